@@ -1,0 +1,63 @@
+//! Two ways to fill a [`DrawPlan`]: [`cpu`] and [`gpu`], with the same stages under the same names:
+//! transform, visibility, shade, lines, resolve.
+//!
+//! Architecture invariant: nothing here knows a mesh or a scene, and the two back-ends do not know each other.
+
+pub mod cpu;
+pub mod gpu;
+pub mod probe;
+mod select;
+
+pub use select::{Backends, Chosen, GpuHost};
+
+use crate::image::Image;
+use crate::limits::{Deadline, Stopped};
+use crate::plan::DrawPlan;
+
+/// Draws plans. A worker owns one; it keeps its buffers from job to job.
+pub trait Renderer {
+    /// Fills the plan's picture.
+    fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError>;
+
+    /// Fills the visibility buffer alone, for tests that compare back-ends sample for sample.
+    ///
+    /// One word a sample at `(y * width + x) * samples + s`: depth bits in the upper half, the complement of the
+    /// triangle id in the lower (so that of equal depths the lowest id wins), 0 where there is nothing.
+    fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError>;
+
+    /// `cpu` or `gpu`.
+    fn kind(&self) -> BackendKind;
+}
+
+/// Which back-end drew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BackendKind {
+    /// Our own rasterizer.
+    Cpu,
+    /// wgpu.
+    Gpu,
+}
+
+impl BackendKind {
+    /// The word used in headers and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cpu => "cpu",
+            Self::Gpu => "gpu",
+        }
+    }
+}
+
+/// Why a picture could not be filled. Never the client's fault, except that its time was up.
+#[derive(Debug, thiserror::Error)]
+pub enum DrawError {
+    /// The job's time was up.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// The device is gone; a fresh one may work.
+    #[error("the GPU was lost: {0}")]
+    DeviceLost(String),
+    /// The device refused the work: out of memory, or a plan beyond its limits.
+    #[error("the GPU cannot draw this: {0}")]
+    Device(String),
+}

@@ -1,0 +1,1 @@
+//! Draws a tiny plan at start and checks its pixels.

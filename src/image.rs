@@ -1,0 +1,42 @@
+//! A finished picture.
+
+/// sRGB colours with straight (not premultiplied) alpha, 8 bits a channel, rows from the top.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Image {
+    /// Pixels in a row.
+    pub width_px: u32,
+    /// Rows.
+    pub height_px: u32,
+    /// `width_px * height_px` times R, G, B, A.
+    pub rgba: Vec<u8>,
+}
+
+impl Image {
+    /// The colour at column `x`, row `y`.
+    pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
+        let i = (y as usize * self.width_px as usize + x as usize) * 4;
+        [self.rgba[i], self.rgba[i + 1], self.rgba[i + 2], self.rgba[i + 3]]
+    }
+
+    /// Whether every pixel is fully opaque, so that an encoder may drop the alpha channel.
+    pub fn is_opaque(&self) -> bool {
+        self.rgba.chunks_exact(4).all(|p| p[3] == 255)
+    }
+}
+
+impl std::fmt::Debug for Image {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Image({}x{})", self.width_px, self.height_px)
+    }
+}
+
+/// File format of the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageFormat {
+    /// Lossless, the default.
+    Png,
+    /// Lossless WebP.
+    Webp,
+    /// Lossy, opaque.
+    Jpeg,
+}

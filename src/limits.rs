@@ -1,0 +1,124 @@
+//! Every cap in one place, and the two things a job spends: bytes ([`Budget`]) and time ([`Deadline`]).
+//!
+//! A client's bytes are never trusted to say how much memory they need: whoever is about to allocate by a count from
+//! the input first spends that many bytes from the job's [`Budget`].
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What a job or a request may use. Defaults are those of the public contract; every one can be configured.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Largest accepted request body, bytes.
+    pub body_bytes: u64,
+    /// Decoded memory one job may hold at once, bytes: meshes, plans, frame buffers.
+    pub memory_bytes: u64,
+    /// Triangles after triangulation and instancing.
+    pub triangles: u64,
+    /// Nodes of a scene graph, counted as often as they are instanced.
+    pub nodes: u64,
+    /// Nesting of JSON objects and arrays.
+    pub json_depth: u64,
+    /// Output image width and height, pixels each.
+    pub image_px: u64,
+    /// Wall-clock time for one job, from acceptance to encoded image, milliseconds.
+    pub job_ms: u64,
+    /// Jobs waiting for each worker. A full queue is refused at once, never waited for.
+    pub queue_per_worker: u64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            body_bytes: 64 << 20,
+            memory_bytes: 2 << 30,
+            triangles: 10_000_000,
+            nodes: 100_000,
+            json_depth: 64,
+            image_px: 4096,
+            job_ms: 30_000,
+            queue_per_worker: 64,
+        }
+    }
+}
+
+/// A cap that the input ran into.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what} is {given}, and the limit is {limit} (raise it with {flag})")]
+pub struct LimitExceeded {
+    /// What was counted, in words: "the number of triangles".
+    pub what: String,
+    /// How much the input wants.
+    pub given: u64,
+    /// How much is allowed.
+    pub limit: u64,
+    /// The `serve` flag that raises the limit.
+    pub flag: &'static str,
+}
+
+/// Refuses a count that is over its cap.
+pub fn check(what: &str, given: u64, limit: u64, flag: &'static str) -> Result<(), LimitExceeded> {
+    if given > limit {
+        return Err(LimitExceeded { what: what.to_owned(), given, limit, flag });
+    }
+    Ok(())
+}
+
+/// Bytes that one job may still allocate. Spend first, allocate after.
+#[derive(Debug)]
+pub struct Budget {
+    spent: u64,
+    limit: u64,
+}
+
+impl Budget {
+    /// A fresh budget of `limits.memory_bytes`.
+    pub fn new(limits: &Limits) -> Self {
+        Self { spent: 0, limit: limits.memory_bytes }
+    }
+
+    /// Takes `count * size_bytes` from the budget for `what`, or refuses.
+    pub fn spend(&mut self, what: &str, count: u64, size_bytes: u64) -> Result<(), LimitExceeded> {
+        let wanted = self.spent.saturating_add(count.saturating_mul(size_bytes));
+        check(&format!("the memory for {what}, in bytes,"), wanted, self.limit, "--limit-memory-bytes")?;
+        self.spent = wanted;
+        Ok(())
+    }
+
+    /// Bytes spent so far.
+    pub fn spent_bytes(&self) -> u64 {
+        self.spent
+    }
+}
+
+/// The job ran out of time or was cancelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the job was stopped before it finished")]
+pub struct Stopped;
+
+/// A flag that whoever keeps the clock raises; the pipeline only looks at it, between stages and inside long loops.
+#[derive(Clone, Debug, Default)]
+pub struct Deadline(Arc<AtomicBool>);
+
+impl Deadline {
+    /// Tells the job to stop at its next check.
+    pub fn stop(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Fails once [`Deadline::stop`] was called.
+    pub fn check(&self) -> Result<(), Stopped> {
+        if self.0.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
+    }
+}
+
+/// Who draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BackendChoice {
+    /// A hardware GPU if there is one, the CPU otherwise.
+    Auto,
+    /// Any GPU, a software Vulkan included.
+    Gpu,
+    /// The CPU rasterizer.
+    Cpu,
+}

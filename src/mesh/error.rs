@@ -1,0 +1,56 @@
+//! Why bytes could not become a mesh.
+
+use crate::limits::{LimitExceeded, Stopped};
+
+/// An import that failed. It is always the input's fault; the detail is safe to show to a client.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{detail}")]
+pub struct MeshError {
+    /// What kind of fault.
+    pub fault: MeshFault,
+    /// One sentence that says what is wrong and where in the file.
+    pub detail: String,
+}
+
+/// The kinds of fault, each with its own status and stable code at the edge of the program.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum MeshFault {
+    /// Not a mesh format that we know.
+    Unrecognised,
+    /// Known format, broken content.
+    Broken,
+    /// Readable, but nothing in it can be drawn.
+    Empty,
+    /// Refers to a file outside the upload, or to one that the upload lacks.
+    OutsideBundle,
+    /// Uses a feature of the format that is not read, and that the file says is required.
+    Unsupported,
+    /// Breaks a limit.
+    Limit(LimitExceeded),
+    /// The job's time was up.
+    Stopped,
+}
+
+impl MeshError {
+    /// The file is of the format but its content is broken.
+    pub fn broken(detail: impl Into<String>) -> Self {
+        Self { fault: MeshFault::Broken, detail: detail.into() }
+    }
+
+    /// An error of the given kind.
+    pub fn new(fault: MeshFault, detail: impl Into<String>) -> Self {
+        Self { fault, detail: detail.into() }
+    }
+}
+
+impl From<LimitExceeded> for MeshError {
+    fn from(limit: LimitExceeded) -> Self {
+        Self { detail: limit.to_string(), fault: MeshFault::Limit(limit) }
+    }
+}
+
+impl From<Stopped> for MeshError {
+    fn from(stopped: Stopped) -> Self {
+        Self { detail: stopped.to_string(), fault: MeshFault::Stopped }
+    }
+}

@@ -1,0 +1,117 @@
+//! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
+//!
+//! Reading order: [`raw`] (what an importer fills), [`import`] (sniffs the format and calls one), [`normalise`] (raw to
+//! `Mesh`), then [`normals`] and [`edges`], which the plan asks for when a look needs them.
+
+mod error;
+mod import;
+pub mod raw;
+
+pub use error::{MeshError, MeshFault};
+pub use import::{Format, import};
+
+/// A triangle mesh in its normal form.
+///
+/// Positions lie in a box of at most 1 unit a side around the origin, in f32. [`Mesh::to_file`] leads back to the file's
+/// own space. Positions are welded: no two are equal, so that indices alone tell which triangles are neighbours.
+/// Attributes (normals, UVs, colours) have their own index, because a file may give one position several normals.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Welded positions in the unit box. Finite.
+    pub positions: Vec<[f32; 3]>,
+    /// Three indices into `positions` a triangle, counter-clockwise seen from the front, no two equal. In file order.
+    pub triangles: Vec<[u32; 3]>,
+    /// A unit normal a triangle, computed in f64 from the file's own positions. Zero where the face has no area.
+    pub face_normals: Vec<[f32; 3]>,
+    /// A polygon edge mask a triangle: bit `i` is set where the edge from corner `i` to corner `i + 1` is an edge of the
+    /// file's polygon, clear where triangulation made it up.
+    pub edge_masks: Vec<u8>,
+    /// Index into `materials` a triangle.
+    pub triangle_materials: Vec<u32>,
+    /// The file's materials; at least one.
+    pub materials: Vec<MaterialSlot>,
+    /// Three indices into the attribute arrays a triangle. Empty where there is no attribute at all.
+    pub attribute_triangles: Vec<[u32; 3]>,
+    /// Unit vertex normals of the file; empty where it has none.
+    pub normals: Vec<[f32; 3]>,
+    /// Texture coordinates; empty where the file has none.
+    pub uvs: Vec<[f32; 2]>,
+    /// Linear RGBA vertex colours; empty where the file has none.
+    pub colors: Vec<[f32; 4]>,
+    /// Bounds of `positions`: minimum and maximum.
+    pub bounds: [[f32; 3]; 2],
+    /// The way back to the file's space.
+    pub to_file: ToFile,
+    /// The axis that points up in the format's convention.
+    pub up: UpAxis,
+    /// What the importer saw, dropped and repaired.
+    pub report: ImportReport,
+}
+
+/// `file = centre + scale * unit`. The scale is a power of two, so going there and back rounds nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToFile {
+    /// Middle of the file's bounding box, in file units.
+    pub centre: [f64; 3],
+    /// File units in a unit of the box.
+    pub scale: f64,
+}
+
+impl Default for ToFile {
+    fn default() -> Self {
+        Self { centre: [0.0; 3], scale: 1.0 }
+    }
+}
+
+/// Which way is up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpAxis {
+    /// +X
+    X,
+    /// -X
+    NegX,
+    /// +Y: glTF and, by custom, OBJ.
+    #[default]
+    Y,
+    /// -Y
+    NegY,
+    /// +Z: STL, by custom.
+    Z,
+    /// -Z
+    NegZ,
+}
+
+/// A material as the file names it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialSlot {
+    /// The asset's own name; empty where it gives none.
+    pub name: String,
+    /// Linear RGBA base colour, where the file gives one.
+    pub base_color: Option<[f32; 4]>,
+}
+
+/// What an importer saw, dropped and repaired. `inspect` prints it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ImportReport {
+    /// Format, as sniffed.
+    pub format: Format,
+    /// Vertices in the file, before welding.
+    pub file_vertices: u64,
+    /// Polygons in the file: `polygons_by_arity[k]` counts those with `k` corners (12 and more share the last place).
+    pub polygons_by_arity: [u64; 13],
+    /// Faces dropped because a corner is NaN or infinite.
+    pub dropped_nonfinite_faces: u64,
+    /// Faces dropped because two corners are the same point or all lie on a line.
+    pub dropped_degenerate_faces: u64,
+    /// Things a user should know; each with a stable code.
+    pub warnings: Vec<Warning>,
+}
+
+/// Something in the file that was read around rather than refused.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// Stable, snake case: `lines_ignored`.
+    pub code: &'static str,
+    /// One sentence.
+    pub detail: String,
+}

@@ -1,0 +1,28 @@
+//! What an importer fills in, before normalisation.
+
+use super::{ImportReport, MaterialSlot, UpAxis};
+
+/// A mesh as the file has it: file units, f64, nothing welded, nothing dropped.
+#[derive(Clone, Debug, Default)]
+pub struct RawMesh {
+    /// Positions in file space, one a vertex. May hold NaN and infinities: normalisation drops the faces that use them.
+    pub positions: Vec<[f64; 3]>,
+    /// Normals, one a vertex, any length; or empty.
+    pub normals: Vec<[f32; 3]>,
+    /// Texture coordinates, one a vertex; or empty.
+    pub uvs: Vec<[f32; 2]>,
+    /// Linear RGBA, one a vertex; or empty.
+    pub colors: Vec<[f32; 4]>,
+    /// Vertex indices; every one is below `positions.len()`: the importer has checked.
+    pub triangles: Vec<[u32; 3]>,
+    /// As [`super::Mesh::edge_masks`], one a triangle.
+    pub edge_masks: Vec<u8>,
+    /// Index into `materials`, one a triangle.
+    pub triangle_materials: Vec<u32>,
+    /// The file's materials; may be empty if every index above is 0.
+    pub materials: Vec<MaterialSlot>,
+    /// The axis that points up.
+    pub up: UpAxis,
+    /// Format, counts and warnings so far.
+    pub report: ImportReport,
+}

@@ -1,0 +1,108 @@
+//! The whole program in one function: bytes -> Mesh -> DrawPlan -> Image -> encoded bytes.
+//!
+//! The command line, the synchronous HTTP handler and the job workers all call [`render`].
+//!
+//! Architecture invariant: nothing from here down reads a clock, a file, the environment, or knows an async runtime.
+
+use crate::backend::{BackendKind, Backends, DrawError};
+use crate::encode::{self, EncodeError};
+use crate::image::ImageFormat;
+use crate::limits::{Budget, Deadline, LimitExceeded, Limits, Stopped};
+use crate::mesh::{self, Format, MeshError};
+use crate::plan::{self, Skip};
+use crate::scene::Spec;
+
+/// What comes in.
+#[derive(Clone, Copy, Debug)]
+pub struct Job<'a> {
+    /// One mesh file.
+    pub mesh: &'a [u8],
+    /// Overrides sniffing.
+    pub format_in: Option<Format>,
+    /// What to draw.
+    pub spec: &'a Spec,
+}
+
+/// What goes out.
+#[derive(Debug)]
+pub struct Output {
+    /// The encoded picture.
+    pub bytes: Vec<u8>,
+    /// Its format.
+    pub format: ImageFormat,
+    /// Who drew it.
+    pub backend: BackendKind,
+    /// What the plan left out, and why.
+    pub skips: Vec<Skip>,
+    /// What the importer noticed.
+    pub warnings: Vec<mesh::Warning>,
+}
+
+/// The stages whose durations a response reports. Each is announced when it ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Bytes to mesh.
+    Parse,
+    /// Mesh and spec to plan.
+    Plan,
+    /// Plan to image.
+    Render,
+    /// Image to bytes.
+    Encode,
+}
+
+/// Why there is no picture, by who is at fault.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The mesh is.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The mesh or the request wants more than is allowed.
+    #[error(transparent)]
+    Limit(#[from] LimitExceeded),
+    /// Nobody: time was up, or the job was cancelled.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// We are: the back-end failed.
+    #[error(transparent)]
+    Draw(DrawError),
+    /// We are: the encoder failed.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+}
+
+/// Turns a mesh into a picture.
+pub fn render(
+    job: Job<'_>,
+    backends: &mut Backends,
+    limits: &Limits,
+    deadline: &Deadline,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Output, RenderError> {
+    let mut budget = Budget::new(limits);
+
+    let mesh = mesh::import(job.mesh, job.format_in, limits, &mut budget, deadline)?;
+    ended(Stage::Parse);
+
+    let plan = plan::build(&mesh, job.spec, &mut budget)?;
+    ended(Stage::Plan);
+
+    let drawn = backends.draw(job.spec.backend, &plan, deadline)?;
+    ended(Stage::Render);
+
+    let format = job.spec.image.format.unwrap_or(ImageFormat::Png);
+    let bytes = encode::encode(&drawn.image, format)?;
+    ended(Stage::Encode);
+
+    let skips = plan.skips;
+    Ok(Output { bytes, format, backend: drawn.backend, skips, warnings: mesh.report.warnings })
+}
+
+impl From<DrawError> for RenderError {
+    fn from(error: DrawError) -> Self {
+        match error {
+            DrawError::Stopped(stopped) => Self::Stopped(stopped),
+            other => Self::Draw(other),
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! What is to be drawn, in the user's terms: a [`Spec`] (looks, camera, light, image) for a mesh.
+//!
+//! [`spec`] holds the request document's meaning after presets and defaults; [`camera`] turns a camera wish and a mesh
+//! into matrices; [`color`] is the one definition of colour.
+
+pub mod camera;
+pub mod color;
+mod spec;
+
+pub use spec::*;
