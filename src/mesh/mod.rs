@@ -4,15 +4,18 @@
 //! `Mesh`), then [`normals`] and [`edges`], which the plan asks for when a look needs them.
 
 mod attributes;
+pub mod edges;
 mod error;
 mod import;
 mod normalise;
+pub mod normals;
 mod obj;
 mod polygon;
 mod pow2;
 pub mod raw;
 mod sniff;
 mod stl;
+pub mod topology;
 
 pub use error::{MeshError, MeshFault};
 pub use import::{Format, import};
