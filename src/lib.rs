@@ -24,4 +24,5 @@ pub mod limits;
 pub mod mesh;
 pub mod pipeline;
 pub mod plan;
+pub mod request;
 pub mod scene;
