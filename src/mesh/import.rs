@@ -1,6 +1,7 @@
 //! Sniffs the format from the bytes and calls its importer.
 
-use super::{Mesh, MeshError, MeshFault};
+use super::normalise::normalise;
+use super::{Mesh, MeshError, MeshFault, obj, sniff, stl};
 use crate::limits::{Budget, Deadline, Limits};
 
 /// The mesh formats that are read.
@@ -19,6 +20,32 @@ pub enum Format {
     StlAscii,
 }
 
+impl Format {
+    /// The names that [`Format::from_name`] knows.
+    pub const NAMES: [&str; 4] = ["obj", "gltf", "glb", "stl"];
+
+    /// From a file extension or a query value. `stl` may be either kind: the importer looks.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name.to_ascii_lowercase().as_str() {
+            "obj" => Some(Self::Obj),
+            "gltf" => Some(Self::Gltf),
+            "glb" => Some(Self::Glb),
+            "stl" => Some(Self::StlBinary),
+            _ => None,
+        }
+    }
+
+    /// The format's usual file extension.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Obj => "obj",
+            Self::Gltf => "gltf",
+            Self::Glb => "glb",
+            Self::StlBinary | Self::StlAscii => "stl",
+        }
+    }
+}
+
 /// Reads a mesh from the bytes of one file. `format` overrides sniffing.
 pub fn import(
     bytes: &[u8],
@@ -27,6 +54,40 @@ pub fn import(
     budget: &mut Budget,
     deadline: &Deadline,
 ) -> Result<Mesh, MeshError> {
-    let _ = (bytes, format, limits, budget, deadline);
-    Err(MeshError::new(MeshFault::Unrecognised, "not a mesh"))
+    if bytes.is_empty() {
+        return Err(MeshError::new(
+            MeshFault::Unrecognised,
+            "the body is empty: send the bytes of a mesh file (OBJ, STL, glTF or GLB)",
+        ));
+    }
+    let format = match format {
+        Some(format) => format,
+        None => sniff::sniff(bytes)?,
+    };
+    let mut cx = Context { limits, budget, deadline };
+    let raw = match format {
+        Format::Obj => obj::read(bytes, &mut cx)?,
+        Format::StlBinary | Format::StlAscii => stl::read(bytes, &mut cx)?,
+        Format::Gltf | Format::Glb => {
+            return Err(MeshError::new(MeshFault::Unsupported, "glTF is not read yet: convert it to OBJ or STL"));
+        }
+    };
+    normalise(raw, &mut cx)
+}
+
+/// What every importer is given beside the bytes.
+pub struct Context<'a> {
+    /// The caps.
+    pub limits: &'a Limits,
+    /// Bytes that may still be allocated.
+    pub budget: &'a mut Budget,
+    /// Looked at inside long loops.
+    pub deadline: &'a Deadline,
+}
+
+impl Context<'_> {
+    /// Refuses more triangles than the limit allows.
+    pub fn check_triangles(&self, count: u64) -> Result<(), MeshError> {
+        Ok(crate::limits::check("the number of triangles", count, self.limits.triangles, "--limit-triangles")?)
+    }
 }

@@ -3,9 +3,16 @@
 //! Reading order: [`raw`] (what an importer fills), [`import`] (sniffs the format and calls one), [`normalise`] (raw to
 //! `Mesh`), then [`normals`] and [`edges`], which the plan asks for when a look needs them.
 
+mod attributes;
 mod error;
 mod import;
+mod normalise;
+mod obj;
+mod polygon;
+mod pow2;
 pub mod raw;
+mod sniff;
+mod stl;
 
 pub use error::{MeshError, MeshFault};
 pub use import::{Format, import};

@@ -4,7 +4,6 @@
 //! each omission is written down in [`DrawPlan::skips`].
 
 mod build;
-mod outline;
 
 pub use build::build;
 
@@ -94,6 +93,10 @@ pub struct SurfacePass<'a> {
     pub intensity: f32,
     /// Ambient share, 0 to 1.
     pub ambient: f32,
+    /// Unit vector towards the headlight, unit-box axes.
+    pub to_light: [f32; 3],
+    /// Unit vector halfway between the light and the viewer: the normal that shines most.
+    pub halfway: [f32; 3],
     /// Wires drawn in the same breath as the surface, from barycentrics.
     pub fwidth: Option<FwidthWire<'a>>,
 }
@@ -187,6 +190,18 @@ pub struct Skip {
     /// Why: "flat shading reads face normals".
     pub why: &'static str,
 }
+
+/// Coverage in 1/1023 to ink: `-4096 log2(1 - c)`, so that the ink of lines that cross adds up as if they were independent,
+/// in integers, whatever the order. Full coverage is 24 halvings.
+pub fn ink_table() -> [u32; 1024] {
+    std::array::from_fn(|q| match q {
+        1023 => INK_FULL,
+        _ => libm::round(-4096.0 * libm::log2(1.0 - q as f64 / 1023.0)) as u32,
+    })
+}
+
+/// Ink of full coverage.
+pub const INK_FULL: u32 = 24 * 4096;
 
 /// Sample positions inside a pixel, in 1/16 pixel from its upper left corner: the standard rotated grid for 4.
 pub fn sample_offsets(samples: u32) -> &'static [[i32; 2]] {

@@ -1,1 +1,227 @@
-//! Camera.
+//! A camera wish and a mesh to screen rows, in f64.
+//!
+//! Fitting is exact: the frame touches the projected mesh itself, not its bounding sphere. For a plane of the view pyramid
+//! with slope t, a vertex (x, y, z) in camera axes (z towards the viewer) asks for `x + t z <= t d + cx`; the largest
+//! left-hand side on each of the four planes gives distance and centre in closed form.
+
+use glam::{DVec2, DVec3};
+
+use super::{CameraSpec, Projection as Kind, View};
+use crate::mesh::{Mesh, UpAxis};
+
+/// A placed camera. Lengths in units of the mesh's box.
+#[derive(Clone, Copy, Debug)]
+pub struct Camera {
+    /// Picture right, picture up, towards the viewer: unit vectors, right-handed.
+    pub axes: [DVec3; 3],
+    /// Where the view's axis crosses the plane z = 0 of the camera's axes.
+    pub center: DVec2,
+    /// Distance of the eye from that plane, along the view's axis.
+    pub distance: f64,
+    /// Half the picture's width and height: at distance 1 in perspective, everywhere in an orthographic view.
+    pub half_size: DVec2,
+    /// Perspective or orthographic.
+    pub kind: Kind,
+    /// Smallest distance from the eye that is drawn.
+    pub near: f64,
+    /// Distance from the eye of the farthest point of the mesh.
+    pub far: f64,
+    /// Whether all of the mesh lies safely between `near` and the guard band.
+    pub contains_mesh: bool,
+}
+
+/// What a picture adds around the mesh.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Border {
+    /// Growth of the mesh itself, units of the box.
+    pub grow: f64,
+    /// Pixels on each side.
+    pub px: f64,
+}
+
+impl Camera {
+    /// Places the camera for a picture of `size_px`.
+    pub fn place(spec: &CameraSpec, mesh: &Mesh, size_px: [u32; 2], border: Border) -> Self {
+        let size = DVec2::new(f64::from(size_px[0]), f64::from(size_px[1]));
+        let up = spec.up.unwrap_or(mesh.up);
+        let free = |v: f64| (1.0 - 2.0 * spec.margin - 2.0 * border.px / v).max(0.05);
+        let inner = DVec2::new(free(size.x), free(size.y));
+        let aspect = size.x / size.y;
+        let tan = tan_deg(spec.fov_deg * 0.5);
+        let tangents = DVec2::new(tan * aspect, tan);
+        let (axes, explicit) = match (spec.eye, spec.target) {
+            (Some(eye), Some(target)) => explicit_axes(mesh, up, eye, target),
+            _ => (named_axes(spec, up), None),
+        };
+        let extents = Extents::new(mesh, axes);
+        let mut camera = match (spec.projection, explicit) {
+            (Kind::Perspective, Some((target, distance))) => {
+                let to = DVec2::new(axes[0].dot(target), axes[1].dot(target));
+                Self::new(axes, to, axes[2].dot(target) + distance, tangents, Kind::Perspective)
+            }
+            (Kind::Perspective, None) => {
+                let (center, distance) = fit_perspective(mesh, axes, tangents * inner, border.grow);
+                Self::new(axes, center, distance, tangents, Kind::Perspective)
+            }
+            (Kind::Orthographic, _) => {
+                let center = explicit.map_or(extents.center(), |(t, _)| DVec2::new(axes[0].dot(t), axes[1].dot(t)));
+                let fitted = ((extents.half() + border.grow) / inner / DVec2::new(aspect, 1.0)).max_element();
+                let half = spec.height.map_or(fitted, |h| 0.5 * h / mesh.to_file.scale);
+                let half = if half > 0.0 { half } else { 1e-3 };
+                Self::new(axes, center, extents.high.z + 1.0, DVec2::new(half * aspect, half), Kind::Orthographic)
+            }
+        };
+        camera.set_range(&extents, border.grow, size);
+        camera
+    }
+
+    fn new(axes: [DVec3; 3], center: DVec2, distance: f64, half_size: DVec2, kind: Kind) -> Self {
+        Self { axes, center, distance, half_size, kind, near: 0.0, far: 0.0, contains_mesh: false }
+    }
+
+    fn set_range(&mut self, extents: &Extents, grow: f64, size_px: DVec2) {
+        let nearest = self.distance - extents.high.z - grow;
+        let farthest = self.distance - extents.low.z + grow;
+        // Behind or around the eye: a millionth of what is in front is close enough.
+        self.near = if nearest > 0.0 { 0.5 * nearest } else { 1e-6 * farthest.max(1e-6) };
+        self.far = farthest.max(2.0 * self.near) * (1.0 + 1e-6);
+        let reach = (extents.high - self.center.extend(0.0)).abs().max((extents.low - self.center.extend(0.0)).abs());
+        let w = if self.kind == Kind::Perspective { nearest } else { 1.0 };
+        let px = (DVec2::new(reach.x, reach.y) + grow) / (self.half_size * w) * size_px * 0.5;
+        // Half of the guard band: hulls of constant pixel width still find room.
+        self.contains_mesh = nearest > 0.0 && px.max_element() < 2048.0;
+    }
+
+    /// The four rows of [`crate::plan::Projection`]: x, y (in 1/256 px from the centre), reversed depth, W.
+    pub fn rows(&self, size_px: [u32; 2]) -> [[f32; 4]; 4] {
+        let [right, up, back] = self.axes;
+        let perspective = self.kind == Kind::Perspective;
+        let unit = DVec2::new(f64::from(size_px[0]), f64::from(size_px[1])) * 128.0 / self.half_size;
+        let row = |axis: DVec3, offset: f64| [axis.x as f32, axis.y as f32, axis.z as f32, offset as f32];
+        let w = if perspective { row(-back, self.distance) } else { [0.0, 0.0, 0.0, 1.0] };
+        // z = near (far - W) / (W (far - near)): 1 at the near plane, 0 at the far one. Written with far - W as one row,
+        // which does not cancel however narrow the field of view is.
+        let range = self.far - self.near;
+        let scale = if perspective { self.near / range } else { 1.0 / range };
+        [
+            row(right * unit.x, -self.center.x * unit.x),
+            row(-up * unit.y, self.center.y * unit.y),
+            row(back * scale, (self.far - self.distance) * scale),
+            w,
+        ]
+    }
+}
+
+/// Bounds of the mesh in camera axes.
+struct Extents {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Extents {
+    fn new(mesh: &Mesh, axes: [DVec3; 3]) -> Self {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for p in positions(mesh, axes) {
+            low = low.min(p);
+            high = high.max(p);
+        }
+        if mesh.positions.is_empty() { Self { low: DVec3::ZERO, high: DVec3::ZERO } } else { Self { low, high } }
+    }
+
+    fn center(&self) -> DVec2 {
+        ((self.low + self.high) * 0.5).truncate()
+    }
+
+    fn half(&self) -> DVec2 {
+        ((self.high - self.low) * 0.5).truncate()
+    }
+}
+
+fn positions(mesh: &Mesh, axes: [DVec3; 3]) -> impl Iterator<Item = DVec3> {
+    mesh.positions.iter().map(move |p| {
+        let p = DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
+        DVec3::new(axes[0].dot(p), axes[1].dot(p), axes[2].dot(p))
+    })
+}
+
+/// Centre and distance at which the mesh, grown by `grow`, touches the pyramid of these slopes.
+fn fit_perspective(mesh: &Mesh, axes: [DVec3; 3], slopes: DVec2, grow: f64) -> (DVec2, f64) {
+    let (mut plus, mut minus, mut nearest) = (DVec2::NEG_INFINITY, DVec2::NEG_INFINITY, f64::NEG_INFINITY);
+    for p in positions(mesh, axes) {
+        let across = p.truncate();
+        plus = plus.max(across + slopes * p.z);
+        minus = minus.max(slopes * p.z - across);
+        nearest = nearest.max(p.z);
+    }
+    if mesh.positions.is_empty() {
+        return (DVec2::ZERO, 1.0);
+    }
+    let lean = DVec2::new((1.0 + slopes.x * slopes.x).sqrt(), (1.0 + slopes.y * slopes.y).sqrt()) * grow;
+    let distance = ((plus + minus + 2.0 * lean) / (2.0 * slopes)).max_element();
+    // A mesh seen as a point or a line asks for no distance at all, and a very wide view for hardly any.
+    ((plus - minus) * 0.5, distance.max(nearest + grow + 1e-3))
+}
+
+type Explicit = Option<(DVec3, f64)>;
+
+/// Axes for an explicit eye and target (file space); the target in box units and its distance from the eye.
+fn explicit_axes(mesh: &Mesh, up: UpAxis, eye: [f64; 3], target: [f64; 3]) -> ([DVec3; 3], Explicit) {
+    let local = |p: [f64; 3]| (DVec3::from(p) - DVec3::from(mesh.to_file.centre)) / mesh.to_file.scale;
+    let (eye, target) = (local(eye), local(target));
+    let [right, up, front] = frame(up);
+    let back = (eye - target).try_normalize().unwrap_or(front);
+    // Looking straight up or down, the picture's right stays the model's right.
+    let side = up.cross(back).try_normalize().unwrap_or(right);
+    ([side, back.cross(side), back], Some((target, (eye - target).length())))
+}
+
+fn named_axes(spec: &CameraSpec, up: UpAxis) -> [DVec3; 3] {
+    let (azimuth, elevation) = match spec.view {
+        View::Iso => (45.0, 30.0),
+        View::Front => (0.0, 0.0),
+        View::Back => (180.0, 0.0),
+        View::Left => (-90.0, 0.0),
+        View::Right => (90.0, 0.0),
+        View::Top => (0.0, 90.0),
+        View::Bottom => (0.0, -90.0),
+    };
+    let (sin_a, cos_a) = sin_cos_deg(spec.azimuth_deg.unwrap_or(azimuth));
+    let (sin_e, cos_e) = sin_cos_deg(spec.elevation_deg.unwrap_or(elevation));
+    let [right, up, front] = frame(up);
+    let back = (right * sin_a + front * cos_a) * cos_e + up * sin_e;
+    let side = right * cos_a - front * sin_a;
+    [side, back.cross(side), back]
+}
+
+/// Model right, up and front for an up axis: right-handed, and as the formats' conventions have it (glTF: +Y up, +Z
+/// front; STL: +Z up, -Y front).
+fn frame(up: UpAxis) -> [DVec3; 3] {
+    let (right, up) = match up {
+        UpAxis::Y => (DVec3::X, DVec3::Y),
+        UpAxis::NegY => (DVec3::X, DVec3::NEG_Y),
+        UpAxis::Z => (DVec3::X, DVec3::Z),
+        UpAxis::NegZ => (DVec3::X, DVec3::NEG_Z),
+        UpAxis::X => (DVec3::NEG_Y, DVec3::X),
+        UpAxis::NegX => (DVec3::Y, DVec3::NEG_X),
+    };
+    [right, up, right.cross(up)]
+}
+
+/// Sine and cosine of degrees, exact at quarter turns.
+fn sin_cos_deg(degrees: f64) -> (f64, f64) {
+    let turns = degrees / 90.0;
+    if turns == libm::rint(turns) {
+        return match libm::rint(turns).rem_euclid(4.0) as i32 {
+            0 => (0.0, 1.0),
+            1 => (1.0, 0.0),
+            2 => (0.0, -1.0),
+            _ => (-1.0, 0.0),
+        };
+    }
+    let radians = degrees.to_radians();
+    (libm::sin(radians), libm::cos(radians))
+}
+
+fn tan_deg(degrees: f64) -> f64 {
+    libm::tan(degrees.to_radians())
+}

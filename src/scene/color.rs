@@ -1,5 +1,7 @@
 //! Colour: sRGB in documents and files, linear light everywhere between.
 
+use crate::image::srgb_to_linear;
+
 /// A linear-light colour with straight alpha.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rgba(pub [f32; 4]);
@@ -45,17 +47,6 @@ impl Rgba {
     }
 }
 
-/// The sRGB transfer function, encoded 0..1 to linear 0..1 (IEC 61966-2-1).
-pub fn srgb_to_linear(v: f64) -> f64 {
-    if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
-}
-
-/// `thresholds[k]` is the smallest linear value that is stored as `k + 1` or more: rounding to the nearest of 256 sRGB
-/// levels, as a table that both back-ends search, so that both store the same byte.
-pub fn srgb8_thresholds() -> [f32; 255] {
-    std::array::from_fn(|k| srgb_to_linear((k as f64 + 0.5) / 255.0) as f32)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -67,15 +58,6 @@ mod tests {
         assert_eq!(Rgba::parse("#f00"), Rgba::parse("#ff0000"));
         for bad in ["", "#", "#ff", "#fffff", "#ggg", "white", "#é12"] {
             assert_eq!(Rgba::parse(bad), None, "{bad}");
-        }
-    }
-
-    #[test]
-    fn thresholds_invert_the_transfer_function() {
-        let thresholds = srgb8_thresholds();
-        for level in 0..=255_u8 {
-            let linear = Rgba::from_srgb8([level; 4]).0[0];
-            assert_eq!(thresholds.partition_point(|&t| t <= linear), level as usize);
         }
     }
 }

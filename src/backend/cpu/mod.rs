@@ -1,35 +1,169 @@
 //! The CPU rasterizer: the reference for bytes.
+//!
+//! Stages, each a file: [`transform`] (with [`clip`] where needed), [`visibility`], [`shade`], [`lines`], [`resolve`]. The picture is cut
+//! into bands of rows that fit a core's cache; threads take bands, and nothing a band draws depends on another.
 
+mod bands;
+mod clip;
+mod isa;
+mod lines;
+mod resolve;
+mod shade;
+mod transform;
+mod visibility;
+
+pub use isa::Isa;
+
+use rayon::prelude::*;
+
+use self::bands::{BandScratch, Bins};
+use self::resolve::SrgbEncoder;
+use self::transform::ScreenVertex;
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::Image;
 use crate::limits::Deadline;
-use crate::plan::DrawPlan;
+use crate::plan::{DrawPlan, ink_table};
 
-/// Draws on the CPU.
+/// Vertices or triangles handed to a thread at a time.
+const CHUNK: usize = 8192;
+
+/// Draws on the CPU. Keeps its buffers from picture to picture.
 pub struct CpuRenderer {
-    threads: usize,
+    isa: Isa,
+    pool: Option<rayon::ThreadPool>,
+    vertices: Vec<ScreenVertex>,
+    hull_vertices: Vec<ScreenVertex>,
+    scratch: bands::ScratchPool,
+    srgb: std::sync::Arc<SrgbEncoder>,
+    ink_table: [u32; 1024],
+}
+
+/// What every stage reads: the plan and the vertices on screen.
+pub struct Stages<'a> {
+    plan: &'a DrawPlan<'a>,
+    vertices: &'a [ScreenVertex],
+    hull_vertices: &'a [ScreenVertex],
+    ink_table: &'a [u32; 1024],
 }
 
 impl CpuRenderer {
     /// A renderer that uses up to `threads` threads. Its pictures do not depend on how many.
     pub fn new(threads: usize) -> Self {
-        Self { threads: threads.max(1) }
+        Self::with_isa(threads, Isa::detect())
+    }
+
+    /// As [`CpuRenderer::new`] on a given instruction set, for tests that compare them.
+    pub fn with_isa(threads: usize, isa: Isa) -> Self {
+        // One thread needs no pool; and if the system gives no threads, one is what there is.
+        let build = || rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("raster-{i}"));
+        let pool = if threads > 1 { build().build().ok() } else { None };
+        Self {
+            isa,
+            pool,
+            vertices: Vec::new(),
+            hull_vertices: Vec::new(),
+            scratch: bands::ScratchPool::default(),
+            srgb: std::sync::Arc::new(SrgbEncoder::new()),
+            ink_table: ink_table(),
+        }
+    }
+
+    /// Transforms the plan's vertices; afterwards [`Stages`] can be made.
+    fn transform(&mut self, plan: &DrawPlan<'_>) {
+        let isa = self.isa;
+        let pool = self.pool.as_ref();
+        self.vertices.resize(plan.positions.len(), ScreenVertex::default());
+        let chunks = plan.positions.chunks(CHUNK).zip(self.vertices.chunks_mut(CHUNK)).collect();
+        run(pool, chunks, |(positions, out)| transform::transform(isa, &plan.projection, positions, out));
+
+        self.hull_vertices.clear();
+        if let Some(hull) = &plan.hull {
+            self.hull_vertices.resize(plan.positions.len(), ScreenVertex::default());
+            let chunks = self.hull_vertices.chunks_mut(CHUNK).enumerate().collect();
+            run(pool, chunks, |(i, out)| {
+                transform::transform_hull(&plan.projection, hull, plan.positions, i * CHUNK, out);
+            });
+        }
+    }
+
+    fn stages<'a>(&'a self, plan: &'a DrawPlan<'a>) -> Stages<'a> {
+        Stages { plan, vertices: &self.vertices, hull_vertices: &self.hull_vertices, ink_table: &self.ink_table }
+    }
+
+    /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside it.
+    fn draw_bands<T: Send>(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        deadline: &Deadline,
+        out: &mut [T],
+        each: impl Fn(&Stages<'_>, &mut BandScratch, &Bins, usize, &mut [T]) + Sync + Send,
+    ) -> Result<(), DrawError> {
+        deadline.check()?;
+        self.transform(plan);
+        let stages = self.stages(plan);
+        let rows = bands::rows_per_band(plan);
+        let bins = bands::bin(&stages, self.pool.as_ref(), rows, deadline)?;
+        let row_len = out.len() / plan.height_px as usize;
+        let items = out.chunks_mut(row_len * rows as usize).enumerate().collect();
+        run(self.pool.as_ref(), items, |(band, out)| {
+            if deadline.check().is_ok() {
+                self.scratch.with(plan, rows, |scratch| each(&stages, scratch, &bins, band, out));
+            }
+        });
+        Ok(deadline.check()?)
+    }
+}
+
+impl Stages<'_> {
+    /// The vertex indices of an id, and whether it is a hull triangle.
+    #[inline(always)]
+    fn triangle(&self, id: u32) -> ([u32; 3], bool) {
+        let count = self.plan.triangles.len() as u32;
+        if id < count {
+            (self.plan.triangles[id as usize], false)
+        } else {
+            (self.plan.triangles[(id - count) as usize], true)
+        }
+    }
+
+    /// The vertices of an id on screen.
+    #[inline(always)]
+    fn screen_triangle(&self, id: u32) -> [ScreenVertex; 3] {
+        let (triangle, is_hull) = self.triangle(id);
+        let vertices = if is_hull { self.hull_vertices } else { self.vertices };
+        triangle.map(|v| vertices[v as usize])
     }
 }
 
 impl Renderer for CpuRenderer {
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
-        deadline.check()?;
-        let _ = self.threads;
-        let rgba = vec![0; plan.width_px as usize * plan.height_px as usize * 4];
+        let mut rgba = vec![0_u8; plan.width_px as usize * plan.height_px as usize * 4];
+        let isa = self.isa;
+        let srgb = self.srgb.clone();
+        self.draw_bands(plan, deadline, &mut rgba, |stages, scratch, bins, band, out| {
+            bands::draw(isa, stages, scratch, bins, band, &srgb, out);
+        })?;
         Ok(Image { width_px: plan.width_px, height_px: plan.height_px, rgba })
     }
 
-    fn draw_visibility(&mut self, _plan: &DrawPlan<'_>, _deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
-        Ok(Vec::new())
+    fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
+        let mut words = vec![0_u64; plan.width_px as usize * plan.height_px as usize * plan.samples as usize];
+        let isa = self.isa;
+        self.draw_bands(plan, deadline, &mut words, |stages, scratch, bins, band, out| {
+            bands::draw_visibility(isa, stages, scratch, bins, band, out);
+        })?;
+        Ok(words)
     }
 
     fn kind(&self) -> BackendKind {
         BackendKind::Cpu
+    }
+}
+
+/// Runs `each` over the items, on the pool if there is one.
+fn run<T: Send>(pool: Option<&rayon::ThreadPool>, items: Vec<T>, each: impl Fn(T) + Sync + Send) {
+    match pool {
+        Some(pool) => pool.install(|| items.into_par_iter().for_each(each)),
+        None => items.into_iter().for_each(each),
     }
 }

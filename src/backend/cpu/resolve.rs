@@ -1,0 +1,73 @@
+//! Stage 5, a pixel: surface over background, ink over both, to sRGB bytes. Twin of `shaders/resolve.wgsl`.
+
+use crate::image::srgb8_thresholds;
+use crate::plan::{DrawPlan, INK_FULL};
+
+/// Linear light to sRGB bytes by the 255 thresholds, with a first guess from a small table.
+pub struct SrgbEncoder {
+    thresholds: [f32; 256],
+    /// Largest byte whose threshold is not above `i / 4096`.
+    guess: Vec<u8>,
+}
+
+impl SrgbEncoder {
+    /// Builds the tables.
+    pub fn new() -> Self {
+        let mut thresholds = [f32::INFINITY; 256];
+        thresholds[..255].copy_from_slice(&srgb8_thresholds());
+        let below = |v: f32| thresholds.partition_point(|&t| t <= v) as u8;
+        let guess = (0..4096).map(|i| below(i as f32 / 4096.0)).collect();
+        Self { thresholds, guess }
+    }
+
+    /// The byte for a linear value; out of range is clamped, NaN is 0.
+    #[inline(always)]
+    pub fn encode(&self, v: f32) -> u8 {
+        let v = if v > 0.0 { v.min(1.0) } else { 0.0 };
+        let mut byte = self.guess[((v * 4096.0) as usize).min(4095)];
+        while byte < 255 && self.thresholds[byte as usize] <= v {
+            byte += 1;
+        }
+        byte
+    }
+}
+
+/// Resolves a band into `rgba`.
+#[inline(always)]
+pub fn resolve(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], ink: Option<&[u32]>, rgba: &mut [u8]) {
+    let line_color = plan.lines.as_ref().map_or([0.0; 4], |lines| lines.color);
+    let mut last = ([f32::NAN; 4], [0; 4]);
+    for (i, (color, out)) in colors.iter().zip(rgba.chunks_exact_mut(4)).enumerate() {
+        let mut c: [f32; 4] = std::array::from_fn(|k| color[k] + plan.background[k] * (1.0 - color[3]));
+        if let Some(ink) = ink
+            && ink[i] > 0
+        {
+            let cover = coverage(ink[i]);
+            c = std::array::from_fn(|k| cover * line_color[k] + c[k] * (1.0 - cover * line_color[3]));
+        }
+        // Neighbours are often the same colour to the bit: flat faces, background.
+        if c != last.0 {
+            last = (c, encode(srgb, c));
+        }
+        out.copy_from_slice(&last.1);
+    }
+}
+
+/// Ink back to coverage, 0 to 1.
+fn coverage(ink: u32) -> f32 {
+    if ink >= INK_FULL { 1.0 } else { 1.0 - libm::exp2f(ink as f32 * (-1.0 / 4096.0)) }
+}
+
+#[inline(always)]
+fn encode(srgb: &SrgbEncoder, c: [f32; 4]) -> [u8; 4] {
+    let alpha = c[3];
+    if alpha >= 1.0 {
+        return [srgb.encode(c[0]), srgb.encode(c[1]), srgb.encode(c[2]), 255];
+    }
+    if alpha <= 0.0 {
+        return [0; 4];
+    }
+    let inverse = 1.0 / alpha;
+    let a = (alpha * 255.0 + 0.5) as u8;
+    [srgb.encode(c[0] * inverse), srgb.encode(c[1] * inverse), srgb.encode(c[2] * inverse), a]
+}

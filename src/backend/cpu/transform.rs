@@ -1,0 +1,183 @@
+//! Stage 1, a vertex: unit box to snapped screen coordinates. Twin of `shaders/transform.wgsl`.
+//!
+//! Bit-exact on every machine and on both back-ends: only `+ - *`, each rounded by itself (ARCHITECTURE.md, "Rounded
+//! operations").
+
+use super::isa::{LANES, dispatch};
+use crate::plan::{HullOffset, HullPass, Projection};
+
+/// Farthest a snapped coordinate may lie from the picture's centre, in 1/256 px: 4096 px.
+pub const GUARD: f32 = 1_048_576.0;
+
+/// A vertex on screen.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ScreenVertex {
+    /// 1/256 px right of the picture's centre, or [`OUTSIDE`].
+    pub x: i32,
+    /// 1/256 px below the centre.
+    pub y: i32,
+    /// Reversed depth.
+    pub z: f32,
+    /// 1 / W.
+    pub inv_w: f32,
+}
+
+/// `x` of a vertex that is behind the near plane or beyond the guard band.
+pub const OUTSIDE: i32 = i32::MIN;
+
+impl ScreenVertex {
+    /// Whether the vertex cannot be drawn without clipping.
+    #[inline(always)]
+    pub fn is_outside(&self) -> bool {
+        self.x == OUTSIDE
+    }
+}
+
+/// `1 / w` for positive normal `w`, the same bits everywhere: Newton's iteration from an integer guess.
+#[inline(always)]
+pub fn recip(w: f32) -> f32 {
+    let mut r = f32::from_bits(0x7EF3_11C7_u32.wrapping_sub(w.to_bits()));
+    for _ in 0..4 {
+        r *= 2.0 - w * r;
+    }
+    r
+}
+
+/// `1 / sqrt(v)` for positive normal `v`, the same bits everywhere.
+#[inline(always)]
+pub fn rsqrt(v: f32) -> f32 {
+    let mut r = f32::from_bits(0x5F37_59DF_u32.wrapping_sub(v.to_bits() >> 1));
+    for _ in 0..4 {
+        r *= 1.5 - (0.5 * v) * r * r;
+    }
+    r
+}
+
+/// To the nearest integer, ties to even, for |v| < 2^22: adding 1.5 * 2^23 leaves the integer in the low bits.
+#[inline(always)]
+pub fn round_to_i32(v: f32) -> i32 {
+    ((v + 12_582_912.0).to_bits() as i32).wrapping_sub(0x4B40_0000)
+}
+
+/// `row . (p, 1)`.
+#[inline(always)]
+pub fn row_dot(row: &[f32; 4], p: [f32; 3]) -> f32 {
+    ((row[0] * p[0] + row[1] * p[1]) + row[2] * p[2]) + row[3]
+}
+
+/// `row . (n, 0)`.
+#[inline(always)]
+fn row_dot3(row: &[f32; 4], n: [f32; 3]) -> f32 {
+    (row[0] * n[0] + row[1] * n[1]) + row[2] * n[2]
+}
+
+/// Homogeneous screen position: X, Y, Z, W.
+#[inline(always)]
+pub fn homogeneous(projection: &Projection, p: [f32; 3]) -> [f32; 4] {
+    [row_dot(&projection.x, p), row_dot(&projection.y, p), row_dot(&projection.z, p), row_dot(&projection.w, p)]
+}
+
+/// Where a hull vertex stands in the unit box: pushed out already if the push is in object units.
+#[inline(always)]
+pub fn hull_position(hull: &HullPass<'_>, position: [f32; 3], vertex: usize) -> [f32; 3] {
+    match hull.offset {
+        HullOffset::Object(t) => {
+            let n = hull.normals[vertex];
+            [position[0] + t * n[0], position[1] + t * n[1], position[2] + t * n[2]]
+        }
+        HullOffset::Px(_) => position,
+    }
+}
+
+dispatch! {
+    /// Transforms `positions` into `out`, of the same length.
+    pub fn transform(projection: &Projection, positions: &[[f32; 3]], out: &mut [ScreenVertex]) = transform_lanes
+}
+
+/// Transforms hull vertices: `out[i]` is position `first + i`, pushed out.
+pub fn transform_hull(
+    projection: &Projection,
+    hull: &HullPass<'_>,
+    positions: &[[f32; 3]],
+    first: usize,
+    out: &mut [ScreenVertex],
+) {
+    for (i, slot) in out.iter_mut().enumerate() {
+        let vertex = first + i;
+        let position = hull_position(hull, positions[vertex], vertex);
+        let push = match hull.offset {
+            HullOffset::Object(_) => None,
+            HullOffset::Px(px) => Some((hull.normals[vertex], 256.0 * px)),
+        };
+        *slot = transform_one(projection, position, push);
+    }
+}
+
+#[inline(always)]
+fn transform_lanes(projection: &Projection, positions: &[[f32; 3]], out: &mut [ScreenVertex]) {
+    let mut groups = positions.chunks_exact(LANES);
+    let mut outs = out.chunks_exact_mut(LANES);
+    for (group, slots) in (&mut groups).zip(&mut outs) {
+        // Vertex by vertex inside a fixed-size loop: the compiler turns this into one vector a component.
+        let mut records = [ScreenVertex::default(); LANES];
+        for lane in 0..LANES {
+            records[lane] = transform_one(projection, group[lane], None);
+        }
+        slots.copy_from_slice(&records);
+    }
+    for (position, slot) in groups.remainder().iter().zip(outs.into_remainder()) {
+        *slot = transform_one(projection, *position, None);
+    }
+}
+
+#[inline(always)]
+fn transform_one(projection: &Projection, p: [f32; 3], push: Option<([f32; 3], f32)>) -> ScreenVertex {
+    let [x, y, z, w] = homogeneous(projection, p);
+    let r = recip(w);
+    let (mut sx, mut sy) = (x * r, y * r);
+    if let Some((normal, units)) = push {
+        // The direction in which the projected point moves along the normal: d(X/W) = (dX - (X/W) dW) / W.
+        let dw = row_dot3(&projection.w, normal);
+        let dx = row_dot3(&projection.x, normal) - sx * dw;
+        let dy = row_dot3(&projection.y, normal) - sy * dw;
+        let length_squared = dx * dx + dy * dy;
+        if length_squared >= 1e-20 {
+            let q = rsqrt(length_squared);
+            sx += units * (dx * q);
+            sy += units * (dy * q);
+        }
+    }
+    // One test with non-short-circuiting ands; NaN compares false and lands outside.
+    let inside = (w >= projection.near_w) & (sx.abs() <= GUARD) & (sy.abs() <= GUARD);
+    if inside {
+        ScreenVertex { x: round_to_i32(sx), y: round_to_i32(sy), z: z * r, inv_w: r }
+    } else {
+        ScreenVertex { x: OUTSIDE, y: 0, z: 0.0, inv_w: 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn recip_and_rsqrt_are_within_two_ulp() {
+        let mut cases = 0;
+        for i in 0..100_000_u32 {
+            let v = f32::from_bits(0x2000_0000 + i * 10_007 % 0x3F00_0000);
+            let (r, s) = (f64::from(recip(v)), f64::from(rsqrt(v)));
+            assert!((r * f64::from(v) - 1.0).abs() < 2.4e-7, "recip({v})");
+            assert!((s * s * f64::from(v) - 1.0).abs() < 6e-7, "rsqrt({v})");
+            cases += 1;
+        }
+        assert_eq!(cases, 100_000);
+    }
+
+    #[test]
+    fn rounds_to_nearest_even() {
+        for (v, want) in [(0.0, 0), (0.5, 0), (1.5, 2), (-0.5, 0), (-1.5, -2), (-2.6, -3), (1_048_575.5, 1_048_576)] {
+            assert_eq!(round_to_i32(v), want, "{v}");
+        }
+    }
+}

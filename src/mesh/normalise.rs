@@ -1,0 +1,245 @@
+//! [`RawMesh`] to [`Mesh`]: the one place where conversions from f64, the policy on NaN, and welding live.
+//!
+//! Everything up to the unit box scales by powers of two alone, so that a file scaled by a power of two gives the same mesh.
+
+use super::attributes::{self, Attributes};
+use super::import::Context;
+use super::pow2::{Pow2, exponent, is_usable, max_abs};
+use super::raw::RawMesh;
+use super::{ImportReport, MaterialSlot, Mesh, MeshError, MeshFault, ToFile};
+use rapidhash::RapidHashMap;
+
+/// Brings an imported mesh into its final form.
+pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshError> {
+    cx.check_triangles(raw.triangles.len() as u64)?;
+    cx.budget.spend("the triangles", raw.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
+    cx.budget.spend("the welded vertices", raw.positions.len() as u64, BYTES_PER_VERTEX)?;
+
+    let file_exponent = scale_down(&mut raw);
+    let faces = pick_faces(&mut raw);
+    cx.deadline.check()?;
+    if faces.is_empty() {
+        return Err(empty(&raw.report));
+    }
+    let unit_box = UnitBox::around(&raw, &faces);
+    let mut mesh = weld(&mut raw, &faces, &unit_box);
+    cx.deadline.check()?;
+    if mesh.triangles.is_empty() {
+        return Err(empty(&raw.report));
+    }
+    mesh.bounds = bounds(&mesh.positions);
+    mesh.to_file = unit_box.to_file(file_exponent);
+    let Attributes { normals, uvs, colors } = attributes::repair(&mut raw, &mesh);
+    if normals.is_empty() && uvs.is_empty() && colors.is_empty() {
+        mesh.attribute_triangles = Vec::new();
+    }
+    (mesh.normals, mesh.uvs, mesh.colors) = (normals, uvs, colors);
+    mesh.materials = raw.materials;
+    let slots = mesh.triangle_materials.iter().copied().max().unwrap_or(0) as usize + 1;
+    while mesh.materials.len() < slots {
+        mesh.materials.push(MaterialSlot { name: String::new(), base_color: None });
+    }
+    mesh.up = raw.up;
+    mesh.report = raw.report;
+    Ok(mesh)
+}
+
+/// A face, its normal, and two index triples, next to those of the raw mesh.
+const BYTES_PER_TRIANGLE: u64 = 20 + 12 + 12 + 12 + 1 + 4;
+/// A welded position, its place in the raw mesh's map, and a hash entry.
+const BYTES_PER_VERTEX: u64 = 12 + 4 + 2 * 17;
+
+/// A face that will be drawn: its place in the raw mesh and its unit normal.
+struct Face {
+    triangle: u32,
+    normal: [f32; 3],
+}
+
+/// Scales all positions so that the largest magnitude used is about 1, and returns the exponent. From here on nothing
+/// over- or underflows that matters.
+fn scale_down(raw: &mut RawMesh) -> i32 {
+    let mut largest = 0.0_f64;
+    for triangle in &raw.triangles {
+        let corners = triangle.map(|v| &raw.positions[v as usize]);
+        if corners.iter().all(|p| is_usable(p)) {
+            largest = corners.iter().fold(largest, |m, p| m.max(max_abs(p)));
+        }
+    }
+    if largest == 0.0 {
+        return 0;
+    }
+    let e = exponent(largest);
+    let down = Pow2::new(-e);
+    for p in &mut raw.positions {
+        // What cannot be computed with must stay recognisable.
+        *p = if is_usable(p) { down.of3(*p) } else { [f64::NAN; 3] };
+    }
+    e
+}
+
+/// The faces that have an area. Counts the others.
+fn pick_faces(raw: &mut RawMesh) -> Vec<Face> {
+    let mut faces = Vec::with_capacity(raw.triangles.len());
+    for (i, triangle) in (0..).zip(&raw.triangles) {
+        let corners = triangle.map(|v| raw.positions[v as usize]);
+        if !corners.iter().all(is_usable) {
+            raw.report.dropped_nonfinite_faces += 1;
+        } else if let Some(normal) = face_normal(corners) {
+            faces.push(Face { triangle: i, normal: normal.map(|c| c as f32) });
+        } else {
+            raw.report.dropped_degenerate_faces += 1;
+        }
+    }
+    faces
+}
+
+/// The unit normal, or none if the area is exactly zero. Good for edges of any length.
+fn face_normal([a, b, c]: [[f64; 3]; 3]) -> Option<[f64; 3]> {
+    let (e, f) = (sub(b, a), sub(c, a));
+    let n = cross(e, f);
+    let length2 = dot(n, n);
+    if length2 > 1e-200 {
+        return Some(n.map(|x| x / length2.sqrt()));
+    }
+    // Tiny edges or a sliver: products may have underflown.
+    let (e, f) = (rescale(e)?, rescale(f)?);
+    let n = rescale(cross(e, f))?;
+    let length = dot(n, n).sqrt();
+    Some(n.map(|x| x / length))
+}
+
+fn rescale(v: [f64; 3]) -> Option<[f64; 3]> {
+    let size = max_abs(&v);
+    (size > 0.0).then(|| Pow2::new(-exponent(size)).of3(v))
+}
+
+fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The map from (scaled) file space to the unit box.
+struct UnitBox {
+    centre: [f64; 3],
+    exponent: i32,
+    down: Pow2,
+}
+
+impl UnitBox {
+    fn around(raw: &RawMesh, faces: &[Face]) -> Self {
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for face in faces {
+            for v in raw.triangles[face.triangle as usize] {
+                let p = raw.positions[v as usize];
+                for k in 0..3 {
+                    low[k] = low[k].min(p[k]);
+                    high[k] = high[k].max(p[k]);
+                }
+            }
+        }
+        let exponent = exponent(max_abs(&sub(high, low)));
+        Self { centre: std::array::from_fn(|k| low[k] * 0.5 + high[k] * 0.5), exponent, down: Pow2::new(-exponent) }
+    }
+
+    fn to_unit(&self, p: [f64; 3]) -> [f32; 3] {
+        self.down.of3(sub(p, self.centre)).map(|c| {
+            let c = c as f32;
+            // No negative zero, so that equal positions have equal bits; nothing subnormal, which some GPUs flush.
+            if c.abs() < f32::MIN_POSITIVE { 0.0 } else { c }
+        })
+    }
+
+    fn to_file(&self, file_exponent: i32) -> ToFile {
+        ToFile {
+            centre: Pow2::new(file_exponent).of3(self.centre),
+            scale: Pow2::new(file_exponent).of(Pow2::new(self.exponent).of(1.0)),
+        }
+    }
+}
+
+/// Positions numbered in the order of their first use, and the triangles that still have three corners.
+fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
+    const UNSEEN: u32 = u32::MAX;
+    let mut mesh = Mesh::default();
+    let mut welded_of_raw = vec![UNSEEN; raw.positions.len()];
+    let mut index_of_bits: RapidHashMap<[u32; 3], u32> = RapidHashMap::default();
+    index_of_bits.reserve(raw.positions.len().min(faces.len()));
+    let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
+    for face in faces {
+        let i = face.triangle as usize;
+        let corners = raw.triangles[i].map(|v| {
+            let known = &mut welded_of_raw[v as usize];
+            if *known == UNSEEN {
+                let p = unit_box.to_unit(raw.positions[v as usize]);
+                *known = *index_of_bits.entry(p.map(f32::to_bits)).or_insert_with(|| {
+                    mesh.positions.push(p);
+                    mesh.positions.len() as u32 - 1
+                });
+            }
+            *known
+        });
+        if corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0] {
+            raw.report.dropped_degenerate_faces += 1;
+            continue;
+        }
+        mesh.triangles.push(corners);
+        mesh.face_normals.push(face.normal);
+        mesh.edge_masks.push(raw.edge_masks[i]);
+        mesh.triangle_materials.push(raw.triangle_materials[i]);
+        if has_attributes {
+            mesh.attribute_triangles.push(raw.triangles[i]);
+        }
+    }
+    if raw.report.dropped_degenerate_faces > 0 {
+        drop_unused(&mut mesh);
+    }
+    mesh
+}
+
+/// A dropped face may have been the only one to use a position.
+fn drop_unused(mesh: &mut Mesh) {
+    const UNSEEN: u32 = u32::MAX;
+    let mut new_of_old = vec![UNSEEN; mesh.positions.len()];
+    let mut positions = Vec::with_capacity(mesh.positions.len());
+    for v in mesh.triangles.iter_mut().flatten() {
+        let new = &mut new_of_old[*v as usize];
+        if *new == UNSEEN {
+            *new = positions.len() as u32;
+            positions.push(mesh.positions[*v as usize]);
+        }
+        *v = *new;
+    }
+    mesh.positions = positions;
+}
+
+fn bounds(positions: &[[f32; 3]]) -> [[f32; 3]; 2] {
+    positions.iter().fold([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]], |[low, high], p| {
+        [std::array::from_fn(|k| low[k].min(p[k])), std::array::from_fn(|k| high[k].max(p[k]))]
+    })
+}
+
+fn empty(report: &ImportReport) -> MeshError {
+    let faces: u64 = report.polygons_by_arity.iter().sum();
+    let (nonfinite, degenerate) = (report.dropped_nonfinite_faces, report.dropped_degenerate_faces);
+    let mut detail = format!(
+        "the {} file has nothing to draw: {} vertices and {faces} faces",
+        report.format.name().to_uppercase(),
+        report.file_vertices
+    );
+    if nonfinite + degenerate > 0 {
+        detail +=
+            &format!(", of whose triangles {nonfinite} have a NaN or infinite corner and {degenerate} have no area");
+    }
+    for warning in &report.warnings {
+        detail += "; ";
+        detail += &warning.detail;
+    }
+    MeshError::new(MeshFault::Empty, detail)
+}

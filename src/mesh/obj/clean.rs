@@ -1,0 +1,341 @@
+//! A reader that hands `tobj` one clean line after the other.
+//!
+//! Only `v`, `vt`, `vn`, `f` and material lines get through, in canonical form, checked and paid for. What `tobj` would
+//! refuse but is harmless (bytes that are not UTF-8, empty faces, partial colours) is dropped or completed on the way.
+
+use super::face::{Corner, Counts, parse_corner, show, write_face};
+use crate::mesh::import::Context;
+use crate::mesh::{MeshError, Warning};
+use rapidhash::RapidHashMap;
+use std::io::{BufRead, Read};
+use tobj::LoadError;
+
+/// What is known of the file once all of it was read.
+pub struct Summary {
+    /// `v` lines.
+    pub vertices: u64,
+    /// `usemtl` names, in order of first use.
+    pub materials: Vec<String>,
+    /// What was left out.
+    pub warnings: Vec<Warning>,
+}
+
+/// Implements [`BufRead`] for `tobj`.
+pub struct Cleaner<'a, 'b> {
+    rest: &'a [u8],
+    newline: u8,
+    line: u64,
+    cx: &'a mut Context<'b>,
+    unpaid_bytes: u64,
+    out: Vec<u8>,
+    read: usize,
+    fault: Option<MeshError>,
+    counts: Counts,
+    triangles: u64,
+    /// Which attributes the faces of the current model have.
+    form: Option<(bool, bool)>,
+    /// Whether the first vertex had a colour. Then all get one.
+    colored: Option<bool>,
+    /// The largest index of each kind and its line: tobj does not say which one was out of range.
+    largest: [(u64, u64); 3],
+    materials: Vec<String>,
+    material_numbers: RapidHashMap<Vec<u8>, usize>,
+    corners: Vec<Corner>,
+    left_out: LeftOut,
+}
+
+#[derive(Default)]
+struct LeftOut {
+    points: u64,
+    lines: u64,
+    short_faces: u64,
+    curves: u64,
+    colors: u64,
+    libraries: u64,
+}
+
+impl<'a, 'b> Cleaner<'a, 'b> {
+    /// Reads `bytes`.
+    pub fn new(bytes: &'a [u8], cx: &'a mut Context<'b>) -> Self {
+        Self {
+            rest: bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes),
+            // Only very old files end their lines with a carriage return alone.
+            newline: if bytes.contains(&b'\n') { b'\n' } else { b'\r' },
+            line: 0,
+            cx,
+            unpaid_bytes: 0,
+            out: Vec::new(),
+            read: 0,
+            fault: None,
+            counts: Counts::default(),
+            triangles: 0,
+            form: None,
+            colored: None,
+            largest: [(0, 0); 3],
+            materials: Vec::new(),
+            material_numbers: RapidHashMap::default(),
+            corners: Vec::new(),
+            left_out: LeftOut::default(),
+        }
+    }
+
+    /// Turns what went wrong, here or in `tobj`, into an error that names the line.
+    pub fn finish(self, error: Option<LoadError>) -> Result<Summary, MeshError> {
+        if let Some(fault) = self.fault {
+            return Err(fault);
+        }
+        let out_of_range = |kind: usize, what: &str, count: u64| {
+            let (index, line) = self.largest[kind];
+            format!("line {line} of the OBJ file: the {what} index {} is out of range: there are {count}", index + 1)
+        };
+        let here = |what: &str| format!("line {} of the OBJ file: {what}", self.line);
+        let detail = match error {
+            None => return Ok(self.summary()),
+            Some(LoadError::PositionParseError) => here("a vertex needs three numbers"),
+            Some(LoadError::NormalParseError) => here("a normal needs three numbers"),
+            Some(LoadError::TexcoordParseError) => here("a texture coordinate needs two numbers"),
+            Some(LoadError::FaceVertexOutOfBounds) => out_of_range(0, "vertex", self.counts.v),
+            Some(LoadError::FaceTexCoordOutOfBounds) => out_of_range(1, "texture coordinate", self.counts.vt),
+            Some(LoadError::FaceNormalOutOfBounds) => out_of_range(2, "normal", self.counts.vn),
+            Some(other) => here(&other.to_string()),
+        };
+        Err(MeshError::broken(detail))
+    }
+
+    fn summary(self) -> Summary {
+        let LeftOut { points, lines, short_faces, curves, colors, libraries } = self.left_out;
+        let warnings = [
+            (points, "points_ignored", "points are not drawn"),
+            (lines, "lines_ignored", "lines are not drawn"),
+            (short_faces, "short_faces_ignored", "faces with fewer than three corners are not drawn"),
+            (curves, "curves_ignored", "free-form curves and surfaces are not drawn"),
+            (colors, "colors_incomplete", "vertices have a colour where the first has none, or the other way round"),
+            (
+                libraries,
+                "mtl_ignored",
+                "material libraries are not part of the upload: material names are kept without them",
+            ),
+        ];
+        let warnings = warnings.into_iter().filter(|w| w.0 > 0);
+        Summary {
+            vertices: self.counts.v,
+            materials: self.materials,
+            warnings: warnings.map(|(n, code, what)| Warning { code, detail: format!("{n} {what}") }).collect(),
+        }
+    }
+
+    /// Cleans lines until one gives output or the file ends.
+    fn refill(&mut self) -> Result<(), MeshError> {
+        self.out.clear();
+        self.read = 0;
+        while self.out.is_empty() && !self.rest.is_empty() {
+            let joined;
+            let mut line = self.next_line();
+            if line.ends_with(b"\\") && !line.trim_ascii_start().starts_with(b"#") {
+                joined = self.join_continued(line);
+                line = &joined;
+            }
+            self.clean(line)?;
+            if self.unpaid_bytes > 1 << 20 || self.line % 65536 == 0 {
+                self.cx.deadline.check()?;
+                self.cx.check_triangles(self.triangles)?;
+                self.cx.budget.spend("the OBJ file", self.unpaid_bytes, 1)?;
+                self.unpaid_bytes = 0;
+            }
+        }
+        Ok(())
+    }
+
+    fn next_line(&mut self) -> &'a [u8] {
+        self.line += 1;
+        let end = self.rest.iter().position(|&b| b == self.newline).unwrap_or(self.rest.len());
+        let line = &self.rest[..end];
+        self.rest = self.rest.get(end + 1..).unwrap_or_default();
+        line.trim_ascii_end()
+    }
+
+    fn join_continued(&mut self, first: &[u8]) -> Vec<u8> {
+        let mut joined = first[..first.len() - 1].to_vec();
+        loop {
+            let line = self.next_line();
+            joined.push(b' ');
+            joined.extend_from_slice(line);
+            if !line.ends_with(b"\\") || self.rest.is_empty() {
+                return joined;
+            }
+            joined.pop();
+        }
+    }
+
+    fn clean(&mut self, line: &[u8]) -> Result<(), MeshError> {
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+        let Some(keyword) = words.next() else { return Ok(()) };
+        match keyword {
+            b"v" => {
+                self.counts.v += 1;
+                self.unpaid_bytes += 48 + 24 + 100;
+                self.vertex(words)?;
+            }
+            b"vt" => {
+                self.counts.vt += 1;
+                self.unpaid_bytes += 32;
+                self.numbers(b"vt", words, 2)?;
+            }
+            b"vn" => {
+                self.counts.vn += 1;
+                self.unpaid_bytes += 48;
+                self.numbers(b"vn", words, 3)?;
+            }
+            b"f" | b"fo" => self.face(words)?,
+            b"l" => self.left_out.lines += 1,
+            b"p" => self.left_out.points += 1,
+            b"curv" | b"curv2" | b"surf" => self.left_out.curves += 1,
+            b"mtllib" => self.left_out.libraries += 1,
+            b"usemtl" => self.material(line.trim_ascii_start()[6..].trim_ascii()),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn vertex<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), MeshError> {
+        let mut all: [&[u8]; 7] = [b""; 7];
+        let mut count = 0;
+        for word in words.take(7) {
+            all[count] = word;
+            count += 1;
+        }
+        self.numbers(b"v", all[..count].iter().copied(), 3)?;
+        let color = Some(&all[3..6]).filter(|c| count >= 6 && c.iter().all(|w| number(w).is_some()));
+        let colored = *self.colored.get_or_insert(color.is_some());
+        self.left_out.colors += u64::from(colored != color.is_some());
+        // Six or seven numbers are a position and a colour; four are x y z w, and tobj divides by w.
+        let more: &[&[u8]] = match color {
+            Some(color) if colored => color,
+            None if colored => &[b"1", b"1", b"1"],
+            _ if count == 4 && number(all[3]).is_some_and(|w| w != 0.0) => &all[3..4],
+            _ => &[],
+        };
+        if !more.is_empty() {
+            self.unpaid_bytes += 48 + 16;
+            self.out.pop();
+            for word in more {
+                self.out.push(b' ');
+                self.out.extend_from_slice(word);
+            }
+            self.out.push(b'\n');
+        }
+        Ok(())
+    }
+
+    /// Writes a line with exactly `count` numbers; `tobj` parses them.
+    fn numbers<'w>(
+        &mut self,
+        keyword: &[u8],
+        mut words: impl Iterator<Item = &'w [u8]>,
+        count: usize,
+    ) -> Result<(), MeshError> {
+        self.out.extend_from_slice(keyword);
+        for i in 0..count {
+            let word = match words.next() {
+                Some(word) if word.is_ascii() => word,
+                // A one-dimensional texture coordinate is legal.
+                None if count == 2 && i == 1 => b"0",
+                other => {
+                    let given = other.map_or(format!("it has {i}"), |w| format!("\"{}\" is none", show(w)));
+                    return Err(self.broken(&format!("\"{}\" needs {count} numbers, and {given}", show(keyword))));
+                }
+            };
+            self.out.push(b' ');
+            self.out.extend_from_slice(word);
+        }
+        self.out.push(b'\n');
+        Ok(())
+    }
+
+    fn face<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), MeshError> {
+        self.corners.clear();
+        for word in words.take_while(|w| !w.starts_with(b"#")) {
+            let corner = parse_corner(word, self.counts).map_err(|why| self.broken(&why))?;
+            for (largest, index) in self.largest.iter_mut().zip([Some(corner.v), corner.vt, corner.vn]) {
+                if index.is_some_and(|i| i > largest.0) {
+                    *largest = (index.unwrap_or(0), self.line);
+                }
+            }
+            self.corners.push(corner);
+        }
+        let n = self.corners.len() as u64;
+        if n < 3 {
+            self.left_out.short_faces += 1;
+            return Ok(());
+        }
+        self.triangles += n - 2;
+        // A face that gives an attribute for some corners only has none.
+        let form = (self.corners.iter().all(|c| c.vt.is_some()), self.corners.iter().all(|c| c.vn.is_some()));
+        if self.form.is_some_and(|old| old != form) {
+            self.out.extend_from_slice(b"o\n");
+            self.unpaid_bytes += 1024;
+        }
+        self.form = Some(form);
+        // tobj's own face (its list doubles), then per corner its index and, with attributes, a vertex and a hash entry of
+        // its own; then ours.
+        let per_corner = if form == (false, false) { 40 } else { 200 };
+        self.unpaid_bytes += 208 + n * (per_corner + if n > 4 { 48 } else { 0 });
+        write_face(&mut self.out, &self.corners, form);
+        Ok(())
+    }
+
+    fn material(&mut self, name: &[u8]) {
+        if name.is_empty() {
+            return;
+        }
+        let number = match self.material_numbers.get(name) {
+            Some(&number) => number,
+            None => {
+                let number = self.materials.len();
+                self.material_numbers.insert(name.to_vec(), number);
+                self.materials.push(String::from_utf8_lossy(name).into_owned());
+                self.unpaid_bytes += 1024 + 4 * name.len() as u64;
+                self.out.extend_from_slice(format!("mtllib {number}\n").as_bytes());
+                number
+            }
+        };
+        self.unpaid_bytes += 1024;
+        self.out.extend_from_slice(format!("usemtl {number}\n").as_bytes());
+    }
+
+    fn broken(&self, what: &str) -> MeshError {
+        MeshError::broken(format!("line {} of the OBJ file: {what}", self.line))
+    }
+}
+
+fn number(word: &[u8]) -> Option<f64> {
+    std::str::from_utf8(word).ok()?.parse().ok().filter(|v: &f64| v.is_finite())
+}
+
+impl BufRead for Cleaner<'_, '_> {
+    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
+        if self.read == self.out.len() && self.fault.is_none() {
+            if let Err(fault) = self.refill() {
+                self.fault = Some(fault);
+            }
+        }
+        if self.fault.is_some() {
+            return Err(std::io::Error::other("refused"));
+        }
+        Ok(&self.out[self.read..])
+    }
+
+    fn consume(&mut self, amount: usize) {
+        self.read += amount;
+    }
+}
+
+impl Read for Cleaner<'_, '_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let available = self.fill_buf()?;
+        let n = available.len().min(buffer.len());
+        buffer[..n].copy_from_slice(&available[..n]);
+        self.consume(n);
+        Ok(n)
+    }
+}

@@ -1,0 +1,137 @@
+//! Wavefront OBJ, parsed by `tobj`. What `tobj` refuses, misreads or trusts is seen to line by line before it looks
+//! ([`clean`]), so that every error names its line and no count is trusted. Materials are names only: nothing opens an MTL.
+
+mod clean;
+mod face;
+
+use self::clean::Cleaner;
+use super::import::Context;
+use super::polygon::Triangulator;
+use super::raw::RawMesh;
+use super::{Format, MaterialSlot, MeshError, Warning};
+use std::path::Path;
+use tobj::{LoadError, LoadOptions};
+
+/// Reads an OBJ file.
+pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    // tobj would fan polygons, which is wrong for concave ones. With one index for all attributes, models whose faces all
+    // have the same form get arrays of equal length; the cleaner starts a new model where the form changes.
+    let options = LoadOptions { single_index: true, triangulate: false, ignore_points: true, ignore_lines: true };
+    let mut cleaner = Cleaner::new(bytes, cx);
+    let loaded = tobj::load_obj_buf(&mut cleaner, &options, material_of_its_own);
+    let summary = cleaner.finish(loaded.as_ref().err().copied())?;
+    let (models, _) = loaded.map_err(|e| MeshError::broken(format!("the OBJ file cannot be read: {e}")))?;
+
+    let mut raw = RawMesh::default();
+    raw.report.format = Format::Obj;
+    raw.report.file_vertices = summary.vertices;
+    raw.report.warnings = summary.warnings;
+    let mut triangulator = Triangulator::default();
+    for model in models {
+        cx.deadline.check()?;
+        append(&mut raw, &model.mesh, &mut triangulator)?;
+    }
+    if triangulator.gave_up() {
+        raw.report.warnings.push(Warning {
+            code: "polygons_fanned",
+            detail: "polygons with very many corners were split into fans, which is wrong where they are concave"
+                .into(),
+        });
+    }
+    linearise(&mut raw.colors);
+    // Slot 0 is for faces before the first `usemtl`; without such faces it would only be confusing.
+    let uses_unnamed = raw.triangle_materials.contains(&0) || summary.materials.is_empty();
+    raw.materials = std::iter::once(String::new())
+        .chain(summary.materials)
+        .skip(usize::from(!uses_unnamed))
+        .map(|name| MaterialSlot { name, base_color: None })
+        .collect();
+    if !uses_unnamed {
+        raw.triangle_materials.iter_mut().for_each(|m| *m -= 1);
+    }
+    Ok(raw)
+}
+
+/// The cleaner writes `mtllib N` before the first `usemtl N`, and this answers with a material of that name: without one,
+/// tobj would forget which faces use it.
+fn material_of_its_own(path: &Path) -> tobj::MTLLoadResult {
+    let name = path.to_str().ok_or(LoadError::MaterialParseError)?.to_owned();
+    let material = tobj::Material { name: name.clone(), ..Default::default() };
+    Ok((vec![material], std::iter::once((name, 0)).collect()))
+}
+
+/// Adds one of tobj's models: the faces between two changes of material or form.
+fn append(raw: &mut RawMesh, mesh: &tobj::Mesh, triangulator: &mut Triangulator) -> Result<(), MeshError> {
+    let base = u32::try_from(raw.positions.len()).ok().filter(|base| {
+        let end = u64::from(*base) + mesh.positions.len() as u64 / 3;
+        end < u64::from(u32::MAX)
+    });
+    let base = base.ok_or_else(|| MeshError::broken("the OBJ file has more than 4 billion vertices"))?;
+    raw.positions.extend(mesh.positions.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
+    let count = raw.positions.len();
+
+    let pad_from = base as usize;
+    pad(
+        &mut raw.normals,
+        pad_from,
+        [0.0; 3],
+        mesh.normals.chunks_exact(3).map(|n| [n[0] as f32, n[1] as f32, n[2] as f32]),
+    );
+    pad(&mut raw.uvs, pad_from, [0.0; 2], mesh.texcoords.chunks_exact(2).map(|t| [t[0] as f32, t[1] as f32]));
+    let colors = mesh.vertex_color.chunks_exact(3);
+    pad(&mut raw.colors, pad_from, [1.0; 4], colors.map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0]));
+    fill(&mut raw.normals, count, [0.0; 3]);
+    fill(&mut raw.uvs, count, [0.0; 2]);
+    fill(&mut raw.colors, count, [1.0; 4]);
+
+    let material = mesh.material_id.map_or(0, |id| id as u32 + 1);
+    let mut corners = Vec::new();
+    let mut at = 0;
+    // No arities means triangles only.
+    let faces = if mesh.face_arities.is_empty() { mesh.indices.len() / 3 } else { mesh.face_arities.len() };
+    for face in 0..faces {
+        let arity = mesh.face_arities.get(face).map_or(3, |&n| n as usize);
+        let Some(indices) = mesh.indices.get(at..at + arity) else { break };
+        at += arity;
+        corners.clear();
+        corners.extend(indices.iter().map(|i| base + i));
+        raw.report.polygons_by_arity[arity.min(12)] += 1;
+        triangulator.split(&corners, &raw.positions, &mut |triangle, mask| {
+            raw.triangles.push(triangle);
+            raw.edge_masks.push(mask);
+            raw.triangle_materials.push(material);
+        });
+    }
+    Ok(())
+}
+
+/// Appends one model's attribute, if it has it; earlier models without it are given `missing`.
+fn pad<T: Copy>(all: &mut Vec<T>, before: usize, missing: T, new: impl ExactSizeIterator<Item = T>) {
+    if new.len() > 0 {
+        fill_always(all, before, missing);
+        all.extend(new);
+    }
+}
+
+/// Makes up for a model without the attribute, where earlier ones have it.
+fn fill<T: Copy>(all: &mut Vec<T>, count: usize, missing: T) {
+    if !all.is_empty() {
+        fill_always(all, count, missing);
+    }
+}
+
+fn fill_always<T: Copy>(all: &mut Vec<T>, count: usize, missing: T) {
+    if all.len() < count {
+        all.resize(count, missing);
+    }
+}
+
+/// OBJ colours are sRGB by custom, 0 to 1 or, from some exporters, 0 to 255.
+fn linearise(colors: &mut [[f32; 4]]) {
+    let scale = if colors.iter().any(|c| c[..3].iter().any(|&v| v > 1.0 && v.is_finite())) { 255.0 } else { 1.0 };
+    for component in colors.iter_mut().flat_map(|c| &mut c[..3]) {
+        let v = f64::from(*component) / scale;
+        let linear = if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) };
+        *component = linear as f32;
+    }
+}

@@ -1,0 +1,89 @@
+//! Which format some bytes are in, from the bytes alone: names and content types lie.
+
+use super::{Format, MeshError, MeshFault, stl};
+
+/// How far into a text its first telling line may be. Exporters write long comment headers.
+const TEXT_SNIFF_BYTES: usize = 1 << 20;
+
+/// The format of `bytes`, or why none fits.
+pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
+    // Before anything that looks at text: a binary STL may well begin with "solid".
+    if stl::is_exact_binary(bytes) {
+        return Ok(Format::StlBinary);
+    }
+    if bytes.starts_with(b"glTF") {
+        return Ok(Format::Glb);
+    }
+    let text = trim_start(bytes);
+    if text.starts_with(b"{") {
+        return if contains(text, b"\"asset\"") {
+            Ok(Format::Gltf)
+        } else {
+            Err(unrecognised("the body is JSON but not glTF: there is no \"asset\" property"))
+        };
+    }
+    if stl::is_ascii(text) {
+        return Ok(Format::StlAscii);
+    }
+    if looks_like_obj(text) {
+        return Ok(Format::Obj);
+    }
+    if stl::is_loose_binary(bytes) {
+        return Ok(Format::StlBinary);
+    }
+    if let Some(name) = known_but_unread(bytes) {
+        return Err(unrecognised(&format!(
+            "the body looks like {name}, which is not read: convert it to OBJ, STL, glTF or GLB"
+        )));
+    }
+    Err(unrecognised(
+        "the body is not a mesh in a known format (OBJ, STL, glTF or GLB); if it is one, name it with format_in",
+    ))
+}
+
+/// Without a byte order mark and leading white space.
+pub fn trim_start(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start()
+}
+
+fn unrecognised(detail: &str) -> MeshError {
+    MeshError::new(MeshFault::Unrecognised, detail)
+}
+
+fn contains(haystack: &[u8], needle: &[u8]) -> bool {
+    haystack.windows(needle.len()).any(|w| w == needle)
+}
+
+/// A vertex with three numbers or a face with an index: words alone also begin lines of prose and of noise.
+fn looks_like_obj(text: &[u8]) -> bool {
+    let head = &text[..text.len().min(TEXT_SNIFF_BYTES)];
+    head.split(|&b| b == b'\n' || b == b'\r').any(|line| {
+        let Ok(line) = std::str::from_utf8(line) else { return false };
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => words.by_ref().take(3).filter(|w| w.parse::<f64>().is_ok()).count() == 3,
+            Some("f") => words.next().is_some_and(is_corner),
+            _ => false,
+        }
+    })
+}
+
+fn is_corner(word: &str) -> bool {
+    word.split('/').next().is_some_and(|index| index.parse::<i64>().is_ok())
+}
+
+/// Formats that users try and we can name.
+fn known_but_unread(bytes: &[u8]) -> Option<&'static str> {
+    let starts = |magic: &[u8]| bytes.starts_with(magic);
+    [
+        (starts(b"ply\n") || starts(b"ply\r"), "PLY"),
+        (starts(b"OFF") || starts(b"COFF"), "OFF"),
+        (starts(b"Kaydara FBX"), "FBX"),
+        (starts(b"PK\x03\x04"), "a zip file (3MF or a bundle)"),
+        (starts(b"\x89PNG") || starts(b"\xFF\xD8\xFF") || starts(b"RIFF"), "a picture"),
+        (starts(b"BLENDER"), "a Blender file"),
+        (starts(b"\xFF\xFE") || starts(b"\xFE\xFF"), "UTF-16 text"),
+    ]
+    .into_iter()
+    .find_map(|(is, name)| is.then_some(name))
+}

@@ -1,0 +1,166 @@
+//! STL, binary and ASCII. The stored normals are ignored: they repeat what the corners say, or lie.
+
+use super::import::Context;
+use super::polygon::ALL_EDGES;
+use super::raw::RawMesh;
+use super::{Format, MeshError, UpAxis, Warning};
+
+/// An 80-byte header and a count come before the triangles.
+const HEADER_BYTES: usize = 84;
+/// A normal, three corners and two attribute bytes.
+const TRIANGLE_BYTES: usize = 50;
+
+/// Reads either kind.
+pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    let text = super::sniff::trim_start(bytes);
+    if !is_exact_binary(bytes) && is_ascii(text) { read_ascii(text, cx) } else { read_binary(bytes, cx) }
+}
+
+/// Whether the length is exactly what the count in the header asks for. Noise never is.
+pub fn is_exact_binary(bytes: &[u8]) -> bool {
+    declared_bytes(bytes) == Some(bytes.len() as u64)
+}
+
+/// Whether the bytes look like a binary STL that was cut off or has something after its end: the count fits the length
+/// roughly.
+pub fn is_loose_binary(bytes: &[u8]) -> bool {
+    let len = bytes.len() as u64;
+    match declared_bytes(bytes) {
+        Some(declared) if declared > HEADER_BYTES as u64 => {
+            if declared > len {
+                declared / 16 <= len
+            } else {
+                len - declared <= 512.max(len / 8)
+            }
+        }
+        _ => false,
+    }
+}
+
+/// Whether the text begins as an ASCII STL and goes on as one.
+pub fn is_ascii(text: &[u8]) -> bool {
+    let begins = text.len() >= 5 && text[..5].eq_ignore_ascii_case(b"solid");
+    if !begins || text.get(5).is_some_and(|b| !b.is_ascii_whitespace()) {
+        return false;
+    }
+    let head = &text[..text.len().min(4096)];
+    head.split(|b| b.is_ascii_whitespace())
+        .any(|w| w.eq_ignore_ascii_case(b"facet") || w.eq_ignore_ascii_case(b"endsolid"))
+}
+
+fn declared_bytes(bytes: &[u8]) -> Option<u64> {
+    let count = bytes.get(80..HEADER_BYTES)?;
+    let count = u32::from_le_bytes(count.try_into().ok()?);
+    Some(HEADER_BYTES as u64 + TRIANGLE_BYTES as u64 * u64::from(count))
+}
+
+fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    let Some(declared) = declared_bytes(bytes) else {
+        return Err(MeshError::broken(format!(
+            "the STL file is {} bytes long, and its header alone is {HEADER_BYTES}",
+            bytes.len()
+        )));
+    };
+    let count = (declared - HEADER_BYTES as u64) / TRIANGLE_BYTES as u64;
+    if declared > bytes.len() as u64 {
+        return Err(MeshError::broken(format!(
+            "the STL header at byte 80 says {count} triangles, which needs {declared} bytes, and the file has {}",
+            bytes.len()
+        )));
+    }
+    let mut raw = new_mesh(Format::StlBinary);
+    if declared < bytes.len() as u64 {
+        raw.report.warnings.push(Warning {
+            code: "trailing_bytes",
+            detail: format!("{} bytes after the last STL triangle are ignored", bytes.len() as u64 - declared),
+        });
+    }
+    reserve(&mut raw, count, cx)?;
+    let body = &bytes[HEADER_BYTES..declared as usize];
+    for (i, triangle) in body.chunks_exact(TRIANGLE_BYTES).enumerate() {
+        if i % 65536 == 0 {
+            cx.deadline.check()?;
+        }
+        for corner in triangle[12..48].chunks_exact(12) {
+            let c = |k: usize| f64::from(f32::from_le_bytes([corner[k], corner[k + 1], corner[k + 2], corner[k + 3]]));
+            raw.positions.push([c(0), c(4), c(8)]);
+        }
+        push_triangle(&mut raw);
+    }
+    finish(raw)
+}
+
+/// ASCII is read by its words alone: exporters disagree on lines and indentation, but every corner is `vertex x y z`.
+fn read_ascii(text: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    let mut raw = new_mesh(Format::StlAscii);
+    // The shortest triangle that a text can hold says how many it can have at most.
+    let count_max = text.len() as u64 / 30 + 1;
+    cx.budget.spend("the STL triangles", count_max, 3 * 24 + 12 + 1 + 4)?;
+    let mut corners = 0_usize;
+    let mut ended = false;
+    for (number, line) in text.split(|&b| b == b'\n').enumerate() {
+        if number % 65536 == 0 {
+            cx.deadline.check()?;
+        }
+        let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|w| !w.is_empty());
+        while let Some(word) = words.next() {
+            if word.eq_ignore_ascii_case(b"vertex") {
+                let mut position = [0.0; 3];
+                for value in &mut position {
+                    *value = parse(words.next()).ok_or_else(|| bad_line(number, "a vertex needs three numbers"))?;
+                }
+                raw.positions.push(position);
+                corners += 1;
+            } else if word.eq_ignore_ascii_case(b"endfacet") {
+                if corners != 3 {
+                    return Err(bad_line(number, &format!("a facet needs three vertices, and this one has {corners}")));
+                }
+                corners = 0;
+                push_triangle(&mut raw);
+            } else if word.eq_ignore_ascii_case(b"solid") || word.eq_ignore_ascii_case(b"endsolid") {
+                ended = word.len() == 8;
+                break; // the rest of the line is a name, which may be any words
+            }
+        }
+    }
+    if corners != 0 || !ended {
+        return Err(MeshError::broken("the STL text has no \"endsolid\" at its end: it seems to be cut off"));
+    }
+    cx.check_triangles(raw.triangles.len() as u64)?;
+    finish(raw)
+}
+
+fn parse(word: Option<&[u8]>) -> Option<f64> {
+    std::str::from_utf8(word?).ok()?.parse().ok()
+}
+
+fn bad_line(index: usize, what: &str) -> MeshError {
+    MeshError::broken(format!("line {} of the STL text: {what}", index + 1))
+}
+
+fn new_mesh(format: Format) -> RawMesh {
+    let mut raw = RawMesh { up: UpAxis::Z, ..RawMesh::default() };
+    raw.report.format = format;
+    raw
+}
+
+fn reserve(raw: &mut RawMesh, count: u64, cx: &mut Context<'_>) -> Result<(), MeshError> {
+    cx.check_triangles(count)?;
+    cx.budget.spend("the STL triangles", count, 3 * 24 + 12 + 1 + 4)?;
+    raw.positions.reserve_exact(count as usize * 3);
+    raw.triangles.reserve_exact(count as usize);
+    Ok(())
+}
+
+fn push_triangle(raw: &mut RawMesh) {
+    let end = raw.positions.len() as u32;
+    raw.triangles.push([end - 3, end - 2, end - 1]);
+}
+
+fn finish(mut raw: RawMesh) -> Result<RawMesh, MeshError> {
+    raw.edge_masks = vec![ALL_EDGES; raw.triangles.len()];
+    raw.triangle_materials = vec![0; raw.triangles.len()];
+    raw.report.file_vertices = raw.positions.len() as u64;
+    raw.report.polygons_by_arity[3] = raw.triangles.len() as u64;
+    Ok(raw)
+}
