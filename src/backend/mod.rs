@@ -54,6 +54,9 @@ pub enum DrawError {
     /// The job's time was up.
     #[error(transparent)]
     Stopped(#[from] Stopped),
+    /// There is no GPU here to draw on.
+    #[error("there is no GPU to draw on: {0}")]
+    NoGpu(String),
     /// The device is gone; a fresh one may work.
     #[error("the GPU was lost: {0}")]
     DeviceLost(String),

@@ -1,1 +1,150 @@
-//! The wgpu back-end: compute shaders, headless.
+//! The wgpu back-end: the CPU's stages as compute shaders, headless.
+//!
+//! In reading order: [`device`] opens a GPU; [`schedule`] decides what is dispatched for a plan; [`recorder`] turns that
+//! into commands; [`stages`] are the pipelines, [`params`] their numbers, [`buffers`] their memory.
+//!
+//! Architecture invariant: a job's use of the device stays on the thread that draws it, because wgpu's error scopes do.
+
+mod buffers;
+mod device;
+mod params;
+mod recorder;
+mod schedule;
+mod stages;
+
+use std::sync::Arc;
+
+pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
+
+use self::buffers::Buffers;
+use self::params::Frame;
+use self::recorder::Recorder;
+use self::schedule::{DeviceTraits, Schedule, Step, has_visibility};
+use self::stages::Slot;
+use super::{BackendKind, DrawError, Renderer};
+use crate::image::Image;
+use crate::limits::Deadline;
+use crate::plan::DrawPlan;
+
+/// Workgroups that share the large triangles: enough to fill a large GPU.
+const TILE_WORKGROUPS: u32 = 1024;
+
+/// The same on a processor, where each costs time even if it finds nothing to do.
+const TILE_WORKGROUPS_SOFTWARE: u32 = 32;
+
+/// Draws on the GPU. A worker's own: buffers are kept from job to job, the device is shared.
+pub struct GpuRenderer {
+    gpu: Arc<Gpu>,
+    buffers: Buffers,
+}
+
+impl GpuRenderer {
+    /// A renderer on an opened GPU.
+    pub fn new(gpu: Arc<Gpu>) -> Self {
+        Self { gpu, buffers: Buffers::default() }
+    }
+
+    /// The GPU that it draws on.
+    pub fn gpu(&self) -> &Arc<Gpu> {
+        &self.gpu
+    }
+
+    /// Runs `job` with errors caught and buffers tidied up afterwards.
+    fn job<T>(&mut self, job: impl FnOnce(&Gpu, &mut Buffers) -> Result<T, DrawError>) -> Result<T, DrawError> {
+        self.gpu.check()?;
+        let result = self.gpu.scoped(|| job(&self.gpu, &mut self.buffers));
+        match &result {
+            Ok(_) => self.buffers.trim(),
+            // Work may still be running on them, and the staging buffer may be half mapped.
+            Err(_) => self.buffers = Buffers::default(),
+        }
+        result
+    }
+}
+
+impl Renderer for GpuRenderer {
+    fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
+        deadline.check()?;
+        Err(DrawError::Device(format!("not yet: {} px", plan.width_px)))
+    }
+
+    fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
+        deadline.check()?;
+        let row_words = plan.width_px as usize * plan.samples as usize;
+        let len = row_words * plan.height_px as usize;
+        if len == 0 || !has_visibility(plan) {
+            return Ok(vec![0; len]);
+        }
+        self.job(|gpu, buffers| {
+            let schedule = Schedule::new(plan, &traits(gpu));
+            upload_geometry(gpu, buffers, plan, &schedule)?;
+            buffers.staging(gpu, schedule.band_rows as u64 * row_words as u64 * 8)?;
+            let mut recorder = Recorder::new(gpu, deadline, buffers, &Frame::new(plan), &schedule.batches);
+            let mut words = Vec::with_capacity(len);
+            execute(&mut recorder, plan, &schedule, |recorder, [first, end]| {
+                let size = u64::from(end - first) * row_words as u64 * 8;
+                recorder.copy_out(Slot::Samples, size, 0)?;
+                recorder.read_staging(size, |bytes| {
+                    words.extend(bytes.chunks_exact(8).map(|b| u64::from_le_bytes(std::array::from_fn(|i| b[i]))));
+                })
+            })?;
+            Ok(words)
+        })
+    }
+
+    fn kind(&self) -> BackendKind {
+        BackendKind::Gpu
+    }
+}
+
+fn traits(gpu: &Gpu) -> DeviceTraits {
+    DeviceTraits {
+        binding_bytes_max: gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size),
+        workgroups_max: gpu.limits.max_compute_workgroups_per_dimension,
+        tile_workgroups: if gpu.is_software() { TILE_WORKGROUPS_SOFTWARE } else { TILE_WORKGROUPS },
+        int64_atomics: gpu.int64_atomics,
+    }
+}
+
+/// Puts what transform and visibility read on the GPU, and makes room for what they write.
+fn upload_geometry(
+    gpu: &Gpu,
+    buffers: &mut Buffers,
+    plan: &DrawPlan<'_>,
+    schedule: &Schedule,
+) -> Result<(), DrawError> {
+    let vertices = plan.positions.len() as u64;
+    buffers.upload(gpu, Slot::Positions, bytemuck::cast_slice(plan.positions))?;
+    buffers.upload(gpu, Slot::Triangles, bytemuck::cast_slice(plan.triangles))?;
+    if let Some(hull) = &plan.hull {
+        buffers.upload(gpu, Slot::HullNormals, bytemuck::cast_slice(&hull.normals))?;
+    }
+    let copies = if plan.hull.is_some() { 2 } else { 1 };
+    buffers.reserve(gpu, Slot::Vertices, vertices * copies * 16)?;
+    buffers.reserve(gpu, Slot::Samples, band_sample_bytes(plan, schedule.band_rows))?;
+    buffers.reserve(gpu, Slot::Work, 8 + u64::from(schedule.work_items) * 4)?;
+    Ok(())
+}
+
+fn band_sample_bytes(plan: &DrawPlan<'_>, rows: u32) -> u64 {
+    u64::from(plan.width_px) * u64::from(rows) * u64::from(plan.samples) * 8
+}
+
+/// Records all steps; `end_band` takes a finished band's rows away.
+fn execute<'a>(
+    recorder: &mut Recorder<'a>,
+    plan: &DrawPlan<'_>,
+    schedule: &Schedule,
+    mut end_band: impl FnMut(&mut Recorder<'a>, [u32; 2]) -> Result<(), DrawError>,
+) -> Result<(), DrawError> {
+    for step in &schedule.steps {
+        match *step {
+            Step::ClearBand => recorder.clear(Slot::Samples, band_sample_bytes(plan, schedule.band_rows))?,
+            Step::ClearWork => recorder.clear(Slot::Work, 8)?,
+            Step::Dispatch { stage, batch, workgroups } => recorder.dispatch(stage, batch, workgroups)?,
+            Step::Submit => recorder.submit()?,
+            Step::EndBand { row_first, row_end } => end_band(recorder, [row_first, row_end])?,
+        }
+    }
+    Ok(())
+}

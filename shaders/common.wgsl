@@ -1,0 +1,169 @@
+// What every stage shares: the plan's numbers, and arithmetic that gives the CPU's bits (ARCHITECTURE.md, "Rounded
+// operations"). Prepended to each stage by src/backend/gpu/stages.rs.
+
+struct Frame {
+    x_row: vec4<f32>,
+    y_row: vec4<f32>,
+    z_row: vec4<f32>,
+    w_row: vec4<f32>,
+    screen_up: vec4<f32>,
+    to_light: vec4<f32>,
+    halfway: vec4<f32>,
+    background: vec4<f32>,
+    hull_color: vec4<f32>,
+    wire_color: vec4<f32>,
+    line_color: vec4<f32>,
+    near_w: f32,
+    // Units of the box along the normal, or 1/256 px on screen.
+    hull_push: f32,
+    metallic: f32,
+    roughness: f32,
+    intensity: f32,
+    ambient: f32,
+    wire_thickness: f32,
+    wire_smoothing: f32,
+    line_width: f32,
+    line_smoothing: f32,
+    // Always 0, which the compiler cannot know.
+    zero: u32,
+    flags: u32,
+    width: i32,
+    height: i32,
+    samples: i32,
+    triangle_count: u32,
+    vertex_count: u32,
+    edge_count: u32,
+    // Where triangles' materials and edge masks start in the attributes; colours start at 0.
+    materials_at: u32,
+    masks_at: u32,
+};
+
+// Which triangles, vertices or edges a dispatch handles, and which rows of the picture the buffers hold.
+struct Batch {
+    first: u32,
+    count: u32,
+    // Added to a triangle's index to get its id.
+    id_base: u32,
+    // Added to a vertex index to get its record.
+    vertex_base: u32,
+    // 0 both, 1 front, 2 back.
+    faces: u32,
+    row_first: i32,
+    row_end: i32,
+    // Items that the work list holds.
+    capacity: u32,
+};
+
+const SURFACE: u32 = 1u;
+const HULL: u32 = 2u;
+const HULL_PX: u32 = 4u;
+const FACE_NORMALS: u32 = 8u;
+const VERTEX_NORMALS: u32 = 16u;
+const FWIDTH: u32 = 32u;
+const TRIANGLE_MATERIALS: u32 = 64u;
+const EDGE_MASKS: u32 = 128u;
+const LINES: u32 = 256u;
+const LINES_HIDDEN: u32 = 512u;
+const LINES_SKIP_BACK: u32 = 1024u;
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> batch: Batch;
+
+fn has(flag: u32) -> bool {
+    return (frame.flags & flag) != 0u;
+}
+
+struct Vertex {
+    x: i32,
+    y: i32,
+    z: f32,
+    inv_w: f32,
+};
+
+// `x` of a vertex that is behind the near plane or beyond the guard band.
+const OUTSIDE: i32 = i32(-0x80000000);
+
+// Rounds a product by itself: nothing can be fused through this.
+fn rn(v: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(v) ^ frame.zero);
+}
+
+// 1 / w for positive normal w.
+fn recip(w: f32) -> f32 {
+    var r = bitcast<f32>(0x7EF311C7u - bitcast<u32>(w));
+    for (var i = 0; i < 4; i++) {
+        r = rn(r * (2.0 - rn(w * r)));
+    }
+    return r;
+}
+
+// 1 / sqrt(v) for positive normal v.
+fn rsqrt(v: f32) -> f32 {
+    var r = bitcast<f32>(0x5F3759DFu - (bitcast<u32>(v) >> 1u));
+    for (var i = 0; i < 4; i++) {
+        r = rn(r * (1.5 - rn(rn(rn(0.5 * v) * r) * r)));
+    }
+    return r;
+}
+
+// To the nearest integer, ties to even, for |v| < 2^22.
+fn round_to_i32(v: f32) -> i32 {
+    return bitcast<i32>(rn(v + 12582912.0)) - 0x4B400000;
+}
+
+// row . (p, 1)
+fn row_dot(row: vec4<f32>, p: vec3<f32>) -> f32 {
+    return rn(rn(rn(row.x * p.x) + rn(row.y * p.y)) + rn(row.z * p.z)) + row.w;
+}
+
+// row . (n, 0)
+fn row_dot3(row: vec4<f32>, n: vec3<f32>) -> f32 {
+    return rn(rn(row.x * n.x) + rn(row.y * n.y)) + rn(row.z * n.z);
+}
+
+// Homogeneous screen position.
+fn homogeneous(p: vec3<f32>) -> vec4<f32> {
+    return vec4(row_dot(frame.x_row, p), row_dot(frame.y_row, p), row_dot(frame.z_row, p), row_dot(frame.w_row, p));
+}
+
+// 64-bit integers as (low, high) words in two's complement.
+
+fn mul_wide(a: i32, b: i32) -> vec2<u32> {
+    let p = u32(abs(a));
+    let q = u32(abs(b));
+    let low = (p & 0xFFFFu) * (q & 0xFFFFu);
+    let mid = (p >> 16u) * (q & 0xFFFFu) + (low >> 16u);
+    let mid2 = (p & 0xFFFFu) * (q >> 16u) + (mid & 0xFFFFu);
+    let v = vec2(p * q, (p >> 16u) * (q >> 16u) + (mid >> 16u) + (mid2 >> 16u));
+    if (a ^ b) < 0 {
+        return negate_wide(v);
+    }
+    return v;
+}
+
+fn negate_wide(v: vec2<u32>) -> vec2<u32> {
+    return vec2(~v.x + 1u, ~v.y + select(0u, 1u, v.x == 0u));
+}
+
+fn sub_wide(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
+    return vec2(a.x - b.x, a.y - b.y - select(0u, 1u, a.x < b.x));
+}
+
+// Of a value >= 0.
+fn wide_to_f32(v: vec2<u32>) -> f32 {
+    return rn(f32(v.y) * 4294967296.0) + f32(v.x);
+}
+
+// Offsets of sample s in 1/16 px from the pixel's upper left corner.
+fn sample_offset(s: i32) -> vec2<i32> {
+    if frame.samples == 1 {
+        return vec2(8, 8);
+    }
+    // x: 6 14 2 10, y: 2 6 10 14, a nibble each.
+    return vec2((0xA2E6 >> u32(4 * s)) & 15, (0xEA62 >> u32(4 * s)) & 15);
+}
+
+// Upper left corner of a pixel in 1/256 px from the picture's centre.
+fn pixel_corner(pixel: vec2<i32>) -> vec2<i32> {
+    return pixel * 256 - vec2(frame.width, frame.height) * 128;
+}

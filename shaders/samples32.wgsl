@@ -1,0 +1,14 @@
+// Visibility samples without 64-bit atomics, in two phases over all triangles: first the nearest depth, then, where a
+// triangle computes just that depth again, the lowest id. The memory is the same as with 64 bits: low word, high word.
+
+@group(1) @binding(4) var<storage, read_write> samples: array<atomic<u32>>;
+
+override PHASE: u32 = 0u;
+
+fn emit(index: u32, z: f32, id: u32) {
+    if PHASE == 0u {
+        atomicMax(&samples[2u * index + 1u], bitcast<u32>(z));
+    } else if atomicLoad(&samples[2u * index + 1u]) == bitcast<u32>(z) {
+        atomicMax(&samples[2u * index], ~id);
+    }
+}

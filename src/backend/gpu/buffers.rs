@@ -1,0 +1,98 @@
+//! A worker's GPU buffers, kept from job to job.
+
+use super::device::Gpu;
+use super::stages::{SLOTS, Slot};
+use crate::backend::DrawError;
+
+/// What a worker keeps between jobs, at most; a job that needed more gives it all back.
+const KEPT_BYTES_MAX: u64 = 256 << 20;
+
+/// Smallest buffer: a binding may not be empty, and a struct must fit in.
+const SIZE_MIN: u64 = 256;
+
+/// Buffers that grow as jobs need.
+#[derive(Default)]
+pub struct Buffers {
+    storage: [Option<wgpu::Buffer>; SLOTS],
+    /// The plan's numbers.
+    pub frame: Option<wgpu::Buffer>,
+    /// The dispatches' numbers.
+    pub batches: Option<wgpu::Buffer>,
+    /// Where results are read by the CPU.
+    pub staging: Option<wgpu::Buffer>,
+}
+
+impl Buffers {
+    /// A buffer of at least `size` bytes for the slot; what it held is lost if it had to grow.
+    pub fn reserve(&mut self, gpu: &Gpu, slot: Slot, size: u64) -> Result<&wgpu::Buffer, DrawError> {
+        use wgpu::BufferUsages as U;
+        let limit = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
+        if size > limit {
+            return Err(DrawError::Device(format!("it needs a buffer of {size} bytes, and the GPU's limit is {limit}")));
+        }
+        let usage = U::STORAGE | U::COPY_DST | U::COPY_SRC;
+        Ok(grow(gpu, &mut self.storage[slot as usize], size, limit, usage))
+    }
+
+    /// Reserves and fills a buffer. The length is rounded up to whole words with zeros.
+    pub fn upload(&mut self, gpu: &Gpu, slot: Slot, bytes: &[u8]) -> Result<(), DrawError> {
+        let buffer = self.reserve(gpu, slot, bytes.len().next_multiple_of(4) as u64)?;
+        let (words, rest) = bytes.split_at(bytes.len() & !3);
+        if !words.is_empty() {
+            gpu.queue.write_buffer(buffer, 0, words);
+        }
+        if !rest.is_empty() {
+            let mut last = [0; 4];
+            last[..rest.len()].copy_from_slice(rest);
+            gpu.queue.write_buffer(buffer, words.len() as u64, &last);
+        }
+        Ok(())
+    }
+
+    /// The slot's buffer, or an empty one where the plan needs none.
+    pub fn storage(&mut self, gpu: &Gpu, slot: Slot) -> Result<&wgpu::Buffer, DrawError> {
+        self.reserve(gpu, slot, 0)
+    }
+
+    /// Fills a uniform buffer.
+    pub fn upload_uniform<'a>(gpu: &Gpu, slot: &'a mut Option<wgpu::Buffer>, bytes: &[u8]) -> &'a wgpu::Buffer {
+        use wgpu::BufferUsages as U;
+        let buffer = grow(gpu, slot, bytes.len() as u64, gpu.limits.max_buffer_size, U::UNIFORM | U::COPY_DST);
+        gpu.queue.write_buffer(buffer, 0, bytes);
+        buffer
+    }
+
+    /// A buffer of at least `size` bytes that the CPU can map.
+    pub fn staging(&mut self, gpu: &Gpu, size: u64) -> Result<&wgpu::Buffer, DrawError> {
+        use wgpu::BufferUsages as U;
+        let limit = gpu.limits.max_buffer_size;
+        if size > limit {
+            return Err(DrawError::Device(format!("the picture has {size} bytes, and the GPU's limit is {limit}")));
+        }
+        Ok(grow(gpu, &mut self.staging, size, limit, U::MAP_READ | U::COPY_DST))
+    }
+
+    /// Gives everything back if it is more than a worker may keep.
+    pub fn trim(&mut self) {
+        let all = self.storage.iter().chain([&self.frame, &self.batches, &self.staging]);
+        let total: u64 = all.flatten().map(wgpu::Buffer::size).sum();
+        if total > KEPT_BYTES_MAX {
+            *self = Self::default();
+        }
+    }
+}
+
+fn grow<'a>(
+    gpu: &Gpu,
+    slot: &'a mut Option<wgpu::Buffer>,
+    size: u64,
+    limit: u64,
+    usage: wgpu::BufferUsages,
+) -> &'a wgpu::Buffer {
+    let kept = slot.take().filter(|buffer| buffer.size() >= size);
+    slot.insert(kept.unwrap_or_else(|| {
+        // A quarter more than asked for, so that a row of slowly growing jobs does not allocate each time.
+        let size = (size + size / 4).next_multiple_of(SIZE_MIN).clamp(SIZE_MIN, limit & !3);
+        gpu.device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
+    }))
+}

@@ -1,0 +1,163 @@
+//! Turns a [`Schedule`](super::schedule::Schedule)'s steps into commands and hands them to the device.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::mpsc;
+use std::time::Duration;
+
+use super::buffers::Buffers;
+use super::device::Gpu;
+use super::params::{BATCH_STRIDE, Batch, Frame, pack};
+use super::stages::{Pipeline, Slot, Stage, uniforms_layout};
+use crate::backend::DrawError;
+use crate::limits::Deadline;
+
+/// How long another thread's poll may take to run our map callback after the work is done.
+const CALLBACK_WAIT: Duration = Duration::from_millis(10);
+const CALLBACK_WAITS_MAX: u32 = 500;
+
+/// One job's commands.
+pub struct Recorder<'a> {
+    gpu: &'a Gpu,
+    deadline: &'a Deadline,
+    buffers: &'a mut Buffers,
+    uniforms: wgpu::BindGroup,
+    kernels: HashMap<Stage, (Arc<Pipeline>, wgpu::BindGroup)>,
+    encoder: Option<wgpu::CommandEncoder>,
+    pass: Option<wgpu::ComputePass<'static>>,
+    in_flight: Option<wgpu::SubmissionIndex>,
+}
+
+impl<'a> Recorder<'a> {
+    /// Begins a job. Everything must be uploaded and reserved before the first dispatch.
+    pub fn new(
+        gpu: &'a Gpu,
+        deadline: &'a Deadline,
+        buffers: &'a mut Buffers,
+        frame: &Frame,
+        batches: &[Batch],
+    ) -> Self {
+        let frame = Buffers::upload_uniform(gpu, &mut buffers.frame, bytemuck::bytes_of(frame)).clone();
+        let batches = Buffers::upload_uniform(gpu, &mut buffers.batches, &pack(batches)).clone();
+        let one = wgpu::BufferBinding { buffer: &batches, offset: 0, size: wgpu::BufferSize::new(BATCH_STRIDE as u64) };
+        let uniforms = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &uniforms_layout(&gpu.device),
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: frame.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(one) },
+            ],
+        });
+        Self { gpu, deadline, buffers, uniforms, kernels: HashMap::new(), encoder: None, pass: None, in_flight: None }
+    }
+
+    /// Runs a kernel.
+    pub fn dispatch(&mut self, stage: Stage, batch: usize, workgroups: [u32; 2]) -> Result<(), DrawError> {
+        if !self.kernels.contains_key(&stage) {
+            let kernel = self.kernel(stage)?;
+            self.kernels.insert(stage, kernel);
+        }
+        self.begin_pass();
+        if let (Some(pass), Some((pipeline, group))) = (&mut self.pass, self.kernels.get(&stage)) {
+            pass.set_pipeline(&pipeline.pipeline);
+            pass.set_bind_group(0, &self.uniforms, &[(batch * BATCH_STRIDE) as u32]);
+            pass.set_bind_group(1, group, &[]);
+            pass.dispatch_workgroups(workgroups[0], workgroups[1], 1);
+        }
+        Ok(())
+    }
+
+    /// Fills the first `size` bytes of a buffer with zeros.
+    pub fn clear(&mut self, slot: Slot, size: u64) -> Result<(), DrawError> {
+        let buffer = self.buffers.storage(self.gpu, slot)?.clone();
+        self.encoder().clear_buffer(&buffer, 0, Some(size));
+        Ok(())
+    }
+
+    /// Copies the first `size` bytes of a buffer to `offset` in the staging buffer.
+    pub fn copy_out(&mut self, slot: Slot, size: u64, offset: u64) -> Result<(), DrawError> {
+        let from = self.buffers.storage(self.gpu, slot)?.clone();
+        if let Some(to) = self.buffers.staging.clone() {
+            self.encoder().copy_buffer_to_buffer(&from, 0, &to, offset, Some(size));
+        }
+        Ok(())
+    }
+
+    /// Hands the commands so far to the device, at most two submissions ahead of it.
+    pub fn submit(&mut self) -> Result<(), DrawError> {
+        self.pass = None;
+        if let Some(encoder) = self.encoder.take() {
+            let submission = self.gpu.queue.submit([encoder.finish()]);
+            if let Some(before) = self.in_flight.replace(submission) {
+                self.gpu.wait(&before, self.deadline)?;
+            }
+        }
+        Ok(self.deadline.check()?)
+    }
+
+    /// Submits, waits, and lends the first `size` bytes of the staging buffer to `read`.
+    pub fn read_staging(&mut self, size: u64, read: impl FnOnce(&[u8])) -> Result<(), DrawError> {
+        self.submit()?;
+        let (Some(submission), Some(staging)) = (self.in_flight.take(), self.buffers.staging.clone()) else {
+            return Ok(());
+        };
+        let (sender, mapped) = mpsc::channel();
+        staging.map_async(wgpu::MapMode::Read, 0..size, move |result| {
+            // A job that gave up does not listen any more.
+            let _ = sender.send(result);
+        });
+        self.gpu.wait(&submission, self.deadline)?;
+        self.wait_mapped(&mapped)?;
+        let view = staging.get_mapped_range(0..size).map_err(|e| DrawError::Device(e.to_string()))?;
+        read(&view);
+        drop(view);
+        staging.unmap();
+        Ok(())
+    }
+
+    /// Another worker's poll may have taken our callback and be about to run it.
+    fn wait_mapped(&self, mapped: &mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>) -> Result<(), DrawError> {
+        for _ in 0..CALLBACK_WAITS_MAX {
+            match mapped.recv_timeout(CALLBACK_WAIT) {
+                Ok(Ok(())) => return Ok(()),
+                Ok(Err(error)) => return Err(DrawError::Device(format!("reading the picture back failed: {error}"))),
+                Err(_) => self.gpu.check()?,
+            }
+        }
+        Err(self.gpu.declare_lost("the picture was never handed back"))
+    }
+
+    fn kernel(&mut self, stage: Stage) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
+        let pipeline = self.gpu.stages.get(&self.gpu.device, stage);
+        let mut bound = Vec::new();
+        for &(slot, _) in stage.buffers() {
+            bound.push((slot, self.buffers.storage(self.gpu, slot)?.clone()));
+        }
+        let entries: Vec<_> = bound
+            .iter()
+            .map(|(slot, buffer)| wgpu::BindGroupEntry { binding: *slot as u32, resource: buffer.as_entire_binding() })
+            .collect();
+        let group = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.buffers,
+            entries: &entries,
+        });
+        Ok((pipeline, group))
+    }
+
+    fn begin_pass(&mut self) {
+        if self.pass.is_none() {
+            let descriptor = wgpu::ComputePassDescriptor { label: None, timestamp_writes: None };
+            let pass = self.encoder().begin_compute_pass(&descriptor).forget_lifetime();
+            self.pass = Some(pass);
+        }
+    }
+
+    /// The encoder, outside any pass.
+    fn encoder(&mut self) -> &mut wgpu::CommandEncoder {
+        self.pass = None;
+        self.encoder.get_or_insert_with(|| {
+            self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None })
+        })
+    }
+}

@@ -1,0 +1,203 @@
+//! The compute pipelines, made when a plan first needs them.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A kernel, in one of its variants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Vertices to the screen.
+    Transform,
+    /// Triangles to samples: small ones, and a list of the large ones.
+    Visibility {
+        /// Whether triangles may need clipping.
+        clip: bool,
+        /// How samples are written.
+        write: Write,
+    },
+    /// Large triangles to samples.
+    VisibilityTile {
+        /// As above.
+        clip: bool,
+        /// As above.
+        write: Write,
+    },
+}
+
+/// How a visibility kernel writes samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Write {
+    /// Depth and id in one 64-bit maximum.
+    Both,
+    /// The maximum of the depths.
+    Depth,
+    /// The lowest id of those that have that depth.
+    Id,
+}
+
+/// Buffers by their binding number in group 1 of every shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u32)]
+pub enum Slot {
+    Positions,
+    HullNormals,
+    Triangles,
+    Vertices,
+    Samples,
+    Work,
+}
+
+/// Number of [`Slot`]s.
+pub const SLOTS: usize = 6;
+
+/// Whether a kernel writes to a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    Read,
+    ReadWrite,
+}
+
+/// A pipeline and the layout of its group 1.
+pub struct Pipeline {
+    pub pipeline: wgpu::ComputePipeline,
+    pub buffers: wgpu::BindGroupLayout,
+}
+
+/// All pipelines of a device so far.
+#[derive(Default)]
+pub struct Stages {
+    made: Mutex<HashMap<Stage, Arc<Pipeline>>>,
+}
+
+impl Stages {
+    /// The pipeline of a stage.
+    pub fn get(&self, device: &wgpu::Device, stage: Stage) -> Arc<Pipeline> {
+        // Held while compiling: two workers that begin together want the same pipelines.
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        made.entry(stage).or_insert_with(|| Arc::new(stage.compile(device))).clone()
+    }
+}
+
+/// The layout of group 0: the plan's numbers, and at a dynamic offset the dispatch's.
+pub fn uniforms_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, has_dynamic_offset| {
+        layout_entry(binding, wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset,
+            min_binding_size: None,
+        })
+    };
+    let entries = [entry(0, false), entry(1, true)];
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("uniforms"), entries: &entries })
+}
+
+fn layout_entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
+}
+
+const COMMON: &str = include_str!("../../../shaders/common.wgsl");
+const CLIP: &str = include_str!("../../../shaders/clip.wgsl");
+const TRIANGLE: &str = include_str!("../../../shaders/triangle.wgsl");
+const SAMPLES_32: &str = include_str!("../../../shaders/samples32.wgsl");
+const SAMPLES_64: &str = include_str!("../../../shaders/samples64.wgsl");
+const VISIBILITY_COMMON: &str = include_str!("../../../shaders/visibility_common.wgsl");
+
+impl Stage {
+    /// The buffers of group 1 that the kernel declares.
+    pub fn buffers(self) -> &'static [(Slot, Access)] {
+        use Access::{Read, ReadWrite};
+        match self {
+            Self::Transform => &[(Slot::Positions, Read), (Slot::HullNormals, Read), (Slot::Vertices, ReadWrite)],
+            Self::Visibility { .. } => &[
+                (Slot::Positions, Read),
+                (Slot::HullNormals, Read),
+                (Slot::Triangles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, ReadWrite),
+                (Slot::Work, ReadWrite),
+            ],
+            Self::VisibilityTile { .. } => &[
+                (Slot::Positions, Read),
+                (Slot::HullNormals, Read),
+                (Slot::Triangles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, ReadWrite),
+                (Slot::Work, Read),
+            ],
+        }
+    }
+
+    /// Name of the entry point, and of the file in shaders/.
+    fn entry(self) -> &'static str {
+        match self {
+            Self::Transform => "transform",
+            Self::Visibility { .. } => "visibility",
+            Self::VisibilityTile { .. } => "visibility_tile",
+        }
+    }
+
+    /// WGSL has no include: a kernel is its files, one after the other.
+    fn source(self) -> String {
+        let visibility = |write: Write, kernel| {
+            let samples = if write == Write::Both { SAMPLES_64 } else { SAMPLES_32 };
+            [COMMON, CLIP, TRIANGLE, VISIBILITY_COMMON, samples, kernel].concat()
+        };
+        match self {
+            Self::Transform => [COMMON, include_str!("../../../shaders/transform.wgsl")].concat(),
+            Self::Visibility { write, .. } => visibility(write, include_str!("../../../shaders/visibility.wgsl")),
+            Self::VisibilityTile { write, .. } => {
+                visibility(write, include_str!("../../../shaders/visibility_tile.wgsl"))
+            }
+        }
+    }
+
+    /// Values of the kernel's `override` constants.
+    fn constants(self) -> Vec<(&'static str, f64)> {
+        match self {
+            Self::Transform => vec![],
+            Self::Visibility { clip, write } | Self::VisibilityTile { clip, write } => {
+                let mut constants = vec![("CLIP", f64::from(u8::from(clip)))];
+                match write {
+                    Write::Both => {}
+                    Write::Depth => constants.push(("PHASE", 0.0)),
+                    Write::Id => constants.push(("PHASE", 1.0)),
+                }
+                constants
+            }
+        }
+    }
+
+    fn compile(self, device: &wgpu::Device) -> Pipeline {
+        let label = Some(self.entry());
+        let source = wgpu::ShaderSource::Wgsl(self.source().into());
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
+        let entries: Vec<_> = self.buffers().iter().map(|&(slot, access)| buffer_entry(slot, access)).collect();
+        let buffers = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: &[Some(&uniforms_layout(device)), Some(&buffers)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label,
+            layout: Some(&layout),
+            module: &module,
+            entry_point: label,
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &self.constants(),
+                // The kernels write their workgroup memory before they read it.
+                zero_initialize_workgroup_memory: false,
+            },
+            cache: None,
+        });
+        Pipeline { pipeline, buffers }
+    }
+}
+
+fn buffer_entry(slot: Slot, access: Access) -> wgpu::BindGroupLayoutEntry {
+    layout_entry(slot as u32, wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Storage { read_only: access == Access::Read },
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    })
+}
