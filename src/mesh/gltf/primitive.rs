@@ -39,13 +39,12 @@ impl Primitive {
             _ => None,
         };
         if let Some((code, detail)) = ignored {
-            warnings.push(Warning { code, detail: format!("{what}: {detail}") });
+            warn_once(warnings, code, format!("{detail}, such as {what}"));
             return Ok(None);
         }
         let attribute = |semantic| json.attributes.get(&Checked::Valid(semantic)).map(|index| index.value());
         let Some(position) = attribute(Semantic::Positions) else {
-            warnings
-                .push(Warning { code: "no_positions", detail: format!("{what} has no positions and is not drawn") });
+            warn_once(warnings, "no_positions", format!("{what} has no positions and is not drawn"));
             return Ok(None);
         };
         let positions: Vec<[f64; 3]> = reader.vectors(position, Type::Vec3, Integers::AsDeclared, cx)?;
@@ -133,6 +132,13 @@ fn read_colors(reader: &mut Reader<'_>, index: usize, cx: &mut Context<'_>) -> R
         return Ok(colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect());
     }
     reader.vectors(index, Type::Vec4, Integers::Normalised, cx)
+}
+
+/// A file may have 100,000 primitives of a kind that is not drawn.
+fn warn_once(warnings: &mut Vec<Warning>, code: &'static str, detail: String) {
+    if warnings.iter().all(|w| w.code != code) {
+        warnings.push(Warning { code, detail });
+    }
 }
 
 /// The triangles of a list, strip or fan. Indices that do not make up a whole triangle are left over.

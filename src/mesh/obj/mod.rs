@@ -3,6 +3,8 @@
 
 mod clean;
 mod face;
+mod left_out;
+mod lines;
 
 use self::clean::Cleaner;
 use super::import::Context;
