@@ -6,6 +6,7 @@
 mod attributes;
 pub mod edges;
 mod error;
+mod gltf;
 mod import;
 mod normalise;
 pub mod normals;
