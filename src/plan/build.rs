@@ -114,7 +114,7 @@ fn surface_pass<'a>(
     }
     let [right, up, back] = camera.axes;
     // Over the viewer's left shoulder: straight ahead would leave every shape without a lit side.
-    let to_light = (back - 0.35 * right + 0.45 * up).normalize();
+    let to_light = (back - 0.5 * right + 0.7 * up).normalize();
     let halfway = (to_light + back).normalize();
     SurfacePass {
         faces: match surface.cull {

@@ -64,6 +64,14 @@ impl Segment {
         [(low as i32).max(0), (high as i32).min(width_px as i32 - 1)]
     }
 
+    /// Whether the point at `t` lies within twice the reach of the first and of the second end.
+    #[inline(always)]
+    fn close_to_ends(&self, t: f32) -> [bool; 2] {
+        // t < 2 reach / length, squared so that no root is needed.
+        let limit = 4.0 * self.reach * self.reach * self.inverse_length_squared;
+        [t * t < limit, (1.0 - t) * (1.0 - t) < limit]
+    }
+
     /// Where along the edge (0 to 1) the point nearest to `p` lies, and the way from there to `p`.
     #[inline(always)]
     fn nearest(&self, p: [f32; 2]) -> (f32, [f32; 2]) {
@@ -211,8 +219,7 @@ fn visible_samples(
         let id = band.ids[i];
         let nothing_nearer = id == NOTHING || depth >= band.depth[i] || id == edge.faces[0] || id == edge.faces[1];
         if !nothing_nearer && id != last.0 {
-            let point = [segment.start[0] + t * segment.along[0], segment.start[1] + t * segment.along[1]];
-            last = (id, !planes.get(stages, id).hides(edge, point, depth));
+            last = (id, !planes.get(stages, id).hides(edge, segment, t, depth));
         }
         count += u32::from(nothing_nearer || last.1);
     }
@@ -252,13 +259,18 @@ impl Plane {
     /// Whether this triangle, which is nearer than the edge at a sample close by, really lies in front of it. The plane is
     /// continued to the edge's own point, because close to a fold the sample itself may be nearer without hiding anything.
     #[inline(always)]
-    fn hides(&self, edge: &Edge, point: [f32; 2], depth: f32) -> bool {
-        let [a, b] = edge.vertices;
-        if self.vertices.iter().any(|&v| v == a || v == b) {
-            return false;
-        }
+    fn hides(&self, edge: &Edge, segment: &Segment, t: f32, depth: f32) -> bool {
+        let point = [segment.start[0] + t * segment.along[0], segment.start[1] + t * segment.along[1]];
         let plane = self.depth[0] + self.depth[1] * point[0] + self.depth[2] * point[1];
-        plane > depth + self.tolerance
+        plane > depth + self.tolerance && !self.meets(edge, segment, t)
+    }
+
+    /// Whether this triangle meets the edge at an end close to `t`: around a vertex, the faces of one fan do not hide each
+    /// other's edges. Farther along they may, as a silhouette hides the edges behind it.
+    #[inline(always)]
+    fn meets(&self, edge: &Edge, segment: &Segment, t: f32) -> bool {
+        let close = segment.close_to_ends(t);
+        (0..2).any(|end| close[end] && self.vertices.contains(&edge.vertices[end]))
     }
 }
 
