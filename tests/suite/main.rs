@@ -5,3 +5,4 @@ mod raster;
 mod scenes;
 mod shapes;
 mod structure;
+mod twins;
