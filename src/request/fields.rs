@@ -14,8 +14,14 @@ pub struct Field {
     pub kind: Kind,
     /// Whether `null` may be given: it means "as if the key were missing".
     pub nullable: bool,
-    set: Box<dyn Fn(&mut Draft, Value) + Send + Sync>,
+    set: Setter,
 }
+
+/// Puts a value in its place.
+type Setter = Box<dyn Fn(&mut Draft, Value) + Send + Sync>;
+
+/// A layer's name, and how it is turned on and off.
+type Layer = (&'static str, fn(&mut Draft, bool));
 
 impl Field {
     /// Puts a value that passed [`Field::kind`] into the draft.
@@ -40,7 +46,7 @@ pub static FIELDS: LazyLock<Vec<Field>> = LazyLock::new(|| {
 });
 
 /// Layers: `null` turns one off, `{}` turns it on with its defaults.
-pub const LAYERS: &[(&str, fn(&mut Draft, bool))] = &[
+pub const LAYERS: &[Layer] = &[
     ("surface", |d, on| {
         if on {
             d.surface();

@@ -36,8 +36,11 @@ pub struct Rules {
     pub backend: BackendChoice,
 }
 
+/// Dotted keys and their values, as text.
+pub type Overrides = [(String, String)];
+
 /// Reads a document and the dotted keys that override it, in order.
-pub fn read(document: Option<&[u8]>, overrides: &[(String, String)], rules: &Rules) -> Result<Spec, RequestError> {
+pub fn read(document: Option<&[u8]>, overrides: &Overrides, rules: &Rules) -> Result<Spec, RequestError> {
     let mut pairs = match document {
         Some(bytes) => json::flatten(bytes, rules.limits.json_depth)?,
         None => Vec::new(),
