@@ -53,7 +53,7 @@ impl From<RenderError> for Complaint {
     fn from(error: RenderError) -> Self {
         match error {
             RenderError::Mesh(_) | RenderError::Limit(_) => Self::input(error.to_string()),
-            RenderError::Draw(DrawError::Device(detail)) => {
+            RenderError::Draw(DrawError::Device(detail) | DrawError::NoGpu(detail)) => {
                 Self::ours(format!("the GPU cannot draw this ({detail}); try --backend cpu"))
             }
             RenderError::Stopped(_) | RenderError::Draw(_) | RenderError::Encode(_) => Self::ours(error.to_string()),

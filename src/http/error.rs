@@ -123,7 +123,7 @@ impl From<&RenderError> for ApiError {
             RenderError::Stopped(stopped) => deadline(stopped.to_string()),
             RenderError::Draw(DrawError::Stopped(stopped)) => deadline(stopped.to_string()),
             // Only reachable by asking for the GPU by name: `auto` goes on with the CPU.
-            RenderError::Draw(DrawError::Device(_)) => {
+            RenderError::Draw(DrawError::Device(_) | DrawError::NoGpu(_)) => {
                 let detail = "the GPU of this server cannot draw this; ask for backend=auto or backend=cpu";
                 Self::new(StatusCode::UNPROCESSABLE_ENTITY, "backend_unavailable", detail)
             }
