@@ -228,11 +228,8 @@ fn bounds(positions: &[[f32; 3]]) -> [[f32; 3]; 2] {
 fn empty(report: &ImportReport) -> MeshError {
     let faces: u64 = report.polygons_by_arity.iter().sum();
     let (nonfinite, degenerate) = (report.dropped_nonfinite_faces, report.dropped_degenerate_faces);
-    let mut detail = format!(
-        "the {} file has nothing to draw: {} vertices and {faces} faces",
-        report.format.name().to_uppercase(),
-        report.file_vertices
-    );
+    let mut detail =
+        format!("the {} file has nothing to draw: {} vertices and {faces} faces", report.format, report.file_vertices);
     if nonfinite + degenerate > 0 {
         detail +=
             &format!(", of whose triangles {nonfinite} have a NaN or infinite corner and {degenerate} have no area");

@@ -1,1 +1,8 @@
 //! The one integration binary: a module per concern.
+
+mod formats;
+mod formats_bad;
+mod formats_gltf;
+mod formats_shared;
+mod mesh_files;
+mod shared;
