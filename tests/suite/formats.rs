@@ -7,13 +7,14 @@ use meshsnap::mesh::topology::Topology;
 use meshsnap::mesh::{Format, Mesh, UpAxis};
 use serde_json::json;
 
-fn edges(mesh: &Mesh) -> EdgeList {
+/// The edge list, with default limits.
+pub fn edges(mesh: &Mesh) -> EdgeList {
     let limits = meshsnap::limits::Limits::default();
     EdgeList::of(mesh, &mut meshsnap::limits::Budget::new(&limits)).unwrap()
 }
 
 /// What must not depend on the format.
-fn assert_same_shape(a: &Mesh, b: &Mesh, what: &str) {
+pub fn assert_same_shape(a: &Mesh, b: &Mesh, what: &str) {
     assert_eq!(a.positions, b.positions, "{what}");
     assert_eq!(a.triangles, b.triangles, "{what}");
     assert_eq!(a.face_normals, b.face_normals, "{what}");
@@ -80,103 +81,6 @@ fn a_box_is_watertight_and_its_quads_stay_quads() {
         let middle: Vec<f32> = (0..3).map(|k| t.iter().map(|&v| mesh.positions[v as usize][k]).sum::<f32>()).collect();
         assert!((0..3).map(|k| middle[k] * n[k]).sum::<f32>() > 0.0, "normals point outwards");
         assert_eq!(n.iter().map(|c| c * c).sum::<f32>(), 1.0);
-    }
-}
-
-/// The area of the triangles, and that none runs against the polygon, tell that a polygon was cut rightly.
-#[test]
-fn concave_polygons_are_cut_inside() {
-    let comb = |teeth: u32| {
-        let mut outline = vec![[0.0, 0.0], [f64::from(2 * teeth), 0.0]];
-        for i in (0..2 * teeth).rev() {
-            outline.push([f64::from(i) + 0.5, if i % 2 == 0 { 3.0 } else { 1.0 }]);
-        }
-        outline
-    };
-    let star = |n: u32| -> Vec<[f64; 2]> {
-        (0..2 * n)
-            .map(|i| {
-                let (r, a) = (if i % 2 == 0 { 2.0 } else { 0.5 }, f64::from(i) * std::f64::consts::PI / f64::from(n));
-                [r * libm::cos(a), r * libm::sin(a)]
-            })
-            .collect()
-    };
-    let shapes: Vec<Vec<[f64; 2]>> = vec![
-        vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]],
-        vec![[0.0, 0.0], [2.0, 2.0], [4.0, 0.0], [2.0, 1.0 / 8.0]], // a quad with a reflex corner: one diagonal is wrong
-        vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 2.0], [0.0, 2.0]], // corners in line
-        vec![
-            [0.0, 0.0],
-            [4.0, 0.0],
-            [4.0, 4.0],
-            [0.0, 4.0],
-            [0.0, 0.0],
-            [1.0, 1.0],
-            [1.0, 3.0],
-            [3.0, 3.0],
-            [3.0, 1.0],
-            [1.0, 1.0],
-        ],
-        comb(3),
-        comb(20),
-        star(5),
-        star(101),
-    ];
-    let mut cases = 0;
-    for outline in &shapes {
-        let n = outline.len();
-        let signed: f64 = (0..n)
-            .map(|i| outline[i][0] * outline[(i + 1) % n][1] - outline[(i + 1) % n][0] * outline[i][1])
-            .sum::<f64>();
-        for axis in 0..3 {
-            for reversed in [false, true] {
-                let mut obj = String::new();
-                for p in outline {
-                    let mut q = [0.25; 3];
-                    (q[axis], q[(axis + 1) % 3]) = (p[0], p[1]);
-                    obj += &format!("v {} {} {}\n", q[0], q[1], q[2]);
-                }
-                let order: Vec<usize> = if reversed { (1..=n).rev().collect() } else { (1..=n).collect() };
-                obj += &format!("f {}\n", order.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));
-                let mesh = read(obj.as_bytes()).unwrap();
-                let normal_axis = (axis + 2) % 3;
-                let sign = if reversed { -signed.signum() } else { signed.signum() };
-                let mut area = 0.0;
-                for (t, normal) in mesh.triangles.iter().zip(&mesh.face_normals) {
-                    assert_eq!(f64::from(normal[normal_axis]), sign, "{outline:?}");
-                    let p = t.map(|v| mesh.positions[v as usize].map(f64::from));
-                    let (u, v) = (axis, (axis + 1) % 3);
-                    area += (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) - (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
-                }
-                let area = area * mesh.to_file.scale * mesh.to_file.scale;
-                assert!((area.abs() - signed.abs()).abs() < 1e-5 * signed.abs(), "{area} {signed} {outline:?}");
-                // Every corner is joined to the next by an edge that is drawn.
-                let drawn = edges(&mesh).edges.iter().filter(|e| e.is_polygon_edge).count();
-                let bridges = usize::from(n == 10 && outline[0] == outline[4]);
-                assert_eq!(drawn, n - bridges, "{outline:?}");
-                cases += 1;
-            }
-        }
-    }
-    assert_eq!(cases, shapes.len() * 6);
-}
-
-#[test]
-fn convex_quads_are_cut_along_the_shorter_diagonal() {
-    let quad = |first: usize| {
-        let corners = [[0.0, 0.0], [3.0, 0.0], [4.0, 1.0], [1.0, 1.0]];
-        let mut obj = String::new();
-        for k in 0..4 {
-            let p = corners[(first + k) % 4];
-            obj += &format!("v {} {} 0\n", p[0], p[1]);
-        }
-        read((obj + "f 1 2 3 4\n").as_bytes()).unwrap()
-    };
-    for first in 0..4 {
-        let mesh = quad(first);
-        let hidden = edges(&mesh).edges.into_iter().find(|e| !e.is_polygon_edge).unwrap();
-        let [a, b] = hidden.vertices.map(|v| mesh.positions[v as usize]);
-        assert_eq!((a[0] - b[0]).abs() * 4.0, 2.0, "from (3, 0) to (1, 1)");
     }
 }
 
@@ -254,86 +158,6 @@ fn bad_faces_are_dropped_and_counted() {
     assert_eq!(mesh.report.dropped_nonfinite_faces, 3);
     assert_eq!(mesh.report.dropped_degenerate_faces, 2);
     assert_eq!(mesh.to_file.scale, 1.0);
-}
-
-#[test]
-fn obj_in_all_its_forms() {
-    let cube = Solid::cuboid();
-    let plain = read(cube.obj().as_bytes()).unwrap();
-    let n = cube.positions.len() as i64;
-    let relative = {
-        let mut out = String::new();
-        for [x, y, z] in &cube.positions {
-            out += &format!("v {x} {y} {z} 1.0\n");
-        }
-        for p in &cube.polygons {
-            let corners: Vec<String> = p.iter().map(|v| format!("{}//", i64::from(*v) - n)).collect();
-            out += &format!("f {}\n", corners.join(" "));
-        }
-        out
-    };
-    let variants = [
-        cube.obj().replace('\n', "\r\n"),
-        cube.obj().replace('\n', "\r"),
-        format!("\u{feff}{}", cube.obj()),
-        cube.obj().replace("\nf ", "\no part\ng a b\ns 1\nf "),
-        cube.obj().replace("\nf ", "\n f\t").replace("v ", "  v   "),
-        cube.obj().replace("\nf ", "\nf \\\n"),
-        cube.obj().replace("\nf ", " # a comment\nf "),
-        format!("f\nf 1\nf 1 2\nl 1 2\np 1\n{}", cube.obj()),
-        relative,
-        cube.obj() + "curv 0 1 2\nunknown words here\n",
-    ];
-    for (i, text) in variants.iter().enumerate() {
-        let mesh = read(text.as_bytes()).unwrap_or_else(|e| panic!("variant {i}: {e}"));
-        assert_same_shape(&plain, &mesh, text);
-        assert_eq!(mesh.edge_masks, plain.edge_masks);
-    }
-    let mut latin1 = cube.obj().into_bytes();
-    latin1.extend(b"# caf\xe9\ng caf\xe9\nusemtl caf\xe9\n");
-    assert_same_shape(&plain, &read(&latin1).unwrap(), "latin-1");
-}
-
-#[test]
-fn obj_faces_of_different_forms_keep_their_own_attributes() {
-    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0.25 0.5\nvn 1 0 0\n\
-               f 1 2 3\nf 1/1 2/1 4/1\nf 1//1 3//1 4//1\nf 2/1/1 3/1/1 4/1/1\nf 1/1 2 3/1/1\n";
-    let mesh = read(obj.as_bytes()).unwrap();
-    assert_eq!(mesh.triangles.len(), 5);
-    let at = |t: usize, c: usize| mesh.attribute_triangles[t][c] as usize;
-    let face = |t: usize| mesh.face_normals[t];
-    let expected_uv = [[0.0; 2], [0.25, 0.5], [0.0; 2], [0.25, 0.5], [0.0; 2]];
-    let expected_normal = [face(0), face(1), [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], face(4)];
-    for t in 0..5 {
-        for c in 0..3 {
-            assert_eq!(mesh.uvs[at(t, c)], expected_uv[t], "{t}");
-            if t != 4 {
-                assert_eq!(mesh.normals[at(t, c)], expected_normal[t], "{t}");
-            }
-        }
-    }
-    assert!(mesh.report.warnings.iter().any(|w| w.code == "normals_repaired"));
-}
-
-#[test]
-fn obj_materials_and_colours() {
-    let obj = "mtllib x.mtl\nv 0 0 0 1 0 0\nv 1 0 0 0 0.5 0\nv 0 1 0\nv 0 0 1 0 0 1 0.5\n\
-               usemtl Red Glass\nf 1 2 3\nusemtl Blue\nf 1 2 4\nusemtl Red Glass\nf 1 3 4\n";
-    let mesh = read(obj.as_bytes()).unwrap();
-    let names: Vec<&str> = mesh.materials.iter().map(|m| m.name.as_str()).collect();
-    assert_eq!(names, ["Red Glass", "Blue"]);
-    assert_eq!(mesh.triangle_materials, [0, 1, 0]);
-    let color = |t: usize, c: usize| mesh.colors[mesh.attribute_triangles[t][c] as usize];
-    assert_eq!(color(0, 0), [1.0, 0.0, 0.0, 1.0]);
-    assert!((color(0, 1)[1] - 0.2140411).abs() < 1e-6, "sRGB 0.5 is linear 0.214");
-    assert_eq!(color(0, 2), [1.0; 4], "a vertex without a colour is white");
-    assert_eq!(color(1, 2), [0.0, 0.0, 1.0, 1.0]);
-    for code in ["mtl_ignored", "colors_incomplete"] {
-        assert!(mesh.report.warnings.iter().any(|w| w.code == code), "{code}");
-    }
-    let unnamed = read(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nusemtl A\nf 3 2 1\n").unwrap();
-    assert_eq!(unnamed.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["", "A"]);
-    assert_eq!(unnamed.triangle_materials, [0, 1]);
 }
 
 #[test]

@@ -3,6 +3,10 @@
 mod formats;
 mod formats_bad;
 mod formats_gltf;
+mod formats_gltf_document;
+mod formats_hostile;
+mod formats_obj;
+mod formats_polygons;
 mod formats_shared;
 mod mesh_files;
 mod shared;
