@@ -46,6 +46,18 @@ impl Format {
     }
 }
 
+impl std::fmt::Display for Format {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Obj => "OBJ",
+            Self::Gltf => "glTF",
+            Self::Glb => "GLB",
+            Self::StlBinary => "binary STL",
+            Self::StlAscii => "ASCII STL",
+        })
+    }
+}
+
 /// Reads a mesh from the bytes of one file. `format` overrides sniffing.
 pub fn import(
     bytes: &[u8],

@@ -1,7 +1,7 @@
 //! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
 //!
-//! Reading order: [`raw`] (what an importer fills), [`import`] (sniffs the format and calls one), [`normalise`] (raw to
-//! `Mesh`), then [`normals`] and [`edges`], which the plan asks for when a look needs them.
+//! Reading order: [`raw`] (what an importer fills), `import` (sniffs the format and calls one), `obj`, `stl` and `gltf` (the
+//! importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and [`topology`], for whoever needs them.
 
 mod attributes;
 pub mod edges;
@@ -17,6 +17,7 @@ pub mod raw;
 mod sniff;
 mod stl;
 pub mod topology;
+mod weld;
 
 pub use error::{MeshError, MeshFault};
 pub use import::{Format, import};

@@ -37,6 +37,16 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Fails if an accessor has no data because that is compressed.
+    pub fn check_not_compressed(&self, index: usize) -> Result<(), MeshError> {
+        let accessor = self.accessor(index)?;
+        let is_empty = accessor.buffer_view.is_none() && accessor.sparse.is_none();
+        match super::document::compression(self.root) {
+            Some(error) if is_empty => Err(error),
+            _ => Ok(()),
+        }
+    }
+
     /// Vectors with `N` components. The accessor must be of the `expected` type, which has `N` components.
     pub fn vectors<const N: usize>(
         &mut self,

@@ -71,9 +71,9 @@ impl<'a> Buffers<'a> {
             (Some(uri), _) => Cow::Owned(from_uri(uri, index, cx)?),
             (None, Some(bin)) if index == 0 => Cow::Borrowed(bin),
             (None, _) => {
-                return Err(MeshError::broken(format!(
-                    "buffer {index} of the glTF file has neither a URI nor a GLB chunk"
-                )));
+                return Err(super::document::compression(self.root).unwrap_or_else(|| {
+                    MeshError::broken(format!("buffer {index} of the glTF file has neither a URI nor a GLB chunk"))
+                }));
             }
         };
         if buffer.byte_length.0 > bytes.len() as u64 {

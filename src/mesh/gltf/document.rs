@@ -75,6 +75,7 @@ fn pruned(json: &[u8]) -> Option<Value> {
     for key in ["animations", "cameras", "extensions", "extras", "images", "samplers", "skins", "textures"] {
         root.remove(key);
     }
+    root.values_mut().for_each(make_integral);
     for scene in root.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
         scene.as_object_mut()?.entry("nodes").or_insert(Value::Array(Vec::new()));
     }
@@ -85,6 +86,29 @@ fn pruned(json: &[u8]) -> Option<Value> {
         }
     }
     Some(value)
+}
+
+/// `1.0` is a good integer in JSON. The document's depth is limited, and so is this recursion.
+fn make_integral(value: &mut Value) {
+    match value {
+        Value::Array(list) => list.iter_mut().for_each(make_integral),
+        Value::Object(map) => map.values_mut().for_each(make_integral),
+        Value::Number(number) => {
+            let whole = number.as_f64().filter(|v| number.is_f64() && v.fract() == 0.0 && v.abs() < 9e15);
+            if let Some(whole) = whole {
+                *value = if whole < 0.0 { Value::from(whole as i64) } else { Value::from(whole as u64) };
+            }
+        }
+        _ => {}
+    }
+}
+
+/// The compression that the file says it uses, if any: data may be missing because it is in there.
+pub fn compression(root: &Root) -> Option<MeshError> {
+    let name = root.extensions_used.iter().find(|e| e.ends_with("_compression"))?;
+    let detail =
+        format!("the glTF file keeps its geometry in {name:.40}, which is not read: export it without compression");
+    Some(MeshError::new(MeshFault::Unsupported, detail))
 }
 
 fn check_demands(root: &Root) -> Result<(), MeshError> {

@@ -47,6 +47,7 @@ impl Primitive {
             warn_once(warnings, "no_positions", format!("{what} has no positions and is not drawn"));
             return Ok(None);
         };
+        reader.check_not_compressed(position)?;
         let positions: Vec<[f64; 3]> = reader.vectors(position, Type::Vec3, Integers::AsDeclared, cx)?;
         let count = positions.len();
         let same_count = |name: &str, len: usize| match len == count {

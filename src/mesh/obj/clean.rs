@@ -180,6 +180,8 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         self.out.extend_from_slice(keyword);
         for i in 0..count {
             let word = match words.next() {
+                // What Microsoft's C library prints for a NaN: 1.#IND, -nan(ind).
+                Some(word) if word.iter().any(|b| matches!(b, b'#' | b'(')) => b"nan",
                 Some(word) if word.is_ascii() => word,
                 // A one-dimensional texture coordinate is legal.
                 None if count == 2 && i == 1 => b"0",
@@ -205,6 +207,10 @@ impl<'a, 'b> Cleaner<'a, 'b> {
                 }
             }
             self.corners.push(corner);
+            // One line may be the whole file.
+            if self.corners.len().is_multiple_of(65536) {
+                self.cx.budget.spend("the corners of an OBJ face", 65536, 300)?;
+            }
         }
         let n = self.corners.len() as u64;
         if n < 3 {

@@ -23,20 +23,16 @@ impl LeftOut {
     /// One warning for each kind that occurred.
     pub fn warnings(&self) -> Vec<Warning> {
         [
-            (self.points, "points_ignored", "lines of points are not drawn"),
+            (self.points, "points_ignored", "points are not drawn"),
             (self.lines, "lines_ignored", "polylines are not drawn"),
             (self.short_faces, "short_faces_ignored", "faces with fewer than three corners are not drawn"),
             (self.curves, "curves_ignored", "free-form curves and surfaces are not drawn"),
             (self.colors, "colors_incomplete", "vertices differ from the first one in having a colour or not"),
-            (
-                self.libraries,
-                "mtl_ignored",
-                "references to a material library are ignored: it is not part of the upload",
-            ),
+            (self.libraries, "mtl_ignored", "the material library is ignored, since it is not part of the upload"),
         ]
         .into_iter()
         .filter(|(count, _, _)| *count > 0)
-        .map(|(count, code, what)| Warning { code, detail: format!("{count} {what}") })
+        .map(|(count, code, what)| Warning { code, detail: format!("{what} (lines in the file: {count})") })
         .collect()
     }
 }
