@@ -53,13 +53,8 @@ impl From<RenderError> for Complaint {
     fn from(error: RenderError) -> Self {
         match error {
             RenderError::Mesh(_) | RenderError::Limit(_) => Self::input(error.to_string()),
-<<<<<<< HEAD
-            RenderError::Draw(DrawError::Device(detail) | DrawError::NoGpu(detail)) => {
-                Self::ours(format!("the GPU cannot draw this ({detail}); try --backend cpu"))
-=======
             RenderError::Draw(DrawError::Stopped(_)) | RenderError::Stopped(_) | RenderError::Encode(_) => {
                 Self::ours(error.to_string())
->>>>>>> service
             }
             RenderError::Draw(detail) => Self::ours(format!("{detail}; try --backend cpu")),
         }

@@ -122,14 +122,6 @@ impl From<&RenderError> for ApiError {
             RenderError::Limit(limit) => limit.into(),
             RenderError::Stopped(stopped) => deadline(stopped.to_string()),
             RenderError::Draw(DrawError::Stopped(stopped)) => deadline(stopped.to_string()),
-<<<<<<< HEAD
-            // Only reachable by asking for the GPU by name: `auto` goes on with the CPU.
-            RenderError::Draw(DrawError::Device(_) | DrawError::NoGpu(_)) => {
-                let detail = "the GPU of this server cannot draw this; ask for backend=auto or backend=cpu";
-                Self::new(StatusCode::UNPROCESSABLE_ENTITY, "backend_unavailable", detail)
-            }
-=======
->>>>>>> service
             RenderError::Draw(DrawError::DeviceLost(_)) => {
                 let detail = "the GPU of this server was lost while drawing; try again, or ask for backend=cpu";
                 Self::new(StatusCode::SERVICE_UNAVAILABLE, "device_lost", detail).retry_after(1)
