@@ -45,6 +45,8 @@ fn resolve(digits: &[u8], count: u64) -> Result<u64, String> {
         .ok_or_else(|| format!("\"{}\" is not a whole number", show(digits)))?;
     match index {
         0 => Err("is 0, and OBJ counts from 1".into()),
+        // tobj multiplies indices by 3 and 2 without a check.
+        4_294_967_296.. => Err(format!("{index} is out of range")),
         1.. => Ok(index.unsigned_abs() - 1),
         _ => count
             .checked_sub(index.unsigned_abs())
