@@ -16,11 +16,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("request", &["scene", "mesh", "image", "limits"]),
     ("jobs", &["pipeline", "backend", "scene", "mesh", "encode", "image", "limits"]),
     ("http", &["jobs", "pipeline", "request", "backend", "scene", "mesh", "image", "limits", "config", "telemetry"]),
-    ("cli", &["pipeline", "request", "backend", "scene", "mesh", "plan", "image", "limits", "config"]),
-    ("config", &["limits", "backend"]),
-    ("telemetry", &[]),
+    ("cli", &["http", "pipeline", "request", "backend", "scene", "mesh", "image", "limits", "config", "telemetry"]),
+    ("config", &["request", "limits"]),
+    ("telemetry", &["config"]),
     ("lib", &[]),
-    ("main", &["http", "cli", "config", "telemetry"]),
+    ("main", &["cli"]),
 ];
 
 /// Crates and what of std may be named where: a word, and the path prefixes under `src/` that may hold it.
@@ -40,7 +40,8 @@ fn imports_go_one_way() {
     let allowed: BTreeMap<_, _> = ALLOWED.iter().copied().collect();
     let mut faults = Vec::new();
     let mut seen = 0;
-    for (file, text) in sources() {
+    // A module's own tests may reach for anything that makes them short.
+    for (file, text) in sources().into_iter().filter(|(file, _)| !file.ends_with("tests.rs")) {
         let module = file.split(['/', '.']).next().unwrap_or_default();
         let may =
             allowed.get(module).unwrap_or_else(|| panic!("src/{file}: say in ALLOWED what `{module}` may import"));
