@@ -152,21 +152,19 @@ fn bounds(mesh: &Mesh) -> Bounds {
     };
     let [min, max]: [[f64; 3]; 2] = mesh.bounds.map(to_file);
     let size: [f64; 3] = std::array::from_fn(|axis| max[axis] - min[axis]);
-    let step = digits_of_f32(size.into_iter().fold(0.0, f64::max));
-    let tidy = |point: [f64; 3]| point.map(|v| round_to(v, step));
+    let largest = size.into_iter().fold(0.0, f64::max);
+    let tidy = |point: [f64; 3]| point.map(|v| without_rounding(v, largest));
     Bounds { min: tidy(min), max: tidy(max), size: tidy(size) }
 }
 
-/// The power of ten below which digits of a mesh this large are rounding: positions are kept in 24 bits.
-fn digits_of_f32(largest: f64) -> f64 {
-    if largest > 0.0 { libm::exp10(libm::floor(libm::log10(largest)) - 6.0) } else { 0.0 }
-}
-
-fn round_to(value: f64, step: f64) -> f64 {
-    // Dividing by a whole power of ten gives the decimal number that people expect; multiplying by its inverse does not.
-    let rounded =
-        if step < 1.0 { (value / step).round() / (1.0 / step).round() } else { (value / step).round() * step };
-    if rounded.is_finite() { rounded } else { value }
+/// Without the digits that mean nothing in a mesh this large: positions are kept in 24 bits.
+fn without_rounding(value: f64, largest: f64) -> f64 {
+    let magnitude = |v: f64| libm::floor(libm::log10(v.abs()));
+    let digits = magnitude(value) - magnitude(largest) + 6.0;
+    if !digits.is_finite() || digits > 16.0 {
+        return value;
+    }
+    if digits < 0.0 { 0.0 } else { format!("{value:.*e}", digits as usize).parse().unwrap_or(value) }
 }
 
 #[cfg(test)]
@@ -175,11 +173,18 @@ mod tests {
 
     #[test]
     fn digits_that_are_rounding_are_not_shown() {
-        let cases =
-            [(-2.779_299_906_158_447, 6.5, -2.7793), (0.1 + 1e-9, 1.0, 0.1), (1e9 + 0.25, 1e9, 1e9), (5.0, 0.0, 5.0)];
-        for (value, size, expected) in cases {
-            assert_eq!(round_to(value, digits_of_f32(size)), expected);
+        let cases = [
+            (-2.779_299_906_158_447, 6.5, -2.7793),
+            (0.1 + 1e-9, 1.0, 0.1),
+            (1e9 + 0.25, 1e9, 1e9),
+            (5.0, 0.0, 5.0),
+            (0.0, 1.0, 0.0),
+            (1e-9, 1.0, 0.0),
+            (1e-31, 1e-30, 1e-31),
+            (f64::MAX, 1.0, f64::MAX),
+        ];
+        for (value, largest, expected) in cases {
+            assert_eq!(without_rounding(value, largest), expected, "{value} {largest}");
         }
-        assert_eq!(round_to(1e-31, digits_of_f32(1e-30)), 1e-31);
     }
 }
