@@ -151,5 +151,40 @@ fn bounds(mesh: &Mesh) -> Bounds {
         std::array::from_fn(|axis| mesh.to_file.centre[axis] + mesh.to_file.scale * f64::from(unit[axis]))
     };
     let [min, max]: [[f64; 3]; 2] = mesh.bounds.map(to_file);
-    Bounds { min, max, size: std::array::from_fn(|axis| max[axis] - min[axis]) }
+    let size: [f64; 3] = std::array::from_fn(|axis| max[axis] - min[axis]);
+    let largest = size.into_iter().fold(0.0, f64::max);
+    let tidy = |point: [f64; 3]| point.map(|v| without_rounding(v, largest));
+    Bounds { min: tidy(min), max: tidy(max), size: tidy(size) }
+}
+
+/// Without the digits that mean nothing in a mesh this large: positions are kept in 24 bits.
+fn without_rounding(value: f64, largest: f64) -> f64 {
+    let magnitude = |v: f64| libm::floor(libm::log10(v.abs()));
+    let digits = magnitude(value) - magnitude(largest) + 6.0;
+    if !digits.is_finite() || digits > 16.0 {
+        return value;
+    }
+    if digits < 0.0 { 0.0 } else { format!("{value:.*e}", digits as usize).parse().unwrap_or(value) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_that_are_rounding_are_not_shown() {
+        let cases = [
+            (-2.779_299_906_158_447, 6.5, -2.7793),
+            (0.1 + 1e-9, 1.0, 0.1),
+            (1e9 + 0.25, 1e9, 1e9),
+            (5.0, 0.0, 5.0),
+            (0.0, 1.0, 0.0),
+            (1e-9, 1.0, 0.0),
+            (1e-31, 1e-30, 1e-31),
+            (f64::MAX, 1.0, f64::MAX),
+        ];
+        for (value, largest, expected) in cases {
+            assert_eq!(without_rounding(value, largest), expected, "{value} {largest}");
+        }
+    }
 }

@@ -1,8 +1,8 @@
 //! The daemon: HTTP in front of [`crate::jobs`].
 //!
 //! Reading order: [`app`] (what handlers share, and every path), [`render`] and [`jobs`] (the resources), [`receive`] (a
-//! request to work, in the order of refusals), [`body`], [`negotiate`], [`error`] (the only status map), [`observe`]
-//! (around every request), [`accept`] and [`io`] (connections).
+//! request to work, in the order of refusals), [`body`], [`negotiate`], [`error`] (the only status map), [`observe`] and
+//! [`lent`] (around every request), [`accept`] and [`io`] (connections).
 //!
 //! Architecture invariant: axum and hyper are used nowhere else.
 
@@ -15,6 +15,7 @@ mod error;
 mod health;
 mod io;
 mod jobs;
+mod lent;
 mod negotiate;
 mod observe;
 mod receive;

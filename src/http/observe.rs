@@ -4,13 +4,14 @@ use std::time::Instant;
 
 use axum::body::Body;
 use axum::extract::Request;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Version, header};
 use axum::middleware::Next;
 use axum::response::Response;
 use tracing::Instrument as _;
 
 use super::dto::ProblemDto;
 use super::error::ApiError;
+use super::lent::Lent;
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
@@ -20,8 +21,15 @@ pub async fn observe(request: Request, next: Next) -> Response {
     let id = request_id(request.headers());
     let span =
         tracing::info_span!("request", request_id = %id, method = %request.method(), path = request.uri().path());
-    let mut response = next.run(request).instrument(span.clone()).await;
+    let (headers, version) = (request.headers().clone(), request.version());
+    let (parts, body) = request.into_parts();
+    let (lent, body) = Lent::new(body);
+    let mut response = next.run(Request::from_parts(parts, body)).instrument(span.clone()).await;
     complete(&mut response, &id);
+    // HTTP/2 ends a stream without ending the connection.
+    if version < Version::HTTP_2 && !lent.discard(&headers).await {
+        response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
+    }
 
     let (status, duration_ms) = (response.status().as_u16(), began.elapsed().as_secs_f64() * 1e3);
     let code = response.extensions().get::<ApiError>().map(|e| (e.code, e.detail.clone()));

@@ -37,7 +37,7 @@ fn knot() -> String {
     for i in 0..ALONG {
         for j in 0..AROUND {
             let at = |i: usize, j: usize| (i % ALONG) * AROUND + j % AROUND + 1;
-            writeln!(text, "f {} {} {} {}", at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)).unwrap();
+            writeln!(text, "f {} {} {} {}", at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)).unwrap();
         }
     }
     text
@@ -55,6 +55,23 @@ fn the_knot_is_what_its_generator_makes() {
     let written = std::fs::read_to_string(&path).unwrap();
     assert!(written == made, "{} differs from its generator", path.display());
     assert!((60_000..120_000).contains(&made.len()), "{} bytes", made.len());
+}
+
+/// Six times the volume that the quads enclose: positive if they face outwards, and 6 pi 0.42^2 times the length.
+#[test]
+fn the_knot_faces_outwards() {
+    let text = knot();
+    let numbers = |line: &str| line.split(' ').skip(1).map(|n| n.parse::<f64>().unwrap()).collect::<Vec<_>>();
+    let points: Vec<_> = text.lines().filter(|l| l.starts_with("v ")).map(numbers).collect();
+    let mut volume = 0.0;
+    for quad in text.lines().filter(|l| l.starts_with("f ")).map(numbers) {
+        let at = |corner: usize| &points[quad[corner] as usize - 1];
+        for (a, b, c) in [(at(0), at(1), at(2)), (at(0), at(2), at(3))] {
+            volume += a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+                + a[2] * (b[0] * c[1] - b[1] * c[0]);
+        }
+    }
+    assert!((100.0..105.0).contains(&volume), "{volume}");
 }
 
 #[test]

@@ -354,6 +354,29 @@ fn connections_are_reused_and_pipelined_answers_come_in_order() {
     assert_eq!(Answer::read(&mut stream).status, 200);
 }
 
+/// A refusal that comes before the body is read must not break the connection for the next request, or say that it does.
+#[test]
+fn early_refusals_leave_the_connection_in_order() {
+    let server = Server::start(&["--limit-body-bytes", "3000000"]);
+    let mut stream = server.connect();
+    for length in [10, 100_000, 900_000] {
+        let head = format!("POST /v1/render?size=0 HTTP/1.1\r\nHost: x\r\nContent-Length: {length}\r\n\r\n");
+        stream.write_all(head.as_bytes()).unwrap();
+        stream.write_all(&vec![b'v'; length]).unwrap();
+        let answer = Answer::read(&mut stream);
+        answer.problem(400, "out_of_range");
+        assert_eq!(answer.header("connection"), None, "{length}");
+    }
+    let head = "POST /v1/render?size=0 HTTP/1.1\r\nHost: x\r\nContent-Length: 2000000\r\n";
+    for more in ["", "Expect: 100-continue\r\n"] {
+        let mut stream = server.connect();
+        write!(stream, "{head}{more}\r\n").unwrap();
+        let answer = Answer::read(&mut stream);
+        answer.problem(400, "out_of_range");
+        assert_eq!(answer.header("connection"), Some("close"));
+    }
+}
+
 #[test]
 fn a_connection_too_many_is_told_so() {
     let server = Server::start(&["--connections", "2"]);
