@@ -19,10 +19,12 @@ fn visibility_tile(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    for (var i = workgroup.x; i < work.large; i += groups.x) {
+    let large_end = min(work.large, batch.large_end);
+    for (var i = batch.large_first + workgroup.x; i < large_end; i += groups.x) {
         draw_item(work.items[i], i32(thread), 0, 1);
     }
-    for (var i = 0u; i < work.huge; i++) {
+    let huge_end = min(work.huge, batch.huge_end);
+    for (var i = batch.huge_first; i < huge_end; i++) {
         // Every workgroup takes every n-th tile; beginning elsewhere for each triangle evens out the load.
         let start = (workgroup.x + i * 61u) % groups.x;
         draw_item(work.items[batch.capacity - 1u - i], i32(thread), i32(start), i32(groups.x));
