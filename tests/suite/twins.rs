@@ -462,3 +462,27 @@ fn timing() {
         }
     }
 }
+
+#[test]
+#[ignore]
+fn timing_clip() {
+    let deadline = Deadline::default();
+    for clip in [false, true] {
+        let mut random = Random(4242);
+        let soup = Soup::new(Kind::Tiny, 300, 0.7, &mut random);
+        let mut view = View::new([200, 150], 4, 3.0, &mut random);
+        view.projection.clip = clip;
+        for near in [0.02, 3.0] {
+        view.projection.near_w = near;
+        let plan = soup.plan(&view);
+        for gpu in gpus().unwrap() {
+            let mut r = GpuRenderer::new(gpu.clone());
+            for _ in 0..3 {
+                let t = std::time::Instant::now();
+                r.draw_visibility(&plan, &deadline).unwrap();
+                println!("  {clip} {near} {:?} {:?}", gpu.info().features, t.elapsed());
+            }
+        }
+        }
+    }
+}

@@ -19,7 +19,7 @@ pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
 use self::buffers::Buffers;
 use self::params::Frame;
 use self::recorder::Recorder;
-use self::schedule::{DeviceTraits, Schedule, Step, has_visibility};
+use self::schedule::{DeviceTraits, Schedule, Step, WORK_HEAD_BYTES, WORK_ITEM_BYTES, has_visibility};
 use self::stages::Slot;
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::Image;
@@ -123,7 +123,7 @@ fn upload_geometry(
     let copies = if plan.hull.is_some() { 2 } else { 1 };
     buffers.reserve(gpu, Slot::Vertices, vertices * copies * 16)?;
     buffers.reserve(gpu, Slot::Samples, band_sample_bytes(plan, schedule.band_rows))?;
-    buffers.reserve(gpu, Slot::Work, 8 + u64::from(schedule.work_items) * 4)?;
+    buffers.reserve(gpu, Slot::Work, WORK_HEAD_BYTES + u64::from(schedule.work_items) * WORK_ITEM_BYTES)?;
     Ok(())
 }
 

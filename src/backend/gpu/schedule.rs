@@ -15,8 +15,13 @@ const BAND_BYTES: u64 = 64 << 20;
 const CHUNK: u32 = 1 << 20;
 
 /// Triangles a dispatch where all may need clipping, into at most six pieces each.
-const CHUNK_CLIP: u32 = 1 << 18;
+const CHUNK_CLIP: u32 = 1 << 17;
 const PIECES_MAX: u32 = 6;
+
+/// Bytes of the work list before its items, and of each.
+pub const WORK_HEAD_BYTES: u64 = 16;
+/// See [`WORK_HEAD_BYTES`].
+pub const WORK_ITEM_BYTES: u64 = 48;
 
 /// What a device allows, and which way it goes.
 #[derive(Clone, Copy, Debug)]
@@ -191,8 +196,11 @@ impl Schedule {
                         ..Batch::default()
                     };
                     self.steps.push(Step::ClearWork);
-                    self.dispatch(device, Stage::Visibility { clip, write }, in_chunk, batch);
-                    let stage = Stage::VisibilityTile { clip, write };
+                    self.dispatch(device, Stage::Visibility { write }, in_chunk, batch);
+                    if clip {
+                        self.dispatch(device, Stage::Clip, in_chunk, batch);
+                    }
+                    let stage = Stage::VisibilityTile { write };
                     self.steps.push(Step::Tiles { stage, batch: self.batches.len() - 1 });
                     if count > chunk {
                         self.steps.push(Step::Submit);
