@@ -97,7 +97,8 @@ fn rn(v: f32) -> f32 {
 fn recip(w: f32) -> f32 {
     var r = bitcast<f32>(0x7EF311C7u - bitcast<u32>(w));
     for (var i = 0; i < 4; i++) {
-        r = rn(r * (2.0 - rn(w * r)));
+        // The residual is exact close to the end, so that recip(1) is 1 and not the number below it.
+        r = r + rn(r * (1.0 - rn(w * r)));
     }
     return r;
 }

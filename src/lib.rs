@@ -18,10 +18,16 @@
 //! - [`http`], [`cli`], [`config`], [`telemetry`]: the edges.
 
 pub mod backend;
+pub mod cli;
+pub mod config;
 pub mod encode;
+pub mod http;
 pub mod image;
+pub mod jobs;
 pub mod limits;
 pub mod mesh;
 pub mod pipeline;
 pub mod plan;
+pub mod request;
 pub mod scene;
+pub mod telemetry;

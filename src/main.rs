@@ -1,3 +1,5 @@
-//! The `meshsnap` binary: arguments to configuration to `serve`, `render`, `inspect` or `health`.
+//! The `meshsnap` binary: arguments to `serve`, `render`, `inspect` or `health`.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    meshsnap::cli::run(std::env::args_os())
+}

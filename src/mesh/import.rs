@@ -1,7 +1,7 @@
 //! Sniffs the format from the bytes and calls its importer.
 
 use super::normalise::normalise;
-use super::{Mesh, MeshError, MeshFault, obj, sniff, stl};
+use super::{Mesh, MeshError, MeshFault, gltf, obj, sniff, stl};
 use crate::limits::{Budget, Deadline, Limits};
 
 /// The mesh formats that are read.
@@ -46,6 +46,18 @@ impl Format {
     }
 }
 
+impl std::fmt::Display for Format {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Obj => "OBJ",
+            Self::Gltf => "glTF",
+            Self::Glb => "GLB",
+            Self::StlBinary => "binary STL",
+            Self::StlAscii => "ASCII STL",
+        })
+    }
+}
+
 /// Reads a mesh from the bytes of one file. `format` overrides sniffing.
 pub fn import(
     bytes: &[u8],
@@ -68,9 +80,7 @@ pub fn import(
     let raw = match format {
         Format::Obj => obj::read(bytes, &mut cx)?,
         Format::StlBinary | Format::StlAscii => stl::read(bytes, &mut cx)?,
-        Format::Gltf | Format::Glb => {
-            return Err(MeshError::new(MeshFault::Unsupported, "glTF is not read yet: convert it to OBJ or STL"));
-        }
+        Format::Gltf | Format::Glb => gltf::read(bytes, &mut cx)?,
     };
     normalise(raw, &mut cx)
 }

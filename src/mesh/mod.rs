@@ -1,18 +1,23 @@
 //! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
 //!
-//! Reading order: [`raw`] (what an importer fills), [`import`] (sniffs the format and calls one), [`normalise`] (raw to
-//! `Mesh`), then [`normals`] and [`edges`], which the plan asks for when a look needs them.
+//! Reading order: [`raw`] (what an importer fills), `import` (sniffs the format and calls one), `obj`, `stl` and `gltf` (the
+//! importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and [`topology`], for whoever needs them.
 
 mod attributes;
+pub mod edges;
 mod error;
+mod gltf;
 mod import;
 mod normalise;
+pub mod normals;
 mod obj;
 mod polygon;
 mod pow2;
 pub mod raw;
 mod sniff;
 mod stl;
+pub mod topology;
+mod weld;
 
 pub use error::{MeshError, MeshFault};
 pub use import::{Format, import};

@@ -6,8 +6,8 @@ use super::attributes::{self, Attributes};
 use super::import::Context;
 use super::pow2::{Pow2, exponent, is_usable, max_abs};
 use super::raw::RawMesh;
+use super::weld::PositionSet;
 use super::{ImportReport, MaterialSlot, Mesh, MeshError, MeshFault, ToFile};
-use rapidhash::RapidHashMap;
 
 /// Brings an imported mesh into its final form.
 pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshError> {
@@ -46,8 +46,8 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshErr
 
 /// A face, its normal, and two index triples, next to those of the raw mesh.
 const BYTES_PER_TRIANGLE: u64 = 20 + 12 + 12 + 12 + 1 + 4;
-/// A welded position, its place in the raw mesh's map, and a hash entry.
-const BYTES_PER_VERTEX: u64 = 12 + 4 + 2 * 17;
+/// A welded position, its place in the raw mesh's map, and its slots in the set while that grows.
+const BYTES_PER_VERTEX: u64 = 12 + 4 + 16;
 
 /// A face that will be drawn: its place in the raw mesh and its unit normal.
 struct Face {
@@ -169,19 +169,16 @@ fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
     const UNSEEN: u32 = u32::MAX;
     let mut mesh = Mesh::default();
     let mut welded_of_raw = vec![UNSEEN; raw.positions.len()];
-    let mut index_of_bits: RapidHashMap<[u32; 3], u32> = RapidHashMap::default();
-    index_of_bits.reserve(raw.positions.len().min(faces.len()));
+    // A closed mesh has half as many vertices as triangles.
+    let mut set = PositionSet::with_capacity(raw.positions.len().min(faces.len() / 2 + 2));
+    reserve(&mut mesh, faces.len());
     let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
     for face in faces {
         let i = face.triangle as usize;
         let corners = raw.triangles[i].map(|v| {
             let known = &mut welded_of_raw[v as usize];
             if *known == UNSEEN {
-                let p = unit_box.to_unit(raw.positions[v as usize]);
-                *known = *index_of_bits.entry(p.map(f32::to_bits)).or_insert_with(|| {
-                    mesh.positions.push(p);
-                    mesh.positions.len() as u32 - 1
-                });
+                *known = set.number(unit_box.to_unit(raw.positions[v as usize]));
             }
             *known
         });
@@ -197,10 +194,18 @@ fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
             mesh.attribute_triangles.push(raw.triangles[i]);
         }
     }
+    mesh.positions = set.positions;
     if raw.report.dropped_degenerate_faces > 0 {
         drop_unused(&mut mesh);
     }
     mesh
+}
+
+fn reserve(mesh: &mut Mesh, faces: usize) {
+    mesh.triangles.reserve_exact(faces);
+    mesh.face_normals.reserve_exact(faces);
+    mesh.edge_masks.reserve_exact(faces);
+    mesh.triangle_materials.reserve_exact(faces);
 }
 
 /// A dropped face may have been the only one to use a position.
@@ -228,11 +233,8 @@ fn bounds(positions: &[[f32; 3]]) -> [[f32; 3]; 2] {
 fn empty(report: &ImportReport) -> MeshError {
     let faces: u64 = report.polygons_by_arity.iter().sum();
     let (nonfinite, degenerate) = (report.dropped_nonfinite_faces, report.dropped_degenerate_faces);
-    let mut detail = format!(
-        "the {} file has nothing to draw: {} vertices and {faces} faces",
-        report.format.name().to_uppercase(),
-        report.file_vertices
-    );
+    let mut detail =
+        format!("the {} file has nothing to draw: {} vertices and {faces} faces", report.format, report.file_vertices);
     if nonfinite + degenerate > 0 {
         detail +=
             &format!(", of whose triangles {nonfinite} have a NaN or infinite corner and {degenerate} have no area");

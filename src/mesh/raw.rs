@@ -26,3 +26,20 @@ pub struct RawMesh {
     /// Format, counts and warnings so far.
     pub report: ImportReport,
 }
+
+/// Appends one part's values of an attribute, for the vertices from `before` to `after`. A part that has none of it gives no
+/// values; where other parts do, its vertices get `missing`.
+pub fn extend_attribute<T: Copy>(
+    all: &mut Vec<T>,
+    before: usize,
+    after: usize,
+    missing: T,
+    new: impl ExactSizeIterator<Item = T>,
+) {
+    if new.len() == after - before && after > before {
+        all.resize(before, missing);
+        all.extend(new);
+    } else if !all.is_empty() {
+        all.resize(after, missing);
+    }
+}

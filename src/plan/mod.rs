@@ -4,6 +4,7 @@
 //! each omission is written down in [`DrawPlan::skips`].
 
 mod build;
+mod wires;
 
 pub use build::build;
 

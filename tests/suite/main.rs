@@ -1,2 +1,23 @@
 //! The one integration binary: a module per concern.
+
+mod cli;
+mod examples;
+mod formats;
+mod formats_bad;
+mod formats_gltf;
+mod formats_gltf_document;
+mod formats_hostile;
+mod formats_obj;
+mod formats_polygons;
+mod formats_shared;
+mod golden;
+mod http;
+mod jobs;
+mod mesh_files;
+mod raster;
+mod scenes;
+mod server;
+mod shapes;
+mod shared;
+mod structure;
 mod twins;

@@ -7,9 +7,7 @@ use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
 use meshsnap::backend::{DrawError, Renderer};
 use meshsnap::limits::Deadline;
-use meshsnap::plan::{
-    DrawPlan, Faces, HullOffset, HullPass, Normals, Projection, SurfacePass, sample_offsets,
-};
+use meshsnap::plan::{DrawPlan, Faces, HullOffset, HullPass, Normals, Projection, SurfacePass, sample_offsets};
 
 /// The GPU with 64-bit atomics (where it has them) and without; None where there is no Vulkan.
 fn gpus() -> Option<&'static [Arc<Gpu>; 2]> {
@@ -237,7 +235,12 @@ fn assert_same(plan: &DrawPlan<'_>, want: &[u64], got: &[u64], what: &str) {
         let (x, y) = (pixel % plan.width_px as usize, pixel / plan.width_px as usize);
         panic!(
             "{what}: {} of {} samples differ, first at ({x}, {y}): wanted {:#018x} (id {}), got {:#018x} (id {})",
-            differing.len(), want.len(), want[i], !(want[i] as u32), got[i], !(got[i] as u32),
+            differing.len(),
+            want.len(),
+            want[i],
+            !(want[i] as u32),
+            got[i],
+            !(got[i] as u32),
         );
     }
 }
@@ -368,7 +371,9 @@ impl Truth {
 
 fn brute_force(plan: &DrawPlan<'_>) -> Vec<Truth> {
     let p = &plan.projection;
-    let dot = |row: &[f32; 4], v: [f32; 3]| (0..3).map(|k| f64::from(row[k]) * f64::from(v[k])).sum::<f64>() + f64::from(row[3]);
+    let dot = |row: &[f32; 4], v: [f32; 3]| {
+        (0..3).map(|k| f64::from(row[k]) * f64::from(v[k])).sum::<f64>() + f64::from(row[3])
+    };
     // The grid that vertices snap to is 1/256 px, so f64 snaps as f32 does but for ties: those are nudged away.
     let snapped: Vec<_> = CpuSnap::all(plan);
     let mut truth: Vec<Truth> = Vec::new();
@@ -380,7 +385,8 @@ fn brute_force(plan: &DrawPlan<'_>) -> Vec<Truth> {
                 let mut owners = Vec::new();
                 for (id, t) in plan.triangles.iter().enumerate() {
                     let corners = t.map(|v| snapped[v as usize]);
-                    let depths = t.map(|v| dot(&p.z, plan.positions[v as usize]) / dot(&p.w, plan.positions[v as usize]));
+                    let depths =
+                        t.map(|v| dot(&p.z, plan.positions[v as usize]) / dot(&p.w, plan.positions[v as usize]));
                     if let Some(z) = owned(corners, depths, at) {
                         owners.push((z, id as u32));
                     }

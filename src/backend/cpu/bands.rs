@@ -266,9 +266,10 @@ fn triangles_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut
 #[inline(always)]
 fn edges_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &SampleBand, ink: &mut [u32]) {
     let Some(pass) = &stages.plan.lines else { return };
+    let mut planes = lines::PlaneCache::new();
     for chunk in &bins.edges {
         for &edge in &chunk[band] {
-            lines::draw(stages, pass, &pass.edges[edge as usize], samples, ink);
+            lines::draw(stages, pass, &pass.edges[edge as usize], samples, &mut planes, ink);
         }
     }
 }

@@ -8,7 +8,7 @@ use super::Stages;
 use super::clip::clip_segment;
 use super::transform::{ScreenVertex, homogeneous};
 use super::visibility::{NOTHING, SampleBand, Setup, area};
-use crate::plan::{Edge, LinePass, sample_offsets};
+use crate::plan::{Edge, LinePass};
 
 /// Farthest from the middle of a unit box to its corner.
 const BOX_RADIUS: f32 = 0.707_106_8;
@@ -48,20 +48,28 @@ impl Segment {
         [((a.min(b) - self.reach) as i32).max(0), ((a.max(b) + self.reach) as i32).min(height_px as i32 - 1)]
     }
 
-    /// First and last column that the capsule may touch in pixel row `y`.
+    /// First and last column whose pixel centre may lie within reach in pixel row `y`.
     #[inline(always)]
     fn columns(&self, y: i32, width_px: u32) -> [i32; 2] {
         let (a, b) = (self.start[0], self.start[0] + self.along[0]);
-        let (mut low, mut high) = (a.min(b), a.max(b));
+        let (mut low, mut high) = (a.min(b) - self.reach, a.max(b) + self.reach);
         // A steep or slanted line touches only a short piece of each row.
         if self.along[1] * self.along[1] > 1e-6 {
             let slope = self.along[0] / self.along[1];
             let center = a + (y as f32 + 0.5 - self.start[1]) * slope;
-            let spread = slope.abs() * (self.reach + 0.5) + self.reach;
+            let spread = self.reach * (1.0 + slope * slope).sqrt();
             low = low.max(center - spread);
             high = high.min(center + spread);
         }
-        [((low - self.reach) as i32).max(0), ((high + self.reach) as i32).min(width_px as i32 - 1)]
+        [(low as i32).max(0), (high as i32).min(width_px as i32 - 1)]
+    }
+
+    /// Whether the point at `t` lies within twice the reach of the first and of the second end.
+    #[inline(always)]
+    fn close_to_ends(&self, t: f32) -> [bool; 2] {
+        // t < 2 reach / length, squared so that no root is needed.
+        let limit = 4.0 * self.reach * self.reach * self.inverse_length_squared;
+        [t * t < limit, (1.0 - t) * (1.0 - t) < limit]
     }
 
     /// Where along the edge (0 to 1) the point nearest to `p` lies, and the way from there to `p`.
@@ -82,25 +90,32 @@ pub fn is_back_edge(stages: &Stages<'_>, lines: &LinePass, edge: &Edge) -> bool 
 
 /// Draws one edge's ink into the band.
 #[inline(always)]
-pub fn draw(stages: &Stages<'_>, lines: &LinePass, edge: &Edge, band: &SampleBand, ink: &mut [u32]) {
+pub fn draw(
+    stages: &Stages<'_>,
+    lines: &LinePass,
+    edge: &Edge,
+    band: &SampleBand,
+    planes: &mut PlaneCache,
+    ink: &mut [u32],
+) {
     let Some(segment) = Segment::new(stages, lines, edge) else { return };
     let [first, last] = segment.rows(band.size_px[1]);
-    let profile = Profile::new(lines, &segment);
+    let capsule = Capsule::new(lines, &segment);
     for y in first.max(band.first_row as i32)..=last.min((band.first_row + band.rows) as i32 - 1) {
         let [from, to] = segment.columns(y, band.size_px[0]);
         let row = (y as u32 - band.first_row) as usize * band.size_px[0] as usize;
         for x in from..=to {
             let (t, offset) = segment.nearest([x as f32 + 0.5, y as f32 + 0.5]);
-            let coverage = (profile.coverage(t, offset) * 1023.0 + 0.5) as u32;
+            let coverage = (capsule.coverage(t, offset) * 1023.0 + 0.5) as u32;
             if coverage == 0 {
                 continue;
             }
-            let share = if lines.hide_behind_surface {
-                visible_share(stages, edge, &segment, t, band, [x as u32, y as u32])
+            let level = if lines.hide_behind_surface {
+                let visible = visible_samples(stages, edge, &segment, t, band, planes, [x as u32, y as u32]);
+                (coverage * visible + band.samples / 2) / band.samples
             } else {
-                [1, 1]
+                coverage
             };
-            let level = (coverage * share[0] + share[1] / 2) / share[1];
             // Once a pixel is full nothing changes it, so it may stop counting long before the sum could wrap.
             let slot = &mut ink[row + x as usize];
             if *slot < 1 << 31 {
@@ -110,109 +125,175 @@ pub fn draw(stages: &Stages<'_>, lines: &LinePass, edge: &Edge, band: &SampleBan
     }
 }
 
-/// Coverage of a pixel's box by a strip, as a function of where the box's centre lies.
+/// Coverage of a pixel's box by a strip, as a function of the distance between their centres.
+///
+/// The box filter's profile across a line with unit normal n is a trapezoid of area 1; its half supports are
+/// `(|nx| + |ny|) / 2` at the foot and `||nx| - |ny|| / 2` at the top. Coverage is its integral over the strip's width.
 struct Profile {
     half_width: f32,
-    smoothing: f32,
-    /// Unit normal of the line.
-    normal: [f32; 2],
+    foot: f32,
+    top: f32,
+    height: f32,
+    /// Curvature of the integral on the flanks.
+    flank: f32,
 }
 
 impl Profile {
-    fn new(lines: &LinePass, segment: &Segment) -> Self {
-        let inverse = segment.inverse_length_squared.sqrt();
-        let normal = [-segment.along[1] * inverse, segment.along[0] * inverse];
-        Self { half_width: 0.5 * lines.width_px, smoothing: 0.5 * lines.smoothing_px, normal }
+    #[inline(always)]
+    fn new(lines: &LinePass, normal: [f32; 2]) -> Self {
+        let (nx, ny) = (normal[0].abs(), normal[1].abs());
+        let smoothing = 0.5 * lines.smoothing_px;
+        let (foot, top) = (0.5 * (nx + ny) + smoothing, (0.5 * (nx - ny).abs() - smoothing).abs());
+        let height = 1.0 / (foot + top);
+        let flank = if foot > top { 0.5 * height / (foot - top) } else { 0.0 };
+        Self { half_width: 0.5 * lines.width_px, foot, top, height, flank }
     }
 
-    /// `T(d + w/2) - T(d - w/2)`; across the line in the middle, around the end points beyond them.
+    /// `T(d + w/2) - T(d - w/2)`, T the trapezoid's integral.
     #[inline(always)]
-    fn coverage(&self, t: f32, offset: [f32; 2]) -> f32 {
-        let distance = (offset[0] * offset[0] + offset[1] * offset[1]).sqrt();
-        if distance > self.half_width + self.smoothing + BOX_RADIUS {
+    fn coverage(&self, distance: f32) -> f32 {
+        if distance >= self.half_width + self.foot {
             return 0.0;
         }
-        let normal = if (t > 0.0 && t < 1.0) || distance < 1e-6 {
-            self.normal
-        } else {
-            [offset[0] / distance, offset[1] / distance]
-        };
-        let (nx, ny) = (normal[0].abs(), normal[1].abs());
-        let wide = 0.5 * (nx + ny) + self.smoothing;
-        let narrow = (0.5 * (nx - ny).abs() - self.smoothing).abs();
-        let strip = trapezoid_integral(distance + self.half_width, wide, narrow)
-            - trapezoid_integral(distance - self.half_width, wide, narrow);
+        let strip = self.half_integral(distance + self.half_width) - self.half_integral(distance - self.half_width);
         strip.clamp(0.0, 1.0)
+    }
+
+    /// Integral of the trapezoid from its middle to `u`.
+    #[inline(always)]
+    fn half_integral(&self, u: f32) -> f32 {
+        let a = u.abs().min(self.foot);
+        let past = (a - self.top).max(0.0);
+        let half = self.height * a - self.flank * past * past;
+        if u < 0.0 { -half } else { half }
     }
 }
 
-/// Integral from minus infinity to `u` of the trapezoid of area 1 whose half supports are `wide` (foot) and `narrow` (top).
-#[inline(always)]
-fn trapezoid_integral(u: f32, wide: f32, narrow: f32) -> f32 {
-    let height = 1.0 / (wide + narrow);
-    let a = u.abs();
-    let half = if a <= narrow {
-        height * a
-    } else if a < wide {
-        let past = a - narrow;
-        height * (narrow + past - past * past / (2.0 * (wide - narrow)))
-    } else {
-        0.5
-    };
-    if u < 0.0 { 0.5 - half } else { 0.5 + half }
+/// A segment's strip, and the caps at its ends.
+struct Capsule<'a> {
+    lines: &'a LinePass,
+    strip: Profile,
+    normal: [f32; 2],
 }
 
-/// In how many of a pixel's samples the edge is not hidden: [count, of].
+impl<'a> Capsule<'a> {
+    #[inline(always)]
+    fn new(lines: &'a LinePass, segment: &Segment) -> Self {
+        let inverse = segment.inverse_length_squared.sqrt();
+        let normal = [-segment.along[1] * inverse, segment.along[0] * inverse];
+        Self { lines, strip: Profile::new(lines, normal), normal }
+    }
+
+    /// Coverage of a pixel at `offset` from the nearest point of the segment, which lies at `t` of its length. Across the
+    /// line in the middle; beyond the ends around them, along the way from the end point.
+    #[inline(always)]
+    fn coverage(&self, t: f32, offset: [f32; 2]) -> f32 {
+        if t > 0.0 && t < 1.0 {
+            return self.strip.coverage((offset[0] * self.normal[0] + offset[1] * self.normal[1]).abs());
+        }
+        let distance = (offset[0] * offset[0] + offset[1] * offset[1]).sqrt();
+        if distance > self.strip.half_width + 0.5 * self.lines.smoothing_px + BOX_RADIUS {
+            return 0.0;
+        }
+        let outwards = if distance < 1e-6 { self.normal } else { offset.map(|v| v / distance) };
+        Profile::new(self.lines, outwards).coverage(distance)
+    }
+}
+
+/// In how many of a pixel's samples the edge is not hidden.
 #[inline(always)]
-fn visible_share(
+fn visible_samples(
     stages: &Stages<'_>,
     edge: &Edge,
     segment: &Segment,
     t: f32,
     band: &SampleBand,
+    planes: &mut PlaneCache,
     at: [u32; 2],
-) -> [u32; 2] {
+) -> u32 {
     let depth = segment.depth[0] + t * (segment.depth[1] - segment.depth[0]);
     let mut count = 0;
     let mut last = (NOTHING, true);
     for s in 0..band.samples {
         let i = band.index(at[0], at[1], s);
         let id = band.ids[i];
-        let visible = if id == NOTHING || depth >= band.depth[i] || id == edge.faces[0] || id == edge.faces[1] {
-            true
-        } else if id == last.0 {
-            last.1
-        } else {
-            let visible = !is_hidden_by(stages, edge, segment, t, depth, id);
-            last = (id, visible);
-            visible
-        };
-        count += u32::from(visible);
+        let nothing_nearer = id == NOTHING || depth >= band.depth[i] || id == edge.faces[0] || id == edge.faces[1];
+        if !nothing_nearer && id != last.0 {
+            last = (id, !planes.get(stages, id).hides(edge, segment, t, depth));
+        }
+        count += u32::from(nothing_nearer || last.1);
     }
-    debug_assert_eq!(sample_offsets(band.samples).len(), band.samples as usize);
-    [count, band.samples]
+    count
 }
 
-/// Whether triangle `id`, which is nearer than the edge at a sample close by, really lies in front of it. Its plane is
-/// continued to the edge's own point, because close to a fold the sample itself may be nearer without hiding anything.
-fn is_hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, t: f32, depth: f32, id: u32) -> bool {
-    let (triangle, is_hull) = stages.triangle(id);
-    if !is_hull && triangle.iter().any(|v| edge.vertices.contains(v)) {
-        return false;
+/// A triangle's plane, as a thing that edges may lie behind.
+#[derive(Clone, Copy)]
+struct Plane {
+    id: u32,
+    vertices: [u32; 3],
+    /// Depth at the picture's corner and its change a pixel.
+    depth: [f32; 3],
+    /// What the surface may fall away over three quarters of a pixel: the curvature between neighbouring faces.
+    tolerance: f32,
+}
+
+impl Plane {
+    fn new(stages: &Stages<'_>, id: u32) -> Self {
+        let (vertices, is_hull) = stages.triangle(id);
+        // A hull shares its vertices' numbers with the surface, but not their place.
+        let vertices = if is_hull { [u32::MAX; 3] } else { vertices };
+        let corners = stages.screen_triangle(id);
+        let in_front = Self { id, vertices, depth: [f32::INFINITY, 0.0, 0.0], tolerance: 0.0 };
+        if corners.iter().any(ScreenVertex::is_outside) {
+            return in_front;
+        }
+        Setup::new(&corners).map_or(in_front, |setup| {
+            let [z, gx, gy] = setup.depth;
+            let half = [stages.plan.width_px as f32 * 128.0, stages.plan.height_px as f32 * 128.0];
+            let corner = z - gx * (setup.x[0] as f32 + half[0]) - gy * (setup.y[0] as f32 + half[1]);
+            let (gx, gy) = (256.0 * gx, 256.0 * gy);
+            Self { id, vertices, depth: [corner, gx, gy], tolerance: 0.75 * (gx.abs() + gy.abs()) }
+        })
     }
-    let vertices = stages.screen_triangle(id);
-    if vertices.iter().any(ScreenVertex::is_outside) {
-        return true;
+
+    /// Whether this triangle, which is nearer than the edge at a sample close by, really lies in front of it. The plane is
+    /// continued to the edge's own point, because close to a fold the sample itself may be nearer without hiding anything.
+    #[inline(always)]
+    fn hides(&self, edge: &Edge, segment: &Segment, t: f32, depth: f32) -> bool {
+        let point = [segment.start[0] + t * segment.along[0], segment.start[1] + t * segment.along[1]];
+        let plane = self.depth[0] + self.depth[1] * point[0] + self.depth[2] * point[1];
+        plane > depth + self.tolerance && !self.meets(edge, segment, t)
     }
-    let Some(setup) = Setup::new(&vertices) else { return false };
-    let half = [stages.plan.width_px as f32 * 128.0, stages.plan.height_px as f32 * 128.0];
-    let x = (segment.start[0] + t * segment.along[0]) * 256.0 - half[0];
-    let y = (segment.start[1] + t * segment.along[1]) * 256.0 - half[1];
-    let [z, gx, gy] = setup.depth;
-    let plane = z + gx * (x - setup.x[0] as f32) + gy * (y - setup.y[0] as f32);
-    // What the surface may fall away over three quarters of a pixel: curvature between neighbouring faces.
-    let tolerance = 192.0 * (gx.abs() + gy.abs());
-    plane > depth + tolerance
+
+    /// Whether this triangle meets the edge at an end close to `t`: around a vertex, the faces of one fan do not hide each
+    /// other's edges. Farther along they may, as a silhouette hides the edges behind it.
+    #[inline(always)]
+    fn meets(&self, edge: &Edge, segment: &Segment, t: f32) -> bool {
+        let close = segment.close_to_ends(t);
+        (0..2).any(|end| close[end] && self.vertices.contains(&edge.vertices[end]))
+    }
+}
+
+/// Planes of triangles seen lately, by the low bits of their id: edges that lie close together look at the same ones.
+pub struct PlaneCache(Vec<Plane>);
+
+impl PlaneCache {
+    const LEN: usize = 1024;
+
+    /// Knows nothing yet.
+    pub fn new() -> Self {
+        let unknown = Plane { id: NOTHING, vertices: [0; 3], depth: [0.0; 3], tolerance: 0.0 };
+        Self(vec![unknown; Self::LEN])
+    }
+
+    #[inline(always)]
+    fn get(&mut self, stages: &Stages<'_>, id: u32) -> &Plane {
+        let slot = &mut self.0[id as usize % Self::LEN];
+        if slot.id != id {
+            *slot = Plane::new(stages, id);
+        }
+        slot
+    }
 }
 
 fn clip(stages: &Stages<'_>, edge: &Edge) -> Option<[ScreenVertex; 2]> {

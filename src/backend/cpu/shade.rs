@@ -212,7 +212,7 @@ fn light(s: &SurfacePass<'_>, up: [f32; 3], base: [f32; 4], n: [f32; 3]) -> [f32
     let n_light = dot(n, s.to_light).max(0.0);
     let n_half = dot(n, s.halfway).max(0.0);
     let light_half = dot(s.to_light, s.halfway);
-    let sky = 0.775 + 0.225 * dot(n, up);
+    let sky = 0.7 + 0.3 * dot(n, up);
     let alpha_squared = (s.roughness * s.roughness).max(0.0025) * (s.roughness * s.roughness).max(0.0025);
     let lobe = n_half * n_half * (alpha_squared - 1.0) + 1.0;
     let gloss = alpha_squared / (lobe * lobe * (light_half * light_half).max(0.1) * (4.0 * s.roughness + 2.0));

@@ -21,9 +21,9 @@ pub struct SampleBand {
     pub rows: u32,
     /// Samples a pixel.
     pub samples: u32,
-    /// Distance between rows of samples, which are padded so that a vector may hang over the right edge.
+    /// Samples in a row, padded so that a vector may hang over the right edge.
     pub stride: usize,
-    /// Reversed depth at `(row * samples + s) * stride + x`; 0 where there is nothing.
+    /// Reversed depth at `row * stride + x * samples + s`; 0 where there is nothing.
     pub depth: Vec<f32>,
     /// Triangle id, laid out likewise.
     pub ids: Vec<u32>,
@@ -32,8 +32,8 @@ pub struct SampleBand {
 impl SampleBand {
     /// An empty band.
     pub fn new(size_px: [u32; 2], first_row: u32, rows: u32, samples: u32) -> Self {
-        let stride = (size_px[0] as usize + LANES).next_multiple_of(LANES);
-        let len = stride * rows as usize * samples as usize;
+        let stride = size_px[0] as usize * samples as usize + LANES;
+        let len = stride * rows as usize;
         Self { size_px, first_row, rows, samples, stride, depth: vec![0.0; len], ids: vec![NOTHING; len] }
     }
 
@@ -46,7 +46,7 @@ impl SampleBand {
     /// Index of sample `s` of the pixel at column `x`, row `y` of the picture.
     #[inline(always)]
     pub fn index(&self, x: u32, y: u32, s: u32) -> usize {
-        ((y - self.first_row) * self.samples + s) as usize * self.stride + x as usize
+        (y - self.first_row) as usize * self.stride + (x * self.samples + s) as usize
     }
 }
 
@@ -101,13 +101,6 @@ impl Setup {
         })
     }
 
-    /// Depth at a point, clamped to what the corners span: beyond that a sliver's gradient is noise.
-    #[inline(always)]
-    pub fn depth_at(&self, x: i32, y: i32) -> f32 {
-        let z = (self.depth[0] + self.depth[1] * (x - self.x[0]) as f32) + self.depth[2] * (y - self.y[0]) as f32;
-        clamp(z, self.depth_range)
-    }
-
     /// First and last pixel column and row that the triangle may touch, inside the band; None if none.
     #[inline(always)]
     fn bounds(&self, band: &SampleBand) -> Option<[[i32; 2]; 2]> {
@@ -136,24 +129,36 @@ pub fn wide_to_f32(v: u64) -> f32 {
 /// the caller promises ascending ids.
 #[inline(always)]
 pub fn draw<const TIES: bool>(setup: &Setup, id: u32, band: &mut SampleBand) {
+    match band.samples {
+        1 => draw_sampled::<TIES, 1>(setup, id, band),
+        _ => draw_sampled::<TIES, 4>(setup, id, band),
+    }
+}
+
+#[inline(always)]
+fn draw_sampled<const TIES: bool, const S: usize>(setup: &Setup, id: u32, band: &mut SampleBand) {
     let Some([columns, rows]) = setup.bounds(band) else { return };
     let edges = Edges::new(setup);
+    let lanes = Lanes::new::<S>(&edges);
     let origin = [band.size_px[0] as i32 * 128, band.size_px[1] as i32 * 128];
     let mut row = rows[0];
     while row <= rows[1] {
-        let height = (rows[1] - row + 1).min(LANES as i32);
         let mut column = columns[0];
         while column <= columns[1] {
             let corner = [column * 256 - origin[0], row * 256 - origin[1]];
             if let Some(values) = edges.at(corner) {
-                let block = Block { column, row, height, corner, values };
-                block.draw::<TIES>(setup, &edges, id, band);
+                let size = [(columns[1] - column + 1).min(BLOCK), (rows[1] - row + 1).min(BLOCK)];
+                let block = Block { column, row, size, corner, values };
+                block.draw::<TIES, S>(setup, &edges, &lanes, id, band);
             }
-            column += LANES as i32;
+            column += BLOCK;
         }
-        row += LANES as i32;
+        row += BLOCK;
     }
 }
+
+/// Pixels along a side of a block, in which edge functions fit 32 bits.
+const BLOCK: i32 = 8;
 
 /// Edge functions of a triangle: `dx`, `dy` and the top-left bias of each edge.
 struct Edges {
@@ -190,48 +195,119 @@ impl Edges {
     }
 }
 
-/// Eight columns and up to eight rows of pixels.
+/// What each lane adds: a vector covers `LANES / S` neighbouring pixels, all samples of each.
+struct Lanes {
+    /// To each edge function.
+    edges: [[i32; LANES]; 3],
+    /// To the position, in 1/256 px.
+    x: [i32; LANES],
+    y: [i32; LANES],
+}
+
+impl Lanes {
+    #[inline(always)]
+    fn new<const S: usize>(edges: &Edges) -> Self {
+        let offsets = sample_offsets(S as u32);
+        let (mut x, mut y) = ([0; LANES], [0; LANES]);
+        for l in 0..LANES {
+            x[l] = 16 * (l / S) as i32 + offsets[l % S][0];
+            y[l] = offsets[l % S][1];
+        }
+        let mut steps = [[0; LANES]; 3];
+        for k in 0..3 {
+            for l in 0..LANES {
+                steps[k][l] = edges.dx[k] * y[l] - edges.dy[k] * x[l];
+            }
+        }
+        Self { edges: steps, x: x.map(|v| 16 * v), y: y.map(|v| 16 * v) }
+    }
+}
+
+/// Up to 8 x 8 pixels.
 struct Block {
     column: i32,
     row: i32,
-    height: i32,
+    size: [i32; 2],
     corner: [i32; 2],
     values: [i32; 3],
 }
 
 impl Block {
     #[inline(always)]
-    fn draw<const TIES: bool>(&self, setup: &Setup, edges: &Edges, id: u32, band: &mut SampleBand) {
-        // How much each edge function changes from lane to lane: 16 sixteenths of a pixel to the right.
-        let steps: [[i32; LANES]; 3] = std::array::from_fn(|k| std::array::from_fn(|l| -edges.dy[k] * 16 * l as i32));
-        let offsets = sample_offsets(band.samples);
-        for y in 0..self.height {
-            for (s, &[sx, sy]) in offsets.iter().enumerate() {
-                let j = 16 * y + sy;
-                let base: [i32; 3] = std::array::from_fn(|k| self.values[k] + edges.dx[k] * j - edges.dy[k] * sx);
-                let mut inside = [0_i32; LANES];
-                for l in 0..LANES {
-                    inside[l] = (base[0] + steps[0][l]) | (base[1] + steps[1][l]) | (base[2] + steps[2][l]);
+    fn draw<const TIES: bool, const S: usize>(
+        &self,
+        setup: &Setup,
+        edges: &Edges,
+        lanes: &Lanes,
+        id: u32,
+        band: &mut SampleBand,
+    ) {
+        let pixels = (LANES / S) as i32;
+        for y in 0..self.size[1] {
+            let mut x = 0;
+            while x < self.size[0] {
+                let at = band.index((self.column + x) as u32, (self.row + y) as u32, 0);
+                let outside = self.outside(edges, lanes, x, y);
+                let depths = band.depth.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
+                let ids = band.ids.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
+                if let (Some(depths), Some(ids)) = (depths, ids) {
+                    let from = [self.corner[0] + 256 * x - setup.x[0], self.corner[1] + 256 * y - setup.y[0]];
+                    update::<TIES>(&outside, &setup.depth_lanes(lanes, from), id, depths, ids);
                 }
-                let x0 = self.corner[0] + 16 * sx - setup.x[0];
-                let row_depth = setup.depth[2] * (self.corner[1] + 16 * j - setup.y[0]) as f32;
-                let at = band.index(self.column as u32, (self.row + y) as u32, s as u32);
-                let depths: &mut [f32] = &mut band.depth[at..at + LANES];
-                let ids: &mut [u32] = &mut band.ids[at..at + LANES];
-                for l in 0..LANES {
-                    let z = (setup.depth[0] + setup.depth[1] * (x0 + 256 * l as i32) as f32) + row_depth;
-                    let z = clamp(z, setup.depth_range);
-                    let nearer = if TIES {
-                        (z > depths[l]) | ((z == depths[l]) & (z > 0.0) & (id < ids[l]))
-                    } else {
-                        z > depths[l]
-                    };
-                    let take = (inside[l] >= 0) & nearer;
-                    depths[l] = if take { z } else { depths[l] };
-                    ids[l] = if take { id } else { ids[l] };
-                }
+                x += pixels;
             }
         }
+    }
+
+    /// Negative where a lane's sample lies outside an edge.
+    #[inline(always)]
+    fn outside(&self, edges: &Edges, lanes: &Lanes, x: i32, y: i32) -> [i32; LANES] {
+        let mut outside = [0_i32; LANES];
+        for k in 0..3 {
+            let base = self.values[k] + 16 * (edges.dx[k] * y - edges.dy[k] * x);
+            let steps = &lanes.edges[k];
+            for l in 0..LANES {
+                outside[l] |= base.wrapping_add(steps[l]);
+            }
+        }
+        outside
+    }
+}
+
+impl Setup {
+    /// Depth at each lane's sample; `from` is the vector's pixel corner relative to corner 0.
+    #[inline(always)]
+    fn depth_lanes(&self, lanes: &Lanes, from: [i32; 2]) -> [f32; LANES] {
+        let mut z = [0.0; LANES];
+        for l in 0..LANES {
+            let (x, y) = ((from[0] + lanes.x[l]) as f32, (from[1] + lanes.y[l]) as f32);
+            z[l] = clamp((self.depth[0] + self.depth[1] * x) + self.depth[2] * y, self.depth_range);
+        }
+        z
+    }
+}
+
+/// Keeps, lane by lane, the nearer of what is there and triangle `id`. Written as whole-array steps without branches,
+/// which is the form that compilers turn into vector instructions.
+#[inline(always)]
+fn update<const TIES: bool>(
+    outside: &[i32; LANES],
+    z: &[f32; LANES],
+    id: u32,
+    depths: &mut [f32; LANES],
+    ids: &mut [u32; LANES],
+) {
+    let (old_depths, old_ids) = (*depths, *ids);
+    let mut keep = [0_u32; LANES];
+    for l in 0..LANES {
+        let nearer = z[l] > old_depths[l];
+        let tied = TIES & (z[l] == old_depths[l]) & (z[l] > 0.0) & (id < old_ids[l]);
+        // All ones where the old sample stays.
+        keep[l] = ((outside[l] >> 31) as u32) | u32::from(nearer | tied).wrapping_sub(1);
+    }
+    for l in 0..LANES {
+        depths[l] = f32::from_bits((old_depths[l].to_bits() & keep[l]) | (z[l].to_bits() & !keep[l]));
+        ids[l] = (old_ids[l] & keep[l]) | (id & !keep[l]);
     }
 }
 

@@ -28,7 +28,9 @@ impl Buffers {
         use wgpu::BufferUsages as U;
         let limit = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
         if size > limit {
-            return Err(DrawError::Device(format!("it needs a buffer of {size} bytes, and the GPU's limit is {limit}")));
+            return Err(DrawError::Device(format!(
+                "it needs a buffer of {size} bytes, and the GPU's limit is {limit}"
+            )));
         }
         let usage = U::STORAGE | U::COPY_DST | U::COPY_SRC;
         Ok(grow(gpu, &mut self.storage[slot as usize], size, limit, usage))

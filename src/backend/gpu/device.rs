@@ -94,7 +94,8 @@ impl Gpu {
             let _ = slot.set(format!("{reason:?}: {message}"));
         });
         // Without a handler wgpu panics. What a job causes is caught by that job's error scope; this is the rest.
-        device.on_uncaptured_error(Arc::new(|error| tracing::error!(%error, "the GPU reported an error outside a job")));
+        device
+            .on_uncaptured_error(Arc::new(|error| tracing::error!(%error, "the GPU reported an error outside a job")));
 
         let features = if int64_atomics { vec!["int64-atomics"] } else { vec![] };
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
@@ -178,7 +179,9 @@ fn find_adapter(kind: GpuKind) -> Result<wgpu::Adapter, DrawError> {
     let instance = wgpu::Instance::new(descriptor);
     let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
     if adapters.is_empty() {
-        return Err(no_gpu("Vulkan lists no adapter; install a driver, or mesa-vulkan-drivers for a software one".to_owned()));
+        return Err(no_gpu(
+            "Vulkan lists no adapter; install a driver, or mesa-vulkan-drivers for a software one".to_owned(),
+        ));
     }
     let rank = |adapter: &wgpu::Adapter| match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => 0,

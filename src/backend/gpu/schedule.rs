@@ -214,7 +214,11 @@ impl Schedule {
         let workgroups = threads.div_ceil(64);
         if workgroups > 0 {
             let x = workgroups.min(device.workgroups_max);
-            self.steps.push(Step::Dispatch { stage, batch: self.batches.len(), workgroups: [x, workgroups.div_ceil(x)] });
+            self.steps.push(Step::Dispatch {
+                stage,
+                batch: self.batches.len(),
+                workgroups: [x, workgroups.div_ceil(x)],
+            });
             self.batches.push(batch);
         }
     }

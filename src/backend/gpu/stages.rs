@@ -89,11 +89,14 @@ impl Stages {
 /// The layout of group 0: the plan's numbers, and at a dynamic offset the dispatch's.
 pub fn uniforms_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let entry = |binding, has_dynamic_offset| {
-        layout_entry(binding, wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            has_dynamic_offset,
-            min_binding_size: None,
-        })
+        layout_entry(
+            binding,
+            wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Uniform,
+                has_dynamic_offset,
+                min_binding_size: None,
+            },
+        )
     };
     let entries = [entry(0, false), entry(1, true)];
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("uniforms"), entries: &entries })
@@ -197,9 +200,12 @@ impl Stage {
 }
 
 fn buffer_entry(slot: Slot, access: Access) -> wgpu::BindGroupLayoutEntry {
-    layout_entry(slot as u32, wgpu::BindingType::Buffer {
-        ty: wgpu::BufferBindingType::Storage { read_only: access == Access::Read },
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    })
+    layout_entry(
+        slot as u32,
+        wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Storage { read_only: access == Access::Read },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+    )
 }

@@ -4,6 +4,8 @@
 //! refuse but is harmless (bytes that are not UTF-8, empty faces, partial colours) is dropped or completed on the way.
 
 use super::face::{Corner, Counts, parse_corner, show, write_face};
+use super::left_out::LeftOut;
+use super::lines::Lines;
 use crate::mesh::import::Context;
 use crate::mesh::{MeshError, Warning};
 use rapidhash::RapidHashMap;
@@ -22,9 +24,7 @@ pub struct Summary {
 
 /// Implements [`BufRead`] for `tobj`.
 pub struct Cleaner<'a, 'b> {
-    rest: &'a [u8],
-    newline: u8,
-    line: u64,
+    lines: Lines<'a>,
     cx: &'a mut Context<'b>,
     unpaid_bytes: u64,
     out: Vec<u8>,
@@ -44,24 +44,11 @@ pub struct Cleaner<'a, 'b> {
     left_out: LeftOut,
 }
 
-#[derive(Default)]
-struct LeftOut {
-    points: u64,
-    lines: u64,
-    short_faces: u64,
-    curves: u64,
-    colors: u64,
-    libraries: u64,
-}
-
 impl<'a, 'b> Cleaner<'a, 'b> {
     /// Reads `bytes`.
     pub fn new(bytes: &'a [u8], cx: &'a mut Context<'b>) -> Self {
         Self {
-            rest: bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes),
-            // Only very old files end their lines with a carriage return alone.
-            newline: if bytes.contains(&b'\n') { b'\n' } else { b'\r' },
-            line: 0,
+            lines: Lines::new(bytes),
             cx,
             unpaid_bytes: 0,
             out: Vec::new(),
@@ -88,9 +75,12 @@ impl<'a, 'b> Cleaner<'a, 'b> {
             let (index, line) = self.largest[kind];
             format!("line {line} of the OBJ file: the {what} index {} is out of range: there are {count}", index + 1)
         };
-        let here = |what: &str| format!("line {} of the OBJ file: {what}", self.line);
+        let here = |what: &str| format!("line {} of the OBJ file: {what}", self.lines.number);
         let detail = match error {
-            None => return Ok(self.summary()),
+            None => {
+                let warnings = self.left_out.warnings();
+                return Ok(Summary { vertices: self.counts.v, materials: self.materials, warnings });
+            }
             Some(LoadError::PositionParseError) => here("a vertex needs three numbers"),
             Some(LoadError::NormalParseError) => here("a normal needs three numbers"),
             Some(LoadError::TexcoordParseError) => here("a texture coordinate needs two numbers"),
@@ -102,41 +92,14 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         Err(MeshError::broken(detail))
     }
 
-    fn summary(self) -> Summary {
-        let LeftOut { points, lines, short_faces, curves, colors, libraries } = self.left_out;
-        let warnings = [
-            (points, "points_ignored", "points are not drawn"),
-            (lines, "lines_ignored", "lines are not drawn"),
-            (short_faces, "short_faces_ignored", "faces with fewer than three corners are not drawn"),
-            (curves, "curves_ignored", "free-form curves and surfaces are not drawn"),
-            (colors, "colors_incomplete", "vertices have a colour where the first has none, or the other way round"),
-            (
-                libraries,
-                "mtl_ignored",
-                "material libraries are not part of the upload: material names are kept without them",
-            ),
-        ];
-        let warnings = warnings.into_iter().filter(|w| w.0 > 0);
-        Summary {
-            vertices: self.counts.v,
-            materials: self.materials,
-            warnings: warnings.map(|(n, code, what)| Warning { code, detail: format!("{n} {what}") }).collect(),
-        }
-    }
-
     /// Cleans lines until one gives output or the file ends.
     fn refill(&mut self) -> Result<(), MeshError> {
         self.out.clear();
         self.read = 0;
-        while self.out.is_empty() && !self.rest.is_empty() {
-            let joined;
-            let mut line = self.next_line();
-            if line.ends_with(b"\\") && !line.trim_ascii_start().starts_with(b"#") {
-                joined = self.join_continued(line);
-                line = &joined;
-            }
-            self.clean(line)?;
-            if self.unpaid_bytes > 1 << 20 || self.line % 65536 == 0 {
+        while self.out.is_empty() {
+            let Some(line) = self.lines.next() else { break };
+            self.clean(&line)?;
+            if self.unpaid_bytes > 1 << 20 || self.lines.number.is_multiple_of(65536) {
                 self.cx.deadline.check()?;
                 self.cx.check_triangles(self.triangles)?;
                 self.cx.budget.spend("the OBJ file", self.unpaid_bytes, 1)?;
@@ -146,29 +109,9 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         Ok(())
     }
 
-    fn next_line(&mut self) -> &'a [u8] {
-        self.line += 1;
-        let end = self.rest.iter().position(|&b| b == self.newline).unwrap_or(self.rest.len());
-        let line = &self.rest[..end];
-        self.rest = self.rest.get(end + 1..).unwrap_or_default();
-        line.trim_ascii_end()
-    }
-
-    fn join_continued(&mut self, first: &[u8]) -> Vec<u8> {
-        let mut joined = first[..first.len() - 1].to_vec();
-        loop {
-            let line = self.next_line();
-            joined.push(b' ');
-            joined.extend_from_slice(line);
-            if !line.ends_with(b"\\") || self.rest.is_empty() {
-                return joined;
-            }
-            joined.pop();
-        }
-    }
-
     fn clean(&mut self, line: &[u8]) -> Result<(), MeshError> {
-        let mut words = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+        let words = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+        let mut words = words.take_while(|w| !w.starts_with(b"#"));
         let Some(keyword) = words.next() else { return Ok(()) };
         match keyword {
             b"v" => {
@@ -237,6 +180,8 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         self.out.extend_from_slice(keyword);
         for i in 0..count {
             let word = match words.next() {
+                // What Microsoft's C library prints for a NaN: 1.#IND, -nan(ind).
+                Some(word) if word.iter().any(|b| matches!(b, b'#' | b'(')) => b"nan",
                 Some(word) if word.is_ascii() => word,
                 // A one-dimensional texture coordinate is legal.
                 None if count == 2 && i == 1 => b"0",
@@ -254,14 +199,18 @@ impl<'a, 'b> Cleaner<'a, 'b> {
 
     fn face<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), MeshError> {
         self.corners.clear();
-        for word in words.take_while(|w| !w.starts_with(b"#")) {
+        for word in words {
             let corner = parse_corner(word, self.counts).map_err(|why| self.broken(&why))?;
             for (largest, index) in self.largest.iter_mut().zip([Some(corner.v), corner.vt, corner.vn]) {
                 if index.is_some_and(|i| i > largest.0) {
-                    *largest = (index.unwrap_or(0), self.line);
+                    *largest = (index.unwrap_or(0), self.lines.number);
                 }
             }
             self.corners.push(corner);
+            // One line may be the whole file.
+            if self.corners.len().is_multiple_of(65536) {
+                self.cx.budget.spend("the corners of an OBJ face", 65536, 300)?;
+            }
         }
         let n = self.corners.len() as u64;
         if n < 3 {
@@ -304,7 +253,7 @@ impl<'a, 'b> Cleaner<'a, 'b> {
     }
 
     fn broken(&self, what: &str) -> MeshError {
-        MeshError::broken(format!("line {} of the OBJ file: {what}", self.line))
+        MeshError::broken(format!("line {} of the OBJ file: {what}", self.lines.number))
     }
 }
 
@@ -315,9 +264,7 @@ fn number(word: &[u8]) -> Option<f64> {
 impl BufRead for Cleaner<'_, '_> {
     fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
         if self.read == self.out.len() && self.fault.is_none() {
-            if let Err(fault) = self.refill() {
-                self.fault = Some(fault);
-            }
+            self.fault = self.refill().err();
         }
         if self.fault.is_some() {
             return Err(std::io::Error::other("refused"));

@@ -3,11 +3,13 @@
 
 mod clean;
 mod face;
+mod left_out;
+mod lines;
 
 use self::clean::Cleaner;
 use super::import::Context;
 use super::polygon::Triangulator;
-use super::raw::RawMesh;
+use super::raw::{RawMesh, extend_attribute};
 use super::{Format, MaterialSlot, MeshError, Warning};
 use std::path::Path;
 use tobj::{LoadError, LoadOptions};
@@ -68,21 +70,13 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh, triangulator: &mut Triangulator)
     });
     let base = base.ok_or_else(|| MeshError::broken("the OBJ file has more than 4 billion vertices"))?;
     raw.positions.extend(mesh.positions.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
-    let count = raw.positions.len();
-
-    let pad_from = base as usize;
-    pad(
-        &mut raw.normals,
-        pad_from,
-        [0.0; 3],
-        mesh.normals.chunks_exact(3).map(|n| [n[0] as f32, n[1] as f32, n[2] as f32]),
-    );
-    pad(&mut raw.uvs, pad_from, [0.0; 2], mesh.texcoords.chunks_exact(2).map(|t| [t[0] as f32, t[1] as f32]));
-    let colors = mesh.vertex_color.chunks_exact(3);
-    pad(&mut raw.colors, pad_from, [1.0; 4], colors.map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0]));
-    fill(&mut raw.normals, count, [0.0; 3]);
-    fill(&mut raw.uvs, count, [0.0; 2]);
-    fill(&mut raw.colors, count, [1.0; 4]);
+    let (before, after) = (base as usize, raw.positions.len());
+    let normals = mesh.normals.chunks_exact(3).map(|n| [n[0] as f32, n[1] as f32, n[2] as f32]);
+    extend_attribute(&mut raw.normals, before, after, [0.0; 3], normals);
+    let uvs = mesh.texcoords.chunks_exact(2).map(|t| [t[0] as f32, t[1] as f32]);
+    extend_attribute(&mut raw.uvs, before, after, [0.0; 2], uvs);
+    let colors = mesh.vertex_color.chunks_exact(3).map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0]);
+    extend_attribute(&mut raw.colors, before, after, [1.0; 4], colors);
 
     let material = mesh.material_id.map_or(0, |id| id as u32 + 1);
     let mut corners = Vec::new();
@@ -103,27 +97,6 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh, triangulator: &mut Triangulator)
         });
     }
     Ok(())
-}
-
-/// Appends one model's attribute, if it has it; earlier models without it are given `missing`.
-fn pad<T: Copy>(all: &mut Vec<T>, before: usize, missing: T, new: impl ExactSizeIterator<Item = T>) {
-    if new.len() > 0 {
-        fill_always(all, before, missing);
-        all.extend(new);
-    }
-}
-
-/// Makes up for a model without the attribute, where earlier ones have it.
-fn fill<T: Copy>(all: &mut Vec<T>, count: usize, missing: T) {
-    if !all.is_empty() {
-        fill_always(all, count, missing);
-    }
-}
-
-fn fill_always<T: Copy>(all: &mut Vec<T>, count: usize, missing: T) {
-    if all.len() < count {
-        all.resize(count, missing);
-    }
 }
 
 /// OBJ colours are sRGB by custom, 0 to 1 or, from some exporters, 0 to 255.

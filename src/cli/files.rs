@@ -1,0 +1,49 @@
+//! Files and standard streams, with `-` for the latter.
+
+use std::fs::File;
+use std::io::{self, ErrorKind, Read, Write as _};
+
+use super::complaint::Complaint;
+
+/// Reads a whole file, or standard input for `-`, of at most `bytes_max`.
+pub fn read(name: &str, bytes_max: u64) -> Result<Vec<u8>, Complaint> {
+    let failed = |error: io::Error| Complaint::input(format!("{name}: cannot be read: {error}"));
+    let mut bytes = Vec::new();
+    let limited =
+        |reader: &mut dyn Read, bytes: &mut Vec<u8>| reader.take(bytes_max.saturating_add(1)).read_to_end(bytes);
+    if name == "-" {
+        limited(&mut io::stdin().lock(), &mut bytes).map_err(failed)?;
+    } else {
+        limited(&mut File::open(name).map_err(failed)?, &mut bytes).map_err(failed)?;
+    }
+    if bytes.len() as u64 > bytes_max {
+        let sentence = format!("{name}: is larger than {bytes_max} bytes (raise it with --limit-memory-bytes)");
+        return Err(Complaint::input(sentence));
+    }
+    Ok(bytes)
+}
+
+/// Writes a whole file, or standard output for `-`.
+pub fn write(name: &str, bytes: &[u8]) -> Result<(), Complaint> {
+    if name == "-" {
+        return print(bytes);
+    }
+    std::fs::write(name, bytes).map_err(|error| {
+        let sentence = format!("{name}: cannot be written: {error}");
+        match error.kind() {
+            ErrorKind::NotFound | ErrorKind::PermissionDenied | ErrorKind::IsADirectory => Complaint::usage(sentence),
+            _ => Complaint::ours(sentence),
+        }
+    })
+}
+
+/// Writes to standard output. A reader who has seen enough (`| head`) is no failure.
+pub fn print(bytes: &[u8]) -> Result<(), Complaint> {
+    let mut out = io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Complaint::ours(format!("standard output cannot be written: {error}")))
+        }
+        _ => Ok(()),
+    }
+}

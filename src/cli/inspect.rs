@@ -1,0 +1,155 @@
+//! `meshsnap inspect`.
+
+use std::fmt::Write as _;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::complaint::Complaint;
+use super::files;
+use super::progress::Progress;
+use super::render::format_in;
+use super::settings::LimitSettings;
+use crate::limits::{Budget, Deadline};
+use crate::mesh::{self, Mesh};
+
+/// Arguments of `inspect`.
+#[derive(Args)]
+pub struct InspectArgs {
+    /// Mesh file (OBJ, STL, glTF, GLB), `-` for standard input
+    mesh: String,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    /// Format of the mesh, where its bytes do not tell: obj, gltf, glb or stl
+    #[arg(long, value_name = "FORMAT")]
+    format_in: Option<String>,
+    #[command(flatten)]
+    limits: LimitSettings,
+}
+
+/// What is in a file.
+#[derive(Serialize)]
+struct Report {
+    format: &'static str,
+    file_bytes: u64,
+    file_vertices: u64,
+    positions: u64,
+    triangles: u64,
+    polygons: u64,
+    /// How many polygons have 3, 4, ... corners; the last place holds all larger ones.
+    polygons_by_arity: Vec<Arity>,
+    materials: Vec<String>,
+    has_normals: bool,
+    has_uvs: bool,
+    has_colors: bool,
+    bounds: Bounds,
+    dropped_nonfinite_faces: u64,
+    dropped_degenerate_faces: u64,
+    warnings: Vec<WarningEntry>,
+}
+
+#[derive(Serialize)]
+struct Arity {
+    corners: usize,
+    count: u64,
+}
+
+#[derive(Serialize)]
+struct Bounds {
+    min: [f64; 3],
+    max: [f64; 3],
+    size: [f64; 3],
+}
+
+#[derive(Serialize)]
+struct WarningEntry {
+    code: &'static str,
+    detail: String,
+}
+
+/// Prints what is in a file.
+pub fn run(arguments: &InspectArgs) -> Result<(), Complaint> {
+    let limits = arguments.limits.config().limits;
+    let format = format_in(arguments.format_in.as_deref())?;
+    let progress = Progress::start("reading");
+    let bytes = files::read(&arguments.mesh, limits.memory_bytes)?;
+    progress.next("parsing");
+    let mut budget = Budget::new(&limits);
+    let mesh = mesh::import(&bytes, format, &limits, &mut budget, &Deadline::default())
+        .map_err(|error| Complaint::from(error).about(&arguments.mesh))?;
+    let report = Report::new(&mesh, bytes.len() as u64);
+    drop(progress);
+    let text = if arguments.json {
+        let json = serde_json::to_string_pretty(&report);
+        json.map_err(|error| Complaint::ours(error.to_string()))? + "\n"
+    } else {
+        report.text()
+    };
+    files::print(text.as_bytes())
+}
+
+impl Report {
+    fn new(mesh: &Mesh, file_bytes: u64) -> Self {
+        let import = &mesh.report;
+        let arities = import.polygons_by_arity.iter().enumerate().filter(|&(_, &count)| count > 0);
+        let warnings = import.warnings.iter();
+        Self {
+            format: import.format.name(),
+            file_bytes,
+            file_vertices: import.file_vertices,
+            positions: mesh.positions.len() as u64,
+            triangles: mesh.triangles.len() as u64,
+            polygons: import.polygons_by_arity.iter().sum(),
+            polygons_by_arity: arities.map(|(corners, &count)| Arity { corners, count }).collect(),
+            materials: mesh.materials.iter().map(|m| m.name.clone()).collect(),
+            has_normals: !mesh.normals.is_empty(),
+            has_uvs: !mesh.uvs.is_empty(),
+            has_colors: !mesh.colors.is_empty(),
+            bounds: bounds(mesh),
+            dropped_nonfinite_faces: import.dropped_nonfinite_faces,
+            dropped_degenerate_faces: import.dropped_degenerate_faces,
+            warnings: warnings.map(|w| WarningEntry { code: w.code, detail: w.detail.clone() }).collect(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut out = String::new();
+        let mut line = |name: &str, value: String| {
+            // Writing to a string cannot fail.
+            let _ = writeln!(out, "{name:<12} {value}");
+        };
+        let arity = |a: &Arity| format!("{} x {}{}", a.count, a.corners, if a.corners == 12 { "+" } else { "" });
+        let point = |p: [f64; 3]| format!("{} {} {}", p[0], p[1], p[2]);
+        let have = |(has, name)| if has { Some(name) } else { None };
+        let attributes = [(self.has_normals, "normals"), (self.has_uvs, "UVs"), (self.has_colors, "colours")];
+        let attributes: Vec<&str> = attributes.into_iter().filter_map(have).collect();
+        line("format", format!("{} ({} bytes)", self.format, self.file_bytes));
+        line("vertices", format!("{} in the file, {} different positions", self.file_vertices, self.positions));
+        line("triangles", self.triangles.to_string());
+        let arities: Vec<String> = self.polygons_by_arity.iter().map(arity).collect();
+        line("polygons", format!("{} ({} corners)", self.polygons, arities.join(", ")));
+        line("attributes", if attributes.is_empty() { "none".into() } else { attributes.join(", ") });
+        let names: Vec<&str> = self.materials.iter().map(|m| if m.is_empty() { "(unnamed)" } else { m }).collect();
+        line("materials", names.join(", "));
+        line("bounds", format!("{} to {}", point(self.bounds.min), point(self.bounds.max)));
+        line("size", point(self.bounds.size));
+        if self.dropped_nonfinite_faces + self.dropped_degenerate_faces > 0 {
+            let (nonfinite, degenerate) = (self.dropped_nonfinite_faces, self.dropped_degenerate_faces);
+            line("dropped", format!("{nonfinite} faces with NaN or infinite corners, {degenerate} without area"));
+        }
+        for warning in &self.warnings {
+            line("warning", format!("{} ({})", warning.detail, warning.code));
+        }
+        out
+    }
+}
+
+/// In the file's own space.
+fn bounds(mesh: &Mesh) -> Bounds {
+    let to_file = |unit: [f32; 3]| {
+        std::array::from_fn(|axis| mesh.to_file.centre[axis] + mesh.to_file.scale * f64::from(unit[axis]))
+    };
+    let [min, max]: [[f64; 3]; 2] = mesh.bounds.map(to_file);
+    Bounds { min, max, size: std::array::from_fn(|axis| max[axis] - min[axis]) }
+}

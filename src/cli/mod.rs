@@ -1,0 +1,88 @@
+//! The command line.
+//!
+//! Exit codes: 0 done, 1 the mesh or the request is at fault, 2 usage, 3 our fault. Whatever fails is one sentence on
+//! standard error.
+
+mod complaint;
+mod files;
+mod health;
+mod inspect;
+mod progress;
+mod render;
+mod serve;
+mod settings;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::{CommandFactory as _, Parser, Subcommand};
+
+use complaint::Complaint;
+
+/// Turns 3D meshes into images, here or as an HTTP service.
+#[derive(Parser)]
+#[command(name = "meshsnap", version, about, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Draw a mesh into an image file
+    Render(Box<render::RenderArgs>),
+    /// Say what is in a mesh file
+    Inspect(inspect::InspectArgs),
+    /// Serve renders over HTTP
+    Serve(serve::ServeArgs),
+    /// Ask a running server whether it is well, for container health checks
+    Health(health::HealthArgs),
+    /// Print a completion script for a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Runs the program with these arguments.
+pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are no errors; clap knows where each belongs.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+        }
+    };
+    let done = match cli.command {
+        Command::Render(arguments) => render::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Serve(arguments) => serve::run(&arguments),
+        Command::Health(arguments) => health::run(&arguments),
+        Command::Completions { shell } => completions(shell),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(complaint) => {
+            eprintln!("meshsnap: {}", complaint.sentence);
+            ExitCode::from(complaint.exit_code)
+        }
+    }
+}
+
+fn completions(shell: clap_complete::Shell) -> Result<(), Complaint> {
+    // Into memory first: the generator panics where a pipe is closed.
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "meshsnap", &mut script);
+    files::print(&script)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+}

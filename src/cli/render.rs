@@ -1,0 +1,188 @@
+//! `meshsnap render`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+
+use super::complaint::Complaint;
+use super::files;
+use super::progress::Progress;
+use super::settings::LimitSettings;
+use crate::backend::{Backends, GpuHost};
+use crate::config::{LogFormat, cores};
+use crate::image::ImageFormat;
+use crate::limits::{BackendChoice, Deadline, Limits};
+use crate::mesh::Format;
+use crate::pipeline::{self, Job, Output, Stage};
+use crate::request::{self, Rules};
+use crate::scene::Spec;
+use crate::telemetry;
+
+/// Arguments of `render`.
+#[derive(Args)]
+pub struct RenderArgs {
+    /// Mesh file (OBJ, STL, glTF, GLB), `-` for standard input
+    #[arg(required = true, value_name = "MESH")]
+    meshes: Vec<String>,
+    /// Image file, `-` for standard output; its extension chooses the format unless --format does
+    #[arg(short, long, value_name = "OUT")]
+    output: String,
+    /// Preset: flat, smooth, unlit, wire, wireframe, outline or hidden-line
+    #[arg(long)]
+    style: Option<String>,
+    /// Request document
+    #[arg(long, value_name = "FILE.json")]
+    request: Option<PathBuf>,
+    /// Dotted key of the request document, such as wire.color=#f00; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// N or WxH, in pixels
+    #[arg(long, value_name = "N|WxH")]
+    size: Option<String>,
+    /// iso, front, back, left, right, top or bottom
+    #[arg(long)]
+    view: Option<String>,
+    /// Axis that points up: y, z, -y, -z, x or -x
+    #[arg(long, allow_hyphen_values = true)]
+    up: Option<String>,
+    /// png, webp or jpeg
+    #[arg(long)]
+    format: Option<String>,
+    /// Format of the mesh, where its bytes do not tell: obj, gltf, glb or stl
+    #[arg(long, value_name = "FORMAT")]
+    format_in: Option<String>,
+    /// auto, gpu or cpu
+    #[arg(long)]
+    backend: Option<String>,
+    /// Samples a pixel
+    #[arg(long)]
+    samples: Option<String>,
+    /// #rgb, #rrggbb, #rrggbbaa or transparent
+    #[arg(long, value_name = "COLOR")]
+    background: Option<String>,
+    /// Threads of the CPU renderer [default: one for each processor]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Print what the picture did not need, and how long each stage took
+    #[arg(long)]
+    explain: bool,
+    #[command(flatten)]
+    limits: LimitSettings,
+}
+
+/// Draws one mesh into one file.
+pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
+    let filter = std::env::var("MESHSNAP_LOG").unwrap_or_default();
+    let filter = if filter.is_empty() { "warn" } else { &filter };
+    telemetry::init(filter, LogFormat::Auto).map_err(Complaint::usage)?;
+    let [mesh_name] = arguments.meshes.as_slice() else {
+        return Err(Complaint::usage("give one MESH: this version draws one file at a time"));
+    };
+    let limits = arguments.limits.config().limits;
+    let format_in = format_in(arguments.format_in.as_deref())?;
+    let spec = read_spec(arguments, &limits)?;
+
+    let progress = Progress::start("reading");
+    let mesh = files::read(mesh_name, limits.memory_bytes)?;
+    progress.next("parsing");
+    let began = Instant::now();
+    let (mut times, mut stage_began) = (Vec::new(), began);
+    let mut ended = |stage| {
+        progress.next(after(stage));
+        times.push((stage, stage_began.elapsed()));
+        stage_began = Instant::now();
+    };
+    let threads = arguments.threads.unwrap_or(cores() as usize);
+    let mut backends = Backends::new(Arc::new(GpuHost::default()), threads);
+    let job = Job { mesh: &mesh, format_in, spec: &spec };
+    let output = pipeline::render(job, &mut backends, &limits, &Deadline::default(), &mut ended)
+        .map_err(|error| Complaint::from(error).about(mesh_name))?;
+    drop(progress);
+
+    files::write(&arguments.output, &output.bytes)?;
+    for warning in &output.warnings {
+        eprintln!("meshsnap: {mesh_name}: warning: {}", warning.detail);
+    }
+    if arguments.explain {
+        explain(&output, &times, began.elapsed());
+    }
+    Ok(())
+}
+
+/// The request document, then the short flags, then `--set`, each over what came before.
+fn read_spec(arguments: &RenderArgs, limits: &Limits) -> Result<Spec, Complaint> {
+    let document = match &arguments.request {
+        Some(path) => Some(files::read(&path.to_string_lossy(), limits.memory_bytes)?),
+        None => None,
+    };
+    let short = [
+        ("style", &arguments.style),
+        ("size", &arguments.size),
+        ("view", &arguments.view),
+        ("up", &arguments.up),
+        ("format", &arguments.format),
+        ("backend", &arguments.backend),
+        ("samples", &arguments.samples),
+        ("background", &arguments.background),
+    ];
+    let mut overrides: Vec<(String, String)> =
+        short.iter().filter_map(|&(key, value)| Some((key.to_owned(), value.clone()?))).collect();
+    for pair in &arguments.set {
+        let (key, value) = pair
+            .split_once('=')
+            .ok_or_else(|| Complaint::usage(format!("--set {pair}: write KEY=VALUE, such as wire.color=#f00")))?;
+        overrides.push((key.to_owned(), value.to_owned()));
+    }
+    let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
+    let mut spec = request::read(document.as_deref(), &overrides, &rules)?;
+    let chosen = overrides.iter().any(|(key, _)| key == "format" || key == "image.format");
+    let format = if chosen { spec.image.format } else { by_extension(&arguments.output, spec.image.format)? };
+    request::set_format(&mut spec, format.unwrap_or(ImageFormat::Png));
+    Ok(spec)
+}
+
+/// The format that the output's name asks for, else the document's.
+fn by_extension(output: &str, asked: Option<ImageFormat>) -> Result<Option<ImageFormat>, Complaint> {
+    let extension = Path::new(output).extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    match extension.as_deref() {
+        Some("png") => Ok(Some(ImageFormat::Png)),
+        Some("webp") => Ok(Some(ImageFormat::Webp)),
+        Some("jpg" | "jpeg") => Ok(Some(ImageFormat::Jpeg)),
+        None => Ok(asked),
+        _ if asked.is_some() => Ok(asked),
+        Some(other) => {
+            let sentence =
+                format!("{output}: no image format is called `{other}`; write png, webp or jpg, or give --format");
+            Err(Complaint::usage(sentence))
+        }
+    }
+}
+
+/// The mesh format that a flag names.
+pub fn format_in(name: Option<&str>) -> Result<Option<Format>, Complaint> {
+    let Some(name) = name else { return Ok(None) };
+    let unknown = || Complaint::usage(format!("--format-in {name}: allowed is one of {}", Format::NAMES.join(", ")));
+    Format::from_name(name).map(Some).ok_or_else(unknown)
+}
+
+fn after(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Parse => "planning",
+        Stage::Plan => "drawing",
+        Stage::Render => "encoding",
+        Stage::Encode => "writing",
+    }
+}
+
+fn explain(output: &Output, times: &[(Stage, Duration)], total: Duration) {
+    eprintln!("drawn by {}", output.backend.name());
+    for skip in &output.skips {
+        eprintln!("skipped {}: {}", skip.what, skip.why);
+    }
+    for (stage, took) in times {
+        eprintln!("{:<6} {:9.3} ms", format!("{stage:?}").to_lowercase(), took.as_secs_f64() * 1e3);
+    }
+    eprintln!("{:<6} {:9.3} ms", "total", total.as_secs_f64() * 1e3);
+}

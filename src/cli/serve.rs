@@ -1,0 +1,73 @@
+//! `meshsnap serve`.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::complaint::Complaint;
+use super::files;
+use super::settings::AllSettings;
+use crate::config::{Config, SETTINGS};
+use crate::http::{self, ServeError};
+use crate::telemetry;
+
+/// Arguments of `serve`.
+#[derive(Args)]
+pub struct ServeArgs {
+    /// TOML file with settings under the names of the flags
+    #[arg(long, value_name = "FILE", env = "MESHSNAP_CONFIG")]
+    config: Option<PathBuf>,
+    #[command(flatten)]
+    settings: AllSettings,
+}
+
+/// Serves until told to stop.
+pub fn run(arguments: &ServeArgs) -> Result<(), Complaint> {
+    let config = resolve(arguments)?;
+    telemetry::init(&config.log, config.log_format).map_err(Complaint::usage)?;
+    if config.data_dir.is_some() {
+        tracing::warn!("this version keeps jobs in memory and stores nothing in --data-dir");
+    }
+    http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
+        ServeError::Unprotected(_) => Complaint::usage(error.to_string()),
+        ServeError::Listen { .. } | ServeError::Start(_) => Complaint::ours(error.to_string()),
+    })
+}
+
+/// Defaults, then the file, then variables and flags.
+fn resolve(arguments: &ServeArgs) -> Result<Config, Complaint> {
+    let mut config = Config::default();
+    if let Some(path) = &arguments.config {
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| Complaint::usage(format!("{name}: the configuration cannot be read: {error}")))?;
+        config.apply_toml(&name, &text).map_err(|error| Complaint::usage(error.to_string()))?;
+    }
+    for setting in SETTINGS.iter().filter(|s| !s.has_flag) {
+        let variable = setting.variable();
+        if let Some(value) = std::env::var(&variable).ok().filter(|v| !v.is_empty()) {
+            config.apply(&variable, setting.key, &value).map_err(|error| Complaint::usage(error.to_string()))?;
+        }
+    }
+    for (key, value) in arguments.settings.given() {
+        config.apply("the command line", key, value).map_err(|error| Complaint::usage(error.to_string()))?;
+    }
+    Ok(config)
+}
+
+/// Two lines for people: where we are, and a command that shows it, to be pasted as it is.
+fn announce(address: SocketAddr, config: &Config) {
+    let host = match address {
+        // Every address of this machine: name one that works from here.
+        _ if address.ip().is_unspecified() => format!("127.0.0.1:{}", address.port()),
+        _ => address.to_string(),
+    };
+    let key = if config.api_keys.is_empty() { "" } else { " -H \"Authorization: Bearer $KEY\"" };
+    let lines = format!(
+        "listening on http://{address}\n\
+         curl{key} --data-binary @api/examples/knot.obj 'http://{host}/v1/render?style=wire' -o out.png\n"
+    );
+    // Nobody reading it is no reason not to serve.
+    let _ = files::print(lines.as_bytes());
+}

@@ -1,0 +1,104 @@
+//! What handlers share, and which path leads to which.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use axum::Router;
+use axum::middleware;
+use axum::routing::{get, post};
+
+use super::error::ApiError;
+use super::{auth, health, jobs, observe, render};
+use crate::backend::GpuHost;
+use crate::config::{Config, cores};
+use crate::jobs::{Bodies, Engine, Jobs, Settings, pipeline_engine};
+use crate::limits::Limits;
+use crate::request::Rules;
+
+/// What handlers share.
+pub struct App {
+    /// Reads request documents.
+    pub rules: Rules,
+    /// The queue and its workers.
+    pub jobs: Jobs,
+    /// Memory of uploads.
+    pub bodies: Arc<Bodies>,
+    /// For the whole of a request's body.
+    pub body_timeout: Duration,
+    /// Threads that draw.
+    pub workers: u64,
+    /// Bearer tokens; empty: everybody.
+    pub api_keys: Vec<String>,
+    draining: AtomicBool,
+}
+
+impl App {
+    /// Starts the workers.
+    pub fn start(config: &Config) -> std::io::Result<Arc<Self>> {
+        let threads = match config.worker_threads {
+            0 => (cores() / config.workers.max(1)).max(1),
+            given => given,
+        };
+        let engine = pipeline_engine(Arc::new(GpuHost::default()), threads as usize, config.limits.clone());
+        Self::with_engine(config, engine)
+    }
+
+    /// Starts workers that draw with `engine`.
+    pub fn with_engine(config: &Config, engine: Engine) -> std::io::Result<Arc<Self>> {
+        let Limits { queue_per_worker, job_ms, .. } = config.limits;
+        let settings = Settings {
+            workers: to_usize(config.workers),
+            queue: to_usize(queue_per_worker.saturating_mul(config.workers)),
+            job_time: Duration::from_millis(job_ms),
+            result_ttl: Duration::from_millis(config.result_ttl_ms),
+            result_bytes: config.result_bytes,
+            result_count: to_usize(config.result_count),
+        };
+        Ok(Arc::new(Self {
+            rules: Rules { limits: config.limits.clone(), backend: config.backend },
+            jobs: Jobs::start(settings, engine)?,
+            bodies: Bodies::new(config.uploads_bytes),
+            body_timeout: Duration::from_millis(config.body_timeout_ms),
+            workers: config.workers,
+            api_keys: config.api_keys.clone(),
+            draining: AtomicBool::new(false),
+        }))
+    }
+
+    /// Takes no more work; what was accepted goes on.
+    pub fn drain(&self) {
+        self.draining.store(true, Ordering::Relaxed);
+        self.jobs.drain();
+    }
+
+    /// Whether [`App::drain`] was called.
+    pub fn is_draining(&self) -> bool {
+        self.draining.load(Ordering::Relaxed)
+    }
+}
+
+/// Every path there is.
+pub fn router(app: &Arc<App>) -> Router {
+    let api = Router::new()
+        .route("/v1/render", post(render::post))
+        .route("/v1/jobs", post(jobs::post))
+        .route("/v1/jobs/{id}", get(jobs::get).delete(jobs::delete))
+        .route("/v1/jobs/{id}/result", get(jobs::result))
+        .route("/v1/capabilities", get(health::capabilities))
+        .route_layer(middleware::from_fn_with_state(app.clone(), auth::check));
+    Router::new()
+        .route("/healthz", get(health::healthz))
+        .route("/readyz", get(health::readyz))
+        .route("/version", get(health::version))
+        .merge(api)
+        .fallback(|| async {
+            ApiError::not_found("there is nothing at this path; the work is done at POST /v1/render")
+        })
+        .layer(middleware::from_fn(observe::observe))
+        .with_state(app.clone())
+}
+
+fn to_usize(number: u64) -> usize {
+    usize::try_from(number).unwrap_or(usize::MAX)
+}

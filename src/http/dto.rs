@@ -1,0 +1,228 @@
+//! What goes over the wire as JSON. Domain types do not serialise themselves.
+
+use serde::Serialize;
+
+use super::error::ApiError;
+use crate::image::ImageFormat;
+use crate::jobs::{Job, Load, State, Timings};
+use crate::limits::BackendChoice;
+use crate::limits::Limits;
+use crate::mesh::Format;
+use crate::request::{self, Style, word_for, words_of};
+
+/// RFC 9457.
+#[derive(Serialize)]
+pub struct ProblemDto<'a> {
+    r#type: String,
+    title: &'a str,
+    status: u16,
+    detail: &'a str,
+    code: &'a str,
+    request_id: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    flag: Option<&'a str>,
+}
+
+impl<'a> ProblemDto<'a> {
+    /// The problem document for an error.
+    pub fn new(error: &'a ApiError, request_id: &'a str) -> Self {
+        Self {
+            r#type: format!("urn:meshsnap:error:{}", error.code),
+            title: error.status.canonical_reason().unwrap_or("Error"),
+            status: error.status.as_u16(),
+            detail: &error.detail,
+            code: error.code,
+            request_id,
+            flag: error.flag,
+        }
+    }
+}
+
+/// State of a job.
+#[derive(Serialize)]
+pub struct JobDto {
+    id: String,
+    state: &'static str,
+    accepted_unix_ms: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    result: Option<ResultDto>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<JobErrorDto>,
+}
+
+/// What became of a job that is done.
+#[derive(Serialize)]
+pub struct ResultDto {
+    url: String,
+    content_type: &'static str,
+    bytes: usize,
+    backend: &'static str,
+    timings_ms: TimingsDto,
+    warnings: Vec<WarningDto>,
+}
+
+/// Why a job failed.
+#[derive(Serialize)]
+pub struct JobErrorDto {
+    status: u16,
+    code: &'static str,
+    detail: String,
+}
+
+/// Something in the file that was read around.
+#[derive(Serialize)]
+pub struct WarningDto {
+    code: &'static str,
+    detail: String,
+}
+
+/// Milliseconds.
+#[derive(Serialize)]
+pub struct TimingsDto {
+    queue: f64,
+    parse: f64,
+    plan: f64,
+    render: f64,
+    encode: f64,
+}
+
+impl JobDto {
+    /// As it is now.
+    pub fn new(job: &Job) -> Self {
+        let state = job.state();
+        let (result, error) = match &state {
+            State::Done(finished) => {
+                let output = &finished.output;
+                let warnings = output.warnings.iter();
+                let result = ResultDto {
+                    url: format!("/v1/jobs/{}/result", job.id),
+                    content_type: media_type(output.format),
+                    bytes: output.bytes.len(),
+                    backend: output.backend.name(),
+                    timings_ms: TimingsDto::new(&finished.timings),
+                    warnings: warnings.map(|w| WarningDto { code: w.code, detail: w.detail.clone() }).collect(),
+                };
+                (Some(result), None)
+            }
+            State::Failed(failure) => {
+                let ApiError { status, code, detail, .. } = ApiError::from(&**failure);
+                (None, Some(JobErrorDto { status: status.as_u16(), code, detail }))
+            }
+            State::Queued | State::Running | State::Cancelled => (None, None),
+        };
+        let (id, accepted_unix_ms) = (job.id.to_string(), job.accepted_unix_ms);
+        Self { id, state: state.name(), accepted_unix_ms, result, error }
+    }
+}
+
+impl TimingsDto {
+    fn new(timings: &Timings) -> Self {
+        // Microseconds are as precise as such a clock is.
+        let [queue, parse, plan, render, encode] =
+            timings.parts().map(|(_, took)| (took.as_secs_f64() * 1e6).round() / 1e3);
+        Self { queue, parse, plan, render, encode }
+    }
+}
+
+/// `/healthz` and `/readyz`.
+#[derive(Serialize)]
+pub struct StatusDto {
+    /// `ok` or `ready`.
+    pub status: &'static str,
+}
+
+/// `/version`.
+#[derive(Serialize)]
+pub struct VersionDto {
+    name: &'static str,
+    version: &'static str,
+}
+
+impl VersionDto {
+    /// This program.
+    pub fn new() -> Self {
+        Self { name: env!("CARGO_PKG_NAME"), version: env!("CARGO_PKG_VERSION") }
+    }
+}
+
+/// `/v1/capabilities`.
+#[derive(Serialize)]
+pub struct CapabilitiesDto {
+    version: &'static str,
+    mesh_formats: [&'static str; 4],
+    image_formats: [&'static str; 3],
+    styles: Vec<&'static str>,
+    request_keys: Vec<&'static str>,
+    backend: BackendDto,
+    workers: u64,
+    load: LoadDto,
+    limits: LimitsDto,
+}
+
+#[derive(Serialize)]
+struct BackendDto {
+    default: &'static str,
+    choices: Vec<&'static str>,
+}
+
+#[derive(Serialize)]
+struct LoadDto {
+    queued: usize,
+    running: usize,
+    kept_results: usize,
+    kept_result_bytes: u64,
+}
+
+#[derive(Serialize)]
+struct LimitsDto {
+    body_bytes: u64,
+    memory_bytes: u64,
+    triangles: u64,
+    nodes: u64,
+    json_depth: u64,
+    image_px: u64,
+    job_ms: u64,
+    queue_per_worker: u64,
+}
+
+impl CapabilitiesDto {
+    /// What this process can do.
+    pub fn new(limits: &Limits, backend: BackendChoice, workers: u64, load: Load) -> Self {
+        let Limits { body_bytes, memory_bytes, triangles, nodes, json_depth, image_px, job_ms, queue_per_worker } =
+            *limits;
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            mesh_formats: Format::NAMES,
+            image_formats: ["png", "webp", "jpeg"],
+            styles: words_of::<Style>(),
+            request_keys: request::keys(),
+            backend: BackendDto { default: word_for(backend), choices: words_of::<BackendChoice>() },
+            workers,
+            load: LoadDto {
+                queued: load.queued,
+                running: load.running,
+                kept_results: load.kept,
+                kept_result_bytes: load.kept_bytes,
+            },
+            limits: LimitsDto {
+                body_bytes,
+                memory_bytes,
+                triangles,
+                nodes,
+                json_depth,
+                image_px,
+                job_ms,
+                queue_per_worker,
+            },
+        }
+    }
+}
+
+/// The media type of a picture.
+pub fn media_type(format: ImageFormat) -> &'static str {
+    match format {
+        ImageFormat::Png => "image/png",
+        ImageFormat::Webp => "image/webp",
+        ImageFormat::Jpeg => "image/jpeg",
+    }
+}

@@ -1,0 +1,132 @@
+//! What a client would like: `Accept` and `Prefer`.
+
+use std::time::Duration;
+
+use axum::http::{HeaderMap, header};
+
+use super::dto::media_type;
+use super::error::ApiError;
+use crate::image::ImageFormat;
+
+/// In order of our own preference.
+const FORMATS: [ImageFormat; 3] = [ImageFormat::Png, ImageFormat::Webp, ImageFormat::Jpeg];
+
+/// Longest wait that a client can ask for: proxies give up after a minute or so.
+const WAIT_S_MAX: u64 = 60;
+
+/// The picture's format: the document's, else the best acceptable one, else PNG.
+pub fn image_format(asked: Option<ImageFormat>, headers: &HeaderMap) -> Result<ImageFormat, ApiError> {
+    if let Some(format) = asked {
+        return Ok(format);
+    }
+    let accept: Vec<&str> = headers.get_all(header::ACCEPT).iter().filter_map(|v| v.to_str().ok()).collect();
+    if accept.iter().all(|line| line.trim().is_empty()) {
+        return Ok(ImageFormat::Png);
+    }
+    let ranges: Vec<(&str, f32)> = accept.iter().flat_map(|line| line.split(',')).filter_map(range).collect();
+    let scored = FORMATS.map(|format| (format, quality(media_type(format), &ranges)));
+    let mut best: Option<(ImageFormat, f32)> = None;
+    for (format, q) in scored {
+        if q > best.map_or(0.0, |(_, q)| q) {
+            best = Some((format, q));
+        }
+    }
+    best.map(|(format, _)| format).ok_or_else(|| {
+        let detail = "the Accept header allows none of image/png, image/webp and image/jpeg";
+        ApiError::new(axum::http::StatusCode::NOT_ACCEPTABLE, "not_acceptable", detail)
+    })
+}
+
+/// A media range and its quality; None where it is nonsense.
+fn range(text: &str) -> Option<(&str, f32)> {
+    let mut parts = text.split(';').map(str::trim);
+    let name = parts.next().filter(|name| name.contains('/'))?;
+    let q = parts.find_map(|p| p.strip_prefix("q=").or_else(|| p.strip_prefix("Q=")));
+    let q = q.map_or(Some(1.0), |q| q.parse::<f32>().ok())?;
+    (0.0..=1.0).contains(&q).then_some((name, q))
+}
+
+/// The quality that the most specific matching range gives.
+fn quality(media_type: &str, ranges: &[(&str, f32)]) -> f32 {
+    let specificity = |name: &str| match name {
+        _ if name.eq_ignore_ascii_case(media_type) => Some(2),
+        _ if name.eq_ignore_ascii_case("image/*") => Some(1),
+        "*/*" => Some(0),
+        _ => None,
+    };
+    let matching = ranges.iter().filter_map(|&(name, q)| specificity(name).map(|s| (s, q)));
+    matching.max_by_key(|&(s, _)| s).map_or(0.0, |(_, q)| q)
+}
+
+/// What `Prefer` asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Prefer {
+    /// 202 at once instead of waiting for the picture.
+    pub respond_async: bool,
+    /// How long to wait for a change.
+    pub wait: Option<Duration>,
+}
+
+/// Reads every `Prefer` header; what is not understood is ignored, as RFC 7240 wants.
+pub fn prefer(headers: &HeaderMap) -> Prefer {
+    let mut prefer = Prefer::default();
+    let lines = headers.get_all("prefer").iter().filter_map(|v| v.to_str().ok());
+    for preference in lines.flat_map(|line| line.split([',', ';'])).map(str::trim) {
+        if preference.eq_ignore_ascii_case("respond-async") {
+            prefer.respond_async = true;
+        } else if let Some((name, value)) = preference.split_once('=')
+            && name.trim().eq_ignore_ascii_case("wait")
+            && let Ok(seconds) = value.trim().trim_matches('"').parse::<u64>()
+        {
+            prefer.wait = Some(Duration::from_secs(seconds.min(WAIT_S_MAX)));
+        }
+    }
+    prefer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn accept(value: &'static str) -> Option<ImageFormat> {
+        let headers = HeaderMap::from_iter([(header::ACCEPT, value.parse().unwrap())]);
+        image_format(None, &headers).ok()
+    }
+
+    #[test]
+    fn the_best_acceptable_format_is_taken() {
+        use ImageFormat::{Jpeg, Png, Webp};
+        let cases = [
+            ("*/*", Some(Png)),
+            ("image/*", Some(Png)),
+            ("image/webp", Some(Webp)),
+            ("image/jpeg;q=0.5, image/webp;q=0.4", Some(Jpeg)),
+            ("text/html,application/xhtml+xml,image/avif,image/webp,*/*;q=0.8", Some(Webp)),
+            ("image/png;q=0, */*", Some(Webp)),
+            ("IMAGE/PNG", Some(Png)),
+            ("text/html", None),
+            ("image/png;q=0", None),
+            ("image/png;q=nan", None),
+            ("application/problem+json", None),
+            ("", Some(Png)),
+        ];
+        for (value, expected) in cases {
+            assert_eq!(accept(value), expected, "{value}");
+        }
+        assert_eq!(image_format(None, &HeaderMap::new()).ok(), Some(Png));
+        assert_eq!(
+            image_format(Some(Jpeg), &HeaderMap::from_iter([(header::ACCEPT, "text/html".parse().unwrap())])).ok(),
+            Some(Jpeg)
+        );
+    }
+
+    #[test]
+    fn preferences_are_found_among_others() {
+        let read =
+            |value: &'static str| prefer(&HeaderMap::from_iter([("prefer".parse().unwrap(), value.parse().unwrap())]));
+        assert!(read("respond-async, wait=5").respond_async);
+        assert_eq!(read("respond-async; wait=5").wait, Some(Duration::from_secs(5)));
+        assert_eq!(read("wait=99999").wait, Some(Duration::from_secs(60)));
+        assert_eq!(read("wait=-1, handling=lenient"), Prefer::default());
+    }
+}

@@ -1,0 +1,65 @@
+//! `POST /v1/render`: a mesh in, a picture out.
+
+use std::sync::Arc;
+
+use axum::extract::{Request, State};
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+
+use super::app::App;
+use super::dto::media_type;
+use super::error::ApiError;
+use super::{jobs, negotiate, receive};
+use crate::jobs::{Finished, Job, Jobs, State as JobState};
+
+/// Draws while the client waits.
+pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Response, ApiError> {
+    let respond_async = negotiate::prefer(request.headers()).respond_async;
+    let work = receive::receive(&app, request).await?;
+    if respond_async {
+        let job = app.jobs.submit(work, true)?;
+        let mut response = jobs::accepted(&job);
+        let applied = HeaderValue::from_static("respond-async");
+        response.headers_mut().insert("preference-applied", applied);
+        return Ok(response);
+    }
+    let waiting = Waiting { job: app.jobs.submit(work, false)?, jobs: app.jobs.clone() };
+    match waiting.job.ended().await {
+        JobState::Done(finished) => Ok(picture(&finished)),
+        JobState::Failed(failure) => Err(ApiError::from(&*failure)),
+        JobState::Queued | JobState::Running | JobState::Cancelled => Err(ApiError::internal()),
+    }
+}
+
+/// A client that waits. When it hangs up, this is dropped, and its job stops.
+struct Waiting {
+    job: Arc<Job>,
+    jobs: Jobs,
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        self.jobs.cancel(&self.job);
+    }
+}
+
+/// The picture, with what there is to say about it.
+pub fn picture(finished: &Finished) -> Response {
+    let output = &finished.output;
+    let etag = format!("\"{:032x}\"", digest(&output.bytes));
+    let timings = finished.timings.parts().map(|(name, took)| format!("{name};dur={:.3}", took.as_secs_f64() * 1e3));
+    let text = |value: &str| HeaderValue::from_str(value).unwrap_or_else(|_| HeaderValue::from_static(""));
+    let headers = [
+        (header::CONTENT_TYPE, HeaderValue::from_static(media_type(output.format))),
+        (header::ETAG, text(&etag)),
+        (HeaderName::from_static("x-render-backend"), HeaderValue::from_static(output.backend.name())),
+        (HeaderName::from_static("server-timing"), text(&timings.join(", "))),
+    ];
+    (StatusCode::OK, headers, output.bytes.clone()).into_response()
+}
+
+/// 128 bits of the picture's bytes: equal pictures have equal tags, and the other way round but for chance.
+fn digest(bytes: &[u8]) -> u128 {
+    let half = |seed| rapidhash::v3::rapidhash_v3_seeded(bytes, &rapidhash::v3::RapidSecrets::seed(seed));
+    u128::from(half(1)) << 64 | u128::from(half(2))
+}

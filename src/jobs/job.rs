@@ -1,0 +1,200 @@
+//! One job: what is to be done, and how far it is.
+
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use bytes::Bytes;
+use tokio::sync::watch;
+use uuid::Uuid;
+
+use super::Reservation;
+use crate::limits::Deadline;
+use crate::mesh::Format;
+use crate::pipeline::{Output, RenderError, Stage};
+use crate::scene::Spec;
+
+/// Names a job; ids made later sort later.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct JobId(Uuid);
+
+impl JobId {
+    fn new() -> Self {
+        Self(Uuid::now_v7())
+    }
+
+    /// From its usual text; None for anything else.
+    pub fn parse(text: &str) -> Option<Self> {
+        Uuid::try_parse(text).ok().map(Self)
+    }
+}
+
+impl fmt::Display for JobId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.hyphenated().fmt(f)
+    }
+}
+
+/// What is to be done.
+#[derive(Debug)]
+pub struct Work {
+    /// One mesh file.
+    pub mesh: Bytes,
+    /// Overrides sniffing.
+    pub format_in: Option<Format>,
+    /// What to draw.
+    pub spec: Spec,
+    /// The memory that `mesh` was granted.
+    pub reservation: Reservation,
+}
+
+/// How far a job is. The last three are final.
+#[derive(Clone, Debug)]
+pub enum State {
+    /// Waits for a worker.
+    Queued,
+    /// A worker is at it.
+    Running,
+    /// There is a picture.
+    Done(Arc<Finished>),
+    /// There is none, and never will be.
+    Failed(Arc<Failure>),
+    /// Whoever asked no longer wants it.
+    Cancelled,
+}
+
+/// A picture and how long it took.
+#[derive(Debug)]
+pub struct Finished {
+    /// The picture and what is known about it.
+    pub output: Output,
+    /// How long each part took.
+    pub timings: Timings,
+}
+
+/// Why a job has no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// The pipeline says why.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// It took too long, waiting included.
+    #[error("the job did not finish within {limit_ms} ms of being accepted")]
+    TimeUp {
+        /// How long it could have taken.
+        limit_ms: u64,
+    },
+    /// A bug of ours.
+    #[error("the renderer failed unexpectedly")]
+    Panicked,
+}
+
+impl State {
+    /// Whether nothing will change any more.
+    pub fn is_final(&self) -> bool {
+        matches!(self, Self::Done(_) | Self::Failed(_) | Self::Cancelled)
+    }
+
+    /// `queued`, `running`, `done`, `failed` or `cancelled`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Queued => "queued",
+            Self::Running => "running",
+            Self::Done(_) => "done",
+            Self::Failed(_) => "failed",
+            Self::Cancelled => "cancelled",
+        }
+    }
+}
+
+/// How long each part of a job took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Timings {
+    /// Waiting for a worker.
+    pub queue: Duration,
+    /// Bytes to mesh.
+    pub parse: Duration,
+    /// Mesh and spec to plan.
+    pub plan: Duration,
+    /// Plan to image.
+    pub render: Duration,
+    /// Image to bytes.
+    pub encode: Duration,
+}
+
+impl Timings {
+    /// Notes what a stage took.
+    pub fn note(&mut self, stage: Stage, took: Duration) {
+        *match stage {
+            Stage::Parse => &mut self.parse,
+            Stage::Plan => &mut self.plan,
+            Stage::Render => &mut self.render,
+            Stage::Encode => &mut self.encode,
+        } = took;
+    }
+
+    /// Name and duration of every part, in order.
+    pub fn parts(&self) -> [(&'static str, Duration); 5] {
+        [
+            ("queue", self.queue),
+            ("parse", self.parse),
+            ("plan", self.plan),
+            ("render", self.render),
+            ("encode", self.encode),
+        ]
+    }
+}
+
+/// A job that was accepted.
+#[derive(Debug)]
+pub struct Job {
+    /// Its name.
+    pub id: JobId,
+    /// Whether it can be found by its id.
+    pub keep: bool,
+    /// When it was accepted.
+    pub accepted: Instant,
+    /// The same for people, milliseconds since 1970.
+    pub accepted_unix_ms: u64,
+    /// Order of acceptance.
+    pub(super) serial: u64,
+    pub(super) deadline: Deadline,
+    pub(super) state: watch::Sender<State>,
+    work: Mutex<Option<Work>>,
+}
+
+impl Job {
+    pub(super) fn new(work: Work, keep: bool, serial: u64) -> Self {
+        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self {
+            id: JobId::new(),
+            keep,
+            accepted: Instant::now(),
+            accepted_unix_ms: u64::try_from(since_1970.as_millis()).unwrap_or(u64::MAX),
+            serial,
+            deadline: Deadline::default(),
+            state: watch::Sender::new(State::Queued),
+            work: Mutex::new(Some(work)),
+        }
+    }
+
+    /// How far it is.
+    pub fn state(&self) -> State {
+        self.state.borrow().clone()
+    }
+
+    /// Waits for its end.
+    pub async fn ended(&self) -> State {
+        let mut states = self.state.subscribe();
+        match states.wait_for(State::is_final).await {
+            Ok(state) => state.clone(),
+            // The sender is ours, so this cannot happen; saying what is known is better than a panic.
+            Err(_) => self.state(),
+        }
+    }
+
+    /// The work, once; its memory is the taker's.
+    pub(super) fn take_work(&self) -> Option<Work> {
+        self.work.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}

@@ -1,0 +1,66 @@
+//! A worker thread: takes jobs, draws them, survives them.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::board::Board;
+use super::job::{Failure, Finished, Job, State, Timings, Work};
+use crate::backend::{Backends, GpuHost};
+use crate::limits::{Deadline, Limits};
+use crate::pipeline::{self, Output, RenderError, Stage};
+
+/// What draws one job after the other on one thread.
+pub type Renderer = Box<dyn FnMut(&Work, &Deadline, &mut dyn FnMut(Stage)) -> Result<Output, RenderError>>;
+
+/// Makes a worker's renderer, on the worker's own thread: devices do not move between threads.
+pub type Engine = Arc<dyn Fn() -> Renderer + Send + Sync>;
+
+/// The real engine. Each worker's CPU path uses up to `threads` threads.
+pub fn pipeline_engine(gpu: Arc<GpuHost>, threads: usize, limits: Limits) -> Engine {
+    Arc::new(move || {
+        let mut backends = Backends::new(gpu.clone(), threads);
+        let limits = limits.clone();
+        Box::new(move |work, deadline, ended| {
+            let job = pipeline::Job { mesh: &work.mesh, format_in: work.format_in, spec: &work.spec };
+            pipeline::render(job, &mut backends, &limits, deadline, ended)
+        })
+    })
+}
+
+/// Works until the board is drained.
+pub fn run(board: &Board, engine: &Engine) {
+    // Made with the first job: an idle process holds no renderer.
+    let mut renderer: Option<Renderer> = None;
+    while let Some((job, work)) = board.take() {
+        let started = Instant::now();
+        let attempt = catch_unwind(AssertUnwindSafe(|| {
+            let renderer = renderer.get_or_insert_with(|| engine());
+            draw(renderer, &job, &work, started)
+        }));
+        let state = attempt.unwrap_or_else(|_| {
+            tracing::error!(job = %job.id, "a job panicked; its worker goes on with a fresh renderer");
+            // What it left behind may be half done. Dropping it may panic as well.
+            let broken = renderer.take();
+            let _ = catch_unwind(AssertUnwindSafe(|| drop(broken)));
+            State::Failed(Arc::new(Failure::Panicked))
+        });
+        // Memory first, then the news: whoever hears of the end can send the next mesh of the same size.
+        drop(work);
+        board.finish(&job, state, started.elapsed());
+    }
+}
+
+fn draw(renderer: &mut Renderer, job: &Job, work: &Work, started: Instant) -> State {
+    let mut timings = Timings { queue: started.duration_since(job.accepted), ..Timings::default() };
+    let mut stage_began = started;
+    let result = renderer(work, &job.deadline, &mut |stage| {
+        let now = Instant::now();
+        timings.note(stage, now.duration_since(stage_began));
+        stage_began = now;
+    });
+    match result {
+        Ok(output) => State::Done(Arc::new(Finished { output, timings })),
+        Err(error) => State::Failed(Arc::new(Failure::Render(error))),
+    }
+}

@@ -1,0 +1,103 @@
+//! Which meshes the default scene shows, and where.
+
+use super::transform::Affine;
+use crate::limits;
+use crate::mesh::MeshError;
+use crate::mesh::import::Context;
+use gltf::json::Root;
+
+/// One showing of a mesh.
+#[derive(Debug)]
+pub struct Instance {
+    /// Index of the mesh.
+    pub mesh: usize,
+    /// From mesh to scene space.
+    pub transform: Affine,
+}
+
+/// The instances of the default scene, in the order of the node tree. A file without nodes shows all its meshes.
+pub fn instances(root: &Root, cx: &mut Context<'_>) -> Result<Vec<Instance>, MeshError> {
+    if root.nodes.is_empty() && root.scenes.is_empty() {
+        let all = 0..root.meshes.len();
+        return Ok(all.map(|mesh| Instance { mesh, transform: Affine::IDENTITY }).collect());
+    }
+    let roots = roots(root)?;
+    Walk { root, on_path: vec![false; root.nodes.len()], met: 0, found: Vec::new() }.run(roots, cx)
+}
+
+/// The root nodes of the default scene: the named one, or the first, or all nodes that are no node's child.
+fn roots(root: &Root) -> Result<Vec<usize>, MeshError> {
+    let index = root.scene.map_or(0, |scene| scene.value());
+    match root.scenes.get(index) {
+        Some(scene) => Ok(scene.nodes.iter().map(|node| node.value()).collect()),
+        None if root.scene.is_some() => Err(MeshError::broken(format!("there is no scene {index} in the glTF file"))),
+        None => {
+            let mut is_child = vec![false; root.nodes.len()];
+            for child in root.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
+                if let Some(flag) = is_child.get_mut(child.value()) {
+                    *flag = true;
+                }
+            }
+            Ok((0..root.nodes.len()).filter(|&node| !is_child[node]).collect())
+        }
+    }
+}
+
+/// A depth-first walk with its own stack, since a hostile file may be 100,000 nodes deep.
+struct Walk<'a> {
+    root: &'a Root,
+    on_path: Vec<bool>,
+    met: u64,
+    found: Vec<Instance>,
+}
+
+enum Step {
+    Enter(usize, Affine),
+    Leave(usize),
+}
+
+impl Walk<'_> {
+    fn run(mut self, roots: Vec<usize>, cx: &mut Context<'_>) -> Result<Vec<Instance>, MeshError> {
+        self.meet(roots.len(), cx)?;
+        let mut steps: Vec<Step> = roots.into_iter().rev().map(|node| Step::Enter(node, Affine::IDENTITY)).collect();
+        while let Some(step) = steps.pop() {
+            match step {
+                Step::Leave(node) => self.on_path[node] = false,
+                Step::Enter(node, parent) => self.enter(node, &parent, &mut steps, cx)?,
+            }
+        }
+        Ok(self.found)
+    }
+
+    /// Counts nodes when they are put on the stack, so that the stack is bounded too.
+    fn meet(&mut self, count: usize, cx: &Context<'_>) -> Result<(), MeshError> {
+        self.met += count as u64;
+        Ok(limits::check("the number of scene nodes", self.met, cx.limits.nodes, "--limit-nodes")?)
+    }
+
+    fn enter(
+        &mut self,
+        index: usize,
+        parent: &Affine,
+        steps: &mut Vec<Step>,
+        cx: &mut Context<'_>,
+    ) -> Result<(), MeshError> {
+        let node = self
+            .root
+            .nodes
+            .get(index)
+            .ok_or_else(|| MeshError::broken(format!("there is no node {index} in the glTF file")))?;
+        if std::mem::replace(&mut self.on_path[index], true) {
+            return Err(MeshError::broken(format!("node {index} of the glTF file is its own ancestor")));
+        }
+        let transform = parent.after(&Affine::of(node));
+        if let Some(mesh) = node.mesh {
+            self.found.push(Instance { mesh: mesh.value(), transform });
+        }
+        steps.push(Step::Leave(index));
+        let children = node.children.as_deref().unwrap_or_default();
+        self.meet(children.len(), cx)?;
+        steps.extend(children.iter().rev().map(|child| Step::Enter(child.value(), transform)));
+        Ok(())
+    }
+}

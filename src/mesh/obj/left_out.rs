@@ -1,0 +1,38 @@
+//! What an OBJ file has that is not drawn.
+
+use crate::mesh::Warning;
+
+/// Counts of lines that were passed over.
+#[derive(Debug, Default)]
+pub struct LeftOut {
+    /// `p` lines.
+    pub points: u64,
+    /// `l` lines.
+    pub lines: u64,
+    /// `f` lines with fewer than three corners.
+    pub short_faces: u64,
+    /// Free-form geometry.
+    pub curves: u64,
+    /// Vertices that differ from the first in having a colour or not.
+    pub colors: u64,
+    /// `mtllib` lines.
+    pub libraries: u64,
+}
+
+impl LeftOut {
+    /// One warning for each kind that occurred.
+    pub fn warnings(&self) -> Vec<Warning> {
+        [
+            (self.points, "points_ignored", "points are not drawn"),
+            (self.lines, "lines_ignored", "polylines are not drawn"),
+            (self.short_faces, "short_faces_ignored", "faces with fewer than three corners are not drawn"),
+            (self.curves, "curves_ignored", "free-form curves and surfaces are not drawn"),
+            (self.colors, "colors_incomplete", "vertices differ from the first one in having a colour or not"),
+            (self.libraries, "mtl_ignored", "the material library is ignored, since it is not part of the upload"),
+        ]
+        .into_iter()
+        .filter(|(count, _, _)| *count > 0)
+        .map(|(count, code, what)| Warning { code, detail: format!("{what} (lines in the file: {count})") })
+        .collect()
+    }
+}

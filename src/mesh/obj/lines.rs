@@ -1,0 +1,56 @@
+//! The logical lines of an OBJ file: continued ones are joined, whatever ends them.
+
+use std::borrow::Cow;
+
+/// An iterator that knows where it is.
+pub struct Lines<'a> {
+    rest: &'a [u8],
+    newline: u8,
+    /// Number of the line last returned, from 1; of a continued one, its end.
+    pub number: u64,
+}
+
+impl<'a> Lines<'a> {
+    /// The lines of a file.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self {
+            rest: bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes),
+            // Only very old files end their lines with a carriage return alone.
+            newline: if bytes.contains(&b'\n') { b'\n' } else { b'\r' },
+            number: 0,
+        }
+    }
+
+    fn physical(&mut self) -> &'a [u8] {
+        self.number += 1;
+        let end = self.rest.iter().position(|&b| b == self.newline).unwrap_or(self.rest.len());
+        let line = &self.rest[..end];
+        self.rest = self.rest.get(end + 1..).unwrap_or_default();
+        line.trim_ascii_end()
+    }
+}
+
+impl<'a> Iterator for Lines<'a> {
+    type Item = Cow<'a, [u8]>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.rest.is_empty() {
+            return None;
+        }
+        let first = self.physical();
+        // A comment cannot be continued: some end in the backslash of a Windows path.
+        if !first.ends_with(b"\\") || first.trim_ascii_start().starts_with(b"#") {
+            return Some(Cow::Borrowed(first));
+        }
+        let mut joined = first.to_vec();
+        while joined.ends_with(b"\\") {
+            joined.pop();
+            joined.push(b' ');
+            if self.rest.is_empty() {
+                break;
+            }
+            joined.extend_from_slice(self.physical());
+        }
+        Some(Cow::Owned(joined))
+    }
+}

@@ -1,0 +1,201 @@
+//! One value of a request document: what may be given for a key, and what was.
+
+use serde_json::Value as Json;
+
+use super::error::{RequestError, RequestFault};
+use crate::scene::color::Rgba;
+
+/// What was given: a JSON value of the document, or the text of a query parameter or of `--set`.
+#[derive(Clone, Debug)]
+pub enum Given {
+    /// From the document.
+    Json(Json),
+    /// From a query parameter or a flag: numbers and lists are still text.
+    Text(String),
+}
+
+impl Given {
+    /// Whether it is `null`.
+    pub fn is_null(&self) -> bool {
+        match self {
+            Self::Json(json) => json.is_null(),
+            Self::Text(text) => text == "null",
+        }
+    }
+
+    /// Whether it is an object without keys: a layer that is there, with its defaults.
+    pub fn is_empty_object(&self) -> bool {
+        match self {
+            Self::Json(json) => json.as_object().is_some_and(serde_json::Map::is_empty),
+            Self::Text(text) => text == "{}",
+        }
+    }
+
+    /// For an error message.
+    pub fn show(&self) -> String {
+        match self {
+            Self::Json(json) => json.to_string(),
+            Self::Text(text) => format!("\"{text}\""),
+        }
+    }
+
+    fn text(&self) -> Option<&str> {
+        match self {
+            Self::Json(json) => json.as_str(),
+            Self::Text(text) => Some(text),
+        }
+    }
+
+    fn number(&self) -> Option<f64> {
+        match self {
+            Self::Json(json) => json.as_f64(),
+            Self::Text(text) => text.trim().parse().ok(),
+        }
+    }
+
+    fn point(&self) -> Option<[f64; 3]> {
+        let parsed;
+        let list = match self {
+            Self::Json(json) => json.as_array()?,
+            Self::Text(text) => {
+                let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']')).unwrap_or(text);
+                let numbers = inner.split(',').map(|n| n.trim().parse::<f64>().ok().map(Json::from));
+                parsed = numbers.collect::<Option<Vec<Json>>>()?;
+                &parsed
+            }
+        };
+        match list.as_slice() {
+            [x, y, z] => Some([x.as_f64()?, y.as_f64()?, z.as_f64()?]),
+            _ => None,
+        }
+    }
+}
+
+/// What is allowed for a key. Everything an error message or a schema says about a key comes from here.
+#[derive(Clone, Debug)]
+pub enum Kind {
+    /// A finite number in a closed range.
+    Number {
+        /// Smallest.
+        min: f64,
+        /// Largest.
+        max: f64,
+    },
+    /// One of a few whole numbers.
+    OneOf(&'static [u32]),
+    /// A width or height: 1 to the limit in pixels.
+    Pixels,
+    /// `N` or `WxH`.
+    Size,
+    /// One of a few words.
+    Words {
+        /// Understood now.
+        now: Vec<&'static str>,
+        /// Known, but not drawn by this version.
+        later: &'static [&'static str],
+    },
+    /// A colour.
+    Color,
+    /// Three finite numbers.
+    Point,
+}
+
+/// A value that passed its [`Kind`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// `null`, for keys that allow it.
+    Null,
+    /// A number.
+    Number(f64),
+    /// Pixels, or one of a few whole numbers.
+    Whole(u32),
+    /// Width and height.
+    Size(u32, u32),
+    /// Place in the list of words.
+    Word(usize),
+    /// A colour.
+    Color(Rgba),
+    /// Three numbers.
+    Point([f64; 3]),
+}
+
+/// Largest magnitude of a coordinate: squares of it still fit an f64 many times over.
+const COORDINATE_MAX: f64 = 1e30;
+
+impl Kind {
+    /// What is allowed, in words.
+    pub fn allowed(&self, image_px_max: u64) -> String {
+        match self {
+            Self::Number { min, max } => format!("a number from {min} to {max}"),
+            Self::OneOf(values) => values.iter().map(u32::to_string).collect::<Vec<_>>().join(" or "),
+            Self::Pixels => format!("a whole number from 1 to {image_px_max}"),
+            Self::Size => format!("N or WxH, with whole numbers from 1 to {image_px_max}"),
+            Self::Words { now, .. } => format!("one of {}", now.join(", ")),
+            Self::Color => {
+                "a colour: #rgb, #rgba, #rrggbb, #rrggbbaa (with # written as %23 in a URL) or transparent".into()
+            }
+            Self::Point => "three finite numbers of at most 1e30, as [x, y, z]".into(),
+        }
+    }
+
+    /// Checks what was given for `key`.
+    pub fn read(&self, key: &str, given: &Given, image_px_max: u64) -> Result<Value, RequestError> {
+        let fail = |fault| RequestError::new(fault, key, given.show(), self.allowed(image_px_max));
+        let wrong_type = || fail(RequestFault::WrongType);
+        let out_of_range = || fail(RequestFault::OutOfRange);
+        match self {
+            Self::Number { min, max } => {
+                let number = given.number().ok_or_else(wrong_type)?;
+                // NaN and the infinities fail this comparison too.
+                if (*min..=*max).contains(&number) { Ok(Value::Number(number)) } else { Err(out_of_range()) }
+            }
+            Self::OneOf(values) => {
+                let number = given.number().ok_or_else(wrong_type)?;
+                let found = values.iter().find(|&&v| f64::from(v) == number);
+                found.map(|&v| Value::Whole(v)).ok_or_else(out_of_range)
+            }
+            Self::Pixels => {
+                let number = given.number().ok_or_else(wrong_type)?;
+                pixels(number, image_px_max).map(Value::Whole).ok_or_else(out_of_range)
+            }
+            Self::Size => {
+                let (width, height) = size(given).ok_or_else(wrong_type)?;
+                let both = pixels(width, image_px_max).zip(pixels(height, image_px_max));
+                both.map(|(w, h)| Value::Size(w, h)).ok_or_else(out_of_range)
+            }
+            Self::Words { now, later } => {
+                let word = given.text().ok_or_else(wrong_type)?;
+                if later.contains(&word) {
+                    return Err(fail(RequestFault::NotYet));
+                }
+                now.iter().position(|&w| w == word).map(Value::Word).ok_or_else(out_of_range)
+            }
+            Self::Color => {
+                let text = given.text().ok_or_else(wrong_type)?;
+                Rgba::parse(text).map(Value::Color).ok_or_else(out_of_range)
+            }
+            Self::Point => {
+                let point = given.point().ok_or_else(wrong_type)?;
+                if point.iter().all(|v| v.abs() <= COORDINATE_MAX) {
+                    Ok(Value::Point(point))
+                } else {
+                    Err(out_of_range())
+                }
+            }
+        }
+    }
+}
+
+fn pixels(number: f64, max: u64) -> Option<u32> {
+    let in_range = number >= 1.0 && number <= max.min(u64::from(u32::MAX)) as f64;
+    (in_range && number.fract() == 0.0).then_some(number as u32)
+}
+
+/// `256`, `"256"` or `"640x480"`.
+fn size(given: &Given) -> Option<(f64, f64)> {
+    if let Some((width, height)) = given.text().and_then(|t| t.split_once(['x', 'X'])) {
+        return Some((width.trim().parse().ok()?, height.trim().parse().ok()?));
+    }
+    let side = given.number().or_else(|| given.text().and_then(|t| t.trim().parse().ok()))?;
+    Some((side, side))
+}

@@ -1,0 +1,154 @@
+//! The words of a request document and what they mean.
+
+use crate::image::ImageFormat;
+use crate::limits::BackendChoice;
+use crate::mesh::UpAxis;
+use crate::scene::{Cull, Hidden, OutlineUnit, Projection, Shading, View, WireEdges, WireMethod};
+
+/// An enumeration that a request names by words.
+pub trait Words: Copy + Send + Sync + 'static {
+    /// Each word and its meaning.
+    const NOW: &'static [(&'static str, Self)];
+    /// Words of the contract that this version does not draw yet.
+    const LATER: &'static [&'static str] = &[];
+}
+
+/// A preset: which layers are drawn, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// One normal a face.
+    Flat,
+    /// Interpolated normals.
+    Smooth,
+    /// Base colours alone.
+    Unlit,
+    /// Flat surface and lines on its edges.
+    Wire,
+    /// Lines alone, back edges too.
+    Wireframe,
+    /// Smooth surface and a hull around it.
+    Outline,
+    /// White surface and lines.
+    HiddenLine,
+}
+
+impl Words for Style {
+    const NOW: &'static [(&'static str, Self)] = &[
+        ("flat", Self::Flat),
+        ("smooth", Self::Smooth),
+        ("unlit", Self::Unlit),
+        ("wire", Self::Wire),
+        ("wireframe", Self::Wireframe),
+        ("outline", Self::Outline),
+        ("hidden-line", Self::HiddenLine),
+    ];
+    const LATER: &'static [&'static str] = &["topology"];
+}
+
+/// Where flat normals come from. One way for now, so nothing downstream asks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlatNormals {
+    /// The triangle's own corners.
+    Face,
+}
+
+impl Words for FlatNormals {
+    const NOW: &'static [(&'static str, Self)] = &[("face", Self::Face)];
+    const LATER: &'static [&'static str] = &["derivative"];
+}
+
+/// How an outline is made. One way for now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OutlineMethod {
+    /// Back faces, pushed out.
+    Hull,
+}
+
+impl Words for OutlineMethod {
+    const NOW: &'static [(&'static str, Self)] = &[("hull", Self::Hull)];
+    const LATER: &'static [&'static str] = &["contour"];
+}
+
+/// A set of lamps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightPreset {
+    /// One at the camera, over an ambient term.
+    Headlight,
+    /// Ambient alone.
+    None,
+}
+
+impl Words for LightPreset {
+    const NOW: &'static [(&'static str, Self)] = &[("headlight", Self::Headlight), ("none", Self::None)];
+    const LATER: &'static [&'static str] = &["three-point"];
+}
+
+impl Words for Shading {
+    const NOW: &'static [(&'static str, Self)] =
+        &[("flat", Self::Flat), ("smooth", Self::Smooth), ("unlit", Self::Unlit)];
+}
+
+impl Words for Cull {
+    const NOW: &'static [(&'static str, Self)] = &[("none", Self::None), ("back", Self::Back), ("front", Self::Front)];
+}
+
+impl Words for WireMethod {
+    const NOW: &'static [(&'static str, Self)] = &[("exact", Self::Exact), ("fwidth", Self::Fwidth)];
+    const LATER: &'static [&'static str] = &["fwidth-min", "barycentric", "threshold"];
+}
+
+impl Words for WireEdges {
+    const NOW: &'static [(&'static str, Self)] = &[("triangles", Self::Triangles), ("polygons", Self::Polygons)];
+    const LATER: &'static [&'static str] = &["feature", "boundary"];
+}
+
+impl Words for Hidden {
+    const NOW: &'static [(&'static str, Self)] = &[("hide", Self::Hide), ("show", Self::Show)];
+    const LATER: &'static [&'static str] = &["fade"];
+}
+
+impl Words for OutlineUnit {
+    const NOW: &'static [(&'static str, Self)] = &[("object", Self::Object), ("px", Self::Px)];
+}
+
+impl Words for View {
+    const NOW: &'static [(&'static str, Self)] = &[
+        ("iso", Self::Iso),
+        ("front", Self::Front),
+        ("back", Self::Back),
+        ("left", Self::Left),
+        ("right", Self::Right),
+        ("top", Self::Top),
+        ("bottom", Self::Bottom),
+    ];
+}
+
+impl Words for Projection {
+    const NOW: &'static [(&'static str, Self)] =
+        &[("perspective", Self::Perspective), ("orthographic", Self::Orthographic)];
+}
+
+impl Words for UpAxis {
+    const NOW: &'static [(&'static str, Self)] =
+        &[("y", Self::Y), ("z", Self::Z), ("-y", Self::NegY), ("-z", Self::NegZ), ("x", Self::X), ("-x", Self::NegX)];
+}
+
+impl Words for ImageFormat {
+    // `jpg` is what the file extension says, so people write it here too.
+    const NOW: &'static [(&'static str, Self)] =
+        &[("png", Self::Png), ("webp", Self::Webp), ("jpeg", Self::Jpeg), ("jpg", Self::Jpeg)];
+}
+
+impl Words for BackendChoice {
+    const NOW: &'static [(&'static str, Self)] = &[("auto", Self::Auto), ("gpu", Self::Gpu), ("cpu", Self::Cpu)];
+}
+
+/// Just the words.
+pub fn words_of<T: Words>() -> Vec<&'static str> {
+    T::NOW.iter().map(|&(word, _)| word).collect()
+}
+
+/// The word for a value; the first where there are several.
+pub fn word_for<T: Words + PartialEq>(value: T) -> &'static str {
+    T::NOW.iter().find(|(_, v)| *v == value).map_or("", |&(word, _)| word)
+}

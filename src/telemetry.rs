@@ -1,0 +1,39 @@
+//! The log: text on a terminal, an object a line elsewhere, always on standard error.
+
+use std::io::IsTerminal as _;
+
+use tracing_subscriber::EnvFilter;
+
+use crate::config::LogFormat;
+
+/// Starts logging. `filter` is in `tracing` syntax: `info`, or `warn,meshsnap::http=debug`.
+pub fn init(filter: &str, format: LogFormat) -> Result<(), String> {
+    let parsed = EnvFilter::try_new(filter).map_err(|e| {
+        format!("`log` is \"{filter}\", which is no filter ({e}); use error, warn, info, debug or trace")
+    })?;
+    let terminal = std::io::stderr().is_terminal();
+    let text = match format {
+        LogFormat::Auto => terminal,
+        LogFormat::Text => true,
+        LogFormat::Json => false,
+    };
+    let builder = tracing_subscriber::fmt().with_env_filter(parsed).with_writer(std::io::stderr);
+    let started = if text {
+        builder.with_ansi(terminal).with_target(false).try_init()
+    } else {
+        builder.json().flatten_event(true).with_current_span(true).with_span_list(false).try_init()
+    };
+    started.map_err(|e| e.to_string())?;
+    log_panics();
+    Ok(())
+}
+
+/// Panics are caught where jobs run, but what they said belongs in the log, in the log's own form.
+fn log_panics() {
+    std::panic::set_hook(Box::new(|info| {
+        let place = info.location().map(ToString::to_string).unwrap_or_default();
+        let message = info.payload_as_str().unwrap_or("a panic without a message");
+        let thread = std::thread::current().name().unwrap_or("unnamed").to_owned();
+        tracing::error!(place, thread, "panic: {message}");
+    }));
+}

@@ -1,0 +1,113 @@
+//! The fixed scenes that every back-end draws, and how to make a mesh, a spec and a plan in a test.
+
+use meshsnap::limits::{BackendChoice, Budget, Deadline, Limits};
+use meshsnap::mesh::{self, Mesh};
+use meshsnap::plan::{self, DrawPlan};
+use meshsnap::request::{self, Rules};
+use meshsnap::scene::Spec;
+
+use crate::shapes;
+
+/// A picture with a name.
+pub struct Scene {
+    pub name: &'static str,
+    pub obj: fn() -> String,
+    pub keys: &'static [(&'static str, &'static str)],
+    pub kind: Kind,
+}
+
+/// What decides how far two back-ends may differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Shaded surfaces and hulls.
+    Surface,
+    /// Lines of any technique over or without a surface.
+    Lines,
+}
+
+const SIZE: (&str, &str) = ("size", "200x160");
+
+/// Every style, both wire techniques, polygons, both outline units, the views, and the awkward cameras.
+pub const SCENES: &[Scene] = &[
+    scene("torus-flat", torus, &[SIZE, ("style", "flat")], Kind::Surface),
+    scene("torus-smooth", torus, &[SIZE, ("style", "smooth")], Kind::Surface),
+    scene("torus-unlit", torus, &[SIZE, ("style", "unlit"), ("surface.color", "c40")], Kind::Surface),
+    scene("torus-wire", torus, &[SIZE, ("style", "wire"), ("wire.edges", "polygons")], Kind::Lines),
+    scene("torus-wire-wide", torus, &[SIZE, ("style", "wire"), ("wire.thickness", "3.5")], Kind::Lines),
+    scene("torus-fwidth", torus, &[SIZE, ("style", "wire"), ("wire.method", "fwidth")], Kind::Lines),
+    scene("torus-wireframe", torus, &[SIZE, ("style", "wireframe"), ("background", "transparent")], Kind::Lines),
+    scene("gear-outline-px", gear, &[SIZE, ("style", "outline"), ("outline.unit", "px")], Kind::Surface),
+    scene("gear-outline-object", gear, &[SIZE, ("style", "outline"), ("outline.thickness", "0.04")], Kind::Surface),
+    scene("gear-hidden-line", gear, &[SIZE, ("style", "hidden-line"), ("view", "front")], Kind::Lines),
+    scene("cube-flat-one-sample", shapes::cube, &[SIZE, ("style", "flat"), ("samples", "1")], Kind::Surface),
+    scene("cube-wire-polygons", shapes::cube, &[SIZE, ("style", "wire"), ("wire.edges", "polygons")], Kind::Lines),
+    scene(
+        "sheet-wire-red",
+        sheet,
+        &[SIZE, ("style", "wire"), ("wire.color", "e02020"), ("view", "right")],
+        Kind::Lines,
+    ),
+    scene("sheet-back-faces", sheet, &[SIZE, ("style", "flat"), ("view", "bottom")], Kind::Surface),
+    scene("sheet-orthographic", sheet, &[SIZE, ("style", "wire"), ("camera.projection", "orthographic")], Kind::Lines),
+    scene("sheet-from-inside", sheet, INSIDE, Kind::Surface),
+    scene("sheet-wire-from-inside", sheet, INSIDE_WIRE, Kind::Lines),
+];
+
+const INSIDE: &[(&str, &str)] = &[
+    SIZE,
+    ("style", "smooth"),
+    ("camera.eye", "0.2,0.35,0.3"),
+    ("camera.target", "-0.8,0,-0.9"),
+    ("camera.fov_deg", "80"),
+];
+const INSIDE_WIRE: &[(&str, &str)] = &[
+    SIZE,
+    ("style", "wire"),
+    ("camera.eye", "0.2,0.35,0.3"),
+    ("camera.target", "-0.8,0,-0.9"),
+    ("camera.fov_deg", "80"),
+];
+
+const fn scene(
+    name: &'static str,
+    obj: fn() -> String,
+    keys: &'static [(&'static str, &'static str)],
+    kind: Kind,
+) -> Scene {
+    Scene { name, obj, keys, kind }
+}
+
+fn torus() -> String {
+    shapes::torus(36)
+}
+
+fn gear() -> String {
+    shapes::gear(14)
+}
+
+fn sheet() -> String {
+    shapes::sheet(18)
+}
+
+/// Imports an OBJ that must be good.
+pub fn mesh(obj: &str) -> Mesh {
+    mesh_of(obj.as_bytes()).unwrap()
+}
+
+/// Imports with default limits.
+pub fn mesh_of(bytes: &[u8]) -> Result<Mesh, mesh::MeshError> {
+    let limits = Limits::default();
+    mesh::import(bytes, None, &limits, &mut Budget::new(&limits), &Deadline::default())
+}
+
+/// Reads dotted keys that must be good.
+pub fn spec(keys: &[(&str, &str)]) -> Spec {
+    let keys: Vec<_> = keys.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
+    let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
+    request::read(None, &keys, &rules).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Plans with default limits.
+pub fn plan<'a>(mesh: &'a Mesh, spec: &Spec) -> DrawPlan<'a> {
+    plan::build(mesh, spec, &mut Budget::new(&Limits::default())).unwrap()
+}

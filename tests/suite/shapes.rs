@@ -1,0 +1,107 @@
+//! Meshes that the tests make themselves, as OBJ text.
+
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+/// A growing OBJ file.
+#[derive(Default)]
+pub struct Obj {
+    text: String,
+    vertices: usize,
+}
+
+impl Obj {
+    pub fn vertex(&mut self, p: [f64; 3]) -> usize {
+        writeln!(self.text, "v {} {} {}", p[0], p[1], p[2]).unwrap();
+        self.vertices += 1;
+        self.vertices
+    }
+
+    pub fn face(&mut self, corners: &[usize]) {
+        let words: Vec<String> = corners.iter().map(usize::to_string).collect();
+        writeln!(self.text, "f {}", words.join(" ")).unwrap();
+    }
+
+    pub fn finish(self) -> String {
+        self.text
+    }
+
+    /// A grid of quads over (u, v) in the unit square; `wrap` closes it in u and v.
+    fn grid(&mut self, n: [usize; 2], wrap: [bool; 2], at: impl Fn(f64, f64) -> [f64; 3]) {
+        let points = [n[0] + usize::from(!wrap[0]), n[1] + usize::from(!wrap[1])];
+        let first = self.vertices + 1;
+        for i in 0..points[0] {
+            for j in 0..points[1] {
+                self.vertex(at(i as f64 / n[0] as f64, j as f64 / n[1] as f64));
+            }
+        }
+        let index = |i: usize, j: usize| first + (i % points[0]) * points[1] + j % points[1];
+        for i in 0..n[0] {
+            for j in 0..n[1] {
+                self.face(&[index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)]);
+            }
+        }
+    }
+}
+
+/// Six quads.
+pub fn cube() -> String {
+    let mut obj = Obj::default();
+    for i in 0..8 {
+        obj.vertex([0, 1, 2].map(|k| f64::from(i >> k & 1) * 2.0 - 1.0));
+    }
+    for face in [[1, 3, 4, 2], [5, 6, 8, 7], [1, 2, 6, 5], [3, 7, 8, 4], [1, 5, 7, 3], [2, 4, 8, 6]] {
+        obj.face(&face);
+    }
+    obj.finish()
+}
+
+/// A closed torus of quads.
+pub fn torus(n: usize) -> String {
+    let mut obj = Obj::default();
+    obj.grid([n, n / 2], [true, true], |u, v| {
+        let (a, b) = (u * TAU, v * TAU);
+        let r = 1.0 + 0.4 * b.cos();
+        [r * a.cos(), 0.4 * b.sin(), -r * a.sin()]
+    });
+    obj.finish()
+}
+
+/// An open, wavy sheet.
+pub fn sheet(n: usize) -> String {
+    let mut obj = Obj::default();
+    obj.grid([n, n], [false, false], |u, v| [u * 2.0 - 1.0, 0.3 * (u * 7.0).sin() * (v * 5.0).cos(), 1.0 - v * 2.0]);
+    obj.finish()
+}
+
+/// A gear: a ring of teeth with hard edges, inside and out.
+pub fn gear(teeth: usize) -> String {
+    let mut obj = Obj::default();
+    let steps = teeth * 4;
+    obj.grid([steps, 4], [true, true], |u, v| {
+        let step = (u * steps as f64).round() as usize;
+        let outer = if step % 4 < 2 { 1.0 } else { 0.78 };
+        let (radius, z) = [(0.4, -0.15), (outer, -0.15), (outer, 0.15), (0.4, 0.15)][(v * 4.0).round() as usize % 4];
+        let a = (step as f64 + if step % 2 == 0 { 0.15 } else { -0.15 }) / steps as f64 * TAU;
+        [radius * a.cos(), radius * a.sin(), z]
+    });
+    obj.finish()
+}
+
+/// A small generator with a fixed sequence (Steele and Vigna's SplitMix64).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in `from..to`.
+    pub fn range(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * ((self.next() >> 11) as f64 / (1_u64 << 53) as f64)
+    }
+}
