@@ -1,69 +1,81 @@
-// Stage 1b, a triangle or edge that reaches behind the eye or far outside the picture. Twin of src/backend/cpu/clip.rs.
+// Stage 1b, a triangle that reaches behind the eye or far outside the picture: what is left of it goes to the work list, as
+// a fan of up to six triangles. Twin of src/backend/cpu/clip.rs.
 
-// Bound of clipped coordinates, a little inside the guard band so that rounding cannot leave it.
-const BOUND: f32 = 1048064.0;
+@group(1) @binding(0) var<storage, read> positions: array<f32>;
+@group(1) @binding(1) var<storage, read> hull_normals: array<f32>;
 
-struct Polygon {
-    corners: array<vec4<f32>, 8>,
-    len: u32,
-};
+@compute @workgroup_size(64)
+fn clip(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = gid.x + gid.y * groups.x * 64u;
+    if i >= batch.count {
+        return;
+    }
+    let t = batch.first + i;
+    if !is_outside(screen_triangle(t)) {
+        return;
+    }
+    corners[0] = homogeneous_corner(triangles[3u * t]);
+    corners[1] = homogeneous_corner(triangles[3u * t + 1u]);
+    corners[2] = homogeneous_corner(triangles[3u * t + 2u]);
+    // Half of the array holds the polygon, the other half takes what a plane leaves of it.
+    var len = 3u;
+    for (var plane = 0u; plane < 5u; plane++) {
+        len = cut(plane, len, 8u * (plane & 1u));
+    }
+    let first = snap_clipped(corners[8]);
+    var before = snap_clipped(corners[9]);
+    for (var k = 2u; k < len; k++) {
+        let next = snap_clipped(corners[8u + k]);
+        draw_piece(Corners(first, before, next), t + batch.id_base);
+        before = next;
+    }
+}
 
-fn clip_triangle(a: vec4<f32>, b: vec4<f32>, c: vec4<f32>) -> Polygon {
-    var polygon: Polygon;
-    polygon.corners[0] = a;
-    polygon.corners[1] = b;
-    polygon.corners[2] = c;
-    polygon.len = 3u;
-    for (var plane = 0; plane < 5; plane++) {
-        var cut: Polygon;
-        for (var i = 0u; i < polygon.len; i++) {
-            let from_corner = polygon.corners[i];
-            let to_corner = polygon.corners[select(i + 1u, 0u, i + 1u == polygon.len)];
-            let d_from = plane_distance(plane, from_corner);
-            let d_to = plane_distance(plane, to_corner);
-            if d_from >= 0.0 && cut.len < 8u {
-                cut.corners[cut.len] = from_corner;
-                cut.len++;
-            }
-            if (d_from >= 0.0) != (d_to >= 0.0) && cut.len < 8u {
-                // Always from the inside to the outside: the neighbour across the edge gets the same point, bit for bit.
-                if d_from >= 0.0 {
-                    cut.corners[cut.len] = intersect(from_corner, to_corner, d_from, d_to);
-                } else {
-                    cut.corners[cut.len] = intersect(to_corner, from_corner, d_to, d_from);
-                }
-                cut.len++;
-            }
+// A triangle cut by five planes has at most eight corners.
+var<private> corners: array<vec4<f32>, 16>;
+
+// Cuts the polygon at `base` by a plane; returns how many corners are left.
+fn cut(plane: u32, len: u32, base: u32) -> u32 {
+    let to = 8u - base;
+    var left = 0u;
+    if len == 0u {
+        return 0u;
+    }
+    var a = corners[base];
+    var d_a = plane_distance(plane, a);
+    for (var i = 1u; i <= len; i++) {
+        let b = corners[base + select(i, 0u, i == len)];
+        let d_b = plane_distance(plane, b);
+        if d_a >= 0.0 && left < 8u {
+            corners[to + left] = a;
+            left++;
         }
-        polygon = cut;
+        if (d_a >= 0.0) != (d_b >= 0.0) && left < 8u {
+            // Always from the inside to the outside: the neighbour across the edge gets the same point, bit for bit.
+            let from_a = d_a >= 0.0;
+            corners[to + left] = intersect(select(b, a, from_a), select(a, b, from_a), max(d_a, d_b), min(d_a, d_b));
+            left++;
+        }
+        a = b;
+        d_a = d_b;
     }
-    return polygon;
+    return left;
 }
 
-fn plane_distance(plane: i32, p: vec4<f32>) -> f32 {
-    let reach = rn(BOUND * p.w);
-    switch plane {
-        case 0: { return rn(p.w - frame.near_w); }
-        case 1: { return rn(reach - p.x); }
-        case 2: { return rn(reach + p.x); }
-        case 3: { return rn(reach - p.y); }
-        default: { return rn(reach + p.y); }
+fn draw_piece(v: Corners, id: u32) {
+    let bounds = pixel_bounds(vec3(v.a.x, v.b.x, v.c.x), vec3(v.a.y, v.b.y, v.c.y));
+    let area = area_of(v.a, v.b, v.c);
+    if bounds.x <= bounds.z && bounds.y <= bounds.w && is_wanted(area) {
+        postpone(setup_of(v.a, v.b, v.c, area), bounds.zw - bounds.xy, id);
     }
 }
 
-fn intersect(inside: vec4<f32>, outside: vec4<f32>, d_inside: f32, d_outside: f32) -> vec4<f32> {
-    let t = rn(d_inside * recip(rn(d_inside - d_outside)));
-    return vec4(
-        inside.x + rn(t * rn(outside.x - inside.x)),
-        inside.y + rn(t * rn(outside.y - inside.y)),
-        inside.z + rn(t * rn(outside.z - inside.z)),
-        inside.w + rn(t * rn(outside.w - inside.w)),
-    );
-}
-
-fn snap_clipped(p: vec4<f32>) -> Vertex {
-    let r = recip(p.w);
-    let x = clamp(rn(p.x * r), -BOUND, BOUND);
-    let y = clamp(rn(p.y * r), -BOUND, BOUND);
-    return Vertex(round_to_i32(x), round_to_i32(y), rn(p.z * r), r);
+fn homogeneous_corner(v: u32) -> vec4<f32> {
+    var p = vec3(positions[3u * v], positions[3u * v + 1u], positions[3u * v + 2u]);
+    if batch.vertex_base != 0u && !has(HULL_PX) {
+        let t = frame.hull_push;
+        let n = vec3(hull_normals[3u * v], hull_normals[3u * v + 1u], hull_normals[3u * v + 2u]);
+        p = vec3(p.x + rn(t * n.x), p.y + rn(t * n.y), p.z + rn(t * n.z));
+    }
+    return homogeneous(p);
 }

@@ -52,6 +52,11 @@ struct Batch {
     row_end: i32,
     // Items that the work list holds.
     capacity: u32,
+    // Which of them a dispatch of the tile kernel draws.
+    large_first: u32,
+    large_end: u32,
+    huge_first: u32,
+    huge_end: u32,
 };
 
 const SURFACE: u32 = 1u;

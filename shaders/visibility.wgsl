@@ -1,15 +1,6 @@
 // Stage 2, a triangle: which samples it owns, and how near it is there. Twin of src/backend/cpu/visibility.rs.
 //
-// A thread draws a triangle of up to 16 x 16 pixels itself; larger ones go to a list for visibility_tile.wgsl.
-
-struct Work {
-    large: atomic<u32>,
-    huge: atomic<u32>,
-    // Triangle index * 8 + piece; large ones from the front, huge ones from the back.
-    items: array<u32>,
-};
-
-@group(1) @binding(5) var<storage, read_write> work: Work;
+// A thread draws a triangle of up to 16 x 16 pixels itself; larger ones go to the work list for visibility_tile.wgsl.
 
 // Triangles of this size in 1/256 px have edge values that fit 32 bits.
 const SMALL: i32 = 4096;
@@ -23,18 +14,8 @@ fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
     let t = batch.first + i;
     let v = screen_triangle(t);
     if is_outside(v) {
-        if CLIP {
-            let polygon = clipped(t);
-            for (var k = 1u; k + 1u < polygon.len; k++) {
-                draw(piece(polygon, k), t, k);
-            }
-        }
         return;
     }
-    draw(v, t, 0u);
-}
-
-fn draw(v: Corners, t: u32, k: u32) {
     let x = vec3(v.a.x, v.b.x, v.c.x);
     let y = vec3(v.a.y, v.b.y, v.c.y);
     let bounds = pixel_bounds(x, y);
@@ -42,22 +23,16 @@ fn draw(v: Corners, t: u32, k: u32) {
         return;
     }
     let area = area_of(v.a, v.b, v.c);
-    if is_zero(area) || (batch.faces == 1u && !is_negative(area)) || (batch.faces == 2u && is_negative(area)) {
+    if !is_wanted(area) {
         return;
     }
     let size_x = max(max(x.x, x.y), x.z) - min(min(x.x, x.y), x.z);
     let size_y = max(max(y.x, y.y), y.z) - min(min(y.x, y.y), y.z);
+    let setup = setup_of(v.a, v.b, v.c, area);
     if max(size_x, size_y) <= SMALL {
-        draw_small(setup_of(v.a, v.b, v.c, area), bounds, t + batch.id_base);
-        return;
-    }
-    let size = bounds.zw - bounds.xy;
-    if max(size.x, size.y) < HUGE_PX {
-        let slot = atomicAdd(&work.large, 1u);
-        work.items[slot] = t * 8u + k;
+        draw_small(setup, bounds, t + batch.id_base);
     } else {
-        let slot = atomicAdd(&work.huge, 1u);
-        work.items[batch.capacity - 1u - slot] = t * 8u + k;
+        postpone(setup, bounds.zw - bounds.xy, t + batch.id_base);
     }
 }
 

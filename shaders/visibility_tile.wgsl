@@ -4,7 +4,7 @@
 struct WorkList {
     large: u32,
     huge: u32,
-    items: array<u32>,
+    items: array<vec4<u32>>,
 };
 
 @group(1) @binding(5) var<storage, read> work: WorkList;
@@ -19,31 +19,34 @@ fn visibility_tile(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    for (var i = workgroup.x; i < work.large; i += groups.x) {
-        draw_item(work.items[i], i32(thread), 0, 1);
+    let large_end = min(work.large, batch.large_end);
+    for (var i = batch.large_first + workgroup.x; i < large_end; i += groups.x) {
+        draw_item(i, i32(thread), 0, 1);
     }
-    for (var i = 0u; i < work.huge; i++) {
+    let huge_end = min(work.huge, batch.huge_end);
+    for (var i = batch.huge_first; i < huge_end; i++) {
         // Every workgroup takes every n-th tile; beginning elsewhere for each triangle evens out the load.
         let start = (workgroup.x + i * 61u) % groups.x;
-        draw_item(work.items[batch.capacity - 1u - i], i32(thread), i32(start), i32(groups.x));
+        draw_item(batch.capacity - 1u - i, i32(thread), i32(start), i32(groups.x));
     }
 }
 
 // Draws every step-th tile of an item.
 fn draw_item(item: u32, thread: i32, start: i32, step: i32) {
-    let t = item / 8u;
-    var v: Corners;
-    if CLIP && (item & 7u) != 0u {
-        v = piece(clipped(t), item & 7u);
-    } else {
-        v = screen_triangle(t);
-    }
-    let s = setup_of(v.a, v.b, v.c, area_of(v.a, v.b, v.c));
+    let x = work.items[3u * item];
+    let y = work.items[3u * item + 1u];
+    let depth = work.items[3u * item + 2u];
+    let s = Setup(
+        bitcast<vec3<i32>>(x.xyz),
+        bitcast<vec3<i32>>(y.xyz),
+        bitcast<vec3<f32>>(depth.xyz),
+        vec2(bitcast<f32>(y.w), bitcast<f32>(depth.w)),
+    );
     let e = edges_of(s);
     let bounds = pixel_bounds(s.x, s.y);
     let tiles = (bounds.zw - bounds.xy) / 64 + 1;
     for (var i = start; i < tiles.x * tiles.y; i += step) {
-        draw_tile(s, e, bounds, bounds.xy + 64 * vec2(i % tiles.x, i / tiles.x), thread, t + batch.id_base);
+        draw_tile(s, e, bounds, bounds.xy + 64 * vec2(i % tiles.x, i / tiles.x), thread, x.w);
     }
 }
 

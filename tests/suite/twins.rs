@@ -265,7 +265,7 @@ fn visibility_of_soups_is_the_same() {
         }
     }
     assert_eq!(cases, 96);
-    assert!(seen > 1_000_000, "{seen} samples saw something");
+    assert!(seen > 500_000, "{seen} samples saw something");
 }
 
 #[test]
@@ -288,7 +288,7 @@ fn visibility_with_faces_and_hulls_is_the_same() {
         }
     }
     assert_eq!(cases, 36);
-    assert!(seen > 1_000_000, "{seen} samples saw something");
+    assert!(seen > 500_000, "{seen} samples saw something");
 }
 
 #[test]
@@ -310,7 +310,7 @@ fn visibility_behind_the_eye_and_off_screen_is_the_same() {
         }
     }
     assert_eq!(cases, 54);
-    assert!(seen > 1_000_000, "{seen} samples saw something");
+    assert!(seen > 500_000, "{seen} samples saw something");
 }
 
 #[test]
@@ -443,4 +443,52 @@ fn owned(mut c: [[i64; 2]; 3], mut z: [f64; 3], at: [i64; 2]) -> Option<f64> {
         depth += value as f64 / area as f64 * z[k];
     }
     (depth > 0.0).then_some(depth)
+}
+
+#[test]
+#[ignore]
+fn timing() {
+    let mut random = Random(4242);
+    let deadline = Deadline::default();
+    for (kind, size, count) in [(Kind::Tiny, [300, 200], 200), (Kind::Tiny, [1000, 700], 3000), (Kind::Sliver, [1000, 700], 300), (Kind::Large, [300, 200], 200), (Kind::Large, [1000, 700], 300)] {
+        let soup = Soup::new(kind, count, 0.7, &mut random);
+        let view = View::new(size, 4, 3.0, &mut random);
+        let plan = soup.plan(&view);
+        let t = std::time::Instant::now();
+        let cpu = CpuRenderer::new(2).draw_visibility(&plan, &deadline).unwrap();
+        println!("{kind:?} {size:?} {count}: cpu {:?}", t.elapsed());
+        for gpu in gpus().unwrap() {
+            let mut r = GpuRenderer::new(gpu.clone());
+            for _ in 0..2 {
+                let t = std::time::Instant::now();
+                let words = r.draw_visibility(&plan, &deadline).unwrap();
+                let bad = words.iter().zip(&cpu).filter(|(a, b)| a != b).count();
+                println!("  {:?} {:?} differ {bad}", gpu.info().features, t.elapsed());
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore]
+fn timing_clip() {
+    let deadline = Deadline::default();
+    for clip in [false, true] {
+        let mut random = Random(4242);
+        let soup = Soup::new(Kind::Tiny, 300, 0.7, &mut random);
+        let mut view = View::new([200, 150], 4, 3.0, &mut random);
+        view.projection.clip = clip;
+        for near in [0.02, 3.0] {
+        view.projection.near_w = near;
+        let plan = soup.plan(&view);
+        for gpu in gpus().unwrap() {
+            let mut r = GpuRenderer::new(gpu.clone());
+            for _ in 0..3 {
+                let t = std::time::Instant::now();
+                r.draw_visibility(&plan, &deadline).unwrap();
+                println!("  {clip} {near} {:?} {:?}", gpu.info().features, t.elapsed());
+            }
+        }
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! One opened GPU: adapter, device, queue, and what it can do. Shared by all workers.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use super::stages::Stages;
@@ -48,6 +48,9 @@ pub struct Gpu {
     pub(super) int64_atomics: bool,
     info: GpuInfo,
     lost: Lost,
+    /// Held while polling: in wgpu-core 30.0.1 a wait that times out panics if another thread's poll has meanwhile found the
+    /// queue empty (device/resource.rs:948), and takes other jobs' callbacks down with it.
+    polling: Mutex<()>,
 }
 
 /// Why the device is gone, once it is.
@@ -56,11 +59,11 @@ type Lost = Arc<OnceLock<String>>;
 /// Storage buffers that the hungriest stage binds.
 const STORAGE_BUFFERS: u32 = 8;
 
-/// How long to wait for the GPU between two looks at the deadline.
-const POLL_SLICE: Duration = Duration::from_millis(20);
+/// How long to wait for the GPU between two looks at the deadline, and before another worker may wait.
+const POLL_SLICE: Duration = Duration::from_millis(5);
 
 /// Slices after which a GPU that finishes nothing counts as hung: two minutes.
-const POLL_SLICES_MAX: u32 = 6000;
+const POLL_SLICES_MAX: u32 = 24_000;
 
 impl Gpu {
     /// Opens the best adapter of the given kind.
@@ -97,7 +100,7 @@ impl Gpu {
         let features = if int64_atomics { vec!["int64-atomics"] } else { vec![] };
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
-        Ok(Self { device, queue, stages: Stages::default(), limits, int64_atomics, info, lost })
+        Ok(Self { device, queue, stages: Stages::default(), limits, int64_atomics, info, lost, polling: Mutex::new(()) })
     }
 
     /// What was opened.
@@ -142,7 +145,10 @@ impl Gpu {
             deadline.check()?;
             let wait = wgpu::PollType::Wait { submission_index: Some(submission.clone()), timeout: Some(POLL_SLICE) };
             // Real device loss panics inside poll, whatever handlers are set.
-            let polled = catch_unwind(AssertUnwindSafe(|| self.device.poll(wait)));
+            let polled = {
+                let _polling = self.polling.lock().unwrap_or_else(PoisonError::into_inner);
+                catch_unwind(AssertUnwindSafe(|| self.device.poll(wait)))
+            };
             match polled {
                 Ok(Ok(_)) => return self.check(),
                 Ok(Err(wgpu::PollError::Timeout)) => self.check()?,

@@ -19,7 +19,7 @@ pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
 use self::buffers::Buffers;
 use self::params::Frame;
 use self::recorder::Recorder;
-use self::schedule::{DeviceTraits, Schedule, Step, has_visibility};
+use self::schedule::{DeviceTraits, Schedule, Step, WORK_HEAD_BYTES, WORK_ITEM_BYTES, has_visibility};
 use self::stages::Slot;
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::Image;
@@ -30,7 +30,7 @@ use crate::plan::DrawPlan;
 const TILE_WORKGROUPS: u32 = 1024;
 
 /// The same on a processor, where each costs time even if it finds nothing to do.
-const TILE_WORKGROUPS_SOFTWARE: u32 = 32;
+const TILE_WORKGROUPS_SOFTWARE: u32 = 64;
 
 /// Draws on the GPU. A worker's own: buffers are kept from job to job, the device is shared.
 pub struct GpuRenderer {
@@ -103,6 +103,7 @@ fn traits(gpu: &Gpu) -> DeviceTraits {
         workgroups_max: gpu.limits.max_compute_workgroups_per_dimension,
         tile_workgroups: if gpu.is_software() { TILE_WORKGROUPS_SOFTWARE } else { TILE_WORKGROUPS },
         int64_atomics: gpu.int64_atomics,
+        loops_are_limited: gpu.is_software(),
     }
 }
 
@@ -122,7 +123,7 @@ fn upload_geometry(
     let copies = if plan.hull.is_some() { 2 } else { 1 };
     buffers.reserve(gpu, Slot::Vertices, vertices * copies * 16)?;
     buffers.reserve(gpu, Slot::Samples, band_sample_bytes(plan, schedule.band_rows))?;
-    buffers.reserve(gpu, Slot::Work, 8 + u64::from(schedule.work_items) * 4)?;
+    buffers.reserve(gpu, Slot::Work, WORK_HEAD_BYTES + u64::from(schedule.work_items) * WORK_ITEM_BYTES)?;
     Ok(())
 }
 
@@ -142,6 +143,10 @@ fn execute<'a>(
             Step::ClearBand => recorder.clear(Slot::Samples, band_sample_bytes(plan, schedule.band_rows))?,
             Step::ClearWork => recorder.clear(Slot::Work, 8)?,
             Step::Dispatch { stage, batch, workgroups } => recorder.dispatch(stage, batch, workgroups)?,
+            Step::Tiles { stage, batch } if schedule.tiles.in_rounds => {
+                recorder.tiles_in_rounds(stage, &schedule.batches[batch], &schedule.tiles)?;
+            }
+            Step::Tiles { stage, batch } => recorder.dispatch(stage, batch, [schedule.tiles.workgroups, 1])?,
             Step::Submit => recorder.submit()?,
             Step::EndBand { row_first, row_end } => end_band(recorder, [row_first, row_end])?,
         }

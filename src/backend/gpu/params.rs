@@ -53,6 +53,10 @@ pub struct Batch {
     pub row_first: u32,
     pub row_end: u32,
     pub capacity: u32,
+    pub large_first: u32,
+    pub large_end: u32,
+    pub huge_first: u32,
+    pub huge_end: u32,
 }
 
 /// Distance between [`Batch`]es in their buffer: every device can bind at multiples of this.
@@ -130,7 +134,7 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_shader() {
         assert_eq!(size_of::<Frame>(), 256);
-        assert_eq!(size_of::<Batch>(), 32);
+        assert_eq!(size_of::<Batch>(), 48);
     }
 
     #[test]

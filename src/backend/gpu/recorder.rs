@@ -8,6 +8,7 @@ use std::time::Duration;
 use super::buffers::Buffers;
 use super::device::Gpu;
 use super::params::{BATCH_STRIDE, Batch, Frame, pack};
+use super::schedule::Tiles;
 use super::stages::{Pipeline, Slot, Stage, uniforms_layout};
 use crate::backend::DrawError;
 use crate::limits::Deadline;
@@ -22,6 +23,7 @@ pub struct Recorder<'a> {
     deadline: &'a Deadline,
     buffers: &'a mut Buffers,
     uniforms: wgpu::BindGroup,
+    spare_batch: usize,
     kernels: HashMap<Stage, (Arc<Pipeline>, wgpu::BindGroup)>,
     encoder: Option<wgpu::CommandEncoder>,
     pass: Option<wgpu::ComputePass<'static>>,
@@ -38,7 +40,10 @@ impl<'a> Recorder<'a> {
         batches: &[Batch],
     ) -> Self {
         let frame = Buffers::upload_uniform(gpu, &mut buffers.frame, bytemuck::bytes_of(frame)).clone();
-        let batches = Buffers::upload_uniform(gpu, &mut buffers.batches, &pack(batches)).clone();
+        // One more, for dispatches whose numbers are known only on the way.
+        let spare_batch = batches.len();
+        let packed = pack(&[batches, &[Batch::default()]].concat());
+        let batches = Buffers::upload_uniform(gpu, &mut buffers.batches, &packed).clone();
         let one = wgpu::BufferBinding { buffer: &batches, offset: 0, size: wgpu::BufferSize::new(BATCH_STRIDE as u64) };
         let uniforms = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
@@ -48,7 +53,17 @@ impl<'a> Recorder<'a> {
                 wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(one) },
             ],
         });
-        Self { gpu, deadline, buffers, uniforms, kernels: HashMap::new(), encoder: None, pass: None, in_flight: None }
+        Self {
+            gpu,
+            deadline,
+            buffers,
+            uniforms,
+            spare_batch,
+            kernels: HashMap::new(),
+            encoder: None,
+            pass: None,
+            in_flight: None,
+        }
     }
 
     /// Runs a kernel.
@@ -63,6 +78,31 @@ impl<'a> Recorder<'a> {
             pass.set_bind_group(0, &self.uniforms, &[(batch * BATCH_STRIDE) as u32]);
             pass.set_bind_group(1, group, &[]);
             pass.dispatch_workgroups(workgroups[0], workgroups[1], 1);
+        }
+        Ok(())
+    }
+
+    /// Draws what the work list holds: reads how long it is, then runs the kernel in rounds of known length.
+    pub fn tiles_in_rounds(&mut self, stage: Stage, batch: &Batch, tiles: &Tiles) -> Result<(), DrawError> {
+        let mut counts = [0; 2];
+        self.copy_out(Slot::Work, 8, 0)?;
+        self.read_staging(8, |bytes| counts = bytemuck::pod_read_unaligned(bytes))?;
+        let [large, huge] = counts.map(|count: u32| count.min(batch.capacity));
+        for [large, huge] in tiles.rounds(large, huge) {
+            let range = Batch {
+                large_first: large.start,
+                large_end: large.end,
+                huge_first: huge.start,
+                huge_end: huge.end,
+                ..*batch
+            };
+            if let Some(batches) = &self.buffers.batches {
+                let offset = (self.spare_batch * BATCH_STRIDE) as u64;
+                self.gpu.queue.write_buffer(batches, offset, bytemuck::bytes_of(&range));
+            }
+            self.dispatch(stage, self.spare_batch, [tiles.workgroups, 1])?;
+            // Writes to buffers come before all commands of a submission: one round each.
+            self.submit()?;
         }
         Ok(())
     }

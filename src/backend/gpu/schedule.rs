@@ -15,8 +15,13 @@ const BAND_BYTES: u64 = 64 << 20;
 const CHUNK: u32 = 1 << 20;
 
 /// Triangles a dispatch where all may need clipping, into at most six pieces each.
-const CHUNK_CLIP: u32 = 1 << 18;
+const CHUNK_CLIP: u32 = 1 << 17;
 const PIECES_MAX: u32 = 6;
+
+/// Bytes of the work list before its items, and of each.
+pub const WORK_HEAD_BYTES: u64 = 16;
+/// See [`WORK_HEAD_BYTES`].
+pub const WORK_ITEM_BYTES: u64 = 48;
 
 /// What a device allows, and which way it goes.
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +34,18 @@ pub struct DeviceTraits {
     pub tile_workgroups: u32,
     /// 64-bit atomics.
     pub int64_atomics: bool,
+    /// Whether a thread's loops are cut off after a while: see [`Tiles`].
+    pub loops_are_limited: bool,
 }
+
+/// Sample tests that may be handed to the device without looking at how many it really is: a second or so of work.
+const BLIND_TESTS_MAX: u64 = 1 << 38;
+
+/// Loop iterations a thread of the tile kernel may run in a dispatch of known extent.
+///
+/// llvmpipe (Mesa 22) leaves all loops of a thread after 65,535 iterations, silently; and on real devices a dispatch
+/// should end in time for the deadline.
+const ITERATIONS_MAX: u64 = 40_000;
 
 /// One command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +62,13 @@ pub enum Step {
         batch: usize,
         /// How often.
         workgroups: [u32; 2],
+    },
+    /// Draws the large triangles of the batch.
+    Tiles {
+        /// The kernel.
+        stage: Stage,
+        /// Index of its numbers.
+        batch: usize,
     },
     /// Hands what was recorded to the device.
     Submit,
@@ -67,6 +90,49 @@ pub struct Schedule {
     pub band_rows: u32,
     /// Items that the work list must hold.
     pub work_items: u32,
+    /// How the tile kernel is run.
+    pub tiles: Tiles,
+}
+
+/// How the tile kernel is run: at once over whatever is in the work list, or, where that might take too long, in rounds
+/// whose number follows from the list's length, which is read back first.
+#[derive(Clone, Copy, Debug)]
+pub struct Tiles {
+    /// Whether to run in rounds.
+    pub in_rounds: bool,
+    /// Workgroups a dispatch.
+    pub workgroups: u32,
+    tile_iterations: u64,
+    band_tiles: u64,
+}
+
+impl Tiles {
+    fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, band_rows: u32) -> Self {
+        let pixels = u64::from(plan.width_px) * u64::from(plan.height_px);
+        let tests = (plan.triangles.len() as u64).saturating_mul(pixels * u64::from(plan.samples));
+        Self {
+            in_rounds: device.loops_are_limited || tests > BLIND_TESTS_MAX,
+            workgroups: device.tile_workgroups.min(device.workgroups_max),
+            // 64 blocks, in each the samples; and as much again for the way there.
+            tile_iterations: 64 * (u64::from(plan.samples) + 1) + 64,
+            band_tiles: u64::from(plan.width_px / 64 + 2) * u64::from(band_rows / 64 + 2),
+        }
+    }
+
+    /// The ranges of large and of huge items to draw in each round.
+    pub fn rounds(&self, large: u32, huge: u32) -> Vec<[std::ops::Range<u32>; 2]> {
+        // A large triangle is at most 128 pixels, three tiles, wide and high, and one workgroup's.
+        let large_step = (ITERATIONS_MAX / (9 * self.tile_iterations)).max(1) * u64::from(self.workgroups);
+        let huge_iterations = self.band_tiles.div_ceil(u64::from(self.workgroups)) * self.tile_iterations;
+        let huge_step = (ITERATIONS_MAX / huge_iterations).max(1);
+        let ranges = |count: u32, step: u64| {
+            (0..u64::from(count)).step_by(step as usize).map(move |i| i as u32..(i + step).min(u64::from(count)) as u32)
+        };
+        ranges(large, large_step)
+            .map(|range| [range, 0..0])
+            .chain(ranges(huge, huge_step).map(|range| [0..0, range]))
+            .collect()
+    }
 }
 
 /// Whether a plan needs the sample buffer at all.
@@ -80,7 +146,8 @@ impl Schedule {
         let row_bytes = u64::from(plan.width_px) * pixel_bytes(plan);
         let band_bytes = BAND_BYTES.min(device.binding_bytes_max);
         let band_rows = (band_bytes / row_bytes.max(1)).clamp(1, u64::from(plan.height_px.max(1))) as u32;
-        let mut schedule = Self { steps: Vec::new(), batches: Vec::new(), band_rows, work_items: 0 };
+        let tiles = Tiles::new(plan, device, band_rows);
+        let mut schedule = Self { steps: Vec::new(), batches: Vec::new(), band_rows, work_items: 0, tiles };
         schedule.transform(plan, device);
         for row_first in (0..plan.height_px).step_by(band_rows as usize) {
             let rows = [row_first, plan.height_px.min(row_first + band_rows)];
@@ -124,12 +191,17 @@ impl Schedule {
                         row_first: rows[0],
                         row_end: rows[1],
                         capacity,
+                        large_end: u32::MAX,
+                        huge_end: u32::MAX,
+                        ..Batch::default()
                     };
                     self.steps.push(Step::ClearWork);
-                    self.dispatch(device, Stage::Visibility { clip, write }, in_chunk, batch);
-                    let workgroups = [device.tile_workgroups.min(device.workgroups_max), 1];
-                    let stage = Stage::VisibilityTile { clip, write };
-                    self.steps.push(Step::Dispatch { stage, batch: self.batches.len() - 1, workgroups });
+                    self.dispatch(device, Stage::Visibility { write }, in_chunk, batch);
+                    if clip {
+                        self.dispatch(device, Stage::Clip, in_chunk, batch);
+                    }
+                    let stage = Stage::VisibilityTile { write };
+                    self.steps.push(Step::Tiles { stage, batch: self.batches.len() - 1 });
                     if count > chunk {
                         self.steps.push(Step::Submit);
                     }
@@ -155,4 +227,27 @@ impl Schedule {
 /// Bytes a pixel of the largest buffer that holds a band.
 fn pixel_bytes(plan: &DrawPlan<'_>) -> u64 {
     (u64::from(plan.samples) * 8).max(16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_cover_every_item_once() {
+        let tiles = Tiles { in_rounds: true, workgroups: 32, tile_iterations: 384, band_tiles: 200 };
+        let mut cases = 0;
+        for (large, huge) in [(0, 0), (1, 0), (0, 1), (351, 14), (352, 15), (353, 16), (100_000, 1000)] {
+            let mut next = [0, 0];
+            for round in tiles.rounds(large, huge) {
+                for (range, next) in round.iter().zip(&mut next) {
+                    assert!(range.is_empty() || range.start == *next);
+                    *next = range.end.max(*next);
+                }
+            }
+            assert_eq!(next, [large, huge]);
+            cases += 1;
+        }
+        assert_eq!(cases, 7);
+    }
 }

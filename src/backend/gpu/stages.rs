@@ -10,15 +10,13 @@ pub enum Stage {
     Transform,
     /// Triangles to samples: small ones, and a list of the large ones.
     Visibility {
-        /// Whether triangles may need clipping.
-        clip: bool,
         /// How samples are written.
         write: Write,
     },
+    /// What is left of triangles behind the eye, to the same list.
+    Clip,
     /// Large triangles to samples.
     VisibilityTile {
-        /// As above.
-        clip: bool,
         /// As above.
         write: Write,
     },
@@ -33,6 +31,16 @@ pub enum Write {
     Depth,
     /// The lowest id of those that have that depth.
     Id,
+}
+
+impl Write {
+    fn constants(self) -> Vec<(&'static str, f64)> {
+        match self {
+            Self::Both => vec![],
+            Self::Depth => vec![("PHASE", 0.0)],
+            Self::Id => vec![("PHASE", 1.0)],
+        }
+    }
 }
 
 /// Buffers by their binding number in group 1 of every shader.
@@ -99,11 +107,12 @@ fn layout_entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEnt
 }
 
 const COMMON: &str = include_str!("../../../shaders/common.wgsl");
-const CLIP: &str = include_str!("../../../shaders/clip.wgsl");
+const PLANES: &str = include_str!("../../../shaders/planes.wgsl");
+const WORK: &str = include_str!("../../../shaders/work.wgsl");
 const TRIANGLE: &str = include_str!("../../../shaders/triangle.wgsl");
 const SAMPLES_32: &str = include_str!("../../../shaders/samples32.wgsl");
 const SAMPLES_64: &str = include_str!("../../../shaders/samples64.wgsl");
-const VISIBILITY_COMMON: &str = include_str!("../../../shaders/visibility_common.wgsl");
+const SAMPLES: &str = include_str!("../../../shaders/samples.wgsl");
 
 impl Stage {
     /// The buffers of group 1 that the kernel declares.
@@ -112,21 +121,19 @@ impl Stage {
         match self {
             Self::Transform => &[(Slot::Positions, Read), (Slot::HullNormals, Read), (Slot::Vertices, ReadWrite)],
             Self::Visibility { .. } => &[
-                (Slot::Positions, Read),
-                (Slot::HullNormals, Read),
                 (Slot::Triangles, Read),
                 (Slot::Vertices, Read),
                 (Slot::Samples, ReadWrite),
                 (Slot::Work, ReadWrite),
             ],
-            Self::VisibilityTile { .. } => &[
+            Self::Clip => &[
                 (Slot::Positions, Read),
                 (Slot::HullNormals, Read),
                 (Slot::Triangles, Read),
                 (Slot::Vertices, Read),
-                (Slot::Samples, ReadWrite),
-                (Slot::Work, Read),
+                (Slot::Work, ReadWrite),
             ],
+            Self::VisibilityTile { .. } => &[(Slot::Samples, ReadWrite), (Slot::Work, Read)],
         }
     }
 
@@ -135,21 +142,24 @@ impl Stage {
         match self {
             Self::Transform => "transform",
             Self::Visibility { .. } => "visibility",
+            Self::Clip => "clip",
             Self::VisibilityTile { .. } => "visibility_tile",
         }
     }
 
     /// WGSL has no include: a kernel is its files, one after the other.
     fn source(self) -> String {
-        let visibility = |write: Write, kernel| {
-            let samples = if write == Write::Both { SAMPLES_64 } else { SAMPLES_32 };
-            [COMMON, CLIP, TRIANGLE, VISIBILITY_COMMON, samples, kernel].concat()
-        };
+        let emit = |write: Write| if write == Write::Both { SAMPLES_64 } else { SAMPLES_32 };
         match self {
             Self::Transform => [COMMON, include_str!("../../../shaders/transform.wgsl")].concat(),
-            Self::Visibility { write, .. } => visibility(write, include_str!("../../../shaders/visibility.wgsl")),
-            Self::VisibilityTile { write, .. } => {
-                visibility(write, include_str!("../../../shaders/visibility_tile.wgsl"))
+            Self::Visibility { write } => {
+                let kernel = include_str!("../../../shaders/visibility.wgsl");
+                [COMMON, TRIANGLE, WORK, SAMPLES, emit(write), kernel].concat()
+            }
+            Self::Clip => [COMMON, TRIANGLE, WORK, PLANES, include_str!("../../../shaders/clip.wgsl")].concat(),
+            Self::VisibilityTile { write } => {
+                let kernel = include_str!("../../../shaders/visibility_tile.wgsl");
+                [COMMON, TRIANGLE, SAMPLES, emit(write), kernel].concat()
             }
         }
     }
@@ -157,16 +167,8 @@ impl Stage {
     /// Values of the kernel's `override` constants.
     fn constants(self) -> Vec<(&'static str, f64)> {
         match self {
-            Self::Transform => vec![],
-            Self::Visibility { clip, write } | Self::VisibilityTile { clip, write } => {
-                let mut constants = vec![("CLIP", f64::from(u8::from(clip)))];
-                match write {
-                    Write::Both => {}
-                    Write::Depth => constants.push(("PHASE", 0.0)),
-                    Write::Id => constants.push(("PHASE", 1.0)),
-                }
-                constants
-            }
+            Self::Visibility { write } | Self::VisibilityTile { write } => write.constants(),
+            _ => vec![],
         }
     }
 

@@ -1,0 +1,32 @@
+// Clipping in homogeneous coordinates: what triangles (clip.wgsl) and edges (lines.wgsl) share.
+
+// Bound of clipped coordinates, a little inside the guard band so that rounding cannot leave it.
+const BOUND: f32 = 1048064.0;
+
+fn plane_distance(plane: u32, p: vec4<f32>) -> f32 {
+    let reach = rn(BOUND * p.w);
+    switch plane {
+        case 0u: { return rn(p.w - frame.near_w); }
+        case 1u: { return rn(reach - p.x); }
+        case 2u: { return rn(reach + p.x); }
+        case 3u: { return rn(reach - p.y); }
+        default: { return rn(reach + p.y); }
+    }
+}
+
+fn intersect(inside: vec4<f32>, outside: vec4<f32>, d_inside: f32, d_outside: f32) -> vec4<f32> {
+    let t = rn(d_inside * recip(rn(d_inside - d_outside)));
+    return vec4(
+        inside.x + rn(t * rn(outside.x - inside.x)),
+        inside.y + rn(t * rn(outside.y - inside.y)),
+        inside.z + rn(t * rn(outside.z - inside.z)),
+        inside.w + rn(t * rn(outside.w - inside.w)),
+    );
+}
+
+fn snap_clipped(p: vec4<f32>) -> Vertex {
+    let r = recip(p.w);
+    let x = clamp(rn(p.x * r), -BOUND, BOUND);
+    let y = clamp(rn(p.y * r), -BOUND, BOUND);
+    return Vertex(round_to_i32(x), round_to_i32(y), rn(p.z * r), r);
+}

@@ -1,0 +1,55 @@
+// Where visibility.wgsl and clip.wgsl get triangles from, and the list of those that visibility_tile.wgsl draws.
+
+@group(1) @binding(2) var<storage, read> triangles: array<u32>;
+@group(1) @binding(3) var<storage, read> vertices: array<Vertex>;
+
+struct Work {
+    large: atomic<u32>,
+    huge: atomic<u32>,
+    // Three words of four an item; large ones from the front, huge ones from the back.
+    items: array<vec4<u32>>,
+};
+
+@group(1) @binding(5) var<storage, read_write> work: Work;
+
+// Triangles of this many pixels, in the picture, are shared out over all workgroups.
+const HUGE_PX: i32 = 128;
+
+struct Corners {
+    a: Vertex,
+    b: Vertex,
+    c: Vertex,
+};
+
+fn screen_triangle(t: u32) -> Corners {
+    let base = batch.vertex_base;
+    return Corners(
+        vertices[base + triangles[3u * t]],
+        vertices[base + triangles[3u * t + 1u]],
+        vertices[base + triangles[3u * t + 2u]],
+    );
+}
+
+fn is_outside(v: Corners) -> bool {
+    return v.a.x == OUTSIDE || v.b.x == OUTSIDE || v.c.x == OUTSIDE;
+}
+
+// Whether the batch draws triangles of this area.
+fn is_wanted(area: vec2<u32>) -> bool {
+    if is_zero(area) {
+        return false;
+    }
+    return batch.faces == 0u || (batch.faces == 1u) == is_negative(area);
+}
+
+fn postpone(s: Setup, size: vec2<i32>, id: u32) {
+    var slot: u32;
+    if max(size.x, size.y) < HUGE_PX {
+        slot = atomicAdd(&work.large, 1u);
+    } else {
+        slot = batch.capacity - 1u - atomicAdd(&work.huge, 1u);
+    }
+    work.items[3u * slot] = vec4(bitcast<vec3<u32>>(s.x), id);
+    work.items[3u * slot + 1u] = vec4(bitcast<vec3<u32>>(s.y), bitcast<u32>(s.depth_range.x));
+    work.items[3u * slot + 2u] = vec4(bitcast<vec3<u32>>(s.depth), bitcast<u32>(s.depth_range.y));
+}
