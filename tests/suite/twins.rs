@@ -10,7 +10,7 @@ use meshsnap::limits::Deadline;
 use meshsnap::plan::{DrawPlan, Faces, HullOffset, HullPass, Normals, Projection, SurfacePass, sample_offsets};
 
 /// The GPU with 64-bit atomics (where it has them) and without; None where there is no Vulkan.
-fn gpus() -> Option<&'static [Arc<Gpu>; 2]> {
+pub fn gpus() -> Option<&'static [Arc<Gpu>; 2]> {
     static GPUS: OnceLock<Option<[Arc<Gpu>; 2]>> = OnceLock::new();
     let opened = GPUS.get_or_init(|| {
         let open = |atomics| Gpu::open(GpuKind::Any, atomics).map(Arc::new);
