@@ -13,11 +13,25 @@ mod serve;
 mod settings;
 
 use std::ffi::OsString;
+use std::net::SocketAddr;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
-use complaint::Complaint;
+use crate::config::Config;
+pub use complaint::Complaint;
+
+/// What the command line starts but does not know: `main` joins them.
+pub struct Edges {
+    /// Starts the log, by filter and whether it is JSON.
+    pub log: fn(&str, Option<bool>) -> Result<(), String>,
+    /// Serves until told to stop; hears of the address once clients can connect.
+    pub serve: Serve,
+}
+
+/// Serves.
+pub type Serve = fn(&Config, &mut dyn FnMut(SocketAddr)) -> Result<(), Complaint>;
 
 /// Turns 3D meshes into images, here or as an HTTP service.
 #[derive(Parser)]
@@ -45,7 +59,7 @@ enum Command {
 }
 
 /// Runs the program with these arguments.
-pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
+pub fn run(arguments: impl Iterator<Item = OsString>, edges: &Edges) -> ExitCode {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
@@ -54,14 +68,16 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
-    let done = match cli.command {
-        Command::Render(arguments) => render::run(&arguments),
+    let commanded = || match cli.command {
+        Command::Render(arguments) => render::run(&arguments, edges),
         Command::Inspect(arguments) => inspect::run(&arguments),
-        Command::Serve(arguments) => serve::run(&arguments),
+        Command::Serve(arguments) => serve::run(&arguments, edges),
         Command::Health(arguments) => health::run(&arguments),
         Command::Completions { shell } => completions(shell),
     };
-    match done {
+    // A panic is a bug of ours, and has its exit code; its message has been printed by then.
+    let bug = |_| Err(Complaint::ours("this is a bug in meshsnap; please report it with the mesh and the request"));
+    match catch_unwind(AssertUnwindSafe(commanded)).unwrap_or_else(bug) {
         Ok(()) => ExitCode::SUCCESS,
         Err(complaint) => {
             eprintln!("meshsnap: {}", complaint.sentence);

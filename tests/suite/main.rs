@@ -6,5 +6,6 @@
 mod cli;
 mod examples;
 mod http;
+mod http_bad;
 mod jobs;
 mod server;
