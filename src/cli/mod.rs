@@ -13,25 +13,12 @@ mod serve;
 mod settings;
 
 use std::ffi::OsString;
-use std::net::SocketAddr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
-use crate::config::Config;
-pub use complaint::Complaint;
-
-/// What the command line starts but does not know: `main` joins them.
-pub struct Edges {
-    /// Starts the log, by filter and whether it is JSON.
-    pub log: fn(&str, Option<bool>) -> Result<(), String>,
-    /// Serves until told to stop; hears of the address once clients can connect.
-    pub serve: Serve,
-}
-
-/// Serves.
-pub type Serve = fn(&Config, &mut dyn FnMut(SocketAddr)) -> Result<(), Complaint>;
+use complaint::Complaint;
 
 /// Turns 3D meshes into images, here or as an HTTP service.
 #[derive(Parser)]
@@ -59,7 +46,7 @@ enum Command {
 }
 
 /// Runs the program with these arguments.
-pub fn run(arguments: impl Iterator<Item = OsString>, edges: &Edges) -> ExitCode {
+pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
@@ -69,9 +56,9 @@ pub fn run(arguments: impl Iterator<Item = OsString>, edges: &Edges) -> ExitCode
         }
     };
     let commanded = || match cli.command {
-        Command::Render(arguments) => render::run(&arguments, edges),
+        Command::Render(arguments) => render::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
-        Command::Serve(arguments) => serve::run(&arguments, edges),
+        Command::Serve(arguments) => serve::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
         Command::Completions { shell } => completions(shell),
     };

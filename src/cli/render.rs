@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 
-use super::Edges;
 use super::complaint::Complaint;
 use super::files;
 use super::progress::Progress;
@@ -19,6 +18,7 @@ use crate::mesh::Format;
 use crate::pipeline::{self, Job, Output, Stage};
 use crate::request::{self, Rules};
 use crate::scene::Spec;
+use crate::telemetry;
 
 /// Arguments of `render`.
 #[derive(Args)]
@@ -73,10 +73,10 @@ pub struct RenderArgs {
 }
 
 /// Draws one mesh into one file.
-pub fn run(arguments: &RenderArgs, edges: &Edges) -> Result<(), Complaint> {
+pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
     let filter = std::env::var("MESHSNAP_LOG").unwrap_or_default();
     let filter = if filter.is_empty() { "warn" } else { &filter };
-    (edges.log)(filter, Some(false)).map_err(Complaint::usage)?;
+    telemetry::init(filter, Some(false)).map_err(Complaint::usage)?;
     let [mesh_name] = arguments.meshes.as_slice() else {
         return Err(Complaint::usage("give one MESH: this version draws one file at a time"));
     };

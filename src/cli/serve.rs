@@ -5,11 +5,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Edges;
 use super::complaint::Complaint;
 use super::files;
 use super::settings::AllSettings;
 use crate::config::{Config, SETTINGS};
+use crate::http::{self, ServeError};
+use crate::telemetry;
 
 /// Arguments of `serve`.
 #[derive(Args)]
@@ -22,13 +23,16 @@ pub struct ServeArgs {
 }
 
 /// Serves until told to stop.
-pub fn run(arguments: &ServeArgs, edges: &Edges) -> Result<(), Complaint> {
+pub fn run(arguments: &ServeArgs) -> Result<(), Complaint> {
     let config = resolve(arguments)?;
-    (edges.log)(&config.log, config.log_json).map_err(Complaint::usage)?;
+    telemetry::init(&config.log, config.log_json).map_err(Complaint::usage)?;
     if config.data_dir.is_some() {
         tracing::warn!("this version keeps jobs in memory and stores nothing in --data-dir");
     }
-    (edges.serve)(&config, &mut |address| announce(address, &config))
+    http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
+        ServeError::Unprotected(_) => Complaint::usage(error.to_string()),
+        ServeError::Listen { .. } | ServeError::Start(_) => Complaint::ours(error.to_string()),
+    })
 }
 
 /// Defaults, then the file, then variables and flags.
