@@ -3,10 +3,12 @@
 //!
 //! A new setting is a field of [`Config`], its default, and a line in [`SETTINGS`].
 
+mod settings;
+
 use std::path::PathBuf;
 
 use crate::limits::{BackendChoice, Limits};
-use crate::request::{IMAGE_PX_MAX, Words, word_for, words_of};
+pub use settings::{Access, SETTINGS, Setting};
 
 /// The settings of a process.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,25 +43,10 @@ pub struct Config {
     pub result_count: u64,
     /// What is logged, in `tracing` filter syntax.
     pub log: String,
-    /// How it is logged.
-    pub log_format: LogFormat,
+    /// Whether the log is JSON; None: where standard error is no terminal.
+    pub log_json: Option<bool>,
     /// What a job may use.
     pub limits: Limits,
-}
-
-/// Form of the log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LogFormat {
-    /// Text on a terminal, JSON elsewhere.
-    Auto,
-    /// For people.
-    Text,
-    /// For machines: an object a line.
-    Json,
-}
-
-impl Words for LogFormat {
-    const NOW: &'static [(&'static str, Self)] = &[("auto", Self::Auto), ("text", Self::Text), ("json", Self::Json)];
 }
 
 impl Default for Config {
@@ -80,7 +67,7 @@ impl Default for Config {
             result_bytes: 256 << 20,
             result_count: 10_000,
             log: "info".into(),
-            log_format: LogFormat::Auto,
+            log_json: None,
             limits: Limits::default(),
         }
     }
@@ -89,100 +76,6 @@ impl Default for Config {
 /// Processors that this process may use.
 pub fn cores() -> u64 {
     std::thread::available_parallelism().map_or(1, |n| n.get() as u64)
-}
-
-/// A setting's place in the configuration, and how its text is read and written.
-#[derive(Clone, Copy)]
-pub enum Access {
-    /// A whole number in a closed range.
-    Number(u64, u64, fn(&mut Config) -> &mut u64),
-    /// On or off.
-    Switch(fn(&mut Config) -> &mut bool),
-    /// Anything else: how to set it, and how to show it.
-    Text(fn(&mut Config, &str) -> Result<(), String>, fn(&Config) -> String),
-}
-
-/// One setting.
-pub struct Setting {
-    /// Kebab case, as in the flag.
-    pub key: &'static str,
-    /// One sentence.
-    pub help: &'static str,
-    /// Where and how.
-    pub access: Access,
-    /// Whether there is a flag: secrets have none, because every user of the machine can read a command line.
-    pub has_flag: bool,
-}
-
-/// Longest time that can be set: a day, so that no sum of times overflows.
-const MS_MAX: u64 = 24 * 3600 * 1000;
-
-/// Every setting.
-pub const SETTINGS: &[Setting] = &[
-    text("listen", "Address and port to listen on", |c, v| set(&mut c.listen, v), |c| c.listen.clone()),
-    text("data-dir", "Where meshes and results are stored (this version keeps them in memory)", set_data_dir, data_dir),
-    number("workers", "Threads that draw", 1, 1024, |c| &mut c.workers),
-    number("worker-threads", "Threads within one CPU render; 0: cores / workers", 0, 1024, |c| &mut c.worker_threads),
-    number("queue", "Jobs that may wait for each worker", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
-    text("backend", "Who draws unless a request says: auto, gpu or cpu", set_backend, |c| word_for(c.backend).into()),
-    secret("api-keys", "Bearer tokens of clients, separated by commas", set_api_keys),
-    switch("no-auth", "Serve without keys even beyond loopback", |c| &mut c.no_auth),
-    number("connections", "Connections at once", 1, 1 << 20, |c| &mut c.connections),
-    number("uploads-bytes", "Uploads in memory at once", 1, u64::MAX, |c| &mut c.uploads_bytes),
-    number("header-timeout-ms", "Time for a request's header", 1, MS_MAX, |c| &mut c.header_timeout_ms),
-    number("body-timeout-ms", "Time for a request's body", 1, MS_MAX, |c| &mut c.body_timeout_ms),
-    number("result-ttl-ms", "How long a job's result is kept", 0, MS_MAX, |c| &mut c.result_ttl_ms),
-    number("result-bytes", "Memory for results of jobs", 0, u64::MAX, |c| &mut c.result_bytes),
-    number("result-count", "Results of jobs in memory", 1, 1 << 24, |c| &mut c.result_count),
-    text(
-        "log",
-        "What is logged: error, warn, info, debug, or a tracing filter",
-        |c, v| set(&mut c.log, v),
-        |c| c.log.clone(),
-    ),
-    text("log-format", "auto, text or json", set_log_format, |c| word_for(c.log_format).into()),
-    number("limit-body-bytes", "Largest request body", 1, u64::MAX, |c| &mut c.limits.body_bytes),
-    number("limit-memory-bytes", "Memory for one job", 1, u64::MAX, |c| &mut c.limits.memory_bytes),
-    number("limit-triangles", "Triangles of one mesh", 1, u64::MAX, |c| &mut c.limits.triangles),
-    number("limit-nodes", "Nodes of one scene graph", 1, u64::MAX, |c| &mut c.limits.nodes),
-    // 128 is where the JSON parser itself stops.
-    number("limit-json-depth", "Nesting of JSON", 1, 128, |c| &mut c.limits.json_depth),
-    number("limit-image-px", "Width and height of a picture", 1, IMAGE_PX_MAX, |c| &mut c.limits.image_px),
-    number("limit-job-ms", "Time for one job, waiting included", 1, MS_MAX, |c| &mut c.limits.job_ms),
-    number("limit-queue-per-worker", "The same as --queue", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
-];
-
-impl Setting {
-    /// The environment variable.
-    pub fn variable(&self) -> String {
-        format!("MESHSNAP_{}", self.key.to_ascii_uppercase().replace('-', "_"))
-    }
-
-    /// Reads `value` into `config`, or says what is allowed.
-    pub fn set(&self, config: &mut Config, value: &str) -> Result<(), String> {
-        match self.access {
-            Access::Number(min, max, at) => {
-                let number = parse_number(value).filter(|n| (min..=max).contains(n));
-                *at(config) = number.ok_or_else(|| format!("a whole number from {min} to {max}"))?;
-                Ok(())
-            }
-            Access::Switch(at) => {
-                *at(config) = value.parse().map_err(|_| "true or false".to_owned())?;
-                Ok(())
-            }
-            Access::Text(set, _) => set(config, value),
-        }
-    }
-
-    /// The value in `config`, as text.
-    pub fn show(&self, config: &Config) -> String {
-        let mut copy = config.clone();
-        match self.access {
-            Access::Number(_, _, at) => at(&mut copy).to_string(),
-            Access::Switch(at) => at(&mut copy).to_string(),
-            Access::Text(_, get) => get(config),
-        }
-    }
 }
 
 /// A setting that cannot be.
@@ -255,71 +148,6 @@ fn toml_text(value: &toml::Value) -> Option<String> {
     }
 }
 
-/// `1000`, `1_000` or `64MiB`.
-fn parse_number(text: &str) -> Option<u64> {
-    let units = [("KiB", 10), ("MiB", 20), ("GiB", 30)];
-    let unit = units.iter().find_map(|&(name, shift)| text.strip_suffix(name).map(|rest| (rest.trim_end(), shift)));
-    let (digits, shift) = unit.unwrap_or((text, 0));
-    digits.replace('_', "").parse::<u64>().ok()?.checked_mul(1 << shift)
-}
-
-fn set(place: &mut String, value: &str) -> Result<(), String> {
-    if value.is_empty() {
-        return Err("some text".into());
-    }
-    value.clone_into(place);
-    Ok(())
-}
-
-fn set_data_dir(config: &mut Config, value: &str) -> Result<(), String> {
-    config.data_dir = Some(value.into());
-    Ok(())
-}
-
-fn data_dir(config: &Config) -> String {
-    config.data_dir.as_ref().map(|d| d.display().to_string()).unwrap_or_default()
-}
-
-fn set_word<T: Words>(place: &mut T, value: &str) -> Result<(), String> {
-    let found = T::NOW.iter().find(|&&(word, _)| word == value);
-    *place = found.map(|&(_, v)| v).ok_or_else(|| format!("one of {}", words_of::<T>().join(", ")))?;
-    Ok(())
-}
-
-fn set_backend(config: &mut Config, value: &str) -> Result<(), String> {
-    set_word(&mut config.backend, value)
-}
-
-fn set_log_format(config: &mut Config, value: &str) -> Result<(), String> {
-    set_word(&mut config.log_format, value)
-}
-
-fn set_api_keys(config: &mut Config, value: &str) -> Result<(), String> {
-    config.api_keys = value.split(',').map(str::trim).filter(|k| !k.is_empty()).map(str::to_owned).collect();
-    Ok(())
-}
-
-const fn number(key: &'static str, help: &'static str, min: u64, max: u64, at: fn(&mut Config) -> &mut u64) -> Setting {
-    Setting { key, help, access: Access::Number(min, max, at), has_flag: true }
-}
-
-const fn switch(key: &'static str, help: &'static str, at: fn(&mut Config) -> &mut bool) -> Setting {
-    Setting { key, help, access: Access::Switch(at), has_flag: true }
-}
-
-const fn text(
-    key: &'static str,
-    help: &'static str,
-    set: fn(&mut Config, &str) -> Result<(), String>,
-    get: fn(&Config) -> String,
-) -> Setting {
-    Setting { key, help, access: Access::Text(set, get), has_flag: true }
-}
-
-const fn secret(key: &'static str, help: &'static str, set: fn(&mut Config, &str) -> Result<(), String>) -> Setting {
-    Setting { key, help, access: Access::Text(set, |c| format!("{} keys", c.api_keys.len())), has_flag: false }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -361,7 +189,7 @@ mod tests {
         assert_eq!((config.listen.as_str(), config.workers, config.no_auth), ("0.0.0.0:99", 3, true));
         assert_eq!((config.limits.body_bytes, config.limits.queue_per_worker), (2 << 20, 5));
         assert_eq!(config.api_keys, ["a", "b"]);
-        assert_eq!((config.backend, config.log_format), (BackendChoice::Cpu, LogFormat::Json));
+        assert_eq!((config.backend, config.log_json), (BackendChoice::Cpu, Some(true)));
     }
 
     #[test]

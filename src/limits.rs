@@ -42,6 +42,9 @@ impl Default for Limits {
     }
 }
 
+/// The largest picture side that the rasterizers' fixed point can address; no setting goes beyond it.
+pub const IMAGE_PX_MAX: u64 = 4096;
+
 /// A cap that the input ran into.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what} is {given}, and the limit is {limit} (raise it with {flag})")]

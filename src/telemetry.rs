@@ -4,19 +4,14 @@ use std::io::IsTerminal as _;
 
 use tracing_subscriber::EnvFilter;
 
-use crate::config::LogFormat;
-
-/// Starts logging. `filter` is in `tracing` syntax: `info`, or `warn,meshsnap::http=debug`.
-pub fn init(filter: &str, format: LogFormat) -> Result<(), String> {
+/// Starts logging. `filter` is in `tracing` syntax: `info`, or `warn,meshsnap::http=debug`. `json` of None means: where
+/// standard error is no terminal.
+pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
     let parsed = EnvFilter::try_new(filter).map_err(|e| {
         format!("`log` is \"{filter}\", which is no filter ({e}); use error, warn, info, debug or trace")
     })?;
     let terminal = std::io::stderr().is_terminal();
-    let text = match format {
-        LogFormat::Auto => terminal,
-        LogFormat::Text => true,
-        LogFormat::Json => false,
-    };
+    let text = !json.unwrap_or(!terminal);
     let builder = tracing_subscriber::fmt().with_env_filter(parsed).with_writer(std::io::stderr);
     let started = if text {
         builder.with_ansi(terminal).with_target(false).try_init()

@@ -1,7 +1,7 @@
 //! Files and standard streams, with `-` for the latter.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, Read, Write as _};
+use std::io::{self, ErrorKind, IsTerminal as _, Read, Write as _};
 
 use super::complaint::Complaint;
 
@@ -25,6 +25,11 @@ pub fn read(name: &str, bytes_max: u64) -> Result<Vec<u8>, Complaint> {
 
 /// Writes a whole file, or standard output for `-`.
 pub fn write(name: &str, bytes: &[u8]) -> Result<(), Complaint> {
+    if name == "-" && io::stdout().is_terminal() {
+        return Err(Complaint::usage(
+            "standard output is a terminal, which shows no pictures; give -o FILE, or a pipe",
+        ));
+    }
     if name == "-" {
         return print(bytes);
     }

@@ -13,6 +13,7 @@ mod serve;
 mod settings;
 
 use std::ffi::OsString;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -54,14 +55,16 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
-    let done = match cli.command {
+    let commanded = || match cli.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
         Command::Completions { shell } => completions(shell),
     };
-    match done {
+    // A panic is a bug of ours, and has its exit code; its message has been printed by then.
+    let bug = |_| Err(Complaint::ours("this is a bug in meshsnap; please report it with the mesh and the request"));
+    match catch_unwind(AssertUnwindSafe(commanded)).unwrap_or_else(bug) {
         Ok(()) => ExitCode::SUCCESS,
         Err(complaint) => {
             eprintln!("meshsnap: {}", complaint.sentence);

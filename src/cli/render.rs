@@ -11,7 +11,7 @@ use super::files;
 use super::progress::Progress;
 use super::settings::LimitSettings;
 use crate::backend::{Backends, GpuHost};
-use crate::config::{LogFormat, cores};
+use crate::config::cores;
 use crate::image::ImageFormat;
 use crate::limits::{BackendChoice, Deadline, Limits};
 use crate::mesh::Format;
@@ -76,7 +76,7 @@ pub struct RenderArgs {
 pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
     let filter = std::env::var("MESHSNAP_LOG").unwrap_or_default();
     let filter = if filter.is_empty() { "warn" } else { &filter };
-    telemetry::init(filter, LogFormat::Auto).map_err(Complaint::usage)?;
+    telemetry::init(filter, Some(false)).map_err(Complaint::usage)?;
     let [mesh_name] = arguments.meshes.as_slice() else {
         return Err(Complaint::usage("give one MESH: this version draws one file at a time"));
     };

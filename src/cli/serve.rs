@@ -25,7 +25,7 @@ pub struct ServeArgs {
 /// Serves until told to stop.
 pub fn run(arguments: &ServeArgs) -> Result<(), Complaint> {
     let config = resolve(arguments)?;
-    telemetry::init(&config.log, config.log_format).map_err(Complaint::usage)?;
+    telemetry::init(&config.log, config.log_json).map_err(Complaint::usage)?;
     if config.data_dir.is_some() {
         tracing::warn!("this version keeps jobs in memory and stores nothing in --data-dir");
     }

@@ -67,6 +67,8 @@ pub struct JobErrorDto {
     status: u16,
     code: &'static str,
     detail: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    flag: Option<&'static str>,
 }
 
 /// Something in the file that was read around.
@@ -92,21 +94,20 @@ impl JobDto {
         let state = job.state();
         let (result, error) = match &state {
             State::Done(finished) => {
-                let output = &finished.output;
-                let warnings = output.warnings.iter();
+                let warnings = finished.warnings.iter();
                 let result = ResultDto {
                     url: format!("/v1/jobs/{}/result", job.id),
-                    content_type: media_type(output.format),
-                    bytes: output.bytes.len(),
-                    backend: output.backend.name(),
+                    content_type: media_type(finished.format),
+                    bytes: finished.picture.len(),
+                    backend: finished.backend.name(),
                     timings_ms: TimingsDto::new(&finished.timings),
                     warnings: warnings.map(|w| WarningDto { code: w.code, detail: w.detail.clone() }).collect(),
                 };
                 (Some(result), None)
             }
             State::Failed(failure) => {
-                let ApiError { status, code, detail, .. } = ApiError::from(&**failure);
-                (None, Some(JobErrorDto { status: status.as_u16(), code, detail }))
+                let ApiError { status, code, detail, flag, .. } = ApiError::from(&**failure);
+                (None, Some(JobErrorDto { status: status.as_u16(), code, detail, flag }))
             }
             State::Queued | State::Running | State::Cancelled => (None, None),
         };

@@ -89,7 +89,11 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
             _ = terminate.recv() => {}
             _ = interrupt.recv() => {}
         }
-        drain(&app, Duration::from_millis(config.limits.job_ms) + DRAIN_GRACE).await;
+        tokio::select! {
+            () = drain(&app, Duration::from_millis(config.limits.job_ms) + DRAIN_GRACE) => {}
+            _ = terminate.recv() => tracing::warn!("told twice to end: jobs are abandoned"),
+            _ = interrupt.recv() => tracing::warn!("told twice to end: jobs are abandoned"),
+        }
     };
     let header_timeout = Duration::from_millis(config.header_timeout_ms);
     accept::run(listener, router, config.connections as usize, header_timeout, stop).await;

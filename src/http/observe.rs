@@ -15,12 +15,15 @@ use super::lent::Lent;
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
+/// A path can be as long as a header may be; a log line should not.
+const LOGGED_PATH_CHARS_MAX: usize = 256;
+
 /// Gives the request an id and a span, logs how it ended, and turns errors into `application/problem+json`.
 pub async fn observe(request: Request, next: Next) -> Response {
     let began = Instant::now();
     let id = request_id(request.headers());
-    let span =
-        tracing::info_span!("request", request_id = %id, method = %request.method(), path = request.uri().path());
+    let path: String = request.uri().path().chars().take(LOGGED_PATH_CHARS_MAX).collect();
+    let span = tracing::info_span!("request", request_id = %id, method = %request.method(), path);
     let (headers, version) = (request.headers().clone(), request.version());
     let (parts, body) = request.into_parts();
     let (lent, body) = Lent::new(body);

@@ -45,17 +45,16 @@ impl Drop for Waiting {
 
 /// The picture, with what there is to say about it.
 pub fn picture(finished: &Finished) -> Response {
-    let output = &finished.output;
-    let etag = format!("\"{:032x}\"", digest(&output.bytes));
+    let etag = format!("\"{:032x}\"", digest(&finished.picture));
     let timings = finished.timings.parts().map(|(name, took)| format!("{name};dur={:.3}", took.as_secs_f64() * 1e3));
     let text = |value: &str| HeaderValue::from_str(value).unwrap_or_else(|_| HeaderValue::from_static(""));
     let headers = [
-        (header::CONTENT_TYPE, HeaderValue::from_static(media_type(output.format))),
+        (header::CONTENT_TYPE, HeaderValue::from_static(media_type(finished.format))),
         (header::ETAG, text(&etag)),
-        (HeaderName::from_static("x-render-backend"), HeaderValue::from_static(output.backend.name())),
+        (HeaderName::from_static("x-render-backend"), HeaderValue::from_static(finished.backend.name())),
         (HeaderName::from_static("server-timing"), text(&timings.join(", "))),
     ];
-    (StatusCode::OK, headers, output.bytes.clone()).into_response()
+    (StatusCode::OK, headers, finished.picture.clone()).into_response()
 }
 
 /// 128 bits of the picture's bytes: equal pictures have equal tags, and the other way round but for chance.

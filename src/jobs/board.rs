@@ -114,7 +114,7 @@ impl Board {
             inner.queue.retain(|queued| queued.serial != job.serial);
         }
         if job.keep {
-            let bytes = if let State::Done(finished) = &state { finished.output.bytes.len() as u64 } else { 0 };
+            let bytes = if let State::Done(finished) = &state { finished.picture.len() as u64 } else { 0 };
             inner.ended.push_back((Instant::now(), job.id, bytes));
             inner.ended_bytes += bytes;
             self.evict(inner);

@@ -9,8 +9,10 @@ use tokio::sync::watch;
 use uuid::Uuid;
 
 use super::Reservation;
+use crate::backend::BackendKind;
+use crate::image::ImageFormat;
 use crate::limits::Deadline;
-use crate::mesh::Format;
+use crate::mesh::{Format, Warning};
 use crate::pipeline::{Output, RenderError, Stage};
 use crate::scene::Spec;
 
@@ -63,13 +65,27 @@ pub enum State {
     Cancelled,
 }
 
-/// A picture and how long it took.
+/// A picture and what is known about it.
 #[derive(Debug)]
 pub struct Finished {
-    /// The picture and what is known about it.
-    pub output: Output,
+    /// The encoded picture; clones share it.
+    pub picture: Bytes,
+    /// Its format.
+    pub format: ImageFormat,
+    /// Who drew it.
+    pub backend: BackendKind,
+    /// What the importer noticed.
+    pub warnings: Vec<Warning>,
     /// How long each part took.
     pub timings: Timings,
+}
+
+impl Finished {
+    /// From what the pipeline gave.
+    pub fn new(output: Output, timings: Timings) -> Self {
+        let Output { bytes, format, backend, warnings, .. } = output;
+        Self { picture: bytes.into(), format, backend, warnings, timings }
+    }
 }
 
 /// Why a job has no picture.

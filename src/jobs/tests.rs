@@ -8,9 +8,10 @@ use bytes::Bytes;
 use super::*;
 use crate::backend::BackendKind;
 use crate::image::ImageFormat;
-use crate::limits::{Deadline, Limits, Stopped};
+use crate::limits::{BackendChoice, Deadline, Stopped};
 use crate::pipeline::{Output, RenderError, Stage};
-use crate::request;
+use crate::scene::color::Rgba;
+use crate::scene::{CameraSpec, ImageSpec, Light, Projection, Spec, View};
 
 const SOON: Duration = Duration::from_secs(10);
 
@@ -26,11 +27,28 @@ fn settings() -> Settings {
 }
 
 fn work(bodies: &Arc<Bodies>, mesh: &'static [u8]) -> Work {
-    let rules = request::Rules { limits: Limits::default(), backend: crate::limits::BackendChoice::Cpu };
     let mut reservation = bodies.reserve();
     reservation.grow(mesh.len() as u64).unwrap();
-    let spec = request::read(None, &[], &rules).unwrap();
-    Work { mesh: Bytes::from_static(mesh), format_in: None, spec, reservation }
+    Work { mesh: Bytes::from_static(mesh), format_in: None, spec: spec(), reservation }
+}
+
+/// What is drawn does not matter here.
+fn spec() -> Spec {
+    let camera = CameraSpec {
+        view: View::Iso,
+        azimuth_deg: None,
+        elevation_deg: None,
+        projection: Projection::Perspective,
+        fov_deg: 35.0,
+        height: None,
+        up: None,
+        margin: 0.0,
+        eye: None,
+        target: None,
+    };
+    let image = ImageSpec { width_px: 8, height_px: 8, format: None, samples: 1, background: Rgba::WHITE };
+    let light = Light { intensity: 1.0, ambient: 0.3 };
+    Spec { surface: None, wire: None, outline: None, camera, light, image, backend: BackendChoice::Cpu }
 }
 
 fn output(bytes: usize) -> Output {
@@ -109,7 +127,7 @@ fn a_job_ends_with_its_picture_and_gives_its_memory_back() {
     let bench = bench(settings());
     let job = bench.submit(b"12345", false).unwrap();
     let State::Done(finished) = wait(&job) else { panic!("{:?}", job.state()) };
-    assert_eq!(finished.output.bytes.len(), 5);
+    assert_eq!(finished.picture.len(), 5);
     assert_eq!(bench.bodies.used_bytes(), 0);
     assert!(bench.jobs.find(job.id).is_none(), "not kept");
 }

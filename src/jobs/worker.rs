@@ -60,7 +60,7 @@ fn draw(renderer: &mut Renderer, job: &Job, work: &Work, started: Instant) -> St
         stage_began = now;
     });
     match result {
-        Ok(output) => State::Done(Arc::new(Finished { output, timings })),
+        Ok(output) => State::Done(Arc::new(Finished::new(output, timings))),
         Err(error) => State::Failed(Arc::new(Failure::Render(error))),
     }
 }

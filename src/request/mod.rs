@@ -17,7 +17,7 @@ pub use error::{RequestError, RequestFault};
 pub use words::{Style, Words, word_for, words_of};
 
 use crate::image::ImageFormat;
-use crate::limits::{BackendChoice, Limits};
+use crate::limits::{BackendChoice, IMAGE_PX_MAX, Limits};
 use crate::scene::Spec;
 use crate::scene::color::Rgba;
 use draft::Draft;
@@ -118,9 +118,6 @@ fn apply(draft: &mut Draft, key: &str, given: &Given, rules: &Rules) -> Result<(
     field.set(draft, value);
     Ok(())
 }
-
-/// The largest picture that the rasterizers' fixed point can address, so no flag goes beyond it.
-pub const IMAGE_PX_MAX: u64 = 4096;
 
 fn unknown(key: &str, given: &Given) -> RequestError {
     let later = LATER.contains(&key) || LATER.iter().any(|l| key.strip_prefix(l).is_some_and(|r| r.starts_with('.')));

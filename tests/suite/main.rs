@@ -15,6 +15,7 @@ mod formats_polygons;
 mod formats_shared;
 mod golden;
 mod http;
+mod http_bad;
 mod jobs;
 mod likeness;
 mod mesh_files;
