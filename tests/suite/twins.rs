@@ -6,12 +6,12 @@ use std::sync::{Arc, OnceLock};
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
 use meshsnap::backend::{DrawError, Renderer};
-use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::plan::{DrawPlan, Faces, HullOffset, HullPass, Normals, Projection, SurfacePass, sample_offsets};
 
 use crate::golden;
-use crate::scenes::{self, SCENES};
+use crate::likeness::{Likeness, Tolerance};
+use crate::scenes::SCENES;
 
 /// The GPU with 64-bit atomics (where it has them) and without; None where there is no Vulkan.
 pub fn gpus() -> Option<&'static [Arc<Gpu>; 2]> {
@@ -449,21 +449,6 @@ fn owned(mut c: [[i64; 2]; 3], mut z: [f64; 3], at: [i64; 2]) -> Option<f64> {
     (depth > 0.0).then_some(depth)
 }
 
-/// How far a scene's pictures may lie apart.
-#[derive(Clone, Copy, Debug)]
-struct Tolerance {
-    /// Largest difference of a channel, of 255.
-    channel: u8,
-    /// Largest share of pixels that differ at all.
-    pixels: f64,
-}
-
-/// ACCURACY.md, goal 8.
-const SURFACE_TOLERANCE: Tolerance = Tolerance { channel: 1, pixels: 0.001 };
-
-/// Coverage runs through square roots and exponentials, which devices round their own way.
-const LINES_TOLERANCE: Tolerance = Tolerance { channel: 1, pixels: 0.01 };
-
 #[test]
 fn pictures_of_the_scenes_agree() {
     if gpus().is_none() {
@@ -472,28 +457,15 @@ fn pictures_of_the_scenes_agree() {
     let mut cases = 0;
     for scene in SCENES {
         let cpu = golden::draw(scene, &mut CpuRenderer::new(1));
-        let tolerance = if scene.kind == scenes::Kind::Lines { LINES_TOLERANCE } else { SURFACE_TOLERANCE };
         for gpu in gpus().unwrap() {
             let mut renderer = GpuRenderer::new(gpu.clone());
             // Twice: the second picture comes from buffers that the first has used.
             for _ in 0..2 {
                 let picture = golden::draw(scene, &mut renderer);
-                assert_close(&cpu, &picture, tolerance, scene.name);
+                Likeness::of(&cpu, &picture).assert(Tolerance::TWINS, scene.name);
                 cases += 1;
             }
         }
     }
     assert_eq!(cases, SCENES.len() * 4);
-}
-
-fn assert_close(cpu: &Image, gpu: &Image, tolerance: Tolerance, what: &str) {
-    assert_eq!((cpu.width_px, cpu.height_px, cpu.rgba.len()), (gpu.width_px, gpu.height_px, gpu.rgba.len()), "{what}");
-    let pairs = || cpu.rgba.chunks_exact(4).zip(gpu.rgba.chunks_exact(4));
-    let worst = cpu.rgba.iter().zip(&gpu.rgba).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);
-    let differing = pairs().filter(|(a, b)| a != b).count();
-    let share = differing as f64 / pairs().count() as f64;
-    println!("{what}: {differing} pixels differ, by {worst} at most");
-    let first = pairs().position(|(a, b)| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > tolerance.channel));
-    let at = first.map(|i| (i as u32 % cpu.width_px, i as u32 / cpu.width_px));
-    assert!(worst <= tolerance.channel && share <= tolerance.pixels, "{what}: {differing} pixels ({share}), by {worst}; first at {at:?}");
 }
