@@ -119,7 +119,7 @@ impl Gpu {
     }
 
     /// Whether this is a processor that plays GPU.
-    pub(super) fn is_software(&self) -> bool {
+    pub fn is_software(&self) -> bool {
         self.info.device_type == type_name(wgpu::DeviceType::Cpu)
     }
 
