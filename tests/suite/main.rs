@@ -27,3 +27,4 @@ mod shapes;
 mod shared;
 mod structure;
 mod twins;
+mod twins_visibility;

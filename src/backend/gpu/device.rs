@@ -1,7 +1,7 @@
 //! One opened GPU: adapter, device, queue, and what it can do. Shared by all workers.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 
 use super::stages::Stages;
@@ -48,9 +48,6 @@ pub struct Gpu {
     pub(super) int64_atomics: bool,
     info: GpuInfo,
     lost: Lost,
-    /// Held while polling: in wgpu-core 30.0.1 a wait that times out panics if another thread's poll has meanwhile found the
-    /// queue empty (device/resource.rs:948), and takes other jobs' callbacks down with it.
-    polling: Mutex<()>,
 }
 
 /// Why the device is gone, once it is.
@@ -59,11 +56,15 @@ type Lost = Arc<OnceLock<String>>;
 /// Storage buffers that the hungriest stage binds.
 const STORAGE_BUFFERS: u32 = 8;
 
-/// How long to wait for the GPU between two looks at the deadline, and before another worker may wait.
-const POLL_SLICE: Duration = Duration::from_millis(5);
+/// How often to look without a pause: a small picture takes a fraction of a millisecond.
+const EAGER_POLLS: u32 = 64;
 
-/// Slices after which a GPU that finishes nothing counts as hung: two minutes.
-const POLL_SLICES_MAX: u32 = 24_000;
+/// Shortest and longest pause between two looks.
+const PAUSE_MIN: Duration = Duration::from_micros(20);
+const PAUSE_MAX: Duration = Duration::from_millis(2);
+
+/// Pauses, added up, after which a GPU that finishes nothing counts as hung.
+const HUNG_AFTER: Duration = Duration::from_secs(120);
 
 impl Gpu {
     /// Opens the best adapter of the given kind.
@@ -100,16 +101,7 @@ impl Gpu {
         let features = if int64_atomics { vec!["int64-atomics"] } else { vec![] };
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
-        Ok(Self {
-            device,
-            queue,
-            stages: Stages::default(),
-            limits,
-            int64_atomics,
-            info,
-            lost,
-            polling: Mutex::new(()),
-        })
+        Ok(Self { device, queue, stages: Stages::default(), limits, int64_atomics, info, lost })
     }
 
     /// What was opened.
@@ -128,7 +120,7 @@ impl Gpu {
     }
 
     /// Whether this is a processor that plays GPU.
-    pub(super) fn is_software(&self) -> bool {
+    pub fn is_software(&self) -> bool {
         self.info.device_type == type_name(wgpu::DeviceType::Cpu)
     }
 
@@ -148,21 +140,30 @@ impl Gpu {
         }
     }
 
-    /// Waits until a submission is done, looking at the deadline now and then.
-    pub(super) fn wait(&self, submission: &wgpu::SubmissionIndex, deadline: &Deadline) -> Result<(), DrawError> {
-        for _ in 0..POLL_SLICES_MAX {
+    /// Waits until a callback of the device has sent its news, looking at the deadline now and then.
+    ///
+    /// Only ever polls without blocking. In wgpu-core 30.0.1 a wait with a timeout panics if it runs out just when another
+    /// thread's poll or submit finds the queue empty (device/resource.rs:948), and takes other jobs' callbacks down with
+    /// it; a wait without one could hang for ever.
+    pub(super) fn wait<T>(&self, news: &mpsc::Receiver<T>, deadline: &Deadline) -> Result<T, DrawError> {
+        let (mut polls, mut waited) = (0_u32, Duration::ZERO);
+        while waited < HUNG_AFTER {
             deadline.check()?;
-            let wait = wgpu::PollType::Wait { submission_index: Some(submission.clone()), timeout: Some(POLL_SLICE) };
+            self.check()?;
             // Real device loss panics inside poll, whatever handlers are set.
-            let polled = {
-                let _polling = self.polling.lock().unwrap_or_else(PoisonError::into_inner);
-                catch_unwind(AssertUnwindSafe(|| self.device.poll(wait)))
-            };
-            match polled {
-                Ok(Ok(_)) => return self.check(),
-                Ok(Err(wgpu::PollError::Timeout)) => self.check()?,
+            match catch_unwind(AssertUnwindSafe(|| self.device.poll(wgpu::PollType::Poll))) {
+                Ok(Ok(_)) => {}
                 Ok(Err(error)) => return Err(DrawError::Device(error.to_string())),
-                Err(_) => return Err(self.declare_lost("waiting for it failed")),
+                Err(_) => return Err(self.declare_lost("polling it failed")),
+            }
+            polls += 1;
+            let pause = if polls <= EAGER_POLLS { Duration::ZERO } else { (waited / 8).clamp(PAUSE_MIN, PAUSE_MAX) };
+            // Another worker's poll may run our callback: then this wakes up at once.
+            match news.recv_timeout(pause) {
+                Ok(news) => return Ok(news),
+                Err(mpsc::RecvTimeoutError::Timeout) if pause.is_zero() => std::thread::yield_now(),
+                Err(mpsc::RecvTimeoutError::Timeout) => waited += pause,
+                Err(mpsc::RecvTimeoutError::Disconnected) => return Err(self.declare_lost("it forgot a job")),
             }
         }
         Err(self.declare_lost("it did not answer for two minutes"))

@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::mpsc;
-use std::time::Duration;
 
 use super::buffers::Buffers;
 use super::device::Gpu;
@@ -12,10 +11,6 @@ use super::schedule::Tiles;
 use super::stages::{Pipeline, Slot, Stage, uniforms_layout};
 use crate::backend::DrawError;
 use crate::limits::Deadline;
-
-/// How long another thread's poll may take to run our map callback after the work is done.
-const CALLBACK_WAIT: Duration = Duration::from_millis(10);
-const CALLBACK_WAITS_MAX: u32 = 500;
 
 /// One job's commands.
 pub struct Recorder<'a> {
@@ -27,7 +22,7 @@ pub struct Recorder<'a> {
     kernels: HashMap<Stage, (Arc<Pipeline>, wgpu::BindGroup)>,
     encoder: Option<wgpu::CommandEncoder>,
     pass: Option<wgpu::ComputePass<'static>>,
-    in_flight: Option<wgpu::SubmissionIndex>,
+    in_flight: Option<mpsc::Receiver<()>>,
 }
 
 impl<'a> Recorder<'a> {
@@ -128,8 +123,13 @@ impl<'a> Recorder<'a> {
     pub fn submit(&mut self) -> Result<(), DrawError> {
         self.pass = None;
         if let Some(encoder) = self.encoder.take() {
-            let submission = self.gpu.queue.submit([encoder.finish()]);
-            if let Some(before) = self.in_flight.replace(submission) {
+            let (sender, done) = mpsc::channel();
+            encoder.on_submitted_work_done(move || {
+                // A job that gave up does not listen any more.
+                let _ = sender.send(());
+            });
+            self.gpu.queue.submit([encoder.finish()]);
+            if let Some(before) = self.in_flight.replace(done) {
                 self.gpu.wait(&before, self.deadline)?;
             }
         }
@@ -146,31 +146,18 @@ impl<'a> Recorder<'a> {
 
     fn read(&mut self, staging: &wgpu::Buffer, size: u64, read: impl FnOnce(&[u8])) -> Result<(), DrawError> {
         self.submit()?;
-        let Some(submission) = self.in_flight.take() else { return Ok(()) };
         let (sender, mapped) = mpsc::channel();
         staging.map_async(wgpu::MapMode::Read, 0..size, move |result| {
             // A job that gave up does not listen any more.
             let _ = sender.send(result);
         });
-        self.gpu.wait(&submission, self.deadline)?;
-        self.wait_mapped(&mapped)?;
+        let mapped = self.gpu.wait(&mapped, self.deadline)?;
+        mapped.map_err(|error| DrawError::Device(format!("reading the picture back failed: {error}")))?;
         let view = staging.get_mapped_range(0..size).map_err(|e| DrawError::Device(e.to_string()))?;
         read(&view);
         drop(view);
         staging.unmap();
         Ok(())
-    }
-
-    /// Another worker's poll may have taken our callback and be about to run it.
-    fn wait_mapped(&self, mapped: &mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>) -> Result<(), DrawError> {
-        for _ in 0..CALLBACK_WAITS_MAX {
-            match mapped.recv_timeout(CALLBACK_WAIT) {
-                Ok(Ok(())) => return Ok(()),
-                Ok(Err(error)) => return Err(DrawError::Device(format!("reading the picture back failed: {error}"))),
-                Err(_) => self.gpu.check()?,
-            }
-        }
-        Err(self.gpu.declare_lost("the picture was never handed back"))
     }
 
     fn kernel(&mut self, stage: Stage) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
