@@ -32,7 +32,8 @@ struct Frame {
     samples: i32,
     triangle_count: u32,
     vertex_count: u32,
-    edge_count: u32,
+    // Added to a vertex index to get the hull's record.
+    hull_base: u32,
     // Where triangles' materials and edge masks start in the attributes; colours start at 0.
     materials_at: u32,
     masks_at: u32,
@@ -57,6 +58,8 @@ struct Batch {
     large_end: u32,
     huge_first: u32,
     huge_end: u32,
+    // Edges that a workgroup draws.
+    edges_per_group: u32,
 };
 
 const SURFACE: u32 = 1u;

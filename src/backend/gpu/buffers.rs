@@ -20,6 +20,8 @@ pub struct Buffers {
     pub batches: Option<wgpu::Buffer>,
     /// Where results are read by the CPU.
     pub staging: Option<wgpu::Buffer>,
+    /// Where the CPU reads how long the work list is.
+    counts: Option<wgpu::Buffer>,
 }
 
 impl Buffers {
@@ -72,6 +74,12 @@ impl Buffers {
             return Err(DrawError::Device(format!("the picture has {size} bytes, and the GPU's limit is {limit}")));
         }
         Ok(grow(gpu, &mut self.staging, size, limit, U::MAP_READ | U::COPY_DST))
+    }
+
+    /// A small buffer that the CPU can map.
+    pub fn counts(&mut self, gpu: &Gpu) -> &wgpu::Buffer {
+        use wgpu::BufferUsages as U;
+        grow(gpu, &mut self.counts, 8, SIZE_MIN, U::MAP_READ | U::COPY_DST)
     }
 
     /// Gives everything back if it is more than a worker may keep.

@@ -17,14 +17,14 @@ use std::sync::Arc;
 pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
-use self::params::Frame;
+use self::params::{Frame, attributes};
 use self::recorder::Recorder;
 use self::schedule::{DeviceTraits, Schedule, Step, WORK_HEAD_BYTES, WORK_ITEM_BYTES, has_visibility};
 use self::stages::Slot;
 use super::{BackendKind, DrawError, Renderer};
-use crate::image::Image;
+use crate::image::{Image, srgb8_thresholds};
 use crate::limits::Deadline;
-use crate::plan::DrawPlan;
+use crate::plan::{DrawPlan, Normals, ink_table};
 
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
@@ -65,7 +65,25 @@ impl GpuRenderer {
 impl Renderer for GpuRenderer {
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
         deadline.check()?;
-        Err(DrawError::Device(format!("not yet: {} px", plan.width_px)))
+        let row_bytes = u64::from(plan.width_px) * 4;
+        let size = row_bytes * u64::from(plan.height_px);
+        let mut image = Image { width_px: plan.width_px, height_px: plan.height_px, rgba: Vec::new() };
+        if size == 0 {
+            return Ok(image);
+        }
+        self.job(|gpu, buffers| {
+            let schedule = Schedule::picture(plan, &traits(gpu));
+            upload_geometry(gpu, buffers, plan, &schedule)?;
+            upload_looks(gpu, buffers, plan, &schedule)?;
+            buffers.staging(gpu, size)?;
+            let mut recorder = Recorder::new(gpu, deadline, buffers, &Frame::new(plan), &schedule.batches);
+            execute(&mut recorder, plan, &schedule, |recorder, [first, end]| {
+                recorder.copy_out(Slot::Rgba, u64::from(end - first) * row_bytes, u64::from(first) * row_bytes)?;
+                recorder.submit()
+            })?;
+            recorder.read_staging(size, |bytes| image.rgba = bytes.to_vec())?;
+            Ok(image)
+        })
     }
 
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
@@ -76,7 +94,7 @@ impl Renderer for GpuRenderer {
             return Ok(vec![0; len]);
         }
         self.job(|gpu, buffers| {
-            let schedule = Schedule::new(plan, &traits(gpu));
+            let schedule = Schedule::samples(plan, &traits(gpu));
             upload_geometry(gpu, buffers, plan, &schedule)?;
             buffers.staging(gpu, schedule.band_rows as u64 * row_words as u64 * 8)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, &Frame::new(plan), &schedule.batches);
@@ -122,8 +140,43 @@ fn upload_geometry(
     }
     let copies = if plan.hull.is_some() { 2 } else { 1 };
     buffers.reserve(gpu, Slot::Vertices, vertices * copies * 16)?;
+    if !has_visibility(plan) {
+        return Ok(());
+    }
     buffers.reserve(gpu, Slot::Samples, band_sample_bytes(plan, schedule.band_rows))?;
     buffers.reserve(gpu, Slot::Work, WORK_HEAD_BYTES + u64::from(schedule.work_items) * WORK_ITEM_BYTES)?;
+    Ok(())
+}
+
+/// Puts what shade, lines and resolve read on the GPU, and makes room for what they write.
+fn upload_looks(
+    gpu: &Gpu,
+    buffers: &mut Buffers,
+    plan: &DrawPlan<'_>,
+    schedule: &Schedule,
+) -> Result<(), DrawError> {
+    let band_pixels = u64::from(plan.width_px) * u64::from(schedule.band_rows);
+    if has_visibility(plan) {
+        buffers.reserve(gpu, Slot::Colors, band_pixels * 16)?;
+    }
+    if let Some(surface) = &plan.surface {
+        buffers.upload(gpu, Slot::Attributes, &attributes(surface))?;
+        match &surface.normals {
+            Normals::None => {}
+            Normals::Face(normals) => buffers.upload(gpu, Slot::Normals, bytemuck::cast_slice(normals))?,
+            Normals::Vertex { values, triangles } => {
+                buffers.upload(gpu, Slot::Normals, bytemuck::cast_slice(values))?;
+                buffers.upload(gpu, Slot::NormalTriangles, bytemuck::cast_slice(triangles))?;
+            }
+        }
+    }
+    if let Some(lines) = &plan.lines {
+        buffers.upload(gpu, Slot::Edges, bytemuck::cast_slice(&lines.edges))?;
+        buffers.upload(gpu, Slot::InkTable, bytemuck::cast_slice(&ink_table()))?;
+        buffers.reserve(gpu, Slot::Ink, band_pixels * 4)?;
+    }
+    buffers.upload(gpu, Slot::Thresholds, bytemuck::cast_slice(&srgb8_thresholds()))?;
+    buffers.reserve(gpu, Slot::Rgba, band_pixels * 4)?;
     Ok(())
 }
 
@@ -140,7 +193,7 @@ fn execute<'a>(
 ) -> Result<(), DrawError> {
     for step in &schedule.steps {
         match *step {
-            Step::ClearBand => recorder.clear(Slot::Samples, band_sample_bytes(plan, schedule.band_rows))?,
+            Step::ClearBand => clear_band(recorder, plan, schedule.band_rows)?,
             Step::ClearWork => recorder.clear(Slot::Work, 8)?,
             Step::Dispatch { stage, batch, workgroups } => recorder.dispatch(stage, batch, workgroups)?,
             Step::Tiles { stage, batch } if schedule.tiles.in_rounds => {
@@ -150,6 +203,16 @@ fn execute<'a>(
             Step::Submit => recorder.submit()?,
             Step::EndBand { row_first, row_end } => end_band(recorder, [row_first, row_end])?,
         }
+    }
+    Ok(())
+}
+
+fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, rows: u32) -> Result<(), DrawError> {
+    if has_visibility(plan) {
+        recorder.clear(Slot::Samples, band_sample_bytes(plan, rows))?;
+    }
+    if plan.lines.is_some() {
+        recorder.clear(Slot::Ink, u64::from(plan.width_px) * u64::from(rows) * 4)?;
     }
     Ok(())
 }

@@ -85,8 +85,9 @@ impl<'a> Recorder<'a> {
     /// Draws what the work list holds: reads how long it is, then runs the kernel in rounds of known length.
     pub fn tiles_in_rounds(&mut self, stage: Stage, batch: &Batch, tiles: &Tiles) -> Result<(), DrawError> {
         let mut counts = [0; 2];
-        self.copy_out(Slot::Work, 8, 0)?;
-        self.read_staging(8, |bytes| counts = bytemuck::pod_read_unaligned(bytes))?;
+        let (work, to) = (self.buffers.storage(self.gpu, Slot::Work)?.clone(), self.buffers.counts(self.gpu).clone());
+        self.encoder().copy_buffer_to_buffer(&work, 0, &to, 0, Some(8));
+        self.read(&to, 8, |bytes| counts = bytemuck::pod_read_unaligned(bytes))?;
         let [large, huge] = counts.map(|count: u32| count.min(batch.capacity));
         for [large, huge] in tiles.rounds(large, huge) {
             let range = Batch {
@@ -137,10 +138,15 @@ impl<'a> Recorder<'a> {
 
     /// Submits, waits, and lends the first `size` bytes of the staging buffer to `read`.
     pub fn read_staging(&mut self, size: u64, read: impl FnOnce(&[u8])) -> Result<(), DrawError> {
+        match self.buffers.staging.clone() {
+            Some(staging) => self.read(&staging, size, read),
+            None => Ok(()),
+        }
+    }
+
+    fn read(&mut self, staging: &wgpu::Buffer, size: u64, read: impl FnOnce(&[u8])) -> Result<(), DrawError> {
         self.submit()?;
-        let (Some(submission), Some(staging)) = (self.in_flight.take(), self.buffers.staging.clone()) else {
-            return Ok(());
-        };
+        let Some(submission) = self.in_flight.take() else { return Ok(()) };
         let (sender, mapped) = mpsc::channel();
         staging.map_async(wgpu::MapMode::Read, 0..size, move |result| {
             // A job that gave up does not listen any more.

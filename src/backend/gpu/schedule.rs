@@ -6,7 +6,7 @@
 
 use super::params::{Batch, faces_code};
 use super::stages::{Stage, Write};
-use crate::plan::{DrawPlan, Faces};
+use crate::plan::{DrawPlan, Faces, LinePass};
 
 /// Largest buffer that depends on the picture's size, bytes.
 const BAND_BYTES: u64 = 64 << 20;
@@ -22,6 +22,12 @@ const PIECES_MAX: u32 = 6;
 pub const WORK_HEAD_BYTES: u64 = 16;
 /// See [`WORK_HEAD_BYTES`].
 pub const WORK_ITEM_BYTES: u64 = 48;
+
+/// Edges a dispatch.
+const EDGE_CHUNK: u32 = 1 << 20;
+
+/// Threads of a workgroup, in every kernel.
+const WORKGROUP: u32 = 64;
 
 /// What a device allows, and which way it goes.
 #[derive(Clone, Copy, Debug)]
@@ -141,8 +147,17 @@ pub fn has_visibility(plan: &DrawPlan<'_>) -> bool {
 }
 
 impl Schedule {
-    /// The commands for `plan`.
-    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits) -> Self {
+    /// The commands for a picture of `plan`.
+    pub fn picture(plan: &DrawPlan<'_>, device: &DeviceTraits) -> Self {
+        Self::new(plan, device, true)
+    }
+
+    /// The commands for the visibility buffer of `plan` alone.
+    pub fn samples(plan: &DrawPlan<'_>, device: &DeviceTraits) -> Self {
+        Self::new(plan, device, false)
+    }
+
+    fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, picture: bool) -> Self {
         let row_bytes = u64::from(plan.width_px) * pixel_bytes(plan);
         let band_bytes = BAND_BYTES.min(device.binding_bytes_max);
         let band_rows = (band_bytes / row_bytes.max(1)).clamp(1, u64::from(plan.height_px.max(1))) as u32;
@@ -152,7 +167,12 @@ impl Schedule {
         for row_first in (0..plan.height_px).step_by(band_rows as usize) {
             let rows = [row_first, plan.height_px.min(row_first + band_rows)];
             schedule.steps.push(Step::ClearBand);
-            schedule.visibility(plan, device, rows);
+            if has_visibility(plan) {
+                schedule.visibility(plan, device, rows);
+            }
+            if picture {
+                schedule.picture_stages(plan, device, rows);
+            }
             schedule.steps.push(Step::EndBand { row_first, row_end: rows[1] });
         }
         schedule
@@ -210,8 +230,33 @@ impl Schedule {
         }
     }
 
+    /// What follows visibility, for a band.
+    fn picture_stages(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2]) {
+        let count = plan.width_px * (rows[1] - rows[0]);
+        let pixels = Batch { count, row_first: rows[0], row_end: rows[1], ..Batch::default() };
+        if has_visibility(plan) {
+            self.dispatch(device, Stage::Shade, count, pixels);
+        }
+        if let Some(lines) = &plan.lines {
+            let edges_per_group = edges_per_group(plan, lines, device);
+            let edges = lines.edges.len() as u32;
+            for first in (0..edges).step_by(EDGE_CHUNK as usize) {
+                let count = EDGE_CHUNK.min(edges - first);
+                let batch = Batch { first, count, edges_per_group, ..pixels };
+                self.dispatch_groups(device, Stage::Lines, count.div_ceil(edges_per_group), batch);
+                if edges > EDGE_CHUNK {
+                    self.steps.push(Step::Submit);
+                }
+            }
+        }
+        self.dispatch(device, Stage::Resolve, count, pixels);
+    }
+
     fn dispatch(&mut self, device: &DeviceTraits, stage: Stage, threads: u32, batch: Batch) {
-        let workgroups = threads.div_ceil(64);
+        self.dispatch_groups(device, stage, threads.div_ceil(WORKGROUP), batch);
+    }
+
+    fn dispatch_groups(&mut self, device: &DeviceTraits, stage: Stage, workgroups: u32, batch: Batch) {
         if workgroups > 0 {
             let x = workgroups.min(device.workgroups_max);
             self.steps.push(Step::Dispatch {
@@ -222,6 +267,19 @@ impl Schedule {
             self.batches.push(batch);
         }
     }
+}
+
+/// Edges that a workgroup draws: all its threads draw the long ones together, each one's share of which is bounded.
+fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> u32 {
+    if !device.loops_are_limited {
+        return WORKGROUP;
+    }
+    let reach = f64::from(0.5 * lines.width_px + 0.5 * lines.smoothing_px + 1.0);
+    let side = f64::from(plan.width_px.max(plan.height_px));
+    // In every eighth row, every eighth column of what is in reach, and the samples of each pixel.
+    let pixels = (side + 2.0 * reach) / 8.0 * (2.0 * reach / 8.0 + 2.0) + side / 8.0;
+    let iterations = pixels * f64::from(plan.samples + 2);
+    (ITERATIONS_MAX as f64 / iterations).clamp(1.0, f64::from(WORKGROUP)) as u32
 }
 
 /// Bytes a pixel of the largest buffer that holds a band.

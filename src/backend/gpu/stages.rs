@@ -20,6 +20,12 @@ pub enum Stage {
         /// As above.
         write: Write,
     },
+    /// Samples to colours.
+    Shade,
+    /// Edges to ink.
+    Lines,
+    /// Colours and ink to bytes.
+    Resolve,
 }
 
 /// How a visibility kernel writes samples.
@@ -53,10 +59,19 @@ pub enum Slot {
     Vertices,
     Samples,
     Work,
+    Normals,
+    NormalTriangles,
+    Attributes,
+    Colors,
+    Edges,
+    Ink,
+    InkTable,
+    Thresholds,
+    Rgba,
 }
 
 /// Number of [`Slot`]s.
-pub const SLOTS: usize = 6;
+pub const SLOTS: usize = 15;
 
 /// Whether a kernel writes to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,6 +149,28 @@ impl Stage {
                 (Slot::Work, ReadWrite),
             ],
             Self::VisibilityTile { .. } => &[(Slot::Samples, ReadWrite), (Slot::Work, Read)],
+            Self::Shade => &[
+                (Slot::Positions, Read),
+                (Slot::Triangles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, Read),
+                (Slot::Normals, Read),
+                (Slot::NormalTriangles, Read),
+                (Slot::Attributes, Read),
+                (Slot::Colors, ReadWrite),
+            ],
+            Self::Lines => &[
+                (Slot::Positions, Read),
+                (Slot::Triangles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, Read),
+                (Slot::Edges, Read),
+                (Slot::Ink, ReadWrite),
+                (Slot::InkTable, Read),
+            ],
+            Self::Resolve => {
+                &[(Slot::Colors, Read), (Slot::Ink, Read), (Slot::Thresholds, Read), (Slot::Rgba, ReadWrite)]
+            }
         }
     }
 
@@ -144,6 +181,9 @@ impl Stage {
             Self::Visibility { .. } => "visibility",
             Self::Clip => "clip",
             Self::VisibilityTile { .. } => "visibility_tile",
+            Self::Shade => "shade",
+            Self::Lines => "lines",
+            Self::Resolve => "resolve",
         }
     }
 
@@ -161,6 +201,9 @@ impl Stage {
                 let kernel = include_str!("../../../shaders/visibility_tile.wgsl");
                 [COMMON, TRIANGLE, SAMPLES, emit(write), kernel].concat()
             }
+            Self::Shade => [COMMON, TRIANGLE, include_str!("../../../shaders/shade.wgsl")].concat(),
+            Self::Lines => [COMMON, TRIANGLE, PLANES, include_str!("../../../shaders/lines.wgsl")].concat(),
+            Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
         }
     }
 

@@ -1,0 +1,60 @@
+// Stage 5, a pixel: surface over background, ink over both, to sRGB bytes. Twin of src/backend/cpu/resolve.rs.
+
+@group(1) @binding(9) var<storage, read> colors: array<vec4<f32>>;
+@group(1) @binding(11) var<storage, read> ink: array<u32>;
+// thresholds[k] is the smallest linear value that is stored as k + 1 or more.
+@group(1) @binding(13) var<storage, read> thresholds: array<f32>;
+@group(1) @binding(14) var<storage, read_write> rgba: array<u32>;
+
+// Ink of full coverage.
+const INK_FULL: u32 = 98304u;
+
+@compute @workgroup_size(64)
+fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = gid.x + gid.y * groups.x * 64u;
+    if i >= batch.count {
+        return;
+    }
+    var c = frame.background;
+    if has(SURFACE | HULL) {
+        let color = colors[i];
+        c = color + frame.background * (1.0 - color.w);
+    }
+    if has(LINES) {
+        let cover = coverage(ink[i]);
+        c = cover * frame.line_color + c * (1.0 - cover * frame.line_color.w);
+    }
+    rgba[i] = encode(c);
+}
+
+// Ink back to coverage, 0 to 1.
+fn coverage(v: u32) -> f32 {
+    if v >= INK_FULL {
+        return 1.0;
+    }
+    return 1.0 - exp2(f32(v) * (-1.0 / 4096.0));
+}
+
+fn encode(c: vec4<f32>) -> u32 {
+    if c.w <= 0.0 {
+        return 0u;
+    }
+    var color = c.xyz;
+    var alpha = 255u;
+    if c.w < 1.0 {
+        color = color * (1.0 / c.w);
+        alpha = u32(c.w * 255.0 + 0.5);
+    }
+    return srgb(color.x) | (srgb(color.y) << 8u) | (srgb(color.z) << 16u) | (alpha << 24u);
+}
+
+// How many thresholds are not above v.
+fn srgb(v: f32) -> u32 {
+    var byte = 0u;
+    for (var step = 128u; step > 0u; step = step >> 1u) {
+        if thresholds[byte + step - 1u] <= v {
+            byte += step;
+        }
+    }
+    return byte;
+}
