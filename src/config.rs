@@ -3,7 +3,11 @@
 //!
 //! A new setting is a field of [`Config`], its default, and a line in [`SETTINGS`].
 
+mod hardware;
+
 use std::path::PathBuf;
+
+pub use hardware::why_no_gpu;
 
 use crate::limits::{BackendChoice, Limits};
 use crate::request::{IMAGE_PX_MAX, Words, word_for, words_of};

@@ -19,6 +19,7 @@ mod jobs;
 mod mesh_files;
 mod raster;
 mod scenes;
+mod select;
 mod server;
 mod shapes;
 mod shared;

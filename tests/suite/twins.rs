@@ -495,5 +495,8 @@ fn assert_close(cpu: &Image, gpu: &Image, tolerance: Tolerance, what: &str) {
     println!("{what}: {differing} pixels differ, by {worst} at most");
     let first = pairs().position(|(a, b)| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > tolerance.channel));
     let at = first.map(|i| (i as u32 % cpu.width_px, i as u32 / cpu.width_px));
-    assert!(worst <= tolerance.channel && share <= tolerance.pixels, "{what}: {differing} pixels ({share}), by {worst}; first at {at:?}");
+    assert!(
+        worst <= tolerance.channel && share <= tolerance.pixels,
+        "{what}: {differing} pixels ({share}), by {worst}; first at {at:?}"
+    );
 }

@@ -100,7 +100,16 @@ impl Gpu {
         let features = if int64_atomics { vec!["int64-atomics"] } else { vec![] };
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
-        Ok(Self { device, queue, stages: Stages::default(), limits, int64_atomics, info, lost, polling: Mutex::new(()) })
+        Ok(Self {
+            device,
+            queue,
+            stages: Stages::default(),
+            limits,
+            int64_atomics,
+            info,
+            lost,
+            polling: Mutex::new(()),
+        })
     }
 
     /// What was opened.

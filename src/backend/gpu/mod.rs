@@ -149,12 +149,7 @@ fn upload_geometry(
 }
 
 /// Puts what shade, lines and resolve read on the GPU, and makes room for what they write.
-fn upload_looks(
-    gpu: &Gpu,
-    buffers: &mut Buffers,
-    plan: &DrawPlan<'_>,
-    schedule: &Schedule,
-) -> Result<(), DrawError> {
+fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
     let band_pixels = u64::from(plan.width_px) * u64::from(schedule.band_rows);
     if has_visibility(plan) {
         buffers.reserve(gpu, Slot::Colors, band_pixels * 16)?;

@@ -135,12 +135,9 @@ impl Stage {
         use Access::{Read, ReadWrite};
         match self {
             Self::Transform => &[(Slot::Positions, Read), (Slot::HullNormals, Read), (Slot::Vertices, ReadWrite)],
-            Self::Visibility { .. } => &[
-                (Slot::Triangles, Read),
-                (Slot::Vertices, Read),
-                (Slot::Samples, ReadWrite),
-                (Slot::Work, ReadWrite),
-            ],
+            Self::Visibility { .. } => {
+                &[(Slot::Triangles, Read), (Slot::Vertices, Read), (Slot::Samples, ReadWrite), (Slot::Work, ReadWrite)]
+            }
             Self::Clip => &[
                 (Slot::Positions, Read),
                 (Slot::HullNormals, Read),
