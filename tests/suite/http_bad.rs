@@ -206,7 +206,13 @@ fn a_connection_too_many_is_told_so() {
     let server = Server::start(&["--connections", "2"]);
     let held = [server.connect(), server.connect()];
     let began = Instant::now();
-    while server.send("GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", b"").status != 503 {
+    loop {
+        let answer = server.send("GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", b"");
+        if answer.status == 503 {
+            answer.problem(503, "connections_full");
+            assert!(answer.header("retry-after").is_some());
+            break;
+        }
         assert!(began.elapsed() < PATIENCE);
     }
     drop(held);
