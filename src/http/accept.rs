@@ -117,7 +117,7 @@ async fn speaks_in_time(stream: &TcpStream, limit: Duration) -> bool {
 }
 
 /// One connection too many: says so, without reading what it wants, and hangs up.
-async fn refuse(mut stream: TcpStream) {
+async fn refuse(stream: TcpStream) {
     let detail = "as many connections are open as may be; try again shortly";
     let error = ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "connections_full", detail).flag(Some("--connections"));
     let request_id = uuid::Uuid::now_v7().to_string();

@@ -59,7 +59,7 @@ pub async fn result(State(app): State<Arc<App>>, Path(id): Path<String>) -> Resu
     let conflict = |code, detail| ApiError::new(StatusCode::CONFLICT, code, detail);
     match job.state() {
         JobState::Done(finished) => Ok(render::picture(&finished)),
-        JobState::Failed(failure) => Err(ApiError::from(&*failure)),
+        JobState::Failed(failure) => Err(render::failed(&job, &failure)),
         JobState::Queued | JobState::Running => {
             Err(conflict("not_finished", "the job has not ended yet; ask again shortly").retry_after(1))
         }

@@ -10,7 +10,7 @@ use super::app::App;
 use super::dto::media_type;
 use super::error::ApiError;
 use super::{jobs, negotiate, receive};
-use crate::jobs::{Finished, Job, Jobs, State as JobState};
+use crate::jobs::{Failure, Finished, Job, Jobs, State as JobState};
 
 /// Draws while the client waits.
 pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Response, ApiError> {
@@ -26,7 +26,7 @@ pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Respo
     let waiting = Waiting { job: app.jobs.submit(work, false)?, jobs: app.jobs.clone() };
     match waiting.job.ended().await {
         JobState::Done(finished) => Ok(picture(&finished)),
-        JobState::Failed(failure) => Err(ApiError::from(&*failure)),
+        JobState::Failed(failure) => Err(failed(&waiting.job, &failure)),
         JobState::Queued | JobState::Running | JobState::Cancelled => Err(ApiError::internal()),
     }
 }
@@ -41,6 +41,15 @@ impl Drop for Waiting {
     fn drop(&mut self) {
         self.jobs.cancel(&self.job);
     }
+}
+
+/// The answer for a job without a picture. What the answer must not say goes to the log, under the request's id.
+pub fn failed(job: &Job, failure: &Failure) -> ApiError {
+    let error = ApiError::from(failure);
+    if error.status.is_server_error() {
+        tracing::error!(job = %job.id, %failure, "a job failed");
+    }
+    error
 }
 
 /// The picture, with what there is to say about it.
