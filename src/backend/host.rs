@@ -4,86 +4,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use super::gpu::{AtomicsChoice, Gpu, GpuInfo, GpuKind, GpuRenderer};
+use super::DrawError;
+use super::device::{GpuDevice, GpuState, GpuStatus, HardwareHint, Opener, let_go};
+use super::gpu::{AtomicsChoice, Gpu, GpuKind};
 use super::probe::probe;
-use super::{DrawError, Renderer};
 
 /// Jobs in a row that lost the device, after which `auto` goes on with the CPU.
 const LOSSES_MAX: u32 = 3;
-
-/// What is known about the machine before any driver is loaded. Loading Vulkan to find out costs time, and a software one
-/// brings a whole compiler with it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum HardwareHint {
-    /// There cannot be a hardware GPU.
-    None {
-        /// How that is known.
-        reason: String,
-    },
-    /// There may be one.
-    Maybe,
-}
-
-impl HardwareHint {
-    /// There may be one, unless a reason is known why not.
-    pub fn unless(reason: Option<String>) -> Self {
-        reason.map_or(Self::Maybe, |reason| Self::None { reason })
-    }
-}
-
-/// An opened device, as far as choosing a back-end goes.
-pub trait GpuDevice: Send + Sync {
-    /// What was opened.
-    fn info(&self) -> &GpuInfo;
-
-    /// Whether it is a processor that plays GPU.
-    fn is_software(&self) -> bool;
-
-    /// Why it is gone, if it is.
-    fn lost(&self) -> Option<&str>;
-
-    /// A renderer on it, for one thread.
-    fn renderer(self: Arc<Self>) -> Box<dyn Renderer>;
-}
-
-/// Opens a device.
-pub type Opener = dyn Fn(GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> + Send + Sync;
-
-/// How it stands with the GPU.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GpuStatus {
-    /// In one word.
-    pub state: GpuState,
-    /// What was opened last.
-    pub info: Option<GpuInfo>,
-    /// Why there is no GPU, or why `auto` means the CPU in spite of it.
-    pub reason: Option<String>,
-}
-
-/// How it stands with the GPU, in one word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GpuState {
-    /// No job needed it yet.
-    NotOpened,
-    /// It passed the probe.
-    Ready,
-    /// There is none.
-    None,
-    /// There is one that cannot be used.
-    Failed,
-}
-
-impl GpuState {
-    /// The word used in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::NotOpened => "not opened",
-            Self::Ready => "ready",
-            Self::None => "none",
-            Self::Failed => "failed",
-        }
-    }
-}
 
 /// The process's one GPU, shared by all workers.
 pub struct GpuHost {
@@ -281,29 +208,6 @@ impl GpuHost {
         // A driver that makes wgpu panic must cost the GPU, not the job.
         catch_unwind(AssertUnwindSafe(attempt))
             .unwrap_or_else(|_| Err(OpenError::Unusable("opening the GPU panicked; the log has more".to_owned())))
-    }
-}
-
-/// Drops what belongs to a device that may be gone: wgpu may panic then, which is nobody's concern any more.
-pub(super) fn let_go<T>(thing: T) {
-    let _ = catch_unwind(AssertUnwindSafe(|| drop(thing)));
-}
-
-impl GpuDevice for Gpu {
-    fn info(&self) -> &GpuInfo {
-        Self::info(self)
-    }
-
-    fn is_software(&self) -> bool {
-        Self::info(self).device_type == "software"
-    }
-
-    fn lost(&self) -> Option<&str> {
-        Self::lost(self)
-    }
-
-    fn renderer(self: Arc<Self>) -> Box<dyn Renderer> {
-        Box::new(GpuRenderer::new(self))
     }
 }
 

@@ -4,12 +4,14 @@
 //! Architecture invariant: nothing here knows a mesh or a scene, and the two back-ends do not know each other.
 
 pub mod cpu;
+mod device;
 pub mod gpu;
 mod host;
 pub mod probe;
 mod select;
 
-pub use host::{GpuDevice, GpuHost, GpuState, GpuStatus, HardwareHint, Opener};
+pub use device::{GpuDevice, GpuState, GpuStatus, HardwareHint, Opener};
+pub use host::GpuHost;
 pub use select::{Backends, Chosen};
 
 use crate::image::Image;

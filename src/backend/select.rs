@@ -3,8 +3,9 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 
+use super::device::{GpuDevice, let_go};
 use super::gpu::GpuKind;
-use super::host::{GpuDevice, GpuHost, let_go};
+use super::host::GpuHost;
 use super::{BackendKind, DrawError, Renderer, cpu};
 use crate::image::Image;
 use crate::limits::{BackendChoice, Deadline};

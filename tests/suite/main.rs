@@ -23,6 +23,7 @@ mod models;
 mod raster;
 mod scenes;
 mod select;
+mod select_fakes;
 mod server;
 mod shapes;
 mod shared;
