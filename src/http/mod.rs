@@ -34,6 +34,9 @@ use app::App;
 /// What jobs may take beyond their deadline before the process ends without them.
 const DRAIN_GRACE: Duration = Duration::from_secs(5);
 
+/// How long workers without work may take to put their renderers down.
+const WORKERS_GRACE: Duration = Duration::from_secs(2);
+
 /// Why the daemon did not start.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
@@ -97,6 +100,7 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     };
     let header_timeout = Duration::from_millis(config.header_timeout_ms);
     accept::run(listener, router, config.connections as usize, header_timeout, stop).await;
+    app.jobs.join(WORKERS_GRACE);
     tracing::info!("ended");
     Ok(())
 }

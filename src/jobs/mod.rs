@@ -18,8 +18,9 @@ pub use bodies::{Bodies, BodiesFull, Reservation};
 pub use job::{Failure, Finished, Job, JobId, State, Timings, Work};
 pub use worker::{Engine, Renderer, pipeline_engine};
 
-use std::sync::Arc;
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use board::Board;
 
@@ -73,6 +74,7 @@ pub struct Load {
 #[derive(Clone)]
 pub struct Jobs {
     board: Arc<Board>,
+    workers: Arc<Mutex<Vec<JoinHandle<()>>>>,
 }
 
 impl Jobs {
@@ -80,14 +82,15 @@ impl Jobs {
     pub fn start(settings: Settings, engine: Engine) -> std::io::Result<Self> {
         let workers = settings.workers.max(1);
         let board = Arc::new(Board::new(settings));
+        let mut threads = Vec::new();
         for index in 0..workers {
             let (board, engine) = (board.clone(), engine.clone());
             let name = format!("render-{index}");
-            std::thread::Builder::new().name(name).spawn(move || worker::run(&board, &engine))?;
+            threads.push(std::thread::Builder::new().name(name).spawn(move || worker::run(&board, &engine))?);
         }
         let ticking = board.clone();
         std::thread::Builder::new().name("job-clock".into()).spawn(move || clock::run(&ticking))?;
-        Ok(Self { board })
+        Ok(Self { board, workers: Arc::new(Mutex::new(threads)) })
     }
 
     /// Queues work. A kept job can be found again by its id until its result expires; another lives as long as its handle.
@@ -125,5 +128,17 @@ impl Jobs {
         let mut outstanding = self.board.outstanding();
         // The sender lives in the board, so waiting cannot fail while self is there.
         let _ = outstanding.wait_for(|&count| count == 0).await;
+    }
+
+    /// Waits, after [`Jobs::drain`], until the workers have ended and dropped their renderers; no longer than `patience`,
+    /// since a worker may be stuck. A GPU driver that is unloaded under a thread that still owns its device crashes.
+    pub fn join(&self, patience: Duration) {
+        let until = Instant::now() + patience;
+        let mut workers = self.workers.lock().unwrap_or_else(PoisonError::into_inner);
+        while workers.iter().any(|worker| !worker.is_finished()) && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        // Finished or not, there is nothing more to do about them: the process is about to end.
+        workers.clear();
     }
 }

@@ -1,6 +1,6 @@
 //! What to draw, already decided. Back-ends only fill: they see slices and numbers, never a mesh or a scene.
 //!
-//! [`build`] makes a [`DrawPlan`] from a mesh and a spec; everything that a scene does not need is left out there, and
+//! [`build()`] makes a [`DrawPlan`] from a mesh and a spec; everything that a scene does not need is left out there, and
 //! each omission is written down in [`DrawPlan::skips`].
 
 mod build;

@@ -5,8 +5,8 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 use super::clip::clip_triangle;
-use super::isa::{Isa, dispatch};
-use super::resolve::{SrgbEncoder, resolve};
+use super::isa::dispatch;
+use super::resolve::resolve;
 use super::transform::{ScreenVertex, homogeneous};
 use super::visibility::{self, NOTHING, SampleBand, Setup, area, axis_bounds, is_wanted};
 use super::{CHUNK, Stages, lines, shade};
@@ -169,18 +169,10 @@ impl ScratchPool {
 }
 
 /// Draws band number `band` into its rows of the picture.
-pub fn draw(
-    isa: Isa,
-    stages: &Stages<'_>,
-    scratch: &mut BandScratch,
-    bins: &Bins,
-    band: usize,
-    srgb: &SrgbEncoder,
-    rgba: &mut [u8],
-) {
-    let plan = stages.plan;
+pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, rgba: &mut [u8]) {
+    let (plan, isa) = (stages.plan, stages.isa);
     let pixels = rgba.len() / 4;
-    fill_samples(isa, stages, scratch, bins, band);
+    fill_samples(stages, scratch, bins, band);
     scratch.colors.clear();
     scratch.colors.resize(pixels, [0.0; 4]);
     if plan.surface.is_some() || plan.hull.is_some() {
@@ -192,19 +184,12 @@ pub fn draw(
         draw_edges(isa, stages, bins, band, &scratch.samples, &mut scratch.ink);
     }
     let ink = plan.lines.as_ref().map(|_| scratch.ink.as_slice());
-    resolve(plan, srgb, &scratch.colors, ink, rgba);
+    resolve(plan, stages.srgb, &scratch.colors, ink, rgba);
 }
 
 /// Draws band number `band` of the visibility buffer alone, as [`Renderer::draw_visibility`](super::Renderer) says.
-pub fn draw_visibility(
-    isa: Isa,
-    stages: &Stages<'_>,
-    scratch: &mut BandScratch,
-    bins: &Bins,
-    band: usize,
-    words: &mut [u64],
-) {
-    fill_samples(isa, stages, scratch, bins, band);
+pub fn draw_visibility(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, words: &mut [u64]) {
+    fill_samples(stages, scratch, bins, band);
     let samples = &scratch.samples;
     for (i, word) in words.iter_mut().enumerate() {
         let (pixel, s) = (i as u32 / samples.samples, i as u32 % samples.samples);
@@ -216,14 +201,14 @@ pub fn draw_visibility(
 }
 
 /// Moves the scratch to the band and fills its samples, unless nothing in the plan reads them.
-fn fill_samples(isa: Isa, stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
+fn fill_samples(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
     let plan = stages.plan;
     let first_row = band as u32 * scratch.rows;
     scratch.samples.first_row = first_row;
     scratch.samples.rows = scratch.rows.min(plan.height_px - first_row);
     if plan.surface.is_some() || plan.hull.is_some() {
         scratch.samples.clear();
-        draw_triangles(isa, stages, bins, band, &mut scratch.samples);
+        draw_triangles(stages.isa, stages, bins, band, &mut scratch.samples);
     }
 }
 

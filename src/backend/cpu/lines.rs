@@ -11,7 +11,7 @@ use super::visibility::{NOTHING, SampleBand, Setup, area};
 use crate::plan::{Edge, LinePass};
 
 /// Farthest from the middle of a unit box to its corner.
-const BOX_RADIUS: f32 = 0.707_106_8;
+const BOX_RADIUS: f32 = std::f32::consts::FRAC_1_SQRT_2;
 
 /// An edge on screen, pixels from the picture's upper left corner.
 #[derive(Clone, Copy, Debug)]
@@ -111,7 +111,7 @@ pub fn draw(
                 continue;
             }
             let level = if lines.hide_behind_surface {
-                let visible = visible_samples(stages, edge, &segment, t, band, planes, [x as u32, y as u32]);
+                let visible = visible_samples(stages, edge, &segment, t, band.pixel(x as u32, y as u32), planes);
                 (coverage * visible + band.samples / 2) / band.samples
             } else {
                 coverage
@@ -207,17 +207,14 @@ fn visible_samples(
     edge: &Edge,
     segment: &Segment,
     t: f32,
-    band: &SampleBand,
+    (ids, depths): (&[u32], &[f32]),
     planes: &mut PlaneCache,
-    at: [u32; 2],
 ) -> u32 {
     let depth = segment.depth[0] + t * (segment.depth[1] - segment.depth[0]);
     let mut count = 0;
     let mut last = (NOTHING, true);
-    for s in 0..band.samples {
-        let i = band.index(at[0], at[1], s);
-        let id = band.ids[i];
-        let nothing_nearer = id == NOTHING || depth >= band.depth[i] || id == edge.faces[0] || id == edge.faces[1];
+    for (&id, &nearest) in ids.iter().zip(depths) {
+        let nothing_nearer = id == NOTHING || depth >= nearest || id == edge.faces[0] || id == edge.faces[1];
         if !nothing_nearer && id != last.0 {
             last = (id, !planes.get(stages, id).hides(edge, segment, t, depth));
         }

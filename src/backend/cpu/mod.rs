@@ -3,6 +3,9 @@
 //! Stages, each a file: [`transform`] (with [`clip`] where needed), [`visibility`], [`shade`], [`lines`], [`resolve`]. The picture is cut
 //! into bands of rows that fit a core's cache; threads take bands, and nothing a band draws depends on another.
 
+// Loops over lanes and corners walk several arrays at once; an index says that best.
+#![allow(clippy::needless_range_loop)]
+
 mod bands;
 mod clip;
 mod isa;
@@ -34,7 +37,7 @@ pub struct CpuRenderer {
     vertices: Vec<ScreenVertex>,
     hull_vertices: Vec<ScreenVertex>,
     scratch: bands::ScratchPool,
-    srgb: std::sync::Arc<SrgbEncoder>,
+    srgb: SrgbEncoder,
     ink_table: [u32; 1024],
 }
 
@@ -43,6 +46,8 @@ pub struct Stages<'a> {
     plan: &'a DrawPlan<'a>,
     vertices: &'a [ScreenVertex],
     hull_vertices: &'a [ScreenVertex],
+    isa: Isa,
+    srgb: &'a SrgbEncoder,
     ink_table: &'a [u32; 1024],
 }
 
@@ -63,7 +68,7 @@ impl CpuRenderer {
             vertices: Vec::new(),
             hull_vertices: Vec::new(),
             scratch: bands::ScratchPool::default(),
-            srgb: std::sync::Arc::new(SrgbEncoder::new()),
+            srgb: SrgbEncoder::new(),
             ink_table: ink_table(),
         }
     }
@@ -87,7 +92,14 @@ impl CpuRenderer {
     }
 
     fn stages<'a>(&'a self, plan: &'a DrawPlan<'a>) -> Stages<'a> {
-        Stages { plan, vertices: &self.vertices, hull_vertices: &self.hull_vertices, ink_table: &self.ink_table }
+        Stages {
+            plan,
+            vertices: &self.vertices,
+            hull_vertices: &self.hull_vertices,
+            isa: self.isa,
+            srgb: &self.srgb,
+            ink_table: &self.ink_table,
+        }
     }
 
     /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside it.
@@ -138,20 +150,13 @@ impl Stages<'_> {
 impl Renderer for CpuRenderer {
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
         let mut rgba = vec![0_u8; plan.width_px as usize * plan.height_px as usize * 4];
-        let isa = self.isa;
-        let srgb = self.srgb.clone();
-        self.draw_bands(plan, deadline, &mut rgba, |stages, scratch, bins, band, out| {
-            bands::draw(isa, stages, scratch, bins, band, &srgb, out);
-        })?;
+        self.draw_bands(plan, deadline, &mut rgba, bands::draw)?;
         Ok(Image { width_px: plan.width_px, height_px: plan.height_px, rgba })
     }
 
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
         let mut words = vec![0_u64; plan.width_px as usize * plan.height_px as usize * plan.samples as usize];
-        let isa = self.isa;
-        self.draw_bands(plan, deadline, &mut words, |stages, scratch, bins, band, out| {
-            bands::draw_visibility(isa, stages, scratch, bins, band, out);
-        })?;
+        self.draw_bands(plan, deadline, &mut words, bands::draw_visibility)?;
         Ok(words)
     }
 

@@ -50,6 +50,16 @@ impl SampleBand {
     }
 }
 
+impl SampleBand {
+    /// Ids and depths of a pixel's samples.
+    #[inline(always)]
+    pub fn pixel(&self, x: u32, y: u32) -> (&[u32], &[f32]) {
+        let first = self.index(x, y, 0);
+        let samples = first..first + self.samples as usize;
+        (&self.ids[samples.clone()], &self.depth[samples])
+    }
+}
+
 /// A triangle, ready to be drawn and to have its depth evaluated.
 #[derive(Clone, Copy, Debug)]
 pub struct Setup {
