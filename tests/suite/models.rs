@@ -34,8 +34,7 @@ fn every_model_is_drawn_in_every_style_alike_on_both_back_ends() {
                 let other = gpu.draw(&plan, &Deadline::default()).unwrap();
                 let like = Likeness::of(&picture, &other);
                 println!("{name:24} {style:10} {like}");
-                let tolerance = if ["wire", "wireframe"].contains(&style) { Tolerance::LINES } else { Tolerance::SURFACE };
-                like.assert(tolerance, &format!("{name}, {style}"));
+                like.assert(Tolerance::TWINS, &format!("{name}, {style}"));
                 compared += 1;
             }
             sheet.add(&picture);

@@ -13,44 +13,29 @@ pub struct Scene {
     pub name: &'static str,
     pub obj: fn() -> String,
     pub keys: &'static [(&'static str, &'static str)],
-    pub kind: Kind,
-}
-
-/// What decides how far two back-ends may differ.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Shaded surfaces and hulls.
-    Surface,
-    /// Lines of any technique over or without a surface.
-    Lines,
 }
 
 const SIZE: (&str, &str) = ("size", "200x160");
 
 /// Every style, both wire techniques, polygons, both outline units, the views, and the awkward cameras.
 pub const SCENES: &[Scene] = &[
-    scene("torus-flat", torus, &[SIZE, ("style", "flat")], Kind::Surface),
-    scene("torus-smooth", torus, &[SIZE, ("style", "smooth")], Kind::Surface),
-    scene("torus-unlit", torus, &[SIZE, ("style", "unlit"), ("surface.color", "c40")], Kind::Surface),
-    scene("torus-wire", torus, &[SIZE, ("style", "wire"), ("wire.edges", "polygons")], Kind::Lines),
-    scene("torus-wire-wide", torus, &[SIZE, ("style", "wire"), ("wire.thickness", "3.5")], Kind::Lines),
-    scene("torus-fwidth", torus, &[SIZE, ("style", "wire"), ("wire.method", "fwidth")], Kind::Lines),
-    scene("torus-wireframe", torus, &[SIZE, ("style", "wireframe"), ("background", "transparent")], Kind::Lines),
-    scene("gear-outline-px", gear, &[SIZE, ("style", "outline"), ("outline.unit", "px")], Kind::Surface),
-    scene("gear-outline-object", gear, &[SIZE, ("style", "outline"), ("outline.thickness", "0.04")], Kind::Surface),
-    scene("gear-hidden-line", gear, &[SIZE, ("style", "hidden-line"), ("view", "front")], Kind::Lines),
-    scene("cube-flat-one-sample", shapes::cube, &[SIZE, ("style", "flat"), ("samples", "1")], Kind::Surface),
-    scene("cube-wire-polygons", shapes::cube, &[SIZE, ("style", "wire"), ("wire.edges", "polygons")], Kind::Lines),
-    scene(
-        "sheet-wire-red",
-        sheet,
-        &[SIZE, ("style", "wire"), ("wire.color", "e02020"), ("view", "right")],
-        Kind::Lines,
-    ),
-    scene("sheet-back-faces", sheet, &[SIZE, ("style", "flat"), ("view", "bottom")], Kind::Surface),
-    scene("sheet-orthographic", sheet, &[SIZE, ("style", "wire"), ("camera.projection", "orthographic")], Kind::Lines),
-    scene("sheet-from-inside", sheet, INSIDE, Kind::Surface),
-    scene("sheet-wire-from-inside", sheet, INSIDE_WIRE, Kind::Lines),
+    scene("torus-flat", torus, &[SIZE, ("style", "flat")]),
+    scene("torus-smooth", torus, &[SIZE, ("style", "smooth")]),
+    scene("torus-unlit", torus, &[SIZE, ("style", "unlit"), ("surface.color", "c40")]),
+    scene("torus-wire", torus, &[SIZE, ("style", "wire"), ("wire.edges", "polygons")]),
+    scene("torus-wire-wide", torus, &[SIZE, ("style", "wire"), ("wire.thickness", "3.5")]),
+    scene("torus-fwidth", torus, &[SIZE, ("style", "wire"), ("wire.method", "fwidth")]),
+    scene("torus-wireframe", torus, &[SIZE, ("style", "wireframe"), ("background", "transparent")]),
+    scene("gear-outline-px", gear, &[SIZE, ("style", "outline"), ("outline.unit", "px")]),
+    scene("gear-outline-object", gear, &[SIZE, ("style", "outline"), ("outline.thickness", "0.04")]),
+    scene("gear-hidden-line", gear, &[SIZE, ("style", "hidden-line"), ("view", "front")]),
+    scene("cube-flat-one-sample", shapes::cube, &[SIZE, ("style", "flat"), ("samples", "1")]),
+    scene("cube-wire-polygons", shapes::cube, &[SIZE, ("style", "wire"), ("wire.edges", "polygons")]),
+    scene("sheet-wire-red", sheet, &[SIZE, ("style", "wire"), ("wire.color", "e02020"), ("view", "right")]),
+    scene("sheet-back-faces", sheet, &[SIZE, ("style", "flat"), ("view", "bottom")]),
+    scene("sheet-orthographic", sheet, &[SIZE, ("style", "wire"), ("camera.projection", "orthographic")]),
+    scene("sheet-from-inside", sheet, INSIDE),
+    scene("sheet-wire-from-inside", sheet, INSIDE_WIRE),
 ];
 
 const INSIDE: &[(&str, &str)] = &[
@@ -68,13 +53,8 @@ const INSIDE_WIRE: &[(&str, &str)] = &[
     ("camera.fov_deg", "80"),
 ];
 
-const fn scene(
-    name: &'static str,
-    obj: fn() -> String,
-    keys: &'static [(&'static str, &'static str)],
-    kind: Kind,
-) -> Scene {
-    Scene { name, obj, keys, kind }
+const fn scene(name: &'static str, obj: fn() -> String, keys: &'static [(&'static str, &'static str)]) -> Scene {
+    Scene { name, obj, keys }
 }
 
 fn torus() -> String {

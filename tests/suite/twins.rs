@@ -5,10 +5,10 @@ use std::sync::{Arc, OnceLock};
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
 use meshsnap::backend::{DrawError, Renderer};
-use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 
 use crate::golden;
+use crate::likeness::{Likeness, Tolerance};
 use crate::scenes::{self, SCENES};
 use crate::shapes;
 
@@ -34,21 +34,6 @@ pub fn gpus() -> Option<&'static [Arc<Gpu>; 2]> {
     opened.as_ref()
 }
 
-/// How far a scene's pictures may lie apart.
-#[derive(Clone, Copy, Debug)]
-struct Tolerance {
-    /// Largest difference of a channel, of 255.
-    channel: u8,
-    /// Largest share of pixels that differ at all.
-    pixels: f64,
-}
-
-/// ACCURACY.md, goal 8.
-const SURFACE_TOLERANCE: Tolerance = Tolerance { channel: 1, pixels: 0.001 };
-
-/// Coverage runs through square roots and exponentials, which devices round their own way.
-const LINES_TOLERANCE: Tolerance = Tolerance { channel: 1, pixels: 0.01 };
-
 #[test]
 fn pictures_of_the_scenes_agree() {
     if gpus().is_none() {
@@ -58,33 +43,17 @@ fn pictures_of_the_scenes_agree() {
     for scene in SCENES {
         let cpu = golden::draw(scene, &mut CpuRenderer::new(1));
         assert!(cpu.rgba.chunks(4).any(|pixel| pixel != &cpu.rgba[..4]), "{} is blank", scene.name);
-        let tolerance = if scene.kind == scenes::Kind::Lines { LINES_TOLERANCE } else { SURFACE_TOLERANCE };
         for gpu in gpus().unwrap() {
             let mut renderer = GpuRenderer::new(gpu.clone());
             // Twice: the second picture comes from buffers that the first has used.
             for _ in 0..2 {
                 let picture = golden::draw(scene, &mut renderer);
-                assert_close(&cpu, &picture, tolerance, scene.name);
+                Likeness::of(&cpu, &picture).assert(Tolerance::TWINS, scene.name);
                 cases += 1;
             }
         }
     }
     assert_eq!(cases, SCENES.len() * 4);
-}
-
-fn assert_close(cpu: &Image, gpu: &Image, tolerance: Tolerance, what: &str) {
-    assert_eq!((cpu.width_px, cpu.height_px, cpu.rgba.len()), (gpu.width_px, gpu.height_px, gpu.rgba.len()), "{what}");
-    let pairs = || cpu.rgba.chunks_exact(4).zip(gpu.rgba.chunks_exact(4));
-    let worst = cpu.rgba.iter().zip(&gpu.rgba).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);
-    let differing = pairs().filter(|(a, b)| a != b).count();
-    let share = differing as f64 / pairs().count() as f64;
-    println!("{what}: {differing} pixels differ, by {worst} at most");
-    let first = pairs().position(|(a, b)| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > tolerance.channel));
-    let at = first.map(|i| (i as u32 % cpu.width_px, i as u32 / cpu.width_px));
-    assert!(
-        worst <= tolerance.channel && share <= tolerance.pixels,
-        "{what}: {differing} pixels ({share}), by {worst}; first at {at:?}"
-    );
 }
 
 #[test]
@@ -108,7 +77,7 @@ fn long_and_wide_lines_on_large_pictures_agree() {
         let deadline = Deadline::default();
         let cpu = CpuRenderer::new(2).draw(&plan, &deadline).unwrap();
         let gpu = GpuRenderer::new(gpus().unwrap()[0].clone()).draw(&plan, &deadline).unwrap();
-        assert_close(&cpu, &gpu, LINES_TOLERANCE, &format!("{keys:?}"));
+        Likeness::of(&cpu, &gpu).assert(Tolerance::TWINS, &format!("{keys:?}"));
         cases += 1;
     }
     assert_eq!(cases, 4);
@@ -141,7 +110,7 @@ fn a_stopped_job_leaves_a_working_renderer() {
         }
         clock.join().unwrap();
         let image = renderer.draw(&plan, &Deadline::default()).unwrap();
-        assert_close(&want, &image, SURFACE_TOLERANCE, "after a stopped job");
+        Likeness::of(&want, &image).assert(Tolerance::TWINS, "after a stopped job");
     }
     assert!(stopped >= 1);
 }
@@ -158,7 +127,7 @@ fn workers_share_a_device() {
                 for i in 0..SCENES.len() {
                     let scene = &SCENES[(i * 5 + worker) % SCENES.len()];
                     let cpu = golden::draw(scene, &mut CpuRenderer::new(1));
-                    assert_close(&cpu, &golden::draw(scene, &mut renderer), LINES_TOLERANCE, scene.name);
+                    Likeness::of(&cpu, &golden::draw(scene, &mut renderer)).assert(Tolerance::TWINS, scene.name);
                     drawn.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
                 }
             });
