@@ -3,9 +3,12 @@
 //!
 //! A new setting is a field of [`Config`], its default, and a line in [`SETTINGS`].
 
+mod hardware;
 mod settings;
 
 use std::path::PathBuf;
+
+pub use hardware::why_no_gpu;
 
 use crate::limits::{BackendChoice, Limits};
 pub use settings::{Access, SETTINGS, Setting};

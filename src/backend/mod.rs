@@ -5,10 +5,12 @@
 
 pub mod cpu;
 pub mod gpu;
+mod host;
 pub mod probe;
 mod select;
 
-pub use select::{Backends, Chosen, GpuHost};
+pub use host::{GpuDevice, GpuHost, GpuState, GpuStatus, HardwareHint, Opener};
+pub use select::{Backends, Chosen};
 
 use crate::image::Image;
 use crate::limits::{Deadline, Stopped};

@@ -1,20 +1,21 @@
-//! Which back-end draws a job: the choice, the first opening of the GPU, and what happens when it is lost.
+//! Which back-end draws a job, and what happens when the GPU fails it.
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 
+use super::gpu::GpuKind;
+use super::host::{GpuDevice, GpuHost, let_go};
 use super::{BackendKind, DrawError, Renderer, cpu};
 use crate::image::Image;
 use crate::limits::{BackendChoice, Deadline};
 use crate::plan::DrawPlan;
 
-/// The process's one GPU, opened on first need and shared by all workers.
-#[derive(Debug, Default)]
-pub struct GpuHost {}
-
 /// A worker's renderers. Stays on its thread.
 pub struct Backends {
     cpu: cpu::CpuRenderer,
-    _gpu: Arc<GpuHost>,
+    host: Arc<GpuHost>,
+    /// Made with the first picture that the GPU draws here, and the device it is on.
+    gpu: Option<(Box<dyn Renderer>, Arc<dyn GpuDevice>)>,
 }
 
 /// A picture and who drew it.
@@ -28,8 +29,8 @@ pub struct Chosen {
 
 impl Backends {
     /// Renderers for one worker. The CPU path uses up to `threads` threads; no GPU is touched yet.
-    pub fn new(gpu: Arc<GpuHost>, threads: usize) -> Self {
-        Self { cpu: cpu::CpuRenderer::new(threads), _gpu: gpu }
+    pub fn new(host: Arc<GpuHost>, threads: usize) -> Self {
+        Self { cpu: cpu::CpuRenderer::new(threads), host, gpu: None }
     }
 
     /// Draws the plan on the back-end that `choice` means here and now.
@@ -39,8 +40,100 @@ impl Backends {
         plan: &DrawPlan<'_>,
         deadline: &Deadline,
     ) -> Result<Chosen, DrawError> {
-        let _ = choice;
-        let image = self.cpu.draw(plan, deadline)?;
-        Ok(Chosen { image, backend: self.cpu.kind() })
+        match choice {
+            BackendChoice::Cpu => self.draw_on_cpu(plan, deadline),
+            BackendChoice::Gpu => self.draw_on_gpu(GpuKind::Any, plan, deadline),
+            BackendChoice::Auto => match self.draw_on_gpu(GpuKind::Hardware, plan, deadline) {
+                Ok(chosen) => Ok(chosen),
+                Err(DrawError::Stopped(stopped)) => Err(stopped.into()),
+                Err(error) => {
+                    // That there is none is no news: the host said so when it was decided.
+                    if !matches!(error, DrawError::NoGpu(_)) {
+                        tracing::warn!(%error, "the CPU draws this job");
+                    }
+                    self.draw_on_cpu(plan, deadline)
+                }
+            },
+        }
     }
+
+    fn draw_on_cpu(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Chosen, DrawError> {
+        Ok(Chosen { image: self.cpu.draw(plan, deadline)?, backend: self.cpu.kind() })
+    }
+
+    /// Draws on the GPU; where that is lost, once more on a fresh one.
+    fn draw_on_gpu(&mut self, kind: GpuKind, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Chosen, DrawError> {
+        let image = match self.try_gpu(kind, plan, deadline, Attempt::First) {
+            Err(DrawError::DeviceLost(_)) => self.try_gpu(kind, plan, deadline, Attempt::Second)?,
+            result => {
+                let image = result?;
+                self.host.count_success();
+                image
+            }
+        };
+        Ok(Chosen { image, backend: BackendKind::Gpu })
+    }
+
+    fn try_gpu(
+        &mut self,
+        kind: GpuKind,
+        plan: &DrawPlan<'_>,
+        deadline: &Deadline,
+        attempt: Attempt,
+    ) -> Result<Image, DrawError> {
+        if self.gpu.as_ref().is_some_and(|(_, device)| device.lost().is_some()) {
+            // What is left here would keep a device alive that nobody draws on any more.
+            let_go(self.gpu.take());
+        }
+        let found = self.host.device(kind);
+        if let (Err(DrawError::DeviceLost(reason)), Attempt::First) = (&found, attempt) {
+            self.host.count_loss(reason);
+        }
+        let device = found?;
+        let result = self.draw_on(&device, plan, deadline);
+        if let Err(DrawError::DeviceLost(reason)) = &result {
+            // Workers that share a device lose it together: that is one loss.
+            if self.host.note_lost(&device, reason) && attempt == Attempt::First {
+                self.host.count_loss(reason);
+            }
+        }
+        result
+    }
+
+    fn draw_on(
+        &mut self,
+        device: &Arc<dyn GpuDevice>,
+        plan: &DrawPlan<'_>,
+        deadline: &Deadline,
+    ) -> Result<Image, DrawError> {
+        let (mut renderer, device) = match self.gpu.take() {
+            Some((renderer, own)) if Arc::ptr_eq(&own, device) => (renderer, own),
+            old => {
+                let_go(old);
+                (device.clone().renderer(), device.clone())
+            }
+        };
+        // wgpu panics here and there on a device that is gone.
+        let drawn = catch_unwind(AssertUnwindSafe(|| renderer.draw(plan, deadline)));
+        let result = match (drawn, device.lost()) {
+            (Ok(result), _) => result,
+            (Err(_), Some(reason)) => Err(DrawError::DeviceLost(reason.to_owned())),
+            (Err(panic), None) => {
+                let_go(renderer);
+                resume_unwind(panic);
+            }
+        };
+        match result {
+            Err(DrawError::DeviceLost(_)) => let_go(renderer),
+            _ => self.gpu = Some((renderer, device)),
+        }
+        result
+    }
+}
+
+/// A job draws on the GPU at most twice, and counts as lost at most once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Attempt {
+    First,
+    Second,
 }

@@ -11,7 +11,10 @@ use super::progress::Progress;
 use super::render::format_in;
 use super::settings::LimitSettings;
 use crate::limits::{Budget, Deadline};
+use crate::mesh::edges::EdgeList;
+use crate::mesh::topology::Topology;
 use crate::mesh::{self, Mesh};
+use crate::pipeline::RenderError;
 
 /// Arguments of `inspect`.
 #[derive(Args)]
@@ -44,9 +47,22 @@ struct Report {
     has_uvs: bool,
     has_colors: bool,
     bounds: Bounds,
+    topology: TopologyEntry,
     dropped_nonfinite_faces: u64,
     dropped_degenerate_faces: u64,
     warnings: Vec<WarningEntry>,
+}
+
+/// How the triangles hang together, after welding.
+#[derive(Serialize)]
+struct TopologyEntry {
+    components: u64,
+    edges: u64,
+    open_edges: u64,
+    nonmanifold_edges: u64,
+    inconsistent_edges: u64,
+    euler_characteristic: i64,
+    is_watertight: bool,
 }
 
 #[derive(Serialize)]
@@ -78,7 +94,10 @@ pub fn run(arguments: &InspectArgs) -> Result<(), Complaint> {
     let mut budget = Budget::new(&limits);
     let mesh = mesh::import(&bytes, format, &limits, &mut budget, &Deadline::default())
         .map_err(|error| Complaint::from(error).about(&arguments.mesh))?;
-    let report = Report::new(&mesh, bytes.len() as u64);
+    progress.next("counting edges");
+    let edges = EdgeList::of(&mesh, &mut budget)
+        .map_err(|limit| Complaint::from(RenderError::Limit(limit)).about(&arguments.mesh))?;
+    let report = Report::new(&mesh, Topology::of(&mesh, &edges), bytes.len() as u64);
     drop(progress);
     let text = if arguments.json {
         let json = serde_json::to_string_pretty(&report);
@@ -89,8 +108,43 @@ pub fn run(arguments: &InspectArgs) -> Result<(), Complaint> {
     files::print(text.as_bytes())
 }
 
+impl TopologyEntry {
+    fn new(topology: Topology) -> Self {
+        let Topology {
+            components,
+            edges,
+            open_edges,
+            nonmanifold_edges,
+            inconsistent_edges,
+            euler_characteristic,
+            is_watertight,
+        } = topology;
+        Self {
+            components,
+            edges,
+            open_edges,
+            nonmanifold_edges,
+            inconsistent_edges,
+            euler_characteristic,
+            is_watertight,
+        }
+    }
+
+    fn text(&self) -> String {
+        let Self { components, edges, open_edges, nonmanifold_edges, inconsistent_edges, .. } = self;
+        let parts = if *components == 1 { "1 part".to_owned() } else { format!("{components} parts") };
+        if self.is_watertight {
+            return format!("{parts}, watertight, {edges} edges, Euler characteristic {}", self.euler_characteristic);
+        }
+        format!(
+            "{parts}, {edges} edges: {open_edges} open, {nonmanifold_edges} non-manifold, \
+             {inconsistent_edges} between faces of opposite winding"
+        )
+    }
+}
+
 impl Report {
-    fn new(mesh: &Mesh, file_bytes: u64) -> Self {
+    fn new(mesh: &Mesh, topology: Topology, file_bytes: u64) -> Self {
         let import = &mesh.report;
         let arities = import.polygons_by_arity.iter().enumerate().filter(|&(_, &count)| count > 0);
         let warnings = import.warnings.iter();
@@ -107,6 +161,7 @@ impl Report {
             has_uvs: !mesh.uvs.is_empty(),
             has_colors: !mesh.colors.is_empty(),
             bounds: bounds(mesh),
+            topology: TopologyEntry::new(topology),
             dropped_nonfinite_faces: import.dropped_nonfinite_faces,
             dropped_degenerate_faces: import.dropped_degenerate_faces,
             warnings: warnings.map(|w| WarningEntry { code: w.code, detail: w.detail.clone() }).collect(),
@@ -134,6 +189,7 @@ impl Report {
         line("materials", names.join(", "));
         line("bounds", format!("{} to {}", point(self.bounds.min), point(self.bounds.max)));
         line("size", point(self.bounds.size));
+        line("topology", self.topology.text());
         if self.dropped_nonfinite_faces + self.dropped_degenerate_faces > 0 {
             let (nonfinite, degenerate) = (self.dropped_nonfinite_faces, self.dropped_degenerate_faces);
             line("dropped", format!("{nonfinite} faces with NaN or infinite corners, {degenerate} without area"));

@@ -10,8 +10,8 @@ use super::complaint::Complaint;
 use super::files;
 use super::progress::Progress;
 use super::settings::LimitSettings;
-use crate::backend::{Backends, GpuHost};
-use crate::config::cores;
+use crate::backend::{Backends, GpuHost, GpuStatus, HardwareHint};
+use crate::config::{cores, why_no_gpu};
 use crate::image::ImageFormat;
 use crate::limits::{BackendChoice, Deadline, Limits};
 use crate::mesh::Format;
@@ -95,7 +95,8 @@ pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
         stage_began = Instant::now();
     };
     let threads = arguments.threads.unwrap_or(cores() as usize);
-    let mut backends = Backends::new(Arc::new(GpuHost::default()), threads);
+    let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));
+    let mut backends = Backends::new(gpu.clone(), threads);
     let job = Job { mesh: &mesh, format_in, spec: &spec };
     let output = pipeline::render(job, &mut backends, &limits, &Deadline::default(), &mut ended)
         .map_err(|error| Complaint::from(error).about(mesh_name))?;
@@ -106,7 +107,7 @@ pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
         eprintln!("meshsnap: {mesh_name}: warning: {}", warning.detail);
     }
     if arguments.explain {
-        explain(&output, &times, began.elapsed());
+        explain(&output, &gpu.status(), &times, began.elapsed());
     }
     Ok(())
 }
@@ -176,8 +177,14 @@ fn after(stage: Stage) -> &'static str {
     }
 }
 
-fn explain(output: &Output, times: &[(Stage, Duration)], total: Duration) {
+fn explain(output: &Output, gpu: &GpuStatus, times: &[(Stage, Duration)], total: Duration) {
     eprintln!("drawn by {}", output.backend.name());
+    let device = gpu.info.as_ref().map(|info| {
+        let features = if info.features.is_empty() { "no optional features".into() } else { info.features.join(", ") };
+        format!("{}, {}, {}, {features}", info.name, info.driver, info.device_type)
+    });
+    let parts = [Some(gpu.state.name().to_owned()), device, gpu.reason.clone()];
+    eprintln!("gpu: {}", parts.into_iter().flatten().collect::<Vec<_>>().join("; "));
     for skip in &output.skips {
         eprintln!("skipped {}: {}", skip.what, skip.why);
     }

@@ -10,8 +10,8 @@ use axum::routing::{get, post};
 
 use super::error::ApiError;
 use super::{auth, health, jobs, observe, render};
-use crate::backend::GpuHost;
-use crate::config::{Config, cores};
+use crate::backend::{GpuHost, HardwareHint};
+use crate::config::{Config, cores, why_no_gpu};
 use crate::jobs::{Bodies, Engine, Jobs, Settings, pipeline_engine};
 use crate::limits::Limits;
 use crate::request::Rules;
@@ -22,6 +22,8 @@ pub struct App {
     pub rules: Rules,
     /// The queue and its workers.
     pub jobs: Jobs,
+    /// The GPU, if there is one.
+    pub gpu: Arc<GpuHost>,
     /// Memory of uploads.
     pub bodies: Arc<Bodies>,
     /// For the whole of a request's body.
@@ -40,12 +42,13 @@ impl App {
             0 => (cores() / config.workers.max(1)).max(1),
             given => given,
         };
-        let engine = pipeline_engine(Arc::new(GpuHost::default()), threads as usize, config.limits.clone());
-        Self::with_engine(config, engine)
+        let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));
+        let engine = pipeline_engine(gpu.clone(), threads as usize, config.limits.clone());
+        Self::with_engine(config, engine, gpu)
     }
 
-    /// Starts workers that draw with `engine`.
-    pub fn with_engine(config: &Config, engine: Engine) -> std::io::Result<Arc<Self>> {
+    /// Starts workers that draw with `engine`, which draws on `gpu` if on any.
+    pub fn with_engine(config: &Config, engine: Engine, gpu: Arc<GpuHost>) -> std::io::Result<Arc<Self>> {
         let Limits { queue_per_worker, job_ms, .. } = config.limits;
         let settings = Settings {
             workers: to_usize(config.workers),
@@ -58,6 +61,7 @@ impl App {
         Ok(Arc::new(Self {
             rules: Rules { limits: config.limits.clone(), backend: config.backend },
             jobs: Jobs::start(settings, engine)?,
+            gpu,
             bodies: Bodies::new(config.uploads_bytes),
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             workers: config.workers,

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::error::ApiError;
+use crate::backend::GpuStatus;
 use crate::image::ImageFormat;
 use crate::jobs::{Job, Load, State, Timings};
 use crate::limits::BackendChoice;
@@ -160,10 +161,38 @@ pub struct CapabilitiesDto {
     limits: LimitsDto,
 }
 
+/// Who draws.
 #[derive(Serialize)]
-struct BackendDto {
+pub struct BackendDto {
     default: &'static str,
     choices: Vec<&'static str>,
+    gpu: GpuDto,
+}
+
+#[derive(Serialize)]
+struct GpuDto {
+    state: &'static str,
+    name: Option<String>,
+    driver: Option<String>,
+    device_type: Option<&'static str>,
+    features: Vec<&'static str>,
+    reason: Option<String>,
+}
+
+impl BackendDto {
+    /// The back-end of a request that names none, and how it stands with the GPU.
+    pub fn new(default: BackendChoice, gpu: GpuStatus) -> Self {
+        let GpuStatus { state, info, reason } = gpu;
+        let (name, driver, device_type, features) = match info {
+            Some(info) => (Some(info.name), Some(info.driver), Some(info.device_type), info.features),
+            None => (None, None, None, Vec::new()),
+        };
+        Self {
+            default: word_for(default),
+            choices: words_of::<BackendChoice>(),
+            gpu: GpuDto { state: state.name(), name, driver, device_type, features, reason },
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -188,7 +217,7 @@ struct LimitsDto {
 
 impl CapabilitiesDto {
     /// What this process can do.
-    pub fn new(limits: &Limits, backend: BackendChoice, workers: u64, load: Load) -> Self {
+    pub fn new(limits: &Limits, backend: BackendDto, workers: u64, load: Load) -> Self {
         let Limits { body_bytes, memory_bytes, triangles, nodes, json_depth, image_px, job_ms, queue_per_worker } =
             *limits;
         Self {
@@ -197,7 +226,7 @@ impl CapabilitiesDto {
             image_formats: ["png", "webp", "jpeg"],
             styles: words_of::<Style>(),
             request_keys: request::keys(),
-            backend: BackendDto { default: word_for(backend), choices: words_of::<BackendChoice>() },
+            backend,
             workers,
             load: LoadDto {
                 queued: load.queued,

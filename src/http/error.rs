@@ -127,6 +127,11 @@ impl From<&RenderError> for ApiError {
                 Self::new(StatusCode::SERVICE_UNAVAILABLE, "device_lost", detail).retry_after(1)
             }
             // Only reachable by asking for the GPU by name: `auto` goes on with the CPU.
+            RenderError::Draw(DrawError::NoGpu(_)) => {
+                let detail = "this server has no GPU that can be used; ask for backend=auto or backend=cpu \
+                              (backend.gpu at /v1/capabilities says why)";
+                Self::new(StatusCode::UNPROCESSABLE_ENTITY, "backend_unavailable", detail)
+            }
             RenderError::Draw(_) => {
                 let detail = "the GPU of this server cannot draw this; ask for backend=auto or backend=cpu";
                 Self::new(StatusCode::UNPROCESSABLE_ENTITY, "backend_unavailable", detail)

@@ -8,7 +8,7 @@ use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
 use super::app::App;
-use super::dto::{CapabilitiesDto, StatusDto, VersionDto};
+use super::dto::{BackendDto, CapabilitiesDto, StatusDto, VersionDto};
 use super::error::ApiError;
 
 /// The process is alive.
@@ -33,7 +33,8 @@ pub async fn version() -> Response {
 /// Formats, styles, keys, limits and load.
 pub async fn capabilities(State(app): State<Arc<App>>) -> Response {
     let rules = &app.rules;
-    fresh(Json(CapabilitiesDto::new(&rules.limits, rules.backend, app.workers, app.jobs.load())))
+    let backend = BackendDto::new(rules.backend, app.gpu.status());
+    fresh(Json(CapabilitiesDto::new(&rules.limits, backend, app.workers, app.jobs.load())))
 }
 
 fn fresh(body: impl IntoResponse) -> Response {

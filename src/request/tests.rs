@@ -255,3 +255,40 @@ fn jpeg_lays_its_background_over_white_in_linear_light() {
     set_format(&mut spec, ImageFormat::Png);
     assert_eq!(spec.image.background, Rgba::TRANSPARENT);
 }
+
+/// Neither a query nor a document can do more than be refused, whatever is in it.
+#[test]
+fn noise_is_refused_without_a_panic() {
+    let mut state = 7_u64;
+    let mut random = move |bound: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % bound
+    };
+    let known = keys();
+    let values = [
+        "", "0", "1", "4", "#f00", "iso", "png", "-1", "1e308", "NaN", "inf", "null", "{}", "[]", "#", "#é", "x", "1x",
+        "x1", "1,2,3", "é", "\u{0}",
+    ];
+    let seed = br##"{"style":"wire","wire":{"color":"#f00","thickness":1},"camera":{"eye":[1,2,3],"target":[0,0,0]}}"##;
+    let (mut read_well, mut refused) = (0, 0);
+    for round in 0..20_000 {
+        let mut document = seed.to_vec();
+        for _ in 0..random(4) {
+            let place = random(document.len());
+            document[place] = b"{}[]\",:0e.\\\xff #fn"[random(16)];
+        }
+        let mut key = known[random(known.len())].to_owned();
+        if round % 5 == 0 {
+            key.insert(random(key.len() + 1), ['.', 'é', 'x'][random(3)]);
+        }
+        let pairs = [(key, values[random(values.len())].to_owned())];
+        match read(Some(&document).filter(|_| round % 2 == 0).map(Vec::as_slice), &pairs, &rules()) {
+            Ok(_) => read_well += 1,
+            Err(error) => {
+                assert!(error.to_string().len() < 2_000, "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(read_well > 500 && refused > 5_000, "{read_well} read, {refused} refused");
+}

@@ -140,6 +140,12 @@ fn inspect_says_what_is_in_the_file() {
     assert_eq!(report["positions"], 8);
     assert_eq!(report["bounds"]["min"], serde_json::json!([-1.0, -1.0, -1.0]));
     assert_eq!(report["bounds"]["size"], serde_json::json!([2.0, 2.0, 2.0]));
+    let topology = &report["topology"];
+    assert_eq!((topology["is_watertight"].as_bool(), topology["open_edges"].as_u64()), (Some(true), Some(0)));
+    assert_eq!((topology["components"].as_u64(), topology["euler_characteristic"].as_i64()), (Some(1), Some(2)));
+    let open = run(&["inspect", "-"], b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let open = String::from_utf8(open.stdout).unwrap();
+    assert!(open.contains("3 edges: 3 open"), "{open}");
     let text = run(&["inspect", "-"], CUBE_OBJ);
     let text = String::from_utf8(text.stdout).unwrap();
     assert!(text.contains("triangles") && text.contains("6 x 4"), "{text}");
@@ -150,7 +156,7 @@ fn explain_tells_what_was_skipped_and_how_long_it_took() {
     let arguments = ["render", "-", "-o", "-", "--size", "16", "--style", "flat", "--backend", "cpu", "--explain"];
     let output = run(&arguments, CUBE_OBJ);
     let stderr = String::from_utf8(output.stderr).unwrap();
-    for part in ["drawn by cpu", "parse", "plan", "render", "encode", "total"] {
+    for part in ["drawn by cpu", "gpu: no", "parse", "plan", "render", "encode", "total"] {
         assert!(stderr.contains(part), "{part}: {stderr}");
     }
     assert!(stderr.contains("skipped "), "{stderr}");

@@ -134,6 +134,12 @@ fn the_process_says_how_it_is() {
     assert_eq!(capabilities["limits"]["triangles"], 1234);
     assert_eq!(capabilities["limits"]["body_bytes"], 64 << 20);
     assert!(capabilities["styles"].as_array().unwrap().len() >= 7);
+    let backend = &capabilities["backend"];
+    assert_eq!((&backend["default"], &backend["choices"]), (&"cpu".into(), &serde_json::json!(["auto", "gpu", "cpu"])));
+    for key in ["state", "name", "driver", "device_type", "features", "reason"] {
+        assert!(backend["gpu"].as_object().unwrap().contains_key(key), "{backend}");
+    }
+    assert!(["not opened", "none"].contains(&backend["gpu"]["state"].as_str().unwrap()), "{backend}");
     let mut stream = server.connect();
     stream.write_all(b"HEAD /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n").unwrap();
     let mut head = String::new();

@@ -22,6 +22,7 @@ mod mesh_files;
 mod models;
 mod raster;
 mod scenes;
+mod select;
 mod server;
 mod shapes;
 mod shared;

@@ -1,0 +1,314 @@
+//! The process's one GPU: opened on first need, probed before it is used, opened again when it was lost.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use super::gpu::{AtomicsChoice, Gpu, GpuInfo, GpuKind, GpuRenderer};
+use super::probe::probe;
+use super::{DrawError, Renderer};
+
+/// Jobs in a row that lost the device, after which `auto` goes on with the CPU.
+const LOSSES_MAX: u32 = 3;
+
+/// What is known about the machine before any driver is loaded. Loading Vulkan to find out costs time, and a software one
+/// brings a whole compiler with it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HardwareHint {
+    /// There cannot be a hardware GPU.
+    None {
+        /// How that is known.
+        reason: String,
+    },
+    /// There may be one.
+    Maybe,
+}
+
+impl HardwareHint {
+    /// There may be one, unless a reason is known why not.
+    pub fn unless(reason: Option<String>) -> Self {
+        reason.map_or(Self::Maybe, |reason| Self::None { reason })
+    }
+}
+
+/// An opened device, as far as choosing a back-end goes.
+pub trait GpuDevice: Send + Sync {
+    /// What was opened.
+    fn info(&self) -> &GpuInfo;
+
+    /// Whether it is a processor that plays GPU.
+    fn is_software(&self) -> bool;
+
+    /// Why it is gone, if it is.
+    fn lost(&self) -> Option<&str>;
+
+    /// A renderer on it, for one thread.
+    fn renderer(self: Arc<Self>) -> Box<dyn Renderer>;
+}
+
+/// Opens a device.
+pub type Opener = dyn Fn(GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> + Send + Sync;
+
+/// How it stands with the GPU.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GpuStatus {
+    /// In one word.
+    pub state: GpuState,
+    /// What was opened last.
+    pub info: Option<GpuInfo>,
+    /// Why there is no GPU, or why `auto` means the CPU in spite of it.
+    pub reason: Option<String>,
+}
+
+/// How it stands with the GPU, in one word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GpuState {
+    /// No job needed it yet.
+    NotOpened,
+    /// It passed the probe.
+    Ready,
+    /// There is none.
+    None,
+    /// There is one that cannot be used.
+    Failed,
+}
+
+impl GpuState {
+    /// The word used in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NotOpened => "not opened",
+            Self::Ready => "ready",
+            Self::None => "none",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+/// The process's one GPU, shared by all workers.
+pub struct GpuHost {
+    open: Box<Opener>,
+    /// Why `auto` means the CPU, once that is decided. It stays decided.
+    without: OnceLock<String>,
+    /// Held while a device is opened.
+    device: Mutex<Slot>,
+    /// Never held for long: reports must not wait for a driver.
+    status: Mutex<GpuStatus>,
+    /// Jobs in a row that lost the device.
+    losses: AtomicU32,
+}
+
+#[derive(Default)]
+struct Slot {
+    current: Option<Arc<dyn GpuDevice>>,
+    /// Why the first opening failed; it is not tried again.
+    failed: Option<String>,
+    /// Whether any opening ever succeeded. From then on a failure counts as a loss.
+    opened_before: bool,
+}
+
+/// How an opening failed.
+enum OpenError {
+    /// There is no such device.
+    Absent(String),
+    /// There is one that cannot be used.
+    Unusable(String),
+}
+
+impl GpuHost {
+    /// The host of Vulkan's GPUs. Nothing is loaded yet.
+    pub fn new(hint: HardwareHint) -> Self {
+        Self::with_opener(hint, Box::new(|kind| Ok(Arc::new(Gpu::open(kind, AtomicsChoice::Best)?))))
+    }
+
+    /// The host of whatever `open` opens.
+    pub fn with_opener(hint: HardwareHint, open: Box<Opener>) -> Self {
+        let status = match &hint {
+            HardwareHint::None { reason } => {
+                GpuStatus { state: GpuState::None, info: None, reason: Some(reason.clone()) }
+            }
+            HardwareHint::Maybe => GpuStatus { state: GpuState::NotOpened, info: None, reason: None },
+        };
+        let without = OnceLock::new();
+        if let HardwareHint::None { reason } = hint {
+            tracing::info!(reason, "no hardware GPU: `auto` means the CPU");
+            let _ = without.set(reason);
+        }
+        Self { open, without, device: Mutex::default(), status: Mutex::new(status), losses: AtomicU32::new(0) }
+    }
+
+    /// How it stands. Does not wait for an opening.
+    pub fn status(&self) -> GpuStatus {
+        self.status.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The device that a request of this kind draws on, opened now if need be; workers that come meanwhile wait for it.
+    ///
+    /// `NoGpu` is for good. `DeviceLost` means that a device that was there is gone, and that another try may help.
+    pub fn device(&self, kind: GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> {
+        self.check_auto(kind)?;
+        let mut slot = self.device.lock().unwrap_or_else(PoisonError::into_inner);
+        // Decided, perhaps, by whoever held the lock.
+        self.check_auto(kind)?;
+        if let Some(device) = slot.current.clone() {
+            let Some(reason) = device.lost().map(str::to_owned) else { return Ok(device) };
+            self.retire(slot.current.take(), &reason);
+            return Err(DrawError::DeviceLost(reason));
+        }
+        if let Some(reason) = &slot.failed {
+            return Err(DrawError::NoGpu(reason.clone()));
+        }
+        match self.open_and_probe(kind) {
+            Ok(device) => self.opened(&mut slot, device, kind),
+            Err(error) => Err(self.not_opened(&mut slot, error, kind)),
+        }
+    }
+
+    /// A job found the device lost. Whether it is the first to say so.
+    pub fn note_lost(&self, device: &Arc<dyn GpuDevice>, reason: &str) -> bool {
+        let mut slot = self.device.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_current = slot.current.as_ref().is_some_and(|current| Arc::ptr_eq(current, device));
+        if is_current {
+            self.retire(slot.current.take(), reason);
+        }
+        is_current
+    }
+
+    /// Counts a job whose device was lost under it. After too many in a row `auto` means the CPU.
+    pub fn count_loss(&self, reason: &str) {
+        if self.losses.fetch_add(1, Ordering::Relaxed) + 1 == LOSSES_MAX {
+            self.go_without(format!("the GPU was lost in {LOSSES_MAX} jobs in a row, at last because: {reason}"), true);
+        }
+    }
+
+    /// Counts a job that the device drew without trouble.
+    pub fn count_success(&self) {
+        self.losses.store(0, Ordering::Relaxed);
+    }
+
+    fn check_auto(&self, kind: GpuKind) -> Result<(), DrawError> {
+        match self.without.get() {
+            Some(reason) if kind == GpuKind::Hardware => Err(DrawError::NoGpu(reason.clone())),
+            _ => Ok(()),
+        }
+    }
+
+    fn opened(
+        &self,
+        slot: &mut Slot,
+        device: Arc<dyn GpuDevice>,
+        kind: GpuKind,
+    ) -> Result<Arc<dyn GpuDevice>, DrawError> {
+        let info = device.info();
+        tracing::info!(
+            name = info.name,
+            driver = info.driver,
+            device_type = info.device_type,
+            features = ?info.features,
+            "opened the GPU"
+        );
+        slot.opened_before = true;
+        self.set_status(|status| {
+            *status = GpuStatus { state: GpuState::Ready, info: Some(info.clone()), reason: None }
+        });
+        if device.is_software() {
+            // The best adapter there is: `auto` need not look for a better one.
+            self.go_without(format!("{} is no hardware", info.name), false);
+        }
+        slot.current = Some(device.clone());
+        // Only then, so that its memory is not opened twice.
+        self.check_auto(kind)?;
+        Ok(device)
+    }
+
+    fn not_opened(&self, slot: &mut Slot, error: OpenError, kind: GpuKind) -> DrawError {
+        let (state, reason) = match error {
+            OpenError::Absent(reason) => (GpuState::None, reason),
+            OpenError::Unusable(reason) => (GpuState::Failed, reason),
+        };
+        self.set_status(|status| *status = GpuStatus { state, info: None, reason: Some(reason.clone()) });
+        if slot.opened_before {
+            return DrawError::DeviceLost(reason);
+        }
+        self.go_without(reason.clone(), state == GpuState::Failed);
+        // Where hardware alone is absent there may still be software.
+        if kind == GpuKind::Any || state == GpuState::Failed {
+            slot.failed = Some(reason.clone());
+        }
+        DrawError::NoGpu(reason)
+    }
+
+    /// Decides, once, that `auto` means the CPU.
+    fn go_without(&self, reason: String, is_fault: bool) {
+        if self.without.set(reason.clone()).is_ok() {
+            match is_fault {
+                true => tracing::warn!(reason, "the GPU cannot be used: `auto` means the CPU"),
+                false => tracing::info!(reason, "no hardware GPU: `auto` means the CPU"),
+            }
+        }
+        self.set_status(|_| {});
+    }
+
+    /// Changes the status; while `auto` does without, the reason stays in it.
+    fn set_status(&self, change: impl FnOnce(&mut GpuStatus)) {
+        let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner);
+        change(&mut status);
+        if let Some(reason) = self.without.get() {
+            status.reason = Some(reason.clone());
+        }
+    }
+
+    /// Lets go of a lost device.
+    fn retire(&self, device: Option<Arc<dyn GpuDevice>>, reason: &str) {
+        tracing::warn!(reason, "the GPU was lost");
+        self.set_status(|status| {
+            status.state = GpuState::Failed;
+            status.reason = Some(format!("the GPU was lost: {reason}"));
+        });
+        let_go(device);
+    }
+
+    fn open_and_probe(&self, kind: GpuKind) -> Result<Arc<dyn GpuDevice>, OpenError> {
+        let attempt = || {
+            let device = (self.open)(kind).map_err(|error| match error {
+                DrawError::NoGpu(reason) => OpenError::Absent(reason),
+                other => OpenError::Unusable(other.to_string()),
+            })?;
+            let name = device.info().name.clone();
+            probe(&mut *device.clone().renderer()).map_err(|error| OpenError::Unusable(format!("{name}: {error}")))?;
+            Ok(device)
+        };
+        // A driver that makes wgpu panic must cost the GPU, not the job.
+        catch_unwind(AssertUnwindSafe(attempt))
+            .unwrap_or_else(|_| Err(OpenError::Unusable("opening the GPU panicked; the log has more".to_owned())))
+    }
+}
+
+/// Drops what belongs to a device that may be gone: wgpu may panic then, which is nobody's concern any more.
+pub(super) fn let_go<T>(thing: T) {
+    let _ = catch_unwind(AssertUnwindSafe(|| drop(thing)));
+}
+
+impl GpuDevice for Gpu {
+    fn info(&self) -> &GpuInfo {
+        Self::info(self)
+    }
+
+    fn is_software(&self) -> bool {
+        Self::info(self).device_type == "software"
+    }
+
+    fn lost(&self) -> Option<&str> {
+        Self::lost(self)
+    }
+
+    fn renderer(self: Arc<Self>) -> Box<dyn Renderer> {
+        Box::new(GpuRenderer::new(self))
+    }
+}
+
+impl std::fmt::Debug for GpuHost {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("GpuHost").field("status", &self.status()).finish_non_exhaustive()
+    }
+}

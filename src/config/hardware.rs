@@ -1,0 +1,62 @@
+//! Whether this machine can have a hardware GPU at all, told by its device nodes: no driver is loaded to find out.
+
+use std::path::Path;
+
+/// Why there cannot be a hardware GPU here; None where there may be one.
+///
+/// On Linux every driver needs a node under `/dev`, and containers have it only if it was passed to them. Elsewhere it
+/// takes the driver to know.
+pub fn why_no_gpu() -> Option<String> {
+    if cfg!(target_os = "linux") { why_no_gpu_under(Path::new("/dev")) } else { None }
+}
+
+fn why_no_gpu_under(dev: &Path) -> Option<String> {
+    // Without the right to list /dev nothing is known; then the driver has to tell.
+    let names = |folder: &Path| -> std::io::Result<Vec<String>> {
+        std::fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned())).collect()
+    };
+    let nodes = names(dev).ok()?;
+    let nvidia =
+        |name: &str| name.strip_prefix("nvidia").is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
+    let is_gpu = |name: &String| nvidia(name) || name == "dxg";
+    let has_render_node = || match names(&dev.join("dri")) {
+        Ok(nodes) => nodes.iter().any(|name| name.starts_with("renderD")),
+        Err(error) => error.kind() != std::io::ErrorKind::NotFound,
+    };
+    if nodes.iter().any(is_gpu) || has_render_node() {
+        return None;
+    }
+    let dev = dev.display();
+    Some(format!("this machine shows no GPU: there is no {dev}/dri/renderD*, {dev}/nvidia* or {dev}/dxg"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gpu_is_known_by_its_node() {
+        let cases: &[(&[&str], bool)] = &[
+            (&[], false),
+            (&["null", "nvidiactl", "nvidia-uvm", "dri/card0"], false),
+            (&["dri/renderD128"], true),
+            (&["nvidia0"], true),
+            (&["nvidiactl", "nvidia12"], true),
+            (&["dxg"], true),
+        ];
+        let mut checked = 0;
+        for (nodes, may_have_one) in cases {
+            let dev = tempfile::tempdir().unwrap();
+            std::fs::create_dir(dev.path().join("dri")).unwrap();
+            for node in *nodes {
+                std::fs::write(dev.path().join(node), "").unwrap();
+            }
+            assert_eq!(why_no_gpu_under(dev.path()).is_none(), *may_have_one, "{nodes:?}");
+            checked += 1;
+        }
+        assert_eq!(checked, 6);
+        let empty = tempfile::tempdir().unwrap();
+        assert!(why_no_gpu_under(empty.path()).is_some_and(|reason| reason.contains("renderD")));
+        assert_eq!(why_no_gpu_under(&empty.path().join("missing")), None);
+    }
+}
