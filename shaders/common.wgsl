@@ -26,10 +26,8 @@ struct Frame {
     line_smoothing: f32,
     // Always 0, which the compiler cannot know.
     zero: u32,
-    flags: u32,
     width: i32,
     height: i32,
-    samples: i32,
     triangle_count: u32,
     vertex_count: u32,
     // Added to a vertex index to get the hull's record.
@@ -73,12 +71,22 @@ const EDGE_MASKS: u32 = 128u;
 const LINES: u32 = 256u;
 const LINES_HIDDEN: u32 = 512u;
 const LINES_SKIP_BACK: u32 = 1024u;
+const CLIPPED: u32 = 2048u;
+const FOUR_SAMPLES: u32 = 4096u;
+
+// What the plan has, of the above. A constant of the pipeline, so that a kernel contains only what its plan needs.
+override LOOK: u32 = 0u;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> batch: Batch;
 
 fn has(flag: u32) -> bool {
-    return (frame.flags & flag) != 0u;
+    return (LOOK & flag) != 0u;
+}
+
+// Samples a pixel.
+fn sample_count() -> i32 {
+    return select(1, 4, has(FOUR_SAMPLES));
 }
 
 struct Vertex {
@@ -165,7 +173,7 @@ fn wide_to_f32(v: vec2<u32>) -> f32 {
 
 // Offsets of sample s in 1/16 px from the pixel's upper left corner.
 fn sample_offset(s: i32) -> vec2<i32> {
-    if frame.samples == 1 {
+    if sample_count() == 1 {
         return vec2(8, 8);
     }
     // x: 6 14 2 10, y: 2 6 10 14, a nibble each.

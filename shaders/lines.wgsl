@@ -76,7 +76,7 @@ fn segment_of(edge: vec4<u32>) -> Segment {
     var b = vertices[edge.y];
     var drawn = !(has(LINES_SKIP_BACK) && looks_away(edge.z) && looks_away(edge.w));
     if drawn && (a.x == OUTSIDE || b.x == OUTSIDE) {
-        drawn = clip_segment(edge.xy, &a, &b);
+        drawn = has(CLIPPED) && clip_segment(edge.xy, &a, &b);
     }
     let half = vec2(frame.width, frame.height) * 128;
     let start = vec2<f32>(vec2(a.x, a.y) + half) * (1.0 / 256.0);
@@ -170,7 +170,7 @@ fn add_ink(edge: vec4<u32>, s: Segment, t: f32, pixel: vec2<i32>, coverage: u32)
     let at = u32((pixel.y - batch.row_first) * frame.width + pixel.x);
     var level = coverage;
     if has(LINES_HIDDEN) {
-        let count = u32(frame.samples);
+        let count = u32(sample_count());
         level = (coverage * visible_samples(edge, s, t, at * count) + count / 2u) / count;
     }
     // Once a pixel is full nothing changes it, so it may stop counting long before the sum could wrap.
@@ -240,7 +240,7 @@ fn visible_samples(edge: vec4<u32>, s: Segment, t: f32, first_sample: u32) -> u3
     var count = 0u;
     var last_id = NOTHING;
     var last_visible = true;
-    for (var n = 0u; n < u32(frame.samples); n++) {
+    for (var n = 0u; n < u32(sample_count()); n++) {
         let word = samples[first_sample + n];
         let id = select(~word.x, NOTHING, word.y == 0u);
         if id == NOTHING || depth >= bitcast<f32>(word.y) || id == edge.z || id == edge.w {

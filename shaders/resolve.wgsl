@@ -48,13 +48,10 @@ fn encode(c: vec4<f32>) -> u32 {
     return srgb(color.x) | (srgb(color.y) << 8u) | (srgb(color.z) << 16u) | (alpha << 24u);
 }
 
-// How many thresholds are not above v.
+// How many thresholds are not above v. The formula comes within one step of it, the table decides.
 fn srgb(v: f32) -> u32 {
-    var byte = 0u;
-    for (var step = 128u; step > 0u; step = step >> 1u) {
-        if thresholds[byte + step - 1u] <= v {
-            byte += step;
-        }
-    }
-    return byte;
+    let c = clamp(v, 0.0, 1.0);
+    let encoded = select(1.055 * exp2(log2(max(c, 1e-6)) * (1.0 / 2.4)) - 0.055, 12.92 * c, c <= 0.0031308);
+    let guess = u32(clamp(encoded * 255.0 + 0.5, 1.0, 254.0));
+    return guess - u32(v < thresholds[guess - 1u]) + u32(v >= thresholds[guess]);
 }

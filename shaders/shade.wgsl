@@ -20,34 +20,18 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         return;
     }
     let pixel = vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width);
-    if frame.samples == 1 {
+    if sample_count() == 1 {
         colors[i] = group_color(id_at(i), pixel, vec2(8, 8), 1);
         return;
     }
     let ids = vec4(id_at(4u * i), id_at(4u * i + 1u), id_at(4u * i + 2u), id_at(4u * i + 3u));
-    if all(ids == vec4(ids.x)) {
-        colors[i] = group_color(ids.x, pixel, vec2(32, 32), 4);
-        return;
-    }
-    colors[i] = mixed_pixel(ids, pixel);
-}
-
-fn id_at(sample: u32) -> u32 {
-    let word = samples[sample];
-    return select(~word.x, NOTHING, word.y == 0u);
-}
-
-fn mixed_pixel(ids: vec4<u32>, pixel: vec2<i32>) -> vec4<f32> {
+    var left = ids != vec4(NOTHING);
     var sum = vec4(0.0);
-    var done = vec4(false);
-    for (var s = 0u; s < 4u; s++) {
-        // Each triangle is shaded at the first of its samples; the others are done with.
-        if done[s] {
-            continue;
-        }
-        let id = ids[s];
+    // Once for each triangle among the samples.
+    while any(left) {
+        let id = select(select(select(ids.w, ids.z, left.z), ids.y, left.y), ids.x, left.x);
         let same = ids == vec4(id);
-        done = done | same;
+        left = left & !same;
         let counts = select(vec4(0), vec4(1), same);
         // The samples' offsets: 6 14 2 10 across, 2 6 10 14 down.
         let across = counts * vec4(6, 14, 2, 10);
@@ -56,7 +40,12 @@ fn mixed_pixel(ids: vec4<u32>, pixel: vec2<i32>) -> vec4<f32> {
         let count = counts.x + counts.y + counts.z + counts.w;
         sum += f32(count) * 0.25 * group_color(id, pixel, offset, count);
     }
-    return sum;
+    colors[i] = sum;
+}
+
+fn id_at(sample: u32) -> u32 {
+    let word = samples[sample];
+    return select(~word.x, NOTHING, word.y == 0u);
 }
 
 // The colour of a triangle at the mean of `count` samples whose offsets in 1/16 px add up to `offset_sum`.
@@ -127,7 +116,7 @@ fn corners_of(id: u32, at: vec2<f32>) -> Corners {
     let a = vertices[triangles[3u * id]];
     let b = vertices[triangles[3u * id + 1u]];
     let c = vertices[triangles[3u * id + 2u]];
-    if a.x != OUTSIDE && b.x != OUTSIDE && c.x != OUTSIDE {
+    if !has(CLIPPED) || (a.x != OUTSIDE && b.x != OUTSIDE && c.x != OUTSIDE) {
         let x = vec3<f32>(vec3(a.x, b.x, c.x)) - at.x;
         let y = vec3<f32>(vec3(a.y, b.y, c.y)) - at.y;
         return Corners(x, y, vec3(1.0), vec3(a.inv_w, b.inv_w, c.inv_w), true, is_negative(area_of(a, b, c)));

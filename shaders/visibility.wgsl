@@ -42,7 +42,7 @@ fn draw_small(s: Setup, bounds: vec4<i32>, id: u32) {
     let c = (e.dx * (corner.y - s.y) - e.dy * (corner.x - s.x) + e.bias) >> vec3(4u);
     for (var y = bounds.y; y <= bounds.w; y++) {
         for (var x = bounds.x; x <= bounds.z; x++) {
-            for (var n = 0; n < frame.samples; n++) {
+            for (var n = 0; n < sample_count(); n++) {
                 let at = 16 * (vec2(x, y) - bounds.xy) + sample_offset(n);
                 let value = c + e.dx * at.y - e.dy * at.x;
                 if (value.x | value.y | value.z) >= 0 {

@@ -80,7 +80,7 @@ fn draw_tile(s: Setup, e: Edges, bounds: vec4<i32>, tile: vec2<i32>, thread: i32
 
 fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel: vec2<i32>, id: u32) {
     let corner = pixel_corner(pixel);
-    for (var n = 0; n < frame.samples; n++) {
+    for (var n = 0; n < sample_count(); n++) {
         let offset = sample_offset(n);
         let at = 16 * in_block + offset;
         let value = values + e.dx * at.y - e.dy * at.x;

@@ -135,3 +135,37 @@ fn workers_share_a_device() {
     });
     assert_eq!(drawn.into_inner(), 4 * SCENES.len());
 }
+
+#[test]
+fn materials_masks_and_normals_agree() {
+    let Some(gpus) = gpus() else { return };
+    let mesh = scenes::mesh(&shapes::torus(20));
+    let materials: Vec<u32> = (0..mesh.triangles.len() as u32).map(|t| t / 7 % 3).collect();
+    let mut cases = 0;
+    for style in ["flat", "smooth", "unlit"] {
+        for edges in ["triangles", "polygons"] {
+            for samples in ["1", "4"] {
+                let spec = scenes::spec(&[
+                    ("style", style),
+                    ("size", "150x110"),
+                    ("samples", samples),
+                    ("wire.method", "fwidth"),
+                    ("wire.edges", edges),
+                    ("wire.opacity", "0.7"),
+                ]);
+                let mut plan = scenes::plan(&mesh, &spec);
+                let surface = plan.surface.as_mut().unwrap();
+                surface.material_colors = vec![[0.8, 0.1, 0.1, 1.0], [0.1, 0.7, 0.2, 1.0], [0.2, 0.2, 0.9, 0.5]];
+                surface.triangle_materials = &materials;
+                plan.background = [0.0; 4];
+                let cpu = CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap();
+                let is_mostly = |channel: usize| cpu.rgba.chunks(4).any(|p| p[channel] > 128 && p[2 - channel] < 100);
+                assert!(is_mostly(0) && is_mostly(2), "{style}: not all materials are seen");
+                let gpu = GpuRenderer::new(gpus[0].clone()).draw(&plan, &Deadline::default()).unwrap();
+                Likeness::of(&cpu, &gpu).assert(Tolerance::TWINS, &format!("{style} {edges} {samples}"));
+                cases += 1;
+            }
+        }
+    }
+    assert_eq!(cases, 12);
+}

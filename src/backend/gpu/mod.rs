@@ -7,6 +7,7 @@
 
 mod buffers;
 mod device;
+mod look;
 mod params;
 mod recorder;
 mod schedule;
@@ -17,7 +18,7 @@ use std::sync::Arc;
 pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
-use self::params::{Frame, attributes};
+use self::params::attributes;
 use self::recorder::Recorder;
 use self::schedule::{DeviceTraits, Schedule, Step, WORK_HEAD_BYTES, WORK_ITEM_BYTES, has_visibility};
 use self::stages::Slot;
@@ -76,7 +77,7 @@ impl Renderer for GpuRenderer {
             upload_geometry(gpu, buffers, plan, &schedule)?;
             upload_looks(gpu, buffers, plan, &schedule)?;
             buffers.staging(gpu, size)?;
-            let mut recorder = Recorder::new(gpu, deadline, buffers, &Frame::new(plan), &schedule.batches);
+            let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
             execute(&mut recorder, plan, &schedule, |recorder, [first, end]| {
                 recorder.copy_out(Slot::Rgba, u64::from(end - first) * row_bytes, u64::from(first) * row_bytes)?;
                 recorder.submit()
@@ -97,7 +98,7 @@ impl Renderer for GpuRenderer {
             let schedule = Schedule::samples(plan, &traits(gpu));
             upload_geometry(gpu, buffers, plan, &schedule)?;
             buffers.staging(gpu, schedule.band_rows as u64 * row_words as u64 * 8)?;
-            let mut recorder = Recorder::new(gpu, deadline, buffers, &Frame::new(plan), &schedule.batches);
+            let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
             let mut words = Vec::with_capacity(len);
             execute(&mut recorder, plan, &schedule, |recorder, [first, end]| {
                 let size = u64::from(end - first) * row_words as u64 * 8;

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::plan::{DrawPlan, Faces, HullOffset, LinePass, Normals, SurfacePass};
+use crate::plan::{DrawPlan, Faces, HullOffset, SurfacePass};
 
 /// The plan's numbers.
 #[repr(C)]
@@ -30,15 +30,15 @@ pub struct Frame {
     line_width: f32,
     line_smoothing: f32,
     zero: u32,
-    flags: u32,
     width: u32,
     height: u32,
-    samples: u32,
     triangle_count: u32,
     vertex_count: u32,
     hull_base: u32,
     materials_at: u32,
     masks_at: u32,
+    /// WGSL rounds a struct up to its alignment.
+    padding: [u32; 2],
 }
 
 /// A dispatch's numbers.
@@ -63,20 +63,6 @@ pub struct Batch {
 /// Distance between [`Batch`]es in their buffer: every device can bind at multiples of this.
 pub const BATCH_STRIDE: usize = 256;
 
-mod flags {
-    pub const SURFACE: u32 = 1;
-    pub const HULL: u32 = 2;
-    pub const HULL_PX: u32 = 4;
-    pub const FACE_NORMALS: u32 = 8;
-    pub const VERTEX_NORMALS: u32 = 16;
-    pub const FWIDTH: u32 = 32;
-    pub const TRIANGLE_MATERIALS: u32 = 64;
-    pub const EDGE_MASKS: u32 = 128;
-    pub const LINES: u32 = 256;
-    pub const LINES_HIDDEN: u32 = 512;
-    pub const LINES_SKIP_BACK: u32 = 1024;
-}
-
 impl Frame {
     /// The numbers of a plan.
     pub fn new(plan: &DrawPlan<'_>) -> Self {
@@ -91,38 +77,29 @@ impl Frame {
             background: plan.background,
             width: plan.width_px,
             height: plan.height_px,
-            samples: plan.samples,
             triangle_count: plan.triangles.len() as u32,
             hull_base: plan.positions.len() as u32,
             ..Self::default()
         };
         if let Some(surface) = &plan.surface {
-            frame.surface(plan, surface);
+            frame.surface(surface);
         }
         if let Some(hull) = &plan.hull {
-            frame.flags |= flags::HULL;
             frame.hull_color = hull.color;
-            match hull.offset {
-                HullOffset::Object(units) => frame.hull_push = units,
-                HullOffset::Px(px) => {
-                    frame.flags |= flags::HULL_PX;
-                    frame.hull_push = 256.0 * px;
-                }
-            }
+            frame.hull_push = match hull.offset {
+                HullOffset::Object(units) => units,
+                HullOffset::Px(px) => 256.0 * px,
+            };
         }
         if let Some(lines) = &plan.lines {
-            frame.lines(plan, lines);
+            frame.line_color = lines.color;
+            frame.line_width = lines.width_px;
+            frame.line_smoothing = lines.smoothing_px;
         }
         frame
     }
 
-    fn surface(&mut self, plan: &DrawPlan<'_>, surface: &SurfacePass<'_>) {
-        self.flags |= flags::SURFACE;
-        self.flags |= match surface.normals {
-            Normals::None => 0,
-            Normals::Face(_) => flags::FACE_NORMALS,
-            Normals::Vertex { .. } => flags::VERTEX_NORMALS,
-        };
+    fn surface(&mut self, surface: &SurfacePass<'_>) {
         self.metallic = surface.metallic;
         self.roughness = surface.roughness;
         self.intensity = surface.intensity;
@@ -131,31 +108,10 @@ impl Frame {
         self.halfway = xyz(surface.halfway);
         self.materials_at = surface.material_colors.len() as u32 * 4;
         self.masks_at = self.materials_at + surface.triangle_materials.len() as u32;
-        if surface.triangle_materials.len() == plan.triangles.len() {
-            self.flags |= flags::TRIANGLE_MATERIALS;
-        }
         if let Some(wire) = &surface.fwidth {
-            self.flags |= flags::FWIDTH;
             self.wire_color = wire.color;
             self.wire_thickness = wire.thickness;
             self.wire_smoothing = wire.smoothing;
-            if wire.edge_masks.len() == plan.triangles.len() {
-                self.flags |= flags::EDGE_MASKS;
-            }
-        }
-    }
-
-    fn lines(&mut self, plan: &DrawPlan<'_>, lines: &LinePass) {
-        self.flags |= flags::LINES;
-        self.line_color = lines.color;
-        self.line_width = lines.width_px;
-        self.line_smoothing = lines.smoothing_px;
-        // Where there is no surface there is nothing to hide behind, and no samples to ask.
-        if lines.hide_behind_surface && (plan.surface.is_some() || plan.hull.is_some()) {
-            self.flags |= flags::LINES_HIDDEN;
-        }
-        if lines.skip_back_edges {
-            self.flags |= flags::LINES_SKIP_BACK;
         }
     }
 }
@@ -198,26 +154,5 @@ mod tests {
     fn sizes_are_those_of_the_shader() {
         assert_eq!(size_of::<Frame>(), 256);
         assert_eq!(size_of::<Batch>(), 52);
-    }
-
-    #[test]
-    fn flags_are_those_of_the_shader() {
-        let shader = include_str!("../../../shaders/common.wgsl");
-        let all = [
-            ("SURFACE", flags::SURFACE),
-            ("HULL", flags::HULL),
-            ("HULL_PX", flags::HULL_PX),
-            ("FACE_NORMALS", flags::FACE_NORMALS),
-            ("VERTEX_NORMALS", flags::VERTEX_NORMALS),
-            ("FWIDTH", flags::FWIDTH),
-            ("TRIANGLE_MATERIALS", flags::TRIANGLE_MATERIALS),
-            ("EDGE_MASKS", flags::EDGE_MASKS),
-            ("LINES", flags::LINES),
-            ("LINES_HIDDEN", flags::LINES_HIDDEN),
-            ("LINES_SKIP_BACK", flags::LINES_SKIP_BACK),
-        ];
-        for (name, value) in all {
-            assert!(shader.contains(&format!("const {name}: u32 = {value}u;")), "{name}");
-        }
     }
 }

@@ -6,11 +6,13 @@ use std::sync::mpsc;
 
 use super::buffers::Buffers;
 use super::device::Gpu;
+use super::look::look;
 use super::params::{BATCH_STRIDE, Batch, Frame, pack};
 use super::schedule::Tiles;
 use super::stages::{Pipeline, Slot, Stage, uniforms_layout};
 use crate::backend::DrawError;
 use crate::limits::Deadline;
+use crate::plan::DrawPlan;
 
 /// One job's commands.
 pub struct Recorder<'a> {
@@ -19,6 +21,7 @@ pub struct Recorder<'a> {
     buffers: &'a mut Buffers,
     uniforms: wgpu::BindGroup,
     spare_batch: usize,
+    look: u32,
     kernels: HashMap<Stage, (Arc<Pipeline>, wgpu::BindGroup)>,
     encoder: Option<wgpu::CommandEncoder>,
     pass: Option<wgpu::ComputePass<'static>>,
@@ -31,10 +34,11 @@ impl<'a> Recorder<'a> {
         gpu: &'a Gpu,
         deadline: &'a Deadline,
         buffers: &'a mut Buffers,
-        frame: &Frame,
+        plan: &DrawPlan<'_>,
         batches: &[Batch],
     ) -> Self {
-        let frame = Buffers::upload_uniform(gpu, &mut buffers.frame, bytemuck::bytes_of(frame)).clone();
+        let frame = Frame::new(plan);
+        let frame = Buffers::upload_uniform(gpu, &mut buffers.frame, bytemuck::bytes_of(&frame)).clone();
         // One more, for dispatches whose numbers are known only on the way.
         let spare_batch = batches.len();
         let packed = pack(&[batches, &[Batch::default()]].concat());
@@ -54,6 +58,7 @@ impl<'a> Recorder<'a> {
             buffers,
             uniforms,
             spare_batch,
+            look: look(plan),
             kernels: HashMap::new(),
             encoder: None,
             pass: None,
@@ -161,7 +166,7 @@ impl<'a> Recorder<'a> {
     }
 
     fn kernel(&mut self, stage: Stage) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
-        let pipeline = self.gpu.stages.get(&self.gpu.device, stage);
+        let pipeline = self.gpu.stages.get(&self.gpu.device, stage, self.look);
         let mut bound = Vec::new();
         for &(slot, _) in stage.buffers() {
             bound.push((slot, self.buffers.storage(self.gpu, slot)?.clone()));

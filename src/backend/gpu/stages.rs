@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::look;
+
 /// A kernel, in one of its variants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
@@ -37,16 +39,6 @@ pub enum Write {
     Depth,
     /// The lowest id of those that have that depth.
     Id,
-}
-
-impl Write {
-    fn constants(self) -> Vec<(&'static str, f64)> {
-        match self {
-            Self::Both => vec![],
-            Self::Depth => vec![("PHASE", 0.0)],
-            Self::Id => vec![("PHASE", 1.0)],
-        }
-    }
 }
 
 /// Buffers by their binding number in group 1 of every shader.
@@ -89,15 +81,16 @@ pub struct Pipeline {
 /// All pipelines of a device so far.
 #[derive(Default)]
 pub struct Stages {
-    made: Mutex<HashMap<Stage, Arc<Pipeline>>>,
+    made: Mutex<HashMap<(Stage, u32), Arc<Pipeline>>>,
 }
 
 impl Stages {
-    /// The pipeline of a stage.
-    pub fn get(&self, device: &wgpu::Device, stage: Stage) -> Arc<Pipeline> {
+    /// The pipeline of a stage for a plan of this look.
+    pub fn get(&self, device: &wgpu::Device, stage: Stage, look: u32) -> Arc<Pipeline> {
+        let look = look & stage.looks();
         // Held while compiling: two workers that begin together want the same pipelines.
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        made.entry(stage).or_insert_with(|| Arc::new(stage.compile(device))).clone()
+        made.entry((stage, look)).or_insert_with(|| Arc::new(stage.compile(device, look))).clone()
     }
 }
 
@@ -204,15 +197,33 @@ impl Stage {
         }
     }
 
-    /// Values of the kernel's `override` constants.
-    fn constants(self) -> Vec<(&'static str, f64)> {
+    /// The flags that the kernel reads; there is a pipeline for every combination that a plan asks for.
+    fn looks(self) -> u32 {
+        const SHADED: u32 = look::SURFACE | look::FACE_NORMALS | look::VERTEX_NORMALS | look::FWIDTH;
         match self {
-            Self::Visibility { write } | Self::VisibilityTile { write } => write.constants(),
-            _ => vec![],
+            Self::Transform | Self::Clip => look::HULL_PX,
+            Self::Visibility { .. } | Self::VisibilityTile { .. } => look::FOUR_SAMPLES,
+            Self::Shade => SHADED | look::TRIANGLE_MATERIALS | look::EDGE_MASKS | look::CLIPPED | look::FOUR_SAMPLES,
+            Self::Lines => look::LINES_HIDDEN | look::LINES_SKIP_BACK | look::CLIPPED | look::FOUR_SAMPLES,
+            Self::Resolve => look::SURFACE | look::HULL | look::LINES,
         }
     }
 
-    fn compile(self, device: &wgpu::Device) -> Pipeline {
+    /// Values of the kernel's `override` constants.
+    fn constants(self, look: u32) -> Vec<(&'static str, f64)> {
+        let look = ("LOOK", f64::from(look));
+        match self {
+            Self::Visibility { write: Write::Depth } | Self::VisibilityTile { write: Write::Depth } => {
+                vec![look, ("PHASE", 0.0)]
+            }
+            Self::Visibility { write: Write::Id } | Self::VisibilityTile { write: Write::Id } => {
+                vec![look, ("PHASE", 1.0)]
+            }
+            _ => vec![look],
+        }
+    }
+
+    fn compile(self, device: &wgpu::Device, look: u32) -> Pipeline {
         let label = Some(self.entry());
         let source = wgpu::ShaderSource::Wgsl(self.source().into());
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
@@ -229,7 +240,7 @@ impl Stage {
             module: &module,
             entry_point: label,
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &self.constants(),
+                constants: &self.constants(look),
                 // The kernels write their workgroup memory before they read it.
                 zero_initialize_workgroup_memory: false,
             },
