@@ -150,7 +150,7 @@ fn jittered_grid(seed: u64) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
         for i in 0..n {
             let at = |di: u32, dj: u32| (j + dj) * (n + 1) + i + di;
             let (a, b, c, d) = (at(0, 0), at(1, 0), at(1, 1), at(0, 1));
-            if random.next() % 2 == 0 {
+            if random.next().is_multiple_of(2) {
                 triangles.extend([[a, b, c], [a, c, d]]);
             } else {
                 triangles.extend([[b, c, d], [d, a, b]]);

@@ -82,7 +82,7 @@ pub fn gear(teeth: usize) -> String {
         let step = (u * steps as f64).round() as usize;
         let outer = if step % 4 < 2 { 1.0 } else { 0.78 };
         let (radius, z) = [(0.4, -0.15), (outer, -0.15), (outer, 0.15), (0.4, 0.15)][(v * 4.0).round() as usize % 4];
-        let a = (step as f64 + if step % 2 == 0 { 0.15 } else { -0.15 }) / steps as f64 * TAU;
+        let a = (step as f64 + if step.is_multiple_of(2) { 0.15 } else { -0.15 }) / steps as f64 * TAU;
         [radius * a.cos(), radius * a.sin(), z]
     });
     obj.finish()
