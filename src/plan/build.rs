@@ -24,6 +24,8 @@ pub fn build<'a>(mesh: &'a Mesh, spec: &Spec, budget: &mut Budget) -> Result<Dra
     let pixels = u64::from(size_px[0]) * u64::from(size_px[1]);
     budget.spend("the picture", pixels, 4)?;
     budget.spend("vertices on screen", mesh.positions.len() as u64, 32)?;
+    // Up to eight 4-byte entries in the lists of what each part of the picture has to draw.
+    budget.spend("lists of triangles", mesh.triangles.len() as u64, 32)?;
 
     let offset = spec.outline.map(|outline| hull_offset(mesh, &outline));
     let camera = Camera::place(&spec.camera, mesh, size_px, border(spec, offset));

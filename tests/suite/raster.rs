@@ -212,3 +212,21 @@ fn plan<'a>(positions: &'a [[f32; 3]], triangles: &'a [[u32; 3]], samples: u32) 
         skips: Vec::new(),
     }
 }
+
+#[test]
+fn huge_triangles_by_the_thousand_stop_when_told() {
+    let positions: Vec<[f32; 3]> = (0..3).map(|i| [[-2.0, -2.0, 0.5], [6.0, -2.0, 0.5], [-2.0, 6.0, 0.5]][i]).collect();
+    let triangles = vec![[0, 1, 2]; 300_000];
+    let mut plan = plan(&positions, &triangles, 4);
+    (plan.width_px, plan.height_px) = (1024, 2048);
+    let deadline = Deadline::default();
+    let began = std::time::Instant::now();
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            std::thread::sleep(std::time::Duration::from_millis(100));
+            deadline.stop();
+        });
+        assert!(CpuRenderer::new(2).draw(&plan, &deadline).is_err(), "it ended before it was told to");
+    });
+    assert!(began.elapsed().as_millis() < 2000, "it went on for {:?} after it was told to stop", began.elapsed());
+}

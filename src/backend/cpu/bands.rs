@@ -1,140 +1,24 @@
-//! Bands of rows: which triangles and edges each one sees, and how one is drawn from start to finish.
+//! Bands of rows: how one is drawn from start to finish.
 
 use std::sync::{Mutex, PoisonError};
 
-use rayon::prelude::*;
-
-use super::clip::clip_triangle;
+use super::bins::Bins;
 use super::isa::dispatch;
 use super::resolve::resolve;
-use super::transform::{ScreenVertex, homogeneous};
-use super::visibility::{self, NOTHING, SampleBand, Setup, area, axis_bounds, is_wanted};
-use super::{CHUNK, Stages, lines, shade};
-use crate::limits::{Deadline, Stopped};
-use crate::plan::{DrawPlan, Faces};
+use super::visibility::{self, NOTHING, SampleBand, Setup};
+use super::{Stages, lines, shade};
+use crate::plan::DrawPlan;
 
 /// Sample memory of a band, bytes: half of a common 1 MiB second-level cache.
 const BAND_BYTES: usize = 512 << 10;
+
+/// Triangles or edges between two looks at the deadline: at most some 10 ms, however large each is.
+const CHECK_EVERY: usize = 256;
 
 /// Rows in each band but the last.
 pub fn rows_per_band(plan: &DrawPlan<'_>) -> u32 {
     let row_bytes = plan.width_px as usize * plan.samples as usize * 8;
     ((BAND_BYTES / row_bytes.max(1)) as u32).clamp(1, plan.height_px.max(1))
-}
-
-/// What each band has to draw, chunk by chunk in ascending order.
-pub struct Bins {
-    triangles: Vec<ChunkBins>,
-    edges: Vec<Vec<Vec<u32>>>,
-}
-
-/// A chunk's triangles by band.
-struct ChunkBins {
-    /// Ids.
-    whole: Vec<Vec<u32>>,
-    /// Pieces of triangles that had to be clipped.
-    pieces: Vec<Vec<(u32, [ScreenVertex; 3])>>,
-}
-
-/// Sorts the plan's triangles and edges into bands.
-pub fn bin(
-    stages: &Stages<'_>,
-    pool: Option<&rayon::ThreadPool>,
-    rows: u32,
-    deadline: &Deadline,
-) -> Result<Bins, Stopped> {
-    let plan = stages.plan;
-    let count = plan.triangles.len();
-    let surface = plan.surface.as_ref().map(|s| (0..count, s.faces));
-    let hull = plan.hull.as_ref().map(|_| (count..2 * count, Faces::Back));
-    let chunks: Vec<_> = [surface, hull]
-        .into_iter()
-        .flatten()
-        .flat_map(|(ids, faces)| {
-            let end = ids.end;
-            ids.step_by(CHUNK).map(move |first| (first..end.min(first + CHUNK), faces))
-        })
-        .collect();
-    let triangles = map(pool, chunks, |(ids, faces)| match deadline.check() {
-        Ok(()) => bin_triangles(stages, rows, ids, faces),
-        Err(Stopped) => ChunkBins { whole: Vec::new(), pieces: Vec::new() },
-    });
-    let edge_count = plan.lines.as_ref().map_or(0, |lines| lines.edges.len());
-    let edge_chunks = (0..edge_count).step_by(CHUNK).map(|first| first..edge_count.min(first + CHUNK)).collect();
-    let edges = map(pool, edge_chunks, |range| match deadline.check() {
-        Ok(()) => bin_edges(stages, rows, range),
-        Err(Stopped) => Vec::new(),
-    });
-    deadline.check()?;
-    Ok(Bins { triangles, edges })
-}
-
-fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
-    plan.height_px.div_ceil(rows) as usize
-}
-
-fn bin_triangles(stages: &Stages<'_>, rows: u32, ids: std::ops::Range<usize>, faces: Faces) -> ChunkBins {
-    let plan = stages.plan;
-    let bands = band_count(plan, rows);
-    let mut bins = ChunkBins { whole: vec![Vec::new(); bands], pieces: vec![Vec::new(); bands] };
-    for id in ids {
-        let vertices = stages.screen_triangle(id as u32);
-        if vertices.iter().any(ScreenVertex::is_outside) {
-            bin_clipped(stages, rows, id as u32, faces, &mut bins);
-        } else if is_wanted(faces, area(&vertices))
-            && let Some([first, last]) = bands_of(plan, rows, &vertices)
-        {
-            for band in first..=last {
-                bins.whole[band].push(id as u32);
-            }
-        }
-    }
-    bins
-}
-
-fn bin_clipped(stages: &Stages<'_>, rows: u32, id: u32, faces: Faces, bins: &mut ChunkBins) {
-    let plan = stages.plan;
-    if !plan.projection.clip {
-        return;
-    }
-    let corners = stages.positions_of(id).map(|(position, _)| homogeneous(&plan.projection, position));
-    clip_triangle(&plan.projection, corners, |piece| {
-        if is_wanted(faces, area(&piece))
-            && let Some([first, last]) = bands_of(plan, rows, &piece)
-        {
-            for band in first..=last {
-                bins.pieces[band].push((id, piece));
-            }
-        }
-    });
-}
-
-/// First and last band that a triangle on screen touches; None if it lies beside, above or below the picture.
-#[inline(always)]
-fn bands_of(plan: &DrawPlan<'_>, rows: u32, v: &[ScreenVertex; 3]) -> Option<[usize; 2]> {
-    axis_bounds(&v.map(|v| v.x), plan.width_px, 0, plan.width_px)?;
-    let [first, last] = axis_bounds(&v.map(|v| v.y), plan.height_px, 0, plan.height_px)?;
-    Some([first as usize / rows as usize, last as usize / rows as usize])
-}
-
-fn bin_edges(stages: &Stages<'_>, rows: u32, range: std::ops::Range<usize>) -> Vec<Vec<u32>> {
-    let mut bins = vec![Vec::new(); band_count(stages.plan, rows)];
-    let Some(pass) = &stages.plan.lines else { return bins };
-    for i in range {
-        let edge = &pass.edges[i];
-        if lines::is_back_edge(stages, pass, edge) {
-            continue;
-        }
-        if let Some(segment) = lines::Segment::new(stages, pass, edge) {
-            let [first, last] = segment.rows(stages.plan.height_px);
-            for band in first / rows as i32..=last / rows as i32 {
-                if first <= last {
-                    bins[band as usize].push(i as u32);
-                }
-            }
-        }
-    }
-    bins
 }
 
 /// A band's buffers, kept from band to band.
@@ -230,18 +114,22 @@ dispatch! {
 #[inline(always)]
 fn triangles_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) {
     for chunk in &bins.triangles {
-        // Pieces come first and out of order, so that ties must be looked at: only where something was clipped at all.
-        for (id, piece) in &chunk.pieces[band] {
+        // What is not in ascending order comes with ties looked at.
+        let ordered = chunk.whole.is_ordered() && !stages.plan.projection.clip;
+        for (id, piece) in chunk.pieces_in(band) {
             if let Some(setup) = Setup::new(piece) {
-                visibility::draw::<true>(&setup, *id, samples);
+                visibility::draw::<true>(&setup, id, samples);
             }
         }
-        for &id in &chunk.whole[band] {
+        for (i, id) in chunk.whole.items_in(band).enumerate() {
+            if i % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
+                return;
+            }
             if let Some(setup) = Setup::new(&stages.screen_triangle(id)) {
-                if stages.plan.projection.clip {
-                    visibility::draw::<true>(&setup, id, samples);
-                } else {
+                if ordered {
                     visibility::draw::<false>(&setup, id, samples);
+                } else {
+                    visibility::draw::<true>(&setup, id, samples);
                 }
             }
         }
@@ -253,19 +141,11 @@ fn edges_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &SampleB
     let Some(pass) = &stages.plan.lines else { return };
     let mut planes = lines::PlaneCache::new();
     for chunk in &bins.edges {
-        for &edge in &chunk[band] {
+        for (i, edge) in chunk.items_in(band).enumerate() {
+            if i % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
+                return;
+            }
             lines::draw(stages, pass, &pass.edges[edge as usize], samples, &mut planes, ink);
         }
-    }
-}
-
-fn map<T: Send, U: Send>(
-    pool: Option<&rayon::ThreadPool>,
-    items: Vec<T>,
-    each: impl Fn(T) -> U + Sync + Send,
-) -> Vec<U> {
-    match pool {
-        Some(pool) => pool.install(|| items.into_par_iter().map(each).collect()),
-        None => items.into_iter().map(each).collect(),
     }
 }

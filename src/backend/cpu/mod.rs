@@ -7,6 +7,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod bands;
+mod bins;
 mod clip;
 mod isa;
 mod lines;
@@ -19,7 +20,8 @@ pub use isa::Isa;
 
 use rayon::prelude::*;
 
-use self::bands::{BandScratch, Bins};
+use self::bands::BandScratch;
+use self::bins::Bins;
 use self::resolve::SrgbEncoder;
 use self::transform::ScreenVertex;
 use super::{BackendKind, DrawError, Renderer};
@@ -44,6 +46,7 @@ pub struct CpuRenderer {
 /// What every stage reads: the plan and the vertices on screen.
 pub struct Stages<'a> {
     plan: &'a DrawPlan<'a>,
+    deadline: &'a Deadline,
     vertices: &'a [ScreenVertex],
     hull_vertices: &'a [ScreenVertex],
     isa: Isa,
@@ -91,9 +94,10 @@ impl CpuRenderer {
         }
     }
 
-    fn stages<'a>(&'a self, plan: &'a DrawPlan<'a>) -> Stages<'a> {
+    fn stages<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> Stages<'a> {
         Stages {
             plan,
+            deadline,
             vertices: &self.vertices,
             hull_vertices: &self.hull_vertices,
             isa: self.isa,
@@ -112,9 +116,9 @@ impl CpuRenderer {
     ) -> Result<(), DrawError> {
         deadline.check()?;
         self.transform(plan);
-        let stages = self.stages(plan);
+        let stages = self.stages(plan, deadline);
         let rows = bands::rows_per_band(plan);
-        let bins = bands::bin(&stages, self.pool.as_ref(), rows, deadline)?;
+        let bins = bins::bin(&stages, self.pool.as_ref(), rows)?;
         let row_len = out.len() / plan.height_px as usize;
         let items = out.chunks_mut(row_len * rows as usize).enumerate().collect();
         run(self.pool.as_ref(), items, |(band, out)| {

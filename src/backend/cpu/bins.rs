@@ -1,0 +1,175 @@
+//! Which triangles and edges each band of rows sees.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::clip::clip_triangle;
+use super::transform::{ScreenVertex, homogeneous};
+use super::visibility::{area, axis_bounds, is_wanted};
+use super::{CHUNK, Stages, lines};
+use crate::limits::Stopped;
+use crate::plan::{DrawPlan, Faces};
+
+/// What touches more bands than this is listed once for all of them, or large triangles on a tall picture would take
+/// gigabytes of lists.
+const TALL_BANDS: usize = 8;
+
+/// What each band has to draw, chunk by chunk in ascending order.
+pub struct Bins {
+    pub triangles: Vec<TriangleBin>,
+    pub edges: Vec<Bin>,
+}
+
+/// A chunk's triangles by band.
+#[derive(Default)]
+pub struct TriangleBin {
+    /// Ids of triangles that need no clipping.
+    pub whole: Bin,
+    /// What clipping left of others, with the first and last band.
+    pieces: Vec<(u32, [u32; 2], [ScreenVertex; 3])>,
+}
+
+/// A chunk's items by band.
+#[derive(Default)]
+pub struct Bin {
+    by_band: Vec<Vec<u32>>,
+    /// Items that touch many bands, with the first and last.
+    tall: Vec<(u32, [u32; 2])>,
+}
+
+impl Bin {
+    fn new(bands: usize) -> Self {
+        Self { by_band: vec![Vec::new(); bands], tall: Vec::new() }
+    }
+
+    fn push(&mut self, item: u32, [first, last]: [usize; 2]) {
+        if last - first >= TALL_BANDS {
+            self.tall.push((item, [first as u32, last as u32]));
+            return;
+        }
+        for band in &mut self.by_band[first..=last] {
+            band.push(item);
+        }
+    }
+
+    /// Whether every band's items come in ascending order.
+    pub fn is_ordered(&self) -> bool {
+        self.tall.is_empty()
+    }
+
+    /// The band's items.
+    pub fn items_in(&self, band: usize) -> impl Iterator<Item = u32> {
+        let tall = self.tall.iter().filter(move |(_, bands)| contains(*bands, band)).map(|&(item, _)| item);
+        self.by_band.get(band).into_iter().flatten().copied().chain(tall)
+    }
+}
+
+impl TriangleBin {
+    /// The band's clipped pieces, and whose they are.
+    pub fn pieces_in(&self, band: usize) -> impl Iterator<Item = (u32, &[ScreenVertex; 3])> {
+        self.pieces.iter().filter(move |(_, bands, _)| contains(*bands, band)).map(|(id, _, piece)| (*id, piece))
+    }
+}
+
+fn contains([first, last]: [u32; 2], band: usize) -> bool {
+    (first as usize..=last as usize).contains(&band)
+}
+
+/// Sorts the plan's triangles and edges into bands of `rows`.
+pub fn bin(stages: &Stages<'_>, pool: Option<&rayon::ThreadPool>, rows: u32) -> Result<Bins, Stopped> {
+    let plan = stages.plan;
+    let count = plan.triangles.len();
+    let surface = plan.surface.as_ref().map(|s| (0..count, s.faces));
+    let hull = plan.hull.as_ref().map(|_| (count..2 * count, Faces::Back));
+    let passes = [surface, hull].into_iter().flatten();
+    let jobs = passes.flat_map(|(ids, faces)| chunks(ids).map(move |chunk| (chunk, faces))).collect();
+    let triangles = map(pool, jobs, |(ids, faces)| match stages.deadline.check() {
+        Ok(()) => bin_triangles(stages, rows, ids, faces),
+        Err(Stopped) => TriangleBin::default(),
+    });
+    let edges = 0..plan.lines.as_ref().map_or(0, |lines| lines.edges.len());
+    let edges = map(pool, chunks(edges).collect(), |range| match stages.deadline.check() {
+        Ok(()) => bin_edges(stages, rows, range),
+        Err(Stopped) => Bin::default(),
+    });
+    stages.deadline.check()?;
+    Ok(Bins { triangles, edges })
+}
+
+fn chunks(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let end = range.end;
+    range.step_by(CHUNK).map(move |first| first..end.min(first + CHUNK))
+}
+
+fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
+    plan.height_px.div_ceil(rows) as usize
+}
+
+fn bin_triangles(stages: &Stages<'_>, rows: u32, ids: Range<usize>, faces: Faces) -> TriangleBin {
+    let plan = stages.plan;
+    let mut bin = TriangleBin { whole: Bin::new(band_count(plan, rows)), pieces: Vec::new() };
+    for id in ids {
+        let vertices = stages.screen_triangle(id as u32);
+        if vertices.iter().any(ScreenVertex::is_outside) {
+            bin_clipped(stages, rows, id as u32, faces, &mut bin);
+        } else if is_wanted(faces, area(&vertices))
+            && let Some(bands) = bands_of(plan, rows, &vertices)
+        {
+            bin.whole.push(id as u32, bands);
+        }
+    }
+    bin
+}
+
+fn bin_clipped(stages: &Stages<'_>, rows: u32, id: u32, faces: Faces, bin: &mut TriangleBin) {
+    let plan = stages.plan;
+    if !plan.projection.clip {
+        return;
+    }
+    let corners = stages.positions_of(id).map(|(position, _)| homogeneous(&plan.projection, position));
+    clip_triangle(&plan.projection, corners, |piece| {
+        if is_wanted(faces, area(&piece))
+            && let Some(bands) = bands_of(plan, rows, &piece)
+        {
+            bin.pieces.push((id, bands.map(|band| band as u32), piece));
+        }
+    });
+}
+
+/// First and last band that a triangle on screen touches; None if it lies beside, above or below the picture.
+#[inline(always)]
+fn bands_of(plan: &DrawPlan<'_>, rows: u32, v: &[ScreenVertex; 3]) -> Option<[usize; 2]> {
+    axis_bounds(&v.map(|v| v.x), plan.width_px, 0, plan.width_px)?;
+    let [first, last] = axis_bounds(&v.map(|v| v.y), plan.height_px, 0, plan.height_px)?;
+    Some([first as usize / rows as usize, last as usize / rows as usize])
+}
+
+fn bin_edges(stages: &Stages<'_>, rows: u32, range: Range<usize>) -> Bin {
+    let mut bin = Bin::new(band_count(stages.plan, rows));
+    let Some(pass) = &stages.plan.lines else { return bin };
+    for i in range {
+        let edge = &pass.edges[i];
+        if lines::is_back_edge(stages, pass, edge) {
+            continue;
+        }
+        if let Some(segment) = lines::Segment::new(stages, pass, edge) {
+            let [first, last] = segment.rows(stages.plan.height_px);
+            if first <= last {
+                bin.push(i as u32, [first, last].map(|row| row as usize / rows as usize));
+            }
+        }
+    }
+    bin
+}
+
+fn map<T: Send, U: Send>(
+    pool: Option<&rayon::ThreadPool>,
+    items: Vec<T>,
+    each: impl Fn(T) -> U + Sync + Send,
+) -> Vec<U> {
+    match pool {
+        Some(pool) => pool.install(|| items.into_par_iter().map(each).collect()),
+        None => items.into_iter().map(each).collect(),
+    }
+}
