@@ -14,6 +14,8 @@ RUN apt-get update -qq \
     && rm -rf /var/lib/apt/lists/* \
     && useradd --system --no-create-home --shell /usr/sbin/nologin meshsnap
 COPY --from=build /usr/local/bin/meshsnap /usr/local/bin/meshsnap
+# The Vulkan loader complains on standard error where this is missing.
+ENV XDG_RUNTIME_DIR=/tmp
 USER meshsnap
 # A container must listen beyond loopback to be reached at all, and that needs a decision about keys: set
 # MESHSNAP_API_KEYS, or MESHSNAP_NO_AUTH=true where the network around the container keeps strangers out.

@@ -4,8 +4,10 @@ use std::sync::{Mutex, PoisonError};
 
 use super::bins::Bins;
 use super::isa::dispatch;
+use super::occluders::PlaneCache;
 use super::resolve::resolve;
-use super::visibility::{self, NOTHING, SampleBand, Setup};
+use super::samples::{NOTHING, SampleBand};
+use super::visibility::{self, Setup};
 use super::{Stages, lines, shade};
 use crate::plan::DrawPlan;
 
@@ -139,7 +141,7 @@ fn triangles_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut
 #[inline(always)]
 fn edges_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &SampleBand, ink: &mut [u32]) {
     let Some(pass) = &stages.plan.lines else { return };
-    let mut planes = lines::PlaneCache::new();
+    let mut planes = PlaneCache::new();
     for chunk in &bins.edges {
         for (i, edge) in chunk.items_in(band).enumerate() {
             if i % CHECK_EVERY == 0 && stages.deadline.check().is_err() {

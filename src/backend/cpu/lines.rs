@@ -6,8 +6,10 @@
 
 use super::Stages;
 use super::clip::clip_segment;
+use super::occluders::PlaneCache;
+use super::samples::{NOTHING, SampleBand};
 use super::transform::{ScreenVertex, homogeneous};
-use super::visibility::{NOTHING, SampleBand, Setup, area};
+use super::visibility::area;
 use crate::plan::{Edge, LinePass};
 
 /// Farthest from the middle of a unit box to its corner.
@@ -64,9 +66,15 @@ impl Segment {
         [(low as i32).max(0), (high as i32).min(width_px as i32 - 1)]
     }
 
+    /// The point at `t` of the way, pixels from the picture's upper left corner.
+    #[inline(always)]
+    pub fn point(&self, t: f32) -> [f32; 2] {
+        [self.start[0] + t * self.along[0], self.start[1] + t * self.along[1]]
+    }
+
     /// Whether the point at `t` lies within twice the reach of the first and of the second end.
     #[inline(always)]
-    fn close_to_ends(&self, t: f32) -> [bool; 2] {
+    pub fn close_to_ends(&self, t: f32) -> [bool; 2] {
         // t < 2 reach / length, squared so that no root is needed.
         let limit = 4.0 * self.reach * self.reach * self.inverse_length_squared;
         [t * t < limit, (1.0 - t) * (1.0 - t) < limit]
@@ -221,76 +229,6 @@ fn visible_samples(
         count += u32::from(nothing_nearer || last.1);
     }
     count
-}
-
-/// A triangle's plane, as a thing that edges may lie behind.
-#[derive(Clone, Copy)]
-struct Plane {
-    id: u32,
-    vertices: [u32; 3],
-    /// Depth at the picture's corner and its change a pixel.
-    depth: [f32; 3],
-    /// What the surface may fall away over three quarters of a pixel: the curvature between neighbouring faces.
-    tolerance: f32,
-}
-
-impl Plane {
-    fn new(stages: &Stages<'_>, id: u32) -> Self {
-        let (vertices, is_hull) = stages.triangle(id);
-        // A hull shares its vertices' numbers with the surface, but not their place.
-        let vertices = if is_hull { [u32::MAX; 3] } else { vertices };
-        let corners = stages.screen_triangle(id);
-        let in_front = Self { id, vertices, depth: [f32::INFINITY, 0.0, 0.0], tolerance: 0.0 };
-        if corners.iter().any(ScreenVertex::is_outside) {
-            return in_front;
-        }
-        Setup::new(&corners).map_or(in_front, |setup| {
-            let [z, gx, gy] = setup.depth;
-            let half = [stages.plan.width_px as f32 * 128.0, stages.plan.height_px as f32 * 128.0];
-            let corner = z - gx * (setup.x[0] as f32 + half[0]) - gy * (setup.y[0] as f32 + half[1]);
-            let (gx, gy) = (256.0 * gx, 256.0 * gy);
-            Self { id, vertices, depth: [corner, gx, gy], tolerance: 0.75 * (gx.abs() + gy.abs()) }
-        })
-    }
-
-    /// Whether this triangle, which is nearer than the edge at a sample close by, really lies in front of it. The plane is
-    /// continued to the edge's own point, because close to a fold the sample itself may be nearer without hiding anything.
-    #[inline(always)]
-    fn hides(&self, edge: &Edge, segment: &Segment, t: f32, depth: f32) -> bool {
-        let point = [segment.start[0] + t * segment.along[0], segment.start[1] + t * segment.along[1]];
-        let plane = self.depth[0] + self.depth[1] * point[0] + self.depth[2] * point[1];
-        plane > depth + self.tolerance && !self.meets(edge, segment, t)
-    }
-
-    /// Whether this triangle meets the edge at an end close to `t`: around a vertex, the faces of one fan do not hide each
-    /// other's edges. Farther along they may, as a silhouette hides the edges behind it.
-    #[inline(always)]
-    fn meets(&self, edge: &Edge, segment: &Segment, t: f32) -> bool {
-        let close = segment.close_to_ends(t);
-        (0..2).any(|end| close[end] && self.vertices.contains(&edge.vertices[end]))
-    }
-}
-
-/// Planes of triangles seen lately, by the low bits of their id: edges that lie close together look at the same ones.
-pub struct PlaneCache(Vec<Plane>);
-
-impl PlaneCache {
-    const LEN: usize = 1024;
-
-    /// Knows nothing yet.
-    pub fn new() -> Self {
-        let unknown = Plane { id: NOTHING, vertices: [0; 3], depth: [0.0; 3], tolerance: 0.0 };
-        Self(vec![unknown; Self::LEN])
-    }
-
-    #[inline(always)]
-    fn get(&mut self, stages: &Stages<'_>, id: u32) -> &Plane {
-        let slot = &mut self.0[id as usize % Self::LEN];
-        if slot.id != id {
-            *slot = Plane::new(stages, id);
-        }
-        slot
-    }
 }
 
 fn clip(stages: &Stages<'_>, edge: &Edge) -> Option<[ScreenVertex; 2]> {

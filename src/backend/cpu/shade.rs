@@ -4,8 +4,9 @@
 //! light is a headlight over the viewer's shoulder: Lambert plus the GGX lobe, with a sky that is brighter than the ground.
 
 use super::Stages;
+use super::samples::{NOTHING, SampleBand};
 use super::transform::{ScreenVertex, homogeneous, hull_position};
-use super::visibility::{NOTHING, SampleBand, area};
+use super::visibility::area;
 use crate::plan::{FwidthWire, Normals, SurfacePass, sample_offsets};
 
 /// Shades every pixel of the band into `colors` (premultiplied linear RGBA, row by row, nothing behind it).

@@ -1,0 +1,55 @@
+//! The visibility buffer of a band: what every sample sees, and how near it is.
+
+use super::isa::LANES;
+
+/// No triangle.
+pub const NOTHING: u32 = u32::MAX;
+
+/// Rows of samples of one horizontal band of the picture.
+pub struct SampleBand {
+    /// Picture size, pixels.
+    pub size_px: [u32; 2],
+    /// First row of the band.
+    pub first_row: u32,
+    /// Rows in the band.
+    pub rows: u32,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Samples in a row, padded so that a vector may hang over the right edge.
+    pub stride: usize,
+    /// Reversed depth at `row * stride + x * samples + s`; 0 where there is nothing.
+    pub depth: Vec<f32>,
+    /// Triangle id, laid out likewise.
+    pub ids: Vec<u32>,
+}
+
+impl SampleBand {
+    /// An empty band.
+    pub fn new(size_px: [u32; 2], first_row: u32, rows: u32, samples: u32) -> Self {
+        let stride = size_px[0] as usize * samples as usize + LANES;
+        let len = stride * rows as usize;
+        Self { size_px, first_row, rows, samples, stride, depth: vec![0.0; len], ids: vec![NOTHING; len] }
+    }
+
+    /// Empties the band.
+    pub fn clear(&mut self) {
+        self.depth.fill(0.0);
+        self.ids.fill(NOTHING);
+    }
+
+    /// Index of sample `s` of the pixel at column `x`, row `y` of the picture.
+    #[inline(always)]
+    pub fn index(&self, x: u32, y: u32, s: u32) -> usize {
+        (y - self.first_row) as usize * self.stride + (x * self.samples + s) as usize
+    }
+}
+
+impl SampleBand {
+    /// Ids and depths of a pixel's samples.
+    #[inline(always)]
+    pub fn pixel(&self, x: u32, y: u32) -> (&[u32], &[f32]) {
+        let first = self.index(x, y, 0);
+        let samples = first..first + self.samples as usize;
+        (&self.ids[samples.clone()], &self.depth[samples])
+    }
+}
