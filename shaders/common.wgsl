@@ -74,8 +74,9 @@ const LINES: u32 = 256u;
 const LINES_HIDDEN: u32 = 512u;
 const LINES_SKIP_BACK: u32 = 1024u;
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<uniform> batch: Batch;
+// Not var<uniform>: see uniforms_layout in stages.rs.
+@group(0) @binding(0) var<storage, read> frame: Frame;
+@group(0) @binding(1) var<storage, read> batch: Batch;
 
 fn has(flag: u32) -> bool {
     return (frame.flags & flag) != 0u;
