@@ -40,6 +40,19 @@ fn every_style_has_its_layers() {
 }
 
 #[test]
+fn the_default_size_keeps_to_the_limit() {
+    let limits = Limits { image_px: 100, ..Limits::default() };
+    let image = |pairs: &Overrides| {
+        let spec = read(None, pairs, &Rules { limits: limits.clone(), backend: BackendChoice::Auto }).unwrap();
+        (spec.image.width_px, spec.image.height_px)
+    };
+    assert_eq!(image(&[]), (100, 100));
+    assert_eq!(image(&[("image.width".to_owned(), "50".to_owned())]), (50, 100));
+    let spec = query(&[]).unwrap();
+    assert_eq!((spec.image.width_px, spec.image.height_px), (512, 512));
+}
+
+#[test]
 fn null_turns_a_layer_off_and_presence_turns_it_on() {
     assert!(json(r#"{"style":"wire","surface":null}"#).unwrap().surface.is_none());
     assert!(json(r#"{"style":"flat","wire":{}}"#).unwrap().wire.is_some());
@@ -182,6 +195,7 @@ fn every_bad_value_is_refused_by_name() {
         (&[("camera.eye", "1,2,3")], Conflict, "camera.eye", "camera.target"),
         (&[("camera.target", "1,2,3")], Conflict, "camera.target", "camera.eye"),
         (&[("camera.target", "1,2,3"), ("camera.eye", "1,2,3")], Conflict, "camera.target", "differ"),
+        (&[("outline.thickness", "-1")], OutOfRange, "outline.thickness", "from 0 to 1e30"),
         (&[("outline.thickness", "101"), ("outline.unit", "px")], OutOfRange, "outline.thickness", "100"),
         (&[("wire", "on")], WrongType, "wire", "null"),
         (&[("camera", "null")], WrongType, "camera", "an object"),
@@ -193,7 +207,7 @@ fn every_bad_value_is_refused_by_name() {
         let sentence = error.to_string();
         assert!(sentence.contains(part) && sentence.contains(&format!("`{key}`")), "{pairs:?}: {sentence}");
     }
-    assert_eq!(cases.len(), 50);
+    assert_eq!(cases.len(), 51);
 }
 
 #[test]
