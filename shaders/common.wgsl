@@ -77,9 +77,8 @@ const FOUR_SAMPLES: u32 = 4096u;
 // What the plan has, of the above. A constant of the pipeline, so that a kernel contains only what its plan needs.
 override LOOK: u32 = 0u;
 
-// Not var<uniform>: see uniforms_layout in stages.rs.
-@group(0) @binding(0) var<storage, read> frame: Frame;
-@group(0) @binding(1) var<storage, read> batch: Batch;
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> batch: Batch;
 
 fn has(flag: u32) -> bool {
     return (LOOK & flag) != 0u;

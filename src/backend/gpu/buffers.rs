@@ -58,10 +58,10 @@ impl Buffers {
         self.reserve(gpu, slot, 0)
     }
 
-    /// Fills a buffer of numbers that are the same for all threads.
+    /// Fills a uniform buffer.
     pub fn upload_uniform<'a>(gpu: &Gpu, slot: &'a mut Option<wgpu::Buffer>, bytes: &[u8]) -> &'a wgpu::Buffer {
         use wgpu::BufferUsages as U;
-        let buffer = grow(gpu, slot, bytes.len() as u64, gpu.limits.max_buffer_size, U::STORAGE | U::COPY_DST);
+        let buffer = grow(gpu, slot, bytes.len() as u64, gpu.limits.max_buffer_size, U::UNIFORM | U::COPY_DST);
         gpu.queue.write_buffer(buffer, 0, bytes);
         buffer
     }

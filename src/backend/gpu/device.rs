@@ -53,8 +53,8 @@ pub struct Gpu {
 /// Why the device is gone, once it is.
 type Lost = Arc<OnceLock<String>>;
 
-/// Storage buffers that the hungriest stage binds: eight of its own, and the plan's and the dispatch's numbers.
-const STORAGE_BUFFERS: u32 = 10;
+/// Storage buffers that the hungriest stage binds.
+const STORAGE_BUFFERS: u32 = 8;
 
 /// How often to look without a pause: a small picture takes a fraction of a millisecond.
 const EAGER_POLLS: u32 = 64;

@@ -95,15 +95,12 @@ impl Stages {
 }
 
 /// The layout of group 0: the plan's numbers, and at a dynamic offset the dispatch's.
-///
-/// Storage buffers, though they are uniform: lavapipe (Mesa 22) compiles a kernel anew for the values of its uniform
-/// buffers, with each job, and keeps every one of these kernels until the device is closed.
 pub fn uniforms_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let entry = |binding, has_dynamic_offset| {
         layout_entry(
             binding,
             wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Storage { read_only: true },
+                ty: wgpu::BufferBindingType::Uniform,
                 has_dynamic_offset,
                 min_binding_size: None,
             },
