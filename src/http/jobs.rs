@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use axum::Json;
+use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, Request, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -30,12 +31,8 @@ pub fn accepted(job: &Job) -> Response {
 }
 
 /// The job's state; with `Prefer: wait=N`, once it has ended or N seconds are over.
-pub async fn get(
-    State(app): State<Arc<App>>,
-    Path(id): Path<String>,
-    headers: HeaderMap,
-) -> Result<Response, ApiError> {
-    let job = find(&app, &id)?;
+pub async fn get(State(app): State<Arc<App>>, id: JobPath, headers: HeaderMap) -> Result<Response, ApiError> {
+    let job = find(&app, id)?;
     let Some(wait) = negotiate::prefer(&headers).wait else { return Ok(state_of(&job)) };
     // Running out of time is no error: the state then says that it has not ended.
     let _ = tokio::time::timeout(wait, job.ended()).await;
@@ -47,15 +44,15 @@ pub async fn get(
 }
 
 /// Cancels a job that has not ended; says what has become of it.
-pub async fn delete(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, ApiError> {
-    let job = find(&app, &id)?;
+pub async fn delete(State(app): State<Arc<App>>, id: JobPath) -> Result<Response, ApiError> {
+    let job = find(&app, id)?;
     app.jobs.cancel(&job);
     Ok(state_of(&job))
 }
 
 /// The picture, or the error that a waiting client would have got.
-pub async fn result(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, ApiError> {
-    let job = find(&app, &id)?;
+pub async fn result(State(app): State<Arc<App>>, id: JobPath) -> Result<Response, ApiError> {
+    let job = find(&app, id)?;
     let conflict = |code, detail| ApiError::new(StatusCode::CONFLICT, code, detail);
     match job.state() {
         JobState::Done(finished) => Ok(render::picture(&finished)),
@@ -67,8 +64,11 @@ pub async fn result(State(app): State<Arc<App>>, Path(id): Path<String>) -> Resu
     }
 }
 
-fn find(app: &App, id: &str) -> Result<Arc<Job>, ApiError> {
-    let job = JobId::parse(id).and_then(|id| app.jobs.find(id));
+/// What the path says in place of an id; not even text, perhaps, which is then no job's id either.
+type JobPath = Result<Path<String>, PathRejection>;
+
+fn find(app: &App, id: JobPath) -> Result<Arc<Job>, ApiError> {
+    let job = id.ok().and_then(|Path(id)| JobId::parse(&id)).and_then(|id| app.jobs.find(id));
     job.ok_or_else(|| ApiError::not_found("there is no such job, or its result has expired"))
 }
 

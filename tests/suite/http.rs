@@ -92,7 +92,9 @@ fn a_form_brings_its_document_and_the_query_overrides_it() {
 #[test]
 fn paths_and_methods_that_are_not_there() {
     let server = Server::start(&[]);
-    for path in ["/", "/v1", "/v1/render/", "/v1/nothing", "/v1/jobs/x", "/v1/jobs/../../etc/passwd", "/%00"] {
+    for path in
+        ["/", "/v1", "/v1/render/", "/v1/nothing", "/v1/jobs/x", "/v1/jobs/%ff", "/v1/jobs/../../etc/passwd", "/%00"]
+    {
         server.get(path).problem(404, "not_found");
     }
     let cases = [
