@@ -182,6 +182,7 @@ fn every_bad_value_is_refused_by_name() {
         (&[("camera.eye", "1,2,3")], Conflict, "camera.eye", "camera.target"),
         (&[("camera.target", "1,2,3")], Conflict, "camera.target", "camera.eye"),
         (&[("camera.target", "1,2,3"), ("camera.eye", "1,2,3")], Conflict, "camera.target", "differ"),
+        (&[("outline.thickness", "-1")], OutOfRange, "outline.thickness", "from 0 to 1e30"),
         (&[("outline.thickness", "101"), ("outline.unit", "px")], OutOfRange, "outline.thickness", "100"),
         (&[("wire", "on")], WrongType, "wire", "null"),
         (&[("camera", "null")], WrongType, "camera", "an object"),
@@ -193,7 +194,7 @@ fn every_bad_value_is_refused_by_name() {
         let sentence = error.to_string();
         assert!(sentence.contains(part) && sentence.contains(&format!("`{key}`")), "{pairs:?}: {sentence}");
     }
-    assert_eq!(cases.len(), 50);
+    assert_eq!(cases.len(), 51);
 }
 
 #[test]

@@ -126,7 +126,7 @@ impl Kind {
     /// What is allowed, in words.
     pub fn allowed(&self, image_px_max: u64) -> String {
         match self {
-            Self::Number { min, max } => format!("a number from {min} to {max}"),
+            Self::Number { min, max } => format!("a number from {} to {}", short(*min), short(*max)),
             Self::OneOf(values) => values.iter().map(u32::to_string).collect::<Vec<_>>().join(" or "),
             Self::Pixels => format!("a whole number from 1 to {image_px_max}"),
             Self::Size => format!("N or WxH, with whole numbers from 1 to {image_px_max}"),
@@ -184,6 +184,12 @@ impl Kind {
             }
         }
     }
+}
+
+/// `1e30` and not a one with thirty zeros after it.
+fn short(number: f64) -> String {
+    let (plain, scientific) = (number.to_string(), format!("{number:e}"));
+    if plain.len() > 2 * scientific.len() { scientific } else { plain }
 }
 
 fn pixels(number: f64, max: u64) -> Option<u32> {
