@@ -52,6 +52,10 @@ pub fn read(document: Option<&[u8]>, overrides: &Overrides, rules: &Rules) -> Re
         style = read_style(given)?;
     }
     let mut draft = Draft::new(style, rules.backend);
+    // A picture whose size nobody gave must not be larger than one that somebody could ask for.
+    let side_max = u32::try_from(rules.limits.image_px).unwrap_or(u32::MAX);
+    let image = &mut draft.spec.image;
+    (image.width_px, image.height_px) = (image.width_px.min(side_max), image.height_px.min(side_max));
     for (key, given) in pairs.iter().filter(|(key, _)| key != "style") {
         apply(&mut draft, key, given, rules)?;
     }

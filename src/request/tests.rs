@@ -40,6 +40,19 @@ fn every_style_has_its_layers() {
 }
 
 #[test]
+fn the_default_size_keeps_to_the_limit() {
+    let limits = Limits { image_px: 100, ..Limits::default() };
+    let image = |pairs: &Overrides| {
+        let spec = read(None, pairs, &Rules { limits: limits.clone(), backend: BackendChoice::Auto }).unwrap();
+        (spec.image.width_px, spec.image.height_px)
+    };
+    assert_eq!(image(&[]), (100, 100));
+    assert_eq!(image(&[("image.width".to_owned(), "50".to_owned())]), (50, 100));
+    let spec = query(&[]).unwrap();
+    assert_eq!((spec.image.width_px, spec.image.height_px), (512, 512));
+}
+
+#[test]
 fn null_turns_a_layer_off_and_presence_turns_it_on() {
     assert!(json(r#"{"style":"wire","surface":null}"#).unwrap().surface.is_none());
     assert!(json(r#"{"style":"flat","wire":{}}"#).unwrap().wire.is_some());
