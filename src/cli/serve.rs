@@ -1,5 +1,6 @@
 //! `meshsnap serve`.
 
+use std::io::ErrorKind;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
@@ -31,6 +32,9 @@ pub fn run(arguments: &ServeArgs) -> Result<(), Complaint> {
     }
     http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
         ServeError::Unprotected(_) => Complaint::usage(error.to_string()),
+        ServeError::Listen { error: ref cause, .. } if cause.kind() == ErrorKind::InvalidInput => {
+            Complaint::usage(error.to_string())
+        }
         ServeError::Listen { .. } | ServeError::Start(_) => Complaint::ours(error.to_string()),
     })
 }

@@ -117,7 +117,7 @@ fn failures_are_one_sentence_with_the_right_exit_code() {
         (&["serve", "--workers", "0"], b"", 2, "from 1 to 1024"),
         (&["serve", "--listen", "0.0.0.0:0"], b"", 2, "--no-auth"),
         (&["serve", "--listen", "[::]:0"], b"", 2, "MESHSNAP_API_KEYS"),
-        (&["serve", "--listen", "nonsense"], b"", 3, "nonsense"),
+        (&["serve", "--listen", "nonsense"], b"", 2, "nonsense"),
         (&["serve", "--config", "missing.toml"], b"", 2, "missing.toml"),
         (&["serve", "--log", "a=b=c"], b"", 2, "filter"),
         (&["health", "http://127.0.0.1:1"], b"", 1, "127.0.0.1:1"),
