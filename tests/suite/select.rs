@@ -283,4 +283,20 @@ fn a_server_says_who_drew() {
     let again = server.post("/v1/render?size=32", CUBE_OBJ);
     assert_eq!(again.header("x-render-backend"), Some(drawn_by.as_str()));
     assert_eq!(server.post("/v1/render?size=32&backend=cpu", CUBE_OBJ).header("x-render-backend"), Some("cpu"));
+    memory_stays_flat(&server);
+}
+
+/// A driver may keep something of every job: a software one keeps kernels.
+fn memory_stays_flat(server: &Server) {
+    let draw = |count: usize| {
+        for i in 0..count {
+            let style = ["flat", "wire", "outline"][i % 3];
+            let answer = server.post(&format!("/v1/render?size=32&backend=gpu&style={style}"), CUBE_OBJ);
+            assert_eq!(answer.status, 200);
+        }
+        server.resident_bytes() / (1 << 20)
+    };
+    let warm = draw(100);
+    let after = draw(200);
+    assert!(after <= warm + 64, "resident memory grew from {warm} to {after} MiB in 200 jobs");
 }

@@ -1,6 +1,7 @@
 //! One opened GPU: adapter, device, queue, and what it can do. Shared by all workers.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 
@@ -48,7 +49,12 @@ pub struct Gpu {
     pub(super) int64_atomics: bool,
     info: GpuInfo,
     lost: Lost,
+    jobs_ended: AtomicU32,
 }
+
+/// Jobs after which a software device gets new pipelines. llvmpipe compiles a kernel anew for every set of uniform values
+/// that its branches depend on, and keeps each copy (1 to 3 MiB a job) until the pipeline goes.
+const SOFTWARE_PIPELINE_JOBS: u32 = 32;
 
 /// Why the device is gone, once it is.
 type Lost = Arc<OnceLock<String>>;
@@ -101,7 +107,16 @@ impl Gpu {
         let features = if int64_atomics { vec!["int64-atomics"] } else { vec![] };
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
-        Ok(Self { device, queue, stages: Stages::default(), limits, int64_atomics, info, lost })
+        Ok(Self {
+            device,
+            queue,
+            stages: Stages::default(),
+            limits,
+            int64_atomics,
+            info,
+            lost,
+            jobs_ended: AtomicU32::new(0),
+        })
     }
 
     /// What was opened.
@@ -122,6 +137,14 @@ impl Gpu {
     /// Whether this is a processor that plays GPU.
     pub fn is_software(&self) -> bool {
         self.info.device_type == type_name(wgpu::DeviceType::Cpu)
+    }
+
+    /// To be called after each job.
+    pub(super) fn job_ended(&self) {
+        let count = self.jobs_ended.fetch_add(1, Ordering::Relaxed).wrapping_add(1);
+        if self.is_software() && count.is_multiple_of(SOFTWARE_PIPELINE_JOBS) {
+            self.stages.clear();
+        }
     }
 
     /// Runs `work` and turns what the device complains about meanwhile, on this thread, into an error.

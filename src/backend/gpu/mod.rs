@@ -54,6 +54,7 @@ impl GpuRenderer {
     fn job<T>(&mut self, job: impl FnOnce(&Gpu, &mut Buffers) -> Result<T, DrawError>) -> Result<T, DrawError> {
         self.gpu.check()?;
         let result = self.gpu.scoped(|| job(&self.gpu, &mut self.buffers));
+        self.gpu.job_ended();
         match &result {
             Ok(_) => self.buffers.trim(),
             // Work may still be running on them, and the staging buffer may be half mapped.

@@ -92,6 +92,11 @@ impl Stages {
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         made.entry((stage, look)).or_insert_with(|| Arc::new(stage.compile(device, look))).clone()
     }
+
+    /// Forgets all pipelines; jobs that use one keep it until they are done.
+    pub fn clear(&self) {
+        self.made.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
 }
 
 /// The layout of group 0: the plan's numbers, and at a dynamic offset the dispatch's.
