@@ -41,6 +41,7 @@ impl Likeness {
 
     /// Panics where the tolerance is broken.
     pub fn assert(&self, tolerance: Tolerance, what: &str) {
+        println!("{what:32} {self}");
         let share = |n: usize| n as f64 / self.pixels as f64;
         assert!(
             self.max <= tolerance.max && share(self.differing) <= tolerance.share,

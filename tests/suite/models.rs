@@ -32,9 +32,7 @@ fn every_model_is_drawn_in_every_style_alike_on_both_back_ends() {
             drawn += 1;
             if let Some(gpu) = &mut gpu {
                 let other = gpu.draw(&plan, &Deadline::default()).unwrap();
-                let like = Likeness::of(&picture, &other);
-                println!("{name:24} {style:10} {like}");
-                like.assert(Tolerance::TWINS, &format!("{name}, {style}"));
+                Likeness::of(&picture, &other).assert(Tolerance::TWINS, &format!("{name}, {style}"));
                 compared += 1;
             }
             sheet.add(&picture);
