@@ -9,6 +9,9 @@ use crate::scene::{
     WireEdges, WireMethod,
 };
 
+/// Largest thickness of a wire in multiples of `fwidth`; an exact one is in pixels.
+const FWIDTH_MAX: f32 = 10.0;
+
 /// Largest outline in pixels: wider than any picture's border needs, and far from overflowing fixed point.
 const OUTLINE_PX_MAX: f32 = 100.0;
 
@@ -65,6 +68,10 @@ impl Draft {
         if let Some(wire) = &mut self.spec.wire {
             let default = if wire.method == WireMethod::Exact { 0.0 } else { 1.0 };
             wire.smoothing = self.smoothing.unwrap_or(default);
+            if wire.method == WireMethod::Fwidth && wire.thickness > FWIDTH_MAX {
+                let allowed = format!("a number from 0 to {FWIDTH_MAX} where `wire.method` is fwidth");
+                return Err(RequestError::new(RequestFault::OutOfRange, "wire.thickness", wire.thickness, allowed));
+            }
         }
         match self.light {
             LightPreset::Headlight => self.spec.light.ambient = self.ambient.unwrap_or(0.3),

@@ -114,7 +114,7 @@ fn wire_fields() -> Vec<Field> {
     vec![
         words("wire.method", |d, v| d.wire().method = v),
         color("wire.color", |d, v| d.wire().color = v.unwrap_or(d.wire().color)),
-        number("wire.thickness", 0.0, 10.0, |d, v| d.wire().thickness = v),
+        number("wire.thickness", 0.0, 100.0, |d, v| d.wire().thickness = v),
         number("wire.smoothing", 0.0, 10.0, |d, v| {
             d.wire();
             d.smoothing = Some(v);

@@ -179,7 +179,8 @@ fn every_bad_value_is_refused_by_name() {
         (&[("format", "bmp")], OutOfRange, "format", "png"),
         (&[("background", "white")], OutOfRange, "background", "#rgb"),
         (&[("background", "")], OutOfRange, "background", "%23"),
-        (&[("wire.thickness", "11")], OutOfRange, "wire.thickness", "from 0 to 10"),
+        (&[("wire.thickness", "101")], OutOfRange, "wire.thickness", "from 0 to 100"),
+        (&[("wire.method", "fwidth"), ("wire.thickness", "11")], OutOfRange, "wire.thickness", "from 0 to 10 where"),
         (&[("wire.thickness", "inf")], OutOfRange, "wire.thickness", "from 0 to 10"),
         (&[("wire.thickness", "nan")], OutOfRange, "wire.thickness", "from 0 to 10"),
         (&[("wire.smoothing", "-0.1")], OutOfRange, "wire.smoothing", "from 0 to 10"),
@@ -207,7 +208,7 @@ fn every_bad_value_is_refused_by_name() {
         let sentence = error.to_string();
         assert!(sentence.contains(part) && sentence.contains(&format!("`{key}`")), "{pairs:?}: {sentence}");
     }
-    assert_eq!(cases.len(), 51);
+    assert_eq!(cases.len(), 52);
 }
 
 #[test]
