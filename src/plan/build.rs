@@ -26,6 +26,11 @@ pub fn build<'a>(mesh: &'a Mesh, spec: &Spec, budget: &mut Budget) -> Result<Dra
     budget.spend("vertices on screen", mesh.positions.len() as u64, 32)?;
     // Up to eight 4-byte entries in the lists of what each part of the picture has to draw.
     budget.spend("lists of triangles", mesh.triangles.len() as u64, 32)?;
+    let is_smooth = spec.surface.is_some_and(|surface| surface.shading == Shading::Smooth);
+    if spec.outline.is_some() || (is_smooth && mesh.normals.is_empty()) {
+        // Sums in f64, then the unit normals in f32.
+        budget.spend("vertex normals", mesh.positions.len() as u64, 36)?;
+    }
 
     let offset = spec.outline.map(|outline| hull_offset(mesh, &outline));
     let camera = Camera::place(&spec.camera, mesh, size_px, border(spec, offset));

@@ -3,8 +3,9 @@
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::{CpuRenderer, Isa};
 use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, Faces, Normals, Projection, SurfacePass, sample_offsets};
+use meshsnap::plan::{DrawPlan, sample_offsets};
 
+use crate::scenes;
 use crate::shapes::Random;
 
 const WIDTH: u32 = 96;
@@ -176,41 +177,7 @@ fn soup(seed: u64) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
 }
 
 fn plan<'a>(positions: &'a [[f32; 3]], triangles: &'a [[u32; 3]], samples: u32) -> DrawPlan<'a> {
-    DrawPlan {
-        width_px: WIDTH,
-        height_px: HEIGHT,
-        samples,
-        positions,
-        triangles,
-        projection: Projection {
-            x: [SCALE * 256.0, 0.0, 0.0, 0.0],
-            y: [0.0, SCALE * 256.0, 0.0, 0.0],
-            z: [0.0, 0.0, 1.0, 0.0],
-            w: [0.0, 0.0, 0.0, 1.0],
-            near_w: 0.5,
-            clip: false,
-            to_viewer: [0.0, 0.0, 1.0],
-            screen_up: [0.0, 1.0, 0.0],
-            screen_right: [1.0, 0.0, 0.0],
-        },
-        surface: Some(SurfacePass {
-            faces: Faces::Both,
-            normals: Normals::None,
-            material_colors: vec![[1.0; 4]],
-            triangle_materials: &[],
-            metallic: 0.0,
-            roughness: 0.6,
-            intensity: 1.0,
-            ambient: 0.3,
-            to_light: [0.0, 0.0, 1.0],
-            halfway: [0.0, 0.0, 1.0],
-            fwidth: None,
-        }),
-        hull: None,
-        lines: None,
-        background: [1.0; 4],
-        skips: Vec::new(),
-    }
+    scenes::screen_plan([WIDTH, HEIGHT], samples, SCALE, positions, triangles)
 }
 
 #[test]

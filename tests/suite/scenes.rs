@@ -2,7 +2,7 @@
 
 use meshsnap::limits::{BackendChoice, Budget, Deadline, Limits};
 use meshsnap::mesh::{self, Mesh};
-use meshsnap::plan::{self, DrawPlan};
+use meshsnap::plan::{self, DrawPlan, Faces, Normals, Projection, SurfacePass};
 use meshsnap::request::{self, Rules};
 use meshsnap::scene::Spec;
 
@@ -90,4 +90,51 @@ pub fn spec(keys: &[(&str, &str)]) -> Spec {
 /// Plans with default limits.
 pub fn plan<'a>(mesh: &'a Mesh, spec: &Spec) -> DrawPlan<'a> {
     plan::build(mesh, spec, &mut Budget::new(&Limits::default())).unwrap()
+}
+
+/// A plan made by hand: positions are pixels from the picture's centre over `scale`, y down, and a depth; unlit white on black.
+pub fn screen_plan<'a>(
+    size_px: [u32; 2],
+    samples: u32,
+    scale: f32,
+    positions: &'a [[f32; 3]],
+    triangles: &'a [[u32; 3]],
+) -> DrawPlan<'a> {
+    let projection = Projection {
+        x: [scale * 256.0, 0.0, 0.0, 0.0],
+        y: [0.0, scale * 256.0, 0.0, 0.0],
+        z: [0.0, 0.0, 1.0, 0.0],
+        w: [0.0, 0.0, 0.0, 1.0],
+        near_w: 0.5,
+        clip: false,
+        to_viewer: [0.0, 0.0, 1.0],
+        screen_up: [0.0, 1.0, 0.0],
+        screen_right: [1.0, 0.0, 0.0],
+    };
+    let surface = SurfacePass {
+        faces: Faces::Both,
+        normals: Normals::None,
+        material_colors: vec![[1.0; 4]],
+        triangle_materials: &[],
+        metallic: 0.0,
+        roughness: 0.6,
+        intensity: 1.0,
+        ambient: 0.3,
+        to_light: [0.0, 0.0, 1.0],
+        halfway: [0.0, 0.0, 1.0],
+        fwidth: None,
+    };
+    DrawPlan {
+        width_px: size_px[0],
+        height_px: size_px[1],
+        samples,
+        positions,
+        triangles,
+        projection,
+        surface: Some(surface),
+        hull: None,
+        lines: None,
+        background: [0.0, 0.0, 0.0, 1.0],
+        skips: Vec::new(),
+    }
 }

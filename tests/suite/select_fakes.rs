@@ -8,7 +8,9 @@ use meshsnap::backend::gpu::{GpuInfo, GpuKind};
 use meshsnap::backend::{BackendKind, DrawError, GpuDevice, GpuHost, HardwareHint, Opener, Renderer};
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, Faces, Normals, Projection, SurfacePass};
+use meshsnap::plan::DrawPlan;
+
+use crate::scenes;
 
 /// What an attempt to open finds.
 #[derive(Clone, Copy, Debug)]
@@ -162,39 +164,6 @@ impl Renderer for FakeRenderer {
 const JOB_PX: u32 = 5;
 
 pub fn job() -> DrawPlan<'static> {
-    DrawPlan {
-        width_px: JOB_PX,
-        height_px: JOB_PX,
-        samples: 1,
-        positions: &[[-9.0, -9.0, 0.5], [9.0, -9.0, 0.5], [0.0, 2.0, 0.5]],
-        triangles: &[[0, 1, 2]],
-        projection: Projection {
-            x: [256.0, 0.0, 0.0, 0.0],
-            y: [0.0, -256.0, 0.0, 0.0],
-            z: [0.0, 0.0, 1.0, 0.0],
-            w: [0.0, 0.0, 0.0, 1.0],
-            near_w: 0.5,
-            clip: false,
-            to_viewer: [0.0, 0.0, 1.0],
-            screen_up: [0.0, 1.0, 0.0],
-            screen_right: [1.0, 0.0, 0.0],
-        },
-        surface: Some(SurfacePass {
-            faces: Faces::Both,
-            normals: Normals::None,
-            material_colors: vec![[1.0, 0.0, 0.0, 1.0]],
-            triangle_materials: &[],
-            metallic: 0.0,
-            roughness: 1.0,
-            intensity: 1.0,
-            ambient: 0.0,
-            to_light: [0.0, 0.0, 1.0],
-            halfway: [0.0, 0.0, 1.0],
-            fwidth: None,
-        }),
-        hull: None,
-        lines: None,
-        background: [1.0; 4],
-        skips: Vec::new(),
-    }
+    let positions = &[[-9.0, 9.0, 0.5], [9.0, 9.0, 0.5], [0.0, -2.0, 0.5]];
+    scenes::screen_plan([JOB_PX; 2], 1, 1.0, positions, &[[0, 1, 2]])
 }
