@@ -7,23 +7,17 @@ struct Frame {
     z_row: vec4<f32>,
     w_row: vec4<f32>,
     screen_up: vec4<f32>,
-    to_light: vec4<f32>,
-    halfway: vec4<f32>,
+    // Towards each lamp, and how strong it is.
+    lamps: array<vec4<f32>, 3>,
+    halfways: array<vec4<f32>, 3>,
     background: vec4<f32>,
     hull_color: vec4<f32>,
-    wire_color: vec4<f32>,
-    line_color: vec4<f32>,
     near_w: f32,
     // Units of the box along the normal, or 1/256 px on screen.
     hull_push: f32,
-    metallic: f32,
-    roughness: f32,
-    intensity: f32,
     ambient: f32,
-    wire_thickness: f32,
-    wire_smoothing: f32,
-    line_width: f32,
-    line_smoothing: f32,
+    lamp_count: u32,
+    line_pass_count: u32,
     // Always 0, which the compiler cannot know.
     zero: u32,
     width: i32,
@@ -32,9 +26,9 @@ struct Frame {
     vertex_count: u32,
     // Added to a vertex index to get the hull's record.
     hull_base: u32,
-    // Where triangles' materials and edge masks start in the attributes; colours start at 0.
-    materials_at: u32,
+    // Where edge masks start in the attributes; triangles' materials start at 0.
     masks_at: u32,
+    material_count: u32,
 };
 
 // Which triangles, vertices or edges a dispatch handles, and which rows of the picture the buffers hold.
@@ -58,19 +52,28 @@ struct Batch {
     huge_end: u32,
     // Edges that a workgroup draws.
     edges_per_group: u32,
+    // Of the line pass: pixels, pixels, bits, and where its ink starts.
+    line_width: f32,
+    line_smoothing: f32,
+    line_flags: u32,
+    ink_at: u32,
 };
+
+// Bits of `line_flags`.
+const SHOWN_VISIBLE: u32 = 1u;
+const SHOWN_HIDDEN: u32 = 2u;
+const SKIP_BACK: u32 = 4u;
+const CONTOUR: u32 = 8u;
 
 const SURFACE: u32 = 1u;
 const HULL: u32 = 2u;
 const HULL_PX: u32 = 4u;
 const FACE_NORMALS: u32 = 8u;
 const VERTEX_NORMALS: u32 = 16u;
-const FWIDTH: u32 = 32u;
+const WIRES: u32 = 32u;
 const TRIANGLE_MATERIALS: u32 = 64u;
 const EDGE_MASKS: u32 = 128u;
 const LINES: u32 = 256u;
-const LINES_HIDDEN: u32 = 512u;
-const LINES_SKIP_BACK: u32 = 1024u;
 const CLIPPED: u32 = 2048u;
 const FOUR_SAMPLES: u32 = 4096u;
 

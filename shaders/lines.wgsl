@@ -74,7 +74,7 @@ struct Segment {
 fn segment_of(edge: vec4<u32>) -> Segment {
     var a = vertices[edge.x];
     var b = vertices[edge.y];
-    var drawn = !(has(LINES_SKIP_BACK) && looks_away(edge.z) && looks_away(edge.w));
+    var drawn = is_drawn(edge);
     if drawn && (a.x == OUTSIDE || b.x == OUTSIDE) {
         drawn = has(CLIPPED) && clip_segment(edge.xy, &a, &b);
     }
@@ -87,8 +87,20 @@ fn segment_of(edge: vec4<u32>) -> Segment {
     if length_squared > 0.0 {
         inverse = 1.0 / length_squared;
     }
-    let reach = 0.5 * frame.line_width + 0.5 * frame.line_smoothing + BOX_RADIUS;
+    let reach = 0.5 * batch.line_width + 0.5 * batch.line_smoothing + BOX_RADIUS;
     return Segment(start, along, inverse, reach, vec2(a.z, b.z), drawn);
+}
+
+// Whether the pass draws the edge in this view: not on the far side of a closed surface; of a contour only the silhouette.
+fn is_drawn(edge: vec4<u32>) -> bool {
+    if (batch.line_flags & (SKIP_BACK | CONTOUR)) == 0u {
+        return true;
+    }
+    let a = looks_away(edge.z);
+    let b = looks_away(edge.w);
+    let is_back = (batch.line_flags & SKIP_BACK) != 0u && a && b;
+    let is_inner = (batch.line_flags & CONTOUR) != 0u && a == b && edge.w != NO_FACE;
+    return !is_back && !is_inner;
 }
 
 // Whether a face is certainly turned away. A missing face is: it shows nothing.
@@ -167,11 +179,14 @@ fn draw(edge: vec4<u32>, s: Segment, rows: vec2<i32>, cell: vec2<i32>, step: vec
 }
 
 fn add_ink(edge: vec4<u32>, s: Segment, t: f32, pixel: vec2<i32>, coverage: u32) {
-    let at = u32((pixel.y - batch.row_first) * frame.width + pixel.x);
+    let pixel_at = u32((pixel.y - batch.row_first) * frame.width + pixel.x);
+    let at = batch.ink_at + pixel_at;
     var level = coverage;
-    if has(LINES_HIDDEN) {
+    if (batch.line_flags & (SHOWN_VISIBLE | SHOWN_HIDDEN)) != 0u {
         let count = u32(sample_count());
-        level = (coverage * visible_samples(edge, s, t, at * count) + count / 2u) / count;
+        let visible = visible_samples(edge, s, t, pixel_at * count);
+        let shown = select(count - visible, visible, (batch.line_flags & SHOWN_VISIBLE) != 0u);
+        level = (coverage * shown + count / 2u) / count;
     }
     // Once a pixel is full nothing changes it, so it may stop counting long before the sum could wrap.
     if atomicLoad(&ink[at]) < 0x80000000u {
@@ -191,7 +206,7 @@ struct Profile {
 
 fn profile_of(normal: vec2<f32>) -> Profile {
     let n = abs(normal);
-    let smoothing = 0.5 * frame.line_smoothing;
+    let smoothing = 0.5 * batch.line_smoothing;
     let foot = 0.5 * (n.x + n.y) + smoothing;
     let top = abs(0.5 * abs(n.x - n.y) - smoothing);
     let height = 1.0 / (foot + top);
@@ -203,7 +218,7 @@ fn profile_of(normal: vec2<f32>) -> Profile {
 }
 
 fn strip_coverage(p: Profile, distance: f32) -> f32 {
-    let half_width = 0.5 * frame.line_width;
+    let half_width = 0.5 * batch.line_width;
     if distance >= half_width + p.foot {
         return 0.0;
     }
@@ -224,7 +239,7 @@ fn coverage_of(strip: Profile, normal: vec2<f32>, t: f32, offset: vec2<f32>) -> 
         return strip_coverage(strip, abs(dot(offset, normal)));
     }
     let distance = sqrt(dot(offset, offset));
-    if distance > 0.5 * frame.line_width + 0.5 * frame.line_smoothing + BOX_RADIUS {
+    if distance > 0.5 * batch.line_width + 0.5 * batch.line_smoothing + BOX_RADIUS {
         return 0.0;
     }
     var outwards = normal;

@@ -5,6 +5,7 @@
 // thresholds[k] is the smallest linear value that is stored as k + 1 or more.
 @group(1) @binding(13) var<storage, read> thresholds: array<f32>;
 @group(1) @binding(14) var<storage, read_write> rgba: array<u32>;
+@group(1) @binding(17) var<storage, read> line_colors: array<vec4<f32>>;
 
 // Ink of full coverage.
 const INK_FULL: u32 = 98304u;
@@ -21,8 +22,11 @@ fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroup
         c = color + frame.background * (1.0 - color.w);
     }
     if has(LINES) {
-        let cover = coverage(ink[i]);
-        c = cover * frame.line_color + c * (1.0 - cover * frame.line_color.w);
+        for (var n = 0u; n < frame.line_pass_count; n++) {
+            let cover = coverage(ink[n * batch.count + i]);
+            let color = line_colors[n];
+            c = cover * color + c * (1.0 - cover * color.w);
+        }
     }
     rgba[i] = encode(c);
 }

@@ -7,9 +7,33 @@
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
 @group(1) @binding(6) var<storage, read> normals: array<f32>;
 @group(1) @binding(7) var<storage, read> normal_triangles: array<u32>;
-// Material colours, then triangles' materials, then edge masks, a byte each.
+// Triangles' materials, then edge masks, a byte each.
 @group(1) @binding(8) var<storage, read> attributes: array<u32>;
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
+@group(1) @binding(15) var<storage, read> materials: array<Material>;
+@group(1) @binding(16) var<storage, read> face_normals: array<f32>;
+
+// src/plan/surface.rs explains the fields.
+struct Material {
+    base_color: vec4<f32>,
+    // Emissive colour, alpha cutoff.
+    emissive: vec4<f32>,
+    wire_color: vec4<f32>,
+    wire_thickness: f32,
+    wire_smoothing: f32,
+    metallic: f32,
+    roughness: f32,
+    normal_scale: f32,
+    flags: u32,
+    padding: vec2<u32>,
+    // Four texture uses of eight words.
+    textures: array<vec4<u32>, 8>,
+};
+
+// Bits of a material's flags.
+const MATERIAL_FACE_NORMALS: u32 = 2u;
+const MATERIAL_VERTEX_NORMALS: u32 = 8u;
+const MATERIAL_WIRES: u32 = 1920u;
 
 const NOTHING: u32 = 0xFFFFFFFFu;
 
@@ -62,34 +86,36 @@ fn group_color(id: u32, pixel: vec2<i32>, offset_sum: vec2<i32>, count: i32) -> 
 }
 
 fn surface_color(id: u32, at: vec2<f32>) -> vec4<f32> {
-    var color = base_color(id);
-    if has(VERTEX_NORMALS | FWIDTH) {
+    let m = material_index(id);
+    var color = materials[m].base_color;
+    let flags = materials[m].flags;
+    if (flags & (MATERIAL_VERTEX_NORMALS | MATERIAL_WIRES)) != 0u {
         let b = barycentrics(id, at);
-        if has(VERTEX_NORMALS) {
-            color = light(color, facing(interpolated_normal(id, b.value), b.front));
-        } else if has(FACE_NORMALS) {
-            color = light(color, facing(normal_at(id), b.front));
+        if (flags & MATERIAL_VERTEX_NORMALS) != 0u {
+            color = light(m, facing(interpolated_normal(id, b.value), b.front));
+        } else if (flags & MATERIAL_FACE_NORMALS) != 0u {
+            color = light(m, facing(face_normal(id), b.front));
         }
-        if has(FWIDTH) {
-            let cover = wire_factor(id, b);
-            color = cover * frame.wire_color + color * (1.0 - cover * frame.wire_color.w);
+        if (flags & MATERIAL_WIRES) != 0u {
+            let cover = wire_factor(id, m, b);
+            let wire = materials[m].wire_color;
+            color = cover * wire + color * (1.0 - cover * wire.w);
         }
-    } else if has(FACE_NORMALS) {
-        color = light(color, facing(normal_at(id), is_front(id, at)));
+    } else if (flags & MATERIAL_FACE_NORMALS) != 0u {
+        color = light(m, facing(face_normal(id), is_front(id, at)));
     }
     return color;
 }
 
-fn base_color(id: u32) -> vec4<f32> {
-    var material = 0u;
+fn material_index(id: u32) -> u32 {
     if has(TRIANGLE_MATERIALS) {
-        material = attributes[frame.materials_at + id];
+        return min(attributes[id], frame.material_count - 1u);
     }
-    if 4u * material >= frame.materials_at {
-        return vec4(0.5, 0.5, 0.5, 1.0);
-    }
-    let i = 4u * material;
-    return bitcast<vec4<f32>>(vec4(attributes[i], attributes[i + 1u], attributes[i + 2u], attributes[i + 3u]));
+    return 0u;
+}
+
+fn face_normal(id: u32) -> vec3<f32> {
+    return vec3(face_normals[3u * id], face_normals[3u * id + 1u], face_normals[3u * id + 2u]);
 }
 
 fn normal_at(i: u32) -> vec3<f32> {
@@ -176,32 +202,41 @@ fn facing(n: vec3<f32>, front: bool) -> vec3<f32> {
 }
 
 // Light on a surface with unit normal n: straight alpha in, premultiplied out.
-fn light(base: vec4<f32>, n: vec3<f32>) -> vec4<f32> {
-    let n_light = max(dot(n, frame.to_light.xyz), 0.0);
-    let n_half = max(dot(n, frame.halfway.xyz), 0.0);
-    let light_half = dot(frame.to_light.xyz, frame.halfway.xyz);
-    let sky = 0.7 + 0.3 * dot(n, frame.screen_up.xyz);
-    let alpha = max(frame.roughness * frame.roughness, 0.0025);
+fn light(m: u32, n: vec3<f32>) -> vec4<f32> {
+    let base = materials[m].base_color;
+    let roughness = materials[m].roughness;
+    let alpha = max(roughness * roughness, 0.0025);
     let alpha_squared = alpha * alpha;
-    let lobe = n_half * n_half * (alpha_squared - 1.0) + 1.0;
-    let gloss = alpha_squared / (lobe * lobe * max(light_half * light_half, 0.1) * (4.0 * frame.roughness + 2.0));
-    let ambient = frame.ambient * sky;
-    let direct = (1.0 - frame.ambient) * frame.intensity * n_light;
-    let specular = 0.04 + frame.metallic * (base.xyz - 0.04);
-    let reflected = base.xyz * (1.0 - frame.metallic) + specular * gloss;
-    return vec4(clamp(base.xyz * ambient + direct * reflected, vec3(0.0), vec3(1.0)) * base.w, base.w);
+    let ambient = frame.ambient * (0.7 + 0.3 * dot(n, frame.screen_up.xyz));
+    var diffuse = 0.0;
+    var shine = 0.0;
+    for (var i = 0u; i < frame.lamp_count; i++) {
+        let lamp = frame.lamps[i];
+        let halfway = frame.halfways[i].xyz;
+        let n_light = max(dot(n, lamp.xyz), 0.0);
+        let n_half = max(dot(n, halfway), 0.0);
+        let light_half = dot(lamp.xyz, halfway);
+        let lobe = n_half * n_half * (alpha_squared - 1.0) + 1.0;
+        let gloss = alpha_squared / (lobe * lobe * max(light_half * light_half, 0.1) * (4.0 * roughness + 2.0));
+        diffuse += lamp.w * n_light;
+        shine += lamp.w * n_light * gloss;
+    }
+    let metallic = materials[m].metallic;
+    let specular = 0.04 + metallic * (base.xyz - 0.04);
+    let reflected = base.xyz * (1.0 - metallic) * diffuse + specular * shine;
+    return vec4(clamp(base.xyz * ambient + reflected, vec3(0.0), vec3(1.0)) * base.w, base.w);
 }
 
 // 1 on the wire, 0 away from it.
-fn wire_factor(id: u32, b: Barycentrics) -> f32 {
+fn wire_factor(id: u32, m: u32, b: Barycentrics) -> f32 {
     var mask = 7u;
     if has(EDGE_MASKS) {
         mask = attributes[frame.masks_at + id / 4u] >> (8u * (id & 3u));
     }
     // Coordinate i vanishes on the edge opposite corner i, which runs from corner i + 1 to i + 2.
     let drawn = (vec3(mask) & vec3(2u, 4u, 1u)) != vec3(0u);
-    let near = frame.wire_thickness * b.fwidth;
-    let far = (frame.wire_thickness + frame.wire_smoothing) * b.fwidth;
+    let near = materials[m].wire_thickness * b.fwidth;
+    let far = (materials[m].wire_thickness + materials[m].wire_smoothing) * b.fwidth;
     let away = select(vec3(1.0), vec3(ramp(near.x, far.x, b.value.x), ramp(near.y, far.y, b.value.y), ramp(near.z, far.z, b.value.z)), drawn);
     return 1.0 - min(min(away.x, away.y), away.z);
 }

@@ -7,8 +7,9 @@
 use crate::backend::{BackendKind, Backends, DrawError};
 use crate::encode::{self, EncodeError};
 use crate::image::ImageFormat;
-use crate::limits::{Budget, Deadline, LimitExceeded, Limits, Stopped};
+use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::{self, Format, MeshError};
+pub use crate::plan::PlanError;
 use crate::plan::{self, Skip};
 use crate::scene::Spec;
 
@@ -57,9 +58,9 @@ pub enum RenderError {
     /// The mesh is.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// The mesh or the request wants more than is allowed.
+    /// The mesh and the request do not go together, or want more than is allowed.
     #[error(transparent)]
-    Limit(#[from] LimitExceeded),
+    Plan(PlanError),
     /// Nobody: time was up, or the job was cancelled.
     #[error(transparent)]
     Stopped(#[from] Stopped),
@@ -96,6 +97,15 @@ pub fn render(
 
     let skips = plan.skips;
     Ok(Output { bytes, format, backend: drawn.backend, skips, warnings: mesh.report.warnings })
+}
+
+impl From<PlanError> for RenderError {
+    fn from(error: PlanError) -> Self {
+        match error {
+            PlanError::Stopped(stopped) => Self::Stopped(stopped),
+            other => Self::Plan(other),
+        }
+    }
 }
 
 impl From<DrawError> for RenderError {

@@ -7,7 +7,7 @@
 use super::{DrawError, Renderer};
 use crate::image::srgb8_thresholds;
 use crate::limits::Deadline;
-use crate::plan::{DrawPlan, Faces, Normals, Projection, SurfacePass, sample_offsets};
+use crate::plan::{DrawPlan, Faces, MaterialLook, Projection, SurfacePass, sample_offsets};
 
 /// Side of the picture: large enough for a triangle that goes the way of large triangles.
 const SIZE_PX: u32 = 24;
@@ -143,31 +143,13 @@ fn plan(samples: u32) -> DrawPlan<'static> {
         screen_up: [0.0, 1.0, 0.0],
         screen_right: [1.0, 0.0, 0.0],
     };
-    let surface = SurfacePass {
-        faces: Faces::Front,
-        normals: Normals::None,
-        material_colors: COLORS.to_vec(),
-        triangle_materials: &MATERIALS,
-        metallic: 0.0,
-        roughness: 1.0,
-        intensity: 1.0,
-        ambient: 0.0,
-        to_light: [0.0, 0.0, 1.0],
-        halfway: [0.0, 0.0, 1.0],
-        fwidth: None,
-    };
+    let materials = COLORS.iter().map(|&color| MaterialLook::unlit(color)).collect();
+    let surface = SurfacePass { triangle_materials: &MATERIALS, ..SurfacePass::new(Faces::Front, materials) };
     DrawPlan {
-        width_px: SIZE_PX,
-        height_px: SIZE_PX,
         samples,
-        positions: &POSITIONS,
-        triangles: &TRIANGLES,
-        projection,
         surface: Some(surface),
-        hull: None,
-        lines: None,
         background: BACKGROUND,
-        skips: Vec::new(),
+        ..DrawPlan::new([SIZE_PX; 2], &POSITIONS, &TRIANGLES, projection)
     }
 }
 

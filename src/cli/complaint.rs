@@ -52,7 +52,7 @@ impl From<MeshError> for Complaint {
 impl From<RenderError> for Complaint {
     fn from(error: RenderError) -> Self {
         match error {
-            RenderError::Mesh(_) | RenderError::Limit(_) => Self::input(error.to_string()),
+            RenderError::Mesh(_) | RenderError::Plan(_) => Self::input(error.to_string()),
             RenderError::Draw(DrawError::Stopped(_)) | RenderError::Stopped(_) | RenderError::Encode(_) => {
                 Self::ours(error.to_string())
             }

@@ -14,6 +14,7 @@ use crate::limits::{Budget, Deadline};
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Topology;
 use crate::mesh::{self, Mesh};
+use crate::pipeline::PlanError;
 use crate::pipeline::RenderError;
 
 /// Arguments of `inspect`.
@@ -96,7 +97,7 @@ pub fn run(arguments: &InspectArgs) -> Result<(), Complaint> {
         .map_err(|error| Complaint::from(error).about(&arguments.mesh))?;
     progress.next("counting edges");
     let edges = EdgeList::of(&mesh, &mut budget)
-        .map_err(|limit| Complaint::from(RenderError::Limit(limit)).about(&arguments.mesh))?;
+        .map_err(|limit| Complaint::from(RenderError::from(PlanError::from(limit))).about(&arguments.mesh))?;
     let report = Report::new(&mesh, Topology::of(&mesh, &edges), bytes.len() as u64);
     drop(progress);
     let text = if arguments.json {

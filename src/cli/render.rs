@@ -186,7 +186,7 @@ fn explain(output: &Output, gpu: &GpuStatus, times: &[(Stage, Duration)], total:
     let parts = [Some(gpu.state.name().to_owned()), device, gpu.reason.clone()];
     eprintln!("gpu: {}", parts.into_iter().flatten().collect::<Vec<_>>().join("; "));
     for skip in &output.skips {
-        eprintln!("skipped {}: {}", skip.what, skip.why);
+        eprintln!("skipped {}: {}", skip.kind, skip.why);
     }
     for (stage, took) in times {
         eprintln!("{:<6} {:9.3} ms", format!("{stage:?}").to_lowercase(), took.as_secs_f64() * 1e3);

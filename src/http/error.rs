@@ -10,6 +10,7 @@ use crate::backend::DrawError;
 use crate::jobs::{BodiesFull, Failure, Refusal};
 use crate::limits::LimitExceeded;
 use crate::mesh::{MeshError, MeshFault};
+use crate::pipeline::PlanError;
 use crate::pipeline::RenderError;
 use crate::request::RequestError;
 
@@ -119,7 +120,7 @@ impl From<&RenderError> for ApiError {
     fn from(error: &RenderError) -> Self {
         match error {
             RenderError::Mesh(error) => error.into(),
-            RenderError::Limit(limit) => limit.into(),
+            RenderError::Plan(error) => error.into(),
             RenderError::Stopped(stopped) => deadline(stopped.to_string()),
             RenderError::Draw(DrawError::Stopped(stopped)) => deadline(stopped.to_string()),
             RenderError::Draw(DrawError::DeviceLost(_)) => {
@@ -138,6 +139,18 @@ impl From<&RenderError> for ApiError {
             }
             RenderError::Encode(_) => Self::internal(),
         }
+    }
+}
+
+impl From<&PlanError> for ApiError {
+    fn from(error: &PlanError) -> Self {
+        let code = match error {
+            PlanError::Limit(limit) => return limit.into(),
+            PlanError::Stopped(stopped) => return deadline(stopped.to_string()),
+            PlanError::Texture(_) => "texture_broken",
+            PlanError::NoCamera => "no_camera",
+        };
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, code, error.to_string())
     }
 }
 

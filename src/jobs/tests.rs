@@ -11,7 +11,7 @@ use crate::image::ImageFormat;
 use crate::limits::{BackendChoice, Deadline, Stopped};
 use crate::pipeline::{Output, RenderError, Stage};
 use crate::scene::color::Rgba;
-use crate::scene::{CameraSpec, ImageSpec, Light, Projection, Spec, View};
+use crate::scene::{CameraSpec, ImageSpec, Layers, Light, LightPreset, Projection, Spec, View};
 
 const SOON: Duration = Duration::from_secs(10);
 
@@ -45,10 +45,19 @@ fn spec() -> Spec {
         margin: 0.0,
         eye: None,
         target: None,
+        from_file: false,
     };
     let image = ImageSpec { width_px: 8, height_px: 8, format: None, samples: 1, background: Rgba::WHITE };
-    let light = Light { intensity: 1.0, ambient: 0.3 };
-    Spec { surface: None, wire: None, outline: None, camera, light, image, backend: BackendChoice::Cpu }
+    let light = Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3 };
+    Spec {
+        layers: Layers::default(),
+        materials: Vec::new(),
+        topology: None,
+        camera,
+        light,
+        image,
+        backend: BackendChoice::Cpu,
+    }
 }
 
 fn output(bytes: usize) -> Output {

@@ -8,6 +8,7 @@ pub mod edges;
 mod error;
 mod gltf;
 mod import;
+pub mod material;
 mod normalise;
 pub mod normals;
 mod obj;
@@ -21,6 +22,9 @@ mod weld;
 
 pub use error::{MeshError, MeshFault};
 pub use import::{Format, import};
+pub use material::MaterialSlot;
+
+use material::{FileCamera, ImageSource};
 
 /// A triangle mesh in its normal form.
 ///
@@ -42,11 +46,15 @@ pub struct Mesh {
     pub triangle_materials: Vec<u32>,
     /// The file's materials; at least one.
     pub materials: Vec<MaterialSlot>,
+    /// The images that the materials refer to, still encoded.
+    pub images: Vec<ImageSource>,
+    /// The file's cameras, in the order of the scene.
+    pub cameras: Vec<FileCamera>,
     /// Three indices into the attribute arrays a triangle. Empty where there is no attribute at all.
     pub attribute_triangles: Vec<[u32; 3]>,
     /// Unit vertex normals of the file; empty where it has none.
     pub normals: Vec<[f32; 3]>,
-    /// Texture coordinates; empty where the file has none.
+    /// Texture coordinates, (0, 0) the upper left corner of the image and v down; empty where the file has none.
     pub uvs: Vec<[f32; 2]>,
     /// Linear RGBA vertex colours; empty where the file has none.
     pub colors: Vec<[f32; 4]>,
@@ -91,15 +99,6 @@ pub enum UpAxis {
     Z,
     /// -Z
     NegZ,
-}
-
-/// A material as the file names it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MaterialSlot {
-    /// The asset's own name; empty where it gives none.
-    pub name: String,
-    /// Linear RGBA base colour, where the file gives one.
-    pub base_color: Option<[f32; 4]>,
 }
 
 /// What an importer saw, dropped and repaired. `inspect` prints it.

@@ -37,8 +37,9 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshErr
     mesh.materials = raw.materials;
     let slots = mesh.triangle_materials.iter().copied().max().unwrap_or(0) as usize + 1;
     while mesh.materials.len() < slots {
-        mesh.materials.push(MaterialSlot { name: String::new(), base_color: None });
+        mesh.materials.push(MaterialSlot::default());
     }
+    (mesh.images, mesh.cameras) = (raw.images, raw.cameras);
     mesh.up = raw.up;
     mesh.report = raw.report;
     Ok(mesh)

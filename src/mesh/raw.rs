@@ -1,5 +1,6 @@
 //! What an importer fills in, before normalisation.
 
+use super::material::{FileCamera, ImageSource};
 use super::{ImportReport, MaterialSlot, UpAxis};
 
 /// A mesh as the file has it: file units, f64, nothing welded, nothing dropped.
@@ -9,7 +10,7 @@ pub struct RawMesh {
     pub positions: Vec<[f64; 3]>,
     /// Normals, one a vertex, any length; or empty.
     pub normals: Vec<[f32; 3]>,
-    /// Texture coordinates, one a vertex; or empty.
+    /// Texture coordinates, one a vertex, (0, 0) the upper left corner of the image and v down; or empty.
     pub uvs: Vec<[f32; 2]>,
     /// Linear RGBA, one a vertex; or empty.
     pub colors: Vec<[f32; 4]>,
@@ -21,6 +22,10 @@ pub struct RawMesh {
     pub triangle_materials: Vec<u32>,
     /// The file's materials; may be empty if every index above is 0.
     pub materials: Vec<MaterialSlot>,
+    /// The images that the materials refer to, still encoded.
+    pub images: Vec<ImageSource>,
+    /// The file's cameras.
+    pub cameras: Vec<FileCamera>,
     /// The axis that points up.
     pub up: UpAxis,
     /// Format, counts and warnings so far.

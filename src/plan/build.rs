@@ -1,15 +1,18 @@
 //! Spec and mesh to plan: what each look needs, and what it does not.
 
-use super::{DrawPlan, Faces, FwidthWire, HullOffset, HullPass, LinePass, Normals, Projection, Skip, SurfacePass};
+use std::borrow::Cow;
+
+use super::parts::Parts;
+use super::skips::{SkipKind, Skips};
+use super::textures::TextureLoader;
+use super::{
+    CornerValues, DrawPlan, Faces, HullOffset, HullPass, PlanError, Projection, SurfacePass, flags, lights, materials,
+    wires,
+};
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::{Mesh, normals};
-use crate::plan::wires;
 use crate::scene::camera::{Border, Camera};
-use crate::scene::color::Rgba;
-use crate::scene::{Cull, Outline, OutlineUnit, Shading, Spec, Surface, Wire, WireMethod};
-
-/// Surfaces for which neither the request nor the file names a colour: `#c8ccd2`, a calm light grey.
-const DEFAULT_COLOR: [u8; 4] = [0xc8, 0xcc, 0xd2, 0xff];
+use crate::scene::{Cull, Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
 
 /// Width of an outline in pixels where the request does not say.
 const OUTLINE_PX: f32 = 3.0;
@@ -19,68 +22,110 @@ const OUTLINE_PX: f32 = 3.0;
 const OUTLINE_OBJECT_SHARE: f32 = 0.015;
 
 /// Decides what is drawn.
-pub fn build<'a>(mesh: &'a Mesh, spec: &Spec, budget: &mut Budget) -> Result<DrawPlan<'a>, LimitExceeded> {
+pub fn build<'a>(mesh: &'a Mesh, spec: &Spec, budget: &mut Budget) -> Result<DrawPlan<'a>, PlanError> {
+    build_keeping(mesh, spec, budget, &[])
+}
+
+/// As [`build`], but nothing in `keep` is skipped, for tests: the picture is the same to the byte.
+pub fn build_keeping<'a>(
+    mesh: &'a Mesh,
+    spec: &Spec,
+    budget: &mut Budget,
+    keep: &[SkipKind],
+) -> Result<DrawPlan<'a>, PlanError> {
     let size_px = [spec.image.width_px, spec.image.height_px];
-    let pixels = u64::from(size_px[0]) * u64::from(size_px[1]);
-    budget.spend("the picture", pixels, 4)?;
-    budget.spend("vertices on screen", mesh.positions.len() as u64, 32)?;
-    // Up to eight 4-byte entries in the lists of what each part of the picture has to draw.
-    budget.spend("lists of triangles", mesh.triangles.len() as u64, 32)?;
-    let is_smooth = spec.surface.is_some_and(|surface| surface.shading == Shading::Smooth);
-    if spec.outline.is_some() || (is_smooth && mesh.normals.is_empty()) {
-        // Sums in f64, then the unit normals in f32.
-        budget.spend("vertex normals", mesh.positions.len() as u64, 36)?;
+    let parts = Parts::new(mesh, spec);
+    pay(mesh, size_px, &parts, budget)?;
+    if spec.camera.from_file && mesh.cameras.is_empty() {
+        return Err(PlanError::NoCamera);
     }
 
-    let offset = spec.outline.map(|outline| hull_offset(mesh, &outline));
-    let camera = Camera::place(&spec.camera, mesh, size_px, border(spec, offset));
-    let mut skips = Vec::new();
-    let lines = exact_wire(spec).map(|wire| wires::pass(mesh, wire, spec, budget)).transpose()?;
-    let surface = spec.surface.as_ref().map(|s| surface_pass(mesh, s, spec, &camera, &mut skips));
-    let hull = spec.outline.zip(offset).map(|(outline, offset)| hull_pass(mesh, &outline, offset, surface.as_ref()));
-    note_skips(mesh, spec, &camera, lines.as_ref(), &mut skips);
+    let mut skips = Skips::new(keep);
+    let camera = Camera::place(&spec.camera, mesh, size_px, border(mesh, &parts, spec));
+    let contour_px = |material: usize| {
+        let outline = parts.layers[material].outline;
+        outline.map_or(0.0, |outline| contour_px(mesh, &outline, &camera, size_px))
+    };
+    let lines = wires::passes(mesh, spec, &parts, contour_px, &mut skips, budget)?;
+    let layers = parts.layers_pass();
+    let surface = surface_pass(mesh, spec, &parts, &camera, &mut skips, budget)?;
+    let welded = surface.as_ref().and_then(|s| s.vertex_normals.as_ref()).filter(|_| mesh.normals.is_empty());
+    let hull = parts.has_hull().then(|| hull_pass(mesh, &parts, welded.map(|n| n.values.clone())));
+
+    skips.skip(SkipKind::Layers, layers.is_none(), "nothing shines through");
+    skips.skip(SkipKind::Hull, hull.is_none(), "the look has no hull");
+    skips.skip(SkipKind::Surface, surface.is_none(), "the look has no filled surface, and no line that one could hide");
+    let visible = surface.is_some() || hull.is_some();
+    skips.skip(SkipKind::Visibility, !visible, "no surface and no hull: no depth is needed");
+    let unclipped = skips.skip(
+        SkipKind::Clipping,
+        camera.contains_mesh,
+        "the whole mesh lies between the eye and the picture's guard band",
+    );
     Ok(DrawPlan {
         width_px: size_px[0],
         height_px: size_px[1],
         samples: spec.image.samples,
         positions: &mesh.positions,
         triangles: &mesh.triangles,
-        projection: projection(&camera, size_px),
+        roles: parts.roles(mesh, layers.as_ref()),
+        projection: projection(&camera, size_px, !unclipped),
         surface,
+        layers,
         hull,
         lines,
         background: spec.image.background.premultiplied(),
-        skips,
+        skips: skips.done,
     })
 }
 
-fn projection(camera: &Camera, size_px: [u32; 2]) -> Projection {
+/// Spends what the plan and both back-ends will allocate.
+fn pay(mesh: &Mesh, size_px: [u32; 2], parts: &Parts<'_>, budget: &mut Budget) -> Result<(), LimitExceeded> {
+    let pixels = u64::from(size_px[0]) * u64::from(size_px[1]);
+    budget.spend("the picture", pixels, 4)?;
+    budget.spend("vertices on screen", mesh.positions.len() as u64, 32)?;
+    // Up to eight 4-byte entries in the lists of what each part of the picture has to draw, and a role.
+    budget.spend("lists of triangles", mesh.triangles.len() as u64, 33)?;
+    budget.spend("materials", mesh.materials.len() as u64, 256)?;
+    let is_smooth = parts.layers.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::scene::Shading::Smooth));
+    if parts.has_hull() || (is_smooth && mesh.normals.is_empty()) {
+        // Sums in f64, then the unit normals in f32; and how far each moves.
+        budget.spend("vertex normals", mesh.positions.len() as u64, 40)?;
+    }
+    Ok(())
+}
+
+fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection {
     let [x, y, z, w] = camera.rows(size_px);
     let [right, up, back] = camera.axes.map(|axis| axis.as_vec3().to_array());
     // In an orthographic view W is 1 and nothing is behind the eye.
     let near_w = if w[3] == 1.0 && w[..3] == [0.0; 3] { 0.5 } else { camera.near as f32 };
-    let clip = !camera.contains_mesh;
     Projection { x, y, z, w, near_w, clip, to_viewer: back, screen_up: up, screen_right: right }
 }
 
-fn border(spec: &Spec, offset: Option<HullOffset>) -> Border {
+/// What the widest outline and the widest line ask for.
+fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
     let mut border = Border::default();
-    match offset {
-        Some(HullOffset::Object(grow)) => border.grow = f64::from(grow),
-        Some(HullOffset::Px(px)) => border.px = f64::from(px),
-        None => {}
+    for layers in &parts.layers {
+        if let Some(outline) = &layers.outline {
+            // Half of a contour lies on the surface itself.
+            let share = if outline.method == OutlineMethod::Contour { 0.5 } else { 1.0 };
+            match outline_offset(mesh, outline) {
+                HullOffset::Object(grow) => border.grow = border.grow.max(share * f64::from(grow)),
+                HullOffset::Px(px) => border.px = border.px.max(share * f64::from(px)),
+            }
+        }
+        if let Some(wire) = layers.wire.filter(|wire| wire.method == WireMethod::Exact) {
+            border.px = border.px.max(f64::from(0.5 * (wire.thickness + wire.smoothing)));
+        }
     }
-    if let Some(wire) = exact_wire(spec) {
-        border.px = border.px.max(f64::from(0.5 * (wire.thickness + wire.smoothing)));
+    if let Some(topology) = &spec.topology {
+        border.px = border.px.max(f64::from(1.25 * topology.thickness));
     }
     border
 }
 
-fn exact_wire(spec: &Spec) -> Option<&Wire> {
-    spec.wire.as_ref().filter(|wire| wire.method == WireMethod::Exact)
-}
-
-fn hull_offset(mesh: &Mesh, outline: &Outline) -> HullOffset {
+fn outline_offset(mesh: &Mesh, outline: &Outline) -> HullOffset {
     match outline.unit {
         OutlineUnit::Px => HullOffset::Px(outline.thickness.unwrap_or(OUTLINE_PX)),
         OutlineUnit::Object => {
@@ -93,118 +138,119 @@ fn hull_offset(mesh: &Mesh, outline: &Outline) -> HullOffset {
     }
 }
 
+/// Width of a contour in pixels; one in object units is as wide as at the mesh's centre.
+fn contour_px(mesh: &Mesh, outline: &Outline, camera: &Camera, size_px: [u32; 2]) -> f32 {
+    const PX_MAX: f32 = 100.0;
+    match outline_offset(mesh, outline) {
+        HullOffset::Px(px) => px.min(PX_MAX),
+        HullOffset::Object(units) => ((f64::from(units) * camera.px_per_unit(size_px)) as f32).min(PX_MAX),
+    }
+}
+
 fn surface_pass<'a>(
     mesh: &'a Mesh,
-    surface: &Surface,
     spec: &Spec,
+    parts: &Parts<'_>,
     camera: &Camera,
-    skips: &mut Vec<Skip>,
-) -> SurfacePass<'a> {
-    let normals = match surface.shading {
-        Shading::Unlit => {
-            skips.push(Skip { what: "normals", why: "an unlit surface takes no light" });
-            Normals::None
-        }
-        Shading::Flat => {
-            skips.push(Skip { what: "vertex normals", why: "flat shading reads face normals" });
-            Normals::Face(&mesh.face_normals)
-        }
-        Shading::Smooth => {
-            let (values, triangles) = normals::smooth(mesh);
-            Normals::Vertex { values, triangles }
-        }
-    };
-    let material_colors = material_colors(mesh, surface);
-    let several = material_colors.len() > 1;
-    if !several {
-        skips.push(Skip { what: "material indices", why: "every triangle has the same colour" });
+    skips: &mut Skips<'_>,
+    budget: &mut Budget,
+) -> Result<Option<SurfacePass<'a>>, PlanError> {
+    let is_shaded = parts.has_fill() || parts.has_barycentric_wire();
+    if !is_shaded && !parts.needs_occluder() {
+        return Ok(None);
     }
-    let [right, up, back] = camera.axes;
-    // Over the viewer's left shoulder: straight ahead would leave every shape without a lit side.
-    let to_light = (back - 0.5 * right + 0.7 * up).normalize();
-    let halfway = (to_light + back).normalize();
-    SurfacePass {
-        faces: match surface.cull {
+    skips.skip(SkipKind::Shading, !is_shaded, "the surface is not seen: it only hides lines");
+    let edge_masks = if parts.has_barycentric_wire() || parts.shows_edge_distance() {
+        wires::edge_masks(mesh, parts, budget)?
+    } else {
+        Vec::new()
+    };
+    let mut loader = TextureLoader::new(mesh, budget);
+    let mut looks = Vec::with_capacity(mesh.materials.len());
+    for (slot, layers) in mesh.materials.iter().zip(&parts.layers) {
+        looks.push(materials::look(mesh, slot, layers, &mut loader)?);
+    }
+    let textures = loader.finish();
+    let is_one = looks.iter().all(|look| *look == looks[0]);
+    let one_material = skips.skip(SkipKind::MaterialIndices, is_one, "every triangle has the same material");
+    if one_material {
+        looks.truncate(1);
+    }
+    let mut pass = SurfacePass {
+        faces: match parts.common_cull() {
             Cull::None => Faces::Both,
             Cull::Back => Faces::Front,
             Cull::Front => Faces::Back,
         },
-        normals,
-        material_colors,
-        triangle_materials: if several { &mesh.triangle_materials } else { &[] },
-        metallic: surface.metallic,
-        roughness: surface.roughness,
-        intensity: spec.light.intensity,
-        ambient: spec.light.ambient,
-        to_light: to_light.as_vec3().to_array(),
-        halfway: halfway.as_vec3().to_array(),
-        fwidth: spec.wire.as_ref().filter(|wire| wire.method == WireMethod::Fwidth).map(|w| fwidth_wire(mesh, w)),
-    }
-}
-
-fn material_colors(mesh: &Mesh, surface: &Surface) -> Vec<[f32; 4]> {
-    let default = Rgba::from_srgb8(DEFAULT_COLOR).0;
-    let color = |slot: Option<[f32; 4]>| {
-        let [r, g, b, _] = surface.color.map_or(slot.unwrap_or(default), |c| c.0);
-        // Opaque: transparent surfaces are not in this version.
-        [r, g, b, 1.0]
+        is_shaded,
+        materials: looks,
+        triangle_materials: if one_material { &[] } else { &mesh.triangle_materials },
+        face_normals: &[],
+        vertex_normals: None,
+        uvs: None,
+        colors: None,
+        edge_masks: Cow::Owned(edge_masks),
+        textures,
+        lights: lights::lights(&spec.light, camera),
     };
-    let mut colors: Vec<_> = mesh.materials.iter().map(|slot| color(slot.base_color)).collect();
-    if colors.iter().all(|c| *c == colors[0]) {
-        colors.truncate(1);
-    }
-    if colors.is_empty() {
-        colors.push(color(None));
-    }
-    colors
+    attributes(mesh, &mut pass, skips);
+    Ok(Some(pass))
 }
 
-fn fwidth_wire<'a>(mesh: &'a Mesh, wire: &Wire) -> FwidthWire<'a> {
-    FwidthWire {
-        color: wires::color(wire),
-        thickness: wire.thickness,
-        smoothing: wire.smoothing,
-        edge_masks: if wires::draws_every_edge(mesh, wire) { &[] } else { &mesh.edge_masks },
+/// Gives the pass the arrays that its materials read.
+fn attributes<'a>(mesh: &'a Mesh, pass: &mut SurfacePass<'a>, skips: &mut Skips<'_>) {
+    let all = pass.all_flags();
+    let reads = |flag: u32| pass.is_shaded && all & flag != 0;
+    let faceless = !reads(flags::FACE_NORMALS);
+    if !skips.skip(SkipKind::FaceNormals, faceless, "no material is lit by them") {
+        pass.face_normals = &mesh.face_normals;
+    }
+    if !skips.skip(SkipKind::VertexNormals, !reads(flags::VERTEX_NORMALS), "no material is shaded smoothly") {
+        let (values, triangles) = normals::smooth(mesh);
+        pass.vertex_normals = Some(CornerValues { values, triangles });
+    }
+    let samples = pass.is_shaded && pass.materials.iter().any(materials::samples);
+    skips.skip(SkipKind::Textures, !samples, "nothing samples one");
+    let shows_uvs = pass.materials.iter().any(|m| m.flags & flags::DEBUG == 5 << flags::DEBUG_SHIFT);
+    if !mesh.uvs.is_empty() && !skips.skip(SkipKind::Uvs, !samples && !shows_uvs, "nothing samples a texture") {
+        let values = Cow::Borrowed(mesh.uvs.as_slice());
+        pass.uvs = Some(CornerValues { values, triangles: &mesh.attribute_triangles });
+    }
+    let colorless = !reads(flags::VERTEX_COLORS);
+    if !mesh.colors.is_empty() && !skips.skip(SkipKind::VertexColors, colorless, "no material shows them") {
+        let values = Cow::Borrowed(mesh.colors.as_slice());
+        pass.colors = Some(CornerValues { values, triangles: &mesh.attribute_triangles });
     }
 }
 
-fn hull_pass<'a>(
-    mesh: &'a Mesh,
-    outline: &Outline,
-    offset: HullOffset,
-    surface: Option<&SurfacePass<'a>>,
-) -> HullPass<'a> {
+fn hull_pass<'a>(mesh: &'a Mesh, parts: &Parts<'_>, welded: Option<Cow<'a, [[f32; 3]]>>) -> HullPass<'a> {
+    let outline = |m: usize| parts.layers[m].outline.filter(|o| o.method == OutlineMethod::Hull);
+    let offsets: Vec<Option<HullOffset>> =
+        (0..parts.layers.len()).map(|m| outline(m).map(|o| outline_offset(mesh, &o))).collect();
+    let mut colors: Vec<[f32; 4]> =
+        (0..parts.layers.len()).map(|m| outline(m).map_or([0.0; 4], |o| o.color.premultiplied())).collect();
+    let used: Vec<[f32; 4]> = (0..colors.len()).filter(|&m| offsets[m].is_some()).map(|m| colors[m]).collect();
+    if used.iter().all(|color| *color == used[0]) {
+        colors = vec![used[0]];
+    }
+    let first = offsets.iter().flatten().next().copied().unwrap_or(HullOffset::Px(0.0));
+    let amounts =
+        if offsets.iter().flatten().all(|offset| *offset == first) { Vec::new() } else { amounts(mesh, &offsets) };
     // The file's normals may split at hard edges, where a hull that followed them would tear: always the welded ones.
-    let welded = match surface.map(|s| &s.normals) {
-        Some(Normals::Vertex { values, .. }) if mesh.normals.is_empty() => values.clone(),
-        _ => normals::angle_weighted(mesh).into(),
-    };
-    HullPass { color: outline.color.premultiplied(), normals: welded, offset }
+    let normals = welded.unwrap_or_else(|| normals::angle_weighted(mesh).into());
+    HullPass { colors, normals, offset: first, amounts }
 }
 
-fn note_skips(mesh: &Mesh, spec: &Spec, camera: &Camera, lines: Option<&LinePass>, skips: &mut Vec<Skip>) {
-    if spec.surface.is_none() {
-        skips.push(Skip { what: "surface", why: "the look has no filled surface: nothing is shaded" });
+/// How far each position moves: as far as the thickest outline of its parts. (The request has seen to it that all have the
+/// same unit.)
+fn amounts(mesh: &Mesh, offsets: &[Option<HullOffset>]) -> Vec<f32> {
+    let mut amounts = vec![0.0_f32; mesh.positions.len()];
+    for (triangle, &material) in mesh.triangles.iter().zip(&mesh.triangle_materials) {
+        if let Some(Some(HullOffset::Object(amount) | HullOffset::Px(amount))) = offsets.get(material as usize) {
+            for &v in triangle {
+                amounts[v as usize] = amounts[v as usize].max(*amount);
+            }
+        }
     }
-    if spec.surface.is_none() && spec.outline.is_none() {
-        skips.push(Skip { what: "visibility", why: "no surface and no hull: no depth is needed" });
-    }
-    if spec.outline.is_none() {
-        skips.push(Skip { what: "hull", why: "the look has no outline" });
-    }
-    if lines.is_none() {
-        skips.push(Skip { what: "adjacency", why: "no line asks which triangles are neighbours" });
-    }
-    if lines.is_some_and(|lines| lines.skip_back_edges) {
-        skips.push(Skip { what: "edges that look away", why: "the surface is closed: they are hidden" });
-    }
-    if camera.contains_mesh {
-        skips.push(Skip { what: "clipping", why: "the whole mesh lies between the eye and the picture's guard band" });
-    }
-    if !mesh.uvs.is_empty() {
-        skips.push(Skip { what: "texture coordinates", why: "nothing samples a texture" });
-    }
-    if !mesh.colors.is_empty() {
-        skips.push(Skip { what: "vertex colours", why: "the look does not show them" });
-    }
+    amounts
 }

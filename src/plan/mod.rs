@@ -4,9 +4,27 @@
 //! each omission is written down in [`DrawPlan::skips`].
 
 mod build;
+mod error;
+mod hull;
+mod lights;
+mod lines;
+mod materials;
+mod parts;
+mod skips;
+mod surface;
+mod textures;
 mod wires;
 
-pub use build::build;
+pub use build::{build, build_keeping};
+pub use error::PlanError;
+pub use hull::{HullOffset, HullPass};
+pub use lines::{Edge, INK_FULL, LinePass, Shown, ink_table};
+pub use skips::{Skip, SkipKind};
+pub use surface::{
+    CornerValues, Lamp, Lights, MaterialLook, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, flags, slots,
+};
+
+use std::borrow::Cow;
 
 /// Everything a back-end needs for one picture.
 ///
@@ -24,14 +42,18 @@ pub struct DrawPlan<'a> {
     pub positions: &'a [[f32; 3]],
     /// Triangles over `positions`. An id in the visibility buffer is an index here, plus `triangles.len()` for the hull.
     pub triangles: &'a [[u32; 3]],
+    /// What each triangle takes part in: bits of [`roles`]. Empty where all are [`roles::SURFACE`] and [`roles::HULL`].
+    pub roles: Cow<'a, [u8]>,
     /// Unit box to screen.
     pub projection: Projection,
     /// The filled surface; None where a look has none.
     pub surface: Option<SurfacePass<'a>>,
+    /// What lies over the surface and lets it shine through; None where nothing does.
+    pub layers: Option<LayersPass>,
     /// The pushed-out back faces; None where a look has none.
     pub hull: Option<HullPass<'a>>,
-    /// Lines of exact width; None where a look has none.
-    pub lines: Option<LinePass>,
+    /// Lines of exact width, drawn over all else, in this order.
+    pub lines: Vec<LinePass>,
     /// Premultiplied linear RGBA behind everything.
     pub background: [f32; 4],
     /// What this scene did not need, and why.
@@ -64,6 +86,20 @@ pub struct Projection {
     pub screen_right: [f32; 3],
 }
 
+/// What a triangle takes part in.
+pub mod roles {
+    /// Drawn into the visibility buffer, if the plan has a surface.
+    pub const SURFACE: u8 = 1;
+    /// Drawn into the layers, if the plan has layers.
+    pub const LAYER: u8 = 2;
+    /// Its back is drawn, pushed out, if the plan has a hull.
+    pub const HULL: u8 = 4;
+    /// As surface or layer only where it faces the viewer, whatever [`SurfacePass::faces`](super::SurfacePass) says.
+    pub const FRONT_ONLY: u8 = 8;
+    /// The same for its other side.
+    pub const BACK_ONLY: u8 = 16;
+}
+
 /// Which side of triangles a pass draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Faces {
@@ -75,134 +111,56 @@ pub enum Faces {
     Back,
 }
 
-/// The filled surface.
-#[derive(Debug)]
-pub struct SurfacePass<'a> {
-    /// Which faces are drawn.
-    pub faces: Faces,
-    /// How a visible sample gets its normal.
-    pub normals: Normals<'a>,
-    /// Linear RGBA, by material index.
-    pub material_colors: Vec<[f32; 4]>,
-    /// Material index a triangle; empty where there is one material.
-    pub triangle_materials: &'a [u32],
-    /// 0 to 1.
-    pub metallic: f32,
-    /// 0 to 1.
-    pub roughness: f32,
-    /// Headlight strength.
-    pub intensity: f32,
-    /// Ambient share, 0 to 1.
-    pub ambient: f32,
-    /// Unit vector towards the headlight, unit-box axes.
-    pub to_light: [f32; 3],
-    /// Unit vector halfway between the light and the viewer: the normal that shines most.
-    pub halfway: [f32; 3],
-    /// Wires drawn in the same breath as the surface, from barycentrics.
-    pub fwidth: Option<FwidthWire<'a>>,
+/// Transparent surfaces, peeled off sample by sample.
+///
+/// Layer 0 of a sample is the nearest triangle with [`roles::LAYER`] (or hull triangle, see below), layer k the nearest behind
+/// layer k - 1 by (depth, lowest id first), all of them in front of the visibility buffer's surface unless `behind_surface`. Each is
+/// shaded as the surface is, and they lie over each other and over what the visibility buffer shows, nearest on top.
+///
+/// Where a plan has layers, hull triangles are not in the visibility buffer but in the layers; one is left out where a nearer
+/// layer of the same sample belongs to the same material (modulo 32), because a glass must not show the back of its own outline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LayersPass {
+    /// Layers that are looked for; what lies behind the last of them is not drawn.
+    pub count_max: u32,
+    /// Whether layers go on behind the surface: for wires that show through it.
+    pub behind_surface: bool,
+    /// Whether layers show wires alone; the fill is in the visibility buffer.
+    pub wires_only: bool,
+    /// What remains of wires from the second layer on, 0 to 1.
+    pub fade: f32,
 }
 
-/// Where normals come from.
-#[derive(Debug)]
-pub enum Normals<'a> {
-    /// Unlit: none are read.
-    None,
-    /// A unit normal a triangle.
-    Face(&'a [[f32; 3]]),
-    /// Interpolated between corners.
-    Vertex {
-        /// Unit normals.
-        values: std::borrow::Cow<'a, [[f32; 3]]>,
-        /// Three indices into `values` a triangle.
+impl<'a> DrawPlan<'a> {
+    /// A plan that draws nothing yet, at 1 sample a pixel, on nothing.
+    pub fn new(
+        size_px: [u32; 2],
+        positions: &'a [[f32; 3]],
         triangles: &'a [[u32; 3]],
-    },
-}
+        projection: Projection,
+    ) -> Self {
+        Self {
+            width_px: size_px[0],
+            height_px: size_px[1],
+            samples: 1,
+            positions,
+            triangles,
+            roles: Cow::Borrowed(&[]),
+            projection,
+            surface: None,
+            layers: None,
+            hull: None,
+            lines: Vec::new(),
+            background: [0.0; 4],
+            skips: Vec::new(),
+        }
+    }
 
-/// `min_i smoothstep(t d_i, (t + s) d_i, b_i)` over the drawn edges, with `d = |db/dx| + |db/dy|` a pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FwidthWire<'a> {
-    /// Premultiplied linear RGBA, opacity included.
-    pub color: [f32; 4],
-    /// t
-    pub thickness: f32,
-    /// s
-    pub smoothing: f32,
-    /// Which edges of each triangle are drawn (bit i: corner i to i + 1); empty where all are.
-    pub edge_masks: &'a [u8],
+    /// Whether any sample gets a colour.
+    pub fn is_shaded(&self) -> bool {
+        self.surface.as_ref().is_some_and(|surface| surface.is_shaded) || self.hull.is_some()
+    }
 }
-
-/// The inverted hull: back faces only, each vertex pushed out along its normal.
-#[derive(Debug)]
-pub struct HullPass<'a> {
-    /// Premultiplied linear RGBA.
-    pub color: [f32; 4],
-    /// A unit normal a position.
-    pub normals: std::borrow::Cow<'a, [[f32; 3]]>,
-    /// How far.
-    pub offset: HullOffset,
-}
-
-/// How far a hull vertex moves.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum HullOffset {
-    /// Along the normal, in units of the box.
-    Object(f32),
-    /// On screen along the projected normal, in pixels.
-    Px(f32),
-}
-
-/// Lines along edges, of one width and colour.
-#[derive(Debug)]
-pub struct LinePass {
-    /// Each edge once.
-    pub edges: Vec<Edge>,
-    /// Full width, pixels.
-    pub width_px: f32,
-    /// Extra ramp, pixels.
-    pub smoothing_px: f32,
-    /// Premultiplied linear RGBA, opacity included.
-    pub color: [f32; 4],
-    /// Whether edges behind a surface are left out. Needs the visibility buffer.
-    pub hide_behind_surface: bool,
-    /// Whether an edge whose faces all look away can be left out: true for closed surfaces.
-    pub skip_back_edges: bool,
-}
-
-/// An edge and the first two faces it belongs to.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Edge {
-    /// Indices into the positions.
-    pub vertices: [u32; 2],
-    /// Triangle indices; [`Edge::NO_FACE`] where there is no second face.
-    pub faces: [u32; 2],
-}
-
-impl Edge {
-    /// No triangle.
-    pub const NO_FACE: u32 = u32::MAX;
-}
-
-/// Something that was left out because this scene does not need it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Skip {
-    /// What: "vertex normals".
-    pub what: &'static str,
-    /// Why: "flat shading reads face normals".
-    pub why: &'static str,
-}
-
-/// Coverage in 1/1023 to ink: `-4096 log2(1 - c)`, so that the ink of lines that cross adds up as if they were independent,
-/// in integers, whatever the order. Full coverage is 24 halvings.
-pub fn ink_table() -> [u32; 1024] {
-    std::array::from_fn(|q| match q {
-        1023 => INK_FULL,
-        _ => libm::round(-4096.0 * libm::log2(1.0 - q as f64 / 1023.0)) as u32,
-    })
-}
-
-/// Ink of full coverage.
-pub const INK_FULL: u32 = 24 * 4096;
 
 /// Sample positions inside a pixel, in 1/16 pixel from its upper left corner: the standard rotated grid for 4.
 pub fn sample_offsets(samples: u32) -> &'static [[i32; 2]] {

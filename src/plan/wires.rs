@@ -1,40 +1,275 @@
-//! Which edges a wire follows, once each.
+//! Which edges are drawn as lines, once each, in which style.
 
-use super::{Edge, LinePass};
+use std::sync::Arc;
+
+use rapidhash::RapidHashSet;
+
+use super::parts::{FADE, Fill, Parts};
+use super::skips::{SkipKind, Skips};
+use super::{Edge, LinePass, Shown};
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
-use crate::mesh::edges::EdgeList;
-use crate::scene::{Hidden, Spec, Wire, WireEdges};
+use crate::mesh::edges::{EdgeList, MeshEdge, NO_FACE};
+use crate::scene::color::Rgba;
+use crate::scene::{Hidden, OutlineMethod, Spec, Topology, Wire, WireEdges, WireMethod};
 
-/// The line pass of an exact wire.
-pub fn pass(mesh: &Mesh, wire: &Wire, spec: &Spec, budget: &mut Budget) -> Result<LinePass, LimitExceeded> {
-    let list = EdgeList::of(mesh, budget)?;
-    let hide_behind_surface = wire.hidden == Hidden::Hide && spec.surface.is_some();
-    let skip_back_edges = hide_behind_surface && list.is_closed();
-    let every = draws_every_edge(mesh, wire);
-    let edges = list
-        .edges
-        .iter()
-        .filter(|edge| every || edge.is_polygon_edge)
-        .map(|edge| Edge { vertices: edge.vertices, faces: edge.faces })
-        .collect::<Vec<_>>();
-    budget.spend("drawn edges", edges.len() as u64, 16)?;
-    Ok(LinePass {
-        edges,
-        width_px: wire.thickness,
-        smoothing_px: wire.smoothing,
-        color: color(wire),
-        hide_behind_surface,
-        skip_back_edges,
-    })
+/// How much wider than the polygons' edges those that tell of a fault are.
+const FAULT_WIDTH: f32 = 2.5;
+
+/// Lines of one style, and the edges that have it.
+struct Want {
+    width_px: f32,
+    smoothing_px: f32,
+    color: [f32; 4],
+    hidden: Hidden,
+    lit: bool,
+    contour: bool,
+    class: Class,
+    /// Which materials' edges; empty: all.
+    materials: Vec<bool>,
 }
 
-/// Whether the wire follows every edge of every triangle.
-pub fn draws_every_edge(mesh: &Mesh, wire: &Wire) -> bool {
-    wire.edges == WireEdges::Triangles || mesh.edge_masks.iter().all(|&mask| mask == 0b111)
+/// A kind of edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Class {
+    All,
+    Polygon,
+    /// Faces meet at an angle whose cosine is below this, or there are not two.
+    Feature(f64),
+    /// Two faces that meet so.
+    Crease(f64),
+    Boundary,
+    Nonmanifold,
+}
+
+/// The passes of a scene. `contour_px` is the width of each part's contour, where it has one.
+pub fn passes(
+    mesh: &Mesh,
+    spec: &Spec,
+    parts: &Parts<'_>,
+    contour_px: impl Fn(usize) -> f32,
+    skips: &mut Skips<'_>,
+    budget: &mut Budget,
+) -> Result<Vec<LinePass>, LimitExceeded> {
+    let mut wants = wire_wants(parts);
+    wants.extend(spec.topology.iter().flat_map(topology_wants));
+    wants.extend(contour_wants(parts, contour_px));
+    wants.retain(|want| want.width_px + want.smoothing_px > 0.0 && want.color[3] > 0.0);
+    if skips.skip(SkipKind::Adjacency, wants.is_empty(), "no line asks which triangles are neighbours") {
+        return Ok(Vec::new());
+    }
+    let list = EdgeList::of(mesh, budget)?;
+    let hides = parts.has_fill() || parts.needs_occluder() || spec.topology.is_some();
+    // On a closed surface that nothing shines through, what looks away is hidden.
+    let is_solid = hides && list.is_closed() && (0..parts.layers.len()).all(|m| parts.fill(m) != Fill::Transparent);
+    let back_edges = is_solid && wants.iter().any(|want| want.hidden == Hidden::Hide);
+    let skip_back = skips.skip(SkipKind::BackEdges, back_edges, "the surface is closed: they are hidden");
+    let mut passes = Vec::new();
+    for want in &wants {
+        let edges: Arc<[Edge]> = list
+            .edges
+            .iter()
+            .filter(|edge| want.draws(mesh, edge))
+            .map(|edge| Edge { vertices: edge.vertices, faces: edge.faces })
+            .collect();
+        budget.spend("drawn edges", edges.len() as u64, 16)?;
+        if !edges.is_empty() {
+            passes.extend(want.passes(&edges, hides, skip_back));
+        }
+    }
+    Ok(passes)
 }
 
 /// Premultiplied, opacity included.
 pub fn color(wire: &Wire) -> [f32; 4] {
     wire.color.premultiplied().map(|v| v * wire.opacity)
+}
+
+/// Which edges of each triangle its part's wire follows; empty where it is all of them.
+pub fn edge_masks(mesh: &Mesh, parts: &Parts<'_>, budget: &mut Budget) -> Result<Vec<u8>, LimitExceeded> {
+    let classes: Vec<Class> =
+        parts.layers.iter().map(|layers| layers.wire.as_ref().map_or(Class::All, class_of)).collect();
+    let is_polygonal = mesh.edge_masks.iter().any(|&mask| mask != 0b111);
+    if classes.iter().all(|class| *class == Class::All || (*class == Class::Polygon && !is_polygonal)) {
+        return Ok(Vec::new());
+    }
+    budget.spend("edge masks", mesh.triangles.len() as u64, 1)?;
+    let class_at = |t: usize| classes.get(mesh.triangle_materials[t] as usize).copied().unwrap_or(Class::All);
+    let mut masks: Vec<u8> = (0..mesh.triangles.len())
+        .map(|t| match class_at(t) {
+            Class::All => 0b111,
+            Class::Polygon => mesh.edge_masks[t],
+            _ => 0,
+        })
+        .collect();
+    let asks = |class: &Class| !matches!(class, Class::All | Class::Polygon);
+    if classes.iter().any(asks) {
+        let list = EdgeList::of(mesh, budget)?;
+        mark(mesh, &list, &mut masks, class_at);
+    }
+    Ok(masks)
+}
+
+/// Sets the bits of edges that belong to their triangle's class, where that depends on neighbours.
+fn mark(mesh: &Mesh, list: &EdgeList, masks: &mut [u8], class_at: impl Fn(usize) -> Class) {
+    // Edges know their first two faces; the few that have more are looked up.
+    let mut crowded = RapidHashSet::default();
+    for edge in &list.edges {
+        if edge.face_count > 2 {
+            crowded.insert([edge.vertices[0].min(edge.vertices[1]), edge.vertices[0].max(edge.vertices[1])]);
+        }
+        for face in edge.faces.into_iter().filter(|&face| face != NO_FACE) {
+            if is_of(class_at(face as usize), mesh, edge) {
+                masks[face as usize] |= corner_bit(&mesh.triangles[face as usize], edge.vertices);
+            }
+        }
+    }
+    if crowded.is_empty() {
+        return;
+    }
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        for k in 0..3 {
+            let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+            if matches!(class_at(t), Class::Feature(_)) && crowded.contains(&[a.min(b), a.max(b)]) {
+                masks[t] |= 1 << k;
+            }
+        }
+    }
+}
+
+fn corner_bit(triangle: &[u32; 3], [a, b]: [u32; 2]) -> u8 {
+    (0..3).filter(|&k| [[a, b], [b, a]].contains(&[triangle[k], triangle[(k + 1) % 3]])).map(|k| 1 << k).sum()
+}
+
+fn wire_wants(parts: &Parts<'_>) -> Vec<Want> {
+    let mut kinds: Vec<(Wire, Vec<bool>)> = Vec::new();
+    for (material, layers) in parts.layers.iter().enumerate() {
+        let Some(wire) = layers.wire.filter(|wire| wire.method == WireMethod::Exact) else { continue };
+        let at = kinds.iter().position(|(kind, _)| *kind == wire).unwrap_or_else(|| {
+            kinds.push((wire, vec![false; parts.layers.len()]));
+            kinds.len() - 1
+        });
+        kinds[at].1[material] = true;
+    }
+    let want = |(wire, materials): (Wire, Vec<bool>)| Want {
+        width_px: wire.thickness,
+        smoothing_px: wire.smoothing,
+        color: color(&wire),
+        hidden: wire.hidden,
+        lit: wire.lit,
+        contour: false,
+        class: class_of(&wire),
+        materials: if materials.iter().all(|&m| m) { Vec::new() } else { materials },
+    };
+    kinds.into_iter().map(want).collect()
+}
+
+fn class_of(wire: &Wire) -> Class {
+    match wire.edges {
+        WireEdges::Triangles => Class::All,
+        WireEdges::Polygons => Class::Polygon,
+        WireEdges::Feature => Class::Feature(cos_deg(wire.feature_angle_deg)),
+        WireEdges::Boundary => Class::Boundary,
+    }
+}
+
+/// Faults last, so that they lie on top.
+fn topology_wants(topology: &Topology) -> Vec<Want> {
+    let want = |color: Option<Rgba>, class, share: f32, hidden| {
+        color.map(|color| Want {
+            width_px: topology.thickness * share,
+            smoothing_px: 0.0,
+            color: color.premultiplied(),
+            hidden,
+            lit: false,
+            contour: false,
+            class,
+            materials: Vec::new(),
+        })
+    };
+    let crease = Class::Crease(cos_deg(topology.crease_angle_deg));
+    let kinds = [
+        want(topology.polygon, Class::Polygon, 1.0, Hidden::Hide),
+        want(topology.crease, crease, FAULT_WIDTH, Hidden::Hide),
+        // A fault on the far side is one too.
+        want(topology.open, Class::Boundary, FAULT_WIDTH, Hidden::Fade),
+        want(topology.nonmanifold, Class::Nonmanifold, FAULT_WIDTH, Hidden::Fade),
+    ];
+    kinds.into_iter().flatten().collect()
+}
+
+fn contour_wants(parts: &Parts<'_>, contour_px: impl Fn(usize) -> f32) -> Vec<Want> {
+    let mut wants: Vec<Want> = Vec::new();
+    for (material, layers) in parts.layers.iter().enumerate() {
+        let Some(outline) = layers.outline.filter(|o| o.method == OutlineMethod::Contour) else { continue };
+        let (width_px, color) = (contour_px(material), outline.color.premultiplied());
+        let at = wants.iter().position(|w| w.width_px == width_px && w.color == color).unwrap_or_else(|| {
+            let materials = vec![false; parts.layers.len()];
+            let class = Class::All;
+            wants.push(Want {
+                width_px,
+                smoothing_px: 0.0,
+                color,
+                hidden: Hidden::Hide,
+                lit: false,
+                contour: true,
+                class,
+                materials,
+            });
+            wants.len() - 1
+        });
+        wants[at].materials[material] = true;
+    }
+    wants
+}
+
+impl Want {
+    fn draws(&self, mesh: &Mesh, edge: &MeshEdge) -> bool {
+        let mut faces = edge.faces.into_iter().filter(|&face| face != NO_FACE);
+        let material = |face: u32| mesh.triangle_materials[face as usize] as usize;
+        (self.materials.is_empty() || faces.any(|face| self.materials.get(material(face)) == Some(&true)))
+            && is_of(self.class, mesh, edge)
+    }
+
+    fn passes(&self, edges: &Arc<[Edge]>, hides: bool, skip_back: bool) -> Vec<LinePass> {
+        let pass = |shown, color| LinePass {
+            edges: edges.clone(),
+            width_px: self.width_px,
+            smoothing_px: self.smoothing_px,
+            color,
+            shown,
+            skip_back_edges: skip_back && shown == Shown::Visible,
+            contour: self.contour,
+            lit: self.lit,
+        };
+        match self.hidden {
+            Hidden::Show => vec![pass(Shown::All, self.color)],
+            _ if !hides => vec![pass(Shown::All, self.color)],
+            Hidden::Hide => vec![pass(Shown::Visible, self.color)],
+            Hidden::Fade => {
+                vec![pass(Shown::Hidden, self.color.map(|v| v * FADE)), pass(Shown::Visible, self.color)]
+            }
+        }
+    }
+}
+
+fn is_of(class: Class, mesh: &Mesh, edge: &MeshEdge) -> bool {
+    let bends = |limit: f64| {
+        let [a, b] = edge.faces.map(|face| mesh.face_normals[face as usize].map(f64::from));
+        let cos = (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+        // Two faces that disagree which side is out bend the other way round.
+        (if edge.is_wound_alike { -cos } else { cos }) < limit
+    };
+    match class {
+        Class::All => true,
+        Class::Polygon => edge.is_polygon_edge,
+        Class::Feature(limit) => edge.face_count != 2 || bends(limit),
+        Class::Crease(limit) => edge.face_count == 2 && bends(limit),
+        Class::Boundary => edge.face_count == 1,
+        Class::Nonmanifold => edge.face_count > 2 || (edge.face_count == 2 && edge.is_wound_alike),
+    }
+}
+
+fn cos_deg(degrees: f64) -> f64 {
+    libm::cos(degrees.to_radians())
 }

@@ -1,12 +1,12 @@
 //! A [`Spec`] in the making: defaults, presets, and what can only be settled when every key is known.
 
 use super::error::{RequestError, RequestFault};
-use super::words::{LightPreset, Style};
+use super::words::Style;
 use crate::limits::BackendChoice;
 use crate::scene::color::Rgba;
 use crate::scene::{
-    CameraSpec, Cull, Hidden, ImageSpec, Light, Outline, OutlineUnit, Projection, Shading, Spec, Surface, View, Wire,
-    WireEdges, WireMethod,
+    CameraSpec, Cull, DebugView, FlatNormals, Hidden, ImageSpec, Layers, Light, LightPreset, Outline, OutlineMethod,
+    OutlineUnit, Projection, Shading, Spec, Surface, Topology, View, Wire, WireEdges, WireMethod,
 };
 
 /// Largest thickness of a wire in multiples of `fwidth`; an exact one is in pixels.
@@ -22,8 +22,6 @@ pub struct Draft {
     pub spec: Spec,
     /// None: 0 for exact lines, 1 for `fwidth`.
     pub smoothing: Option<f32>,
-    /// Which lamps.
-    pub light: LightPreset,
     /// None: 0.3 under a headlight, 1 without one.
     pub ambient: Option<f32>,
 }
@@ -39,33 +37,36 @@ impl Draft {
             Style::Smooth => (surface(Shading::Smooth), None, None),
             Style::Unlit => (surface(Shading::Unlit), None, None),
             Style::Wire => (surface(Shading::Flat), wire(Hidden::Hide), None),
-            Style::Wireframe => (None, wire(Hidden::Show), None),
+            Style::Wireframe => (None, wire(Hidden::Fade), None),
             Style::Outline => (surface(Shading::Smooth), None, Some(OUTLINE)),
             Style::HiddenLine => (white, wire(Hidden::Hide), None),
+            Style::Topology => (surface(Shading::Flat), None, None),
         };
-        let light = Light { intensity: 1.0, ambient: 0.3 };
-        let spec = Spec { surface, wire, outline, camera: CAMERA, light, image: IMAGE, backend };
-        Self { spec, smoothing: None, light: LightPreset::Headlight, ambient: None }
+        let light = Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3 };
+        let topology = (style == Style::Topology).then_some(TOPOLOGY);
+        let layers = Layers { surface, wire, outline };
+        let spec = Spec { layers, materials: Vec::new(), topology, camera: CAMERA, light, image: IMAGE, backend };
+        Self { spec, smoothing: None, ambient: None }
     }
 
     /// The surface layer, turned on by being spoken of.
     pub fn surface(&mut self) -> &mut Surface {
-        self.spec.surface.get_or_insert(SURFACE)
+        self.spec.layers.surface.get_or_insert(SURFACE)
     }
 
     /// The wire layer, turned on by being spoken of.
     pub fn wire(&mut self) -> &mut Wire {
-        self.spec.wire.get_or_insert(WIRE)
+        self.spec.layers.wire.get_or_insert(WIRE)
     }
 
     /// The outline layer, turned on by being spoken of.
     pub fn outline(&mut self) -> &mut Outline {
-        self.spec.outline.get_or_insert(OUTLINE)
+        self.spec.layers.outline.get_or_insert(OUTLINE)
     }
 
     /// Settles what depends on several keys.
     pub fn finish(mut self) -> Result<Spec, RequestError> {
-        if let Some(wire) = &mut self.spec.wire {
+        if let Some(wire) = &mut self.spec.layers.wire {
             let default = if wire.method == WireMethod::Exact { 0.0 } else { 1.0 };
             wire.smoothing = self.smoothing.unwrap_or(default);
             if wire.method == WireMethod::Fwidth && wire.thickness > FWIDTH_MAX {
@@ -73,11 +74,9 @@ impl Draft {
                 return Err(RequestError::new(RequestFault::OutOfRange, "wire.thickness", wire.thickness, allowed));
             }
         }
-        match self.light {
-            LightPreset::Headlight => self.spec.light.ambient = self.ambient.unwrap_or(0.3),
-            LightPreset::None => self.spec.light = Light { intensity: 0.0, ambient: self.ambient.unwrap_or(1.0) },
-        }
-        if let Some(Outline { unit: OutlineUnit::Px, thickness: Some(thickness), .. }) = self.spec.outline
+        let has_lamps = self.spec.light.preset != LightPreset::None;
+        self.spec.light.ambient = self.ambient.unwrap_or(if has_lamps { 0.3 } else { 1.0 });
+        if let Some(Outline { unit: OutlineUnit::Px, thickness: Some(thickness), .. }) = self.spec.layers.outline
             && thickness > OUTLINE_PX_MAX
         {
             let allowed = format!("a number from 0 to {OUTLINE_PX_MAX} where `outline.unit` is px");
@@ -100,8 +99,18 @@ fn check_camera(camera: &CameraSpec) -> Result<(), RequestError> {
     }
 }
 
-const SURFACE: Surface =
-    Surface { shading: Shading::Flat, color: None, metallic: 0.0, roughness: 0.6, cull: Cull::None };
+const SURFACE: Surface = Surface {
+    shading: Shading::Flat,
+    normals: FlatNormals::Face,
+    color: None,
+    metallic: None,
+    roughness: None,
+    emissive: None,
+    opacity: 1.0,
+    textures: true,
+    debug: DebugView::None,
+    cull: Cull::None,
+};
 
 const WIRE: Wire = Wire {
     method: WireMethod::Exact,
@@ -109,11 +118,23 @@ const WIRE: Wire = Wire {
     thickness: 1.0,
     smoothing: 0.0,
     opacity: 1.0,
+    lit: false,
     edges: WireEdges::Triangles,
+    feature_angle_deg: 30.0,
     hidden: Hidden::Hide,
 };
 
-const OUTLINE: Outline = Outline { color: Rgba::BLACK, thickness: None, unit: OutlineUnit::Object };
+const OUTLINE: Outline =
+    Outline { method: OutlineMethod::Hull, color: Rgba::BLACK, thickness: None, unit: OutlineUnit::Object };
+
+const TOPOLOGY: Topology = Topology {
+    polygon: Some(Rgba::BLACK),
+    crease: None,
+    open: Some(Rgba([1.0, 0.0, 0.0, 1.0])),
+    nonmanifold: Some(Rgba([0.5, 0.0, 0.5, 1.0])),
+    crease_angle_deg: 30.0,
+    thickness: 1.0,
+};
 
 const CAMERA: CameraSpec = CameraSpec {
     view: View::Iso,
@@ -126,6 +147,7 @@ const CAMERA: CameraSpec = CameraSpec {
     margin: 0.05,
     eye: None,
     target: None,
+    from_file: false,
 };
 
 const IMAGE: ImageSpec = ImageSpec { width_px: 512, height_px: 512, format: None, samples: 4, background: Rgba::WHITE };

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use super::draft::Draft;
 use super::value::{Kind, Value};
-use super::words::{FlatNormals, OutlineMethod, Words, words_of};
+use super::words::{Words, words_of};
 
 /// A key of the document.
 pub struct Field {
@@ -51,21 +51,21 @@ pub const LAYERS: &[Layer] = &[
         if on {
             d.surface();
         } else {
-            d.spec.surface = None
+            d.spec.layers.surface = None
         }
     }),
     ("wire", |d, on| {
         if on {
             d.wire();
         } else {
-            d.spec.wire = None
+            d.spec.layers.wire = None
         }
     }),
     ("outline", |d, on| {
         if on {
             d.outline();
         } else {
-            d.spec.outline = None
+            d.spec.layers.outline = None
         }
     }),
 ];
@@ -102,10 +102,10 @@ pub const LATER: &[&str] = &[
 fn surface_fields() -> Vec<Field> {
     vec![
         words("surface.shading", |d, v| d.surface().shading = v),
-        words("surface.normals", |d, FlatNormals::Face| _ = d.surface()),
+        words("surface.normals", |d, v| d.surface().normals = v),
         color("surface.color", |d, v| d.surface().color = v).nullable(),
-        number("surface.metallic", 0.0, 1.0, |d, v| d.surface().metallic = v),
-        number("surface.roughness", 0.0, 1.0, |d, v| d.surface().roughness = v),
+        number("surface.metallic", 0.0, 1.0, |d, v| d.surface().metallic = Some(v)),
+        number("surface.roughness", 0.0, 1.0, |d, v| d.surface().roughness = Some(v)),
         words("surface.cull", |d, v| d.surface().cull = v),
     ]
 }
@@ -127,7 +127,7 @@ fn wire_fields() -> Vec<Field> {
 
 fn outline_fields() -> Vec<Field> {
     vec![
-        words("outline.method", |d, OutlineMethod::Hull| _ = d.outline()),
+        words("outline.method", |d, v| d.outline().method = v),
         color("outline.color", |d, v| d.outline().color = v.unwrap_or(d.outline().color)),
         optional("outline.thickness", 0.0, 1e30, |d, v| d.outline().thickness = v.map(|t| t as f32)),
         words("outline.unit", |d, v| d.outline().unit = v),
@@ -151,7 +151,7 @@ fn camera_fields() -> Vec<Field> {
 
 fn other_fields() -> Vec<Field> {
     vec![
-        words("light.preset", |d, v| d.light = v),
+        words("light.preset", |d, v| d.spec.light.preset = v),
         number("light.intensity", 0.0, 10.0, |d, v| d.spec.light.intensity = v),
         number("light.ambient", 0.0, 1.0, |d, v| d.ambient = Some(v)),
         pixels("image.width", |d, v| d.spec.image.width_px = v),

@@ -29,10 +29,10 @@ fn every_style_has_its_layers() {
     assert_eq!(cases.len(), Style::NOW.len());
     for (style, shading, hidden, outline) in cases {
         let spec = query(&[("style", style)]).unwrap();
-        assert_eq!(spec.surface.map(|s| s.shading), shading, "{style}");
-        assert_eq!(spec.wire.map(|w| w.hidden), hidden, "{style}");
-        assert_eq!(spec.outline.is_some(), outline, "{style}");
-        if let Some(wire) = spec.wire {
+        assert_eq!(spec.layers.surface.map(|s| s.shading), shading, "{style}");
+        assert_eq!(spec.layers.wire.map(|w| w.hidden), hidden, "{style}");
+        assert_eq!(spec.layers.outline.is_some(), outline, "{style}");
+        if let Some(wire) = spec.layers.wire {
             assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Exact, 1.0, 0.0));
         }
     }
@@ -54,14 +54,14 @@ fn the_default_size_keeps_to_the_limit() {
 
 #[test]
 fn null_turns_a_layer_off_and_presence_turns_it_on() {
-    assert!(json(r#"{"style":"wire","surface":null}"#).unwrap().surface.is_none());
-    assert!(json(r#"{"style":"flat","wire":{}}"#).unwrap().wire.is_some());
-    assert!(json(r#"{"wire":{"opacity":0.5}}"#).unwrap().wire.is_some());
-    assert!(query(&[("style", "outline"), ("outline", "null")]).unwrap().outline.is_none());
-    assert!(query(&[("outline", "{}")]).unwrap().outline.is_some());
+    assert!(json(r#"{"style":"wire","surface":null}"#).unwrap().layers.surface.is_none());
+    assert!(json(r#"{"style":"flat","wire":{}}"#).unwrap().layers.wire.is_some());
+    assert!(json(r#"{"wire":{"opacity":0.5}}"#).unwrap().layers.wire.is_some());
+    assert!(query(&[("style", "outline"), ("outline", "null")]).unwrap().layers.outline.is_none());
+    assert!(query(&[("outline", "{}")]).unwrap().layers.outline.is_some());
     let over = [("wire.color".to_owned(), "#f00".to_owned())];
     let spec = read(Some(br#"{"style":"wire","wire":null}"#), &over, &rules()).unwrap();
-    assert_eq!(spec.wire.unwrap().color, Rgba::parse("#f00").unwrap());
+    assert_eq!(spec.layers.wire.unwrap().color, Rgba::parse("#f00").unwrap());
 }
 
 #[test]
@@ -69,11 +69,11 @@ fn the_query_overrides_the_document_and_the_document_the_style() {
     let document = br##"{"style":"outline","surface":{"color":"#0f0"},"image":{"width":100,"height":50}}"##;
     let over = [("surface.color".to_owned(), "f00".to_owned()), ("size".to_owned(), "64".to_owned())];
     let spec = read(Some(document), &over, &rules()).unwrap();
-    assert_eq!(spec.surface.unwrap().color, Rgba::parse("#ff0000"));
-    assert_eq!(spec.surface.unwrap().shading, Shading::Smooth);
+    assert_eq!(spec.layers.surface.unwrap().color, Rgba::parse("#ff0000"));
+    assert_eq!(spec.layers.surface.unwrap().shading, Shading::Smooth);
     assert_eq!((spec.image.width_px, spec.image.height_px), (64, 64));
     let over = [("style".to_owned(), "unlit".to_owned())];
-    assert_eq!(read(Some(document), &over, &rules()).unwrap().surface.unwrap().shading, Shading::Unlit);
+    assert_eq!(read(Some(document), &over, &rules()).unwrap().layers.surface.unwrap().shading, Shading::Unlit);
 }
 
 #[test]
@@ -90,12 +90,20 @@ fn every_key_reaches_its_field() {
         "backend": "cpu"
     }"##;
     let spec = json(document).unwrap();
-    let surface = spec.surface.unwrap();
-    assert_eq!((surface.shading, surface.metallic, surface.roughness), (Shading::Smooth, 1.0, 0.25));
-    let wire = spec.wire.unwrap();
+    let surface = spec.layers.surface.unwrap();
+    assert_eq!((surface.shading, surface.metallic, surface.roughness), (Shading::Smooth, Some(1.0), Some(0.25)));
+    let wire = spec.layers.wire.unwrap();
     assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Fwidth, 2.0, 1.0));
     assert_eq!((wire.edges, wire.hidden, wire.opacity), (WireEdges::Polygons, Hidden::Show, 0.5));
-    assert_eq!(spec.outline, Some(Outline { color: Rgba::WHITE, thickness: Some(3.0), unit: OutlineUnit::Px }));
+    assert_eq!(
+        spec.layers.outline,
+        Some(Outline {
+            method: crate::scene::OutlineMethod::Hull,
+            color: Rgba::WHITE,
+            thickness: Some(3.0),
+            unit: OutlineUnit::Px
+        })
+    );
     let camera = spec.camera;
     assert_eq!((camera.view, camera.up, camera.height), (View::Top, Some(UpAxis::NegZ), Some(2.5)));
     assert_eq!((camera.azimuth_deg, camera.elevation_deg), (Some(10.0), Some(-20.0)));
@@ -127,7 +135,7 @@ fn text_and_json_mean_the_same() {
 
 #[test]
 fn defaults_depend_on_other_keys_where_the_contract_says_so() {
-    let smoothing = |pairs: &[(&str, &str)]| query(pairs).unwrap().wire.unwrap().smoothing;
+    let smoothing = |pairs: &[(&str, &str)]| query(pairs).unwrap().layers.wire.unwrap().smoothing;
     assert_eq!(smoothing(&[("wire.method", "exact")]), 0.0);
     assert_eq!(smoothing(&[("wire.method", "fwidth")]), 1.0);
     assert_eq!(smoothing(&[("wire.smoothing", "0"), ("wire.method", "fwidth")]), 0.0);

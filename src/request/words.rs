@@ -3,7 +3,10 @@
 use crate::image::ImageFormat;
 use crate::limits::BackendChoice;
 use crate::mesh::UpAxis;
-use crate::scene::{Cull, Hidden, OutlineUnit, Projection, Shading, View, WireEdges, WireMethod};
+use crate::scene::{
+    Cull, FlatNormals, Hidden, LightPreset, OutlineMethod, OutlineUnit, Projection, Shading, View, WireEdges,
+    WireMethod,
+};
 
 /// An enumeration that a request names by words.
 pub trait Words: Copy + Send + Sync + 'static {
@@ -30,6 +33,8 @@ pub enum Style {
     Outline,
     /// White surface and lines.
     HiddenLine,
+    /// Flat surface, and edges by how many faces they have.
+    Topology,
 }
 
 impl Words for Style {
@@ -41,46 +46,21 @@ impl Words for Style {
         ("wireframe", Self::Wireframe),
         ("outline", Self::Outline),
         ("hidden-line", Self::HiddenLine),
+        ("topology", Self::Topology),
     ];
-    const LATER: &'static [&'static str] = &["topology"];
-}
-
-/// Where flat normals come from. One way for now, so nothing downstream asks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FlatNormals {
-    /// The triangle's own corners.
-    Face,
 }
 
 impl Words for FlatNormals {
-    const NOW: &'static [(&'static str, Self)] = &[("face", Self::Face)];
-    const LATER: &'static [&'static str] = &["derivative"];
-}
-
-/// How an outline is made. One way for now.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OutlineMethod {
-    /// Back faces, pushed out.
-    Hull,
+    const NOW: &'static [(&'static str, Self)] = &[("face", Self::Face), ("derivative", Self::Derivative)];
 }
 
 impl Words for OutlineMethod {
-    const NOW: &'static [(&'static str, Self)] = &[("hull", Self::Hull)];
-    const LATER: &'static [&'static str] = &["contour"];
-}
-
-/// A set of lamps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightPreset {
-    /// One at the camera, over an ambient term.
-    Headlight,
-    /// Ambient alone.
-    None,
+    const NOW: &'static [(&'static str, Self)] = &[("hull", Self::Hull), ("contour", Self::Contour)];
 }
 
 impl Words for LightPreset {
-    const NOW: &'static [(&'static str, Self)] = &[("headlight", Self::Headlight), ("none", Self::None)];
-    const LATER: &'static [&'static str] = &["three-point"];
+    const NOW: &'static [(&'static str, Self)] =
+        &[("headlight", Self::Headlight), ("three-point", Self::ThreePoint), ("none", Self::None)];
 }
 
 impl Words for Shading {
@@ -93,18 +73,26 @@ impl Words for Cull {
 }
 
 impl Words for WireMethod {
-    const NOW: &'static [(&'static str, Self)] = &[("exact", Self::Exact), ("fwidth", Self::Fwidth)];
-    const LATER: &'static [&'static str] = &["fwidth-min", "barycentric", "threshold"];
+    const NOW: &'static [(&'static str, Self)] = &[
+        ("exact", Self::Exact),
+        ("fwidth", Self::Fwidth),
+        ("fwidth-min", Self::FwidthMin),
+        ("barycentric", Self::Barycentric),
+        ("threshold", Self::Threshold),
+    ];
 }
 
 impl Words for WireEdges {
-    const NOW: &'static [(&'static str, Self)] = &[("triangles", Self::Triangles), ("polygons", Self::Polygons)];
-    const LATER: &'static [&'static str] = &["feature", "boundary"];
+    const NOW: &'static [(&'static str, Self)] = &[
+        ("triangles", Self::Triangles),
+        ("polygons", Self::Polygons),
+        ("feature", Self::Feature),
+        ("boundary", Self::Boundary),
+    ];
 }
 
 impl Words for Hidden {
-    const NOW: &'static [(&'static str, Self)] = &[("hide", Self::Hide), ("show", Self::Show)];
-    const LATER: &'static [&'static str] = &["fade"];
+    const NOW: &'static [(&'static str, Self)] = &[("hide", Self::Hide), ("show", Self::Show), ("fade", Self::Fade)];
 }
 
 impl Words for OutlineUnit {

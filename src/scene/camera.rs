@@ -7,6 +7,7 @@
 use glam::{DVec2, DVec3};
 
 use super::{CameraSpec, Projection as Kind, View};
+use crate::mesh::material::{FileCamera, FileLens};
 use crate::mesh::{Mesh, UpAxis};
 
 /// A placed camera. Lengths in units of the mesh's box.
@@ -47,10 +48,16 @@ impl Camera {
         let free = |v: f64| (1.0 - 2.0 * spec.margin - 2.0 * border.px / v).max(0.05);
         let inner = DVec2::new(free(size.x), free(size.y));
         let aspect = size.x / size.y;
+        let file = mesh.cameras.first().filter(|_| spec.from_file);
+        let (spec, file_axes) = match file {
+            Some(camera) => (&through(spec, camera), Some(file_axes(mesh, camera))),
+            None => (spec, None),
+        };
         let tan = tan_deg(spec.fov_deg * 0.5);
         let tangents = DVec2::new(tan * aspect, tan);
-        let (axes, explicit) = match (spec.eye, spec.target) {
-            (Some(eye), Some(target)) => explicit_axes(mesh, up, eye, target),
+        let (axes, explicit) = match (file_axes, spec.eye, spec.target) {
+            (Some(placed), ..) => placed,
+            (None, Some(eye), Some(target)) => explicit_axes(mesh, up, eye, target),
             _ => (named_axes(spec, up), None),
         };
         let extents = Extents::new(mesh, axes);
@@ -90,6 +97,12 @@ impl Camera {
         let px = (DVec2::new(reach.x, reach.y) + grow) / (self.half_size * w) * size_px * 0.5;
         // Half of the guard band: hulls of constant pixel width still find room.
         self.contains_mesh = nearest > 0.0 && px.max_element() < 2048.0;
+    }
+
+    /// Pixels that a unit of the box takes at the box's centre.
+    pub fn px_per_unit(&self, size_px: [u32; 2]) -> f64 {
+        let w = if self.kind == Kind::Perspective { self.distance.max(self.near) } else { 1.0 };
+        f64::from(size_px[1]) * 0.5 / (self.half_size.y * w)
     }
 
     /// The four rows of [`crate::plan::Projection`]: x, y (in 1/256 px from the centre), reversed depth, W.
@@ -173,6 +186,25 @@ fn explicit_axes(mesh: &Mesh, up: UpAxis, eye: [f64; 3], target: [f64; 3]) -> ([
     // Looking straight up or down, the picture's right stays the model's right.
     let side = up.cross(back).try_normalize().unwrap_or(right);
     ([side, back.cross(side), back], Some((target, (eye - target).length())))
+}
+
+/// The wish with the lens of the file's camera.
+fn through(spec: &CameraSpec, camera: &FileCamera) -> CameraSpec {
+    match camera.lens {
+        FileLens::Perspective { fov_deg } => {
+            CameraSpec { projection: Kind::Perspective, fov_deg: fov_deg.clamp(0.01, 179.0), ..*spec }
+        }
+        FileLens::Orthographic { height } => {
+            CameraSpec { projection: Kind::Orthographic, height: Some(height), ..*spec }
+        }
+    }
+}
+
+/// The file camera's axes; a point in front of it, and how far that is.
+fn file_axes(mesh: &Mesh, camera: &FileCamera) -> ([DVec3; 3], Explicit) {
+    let axes = camera.axes.map(DVec3::from);
+    let eye = (DVec3::from(camera.eye) - DVec3::from(mesh.to_file.centre)) / mesh.to_file.scale;
+    (axes, Some((eye - axes[2], 1.0)))
 }
 
 fn named_axes(spec: &CameraSpec, up: UpAxis) -> [DVec3; 3] {

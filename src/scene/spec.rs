@@ -1,8 +1,7 @@
-//! The request document, understood: presets applied, defaults filled in, every value in range.
-//!
-//! A layer that is `Some` is drawn. Units are in the names.
+//! The request document, understood: presets applied, defaults filled in, every value in range. Units are in the names.
 
 use super::color::Rgba;
+use super::layers::{Layers, Topology};
 pub use crate::image::ImageFormat;
 pub use crate::limits::BackendChoice;
 use crate::mesh::UpAxis;
@@ -10,12 +9,12 @@ use crate::mesh::UpAxis;
 /// Everything a request says.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spec {
-    /// The filled surface, if any.
-    pub surface: Option<Surface>,
-    /// Lines along the mesh's edges, if any.
-    pub wire: Option<Wire>,
-    /// The line around the shape, if any.
-    pub outline: Option<Outline>,
+    /// What is drawn, for materials that `materials` does not name.
+    pub layers: Layers,
+    /// What is drawn for the asset's materials of these names; the last of equal names counts.
+    pub materials: Vec<(String, Layers)>,
+    /// Edges that say how the mesh hangs together, if any.
+    pub topology: Option<Topology>,
     /// Where from.
     pub camera: CameraSpec,
     /// Lit how.
@@ -24,109 +23,6 @@ pub struct Spec {
     pub image: ImageSpec,
     /// Which back-end draws.
     pub backend: BackendChoice,
-}
-
-/// How a surface takes light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shading {
-    /// One normal a triangle.
-    Flat,
-    /// Interpolated vertex normals.
-    Smooth,
-    /// The base colour, as it is.
-    Unlit,
-}
-
-/// Which faces are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cull {
-    /// Both sides.
-    None,
-    /// Front faces only.
-    Back,
-    /// Back faces only.
-    Front,
-}
-
-/// The filled surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Surface {
-    /// How it takes light.
-    pub shading: Shading,
-    /// Overrides the file's own base colours; None keeps them (or a calm grey where there are none).
-    pub color: Option<Rgba>,
-    /// 0 to 1.
-    pub metallic: f32,
-    /// 0 to 1.
-    pub roughness: f32,
-    /// Which faces are drawn.
-    pub cull: Cull,
-}
-
-/// How wires are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WireMethod {
-    /// Full width in pixels by exact box-filter coverage.
-    Exact,
-    /// `min_i smoothstep(t d_i, (t + s) d_i, b_i)` with `d = fwidth(b)`.
-    Fwidth,
-}
-
-/// Which edges a wire follows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WireEdges {
-    /// Every triangle's edges.
-    Triangles,
-    /// Edges of the file's polygons: no triangulation diagonals.
-    Polygons,
-}
-
-/// What becomes of edges behind a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hidden {
-    /// Not drawn.
-    Hide,
-    /// Drawn as if nothing lay in front.
-    Show,
-}
-
-/// Lines along the mesh's edges.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wire {
-    /// The technique.
-    pub method: WireMethod,
-    /// Line colour.
-    pub color: Rgba,
-    /// `exact`: full width, pixels. `fwidth`: threshold in multiples of `d`, 0 to 10.
-    pub thickness: f32,
-    /// `exact`: extra ramp, pixels. `fwidth`: width of the smoothstep in multiples of `d`, 0 to 10.
-    pub smoothing: f32,
-    /// 0 to 1.
-    pub opacity: f32,
-    /// Which edges.
-    pub edges: WireEdges,
-    /// What becomes of hidden edges.
-    pub hidden: Hidden,
-}
-
-/// Unit of an outline's thickness.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OutlineUnit {
-    /// Model units, along the normal.
-    Object,
-    /// Pixels, on screen.
-    Px,
-}
-
-/// An inverted hull: the back faces, pushed out, in one colour.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outline {
-    /// Line colour.
-    pub color: Rgba,
-    /// In `unit`. None: 3 px; or in object units, 0.03 for a model whose longest side is 2, and in proportion for others.
-    pub thickness: Option<f32>,
-    /// Unit of `thickness`.
-    pub unit: OutlineUnit,
 }
 
 /// Named directions to look from.
@@ -180,12 +76,29 @@ pub struct CameraSpec {
     pub eye: Option<[f64; 3]>,
     /// The point in file space at the picture's centre.
     pub target: Option<[f64; 3]>,
+    /// Looks through the file's own first camera; nothing is fitted.
+    pub from_file: bool,
 }
 
-/// Light: a headlight over an ambient term.
+/// Which lamps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightPreset {
+    /// One over the viewer's shoulder.
+    Headlight,
+    /// Key, fill and rim, as in a studio; they turn with the camera.
+    ThreePoint,
+    /// None: ambient light alone.
+    None,
+}
+
+/// Lamps over an ambient term.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
-    /// Strength of the headlight, 0 to 10.
+    /// Which lamps.
+    pub preset: LightPreset,
+    /// Where the key light shines, in file space; None: as the preset has it, relative to the camera. Not zero.
+    pub direction: Option<[f64; 3]>,
+    /// Strength of the lamps, 0 to 10.
     pub intensity: f32,
     /// Share of light that comes from everywhere, 0 to 1.
     pub ambient: f32,

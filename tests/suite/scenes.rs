@@ -2,7 +2,7 @@
 
 use meshsnap::limits::{BackendChoice, Budget, Deadline, Limits};
 use meshsnap::mesh::{self, Mesh};
-use meshsnap::plan::{self, DrawPlan, Faces, Normals, Projection, SurfacePass};
+use meshsnap::plan::{self, DrawPlan, Faces, MaterialLook, Projection, SurfacePass};
 use meshsnap::request::{self, Rules};
 use meshsnap::scene::Spec;
 
@@ -111,30 +111,10 @@ pub fn screen_plan<'a>(
         screen_up: [0.0, 1.0, 0.0],
         screen_right: [1.0, 0.0, 0.0],
     };
-    let surface = SurfacePass {
-        faces: Faces::Both,
-        normals: Normals::None,
-        material_colors: vec![[1.0; 4]],
-        triangle_materials: &[],
-        metallic: 0.0,
-        roughness: 0.6,
-        intensity: 1.0,
-        ambient: 0.3,
-        to_light: [0.0, 0.0, 1.0],
-        halfway: [0.0, 0.0, 1.0],
-        fwidth: None,
-    };
     DrawPlan {
-        width_px: size_px[0],
-        height_px: size_px[1],
         samples,
-        positions,
-        triangles,
-        projection,
-        surface: Some(surface),
-        hull: None,
-        lines: None,
+        surface: Some(SurfacePass::new(Faces::Both, vec![MaterialLook::unlit([1.0; 4])])),
         background: [0.0, 0.0, 0.0, 1.0],
-        skips: Vec::new(),
+        ..DrawPlan::new(size_px, positions, triangles, projection)
     }
 }

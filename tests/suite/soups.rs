@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use meshsnap::plan::{DrawPlan, Faces, HullOffset, HullPass, Normals, Projection, SurfacePass};
+use meshsnap::plan::{DrawPlan, Faces, HullOffset, HullPass, MaterialLook, Projection, SurfacePass};
 
 /// xorshift64*: the tests must draw the same soups everywhere.
 pub struct Random(pub u64);
@@ -109,39 +109,22 @@ impl Soup {
 
     pub fn plan(&self, view: &View) -> DrawPlan<'_> {
         DrawPlan {
-            width_px: view.width,
-            height_px: view.height,
             samples: view.samples,
-            positions: &self.positions,
-            triangles: &self.triangles,
-            projection: view.projection,
-            surface: view.surface.map(|faces| flat_surface(faces, Normals::None)),
+            surface: view.surface.map(flat_surface),
             hull: view.hull.map(|offset| HullPass {
-                color: [0.0, 0.0, 0.0, 1.0],
+                colors: vec![[0.0, 0.0, 0.0, 1.0]],
                 normals: Cow::Borrowed(&self.normals),
                 offset,
+                amounts: Vec::new(),
             }),
-            lines: None,
             background: [1.0; 4],
-            skips: Vec::new(),
+            ..DrawPlan::new([view.width, view.height], &self.positions, &self.triangles, view.projection)
         }
     }
 }
 
-pub fn flat_surface(faces: Faces, normals: Normals<'_>) -> SurfacePass<'_> {
-    SurfacePass {
-        faces,
-        normals,
-        material_colors: vec![[0.5, 0.25, 0.125, 1.0]],
-        triangle_materials: &[],
-        metallic: 0.0,
-        roughness: 0.6,
-        intensity: 1.0,
-        ambient: 0.3,
-        to_light: unit([0.3, 0.4, 1.0]),
-        halfway: unit([0.15, 0.2, 1.0]),
-        fwidth: None,
-    }
+pub fn flat_surface(faces: Faces) -> SurfacePass<'static> {
+    SurfacePass::new(faces, vec![MaterialLook::unlit([0.5, 0.25, 0.125, 1.0])])
 }
 
 /// How a soup is looked at.

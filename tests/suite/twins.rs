@@ -6,6 +6,7 @@ use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
 use meshsnap::backend::{DrawError, Renderer};
 use meshsnap::limits::Deadline;
+use meshsnap::plan::MaterialLook;
 
 use crate::golden;
 use crate::likeness::{Likeness, Tolerance};
@@ -155,7 +156,9 @@ fn materials_masks_and_normals_agree() {
                 ]);
                 let mut plan = scenes::plan(&mesh, &spec);
                 let surface = plan.surface.as_mut().unwrap();
-                surface.material_colors = vec![[0.8, 0.1, 0.1, 1.0], [0.1, 0.7, 0.2, 1.0], [0.2, 0.2, 0.9, 0.5]];
+                let colors = [[0.8, 0.1, 0.1, 1.0], [0.1, 0.7, 0.2, 1.0], [0.2, 0.2, 0.9, 0.5]];
+                let first = surface.materials[0];
+                surface.materials = colors.map(|base_color| MaterialLook { base_color, ..first }).to_vec();
                 surface.triangle_materials = &materials;
                 plan.background = [0.0; 4];
                 let cpu = CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap();

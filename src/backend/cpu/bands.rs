@@ -2,14 +2,14 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::bins::Bins;
+use super::bins::{Bin, Bins};
 use super::isa::dispatch;
 use super::occluders::PlaneCache;
 use super::resolve::resolve;
 use super::samples::{NOTHING, SampleBand};
 use super::visibility::{self, Setup};
 use super::{Stages, lines, shade};
-use crate::plan::DrawPlan;
+use crate::plan::{DrawPlan, LinePass};
 
 /// Sample memory of a band, bytes: half of a common 1 MiB second-level cache.
 const BAND_BYTES: usize = 512 << 10;
@@ -61,16 +61,16 @@ pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: u
     fill_samples(stages, scratch, bins, band);
     scratch.colors.clear();
     scratch.colors.resize(pixels, [0.0; 4]);
-    if plan.surface.is_some() || plan.hull.is_some() {
+    if plan.is_shaded() {
         shade_band(isa, stages, &scratch.samples, &mut scratch.colors);
     }
-    if plan.lines.is_some() {
-        scratch.ink.clear();
-        scratch.ink.resize(pixels, 0);
-        draw_edges(isa, stages, bins, band, &scratch.samples, &mut scratch.ink);
+    scratch.ink.clear();
+    scratch.ink.resize(pixels * plan.lines.len(), 0);
+    let passes = plan.lines.iter().zip(&bins.edges).zip(scratch.ink.chunks_exact_mut(pixels.max(1)));
+    for ((pass, bins), ink) in passes {
+        draw_edges(isa, stages, pass, bins, band, &scratch.samples, ink);
     }
-    let ink = plan.lines.as_ref().map(|_| scratch.ink.as_slice());
-    resolve(plan, stages.srgb, &scratch.colors, ink, rgba);
+    resolve(plan, stages.srgb, &scratch.colors, &scratch.ink, rgba);
 }
 
 /// Draws band number `band` of the visibility buffer alone, as [`Renderer::draw_visibility`](super::Renderer) says.
@@ -110,7 +110,14 @@ dispatch! {
 
 dispatch! {
     /// The line stage of a band.
-    pub fn draw_edges(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &SampleBand, ink: &mut [u32]) = edges_kernel
+    pub fn draw_edges(
+        stages: &Stages<'_>,
+        pass: &LinePass,
+        bins: &[Bin],
+        band: usize,
+        samples: &SampleBand,
+        ink: &mut [u32],
+    ) = edges_kernel
 }
 
 #[inline(always)]
@@ -139,10 +146,16 @@ fn triangles_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut
 }
 
 #[inline(always)]
-fn edges_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &SampleBand, ink: &mut [u32]) {
-    let Some(pass) = &stages.plan.lines else { return };
+fn edges_kernel(
+    stages: &Stages<'_>,
+    pass: &LinePass,
+    bins: &[Bin],
+    band: usize,
+    samples: &SampleBand,
+    ink: &mut [u32],
+) {
     let mut planes = PlaneCache::new();
-    for chunk in &bins.edges {
+    for chunk in bins {
         for (i, edge) in chunk.items_in(band).enumerate() {
             if i % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
                 return;

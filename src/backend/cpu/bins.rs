@@ -9,7 +9,7 @@ use super::transform::{ScreenVertex, homogeneous};
 use super::visibility::{area, axis_bounds, is_wanted};
 use super::{CHUNK, Stages, lines};
 use crate::limits::Stopped;
-use crate::plan::{DrawPlan, Faces};
+use crate::plan::{DrawPlan, Faces, LinePass};
 
 /// What touches more bands than this is listed once for all of them, or large triangles on a tall picture would take
 /// gigabytes of lists.
@@ -18,7 +18,8 @@ const TALL_BANDS: usize = 8;
 /// What each band has to draw, chunk by chunk in ascending order.
 pub struct Bins {
     pub triangles: Vec<TriangleBin>,
-    pub edges: Vec<Bin>,
+    /// By line pass.
+    pub edges: Vec<Vec<Bin>>,
 }
 
 /// A chunk's triangles by band.
@@ -88,11 +89,13 @@ pub fn bin(stages: &Stages<'_>, pool: Option<&rayon::ThreadPool>, rows: u32) -> 
         Ok(()) => bin_triangles(stages, rows, ids, faces),
         Err(Stopped) => TriangleBin::default(),
     });
-    let edges = 0..plan.lines.as_ref().map_or(0, |lines| lines.edges.len());
-    let edges = map(pool, chunks(edges).collect(), |range| match stages.deadline.check() {
-        Ok(()) => bin_edges(stages, rows, range),
-        Err(Stopped) => Bin::default(),
-    });
+    let bin_pass = |pass: &LinePass| {
+        map(pool, chunks(0..pass.edges.len()).collect(), |range| match stages.deadline.check() {
+            Ok(()) => bin_edges(stages, pass, rows, range),
+            Err(Stopped) => Bin::default(),
+        })
+    };
+    let edges = plan.lines.iter().map(bin_pass).collect();
     stages.deadline.check()?;
     Ok(Bins { triangles, edges })
 }
@@ -145,12 +148,11 @@ fn bands_of(plan: &DrawPlan<'_>, rows: u32, v: &[ScreenVertex; 3]) -> Option<[us
     Some([first as usize / rows as usize, last as usize / rows as usize])
 }
 
-fn bin_edges(stages: &Stages<'_>, rows: u32, range: Range<usize>) -> Bin {
+fn bin_edges(stages: &Stages<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> Bin {
     let mut bin = Bin::new(band_count(stages.plan, rows));
-    let Some(pass) = &stages.plan.lines else { return bin };
     for i in range {
         let edge = &pass.edges[i];
-        if lines::is_back_edge(stages, pass, edge) {
+        if !lines::is_drawn(stages, pass, edge) {
             continue;
         }
         if let Some(segment) = lines::Segment::new(stages, pass, edge) {

@@ -10,7 +10,7 @@ use super::occluders::PlaneCache;
 use super::samples::{NOTHING, SampleBand};
 use super::transform::{ScreenVertex, homogeneous};
 use super::visibility::area;
-use crate::plan::{Edge, LinePass};
+use crate::plan::{Edge, LinePass, Shown};
 
 /// Farthest from the middle of a unit box to its corner.
 const BOX_RADIUS: f32 = std::f32::consts::FRAC_1_SQRT_2;
@@ -90,10 +90,18 @@ impl Segment {
     }
 }
 
-/// Whether an edge of a closed surface is on its far side, where nothing of it can be seen.
+/// Whether the pass draws the edge in this view: not on the far side of a closed surface, where nothing of it can be seen;
+/// and of a contour only the silhouette.
 #[inline(always)]
-pub fn is_back_edge(stages: &Stages<'_>, lines: &LinePass, edge: &Edge) -> bool {
-    lines.skip_back_edges && edge.faces.iter().all(|&face| stages.looks_away(face))
+pub fn is_drawn(stages: &Stages<'_>, lines: &LinePass, edge: &Edge) -> bool {
+    if !(lines.skip_back_edges || lines.contour) {
+        return true;
+    }
+    let [a, b] = edge.faces.map(|face| stages.looks_away(face));
+    let is_open = edge.faces[1] == Edge::NO_FACE;
+    let is_back = lines.skip_back_edges && a && b;
+    let is_inner = lines.contour && a == b && !is_open;
+    !(is_back || is_inner)
 }
 
 /// Draws one edge's ink into the band.
@@ -118,11 +126,12 @@ pub fn draw(
             if coverage == 0 {
                 continue;
             }
-            let level = if lines.hide_behind_surface {
-                let visible = visible_samples(stages, edge, &segment, t, band.pixel(x as u32, y as u32), planes);
-                (coverage * visible + band.samples / 2) / band.samples
-            } else {
+            let level = if lines.shown == Shown::All {
                 coverage
+            } else {
+                let visible = visible_samples(stages, edge, &segment, t, band.pixel(x as u32, y as u32), planes);
+                let shown = if lines.shown == Shown::Visible { visible } else { band.samples - visible };
+                (coverage * shown + band.samples / 2) / band.samples
             };
             // Once a pixel is full nothing changes it, so it may stop counting long before the sum could wrap.
             let slot = &mut ink[row + x as usize];

@@ -32,18 +32,17 @@ impl SrgbEncoder {
     }
 }
 
-/// Resolves a band into `rgba`.
+/// Resolves a band into `rgba`; `ink` is that of one line pass after the other.
 #[inline(always)]
-pub fn resolve(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], ink: Option<&[u32]>, rgba: &mut [u8]) {
-    let line_color = plan.lines.as_ref().map_or([0.0; 4], |lines| lines.color);
+pub fn resolve(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], ink: &[u32], rgba: &mut [u8]) {
     let mut last = ([f32::NAN; 4], [0; 4]);
     for (i, (color, out)) in colors.iter().zip(rgba.chunks_exact_mut(4)).enumerate() {
         let mut c: [f32; 4] = std::array::from_fn(|k| color[k] + plan.background[k] * (1.0 - color[3]));
-        if let Some(ink) = ink
-            && ink[i] > 0
-        {
-            let cover = coverage(ink[i]);
-            c = std::array::from_fn(|k| cover * line_color[k] + c[k] * (1.0 - cover * line_color[3]));
+        for (lines, ink) in plan.lines.iter().zip(ink.chunks_exact(colors.len())) {
+            if ink[i] > 0 {
+                let cover = coverage(ink[i]);
+                c = std::array::from_fn(|k| cover * lines.color[k] + c[k] * (1.0 - cover * lines.color[3]));
+            }
         }
         // Neighbours are often the same colour to the bit: flat faces, background.
         if c != last.0 {

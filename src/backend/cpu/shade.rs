@@ -7,7 +7,7 @@ use super::Stages;
 use super::samples::{NOTHING, SampleBand};
 use super::transform::{ScreenVertex, homogeneous, hull_position};
 use super::visibility::area;
-use crate::plan::{FwidthWire, Normals, SurfacePass, sample_offsets};
+use crate::plan::{Lights, MaterialLook, SurfacePass, flags, sample_offsets};
 
 /// Shades every pixel of the band into `colors` (premultiplied linear RGBA, row by row, nothing behind it).
 #[inline(always)]
@@ -97,28 +97,32 @@ impl<'a> Shader<'a> {
         let triangles = self.stages.plan.triangles.len() as u32;
         match (&self.stages.plan.surface, &self.stages.plan.hull) {
             (Some(surface), _) if id < triangles => self.surface_point(surface, id as usize, at),
-            (_, Some(hull)) => hull.color,
+            (_, Some(hull)) => hull.colors[0],
             _ => [0.0; 4],
         }
     }
 
     fn surface_point(&mut self, surface: &SurfacePass<'_>, id: usize, at: [f32; 2]) -> [f32; 4] {
-        let base = base_color(surface, id);
-        let flat = matches!(surface.normals, Normals::None | Normals::Face(_)) && surface.fwidth.is_none();
+        let material = surface.material(id);
+        let flat = material.flags & (flags::VERTEX_NORMALS | flags::WIRES) == 0;
         let bary = || Barycentrics::new(&corners(self.stages, id as u32, at));
         let up = self.stages.plan.projection.screen_up;
-        let lit = match &surface.normals {
-            Normals::None => base,
-            Normals::Face(normals) => light(surface, up, base, facing(normals[id], self.is_front(id as u32, at))),
-            Normals::Vertex { values, triangles } => {
-                let b = bary();
-                let normal = interpolate(values, triangles[id], b.value);
-                light(surface, up, base, facing(normal, b.front))
-            }
+        let lit = if material.flags & flags::FACE_NORMALS != 0 {
+            let normal = facing(surface.face_normals[id], self.is_front(id as u32, at));
+            light(&surface.lights, material, up, normal)
+        } else if let Some(normals) =
+            surface.vertex_normals.as_ref().filter(|_| material.flags & flags::VERTEX_NORMALS != 0)
+        {
+            let b = bary();
+            let normal = interpolate(&normals.values, normals.triangles[id], b.value);
+            light(&surface.lights, material, up, facing(normal, b.front))
+        } else {
+            material.base_color
         };
-        let color = match &surface.fwidth {
-            Some(wire) => over(wire_factor(wire, id, &bary()), wire.color, lit),
-            None => lit,
+        let color = if material.flags & flags::WIRES != 0 {
+            over(wire_factor(surface, material, id, &bary()), material.wire_color, lit)
+        } else {
+            lit
         };
         if flat {
             self.flat = Some((id as u32, color));
@@ -133,11 +137,6 @@ impl<'a> Shader<'a> {
         }
         area(&vertices) < 0
     }
-}
-
-fn base_color(surface: &SurfacePass<'_>, id: usize) -> [f32; 4] {
-    let material = surface.triangle_materials.get(id).copied().unwrap_or(0) as usize;
-    surface.material_colors.get(material).copied().unwrap_or([0.5, 0.5, 0.5, 1.0])
 }
 
 /// A corner relative to the shaded point: homogeneous (x, y, w), and the factor that its barycentric takes besides.
@@ -209,34 +208,40 @@ fn facing(n: [f32; 3], front: bool) -> [f32; 3] {
 }
 
 /// Light on a surface with unit normal `n`: straight alpha in, premultiplied out.
-fn light(s: &SurfacePass<'_>, up: [f32; 3], base: [f32; 4], n: [f32; 3]) -> [f32; 4] {
-    let n_light = dot(n, s.to_light).max(0.0);
-    let n_half = dot(n, s.halfway).max(0.0);
-    let light_half = dot(s.to_light, s.halfway);
-    let sky = 0.7 + 0.3 * dot(n, up);
+fn light(lights: &Lights, s: &MaterialLook, up: [f32; 3], n: [f32; 3]) -> [f32; 4] {
+    let base = s.base_color;
     let alpha_squared = (s.roughness * s.roughness).max(0.0025) * (s.roughness * s.roughness).max(0.0025);
-    let lobe = n_half * n_half * (alpha_squared - 1.0) + 1.0;
-    let gloss = alpha_squared / (lobe * lobe * (light_half * light_half).max(0.1) * (4.0 * s.roughness + 2.0));
-    let ambient = s.ambient * sky;
-    let direct = (1.0 - s.ambient) * s.intensity * n_light;
+    let ambient = lights.ambient * (0.7 + 0.3 * dot(n, up));
+    let (mut diffuse, mut shine) = (0.0, 0.0);
+    for lamp in &lights.lamps {
+        let n_light = dot(n, lamp.to_light).max(0.0);
+        let n_half = dot(n, lamp.halfway).max(0.0);
+        let light_half = dot(lamp.to_light, lamp.halfway);
+        let lobe = n_half * n_half * (alpha_squared - 1.0) + 1.0;
+        let gloss = alpha_squared / (lobe * lobe * (light_half * light_half).max(0.1) * (4.0 * s.roughness + 2.0));
+        let direct = lamp.strength * n_light;
+        diffuse += direct;
+        shine += direct * gloss;
+    }
     let mut out = base;
     for k in 0..3 {
         let specular = 0.04 + s.metallic * (base[k] - 0.04);
-        let reflected = base[k] * (1.0 - s.metallic) + specular * gloss;
-        out[k] = (base[k] * ambient + direct * reflected).clamp(0.0, 1.0) * base[3];
+        let reflected = base[k] * (1.0 - s.metallic) * diffuse + specular * shine;
+        out[k] = (base[k] * ambient + reflected).clamp(0.0, 1.0) * base[3];
     }
     out
 }
 
 /// 1 on the wire, 0 away from it.
-fn wire_factor(wire: &FwidthWire<'_>, id: usize, b: &Barycentrics) -> f32 {
-    let mask = wire.edge_masks.get(id).copied().unwrap_or(0b111);
+fn wire_factor(surface: &SurfacePass<'_>, wire: &MaterialLook, id: usize, b: &Barycentrics) -> f32 {
+    let mask = surface.edge_masks.get(id).copied().unwrap_or(0b111);
     let mut away = 1.0_f32;
+    let (thickness, smoothing) = (wire.wire_thickness, wire.wire_smoothing);
     for i in 0..3 {
         // Coordinate i vanishes on the edge opposite corner i, which runs from corner i + 1 to i + 2.
         if mask >> ((i + 1) % 3) & 1 == 1 {
             let d = b.fwidth[i];
-            away = away.min(smoothstep(wire.thickness * d, (wire.thickness + wire.smoothing) * d, b.value[i]));
+            away = away.min(smoothstep(thickness * d, (thickness + smoothing) * d, b.value[i]));
         }
     }
     1.0 - away

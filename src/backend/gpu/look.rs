@@ -1,18 +1,16 @@
 //! What a plan has: the shaders' `LOOK`, a constant of each pipeline, so that a kernel contains only what its plan needs.
 
-use crate::plan::{DrawPlan, HullOffset, Normals};
+use crate::plan::{DrawPlan, HullOffset, flags};
 
 pub const SURFACE: u32 = 1;
 pub const HULL: u32 = 2;
 pub const HULL_PX: u32 = 4;
 pub const FACE_NORMALS: u32 = 8;
 pub const VERTEX_NORMALS: u32 = 16;
-pub const FWIDTH: u32 = 32;
+pub const WIRES: u32 = 32;
 pub const TRIANGLE_MATERIALS: u32 = 64;
 pub const EDGE_MASKS: u32 = 128;
 pub const LINES: u32 = 256;
-pub const LINES_HIDDEN: u32 = 512;
-pub const LINES_SKIP_BACK: u32 = 1024;
 pub const CLIPPED: u32 = 2048;
 pub const FOUR_SAMPLES: u32 = 4096;
 
@@ -22,26 +20,16 @@ pub fn look(plan: &DrawPlan<'_>) -> u32 {
     let count = plan.triangles.len();
     let mut look = when(plan.projection.clip, CLIPPED) | when(plan.samples == 4, FOUR_SAMPLES);
     if let Some(surface) = &plan.surface {
-        look |= SURFACE | when(surface.triangle_materials.len() == count, TRIANGLE_MATERIALS);
-        look |= match surface.normals {
-            Normals::None => 0,
-            Normals::Face(_) => FACE_NORMALS,
-            Normals::Vertex { .. } => VERTEX_NORMALS,
-        };
-        if let Some(wire) = &surface.fwidth {
-            look |= FWIDTH | when(wire.edge_masks.len() == count, EDGE_MASKS);
-        }
+        let all = surface.all_flags();
+        look |= when(surface.is_shaded, SURFACE) | when(surface.triangle_materials.len() == count, TRIANGLE_MATERIALS);
+        look |= when(all & flags::FACE_NORMALS != 0, FACE_NORMALS);
+        look |= when(all & flags::VERTEX_NORMALS != 0, VERTEX_NORMALS);
+        look |= when(all & flags::WIRES != 0, WIRES) | when(surface.edge_masks.len() == count, EDGE_MASKS);
     }
     if let Some(hull) = &plan.hull {
         look |= HULL | when(matches!(hull.offset, HullOffset::Px(_)), HULL_PX);
     }
-    if let Some(lines) = &plan.lines {
-        // Where there is no surface there is nothing to hide behind, and no samples to ask.
-        let something_hides = plan.surface.is_some() || plan.hull.is_some();
-        look |= LINES | when(lines.hide_behind_surface && something_hides, LINES_HIDDEN);
-        look |= when(lines.skip_back_edges, LINES_SKIP_BACK);
-    }
-    look
+    look | when(!plan.lines.is_empty(), LINES)
 }
 
 #[cfg(test)]
@@ -57,12 +45,10 @@ mod tests {
             ("HULL_PX", HULL_PX),
             ("FACE_NORMALS", FACE_NORMALS),
             ("VERTEX_NORMALS", VERTEX_NORMALS),
-            ("FWIDTH", FWIDTH),
+            ("WIRES", WIRES),
             ("TRIANGLE_MATERIALS", TRIANGLE_MATERIALS),
             ("EDGE_MASKS", EDGE_MASKS),
             ("LINES", LINES),
-            ("LINES_HIDDEN", LINES_HIDDEN),
-            ("LINES_SKIP_BACK", LINES_SKIP_BACK),
             ("CLIPPED", CLIPPED),
             ("FOUR_SAMPLES", FOUR_SAMPLES),
         ];

@@ -25,7 +25,7 @@ use self::stages::Slot;
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::{Image, srgb8_thresholds};
 use crate::limits::Deadline;
-use crate::plan::{DrawPlan, Normals, ink_table};
+use crate::plan::{DrawPlan, Edge, ink_table};
 
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
@@ -158,19 +158,20 @@ fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule:
     }
     if let Some(surface) = &plan.surface {
         buffers.upload(gpu, Slot::Attributes, &attributes(surface))?;
-        match &surface.normals {
-            Normals::None => {}
-            Normals::Face(normals) => buffers.upload(gpu, Slot::Normals, bytemuck::cast_slice(normals))?,
-            Normals::Vertex { values, triangles } => {
-                buffers.upload(gpu, Slot::Normals, bytemuck::cast_slice(values))?;
-                buffers.upload(gpu, Slot::NormalTriangles, bytemuck::cast_slice(triangles))?;
-            }
+        buffers.upload(gpu, Slot::Materials, bytemuck::cast_slice(&surface.materials))?;
+        buffers.upload(gpu, Slot::FaceNormals, bytemuck::cast_slice(surface.face_normals))?;
+        if let Some(normals) = &surface.vertex_normals {
+            buffers.upload(gpu, Slot::Normals, bytemuck::cast_slice(&normals.values))?;
+            buffers.upload(gpu, Slot::NormalTriangles, bytemuck::cast_slice(normals.triangles))?;
         }
     }
-    if let Some(lines) = &plan.lines {
-        buffers.upload(gpu, Slot::Edges, bytemuck::cast_slice(&lines.edges))?;
+    if !plan.lines.is_empty() {
+        let edges: Vec<Edge> = plan.lines.iter().flat_map(|lines| lines.edges.iter().copied()).collect();
+        let colors: Vec<[f32; 4]> = plan.lines.iter().map(|lines| lines.color).collect();
+        buffers.upload(gpu, Slot::Edges, bytemuck::cast_slice(&edges))?;
+        buffers.upload(gpu, Slot::LineColors, bytemuck::cast_slice(&colors))?;
         buffers.upload(gpu, Slot::InkTable, bytemuck::cast_slice(&ink_table()))?;
-        buffers.reserve(gpu, Slot::Ink, band_pixels * 4)?;
+        buffers.reserve(gpu, Slot::Ink, band_pixels * 4 * plan.lines.len() as u64)?;
     }
     buffers.upload(gpu, Slot::Thresholds, bytemuck::cast_slice(&srgb8_thresholds()))?;
     buffers.reserve(gpu, Slot::Rgba, band_pixels * 4)?;
@@ -208,8 +209,8 @@ fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, rows: u32) -> Re
     if has_visibility(plan) {
         recorder.clear(Slot::Samples, band_sample_bytes(plan, rows))?;
     }
-    if plan.lines.is_some() {
-        recorder.clear(Slot::Ink, u64::from(plan.width_px) * u64::from(rows) * 4)?;
+    if !plan.lines.is_empty() {
+        recorder.clear(Slot::Ink, u64::from(plan.width_px) * u64::from(rows) * 4 * plan.lines.len() as u64)?;
     }
     Ok(())
 }

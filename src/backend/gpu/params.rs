@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::plan::{DrawPlan, Faces, HullOffset, SurfacePass};
+use crate::plan::{DrawPlan, Faces, HullOffset, Lights, LinePass, Shown, SurfacePass};
 
 /// The plan's numbers.
 #[repr(C)]
@@ -13,37 +13,30 @@ pub struct Frame {
     z_row: [f32; 4],
     w_row: [f32; 4],
     screen_up: [f32; 4],
-    to_light: [f32; 4],
-    halfway: [f32; 4],
+    lamps: [[f32; 4]; Lights::LAMPS_MAX],
+    halfways: [[f32; 4]; Lights::LAMPS_MAX],
     background: [f32; 4],
     hull_color: [f32; 4],
-    wire_color: [f32; 4],
-    line_color: [f32; 4],
     near_w: f32,
     hull_push: f32,
-    metallic: f32,
-    roughness: f32,
-    intensity: f32,
     ambient: f32,
-    wire_thickness: f32,
-    wire_smoothing: f32,
-    line_width: f32,
-    line_smoothing: f32,
+    lamp_count: u32,
+    line_pass_count: u32,
     zero: u32,
     width: u32,
     height: u32,
     triangle_count: u32,
     vertex_count: u32,
     hull_base: u32,
-    materials_at: u32,
     masks_at: u32,
+    material_count: u32,
     /// WGSL rounds a struct up to its alignment.
-    padding: [u32; 2],
+    padding: [u32; 3],
 }
 
 /// A dispatch's numbers.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Batch {
     pub first: u32,
     pub count: u32,
@@ -58,6 +51,22 @@ pub struct Batch {
     pub huge_first: u32,
     pub huge_end: u32,
     pub edges_per_group: u32,
+    pub line_width: f32,
+    pub line_smoothing: f32,
+    pub line_flags: u32,
+    pub ink_at: u32,
+}
+
+/// Bits of [`Batch::line_flags`].
+pub fn line_flags(lines: &LinePass, something_hides: bool) -> u32 {
+    // Where there is no surface there is nothing to hide behind, and no samples to ask.
+    let shown = match lines.shown {
+        Shown::All => 0,
+        _ if !something_hides => 0,
+        Shown::Visible => 1,
+        Shown::Hidden => 2,
+    };
+    shown | u32::from(lines.skip_back_edges) << 2 | u32::from(lines.contour) << 3
 }
 
 /// Distance between [`Batch`]es in their buffer: every device can bind at multiples of this.
@@ -85,43 +94,32 @@ impl Frame {
             frame.surface(surface);
         }
         if let Some(hull) = &plan.hull {
-            frame.hull_color = hull.color;
+            frame.hull_color = hull.colors[0];
             frame.hull_push = match hull.offset {
                 HullOffset::Object(units) => units,
                 HullOffset::Px(px) => 256.0 * px,
             };
         }
-        if let Some(lines) = &plan.lines {
-            frame.line_color = lines.color;
-            frame.line_width = lines.width_px;
-            frame.line_smoothing = lines.smoothing_px;
-        }
+        frame.line_pass_count = plan.lines.len() as u32;
         frame
     }
 
     fn surface(&mut self, surface: &SurfacePass<'_>) {
-        self.metallic = surface.metallic;
-        self.roughness = surface.roughness;
-        self.intensity = surface.intensity;
-        self.ambient = surface.ambient;
-        self.to_light = xyz(surface.to_light);
-        self.halfway = xyz(surface.halfway);
-        self.materials_at = surface.material_colors.len() as u32 * 4;
-        self.masks_at = self.materials_at + surface.triangle_materials.len() as u32;
-        if let Some(wire) = &surface.fwidth {
-            self.wire_color = wire.color;
-            self.wire_thickness = wire.thickness;
-            self.wire_smoothing = wire.smoothing;
+        for (i, lamp) in surface.lights.lamps.iter().take(Lights::LAMPS_MAX).enumerate() {
+            let [x, y, z] = lamp.to_light;
+            self.lamps[i] = [x, y, z, lamp.strength];
+            self.halfways[i] = xyz(lamp.halfway);
+            self.lamp_count += 1;
         }
+        self.ambient = surface.lights.ambient;
+        self.material_count = surface.materials.len() as u32;
+        self.masks_at = surface.triangle_materials.len() as u32;
     }
 }
 
-/// Material colours, then triangles' materials, then edge masks four to a word: what [`Frame::materials_at`] and
-/// `masks_at` point into.
+/// Triangles' materials, then edge masks four to a word: what [`Frame::masks_at`] points into.
 pub fn attributes(surface: &SurfacePass<'_>) -> Vec<u8> {
-    let masks = surface.fwidth.as_ref().map_or(&[][..], |wire| wire.edge_masks);
-    let colors: &[u8] = bytemuck::cast_slice(&surface.material_colors);
-    [colors, bytemuck::cast_slice(surface.triangle_materials), masks].concat()
+    [bytemuck::cast_slice(surface.triangle_materials), &surface.edge_masks[..]].concat()
 }
 
 fn xyz(v: [f32; 3]) -> [f32; 4] {
@@ -152,7 +150,7 @@ mod tests {
 
     #[test]
     fn sizes_are_those_of_the_shader() {
-        assert_eq!(size_of::<Frame>(), 256);
-        assert_eq!(size_of::<Batch>(), 52);
+        assert_eq!(size_of::<Frame>(), 272);
+        assert_eq!(size_of::<Batch>(), 68);
     }
 }

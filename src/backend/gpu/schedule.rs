@@ -4,7 +4,7 @@
 //! After each chunk of a large mesh, and each band, the commands go to the device, so that no single submission takes
 //! long and the deadline is looked at in between.
 
-use super::params::{Batch, faces_code};
+use super::params::{Batch, faces_code, line_flags};
 use super::stages::{Stage, Write};
 use crate::plan::{DrawPlan, Faces, LinePass};
 
@@ -180,7 +180,7 @@ impl Schedule {
 
     fn transform(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits) {
         let count = plan.positions.len() as u32;
-        if plan.surface.is_some() || plan.lines.is_some() {
+        if plan.surface.is_some() || !plan.lines.is_empty() {
             self.dispatch(device, Stage::Transform, count, Batch { count, ..Batch::default() });
         }
         if plan.hull.is_some() {
@@ -234,20 +234,30 @@ impl Schedule {
     fn picture_stages(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2]) {
         let count = plan.width_px * (rows[1] - rows[0]);
         let pixels = Batch { count, row_first: rows[0], row_end: rows[1], ..Batch::default() };
-        if has_visibility(plan) {
+        if plan.is_shaded() {
             self.dispatch(device, Stage::Shade, count, pixels);
         }
-        if let Some(lines) = &plan.lines {
-            let edges_per_group = edges_per_group(plan, lines, device);
+        let mut edges_first = 0;
+        for (pass, lines) in (0..).zip(&plan.lines) {
+            let lined = Batch {
+                edges_per_group: edges_per_group(plan, lines, device),
+                line_width: lines.width_px,
+                line_smoothing: lines.smoothing_px,
+                line_flags: line_flags(lines, has_visibility(plan)),
+                ink_at: pass * count,
+                ..pixels
+            };
+            let edges_per_group = lined.edges_per_group;
             let edges = lines.edges.len() as u32;
             for first in (0..edges).step_by(EDGE_CHUNK as usize) {
                 let count = EDGE_CHUNK.min(edges - first);
-                let batch = Batch { first, count, edges_per_group, ..pixels };
+                let batch = Batch { first: edges_first + first, count, ..lined };
                 self.dispatch_groups(device, Stage::Lines, count.div_ceil(edges_per_group), batch);
                 if edges > EDGE_CHUNK {
                     self.steps.push(Step::Submit);
                 }
             }
+            edges_first += edges;
         }
         self.dispatch(device, Stage::Resolve, count, pixels);
     }
@@ -284,7 +294,7 @@ fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits)
 
 /// Bytes a pixel of the largest buffer that holds a band.
 fn pixel_bytes(plan: &DrawPlan<'_>) -> u64 {
-    (u64::from(plan.samples) * 8).max(16)
+    (u64::from(plan.samples) * 8).max(16).max(4 * plan.lines.len() as u64)
 }
 
 #[cfg(test)]

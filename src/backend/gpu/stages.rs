@@ -60,10 +60,13 @@ pub enum Slot {
     InkTable,
     Thresholds,
     Rgba,
+    Materials,
+    FaceNormals,
+    LineColors,
 }
 
 /// Number of [`Slot`]s.
-pub const SLOTS: usize = 15;
+pub const SLOTS: usize = 18;
 
 /// Whether a kernel writes to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,6 +155,8 @@ impl Stage {
                 (Slot::Normals, Read),
                 (Slot::NormalTriangles, Read),
                 (Slot::Attributes, Read),
+                (Slot::Materials, Read),
+                (Slot::FaceNormals, Read),
                 (Slot::Colors, ReadWrite),
             ],
             Self::Lines => &[
@@ -163,9 +168,13 @@ impl Stage {
                 (Slot::Ink, ReadWrite),
                 (Slot::InkTable, Read),
             ],
-            Self::Resolve => {
-                &[(Slot::Colors, Read), (Slot::Ink, Read), (Slot::Thresholds, Read), (Slot::Rgba, ReadWrite)]
-            }
+            Self::Resolve => &[
+                (Slot::Colors, Read),
+                (Slot::Ink, Read),
+                (Slot::Thresholds, Read),
+                (Slot::Rgba, ReadWrite),
+                (Slot::LineColors, Read),
+            ],
         }
     }
 
@@ -204,12 +213,12 @@ impl Stage {
 
     /// The flags that the kernel reads; there is a pipeline for every combination that a plan asks for.
     fn looks(self) -> u32 {
-        const SHADED: u32 = look::SURFACE | look::FACE_NORMALS | look::VERTEX_NORMALS | look::FWIDTH;
+        const SHADED: u32 = look::SURFACE | look::FACE_NORMALS | look::VERTEX_NORMALS | look::WIRES;
         match self {
             Self::Transform | Self::Clip => look::HULL_PX,
             Self::Visibility { .. } | Self::VisibilityTile { .. } => look::FOUR_SAMPLES,
             Self::Shade => SHADED | look::TRIANGLE_MATERIALS | look::EDGE_MASKS | look::CLIPPED | look::FOUR_SAMPLES,
-            Self::Lines => look::LINES_HIDDEN | look::LINES_SKIP_BACK | look::CLIPPED | look::FOUR_SAMPLES,
+            Self::Lines => look::CLIPPED | look::FOUR_SAMPLES,
             Self::Resolve => look::SURFACE | look::HULL | look::LINES,
         }
     }

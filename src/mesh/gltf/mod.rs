@@ -47,7 +47,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     warn_of_unread(&root, &mut raw.report.warnings);
     raw.materials = materials(&root);
     if uses_default {
-        raw.materials.push(MaterialSlot { name: String::new(), base_color: None });
+        raw.materials.push(MaterialSlot::default());
     }
     Ok(raw)
 }
@@ -98,6 +98,7 @@ fn materials(root: &Root) -> Vec<MaterialSlot> {
         .map(|material| MaterialSlot {
             name: material.name.clone().unwrap_or_default(),
             base_color: Some(material.pbr_metallic_roughness.base_color_factor.0),
+            ..MaterialSlot::default()
         })
         .collect()
 }

@@ -46,7 +46,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     raw.materials = std::iter::once(String::new())
         .chain(summary.materials)
         .skip(usize::from(!uses_unnamed))
-        .map(|name| MaterialSlot { name, base_color: None })
+        .map(|name| MaterialSlot { name, ..MaterialSlot::default() })
         .collect();
     if !uses_unnamed {
         raw.triangle_materials.iter_mut().for_each(|m| *m -= 1);

@@ -1,0 +1,169 @@
+//! What each part of a mesh takes part in. A part is what shares a material.
+
+use std::borrow::Cow;
+
+use super::{LayersPass, roles};
+use crate::mesh::Mesh;
+use crate::mesh::material::AlphaMode;
+use crate::scene::{Cull, DebugView, Hidden, Layers, OutlineMethod, Spec, WireMethod};
+
+/// Layers that are peeled off before what is left counts as unseen.
+const LAYERS_MAX: u32 = 16;
+
+/// What remains of hidden lines that fade.
+pub const FADE: f32 = 0.25;
+
+/// The parts of a mesh, by material index.
+pub struct Parts<'a> {
+    /// What is drawn of each.
+    pub layers: Vec<&'a Layers>,
+    fills: Vec<Fill>,
+}
+
+/// How a part's surface is filled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fill {
+    /// Not at all.
+    None,
+    /// Nothing shines through.
+    Opaque,
+    /// Something may.
+    Transparent,
+}
+
+impl<'a> Parts<'a> {
+    /// Finds each material's look by its name.
+    pub fn new(mesh: &Mesh, spec: &'a Spec) -> Self {
+        let named = |name: &str| spec.materials.iter().rev().find(|(n, _)| n == name).map(|(_, layers)| layers);
+        let layers: Vec<&Layers> =
+            mesh.materials.iter().map(|slot| named(&slot.name).unwrap_or(&spec.layers)).collect();
+        let fills = layers.iter().zip(&mesh.materials).map(|(layers, slot)| fill(layers, slot)).collect();
+        Self { layers, fills }
+    }
+
+    /// How a part is filled.
+    pub fn fill(&self, material: usize) -> Fill {
+        self.fills.get(material).copied().unwrap_or(Fill::Opaque)
+    }
+
+    /// Whether any part is.
+    pub fn has_fill(&self) -> bool {
+        self.fills.iter().any(|fill| *fill != Fill::None)
+    }
+
+    /// Whether any part has an inverted hull.
+    pub fn has_hull(&self) -> bool {
+        self.layers.iter().any(|layers| has_hull(layers))
+    }
+
+    /// Whether any part has a wire that is drawn with the surface.
+    pub fn has_barycentric_wire(&self) -> bool {
+        self.layers.iter().any(|layers| barycentric_wire(layers).is_some())
+    }
+
+    /// Whether any part shows how far its edges are.
+    pub fn shows_edge_distance(&self) -> bool {
+        self.layers.iter().any(|layers| layers.surface.is_some_and(|s| s.debug == DebugView::EdgeDistance))
+    }
+
+    /// Whether a surface that nobody sees is needed to hide lines.
+    pub fn needs_occluder(&self) -> bool {
+        let hides =
+            |layers: &&Layers| layers.wire.is_some_and(|w| w.method == WireMethod::Exact && w.hidden != Hidden::Show);
+        let contour = |layers: &&Layers| layers.outline.is_some_and(|o| o.method == OutlineMethod::Contour);
+        !self.has_fill() && (self.layers.iter().any(hides) || self.layers.iter().any(contour))
+    }
+
+    /// The layers, if any part needs them.
+    pub fn layers_pass(&self) -> Option<LayersPass> {
+        let transparent = self.fills.contains(&Fill::Transparent);
+        let wires = || self.layers.iter().zip(&self.fills).filter_map(|(l, fill)| Some((barycentric_wire(l)?, *fill)));
+        let bare = wires().any(|(_, fill)| fill == Fill::None);
+        let through = wires().any(|(wire, fill)| fill == Fill::Opaque && wire != Hidden::Hide);
+        if !(transparent || bare || through) {
+            return None;
+        }
+        // Wires that show through an opaque fill and fills that let something through do not go together: then what is
+        // hidden by an opaque fill stays hidden.
+        let wires_only = through && !transparent;
+        let fades = wires().any(|(wire, _)| wire == Hidden::Fade);
+        let hides = !transparent && !wires_only && wires().all(|(wire, _)| wire == Hidden::Hide);
+        Some(LayersPass {
+            count_max: if hides { 1 } else { LAYERS_MAX },
+            behind_surface: wires_only,
+            wires_only,
+            fade: if fades { FADE } else { 1.0 },
+        })
+    }
+
+    /// The bits of [`roles`] of each part, given the plan's layers; `faces` is what the surface pass draws anyway.
+    fn role(&self, material: usize, pass: Option<&LayersPass>, common: Cull) -> u8 {
+        let layers = self.layers[material];
+        let wire = barycentric_wire(layers);
+        let mut role = match self.fill(material) {
+            Fill::Opaque => roles::SURFACE,
+            Fill::Transparent => roles::LAYER,
+            Fill::None if wire.is_some() => roles::LAYER,
+            Fill::None if self.needs_occluder() => roles::SURFACE,
+            Fill::None => 0,
+        };
+        if pass.is_some_and(|pass| pass.wires_only) && wire.is_some_and(|hidden| hidden != Hidden::Hide) {
+            role |= roles::LAYER;
+        }
+        if has_hull(layers) {
+            role |= roles::HULL;
+        }
+        match layers.surface.map_or(Cull::None, |s| s.cull) {
+            cull if cull == common => {}
+            Cull::None => {}
+            Cull::Back => role |= roles::FRONT_ONLY,
+            Cull::Front => role |= roles::BACK_ONLY,
+        }
+        role
+    }
+
+    /// Which side all parts hide; where they differ, none, and each part's role says.
+    pub fn common_cull(&self) -> Cull {
+        let mut all = self.layers.iter().map(|layers| layers.surface.map_or(Cull::None, |s| s.cull));
+        let first = all.next().unwrap_or(Cull::None);
+        if all.all(|cull| cull == first) { first } else { Cull::None }
+    }
+
+    /// [`DrawPlan::roles`](super::DrawPlan::roles).
+    pub fn roles(&self, mesh: &Mesh, pass: Option<&LayersPass>) -> Cow<'static, [u8]> {
+        let common = self.common_cull();
+        let by_part: Vec<u8> = (0..self.layers.len()).map(|m| self.role(m, pass, common)).collect();
+        let (surface, hull) = (self.has_fill() || self.needs_occluder(), self.has_hull());
+        let usual = |role: u8| {
+            (role & roles::SURFACE != 0 || !surface)
+                && (role & roles::HULL != 0 || !hull)
+                && role & (roles::FRONT_ONLY | roles::BACK_ONLY) == 0
+        };
+        if pass.is_none() && by_part.iter().all(|&role| usual(role)) {
+            return Cow::Borrowed(&[]);
+        }
+        mesh.triangle_materials.iter().map(|&m| by_part.get(m as usize).copied().unwrap_or(roles::SURFACE)).collect()
+    }
+}
+
+/// Whether hidden edges of a part's barycentric wire are shown, if it has one.
+fn barycentric_wire(layers: &Layers) -> Option<Hidden> {
+    layers.wire.filter(|wire| wire.method != WireMethod::Exact).map(|wire| wire.hidden)
+}
+
+fn has_hull(layers: &Layers) -> bool {
+    layers.outline.is_some_and(|outline| outline.method == OutlineMethod::Hull)
+}
+
+fn fill(layers: &Layers, slot: &crate::mesh::MaterialSlot) -> Fill {
+    let Some(surface) = &layers.surface else { return Fill::None };
+    if surface.debug != DebugView::None {
+        return Fill::Opaque;
+    }
+    let own_alpha = match (surface.color, slot.alpha) {
+        (Some(color), _) => color.0[3] < 1.0,
+        (None, AlphaMode::Opaque) => false,
+        (None, AlphaMode::Mask(_) | AlphaMode::Blend) => true,
+    };
+    if own_alpha || surface.opacity < 1.0 { Fill::Transparent } else { Fill::Opaque }
+}
