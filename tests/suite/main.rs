@@ -22,6 +22,7 @@ mod mesh_files;
 mod models;
 mod raster;
 mod scenes;
+mod schema;
 mod select;
 mod select_fakes;
 mod server;
