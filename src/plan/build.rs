@@ -50,7 +50,7 @@ pub fn build_keeping<'a>(
     let layers = parts.layers_pass();
     let surface = surface_pass(mesh, spec, &parts, &camera, &mut skips, budget)?;
     let welded = surface.as_ref().and_then(|s| s.vertex_normals.as_ref()).filter(|_| mesh.normals.is_empty());
-    let hull = parts.has_hull().then(|| hull_pass(mesh, &parts, welded.map(|n| n.values.clone())));
+    let hull = parts.has_hull().then(|| hull_pass(mesh, &parts, layers.is_some(), welded.map(|n| n.values.clone())));
 
     skips.skip(SkipKind::Layers, layers.is_none(), "nothing shines through");
     skips.skip(SkipKind::Hull, hull.is_none(), "the look has no hull");
@@ -223,7 +223,12 @@ fn attributes<'a>(mesh: &'a Mesh, pass: &mut SurfacePass<'a>, skips: &mut Skips<
     }
 }
 
-fn hull_pass<'a>(mesh: &'a Mesh, parts: &Parts<'_>, welded: Option<Cow<'a, [[f32; 3]]>>) -> HullPass<'a> {
+fn hull_pass<'a>(
+    mesh: &'a Mesh,
+    parts: &Parts<'_>,
+    layered: bool,
+    welded: Option<Cow<'a, [[f32; 3]]>>,
+) -> HullPass<'a> {
     let outline = |m: usize| parts.layers[m].outline.filter(|o| o.method == OutlineMethod::Hull);
     let offsets: Vec<Option<HullOffset>> =
         (0..parts.layers.len()).map(|m| outline(m).map(|o| outline_offset(mesh, &o))).collect();
@@ -238,7 +243,9 @@ fn hull_pass<'a>(mesh: &'a Mesh, parts: &Parts<'_>, welded: Option<Cow<'a, [[f32
         if offsets.iter().flatten().all(|offset| *offset == first) { Vec::new() } else { amounts(mesh, &offsets) };
     // The file's normals may split at hard edges, where a hull that followed them would tear: always the welded ones.
     let normals = welded.unwrap_or_else(|| normals::angle_weighted(mesh).into());
-    HullPass { colors, normals, offset: first, amounts }
+    let tells_apart = colors.len() > 1 || (layered && mesh.materials.len() > 1);
+    let triangle_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
+    HullPass { colors, normals, offset: first, amounts, triangle_materials }
 }
 
 /// How far each position moves: as far as the thickest outline of its parts. (The request has seen to it that all have the

@@ -17,6 +17,7 @@ mod golden;
 mod http;
 mod http_bad;
 mod jobs;
+mod layers;
 mod likeness;
 mod mesh_files;
 mod models;

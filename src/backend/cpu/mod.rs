@@ -11,6 +11,7 @@ mod barycentric;
 mod bins;
 mod clip;
 mod isa;
+mod layers;
 mod light;
 mod lines;
 mod occluders;
@@ -133,6 +134,17 @@ impl CpuRenderer {
             }
         });
         Ok(deadline.check()?)
+    }
+}
+
+impl CpuRenderer {
+    /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare back-ends sample for sample.
+    pub fn draw_layer(&mut self, plan: &DrawPlan<'_>, layer: u32, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
+        let mut words = vec![0_u64; plan.width_px as usize * plan.height_px as usize * plan.samples as usize];
+        self.draw_bands(plan, deadline, &mut words, |stages, scratch, bins, band, words| {
+            bands::draw_layer(stages, scratch, bins, band, layer, words);
+        })?;
+        Ok(words)
     }
 }
 

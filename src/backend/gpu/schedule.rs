@@ -5,8 +5,8 @@
 //! long and the deadline is looked at in between.
 
 use super::params::{Batch, faces_code, line_flags};
-use super::stages::{Stage, Write};
-use crate::plan::{DrawPlan, Faces, LinePass};
+use super::stages::{Into, Stage, Write};
+use crate::plan::{DrawPlan, Faces, LinePass, roles};
 
 /// Largest buffer that depends on the picture's size, bytes.
 const BAND_BYTES: u64 = 64 << 20;
@@ -22,6 +22,9 @@ const PIECES_MAX: u32 = 6;
 pub const WORK_HEAD_BYTES: u64 = 16;
 /// See [`WORK_HEAD_BYTES`].
 pub const WORK_ITEM_BYTES: u64 = 48;
+
+/// Bytes of what layers make of a sample.
+pub const LAYERED_BYTES: u64 = 32;
 
 /// Edges a dispatch.
 const EDGE_CHUNK: u32 = 1 << 20;
@@ -60,6 +63,16 @@ pub enum Step {
     ClearBand,
     /// Empties the work list.
     ClearWork,
+    /// Empties the layer that is looked for.
+    ClearLayer,
+    /// Where the device must be waited for anyway, asks whether there is another layer behind this one, and if not, goes on
+    /// at step `end`.
+    EndLayer {
+        /// Which.
+        layer: u32,
+        /// Index of the step after the last layer.
+        end: usize,
+    },
     /// Runs a kernel over `threads` threads with the batch at `batch`.
     Dispatch {
         /// Which.
@@ -87,6 +100,17 @@ pub enum Step {
     },
 }
 
+/// What is wanted of a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goal {
+    /// The picture.
+    Picture,
+    /// The visibility buffer alone.
+    Samples,
+    /// One layer alone.
+    Layer(u32),
+}
+
 /// All commands for a plan.
 #[derive(Debug)]
 pub struct Schedule {
@@ -96,6 +120,8 @@ pub struct Schedule {
     pub band_rows: u32,
     /// Items that the work list must hold.
     pub work_items: u32,
+    /// Layers that are looked for in each band.
+    pub layers: u32,
     /// How the tile kernel is run.
     pub tiles: Tiles,
 }
@@ -147,30 +173,22 @@ pub fn has_visibility(plan: &DrawPlan<'_>) -> bool {
 }
 
 impl Schedule {
-    /// The commands for a picture of `plan`.
-    pub fn picture(plan: &DrawPlan<'_>, device: &DeviceTraits) -> Self {
-        Self::new(plan, device, true)
-    }
-
-    /// The commands for the visibility buffer of `plan` alone.
-    pub fn samples(plan: &DrawPlan<'_>, device: &DeviceTraits) -> Self {
-        Self::new(plan, device, false)
-    }
-
-    fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, picture: bool) -> Self {
+    /// The commands for what is wanted of `plan`.
+    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Self {
         let row_bytes = u64::from(plan.width_px) * pixel_bytes(plan);
         let band_bytes = BAND_BYTES.min(device.binding_bytes_max);
         let band_rows = (band_bytes / row_bytes.max(1)).clamp(1, u64::from(plan.height_px.max(1))) as u32;
         let tiles = Tiles::new(plan, device, band_rows);
-        let mut schedule = Self { steps: Vec::new(), batches: Vec::new(), band_rows, work_items: 0, tiles };
+        let mut schedule = Self { steps: Vec::new(), batches: Vec::new(), band_rows, work_items: 0, layers: 0, tiles };
         schedule.transform(plan, device);
         for row_first in (0..plan.height_px).step_by(band_rows as usize) {
             let rows = [row_first, plan.height_px.min(row_first + band_rows)];
             schedule.steps.push(Step::ClearBand);
             if has_visibility(plan) {
                 schedule.visibility(plan, device, rows);
+                schedule.layers(plan, device, rows, goal);
             }
-            if picture {
+            if goal == Goal::Picture {
                 schedule.picture_stages(plan, device, rows);
             }
             schedule.steps.push(Step::EndBand { row_first, row_end: rows[1] });
@@ -189,15 +207,60 @@ impl Schedule {
     }
 
     fn visibility(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2]) {
+        let hull = Pass::hull(plan).filter(|_| !plan.has_layered_hull());
+        self.triangles(plan, device, rows, (Into::Surface, 0), [Pass::surface(plan, roles::SURFACE), hull]);
+    }
+
+    /// One round a layer; a round does nothing where the one before has left nothing to find.
+    fn layers(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2], goal: Goal) {
+        let Some(pass) = plan.layers() else { return };
+        let rounds = match goal {
+            Goal::Picture => pass.count_max,
+            Goal::Samples => 0,
+            Goal::Layer(layer) => layer + 1,
+        };
+        self.layers = rounds;
+        // Without roles, nothing is a layer.
+        let surface = Pass::surface(plan, roles::LAYER).filter(|_| !plan.roles.is_empty());
+        let hull = Pass::hull(plan).filter(|_| plan.has_layered_hull());
+        let count = plan.width_px * (rows[1] - rows[0]);
+        // A layer that is wanted for itself is not shaded: then no sample is done before its last triangle.
+        let role = if goal == Goal::Picture { u32::from(roles::LAYER) } else { 0 };
+        let mut ends = Vec::new();
+        for layer in 0..rounds {
+            self.steps.push(Step::ClearLayer);
+            self.triangles(plan, device, rows, (Into::Layer, layer), [surface, hull]);
+            let batch = Batch { count, row_first: rows[0], row_end: rows[1], role, layer, ..Batch::default() };
+            self.dispatch(device, Stage::Layers, count, batch);
+            self.steps.push(Step::Submit);
+            if self.tiles.in_rounds && goal == Goal::Picture {
+                ends.push(self.steps.len());
+                self.steps.push(Step::EndLayer { layer, end: 0 });
+            }
+        }
+        let last = self.steps.len();
+        for at in ends {
+            if let Some(Step::EndLayer { end, .. }) = self.steps.get_mut(at) {
+                *end = last;
+            }
+        }
+    }
+
+    fn triangles(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        device: &DeviceTraits,
+        rows: [u32; 2],
+        (into, layer): (Into, u32),
+        passes: [Option<Pass>; 2],
+    ) {
         let clip = plan.projection.clip;
         let writes: &[Write] = if device.int64_atomics { &[Write::Both] } else { &[Write::Depth, Write::Id] };
-        let (count, vertices) = (plan.triangles.len() as u32, plan.positions.len() as u32);
-        let surface = plan.surface.as_ref().map(|s| (0, 0, s.faces));
-        let hull = plan.hull.as_ref().map(|_| (count, vertices, Faces::Back));
+        let count = plan.triangles.len() as u32;
         let (chunk, pieces) = if clip { (CHUNK_CLIP, PIECES_MAX) } else { (CHUNK, 1) };
         // Every depth must be known before the first id is compared with it.
         for &write in writes {
-            for (id_base, vertex_base, faces) in [surface, hull].into_iter().flatten() {
+            for Pass { id_base, vertex_base, faces, role } in passes.into_iter().flatten() {
                 for first in (0..count).step_by(chunk as usize) {
                     let in_chunk = chunk.min(count - first);
                     let capacity = in_chunk * pieces;
@@ -213,14 +276,16 @@ impl Schedule {
                         capacity,
                         large_end: u32::MAX,
                         huge_end: u32::MAX,
+                        role: u32::from(role),
+                        layer,
                         ..Batch::default()
                     };
                     self.steps.push(Step::ClearWork);
-                    self.dispatch(device, Stage::Visibility { write }, in_chunk, batch);
+                    self.dispatch(device, Stage::Visibility { write, into }, in_chunk, batch);
                     if clip {
                         self.dispatch(device, Stage::Clip, in_chunk, batch);
                     }
-                    let stage = Stage::VisibilityTile { write };
+                    let stage = Stage::VisibilityTile { write, into };
                     self.steps.push(Step::Tiles { stage, batch: self.batches.len() - 1 });
                     if count > chunk {
                         self.steps.push(Step::Submit);
@@ -279,6 +344,26 @@ impl Schedule {
     }
 }
 
+/// Triangles that are drawn for the same reason.
+#[derive(Clone, Copy)]
+struct Pass {
+    id_base: u32,
+    vertex_base: u32,
+    faces: Faces,
+    role: u8,
+}
+
+impl Pass {
+    fn surface(plan: &DrawPlan<'_>, role: u8) -> Option<Self> {
+        plan.surface.as_ref().map(|s| Self { id_base: 0, vertex_base: 0, faces: s.faces, role })
+    }
+
+    fn hull(plan: &DrawPlan<'_>) -> Option<Self> {
+        let (id_base, vertex_base) = (plan.triangles.len() as u32, plan.positions.len() as u32);
+        plan.hull.as_ref().map(|_| Self { id_base, vertex_base, faces: Faces::Back, role: roles::HULL })
+    }
+}
+
 /// Edges that a workgroup draws: all its threads draw the long ones together, each one's share of which is bounded.
 fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> u32 {
     if !device.loops_are_limited {
@@ -294,7 +379,8 @@ fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits)
 
 /// Bytes a pixel of the largest buffer that holds a band.
 fn pixel_bytes(plan: &DrawPlan<'_>) -> u64 {
-    (u64::from(plan.samples) * 8).max(16).max(4 * plan.lines.len() as u64)
+    let sample = if plan.layers().is_some() { LAYERED_BYTES } else { 8 };
+    (u64::from(plan.samples) * sample).max(16).max(4 * plan.lines.len() as u64)
 }
 
 #[cfg(test)]

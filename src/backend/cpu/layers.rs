@@ -1,0 +1,345 @@
+//! Stage 3b, a sample: the layers over its surface, nearest first, and the surface under them. Twin of `shaders/layers.wgsl`.
+//!
+//! Depth peeling (Everitt 2001, "Interactive order-independent transparency"), for each sample by itself: a round finds the
+//! greatest word (depth, lowest id) below the last round's, all words above the visibility buffer's.
+
+use super::Stages;
+use super::bins::TriangleBin;
+use super::isa::{LANES, dispatch};
+use super::point::Show;
+use super::samples::{NOTHING, SampleBand};
+use super::shade::Shader;
+use super::transform::ScreenVertex;
+use super::visibility::{self, Setup, Target};
+use crate::plan::{LayersPass, roles, sample_offsets};
+
+/// Triangles between two looks at the deadline.
+const CHECK_EVERY: usize = 256;
+
+/// What a band's layers need beside its samples.
+pub struct LayerBand {
+    /// This round's layer; begins as a copy of what it must lie before.
+    found: SampleBand,
+    /// The last round's; depth 0 where a sample is done.
+    previous: SampleBand,
+    /// Premultiplied linear RGBA so far, laid out as the samples.
+    colors: Vec<[f32; 4]>,
+    /// Materials so far, a bit each, modulo 32.
+    materials: Vec<u32>,
+    /// Of each triangle of the band, in the order of its bins: whether it may be in a round to come.
+    pending: Vec<bool>,
+}
+
+impl LayerBand {
+    /// For bands like this one.
+    pub fn new(base: &SampleBand) -> Self {
+        let like = || SampleBand::new(base.size_px, 0, base.rows, base.samples);
+        let len = base.depth.len();
+        let (colors, materials) = (vec![[0.0; 4]; len], vec![0; len]);
+        Self { found: like(), previous: like(), colors, materials, pending: Vec::new() }
+    }
+
+    /// Forgets everything, and moves to where `base` is.
+    fn begin(&mut self, base: &SampleBand) {
+        for samples in [&mut self.found, &mut self.previous] {
+            (samples.first_row, samples.rows) = (base.first_row, base.rows);
+        }
+        self.previous.depth.fill(f32::INFINITY);
+        self.previous.ids.fill(0);
+        self.colors.fill([0.0; 4]);
+        self.materials.fill(0);
+        self.pending.clear();
+    }
+
+    /// Empties the round: what it finds must lie before `base`, if there is one.
+    fn begin_round(&mut self, base: Option<&SampleBand>) {
+        match base {
+            Some(base) => {
+                self.found.depth.copy_from_slice(&base.depth);
+                self.found.ids.copy_from_slice(&base.ids);
+            }
+            None => self.found.clear(),
+        }
+    }
+
+    /// Takes a sample's find as its last layer: its id, or None if the sample is done.
+    #[inline(always)]
+    fn take(&mut self, base: Option<&SampleBand>, at: usize) -> Option<u32> {
+        let (depth, id) = (self.found.depth[at], self.found.ids[at]);
+        let (base_depth, base_id) = base.map_or((0.0, NOTHING), |base| (base.depth[at], base.ids[at]));
+        if depth == base_depth && id == base_id {
+            self.previous.depth[at] = 0.0;
+            return None;
+        }
+        (self.previous.depth[at], self.previous.ids[at]) = (depth, id);
+        Some(id)
+    }
+}
+
+/// Keeps the nearest of what lies behind the last layer.
+struct Behind<'a> {
+    found: &'a mut SampleBand,
+    previous: &'a SampleBand,
+    /// Not 0 where the triangle lies behind the last layer of some sample.
+    pending: [u32; LANES],
+}
+
+impl Target for Behind<'_> {
+    #[inline(always)]
+    fn band(&self) -> &SampleBand {
+        self.found
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, at: usize, outside: &[i32; LANES], z: &[f32; LANES], id: u32) {
+        let lanes = (
+            self.found.depth.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>()),
+            self.found.ids.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>()),
+            self.previous.depth.get(at..).and_then(|d| d.first_chunk::<LANES>()),
+            self.previous.ids.get(at..).and_then(|d| d.first_chunk::<LANES>()),
+        );
+        let (Some(depths), Some(ids), Some(last_depths), Some(last_ids)) = lanes else { return };
+        let (old_depths, old_ids) = (*depths, *ids);
+        let mut keep = [0_u32; LANES];
+        for l in 0..LANES {
+            let behind = (z[l] < last_depths[l]) | ((z[l] == last_depths[l]) & (id > last_ids[l]));
+            let nearer = (z[l] > old_depths[l]) | ((z[l] == old_depths[l]) & (id < old_ids[l]));
+            let open = !((outside[l] >> 31) as u32) & u32::from(behind & (z[l] > 0.0)).wrapping_neg();
+            self.pending[l] |= open;
+            // All ones where the old sample stays.
+            keep[l] = !(open & u32::from(nearer).wrapping_neg());
+        }
+        for l in 0..LANES {
+            depths[l] = f32::from_bits((old_depths[l].to_bits() & keep[l]) | (z[l].to_bits() & !keep[l]));
+            ids[l] = (old_ids[l] & keep[l]) | (id & !keep[l]);
+        }
+    }
+}
+
+/// Shades the band: its layers, and the surface under them.
+pub fn draw(
+    stages: &Stages<'_>,
+    pass: &LayersPass,
+    bins: (&[TriangleBin], usize),
+    base: &SampleBand,
+    layers: &mut LayerBand,
+    colors: &mut [[f32; 4]],
+) {
+    layers.begin(base);
+    let floor = (!pass.behind_surface).then_some(base);
+    for layer in 0..pass.count_max {
+        layers.begin_round(floor);
+        peel(stages.isa, stages, bins, layers);
+        let show = Show { fill: !pass.wires_only, wires: if layer == 0 { 1.0 } else { pass.fade } };
+        let mut is_open = false;
+        lay(stages.isa, stages, show, floor, layers, &mut is_open);
+        if !is_open || stages.deadline.check().is_err() {
+            break;
+        }
+    }
+    under(stages.isa, stages, base, layers, colors);
+}
+
+/// Leaves layer number `layer` in `found`, unshaded: id [`NOTHING`] where a sample has none.
+pub fn find(
+    stages: &Stages<'_>,
+    pass: &LayersPass,
+    bins: (&[TriangleBin], usize),
+    base: &SampleBand,
+    layers: &mut LayerBand,
+    layer: u32,
+) -> Vec<u64> {
+    layers.begin(base);
+    let floor = (!pass.behind_surface).then_some(base);
+    let mut words = vec![0; base.depth.len()];
+    for _ in 0..=layer {
+        layers.begin_round(floor);
+        peel(stages.isa, stages, bins, layers);
+        for (at, word) in words.iter_mut().enumerate() {
+            *word = if layers.take(floor, at).is_some() { layers.found.word(at) } else { 0 };
+        }
+    }
+    words
+}
+
+dispatch! {
+    /// Finds the next layer of a band.
+    pub fn peel(stages: &Stages<'_>, bins: (&[TriangleBin], usize), layers: &mut LayerBand) = peel_kernel
+}
+
+dispatch! {
+    /// Shades the layer that was found and lays it under those before it; says whether there may be another.
+    pub fn lay(
+        stages: &Stages<'_>,
+        show: Show,
+        floor: Option<&SampleBand>,
+        layers: &mut LayerBand,
+        is_open: &mut bool,
+    ) = lay_kernel
+}
+
+dispatch! {
+    /// Shades the surface, lays it under the layers, and averages each pixel's samples.
+    pub fn under(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colors: &mut [[f32; 4]]) = under_kernel
+}
+
+#[inline(always)]
+fn peel_kernel(stages: &Stages<'_>, (bins, band): (&[TriangleBin], usize), layers: &mut LayerBand) {
+    let LayerBand { found, previous, pending, .. } = layers;
+    let mut item = 0;
+    for chunk in bins {
+        for (id, piece) in chunk.pieces_in(band) {
+            offer(item, id, || *piece, found, previous, pending);
+            item += 1;
+        }
+        for id in chunk.whole.items_in(band) {
+            if item % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
+                return;
+            }
+            offer(item, id, || stages.screen_triangle(id), found, previous, pending);
+            item += 1;
+        }
+    }
+}
+
+/// Draws the band's triangle number `item`, unless an earlier round has seen the last of it.
+#[inline(always)]
+fn offer(
+    item: usize,
+    id: u32,
+    corners: impl Fn() -> [ScreenVertex; 3],
+    found: &mut SampleBand,
+    previous: &SampleBand,
+    pending: &mut Vec<bool>,
+) {
+    if pending.get(item) == Some(&false) {
+        return;
+    }
+    let mut target = Behind { found, previous, pending: [0; LANES] };
+    if let Some(setup) = Setup::new(&corners()) {
+        visibility::draw(&setup, id, &mut target);
+    }
+    let is_pending = target.pending != [0; LANES];
+    match pending.get_mut(item) {
+        Some(kept) => *kept = is_pending,
+        None => pending.push(is_pending),
+    }
+}
+
+#[inline(always)]
+fn lay_kernel(stages: &Stages<'_>, show: Show, floor: Option<&SampleBand>, layers: &mut LayerBand, is_open: &mut bool) {
+    let hull = stages.plan.hull.as_ref().filter(|_| stages.plan.has_layered_hull());
+    let triangles = stages.plan.triangles.len() as u32;
+    let mut shader = Shader::new(stages);
+    for y in layers.found.first_row..layers.found.first_row + layers.found.rows {
+        for x in 0..layers.found.size_px[0] {
+            let first = layers.found.index(x, y, 0);
+            let mut ids = [NOTHING; 4];
+            let mut any = false;
+            for s in 0..layers.found.samples as usize {
+                let at = first + s;
+                let Some(id) = layers.take(floor, at) else { continue };
+                any = true;
+                let Some(hull) = hull else {
+                    ids[s] = id;
+                    continue;
+                };
+                let bit = 1 << (hull.material((id % triangles) as usize) % 32);
+                if id < triangles || layers.materials[at] & bit == 0 {
+                    ids[s] = id;
+                }
+                layers.materials[at] |= bit;
+            }
+            if !any {
+                continue;
+            }
+            groups(
+                &mut shader,
+                ids,
+                [x, y],
+                layers.found.samples,
+                |_| show,
+                |s, color| {
+                    let at = first + s;
+                    let so_far = &mut layers.colors[at];
+                    let rest = 1.0 - so_far[3];
+                    for k in 0..4 {
+                        so_far[k] += rest * color[k];
+                    }
+                    if so_far[3] >= 1.0 {
+                        layers.previous.depth[at] = 0.0;
+                    }
+                },
+            );
+            for s in 0..layers.found.samples as usize {
+                *is_open |= layers.previous.depth[first + s] > 0.0;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colors: &mut [[f32; 4]]) {
+    let plan = stages.plan;
+    let wires_only = plan.layers().is_some_and(|pass| pass.wires_only);
+    let show = |id: u32| match wires_only && plan.role(id as usize) & roles::LAYER != 0 {
+        true => Show { fill: true, wires: 0.0 },
+        false => Show::ALL,
+    };
+    let mut shader = Shader::new(stages);
+    let share = 1.0 / base.samples as f32;
+    let mut colors = colors.iter_mut();
+    for y in base.first_row..base.first_row + base.rows {
+        for x in 0..base.size_px[0] {
+            let Some(out) = colors.next() else { return };
+            let first = base.index(x, y, 0);
+            let mut ids = [NOTHING; 4];
+            for s in 0..base.samples as usize {
+                ids[s] = base.ids[first + s];
+                let over = layers.colors[first + s];
+                for k in 0..4 {
+                    out[k] += share * over[k];
+                }
+            }
+            groups(&mut shader, ids, [x, y], base.samples, show, |s, color| {
+                let weight = share * (1.0 - layers.colors[first + s][3]);
+                for k in 0..4 {
+                    out[k] += weight * color[k];
+                }
+            });
+        }
+    }
+}
+
+/// Shades each triangle among a pixel's samples once, at the mean position of its samples, and calls `each` with every
+/// sample that sees one.
+#[inline(always)]
+fn groups(
+    shader: &mut Shader<'_>,
+    ids: [u32; 4],
+    [x, y]: [u32; 2],
+    samples: u32,
+    show: impl Fn(u32) -> Show,
+    mut each: impl FnMut(usize, [f32; 4]),
+) {
+    let offsets = sample_offsets(samples);
+    for s in 0..offsets.len() {
+        if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {
+            continue;
+        }
+        let (mut offset, mut count) = ([0, 0], 0);
+        for (id, at) in ids.iter().zip(offsets) {
+            if *id == ids[s] {
+                offset = [offset[0] + at[0], offset[1] + at[1]];
+                count += 1;
+            }
+        }
+        shader.points.show = show(ids[s]);
+        let color = shader.group(ids[s], x, y, offset, count);
+        for t in s..offsets.len() {
+            if ids[t] == ids[s] {
+                each(t, color);
+            }
+        }
+    }
+}
