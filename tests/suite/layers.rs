@@ -138,7 +138,7 @@ fn layers_of_soups_are_the_same() {
         }
     }
     assert_eq!(cases, 36);
-    assert!(seen > 200_000, "{seen} samples saw something");
+    assert!(seen > 100_000, "{seen} samples saw something");
 }
 
 #[test]
@@ -199,11 +199,15 @@ fn layers_are_what_sorting_each_sample_gives() {
     for kind in [Kind::Large, Kind::Ties, Kind::Mixed] {
         for samples in [1, 4] {
             for distance in [0.0, 3.0, 0.5] {
-                let mut soup = Layered::new(Soup::new(kind, 24, 0.7, &mut random), &mut random);
+                let mut soup = Layered::new(Soup::new(kind, 60, 0.7, &mut random), &mut random);
+                // Mostly layers: what is opaque hides them.
+                for role in soup.roles.iter_mut().filter(|role| **role & roles::SURFACE != 0) {
+                    *role = if random.below(6) == 0 { *role } else { roles::LAYER };
+                }
                 // Colours must not depend on where in its pixel a triangle is shaded.
                 soup.materials.iter_mut().for_each(|m| *m %= 2);
                 let view = View::new([50, 40], samples, distance, &mut random);
-                let plan = soup.plan(&view, LayersPass { count_max: 24, ..PASS });
+                let plan = soup.plan(&view, LayersPass { count_max: 64, ..PASS });
                 let (want, depth) = sorted(&plan);
                 deepest = deepest.max(depth);
                 let got = CpuRenderer::new(2).draw(&plan, &Deadline::default()).unwrap();
@@ -214,7 +218,7 @@ fn layers_are_what_sorting_each_sample_gives() {
         }
     }
     assert_eq!(cases, 18);
-    assert!(deepest >= 8, "no sample has more than {deepest} layers");
+    assert!(deepest >= 12, "no sample has more than {deepest} layers");
 }
 
 /// Every triangle drawn alone, then each sample's triangles sorted and blended in f64; and how many layers the deepest has.

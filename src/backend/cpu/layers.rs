@@ -33,8 +33,9 @@ pub struct LayerBand {
 impl LayerBand {
     /// For bands like this one.
     pub fn new(base: &SampleBand) -> Self {
-        let like = || SampleBand::new(base.size_px, 0, base.rows, base.samples);
+        // A picture's last band has fewer rows than it has room for.
         let len = base.depth.len();
+        let like = || SampleBand { depth: vec![0.0; len], ids: vec![NOTHING; len], ..*base };
         let (colors, materials) = (vec![[0.0; 4]; len], vec![0; len]);
         Self { found: like(), previous: like(), colors, materials, pending: Vec::new() }
     }
