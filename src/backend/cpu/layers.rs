@@ -75,6 +75,21 @@ impl LayerBand {
         (self.previous.depth[at], self.previous.ids[at]) = (depth, id);
         Some(id)
     }
+
+    /// Lays a colour under what some samples of the pixel at `first` have so far.
+    #[inline(always)]
+    fn lay(&mut self, first: usize, same: [bool; 4], color: [f32; 4]) {
+        for s in (0..4).filter(|&s| same[s]) {
+            let so_far = &mut self.colors[first + s];
+            let rest = 1.0 - so_far[3];
+            for k in 0..4 {
+                so_far[k] += rest * color[k];
+            }
+            if so_far[3] >= 1.0 {
+                self.previous.depth[first + s] = 0.0;
+            }
+        }
+    }
 }
 
 /// Keeps the nearest of what lies behind the last layer.
@@ -254,24 +269,7 @@ fn lay_kernel(stages: &Stages<'_>, show: Show, floor: Option<&SampleBand>, layer
             if !any {
                 continue;
             }
-            groups(
-                &mut shader,
-                ids,
-                [x, y],
-                layers.found.samples,
-                |_| show,
-                |s, color| {
-                    let at = first + s;
-                    let so_far = &mut layers.colors[at];
-                    let rest = 1.0 - so_far[3];
-                    for k in 0..4 {
-                        so_far[k] += rest * color[k];
-                    }
-                    if so_far[3] >= 1.0 {
-                        layers.previous.depth[at] = 0.0;
-                    }
-                },
-            );
+            groups(&mut shader, ids, [x, y], |_| show, |same, color| layers.lay(first, same, color));
             for s in 0..layers.found.samples as usize {
                 *is_open |= layers.previous.depth[first + s] > 0.0;
             }
@@ -302,8 +300,9 @@ fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colo
                     out[k] += share * over[k];
                 }
             }
-            groups(&mut shader, ids, [x, y], base.samples, show, |s, color| {
-                let weight = share * (1.0 - layers.colors[first + s][3]);
+            groups(&mut shader, ids, [x, y], show, |same, color| {
+                let rest = |s: usize| if same[s] { 1.0 - layers.colors[first + s][3] } else { 0.0 };
+                let weight = share * (0..base.samples as usize).map(rest).sum::<f32>();
                 for k in 0..4 {
                     out[k] += weight * color[k];
                 }
@@ -312,18 +311,17 @@ fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colo
     }
 }
 
-/// Shades each triangle among a pixel's samples once, at the mean position of its samples, and calls `each` with every
-/// sample that sees one.
+/// Shades each triangle among a pixel's samples once, at the mean position of its samples, and calls `each` with which samples
+/// these are, and its colour.
 #[inline(always)]
 fn groups(
     shader: &mut Shader<'_>,
     ids: [u32; 4],
     [x, y]: [u32; 2],
-    samples: u32,
     show: impl Fn(u32) -> Show,
-    mut each: impl FnMut(usize, [f32; 4]),
+    mut each: impl FnMut([bool; 4], [f32; 4]),
 ) {
-    let offsets = sample_offsets(samples);
+    let offsets = sample_offsets(shader.stages.plan.samples);
     for s in 0..offsets.len() {
         if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {
             continue;
@@ -337,10 +335,6 @@ fn groups(
         }
         shader.points.show = show(ids[s]);
         let color = shader.group(ids[s], x, y, offset, count);
-        for t in s..offsets.len() {
-            if ids[t] == ids[s] {
-                each(t, color);
-            }
-        }
+        each(ids.map(|id| id == ids[s]), color);
     }
 }

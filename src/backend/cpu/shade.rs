@@ -24,7 +24,8 @@ pub fn shade(stages: &Stages<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
 
 /// Finds out who is seen in a pixel, and where.
 pub struct Shader<'a> {
-    stages: &'a Stages<'a>,
+    /// What it reads.
+    pub stages: &'a Stages<'a>,
     /// Finds out what they look like.
     pub points: PointShader<'a>,
 }
