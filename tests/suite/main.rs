@@ -18,6 +18,7 @@ mod http;
 mod http_bad;
 mod jobs;
 mod layers;
+mod layers_hull;
 mod likeness;
 mod mesh_files;
 mod models;
