@@ -112,7 +112,7 @@ fn outlines_may_be_thicker_on_one_part() {
     for (unit, thin, thick) in [("px", 2.0, 8.0), ("object", 0.03, 0.12)] {
         let mut spec = outlined("front");
         let thickness = |mut layers: Layers, t| {
-            for outline in &mut layers.outline {
+            if let Some(outline) = &mut layers.outline {
                 outline.unit = match unit {
                     "px" => meshsnap::scene::OutlineUnit::Px,
                     _ => meshsnap::scene::OutlineUnit::Object,

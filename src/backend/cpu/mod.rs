@@ -1,6 +1,7 @@
 //! The CPU rasterizer: the reference for bytes.
 //!
-//! Stages, each a file: [`transform`] (with [`clip`] where needed), [`visibility`], [`shade`], [`lines`], [`resolve`]. The picture is cut
+//! Stages, each a file: [`transform`] (with [`clip`] where needed), [`visibility`], [`layers`] (with [`peel`]), [`shade`],
+//! [`lines`], [`resolve`]. The picture is cut
 //! into bands of rows that fit a core's cache; threads take bands, and nothing a band draws depends on another.
 
 // Loops over lanes and corners walk several arrays at once; an index says that best.
@@ -15,6 +16,7 @@ mod layers;
 mod light;
 mod lines;
 mod occluders;
+mod peel;
 mod point;
 mod resolve;
 mod samples;

@@ -12,6 +12,7 @@ mod params;
 mod recorder;
 mod schedule;
 mod stages;
+mod tiles;
 
 use std::sync::Arc;
 
