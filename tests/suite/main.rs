@@ -17,6 +17,8 @@ mod golden;
 mod http;
 mod http_bad;
 mod jobs;
+mod layers;
+mod layers_hull;
 mod likeness;
 mod mesh_files;
 mod models;
