@@ -84,7 +84,8 @@ fn triangles_and_memory_are_limited_in_every_format() {
         let stopped = Deadline::default();
         stopped.stop();
         let limits = Limits::default();
-        let error = import(bytes, None, &limits, &mut Budget::new(&limits), &stopped).unwrap_err();
+        let error =
+            import(&Bundle::of_one(bytes.clone()), None, &limits, &mut Budget::new(&limits), &stopped).unwrap_err();
         assert_eq!(error.fault, MeshFault::Stopped);
     }
 }
