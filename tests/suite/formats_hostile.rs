@@ -2,7 +2,7 @@
 
 use crate::mesh_files::{Gltf, Solid, read, read_limited};
 use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::{MeshFault, import};
+use meshsnap::mesh::{Bundle, MeshFault, import};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
