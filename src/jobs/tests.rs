@@ -68,7 +68,7 @@ fn output(bytes: usize) -> Output {
 
 /// What the mesh bytes make the fake renderer do.
 fn act(work: &Work, deadline: &Deadline, gate: &Mutex<Receiver<()>>) -> Result<Output, RenderError> {
-    match &work.mesh[..] {
+    match &work.bundle.files()[0].bytes[..] {
         b"panic" => panic!("asked to"),
         b"wait" => {
             gate.lock().unwrap().recv_timeout(SOON).map_or(Err(RenderError::Stopped(Stopped)), |()| Ok(output(1)))

@@ -1,7 +1,7 @@
 //! Which file of a bundle is the mesh.
 
-use super::bundle::{BundleFile, Folder, show, show_all};
-use super::{Format, MeshError, MeshFault, sniff};
+use super::bundle::{BundleFile, show, show_all};
+use super::{Folder, Format, MeshError, MeshFault, sniff};
 use crate::limits::Deadline;
 
 /// Finds the mesh among the files: the one that `entry` names, or the only one that is a mesh. `format` overrides sniffing.

@@ -1,8 +1,8 @@
 //! Opens a bundle, finds its mesh, sniffs the format from the bytes and calls its importer.
 
-use super::bundle::{Bundle, Folder};
+use super::bundle::Bundle;
 use super::normalise::normalise;
-use super::{Mesh, MeshError, MeshFault, entry, gltf, obj, stl, unzip};
+use super::{Folder, Mesh, MeshError, MeshFault, entry, gltf, obj, stl, unzip};
 use crate::limits::{Budget, Deadline, Limits};
 
 /// The mesh formats that are read.

@@ -180,11 +180,11 @@ fn bombs_break_a_limit_before_they_go_off() {
         ("too large together", archive(&nine, 9), &Limits::default(), "--limit-bundle-bytes"),
         (
             "too large",
-            archive(&[bomb.clone()], 1),
+            archive(std::slice::from_ref(&bomb), 1),
             &Limits { bundle_bytes: 1000, ..Limits::default() },
             "--limit-bundle-bytes",
         ),
-        ("too large for the job", archive(&[bomb.clone()], 1), &small, "--limit-memory-bytes"),
+        ("too large for the job", archive(std::slice::from_ref(&bomb), 1), &small, "--limit-memory-bytes"),
         ("65,535 entries", archive(&many, 65_535), &Limits::default(), "--limit-bundle-entries"),
         ("1,001 entries", archive(&many[..1001], 1001), &Limits::default(), "--limit-bundle-entries"),
     ];

@@ -190,7 +190,7 @@ fn broken_and_hostile_libraries() {
     let texts = [
         million + "newmtl A\nKd 0.5\n",
         format!("{long}\nnewmtl {long}\nnewmtl A\nKd {long}\nmap_Kd {long}\nKd 0.5\n"),
-        format!("newmtl A\nmap_Kd {}\nKd 0.5\n", "-s 1 ".repeat(5_000_000)),
+        format!("newmtl A\nmap_Kd {}-s\nKd 0.5\n", "-s 1 ".repeat(5_000_000)),
         format!("newmtl A\nKd 0.5{}\n", "\\\n".repeat(10_000_000)),
     ];
     for text in &texts {

@@ -8,7 +8,7 @@ use super::left_out::LeftOut;
 use super::lines::Lines;
 use crate::mesh::import::Context;
 use crate::mesh::{MeshError, Warning};
-use rapidhash::{RapidHashMap, RapidHashSet};
+use rapidhash::RapidHashMap;
 use std::io::{BufRead, Read};
 use tobj::LoadError;
 
@@ -18,7 +18,7 @@ pub struct Summary {
     pub vertices: u64,
     /// `usemtl` names, in order of first use.
     pub materials: Vec<Vec<u8>>,
-    /// What `mtllib` lines say, each once, in order.
+    /// What `mtllib` lines say.
     pub libraries: Vec<Vec<u8>>,
     /// What was left out.
     pub warnings: Vec<Warning>,
@@ -43,7 +43,6 @@ pub struct Cleaner<'a, 'b> {
     materials: Vec<Vec<u8>>,
     material_numbers: RapidHashMap<Vec<u8>, usize>,
     libraries: Vec<Vec<u8>>,
-    libraries_seen: RapidHashSet<Vec<u8>>,
     corners: Vec<Corner>,
     left_out: LeftOut,
 }
@@ -66,7 +65,6 @@ impl<'a, 'b> Cleaner<'a, 'b> {
             materials: Vec::new(),
             material_numbers: RapidHashMap::default(),
             libraries: Vec::new(),
-            libraries_seen: RapidHashSet::default(),
             corners: Vec::new(),
             left_out: LeftOut::default(),
         }
@@ -260,11 +258,8 @@ impl<'a, 'b> Cleaner<'a, 'b> {
     }
 
     fn library(&mut self, name: &[u8]) {
-        if !name.is_empty() && !self.libraries_seen.contains(name) {
-            self.unpaid_bytes += 256 + 2 * name.len() as u64;
-            self.libraries_seen.insert(name.to_vec());
-            self.libraries.push(name.to_vec());
-        }
+        self.unpaid_bytes += 128 + 2 * name.len() as u64;
+        self.libraries.push(name.to_vec());
     }
 
     fn broken(&self, what: &str) -> MeshError {

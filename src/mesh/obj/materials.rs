@@ -5,11 +5,11 @@
 use super::map::Map;
 use super::mtl::{self, Material, PassedOver};
 use super::srgb_to_linear;
-use crate::mesh::bundle::{Folder, show_all};
+use crate::mesh::bundle::show_all;
 use crate::mesh::import::Context;
 use crate::mesh::material::{AlphaMode, ImageContent, ImageSource, TextureRef};
 use crate::mesh::raw::RawMesh;
-use crate::mesh::{MaterialSlot, MeshError, Warning};
+use crate::mesh::{Folder, MaterialSlot, MeshError, Warning};
 use rapidhash::{RapidHashMap, RapidHashSet};
 use std::borrow::Cow;
 
@@ -67,9 +67,10 @@ struct Images {
 impl Reader<'_> {
     /// The files that `mtllib` lines mean, each once. A line is one name with spaces, or several names.
     fn find_libraries(&mut self, lines: &[Vec<u8>]) -> Vec<usize> {
+        let mut said = RapidHashSet::default();
         let mut seen = RapidHashSet::default();
         let mut files = Vec::new();
-        for line in lines {
+        for line in lines.iter().filter(|line| !line.is_empty() && said.insert(line.as_slice())) {
             let whole = text(line);
             let folder = self.folder.entry().folder();
             let numbers: Vec<usize> = match self.find(folder, &whole) {
