@@ -199,3 +199,27 @@ fn real_models_come_with_their_materials_however_they_are_packed() {
     }
     assert_eq!(models.len(), 2);
 }
+
+#[test]
+fn gltf_finds_its_buffers() {
+    let Some(folder) = folder("models") else { return };
+    let read = |name: &str| std::fs::read(folder.join("PalmTree").join(name)).unwrap();
+    let names: Vec<String> = std::fs::read_dir(folder.join("PalmTree"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    let all: Vec<(&str, Vec<u8>)> = names.iter().map(|name| (name.as_str(), read(name))).collect();
+    let all: Vec<(&str, &[u8])> = all.iter().map(|(name, bytes)| (*name, bytes.as_slice())).collect();
+    for bundle in [Bundle::of_files(files(&all)), Bundle::of_one(zipped(&all))] {
+        assert!(read_bundle(&bundle).unwrap().triangles.len() > 100);
+    }
+    let error = read_bundle(&Bundle::of_one(read("PalmTree.gltf"))).unwrap_err();
+    assert_eq!(error.fault, MeshFault::OutsideBundle);
+    assert!(error.detail.contains(".bin") && error.detail.contains("add it"), "{error}");
+    let out = r#"{"asset":{"version":"2.0"},"buffers":[{"uri":"../x.bin","byteLength":36}],"bufferViews":[{"buffer":0,"byteLength":36}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}]}"#;
+    let bundle = |gltf, bin| Bundle::of_files(files(&[(gltf, out.as_bytes()), (bin, &[0; 36])]));
+    assert_eq!(read_bundle(&bundle("x.gltf", "x.bin")).unwrap_err().fault, MeshFault::OutsideBundle);
+    assert_eq!(read_bundle(&bundle("m/x.gltf", "x.bin")).unwrap_err().fault, MeshFault::Empty, "three equal points");
+}

@@ -16,6 +16,9 @@ use std::borrow::Cow;
 /// Where a texture counts as there and where not, if it is both drawn and cut out by the same image.
 const MASK_AT: f32 = 0.5;
 
+/// Most libraries that one line can name: a longer line is no list of files.
+const LIBRARIES_MAX: usize = 100;
+
 /// A slot for each of `names`, in their order, as the `libraries` describe them. Images go to `raw`, and so do warnings.
 pub fn read(
     names: &[Vec<u8>],
@@ -24,7 +27,7 @@ pub fn read(
     cx: &mut Context<'_>,
 ) -> Result<Vec<MaterialSlot>, MeshError> {
     let mut reader = Reader { folder: cx.bundle, images: Images::default(), notes: Notes::default() };
-    let files = reader.find_libraries(libraries);
+    let files = reader.find_libraries(libraries, cx)?;
     cx.budget.spend("materials", names.len() as u64, size_of::<Option<(Material, usize)>>() as u64 + 64)?;
     let numbers: RapidHashMap<&[u8], usize> = names.iter().enumerate().map(|(i, name)| (name.as_slice(), i)).collect();
     let mut found: Vec<Option<(Material, usize)>> = vec![None; names.len()];
@@ -34,6 +37,7 @@ pub fn read(
     }
     let mut slots = Vec::with_capacity(names.len());
     for (name, found) in names.iter().zip(found) {
+        cx.deadline.check()?;
         let name = String::from_utf8_lossy(name).into_owned();
         let slot = match found {
             Some((material, library)) => reader.slot(&material, library, cx)?,
@@ -66,23 +70,27 @@ struct Images {
 
 impl Reader<'_> {
     /// The files that `mtllib` lines mean, each once. A line is one name with spaces, or several names.
-    fn find_libraries(&mut self, lines: &[Vec<u8>]) -> Vec<usize> {
+    fn find_libraries(&mut self, lines: &[Vec<u8>], cx: &Context<'_>) -> Result<Vec<usize>, MeshError> {
         let mut said = RapidHashSet::default();
         let mut seen = RapidHashSet::default();
         let mut files = Vec::new();
         for line in lines.iter().filter(|line| !line.is_empty() && said.insert(line.as_slice())) {
+            cx.deadline.check()?;
             let whole = text(line);
             let folder = self.folder.entry().folder();
             let numbers: Vec<usize> = match self.find(folder, &whole) {
                 Some(number) => vec![number],
-                None => whole.split_ascii_whitespace().filter_map(|word| self.find(folder, word)).collect(),
+                None => {
+                    let words = whole.split_ascii_whitespace().take(LIBRARIES_MAX);
+                    words.filter_map(|word| self.find(folder, word)).collect()
+                }
             };
             if numbers.is_empty() {
                 self.notes.libraries.push(whole.into_owned());
             }
             files.extend(numbers.into_iter().filter(|&number| seen.insert(number)));
         }
-        files
+        Ok(files)
     }
 
     /// A file by its path from `folder` or from the mesh, or else by its base name: libraries are full of other people's
