@@ -6,8 +6,8 @@ use super::parts::Parts;
 use super::skips::{SkipKind, Skips};
 use super::textures::TextureLoader;
 use super::{
-    CornerValues, DrawPlan, Faces, HullOffset, HullPass, PlanError, Projection, SurfacePass, flags, lights, materials,
-    wires,
+    CornerValues, DrawPlan, Faces, HullOffset, HullPass, LayersPass, PlanError, Projection, SurfacePass, flags, lights,
+    materials, wires,
 };
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::{Mesh, normals};
@@ -46,17 +46,12 @@ pub fn build_keeping<'a>(
         let outline = parts.layers[material].outline;
         outline.map_or(0.0, |outline| contour_px(mesh, &outline, &camera, size_px))
     };
-    let lines = wires::passes(mesh, spec, &parts, contour_px, &mut skips, budget)?;
-    let layers = parts.layers_pass();
+    let lines = wires::passes(mesh, spec, &parts, contour_px, camera.contains_mesh, &mut skips, budget)?;
     let surface = surface_pass(mesh, spec, &parts, &camera, &mut skips, budget)?;
     let welded = surface.as_ref().and_then(|s| s.vertex_normals.as_ref()).filter(|_| mesh.normals.is_empty());
-    let hull = parts.has_hull().then(|| hull_pass(mesh, &parts, welded.map(|n| n.values.clone())));
-
-    skips.skip(SkipKind::Layers, layers.is_none(), "nothing shines through");
-    skips.skip(SkipKind::Hull, hull.is_none(), "the look has no hull");
-    skips.skip(SkipKind::Surface, surface.is_none(), "the look has no filled surface, and no line that one could hide");
-    let visible = surface.is_some() || hull.is_some();
-    skips.skip(SkipKind::Visibility, !visible, "no surface and no hull: no depth is needed");
+    let no_hull = skips.skip(SkipKind::Hull, !parts.has_hull(), "the look has no hull");
+    let hull = (!no_hull).then(|| hull_pass(mesh, &parts, welded.map(|n| n.values.clone())));
+    let layers = layers_pass(&parts, hull.is_some(), &mut skips);
     let unclipped = skips.skip(
         SkipKind::Clipping,
         camera.contains_mesh,
@@ -68,7 +63,7 @@ pub fn build_keeping<'a>(
         samples: spec.image.samples,
         positions: &mesh.positions,
         triangles: &mesh.triangles,
-        roles: parts.roles(mesh, layers.as_ref()),
+        roles: parts.roles(mesh, surface.is_some(), layers.as_ref(), hull.is_some()),
         projection: projection(&camera, size_px, !unclipped),
         surface,
         layers,
@@ -155,11 +150,14 @@ fn surface_pass<'a>(
     skips: &mut Skips<'_>,
     budget: &mut Budget,
 ) -> Result<Option<SurfacePass<'a>>, PlanError> {
-    let is_shaded = parts.has_fill() || parts.has_barycentric_wire();
-    if !is_shaded && !parts.needs_occluder() {
+    let is_seen = parts.has_fill() || parts.has_barycentric_wire();
+    let is_needless = !is_seen && !parts.needs_occluder();
+    let why = "the look has no filled surface, and no line that one could hide";
+    if skips.skip(SkipKind::Surface, is_needless, why) {
+        skips.skip(SkipKind::Visibility, !parts.has_hull(), "no surface and no hull: no depth is needed");
         return Ok(None);
     }
-    skips.skip(SkipKind::Shading, !is_shaded, "the surface is not seen: it only hides lines");
+    let is_shaded = !skips.skip(SkipKind::Shading, !is_seen, "the surface is not seen: it only hides lines");
     let edge_masks = if parts.has_barycentric_wire() || parts.shows_edge_distance() {
         wires::edge_masks(mesh, parts, budget)?
     } else {
@@ -223,6 +221,16 @@ fn attributes<'a>(mesh: &'a Mesh, pass: &mut SurfacePass<'a>, skips: &mut Skips<
     }
 }
 
+fn layers_pass(parts: &Parts<'_>, has_hull: bool, skips: &mut Skips<'_>) -> Option<LayersPass> {
+    let needed = parts.layers_pass();
+    // Hulls are drawn in another way where there are layers.
+    if skips.skip(SkipKind::Layers, needed.is_none(), "nothing shines through") || (needed.is_none() && has_hull) {
+        return None;
+    }
+    let empty = LayersPass { count_max: 1, behind_surface: false, wires_only: false, fade: 1.0 };
+    Some(needed.unwrap_or(empty))
+}
+
 fn hull_pass<'a>(mesh: &'a Mesh, parts: &Parts<'_>, welded: Option<Cow<'a, [[f32; 3]]>>) -> HullPass<'a> {
     let outline = |m: usize| parts.layers[m].outline.filter(|o| o.method == OutlineMethod::Hull);
     let offsets: Vec<Option<HullOffset>> =
@@ -230,8 +238,9 @@ fn hull_pass<'a>(mesh: &'a Mesh, parts: &Parts<'_>, welded: Option<Cow<'a, [[f32
     let mut colors: Vec<[f32; 4]> =
         (0..parts.layers.len()).map(|m| outline(m).map_or([0.0; 4], |o| o.color.premultiplied())).collect();
     let used: Vec<[f32; 4]> = (0..colors.len()).filter(|&m| offsets[m].is_some()).map(|m| colors[m]).collect();
-    if used.iter().all(|color| *color == used[0]) {
-        colors = vec![used[0]];
+    let color = used.first().copied().unwrap_or_default();
+    if used.iter().all(|c| *c == color) {
+        colors = vec![color];
     }
     let first = offsets.iter().flatten().next().copied().unwrap_or(HullOffset::Px(0.0));
     let amounts =

@@ -129,11 +129,10 @@ impl<'a> Parts<'a> {
         if all.all(|cull| cull == first) { first } else { Cull::None }
     }
 
-    /// [`DrawPlan::roles`](super::DrawPlan::roles).
-    pub fn roles(&self, mesh: &Mesh, pass: Option<&LayersPass>) -> Cow<'static, [u8]> {
+    /// [`DrawPlan::roles`](super::DrawPlan::roles) of a plan that has these passes.
+    pub fn roles(&self, mesh: &Mesh, surface: bool, pass: Option<&LayersPass>, hull: bool) -> Cow<'static, [u8]> {
         let common = self.common_cull();
         let by_part: Vec<u8> = (0..self.layers.len()).map(|m| self.role(m, pass, common)).collect();
-        let (surface, hull) = (self.has_fill() || self.needs_occluder(), self.has_hull());
         let usual = |role: u8| {
             (role & roles::SURFACE != 0 || !surface)
                 && (role & roles::HULL != 0 || !hull)

@@ -40,8 +40,6 @@ pub enum SkipKind {
     MaterialIndices,
     /// Which triangles are neighbours.
     Adjacency,
-    /// Edges on the far side of a closed surface.
-    BackEdges,
     /// Clipping at the near plane and the guard band.
     Clipping,
 }
@@ -62,7 +60,6 @@ impl SkipKind {
         Self::FineTextureLevels,
         Self::MaterialIndices,
         Self::Adjacency,
-        Self::BackEdges,
         Self::Clipping,
     ];
 }
@@ -83,7 +80,6 @@ impl fmt::Display for SkipKind {
             Self::FineTextureLevels => "fine texture levels",
             Self::MaterialIndices => "material indices",
             Self::Adjacency => "adjacency",
-            Self::BackEdges => "edges that look away",
             Self::Clipping => "clipping",
         })
     }

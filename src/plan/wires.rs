@@ -11,7 +11,7 @@ use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge, NO_FACE};
 use crate::scene::color::Rgba;
-use crate::scene::{Hidden, OutlineMethod, Spec, Topology, Wire, WireEdges, WireMethod};
+use crate::scene::{Cull, Hidden, OutlineMethod, Spec, Topology, Wire, WireEdges, WireMethod};
 
 /// How much wider than the polygons' edges those that tell of a fault are.
 const FAULT_WIDTH: f32 = 2.5;
@@ -42,12 +42,14 @@ enum Class {
     Nonmanifold,
 }
 
-/// The passes of a scene. `contour_px` is the width of each part's contour, where it has one.
+/// The passes of a scene. `contour_px` is the width of each part's contour, where it has one; `is_outside` says that the eye is
+/// surely outside of the mesh.
 pub fn passes(
     mesh: &Mesh,
     spec: &Spec,
     parts: &Parts<'_>,
     contour_px: impl Fn(usize) -> f32,
+    is_outside: bool,
     skips: &mut Skips<'_>,
     budget: &mut Budget,
 ) -> Result<Vec<LinePass>, LimitExceeded> {
@@ -60,10 +62,9 @@ pub fn passes(
     }
     let list = EdgeList::of(mesh, budget)?;
     let hides = parts.has_fill() || parts.needs_occluder() || spec.topology.is_some();
-    // On a closed surface that nothing shines through, what looks away is hidden.
+    // On a closed surface that nothing shines through, seen from outside, what looks away is hidden.
     let is_solid = hides && list.is_closed() && (0..parts.layers.len()).all(|m| parts.fill(m) != Fill::Transparent);
-    let back_edges = is_solid && wants.iter().any(|want| want.hidden == Hidden::Hide);
-    let skip_back = skips.skip(SkipKind::BackEdges, back_edges, "the surface is closed: they are hidden");
+    let skip_back = is_solid && is_outside && parts.common_cull() != Cull::Front;
     let mut passes = Vec::new();
     for want in &wants {
         let edges: Arc<[Edge]> = list

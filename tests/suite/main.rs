@@ -31,6 +31,7 @@ mod select_fakes;
 mod server;
 mod shapes;
 mod shared;
+mod skips;
 mod soups;
 mod structure;
 mod twins;

@@ -7,16 +7,20 @@
 #![allow(clippy::needless_range_loop)]
 
 mod bands;
+mod barycentric;
 mod bins;
 mod clip;
 mod isa;
+mod light;
 mod lines;
 mod occluders;
+mod point;
 mod resolve;
 mod samples;
 mod shade;
 mod transform;
 mod visibility;
+mod wire;
 
 pub use isa::Isa;
 

@@ -130,6 +130,15 @@ const SAMPLES_32: &str = include_str!("../../../shaders/samples32.wgsl");
 const SAMPLES_64: &str = include_str!("../../../shaders/samples64.wgsl");
 const SAMPLES: &str = include_str!("../../../shaders/samples.wgsl");
 
+/// The shade stage: from where a point lies to its colour.
+const SHADE: &[&str] = &[
+    include_str!("../../../shaders/barycentric.wgsl"),
+    include_str!("../../../shaders/light.wgsl"),
+    include_str!("../../../shaders/wire.wgsl"),
+    include_str!("../../../shaders/point.wgsl"),
+    include_str!("../../../shaders/shade.wgsl"),
+];
+
 impl Stage {
     /// The buffers of group 1 that the kernel declares.
     pub fn buffers(self) -> &'static [(Slot, Access)] {
@@ -205,7 +214,7 @@ impl Stage {
                 let kernel = include_str!("../../../shaders/visibility_tile.wgsl");
                 [COMMON, TRIANGLE, SAMPLES, emit(write), kernel].concat()
             }
-            Self::Shade => [COMMON, TRIANGLE, include_str!("../../../shaders/shade.wgsl")].concat(),
+            Self::Shade => [&[COMMON, TRIANGLE], SHADE].concat().concat(),
             Self::Lines => [COMMON, TRIANGLE, PLANES, include_str!("../../../shaders/lines.wgsl")].concat(),
             Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
         }
