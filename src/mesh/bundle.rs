@@ -42,9 +42,8 @@ impl Bundle {
     }
 
     /// Several files; a single one may be a zip archive.
-    pub fn of_files(mut files: Vec<BundleFile>) -> Self {
+    pub fn of_files(files: Vec<BundleFile>) -> Self {
         let is_zip = files.len() == 1 && files[0].bytes.starts_with(b"PK\x03\x04");
-        files.shrink_to_fit();
         Self { files, entry: None, is_zip }
     }
 

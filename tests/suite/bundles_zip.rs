@@ -5,6 +5,7 @@ use meshsnap::mesh::{Bundle, MeshFault, import};
 use std::time::{Duration, Instant};
 
 use crate::bundles::{read_bundle, zipped};
+use crate::mesh_files::Noise;
 use crate::server::{CUBE_OBJ, Server};
 
 /// An entry of an archive made by hand, which may lie.
@@ -249,4 +250,43 @@ fn a_server_that_got_a_bomb_goes_on() {
     server.post("/v1/render?size=16", &zipped(&[("cube.obj", CUBE_OBJ)])).picture(16, 16);
     let limits = server.get("/v1/capabilities").json()["limits"].take();
     assert_eq!((&limits["bundle_bytes"], &limits["bundle_entries"]), (&1_000_000.into(), &3.into()));
+}
+
+/// Every archive that is nearly right: whatever it is taken for, nobody panics over it, and it ends soon.
+#[test]
+fn damaged_archives_never_panic() {
+    let mtl: &[u8] = b"newmtl A\nKd 0.5\nmap_Kd -s 2 2 1 a.png\nd 0.5\nnewmtl B\nPr 0.5\nnorm -bm 2 a.png\n";
+    let obj: &[u8] = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl A\nf 1/1 2/1 3/1\nusemtl B\nf 3 2 1\n";
+    let honest =
+        archive(&[Raw::stored("m.obj", obj), Raw::deflated("m.mtl", mtl), Raw::stored("a.png", b"\x89PNG")], 3);
+    assert!(read_bundle(&Bundle::of_one(honest.clone())).is_ok());
+    let limits = Limits { memory_bytes: 64 << 20, ..Limits::default() };
+    let began = Instant::now();
+    let mut noise = Noise(7);
+    let mut random = |below: usize| (noise.next() >> 33) as usize % below;
+    let (mut read, mut refused) = (0, 0);
+    for _ in 0..20_000 {
+        let mut bytes = honest.clone();
+        for _ in 0..=random(3) {
+            let at = random(bytes.len());
+            match random(5) {
+                0 => bytes[at] = random(256) as u8,
+                1 => bytes[at] ^= 1 << random(8),
+                2 => bytes[at] = [0, 0xff, 0x7f, 0x80][random(4)],
+                3 => drop(bytes.drain(at..(at + 1 + random(8)).min(bytes.len()))),
+                _ => bytes.splice(at..at, [random(256) as u8; 4]).for_each(drop),
+            }
+        }
+        // Said to be an archive, since its first bytes may be gone as well.
+        match import(&Bundle::zip(bytes), None, &limits, &mut Budget::new(&limits), &Deadline::default()) {
+            Ok(_) => read += 1,
+            Err(error) => {
+                assert!(!error.detail.is_empty() && error.detail.len() < 2000, "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert_eq!(read + refused, 20_000);
+    assert!(read > 500 && refused > 500, "{read} read, {refused} refused");
+    assert!(began.elapsed() < Duration::from_secs(60), "{:?}", began.elapsed());
 }

@@ -5,6 +5,7 @@ use meshsnap::mesh::{Bundle, Mesh, MeshError, MeshFault};
 use std::time::{Duration, Instant};
 
 use crate::bundles::{files, read_bundle};
+use crate::mesh_files::Noise;
 
 /// A triangle in each of three materials.
 const OBJ: &[u8] =
@@ -208,4 +209,63 @@ fn broken_and_hostile_libraries() {
     let error = read_bundle(&Bundle::of_files(files(&[("m.obj", obj.as_bytes()), ("x.mtl", mtl.as_bytes())])));
     assert!(matches!(error.unwrap_err().fault, MeshFault::Limit(_)));
     assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
+}
+
+/// Statements thrown together, some of them cut: each is read or passed over.
+#[test]
+fn soups_of_statements_are_read() {
+    const WORDS: [&str; 30] = [
+        "newmtl",
+        "A",
+        "B",
+        "\n",
+        "\n",
+        "\n",
+        "Kd",
+        "Ke",
+        "d",
+        "Tr",
+        "Ns",
+        "Pm",
+        "Pr",
+        "map_Kd",
+        "map_d",
+        "map_Ke",
+        "norm",
+        "-s",
+        "-o",
+        "-clamp",
+        "on",
+        "-bm",
+        "0.5",
+        "1",
+        "-1e30",
+        "nan",
+        "a.png",
+        "tex/n.png",
+        "\\\n",
+        "#",
+    ];
+    let mut noise = Noise(3);
+    let mut textured = 0;
+    for _ in 0..5_000 {
+        let mut text = "newmtl A\n".to_owned();
+        for _ in 0..60 {
+            text += WORDS[(noise.next() >> 33) as usize % WORDS.len()];
+            text += " ";
+        }
+        let mesh = read_mtl(text.as_bytes()).unwrap();
+        for slot in &mesh.materials {
+            let textures = [slot.base_texture, slot.emissive_texture, slot.normal_texture];
+            for texture in textures.into_iter().flatten() {
+                assert!((texture.image as usize) < mesh.images.len(), "{text}");
+                assert!(texture.transform.iter().flatten().all(|v| v.is_finite()), "{text}");
+                textured += 1;
+            }
+            let factors = [slot.metallic, slot.roughness, slot.base_color.map(|c| c[3])];
+            assert!(factors.into_iter().flatten().all(|v| (0.0..=1.0).contains(&v)), "{text}");
+            assert!(slot.emissive.iter().flatten().all(|v| v.is_finite() && *v >= 0.0), "{text}");
+        }
+    }
+    assert!(textured > 500, "{textured}");
 }
