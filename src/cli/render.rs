@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 use clap::Args;
 
 use super::complaint::Complaint;
-use super::files;
 use super::progress::Progress;
 use super::settings::LimitSettings;
+use super::{bundle, files};
 use crate::backend::{Backends, GpuHost, GpuStatus, HardwareHint};
 use crate::config::{cores, why_no_gpu};
 use crate::image::ImageFormat;
@@ -23,7 +23,7 @@ use crate::telemetry;
 /// Arguments of `render`.
 #[derive(Args)]
 pub struct RenderArgs {
-    /// Mesh file (OBJ, STL, glTF, GLB), `-` for standard input
+    /// Mesh file (OBJ, STL, glTF, GLB) and the files it refers to, or a .zip of them; `-` for standard input
     #[arg(required = true, value_name = "MESH")]
     meshes: Vec<String>,
     /// Image file, `-` for standard output; its extension chooses the format unless --format does
@@ -50,6 +50,9 @@ pub struct RenderArgs {
     /// Format of the mesh, where its bytes do not tell: obj, gltf, glb or stl
     #[arg(long, value_name = "FORMAT")]
     format_in: Option<String>,
+    /// Which of several files is the mesh, where more than one could be
+    #[arg(long, value_name = "FILE")]
+    entry: Option<String>,
     #[arg(long, help = format!("Who draws: {}", one_of::<BackendChoice>()))]
     backend: Option<String>,
     /// Samples a pixel: 1 or 4
@@ -73,20 +76,18 @@ fn one_of<T: Words>() -> String {
     words_of::<T>().join(", ")
 }
 
-/// Draws one mesh into one file.
+/// Draws one mesh, with what belongs to it, into one file.
 pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
     let filter = std::env::var("MESHSNAP_LOG").unwrap_or_default();
     let filter = if filter.is_empty() { "warn" } else { &filter };
     telemetry::init(filter, Some(false)).map_err(Complaint::usage)?;
-    let [mesh_name] = arguments.meshes.as_slice() else {
-        return Err(Complaint::usage("give one MESH: this version draws one file at a time"));
-    };
+    let mesh_name = bundle::name(&arguments.meshes);
     let limits = arguments.limits.config().limits;
     let format_in = format_in(arguments.format_in.as_deref())?;
     let spec = read_spec(arguments, &limits)?;
 
     let progress = Progress::start("reading");
-    let mesh = files::read(mesh_name, limits.memory_bytes)?;
+    let bundle = bundle::read(&arguments.meshes, arguments.entry.clone(), &limits)?;
     progress.next("parsing");
     let began = Instant::now();
     let (mut times, mut stage_began) = (Vec::new(), began);
@@ -98,7 +99,7 @@ pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
     let threads = arguments.threads.unwrap_or(cores() as usize);
     let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));
     let mut backends = Backends::new(gpu.clone(), threads);
-    let job = Job { mesh: &mesh, format_in, spec: &spec };
+    let job = Job { bundle: &bundle, format_in, spec: &spec };
     let output = pipeline::render(job, &mut backends, &limits, &Deadline::default(), &mut ended)
         .map_err(|error| Complaint::from(error).about(mesh_name))?;
     drop(progress);

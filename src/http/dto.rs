@@ -216,6 +216,8 @@ struct LimitsDto {
     nodes: u64,
     json_depth: u64,
     image_px: u64,
+    bundle_bytes: u64,
+    bundle_entries: u64,
     job_ms: u64,
     queue_per_worker: u64,
 }
@@ -223,8 +225,8 @@ struct LimitsDto {
 impl CapabilitiesDto {
     /// What this process can do.
     pub fn new(limits: &Limits, backend: BackendDto, workers: u64, load: Load) -> Self {
-        let Limits { body_bytes, memory_bytes, triangles, nodes, json_depth, image_px, job_ms, queue_per_worker } =
-            *limits;
+        let Limits { body_bytes, memory_bytes, triangles, nodes, json_depth, image_px, .. } = *limits;
+        let Limits { bundle_bytes, bundle_entries, job_ms, queue_per_worker, .. } = *limits;
         Self {
             version: env!("CARGO_PKG_VERSION"),
             mesh_formats: Format::NAMES,
@@ -248,6 +250,8 @@ impl CapabilitiesDto {
                 nodes,
                 json_depth,
                 image_px,
+                bundle_bytes,
+                bundle_entries,
                 job_ms,
                 queue_per_worker,
             },

@@ -13,7 +13,7 @@ fn bad_forms_are_refused_precisely() {
         (form(&[("request", b"{}")]), 400, "bad_form"),
         (form(&[("file", CUBE_OBJ), ("other", b"")]), 400, "bad_form"),
         (form(&[("file", CUBE_OBJ), ("request", b"{}"), ("request", b"{}")]), 400, "bad_form"),
-        (form(&[("file", CUBE_OBJ), ("file", CUBE_OBJ)]), 415, "bundle_not_supported"),
+        (form(&[("file", CUBE_OBJ), ("file", CUBE_OBJ)]), 400, "bad_form"),
         (form(&[("file", CUBE_OBJ), ("request", b"{")]), 400, "not_json"),
         (form(&[("file", CUBE_OBJ), ("request", br#"{"sise":1}"#)]), 400, "unknown_key"),
         (form(&[("file", CUBE_OBJ)])[..40].to_vec(), 400, "bad_form"),
@@ -90,9 +90,9 @@ fn bytes_that_are_no_mesh_are_a_precise_4xx() {
     assert!((400..500).contains(&server.post("/v1/render", &glb).status));
     // Comments alone could be anything; said to be an OBJ, they are an OBJ without a mesh.
     server.post("/v1/render?format_in=obj", b"# nothing\n# at all\n").problem(422, "mesh_empty");
-    server.post("/v1/render", b"PK\x03\x04 a zip by its bytes").problem(415, "bundle_not_supported");
+    server.post("/v1/render", b"PK\x03\x04 a zip by its bytes").problem(422, "bundle_broken");
     let zip = ["Content-Type: application/zip"];
-    server.request("POST", "/v1/render", &zip, CUBE_OBJ).problem(415, "bundle_not_supported");
+    server.request("POST", "/v1/render", &zip, CUBE_OBJ).problem(422, "bundle_broken");
     let gzip = ["Content-Encoding: gzip"];
     server.request("POST", "/v1/render", &gzip, CUBE_OBJ).problem(415, "content_encoding");
 }

@@ -3,6 +3,9 @@
 // Helpers outside of #[test] functions may give up as loudly as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod bundles;
+mod bundles_http;
+mod bundles_zip;
 mod cli;
 mod examples;
 mod formats;
@@ -10,6 +13,7 @@ mod formats_bad;
 mod formats_gltf;
 mod formats_gltf_document;
 mod formats_hostile;
+mod formats_mtl;
 mod formats_obj;
 mod formats_polygons;
 mod formats_shared;

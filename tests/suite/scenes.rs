@@ -1,7 +1,7 @@
 //! The fixed scenes that every back-end draws, and how to make a mesh, a spec and a plan in a test.
 
 use meshsnap::limits::{BackendChoice, Budget, Deadline, Limits};
-use meshsnap::mesh::{self, Mesh};
+use meshsnap::mesh::{self, Bundle, Mesh};
 use meshsnap::plan::{self, DrawPlan, Faces, MaterialLook, Projection, SurfacePass};
 use meshsnap::request::{self, Rules};
 use meshsnap::scene::color::Rgba;
@@ -125,7 +125,7 @@ pub fn mesh(obj: &str) -> Mesh {
 /// Imports with default limits.
 pub fn mesh_of(bytes: &[u8]) -> Result<Mesh, mesh::MeshError> {
     let limits = Limits::default();
-    mesh::import(bytes, None, &limits, &mut Budget::new(&limits), &Deadline::default())
+    mesh::import(&Bundle::of_one(bytes.to_vec()), None, &limits, &mut Budget::new(&limits), &Deadline::default())
 }
 
 /// Reads dotted keys that must be good.
