@@ -17,6 +17,8 @@ mod table;
 mod tests;
 #[cfg(test)]
 mod tests_bad;
+#[cfg(test)]
+mod tests_materials;
 mod value;
 mod words;
 

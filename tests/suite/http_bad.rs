@@ -42,6 +42,10 @@ fn bad_queries_are_a_400_that_names_the_key() {
         ("max_error=1", "not_supported_yet", "max_error"),
         ("wire.thickness=inf", "out_of_range", "from 0 to 10"),
         ("camera.eye=1,2,3", "conflicting_keys", "camera.target"),
+        ("materials.Glass%20v2.1.surface.opacity=3", "out_of_range", "`materials.Glass v2.1.surface.opacity`"),
+        ("materials.Glass.opacity=0.3", "unknown_key", "did you mean surface.opacity"),
+        ("light.direction=0,0,0", "out_of_range", "not all zero"),
+        ("wire.method=fwidth&wire.thickness=11", "out_of_range", "from 0 to 10 where"),
         ("format_in=dae", "out_of_range", "obj, gltf, glb, stl"),
         ("background=%00", "out_of_range", "background"),
         ("%ff=%ff", "unknown_key", "no key"),
@@ -52,7 +56,8 @@ fn bad_queries_are_a_400_that_names_the_key() {
         let detail = server.post(&format!("/v1/render?{query}"), CUBE_OBJ).problem(400, code);
         assert!(detail.contains(part), "{query}: {detail}");
     }
-    assert_eq!(cases.len(), 16);
+    assert_eq!(cases.len(), 20);
+    server.post("/v1/render?size=8&materials.Glass%20v2.1.wire=%7B%7D&surface.textures=0", CUBE_OBJ).picture(8, 8);
     server.post("/v1/render?size=8&wire.color=f00&background=%23fff8&format_in=obj", CUBE_OBJ).picture(8, 8);
 }
 
