@@ -7,7 +7,7 @@ use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
 use meshsnap::plan::DrawPlan;
-use meshsnap::scene::{Layers, Spec};
+use meshsnap::scene::{Hidden, Layers, Spec};
 
 use crate::likeness::{Likeness, Tolerance};
 use crate::scenes;
@@ -137,4 +137,25 @@ fn black_by_side(mesh: &Mesh, spec: &Spec) -> [usize; 2] {
         picture.rgba.chunks(4).enumerate().filter(|(i, pixel)| is_there(*i) && is_black(pixel)).count()
     };
     [black(false), black(true)]
+}
+
+#[test]
+fn a_part_that_hides_its_wires_keeps_those_in_front_where_another_shows_all() {
+    let mesh = scenes::mesh(&shapes::two_balls());
+    let mut spec =
+        scenes::spec(&[("style", "wire"), ("wire.method", "fwidth"), ("view", "front"), ("size", "200x160")]);
+    spec.layers.wire.iter_mut().for_each(|wire| wire.hidden = Hidden::Hide);
+    let all_hide = draw(&scenes::plan(&mesh, &spec), "all hide");
+    let mut shows = spec.layers;
+    shows.wire.iter_mut().for_each(|wire| wire.hidden = Hidden::Show);
+    spec.materials = vec![("right".into(), shows)];
+    let plan = scenes::plan(&mesh, &spec);
+    assert!(plan.layers.is_some_and(|layers| layers.wires_only && layers.behind_surface));
+    let one_shows = draw(&plan, "one shows");
+    let differing = |right: bool| {
+        let pixels = all_hide.rgba.chunks(4).zip(one_shows.rgba.chunks(4)).enumerate();
+        pixels.filter(|(i, (a, b))| (i % 200 >= 100) == right && a != b).count()
+    };
+    assert_eq!(differing(false), 0);
+    assert!(differing(true) > 300, "{} pixels", differing(true));
 }

@@ -9,6 +9,7 @@ mod buffers;
 mod device;
 mod look;
 mod params;
+mod passes;
 mod recorder;
 mod schedule;
 mod stages;

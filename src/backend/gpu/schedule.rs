@@ -5,9 +5,10 @@
 //! long and the deadline is looked at in between.
 
 use super::params::{Batch, faces_code, line_flags};
+use super::passes::Pass;
 use super::stages::{Into, Stage, Write};
-use super::tiles::{ITERATIONS_MAX, Tiles};
-use crate::plan::{DrawPlan, Faces, LinePass, roles};
+use super::tiles::{Tiles, edges_per_group};
+use crate::plan::{DrawPlan, roles};
 
 /// Largest buffer that depends on the picture's size, bytes.
 const BAND_BYTES: u64 = 64 << 20;
@@ -31,7 +32,7 @@ pub const LAYERED_BYTES: u64 = 32;
 const EDGE_CHUNK: u32 = 1 << 20;
 
 /// Threads of a workgroup, in every kernel.
-const WORKGROUP: u32 = 64;
+pub const WORKGROUP: u32 = 64;
 
 /// What a device allows, and which way it goes.
 #[derive(Clone, Copy, Debug)]
@@ -158,8 +159,7 @@ impl Schedule {
     }
 
     fn visibility(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2]) {
-        let hull = Pass::hull(plan).filter(|_| !plan.has_layered_hull());
-        self.triangles(plan, device, rows, (Into::Surface, 0), [Pass::surface(plan, roles::SURFACE), hull]);
+        self.triangles(plan, device, rows, (Into::Surface, 0), Pass::of_surface(plan));
     }
 
     /// One round a layer; a round does nothing where the one before has left nothing to find.
@@ -171,16 +171,13 @@ impl Schedule {
             Goal::Layer(layer) => layer + 1,
         };
         self.layers = rounds;
-        // Without roles, nothing is a layer.
-        let surface = Pass::surface(plan, roles::LAYER).filter(|_| !plan.roles.is_empty());
-        let hull = Pass::hull(plan).filter(|_| plan.has_layered_hull());
         let count = plan.width_px * (rows[1] - rows[0]);
         // A layer that is wanted for itself is not shaded: then no sample is done before its last triangle.
         let role = if goal == Goal::Picture { u32::from(roles::LAYER) } else { 0 };
         let mut ends = Vec::new();
         for layer in 0..rounds {
             self.steps.push(Step::ClearLayer);
-            self.triangles(plan, device, rows, (Into::Layer, layer), [surface, hull]);
+            self.triangles(plan, device, rows, (Into::Layer, layer), Pass::of_layers(plan));
             let batch = Batch { count, row_first: rows[0], row_end: rows[1], role, layer, ..Batch::default() };
             self.dispatch(device, Stage::Layers, count, batch);
             self.steps.push(Step::Submit);
@@ -293,39 +290,6 @@ impl Schedule {
             self.batches.push(batch);
         }
     }
-}
-
-/// Triangles that are drawn for the same reason.
-#[derive(Clone, Copy)]
-struct Pass {
-    id_base: u32,
-    vertex_base: u32,
-    faces: Faces,
-    role: u8,
-}
-
-impl Pass {
-    fn surface(plan: &DrawPlan<'_>, role: u8) -> Option<Self> {
-        plan.surface.as_ref().map(|s| Self { id_base: 0, vertex_base: 0, faces: s.faces, role })
-    }
-
-    fn hull(plan: &DrawPlan<'_>) -> Option<Self> {
-        let (id_base, vertex_base) = (plan.triangles.len() as u32, plan.positions.len() as u32);
-        plan.hull.as_ref().map(|_| Self { id_base, vertex_base, faces: Faces::Back, role: roles::HULL })
-    }
-}
-
-/// Edges that a workgroup draws: all its threads draw the long ones together, each one's share of which is bounded.
-fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> u32 {
-    if !device.loops_are_limited {
-        return WORKGROUP;
-    }
-    let reach = f64::from(0.5 * lines.width_px + 0.5 * lines.smoothing_px + 1.0);
-    let side = f64::from(plan.width_px.max(plan.height_px));
-    // In every eighth row, every eighth column of what is in reach, and the samples of each pixel.
-    let pixels = (side + 2.0 * reach) / 8.0 * (2.0 * reach / 8.0 + 2.0) + side / 8.0;
-    let iterations = pixels * f64::from(plan.samples + 2);
-    (ITERATIONS_MAX as f64 / iterations).clamp(1.0, f64::from(WORKGROUP)) as u32
 }
 
 /// Bytes a pixel of the largest buffer that holds a band.

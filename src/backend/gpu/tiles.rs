@@ -1,7 +1,8 @@
-//! How often the kernel that draws large triangles is run, and over how many each time.
+//! How much a thread is given at a time: how often the kernel that draws large triangles is run, and how many edges one that
+//! draws lines takes.
 
-use super::schedule::DeviceTraits;
-use crate::plan::DrawPlan;
+use super::schedule::{DeviceTraits, WORKGROUP};
+use crate::plan::{DrawPlan, LinePass};
 
 /// Sample tests that may be handed to the device without looking at how many it really is: a second or so of work.
 const BLIND_TESTS_MAX: u64 = 1 << 38;
@@ -10,7 +11,7 @@ const BLIND_TESTS_MAX: u64 = 1 << 38;
 ///
 /// llvmpipe (Mesa 22) leaves all loops of a thread after 65,535 iterations, silently; and on real devices a dispatch
 /// should end in time for the deadline.
-pub const ITERATIONS_MAX: u64 = 40_000;
+const ITERATIONS_MAX: u64 = 40_000;
 
 /// How the tile kernel is run: at once over whatever is in the work list, or, where that might take too long, in rounds
 /// whose number follows from the list's length, which is read back first.
@@ -52,6 +53,19 @@ impl Tiles {
             .chain(ranges(huge, huge_step).map(|range| [0..0, range]))
             .collect()
     }
+}
+
+/// Edges that a workgroup draws: all its threads draw the long ones together, each one's share of which is bounded.
+pub fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> u32 {
+    if !device.loops_are_limited {
+        return WORKGROUP;
+    }
+    let reach = f64::from(0.5 * lines.width_px + 0.5 * lines.smoothing_px + 1.0);
+    let side = f64::from(plan.width_px.max(plan.height_px));
+    // In every eighth row, every eighth column of what is in reach, and the samples of each pixel.
+    let pixels = (side + 2.0 * reach) / 8.0 * (2.0 * reach / 8.0 + 2.0) + side / 8.0;
+    let iterations = pixels * f64::from(plan.samples + 2);
+    (ITERATIONS_MAX as f64 / iterations).clamp(1.0, f64::from(WORKGROUP)) as u32
 }
 
 #[cfg(test)]
