@@ -14,10 +14,10 @@ use crate::backend::{Backends, GpuHost, GpuStatus, HardwareHint};
 use crate::config::{cores, why_no_gpu};
 use crate::image::ImageFormat;
 use crate::limits::{BackendChoice, Deadline, Limits};
-use crate::mesh::Format;
+use crate::mesh::{Format, UpAxis};
 use crate::pipeline::{self, Job, Output, Stage};
-use crate::request::{self, Rules};
-use crate::scene::Spec;
+use crate::request::{self, Rules, Style, Words, words_of};
+use crate::scene::{Spec, View};
 use crate::telemetry;
 
 /// Arguments of `render`.
@@ -29,26 +29,23 @@ pub struct RenderArgs {
     /// Image file, `-` for standard output; its extension chooses the format unless --format does
     #[arg(short, long, value_name = "OUT")]
     output: String,
-    /// Preset: flat, smooth, unlit, wire, wireframe, outline or hidden-line
-    #[arg(long)]
+    #[arg(long, help = format!("Preset: {}", one_of::<Style>()))]
     style: Option<String>,
-    /// Request document
+    /// Request document (JSON; `meshsnap serve` has its schema at /v1/schema)
     #[arg(long, value_name = "FILE.json")]
     request: Option<PathBuf>,
-    /// Dotted key of the request document, such as wire.color=#f00; may be repeated
+    /// Dotted key of the request document, such as wire.color=#f00, outline={}, wire=null or
+    /// materials.Glass.surface.opacity=0.3; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// N or WxH, in pixels
     #[arg(long, value_name = "N|WxH")]
     size: Option<String>,
-    /// iso, front, back, left, right, top or bottom
-    #[arg(long)]
+    #[arg(long, help = format!("Named direction: {}", one_of::<View>()))]
     view: Option<String>,
-    /// Axis that points up: y, z, -y, -z, x or -x
-    #[arg(long, allow_hyphen_values = true)]
+    #[arg(long, allow_hyphen_values = true, help = format!("Axis that points up: {}", one_of::<UpAxis>()))]
     up: Option<String>,
-    /// png, webp or jpeg
-    #[arg(long)]
+    #[arg(long, help = format!("Image format: {}", one_of::<ImageFormat>()))]
     format: Option<String>,
     /// Format of the mesh, where its bytes do not tell: obj, gltf, glb or stl
     #[arg(long, value_name = "FORMAT")]
@@ -56,10 +53,9 @@ pub struct RenderArgs {
     /// Which of several files is the mesh, where more than one could be
     #[arg(long, value_name = "FILE")]
     entry: Option<String>,
-    /// auto, gpu or cpu
-    #[arg(long)]
+    #[arg(long, help = format!("Who draws: {}", one_of::<BackendChoice>()))]
     backend: Option<String>,
-    /// Samples a pixel
+    /// Samples a pixel: 1 or 4
     #[arg(long)]
     samples: Option<String>,
     /// #rgb, #rrggbb, #rrggbbaa or transparent
@@ -73,6 +69,11 @@ pub struct RenderArgs {
     explain: bool,
     #[command(flatten)]
     limits: LimitSettings,
+}
+
+/// The words of the request document, for a line of help.
+fn one_of<T: Words>() -> String {
+    words_of::<T>().join(", ")
 }
 
 /// Draws one mesh, with what belongs to it, into one file.

@@ -1,8 +1,11 @@
 //! What goes over the wire as JSON. Domain types do not serialise themselves.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::error::ApiError;
+use super::schema;
 use crate::backend::GpuStatus;
 use crate::image::ImageFormat;
 use crate::jobs::{Job, Load, State, Timings};
@@ -154,7 +157,9 @@ pub struct CapabilitiesDto {
     mesh_formats: [&'static str; 4],
     image_formats: [&'static str; 3],
     styles: Vec<&'static str>,
+    schema: &'static str,
     request_keys: Vec<&'static str>,
+    request_words: BTreeMap<&'static str, Vec<&'static str>>,
     backend: BackendDto,
     workers: u64,
     load: LoadDto,
@@ -227,7 +232,9 @@ impl CapabilitiesDto {
             mesh_formats: Format::NAMES,
             image_formats: ["png", "webp", "jpeg"],
             styles: words_of::<Style>(),
+            schema: schema::PATH,
             request_keys: request::keys(),
+            request_words: request::vocabulary(),
             backend,
             workers,
             load: LoadDto {
