@@ -51,5 +51,5 @@ fn group_color(id: u32, pixel: vec2<i32>, offset_sum: vec2<i32>, count: i32) -> 
     }
     let share = select(select(select(0.25, 1.0 / 3.0, count == 3), 0.5, count == 2), 1.0, count == 1);
     let scale = 16.0 * share;
-    return point_color(id, vec2<f32>(pixel_corner(pixel)) + vec2<f32>(offset_sum) * scale);
+    return point_color(id, vec2<f32>(pixel_corner(pixel)) + rn2(vec2<f32>(offset_sum) * scale));
 }

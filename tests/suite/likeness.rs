@@ -39,6 +39,11 @@ impl Likeness {
         like
     }
 
+    /// Pixels that differ at all.
+    pub fn differing(&self) -> usize {
+        self.differing
+    }
+
     /// Panics where the tolerance is broken.
     pub fn assert(&self, tolerance: Tolerance, what: &str) {
         println!("{what:32} {self}");

@@ -30,4 +30,6 @@ mod shared;
 mod soups;
 mod structure;
 mod twins;
+mod twins_shade;
 mod twins_visibility;
+mod wire_formulas;

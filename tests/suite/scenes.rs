@@ -4,7 +4,7 @@ use meshsnap::limits::{BackendChoice, Budget, Deadline, Limits};
 use meshsnap::mesh::{self, Mesh};
 use meshsnap::plan::{self, DrawPlan, Faces, MaterialLook, Projection, SurfacePass};
 use meshsnap::request::{self, Rules};
-use meshsnap::scene::Spec;
+use meshsnap::scene::{DebugView, Spec};
 
 use crate::shapes;
 
@@ -13,6 +13,8 @@ pub struct Scene {
     pub name: &'static str,
     pub obj: fn() -> String,
     pub keys: &'static [(&'static str, &'static str)],
+    /// What no key says.
+    pub adjust: fn(&mut Spec),
 }
 
 const SIZE: (&str, &str) = ("size", "200x160");
@@ -36,7 +38,23 @@ pub const SCENES: &[Scene] = &[
     scene("sheet-orthographic", sheet, &[SIZE, ("style", "wire"), ("camera.projection", "orthographic")]),
     scene("sheet-from-inside", sheet, INSIDE),
     scene("sheet-wire-from-inside", sheet, INSIDE_WIRE),
+    scene("torus-derivative", torus, &[SIZE, ("style", "flat"), ("surface.normals", "derivative"), METAL]),
+    scene("gear-metal", gear, &[SIZE, ("style", "flat"), METAL, ("surface.color", "d9a441"), SHINY]),
+    scene("torus-metal", torus, &[SIZE, ("style", "smooth"), METAL, ("light.preset", "three-point"), SHINY]),
+    scene("sheet-threshold", sheet, &[SIZE, ("style", "wire"), ("wire.method", "threshold"), ("samples", "1")]),
+    scene("gear-fwidth-min", gear, &[SIZE, ("style", "wire"), ("wire.method", "fwidth-min"), ("view", "front")]),
+    adjusted("gear-barycentric-lit", gear, BARYCENTRIC_RED, |spec| spec.layers.wire.as_mut().unwrap().lit = true),
+    adjusted("torus-debug-normal", torus, &[SIZE, ("style", "smooth")], |spec| debug(spec, DebugView::Normal)),
+    adjusted("gear-debug-edge-distance", gear, &[SIZE], |spec| debug(spec, DebugView::EdgeDistance)),
+    adjusted("sheet-debug-barycentric", sheet, INSIDE, |spec| debug(spec, DebugView::Barycentric)),
+    adjusted("sheet-debug-face-orientation", sheet, LOW, |spec| debug(spec, DebugView::FaceOrientation)),
 ];
+
+const METAL: (&str, &str) = ("surface.metallic", "1");
+const SHINY: (&str, &str) = ("surface.roughness", "0.25");
+const LOW: &[(&str, &str)] = &[SIZE, ("style", "flat"), ("camera.elevation_deg", "-4")];
+const BARYCENTRIC_RED: &[(&str, &str)] =
+    &[SIZE, ("style", "wire"), ("wire.method", "barycentric"), ("wire.color", "c02020"), ("wire.thickness", "3")];
 
 const INSIDE: &[(&str, &str)] = &[
     SIZE,
@@ -54,7 +72,20 @@ const INSIDE_WIRE: &[(&str, &str)] = &[
 ];
 
 const fn scene(name: &'static str, obj: fn() -> String, keys: &'static [(&'static str, &'static str)]) -> Scene {
-    Scene { name, obj, keys }
+    Scene { name, obj, keys, adjust: |_| {} }
+}
+
+const fn adjusted(
+    name: &'static str,
+    obj: fn() -> String,
+    keys: &'static [(&'static str, &'static str)],
+    adjust: fn(&mut Spec),
+) -> Scene {
+    Scene { name, obj, keys, adjust }
+}
+
+fn debug(spec: &mut Spec, view: DebugView) {
+    spec.layers.surface.as_mut().unwrap().debug = view;
 }
 
 fn torus() -> String {

@@ -52,7 +52,7 @@ pub enum Slot {
     Samples,
     Work,
     Normals,
-    NormalTriangles,
+    CornerTriangles,
     Attributes,
     Colors,
     Edges,
@@ -63,10 +63,13 @@ pub enum Slot {
     Materials,
     FaceNormals,
     LineColors,
+    Uvs,
+    VertexColors,
+    Texels,
 }
 
 /// Number of [`Slot`]s.
-pub const SLOTS: usize = 18;
+pub const SLOTS: usize = 21;
 
 /// Whether a kernel writes to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -133,8 +136,10 @@ const SAMPLES: &str = include_str!("../../../shaders/samples.wgsl");
 /// The shade stage: from where a point lies to its colour.
 const SHADE: &[&str] = &[
     include_str!("../../../shaders/barycentric.wgsl"),
+    include_str!("../../../shaders/texture.wgsl"),
     include_str!("../../../shaders/light.wgsl"),
     include_str!("../../../shaders/wire.wgsl"),
+    include_str!("../../../shaders/debug.wgsl"),
     include_str!("../../../shaders/point.wgsl"),
     include_str!("../../../shaders/shade.wgsl"),
 ];
@@ -162,10 +167,13 @@ impl Stage {
                 (Slot::Vertices, Read),
                 (Slot::Samples, Read),
                 (Slot::Normals, Read),
-                (Slot::NormalTriangles, Read),
+                (Slot::CornerTriangles, Read),
                 (Slot::Attributes, Read),
                 (Slot::Materials, Read),
                 (Slot::FaceNormals, Read),
+                (Slot::Uvs, Read),
+                (Slot::VertexColors, Read),
+                (Slot::Texels, Read),
                 (Slot::Colors, ReadWrite),
             ],
             Self::Lines => &[
@@ -222,11 +230,14 @@ impl Stage {
 
     /// The flags that the kernel reads; there is a pipeline for every combination that a plan asks for.
     fn looks(self) -> u32 {
-        const SHADED: u32 = look::SURFACE | look::FACE_NORMALS | look::VERTEX_NORMALS | look::WIRES;
+        const NORMALS: u32 = look::FACE_NORMALS | look::VERTEX_NORMALS | look::DERIVATIVE_NORMALS;
+        const WIRES: u32 = look::WIRES | look::WIRE_MINIMUM | look::WIRE_LIT | look::EDGE_MASKS;
+        const PAINT: u32 = look::VERTEX_COLORS | look::UVS | look::TEXTURES | look::DEBUG | look::VARYING;
+        const SHADED: u32 = look::SURFACE | look::TRIANGLE_MATERIALS | NORMALS | WIRES | PAINT;
         match self {
             Self::Transform | Self::Clip => look::HULL_PX,
             Self::Visibility { .. } | Self::VisibilityTile { .. } => look::FOUR_SAMPLES,
-            Self::Shade => SHADED | look::TRIANGLE_MATERIALS | look::EDGE_MASKS | look::CLIPPED | look::FOUR_SAMPLES,
+            Self::Shade => SHADED | look::CLIPPED | look::FOUR_SAMPLES,
             Self::Lines => look::CLIPPED | look::FOUR_SAMPLES,
             Self::Resolve => look::SURFACE | look::HULL | look::LINES,
         }
