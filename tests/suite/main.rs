@@ -29,6 +29,7 @@ mod shapes;
 mod shared;
 mod soups;
 mod structure;
+mod texture_formulas;
 mod twins;
 mod twins_shade;
 mod twins_visibility;
