@@ -17,10 +17,12 @@ const POSITIONS: [[f32; 3]; 4] = [[-8.0, -8.0, 0.5], [8.0, -8.0, 0.5], [8.0, 8.0
 const TRIANGLES: [[u32; 3]; 2] = [[0, 2, 1], [0, 3, 2]];
 const ONE: u16 = 0x3C00;
 
+/// Where texture coordinates begin and how they step, in texels; the sampler; and the texel that is in column or row k.
+type Case = (f32, f32, u32, fn(i32) -> i32);
+
 #[test]
 fn texels_are_where_they_belong() {
-    // Upper left corner of the picture, step a pixel, in texels; what is drawn in column and row k.
-    let cases: [(f32, f32, u32, fn(i32) -> i32); 5] = [
+    let cases: [Case; 5] = [
         (0.0, 1.0, 0, |k| k),
         (-20.0, 1.0, 0, |k| (k - 20).rem_euclid(16)),
         (-20.0, 1.0, 5, |k| {

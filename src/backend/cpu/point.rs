@@ -7,12 +7,18 @@ use super::light::{Light, light};
 use super::texture::{Uv, blend, sample};
 use super::transform::ScreenVertex;
 use super::visibility::area;
-use super::wire::{Place, wire_cover};
+use super::wire::{Place, edge_mask, fwidth_cover, wire_cover};
 use crate::plan::{MaterialLook, SurfacePass, TEXTURE_NONE, flags, slots};
 
-/// What changes from point to point of a triangle, textures aside.
-const VARYING: u32 =
-    flags::VERTEX_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_COLORS | flags::WIRES | flags::DEBUG;
+/// What the common looks do without, textures aside.
+const RICH: u32 = flags::DERIVATIVE_NORMALS
+    | flags::VERTEX_COLORS
+    | flags::DEBUG
+    | flags::WIRE_LIT
+    | (flags::WIRES & !flags::WIRE_FWIDTH);
+
+/// What changes from point to point of a triangle in a common look.
+const VARYING: u32 = flags::VERTEX_NORMALS | flags::WIRE_FWIDTH;
 
 /// What decides by barycentrics rather than blends, textures aside: there both back-ends need the same bits.
 const DECIDING: u32 = flags::VERTEX_COLORS | flags::WIRE_THRESHOLD | flags::DEBUG;
@@ -40,24 +46,45 @@ impl<'a> PointShader<'a> {
     }
 
     /// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's centre.
+    #[inline(always)]
     pub fn color(&mut self, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> [f32; 4] {
         let look = surface.material(id as usize);
-        let is_textured = look.textures.iter().any(|used| used.texture != TEXTURE_NONE);
-        if look.flags & VARYING != 0 || is_textured {
-            return self.varying(surface, look, id, at, is_textured);
+        let is_textured =
+            !surface.textures.images.is_empty() && look.textures.iter().any(|used| used.texture != TEXTURE_NONE);
+        if look.flags & RICH != 0 || is_textured {
+            return self.rich(surface, look, id, at, is_textured);
         }
         let base = with_alpha(look, look.base_color);
+        let varies = look.flags & VARYING != 0;
+        let b = if varies { Some(Barycentrics::new(&corners(self.stages, id, at))) } else { None };
         let mut light = Light::NONE;
-        if look.flags & flags::FACE_NORMALS != 0 {
-            let normal = facing(surface.face_normals[id as usize], self.is_front(id, at));
+        if look.flags & LIT != 0 {
+            let normal = match (&b, &surface.vertex_normals) {
+                (Some(b), Some(normals)) if look.flags & flags::VERTEX_NORMALS != 0 => {
+                    let corners = normals.triangles[id as usize].map(|i| normals.values[i as usize]);
+                    facing(blend(corners, b.value), b.front)
+                }
+                (Some(b), _) => facing(surface.face_normals[id as usize], b.front),
+                (None, _) => facing(surface.face_normals[id as usize], self.is_front(id, at)),
+            };
             light = self.light(surface, look.metallic, look.roughness, normal);
         }
         let color = premultiplied(lit(base, light), look.emissive);
-        self.flat = Some((id, color));
-        color
+        match &b {
+            None => {
+                self.flat = Some((id, color));
+                color
+            }
+            Some(b) if look.flags & flags::WIRE_FWIDTH != 0 => {
+                over(fwidth_cover(edge_mask(surface, id), look, b), look.wire_color, color)
+            }
+            Some(_) => color,
+        }
     }
 
-    fn varying(
+    /// Every look there is.
+    #[inline(never)]
+    fn rich(
         &self,
         surface: &SurfacePass<'_>,
         look: &MaterialLook,

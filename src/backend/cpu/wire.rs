@@ -20,17 +20,10 @@ pub struct Place<'a> {
 pub fn wire_cover(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<'_>) -> f32 {
     let mask = edge_mask(surface, place.id);
     let b = &place.b;
-    let (thickness, end) = (look.wire_thickness, look.wire_thickness + look.wire_smoothing);
     if look.flags & flags::WIRE_FWIDTH != 0 {
-        let mut away = 1.0_f32;
-        for i in 0..3 {
-            if is_drawn(mask, i) {
-                let d = b.fwidth(i);
-                away = away.min(smoothstep(thickness * d, end * d, b.value[i]));
-            }
-        }
-        return 1.0 - away;
+        return fwidth_cover(mask, look, b);
     }
+    let (thickness, end) = (look.wire_thickness, look.wire_thickness + look.wire_smoothing);
     let nearest = min_drawn(mask, b.value);
     if look.flags & flags::WIRE_FWIDTH_MIN != 0 {
         // As a GPU's derivatives of the minimum would be: across a corner's bisector they mix two coordinates.
@@ -43,6 +36,20 @@ pub fn wire_cover(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<
         return 1.0 - smoothstep(0.0, 0.1 * thickness, nearest);
     }
     if nearest < 0.02 * thickness { 1.0 } else { 0.0 }
+}
+
+/// The smoothstep of each coordinate by its own exact width, and the minimum of the three.
+#[inline(always)]
+pub fn fwidth_cover(mask: u8, look: &MaterialLook, b: &Barycentrics) -> f32 {
+    let (thickness, end) = (look.wire_thickness, look.wire_thickness + look.wire_smoothing);
+    let mut away = 1.0_f32;
+    for i in 0..3 {
+        if is_drawn(mask, i) {
+            let d = b.fwidth(i);
+            away = away.min(smoothstep(thickness * d, end * d, b.value[i]));
+        }
+    }
+    1.0 - away
 }
 
 /// The edges of a triangle that are drawn: bit i runs from corner i to i + 1.
