@@ -45,7 +45,7 @@ fn group_color(g: Group, pixel: vec2<i32>, show: Show) -> vec4<f32> {
     }
     let share = select(select(select(0.25, 1.0 / 3.0, g.count == 3), 0.5, g.count == 2), 1.0, g.count == 1);
     let scale = 16.0 * share;
-    return point_color(g.id, vec2<f32>(pixel_corner(pixel)) + vec2<f32>(g.offset_sum) * scale, show);
+    return point_color(g.id, vec2<f32>(pixel_corner(pixel)) + rn2(vec2<f32>(g.offset_sum) * scale), show);
 }
 
 fn hull_material(t: u32) -> u32 {

@@ -44,6 +44,11 @@ impl Likeness {
         self.max <= tolerance.max && self.differing as f64 / self.pixels as f64 <= tolerance.share
     }
 
+    /// Pixels that differ at all.
+    pub fn differing(&self) -> usize {
+        self.differing
+    }
+
     /// Panics where the tolerance is broken.
     pub fn assert(&self, tolerance: Tolerance, what: &str) {
         println!("{what:32} {self}");

@@ -37,5 +37,8 @@ mod shared;
 mod skips;
 mod soups;
 mod structure;
+mod texture_formulas;
 mod twins;
+mod twins_shade;
 mod twins_visibility;
+mod wire_formulas;

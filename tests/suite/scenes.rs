@@ -5,7 +5,7 @@ use meshsnap::mesh::{self, Bundle, Mesh};
 use meshsnap::plan::{self, DrawPlan, Faces, MaterialLook, Projection, SurfacePass};
 use meshsnap::request::{self, Rules};
 use meshsnap::scene::color::Rgba;
-use meshsnap::scene::{Layers, Spec};
+use meshsnap::scene::{DebugView, Layers, Spec};
 
 use crate::shapes;
 
@@ -55,6 +55,16 @@ pub const SCENES: &[Scene] = &[
     scene("torus-wire-fwidth-fade", torus, FWIDTH_FILLED),
     edited(scene("two-one-outlined", two, &[SIZE, ("style", "outline"), ("outline.unit", "px")]), left_outlined),
     edited(scene("two-one-glass", two, &[SIZE, ("style", "flat"), ("view", "left")]), left_glass),
+    scene("torus-derivative", torus, &[SIZE, ("style", "flat"), ("surface.normals", "derivative"), METAL]),
+    scene("gear-metal", gear, &[SIZE, ("style", "flat"), METAL, ("surface.color", "d9a441"), SHINY]),
+    scene("torus-metal", torus, &[SIZE, ("style", "smooth"), METAL, ("light.preset", "three-point"), SHINY]),
+    scene("sheet-threshold", sheet, &[SIZE, ("style", "wire"), ("wire.method", "threshold"), ("samples", "1")]),
+    scene("gear-fwidth-min", gear, &[SIZE, ("style", "wire"), ("wire.method", "fwidth-min"), ("view", "front")]),
+    edited(scene("gear-barycentric-lit", gear, BARYCENTRIC_RED), |spec| spec.layers.wire.as_mut().unwrap().lit = true),
+    edited(scene("torus-debug-normal", torus, &[SIZE, ("style", "smooth")]), |spec| debug(spec, DebugView::Normal)),
+    edited(scene("gear-debug-edge-distance", gear, &[SIZE]), |spec| debug(spec, DebugView::EdgeDistance)),
+    edited(scene("sheet-debug-barycentric", sheet, INSIDE), |spec| debug(spec, DebugView::Barycentric)),
+    edited(scene("sheet-debug-face-orientation", sheet, LOW), |spec| debug(spec, DebugView::FaceOrientation)),
 ];
 
 const FWIDTH_SHOW: &[(&str, &str)] = &[SIZE, ("style", "wireframe"), ("wire.method", "fwidth")];
@@ -62,6 +72,13 @@ const FWIDTH_FADE: &[(&str, &str)] =
     &[SIZE, ("style", "wireframe"), ("wire.method", "fwidth"), ("wire.hidden", "fade"), ("wire.edges", "polygons")];
 const FWIDTH_FILLED: &[(&str, &str)] =
     &[SIZE, ("style", "wire"), ("wire.method", "fwidth"), ("wire.hidden", "fade"), ("wire.edges", "polygons")];
+
+const METAL: (&str, &str) = ("surface.metallic", "1");
+const SHINY: (&str, &str) = ("surface.roughness", "0.25");
+const LOW: &[(&str, &str)] = &[SIZE, ("style", "flat"), ("camera.elevation_deg", "-4")];
+const BARYCENTRIC_RED: &[(&str, &str)] =
+    &[SIZE, ("style", "wire"), ("wire.method", "barycentric"), ("wire.color", "c02020"), ("wire.thickness", "3")];
+
 const INSIDE: &[(&str, &str)] = &[
     SIZE,
     ("style", "smooth"),
@@ -103,6 +120,10 @@ fn left_glass(spec: &mut Spec) {
 
 fn two() -> String {
     shapes::two_balls()
+}
+
+fn debug(spec: &mut Spec, view: DebugView) {
+    spec.layers.surface.as_mut().unwrap().debug = view;
 }
 
 fn torus() -> String {

@@ -20,7 +20,7 @@ use std::sync::Arc;
 pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
-use self::params::{attributes, hull_amounts, hull_looks};
+use self::params::{attributes, corner_triangles, hull_amounts, hull_looks};
 use self::recorder::Recorder;
 use self::schedule::{
     DeviceTraits, Goal, LAYERED_BYTES, Schedule, Step, WORK_HEAD_BYTES, WORK_ITEM_BYTES, has_visibility,
@@ -194,8 +194,18 @@ fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule:
         buffers.upload(gpu, Slot::FaceNormals, bytemuck::cast_slice(surface.face_normals))?;
         if let Some(normals) = &surface.vertex_normals {
             buffers.upload(gpu, Slot::Normals, bytemuck::cast_slice(&normals.values))?;
-            buffers.upload(gpu, Slot::NormalTriangles, bytemuck::cast_slice(normals.triangles))?;
         }
+        if let Some(uvs) = &surface.uvs {
+            buffers.upload(gpu, Slot::Uvs, bytemuck::cast_slice(&uvs.values))?;
+        }
+        if let Some(colors) = &surface.colors {
+            buffers.upload(gpu, Slot::VertexColors, bytemuck::cast_slice(&colors.values))?;
+        }
+        let triangles = corner_triangles(surface).0;
+        let triangles: Vec<&[u8]> = triangles.into_iter().map(bytemuck::cast_slice).collect();
+        buffers.upload_parts(gpu, Slot::CornerTriangles, &triangles)?;
+        let (images, texels) = (&surface.textures.images, &surface.textures.texels);
+        buffers.upload_parts(gpu, Slot::Texels, &[bytemuck::cast_slice(images), bytemuck::cast_slice(texels)])?;
     }
     if !plan.lines.is_empty() {
         let edges: Vec<Edge> = plan.lines.iter().flat_map(|lines| lines.edges.iter().copied()).collect();

@@ -67,7 +67,7 @@ pub enum Slot {
     Samples,
     Work,
     Normals,
-    NormalTriangles,
+    CornerTriangles,
     Attributes,
     Colors,
     Edges,
@@ -78,6 +78,9 @@ pub enum Slot {
     Materials,
     FaceNormals,
     LineColors,
+    Uvs,
+    VertexColors,
+    Texels,
     Roles = 24,
     HullLooks,
     Layer,
@@ -158,8 +161,10 @@ const GROUP: &str = include_str!("../../../shaders/group.wgsl");
 /// What shade and layers have in common: from where a point lies to its colour.
 const SHADE: &[&str] = &[
     include_str!("../../../shaders/barycentric.wgsl"),
+    include_str!("../../../shaders/texture.wgsl"),
     include_str!("../../../shaders/light.wgsl"),
     include_str!("../../../shaders/wire.wgsl"),
+    include_str!("../../../shaders/debug.wgsl"),
     include_str!("../../../shaders/point.wgsl"),
     GROUP,
     LAYERED,
@@ -213,10 +218,13 @@ impl Stage {
                 (Slot::Triangles, Read),
                 (Slot::Vertices, Read),
                 (Slot::Normals, Read),
-                (Slot::NormalTriangles, Read),
+                (Slot::CornerTriangles, Read),
                 (Slot::Attributes, Read),
                 (Slot::Materials, Read),
                 (Slot::FaceNormals, Read),
+                (Slot::Uvs, Read),
+                (Slot::VertexColors, Read),
+                (Slot::Texels, Read),
                 (Slot::Roles, Read),
                 (Slot::HullLooks, Read),
                 (Slot::Layer, Read),
@@ -229,13 +237,16 @@ impl Stage {
                 (Slot::Vertices, Read),
                 (Slot::Samples, Read),
                 (Slot::Normals, Read),
-                (Slot::NormalTriangles, Read),
+                (Slot::CornerTriangles, Read),
                 (Slot::Attributes, Read),
                 (Slot::Materials, Read),
                 (Slot::FaceNormals, Read),
                 (Slot::Roles, Read),
                 (Slot::HullLooks, Read),
                 (Slot::Layered, Read),
+                (Slot::Uvs, Read),
+                (Slot::VertexColors, Read),
+                (Slot::Texels, Read),
                 (Slot::Colors, ReadWrite),
             ],
             Self::Lines => &[
@@ -317,12 +328,14 @@ impl Stage {
 
     /// The flags that the kernel reads; there is a pipeline for every combination that a plan asks for.
     fn looks(self) -> u32 {
+        const NORMALS: u32 = look::FACE_NORMALS | look::VERTEX_NORMALS | look::DERIVATIVE_NORMALS;
+        const WIRES: u32 = look::WIRES | look::WIRE_MINIMUM | look::WIRE_LIT | look::EDGE_MASKS;
+        const PAINT: u32 = look::VERTEX_COLORS | look::UVS | look::TEXTURES | look::DEBUG | look::VARYING;
         const SHADED: u32 = look::SURFACE
-            | look::FACE_NORMALS
-            | look::VERTEX_NORMALS
-            | look::WIRES
             | look::TRIANGLE_MATERIALS
-            | look::EDGE_MASKS
+            | NORMALS
+            | WIRES
+            | PAINT
             | look::CLIPPED
             | look::FOUR_SAMPLES
             | look::HULL_LOOKS
