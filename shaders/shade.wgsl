@@ -16,7 +16,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
     let pixel = vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width);
     if sample_count() == 1 {
         let id = id_at(i);
-        var color = group_color(lone_group(id), pixel, shown(id));
+        var color = group_color(lone_group(id), pixel, surface_show(id));
         if has(LAYERS) {
             color = layered[i].color + (1.0 - layered[i].color.w) * color;
         }
@@ -55,7 +55,7 @@ fn id_at(sample: u32) -> u32 {
 }
 
 // What of its material a surface triangle shows: where layers show wires, not these.
-fn shown(id: u32) -> Show {
+fn surface_show(id: u32) -> Show {
     if has(WIRES_ONLY) && id < frame.triangle_count {
         let role = roles[id / 4u] >> (8u * (id & 3u));
         return Show(true, select(1.0, 0.0, (role & ROLE_LAYER) != 0u));
