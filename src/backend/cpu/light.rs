@@ -22,6 +22,7 @@ impl Light {
 }
 
 /// Light on a surface with unit normal `n`.
+#[inline(always)]
 pub fn light(lights: &Lights, projection: &Projection, metallic: f32, roughness: f32, n: [f32; 3]) -> Light {
     let alpha = (roughness * roughness).max(0.0025);
     let alpha_squared = alpha * alpha;

@@ -46,7 +46,6 @@ impl<'a> PointShader<'a> {
     }
 
     /// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's centre.
-    #[inline(always)]
     pub fn color(&mut self, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> [f32; 4] {
         let look = surface.material(id as usize);
         let is_textured =
@@ -54,32 +53,40 @@ impl<'a> PointShader<'a> {
         if look.flags & RICH != 0 || is_textured {
             return self.rich(surface, look, id, at, is_textured);
         }
+        if look.flags & VARYING != 0 {
+            return self.common(surface, look, id, at);
+        }
         let base = with_alpha(look, look.base_color);
-        let varies = look.flags & VARYING != 0;
-        let b = if varies { Some(Barycentrics::new(&corners(self.stages, id, at))) } else { None };
         let mut light = Light::NONE;
-        if look.flags & LIT != 0 {
-            let normal = match (&b, &surface.vertex_normals) {
-                (Some(b), Some(normals)) if look.flags & flags::VERTEX_NORMALS != 0 => {
-                    let corners = normals.triangles[id as usize].map(|i| normals.values[i as usize]);
-                    facing(blend(corners, b.value), b.front)
-                }
-                (Some(b), _) => facing(surface.face_normals[id as usize], b.front),
-                (None, _) => facing(surface.face_normals[id as usize], self.is_front(id, at)),
-            };
+        if look.flags & flags::FACE_NORMALS != 0 {
+            let normal = facing(surface.face_normals[id as usize], self.is_front(id, at));
             light = self.light(surface, look.metallic, look.roughness, normal);
         }
         let color = premultiplied(lit(base, light), look.emissive);
-        match &b {
-            None => {
-                self.flat = Some((id, color));
-                color
-            }
-            Some(b) if look.flags & flags::WIRE_FWIDTH != 0 => {
-                over(fwidth_cover(edge_mask(surface, id), look, b), look.wire_color, color)
-            }
-            Some(_) => color,
+        self.flat = Some((id, color));
+        color
+    }
+
+    /// One base colour, smooth or with a wire by fwidth.
+    fn common(&self, surface: &SurfacePass<'_>, look: &MaterialLook, id: u32, at: [f32; 2]) -> [f32; 4] {
+        let b = Barycentrics::new(&corners(self.stages, id, at));
+        let base = with_alpha(look, look.base_color);
+        let mut light = Light::NONE;
+        if look.flags & LIT != 0 {
+            let normal = match &surface.vertex_normals {
+                Some(normals) if look.flags & flags::VERTEX_NORMALS != 0 => {
+                    let corners = normals.triangles[id as usize].map(|i| normals.values[i as usize]);
+                    blend(corners, b.value)
+                }
+                _ => surface.face_normals.get(id as usize).copied().unwrap_or(self.stages.plan.projection.to_viewer),
+            };
+            light = self.light(surface, look.metallic, look.roughness, facing(normal, b.front));
         }
+        let color = premultiplied(lit(base, light), look.emissive);
+        if look.flags & flags::WIRE_FWIDTH == 0 {
+            return color;
+        }
+        over(fwidth_cover(edge_mask(surface, id), look, &b), look.wire_color, color)
     }
 
     /// Every look there is.
@@ -129,6 +136,7 @@ impl<'a> PointShader<'a> {
     }
 
     /// What light makes of a colour at a point with this normal.
+    #[inline(always)]
     pub fn light(&self, surface: &SurfacePass<'_>, metallic: f32, roughness: f32, normal: [f32; 3]) -> Light {
         light(&surface.lights, &self.stages.plan.projection, metallic, roughness, normal)
     }
