@@ -3,7 +3,7 @@
 //! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have no diffuse colour, so
 //! they mirror a studio instead: bright above, a little brighter at the horizon, dark below, and blurred by roughness.
 
-use super::point::dot;
+use super::vector::dot;
 use super::wire::smoothstep;
 use crate::plan::{Lights, Projection};
 

@@ -6,6 +6,7 @@ use super::debug;
 use super::light::{Light, light};
 use super::texture::{Uv, blend, sample};
 use super::transform::ScreenVertex;
+use super::vector::{across, cross, dot, sub, unit_or};
 use super::visibility::area;
 use super::wire::{Place, edge_mask, fwidth_cover, wire_cover};
 use crate::plan::{MaterialLook, SurfacePass, TEXTURE_NONE, flags, slots};
@@ -272,32 +273,6 @@ fn facing(n: [f32; 3], front: bool) -> [f32; 3] {
     n.map(|v| v * scale)
 }
 
-fn unit_or(v: [f32; 3], otherwise: [f32; 3]) -> [f32; 3] {
-    let length_squared = dot(v, v);
-    if length_squared > 1e-20 && length_squared < 1e30 { v.map(|c| c / length_squared.sqrt()) } else { otherwise }
-}
-
 fn over(cover: f32, top: [f32; 4], under: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|k| cover * top[k] + under[k] * (1.0 - cover * top[3]))
-}
-
-/// Scalar product.
-pub fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
-}
-
-fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// What of `v` is at right angles to the unit vector `n`, at length about 1 where that is not nothing.
-fn across(v: [f32; 3], n: [f32; 3]) -> [f32; 3] {
-    let largest = v.iter().fold(0.0_f32, |most, c| most.max(c.abs()));
-    let v = if largest > 0.0 { v.map(|c| c / largest) } else { v };
-    let along = dot(v, n);
-    std::array::from_fn(|k| v[k] - along * n[k])
 }
