@@ -44,7 +44,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         if has(LAYERS) {
             weight = dot(rest, select(vec4(0.0), vec4(1.0), group.same));
         }
-        sum += weight * 0.25 * group_color(group, pixel, shown(group.id));
+        sum += weight * 0.25 * group_color(group, pixel, surface_show(group.id));
     }
     colors[i] = sum;
 }

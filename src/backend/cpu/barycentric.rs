@@ -15,6 +15,7 @@ pub struct Corner {
 
 /// The corners of a triangle seen from point `at`. Snapped corners where there are some; where one is behind the eye,
 /// the homogeneous ones, which stay right there.
+#[inline]
 pub fn corners(stages: &Stages<'_>, id: u32, at: [f32; 2]) -> [Corner; 3] {
     let vertices = stages.screen_triangle(id);
     if vertices.iter().any(ScreenVertex::is_outside) {

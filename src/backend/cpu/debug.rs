@@ -2,8 +2,9 @@
 
 use super::barycentric::{Corner, edge_distances_px};
 use super::light::light;
-use super::point::{dot, lit, normal};
+use super::point::{lit, normal};
 use super::texture::{Uv, blend, floor};
+use super::vector::dot;
 use super::wire::{Place, edge_mask, is_drawn};
 use crate::plan::{MaterialLook, SurfacePass, flags};
 

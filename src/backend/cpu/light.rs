@@ -3,7 +3,7 @@
 //! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have no diffuse colour, so
 //! they mirror a studio instead: bright above, a little brighter at the horizon, dark below, and blurred by roughness.
 
-use super::point::dot;
+use super::vector::dot;
 use super::wire::smoothstep;
 use crate::plan::{Lights, Projection};
 
@@ -22,6 +22,7 @@ impl Light {
 }
 
 /// Light on a surface with unit normal `n`.
+#[inline(always)]
 pub fn light(lights: &Lights, projection: &Projection, metallic: f32, roughness: f32, n: [f32; 3]) -> Light {
     let alpha = (roughness * roughness).max(0.0025);
     let alpha_squared = alpha * alpha;

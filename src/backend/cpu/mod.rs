@@ -24,6 +24,7 @@ mod samples;
 mod shade;
 mod texture;
 mod transform;
+mod vector;
 mod visibility;
 mod wire;
 

@@ -6,6 +6,7 @@ use super::debug;
 use super::light::{Light, light};
 use super::texture::{Uv, blend, sample};
 use super::transform::ScreenVertex;
+use super::vector::{across, cross, dot, sub, unit_or};
 use super::visibility::area;
 use super::wire::{Place, edge_mask, fwidth_cover, wire_cover};
 use crate::plan::{MaterialLook, SurfacePass, TEXTURE_NONE, flags, slots};
@@ -62,7 +63,6 @@ impl<'a> PointShader<'a> {
     }
 
     /// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's centre.
-    #[inline(always)]
     pub fn color(&mut self, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> [f32; 4] {
         let look = surface.material(id as usize);
         let is_textured =
@@ -70,32 +70,40 @@ impl<'a> PointShader<'a> {
         if look.flags & RICH != 0 || is_textured {
             return self.rich(surface, look, id, at, is_textured);
         }
+        if look.flags & VARYING != 0 {
+            return self.common(surface, look, id, at);
+        }
         let base = self.with_alpha(look, look.base_color);
-        let varies = look.flags & VARYING != 0;
-        let b = if varies { Some(Barycentrics::new(&corners(self.stages, id, at))) } else { None };
         let mut light = Light::NONE;
-        if look.flags & LIT != 0 {
-            let normal = match (&b, &surface.vertex_normals) {
-                (Some(b), Some(normals)) if look.flags & flags::VERTEX_NORMALS != 0 => {
-                    let corners = normals.triangles[id as usize].map(|i| normals.values[i as usize]);
-                    facing(blend(corners, b.value), b.front)
-                }
-                (Some(b), _) => facing(surface.face_normals[id as usize], b.front),
-                (None, _) => facing(surface.face_normals[id as usize], self.is_front(id, at)),
-            };
+        if look.flags & flags::FACE_NORMALS != 0 {
+            let normal = facing(surface.face_normals[id as usize], self.is_front(id, at));
             light = self.light(surface, look.metallic, look.roughness, normal);
         }
         let color = premultiplied(lit(base, light), look.emissive);
-        match &b {
-            None => {
-                self.flat = Some((id, color));
-                color
-            }
-            Some(b) if look.flags & flags::WIRE_FWIDTH != 0 && self.show.wires > 0.0 => {
-                over(self.show.wires * fwidth_cover(edge_mask(surface, id), look, b), look.wire_color, color)
-            }
-            Some(_) => color,
+        self.flat = Some((id, color));
+        color
+    }
+
+    /// One base colour, smooth or with a wire by fwidth.
+    fn common(&self, surface: &SurfacePass<'_>, look: &MaterialLook, id: u32, at: [f32; 2]) -> [f32; 4] {
+        let b = Barycentrics::new(&corners(self.stages, id, at));
+        let base = self.with_alpha(look, look.base_color);
+        let mut light = Light::NONE;
+        if look.flags & LIT != 0 {
+            let normal = match &surface.vertex_normals {
+                Some(normals) if look.flags & flags::VERTEX_NORMALS != 0 => {
+                    let corners = normals.triangles[id as usize].map(|i| normals.values[i as usize]);
+                    blend(corners, b.value)
+                }
+                _ => surface.face_normals.get(id as usize).copied().unwrap_or(self.stages.plan.projection.to_viewer),
+            };
+            light = self.light(surface, look.metallic, look.roughness, facing(normal, b.front));
         }
+        let color = premultiplied(lit(base, light), look.emissive);
+        if look.flags & flags::WIRE_FWIDTH == 0 || self.show.wires == 0.0 {
+            return color;
+        }
+        over(self.show.wires * fwidth_cover(edge_mask(surface, id), look, &b), look.wire_color, color)
     }
 
     /// Every look there is.
@@ -161,6 +169,7 @@ impl<'a> PointShader<'a> {
     }
 
     /// What light makes of a colour at a point with this normal.
+    #[inline(always)]
     pub fn light(&self, surface: &SurfacePass<'_>, metallic: f32, roughness: f32, normal: [f32; 3]) -> Light {
         light(&surface.lights, &self.stages.plan.projection, metallic, roughness, normal)
     }
@@ -284,32 +293,6 @@ fn facing(n: [f32; 3], front: bool) -> [f32; 3] {
     n.map(|v| v * scale)
 }
 
-fn unit_or(v: [f32; 3], otherwise: [f32; 3]) -> [f32; 3] {
-    let length_squared = dot(v, v);
-    if length_squared > 1e-20 && length_squared < 1e30 { v.map(|c| c / length_squared.sqrt()) } else { otherwise }
-}
-
 fn over(cover: f32, top: [f32; 4], under: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|k| cover * top[k] + under[k] * (1.0 - cover * top[3]))
-}
-
-/// Scalar product.
-pub fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
-}
-
-fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// What of `v` is at right angles to the unit vector `n`, at length about 1 where that is not nothing.
-fn across(v: [f32; 3], n: [f32; 3]) -> [f32; 3] {
-    let largest = v.iter().fold(0.0_f32, |most, c| most.max(c.abs()));
-    let v = if largest > 0.0 { v.map(|c| c / largest) } else { v };
-    let along = dot(v, n);
-    std::array::from_fn(|k| v[k] - along * n[k])
 }
