@@ -211,6 +211,8 @@ struct LimitsDto {
     nodes: u64,
     json_depth: u64,
     image_px: u64,
+    texture_px: u64,
+    texture_total_px: u64,
     job_ms: u64,
     queue_per_worker: u64,
 }
@@ -218,8 +220,18 @@ struct LimitsDto {
 impl CapabilitiesDto {
     /// What this process can do.
     pub fn new(limits: &Limits, backend: BackendDto, workers: u64, load: Load) -> Self {
-        let Limits { body_bytes, memory_bytes, triangles, nodes, json_depth, image_px, job_ms, queue_per_worker } =
-            *limits;
+        let Limits {
+            body_bytes,
+            memory_bytes,
+            triangles,
+            nodes,
+            json_depth,
+            image_px,
+            texture_px,
+            texture_total_px,
+            job_ms,
+            queue_per_worker,
+        } = *limits;
         Self {
             version: env!("CARGO_PKG_VERSION"),
             mesh_formats: Format::NAMES,
@@ -241,6 +253,8 @@ impl CapabilitiesDto {
                 nodes,
                 json_depth,
                 image_px,
+                texture_px,
+                texture_total_px,
                 job_ms,
                 queue_per_worker,
             },
