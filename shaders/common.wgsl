@@ -29,6 +29,10 @@ struct Frame {
     // Where edge masks start in the attributes; triangles' materials start at 0.
     masks_at: u32,
     material_count: u32,
+    // What remains of wires from the second layer on.
+    layer_fade: f32,
+    // Colours at the start of the hull's looks; its triangles' materials follow.
+    hull_color_count: u32,
 };
 
 // Which triangles, vertices or edges a dispatch handles, and which rows of the picture the buffers hold.
@@ -57,6 +61,10 @@ struct Batch {
     line_smoothing: f32,
     line_flags: u32,
     ink_at: u32,
+    // The role that drawn triangles have, where the plan has roles.
+    role: u32,
+    // Number of the layer that is looked for; 0 also for the visibility buffer.
+    layer: u32,
 };
 
 // Bits of `line_flags`.
@@ -76,6 +84,19 @@ const EDGE_MASKS: u32 = 128u;
 const LINES: u32 = 256u;
 const CLIPPED: u32 = 2048u;
 const FOUR_SAMPLES: u32 = 4096u;
+const ROLES: u32 = 0x100000u;
+const HULL_AMOUNTS: u32 = 0x200000u;
+const HULL_LOOKS: u32 = 0x400000u;
+const LAYERS: u32 = 0x800000u;
+const BEHIND_SURFACE: u32 = 0x1000000u;
+const WIRES_ONLY: u32 = 0x2000000u;
+const LAYERED_HULL: u32 = 0x4000000u;
+
+// src/plan/mod.rs explains these bits of a triangle's role.
+const ROLE_LAYER: u32 = 2u;
+const ROLE_HULL: u32 = 4u;
+const ROLE_FRONT_ONLY: u32 = 8u;
+const ROLE_BACK_ONLY: u32 = 16u;
 
 // What the plan has, of the above. A constant of the pipeline, so that a kernel contains only what its plan needs.
 override LOOK: u32 = 0u;

@@ -25,14 +25,23 @@ struct Material {
 };
 
 // Bits of a material's flags.
+const MATERIAL_FILL: u32 = 1u;
 const MATERIAL_FACE_NORMALS: u32 = 2u;
 const MATERIAL_VERTEX_NORMALS: u32 = 8u;
 const MATERIAL_WIRES: u32 = 1920u;
 
+// What of its material a point shows.
+struct Show {
+    fill: bool,
+    // How much of its wires, 0 to 1.
+    wires: f32,
+};
+
 // Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's centre.
-fn point_color(id: u32, at: vec2<f32>) -> vec4<f32> {
+fn point_color(id: u32, at: vec2<f32>, show: Show) -> vec4<f32> {
     let m = material_index(id);
     var color = materials[m].base_color;
+    color = vec4(color.xyz * color.w, color.w);
     let flags = materials[m].flags;
     if (flags & (MATERIAL_VERTEX_NORMALS | MATERIAL_WIRES)) != 0u {
         let b = barycentrics(id, at);
@@ -41,13 +50,19 @@ fn point_color(id: u32, at: vec2<f32>) -> vec4<f32> {
         } else if (flags & MATERIAL_FACE_NORMALS) != 0u {
             color = light(m, facing(face_normal(id), b.front));
         }
-        if (flags & MATERIAL_WIRES) != 0u {
-            let cover = wire_factor(id, m, b);
+        if !show.fill || (flags & MATERIAL_FILL) == 0u {
+            color = vec4(0.0);
+        }
+        if (flags & MATERIAL_WIRES) != 0u && show.wires > 0.0 {
+            let cover = show.wires * wire_factor(id, m, b);
             let wire = materials[m].wire_color;
             color = cover * wire + color * (1.0 - cover * wire.w);
         }
     } else if (flags & MATERIAL_FACE_NORMALS) != 0u {
         color = light(m, facing(face_normal(id), is_front(id, at)));
+    }
+    if (flags & MATERIAL_WIRES) == 0u && (!show.fill || (flags & MATERIAL_FILL) == 0u) {
+        return vec4(0.0);
     }
     return color;
 }

@@ -25,6 +25,10 @@ pub struct Limits {
     pub texture_px: u64,
     /// All textures that one picture decodes, pixels.
     pub texture_total_px: u64,
+    /// Files of a bundle once unpacked, bytes.
+    pub bundle_bytes: u64,
+    /// Files of one bundle; of a zip archive every entry counts.
+    pub bundle_entries: u64,
     /// Wall-clock time for one job, from acceptance to encoded image, milliseconds.
     pub job_ms: u64,
     /// Jobs waiting for each worker. A full queue is refused at once, never waited for.
@@ -42,6 +46,8 @@ impl Default for Limits {
             image_px: 4096,
             texture_px: 8192,
             texture_total_px: 256 << 20,
+            bundle_bytes: 512 << 20,
+            bundle_entries: 1000,
             job_ms: 30_000,
             queue_per_worker: 64,
         }

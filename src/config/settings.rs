@@ -67,6 +67,8 @@ pub const SETTINGS: &[Setting] = &[
     number("limit-texture-total-px", "Pixels of all textures of one picture", 1, u64::MAX, |c| {
         &mut c.limits.texture_total_px
     }),
+    number("limit-bundle-bytes", "Files of a bundle, unpacked", 1, u64::MAX, |c| &mut c.limits.bundle_bytes),
+    number("limit-bundle-entries", "Files of a bundle", 1, 1 << 16, |c| &mut c.limits.bundle_entries),
     number("limit-job-ms", "Time for one job, waiting included", 1, MS_MAX, |c| &mut c.limits.job_ms),
     number("limit-queue-per-worker", "The same as --queue", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
 ];

@@ -1,9 +1,9 @@
 //! glTF: what a file says about its surfaces.
 
-use crate::mesh_files::{Gltf, read};
+use crate::mesh_files::{Gltf, read, read_bundle};
 use crate::shared::folder;
 use meshsnap::mesh::material::{AlphaMode, ImageContent, TextureRef, Wrap};
-use meshsnap::mesh::{MaterialSlot, Mesh, MeshError, MeshFault};
+use meshsnap::mesh::{Bundle, BundleFile, MaterialSlot, Mesh, MeshError, MeshFault};
 use serde_json::{Value, json};
 
 /// A triangle with two sets of texture coordinates and a material that uses what is in the lists.
@@ -242,5 +242,10 @@ fn known_models_have_their_known_materials() {
     assert!(matches!(&mesh.images[0].content, ImageContent::Missing(why) if why.contains("StylizedWater.png")));
     json["images"][0]["uri"] = embed("StylizedWater.png");
     let mesh = read(json.to_string().as_bytes()).unwrap();
-    assert!(matches!(&mesh.images[0].content, ImageContent::Encoded(bytes) if bytes.len() == 553_110));
+    let is_there =
+        |mesh: &Mesh| matches!(&mesh.images[0].content, ImageContent::Encoded(bytes) if bytes.len() == 553_110);
+    assert!(is_there(&mesh));
+    let file = |name: &str| BundleFile::new(name, std::fs::read(palm.join(name)).unwrap()).unwrap();
+    let files = ["PalmTree.gltf", "PalmTree.bin", "StylizedWater.png"].map(file);
+    assert!(is_there(&read_bundle(&Bundle::of_files(files.to_vec())).unwrap()), "from the bundle");
 }

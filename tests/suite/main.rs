@@ -3,6 +3,9 @@
 // Helpers outside of #[test] functions may give up as loudly as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod bundles;
+mod bundles_http;
+mod bundles_zip;
 mod cli;
 mod examples;
 mod formats;
@@ -12,6 +15,7 @@ mod formats_gltf_document;
 mod formats_gltf_scene;
 mod formats_gltf_surfaces;
 mod formats_hostile;
+mod formats_mtl;
 mod formats_obj;
 mod formats_polygons;
 mod formats_shared;
@@ -19,11 +23,14 @@ mod golden;
 mod http;
 mod http_bad;
 mod jobs;
+mod layers;
+mod layers_hull;
 mod likeness;
 mod mesh_files;
 mod models;
 mod raster;
 mod scenes;
+mod schema;
 mod select;
 mod select_fakes;
 mod server;

@@ -8,17 +8,33 @@ use super::visibility::area;
 use super::wire::wire_factor;
 use crate::plan::{SurfacePass, flags};
 
+/// What of its material a point shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Show {
+    /// Whether its fill.
+    pub fill: bool,
+    /// How much of its wires, 0 to 1.
+    pub wires: f32,
+}
+
+impl Show {
+    /// All of it.
+    pub const ALL: Self = Self { fill: true, wires: 1.0 };
+}
+
 /// Shades points of surface triangles.
 pub struct PointShader<'a> {
     stages: &'a Stages<'a>,
     /// Flat colours do not change over a triangle: the last one is kept.
     flat: Option<(u32, [f32; 4])>,
+    /// What is shown; the same for all points of a triangle.
+    pub show: Show,
 }
 
 impl<'a> PointShader<'a> {
     /// One for a band.
     pub fn new(stages: &'a Stages<'a>) -> Self {
-        Self { stages, flat: None }
+        Self { stages, flat: None, show: Show::ALL }
     }
 
     /// The colour of triangle `id` where it is known to be the same all over, and is the one that was shaded last.
@@ -33,7 +49,9 @@ impl<'a> PointShader<'a> {
         let flat = material.flags & (flags::VERTEX_NORMALS | flags::WIRES) == 0;
         let bary = || Barycentrics::new(&corners(self.stages, id, at));
         let up = self.stages.plan.projection.screen_up;
-        let lit = if material.flags & flags::FACE_NORMALS != 0 {
+        let lit = if !self.show.fill || material.flags & flags::FILL == 0 {
+            [0.0; 4]
+        } else if material.flags & flags::FACE_NORMALS != 0 {
             let normal = facing(surface.face_normals[id as usize], self.is_front(id, at));
             light(&surface.lights, material, up, normal)
         } else if let Some(normals) =
@@ -43,10 +61,11 @@ impl<'a> PointShader<'a> {
             let normal = interpolate(&normals.values, normals.triangles[id as usize], b.value);
             light(&surface.lights, material, up, facing(normal, b.front))
         } else {
-            material.base_color
+            let [r, g, b, a] = material.base_color;
+            [r * a, g * a, b * a, a]
         };
-        let color = if material.flags & flags::WIRES != 0 {
-            over(wire_factor(surface, material, id as usize, &bary()), material.wire_color, lit)
+        let color = if material.flags & flags::WIRES != 0 && self.show.wires > 0.0 {
+            over(self.show.wires * wire_factor(surface, material, id as usize, &bary()), material.wire_color, lit)
         } else {
             lit
         };

@@ -13,6 +13,13 @@ pub const EDGE_MASKS: u32 = 128;
 pub const LINES: u32 = 256;
 pub const CLIPPED: u32 = 2048;
 pub const FOUR_SAMPLES: u32 = 4096;
+pub const ROLES: u32 = 0x10_0000;
+pub const HULL_AMOUNTS: u32 = 0x20_0000;
+pub const HULL_LOOKS: u32 = 0x40_0000;
+pub const LAYERS: u32 = 0x80_0000;
+pub const BEHIND_SURFACE: u32 = 0x100_0000;
+pub const WIRES_ONLY: u32 = 0x200_0000;
+pub const LAYERED_HULL: u32 = 0x400_0000;
 
 /// The flags of a plan.
 pub fn look(plan: &DrawPlan<'_>) -> u32 {
@@ -28,6 +35,12 @@ pub fn look(plan: &DrawPlan<'_>) -> u32 {
     }
     if let Some(hull) = &plan.hull {
         look |= HULL | when(matches!(hull.offset, HullOffset::Px(_)), HULL_PX);
+        look |= when(hull.amounts.len() == plan.positions.len(), HULL_AMOUNTS);
+        look |= when(hull.triangle_materials.len() == count, HULL_LOOKS) | when(plan.has_layered_hull(), LAYERED_HULL);
+    }
+    look |= when(plan.roles.len() == count && count > 0, ROLES);
+    if let Some(layers) = plan.layers() {
+        look |= LAYERS | when(layers.behind_surface, BEHIND_SURFACE) | when(layers.wires_only, WIRES_ONLY);
     }
     look | when(!plan.lines.is_empty(), LINES)
 }
@@ -51,9 +64,17 @@ mod tests {
             ("LINES", LINES),
             ("CLIPPED", CLIPPED),
             ("FOUR_SAMPLES", FOUR_SAMPLES),
+            ("ROLES", ROLES),
+            ("HULL_AMOUNTS", HULL_AMOUNTS),
+            ("HULL_LOOKS", HULL_LOOKS),
+            ("LAYERS", LAYERS),
+            ("BEHIND_SURFACE", BEHIND_SURFACE),
+            ("WIRES_ONLY", WIRES_ONLY),
+            ("LAYERED_HULL", LAYERED_HULL),
         ];
         for (name, value) in all {
-            assert!(shader.contains(&format!("const {name}: u32 = {value}u;")), "{name}");
+            let ways = [format!("const {name}: u32 = {value}u;"), format!("const {name}: u32 = {value:#X}u;")];
+            assert!(ways.iter().any(|way| shader.contains(&way.replace("0X", "0x"))), "{name}");
         }
     }
 }

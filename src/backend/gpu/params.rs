@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::plan::{DrawPlan, Faces, HullOffset, Lights, LinePass, Shown, SurfacePass};
+use crate::plan::{DrawPlan, Faces, HullOffset, HullPass, Lights, LinePass, Shown, SurfacePass};
 
 /// The plan's numbers.
 #[repr(C)]
@@ -30,8 +30,10 @@ pub struct Frame {
     hull_base: u32,
     masks_at: u32,
     material_count: u32,
+    layer_fade: f32,
+    hull_color_count: u32,
     /// WGSL rounds a struct up to its alignment.
-    padding: [u32; 3],
+    padding: u32,
 }
 
 /// A dispatch's numbers.
@@ -55,6 +57,8 @@ pub struct Batch {
     pub line_smoothing: f32,
     pub line_flags: u32,
     pub ink_at: u32,
+    pub role: u32,
+    pub layer: u32,
 }
 
 /// Bits of [`Batch::line_flags`].
@@ -94,12 +98,14 @@ impl Frame {
             frame.surface(surface);
         }
         if let Some(hull) = &plan.hull {
-            frame.hull_color = hull.colors[0];
+            frame.hull_color = hull.color(0);
+            frame.hull_color_count = hull.colors.len() as u32;
             frame.hull_push = match hull.offset {
                 HullOffset::Object(units) => units,
                 HullOffset::Px(px) => 256.0 * px,
             };
         }
+        frame.layer_fade = plan.layers().map_or(1.0, |layers| layers.fade);
         frame.line_pass_count = plan.lines.len() as u32;
         frame
     }
@@ -115,6 +121,20 @@ impl Frame {
         self.material_count = surface.materials.len() as u32;
         self.masks_at = surface.triangle_materials.len() as u32;
     }
+}
+
+/// The hull's colours, then its triangles' materials: what [`Frame::hull_color_count`] points into.
+pub fn hull_looks(hull: &HullPass<'_>) -> Vec<u8> {
+    [bytemuck::cast_slice(&hull.colors), bytemuck::cast_slice::<u32, u8>(hull.triangle_materials)].concat()
+}
+
+/// How far each position moves, as [`Frame`] has it for all.
+pub fn hull_amounts(hull: &HullPass<'_>) -> Vec<f32> {
+    let unit = match hull.offset {
+        HullOffset::Object(_) => 1.0,
+        HullOffset::Px(_) => 256.0,
+    };
+    hull.amounts.iter().map(|amount| unit * amount).collect()
 }
 
 /// Triangles' materials, then edge masks four to a word: what [`Frame::masks_at`] points into.
@@ -151,6 +171,6 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_shader() {
         assert_eq!(size_of::<Frame>(), 272);
-        assert_eq!(size_of::<Batch>(), 68);
+        assert_eq!(size_of::<Batch>(), 76);
     }
 }

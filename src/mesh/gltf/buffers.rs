@@ -95,21 +95,28 @@ impl<'a> Buffers<'a> {
 /// What a URI leads to.
 #[derive(Debug)]
 pub enum Uri {
-    /// These bytes.
+    /// These bytes, paid for.
     Bytes(Vec<u8>),
     /// Something that is not in the upload; the sentence says what to do about it.
     Outside(String),
 }
 
-/// Resolves the URI of `what` ("buffer 0", "image 3"). Only `data:` URIs hold bytes; anything else would be a file or a
-/// network address, and neither is ever opened.
+/// Resolves the URI of `what` ("buffer 0", "image 3"): decodes a `data:` URI, or takes the file of the bundle that the URI
+/// means. Nothing else is ever opened.
 pub fn from_uri(uri: &str, what: &str, cx: &mut Context<'_>) -> Result<Uri, MeshError> {
     let Some(data) = strip_prefix_ignore_case(uri, "data:") else {
-        let name = printable(uri);
-        return Ok(Uri::Outside(format!(
-            "{what} of the glTF file is \"{name}\", which is not part of the upload: send a GLB, embed it, or send it \
-             along in a multipart bundle"
-        )));
+        return match cx.bundle.resolve(uri) {
+            Ok(Some(file)) => {
+                cx.budget.spend("a file of the bundle", file.bytes.len() as u64, 1)?;
+                Ok(Uri::Bytes(file.bytes.to_vec()))
+            }
+            Ok(None) => Ok(Uri::Outside(format!(
+                "{what} of the glTF file is \"{}\", which is not part of the upload: add it, send a GLB, or embed it",
+                printable(uri)
+            ))),
+            Err(error) if error.fault == MeshFault::OutsideBundle => Ok(Uri::Outside(error.detail)),
+            Err(error) => Err(error),
+        };
     };
     let (_, base64) = data
         .split_once(";base64,")
