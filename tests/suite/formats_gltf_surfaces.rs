@@ -1,6 +1,7 @@
 //! glTF: what a file says about its surfaces.
 
-use crate::mesh_files::{Gltf, read, read_bundle};
+use crate::bundles::read_bundle;
+use crate::mesh_files::{Gltf, read};
 use crate::shared::folder;
 use meshsnap::mesh::material::{AlphaMode, ImageContent, TextureRef, Wrap};
 use meshsnap::mesh::{Bundle, BundleFile, MaterialSlot, Mesh, MeshError, MeshFault};
