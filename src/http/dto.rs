@@ -216,6 +216,8 @@ struct LimitsDto {
     nodes: u64,
     json_depth: u64,
     image_px: u64,
+    texture_px: u64,
+    texture_total_px: u64,
     bundle_bytes: u64,
     bundle_entries: u64,
     job_ms: u64,
@@ -227,6 +229,7 @@ impl CapabilitiesDto {
     pub fn new(limits: &Limits, backend: BackendDto, workers: u64, load: Load) -> Self {
         let Limits { body_bytes, memory_bytes, triangles, nodes, json_depth, image_px, .. } = *limits;
         let Limits { bundle_bytes, bundle_entries, job_ms, queue_per_worker, .. } = *limits;
+        let Limits { texture_px, texture_total_px, .. } = *limits;
         Self {
             version: env!("CARGO_PKG_VERSION"),
             mesh_formats: Format::NAMES,
@@ -250,6 +253,8 @@ impl CapabilitiesDto {
                 nodes,
                 json_depth,
                 image_px,
+                texture_px,
+                texture_total_px,
                 bundle_bytes,
                 bundle_entries,
                 job_ms,

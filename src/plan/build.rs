@@ -170,10 +170,12 @@ fn surface_pass<'a>(
     };
     let mut loader = TextureLoader::new(mesh, budget);
     let mut looks = Vec::with_capacity(mesh.materials.len());
-    for (slot, layers) in mesh.materials.iter().zip(&parts.layers) {
+    for (index, (slot, layers)) in mesh.materials.iter().zip(&parts.layers).enumerate() {
+        loader.for_material(index);
         looks.push(materials::look(mesh, slot, layers, &mut loader)?);
     }
-    let textures = loader.finish();
+    let size_px = [spec.image.width_px, spec.image.height_px];
+    let textures = loader.finish(&projection(camera, size_px, true), skips)?;
     let is_one = looks.iter().all(|look| *look == looks[0]);
     let one_material = skips.skip(SkipKind::MaterialIndices, is_one, "every triangle has the same material");
     if one_material {

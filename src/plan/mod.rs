@@ -12,6 +12,10 @@ mod materials;
 mod parts;
 mod skips;
 mod surface;
+mod texture_closeup;
+mod texture_decode;
+mod texture_half;
+mod texture_levels;
 mod textures;
 mod wires;
 
