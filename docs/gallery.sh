@@ -7,7 +7,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 backend=${1:-cpu}
-size=232
+size=200
 columns=4
 # From the plainest look to the ones that look inside.
 looks=(
