@@ -57,6 +57,8 @@ struct Batch {
     line_smoothing: f32,
     line_flags: u32,
     ink_at: u32,
+    // Where the faces whose light falls on lines start in the ink.
+    owners_at: u32,
 };
 
 // Bits of `line_flags`.
@@ -64,6 +66,7 @@ const SHOWN_VISIBLE: u32 = 1u;
 const SHOWN_HIDDEN: u32 = 2u;
 const SKIP_BACK: u32 = 4u;
 const CONTOUR: u32 = 8u;
+const LIT_PASS: u32 = 16u;
 
 const SURFACE: u32 = 1u;
 const HULL: u32 = 2u;
@@ -76,6 +79,7 @@ const EDGE_MASKS: u32 = 128u;
 const LINES: u32 = 256u;
 const CLIPPED: u32 = 2048u;
 const FOUR_SAMPLES: u32 = 4096u;
+const LIT: u32 = 1048576u;
 
 // What the plan has, of the above. A constant of the pipeline, so that a kernel contains only what its plan needs.
 override LOOK: u32 = 0u;

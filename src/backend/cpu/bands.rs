@@ -8,7 +8,7 @@ use super::occluders::PlaneCache;
 use super::resolve::resolve;
 use super::samples::{NOTHING, SampleBand};
 use super::visibility::{self, Setup};
-use super::{Stages, lines, shade};
+use super::{Stages, lines, lit, shade};
 use crate::plan::{DrawPlan, LinePass};
 
 /// Sample memory of a band, bytes: half of a common 1 MiB second-level cache.
@@ -29,7 +29,9 @@ pub struct BandScratch {
     /// Rows that `samples` has room for; the last band of a picture may use fewer.
     rows: u32,
     colors: Vec<[f32; 4]>,
+    /// Of one line pass after the other; then, if lines are lit, whose light falls on them.
     ink: Vec<u32>,
+    light: Vec<[f32; 2]>,
 }
 
 /// Buffers of bands that nobody draws just now.
@@ -48,6 +50,7 @@ impl ScratchPool {
             rows,
             colors: Vec::new(),
             ink: Vec::new(),
+            light: Vec::new(),
         });
         each(&mut scratch);
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
@@ -65,12 +68,18 @@ pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: u
         shade_band(isa, stages, &scratch.samples, &mut scratch.colors);
     }
     scratch.ink.clear();
-    scratch.ink.resize(pixels * plan.lines.len(), 0);
-    let passes = plan.lines.iter().zip(&bins.edges).zip(scratch.ink.chunks_exact_mut(pixels.max(1)));
+    scratch.ink.resize(pixels * (plan.lines.len() + usize::from(plan.lights_lines())), 0);
+    let (inks, owners) = scratch.ink.split_at_mut(pixels * plan.lines.len());
+    let passes = plan.lines.iter().zip(&bins.edges).zip(inks.chunks_exact_mut(pixels.max(1)));
     for ((pass, bins), ink) in passes {
-        draw_edges(isa, stages, pass, bins, band, &scratch.samples, ink);
+        draw_edges(isa, stages, pass, bins, band, &scratch.samples, ink, owners);
     }
-    resolve(plan, stages.srgb, &scratch.colors, &scratch.ink, rgba);
+    scratch.light.clear();
+    if plan.lights_lines() {
+        scratch.light.resize(pixels, lit::WHITE);
+        lit::light_lines(stages, &scratch.samples, owners, &mut scratch.light);
+    }
+    resolve(plan, stages.srgb, &scratch.colors, inks, &scratch.light, rgba);
 }
 
 /// Draws band number `band` of the visibility buffer alone, as [`Renderer::draw_visibility`](super::Renderer) says.
@@ -117,6 +126,7 @@ dispatch! {
         band: usize,
         samples: &SampleBand,
         ink: &mut [u32],
+        owners: &mut [u32],
     ) = edges_kernel
 }
 
@@ -153,6 +163,7 @@ fn edges_kernel(
     band: usize,
     samples: &SampleBand,
     ink: &mut [u32],
+    owners: &mut [u32],
 ) {
     let mut planes = PlaneCache::new();
     for chunk in bins {
@@ -160,7 +171,7 @@ fn edges_kernel(
             if i % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
                 return;
             }
-            lines::draw(stages, pass, &pass.edges[edge as usize], samples, &mut planes, ink);
+            lines::draw(stages, pass, &pass.edges[edge as usize], samples, &mut planes, ink, owners);
         }
     }
 }

@@ -13,6 +13,7 @@ mod clip;
 mod isa;
 mod light;
 mod lines;
+mod lit;
 mod occluders;
 mod point;
 mod resolve;

@@ -65,13 +65,14 @@ impl<'a> PointShader<'a> {
     }
 }
 
-fn interpolate(values: &[[f32; 3]], corners: [u32; 3], b: [f32; 3]) -> [f32; 3] {
+/// The value between three corners.
+pub fn interpolate(values: &[[f32; 3]], corners: [u32; 3], b: [f32; 3]) -> [f32; 3] {
     let [n0, n1, n2] = corners.map(|i| values[i as usize]);
     std::array::from_fn(|k| (b[0] * n0[k] + b[1] * n1[k]) + b[2] * n2[k])
 }
 
 /// The unit normal on the viewer's side.
-fn facing(n: [f32; 3], front: bool) -> [f32; 3] {
+pub fn facing(n: [f32; 3], front: bool) -> [f32; 3] {
     let length_squared = dot(n, n);
     let scale = if length_squared > 1e-20 { 1.0 / length_squared.sqrt() } else { 0.0 };
     let scale = if front { scale } else { -scale };

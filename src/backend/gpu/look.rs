@@ -13,6 +13,7 @@ pub const EDGE_MASKS: u32 = 128;
 pub const LINES: u32 = 256;
 pub const CLIPPED: u32 = 2048;
 pub const FOUR_SAMPLES: u32 = 4096;
+pub const LIT: u32 = 1 << 20;
 
 /// The flags of a plan.
 pub fn look(plan: &DrawPlan<'_>) -> u32 {
@@ -29,7 +30,7 @@ pub fn look(plan: &DrawPlan<'_>) -> u32 {
     if let Some(hull) = &plan.hull {
         look |= HULL | when(matches!(hull.offset, HullOffset::Px(_)), HULL_PX);
     }
-    look | when(!plan.lines.is_empty(), LINES)
+    look | when(!plan.lines.is_empty(), LINES) | when(plan.lights_lines(), LIT)
 }
 
 #[cfg(test)]
@@ -51,6 +52,7 @@ mod tests {
             ("LINES", LINES),
             ("CLIPPED", CLIPPED),
             ("FOUR_SAMPLES", FOUR_SAMPLES),
+            ("LIT", LIT),
         ];
         for (name, value) in all {
             assert!(shader.contains(&format!("const {name}: u32 = {value}u;")), "{name}");

@@ -26,6 +26,8 @@ pub enum Stage {
     Shade,
     /// Edges to ink.
     Lines,
+    /// Samples and ink to the light on lines.
+    Lit,
     /// Colours and ink to bytes.
     Resolve,
 }
@@ -139,6 +141,15 @@ const SHADE: &[&str] = &[
     include_str!("../../../shaders/shade.wgsl"),
 ];
 
+/// The light stage: from where a point lies to its light.
+const LIT: &[&str] = &[
+    include_str!("../../../shaders/barycentric.wgsl"),
+    include_str!("../../../shaders/point.wgsl"),
+    include_str!("../../../shaders/light.wgsl"),
+    include_str!("../../../shaders/wire.wgsl"),
+    include_str!("../../../shaders/lit.wgsl"),
+];
+
 impl Stage {
     /// The buffers of group 1 that the kernel declares.
     pub fn buffers(self) -> &'static [(Slot, Access)] {
@@ -177,6 +188,19 @@ impl Stage {
                 (Slot::Ink, ReadWrite),
                 (Slot::InkTable, Read),
             ],
+            Self::Lit => &[
+                (Slot::Positions, Read),
+                (Slot::Triangles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, Read),
+                (Slot::Normals, Read),
+                (Slot::NormalTriangles, Read),
+                (Slot::Attributes, Read),
+                (Slot::Materials, Read),
+                (Slot::FaceNormals, Read),
+                (Slot::Colors, ReadWrite),
+                (Slot::Ink, Read),
+            ],
             Self::Resolve => &[
                 (Slot::Colors, Read),
                 (Slot::Ink, Read),
@@ -196,6 +220,7 @@ impl Stage {
             Self::VisibilityTile { .. } => "visibility_tile",
             Self::Shade => "shade",
             Self::Lines => "lines",
+            Self::Lit => "lit",
             Self::Resolve => "resolve",
         }
     }
@@ -215,6 +240,7 @@ impl Stage {
                 [COMMON, TRIANGLE, SAMPLES, emit(write), kernel].concat()
             }
             Self::Shade => [&[COMMON, TRIANGLE], SHADE].concat().concat(),
+            Self::Lit => [&[COMMON, TRIANGLE], LIT].concat().concat(),
             Self::Lines => [COMMON, TRIANGLE, PLANES, include_str!("../../../shaders/lines.wgsl")].concat(),
             Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
         }
@@ -226,9 +252,11 @@ impl Stage {
         match self {
             Self::Transform | Self::Clip => look::HULL_PX,
             Self::Visibility { .. } | Self::VisibilityTile { .. } => look::FOUR_SAMPLES,
-            Self::Shade => SHADED | look::TRIANGLE_MATERIALS | look::EDGE_MASKS | look::CLIPPED | look::FOUR_SAMPLES,
+            Self::Shade | Self::Lit => {
+                SHADED | look::TRIANGLE_MATERIALS | look::EDGE_MASKS | look::CLIPPED | look::FOUR_SAMPLES
+            }
             Self::Lines => look::CLIPPED | look::FOUR_SAMPLES,
-            Self::Resolve => look::SURFACE | look::HULL | look::LINES,
+            Self::Resolve => look::SURFACE | look::HULL | look::LINES | look::LIT,
         }
     }
 
