@@ -332,7 +332,7 @@ fn visible_samples(edge: vec4<u32>, s: Segment, t: f32, first_sample: u32) -> u3
 // Whether a triangle, which is nearer than the edge at a sample close by, really lies in front of it. Its plane is continued
 // to the edge's own point, because close to a fold the sample itself may be nearer without hiding anything.
 //
-// Towards a silhouette the surface falls away faster than its plane: as much again as the plane falls is granted.
+// Of a contour: towards a silhouette the surface falls away faster than its plane: as much again as the plane falls is granted.
 fn hides(id: u32, edge: vec4<u32>, s: Segment, t: f32, depth: f32, sample_depth: f32) -> bool {
     let is_hull = id >= frame.triangle_count;
     let index = 3u * select(id, id - frame.triangle_count, is_hull);
@@ -356,7 +356,8 @@ fn hides(id: u32, edge: vec4<u32>, s: Segment, t: f32, depth: f32, sample_depth:
     let point = s.start + t * s.along;
     let plane = corner + 256.0 * gx * point.x + 256.0 * gy * point.y;
     // What the surface may fall away over three quarters of a pixel: the curvature between neighbouring faces.
-    return plane - max(sample_depth - plane, 0.0) > depth + 192.0 * (abs(gx) + abs(gy));
+    let fall = select(0.0, max(sample_depth - plane, 0.0), (batch.line_flags & CONTOUR) != 0u);
+    return plane - fall > depth + 192.0 * (abs(gx) + abs(gy));
 }
 
 // Whether a triangle meets the edge at an end close to t: around a vertex, the faces of one fan do not hide each other's edges.

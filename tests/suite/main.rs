@@ -18,6 +18,7 @@ mod http;
 mod http_bad;
 mod jobs;
 mod likeness;
+mod line_looks;
 mod mesh_files;
 mod models;
 mod raster;

@@ -131,7 +131,8 @@ pub fn draw(
             let level = if lines.shown == Shown::All || !something_hides {
                 coverage
             } else {
-                let visible = visible_samples(stages, edge, &segment, t, band.pixel(x as u32, y as u32), planes);
+                let visible =
+                    visible_samples(stages, edge, &segment, t, band.pixel(x as u32, y as u32), planes, lines.contour);
                 let shown = if lines.shown == Shown::Visible { visible } else { band.samples - visible };
                 (coverage * shown + band.samples / 2) / band.samples
             };
@@ -232,6 +233,7 @@ fn visible_samples(
     t: f32,
     (ids, depths): (&[u32], &[f32]),
     planes: &mut PlaneCache,
+    is_contour: bool,
 ) -> u32 {
     let depth = segment.depth[0] + t * (segment.depth[1] - segment.depth[0]);
     let mut count = 0;
@@ -239,7 +241,7 @@ fn visible_samples(
     for (&id, &nearest) in ids.iter().zip(depths) {
         let nothing_nearer = id == NOTHING || depth >= nearest || id == edge.faces[0] || id == edge.faces[1];
         if !nothing_nearer && id != last.0 {
-            last = (id, !planes.get(stages, id).hides(edge, segment, t, depth, nearest));
+            last = (id, !planes.get(stages, id).hides(edge, segment, t, depth, is_contour.then_some(nearest)));
         }
         count += u32::from(nothing_nearer || last.1);
     }
