@@ -78,7 +78,7 @@ pub fn passes(
     let list = edges.of(mesh, budget)?;
     let hides = parts.has_fill() || parts.needs_occluder();
     let skip_back =
-        hides && is_outside && wants.iter().any(|w| w.hidden != Hidden::Show) && is_solid(mesh, parts, list);
+        hides && is_outside && wants.iter().any(|w| w.hidden == Hidden::Hide) && is_solid(mesh, parts, list);
     let silhouettes = Silhouettes::new(mesh, parts, list);
     let mut passes = Vec::new();
     for want in &wants {
@@ -251,7 +251,7 @@ impl Want {
             smoothing_px: self.smoothing_px,
             color,
             shown,
-            skip_back_edges: skip_back && shown == Shown::Visible,
+            skip_back_edges: skip_back && self.hidden == Hidden::Hide,
             contour: self.contour,
             lit: self.lit,
         };
