@@ -26,7 +26,7 @@ fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroup
         for (var n = 0u; n < frame.line_pass_count; n++) {
             let cover = coverage(ink[n * batch.count + i]);
             var color = line_colors[2u * n];
-            if has(LIT) && line_colors[2u * n + 1u].x != 0.0 {
+            if has(LIT_LINES) && line_colors[2u * n + 1u].x != 0.0 {
                 color = lit_color(color, colors[batch.count + i].xy);
             }
             c = cover * color + c * (1.0 - cover * color.w);

@@ -21,6 +21,14 @@ pub struct Limits {
     pub json_depth: u64,
     /// Output image width and height, pixels each.
     pub image_px: u64,
+    /// Width and height of a texture, pixels each.
+    pub texture_px: u64,
+    /// All textures that one picture decodes, pixels.
+    pub texture_total_px: u64,
+    /// Files of a bundle once unpacked, bytes.
+    pub bundle_bytes: u64,
+    /// Files of one bundle; of a zip archive every entry counts.
+    pub bundle_entries: u64,
     /// Wall-clock time for one job, from acceptance to encoded image, milliseconds.
     pub job_ms: u64,
     /// Jobs waiting for each worker. A full queue is refused at once, never waited for.
@@ -36,6 +44,10 @@ impl Default for Limits {
             nodes: 100_000,
             json_depth: 64,
             image_px: 4096,
+            texture_px: 8192,
+            texture_total_px: 256 << 20,
+            bundle_bytes: 512 << 20,
+            bundle_entries: 1000,
             job_ms: 30_000,
             queue_per_worker: 64,
         }
@@ -67,17 +79,21 @@ pub fn check(what: &str, given: u64, limit: u64, flag: &'static str) -> Result<(
     Ok(())
 }
 
-/// Bytes that one job may still allocate. Spend first, allocate after.
+/// Bytes that one job may still allocate, and pixels that it may decode. Spend first, allocate after.
 #[derive(Debug)]
 pub struct Budget {
     spent: u64,
     limit: u64,
+    texture_px: u64,
+    texture_total_px: u64,
+    textures_px: u64,
 }
 
 impl Budget {
-    /// A fresh budget of `limits.memory_bytes`.
+    /// A fresh budget of `limits.memory_bytes` and of the limits on textures.
     pub fn new(limits: &Limits) -> Self {
-        Self { spent: 0, limit: limits.memory_bytes }
+        let Limits { memory_bytes, texture_px, texture_total_px, .. } = *limits;
+        Self { spent: 0, limit: memory_bytes, texture_px, texture_total_px, textures_px: 0 }
     }
 
     /// Takes `count * size_bytes` from the budget for `what`, or refuses.
@@ -85,6 +101,17 @@ impl Budget {
         let wanted = self.spent.saturating_add(count.saturating_mul(size_bytes));
         check(&format!("the memory for {what}, in bytes,"), wanted, self.limit, "--limit-memory-bytes")?;
         self.spent = wanted;
+        Ok(())
+    }
+
+    /// Takes the pixels of a texture, or refuses; `what` names it: "image 3".
+    pub fn spend_texture(&mut self, what: &str, width_px: u32, height_px: u32) -> Result<(), LimitExceeded> {
+        let side = u64::from(width_px.max(height_px));
+        check(&format!("the longer side of {what}, in pixels,"), side, self.texture_px, "--limit-texture-px")?;
+        let total = self.textures_px.saturating_add(u64::from(width_px) * u64::from(height_px));
+        let what = format!("the number of pixels of all textures up to {what}");
+        check(&what, total, self.texture_total_px, "--limit-texture-total-px")?;
+        self.textures_px = total;
         Ok(())
     }
 

@@ -29,6 +29,9 @@ pub struct Setting {
 /// Longest time that can be set: a day, so that no sum of times overflows.
 const MS_MAX: u64 = 24 * 3600 * 1000;
 
+/// The largest side of a JPEG.
+const TEXTURE_PX_MAX: u64 = 65_535;
+
 /// Every setting.
 pub const SETTINGS: &[Setting] = &[
     text("listen", "Address and port to listen on", |c, v| set(&mut c.listen, v), |c| c.listen.clone()),
@@ -60,6 +63,12 @@ pub const SETTINGS: &[Setting] = &[
     // 128 is where the JSON parser itself stops.
     number("limit-json-depth", "Nesting of JSON", 1, 128, |c| &mut c.limits.json_depth),
     number("limit-image-px", "Width and height of a picture", 1, IMAGE_PX_MAX, |c| &mut c.limits.image_px),
+    number("limit-texture-px", "Width and height of a texture", 1, TEXTURE_PX_MAX, |c| &mut c.limits.texture_px),
+    number("limit-texture-total-px", "Pixels of all textures of one picture", 1, u64::MAX, |c| {
+        &mut c.limits.texture_total_px
+    }),
+    number("limit-bundle-bytes", "Files of a bundle, unpacked", 1, u64::MAX, |c| &mut c.limits.bundle_bytes),
+    number("limit-bundle-entries", "Files of a bundle", 1, 1 << 16, |c| &mut c.limits.bundle_entries),
     number("limit-job-ms", "Time for one job, waiting included", 1, MS_MAX, |c| &mut c.limits.job_ms),
     number("limit-queue-per-worker", "The same as --queue", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
 ];

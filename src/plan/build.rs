@@ -47,7 +47,7 @@ pub fn build_keeping<'a>(
         outline.map_or(0.0, |outline| contour_px(mesh, &outline, &camera, size_px))
     };
     let mut edges = wires::Edges::default();
-    let lines = wires::passes(mesh, spec, &parts, contour_px, camera.contains_mesh, &mut edges, &mut skips, budget)?;
+    let lines = wires::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, budget)?;
     let surface = surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, budget)?;
     let welded = surface.as_ref().and_then(|s| s.vertex_normals.as_ref()).filter(|_| mesh.normals.is_empty());
     let no_hull = skips.skip(SkipKind::Hull, !parts.has_hull(), "the look has no hull");
@@ -82,6 +82,11 @@ fn pay(mesh: &Mesh, size_px: [u32; 2], parts: &Parts<'_>, budget: &mut Budget) -
     budget.spend("vertices on screen", mesh.positions.len() as u64, 32)?;
     // Up to eight 4-byte entries in the lists of what each part of the picture has to draw, and a role.
     budget.spend("lists of triangles", mesh.triangles.len() as u64, 33)?;
+    if parts.layers_pass().is_some() {
+        // A triangle may be in the visibility buffer's lists and in the layers', and each thread notes which are done with.
+        // What layers need a sample is bounded: they are drawn band by band.
+        budget.spend("lists of layers", mesh.triangles.len() as u64, 32)?;
+    }
     budget.spend("materials", mesh.materials.len() as u64, 256)?;
     let is_smooth = parts.layers.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::scene::Shading::Smooth));
     if parts.has_hull() || (is_smooth && mesh.normals.is_empty()) {
@@ -167,10 +172,12 @@ fn surface_pass<'a>(
     };
     let mut loader = TextureLoader::new(mesh, budget);
     let mut looks = Vec::with_capacity(mesh.materials.len());
-    for (slot, layers) in mesh.materials.iter().zip(&parts.layers) {
+    for (index, (slot, layers)) in mesh.materials.iter().zip(&parts.layers).enumerate() {
+        loader.for_material(index);
         looks.push(materials::look(mesh, slot, layers, &mut loader)?);
     }
-    let textures = loader.finish();
+    let size_px = [spec.image.width_px, spec.image.height_px];
+    let textures = loader.finish(&projection(camera, size_px, true), skips)?;
     let is_one = looks.iter().all(|look| *look == looks[0]);
     let one_material = skips.skip(SkipKind::MaterialIndices, is_one, "every triangle has the same material");
     if one_material {
@@ -249,7 +256,9 @@ fn hull_pass<'a>(mesh: &'a Mesh, parts: &Parts<'_>, welded: Option<Cow<'a, [[f32
         if offsets.iter().flatten().all(|offset| *offset == first) { Vec::new() } else { amounts(mesh, &offsets) };
     // The file's normals may split at hard edges, where a hull that followed them would tear: always the welded ones.
     let normals = welded.unwrap_or_else(|| normals::angle_weighted(mesh).into());
-    HullPass { colors, normals, offset: first, amounts }
+    let tells_apart = colors.len() > 1 || (parts.layers_pass().is_some() && mesh.materials.len() > 1);
+    let triangle_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
+    HullPass { colors, normals, offset: first, amounts, triangle_materials }
 }
 
 /// How far each position moves: as far as the thickest outline of its parts. (The request has seen to it that all have the

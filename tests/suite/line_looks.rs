@@ -16,9 +16,6 @@ use crate::{scenes, shapes, twins};
 
 const BLACK: Rgba = Rgba([0.0, 0.0, 0.0, 1.0]);
 
-/// Three quads that share an edge.
-const FIN: &str = "v 0 0 0\nv 0 1 0\nv 1 0 .2\nv 1 1 .2\nv -1 0 .4\nv -1 1 .4\nv .2 0 -1\nv .2 1 -1\nf 1 2 4 3\nf 1 2 6 5\nf 1 2 8 7\n";
-
 fn contour(thickness: f32) -> Option<Outline> {
     let thickness = Some(thickness);
     Some(Outline { method: OutlineMethod::Contour, color: BLACK, thickness, unit: OutlineUnit::Px })
@@ -37,7 +34,7 @@ const CAMERAS: &[&[(&str, &str)]] = &[
 #[test]
 fn every_class_hidden_mode_contour_and_light_agrees() {
     let Some(gpus) = twins::gpus() else { return };
-    let meshes = [scenes::mesh(&shapes::gear(9)), scenes::mesh(&shapes::sheet(9)), scenes::mesh(FIN)];
+    let meshes = [scenes::mesh(&shapes::gear(9)), scenes::mesh(&shapes::sheet(9)), scenes::mesh(shapes::FIN)];
     let mut gpu = GpuRenderer::new(Arc::clone(&gpus[0]));
     let mut cases = 0;
     for edges in [WireEdges::Triangles, WireEdges::Polygons, WireEdges::Feature, WireEdges::Boundary] {

@@ -3,13 +3,19 @@
 // Helpers outside of #[test] functions may give up as loudly as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod bundles;
+mod bundles_http;
+mod bundles_zip;
 mod cli;
 mod examples;
 mod formats;
 mod formats_bad;
 mod formats_gltf;
 mod formats_gltf_document;
+mod formats_gltf_scene;
+mod formats_gltf_surfaces;
 mod formats_hostile;
+mod formats_mtl;
 mod formats_obj;
 mod formats_polygons;
 mod formats_shared;
@@ -17,12 +23,15 @@ mod golden;
 mod http;
 mod http_bad;
 mod jobs;
+mod layers;
+mod layers_hull;
 mod likeness;
 mod line_looks;
 mod mesh_files;
 mod models;
 mod raster;
 mod scenes;
+mod schema;
 mod select;
 mod select_fakes;
 mod server;
@@ -31,5 +40,10 @@ mod shared;
 mod skips;
 mod soups;
 mod structure;
+mod texture_formulas;
+mod textures;
+mod textures_closeup;
 mod twins;
+mod twins_shade;
 mod twins_visibility;
+mod wire_formulas;

@@ -9,7 +9,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("image", &[]),
     ("mesh", &["limits"]),
     ("scene", &["mesh", "image", "limits"]),
-    ("plan", &["scene", "mesh", "limits"]),
+    ("plan", &["scene", "mesh", "image", "limits"]),
     ("backend", &["plan", "image", "limits"]),
     ("encode", &["image"]),
     ("pipeline", &["encode", "backend", "plan", "scene", "mesh", "image", "limits"]),

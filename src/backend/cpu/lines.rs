@@ -110,8 +110,7 @@ pub fn draw(
     edge: &Edge,
     band: &SampleBand,
     planes: &mut PlaneCache,
-    ink: &mut [u32],
-    owners: &mut [u32],
+    [ink, owners]: [&mut [u32]; 2],
 ) {
     let Some(segment) = Segment::new(stages, lines, edge) else { return };
     let [first, last] = segment.rows(band.size_px[1]);

@@ -1,5 +1,6 @@
 //! Stage 5, a pixel: surface over background, ink over both, to sRGB bytes. Twin of `shaders/resolve.wgsl`.
 
+use super::light::Light;
 use crate::image::srgb8_thresholds;
 use crate::plan::{DrawPlan, INK_FULL};
 
@@ -40,7 +41,7 @@ pub fn resolve(
     srgb: &SrgbEncoder,
     colors: &[[f32; 4]],
     ink: &[u32],
-    light: &[[f32; 2]],
+    light: &[Light],
     rgba: &mut [u8],
 ) {
     let mut last = ([f32::NAN; 4], [0; 4]);
@@ -62,9 +63,9 @@ pub fn resolve(
     }
 }
 
-/// A premultiplied colour under light `[A, B]`.
-fn lit(c: [f32; 4], [a, b]: [f32; 2]) -> [f32; 4] {
-    let under = |v: f32| (v * a + b * c[3]).clamp(0.0, c[3]);
+/// A premultiplied colour under light.
+fn lit(c: [f32; 4], light: Light) -> [f32; 4] {
+    let under = |v: f32| (v * light.gain + light.gloss * c[3]).clamp(0.0, c[3]);
     [under(c[0]), under(c[1]), under(c[2]), c[3]]
 }
 

@@ -1,6 +1,6 @@
 //! Reading accessors: every offset and count is checked, in 64 bits, and paid for, before any data is touched.
 
-use super::buffers::Buffers;
+use super::buffers::{Buffers, View};
 use crate::mesh::MeshError;
 use crate::mesh::import::Context;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
@@ -26,6 +26,11 @@ impl<'a> Reader<'a> {
     /// A reader of `root`'s accessors.
     pub fn new(root: &'a Root, bin: Option<&'a [u8]>) -> Self {
         Self { root, buffers: Buffers::new(root, bin) }
+    }
+
+    /// The bytes of a buffer view.
+    pub fn view(&mut self, index: usize, cx: &mut Context<'_>) -> Result<View<'a>, MeshError> {
+        self.buffers.view(index, cx)
     }
 
     /// The declared type of an accessor, and how many elements it has.

@@ -68,7 +68,10 @@ impl<'a> Buffers<'a> {
             return Ok(Rc::clone(done));
         }
         let bytes = match (&buffer.uri, self.bin) {
-            (Some(uri), _) => Cow::Owned(from_uri(uri, index, cx)?),
+            (Some(uri), _) => match from_uri(uri, &format!("buffer {index}"), cx)? {
+                Uri::Bytes(bytes) => Cow::Owned(bytes),
+                Uri::Outside(sentence) => return Err(MeshError::new(MeshFault::OutsideBundle, sentence)),
+            },
             (None, Some(bin)) if index == 0 => Cow::Borrowed(bin),
             (None, _) => {
                 return Err(super::document::compression(self.root).unwrap_or_else(|| {
@@ -89,25 +92,45 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// Decodes a `data:` URI. Anything else would be a file or a network address, and neither is ever opened.
-fn from_uri(uri: &str, index: usize, cx: &mut Context<'_>) -> Result<Vec<u8>, MeshError> {
+/// What a URI leads to.
+#[derive(Debug)]
+pub enum Uri {
+    /// These bytes, paid for.
+    Bytes(Vec<u8>),
+    /// Something that is not in the upload; the sentence says what to do about it.
+    Outside(String),
+}
+
+/// Resolves the URI of `what` ("buffer 0", "image 3"): decodes a `data:` URI, or takes the file of the bundle that the URI
+/// means. Nothing else is ever opened.
+pub fn from_uri(uri: &str, what: &str, cx: &mut Context<'_>) -> Result<Uri, MeshError> {
     let Some(data) = strip_prefix_ignore_case(uri, "data:") else {
-        let name: String = uri.chars().filter(|c| !c.is_control()).take(80).collect();
-        return Err(MeshError::new(
-            MeshFault::OutsideBundle,
-            format!(
-                "buffer {index} of the glTF file is \"{name}\", which is not part of the upload: send a GLB, or embed it"
-            ),
-        ));
+        return match cx.bundle.resolve(uri) {
+            Ok(Some(file)) => {
+                cx.budget.spend("a file of the bundle", file.bytes.len() as u64, 1)?;
+                Ok(Uri::Bytes(file.bytes.to_vec()))
+            }
+            Ok(None) => Ok(Uri::Outside(format!(
+                "{what} of the glTF file is \"{}\", which is not part of the upload: add it, send a GLB, or embed it",
+                printable(uri)
+            ))),
+            Err(error) if error.fault == MeshFault::OutsideBundle => Ok(Uri::Outside(error.detail)),
+            Err(error) => Err(error),
+        };
     };
     let (_, base64) = data
         .split_once(";base64,")
-        .ok_or_else(|| MeshError::broken(format!("the data URI of buffer {index} of the glTF file is not base64")))?;
-    cx.budget.spend("a glTF buffer", base64.len() as u64, 1)?;
+        .ok_or_else(|| MeshError::broken(format!("the data URI of {what} of the glTF file is not base64")))?;
+    cx.budget.spend("a data URI of the glTF file", base64.len() as u64, 1)?;
     let lenient = GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent);
-    GeneralPurpose::new(&base64::alphabet::STANDARD, lenient).decode(base64.trim_ascii()).map_err(|error| {
-        MeshError::broken(format!("the data URI of buffer {index} of the glTF file is not valid base64: {error}"))
-    })
+    GeneralPurpose::new(&base64::alphabet::STANDARD, lenient).decode(base64.trim_ascii()).map(Uri::Bytes).map_err(
+        |error| MeshError::broken(format!("the data URI of {what} of the glTF file is not valid base64: {error}")),
+    )
+}
+
+/// The beginning of a name from the file, fit for a sentence.
+pub fn printable(name: &str) -> String {
+    name.chars().filter(|c| !c.is_control()).take(80).collect()
 }
 
 fn strip_prefix_ignore_case<'t>(text: &'t str, prefix: &str) -> Option<&'t str> {

@@ -68,22 +68,17 @@ fn measure(json: &[u8]) -> Size {
     size
 }
 
-/// The document without what is not read, and with what the crate wants though the specification does not.
+/// The document without what is not read from it or read by [`super::model`], and with what the crate wants though the specification does not.
 fn pruned(json: &[u8]) -> Option<Value> {
     let mut value: Value = serde_json::from_slice(json).ok()?;
     let root = value.as_object_mut()?;
-    for key in ["animations", "cameras", "extensions", "extras", "images", "samplers", "skins", "textures"] {
+    for key in ["animations", "cameras", "extensions", "extras", "images", "materials", "samplers", "skins", "textures"]
+    {
         root.remove(key);
     }
     root.values_mut().for_each(make_integral);
     for scene in root.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
         scene.as_object_mut()?.entry("nodes").or_insert(Value::Array(Vec::new()));
-    }
-    for material in root.get_mut("materials").and_then(Value::as_array_mut).into_iter().flatten() {
-        material.as_object_mut()?.retain(|key, _| key == "name" || key == "pbrMetallicRoughness");
-        if let Some(pbr) = material.get_mut("pbrMetallicRoughness").and_then(Value::as_object_mut) {
-            pbr.retain(|key, _| key == "baseColorFactor");
-        }
     }
     Some(value)
 }

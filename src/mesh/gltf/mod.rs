@@ -1,17 +1,24 @@
 //! glTF 2.0, as JSON or GLB. The `gltf` crate gives the typed JSON model; what the model says is checked and read here.
 //!
 //! Reading order: [`container`], [`document`], [`scene`] (which nodes are shown, and where), [`primitive`], [`accessor`],
-//! [`buffers`].
+//! [`buffers`]; and for surfaces [`model`] (the document's other half), [`materials`], [`images`], [`cameras`].
 
 mod accessor;
 mod buffers;
+mod cameras;
 mod container;
 mod document;
+mod images;
+mod materials;
+mod model;
+mod ngons;
 mod primitive;
 mod scene;
 mod transform;
 
 use self::accessor::Reader;
+use self::materials::Materials;
+use self::model::Lists;
 use self::primitive::Primitive;
 use super::import::Context;
 use super::raw::RawMesh;
@@ -32,20 +39,28 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
         (bytes, None)
     };
     let root = document::parse(json, cx)?;
-    let instances = scene::instances(&root, cx)?;
+    let lists = Lists::of(json);
+    let scene = scene::scene(&root, cx)?;
+    raw.cameras = cameras::cameras(&scene.cameras, &lists, &mut raw.report.warnings);
 
-    let mut primitives = Primitives { root: &root, reader: Reader::new(&root, bin), of_mesh: Vec::new() };
-    primitives.of_mesh.resize(root.meshes.len(), None);
-    let default_material = root.materials.len();
+    let mut primitives = Primitives {
+        root: &root,
+        lists: &lists,
+        reader: Reader::new(&root, bin),
+        materials: Materials::new(&lists, cx)?,
+        of_mesh: vec![None; root.meshes.len()],
+    };
+    let default_material = primitives.materials.count();
     let mut uses_default = false;
-    for instance in &instances {
+    for instance in &scene.instances {
         for primitive in primitives.of(instance.mesh, &mut raw.report.warnings, cx)?.iter() {
             uses_default |= primitive.material().is_none();
             primitive.append(&mut raw, &instance.transform, default_material, cx)?;
         }
     }
     warn_of_unread(&root, &mut raw.report.warnings);
-    raw.materials = materials(&root);
+    let (slots, images) = primitives.materials.into_slots();
+    (raw.materials, raw.images) = (slots, images.sources);
     if uses_default {
         raw.materials.push(MaterialSlot::default());
     }
@@ -55,7 +70,9 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
 /// The decoded primitives of the meshes that were asked for.
 struct Primitives<'a> {
     root: &'a Root,
+    lists: &'a Lists<'a>,
     reader: Reader<'a>,
+    materials: Materials<'a>,
     of_mesh: Vec<Option<Rc<Vec<Primitive>>>>,
 }
 
@@ -74,33 +91,36 @@ impl Primitives<'_> {
         if let Some(done) = &self.of_mesh[mesh] {
             return Ok(Rc::clone(done));
         }
+        let has_ngons = self.ngons(mesh);
         let mut primitives = Vec::new();
         for (i, primitive) in json.primitives.iter().enumerate() {
-            let what = format!("primitive {i} of mesh {mesh}");
-            let material = primitive.material.map(|m| m.value());
-            if material.is_some_and(|m| m >= self.root.materials.len()) {
-                let material = material.unwrap_or_default();
-                return Err(MeshError::broken(format!(
-                    "{what} of the glTF file uses material {material}, which is not there"
-                )));
-            }
-            primitives.extend(Primitive::read(&what, primitive, &mut self.reader, warnings, cx)?);
+            let source = primitive::Source {
+                what: format!("primitive {i} of mesh {mesh}"),
+                json: primitive,
+                has_ngons: has_ngons.get(i).copied().unwrap_or(false),
+            };
+            primitives.extend(Primitive::read(&source, &mut self.reader, &mut self.materials, warnings, cx)?);
         }
         let primitives = Rc::new(primitives);
         self.of_mesh[mesh] = Some(Rc::clone(&primitives));
         Ok(primitives)
     }
+
+    /// Which primitives of a mesh keep their polygons in the order of triangles.
+    fn ngons(&self, mesh: usize) -> Vec<bool> {
+        if !self.root.extensions_used.iter().any(|name| name == "FB_ngon_encoding") {
+            return Vec::new();
+        }
+        let json: model::MeshExtensions = model::entry("mesh", &self.lists.meshes, mesh).unwrap_or_default();
+        json.primitives.iter().map(|primitive| primitive.extensions.ngons.is_some()).collect()
+    }
 }
 
-fn materials(root: &Root) -> Vec<MaterialSlot> {
-    root.materials
-        .iter()
-        .map(|material| MaterialSlot {
-            name: material.name.clone().unwrap_or_default(),
-            base_color: Some(material.pbr_metallic_roughness.base_color_factor.0),
-            ..MaterialSlot::default()
-        })
-        .collect()
+/// A file may have 100,000 primitives of a kind that is not drawn.
+fn warn_once(warnings: &mut Vec<Warning>, code: &'static str, detail: String) {
+    if warnings.iter().all(|w| w.code != code) {
+        warnings.push(Warning { code, detail });
+    }
 }
 
 fn warn_of_unread(root: &Root, warnings: &mut Vec<Warning>) {

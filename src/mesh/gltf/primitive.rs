@@ -1,7 +1,10 @@
 //! A primitive: its triangles and vertices, decoded once however many nodes show it.
 
 use super::accessor::{Integers, Reader};
+use super::materials::Materials;
+use super::ngons;
 use super::transform::Affine;
+use super::warn_once;
 use crate::mesh::import::Context;
 use crate::mesh::polygon::ALL_EDGES;
 use crate::mesh::raw::{RawMesh, extend_attribute};
@@ -18,18 +21,33 @@ pub struct Primitive {
     uvs: Vec<[f64; 2]>,
     colors: Vec<[f64; 4]>,
     triangles: Vec<[u32; 3]>,
+    /// As [`RawMesh::edge_masks`]; empty where every edge is a polygon's.
+    edge_masks: Vec<u8>,
+    /// As [`crate::mesh::ImportReport::polygons_by_arity`].
+    polygons_by_arity: [u64; 13],
     material: Option<usize>,
 }
 
+/// Where a primitive comes from.
+pub struct Source<'a> {
+    /// How errors speak of it.
+    pub what: String,
+    /// The document's part.
+    pub json: &'a mesh::Primitive,
+    /// Whether the order of its triangles tells its polygons.
+    pub has_ngons: bool,
+}
+
 impl Primitive {
-    /// Decodes a primitive; `what` names it in errors. None if it has nothing that is drawn.
+    /// Decodes a primitive. None if it has nothing that is drawn.
     pub fn read(
-        what: &str,
-        json: &mesh::Primitive,
+        source: &Source<'_>,
         reader: &mut Reader<'_>,
+        materials: &mut Materials<'_>,
         warnings: &mut Vec<Warning>,
         cx: &mut Context<'_>,
     ) -> Result<Option<Self>, MeshError> {
+        let (what, json) = (&source.what, source.json);
         let Checked::Valid(mode) = json.mode else {
             return Err(MeshError::broken(format!("{what} of the glTF file has an unknown mode")));
         };
@@ -48,26 +66,29 @@ impl Primitive {
             return Ok(None);
         };
         reader.check_not_compressed(position)?;
+        let material = json.material.map(|m| m.value());
+        let uv_set = match material {
+            Some(index) => materials.uv_set(what, index, reader, warnings, cx)?,
+            None => None,
+        };
         let positions: Vec<[f64; 3]> = reader.vectors(position, Type::Vec3, Integers::AsDeclared, cx)?;
         let count = positions.len();
-        let same_count = |name: &str, len: usize| match len == count {
-            true => Ok(()),
-            false => Err(MeshError::broken(format!(
-                "{what} of the glTF file has {count} positions and {len} values of {name}"
-            ))),
-        };
-        let mut out = Self { positions, material: json.material.map(|m| m.value()), ..Self::default() };
+        let mut out = Self { positions, material, ..Self::default() };
         if let Some(index) = attribute(Semantic::Normals) {
             out.normals = reader.vectors(index, Type::Vec3, Integers::AsDeclared, cx)?;
-            same_count("NORMAL", out.normals.len())?;
+            same_count(what, "NORMAL", count, out.normals.len())?;
         }
-        if let Some(index) = attribute(Semantic::TexCoords(0)) {
+        let set = uv_set.unwrap_or(0);
+        if let Some(index) = attribute(Semantic::TexCoords(set)) {
             out.uvs = reader.vectors(index, Type::Vec2, Integers::AsDeclared, cx)?;
-            same_count("TEXCOORD_0", out.uvs.len())?;
+            same_count(what, &format!("TEXCOORD_{set}"), count, out.uvs.len())?;
+        } else if uv_set.is_some() {
+            let detail = format!("{what} has a texture and no TEXCOORD_{set} that says where it goes");
+            warn_once(warnings, "uvs_missing", detail);
         }
         if let Some(index) = attribute(Semantic::Colors(0)) {
             out.colors = read_colors(reader, index, cx)?;
-            same_count("COLOR_0", out.colors.len())?;
+            same_count(what, "COLOR_0", count, out.colors.len())?;
         }
         let indices = match json.indices {
             Some(index) => Some(reader.indices(index.value(), cx)?),
@@ -79,6 +100,12 @@ impl Primitive {
             )));
         }
         out.triangles = triangles(mode, indices.as_deref(), count, cx)?;
+        if source.has_ngons && mode == Mode::Triangles {
+            cx.budget.spend("glTF polygons", out.triangles.len() as u64, 1)?;
+            (out.edge_masks, out.polygons_by_arity) = ngons::edge_masks(&out.triangles);
+        } else {
+            out.polygons_by_arity[3] = out.triangles.len() as u64;
+        }
         Ok(Some(out))
     }
 
@@ -113,10 +140,13 @@ impl Primitive {
             let [b, c] = if mirrored { [c, b] } else { [b, c] };
             [a + base, b + base, c + base]
         }));
+        raw.edge_masks.extend(self.edge_masks.iter().map(|&m| if mirrored { ngons::mirrored(m) } else { m }));
         raw.edge_masks.resize(raw.triangles.len(), ALL_EDGES);
         raw.triangle_materials.resize(raw.triangles.len(), self.material.unwrap_or(default_material) as u32);
         raw.report.file_vertices += self.positions.len() as u64;
-        raw.report.polygons_by_arity[3] += self.triangles.len() as u64;
+        for (all, own) in raw.report.polygons_by_arity.iter_mut().zip(self.polygons_by_arity) {
+            *all += own;
+        }
         Ok(())
     }
 
@@ -126,6 +156,13 @@ impl Primitive {
     }
 }
 
+fn same_count(what: &str, name: &str, positions: usize, values: usize) -> Result<(), MeshError> {
+    if positions == values {
+        return Ok(());
+    }
+    Err(MeshError::broken(format!("{what} of the glTF file has {positions} positions and {values} values of {name}")))
+}
+
 fn read_colors(reader: &mut Reader<'_>, index: usize, cx: &mut Context<'_>) -> Result<Vec<[f64; 4]>, MeshError> {
     if reader.shape(index)?.0 == Type::Vec3 {
         let colors: Vec<[f64; 3]> = reader.vectors(index, Type::Vec3, Integers::Normalised, cx)?;
@@ -133,13 +170,6 @@ fn read_colors(reader: &mut Reader<'_>, index: usize, cx: &mut Context<'_>) -> R
         return Ok(colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect());
     }
     reader.vectors(index, Type::Vec4, Integers::Normalised, cx)
-}
-
-/// A file may have 100,000 primitives of a kind that is not drawn.
-fn warn_once(warnings: &mut Vec<Warning>, code: &'static str, detail: String) {
-    if warnings.iter().all(|w| w.code != code) {
-        warnings.push(Warning { code, detail });
-    }
 }
 
 /// The triangles of a list, strip or fan. Indices that do not make up a whole triangle are left over.

@@ -1,5 +1,6 @@
 //! Which meshes the default scene shows, and where.
 
+use super::cameras::Placed;
 use super::transform::Affine;
 use crate::limits;
 use crate::mesh::MeshError;
@@ -15,14 +16,24 @@ pub struct Instance {
     pub transform: Affine,
 }
 
-/// The instances of the default scene, in the order of the node tree. A file without nodes shows all its meshes.
-pub fn instances(root: &Root, cx: &mut Context<'_>) -> Result<Vec<Instance>, MeshError> {
+/// What the default scene shows, in the order of the node tree.
+#[derive(Debug, Default)]
+pub struct Scene {
+    /// Its meshes.
+    pub instances: Vec<Instance>,
+    /// Its cameras.
+    pub cameras: Vec<Placed>,
+}
+
+/// The default scene. A file without nodes shows all its meshes.
+pub fn scene(root: &Root, cx: &mut Context<'_>) -> Result<Scene, MeshError> {
     if root.nodes.is_empty() && root.scenes.is_empty() {
         let all = 0..root.meshes.len();
-        return Ok(all.map(|mesh| Instance { mesh, transform: Affine::IDENTITY }).collect());
+        let instances = all.map(|mesh| Instance { mesh, transform: Affine::IDENTITY }).collect();
+        return Ok(Scene { instances, cameras: Vec::new() });
     }
     let roots = roots(root)?;
-    Walk { root, on_path: vec![false; root.nodes.len()], met: 0, found: Vec::new() }.run(roots, cx)
+    Walk { root, on_path: vec![false; root.nodes.len()], met: 0, found: Scene::default() }.run(roots, cx)
 }
 
 /// The root nodes of the default scene: the named one, or the first, or all nodes that are no node's child.
@@ -48,7 +59,7 @@ struct Walk<'a> {
     root: &'a Root,
     on_path: Vec<bool>,
     met: u64,
-    found: Vec<Instance>,
+    found: Scene,
 }
 
 enum Step {
@@ -57,7 +68,7 @@ enum Step {
 }
 
 impl Walk<'_> {
-    fn run(mut self, roots: Vec<usize>, cx: &mut Context<'_>) -> Result<Vec<Instance>, MeshError> {
+    fn run(mut self, roots: Vec<usize>, cx: &mut Context<'_>) -> Result<Scene, MeshError> {
         self.meet(roots.len(), cx)?;
         let mut steps: Vec<Step> = roots.into_iter().rev().map(|node| Step::Enter(node, Affine::IDENTITY)).collect();
         while let Some(step) = steps.pop() {
@@ -92,7 +103,12 @@ impl Walk<'_> {
         }
         let transform = parent.after(&Affine::of(node));
         if let Some(mesh) = node.mesh {
-            self.found.push(Instance { mesh: mesh.value(), transform });
+            self.found.instances.push(Instance { mesh: mesh.value(), transform });
+        }
+        if let Some(camera) = node.camera {
+            cx.budget.spend("cameras", 1, 1024)?;
+            let name = node.name.as_deref().map(|name| name.chars().take(200).collect());
+            self.found.cameras.push(Placed { camera: camera.value(), name, transform });
         }
         steps.push(Step::Leave(index));
         let children = node.children.as_deref().unwrap_or_default();

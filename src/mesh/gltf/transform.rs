@@ -41,6 +41,11 @@ impl Affine {
         Self { linear, translation: self.point(inner.translation) }
     }
 
+    /// Where the three axes lead.
+    pub fn columns(&self) -> [[f64; 3]; 3] {
+        std::array::from_fn(|column| std::array::from_fn(|row| self.linear[row][column]))
+    }
+
     /// A transformed point.
     pub fn point(&self, p: [f64; 3]) -> [f64; 3] {
         if *self == Self::IDENTITY {

@@ -1,0 +1,30 @@
+//! Vectors of three.
+
+/// Scalar product.
+pub fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
+}
+
+/// `a - b`
+pub fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// Vector product.
+pub fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// What of `v` is at right angles to the unit vector `n`, at length about 1 where that is not nothing.
+pub fn across(v: [f32; 3], n: [f32; 3]) -> [f32; 3] {
+    let largest = v.iter().fold(0.0_f32, |most, c| most.max(c.abs()));
+    let v = if largest > 0.0 { v.map(|c| c / largest) } else { v };
+    let along = dot(v, n);
+    std::array::from_fn(|k| v[k] - along * n[k])
+}
+
+/// At length 1, unless it has no direction to speak of.
+pub fn unit_or(v: [f32; 3], otherwise: [f32; 3]) -> [f32; 3] {
+    let length_squared = dot(v, v);
+    if length_squared > 1e-20 && length_squared < 1e30 { v.map(|c| c / length_squared.sqrt()) } else { otherwise }
+}

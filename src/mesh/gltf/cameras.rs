@@ -1,0 +1,72 @@
+//! Cameras of the scene.
+
+use super::model::{self, Lists, entry};
+use super::transform::Affine;
+use crate::mesh::material::{FileCamera, FileLens};
+use crate::mesh::{MeshError, Warning};
+
+/// A node that shows a camera.
+#[derive(Debug)]
+pub struct Placed {
+    /// Index of the camera.
+    pub camera: usize,
+    /// The node's name.
+    pub name: Option<String>,
+    /// From node to scene space.
+    pub transform: Affine,
+}
+
+/// Reads the cameras of the default scene. A broken one is left out: most pictures are taken through none of them.
+pub fn cameras(placed: &[Placed], lists: &Lists<'_>, warnings: &mut Vec<Warning>) -> Vec<FileCamera> {
+    let mut cameras = Vec::new();
+    for place in placed {
+        match camera(place, lists) {
+            Ok(camera) => cameras.push(camera),
+            Err(error) => super::warn_once(warnings, "camera_ignored", format!("a camera is left out: {error}")),
+        }
+    }
+    cameras
+}
+
+fn camera(place: &Placed, lists: &Lists<'_>) -> Result<FileCamera, MeshError> {
+    let index = place.camera;
+    let json: model::Camera = entry("camera", &lists.cameras, index)?;
+    let broken = |what: &str| MeshError::broken(format!("camera {index} of the glTF file {what}"));
+    let lens = match (&json.perspective, &json.orthographic) {
+        (Some(lens), _) if lens.yfov > 0.0 && lens.yfov < std::f64::consts::PI => {
+            FileLens::Perspective { fov_deg: lens.yfov.to_degrees() }
+        }
+        (Some(_), _) => return Err(broken("has a field of view that is not between 0 and half a turn")),
+        (None, Some(lens)) if lens.ymag != 0.0 && (2.0 * lens.ymag).is_finite() => {
+            FileLens::Orthographic { height: 2.0 * lens.ymag.abs() }
+        }
+        (None, Some(_)) => return Err(broken("has no height")),
+        (None, None) => return Err(broken("has neither a perspective nor an orthographic lens")),
+    };
+    let eye = place.transform.point([0.0; 3]);
+    let axes = axes(&place.transform).ok_or_else(|| broken("is scaled to nothing"))?;
+    if !eye.iter().all(|c| c.is_finite()) {
+        return Err(broken("is infinitely far away"));
+    }
+    let name = json.name.filter(|name| !name.is_empty()).or_else(|| place.name.clone()).unwrap_or_default();
+    Ok(FileCamera { name, eye, axes, lens })
+}
+
+/// Cameras look along -Z with +Y up. Scales and mirrorings of a node do not reach the picture.
+fn axes(transform: &Affine) -> Option<[[f64; 3]; 3]> {
+    let [_, up, back] = transform.columns();
+    let back = unit(back)?;
+    let right = unit(cross(unit(up)?, back))?;
+    Some([right, cross(back, right), back])
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
+    let largest = v.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+    let v = v.map(|c| c / largest);
+    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    (length >= 1.0 && length.is_finite()).then(|| v.map(|c| c / length))
+}

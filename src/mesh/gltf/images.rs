@@ -1,0 +1,159 @@
+//! Textures, samplers and images: what a material's use of a texture refers to.
+
+use super::accessor::Reader;
+use super::buffers::{self, Uri};
+use super::model::{self, Lists, TextureInfo, Transform, entry};
+use crate::mesh::import::Context;
+use crate::mesh::material::{ImageContent, ImageSource, TextureRef, Wrap};
+use crate::mesh::{MeshError, Warning};
+use std::collections::BTreeMap;
+
+/// The images that drawn materials use, collected while they are read.
+#[derive(Debug, Default)]
+pub struct Images {
+    /// In the order of their first use.
+    pub sources: Vec<ImageSource>,
+    /// Index into `sources` by the file's image index, and whether it is in a format that is not read.
+    known: BTreeMap<(usize, bool), u32>,
+}
+
+impl Images {
+    /// What a texture of the file refers to; `what` names the material. None where the texture has no image.
+    pub fn texture(
+        &mut self,
+        what: &str,
+        info: &TextureInfo,
+        lists: &Lists<'_>,
+        reader: &mut Reader<'_>,
+        warnings: &mut Vec<Warning>,
+        cx: &mut Context<'_>,
+    ) -> Result<Option<TextureRef>, MeshError> {
+        let index = info.index.0;
+        if index >= lists.textures.len() {
+            return Err(MeshError::broken(format!(
+                "{what} of the glTF file uses texture {index}, and there are {}",
+                lists.textures.len()
+            )));
+        }
+        let texture: model::Texture = entry("texture", &lists.textures, index)?;
+        let in_other = |other: &Option<model::OtherSource>| other.as_ref().and_then(|other| other.source);
+        let (image, is_unread) = match (in_other(&texture.extensions.webp), texture.source) {
+            (Some(webp), _) => (webp.0, false),
+            (None, Some(source)) => (source.0, false),
+            (None, None) => match in_other(&texture.extensions.basisu) {
+                Some(basisu) => (basisu.0, true),
+                None => {
+                    let detail = format!("texture {index} has no image that is read; it is drawn as if it were white");
+                    super::warn_once(warnings, "texture_without_image", detail);
+                    return Ok(None);
+                }
+            },
+        };
+        let image = self.image(index, image, is_unread, lists, reader, cx)?;
+        let sampler = match texture.sampler {
+            Some(sampler) => entry::<model::Sampler>("sampler", &lists.samplers, sampler.0)?,
+            None => model::Sampler::default(),
+        };
+        Ok(Some(TextureRef {
+            image,
+            transform: info.extensions.transform.as_ref().map_or(TextureRef::IDENTITY, transform),
+            wrap: [sampler.wrap_s, sampler.wrap_t].map(wrap),
+            nearest: sampler.mag_filter == Some(GL_NEAREST),
+        }))
+    }
+
+    fn image(
+        &mut self,
+        texture: usize,
+        index: usize,
+        is_unread: bool,
+        lists: &Lists<'_>,
+        reader: &mut Reader<'_>,
+        cx: &mut Context<'_>,
+    ) -> Result<u32, MeshError> {
+        if let Some(&known) = self.known.get(&(index, is_unread)) {
+            return Ok(known);
+        }
+        if index >= lists.images.len() {
+            return Err(MeshError::broken(format!(
+                "texture {texture} of the glTF file uses image {index}, and there are {}",
+                lists.images.len()
+            )));
+        }
+        cx.deadline.check()?;
+        let raw_bytes = lists.images[index].get().len() as u64;
+        cx.budget.spend("a glTF image's description", raw_bytes, 1)?;
+        let image: model::Image = entry("image", &lists.images, index)?;
+        let name = name(index, &image);
+        let content = if is_unread {
+            ImageContent::Missing(format!(
+                "{name} is a Basis Universal texture (KHR_texture_basisu), which is not read: export the model with PNG, JPEG or WebP images"
+            ))
+        } else {
+            content(&name, index, &image, reader, cx)?
+        };
+        cx.budget.spend("images", 1, size_of::<ImageSource>() as u64 * 2 + 64)?;
+        let place = self.sources.len() as u32;
+        self.sources.push(ImageSource { name, content });
+        self.known.insert((index, is_unread), place);
+        Ok(place)
+    }
+}
+
+/// The bytes of an image, still encoded.
+fn content(
+    name: &str,
+    index: usize,
+    image: &model::Image,
+    reader: &mut Reader<'_>,
+    cx: &mut Context<'_>,
+) -> Result<ImageContent, MeshError> {
+    if let Some(view) = image.buffer_view {
+        let view = reader.view(view.0, cx)?;
+        cx.budget.spend("an image of the glTF file", view.bytes().len() as u64, 1)?;
+        return Ok(ImageContent::Encoded(view.bytes().into()));
+    }
+    match &image.uri {
+        Some(uri) => Ok(match buffers::from_uri(uri, &format!("image {index}"), cx)? {
+            Uri::Bytes(bytes) => {
+                cx.budget.spend("an image of the glTF file", bytes.len() as u64, 1)?;
+                ImageContent::Encoded(bytes.into())
+            }
+            Uri::Outside(sentence) => ImageContent::Missing(sentence),
+        }),
+        None => Err(MeshError::broken(format!("{name} of the glTF file has neither a URI nor a buffer view"))),
+    }
+}
+
+/// `image 3 ("wood.png")`
+fn name(index: usize, image: &model::Image) -> String {
+    let file = image.uri.as_deref().filter(|uri| uri.get(..5).is_none_or(|head| !head.eq_ignore_ascii_case("data:")));
+    let known = image.name.as_deref().filter(|name| !name.is_empty()).or(file).unwrap_or_default();
+    match buffers::printable(known).as_str() {
+        "" => format!("image {index}"),
+        known => format!("image {index} (\"{known}\")"),
+    }
+}
+
+const GL_NEAREST: f64 = 9728.0;
+const GL_CLAMP_TO_EDGE: f64 = 33071.0;
+const GL_MIRRORED_REPEAT: f64 = 33648.0;
+
+fn wrap(mode: Option<f64>) -> Wrap {
+    match mode {
+        Some(GL_CLAMP_TO_EDGE) => Wrap::Clamp,
+        Some(GL_MIRRORED_REPEAT) => Wrap::Mirror,
+        _ => Wrap::Repeat,
+    }
+}
+
+/// Scaled, then turned counter-clockwise as the image is seen (v runs down), then moved. The extension's own example fixes
+/// the direction: a quarter turn and an offset of (0, 1) show the lower left quadrant.
+fn transform(json: &Transform) -> [[f32; 3]; 2] {
+    // Large enough for any atlas, small enough that no product of two is infinite.
+    let tame = |v: f64| v.clamp(-1e6, 1e6);
+    let (sin, cos) = libm::sincos(json.rotation.unwrap_or(0.0));
+    let [x, y] = json.offset.unwrap_or([0.0; 2]).map(tame);
+    let [width, height] = json.scale.unwrap_or([1.0; 2]).map(tame);
+    [[cos * width, sin * height, x], [-sin * width, cos * height, y]].map(|row| row.map(|v| v as f32))
+}

@@ -1,0 +1,342 @@
+//! Images to textures: every kind of pixel and every level.
+
+use std::io::Cursor;
+use std::time::{Duration, Instant};
+
+use crate::mesh_files::{Gltf, Noise, read};
+use crate::scenes;
+use image::{DynamicImage, ImageFormat};
+use meshsnap::limits::{Budget, Limits};
+use meshsnap::mesh::Mesh;
+use meshsnap::plan::{self, DrawPlan, PlanError, SkipKind, TEXTURE_NONE, Texture, Textures, slots};
+use serde_json::{Value, json};
+
+/// Triangles with texture coordinates, and one material with one image.
+pub fn model(corners: &[[[f32; 3]; 3]], uvs: &[[[f32; 2]; 3]], image: &[u8], material: Value) -> Mesh {
+    let mut gltf = Gltf::default();
+    let p = gltf.floats("VEC3", corners.as_flattened().as_flattened());
+    let t = gltf.floats("VEC2", uvs.as_flattened().as_flattened());
+    gltf.mesh(json!({ "attributes": { "POSITION": p, "TEXCOORD_0": t }, "material": 0 }));
+    let view = gltf.view(image);
+    gltf.json["nodes"] = json!([{ "mesh": 0 }]);
+    // A word for it that is a lie.
+    gltf.json["images"] = json!([{ "bufferView": view, "mimeType": "image/vnd.radiance" }]);
+    gltf.json["textures"] = json!([{ "source": 0 }]);
+    gltf.json["materials"] = json!([material]);
+    read(&gltf.glb()).unwrap()
+}
+
+pub fn base() -> Value {
+    json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } })
+}
+
+const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+const UVS: [[f32; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+
+pub fn model_of(image: &[u8]) -> Mesh {
+    model(&[TRIANGLE], &[UVS], image, base())
+}
+
+pub fn encode(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
+    let mut out = Cursor::new(Vec::new());
+    image.write_to(&mut out, format).unwrap();
+    out.into_inner()
+}
+
+fn plan_of<'a>(mesh: &'a Mesh, keep: &[SkipKind], limits: &Limits) -> Result<DrawPlan<'a>, PlanError> {
+    plan::build_keeping(mesh, &scenes::spec(&[("style", "smooth"), ("size", "64")]), &mut Budget::new(limits), keep)
+}
+
+/// All levels of the textures.
+fn textures(mesh: &Mesh) -> Textures {
+    plan_of(mesh, &[SkipKind::FineTextureLevels], &Limits::default()).unwrap().surface.unwrap().textures
+}
+
+fn error(mesh: &Mesh) -> PlanError {
+    plan_of(mesh, &[], &Limits::default()).unwrap_err()
+}
+
+fn value(half: u16) -> f64 {
+    let (exponent, fraction) = (i32::from(half >> 10 & 31), f64::from(half & 1023));
+    assert!(half < 0x7c00, "neither negative nor infinite");
+    if exponent == 0 { fraction * 2.0_f64.powi(-24) } else { (1.0 + fraction / 1024.0) * 2.0_f64.powi(exponent - 15) }
+}
+
+fn linear(v: f64) -> f64 {
+    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}
+
+fn noise(width: u32, height: u32, channels: usize, seed: u64) -> Vec<u8> {
+    let mut bytes = Noise(seed).bytes((width * height) as usize * channels);
+    // Some texels without any alpha, and whole blocks of them.
+    if channels == 4 {
+        for (i, pixel) in bytes.chunks_exact_mut(4).enumerate() {
+            let (x, y) = (i as u32 % width, i as u32 / width);
+            if pixel[3] < 64 || (x < width / 2 && y < height / 2) {
+                pixel[3] = 0;
+            }
+        }
+    }
+    bytes
+}
+
+/// The levels by their definition, in f64: overlaps of squares, colours weighted by alpha.
+fn levels(width: u32, height: u32, first: Vec<[f64; 4]>, weigh: bool) -> Vec<Vec<[f64; 4]>> {
+    let mut all = vec![first];
+    let (mut w, mut h) = (width, height);
+    while w > 1 || h > 1 {
+        let (nw, nh) = ((w / 2).max(1), (h / 2).max(1));
+        let last = &all[all.len() - 1];
+        let overlap = |a: u32, n: u32, b: u32, m: u32| {
+            let (scale, a, b) = (f64::from(m) / f64::from(n), f64::from(a), f64::from(b));
+            ((a + 1.0) * scale).min(b + 1.0) - (a * scale).max(b)
+        };
+        let mut next = Vec::new();
+        for y in 0..nh {
+            for x in 0..nw {
+                let (mut plain, mut weighted, mut area) = ([0.0; 3], [0.0; 4], 0.0);
+                for sy in 0..h {
+                    for sx in 0..w {
+                        let part = overlap(x, nw, sx, w).max(0.0) * overlap(y, nh, sy, h).max(0.0);
+                        let texel = last[(sy * w + sx) as usize];
+                        area += part;
+                        weighted[3] += part * texel[3];
+                        for k in 0..3 {
+                            plain[k] += part * texel[k];
+                            weighted[k] += part * texel[3] * texel[k];
+                        }
+                    }
+                }
+                let [r, g, b] = plain.map(|v| v / area);
+                next.push(if weigh && weighted[3] > 0.0 {
+                    let [r, g, b, a] = weighted;
+                    [r / a, g / a, b / a, a / area]
+                } else {
+                    [r, g, b, weighted[3] / area]
+                });
+            }
+        }
+        all.push(next);
+        (w, h) = (nw, nh);
+    }
+    all
+}
+
+fn assert_levels(textures: &Textures, image: &Texture, expected: &[Vec<[f64; 4]>], name: &str) {
+    assert_eq!((image.first_level, image.levels as usize), (0, expected.len()), "{name}");
+    let texels = &textures.texels[image.first_texel as usize..];
+    for (got, want) in texels.iter().zip(expected.iter().flatten()) {
+        for (got, want) in got.iter().zip(want) {
+            let off = (value(*got) - want).abs();
+            assert!(
+                off <= want * 2.0_f64.powi(-11) * 1.01 + 2.0_f64.powi(-25) * 1.01,
+                "{name}: {} is not {want}",
+                value(*got)
+            );
+        }
+    }
+}
+
+#[test]
+fn every_level_is_the_mean_of_what_it_covers() {
+    let sizes = [(1, 1), (2, 2), (16, 1), (1, 7), (13, 7), (5, 5), (32, 24), (31, 33)];
+    let mut cases = 0;
+    for (width, height) in sizes {
+        for channels in [3, 4] {
+            let bytes = noise(width, height, channels, 7 + u64::from(width));
+            let pixels = bytes.chunks_exact(channels).map(|p| [p[0], p[1], p[2], *p.get(3).unwrap_or(&255)]);
+            let pixels: Vec<[f64; 4]> = pixels.map(|p| p.map(|v| f64::from(v) / 255.0)).collect();
+            let picture: DynamicImage = if channels == 3 {
+                image::RgbImage::from_raw(width, height, bytes).unwrap().into()
+            } else {
+                image::RgbaImage::from_raw(width, height, bytes).unwrap().into()
+            };
+            // Read as colour and as data.
+            let material = json!({ "pbrMetallicRoughness":
+                { "baseColorTexture": { "index": 0 }, "metallicRoughnessTexture": { "index": 0 } } });
+            let mesh = model(&[TRIANGLE], &[UVS], &encode(&picture, ImageFormat::Png), material);
+            let textures = textures(&mesh);
+            let [color, data] = &textures.images[..] else { panic!("{} textures", textures.images.len()) };
+            assert_eq!((color.width, color.height), (width, height));
+            let lit = pixels.iter().map(|&[r, g, b, a]| [linear(r), linear(g), linear(b), a]).collect();
+            let name = format!("{width}x{height}x{channels}");
+            assert_levels(&textures, color, &levels(width, height, lit, channels == 4), &name);
+            assert_levels(&textures, data, &levels(width, height, pixels, false), &name);
+            let all: usize =
+                levels(width, height, vec![[0.0; 4]; (width * height) as usize], false).iter().map(Vec::len).sum();
+            assert_eq!((data.first_texel as usize, textures.texels.len()), (all, 2 * all));
+            cases += 1;
+        }
+    }
+    assert_eq!(cases, 16);
+}
+
+#[test]
+fn every_kind_of_pixel_and_file() {
+    let rgba = image::RgbaImage::from_raw(9, 6, noise(9, 6, 4, 3)).unwrap();
+    let picture = DynamicImage::from(rgba);
+    let kinds = [
+        (DynamicImage::from(picture.to_luma8()), ImageFormat::Png),
+        (picture.to_luma_alpha8().into(), ImageFormat::Png),
+        (picture.to_rgb8().into(), ImageFormat::Png),
+        (picture.to_luma16().into(), ImageFormat::Png),
+        (picture.to_luma_alpha16().into(), ImageFormat::Png),
+        (picture.to_rgb16().into(), ImageFormat::Png),
+        (picture.to_rgba16().into(), ImageFormat::Png),
+        (picture.to_rgb8().into(), ImageFormat::WebP),
+        (picture.clone(), ImageFormat::WebP),
+    ];
+    for (picture, format) in &kinds {
+        let textures = textures(&model_of(&encode(picture, *format)));
+        let wide = picture.to_rgba32f();
+        let expected: Vec<[f64; 4]> = wide.pixels().map(|p| p.0.map(f64::from)).collect();
+        let texels = &textures.texels[..54];
+        for (texel, [r, g, b, a]) in texels.iter().zip(expected) {
+            for (got, want) in texel.iter().zip([linear(r), linear(g), linear(b), a]) {
+                assert!(
+                    (value(*got) - want).abs() < 1e-3,
+                    "{:?} {format:?}: {} is not {want}",
+                    picture.color(),
+                    value(*got)
+                );
+            }
+        }
+    }
+    assert_eq!(kinds.len(), 9);
+    // A palette, by hand: two colours.
+    let palette =
+        png(&[(b"IHDR", &header(2, 1, 1, 3)), (b"PLTE", &[255, 0, 0, 0, 255, 0]), (b"IDAT", &zlib(&[0, 0b0100_0000]))]);
+    let texels = textures(&model_of(&palette)).texels;
+    assert_eq!(texels[..2], [[0x3c00, 0, 0, 0x3c00], [0, 0x3c00, 0, 0x3c00]]);
+    // JPEG loses something, and grey stays grey.
+    let grey = image::GrayImage::from_pixel(16, 16, image::Luma([188]));
+    for picture in [DynamicImage::from(grey.clone()), DynamicImage::from(DynamicImage::from(grey).to_rgb8())] {
+        let texels = textures(&model_of(&encode(&picture, ImageFormat::Jpeg))).texels;
+        assert!(texels.iter().all(|t| (value(t[0]) - 0.503).abs() < 0.01 && t[3] == 0x3c00), "{:?}", texels[0]);
+    }
+}
+
+fn header(width: u32, height: u32, depth: u8, color: u8) -> Vec<u8> {
+    [&width.to_be_bytes()[..], &height.to_be_bytes(), &[depth, color, 0, 0, 0]].concat()
+}
+
+fn png(chunks: &[(&[u8; 4], &[u8])]) -> Vec<u8> {
+    let mut out = b"\x89PNG\r\n\x1a\n".to_vec();
+    for (kind, data) in chunks.iter().copied().chain([(b"IEND", &[][..])]) {
+        out.extend((data.len() as u32).to_be_bytes());
+        let body = [&kind[..], data].concat();
+        let mut crc = u32::MAX;
+        for byte in &body {
+            crc ^= u32::from(*byte);
+            for _ in 0..8 {
+                crc = crc >> 1 ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 };
+            }
+        }
+        out.extend(body);
+        out.extend((!crc).to_be_bytes());
+    }
+    out
+}
+
+/// Stored, not compressed.
+fn zlib(data: &[u8]) -> Vec<u8> {
+    let (mut a, mut b) = (1_u32, 0_u32);
+    for byte in data {
+        a = (a + u32::from(*byte)) % 65521;
+        b = (b + a) % 65521;
+    }
+    let length = data.len() as u16;
+    [&[0x78, 1, 1][..], &length.to_le_bytes(), &(!length).to_le_bytes(), data, &(b << 16 | a).to_be_bytes()].concat()
+}
+
+#[test]
+fn broken_images_are_named() {
+    let good = encode(&image::RgbImage::from_raw(16, 16, noise(16, 16, 3, 5)).unwrap().into(), ImageFormat::Png);
+    let mut flipped = good.clone();
+    flipped[40] ^= 0x55;
+    let cases = [
+        (good[..good.len() / 2].to_vec(), "image 0 of the mesh cannot be decoded"),
+        (good[..30].to_vec(), "image 0 of the mesh cannot be decoded"),
+        (flipped, "image 0 of the mesh cannot be decoded"),
+        (b"GIF89a and so on".to_vec(), "image 0 of the mesh is neither a PNG, a JPEG nor a WebP image"),
+        (vec![0], "neither a PNG"),
+        (b"\xff\xd8\xff\xe0 no JPEG".to_vec(), "cannot be decoded"),
+        (b"RIFF\0\0\0\0WEBPVP8 no".to_vec(), "cannot be decoded"),
+        (png(&[(b"IHDR", &header(0, 5, 8, 2))]), "image 0 of the mesh"),
+    ];
+    for (bytes, part) in &cases {
+        let mesh = model_of(bytes);
+        let PlanError::Texture(sentence) = error(&mesh) else { panic!("{part}") };
+        assert!(sentence.contains(part), "{sentence}");
+        // A look that does not sample it never looks at it.
+        let spec = scenes::spec(&[("style", "smooth"), ("surface.color", "888")]);
+        let plan = scenes::plan(&mesh, &spec);
+        assert!(plan.surface.unwrap().textures.images.is_empty());
+    }
+    assert_eq!(cases.len(), 8);
+    // No bytes may panic.
+    let mut noise = Noise(99);
+    for _ in 0..300 {
+        let mut bytes = good.clone();
+        for _ in 0..3 {
+            let at = 8 + noise.next() as usize % (bytes.len() - 8);
+            bytes[at] = noise.next() as u8;
+        }
+        let _ = plan_of(&model_of(&bytes), &[], &Limits::default());
+    }
+}
+
+#[test]
+fn sizes_are_checked_before_anything_is_decoded() {
+    let bomb = png(&[(b"IHDR", &header(30_000, 30_000, 8, 6)), (b"IDAT", &zlib(&[0; 900]))]);
+    assert!(bomb.len() < 1024);
+    let mesh = model_of(&bomb);
+    let start = Instant::now();
+    let PlanError::Limit(limit) = error(&mesh) else { panic!("no limit") };
+    assert!(start.elapsed() < Duration::from_millis(50), "{:?}", start.elapsed());
+    assert_eq!((limit.flag, limit.given, limit.limit), ("--limit-texture-px", 30_000, 8192));
+    assert!(limit.to_string().contains("image 0"), "{limit}");
+
+    let picture = encode(&image::RgbImage::new(100, 50).into(), ImageFormat::Png);
+    let flag = |limits: Limits| {
+        let mesh = model_of(&picture);
+        plan_of(&mesh, &[], &limits).map(|_| ()).map_err(|e| match e {
+            PlanError::Limit(limit) => limit.flag,
+            other => panic!("{other}"),
+        })
+    };
+    let usual = Limits::default();
+    assert_eq!(flag(Limits { texture_px: 100, texture_total_px: 5000, ..usual.clone() }), Ok(()));
+    assert_eq!(flag(Limits { texture_px: 99, ..usual.clone() }), Err("--limit-texture-px"));
+    assert_eq!(flag(Limits { texture_total_px: 4999, ..usual.clone() }), Err("--limit-texture-total-px"));
+    assert_eq!(flag(Limits { memory_bytes: 100_000, ..usual }), Err("--limit-memory-bytes"));
+
+    // Within the limits, and not paid for.
+    let large = png(&[(b"IHDR", &header(8000, 8000, 16, 6)), (b"IDAT", &zlib(&[0; 900]))]);
+    let mesh = model_of(&large);
+    let start = Instant::now();
+    let small = Limits { memory_bytes: 256 << 20, ..Limits::default() };
+    assert!(matches!(plan_of(&mesh, &[], &small), Err(PlanError::Limit(_))));
+    assert!(start.elapsed() < Duration::from_millis(50), "{:?}", start.elapsed());
+}
+
+#[test]
+fn uses_are_written_as_the_shaders_read_them() {
+    let picture = encode(&image::RgbImage::new(4, 4).into(), ImageFormat::Png);
+    let material = json!({ "emissiveFactor": [1, 1, 1], "emissiveTexture": { "index": 0 },
+        "normalTexture": { "index": 0 }, "pbrMetallicRoughness": { "baseColorTexture": { "index": 0,
+        "extensions": { "KHR_texture_transform": { "offset": [0.25, 0.5], "scale": [2, 3] } } } } });
+    let mesh = model(&[TRIANGLE], &[UVS], &picture, material);
+    let plan = plan_of(&mesh, &[], &Limits::default()).unwrap();
+    let surface = plan.surface.unwrap();
+    let uses = surface.materials[0].textures;
+    assert_eq!(uses.map(|u| u.texture), [0, TEXTURE_NONE, 1, 0], "once as colour and once as data");
+    assert_eq!(uses[slots::BASE].transform, [[2.0, 0.0, 0.25], [0.0, 3.0, 0.5]]);
+    assert_eq!((uses[slots::BASE].sampler, surface.textures.images.len()), (0, 2));
+    // Without texture coordinates there is nothing to sample with.
+    let mut bare = mesh.clone();
+    bare.uvs.clear();
+    let surface = plan_of(&bare, &[], &Limits::default()).unwrap().surface.unwrap();
+    assert!(surface.materials[0].textures.iter().all(|u| u.texture == TEXTURE_NONE));
+    assert!(surface.textures.texels.is_empty());
+}
