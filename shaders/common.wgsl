@@ -69,6 +69,8 @@ struct Batch {
     line_smoothing: f32,
     line_flags: u32,
     ink_at: u32,
+    // Where the faces whose light falls on lines start in the ink.
+    owners_at: u32,
     // The role that drawn triangles have, where the plan has roles.
     role: u32,
     // Number of the layer that is looked for; 0 also for the visibility buffer.
@@ -80,6 +82,7 @@ const SHOWN_VISIBLE: u32 = 1u;
 const SHOWN_HIDDEN: u32 = 2u;
 const SKIP_BACK: u32 = 4u;
 const CONTOUR: u32 = 8u;
+const LIT_PASS: u32 = 16u;
 
 const SURFACE: u32 = 1u;
 const HULL: u32 = 2u;
@@ -92,6 +95,7 @@ const EDGE_MASKS: u32 = 128u;
 const LINES: u32 = 256u;
 const CLIPPED: u32 = 2048u;
 const FOUR_SAMPLES: u32 = 4096u;
+const LIT_LINES: u32 = 8192u;
 const ROLES: u32 = 0x100000u;
 const HULL_AMOUNTS: u32 = 0x200000u;
 const HULL_LOOKS: u32 = 0x400000u;

@@ -96,11 +96,66 @@ fn is_drawn(edge: vec4<u32>) -> bool {
     if (batch.line_flags & (SKIP_BACK | CONTOUR)) == 0u {
         return true;
     }
-    let a = looks_away(edge.z);
-    let b = looks_away(edge.w);
-    let is_back = (batch.line_flags & SKIP_BACK) != 0u && a && b;
-    let is_inner = (batch.line_flags & CONTOUR) != 0u && a == b && edge.w != NO_FACE;
-    return !is_back && !is_inner;
+    let is_contour = (batch.line_flags & CONTOUR) != 0u;
+    if (batch.line_flags & SKIP_BACK) != 0u && is_hidden(edge.z, is_contour) && is_hidden(edge.w, is_contour) {
+        return false;
+    }
+    if !is_contour {
+        return true;
+    }
+    // The faces lie on one side of the edge on screen, and none on the other.
+    let a = side_of(edge, edge.z);
+    let b = side_of(edge, edge.w);
+    return (a < 0 || b < 0) != (a > 0 || b > 0);
+}
+
+// Whether a face of a closed surface shows nothing of its edges. Of a contour, one seen from its very edge does not either.
+fn is_hidden(face: u32, is_contour: bool) -> bool {
+    return looks_away(face) || (is_contour && is_edge_on(face));
+}
+
+fn is_edge_on(face: u32) -> bool {
+    let a = vertices[triangles[3u * face]];
+    let b = vertices[triangles[3u * face + 1u]];
+    let c = vertices[triangles[3u * face + 2u]];
+    return a.x != OUTSIDE && b.x != OUTSIDE && c.x != OUTSIDE && is_zero(area_of(a, b, c));
+}
+
+// On which side of the edge a face lies on screen: -1, 1, or 0 where it is seen from its very edge or is not there.
+fn side_of(edge: vec4<u32>, face: u32) -> i32 {
+    if face == NO_FACE {
+        return 0;
+    }
+    let t = vec3(triangles[3u * face], triangles[3u * face + 1u], triangles[3u * face + 2u]);
+    let is_end = (t == vec3(edge.x)) | (t == vec3(edge.y));
+    let corner = select(select(t.z, t.y, !is_end.y), t.x, !is_end.x);
+    let a = vertices[edge.x];
+    let b = vertices[edge.y];
+    let c = vertices[corner];
+    if a.x != OUTSIDE && b.x != OUTSIDE && c.x != OUTSIDE {
+        let area = area_of(a, b, c);
+        return select(select(1, -1, is_negative(area)), 0, is_zero(area));
+    }
+    // Where a corner is behind the eye, by the side of the face's plane on which the eye is.
+    let p = homogeneous_of(edge.x);
+    let q = homogeneous_of(edge.y);
+    let r = homogeneous_of(corner);
+    let x = rn(p.y * q.w) - rn(p.w * q.y);
+    let y = rn(p.w * q.x) - rn(p.x * q.w);
+    let w = rn(p.x * q.y) - rn(p.y * q.x);
+    let volume = (rn(rn(x) * r.x) + rn(rn(y) * r.y)) + rn(rn(w) * r.w);
+    return i32(volume > 0.0) - i32(volume < 0.0);
+}
+
+fn homogeneous_of(v: u32) -> vec4<f32> {
+    return homogeneous(vec3(positions[3u * v], positions[3u * v + 1u], positions[3u * v + 2u]));
+}
+
+// The face whose light falls on the edge's line where the pixel sees no surface, plus 1: of those that look at the viewer the one
+// with the highest id, so that the order of edges does not matter; of any, where none does.
+fn lit_by(edge: vec4<u32>) -> u32 {
+    let best = max(select(edge.z + 1u, 0u, looks_away(edge.z)), select(edge.w + 1u, 0u, looks_away(edge.w)));
+    return select(edge.z + 1u, best, best > 0u);
 }
 
 // Whether a face is certainly turned away. A missing face is: it shows nothing.
@@ -120,8 +175,8 @@ fn looks_away(face: u32) -> bool {
 
 // Whether anything is left of the segment; what that is.
 fn clip_segment(ends: vec2<u32>, a: ptr<function, Vertex>, b: ptr<function, Vertex>) -> bool {
-    var p = homogeneous(vec3(positions[3u * ends.x], positions[3u * ends.x + 1u], positions[3u * ends.x + 2u]));
-    var q = homogeneous(vec3(positions[3u * ends.y], positions[3u * ends.y + 1u], positions[3u * ends.y + 2u]));
+    var p = homogeneous_of(ends.x);
+    var q = homogeneous_of(ends.y);
     for (var plane = 0u; plane < 5u; plane++) {
         let d_p = plane_distance(plane, p);
         let d_q = plane_distance(plane, q);
@@ -191,6 +246,9 @@ fn add_ink(edge: vec4<u32>, s: Segment, t: f32, pixel: vec2<i32>, coverage: u32)
     // Once a pixel is full nothing changes it, so it may stop counting long before the sum could wrap.
     if atomicLoad(&ink[at]) < 0x80000000u {
         atomicAdd(&ink[at], ink_table[level]);
+    }
+    if level > 0u && (batch.line_flags & LIT_PASS) != 0u {
+        atomicMax(&ink[batch.owners_at + pixel_at], lit_by(edge));
     }
 }
 
@@ -264,7 +322,7 @@ fn visible_samples(edge: vec4<u32>, s: Segment, t: f32, first_sample: u32) -> u3
         }
         if id != last_id {
             last_id = id;
-            last_visible = !hides(id, edge, s, t, depth);
+            last_visible = !hides(id, edge, s, t, depth, bitcast<f32>(word.y));
         }
         count += u32(last_visible);
     }
@@ -273,7 +331,9 @@ fn visible_samples(edge: vec4<u32>, s: Segment, t: f32, first_sample: u32) -> u3
 
 // Whether a triangle, which is nearer than the edge at a sample close by, really lies in front of it. Its plane is continued
 // to the edge's own point, because close to a fold the sample itself may be nearer without hiding anything.
-fn hides(id: u32, edge: vec4<u32>, s: Segment, t: f32, depth: f32) -> bool {
+//
+// Of a contour: towards a silhouette the surface falls away faster than its plane: as much again as the plane falls is granted.
+fn hides(id: u32, edge: vec4<u32>, s: Segment, t: f32, depth: f32, sample_depth: f32) -> bool {
     let is_hull = id >= frame.triangle_count;
     let index = 3u * select(id, id - frame.triangle_count, is_hull);
     let base = select(0u, frame.hull_base, is_hull);
@@ -296,7 +356,8 @@ fn hides(id: u32, edge: vec4<u32>, s: Segment, t: f32, depth: f32) -> bool {
     let point = s.start + t * s.along;
     let plane = corner + 256.0 * gx * point.x + 256.0 * gy * point.y;
     // What the surface may fall away over three quarters of a pixel: the curvature between neighbouring faces.
-    return plane > depth + 192.0 * (abs(gx) + abs(gy));
+    let fall = select(0.0, max(sample_depth - plane, 0.0), (batch.line_flags & CONTOUR) != 0u);
+    return plane - fall > depth + 192.0 * (abs(gx) + abs(gy));
 }
 
 // Whether a triangle meets the edge at an end close to t: around a vertex, the faces of one fan do not hide each other's edges.

@@ -5,6 +5,7 @@
 // thresholds[k] is the smallest linear value that is stored as k + 1 or more.
 @group(1) @binding(13) var<storage, read> thresholds: array<f32>;
 @group(1) @binding(14) var<storage, read_write> rgba: array<u32>;
+// Of each pass its colour, and whether it is lit.
 @group(1) @binding(17) var<storage, read> line_colors: array<vec4<f32>>;
 
 // Ink of full coverage.
@@ -24,11 +25,19 @@ fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroup
     if has(LINES) {
         for (var n = 0u; n < frame.line_pass_count; n++) {
             let cover = coverage(ink[n * batch.count + i]);
-            let color = line_colors[n];
+            var color = line_colors[2u * n];
+            if has(LIT_LINES) && line_colors[2u * n + 1u].x != 0.0 {
+                color = lit_color(color, colors[batch.count + i].xy);
+            }
             c = cover * color + c * (1.0 - cover * color.w);
         }
     }
     rgba[i] = encode(c);
+}
+
+// A premultiplied colour under light (A, B).
+fn lit_color(c: vec4<f32>, light: vec2<f32>) -> vec4<f32> {
+    return vec4(clamp(c.xyz * light.x + light.y * c.w, vec3(0.0), vec3(c.w)), c.w);
 }
 
 // Ink back to coverage, 0 to 1.

@@ -26,6 +26,8 @@ pub struct MeshEdge {
 pub struct EdgeList {
     /// The edges.
     pub edges: Vec<MeshEdge>,
+    /// The third face and more at an edge: the edge's index and the face, in mesh order.
+    pub further_faces: Vec<[u32; 2]>,
 }
 
 impl EdgeList {
@@ -36,7 +38,7 @@ impl EdgeList {
         budget.spend("the edges", mesh.positions.len() as u64 + 1, 4)?;
         let buckets = Buckets::of(mesh);
         let leaders = buckets.leaders(half_edges as usize);
-        Ok(Self { edges: collect(mesh, &leaders) })
+        Ok(collect(mesh, &leaders))
     }
 
     /// Whether every edge has exactly two faces, of opposite directions: then the mesh is the skin of a solid.
@@ -100,8 +102,9 @@ impl Buckets {
     }
 }
 
-fn collect(mesh: &Mesh, leaders: &[u32]) -> Vec<MeshEdge> {
+fn collect(mesh: &Mesh, leaders: &[u32]) -> EdgeList {
     let mut edges: Vec<MeshEdge> = Vec::with_capacity(leaders.len() / 2 + 1);
+    let mut further_faces = Vec::new();
     let mut edge_of_half_edge = vec![0_u32; leaders.len()];
     for (i, &leader) in leaders.iter().enumerate() {
         let (face, corner) = (i / 3, i % 3);
@@ -119,16 +122,19 @@ fn collect(mesh: &Mesh, leaders: &[u32]) -> Vec<MeshEdge> {
             });
         } else {
             // A leader comes before all that it leads.
-            let edge = &mut edges[edge_of_half_edge[leader as usize] as usize];
+            let number = edge_of_half_edge[leader as usize];
+            let edge = &mut edges[number as usize];
             if edge.face_count == 1 {
                 edge.faces[1] = face as u32;
+            } else {
+                further_faces.push([number, face as u32]);
             }
             edge.face_count += 1;
             edge.is_polygon_edge |= is_polygon_edge;
             edge.is_wound_alike |= edge.vertices == vertices;
         }
     }
-    edges
+    EdgeList { edges, further_faces }
 }
 
 #[cfg(test)]
@@ -174,6 +180,7 @@ mod tests {
         let hinge = list.edges[0];
         assert_eq!((hinge.face_count, hinge.faces), (3, [0, 1]));
         assert!(hinge.is_wound_alike);
+        assert_eq!(list.further_faces, [[0, 2]]);
     }
 
     #[test]

@@ -46,8 +46,9 @@ pub fn build_keeping<'a>(
         let outline = parts.layers[material].outline;
         outline.map_or(0.0, |outline| contour_px(mesh, &outline, &camera, size_px))
     };
-    let lines = wires::passes(mesh, spec, &parts, contour_px, camera.contains_mesh, &mut skips, budget)?;
-    let surface = surface_pass(mesh, spec, &parts, &camera, &mut skips, budget)?;
+    let mut edges = wires::Edges::default();
+    let lines = wires::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, budget)?;
+    let surface = surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, budget)?;
     let welded = surface.as_ref().and_then(|s| s.vertex_normals.as_ref()).filter(|_| mesh.normals.is_empty());
     let no_hull = skips.skip(SkipKind::Hull, !parts.has_hull(), "the look has no hull");
     let hull = (!no_hull).then(|| hull_pass(mesh, &parts, welded.map(|n| n.values.clone())));
@@ -152,6 +153,7 @@ fn surface_pass<'a>(
     spec: &Spec,
     parts: &Parts<'_>,
     camera: &Camera,
+    edges: &mut wires::Edges,
     skips: &mut Skips<'_>,
     budget: &mut Budget,
 ) -> Result<Option<SurfacePass<'a>>, PlanError> {
@@ -164,7 +166,7 @@ fn surface_pass<'a>(
     }
     let is_shaded = !skips.skip(SkipKind::Shading, !is_seen, "the surface is not seen: it only hides lines");
     let edge_masks = if parts.has_barycentric_wire() || parts.shows_edge_distance() {
-        wires::edge_masks(mesh, parts, budget)?
+        wires::edge_masks(mesh, parts, edges, budget)?
     } else {
         Vec::new()
     };

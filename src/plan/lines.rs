@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use super::DrawPlan;
+
 /// Lines along edges, of one width and colour.
 #[derive(Clone, Debug)]
 pub struct LinePass {
@@ -17,11 +19,17 @@ pub struct LinePass {
     pub shown: Shown,
     /// Whether an edge whose faces all look away can be left out: true for closed surfaces.
     pub skip_back_edges: bool,
-    /// Whether only edges of this view's silhouette are drawn: one face looks at the viewer and the other away, or there is
-    /// one face alone.
+    /// Whether only edges of this view's silhouette are drawn: those whose faces all lie on one side of them on screen.
     pub contour: bool,
-    /// Whether the surface's light falls on the line.
+    /// Whether the surface's light falls on the line; without a surface that is seen there is none, and the colour stays.
     pub lit: bool,
+}
+
+impl DrawPlan<'_> {
+    /// Whether light has to be found for any line: one wants it, and there is a surface that has it.
+    pub fn lights_lines(&self) -> bool {
+        self.surface.as_ref().is_some_and(|surface| surface.is_shaded) && self.lines.iter().any(|lines| lines.lit)
+    }
 }
 
 /// Which parts of an edge are drawn.

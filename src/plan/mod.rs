@@ -10,6 +10,7 @@ mod lights;
 mod lines;
 mod materials;
 mod parts;
+mod silhouette;
 mod skips;
 mod surface;
 mod texture_closeup;

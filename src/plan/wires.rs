@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use rapidhash::RapidHashSet;
-
 use super::parts::{FADE, Fill, Parts};
+use super::silhouette::Silhouettes;
 use super::skips::{SkipKind, Skips};
 use super::{Edge, LinePass, Shown};
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge, NO_FACE};
+use crate::mesh::topology::is_outward;
 use crate::scene::color::Rgba;
 use crate::scene::{Cull, Hidden, OutlineMethod, Spec, Topology, Wire, WireEdges, WireMethod};
 
@@ -42,14 +42,28 @@ enum Class {
     Nonmanifold,
 }
 
+/// A mesh's edges, found when something first asks for them, and then kept.
+#[derive(Default)]
+pub struct Edges(Option<EdgeList>);
+
+impl Edges {
+    fn of(&mut self, mesh: &Mesh, budget: &mut Budget) -> Result<&EdgeList, LimitExceeded> {
+        let list = match self.0.take() {
+            Some(list) => list,
+            None => EdgeList::of(mesh, budget)?,
+        };
+        Ok(self.0.insert(list))
+    }
+}
+
 /// The passes of a scene. `contour_px` is the width of each part's contour, where it has one; `is_outside` says that the eye is
 /// surely outside of the mesh.
 pub fn passes(
     mesh: &Mesh,
     spec: &Spec,
     parts: &Parts<'_>,
-    contour_px: impl Fn(usize) -> f32,
-    is_outside: bool,
+    (contour_px, is_outside): (impl Fn(usize) -> f32, bool),
+    edges: &mut Edges,
     skips: &mut Skips<'_>,
     budget: &mut Budget,
 ) -> Result<Vec<LinePass>, LimitExceeded> {
@@ -60,19 +74,19 @@ pub fn passes(
     if skips.skip(SkipKind::Adjacency, wants.is_empty(), "no line asks which triangles are neighbours") {
         return Ok(Vec::new());
     }
-    let list = EdgeList::of(mesh, budget)?;
-    let hides = parts.has_fill() || parts.needs_occluder() || spec.topology.is_some();
-    // On a closed surface that nothing shines through, seen from outside, what looks away is hidden.
-    let is_solid = hides && list.is_closed() && (0..parts.layers.len()).all(|m| parts.fill(m) != Fill::Transparent);
-    let skip_back = is_solid && is_outside && parts.common_cull() != Cull::Front;
+    let list = edges.of(mesh, budget)?;
+    let hides = parts.has_fill() || parts.needs_occluder();
+    let skip_back =
+        hides && is_outside && wants.iter().any(|w| w.hidden == Hidden::Hide) && is_solid(mesh, parts, list);
+    let silhouettes = Silhouettes::new(mesh, parts, list);
     let mut passes = Vec::new();
     for want in &wants {
-        let edges: Arc<[Edge]> = list
-            .edges
-            .iter()
-            .filter(|edge| want.draws(mesh, edge))
-            .map(|edge| Edge { vertices: edge.vertices, faces: edge.faces })
-            .collect();
+        let drawn =
+            list.edges.iter().zip(0_u32..).filter(|(edge, _)| want.draws(mesh, edge)).filter_map(|(edge, i)| {
+                let all = Edge { vertices: edge.vertices, faces: edge.faces };
+                if want.contour { silhouettes.edge(i, all) } else { Some(all) }
+            });
+        let edges: Arc<[Edge]> = drawn.collect();
         budget.spend("drawn edges", edges.len() as u64, 16)?;
         if !edges.is_empty() {
             passes.extend(want.passes(&edges, hides, skip_back));
@@ -81,13 +95,27 @@ pub fn passes(
     Ok(passes)
 }
 
+/// Whether what looks away is hidden: on a closed surface, its fronts outside, all of which is drawn and lets nothing through.
+fn is_solid(mesh: &Mesh, parts: &Parts<'_>, list: &EdgeList) -> bool {
+    let mut all = 0..parts.layers.len();
+    let covers = if parts.has_fill() { Fill::Opaque } else { Fill::None };
+    all.all(|m| parts.fill(m) == covers && parts.layers[m].surface.is_none_or(|s| s.cull != Cull::Front))
+        && list.is_closed()
+        && is_outward(mesh)
+}
+
 /// Premultiplied, opacity included.
 pub fn color(wire: &Wire) -> [f32; 4] {
     wire.color.premultiplied().map(|v| v * wire.opacity)
 }
 
 /// Which edges of each triangle its part's wire follows; empty where it is all of them.
-pub fn edge_masks(mesh: &Mesh, parts: &Parts<'_>, budget: &mut Budget) -> Result<Vec<u8>, LimitExceeded> {
+pub fn edge_masks(
+    mesh: &Mesh,
+    parts: &Parts<'_>,
+    edges: &mut Edges,
+    budget: &mut Budget,
+) -> Result<Vec<u8>, LimitExceeded> {
     let classes: Vec<Class> =
         parts.layers.iter().map(|layers| layers.wire.as_ref().map_or(Class::All, class_of)).collect();
     let is_polygonal = mesh.edge_masks.iter().any(|&mask| mask != 0b111);
@@ -105,35 +133,18 @@ pub fn edge_masks(mesh: &Mesh, parts: &Parts<'_>, budget: &mut Budget) -> Result
         .collect();
     let asks = |class: &Class| !matches!(class, Class::All | Class::Polygon);
     if classes.iter().any(asks) {
-        let list = EdgeList::of(mesh, budget)?;
-        mark(mesh, &list, &mut masks, class_at);
+        mark(mesh, edges.of(mesh, budget)?, &mut masks, class_at);
     }
     Ok(masks)
 }
 
 /// Sets the bits of edges that belong to their triangle's class, where that depends on neighbours.
 fn mark(mesh: &Mesh, list: &EdgeList, masks: &mut [u8], class_at: impl Fn(usize) -> Class) {
-    // Edges know their first two faces; the few that have more are looked up.
-    let mut crowded = RapidHashSet::default();
-    for edge in &list.edges {
-        if edge.face_count > 2 {
-            crowded.insert([edge.vertices[0].min(edge.vertices[1]), edge.vertices[0].max(edge.vertices[1])]);
-        }
-        for face in edge.faces.into_iter().filter(|&face| face != NO_FACE) {
-            if is_of(class_at(face as usize), mesh, edge) {
-                masks[face as usize] |= corner_bit(&mesh.triangles[face as usize], edge.vertices);
-            }
-        }
-    }
-    if crowded.is_empty() {
-        return;
-    }
-    for (t, triangle) in mesh.triangles.iter().enumerate() {
-        for k in 0..3 {
-            let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
-            if matches!(class_at(t), Class::Feature(_)) && crowded.contains(&[a.min(b), a.max(b)]) {
-                masks[t] |= 1 << k;
-            }
+    let first_two = list.edges.iter().flat_map(|edge| edge.faces.map(|face| (edge, face)));
+    let further = list.further_faces.iter().map(|&[edge, face]| (&list.edges[edge as usize], face));
+    for (edge, face) in first_two.chain(further).filter(|&(_, face)| face != NO_FACE) {
+        if is_of(class_at(face as usize), mesh, edge) {
+            masks[face as usize] |= corner_bit(&mesh.triangles[face as usize], edge.vertices);
         }
     }
 }
@@ -239,7 +250,7 @@ impl Want {
             smoothing_px: self.smoothing_px,
             color,
             shown,
-            skip_back_edges: skip_back && shown == Shown::Visible,
+            skip_back_edges: skip_back && self.hidden == Hidden::Hide,
             contour: self.contour,
             lit: self.lit,
         };
@@ -258,6 +269,10 @@ fn is_of(class: Class, mesh: &Mesh, edge: &MeshEdge) -> bool {
     let bends = |limit: f64| {
         let [a, b] = edge.faces.map(|face| mesh.face_normals[face as usize].map(f64::from));
         let cos = (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+        if a == [0.0; 3] || b == [0.0; 3] {
+            // A face without area has no direction to bend from.
+            return false;
+        }
         // Two faces that disagree which side is out bend the other way round.
         (if edge.is_wound_alike { -cos } else { cos }) < limit
     };

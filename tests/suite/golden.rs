@@ -33,7 +33,7 @@ fn cpu_pictures_equal_the_stored_ones_to_the_byte() {
         }
     }
     assert_eq!(compared, SCENES.len() * 8);
-    assert_eq!(SCENES.len(), 34);
+    assert_eq!(SCENES.len(), 40);
 }
 
 /// Draws a scene.

@@ -26,6 +26,7 @@ mod jobs;
 mod layers;
 mod layers_hull;
 mod likeness;
+mod line_looks;
 mod mesh_files;
 mod models;
 mod raster;

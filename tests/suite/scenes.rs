@@ -65,6 +65,25 @@ pub const SCENES: &[Scene] = &[
     edited(scene("gear-debug-edge-distance", gear, &[SIZE]), |spec| debug(spec, DebugView::EdgeDistance)),
     edited(scene("sheet-debug-barycentric", sheet, INSIDE), |spec| debug(spec, DebugView::Barycentric)),
     edited(scene("sheet-debug-face-orientation", sheet, LOW), |spec| debug(spec, DebugView::FaceOrientation)),
+    scene("torus-contour", torus, CONTOUR),
+    scene("gear-contour", gear, CONTOUR),
+    scene("gear-feature-fade", gear, FEATURE_FADE),
+    scene("fin-topology", fin, &[SIZE, ("style", "topology")]),
+    scene("torus-wire-lit", torus, LIT_RED),
+    scene("sheet-boundary", sheet, &[SIZE, ("style", "wire"), ("wire.edges", "boundary"), ("wire.thickness", "2")]),
+];
+
+const CONTOUR: &[(&str, &str)] =
+    &[SIZE, ("style", "outline"), ("outline.method", "contour"), ("outline.unit", "px"), ("outline.thickness", "3")];
+const FEATURE_FADE: &[(&str, &str)] =
+    &[SIZE, ("style", "wire"), ("wire.edges", "feature"), ("wire.hidden", "fade"), ("wire.thickness", "1.5")];
+const LIT_RED: &[(&str, &str)] = &[
+    SIZE,
+    ("style", "wire"),
+    ("wire.edges", "polygons"),
+    ("wire.color", "e02020"),
+    ("wire.thickness", "2.5"),
+    ("wire.lit", "true"),
 ];
 
 const FWIDTH_SHOW: &[(&str, &str)] = &[SIZE, ("style", "wireframe"), ("wire.method", "fwidth")];
@@ -128,6 +147,10 @@ fn debug(spec: &mut Spec, view: DebugView) {
 
 fn torus() -> String {
     shapes::torus(36)
+}
+
+fn fin() -> String {
+    shapes::FIN.to_owned()
 }
 
 fn gear() -> String {

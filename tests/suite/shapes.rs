@@ -70,6 +70,9 @@ impl Obj {
     }
 }
 
+/// Three quads that share an edge.
+pub const FIN: &str = "v 0 0 0\nv 0 1 0\nv 1 0 .2\nv 1 1 .2\nv -1 0 .4\nv -1 1 .4\nv .2 0 -1\nv .2 1 -1\nf 1 2 4 3\nf 1 2 6 5\nf 1 2 8 7\n";
+
 /// Six quads.
 pub fn cube() -> String {
     let mut obj = Obj::default();

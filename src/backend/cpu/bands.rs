@@ -5,11 +5,12 @@ use std::sync::{Mutex, PoisonError};
 use super::bins::{Bin, Bins};
 use super::isa::dispatch;
 use super::layers::{self, LayerBand};
+use super::light::Light;
 use super::occluders::PlaneCache;
 use super::resolve::resolve;
 use super::samples::SampleBand;
 use super::visibility::{self, Nearest, Setup};
-use super::{Stages, lines, shade};
+use super::{Stages, line_light, lines, shade};
 use crate::plan::{DrawPlan, LinePass};
 
 /// Sample memory of a band, bytes: half of a common 1 MiB second-level cache.
@@ -35,7 +36,9 @@ pub struct BandScratch {
     rows: u32,
     layers: Option<LayerBand>,
     colors: Vec<[f32; 4]>,
+    /// Of one line pass after the other; then, if lines are lit, whose light falls on them.
     ink: Vec<u32>,
+    light: Vec<Light>,
 }
 
 /// Buffers of bands that nobody draws just now.
@@ -55,6 +58,7 @@ impl ScratchPool {
             layers: None,
             colors: Vec::new(),
             ink: Vec::new(),
+            light: Vec::new(),
         });
         each(&mut scratch);
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
@@ -75,12 +79,18 @@ pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: u
         shade_band(isa, stages, &scratch.samples, &mut scratch.colors);
     }
     scratch.ink.clear();
-    scratch.ink.resize(pixels * plan.lines.len(), 0);
-    let passes = plan.lines.iter().zip(&bins.edges).zip(scratch.ink.chunks_exact_mut(pixels.max(1)));
+    scratch.ink.resize(pixels * (plan.lines.len() + usize::from(plan.lights_lines())), 0);
+    let (inks, owners) = scratch.ink.split_at_mut(pixels * plan.lines.len());
+    let passes = plan.lines.iter().zip(&bins.edges).zip(inks.chunks_exact_mut(pixels.max(1)));
     for ((pass, bins), ink) in passes {
-        draw_edges(isa, stages, pass, bins, band, &scratch.samples, ink);
+        draw_edges(isa, stages, pass, bins, band, &scratch.samples, [ink, owners]);
     }
-    resolve(plan, stages.srgb, &scratch.colors, &scratch.ink, rgba);
+    scratch.light.clear();
+    if plan.lights_lines() {
+        scratch.light.resize(pixels, Light::NONE);
+        line_light::light_lines(stages, &scratch.samples, owners, &mut scratch.light);
+    }
+    resolve(plan, stages.srgb, &scratch.colors, inks, &scratch.light, rgba);
 }
 
 /// Draws band number `band` of the visibility buffer alone, as [`Renderer::draw_visibility`](super::Renderer) says.
@@ -146,7 +156,7 @@ dispatch! {
         bins: &[Bin],
         band: usize,
         samples: &SampleBand,
-        ink: &mut [u32],
+        ink: [&mut [u32]; 2],
     ) = edges_kernel
 }
 
@@ -182,7 +192,7 @@ fn edges_kernel(
     bins: &[Bin],
     band: usize,
     samples: &SampleBand,
-    ink: &mut [u32],
+    [ink, owners]: [&mut [u32]; 2],
 ) {
     let mut planes = PlaneCache::new();
     for chunk in bins {
@@ -190,7 +200,7 @@ fn edges_kernel(
             if i % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
                 return;
             }
-            lines::draw(stages, pass, &pass.edges[edge as usize], samples, &mut planes, ink);
+            lines::draw(stages, pass, &pass.edges[edge as usize], samples, &mut planes, [ink, owners]);
         }
     }
 }

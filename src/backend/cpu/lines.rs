@@ -94,14 +94,12 @@ impl Segment {
 /// and of a contour only the silhouette.
 #[inline(always)]
 pub fn is_drawn(stages: &Stages<'_>, lines: &LinePass, edge: &Edge) -> bool {
-    if !(lines.skip_back_edges || lines.contour) {
-        return true;
+    // Of a contour, what is seen from its very edge shows nothing either: its line would lie on that of the side it hides behind.
+    let is_hidden = |face| stages.looks_away(face) || (lines.contour && stages.is_edge_on(face));
+    if lines.skip_back_edges && edge.faces.into_iter().all(is_hidden) {
+        return false;
     }
-    let [a, b] = edge.faces.map(|face| stages.looks_away(face));
-    let is_open = edge.faces[1] == Edge::NO_FACE;
-    let is_back = lines.skip_back_edges && a && b;
-    let is_inner = lines.contour && a == b && !is_open;
-    !(is_back || is_inner)
+    !lines.contour || stages.is_silhouette(edge)
 }
 
 /// Draws one edge's ink into the band.
@@ -112,11 +110,14 @@ pub fn draw(
     edge: &Edge,
     band: &SampleBand,
     planes: &mut PlaneCache,
-    ink: &mut [u32],
+    [ink, owners]: [&mut [u32]; 2],
 ) {
     let Some(segment) = Segment::new(stages, lines, edge) else { return };
     let [first, last] = segment.rows(band.size_px[1]);
     let capsule = Capsule::new(lines, &segment);
+    // Where there is no surface there is nothing to hide behind, and no samples to ask.
+    let something_hides = stages.plan.surface.is_some() || stages.plan.hull.is_some();
+    let owner = if lines.lit && !owners.is_empty() { stages.lit_by(edge) } else { 0 };
     for y in first.max(band.first_row as i32)..=last.min((band.first_row + band.rows) as i32 - 1) {
         let [from, to] = segment.columns(y, band.size_px[0]);
         let row = (y as u32 - band.first_row) as usize * band.size_px[0] as usize;
@@ -126,10 +127,11 @@ pub fn draw(
             if coverage == 0 {
                 continue;
             }
-            let level = if lines.shown == Shown::All {
+            let level = if lines.shown == Shown::All || !something_hides {
                 coverage
             } else {
-                let visible = visible_samples(stages, edge, &segment, t, band.pixel(x as u32, y as u32), planes);
+                let visible =
+                    visible_samples(stages, edge, &segment, t, band.pixel(x as u32, y as u32), planes, lines.contour);
                 let shown = if lines.shown == Shown::Visible { visible } else { band.samples - visible };
                 (coverage * shown + band.samples / 2) / band.samples
             };
@@ -137,6 +139,10 @@ pub fn draw(
             let slot = &mut ink[row + x as usize];
             if *slot < 1 << 31 {
                 *slot += stages.ink_table[level as usize];
+            }
+            if owner > 0 && level > 0 {
+                let slot = &mut owners[row + x as usize];
+                *slot = (*slot).max(owner);
             }
         }
     }
@@ -226,6 +232,7 @@ fn visible_samples(
     t: f32,
     (ids, depths): (&[u32], &[f32]),
     planes: &mut PlaneCache,
+    is_contour: bool,
 ) -> u32 {
     let depth = segment.depth[0] + t * (segment.depth[1] - segment.depth[0]);
     let mut count = 0;
@@ -233,7 +240,7 @@ fn visible_samples(
     for (&id, &nearest) in ids.iter().zip(depths) {
         let nothing_nearer = id == NOTHING || depth >= nearest || id == edge.faces[0] || id == edge.faces[1];
         if !nothing_nearer && id != last.0 {
-            last = (id, !planes.get(stages, id).hides(edge, segment, t, depth));
+            last = (id, !planes.get(stages, id).hides(edge, segment, t, depth, is_contour.then_some(nearest)));
         }
         count += u32::from(nothing_nearer || last.1);
     }
@@ -254,5 +261,56 @@ impl Stages<'_> {
         }
         let vertices = self.screen_triangle(face);
         !vertices.iter().any(ScreenVertex::is_outside) && area(&vertices) > 0
+    }
+
+    /// Whether a face has no area on screen.
+    fn is_edge_on(&self, face: u32) -> bool {
+        let vertices = self.screen_triangle(face);
+        !vertices.iter().any(ScreenVertex::is_outside) && area(&vertices) == 0
+    }
+
+    /// Whether the edge's faces lie on one side of it on screen, and none on the other: there the surface ends, or turns back
+    /// under itself. It does not matter which way the faces are wound.
+    fn is_silhouette(&self, edge: &Edge) -> bool {
+        let [a, b] = edge.faces.map(|face| self.side_of(edge, face));
+        (a < 0 || b < 0) != (a > 0 || b > 0)
+    }
+
+    /// On which side of the edge a face lies on screen: -1, 1, or 0 where it is seen from its very edge or is not there.
+    fn side_of(&self, edge: &Edge, face: u32) -> i32 {
+        if face == Edge::NO_FACE {
+            return 0;
+        }
+        let [a, b] = edge.vertices;
+        let [p, q, r] = self.plan.triangles[face as usize];
+        let is_end = |v| v == a || v == b;
+        let corners = [
+            a,
+            b,
+            if !is_end(p) {
+                p
+            } else if !is_end(q) {
+                q
+            } else {
+                r
+            },
+        ];
+        let vertices = corners.map(|v| self.vertices[v as usize]);
+        if !vertices.iter().any(ScreenVertex::is_outside) {
+            return area(&vertices).signum() as i32;
+        }
+        // Where a corner is behind the eye, by the side of the face's plane on which the eye is.
+        let [a, b, c] = corners.map(|v| homogeneous(&self.plan.projection, self.plan.positions[v as usize]));
+        let (x, y) = (a[1] * b[3] - a[3] * b[1], a[3] * b[0] - a[0] * b[3]);
+        let volume = (x * c[0] + y * c[1]) + (a[0] * b[1] - a[1] * b[0]) * c[3];
+        i32::from(volume > 0.0) - i32::from(volume < 0.0)
+    }
+
+    /// The face whose light falls on an edge's line where the pixel sees no surface, plus 1: of those that look at the viewer
+    /// the one with the highest id, so that the order of edges does not matter; of any, where none does.
+    fn lit_by(&self, edge: &Edge) -> u32 {
+        let towards = |face: u32| if self.looks_away(face) { 0 } else { face + 1 };
+        let best = towards(edge.faces[0]).max(towards(edge.faces[1]));
+        if best > 0 { best } else { edge.faces[0].wrapping_add(1) }
     }
 }

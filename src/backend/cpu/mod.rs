@@ -15,6 +15,7 @@ mod debug;
 mod isa;
 mod layers;
 mod light;
+mod line_light;
 mod lines;
 mod occluders;
 mod peel;

@@ -39,11 +39,16 @@ impl Plane {
 
     /// Whether this triangle, which is nearer than the edge at a sample close by, really lies in front of it. The plane is
     /// continued to the edge's own point, because close to a fold the sample itself may be nearer without hiding anything.
+    ///
+    /// `contour_depth` is of a contour the sample's depth (else: none): towards a silhouette the surface falls away faster than its plane: depth there goes with the root of the distance, and the
+    /// tangent at any point, continued to the silhouette, comes down only half the way. So the other half is granted: as much
+    /// again as the plane falls between the sample and the edge.
     #[inline(always)]
-    pub fn hides(&self, edge: &Edge, segment: &Segment, t: f32, depth: f32) -> bool {
+    pub fn hides(&self, edge: &Edge, segment: &Segment, t: f32, depth: f32, contour_depth: Option<f32>) -> bool {
         let point = segment.point(t);
         let plane = self.depth[0] + self.depth[1] * point[0] + self.depth[2] * point[1];
-        plane > depth + self.tolerance && !self.meets(edge, segment, t)
+        let fall = contour_depth.map_or(0.0, |sample| (sample - plane).max(0.0));
+        plane - fall > depth + self.tolerance && !self.meets(edge, segment, t)
     }
 
     /// Whether this triangle meets the edge at an end close to `t`: around a vertex, the faces of one fan do not hide each

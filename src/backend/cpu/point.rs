@@ -286,7 +286,7 @@ fn lit_wire(cover: f32, wire: [f32; 4], base: [f32; 4], light: Light, emissive: 
 }
 
 /// The unit normal on the viewer's side.
-fn facing(n: [f32; 3], front: bool) -> [f32; 3] {
+pub fn facing(n: [f32; 3], front: bool) -> [f32; 3] {
     let length_squared = dot(n, n);
     let scale = if length_squared > 1e-20 { 1.0 / length_squared.sqrt() } else { 0.0 };
     let scale = if front { scale } else { -scale };

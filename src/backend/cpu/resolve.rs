@@ -1,5 +1,6 @@
 //! Stage 5, a pixel: surface over background, ink over both, to sRGB bytes. Twin of `shaders/resolve.wgsl`.
 
+use super::light::Light;
 use crate::image::srgb8_thresholds;
 use crate::plan::{DrawPlan, INK_FULL};
 
@@ -32,16 +33,26 @@ impl SrgbEncoder {
     }
 }
 
-/// Resolves a band into `rgba`; `ink` is that of one line pass after the other.
+/// Resolves a band into `rgba`; `ink` is that of one line pass after the other, `light` what falls on those that are lit (empty
+/// where none is).
 #[inline(always)]
-pub fn resolve(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], ink: &[u32], rgba: &mut [u8]) {
+pub fn resolve(
+    plan: &DrawPlan<'_>,
+    srgb: &SrgbEncoder,
+    colors: &[[f32; 4]],
+    ink: &[u32],
+    light: &[Light],
+    rgba: &mut [u8],
+) {
     let mut last = ([f32::NAN; 4], [0; 4]);
     for (i, (color, out)) in colors.iter().zip(rgba.chunks_exact_mut(4)).enumerate() {
         let mut c: [f32; 4] = std::array::from_fn(|k| color[k] + plan.background[k] * (1.0 - color[3]));
         for (lines, ink) in plan.lines.iter().zip(ink.chunks_exact(colors.len())) {
             if ink[i] > 0 {
                 let cover = coverage(ink[i]);
-                c = std::array::from_fn(|k| cover * lines.color[k] + c[k] * (1.0 - cover * lines.color[3]));
+                let light = light.get(i).filter(|_| lines.lit);
+                let color = light.map_or(lines.color, |light| lit(lines.color, *light));
+                c = std::array::from_fn(|k| cover * color[k] + c[k] * (1.0 - cover * color[3]));
             }
         }
         // Neighbours are often the same colour to the bit: flat faces, background.
@@ -50,6 +61,12 @@ pub fn resolve(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], ink
         }
         out.copy_from_slice(&last.1);
     }
+}
+
+/// A premultiplied colour under light.
+fn lit(c: [f32; 4], light: Light) -> [f32; 4] {
+    let under = |v: f32| (v * light.gain + light.gloss * c[3]).clamp(0.0, c[3]);
+    [under(c[0]), under(c[1]), under(c[2]), c[3]]
 }
 
 /// Ink back to coverage, 0 to 1.

@@ -23,13 +23,14 @@ use self::buffers::Buffers;
 use self::params::{attributes, corner_triangles, hull_amounts, hull_looks};
 use self::recorder::Recorder;
 use self::schedule::{
-    DeviceTraits, Goal, LAYERED_BYTES, Schedule, Step, WORK_HEAD_BYTES, WORK_ITEM_BYTES, has_visibility,
+    DeviceTraits, Goal, LAYERED_BYTES, Schedule, Step, WORK_HEAD_BYTES, WORK_ITEM_BYTES, color_bytes, has_visibility,
+    ink_bytes,
 };
 use self::stages::Slot;
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::{Image, srgb8_thresholds};
 use crate::limits::Deadline;
-use crate::plan::{DrawPlan, Edge, ink_table};
+use crate::plan::{DrawPlan, Edge, LinePass, ink_table};
 
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
@@ -186,7 +187,7 @@ fn upload_geometry(
 fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
     let band_pixels = u64::from(plan.width_px) * u64::from(schedule.band_rows);
     if has_visibility(plan) {
-        buffers.reserve(gpu, Slot::Colors, band_pixels * 16)?;
+        buffers.reserve(gpu, Slot::Colors, band_pixels * color_bytes(plan))?;
     }
     if let Some(surface) = &plan.surface {
         buffers.upload(gpu, Slot::Attributes, &attributes(surface))?;
@@ -209,11 +210,12 @@ fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule:
     }
     if !plan.lines.is_empty() {
         let edges: Vec<Edge> = plan.lines.iter().flat_map(|lines| lines.edges.iter().copied()).collect();
-        let colors: Vec<[f32; 4]> = plan.lines.iter().map(|lines| lines.color).collect();
+        let lit = |lines: &LinePass| [f32::from(u8::from(lines.lit)), 0.0, 0.0, 0.0];
+        let colors: Vec<[f32; 4]> = plan.lines.iter().flat_map(|lines| [lines.color, lit(lines)]).collect();
         buffers.upload(gpu, Slot::Edges, bytemuck::cast_slice(&edges))?;
         buffers.upload(gpu, Slot::LineColors, bytemuck::cast_slice(&colors))?;
         buffers.upload(gpu, Slot::InkTable, bytemuck::cast_slice(&ink_table()))?;
-        buffers.reserve(gpu, Slot::Ink, band_pixels * 4 * plan.lines.len() as u64)?;
+        buffers.reserve(gpu, Slot::Ink, band_pixels * ink_bytes(plan))?;
     }
     buffers.upload(gpu, Slot::Thresholds, bytemuck::cast_slice(&srgb8_thresholds()))?;
     buffers.reserve(gpu, Slot::Rgba, band_pixels * 4)?;
@@ -264,7 +266,7 @@ fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, schedule: &Sched
         recorder.clear(Slot::Samples, band_sample_bytes(plan, rows))?;
     }
     if !plan.lines.is_empty() {
-        recorder.clear(Slot::Ink, u64::from(plan.width_px) * u64::from(rows) * 4 * plan.lines.len() as u64)?;
+        recorder.clear(Slot::Ink, u64::from(plan.width_px) * u64::from(rows) * ink_bytes(plan))?;
     }
     Ok(())
 }

@@ -63,12 +63,13 @@ pub struct Batch {
     pub line_smoothing: f32,
     pub line_flags: u32,
     pub ink_at: u32,
+    pub owners_at: u32,
     pub role: u32,
     pub layer: u32,
 }
 
 /// Bits of [`Batch::line_flags`].
-pub fn line_flags(lines: &LinePass, something_hides: bool) -> u32 {
+pub fn line_flags(lines: &LinePass, something_hides: bool, lights_lines: bool) -> u32 {
     // Where there is no surface there is nothing to hide behind, and no samples to ask.
     let shown = match lines.shown {
         Shown::All => 0,
@@ -76,7 +77,10 @@ pub fn line_flags(lines: &LinePass, something_hides: bool) -> u32 {
         Shown::Visible => 1,
         Shown::Hidden => 2,
     };
-    shown | u32::from(lines.skip_back_edges) << 2 | u32::from(lines.contour) << 3
+    shown
+        | u32::from(lines.skip_back_edges) << 2
+        | u32::from(lines.contour) << 3
+        | u32::from(lines.lit && lights_lines) << 4
 }
 
 /// Distance between [`Batch`]es in their buffer: every device can bind at multiples of this.
@@ -202,6 +206,6 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_shader() {
         assert_eq!(size_of::<Frame>(), 320);
-        assert_eq!(size_of::<Batch>(), 76);
+        assert_eq!(size_of::<Batch>(), 80);
     }
 }

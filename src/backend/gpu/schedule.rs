@@ -256,8 +256,9 @@ impl Schedule {
                 edges_per_group: edges_per_group(plan, lines, device),
                 line_width: lines.width_px,
                 line_smoothing: lines.smoothing_px,
-                line_flags: line_flags(lines, has_visibility(plan)),
+                line_flags: line_flags(lines, has_visibility(plan), plan.lights_lines()),
                 ink_at: pass * count,
+                owners_at: plan.lines.len() as u32 * count,
                 ..pixels
             };
             let edges_per_group = lined.edges_per_group;
@@ -271,6 +272,9 @@ impl Schedule {
                 }
             }
             edges_first += edges;
+        }
+        if plan.lights_lines() {
+            self.dispatch(device, Stage::LineLight, count, pixels);
         }
         self.dispatch(device, Stage::Resolve, count, pixels);
     }
@@ -295,5 +299,15 @@ impl Schedule {
 /// Bytes a pixel of the largest buffer that holds a band.
 fn pixel_bytes(plan: &DrawPlan<'_>) -> u64 {
     let sample = if plan.layers().is_some() { LAYERED_BYTES } else { 8 };
-    (u64::from(plan.samples) * sample).max(16).max(4 * plan.lines.len() as u64)
+    (u64::from(plan.samples) * sample).max(color_bytes(plan)).max(ink_bytes(plan))
+}
+
+/// Bytes a pixel of colours: the surface's, and the light on lines where they are lit.
+pub fn color_bytes(plan: &DrawPlan<'_>) -> u64 {
+    if plan.lights_lines() { 32 } else { 16 }
+}
+
+/// Bytes a pixel of ink: of each line pass, and whose light falls on lines where they are lit.
+pub fn ink_bytes(plan: &DrawPlan<'_>) -> u64 {
+    4 * (plan.lines.len() as u64 + u64::from(plan.lights_lines()))
 }

@@ -32,6 +32,8 @@ pub enum Stage {
     Shade,
     /// Edges to ink.
     Lines,
+    /// Samples and ink to the light on lines.
+    LineLight,
     /// Colours and ink to bytes.
     Resolve,
 }
@@ -258,6 +260,22 @@ impl Stage {
                 (Slot::Ink, ReadWrite),
                 (Slot::InkTable, Read),
             ],
+            Self::LineLight => &[
+                (Slot::Positions, Read),
+                (Slot::Triangles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, Read),
+                (Slot::Normals, Read),
+                (Slot::CornerTriangles, Read),
+                (Slot::Attributes, Read),
+                (Slot::Materials, Read),
+                (Slot::FaceNormals, Read),
+                (Slot::Uvs, Read),
+                (Slot::VertexColors, Read),
+                (Slot::Texels, Read),
+                (Slot::Colors, ReadWrite),
+                (Slot::Ink, Read),
+            ],
             Self::Resolve => &[
                 (Slot::Colors, Read),
                 (Slot::Ink, Read),
@@ -293,6 +311,7 @@ impl Stage {
             Self::VisibilityTile { .. } => "visibility_tile",
             Self::Shade => "shade",
             Self::Lines => "lines",
+            Self::LineLight => "line_light",
             Self::Resolve => "resolve",
         }
     }
@@ -320,6 +339,9 @@ impl Stage {
             }
             Self::Shade => {
                 [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/shade.wgsl")]].concat().concat()
+            }
+            Self::LineLight => {
+                [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/line_light.wgsl")]].concat().concat()
             }
             Self::Lines => [COMMON, TRIANGLE, PLANES, include_str!("../../../shaders/lines.wgsl")].concat(),
             Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
@@ -351,8 +373,9 @@ impl Stage {
             Self::VisibilityTile { into: Into::Layer, .. } => look::FOUR_SAMPLES | look::BEHIND_SURFACE,
             Self::Layers => SHADED | look::LAYERED_HULL,
             Self::Shade => SHADED | look::LAYERS,
+            Self::LineLight => SHADED,
             Self::Lines => look::CLIPPED | look::FOUR_SAMPLES,
-            Self::Resolve => look::SURFACE | look::HULL | look::LINES,
+            Self::Resolve => look::SURFACE | look::HULL | look::LINES | look::LIT_LINES,
         }
     }
 
