@@ -3,6 +3,7 @@
 // Helpers outside of #[test] functions may give up as loudly as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod accuracy_wires;
 mod cli;
 mod examples;
 mod formats;
@@ -18,8 +19,12 @@ mod http;
 mod http_bad;
 mod jobs;
 mod likeness;
+mod lines_scenes;
 mod mesh_files;
 mod models;
+#[path = "../oracle/mod.rs"]
+mod oracle;
+mod oracle_parts;
 mod raster;
 mod scenes;
 mod select;
@@ -30,5 +35,6 @@ mod shared;
 mod skips;
 mod soups;
 mod structure;
+mod truth;
 mod twins;
 mod twins_visibility;
