@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::camera::project;
 use super::screen::{Piece, Scene, Screen, is_front};
-use super::vector::{V2, V3, mix};
+use super::vector::{V2, V3, length, mix, sub};
 
 /// A piece of an edge on screen, pixels from the upper left corner.
 pub type Segment = [V2; 2];
@@ -13,6 +13,9 @@ pub type Segment = [V2; 2];
 /// How much nearer, as a share of its depth, a surface must be to hide an edge: more than f64 rounds, and far less than any
 /// two surfaces that are not meant to touch.
 const NEARER: f64 = 1e-9;
+
+/// What is left of an edge by rounding alone, where it ends at what hides it. Its round caps would show as a dot.
+const CRUMB_PX: f64 = 1e-4;
 
 /// Every edge, hidden or not.
 pub fn all(scene: &Scene) -> Vec<Segment> {
@@ -25,7 +28,11 @@ pub fn visible(scene: &Scene, screen: &Screen) -> Vec<Segment> {
     for &edge in &scene.edges {
         let Some([a, b]) = on_screen(scene, edge) else { continue };
         for [from, to] in visible_parts(screen, edge, [a, b]) {
-            segments.push([xy(mix(a, b, from)), xy(mix(a, b, to))]);
+            let segment = [from, to].map(|t| xy(mix(a, b, t)));
+            let is_whole = from <= 0.0 && to >= 1.0;
+            if is_whole || length(sub(segment[1], segment[0])) > CRUMB_PX {
+                segments.push(segment);
+            }
         }
     }
     segments

@@ -6,24 +6,28 @@ use std::sync::Arc;
 use meshsnap::backend::Renderer;
 use meshsnap::plan::{DrawPlan, Edge, LinePass, Shown};
 
+use crate::accuracy_geometry::eye_plan;
 use crate::lines_scenes::{CONTOURS, MESHES, MeshScene, plan_keys};
+use crate::oracle::visible::Segment;
 use crate::oracle::{capsule, strip};
 use crate::scenes;
-use crate::truth::{Errors, Gate, cases, drawn_ink, renderers, true_ink};
+use crate::shapes::Random;
+use crate::truth::{Errors, Gate, cases, drawn_ink, renderers, segments, true_ink};
 
 /// Goal 1.
 const ISOLATED_GOAL: Gate = Gate { rmse: 0.35, max: 1.0, ink: f64::INFINITY };
 /// Goal 1: how much too wide or narrow, pixels.
 const WIDTH_GOAL_PX: f64 = 0.005;
 /// Goal 2.
-const MESHES_GOAL: Gate = Gate { rmse: 1.5, max: f64::INFINITY, ink: 0.005 };
+pub const MESHES_GOAL: Gate = Gate { rmse: 1.5, max: f64::INFINITY, ink: 0.005 };
 /// Goal 3.
 const SILHOUETTE_GOAL_INK: f64 = 0.01;
 
-/// Measured now.
-const ISOLATED_NOW: Gate = Gate { rmse: 9.0, max: 90.0, ..ISOLATED_GOAL };
-const WIDTH_NOW_PX: f64 = WIDTH_GOAL_PX;
-const ENDS_NOW: Gate = Gate { rmse: 90.0, max: 255.0, ink: f64::INFINITY };
+/// Round ends, measured now; they have goal 1 too.
+const ENDS_NOW: Gate = Gate { rmse: 1.9, max: 61.0, ..ISOLATED_GOAL };
+
+/// Measured now, ends in the picture included; 0.01 px of distance are 2.55/255 on a line's border.
+const BEHIND_EYE_NOW: Gate = Gate { rmse: 90.0, max: 255.0, ink: 1.0 };
 
 const SIZE_PX: u32 = 48;
 const WIDTHS_PX: [f32; 9] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 8.0, 16.0];
@@ -94,10 +98,10 @@ fn isolated_lines_have_their_exact_coverage() {
             }
             wanted += angles().len() * count as usize;
             let what = format!("1 isolated, {width} px, {}", renderer.kind().name());
-            missed.extend(errors.check(&what, ISOLATED_NOW).err());
+            missed.extend(errors.check(&what, ISOLATED_GOAL).err());
             let bias_px = f64::from(width) * (errors.ink() - 1.0);
-            println!("{:<44} {bias_px:+.5} px too wide (gate {WIDTH_NOW_PX})", what);
-            if bias_px.abs() > WIDTH_NOW_PX {
+            println!("{:<44} {bias_px:+.5} px too wide (gate {WIDTH_GOAL_PX})", what);
+            if bias_px.abs() > WIDTH_GOAL_PX {
                 missed.push(format!("{what}: {bias_px} px too wide"));
             }
         }
@@ -135,9 +139,39 @@ fn lines_end_in_round_caps() {
 }
 
 fn capsule_ink(ends: [[f32; 3]; 2], width: f32) -> Vec<f64> {
-    let segment = ends.map(|p| [0, 1].map(|k| f64::from(p[k]) + 0.5 * f64::from(SIZE_PX)));
+    segment_ink(ends.map(|p| [0, 1].map(|k| f64::from(p[k]) + 0.5 * f64::from(SIZE_PX))), width)
+}
+
+fn segment_ink(segment: Segment, width: f32) -> Vec<f64> {
     let pixel = |i: u32| [i % SIZE_PX, i / SIZE_PX].map(|v| f64::from(v) + 0.5);
     (0..SIZE_PX * SIZE_PX).map(|i| capsule::coverage(pixel(i), segment, f64::from(width))).collect()
+}
+
+#[test]
+fn lines_that_come_from_behind_the_eye_have_their_exact_coverage() {
+    let mut random = Random(31);
+    let mut missed = Vec::new();
+    let (mut drawn, count) = (0, cases(300, 10_000));
+    for mut renderer in renderers() {
+        let mut errors = Errors::default();
+        for i in 0..count {
+            let near = [0.001, 0.05, 0.3][i % 3];
+            let mut end = |z: [f64; 2]| {
+                [random.range(-1.0, 1.0) as f32, random.range(-1.0, 1.0) as f32, random.range(z[0], z[1]) as f32]
+            };
+            let ends = [end([-1.0, -0.1]), end([0.4, 2.0])];
+            let width = [1.0, 3.0][i / 3 % 2];
+            let mut plan = line_plan(&ends, &[[0, 1]], width);
+            plan.projection = eye_plan([SIZE_PX; 2], &[], &[], near).projection;
+            let [segment] = segments(&plan)[..] else { panic!("edge {i} is out of sight") };
+            errors.add(&Errors::of(&drawn_ink(&plan, renderer.as_mut()), &segment_ink(segment, width)));
+            drawn += 1;
+        }
+        let what = format!("4 lines from behind the eye, {}", renderer.kind().name());
+        missed.extend(errors.check(&what, BEHIND_EYE_NOW).err());
+    }
+    assert_eq!(drawn, count * renderers().len());
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
 #[test]

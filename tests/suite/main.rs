@@ -3,6 +3,8 @@
 // Helpers outside of #[test] functions may give up as loudly as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod accuracy_geometry;
+mod accuracy_shading;
 mod accuracy_wires;
 mod cli;
 mod examples;
@@ -22,6 +24,7 @@ mod likeness;
 mod lines_scenes;
 mod mesh_files;
 mod models;
+mod mutations;
 #[path = "../oracle/mod.rs"]
 mod oracle;
 mod oracle_parts;
