@@ -46,7 +46,7 @@ pub struct Pen<'a> {
 }
 
 /// A picture in linear light, row by row: lines over the surface, whose colour `shade` tells by triangle and point, over a
-/// background. Also the share of each pixel that is not background.
+/// background.
 pub fn picture(
     screen: &Screen,
     pen: &Pen<'_>,

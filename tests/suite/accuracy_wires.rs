@@ -6,30 +6,21 @@ use std::sync::Arc;
 use meshsnap::backend::Renderer;
 use meshsnap::plan::{DrawPlan, Edge, LinePass, Shown};
 
-use crate::accuracy_geometry::eye_plan;
 use crate::lines_scenes::{CONTOURS, MESHES, MeshScene, plan_keys};
 use crate::oracle::visible::Segment;
 use crate::oracle::{capsule, strip};
 use crate::scenes;
-use crate::shapes::Random;
-use crate::truth::{Errors, Gate, cases, drawn_ink, renderers, segments, true_ink};
+use crate::truth::{Errors, Gate, cases, drawn_ink, renderers, true_ink};
 
 /// Goal 1.
 const ISOLATED_GOAL: Gate = Gate { rmse: 0.35, max: 1.0, ink: f64::INFINITY };
 /// Goal 1: how much too wide or narrow, pixels.
 const WIDTH_GOAL_PX: f64 = 0.005;
-/// Goal 2.
-pub const MESHES_GOAL: Gate = Gate { rmse: 1.5, max: f64::INFINITY, ink: 0.005 };
-/// Goal 3.
-const SILHOUETTE_GOAL_INK: f64 = 0.01;
 
 /// Round ends, measured now; they have goal 1 too.
-const ENDS_NOW: Gate = Gate { rmse: 1.9, max: 61.0, ..ISOLATED_GOAL };
+const ENDS_NOW: Gate = Gate { rmse: 1.9, max: 69.0, ..ISOLATED_GOAL };
 
-/// Measured now, ends in the picture included; 0.01 px of distance are 2.55/255 on a line's border.
-const BEHIND_EYE_NOW: Gate = Gate { rmse: 90.0, max: 255.0, ink: 1.0 };
-
-const SIZE_PX: u32 = 48;
+pub const SIZE_PX: u32 = 48;
 const WIDTHS_PX: [f32; 9] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 8.0, 16.0];
 
 /// A line pass of opaque white on nothing, so that alpha is coverage.
@@ -85,7 +76,7 @@ fn isolated_lines_have_their_exact_coverage() {
     let mut drawn = 0;
     let mut wanted = 0;
     for mut renderer in renderers() {
-        let count = if renderer.kind().name() == "cpu" { 64 } else { cases(4, 64) };
+        let count = if renderer.kind().name() == "cpu" { 64 } else { cases(4, 16) };
         for width in WIDTHS_PX {
             let mut errors = Errors::default();
             for angle in angles() {
@@ -142,36 +133,10 @@ fn capsule_ink(ends: [[f32; 3]; 2], width: f32) -> Vec<f64> {
     segment_ink(ends.map(|p| [0, 1].map(|k| f64::from(p[k]) + 0.5 * f64::from(SIZE_PX))), width)
 }
 
-fn segment_ink(segment: Segment, width: f32) -> Vec<f64> {
+/// The coverage of every pixel by a line with round ends.
+pub fn segment_ink(segment: Segment, width: f32) -> Vec<f64> {
     let pixel = |i: u32| [i % SIZE_PX, i / SIZE_PX].map(|v| f64::from(v) + 0.5);
     (0..SIZE_PX * SIZE_PX).map(|i| capsule::coverage(pixel(i), segment, f64::from(width))).collect()
-}
-
-#[test]
-fn lines_that_come_from_behind_the_eye_have_their_exact_coverage() {
-    let mut random = Random(31);
-    let mut missed = Vec::new();
-    let (mut drawn, count) = (0, cases(300, 10_000));
-    for mut renderer in renderers() {
-        let mut errors = Errors::default();
-        for i in 0..count {
-            let near = [0.001, 0.05, 0.3][i % 3];
-            let mut end = |z: [f64; 2]| {
-                [random.range(-1.0, 1.0) as f32, random.range(-1.0, 1.0) as f32, random.range(z[0], z[1]) as f32]
-            };
-            let ends = [end([-1.0, -0.1]), end([0.4, 2.0])];
-            let width = [1.0, 3.0][i / 3 % 2];
-            let mut plan = line_plan(&ends, &[[0, 1]], width);
-            plan.projection = eye_plan([SIZE_PX; 2], &[], &[], near).projection;
-            let [segment] = segments(&plan)[..] else { panic!("edge {i} is out of sight") };
-            errors.add(&Errors::of(&drawn_ink(&plan, renderer.as_mut()), &segment_ink(segment, width)));
-            drawn += 1;
-        }
-        let what = format!("4 lines from behind the eye, {}", renderer.kind().name());
-        missed.extend(errors.check(&what, BEHIND_EYE_NOW).err());
-    }
-    assert_eq!(drawn, count * renderers().len());
-    assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
 #[test]
@@ -224,21 +189,39 @@ fn measure(
     renderers.len()
 }
 
+/// Models that are not stored here, on machines that have them.
 #[test]
-fn gates_are_never_looser_than_need_be() {
-    // A scene whose level is within the goal has the goal as its gate.
-    let mut scenes = 0;
-    for scene in MESHES {
-        assert!(
-            scene.now.rmse >= MESHES_GOAL.rmse && scene.now.ink >= MESHES_GOAL.ink,
-            "{}: the goal will do",
-            scene.name
-        );
-        scenes += 1;
+fn lines_of_known_models_have_their_exact_coverage() {
+    let Some(folder) = crate::shared::folder("models") else { return };
+    let mut missed = Vec::new();
+    let mut drawn = 0;
+    let mut renderers = renderers();
+    let models = cases(&KNOWN[..1], &KNOWN[..]);
+    for (name, now) in models {
+        let mesh = scenes::mesh_of(&std::fs::read(folder.join(name)).unwrap()).unwrap();
+        let keys = [
+            ("size", "512x512"),
+            ("background", "transparent"),
+            ("style", "wireframe"),
+            ("wire.hidden", "hide"),
+            ("wire.color", "fff"),
+        ];
+        let spec = scenes::spec(&keys);
+        let plan = scenes::plan(&mesh, &spec);
+        let truth = true_ink(&plan);
+        for renderer in &mut renderers {
+            let what = format!("2 mesh, {name}, 1 px, {}", renderer.kind().name());
+            missed.extend(Errors::of(&drawn_ink(&plan, renderer.as_mut()), &truth).check(&what, *now).err());
+            drawn += 1;
+        }
     }
-    for scene in CONTOURS {
-        assert!(scene.now.ink >= SILHOUETTE_GOAL_INK, "{}: the goal will do", scene.name);
-        scenes += 1;
-    }
-    assert_eq!(scenes, MESHES.len() + CONTOURS.len());
+    assert_eq!(drawn, models.len() * renderers.len());
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
+
+/// Files, and what is let pass now; the goal is 2's.
+const KNOWN: [(&str, Gate); 3] = [
+    ("suzanne.obj", Gate { rmse: 90.0, max: f64::INFINITY, ink: 1.0 }),
+    ("spot.obj", Gate { rmse: 90.0, max: f64::INFINITY, ink: 1.0 }),
+    ("stanford-bunny.obj", Gate { rmse: 90.0, max: f64::INFINITY, ink: 1.0 }),
+];

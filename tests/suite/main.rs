@@ -3,6 +3,7 @@
 // Helpers outside of #[test] functions may give up as loudly as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod accuracy_behind_eye;
 mod accuracy_geometry;
 mod accuracy_shading;
 mod accuracy_wires;

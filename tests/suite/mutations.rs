@@ -6,10 +6,10 @@ use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::limits::Deadline;
 use meshsnap::plan::DrawPlan;
 
-use crate::accuracy_geometry::{Ownership, eye_plan, jittered_net};
+use crate::accuracy_behind_eye::eye_plan;
+use crate::accuracy_geometry::{Ownership, jittered_net};
 use crate::accuracy_shading::{COLOR_GOAL, FLAT_NOW, NORMAL_GOAL_RAD, color_errors, normal_error, slivers};
-use crate::accuracy_wires::MESHES_GOAL;
-use crate::lines_scenes::{MESHES, plan_keys};
+use crate::lines_scenes::{MESHES, MESHES_GOAL, plan_keys};
 use crate::oracle::camera::{Homogeneous, project};
 use crate::oracle::light::{face_normal, weights};
 use crate::oracle::screen::Screen;
