@@ -5,7 +5,7 @@
 //! the set of points within half its width, on screen, of the visible part of an edge: caps and joins are round, and on a
 //! silhouette the outer half is drawn too. An edge is visible where no surface that is not incident to it lies in front.
 //!
-//! Four parts, each checked against the others by `tests/suite/oracle_parts.rs`:
+//! Four parts, each checked against the others by `tests/suite/oracle_*.rs`:
 //! 1. [`coverage`]: which pixels a snapped triangle covers, by exact integer signs, and how much of each.
 //! 2. [`strip`] and [`capsule`]: straight lines in closed form.
 //! 3. [`screen`], [`visible`], [`ink`], [`rays`]: any scene, by many points a pixel.

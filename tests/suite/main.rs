@@ -29,6 +29,7 @@ mod mutations;
 #[path = "../oracle/mod.rs"]
 mod oracle;
 mod oracle_parts;
+mod oracle_scenes;
 mod raster;
 mod scenes;
 mod select;
