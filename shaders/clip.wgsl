@@ -3,11 +3,12 @@
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(1) var<storage, read> hull_normals: array<f32>;
+@group(1) @binding(29) var<storage, read> hull_amounts: array<f32>;
 
 @compute @workgroup_size(64)
 fn clip(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = gid.x + gid.y * groups.x * 64u;
-    if i >= batch.count {
+    if i >= batch.count || is_over() {
         return;
     }
     let t = batch.first + i;
@@ -26,7 +27,7 @@ fn clip(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) 
     var before = snap_clipped(corners[9]);
     for (var k = 2u; k < len; k++) {
         let next = snap_clipped(corners[8u + k]);
-        draw_piece(Corners(first, before, next), t + batch.id_base);
+        draw_piece(Corners(first, before, next), t);
         before = next;
     }
 }
@@ -62,18 +63,21 @@ fn cut(plane: u32, len: u32, base: u32) -> u32 {
     return left;
 }
 
-fn draw_piece(v: Corners, id: u32) {
+fn draw_piece(v: Corners, t: u32) {
     let bounds = pixel_bounds(vec3(v.a.x, v.b.x, v.c.x), vec3(v.a.y, v.b.y, v.c.y));
     let area = area_of(v.a, v.b, v.c);
-    if bounds.x <= bounds.z && bounds.y <= bounds.w && is_wanted(area) {
-        postpone(setup_of(v.a, v.b, v.c, area), bounds.zw - bounds.xy, id);
+    if bounds.x <= bounds.z && bounds.y <= bounds.w && is_wanted(t, area) {
+        postpone(setup_of(v.a, v.b, v.c, area), bounds.zw - bounds.xy, t + batch.id_base);
     }
 }
 
 fn homogeneous_corner(v: u32) -> vec4<f32> {
     var p = vec3(positions[3u * v], positions[3u * v + 1u], positions[3u * v + 2u]);
     if batch.vertex_base != 0u && !has(HULL_PX) {
-        let t = frame.hull_push;
+        var t = frame.hull_push;
+        if has(HULL_AMOUNTS) {
+            t = hull_amounts[v];
+        }
         let n = vec3(hull_normals[3u * v], hull_normals[3u * v + 1u], hull_normals[3u * v + 2u]);
         p = vec3(p.x + rn(t * n.x), p.y + rn(t * n.y), p.z + rn(t * n.z));
     }

@@ -7,6 +7,8 @@ struct Frame {
     z_row: vec4<f32>,
     w_row: vec4<f32>,
     screen_up: vec4<f32>,
+    screen_right: vec4<f32>,
+    to_viewer: vec4<f32>,
     // Towards each lamp, and how strong it is.
     lamps: array<vec4<f32>, 3>,
     halfways: array<vec4<f32>, 3>,
@@ -29,6 +31,16 @@ struct Frame {
     // Where edge masks start in the attributes; triangles' materials start at 0.
     masks_at: u32,
     material_count: u32,
+    // What remains of wires from the second layer on.
+    layer_fade: f32,
+    // Colours at the start of the hull's looks; its triangles' materials follow.
+    hull_color_count: u32,
+    // Textures; what each is, is in front of the texels.
+    image_count: u32,
+    // Where each kind of corner value has its indices among the corner triangles.
+    normal_triangles_at: u32,
+    uv_triangles_at: u32,
+    color_triangles_at: u32,
 };
 
 // Which triangles, vertices or edges a dispatch handles, and which rows of the picture the buffers hold.
@@ -57,6 +69,10 @@ struct Batch {
     line_smoothing: f32,
     line_flags: u32,
     ink_at: u32,
+    // The role that drawn triangles have, where the plan has roles.
+    role: u32,
+    // Number of the layer that is looked for; 0 also for the visibility buffer.
+    layer: u32,
 };
 
 // Bits of `line_flags`.
@@ -76,6 +92,29 @@ const EDGE_MASKS: u32 = 128u;
 const LINES: u32 = 256u;
 const CLIPPED: u32 = 2048u;
 const FOUR_SAMPLES: u32 = 4096u;
+const ROLES: u32 = 0x100000u;
+const HULL_AMOUNTS: u32 = 0x200000u;
+const HULL_LOOKS: u32 = 0x400000u;
+const LAYERS: u32 = 0x800000u;
+const BEHIND_SURFACE: u32 = 0x1000000u;
+const WIRES_ONLY: u32 = 0x2000000u;
+const LAYERED_HULL: u32 = 0x4000000u;
+
+// src/plan/mod.rs explains these bits of a triangle's role.
+const ROLE_LAYER: u32 = 2u;
+const ROLE_HULL: u32 = 4u;
+const ROLE_FRONT_ONLY: u32 = 8u;
+const ROLE_BACK_ONLY: u32 = 16u;
+const DERIVATIVE_NORMALS: u32 = 65536u;
+const VERTEX_COLORS: u32 = 131072u;
+const UVS: u32 = 262144u;
+const TEXTURES: u32 = 524288u;
+// Wires by the smallest coordinate.
+const WIRE_MINIMUM: u32 = 0x8000000u;
+const WIRE_LIT: u32 = 0x10000000u;
+const DEBUG: u32 = 0x20000000u;
+// Whether colours change over a triangle at all.
+const VARYING: u32 = 0x40000000u;
 
 // What the plan has, of the above. A constant of the pipeline, so that a kernel contains only what its plan needs.
 override LOOK: u32 = 0u;
@@ -105,6 +144,18 @@ const OUTSIDE: i32 = i32(-0x80000000);
 // Rounds a product by itself: nothing can be fused through this.
 fn rn(v: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(v) ^ frame.zero);
+}
+
+fn rn2(v: vec2<f32>) -> vec2<f32> {
+    return bitcast<vec2<f32>>(bitcast<vec2<u32>>(v) ^ vec2(frame.zero));
+}
+
+fn rn3(v: vec3<f32>) -> vec3<f32> {
+    return bitcast<vec3<f32>>(bitcast<vec3<u32>>(v) ^ vec3(frame.zero));
+}
+
+fn rn4(v: vec4<f32>) -> vec4<f32> {
+    return bitcast<vec4<f32>>(bitcast<vec4<u32>>(v) ^ vec4(frame.zero));
 }
 
 // 1 / w for positive normal w.

@@ -5,7 +5,7 @@
 
 override PHASE: u32 = 0u;
 
-fn emit(index: u32, z: f32, id: u32) {
+fn keep_nearest(index: u32, z: f32, id: u32) {
     if PHASE == 0u {
         atomicMax(&samples[2u * index + 1u], bitcast<u32>(z));
     } else if atomicLoad(&samples[2u * index + 1u]) == bitcast<u32>(z) {

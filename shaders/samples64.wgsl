@@ -2,6 +2,6 @@
 
 @group(1) @binding(4) var<storage, read_write> samples: array<atomic<u64>>;
 
-fn emit(index: u32, z: f32, id: u32) {
+fn keep_nearest(index: u32, z: f32, id: u32) {
     atomicMax(&samples[index], (u64(bitcast<u32>(z)) << 32u) | u64(~id));
 }

@@ -2,6 +2,8 @@
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(1) var<storage, read> hull_normals: array<f32>;
+// How far each moves, where they differ: as frame.hull_push.
+@group(1) @binding(29) var<storage, read> hull_amounts: array<f32>;
 @group(1) @binding(3) var<storage, read_write> vertices: array<Vertex>;
 
 // Farthest a snapped coordinate may lie from the picture's centre: 4096 px.
@@ -19,17 +21,20 @@ fn transform(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgro
         return;
     }
     let n = vec3(hull_normals[3u * i], hull_normals[3u * i + 1u], hull_normals[3u * i + 2u]);
+    var amount = frame.hull_push;
+    if has(HULL_AMOUNTS) {
+        amount = hull_amounts[i];
+    }
     var push = 0.0;
     if has(HULL_PX) {
-        push = frame.hull_push;
+        push = amount;
     } else {
-        p = hull_position(p, n);
+        p = hull_position(p, n, amount);
     }
     vertices[batch.vertex_base + i] = snap_vertex(p, n, push);
 }
 
-fn hull_position(p: vec3<f32>, n: vec3<f32>) -> vec3<f32> {
-    let t = frame.hull_push;
+fn hull_position(p: vec3<f32>, n: vec3<f32>, t: f32) -> vec3<f32> {
     return vec3(p.x + rn(t * n.x), p.y + rn(t * n.y), p.z + rn(t * n.z));
 }
 

@@ -8,7 +8,7 @@ const SMALL: i32 = 4096;
 @compute @workgroup_size(64)
 fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = gid.x + gid.y * groups.x * 64u;
-    if i >= batch.count {
+    if i >= batch.count || is_over() {
         return;
     }
     let t = batch.first + i;
@@ -23,7 +23,7 @@ fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
         return;
     }
     let area = area_of(v.a, v.b, v.c);
-    if !is_wanted(area) {
+    if !is_wanted(t, area) {
         return;
     }
     let size_x = max(max(x.x, x.y), x.z) - min(min(x.x, x.y), x.z);

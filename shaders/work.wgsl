@@ -11,6 +11,10 @@ struct Work {
 };
 
 @group(1) @binding(5) var<storage, read_write> work: Work;
+// A byte a triangle.
+@group(1) @binding(24) var<storage, read> roles: array<u32>;
+// By layer: whether there may be another behind it.
+@group(1) @binding(28) var<storage, read> rounds: array<u32>;
 
 // Triangles of this many pixels, in the picture, are shared out over all workgroups.
 const HUGE_PX: i32 = 128;
@@ -34,12 +38,27 @@ fn is_outside(v: Corners) -> bool {
     return v.a.x == OUTSIDE || v.b.x == OUTSIDE || v.c.x == OUTSIDE;
 }
 
-// Whether the batch draws triangles of this area.
-fn is_wanted(area: vec2<u32>) -> bool {
+// Whether the batch draws triangle t, which has this area.
+fn is_wanted(t: u32, area: vec2<u32>) -> bool {
     if is_zero(area) {
         return false;
     }
-    return batch.faces == 0u || (batch.faces == 1u) == is_negative(area);
+    var faces = batch.faces;
+    if has(ROLES) {
+        let role = roles[t / 4u] >> (8u * (t & 3u));
+        if (role & batch.role) == 0u {
+            return false;
+        }
+        if batch.role != ROLE_HULL && (role & (ROLE_FRONT_ONLY | ROLE_BACK_ONLY)) != 0u {
+            faces = select(2u, 1u, (role & ROLE_FRONT_ONLY) != 0u);
+        }
+    }
+    return faces == 0u || (faces == 1u) == is_negative(area);
+}
+
+// Whether the round before this one has found that there is nothing left.
+fn is_over() -> bool {
+    return has(LAYERS) && batch.layer > 0u && rounds[batch.layer - 1u] == 0u;
 }
 
 fn postpone(s: Setup, size: vec2<i32>, id: u32) {

@@ -177,10 +177,12 @@ mod tests {
             nodes: _,
             json_depth: _,
             image_px: _,
+            bundle_bytes: _,
+            bundle_entries: _,
             job_ms: _,
             queue_per_worker: _,
         } = Limits::default();
-        assert_eq!(count, 8, "a limit without a flag, or a flag without a limit");
+        assert_eq!(count, 10, "a limit without a flag, or a flag without a limit");
     }
 
     #[test]

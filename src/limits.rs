@@ -21,6 +21,10 @@ pub struct Limits {
     pub json_depth: u64,
     /// Output image width and height, pixels each.
     pub image_px: u64,
+    /// Files of a bundle once unpacked, bytes.
+    pub bundle_bytes: u64,
+    /// Files of one bundle; of a zip archive every entry counts.
+    pub bundle_entries: u64,
     /// Wall-clock time for one job, from acceptance to encoded image, milliseconds.
     pub job_ms: u64,
     /// Jobs waiting for each worker. A full queue is refused at once, never waited for.
@@ -36,6 +40,8 @@ impl Default for Limits {
             nodes: 100_000,
             json_depth: 64,
             image_px: 4096,
+            bundle_bytes: 512 << 20,
+            bundle_entries: 1000,
             job_ms: 30_000,
             queue_per_worker: 64,
         }

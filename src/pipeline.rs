@@ -8,7 +8,7 @@ use crate::backend::{BackendKind, Backends, DrawError};
 use crate::encode::{self, EncodeError};
 use crate::image::ImageFormat;
 use crate::limits::{Budget, Deadline, Limits, Stopped};
-use crate::mesh::{self, Format, MeshError};
+use crate::mesh::{self, Bundle, Format, MeshError};
 pub use crate::plan::PlanError;
 use crate::plan::{self, Skip};
 use crate::scene::Spec;
@@ -16,8 +16,8 @@ use crate::scene::Spec;
 /// What comes in.
 #[derive(Clone, Copy, Debug)]
 pub struct Job<'a> {
-    /// One mesh file.
-    pub mesh: &'a [u8],
+    /// The mesh and what came along with it.
+    pub bundle: &'a Bundle,
     /// Overrides sniffing.
     pub format_in: Option<Format>,
     /// What to draw.
@@ -82,7 +82,7 @@ pub fn render(
 ) -> Result<Output, RenderError> {
     let mut budget = Budget::new(limits);
 
-    let mesh = mesh::import(job.mesh, job.format_in, limits, &mut budget, deadline)?;
+    let mesh = mesh::import(job.bundle, job.format_in, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
 
     let plan = plan::build(&mesh, job.spec, &mut budget)?;

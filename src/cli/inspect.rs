@@ -6,10 +6,10 @@ use clap::Args;
 use serde::Serialize;
 
 use super::complaint::Complaint;
-use super::files;
 use super::progress::Progress;
 use super::render::format_in;
 use super::settings::LimitSettings;
+use super::{bundle, files};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Topology;
@@ -20,14 +20,18 @@ use crate::pipeline::RenderError;
 /// Arguments of `inspect`.
 #[derive(Args)]
 pub struct InspectArgs {
-    /// Mesh file (OBJ, STL, glTF, GLB), `-` for standard input
-    mesh: String,
+    /// Mesh file (OBJ, STL, glTF, GLB) and the files it refers to, or a .zip of them; `-` for standard input
+    #[arg(required = true, value_name = "MESH")]
+    meshes: Vec<String>,
     /// Print JSON
     #[arg(long)]
     json: bool,
     /// Format of the mesh, where its bytes do not tell: obj, gltf, glb or stl
     #[arg(long, value_name = "FORMAT")]
     format_in: Option<String>,
+    /// Which of several files is the mesh, where more than one could be
+    #[arg(long, value_name = "FILE")]
+    entry: Option<String>,
     #[command(flatten)]
     limits: LimitSettings,
 }
@@ -90,15 +94,16 @@ pub fn run(arguments: &InspectArgs) -> Result<(), Complaint> {
     let limits = arguments.limits.config().limits;
     let format = format_in(arguments.format_in.as_deref())?;
     let progress = Progress::start("reading");
-    let bytes = files::read(&arguments.mesh, limits.memory_bytes)?;
+    let mesh_name = bundle::name(&arguments.meshes);
+    let bundle = bundle::read(&arguments.meshes, arguments.entry.clone(), &limits)?;
     progress.next("parsing");
     let mut budget = Budget::new(&limits);
-    let mesh = mesh::import(&bytes, format, &limits, &mut budget, &Deadline::default())
-        .map_err(|error| Complaint::from(error).about(&arguments.mesh))?;
+    let mesh = mesh::import(&bundle, format, &limits, &mut budget, &Deadline::default())
+        .map_err(|error| Complaint::from(error).about(mesh_name))?;
     progress.next("counting edges");
     let edges = EdgeList::of(&mesh, &mut budget)
-        .map_err(|limit| Complaint::from(RenderError::from(PlanError::from(limit))).about(&arguments.mesh))?;
-    let report = Report::new(&mesh, Topology::of(&mesh, &edges), bytes.len() as u64);
+        .map_err(|limit| Complaint::from(RenderError::from(PlanError::from(limit))).about(mesh_name))?;
+    let report = Report::new(&mesh, Topology::of(&mesh, &edges), bundle.bytes_len());
     drop(progress);
     let text = if arguments.json {
         let json = serde_json::to_string_pretty(&report);

@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 the mesh or the request is at fault, 2 usage, 3 our fault. Whatever fails is one sentence on
 //! standard error.
 
+mod bundle;
 mod complaint;
 mod files;
 mod health;

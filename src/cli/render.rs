@@ -7,56 +7,55 @@ use std::time::{Duration, Instant};
 use clap::Args;
 
 use super::complaint::Complaint;
-use super::files;
 use super::progress::Progress;
 use super::settings::LimitSettings;
+use super::{bundle, files};
 use crate::backend::{Backends, GpuHost, GpuStatus, HardwareHint};
 use crate::config::{cores, why_no_gpu};
 use crate::image::ImageFormat;
 use crate::limits::{BackendChoice, Deadline, Limits};
-use crate::mesh::Format;
+use crate::mesh::{Format, UpAxis};
 use crate::pipeline::{self, Job, Output, Stage};
-use crate::request::{self, Rules};
-use crate::scene::Spec;
+use crate::request::{self, Rules, Style, Words, words_of};
+use crate::scene::{Spec, View};
 use crate::telemetry;
 
 /// Arguments of `render`.
 #[derive(Args)]
 pub struct RenderArgs {
-    /// Mesh file (OBJ, STL, glTF, GLB), `-` for standard input
+    /// Mesh file (OBJ, STL, glTF, GLB) and the files it refers to, or a .zip of them; `-` for standard input
     #[arg(required = true, value_name = "MESH")]
     meshes: Vec<String>,
     /// Image file, `-` for standard output; its extension chooses the format unless --format does
     #[arg(short, long, value_name = "OUT")]
     output: String,
-    /// Preset: flat, smooth, unlit, wire, wireframe, outline or hidden-line
-    #[arg(long)]
+    #[arg(long, help = format!("Preset: {}", one_of::<Style>()))]
     style: Option<String>,
-    /// Request document
+    /// Request document (JSON; `meshsnap serve` has its schema at /v1/schema)
     #[arg(long, value_name = "FILE.json")]
     request: Option<PathBuf>,
-    /// Dotted key of the request document, such as wire.color=#f00; may be repeated
+    /// Dotted key of the request document, such as wire.color=#f00, outline={}, wire=null or
+    /// materials.Glass.surface.opacity=0.3; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// N or WxH, in pixels
     #[arg(long, value_name = "N|WxH")]
     size: Option<String>,
-    /// iso, front, back, left, right, top or bottom
-    #[arg(long)]
+    #[arg(long, help = format!("Named direction: {}", one_of::<View>()))]
     view: Option<String>,
-    /// Axis that points up: y, z, -y, -z, x or -x
-    #[arg(long, allow_hyphen_values = true)]
+    #[arg(long, allow_hyphen_values = true, help = format!("Axis that points up: {}", one_of::<UpAxis>()))]
     up: Option<String>,
-    /// png, webp or jpeg
-    #[arg(long)]
+    #[arg(long, help = format!("Image format: {}", one_of::<ImageFormat>()))]
     format: Option<String>,
     /// Format of the mesh, where its bytes do not tell: obj, gltf, glb or stl
     #[arg(long, value_name = "FORMAT")]
     format_in: Option<String>,
-    /// auto, gpu or cpu
-    #[arg(long)]
+    /// Which of several files is the mesh, where more than one could be
+    #[arg(long, value_name = "FILE")]
+    entry: Option<String>,
+    #[arg(long, help = format!("Who draws: {}", one_of::<BackendChoice>()))]
     backend: Option<String>,
-    /// Samples a pixel
+    /// Samples a pixel: 1 or 4
     #[arg(long)]
     samples: Option<String>,
     /// #rgb, #rrggbb, #rrggbbaa or transparent
@@ -72,20 +71,23 @@ pub struct RenderArgs {
     limits: LimitSettings,
 }
 
-/// Draws one mesh into one file.
+/// The words of the request document, for a line of help.
+fn one_of<T: Words>() -> String {
+    words_of::<T>().join(", ")
+}
+
+/// Draws one mesh, with what belongs to it, into one file.
 pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
     let filter = std::env::var("MESHSNAP_LOG").unwrap_or_default();
     let filter = if filter.is_empty() { "warn" } else { &filter };
     telemetry::init(filter, Some(false)).map_err(Complaint::usage)?;
-    let [mesh_name] = arguments.meshes.as_slice() else {
-        return Err(Complaint::usage("give one MESH: this version draws one file at a time"));
-    };
+    let mesh_name = bundle::name(&arguments.meshes);
     let limits = arguments.limits.config().limits;
     let format_in = format_in(arguments.format_in.as_deref())?;
     let spec = read_spec(arguments, &limits)?;
 
     let progress = Progress::start("reading");
-    let mesh = files::read(mesh_name, limits.memory_bytes)?;
+    let bundle = bundle::read(&arguments.meshes, arguments.entry.clone(), &limits)?;
     progress.next("parsing");
     let began = Instant::now();
     let (mut times, mut stage_began) = (Vec::new(), began);
@@ -97,7 +99,7 @@ pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
     let threads = arguments.threads.unwrap_or(cores() as usize);
     let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));
     let mut backends = Backends::new(gpu.clone(), threads);
-    let job = Job { mesh: &mesh, format_in, spec: &spec };
+    let job = Job { bundle: &bundle, format_in, spec: &spec };
     let output = pipeline::render(job, &mut backends, &limits, &Deadline::default(), &mut ended)
         .map_err(|error| Complaint::from(error).about(mesh_name))?;
     drop(progress);

@@ -60,6 +60,8 @@ pub const SETTINGS: &[Setting] = &[
     // 128 is where the JSON parser itself stops.
     number("limit-json-depth", "Nesting of JSON", 1, 128, |c| &mut c.limits.json_depth),
     number("limit-image-px", "Width and height of a picture", 1, IMAGE_PX_MAX, |c| &mut c.limits.image_px),
+    number("limit-bundle-bytes", "Files of a bundle, unpacked", 1, u64::MAX, |c| &mut c.limits.bundle_bytes),
+    number("limit-bundle-entries", "Files of a bundle", 1, 1 << 16, |c| &mut c.limits.bundle_entries),
     number("limit-job-ms", "Time for one job, waiting included", 1, MS_MAX, |c| &mut c.limits.job_ms),
     number("limit-queue-per-worker", "The same as --queue", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
 ];

@@ -9,6 +9,7 @@ use axum::middleware;
 use axum::routing::{get, post};
 
 use super::error::ApiError;
+use super::schema::{self, Schema};
 use super::{auth, health, jobs, observe, render};
 use crate::backend::{GpuHost, HardwareHint};
 use crate::config::{Config, cores, why_no_gpu};
@@ -20,6 +21,8 @@ use crate::request::Rules;
 pub struct App {
     /// Reads request documents.
     pub rules: Rules,
+    /// The same for those who write them.
+    pub schema: Schema,
     /// The queue and its workers.
     pub jobs: Jobs,
     /// The GPU, if there is one.
@@ -58,8 +61,10 @@ impl App {
             result_bytes: config.result_bytes,
             result_count: to_usize(config.result_count),
         };
+        let rules = Rules { limits: config.limits.clone(), backend: config.backend };
         Ok(Arc::new(Self {
-            rules: Rules { limits: config.limits.clone(), backend: config.backend },
+            schema: Schema::new(&rules),
+            rules,
             jobs: Jobs::start(settings, engine)?,
             gpu,
             bodies: Bodies::new(config.uploads_bytes),
@@ -89,6 +94,7 @@ pub fn router(app: &Arc<App>) -> Router {
         .route("/v1/jobs", post(jobs::post))
         .route("/v1/jobs/{id}", get(jobs::get).delete(jobs::delete))
         .route("/v1/jobs/{id}/result", get(jobs::result))
+        .route(schema::PATH, get(schema::get))
         .route("/v1/capabilities", get(health::capabilities))
         .route_layer(middleware::from_fn_with_state(app.clone(), auth::check));
     Router::new()

@@ -10,12 +10,14 @@ use futures_util::{Stream, StreamExt as _};
 
 use super::error::ApiError;
 use crate::jobs::{Bodies, Reservation};
+use crate::limits;
+use crate::mesh::{Bundle, BundleFile};
 
 /// What a body holds.
 #[derive(Debug)]
 pub struct Upload {
-    /// The mesh file.
-    pub mesh: Bytes,
+    /// The mesh and what came along with it.
+    pub bundle: Bundle,
     /// The request document, if the body is a multipart form that has one.
     pub document: Option<Bytes>,
     /// The memory that the two take.
@@ -26,6 +28,8 @@ pub struct Upload {
 pub struct BodyLimits<'a> {
     /// Largest body.
     pub bytes: u64,
+    /// Most files of a form.
+    pub files: u64,
     /// For all of it.
     pub time: Duration,
     /// Memory shared with other uploads.
@@ -37,9 +41,6 @@ pub fn check_header(headers: &HeaderMap, bytes_max: u64) -> Result<(), ApiError>
     let length = headers.get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()).and_then(|v| v.parse::<u64>().ok());
     if length.is_some_and(|length| length > bytes_max) {
         return Err(ApiError::body_too_large(bytes_max));
-    }
-    if media_type(headers).is_some_and(|t| t.eq_ignore_ascii_case("application/zip")) {
-        return Err(zip());
     }
     if headers.get(header::CONTENT_ENCODING).is_some_and(|v| !v.as_bytes().eq_ignore_ascii_case(b"identity")) {
         let detail = "a Content-Encoding is not understood; send the body as it is";
@@ -53,25 +54,24 @@ pub fn is_multipart(headers: &HeaderMap) -> bool {
     media_type(headers).is_some_and(|t| t.eq_ignore_ascii_case("multipart/form-data"))
 }
 
-/// Reads the body: the bytes of a mesh file, or a form with one.
+/// Reads the body: the bytes of a mesh file or of a zip archive, or a form with files.
 pub async fn read(request: Request, limits: BodyLimits<'_>) -> Result<Upload, ApiError> {
     let reading = async {
         let multipart = is_multipart(request.headers());
+        let is_zip = media_type(request.headers()).is_some_and(|t| t.eq_ignore_ascii_case("application/zip"));
         let (parts, body) = request.into_parts();
         let meter = Meter::new(limits.bytes, limits.bodies);
         if multipart {
             let body = Body::from_stream(metered(body, meter.clone()));
-            form(Request::from_parts(parts, body), &meter).await
+            form(Request::from_parts(parts, body), &meter, limits.files).await
         } else {
-            let mesh = whole(metered(body, meter.clone()), &meter).await?;
-            Ok(Upload { mesh, document: None, reservation: meter.reservation() })
+            let bytes = whole(metered(body, meter.clone()), &meter).await?;
+            // An archive stays closed until a worker opens it: unpacking is work.
+            let bundle = if is_zip { Bundle::zip(bytes) } else { Bundle::of_one(bytes) };
+            Ok(Upload { bundle, document: None, reservation: meter.reservation() })
         }
     };
-    let upload = tokio::time::timeout(limits.time, reading).await.unwrap_or_else(|_| Err(too_slow(limits.time)))?;
-    if upload.mesh.starts_with(b"PK\x03\x04") {
-        return Err(zip());
-    }
-    Ok(upload)
+    tokio::time::timeout(limits.time, reading).await.unwrap_or_else(|_| Err(too_slow(limits.time)))
 }
 
 async fn whole(chunks: impl Stream<Item = Result<Bytes, Broken>>, meter: &Meter) -> Result<Bytes, ApiError> {
@@ -84,34 +84,52 @@ async fn whole(chunks: impl Stream<Item = Result<Bytes, Broken>>, meter: &Meter)
     Ok(bytes.into())
 }
 
-async fn form(request: Request, meter: &Meter) -> Result<Upload, ApiError> {
-    let bad = |detail: String| ApiError::new(StatusCode::BAD_REQUEST, "bad_form", detail);
+async fn form(request: Request, meter: &Meter, files_max: u64) -> Result<Upload, ApiError> {
     let broken = |error: axum::extract::multipart::MultipartError| {
-        meter.fault_or(|| bad(format!("the form cannot be read: {}", error.body_text())))
+        meter.fault_or(|| bad_form(format!("the form cannot be read: {}", error.body_text())))
     };
-    let mut form = Multipart::from_request(request, &()).await.map_err(|e| bad(e.body_text()))?;
-    let (mut mesh, mut document) = (None, None);
+    let mut form = Multipart::from_request(request, &()).await.map_err(|e| bad_form(e.body_text()))?;
+    let (mut files, mut document): (Vec<BundleFile>, _) = (Vec::new(), None);
     while let Some(field) = form.next_field().await.map_err(broken)? {
-        let name = field.name().unwrap_or_default().to_owned();
-        let place = match name.as_str() {
-            "file" => &mut mesh,
-            "request" => &mut document,
-            _ => {
-                let name: String = name.chars().take(40).collect();
-                return Err(bad(format!("a form part is named {name:?}, and allowed are `file` and `request`")));
+        match field.name().unwrap_or_default() {
+            "file" => {
+                let count = files.len() as u64 + 1;
+                limits::check("the number of files in the form", count, files_max, "--limit-bundle-entries")
+                    .map_err(|limit| ApiError::from(&limit))?;
+                // Before its bytes are read, so that a bad name costs nothing.
+                let mut file = named(field.file_name(), files.len())?;
+                file.check_new(&files).map_err(|e| bad_form(format!("{e}; each `file` part needs its own")))?;
+                file.bytes = field.bytes().await.map_err(broken)?;
+                files.push(file);
             }
-        };
-        if place.is_some() && name == "file" {
-            let detail = "the form has several `file` parts, and bundles are not read by this version; send one file";
-            return Err(ApiError::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "bundle_not_supported", detail));
+            "request" if document.is_some() => {
+                return Err(bad_form("the form has several `request` parts; send at most one".into()));
+            }
+            "request" => document = Some(field.bytes().await.map_err(broken)?),
+            other => {
+                let name: String = other.chars().take(40).collect();
+                return Err(bad_form(format!("a form part is named {name:?}, and allowed are `file` and `request`")));
+            }
         }
-        if place.is_some() {
-            return Err(bad("the form has several `request` parts; send at most one".into()));
-        }
-        *place = Some(field.bytes().await.map_err(broken)?);
     }
-    let mesh = mesh.ok_or_else(|| bad("the form has no `file` part; send the mesh as one".into()))?;
-    Ok(Upload { mesh, document, reservation: meter.reservation() })
+    if files.is_empty() {
+        return Err(bad_form("the form has no `file` part; send the mesh as one".into()));
+    }
+    Ok(Upload { bundle: Bundle::of_files(files), document, reservation: meter.reservation() })
+}
+
+/// An empty file by the name that its part gives. One part needs no name.
+fn named(name: Option<&str>, before: usize) -> Result<BundleFile, ApiError> {
+    let name = match name {
+        None | Some("") if before == 0 => "mesh",
+        None | Some("") => return Err(bad_form(format!("`file` part {} of the form has no filename", before + 1))),
+        Some(name) => name,
+    };
+    BundleFile::new(name, Bytes::new()).map_err(|error| bad_form(error.to_string()))
+}
+
+fn bad_form(detail: String) -> ApiError {
+    ApiError::new(StatusCode::BAD_REQUEST, "bad_form", detail)
 }
 
 /// A body that ended before its end. Why is in the [`Meter`], if it was us.
@@ -181,11 +199,6 @@ fn metered(body: Body, meter: Meter) -> impl Stream<Item = Result<Bytes, Broken>
 fn media_type(headers: &HeaderMap) -> Option<&str> {
     let value = headers.get(header::CONTENT_TYPE)?.to_str().ok()?;
     value.split(';').next().map(str::trim)
-}
-
-fn zip() -> ApiError {
-    let detail = "zip bundles are not read by this version; send one self-contained mesh file";
-    ApiError::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "bundle_not_supported", detail)
 }
 
 fn too_slow(limit: Duration) -> ApiError {

@@ -1,8 +1,11 @@
 //! What goes over the wire as JSON. Domain types do not serialise themselves.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::error::ApiError;
+use super::schema;
 use crate::backend::GpuStatus;
 use crate::image::ImageFormat;
 use crate::jobs::{Job, Load, State, Timings};
@@ -154,7 +157,9 @@ pub struct CapabilitiesDto {
     mesh_formats: [&'static str; 4],
     image_formats: [&'static str; 3],
     styles: Vec<&'static str>,
+    schema: &'static str,
     request_keys: Vec<&'static str>,
+    request_words: BTreeMap<&'static str, Vec<&'static str>>,
     backend: BackendDto,
     workers: u64,
     load: LoadDto,
@@ -211,6 +216,8 @@ struct LimitsDto {
     nodes: u64,
     json_depth: u64,
     image_px: u64,
+    bundle_bytes: u64,
+    bundle_entries: u64,
     job_ms: u64,
     queue_per_worker: u64,
 }
@@ -218,14 +225,16 @@ struct LimitsDto {
 impl CapabilitiesDto {
     /// What this process can do.
     pub fn new(limits: &Limits, backend: BackendDto, workers: u64, load: Load) -> Self {
-        let Limits { body_bytes, memory_bytes, triangles, nodes, json_depth, image_px, job_ms, queue_per_worker } =
-            *limits;
+        let Limits { body_bytes, memory_bytes, triangles, nodes, json_depth, image_px, .. } = *limits;
+        let Limits { bundle_bytes, bundle_entries, job_ms, queue_per_worker, .. } = *limits;
         Self {
             version: env!("CARGO_PKG_VERSION"),
             mesh_formats: Format::NAMES,
             image_formats: ["png", "webp", "jpeg"],
             styles: words_of::<Style>(),
+            schema: schema::PATH,
             request_keys: request::keys(),
+            request_words: request::vocabulary(),
             backend,
             workers,
             load: LoadDto {
@@ -241,6 +250,8 @@ impl CapabilitiesDto {
                 nodes,
                 json_depth,
                 image_px,
+                bundle_bytes,
+                bundle_entries,
                 job_ms,
                 queue_per_worker,
             },

@@ -161,6 +161,8 @@ impl From<&MeshError> for ApiError {
             MeshFault::Broken => (StatusCode::UNPROCESSABLE_ENTITY, "mesh_broken"),
             MeshFault::Empty => (StatusCode::UNPROCESSABLE_ENTITY, "mesh_empty"),
             MeshFault::OutsideBundle => (StatusCode::UNPROCESSABLE_ENTITY, "mesh_outside_bundle"),
+            MeshFault::BundleBroken => (StatusCode::UNPROCESSABLE_ENTITY, "bundle_broken"),
+            MeshFault::EntryUnclear => (StatusCode::UNPROCESSABLE_ENTITY, "entry_unclear"),
             MeshFault::Unsupported => (StatusCode::UNPROCESSABLE_ENTITY, "mesh_unsupported"),
             MeshFault::Limit(limit) => return limit.into(),
             MeshFault::Stopped => return deadline(error.detail.clone()),

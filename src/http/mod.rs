@@ -1,6 +1,6 @@
 //! The daemon: HTTP in front of [`crate::jobs`].
 //!
-//! Reading order: [`app`] (what handlers share, and every path), [`render`] and [`jobs`] (the resources), [`receive`] (a
+//! Reading order: [`app`] (what handlers share, and every path), [`render`], [`jobs`] and [`schema`] (the resources), [`receive`] (a
 //! request to work, in the order of refusals), [`body`], [`negotiate`], [`error`] (the only status map), [`observe`] and
 //! [`lent`] (around every request), [`accept`] and [`io`] (connections).
 //!
@@ -20,6 +20,7 @@ mod negotiate;
 mod observe;
 mod receive;
 mod render;
+mod schema;
 
 use std::net::SocketAddr;
 use std::sync::Arc;

@@ -66,8 +66,8 @@ pub fn picture(finished: &Finished) -> Response {
     (StatusCode::OK, headers, finished.picture.clone()).into_response()
 }
 
-/// 128 bits of the picture's bytes: equal pictures have equal tags, and the other way round but for chance.
-fn digest(bytes: &[u8]) -> u128 {
+/// 128 bits of a body: equal bodies have equal tags, and the other way round but for chance.
+pub fn digest(bytes: &[u8]) -> u128 {
     let half = |seed| rapidhash::v3::rapidhash_v3_seeded(bytes, &rapidhash::v3::RapidSecrets::seed(seed));
     u128::from(half(1)) << 64 | u128::from(half(2))
 }

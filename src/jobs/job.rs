@@ -12,7 +12,7 @@ use super::Reservation;
 use crate::backend::BackendKind;
 use crate::image::ImageFormat;
 use crate::limits::Deadline;
-use crate::mesh::{Format, Warning};
+use crate::mesh::{Bundle, Format, Warning};
 use crate::pipeline::{Output, RenderError, Stage};
 use crate::scene::Spec;
 
@@ -40,13 +40,13 @@ impl fmt::Display for JobId {
 /// What is to be done.
 #[derive(Debug)]
 pub struct Work {
-    /// One mesh file.
-    pub mesh: Bytes,
+    /// The mesh and what came along with it.
+    pub bundle: Bundle,
     /// Overrides sniffing.
     pub format_in: Option<Format>,
     /// What to draw.
     pub spec: Spec,
-    /// The memory that `mesh` was granted.
+    /// The memory that `bundle` was granted.
     pub reservation: Reservation,
 }
 

@@ -9,6 +9,7 @@ use super::*;
 use crate::backend::BackendKind;
 use crate::image::ImageFormat;
 use crate::limits::{BackendChoice, Deadline, Stopped};
+use crate::mesh::Bundle;
 use crate::pipeline::{Output, RenderError, Stage};
 use crate::scene::color::Rgba;
 use crate::scene::{CameraSpec, ImageSpec, Layers, Light, LightPreset, Projection, Spec, View};
@@ -29,7 +30,7 @@ fn settings() -> Settings {
 fn work(bodies: &Arc<Bodies>, mesh: &'static [u8]) -> Work {
     let mut reservation = bodies.reserve();
     reservation.grow(mesh.len() as u64).unwrap();
-    Work { mesh: Bytes::from_static(mesh), format_in: None, spec: spec(), reservation }
+    Work { bundle: Bundle::of_one(Bytes::from_static(mesh)), format_in: None, spec: spec(), reservation }
 }
 
 /// What is drawn does not matter here.
@@ -67,7 +68,7 @@ fn output(bytes: usize) -> Output {
 
 /// What the mesh bytes make the fake renderer do.
 fn act(work: &Work, deadline: &Deadline, gate: &Mutex<Receiver<()>>) -> Result<Output, RenderError> {
-    match &work.mesh[..] {
+    match &work.bundle.files()[0].bytes[..] {
         b"panic" => panic!("asked to"),
         b"wait" => {
             gate.lock().unwrap().recv_timeout(SOON).map_or(Err(RenderError::Stopped(Stopped)), |()| Ok(output(1)))

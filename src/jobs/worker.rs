@@ -22,7 +22,7 @@ pub fn pipeline_engine(gpu: Arc<GpuHost>, threads: usize, limits: Limits) -> Eng
         let mut backends = Backends::new(gpu.clone(), threads);
         let limits = limits.clone();
         Box::new(move |work, deadline, ended| {
-            let job = pipeline::Job { mesh: &work.mesh, format_in: work.format_in, spec: &work.spec };
+            let job = pipeline::Job { bundle: &work.bundle, format_in: work.format_in, spec: &work.spec };
             pipeline::render(job, &mut backends, &limits, deadline, ended)
         })
     })

@@ -23,6 +23,10 @@ pub enum MeshFault {
     Empty,
     /// Refers to a file outside the upload, or to one that the upload lacks.
     OutsideBundle,
+    /// A bundle that cannot be unpacked, or whose files have names that no file may have.
+    BundleBroken,
+    /// Several files of the bundle are meshes, or the one that was asked for is not there.
+    EntryUnclear,
     /// Uses a feature of the format that is not read, and that the file says is required.
     Unsupported,
     /// Breaks a limit.

@@ -1,7 +1,8 @@
-//! Sniffs the format from the bytes and calls its importer.
+//! Opens a bundle, finds its mesh, sniffs the format from the bytes and calls its importer.
 
+use super::bundle::Bundle;
 use super::normalise::normalise;
-use super::{Mesh, MeshError, MeshFault, gltf, obj, sniff, stl};
+use super::{Folder, Mesh, MeshError, MeshFault, entry, gltf, obj, stl, unzip};
 use crate::limits::{Budget, Deadline, Limits};
 
 /// The mesh formats that are read.
@@ -58,25 +59,28 @@ impl std::fmt::Display for Format {
     }
 }
 
-/// Reads a mesh from the bytes of one file. `format` overrides sniffing.
+/// Reads the mesh of a bundle. `format` overrides sniffing.
 pub fn import(
-    bytes: &[u8],
+    bundle: &Bundle,
     format: Option<Format>,
     limits: &Limits,
     budget: &mut Budget,
     deadline: &Deadline,
 ) -> Result<Mesh, MeshError> {
-    if bytes.is_empty() {
-        return Err(MeshError::new(
-            MeshFault::Unrecognised,
-            "the body is empty: send the bytes of a mesh file (OBJ, STL, glTF or GLB)",
-        ));
-    }
-    let format = match format {
-        Some(format) => format,
-        None => sniff::sniff(bytes)?,
+    let files = match bundle.files.as_slice() {
+        [archive] if bundle.is_zip => unzip::unzip(&archive.bytes, limits, budget, deadline)?,
+        [single] if single.bytes.is_empty() => {
+            return Err(MeshError::new(
+                MeshFault::Unrecognised,
+                "the body is empty: send the bytes of a mesh file (OBJ, STL, glTF or GLB)",
+            ));
+        }
+        // Clones of shared bytes.
+        files => files.to_vec(),
     };
-    let mut cx = Context { limits, budget, deadline };
+    let (folder, format) = entry::choose(files, bundle.entry.as_deref(), format, deadline)?;
+    let bytes = &folder.entry().bytes;
+    let mut cx = Context { limits, budget, deadline, bundle: &folder };
     let raw = match format {
         Format::Obj => obj::read(bytes, &mut cx)?,
         Format::StlBinary | Format::StlAscii => stl::read(bytes, &mut cx)?,
@@ -93,6 +97,8 @@ pub struct Context<'a> {
     pub budget: &'a mut Budget,
     /// Looked at inside long loops.
     pub deadline: &'a Deadline,
+    /// The files that names in the mesh may mean.
+    pub bundle: &'a Folder,
 }
 
 impl Context<'_> {

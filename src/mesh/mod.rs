@@ -1,11 +1,15 @@
 //! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
 //!
-//! Reading order: [`raw`] (what an importer fills), `import` (sniffs the format and calls one), `obj`, `stl` and `gltf` (the
-//! importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and [`topology`], for whoever needs them.
+//! Reading order: [`bundle`] (what comes in), `folder` (what names in it mean), [`raw`] (what an importer fills), `import` (opens the bundle, sniffs the format
+//! and calls one), `obj`, `stl` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
+//! [`topology`], for whoever needs them.
 
 mod attributes;
+pub mod bundle;
 pub mod edges;
+mod entry;
 mod error;
+mod folder;
 mod gltf;
 mod import;
 pub mod material;
@@ -18,9 +22,12 @@ pub mod raw;
 mod sniff;
 mod stl;
 pub mod topology;
+mod unzip;
 mod weld;
 
+pub use bundle::{Bundle, BundleFile};
 pub use error::{MeshError, MeshFault};
+pub use folder::Folder;
 pub use import::{Format, import};
 pub use material::MaterialSlot;
 

@@ -41,6 +41,16 @@ pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
     ))
 }
 
+/// The format of a file that lies among others, few of which are meshes. What only resembles a binary STL is one if it
+/// `may_be_stl` by its name.
+pub fn sniff_among_others(bytes: &[u8], may_be_stl: bool) -> Option<Format> {
+    if known_but_unread(bytes).is_some() {
+        return stl::is_exact_binary(bytes).then_some(Format::StlBinary);
+    }
+    let format = sniff(bytes).ok()?;
+    (format != Format::StlBinary || may_be_stl || stl::is_exact_binary(bytes)).then_some(format)
+}
+
 /// Without a byte order mark and leading white space.
 pub fn trim_start(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start()

@@ -81,6 +81,11 @@ fn pay(mesh: &Mesh, size_px: [u32; 2], parts: &Parts<'_>, budget: &mut Budget) -
     budget.spend("vertices on screen", mesh.positions.len() as u64, 32)?;
     // Up to eight 4-byte entries in the lists of what each part of the picture has to draw, and a role.
     budget.spend("lists of triangles", mesh.triangles.len() as u64, 33)?;
+    if parts.layers_pass().is_some() {
+        // A triangle may be in the visibility buffer's lists and in the layers', and each thread notes which are done with.
+        // What layers need a sample is bounded: they are drawn band by band.
+        budget.spend("lists of layers", mesh.triangles.len() as u64, 32)?;
+    }
     budget.spend("materials", mesh.materials.len() as u64, 256)?;
     let is_smooth = parts.layers.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::scene::Shading::Smooth));
     if parts.has_hull() || (is_smooth && mesh.normals.is_empty()) {
@@ -247,7 +252,9 @@ fn hull_pass<'a>(mesh: &'a Mesh, parts: &Parts<'_>, welded: Option<Cow<'a, [[f32
         if offsets.iter().flatten().all(|offset| *offset == first) { Vec::new() } else { amounts(mesh, &offsets) };
     // The file's normals may split at hard edges, where a hull that followed them would tear: always the welded ones.
     let normals = welded.unwrap_or_else(|| normals::angle_weighted(mesh).into());
-    HullPass { colors, normals, offset: first, amounts }
+    let tells_apart = colors.len() > 1 || (parts.layers_pass().is_some() && mesh.materials.len() > 1);
+    let triangle_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
+    HullPass { colors, normals, offset: first, amounts, triangle_materials }
 }
 
 /// How far each position moves: as far as the thickest outline of its parts. (The request has seen to it that all have the

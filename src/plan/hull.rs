@@ -13,6 +13,34 @@ pub struct HullPass<'a> {
     pub offset: HullOffset,
     /// How far each position moves, in the unit of `offset`, where parts differ; else empty, and all move by `offset`.
     pub amounts: Vec<f32>,
+    /// Material index a triangle; empty where all are the same. Unlike the surface's, never merged because they look alike:
+    /// it also says what hides which hull, see [`LayersPass`](super::LayersPass).
+    pub triangle_materials: &'a [u32],
+}
+
+impl HullPass<'_> {
+    /// How far a position moves.
+    #[inline(always)]
+    pub fn offset_at(&self, position: usize) -> HullOffset {
+        match (self.amounts.get(position), self.offset) {
+            (None, offset) => offset,
+            (Some(&amount), HullOffset::Object(_)) => HullOffset::Object(amount),
+            (Some(&amount), HullOffset::Px(_)) => HullOffset::Px(amount),
+        }
+    }
+
+    /// The material of a triangle.
+    #[inline(always)]
+    pub fn material(&self, triangle: usize) -> u32 {
+        self.triangle_materials.get(triangle).copied().unwrap_or(0)
+    }
+
+    /// The colour of a triangle's back.
+    #[inline(always)]
+    pub fn color(&self, triangle: usize) -> [f32; 4] {
+        let last = self.colors.len().saturating_sub(1);
+        self.colors.get((self.material(triangle) as usize).min(last)).copied().unwrap_or_default()
+    }
 }
 
 /// How far a hull vertex moves.

@@ -117,15 +117,16 @@ pub enum Faces {
 /// layer k - 1 by (depth, lowest id first), all of them in front of the visibility buffer's surface unless `behind_surface`. Each is
 /// shaded as the surface is, and they lie over each other and over what the visibility buffer shows, nearest on top.
 ///
-/// Where a plan has layers, hull triangles are not in the visibility buffer but in the layers; one is left out where a nearer
-/// layer of the same sample belongs to the same material (modulo 32), because a glass must not show the back of its own outline.
+/// Where layers do not go on behind the surface, hull triangles are not in the visibility buffer but in the layers; one adds
+/// nothing (but counts as a layer) where a nearer layer of the same sample belongs to the same material (modulo 32), because a
+/// glass must not show the back of its own outline. Where they do, everything filled is opaque, and so may the hull be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayersPass {
     /// Layers that are looked for; what lies behind the last of them is not drawn.
     pub count_max: u32,
     /// Whether layers go on behind the surface: for wires that show through it.
     pub behind_surface: bool,
-    /// Whether layers show wires alone; the fill is in the visibility buffer.
+    /// Whether layers show wires alone, and the visibility buffer what has [`roles::LAYER`] without its wires.
     pub wires_only: bool,
     /// What remains of wires from the second layer on, 0 to 1.
     pub fade: f32,
@@ -154,6 +155,23 @@ impl<'a> DrawPlan<'a> {
             background: [0.0; 4],
             skips: Vec::new(),
         }
+    }
+
+    /// The layers, where there are any to look for.
+    pub fn layers(&self) -> Option<&LayersPass> {
+        let has_triangles = self.surface.is_some() || self.hull.is_some();
+        self.layers.as_ref().filter(|layers| layers.count_max > 0 && has_triangles)
+    }
+
+    /// Whether the hull is drawn into the layers and not into the visibility buffer.
+    pub fn has_layered_hull(&self) -> bool {
+        self.hull.is_some() && self.layers().is_some_and(|layers| !layers.behind_surface)
+    }
+
+    /// What a triangle takes part in.
+    #[inline(always)]
+    pub fn role(&self, triangle: usize) -> u8 {
+        self.roles.get(triangle).copied().unwrap_or(roles::SURFACE | roles::HULL)
     }
 
     /// Whether any sample gets a colour.

@@ -1,90 +1,91 @@
 //! A [`Spec`] in the making: defaults, presets, and what can only be settled when every key is known.
 
 use super::error::{RequestError, RequestFault};
-use super::words::Style;
+use super::look::Look;
+use super::words::{Style, word_for};
 use crate::limits::BackendChoice;
 use crate::scene::color::Rgba;
 use crate::scene::{
-    CameraSpec, Cull, DebugView, FlatNormals, Hidden, ImageSpec, Layers, Light, LightPreset, Outline, OutlineMethod,
-    OutlineUnit, Projection, Shading, Spec, Surface, Topology, View, Wire, WireEdges, WireMethod,
+    CameraSpec, ImageSpec, Layers, Light, LightPreset, OutlineMethod, OutlineUnit, Projection, Spec, Topology, View,
 };
-
-/// Largest thickness of a wire in multiples of `fwidth`; an exact one is in pixels.
-const FWIDTH_MAX: f32 = 10.0;
-
-/// Largest outline in pixels: wider than any picture's border needs, and far from overflowing fixed point.
-const OUTLINE_PX_MAX: f32 = 100.0;
 
 /// A spec whose dependent defaults are still open.
 #[derive(Clone, Debug)]
 pub struct Draft {
-    /// Everything that does not depend on other keys.
-    pub spec: Spec,
-    /// None: 0 for exact lines, 1 for `fwidth`.
-    pub smoothing: Option<f32>,
-    /// None: 0.3 under a headlight, 1 without one.
+    /// The document's own layers; each of its materials begins from them.
+    pub look: Look,
+    /// The topology layer, if it is on.
+    pub topology: Option<Topology>,
+    /// See [`Spec::camera`].
+    pub camera: CameraSpec,
+    /// See [`Spec::light`]; but for the ambient share.
+    pub light: Light,
+    /// None: 0.3 where there are lamps, 1 where there are none.
     pub ambient: Option<f32>,
+    /// See [`Spec::image`].
+    pub image: ImageSpec,
+    /// See [`Spec::backend`].
+    pub backend: BackendChoice,
 }
 
 impl Draft {
     /// The defaults, and a style's layers.
     pub fn new(style: Style, backend: BackendChoice) -> Self {
-        let surface = |shading| Some(Surface { shading, ..SURFACE });
-        let wire = |hidden| Some(Wire { hidden, ..WIRE });
-        let white = Some(Surface { shading: Shading::Unlit, color: Some(Rgba::WHITE), ..SURFACE });
-        let (surface, wire, outline) = match style {
-            Style::Flat => (surface(Shading::Flat), None, None),
-            Style::Smooth => (surface(Shading::Smooth), None, None),
-            Style::Unlit => (surface(Shading::Unlit), None, None),
-            Style::Wire => (surface(Shading::Flat), wire(Hidden::Hide), None),
-            Style::Wireframe => (None, wire(Hidden::Fade), None),
-            Style::Outline => (surface(Shading::Smooth), None, Some(OUTLINE)),
-            Style::HiddenLine => (white, wire(Hidden::Hide), None),
-            Style::Topology => (surface(Shading::Flat), None, None),
-        };
-        let light = Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3 };
-        let topology = (style == Style::Topology).then_some(TOPOLOGY);
-        let layers = Layers { surface, wire, outline };
-        let spec = Spec { layers, materials: Vec::new(), topology, camera: CAMERA, light, image: IMAGE, backend };
-        Self { spec, smoothing: None, ambient: None }
+        Self {
+            look: Look::new(style),
+            topology: (style == Style::Topology).then(default_topology),
+            camera: CAMERA,
+            light: Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3 },
+            ambient: None,
+            image: IMAGE,
+            backend,
+        }
     }
 
-    /// The surface layer, turned on by being spoken of.
-    pub fn surface(&mut self) -> &mut Surface {
-        self.spec.layers.surface.get_or_insert(SURFACE)
+    /// The topology layer, turned on by being spoken of.
+    pub fn topology(&mut self) -> &mut Topology {
+        self.topology.get_or_insert_with(default_topology)
     }
 
-    /// The wire layer, turned on by being spoken of.
-    pub fn wire(&mut self) -> &mut Wire {
-        self.spec.layers.wire.get_or_insert(WIRE)
+    /// Turns the topology layer on or off.
+    pub fn turn_topology(&mut self, on: bool) {
+        self.topology = on.then(|| *self.topology());
     }
 
-    /// The outline layer, turned on by being spoken of.
-    pub fn outline(&mut self) -> &mut Outline {
-        self.spec.layers.outline.get_or_insert(OUTLINE)
+    /// Settles what depends on several keys. Each material has a name.
+    pub fn finish(self, materials: Vec<(String, Look)>) -> Result<Spec, RequestError> {
+        let Self { look, topology, camera, mut light, ambient, image, backend } = self;
+        let layers = look.finish("")?;
+        let materials = materials.into_iter().map(|(name, look)| {
+            let layers = look.finish(&format!("materials.{name}."))?;
+            Ok((name, layers))
+        });
+        let materials = materials.collect::<Result<Vec<_>, _>>()?;
+        check_hull_units(&layers, &materials)?;
+        check_camera(&camera)?;
+        let has_lamps = light.preset != LightPreset::None;
+        light.ambient = ambient.unwrap_or(if has_lamps { 0.3 } else { 1.0 });
+        Ok(Spec { layers, materials, topology, camera, light, image, backend })
     }
+}
 
-    /// Settles what depends on several keys.
-    pub fn finish(mut self) -> Result<Spec, RequestError> {
-        if let Some(wire) = &mut self.spec.layers.wire {
-            let default = if wire.method == WireMethod::Exact { 0.0 } else { 1.0 };
-            wire.smoothing = self.smoothing.unwrap_or(default);
-            if wire.method == WireMethod::Fwidth && wire.thickness > FWIDTH_MAX {
-                let allowed = format!("a number from 0 to {FWIDTH_MAX} where `wire.method` is fwidth");
-                return Err(RequestError::new(RequestFault::OutOfRange, "wire.thickness", wire.thickness, allowed));
+/// The hulls of a picture are one mesh that is pushed out in one way, if not everywhere equally far.
+fn check_hull_units(layers: &Layers, materials: &[(String, Layers)]) -> Result<(), RequestError> {
+    let unit = |layers: &Layers| layers.outline.filter(|o| o.method == OutlineMethod::Hull).map(|o| o.unit);
+    let named = materials.iter().map(|(name, layers)| (format!("materials.{name}.outline.unit"), unit(layers)));
+    let mut first: Option<(String, OutlineUnit)> = None;
+    for (key, unit) in std::iter::once(("outline.unit".to_owned(), unit(layers))).chain(named) {
+        let Some(unit) = unit else { continue };
+        match &first {
+            None => first = Some((key, unit)),
+            Some((other, of_other)) if *of_other != unit => {
+                let why = format!("`{other}` is {}: all hulls of one picture have the same unit", word_for(*of_other));
+                return Err(RequestError::new(RequestFault::Conflict, &key, word_for(unit), why));
             }
+            Some(_) => {}
         }
-        let has_lamps = self.spec.light.preset != LightPreset::None;
-        self.spec.light.ambient = self.ambient.unwrap_or(if has_lamps { 0.3 } else { 1.0 });
-        if let Some(Outline { unit: OutlineUnit::Px, thickness: Some(thickness), .. }) = self.spec.layers.outline
-            && thickness > OUTLINE_PX_MAX
-        {
-            let allowed = format!("a number from 0 to {OUTLINE_PX_MAX} where `outline.unit` is px");
-            return Err(RequestError::new(RequestFault::OutOfRange, "outline.thickness", thickness, allowed));
-        }
-        check_camera(&self.spec.camera)?;
-        Ok(self.spec)
     }
+    Ok(())
 }
 
 fn check_camera(camera: &CameraSpec) -> Result<(), RequestError> {
@@ -95,46 +96,24 @@ fn check_camera(camera: &CameraSpec) -> Result<(), RequestError> {
         (Some(eye), Some(target)) if eye == target => {
             conflict("camera.target", "the same point as `camera.eye`", "they must differ to say where to look")
         }
+        (Some(_), _) if camera.from_file => {
+            conflict("camera.from_file", "true", "`camera.eye` is given too: choose one of the two cameras")
+        }
         _ => Ok(()),
     }
 }
 
-const SURFACE: Surface = Surface {
-    shading: Shading::Flat,
-    normals: FlatNormals::Face,
-    color: None,
-    metallic: None,
-    roughness: None,
-    emissive: None,
-    opacity: 1.0,
-    textures: true,
-    debug: DebugView::None,
-    cull: Cull::None,
-};
-
-const WIRE: Wire = Wire {
-    method: WireMethod::Exact,
-    color: Rgba::BLACK,
-    thickness: 1.0,
-    smoothing: 0.0,
-    opacity: 1.0,
-    lit: false,
-    edges: WireEdges::Triangles,
-    feature_angle_deg: 30.0,
-    hidden: Hidden::Hide,
-};
-
-const OUTLINE: Outline =
-    Outline { method: OutlineMethod::Hull, color: Rgba::BLACK, thickness: None, unit: OutlineUnit::Object };
-
-const TOPOLOGY: Topology = Topology {
-    polygon: Some(Rgba::BLACK),
-    crease: None,
-    open: Some(Rgba([1.0, 0.0, 0.0, 1.0])),
-    nonmanifold: Some(Rgba([0.5, 0.0, 0.5, 1.0])),
-    crease_angle_deg: 30.0,
-    thickness: 1.0,
-};
+/// Faults in colours that stand out from each other and from any calm surface; edges of polygons recede.
+fn default_topology() -> Topology {
+    Topology {
+        polygon: Some(Rgba::from_srgb8([0x33, 0x3a, 0x44, 0x99])),
+        crease: None,
+        open: Some(Rgba::from_srgb8([0xf0, 0x5a, 0x1e, 0xff])),
+        nonmanifold: Some(Rgba::from_srgb8([0xd0, 0x1c, 0x9b, 0xff])),
+        crease_angle_deg: 30.0,
+        thickness: 1.0,
+    }
+}
 
 const CAMERA: CameraSpec = CameraSpec {
     view: View::Iso,

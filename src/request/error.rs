@@ -52,7 +52,7 @@ impl RequestError {
     /// An error of the given kind; `given` is shortened here.
     pub fn new(fault: RequestFault, key: &str, given: impl fmt::Display, allowed: impl Into<String>) -> Self {
         let given = shorten(&given.to_string());
-        Self { fault, key: shorten(key), given, allowed: allowed.into(), flag: None }
+        Self { fault, key: shorten_key(key), given, allowed: allowed.into(), flag: None }
     }
 }
 
@@ -77,11 +77,25 @@ impl fmt::Display for RequestError {
 
 impl std::error::Error for RequestError {}
 
-/// Keeps an answer short and printable, whatever was sent.
+/// A material's name may be long, and what is asked of it stands at the key's end: what is left out is in the middle.
+fn shorten_key(key: &str) -> String {
+    const CHARS_MAX: usize = 120;
+    let count = key.chars().count();
+    if count <= CHARS_MAX {
+        return shorten_to(key, CHARS_MAX);
+    }
+    let end: String = key.chars().skip(count - CHARS_MAX / 2).collect();
+    shorten_to(key, CHARS_MAX / 2) + &shorten_to(&end, CHARS_MAX / 2)
+}
+
 fn shorten(text: &str) -> String {
-    const CHARS_MAX: usize = 80;
-    let mut short: String = text.chars().take(CHARS_MAX).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
-    if text.chars().nth(CHARS_MAX).is_some() {
+    shorten_to(text, 80)
+}
+
+/// Keeps an answer short and printable, whatever was sent.
+fn shorten_to(text: &str, chars_max: usize) -> String {
+    let mut short: String = text.chars().take(chars_max).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
+    if text.chars().nth(chars_max).is_some() {
         short.push_str("...");
     }
     short

@@ -1,237 +1,236 @@
-//! The table of keys: a line for each key of a request document, with what it allows and where it goes.
+//! What a key is: its name, what it allows, what it means, and where its value goes.
 
-use std::sync::LazyLock;
+use serde_json::Value as Json;
 
 use super::draft::Draft;
+use super::look::Look;
 use super::value::{Kind, Value};
 use super::words::{Words, words_of};
+use crate::scene::color::Rgba;
 
 /// A key of the document.
 pub struct Field {
     /// Dotted, such as `wire.color`.
     pub key: &'static str,
+    /// One line on what it does.
+    pub about: &'static str,
     /// What may be given.
     pub kind: Kind,
-    /// Whether `null` may be given: it means "as if the key were missing".
+    /// Whether `null` may be given.
     pub nullable: bool,
+    /// What a key that is not given means; None where that depends on other keys.
+    pub default: Option<Json>,
     set: Setter,
 }
 
-/// Puts a value in its place.
-type Setter = Box<dyn Fn(&mut Draft, Value) + Send + Sync>;
+/// Puts a value in its place: in what a material has too, or in what only the document has.
+enum Setter {
+    Look(Put<Look>),
+    Document(Put<Draft>),
+}
 
-/// A layer's name, and how it is turned on and off.
-type Layer = (&'static str, fn(&mut Draft, bool));
+type Put<T> = Box<dyn Fn(&mut T, Value) + Send + Sync>;
 
-impl Field {
-    /// Puts a value that passed [`Field::kind`] into the draft.
-    pub fn set(&self, draft: &mut Draft, value: Value) {
-        (self.set)(draft, value);
+/// A layer: `null` turns it off, `{}` turns it on with its defaults.
+pub struct Layer {
+    /// As in the document.
+    pub name: &'static str,
+    /// One line on what it draws.
+    pub about: &'static str,
+    turn: Turn,
+}
+
+/// Turns a layer on or off.
+enum Turn {
+    Look(fn(&mut Look, bool)),
+    Document(fn(&mut Draft, bool)),
+}
+
+/// An object of the document that holds keys but is no layer.
+pub struct Group {
+    /// As in the document.
+    pub name: &'static str,
+    /// One line on what it holds.
+    pub about: &'static str,
+}
+
+/// Where values go.
+pub enum Target<'d> {
+    /// The document itself.
+    Document(&'d mut Draft),
+    /// One of its materials.
+    Material(&'d mut Look),
+}
+
+impl Target<'_> {
+    /// Whether it is a material.
+    pub fn is_material(&self) -> bool {
+        matches!(self, Self::Material(_))
     }
 
-    fn nullable(mut self) -> Self {
+    fn look(&mut self) -> &mut Look {
+        match self {
+            Self::Document(draft) => &mut draft.look,
+            Self::Material(look) => look,
+        }
+    }
+}
+
+impl Field {
+    /// Whether a material may have it.
+    pub fn is_for_materials(&self) -> bool {
+        matches!(self.set, Setter::Look(_))
+    }
+
+    /// Puts a value that passed [`Field::kind`] in its place.
+    pub fn set(&self, target: &mut Target<'_>, value: Value) {
+        match (&self.set, target) {
+            (Setter::Look(set), target) => set(target.look(), value),
+            (Setter::Document(set), Target::Document(draft)) => set(draft, value),
+            (Setter::Document(_), Target::Material(_)) => {}
+        }
+    }
+
+    /// Says what a key that is not given means.
+    pub fn default(mut self, default: impl Into<Json>) -> Self {
+        self.default = Some(default.into());
+        self
+    }
+
+    /// Lets `null` be given.
+    pub fn nullable(mut self) -> Self {
         self.nullable = true;
         self
     }
 }
 
-/// Every key with a value. `style` is read before them, since presets come first.
-pub static FIELDS: LazyLock<Vec<Field>> = LazyLock::new(|| {
-    let mut fields = surface_fields();
-    fields.extend(wire_fields());
-    fields.extend(outline_fields());
-    fields.extend(camera_fields());
-    fields.extend(other_fields());
-    fields
-});
+impl Layer {
+    /// A layer that a material may have too.
+    pub const fn of_looks(name: &'static str, about: &'static str, turn: fn(&mut Look, bool)) -> Self {
+        Self { name, about, turn: Turn::Look(turn) }
+    }
 
-/// Layers: `null` turns one off, `{}` turns it on with its defaults.
-pub const LAYERS: &[Layer] = &[
-    ("surface", |d, on| {
-        if on {
-            d.surface();
-        } else {
-            d.spec.layers.surface = None
+    /// A layer that only the document has.
+    pub const fn of_document(name: &'static str, about: &'static str, turn: fn(&mut Draft, bool)) -> Self {
+        Self { name, about, turn: Turn::Document(turn) }
+    }
+
+    /// Whether a material may have it.
+    pub fn is_for_materials(&self) -> bool {
+        matches!(self.turn, Turn::Look(_))
+    }
+
+    /// Turns it on or off.
+    pub fn turn(&self, target: &mut Target<'_>, on: bool) {
+        match (&self.turn, target) {
+            (Turn::Look(turn), target) => turn(target.look(), on),
+            (Turn::Document(turn), Target::Document(draft)) => turn(draft, on),
+            (Turn::Document(_), Target::Material(_)) => {}
         }
-    }),
-    ("wire", |d, on| {
-        if on {
-            d.wire();
-        } else {
-            d.spec.layers.wire = None
-        }
-    }),
-    ("outline", |d, on| {
-        if on {
-            d.outline();
-        } else {
-            d.spec.layers.outline = None
-        }
-    }),
-];
-
-/// Objects of the document that hold keys but are no layers.
-pub const GROUPS: &[&str] = &["camera", "light", "image"];
-
-/// Short names, and the keys they stand for.
-pub const SHORT: &[(&str, &str)] = &[
-    ("format", "image.format"),
-    ("samples", "image.samples"),
-    ("background", "image.background"),
-    ("view", "camera.view"),
-    ("up", "camera.up"),
-];
-
-/// Keys of the contract that this version does not draw yet.
-pub const LATER: &[&str] = &[
-    "surface.emissive",
-    "surface.opacity",
-    "surface.textures",
-    "surface.debug",
-    "wire.lit",
-    "wire.feature_angle_deg",
-    "materials",
-    "camera.from_file",
-    "light.direction",
-    "image.max_error",
-    "image.max_time_ms",
-    "max_error",
-    "max_time_ms",
-];
-
-fn surface_fields() -> Vec<Field> {
-    vec![
-        words("surface.shading", |d, v| d.surface().shading = v),
-        words("surface.normals", |d, v| d.surface().normals = v),
-        color("surface.color", |d, v| d.surface().color = v).nullable(),
-        number("surface.metallic", 0.0, 1.0, |d, v| d.surface().metallic = Some(v)),
-        number("surface.roughness", 0.0, 1.0, |d, v| d.surface().roughness = Some(v)),
-        words("surface.cull", |d, v| d.surface().cull = v),
-    ]
+    }
 }
 
-fn wire_fields() -> Vec<Field> {
-    vec![
-        words("wire.method", |d, v| d.wire().method = v),
-        color("wire.color", |d, v| d.wire().color = v.unwrap_or(d.wire().color)),
-        number("wire.thickness", 0.0, 100.0, |d, v| d.wire().thickness = v),
-        number("wire.smoothing", 0.0, 10.0, |d, v| {
-            d.wire();
-            d.smoothing = Some(v);
-        }),
-        number("wire.opacity", 0.0, 1.0, |d, v| d.wire().opacity = v),
-        words("wire.edges", |d, v| d.wire().edges = v),
-        words("wire.hidden", |d, v| d.wire().hidden = v),
-    ]
+/// [`Draft`] or [`Look`]: what a field's setter writes to.
+pub trait Receiver: Sized {
+    #[doc(hidden)]
+    fn field(
+        key: &'static str,
+        about: &'static str,
+        kind: Kind,
+        set: impl Fn(&mut Self, Value) + Send + Sync + 'static,
+    ) -> Field;
 }
 
-fn outline_fields() -> Vec<Field> {
-    vec![
-        words("outline.method", |d, v| d.outline().method = v),
-        color("outline.color", |d, v| d.outline().color = v.unwrap_or(d.outline().color)),
-        optional("outline.thickness", 0.0, 1e30, |d, v| d.outline().thickness = v.map(|t| t as f32)),
-        words("outline.unit", |d, v| d.outline().unit = v),
-    ]
+impl Receiver for Look {
+    fn field(
+        key: &'static str,
+        about: &'static str,
+        kind: Kind,
+        set: impl Fn(&mut Self, Value) + Send + Sync + 'static,
+    ) -> Field {
+        Field { key, about, kind, nullable: false, default: None, set: Setter::Look(Box::new(set)) }
+    }
 }
 
-fn camera_fields() -> Vec<Field> {
-    vec![
-        words("camera.view", |d, v| d.spec.camera.view = v),
-        optional("camera.azimuth_deg", -3600.0, 3600.0, |d, v| d.spec.camera.azimuth_deg = v),
-        optional("camera.elevation_deg", -90.0, 90.0, |d, v| d.spec.camera.elevation_deg = v),
-        words("camera.projection", |d, v| d.spec.camera.projection = v),
-        double("camera.fov_deg", 0.01, 179.0, |d, v| d.spec.camera.fov_deg = v),
-        optional("camera.height", 1e-30, 1e30, |d, v| d.spec.camera.height = v),
-        optional_words("camera.up", |d, v| d.spec.camera.up = v),
-        double("camera.margin", 0.0, 0.45, |d, v| d.spec.camera.margin = v),
-        point("camera.eye", |d, v| d.spec.camera.eye = v),
-        point("camera.target", |d, v| d.spec.camera.target = v),
-    ]
+impl Receiver for Draft {
+    fn field(
+        key: &'static str,
+        about: &'static str,
+        kind: Kind,
+        set: impl Fn(&mut Self, Value) + Send + Sync + 'static,
+    ) -> Field {
+        Field { key, about, kind, nullable: false, default: None, set: Setter::Document(Box::new(set)) }
+    }
 }
 
-fn other_fields() -> Vec<Field> {
-    vec![
-        words("light.preset", |d, v| d.spec.light.preset = v),
-        number("light.intensity", 0.0, 10.0, |d, v| d.spec.light.intensity = v),
-        number("light.ambient", 0.0, 1.0, |d, v| d.ambient = Some(v)),
-        pixels("image.width", |d, v| d.spec.image.width_px = v),
-        pixels("image.height", |d, v| d.spec.image.height_px = v),
-        size("size", |d, w, h| (d.spec.image.width_px, d.spec.image.height_px) = (w, h)),
-        optional_words("image.format", |d, v| d.spec.image.format = v),
-        one_of("image.samples", &[1, 4], |d, v| d.spec.image.samples = v),
-        color("image.background", |d, v| d.spec.image.background = v.unwrap_or(d.spec.image.background)),
-        words("backend", |d, v| d.spec.backend = v),
-    ]
+/// What a setter takes, out of a value.
+pub trait FromValue: Sized {
+    #[doc(hidden)]
+    fn from_value(value: Value) -> Option<Self>;
 }
 
-fn field(key: &'static str, kind: Kind, set: impl Fn(&mut Draft, Value) + Send + Sync + 'static) -> Field {
-    Field { key, kind, nullable: false, set: Box::new(set) }
+macro_rules! from_value {
+    ($($type:ty: $pattern:pat => $result:expr),* $(,)?) => {
+        $(impl FromValue for $type {
+            fn from_value(value: Value) -> Option<Self> {
+                match value {
+                    $pattern => Some($result),
+                    _ => None,
+                }
+            }
+        })*
+    };
 }
 
-fn number(key: &'static str, min: f64, max: f64, set: fn(&mut Draft, f32)) -> Field {
-    field(key, Kind::Number { min, max }, move |d, v| {
-        if let Value::Number(v) = v {
-            set(d, v as f32)
+from_value! {
+    f64: Value::Number(v) => v,
+    f32: Value::Number(v) => v as f32,
+    u32: Value::Whole(v) => v,
+    [u32; 2]: Value::Size(width, height) => [width, height],
+    [f64; 3]: Value::Point(v) => v,
+    Rgba: Value::Color(v) => v,
+    bool: Value::Flag(v) => v,
+}
+
+/// A key that always has a value.
+pub fn value<T: Receiver + 'static, V: FromValue + 'static>(
+    key: &'static str,
+    kind: Kind,
+    set: fn(&mut T, V),
+    about: &'static str,
+) -> Field {
+    T::field(key, about, kind, move |target, value| {
+        if let Some(value) = V::from_value(value) {
+            set(target, value);
         }
     })
 }
 
-fn double(key: &'static str, min: f64, max: f64, set: fn(&mut Draft, f64)) -> Field {
-    field(key, Kind::Number { min, max }, move |d, v| {
-        if let Value::Number(v) = v {
-            set(d, v)
+/// A key whose value may be `null`.
+pub fn optional<T: Receiver + 'static, V: FromValue + 'static>(
+    key: &'static str,
+    kind: Kind,
+    set: fn(&mut T, Option<V>),
+    about: &'static str,
+) -> Field {
+    T::field(key, about, kind, move |target, value| set(target, V::from_value(value))).nullable()
+}
+
+/// A key whose value is one of a few words.
+pub fn words<T: Receiver + 'static, W: Words>(key: &'static str, set: fn(&mut T, W), about: &'static str) -> Field {
+    T::field(key, about, Kind::Words(words_of::<W>()), move |target, value| {
+        if let Value::Word(place) = value {
+            set(target, W::ALL[place].1);
         }
     })
 }
 
-fn optional(key: &'static str, min: f64, max: f64, set: fn(&mut Draft, Option<f64>)) -> Field {
-    let set = move |d: &mut Draft, v| set(d, if let Value::Number(v) = v { Some(v) } else { None });
-    field(key, Kind::Number { min, max }, set).nullable()
-}
-
-fn words<T: Words>(key: &'static str, set: fn(&mut Draft, T)) -> Field {
-    let kind = Kind::Words { now: words_of::<T>(), later: T::LATER };
-    field(key, kind, move |d, v| {
-        if let Value::Word(place) = v {
-            set(d, T::NOW[place].1)
-        }
-    })
-}
-
-fn optional_words<T: Words>(key: &'static str, set: fn(&mut Draft, Option<T>)) -> Field {
-    let kind = Kind::Words { now: words_of::<T>(), later: T::LATER };
-    field(key, kind, move |d, v| set(d, if let Value::Word(place) = v { Some(T::NOW[place].1) } else { None }))
-        .nullable()
-}
-
-fn color(key: &'static str, set: fn(&mut Draft, Option<crate::scene::color::Rgba>)) -> Field {
-    field(key, Kind::Color, move |d, v| set(d, if let Value::Color(v) = v { Some(v) } else { None }))
-}
-
-fn point(key: &'static str, set: fn(&mut Draft, Option<[f64; 3]>)) -> Field {
-    field(key, Kind::Point, move |d, v| set(d, if let Value::Point(v) = v { Some(v) } else { None })).nullable()
-}
-
-fn pixels(key: &'static str, set: fn(&mut Draft, u32)) -> Field {
-    field(key, Kind::Pixels, move |d, v| {
-        if let Value::Whole(v) = v {
-            set(d, v)
-        }
-    })
-}
-
-fn size(key: &'static str, set: fn(&mut Draft, u32, u32)) -> Field {
-    field(key, Kind::Size, move |d, v| {
-        if let Value::Size(w, h) = v {
-            set(d, w, h)
-        }
-    })
-}
-
-fn one_of(key: &'static str, values: &'static [u32], set: fn(&mut Draft, u32)) -> Field {
-    field(key, Kind::OneOf(values), move |d, v| {
-        if let Value::Whole(v) = v {
-            set(d, v)
-        }
-    })
+/// A key whose value is one of a few words, or `null`.
+pub fn optional_words<T: Receiver + 'static, W: Words>(
+    key: &'static str,
+    set: fn(&mut T, Option<W>),
+    about: &'static str,
+) -> Field {
+    let word = |value| if let Value::Word(place) = value { Some(W::ALL[place].1) } else { None };
+    T::field(key, about, Kind::Words(words_of::<W>()), move |target, value| set(target, word(value))).nullable()
 }

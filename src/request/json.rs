@@ -3,14 +3,15 @@
 use serde_json::Value as Json;
 
 use super::error::{RequestError, RequestFault};
-use super::fields::{GROUPS, LAYERS};
+use super::item::Item;
+use super::table::{GROUPS, LAYERS, MATERIALS};
 use super::value::Given;
 
 /// Longest document: a thousand times what anybody writes by hand, and small when parsed.
 const DOCUMENT_BYTES_MAX: usize = 1 << 20;
 
 /// Parses a document and flattens its objects, in document order of the sorted keys.
-pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<(String, Given)>, RequestError> {
+pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestError> {
     let not_json = |given: String, allowed: String| RequestError::new(RequestFault::NotJson, "request", given, allowed);
     if document.len() > DOCUMENT_BYTES_MAX {
         return Err(not_json(format!("{} bytes long", document.len()), format!("{DOCUMENT_BYTES_MAX} bytes")));
@@ -26,31 +27,54 @@ pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<(String, Given)>, 
     let Json::Object(object) = json else {
         return Err(not_json(Given::Json(json).show(), "a JSON object".into()));
     };
-    let mut pairs = Vec::new();
+    let mut items = Vec::new();
     for (key, value) in object {
         if key.contains('.') {
-            return Err(dotted(&key, &value));
+            return Err(dotted("", &key, &value));
         }
         match value {
-            Json::Object(inner) if is_object_key(&key) && !inner.is_empty() => {
-                for (name, value) in inner {
-                    pairs.push((format!("{key}.{name}"), Given::Json(value)));
+            Json::Object(materials) if key == MATERIALS.name => {
+                for (name, value) in materials {
+                    flatten_material(name, value, &mut items)?;
                 }
             }
-            other => pairs.push((key, Given::Json(other))),
+            other => flatten_object(None, key, other, &mut items),
         }
     }
-    Ok(pairs)
+    Ok(items)
 }
 
-fn is_object_key(key: &str) -> bool {
-    LAYERS.iter().any(|&(layer, _)| layer == key) || GROUPS.contains(&key)
+fn flatten_material(name: String, value: Json, items: &mut Vec<Item>) -> Result<(), RequestError> {
+    match value {
+        Json::Object(layers) if !layers.is_empty() => {
+            for (layer, value) in layers {
+                if layer.contains('.') {
+                    return Err(dotted(&format!("{}.{name}.", MATERIALS.name), &layer, &value));
+                }
+                flatten_object(Some(&name), layer, value, items);
+            }
+        }
+        other => items.push(Item { material: Some(name), key: String::new(), given: Given::Json(other) }),
+    }
+    Ok(())
 }
 
-fn dotted(key: &str, value: &Json) -> RequestError {
+/// The keys of a layer or a group, one by one; anything else as it is.
+fn flatten_object(material: Option<&String>, key: String, value: Json, items: &mut Vec<Item>) {
+    let holds_keys = LAYERS.iter().map(|l| l.name).chain(GROUPS.iter().map(|g| g.name)).any(|name| name == key);
+    let item = |key, value| Item { material: material.cloned(), key, given: Given::Json(value) };
+    match value {
+        Json::Object(inner) if holds_keys && !inner.is_empty() => {
+            items.extend(inner.into_iter().map(|(name, value)| item(format!("{key}.{name}"), value)));
+        }
+        other => items.push(item(key, other)),
+    }
+}
+
+fn dotted(prefix: &str, key: &str, value: &Json) -> RequestError {
     let nested = key.split_once('.').map_or(String::new(), |(a, b)| format!("{{\"{a}\": {{\"{b}\": ...}}}}"));
     let allowed = format!("dotted keys are for query parameters and --set; write {nested} in the document");
-    RequestError::new(RequestFault::UnknownKey, key, value, allowed)
+    RequestError::new(RequestFault::UnknownKey, &format!("{prefix}{key}"), value, allowed)
 }
 
 /// Deepest nesting of objects and arrays, without recursion. Exact for valid JSON; for anything else the parser speaks.

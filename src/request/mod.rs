@@ -1,31 +1,52 @@
 //! The request document: JSON and dotted keys to a [`Spec`].
 //!
 //! Defaults, then the style's preset, then the document, then the dotted keys of a query or of `--set`: each overrides
-//! what came before. [`fields`] is the table of keys; a new key is a line there.
+//! what came before. Materials begin from what the document's own layers have become by then, wherever they stand.
+//! [`table`] is the table of keys; a new key is a line there, and [`schema()`] writes it out for others.
 
 mod draft;
 mod error;
 mod fields;
+mod item;
 mod json;
+mod look;
+mod schema;
 mod suggest;
+mod table;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_bad;
+#[cfg(test)]
+mod tests_materials;
 mod value;
 mod words;
 
 pub use error::{RequestError, RequestFault};
+pub use schema::schema;
 pub use words::{Style, Words, word_for, words_of};
+
+use std::collections::BTreeMap;
 
 use crate::image::ImageFormat;
 use crate::limits::{BackendChoice, IMAGE_PX_MAX, Limits};
 use crate::scene::Spec;
 use crate::scene::color::Rgba;
 use draft::Draft;
-use fields::{FIELDS, GROUPS, LATER, LAYERS, SHORT};
+use fields::{Layer, Target};
+use item::Item;
+use look::Look;
+use table::{FIELDS, GROUPS, LATER, LAYERS, MATERIALS, SHORT};
 use value::{Given, Kind, Value};
 
 /// The style of a request that names none.
 const STYLE_DEFAULT: Style = Style::Flat;
+
+/// Materials of one request: more than any asset has, and soon looked through.
+const MATERIALS_MAX: usize = 1000;
+
+/// Longest name of a material.
+const MATERIAL_NAME_CHARS_MAX: usize = 256;
 
 /// What a request is read against.
 #[derive(Clone, Debug)]
@@ -41,25 +62,28 @@ pub type Overrides = [(String, String)];
 
 /// Reads a document and the dotted keys that override it, in order.
 pub fn read(document: Option<&[u8]>, overrides: &Overrides, rules: &Rules) -> Result<Spec, RequestError> {
-    let mut pairs = match document {
+    let mut items = match document {
         Some(bytes) => json::flatten(bytes, rules.limits.json_depth)?,
         None => Vec::new(),
     };
-    pairs.extend(overrides.iter().map(|(key, text)| (key.clone(), Given::Text(text.clone()))));
+    items.extend(overrides.iter().map(|(key, text)| Item::dotted(key, text)));
+    let (of_materials, mut items): (Vec<Item>, Vec<Item>) = items.into_iter().partition(|i| i.material.is_some());
 
     let mut style = STYLE_DEFAULT;
-    for (_, given) in pairs.iter().filter(|(key, _)| key == "style") {
-        style = read_style(given)?;
+    for item in items.iter().filter(|item| item.key == "style") {
+        style = read_style(&item.given)?;
     }
+    items.retain(|item| item.key != "style");
     let mut draft = Draft::new(style, rules.backend);
     // A picture whose size nobody gave must not be larger than one that somebody could ask for.
     let side_max = u32::try_from(rules.limits.image_px).unwrap_or(u32::MAX);
-    let image = &mut draft.spec.image;
+    let image = &mut draft.image;
     (image.width_px, image.height_px) = (image.width_px.min(side_max), image.height_px.min(side_max));
-    for (key, given) in pairs.iter().filter(|(key, _)| key != "style") {
-        apply(&mut draft, key, given, rules)?;
+    for item in &items {
+        apply(&mut Target::Document(&mut draft), item, rules)?;
     }
-    draft.finish()
+    let materials = read_materials(&draft.look, of_materials, rules)?;
+    draft.finish(materials)
 }
 
 /// Settles the picture's format. JPEG has no alpha, so its background is laid over white here, in linear light.
@@ -74,59 +98,110 @@ pub fn set_format(spec: &mut Spec, format: ImageFormat) {
 /// Every key, sorted, for lists and suggestions.
 pub fn keys() -> Vec<&'static str> {
     let mut keys: Vec<_> = FIELDS.iter().map(|f| f.key).collect();
-    keys.extend(LAYERS.iter().map(|&(key, _)| key));
+    keys.extend(LAYERS.iter().map(|layer| layer.name));
     keys.extend(SHORT.iter().map(|&(key, _)| key));
-    keys.push("style");
+    keys.extend([MATERIALS.name, "style"]);
     keys.sort_unstable();
     keys
 }
 
+/// The keys whose values are words, and those words.
+pub fn vocabulary() -> BTreeMap<&'static str, Vec<&'static str>> {
+    let of_field = |field: &'static fields::Field| match &field.kind {
+        Kind::Words(words) => Some((field.key, words.clone())),
+        _ => None,
+    };
+    FIELDS.iter().filter_map(of_field).chain([("style", words_of::<Style>())]).collect()
+}
+
 fn read_style(given: &Given) -> Result<Style, RequestError> {
-    let kind = Kind::Words { now: words_of::<Style>(), later: Style::LATER };
-    match kind.read("style", given, 0)? {
-        Value::Word(place) => Ok(Style::NOW[place].1),
+    match Kind::Words(words_of::<Style>()).read("style", given, 0)? {
+        Value::Word(place) => Ok(Style::ALL[place].1),
         _ => Ok(STYLE_DEFAULT),
     }
 }
 
-fn apply(draft: &mut Draft, key: &str, given: &Given, rules: &Rules) -> Result<(), RequestError> {
-    if let Some((_, turn)) = LAYERS.iter().find(|&&(layer, _)| layer == key) {
+/// Each material's layers, which begin from the document's; sorted by name.
+fn read_materials(base: &Look, items: Vec<Item>, rules: &Rules) -> Result<Vec<(String, Look)>, RequestError> {
+    let mut materials: BTreeMap<String, Look> = BTreeMap::new();
+    for item in items {
+        let name = item.material.clone().unwrap_or_default();
+        let chars = name.chars().count();
+        if chars > MATERIAL_NAME_CHARS_MAX {
+            let (given, allowed) = (format!("{chars} characters long"), format!("at most {MATERIAL_NAME_CHARS_MAX}"));
+            return Err(RequestError::new(RequestFault::OutOfRange, &item.whole_key(), given, allowed));
+        }
+        let look = materials.entry(name).or_insert_with(|| base.clone());
+        apply(&mut Target::Material(look), &item, rules)?;
+        if materials.len() > MATERIALS_MAX {
+            let (given, allowed) = ("more than that".to_owned(), format!("at most {MATERIALS_MAX} materials"));
+            return Err(RequestError::new(RequestFault::OutOfRange, MATERIALS.name, given, allowed));
+        }
+    }
+    Ok(materials.into_iter().collect())
+}
+
+fn apply(target: &mut Target<'_>, item: &Item, rules: &Rules) -> Result<(), RequestError> {
+    let (key, given) = (item.key.as_str(), &item.given);
+    let layer = LAYERS.iter().find(|layer| layer.name == key && (!target.is_material() || layer.is_for_materials()));
+    if let Some(layer) = layer {
         if given.is_null() || given.is_empty_object() {
-            turn(draft, !given.is_null());
+            layer.turn(target, !given.is_null());
             return Ok(());
         }
         let allowed = "an object with the layer's keys, {} for its defaults, or null to turn the layer off";
-        return Err(RequestError::new(RequestFault::WrongType, key, given.show(), allowed));
+        return Err(RequestError::new(RequestFault::WrongType, &item.whole_key(), given.show(), allowed));
     }
-    if GROUPS.contains(&key) {
-        if given.is_empty_object() {
-            return Ok(());
-        }
-        return Err(RequestError::new(RequestFault::WrongType, key, given.show(), "an object"));
+    let allowed = match target {
+        Target::Material(_) => key.is_empty().then_some("an object with the layers surface, wire and outline"),
+        Target::Document(_) if key == MATERIALS.name => Some("an object of materials by their names"),
+        Target::Document(_) => GROUPS.iter().any(|group| group.name == key).then_some("an object"),
+    };
+    if let Some(allowed) = allowed {
+        let error = || RequestError::new(RequestFault::WrongType, &item.whole_key(), given.show(), allowed);
+        return if given.is_empty_object() { Ok(()) } else { Err(error()) };
     }
-    let long = SHORT.iter().find(|&&(short, _)| short == key).map_or(key, |&(_, long)| long);
-    let Some(field) = FIELDS.iter().find(|f| f.key == long) else {
-        return Err(unknown(key, given));
+    let long = SHORT.iter().find(|&&(short, _)| short == key && !target.is_material()).map_or(key, |&(_, long)| long);
+    let field = FIELDS.iter().find(|f| f.key == long && (!target.is_material() || f.is_for_materials()));
+    let Some(field) = field else {
+        return Err(if target.is_material() { unknown_of_material(item) } else { unknown(key, given) });
     };
     if field.nullable && given.is_null() {
-        field.set(draft, Value::Null);
+        field.set(target, Value::Null);
         return Ok(());
     }
-    let value = field.kind.read(key, given, rules.limits.image_px).map_err(|mut error| {
+    let value = field.kind.read(&item.whole_key(), given, rules.limits.image_px).map_err(|mut error| {
         let is_image_limit = matches!(field.kind, Kind::Pixels | Kind::Size);
         if is_image_limit && error.fault == RequestFault::OutOfRange && rules.limits.image_px < IMAGE_PX_MAX {
             error.flag = Some("--limit-image-px");
         }
+        if field.nullable {
+            error.allowed.push_str(", or null");
+        }
         error
     })?;
-    field.set(draft, value);
+    field.set(target, value);
     Ok(())
 }
 
 fn unknown(key: &str, given: &Given) -> RequestError {
-    let later = LATER.contains(&key) || LATER.iter().any(|l| key.strip_prefix(l).is_some_and(|r| r.starts_with('.')));
-    if later {
+    if LATER.contains(&key) {
         return RequestError::new(RequestFault::NotYet, key, given.show(), "leave it out");
     }
     RequestError::new(RequestFault::UnknownKey, key, given.show(), suggest::allowed(key, &keys()))
+}
+
+fn unknown_of_material(item: &Item) -> RequestError {
+    let layers: Vec<&str> = LAYERS.iter().filter(|l| Layer::is_for_materials(l)).map(|l| l.name).collect();
+    let of_layers = FIELDS.iter().filter(|f| f.is_for_materials()).map(|f| f.key).chain(layers.iter().copied());
+    let known: Vec<&str> = of_layers.collect();
+    let has_layer = item.key.split_once('.').is_some_and(|(layer, _)| layers.contains(&layer));
+    let allowed = if has_layer {
+        suggest::allowed(&item.key, &known)
+    } else {
+        let near = suggest::nearest(&item.key, &known);
+        let near = if near.is_empty() { String::new() } else { format!(" (did you mean {}?)", near.join(" or ")) };
+        format!("a material has the layers {} and their keys{near}", layers.join(", "))
+    };
+    RequestError::new(RequestFault::UnknownKey, &item.whole_key(), item.given.show(), allowed)
 }

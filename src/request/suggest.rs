@@ -20,7 +20,8 @@ pub fn allowed(key: &str, known: &[&'static str]) -> String {
     format!("its neighbours are {}", siblings.join(", "))
 }
 
-fn nearest(key: &str, known: &[&'static str]) -> Vec<&'static str> {
+/// The known keys that were most likely meant; none where nothing is near.
+pub fn nearest(key: &str, known: &[&'static str]) -> Vec<&'static str> {
     if key.chars().count() > KEY_CHARS_MAX {
         return Vec::new();
     }

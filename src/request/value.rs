@@ -46,6 +46,17 @@ impl Given {
         }
     }
 
+    fn flag(&self) -> Option<bool> {
+        match self {
+            Self::Json(json) => json.as_bool(),
+            Self::Text(text) => match text.as_str() {
+                "true" | "1" => Some(true),
+                "false" | "0" => Some(false),
+                _ => None,
+            },
+        }
+    }
+
     fn number(&self) -> Option<f64> {
         match self {
             Self::Json(json) => json.as_f64(),
@@ -88,16 +99,15 @@ pub enum Kind {
     /// `N` or `WxH`.
     Size,
     /// One of a few words.
-    Words {
-        /// Understood now.
-        now: Vec<&'static str>,
-        /// Known, but not drawn by this version.
-        later: &'static [&'static str],
-    },
+    Words(Vec<&'static str>),
     /// A colour.
     Color,
     /// Three finite numbers.
     Point,
+    /// Three finite numbers, not all zero.
+    Direction,
+    /// Yes or no.
+    Flag,
 }
 
 /// A value that passed its [`Kind`].
@@ -117,10 +127,12 @@ pub enum Value {
     Color(Rgba),
     /// Three numbers.
     Point([f64; 3]),
+    /// Yes or no.
+    Flag(bool),
 }
 
 /// Largest magnitude of a coordinate: squares of it still fit an f64 many times over.
-const COORDINATE_MAX: f64 = 1e30;
+pub const COORDINATE_MAX: f64 = 1e30;
 
 impl Kind {
     /// What is allowed, in words.
@@ -130,11 +142,13 @@ impl Kind {
             Self::OneOf(values) => values.iter().map(u32::to_string).collect::<Vec<_>>().join(" or "),
             Self::Pixels => format!("a whole number from 1 to {image_px_max}"),
             Self::Size => format!("N or WxH, with whole numbers from 1 to {image_px_max}"),
-            Self::Words { now, .. } => format!("one of {}", now.join(", ")),
+            Self::Words(words) => format!("one of {}", words.join(", ")),
             Self::Color => {
                 "a colour: #rgb, #rgba, #rrggbb, #rrggbbaa (with # written as %23 in a URL) or transparent".into()
             }
             Self::Point => "three finite numbers of at most 1e30, as [x, y, z]".into(),
+            Self::Direction => "three finite numbers of at most 1e30, not all zero, as [x, y, z]".into(),
+            Self::Flag => "true or false".into(),
         }
     }
 
@@ -163,12 +177,9 @@ impl Kind {
                 let both = pixels(width, image_px_max).zip(pixels(height, image_px_max));
                 both.map(|(w, h)| Value::Size(w, h)).ok_or_else(out_of_range)
             }
-            Self::Words { now, later } => {
+            Self::Words(words) => {
                 let word = given.text().ok_or_else(wrong_type)?;
-                if later.contains(&word) {
-                    return Err(fail(RequestFault::NotYet));
-                }
-                now.iter().position(|&w| w == word).map(Value::Word).ok_or_else(out_of_range)
+                words.iter().position(|&w| w == word).map(Value::Word).ok_or_else(out_of_range)
             }
             Self::Color => {
                 let text = given.text().ok_or_else(wrong_type)?;
@@ -176,14 +187,25 @@ impl Kind {
             }
             Self::Point => {
                 let point = given.point().ok_or_else(wrong_type)?;
-                if point.iter().all(|v| v.abs() <= COORDINATE_MAX) {
-                    Ok(Value::Point(point))
-                } else {
-                    Err(out_of_range())
-                }
+                Some(point).filter(|p| largest(p) <= COORDINATE_MAX).map(Value::Point).ok_or_else(out_of_range)
             }
+            Self::Direction => {
+                let [x, y, z] = given.point().ok_or_else(wrong_type)?;
+                let largest = largest(&[x, y, z]);
+                if largest == 0.0 || largest > COORDINATE_MAX {
+                    return Err(out_of_range());
+                }
+                // Only where it points matters, and squares of tiny numbers are zero.
+                let unit = if largest < 1.0 / COORDINATE_MAX { largest } else { 1.0 };
+                Ok(Value::Point([x / unit, y / unit, z / unit]))
+            }
+            Self::Flag => given.flag().map(Value::Flag).ok_or_else(wrong_type),
         }
     }
+}
+
+fn largest(point: &[f64; 3]) -> f64 {
+    point.iter().fold(0.0, |largest, v| v.abs().max(largest))
 }
 
 /// `1e30` and not a one with thirty zeros after it.

@@ -4,16 +4,14 @@ use crate::image::ImageFormat;
 use crate::limits::BackendChoice;
 use crate::mesh::UpAxis;
 use crate::scene::{
-    Cull, FlatNormals, Hidden, LightPreset, OutlineMethod, OutlineUnit, Projection, Shading, View, WireEdges,
-    WireMethod,
+    Cull, DebugView, FlatNormals, Hidden, LightPreset, OutlineMethod, OutlineUnit, Projection, Shading, View,
+    WireEdges, WireMethod,
 };
 
 /// An enumeration that a request names by words.
 pub trait Words: Copy + Send + Sync + 'static {
     /// Each word and its meaning.
-    const NOW: &'static [(&'static str, Self)];
-    /// Words of the contract that this version does not draw yet.
-    const LATER: &'static [&'static str] = &[];
+    const ALL: &'static [(&'static str, Self)];
 }
 
 /// A preset: which layers are drawn, and how.
@@ -38,7 +36,7 @@ pub enum Style {
 }
 
 impl Words for Style {
-    const NOW: &'static [(&'static str, Self)] = &[
+    const ALL: &'static [(&'static str, Self)] = &[
         ("flat", Self::Flat),
         ("smooth", Self::Smooth),
         ("unlit", Self::Unlit),
@@ -51,29 +49,42 @@ impl Words for Style {
 }
 
 impl Words for FlatNormals {
-    const NOW: &'static [(&'static str, Self)] = &[("face", Self::Face), ("derivative", Self::Derivative)];
+    const ALL: &'static [(&'static str, Self)] = &[("face", Self::Face), ("derivative", Self::Derivative)];
 }
 
 impl Words for OutlineMethod {
-    const NOW: &'static [(&'static str, Self)] = &[("hull", Self::Hull), ("contour", Self::Contour)];
+    const ALL: &'static [(&'static str, Self)] = &[("hull", Self::Hull), ("contour", Self::Contour)];
 }
 
 impl Words for LightPreset {
-    const NOW: &'static [(&'static str, Self)] =
+    const ALL: &'static [(&'static str, Self)] =
         &[("headlight", Self::Headlight), ("three-point", Self::ThreePoint), ("none", Self::None)];
 }
 
 impl Words for Shading {
-    const NOW: &'static [(&'static str, Self)] =
+    const ALL: &'static [(&'static str, Self)] =
         &[("flat", Self::Flat), ("smooth", Self::Smooth), ("unlit", Self::Unlit)];
 }
 
+impl Words for DebugView {
+    const ALL: &'static [(&'static str, Self)] = &[
+        ("none", Self::None),
+        ("barycentric", Self::Barycentric),
+        ("min-barycentric", Self::MinBarycentric),
+        ("edge-distance", Self::EdgeDistance),
+        ("normal", Self::Normal),
+        ("uv", Self::Uv),
+        ("face-orientation", Self::FaceOrientation),
+        ("vertex-color", Self::VertexColor),
+    ];
+}
+
 impl Words for Cull {
-    const NOW: &'static [(&'static str, Self)] = &[("none", Self::None), ("back", Self::Back), ("front", Self::Front)];
+    const ALL: &'static [(&'static str, Self)] = &[("none", Self::None), ("back", Self::Back), ("front", Self::Front)];
 }
 
 impl Words for WireMethod {
-    const NOW: &'static [(&'static str, Self)] = &[
+    const ALL: &'static [(&'static str, Self)] = &[
         ("exact", Self::Exact),
         ("fwidth", Self::Fwidth),
         ("fwidth-min", Self::FwidthMin),
@@ -83,7 +94,7 @@ impl Words for WireMethod {
 }
 
 impl Words for WireEdges {
-    const NOW: &'static [(&'static str, Self)] = &[
+    const ALL: &'static [(&'static str, Self)] = &[
         ("triangles", Self::Triangles),
         ("polygons", Self::Polygons),
         ("feature", Self::Feature),
@@ -92,15 +103,15 @@ impl Words for WireEdges {
 }
 
 impl Words for Hidden {
-    const NOW: &'static [(&'static str, Self)] = &[("hide", Self::Hide), ("show", Self::Show), ("fade", Self::Fade)];
+    const ALL: &'static [(&'static str, Self)] = &[("hide", Self::Hide), ("show", Self::Show), ("fade", Self::Fade)];
 }
 
 impl Words for OutlineUnit {
-    const NOW: &'static [(&'static str, Self)] = &[("object", Self::Object), ("px", Self::Px)];
+    const ALL: &'static [(&'static str, Self)] = &[("object", Self::Object), ("px", Self::Px)];
 }
 
 impl Words for View {
-    const NOW: &'static [(&'static str, Self)] = &[
+    const ALL: &'static [(&'static str, Self)] = &[
         ("iso", Self::Iso),
         ("front", Self::Front),
         ("back", Self::Back),
@@ -112,31 +123,31 @@ impl Words for View {
 }
 
 impl Words for Projection {
-    const NOW: &'static [(&'static str, Self)] =
+    const ALL: &'static [(&'static str, Self)] =
         &[("perspective", Self::Perspective), ("orthographic", Self::Orthographic)];
 }
 
 impl Words for UpAxis {
-    const NOW: &'static [(&'static str, Self)] =
+    const ALL: &'static [(&'static str, Self)] =
         &[("y", Self::Y), ("z", Self::Z), ("-y", Self::NegY), ("-z", Self::NegZ), ("x", Self::X), ("-x", Self::NegX)];
 }
 
 impl Words for ImageFormat {
     // `jpg` is what the file extension says, so people write it here too.
-    const NOW: &'static [(&'static str, Self)] =
+    const ALL: &'static [(&'static str, Self)] =
         &[("png", Self::Png), ("webp", Self::Webp), ("jpeg", Self::Jpeg), ("jpg", Self::Jpeg)];
 }
 
 impl Words for BackendChoice {
-    const NOW: &'static [(&'static str, Self)] = &[("auto", Self::Auto), ("gpu", Self::Gpu), ("cpu", Self::Cpu)];
+    const ALL: &'static [(&'static str, Self)] = &[("auto", Self::Auto), ("gpu", Self::Gpu), ("cpu", Self::Cpu)];
 }
 
 /// Just the words.
 pub fn words_of<T: Words>() -> Vec<&'static str> {
-    T::NOW.iter().map(|&(word, _)| word).collect()
+    T::ALL.iter().map(|&(word, _)| word).collect()
 }
 
 /// The word for a value; the first where there are several.
 pub fn word_for<T: Words + PartialEq>(value: T) -> &'static str {
-    T::NOW.iter().find(|(_, v)| *v == value).map_or("", |&(word, _)| word)
+    T::ALL.iter().find(|(_, v)| *v == value).map_or("", |&(word, _)| word)
 }

@@ -138,9 +138,9 @@ pub struct Wire {
     pub method: WireMethod,
     /// Line colour.
     pub color: Rgba,
-    /// `exact`: full width, pixels. `fwidth`: threshold in multiples of `d`, 0 to 10.
+    /// `exact`: full width, pixels, 0 to 100. Else t, in multiples of what the method measures in, 0 to 10.
     pub thickness: f32,
-    /// `exact`: extra ramp, pixels. `fwidth`: width of the smoothstep in multiples of `d`, 0 to 10.
+    /// `exact`: extra ramp, pixels. `fwidth` and `fwidth-min`: s, width of the smoothstep in multiples of `d`. 0 to 10.
     pub smoothing: f32,
     /// 0 to 1.
     pub opacity: f32,

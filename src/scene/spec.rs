@@ -11,7 +11,8 @@ use crate::mesh::UpAxis;
 pub struct Spec {
     /// What is drawn, for materials that `materials` does not name.
     pub layers: Layers,
-    /// What is drawn for the asset's materials of these names; the last of equal names counts.
+    /// What is drawn for the asset's materials of these names, in full: nothing is taken from `layers` any more. The last of
+    /// equal names counts.
     pub materials: Vec<(String, Layers)>,
     /// Edges that say how the mesh hangs together, if any.
     pub topology: Option<Topology>,
@@ -76,7 +77,7 @@ pub struct CameraSpec {
     pub eye: Option<[f64; 3]>,
     /// The point in file space at the picture's centre.
     pub target: Option<[f64; 3]>,
-    /// Looks through the file's own first camera; nothing is fitted.
+    /// Looks through the file's own first camera; nothing is fitted. Not together with `eye`.
     pub from_file: bool,
 }
 

@@ -109,7 +109,7 @@ fn failures_are_one_sentence_with_the_right_exit_code() {
         (&["render", "-", "-o", "out.bmp"], CUBE_OBJ, 2, "bmp"),
         (&["render", "-", "-o", "-", "--set", "wire"], CUBE_OBJ, 2, "KEY=VALUE"),
         (&["render", "-", "-o", "-", "--format-in", "dae"], CUBE_OBJ, 2, "obj"),
-        (&["render", "a", "b", "-o", "-"], b"", 2, "one MESH"),
+        (&["render", "-", "-", "-o", "-"], b"", 2, "once"),
         (&["render"], b"", 2, "MESH"),
         (&["render", "-", "-o", "-", "--sise", "8"], b"", 2, "--size"),
         (&["draw"], b"", 2, "draw"),

@@ -146,7 +146,7 @@ fn equal_positions_are_welded_and_attributes_are_not() {
     assert_eq!(mesh.to_file.scale, 1.0, "unused vertices do not count in the bounds");
     let normal = |t: usize, c: usize| mesh.normals[mesh.attribute_triangles[t][c] as usize];
     assert_eq!((normal(0, 0), normal(1, 0)), ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]), "unit, and the file's");
-    assert_eq!(mesh.uvs[mesh.attribute_triangles[1][0] as usize], [1.0, 1.0]);
+    assert_eq!(mesh.uvs[mesh.attribute_triangles[1][0] as usize], [1.0, 0.0], "v runs down");
 }
 
 #[test]

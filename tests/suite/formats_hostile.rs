@@ -2,7 +2,7 @@
 
 use crate::mesh_files::{Gltf, Solid, read, read_limited};
 use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::{MeshFault, import};
+use meshsnap::mesh::{Bundle, MeshFault, import};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
@@ -84,7 +84,8 @@ fn triangles_and_memory_are_limited_in_every_format() {
         let stopped = Deadline::default();
         stopped.stop();
         let limits = Limits::default();
-        let error = import(bytes, None, &limits, &mut Budget::new(&limits), &stopped).unwrap_err();
+        let error =
+            import(&Bundle::of_one(bytes.clone()), None, &limits, &mut Budget::new(&limits), &stopped).unwrap_err();
         assert_eq!(error.fault, MeshFault::Stopped);
     }
 }

@@ -43,13 +43,14 @@ fn obj_in_all_its_forms() {
 
 #[test]
 fn obj_faces_of_different_forms_keep_their_own_attributes() {
-    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0.25 0.5\nvn 1 0 0\n\
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0.25 0.625\nvn 1 0 0\n\
                f 1 2 3\nf 1/1 2/1 4/1\nf 1//1 3//1 4//1\nf 2/1/1 3/1/1 4/1/1\nf 1/1 2 3/1/1\n";
     let mesh = read(obj.as_bytes()).unwrap();
     assert_eq!(mesh.triangles.len(), 5);
+    // v runs up in OBJ, and down in a mesh.
     let at = |t: usize, c: usize| mesh.attribute_triangles[t][c] as usize;
     let face = |t: usize| mesh.face_normals[t];
-    let expected_uv = [[0.0; 2], [0.25, 0.5], [0.0; 2], [0.25, 0.5], [0.0; 2]];
+    let expected_uv = [[0.0; 2], [0.25, 0.375], [0.0; 2], [0.25, 0.375], [0.0; 2]];
     let expected_normal = [face(0), face(1), [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], face(4)];
     for t in 0..5 {
         for c in 0..3 {

@@ -33,13 +33,13 @@ fn cpu_pictures_equal_the_stored_ones_to_the_byte() {
         }
     }
     assert_eq!(compared, SCENES.len() * 8);
-    assert_eq!(SCENES.len(), 17);
+    assert_eq!(SCENES.len(), 34);
 }
 
 /// Draws a scene.
 pub fn draw(scene: &Scene, renderer: &mut dyn Renderer) -> Image {
     let mesh = scenes::mesh(&(scene.obj)());
-    let spec = scenes::spec(scene.keys);
+    let spec = scene.spec();
     renderer.draw(&scenes::plan(&mesh, &spec), &Deadline::default()).unwrap()
 }
 

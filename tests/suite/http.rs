@@ -28,7 +28,7 @@ fn a_posted_mesh_comes_back_as_a_picture() {
 fn every_style_and_format_is_drawn() {
     let server = Server::start(&[]);
     let mut cases = 0;
-    for style in ["flat", "smooth", "unlit", "wire", "wireframe", "outline", "hidden-line"] {
+    for style in ["flat", "smooth", "unlit", "wire", "wireframe", "outline", "hidden-line", "topology"] {
         for (format, media_type) in [("png", "image/png"), ("webp", "image/webp"), ("jpeg", "image/jpeg")] {
             let answer = server.post(&format!("/v1/render?style={style}&size=48&format={format}"), CUBE_OBJ);
             answer.picture(48, 48);
@@ -36,7 +36,7 @@ fn every_style_and_format_is_drawn() {
             cases += 1;
         }
     }
-    assert_eq!(cases, 21);
+    assert_eq!(cases, 24);
 }
 
 #[test]
@@ -135,7 +135,10 @@ fn the_process_says_how_it_is() {
     let capabilities = server.get("/v1/capabilities").json();
     assert_eq!(capabilities["limits"]["triangles"], 1234);
     assert_eq!(capabilities["limits"]["body_bytes"], 64 << 20);
-    assert!(capabilities["styles"].as_array().unwrap().len() >= 7);
+    assert_eq!(capabilities["styles"].as_array().unwrap().len(), 8);
+    assert_eq!(capabilities["styles"], capabilities["request_words"]["style"]);
+    assert_eq!(capabilities["request_words"]["wire.hidden"], serde_json::json!(["hide", "show", "fade"]));
+    assert!(capabilities["request_keys"].as_array().unwrap().contains(&"topology.nonmanifold".into()));
     let backend = &capabilities["backend"];
     assert_eq!((&backend["default"], &backend["choices"]), (&"cpu".into(), &serde_json::json!(["auto", "gpu", "cpu"])));
     for key in ["state", "name", "driver", "device_type", "features", "reason"] {

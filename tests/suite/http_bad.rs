@@ -13,7 +13,7 @@ fn bad_forms_are_refused_precisely() {
         (form(&[("request", b"{}")]), 400, "bad_form"),
         (form(&[("file", CUBE_OBJ), ("other", b"")]), 400, "bad_form"),
         (form(&[("file", CUBE_OBJ), ("request", b"{}"), ("request", b"{}")]), 400, "bad_form"),
-        (form(&[("file", CUBE_OBJ), ("file", CUBE_OBJ)]), 415, "bundle_not_supported"),
+        (form(&[("file", CUBE_OBJ), ("file", CUBE_OBJ)]), 400, "bad_form"),
         (form(&[("file", CUBE_OBJ), ("request", b"{")]), 400, "not_json"),
         (form(&[("file", CUBE_OBJ), ("request", br#"{"sise":1}"#)]), 400, "unknown_key"),
         (form(&[("file", CUBE_OBJ)])[..40].to_vec(), 400, "bad_form"),
@@ -39,9 +39,13 @@ fn bad_queries_are_a_400_that_names_the_key() {
         ("size=NaN", "out_of_range", "from 1 to 4096"),
         ("size=", "wrong_type", "N or WxH"),
         ("style=toon", "out_of_range", "wireframe"),
-        ("style=topology", "not_supported_yet", "topology"),
+        ("max_error=1", "not_supported_yet", "max_error"),
         ("wire.thickness=inf", "out_of_range", "from 0 to 10"),
         ("camera.eye=1,2,3", "conflicting_keys", "camera.target"),
+        ("materials.Glass%20v2.1.surface.opacity=3", "out_of_range", "`materials.Glass v2.1.surface.opacity`"),
+        ("materials.Glass.opacity=0.3", "unknown_key", "did you mean surface.opacity"),
+        ("light.direction=0,0,0", "out_of_range", "not all zero"),
+        ("wire.method=fwidth&wire.thickness=11", "out_of_range", "from 0 to 10 where"),
         ("format_in=dae", "out_of_range", "obj, gltf, glb, stl"),
         ("background=%00", "out_of_range", "background"),
         ("%ff=%ff", "unknown_key", "no key"),
@@ -52,7 +56,8 @@ fn bad_queries_are_a_400_that_names_the_key() {
         let detail = server.post(&format!("/v1/render?{query}"), CUBE_OBJ).problem(400, code);
         assert!(detail.contains(part), "{query}: {detail}");
     }
-    assert_eq!(cases.len(), 16);
+    assert_eq!(cases.len(), 20);
+    server.post("/v1/render?size=8&materials.Glass%20v2.1.wire=%7B%7D&surface.textures=0", CUBE_OBJ).picture(8, 8);
     server.post("/v1/render?size=8&wire.color=f00&background=%23fff8&format_in=obj", CUBE_OBJ).picture(8, 8);
 }
 
@@ -90,9 +95,9 @@ fn bytes_that_are_no_mesh_are_a_precise_4xx() {
     assert!((400..500).contains(&server.post("/v1/render", &glb).status));
     // Comments alone could be anything; said to be an OBJ, they are an OBJ without a mesh.
     server.post("/v1/render?format_in=obj", b"# nothing\n# at all\n").problem(422, "mesh_empty");
-    server.post("/v1/render", b"PK\x03\x04 a zip by its bytes").problem(415, "bundle_not_supported");
+    server.post("/v1/render", b"PK\x03\x04 a zip by its bytes").problem(422, "bundle_broken");
     let zip = ["Content-Type: application/zip"];
-    server.request("POST", "/v1/render", &zip, CUBE_OBJ).problem(415, "bundle_not_supported");
+    server.request("POST", "/v1/render", &zip, CUBE_OBJ).problem(422, "bundle_broken");
     let gzip = ["Content-Encoding: gzip"];
     server.request("POST", "/v1/render", &gzip, CUBE_OBJ).problem(415, "content_encoding");
 }

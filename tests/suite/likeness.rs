@@ -39,14 +39,20 @@ impl Likeness {
         like
     }
 
+    /// Whether the tolerance holds.
+    pub fn is_within(&self, tolerance: Tolerance) -> bool {
+        self.max <= tolerance.max && self.differing as f64 / self.pixels as f64 <= tolerance.share
+    }
+
+    /// Pixels that differ at all.
+    pub fn differing(&self) -> usize {
+        self.differing
+    }
+
     /// Panics where the tolerance is broken.
     pub fn assert(&self, tolerance: Tolerance, what: &str) {
         println!("{what:32} {self}");
-        let share = |n: usize| n as f64 / self.pixels as f64;
-        assert!(
-            self.max <= tolerance.max && share(self.differing) <= tolerance.share,
-            "{what}: {self}; allowed is {tolerance:?}"
-        );
+        assert!(self.is_within(tolerance), "{what}: {self}; allowed is {tolerance:?}");
     }
 }
 

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::{Format, Mesh, MeshError, import};
+use meshsnap::mesh::{Bundle, Format, Mesh, MeshError, import};
 use serde_json::{Value, json};
 
 /// Imports with default limits.
@@ -17,7 +17,7 @@ pub fn read_as(bytes: &[u8], format: Option<Format>) -> Result<Mesh, MeshError> 
 
 /// Imports with limits.
 pub fn read_limited(bytes: &[u8], format: Option<Format>, limits: &Limits) -> Result<Mesh, MeshError> {
-    import(bytes, format, limits, &mut Budget::new(limits), &Deadline::default())
+    import(&Bundle::of_one(bytes.to_vec()), format, limits, &mut Budget::new(limits), &Deadline::default())
 }
 
 /// Polygons over positions that f32 and short decimals hold exactly.

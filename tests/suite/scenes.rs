@@ -1,10 +1,11 @@
 //! The fixed scenes that every back-end draws, and how to make a mesh, a spec and a plan in a test.
 
 use meshsnap::limits::{BackendChoice, Budget, Deadline, Limits};
-use meshsnap::mesh::{self, Mesh};
+use meshsnap::mesh::{self, Bundle, Mesh};
 use meshsnap::plan::{self, DrawPlan, Faces, MaterialLook, Projection, SurfacePass};
 use meshsnap::request::{self, Rules};
-use meshsnap::scene::Spec;
+use meshsnap::scene::color::Rgba;
+use meshsnap::scene::{DebugView, Layers, Spec};
 
 use crate::shapes;
 
@@ -13,6 +14,17 @@ pub struct Scene {
     pub name: &'static str,
     pub obj: fn() -> String,
     pub keys: &'static [(&'static str, &'static str)],
+    /// What the keys do not say.
+    pub edit: fn(&mut Spec),
+}
+
+impl Scene {
+    /// The keys, understood, and what they do not say.
+    pub fn spec(&self) -> Spec {
+        let mut spec = spec(self.keys);
+        (self.edit)(&mut spec);
+        spec
+    }
 }
 
 const SIZE: (&str, &str) = ("size", "200x160");
@@ -36,7 +48,36 @@ pub const SCENES: &[Scene] = &[
     scene("sheet-orthographic", sheet, &[SIZE, ("style", "wire"), ("camera.projection", "orthographic")]),
     scene("sheet-from-inside", sheet, INSIDE),
     scene("sheet-wire-from-inside", sheet, INSIDE_WIRE),
+    edited(scene("torus-glass", torus, &[SIZE, ("style", "smooth")]), glass),
+    edited(scene("gear-glass-outline", gear, &[SIZE, ("style", "outline")]), glass),
+    scene("torus-wireframe-fwidth-show", torus, FWIDTH_SHOW),
+    scene("torus-wireframe-fwidth-fade", torus, FWIDTH_FADE),
+    scene("torus-wire-fwidth-fade", torus, FWIDTH_FILLED),
+    edited(scene("two-one-outlined", two, &[SIZE, ("style", "outline"), ("outline.unit", "px")]), left_outlined),
+    edited(scene("two-one-glass", two, &[SIZE, ("style", "flat"), ("view", "left")]), left_glass),
+    scene("torus-derivative", torus, &[SIZE, ("style", "flat"), ("surface.normals", "derivative"), METAL]),
+    scene("gear-metal", gear, &[SIZE, ("style", "flat"), METAL, ("surface.color", "d9a441"), SHINY]),
+    scene("torus-metal", torus, &[SIZE, ("style", "smooth"), METAL, ("light.preset", "three-point"), SHINY]),
+    scene("sheet-threshold", sheet, &[SIZE, ("style", "wire"), ("wire.method", "threshold"), ("samples", "1")]),
+    scene("gear-fwidth-min", gear, &[SIZE, ("style", "wire"), ("wire.method", "fwidth-min"), ("view", "front")]),
+    edited(scene("gear-barycentric-lit", gear, BARYCENTRIC_RED), |spec| spec.layers.wire.as_mut().unwrap().lit = true),
+    edited(scene("torus-debug-normal", torus, &[SIZE, ("style", "smooth")]), |spec| debug(spec, DebugView::Normal)),
+    edited(scene("gear-debug-edge-distance", gear, &[SIZE]), |spec| debug(spec, DebugView::EdgeDistance)),
+    edited(scene("sheet-debug-barycentric", sheet, INSIDE), |spec| debug(spec, DebugView::Barycentric)),
+    edited(scene("sheet-debug-face-orientation", sheet, LOW), |spec| debug(spec, DebugView::FaceOrientation)),
 ];
+
+const FWIDTH_SHOW: &[(&str, &str)] = &[SIZE, ("style", "wireframe"), ("wire.method", "fwidth")];
+const FWIDTH_FADE: &[(&str, &str)] =
+    &[SIZE, ("style", "wireframe"), ("wire.method", "fwidth"), ("wire.hidden", "fade"), ("wire.edges", "polygons")];
+const FWIDTH_FILLED: &[(&str, &str)] =
+    &[SIZE, ("style", "wire"), ("wire.method", "fwidth"), ("wire.hidden", "fade"), ("wire.edges", "polygons")];
+
+const METAL: (&str, &str) = ("surface.metallic", "1");
+const SHINY: (&str, &str) = ("surface.roughness", "0.25");
+const LOW: &[(&str, &str)] = &[SIZE, ("style", "flat"), ("camera.elevation_deg", "-4")];
+const BARYCENTRIC_RED: &[(&str, &str)] =
+    &[SIZE, ("style", "wire"), ("wire.method", "barycentric"), ("wire.color", "c02020"), ("wire.thickness", "3")];
 
 const INSIDE: &[(&str, &str)] = &[
     SIZE,
@@ -54,7 +95,35 @@ const INSIDE_WIRE: &[(&str, &str)] = &[
 ];
 
 const fn scene(name: &'static str, obj: fn() -> String, keys: &'static [(&'static str, &'static str)]) -> Scene {
-    Scene { name, obj, keys }
+    Scene { name, obj, keys, edit: |_| () }
+}
+
+const fn edited(scene: Scene, edit: fn(&mut Spec)) -> Scene {
+    Scene { edit, ..scene }
+}
+
+fn glass(spec: &mut Spec) {
+    spec.layers.surface.iter_mut().for_each(|surface| surface.opacity = 0.4);
+}
+
+/// The part named "left" has the outline, the other has none.
+fn left_outlined(spec: &mut Spec) {
+    spec.materials = vec![("right".into(), Layers { outline: None, ..spec.layers })];
+}
+
+/// The part named "left" is glass.
+fn left_glass(spec: &mut Spec) {
+    let mut layers = spec.layers;
+    layers.surface.iter_mut().for_each(|s| (s.opacity, s.color) = (0.45, Some(Rgba([0.1, 0.3, 0.8, 1.0]))));
+    spec.materials = vec![("left".into(), layers)];
+}
+
+fn two() -> String {
+    shapes::two_balls()
+}
+
+fn debug(spec: &mut Spec, view: DebugView) {
+    spec.layers.surface.as_mut().unwrap().debug = view;
 }
 
 fn torus() -> String {
@@ -77,7 +146,7 @@ pub fn mesh(obj: &str) -> Mesh {
 /// Imports with default limits.
 pub fn mesh_of(bytes: &[u8]) -> Result<Mesh, mesh::MeshError> {
     let limits = Limits::default();
-    mesh::import(bytes, None, &limits, &mut Budget::new(&limits), &Deadline::default())
+    mesh::import(&Bundle::of_one(bytes.to_vec()), None, &limits, &mut Budget::new(&limits), &Deadline::default())
 }
 
 /// Reads dotted keys that must be good.

@@ -26,6 +26,32 @@ impl Obj {
         self.text
     }
 
+    /// A closed ball: quads, and triangles at its poles.
+    pub fn ball(&mut self, centre: [f64; 3], radius: f64, n: usize) {
+        let at = |i: usize, j: usize| {
+            let (a, b) = (i as f64 / n as f64 * TAU, j as f64 / (n / 2) as f64 * 0.5 * TAU);
+            let p = [b.sin() * a.cos(), b.cos(), -b.sin() * a.sin()];
+            [0, 1, 2].map(|k| centre[k] + radius * p[k])
+        };
+        let rows: Vec<Vec<usize>> = (0..=n / 2)
+            .map(|j| {
+                let ring = if j == 0 || j == n / 2 { 1 } else { n };
+                (0..ring).map(|i| self.vertex(at(i, j))).collect()
+            })
+            .collect();
+        for pair in rows.windows(2) {
+            for i in 0..n {
+                let at = |row: &[usize], i: usize| row[i % row.len()];
+                let corners = [at(&pair[0], i), at(&pair[1], i), at(&pair[1], i + 1), at(&pair[0], i + 1)];
+                match (pair[0].len(), pair[1].len()) {
+                    (1, _) => self.face(&[corners[0], corners[1], corners[2]]),
+                    (_, 1) => self.face(&[corners[0], corners[1], corners[3]]),
+                    _ => self.face(&corners),
+                }
+            }
+        }
+    }
+
     /// A grid of quads over (u, v) in the unit square; `wrap` closes it in u and v.
     fn grid(&mut self, n: [usize; 2], wrap: [bool; 2], at: impl Fn(f64, f64) -> [f64; 3]) {
         let points = [n[0] + usize::from(!wrap[0]), n[1] + usize::from(!wrap[1])];
@@ -64,6 +90,16 @@ pub fn torus(n: usize) -> String {
         let r = 1.0 + 0.4 * b.cos();
         [r * a.cos(), 0.4 * b.sin(), -r * a.sin()]
     });
+    obj.finish()
+}
+
+/// Two balls side by side, of the materials "left" and "right"; seen from the left, one before the other.
+pub fn two_balls() -> String {
+    let mut obj = Obj::default();
+    for (name, x, radius) in [("left", -1.1, 0.9), ("right", 1.1, 1.0)] {
+        obj.text.push_str(&format!("usemtl {name}\n"));
+        obj.ball([x, 0.0, 0.0], radius, 20);
+    }
     obj.finish()
 }
 

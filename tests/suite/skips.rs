@@ -19,7 +19,7 @@ fn turning_a_skip_off_changes_no_byte() {
     let (mut cases, mut skipped) = (0, vec![0; SkipKind::ALL.len()]);
     for scene in SCENES {
         let mesh = scenes::mesh(&(scene.obj)());
-        let spec = scenes::spec(scene.keys);
+        let spec = scene.spec();
         let usual = keeping(&mesh, &spec, &[]);
         let want = renderer.draw(&usual, &deadline).unwrap();
         for (kind, count) in SkipKind::ALL.iter().zip(&mut skipped) {

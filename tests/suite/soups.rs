@@ -116,6 +116,7 @@ impl Soup {
                 normals: Cow::Borrowed(&self.normals),
                 offset,
                 amounts: Vec::new(),
+                triangle_materials: &[],
             }),
             background: [1.0; 4],
             ..DrawPlan::new([view.width, view.height], &self.positions, &self.triangles, view.projection)

@@ -90,7 +90,7 @@ fn a_stopped_job_leaves_a_working_renderer() {
     let mut renderer = GpuRenderer::new(gpus[0].clone());
     let want = golden::draw(&SCENES[0], &mut CpuRenderer::new(1));
     let mesh = scenes::mesh(&(SCENES[0].obj)());
-    let spec = scenes::spec(SCENES[0].keys);
+    let spec = SCENES[0].spec();
     let plan = scenes::plan(&mesh, &spec);
     let mut stopped = 0;
     // Raised at once, and by another thread at some point on the way.

@@ -4,22 +4,27 @@ use std::sync::{Mutex, PoisonError};
 
 use super::bins::{Bin, Bins};
 use super::isa::dispatch;
+use super::layers::{self, LayerBand};
 use super::occluders::PlaneCache;
 use super::resolve::resolve;
-use super::samples::{NOTHING, SampleBand};
-use super::visibility::{self, Setup};
+use super::samples::SampleBand;
+use super::visibility::{self, Nearest, Setup};
 use super::{Stages, lines, shade};
 use crate::plan::{DrawPlan, LinePass};
 
 /// Sample memory of a band, bytes: half of a common 1 MiB second-level cache.
 const BAND_BYTES: usize = 512 << 10;
 
+/// Bytes of a sample, its layers included.
+const LAYERED_SAMPLE_BYTES: usize = 44;
+
 /// Triangles or edges between two looks at the deadline: at most some 10 ms, however large each is.
 const CHECK_EVERY: usize = 256;
 
 /// Rows in each band but the last.
 pub fn rows_per_band(plan: &DrawPlan<'_>) -> u32 {
-    let row_bytes = plan.width_px as usize * plan.samples as usize * 8;
+    let sample_bytes = if plan.layers().is_some() { LAYERED_SAMPLE_BYTES } else { 8 };
+    let row_bytes = plan.width_px as usize * plan.samples as usize * sample_bytes;
     ((BAND_BYTES / row_bytes.max(1)) as u32).clamp(1, plan.height_px.max(1))
 }
 
@@ -28,6 +33,7 @@ pub struct BandScratch {
     samples: SampleBand,
     /// Rows that `samples` has room for; the last band of a picture may use fewer.
     rows: u32,
+    layers: Option<LayerBand>,
     colors: Vec<[f32; 4]>,
     ink: Vec<u32>,
 }
@@ -46,6 +52,7 @@ impl ScratchPool {
         let mut scratch = kept.unwrap_or_else(|| BandScratch {
             samples: SampleBand::new(size_px, 0, rows, plan.samples),
             rows,
+            layers: None,
             colors: Vec::new(),
             ink: Vec::new(),
         });
@@ -61,7 +68,10 @@ pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: u
     fill_samples(stages, scratch, bins, band);
     scratch.colors.clear();
     scratch.colors.resize(pixels, [0.0; 4]);
-    if plan.is_shaded() {
+    if let Some(pass) = plan.layers() {
+        let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples));
+        layers::draw(stages, pass, (&bins.layers, band), &scratch.samples, layers, &mut scratch.colors);
+    } else if plan.is_shaded() {
         shade_band(isa, stages, &scratch.samples, &mut scratch.colors);
     }
     scratch.ink.clear();
@@ -77,12 +87,32 @@ pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: u
 pub fn draw_visibility(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, words: &mut [u64]) {
     fill_samples(stages, scratch, bins, band);
     let samples = &scratch.samples;
-    for (i, word) in words.iter_mut().enumerate() {
-        let (pixel, s) = (i as u32 / samples.samples, i as u32 % samples.samples);
-        let (x, row) = (pixel % samples.size_px[0], pixel / samples.size_px[0]);
-        let at = samples.index(x, samples.first_row + row, s);
-        let id = samples.ids[at];
-        *word = if id == NOTHING { 0 } else { u64::from(samples.depth[at].to_bits()) << 32 | u64::from(!id) };
+    for_each_sample(samples, words, |at| samples.word(at));
+}
+
+/// Draws band number `band` of a layer alone, likewise.
+pub fn draw_layer(
+    stages: &Stages<'_>,
+    scratch: &mut BandScratch,
+    bins: &Bins,
+    band: usize,
+    layer: u32,
+    words: &mut [u64],
+) {
+    fill_samples(stages, scratch, bins, band);
+    if let Some(pass) = stages.plan.layers() {
+        let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples));
+        let found = layers::find(stages, pass, (&bins.layers, band), &scratch.samples, layers, layer);
+        for_each_sample(&scratch.samples, words, |at| found[at]);
+    }
+}
+
+/// Fills the words of a band's samples, given where each is.
+fn for_each_sample(band: &SampleBand, words: &mut [u64], word: impl Fn(usize) -> u64) {
+    for (i, out) in words.iter_mut().enumerate() {
+        let (pixel, s) = (i as u32 / band.samples, i as u32 % band.samples);
+        let (x, row) = (pixel % band.size_px[0], pixel / band.size_px[0]);
+        *out = word(band.index(x, band.first_row + row, s));
     }
 }
 
@@ -127,7 +157,7 @@ fn triangles_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut
         let ordered = chunk.whole.is_ordered() && !stages.plan.projection.clip;
         for (id, piece) in chunk.pieces_in(band) {
             if let Some(setup) = Setup::new(piece) {
-                visibility::draw::<true>(&setup, id, samples);
+                visibility::draw(&setup, id, &mut Nearest::<true>(samples));
             }
         }
         for (i, id) in chunk.whole.items_in(band).enumerate() {
@@ -136,9 +166,9 @@ fn triangles_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut
             }
             if let Some(setup) = Setup::new(&stages.screen_triangle(id)) {
                 if ordered {
-                    visibility::draw::<false>(&setup, id, samples);
+                    visibility::draw(&setup, id, &mut Nearest::<false>(samples));
                 } else {
-                    visibility::draw::<true>(&setup, id, samples);
+                    visibility::draw(&setup, id, &mut Nearest::<true>(samples));
                 }
             }
         }

@@ -9,7 +9,7 @@ use super::transform::{ScreenVertex, homogeneous};
 use super::visibility::{area, axis_bounds, is_wanted};
 use super::{CHUNK, Stages, lines};
 use crate::limits::Stopped;
-use crate::plan::{DrawPlan, Faces, LinePass};
+use crate::plan::{DrawPlan, Faces, LinePass, roles};
 
 /// What touches more bands than this is listed once for all of them, or large triangles on a tall picture would take
 /// gigabytes of lists.
@@ -17,7 +17,10 @@ const TALL_BANDS: usize = 8;
 
 /// What each band has to draw, chunk by chunk in ascending order.
 pub struct Bins {
+    /// For the visibility buffer.
     pub triangles: Vec<TriangleBin>,
+    /// For the layers over it.
+    pub layers: Vec<TriangleBin>,
     /// By line pass.
     pub edges: Vec<Vec<Bin>>,
 }
@@ -80,15 +83,15 @@ fn contains([first, last]: [u32; 2], band: usize) -> bool {
 /// Sorts the plan's triangles and edges into bands of `rows`.
 pub fn bin(stages: &Stages<'_>, pool: Option<&rayon::ThreadPool>, rows: u32) -> Result<Bins, Stopped> {
     let plan = stages.plan;
-    let count = plan.triangles.len();
-    let surface = plan.surface.as_ref().map(|s| (0..count, s.faces));
-    let hull = plan.hull.as_ref().map(|_| (count..2 * count, Faces::Back));
-    let passes = [surface, hull].into_iter().flatten();
-    let jobs = passes.flat_map(|(ids, faces)| chunks(ids).map(move |chunk| (chunk, faces))).collect();
-    let triangles = map(pool, jobs, |(ids, faces)| match stages.deadline.check() {
-        Ok(()) => bin_triangles(stages, rows, ids, faces),
-        Err(Stopped) => TriangleBin::default(),
-    });
+    let (base, layers) = passes(plan);
+    let bin_all = |passes: Vec<Pass>| {
+        let jobs = passes.into_iter().flat_map(Pass::chunks).collect();
+        map(pool, jobs, |pass| match stages.deadline.check() {
+            Ok(()) => bin_triangles(stages, rows, &pass),
+            Err(Stopped) => TriangleBin::default(),
+        })
+    };
+    let (triangles, layers) = (bin_all(base), bin_all(layers));
     let bin_pass = |pass: &LinePass| {
         map(pool, chunks(0..pass.edges.len()).collect(), |range| match stages.deadline.check() {
             Ok(()) => bin_edges(stages, pass, rows, range),
@@ -97,7 +100,48 @@ pub fn bin(stages: &Stages<'_>, pool: Option<&rayon::ThreadPool>, rows: u32) -> 
     };
     let edges = plan.lines.iter().map(bin_pass).collect();
     stages.deadline.check()?;
-    Ok(Bins { triangles, edges })
+    Ok(Bins { triangles, layers, edges })
+}
+
+/// Triangles that are drawn for the same reason.
+struct Pass {
+    ids: Range<usize>,
+    /// Added to a triangle's index to get its id.
+    id_base: usize,
+    role: u8,
+    faces: Faces,
+}
+
+impl Pass {
+    fn chunks(self) -> impl Iterator<Item = Self> {
+        chunks(self.ids.clone()).map(move |ids| Self { ids, ..self })
+    }
+
+    /// Which faces of a triangle are drawn; None where it has another role.
+    #[inline(always)]
+    fn faces_of(&self, plan: &DrawPlan<'_>, id: usize) -> Option<Faces> {
+        match plan.roles.get(id - self.id_base) {
+            None => Some(self.faces),
+            Some(role) if role & self.role == 0 => None,
+            _ if self.role == roles::HULL => Some(self.faces),
+            Some(role) if role & roles::FRONT_ONLY != 0 => Some(Faces::Front),
+            Some(role) if role & roles::BACK_ONLY != 0 => Some(Faces::Back),
+            _ => Some(self.faces),
+        }
+    }
+}
+
+/// What goes into the visibility buffer, and what into the layers.
+fn passes(plan: &DrawPlan<'_>) -> (Vec<Pass>, Vec<Pass>) {
+    let count = plan.triangles.len();
+    let surface = |role| plan.surface.as_ref().map(|s| Pass { ids: 0..count, id_base: 0, role, faces: s.faces });
+    let pushed = Pass { ids: count..2 * count, id_base: count, role: roles::HULL, faces: Faces::Back };
+    let hull = plan.hull.as_ref().map(|_| pushed);
+    // Without roles, nothing is a layer.
+    let layer = surface(roles::LAYER).filter(|_| plan.layers().is_some() && !plan.roles.is_empty());
+    let (base_hull, layered_hull) = if plan.has_layered_hull() { (None, hull) } else { (hull, None) };
+    let collect = |passes: [Option<Pass>; 2]| passes.into_iter().flatten().collect();
+    (collect([surface(roles::SURFACE), base_hull]), collect([layer, layered_hull]))
 }
 
 fn chunks(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
@@ -109,10 +153,11 @@ fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
     plan.height_px.div_ceil(rows) as usize
 }
 
-fn bin_triangles(stages: &Stages<'_>, rows: u32, ids: Range<usize>, faces: Faces) -> TriangleBin {
+fn bin_triangles(stages: &Stages<'_>, rows: u32, pass: &Pass) -> TriangleBin {
     let plan = stages.plan;
     let mut bin = TriangleBin { whole: Bin::new(band_count(plan, rows)), pieces: Vec::new() };
-    for id in ids {
+    for id in pass.ids.clone() {
+        let Some(faces) = pass.faces_of(plan, id) else { continue };
         let vertices = stages.screen_triangle(id as u32);
         if vertices.iter().any(ScreenVertex::is_outside) {
             bin_clipped(stages, rows, id as u32, faces, &mut bin);

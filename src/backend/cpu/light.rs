@@ -1,31 +1,67 @@
 //! Light without images. Twin of `shaders/light.wgsl`.
 //!
-//! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground.
+//! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have no diffuse colour, so
+//! they mirror a studio instead: bright above, a little brighter at the horizon, dark below, and blurred by roughness.
 
 use super::point::dot;
-use crate::plan::{Lights, MaterialLook};
+use super::wire::smoothstep;
+use crate::plan::{Lights, Projection};
 
-/// Light on a surface with unit normal `n`: straight alpha in, premultiplied out.
-pub fn light(lights: &Lights, s: &MaterialLook, up: [f32; 3], n: [f32; 3]) -> [f32; 4] {
-    let base = s.base_color;
-    let alpha_squared = (s.roughness * s.roughness).max(0.0025) * (s.roughness * s.roughness).max(0.0025);
-    let ambient = lights.ambient * (0.7 + 0.3 * dot(n, up));
-    let (mut diffuse, mut shine) = (0.0, 0.0);
+/// What light makes of a base colour: `base * gain + gloss`, in each channel.
+#[derive(Clone, Copy, Debug)]
+pub struct Light {
+    /// Of what the base colour tints.
+    pub gain: f32,
+    /// Of what it does not.
+    pub gloss: f32,
+}
+
+impl Light {
+    /// The base colour as it is.
+    pub const NONE: Self = Self { gain: 1.0, gloss: 0.0 };
+}
+
+/// Light on a surface with unit normal `n`.
+pub fn light(lights: &Lights, projection: &Projection, metallic: f32, roughness: f32, n: [f32; 3]) -> Light {
+    let alpha = (roughness * roughness).max(0.0025);
+    let alpha_squared = alpha * alpha;
+    let ambient = lights.ambient * (0.7 + 0.3 * dot(n, projection.screen_up));
+    let (mut diffuse, mut shine, mut strength) = (0.0, 0.0, 0.0);
     for lamp in &lights.lamps {
         let n_light = dot(n, lamp.to_light).max(0.0);
         let n_half = dot(n, lamp.halfway).max(0.0);
         let light_half = dot(lamp.to_light, lamp.halfway);
         let lobe = n_half * n_half * (alpha_squared - 1.0) + 1.0;
-        let gloss = alpha_squared / (lobe * lobe * (light_half * light_half).max(0.1) * (4.0 * s.roughness + 2.0));
+        let gloss = alpha_squared / (lobe * lobe * (light_half * light_half).max(0.1) * (4.0 * roughness + 2.0));
         let direct = lamp.strength * n_light;
         diffuse += direct;
         shine += direct * gloss;
+        strength += lamp.strength;
     }
-    let mut out = base;
-    for k in 0..3 {
-        let specular = 0.04 + s.metallic * (base[k] - 0.04);
-        let reflected = base[k] * (1.0 - s.metallic) * diffuse + specular * shine;
-        out[k] = (base[k] * ambient + reflected).clamp(0.0, 1.0) * base[3];
+    // F0 = 0.04 (1 - metallic) + metallic base.
+    let matte = 1.0 - metallic;
+    let mut light = Light { gain: matte * (ambient + diffuse) + metallic * shine, gloss: 0.04 * matte * shine };
+    if metallic > 0.0 {
+        let n_view = dot(n, projection.to_viewer);
+        // Schlick's rise towards grazing angles, less of it where the surface is rough.
+        let grazing = 1.0 - n_view.clamp(0.0, 1.0);
+        let square = grazing * grazing;
+        let rise = square * square * grazing * (1.0 - roughness);
+        let mirrored = 2.0 * n_view * dot(n, projection.screen_up) - dot(projection.to_viewer, projection.screen_up);
+        let seen = metallic * (lights.ambient + 0.5 * strength) * studio(mirrored, roughness);
+        light.gain += seen * (1.0 - rise);
+        light.gloss += seen * rise;
     }
-    out
+    light
+}
+
+/// Brightness of the studio in a direction that rises by `up` (the sine of its elevation).
+fn studio(up: f32, roughness: f32) -> f32 {
+    const SKY: f32 = 1.15;
+    const GROUND: f32 = 0.36;
+    const HORIZON: f32 = 0.35;
+    let blur = 0.2 + 0.8 * roughness;
+    let sky = smoothstep(-blur, blur, up);
+    let band = up / blur;
+    (GROUND + (SKY - GROUND) * sky) + HORIZON * (1.0 - roughness) / (1.0 + 4.0 * band * band)
 }

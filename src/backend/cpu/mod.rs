@@ -1,6 +1,7 @@
 //! The CPU rasterizer: the reference for bytes.
 //!
-//! Stages, each a file: [`transform`] (with [`clip`] where needed), [`visibility`], [`shade`], [`lines`], [`resolve`]. The picture is cut
+//! Stages, each a file: [`transform`] (with [`clip`] where needed), [`visibility`], [`layers`] (with [`peel`]), [`shade`],
+//! [`lines`], [`resolve`]. The picture is cut
 //! into bands of rows that fit a core's cache; threads take bands, and nothing a band draws depends on another.
 
 // Loops over lanes and corners walk several arrays at once; an index says that best.
@@ -10,14 +11,18 @@ mod bands;
 mod barycentric;
 mod bins;
 mod clip;
+mod debug;
 mod isa;
+mod layers;
 mod light;
 mod lines;
 mod occluders;
+mod peel;
 mod point;
 mod resolve;
 mod samples;
 mod shade;
+mod texture;
 mod transform;
 mod visibility;
 mod wire;
@@ -133,6 +138,17 @@ impl CpuRenderer {
             }
         });
         Ok(deadline.check()?)
+    }
+}
+
+impl CpuRenderer {
+    /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare back-ends sample for sample.
+    pub fn draw_layer(&mut self, plan: &DrawPlan<'_>, layer: u32, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
+        let mut words = vec![0_u64; plan.width_px as usize * plan.height_px as usize * plan.samples as usize];
+        self.draw_bands(plan, deadline, &mut words, |stages, scratch, bins, band, words| {
+            bands::draw_layer(stages, scratch, bins, band, layer, words);
+        })?;
+        Ok(words)
     }
 }
 

@@ -1,24 +1,58 @@
 //! The colour of one point of the surface: stage 3's formulas. Twin of `shaders/point.wgsl`.
 
 use super::Stages;
-use super::barycentric::{Barycentrics, corners};
-use super::light::light;
+use super::barycentric::{Barycentrics, Quad, corners};
+use super::debug;
+use super::light::{Light, light};
+use super::texture::{Uv, blend, sample};
 use super::transform::ScreenVertex;
 use super::visibility::area;
-use super::wire::wire_factor;
-use crate::plan::{SurfacePass, flags};
+use super::wire::{Place, edge_mask, fwidth_cover, wire_cover};
+use crate::plan::{MaterialLook, SurfacePass, TEXTURE_NONE, flags, slots};
+
+/// What the common looks do without, textures aside.
+const RICH: u32 = flags::DERIVATIVE_NORMALS
+    | flags::VERTEX_COLORS
+    | flags::DEBUG
+    | flags::WIRE_LIT
+    | (flags::WIRES & !flags::WIRE_FWIDTH);
+
+/// What changes from point to point of a triangle in a common look.
+const VARYING: u32 = flags::VERTEX_NORMALS | flags::WIRE_FWIDTH;
+
+/// What decides by barycentrics rather than blends, textures aside: there both back-ends need the same bits.
+const DECIDING: u32 = flags::VERTEX_COLORS | flags::WIRE_THRESHOLD | flags::DEBUG;
+
+/// Any normal.
+const LIT: u32 = flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_NORMALS;
+
+/// What of its material a point shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Show {
+    /// Whether its fill.
+    pub fill: bool,
+    /// How much of its wires, 0 to 1.
+    pub wires: f32,
+}
+
+impl Show {
+    /// All of it.
+    pub const ALL: Self = Self { fill: true, wires: 1.0 };
+}
 
 /// Shades points of surface triangles.
 pub struct PointShader<'a> {
     stages: &'a Stages<'a>,
     /// Flat colours do not change over a triangle: the last one is kept.
     flat: Option<(u32, [f32; 4])>,
+    /// What is shown; the same for all points of a triangle.
+    pub show: Show,
 }
 
 impl<'a> PointShader<'a> {
     /// One for a band.
     pub fn new(stages: &'a Stages<'a>) -> Self {
-        Self { stages, flat: None }
+        Self { stages, flat: None, show: Show::ALL }
     }
 
     /// The colour of triangle `id` where it is known to be the same all over, and is the one that was shaded last.
@@ -28,32 +62,140 @@ impl<'a> PointShader<'a> {
     }
 
     /// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's centre.
+    #[inline(always)]
     pub fn color(&mut self, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> [f32; 4] {
-        let material = surface.material(id as usize);
-        let flat = material.flags & (flags::VERTEX_NORMALS | flags::WIRES) == 0;
-        let bary = || Barycentrics::new(&corners(self.stages, id, at));
-        let up = self.stages.plan.projection.screen_up;
-        let lit = if material.flags & flags::FACE_NORMALS != 0 {
-            let normal = facing(surface.face_normals[id as usize], self.is_front(id, at));
-            light(&surface.lights, material, up, normal)
-        } else if let Some(normals) =
-            surface.vertex_normals.as_ref().filter(|_| material.flags & flags::VERTEX_NORMALS != 0)
-        {
-            let b = bary();
-            let normal = interpolate(&normals.values, normals.triangles[id as usize], b.value);
-            light(&surface.lights, material, up, facing(normal, b.front))
-        } else {
-            material.base_color
-        };
-        let color = if material.flags & flags::WIRES != 0 {
-            over(wire_factor(surface, material, id as usize, &bary()), material.wire_color, lit)
-        } else {
-            lit
-        };
-        if flat {
-            self.flat = Some((id, color));
+        let look = surface.material(id as usize);
+        let is_textured =
+            !surface.textures.images.is_empty() && look.textures.iter().any(|used| used.texture != TEXTURE_NONE);
+        if look.flags & RICH != 0 || is_textured {
+            return self.rich(surface, look, id, at, is_textured);
         }
-        color
+        let base = self.with_alpha(look, look.base_color);
+        let varies = look.flags & VARYING != 0;
+        let b = if varies { Some(Barycentrics::new(&corners(self.stages, id, at))) } else { None };
+        let mut light = Light::NONE;
+        if look.flags & LIT != 0 {
+            let normal = match (&b, &surface.vertex_normals) {
+                (Some(b), Some(normals)) if look.flags & flags::VERTEX_NORMALS != 0 => {
+                    let corners = normals.triangles[id as usize].map(|i| normals.values[i as usize]);
+                    facing(blend(corners, b.value), b.front)
+                }
+                (Some(b), _) => facing(surface.face_normals[id as usize], b.front),
+                (None, _) => facing(surface.face_normals[id as usize], self.is_front(id, at)),
+            };
+            light = self.light(surface, look.metallic, look.roughness, normal);
+        }
+        let color = premultiplied(lit(base, light), look.emissive);
+        match &b {
+            None => {
+                self.flat = Some((id, color));
+                color
+            }
+            Some(b) if look.flags & flags::WIRE_FWIDTH != 0 && self.show.wires > 0.0 => {
+                over(self.show.wires * fwidth_cover(edge_mask(surface, id), look, b), look.wire_color, color)
+            }
+            Some(_) => color,
+        }
+    }
+
+    /// Every look there is.
+    #[inline(never)]
+    fn rich(
+        &self,
+        surface: &SurfacePass<'_>,
+        look: &MaterialLook,
+        id: u32,
+        at: [f32; 2],
+        is_textured: bool,
+    ) -> [f32; 4] {
+        let c = corners(self.stages, id, at);
+        let is_deciding = is_textured || look.flags & DECIDING != 0;
+        let b = if is_deciding { Barycentrics::exact(&c) } else { Barycentrics::new(&c) };
+        let place = Place { stages: self.stages, id, at, b };
+        let has_wire = look.flags & flags::WIRES != 0 && self.show.wires > 0.0;
+        let cover = if has_wire { self.show.wires * wire_cover(surface, look, &place) } else { 0.0 };
+        if look.flags & flags::DEBUG != 0 && !self.show.fill {
+            return look.wire_color.map(|v| cover * v);
+        }
+        if look.flags & flags::DEBUG != 0 {
+            return over(cover, look.wire_color, debug::color(surface, look, &place, &c));
+        }
+        let uv = surface.uvs.as_ref().filter(|_| is_textured).map(|uvs| Uv::new(uvs, id, &place.b));
+        let texture = |slot: usize| match &uv {
+            Some(uv) if look.textures[slot].texture != TEXTURE_NONE => {
+                sample(&surface.textures, &look.textures[slot], uv)
+            }
+            _ => [1.0; 4],
+        };
+        let base = self.with_alpha(look, base_color(surface, look, &place, texture(slots::BASE)));
+        if base[3] == 0.0 && cover == 0.0 {
+            return [0.0; 4];
+        }
+        let mut light = Light::NONE;
+        if look.flags & LIT != 0 {
+            let [_, roughness, metallic, _] = texture(slots::METALLIC_ROUGHNESS);
+            let mut normal = normal(surface, look, &place);
+            if let Some(uv) = uv.as_ref().filter(|_| look.textures[slots::NORMAL].texture != TEXTURE_NONE) {
+                normal = self.bumped(surface, look, &place, uv, normal);
+            }
+            light = self.light(surface, look.metallic * metallic, look.roughness * roughness, normal);
+        }
+        let [r, g, b, _] = texture(slots::EMISSIVE);
+        let emissive = [look.emissive[0] * r, look.emissive[1] * g, look.emissive[2] * b];
+        if look.flags & flags::WIRE_LIT != 0 {
+            return lit_wire(cover, look.wire_color, base, light, emissive);
+        }
+        over(cover, look.wire_color, premultiplied(lit(base, light), emissive))
+    }
+
+    /// What the material makes of alpha.
+    fn with_alpha(&self, look: &MaterialLook, mut base: [f32; 4]) -> [f32; 4] {
+        let is_cut = look.flags & flags::MASK != 0 && base[3] < look.alpha_cutoff;
+        if is_cut || !self.show.fill || look.flags & flags::FILL == 0 {
+            return [0.0; 4];
+        }
+        if look.flags & flags::BLEND == 0 {
+            base[3] = 1.0;
+        }
+        base
+    }
+
+    /// What light makes of a colour at a point with this normal.
+    pub fn light(&self, surface: &SurfacePass<'_>, metallic: f32, roughness: f32, normal: [f32; 3]) -> Light {
+        light(&surface.lights, &self.stages.plan.projection, metallic, roughness, normal)
+    }
+
+    /// The normal that the normal texture makes of `n`. Its axes are the triangle's own: where u grows, and where v shrinks.
+    fn bumped(
+        &self,
+        surface: &SurfacePass<'_>,
+        look: &MaterialLook,
+        place: &Place<'_>,
+        uv: &Uv,
+        n: [f32; 3],
+    ) -> [f32; 3] {
+        let Some(uvs) = &surface.uvs else { return n };
+        let used = &look.textures[slots::NORMAL];
+        let p = place.stages.positions_of(place.id).map(|(position, _)| position);
+        let [t0, t1, t2] = uvs.triangles[place.id as usize].map(|i| {
+            let [u, v] = uvs.values[i as usize];
+            used.transform.map(|[a, b, _]| a * u + b * v)
+        });
+        let (e1, e2) = (sub(p[1], p[0]), sub(p[2], p[0]));
+        let (d1, d2) = ([t1[0] - t0[0], t1[1] - t0[1]], [t2[0] - t0[0], t2[1] - t0[1]]);
+        let turn = d1[0] * d2[1] - d2[0] * d1[1];
+        if !(turn.abs() > 1e-30 && turn.abs() < 1e30) {
+            return n;
+        }
+        // Seen from behind, a bump is a dent. v runs down in the image, and the texture's y up.
+        let side = if (turn > 0.0) == place.b.front { 1.0 } else { -1.0 };
+        let along_u: [f32; 3] = std::array::from_fn(|k| side * (e1[k] * d2[1] - e2[k] * d1[1]));
+        let along_up: [f32; 3] = std::array::from_fn(|k| side * (e1[k] * d2[0] - e2[k] * d1[0]));
+        let tangent = unit_or(across(along_u, n), [0.0; 3]);
+        let up = unit_or(across(across(along_up, n), tangent), [0.0; 3]);
+        let [x, y, z, _] = sample(&surface.textures, used, uv).map(|v| 2.0 * v - 1.0);
+        let (x, y) = (x * look.normal_scale, y * look.normal_scale);
+        unit_or(std::array::from_fn(|k| (x * tangent[k] + y * up[k]) + z * n[k]), n)
     }
 
     fn is_front(&self, id: u32, at: [f32; 2]) -> bool {
@@ -65,9 +207,73 @@ impl<'a> PointShader<'a> {
     }
 }
 
-fn interpolate(values: &[[f32; 3]], corners: [u32; 3], b: [f32; 3]) -> [f32; 3] {
-    let [n0, n1, n2] = corners.map(|i| values[i as usize]);
-    std::array::from_fn(|k| (b[0] * n0[k] + b[1] * n1[k]) + b[2] * n2[k])
+/// The unit normal on the viewer's side, without normal textures.
+pub fn normal(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<'_>) -> [f32; 3] {
+    let Place { stages, id, b, .. } = place;
+    let to_viewer = stages.plan.projection.to_viewer;
+    if look.flags & flags::DERIVATIVE_NORMALS != 0 {
+        return derivative_normal(place);
+    }
+    if look.flags & flags::FACE_NORMALS != 0 {
+        return facing(surface.face_normals[*id as usize], b.front);
+    }
+    match &surface.vertex_normals {
+        Some(normals) => {
+            let corners = normals.triangles[*id as usize].map(|i| normals.values[i as usize]);
+            facing(blend(corners, b.value), b.front)
+        }
+        None => to_viewer,
+    }
+}
+
+/// The cross product of the position's fine derivatives in a block of 2 x 2 pixels, as a GPU's rasterizer has them: in f32,
+/// errors and all. (The same errors on both back-ends.)
+fn derivative_normal(place: &Place<'_>) -> [f32; 3] {
+    let Place { stages, id, at, .. } = place;
+    let quad = Quad::around(stages.plan, *at);
+    let corners = stages.positions_of(*id).map(|(position, _)| position);
+    // A neighbour beyond the horizon of the triangle's plane is as far away as that.
+    let bounded = |b: [f32; 3]| b.map(|v| v.clamp(-1e6, 1e6));
+    let [own, across, down] = quad.barycentrics(stages, *id).map(|b| blend(corners, bounded(b)));
+    // Large enough that no square vanishes.
+    let step = |p: [f32; 3], sign: f32| sub(p, own).map(|v| v * (4096.0 * sign));
+    let (dx, dy) = (step(across, quad.sign[0]), step(down, quad.sign[1]));
+    unit_or(cross(dy, dx), stages.plan.projection.to_viewer)
+}
+
+/// Base colour with straight alpha.
+fn base_color(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<'_>, texel: [f32; 4]) -> [f32; 4] {
+    let tint = match &surface.colors {
+        Some(colors) if look.flags & flags::VERTEX_COLORS != 0 => {
+            blend(colors.triangles[place.id as usize].map(|i| colors.values[i as usize]), place.b.value)
+        }
+        _ => [1.0; 4],
+    };
+    std::array::from_fn(|k| look.base_color[k] * tint[k] * texel[k])
+}
+
+/// A straight colour under light, as bright as can be shown.
+pub fn lit(base: [f32; 4], light: Light) -> [f32; 4] {
+    let [r, g, b] = [0, 1, 2].map(|k| (base[k] * light.gain + light.gloss).clamp(0.0, 1.0));
+    [r, g, b, base[3]]
+}
+
+fn premultiplied(straight: [f32; 4], emissive: [f32; 3]) -> [f32; 4] {
+    let alpha = straight[3];
+    let [r, g, b] = [0, 1, 2].map(|k| (straight[k] + emissive[k]) * alpha);
+    [r, g, b, alpha]
+}
+
+/// The wire as paint: over the base colour, under the light.
+fn lit_wire(cover: f32, wire: [f32; 4], base: [f32; 4], light: Light, emissive: [f32; 3]) -> [f32; 4] {
+    let [r, g, b, alpha] = base;
+    let painted = over(cover, wire, [r * alpha, g * alpha, b * alpha, alpha]);
+    let left = alpha * (1.0 - cover * wire[3]);
+    let [r, g, b] = [0, 1, 2].map(|k| {
+        let lit = painted[k] * light.gain + painted[3] * light.gloss;
+        lit.clamp(0.0, painted[3]) + emissive[k] * left
+    });
+    [r, g, b, painted[3]]
 }
 
 /// The unit normal on the viewer's side.
@@ -78,6 +284,11 @@ fn facing(n: [f32; 3], front: bool) -> [f32; 3] {
     n.map(|v| v * scale)
 }
 
+fn unit_or(v: [f32; 3], otherwise: [f32; 3]) -> [f32; 3] {
+    let length_squared = dot(v, v);
+    if length_squared > 1e-20 && length_squared < 1e30 { v.map(|c| c / length_squared.sqrt()) } else { otherwise }
+}
+
 fn over(cover: f32, top: [f32; 4], under: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|k| cover * top[k] + under[k] * (1.0 - cover * top[3]))
 }
@@ -85,4 +296,20 @@ fn over(cover: f32, top: [f32; 4], under: [f32; 4]) -> [f32; 4] {
 /// Scalar product.
 pub fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
+}
+
+fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// What of `v` is at right angles to the unit vector `n`, at length about 1 where that is not nothing.
+fn across(v: [f32; 3], n: [f32; 3]) -> [f32; 3] {
+    let largest = v.iter().fold(0.0_f32, |most, c| most.max(c.abs()));
+    let v = if largest > 0.0 { v.map(|c| c / largest) } else { v };
+    let along = dot(v, n);
+    std::array::from_fn(|k| v[k] - along * n[k])
 }

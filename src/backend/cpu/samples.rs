@@ -45,6 +45,13 @@ impl SampleBand {
 }
 
 impl SampleBand {
+    /// What a sample sees, in one number: nearer is larger, of equal depths the lower id.
+    #[inline(always)]
+    pub fn word(&self, at: usize) -> u64 {
+        let id = self.ids[at];
+        if id == NOTHING { 0 } else { u64::from(self.depth[at].to_bits()) << 32 | u64::from(!id) }
+    }
+
     /// Ids and depths of a pixel's samples.
     #[inline(always)]
     pub fn pixel(&self, x: u32, y: u32) -> (&[u32], &[f32]) {

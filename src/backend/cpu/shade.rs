@@ -12,7 +12,7 @@ use crate::plan::sample_offsets;
 #[inline(always)]
 pub fn shade(stages: &Stages<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
     let width = band.size_px[0];
-    let mut shader = Shader { stages, points: PointShader::new(stages) };
+    let mut shader = Shader::new(stages);
     for row in 0..band.rows {
         let y = band.first_row + row;
         let line = &mut colors[(row * width) as usize..][..width as usize];
@@ -23,12 +23,19 @@ pub fn shade(stages: &Stages<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
 }
 
 /// Finds out who is seen in a pixel, and where.
-struct Shader<'a> {
-    stages: &'a Stages<'a>,
-    points: PointShader<'a>,
+pub struct Shader<'a> {
+    /// What it reads.
+    pub stages: &'a Stages<'a>,
+    /// Finds out what they look like.
+    pub points: PointShader<'a>,
 }
 
-impl Shader<'_> {
+impl<'a> Shader<'a> {
+    /// One for a band.
+    pub fn new(stages: &'a Stages<'a>) -> Self {
+        Self { stages, points: PointShader::new(stages) }
+    }
+
     #[inline(always)]
     fn pixel(&mut self, band: &SampleBand, x: u32, y: u32) -> [f32; 4] {
         let first = band.ids[band.index(x, y, 0)];
@@ -71,7 +78,7 @@ impl Shader<'_> {
 
     /// The colour of triangle `id` at the mean of `count` samples whose offsets in 1/16 px add up to `offset_sum`.
     #[inline(always)]
-    fn group(&mut self, id: u32, x: u32, y: u32, offset_sum: [i32; 2], count: i32) -> [f32; 4] {
+    pub fn group(&mut self, id: u32, x: u32, y: u32, offset_sum: [i32; 2], count: i32) -> [f32; 4] {
         if id == NOTHING {
             return [0.0; 4];
         }
@@ -82,9 +89,9 @@ impl Shader<'_> {
         let scale = 16.0 * [1.0, 0.5, 1.0 / 3.0, 0.25][count as usize - 1];
         let corner = [x as i32 * 256 - plan.width_px as i32 * 128, y as i32 * 256 - plan.height_px as i32 * 128];
         let at = [corner[0] as f32 + offset_sum[0] as f32 * scale, corner[1] as f32 + offset_sum[1] as f32 * scale];
-        match (&plan.surface, &plan.hull) {
-            (Some(surface), _) if id < plan.triangles.len() as u32 => self.points.color(surface, id, at),
-            (_, Some(hull)) => hull.colors[0],
+        match (id.checked_sub(plan.triangles.len() as u32), &plan.surface, &plan.hull) {
+            (None, Some(surface), _) if surface.is_shaded => self.points.color(surface, id, at),
+            (Some(triangle), _, Some(hull)) => hull.color(triangle as usize),
             _ => [0.0; 4],
         }
     }

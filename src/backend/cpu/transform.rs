@@ -82,7 +82,7 @@ pub fn homogeneous(projection: &Projection, p: [f32; 3]) -> [f32; 4] {
 /// Where a hull vertex stands in the unit box: pushed out already if the push is in object units.
 #[inline(always)]
 pub fn hull_position(hull: &HullPass<'_>, position: [f32; 3], vertex: usize) -> [f32; 3] {
-    match hull.offset {
+    match hull.offset_at(vertex) {
         HullOffset::Object(t) => {
             let n = hull.normals[vertex];
             [position[0] + t * n[0], position[1] + t * n[1], position[2] + t * n[2]]
@@ -107,7 +107,7 @@ pub fn transform_hull(
     for (i, slot) in out.iter_mut().enumerate() {
         let vertex = first + i;
         let position = hull_position(hull, positions[vertex], vertex);
-        let push = match hull.offset {
+        let push = match hull.offset_at(vertex) {
             HullOffset::Object(_) => None,
             HullOffset::Px(px) => Some((hull.normals[vertex], 256.0 * px)),
         };

@@ -84,18 +84,47 @@ pub fn wide_to_f32(v: u64) -> f32 {
     ((v >> 32) as u32 as f32) * 4_294_967_296.0 + (v as u32 as f32)
 }
 
-/// Draws a triangle into the band. With `TIES`, of equal depths the lowest id wins whatever the order of drawing; without,
-/// the caller promises ascending ids.
+/// Where a triangle's samples go.
+pub trait Target {
+    /// Its rows of samples.
+    fn band(&self) -> &SampleBand;
+
+    /// Offers triangle `id` to the samples from index `at` on: its depth at each, and which lie outside it (negative).
+    fn offer(&mut self, at: usize, outside: &[i32; LANES], z: &[f32; LANES], id: u32);
+}
+
+/// Keeps the nearest. With `TIES`, of equal depths the lowest id wins whatever the order of drawing; without, the caller
+/// promises ascending ids.
+pub struct Nearest<'a, const TIES: bool>(pub &'a mut SampleBand);
+
+impl<const TIES: bool> Target for Nearest<'_, TIES> {
+    #[inline(always)]
+    fn band(&self) -> &SampleBand {
+        self.0
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, at: usize, outside: &[i32; LANES], z: &[f32; LANES], id: u32) {
+        let depths = self.0.depth.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
+        let ids = self.0.ids.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
+        if let (Some(depths), Some(ids)) = (depths, ids) {
+            update::<TIES>(outside, z, id, depths, ids);
+        }
+    }
+}
+
+/// Draws a triangle into the target.
 #[inline(always)]
-pub fn draw<const TIES: bool>(setup: &Setup, id: u32, band: &mut SampleBand) {
-    match band.samples {
-        1 => draw_sampled::<TIES, 1>(setup, id, band),
-        _ => draw_sampled::<TIES, 4>(setup, id, band),
+pub fn draw(setup: &Setup, id: u32, target: &mut impl Target) {
+    match target.band().samples {
+        1 => draw_sampled::<1>(setup, id, target),
+        _ => draw_sampled::<4>(setup, id, target),
     }
 }
 
 #[inline(always)]
-fn draw_sampled<const TIES: bool, const S: usize>(setup: &Setup, id: u32, band: &mut SampleBand) {
+fn draw_sampled<const S: usize>(setup: &Setup, id: u32, target: &mut impl Target) {
+    let band = target.band();
     let Some([columns, rows]) = setup.bounds(band) else { return };
     let edges = Edges::new(setup);
     let lanes = Lanes::new::<S>(&edges);
@@ -108,7 +137,7 @@ fn draw_sampled<const TIES: bool, const S: usize>(setup: &Setup, id: u32, band: 
             if let Some(values) = edges.at(corner) {
                 let size = [(columns[1] - column + 1).min(BLOCK), (rows[1] - row + 1).min(BLOCK)];
                 let block = Block { column, row, size, corner, values };
-                block.draw::<TIES, S>(setup, &edges, &lanes, id, band);
+                block.draw::<S>(setup, &edges, &lanes, id, target);
             }
             column += BLOCK;
         }
@@ -193,26 +222,15 @@ struct Block {
 
 impl Block {
     #[inline(always)]
-    fn draw<const TIES: bool, const S: usize>(
-        &self,
-        setup: &Setup,
-        edges: &Edges,
-        lanes: &Lanes,
-        id: u32,
-        band: &mut SampleBand,
-    ) {
+    fn draw<const S: usize>(&self, setup: &Setup, edges: &Edges, lanes: &Lanes, id: u32, target: &mut impl Target) {
         let pixels = (LANES / S) as i32;
         for y in 0..self.size[1] {
             let mut x = 0;
             while x < self.size[0] {
-                let at = band.index((self.column + x) as u32, (self.row + y) as u32, 0);
+                let at = target.band().index((self.column + x) as u32, (self.row + y) as u32, 0);
                 let outside = self.outside(edges, lanes, x, y);
-                let depths = band.depth.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
-                let ids = band.ids.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
-                if let (Some(depths), Some(ids)) = (depths, ids) {
-                    let from = [self.corner[0] + 256 * x - setup.x[0], self.corner[1] + 256 * y - setup.y[0]];
-                    update::<TIES>(&outside, &setup.depth_lanes(lanes, from), id, depths, ids);
-                }
+                let from = [self.corner[0] + 256 * x - setup.x[0], self.corner[1] + 256 * y - setup.y[0]];
+                target.offer(at, &outside, &setup.depth_lanes(lanes, from), id);
                 x += pixels;
             }
         }

@@ -53,6 +53,17 @@ impl Buffers {
         Ok(())
     }
 
+    /// Reserves a buffer and fills it with slices of whole words, one after the other.
+    pub fn upload_parts(&mut self, gpu: &Gpu, slot: Slot, parts: &[&[u8]]) -> Result<(), DrawError> {
+        let buffer = self.reserve(gpu, slot, parts.iter().map(|part| part.len() as u64).sum())?;
+        let mut at = 0;
+        for part in parts.iter().filter(|part| !part.is_empty()) {
+            gpu.queue.write_buffer(buffer, at, part);
+            at += part.len() as u64;
+        }
+        Ok(())
+    }
+
     /// The slot's buffer, or an empty one where the plan needs none.
     pub fn storage(&mut self, gpu: &Gpu, slot: Slot) -> Result<&wgpu::Buffer, DrawError> {
         self.reserve(gpu, slot, 0)

@@ -60,7 +60,7 @@ const SOFTWARE_PIPELINE_JOBS: u32 = 32;
 type Lost = Arc<OnceLock<String>>;
 
 /// Storage buffers that the hungriest stage binds.
-const STORAGE_BUFFERS: u32 = 14;
+const STORAGE_BUFFERS: u32 = 16;
 
 /// How often to look without a pause: a small picture takes a fraction of a millisecond.
 const EAGER_POLLS: u32 = 64;

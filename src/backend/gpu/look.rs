@@ -1,6 +1,6 @@
 //! What a plan has: the shaders' `LOOK`, a constant of each pipeline, so that a kernel contains only what its plan needs.
 
-use crate::plan::{DrawPlan, HullOffset, flags};
+use crate::plan::{DrawPlan, HullOffset, SurfacePass, flags};
 
 pub const SURFACE: u32 = 1;
 pub const HULL: u32 = 2;
@@ -13,6 +13,21 @@ pub const EDGE_MASKS: u32 = 128;
 pub const LINES: u32 = 256;
 pub const CLIPPED: u32 = 2048;
 pub const FOUR_SAMPLES: u32 = 4096;
+pub const ROLES: u32 = 0x10_0000;
+pub const HULL_AMOUNTS: u32 = 0x20_0000;
+pub const HULL_LOOKS: u32 = 0x40_0000;
+pub const LAYERS: u32 = 0x80_0000;
+pub const BEHIND_SURFACE: u32 = 0x100_0000;
+pub const WIRES_ONLY: u32 = 0x200_0000;
+pub const LAYERED_HULL: u32 = 0x400_0000;
+pub const DERIVATIVE_NORMALS: u32 = 1 << 16;
+pub const VERTEX_COLORS: u32 = 1 << 17;
+pub const UVS: u32 = 1 << 18;
+pub const TEXTURES: u32 = 1 << 19;
+pub const WIRE_MINIMUM: u32 = 0x800_0000;
+pub const WIRE_LIT: u32 = 0x1000_0000;
+pub const DEBUG: u32 = 0x2000_0000;
+pub const VARYING: u32 = 0x4000_0000;
 
 /// The flags of a plan.
 pub fn look(plan: &DrawPlan<'_>) -> u32 {
@@ -24,12 +39,35 @@ pub fn look(plan: &DrawPlan<'_>) -> u32 {
         look |= when(surface.is_shaded, SURFACE) | when(surface.triangle_materials.len() == count, TRIANGLE_MATERIALS);
         look |= when(all & flags::FACE_NORMALS != 0, FACE_NORMALS);
         look |= when(all & flags::VERTEX_NORMALS != 0, VERTEX_NORMALS);
+        look |= varying(surface, all);
         look |= when(all & flags::WIRES != 0, WIRES) | when(surface.edge_masks.len() == count, EDGE_MASKS);
     }
     if let Some(hull) = &plan.hull {
         look |= HULL | when(matches!(hull.offset, HullOffset::Px(_)), HULL_PX);
+        look |= when(hull.amounts.len() == plan.positions.len(), HULL_AMOUNTS);
+        look |= when(hull.triangle_materials.len() == count, HULL_LOOKS) | when(plan.has_layered_hull(), LAYERED_HULL);
+    }
+    look |= when(plan.roles.len() == count && count > 0, ROLES);
+    if let Some(layers) = plan.layers() {
+        look |= LAYERS | when(layers.behind_surface, BEHIND_SURFACE) | when(layers.wires_only, WIRES_ONLY);
     }
     look | when(!plan.lines.is_empty(), LINES)
+}
+
+/// What changes over a triangle.
+fn varying(surface: &SurfacePass<'_>, all: u32) -> u32 {
+    let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
+    let is_textured = (0..4).any(|slot| surface.samples(slot)) && surface.uvs.is_some();
+    let by_minimum = flags::WIRE_THRESHOLD | flags::WIRE_BARYCENTRIC | flags::WIRE_FWIDTH_MIN;
+    let varies = flags::VERTEX_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_COLORS | flags::WIRES | flags::DEBUG;
+    when(all & flags::DERIVATIVE_NORMALS != 0, DERIVATIVE_NORMALS)
+        | when(all & (flags::VERTEX_COLORS | flags::DEBUG) != 0 && surface.colors.is_some(), VERTEX_COLORS)
+        | when((is_textured || all & flags::DEBUG != 0) && surface.uvs.is_some(), UVS)
+        | when(is_textured, TEXTURES)
+        | when(all & by_minimum != 0, WIRE_MINIMUM)
+        | when(all & flags::WIRE_LIT != 0, WIRE_LIT)
+        | when(all & flags::DEBUG != 0, DEBUG)
+        | when(all & varies != 0 || is_textured, VARYING)
 }
 
 #[cfg(test)]
@@ -51,9 +89,25 @@ mod tests {
             ("LINES", LINES),
             ("CLIPPED", CLIPPED),
             ("FOUR_SAMPLES", FOUR_SAMPLES),
+            ("ROLES", ROLES),
+            ("HULL_AMOUNTS", HULL_AMOUNTS),
+            ("HULL_LOOKS", HULL_LOOKS),
+            ("LAYERS", LAYERS),
+            ("BEHIND_SURFACE", BEHIND_SURFACE),
+            ("WIRES_ONLY", WIRES_ONLY),
+            ("LAYERED_HULL", LAYERED_HULL),
+            ("DERIVATIVE_NORMALS", DERIVATIVE_NORMALS),
+            ("VERTEX_COLORS", VERTEX_COLORS),
+            ("UVS", UVS),
+            ("TEXTURES", TEXTURES),
+            ("WIRE_MINIMUM", WIRE_MINIMUM),
+            ("WIRE_LIT", WIRE_LIT),
+            ("DEBUG", DEBUG),
+            ("VARYING", VARYING),
         ];
         for (name, value) in all {
-            assert!(shader.contains(&format!("const {name}: u32 = {value}u;")), "{name}");
+            let ways = [format!("const {name}: u32 = {value}u;"), format!("const {name}: u32 = {value:#X}u;")];
+            assert!(ways.iter().any(|way| shader.contains(&way.replace("0X", "0x"))), "{name}");
         }
     }
 }

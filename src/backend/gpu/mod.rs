@@ -9,18 +9,22 @@ mod buffers;
 mod device;
 mod look;
 mod params;
+mod passes;
 mod recorder;
 mod schedule;
 mod stages;
+mod tiles;
 
 use std::sync::Arc;
 
 pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
-use self::params::attributes;
+use self::params::{attributes, corner_triangles, hull_amounts, hull_looks};
 use self::recorder::Recorder;
-use self::schedule::{DeviceTraits, Schedule, Step, WORK_HEAD_BYTES, WORK_ITEM_BYTES, has_visibility};
+use self::schedule::{
+    DeviceTraits, Goal, LAYERED_BYTES, Schedule, Step, WORK_HEAD_BYTES, WORK_ITEM_BYTES, has_visibility,
+};
 use self::stages::Slot;
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::{Image, srgb8_thresholds};
@@ -50,6 +54,45 @@ impl GpuRenderer {
         &self.gpu
     }
 
+    /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare back-ends sample for sample.
+    pub fn draw_layer(&mut self, plan: &DrawPlan<'_>, layer: u32, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
+        match plan.layers() {
+            Some(_) => self.words(plan, Goal::Layer(layer), Slot::Layer, deadline),
+            None => Ok(vec![0; plan.width_px as usize * plan.samples as usize * plan.height_px as usize]),
+        }
+    }
+
+    /// What a buffer of samples holds in the end.
+    fn words(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        goal: Goal,
+        slot: Slot,
+        deadline: &Deadline,
+    ) -> Result<Vec<u64>, DrawError> {
+        deadline.check()?;
+        let row_words = plan.width_px as usize * plan.samples as usize;
+        let len = row_words * plan.height_px as usize;
+        if len == 0 || !has_visibility(plan) {
+            return Ok(vec![0; len]);
+        }
+        self.job(|gpu, buffers| {
+            let schedule = Schedule::new(plan, &traits(gpu), goal);
+            upload_geometry(gpu, buffers, plan, &schedule)?;
+            buffers.staging(gpu, schedule.band_rows as u64 * row_words as u64 * 8)?;
+            let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
+            let mut words = Vec::with_capacity(len);
+            execute(&mut recorder, plan, &schedule, |recorder, [first, end]| {
+                let size = u64::from(end - first) * row_words as u64 * 8;
+                recorder.copy_out(slot, size, 0)?;
+                recorder.read_staging(size, |bytes| {
+                    words.extend(bytes.chunks_exact(8).map(|b| u64::from_le_bytes(std::array::from_fn(|i| b[i]))));
+                })
+            })?;
+            Ok(words)
+        })
+    }
+
     /// Runs `job` with errors caught and buffers tidied up afterwards.
     fn job<T>(&mut self, job: impl FnOnce(&Gpu, &mut Buffers) -> Result<T, DrawError>) -> Result<T, DrawError> {
         self.gpu.check()?;
@@ -74,7 +117,7 @@ impl Renderer for GpuRenderer {
             return Ok(image);
         }
         self.job(|gpu, buffers| {
-            let schedule = Schedule::picture(plan, &traits(gpu));
+            let schedule = Schedule::new(plan, &traits(gpu), Goal::Picture);
             upload_geometry(gpu, buffers, plan, &schedule)?;
             upload_looks(gpu, buffers, plan, &schedule)?;
             buffers.staging(gpu, size)?;
@@ -89,27 +132,7 @@ impl Renderer for GpuRenderer {
     }
 
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
-        deadline.check()?;
-        let row_words = plan.width_px as usize * plan.samples as usize;
-        let len = row_words * plan.height_px as usize;
-        if len == 0 || !has_visibility(plan) {
-            return Ok(vec![0; len]);
-        }
-        self.job(|gpu, buffers| {
-            let schedule = Schedule::samples(plan, &traits(gpu));
-            upload_geometry(gpu, buffers, plan, &schedule)?;
-            buffers.staging(gpu, schedule.band_rows as u64 * row_words as u64 * 8)?;
-            let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
-            let mut words = Vec::with_capacity(len);
-            execute(&mut recorder, plan, &schedule, |recorder, [first, end]| {
-                let size = u64::from(end - first) * row_words as u64 * 8;
-                recorder.copy_out(Slot::Samples, size, 0)?;
-                recorder.read_staging(size, |bytes| {
-                    words.extend(bytes.chunks_exact(8).map(|b| u64::from_le_bytes(std::array::from_fn(|i| b[i]))));
-                })
-            })?;
-            Ok(words)
-        })
+        self.words(plan, Goal::Samples, Slot::Samples, deadline)
     }
 
     fn kind(&self) -> BackendKind {
@@ -139,13 +162,22 @@ fn upload_geometry(
     buffers.upload(gpu, Slot::Triangles, bytemuck::cast_slice(plan.triangles))?;
     if let Some(hull) = &plan.hull {
         buffers.upload(gpu, Slot::HullNormals, bytemuck::cast_slice(&hull.normals))?;
+        buffers.upload(gpu, Slot::HullAmounts, bytemuck::cast_slice(&hull_amounts(hull)))?;
+        buffers.upload(gpu, Slot::HullLooks, &hull_looks(hull))?;
     }
     let copies = if plan.hull.is_some() { 2 } else { 1 };
     buffers.reserve(gpu, Slot::Vertices, vertices * copies * 16)?;
     if !has_visibility(plan) {
         return Ok(());
     }
+    buffers.upload(gpu, Slot::Roles, &plan.roles)?;
     buffers.reserve(gpu, Slot::Samples, band_sample_bytes(plan, schedule.band_rows))?;
+    if plan.layers().is_some() {
+        let samples = band_sample_bytes(plan, schedule.band_rows) / 8;
+        buffers.reserve(gpu, Slot::Layer, samples * 8)?;
+        buffers.reserve(gpu, Slot::Layered, samples * LAYERED_BYTES)?;
+        buffers.reserve(gpu, Slot::Rounds, u64::from(schedule.layers) * 4)?;
+    }
     buffers.reserve(gpu, Slot::Work, WORK_HEAD_BYTES + u64::from(schedule.work_items) * WORK_ITEM_BYTES)?;
     Ok(())
 }
@@ -162,8 +194,18 @@ fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule:
         buffers.upload(gpu, Slot::FaceNormals, bytemuck::cast_slice(surface.face_normals))?;
         if let Some(normals) = &surface.vertex_normals {
             buffers.upload(gpu, Slot::Normals, bytemuck::cast_slice(&normals.values))?;
-            buffers.upload(gpu, Slot::NormalTriangles, bytemuck::cast_slice(normals.triangles))?;
         }
+        if let Some(uvs) = &surface.uvs {
+            buffers.upload(gpu, Slot::Uvs, bytemuck::cast_slice(&uvs.values))?;
+        }
+        if let Some(colors) = &surface.colors {
+            buffers.upload(gpu, Slot::VertexColors, bytemuck::cast_slice(&colors.values))?;
+        }
+        let triangles = corner_triangles(surface).0;
+        let triangles: Vec<&[u8]> = triangles.into_iter().map(bytemuck::cast_slice).collect();
+        buffers.upload_parts(gpu, Slot::CornerTriangles, &triangles)?;
+        let (images, texels) = (&surface.textures.images, &surface.textures.texels);
+        buffers.upload_parts(gpu, Slot::Texels, &[bytemuck::cast_slice(images), bytemuck::cast_slice(texels)])?;
     }
     if !plan.lines.is_empty() {
         let edges: Vec<Edge> = plan.lines.iter().flat_map(|lines| lines.edges.iter().copied()).collect();
@@ -189,9 +231,17 @@ fn execute<'a>(
     schedule: &Schedule,
     mut end_band: impl FnMut(&mut Recorder<'a>, [u32; 2]) -> Result<(), DrawError>,
 ) -> Result<(), DrawError> {
-    for step in &schedule.steps {
+    let mut next = 0;
+    while let Some(step) = schedule.steps.get(next) {
+        next += 1;
         match *step {
-            Step::ClearBand => clear_band(recorder, plan, schedule.band_rows)?,
+            Step::ClearBand => clear_band(recorder, plan, schedule)?,
+            Step::ClearLayer => recorder.clear(Slot::Layer, band_sample_bytes(plan, schedule.band_rows))?,
+            Step::EndLayer { layer, end } => {
+                if recorder.read_word(Slot::Rounds, layer)? == 0 {
+                    next = end;
+                }
+            }
             Step::ClearWork => recorder.clear(Slot::Work, 8)?,
             Step::Dispatch { stage, batch, workgroups } => recorder.dispatch(stage, batch, workgroups)?,
             Step::Tiles { stage, batch } if schedule.tiles.in_rounds => {
@@ -205,7 +255,11 @@ fn execute<'a>(
     Ok(())
 }
 
-fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, rows: u32) -> Result<(), DrawError> {
+fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
+    let rows = schedule.band_rows;
+    if schedule.layers > 0 {
+        recorder.clear(Slot::Rounds, u64::from(schedule.layers) * 4)?;
+    }
     if has_visibility(plan) {
         recorder.clear(Slot::Samples, band_sample_bytes(plan, rows))?;
     }

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::plan::{DrawPlan, Faces, HullOffset, Lights, LinePass, Shown, SurfacePass};
+use crate::plan::{DrawPlan, Faces, HullOffset, HullPass, Lights, LinePass, Shown, SurfacePass};
 
 /// The plan's numbers.
 #[repr(C)]
@@ -13,6 +13,8 @@ pub struct Frame {
     z_row: [f32; 4],
     w_row: [f32; 4],
     screen_up: [f32; 4],
+    screen_right: [f32; 4],
+    to_viewer: [f32; 4],
     lamps: [[f32; 4]; Lights::LAMPS_MAX],
     halfways: [[f32; 4]; Lights::LAMPS_MAX],
     background: [f32; 4],
@@ -30,8 +32,14 @@ pub struct Frame {
     hull_base: u32,
     masks_at: u32,
     material_count: u32,
+    layer_fade: f32,
+    hull_color_count: u32,
+    image_count: u32,
+    normal_triangles_at: u32,
+    uv_triangles_at: u32,
+    color_triangles_at: u32,
     /// WGSL rounds a struct up to its alignment.
-    padding: [u32; 3],
+    padding: u32,
 }
 
 /// A dispatch's numbers.
@@ -55,6 +63,8 @@ pub struct Batch {
     pub line_smoothing: f32,
     pub line_flags: u32,
     pub ink_at: u32,
+    pub role: u32,
+    pub layer: u32,
 }
 
 /// Bits of [`Batch::line_flags`].
@@ -83,6 +93,8 @@ impl Frame {
             w_row: p.w,
             near_w: p.near_w,
             screen_up: xyz(p.screen_up),
+            screen_right: xyz(p.screen_right),
+            to_viewer: xyz(p.to_viewer),
             background: plan.background,
             width: plan.width_px,
             height: plan.height_px,
@@ -94,12 +106,14 @@ impl Frame {
             frame.surface(surface);
         }
         if let Some(hull) = &plan.hull {
-            frame.hull_color = hull.colors[0];
+            frame.hull_color = hull.color(0);
+            frame.hull_color_count = hull.colors.len() as u32;
             frame.hull_push = match hull.offset {
                 HullOffset::Object(units) => units,
                 HullOffset::Px(px) => 256.0 * px,
             };
         }
+        frame.layer_fade = plan.layers().map_or(1.0, |layers| layers.fade);
         frame.line_pass_count = plan.lines.len() as u32;
         frame
     }
@@ -114,12 +128,49 @@ impl Frame {
         self.ambient = surface.lights.ambient;
         self.material_count = surface.materials.len() as u32;
         self.masks_at = surface.triangle_materials.len() as u32;
+        self.image_count = surface.textures.images.len() as u32;
+        let (_, [normals, uvs, colors]) = corner_triangles(surface);
+        (self.normal_triangles_at, self.uv_triangles_at, self.color_triangles_at) = (normals, uvs, colors);
     }
+}
+
+/// The hull's colours, then its triangles' materials: what [`Frame::hull_color_count`] points into.
+pub fn hull_looks(hull: &HullPass<'_>) -> Vec<u8> {
+    [bytemuck::cast_slice(&hull.colors), bytemuck::cast_slice::<u32, u8>(hull.triangle_materials)].concat()
+}
+
+/// How far each position moves, as [`Frame`] has it for all.
+pub fn hull_amounts(hull: &HullPass<'_>) -> Vec<f32> {
+    let unit = match hull.offset {
+        HullOffset::Object(_) => 1.0,
+        HullOffset::Px(_) => 256.0,
+    };
+    hull.amounts.iter().map(|amount| unit * amount).collect()
 }
 
 /// Triangles' materials, then edge masks four to a word: what [`Frame::masks_at`] points into.
 pub fn attributes(surface: &SurfacePass<'_>) -> Vec<u8> {
     [bytemuck::cast_slice(surface.triangle_materials), &surface.edge_masks[..]].concat()
+}
+
+/// The index arrays of normals, texture coordinates and colours, each once, and where each of the three begins when they
+/// lie one after the other.
+pub fn corner_triangles<'a>(surface: &SurfacePass<'a>) -> (Vec<&'a [[u32; 3]]>, [u32; 3]) {
+    let of = [
+        surface.vertex_normals.as_ref().map(|v| v.triangles),
+        surface.uvs.as_ref().map(|v| v.triangles),
+        surface.colors.as_ref().map(|v| v.triangles),
+    ];
+    let mut parts: Vec<&[[u32; 3]]> = Vec::new();
+    let starts = of.map(|triangles| {
+        let Some(triangles) = triangles else { return 0 };
+        let at = parts.iter().position(|part| std::ptr::eq(*part, triangles)).unwrap_or_else(|| {
+            parts.push(triangles);
+            parts.len() - 1
+        });
+        parts[..at].iter().map(|part| 3 * part.len() as u32).sum()
+    });
+    (parts, starts)
 }
 
 fn xyz(v: [f32; 3]) -> [f32; 4] {
@@ -150,7 +201,7 @@ mod tests {
 
     #[test]
     fn sizes_are_those_of_the_shader() {
-        assert_eq!(size_of::<Frame>(), 272);
-        assert_eq!(size_of::<Batch>(), 68);
+        assert_eq!(size_of::<Frame>(), 320);
+        assert_eq!(size_of::<Batch>(), 76);
     }
 }

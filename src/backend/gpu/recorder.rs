@@ -8,8 +8,8 @@ use super::buffers::Buffers;
 use super::device::Gpu;
 use super::look::look;
 use super::params::{BATCH_STRIDE, Batch, Frame, pack};
-use super::schedule::Tiles;
 use super::stages::{Pipeline, Slot, Stage, uniforms_layout};
+use super::tiles::Tiles;
 use crate::backend::DrawError;
 use crate::limits::Deadline;
 use crate::plan::DrawPlan;
@@ -108,6 +108,15 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
+    /// Reads one word of a buffer, when all that was recorded is done.
+    pub fn read_word(&mut self, slot: Slot, index: u32) -> Result<u32, DrawError> {
+        let (from, to) = (self.buffers.storage(self.gpu, slot)?.clone(), self.buffers.counts(self.gpu).clone());
+        self.encoder().copy_buffer_to_buffer(&from, u64::from(index) * 4, &to, 0, Some(4));
+        let mut word = 0;
+        self.read(&to, 4, |bytes| word = bytemuck::pod_read_unaligned(bytes))?;
+        Ok(word)
+    }
+
     /// Fills the first `size` bytes of a buffer with zeros.
     pub fn clear(&mut self, slot: Slot, size: u64) -> Result<(), DrawError> {
         let buffer = self.buffers.storage(self.gpu, slot)?.clone();
@@ -169,7 +178,7 @@ impl<'a> Recorder<'a> {
         let pipeline = self.gpu.stages.get(&self.gpu.device, stage, self.look);
         let mut bound = Vec::new();
         for &(slot, _) in stage.buffers() {
-            bound.push((slot, self.buffers.storage(self.gpu, slot)?.clone()));
+            bound.push((slot, self.buffers.storage(self.gpu, stage.bound_at(slot))?.clone()));
         }
         let entries: Vec<_> = bound
             .iter()

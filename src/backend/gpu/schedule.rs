@@ -5,8 +5,10 @@
 //! long and the deadline is looked at in between.
 
 use super::params::{Batch, faces_code, line_flags};
-use super::stages::{Stage, Write};
-use crate::plan::{DrawPlan, Faces, LinePass};
+use super::passes::Pass;
+use super::stages::{Into, Stage, Write};
+use super::tiles::{Tiles, edges_per_group};
+use crate::plan::{DrawPlan, roles};
 
 /// Largest buffer that depends on the picture's size, bytes.
 const BAND_BYTES: u64 = 64 << 20;
@@ -23,11 +25,14 @@ pub const WORK_HEAD_BYTES: u64 = 16;
 /// See [`WORK_HEAD_BYTES`].
 pub const WORK_ITEM_BYTES: u64 = 48;
 
+/// Bytes of what layers make of a sample.
+pub const LAYERED_BYTES: u64 = 32;
+
 /// Edges a dispatch.
 const EDGE_CHUNK: u32 = 1 << 20;
 
 /// Threads of a workgroup, in every kernel.
-const WORKGROUP: u32 = 64;
+pub const WORKGROUP: u32 = 64;
 
 /// What a device allows, and which way it goes.
 #[derive(Clone, Copy, Debug)]
@@ -44,15 +49,6 @@ pub struct DeviceTraits {
     pub loops_are_limited: bool,
 }
 
-/// Sample tests that may be handed to the device without looking at how many it really is: a second or so of work.
-const BLIND_TESTS_MAX: u64 = 1 << 38;
-
-/// Loop iterations a thread of the tile kernel may run in a dispatch of known extent.
-///
-/// llvmpipe (Mesa 22) leaves all loops of a thread after 65,535 iterations, silently; and on real devices a dispatch
-/// should end in time for the deadline.
-const ITERATIONS_MAX: u64 = 40_000;
-
 /// One command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
@@ -60,6 +56,16 @@ pub enum Step {
     ClearBand,
     /// Empties the work list.
     ClearWork,
+    /// Empties the layer that is looked for.
+    ClearLayer,
+    /// Where the device must be waited for anyway, asks whether there is another layer behind this one, and if not, goes on
+    /// at step `end`.
+    EndLayer {
+        /// Which.
+        layer: u32,
+        /// Index of the step after the last layer.
+        end: usize,
+    },
     /// Runs a kernel over `threads` threads with the batch at `batch`.
     Dispatch {
         /// Which.
@@ -87,6 +93,17 @@ pub enum Step {
     },
 }
 
+/// What is wanted of a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goal {
+    /// The picture.
+    Picture,
+    /// The visibility buffer alone.
+    Samples,
+    /// One layer alone.
+    Layer(u32),
+}
+
 /// All commands for a plan.
 #[derive(Debug)]
 pub struct Schedule {
@@ -96,49 +113,10 @@ pub struct Schedule {
     pub band_rows: u32,
     /// Items that the work list must hold.
     pub work_items: u32,
+    /// Layers that are looked for in each band.
+    pub layers: u32,
     /// How the tile kernel is run.
     pub tiles: Tiles,
-}
-
-/// How the tile kernel is run: at once over whatever is in the work list, or, where that might take too long, in rounds
-/// whose number follows from the list's length, which is read back first.
-#[derive(Clone, Copy, Debug)]
-pub struct Tiles {
-    /// Whether to run in rounds.
-    pub in_rounds: bool,
-    /// Workgroups a dispatch.
-    pub workgroups: u32,
-    tile_iterations: u64,
-    band_tiles: u64,
-}
-
-impl Tiles {
-    fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, band_rows: u32) -> Self {
-        let pixels = u64::from(plan.width_px) * u64::from(plan.height_px);
-        let tests = (plan.triangles.len() as u64).saturating_mul(pixels * u64::from(plan.samples));
-        Self {
-            in_rounds: device.loops_are_limited || tests > BLIND_TESTS_MAX,
-            workgroups: device.tile_workgroups.min(device.workgroups_max),
-            // 64 blocks, in each the samples; and as much again for the way there.
-            tile_iterations: 64 * (u64::from(plan.samples) + 1) + 64,
-            band_tiles: u64::from(plan.width_px / 64 + 2) * u64::from(band_rows / 64 + 2),
-        }
-    }
-
-    /// The ranges of large and of huge items to draw in each round.
-    pub fn rounds(&self, large: u32, huge: u32) -> Vec<[std::ops::Range<u32>; 2]> {
-        // A large triangle is at most 128 pixels, three tiles, wide and high, and one workgroup's.
-        let large_step = (ITERATIONS_MAX / (9 * self.tile_iterations)).max(1) * u64::from(self.workgroups);
-        let huge_iterations = self.band_tiles.div_ceil(u64::from(self.workgroups)) * self.tile_iterations;
-        let huge_step = (ITERATIONS_MAX / huge_iterations).max(1);
-        let ranges = |count: u32, step: u64| {
-            (0..u64::from(count)).step_by(step as usize).map(move |i| i as u32..(i + step).min(u64::from(count)) as u32)
-        };
-        ranges(large, large_step)
-            .map(|range| [range, 0..0])
-            .chain(ranges(huge, huge_step).map(|range| [0..0, range]))
-            .collect()
-    }
 }
 
 /// Whether a plan needs the sample buffer at all.
@@ -147,30 +125,22 @@ pub fn has_visibility(plan: &DrawPlan<'_>) -> bool {
 }
 
 impl Schedule {
-    /// The commands for a picture of `plan`.
-    pub fn picture(plan: &DrawPlan<'_>, device: &DeviceTraits) -> Self {
-        Self::new(plan, device, true)
-    }
-
-    /// The commands for the visibility buffer of `plan` alone.
-    pub fn samples(plan: &DrawPlan<'_>, device: &DeviceTraits) -> Self {
-        Self::new(plan, device, false)
-    }
-
-    fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, picture: bool) -> Self {
+    /// The commands for what is wanted of `plan`.
+    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Self {
         let row_bytes = u64::from(plan.width_px) * pixel_bytes(plan);
         let band_bytes = BAND_BYTES.min(device.binding_bytes_max);
         let band_rows = (band_bytes / row_bytes.max(1)).clamp(1, u64::from(plan.height_px.max(1))) as u32;
         let tiles = Tiles::new(plan, device, band_rows);
-        let mut schedule = Self { steps: Vec::new(), batches: Vec::new(), band_rows, work_items: 0, tiles };
+        let mut schedule = Self { steps: Vec::new(), batches: Vec::new(), band_rows, work_items: 0, layers: 0, tiles };
         schedule.transform(plan, device);
         for row_first in (0..plan.height_px).step_by(band_rows as usize) {
             let rows = [row_first, plan.height_px.min(row_first + band_rows)];
             schedule.steps.push(Step::ClearBand);
             if has_visibility(plan) {
                 schedule.visibility(plan, device, rows);
+                schedule.layers(plan, device, rows, goal);
             }
-            if picture {
+            if goal == Goal::Picture {
                 schedule.picture_stages(plan, device, rows);
             }
             schedule.steps.push(Step::EndBand { row_first, row_end: rows[1] });
@@ -189,15 +159,56 @@ impl Schedule {
     }
 
     fn visibility(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2]) {
+        self.triangles(plan, device, rows, (Into::Surface, 0), Pass::of_surface(plan));
+    }
+
+    /// One round a layer; a round does nothing where the one before has left nothing to find.
+    fn layers(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2], goal: Goal) {
+        let Some(pass) = plan.layers() else { return };
+        let rounds = match goal {
+            Goal::Picture => pass.count_max,
+            Goal::Samples => 0,
+            Goal::Layer(layer) => layer + 1,
+        };
+        self.layers = rounds;
+        let count = plan.width_px * (rows[1] - rows[0]);
+        // A layer that is wanted for itself is not shaded: then no sample is done before its last triangle.
+        let role = if goal == Goal::Picture { u32::from(roles::LAYER) } else { 0 };
+        let mut ends = Vec::new();
+        for layer in 0..rounds {
+            self.steps.push(Step::ClearLayer);
+            self.triangles(plan, device, rows, (Into::Layer, layer), Pass::of_layers(plan));
+            let batch = Batch { count, row_first: rows[0], row_end: rows[1], role, layer, ..Batch::default() };
+            self.dispatch(device, Stage::Layers, count, batch);
+            self.steps.push(Step::Submit);
+            if self.tiles.in_rounds && goal == Goal::Picture {
+                ends.push(self.steps.len());
+                self.steps.push(Step::EndLayer { layer, end: 0 });
+            }
+        }
+        let last = self.steps.len();
+        for at in ends {
+            if let Some(Step::EndLayer { end, .. }) = self.steps.get_mut(at) {
+                *end = last;
+            }
+        }
+    }
+
+    fn triangles(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        device: &DeviceTraits,
+        rows: [u32; 2],
+        (into, layer): (Into, u32),
+        passes: [Option<Pass>; 2],
+    ) {
         let clip = plan.projection.clip;
         let writes: &[Write] = if device.int64_atomics { &[Write::Both] } else { &[Write::Depth, Write::Id] };
-        let (count, vertices) = (plan.triangles.len() as u32, plan.positions.len() as u32);
-        let surface = plan.surface.as_ref().map(|s| (0, 0, s.faces));
-        let hull = plan.hull.as_ref().map(|_| (count, vertices, Faces::Back));
+        let count = plan.triangles.len() as u32;
         let (chunk, pieces) = if clip { (CHUNK_CLIP, PIECES_MAX) } else { (CHUNK, 1) };
         // Every depth must be known before the first id is compared with it.
         for &write in writes {
-            for (id_base, vertex_base, faces) in [surface, hull].into_iter().flatten() {
+            for Pass { id_base, vertex_base, faces, role } in passes.into_iter().flatten() {
                 for first in (0..count).step_by(chunk as usize) {
                     let in_chunk = chunk.min(count - first);
                     let capacity = in_chunk * pieces;
@@ -213,14 +224,16 @@ impl Schedule {
                         capacity,
                         large_end: u32::MAX,
                         huge_end: u32::MAX,
+                        role: u32::from(role),
+                        layer,
                         ..Batch::default()
                     };
                     self.steps.push(Step::ClearWork);
-                    self.dispatch(device, Stage::Visibility { write }, in_chunk, batch);
+                    self.dispatch(device, Stage::Visibility { write, into }, in_chunk, batch);
                     if clip {
                         self.dispatch(device, Stage::Clip, in_chunk, batch);
                     }
-                    let stage = Stage::VisibilityTile { write };
+                    let stage = Stage::VisibilityTile { write, into };
                     self.steps.push(Step::Tiles { stage, batch: self.batches.len() - 1 });
                     if count > chunk {
                         self.steps.push(Step::Submit);
@@ -279,43 +292,8 @@ impl Schedule {
     }
 }
 
-/// Edges that a workgroup draws: all its threads draw the long ones together, each one's share of which is bounded.
-fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> u32 {
-    if !device.loops_are_limited {
-        return WORKGROUP;
-    }
-    let reach = f64::from(0.5 * lines.width_px + 0.5 * lines.smoothing_px + 1.0);
-    let side = f64::from(plan.width_px.max(plan.height_px));
-    // In every eighth row, every eighth column of what is in reach, and the samples of each pixel.
-    let pixels = (side + 2.0 * reach) / 8.0 * (2.0 * reach / 8.0 + 2.0) + side / 8.0;
-    let iterations = pixels * f64::from(plan.samples + 2);
-    (ITERATIONS_MAX as f64 / iterations).clamp(1.0, f64::from(WORKGROUP)) as u32
-}
-
 /// Bytes a pixel of the largest buffer that holds a band.
 fn pixel_bytes(plan: &DrawPlan<'_>) -> u64 {
-    (u64::from(plan.samples) * 8).max(16).max(4 * plan.lines.len() as u64)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rounds_cover_every_item_once() {
-        let tiles = Tiles { in_rounds: true, workgroups: 32, tile_iterations: 384, band_tiles: 200 };
-        let mut cases = 0;
-        for (large, huge) in [(0, 0), (1, 0), (0, 1), (351, 14), (352, 15), (353, 16), (100_000, 1000)] {
-            let mut next = [0, 0];
-            for round in tiles.rounds(large, huge) {
-                for (range, next) in round.iter().zip(&mut next) {
-                    assert!(range.is_empty() || range.start == *next);
-                    *next = range.end.max(*next);
-                }
-            }
-            assert_eq!(next, [large, huge]);
-            cases += 1;
-        }
-        assert_eq!(cases, 7);
-    }
+    let sample = if plan.layers().is_some() { LAYERED_BYTES } else { 8 };
+    (u64::from(plan.samples) * sample).max(16).max(4 * plan.lines.len() as u64)
 }

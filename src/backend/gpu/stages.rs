@@ -14,6 +14,8 @@ pub enum Stage {
     Visibility {
         /// How samples are written.
         write: Write,
+        /// Where to.
+        into: Into,
     },
     /// What is left of triangles behind the eye, to the same list.
     Clip,
@@ -21,7 +23,11 @@ pub enum Stage {
     VisibilityTile {
         /// As above.
         write: Write,
+        /// As above.
+        into: Into,
     },
+    /// A layer's samples to colours, under those of the layers before it.
+    Layers,
     /// Samples to colours.
     Shade,
     /// Edges to ink.
@@ -41,6 +47,15 @@ pub enum Write {
     Id,
 }
 
+/// What a visibility kernel's samples are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Into {
+    /// The visibility buffer.
+    Surface,
+    /// A layer.
+    Layer,
+}
+
 /// Buffers by their binding number in group 1 of every shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u32)]
@@ -52,7 +67,7 @@ pub enum Slot {
     Samples,
     Work,
     Normals,
-    NormalTriangles,
+    CornerTriangles,
     Attributes,
     Colors,
     Edges,
@@ -63,10 +78,19 @@ pub enum Slot {
     Materials,
     FaceNormals,
     LineColors,
+    Uvs,
+    VertexColors,
+    Texels,
+    Roles = 24,
+    HullLooks,
+    Layer,
+    Layered,
+    Rounds,
+    HullAmounts,
 }
 
 /// Number of [`Slot`]s.
-pub const SLOTS: usize = 18;
+pub const SLOTS: usize = 30;
 
 /// Whether a kernel writes to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,14 +153,21 @@ const TRIANGLE: &str = include_str!("../../../shaders/triangle.wgsl");
 const SAMPLES_32: &str = include_str!("../../../shaders/samples32.wgsl");
 const SAMPLES_64: &str = include_str!("../../../shaders/samples64.wgsl");
 const SAMPLES: &str = include_str!("../../../shaders/samples.wgsl");
+const LAYERED: &str = include_str!("../../../shaders/layered.wgsl");
+const EMIT: &str = include_str!("../../../shaders/emit.wgsl");
+const EMIT_LAYER: &str = include_str!("../../../shaders/emit_layer.wgsl");
+const GROUP: &str = include_str!("../../../shaders/group.wgsl");
 
-/// The shade stage: from where a point lies to its colour.
+/// What shade and layers have in common: from where a point lies to its colour.
 const SHADE: &[&str] = &[
     include_str!("../../../shaders/barycentric.wgsl"),
+    include_str!("../../../shaders/texture.wgsl"),
     include_str!("../../../shaders/light.wgsl"),
     include_str!("../../../shaders/wire.wgsl"),
+    include_str!("../../../shaders/debug.wgsl"),
     include_str!("../../../shaders/point.wgsl"),
-    include_str!("../../../shaders/shade.wgsl"),
+    GROUP,
+    LAYERED,
 ];
 
 impl Stage {
@@ -144,28 +175,78 @@ impl Stage {
     pub fn buffers(self) -> &'static [(Slot, Access)] {
         use Access::{Read, ReadWrite};
         match self {
-            Self::Transform => &[(Slot::Positions, Read), (Slot::HullNormals, Read), (Slot::Vertices, ReadWrite)],
-            Self::Visibility { .. } => {
-                &[(Slot::Triangles, Read), (Slot::Vertices, Read), (Slot::Samples, ReadWrite), (Slot::Work, ReadWrite)]
-            }
+            Self::Transform => &[
+                (Slot::Positions, Read),
+                (Slot::HullNormals, Read),
+                (Slot::HullAmounts, Read),
+                (Slot::Vertices, ReadWrite),
+            ],
+            Self::Visibility { into: Into::Surface, .. } => &[
+                (Slot::Triangles, Read),
+                (Slot::Roles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, ReadWrite),
+                (Slot::Work, ReadWrite),
+                (Slot::Rounds, Read),
+            ],
+            Self::Visibility { into: Into::Layer, .. } => &[
+                (Slot::Triangles, Read),
+                (Slot::Roles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, ReadWrite),
+                (Slot::Work, ReadWrite),
+                (Slot::Rounds, Read),
+                (Slot::Layer, Read),
+                (Slot::Layered, Read),
+            ],
             Self::Clip => &[
                 (Slot::Positions, Read),
                 (Slot::HullNormals, Read),
+                (Slot::HullAmounts, Read),
                 (Slot::Triangles, Read),
+                (Slot::Roles, Read),
                 (Slot::Vertices, Read),
                 (Slot::Work, ReadWrite),
+                (Slot::Rounds, Read),
             ],
-            Self::VisibilityTile { .. } => &[(Slot::Samples, ReadWrite), (Slot::Work, Read)],
+            Self::VisibilityTile { into: Into::Surface, .. } => &[(Slot::Samples, ReadWrite), (Slot::Work, Read)],
+            Self::VisibilityTile { into: Into::Layer, .. } => {
+                &[(Slot::Samples, ReadWrite), (Slot::Work, Read), (Slot::Layer, Read), (Slot::Layered, Read)]
+            }
+            Self::Layers => &[
+                (Slot::Positions, Read),
+                (Slot::Triangles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Normals, Read),
+                (Slot::CornerTriangles, Read),
+                (Slot::Attributes, Read),
+                (Slot::Materials, Read),
+                (Slot::FaceNormals, Read),
+                (Slot::Uvs, Read),
+                (Slot::VertexColors, Read),
+                (Slot::Texels, Read),
+                (Slot::Roles, Read),
+                (Slot::HullLooks, Read),
+                (Slot::Layer, Read),
+                (Slot::Layered, ReadWrite),
+                (Slot::Rounds, ReadWrite),
+            ],
             Self::Shade => &[
                 (Slot::Positions, Read),
                 (Slot::Triangles, Read),
                 (Slot::Vertices, Read),
                 (Slot::Samples, Read),
                 (Slot::Normals, Read),
-                (Slot::NormalTriangles, Read),
+                (Slot::CornerTriangles, Read),
                 (Slot::Attributes, Read),
                 (Slot::Materials, Read),
                 (Slot::FaceNormals, Read),
+                (Slot::Roles, Read),
+                (Slot::HullLooks, Read),
+                (Slot::Layered, Read),
+                (Slot::Uvs, Read),
+                (Slot::VertexColors, Read),
+                (Slot::Texels, Read),
                 (Slot::Colors, ReadWrite),
             ],
             Self::Lines => &[
@@ -187,12 +268,28 @@ impl Stage {
         }
     }
 
+    /// The buffer that is bound at a slot's number: a kernel that looks for a layer writes it where others write samples, and
+    /// reads these where others find layers.
+    pub fn bound_at(self, slot: Slot) -> Slot {
+        match (self, slot) {
+            (Self::Visibility { into: Into::Layer, .. } | Self::VisibilityTile { into: Into::Layer, .. }, slot) => {
+                match slot {
+                    Slot::Samples => Slot::Layer,
+                    Slot::Layer => Slot::Samples,
+                    slot => slot,
+                }
+            }
+            _ => slot,
+        }
+    }
+
     /// Name of the entry point, and of the file in shaders/.
     fn entry(self) -> &'static str {
         match self {
             Self::Transform => "transform",
             Self::Visibility { .. } => "visibility",
             Self::Clip => "clip",
+            Self::Layers => "layers",
             Self::VisibilityTile { .. } => "visibility_tile",
             Self::Shade => "shade",
             Self::Lines => "lines",
@@ -202,19 +299,28 @@ impl Stage {
 
     /// WGSL has no include: a kernel is its files, one after the other.
     fn source(self) -> String {
-        let emit = |write: Write| if write == Write::Both { SAMPLES_64 } else { SAMPLES_32 };
+        let keep_nearest = |write: Write| if write == Write::Both { SAMPLES_64 } else { SAMPLES_32 };
+        let emit = |into: Into| match into {
+            Into::Surface => EMIT.to_owned(),
+            Into::Layer => [LAYERED, EMIT_LAYER].concat(),
+        };
         match self {
             Self::Transform => [COMMON, include_str!("../../../shaders/transform.wgsl")].concat(),
-            Self::Visibility { write } => {
+            Self::Visibility { write, into } => {
                 let kernel = include_str!("../../../shaders/visibility.wgsl");
-                [COMMON, TRIANGLE, WORK, SAMPLES, emit(write), kernel].concat()
+                [COMMON, TRIANGLE, WORK, SAMPLES, keep_nearest(write), &emit(into), kernel].concat()
             }
             Self::Clip => [COMMON, TRIANGLE, WORK, PLANES, include_str!("../../../shaders/clip.wgsl")].concat(),
-            Self::VisibilityTile { write } => {
+            Self::VisibilityTile { write, into } => {
                 let kernel = include_str!("../../../shaders/visibility_tile.wgsl");
-                [COMMON, TRIANGLE, SAMPLES, emit(write), kernel].concat()
+                [COMMON, TRIANGLE, SAMPLES, keep_nearest(write), &emit(into), kernel].concat()
             }
-            Self::Shade => [&[COMMON, TRIANGLE], SHADE].concat().concat(),
+            Self::Layers => {
+                [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/layers.wgsl")]].concat().concat()
+            }
+            Self::Shade => {
+                [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/shade.wgsl")]].concat().concat()
+            }
             Self::Lines => [COMMON, TRIANGLE, PLANES, include_str!("../../../shaders/lines.wgsl")].concat(),
             Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
         }
@@ -222,11 +328,29 @@ impl Stage {
 
     /// The flags that the kernel reads; there is a pipeline for every combination that a plan asks for.
     fn looks(self) -> u32 {
-        const SHADED: u32 = look::SURFACE | look::FACE_NORMALS | look::VERTEX_NORMALS | look::WIRES;
+        const NORMALS: u32 = look::FACE_NORMALS | look::VERTEX_NORMALS | look::DERIVATIVE_NORMALS;
+        const WIRES: u32 = look::WIRES | look::WIRE_MINIMUM | look::WIRE_LIT | look::EDGE_MASKS;
+        const PAINT: u32 = look::VERTEX_COLORS | look::UVS | look::TEXTURES | look::DEBUG | look::VARYING;
+        const SHADED: u32 = look::SURFACE
+            | look::TRIANGLE_MATERIALS
+            | NORMALS
+            | WIRES
+            | PAINT
+            | look::CLIPPED
+            | look::FOUR_SAMPLES
+            | look::HULL_LOOKS
+            | look::WIRES_ONLY;
         match self {
-            Self::Transform | Self::Clip => look::HULL_PX,
-            Self::Visibility { .. } | Self::VisibilityTile { .. } => look::FOUR_SAMPLES,
-            Self::Shade => SHADED | look::TRIANGLE_MATERIALS | look::EDGE_MASKS | look::CLIPPED | look::FOUR_SAMPLES,
+            Self::Transform => look::HULL_PX | look::HULL_AMOUNTS,
+            Self::Clip => look::HULL_PX | look::HULL_AMOUNTS | look::ROLES | look::LAYERS,
+            Self::Visibility { into: Into::Surface, .. } => look::FOUR_SAMPLES | look::ROLES,
+            Self::Visibility { into: Into::Layer, .. } => {
+                look::FOUR_SAMPLES | look::ROLES | look::LAYERS | look::BEHIND_SURFACE
+            }
+            Self::VisibilityTile { into: Into::Surface, .. } => look::FOUR_SAMPLES,
+            Self::VisibilityTile { into: Into::Layer, .. } => look::FOUR_SAMPLES | look::BEHIND_SURFACE,
+            Self::Layers => SHADED | look::LAYERED_HULL,
+            Self::Shade => SHADED | look::LAYERS,
             Self::Lines => look::CLIPPED | look::FOUR_SAMPLES,
             Self::Resolve => look::SURFACE | look::HULL | look::LINES,
         }
@@ -236,10 +360,10 @@ impl Stage {
     fn constants(self, look: u32) -> Vec<(&'static str, f64)> {
         let look = ("LOOK", f64::from(look));
         match self {
-            Self::Visibility { write: Write::Depth } | Self::VisibilityTile { write: Write::Depth } => {
+            Self::Visibility { write: Write::Depth, .. } | Self::VisibilityTile { write: Write::Depth, .. } => {
                 vec![look, ("PHASE", 0.0)]
             }
-            Self::Visibility { write: Write::Id } | Self::VisibilityTile { write: Write::Id } => {
+            Self::Visibility { write: Write::Id, .. } | Self::VisibilityTile { write: Write::Id, .. } => {
                 vec![look, ("PHASE", 1.0)]
             }
             _ => vec![look],

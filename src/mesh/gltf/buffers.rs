@@ -89,14 +89,18 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// Decodes a `data:` URI. Anything else would be a file or a network address, and neither is ever opened.
+/// Decodes a `data:` URI, or takes the file of the bundle that the URI means. Nothing else is ever opened.
 fn from_uri(uri: &str, index: usize, cx: &mut Context<'_>) -> Result<Vec<u8>, MeshError> {
     let Some(data) = strip_prefix_ignore_case(uri, "data:") else {
+        if let Some(file) = cx.bundle.resolve(uri)? {
+            cx.budget.spend("a glTF buffer", file.bytes.len() as u64, 1)?;
+            return Ok(file.bytes.to_vec());
+        }
         let name: String = uri.chars().filter(|c| !c.is_control()).take(80).collect();
         return Err(MeshError::new(
             MeshFault::OutsideBundle,
             format!(
-                "buffer {index} of the glTF file is \"{name}\", which is not part of the upload: send a GLB, or embed it"
+                "buffer {index} of the glTF file is \"{name}\", which is not part of the upload: add it, send a GLB, or embed it"
             ),
         ));
     };

@@ -17,7 +17,9 @@ pub struct Summary {
     /// `v` lines.
     pub vertices: u64,
     /// `usemtl` names, in order of first use.
-    pub materials: Vec<String>,
+    pub materials: Vec<Vec<u8>>,
+    /// What `mtllib` lines say.
+    pub libraries: Vec<Vec<u8>>,
     /// What was left out.
     pub warnings: Vec<Warning>,
 }
@@ -38,8 +40,9 @@ pub struct Cleaner<'a, 'b> {
     colored: Option<bool>,
     /// The largest index of each kind and its line: tobj does not say which one was out of range.
     largest: [(u64, u64); 3],
-    materials: Vec<String>,
+    materials: Vec<Vec<u8>>,
     material_numbers: RapidHashMap<Vec<u8>, usize>,
+    libraries: Vec<Vec<u8>>,
     corners: Vec<Corner>,
     left_out: LeftOut,
 }
@@ -61,6 +64,7 @@ impl<'a, 'b> Cleaner<'a, 'b> {
             largest: [(0, 0); 3],
             materials: Vec::new(),
             material_numbers: RapidHashMap::default(),
+            libraries: Vec::new(),
             corners: Vec::new(),
             left_out: LeftOut::default(),
         }
@@ -79,7 +83,8 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         let detail = match error {
             None => {
                 let warnings = self.left_out.warnings();
-                return Ok(Summary { vertices: self.counts.v, materials: self.materials, warnings });
+                let Self { counts, materials, libraries, .. } = self;
+                return Ok(Summary { vertices: counts.v, materials, libraries, warnings });
             }
             Some(LoadError::PositionParseError) => here("a vertex needs three numbers"),
             Some(LoadError::NormalParseError) => here("a normal needs three numbers"),
@@ -133,7 +138,7 @@ impl<'a, 'b> Cleaner<'a, 'b> {
             b"l" => self.left_out.lines += 1,
             b"p" => self.left_out.points += 1,
             b"curv" | b"curv2" | b"surf" => self.left_out.curves += 1,
-            b"mtllib" => self.left_out.libraries += 1,
+            b"mtllib" => self.library(line.trim_ascii_start()[6..].trim_ascii()),
             b"usemtl" => self.material(line.trim_ascii_start()[6..].trim_ascii()),
             _ => {}
         }
@@ -242,7 +247,7 @@ impl<'a, 'b> Cleaner<'a, 'b> {
             None => {
                 let number = self.materials.len();
                 self.material_numbers.insert(name.to_vec(), number);
-                self.materials.push(String::from_utf8_lossy(name).into_owned());
+                self.materials.push(name.to_vec());
                 self.unpaid_bytes += 1024 + 4 * name.len() as u64;
                 self.out.extend_from_slice(format!("mtllib {number}\n").as_bytes());
                 number
@@ -250,6 +255,11 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         };
         self.unpaid_bytes += 1024;
         self.out.extend_from_slice(format!("usemtl {number}\n").as_bytes());
+    }
+
+    fn library(&mut self, name: &[u8]) {
+        self.unpaid_bytes += 128 + 2 * name.len() as u64;
+        self.libraries.push(name.to_vec());
     }
 
     fn broken(&self, what: &str) -> MeshError {

@@ -15,8 +15,6 @@ pub struct LeftOut {
     pub curves: u64,
     /// Vertices that differ from the first in having a colour or not.
     pub colors: u64,
-    /// `mtllib` lines.
-    pub libraries: u64,
 }
 
 impl LeftOut {
@@ -28,7 +26,6 @@ impl LeftOut {
             (self.short_faces, "short_faces_ignored", "faces with fewer than three corners are not drawn"),
             (self.curves, "curves_ignored", "free-form curves and surfaces are not drawn"),
             (self.colors, "colors_incomplete", "vertices differ from the first one in having a colour or not"),
-            (self.libraries, "mtl_ignored", "the material library is ignored, since it is not part of the upload"),
         ]
         .into_iter()
         .filter(|(count, _, _)| *count > 0)

@@ -1,10 +1,14 @@
 //! Wavefront OBJ, parsed by `tobj`. What `tobj` refuses, misreads or trusts is seen to line by line before it looks
-//! ([`clean`]), so that every error names its line and no count is trusted. Materials are names only: nothing opens an MTL.
+//! ([`clean`]), so that every error names its line and no count is trusted. MTL files are read by [`mtl`], not by `tobj`,
+//! which would panic on some; [`materials`] turns what they say into slots and images.
 
 mod clean;
 mod face;
 mod left_out;
 mod lines;
+mod map;
+mod materials;
+mod mtl;
 
 use self::clean::Cleaner;
 use super::import::Context;
@@ -41,13 +45,10 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
         });
     }
     linearise(&mut raw.colors);
+    let slots = materials::read(&summary.materials, &summary.libraries, &mut raw, cx)?;
     // Slot 0 is for faces before the first `usemtl`; without such faces it would only be confusing.
-    let uses_unnamed = raw.triangle_materials.contains(&0) || summary.materials.is_empty();
-    raw.materials = std::iter::once(String::new())
-        .chain(summary.materials)
-        .skip(usize::from(!uses_unnamed))
-        .map(|name| MaterialSlot { name, ..MaterialSlot::default() })
-        .collect();
+    let uses_unnamed = raw.triangle_materials.contains(&0) || slots.is_empty();
+    raw.materials = std::iter::once(MaterialSlot::default()).chain(slots).skip(usize::from(!uses_unnamed)).collect();
     if !uses_unnamed {
         raw.triangle_materials.iter_mut().for_each(|m| *m -= 1);
     }
@@ -73,7 +74,8 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh, triangulator: &mut Triangulator)
     let (before, after) = (base as usize, raw.positions.len());
     let normals = mesh.normals.chunks_exact(3).map(|n| [n[0] as f32, n[1] as f32, n[2] as f32]);
     extend_attribute(&mut raw.normals, before, after, [0.0; 3], normals);
-    let uvs = mesh.texcoords.chunks_exact(2).map(|t| [t[0] as f32, t[1] as f32]);
+    // In OBJ v runs up from the image's lower edge, in a RawMesh down from the upper one.
+    let uvs = mesh.texcoords.chunks_exact(2).map(|t| [t[0] as f32, (1.0 - t[1]) as f32]);
     extend_attribute(&mut raw.uvs, before, after, [0.0; 2], uvs);
     let colors = mesh.vertex_color.chunks_exact(3).map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0]);
     extend_attribute(&mut raw.colors, before, after, [1.0; 4], colors);
@@ -103,8 +105,11 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh, triangulator: &mut Triangulator)
 fn linearise(colors: &mut [[f32; 4]]) {
     let scale = if colors.iter().any(|c| c[..3].iter().any(|&v| v > 1.0 && v.is_finite())) { 255.0 } else { 1.0 };
     for component in colors.iter_mut().flat_map(|c| &mut c[..3]) {
-        let v = f64::from(*component) / scale;
-        let linear = if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) };
-        *component = linear as f32;
+        *component = srgb_to_linear(f64::from(*component) / scale) as f32;
     }
+}
+
+/// The sRGB transfer function (IEC 61966-2-1), continued beyond 1.
+fn srgb_to_linear(v: f64) -> f64 {
+    if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
 }

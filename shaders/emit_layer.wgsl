@@ -1,0 +1,20 @@
+// Where the visibility stage's samples go when it looks for a layer: into that, if they lie behind the layer before it.
+
+// The visibility buffer; `samples` is the layer.
+@group(1) @binding(26) var<storage, read> base: array<vec2<u32>>;
+@group(1) @binding(27) var<storage, read> layered: array<Layered>;
+
+fn emit(index: u32, z: f32, id: u32) {
+    let word = vec2(~id, bitcast<u32>(z));
+    if batch.layer > 0u && !is_below(word, layered[index].previous) {
+        return;
+    }
+    if !has(BEHIND_SURFACE) && !is_below(base[index], word) {
+        return;
+    }
+    keep_nearest(index, z, id);
+}
+
+fn is_below(a: vec2<u32>, b: vec2<u32>) -> bool {
+    return a.y < b.y || (a.y == b.y && a.x < b.x);
+}

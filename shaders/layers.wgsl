@@ -1,0 +1,94 @@
+// Stage 3b, a pixel: a layer's colours, under those of the layers before it. Twin of src/backend/cpu/layers.rs.
+
+// What was found, as in the visibility buffer.
+@group(1) @binding(26) var<storage, read> layer: array<vec2<u32>>;
+@group(1) @binding(27) var<storage, read_write> layered: array<Layered>;
+// By layer: whether there may be another behind it.
+@group(1) @binding(28) var<storage, read_write> rounds: array<atomic<u32>>;
+
+@compute @workgroup_size(64)
+fn layers(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = gid.x + gid.y * groups.x * 64u;
+    if i >= batch.count {
+        return;
+    }
+    if batch.layer > 0u && atomicLoad(&rounds[batch.layer - 1u]) == 0u {
+        return;
+    }
+    let pixel = vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width);
+    if batch.role == 0u {
+        // The layer is wanted for itself.
+        for (var s = 0u; s < u32(sample_count()); s++) {
+            _ = take(u32(sample_count()) * i + s);
+        }
+        proceed(u32(sample_count()) * i, u32(sample_count()));
+        return;
+    }
+    let show = Show(!has(WIRES_ONLY), select(frame.layer_fade, 1.0, batch.layer == 0u));
+    if sample_count() == 1 {
+        lay(i, group_color(lone_group(take(i)), pixel, show));
+        proceed(i, 1u);
+        return;
+    }
+    let ids = vec4(take(4u * i), take(4u * i + 1u), take(4u * i + 2u), take(4u * i + 3u));
+    var left = ids != vec4(NOTHING);
+    // Once for each triangle among the samples.
+    while any(left) {
+        let group = first_group(ids, left);
+        left = left & !group.same;
+        let color = group_color(group, pixel, show);
+        if group.same.x {
+            lay(4u * i, color);
+        }
+        if group.same.y {
+            lay(4u * i + 1u, color);
+        }
+        if group.same.z {
+            lay(4u * i + 2u, color);
+        }
+        if group.same.w {
+            lay(4u * i + 3u, color);
+        }
+    }
+    proceed(4u * i, 4u);
+}
+
+// Takes a sample's find as its last layer: its id, or NOTHING where there is none or where it adds nothing.
+fn take(sample: u32) -> u32 {
+    var so_far = Layered(vec4(0.0), vec2(0u), 0u, 0u);
+    if batch.layer > 0u {
+        so_far = layered[sample];
+    }
+    let word = layer[sample];
+    so_far.previous = word;
+    var id = select(~word.x, NOTHING, word.y == 0u);
+    if has(LAYERED_HULL) && id != NOTHING {
+        let is_hull = id >= frame.triangle_count;
+        let bit = 1u << (hull_material(id - select(0u, frame.triangle_count, is_hull)) & 31u);
+        if is_hull && (so_far.materials & bit) != 0u {
+            id = NOTHING;
+        }
+        so_far.materials |= bit;
+    }
+    layered[sample] = so_far;
+    return id;
+}
+
+// Lays a colour under a sample's others.
+fn lay(sample: u32, color: vec4<f32>) {
+    let so_far = layered[sample].color;
+    let sum = so_far + (1.0 - so_far.w) * color;
+    layered[sample].color = sum;
+    if sum.w >= 1.0 {
+        layered[sample].previous = vec2(0u);
+    }
+}
+
+// Says whether any of some samples may have another layer.
+fn proceed(first: u32, count: u32) {
+    for (var s = first; s < first + count; s++) {
+        if layered[s].previous.y != 0u && atomicLoad(&rounds[batch.layer]) == 0u {
+            atomicStore(&rounds[batch.layer], 1u);
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! Stage 3b, a sample: the layers over its surface, nearest first, and the surface under them. Twin of `shaders/layers.wgsl`.
+//!
+//! Depth peeling (Everitt 2001, "Interactive order-independent transparency"), for each sample by itself: a round finds the
+//! greatest word (depth, lowest id) below the last round's, all words above the visibility buffer's.
+
+use super::Stages;
+use super::bins::TriangleBin;
+use super::isa::dispatch;
+use super::peel::peel;
+use super::point::Show;
+use super::samples::{NOTHING, SampleBand};
+use super::shade::Shader;
+use crate::plan::{LayersPass, roles, sample_offsets};
+
+/// What a band's layers need beside its samples.
+pub struct LayerBand {
+    /// This round's layer; begins as a copy of what it must lie before.
+    pub found: SampleBand,
+    /// The last round's; depth 0 where a sample is done.
+    pub previous: SampleBand,
+    /// Premultiplied linear RGBA so far, laid out as the samples.
+    colors: Vec<[f32; 4]>,
+    /// Materials so far, a bit each, modulo 32.
+    materials: Vec<u32>,
+    /// Of each triangle of the band, in the order of its bins: whether it may be in a round to come.
+    pub pending: Vec<bool>,
+}
+
+impl LayerBand {
+    /// For bands like this one.
+    pub fn new(base: &SampleBand) -> Self {
+        // A picture's last band has fewer rows than it has room for.
+        let len = base.depth.len();
+        let like = || SampleBand { depth: vec![0.0; len], ids: vec![NOTHING; len], ..*base };
+        let (colors, materials) = (vec![[0.0; 4]; len], vec![0; len]);
+        Self { found: like(), previous: like(), colors, materials, pending: Vec::new() }
+    }
+
+    /// Forgets everything, and moves to where `base` is.
+    fn begin(&mut self, base: &SampleBand) {
+        for samples in [&mut self.found, &mut self.previous] {
+            (samples.first_row, samples.rows) = (base.first_row, base.rows);
+        }
+        self.previous.depth.fill(f32::INFINITY);
+        self.previous.ids.fill(0);
+        self.colors.fill([0.0; 4]);
+        self.materials.fill(0);
+        self.pending.clear();
+    }
+
+    /// Empties the round: what it finds must lie before `base`, if there is one.
+    fn begin_round(&mut self, base: Option<&SampleBand>) {
+        match base {
+            Some(base) => {
+                self.found.depth.copy_from_slice(&base.depth);
+                self.found.ids.copy_from_slice(&base.ids);
+            }
+            None => self.found.clear(),
+        }
+    }
+
+    /// Takes a sample's find as its last layer: its id, or None if the sample is done.
+    #[inline(always)]
+    fn take(&mut self, base: Option<&SampleBand>, at: usize) -> Option<u32> {
+        let (depth, id) = (self.found.depth[at], self.found.ids[at]);
+        let (base_depth, base_id) = base.map_or((0.0, NOTHING), |base| (base.depth[at], base.ids[at]));
+        if depth == base_depth && id == base_id {
+            self.previous.depth[at] = 0.0;
+            return None;
+        }
+        (self.previous.depth[at], self.previous.ids[at]) = (depth, id);
+        Some(id)
+    }
+
+    /// Lays a colour under what some samples of the pixel at `first` have so far.
+    #[inline(always)]
+    fn lay(&mut self, first: usize, same: [bool; 4], color: [f32; 4]) {
+        for s in (0..4).filter(|&s| same[s]) {
+            let so_far = &mut self.colors[first + s];
+            let rest = 1.0 - so_far[3];
+            for k in 0..4 {
+                so_far[k] += rest * color[k];
+            }
+            if so_far[3] >= 1.0 {
+                self.previous.depth[first + s] = 0.0;
+            }
+        }
+    }
+}
+
+/// Shades the band: its layers, and the surface under them.
+pub fn draw(
+    stages: &Stages<'_>,
+    pass: &LayersPass,
+    bins: (&[TriangleBin], usize),
+    base: &SampleBand,
+    layers: &mut LayerBand,
+    colors: &mut [[f32; 4]],
+) {
+    layers.begin(base);
+    let floor = (!pass.behind_surface).then_some(base);
+    for layer in 0..pass.count_max {
+        layers.begin_round(floor);
+        peel(stages.isa, stages, bins, layers);
+        let show = Show { fill: !pass.wires_only, wires: if layer == 0 { 1.0 } else { pass.fade } };
+        let mut is_open = false;
+        lay(stages.isa, stages, show, floor, layers, &mut is_open);
+        if !is_open || stages.deadline.check().is_err() {
+            break;
+        }
+    }
+    under(stages.isa, stages, base, layers, colors);
+}
+
+/// Leaves layer number `layer` in `found`, unshaded: id [`NOTHING`] where a sample has none.
+pub fn find(
+    stages: &Stages<'_>,
+    pass: &LayersPass,
+    bins: (&[TriangleBin], usize),
+    base: &SampleBand,
+    layers: &mut LayerBand,
+    layer: u32,
+) -> Vec<u64> {
+    layers.begin(base);
+    let floor = (!pass.behind_surface).then_some(base);
+    let mut words = vec![0; base.depth.len()];
+    for _ in 0..=layer {
+        layers.begin_round(floor);
+        peel(stages.isa, stages, bins, layers);
+        for (at, word) in words.iter_mut().enumerate() {
+            *word = if layers.take(floor, at).is_some() { layers.found.word(at) } else { 0 };
+        }
+    }
+    words
+}
+
+dispatch! {
+    /// Shades the layer that was found and lays it under those before it; says whether there may be another.
+    pub fn lay(
+        stages: &Stages<'_>,
+        show: Show,
+        floor: Option<&SampleBand>,
+        layers: &mut LayerBand,
+        is_open: &mut bool,
+    ) = lay_kernel
+}
+
+dispatch! {
+    /// Shades the surface, lays it under the layers, and averages each pixel's samples.
+    pub fn under(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colors: &mut [[f32; 4]]) = under_kernel
+}
+
+#[inline(always)]
+fn lay_kernel(stages: &Stages<'_>, show: Show, floor: Option<&SampleBand>, layers: &mut LayerBand, is_open: &mut bool) {
+    let hull = stages.plan.hull.as_ref().filter(|_| stages.plan.has_layered_hull());
+    let triangles = stages.plan.triangles.len() as u32;
+    let mut shader = Shader::new(stages);
+    for y in layers.found.first_row..layers.found.first_row + layers.found.rows {
+        for x in 0..layers.found.size_px[0] {
+            let first = layers.found.index(x, y, 0);
+            let mut ids = [NOTHING; 4];
+            let mut any = false;
+            for s in 0..layers.found.samples as usize {
+                let at = first + s;
+                let Some(id) = layers.take(floor, at) else { continue };
+                any = true;
+                let Some(hull) = hull else {
+                    ids[s] = id;
+                    continue;
+                };
+                let bit = 1 << (hull.material((id % triangles) as usize) % 32);
+                if id < triangles || layers.materials[at] & bit == 0 {
+                    ids[s] = id;
+                }
+                layers.materials[at] |= bit;
+            }
+            if !any {
+                continue;
+            }
+            groups(&mut shader, ids, [x, y], |_| show, |same, color| layers.lay(first, same, color));
+            for s in 0..layers.found.samples as usize {
+                *is_open |= layers.previous.depth[first + s] > 0.0;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colors: &mut [[f32; 4]]) {
+    let plan = stages.plan;
+    let wires_only = plan.layers().is_some_and(|pass| pass.wires_only);
+    let show = |id: u32| match wires_only && plan.role(id as usize) & roles::LAYER != 0 {
+        true => Show { fill: true, wires: 0.0 },
+        false => Show::ALL,
+    };
+    let mut shader = Shader::new(stages);
+    let share = 1.0 / base.samples as f32;
+    let mut colors = colors.iter_mut();
+    for y in base.first_row..base.first_row + base.rows {
+        for x in 0..base.size_px[0] {
+            let Some(out) = colors.next() else { return };
+            let first = base.index(x, y, 0);
+            let mut ids = [NOTHING; 4];
+            for s in 0..base.samples as usize {
+                ids[s] = base.ids[first + s];
+                let over = layers.colors[first + s];
+                for k in 0..4 {
+                    out[k] += share * over[k];
+                }
+            }
+            groups(&mut shader, ids, [x, y], show, |same, color| {
+                let rest = |s: usize| if same[s] { 1.0 - layers.colors[first + s][3] } else { 0.0 };
+                let weight = share * (0..base.samples as usize).map(rest).sum::<f32>();
+                for k in 0..4 {
+                    out[k] += weight * color[k];
+                }
+            });
+        }
+    }
+}
+
+/// Shades each triangle among a pixel's samples once, at the mean position of its samples, and calls `each` with which samples
+/// these are, and its colour.
+#[inline(always)]
+fn groups(
+    shader: &mut Shader<'_>,
+    ids: [u32; 4],
+    [x, y]: [u32; 2],
+    show: impl Fn(u32) -> Show,
+    mut each: impl FnMut([bool; 4], [f32; 4]),
+) {
+    let offsets = sample_offsets(shader.stages.plan.samples);
+    for s in 0..offsets.len() {
+        if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {
+            continue;
+        }
+        let (mut offset, mut count) = ([0, 0], 0);
+        for (id, at) in ids.iter().zip(offsets) {
+            if *id == ids[s] {
+                offset = [offset[0] + at[0], offset[1] + at[1]];
+                count += 1;
+            }
+        }
+        shader.points.show = show(ids[s]);
+        let color = shader.group(ids[s], x, y, offset, count);
+        each(ids.map(|id| id == ids[s]), color);
+    }
+}

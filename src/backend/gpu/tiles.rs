@@ -1,0 +1,92 @@
+//! How much a thread is given at a time: how often the kernel that draws large triangles is run, and how many edges one that
+//! draws lines takes.
+
+use super::schedule::{DeviceTraits, WORKGROUP};
+use crate::plan::{DrawPlan, LinePass};
+
+/// Sample tests that may be handed to the device without looking at how many it really is: a second or so of work.
+const BLIND_TESTS_MAX: u64 = 1 << 38;
+
+/// Loop iterations a thread of the tile kernel may run in a dispatch of known extent.
+///
+/// llvmpipe (Mesa 22) leaves all loops of a thread after 65,535 iterations, silently; and on real devices a dispatch
+/// should end in time for the deadline.
+const ITERATIONS_MAX: u64 = 40_000;
+
+/// How the tile kernel is run: at once over whatever is in the work list, or, where that might take too long, in rounds
+/// whose number follows from the list's length, which is read back first.
+#[derive(Clone, Copy, Debug)]
+pub struct Tiles {
+    /// Whether to run in rounds.
+    pub in_rounds: bool,
+    /// Workgroups a dispatch.
+    pub workgroups: u32,
+    tile_iterations: u64,
+    band_tiles: u64,
+}
+
+impl Tiles {
+    /// For the bands of a plan.
+    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, band_rows: u32) -> Self {
+        let pixels = u64::from(plan.width_px) * u64::from(plan.height_px);
+        let tests = (plan.triangles.len() as u64).saturating_mul(pixels * u64::from(plan.samples));
+        Self {
+            in_rounds: device.loops_are_limited || tests > BLIND_TESTS_MAX,
+            workgroups: device.tile_workgroups.min(device.workgroups_max),
+            // 64 blocks, in each the samples; and as much again for the way there.
+            tile_iterations: 64 * (u64::from(plan.samples) + 1) + 64,
+            band_tiles: u64::from(plan.width_px / 64 + 2) * u64::from(band_rows / 64 + 2),
+        }
+    }
+
+    /// The ranges of large and of huge items to draw in each round.
+    pub fn rounds(&self, large: u32, huge: u32) -> Vec<[std::ops::Range<u32>; 2]> {
+        // A large triangle is at most 128 pixels, three tiles, wide and high, and one workgroup's.
+        let large_step = (ITERATIONS_MAX / (9 * self.tile_iterations)).max(1) * u64::from(self.workgroups);
+        let huge_iterations = self.band_tiles.div_ceil(u64::from(self.workgroups)) * self.tile_iterations;
+        let huge_step = (ITERATIONS_MAX / huge_iterations).max(1);
+        let ranges = |count: u32, step: u64| {
+            (0..u64::from(count)).step_by(step as usize).map(move |i| i as u32..(i + step).min(u64::from(count)) as u32)
+        };
+        ranges(large, large_step)
+            .map(|range| [range, 0..0])
+            .chain(ranges(huge, huge_step).map(|range| [0..0, range]))
+            .collect()
+    }
+}
+
+/// Edges that a workgroup draws: all its threads draw the long ones together, each one's share of which is bounded.
+pub fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> u32 {
+    if !device.loops_are_limited {
+        return WORKGROUP;
+    }
+    let reach = f64::from(0.5 * lines.width_px + 0.5 * lines.smoothing_px + 1.0);
+    let side = f64::from(plan.width_px.max(plan.height_px));
+    // In every eighth row, every eighth column of what is in reach, and the samples of each pixel.
+    let pixels = (side + 2.0 * reach) / 8.0 * (2.0 * reach / 8.0 + 2.0) + side / 8.0;
+    let iterations = pixels * f64::from(plan.samples + 2);
+    (ITERATIONS_MAX as f64 / iterations).clamp(1.0, f64::from(WORKGROUP)) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_cover_every_item_once() {
+        let tiles = Tiles { in_rounds: true, workgroups: 32, tile_iterations: 384, band_tiles: 200 };
+        let mut cases = 0;
+        for (large, huge) in [(0, 0), (1, 0), (0, 1), (351, 14), (352, 15), (353, 16), (100_000, 1000)] {
+            let mut next = [0, 0];
+            for round in tiles.rounds(large, huge) {
+                for (range, next) in round.iter().zip(&mut next) {
+                    assert!(range.is_empty() || range.start == *next);
+                    *next = range.end.max(*next);
+                }
+            }
+            assert_eq!(next, [large, huge]);
+            cases += 1;
+        }
+        assert_eq!(cases, 7);
+    }
+}

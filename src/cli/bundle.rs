@@ -1,0 +1,71 @@
+//! The files named on the command line, as one bundle. Only what is named is read: a mesh brings no other file along.
+
+use std::path::{Component, Path, PathBuf};
+
+use bytes::Bytes;
+
+use super::complaint::Complaint;
+use super::files;
+use crate::limits::{self, Limits};
+use crate::mesh::{Bundle, BundleFile};
+
+/// How to speak of them.
+pub fn name(names: &[String]) -> &str {
+    names.first().map_or("", String::as_str)
+}
+
+/// Reads the files. Their paths in the bundle begin at the folder that all of them have in common, so that they find each
+/// other as they would on disk.
+pub fn read(names: &[String], entry: Option<String>, limits: &Limits) -> Result<Bundle, Complaint> {
+    if names.iter().filter(|name| *name == "-").count() > 1 {
+        return Err(Complaint::usage("`-`, standard input, can be given once"));
+    }
+    if let [single] = names {
+        let bytes = Bytes::from(files::read(single, limits.memory_bytes)?);
+        let file = BundleFile::new(&relative_to(&folder_of(single)?, single)?, bytes.clone());
+        // A name that no file of a bundle may have matters to nobody where there is one file.
+        let bundle = file.map_or_else(|_| Bundle::of_one(bytes), |file| Bundle::of_files(vec![file]));
+        return Ok(bundle.with_entry(entry));
+    }
+    let count = names.len() as u64;
+    limits::check("the number of files", count, limits.bundle_entries, "--limit-bundle-entries")
+        .map_err(|limit| Complaint::input(limit.to_string()))?;
+    let mut common = folder_of(name(names))?;
+    for name in names {
+        let folder = folder_of(name)?;
+        common = common.components().zip(folder.components()).take_while(|(a, b)| a == b).map(|(a, _)| a).collect();
+    }
+    let (mut all, mut left): (Vec<BundleFile>, _) = (Vec::new(), limits.memory_bytes);
+    for name in names {
+        let bytes = files::read(name, left)?;
+        left -= bytes.len() as u64;
+        let file = BundleFile::new(&relative_to(&common, name)?, bytes);
+        let file = file.map_err(|error| Complaint::input(format!("{name}: {error}")))?;
+        file.check_new(&all).map_err(|error| Complaint::usage(format!("{name}: {error}")))?;
+        all.push(file);
+    }
+    Ok(Bundle::of_files(all).with_entry(entry))
+}
+
+fn folder_of(name: &str) -> Result<PathBuf, Complaint> {
+    Ok(absolute(name)?.parent().map(Path::to_path_buf).unwrap_or_default())
+}
+
+/// From the root, without `.` and `..`; links are not followed. Standard input lies in the current folder.
+fn absolute(name: &str) -> Result<PathBuf, Complaint> {
+    let path = std::path::absolute(name).map_err(|error| Complaint::input(format!("{name}: {error}")))?;
+    let mut plain = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir => drop(plain.pop()),
+            other => plain.push(other),
+        }
+    }
+    Ok(plain)
+}
+
+fn relative_to(folder: &Path, name: &str) -> Result<String, Complaint> {
+    let path = absolute(name)?;
+    Ok(path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned())
+}

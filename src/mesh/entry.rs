@@ -1,0 +1,76 @@
+//! Which file of a bundle is the mesh.
+
+use super::bundle::{BundleFile, show, show_all};
+use super::{Folder, Format, MeshError, MeshFault, sniff};
+use crate::limits::Deadline;
+
+/// Finds the mesh among the files: the one that `entry` names, or the only one that is a mesh. `format` overrides sniffing.
+pub fn choose(
+    files: Vec<BundleFile>,
+    entry: Option<&str>,
+    format: Option<Format>,
+    deadline: &Deadline,
+) -> Result<(Folder, Format), MeshError> {
+    let folder = Folder::new(files.clone(), 0);
+    let number = match entry {
+        Some(name) => folder
+            .at("", name)
+            .ok()
+            .flatten()
+            .or_else(|| folder.of_base_name(name))
+            .ok_or_else(|| unknown(name, &files))?,
+        None if files.len() == 1 => 0,
+        None => only_mesh(&files, format, deadline)?,
+    };
+    let format = match format {
+        Some(format) => format,
+        None => sniff::sniff(&files[number].bytes)?,
+    };
+    Ok((folder.with_entry(number), format))
+}
+
+fn only_mesh(files: &[BundleFile], format: Option<Format>, deadline: &Deadline) -> Result<usize, MeshError> {
+    let mut meshes = Vec::new();
+    for (number, file) in files.iter().enumerate() {
+        deadline.check()?;
+        if is_mesh(file, format) {
+            meshes.push(number);
+        }
+    }
+    match meshes[..] {
+        [number] => Ok(number),
+        [] => Err(MeshError::new(MeshFault::Unrecognised, no_mesh(files))),
+        _ => {
+            let names = show_all(meshes.iter().map(|&number| files[number].path.as_str()));
+            let detail = format!("several files of the bundle are meshes: {names}; say which one to draw with `entry`");
+            Err(MeshError::new(MeshFault::EntryUnclear, detail))
+        }
+    }
+}
+
+/// Whether a file is a mesh beyond doubt: among other files, what only resembles an STL is more likely a texture.
+fn is_mesh(file: &BundleFile, format: Option<Format>) -> bool {
+    let by_name = Format::from_name(&file.extension());
+    let sniffed = sniff::sniff_among_others(&file.bytes, by_name == Some(Format::StlBinary));
+    match format {
+        Some(format) => [by_name, sniffed].into_iter().flatten().any(|found| found.name() == format.name()),
+        None => sniffed.is_some(),
+    }
+}
+
+fn no_mesh(files: &[BundleFile]) -> String {
+    if files.is_empty() {
+        return "the bundle has no files in it; send a mesh (OBJ, STL, glTF or GLB) and what belongs to it".into();
+    }
+    if files.iter().any(|file| file.path.to_ascii_lowercase().ends_with(".model")) {
+        return "the zip archive is a 3MF file, which is not read: convert it to OBJ, STL, glTF or GLB".into();
+    }
+    let names = show_all(files.iter().map(|file| file.path.as_str()));
+    format!("no file of the bundle is a mesh in a known format (OBJ, STL, glTF or GLB): there is {names}")
+}
+
+fn unknown(name: &str, files: &[BundleFile]) -> MeshError {
+    let names = show_all(files.iter().map(|file| file.path.as_str()));
+    let detail = format!("`entry` is \"{}\", and the bundle has no such file: there is {names}", show(name));
+    MeshError::new(MeshFault::EntryUnclear, detail)
+}

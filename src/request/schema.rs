@@ -1,0 +1,152 @@
+//! The request document as a JSON Schema (draft 2020-12), written from the table of keys.
+//!
+//! It says all that the reader checks but for what no schema can say: that `eye` and `target` differ, that the hulls of
+//! several materials share a unit, and what a material's key means together with keys of the document.
+
+use serde_json::{Map, Value as Json, json};
+
+use super::fields::{Field, Layer};
+use super::look::{MULTIPLE_MAX, OUTLINE_PX_MAX};
+use super::table::{FIELDS, GROUPS, LAYERS, MATERIALS, SHORT, STYLE_ABOUT};
+use super::value::{COORDINATE_MAX, Kind};
+use super::words::{Style, word_for, words_of};
+use super::{MATERIAL_NAME_CHARS_MAX, MATERIALS_MAX, Rules, STYLE_DEFAULT};
+
+/// The schema of documents that [`super::read`] understands under these rules.
+pub fn schema(rules: &Rules) -> Json {
+    let image_px = rules.limits.image_px;
+    let mut definitions = Map::new();
+    let mut properties = Map::new();
+    let style = json!({
+        "description": STYLE_ABOUT, "enum": words_of::<Style>(), "default": word_for(STYLE_DEFAULT),
+    });
+    properties.insert("style".into(), style);
+    for layer in LAYERS {
+        definitions.insert(layer.name.into(), object(layer.name, layer.about, &["object", "null"], image_px));
+        properties.insert(layer.name.into(), reference(layer.name));
+    }
+    for group in GROUPS {
+        properties.insert(group.name.into(), object(group.name, group.about, &["object"], image_px));
+    }
+    properties.insert(MATERIALS.name.into(), materials());
+    for field in FIELDS.iter().filter(|field| !field.key.contains('.')) {
+        properties.insert(field.key.into(), property(field, image_px));
+    }
+    for (short, long) in SHORT {
+        if let Some(field) = FIELDS.iter().find(|field| field.key == *long) {
+            let mut property = property(field, image_px);
+            property["description"] = format!("Short for {long}.").into();
+            properties.insert((*short).into(), property);
+        }
+    }
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "meshsnap request",
+        "description": "How to turn a mesh into an image. A layer that is present is drawn, null turns it off. A query's dotted \
+                        keys (wire.color) and the short names override the document.",
+        "type": "object",
+        "properties": properties,
+        "additionalProperties": false,
+        "$defs": definitions,
+    })
+}
+
+fn reference(name: &str) -> Json {
+    json!({ "$ref": format!("#/$defs/{name}") })
+}
+
+fn materials() -> Json {
+    let layers = LAYERS.iter().filter(|layer| Layer::is_for_materials(layer));
+    let layers: Map<String, Json> = layers.map(|layer| (layer.name.to_owned(), reference(layer.name))).collect();
+    json!({
+        "description": MATERIALS.about,
+        "type": "object",
+        "maxProperties": MATERIALS_MAX,
+        "propertyNames": { "maxLength": MATERIAL_NAME_CHARS_MAX },
+        "additionalProperties": { "type": "object", "properties": layers, "additionalProperties": false },
+    })
+}
+
+/// A layer or a group with its keys, and what those ask of each other.
+fn object(name: &str, about: &str, types: &[&str], image_px: u64) -> Json {
+    let of_it = |field: &&Field| field.key.split_once('.').is_some_and(|(home, _)| home == name);
+    let last = |field: &Field| field.key.rsplit('.').next().unwrap_or_default().to_owned();
+    let properties: Map<String, Json> =
+        FIELDS.iter().filter(of_it).map(|field| (last(field), property(field, image_px))).collect();
+    let mut schema = json!({
+        "description": about, "type": types, "properties": properties, "additionalProperties": false,
+    });
+    let given = |key: &str, is: Json| json!({ "properties": { key: is }, "required": [key] });
+    let rules = match name {
+        "wire" => {
+            let thin = json!({ "properties": { "thickness": { "maximum": MULTIPLE_MAX } } });
+            vec![json!({ "if": given("method", json!({ "not": { "const": "exact" } })), "then": thin })]
+        }
+        "outline" => {
+            let thin = json!({ "properties": { "thickness": { "maximum": OUTLINE_PX_MAX } } });
+            vec![json!({ "if": given("unit", json!({ "const": "px" })), "then": thin })]
+        }
+        "camera" => {
+            let point = |key| given(key, json!({ "type": "array" }));
+            let no_file = json!({ "properties": { "from_file": { "const": false } } });
+            vec![
+                json!({ "if": point("eye"), "then": { "allOf": [point("target"), no_file] } }),
+                json!({ "if": point("target"), "then": point("eye") }),
+            ]
+        }
+        _ => Vec::new(),
+    };
+    if !rules.is_empty() {
+        schema["allOf"] = rules.into();
+    }
+    schema
+}
+
+fn property(field: &Field, image_px: u64) -> Json {
+    let mut schema = of_kind(&field.kind, image_px);
+    if field.nullable {
+        if let Some(Json::Array(words)) = schema.get_mut("enum") {
+            words.push(Json::Null);
+        }
+        if let Some(of_type) = schema.get_mut("type") {
+            *of_type = json!([of_type.take(), "null"]);
+        }
+    }
+    schema["description"] = field.about.into();
+    if let Some(default) = &field.default {
+        schema["default"] = default.clone();
+    }
+    schema
+}
+
+fn of_kind(kind: &Kind, image_px: u64) -> Json {
+    let whole = || json!({ "type": "integer", "minimum": 1, "maximum": image_px });
+    let coordinates = || {
+        let coordinate = json!({ "type": "number", "minimum": -COORDINATE_MAX, "maximum": COORDINATE_MAX });
+        json!({ "type": "array", "items": coordinate, "minItems": 3, "maxItems": 3 })
+    };
+    match kind {
+        Kind::Number { min, max } => json!({ "type": "number", "minimum": min, "maximum": max }),
+        Kind::OneOf(values) => json!({ "enum": values }),
+        Kind::Pixels => whole(),
+        Kind::Size => {
+            let digits = image_px.to_string().len() - 1;
+            let side = format!("[1-9][0-9]{{0,{digits}}}");
+            json!({ "anyOf": [whole(), { "type": "string", "pattern": format!("^{side}([xX]{side})?$") }] })
+        }
+        Kind::Words(words) => json!({ "enum": words }),
+        Kind::Color => {
+            let hex = "[0-9a-fA-F]";
+            let pattern = format!("^(transparent|#?({hex}{{3,4}}|{hex}{{6}}|{hex}{{8}}))$");
+            json!({ "type": "string", "pattern": pattern })
+        }
+        Kind::Point => coordinates(),
+        Kind::Direction => {
+            let mut schema = coordinates();
+            // The type is said here too: `items` alone would be true of null.
+            schema["not"] = json!({ "type": "array", "items": { "const": 0 } });
+            schema
+        }
+        Kind::Flag => json!({ "type": "boolean" }),
+    }
+}
