@@ -3,6 +3,10 @@
 // Helpers outside of #[test] functions may give up as loudly as tests do.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod accuracy_behind_eye;
+mod accuracy_geometry;
+mod accuracy_shading;
+mod accuracy_wires;
 mod bundles;
 mod bundles_http;
 mod bundles_zip;
@@ -27,8 +31,14 @@ mod layers;
 mod layers_hull;
 mod likeness;
 mod line_looks;
+mod lines_scenes;
 mod mesh_files;
 mod models;
+mod mutations;
+#[path = "../oracle/mod.rs"]
+mod oracle;
+mod oracle_parts;
+mod oracle_scenes;
 mod raster;
 mod scenes;
 mod schema;
@@ -43,6 +53,7 @@ mod structure;
 mod texture_formulas;
 mod textures;
 mod textures_closeup;
+mod truth;
 mod twins;
 mod twins_shade;
 mod twins_visibility;
