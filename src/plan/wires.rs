@@ -289,3 +289,6 @@ fn is_of(class: Class, mesh: &Mesh, edge: &MeshEdge) -> bool {
 fn cos_deg(degrees: f64) -> f64 {
     libm::cos(degrees.to_radians())
 }
+
+#[cfg(test)]
+mod tests;
