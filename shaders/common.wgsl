@@ -96,6 +96,8 @@ const LINES: u32 = 256u;
 const CLIPPED: u32 = 2048u;
 const FOUR_SAMPLES: u32 = 4096u;
 const LIT_LINES: u32 = 8192u;
+// Whether any line pass is a contour.
+const CONTOURS: u32 = 16384u;
 const ROLES: u32 = 0x100000u;
 const HULL_AMOUNTS: u32 = 0x200000u;
 const HULL_LOOKS: u32 = 0x400000u;

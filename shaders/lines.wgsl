@@ -93,10 +93,10 @@ fn segment_of(edge: vec4<u32>) -> Segment {
 
 // Whether the pass draws the edge in this view: not on the far side of a closed surface; of a contour only the silhouette.
 fn is_drawn(edge: vec4<u32>) -> bool {
-    if (batch.line_flags & (SKIP_BACK | CONTOUR)) == 0u {
+    let is_contour = is_contour_pass();
+    if (batch.line_flags & SKIP_BACK) == 0u && !is_contour {
         return true;
     }
-    let is_contour = (batch.line_flags & CONTOUR) != 0u;
     if (batch.line_flags & SKIP_BACK) != 0u && is_hidden(edge.z, is_contour) && is_hidden(edge.w, is_contour) {
         return false;
     }
@@ -107,6 +107,10 @@ fn is_drawn(edge: vec4<u32>) -> bool {
     let a = side_of(edge, edge.z);
     let b = side_of(edge, edge.w);
     return (a < 0 || b < 0) != (a > 0 || b > 0);
+}
+
+fn is_contour_pass() -> bool {
+    return has(CONTOURS) && (batch.line_flags & CONTOUR) != 0u;
 }
 
 // Whether a face of a closed surface shows nothing of its edges. Of a contour, one seen from its very edge does not either.
@@ -356,7 +360,7 @@ fn hides(id: u32, edge: vec4<u32>, s: Segment, t: f32, depth: f32, sample_depth:
     let point = s.start + t * s.along;
     let plane = corner + 256.0 * gx * point.x + 256.0 * gy * point.y;
     // What the surface may fall away over three quarters of a pixel: the curvature between neighbouring faces.
-    let fall = select(0.0, max(sample_depth - plane, 0.0), (batch.line_flags & CONTOUR) != 0u);
+    let fall = select(0.0, max(sample_depth - plane, 0.0), is_contour_pass());
     return plane - fall > depth + 192.0 * (abs(gx) + abs(gy));
 }
 

@@ -14,6 +14,7 @@ pub const LINES: u32 = 256;
 pub const CLIPPED: u32 = 2048;
 pub const FOUR_SAMPLES: u32 = 4096;
 pub const LIT_LINES: u32 = 8192;
+pub const CONTOURS: u32 = 16384;
 pub const ROLES: u32 = 0x10_0000;
 pub const HULL_AMOUNTS: u32 = 0x20_0000;
 pub const HULL_LOOKS: u32 = 0x40_0000;
@@ -52,7 +53,9 @@ pub fn look(plan: &DrawPlan<'_>) -> u32 {
     if let Some(layers) = plan.layers() {
         look |= LAYERS | when(layers.behind_surface, BEHIND_SURFACE) | when(layers.wires_only, WIRES_ONLY);
     }
-    look | when(!plan.lines.is_empty(), LINES) | when(plan.lights_lines(), LIT_LINES)
+    look | when(!plan.lines.is_empty(), LINES)
+        | when(plan.lines.iter().any(|lines| lines.contour), CONTOURS)
+        | when(plan.lights_lines(), LIT_LINES)
 }
 
 /// What changes over a triangle.
@@ -91,6 +94,7 @@ mod tests {
             ("CLIPPED", CLIPPED),
             ("FOUR_SAMPLES", FOUR_SAMPLES),
             ("LIT_LINES", LIT_LINES),
+            ("CONTOURS", CONTOURS),
             ("ROLES", ROLES),
             ("HULL_AMOUNTS", HULL_AMOUNTS),
             ("HULL_LOOKS", HULL_LOOKS),

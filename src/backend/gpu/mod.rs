@@ -1,12 +1,13 @@
 //! The wgpu back-end: the CPU's stages as compute shaders, headless.
 //!
 //! In reading order: [`device`] opens a GPU; [`schedule`] decides what is dispatched for a plan; [`recorder`] turns that
-//! into commands; [`stages`] are the pipelines, [`params`] their numbers, [`buffers`] their memory.
+//! into commands; [`kernels`] says what each stage is made of, [`stages`] are their pipelines, [`params`] their numbers, [`buffers`] their memory.
 //!
 //! Architecture invariant: a job's use of the device stays on the thread that draws it, because wgpu's error scopes do.
 
 mod buffers;
 mod device;
+mod kernels;
 mod look;
 mod params;
 mod passes;

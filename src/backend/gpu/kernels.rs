@@ -1,0 +1,250 @@
+//! What each kernel is made of: its buffers, its source, and what of a plan it is specialised to.
+
+use super::look;
+use super::stages::{Access, Into, Slot, Stage, Write};
+
+const COMMON: &str = include_str!("../../../shaders/common.wgsl");
+const PLANES: &str = include_str!("../../../shaders/planes.wgsl");
+const WORK: &str = include_str!("../../../shaders/work.wgsl");
+const TRIANGLE: &str = include_str!("../../../shaders/triangle.wgsl");
+const SAMPLES_32: &str = include_str!("../../../shaders/samples32.wgsl");
+const SAMPLES_64: &str = include_str!("../../../shaders/samples64.wgsl");
+const SAMPLES: &str = include_str!("../../../shaders/samples.wgsl");
+const LAYERED: &str = include_str!("../../../shaders/layered.wgsl");
+const EMIT: &str = include_str!("../../../shaders/emit.wgsl");
+const EMIT_LAYER: &str = include_str!("../../../shaders/emit_layer.wgsl");
+const GROUP: &str = include_str!("../../../shaders/group.wgsl");
+
+/// What shade and layers have in common: from where a point lies to its colour.
+const SHADE: &[&str] = &[
+    include_str!("../../../shaders/barycentric.wgsl"),
+    include_str!("../../../shaders/texture.wgsl"),
+    include_str!("../../../shaders/light.wgsl"),
+    include_str!("../../../shaders/wire.wgsl"),
+    include_str!("../../../shaders/debug.wgsl"),
+    include_str!("../../../shaders/point.wgsl"),
+    GROUP,
+    LAYERED,
+];
+
+impl Stage {
+    /// The buffers of group 1 that the kernel declares.
+    pub fn buffers(self) -> &'static [(Slot, Access)] {
+        use Access::{Read, ReadWrite};
+        match self {
+            Self::Transform => &[
+                (Slot::Positions, Read),
+                (Slot::HullNormals, Read),
+                (Slot::HullAmounts, Read),
+                (Slot::Vertices, ReadWrite),
+            ],
+            Self::Visibility { into: Into::Surface, .. } => &[
+                (Slot::Triangles, Read),
+                (Slot::Roles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, ReadWrite),
+                (Slot::Work, ReadWrite),
+                (Slot::Rounds, Read),
+            ],
+            Self::Visibility { into: Into::Layer, .. } => &[
+                (Slot::Triangles, Read),
+                (Slot::Roles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, ReadWrite),
+                (Slot::Work, ReadWrite),
+                (Slot::Rounds, Read),
+                (Slot::Layer, Read),
+                (Slot::Layered, Read),
+            ],
+            Self::Clip => &[
+                (Slot::Positions, Read),
+                (Slot::HullNormals, Read),
+                (Slot::HullAmounts, Read),
+                (Slot::Triangles, Read),
+                (Slot::Roles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Work, ReadWrite),
+                (Slot::Rounds, Read),
+            ],
+            Self::VisibilityTile { into: Into::Surface, .. } => &[(Slot::Samples, ReadWrite), (Slot::Work, Read)],
+            Self::VisibilityTile { into: Into::Layer, .. } => {
+                &[(Slot::Samples, ReadWrite), (Slot::Work, Read), (Slot::Layer, Read), (Slot::Layered, Read)]
+            }
+            Self::Layers => &[
+                (Slot::Positions, Read),
+                (Slot::Triangles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Normals, Read),
+                (Slot::CornerTriangles, Read),
+                (Slot::Attributes, Read),
+                (Slot::Materials, Read),
+                (Slot::FaceNormals, Read),
+                (Slot::Uvs, Read),
+                (Slot::VertexColors, Read),
+                (Slot::Texels, Read),
+                (Slot::Roles, Read),
+                (Slot::HullLooks, Read),
+                (Slot::Layer, Read),
+                (Slot::Layered, ReadWrite),
+                (Slot::Rounds, ReadWrite),
+            ],
+            Self::Shade => &[
+                (Slot::Positions, Read),
+                (Slot::Triangles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, Read),
+                (Slot::Normals, Read),
+                (Slot::CornerTriangles, Read),
+                (Slot::Attributes, Read),
+                (Slot::Materials, Read),
+                (Slot::FaceNormals, Read),
+                (Slot::Roles, Read),
+                (Slot::HullLooks, Read),
+                (Slot::Layered, Read),
+                (Slot::Uvs, Read),
+                (Slot::VertexColors, Read),
+                (Slot::Texels, Read),
+                (Slot::Colors, ReadWrite),
+            ],
+            Self::Lines => &[
+                (Slot::Positions, Read),
+                (Slot::Triangles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, Read),
+                (Slot::Edges, Read),
+                (Slot::Ink, ReadWrite),
+                (Slot::InkTable, Read),
+            ],
+            Self::LineLight => &[
+                (Slot::Positions, Read),
+                (Slot::Triangles, Read),
+                (Slot::Vertices, Read),
+                (Slot::Samples, Read),
+                (Slot::Normals, Read),
+                (Slot::CornerTriangles, Read),
+                (Slot::Attributes, Read),
+                (Slot::Materials, Read),
+                (Slot::FaceNormals, Read),
+                (Slot::Uvs, Read),
+                (Slot::VertexColors, Read),
+                (Slot::Texels, Read),
+                (Slot::Colors, ReadWrite),
+                (Slot::Ink, Read),
+            ],
+            Self::Resolve => &[
+                (Slot::Colors, Read),
+                (Slot::Ink, Read),
+                (Slot::Thresholds, Read),
+                (Slot::Rgba, ReadWrite),
+                (Slot::LineColors, Read),
+            ],
+        }
+    }
+
+    /// The buffer that is bound at a slot's number: a kernel that looks for a layer writes it where others write samples, and
+    /// reads these where others find layers.
+    pub fn bound_at(self, slot: Slot) -> Slot {
+        match (self, slot) {
+            (Self::Visibility { into: Into::Layer, .. } | Self::VisibilityTile { into: Into::Layer, .. }, slot) => {
+                match slot {
+                    Slot::Samples => Slot::Layer,
+                    Slot::Layer => Slot::Samples,
+                    slot => slot,
+                }
+            }
+            _ => slot,
+        }
+    }
+
+    /// Name of the entry point, and of the file in shaders/.
+    pub fn entry(self) -> &'static str {
+        match self {
+            Self::Transform => "transform",
+            Self::Visibility { .. } => "visibility",
+            Self::Clip => "clip",
+            Self::Layers => "layers",
+            Self::VisibilityTile { .. } => "visibility_tile",
+            Self::Shade => "shade",
+            Self::Lines => "lines",
+            Self::LineLight => "line_light",
+            Self::Resolve => "resolve",
+        }
+    }
+
+    /// WGSL has no include: a kernel is its files, one after the other.
+    pub fn source(self) -> String {
+        let keep_nearest = |write: Write| if write == Write::Both { SAMPLES_64 } else { SAMPLES_32 };
+        let emit = |into: Into| match into {
+            Into::Surface => EMIT.to_owned(),
+            Into::Layer => [LAYERED, EMIT_LAYER].concat(),
+        };
+        match self {
+            Self::Transform => [COMMON, include_str!("../../../shaders/transform.wgsl")].concat(),
+            Self::Visibility { write, into } => {
+                let kernel = include_str!("../../../shaders/visibility.wgsl");
+                [COMMON, TRIANGLE, WORK, SAMPLES, keep_nearest(write), &emit(into), kernel].concat()
+            }
+            Self::Clip => [COMMON, TRIANGLE, WORK, PLANES, include_str!("../../../shaders/clip.wgsl")].concat(),
+            Self::VisibilityTile { write, into } => {
+                let kernel = include_str!("../../../shaders/visibility_tile.wgsl");
+                [COMMON, TRIANGLE, SAMPLES, keep_nearest(write), &emit(into), kernel].concat()
+            }
+            Self::Layers => {
+                [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/layers.wgsl")]].concat().concat()
+            }
+            Self::Shade => {
+                [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/shade.wgsl")]].concat().concat()
+            }
+            Self::LineLight => {
+                [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/line_light.wgsl")]].concat().concat()
+            }
+            Self::Lines => [COMMON, TRIANGLE, PLANES, include_str!("../../../shaders/lines.wgsl")].concat(),
+            Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
+        }
+    }
+
+    /// The flags that the kernel reads; there is a pipeline for every combination that a plan asks for.
+    pub fn looks(self) -> u32 {
+        const NORMALS: u32 = look::FACE_NORMALS | look::VERTEX_NORMALS | look::DERIVATIVE_NORMALS;
+        const WIRES: u32 = look::WIRES | look::WIRE_MINIMUM | look::WIRE_LIT | look::EDGE_MASKS;
+        const PAINT: u32 = look::VERTEX_COLORS | look::UVS | look::TEXTURES | look::DEBUG | look::VARYING;
+        const SHADED: u32 = look::SURFACE
+            | look::TRIANGLE_MATERIALS
+            | NORMALS
+            | WIRES
+            | PAINT
+            | look::CLIPPED
+            | look::FOUR_SAMPLES
+            | look::HULL_LOOKS
+            | look::WIRES_ONLY;
+        match self {
+            Self::Transform => look::HULL_PX | look::HULL_AMOUNTS,
+            Self::Clip => look::HULL_PX | look::HULL_AMOUNTS | look::ROLES | look::LAYERS,
+            Self::Visibility { into: Into::Surface, .. } => look::FOUR_SAMPLES | look::ROLES,
+            Self::Visibility { into: Into::Layer, .. } => {
+                look::FOUR_SAMPLES | look::ROLES | look::LAYERS | look::BEHIND_SURFACE
+            }
+            Self::VisibilityTile { into: Into::Surface, .. } => look::FOUR_SAMPLES,
+            Self::VisibilityTile { into: Into::Layer, .. } => look::FOUR_SAMPLES | look::BEHIND_SURFACE,
+            Self::Layers => SHADED | look::LAYERED_HULL,
+            Self::Shade => SHADED | look::LAYERS,
+            Self::LineLight => SHADED,
+            Self::Lines => look::CONTOURS | look::CLIPPED | look::FOUR_SAMPLES,
+            Self::Resolve => look::SURFACE | look::HULL | look::LINES | look::LIT_LINES,
+        }
+    }
+
+    /// Values of the kernel's `override` constants.
+    pub fn constants(self, look: u32) -> Vec<(&'static str, f64)> {
+        let look = ("LOOK", f64::from(look));
+        match self {
+            Self::Visibility { write: Write::Depth, .. } | Self::VisibilityTile { write: Write::Depth, .. } => {
+                vec![look, ("PHASE", 0.0)]
+            }
+            Self::Visibility { write: Write::Id, .. } | Self::VisibilityTile { write: Write::Id, .. } => {
+                vec![look, ("PHASE", 1.0)]
+            }
+            _ => vec![look],
+        }
+    }
+}
