@@ -85,7 +85,7 @@ pub fn render(
     let mesh = mesh::import(job.bundle, job.format_in, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
 
-    let plan = plan::build(&mesh, job.spec, &mut budget)?;
+    let plan = plan::build(&mesh, job.spec, &mut budget, deadline)?;
     ended(Stage::Plan);
 
     let drawn = backends.draw(job.spec.backend, &plan, deadline)?;

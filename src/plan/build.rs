@@ -9,7 +9,7 @@ use super::{
     CornerValues, DrawPlan, Faces, HullOffset, HullPass, LayersPass, PlanError, Projection, SurfacePass, flags, lights,
     materials, wires,
 };
-use crate::limits::{Budget, LimitExceeded};
+use crate::limits::{Budget, Deadline, LimitExceeded};
 use crate::mesh::{Mesh, normals};
 use crate::scene::camera::{Border, Camera};
 use crate::scene::{Cull, Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
@@ -21,9 +21,22 @@ const OUTLINE_PX: f32 = 3.0;
 /// side 2.
 const OUTLINE_OBJECT_SHARE: f32 = 0.015;
 
+/// What a plan may spend.
+pub struct Means<'m> {
+    /// Bytes.
+    pub budget: &'m mut Budget,
+    /// Time.
+    pub deadline: &'m Deadline,
+}
+
 /// Decides what is drawn.
-pub fn build<'a>(mesh: &'a Mesh, spec: &Spec, budget: &mut Budget) -> Result<DrawPlan<'a>, PlanError> {
-    build_keeping(mesh, spec, budget, &[])
+pub fn build<'a>(
+    mesh: &'a Mesh,
+    spec: &Spec,
+    budget: &mut Budget,
+    deadline: &Deadline,
+) -> Result<DrawPlan<'a>, PlanError> {
+    build_keeping(mesh, spec, budget, deadline, &[])
 }
 
 /// As [`build`], but nothing in `keep` is skipped, for tests: the picture is the same to the byte.
@@ -31,11 +44,13 @@ pub fn build_keeping<'a>(
     mesh: &'a Mesh,
     spec: &Spec,
     budget: &mut Budget,
+    deadline: &Deadline,
     keep: &[SkipKind],
 ) -> Result<DrawPlan<'a>, PlanError> {
+    let mut means = Means { budget, deadline };
     let size_px = [spec.image.width_px, spec.image.height_px];
     let parts = Parts::new(mesh, spec);
-    pay(mesh, size_px, &parts, budget)?;
+    pay(mesh, size_px, &parts, means.budget)?;
     if spec.camera.from_file && mesh.cameras.is_empty() {
         return Err(PlanError::NoCamera);
     }
@@ -47,8 +62,9 @@ pub fn build_keeping<'a>(
         outline.map_or(0.0, |outline| contour_px(mesh, &outline, &camera, size_px))
     };
     let mut edges = wires::Edges::default();
-    let lines = wires::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, budget)?;
-    let surface = surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, budget)?;
+    let lines =
+        wires::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, &mut means)?;
+    let surface = surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
     let welded = surface.as_ref().and_then(|s| s.vertex_normals.as_ref()).filter(|_| mesh.normals.is_empty());
     let no_hull = skips.skip(SkipKind::Hull, !parts.has_hull(), "the look has no hull");
     let hull = (!no_hull).then(|| hull_pass(mesh, &parts, welded.map(|n| n.values.clone())));
@@ -155,7 +171,7 @@ fn surface_pass<'a>(
     camera: &Camera,
     edges: &mut wires::Edges,
     skips: &mut Skips<'_>,
-    budget: &mut Budget,
+    means: &mut Means<'_>,
 ) -> Result<Option<SurfacePass<'a>>, PlanError> {
     let is_seen = parts.has_fill() || parts.has_barycentric_wire();
     let is_needless = !is_seen && !parts.needs_occluder();
@@ -166,11 +182,11 @@ fn surface_pass<'a>(
     }
     let is_shaded = !skips.skip(SkipKind::Shading, !is_seen, "the surface is not seen: it only hides lines");
     let edge_masks = if parts.has_barycentric_wire() || parts.shows_edge_distance() {
-        wires::edge_masks(mesh, parts, edges, budget)?
+        wires::edge_masks(mesh, parts, edges, means)?
     } else {
         Vec::new()
     };
-    let mut loader = TextureLoader::new(mesh, budget);
+    let mut loader = TextureLoader::new(mesh, means);
     let mut looks = Vec::with_capacity(mesh.materials.len());
     for (index, (slot, layers)) in mesh.materials.iter().zip(&parts.layers).enumerate() {
         loader.for_material(index);

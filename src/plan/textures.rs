@@ -6,11 +6,12 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
+use super::build::Means;
 use super::skips::{SkipKind, Skips};
 use super::texture_closeup::{self, Use};
 use super::texture_decode::{self, Header};
 use super::{PlanError, Projection, Texture, TextureUse, Textures, texture_levels};
-use crate::limits::Budget;
+use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
 use crate::mesh::material::{ImageContent, TextureRef, Wrap};
 
@@ -21,6 +22,7 @@ pub const TEXELS_MAX: u64 = (96 << 20) / 8;
 pub struct TextureLoader<'a> {
     mesh: &'a Mesh,
     budget: &'a mut Budget,
+    deadline: &'a Deadline,
     material: u32,
     wanted: Vec<Wanted>,
     known: BTreeMap<(u32, bool), usize>,
@@ -36,8 +38,16 @@ struct Wanted {
 
 impl<'a> TextureLoader<'a> {
     /// Nothing so far.
-    pub fn new(mesh: &'a Mesh, budget: &'a mut Budget) -> Self {
-        Self { mesh, budget, material: 0, wanted: Vec::new(), known: BTreeMap::new(), uses: Vec::new() }
+    pub fn new(mesh: &'a Mesh, means: &'a mut Means<'_>) -> Self {
+        Self {
+            mesh,
+            budget: means.budget,
+            deadline: means.deadline,
+            material: 0,
+            wanted: Vec::new(),
+            known: BTreeMap::new(),
+            uses: Vec::new(),
+        }
     }
 
     /// Says whose textures are loaded next.
@@ -79,7 +89,7 @@ impl<'a> TextureLoader<'a> {
         if self.wanted.is_empty() {
             return Ok(Textures::default());
         }
-        let Self { mesh, budget, wanted, uses, .. } = self;
+        let Self { mesh, budget, deadline, wanted, uses, .. } = self;
         let sizes: Vec<[u32; 2]> = wanted.iter().map(|w| [w.header.width, w.header.height]).collect();
         let mut finest = texture_closeup::finest_levels(mesh, projection, &uses, wanted.len());
         for (level, size) in finest.iter_mut().zip(&sizes) {
@@ -100,6 +110,7 @@ impl<'a> TextureLoader<'a> {
             let bytes = decoding_bytes.saturating_add(texture_levels::working_bytes(width, height));
             budget.spend("decoding textures", bytes.saturating_sub(most), 1)?;
             most = most.max(bytes);
+            deadline.check()?;
             let image = &mesh.images[want.image as usize];
             let ImageContent::Encoded(encoded) = &image.content else { continue };
             let pixels = texture_decode::decode(&image.name, encoded, &want.header)?;

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
+use super::build::Means;
 use super::parts::{FADE, Fill, Parts};
 use super::silhouette::Silhouettes;
 use super::skips::{SkipKind, Skips};
-use super::{Edge, LinePass, Shown};
-use crate::limits::{Budget, LimitExceeded};
+use super::{Edge, LinePass, PlanError, Shown};
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge, NO_FACE};
 use crate::mesh::topology::is_outward;
@@ -47,10 +47,13 @@ enum Class {
 pub struct Edges(Option<EdgeList>);
 
 impl Edges {
-    fn of(&mut self, mesh: &Mesh, budget: &mut Budget) -> Result<&EdgeList, LimitExceeded> {
+    fn of(&mut self, mesh: &Mesh, means: &mut Means<'_>) -> Result<&EdgeList, PlanError> {
         let list = match self.0.take() {
             Some(list) => list,
-            None => EdgeList::of(mesh, budget)?,
+            None => {
+                means.deadline.check()?;
+                EdgeList::of(mesh, means.budget)?
+            }
         };
         Ok(self.0.insert(list))
     }
@@ -65,8 +68,8 @@ pub fn passes(
     (contour_px, is_outside): (impl Fn(usize) -> f32, bool),
     edges: &mut Edges,
     skips: &mut Skips<'_>,
-    budget: &mut Budget,
-) -> Result<Vec<LinePass>, LimitExceeded> {
+    means: &mut Means<'_>,
+) -> Result<Vec<LinePass>, PlanError> {
     let mut wants = wire_wants(parts);
     wants.extend(spec.topology.iter().flat_map(topology_wants));
     wants.extend(contour_wants(parts, contour_px));
@@ -74,7 +77,7 @@ pub fn passes(
     if skips.skip(SkipKind::Adjacency, wants.is_empty(), "no line asks which triangles are neighbours") {
         return Ok(Vec::new());
     }
-    let list = edges.of(mesh, budget)?;
+    let list = edges.of(mesh, means)?;
     let hides = parts.has_fill() || parts.needs_occluder();
     let skip_back =
         hides && is_outside && wants.iter().any(|w| w.hidden == Hidden::Hide) && is_solid(mesh, parts, list);
@@ -87,7 +90,8 @@ pub fn passes(
                 if want.contour { silhouettes.edge(i, all) } else { Some(all) }
             });
         let edges: Arc<[Edge]> = drawn.collect();
-        budget.spend("drawn edges", edges.len() as u64, 16)?;
+        means.deadline.check()?;
+        means.budget.spend("drawn edges", edges.len() as u64, 16)?;
         if !edges.is_empty() {
             passes.extend(want.passes(&edges, hides, skip_back));
         }
@@ -114,15 +118,15 @@ pub fn edge_masks(
     mesh: &Mesh,
     parts: &Parts<'_>,
     edges: &mut Edges,
-    budget: &mut Budget,
-) -> Result<Vec<u8>, LimitExceeded> {
+    means: &mut Means<'_>,
+) -> Result<Vec<u8>, PlanError> {
     let classes: Vec<Class> =
         parts.layers.iter().map(|layers| layers.wire.as_ref().map_or(Class::All, class_of)).collect();
     let is_polygonal = mesh.edge_masks.iter().any(|&mask| mask != 0b111);
     if classes.iter().all(|class| *class == Class::All || (*class == Class::Polygon && !is_polygonal)) {
         return Ok(Vec::new());
     }
-    budget.spend("edge masks", mesh.triangles.len() as u64, 1)?;
+    means.budget.spend("edge masks", mesh.triangles.len() as u64, 1)?;
     let class_at = |t: usize| classes.get(mesh.triangle_materials[t] as usize).copied().unwrap_or(Class::All);
     let mut masks: Vec<u8> = (0..mesh.triangles.len())
         .map(|t| match class_at(t) {
@@ -133,7 +137,7 @@ pub fn edge_masks(
         .collect();
     let asks = |class: &Class| !matches!(class, Class::All | Class::Polygon);
     if classes.iter().any(asks) {
-        mark(mesh, edges.of(mesh, budget)?, &mut masks, class_at);
+        mark(mesh, edges.of(mesh, means)?, &mut masks, class_at);
     }
     Ok(masks)
 }

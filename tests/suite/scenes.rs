@@ -181,7 +181,7 @@ pub fn spec(keys: &[(&str, &str)]) -> Spec {
 
 /// Plans with default limits.
 pub fn plan<'a>(mesh: &'a Mesh, spec: &Spec) -> DrawPlan<'a> {
-    plan::build(mesh, spec, &mut Budget::new(&Limits::default())).unwrap()
+    plan::build(mesh, spec, &mut Budget::new(&Limits::default()), &Deadline::default()).unwrap()
 }
 
 /// A plan made by hand: positions are pixels from the picture's centre over `scale`, y down, and a depth; unlit white on black.

@@ -46,5 +46,5 @@ fn turning_a_skip_off_changes_no_byte() {
 }
 
 fn keeping<'a>(mesh: &'a Mesh, spec: &Spec, keep: &[SkipKind]) -> DrawPlan<'a> {
-    plan::build_keeping(mesh, spec, &mut Budget::new(&Limits::default()), keep).unwrap()
+    plan::build_keeping(mesh, spec, &mut Budget::new(&Limits::default()), &Deadline::default(), keep).unwrap()
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use crate::mesh_files::{Gltf, Noise, read};
 use crate::scenes;
 use image::{DynamicImage, ImageFormat};
-use meshsnap::limits::{Budget, Limits};
+use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use meshsnap::plan::{self, DrawPlan, PlanError, SkipKind, TEXTURE_NONE, Texture, Textures, slots};
 use serde_json::{Value, json};
@@ -44,7 +44,13 @@ pub fn encode(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
 }
 
 fn plan_of<'a>(mesh: &'a Mesh, keep: &[SkipKind], limits: &Limits) -> Result<DrawPlan<'a>, PlanError> {
-    plan::build_keeping(mesh, &scenes::spec(&[("style", "smooth"), ("size", "64")]), &mut Budget::new(limits), keep)
+    plan::build_keeping(
+        mesh,
+        &scenes::spec(&[("style", "smooth"), ("size", "64")]),
+        &mut Budget::new(limits),
+        &Deadline::default(),
+        keep,
+    )
 }
 
 /// All levels of the textures.

@@ -1,6 +1,7 @@
 //! Classes of edges.
 
 use super::*;
+use crate::limits::Budget;
 use crate::limits::{Deadline, Limits};
 
 /// How many edges are feature, crease (both at 30 degrees), boundary and non-manifold.
