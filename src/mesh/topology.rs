@@ -42,16 +42,12 @@ impl Topology {
 
 /// Whether every component of a closed mesh has its faces' fronts outside: none encloses a negative volume.
 pub fn is_outward(mesh: &Mesh) -> bool {
-    let parent = union(mesh).0;
+    let roots = union(mesh).0;
     let mut volumes = vec![0.0_f64; mesh.positions.len()];
     for t in &mesh.triangles {
         let [a, b, c] = t.map(|v| mesh.positions[v as usize].map(f64::from));
         let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
-        let mut root = t[0];
-        while parent[root as usize] != root {
-            root = parent[root as usize];
-        }
-        volumes[root as usize] += (a[0] * cross[0] + a[1] * cross[1]) + a[2] * cross[2];
+        volumes[roots[t[0] as usize] as usize] += (a[0] * cross[0] + a[1] * cross[1]) + a[2] * cross[2];
     }
     volumes.iter().all(|&volume| volume >= 0.0)
 }
@@ -60,7 +56,8 @@ fn components(mesh: &Mesh) -> u64 {
     union(mesh).1
 }
 
-/// Connected components by union-find with path halving: each vertex's parent, and how many there are.
+/// Connected components by union-find with path halving: each vertex's component, by its lowest vertex, and how many there
+/// are.
 fn union(mesh: &Mesh) -> (Vec<u32>, u64) {
     let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
     let find = |mut v: u32, parent: &mut Vec<u32>| {
@@ -80,6 +77,10 @@ fn union(mesh: &Mesh) -> (Vec<u32>, u64) {
                 count -= 1;
             }
         }
+    }
+    // No parent has a higher number than its child, so that one pass upwards leads every vertex to its root.
+    for v in 0..parent.len() {
+        parent[v] = parent[parent[v] as usize];
     }
     (parent, count)
 }

@@ -49,6 +49,7 @@ pub fn build_keeping<'a>(
 ) -> Result<DrawPlan<'a>, PlanError> {
     let mut means = Means { budget, deadline };
     let size_px = [spec.image.width_px, spec.image.height_px];
+    means.budget.spend("materials", mesh.materials.len() as u64, 272)?;
     let parts = Parts::new(mesh, spec);
     pay(mesh, size_px, &parts, means.budget)?;
     if spec.camera.from_file && mesh.cameras.is_empty() {
@@ -57,10 +58,7 @@ pub fn build_keeping<'a>(
 
     let mut skips = Skips::new(keep);
     let camera = Camera::place(&spec.camera, mesh, size_px, border(mesh, &parts, spec));
-    let contour_px = |material: usize| {
-        let outline = parts.layers[material].outline;
-        outline.map_or(0.0, |outline| contour_px(mesh, &outline, &camera, size_px))
-    };
+    let contour_px = |outline: &Outline| contour_px(mesh, outline, &camera, size_px);
     let mut edges = wires::Edges::default();
     let lines =
         wires::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, &mut means)?;
@@ -103,8 +101,7 @@ fn pay(mesh: &Mesh, size_px: [u32; 2], parts: &Parts<'_>, budget: &mut Budget) -
         // What layers need a sample is bounded: they are drawn band by band.
         budget.spend("lists of layers", mesh.triangles.len() as u64, 32)?;
     }
-    budget.spend("materials", mesh.materials.len() as u64, 256)?;
-    let is_smooth = parts.layers.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::scene::Shading::Smooth));
+    let is_smooth = parts.looks.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::scene::Shading::Smooth));
     if parts.has_hull() || (is_smooth && mesh.normals.is_empty()) {
         // Sums in f64, then the unit normals in f32; and how far each moves.
         budget.spend("vertex normals", mesh.positions.len() as u64, 40)?;
@@ -123,7 +120,7 @@ fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection {
 /// What the widest outline and the widest line ask for.
 fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
     let mut border = Border::default();
-    for layers in &parts.layers {
+    for layers in &parts.looks {
         if let Some(outline) = &layers.outline {
             // Half of a contour lies on the surface itself.
             let share = if outline.method == OutlineMethod::Contour { 0.5 } else { 1.0 };

@@ -2,10 +2,12 @@
 
 use std::borrow::Cow;
 
+use rapidhash::RapidHashMap;
+
 use super::{LayersPass, roles};
 use crate::mesh::Mesh;
 use crate::mesh::material::AlphaMode;
-use crate::scene::{Cull, DebugView, Hidden, Layers, OutlineMethod, Spec, WireMethod};
+use crate::scene::{Cull, DebugView, Hidden, Layers, OutlineMethod, Spec, Wire, WireMethod};
 
 /// Layers that are peeled off before what is left counts as unseen.
 const LAYERS_MAX: u32 = 16;
@@ -17,7 +19,13 @@ pub const FADE: f32 = 0.25;
 pub struct Parts<'a> {
     /// What is drawn of each.
     pub layers: Vec<&'a Layers>,
+    /// Index of each part's layers in `looks`.
+    pub look_of: Vec<u32>,
+    /// The layers that any part has, each once for every way that the request names it.
+    pub looks: Vec<&'a Layers>,
     fills: Vec<Fill>,
+    has_fill: bool,
+    needs_occluder: bool,
 }
 
 /// How a part's surface is filled.
@@ -34,11 +42,25 @@ pub enum Fill {
 impl<'a> Parts<'a> {
     /// Finds each material's look by its name.
     pub fn new(mesh: &Mesh, spec: &'a Spec) -> Self {
-        let named = |name: &str| spec.materials.iter().rev().find(|(n, _)| n == name).map(|(_, layers)| layers);
-        let layers: Vec<&Layers> =
-            mesh.materials.iter().map(|slot| named(&slot.name).unwrap_or(&spec.layers)).collect();
-        let fills = layers.iter().zip(&mesh.materials).map(|(layers, slot)| fill(layers, slot)).collect();
-        Self { layers, fills }
+        let named: RapidHashMap<&str, u32> = spec.materials.iter().map(|(name, _)| name.as_str()).zip(1..).collect();
+        let all: Vec<&Layers> =
+            std::iter::once(&spec.layers).chain(spec.materials.iter().map(|(_, layers)| layers)).collect();
+        // In the order in which materials first need them.
+        let (mut looks, mut place) = (Vec::new(), vec![u32::MAX; all.len()]);
+        let mut look_of = Vec::with_capacity(mesh.materials.len());
+        for slot in &mesh.materials {
+            let asked = named.get(slot.name.as_str()).map_or(0, |&at| at as usize);
+            if place[asked] == u32::MAX {
+                place[asked] = looks.len() as u32;
+                looks.push(all[asked]);
+            }
+            look_of.push(place[asked]);
+        }
+        let layers: Vec<&Layers> = look_of.iter().map(|&look| looks[look as usize]).collect();
+        let fills: Vec<Fill> = layers.iter().zip(&mesh.materials).map(|(layers, slot)| fill(layers, slot)).collect();
+        let has_fill = fills.iter().any(|fill| *fill != Fill::None);
+        let needs_occluder = !has_fill && looks.iter().any(|layers| hides_lines(layers));
+        Self { layers, look_of, looks, fills, has_fill, needs_occluder }
     }
 
     /// How a part is filled.
@@ -48,30 +70,27 @@ impl<'a> Parts<'a> {
 
     /// Whether any part is.
     pub fn has_fill(&self) -> bool {
-        self.fills.iter().any(|fill| *fill != Fill::None)
+        self.has_fill
     }
 
     /// Whether any part has an inverted hull.
     pub fn has_hull(&self) -> bool {
-        self.layers.iter().any(|layers| has_hull(layers))
+        self.looks.iter().any(|layers| has_hull(layers))
     }
 
     /// Whether any part has a wire that is drawn with the surface.
     pub fn has_barycentric_wire(&self) -> bool {
-        self.layers.iter().any(|layers| barycentric_wire(layers).is_some())
+        self.looks.iter().any(|layers| barycentric_wire(layers).is_some())
     }
 
     /// Whether any part shows how far its edges are.
     pub fn shows_edge_distance(&self) -> bool {
-        self.layers.iter().any(|layers| layers.surface.is_some_and(|s| s.debug == DebugView::EdgeDistance))
+        self.looks.iter().any(|layers| layers.surface.is_some_and(|s| s.debug == DebugView::EdgeDistance))
     }
 
     /// Whether a surface that nobody sees is needed to hide lines.
     pub fn needs_occluder(&self) -> bool {
-        let hides =
-            |layers: &&Layers| layers.wire.is_some_and(|w| w.method == WireMethod::Exact && w.hidden != Hidden::Show);
-        let contour = |layers: &&Layers| layers.outline.is_some_and(|o| o.method == OutlineMethod::Contour);
-        !self.has_fill() && (self.layers.iter().any(hides) || self.layers.iter().any(contour))
+        self.needs_occluder
     }
 
     /// The layers, if any part needs them.
@@ -124,7 +143,7 @@ impl<'a> Parts<'a> {
 
     /// Which side all parts hide; where they differ, none, and each part's role says.
     pub fn common_cull(&self) -> Cull {
-        let mut all = self.layers.iter().map(|layers| layers.surface.map_or(Cull::None, |s| s.cull));
+        let mut all = self.looks.iter().map(|layers| layers.surface.map_or(Cull::None, |s| s.cull));
         let first = all.next().unwrap_or(Cull::None);
         if all.all(|cull| cull == first) { first } else { Cull::None }
     }
@@ -148,6 +167,12 @@ impl<'a> Parts<'a> {
 /// Whether hidden edges of a part's barycentric wire are shown, if it has one.
 fn barycentric_wire(layers: &Layers) -> Option<Hidden> {
     layers.wire.filter(|wire| wire.method != WireMethod::Exact).map(|wire| wire.hidden)
+}
+
+/// Whether a look has lines of exact width that a surface would hide.
+fn hides_lines(layers: &Layers) -> bool {
+    let hides = |wire: Wire| wire.method == WireMethod::Exact && wire.hidden != Hidden::Show;
+    layers.wire.is_some_and(hides) || layers.outline.is_some_and(|o| o.method == OutlineMethod::Contour)
 }
 
 fn has_hull(layers: &Layers) -> bool {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Edge;
 use super::parts::{Fill, Parts};
+use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
 
@@ -18,7 +19,10 @@ pub struct Silhouettes<'a> {
 
 impl<'a> Silhouettes<'a> {
     /// Those of a mesh.
-    pub fn new(mesh: &'a Mesh, parts: &Parts<'_>, list: &EdgeList) -> Self {
+    pub fn new(mesh: &'a Mesh, parts: &Parts<'_>, list: &EdgeList, budget: &mut Budget) -> Result<Self, LimitExceeded> {
+        // A list for each edge, and a place in the map.
+        budget.spend("edges of many faces", list.further_faces.len() as u64, 100)?;
+        budget.spend("materials", parts.layers.len() as u64, 1)?;
         let has_fill = parts.has_fill();
         let absent = (0..parts.layers.len()).map(|m| has_fill && parts.fill(m) == Fill::None).collect();
         let mut crowded: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
@@ -26,7 +30,7 @@ impl<'a> Silhouettes<'a> {
             let first_two = list.edges[edge as usize].faces;
             crowded.entry(edge).or_insert_with(|| first_two.to_vec()).push(face);
         }
-        Self { mesh, absent, crowded }
+        Ok(Self { mesh, absent, crowded })
     }
 
     /// The edge numbered `index` with the faces that decide whether it is a silhouette; None where no view makes it one.

@@ -11,7 +11,7 @@ use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge, NO_FACE};
 use crate::mesh::topology::is_outward;
 use crate::scene::color::Rgba;
-use crate::scene::{Cull, Hidden, OutlineMethod, Spec, Topology, Wire, WireEdges, WireMethod};
+use crate::scene::{Cull, Hidden, Outline, OutlineMethod, Spec, Topology, Wire, WireEdges, WireMethod};
 
 /// How much wider than the polygons' edges those that tell of a fault are.
 const FAULT_WIDTH: f32 = 2.5;
@@ -25,8 +25,8 @@ struct Want {
     lit: bool,
     contour: bool,
     class: Class,
-    /// Which materials' edges; empty: all.
-    materials: Vec<bool>,
+    /// Edges of which of [`Parts::looks`]; empty: all.
+    looks: Vec<bool>,
 }
 
 /// A kind of edge.
@@ -59,13 +59,13 @@ impl Edges {
     }
 }
 
-/// The passes of a scene. `contour_px` is the width of each part's contour, where it has one; `is_outside` says that the eye is
+/// The passes of a scene. `contour_px` is the width of a contour; `is_outside` says that the eye is
 /// surely outside of the mesh.
 pub fn passes(
     mesh: &Mesh,
     spec: &Spec,
     parts: &Parts<'_>,
-    (contour_px, is_outside): (impl Fn(usize) -> f32, bool),
+    (contour_px, is_outside): (impl Fn(&Outline) -> f32, bool),
     edges: &mut Edges,
     skips: &mut Skips<'_>,
     means: &mut Means<'_>,
@@ -81,13 +81,16 @@ pub fn passes(
     let hides = parts.has_fill() || parts.needs_occluder();
     let skip_back =
         hides && is_outside && wants.iter().any(|w| w.hidden == Hidden::Hide) && is_solid(mesh, parts, list);
-    let silhouettes = Silhouettes::new(mesh, parts, list);
+    let silhouettes = match wants.iter().any(|want| want.contour) {
+        true => Some(Silhouettes::new(mesh, parts, list, means.budget)?),
+        false => None,
+    };
     let mut passes = Vec::new();
     for want in &wants {
         let drawn =
-            list.edges.iter().zip(0_u32..).filter(|(edge, _)| want.draws(mesh, edge)).filter_map(|(edge, i)| {
+            list.edges.iter().zip(0_u32..).filter(|(edge, _)| want.draws(mesh, parts, edge)).filter_map(|(edge, i)| {
                 let all = Edge { vertices: edge.vertices, faces: edge.faces };
-                if want.contour { silhouettes.edge(i, all) } else { Some(all) }
+                silhouettes.as_ref().filter(|_| want.contour).map_or(Some(all), |s| s.edge(i, all))
             });
         let edges: Arc<[Edge]> = drawn.collect();
         means.deadline.check()?;
@@ -159,15 +162,15 @@ fn corner_bit(triangle: &[u32; 3], [a, b]: [u32; 2]) -> u8 {
 
 fn wire_wants(parts: &Parts<'_>) -> Vec<Want> {
     let mut kinds: Vec<(Wire, Vec<bool>)> = Vec::new();
-    for (material, layers) in parts.layers.iter().enumerate() {
+    for (look, layers) in parts.looks.iter().enumerate() {
         let Some(wire) = layers.wire.filter(|wire| wire.method == WireMethod::Exact) else { continue };
         let at = kinds.iter().position(|(kind, _)| *kind == wire).unwrap_or_else(|| {
-            kinds.push((wire, vec![false; parts.layers.len()]));
+            kinds.push((wire, vec![false; parts.looks.len()]));
             kinds.len() - 1
         });
-        kinds[at].1[material] = true;
+        kinds[at].1[look] = true;
     }
-    let want = |(wire, materials): (Wire, Vec<bool>)| Want {
+    let want = |(wire, looks): (Wire, Vec<bool>)| Want {
         width_px: wire.thickness,
         smoothing_px: wire.smoothing,
         color: color(&wire),
@@ -175,7 +178,7 @@ fn wire_wants(parts: &Parts<'_>) -> Vec<Want> {
         lit: wire.lit,
         contour: false,
         class: class_of(&wire),
-        materials: if materials.iter().all(|&m| m) { Vec::new() } else { materials },
+        looks: if looks.iter().all(|&drawn| drawn) { Vec::new() } else { looks },
     };
     kinds.into_iter().map(want).collect()
 }
@@ -200,7 +203,7 @@ fn topology_wants(topology: &Topology) -> Vec<Want> {
             lit: false,
             contour: false,
             class,
-            materials: Vec::new(),
+            looks: Vec::new(),
         })
     };
     let crease = Class::Crease(cos_deg(topology.crease_angle_deg));
@@ -214,13 +217,13 @@ fn topology_wants(topology: &Topology) -> Vec<Want> {
     kinds.into_iter().flatten().collect()
 }
 
-fn contour_wants(parts: &Parts<'_>, contour_px: impl Fn(usize) -> f32) -> Vec<Want> {
+fn contour_wants(parts: &Parts<'_>, contour_px: impl Fn(&Outline) -> f32) -> Vec<Want> {
     let mut wants: Vec<Want> = Vec::new();
-    for (material, layers) in parts.layers.iter().enumerate() {
+    for (look, layers) in parts.looks.iter().enumerate() {
         let Some(outline) = layers.outline.filter(|o| o.method == OutlineMethod::Contour) else { continue };
-        let (width_px, color) = (contour_px(material), outline.color.premultiplied());
+        let (width_px, color) = (contour_px(&outline), outline.color.premultiplied());
         let at = wants.iter().position(|w| w.width_px == width_px && w.color == color).unwrap_or_else(|| {
-            let materials = vec![false; parts.layers.len()];
+            let looks = vec![false; parts.looks.len()];
             let class = Class::All;
             wants.push(Want {
                 width_px,
@@ -230,21 +233,20 @@ fn contour_wants(parts: &Parts<'_>, contour_px: impl Fn(usize) -> f32) -> Vec<Wa
                 lit: false,
                 contour: true,
                 class,
-                materials,
+                looks,
             });
             wants.len() - 1
         });
-        wants[at].materials[material] = true;
+        wants[at].looks[look] = true;
     }
     wants
 }
 
 impl Want {
-    fn draws(&self, mesh: &Mesh, edge: &MeshEdge) -> bool {
+    fn draws(&self, mesh: &Mesh, parts: &Parts<'_>, edge: &MeshEdge) -> bool {
         let mut faces = edge.faces.into_iter().filter(|&face| face != NO_FACE);
-        let material = |face: u32| mesh.triangle_materials[face as usize] as usize;
-        (self.materials.is_empty() || faces.any(|face| self.materials.get(material(face)) == Some(&true)))
-            && is_of(self.class, mesh, edge)
+        let look = |face: u32| parts.look_of[mesh.triangle_materials[face as usize] as usize] as usize;
+        (self.looks.is_empty() || faces.any(|face| self.looks[look(face)])) && is_of(self.class, mesh, edge)
     }
 
     fn passes(&self, edges: &Arc<[Edge]>, hides: bool, skip_back: bool) -> Vec<LinePass> {

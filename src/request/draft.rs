@@ -2,12 +2,15 @@
 
 use super::error::{RequestError, RequestFault};
 use super::look::Look;
-use super::words::{Style, word_for};
+use super::words::{Style, Words, word_for};
 use crate::limits::BackendChoice;
 use crate::scene::color::Rgba;
 use crate::scene::{
-    CameraSpec, ImageSpec, Layers, Light, LightPreset, OutlineMethod, OutlineUnit, Projection, Spec, Topology, View,
+    CameraSpec, ImageSpec, Layers, Light, LightPreset, OutlineMethod, Projection, Spec, Topology, View, WireMethod,
 };
+
+/// Different exact wires and contours in one picture.
+const LINE_STYLES_MAX: usize = 64;
 
 /// A spec whose dependent defaults are still open.
 #[derive(Clone, Debug)]
@@ -61,7 +64,7 @@ impl Draft {
             Ok((name, layers))
         });
         let materials = materials.collect::<Result<Vec<_>, _>>()?;
-        check_hull_units(&layers, &materials)?;
+        check_parts(&layers, &materials)?;
         check_camera(&camera)?;
         let has_lamps = light.preset != LightPreset::None;
         light.ambient = ambient.unwrap_or(if has_lamps { 0.3 } else { 1.0 });
@@ -69,18 +72,46 @@ impl Draft {
     }
 }
 
-/// The hulls of a picture are one mesh that is pushed out in one way, if not everywhere equally far.
-fn check_hull_units(layers: &Layers, materials: &[(String, Layers)]) -> Result<(), RequestError> {
+/// What all parts of a picture share.
+fn check_parts(layers: &Layers, materials: &[(String, Layers)]) -> Result<(), RequestError> {
     let unit = |layers: &Layers| layers.outline.filter(|o| o.method == OutlineMethod::Hull).map(|o| o.unit);
-    let named = materials.iter().map(|(name, layers)| (format!("materials.{name}.outline.unit"), unit(layers)));
-    let mut first: Option<(String, OutlineUnit)> = None;
-    for (key, unit) in std::iter::once(("outline.unit".to_owned(), unit(layers))).chain(named) {
-        let Some(unit) = unit else { continue };
+    check_shared(layers, materials, "outline.unit", unit, "all hulls of one picture have the same unit")?;
+    let hidden = |layers: &Layers| layers.wire.filter(|w| w.method != WireMethod::Exact).map(|w| w.hidden);
+    check_shared(layers, materials, "wire.hidden", hidden, "all wires by barycentrics do the same in one picture")?;
+
+    // Each is a pass over the picture.
+    let exact = |layers: &Layers| layers.wire.filter(|wire| wire.method == WireMethod::Exact);
+    let contour = |layers: &Layers| layers.outline.filter(|outline| outline.method == OutlineMethod::Contour);
+    let (mut wires, mut contours) = (Vec::new(), Vec::new());
+    for layers in std::iter::once(layers).chain(materials.iter().map(|(_, layers)| layers)) {
+        wires.extend(exact(layers).filter(|wire| !wires.contains(wire)));
+        contours.extend(contour(layers).filter(|outline| !contours.contains(outline)));
+        if wires.len() + contours.len() > LINE_STYLES_MAX {
+            let given = format!("more than {LINE_STYLES_MAX} different wires and contours");
+            let why = format!("allowed are {LINE_STYLES_MAX} in one picture");
+            return Err(RequestError::new(RequestFault::Conflict, "materials", given, why));
+        }
+    }
+    Ok(())
+}
+
+/// Fails where two parts that have a value of this key have different ones.
+fn check_shared<T: Words + PartialEq>(
+    layers: &Layers,
+    materials: &[(String, Layers)],
+    key: &str,
+    value: impl Fn(&Layers) -> Option<T>,
+    rule: &str,
+) -> Result<(), RequestError> {
+    let named = materials.iter().map(|(name, layers)| (format!("materials.{name}.{key}"), value(layers)));
+    let mut first: Option<(String, T)> = None;
+    for (key, value) in std::iter::once((key.to_owned(), value(layers))).chain(named) {
+        let Some(value) = value else { continue };
         match &first {
-            None => first = Some((key, unit)),
-            Some((other, of_other)) if *of_other != unit => {
-                let why = format!("`{other}` is {}: all hulls of one picture have the same unit", word_for(*of_other));
-                return Err(RequestError::new(RequestFault::Conflict, &key, word_for(unit), why));
+            None => first = Some((key, value)),
+            Some((other, of_other)) if *of_other != value => {
+                let why = format!("`{other}` is {}: {rule}", word_for(*of_other));
+                return Err(RequestError::new(RequestFault::Conflict, &key, word_for(value), why));
             }
             Some(_) => {}
         }

@@ -53,3 +53,19 @@ fn dependent_defaults_and_limits_are_settled_for_each_material() {
     let document = r#"{"style":"outline","materials":{"A":{"outline":{"method":"contour","unit":"px"}}}}"#;
     assert_eq!(material(&json(document).unwrap(), "A").outline.unwrap().unit, OutlineUnit::Px);
 }
+
+#[test]
+fn materials_share_what_one_picture_can_do_in_one_way() {
+    let hidden = r#"{"style":"wire","wire":{"method":"fwidth"},"materials":{"A":{"wire":{"hidden":"fade"}}}}"#;
+    let error = json(hidden).unwrap_err();
+    assert_eq!((error.fault, error.key.as_str()), (RequestFault::Conflict, "materials.A.wire.hidden"));
+    // Exact wires may differ, though not without end.
+    let many = |count: usize| {
+        let wires: Vec<_> = (0..count).map(|i| format!(r#""M{i}":{{"wire":{{"thickness":{}}}}}"#, i + 1)).collect();
+        json(&format!(r#"{{"materials":{{{}}}}}"#, wires.join(",")))
+    };
+    assert_eq!(many(64).unwrap().materials.len(), 64);
+    let error = many(65).unwrap_err();
+    assert_eq!((error.fault, error.key.as_str()), (RequestFault::Conflict, "materials"));
+    assert!(error.to_string().contains("64"), "{error}");
+}

@@ -130,7 +130,8 @@ fn wire() -> Vec<Field> {
         words(
             "wire.hidden",
             |l: &mut Look, v| l.wire().hidden = v,
-            "What becomes of edges behind a surface; by default hide, and fade in the style wireframe.",
+            "What becomes of edges behind a surface; by default hide, and fade in the style wireframe. By barycentrics: \
+             the same for all parts, and beside transparent parts what an opaque fill hides stays hidden.",
         ),
     ]
 }
