@@ -26,9 +26,10 @@ for request in api/examples/*.json; do
 done
 
 cargo build --release --quiet
-mkdir -p docs/gallery
-rm -f docs/gallery/*.webp
-page=docs/gallery.md
+# Nothing that is there changes until all pictures are drawn.
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+page=$work/gallery.md
 {
   echo "# Every look"
   echo
@@ -40,11 +41,15 @@ page=docs/gallery.md
 row=""
 count=0
 for name in "${looks[@]}"; do
-  target/release/meshsnap render api/examples/lamp.obj -o "docs/gallery/$name.webp" \
+  target/release/meshsnap render api/examples/lamp.obj -o "$work/$name.webp" \
     --request "api/examples/$name.json" --size $size --backend "$backend" --format webp
   row+="| [![$name](gallery/$name.webp)](../api/examples/$name.json)<br>$name "
   count=$((count + 1))
   if [ $((count % columns)) = 0 ]; then echo "$row|" >> "$page"; row=""; fi
 done
 [ -z "$row" ] || echo "$row|" >> "$page"
+mkdir -p docs/gallery
+rm -f docs/gallery/*.webp
+mv "$work"/*.webp docs/gallery/
+mv "$page" docs/gallery.md
 echo "$count pictures, $(du -cb docs/gallery/*.webp | tail -1 | cut -f1) bytes"

@@ -21,7 +21,8 @@ struct Material {
     roughness: f32,
     normal_scale: f32,
     flags: u32,
-    padding: vec2<u32>,
+    opacity: f32,
+    padding: u32,
     // Four texture uses of eight words.
     textures: array<vec4<u32>, 8>,
 };
@@ -40,6 +41,8 @@ const MATERIAL_WIRE_FWIDTH: u32 = 1024u;
 const MATERIAL_WIRES: u32 = 1920u;
 const MATERIAL_WIRE_LIT: u32 = 2048u;
 const MATERIAL_DEBUG_SHIFT: u32 = 12u;
+const MATERIAL_OWN_METALLIC: u32 = 32768u;
+const MATERIAL_OWN_ROUGHNESS: u32 = 65536u;
 
 // Places among a material's textures.
 const SLOT_BASE: u32 = 0u;
@@ -102,7 +105,9 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
         var gloss = vec2(materials[m].roughness, materials[m].metallic);
         var n = normal(id, at, m, b);
         if has(TEXTURES) {
-            gloss *= sample_texture(m, SLOT_METALLIC_ROUGHNESS, uv).yz;
+            let textured = sample_texture(m, SLOT_METALLIC_ROUGHNESS, uv).yz;
+            let own = vec2(flags & MATERIAL_OWN_ROUGHNESS, flags & MATERIAL_OWN_METALLIC) != vec2(0u);
+            gloss *= select(textured, vec2(1.0), own);
             if use_of(m, SLOT_NORMAL).texture < frame.image_count {
                 n = bumped(id, m, b.front, uv, n);
             }
@@ -208,7 +213,7 @@ fn with_alpha(m: u32, base: vec4<f32>, show: Show) -> vec4<f32> {
     if is_cut || !show.fill || (flags & MATERIAL_FILL) == 0u {
         return vec4(0.0);
     }
-    return vec4(base.xyz, select(1.0, base.w, (flags & MATERIAL_BLEND) != 0u));
+    return vec4(base.xyz, select(1.0, base.w, (flags & MATERIAL_BLEND) != 0u) * materials[m].opacity);
 }
 
 // A straight colour under light, as bright as can be shown.

@@ -4,11 +4,13 @@
 //!
 //! Architecture invariant: nothing from here down reads a clock, a file, the environment, or knows an async runtime.
 
+use std::collections::BTreeSet;
+
 use crate::backend::{BackendKind, Backends, DrawError};
 use crate::encode::{self, EncodeError};
 use crate::image::ImageFormat;
 use crate::limits::{Budget, Deadline, Limits, Stopped};
-use crate::mesh::{self, Bundle, Format, MeshError};
+use crate::mesh::{self, Bundle, Format, Mesh, MeshError, Warning};
 pub use crate::plan::PlanError;
 use crate::plan::{self, Skip};
 use crate::scene::Spec;
@@ -36,7 +38,7 @@ pub struct Output {
     /// What the plan left out, and why.
     pub skips: Vec<Skip>,
     /// What the importer noticed.
-    pub warnings: Vec<mesh::Warning>,
+    pub warnings: Vec<Warning>,
 }
 
 /// The stages whose durations a response reports. Each is announced when it ends.
@@ -82,9 +84,11 @@ pub fn render(
 ) -> Result<Output, RenderError> {
     let mut budget = Budget::new(limits);
 
-    let mesh = mesh::import(job.bundle, job.format_in, limits, &mut budget, deadline)?;
+    let mut mesh = mesh::import(job.bundle, job.format_in, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
 
+    let mut warnings = std::mem::take(&mut mesh.report.warnings);
+    warnings.extend(unknown_materials(&mesh, job.spec));
     let plan = plan::build(&mesh, job.spec, &mut budget, deadline)?;
     ended(Stage::Plan);
 
@@ -96,7 +100,24 @@ pub fn render(
     ended(Stage::Encode);
 
     let skips = plan.skips;
-    Ok(Output { bytes, format, backend: drawn.backend, skips, warnings: mesh.report.warnings })
+    Ok(Output { bytes, format, backend: drawn.backend, skips, warnings })
+}
+
+/// A look for a material that the mesh does not have is most likely a misspelt name.
+fn unknown_materials(mesh: &Mesh, spec: &Spec) -> Option<Warning> {
+    const SHOWN_MAX: usize = 12;
+    let quoted = |name: &str| format!("{:?}", name.chars().take(40).collect::<String>());
+    let known: BTreeSet<&str> = mesh.materials.iter().map(|slot| slot.name.as_str()).collect();
+    let mut unknown = spec.materials.iter().map(|(name, _)| name.as_str()).filter(|name| !known.contains(name));
+    let first = unknown.next()?;
+    let more = match unknown.count() {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    let has: Vec<String> = known.iter().take(SHOWN_MAX).map(|name| quoted(name)).collect();
+    let etc = if known.len() > SHOWN_MAX { ", ..." } else { "" };
+    let detail = format!("the mesh has no material {}{more}; it has {}{etc}", quoted(first), has.join(", "));
+    Some(Warning { code: "material_unknown", detail })
 }
 
 impl From<PlanError> for RenderError {

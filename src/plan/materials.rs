@@ -39,7 +39,7 @@ pub fn look(
 fn fill(look: &mut MaterialLook, mesh: &Mesh, slot: &MaterialSlot, surface: &Surface) {
     let file = slot.base_color.unwrap_or(Rgba::from_srgb8(DEFAULT_COLOR).0);
     look.base_color = surface.color.map_or(file, |color| color.0);
-    look.base_color[3] *= surface.opacity;
+    look.opacity = if surface.debug == DebugView::None { surface.opacity } else { 1.0 };
     look.metallic = surface.metallic.or(slot.metallic).unwrap_or(0.0);
     look.roughness = surface.roughness.or(slot.roughness).unwrap_or(DEFAULT_ROUGHNESS);
     look.normal_scale = slot.normal_scale.unwrap_or(1.0);
@@ -55,17 +55,17 @@ fn fill(look: &mut MaterialLook, mesh: &Mesh, slot: &MaterialSlot, surface: &Sur
     look.flags |= match alpha {
         _ if surface.debug != DebugView::None => 0,
         AlphaMode::Mask(cutoff) => {
-            look.alpha_cutoff = cutoff * surface.opacity;
+            look.alpha_cutoff = cutoff;
             flags::MASK
         }
         AlphaMode::Blend => flags::BLEND,
         AlphaMode::Opaque => 0,
     };
-    if surface.opacity < 1.0 && surface.debug == DebugView::None {
-        look.flags |= flags::BLEND;
-        if alpha == AlphaMode::Opaque {
-            look.base_color[3] = surface.opacity;
-        }
+    if surface.metallic.is_some() {
+        look.flags |= flags::OWN_METALLIC;
+    }
+    if surface.roughness.is_some() {
+        look.flags |= flags::OWN_ROUGHNESS;
     }
     if surface.debug == DebugView::VertexColor && !mesh.colors.is_empty() {
         look.flags |= flags::VERTEX_COLORS;
@@ -103,10 +103,10 @@ fn sample(
     textures: &mut TextureLoader<'_>,
 ) -> Result<(), PlanError> {
     let is_lit = look.flags & (flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_NORMALS) != 0;
-    let own_gloss = surface.metallic.is_none() && surface.roughness.is_none();
+    let asks_gloss = surface.metallic.is_none() || surface.roughness.is_none();
     let wanted: [(usize, bool, &Option<TextureRef>, bool); 4] = [
         (slots::BASE, surface.color.is_none(), &slot.base_texture, true),
-        (slots::METALLIC_ROUGHNESS, is_lit && own_gloss, &slot.metallic_roughness_texture, false),
+        (slots::METALLIC_ROUGHNESS, is_lit && asks_gloss, &slot.metallic_roughness_texture, false),
         // The other kinds of normals are there to show the faces as they are.
         (slots::NORMAL, look.flags & flags::VERTEX_NORMALS != 0, &slot.normal_texture, false),
         (slots::EMISSIVE, surface.emissive.is_none() && look.emissive != [0.0; 3], &slot.emissive_texture, true),

@@ -44,7 +44,7 @@ pub struct CornerValues<'a, T: Clone> {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct MaterialLook {
-    /// Linear RGBA, straight alpha, opacity included.
+    /// Linear RGBA, straight alpha.
     pub base_color: [f32; 4],
     /// Linear RGB that it gives off.
     pub emissive: [f32; 3],
@@ -64,8 +64,10 @@ pub struct MaterialLook {
     pub normal_scale: f32,
     /// Bits of [`flags`].
     pub flags: u32,
+    /// Multiplies whatever alpha comes to, 0 to 1.
+    pub opacity: f32,
     /// 0
-    pub padding: [u32; 2],
+    pub padding: u32,
     /// By [`slots`].
     pub textures: [TextureUse; 4],
 }
@@ -111,7 +113,7 @@ pub mod flags {
     pub const VERTEX_COLORS: u32 = 16;
     /// Alpha is 0 below the cutoff and 1 from it on.
     pub const MASK: u32 = 32;
-    /// Alpha is what it is. Without this and `MASK`: 1.
+    /// Alpha is what it is. Without this and `MASK`: 1; the opacity multiplies it.
     pub const BLEND: u32 = 64;
     /// A wire where any `b < 0.02 t`.
     pub const WIRE_THRESHOLD: u32 = 128;
@@ -130,6 +132,10 @@ pub mod flags {
     pub const DEBUG_SHIFT: u32 = 12;
     /// Those three bits.
     pub const DEBUG: u32 = 7 << DEBUG_SHIFT;
+    /// The request gives the metallic share: the texture has no say in it.
+    pub const OWN_METALLIC: u32 = 1 << 15;
+    /// The request gives the roughness, likewise.
+    pub const OWN_ROUGHNESS: u32 = 1 << 16;
 }
 
 /// Decoded textures with their smaller versions, as large as the picture can show.
@@ -203,7 +209,8 @@ impl MaterialLook {
             roughness: 1.0,
             normal_scale: 1.0,
             flags: flags::FILL,
-            padding: [0; 2],
+            opacity: 1.0,
+            padding: 0,
             textures: [TextureUse::NONE; 4],
         }
     }

@@ -146,7 +146,10 @@ impl<'a> PointShader<'a> {
             if let Some(uv) = uv.as_ref().filter(|_| look.textures[slots::NORMAL].texture != TEXTURE_NONE) {
                 normal = self.bumped(surface, look, &place, uv, normal);
             }
-            light = self.light(surface, look.metallic * metallic, look.roughness * roughness, normal);
+            let own = |flag: u32, textured: f32| if look.flags & flag != 0 { 1.0 } else { textured };
+            let metallic = look.metallic * own(flags::OWN_METALLIC, metallic);
+            let roughness = look.roughness * own(flags::OWN_ROUGHNESS, roughness);
+            light = self.light(surface, metallic, roughness, normal);
         }
         let [r, g, b, _] = texture(slots::EMISSIVE);
         let emissive = [look.emissive[0] * r, look.emissive[1] * g, look.emissive[2] * b];
@@ -165,6 +168,7 @@ impl<'a> PointShader<'a> {
         if look.flags & flags::BLEND == 0 {
             base[3] = 1.0;
         }
+        base[3] *= look.opacity;
         base
     }
 
