@@ -27,6 +27,9 @@ pub struct LayerBand {
 }
 
 impl LayerBand {
+    /// Bytes a sample: two depths and ids, a colour, and materials.
+    pub const SAMPLE_BYTES: usize = 8 + 8 + 16 + 4;
+
     /// For bands like this one.
     pub fn new(base: &SampleBand) -> Self {
         // A picture's last band has fewer rows than it has room for.
