@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::clip::clip_triangle;
 use super::transform::{ScreenVertex, homogeneous};
 use super::visibility::{area, axis_bounds, is_wanted};
-use super::{CHUNK, Stages, lines};
+use super::{CHUNK, Stages, contour, lines};
 use crate::limits::Stopped;
 use crate::plan::{DrawPlan, Faces, LinePass, roles};
 
@@ -202,7 +202,7 @@ fn bin_edges(stages: &Stages<'_>, pass: &LinePass, rows: u32, range: Range<usize
     let mut bin = Bin::new(band_count(stages.plan, rows));
     for i in range {
         let edge = &pass.edges[i];
-        if !lines::is_drawn(stages, pass, edge) {
+        if !contour::is_drawn(stages, pass, edge) {
             continue;
         }
         if let Some(segment) = lines::Segment::new(stages, pass, edge) {

@@ -11,6 +11,7 @@ mod bands;
 mod barycentric;
 mod bins;
 mod clip;
+mod contour;
 mod debug;
 mod isa;
 mod layers;
