@@ -209,11 +209,13 @@ fn bumped(id: u32, m: u32, front: bool, uv: Uv, n: vec3<f32>) -> vec3<f32> {
 // What the material makes of alpha.
 fn with_alpha(m: u32, base: vec4<f32>, show: Show) -> vec4<f32> {
     let flags = materials[m].flags;
-    let is_cut = (flags & MATERIAL_MASK) != 0u && base.w < materials[m].emissive.w;
+    // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.
+    let alpha = clamp(base.w, 0.0, 1.0);
+    let is_cut = (flags & MATERIAL_MASK) != 0u && alpha < materials[m].emissive.w;
     if is_cut || !show.fill || (flags & MATERIAL_FILL) == 0u {
         return vec4(0.0);
     }
-    return vec4(base.xyz, select(1.0, base.w, (flags & MATERIAL_BLEND) != 0u) * materials[m].opacity);
+    return vec4(base.xyz, select(1.0, alpha, (flags & MATERIAL_BLEND) != 0u) * materials[m].opacity);
 }
 
 // A straight colour under light, as bright as can be shown.
@@ -230,7 +232,7 @@ fn lit_wire(cover: f32, wire: vec4<f32>, base: vec4<f32>, light_here: Light, emi
     let painted = over(cover, wire, vec4(base.xyz * base.w, base.w));
     let left = base.w * (1.0 - cover * wire.w);
     let lit = painted.xyz * light_here.gain + painted.w * light_here.gloss;
-    return vec4(clamp(lit, vec3(0.0), vec3(painted.w)) + emissive * left, painted.w);
+    return vec4(clamp(lit, vec3(0.0), vec3(max(painted.w, 0.0))) + emissive * left, painted.w);
 }
 
 // The unit normal on the viewer's side.

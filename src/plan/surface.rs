@@ -109,6 +109,8 @@ pub mod flags {
     pub const DERIVATIVE_NORMALS: u32 = 4;
     /// Lit by interpolated vertex normals.
     pub const VERTEX_NORMALS: u32 = 8;
+    /// Any normal.
+    pub const LIT: u32 = FACE_NORMALS | DERIVATIVE_NORMALS | VERTEX_NORMALS;
     /// Vertex colours multiply the base colour.
     pub const VERTEX_COLORS: u32 = 16;
     /// Alpha is 0 below the cutoff and 1 from it on.

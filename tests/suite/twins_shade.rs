@@ -158,6 +158,38 @@ fn hostile_coordinates_and_textures_agree() {
     assert_eq!(cases, 4);
 }
 
+#[test]
+fn alpha_that_rounds_below_nothing_agrees() {
+    let Some(gpus) = twins::gpus() else { return };
+    let mut gpu = GpuRenderer::new(gpus[0].clone());
+    // Alpha is 0 along the upper edge, which runs through pixels' centres: there the third barycentric rounds to either side of 0.
+    let corners = |i: u32| {
+        let (left, top) = (-60.0 + 2.0 * i as f32, 9.5 * i as f32 - 47.0);
+        [[left, top, 0.5], [left + 71.0 + 3.0 * i as f32, top, 0.5], [left + 23.0, top + 9.0, 0.5]]
+    };
+    let positions: Vec<_> = (0..10).flat_map(corners).collect();
+    let triangles: Vec<_> = (0..10).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let values: Vec<_> = [0.0, 0.0, 1.0].repeat(10).into_iter().map(|alpha| [0.9, 0.5, 0.3, alpha]).collect();
+    let lit_wire = flags::WIRE_FWIDTH | flags::WIRE_LIT;
+    let mut cases = 0;
+    for bits in [lit_wire | flags::BLEND, lit_wire | flags::BLEND | flags::MASK, flags::BLEND] {
+        for samples in [1, 4] {
+            let mut plan = scenes::screen_plan([160, 100], samples, 1.0, &positions, &triangles);
+            plan.background = [0.0; 4];
+            let surface = plan.surface.as_mut().unwrap();
+            surface.colors = Some(CornerValues { values: Cow::Borrowed(&values), triangles: &triangles });
+            let flags = flags::FILL | flags::VERTEX_COLORS | bits;
+            surface.materials = vec![MaterialLook { flags, wire_thickness: 1.0, ..base_look() }];
+            let picture = CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap();
+            assert!(colors(&picture) > 15, "{bits}: too plain");
+            let other = gpu.draw(&plan, &Deadline::default()).unwrap();
+            Likeness::of(&picture, &other).assert(Tolerance::TWINS, &format!("{bits}, {samples} samples"));
+            cases += 1;
+        }
+    }
+    assert_eq!(cases, 6);
+}
+
 /// Two meshes, the second from inside (where triangles are clipped), with one sample a pixel and with four.
 fn each_view(mut each: impl FnMut(&str, &mut DrawPlan<'_>)) {
     for (name, obj, camera) in [("torus", shapes::torus(16), &[][..]), ("inside a sheet", shapes::sheet(12), INSIDE)] {

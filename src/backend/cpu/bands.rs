@@ -1,7 +1,5 @@
 //! Bands of rows: how one is drawn from start to finish.
 
-use std::sync::{Mutex, PoisonError};
-
 use super::bins::{Bin, Bins};
 use super::isa::dispatch;
 use super::layers::{self, LayerBand};
@@ -9,61 +7,13 @@ use super::light::Light;
 use super::occluders::PlaneCache;
 use super::resolve::resolve;
 use super::samples::SampleBand;
+use super::scratch::{BandScratch, ink_planes};
 use super::visibility::{self, Nearest, Setup};
 use super::{Stages, line_light, lines, shade};
-use crate::plan::{DrawPlan, LinePass};
-
-/// Sample memory of a band, bytes: half of a common 1 MiB second-level cache.
-const BAND_BYTES: usize = 512 << 10;
-
-/// Bytes of a sample, its layers included.
-const LAYERED_SAMPLE_BYTES: usize = 44;
+use crate::plan::LinePass;
 
 /// Triangles or edges between two looks at the deadline: at most some 10 ms, however large each is.
-const CHECK_EVERY: usize = 256;
-
-/// Rows in each band but the last.
-pub fn rows_per_band(plan: &DrawPlan<'_>) -> u32 {
-    let sample_bytes = if plan.layers().is_some() { LAYERED_SAMPLE_BYTES } else { 8 };
-    let row_bytes = plan.width_px as usize * plan.samples as usize * sample_bytes;
-    ((BAND_BYTES / row_bytes.max(1)) as u32).clamp(1, plan.height_px.max(1))
-}
-
-/// A band's buffers, kept from band to band.
-pub struct BandScratch {
-    samples: SampleBand,
-    /// Rows that `samples` has room for; the last band of a picture may use fewer.
-    rows: u32,
-    layers: Option<LayerBand>,
-    colors: Vec<[f32; 4]>,
-    /// Of one line pass after the other; then, if lines are lit, whose light falls on them.
-    ink: Vec<u32>,
-    light: Vec<Light>,
-}
-
-/// Buffers of bands that nobody draws just now.
-#[derive(Default)]
-pub struct ScratchPool(Mutex<Vec<BandScratch>>);
-
-impl ScratchPool {
-    /// Lends a scratch that fits the plan.
-    pub fn with(&self, plan: &DrawPlan<'_>, rows: u32, each: impl FnOnce(&mut BandScratch)) {
-        let size_px = [plan.width_px, plan.height_px];
-        let fits =
-            |s: &BandScratch| s.samples.size_px == size_px && s.rows == rows && s.samples.samples == plan.samples;
-        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().filter(fits);
-        let mut scratch = kept.unwrap_or_else(|| BandScratch {
-            samples: SampleBand::new(size_px, 0, rows, plan.samples),
-            rows,
-            layers: None,
-            colors: Vec::new(),
-            ink: Vec::new(),
-            light: Vec::new(),
-        });
-        each(&mut scratch);
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
-    }
-}
+pub const CHECK_EVERY: usize = 256;
 
 /// Draws band number `band` into its rows of the picture.
 pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, rgba: &mut [u8]) {
@@ -79,7 +29,7 @@ pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: u
         shade_band(isa, stages, &scratch.samples, &mut scratch.colors);
     }
     scratch.ink.clear();
-    scratch.ink.resize(pixels * (plan.lines.len() + usize::from(plan.lights_lines())), 0);
+    scratch.ink.resize(pixels * ink_planes(plan), 0);
     let (inks, owners) = scratch.ink.split_at_mut(pixels * plan.lines.len());
     let passes = plan.lines.iter().zip(&bins.edges).zip(inks.chunks_exact_mut(pixels.max(1)));
     for ((pass, bins), ink) in passes {
@@ -165,7 +115,10 @@ fn triangles_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut
     for chunk in &bins.triangles {
         // What is not in ascending order comes with ties looked at.
         let ordered = chunk.whole.is_ordered() && !stages.plan.projection.clip;
-        for (id, piece) in chunk.pieces_in(band) {
+        for (i, (id, piece)) in chunk.pieces_in(band).enumerate() {
+            if i % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
+                return;
+            }
             if let Some(setup) = Setup::new(piece) {
                 visibility::draw(&setup, id, &mut Nearest::<true>(samples));
             }

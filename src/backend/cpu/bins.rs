@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::clip::clip_triangle;
 use super::transform::{ScreenVertex, homogeneous};
 use super::visibility::{area, axis_bounds, is_wanted};
-use super::{CHUNK, Stages, lines};
+use super::{CHUNK, Stages, contour, lines};
 use crate::limits::Stopped;
 use crate::plan::{DrawPlan, Faces, LinePass, roles};
 
@@ -30,8 +30,10 @@ pub struct Bins {
 pub struct TriangleBin {
     /// Ids of triangles that need no clipping.
     pub whole: Bin,
-    /// What clipping left of others, with the first and last band.
-    pieces: Vec<(u32, [u32; 2], [ScreenVertex; 3])>,
+    /// What clipping left of others, and whose it is.
+    pieces: Vec<(u32, [ScreenVertex; 3])>,
+    /// Indices into `pieces`.
+    piece_bands: Bin,
 }
 
 /// A chunk's items by band.
@@ -64,20 +66,22 @@ impl Bin {
 
     /// The band's items.
     pub fn items_in(&self, band: usize) -> impl Iterator<Item = u32> {
-        let tall = self.tall.iter().filter(move |(_, bands)| contains(*bands, band)).map(|&(item, _)| item);
+        let is_here = move |[first, last]: [u32; 2]| (first as usize..=last as usize).contains(&band);
+        let tall = self.tall.iter().filter(move |(_, bands)| is_here(*bands)).map(|&(item, _)| item);
         self.by_band.get(band).into_iter().flatten().copied().chain(tall)
     }
 }
 
 impl TriangleBin {
+    fn push_piece(&mut self, id: u32, piece: [ScreenVertex; 3], bands: [usize; 2]) {
+        self.piece_bands.push(self.pieces.len() as u32, bands);
+        self.pieces.push((id, piece));
+    }
+
     /// The band's clipped pieces, and whose they are.
     pub fn pieces_in(&self, band: usize) -> impl Iterator<Item = (u32, &[ScreenVertex; 3])> {
-        self.pieces.iter().filter(move |(_, bands, _)| contains(*bands, band)).map(|(id, _, piece)| (*id, piece))
+        self.piece_bands.items_in(band).map(|i| &self.pieces[i as usize]).map(|(id, piece)| (*id, piece))
     }
-}
-
-fn contains([first, last]: [u32; 2], band: usize) -> bool {
-    (first as usize..=last as usize).contains(&band)
 }
 
 /// Sorts the plan's triangles and edges into bands of `rows`.
@@ -155,7 +159,8 @@ fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
 
 fn bin_triangles(stages: &Stages<'_>, rows: u32, pass: &Pass) -> TriangleBin {
     let plan = stages.plan;
-    let mut bin = TriangleBin { whole: Bin::new(band_count(plan, rows)), pieces: Vec::new() };
+    let bands = band_count(plan, rows);
+    let mut bin = TriangleBin { whole: Bin::new(bands), pieces: Vec::new(), piece_bands: Bin::new(bands) };
     for id in pass.ids.clone() {
         let Some(faces) = pass.faces_of(plan, id) else { continue };
         let vertices = stages.screen_triangle(id as u32);
@@ -180,7 +185,7 @@ fn bin_clipped(stages: &Stages<'_>, rows: u32, id: u32, faces: Faces, bin: &mut 
         if is_wanted(faces, area(&piece))
             && let Some(bands) = bands_of(plan, rows, &piece)
         {
-            bin.pieces.push((id, bands.map(|band| band as u32), piece));
+            bin.push_piece(id, piece, bands);
         }
     });
 }
@@ -197,7 +202,7 @@ fn bin_edges(stages: &Stages<'_>, pass: &LinePass, rows: u32, range: Range<usize
     let mut bin = Bin::new(band_count(stages.plan, rows));
     for i in range {
         let edge = &pass.edges[i];
-        if !lines::is_drawn(stages, pass, edge) {
+        if !contour::is_drawn(stages, pass, edge) {
             continue;
         }
         if let Some(segment) = lines::Segment::new(stages, pass, edge) {
@@ -218,5 +223,27 @@ fn map<T: Send, U: Send>(
     match pool {
         Some(pool) => pool.install(|| items.into_par_iter().map(each).collect()),
         None => items.into_iter().map(each).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_band_lists_the_pieces_that_touch_it() {
+        let mut bin = TriangleBin { whole: Bin::new(20), pieces: Vec::new(), piece_bands: Bin::new(20) };
+        let spans = [[0, 0], [2, 4], [0, 19], [3, 3], [5, 15]];
+        for (id, span) in (100..).zip(spans) {
+            bin.push_piece(id, [ScreenVertex::default(); 3], span);
+        }
+        for band in 0..20 {
+            let mut found: Vec<u32> = bin.pieces_in(band).map(|(id, _)| id).collect();
+            found.sort_unstable();
+            let want = (100..).zip(spans).filter(|(_, [first, last])| (*first..=*last).contains(&band));
+            assert_eq!(found, want.map(|(id, _)| id).collect::<Vec<u32>>(), "band {band}");
+        }
+        // What touches few bands is not looked at in the others.
+        assert_eq!(bin.piece_bands.tall.len(), 2);
     }
 }

@@ -8,9 +8,6 @@ use super::vector::dot;
 use super::wire::{Place, edge_mask, is_drawn};
 use crate::plan::{MaterialLook, SurfacePass, flags};
 
-/// Any normal.
-const LIT: u32 = flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_NORMALS;
-
 /// What the material's debug view shows at a point: opaque linear RGBA.
 pub fn color(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<'_>, corners: &[Corner; 3]) -> [f32; 4] {
     let b = place.b.value;
@@ -24,7 +21,7 @@ pub fn color(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<'_>, 
             let nearest = (0..3).filter(|&i| is_drawn(mask, i)).fold(8.0_f32, |least, i| least.min(px[i]));
             shown([nearest / 8.0; 3])
         }
-        4 if look.flags & LIT != 0 => {
+        4 if look.flags & flags::LIT != 0 => {
             let n = normal(surface, look, place);
             let axes = [projection.screen_right, projection.screen_up, projection.to_viewer];
             shown(axes.map(|axis| 0.5 + 0.5 * dot(n, axis)))
@@ -35,7 +32,7 @@ pub fn color(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<'_>, 
         },
         6 => {
             let paint = if place.b.front { [0.36, 0.56, 0.86] } else { [0.86, 0.30, 0.26] };
-            if look.flags & LIT == 0 {
+            if look.flags & flags::LIT == 0 {
                 return shown(paint);
             }
             let n = normal(surface, look, place);

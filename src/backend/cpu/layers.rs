@@ -10,7 +10,7 @@ use super::peel::peel;
 use super::point::Show;
 use super::samples::{NOTHING, SampleBand};
 use super::shade::Shader;
-use crate::plan::{LayersPass, roles, sample_offsets};
+use crate::plan::{LayersPass, roles};
 
 /// What a band's layers need beside its samples.
 pub struct LayerBand {
@@ -27,6 +27,9 @@ pub struct LayerBand {
 }
 
 impl LayerBand {
+    /// Bytes a sample: two depths and ids, a colour, and materials.
+    pub const SAMPLE_BYTES: usize = 8 + 8 + 16 + 4;
+
     /// For bands like this one.
     pub fn new(base: &SampleBand) -> Self {
         // A picture's last band has fewer rows than it has room for.
@@ -177,7 +180,7 @@ fn lay_kernel(stages: &Stages<'_>, show: Show, floor: Option<&SampleBand>, layer
             if !any {
                 continue;
             }
-            groups(&mut shader, ids, [x, y], |_| show, |same, color| layers.lay(first, same, color));
+            shader.groups(ids, [x, y], |_| show, |same, color| layers.lay(first, same, color));
             for s in 0..layers.found.samples as usize {
                 *is_open |= layers.previous.depth[first + s] > 0.0;
             }
@@ -208,7 +211,7 @@ fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colo
                     out[k] += share * over[k];
                 }
             }
-            groups(&mut shader, ids, [x, y], show, |same, color| {
+            shader.groups(ids, [x, y], show, |same, color| {
                 let rest = |s: usize| if same[s] { 1.0 - layers.colors[first + s][3] } else { 0.0 };
                 let weight = share * (0..base.samples as usize).map(rest).sum::<f32>();
                 for k in 0..4 {
@@ -216,33 +219,5 @@ fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colo
                 }
             });
         }
-    }
-}
-
-/// Shades each triangle among a pixel's samples once, at the mean position of its samples, and calls `each` with which samples
-/// these are, and its colour.
-#[inline(always)]
-fn groups(
-    shader: &mut Shader<'_>,
-    ids: [u32; 4],
-    [x, y]: [u32; 2],
-    show: impl Fn(u32) -> Show,
-    mut each: impl FnMut([bool; 4], [f32; 4]),
-) {
-    let offsets = sample_offsets(shader.stages.plan.samples);
-    for s in 0..offsets.len() {
-        if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {
-            continue;
-        }
-        let (mut offset, mut count) = ([0, 0], 0);
-        for (id, at) in ids.iter().zip(offsets) {
-            if *id == ids[s] {
-                offset = [offset[0] + at[0], offset[1] + at[1]];
-                count += 1;
-            }
-        }
-        shader.points.show = show(ids[s]);
-        let color = shader.group(ids[s], x, y, offset, count);
-        each(ids.map(|id| id == ids[s]), color);
     }
 }

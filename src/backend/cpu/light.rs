@@ -19,6 +19,14 @@ pub struct Light {
 impl Light {
     /// The base colour as it is.
     pub const NONE: Self = Self { gain: 1.0, gloss: 0.0 };
+
+    /// What it makes of a premultiplied colour: no channel brighter than alpha lets through.
+    #[inline(always)]
+    pub fn on_premultiplied(self, c: [f32; 4]) -> [f32; 4] {
+        // Not `f32::clamp`, which would not bear an alpha below 0.
+        let under = |v: f32| (v * self.gain + self.gloss * c[3]).max(0.0).min(c[3].max(0.0));
+        [under(c[0]), under(c[1]), under(c[2]), c[3]]
+    }
 }
 
 /// Light on a surface with unit normal `n`.

@@ -44,7 +44,7 @@ fn pixel(stages: &Stages<'_>, surface: &SurfacePass<'_>, band: &SampleBand, [x, 
 /// The light on a triangle at a point, in 1/256 px from the picture's centre, which may lie beside it.
 fn point(stages: &Stages<'_>, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> Light {
     let look = surface.material(id as usize);
-    if look.flags & (flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_NORMALS) == 0 {
+    if look.flags & flags::LIT == 0 {
         return Light::NONE;
     }
     let mut b = Barycentrics::new(&corners(stages, id, at));

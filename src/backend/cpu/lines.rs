@@ -9,7 +9,6 @@ use super::clip::clip_segment;
 use super::occluders::PlaneCache;
 use super::samples::{NOTHING, SampleBand};
 use super::transform::{ScreenVertex, homogeneous};
-use super::visibility::area;
 use crate::plan::{Edge, LinePass, Shown};
 
 /// Farthest from the middle of a unit box to its corner.
@@ -88,18 +87,6 @@ impl Segment {
         let t = t.clamp(0.0, 1.0);
         (t, [from_start[0] - t * self.along[0], from_start[1] - t * self.along[1]])
     }
-}
-
-/// Whether the pass draws the edge in this view: not on the far side of a closed surface, where nothing of it can be seen;
-/// and of a contour only the silhouette.
-#[inline(always)]
-pub fn is_drawn(stages: &Stages<'_>, lines: &LinePass, edge: &Edge) -> bool {
-    // Of a contour, what is seen from its very edge shows nothing either: its line would lie on that of the side it hides behind.
-    let is_hidden = |face| stages.looks_away(face) || (lines.contour && stages.is_edge_on(face));
-    if lines.skip_back_edges && edge.faces.into_iter().all(is_hidden) {
-        return false;
-    }
-    !lines.contour || stages.is_silhouette(edge)
 }
 
 /// Draws one edge's ink into the band.
@@ -250,67 +237,4 @@ fn visible_samples(
 fn clip(stages: &Stages<'_>, edge: &Edge) -> Option<[ScreenVertex; 2]> {
     let projection = &stages.plan.projection;
     clip_segment(projection, edge.vertices.map(|v| homogeneous(projection, stages.plan.positions[v as usize])))
-}
-
-impl Stages<'_> {
-    /// Whether a face is certainly turned away. A missing face is: it shows nothing.
-    #[inline(always)]
-    fn looks_away(&self, face: u32) -> bool {
-        if face == Edge::NO_FACE {
-            return true;
-        }
-        let vertices = self.screen_triangle(face);
-        !vertices.iter().any(ScreenVertex::is_outside) && area(&vertices) > 0
-    }
-
-    /// Whether a face has no area on screen.
-    fn is_edge_on(&self, face: u32) -> bool {
-        let vertices = self.screen_triangle(face);
-        !vertices.iter().any(ScreenVertex::is_outside) && area(&vertices) == 0
-    }
-
-    /// Whether the edge's faces lie on one side of it on screen, and none on the other: there the surface ends, or turns back
-    /// under itself. It does not matter which way the faces are wound.
-    fn is_silhouette(&self, edge: &Edge) -> bool {
-        let [a, b] = edge.faces.map(|face| self.side_of(edge, face));
-        (a < 0 || b < 0) != (a > 0 || b > 0)
-    }
-
-    /// On which side of the edge a face lies on screen: -1, 1, or 0 where it is seen from its very edge or is not there.
-    fn side_of(&self, edge: &Edge, face: u32) -> i32 {
-        if face == Edge::NO_FACE {
-            return 0;
-        }
-        let [a, b] = edge.vertices;
-        let [p, q, r] = self.plan.triangles[face as usize];
-        let is_end = |v| v == a || v == b;
-        let corners = [
-            a,
-            b,
-            if !is_end(p) {
-                p
-            } else if !is_end(q) {
-                q
-            } else {
-                r
-            },
-        ];
-        let vertices = corners.map(|v| self.vertices[v as usize]);
-        if !vertices.iter().any(ScreenVertex::is_outside) {
-            return area(&vertices).signum() as i32;
-        }
-        // Where a corner is behind the eye, by the side of the face's plane on which the eye is.
-        let [a, b, c] = corners.map(|v| homogeneous(&self.plan.projection, self.plan.positions[v as usize]));
-        let (x, y) = (a[1] * b[3] - a[3] * b[1], a[3] * b[0] - a[0] * b[3]);
-        let volume = (x * c[0] + y * c[1]) + (a[0] * b[1] - a[1] * b[0]) * c[3];
-        i32::from(volume > 0.0) - i32::from(volume < 0.0)
-    }
-
-    /// The face whose light falls on an edge's line where the pixel sees no surface, plus 1: of those that look at the viewer
-    /// the one with the highest id, so that the order of edges does not matter; of any, where none does.
-    fn lit_by(&self, edge: &Edge) -> u32 {
-        let towards = |face: u32| if self.looks_away(face) { 0 } else { face + 1 };
-        let best = towards(edge.faces[0]).max(towards(edge.faces[1]));
-        if best > 0 { best } else { edge.faces[0].wrapping_add(1) }
-    }
 }

@@ -11,6 +11,7 @@ mod bands;
 mod barycentric;
 mod bins;
 mod clip;
+mod contour;
 mod debug;
 mod isa;
 mod layers;
@@ -22,6 +23,7 @@ mod peel;
 mod point;
 mod resolve;
 mod samples;
+mod scratch;
 mod shade;
 mod texture;
 mod transform;
@@ -33,9 +35,9 @@ pub use isa::Isa;
 
 use rayon::prelude::*;
 
-use self::bands::BandScratch;
 use self::bins::Bins;
 use self::resolve::SrgbEncoder;
+use self::scratch::{BandScratch, ScratchPool};
 use self::transform::ScreenVertex;
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::Image;
@@ -51,7 +53,7 @@ pub struct CpuRenderer {
     pool: Option<rayon::ThreadPool>,
     vertices: Vec<ScreenVertex>,
     hull_vertices: Vec<ScreenVertex>,
-    scratch: bands::ScratchPool,
+    scratch: ScratchPool,
     srgb: SrgbEncoder,
     ink_table: [u32; 1024],
 }
@@ -83,7 +85,7 @@ impl CpuRenderer {
             pool,
             vertices: Vec::new(),
             hull_vertices: Vec::new(),
-            scratch: bands::ScratchPool::default(),
+            scratch: ScratchPool::default(),
             srgb: SrgbEncoder::new(),
             ink_table: ink_table(),
         }
@@ -130,7 +132,7 @@ impl CpuRenderer {
         deadline.check()?;
         self.transform(plan);
         let stages = self.stages(plan, deadline);
-        let rows = bands::rows_per_band(plan);
+        let rows = scratch::rows_per_band(plan);
         let bins = bins::bin(&stages, self.pool.as_ref(), rows)?;
         let row_len = out.len() / plan.height_px as usize;
         let items = out.chunks_mut(row_len * rows as usize).enumerate().collect();
@@ -139,6 +141,7 @@ impl CpuRenderer {
                 self.scratch.with(plan, rows, |scratch| each(&stages, scratch, &bins, band, out));
             }
         });
+        self.scratch.trim();
         Ok(deadline.check()?)
     }
 }

@@ -1,15 +1,13 @@
 //! Stage 2 once more, a round a layer: the nearest triangle behind the layer before. Twin of `shaders/emit_layer.wgsl`.
 
 use super::Stages;
+use super::bands::CHECK_EVERY;
 use super::bins::TriangleBin;
 use super::isa::{LANES, dispatch};
 use super::layers::LayerBand;
 use super::samples::SampleBand;
 use super::transform::ScreenVertex;
 use super::visibility::{self, Setup, Target};
-
-/// Triangles between two looks at the deadline.
-const CHECK_EVERY: usize = 256;
 
 dispatch! {
     /// Finds the next layer of a band.
@@ -62,6 +60,9 @@ fn peel_kernel(stages: &Stages<'_>, (bins, band): (&[TriangleBin], usize), layer
     let mut item = 0;
     for chunk in bins {
         for (id, piece) in chunk.pieces_in(band) {
+            if item % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
+                return;
+            }
             offer(item, id, || *piece, found, previous, pending);
             item += 1;
         }

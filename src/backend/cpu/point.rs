@@ -24,9 +24,6 @@ const VARYING: u32 = flags::VERTEX_NORMALS | flags::WIRE_FWIDTH;
 /// What decides by barycentrics rather than blends, textures aside: there both back-ends need the same bits.
 const DECIDING: u32 = flags::VERTEX_COLORS | flags::WIRE_THRESHOLD | flags::DEBUG;
 
-/// Any normal.
-const LIT: u32 = flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_NORMALS;
-
 /// What of its material a point shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Show {
@@ -89,7 +86,7 @@ impl<'a> PointShader<'a> {
         let b = Barycentrics::new(&corners(self.stages, id, at));
         let base = self.with_alpha(look, look.base_color);
         let mut light = Light::NONE;
-        if look.flags & LIT != 0 {
+        if look.flags & flags::LIT != 0 {
             let normal = match &surface.vertex_normals {
                 Some(normals) if look.flags & flags::VERTEX_NORMALS != 0 => {
                     let corners = normals.triangles[id as usize].map(|i| normals.values[i as usize]);
@@ -140,7 +137,7 @@ impl<'a> PointShader<'a> {
             return [0.0; 4];
         }
         let mut light = Light::NONE;
-        if look.flags & LIT != 0 {
+        if look.flags & flags::LIT != 0 {
             let [_, roughness, metallic, _] = texture(slots::METALLIC_ROUGHNESS);
             let mut normal = normal(surface, look, &place);
             if let Some(uv) = uv.as_ref().filter(|_| look.textures[slots::NORMAL].texture != TEXTURE_NONE) {
@@ -161,6 +158,8 @@ impl<'a> PointShader<'a> {
 
     /// What the material makes of alpha.
     fn with_alpha(&self, look: &MaterialLook, mut base: [f32; 4]) -> [f32; 4] {
+        // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.
+        base[3] = if base[3] > 0.0 { base[3].min(1.0) } else { 0.0 };
         let is_cut = look.flags & flags::MASK != 0 && base[3] < look.alpha_cutoff;
         if is_cut || !self.show.fill || look.flags & flags::FILL == 0 {
             return [0.0; 4];
@@ -282,11 +281,8 @@ fn lit_wire(cover: f32, wire: [f32; 4], base: [f32; 4], light: Light, emissive: 
     let [r, g, b, alpha] = base;
     let painted = over(cover, wire, [r * alpha, g * alpha, b * alpha, alpha]);
     let left = alpha * (1.0 - cover * wire[3]);
-    let [r, g, b] = [0, 1, 2].map(|k| {
-        let lit = painted[k] * light.gain + painted[3] * light.gloss;
-        lit.clamp(0.0, painted[3]) + emissive[k] * left
-    });
-    [r, g, b, painted[3]]
+    let [r, g, b, alpha] = light.on_premultiplied(painted);
+    [r + emissive[0] * left, g + emissive[1] * left, b + emissive[2] * left, alpha]
 }
 
 /// The unit normal on the viewer's side.

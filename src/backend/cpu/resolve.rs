@@ -51,7 +51,7 @@ pub fn resolve(
             if ink[i] > 0 {
                 let cover = coverage(ink[i]);
                 let light = light.get(i).filter(|_| lines.lit);
-                let color = light.map_or(lines.color, |light| lit(lines.color, *light));
+                let color = light.map_or(lines.color, |light| light.on_premultiplied(lines.color));
                 c = std::array::from_fn(|k| cover * color[k] + c[k] * (1.0 - cover * color[3]));
             }
         }
@@ -61,12 +61,6 @@ pub fn resolve(
         }
         out.copy_from_slice(&last.1);
     }
-}
-
-/// A premultiplied colour under light.
-fn lit(c: [f32; 4], light: Light) -> [f32; 4] {
-    let under = |v: f32| (v * light.gain + light.gloss * c[3]).clamp(0.0, c[3]);
-    [under(c[0]), under(c[1]), under(c[2]), c[3]]
 }
 
 /// Ink back to coverage, 0 to 1.

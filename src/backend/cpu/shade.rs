@@ -4,7 +4,7 @@
 //! weigh their share.
 
 use super::Stages;
-use super::point::PointShader;
+use super::point::{PointShader, Show};
 use super::samples::{NOTHING, SampleBand};
 use crate::plan::sample_offsets;
 
@@ -25,9 +25,9 @@ pub fn shade(stages: &Stages<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
 /// Finds out who is seen in a pixel, and where.
 pub struct Shader<'a> {
     /// What it reads.
-    pub stages: &'a Stages<'a>,
+    stages: &'a Stages<'a>,
     /// Finds out what they look like.
-    pub points: PointShader<'a>,
+    points: PointShader<'a>,
 }
 
 impl<'a> Shader<'a> {
@@ -53,11 +53,35 @@ impl<'a> Shader<'a> {
     }
 
     fn mixed_pixel(&mut self, ids: [u32; 4], x: u32, y: u32) -> [f32; 4] {
-        let offsets = sample_offsets(4);
         let mut sum = [0.0; 4];
-        for s in 0..4 {
+        self.groups(
+            ids,
+            [x, y],
+            |_| Show::ALL,
+            |same, color| {
+                let weight = same.map(|same| f32::from(u8::from(same)) * 0.25).iter().sum::<f32>();
+                for k in 0..4 {
+                    sum[k] += weight * color[k];
+                }
+            },
+        );
+        sum
+    }
+
+    /// Shades each triangle among a pixel's samples once, at the mean position of its samples, and calls `each` with which
+    /// samples these are, and its colour. `ids` past the samples are [`NOTHING`].
+    #[inline(always)]
+    pub fn groups(
+        &mut self,
+        ids: [u32; 4],
+        [x, y]: [u32; 2],
+        show: impl Fn(u32) -> Show,
+        mut each: impl FnMut([bool; 4], [f32; 4]),
+    ) {
+        let offsets = sample_offsets(self.stages.plan.samples);
+        for s in 0..offsets.len() {
             // Each triangle is shaded at the first of its samples; the others are done with.
-            if ids[..s].contains(&ids[s]) {
+            if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {
                 continue;
             }
             let (mut offset, mut count) = ([0, 0], 0);
@@ -67,18 +91,15 @@ impl<'a> Shader<'a> {
                     count += 1;
                 }
             }
+            self.points.show = show(ids[s]);
             let color = self.group(ids[s], x, y, offset, count);
-            let weight = count as f32 * 0.25;
-            for k in 0..4 {
-                sum[k] += weight * color[k];
-            }
+            each(ids.map(|id| id == ids[s]), color);
         }
-        sum
     }
 
     /// The colour of triangle `id` at the mean of `count` samples whose offsets in 1/16 px add up to `offset_sum`.
     #[inline(always)]
-    pub fn group(&mut self, id: u32, x: u32, y: u32, offset_sum: [i32; 2], count: i32) -> [f32; 4] {
+    fn group(&mut self, id: u32, x: u32, y: u32, offset_sum: [i32; 2], count: i32) -> [f32; 4] {
         if id == NOTHING {
             return [0.0; 4];
         }

@@ -4,6 +4,7 @@ use super::look;
 use super::stages::{Access, Into, Slot, Stage, Write};
 
 const COMMON: &str = include_str!("../../../shaders/common.wgsl");
+const CONTOUR: &str = include_str!("../../../shaders/contour.wgsl");
 const PLANES: &str = include_str!("../../../shaders/planes.wgsl");
 const WORK: &str = include_str!("../../../shaders/work.wgsl");
 const TRIANGLE: &str = include_str!("../../../shaders/triangle.wgsl");
@@ -198,7 +199,7 @@ impl Stage {
             Self::LineLight => {
                 [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/line_light.wgsl")]].concat().concat()
             }
-            Self::Lines => [COMMON, TRIANGLE, PLANES, include_str!("../../../shaders/lines.wgsl")].concat(),
+            Self::Lines => [COMMON, TRIANGLE, PLANES, CONTOUR, include_str!("../../../shaders/lines.wgsl")].concat(),
             Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
         }
     }
