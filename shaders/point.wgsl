@@ -1,7 +1,7 @@
 // The colour of one point of the surface: stage 3's formulas. Twin of src/backend/cpu/point.rs.
 
 @group(1) @binding(6) var<storage, read> normals: array<f32>;
-// Three indices a triangle, for each kind of corner value.
+// Three indices a triangle, for each kind of corner value that does not go by position.
 @group(1) @binding(7) var<storage, read> corner_triangles: array<u32>;
 // Triangles' materials, then edge masks, a byte each.
 @group(1) @binding(8) var<storage, read> attributes: array<u32>;
@@ -26,6 +26,9 @@ struct Material {
     // Four texture uses of eight words.
     textures: array<vec4<u32>, 8>,
 };
+
+// Where normals begin whose index is the plan's own triangles.
+const OWN_TRIANGLES: u32 = 0xFFFFFFFFu;
 
 // Bits of a material's flags.
 const MATERIAL_FILL: u32 = 1u;
@@ -135,8 +138,13 @@ fn face_normal(id: u32) -> vec3<f32> {
     return vec3(face_normals[3u * id], face_normals[3u * id + 1u], face_normals[3u * id + 2u]);
 }
 
-fn normal_at(i: u32) -> vec3<f32> {
-    let v = corner_triangles[i];
+fn normal_at(id: u32, corner: u32) -> vec3<f32> {
+    var v: u32;
+    if frame.normal_triangles_at == OWN_TRIANGLES {
+        v = triangles[3u * id + corner];
+    } else {
+        v = corner_triangles[frame.normal_triangles_at + 3u * id + corner];
+    }
     return vec3(normals[3u * v], normals[3u * v + 1u], normals[3u * v + 2u]);
 }
 
@@ -157,8 +165,7 @@ fn normal(id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> vec3<f32> {
         return facing(face_normal(id), b.front);
     }
     if has(VERTEX_NORMALS) {
-        let first = frame.normal_triangles_at + 3u * id;
-        return facing(blend3(b.value, normal_at(first), normal_at(first + 1u), normal_at(first + 2u)), b.front);
+        return facing(blend3(b.value, normal_at(id, 0u), normal_at(id, 1u), normal_at(id, 2u)), b.front);
     }
     return frame.to_viewer.xyz;
 }

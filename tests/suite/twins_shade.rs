@@ -190,6 +190,39 @@ fn alpha_that_rounds_below_nothing_agrees() {
     assert_eq!(cases, 6);
 }
 
+#[test]
+fn normals_and_colours_that_go_by_different_indices_agree() {
+    let Some(gpus) = twins::gpus() else { return };
+    let (mut gpu, mut cpu) = (GpuRenderer::new(gpus[0].clone()), CpuRenderer::new(1));
+    // An index of its own for every corner. Plans of any lifetime may borrow it.
+    let corners: &'static [[u32; 3]] = (0..10_000).map(|t| [3 * t + 2, 3 * t, 3 * t + 1]).collect::<Vec<_>>().leak();
+    let mut cases = 0;
+    each_view(|view, plan| {
+        let (own, count) = (plan.triangles, plan.triangles.len());
+        let surface = plan.surface.as_mut().unwrap();
+        surface.materials = vec![MaterialLook { flags: SMOOTH | flags::VERTEX_COLORS, ..base_look() }];
+        let by_position = surface.vertex_normals.clone().unwrap();
+        assert!(std::ptr::eq(by_position.triangles, own), "{view}: the normals have an index of their own");
+        let all: Vec<[f32; 3]> = own.iter().flatten().map(|&v| by_position.values[v as usize]).collect();
+        let turned = (0..count).flat_map(|t| [all[3 * t + 1], all[3 * t + 2], all[3 * t]]).collect();
+        let by_corner = CornerValues { values: Cow::Owned(turned), triangles: &corners[..count] };
+        let paint = (0..3 * count).map(|c| [(c % 3) as f32 / 2.0, (c % 7) as f32 / 6.0, 0.5, 1.0]).collect();
+        let paint = CornerValues { values: Cow::Owned(paint), triangles: &corners[..count] };
+        let mut pictures = Vec::new();
+        for normals in [by_position, by_corner] {
+            let surface = plan.surface.as_mut().unwrap();
+            (surface.vertex_normals, surface.colors) = (Some(normals), Some(paint.clone()));
+            let picture = cpu.draw(plan, &Deadline::default()).unwrap();
+            assert!(colors(&picture) > 100, "{view}: too plain");
+            Likeness::of(&picture, &gpu.draw(plan, &Deadline::default()).unwrap()).assert(Tolerance::TWINS, view);
+            pictures.push(picture);
+            cases += 1;
+        }
+        assert_eq!(pictures[0].rgba, pictures[1].rgba, "{view}: the same normals by another index");
+    });
+    assert_eq!(cases, 8);
+}
+
 /// Two meshes, the second from inside (where triangles are clipped), with one sample a pixel and with four.
 fn each_view(mut each: impl FnMut(&str, &mut DrawPlan<'_>)) {
     for (name, obj, camera) in [("torus", shapes::torus(16), &[][..]), ("inside a sheet", shapes::sheet(12), INSIDE)] {

@@ -71,10 +71,15 @@ impl Buffers {
 
     /// Fills a uniform buffer.
     pub fn upload_uniform<'a>(gpu: &Gpu, slot: &'a mut Option<wgpu::Buffer>, bytes: &[u8]) -> &'a wgpu::Buffer {
-        use wgpu::BufferUsages as U;
-        let buffer = grow(gpu, slot, bytes.len() as u64, gpu.limits.max_buffer_size, U::UNIFORM | U::COPY_DST);
+        let buffer = Self::uniform(gpu, slot, bytes.len() as u64);
         gpu.queue.write_buffer(buffer, 0, bytes);
         buffer
+    }
+
+    /// A uniform buffer of at least `size` bytes.
+    pub fn uniform<'a>(gpu: &Gpu, slot: &'a mut Option<wgpu::Buffer>, size: u64) -> &'a wgpu::Buffer {
+        use wgpu::BufferUsages as U;
+        grow(gpu, slot, size, gpu.limits.max_buffer_size, U::UNIFORM | U::COPY_DST)
     }
 
     /// A buffer of at least `size` bytes that the CPU can map.
@@ -95,7 +100,7 @@ impl Buffers {
 
     /// Gives everything back if it is more than a worker may keep.
     pub fn trim(&mut self) {
-        let all = self.storage.iter().chain([&self.frame, &self.batches, &self.staging]);
+        let all = self.storage.iter().chain([&self.frame, &self.batches, &self.staging, &self.counts]);
         let total: u64 = all.flatten().map(wgpu::Buffer::size).sum();
         if total > KEPT_BYTES_MAX {
             *self = Self::default();

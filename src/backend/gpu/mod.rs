@@ -1,7 +1,8 @@
 //! The wgpu back-end: the CPU's stages as compute shaders, headless.
 //!
 //! In reading order: [`device`] opens a GPU; [`schedule`] decides what is dispatched for a plan; [`recorder`] turns that
-//! into commands; [`kernels`] says what each stage is made of, [`stages`] are their pipelines, [`params`] their numbers, [`buffers`] their memory.
+//! into commands; [`kernels`] says what each stage is made of, [`stages`] are their pipelines, [`params`] their numbers,
+//! [`buffers`] their memory and [`sizes`] how much of it.
 //!
 //! Architecture invariant: a job's use of the device stays on the thread that draws it, because wgpu's error scopes do.
 
@@ -13,7 +14,9 @@ mod params;
 mod passes;
 mod recorder;
 mod schedule;
+mod sizes;
 mod stages;
+mod step;
 mod tiles;
 
 use std::sync::Arc;
@@ -21,17 +24,18 @@ use std::sync::Arc;
 pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
-use self::params::{attributes, corner_triangles, hull_amounts, hull_looks};
+use self::params::{attributes, corner_triangles, edge_lists, hull_amounts, hull_looks};
 use self::recorder::Recorder;
-use self::schedule::{
-    DeviceTraits, Goal, LAYERED_BYTES, Schedule, Step, WORK_HEAD_BYTES, WORK_ITEM_BYTES, color_bytes, has_visibility,
-    ink_bytes,
+use self::schedule::Schedule;
+use self::sizes::{
+    DeviceTraits, LAYERED_BYTES, SAMPLE_BYTES, color_bytes, has_visibility, ink_bytes, samples, work_bytes,
 };
 use self::stages::Slot;
+use self::step::{Goal, Step};
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::{Image, srgb8_thresholds};
 use crate::limits::Deadline;
-use crate::plan::{DrawPlan, Edge, LinePass, ink_table};
+use crate::plan::{DrawPlan, LinePass, ink_table};
 
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
@@ -79,7 +83,7 @@ impl GpuRenderer {
             return Ok(vec![0; len]);
         }
         self.job(|gpu, buffers| {
-            let schedule = Schedule::new(plan, &traits(gpu), goal);
+            let schedule = Schedule::new(plan, &traits(gpu), goal)?;
             upload_geometry(gpu, buffers, plan, &schedule)?;
             buffers.staging(gpu, schedule.band_rows as u64 * row_words as u64 * 8)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
@@ -119,7 +123,7 @@ impl Renderer for GpuRenderer {
             return Ok(image);
         }
         self.job(|gpu, buffers| {
-            let schedule = Schedule::new(plan, &traits(gpu), Goal::Picture);
+            let schedule = Schedule::new(plan, &traits(gpu), Goal::Picture)?;
             upload_geometry(gpu, buffers, plan, &schedule)?;
             upload_looks(gpu, buffers, plan, &schedule)?;
             buffers.staging(gpu, size)?;
@@ -173,14 +177,14 @@ fn upload_geometry(
         return Ok(());
     }
     buffers.upload(gpu, Slot::Roles, &plan.roles)?;
-    buffers.reserve(gpu, Slot::Samples, band_sample_bytes(plan, schedule.band_rows))?;
+    let samples = samples(plan, schedule.band_rows);
+    buffers.reserve(gpu, Slot::Samples, samples * SAMPLE_BYTES)?;
     if plan.layers().is_some() {
-        let samples = band_sample_bytes(plan, schedule.band_rows) / 8;
-        buffers.reserve(gpu, Slot::Layer, samples * 8)?;
+        buffers.reserve(gpu, Slot::Layer, samples * SAMPLE_BYTES)?;
         buffers.reserve(gpu, Slot::Layered, samples * LAYERED_BYTES)?;
         buffers.reserve(gpu, Slot::Rounds, u64::from(schedule.layers) * 4)?;
     }
-    buffers.reserve(gpu, Slot::Work, WORK_HEAD_BYTES + u64::from(schedule.work_items) * WORK_ITEM_BYTES)?;
+    buffers.reserve(gpu, Slot::Work, work_bytes(schedule.work_items))?;
     Ok(())
 }
 
@@ -203,17 +207,17 @@ fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule:
         if let Some(colors) = &surface.colors {
             buffers.upload(gpu, Slot::VertexColors, bytemuck::cast_slice(&colors.values))?;
         }
-        let triangles = corner_triangles(surface).0;
+        let triangles = corner_triangles(surface, plan.triangles).0;
         let triangles: Vec<&[u8]> = triangles.into_iter().map(bytemuck::cast_slice).collect();
         buffers.upload_parts(gpu, Slot::CornerTriangles, &triangles)?;
         let (images, texels) = (&surface.textures.images, &surface.textures.texels);
         buffers.upload_parts(gpu, Slot::Texels, &[bytemuck::cast_slice(images), bytemuck::cast_slice(texels)])?;
     }
     if !plan.lines.is_empty() {
-        let edges: Vec<Edge> = plan.lines.iter().flat_map(|lines| lines.edges.iter().copied()).collect();
+        let edges: Vec<&[u8]> = edge_lists(&plan.lines).0.into_iter().map(bytemuck::cast_slice).collect();
         let lit = |lines: &LinePass| [f32::from(u8::from(lines.lit)), 0.0, 0.0, 0.0];
         let colors: Vec<[f32; 4]> = plan.lines.iter().flat_map(|lines| [lines.color, lit(lines)]).collect();
-        buffers.upload(gpu, Slot::Edges, bytemuck::cast_slice(&edges))?;
+        buffers.upload_parts(gpu, Slot::Edges, &edges)?;
         buffers.upload(gpu, Slot::LineColors, bytemuck::cast_slice(&colors))?;
         buffers.upload(gpu, Slot::InkTable, bytemuck::cast_slice(&ink_table()))?;
         buffers.reserve(gpu, Slot::Ink, band_pixels * ink_bytes(plan))?;
@@ -221,10 +225,6 @@ fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule:
     buffers.upload(gpu, Slot::Thresholds, bytemuck::cast_slice(&srgb8_thresholds()))?;
     buffers.reserve(gpu, Slot::Rgba, band_pixels * 4)?;
     Ok(())
-}
-
-fn band_sample_bytes(plan: &DrawPlan<'_>, rows: u32) -> u64 {
-    u64::from(plan.width_px) * u64::from(rows) * u64::from(plan.samples) * 8
 }
 
 /// Records all steps; `end_band` takes a finished band's rows away.
@@ -239,7 +239,7 @@ fn execute<'a>(
         next += 1;
         match *step {
             Step::ClearBand => clear_band(recorder, plan, schedule)?,
-            Step::ClearLayer => recorder.clear(Slot::Layer, band_sample_bytes(plan, schedule.band_rows))?,
+            Step::ClearLayer => recorder.clear(Slot::Layer, samples(plan, schedule.band_rows) * SAMPLE_BYTES)?,
             Step::EndLayer { layer, end } => {
                 if recorder.read_word(Slot::Rounds, layer)? == 0 {
                     next = end;
@@ -264,7 +264,7 @@ fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, schedule: &Sched
         recorder.clear(Slot::Rounds, u64::from(schedule.layers) * 4)?;
     }
     if has_visibility(plan) {
-        recorder.clear(Slot::Samples, band_sample_bytes(plan, rows))?;
+        recorder.clear(Slot::Samples, samples(plan, rows) * SAMPLE_BYTES)?;
     }
     if !plan.lines.is_empty() {
         recorder.clear(Slot::Ink, u64::from(plan.width_px) * u64::from(rows) * ink_bytes(plan))?;

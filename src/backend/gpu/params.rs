@@ -1,8 +1,10 @@
 //! The uniforms of shaders/common.wgsl, field for field.
 
+use std::sync::Arc;
+
 use bytemuck::{Pod, Zeroable};
 
-use crate::plan::{DrawPlan, Faces, HullOffset, HullPass, Lights, LinePass, Shown, SurfacePass};
+use crate::plan::{DrawPlan, Edge, Faces, HullOffset, HullPass, Lights, LinePass, Shown, SurfacePass};
 
 /// The plan's numbers.
 #[repr(C)]
@@ -107,7 +109,7 @@ impl Frame {
             ..Self::default()
         };
         if let Some(surface) = &plan.surface {
-            frame.surface(surface);
+            frame.surface(surface, plan.triangles);
         }
         if let Some(hull) = &plan.hull {
             frame.hull_color = hull.color(0);
@@ -122,7 +124,7 @@ impl Frame {
         frame
     }
 
-    fn surface(&mut self, surface: &SurfacePass<'_>) {
+    fn surface(&mut self, surface: &SurfacePass<'_>, triangles: &[[u32; 3]]) {
         for (i, lamp) in surface.lights.lamps.iter().take(Lights::LAMPS_MAX).enumerate() {
             let [x, y, z] = lamp.to_light;
             self.lamps[i] = [x, y, z, lamp.strength];
@@ -133,7 +135,7 @@ impl Frame {
         self.material_count = surface.materials.len() as u32;
         self.masks_at = surface.triangle_materials.len() as u32;
         self.image_count = surface.textures.images.len() as u32;
-        let (_, [normals, uvs, colors]) = corner_triangles(surface);
+        let (_, [normals, uvs, colors]) = corner_triangles(surface, triangles);
         (self.normal_triangles_at, self.uv_triangles_at, self.color_triangles_at) = (normals, uvs, colors);
     }
 }
@@ -157,16 +159,23 @@ pub fn attributes(surface: &SurfacePass<'_>) -> Vec<u8> {
     [bytemuck::cast_slice(surface.triangle_materials), &surface.edge_masks[..]].concat()
 }
 
+/// Where normals begin whose index is the plan's own triangles: those are on the GPU already.
+const OWN_TRIANGLES: u32 = u32::MAX;
+
 /// The index arrays of normals, texture coordinates and colours, each once, and where each of the three begins when they
 /// lie one after the other.
-pub fn corner_triangles<'a>(surface: &SurfacePass<'a>) -> (Vec<&'a [[u32; 3]]>, [u32; 3]) {
+///
+/// A mesh's normals go by position (`own`, the plan's triangles) or by what the other two go by: one array is all there is.
+pub fn corner_triangles<'a>(surface: &SurfacePass<'a>, own: &[[u32; 3]]) -> (Vec<&'a [[u32; 3]]>, [u32; 3]) {
+    let normals = surface.vertex_normals.as_ref().map(|v| v.triangles);
+    let has_own = normals.is_some_and(|triangles| std::ptr::eq(triangles, own));
     let of = [
-        surface.vertex_normals.as_ref().map(|v| v.triangles),
+        normals.filter(|_| !has_own),
         surface.uvs.as_ref().map(|v| v.triangles),
         surface.colors.as_ref().map(|v| v.triangles),
     ];
     let mut parts: Vec<&[[u32; 3]]> = Vec::new();
-    let starts = of.map(|triangles| {
+    let [normals, uvs, colors] = of.map(|triangles| {
         let Some(triangles) = triangles else { return 0 };
         let at = parts.iter().position(|part| std::ptr::eq(*part, triangles)).unwrap_or_else(|| {
             parts.push(triangles);
@@ -174,7 +183,25 @@ pub fn corner_triangles<'a>(surface: &SurfacePass<'a>) -> (Vec<&'a [[u32; 3]]>, 
         });
         parts[..at].iter().map(|part| 3 * part.len() as u32).sum()
     });
-    (parts, starts)
+    (parts, [if has_own { OWN_TRIANGLES } else { normals }, uvs, colors])
+}
+
+/// The lists of edges of line passes, each once, and where each pass's begins when they lie one after the other.
+pub fn edge_lists(passes: &[LinePass]) -> (Vec<&[Edge]>, Vec<u32>) {
+    let mut lists: Vec<(&Arc<[Edge]>, u32)> = Vec::new();
+    let mut next = 0_u32;
+    let starts = passes.iter().map(|LinePass { edges, .. }| {
+        if let Some((_, start)) = lists.iter().find(|(list, _)| Arc::ptr_eq(list, edges)) {
+            return *start;
+        }
+        lists.push((edges, next));
+        // Far more than a device has room for: then nothing is drawn.
+        let start = next;
+        next = start.saturating_add(edges.len() as u32);
+        start
+    });
+    let starts = starts.collect();
+    (lists.into_iter().map(|(list, _)| &list[..]).collect(), starts)
 }
 
 fn xyz(v: [f32; 3]) -> [f32; 4] {
@@ -192,7 +219,7 @@ pub fn faces_code(faces: Faces) -> u32 {
 
 /// The batches, each at a multiple of [`BATCH_STRIDE`].
 pub fn pack(batches: &[Batch]) -> Vec<u8> {
-    let mut bytes = vec![0; batches.len().max(1) * BATCH_STRIDE];
+    let mut bytes = vec![0; batches.len() * BATCH_STRIDE];
     for (batch, slot) in batches.iter().zip(bytes.chunks_exact_mut(BATCH_STRIDE)) {
         slot[..size_of::<Batch>()].copy_from_slice(bytemuck::bytes_of(batch));
     }
@@ -201,11 +228,50 @@ pub fn pack(batches: &[Batch]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
+    use std::borrow::Cow;
+
     use super::*;
+    use crate::plan::CornerValues;
 
     #[test]
     fn sizes_are_those_of_the_shader() {
         assert_eq!(size_of::<Frame>(), 320);
         assert_eq!(size_of::<Batch>(), 80);
+    }
+
+    #[test]
+    fn a_list_of_edges_is_uploaded_once() {
+        let list = |count: u32| -> Arc<[Edge]> {
+            (0..count).map(|v| Edge { vertices: [v, v + 1], faces: [Edge::NO_FACE; 2] }).collect()
+        };
+        let (long, short) = (list(5), list(3));
+        let passes = [&long, &short, &long, &list(3), &short].map(|edges| LinePass {
+            edges: edges.clone(),
+            width_px: 1.0,
+            smoothing_px: 1.0,
+            color: [1.0; 4],
+            shown: Shown::All,
+            skip_back_edges: false,
+            contour: false,
+            lit: false,
+        });
+        let (lists, starts) = edge_lists(&passes);
+        assert_eq!(lists.iter().map(|list| list.len()).collect::<Vec<_>>(), [5, 3, 3]);
+        assert_eq!(starts, [0, 5, 0, 8, 5]);
+    }
+
+    #[test]
+    fn an_index_of_corners_is_uploaded_once_and_the_plans_own_never() {
+        let (own, other) = (vec![[0, 1, 2]; 4], vec![[0, 1, 2]; 4]);
+        let values = |triangles| CornerValues { values: Cow::Owned(vec![[0.0; 3]; 3]), triangles };
+        let mut surface = SurfacePass::new(Faces::Both, Vec::new());
+        surface.uvs = Some(CornerValues { values: Cow::Owned(vec![[0.0; 2]; 3]), triangles: &other });
+        surface.vertex_normals = Some(values(&own));
+        assert_eq!(corner_triangles(&surface, &own), (vec![&other[..]], [OWN_TRIANGLES, 0, 0]));
+        surface.vertex_normals = Some(values(&other));
+        assert_eq!(corner_triangles(&surface, &own), (vec![&other[..]], [0, 0, 0]));
+        surface.uvs = None;
+        surface.colors = Some(CornerValues { values: Cow::Owned(vec![[0.0; 4]; 3]), triangles: &own });
+        assert_eq!(corner_triangles(&surface, &own), (vec![&other[..], &own[..]], [0, 0, 12]));
     }
 }

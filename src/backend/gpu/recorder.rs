@@ -41,8 +41,7 @@ impl<'a> Recorder<'a> {
         let frame = Buffers::upload_uniform(gpu, &mut buffers.frame, bytemuck::bytes_of(&frame)).clone();
         // One more, for dispatches whose numbers are known only on the way.
         let spare_batch = batches.len();
-        let packed = pack(&[batches, &[Batch::default()]].concat());
-        let batches = Buffers::upload_uniform(gpu, &mut buffers.batches, &packed).clone();
+        let batches = upload_batches(gpu, &mut buffers.batches, batches).clone();
         let one = wgpu::BufferBinding { buffer: &batches, offset: 0, size: wgpu::BufferSize::new(BATCH_STRIDE as u64) };
         let uniforms = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
@@ -207,4 +206,16 @@ impl<'a> Recorder<'a> {
             self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None })
         })
     }
+}
+
+/// Uploads batches, a share at a time, into a buffer with room for one more.
+fn upload_batches<'a>(gpu: &Gpu, slot: &'a mut Option<wgpu::Buffer>, batches: &[Batch]) -> &'a wgpu::Buffer {
+    let buffer = Buffers::uniform(gpu, slot, (batches.len() + 1) as u64 * BATCH_STRIDE as u64);
+    let mut at = 0;
+    for share in batches.chunks(4096) {
+        let packed = pack(share);
+        gpu.queue.write_buffer(buffer, at, &packed);
+        at += packed.len() as u64;
+    }
+    buffer
 }

@@ -4,14 +4,14 @@
 //! After each chunk of a large mesh, and each band, the commands go to the device, so that no single submission takes
 //! long and the deadline is looked at in between.
 
-use super::params::{Batch, faces_code, line_flags};
+use super::params::{Batch, edge_lists, faces_code, line_flags};
 use super::passes::Pass;
+use super::sizes::{DeviceTraits, band_rows, has_visibility};
 use super::stages::{Into, Stage, Write};
+use super::step::{Goal, Step};
 use super::tiles::{Tiles, edges_per_group};
+use crate::backend::DrawError;
 use crate::plan::{DrawPlan, roles};
-
-/// Largest buffer that depends on the picture's size, bytes.
-const BAND_BYTES: u64 = 64 << 20;
 
 /// Triangles a dispatch, where none needs clipping; each may leave one item in the work list.
 const CHUNK: u32 = 1 << 20;
@@ -20,89 +20,18 @@ const CHUNK: u32 = 1 << 20;
 const CHUNK_CLIP: u32 = 1 << 17;
 const PIECES_MAX: u32 = 6;
 
-/// Bytes of the work list before its items, and of each.
-pub const WORK_HEAD_BYTES: u64 = 16;
-/// See [`WORK_HEAD_BYTES`].
-pub const WORK_ITEM_BYTES: u64 = 48;
-
-/// Bytes of what layers make of a sample.
-pub const LAYERED_BYTES: u64 = 32;
-
 /// Edges a dispatch.
 const EDGE_CHUNK: u32 = 1 << 20;
 
+/// Different numbers that dispatches may have, each 256 bytes on the GPU: 128 MiB.
+///
+/// The most that a job within all other limits takes: of 4096 rows at 4 samples, 64 line passes make 66 bands of 63 rows. In
+/// each, 10 million triangles that may need clipping are 77 chunks, for the surface and 16 layers, filled and hull, in two
+/// phases: 17 * 77 * 2 * 2 = 5236. 64 passes of 30 million edges are 29 chunks each, 1856. That makes 0.47 million.
+const BATCHES_MAX: usize = 1 << 19;
+
 /// Threads of a workgroup, in every kernel.
 pub const WORKGROUP: u32 = 64;
-
-/// What a device allows, and which way it goes.
-#[derive(Clone, Copy, Debug)]
-pub struct DeviceTraits {
-    /// Largest buffer that can be bound, bytes.
-    pub binding_bytes_max: u64,
-    /// Workgroups in one direction.
-    pub workgroups_max: u32,
-    /// Workgroups that share the large triangles.
-    pub tile_workgroups: u32,
-    /// 64-bit atomics.
-    pub int64_atomics: bool,
-    /// Whether a thread's loops are cut off after a while: see [`Tiles`].
-    pub loops_are_limited: bool,
-}
-
-/// One command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
-    /// Fills a band's samples (and ink) with zeros.
-    ClearBand,
-    /// Empties the work list.
-    ClearWork,
-    /// Empties the layer that is looked for.
-    ClearLayer,
-    /// Where the device must be waited for anyway, asks whether there is another layer behind this one, and if not, goes on
-    /// at step `end`.
-    EndLayer {
-        /// Which.
-        layer: u32,
-        /// Index of the step after the last layer.
-        end: usize,
-    },
-    /// Runs a kernel over `threads` threads with the batch at `batch`.
-    Dispatch {
-        /// Which.
-        stage: Stage,
-        /// Index of its numbers.
-        batch: usize,
-        /// How often.
-        workgroups: [u32; 2],
-    },
-    /// Draws the large triangles of the batch.
-    Tiles {
-        /// The kernel.
-        stage: Stage,
-        /// Index of its numbers.
-        batch: usize,
-    },
-    /// Hands what was recorded to the device.
-    Submit,
-    /// The band is finished: its rows are copied out.
-    EndBand {
-        /// First row.
-        row_first: u32,
-        /// Past its last row.
-        row_end: u32,
-    },
-}
-
-/// What is wanted of a plan.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Goal {
-    /// The picture.
-    Picture,
-    /// The visibility buffer alone.
-    Samples,
-    /// One layer alone.
-    Layer(u32),
-}
 
 /// All commands for a plan.
 #[derive(Debug)]
@@ -117,54 +46,58 @@ pub struct Schedule {
     pub layers: u32,
     /// How the tile kernel is run.
     pub tiles: Tiles,
-}
-
-/// Whether a plan needs the sample buffer at all.
-pub fn has_visibility(plan: &DrawPlan<'_>) -> bool {
-    plan.surface.is_some() || plan.hull.is_some()
+    /// Where each line pass's edges begin.
+    edge_starts: Vec<u32>,
 }
 
 impl Schedule {
     /// The commands for what is wanted of `plan`.
-    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Self {
-        let row_bytes = u64::from(plan.width_px) * pixel_bytes(plan);
-        let band_bytes = BAND_BYTES.min(device.binding_bytes_max);
-        let band_rows = (band_bytes / row_bytes.max(1)).clamp(1, u64::from(plan.height_px.max(1))) as u32;
+    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Result<Self, DrawError> {
+        let band_rows = band_rows(plan, device);
         let tiles = Tiles::new(plan, device, band_rows);
-        let mut schedule = Self { steps: Vec::new(), batches: Vec::new(), band_rows, work_items: 0, layers: 0, tiles };
-        schedule.transform(plan, device);
+        let edge_starts = edge_lists(&plan.lines).1;
+        let (steps, batches) = (Vec::new(), Vec::new());
+        let mut schedule = Self { steps, batches, band_rows, work_items: 0, layers: 0, tiles, edge_starts };
+        schedule.transform(plan, device)?;
         for row_first in (0..plan.height_px).step_by(band_rows as usize) {
             let rows = [row_first, plan.height_px.min(row_first + band_rows)];
             schedule.steps.push(Step::ClearBand);
             if has_visibility(plan) {
-                schedule.visibility(plan, device, rows);
-                schedule.layers(plan, device, rows, goal);
+                schedule.visibility(plan, device, rows)?;
+                schedule.layers(plan, device, rows, goal)?;
             }
             if goal == Goal::Picture {
-                schedule.picture_stages(plan, device, rows);
+                schedule.picture_stages(plan, device, rows)?;
             }
             schedule.steps.push(Step::EndBand { row_first, row_end: rows[1] });
         }
-        schedule
+        Ok(schedule)
     }
 
-    fn transform(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits) {
+    fn transform(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits) -> Result<(), DrawError> {
         let count = plan.positions.len() as u32;
         if plan.surface.is_some() || !plan.lines.is_empty() {
-            self.dispatch(device, Stage::Transform, count, Batch { count, ..Batch::default() });
+            self.dispatch(device, Stage::Transform, count, Batch { count, ..Batch::default() })?;
         }
         if plan.hull.is_some() {
-            self.dispatch(device, Stage::Transform, count, Batch { count, vertex_base: count, ..Batch::default() });
+            self.dispatch(device, Stage::Transform, count, Batch { count, vertex_base: count, ..Batch::default() })?;
         }
+        Ok(())
     }
 
-    fn visibility(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2]) {
-        self.triangles(plan, device, rows, (Into::Surface, 0), Pass::of_surface(plan));
+    fn visibility(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2]) -> Result<(), DrawError> {
+        self.triangles(plan, device, rows, (Into::Surface, 0), Pass::of_surface(plan))
     }
 
     /// One round a layer; a round does nothing where the one before has left nothing to find.
-    fn layers(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2], goal: Goal) {
-        let Some(pass) = plan.layers() else { return };
+    fn layers(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        device: &DeviceTraits,
+        rows: [u32; 2],
+        goal: Goal,
+    ) -> Result<(), DrawError> {
+        let Some(pass) = plan.layers() else { return Ok(()) };
         let rounds = match goal {
             Goal::Picture => pass.count_max,
             Goal::Samples => 0,
@@ -177,9 +110,9 @@ impl Schedule {
         let mut ends = Vec::new();
         for layer in 0..rounds {
             self.steps.push(Step::ClearLayer);
-            self.triangles(plan, device, rows, (Into::Layer, layer), Pass::of_layers(plan));
+            self.triangles(plan, device, rows, (Into::Layer, layer), Pass::of_layers(plan))?;
             let batch = Batch { count, row_first: rows[0], row_end: rows[1], role, layer, ..Batch::default() };
-            self.dispatch(device, Stage::Layers, count, batch);
+            self.dispatch(device, Stage::Layers, count, batch)?;
             self.steps.push(Step::Submit);
             if self.tiles.in_rounds && goal == Goal::Picture {
                 ends.push(self.steps.len());
@@ -192,6 +125,7 @@ impl Schedule {
                 *end = last;
             }
         }
+        Ok(())
     }
 
     fn triangles(
@@ -201,7 +135,7 @@ impl Schedule {
         rows: [u32; 2],
         (into, layer): (Into, u32),
         passes: [Option<Pass>; 2],
-    ) {
+    ) -> Result<(), DrawError> {
         let clip = plan.projection.clip;
         let writes: &[Write] = if device.int64_atomics { &[Write::Both] } else { &[Write::Depth, Write::Id] };
         let count = plan.triangles.len() as u32;
@@ -229,9 +163,9 @@ impl Schedule {
                         ..Batch::default()
                     };
                     self.steps.push(Step::ClearWork);
-                    self.dispatch(device, Stage::Visibility { write, into }, in_chunk, batch);
+                    self.dispatch(device, Stage::Visibility { write, into }, in_chunk, batch)?;
                     if clip {
-                        self.dispatch(device, Stage::Clip, in_chunk, batch);
+                        self.dispatch(device, Stage::Clip, in_chunk, batch)?;
                     }
                     let stage = Stage::VisibilityTile { write, into };
                     self.steps.push(Step::Tiles { stage, batch: self.batches.len() - 1 });
@@ -241,17 +175,17 @@ impl Schedule {
                 }
             }
         }
+        Ok(())
     }
 
     /// What follows visibility, for a band.
-    fn picture_stages(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2]) {
+    fn picture_stages(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2]) -> Result<(), DrawError> {
         let count = plan.width_px * (rows[1] - rows[0]);
         let pixels = Batch { count, row_first: rows[0], row_end: rows[1], ..Batch::default() };
         if plan.is_shaded() {
-            self.dispatch(device, Stage::Shade, count, pixels);
+            self.dispatch(device, Stage::Shade, count, pixels)?;
         }
-        let mut edges_first = 0;
-        for (pass, lines) in (0..).zip(&plan.lines) {
+        for (pass, (lines, edges_first)) in (0..).zip(plan.lines.iter().zip(self.edge_starts.clone())) {
             let lined = Batch {
                 edges_per_group: edges_per_group(plan, lines, device),
                 line_width: lines.width_px,
@@ -265,49 +199,98 @@ impl Schedule {
             let edges = lines.edges.len() as u32;
             for first in (0..edges).step_by(EDGE_CHUNK as usize) {
                 let count = EDGE_CHUNK.min(edges - first);
-                let batch = Batch { first: edges_first + first, count, ..lined };
-                self.dispatch_groups(device, Stage::Lines, count.div_ceil(edges_per_group), batch);
+                let batch = Batch { first: edges_first.saturating_add(first), count, ..lined };
+                self.dispatch_groups(device, Stage::Lines, count.div_ceil(edges_per_group), batch)?;
                 if edges > EDGE_CHUNK {
                     self.steps.push(Step::Submit);
                 }
             }
-            edges_first += edges;
         }
         if plan.lights_lines() {
-            self.dispatch(device, Stage::LineLight, count, pixels);
+            self.dispatch(device, Stage::LineLight, count, pixels)?;
         }
-        self.dispatch(device, Stage::Resolve, count, pixels);
+        self.dispatch(device, Stage::Resolve, count, pixels)
     }
 
-    fn dispatch(&mut self, device: &DeviceTraits, stage: Stage, threads: u32, batch: Batch) {
-        self.dispatch_groups(device, stage, threads.div_ceil(WORKGROUP), batch);
+    fn dispatch(&mut self, device: &DeviceTraits, stage: Stage, threads: u32, batch: Batch) -> Result<(), DrawError> {
+        self.dispatch_groups(device, stage, threads.div_ceil(WORKGROUP), batch)
     }
 
-    fn dispatch_groups(&mut self, device: &DeviceTraits, stage: Stage, workgroups: u32, batch: Batch) {
-        if workgroups > 0 {
-            let x = workgroups.min(device.workgroups_max);
-            self.steps.push(Step::Dispatch {
-                stage,
-                batch: self.batches.len(),
-                workgroups: [x, workgroups.div_ceil(x)],
-            });
+    fn dispatch_groups(
+        &mut self,
+        device: &DeviceTraits,
+        stage: Stage,
+        workgroups: u32,
+        batch: Batch,
+    ) -> Result<(), DrawError> {
+        if workgroups == 0 {
+            return Ok(());
+        }
+        // Neighbours may share theirs: triangles are drawn and clipped by the same numbers.
+        if self.batches.last() != Some(&batch) {
+            if self.batches.len() == BATCHES_MAX {
+                return Err(DrawError::Device(format!("it takes more than {BATCHES_MAX} dispatches")));
+            }
             self.batches.push(batch);
         }
+        let x = workgroups.min(device.workgroups_max);
+        let batch = self.batches.len() - 1;
+        self.steps.push(Step::Dispatch { stage, batch, workgroups: [x, workgroups.div_ceil(x)] });
+        Ok(())
     }
 }
 
-/// Bytes a pixel of the largest buffer that holds a band.
-fn pixel_bytes(plan: &DrawPlan<'_>) -> u64 {
-    let sample = if plan.layers().is_some() { LAYERED_BYTES } else { 8 };
-    (u64::from(plan.samples) * sample).max(color_bytes(plan)).max(ink_bytes(plan))
-}
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
 
-/// Bytes a pixel of colours: the surface's, and the light on lines where they are lit.
-pub fn color_bytes(plan: &DrawPlan<'_>) -> u64 {
-    if plan.lights_lines() { 32 } else { 16 }
-}
+    use super::*;
+    use crate::plan::{Edge, Faces, LayersPass, LinePass, Projection, Shown, SurfacePass};
 
-/// Bytes a pixel of ink: of each line pass, and whose light falls on lines where they are lit.
-pub fn ink_bytes(plan: &DrawPlan<'_>) -> u64 {
-    4 * (plan.lines.len() as u64 + u64::from(plan.lights_lines()))
+    const DEVICE: DeviceTraits = DeviceTraits {
+        binding_bytes_max: 128 << 20,
+        workgroups_max: 65_535,
+        tile_workgroups: 64,
+        int64_atomics: false,
+        loops_are_limited: true,
+    };
+
+    /// The largest picture of that many triangles, all clipped, under `lines` passes of one list of edges.
+    fn schedule(triangles: &[[u32; 3]], lines: usize) -> Result<Schedule, DrawError> {
+        let row = [0.0; 4];
+        let [x, y, z, w] = [row; 4];
+        let axes = [[0.0; 3]; 3];
+        let [to_viewer, screen_up, screen_right] = axes;
+        let clip = Projection { x, y, z, w, near_w: 0.1, clip: true, to_viewer, screen_up, screen_right };
+        let mut plan = DrawPlan::new([4096, 4096], &[[0.0; 3]], triangles, clip);
+        plan.samples = 4;
+        plan.surface = Some(SurfacePass::new(Faces::Both, Vec::new()));
+        plan.roles = vec![roles::SURFACE | roles::LAYER; triangles.len()].into();
+        plan.layers = Some(LayersPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 });
+        let line = LinePass {
+            edges: Arc::new([Edge { vertices: [0; 2], faces: [Edge::NO_FACE; 2] }; 3]),
+            width_px: 1.0,
+            smoothing_px: 1.0,
+            color: [1.0; 4],
+            shown: Shown::All,
+            skip_back_edges: false,
+            contour: false,
+            lit: false,
+        };
+        plan.lines = vec![line; lines];
+        Schedule::new(&plan, &DEVICE, Goal::Picture)
+    }
+
+    #[test]
+    fn the_largest_job_is_scheduled_and_what_goes_beyond_is_refused() {
+        let triangles = vec![[0; 3]; 10_000_000];
+        let all = schedule(&triangles, 64).unwrap();
+        assert!(all.batches.len() > BATCHES_MAX / 4, "{}: the limit is far too high", all.batches.len());
+        assert!(all.steps.len() < 8 * BATCHES_MAX);
+        // As many passes mean as many bands.
+        let few = &triangles[..1];
+        assert!(schedule(few, 256).is_ok());
+        let refused = schedule(few, 4096).unwrap_err();
+        assert!(matches!(&refused, DrawError::Device(reason) if reason.contains("dispatches")), "{refused}");
+    }
 }

@@ -1,7 +1,8 @@
 //! How much a thread is given at a time: how often the kernel that draws large triangles is run, and how many edges one that
 //! draws lines takes.
 
-use super::schedule::{DeviceTraits, WORKGROUP};
+use super::schedule::WORKGROUP;
+use super::sizes::DeviceTraits;
 use crate::plan::{DrawPlan, LinePass};
 
 /// Sample tests that may be handed to the device without looking at how many it really is: a second or so of work.
