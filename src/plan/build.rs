@@ -174,7 +174,6 @@ fn surface_pass<'a>(
     let is_needless = !is_seen && !parts.needs_occluder();
     let why = "the look has no filled surface, and no line that one could hide";
     if skips.skip(SkipKind::Surface, is_needless, why) {
-        skips.skip(SkipKind::Visibility, !parts.has_hull(), "no surface and no hull: no depth is needed");
         return Ok(None);
     }
     let is_shaded = !skips.skip(SkipKind::Shading, !is_seen, "the surface is not seen: it only hides lines");
@@ -185,9 +184,17 @@ fn surface_pass<'a>(
     };
     let mut loader = TextureLoader::new(mesh, means);
     let mut looks = Vec::with_capacity(mesh.materials.len());
+    let used = used_materials(mesh);
     for (index, (slot, layers)) in mesh.materials.iter().zip(&parts.layers).enumerate() {
-        loader.for_material(index);
+        loader.for_material(index, used[index]);
         looks.push(materials::look(mesh, slot, layers, &mut loader)?);
+    }
+    let samples = looks.iter().any(materials::samples);
+    if !skips.skip(SkipKind::Textures, !samples, "nothing samples one") && !samples {
+        for (index, slot) in mesh.materials.iter().enumerate() {
+            loader.for_material(index, used[index]);
+            materials::load_all(slot, &mut loader)?;
+        }
     }
     let size_px = [spec.image.width_px, spec.image.height_px];
     let textures = loader.finish(&projection(camera, size_px, true), skips)?;
@@ -217,6 +224,17 @@ fn surface_pass<'a>(
     Ok(Some(pass))
 }
 
+/// Whether any triangle has a material.
+fn used_materials(mesh: &Mesh) -> Vec<bool> {
+    let mut used = vec![false; mesh.materials.len()];
+    for &material in &mesh.triangle_materials {
+        if let Some(used) = used.get_mut(material as usize) {
+            *used = true;
+        }
+    }
+    used
+}
+
 /// Gives the pass the arrays that its materials read.
 fn attributes<'a>(mesh: &'a Mesh, pass: &mut SurfacePass<'a>, skips: &mut Skips<'_>) {
     let all = pass.all_flags();
@@ -230,7 +248,6 @@ fn attributes<'a>(mesh: &'a Mesh, pass: &mut SurfacePass<'a>, skips: &mut Skips<
         pass.vertex_normals = Some(CornerValues { values, triangles });
     }
     let samples = pass.is_shaded && pass.materials.iter().any(materials::samples);
-    skips.skip(SkipKind::Textures, !samples, "nothing samples one");
     let shows_uvs = pass.materials.iter().any(|m| m.flags & flags::DEBUG == 5 << flags::DEBUG_SHIFT);
     if !mesh.uvs.is_empty() && !skips.skip(SkipKind::Uvs, !samples && !shows_uvs, "nothing samples a texture") {
         let values = Cow::Borrowed(mesh.uvs.as_slice());

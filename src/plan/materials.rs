@@ -36,6 +36,22 @@ pub fn look(
     Ok(look)
 }
 
+/// Loads all textures of a material that samples none.
+pub fn load_all(slot: &MaterialSlot, textures: &mut TextureLoader<'_>) -> Result<(), PlanError> {
+    let all = [
+        (&slot.base_texture, true),
+        (&slot.metallic_roughness_texture, false),
+        (&slot.normal_texture, false),
+        (&slot.emissive_texture, true),
+    ];
+    for (texture, is_color) in all {
+        if let Some(texture) = texture {
+            textures.load(texture, is_color)?;
+        }
+    }
+    Ok(())
+}
+
 fn fill(look: &mut MaterialLook, mesh: &Mesh, slot: &MaterialSlot, surface: &Surface) {
     let file = slot.base_color.unwrap_or(Rgba::from_srgb8(DEFAULT_COLOR).0);
     look.base_color = surface.color.map_or(file, |color| color.0);

@@ -17,6 +17,7 @@ mod texture_closeup;
 mod texture_decode;
 mod texture_half;
 mod texture_levels;
+mod texture_png;
 mod textures;
 mod wires;
 

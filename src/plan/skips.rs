@@ -18,8 +18,6 @@ pub enum SkipKind {
     Surface,
     /// Colours of a surface that only hides lines.
     Shading,
-    /// The visibility buffer.
-    Visibility,
     /// Pushed-out back faces.
     Hull,
     /// Transparent layers and their blending.
@@ -49,7 +47,6 @@ impl SkipKind {
     pub const ALL: &'static [Self] = &[
         Self::Surface,
         Self::Shading,
-        Self::Visibility,
         Self::Hull,
         Self::Layers,
         Self::FaceNormals,
@@ -69,7 +66,6 @@ impl fmt::Display for SkipKind {
         f.write_str(match self {
             Self::Surface => "surface",
             Self::Shading => "shading",
-            Self::Visibility => "visibility",
             Self::Hull => "hull",
             Self::Layers => "transparent layers",
             Self::FaceNormals => "face normals",

@@ -17,6 +17,7 @@
 //! are taken at their worst. A corner that is snapped nowhere, behind the eye or far outside, keeps every level.
 
 use super::Projection;
+use crate::limits::{Deadline, Stopped};
 use crate::mesh::Mesh;
 
 /// A material's use of a texture.
@@ -33,7 +34,13 @@ pub struct Use {
 }
 
 /// For each of `count` textures, a level that every pixel that samples it reaches or exceeds.
-pub fn finest_levels(mesh: &Mesh, projection: &Projection, uses: &[Use], count: usize) -> Vec<u32> {
+pub fn finest_levels(
+    mesh: &Mesh,
+    projection: &Projection,
+    uses: &[Use],
+    count: usize,
+    deadline: &Deadline,
+) -> Result<Vec<u32>, Stopped> {
     let mut of_material = vec![Vec::new(); mesh.materials.len()];
     for (index, one) in uses.iter().enumerate() {
         if let Some(list) = of_material.get_mut(one.material as usize) {
@@ -44,6 +51,9 @@ pub fn finest_levels(mesh: &Mesh, projection: &Projection, uses: &[Use], count: 
     // Those that may still be spared a level.
     let mut open: usize = of_material.iter().map(Vec::len).sum();
     for (t, &material) in mesh.triangle_materials.iter().enumerate() {
+        if t.is_multiple_of(4096) {
+            deadline.check()?;
+        }
         let Some(list) = of_material.get_mut(material as usize).filter(|list| !list.is_empty()) else { continue };
         let screen = on_screen(mesh.triangles[t].map(|v| mesh.positions[v as usize]), projection);
         let uvs = mesh.attribute_triangles[t].map(|v| mesh.uvs[v as usize]);
@@ -64,7 +74,7 @@ pub fn finest_levels(mesh: &Mesh, projection: &Projection, uses: &[Use], count: 
     for (one, &least) in uses.iter().zip(&least) {
         levels[one.texture] = levels[one.texture].min(level(least));
     }
-    levels
+    Ok(levels)
 }
 
 /// The level at which a pixel covers `density` texels of level 0, rounded down, with a margin for the sampler's own

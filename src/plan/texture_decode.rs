@@ -1,10 +1,14 @@
 //! Encoded images to rows of linear texels. What the bytes are is sniffed: a file's word for it is not taken.
+//!
+//! A decoder cannot be stopped midway. Its time is bounded by the pixels that the budget allows and by the input's length, once for
+//! PNG and WebP and baseline JPEG; a progressive JPEG's scans go over all pixels again, and zune-jpeg refuses more than 100 of them.
 
-use std::io::Cursor;
+use std::io::{BufRead, Cursor, Seek};
 
 use super::PlanError;
+use super::texture_png::Essentials;
 use crate::image::srgb_to_linear;
-use ::image::{ColorType, ImageDecoder, ImageFormat, ImageReader, Limits};
+use ::image::{ColorType, ImageDecoder, ImageFormat, ImageReader, ImageResult, Limits};
 
 /// What an image's first bytes say.
 #[derive(Clone, Copy, Debug)]
@@ -40,14 +44,14 @@ pub struct Table<T> {
     alpha: Vec<T>,
 }
 
-/// What decoders may allocate beside their result.
-const DECODER_BYTES_MAX: u64 = 1 << 30;
+/// What decoders may allocate unpaid: a row of half a million pixels, and tables.
+const ALLOWANCE_BYTES: u64 = 4 << 20;
 
 /// Reads what is needed to know the size, and no more. `name` is for errors.
 pub fn header(name: &str, bytes: &[u8]) -> Result<Header, PlanError> {
     let format = sniff(bytes)
         .ok_or_else(|| PlanError::Texture(format!("{name} of the mesh is neither a PNG, a JPEG nor a WebP image")))?;
-    let decoder = decoder(name, bytes, format)?;
+    let decoder = decoder(name, bytes, format, ALLOWANCE_BYTES)?;
     let (width, height) = decoder.dimensions();
     if width == 0 || height == 0 {
         return Err(PlanError::Texture(format!("{name} of the mesh has no pixels")));
@@ -60,7 +64,8 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<Header, PlanError> {
 
 /// Decodes; the caller has paid for it.
 pub fn decode(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, PlanError> {
-    let decoder = decoder(name, bytes, header.format)?;
+    let limit_bytes = header.decoding_bytes.saturating_add(ALLOWANCE_BYTES);
+    let decoder = decoder(name, bytes, header.format, limit_bytes)?;
     let (width, height) = decoder.dimensions();
     let (channels, is_wide) = match decoder.color_type() {
         ColorType::L8 => (1, false),
@@ -142,12 +147,30 @@ fn sniff(bytes: &[u8]) -> Option<ImageFormat> {
     }
 }
 
-fn decoder<'b>(name: &str, bytes: &'b [u8], format: ImageFormat) -> Result<impl ImageDecoder + 'b, PlanError> {
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+/// `limit_bytes` is what it may allocate beside its result.
+fn decoder<'b>(
+    name: &str,
+    bytes: &'b [u8],
+    format: ImageFormat,
+    limit_bytes: u64,
+) -> Result<Box<dyn ImageDecoder + 'b>, PlanError> {
     let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(DECODER_BYTES_MAX);
+    limits.max_alloc = Some(limit_bytes);
+    match format {
+        ImageFormat::Png => limited(Essentials::new(bytes), format, limits),
+        _ => limited(Cursor::new(bytes), format, limits),
+    }
+    .map_err(|error| broken(name, &error))
+}
+
+fn limited<'b>(
+    input: impl BufRead + Seek + 'b,
+    format: ImageFormat,
+    limits: Limits,
+) -> ImageResult<Box<dyn ImageDecoder + 'b>> {
+    let mut reader = ImageReader::with_format(input, format);
     reader.limits(limits);
-    reader.into_decoder().map_err(|error| broken(name, &error))
+    Ok(Box::new(reader.into_decoder()?))
 }
 
 fn broken(name: &str, error: &::image::ImageError) -> PlanError {

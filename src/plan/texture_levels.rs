@@ -3,6 +3,7 @@
 
 use super::texture_decode::{Pixels, Table};
 use super::texture_half::half;
+use crate::limits::{Deadline, Stopped};
 
 /// How many levels an image has, down to a single texel.
 pub fn count(width: u32, height: u32) -> u32 {
@@ -26,44 +27,58 @@ pub fn working_bytes(width: u32, height: u32) -> u64 {
 }
 
 /// Appends the levels from `first` on as half floats.
-pub fn append(pixels: &Pixels, is_color: bool, first: u32, out: &mut Vec<[u16; 4]>) {
+pub fn append(
+    pixels: &Pixels,
+    is_color: bool,
+    first: u32,
+    out: &mut Vec<[u16; 4]>,
+    deadline: &Deadline,
+) -> Result<(), Stopped> {
     let (width, height) = (pixels.width, pixels.height);
     if first == 0 {
         let table = pixels.table(is_color, half);
         let start = out.len();
         out.resize(start + width as usize * height as usize, [0; 4]);
         for (y, row) in (0..height).zip(out[start..].chunks_exact_mut(width as usize)) {
+            deadline.check()?;
             pixels.row(y, &table, row);
         }
     }
     if count(width, height) == 1 {
-        return;
+        return Ok(());
     }
     // In a normal or a metallic map, alpha means nothing.
     let weigh = is_color && pixels.has_alpha();
     let table: Table<f32> = pixels.table(is_color, |v| v);
-    let mut level = shrink([width, height], weigh, |y, row| pixels.row(y, &table, row));
+    let mut level = shrink([width, height], weigh, deadline, |y, row| pixels.row(y, &table, row))?;
     for k in 1.. {
         if k >= first {
             out.extend(level.iter().map(|texel| texel.map(half)));
         }
         if k + 1 == count(width, height) {
-            return;
+            break;
         }
         let size = [side(width, k), side(height, k)];
         let stride = size[0] as usize;
-        level = shrink(size, weigh, |y, row| row.copy_from_slice(&level[y as usize * stride..][..stride]));
+        level = shrink(size, weigh, deadline, |y, row| row.copy_from_slice(&level[y as usize * stride..][..stride]))?;
     }
+    Ok(())
 }
 
 /// The next level of an image whose rows `read` gives.
-fn shrink(size: [u32; 2], weigh: bool, mut read: impl FnMut(u32, &mut [[f32; 4]])) -> Vec<[f32; 4]> {
+fn shrink(
+    size: [u32; 2],
+    weigh: bool,
+    deadline: &Deadline,
+    mut read: impl FnMut(u32, &mut [[f32; 4]]),
+) -> Result<Vec<[f32; 4]>, Stopped> {
     let to = size.map(|s| side(s, 1));
     let columns: Vec<Taps> = (0..to[0]).map(|x| Taps::of(size[0], x)).collect();
     let mut line = vec![[0.0; 4]; size[0] as usize];
     let mut sums = vec![Sum::default(); to[0] as usize];
     let mut out = Vec::with_capacity(to[0] as usize * to[1] as usize);
     for y in 0..to[1] {
+        deadline.check()?;
         sums.fill(Sum::default());
         let rows = Taps::of(size[1], y);
         for (row, down) in (rows.first..).zip(rows.weights()) {
@@ -76,7 +91,7 @@ fn shrink(size: [u32; 2], weigh: bool, mut read: impl FnMut(u32, &mut [[f32; 4]]
         }
         out.extend(sums.iter().map(|sum| sum.mean(weigh)));
     }
-    out
+    Ok(out)
 }
 
 /// The texels that one of the next level covers, and how much of each; the weights add up to 1.

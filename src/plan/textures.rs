@@ -24,6 +24,7 @@ pub struct TextureLoader<'a> {
     budget: &'a mut Budget,
     deadline: &'a Deadline,
     material: u32,
+    is_used: bool,
     wanted: Vec<Wanted>,
     known: BTreeMap<(u32, bool), usize>,
     uses: Vec<Use>,
@@ -44,21 +45,25 @@ impl<'a> TextureLoader<'a> {
             budget: means.budget,
             deadline: means.deadline,
             material: 0,
+            is_used: true,
             wanted: Vec::new(),
             known: BTreeMap::new(),
             uses: Vec::new(),
         }
     }
 
-    /// Says whose textures are loaded next.
-    pub fn for_material(&mut self, material: usize) {
+    /// Says whose textures are loaded next. One that no triangle uses (`is_used`) gets none.
+    pub fn for_material(&mut self, material: usize, is_used: bool) {
         self.material = material as u32;
+        self.is_used = is_used;
     }
 
     /// A texture for a material; `is_color` says that texels are sRGB.
     pub fn load(&mut self, texture: &TextureRef, is_color: bool) -> Result<TextureUse, PlanError> {
         // Without coordinates nothing says where it goes.
-        let Some(image) = self.mesh.images.get(texture.image as usize).filter(|_| !self.mesh.uvs.is_empty()) else {
+        let Some(image) =
+            self.mesh.images.get(texture.image as usize).filter(|_| self.is_used && !self.mesh.uvs.is_empty())
+        else {
             return Ok(TextureUse::NONE);
         };
         let bytes = match &image.content {
@@ -91,7 +96,7 @@ impl<'a> TextureLoader<'a> {
         }
         let Self { mesh, budget, deadline, wanted, uses, .. } = self;
         let sizes: Vec<[u32; 2]> = wanted.iter().map(|w| [w.header.width, w.header.height]).collect();
-        let mut finest = texture_closeup::finest_levels(mesh, projection, &uses, wanted.len());
+        let mut finest = texture_closeup::finest_levels(mesh, projection, &uses, wanted.len(), deadline)?;
         for (level, size) in finest.iter_mut().zip(&sizes) {
             *level = (*level).min(texture_levels::count(size[0], size[1]) - 1);
         }
@@ -115,7 +120,7 @@ impl<'a> TextureLoader<'a> {
             let ImageContent::Encoded(encoded) = &image.content else { continue };
             let pixels = texture_decode::decode(&image.name, encoded, &want.header)?;
             let first_texel = textures.texels.len() as u32;
-            texture_levels::append(&pixels, want.is_color, first_level, &mut textures.texels);
+            texture_levels::append(&pixels, want.is_color, first_level, &mut textures.texels, deadline)?;
             let levels = texture_levels::count(width, height);
             textures.images.push(Texture { width, height, first_level, levels, first_texel, padding: [0; 3] });
         }

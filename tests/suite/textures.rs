@@ -326,6 +326,72 @@ fn sizes_are_checked_before_anything_is_decoded() {
     assert!(start.elapsed() < Duration::from_millis(50), "{:?}", start.elapsed());
 }
 
+/// Whatever is not pixels is passed over: a colour profile that inflates to 80 MiB, and text of 6 MiB, which is more than the
+/// decoder may take before it is paid.
+#[test]
+fn chunks_beside_the_pixels_cost_nothing() {
+    // Deflate's fixed codes: a zero, then copies of 258 bytes from a distance of 1, which are 13 bits, twelve zero.
+    let mut bits = vec![true, true, false];
+    bits.extend([false, false, true, true, false, false, false, false]);
+    for _ in 0..(80 << 20) / 258 {
+        bits.extend([true, true, false, false, false, true, false, true]);
+        bits.extend([false; 5]);
+    }
+    bits.extend([false; 7]);
+    let packed = bits.chunks(8).map(|byte| byte.iter().rev().fold(0, |sum, &bit| sum << 1 | u8::from(bit)));
+    let profile: Vec<u8> = b"p\0\0\x78\x01".iter().copied().chain(packed).collect();
+    let text = [b"Comment\0", &vec![b'x'; 6 << 20][..]].concat();
+    let (header, row) = (header(2, 1, 8, 0), zlib(&[0, 255, 0]));
+    let plain = png(&[(b"IHDR", &header), (b"IDAT", &row)]);
+    let mut cases = 0;
+    let want = textures(&model_of(&plain));
+    for (kind, data) in [(b"iCCP", &profile), (b"tEXt", &text), (b"eXIf", &text), (b"tIME", &text)] {
+        let picture = png(&[(b"IHDR", &header), (kind, data), (b"IDAT", &row)]);
+        let mesh = model_of(&picture);
+        // Far too little for what they hold.
+        let limits = Limits { memory_bytes: 16 << 20, ..Limits::default() };
+        let plan = plan_of(&mesh, &[SkipKind::FineTextureLevels], &limits).unwrap();
+        assert_eq!(plan.surface.unwrap().textures.texels, want.texels);
+        cases += 1;
+    }
+    assert_eq!(cases, 4);
+    // What is needed for the pixels is kept.
+    let clear = png(&[(b"IHDR", &header), (b"tRNS", &[0, 255]), (b"IDAT", &row)]);
+    assert_eq!(textures(&model_of(&clear)).texels[..2], [[0x3c00, 0x3c00, 0x3c00, 0], [0, 0, 0, 0x3c00]]);
+}
+
+/// An image of a material that no triangle has is not looked at, and the others keep their places.
+#[test]
+fn materials_without_triangles_load_nothing() {
+    let picture = encode(&image::RgbImage::new(4, 4).into(), ImageFormat::Png);
+    let mut mesh = model_of(&picture);
+    let slot = mesh.materials[0].clone();
+    mesh.materials.insert(0, slot);
+    mesh.triangle_materials.fill(1);
+    let mut broken = mesh.materials[0].base_texture.unwrap();
+    broken.image = mesh.images.len() as u32;
+    mesh.materials[0].base_texture = Some(broken);
+    let mut image = mesh.images[0].clone();
+    image.content = meshsnap::mesh::material::ImageContent::Missing("lost".to_owned());
+    mesh.images.push(image);
+    let surface = plan_of(&mesh, &[], &Limits::default()).unwrap().surface.unwrap();
+    assert_eq!(surface.materials.len(), 2);
+    let places = [0, 1].map(|m| surface.materials[m].textures[slots::BASE].texture);
+    assert_eq!((places, surface.textures.images.len()), ([TEXTURE_NONE, 0], 1));
+    mesh.triangle_materials.fill(0);
+    assert_eq!(error(&mesh), PlanError::Texture("lost".to_owned()));
+}
+
+#[test]
+fn a_stopped_job_decodes_nothing_more() {
+    let picture = encode(&image::RgbImage::new(4, 4).into(), ImageFormat::Png);
+    let (mesh, deadline) = (model_of(&picture), Deadline::default());
+    deadline.stop();
+    let spec = scenes::spec(&[("style", "smooth"), ("size", "64")]);
+    let plan = plan::build(&mesh, &spec, &mut Budget::new(&Limits::default()), &deadline);
+    assert!(matches!(plan, Err(PlanError::Stopped(_))));
+}
+
 #[test]
 fn uses_are_written_as_the_shaders_read_them() {
     let picture = encode(&image::RgbImage::new(4, 4).into(), ImageFormat::Png);
