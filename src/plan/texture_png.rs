@@ -34,9 +34,9 @@ impl<'b> Essentials<'b> {
                 _ => (self.rest, &[][..]),
             };
             self.rest = rest;
-            // Chunks whose name starts with a small letter are ancillary.
-            let is_ancillary = chunk.get(4).is_some_and(|first| first & 0x20 != 0);
-            if !is_ancillary || chunk.get(4..8) == Some(b"tRNS") {
+            // Chunks whose name starts with a small letter are ancillary. Half a name is none.
+            let is_ancillary = chunk.get(4..8).is_some_and(|name| name[0] & 0x20 != 0 && name != b"tRNS");
+            if !is_ancillary {
                 self.current = chunk;
             }
         }

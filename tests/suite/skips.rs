@@ -23,6 +23,7 @@ const TEXTURED: &[(&str, &[(&str, &str)])] = &[
     ),
     ("texture-unused", &[("style", "smooth"), ("size", "48"), ("surface.color", "c40")]),
     ("texture-wire", &[("style", "wireframe"), ("size", "48")]),
+    ("texture-wire-show", &[("style", "wireframe"), ("size", "48"), ("wire.hidden", "show")]),
 ];
 
 /// What was left out, how often, and what of it was tried the other way.
