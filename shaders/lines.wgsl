@@ -144,6 +144,11 @@ fn draw(edge: vec4<u32>, s: Segment, rows: vec2<i32>, cell: vec2<i32>, step: vec
     for (var y = rows.x + cell.y; y <= rows.y; y += step.y) {
         let columns = columns_of(s, y);
         for (var x = columns.x + cell.x; x <= columns.y; x += step.x) {
+            // What is full stays full, whatever else comes; only a lit line still asks whose it is.
+            let at = batch.ink_at + u32((y - batch.row_first) * frame.width + x);
+            if (batch.line_flags & LIT_PASS) == 0u && atomicLoad(&ink[at]) >= INK_FULL {
+                continue;
+            }
             let from_start = vec2(f32(x), f32(y)) + 0.5 - s.start;
             let t = clamp(dot(from_start, s.along) * s.inverse_length_squared, 0.0, 1.0);
             let level = u32(coverage_of(strip, normal, t, from_start - t * s.along) * 1023.0 + 0.5);

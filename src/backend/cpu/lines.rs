@@ -9,7 +9,7 @@ use super::clip::clip_segment;
 use super::occluders::PlaneCache;
 use super::samples::{NOTHING, SampleBand};
 use super::transform::{ScreenVertex, homogeneous};
-use crate::plan::{Edge, LinePass, Shown};
+use crate::plan::{Edge, INK_FULL, LinePass, Shown};
 
 /// Farthest from the middle of a unit box to its corner.
 const BOX_RADIUS: f32 = std::f32::consts::FRAC_1_SQRT_2;
@@ -109,6 +109,10 @@ pub fn draw(
         let [from, to] = segment.columns(y, band.size_px[0]);
         let row = (y as u32 - band.first_row) as usize * band.size_px[0] as usize;
         for x in from..=to {
+            // What is full stays full, whatever else comes; only a lit line still asks whose it is.
+            if owner == 0 && ink[row + x as usize] >= INK_FULL {
+                continue;
+            }
             let (t, offset) = segment.nearest([x as f32 + 0.5, y as f32 + 0.5]);
             let coverage = (capsule.coverage(t, offset) * 1023.0 + 0.5) as u32;
             if coverage == 0 {
@@ -122,7 +126,7 @@ pub fn draw(
                 let shown = if lines.shown == Shown::Visible { visible } else { band.samples - visible };
                 (coverage * shown + band.samples / 2) / band.samples
             };
-            // Once a pixel is full nothing changes it, so it may stop counting long before the sum could wrap.
+            // Long before the sum could wrap.
             let slot = &mut ink[row + x as usize];
             if *slot < 1 << 31 {
                 *slot += stages.ink_table[level as usize];
