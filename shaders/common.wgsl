@@ -77,6 +77,9 @@ struct Batch {
     layer: u32,
 };
 
+// Ink of full coverage.
+const INK_FULL: u32 = 98304u;
+
 // Bits of `line_flags`.
 const SHOWN_VISIBLE: u32 = 1u;
 const SHOWN_HIDDEN: u32 = 2u;

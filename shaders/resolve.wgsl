@@ -8,9 +8,6 @@
 // Of each pass its colour, and whether it is lit.
 @group(1) @binding(17) var<storage, read> line_colors: array<vec4<f32>>;
 
-// Ink of full coverage.
-const INK_FULL: u32 = 98304u;
-
 @compute @workgroup_size(64)
 fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = gid.x + gid.y * groups.x * 64u;
