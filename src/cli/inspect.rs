@@ -20,13 +20,13 @@ use crate::pipeline::RenderError;
 /// Arguments of `inspect`.
 #[derive(Args)]
 pub struct InspectArgs {
-    /// Mesh file (OBJ, STL, glTF, GLB) and the files it refers to, or a .zip of them; `-` for standard input
+    /// Mesh file (OBJ, STL, PLY, glTF, GLB) and the files it refers to, or a .zip of them; `-` for standard input
     #[arg(required = true, value_name = "MESH")]
     meshes: Vec<String>,
     /// Print JSON
     #[arg(long)]
     json: bool,
-    /// Format of the mesh, where its bytes do not tell: obj, gltf, glb or stl
+    /// Format of the mesh, where its bytes do not tell: obj, gltf, glb, stl or ply
     #[arg(long, value_name = "FORMAT")]
     format_in: Option<String>,
     /// Which of several files is the mesh, where more than one could be

@@ -154,7 +154,7 @@ impl VersionDto {
 #[derive(Serialize)]
 pub struct CapabilitiesDto {
     version: &'static str,
-    mesh_formats: [&'static str; 4],
+    mesh_formats: [&'static str; Format::NAMES.len()],
     image_formats: [&'static str; 3],
     styles: Vec<&'static str>,
     schema: &'static str,

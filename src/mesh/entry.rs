@@ -60,13 +60,13 @@ fn is_mesh(file: &BundleFile, format: Option<Format>) -> bool {
 
 fn no_mesh(files: &[BundleFile]) -> String {
     if files.is_empty() {
-        return "the bundle has no files in it; send a mesh (OBJ, STL, glTF or GLB) and what belongs to it".into();
+        return format!("the bundle has no files in it; send a mesh ({}) and what belongs to it", Format::ALL);
     }
     if files.iter().any(|file| file.path.to_ascii_lowercase().ends_with(".model")) {
-        return "the zip archive is a 3MF file, which is not read: convert it to OBJ, STL, glTF or GLB".into();
+        return format!("the zip archive is a 3MF file, which is not read: convert it to {}", Format::ALL);
     }
     let names = show_all(files.iter().map(|file| file.path.as_str()));
-    format!("no file of the bundle is a mesh in a known format (OBJ, STL, glTF or GLB): there is {names}")
+    format!("no file of the bundle is a mesh in a known format ({}): there is {names}", Format::ALL)
 }
 
 fn unknown(name: &str, files: &[BundleFile]) -> MeshError {

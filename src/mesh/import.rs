@@ -2,7 +2,7 @@
 
 use super::bundle::Bundle;
 use super::normalise::normalise;
-use super::{Folder, Mesh, MeshError, MeshFault, entry, gltf, obj, stl, unzip};
+use super::{Folder, Mesh, MeshError, MeshFault, entry, gltf, obj, ply, stl, unzip};
 use crate::limits::{Budget, Deadline, Limits};
 
 /// The mesh formats that are read.
@@ -19,11 +19,16 @@ pub enum Format {
     StlBinary,
     /// ASCII STL.
     StlAscii,
+    /// PLY of any encoding.
+    Ply,
 }
 
 impl Format {
     /// The names that [`Format::from_name`] knows.
-    pub const NAMES: [&str; 4] = ["obj", "gltf", "glb", "stl"];
+    pub const NAMES: [&str; 5] = ["obj", "gltf", "glb", "stl", "ply"];
+
+    /// All of them, for a sentence.
+    pub const ALL: &str = "OBJ, STL, PLY, glTF or GLB";
 
     /// From a file extension or a query value. `stl` may be either kind: the importer looks.
     pub fn from_name(name: &str) -> Option<Self> {
@@ -32,6 +37,7 @@ impl Format {
             "gltf" => Some(Self::Gltf),
             "glb" => Some(Self::Glb),
             "stl" => Some(Self::StlBinary),
+            "ply" => Some(Self::Ply),
             _ => None,
         }
     }
@@ -43,6 +49,7 @@ impl Format {
             Self::Gltf => "gltf",
             Self::Glb => "glb",
             Self::StlBinary | Self::StlAscii => "stl",
+            Self::Ply => "ply",
         }
     }
 }
@@ -55,6 +62,7 @@ impl std::fmt::Display for Format {
             Self::Glb => "GLB",
             Self::StlBinary => "binary STL",
             Self::StlAscii => "ASCII STL",
+            Self::Ply => "PLY",
         })
     }
 }
@@ -72,7 +80,7 @@ pub fn import(
         [single] if single.bytes.is_empty() => {
             return Err(MeshError::new(
                 MeshFault::Unrecognised,
-                "the body is empty: send the bytes of a mesh file (OBJ, STL, glTF or GLB)",
+                format!("the body is empty: send the bytes of a mesh file ({})", Format::ALL),
             ));
         }
         // Clones of shared bytes.
@@ -84,6 +92,7 @@ pub fn import(
     let raw = match format {
         Format::Obj => obj::read(bytes, &mut cx)?,
         Format::StlBinary | Format::StlAscii => stl::read(bytes, &mut cx)?,
+        Format::Ply => ply::read(bytes, &mut cx)?,
         Format::Gltf | Format::Glb => gltf::read(bytes, &mut cx)?,
     };
     normalise(raw, &mut cx)

@@ -1,7 +1,7 @@
 //! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
 //!
 //! Reading order: [`bundle`] (what comes in), `folder` (what names in it mean), [`raw`] (what an importer fills), `import` (opens the bundle, sniffs the format
-//! and calls one), `obj`, `stl` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
+//! and calls one), `obj`, `stl`, `ply` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
 //! [`topology`], for whoever needs them.
 
 mod attributes;
@@ -16,6 +16,7 @@ pub mod material;
 mod normalise;
 pub mod normals;
 mod obj;
+mod ply;
 mod polygon;
 mod pow2;
 pub mod raw;

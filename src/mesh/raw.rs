@@ -48,3 +48,8 @@ pub fn extend_attribute<T: Copy>(
         all.resize(after, missing);
     }
 }
+
+/// The sRGB transfer function (IEC 61966-2-1), continued beyond 1: for formats that store colours as displayed.
+pub fn srgb_to_linear(v: f64) -> f64 {
+    if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
+}

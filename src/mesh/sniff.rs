@@ -1,6 +1,6 @@
 //! Which format some bytes are in, from the bytes alone: names and content types lie.
 
-use super::{Format, MeshError, MeshFault, stl};
+use super::{Format, MeshError, MeshFault, ply, stl};
 
 /// How far into a text its first telling line may be. Exporters write long comment headers.
 const TEXT_SNIFF_BYTES: usize = 1 << 20;
@@ -13,6 +13,9 @@ pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
     }
     if bytes.starts_with(b"glTF") {
         return Ok(Format::Glb);
+    }
+    if ply::is_ply(bytes) {
+        return Ok(Format::Ply);
     }
     let text = trim_start(bytes);
     if text.starts_with(b"{") {
@@ -33,12 +36,14 @@ pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
     }
     if let Some(name) = known_but_unread(bytes) {
         return Err(unrecognised(&format!(
-            "the body looks like {name}, which is not read: convert it to OBJ, STL, glTF or GLB"
+            "the body looks like {name}, which is not read: convert it to {}",
+            Format::ALL
         )));
     }
-    Err(unrecognised(
-        "the body is not a mesh in a known format (OBJ, STL, glTF or GLB); if it is one, name it with format_in",
-    ))
+    Err(unrecognised(&format!(
+        "the body is not a mesh in a known format ({}); if it is one, name it with format_in",
+        Format::ALL
+    )))
 }
 
 /// The format of a file that lies among others, few of which are meshes. What only resembles a binary STL is one if it
@@ -86,7 +91,6 @@ fn is_corner(word: &str) -> bool {
 fn known_but_unread(bytes: &[u8]) -> Option<&'static str> {
     let starts = |magic: &[u8]| bytes.starts_with(magic);
     [
-        (starts(b"ply\n") || starts(b"ply\r"), "PLY"),
         (starts(b"OFF") || starts(b"COFF"), "OFF"),
         (starts(b"Kaydara FBX"), "FBX"),
         (starts(b"PK\x03\x04"), "a zip file (3MF or a bundle)"),

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use crate::mesh_files::{Gltf, Solid, read, read_as};
+use crate::ply_files::Encoding;
 use meshsnap::mesh::edges::EdgeList;
 use meshsnap::mesh::topology::Topology;
 use meshsnap::mesh::{Format, Mesh, UpAxis};
@@ -45,12 +46,15 @@ fn one_shape_in_every_format_is_one_mesh() {
         let solid = solid.triangulated(&triangles);
 
         let gltf = solid.gltf();
-        let files: [(Vec<u8>, Format, UpAxis); 5] = [
+        let files: [(Vec<u8>, Format, UpAxis); 8] = [
             (solid.obj().into_bytes(), Format::Obj, UpAxis::Y),
             (solid.stl_binary(), Format::StlBinary, UpAxis::Z),
             (solid.stl_ascii().into_bytes(), Format::StlAscii, UpAxis::Z),
             (gltf.glb(), Format::Glb, UpAxis::Y),
             (gltf.gltf().into_bytes(), Format::Gltf, UpAxis::Y),
+            (solid.ply(Encoding::Ascii), Format::Ply, UpAxis::Y),
+            (solid.ply(Encoding::Little), Format::Ply, UpAxis::Y),
+            (solid.ply(Encoding::Big), Format::Ply, UpAxis::Y),
         ];
         for (bytes, format, up) in files {
             let mesh = read(&bytes).unwrap();
@@ -63,7 +67,7 @@ fn one_shape_in_every_format_is_one_mesh() {
             cases += 1;
         }
     }
-    assert_eq!(cases, 10);
+    assert_eq!(cases, 16);
 }
 
 #[test]

@@ -1,13 +1,14 @@
 //! Broken meshes: the right fault, a useful sentence, no panic, no long wait.
 
 use crate::mesh_files::{Noise, Solid, glb, read, read_as};
+use crate::ply_files::Encoding;
 use meshsnap::mesh::{Format, MeshFault};
 use serde_json::json;
 use std::time::{Duration, Instant};
 
-const FORMATS: [Format; 5] = [Format::Obj, Format::Gltf, Format::Glb, Format::StlBinary, Format::StlAscii];
+const FORMATS: [Format; 6] = [Format::Obj, Format::Gltf, Format::Glb, Format::StlBinary, Format::StlAscii, Format::Ply];
 
-fn small_files() -> [(Format, Vec<u8>); 5] {
+fn small_files() -> [(Format, Vec<u8>); 8] {
     let solid = Solid::cuboid().triangulated(&[[0, 2, 3], [4, 5, 7], [0, 1, 5]]);
     let gltf = solid.gltf();
     [
@@ -16,6 +17,9 @@ fn small_files() -> [(Format, Vec<u8>); 5] {
         (Format::Glb, gltf.glb()),
         (Format::StlBinary, solid.stl_binary()),
         (Format::StlAscii, solid.stl_ascii().into_bytes()),
+        (Format::Ply, solid.ply(Encoding::Ascii)),
+        (Format::Ply, solid.ply(Encoding::Little)),
+        (Format::Ply, solid.ply(Encoding::Big)),
     ]
 }
 
@@ -32,7 +36,7 @@ fn what_is_not_a_mesh_is_unrecognised() {
         b"{\"a\": 1}",
         b"[1, 2]",
         b"\x89PNG\r\n\x1a\n",
-        b"ply\nformat ascii 1.0\n",
+        b"OFF\n3 1 0\n",
         b"solid as a rock",
         b"<html></html>",
         b"gl",
@@ -42,7 +46,7 @@ fn what_is_not_a_mesh_is_unrecognised() {
         assert_eq!(error.fault, MeshFault::Unrecognised, "{:?}: {error}", String::from_utf8_lossy(input));
     }
     assert!(read(b"").unwrap_err().detail.contains("empty"));
-    assert!(read(b"ply\nformat ascii 1.0\n").unwrap_err().detail.contains("PLY"));
+    assert!(read(b"OFF\n3 1 0\n").unwrap_err().detail.contains("OFF, which is not read: convert it to OBJ, STL, PLY"));
     for format in FORMATS {
         assert_eq!(read_as(b"", Some(format)).unwrap_err().fault, MeshFault::Unrecognised);
         assert!(read_as(b"# only comments\n", Some(format)).is_err());
@@ -66,7 +70,7 @@ fn random_bytes_are_refused_whatever_they_are_called() {
             cases += 1;
         }
     }
-    assert_eq!(cases, 10_000);
+    assert_eq!(cases, 12_000);
 }
 
 #[test]
@@ -117,7 +121,7 @@ fn mutated_files_never_panic_and_are_never_slow() {
             cases += 1;
         }
     }
-    assert_eq!(cases, 10_000);
+    assert_eq!(cases, 16_000);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Meshes made to cost a lot: refused by a limit, in time, before anything is allocated.
 
 use crate::mesh_files::{Gltf, Solid, read, read_limited};
+use crate::ply_files::Encoding;
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::{Bundle, MeshFault, import};
 use serde_json::{Value, json};
@@ -72,6 +73,9 @@ fn triangles_and_memory_are_limited_in_every_format() {
         gltf.glb(),
         solid.stl_binary(),
         solid.stl_ascii().into_bytes(),
+        solid.ply(Encoding::Ascii),
+        solid.ply(Encoding::Little),
+        solid.ply(Encoding::Big),
     ];
     for bytes in &files {
         let exact = Limits { triangles: 3, ..Limits::default() };

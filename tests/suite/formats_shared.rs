@@ -16,7 +16,7 @@ fn all_models_import() {
     let mut imported = 0;
     let mut refused = Vec::new();
     for path in files(&folder) {
-        if !["obj", "stl", "glb", "gltf"].contains(&extension(&path).as_str()) {
+        if !["obj", "stl", "ply", "glb", "gltf"].contains(&extension(&path).as_str()) {
             continue;
         }
         let name = path.strip_prefix(&folder).unwrap().to_string_lossy().into_owned();
@@ -40,7 +40,7 @@ fn all_models_import() {
             }
         }
     }
-    // Compressed, or in several files.
+    // Compressed, in several files, or points alone.
     let expected = [
         ("BoxDraco/BoxDraco.gltf", MeshFault::Unsupported),
         ("BoxMeshopt.glb", MeshFault::Unsupported),
@@ -48,10 +48,12 @@ fn all_models_import() {
         ("PalmTree/PalmTree.gltf", MeshFault::OutsideBundle),
         ("meshopt-fallback/meshopt-fallback.gltf", MeshFault::OutsideBundle),
         ("meshopt-no-fallback/meshopt-no-fallback.gltf", MeshFault::Unsupported),
+        ("points_ascii.ply", MeshFault::Empty),
+        ("points_bin.ply", MeshFault::Empty),
     ];
     let refused: Vec<(&str, MeshFault)> = refused.iter().map(|(n, e)| (n.as_str(), e.fault.clone())).collect();
     assert_eq!(refused, expected);
-    assert_eq!(imported, 29);
+    assert_eq!(imported, 31);
 }
 
 #[test]
@@ -68,6 +70,8 @@ fn known_models_have_their_known_sizes() {
         ("Duck.glb", 4212, 0),
         ("BoxTextured.glb", 12, 0),
         ("featuretype.STL", 3476, 0),
+        ("featuretype.ply", 3476, 0),
+        ("cube_blender_uv.ply", 12, 6),
     ];
     for (name, triangles, polygons) in cases {
         let mesh = read(&std::fs::read(folder.join(name)).unwrap()).unwrap();

@@ -46,7 +46,7 @@ fn bad_queries_are_a_400_that_names_the_key() {
         ("materials.Glass.opacity=0.3", "unknown_key", "did you mean surface.opacity"),
         ("light.direction=0,0,0", "out_of_range", "not all zero"),
         ("wire.method=fwidth&wire.thickness=11", "out_of_range", "from 0 to 10 where"),
-        ("format_in=dae", "out_of_range", "obj, gltf, glb, stl"),
+        ("format_in=dae", "out_of_range", "obj, gltf, glb, stl, ply"),
         ("background=%00", "out_of_range", "background"),
         ("%ff=%ff", "unknown_key", "no key"),
         ("=", "unknown_key", "no key"),

@@ -13,7 +13,7 @@ mod mtl;
 use self::clean::Cleaner;
 use super::import::Context;
 use super::polygon::Triangulator;
-use super::raw::{RawMesh, extend_attribute};
+use super::raw::{RawMesh, extend_attribute, srgb_to_linear};
 use super::{Format, MaterialSlot, MeshError, Warning};
 use std::path::Path;
 use tobj::{LoadError, LoadOptions};
@@ -107,9 +107,4 @@ fn linearise(colors: &mut [[f32; 4]]) {
     for component in colors.iter_mut().flat_map(|c| &mut c[..3]) {
         *component = srgb_to_linear(f64::from(*component) / scale) as f32;
     }
-}
-
-/// The sRGB transfer function (IEC 61966-2-1), continued beyond 1.
-fn srgb_to_linear(v: f64) -> f64 {
-    if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
 }

@@ -1,0 +1,123 @@
+//! A binary body, in either byte order.
+
+use super::header::Kind;
+use super::layout::{Layout, Step};
+use super::source::{Columns, Source};
+
+/// Reads numbers; `BIG`: most significant byte first.
+pub struct Binary<'a, const BIG: bool> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+/// Evaluates an expression with `$type` standing for the Rust type of a kind, so that loops inside of it are compiled for
+/// each type and do not ask for every number.
+macro_rules! by_kind {
+    ($kind:expr, $type:ident => $body:expr) => {
+        match $kind {
+            Kind::I8 => by_kind!(@ i8, $type, $body),
+            Kind::U8 => by_kind!(@ u8, $type, $body),
+            Kind::I16 => by_kind!(@ i16, $type, $body),
+            Kind::U16 => by_kind!(@ u16, $type, $body),
+            Kind::I32 => by_kind!(@ i32, $type, $body),
+            Kind::U32 => by_kind!(@ u32, $type, $body),
+            Kind::F32 => by_kind!(@ f32, $type, $body),
+            Kind::F64 => by_kind!(@ f64, $type, $body),
+        }
+    };
+    (@ $rust:ty, $type:ident, $body:expr) => {{
+        type $type = $rust;
+        $body
+    }};
+}
+
+/// A number in a file. `bytes` is exactly as long as it needs.
+trait Number {
+    fn read<const BIG: bool>(bytes: &[u8]) -> f64;
+}
+
+macro_rules! number {
+    ($($type:ty),*) => {$(
+        impl Number for $type {
+            fn read<const BIG: bool>(bytes: &[u8]) -> f64 {
+                let mut own = [0; size_of::<Self>()];
+                own.copy_from_slice(bytes);
+                if BIG {
+                    own.reverse();
+                }
+                f64::from(Self::from_le_bytes(own))
+            }
+        }
+    )*};
+}
+number!(i8, u8, i16, u16, i32, u32, f32, f64);
+
+impl<'a, const BIG: bool> Binary<'a, BIG> {
+    /// Reads `bytes` from `at` on.
+    pub fn new(bytes: &'a [u8], at: usize) -> Self {
+        Self { bytes, at }
+    }
+
+    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let end = self.at.checked_add(count)?;
+        let taken = self.bytes.get(self.at..end)?;
+        self.at = end;
+        Some(taken)
+    }
+}
+
+impl<const BIG: bool> Source for Binary<'_, BIG> {
+    fn value(&mut self, kind: Kind) -> Option<f64> {
+        let bytes = self.take(kind.bytes())?;
+        Some(by_kind!(kind, T => T::read::<BIG>(bytes)))
+    }
+
+    fn values(&mut self, kind: Kind, count: usize, items: &mut Vec<f64>) -> Option<()> {
+        let bytes = self.take(count.checked_mul(kind.bytes())?)?;
+        by_kind!(kind, T => items.extend(bytes.chunks_exact(size_of::<T>()).map(T::read::<BIG>)));
+        Some(())
+    }
+
+    fn skip(&mut self, _numbers: usize, bytes: usize) -> Option<()> {
+        self.take(bytes).map(|_| ())
+    }
+
+    fn columns(&mut self, layout: &Layout, rows: usize, columns: &mut Columns) -> Option<()> {
+        let stride = layout.stride?;
+        let block = self.take(rows.checked_mul(stride)?)?;
+        for step in &layout.steps {
+            let Step::Value { kind, slot, offset } = *step else { continue };
+            let column = &mut columns[slot];
+            column.clear();
+            by_kind!(kind, T => {
+                let of_record = |record: &[u8]| T::read::<BIG>(&record[offset..offset + size_of::<T>()]);
+                column.extend(block.chunks_exact(stride).map(of_record));
+            });
+        }
+        Some(())
+    }
+
+    fn is_in_columns(&self) -> bool {
+        true
+    }
+
+    fn numbers_left(&self, kind: Kind) -> u64 {
+        (self.bytes.len() - self.at) as u64 / kind.bytes() as u64
+    }
+
+    fn at(&self) -> usize {
+        self.at
+    }
+
+    fn place(&self, at: usize) -> String {
+        format!("byte {at} of the PLY file")
+    }
+
+    fn why(&self) -> String {
+        "the file ends within".into()
+    }
+
+    fn trailing_bytes(&self) -> usize {
+        self.bytes.len() - self.at
+    }
+}
