@@ -4,6 +4,7 @@ use crate::formats::assert_same_shape;
 use crate::mesh_files::{Solid, read};
 use crate::ply_files::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
 use crate::scenes;
+use crate::server::Server;
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::limits::Deadline;
@@ -217,4 +218,22 @@ fn strips_wind_alternately_and_begin_anew() {
         let both = ply.element("face", &INDICES, &[list(&[0.0, 2.0, 3.0, 1.0])]);
         assert_eq!(read(&both.bytes()).unwrap().triangles.len(), 8);
     }
+}
+
+#[test]
+fn the_service_reads_it_by_its_bytes_and_by_its_name() {
+    let server = Server::start(&[]);
+    for encoding in ENCODINGS {
+        let bytes = polygons().ply(encoding);
+        let sniffed = server.post("/v1/render?size=32", &bytes);
+        sniffed.picture(32, 32);
+        assert_eq!(server.post("/v1/render?size=32&format_in=ply", &bytes).body, sniffed.body);
+        server.post("/v1/render?size=32", &bytes[..bytes.len() - 9]).problem(422, "mesh_broken");
+        server.post("/v1/render?size=32&format_in=stl", &bytes).problem(422, "mesh_broken");
+    }
+    let points = Ply::new(Encoding::Little).element("vertex", &XYZ, &Solid::cuboid().vertex_records()).bytes();
+    let detail = server.post("/v1/render", &points).problem(422, "mesh_empty");
+    assert!(detail.contains("8 vertices and 0 faces; points are not drawn"), "{detail}");
+    let formats = server.get("/v1/capabilities").json()["mesh_formats"].clone();
+    assert!(formats.as_array().unwrap().contains(&"ply".into()), "{formats}");
 }

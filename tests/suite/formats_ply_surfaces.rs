@@ -4,6 +4,10 @@ use crate::bundles::{files, read_bundle};
 use crate::formats_ply::codes;
 use crate::mesh_files::read;
 use crate::ply_files::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
+use crate::scenes;
+use meshsnap::backend::Renderer;
+use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::limits::Deadline;
 use meshsnap::mesh::material::ImageContent;
 use meshsnap::mesh::{Bundle, Mesh};
 
@@ -147,4 +151,69 @@ fn textures_come_from_the_bundle() {
     let bare = triangle(Encoding::Ascii, &[], [&[]; 3]).line("comment TextureFile a.png");
     let mesh = read(&bare.element("face", &INDICES, &self::face()).bytes()).unwrap();
     assert_eq!((mesh.materials.len(), mesh.materials[0].base_texture, codes(&mesh)), (1, None, vec!["uvs_missing"]));
+}
+
+/// A sheet of two quads with a texture and colours: as OBJ, and as PLY with texture coordinates a vertex and a corner.
+#[test]
+fn textured_and_coloured_files_draw_what_obj_draws() {
+    let mut png = Vec::new();
+    let image = image::RgbImage::from_fn(16, 16, |x, y| {
+        image::Rgb([(x * 16) as u8, (y * 16) as u8, 255 * ((x + y) % 2) as u8])
+    });
+    image.write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
+    let vertices: Vec<[f64; 8]> = (0..6_u32)
+        .map(|i| {
+            let (x, y) = (f64::from(i % 3), f64::from(i / 3));
+            let color = |k: u32| f64::from((i + k) % 3) * 0.5;
+            [x, y, x * y * 0.25, x * 0.5, y, color(0), color(1), color(2)]
+        })
+        .collect();
+    let quads = [[0, 1, 4, 3], [1, 2, 5, 4]];
+    let faces = quads.map(|quad: [usize; 4]| list(&quad.map(|v| v as f64)));
+    let mut obj = String::from("mtllib m.mtl\nusemtl m\n");
+    for [x, y, z, u, v, r, g, b] in &vertices {
+        obj += &format!("v {x} {y} {z} {r} {g} {b}\nvt {u} {v}\n");
+    }
+    for quad in quads {
+        let corners: Vec<String> = quad.iter().map(|v| format!("{0}/{0}", v + 1)).collect();
+        obj += &format!("f {}\n", corners.join(" "));
+    }
+    let draw = |entry: (&str, &[u8]), style: &str| {
+        let bundle = files(&[entry, ("m.mtl", b"newmtl m\nKd 1 1 1\nmap_Kd t.png\n"), ("t.png", &png)]);
+        let mesh = read_bundle(&Bundle::of_files(bundle)).unwrap();
+        let plan = scenes::plan(&mesh, &scenes::spec(&[("size", "96"), ("view", "front"), ("style", style)]));
+        CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap().rgba
+    };
+    let mut cases = 0;
+    for style in ["smooth", "flat", "unlit"] {
+        let expected = draw(("m.obj", obj.as_bytes()), style);
+        assert!(
+            expected.chunks(4).any(|p| p[0] > p[2].saturating_add(50))
+                && expected.chunks(4).any(|p| p[2] > p[0].saturating_add(50)),
+            "colourful"
+        );
+        for encoding in ENCODINGS {
+            let colors = ["double red", "double green", "double blue"];
+            let at_vertices = [&XYZ[..], &["float s", "float t"], &colors].concat();
+            let all: Vec<Vec<f64>> = vertices.iter().map(|v| v.to_vec()).collect();
+            let named = || Ply::new(encoding).line("comment TextureFile t.png");
+            let by_vertex = named().element("vertex", &at_vertices, &all).element("face", &INDICES, &faces);
+            let without: Vec<Vec<f64>> = vertices.iter().map(|v| [&v[..3], &v[5..]].concat()).collect();
+            let wedges: Vec<Vec<f64>> = quads
+                .iter()
+                .zip(&faces)
+                .map(|(quad, face)| {
+                    let uvs: Vec<f64> = quad.iter().flat_map(|&v| [vertices[v][3], vertices[v][4]]).collect();
+                    [face.clone(), list(&uvs)].concat()
+                })
+                .collect();
+            let by_corner = named().element("vertex", &[&XYZ[..], &colors].concat(), &without);
+            let by_corner = by_corner.element("face", &[INDICES[0], "list uchar double texcoord"], &wedges);
+            for ply in [by_vertex, by_corner] {
+                assert!(draw(("m.ply", &ply.bytes()), style) == expected, "{style} {encoding:?}");
+                cases += 1;
+            }
+        }
+    }
+    assert_eq!(cases, 18);
 }

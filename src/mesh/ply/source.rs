@@ -43,8 +43,6 @@ pub struct Meter {
     unpaid_bytes: u64,
     /// Triangles so far, at least.
     triangles: u64,
-    /// Items that the lists of a [`Row`] have room for.
-    list_items: u64,
 }
 
 /// What memory the records of an element take once read, bytes.
@@ -74,7 +72,7 @@ pub fn each_record<S: Source>(
             cx.deadline.check()?;
         }
         let begin = source.at();
-        read_record(source, layout, &mut row, meter, cx).map_err(|fault| match fault {
+        read_record(source, layout, &mut row, cx).map_err(|fault| match fault {
             Fault::NoValue => {
                 let (place, why) = (source.place(source.at()), source.why());
                 MeshError::broken(format!("{place}: {why} {}", name(element, number)))
@@ -85,15 +83,16 @@ pub fn each_record<S: Source>(
             }
             Fault::Is(error) => *error,
         })?;
-        meter.triangles += keep(&row).map_err(|what| {
-            let place = source.place(begin);
-            MeshError::broken(format!("{place}: {} {what}", name(element, number)))
-        })?;
+        // Before anything is kept: one list may be the whole file.
         let items = row.lists.iter().map(|list| list.len() as u64).sum::<u64>();
         meter.unpaid_bytes += cost.record + cost.item * items;
         if meter.unpaid_bytes > PAY_BYTES {
             meter.pay(cx)?;
         }
+        meter.triangles += keep(&row).map_err(|what| {
+            let place = source.place(begin);
+            MeshError::broken(format!("{place}: {} {what}", name(element, number)))
+        })?;
     }
     meter.pay(cx)
 }
@@ -136,13 +135,7 @@ enum Fault {
     Is(Box<MeshError>),
 }
 
-fn read_record<S: Source>(
-    source: &mut S,
-    layout: &Layout,
-    row: &mut Row,
-    meter: &mut Meter,
-    cx: &mut Context<'_>,
-) -> Result<(), Fault> {
+fn read_record<S: Source>(source: &mut S, layout: &Layout, row: &mut Row, cx: &mut Context<'_>) -> Result<(), Fault> {
     for step in &layout.steps {
         match *step {
             Step::Skip { numbers, bytes } => source.skip(numbers, bytes).ok_or(Fault::NoValue)?,
@@ -151,7 +144,7 @@ fn read_record<S: Source>(
                 let given = source.value(count).ok_or(Fault::NoValue)?;
                 let count = list_length(source, given, item)?;
                 match slot {
-                    Some(slot) => read_list(source, item, count, &mut row.lists[slot], meter, cx)?,
+                    Some(slot) => read_list(source, item, count, &mut row.lists[slot], cx)?,
                     None => skip_list(source, item, count, cx)?,
                 }
             }
@@ -178,15 +171,12 @@ fn read_list<S: Source>(
     item: Kind,
     count: usize,
     list: &mut Vec<f64>,
-    meter: &mut Meter,
     cx: &mut Context<'_>,
 ) -> Result<(), Fault> {
     list.clear();
     if count > list.capacity() {
-        // One list may be the whole file.
-        let more = (count as u64).saturating_sub(meter.list_items);
+        let more = (count - list.capacity()) as u64;
         cx.budget.spend("a list of the PLY file", more, 8).map_err(boxed)?;
-        meter.list_items += more;
         list.reserve_exact(count);
     }
     in_pieces(count, cx, |piece| source.values(item, piece, list))
