@@ -15,7 +15,7 @@ const COLOR: Range<usize> = 6..9;
 const ALPHA: usize = 9;
 const UV: Range<usize> = 10..12;
 
-/// Vertices that are read at once: their columns stay in a first-level cache.
+/// Vertices that are read at once: few enough that their columns stay in the nearest caches.
 const BLOCK: usize = 512;
 /// Blocks between two looks at the deadline.
 const BLOCKS_PER_LOOK: u64 = 128;
