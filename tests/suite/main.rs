@@ -55,6 +55,7 @@ mod textures;
 mod textures_closeup;
 mod truth;
 mod twins;
+mod twins_flat;
 mod twins_shade;
 mod twins_visibility;
 mod wire_formulas;
