@@ -58,4 +58,5 @@ mod twins;
 mod twins_flat;
 mod twins_shade;
 mod twins_visibility;
+mod views;
 mod wire_formulas;
