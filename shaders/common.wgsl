@@ -177,6 +177,14 @@ fn recip(w: f32) -> f32 {
     return r;
 }
 
+// 1 / w for positive normal w, for colours: an iteration less.
+fn quick_recip(w: f32) -> f32 {
+    var r = bitcast<f32>(0x7EF311C7u - bitcast<u32>(w));
+    r = rn(r * (2.0 - rn(w * r)));
+    r = rn(r * (2.0 - rn(w * r)));
+    return rn(r * (2.0 - rn(w * r)));
+}
+
 // 1 / sqrt(v) for positive normal v.
 fn rsqrt(v: f32) -> f32 {
     var r = bitcast<f32>(0x5F3759DFu - (bitcast<u32>(v) >> 1u));
@@ -199,6 +207,12 @@ fn row_dot(row: vec4<f32>, p: vec3<f32>) -> f32 {
 // row . (n, 0)
 fn row_dot3(row: vec4<f32>, n: vec3<f32>) -> f32 {
     return rn(rn(row.x * n.x) + rn(row.y * n.y)) + rn(row.z * n.z);
+}
+
+// a . b
+fn dot3(a: vec3<f32>, b: vec3<f32>) -> f32 {
+    let p = rn3(a * b);
+    return rn(p.x + p.y) + p.z;
 }
 
 // Homogeneous screen position.

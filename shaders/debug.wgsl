@@ -13,8 +13,8 @@ fn debug_color(view: u32, id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> ve
         case 4u: {
             if is_lit {
                 let n = normal(id, at, m, b);
-                let seen = vec3(dot(n, frame.screen_right.xyz), dot(n, frame.screen_up.xyz), dot(n, frame.to_viewer.xyz));
-                return shown(0.5 + 0.5 * seen);
+                let seen = vec3(dot3(n, frame.screen_right.xyz), dot3(n, frame.screen_up.xyz), dot3(n, frame.to_viewer.xyz));
+                return shown(0.5 + rn3(0.5 * seen));
             }
         }
         case 5u: {
@@ -44,13 +44,13 @@ fn checker(at: vec2<f32>) -> vec3<f32> {
     let uv = bounded(at, 65536.0);
     let cell = vec2<i32>(floor(8.0 * uv));
     let bright = select(0.55, 1.0, ((cell.x + cell.y) & 1) == 0);
-    return bright * vec3(0.2 + 0.8 * (uv - floor(uv)), 0.45);
+    return rn3(bright * vec3(0.2 + rn2(0.8 * (uv - floor(uv))), 0.45));
 }
 
 // The linear colour that is stored as these values: sRGB decoding (IEC 61966-2-1), the same bits on both back-ends.
 fn shown(display: vec3<f32>) -> vec4<f32> {
     let v = clamp(display, vec3(0.0), vec3(1.0));
-    let t = rn3((v + 0.055) * (1.0 / 1.055));
+    let t = rn3((v + 0.055) * 0.9478673);
     // t^2.4 = (t t^(-1/5))^3, the root by Newton's iteration from an integer guess.
     var root = bitcast<vec3<f32>>(vec3(0x4C2C47E5u) - bitcast<vec3<u32>>(t) / 5u);
     for (var i = 0; i < 4; i++) {

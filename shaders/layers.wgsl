@@ -77,7 +77,7 @@ fn take(sample: u32) -> u32 {
 // Lays a colour under a sample's others.
 fn lay(sample: u32, color: vec4<f32>) {
     let so_far = layered[sample].color;
-    let sum = so_far + (1.0 - so_far.w) * color;
+    let sum = so_far + rn4((1.0 - so_far.w) * color);
     layered[sample].color = sum;
     if sum.w >= 1.0 {
         layered[sample].previous = vec2(0u);

@@ -69,7 +69,7 @@ fn point_color(id: u32, at: vec2<f32>, show: Show) -> vec4<f32> {
     let base = with_alpha(m, materials[m].base_color, show);
     var light_here = Light(1.0, 0.0);
     if (materials[m].flags & MATERIAL_FACE_NORMALS) != 0u {
-        let normal = facing(face_normal(id), is_front(id, at));
+        let normal = turned_to_viewer(face_normal(id), is_front(id, at));
         light_here = light(materials[m].metallic, materials[m].roughness, normal);
     }
     return premultiplied(lit(base, light_here), materials[m].emissive.xyz);
@@ -119,7 +119,7 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
     }
     var emissive = materials[m].emissive.xyz;
     if has(TEXTURES) {
-        emissive *= sample_texture(m, SLOT_EMISSIVE, uv).xyz;
+        emissive = rn3(emissive * sample_texture(m, SLOT_EMISSIVE, uv).xyz);
     }
     if has(WIRE_LIT) && (flags & MATERIAL_WIRE_LIT) != 0u {
         return lit_wire(cover, wire, base, light_here, emissive);
@@ -162,7 +162,7 @@ fn normal(id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> vec3<f32> {
         return derivative_normal(id, at);
     }
     if has(FACE_NORMALS) && (flags & MATERIAL_FACE_NORMALS) != 0u {
-        return facing(face_normal(id), b.front);
+        return turned_to_viewer(face_normal(id), b.front);
     }
     if has(VERTEX_NORMALS) {
         return facing(blend3(b.value, normal_at(id, 0u), normal_at(id, 1u), normal_at(id, 2u)), b.front);
@@ -222,27 +222,32 @@ fn with_alpha(m: u32, base: vec4<f32>, show: Show) -> vec4<f32> {
     if is_cut || !show.fill || (flags & MATERIAL_FILL) == 0u {
         return vec4(0.0);
     }
-    return vec4(base.xyz, select(1.0, alpha, (flags & MATERIAL_BLEND) != 0u) * materials[m].opacity);
+    return vec4(base.xyz, rn(select(1.0, alpha, (flags & MATERIAL_BLEND) != 0u) * materials[m].opacity));
 }
 
 // A straight colour under light, as bright as can be shown.
 fn lit(base: vec4<f32>, light_here: Light) -> vec4<f32> {
-    return vec4(clamp(base.xyz * light_here.gain + light_here.gloss, vec3(0.0), vec3(1.0)), base.w);
+    return vec4(clamp(rn3(base.xyz * light_here.gain) + light_here.gloss, vec3(0.0), vec3(1.0)), base.w);
 }
 
 fn premultiplied(straight: vec4<f32>, emissive: vec3<f32>) -> vec4<f32> {
-    return vec4((straight.xyz + emissive) * straight.w, straight.w);
+    return vec4(rn3((straight.xyz + emissive) * straight.w), straight.w);
 }
 
 // The wire as paint: over the base colour, under the light.
 fn lit_wire(cover: f32, wire: vec4<f32>, base: vec4<f32>, light_here: Light, emissive: vec3<f32>) -> vec4<f32> {
-    let painted = over(cover, wire, vec4(base.xyz * base.w, base.w));
-    let left = base.w * (1.0 - cover * wire.w);
-    let lit = painted.xyz * light_here.gain + painted.w * light_here.gloss;
-    return vec4(clamp(lit, vec3(0.0), vec3(max(painted.w, 0.0))) + emissive * left, painted.w);
+    let painted = over(cover, wire, vec4(rn3(base.xyz * base.w), base.w));
+    let left = rn(base.w * (1.0 - rn(cover * wire.w)));
+    let lit = rn3(painted.xyz * light_here.gain) + rn(painted.w * light_here.gloss);
+    return vec4(clamp(lit, vec3(0.0), vec3(max(painted.w, 0.0))) + rn3(emissive * left), painted.w);
 }
 
-// The unit normal on the viewer's side.
+// A face's normal on the viewer's side: at unit length already, so that it keeps its bits.
+fn turned_to_viewer(n: vec3<f32>, front: bool) -> vec3<f32> {
+    return select(-n, n, front);
+}
+
+// The unit normal on the viewer's side, of what corners' normals blend to.
 fn facing(n: vec3<f32>, front: bool) -> vec3<f32> {
     let length_squared = dot(n, n);
     var scale = 0.0;
@@ -261,7 +266,7 @@ fn unit_or(v: vec3<f32>, otherwise: vec3<f32>) -> vec3<f32> {
 }
 
 fn over(cover: f32, top: vec4<f32>, under: vec4<f32>) -> vec4<f32> {
-    return cover * top + under * (1.0 - cover * top.w);
+    return rn4(cover * top) + rn4(under * (1.0 - rn(cover * top.w)));
 }
 
 // What of v is at right angles to the unit vector n, at length about 1 where that is not nothing.

@@ -17,7 +17,7 @@ fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroup
     var c = frame.background;
     if has(SURFACE | HULL) {
         let color = colors[i];
-        c = color + frame.background * (1.0 - color.w);
+        c = color + rn4(frame.background * (1.0 - color.w));
     }
     if has(LINES) {
         for (var n = 0u; n < frame.line_pass_count; n++) {
@@ -26,7 +26,7 @@ fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroup
             if has(LIT_LINES) && line_colors[2u * n + 1u].x != 0.0 {
                 color = lit_color(color, colors[batch.count + i].xy);
             }
-            c = cover * color + c * (1.0 - cover * color.w);
+            c = rn4(cover * color) + rn4(c * (1.0 - rn(cover * color.w)));
         }
     }
     rgba[i] = encode(c);
@@ -34,7 +34,7 @@ fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroup
 
 // A premultiplied colour under light (A, B).
 fn lit_color(c: vec4<f32>, light: vec2<f32>) -> vec4<f32> {
-    return vec4(clamp(c.xyz * light.x + light.y * c.w, vec3(0.0), vec3(c.w)), c.w);
+    return vec4(clamp(rn3(c.xyz * light.x) + rn(light.y * c.w), vec3(0.0), vec3(c.w)), c.w);
 }
 
 // Ink back to coverage, 0 to 1.
@@ -52,8 +52,9 @@ fn encode(c: vec4<f32>) -> u32 {
     var color = c.xyz;
     var alpha = 255u;
     if c.w < 1.0 {
-        color = color * (1.0 / c.w);
-        alpha = u32(c.w * 255.0 + 0.5);
+        // Of what is fainter no bit is left.
+        color = rn3(color * recip(max(c.w, 1e-30)));
+        alpha = u32(rn(c.w * 255.0) + 0.5);
     }
     return srgb(color.x) | (srgb(color.y) << 8u) | (srgb(color.z) << 16u) | (alpha << 24u);
 }

@@ -18,7 +18,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         let id = id_at(i);
         var color = group_color(lone_group(id), pixel, surface_show(id));
         if has(LAYERS) {
-            color = layered[i].color + (1.0 - layered[i].color.w) * color;
+            color = layered[i].color + rn4((1.0 - layered[i].color.w) * color);
         }
         colors[i] = color;
         return;
@@ -33,7 +33,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         let b = layered[4u * i + 1u].color;
         let c = layered[4u * i + 2u].color;
         let d = layered[4u * i + 3u].color;
-        sum = 0.25 * ((a + b) + (c + d));
+        sum = rn4(0.25 * (((a + b) + c) + d));
         rest = 1.0 - vec4(a.w, b.w, c.w, d.w);
     }
     // Once for each triangle among the samples.
@@ -42,9 +42,10 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         left = left & !group.same;
         var weight = f32(group.count);
         if has(LAYERS) {
-            weight = dot(rest, select(vec4(0.0), vec4(1.0), group.same));
+            let share = select(vec4(0.0), rest, group.same);
+            weight = ((share.x + share.y) + share.z) + share.w;
         }
-        sum += weight * 0.25 * group_color(group, pixel, surface_show(group.id));
+        sum += rn4(rn(0.25 * weight) * group_color(group, pixel, surface_show(group.id)));
     }
     colors[i] = sum;
 }

@@ -37,7 +37,7 @@ pub struct Output {
     pub backend: BackendKind,
     /// What the plan left out, and why.
     pub skips: Vec<Skip>,
-    /// What the importer noticed.
+    /// What the importer noticed, and what of the request does not go with the mesh.
     pub warnings: Vec<Warning>,
 }
 
@@ -90,6 +90,10 @@ pub fn render(
     let mut warnings = std::mem::take(&mut mesh.report.warnings);
     warnings.extend(unknown_materials(&mesh, job.spec));
     let plan = plan::build(&mesh, job.spec, &mut budget, deadline)?;
+    if plan::is_out_of_view(&plan) {
+        let detail = "the camera looks past the whole mesh, and the picture is blank".to_owned();
+        warnings.push(Warning { code: "mesh_out_of_view", detail });
+    }
     ended(Stage::Plan);
 
     let drawn = backends.draw(job.spec.backend, &plan, deadline)?;

@@ -66,7 +66,12 @@ impl GpuHost {
 
     /// How it stands. Does not wait for an opening.
     pub fn status(&self) -> GpuStatus {
-        self.status.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        // There is one then, of software or well again.
+        if status.state == GpuState::Ready {
+            status.reason = status.reason.map(|reason| format!("`auto` means the CPU all the same: {reason}"));
+        }
+        status
     }
 
     /// The device that a request of this kind draws on, opened now if need be; workers that come meanwhile wait for it.

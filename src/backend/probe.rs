@@ -52,7 +52,7 @@ pub enum ProbeError {
         samples: u32,
     },
     /// A pixel has another colour than it should.
-    #[error("it draws the probe wrong: {wrong} of {of} pixels at {samples} samples a pixel")]
+    #[error("it draws the probe wrong: {wrong} of {of} pixels where samples = {samples}")]
     Pixels {
         /// How many.
         wrong: usize,

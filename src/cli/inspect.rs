@@ -13,7 +13,7 @@ use super::{bundle, files};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Topology;
-use crate::mesh::{self, Mesh};
+use crate::mesh::{self, Mesh, counted};
 use crate::pipeline::PlanError;
 use crate::pipeline::RenderError;
 
@@ -138,12 +138,13 @@ impl TopologyEntry {
 
     fn text(&self) -> String {
         let Self { components, edges, open_edges, nonmanifold_edges, inconsistent_edges, .. } = self;
-        let parts = if *components == 1 { "1 part".to_owned() } else { format!("{components} parts") };
+        let parts = counted(*components, "part", "parts");
+        let edges = counted(*edges, "edge", "edges");
         if self.is_watertight {
-            return format!("{parts}, watertight, {edges} edges, Euler characteristic {}", self.euler_characteristic);
+            return format!("{parts}, watertight, {edges}, Euler characteristic {}", self.euler_characteristic);
         }
         format!(
-            "{parts}, {edges} edges: {open_edges} open, {nonmanifold_edges} non-manifold, \
+            "{parts}, {edges}: {open_edges} open, {nonmanifold_edges} non-manifold, \
              {inconsistent_edges} between faces of opposite winding"
         )
     }
@@ -198,7 +199,13 @@ impl Report {
         line("topology", self.topology.text());
         if self.dropped_nonfinite_faces + self.dropped_degenerate_faces > 0 {
             let (nonfinite, degenerate) = (self.dropped_nonfinite_faces, self.dropped_degenerate_faces);
-            line("dropped", format!("{nonfinite} faces with NaN or infinite corners, {degenerate} without area"));
+            line(
+                "dropped",
+                format!(
+                    "{} with NaN or infinite corners, {degenerate} without area",
+                    counted(nonfinite, "face", "faces")
+                ),
+            );
         }
         for warning in &self.warnings {
             line("warning", format!("{} ({})", warning.detail, warning.code));

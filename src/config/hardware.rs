@@ -27,7 +27,7 @@ fn why_no_gpu_under(dev: &Path) -> Option<String> {
         return None;
     }
     let dev = dev.display();
-    Some(format!("this machine shows no GPU: there is no {dev}/dri/renderD*, {dev}/nvidia* or {dev}/dxg"))
+    Some(format!("this machine shows no hardware GPU: there is no {dev}/dri/renderD*, {dev}/nvidia* or {dev}/dxg"))
 }
 
 #[cfg(test)]

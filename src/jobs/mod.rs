@@ -45,7 +45,7 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// As many jobs wait as may wait.
-    #[error("{queue} jobs are waiting already; try again in {retry_after_s} s")]
+    #[error("the queue is full ({queue} waiting); try again in {retry_after_s} s")]
     QueueFull {
         /// How many may wait.
         queue: usize,

@@ -6,6 +6,7 @@
 
 mod attributes;
 pub mod bundle;
+mod counted;
 pub mod edges;
 mod entry;
 mod error;
@@ -27,6 +28,7 @@ mod unzip;
 mod weld;
 
 pub use bundle::{Bundle, BundleFile};
+pub use counted::counted;
 pub use error::{MeshError, MeshFault};
 pub use folder::Folder;
 pub use import::{Format, import};

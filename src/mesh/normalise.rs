@@ -7,7 +7,7 @@ use super::import::Context;
 use super::pow2::{Pow2, exponent, is_usable, max_abs};
 use super::raw::RawMesh;
 use super::weld::PositionSet;
-use super::{ImportReport, MaterialSlot, Mesh, MeshError, MeshFault, ToFile};
+use super::{ImportReport, MaterialSlot, Mesh, MeshError, MeshFault, ToFile, counted};
 
 /// Brings an imported mesh into its final form.
 pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshError> {
@@ -234,11 +234,12 @@ fn bounds(positions: &[[f32; 3]]) -> [[f32; 3]; 2] {
 fn empty(report: &ImportReport) -> MeshError {
     let faces: u64 = report.polygons_by_arity.iter().sum();
     let (nonfinite, degenerate) = (report.dropped_nonfinite_faces, report.dropped_degenerate_faces);
-    let mut detail =
-        format!("the {} file has nothing to draw: {} vertices and {faces} faces", report.format, report.file_vertices);
+    let (vertices, faces) = (counted(report.file_vertices, "vertex", "vertices"), counted(faces, "face", "faces"));
+    let mut detail = format!("the {} file has nothing to draw: {vertices} and {faces}", report.format);
     if nonfinite + degenerate > 0 {
-        detail +=
-            &format!(", of whose triangles {nonfinite} have a NaN or infinite corner and {degenerate} have no area");
+        let has = |count| counted(count, "has", "have");
+        let (nonfinite, degenerate) = (has(nonfinite), has(degenerate));
+        detail += &format!(", of whose triangles {nonfinite} a NaN or infinite corner and {degenerate} no area");
     }
     for warning in &report.warnings {
         detail += "; ";

@@ -3,7 +3,7 @@
 use super::import::Context;
 use super::polygon::ALL_EDGES;
 use super::raw::RawMesh;
-use super::{Format, MeshError, UpAxis, Warning};
+use super::{Format, MeshError, UpAxis, Warning, counted};
 
 /// An 80-byte header and a count come before the triangles.
 const HEADER_BYTES: usize = 84;
@@ -57,14 +57,15 @@ fn declared_bytes(bytes: &[u8]) -> Option<u64> {
 fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let Some(declared) = declared_bytes(bytes) else {
         return Err(MeshError::broken(format!(
-            "the STL file is {} bytes long, and its header alone is {HEADER_BYTES}",
-            bytes.len()
+            "the STL file is {} long, and its header alone is {HEADER_BYTES}",
+            counted(bytes.len(), "byte", "bytes")
         )));
     };
     let count = (declared - HEADER_BYTES as u64) / TRIANGLE_BYTES as u64;
     if declared > bytes.len() as u64 {
         return Err(MeshError::broken(format!(
-            "the STL header at byte 80 says {count} triangles, which needs {declared} bytes, and the file has {}",
+            "the STL header at byte 80 says {}, which needs {declared} bytes, and the file has {}",
+            counted(count, "triangle", "triangles"),
             bytes.len()
         )));
     }
@@ -72,7 +73,10 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
     if declared < bytes.len() as u64 {
         raw.report.warnings.push(Warning {
             code: "trailing_bytes",
-            detail: format!("{} bytes after the last STL triangle are ignored", bytes.len() as u64 - declared),
+            detail: format!(
+                "ignored: {} after the last STL triangle",
+                counted(bytes.len() as u64 - declared, "byte", "bytes")
+            ),
         });
     }
     reserve(&mut raw, count, cx)?;

@@ -19,6 +19,7 @@ mod texture_half;
 mod texture_levels;
 mod texture_png;
 mod textures;
+mod view;
 mod wires;
 
 pub use build::{build, build_keeping};
@@ -29,6 +30,7 @@ pub use skips::{Skip, SkipKind};
 pub use surface::{
     CornerValues, Lamp, Lights, MaterialLook, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, flags, slots,
 };
+pub use view::is_out_of_view;
 
 use std::borrow::Cow;
 

@@ -51,7 +51,14 @@ const ALLOWANCE_BYTES: u64 = 4 << 20;
 pub fn header(name: &str, bytes: &[u8]) -> Result<Header, PlanError> {
     let format = sniff(bytes)
         .ok_or_else(|| PlanError::Texture(format!("{name} of the mesh is neither a PNG, a JPEG nor a WebP image")))?;
-    let decoder = decoder(name, bytes, format, ALLOWANCE_BYTES)?;
+    let decoder = match (open(bytes, format, ALLOWANCE_BYTES), png_size(bytes)) {
+        (Ok(decoder), _) => decoder,
+        // A row alone is more than the decoder may have: whoever asked knows how large a texture may be.
+        (Err(::image::ImageError::Limits(_)), Some([width, height])) if format == ImageFormat::Png => {
+            return Ok(Header { format, width, height, decoding_bytes: u64::MAX });
+        }
+        (Err(error), _) => return Err(broken(name, &error)),
+    };
     let (width, height) = decoder.dimensions();
     if width == 0 || height == 0 {
         return Err(PlanError::Texture(format!("{name} of the mesh has no pixels")));
@@ -65,7 +72,7 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<Header, PlanError> {
 /// Decodes; the caller has paid for it.
 pub fn decode(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, PlanError> {
     let limit_bytes = header.decoding_bytes.saturating_add(ALLOWANCE_BYTES);
-    let decoder = decoder(name, bytes, header.format, limit_bytes)?;
+    let decoder = open(bytes, header.format, limit_bytes).map_err(|error| broken(name, &error))?;
     let (width, height) = decoder.dimensions();
     let (channels, is_wide) = match decoder.color_type() {
         ColorType::L8 => (1, false),
@@ -148,19 +155,20 @@ fn sniff(bytes: &[u8]) -> Option<ImageFormat> {
 }
 
 /// `limit_bytes` is what it may allocate beside its result.
-fn decoder<'b>(
-    name: &str,
-    bytes: &'b [u8],
-    format: ImageFormat,
-    limit_bytes: u64,
-) -> Result<Box<dyn ImageDecoder + 'b>, PlanError> {
+fn open(bytes: &[u8], format: ImageFormat, limit_bytes: u64) -> ImageResult<Box<dyn ImageDecoder + '_>> {
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(limit_bytes);
     match format {
         ImageFormat::Png => limited(Essentials::new(bytes), format, limits),
         _ => limited(Cursor::new(bytes), format, limits),
     }
-    .map_err(|error| broken(name, &error))
+}
+
+/// Width and height by a PNG's first chunk.
+fn png_size(bytes: &[u8]) -> Option<[u32; 2]> {
+    let number = |at: usize| Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
+    let size = [number(16)?, number(20)?];
+    (bytes.get(12..16)? == b"IHDR" && !size.contains(&0)).then_some(size)
 }
 
 fn limited<'b>(

@@ -23,7 +23,7 @@ pub fn side(px: u32, level: u32) -> u32 {
 /// Memory that [`append`] takes beside its result: the first smaller level and the next one.
 pub fn working_bytes(width: u32, height: u32) -> u64 {
     let px = |level| u64::from(side(width, level)) * u64::from(side(height, level));
-    16 * (px(1) + px(2)) + 64 * u64::from(width) + (4 << 16)
+    (px(1) + px(2)).saturating_mul(16).saturating_add(64 * u64::from(width) + (4 << 16))
 }
 
 /// Appends the levels from `first` on as half floats.

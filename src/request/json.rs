@@ -4,7 +4,8 @@ use serde_json::Value as Json;
 
 use super::error::{RequestError, RequestFault};
 use super::item::Item;
-use super::table::{GROUPS, LAYERS, MATERIALS};
+use super::table::{GROUPS, LAYERS, MATERIALS, SCHEMA};
+use super::unique::{Fault, parse};
 use super::value::Given;
 
 /// Longest document: a thousand times what anybody writes by hand, and small when parsed.
@@ -22,8 +23,12 @@ pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestErro
         error.flag = Some("--limit-json-depth");
         return Err(error);
     }
-    let json: Json =
-        serde_json::from_slice(document).map_err(|e| not_json(format!("not JSON ({e})"), "a JSON object".into()))?;
+    let json = parse(document).map_err(|fault| match fault {
+        Fault::NotJson(e) => not_json(format!("not JSON ({e})"), "a JSON object".into()),
+        Fault::Repeated(key) => {
+            RequestError::new(RequestFault::Conflict, &key, "given twice", "an object has a key once")
+        }
+    })?;
     let Json::Object(object) = json else {
         return Err(not_json(Given::Json(json).show(), "a JSON object".into()));
     };
@@ -33,6 +38,11 @@ pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestErro
             return Err(dotted("", &key, &value));
         }
         match value {
+            // Editors write it to find the schema.
+            Json::String(_) | Json::Null if key == SCHEMA => {}
+            other if key == SCHEMA => {
+                return Err(RequestError::new(RequestFault::WrongType, SCHEMA, other, "a string"));
+            }
             Json::Object(materials) if key == MATERIALS.name => {
                 for (name, value) in materials {
                     flatten_material(name, value, &mut items)?;

@@ -2,6 +2,7 @@
 //!
 //! Defaults, then the style's preset, then the document, then the dotted keys of a query or of `--set`: each overrides
 //! what came before. Materials begin from what the document's own layers have become by then, wherever they stand.
+//! A layer that is `null` is off; of any other key `null` is its default, or as if the key were not there.
 //! [`table`] is the table of keys; a new key is a line there, and [`schema()`] writes it out for others.
 
 mod draft;
@@ -19,6 +20,7 @@ mod tests;
 mod tests_bad;
 #[cfg(test)]
 mod tests_materials;
+mod unique;
 mod value;
 mod words;
 
@@ -70,7 +72,7 @@ pub fn read(document: Option<&[u8]>, overrides: &Overrides, rules: &Rules) -> Re
     let (of_materials, mut items): (Vec<Item>, Vec<Item>) = items.into_iter().partition(|i| i.material.is_some());
 
     let mut style = STYLE_DEFAULT;
-    for item in items.iter().filter(|item| item.key == "style") {
+    for item in items.iter().filter(|item| item.key == "style" && !item.given.is_null()) {
         style = read_style(&item.given)?;
     }
     items.retain(|item| item.key != "style");
@@ -131,6 +133,9 @@ fn read_materials(base: &Look, items: Vec<Item>, rules: &Rules) -> Result<Vec<(S
             let (given, allowed) = (format!("{chars} characters long"), format!("at most {MATERIAL_NAME_CHARS_MAX}"));
             return Err(RequestError::new(RequestFault::OutOfRange, &item.whole_key(), given, allowed));
         }
+        if item.key.is_empty() && item.given.is_null() {
+            continue;
+        }
         let look = materials.entry(name).or_insert_with(|| base.clone());
         apply(&mut Target::Material(look), &item, rules)?;
         if materials.len() > MATERIALS_MAX {
@@ -159,15 +164,20 @@ fn apply(target: &mut Target<'_>, item: &Item, rules: &Rules) -> Result<(), Requ
     };
     if let Some(allowed) = allowed {
         let error = || RequestError::new(RequestFault::WrongType, &item.whole_key(), given.show(), allowed);
-        return if given.is_empty_object() { Ok(()) } else { Err(error()) };
+        return if given.is_empty_object() || given.is_null() { Ok(()) } else { Err(error()) };
     }
     let long = SHORT.iter().find(|&&(short, _)| short == key && !target.is_material()).map_or(key, |&(_, long)| long);
     let field = FIELDS.iter().find(|f| f.key == long && (!target.is_material() || f.is_for_materials()));
     let Some(field) = field else {
         return Err(if target.is_material() { unknown_of_material(item) } else { unknown(key, given) });
     };
-    if field.nullable && given.is_null() {
-        field.set(target, Value::Null);
+    if given.is_null() {
+        match LAYERS.iter().find(|layer| long.split_once('.').is_some_and(|(home, _)| home == layer.name)) {
+            _ if field.nullable => field.set(target, Value::Null),
+            // As in an object without the key.
+            Some(layer) => layer.turn(target, true),
+            None => {}
+        }
         return Ok(());
     }
     let value = field.kind.read(&item.whole_key(), given, rules.limits.image_px).map_err(|mut error| {

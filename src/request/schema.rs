@@ -7,7 +7,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::fields::{Field, Layer};
 use super::look::{MULTIPLE_MAX, OUTLINE_PX_MAX};
-use super::table::{FIELDS, GROUPS, LAYERS, MATERIALS, SHORT, STYLE_ABOUT};
+use super::table::{FIELDS, GROUPS, LAYERS, MATERIALS, SCHEMA, SHORT, STYLE_ABOUT};
 use super::value::{COORDINATE_MAX, Kind};
 use super::words::{Style, word_for, words_of};
 use super::{MATERIAL_NAME_CHARS_MAX, MATERIALS_MAX, Rules, STYLE_DEFAULT};
@@ -20,13 +20,14 @@ pub fn schema(rules: &Rules) -> Json {
     let style = json!({
         "description": STYLE_ABOUT, "enum": words_of::<Style>(), "default": word_for(STYLE_DEFAULT),
     });
+    let style = or_null(style);
     properties.insert("style".into(), style);
     for layer in LAYERS {
         definitions.insert(layer.name.into(), object(layer.name, layer.about, &["object", "null"], image_px));
         properties.insert(layer.name.into(), reference(layer.name));
     }
     for group in GROUPS {
-        properties.insert(group.name.into(), object(group.name, group.about, &["object"], image_px));
+        properties.insert(group.name.into(), object(group.name, group.about, &["object", "null"], image_px));
     }
     properties.insert(MATERIALS.name.into(), materials());
     for field in FIELDS.iter().filter(|field| !field.key.contains('.')) {
@@ -39,10 +40,13 @@ pub fn schema(rules: &Rules) -> Json {
             properties.insert((*short).into(), property);
         }
     }
+    let own = json!({ "description": "Where an editor finds this schema.", "type": ["string", "null"] });
+    properties.insert(SCHEMA.into(), own);
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "meshsnap request",
-        "description": "How to turn a mesh into an image. A layer that is present is drawn, null turns it off. A query's dotted \
+        "description": "How to turn a mesh into an image. A layer that is present is drawn, null turns it off; any other key \
+                        that is null is as if it were not there, unless it says what null means. A query's dotted \
                         keys (wire.color) and the short names override the document.",
         "type": "object",
         "properties": properties,
@@ -60,10 +64,10 @@ fn materials() -> Json {
     let layers: Map<String, Json> = layers.map(|layer| (layer.name.to_owned(), reference(layer.name))).collect();
     json!({
         "description": MATERIALS.about,
-        "type": "object",
+        "type": ["object", "null"],
         "maxProperties": MATERIALS_MAX,
         "propertyNames": { "maxLength": MATERIAL_NAME_CHARS_MAX },
-        "additionalProperties": { "type": "object", "properties": layers, "additionalProperties": false },
+        "additionalProperties": { "type": ["object", "null"], "properties": layers, "additionalProperties": false },
     })
 }
 
@@ -80,7 +84,7 @@ fn object(name: &str, about: &str, types: &[&str], image_px: u64) -> Json {
     let rules = match name {
         "wire" => {
             let thin = json!({ "properties": { "thickness": { "maximum": MULTIPLE_MAX } } });
-            vec![json!({ "if": given("method", json!({ "not": { "const": "exact" } })), "then": thin })]
+            vec![json!({ "if": given("method", json!({ "not": { "enum": ["exact", null] } })), "then": thin })]
         }
         "outline" => {
             let thin = json!({ "properties": { "thickness": { "maximum": OUTLINE_PX_MAX } } });
@@ -88,7 +92,7 @@ fn object(name: &str, about: &str, types: &[&str], image_px: u64) -> Json {
         }
         "camera" => {
             let point = |key| given(key, json!({ "type": "array" }));
-            let no_file = json!({ "properties": { "from_file": { "const": false } } });
+            let no_file = json!({ "properties": { "from_file": { "enum": [false, null] } } });
             vec![
                 json!({ "if": point("eye"), "then": { "allOf": [point("target"), no_file] } }),
                 json!({ "if": point("target"), "then": point("eye") }),
@@ -103,18 +107,23 @@ fn object(name: &str, about: &str, types: &[&str], image_px: u64) -> Json {
 }
 
 fn property(field: &Field, image_px: u64) -> Json {
-    let mut schema = of_kind(&field.kind, image_px);
-    if field.nullable {
-        if let Some(Json::Array(words)) = schema.get_mut("enum") {
-            words.push(Json::Null);
-        }
-        if let Some(of_type) = schema.get_mut("type") {
-            *of_type = json!([of_type.take(), "null"]);
-        }
-    }
+    let mut schema = or_null(of_kind(&field.kind, image_px));
     schema["description"] = field.about.into();
     if let Some(default) = &field.default {
         schema["default"] = default.clone();
+    }
+    schema
+}
+
+fn or_null(mut schema: Json) -> Json {
+    if let Some(Json::Array(words)) = schema.get_mut("enum") {
+        words.push(Json::Null);
+    }
+    if let Some(Json::Array(choices)) = schema.get_mut("anyOf") {
+        choices.push(json!({ "type": "null" }));
+    }
+    if let Some(of_type) = schema.get_mut("type") {
+        *of_type = json!([of_type.take(), "null"]);
     }
     schema
 }

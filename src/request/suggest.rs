@@ -3,27 +3,32 @@
 /// Longer keys are not compared: whoever sends them made no typing mistake.
 const KEY_CHARS_MAX: usize = 64;
 
-/// What to do about an unknown key, in words.
+/// What to do about an unknown key, in words: the nearest key, and those of the object that it stands in.
 pub fn allowed(key: &str, known: &[&'static str]) -> String {
-    let near = nearest(key, known);
-    if !near.is_empty() {
-        return format!("did you mean {}?", near.join(" or "));
-    }
-    let group = key.split_once('.').map(|(group, _)| format!("{group}."));
-    let siblings: Vec<&str> = match &group {
-        Some(group) => known.iter().copied().filter(|k| k.starts_with(group.as_str())).collect(),
-        None => Vec::new(),
+    let group = key.rsplit_once('.').map_or("", |(group, _)| group);
+    let siblings: Vec<&str> = match group {
+        "" => Vec::new(),
+        group => known.iter().filter_map(|k| k.strip_prefix(group)?.strip_prefix('.')).collect(),
     };
-    if siblings.is_empty() {
-        return format!("the keys are {}", known.join(", "));
+    let of_object = if siblings.is_empty() {
+        let top: Vec<&str> = known.iter().copied().filter(|k| !k.contains('.')).collect();
+        format!("the keys are {}", top.join(", "))
+    } else {
+        format!("the keys of {group} are {}", siblings.join(", "))
+    };
+    match nearest(key, known).as_slice() {
+        [] => of_object,
+        near => format!("did you mean {}? ({of_object})", near.join(" or ")),
     }
-    format!("its neighbours are {}", siblings.join(", "))
 }
 
 /// The known keys that were most likely meant; none where nothing is near.
 pub fn nearest(key: &str, known: &[&'static str]) -> Vec<&'static str> {
     if key.chars().count() > KEY_CHARS_MAX {
         return Vec::new();
+    }
+    if let Some(same) = known.iter().find(|k| k.eq_ignore_ascii_case(key)) {
+        return vec![same];
     }
     let same_end: Vec<&'static str> =
         known.iter().copied().filter(|k| k.rsplit_once('.').is_some_and(|(_, last)| last == key)).collect();
@@ -67,12 +72,21 @@ mod tests {
             ("camera.azimuth", "camera.azimuth_deg"),
             ("thickness", "wire.thickness"),
             ("fov_deg", "camera.fov_deg"),
+            ("Wire.Color", "wire.color"),
+            ("UP", "up"),
         ];
         for (typo, expected) in cases {
-            assert!(allowed(typo, &known).contains(expected), "{typo}: {}", allowed(typo, &known));
+            let said = allowed(typo, &known);
+            let (near, of_object) = said.split_once("? (").unwrap();
+            assert!(near.starts_with("did you mean ") && near.contains(expected), "{typo}: {said}");
+            assert!(of_object.starts_with("the keys"), "{typo}: {said}");
         }
-        assert!(allowed("zzzzzzzzzzz", &known).starts_with("the keys are"));
-        assert!(allowed("wire.zzzzzzzzzz", &known).starts_with("its neighbours are"));
+        let said = allowed("zzzzzzzzzzz", &known);
+        assert!(said.starts_with("the keys are") && said.contains(", wire") && !said.contains('.'), "{said}");
+        let said = allowed("wire.zzzzzzzzzz", &known);
+        assert!(said.starts_with("the keys of wire are color, edges") && !said.contains("camera"), "{said}");
+        let said = allowed("wire.colour", &known);
+        assert!(said.contains("the keys of wire are color, edges") && !said.contains("camera"), "{said}");
         assert!(allowed(&"x".repeat(1_000_000), &known).starts_with("the keys are"));
     }
 }

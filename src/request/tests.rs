@@ -178,6 +178,39 @@ fn defaults_depend_on_other_keys_where_the_contract_says_so() {
 }
 
 #[test]
+fn null_is_the_default_or_as_if_the_key_were_not_there() {
+    let keys: Vec<_> = FIELDS.iter().map(|field| field.key).chain(SHORT.iter().map(|&(key, _)| key)).collect();
+    for key in &keys {
+        let home = key.split_once('.').map(|(home, _)| home).filter(|home| LAYERS.iter().any(|l| l.name == *home));
+        let (inner, without) = match key.split_once('.') {
+            Some((home, key)) => (format!(r#"{{"{home}":{{"{key}":null}}}}"#), format!(r#"{{"{home}":{{}}}}"#)),
+            None => (format!(r#"{{"{key}":null}}"#), "{}".to_owned()),
+        };
+        let spec = json(&inner).unwrap_or_else(|error| panic!("{error}"));
+        // What draws none of a kind of edge says so.
+        if home != Some("topology") || key.ends_with("_deg") || key.ends_with("thickness") {
+            assert_eq!(spec, json(&without).unwrap(), "{key}");
+        }
+        query(&[(key, "null")]).unwrap_or_else(|error| panic!("{error}"));
+    }
+    assert_eq!(keys.len(), 56);
+    for document in [r#"{"style":null}"#, r#"{"camera":null,"light":null,"image":null}"#, r#"{"materials":null}"#] {
+        assert_eq!(json(document).unwrap(), json("{}").unwrap(), "{document}");
+    }
+    assert_eq!(json(r#"{"materials":{"A":null}}"#).unwrap(), json("{}").unwrap());
+    assert!(json(r#"{"materials":{"A":{"wire":{"lit":null}}}}"#).unwrap().materials[0].1.wire.is_some());
+    // An override that is null changes nothing.
+    let spec = read(Some(br#"{"wire":{"opacity":0.5}}"#), &[("wire.opacity".into(), "null".into())], &rules()).unwrap();
+    assert_eq!(spec.layers.wire.unwrap().opacity, 0.5);
+}
+
+#[test]
+fn a_document_may_say_where_its_schema_is() {
+    let with = json(r#"{"$schema":"http://127.0.0.1:8080/v1/schema","style":"wire"}"#).unwrap();
+    assert_eq!(with, json(r#"{"style":"wire"}"#).unwrap());
+}
+
+#[test]
 fn nullable_keys_take_null() {
     let document = r#"{"camera":{"height":null,"up":null,"eye":null,"target":null,"azimuth_deg":null},
                        "surface":{"color":null,"metallic":null,"roughness":null,"emissive":null},"outline":{"thickness":null},

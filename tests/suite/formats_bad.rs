@@ -168,9 +168,12 @@ fn nothing_to_draw_says_what_there_was() {
         (no_faces.as_bytes(), "8 vertices and 0 faces"),
         (b"v 0 0 0\nv 1 0 0\nl 1 2\n", "polylines are not drawn (lines in the file: 1)"),
         (b"v 0 0 0\np 1\n", "points are not drawn"),
-        (b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "1 have a NaN or infinite corner"),
-        (b"v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n", "1 have no area"),
-        (b"v 5 5 5\nv 5 5 5\nv 5 5 5\nf 1 2 3\n", "1 have no area"),
+        (
+            b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+            "3 vertices and 1 face, of whose triangles 1 has a NaN or infinite corner and 0 have no area",
+        ),
+        (b"v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n", "1 has no area"),
+        (b"v 5 5 5\nv 5 5 5\nv 5 5 5\nf 1 2 3\n", "1 has no area"),
         (b"solid x\nendsolid x\n", "0 faces"),
         (&[0; 84], "STL file has nothing to draw"),
     ];

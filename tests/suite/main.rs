@@ -60,6 +60,8 @@ mod textures;
 mod textures_closeup;
 mod truth;
 mod twins;
+mod twins_flat;
 mod twins_shade;
 mod twins_visibility;
+mod views;
 mod wire_formulas;

@@ -81,6 +81,18 @@ const GOOD: &[&str] = &[
     r#"{"size":256,"format":"webp","samples":4,"background":"transparent","view":"iso","up":"z"}"#,
     r#"{"size":"640x480"}"#,
     r#"{"size":"640","backend":"cpu"}"#,
+    r#"{"style":null}"#,
+    r#"{"surface":{"shading":null}}"#,
+    r#"{"surface":{"textures":null}}"#,
+    r#"{"wire":{"color":null}}"#,
+    r#"{"materials":null}"#,
+    r#"{"materials":{"A":null}}"#,
+    r#"{"camera":null}"#,
+    r#"{"camera":{"from_file":null}}"#,
+    r#"{"image":{"samples":null}}"#,
+    r#"{"$schema":"x","size":null,"light":null}"#,
+    r#"{"wire":{"method":null,"thickness":100}}"#,
+    r#"{"camera":{"eye":[1,2,3],"target":[0,0,0],"from_file":null}}"#,
 ];
 
 /// Documents that are refused.
@@ -89,7 +101,6 @@ const BAD: &[&str] = &[
     "null",
     "7",
     r#"{"style":"toon"}"#,
-    r#"{"style":null}"#,
     r#"{"sytle":"wire"}"#,
     r#"{"wire.color":"f00"}"#,
     r#"{"max_error":1}"#,
@@ -97,15 +108,12 @@ const BAD: &[&str] = &[
     r#"{"surface":true}"#,
     r#"{"surface":[]}"#,
     r#"{"surface":{"metalic":1}}"#,
-    r#"{"surface":{"shading":null}}"#,
     r#"{"surface":{"opacity":1.01}}"#,
     r#"{"surface":{"opacity":"1"}}"#,
     r#"{"surface":{"textures":1}}"#,
-    r#"{"surface":{"textures":null}}"#,
     r#"{"surface":{"color":"red"}}"#,
     r#"{"surface":{"color":255}}"#,
     r##"{"surface":{"emissive":"#12345"}}"##,
-    r#"{"wire":{"color":null}}"#,
     r#"{"wire":{"thickness":100.1}}"#,
     r#"{"wire":{"method":"threshold","thickness":10.1}}"#,
     r#"{"wire":{"smoothing":-0.1}}"#,
@@ -115,14 +123,11 @@ const BAD: &[&str] = &[
     r#"{"outline":{"thickness":-1}}"#,
     r#"{"topology":{"thickness":20.5}}"#,
     r#"{"topology":{"surface":{}}}"#,
-    r#"{"materials":null}"#,
-    r#"{"materials":{"A":null}}"#,
     r#"{"materials":{"A":{"topology":{}}}}"#,
     r#"{"materials":{"A":{"opacity":0.3}}}"#,
     r#"{"materials":{"A":{"surface.opacity":0.3}}}"#,
     r#"{"materials":{"A":{"surface":{"opacity":3}}}}"#,
     r#"{"materials":{"A":{"style":"wire"}}}"#,
-    r#"{"camera":null}"#,
     r#"{"camera":{"eye":[1,2,3]}}"#,
     r#"{"camera":{"target":[1,2,3],"eye":null}}"#,
     r#"{"camera":{"eye":[1,2],"target":[0,0,0]}}"#,
@@ -130,7 +135,6 @@ const BAD: &[&str] = &[
     r#"{"camera":{"eye":[1,2,2e30],"target":[0,0,0]}}"#,
     r#"{"camera":{"eye":[1,2,3],"target":[0,0,0],"from_file":true}}"#,
     r#"{"camera":{"elevation_deg":91}}"#,
-    r#"{"camera":{"from_file":null}}"#,
     r#"{"light":{"direction":[0,0,0]}}"#,
     r#"{"light":{"direction":[0,-0.0,0.0]}}"#,
     r#"{"light":{"direction":"0,1,0"}}"#,
@@ -139,13 +143,13 @@ const BAD: &[&str] = &[
     r#"{"image":{"width":4097}}"#,
     r#"{"image":{"width":1.5}}"#,
     r#"{"image":{"samples":2}}"#,
-    r#"{"image":{"samples":null}}"#,
     r#"{"image":{"size":512}}"#,
     r#"{"size":0}"#,
     r#"{"size":"640x"}"#,
     r#"{"size":"0x640"}"#,
     r#"{"size":[640,480]}"#,
     r#"{"backend":"cuda"}"#,
+    r#"{"$schema":7}"#,
 ];
 
 #[test]
@@ -160,7 +164,7 @@ fn the_schema_and_the_reader_are_of_one_mind() {
         assert!(request::read(Some(document.as_bytes()), &[], &rules()).is_err(), "the reader takes {document}");
         assert!(!complaints(&validator, document).is_empty(), "the schema takes {document}");
     }
-    assert_eq!((GOOD.len(), BAD.len()), (30, 61));
+    assert_eq!((GOOD.len(), BAD.len()), (42, 53));
 }
 
 /// Documents made at random from pieces of both kinds: as many as both refuse or take; none where they differ.
@@ -214,7 +218,7 @@ fn the_schema_and_the_reader_agree_on_documents_made_at_random() {
         assert_eq!(read.is_ok(), said.is_empty(), "{document}: {said}; {:?}", read.err());
         *if said.is_empty() { &mut taken } else { &mut refused } += 1;
     }
-    assert!(taken > 1_500 && refused > 5_000, "{taken} taken, {refused} refused");
+    assert!(taken > 2_000 && refused > 5_000, "{taken} taken, {refused} refused");
 }
 
 fn complaints(validator: &Validator, document: &str) -> String {

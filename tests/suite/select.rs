@@ -58,7 +58,7 @@ fn the_choice_follows_what_the_machine_has() {
             &[(Auto, Ok(ByCpu)), (Gpu, Ok(ByGpu)), (Auto, Ok(ByCpu)), (Gpu, Ok(ByGpu))],
             &[Hardware, Any],
             GpuState::Ready,
-            Some("software alone"),
+            Some("`auto` means the CPU all the same: software alone"),
         ),
         (
             Maybe,
@@ -66,9 +66,16 @@ fn the_choice_follows_what_the_machine_has() {
             &[(Gpu, Ok(ByGpu)), (Auto, Ok(ByCpu)), (Gpu, Ok(ByGpu))],
             &[Any],
             GpuState::Ready,
-            Some("fake 1 is no hardware"),
+            Some("`auto` means the CPU all the same: fake 1 is no hardware"),
         ),
-        (none(), &[Open::Software], &[(Auto, Ok(ByCpu)), (Gpu, Ok(ByGpu))], &[Any], GpuState::Ready, Some("no node")),
+        (
+            none(),
+            &[Open::Software],
+            &[(Auto, Ok(ByCpu)), (Gpu, Ok(ByGpu))],
+            &[Any],
+            GpuState::Ready,
+            Some("`auto` means the CPU all the same: no node"),
+        ),
         // Nothing there, which is found out once for each kind.
         (
             Maybe,
@@ -93,7 +100,7 @@ fn the_choice_follows_what_the_machine_has() {
             &[(Auto, Ok(ByCpu)), (Gpu, Err("no GPU to draw on: fake 1: it draws the probe wrong")), (Auto, Ok(ByCpu))],
             &[Hardware],
             GpuState::Failed,
-            Some("fake 1: it draws the probe wrong: 1 of 576 pixels at 1 samples a pixel"),
+            Some("fake 1: it draws the probe wrong: 1 of 576 pixels where samples = 1"),
         ),
         (
             Maybe,
@@ -279,6 +286,9 @@ fn a_server_says_who_drew() {
     let gpu = status();
     println!("{gpu}");
     assert_eq!(gpu["state"], "ready");
+    if drawn_by == "cpu" {
+        assert!(gpu["reason"].as_str().is_some_and(|reason| reason.starts_with("`auto` means the CPU")), "{gpu}");
+    }
     assert!(gpu["name"].as_str().is_some_and(|name| !name.is_empty()), "{gpu}");
     let again = server.post("/v1/render?size=32", CUBE_OBJ);
     assert_eq!(again.header("x-render-backend"), Some(drawn_by.as_str()));

@@ -302,6 +302,21 @@ fn sizes_are_checked_before_anything_is_decoded() {
     assert!(start.elapsed() < Duration::from_millis(50), "{:?}", start.elapsed());
     assert_eq!((limit.flag, limit.given, limit.limit), ("--limit-texture-px", 30_000, 8192));
     assert!(limit.to_string().contains("image 0"), "{limit}");
+    // Of these, a row alone is more than a decoder may have.
+    let sizes = [[1 << 31, 1], [(1 << 31) - 1, 1], [(1 << 31) - 1, (1 << 31) - 1], [700_000, 4]];
+    let mut named = 0;
+    for [width, height] in sizes {
+        let wide = model_of(&png(&[(b"IHDR", &header(width, height, 16, 6)), (b"IDAT", &zlib(&[0; 900]))]));
+        let PlanError::Limit(limit) = error(&wide) else { panic!("{width}x{height}: {}", error(&wide)) };
+        assert_eq!((limit.flag, limit.given), ("--limit-texture-px", u64::from(width.max(height))));
+        // Where such a texture is allowed, it is its memory that is not.
+        let vast = Limits { texture_px: u64::MAX, texture_total_px: u64::MAX, ..Limits::default() };
+        assert!(
+            matches!(plan_of(&wide, &[], &vast), Err(PlanError::Limit(limit)) if limit.flag == "--limit-memory-bytes")
+        );
+        named += 1;
+    }
+    assert_eq!(named, 4);
 
     let picture = encode(&image::RgbImage::new(100, 50).into(), ImageFormat::Png);
     let flag = |limits: Limits| {

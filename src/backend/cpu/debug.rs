@@ -66,7 +66,8 @@ fn shown(display: [f32; 3]) -> [f32; 4] {
         if v <= 0.04045 {
             return v * (1.0 / 12.92);
         }
-        let t = (v + 0.055) * (1.0 / 1.055);
+        // Divided by 1.055. Written out: shaders fold constants in f64.
+        let t = (v + 0.055) * 0.947_867_3;
         // t^2.4 = (t t^(-1/5))^3, the root by Newton's iteration from an integer guess.
         let mut root = f32::from_bits(0x4C2C_47E5_u32.wrapping_sub(t.to_bits() / 5));
         for _ in 0..4 {

@@ -2,9 +2,11 @@
 //!
 //! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have no diffuse colour, so
 //! they mirror a studio instead: bright above, a little brighter at the horizon, dark below, and blurred by roughness.
+//!
+//! Both back-ends compute the same bits: a whole flat face has one light, and that may lie on the threshold between two bytes.
 
+use super::transform::quick_recip;
 use super::vector::dot;
-use super::wire::smoothstep;
 use crate::plan::{Lights, Projection};
 
 /// What light makes of a base colour: `base * gain + gloss`, in each channel.
@@ -29,19 +31,39 @@ impl Light {
     }
 }
 
-/// Light on a surface with unit normal `n`.
+/// Light on a surface with unit normal `n`: the bits of the other back-end.
 #[inline(always)]
 pub fn light(lights: &Lights, projection: &Projection, metallic: f32, roughness: f32, n: [f32; 3]) -> Light {
+    light_by(quick_recip, lights, projection, metallic, roughness, n)
+}
+
+/// As [`light`], with the processor's own division: quicker where the normal's bits differ anyway.
+#[inline(always)]
+pub fn light_on_blend(lights: &Lights, projection: &Projection, metallic: f32, roughness: f32, n: [f32; 3]) -> Light {
+    light_by(|w| 1.0 / w, lights, projection, metallic, roughness, n)
+}
+
+#[inline(always)]
+fn light_by(
+    inverse_of: impl Fn(f32) -> f32,
+    lights: &Lights,
+    projection: &Projection,
+    metallic: f32,
+    roughness: f32,
+    n: [f32; 3],
+) -> Light {
     let alpha = (roughness * roughness).max(0.0025);
     let alpha_squared = alpha * alpha;
-    let ambient = lights.ambient * (0.7 + 0.3 * dot(n, projection.screen_up));
+    let n_up = dot(n, projection.screen_up);
+    let ambient = lights.ambient * (0.7 + 0.3 * n_up);
     let (mut diffuse, mut shine, mut strength) = (0.0, 0.0, 0.0);
     for lamp in &lights.lamps {
         let n_light = dot(n, lamp.to_light).max(0.0);
         let n_half = dot(n, lamp.halfway).max(0.0);
         let light_half = dot(lamp.to_light, lamp.halfway);
         let lobe = n_half * n_half * (alpha_squared - 1.0) + 1.0;
-        let gloss = alpha_squared / (lobe * lobe * (light_half * light_half).max(0.1) * (4.0 * roughness + 2.0));
+        let spread = lobe * lobe * (light_half * light_half).max(0.1);
+        let gloss = alpha_squared * inverse_of(spread * (4.0 * roughness + 2.0));
         let direct = lamp.strength * n_light;
         diffuse += direct;
         shine += direct * gloss;
@@ -56,8 +78,8 @@ pub fn light(lights: &Lights, projection: &Projection, metallic: f32, roughness:
         let grazing = 1.0 - n_view.clamp(0.0, 1.0);
         let square = grazing * grazing;
         let rise = square * square * grazing * (1.0 - roughness);
-        let mirrored = 2.0 * n_view * dot(n, projection.screen_up) - dot(projection.to_viewer, projection.screen_up);
-        let seen = metallic * (lights.ambient + 0.5 * strength) * studio(mirrored, roughness);
+        let mirrored = 2.0 * (n_view * n_up) - dot(projection.to_viewer, projection.screen_up);
+        let seen = metallic * (lights.ambient + 0.5 * strength) * studio(inverse_of, mirrored, roughness);
         light.gain += seen * (1.0 - rise);
         light.gloss += seen * rise;
     }
@@ -65,12 +87,18 @@ pub fn light(lights: &Lights, projection: &Projection, metallic: f32, roughness:
 }
 
 /// Brightness of the studio in a direction that rises by `up` (the sine of its elevation).
-fn studio(up: f32, roughness: f32) -> f32 {
-    const SKY: f32 = 1.15;
+fn studio(inverse_of: impl Fn(f32) -> f32, up: f32, roughness: f32) -> f32 {
     const GROUND: f32 = 0.36;
+    const SKY_ABOVE_GROUND: f32 = 0.79;
     const HORIZON: f32 = 0.35;
     let blur = 0.2 + 0.8 * roughness;
-    let sky = smoothstep(-blur, blur, up);
-    let band = up / blur;
-    (GROUND + (SKY - GROUND) * sky) + HORIZON * (1.0 - roughness) / (1.0 + 4.0 * band * band)
+    let square = blur * blur;
+    // 1 / blur and 1 / sum by one reciprocal.
+    let sum = square + 4.0 * (up * up);
+    let inverse = inverse_of(blur * sum);
+    // 0 below -blur, 1 above blur.
+    let t = (0.5 + (0.5 * up) * (sum * inverse)).clamp(0.0, 1.0);
+    let sky = t * t * (3.0 - 2.0 * t);
+    let horizon = (HORIZON * (1.0 - roughness)) * ((square * blur) * inverse);
+    (GROUND + SKY_ABOVE_GROUND * sky) + horizon
 }

@@ -3,10 +3,10 @@
 use super::Stages;
 use super::barycentric::{Barycentrics, Quad, corners};
 use super::debug;
-use super::light::{Light, light};
+use super::light::{Light, light, light_on_blend};
 use super::texture::{Uv, blend, sample};
 use super::transform::ScreenVertex;
-use super::vector::{across, cross, dot, sub, unit_or};
+use super::vector::{across, cross, facing, sub, turned_to_viewer, unit_or};
 use super::visibility::area;
 use super::wire::{Place, edge_mask, fwidth_cover, wire_cover};
 use crate::plan::{MaterialLook, SurfacePass, TEXTURE_NONE, flags, slots};
@@ -73,7 +73,7 @@ impl<'a> PointShader<'a> {
         let base = self.with_alpha(look, look.base_color);
         let mut light = Light::NONE;
         if look.flags & flags::FACE_NORMALS != 0 {
-            let normal = facing(surface.face_normals[id as usize], self.is_front(id, at));
+            let normal = turned_to_viewer(surface.face_normals[id as usize], self.is_front(id, at));
             light = self.light(surface, look.metallic, look.roughness, normal);
         }
         let color = premultiplied(lit(base, light), look.emissive);
@@ -87,14 +87,18 @@ impl<'a> PointShader<'a> {
         let base = self.with_alpha(look, look.base_color);
         let mut light = Light::NONE;
         if look.flags & flags::LIT != 0 {
-            let normal = match &surface.vertex_normals {
-                Some(normals) if look.flags & flags::VERTEX_NORMALS != 0 => {
+            let projection = &self.stages.plan.projection;
+            light = match (&surface.vertex_normals, surface.face_normals.get(id as usize)) {
+                (Some(normals), _) if look.flags & flags::VERTEX_NORMALS != 0 => {
                     let corners = normals.triangles[id as usize].map(|i| normals.values[i as usize]);
-                    blend(corners, b.value)
+                    let normal = facing(blend(corners, b.value), b.front);
+                    light_on_blend(&surface.lights, projection, look.metallic, look.roughness, normal)
                 }
-                _ => surface.face_normals.get(id as usize).copied().unwrap_or(self.stages.plan.projection.to_viewer),
+                (_, face) => {
+                    let normal = face.map_or(projection.to_viewer, |normal| turned_to_viewer(*normal, b.front));
+                    self.light(surface, look.metallic, look.roughness, normal)
+                }
             };
-            light = self.light(surface, look.metallic, look.roughness, facing(normal, b.front));
         }
         let color = premultiplied(lit(base, light), look.emissive);
         if look.flags & flags::WIRE_FWIDTH == 0 || self.show.wires == 0.0 {
@@ -227,7 +231,7 @@ pub fn normal(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<'_>)
         return derivative_normal(place);
     }
     if look.flags & flags::FACE_NORMALS != 0 {
-        return facing(surface.face_normals[*id as usize], b.front);
+        return turned_to_viewer(surface.face_normals[*id as usize], b.front);
     }
     match &surface.vertex_normals {
         Some(normals) => {
@@ -283,14 +287,6 @@ fn lit_wire(cover: f32, wire: [f32; 4], base: [f32; 4], light: Light, emissive: 
     let left = alpha * (1.0 - cover * wire[3]);
     let [r, g, b, alpha] = light.on_premultiplied(painted);
     [r + emissive[0] * left, g + emissive[1] * left, b + emissive[2] * left, alpha]
-}
-
-/// The unit normal on the viewer's side.
-pub fn facing(n: [f32; 3], front: bool) -> [f32; 3] {
-    let length_squared = dot(n, n);
-    let scale = if length_squared > 1e-20 { 1.0 / length_squared.sqrt() } else { 0.0 };
-    let scale = if front { scale } else { -scale };
-    n.map(|v| v * scale)
 }
 
 fn over(cover: f32, top: [f32; 4], under: [f32; 4]) -> [f32; 4] {

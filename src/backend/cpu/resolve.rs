@@ -1,6 +1,7 @@
 //! Stage 5, a pixel: surface over background, ink over both, to sRGB bytes. Twin of `shaders/resolve.wgsl`.
 
 use super::light::Light;
+use super::transform::recip;
 use crate::image::srgb8_thresholds;
 use crate::plan::{DrawPlan, INK_FULL};
 
@@ -77,7 +78,8 @@ fn encode(srgb: &SrgbEncoder, c: [f32; 4]) -> [u8; 4] {
     if alpha <= 0.0 {
         return [0; 4];
     }
-    let inverse = 1.0 / alpha;
+    // Of what is fainter no bit is left.
+    let inverse = recip(alpha.max(1e-30));
     let a = (alpha * 255.0 + 0.5) as u8;
     [srgb.encode(c[0] * inverse), srgb.encode(c[1] * inverse), srgb.encode(c[2] * inverse), a]
 }

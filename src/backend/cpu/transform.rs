@@ -45,6 +45,15 @@ pub fn recip(w: f32) -> f32 {
     r
 }
 
+/// `1 / w` for positive normal `w`, the same bits everywhere, for colours: an iteration less.
+#[inline(always)]
+pub fn quick_recip(w: f32) -> f32 {
+    let r = f32::from_bits(0x7EF3_11C7_u32.wrapping_sub(w.to_bits()));
+    let r = r * (2.0 - w * r);
+    let r = r * (2.0 - w * r);
+    r * (2.0 - w * r)
+}
+
 /// `1 / sqrt(v)` for positive normal `v`, the same bits everywhere.
 #[inline(always)]
 pub fn rsqrt(v: f32) -> f32 {
@@ -169,6 +178,8 @@ mod tests {
             let v = f32::from_bits(0x2000_0000 + i * 10_007 % 0x3F00_0000);
             let (r, s) = (f64::from(recip(v)), f64::from(rsqrt(v)));
             assert!((r * f64::from(v) - 1.0).abs() < 1.2e-7, "recip({v})");
+            let quick = f64::from(quick_recip(v));
+            assert!((quick * f64::from(v) - 1.0).abs() < 2e-7, "quick_recip({v})");
             assert!((s * s * f64::from(v) - 1.0).abs() < 6e-7, "rsqrt({v})");
             cases += 1;
         }

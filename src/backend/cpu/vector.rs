@@ -28,3 +28,16 @@ pub fn unit_or(v: [f32; 3], otherwise: [f32; 3]) -> [f32; 3] {
     let length_squared = dot(v, v);
     if length_squared > 1e-20 && length_squared < 1e30 { v.map(|c| c / length_squared.sqrt()) } else { otherwise }
 }
+
+/// A face's normal on the viewer's side: at unit length already, so that it keeps its bits.
+pub fn turned_to_viewer(n: [f32; 3], front: bool) -> [f32; 3] {
+    if front { n } else { n.map(|v| -v) }
+}
+
+/// The unit normal on the viewer's side, of what corners' normals blend to.
+pub fn facing(n: [f32; 3], front: bool) -> [f32; 3] {
+    let length_squared = dot(n, n);
+    let scale = if length_squared > 1e-20 { 1.0 / length_squared.sqrt() } else { 0.0 };
+    let scale = if front { scale } else { -scale };
+    n.map(|v| v * scale)
+}

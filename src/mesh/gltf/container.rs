@@ -1,7 +1,7 @@
 //! The GLB container: a header and chunks. Own code, since the `gltf` crate's underflows on a length below 12 and refuses
 //! chunks of unknown types, which the specification wants ignored.
 
-use crate::mesh::{MeshError, MeshFault, Warning};
+use crate::mesh::{MeshError, MeshFault, Warning, counted};
 
 /// What a GLB file holds.
 #[derive(Debug)]
@@ -21,8 +21,8 @@ const CHUNK_HEADER_BYTES: usize = 8;
 pub fn split(bytes: &[u8]) -> Result<Glb<'_>, MeshError> {
     let (Some(version), Some(length)) = (u32_at(bytes, 4), u32_at(bytes, 8)) else {
         return Err(MeshError::broken(format!(
-            "the GLB file is {} bytes long, and its header alone is {HEADER_BYTES}",
-            bytes.len()
+            "the GLB file is {} long, and its header alone is {HEADER_BYTES}",
+            counted(bytes.len(), "byte", "bytes")
         )));
     };
     if !bytes.starts_with(b"glTF") {
@@ -38,7 +38,7 @@ pub fn split(bytes: &[u8]) -> Result<Glb<'_>, MeshError> {
     let bytes = match usize::try_from(length).ok().and_then(|n| bytes.get(..n).map(|b| (b, bytes.len() - n))) {
         Some((inside, 0)) => inside,
         Some((inside, more)) => {
-            let detail = format!("{more} bytes after the end of the GLB container are ignored");
+            let detail = format!("ignored: {} after the end of the GLB container", counted(more, "byte", "bytes"));
             warnings.push(Warning { code: "trailing_bytes", detail });
             inside
         }

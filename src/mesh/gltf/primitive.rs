@@ -8,7 +8,7 @@ use super::warn_once;
 use crate::mesh::import::Context;
 use crate::mesh::polygon::ALL_EDGES;
 use crate::mesh::raw::{RawMesh, extend_attribute};
-use crate::mesh::{MeshError, Warning};
+use crate::mesh::{MeshError, Warning, counted};
 use gltf::json::accessor::Type;
 use gltf::json::mesh::{self, Mode, Semantic};
 use gltf::json::validation::Checked;
@@ -96,7 +96,8 @@ impl Primitive {
         };
         if let Some(bad) = indices.iter().flatten().find(|&&i| i as usize >= count) {
             return Err(MeshError::broken(format!(
-                "{what} of the glTF file has the vertex index {bad}, and {count} vertices"
+                "{what} of the glTF file has the vertex index {bad}, and {}",
+                counted(count, "vertex", "vertices")
             )));
         }
         out.triangles = triangles(mode, indices.as_deref(), count, cx)?;

@@ -42,6 +42,9 @@ pub const MATERIALS: Group = Group {
             {\"Glass\": {\"surface\": {\"opacity\": 0.3}, \"outline\": null}}.",
 };
 
+/// Where an editor finds the schema of a document; nothing to a picture.
+pub const SCHEMA: &str = "$schema";
+
 /// What [`super::Style`] chooses.
 pub const STYLE_ABOUT: &str = "A preset of layers, which the layers then override.";
 
