@@ -53,7 +53,10 @@ pub fn load_all(slot: &MaterialSlot, textures: &mut TextureLoader<'_>) -> Result
 }
 
 fn fill(look: &mut MaterialLook, mesh: &Mesh, slot: &MaterialSlot, surface: &Surface) {
-    let file = slot.base_color.unwrap_or(Rgba::from_srgb8(DEFAULT_COLOR).0);
+    // A picture or the vertices' colours say it all: grey would only darken them.
+    let is_painted = slot.base_texture.is_some() || !mesh.colors.is_empty();
+    let none = if is_painted { [1.0; 4] } else { Rgba::from_srgb8(DEFAULT_COLOR).0 };
+    let file = slot.base_color.unwrap_or(none);
     look.base_color = surface.color.map_or(file, |color| color.0);
     look.opacity = if surface.debug == DebugView::None { surface.opacity } else { 1.0 };
     look.metallic = surface.metallic.or(slot.metallic).unwrap_or(0.0);

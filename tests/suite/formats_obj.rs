@@ -2,6 +2,7 @@
 
 use crate::formats::assert_same_shape;
 use crate::mesh_files::{Solid, read};
+use crate::scenes;
 
 #[test]
 fn obj_in_all_its_forms() {
@@ -82,4 +83,15 @@ fn obj_materials_and_colours() {
     let unnamed = read(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nusemtl A\nf 3 2 1\n").unwrap();
     assert_eq!(unnamed.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["", "A"]);
     assert_eq!(unnamed.triangle_materials, [0, 1]);
+}
+
+#[test]
+fn vertex_colors_are_shown_as_they_are() {
+    let base = |obj: &str| {
+        let mesh = scenes::mesh(obj);
+        scenes::plan(&mesh, &scenes::spec(&[("style", "unlit")])).surface.unwrap().materials[0].base_color
+    };
+    let grey = base("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    assert!(grey[0] < 0.7, "{grey:?}");
+    assert_eq!(base("v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nf 1 2 3\n"), [1.0; 4]);
 }
