@@ -64,10 +64,15 @@ struct Batch {
     huge_end: u32,
     // Edges that a workgroup draws.
     edges_per_group: u32,
-    // Of the line pass: pixels, pixels, bits, and where its ink starts.
+    // Of the line pass: pixels, pixels, bits, and, below, where its coverage starts.
     line_width: f32,
     line_smoothing: f32,
     line_flags: u32,
+    // Scale of areas in a stroke, as a power of two; windows of an edge in a pixel of it.
+    line_exponent: u32,
+    line_windows: f32,
+    // Threads that share a window, by rows.
+    line_slices: u32,
     ink_at: u32,
     // Where the faces whose light falls on lines start in the ink.
     owners_at: u32,
@@ -77,15 +82,14 @@ struct Batch {
     layer: u32,
 };
 
-// Ink of full coverage.
-const INK_FULL: u32 = 98304u;
-
 // Bits of `line_flags`.
 const SHOWN_VISIBLE: u32 = 1u;
 const SHOWN_HIDDEN: u32 = 2u;
 const SKIP_BACK: u32 = 4u;
 const CONTOUR: u32 = 8u;
 const LIT_PASS: u32 = 16u;
+const LONG_ONLY: u32 = 32u;
+const SHORT_ONLY: u32 = 64u;
 
 const SURFACE: u32 = 1u;
 const HULL: u32 = 2u;

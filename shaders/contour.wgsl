@@ -53,14 +53,16 @@ fn side_of(edge: vec4<u32>, face: u32) -> i32 {
         return select(select(1, -1, is_negative(area)), 0, is_zero(area));
     }
     // Where a corner is behind the eye, by the side of the face's plane on which the eye is.
-    let p = homogeneous_of(edge.x);
-    let q = homogeneous_of(edge.y);
-    let r = homogeneous_of(corner);
+    let volume = volume_of(homogeneous_of(edge.x), homogeneous_of(edge.y), homogeneous_of(corner));
+    return i32(volume > 0.0) - i32(volume < 0.0);
+}
+
+// Six times the volume that three points on screen, times W, span with the eye.
+fn volume_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
     let x = rn(p.y * q.w) - rn(p.w * q.y);
     let y = rn(p.w * q.x) - rn(p.x * q.w);
     let w = rn(p.x * q.y) - rn(p.y * q.x);
-    let volume = (rn(rn(x) * r.x) + rn(rn(y) * r.y)) + rn(rn(w) * r.w);
-    return i32(volume > 0.0) - i32(volume < 0.0);
+    return (rn(rn(x) * r.x) + rn(rn(y) * r.y)) + rn(rn(w) * r.w);
 }
 
 // The face whose light falls on the edge's line where the pixel sees no surface, plus 1: of those that look at the viewer the one

@@ -21,7 +21,7 @@ fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroup
     }
     if has(LINES) {
         for (var n = 0u; n < frame.line_pass_count; n++) {
-            let cover = coverage(ink[n * batch.count + i]);
+            let cover = bitcast<f32>(ink[n * batch.count + i]);
             var color = line_colors[2u * n];
             if has(LIT_LINES) && line_colors[2u * n + 1u].x != 0.0 {
                 color = lit_color(color, colors[batch.count + i].xy);
@@ -35,14 +35,6 @@ fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroup
 // A premultiplied colour under light (A, B).
 fn lit_color(c: vec4<f32>, light: vec2<f32>) -> vec4<f32> {
     return vec4(clamp(rn3(c.xyz * light.x) + rn(light.y * c.w), vec3(0.0), vec3(c.w)), c.w);
-}
-
-// Ink back to coverage, 0 to 1.
-fn coverage(v: u32) -> f32 {
-    if v >= INK_FULL {
-        return 1.0;
-    }
-    return 1.0 - exp2(f32(v) * (-1.0 / 4096.0));
 }
 
 fn encode(c: vec4<f32>) -> u32 {

@@ -25,7 +25,41 @@ pub struct LinePass {
     pub lit: bool,
 }
 
+impl LinePass {
+    /// Largest number that areas around a line's end are scaled to: they fit 16 bits, and so does the difference of two.
+    pub const SCALED_MAX: f32 = 16_000.0;
+
+    /// From the middle of a line to the farthest pixel's centre that it touches, pixels: half its width, half its ramp, and the
+    /// corner of a pixel.
+    pub fn reach_px(&self) -> f32 {
+        0.5 * self.width_px + 0.5 * self.smoothing_px + std::f32::consts::FRAC_1_SQRT_2
+    }
+
+    /// Length of the windows in which an edge's visible parts are looked for, pixels. As long as the line is wide, or most of the
+    /// pixels around a window would be its neighbours'.
+    pub fn window_px(&self) -> f32 {
+        (2.0 * self.reach_px()).max(8.0)
+    }
+
+    /// The largest power of two that scales areas around the line's end to at most [`LinePass::SCALED_MAX`].
+    pub fn square_exponent(&self) -> u32 {
+        let outer = 0.5 * self.width_px + 0.5 * self.smoothing_px;
+        (1..=13).rev().find(|&e| (outer + 1.5) * (1 << e) as f32 <= Self::SCALED_MAX).unwrap_or(1)
+    }
+
+    /// Rows beyond a band of the picture that its lines look at, to see what hides them.
+    pub fn margin_rows(&self) -> u32 {
+        if self.shown == Shown::All { 0 } else { (self.window_px() + 2.0 * self.reach_px() + 4.0) as u32 }
+    }
+}
+
 impl DrawPlan<'_> {
+    /// Rows beyond a band of the picture that lines look at: none where there is nothing that hides.
+    pub fn line_margin_rows(&self) -> u32 {
+        let something_hides = self.surface.is_some() || self.hull.is_some();
+        self.lines.iter().map(LinePass::margin_rows).filter(|_| something_hides).max().unwrap_or(0)
+    }
+
     /// Whether light has to be found for any line: one wants it, and there is a surface that has it.
     pub fn lights_lines(&self) -> bool {
         self.surface.as_ref().is_some_and(|surface| surface.is_shaded) && self.lines.iter().any(|lines| lines.lit)
@@ -57,15 +91,3 @@ impl Edge {
     /// No triangle.
     pub const NO_FACE: u32 = u32::MAX;
 }
-
-/// Coverage in 1/1023 to ink: `-4096 log2(1 - c)`, so that the ink of lines that cross adds up as if they were independent,
-/// in integers, whatever the order. Full coverage is 24 halvings.
-pub fn ink_table() -> [u32; 1024] {
-    std::array::from_fn(|q| match q {
-        1023 => INK_FULL,
-        _ => libm::round(-4096.0 * libm::log2(1.0 - q as f64 / 1023.0)) as u32,
-    })
-}
-
-/// Ink of full coverage.
-pub const INK_FULL: u32 = 24 * 4096;

@@ -25,7 +25,7 @@ mod wires;
 pub use build::{build, build_keeping};
 pub use error::PlanError;
 pub use hull::{HullOffset, HullPass};
-pub use lines::{Edge, INK_FULL, LinePass, Shown, ink_table};
+pub use lines::{Edge, LinePass, Shown};
 pub use skips::{Skip, SkipKind};
 pub use surface::{
     CornerValues, Lamp, Lights, MaterialLook, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, flags, slots,

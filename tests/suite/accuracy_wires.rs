@@ -6,7 +6,7 @@ use std::sync::Arc;
 use meshsnap::backend::Renderer;
 use meshsnap::plan::{DrawPlan, Edge, LinePass, Shown};
 
-use crate::lines_scenes::{CONTOURS, MESHES, MeshScene, plan_keys};
+use crate::lines_scenes::{CONTOURS, MESHES, MESHES_GOAL, MeshScene, plan_keys};
 use crate::oracle::visible::Segment;
 use crate::oracle::{capsule, strip};
 use crate::scenes;
@@ -17,8 +17,8 @@ const ISOLATED_GOAL: Gate = Gate { rmse: 0.35, max: 1.0, ink: f64::INFINITY };
 /// Goal 1: how much too wide or narrow, pixels.
 const WIDTH_GOAL_PX: f64 = 0.005;
 
-/// Round ends, measured now; they have goal 1 too.
-const ENDS_NOW: Gate = Gate { rmse: 1.9, max: 69.0, ..ISOLATED_GOAL };
+/// Round ends: goal 1's RMSE is reached, its maximum is not yet (measured: 7.3, of 256 points instead of an area).
+const ENDS_NOW: Gate = Gate { max: 8.0, ..ISOLATED_GOAL };
 
 pub const SIZE_PX: u32 = 48;
 const WIDTHS_PX: [f32; 9] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 8.0, 16.0];
@@ -218,9 +218,6 @@ fn lines_of_known_models_have_their_exact_coverage() {
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
-/// Files, and what is let pass now; the goal is 2's.
-const KNOWN: [(&str, Gate); 3] = [
-    ("suzanne.obj", Gate { rmse: 17.7, max: f64::INFINITY, ink: 0.016 }),
-    ("spot.obj", Gate { rmse: 13.1, max: f64::INFINITY, ink: 0.005 }),
-    ("stanford-bunny.obj", Gate { rmse: 20.2, max: f64::INFINITY, ink: 0.016 }),
-];
+/// Files, and what is let pass.
+const KNOWN: [(&str, Gate); 3] =
+    [("suzanne.obj", MESHES_GOAL), ("spot.obj", MESHES_GOAL), ("stanford-bunny.obj", MESHES_GOAL)];

@@ -27,12 +27,14 @@ pub struct Likeness {
 }
 
 impl Likeness {
-    /// Compares two pictures of the same size.
+    /// Compares two pictures of the same size. Colours count as much as they show: of a pixel that is all but transparent, the
+    /// stored colour is that of nothing, or of its last step of alpha.
     pub fn of(a: &Image, b: &Image) -> Self {
         assert_eq!((a.width_px, a.height_px), (b.width_px, b.height_px));
         let mut like = Self { pixels: a.rgba.len() / 4, ..Self::default() };
         for (p, q) in a.rgba.chunks(4).zip(b.rgba.chunks(4)) {
-            let difference = p.iter().zip(q).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);
+            let [p, q] = [p, q].map(shown);
+            let difference = p.iter().zip(q).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0);
             like.differing += usize::from(difference > 0);
             like.max = like.max.max(difference);
         }
@@ -54,6 +56,13 @@ impl Likeness {
         println!("{what:32} {self}");
         assert!(self.is_within(tolerance), "{what}: {self}; allowed is {tolerance:?}");
     }
+}
+
+/// Alpha, and the colours times it.
+fn shown(pixel: &[u8]) -> [u8; 4] {
+    let alpha = u32::from(pixel[3]);
+    let times = |v: u8| ((u32::from(v) * alpha + 127) / 255) as u8;
+    [times(pixel[0]), times(pixel[1]), times(pixel[2]), pixel[3]]
 }
 
 impl fmt::Display for Likeness {

@@ -1,15 +1,16 @@
 //! Bands of rows: how one is drawn from start to finish.
 
 use super::bins::{Bin, Bins};
+use super::ink::Ink;
 use super::isa::dispatch;
 use super::layers::{self, LayerBand};
 use super::light::Light;
-use super::occluders::PlaneCache;
+use super::lines::{LineDrawer, LineTarget};
 use super::resolve::resolve;
 use super::samples::SampleBand;
-use super::scratch::{BandScratch, ink_planes};
+use super::scratch::BandScratch;
 use super::visibility::{self, Nearest, Setup};
-use super::{Stages, line_light, lines, shade};
+use super::{Stages, line_light, shade};
 use crate::plan::LinePass;
 
 /// Triangles or edges between two looks at the deadline: at most some 10 ms, however large each is.
@@ -28,19 +29,8 @@ pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: u
     } else if plan.is_shaded() {
         shade_band(isa, stages, &scratch.samples, &mut scratch.colors);
     }
-    scratch.ink.clear();
-    scratch.ink.resize(pixels * ink_planes(plan), 0);
-    let (inks, owners) = scratch.ink.split_at_mut(pixels * plan.lines.len());
-    let passes = plan.lines.iter().zip(&bins.edges).zip(inks.chunks_exact_mut(pixels.max(1)));
-    for ((pass, bins), ink) in passes {
-        draw_edges(isa, stages, pass, bins, band, &scratch.samples, [ink, owners]);
-    }
-    scratch.light.clear();
-    if plan.lights_lines() {
-        scratch.light.resize(pixels, Light::NONE);
-        line_light::light_lines(stages, &scratch.samples, owners, &mut scratch.light);
-    }
-    resolve(plan, stages.srgb, &scratch.colors, inks, &scratch.light, rgba);
+    draw_lines(stages, scratch, bins, band, pixels);
+    resolve(plan, stages.srgb, &scratch.colors, &scratch.coverage, &scratch.light, rgba);
 }
 
 /// Draws band number `band` of the visibility buffer alone, as [`Renderer::draw_visibility`](super::Renderer) says.
@@ -67,21 +57,44 @@ pub fn draw_layer(
     }
 }
 
+/// Finds how much of each pixel the lines of each pass cover, and their light.
+fn draw_lines(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, pixels: usize) {
+    let plan = stages.plan;
+    scratch.owners.clear();
+    scratch.owners.resize(if plan.lights_lines() { pixels } else { 0 }, 0);
+    scratch.coverage.clear();
+    for (pass, bins) in plan.lines.iter().zip(&bins.edges) {
+        scratch.ink.clear();
+        scratch.ink.resize(pixels, Ink::default());
+        let target = &mut LineTarget { ink: &mut scratch.ink, owners: &mut scratch.owners };
+        draw_edges(stages.isa, stages, pass, bins, band, &scratch.samples, target);
+        scratch.coverage.extend(scratch.ink.iter().map(Ink::coverage));
+    }
+    scratch.light.clear();
+    if plan.lights_lines() {
+        scratch.light.resize(pixels, Light::NONE);
+        line_light::light_lines(stages, &scratch.samples, &scratch.owners, &mut scratch.light);
+    }
+}
+
 /// Fills the words of a band's samples, given where each is.
 fn for_each_sample(band: &SampleBand, words: &mut [u64], word: impl Fn(usize) -> u64) {
     for (i, out) in words.iter_mut().enumerate() {
         let (pixel, s) = (i as u32 / band.samples, i as u32 % band.samples);
         let (x, row) = (pixel % band.size_px[0], pixel / band.size_px[0]);
-        *out = word(band.index(x, band.first_row + row, s));
+        *out = word(band.index(x, band.shown[0] + row, s));
     }
 }
 
 /// Moves the scratch to the band and fills its samples, unless nothing in the plan reads them.
 fn fill_samples(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
     let plan = stages.plan;
-    let first_row = band as u32 * scratch.rows;
-    scratch.samples.first_row = first_row;
-    scratch.samples.rows = scratch.rows.min(plan.height_px - first_row);
+    let first = band as u32 * scratch.rows;
+    let end = (first + scratch.rows).min(plan.height_px);
+    let samples = &mut scratch.samples;
+    samples.shown = [first, end];
+    samples.first_row = first.saturating_sub(scratch.margin);
+    samples.rows = (end + scratch.margin).min(plan.height_px) - samples.first_row;
     if plan.surface.is_some() || plan.hull.is_some() {
         scratch.samples.clear();
         draw_triangles(stages.isa, stages, bins, band, &mut scratch.samples);
@@ -106,7 +119,7 @@ dispatch! {
         bins: &[Bin],
         band: usize,
         samples: &SampleBand,
-        ink: [&mut [u32]; 2],
+        target: &mut LineTarget<'_>,
     ) = edges_kernel
 }
 
@@ -145,15 +158,15 @@ fn edges_kernel(
     bins: &[Bin],
     band: usize,
     samples: &SampleBand,
-    [ink, owners]: [&mut [u32]; 2],
+    target: &mut LineTarget<'_>,
 ) {
-    let mut planes = PlaneCache::new();
+    let mut drawer = LineDrawer::new(stages, pass, samples, samples.shown);
     for chunk in bins {
         for (i, edge) in chunk.items_in(band).enumerate() {
             if i % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
                 return;
             }
-            lines::draw(stages, pass, &pass.edges[edge as usize], samples, &mut planes, [ink, owners]);
+            drawer.draw(&pass.edges[edge as usize], target);
         }
     }
 }

@@ -84,14 +84,15 @@ impl TriangleBin {
     }
 }
 
-/// Sorts the plan's triangles and edges into bands of `rows`.
-pub fn bin(stages: &Stages<'_>, pool: Option<&rayon::ThreadPool>, rows: u32) -> Result<Bins, Stopped> {
+/// Sorts the plan's triangles and edges into bands of `rows`; triangles also into those to which they are as close as
+/// `margin` rows.
+pub fn bin(stages: &Stages<'_>, pool: Option<&rayon::ThreadPool>, [rows, margin]: [u32; 2]) -> Result<Bins, Stopped> {
     let plan = stages.plan;
     let (base, layers) = passes(plan);
     let bin_all = |passes: Vec<Pass>| {
         let jobs = passes.into_iter().flat_map(Pass::chunks).collect();
         map(pool, jobs, |pass| match stages.deadline.check() {
-            Ok(()) => bin_triangles(stages, rows, &pass),
+            Ok(()) => bin_triangles(stages, [rows, margin], &pass),
             Err(Stopped) => TriangleBin::default(),
         })
     };
@@ -157,9 +158,9 @@ fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
     plan.height_px.div_ceil(rows) as usize
 }
 
-fn bin_triangles(stages: &Stages<'_>, rows: u32, pass: &Pass) -> TriangleBin {
+fn bin_triangles(stages: &Stages<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBin {
     let plan = stages.plan;
-    let bands = band_count(plan, rows);
+    let bands = band_count(plan, rows[0]);
     let mut bin = TriangleBin { whole: Bin::new(bands), pieces: Vec::new(), piece_bands: Bin::new(bands) };
     for id in pass.ids.clone() {
         let Some(faces) = pass.faces_of(plan, id) else { continue };
@@ -175,7 +176,7 @@ fn bin_triangles(stages: &Stages<'_>, rows: u32, pass: &Pass) -> TriangleBin {
     bin
 }
 
-fn bin_clipped(stages: &Stages<'_>, rows: u32, id: u32, faces: Faces, bin: &mut TriangleBin) {
+fn bin_clipped(stages: &Stages<'_>, rows: [u32; 2], id: u32, faces: Faces, bin: &mut TriangleBin) {
     let plan = stages.plan;
     if !plan.projection.clip {
         return;
@@ -192,21 +193,23 @@ fn bin_clipped(stages: &Stages<'_>, rows: u32, id: u32, faces: Faces, bin: &mut 
 
 /// First and last band that a triangle on screen touches; None if it lies beside, above or below the picture.
 #[inline(always)]
-fn bands_of(plan: &DrawPlan<'_>, rows: u32, v: &[ScreenVertex; 3]) -> Option<[usize; 2]> {
+fn bands_of(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], v: &[ScreenVertex; 3]) -> Option<[usize; 2]> {
     axis_bounds(&v.map(|v| v.x), plan.width_px, 0, plan.width_px)?;
     let [first, last] = axis_bounds(&v.map(|v| v.y), plan.height_px, 0, plan.height_px)?;
-    Some([first as usize / rows as usize, last as usize / rows as usize])
+    let (first, last) = ((first as u32).saturating_sub(margin), (last as u32 + margin).min(plan.height_px - 1));
+    Some([first, last].map(|row| (row / rows) as usize))
 }
 
 fn bin_edges(stages: &Stages<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> Bin {
     let mut bin = Bin::new(band_count(stages.plan, rows));
+    let reach = pass.reach_px();
     for i in range {
         let edge = &pass.edges[i];
         if !contour::is_drawn(stages, pass, edge) {
             continue;
         }
-        if let Some(segment) = lines::Segment::new(stages, pass, edge) {
-            let [first, last] = segment.rows(stages.plan.height_px);
+        if let Some(segment) = lines::Segment::new(stages, edge) {
+            let [first, last] = segment.rows(reach, stages.plan.height_px);
             if first <= last {
                 bin.push(i as u32, [first, last].map(|row| row as usize / rows as usize));
             }

@@ -74,9 +74,15 @@ impl Stages<'_> {
             return area(&vertices).signum() as i32;
         }
         // Where a corner is behind the eye, by the side of the face's plane on which the eye is.
-        let [a, b, c] = corners.map(|v| homogeneous(&self.plan.projection, self.plan.positions[v as usize]));
-        let (x, y) = (a[1] * b[3] - a[3] * b[1], a[3] * b[0] - a[0] * b[3]);
-        let volume = (x * c[0] + y * c[1]) + (a[0] * b[1] - a[1] * b[0]) * c[3];
+        let corners = corners.map(|v| homogeneous(&self.plan.projection, self.plan.positions[v as usize]));
+        let volume = volume(&corners);
         i32::from(volume > 0.0) - i32::from(volume < 0.0)
     }
+}
+
+/// Six times the volume that three points on screen, times W, span with the eye: its sign is right for points behind the eye
+/// too.
+pub fn volume([a, b, c]: &[[f32; 4]; 3]) -> f32 {
+    let (x, y, w) = (a[1] * b[3] - a[3] * b[1], a[3] * b[0] - a[0] * b[3], a[0] * b[1] - a[1] * b[0]);
+    (x * c[0] + y * c[1]) + w * c[3]
 }

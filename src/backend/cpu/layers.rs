@@ -42,7 +42,7 @@ impl LayerBand {
     /// Forgets everything, and moves to where `base` is.
     fn begin(&mut self, base: &SampleBand) {
         for samples in [&mut self.found, &mut self.previous] {
-            (samples.first_row, samples.rows) = (base.first_row, base.rows);
+            (samples.first_row, samples.rows, samples.shown) = (base.first_row, base.rows, base.shown);
         }
         self.previous.depth.fill(f32::INFINITY);
         self.previous.ids.fill(0);
@@ -158,7 +158,7 @@ fn lay_kernel(stages: &Stages<'_>, show: Show, floor: Option<&SampleBand>, layer
     let hull = stages.plan.hull.as_ref().filter(|_| stages.plan.has_layered_hull());
     let triangles = stages.plan.triangles.len() as u32;
     let mut shader = Shader::new(stages);
-    for y in layers.found.first_row..layers.found.first_row + layers.found.rows {
+    for y in layers.found.shown[0]..layers.found.shown[1] {
         for x in 0..layers.found.size_px[0] {
             let first = layers.found.index(x, y, 0);
             let mut ids = [NOTHING; 4];
@@ -199,7 +199,7 @@ fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colo
     let mut shader = Shader::new(stages);
     let share = 1.0 / base.samples as f32;
     let mut colors = colors.iter_mut();
-    for y in base.first_row..base.first_row + base.rows {
+    for y in base.shown[0]..base.shown[1] {
         for x in 0..base.size_px[0] {
             let Some(out) = colors.next() else { return };
             let first = base.index(x, y, 0);

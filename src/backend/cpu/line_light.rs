@@ -17,7 +17,7 @@ pub fn light_lines(stages: &Stages<'_>, band: &SampleBand, owners: &[u32], light
     let Some(surface) = &stages.plan.surface else { return };
     for (i, (&owner, out)) in (0_u32..).zip(owners.iter().zip(light)) {
         if owner > 0 {
-            *out = pixel(stages, surface, band, [i % band.size_px[0], band.first_row + i / band.size_px[0]], owner - 1);
+            *out = pixel(stages, surface, band, [i % band.size_px[0], band.shown[0] + i / band.size_px[0]], owner - 1);
         }
     }
 }

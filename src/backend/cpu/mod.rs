@@ -13,18 +13,21 @@ mod bins;
 mod clip;
 mod contour;
 mod debug;
+mod hiding;
+mod ink;
 mod isa;
 mod layers;
 mod light;
 mod line_light;
 mod lines;
-mod occluders;
 mod peel;
 mod point;
+mod profile;
 mod resolve;
 mod samples;
 mod scratch;
 mod shade;
+mod stroke;
 mod texture;
 mod transform;
 mod vector;
@@ -42,7 +45,7 @@ use self::transform::ScreenVertex;
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::Image;
 use crate::limits::Deadline;
-use crate::plan::{DrawPlan, ink_table};
+use crate::plan::DrawPlan;
 
 /// Vertices or triangles handed to a thread at a time.
 const CHUNK: usize = 8192;
@@ -55,7 +58,6 @@ pub struct CpuRenderer {
     hull_vertices: Vec<ScreenVertex>,
     scratch: ScratchPool,
     srgb: SrgbEncoder,
-    ink_table: [u32; 1024],
 }
 
 /// What every stage reads: the plan and the vertices on screen.
@@ -66,7 +68,6 @@ pub struct Stages<'a> {
     hull_vertices: &'a [ScreenVertex],
     isa: Isa,
     srgb: &'a SrgbEncoder,
-    ink_table: &'a [u32; 1024],
 }
 
 impl CpuRenderer {
@@ -87,7 +88,6 @@ impl CpuRenderer {
             hull_vertices: Vec::new(),
             scratch: ScratchPool::default(),
             srgb: SrgbEncoder::new(),
-            ink_table: ink_table(),
         }
     }
 
@@ -117,7 +117,6 @@ impl CpuRenderer {
             hull_vertices: &self.hull_vertices,
             isa: self.isa,
             srgb: &self.srgb,
-            ink_table: &self.ink_table,
         }
     }
 
@@ -133,7 +132,7 @@ impl CpuRenderer {
         self.transform(plan);
         let stages = self.stages(plan, deadline);
         let rows = scratch::rows_per_band(plan);
-        let bins = bins::bin(&stages, self.pool.as_ref(), rows)?;
+        let bins = bins::bin(&stages, self.pool.as_ref(), [rows, plan.line_margin_rows()])?;
         let row_len = out.len() / plan.height_px as usize;
         let items = out.chunks_mut(row_len * rows as usize).enumerate().collect();
         run(self.pool.as_ref(), items, |(band, out)| {

@@ -3,7 +3,7 @@
 use super::light::Light;
 use super::transform::recip;
 use crate::image::srgb8_thresholds;
-use crate::plan::{DrawPlan, INK_FULL};
+use crate::plan::DrawPlan;
 
 /// Linear light to sRGB bytes by the 255 thresholds, with a first guess from a small table.
 pub struct SrgbEncoder {
@@ -34,23 +34,23 @@ impl SrgbEncoder {
     }
 }
 
-/// Resolves a band into `rgba`; `ink` is that of one line pass after the other, `light` what falls on those that are lit (empty
+/// Resolves a band into `rgba`; `coverage` is that by one line pass after the other, `light` what falls on those that are lit (empty
 /// where none is).
 #[inline(always)]
 pub fn resolve(
     plan: &DrawPlan<'_>,
     srgb: &SrgbEncoder,
     colors: &[[f32; 4]],
-    ink: &[u32],
+    coverage: &[f32],
     light: &[Light],
     rgba: &mut [u8],
 ) {
     let mut last = ([f32::NAN; 4], [0; 4]);
     for (i, (color, out)) in colors.iter().zip(rgba.chunks_exact_mut(4)).enumerate() {
         let mut c: [f32; 4] = std::array::from_fn(|k| color[k] + plan.background[k] * (1.0 - color[3]));
-        for (lines, ink) in plan.lines.iter().zip(ink.chunks_exact(colors.len())) {
-            if ink[i] > 0 {
-                let cover = coverage(ink[i]);
+        for (lines, coverage) in plan.lines.iter().zip(coverage.chunks_exact(colors.len())) {
+            let cover = coverage[i];
+            if cover > 0.0 {
                 let light = light.get(i).filter(|_| lines.lit);
                 let color = light.map_or(lines.color, |light| light.on_premultiplied(lines.color));
                 c = std::array::from_fn(|k| cover * color[k] + c[k] * (1.0 - cover * color[3]));
@@ -62,11 +62,6 @@ pub fn resolve(
         }
         out.copy_from_slice(&last.1);
     }
-}
-
-/// Ink back to coverage, 0 to 1.
-fn coverage(ink: u32) -> f32 {
-    if ink >= INK_FULL { 1.0 } else { 1.0 - libm::exp2f(ink as f32 * (-1.0 / 4096.0)) }
 }
 
 #[inline(always)]

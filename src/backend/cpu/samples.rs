@@ -13,6 +13,8 @@ pub struct SampleBand {
     pub first_row: u32,
     /// Rows in the band.
     pub rows: u32,
+    /// First row that is shown, and the row after the last; what lies beyond them in the band hides lines that reach into it.
+    pub shown: [u32; 2],
     /// Samples a pixel.
     pub samples: u32,
     /// Samples in a row, padded so that a vector may hang over the right edge.
@@ -28,7 +30,8 @@ impl SampleBand {
     pub fn new(size_px: [u32; 2], first_row: u32, rows: u32, samples: u32) -> Self {
         let stride = size_px[0] as usize * samples as usize + LANES;
         let len = stride * rows as usize;
-        Self { size_px, first_row, rows, samples, stride, depth: vec![0.0; len], ids: vec![NOTHING; len] }
+        let shown = [first_row, first_row + rows];
+        Self { size_px, first_row, rows, shown, samples, stride, depth: vec![0.0; len], ids: vec![NOTHING; len] }
     }
 
     /// Empties the band.
@@ -50,6 +53,12 @@ impl SampleBand {
     pub fn word(&self, at: usize) -> u64 {
         let id = self.ids[at];
         if id == NOTHING { 0 } else { u64::from(self.depth[at].to_bits()) << 32 | u64::from(!id) }
+    }
+
+    /// Whether a pixel of the picture, or beyond, is in the band.
+    #[inline(always)]
+    pub fn has(&self, x: u32, y: u32) -> bool {
+        (x < self.size_px[0]) & (y >= self.first_row) & (y < self.first_row + self.rows)
     }
 
     /// Ids and depths of a pixel's samples.

@@ -2,6 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use super::ink::Ink;
 use super::layers::LayerBand;
 use super::light::Light;
 use super::samples::SampleBand;
@@ -23,29 +24,34 @@ const LAYERED_SAMPLE_BYTES: usize = SAMPLE_BYTES + LayerBand::SAMPLE_BYTES;
 pub fn rows_per_band(plan: &DrawPlan<'_>) -> u32 {
     let sample_bytes = if plan.layers().is_some() { LAYERED_SAMPLE_BYTES } else { SAMPLE_BYTES };
     let light_bytes = if plan.lights_lines() { size_of::<Light>() } else { 0 };
-    let ink_bytes = ink_planes(plan) * size_of::<u32>();
-    let pixel_bytes = plan.samples as usize * sample_bytes + size_of::<[f32; 4]>() + ink_bytes + light_bytes;
+    let ink_bytes = plan.lines.len() * size_of::<f32>() + if plan.lines.is_empty() { 0 } else { size_of::<Ink>() };
+    let owner_bytes = if plan.lights_lines() { size_of::<u32>() } else { 0 };
+    let colors_bytes = size_of::<[f32; 4]>() + light_bytes + owner_bytes;
+    let pixel_bytes = plan.samples as usize * sample_bytes + colors_bytes + ink_bytes;
     let row_bytes = plan.width_px as usize * pixel_bytes;
-    ((BAND_BYTES / row_bytes.max(1)) as u32).clamp(1, plan.height_px.max(1))
-}
-
-/// Words of ink a pixel: one a line pass and, if lines are lit, one for whose light falls on them.
-pub fn ink_planes(plan: &DrawPlan<'_>) -> usize {
-    plan.lines.len() + usize::from(plan.lights_lines())
+    // Where samples beyond the band are drawn too, at least as many in it: or most of the work would be done twice.
+    let least = (2 * plan.line_margin_rows()).max(1);
+    ((BAND_BYTES / row_bytes.max(1)) as u32).max(least).min(plan.height_px.max(1))
 }
 
 /// A band's buffers, kept from band to band.
 pub struct BandScratch {
     /// What each sample sees.
     pub samples: SampleBand,
-    /// Rows that `samples` has room for; the last band of a picture may use fewer.
+    /// Rows that are shown; the last band of a picture may use fewer.
     pub rows: u32,
+    /// Rows beyond these, above and below, that `samples` has room for too.
+    pub margin: u32,
     /// Where the plan has layers.
     pub layers: Option<LayerBand>,
     /// A pixel, premultiplied linear RGBA.
     pub colors: Vec<[f32; 4]>,
-    /// Of one line pass after the other; then, if lines are lit, whose light falls on them.
-    pub ink: Vec<u32>,
+    /// Of the line pass that is drawn just now.
+    pub ink: Vec<Ink>,
+    /// Coverage by lines, 0 to 1, of one pass after the other.
+    pub coverage: Vec<f32>,
+    /// Where lines are lit, whose light falls on them.
+    pub owners: Vec<u32>,
     /// A pixel, where lines are lit.
     pub light: Vec<Light>,
 }
@@ -56,7 +62,9 @@ impl BandScratch {
         let layered = if self.layers.is_some() { LAYERED_SAMPLE_BYTES } else { SAMPLE_BYTES };
         self.samples.depth.len() * layered
             + self.colors.capacity() * size_of::<[f32; 4]>()
-            + self.ink.capacity() * size_of::<u32>()
+            + self.ink.capacity() * size_of::<Ink>()
+            + self.coverage.capacity() * size_of::<f32>()
+            + self.owners.capacity() * size_of::<u32>()
             + self.light.capacity() * size_of::<Light>()
     }
 }
@@ -68,16 +76,20 @@ pub struct ScratchPool(Mutex<Vec<BandScratch>>);
 impl ScratchPool {
     /// Lends a scratch that fits the plan.
     pub fn with(&self, plan: &DrawPlan<'_>, rows: u32, each: impl FnOnce(&mut BandScratch)) {
-        let size_px = [plan.width_px, plan.height_px];
-        let fits =
-            |s: &BandScratch| s.samples.size_px == size_px && s.rows == rows && s.samples.samples == plan.samples;
+        let (size_px, margin) = ([plan.width_px, plan.height_px], plan.line_margin_rows());
+        let fits = |s: &BandScratch| {
+            s.samples.size_px == size_px && s.rows == rows && s.margin == margin && s.samples.samples == plan.samples
+        };
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().filter(fits);
         let mut scratch = kept.unwrap_or_else(|| BandScratch {
-            samples: SampleBand::new(size_px, 0, rows, plan.samples),
+            samples: SampleBand::new(size_px, 0, rows + 2 * margin, plan.samples),
             rows,
+            margin,
             layers: None,
             colors: Vec::new(),
             ink: Vec::new(),
+            coverage: Vec::new(),
+            owners: Vec::new(),
             light: Vec::new(),
         });
         each(&mut scratch);
@@ -133,7 +145,7 @@ mod tests {
         let mut bytes = 0;
         pool.with(plan, rows, |scratch| {
             scratch.colors.resize(pixels, [0.0; 4]);
-            scratch.ink.resize(pixels * ink_planes(plan), 0);
+            scratch.coverage.resize(pixels * plan.lines.len(), 0.0);
             bytes = scratch.bytes();
         });
         pool.trim();

@@ -13,9 +13,8 @@ use crate::plan::sample_offsets;
 pub fn shade(stages: &Stages<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
     let width = band.size_px[0];
     let mut shader = Shader::new(stages);
-    for row in 0..band.rows {
-        let y = band.first_row + row;
-        let line = &mut colors[(row * width) as usize..][..width as usize];
+    for y in band.shown[0]..band.shown[1] {
+        let line = &mut colors[((y - band.shown[0]) * width) as usize..][..width as usize];
         for (x, color) in (0_u32..).zip(line) {
             *color = shader.pixel(band, x, y);
         }

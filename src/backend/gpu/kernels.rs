@@ -5,6 +5,8 @@ use super::stages::{Access, Into, Slot, Stage, Write};
 
 const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 const CONTOUR: &str = include_str!("../../../shaders/contour.wgsl");
+const HIDING: &str = include_str!("../../../shaders/hiding.wgsl");
+const STROKE: &str = include_str!("../../../shaders/stroke.wgsl");
 const PLANES: &str = include_str!("../../../shaders/planes.wgsl");
 const WORK: &str = include_str!("../../../shaders/work.wgsl");
 const TRIANGLE: &str = include_str!("../../../shaders/triangle.wgsl");
@@ -114,8 +116,9 @@ impl Stage {
                 (Slot::Samples, Read),
                 (Slot::Edges, Read),
                 (Slot::Ink, ReadWrite),
-                (Slot::InkTable, Read),
+                (Slot::Strokes, ReadWrite),
             ],
+            Self::Ink => &[(Slot::Ink, ReadWrite), (Slot::Strokes, ReadWrite)],
             Self::LineLight => &[
                 (Slot::Positions, Read),
                 (Slot::Triangles, Read),
@@ -167,6 +170,7 @@ impl Stage {
             Self::VisibilityTile { .. } => "visibility_tile",
             Self::Shade => "shade",
             Self::Lines => "lines",
+            Self::Ink => "ink",
             Self::LineLight => "line_light",
             Self::Resolve => "resolve",
         }
@@ -199,7 +203,11 @@ impl Stage {
             Self::LineLight => {
                 [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/line_light.wgsl")]].concat().concat()
             }
-            Self::Lines => [COMMON, TRIANGLE, PLANES, CONTOUR, include_str!("../../../shaders/lines.wgsl")].concat(),
+            Self::Lines => {
+                [COMMON, TRIANGLE, PLANES, CONTOUR, HIDING, STROKE, include_str!("../../../shaders/lines.wgsl")]
+                    .concat()
+            }
+            Self::Ink => [COMMON, include_str!("../../../shaders/ink.wgsl")].concat(),
             Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
         }
     }
@@ -230,6 +238,7 @@ impl Stage {
             Self::Layers => SHADED | look::LAYERED_HULL,
             Self::Shade => SHADED | look::LAYERS,
             Self::LineLight => SHADED,
+            Self::Ink => 0,
             Self::Lines => look::CONTOURS | look::CLIPPED | look::FOUR_SAMPLES,
             Self::Resolve => look::SURFACE | look::HULL | look::LINES | look::LIT_LINES,
         }

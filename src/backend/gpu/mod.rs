@@ -28,14 +28,15 @@ use self::params::{attributes, corner_triangles, edge_lists, hull_amounts, hull_
 use self::recorder::Recorder;
 use self::schedule::Schedule;
 use self::sizes::{
-    DeviceTraits, LAYERED_BYTES, SAMPLE_BYTES, color_bytes, has_visibility, ink_bytes, samples, work_bytes,
+    DeviceTraits, LAYERED_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, ink_bytes, samples,
+    work_bytes,
 };
 use self::stages::Slot;
-use self::step::{Goal, Step};
+use self::step::{Band, Goal, Step};
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::{Image, srgb8_thresholds};
 use crate::limits::Deadline;
-use crate::plan::{DrawPlan, LinePass, ink_table};
+use crate::plan::{DrawPlan, LinePass};
 
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
@@ -88,9 +89,9 @@ impl GpuRenderer {
             buffers.staging(gpu, schedule.band_rows as u64 * row_words as u64 * 8)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
             let mut words = Vec::with_capacity(len);
-            execute(&mut recorder, plan, &schedule, |recorder, [first, end]| {
-                let size = u64::from(end - first) * row_words as u64 * 8;
-                recorder.copy_out(slot, size, 0)?;
+            execute(&mut recorder, plan, &schedule, |recorder, band| {
+                let size = u64::from(band.rows[1] - band.rows[0]) * row_words as u64 * 8;
+                recorder.copy_out(slot, 0, size, 0)?;
                 recorder.read_staging(size, |bytes| {
                     words.extend(bytes.chunks_exact(8).map(|b| u64::from_le_bytes(std::array::from_fn(|i| b[i]))));
                 })
@@ -128,8 +129,10 @@ impl Renderer for GpuRenderer {
             upload_looks(gpu, buffers, plan, &schedule)?;
             buffers.staging(gpu, size)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
-            execute(&mut recorder, plan, &schedule, |recorder, [first, end]| {
-                recorder.copy_out(Slot::Rgba, u64::from(end - first) * row_bytes, u64::from(first) * row_bytes)?;
+            execute(&mut recorder, plan, &schedule, |recorder, Band { rows: [first, end], buffer_first }| {
+                let from = u64::from(first - buffer_first) * row_bytes;
+                let to = u64::from(first) * row_bytes;
+                recorder.copy_out(Slot::Rgba, from, u64::from(end - first) * row_bytes, to)?;
                 recorder.submit()
             })?;
             recorder.read_staging(size, |bytes| image.rgba = bytes.to_vec())?;
@@ -219,7 +222,7 @@ fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule:
         let colors: Vec<[f32; 4]> = plan.lines.iter().flat_map(|lines| [lines.color, lit(lines)]).collect();
         buffers.upload_parts(gpu, Slot::Edges, &edges)?;
         buffers.upload(gpu, Slot::LineColors, bytemuck::cast_slice(&colors))?;
-        buffers.upload(gpu, Slot::InkTable, bytemuck::cast_slice(&ink_table()))?;
+        buffers.reserve(gpu, Slot::Strokes, band_pixels * STROKES_BYTES)?;
         buffers.reserve(gpu, Slot::Ink, band_pixels * ink_bytes(plan))?;
     }
     buffers.upload(gpu, Slot::Thresholds, bytemuck::cast_slice(&srgb8_thresholds()))?;
@@ -232,7 +235,7 @@ fn execute<'a>(
     recorder: &mut Recorder<'a>,
     plan: &DrawPlan<'_>,
     schedule: &Schedule,
-    mut end_band: impl FnMut(&mut Recorder<'a>, [u32; 2]) -> Result<(), DrawError>,
+    mut end_band: impl FnMut(&mut Recorder<'a>, Band) -> Result<(), DrawError>,
 ) -> Result<(), DrawError> {
     let mut next = 0;
     while let Some(step) = schedule.steps.get(next) {
@@ -252,7 +255,7 @@ fn execute<'a>(
             }
             Step::Tiles { stage, batch } => recorder.dispatch(stage, batch, [schedule.tiles.workgroups, 1])?,
             Step::Submit => recorder.submit()?,
-            Step::EndBand { row_first, row_end } => end_band(recorder, [row_first, row_end])?,
+            Step::EndBand(band) => end_band(recorder, band)?,
         }
     }
     Ok(())
@@ -267,7 +270,9 @@ fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, schedule: &Sched
         recorder.clear(Slot::Samples, samples(plan, rows) * SAMPLE_BYTES)?;
     }
     if !plan.lines.is_empty() {
-        recorder.clear(Slot::Ink, u64::from(plan.width_px) * u64::from(rows) * ink_bytes(plan))?;
+        let pixels = u64::from(plan.width_px) * u64::from(rows);
+        recorder.clear(Slot::Ink, pixels * ink_bytes(plan))?;
+        recorder.clear(Slot::Strokes, pixels * STROKES_BYTES)?;
     }
     Ok(())
 }

@@ -64,6 +64,9 @@ pub struct Batch {
     pub line_width: f32,
     pub line_smoothing: f32,
     pub line_flags: u32,
+    pub line_exponent: u32,
+    pub line_windows: f32,
+    pub line_slices: u32,
     pub ink_at: u32,
     pub owners_at: u32,
     pub role: u32,
@@ -84,6 +87,11 @@ pub fn line_flags(lines: &LinePass, something_hides: bool, lights_lines: bool) -
         | u32::from(lines.contour) << 3
         | u32::from(lines.lit && lights_lines) << 4
 }
+
+/// Bits of [`Batch::line_flags`] for a dispatch that draws only edges that a workgroup shares, or only others.
+pub const LONG_ONLY: u32 = 32;
+/// See [`LONG_ONLY`].
+pub const SHORT_ONLY: u32 = 64;
 
 /// Distance between [`Batch`]es in their buffer: every device can bind at multiples of this.
 pub const BATCH_STRIDE: usize = 256;
@@ -236,7 +244,7 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_shader() {
         assert_eq!(size_of::<Frame>(), 320);
-        assert_eq!(size_of::<Batch>(), 80);
+        assert_eq!(size_of::<Batch>(), 92);
     }
 
     #[test]

@@ -123,11 +123,11 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Copies the first `size` bytes of a buffer to `offset` in the staging buffer.
-    pub fn copy_out(&mut self, slot: Slot, size: u64, offset: u64) -> Result<(), DrawError> {
+    /// Copies `size` bytes of a buffer, from `first` on, to `offset` in the staging buffer.
+    pub fn copy_out(&mut self, slot: Slot, first: u64, size: u64, offset: u64) -> Result<(), DrawError> {
         let from = self.buffers.storage(self.gpu, slot)?.clone();
         if let Some(to) = self.buffers.staging.clone() {
-            self.encoder().copy_buffer_to_buffer(&from, 0, &to, offset, Some(size));
+            self.encoder().copy_buffer_to_buffer(&from, first, &to, offset, Some(size));
         }
         Ok(())
     }

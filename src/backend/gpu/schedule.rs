@@ -6,10 +6,10 @@
 
 use super::params::{Batch, edge_lists, faces_code, line_flags};
 use super::passes::Pass;
-use super::sizes::{DeviceTraits, band_rows, has_visibility};
+use super::sizes::{DeviceTraits, band_rows, has_visibility, margin_rows};
 use super::stages::{Into, Stage, Write};
-use super::step::{Goal, Step};
-use super::tiles::{Tiles, edges_per_group};
+use super::step::{Band, Goal, Step};
+use super::tiles::{Tiles, edges_per_group, slices};
 use crate::backend::DrawError;
 use crate::plan::{DrawPlan, roles};
 
@@ -59,8 +59,10 @@ impl Schedule {
         let (steps, batches) = (Vec::new(), Vec::new());
         let mut schedule = Self { steps, batches, band_rows, work_items: 0, layers: 0, tiles, edge_starts };
         schedule.transform(plan, device)?;
-        for row_first in (0..plan.height_px).step_by(band_rows as usize) {
-            let rows = [row_first, plan.height_px.min(row_first + band_rows)];
+        let margin = margin_rows(plan, band_rows, goal);
+        for first in (0..plan.height_px).step_by((band_rows - 2 * margin) as usize) {
+            let end = plan.height_px.min(first + band_rows - 2 * margin);
+            let rows = [first.saturating_sub(margin), plan.height_px.min(end + margin)];
             schedule.steps.push(Step::ClearBand);
             if has_visibility(plan) {
                 schedule.visibility(plan, device, rows)?;
@@ -69,7 +71,7 @@ impl Schedule {
             if goal == Goal::Picture {
                 schedule.picture_stages(plan, device, rows)?;
             }
-            schedule.steps.push(Step::EndBand { row_first, row_end: rows[1] });
+            schedule.steps.push(Step::EndBand(Band { rows: [first, end], buffer_first: rows[0] }));
         }
         Ok(schedule)
     }
@@ -187,7 +189,9 @@ impl Schedule {
         }
         for (pass, (lines, edges_first)) in (0..).zip(plan.lines.iter().zip(self.edge_starts.clone())) {
             let lined = Batch {
-                edges_per_group: edges_per_group(plan, lines, device),
+                line_exponent: lines.square_exponent(),
+                line_windows: 1.0 / lines.window_px(),
+                line_slices: slices(lines),
                 line_width: lines.width_px,
                 line_smoothing: lines.smoothing_px,
                 line_flags: line_flags(lines, has_visibility(plan), plan.lights_lines()),
@@ -195,16 +199,19 @@ impl Schedule {
                 owners_at: plan.lines.len() as u32 * count,
                 ..pixels
             };
-            let edges_per_group = lined.edges_per_group;
             let edges = lines.edges.len() as u32;
             for first in (0..edges).step_by(EDGE_CHUNK as usize) {
                 let count = EDGE_CHUNK.min(edges - first);
                 let batch = Batch { first: edges_first.saturating_add(first), count, ..lined };
-                self.dispatch_groups(device, Stage::Lines, count.div_ceil(edges_per_group), batch)?;
+                for (flag, edges_per_group) in edges_per_group(plan, lines, device) {
+                    let batch = Batch { line_flags: batch.line_flags | flag, edges_per_group, ..batch };
+                    self.dispatch_groups(device, Stage::Lines, count.div_ceil(edges_per_group), batch)?;
+                }
                 if edges > EDGE_CHUNK {
                     self.steps.push(Step::Submit);
                 }
             }
+            self.dispatch(device, Stage::Ink, count, Batch { ink_at: lined.ink_at, ..pixels })?;
         }
         if plan.lights_lines() {
             self.dispatch(device, Stage::LineLight, count, pixels)?;

@@ -1,5 +1,6 @@
 //! What a device allows, and how large buffers are: bytes a pixel, a sample, an item, and the rows that this leaves room for.
 
+use super::step::Goal;
 use crate::plan::DrawPlan;
 
 /// Largest buffer that depends on the picture's size, bytes.
@@ -40,8 +41,19 @@ pub fn has_visibility(plan: &DrawPlan<'_>) -> bool {
 /// Rows of a band, so that none of its buffers is large or breaks the device's limit.
 pub fn band_rows(plan: &DrawPlan<'_>, device: &DeviceTraits) -> u32 {
     let row_bytes = u64::from(plan.width_px) * pixel_bytes(plan);
-    let band_bytes = BAND_BYTES.min(device.binding_bytes_max);
-    (band_bytes / row_bytes.max(1)).clamp(1, u64::from(plan.height_px.max(1))) as u32
+    let rows = |bytes: u64| bytes / row_bytes.max(1);
+    // Where lines look beyond the band, as many rows in it as around it, if the device has room for them.
+    let least = rows(device.binding_bytes_max).min(4 * u64::from(plan.line_margin_rows()));
+    rows(BAND_BYTES.min(device.binding_bytes_max)).max(least).clamp(1, u64::from(plan.height_px.max(1))) as u32
+}
+
+/// Rows beyond a band that its lines look at. Where a row is so wide or has so many lines that hardly any fit a buffer, fewer
+/// than they would: there something that is hidden by what lies beyond the band may show at its border.
+pub fn margin_rows(plan: &DrawPlan<'_>, band_rows: u32, goal: Goal) -> u32 {
+    if goal != Goal::Picture || band_rows >= plan.height_px {
+        return 0;
+    }
+    plan.line_margin_rows().min(band_rows / 4)
 }
 
 /// Samples of so many rows.
@@ -59,6 +71,9 @@ pub fn ink_bytes(plan: &DrawPlan<'_>) -> u64 {
     4 * (plan.lines.len() as u64 + u64::from(plan.lights_lines()))
 }
 
+/// Bytes of a pixel's strokes: two sums, and a bit for each of 256 points.
+pub const STROKES_BYTES: u64 = 40;
+
 /// Bytes of a work list.
 pub fn work_bytes(items: u32) -> u64 {
     WORK_HEAD_BYTES + u64::from(items) * WORK_ITEM_BYTES
@@ -66,6 +81,7 @@ pub fn work_bytes(items: u32) -> u64 {
 
 /// Bytes a pixel of the largest buffer that holds a band.
 fn pixel_bytes(plan: &DrawPlan<'_>) -> u64 {
+    let strokes = if plan.lines.is_empty() { 0 } else { STROKES_BYTES };
     let sample = if plan.layers().is_some() { LAYERED_BYTES } else { SAMPLE_BYTES };
-    (u64::from(plan.samples) * sample).max(color_bytes(plan)).max(ink_bytes(plan))
+    (u64::from(plan.samples) * sample).max(color_bytes(plan)).max(ink_bytes(plan)).max(strokes)
 }

@@ -30,6 +30,8 @@ pub enum Stage {
     Shade,
     /// Edges to ink.
     Lines,
+    /// Unites the strokes of a line pass in each pixel.
+    Ink,
     /// Samples and ink to the light on lines.
     LineLight,
     /// Colours and ink to bytes.
@@ -72,7 +74,7 @@ pub enum Slot {
     Colors,
     Edges,
     Ink,
-    InkTable,
+    Strokes,
     Thresholds,
     Rgba,
     Materials,

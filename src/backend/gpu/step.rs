@@ -38,12 +38,16 @@ pub enum Step {
     /// Hands what was recorded to the device.
     Submit,
     /// The band is finished: its rows are copied out.
-    EndBand {
-        /// First row.
-        row_first: u32,
-        /// Past its last row.
-        row_end: u32,
-    },
+    EndBand(Band),
+}
+
+/// Rows of the picture that are drawn at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Band {
+    /// First row, and the row after the last.
+    pub rows: [u32; 2],
+    /// The first row that the buffers hold: rows beyond the band hide lines that reach into it.
+    pub buffer_first: u32,
 }
 
 /// What is wanted of a plan.

@@ -1,6 +1,7 @@
 //! How much a thread is given at a time: how often the kernel that draws large triangles is run, and how many edges one that
 //! draws lines takes.
 
+use super::params::{LONG_ONLY, SHORT_ONLY};
 use super::schedule::WORKGROUP;
 use super::sizes::DeviceTraits;
 use crate::plan::{DrawPlan, LinePass};
@@ -56,18 +57,33 @@ impl Tiles {
     }
 }
 
-/// Edges that a workgroup draws: all its threads draw the long ones together, each one's share of which is bounded.
-pub fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> u32 {
-    if !device.loops_are_limited {
-        return WORKGROUP;
-    }
-    let reach = f64::from(0.5 * lines.width_px + 0.5 * lines.smoothing_px + 1.0);
-    let side = f64::from(plan.width_px.max(plan.height_px));
-    // In every eighth row, every eighth column of what is in reach, and the samples of each pixel.
-    let pixels = (side + 2.0 * reach) / 8.0 * (2.0 * reach / 8.0 + 2.0) + side / 8.0;
-    let iterations = pixels * f64::from(plan.samples + 2);
-    (ITERATIONS_MAX as f64 / iterations).clamp(1.0, f64::from(WORKGROUP)) as u32
+/// Threads that share a window of an edge, where the line is so wide that it has many pixels.
+pub fn slices(lines: &LinePass) -> u32 {
+    let side = lines.window_px() + 2.0 * lines.reach_px();
+    (side * 2.0 * lines.reach_px() / 400.0).ceil().clamp(1.0, 64.0) as u32
 }
+
+/// How often the kernel that draws lines is run over its edges: with which flag, and with how many edges a workgroup.
+///
+/// Where a thread's loops are limited, edges that a workgroup shares come by themselves, few at a time.
+pub fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> Vec<(u32, u32)> {
+    if !device.loops_are_limited {
+        return vec![(0, WORKGROUP)];
+    }
+    let (reach, window, slices) = (lines.reach_px(), lines.window_px(), slices(lines) as f32);
+    let side = plan.width_px.max(plan.height_px) as f32;
+    let shares = ((1.5 * side / window + 2.0) * slices / WORKGROUP as f32).ceil();
+    let length = window + 2.0 * (reach + 1.0);
+    // Steps of half a pixel, and at each pixel the samples of three; then a loop over a mask's words for each pixel.
+    let look = 2.0 * length + 1.5 * 3.0 * plan.samples as f32 * length;
+    let draw = (window + 2.0 * reach) / slices * (2.0 + 10.0 * (2.0 * reach + 1.0));
+    let iterations = shares * (LOOKS * look + LOOKS / 4.0 * draw);
+    let shared = (ITERATIONS_MAX as f32 / iterations).clamp(1.0, WORKGROUP as f32) as u32;
+    vec![(SHORT_ONLY, WORKGROUP), (LONG_ONLY, shared)]
+}
+
+/// Looks along an edge in a window that are made room for: a few for each part, and between letters or leaves there are many.
+const LOOKS: f32 = 16.0;
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,297 @@
+// Stage 4, a piece of an edge: which parts of it nothing hides. Twin of src/backend/cpu/hiding.rs; lines.wgsl declares the
+// buffers.
+//
+// The CPU sorts all intervals in which something hides the edge. Here there is no room to keep them, so each part is found by
+// looking again.
+
+const NOTHING: u32 = 0xFFFFFFFFu;
+
+// How much nearer than the edge a surface must be, as a share of depth: what f32 may lose on the way.
+const NEARER: f32 = 1.0000019073486328;
+
+// Parts shorter than this are what rounding leaves of an edge beside what hides it. Their round ends would show as dots.
+const CRUMB_PX: f32 = 0.0625;
+
+// Between two surfaces that hide it: there a sliver of surface may have no sample.
+const GAP_PX: f32 = 0.25;
+
+const MIN_POSITIVE: f32 = 1.17549435e-38;
+
+// How the edge's parts in a range of it are found.
+struct Search {
+    range: vec2<f32>,
+    // Pixels beside and beyond the edge whose triangles are asked too.
+    radius: u32,
+    // From where on parts are still to be found.
+    begin: f32,
+    // What has been found out already: nothing, that the range is one part, or where it is hidden.
+    state: u32,
+};
+
+const UNASKED: u32 = 0u;
+const WHOLE: u32 = 1u;
+const PARTS: u32 = 2u;
+
+// What triangles hide of a range, as far as one look from `begin` on shows it.
+struct Look {
+    // Up to where the edge is hidden without a gap.
+    until: f32,
+    // Where the next interval begins.
+    next: f32,
+    any: bool,
+};
+
+fn begin_search(s: Segment, range: vec2<f32>) -> Search {
+    if (batch.line_flags & (SHOWN_VISIBLE | SHOWN_HIDDEN)) == 0u {
+        return Search(range, 0u, range.x, WHOLE);
+    }
+    if lies_deep(s, range) {
+        let shows_hidden = (batch.line_flags & SHOWN_HIDDEN) != 0u;
+        return Search(range, 0u, select(range.y, range.x, shows_hidden), WHOLE);
+    }
+    return Search(range, 0u, range.x, UNASKED);
+}
+
+// The next part to draw; empty (x >= y) where there is none.
+fn next_part(edge: vec4<u32>, s: Segment, search: ptr<function, Search>) -> vec2<f32> {
+    let range = (*search).range;
+    let shows_visible = (batch.line_flags & SHOWN_VISIBLE) != 0u;
+    // Where the hidden part begins that is being followed to its end.
+    var hidden_from = 2.0;
+    while (*search).begin < range.y {
+        let begin = (*search).begin;
+        if (*search).state == WHOLE {
+            (*search).begin = range.y;
+            return range;
+        }
+        let look = look_along(edge, s, *search);
+        if (*search).state == UNASKED {
+            if !look.any {
+                (*search).state = WHOLE;
+                (*search).begin = select(range.y, range.x, shows_visible);
+            } else {
+                // Where an edge dives under another surface, a sliver of that may have its samples beside the edge.
+                (*search).state = PARTS;
+                (*search).radius = 1u;
+            }
+            continue;
+        }
+        if look.until > begin {
+            // Hidden from here on, perhaps farther than this look has shown.
+            hidden_from = min(hidden_from, begin);
+            (*search).begin = look.until;
+            continue;
+        }
+        if !shows_visible && hidden_from < begin {
+            return vec2(hidden_from, begin);
+        }
+        let end = min(look.next, range.y);
+        (*search).begin = end;
+        let is_gap = begin > range.x && end < range.y;
+        if shows_visible && end - begin > rn(s.inverse_length * select(CRUMB_PX, GAP_PX, is_gap)) {
+            return vec2(begin, end);
+        }
+    }
+    if !shows_visible && hidden_from < range.y {
+        return vec2(hidden_from, range.y);
+    }
+    return vec2(0.0);
+}
+
+// Asks each triangle that is seen along the edge what it hides.
+fn look_along(edge: vec4<u32>, s: Segment, search: Search) -> Look {
+    let count = u32(sample_count());
+    // Of the pixel itself, and of one on each side of it across the edge.
+    let words = count * (2u * search.radius + 1u);
+    let across = select(vec2(1, 0), vec2(0, 1), abs(s.along.x) >= abs(s.along.y));
+    var look = Look(search.begin, 2.0, false);
+    var recent = vec4(NOTHING);
+    var last = vec2(-1);
+    let beyond = f32(search.radius) * s.inverse_length;
+    let walked = vec2(search.range.x - beyond, search.range.y + beyond);
+    let steps = walk_steps(s, walked);
+    for (var i = 0u; i <= steps; i++) {
+        let pixel = walk_pixel(s, walked, i);
+        if all(pixel == last) {
+            continue;
+        }
+        last = pixel;
+        for (var n = 0u; n < words; n++) {
+            let id = seen_at(pixel + (i32(n / count) - i32(search.radius)) * across, n % count).x;
+            if id == NOTHING || any(recent == vec4(id)) {
+                continue;
+            }
+            recent = vec4(id, recent.xyz);
+            var part = hidden_by(edge, s, id);
+            part = vec2(max(part.x, search.range.x), min(part.y, search.range.y));
+            if part.x >= part.y {
+                continue;
+            }
+            look.any = true;
+            if part.x <= look.until {
+                look.until = max(look.until, part.y);
+            } else {
+                look.next = min(look.next, part.x);
+            }
+        }
+    }
+    return look;
+}
+
+fn walk_steps(s: Segment, range: vec2<f32>) -> u32 {
+    return u32(rn(rn(s.length * (range.y - range.x)) * 2.0)) + 1u;
+}
+
+// Where step i along a range of the edge lies; left of or above the picture, or outside of the rows, (-1, -1).
+fn walk_pixel(s: Segment, range: vec2<f32>, i: u32) -> vec2<i32> {
+    let p = point_at(s, min(range.x + rn(f32(i) * (0.5 * s.inverse_length)), range.y));
+    return select(vec2(-1), vec2<i32>(p), all(p >= vec2(0.0)));
+}
+
+// Id and depth (its bits) that a sample of a pixel sees.
+fn seen_at(pixel: vec2<i32>, sample: u32) -> vec2<u32> {
+    if pixel.x < 0 || pixel.x >= frame.width || pixel.y < batch.row_first || pixel.y >= batch.row_end {
+        return vec2(NOTHING, 0u);
+    }
+    let word = samples[u32((pixel.y - batch.row_first) * frame.width + pixel.x) * u32(sample_count()) + sample];
+    return vec2(select(~word.x, NOTHING, word.y == 0u), word.y);
+}
+
+// Whether all triangles that are seen along the edge are nearer than any of it.
+fn lies_deep(s: Segment, range: vec2<f32>) -> bool {
+    let nearest = rn(max(depth_of(s, 0.0), depth_of(s, 1.0)) * NEARER);
+    let count = u32(sample_count());
+    var last_id = NOTHING;
+    var last = vec2(-1);
+    let steps = walk_steps(s, range);
+    for (var i = 0u; i <= steps; i++) {
+        let pixel = walk_pixel(s, range, i);
+        if all(pixel == last) || pixel.x < 0 || pixel.x >= frame.width || pixel.y < batch.row_first || pixel.y >= batch.row_end {
+            continue;
+        }
+        last = pixel;
+        for (var n = 0u; n < count; n++) {
+            let seen = seen_at(pixel, n);
+            if bitcast<f32>(seen.y) <= nearest {
+                return false;
+            }
+            if seen.x != last_id {
+                last_id = seen.x;
+                let corners = corners_of_id(seen.x);
+                let a = vertices[corners.x];
+                let b = vertices[corners.y];
+                let c = vertices[corners.z];
+                if a.x == OUTSIDE || b.x == OUTSIDE || c.x == OUTSIDE || min(min(a.z, b.z), c.z) <= nearest {
+                    return false;
+                }
+            }
+        }
+    }
+    return last_id != NOTHING;
+}
+
+// Where a triangle's records are.
+fn corners_of_id(id: u32) -> vec3<u32> {
+    let is_hull = id >= frame.triangle_count;
+    let at = 3u * select(id, id - frame.triangle_count, is_hull);
+    return vec3(triangles[at], triangles[at + 1u], triangles[at + 2u]) + select(0u, frame.hull_base, is_hull);
+}
+
+// Where along the edge a triangle lies in front of it; empty (x >= y) where nowhere.
+fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
+    let none = vec2(1.0, 0.0);
+    let v = corners_of_id(id);
+    let is_hull = id >= frame.triangle_count;
+    if !is_hull && any(v == vec3(edge.x)) && any(v == vec3(edge.y)) {
+        return none;
+    }
+    let a = vertices[v.x];
+    let b = vertices[v.y];
+    let c = vertices[v.z];
+    // X, Y, Z, W of each corner.
+    var p = vec4(f32(a.x), f32(a.y), a.z, 1.0);
+    var q = vec4(f32(b.x), f32(b.y), b.z, 1.0);
+    var r = vec4(f32(c.x), f32(c.y), c.z, 1.0);
+    var is_clockwise: bool;
+    if a.x == OUTSIDE || b.x == OUTSIDE || c.x == OUTSIDE {
+        if is_hull || !has(CLIPPED) {
+            return none;
+        }
+        p = homogeneous_of(v.x);
+        q = homogeneous_of(v.y);
+        r = homogeneous_of(v.z);
+        is_clockwise = volume_of(p, q, r) > 0.0;
+    } else {
+        let area = area_of(a, b, c);
+        if is_zero(area) || !may_lie_behind(s, a, b, c) {
+            return none;
+        }
+        is_clockwise = !is_negative(area);
+    }
+    let at_start = sides_of(p, q, r, s.ends.xy, is_clockwise);
+    let at_end = sides_of(p, q, r, s.ends.zw, is_clockwise);
+    if any((at_start <= vec3(0.0)) & (at_end <= vec3(0.0))) {
+        return none;
+    }
+    var part = vec2(0.0, 1.0);
+    part = narrowed(part, at_start.x, at_end.x);
+    part = narrowed(part, at_start.y, at_end.y);
+    part = narrowed(part, at_start.z, at_end.z);
+    if part.x >= part.y {
+        return none;
+    }
+    // Depths are compared only where the edge is inside, so that thin triangles need not be continued far.
+    let depths = vec3(p.z, q.z, r.z);
+    let ws = vec3(p.w, q.w, r.w);
+    let first = nearer_by(s, at_start, at_end, depths, ws, part.x);
+    let last = nearer_by(s, at_start, at_end, depths, ws, part.y);
+    if first <= 0.0 && last <= 0.0 {
+        return none;
+    }
+    let share = narrowed(vec2(0.0, 1.0), first, last);
+    if share.x >= share.y {
+        return none;
+    }
+    let length = part.y - part.x;
+    return vec2(part.x + rn(share.x * length), part.x + rn(share.y * length));
+}
+
+// Whether the triangle is not farther away than all of the edge, nor beside its box.
+fn may_lie_behind(s: Segment, a: Vertex, b: Vertex, c: Vertex) -> bool {
+    let low = vec2<f32>(vec2(min(min(a.x, b.x), c.x), min(min(a.y, b.y), c.y)));
+    let high = vec2<f32>(vec2(max(max(a.x, b.x), c.x), max(max(a.y, b.y), c.y)));
+    return max(max(a.z, b.z), c.z) > min(s.depths.x, s.depths.y)
+        && all(low <= max(s.ends.xy, s.ends.zw)) && all(high >= min(s.ends.xy, s.ends.zw));
+}
+
+// Of each side of a triangle, twice the area that it spans with a point; positive inside.
+fn sides_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, at: vec2<f32>, is_clockwise: bool) -> vec3<f32> {
+    let a = rn2(p.xy - rn2(at * p.w));
+    let b = rn2(q.xy - rn2(at * q.w));
+    let c = rn2(r.xy - rn2(at * r.w));
+    let sides = rn3(vec3(b.x, c.x, a.x) * vec3(c.y, a.y, b.y)) - rn3(vec3(b.y, c.y, a.y) * vec3(c.x, a.x, b.x));
+    return select(-sides, sides, is_clockwise);
+}
+
+// By how much the triangle is nearer than the edge at t of the way.
+fn nearer_by(s: Segment, at_start: vec3<f32>, at_end: vec3<f32>, depths: vec3<f32>, ws: vec3<f32>, t: f32) -> f32 {
+    let weights = max(at_start + rn3(t * (at_end - at_start)), vec3(0.0));
+    let z = rn3(weights * depths);
+    let w = rn3(weights * ws);
+    let depth = rn(rn(z.x + z.y) + z.z);
+    let scale = rn(rn(w.x + w.y) + w.z);
+    if scale > MIN_POSITIVE {
+        return rn(depth * recip(scale)) - rn(depth_of(s, t) * NEARER);
+    }
+    return -1.0;
+}
+
+// A range cut down to where the affine function with these values at 0 and 1 is positive.
+fn narrowed(range: vec2<f32>, at_0: f32, at_1: f32) -> vec2<f32> {
+    if at_0 < 0.0 {
+        return vec2(max(range.x, rn(-at_0 * recip(at_1 - at_0))), range.y);
+    } else if at_1 < 0.0 {
+        return vec2(range.x, min(range.y, rn(at_0 * recip(at_0 - at_1))));
+    }
+    return range;
+}
