@@ -5,11 +5,12 @@
 //! the set of points within half its width, on screen, of the visible part of an edge: caps and joins are round, and on a
 //! silhouette the outer half is drawn too. An edge is visible where no surface that is not incident to it lies in front.
 //!
-//! Four parts, each checked against the others by `tests/suite/oracle_*.rs`:
+//! Five parts, each checked against the others by `tests/suite/oracle_*.rs`:
 //! 1. [`coverage`]: which pixels a snapped triangle covers, by exact integer signs, and how much of each.
 //! 2. [`strip`] and [`capsule`]: straight lines in closed form.
-//! 3. [`screen`], [`visible`], [`ink`], [`rays`]: any scene, by many points a pixel.
+//! 3. [`screen`], [`visible`], [`ink`], [`rays`], [`rim`]: any scene, by many points a pixel.
 //! 4. [`light`]: the colour of a lit surface.
+//! 5. [`flip`]: how different two pictures look.
 
 // Each binary that includes this module uses its own part of it.
 #![allow(dead_code)]
@@ -17,12 +18,14 @@
 pub mod camera;
 pub mod capsule;
 pub mod coverage;
+pub mod flip;
 pub mod ink;
 pub mod lattice;
 pub mod light;
 pub mod obj;
 pub mod polygon;
 pub mod rays;
+pub mod rim;
 pub mod screen;
 pub mod srgb;
 pub mod strip;

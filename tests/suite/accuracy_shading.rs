@@ -2,16 +2,15 @@
 
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, SurfacePass, flags};
+use meshsnap::plan::{DrawPlan, flags};
 
-use crate::oracle::coverage::{Coverage, classify, snap};
-use crate::oracle::light::{Lamp, Lights, Material, face_normal, lit, smooth_normals, weights};
+use crate::oracle::light::{face_normal, lit, smooth_normals, weights};
 use crate::oracle::obj::Shape;
-use crate::oracle::rays::nearest;
 use crate::oracle::screen::{Scene, Screen};
 use crate::oracle::srgb;
 use crate::oracle::vector::{V3, cross, dot, length, unit};
 use crate::scenes;
+use crate::seen::{lights, material, only_triangle};
 use crate::shapes::{self, Random};
 use crate::truth::{cases, renderers, scene};
 
@@ -58,36 +57,6 @@ pub fn color_errors(plan: &DrawPlan<'_>, image: &Image, normals: &[[V3; 3]]) -> 
         }
     }
     errors
-}
-
-/// The triangle that is all that is seen in a pixel.
-fn only_triangle(screen: &Screen, pixel: [u32; 2]) -> Option<u32> {
-    let corner = pixel.map(f64::from);
-    let pieces = screen.near(&[corner, [corner[0] + 1.0, corner[1] + 1.0]]);
-    let places = [[0.5, 0.5], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-    let mut seen = places.iter().map(|p| nearest(&pieces, [corner[0] + p[0], corner[1] + p[1]]));
-    let (piece, _) = seen.next()??;
-    let snapped = piece.corners.map(|c| snap([c[0], c[1]]));
-    let is_full = classify(snapped, pixel.map(i64::from)) == Coverage::Full;
-    (is_full && seen.all(|s| s.is_some_and(|(other, _)| other.triangle == piece.triangle))).then_some(piece.triangle)
-}
-
-fn material(surface: &SurfacePass<'_>) -> Material {
-    let [look] = &surface.materials[..] else { panic!("{} materials", surface.materials.len()) };
-    assert_eq!(look.metallic, 0.0);
-    let [r, g, b, _] = look.base_color.map(f64::from);
-    Material { base: [r, g, b], roughness: f64::from(look.roughness) }
-}
-
-fn lights(plan: &DrawPlan<'_>) -> Lights {
-    let lights = &plan.surface.as_ref().unwrap().lights;
-    let wide = |v: [f32; 3]| v.map(f64::from);
-    let lamps = lights.lamps.iter().map(|lamp| Lamp {
-        to_light: wide(lamp.to_light),
-        halfway: wide(lamp.halfway),
-        strength: f64::from(lamp.strength),
-    });
-    Lights { lamps: lamps.collect(), ambient: f64::from(lights.ambient), up: wide(plan.projection.screen_up) }
 }
 
 /// Exact normals at the corners of the plan's triangles.

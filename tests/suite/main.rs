@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod accuracy_behind_eye;
+mod accuracy_bench;
 mod accuracy_geometry;
 mod accuracy_shading;
 mod accuracy_wires;
@@ -36,17 +37,21 @@ mod layers_hull;
 mod likeness;
 mod line_looks;
 mod lines_scenes;
+#[path = "../bench/accuracy/measure/mod.rs"]
+mod measure;
 mod mesh_files;
 mod models;
 mod mutations;
 #[path = "../oracle/mod.rs"]
 mod oracle;
+mod oracle_flip;
 mod oracle_parts;
 mod oracle_scenes;
 mod ply_files;
 mod raster;
 mod scenes;
 mod schema;
+mod seen;
 mod select;
 mod select_fakes;
 mod server;

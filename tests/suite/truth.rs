@@ -1,16 +1,14 @@
-//! From plans and pictures to what the oracle works with, and how far a picture is from the truth.
+//! Pictures, and how far they are from the truth.
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, Faces, Shown};
+use meshsnap::plan::DrawPlan;
 
-use crate::oracle::camera::Camera;
 use crate::oracle::ink::ink;
-use crate::oracle::screen::{Scene, Screen, Sides};
-use crate::oracle::visible::{self, Segment};
+pub use crate::seen::{scene, segments};
 use crate::twins::gpus;
 
 /// Whether to take minutes' worth of cases instead of seconds'.
@@ -30,46 +28,6 @@ pub fn renderers() -> Vec<Box<dyn Renderer>> {
         all.push(Box::new(GpuRenderer::new(gpus[0].clone())));
     }
     all
-}
-
-/// The plan's numbers and nothing else: its geometry, and the edges of its first line pass.
-pub fn scene(plan: &DrawPlan<'_>) -> Scene {
-    assert!(plan.roles.is_empty() && plan.layers.is_none() && plan.hull.is_none(), "the oracle draws one surface");
-    let row = |r: [f32; 4], scale: f64| r.map(|v| f64::from(v) * scale);
-    let p = &plan.projection;
-    let sides = plan.surface.as_ref().map_or(Sides::Neither, |surface| match surface.faces {
-        Faces::Both => Sides::Both,
-        Faces::Front => Sides::Front,
-        Faces::Back => Sides::Back,
-    });
-    Scene {
-        camera: Camera {
-            size_px: [plan.width_px, plan.height_px],
-            x: row(p.x, 1.0 / 256.0),
-            y: row(p.y, 1.0 / 256.0),
-            z: row(p.z, 1.0),
-            w: row(p.w, 1.0),
-            near_w: f64::from(p.near_w),
-        },
-        positions: plan.positions.iter().map(|v| v.map(f64::from)).collect(),
-        triangles: plan.triangles.to_vec(),
-        sides,
-        edges: plan.lines.first().map_or_else(Vec::new, |pass| pass.edges.iter().map(|edge| edge.vertices).collect()),
-    }
-}
-
-/// What of the edges of the plan's only line pass is drawn.
-pub fn segments(plan: &DrawPlan<'_>) -> Vec<Segment> {
-    let [pass] = &plan.lines[..] else { panic!("{} line passes", plan.lines.len()) };
-    let mut scene = scene(plan);
-    if pass.contour {
-        scene.edges = visible::contour(&scene);
-    }
-    match pass.shown {
-        Shown::All => visible::all(&scene),
-        Shown::Visible => visible::visible(&scene, &Screen::new(&scene)),
-        Shown::Hidden => panic!("the oracle draws no hidden lines"),
-    }
 }
 
 /// Points along a pixel's side, so that the oracle takes their square.

@@ -1,0 +1,85 @@
+//! The benchmark of run time against error, in parts that the test suite runs too: scenes, techniques, what is true of each,
+//! and rounds that time them.
+
+// Each binary that includes this module uses its own part of it. A tool for developers: giving up loudly is fine.
+#![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+pub mod goals;
+pub mod json;
+pub mod meshes;
+pub mod plot;
+pub mod rounds;
+pub mod scenes;
+pub mod summary;
+pub mod table;
+pub mod techniques;
+pub mod truths;
+
+use std::sync::Arc;
+
+use meshsnap::backend::Renderer;
+use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::backend::gpu::{Gpu, GpuRenderer};
+
+/// Visibility samples a pixel. More can be added here as plans learn them.
+pub const SAMPLES: &[u32] = &[1, 4];
+
+/// Threads of the CPU's renderers; the first is the baseline's.
+const THREADS: [usize; 2] = [1, 2];
+
+/// What all times are given as ratios to: on the same scene's mesh, in the same rounds.
+pub const BASELINE: &str = "cpu-1, exact wires, 4 samples";
+/// The baseline's samples.
+pub const BASELINE_SAMPLES: u32 = 4;
+
+/// A renderer that is measured.
+pub struct BackEnd {
+    /// `cpu-1`, `cpu-2` (by threads) or `gpu`.
+    pub name: &'static str,
+    pub renderer: Box<dyn Renderer>,
+}
+
+/// The CPU with one thread first, then with two, then the GPU if there is one.
+pub fn back_ends(gpu: Option<Arc<Gpu>>) -> Vec<BackEnd> {
+    let cpu = |(name, threads)| BackEnd { name, renderer: Box::new(CpuRenderer::new(threads)) };
+    let mut all: Vec<BackEnd> = ["cpu-1", "cpu-2"].into_iter().zip(THREADS).map(cpu).collect();
+    all.extend(gpu.map(|gpu| BackEnd { name: "gpu", renderer: Box::new(GpuRenderer::new(gpu)) }));
+    all
+}
+
+/// How much work to do.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Pictures are squares of this many pixels a side.
+    pub size_px: u32,
+    /// Timed rounds.
+    pub runs: usize,
+    /// Of the oracle: points along a pixel's side.
+    pub points_per_side: u32,
+}
+
+impl Effort {
+    /// What is published.
+    pub const FULL: Self = Self { size_px: 512, runs: 9, points_per_side: 32 };
+    /// To look at while working.
+    pub const QUICK: Self = Self { size_px: 256, runs: 3, points_per_side: 16 };
+}
+
+/// One technique on one back-end with one number of samples on one scene.
+#[derive(Clone, Debug)]
+pub struct Row {
+    pub scene: &'static str,
+    pub family: techniques::Family,
+    pub triangles: usize,
+    pub technique: techniques::Technique,
+    pub back_end: &'static str,
+    pub samples: u32,
+    /// What the request asked for: `wire.thickness` or `outline.thickness`; 0 for faces.
+    pub thickness: f64,
+    pub median_ms: f64,
+    /// To the baseline's median.
+    pub time_ratio: f64,
+    pub errors: truths::Errors,
+    /// Of a GPU's picture: how far it is from the CPU's.
+    pub twin: Option<truths::Apart>,
+}

@@ -1,0 +1,161 @@
+//! Draws a scene's cases in rounds, so that whatever slows the machine slows all of them, and measures their pictures.
+
+use std::rc::Rc;
+use std::time::Instant;
+
+use meshsnap::image::Image;
+use meshsnap::limits::Deadline;
+use meshsnap::mesh::Mesh;
+use meshsnap::plan::DrawPlan;
+
+use super::scenes::{Scene, plan};
+use super::techniques::{Family, Technique};
+use super::truths::{Apart, Truth};
+use super::{BASELINE_SAMPLES, BackEnd, Effort, Row, SAMPLES};
+use crate::oracle::screen::Screen;
+use crate::oracle::vector::length;
+
+/// A plan to draw.
+struct Case<'a> {
+    technique: Technique,
+    samples: u32,
+    thickness: f64,
+    plan: DrawPlan<'a>,
+}
+
+/// What a case's draws on one back-end came to.
+struct Drawn {
+    /// Of the round that warms up, which is not timed.
+    picture: Image,
+    /// Of each timed round, milliseconds.
+    times_ms: Vec<f64>,
+}
+
+/// Every technique of the scene's family, by every number of samples, on every back-end.
+pub fn measure(scene: &Scene, effort: Effort, back_ends: &mut [BackEnd]) -> Vec<Row> {
+    let mesh = scene.mesh(effort.size_px);
+    let baseline = baseline(scene, effort, &mesh);
+    let height_px = median_height_px(&baseline.plan);
+    let wanted = |technique: Technique| technique.thickness(scene.width_px, height_px);
+    let mut cases: Vec<Case<'_>> = Vec::new();
+    for &technique in scene.family.techniques() {
+        let cased = |&samples| case(scene, effort, &mesh, technique, samples, wanted(technique));
+        cases.extend(SAMPLES.iter().map(cased));
+    }
+    let truths = truths(scene, effort, &mesh, &baseline, &cases);
+    let (drawn, baseline_ms) = rounds(&cases, &baseline, effort.runs, back_ends);
+
+    let mut rows = Vec::new();
+    let truths = truths.iter().flat_map(|truth| SAMPLES.iter().map(move |_| truth));
+    for ((case, truth), drawn) in cases.iter().zip(truths).zip(&drawn) {
+        for (i, (back_end, on)) in back_ends.iter().zip(drawn).enumerate() {
+            let twin = (i > 0).then(|| Apart::of(&drawn[0].picture, &on.picture));
+            let is_cpu = back_end.name.starts_with("cpu");
+            assert!(!is_cpu || on.picture == drawn[0].picture, "{}: threads change the picture", scene.name);
+            let median_ms = median(on.times_ms.clone());
+            rows.push(Row {
+                scene: scene.name,
+                family: scene.family,
+                triangles: mesh.triangles.len(),
+                technique: case.technique,
+                back_end: back_end.name,
+                samples: case.samples,
+                thickness: case.thickness,
+                median_ms,
+                time_ratio: median_ms / baseline_ms,
+                errors: truth.errors(&on.picture),
+                twin: twin.filter(|_| !is_cpu),
+            });
+        }
+    }
+    rows
+}
+
+/// Each case on each back-end, once to warm up and then in turn; and the baseline's median on the first of them.
+fn rounds(cases: &[Case<'_>], baseline: &Case<'_>, runs: usize, back_ends: &mut [BackEnd]) -> (Vec<Vec<Drawn>>, f64) {
+    let count = back_ends.len();
+    let mut draw = |back_end: usize, plan: &DrawPlan<'_>| {
+        let deadline = Deadline::default();
+        let began = Instant::now();
+        let picture = back_ends[back_end].renderer.draw(plan, &deadline);
+        let took_ms = began.elapsed().as_secs_f64() * 1e3;
+        (picture.expect("a picture"), took_ms)
+    };
+    let mut warm = |plan: &DrawPlan<'_>| -> Vec<Drawn> {
+        (0..count).map(|back_end| Drawn { picture: draw(back_end, plan).0, times_ms: Vec::new() }).collect()
+    };
+    let mut drawn: Vec<Vec<Drawn>> = cases.iter().map(|case| warm(&case.plan)).collect();
+    let mut of_baseline = Vec::new();
+    for _ in 0..runs {
+        of_baseline.push(draw(0, &baseline.plan).1);
+        for (case, drawn) in cases.iter().zip(&mut drawn) {
+            for (back_end, on) in drawn.iter_mut().enumerate() {
+                on.times_ms.push(draw(back_end, &case.plan).1);
+            }
+        }
+    }
+    (drawn, median(of_baseline))
+}
+
+/// Exact wires of the scene's own width, or 1 px wide where it has none.
+fn baseline<'a>(scene: &Scene, effort: Effort, mesh: &'a Mesh) -> Case<'a> {
+    let width_px = if scene.family == Family::Wires { scene.width_px } else { 1.0 };
+    case(scene, effort, mesh, Technique::Exact, BASELINE_SAMPLES, width_px)
+}
+
+fn case<'a>(
+    scene: &Scene,
+    effort: Effort,
+    mesh: &'a Mesh,
+    technique: Technique,
+    samples: u32,
+    thickness: f64,
+) -> Case<'a> {
+    // Requests carry f32.
+    let thickness = f64::from(thickness as f32);
+    let spec = scene.spec(effort.size_px, &technique.keys(scene, samples, thickness));
+    Case { technique, samples, thickness, plan: plan(mesh, &spec) }
+}
+
+/// A truth for each technique, in their order.
+fn truths(scene: &Scene, effort: Effort, mesh: &Mesh, baseline: &Case<'_>, cases: &[Case<'_>]) -> Vec<Rc<Truth>> {
+    let of = |technique, plan: &DrawPlan<'_>| {
+        Rc::new(Truth::new(scene.family, technique, plan, scene.width_px, effort.points_per_side))
+    };
+    let techniques = scene.family.techniques();
+    match scene.family {
+        Family::Wires => vec![of(Technique::Exact, &baseline.plan); techniques.len()],
+        Family::Faces | Family::Pictures => vec![of(Technique::FaceNormals, &cases[0].plan); techniques.len()],
+        // Each in its own view: room is left for what sticks out.
+        Family::Outlines => {
+            let outline = |&technique: &Technique| {
+                let own = cases.iter().find(|case| case.technique == technique).expect("a case of each technique");
+                let mut lines = case(scene, effort, mesh, Technique::Contour, BASELINE_SAMPLES, own.thickness).plan;
+                lines.projection = own.plan.projection;
+                of(technique, &lines)
+            };
+            techniques.iter().map(outline).collect()
+        }
+    }
+}
+
+/// Half of the heights of all triangles on screen, three each, are larger.
+fn median_height_px(plan: &DrawPlan<'_>) -> f64 {
+    let screen = Screen::new(&crate::seen::scene(plan));
+    let heights = screen.pieces.iter().flat_map(|piece| {
+        let corner = |k: usize| [piece.corners[k % 3][0], piece.corners[k % 3][1]];
+        let twice_area = piece.side(0, corner(0));
+        (0..3).map(move |k| {
+            let (a, b) = (corner(k), corner(k + 1));
+            twice_area / length([b[0] - a[0], b[1] - a[1]])
+        })
+    });
+    median(heights.filter(|h| h.is_finite()).collect())
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    assert!(!values.is_empty());
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
+}

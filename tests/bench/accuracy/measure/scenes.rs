@@ -1,0 +1,126 @@
+//! What is drawn: meshes, from where, and how wide lines should be.
+
+use std::path::PathBuf;
+
+use meshsnap::limits::{BackendChoice, Budget, Deadline, Limits};
+use meshsnap::mesh::{self, Bundle, Mesh};
+use meshsnap::plan::{self, DrawPlan};
+use meshsnap::request::{self, Rules};
+use meshsnap::scene::Spec;
+
+use super::meshes;
+use super::techniques::Family;
+use crate::shapes;
+
+/// A scene, measured with each technique of its family.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene {
+    pub name: &'static str,
+    pub family: Family,
+    source: Source,
+    /// Whether a unit of the mesh is a pixel.
+    is_flat: bool,
+    keys: &'static [(&'static str, &'static str)],
+    /// How wide lines should be; of a hull, the strip that shows.
+    pub width_px: f64,
+    /// Whether `--quick` draws it.
+    pub is_quick: bool,
+}
+
+/// Where a mesh is from.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    /// Made for pictures of so many pixels a side.
+    Made(fn(u32) -> String),
+    /// A file of the shared models, and what takes its place where it is not there.
+    Model(&'static str, fn(u32) -> String),
+}
+
+const POLYGONS: &[(&str, &str)] = &[("wire.edges", "polygons")];
+
+/// All of them.
+pub const SCENES: &[Scene] = &[
+    flat("isolated lines", meshes::lines, 1.5),
+    quick(flat("12 px grid", meshes::grid, 1.5)),
+    quick(flat("48-fan", meshes::fan, 1.5)),
+    Scene { keys: POLYGONS, ..flat("small quads", meshes::print, 1.0) },
+    solid("dense ball", Family::Wires, Source::Made(|_| meshes::icosphere(6)), 0.5),
+    solid("dense scan", Family::Wires, Source::Model("stanford-bunny.obj", |_| shapes::torus(256)), 0.5),
+    solid("sparse model", Family::Wires, Source::Model("suzanne.obj", |_| shapes::torus(28)), 1.5),
+    solid("deep rings", Family::Wires, Source::Made(|_| meshes::rings()), 1.0),
+    quick(solid("gear silhouette", Family::Outlines, Source::Made(|_| shapes::gear(14)), 3.0)),
+    solid("torus silhouette", Family::Outlines, Source::Made(|_| shapes::torus(48)), 3.0),
+    solid("rings silhouettes", Family::Outlines, Source::Made(|_| meshes::rings()), 3.0),
+    quick(solid("gear faces", Family::Faces, Source::Made(|_| shapes::gear(14)), 0.0)),
+    solid("torus faces", Family::Faces, Source::Made(|_| shapes::torus(48)), 0.0),
+    solid("rings, whole picture", Family::Pictures, Source::Made(|_| meshes::rings()), 0.0),
+];
+
+/// The small scenes that the test suite measures.
+pub const SMALL: &[&str] = &["12 px grid", "48-fan"];
+
+const fn flat(name: &'static str, made: fn(u32) -> String, width_px: f64) -> Scene {
+    Scene { is_flat: true, ..solid(name, Family::Wires, Source::Made(made), width_px) }
+}
+
+const fn solid(name: &'static str, family: Family, source: Source, width_px: f64) -> Scene {
+    Scene { name, family, source, is_flat: false, keys: &[], width_px, is_quick: false }
+}
+
+const fn quick(scene: Scene) -> Scene {
+    Scene { is_quick: true, ..scene }
+}
+
+impl Scene {
+    /// The mesh, and what it is.
+    pub fn mesh(&self, size_px: u32) -> Mesh {
+        let limits = Limits::default();
+        let bundle = Bundle::of_one(self.bytes(size_px));
+        mesh::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default())
+            .unwrap_or_else(|e| panic!("{}: {e}", self.name))
+    }
+
+    fn bytes(&self, size_px: u32) -> Vec<u8> {
+        match self.source {
+            Source::Made(made) => made(size_px).into_bytes(),
+            Source::Model(file, instead) => {
+                std::fs::read(models().join(file)).unwrap_or_else(|_| instead(size_px).into_bytes())
+            }
+        }
+    }
+
+    /// What is drawn, for readers of the report.
+    pub fn about(&self) -> String {
+        let what = match self.source {
+            Source::Made(_) => "made by the benchmark".to_owned(),
+            Source::Model(file, _) if models().join(file).is_file() => file.to_owned(),
+            Source::Model(file, _) => format!("a torus in place of {file}, which is not there"),
+        };
+        if self.width_px > 0.0 { format!("{what}, lines {} px wide", self.width_px) } else { what }
+    }
+
+    /// A request for the scene, `keys` over its own.
+    pub fn spec(&self, size_px: u32, keys: &[(&str, String)]) -> Spec {
+        let mut all = vec![("size".to_owned(), size_px.to_string())];
+        if self.is_flat {
+            all.push(("view".into(), "front".into()));
+            all.push(("camera.projection".into(), "orthographic".into()));
+            all.push(("camera.height".into(), size_px.to_string()));
+        }
+        all.extend(self.keys.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())));
+        all.extend(keys.iter().map(|(k, v)| ((*k).to_owned(), v.clone())));
+        let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
+        request::read(None, &all, &rules).unwrap_or_else(|e| panic!("{}: {e}", self.name))
+    }
+}
+
+/// Plans with default limits.
+pub fn plan<'a>(mesh: &'a Mesh, spec: &Spec) -> DrawPlan<'a> {
+    plan::build(mesh, spec, &mut Budget::new(&Limits::default()), &Deadline::default()).expect("a plan")
+}
+
+fn models() -> PathBuf {
+    let root = std::env::var_os("MESHSNAP_SHARED")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+    root.join("models")
+}

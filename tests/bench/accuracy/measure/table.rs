@@ -1,0 +1,100 @@
+//! The report on standard output, and what machine it is from.
+
+use std::fmt::Write;
+
+use meshsnap::backend::gpu::GpuInfo;
+
+use super::{BASELINE, Effort, Row};
+
+/// What was measured on: models, and nothing that names a machine.
+#[derive(Clone, Debug)]
+pub struct Machine {
+    pub cpu: String,
+    /// That this process may use.
+    pub cores: usize,
+    pub gpu: Option<String>,
+}
+
+impl Machine {
+    pub fn new(gpu: Option<&GpuInfo>) -> Self {
+        let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+        Self {
+            cpu: model.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned()),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            gpu: gpu.map(|gpu| format!("{} ({}, {})", gpu.name, gpu.device_type, gpu.driver)),
+        }
+    }
+
+    /// One line.
+    pub fn line(&self) -> String {
+        let gpu = self.gpu.as_deref().unwrap_or("none that speaks Vulkan");
+        let cores = if self.cores == 1 { "1 core".to_owned() } else { format!("{} cores", self.cores) };
+        format!("CPU: {}, {cores}; GPU: {gpu}", self.cpu)
+    }
+}
+
+/// How times were taken.
+pub fn method(effort: Effort) -> String {
+    format!(
+        "Pictures of {0} x {0} pixels. Times: medians of {1} interleaved rounds of `Renderer::draw` alone (no import, plan or \
+         encoding), after one that warms up; ratios to {BASELINE}, on the same mesh in the same rounds.",
+        effort.size_px, effort.runs
+    )
+}
+
+const HEAD: [&str; 11] = [
+    "scene",
+    "technique",
+    "back-end",
+    "samples",
+    "thickness",
+    "median ms",
+    "ratio",
+    "RMSE/255",
+    "max/255",
+    "FLIP",
+    "ink",
+];
+
+/// Aligned columns, a line a row, with an empty line between scenes.
+pub fn table(rows: &[Row]) -> String {
+    let lines: Vec<[String; 11]> = rows.iter().map(cells).collect();
+    let widths: [usize; 11] = std::array::from_fn(|k| {
+        lines.iter().map(|line| line[k].chars().count()).chain([HEAD[k].len()]).max().unwrap_or(0)
+    });
+    let mut text = String::new();
+    let mut write = |cells: &[String; 11]| {
+        for (k, (cell, width)) in cells.iter().zip(widths).enumerate() {
+            // Words to the left, numbers to the right.
+            let _ = if k < 3 { write!(text, "{cell:<width$}  ") } else { write!(text, "{cell:>width$}  ") };
+        }
+        text.truncate(text.trim_end().len());
+        text.push('\n');
+    };
+    write(&HEAD.map(str::to_owned));
+    for (i, line) in lines.iter().enumerate() {
+        if i > 0 && rows[i].scene != rows[i - 1].scene {
+            write(&[const { String::new() }; 11]);
+        }
+        write(line);
+    }
+    text
+}
+
+fn cells(row: &Row) -> [String; 11] {
+    let errors = &row.errors;
+    [
+        row.scene.to_owned(),
+        row.technique.name().to_owned(),
+        row.back_end.to_owned(),
+        row.samples.to_string(),
+        format!("{:.3}", row.thickness),
+        format!("{:.3}", row.median_ms),
+        format!("{:.3}", row.time_ratio),
+        format!("{:.3}", errors.rmse),
+        format!("{:.1}", errors.max),
+        format!("{:.5}", errors.flip),
+        errors.ink.map_or_else(|| "-".to_owned(), |ink| format!("{ink:.4}")),
+    ]
+}

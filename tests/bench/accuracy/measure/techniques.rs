@@ -1,0 +1,128 @@
+//! What is compared, and how each technique is asked for the same thing.
+//!
+//! Lines are w pixels wide in truth. The approximating wire methods have no such number; each gets the parameters with which it
+//! is w wide where its own measure is right:
+//! - `fwidth`, `fwidth-min`: a wire is full up to t and gone at t + s, in multiples of |db/dx| + |db/dy|, which is a pixel for an
+//!   edge along the axes; both triangles of an edge draw it, so it is 2t + s wide (half of each ramp counted). s = min(w, 1),
+//!   t = (w - s) / 2. On diagonals that is 1.41 w, a property of the method.
+//! - `barycentric`: half gone at b = 0.05 t, so that with h the height of a triangle on screen it is 0.1 t h wide.
+//! - `threshold`: gone at b = 0.02 t, so 0.04 t h wide. For both h is the scene's median, and t at most 10.
+//! - `hull`: a strip of w pixels beyond the silhouette; `contour`: w pixels, half of them inside.
+
+use super::scenes::Scene;
+
+/// Scenes whose techniques can be compared with each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Family {
+    /// Lines along edges, hidden by a surface that is not seen. Error: of coverage.
+    Wires,
+    /// Lines around shapes. Error: of coverage.
+    Outlines,
+    /// Lit flat faces. Error: of colour, where a pixel shows one face alone.
+    Faces,
+    /// The same, of all pixels, so that anti-aliasing counts.
+    Pictures,
+}
+
+/// A way to draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Technique {
+    Exact,
+    Fwidth,
+    FwidthMin,
+    Barycentric,
+    Threshold,
+    Contour,
+    Hull,
+    FaceNormals,
+    DerivativeNormals,
+}
+
+use Technique::{Barycentric, Contour, DerivativeNormals, Exact, FaceNormals, Fwidth, FwidthMin, Hull, Threshold};
+
+impl Family {
+    pub fn techniques(self) -> &'static [Technique] {
+        match self {
+            Self::Wires => &[Exact, Fwidth, FwidthMin, Barycentric, Threshold],
+            Self::Outlines => &[Contour, Hull],
+            Self::Faces | Self::Pictures => &[FaceNormals, DerivativeNormals],
+        }
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Wires => "wires",
+            Self::Outlines => "outlines",
+            Self::Faces => "faces",
+            Self::Pictures => "pictures",
+        }
+    }
+}
+
+impl Technique {
+    /// As requests name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Exact => "exact",
+            Fwidth => "fwidth",
+            FwidthMin => "fwidth-min",
+            Barycentric => "barycentric",
+            Threshold => "threshold",
+            Contour => "contour",
+            Hull => "hull",
+            FaceNormals => "face",
+            DerivativeNormals => "derivative",
+        }
+    }
+
+    /// The thickness to ask for; `height_px` is the median height of the scene's triangles on screen.
+    pub fn thickness(self, width_px: f64, height_px: f64) -> f64 {
+        let share = width_px / height_px;
+        match self {
+            Exact | Contour | Hull => width_px,
+            Fwidth | FwidthMin => 0.5 * (width_px - width_px.min(1.0)),
+            Barycentric => (share / 0.1).min(10.0),
+            Threshold => (share / 0.04).min(10.0),
+            FaceNormals | DerivativeNormals => 0.0,
+        }
+    }
+
+    /// What a request says. Lines are opaque white on nothing, so that alpha is coverage. A hull needs a surface before it, so it is
+    /// white on a black one.
+    pub fn keys(self, scene: &Scene, samples: u32, thickness: f64) -> Vec<(&'static str, String)> {
+        let mut keys: Vec<(&str, &str)> = match self {
+            Exact | Fwidth | FwidthMin | Barycentric | Threshold => vec![
+                ("style", "wireframe"),
+                ("wire.method", self.name()),
+                ("wire.hidden", "hide"),
+                ("wire.color", "fff"),
+                ("background", "transparent"),
+            ],
+            Contour => vec![("style", "unlit"), ("surface", "null"), ("background", "transparent")],
+            Hull => vec![("style", "unlit"), ("surface.color", "000"), ("background", "000")],
+            FaceNormals | DerivativeNormals => vec![
+                ("style", "flat"),
+                ("surface.normals", self.name()),
+                ("light.preset", "three-point"),
+                ("surface.metallic", "0"),
+                ("surface.color", "c08040"),
+                ("background", "fff"),
+            ],
+        };
+        if matches!(self, Contour | Hull) {
+            keys.extend([("outline.method", self.name()), ("outline.unit", "px"), ("outline.color", "fff")]);
+        }
+        let mut keys: Vec<(&str, String)> = keys.into_iter().map(|(k, v)| (k, v.to_owned())).collect();
+        match self {
+            Exact | Barycentric | Threshold => keys.push(("wire.thickness", thickness.to_string())),
+            Fwidth | FwidthMin => {
+                keys.push(("wire.thickness", thickness.to_string()));
+                keys.push(("wire.smoothing", scene.width_px.min(1.0).to_string()));
+            }
+            Contour | Hull => keys.push(("outline.thickness", thickness.to_string())),
+            FaceNormals | DerivativeNormals => {}
+        }
+        keys.push(("samples", samples.to_string()));
+        keys
+    }
+}

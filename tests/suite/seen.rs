@@ -1,0 +1,82 @@
+//! From plans to what the oracle works with.
+
+use meshsnap::plan::{DrawPlan, Faces, Shown, SurfacePass};
+
+use crate::oracle::camera::Camera;
+use crate::oracle::coverage::{Coverage, classify, snap};
+use crate::oracle::light::{Lamp, Lights, Material};
+use crate::oracle::rays::nearest;
+use crate::oracle::screen::{Scene, Screen, Sides};
+use crate::oracle::visible::{self, Segment};
+
+/// The plan's numbers and nothing else: its geometry, and the edges of its first line pass.
+pub fn scene(plan: &DrawPlan<'_>) -> Scene {
+    assert!(plan.roles.is_empty() && plan.layers.is_none() && plan.hull.is_none(), "the oracle draws one surface");
+    let row = |r: [f32; 4], scale: f64| r.map(|v| f64::from(v) * scale);
+    let p = &plan.projection;
+    let sides = plan.surface.as_ref().map_or(Sides::Neither, |surface| match surface.faces {
+        Faces::Both => Sides::Both,
+        Faces::Front => Sides::Front,
+        Faces::Back => Sides::Back,
+    });
+    Scene {
+        camera: Camera {
+            size_px: [plan.width_px, plan.height_px],
+            x: row(p.x, 1.0 / 256.0),
+            y: row(p.y, 1.0 / 256.0),
+            z: row(p.z, 1.0),
+            w: row(p.w, 1.0),
+            near_w: f64::from(p.near_w),
+        },
+        positions: plan.positions.iter().map(|v| v.map(f64::from)).collect(),
+        triangles: plan.triangles.to_vec(),
+        sides,
+        edges: plan.lines.first().map_or_else(Vec::new, |pass| pass.edges.iter().map(|edge| edge.vertices).collect()),
+    }
+}
+
+/// What of the edges of the plan's only line pass is drawn.
+pub fn segments(plan: &DrawPlan<'_>) -> Vec<Segment> {
+    let [pass] = &plan.lines[..] else { panic!("{} line passes", plan.lines.len()) };
+    let mut scene = scene(plan);
+    if pass.contour {
+        scene.edges = visible::contour(&scene);
+    }
+    match pass.shown {
+        Shown::All => visible::all(&scene),
+        Shown::Visible => visible::visible(&scene, &Screen::new(&scene)),
+        Shown::Hidden => panic!("the oracle draws no hidden lines"),
+    }
+}
+
+/// The triangle that is all that is seen in a pixel.
+pub fn only_triangle(screen: &Screen, pixel: [u32; 2]) -> Option<u32> {
+    let corner = pixel.map(f64::from);
+    let pieces = screen.near(&[corner, [corner[0] + 1.0, corner[1] + 1.0]]);
+    let places = [[0.5, 0.5], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+    let mut seen = places.iter().map(|p| nearest(&pieces, [corner[0] + p[0], corner[1] + p[1]]));
+    let (piece, _) = seen.next()??;
+    let snapped = piece.corners.map(|c| snap([c[0], c[1]]));
+    let is_full = classify(snapped, pixel.map(i64::from)) == Coverage::Full;
+    (is_full && seen.all(|s| s.is_some_and(|(other, _)| other.triangle == piece.triangle))).then_some(piece.triangle)
+}
+
+/// The one material of a surface.
+pub fn material(surface: &SurfacePass<'_>) -> Material {
+    let [look] = &surface.materials[..] else { panic!("{} materials", surface.materials.len()) };
+    assert_eq!(look.metallic, 0.0);
+    let [r, g, b, _] = look.base_color.map(f64::from);
+    Material { base: [r, g, b], roughness: f64::from(look.roughness) }
+}
+
+/// What shines on a plan's surface.
+pub fn lights(plan: &DrawPlan<'_>) -> Lights {
+    let lights = &plan.surface.as_ref().unwrap().lights;
+    let wide = |v: [f32; 3]| v.map(f64::from);
+    let lamps = lights.lamps.iter().map(|lamp| Lamp {
+        to_light: wide(lamp.to_light),
+        halfway: wide(lamp.halfway),
+        strength: f64::from(lamp.strength),
+    });
+    Lights { lamps: lamps.collect(), ambient: f64::from(lights.ambient), up: wide(plan.projection.screen_up) }
+}
