@@ -173,11 +173,10 @@ pub fn sentences(rows: &[Row]) -> [String; 5] {
         at(Technique::Fwidth, least),
         at(Technique::Fwidth, BASELINE_SAMPLES),
     ]
-    .map(|p| p.map_or_else(|| "?".to_owned(), |p| format!("{:.2} in {:.2}", p.error, p.time)));
-    let outline =
-        |technique| point(rows, Family::Outlines, technique, "cpu-1", BASELINE_SAMPLES).map_or(f64::NAN, |p| p.error);
-    let face =
-        |technique| point(rows, Family::Faces, technique, "cpu-1", BASELINE_SAMPLES).map_or(f64::NAN, |p| p.error);
+    .map(|p| p.map_or_else(|| "?".to_owned(), |p| format!("{:.2}/255 at time {:.2}", p.error, p.time)));
+    let mean = |family, technique| point(rows, family, technique, "cpu-1", BASELINE_SAMPLES);
+    let error = |family, technique| mean(family, technique).map_or(f64::NAN, |p| p.error);
+    let time = |family, technique| mean(family, technique).map_or(f64::NAN, |p| p.time);
     [
         "Each line is one technique on one back-end, its points are numbers of samples a pixel, and each point is the geometric mean over \
          the scenes of its family, so that lower left is better."
@@ -190,15 +189,17 @@ pub fn sentences(rows: &[Row]) -> [String; 5] {
         format!("Exact wires on one thread err by {}.", leads_in_words(rows)),
         format!(
             "Samples decide which surface a pixel sees and smooth the other techniques, but cannot mend a wrong width: from {least} to \
-             {BASELINE_SAMPLES} samples exact goes from an error of {exact_1} of the time unit to {exact}, fwidth from {fwidth_1} to {fwidth}."
+             {BASELINE_SAMPLES} samples exact goes from {exact_1} to {exact}, fwidth from {fwidth_1} to {fwidth}."
         ),
         format!(
-            "A contour errs by {:.2} and a pushed-out hull, measured against the strip that it should show, by {:.2}; normals by faces err by \
-             {:.2}, which is what rounding to bytes leaves, and by derivatives by {:.2}.",
-            outline(Technique::Contour),
-            outline(Technique::Hull),
-            face(Technique::FaceNormals),
-            face(Technique::DerivativeNormals)
+            "A contour errs by {:.2}/255 and a pushed-out hull, measured against the strip that it should show, by {:.2}/255; where a pixel \
+             shows one face alone, normals by faces err by {:.2}/255 (rounding to bytes leaves that much) and normals by derivatives by \
+             {:.2}/255 in {:.1} times the time.",
+            error(Family::Outlines, Technique::Contour),
+            error(Family::Outlines, Technique::Hull),
+            error(Family::Faces, Technique::FaceNormals),
+            error(Family::Faces, Technique::DerivativeNormals),
+            time(Family::Faces, Technique::DerivativeNormals) / time(Family::Faces, Technique::FaceNormals),
         ),
     ]
 }

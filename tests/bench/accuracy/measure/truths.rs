@@ -119,7 +119,7 @@ impl Truth {
 }
 
 impl Apart {
-    /// Of two pictures of one plan, shown over black and, where they are transparent, alpha beside colour.
+    /// Of two pictures of one plan; FLIP over black.
     pub fn of(a: &Image, b: &Image) -> Self {
         let pairs = || a.rgba.chunks(4).zip(b.rgba.chunks(4));
         let differ = pairs().filter(|(p, q)| p != q).count();
