@@ -27,7 +27,7 @@ fn rows() -> &'static [Row] {
 
 fn machine() -> Machine {
     // A name as awkward as a driver may have.
-    Machine { cpu: "A & B <C> \"D\"".into(), cores: 2, gpu: None }
+    Machine { cpu: "A & B <C> \"D\"".into(), cores: 2, gpu: None, load: Some(4.0) }
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn outlines_and_faces_are_measured_too() {
 
 #[test]
 fn the_plot_is_well_formed() {
-    let svg = plot::svg(rows(), &machine().line());
+    let svg = plot::svg(rows(), &machine());
     let tags = check_xml(&svg).unwrap_or_else(|e| panic!("{e}\n{svg}"));
     assert!(tags > 60, "{tags} tags");
     for words in ["exact", "fwidth-min", "CPU, 2 threads", "RMSE, /255", "A &amp; B &lt;C&gt;"] {
@@ -121,6 +121,7 @@ fn json_and_table_have_every_row() {
 fn the_page_keeps_what_the_suite_measured() {
     let first = goals::page(rows(), &machine(), EFFORT, "");
     assert_eq!(first.lines().filter(|line| line.starts_with("| ") && line.ends_with(" |")).count(), 11);
+    assert!(first.contains("load average 4.0"), "{first}");
     let missing = first.matches("measured by: `cargo test --test suite ").count();
     assert_eq!(missing, 6, "{first}");
     let line = first.lines().find(|line| line.starts_with("| 6 |")).unwrap();

@@ -49,6 +49,7 @@ fn main() {
     };
     let machine = Machine::new(gpu.as_ref().map(|gpu| gpu.info()));
     println!("{}\n{}", machine.line(), method(options.effort));
+    machine.warning().iter().for_each(|warning| println!("{warning}"));
     let mut back_ends = back_ends(gpu);
     let mut rows = Vec::new();
     for scene in &options.scenes {
@@ -100,7 +101,7 @@ fn write(rows: &[Row], machine: &Machine, options: &Options) {
     let files = [
         ("accuracy.json", json::document(machine, options.effort, &options.scenes, rows)),
         ("accuracy.md", goals::page(rows, machine, options.effort, &before)),
-        ("work-precision.svg", plot::svg(rows, &machine.line())),
+        ("work-precision.svg", plot::svg(rows, machine)),
     ];
     for (name, text) in files {
         std::fs::write(folder.join(name), text).unwrap_or_else(|e| panic!("docs/{name}: {e}"));

@@ -99,6 +99,9 @@ pub fn page(rows: &[Row], machine: &Machine, effort: Effort, before: &str) -> St
         let _ = writeln!(text, "| {} | {} | {} | {measured} |", goal.number, goal.measure, goal.goal);
     }
     let _ = writeln!(text, "\n{}.\n{}\n", machine.line(), method(effort));
+    machine.warning().iter().for_each(|warning| {
+        let _ = writeln!(text, "{warning}\n");
+    });
     text.push_str("## Run time against error\n\n![Run time against error](work-precision.svg)\n\n");
     sentences(rows).iter().for_each(|sentence| {
         let _ = writeln!(text, "{sentence}");

@@ -16,7 +16,7 @@ pub fn document(machine: &Machine, effort: Effort, scenes: &[Scene], rows: &[Row
     };
     let parts = [
         ("schema", schema()),
-        ("machine", json!({ "cpu": machine.cpu, "cores": machine.cores, "gpu": machine.gpu })),
+        ("machine", json!({ "cpu": machine.cpu, "cores": machine.cores, "gpu": machine.gpu, "load": machine.load })),
         ("method", json!(method(effort))),
         ("baseline", json!(BASELINE)),
         ("size_px", json!(effort.size_px)),
@@ -70,7 +70,8 @@ fn short(v: f64) -> Value {
 
 fn schema() -> Value {
     json!({
-        "machine": "models of the processor and the GPU (null: none that speaks Vulkan), and cores that could be used",
+        "machine": "models of the processor and the GPU (null: none that speaks Vulkan), cores that could be used, and the \
+                    load average over a minute before the first round",
         "method": "how pictures and times were taken",
         "baseline": "what every time_ratio is relative to, on the same scene's mesh in the same rounds",
         "size_px": "columns and rows of every picture",

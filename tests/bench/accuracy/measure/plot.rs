@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::summary::{Series, series};
+use super::table::Machine;
 use super::techniques::{Family, Technique};
 use super::{BASELINE, Row};
 
@@ -24,19 +25,19 @@ const PANELS: [Panel; 2] = [
 ];
 
 /// Both panels share the range of errors. Colours are told apart on white and on black.
-pub fn svg(rows: &[Row], machine: &str) -> String {
+pub fn svg(rows: &[Row], machine: &Machine) -> String {
     let all: Vec<Vec<Series>> =
         PANELS.iter().map(|p| p.families.iter().flat_map(|&family| series(rows, family)).collect()).collect();
     let points = || all.iter().flatten().flat_map(|s| &s.points);
     let errors = Axis::new(points().map(|p| p.error), [HEIGHT[1], HEIGHT[0]]);
-    let mut text = head(machine);
+    let mut text = head(&machine.line());
     for (panel, series) in PANELS.iter().zip(&all) {
         let times = Axis::new(series.iter().flat_map(|s| &s.points).map(|p| p.time), panel.x);
         frame(&mut text, panel, &times, &errors);
         series.iter().for_each(|s| line(&mut text, s, &times, &errors));
         legend(&mut text, panel, series);
     }
-    back_ends(&mut text, rows);
+    back_ends(&mut text, rows, machine);
     text.push_str("</svg>\n");
     text
 }
@@ -87,7 +88,7 @@ fn head(machine: &str) -> String {
          @media (prefers-color-scheme:dark){.page{fill:#0d1117;stroke:#30363d}.text{fill:#e6edf3}.grid{stroke:#30363d}}</style>\n",
     );
     let _ = writeln!(text, r#"<rect class="page" x="0.5" y="0.5" width="{}" height="{}" rx="6"/>"#, w - 1.0, h - 1.0);
-    let title = format!("time as a ratio to {BASELINE}");
+    let title = format!("time as a ratio to {BASELINE}; lower left is better");
     label(&mut text, [0.5 * SIZE[0], HEIGHT[1] + 32.0], "middle", &title);
     let _ = writeln!(
         text,
@@ -187,17 +188,18 @@ fn legend(text: &mut String, panel: &Panel, series: &[Series]) {
 }
 
 /// The back-ends by marker, and what the size of markers says.
-fn back_ends(text: &mut String, rows: &[Row]) {
+fn back_ends(text: &mut String, rows: &[Row], machine: &Machine) {
     let y = HEIGHT[1] + 100.0;
     let mut x = PANELS[0].x[0];
-    let known = [("cpu-1", "CPU, 1 thread"), ("cpu-2", "CPU, 2 threads"), ("gpu", "GPU")];
+    let gpu = if machine.has_software_gpu() { "Vulkan on the CPU" } else { "GPU" };
+    let known = [("cpu-1", "CPU, 1 thread"), ("cpu-2", "CPU, 2 threads"), ("gpu", gpu)];
     for (name, words) in known.into_iter().filter(|(name, _)| rows.iter().any(|row| row.back_end == *name)) {
         marker(text, name, "#7d8590", [x + 4.0, y - 4.0], 4.0);
         label(text, [x + 14.0, y], "start", words);
         x += 32.0 + 6.3 * words.len() as f64;
     }
     let samples: Vec<String> = super::SAMPLES.iter().map(u32::to_string).collect();
-    let words = format!("markers grow with samples a pixel: {}; lower left is better", samples.join(", "));
+    let words = format!("larger markers: {} samples a pixel", samples.join(", "));
     label(text, [SIZE[0] - 16.0, y], "end", &words);
 }
 

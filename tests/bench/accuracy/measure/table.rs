@@ -13,6 +13,8 @@ pub struct Machine {
     /// That this process may use.
     pub cores: usize,
     pub gpu: Option<String>,
+    /// What else ran: the load average over a minute before the first round, where the system tells.
+    pub load: Option<f64>,
 }
 
 impl Machine {
@@ -22,8 +24,23 @@ impl Machine {
         Self {
             cpu: model.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned()),
             cores: std::thread::available_parallelism().map_or(1, usize::from),
+            load: std::fs::read_to_string("/proc/loadavg").ok().and_then(|text| text.split(' ').next()?.parse().ok()),
             gpu: gpu.map(|gpu| format!("{} ({}, {})", gpu.name, gpu.device_type, gpu.driver)),
         }
+    }
+
+    /// Whether what stands for the GPU is software, and shares the CPU's cores.
+    pub fn has_software_gpu(&self) -> bool {
+        self.gpu.as_ref().is_some_and(|gpu| gpu.contains("(software,"))
+    }
+
+    /// A warning where times mean little.
+    pub fn warning(&self) -> Option<String> {
+        let load = self.load.filter(|load| *load > 0.5)?;
+        Some(format!(
+            "Other work shared these cores (load average {load:.1} before the first round): times, above all those of several threads, \
+             are larger than on an idle machine; errors are the same."
+        ))
     }
 
     /// One line.
