@@ -55,6 +55,7 @@ struct Report {
     topology: TopologyEntry,
     dropped_nonfinite_faces: u64,
     dropped_degenerate_faces: u64,
+    dropped_collapsed_faces: u64,
     warnings: Vec<WarningEntry>,
 }
 
@@ -171,8 +172,21 @@ impl Report {
             topology: TopologyEntry::new(topology),
             dropped_nonfinite_faces: import.dropped_nonfinite_faces,
             dropped_degenerate_faces: import.dropped_degenerate_faces,
+            dropped_collapsed_faces: import.dropped_collapsed_faces,
             warnings: warnings.map(|w| WarningEntry { code: w.code, detail: w.detail.clone() }).collect(),
         }
+    }
+
+    /// Which faces are not drawn, and why; None where all are.
+    fn dropped(&self) -> Option<String> {
+        let reasons = [
+            (self.dropped_nonfinite_faces, "with NaN or infinite corners"),
+            (self.dropped_degenerate_faces, "without area"),
+            (self.dropped_collapsed_faces, "too small beside the whole mesh"),
+        ];
+        let said = reasons.into_iter().filter(|(count, _)| *count > 0);
+        let said: Vec<String> = said.map(|(count, why)| format!("{} {why}", counted(count, "face", "faces"))).collect();
+        (!said.is_empty()).then(|| said.join(", "))
     }
 
     fn text(&self) -> String {
@@ -197,15 +211,8 @@ impl Report {
         line("bounds", format!("{} to {}", point(self.bounds.min), point(self.bounds.max)));
         line("size", point(self.bounds.size));
         line("topology", self.topology.text());
-        if self.dropped_nonfinite_faces + self.dropped_degenerate_faces > 0 {
-            let (nonfinite, degenerate) = (self.dropped_nonfinite_faces, self.dropped_degenerate_faces);
-            line(
-                "dropped",
-                format!(
-                    "{} with NaN or infinite corners, {degenerate} without area",
-                    counted(nonfinite, "face", "faces")
-                ),
-            );
+        if let Some(dropped) = self.dropped() {
+            line("dropped", dropped);
         }
         for warning in &self.warnings {
             line("warning", format!("{} ({})", warning.detail, warning.code));

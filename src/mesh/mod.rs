@@ -6,6 +6,7 @@
 
 mod attributes;
 pub mod bundle;
+mod coarse;
 mod counted;
 pub mod edges;
 mod entry;
@@ -122,8 +123,11 @@ pub struct ImportReport {
     pub polygons_by_arity: [u64; 13],
     /// Faces dropped because a corner is NaN or infinite.
     pub dropped_nonfinite_faces: u64,
-    /// Faces dropped because two corners are the same point or all lie on a line.
+    /// Faces dropped because two corners are the same point or all lie on a line: exactly, in the file's own numbers.
     pub dropped_degenerate_faces: u64,
+    /// Faces dropped because welding made two of their corners one: so small beside the whole mesh that 24 bits cannot tell
+    /// them apart.
+    pub dropped_collapsed_faces: u64,
     /// Things a user should know; each with a stable code.
     pub warnings: Vec<Warning>,
 }

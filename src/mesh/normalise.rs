@@ -3,6 +3,7 @@
 //! Everything up to the unit box scales by powers of two alone, so that a file scaled by a power of two gives the same mesh.
 
 use super::attributes::{self, Attributes};
+use super::coarse;
 use super::import::Context;
 use super::pow2::{Pow2, exponent, is_usable, max_abs};
 use super::raw::RawMesh;
@@ -15,6 +16,8 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshErr
     cx.budget.spend("the triangles", raw.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
     cx.budget.spend("the welded vertices", raw.positions.len() as u64, BYTES_PER_VERTEX)?;
 
+    raw.report.warnings.extend(coarse::warning(&raw));
+    cx.deadline.check()?;
     let file_exponent = scale_down(&mut raw);
     let faces = pick_faces(&mut raw);
     cx.deadline.check()?;
@@ -184,7 +187,7 @@ fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
             *known
         });
         if corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0] {
-            raw.report.dropped_degenerate_faces += 1;
+            raw.report.dropped_collapsed_faces += 1;
             continue;
         }
         mesh.triangles.push(corners);
@@ -196,7 +199,7 @@ fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
         }
     }
     mesh.positions = set.positions;
-    if raw.report.dropped_degenerate_faces > 0 {
+    if raw.report.dropped_collapsed_faces > 0 {
         drop_unused(&mut mesh);
     }
     mesh
@@ -234,12 +237,17 @@ fn bounds(positions: &[[f32; 3]]) -> [[f32; 3]; 2] {
 fn empty(report: &ImportReport) -> MeshError {
     let faces: u64 = report.polygons_by_arity.iter().sum();
     let (nonfinite, degenerate) = (report.dropped_nonfinite_faces, report.dropped_degenerate_faces);
+    let collapsed = report.dropped_collapsed_faces;
     let (vertices, faces) = (counted(report.file_vertices, "vertex", "vertices"), counted(faces, "face", "faces"));
     let mut detail = format!("the {} file has nothing to draw: {vertices} and {faces}", report.format);
-    if nonfinite + degenerate > 0 {
+    if nonfinite + degenerate + collapsed > 0 {
         let has = |count| counted(count, "has", "have");
         let (nonfinite, degenerate) = (has(nonfinite), has(degenerate));
         detail += &format!(", of whose triangles {nonfinite} a NaN or infinite corner and {degenerate} no area");
+    }
+    if collapsed > 0 {
+        let are = counted(collapsed, "is", "are");
+        detail += &format!("; {are} thinner than 24 bits can tell beside the size of the whole");
     }
     for warning in &report.warnings {
         detail += "; ";

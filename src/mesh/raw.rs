@@ -8,6 +8,8 @@ use super::{ImportReport, MaterialSlot, UpAxis};
 pub struct RawMesh {
     /// Positions in file space, one a vertex. May hold NaN and infinities: normalisation drops the faces that use them.
     pub positions: Vec<[f64; 3]>,
+    /// Whether the file stores those as f32: then what is far from the origin is coarse.
+    pub is_f32: bool,
     /// Normals, one a vertex, any length; or empty.
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates, one a vertex, (0, 0) the upper left corner of the image and v down; or empty.

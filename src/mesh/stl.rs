@@ -79,6 +79,7 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
             ),
         });
     }
+    raw.is_f32 = true;
     reserve(&mut raw, count, cx)?;
     let body = &bytes[HEADER_BYTES..declared as usize];
     for (i, triangle) in body.chunks_exact(TRIANGLE_BYTES).enumerate() {

@@ -58,6 +58,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
             primitive.append(&mut raw, &instance.transform, default_material, cx)?;
         }
     }
+    raw.is_f32 = true;
     warn_of_unread(&root, &mut raw.report.warnings);
     let (slots, images) = primitives.materials.into_slots();
     (raw.materials, raw.images) = (slots, images.sources);

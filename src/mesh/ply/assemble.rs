@@ -22,7 +22,8 @@ pub fn assemble(
     cx: &mut Context<'_>,
 ) -> Result<Vec<u32>, MeshError> {
     raw.report.file_vertices = vertices.positions.len() as u64;
-    let Vertices { positions, normals, uvs, colors } = vertices;
+    let Vertices { positions, is_f32, normals, uvs, colors } = vertices;
+    raw.is_f32 = is_f32;
     (raw.positions, raw.normals, raw.uvs, raw.colors) = (positions, normals, uvs, colors);
     let mut splitter = Splitter::new(faces, raw, cx)?;
     // Triangles at most: every polygon has two fewer than corners.

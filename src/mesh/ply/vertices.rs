@@ -1,6 +1,6 @@
 //! The element `vertex`.
 
-use super::header::Element;
+use super::header::{Element, Kind};
 use super::layout::{Layout, Slot};
 use super::source::{Columns, Cost, Meter, Source, each_record, ends_within};
 use super::stored::{linearise, upright};
@@ -25,6 +25,8 @@ const BLOCKS_PER_LOOK: u64 = 128;
 pub struct Vertices {
     /// One a vertex.
     pub positions: Vec<[f64; 3]>,
+    /// Whether those are stored as f32.
+    pub is_f32: bool,
     /// One a vertex, or empty.
     pub normals: Vec<[f32; 3]>,
     /// One a vertex, or empty.
@@ -78,6 +80,7 @@ pub fn read<S: Source>(
         })?;
         vertices.append(&layout, &columns);
     }
+    vertices.is_f32 = layout.kinds[POSITION].iter().all(|kind| *kind == Some(Kind::F32));
     let kinds = &layout.kinds[COLOR.start..=ALPHA];
     linearise(&mut vertices.colors, kinds);
     Ok(vertices)
@@ -113,6 +116,7 @@ impl Vertices {
         }
         Ok(Self {
             positions: Vec::with_capacity(count as usize),
+            is_f32: false,
             normals: Vec::with_capacity(rooms[0]),
             uvs: Vec::with_capacity(rooms[1]),
             colors: Vec::with_capacity(rooms[2]),
