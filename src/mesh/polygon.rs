@@ -8,6 +8,8 @@ pub const ALL_EDGES: u8 = 0b111;
 /// Corner tests that ear clipping may do in one file before it falls back to fans: about half a second. Clipping is
 /// quadratic, so a few hostile polygons would otherwise take minutes.
 const WORK_MAX: u64 = 100_000_000;
+/// Two squared lengths with less between them count as equal: more than coordinates round in f32, or in f64 far away.
+const EQUAL_LENGTHS2: f64 = 1.0 + 1e-4;
 /// Corners from which a polygon is fanned at once.
 const CORNERS_MAX: usize = 8192;
 
@@ -100,7 +102,8 @@ impl Triangulator {
         orient(self.ring[corner.prev as usize].at, corner.at, self.ring[corner.next as usize].at)
     }
 
-    /// Along the shorter diagonal, which gives the better shaped triangles; the first one if they are equal.
+    /// Along the shorter diagonal, which gives the better shaped triangles; the first one if they are equal, as in all that is
+    /// symmetric. There rounding must not choose, or the same model elsewhere or at another scale would be cut in other ways.
     fn split_quad(&self, positions: &[[f64; 3]], emit: &mut impl FnMut([u32; 3], u8)) {
         let v: [u32; 4] = std::array::from_fn(|i| self.ring[i].vertex);
         let p = v.map(|v| positions[v as usize]);
@@ -108,7 +111,7 @@ impl Triangulator {
         let (d, e) = (diagonal(p[0], p[2]), diagonal(p[1], p[3]));
         let unit = Pow2::new(-exponent(max_abs(&d).max(max_abs(&e))));
         let length2 = |d: [f64; 3]| unit.of3(d).iter().map(|c| c * c).sum::<f64>();
-        if length2(d) <= length2(e) {
+        if length2(d) <= length2(e) * EQUAL_LENGTHS2 {
             emit([v[0], v[1], v[2]], 0b011);
             emit([v[0], v[2], v[3]], 0b110);
         } else {
