@@ -90,4 +90,11 @@ pub struct Edge {
 impl Edge {
     /// No triangle.
     pub const NO_FACE: u32 = u32::MAX;
+
+    /// An edge that runs from the smaller position to the larger, so that lines have the same bytes whatever the order, the
+    /// numbers and the winding of the faces that they are found in.
+    pub fn new(positions: &[[f32; 3]], [a, b]: [u32; 2], faces: [u32; 2]) -> Self {
+        let is_in_order = positions[a as usize] <= positions[b as usize];
+        Self { vertices: if is_in_order { [a, b] } else { [b, a] }, faces }
+    }
 }

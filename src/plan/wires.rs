@@ -89,7 +89,7 @@ pub fn passes(
     for want in &wants {
         let drawn =
             list.edges.iter().zip(0_u32..).filter(|(edge, _)| want.draws(mesh, parts, edge)).filter_map(|(edge, i)| {
-                let all = Edge { vertices: edge.vertices, faces: edge.faces };
+                let all = Edge::new(&mesh.positions, edge.vertices, edge.faces);
                 silhouettes.as_ref().filter(|_| want.contour).map_or(Some(all), |s| s.edge(i, all))
             });
         let edges: Arc<[Edge]> = drawn.collect();
