@@ -7,7 +7,7 @@ use super::skips::{SkipKind, Skips};
 use super::textures::TextureLoader;
 use super::{
     CornerValues, DrawPlan, Faces, HullOffset, HullPass, LayersPass, PlanError, Projection, SurfacePass, flags, lights,
-    materials, wires,
+    materials, miter, wires,
 };
 use crate::limits::{Budget, Deadline, LimitExceeded};
 use crate::mesh::{Mesh, normals};
@@ -65,7 +65,8 @@ pub fn build_keeping<'a>(
     let surface = surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
     let welded = surface.as_ref().and_then(|s| s.vertex_normals.as_ref()).filter(|_| mesh.normals.is_empty());
     let no_hull = skips.skip(SkipKind::Hull, !parts.has_hull(), "the look has no hull");
-    let hull = (!no_hull).then(|| hull_pass(mesh, &parts, welded.map(|n| n.values.clone())));
+    let welded = welded.map(|n| n.values.clone());
+    let hull = (!no_hull).then(|| hull_pass(mesh, &parts, welded, &projection(&camera, size_px, true)));
     let layers = layers_pass(&parts, hull.is_some(), &mut skips);
     let unclipped = skips.skip(
         SkipKind::Clipping,
@@ -103,8 +104,9 @@ fn pay(mesh: &Mesh, size_px: [u32; 2], parts: &Parts<'_>, budget: &mut Budget) -
     }
     let is_smooth = parts.looks.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::scene::Shading::Smooth));
     if parts.has_hull() || (is_smooth && mesh.normals.is_empty()) {
-        // Sums in f64, then the unit normals in f32; and how far each moves.
-        budget.spend("vertex normals", mesh.positions.len() as u64, 40)?;
+        // Sums in f64, then the unit normals in f32, perhaps a copy of them, and how far each moves; or where each is on
+        // screen, which way the silhouette goes there and how it turns, in place of the sums.
+        budget.spend("vertex normals", mesh.positions.len() as u64, 76)?;
     }
     Ok(())
 }
@@ -270,7 +272,12 @@ fn layers_pass(parts: &Parts<'_>, has_hull: bool, skips: &mut Skips<'_>) -> Opti
     Some(needed.unwrap_or(empty))
 }
 
-fn hull_pass<'a>(mesh: &'a Mesh, parts: &Parts<'_>, welded: Option<Cow<'a, [[f32; 3]]>>) -> HullPass<'a> {
+fn hull_pass<'a>(
+    mesh: &'a Mesh,
+    parts: &Parts<'_>,
+    welded: Option<Cow<'a, [[f32; 3]]>>,
+    projection: &Projection,
+) -> HullPass<'a> {
     let outline = |m: usize| parts.layers[m].outline.filter(|o| o.method == OutlineMethod::Hull);
     let offsets: Vec<Option<HullOffset>> =
         (0..parts.layers.len()).map(|m| outline(m).map(|o| outline_offset(mesh, &o))).collect();
@@ -282,25 +289,15 @@ fn hull_pass<'a>(mesh: &'a Mesh, parts: &Parts<'_>, welded: Option<Cow<'a, [[f32
         colors = vec![color];
     }
     let first = offsets.iter().flatten().next().copied().unwrap_or(HullOffset::Px(0.0));
-    let amounts =
-        if offsets.iter().flatten().all(|offset| *offset == first) { Vec::new() } else { amounts(mesh, &offsets) };
+    let is_px = matches!(first, HullOffset::Px(_));
+    let is_same = offsets.iter().flatten().all(|offset| *offset == first);
+    let mut amounts = if is_same && !is_px { Vec::new() } else { miter::amounts(mesh, &offsets) };
     // The file's normals may split at hard edges, where a hull that followed them would tear: always the welded ones.
-    let normals = welded.unwrap_or_else(|| normals::angle_weighted(mesh).into());
+    let mut normals = welded.unwrap_or_else(|| normals::angle_weighted(mesh).into());
+    if is_px {
+        miter::miter(mesh, projection, &offsets, normals.to_mut(), &mut amounts);
+    }
     let tells_apart = colors.len() > 1 || (parts.layers_pass().is_some() && mesh.materials.len() > 1);
     let triangle_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
     HullPass { colors, normals, offset: first, amounts, triangle_materials }
-}
-
-/// How far each position moves: as far as the thickest outline of its parts. (The request has seen to it that all have the
-/// same unit.)
-fn amounts(mesh: &Mesh, offsets: &[Option<HullOffset>]) -> Vec<f32> {
-    let mut amounts = vec![0.0_f32; mesh.positions.len()];
-    for (triangle, &material) in mesh.triangles.iter().zip(&mesh.triangle_materials) {
-        if let Some(Some(HullOffset::Object(amount) | HullOffset::Px(amount))) = offsets.get(material as usize) {
-            for &v in triangle {
-                amounts[v as usize] = amounts[v as usize].max(*amount);
-            }
-        }
-    }
-    amounts
 }

@@ -7,11 +7,11 @@ use std::borrow::Cow;
 pub struct HullPass<'a> {
     /// Premultiplied linear RGBA, by material index; one where all are the same.
     pub colors: Vec<[f32; 4]>,
-    /// A unit normal a position.
+    /// A unit vector a position: where it moves to.
     pub normals: Cow<'a, [[f32; 3]]>,
     /// How far.
     pub offset: HullOffset,
-    /// How far each position moves, in the unit of `offset`, where parts differ; else empty, and all move by `offset`.
+    /// How far each position moves, in the unit of `offset`, where parts differ or corners have to move farther than sides; else empty, and all move by `offset`.
     pub amounts: Vec<f32>,
     /// Material index a triangle; empty where all are the same. Unlike the surface's, never merged because they look alike:
     /// it also says what hides which hull, see [`LayersPass`](super::LayersPass).

@@ -9,6 +9,7 @@ mod hull;
 mod lights;
 mod lines;
 mod materials;
+mod miter;
 mod parts;
 mod silhouette;
 mod skips;

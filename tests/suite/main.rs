@@ -6,6 +6,7 @@
 mod accuracy_behind_eye;
 mod accuracy_bench;
 mod accuracy_geometry;
+mod accuracy_outlines;
 mod accuracy_shading;
 mod accuracy_wires;
 mod bundles;
