@@ -68,6 +68,10 @@ pub fn build_keeping<'a>(
     let welded = welded.map(|n| n.values.clone());
     let hull = (!no_hull).then(|| hull_pass(mesh, &parts, welded, &projection(&camera, size_px, true)));
     let layers = layers_pass(&parts, hull.is_some(), &mut skips);
+    let mut roles = parts.roles(mesh, surface.is_some(), layers.as_ref(), hull.is_some());
+    if let Some(HullPass { offset: HullOffset::Px(_), .. }) = hull {
+        miter::leave_out_fronts(mesh, &projection(&camera, size_px, true), roles.to_mut());
+    }
     let unclipped = skips.skip(
         SkipKind::Clipping,
         camera.contains_mesh,
@@ -79,7 +83,7 @@ pub fn build_keeping<'a>(
         samples: spec.image.samples,
         positions: &mesh.positions,
         triangles: &mesh.triangles,
-        roles: parts.roles(mesh, surface.is_some(), layers.as_ref(), hull.is_some()),
+        roles,
         projection: projection(&camera, size_px, !unclipped),
         surface,
         layers,

@@ -1,7 +1,7 @@
 //! How far and where to each vertex of a hull moves: what lies on the hull's own silhouette so far that the edges there, not the
 //! corners, keep their distance.
 
-use super::{HullOffset, Projection};
+use super::{HullOffset, Projection, roles};
 use crate::mesh::Mesh;
 
 /// Farthest that a corner moves, in widths of the outline.
@@ -42,7 +42,7 @@ pub fn miter(
     normals: &mut [[f32; 3]],
     amounts: &mut [f32],
 ) {
-    let on_screen: Vec<[f64; 2]> = mesh.positions.iter().map(|p| place(projection, p)).collect();
+    let on_screen = on_screen(mesh, projection);
     let is_drawn = |material: u32| offsets.get(material as usize).is_some_and(Option::is_some);
     let drawn = mesh.triangles.iter().zip(&mesh.triangle_materials).filter(|(_, material)| is_drawn(**material));
     // Back faces run clockwise on screen, where y points down. With a corner behind the eye the area is NaN.
@@ -70,6 +70,23 @@ pub fn miter(
             amounts[v] = (amount * miter) as f32;
         }
     }
+}
+
+/// Takes what is seen from the front out of the hull, as it will be: corners that move apart might turn a thin face over, and then it
+/// would lie black before the surface. `of_triangles` are [`DrawPlan::roles`](super::DrawPlan::roles).
+pub fn leave_out_fronts(mesh: &Mesh, projection: &Projection, of_triangles: &mut Vec<u8>) {
+    of_triangles.resize(mesh.triangles.len(), roles::SURFACE | roles::HULL);
+    let on_screen = on_screen(mesh, projection);
+    for (triangle, role) in mesh.triangles.iter().zip(of_triangles) {
+        if area(triangle.map(|v| on_screen[v as usize])) < 0.0 {
+            *role &= !roles::HULL;
+        }
+    }
+}
+
+/// Each position in 1/256 px from the picture's centre; NaN behind the eye.
+fn on_screen(mesh: &Mesh, projection: &Projection) -> Vec<[f64; 2]> {
+    mesh.positions.iter().map(|p| place(projection, p)).collect()
 }
 
 /// At each position the sum of the unit directions in which the silhouette comes and goes.

@@ -54,9 +54,6 @@ fn others(shape: &Shape, random: &mut Random) -> Vec<(&'static str, Shape)> {
 /// looking away; measured now. The goal is 0.
 const INSIDE_OUT_NOW: usize = 2;
 
-/// Looks with lines of exact width: the GPU draws them in another way that does depend on the order.
-const LINES: [&str; 4] = ["wire", "wireframe", "hidden-line", "contour"];
-
 #[test]
 fn order_and_winding_leave_no_trace() {
     let (mut compared, mut wanted) = (0, 0);
@@ -78,9 +75,6 @@ fn order_and_winding_leave_no_trace() {
                     }
                     let allowed = if look == "wire" && is_inside_out { INSIDE_OUT_NOW } else { 0 };
                     for renderer in &mut renderers {
-                        if LINES.contains(&look) && renderer.kind().name() == "gpu" {
-                            continue;
-                        }
                         let [want, got] = [&first, &other].map(|mesh| draw(mesh, keys, "128x96", renderer.as_mut()));
                         assert!(!is_blank(&want), "{name}, {look}");
                         let count = differing(&want, &got);
@@ -95,7 +89,6 @@ fn order_and_winding_leave_no_trace() {
         }
     }
     let hulls_inside_out = wanted / 5 * 2 * 2;
-    let on_gpu = (renderers.len() - 1) * wanted * LINES.len();
-    assert_eq!(compared, (wanted * LOOKS.len() - hulls_inside_out) * renderers.len() - on_gpu);
+    assert_eq!(compared, (wanted * LOOKS.len() - hulls_inside_out) * renderers.len());
     assert!(wrong.is_empty(), "{} of {compared} differ:\n{}", wrong.len(), wrong.join("\n"));
 }
