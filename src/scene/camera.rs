@@ -91,7 +91,9 @@ impl Camera {
         let farthest = self.distance - extents.low.z + grow;
         // Behind or around the eye: a millionth of what is in front is close enough.
         self.near = if nearest > 0.0 { 0.5 * nearest } else { 1e-6 * farthest.max(1e-6) };
-        self.far = farthest.max(2.0 * self.near) * (1.0 + 1e-6);
+        // f32 rounds depths by the size of the box, however close the eye is to its far side: that must not end up behind the far
+        // plane.
+        self.far = (farthest.max(2.0 * self.near) * (1.0 + 1e-6)).max(farthest + 1e-6);
         let reach = (extents.high - self.center.extend(0.0)).abs().max((extents.low - self.center.extend(0.0)).abs());
         let w = if self.kind == Kind::Perspective { nearest } else { 1.0 };
         let px = (DVec2::new(reach.x, reach.y) + grow) / (self.half_size * w) * size_px * 0.5;
