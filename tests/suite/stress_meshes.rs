@@ -11,9 +11,11 @@ use crate::scenes;
 use crate::shapes::{self, Obj};
 
 type Keys = &'static [(&'static str, &'static str)];
+/// A name and what writes an OBJ text.
+type Named = (&'static str, fn() -> String);
 
 /// Names and OBJ texts: smooth, with hard edges, open, coarse, and with poles.
-pub const MESHES: [(&str, fn() -> String); 5] = [
+pub const MESHES: [Named; 5] = [
     ("torus", || shapes::torus(24)),
     ("gear", || shapes::gear(10)),
     ("sheet", || shapes::sheet(12)),
