@@ -73,6 +73,11 @@ struct Batch {
     line_windows: f32,
     // Threads that share a window, by rows.
     line_slices: u32,
+    // Coverage in the middle of a line.
+    line_peak: f32,
+    // Of so many dispatches over the same long edges, which this is.
+    line_turns: u32,
+    line_turn: u32,
     ink_at: u32,
     // Where the faces whose light falls on lines start in the ink.
     owners_at: u32,

@@ -172,7 +172,7 @@ fn lies_deep(s: Segment, range: vec2<f32>) -> bool {
         last = pixel;
         for (var n = 0u; n < count; n++) {
             let seen = seen_at(pixel, n);
-            if bitcast<f32>(seen.y) <= nearest {
+            if seen.x == NOTHING || bitcast<f32>(seen.y) <= nearest {
                 return false;
             }
             if seen.x != last_id {

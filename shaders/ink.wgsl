@@ -13,7 +13,8 @@ fn ink(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) g
     }
     let at = 10u * i;
     let sum = strokes[at];
-    if sum == 0u {
+    let all = strokes[at + 1u];
+    if (sum | all) == 0u {
         return;
     }
     var points = 0u;
@@ -21,13 +22,12 @@ fn ink(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) g
         points += countOneBits(strokes[at + w]);
     }
     var coverage = f32(sum) * (1.0 / 65536.0);
-    let all = strokes[at + 1u];
     if points == 256u && all > 256u {
-        coverage = 1.0;
+        coverage = batch.line_peak;
     } else if all > points {
         coverage = coverage * (f32(points) / f32(all));
     }
-    coverages[batch.ink_at + i] = bitcast<u32>(min(coverage, 1.0));
+    coverages[batch.ink_at + i] = bitcast<u32>(min(coverage, batch.line_peak));
     // For the next pass.
     for (var w = 0u; w < 10u; w++) {
         strokes[at + w] = 0u;

@@ -62,7 +62,7 @@ fn lines(
     let count = atomicLoad(&long_count);
     let all = atomicLoad(&long_shares);
     var share = 0u;
-    var next = thread;
+    var next = thread + 64u * batch.line_turn;
     while share < shares || next < all {
         var edge = index;
         var number = share;
@@ -78,7 +78,7 @@ fn lines(
                 }
             }
             number = next - start;
-            next += 64u;
+            next += 64u * batch.line_turns;
         }
         draw_share(edges[edge], number);
     }

@@ -40,14 +40,11 @@ fn reach_of_line() -> f32 {
     return 0.5 * batch.line_width + 0.5 * batch.line_smoothing + BOX_RADIUS;
 }
 
-// Half the width where the line is as dense as a level; negative where it nowhere is.
+// Half the width where the line is as dense as a level, a share of its peak.
 fn radius_at(level: u32) -> f32 {
     let half_width = 0.5 * batch.line_width;
     let half_ramp = 0.5 * batch.line_smoothing;
-    let share = rn((f32((level * 7u) % 16u) + 0.5) * 0.0625);
-    if rn(share * half_ramp) > half_width {
-        return -1.0;
-    }
+    let share = rn(((f32((level * 7u) % 16u) + 0.5) * 0.0625) * batch.line_peak);
     return rn(half_width + half_ramp) - rn(share * (2.0 * half_ramp));
 }
 
@@ -73,7 +70,8 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
     var stroke: Stroke;
     stroke.along = vec2(round_to_i32(along.x * UNIT), round_to_i32(along.y * UNIT));
     stroke.across = across;
-    let reaches = vec2((past_start < box_along), (past_end > -box_along));
+    let is_past_end = past_end > -box_along;
+    let reaches = vec2(past_start < box_along, is_past_end);
     var area = 0.0;
     if !any(reaches) {
         area = strip_area(vec2(-along.y, along.x), abs(across));
@@ -86,7 +84,8 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
     } else {
         stroke.first = units(-past_start);
         stroke.last = units(-past_end);
-        stroke.has_strip = beyond < box_along;
+        // An edge that is a point has no sides, only the disc around it.
+        stroke.has_strip = any(along != vec2(0.0)) && beyond < box_along;
         stroke.away = vec2(rn(start.x * start.x) + rn(start.y * start.y), rn(end.x * end.x) + rn(end.y * end.y));
         stroke.discs = reaches & (stroke.away <= vec2(rn(reach * reach)));
         stroke.from_start = scaled(select(vec2(0.0), start, stroke.discs.x));
@@ -105,7 +104,7 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
         if points == 0u {
             return false;
         }
-        area = f32(points) * (1.0 / 256.0);
+        area = f32(points) * (batch.line_peak * (1.0 / 256.0));
     }
     if atomicLoad(&strokes[at]) < SUM_MAX && atomicLoad(&strokes[at + 1u]) < SUM_MAX {
         atomicAdd(&strokes[at], u32(area * 65536.0 + 0.5));
@@ -156,9 +155,6 @@ fn bounds_of(stroke: Stroke, word: u32) -> Bounds {
     var radius = 0.5 * batch.line_width;
     if batch.line_smoothing > 0.0 {
         radius = radius_at(word);
-        if radius < 0.0 {
-            return Bounds(1, 0, vec2(-i32(LIMIT)));
-        }
     }
     let discs = vec2(limit_of(radius, stroke.away.x), limit_of(radius, stroke.away.y));
     return Bounds(units(-radius - stroke.across), units(radius - stroke.across), discs);

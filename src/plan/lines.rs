@@ -35,10 +35,15 @@ impl LinePass {
         0.5 * self.width_px + 0.5 * self.smoothing_px + std::f32::consts::FRAC_1_SQRT_2
     }
 
-    /// Length of the windows in which an edge's visible parts are looked for, pixels. As long as the line is wide, or most of the
-    /// pixels around a window would be its neighbours'.
+    /// Coverage in the middle of a line, 0 to 1, by its ramp alone.
+    pub fn peak(&self) -> f32 {
+        if self.smoothing_px > self.width_px { self.width_px / self.smoothing_px } else { 1.0 }
+    }
+
+    /// Length of the windows in which an edge's visible parts are looked for, pixels. Longer for wide lines, or most of the
+    /// pixels around a window would be its neighbours'; but not much, because a window looks along all of itself for each part.
     pub fn window_px(&self) -> f32 {
-        (2.0 * self.reach_px()).max(8.0)
+        (0.5 * self.reach_px()).clamp(8.0, 24.0)
     }
 
     /// The largest power of two that scales areas around the line's end to at most [`LinePass::SCALED_MAX`].

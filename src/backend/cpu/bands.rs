@@ -68,7 +68,8 @@ fn draw_lines(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band:
         scratch.ink.resize(pixels, Ink::default());
         let target = &mut LineTarget { ink: &mut scratch.ink, owners: &mut scratch.owners };
         draw_edges(stages.isa, stages, pass, bins, band, &scratch.samples, target);
-        scratch.coverage.extend(scratch.ink.iter().map(Ink::coverage));
+        let peak = pass.peak();
+        scratch.coverage.extend(scratch.ink.iter().map(|ink| ink.coverage(peak)));
     }
     scratch.light.clear();
     if plan.lights_lines() {
@@ -163,7 +164,8 @@ fn edges_kernel(
     let mut drawer = LineDrawer::new(stages, pass, samples, samples.shown);
     for chunk in bins {
         for (i, edge) in chunk.items_in(band).enumerate() {
-            if i % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
+            // A wide line's edge is as much work as hundreds of others.
+            if (i % CHECK_EVERY == 0 || drawer.has_looked_far()) && stages.deadline.check().is_err() {
                 return;
             }
             drawer.draw(&pass.edges[edge as usize], target);

@@ -5,9 +5,10 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::clip::clip_triangle;
+use super::segment::Segment;
 use super::transform::{ScreenVertex, homogeneous};
 use super::visibility::{area, axis_bounds, is_wanted};
-use super::{CHUNK, Stages, contour, lines};
+use super::{CHUNK, Stages, contour};
 use crate::limits::Stopped;
 use crate::plan::{DrawPlan, Faces, LinePass, roles};
 
@@ -208,7 +209,7 @@ fn bin_edges(stages: &Stages<'_>, pass: &LinePass, rows: u32, range: Range<usize
         if !contour::is_drawn(stages, pass, edge) {
             continue;
         }
-        if let Some(segment) = lines::Segment::new(stages, edge) {
+        if let Some(segment) = Segment::new(stages, edge) {
             let [first, last] = segment.rows(reach, stages.plan.height_px);
             if first <= last {
                 bin.push(i as u32, [first, last].map(|row| row as usize / rows as usize));

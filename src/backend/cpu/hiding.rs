@@ -5,8 +5,8 @@
 
 use super::Stages;
 use super::contour::volume;
-use super::lines::Segment;
 use super::samples::{NOTHING, SampleBand};
+use super::segment::Segment;
 use super::transform::{ScreenVertex, homogeneous, recip};
 use super::visibility::area;
 use crate::plan::Edge;
@@ -66,7 +66,7 @@ impl Hiding {
     ) {
         let mut recent = [NOTHING; RECENT];
         let across = segment.across();
-        let beyond = radius as f32 * segment.inverse_length();
+        let beyond = radius as f32 * segment.inverse_length;
         for [x, y] in segment.walk([range[0] - beyond, range[1] + beyond]) {
             for y in y.saturating_sub(radius * across[1])..=y + radius * across[1] {
                 for x in x.saturating_sub(radius * across[0])..=x + radius * across[0] {
@@ -138,7 +138,7 @@ fn lies_deep((stages, band): (&Stages<'_>, &SampleBand), segment: &Segment, rang
         }
         let (ids, depths) = band.pixel(x, y);
         for (&id, &depth) in ids.iter().zip(depths) {
-            if depth <= nearest {
+            if id == NOTHING || depth <= nearest {
                 return false;
             }
             if id != last {

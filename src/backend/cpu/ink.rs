@@ -21,8 +21,8 @@ pub struct Ink {
 }
 
 impl Ink {
-    /// Whether all points are covered, so that nothing that comes can change anything. One stroke may cover them all and yet
-    /// leave a corner of the pixel; more than one are taken to have covered it.
+    /// Whether all points are covered, so that nothing that comes can change anything but lines whose peak is less than 1. One
+    /// stroke may cover them all and yet leave a corner of the pixel; more than one are taken to have covered it.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.count > POINTS && self.mask == [u16::MAX; WORDS]
@@ -40,19 +40,19 @@ impl Ink {
         }
     }
 
-    /// How much of the pixel is covered, 0 to 1: `area * points of the union / sum of the strokes' points`, a ratio estimate
+    /// How much of the pixel is covered, 0 to the lines' `peak`: `area * points of the union / sum of the strokes' points`, a ratio estimate
     /// whose error is that of the overlap alone.
     #[inline(always)]
-    pub fn coverage(&self) -> f32 {
+    pub fn coverage(&self, peak: f32) -> f32 {
         if self.area == 0 {
             return 0.0;
         }
         if self.is_full() {
-            return 1.0;
+            return peak;
         }
         let union = count(&self.mask);
         let area = self.area as f32 * (1.0 / AREA_UNIT);
         let share = if self.count > union { union as f32 / self.count as f32 } else { 1.0 };
-        (area * share).min(1.0)
+        (area * share).min(peak)
     }
 }

@@ -5,139 +5,13 @@
 //! to a pixel is found close to it: long edges are looked at in windows.
 
 use super::Stages;
-use super::clip::clip_segment;
 use super::hiding::Hiding;
 use super::ink::Ink;
 use super::samples::SampleBand;
+use super::segment::{SLACK_PX, Segment, rows};
 use super::stroke::{self, Direction, Pen};
-use super::transform::{ScreenVertex, homogeneous, recip, rsqrt};
+use super::transform::recip;
 use crate::plan::{Edge, LinePass, Shown};
-
-/// Slack for roundings where only too much is harmless, pixels.
-const SLACK_PX: f32 = 0.05;
-
-/// An edge on screen.
-#[derive(Clone, Copy, Debug)]
-pub struct Segment {
-    /// Ends, in 1/256 px from the picture's centre.
-    ends: [[f32; 2]; 2],
-    depths: [f32; 2],
-    /// First end, pixels from the picture's upper left corner, and the way from there to the other.
-    start: [f32; 2],
-    along: [f32; 2],
-    /// Pixels, and its inverse; 0 where it is a point.
-    length: f32,
-    inverse_length: f32,
-}
-
-impl Segment {
-    /// None where the edge is out of the picture.
-    #[inline(always)]
-    pub fn new(stages: &Stages<'_>, edge: &Edge) -> Option<Self> {
-        let [a, b] = edge.vertices.map(|v| stages.vertices[v as usize]);
-        let [a, b] = if a.is_outside() || b.is_outside() { clip(stages, edge)? } else { [a, b] };
-        let plan = stages.plan;
-        let half = [plan.width_px as i32 * 128, plan.height_px as i32 * 128];
-        let px = |v: &ScreenVertex| [(v.x + half[0]) as f32 * (1.0 / 256.0), (v.y + half[1]) as f32 * (1.0 / 256.0)];
-        let (start, end) = (px(&a), px(&b));
-        let along = [end[0] - start[0], end[1] - start[1]];
-        let squared = along[0] * along[0] + along[1] * along[1];
-        let inverse_length = if squared > 0.0 { rsqrt(squared) } else { 0.0 };
-        let ends = [a, b].map(|v| [v.x as f32, v.y as f32]);
-        Some(Self { ends, depths: [a.z, b.z], start, along, length: squared * inverse_length, inverse_length })
-    }
-
-    /// First and last picture row that a line of this reach may touch; empty if first > last.
-    #[inline(always)]
-    pub fn rows(&self, reach: f32, height_px: u32) -> [i32; 2] {
-        let (a, b) = (self.start[1], self.start[1] + self.along[1]);
-        rows(a, b, reach, [0, height_px as i32])
-    }
-
-    /// Ends, in 1/256 px from the picture's centre.
-    #[inline(always)]
-    pub fn ends(&self) -> [[f32; 2]; 2] {
-        self.ends
-    }
-
-    /// Whether the triangle is not farther away than all of the edge, nor beside its box.
-    #[inline(always)]
-    pub fn may_lie_behind(&self, [a, b, c]: &[ScreenVertex; 3]) -> bool {
-        let [start, end] = self.ends;
-        let overlaps = |k: usize, a: i32, b: i32, c: i32| {
-            let (low, high) = (a.min(b).min(c) as f32, a.max(b).max(c) as f32);
-            (low <= start[k].max(end[k])) & (high >= start[k].min(end[k]))
-        };
-        (a.z.max(b.z).max(c.z) > self.depths[0].min(self.depths[1]))
-            & overlaps(0, a.x, b.x, c.x)
-            & overlaps(1, a.y, b.y, c.y)
-    }
-
-    /// One over its length in pixels; 0 where it is a point.
-    #[inline(always)]
-    pub fn inverse_length(&self) -> f32 {
-        self.inverse_length
-    }
-
-    /// Depth at `t` of the way.
-    #[inline(always)]
-    pub fn depth(&self, t: f32) -> f32 {
-        self.depths[0] + t * (self.depths[1] - self.depths[0])
-    }
-
-    /// The point at `t` of the way, pixels from the picture's upper left corner.
-    #[inline(always)]
-    fn point(&self, t: f32) -> [f32; 2] {
-        [self.start[0] + t * self.along[0], self.start[1] + t * self.along[1]]
-    }
-
-    /// The axis that the edge runs across more than along.
-    #[inline(always)]
-    pub fn across(&self) -> [u32; 2] {
-        if self.along[0].abs() >= self.along[1].abs() { [0, 1] } else { [1, 0] }
-    }
-
-    /// The pixels that the edge passes in a range of it, some twice.
-    #[inline(always)]
-    pub fn walk(&self, [from, to]: [f32; 2]) -> Walk {
-        let steps = (self.length * (to - from) * 2.0) as u32 + 1;
-        Walk { segment: *self, from, to, step: 0.5 * self.inverse_length, next: 0, steps, last: [u32::MAX; 2] }
-    }
-}
-
-/// Steps of half a pixel along an edge.
-pub struct Walk {
-    segment: Segment,
-    from: f32,
-    to: f32,
-    step: f32,
-    next: u32,
-    steps: u32,
-    last: [u32; 2],
-}
-
-impl Iterator for Walk {
-    type Item = [u32; 2];
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<[u32; 2]> {
-        while self.next <= self.steps {
-            let [x, y] = self.segment.point((self.from + self.next as f32 * self.step).min(self.to));
-            self.next += 1;
-            if x >= 0.0 && y >= 0.0 && [x as u32, y as u32] != self.last {
-                self.last = [x as u32, y as u32];
-                return Some(self.last);
-            }
-        }
-        None
-    }
-}
-
-#[inline(always)]
-fn rows(a: f32, b: f32, reach: f32, [first, end]: [i32; 2]) -> [i32; 2] {
-    let reach = reach + SLACK_PX;
-    [((a.min(b) - reach) as i32).max(first), ((a.max(b) + reach) as i32).min(end - 1)]
-}
 
 /// Where a pass's lines go: rows of a band.
 pub struct LineTarget<'a> {
@@ -160,6 +34,8 @@ pub struct LineDrawer<'a> {
     /// Whether something may hide a line.
     is_hidden: bool,
     hiding: Hiding,
+    /// Pixels since the deadline was last looked at.
+    looked_at: i32,
     /// Parts of the edge in the window.
     parts: Vec<[f32; 2]>,
 }
@@ -178,8 +54,19 @@ impl<'a> LineDrawer<'a> {
             windows: 1.0 / lines.window_px(),
             is_hidden: something_hides && lines.shown != Shown::All,
             hiding: Hiding::default(),
+            looked_at: 0,
             parts: Vec::new(),
         }
+    }
+
+    /// Whether so many pixels have been looked at that the deadline should be too; then it counts from 0 again.
+    #[inline(always)]
+    pub fn has_looked_far(&mut self) -> bool {
+        let is_far = self.looked_at > 100_000;
+        if is_far {
+            self.looked_at = 0;
+        }
+        is_far
     }
 
     /// Draws one edge.
@@ -205,6 +92,7 @@ impl<'a> LineDrawer<'a> {
             for y in first..=last {
                 let row = (y - self.rows[0]) as usize * self.band.size_px[0] as usize;
                 let [from, to] = windowed.columns(y, self.pen.reach, self.band.size_px[0]);
+                self.looked_at += (to - from).max(0);
                 for x in from..=to {
                     let at = row + x as usize;
                     let center = [x as f32 + 0.5, y as f32 + 0.5];
@@ -287,9 +175,4 @@ impl Window<'_> {
         // Rounds towards zero, and what is below zero to it.
         (at as u32).min(self.count - 1) == self.number
     }
-}
-
-fn clip(stages: &Stages<'_>, edge: &Edge) -> Option<[ScreenVertex; 2]> {
-    let projection = &stages.plan.projection;
-    clip_segment(projection, edge.vertices.map(|v| homogeneous(projection, stages.plan.positions[v as usize])))
 }

@@ -26,6 +26,7 @@ mod profile;
 mod resolve;
 mod samples;
 mod scratch;
+mod segment;
 mod shade;
 mod stroke;
 mod texture;

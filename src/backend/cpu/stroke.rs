@@ -51,7 +51,9 @@ pub struct Pen {
     half_ramp: f32,
     /// From the middle of the line to the farthest pixel's centre that it touches, pixels.
     pub reach: f32,
-    /// Half the width at each of a ramp's levels, a word of the mask each; negative where the line is nowhere as dense.
+    /// Coverage in the middle of a line, where only its ramp is wider than a pixel.
+    peak: f32,
+    /// Half the width at each of a ramp's levels, a word of the mask each.
     radius: [f32; WORDS],
     /// Scale of areas, so that the largest fits 16 bits.
     square_unit: f32,
@@ -72,7 +74,8 @@ impl Pen {
             half_width,
             half_ramp,
             reach: lines.reach_px(),
-            radius: std::array::from_fn(|l| radius(half_width, half_ramp, l)),
+            radius: std::array::from_fn(|l| radius(half_width, half_ramp, lines.peak(), l)),
+            peak: lines.peak(),
             square_unit: (1 << exponent) as f32,
             half_square: std::array::from_fn(|j| std::array::from_fn(|l| half_square(j, l))),
         }
@@ -81,13 +84,10 @@ impl Pen {
 
 /// The line's coverage across it is a box of its width under another of its ramp's: a trapezoid. Where it is at least
 /// as high as a level, within this distance of the middle, the points of that level are covered: so the denser of two lines
-/// that cross is what remains of both.
-fn radius(half_width: f32, half_ramp: f32, level: usize) -> f32 {
+/// that cross is what remains of both. Levels are shares of the line's peak, which is less than 1 where the ramp is wider.
+fn radius(half_width: f32, half_ramp: f32, peak: f32, level: usize) -> f32 {
     // Neighbouring words far apart in level.
-    let level = (((level * 7) % WORDS) as f32 + 0.5) * (1.0 / WORDS as f32);
-    if level * half_ramp > half_width {
-        return -1.0;
-    }
+    let level = ((((level * 7) % WORDS) as f32 + 0.5) * (1.0 / WORDS as f32)) * peak;
     (half_width + half_ramp) - level * (2.0 * half_ramp)
 }
 
@@ -163,7 +163,8 @@ pub fn cover(pen: &Pen, direction: &Direction, ends: [[f32; 2]; 2]) -> Option<(f
         strip(pen, direction, across, [past_start, past_end], true, &mut mask);
         return Some((area, mask));
     }
-    if beyond < direction.box_along {
+    // An edge that is a point has no sides, only the disc around it.
+    if direction.along != [0.0; 2] && beyond < direction.box_along {
         strip(pen, direction, across, [past_start, past_end], false, &mut mask);
     }
     if reaches[0] {
@@ -173,7 +174,7 @@ pub fn cover(pen: &Pen, direction: &Direction, ends: [[f32; 2]; 2]) -> Option<(f
         disc(pen, end, &mut mask);
     }
     let count = count(&mask);
-    (count > 0).then_some((count as f32 * (1.0 / POINTS as f32), mask))
+    (count > 0).then_some((count as f32 * (pen.peak * (1.0 / POINTS as f32)), mask))
 }
 
 /// Points of a mask.
@@ -193,8 +194,7 @@ fn strip(pen: &Pen, direction: &Direction, across: f32, past: [f32; 2], is_endle
     } else {
         for l in 0..WORDS {
             let r = pen.radius[l];
-            // An interval that has nothing in it, where the line is not as dense.
-            (low[l], high[l]) = if r < 0.0 { (1, 0) } else { (units(-r - across), units(r - across)) };
+            (low[l], high[l]) = (units(-r - across), units(r - across));
         }
     }
     let mut outside = [0; WORDS];
@@ -241,7 +241,7 @@ fn disc(pen: &Pen, end: [f32; 2], mask: &mut Mask) {
     let mut limits = [limit(pen.half_width); WORDS];
     if pen.half_ramp > 0.0 {
         for l in 0..WORDS {
-            limits[l] = if pen.radius[l] < 0.0 { -LIMIT as i16 } else { limit(pen.radius[l]) };
+            limits[l] = limit(pen.radius[l]);
         }
     }
     let (x, y) = (round_to_i32(-end[0] * pen.square_unit) as i16, round_to_i32(-end[1] * pen.square_unit) as i16);

@@ -67,6 +67,9 @@ pub struct Batch {
     pub line_exponent: u32,
     pub line_windows: f32,
     pub line_slices: u32,
+    pub line_peak: f32,
+    pub line_turns: u32,
+    pub line_turn: u32,
     pub ink_at: u32,
     pub owners_at: u32,
     pub role: u32,
@@ -244,7 +247,7 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_shader() {
         assert_eq!(size_of::<Frame>(), 320);
-        assert_eq!(size_of::<Batch>(), 92);
+        assert_eq!(size_of::<Batch>(), 104);
     }
 
     #[test]

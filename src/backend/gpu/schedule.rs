@@ -192,6 +192,7 @@ impl Schedule {
                 line_exponent: lines.square_exponent(),
                 line_windows: 1.0 / lines.window_px(),
                 line_slices: slices(lines, device),
+                line_peak: lines.peak(),
                 line_width: lines.width_px,
                 line_smoothing: lines.smoothing_px,
                 line_flags: line_flags(lines, has_visibility(plan), plan.lights_lines()),
@@ -203,15 +204,23 @@ impl Schedule {
             for first in (0..edges).step_by(EDGE_CHUNK as usize) {
                 let count = EDGE_CHUNK.min(edges - first);
                 let batch = Batch { first: edges_first.saturating_add(first), count, ..lined };
-                for (flag, edges_per_group) in edges_per_group(plan, lines, device) {
-                    let batch = Batch { line_flags: batch.line_flags | flag, edges_per_group, ..batch };
-                    self.dispatch_groups(device, Stage::Lines, count.div_ceil(edges_per_group), batch)?;
+                for (flag, edges_per_group, turns) in edges_per_group(plan, lines, device) {
+                    for line_turn in 0..turns {
+                        let line_flags = batch.line_flags | flag;
+                        let batch = Batch { line_flags, edges_per_group, line_turns: turns, line_turn, ..batch };
+                        self.dispatch_groups(device, Stage::Lines, count.div_ceil(edges_per_group), batch)?;
+                    }
                 }
                 if edges > EDGE_CHUNK {
                     self.steps.push(Step::Submit);
                 }
             }
-            self.dispatch(device, Stage::Ink, count, Batch { ink_at: lined.ink_at, ..pixels })?;
+            self.dispatch(
+                device,
+                Stage::Ink,
+                count,
+                Batch { ink_at: lined.ink_at, line_peak: lined.line_peak, ..pixels },
+            )?;
         }
         if plan.lights_lines() {
             self.dispatch(device, Stage::LineLight, count, pixels)?;

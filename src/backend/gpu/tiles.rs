@@ -69,13 +69,14 @@ pub fn slices(lines: &LinePass, device: &DeviceTraits) -> u32 {
 /// Edges that keep all of a GPU busy.
 const BUSY_EDGES: usize = 1 << 15;
 
-/// How often the kernel that draws lines is run over its edges: with which flag, and with how many edges a workgroup.
+/// How the kernel that draws lines is run over its edges: with which flag, how many edges a workgroup, and in how many turns,
+/// each of which draws its part of the shares.
 ///
 /// Where a thread's loops are limited, edges that a workgroup shares come by themselves, few at a time.
-pub fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> Vec<(u32, u32)> {
+pub fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> Vec<(u32, u32, u32)> {
     if !device.loops_are_limited {
         let edges = (lines.edges.len() as u32).div_ceil(BUSY_GROUPS).clamp(1, WORKGROUP);
-        return vec![(0, edges)];
+        return vec![(0, edges, 1)];
     }
     let (reach, window, slices) = (lines.reach_px(), lines.window_px(), slices(lines, device) as f32);
     let side = plan.width_px.max(plan.height_px) as f32;
@@ -86,7 +87,8 @@ pub fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTra
     let draw = (window + 2.0 * reach) / slices * (2.0 + 10.0 * (2.0 * reach + 1.0));
     let iterations = shares * (LOOKS * look + LOOKS / 4.0 * draw);
     let shared = (ITERATIONS_MAX as f32 / iterations).clamp(1.0, WORKGROUP as f32) as u32;
-    vec![(SHORT_ONLY, WORKGROUP), (LONG_ONLY, shared)]
+    let turns = (iterations / ITERATIONS_MAX as f32).ceil().clamp(1.0, shares) as u32;
+    vec![(SHORT_ONLY, WORKGROUP, 1), (LONG_ONLY, shared, turns)]
 }
 
 /// Workgroups that keep all of a GPU busy.
