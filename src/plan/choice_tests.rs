@@ -9,7 +9,7 @@ fn spec(keys: &[(&str, &str)]) -> Spec {
 }
 
 /// Exact lines err little and are slow where there are many; one sample is cheaper and worse.
-const TABLE: &str = r#"{ "gpu_is_software": GPU, "rows": [
+const TABLE: &str = r#"{ "gpu_is_software": GPU, "size_px": 512, "rows": [
     {"technique":"face","backend":"cpu","samples":1,"error":5,"ms_per_megapixel":10,"ms_per_kilotriangle":0},
     {"technique":"face","backend":"cpu","samples":4,"error":2,"ms_per_megapixel":20,"ms_per_kilotriangle":0},
     {"technique":"exact","backend":"cpu","samples":1,"error":1.5,"ms_per_megapixel":10,"ms_per_kilotriangle":1},

@@ -10,6 +10,8 @@ use serde::Deserialize;
 pub struct ErrorTable {
     /// Whether the GPU that was measured is software. It is then no stand-in for one that `auto` would draw on.
     pub gpu_is_software: bool,
+    /// Columns and rows of the pictures that were measured.
+    size_px: f64,
     rows: Vec<Row>,
 }
 
@@ -20,7 +22,7 @@ pub struct Row {
     backend: String,
     samples: u32,
     /// The largest RMSE of its scenes, /255.
-    pub error: f64,
+    error: f64,
     ms_per_megapixel: f64,
     ms_per_kilotriangle: f64,
 }
@@ -40,6 +42,17 @@ impl ErrorTable {
             self.rows.iter().find(is_it)
         };
         find(backend).or_else(|| find("cpu"))
+    }
+
+    /// How far a picture of so many pixels is expected to be from the truth, RMSE in /255.
+    ///
+    /// Errors of filled pictures are at the edges of what is seen: those grow with a picture's side and its area with the square of
+    /// it, so the mean square goes with 1 / side. Larger pictures than were measured are promised no less error, since finer
+    /// meshes go with them. Errors of lines are means over their own pixels.
+    pub fn error(&self, row: &Row, pixels: f64) -> f64 {
+        let is_filled = matches!(row.technique.as_str(), "face" | "derivative");
+        let edges = (self.size_px / pixels.sqrt()).max(1.0);
+        if is_filled { (row.error * edges.sqrt()).min(255.0) } else { row.error }
     }
 
     /// Whether a GPU was measured that is one.
@@ -69,7 +82,9 @@ mod tests {
             for backend in ["cpu", "gpu"] {
                 for samples in [1, 4] {
                     let row = table.row(technique, backend, samples).unwrap();
-                    assert!(row.error > 0.0 && row.error <= 255.0, "{row:?}");
+                    let [thumbnail, measured, large] = [64.0, 512.0, 2048.0].map(|s: f64| table.error(row, s * s));
+                    assert!(measured > 0.0 && measured <= thumbnail && thumbnail <= 255.0, "{row:?}");
+                    assert_eq!(measured, large);
                     assert!(row.ms_per_megapixel >= 0.0 && row.ms_per_kilotriangle >= 0.0, "{row:?}");
                     assert!(row.time_ms(1e6, 1e3) > 0.0, "{row:?}");
                     found += 1;

@@ -23,9 +23,9 @@ fn an_answer_says_what_was_chosen_and_what_error_to_expect() {
     let (loose_error, chosen) = said(&loose);
     assert_eq!(chosen, "image.samples=1, wire.method=exact, backend=cpu");
     assert_eq!(loose.body, draw("style=wireframe&samples=1&backend=cpu"));
-    let flat = post("image.max_error=3&backend=cpu");
+    let flat = post("image.max_error=9&backend=cpu");
     let (flat_error, chosen) = said(&flat);
-    assert!(flat_error > 0.0 && flat_error <= 3.0 && loose_error > 0.0, "{flat_error} {loose_error}");
+    assert!(flat_error > 0.0 && flat_error <= 9.0 && loose_error > 0.0, "{flat_error} {loose_error}");
     assert_eq!(chosen, "image.samples=4, backend=cpu");
     assert_eq!(flat.body, draw("samples=4&backend=cpu"));
 
@@ -63,10 +63,10 @@ fn a_job_reports_its_choice_and_what_could_not_be_met() {
         assert_eq!(done["state"], "done", "{done:#}");
         (done["result"].clone(), server.get(&format!("{location}/result")))
     };
-    let (met, result) = report("style=wire&max_error=20");
+    let (met, result) = report("style=wire&max_error=30");
     assert_eq!((&met["chosen"]["samples"], &met["chosen"]["wire_methods"]), (&1.into(), &serde_json::json!(["exact"])));
     let expected = met["chosen"]["expected_error"].as_f64().unwrap();
-    assert!(expected > 0.0 && expected <= 20.0 && met["chosen"]["expected_time_ms"].as_f64().unwrap() > 0.0);
+    assert!(expected > 0.0 && expected <= 30.0 && met["chosen"]["expected_time_ms"].as_f64().unwrap() > 0.0);
     assert_eq!(said(&result).0, expected);
     assert_eq!(met["warnings"].as_array().unwrap().len(), 0, "{met:#}");
 

@@ -48,6 +48,7 @@ pub fn table(document: &Value) -> String {
     let parts = [
         ("about", json!(about())),
         ("machine", document["machine"].clone()),
+        ("size_px", document["size_px"].clone()),
         ("gpu_is_software", json!(gpu.is_some_and(|gpu| gpu.contains("(software,")))),
     ];
     for (name, value) in parts {
