@@ -15,7 +15,11 @@ fn is_drawn(edge: vec4<u32>) -> bool {
     if !is_contour {
         return true;
     }
-    // The faces lie on one side of the edge on screen, and none on the other.
+    // The faces lie on one side of the edge on screen, and none on the other; or there is only one, even if that is seen from
+    // its very edge.
+    if edge.w == NO_FACE {
+        return true;
+    }
     let a = side_of(edge, edge.z);
     let b = side_of(edge, edge.w);
     return (a < 0 || b < 0) != (a > 0 || b > 0);

@@ -20,8 +20,11 @@ const SLACK_PX: f32 = 0.05;
 // Shares of an edge that a thread draws by itself.
 const SHORT: u32 = 2u;
 
+// Long edges: which, and where the shares of each begin among those of all.
 var<workgroup> long_edges: array<u32, 64>;
+var<workgroup> long_starts: array<u32, 64>;
 var<workgroup> long_count: atomic<u32>;
+var<workgroup> long_shares: atomic<u32>;
 
 @compute @workgroup_size(64)
 fn lines(
@@ -31,10 +34,11 @@ fn lines(
 ) {
     if thread == 0u {
         atomicStore(&long_count, 0u);
+        atomicStore(&long_shares, 0u);
     }
     workgroupBarrier();
     let i = (workgroup.x + workgroup.y * groups.x) * batch.edges_per_group + thread;
-    var index = batch.first + i;
+    let index = batch.first + i;
     var shares = 0u;
     if thread < batch.edges_per_group && i < batch.count {
         let s = segment_of(edges[index]);
@@ -43,7 +47,9 @@ fn lines(
             shares = window_count(s) * batch.line_slices;
             if shares > SHORT {
                 if (batch.line_flags & SHORT_ONLY) == 0u {
-                    long_edges[atomicAdd(&long_count, 1u)] = index;
+                    let slot = atomicAdd(&long_count, 1u);
+                    long_edges[slot] = index;
+                    long_starts[slot] = atomicAdd(&long_shares, shares);
                 }
                 shares = 0u;
             } else if (batch.line_flags & LONG_ONLY) != 0u {
@@ -52,20 +58,29 @@ fn lines(
         }
     }
     workgroupBarrier();
-    // The thread's own edge, then the long ones.
+    // The thread's own edge, then every 64th share of the long ones.
     let count = atomicLoad(&long_count);
+    let all = atomicLoad(&long_shares);
     var share = 0u;
-    var step = 1u;
-    for (var n = 0u; n <= count; n++) {
-        for (; share < shares; share += step) {
-            draw_share(edges[index], share);
+    var next = thread;
+    while share < shares || next < all {
+        var edge = index;
+        var number = share;
+        if share < shares {
+            share++;
+        } else {
+            // The edge whose start is the last before the share.
+            var start = 0u;
+            for (var slot = 0u; slot < count; slot++) {
+                if long_starts[slot] <= next && long_starts[slot] >= start {
+                    start = long_starts[slot];
+                    edge = long_edges[slot];
+                }
+            }
+            number = next - start;
+            next += 64u;
         }
-        if n < count {
-            index = long_edges[n];
-            shares = window_count(segment_of(edges[index])) * batch.line_slices;
-            share = thread;
-            step = 64u;
-        }
+        draw_share(edges[edge], number);
     }
 }
 

@@ -46,6 +46,10 @@ impl Stages<'_> {
     /// Whether the edge's faces lie on one side of it on screen, and none on the other: there the surface ends, or turns back
     /// under itself. It does not matter which way the faces are wound.
     fn is_silhouette(&self, edge: &Edge) -> bool {
+        // Where there is only one face the surface ends, even if that is seen from its very edge.
+        if edge.faces[1] == Edge::NO_FACE {
+            return true;
+        }
         let [a, b] = edge.faces.map(|face| self.side_of(edge, face));
         (a < 0 || b < 0) != (a > 0 || b > 0)
     }

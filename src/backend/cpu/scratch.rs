@@ -145,6 +145,7 @@ mod tests {
         let mut bytes = 0;
         pool.with(plan, rows, |scratch| {
             scratch.colors.resize(pixels, [0.0; 4]);
+            scratch.ink.resize(pixels, Ink::default());
             scratch.coverage.resize(pixels * plan.lines.len(), 0.0);
             bytes = scratch.bytes();
         });
@@ -154,7 +155,7 @@ mod tests {
 
     #[test]
     fn a_band_and_all_its_ink_fit_the_cache() {
-        for (passes, rows) in [(0, 10), (12, 5), (500, 1)] {
+        for (passes, rows) in [(0, 10), (12, 3), (500, 1)] {
             assert_eq!(rows_per_band(&plan([1000, 900], passes)), rows, "{passes} passes");
         }
     }

@@ -191,7 +191,7 @@ impl Schedule {
             let lined = Batch {
                 line_exponent: lines.square_exponent(),
                 line_windows: 1.0 / lines.window_px(),
-                line_slices: slices(lines),
+                line_slices: slices(lines, device),
                 line_width: lines.width_px,
                 line_smoothing: lines.smoothing_px,
                 line_flags: line_flags(lines, has_visibility(plan), plan.lights_lines()),

@@ -58,19 +58,26 @@ impl Tiles {
 }
 
 /// Threads that share a window of an edge, where the line is so wide that it has many pixels.
-pub fn slices(lines: &LinePass) -> u32 {
+pub fn slices(lines: &LinePass, device: &DeviceTraits) -> u32 {
     let side = lines.window_px() + 2.0 * lines.reach_px();
-    (side * 2.0 * lines.reach_px() / 400.0).ceil().clamp(1.0, 64.0) as u32
+    // Few edges leave most of a GPU idle, so threads may look along them twice; a processor has nothing to spare.
+    let is_idle = !device.loops_are_limited && lines.edges.len() < BUSY_EDGES;
+    let pixels = if is_idle { 64.0 } else { 400.0 };
+    (side * 2.0 * lines.reach_px() / pixels).ceil().clamp(1.0, 64.0) as u32
 }
+
+/// Edges that keep all of a GPU busy.
+const BUSY_EDGES: usize = 1 << 15;
 
 /// How often the kernel that draws lines is run over its edges: with which flag, and with how many edges a workgroup.
 ///
 /// Where a thread's loops are limited, edges that a workgroup shares come by themselves, few at a time.
 pub fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> Vec<(u32, u32)> {
     if !device.loops_are_limited {
-        return vec![(0, WORKGROUP)];
+        let edges = (lines.edges.len() as u32).div_ceil(BUSY_GROUPS).clamp(1, WORKGROUP);
+        return vec![(0, edges)];
     }
-    let (reach, window, slices) = (lines.reach_px(), lines.window_px(), slices(lines) as f32);
+    let (reach, window, slices) = (lines.reach_px(), lines.window_px(), slices(lines, device) as f32);
     let side = plan.width_px.max(plan.height_px) as f32;
     let shares = ((1.5 * side / window + 2.0) * slices / WORKGROUP as f32).ceil();
     let length = window + 2.0 * (reach + 1.0);
@@ -81,6 +88,9 @@ pub fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTra
     let shared = (ITERATIONS_MAX as f32 / iterations).clamp(1.0, WORKGROUP as f32) as u32;
     vec![(SHORT_ONLY, WORKGROUP), (LONG_ONLY, shared)]
 }
+
+/// Workgroups that keep all of a GPU busy.
+const BUSY_GROUPS: u32 = 1024;
 
 /// Looks along an edge in a window that are made room for: a few for each part, and between letters or leaves there are many.
 const LOOKS: f32 = 16.0;
