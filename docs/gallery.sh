@@ -18,7 +18,7 @@ looks=(
   wireframe wireframe-fwidth boundary topology
   outline-hull outline contour materials
   debug-barycentric debug-min-barycentric debug-edge-distance debug-normal
-  debug-uv debug-face-orientation debug-vertex-color
+  debug-uv debug-face-orientation debug-vertex-color max-error
 )
 for request in api/examples/*.json; do
   name=$(basename "$request" .json)

@@ -57,6 +57,9 @@ impl Default for Limits {
 /// The largest picture side that the rasterizers' fixed point can address; no setting goes beyond it.
 pub const IMAGE_PX_MAX: u64 = 4096;
 
+/// The longest time that a job can be given, milliseconds: a day, so that no sum of times overflows.
+pub const JOB_MS_MAX: u64 = 24 * 3600 * 1000;
+
 /// A cap that the input ran into.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what} is {given}, and the limit is {limit} (raise it with {flag})")]

@@ -11,8 +11,8 @@ use crate::encode::{self, EncodeError};
 use crate::image::ImageFormat;
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::{self, Bundle, Format, Mesh, MeshError, Warning};
-pub use crate::plan::PlanError;
 use crate::plan::{self, Skip};
+pub use crate::plan::{Choice, PlanError};
 use crate::scene::Spec;
 
 /// What comes in.
@@ -39,6 +39,8 @@ pub struct Output {
     pub skips: Vec<Skip>,
     /// What the importer noticed, and what of the request does not go with the mesh.
     pub warnings: Vec<Warning>,
+    /// What was chosen for a request that asks for an error or a time; None for others.
+    pub choice: Option<Choice>,
 }
 
 /// The stages whose durations a response reports. Each is announced when it ends.
@@ -89,14 +91,17 @@ pub fn render(
 
     let mut warnings = std::mem::take(&mut mesh.report.warnings);
     warnings.extend(unknown_materials(&mesh, job.spec));
-    let plan = plan::build(&mesh, job.spec, &mut budget, deadline)?;
+    let mut chosen = plan::choose(job.spec, mesh.triangles.len());
+    warnings.extend(chosen.iter_mut().flat_map(|chosen| std::mem::take(&mut chosen.warnings)));
+    let spec = chosen.as_ref().map_or(job.spec, |chosen| &chosen.spec);
+    let plan = plan::build(&mesh, spec, &mut budget, deadline)?;
     if plan::is_out_of_view(&plan) {
         let detail = "the camera looks past the whole mesh, and the picture is blank".to_owned();
         warnings.push(Warning { code: "mesh_out_of_view", detail });
     }
     ended(Stage::Plan);
 
-    let drawn = backends.draw(job.spec.backend, &plan, deadline)?;
+    let drawn = backends.draw(spec.backend, &plan, deadline)?;
     ended(Stage::Render);
 
     let format = job.spec.image.format.unwrap_or(ImageFormat::Png);
@@ -104,7 +109,8 @@ pub fn render(
     ended(Stage::Encode);
 
     let skips = plan.skips;
-    Ok(Output { bytes, format, backend: drawn.backend, skips, warnings })
+    let choice = chosen.map(|chosen| chosen.choice);
+    Ok(Output { bytes, format, backend: drawn.backend, skips, warnings, choice })
 }
 
 /// A look for a material that the mesh does not have is most likely a misspelt name.

@@ -1,7 +1,7 @@
 //! The table of settings: a line for each, with what it allows and where it goes.
 
 use super::Config;
-use crate::limits::{BackendChoice, IMAGE_PX_MAX};
+use crate::limits::{BackendChoice, IMAGE_PX_MAX, JOB_MS_MAX};
 
 /// A setting's place in the configuration, and how its text is read and written.
 #[derive(Clone, Copy)]
@@ -26,8 +26,8 @@ pub struct Setting {
     pub has_flag: bool,
 }
 
-/// Longest time that can be set: a day, so that no sum of times overflows.
-const MS_MAX: u64 = 24 * 3600 * 1000;
+/// Longest time that can be set.
+const MS_MAX: u64 = JOB_MS_MAX;
 
 /// The largest side of a JPEG.
 const TEXTURE_PX_MAX: u64 = 65_535;

@@ -12,6 +12,7 @@ use crate::jobs::{Job, Load, State, Timings};
 use crate::limits::BackendChoice;
 use crate::limits::Limits;
 use crate::mesh::Format;
+use crate::pipeline::Choice;
 use crate::request::{self, Style, word_for, words_of};
 
 /// RFC 9457.
@@ -63,6 +64,28 @@ pub struct ResultDto {
     backend: &'static str,
     timings_ms: TimingsDto,
     warnings: Vec<WarningDto>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    chosen: Option<ChoiceDto>,
+}
+
+/// What was chosen for a request that asks for an error or a time. The back-end stands in the result itself.
+#[derive(Serialize)]
+pub struct ChoiceDto {
+    samples: u32,
+    wire_methods: Vec<&'static str>,
+    expected_error: f64,
+    expected_time_ms: f64,
+}
+
+impl ChoiceDto {
+    fn new(choice: &Choice) -> Self {
+        Self {
+            samples: choice.samples,
+            wire_methods: choice.wire_methods.clone(),
+            expected_error: choice.expected_error,
+            expected_time_ms: choice.expected_time_ms,
+        }
+    }
 }
 
 /// Why a job failed.
@@ -106,6 +129,7 @@ impl JobDto {
                     backend: finished.backend.name(),
                     timings_ms: TimingsDto::new(&finished.timings),
                     warnings: warnings.map(|w| WarningDto { code: w.code, detail: w.detail.clone() }).collect(),
+                    chosen: finished.choice.as_ref().map(ChoiceDto::new),
                 };
                 (Some(result), None)
             }

@@ -63,7 +63,15 @@ pub fn picture(finished: &Finished) -> Response {
         (HeaderName::from_static("x-render-backend"), HeaderValue::from_static(finished.backend.name())),
         (HeaderName::from_static("server-timing"), text(&timings.join(", "))),
     ];
-    (StatusCode::OK, headers, finished.picture.clone()).into_response()
+    let chosen = finished.choice.as_ref().map(|choice| {
+        [
+            (HeaderName::from_static("x-expected-error"), text(&choice.expected_error.to_string())),
+            (HeaderName::from_static("x-chosen"), text(&choice.to_string())),
+        ]
+    });
+    let mut response = (StatusCode::OK, headers, finished.picture.clone()).into_response();
+    response.headers_mut().extend(chosen.into_iter().flatten());
+    response
 }
 
 /// 128 bits of a body: equal bodies have equal tags, and the other way round but for chance.

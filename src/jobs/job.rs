@@ -13,7 +13,7 @@ use crate::backend::BackendKind;
 use crate::image::ImageFormat;
 use crate::limits::Deadline;
 use crate::mesh::{Bundle, Format, Warning};
-use crate::pipeline::{Output, RenderError, Stage};
+use crate::pipeline::{Choice, Output, RenderError, Stage};
 use crate::scene::Spec;
 
 /// Names a job; ids made later sort later.
@@ -76,6 +76,8 @@ pub struct Finished {
     pub backend: BackendKind,
     /// What the importer noticed.
     pub warnings: Vec<Warning>,
+    /// What was chosen for a request that asks for an error or a time.
+    pub choice: Option<Choice>,
     /// How long each part took.
     pub timings: Timings,
 }
@@ -83,8 +85,8 @@ pub struct Finished {
 impl Finished {
     /// From what the pipeline gave.
     pub fn new(output: Output, timings: Timings) -> Self {
-        let Output { bytes, format, backend, warnings, .. } = output;
-        Self { picture: bytes.into(), format, backend, warnings, timings }
+        let Output { bytes, format, backend, warnings, choice, .. } = output;
+        Self { picture: bytes.into(), format, backend, warnings, choice, timings }
     }
 }
 

@@ -58,12 +58,13 @@ fn spec() -> Spec {
         light,
         image,
         backend: BackendChoice::Cpu,
+        ask: None,
     }
 }
 
 fn output(bytes: usize) -> Output {
     let (skips, warnings) = (Vec::new(), Vec::new());
-    Output { bytes: vec![7; bytes], format: ImageFormat::Png, backend: BackendKind::Cpu, skips, warnings }
+    Output { bytes: vec![7; bytes], format: ImageFormat::Png, backend: BackendKind::Cpu, skips, warnings, choice: None }
 }
 
 /// What the mesh bytes make the fake renderer do.

@@ -4,7 +4,9 @@
 //! each omission is written down in [`DrawPlan::skips`].
 
 mod build;
+mod choice;
 mod error;
+mod error_table;
 mod hull;
 mod lights;
 mod lines;
@@ -24,6 +26,7 @@ mod view;
 mod wires;
 
 pub use build::{build, build_keeping};
+pub use choice::{Choice, Chosen, choose};
 pub use error::PlanError;
 pub use hull::{HullOffset, HullPass};
 pub use lines::{Edge, LinePass, Shown};

@@ -6,7 +6,8 @@ use super::words::{Style, Words, word_for};
 use crate::limits::BackendChoice;
 use crate::scene::color::Rgba;
 use crate::scene::{
-    CameraSpec, ImageSpec, Layers, Light, LightPreset, OutlineMethod, Projection, Spec, Topology, View, WireMethod,
+    Ask, CameraSpec, ImageSpec, Layers, Light, LightPreset, Open, OutlineMethod, Projection, Spec, Topology, View,
+    WireMethod,
 };
 
 /// Different exact wires and contours in one picture.
@@ -29,6 +30,12 @@ pub struct Draft {
     pub image: ImageSpec,
     /// See [`Spec::backend`].
     pub backend: BackendChoice,
+    /// See [`Ask::max_error`].
+    pub max_error: Option<f64>,
+    /// See [`Ask::max_time_ms`].
+    pub max_time_ms: Option<f64>,
+    /// What nobody has settled yet; but for the wires.
+    pub open: Open,
 }
 
 impl Draft {
@@ -42,6 +49,10 @@ impl Draft {
             ambient: None,
             image: IMAGE,
             backend,
+            max_error: None,
+            max_time_ms: None,
+            // Whoever runs a server with one back-end has a reason.
+            open: Open { samples: true, backend: backend == BackendChoice::Auto, ..Open::default() },
         }
     }
 
@@ -57,7 +68,12 @@ impl Draft {
 
     /// Settles what depends on several keys. Each material has a name.
     pub fn finish(self, materials: Vec<(String, Look)>) -> Result<Spec, RequestError> {
-        let Self { look, topology, camera, mut light, ambient, image, backend } = self;
+        let Self { look, topology, camera, mut light, ambient, image, backend, max_error, max_time_ms, mut open } =
+            self;
+        open.wire = look.has_open_wire();
+        open.material_wires = materials.iter().map(|(_, look)| look.has_open_wire()).collect();
+        let is_asked = max_error.is_some() || max_time_ms.is_some();
+        let ask = is_asked.then_some(Ask { max_error, max_time_ms, open });
         let layers = look.finish("")?;
         let materials = materials.into_iter().map(|(name, look)| {
             let layers = look.finish(&format!("materials.{name}."))?;
@@ -68,7 +84,7 @@ impl Draft {
         check_camera(&camera)?;
         let has_lamps = light.preset != LightPreset::None;
         light.ambient = ambient.unwrap_or(if has_lamps { 0.3 } else { 1.0 });
-        Ok(Spec { layers, materials, topology, camera, light, image, backend })
+        Ok(Spec { layers, materials, topology, camera, light, image, backend, ask })
     }
 }
 

@@ -22,8 +22,6 @@ pub struct RequestError {
 pub enum RequestFault {
     /// No such key.
     UnknownKey,
-    /// The key or the value has a meaning, but not in this version.
-    NotYet,
     /// Right type, wrong value.
     OutOfRange,
     /// A string for a number, an object for a colour ...
@@ -39,7 +37,6 @@ impl RequestFault {
     pub fn code(self) -> &'static str {
         match self {
             Self::UnknownKey => "unknown_key",
-            Self::NotYet => "not_supported_yet",
             Self::OutOfRange => "out_of_range",
             Self::WrongType => "wrong_type",
             Self::NotJson => "not_json",
@@ -61,7 +58,6 @@ impl fmt::Display for RequestError {
         let Self { key, given, allowed, .. } = self;
         match self.fault {
             RequestFault::UnknownKey => write!(f, "there is no key `{key}` (given {given}); {allowed}"),
-            RequestFault::NotYet => write!(f, "`{key}` is {given}, which this version does not draw yet; {allowed}"),
             RequestFault::OutOfRange | RequestFault::WrongType => {
                 write!(f, "`{key}` is {given}, and allowed is {allowed}")
             }

@@ -29,6 +29,8 @@ struct WireDraft {
     wire: Wire,
     /// None: 0 for exact lines, 1 for the others.
     smoothing: Option<f32>,
+    /// Whether the request names the method.
+    has_method: bool,
 }
 
 impl Look {
@@ -66,6 +68,17 @@ impl Look {
         self.wire_draft().smoothing = Some(smoothing);
     }
 
+    /// The wire's method, which is then no longer open.
+    pub fn set_method(&mut self, method: WireMethod) {
+        let draft = self.wire_draft();
+        (draft.wire.method, draft.has_method) = (method, true);
+    }
+
+    /// Whether there is a wire, and nobody said how it is drawn.
+    pub fn has_open_wire(&self) -> bool {
+        self.wire.is_some_and(|draft| !draft.has_method && draft.smoothing.is_none())
+    }
+
     /// The outline layer, turned on by being spoken of.
     pub fn outline(&mut self) -> &mut Outline {
         self.outline.get_or_insert(OUTLINE)
@@ -91,7 +104,7 @@ impl Look {
         let too_thick = |key: &str, given: f32, allowed: String| {
             Err(RequestError::new(RequestFault::OutOfRange, &format!("{prefix}{key}"), given, allowed))
         };
-        let wire = self.wire.map(|WireDraft { wire, smoothing }| {
+        let wire = self.wire.map(|WireDraft { wire, smoothing, .. }| {
             let default = if wire.method == WireMethod::Exact { 0.0 } else { 1.0 };
             Wire { smoothing: smoothing.unwrap_or(default), ..wire }
         });
@@ -112,7 +125,8 @@ impl Look {
     }
 
     fn wire_draft(&mut self) -> &mut WireDraft {
-        self.wire.get_or_insert(WireDraft { wire: Wire { hidden: self.hidden, ..WIRE }, smoothing: None })
+        let wire = Wire { hidden: self.hidden, ..WIRE };
+        self.wire.get_or_insert(WireDraft { wire, smoothing: None, has_method: false })
     }
 }
 

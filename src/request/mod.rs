@@ -38,7 +38,7 @@ use draft::Draft;
 use fields::{Layer, Target};
 use item::Item;
 use look::Look;
-use table::{FIELDS, GROUPS, LATER, LAYERS, MATERIALS, SHORT};
+use table::{FIELDS, GROUPS, LAYERS, MATERIALS, SHORT};
 use value::{Given, Kind, Value};
 
 /// The style of a request that names none.
@@ -195,9 +195,6 @@ fn apply(target: &mut Target<'_>, item: &Item, rules: &Rules) -> Result<(), Requ
 }
 
 fn unknown(key: &str, given: &Given) -> RequestError {
-    if LATER.contains(&key) {
-        return RequestError::new(RequestFault::NotYet, key, given.show(), "leave it out");
-    }
     RequestError::new(RequestFault::UnknownKey, key, given.show(), suggest::allowed(key, &keys()))
 }
 

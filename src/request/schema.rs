@@ -136,6 +136,7 @@ fn of_kind(kind: &Kind, image_px: u64) -> Json {
     };
     match kind {
         Kind::Number { min, max } => json!({ "type": "number", "minimum": min, "maximum": max }),
+        Kind::Above0 { max } => json!({ "type": "number", "exclusiveMinimum": 0, "maximum": max }),
         Kind::OneOf(values) => json!({ "enum": values }),
         Kind::Pixels => whole(),
         Kind::Size => {

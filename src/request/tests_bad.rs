@@ -6,7 +6,7 @@ use super::*;
 /// Each bad request, its fault, the key that the error must name, and a part of what it must say.
 #[test]
 fn every_bad_value_is_refused_by_name() {
-    use RequestFault::{Conflict, NotYet, OutOfRange, UnknownKey, WrongType};
+    use RequestFault::{Conflict, OutOfRange, UnknownKey, WrongType};
     type Case = (&'static [(&'static str, &'static str)], RequestFault, &'static str, &'static str);
     let cases: &[Case] = &[
         (&[("wire.colour", "#f00")], UnknownKey, "wire.colour", "wire.color"),
@@ -43,8 +43,13 @@ fn every_bad_value_is_refused_by_name() {
             "camera.from_file",
             "camera.eye",
         ),
-        (&[("max_error", "1")], NotYet, "max_error", "leave it out"),
-        (&[("image.max_time_ms", "1")], NotYet, "image.max_time_ms", "leave it out"),
+        (&[("max_error", "0")], OutOfRange, "max_error", "above 0, at most 255"),
+        (&[("max_error", "NaN")], OutOfRange, "max_error", "or null"),
+        (&[("image.max_error", "255.1")], OutOfRange, "image.max_error", "at most 255"),
+        (&[("image.max_error", "low")], WrongType, "image.max_error", "a number"),
+        (&[("image.max_time_ms", "-1")], OutOfRange, "image.max_time_ms", "above 0, at most 86400000"),
+        (&[("image.max_time_ms", "inf")], OutOfRange, "image.max_time_ms", "86400000"),
+        (&[("max_time_ms", "1")], UnknownKey, "max_time_ms", "image.max_time_ms"),
         (&[("size", "0")], OutOfRange, "size", "from 1 to 4096"),
         (&[("size", "1e9")], OutOfRange, "size", "from 1 to 4096"),
         (&[("size", "4097")], OutOfRange, "size", "from 1 to 4096"),
@@ -91,7 +96,7 @@ fn every_bad_value_is_refused_by_name() {
         let sentence = error.to_string();
         assert!(sentence.contains(part) && sentence.contains(&format!("`{key}`")), "{pairs:?}: {sentence}");
     }
-    assert_eq!(cases.len(), 70);
+    assert_eq!(cases.len(), 75);
 }
 
 #[test]

@@ -92,6 +92,11 @@ pub enum Kind {
         /// Largest.
         max: f64,
     },
+    /// A finite number above 0.
+    Above0 {
+        /// Largest.
+        max: f64,
+    },
     /// One of a few whole numbers.
     OneOf(&'static [u32]),
     /// A width or height: 1 to the limit in pixels.
@@ -139,6 +144,7 @@ impl Kind {
     pub fn allowed(&self, image_px_max: u64) -> String {
         match self {
             Self::Number { min, max } => format!("a number from {} to {}", short(*min), short(*max)),
+            Self::Above0 { max } => format!("a number above 0, at most {}", short(*max)),
             Self::OneOf(values) => values.iter().map(u32::to_string).collect::<Vec<_>>().join(" or "),
             Self::Pixels => format!("a whole number from 1 to {image_px_max}"),
             Self::Size => format!("N or WxH, with whole numbers from 1 to {image_px_max}"),
@@ -162,6 +168,10 @@ impl Kind {
                 let number = given.number().ok_or_else(wrong_type)?;
                 // NaN and the infinities fail this comparison too.
                 if (*min..=*max).contains(&number) { Ok(Value::Number(number)) } else { Err(out_of_range()) }
+            }
+            Self::Above0 { max } => {
+                let number = given.number().ok_or_else(wrong_type)?;
+                if number > 0.0 && number <= *max { Ok(Value::Number(number)) } else { Err(out_of_range()) }
             }
             Self::OneOf(values) => {
                 let number = given.number().ok_or_else(wrong_type)?;

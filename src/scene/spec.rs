@@ -1,5 +1,6 @@
 //! The request document, understood: presets applied, defaults filled in, every value in range. Units are in the names.
 
+use super::ask::Ask;
 use super::color::Rgba;
 use super::layers::{Layers, Topology};
 pub use crate::image::ImageFormat;
@@ -24,6 +25,8 @@ pub struct Spec {
     pub image: ImageSpec,
     /// Which back-end draws.
     pub backend: BackendChoice,
+    /// An error or a time that is asked for in place of what `Ask::open` names; None: nothing is chosen.
+    pub ask: Option<Ask>,
 }
 
 /// Named directions to look from.

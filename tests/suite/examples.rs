@@ -16,7 +16,7 @@ use crate::server::{Server, meshsnap};
 use crate::{scenes, twins};
 
 /// Requests under api/examples.
-const EXAMPLES: usize = 31;
+const EXAMPLES: usize = 32;
 
 const SIZE_PX: u32 = 256;
 

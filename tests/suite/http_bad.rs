@@ -39,7 +39,7 @@ fn bad_queries_are_a_400_that_names_the_key() {
         ("size=NaN", "out_of_range", "from 1 to 4096"),
         ("size=", "wrong_type", "N or WxH"),
         ("style=toon", "out_of_range", "wireframe"),
-        ("max_error=1", "not_supported_yet", "max_error"),
+        ("max_error=0", "out_of_range", "above 0, at most 255"),
         ("wire.thickness=inf", "out_of_range", "from 0 to 10"),
         ("camera.eye=1,2,3", "conflicting_keys", "camera.target"),
         ("materials.Glass%20v2.1.surface.opacity=3", "out_of_range", "`materials.Glass v2.1.surface.opacity`"),

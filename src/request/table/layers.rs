@@ -81,7 +81,7 @@ fn wire() -> Vec<Field> {
     vec![
         words(
             "wire.method",
-            |l: &mut Look, v| l.wire().method = v,
+            |l: &mut Look, v| l.set_method(v),
             "exact: true width by coverage; the others follow barycentric coordinates b: fwidth \
              (smoothstep in multiples of |db/dx| + |db/dy|, a coordinate at a time), fwidth-min (of \
              the least one), barycentric (a share of the triangle), threshold (no smoothing).",

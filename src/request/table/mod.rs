@@ -53,12 +53,10 @@ pub const SHORT: &[(&str, &str)] = &[
     ("format", "image.format"),
     ("samples", "image.samples"),
     ("background", "image.background"),
+    ("max_error", "image.max_error"),
     ("view", "camera.view"),
     ("up", "camera.up"),
 ];
-
-/// Keys that have a meaning which this version does not know yet.
-pub const LATER: &[&str] = &["image.max_error", "image.max_time_ms", "max_error", "max_time_ms"];
 
 /// A share, such as an opacity.
 const SHARE: Kind = Kind::Number { min: 0.0, max: 1.0 };
@@ -83,7 +81,7 @@ mod tests {
             assert_eq!(layer.is_some_and(Layer::is_for_materials), field.is_for_materials(), "{}", field.key);
             keys += 1;
         }
-        assert_eq!(keys, 51);
+        assert_eq!(keys, 53);
         assert!(SHORT.iter().all(|(_, long)| FIELDS.iter().any(|f| f.key == *long)));
     }
 }

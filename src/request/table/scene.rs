@@ -4,6 +4,7 @@ use super::super::draft::Draft;
 use super::super::fields::{Field, optional, optional_words, value, words};
 use super::super::value::Kind;
 use super::{SHARE, number};
+use crate::limits::JOB_MS_MAX;
 
 /// In the order of the document.
 pub fn fields() -> Vec<Field> {
@@ -141,12 +142,31 @@ fn image() -> Vec<Field> {
         value(
             "image.samples",
             Kind::OneOf(&[1, 4]),
-            |d: &mut Draft, v| d.image.samples = v,
+            |d: &mut Draft, v| (d.image.samples, d.open.samples) = (v, false),
             "Visibility samples a pixel.",
         )
         .default(4),
+        optional(
+            "image.max_error",
+            Kind::Above0 { max: 255.0 },
+            |d: &mut Draft, v| d.max_error = v,
+            "Largest expected error, RMSE in /255: the cheapest samples, wire.method and backend that meet it are chosen, \
+             but for those that are given.",
+        )
+        .default(()),
+        optional(
+            "image.max_time_ms",
+            Kind::Above0 { max: JOB_MS_MAX as f64 },
+            |d: &mut Draft, v| d.max_time_ms = v,
+            "Longest expected time to draw, by a table of one machine: the most accurate that is within it is chosen.",
+        )
+        .default(()),
         value("image.background", Kind::Color, |d: &mut Draft, v| d.image.background = v, "What is behind the mesh.")
             .default("#fff"),
-        words("backend", |d: &mut Draft, v| d.backend = v, "Who draws; by default the server's choice."),
+        words(
+            "backend",
+            |d: &mut Draft, v| (d.backend, d.open.backend) = (v, false),
+            "Who draws; by default the server's choice.",
+        ),
     ]
 }

@@ -4,6 +4,8 @@
 //!     cargo bench --bench accuracy -- --quick                 # few and small scenes, few rounds; under a minute
 //!     cargo bench --bench accuracy -- --scene 'deep rings'    # one scene, as often as it is named
 //!     cargo bench --bench accuracy -- --write                 # all, and docs/accuracy.{json,md}, docs/work-precision.svg
+//!                                                             # and src/plan/error_table.json
+//!     cargo bench --bench accuracy -- --table-only            # the last of these, from docs/accuracy.json as it is
 //!
 //! What is true and how errors are counted: `measure/truths.rs`. What each technique is asked for: `measure/techniques.rs`.
 //! Times: medians of interleaved rounds of `Renderer::draw` alone, after one that warms up, as ratios to a baseline in the same
@@ -30,7 +32,7 @@ use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind};
 
 use measure::scenes::{SCENES, Scene};
 use measure::table::{Machine, method, table};
-use measure::{Effort, Row, back_ends, goals, json, plot};
+use measure::{Effort, Row, back_ends, condensed, goals, json, plot};
 
 struct Options {
     effort: Effort,
@@ -39,6 +41,9 @@ struct Options {
 }
 
 fn main() {
+    if std::env::args().any(|argument| argument == "--table-only") {
+        return write_table();
+    }
     let options = options();
     let gpu = match Gpu::open(GpuKind::Any, AtomicsChoice::Best) {
         Ok(gpu) => Some(Arc::new(gpu)),
@@ -81,7 +86,7 @@ fn options() -> Options {
                     .scenes
                     .push(*found.unwrap_or_else(|| panic!("there is no scene {wanted:?}; there are {names:?}")));
             }
-            other => panic!("there is no option {other}; there are --quick, --scene NAME and --write"),
+            other => panic!("there is no option {other}; there are --quick, --scene NAME, --write and --table-only"),
         }
     }
     let is_partial = is_quick || !options.scenes.is_empty();
@@ -107,4 +112,14 @@ fn write(rows: &[Row], machine: &Machine, options: &Options) {
         std::fs::write(folder.join(name), text).unwrap_or_else(|e| panic!("docs/{name}: {e}"));
         println!("wrote docs/{name}");
     }
+    write_table();
+}
+
+/// Condenses docs/accuracy.json into what the program chooses by.
+fn write_table() {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(root.join("docs/accuracy.json")).expect("docs/accuracy.json");
+    let document = serde_json::from_str(&text).expect("docs/accuracy.json is JSON");
+    std::fs::write(root.join("src/plan/error_table.json"), condensed::table(&document)).expect("a table");
+    println!("wrote src/plan/error_table.json");
 }

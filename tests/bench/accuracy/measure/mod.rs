@@ -4,6 +4,7 @@
 // Each binary that includes this module uses its own part of it. A tool for developers: giving up loudly is fine.
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+pub mod condensed;
 pub mod goals;
 pub mod json;
 pub mod meshes;

@@ -56,6 +56,25 @@ pub const SCENES: &[Scene] = &[
     solid("rings, whole picture", Family::Pictures, Source::Made(|_| meshes::rings()), 0.0),
 ];
 
+/// Scenes that no table is made from: what a table says of techniques must hold for these too.
+pub const UNSEEN: &[Scene] = &[
+    solid("ball", Family::Wires, Source::Made(|_| meshes::icosphere(4)), 1.0),
+    solid("torus", Family::Wires, Source::Made(|_| shapes::torus(36)), 2.0),
+    solid("cow", Family::Wires, Source::Model("cow.obj", |_| shapes::torus(54)), 1.0),
+    solid("teapot", Family::Wires, Source::Model("teapot.obj", |_| shapes::torus(60)), 0.7),
+    solid("fandisk", Family::Wires, Source::Model("fandisk.obj", |_| shapes::gear(40)), 0.5),
+    solid("ball, whole picture", Family::Pictures, Source::Made(|_| meshes::icosphere(4)), 0.0),
+    solid("torus, whole picture", Family::Pictures, Source::Made(|_| shapes::torus(36)), 0.0),
+    solid("gear, whole picture", Family::Pictures, Source::Made(|_| shapes::gear(23)), 0.0),
+    solid("cow, whole picture", Family::Pictures, Source::Model("cow.obj", |_| shapes::torus(54)), 0.0),
+    solid("teapot, whole picture", Family::Pictures, Source::Model("teapot.obj", |_| shapes::torus(60)), 0.0),
+    solid("fandisk, whole picture", Family::Pictures, Source::Model("fandisk.obj", |_| shapes::gear(40)), 0.0),
+    solid("bunny, whole picture", Family::Pictures, Source::Model("stanford-bunny.obj", |_| shapes::torus(256)), 0.0),
+    solid("torus silhouette, coarse", Family::Outlines, Source::Made(|_| shapes::torus(20)), 2.0),
+    solid("balls' silhouettes", Family::Outlines, Source::Made(|_| shapes::two_balls()), 4.0),
+    solid("cow's silhouette", Family::Outlines, Source::Model("cow.obj", |_| shapes::torus(54)), 3.0),
+];
+
 /// The small scenes that the test suite measures.
 pub const SMALL: &[&str] = &["12 px grid", "48-fan"];
 

@@ -1,0 +1,96 @@
+//! How far each technique is from the truth and how long it takes, as measured: `error_table.json`, which the benchmark
+//! writes (`cargo bench --bench accuracy -- --write`) and which says of itself what its numbers mean.
+
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+
+/// Everything that was measured.
+#[derive(Clone, Debug, Default, Deserialize)]
+pub struct ErrorTable {
+    /// Whether the GPU that was measured is software. It is then no stand-in for one that `auto` would draw on.
+    pub gpu_is_software: bool,
+    /// Columns and rows of the pictures that were measured.
+    size_px: f64,
+    rows: Vec<Row>,
+}
+
+/// A technique on a kind of back-end with a number of samples.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Row {
+    technique: String,
+    backend: String,
+    samples: u32,
+    /// The largest RMSE of its scenes, /255.
+    error: f64,
+    ms_per_megapixel: f64,
+    ms_per_kilotriangle: f64,
+}
+
+impl ErrorTable {
+    /// The table that this program was built with; empty if it could not be read, which a test rules out.
+    pub fn shipped() -> &'static Self {
+        static SHIPPED: LazyLock<ErrorTable> =
+            LazyLock::new(|| serde_json::from_str(include_str!("error_table.json")).unwrap_or_default());
+        &SHIPPED
+    }
+
+    /// A technique on the back-end of this name; on the CPU where the table knows no GPU, since their pictures agree.
+    pub fn row(&self, technique: &str, backend: &str, samples: u32) -> Option<&Row> {
+        let find = |backend: &str| {
+            let is_it = |row: &&Row| row.technique == technique && row.backend == backend && row.samples == samples;
+            self.rows.iter().find(is_it)
+        };
+        find(backend).or_else(|| find("cpu"))
+    }
+
+    /// How far a picture of so many pixels is expected to be from the truth, RMSE in /255.
+    ///
+    /// Errors of filled pictures are at the edges of what is seen: those grow with a picture's side and its area with the square of
+    /// it, so the mean square goes with 1 / side. Larger pictures than were measured are promised no less error, since finer
+    /// meshes go with them. Errors of lines are means over their own pixels.
+    pub fn error(&self, row: &Row, pixels: f64) -> f64 {
+        let is_filled = matches!(row.technique.as_str(), "face" | "derivative");
+        let edges = (self.size_px / pixels.sqrt()).max(1.0);
+        if is_filled { (row.error * edges.sqrt()).min(255.0) } else { row.error }
+    }
+
+    /// Whether a GPU was measured that is one.
+    pub fn knows_gpu(&self) -> bool {
+        !self.gpu_is_software && self.rows.iter().any(|row| row.backend == "gpu")
+    }
+}
+
+impl Row {
+    /// What it is expected to take, milliseconds.
+    pub fn time_ms(&self, pixels: f64, triangles: f64) -> f64 {
+        self.ms_per_megapixel * pixels / 1e6 + self.ms_per_kilotriangle * triangles / 1e3
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_table_knows_every_technique() {
+        let table = ErrorTable::shipped();
+        let techniques =
+            ["exact", "fwidth", "fwidth-min", "barycentric", "threshold", "contour", "hull", "face", "derivative"];
+        let mut found = 0;
+        for technique in techniques {
+            for backend in ["cpu", "gpu"] {
+                for samples in [1, 4] {
+                    let row = table.row(technique, backend, samples).unwrap();
+                    let [thumbnail, measured, large] = [64.0, 512.0, 2048.0].map(|s: f64| table.error(row, s * s));
+                    assert!(measured > 0.0 && measured <= thumbnail && thumbnail <= 255.0, "{row:?}");
+                    assert_eq!(measured, large);
+                    assert!(row.ms_per_megapixel >= 0.0 && row.ms_per_kilotriangle >= 0.0, "{row:?}");
+                    assert!(row.time_ms(1e6, 1e3) > 0.0, "{row:?}");
+                    found += 1;
+                }
+            }
+        }
+        assert_eq!(found, 36);
+    }
+}

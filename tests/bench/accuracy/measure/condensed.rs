@@ -1,0 +1,81 @@
+//! `src/plan/error_table.json`: what was measured, a row for each technique on each kind of back-end with each number of samples.
+//! The program chooses by it where a request asks for an error or a time.
+
+use std::fmt::Write;
+
+use serde_json::{Value, json};
+
+use super::BASELINE;
+
+/// Kinds of back-ends, and which of the measured ones stand for them.
+const KINDS: [(&str, &str); 2] = [("cpu", "cpu-1"), ("gpu", "gpu")];
+
+/// From the document that `json.rs` writes, so that a table can be made without measuring again.
+pub fn table(document: &Value) -> String {
+    let rows = document["rows"].as_array().expect("rows");
+    let megapixels = document["size_px"].as_f64().expect("size_px").powi(2) / 1e6;
+    let kilotriangles = |scene: &Value| {
+        let scenes = document["scenes"].as_array().expect("scenes");
+        let scene = scenes.iter().find(|s| s["name"] == *scene).expect("a scene of every row");
+        scene["triangles"].as_f64().expect("triangles") / 1e3
+    };
+    let mut made: Vec<String> = Vec::new();
+    for (kind, back_end) in KINDS {
+        let mut seen: Vec<(&Value, &Value)> = Vec::new();
+        for row in rows.iter().filter(|row| row["backend"] == back_end) {
+            let key = (&row["technique"], &row["samples"]);
+            if seen.contains(&key) {
+                continue;
+            }
+            seen.push(key);
+            let alike: Vec<&Value> =
+                rows.iter().filter(|r| r["backend"] == back_end && (&r["technique"], &r["samples"]) == key).collect();
+            let error = alike.iter().map(|r| r["rmse"].as_f64().expect("rmse")).fold(0.0, f64::max);
+            let points: Vec<[f64; 3]> = alike
+                .iter()
+                .map(|r| [megapixels, kilotriangles(&r["scene"]), r["median_ms"].as_f64().expect("median_ms")])
+                .collect();
+            let [per_pixel, per_triangle] = fit(&points).map(|v| format!("{v:.3e}").parse::<f64>().expect("a number"));
+            let row = json!({
+                "technique": key.0, "backend": kind, "samples": key.1, "error": error,
+                "ms_per_megapixel": per_pixel, "ms_per_kilotriangle": per_triangle,
+            });
+            made.push(format!("    {row}"));
+        }
+    }
+    let gpu = document["machine"]["gpu"].as_str();
+    let mut text = String::from("{\n");
+    let parts = [
+        ("about", json!(about())),
+        ("machine", document["machine"].clone()),
+        ("size_px", document["size_px"].clone()),
+        ("gpu_is_software", json!(gpu.is_some_and(|gpu| gpu.contains("(software,")))),
+    ];
+    for (name, value) in parts {
+        let _ = writeln!(text, "  \"{name}\": {value},");
+    }
+    let _ = write!(text, "  \"rows\": [\n{}\n  ]\n}}\n", made.join(",\n"));
+    text
+}
+
+fn about() -> String {
+    format!(
+        "Written by `cargo bench --bench accuracy -- --write`, or with --table-only from docs/accuracy.json. error: the largest RMSE \
+         (/255) of the technique's scenes, since a promise must hold for the worst of them. Times: least squares of relative errors \
+         through the scenes' medians, on this machine, which other machines differ from; cpu is one thread. There are pictures of \
+         one size alone, so what a picture costs whatever it shows counts as its pixels'. The benchmark's baseline: {BASELINE}."
+    )
+}
+
+/// The a, b >= 0 that make a p + b t nearest to ms, for points [p, t, ms], in squares of relative errors.
+pub fn fit(points: &[[f64; 3]]) -> [f64; 2] {
+    let sum = |f: fn(f64, f64) -> f64| points.iter().map(|[p, t, ms]| f(p / ms, t / ms)).sum::<f64>();
+    let (pp, pt, tt, p, t) = (sum(|p, _| p * p), sum(|p, t| p * t), sum(|_, t| t * t), sum(|p, _| p), sum(|_, t| t));
+    let determinant = pp * tt - pt * pt;
+    let [a, b] = [p * tt - t * pt, t * pp - p * pt].map(|v| v / determinant);
+    match (a > 0.0, b > 0.0) {
+        (true, true) => [a, b],
+        (false, true) => [0.0, t / tt],
+        _ => [p / pp, 0.0],
+    }
+}
