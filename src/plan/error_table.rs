@@ -47,12 +47,11 @@ impl ErrorTable {
     /// How far a picture of so many pixels is expected to be from the truth, RMSE in /255.
     ///
     /// Errors of filled pictures are at the edges of what is seen: those grow with a picture's side and its area with the square of
-    /// it, so the mean square goes with 1 / side. Larger pictures than were measured are promised no less error, since finer
-    /// meshes go with them. Errors of lines are means over their own pixels.
+    /// it, so the mean square goes with 1 / side. Lines of one mesh meet in more and more of the pixels as these get fewer, with about
+    /// the same effect. Larger pictures than were measured are promised no less error, since finer meshes go with them.
     pub fn error(&self, row: &Row, pixels: f64) -> f64 {
-        let is_filled = matches!(row.technique.as_str(), "face" | "derivative");
-        let edges = (self.size_px / pixels.sqrt()).max(1.0);
-        if is_filled { (row.error * edges.sqrt()).min(255.0) } else { row.error }
+        let smaller = (self.size_px / pixels.sqrt()).max(1.0);
+        (row.error * smaller.sqrt()).min(255.0)
     }
 
     /// Whether a GPU was measured that is one.

@@ -11,12 +11,10 @@ use crate::measure::techniques::{Family, Technique};
 use crate::measure::{Effort, back_ends, condensed, rounds};
 use crate::truth::cases;
 
-/// Sides of pictures. In thumbnails of dense models the lines meet in every pixel, and errors reach 2.2 times what is expected
-/// (measured at 96 px): the table does not speak of those.
-const SIZES_PX: [u32; 2] = [256, 512];
+/// Sides of pictures.
+const SIZES_PX: [u32; 2] = [96, 512];
 
-/// How far an error may exceed what is expected. The expectation is the worst of a few scenes at 512 px and not a bound: at 256 px
-/// a hull around a cow exceeds it by a tenth (measured).
+/// How far an error may exceed what is expected: the expectation is the worst of a few scenes at 512 px, and not a bound.
 const FACTOR: f64 = 1.25;
 
 fn root() -> PathBuf {
