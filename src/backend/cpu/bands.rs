@@ -13,7 +13,8 @@ use super::visibility::{self, Nearest, Setup};
 use super::{Stages, line_light, shade};
 use crate::plan::LinePass;
 
-/// Triangles or edges between two looks at the deadline: at most some 10 ms, however large each is.
+/// Triangles or edges between two looks at the deadline: at most some 10 ms of triangles, however large each is. Edges of wide
+/// lines count their pixels too.
 pub const CHECK_EVERY: usize = 256;
 
 /// Draws band number `band` into its rows of the picture.

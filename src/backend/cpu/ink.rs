@@ -9,7 +9,8 @@ use super::stroke::{Mask, POINTS, WORDS, count};
 /// Steps to the pixel of a sum of areas.
 const AREA_UNIT: f32 = 65_536.0;
 
-/// Sums stop before they could wrap. No picture comes close: a pixel whose points are all covered takes no more.
+/// Sums stop before they could wrap. Only lit lines come close, in a pixel that 32,768 of them cover: others stop when all points
+/// are covered.
 const SUM_MAX: u32 = 1 << 31;
 
 /// A pixel's strokes.

@@ -3,7 +3,8 @@
 use super::step::Goal;
 use crate::plan::DrawPlan;
 
-/// Largest buffer that depends on the picture's size, bytes.
+/// Largest buffer that depends on the picture's size, bytes; but where wide lines look far beyond a band it may be as large as the
+/// device binds.
 const BAND_BYTES: u64 = 64 << 20;
 
 /// Bytes of the work list before its items.
