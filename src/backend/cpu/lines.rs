@@ -1,7 +1,7 @@
 //! Stage 4, an edge: lines of exact width. Twin of `shaders/lines.wgsl`.
 //!
 //! A line is all that lies within half its width of the visible parts of an edge ([`hiding`](super::hiding)): a stroke for
-//! each part ([`stroke`](super::stroke)), and in each pixel their union ([`ink`](super::ink)). What is visible of an edge close
+//! each part ([`stroke`]), and in each pixel their union ([`ink`](super::ink)). What is visible of an edge close
 //! to a pixel is found close to it: long edges are looked at in windows.
 
 use super::Stages;
