@@ -100,7 +100,7 @@ type Candidate = (Spec, [f64; 2]);
 
 /// Every way to fill in what is open, with what is expected of it.
 fn candidates(table: &ErrorTable, spec: &Spec, ask: &Ask, triangles: usize) -> Vec<Candidate> {
-    let samples = if ask.open.samples { vec![1, 4] } else { vec![spec.image.samples] };
+    let samples = if ask.open.samples { vec![1, 4, 8, 16] } else { vec![spec.image.samples] };
     let has_open_wire = ask.open.wire || ask.open.material_wires.contains(&true);
     let methods = if has_open_wire { METHODS.map(Some).to_vec() } else { vec![None] };
     let backends = match (ask.open.backend, table.knows_gpu()) {
