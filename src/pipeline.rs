@@ -94,6 +94,7 @@ pub fn render(
     let mut chosen = plan::choose(job.spec, mesh.triangles.len(), backends.has_gpu());
     warnings.extend(chosen.iter_mut().flat_map(|chosen| std::mem::take(&mut chosen.warnings)));
     let spec = chosen.as_ref().map_or(job.spec, |chosen| &chosen.spec);
+    warnings.extend(plan::thicken(&mut mesh, spec, &mut budget, deadline)?);
     let plan = plan::build(&mesh, spec, &mut budget, deadline)?;
     if plan::is_out_of_view(&plan) {
         let detail = "the camera looks past the whole mesh, and the picture is blank".to_owned();

@@ -7,7 +7,7 @@ use super::skips::{SkipKind, Skips};
 use super::textures::TextureLoader;
 use super::{
     CornerValues, DrawPlan, Faces, HullOffset, HullPass, LayersPass, PlanError, Projection, SurfacePass, flags, lights,
-    materials, miter, wires,
+    loose, materials, miter, wires,
 };
 use crate::limits::{Budget, Deadline, LimitExceeded};
 use crate::mesh::{Mesh, normals};
@@ -124,8 +124,9 @@ fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection {
 }
 
 /// What the widest outline and the widest line ask for.
-fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
-    let mut border = Border::default();
+pub(super) fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
+    let mut border =
+        Border { px: if mesh.loose.is_empty() { 0.0 } else { 0.5 * loose::POINT_PX }, ..Border::default() };
     for layers in &parts.looks {
         if let Some(outline) = &layers.outline {
             // Half of a contour lies on the surface itself.

@@ -10,6 +10,7 @@ mod error_table;
 mod hull;
 mod lights;
 mod lines;
+mod loose;
 mod materials;
 mod miter;
 mod parts;
@@ -30,6 +31,7 @@ pub use choice::{Choice, Chosen, choose};
 pub use error::PlanError;
 pub use hull::{HullOffset, HullPass};
 pub use lines::{Edge, LinePass, Shown};
+pub use loose::thicken;
 pub use skips::{Skip, SkipKind};
 pub use surface::{
     CornerValues, Lamp, Lights, MaterialLook, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, flags, slots,

@@ -157,10 +157,18 @@ impl<'a> Parts<'a> {
                 && (role & roles::HULL != 0 || !hull)
                 && role & (roles::FRONT_ONLY | roles::BACK_ONLY) == 0
         };
-        if pass.is_none() && by_part.iter().all(|&role| usual(role)) {
+        let own = mesh.own_triangles().len();
+        let is_bare = hull && own < mesh.triangles.len();
+        if pass.is_none() && by_part.iter().all(|&role| usual(role)) && !is_bare {
             return Cow::Borrowed(&[]);
         }
-        mesh.triangle_materials.iter().map(|&m| by_part.get(m as usize).copied().unwrap_or(roles::SURFACE)).collect()
+        let role = |m: u32| by_part.get(m as usize).copied().unwrap_or(roles::SURFACE);
+        let mut all: Vec<u8> = mesh.triangle_materials.iter().map(|&m| role(m)).collect();
+        for role in all.iter_mut().skip(own) {
+            // Lines and points face the viewer, and have no hull.
+            *role &= roles::SURFACE | roles::LAYER;
+        }
+        all.into()
     }
 }
 

@@ -40,6 +40,7 @@ mod layers_hull;
 mod likeness;
 mod line_looks;
 mod lines_scenes;
+mod loose;
 #[path = "../bench/accuracy/measure/mod.rs"]
 mod measure;
 mod mesh_files;
