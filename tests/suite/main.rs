@@ -74,6 +74,7 @@ mod stress_views;
 mod structure;
 mod texture_formulas;
 mod textures;
+mod textures_bad;
 mod textures_closeup;
 mod truth;
 mod twins;
