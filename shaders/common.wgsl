@@ -97,6 +97,8 @@ const TRIANGLE_MATERIALS: u32 = 64u;
 const EDGE_MASKS: u32 = 128u;
 const LINES: u32 = 256u;
 const CLIPPED: u32 = 2048u;
+const EIGHT_SAMPLES: u32 = 512u;
+const SIXTEEN_SAMPLES: u32 = 1024u;
 const FOUR_SAMPLES: u32 = 4096u;
 const LIT_LINES: u32 = 8192u;
 // Whether any line pass is a contour.
@@ -135,7 +137,7 @@ fn has(flag: u32) -> bool {
 
 // Samples a pixel.
 fn sample_count() -> i32 {
-    return select(1, 4, has(FOUR_SAMPLES));
+    return select(select(select(1, 4, has(FOUR_SAMPLES)), 8, has(EIGHT_SAMPLES)), 16, has(SIXTEEN_SAMPLES));
 }
 
 struct Vertex {
@@ -241,16 +243,41 @@ fn wide_to_f32(v: vec2<u32>) -> f32 {
     return rn(f32(v.y) * 4294967296.0) + f32(v.x);
 }
 
-// Offsets of sample s in 1/16 px from the pixel's upper left corner.
-fn sample_offset(s: i32) -> vec2<i32> {
-    if sample_count() == 1 {
-        return vec2(8, 8);
+// Where sample s is, in 1/16 px from sample_corner(): a nibble a sample, the first lowest, as sample_offsets() in src/plan/mod.rs.
+fn sample_step(s: i32) -> vec2<i32> {
+    var x = 0x8u;
+    var y = 0x8u;
+    if has(FOUR_SAMPLES) {
+        x = 0xA2E6u;
+        y = 0xEA62u;
     }
-    // x: 6 14 2 10, y: 2 6 10 14, a nibble each.
-    return vec2((0xA2E6 >> u32(4 * s)) & 15, (0xEA62 >> u32(4 * s)) & 15);
+    if has(EIGHT_SAMPLES) {
+        x = 0xFB135D79u;
+        y = 0x1F7D39B5u;
+    }
+    if has(SIXTEEN_SAMPLES) {
+        x = select(0xBDA3C579u, 0x1EF02486u, s >= 8);
+        y = select(0x3BD67A59u, 0x0F48C21Eu, s >= 8);
+    }
+    let nibble = 4u * u32(s & 7);
+    return vec2<i32>(vec2((x >> nibble) & 15u, (y >> nibble) & 15u));
+}
+
+// The same in 1/256 px from the pixel's upper left corner.
+fn sample_offset(s: i32) -> vec2<i32> {
+    return 16 * sample_step(s) + sample_shift();
+}
+
+fn sample_shift() -> i32 {
+    return select(0, 8, has(SIXTEEN_SAMPLES));
 }
 
 // Upper left corner of a pixel in 1/256 px from the picture's centre.
 fn pixel_corner(pixel: vec2<i32>) -> vec2<i32> {
     return pixel * 256 - vec2(frame.width, frame.height) * 128;
+}
+
+// The same, moved so that all samples lie multiples of 1/16 px away.
+fn sample_corner(pixel: vec2<i32>) -> vec2<i32> {
+    return pixel_corner(pixel) + sample_shift();
 }

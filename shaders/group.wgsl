@@ -1,4 +1,5 @@
-// The samples of a pixel that see the same triangle, and their colour. Shared by shade and layers.
+// The samples of a pixel that see the same triangle, and their colour. Shared by shade and layers, whose seen(sample) says what
+// triangle a sample sees.
 
 @group(1) @binding(24) var<storage, read> roles: array<u32>;
 // Colours, then the materials of the surface's triangles and of the hull's.
@@ -8,28 +9,38 @@ const NOTHING: u32 = 0xFFFFFFFFu;
 
 struct Group {
     id: u32,
-    // Which of the pixel's samples.
-    same: vec4<bool>,
-    // Their number, and the sum of their offsets in 1/16 px.
+    // Which of the pixel's samples, a bit each.
+    same: u32,
+    // Their number, and the sum of their offsets in 1/256 px.
     count: i32,
     offset_sum: vec2<i32>,
 };
 
-// The triangle that the first of the samples `left` sees.
-fn first_group(ids: vec4<u32>, left: vec4<bool>) -> Group {
-    let id = select(select(select(ids.w, ids.z, left.z), ids.y, left.y), ids.x, left.x);
-    let same = ids == vec4(id);
-    let counts = select(vec4(0), vec4(1), same);
-    // The samples' offsets: 6 14 2 10 across, 2 6 10 14 down.
-    let across = counts * vec4(6, 14, 2, 10);
-    let down = counts * vec4(2, 6, 10, 14);
-    let offset = vec2(across.x + across.y + across.z + across.w, down.x + down.y + down.z + down.w);
-    return Group(id, same, counts.x + counts.y + counts.z + counts.w, offset);
+// Which samples of the pixel whose first one is given see a triangle, a bit each.
+fn seeing(first: u32) -> u32 {
+    var mask = 0u;
+    for (var s = 0; s < sample_count(); s++) {
+        mask |= select(0u, 1u, seen(first + u32(s)) != NOTHING) << u32(s);
+    }
+    return mask;
+}
+
+// The triangle that the first of the samples `left` sees, of the pixel whose first sample is given.
+fn first_group(first: u32, left: u32) -> Group {
+    var g = Group(seen(first + firstTrailingBit(left)), 0u, 0, vec2(0));
+    for (var s = 0; s < sample_count(); s++) {
+        if seen(first + u32(s)) == g.id {
+            g.same |= 1u << u32(s);
+            g.count++;
+            g.offset_sum += sample_offset(s);
+        }
+    }
+    return g;
 }
 
 // The only sample of a pixel.
 fn lone_group(id: u32) -> Group {
-    return Group(id, vec4(true, false, false, false), 1, vec2(8, 8));
+    return Group(id, 1u, 1, sample_offset(0));
 }
 
 // The colour of a group's triangle at the mean of its samples.
@@ -43,9 +54,8 @@ fn group_color(g: Group, pixel: vec2<i32>, show: Show) -> vec4<f32> {
     if !has(SURFACE) {
         return vec4(0.0);
     }
-    let share = select(select(select(0.25, 1.0 / 3.0, g.count == 3), 0.5, g.count == 2), 1.0, g.count == 1);
-    let scale = 16.0 * share;
-    return point_color(g.id, vec2<f32>(pixel_corner(pixel)) + rn2(vec2<f32>(g.offset_sum) * scale), show);
+    let mean = rn2(vec2<f32>(g.offset_sum) * recip(f32(g.count)));
+    return point_color(g.id, vec2<f32>(pixel_corner(pixel)) + mean, show);
 }
 
 // Of an id, the hull's or not.

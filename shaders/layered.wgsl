@@ -7,5 +7,6 @@ struct Layered {
     previous: vec2<u32>,
     // Materials of its layers, a bit each, modulo 32.
     materials: u32,
-    padding: u32,
+    // The id that the last layer was taken for.
+    taken: u32,
 };

@@ -30,27 +30,28 @@ fn layers(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups
         proceed(i, 1u);
         return;
     }
-    let ids = vec4(take(4u * i), take(4u * i + 1u), take(4u * i + 2u), take(4u * i + 3u));
-    var left = ids != vec4(NOTHING);
+    let first = u32(sample_count()) * i;
+    for (var s = 0; s < sample_count(); s++) {
+        _ = take(first + u32(s));
+    }
     // Once for each triangle among the samples.
-    while any(left) {
-        let group = first_group(ids, left);
-        left = left & !group.same;
+    var left = seeing(first);
+    while left != 0u {
+        let group = first_group(first, left);
+        left &= ~group.same;
         let color = group_color(group, pixel, show);
-        if group.same.x {
-            lay(4u * i, color);
-        }
-        if group.same.y {
-            lay(4u * i + 1u, color);
-        }
-        if group.same.z {
-            lay(4u * i + 2u, color);
-        }
-        if group.same.w {
-            lay(4u * i + 3u, color);
+        for (var s = 0; s < sample_count(); s++) {
+            if ((group.same >> u32(s)) & 1u) != 0u {
+                lay(first + u32(s), color);
+            }
         }
     }
-    proceed(4u * i, 4u);
+    proceed(first, u32(sample_count()));
+}
+
+// The id that was taken last.
+fn seen(sample: u32) -> u32 {
+    return layered[sample].taken;
 }
 
 // Takes a sample's find as its last layer: its id, or NOTHING where there is none or where it adds nothing.
@@ -70,6 +71,7 @@ fn take(sample: u32) -> u32 {
         }
         so_far.materials |= bit;
     }
+    so_far.taken = id;
     layered[sample] = so_far;
     return id;
 }

@@ -28,7 +28,7 @@ fn line_light(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
         let word = samples[i * samples_px + s];
         // Neither a hull nor nothing.
         if word.y != 0u && ~word.x < frame.triangle_count {
-            sum += point_light(~word.x, vec2<f32>(corner + 16 * sample_offset(i32(s))));
+            sum += point_light(~word.x, vec2<f32>(corner + sample_offset(i32(s))));
             count += 1.0;
         }
     }

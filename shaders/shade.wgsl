@@ -15,7 +15,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
     }
     let pixel = vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width);
     if sample_count() == 1 {
-        let id = id_at(i);
+        let id = seen(i);
         var color = group_color(lone_group(id), pixel, surface_show(id));
         if has(LAYERS) {
             color = layered[i].color + rn4((1.0 - layered[i].color.w) * color);
@@ -23,34 +23,42 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         colors[i] = color;
         return;
     }
-    let ids = vec4(id_at(4u * i), id_at(4u * i + 1u), id_at(4u * i + 2u), id_at(4u * i + 3u));
-    var left = ids != vec4(NOTHING);
+    let first = u32(sample_count()) * i;
+    // A power of two.
+    let share = 1.0 / f32(sample_count());
     var sum = vec4(0.0);
-    // What of each sample is left for the surface.
-    var rest = vec4(1.0);
     if has(LAYERS) {
-        let a = layered[4u * i].color;
-        let b = layered[4u * i + 1u].color;
-        let c = layered[4u * i + 2u].color;
-        let d = layered[4u * i + 3u].color;
-        sum = rn4(0.25 * (((a + b) + c) + d));
-        rest = 1.0 - vec4(a.w, b.w, c.w, d.w);
+        for (var s = 0; s < sample_count(); s++) {
+            sum += layered[first + u32(s)].color;
+        }
+        sum = rn4(share * sum);
     }
     // Once for each triangle among the samples.
-    while any(left) {
-        let group = first_group(ids, left);
-        left = left & !group.same;
+    var left = seeing(first);
+    while left != 0u {
+        let group = first_group(first, left);
+        left &= ~group.same;
         var weight = f32(group.count);
         if has(LAYERS) {
-            let share = select(vec4(0.0), rest, group.same);
-            weight = ((share.x + share.y) + share.z) + share.w;
+            weight = uncovered(first, group.same);
         }
-        sum += rn4(rn(0.25 * weight) * group_color(group, pixel, surface_show(group.id)));
+        sum += rn4(rn(share * weight) * group_color(group, pixel, surface_show(group.id)));
     }
     colors[i] = sum;
 }
 
-fn id_at(sample: u32) -> u32 {
+// What the layers over some samples leave of the surface, in samples.
+fn uncovered(first: u32, same: u32) -> f32 {
+    var sum = 0.0;
+    for (var s = 0; s < sample_count(); s++) {
+        if ((same >> u32(s)) & 1u) != 0u {
+            sum += 1.0 - layered[first + u32(s)].color.w;
+        }
+    }
+    return sum;
+}
+
+fn seen(sample: u32) -> u32 {
     let word = samples[sample];
     return select(~word.x, NOTHING, word.y == 0u);
 }

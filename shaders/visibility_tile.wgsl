@@ -57,7 +57,7 @@ fn draw_tile(s: Setup, e: Edges, bounds: vec4<i32>, tile: vec2<i32>, thread: i32
     workgroupBarrier();
     let block = tile + 8 * vec2(thread & 7, thread >> 3u);
     if all(block <= bounds.zw) {
-        let values = edge_values(s, e, pixel_corner(block));
+        let values = edge_values(s, e, sample_corner(block));
         // The largest each edge function can be in the block.
         let most = values + max(e.dx, vec3(0)) * 127 + max(-e.dy, vec3(0)) * 127;
         if (most.x | most.y | most.z) >= 0 {
@@ -79,9 +79,9 @@ fn draw_tile(s: Setup, e: Edges, bounds: vec4<i32>, tile: vec2<i32>, thread: i32
 }
 
 fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel: vec2<i32>, id: u32) {
-    let corner = pixel_corner(pixel);
+    let corner = sample_corner(pixel);
     for (var n = 0; n < sample_count(); n++) {
-        let offset = sample_offset(n);
+        let offset = sample_step(n);
         let at = 16 * in_block + offset;
         let value = values + e.dx * at.y - e.dy * at.x;
         if (value.x | value.y | value.z) >= 0 {
@@ -93,7 +93,7 @@ fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel:
     }
 }
 
-// Edge values in sixteenths at a pixel corner, exact for the 8 x 8 pixels from there.
+// Edge values in sixteenths at a pixel's sample corner, exact for the 8 x 8 pixels from there.
 fn edge_values(s: Setup, e: Edges, corner: vec2<i32>) -> vec3<i32> {
     return vec3(
         edge_value(e.dx.x, e.dy.x, e.bias.x, corner - vec2(s.x.x, s.y.x)),

@@ -91,7 +91,7 @@ pub fn render(
 
     let mut warnings = std::mem::take(&mut mesh.report.warnings);
     warnings.extend(unknown_materials(&mesh, job.spec));
-    let mut chosen = plan::choose(job.spec, mesh.triangles.len());
+    let mut chosen = plan::choose(job.spec, mesh.triangles.len(), backends.has_gpu());
     warnings.extend(chosen.iter_mut().flat_map(|chosen| std::mem::take(&mut chosen.warnings)));
     let spec = chosen.as_ref().map_or(job.spec, |chosen| &chosen.spec);
     let plan = plan::build(&mesh, spec, &mut budget, deadline)?;

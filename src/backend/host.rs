@@ -74,6 +74,11 @@ impl GpuHost {
         status
     }
 
+    /// Whether `auto` has not yet come to mean the CPU.
+    pub fn may_have_hardware(&self) -> bool {
+        self.without.get().is_none()
+    }
+
     /// The device that a request of this kind draws on, opened now if need be; workers that come meanwhile wait for it.
     ///
     /// `NoGpu` is for good. `DeviceLost` means that a device that was there is gone, and that another try may help.

@@ -89,13 +89,13 @@ fn count_differing<T>(want: &[T], got: &[T], same: impl Fn(&T, &T) -> bool) -> u
     missing + want.iter().zip(got).filter(|(a, b)| !same(a, b)).count()
 }
 
-/// The triangle at a sample, by the formula of the scene's edges; `x`, `y` in 1/16 px from the upper left corner.
+/// The triangle at a sample, by the formula of the scene's edges; `x`, `y` in 1/256 px from the upper left corner.
 fn seen_at([x, y]: [i32; 2]) -> Option<u32> {
-    if x + y < 12 * 16 + 3 {
+    if x + y < 12 * 256 + 48 {
         Some(0)
-    } else if x >= 20 * 16 {
+    } else if x >= 20 * 256 {
         None
-    } else if 6 * x + 5 * y < 120 * 16 {
+    } else if 6 * x + 5 * y < 120 * 256 {
         Some(2)
     } else {
         Some(3)
@@ -105,7 +105,7 @@ fn seen_at([x, y]: [i32; 2]) -> Option<u32> {
 /// What each sample sees, in the order of the visibility buffer.
 fn samples_seen(samples: u32) -> impl Iterator<Item = Option<u32>> {
     let side = SIZE_PX as i32;
-    let pixels = (0..side).flat_map(move |y| (0..side).map(move |x| [x * 16, y * 16]));
+    let pixels = (0..side).flat_map(move |y| (0..side).map(move |x| [x * 256, y * 256]));
     pixels.flat_map(move |[x, y]| sample_offsets(samples).iter().map(move |[dx, dy]| seen_at([x + dx, y + dy])))
 }
 

@@ -34,6 +34,11 @@ impl Backends {
         Self { cpu: cpu::CpuRenderer::new(threads), host, gpu: None }
     }
 
+    /// Whether `auto` may mean a GPU here. Opens none, so it may turn out that there is none.
+    pub fn has_gpu(&self) -> bool {
+        self.host.may_have_hardware()
+    }
+
     /// Draws the plan on the back-end that `choice` means here and now.
     pub fn draw(
         &mut self,

@@ -189,7 +189,7 @@ fn a_panic_costs_its_job_alone() {
 #[test]
 fn a_job_out_of_time_stops_wherever_it_is() {
     let bench = bench(Settings { job_time: Duration::from_millis(150), ..settings() });
-    let (running, queued) = (bench.submit(b"spin", true).unwrap(), bench.submit(b"1", true).unwrap());
+    let (running, queued) = (bench.submit(b"spin", true).unwrap(), bench.submit(b"spin", true).unwrap());
     for job in [&running, &queued] {
         let State::Failed(failure) = wait(job) else { panic!("{:?}", job.state()) };
         assert!(matches!(*failure, Failure::TimeUp { limit_ms: 150 }), "{failure:?}");

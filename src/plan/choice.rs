@@ -38,9 +38,9 @@ pub struct Choice {
     pub expected_time_ms: f64,
 }
 
-/// Chooses for a mesh of so many triangles; None where nothing is asked for.
-pub fn choose(spec: &Spec, triangles: usize) -> Option<Chosen> {
-    choose_from(ErrorTable::shipped(), spec, triangles)
+/// Chooses for a mesh of so many triangles; None where nothing is asked for. `has_gpu`: whether `auto` may mean a GPU here.
+pub fn choose(spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Chosen> {
+    choose_from(ErrorTable::shipped(), spec, triangles, has_gpu)
 }
 
 impl fmt::Display for Choice {
@@ -55,9 +55,9 @@ impl fmt::Display for Choice {
 /// The methods whose width can be given in pixels. The others' depends on each triangle's size.
 const METHODS: [WireMethod; 3] = [WireMethod::Exact, WireMethod::Fwidth, WireMethod::FwidthMin];
 
-fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize) -> Option<Chosen> {
+fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Chosen> {
     let ask = spec.ask.as_ref()?;
-    let all = candidates(table, spec, ask, triangles);
+    let all = candidates(table, spec, ask, triangles, has_gpu);
     let time = |(_, [_, time_ms]): &Candidate| *time_ms;
     let error = |(_, [error, _]): &Candidate| *error;
     let is_in_time = |c: &&Candidate| ask.max_time_ms.is_none_or(|max| time(c) <= max);
@@ -99,11 +99,11 @@ fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize) -> Option<Chos
 type Candidate = (Spec, [f64; 2]);
 
 /// Every way to fill in what is open, with what is expected of it.
-fn candidates(table: &ErrorTable, spec: &Spec, ask: &Ask, triangles: usize) -> Vec<Candidate> {
-    let samples = if ask.open.samples { vec![1, 4] } else { vec![spec.image.samples] };
+fn candidates(table: &ErrorTable, spec: &Spec, ask: &Ask, triangles: usize, has_gpu: bool) -> Vec<Candidate> {
+    let samples = if ask.open.samples { vec![1, 4, 8, 16] } else { vec![spec.image.samples] };
     let has_open_wire = ask.open.wire || ask.open.material_wires.contains(&true);
     let methods = if has_open_wire { METHODS.map(Some).to_vec() } else { vec![None] };
-    let backends = match (ask.open.backend, table.knows_gpu()) {
+    let backends = match (ask.open.backend, has_gpu && table.knows_gpu()) {
         (false, _) => vec![spec.backend],
         (true, false) => vec![BackendChoice::Cpu],
         (true, true) => vec![BackendChoice::Cpu, BackendChoice::Auto],
@@ -112,8 +112,7 @@ fn candidates(table: &ErrorTable, spec: &Spec, ask: &Ask, triangles: usize) -> V
     for &samples in &samples {
         for &method in &methods {
             for &backend in &backends {
-                // Of an `auto` that was given, nobody knows here what it will mean.
-                let is_gpu = backend == BackendChoice::Gpu || ask.open.backend && backend == BackendChoice::Auto;
+                let is_gpu = backend == BackendChoice::Gpu || has_gpu && backend == BackendChoice::Auto;
                 let mut spec = spec.clone();
                 spec.image.samples = samples;
                 spec.backend = backend;

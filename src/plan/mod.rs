@@ -51,7 +51,7 @@ pub struct DrawPlan<'a> {
     pub width_px: u32,
     /// Rows, at most 4096.
     pub height_px: u32,
-    /// Visibility samples a pixel: 1 or 4.
+    /// Visibility samples a pixel: 1, 4, 8 or 16.
     pub samples: u32,
     /// Positions in the unit box.
     pub positions: &'a [[f32; 3]],
@@ -194,10 +194,67 @@ impl<'a> DrawPlan<'a> {
     }
 }
 
-/// Sample positions inside a pixel, in 1/16 pixel from its upper left corner: the standard rotated grid for 4.
+/// Sample positions inside a pixel, in 1/256 pixel from its upper left corner: the standard patterns of Direct3D 11 and Vulkan.
+///
+/// No two share a row or a column, their mean is the pixel's centre, and all leave the same remainder modulo 16 (that of 16
+/// samples is 8, because as many rows and columns in sixteenths have no symmetric places otherwise).
 pub fn sample_offsets(samples: u32) -> &'static [[i32; 2]] {
+    const fn scaled<const N: usize>(mut sixteenths: [[i32; 2]; N], shift: i32) -> [[i32; 2]; N] {
+        let mut s = 0;
+        while s < N {
+            sixteenths[s] = [16 * sixteenths[s][0] + shift, 16 * sixteenths[s][1] + shift];
+            s += 1;
+        }
+        sixteenths
+    }
+    const ONE: [[i32; 2]; 1] = scaled([[8, 8]], 0);
+    const FOUR: [[i32; 2]; 4] = scaled([[6, 2], [14, 6], [2, 10], [10, 14]], 0);
+    const EIGHT: [[i32; 2]; 8] = scaled([[9, 5], [7, 11], [13, 9], [5, 3], [3, 13], [1, 7], [11, 15], [15, 1]], 0);
+    const SIXTEEN: [[i32; 2]; 16] = scaled(
+        [
+            [9, 9],
+            [7, 5],
+            [5, 10],
+            [12, 7],
+            [3, 6],
+            [10, 13],
+            [13, 11],
+            [11, 3],
+            [6, 14],
+            [8, 1],
+            [4, 2],
+            [2, 12],
+            [0, 8],
+            [15, 4],
+            [14, 15],
+            [1, 0],
+        ],
+        8,
+    );
     match samples {
-        1 => &[[8, 8]],
-        _ => &[[6, 2], [14, 6], [2, 10], [10, 14]],
+        1 => &ONE,
+        4 => &FOUR,
+        8 => &EIGHT,
+        _ => &SIXTEEN,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_are_spread_evenly() {
+        for samples in [1, 4, 8, 16] {
+            let offsets = sample_offsets(samples);
+            assert_eq!(offsets.len(), samples as usize);
+            for k in 0..2 {
+                let mut cells: Vec<_> = offsets.iter().map(|at| at[k] * samples as i32 / 256).collect();
+                cells.sort_unstable();
+                assert_eq!(cells, (0..samples as i32).collect::<Vec<_>>(), "one in each row and column");
+                assert_eq!(offsets.iter().map(|at| at[k]).sum::<i32>(), 128 * samples as i32);
+                assert!(offsets.iter().all(|at| at[k] & 15 == offsets[0][0] & 15));
+            }
+        }
     }
 }

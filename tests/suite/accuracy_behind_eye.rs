@@ -68,7 +68,7 @@ fn triangles_with_corners_behind_the_eye_are_where_they_should_be() {
 fn sample_position(plan: &DrawPlan<'_>, sample: usize) -> V2 {
     let (pixel, offset) = (sample / 4, sample_offsets(4)[sample % 4]);
     let corner = [pixel % plan.width_px as usize, pixel / plan.width_px as usize];
-    [0, 1].map(|k| corner[k] as f64 + f64::from(offset[k]) / 16.0)
+    [0, 1].map(|k| corner[k] as f64 + f64::from(offset[k]) / 256.0)
 }
 
 /// Where a triangle is seen: where four affine functions of the screen, each a signed distance in pixels, are positive. A point

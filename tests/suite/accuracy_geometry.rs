@@ -85,7 +85,9 @@ fn shared_edges_own_every_sample_once() {
     let mut missed = Vec::new();
     let (mut edges, mut random) = (0, Random(11));
     for mut renderer in renderers() {
-        for (n, size, samples) in [(12, 256, 4), (100, 256, 1), (100, 256, 4), (590, 512, 4)] {
+        for (n, size, samples) in
+            [(12, 256, 4), (100, 256, 1), (100, 256, 4), (100, 256, 8), (100, 256, 16), (590, 512, 4)]
+        {
             let (positions, triangles) = jittered_net(n, [size; 2], &mut random);
             let plan = scenes::screen_plan([size; 2], samples, 1.0, &positions, &triangles);
             let what = format!("6 net of {} triangles, {}", triangles.len(), renderer.kind().name());

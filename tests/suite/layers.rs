@@ -117,7 +117,7 @@ fn layers_of_soups_are_the_same() {
     let (mut cases, mut seen) = (0, 0);
     let hulls = [None, Some(0.0), Some(3.0)];
     for kind in KINDS {
-        for samples in [1, 4] {
+        for samples in [1, 4, 8, 16] {
             // From the side, from afar, and from within, where triangles reach behind the eye.
             for distance in [0.0, 3.0, 0.4] {
                 let count = if kind == Kind::Tiny { 400 } else { 30 };
@@ -130,7 +130,7 @@ fn layers_of_soups_are_the_same() {
             }
         }
     }
-    assert_eq!(cases, 36);
+    assert_eq!(cases, 72);
     assert!(seen > 100_000, "{seen} samples saw something");
 }
 
@@ -152,7 +152,7 @@ fn pictures_with_layers_agree() {
     let mut random = Random(61);
     let mut cases = 0;
     for (i, kind) in KINDS.into_iter().enumerate() {
-        for samples in [1, 4] {
+        for samples in [1, 4, 8, 16] {
             for distance in [3.0, 0.4] {
                 let soup = Layered::new(Soup::new(kind, 40, 0.7, &mut random), &mut random);
                 let hull_px = [None, Some(2.0), Some(0.0)][(cases / 2) % 3];
@@ -182,7 +182,7 @@ fn pictures_with_layers_agree() {
             }
         }
     }
-    assert_eq!(cases, 24);
+    assert_eq!(cases, 48);
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn layers_are_what_sorting_each_sample_gives() {
     let mut random = Random(808);
     let (mut cases, mut deepest) = (0, 0);
     for kind in [Kind::Large, Kind::Ties, Kind::Mixed] {
-        for samples in [1, 4] {
+        for samples in [1, 4, 8, 16] {
             for distance in [0.0, 3.0, 0.5] {
                 let mut soup = Layered::new(Soup::new(kind, 60, 0.7, &mut random), &mut random);
                 // Mostly layers: what is opaque hides them.
@@ -210,7 +210,7 @@ fn layers_are_what_sorting_each_sample_gives() {
             }
         }
     }
-    assert_eq!(cases, 18);
+    assert_eq!(cases, 36);
     assert!(deepest >= 12, "no sample has more than {deepest} layers");
 }
 

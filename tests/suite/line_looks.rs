@@ -41,7 +41,7 @@ fn every_class_hidden_mode_contour_and_light_agrees() {
         for hidden in [Hidden::Hide, Hidden::Show, Hidden::Fade] {
             for bits in 0..8_usize {
                 let camera = CAMERAS[cases % 3];
-                let samples = if bits & 4 == 0 { "1" } else { "4" };
+                let samples = ["1", "4", "8", "16"][(bits & 4) / 2 + cases / 5 % 2];
                 let keys = [("style", "wire"), ("size", "150x110"), ("samples", samples), ("wire.thickness", "2.5")];
                 let mut spec = scenes::spec(&[&keys[..], camera].concat());
                 let wire = spec.layers.wire.as_mut().unwrap();

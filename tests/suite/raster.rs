@@ -19,7 +19,7 @@ fn shared_edges_own_every_sample_exactly_once() {
     let mut samples_checked = 0;
     for seed in 0..12 {
         let (positions, triangles) = jittered_grid(seed);
-        for samples in [1, 4] {
+        for samples in [1, 4, 8, 16] {
             let plan = plan(&positions, &triangles, samples);
             let words = CpuRenderer::new(1).draw_visibility(&plan, &Deadline::default()).unwrap();
             for (i, word) in words.iter().enumerate() {
@@ -30,7 +30,7 @@ fn shared_edges_own_every_sample_exactly_once() {
             }
         }
     }
-    assert_eq!(samples_checked, 12 * (WIDTH * HEIGHT * 5) as usize);
+    assert_eq!(samples_checked, 12 * (WIDTH * HEIGHT * 29) as usize);
 }
 
 #[test]
@@ -38,7 +38,7 @@ fn soups_are_the_same_with_every_instruction_set_and_thread_count_and_have_the_n
     let mut cases = 0;
     for seed in 0..40 {
         let (positions, triangles) = soup(seed);
-        for samples in [1, 4] {
+        for samples in [1, 4, 8, 16] {
             let plan = plan(&positions, &triangles, samples);
             let words = CpuRenderer::with_isa(1, Isa::Baseline).draw_visibility(&plan, &Deadline::default()).unwrap();
             for renderer in [&mut CpuRenderer::new(1), &mut CpuRenderer::new(3)] {
@@ -50,7 +50,7 @@ fn soups_are_the_same_with_every_instruction_set_and_thread_count_and_have_the_n
             cases += 1;
         }
     }
-    assert_eq!(cases, 80);
+    assert_eq!(cases, 160);
 }
 
 /// The owner covers the sample, and no other triangle that does is clearly nearer.
@@ -116,7 +116,7 @@ fn depth_error(plan: &DrawPlan<'_>, id: u32) -> f64 {
 fn sample_position(plan: &DrawPlan<'_>, sample: usize) -> [i64; 2] {
     let per_pixel = plan.samples as usize;
     let (pixel, s) = (sample / per_pixel, sample % per_pixel);
-    let offset = sample_offsets(plan.samples)[s].map(|v| i64::from(v) * 16);
+    let offset = sample_offsets(plan.samples)[s].map(i64::from);
     let (x, y) = (pixel % plan.width_px as usize, pixel / plan.width_px as usize);
     [
         x as i64 * 256 - i64::from(plan.width_px) * 128 + offset[0],

@@ -145,7 +145,7 @@ fn materials_masks_and_normals_agree() {
     let mut cases = 0;
     for style in ["flat", "smooth", "unlit"] {
         for edges in ["triangles", "polygons"] {
-            for samples in ["1", "4"] {
+            for samples in ["1", "4", "8", "16"] {
                 let spec = scenes::spec(&[
                     ("style", style),
                     ("size", "150x110"),
@@ -170,5 +170,5 @@ fn materials_masks_and_normals_agree() {
             }
         }
     }
-    assert_eq!(cases, 12);
+    assert_eq!(cases, 24);
 }

@@ -173,7 +173,7 @@ fn alpha_that_rounds_below_nothing_agrees() {
     let lit_wire = flags::WIRE_FWIDTH | flags::WIRE_LIT;
     let mut cases = 0;
     for bits in [lit_wire | flags::BLEND, lit_wire | flags::BLEND | flags::MASK, flags::BLEND] {
-        for samples in [1, 4] {
+        for samples in [1, 4, 8, 16] {
             let mut plan = scenes::screen_plan([160, 100], samples, 1.0, &positions, &triangles);
             plan.background = [0.0; 4];
             let surface = plan.surface.as_mut().unwrap();
@@ -187,7 +187,7 @@ fn alpha_that_rounds_below_nothing_agrees() {
             cases += 1;
         }
     }
-    assert_eq!(cases, 6);
+    assert_eq!(cases, 12);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use super::bins::TriangleBin;
 use super::isa::dispatch;
 use super::peel::peel;
 use super::point::Show;
-use super::samples::{NOTHING, SampleBand};
+use super::samples::{NOTHING, SampleBand, for_samples};
 use super::shade::Shader;
 use crate::plan::{LayersPass, roles};
 
@@ -77,8 +77,8 @@ impl LayerBand {
 
     /// Lays a colour under what some samples of the pixel at `first` have so far.
     #[inline(always)]
-    fn lay(&mut self, first: usize, same: [bool; 4], color: [f32; 4]) {
-        for s in (0..4).filter(|&s| same[s]) {
+    fn lay<const S: usize>(&mut self, first: usize, same: [bool; S], color: [f32; 4]) {
+        for s in (0..S).filter(|&s| same[s]) {
             let so_far = &mut self.colors[first + s];
             let rest = 1.0 - so_far[3];
             for k in 0..4 {
@@ -155,15 +155,26 @@ dispatch! {
 
 #[inline(always)]
 fn lay_kernel(stages: &Stages<'_>, show: Show, floor: Option<&SampleBand>, layers: &mut LayerBand, is_open: &mut bool) {
+    for_samples!(layers.found.samples, lay_sampled(stages, show, floor, layers, is_open));
+}
+
+#[inline(always)]
+fn lay_sampled<const S: usize>(
+    stages: &Stages<'_>,
+    show: Show,
+    floor: Option<&SampleBand>,
+    layers: &mut LayerBand,
+    is_open: &mut bool,
+) {
     let hull = stages.plan.hull.as_ref().filter(|_| stages.plan.has_layered_hull());
     let triangles = stages.plan.triangles.len() as u32;
     let mut shader = Shader::new(stages);
     for y in layers.found.shown[0]..layers.found.shown[1] {
         for x in 0..layers.found.size_px[0] {
             let first = layers.found.index(x, y, 0);
-            let mut ids = [NOTHING; 4];
+            let mut ids = [NOTHING; S];
             let mut any = false;
-            for s in 0..layers.found.samples as usize {
+            for s in 0..S {
                 let at = first + s;
                 let Some(id) = layers.take(floor, at) else { continue };
                 any = true;
@@ -181,7 +192,7 @@ fn lay_kernel(stages: &Stages<'_>, show: Show, floor: Option<&SampleBand>, layer
                 continue;
             }
             shader.groups(ids, [x, y], |_| show, |same, color| layers.lay(first, same, color));
-            for s in 0..layers.found.samples as usize {
+            for s in 0..S {
                 *is_open |= layers.previous.depth[first + s] > 0.0;
             }
         }
@@ -190,6 +201,11 @@ fn lay_kernel(stages: &Stages<'_>, show: Show, floor: Option<&SampleBand>, layer
 
 #[inline(always)]
 fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colors: &mut [[f32; 4]]) {
+    for_samples!(base.samples, under_sampled(stages, base, layers, colors));
+}
+
+#[inline(always)]
+fn under_sampled<const S: usize>(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colors: &mut [[f32; 4]]) {
     let plan = stages.plan;
     let wires_only = plan.layers().is_some_and(|pass| pass.wires_only);
     let show = |id: u32| match wires_only && plan.role(id as usize) & roles::LAYER != 0 {
@@ -197,14 +213,14 @@ fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colo
         false => Show::ALL,
     };
     let mut shader = Shader::new(stages);
-    let share = 1.0 / base.samples as f32;
+    let share = 1.0 / S as f32;
     let mut colors = colors.iter_mut();
     for y in base.shown[0]..base.shown[1] {
         for x in 0..base.size_px[0] {
             let Some(out) = colors.next() else { return };
             let first = base.index(x, y, 0);
-            let mut ids = [NOTHING; 4];
-            for s in 0..base.samples as usize {
+            let mut ids = [NOTHING; S];
+            for s in 0..S {
                 ids[s] = base.ids[first + s];
                 let over = layers.colors[first + s];
                 for k in 0..4 {
@@ -213,7 +229,7 @@ fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colo
             }
             shader.groups(ids, [x, y], show, |same, color| {
                 let rest = |s: usize| if same[s] { 1.0 - layers.colors[first + s][3] } else { 0.0 };
-                let weight = share * (0..base.samples as usize).map(rest).sum::<f32>();
+                let weight = share * (0..S).map(rest).sum::<f32>();
                 for k in 0..4 {
                     out[k] += weight * color[k];
                 }

@@ -29,7 +29,7 @@ fn pixel(stages: &Stages<'_>, surface: &SurfacePass<'_>, band: &SampleBand, [x, 
     for (&id, offset) in band.pixel(x, y).0.iter().zip(sample_offsets(band.samples)) {
         // Neither a hull nor nothing.
         if id < plan.triangles.len() as u32 {
-            let at = [(corner[0] + 16 * offset[0]) as f32, (corner[1] + 16 * offset[1]) as f32];
+            let at = [(corner[0] + offset[0]) as f32, (corner[1] + offset[1]) as f32];
             let light = point(stages, surface, id, at);
             sum = Light { gain: sum.gain + light.gain, gloss: sum.gloss + light.gloss };
             count += 1.0;

@@ -2,6 +2,19 @@
 
 use super::isa::LANES;
 
+/// Calls `f::<S>` for `S` samples a pixel, so that its loops over them have a constant length.
+macro_rules! for_samples {
+    ($samples:expr, $($f:ident).+ ($($argument:expr),* $(,)?)) => {
+        match $samples {
+            1 => $($f).+::<1>($($argument),*),
+            4 => $($f).+::<4>($($argument),*),
+            8 => $($f).+::<8>($($argument),*),
+            _ => $($f).+::<16>($($argument),*),
+        }
+    };
+}
+pub(super) use for_samples;
+
 /// No triangle.
 pub const NOTHING: u32 = u32::MAX;
 

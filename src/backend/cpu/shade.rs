@@ -5,18 +5,24 @@
 
 use super::Stages;
 use super::point::{PointShader, Show};
-use super::samples::{NOTHING, SampleBand};
+use super::samples::{NOTHING, SampleBand, for_samples};
+use super::transform::recip;
 use crate::plan::sample_offsets;
 
 /// Shades every pixel of the band into `colors` (premultiplied linear RGBA, row by row, nothing behind it).
 #[inline(always)]
 pub fn shade(stages: &Stages<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
+    for_samples!(band.samples, shade_sampled(stages, band, colors));
+}
+
+#[inline(always)]
+fn shade_sampled<const S: usize>(stages: &Stages<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
     let width = band.size_px[0];
     let mut shader = Shader::new(stages);
     for y in band.shown[0]..band.shown[1] {
         let line = &mut colors[((y - band.shown[0]) * width) as usize..][..width as usize];
         for (x, color) in (0_u32..).zip(line) {
-            *color = shader.pixel(band, x, y);
+            *color = shader.pixel::<S>(band, x, y);
         }
     }
 }
@@ -36,29 +42,28 @@ impl<'a> Shader<'a> {
     }
 
     #[inline(always)]
-    fn pixel(&mut self, band: &SampleBand, x: u32, y: u32) -> [f32; 4] {
-        let first = band.ids[band.index(x, y, 0)];
-        if band.samples == 1 {
-            return self.group(first, x, y, [8, 8], 1);
+    fn pixel<const S: usize>(&mut self, band: &SampleBand, x: u32, y: u32) -> [f32; 4] {
+        let at = band.index(x, y, 0);
+        let mut ids = [band.ids[at]; S];
+        let mut is_mixed = false;
+        for s in 1..S {
+            ids[s] = band.ids[at + s];
+            is_mixed |= ids[s] != ids[0];
         }
-        let mut ids = [first; 4];
-        for s in 1..4 {
-            ids[s] = band.ids[band.index(x, y, s as u32)];
-        }
-        if ids == [first; 4] {
-            return self.group(first, x, y, [32, 32], 4);
+        if !is_mixed {
+            return self.group(ids[0], x, y, [128 * S as i32; 2], S as i32);
         }
         self.mixed_pixel(ids, x, y)
     }
 
-    fn mixed_pixel(&mut self, ids: [u32; 4], x: u32, y: u32) -> [f32; 4] {
+    fn mixed_pixel<const S: usize>(&mut self, ids: [u32; S], x: u32, y: u32) -> [f32; 4] {
         let mut sum = [0.0; 4];
         self.groups(
             ids,
             [x, y],
             |_| Show::ALL,
             |same, color| {
-                let weight = same.map(|same| f32::from(u8::from(same)) * 0.25).iter().sum::<f32>();
+                let weight = same.iter().filter(|same| **same).count() as f32 / S as f32;
                 for k in 0..4 {
                     sum[k] += weight * color[k];
                 }
@@ -68,17 +73,17 @@ impl<'a> Shader<'a> {
     }
 
     /// Shades each triangle among a pixel's samples once, at the mean position of its samples, and calls `each` with which
-    /// samples these are, and its colour. `ids` past the samples are [`NOTHING`].
+    /// samples these are, and its colour.
     #[inline(always)]
-    pub fn groups(
+    pub fn groups<const S: usize>(
         &mut self,
-        ids: [u32; 4],
+        ids: [u32; S],
         [x, y]: [u32; 2],
         show: impl Fn(u32) -> Show,
-        mut each: impl FnMut([bool; 4], [f32; 4]),
+        mut each: impl FnMut([bool; S], [f32; 4]),
     ) {
-        let offsets = sample_offsets(self.stages.plan.samples);
-        for s in 0..offsets.len() {
+        let offsets = sample_offsets(S as u32);
+        for s in 0..S {
             // Each triangle is shaded at the first of its samples; the others are done with.
             if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {
                 continue;
@@ -96,7 +101,7 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The colour of triangle `id` at the mean of `count` samples whose offsets in 1/16 px add up to `offset_sum`.
+    /// The colour of triangle `id` at the mean of `count` samples whose offsets in 1/256 px add up to `offset_sum`.
     #[inline(always)]
     fn group(&mut self, id: u32, x: u32, y: u32, offset_sum: [i32; 2], count: i32) -> [f32; 4] {
         if id == NOTHING {
@@ -106,7 +111,7 @@ impl<'a> Shader<'a> {
             return color;
         }
         let plan = self.stages.plan;
-        let scale = 16.0 * [1.0, 0.5, 1.0 / 3.0, 0.25][count as usize - 1];
+        let scale = recip(count as f32);
         let corner = [x as i32 * 256 - plan.width_px as i32 * 128, y as i32 * 256 - plan.height_px as i32 * 128];
         let at = [corner[0] as f32 + offset_sum[0] as f32 * scale, corner[1] as f32 + offset_sum[1] as f32 * scale];
         match (self.stages.is_hull(id), &plan.surface, &plan.hull) {

@@ -5,7 +5,7 @@
 //! depend on where a traversal began.
 
 use super::isa::LANES;
-use super::samples::SampleBand;
+use super::samples::{SampleBand, for_samples};
 use super::transform::{ScreenVertex, recip};
 use crate::plan::{Faces, sample_offsets};
 
@@ -116,10 +116,7 @@ impl<const TIES: bool> Target for Nearest<'_, TIES> {
 /// Draws a triangle into the target.
 #[inline(always)]
 pub fn draw(setup: &Setup, id: u32, target: &mut impl Target) {
-    match target.band().samples {
-        1 => draw_sampled::<1>(setup, id, target),
-        _ => draw_sampled::<4>(setup, id, target),
-    }
+    for_samples!(target.band().samples, draw_sampled(setup, id, target))
 }
 
 #[inline(always)]
@@ -127,8 +124,10 @@ fn draw_sampled<const S: usize>(setup: &Setup, id: u32, target: &mut impl Target
     let band = target.band();
     let Some([columns, rows]) = setup.bounds(band) else { return };
     let edges = Edges::new(setup);
-    let lanes = Lanes::new::<S>(&edges);
-    let origin = [band.size_px[0] as i32 * 128, band.size_px[1] as i32 * 128];
+    let lanes = [Lanes::new::<S>(&edges, 0), Lanes::new::<S>(&edges, LANES)];
+    // All samples lie multiples of 1/16 px from here.
+    let shift = sample_offsets(S as u32)[0][0] & 15;
+    let origin = [band.size_px[0] as i32 * 128 - shift, band.size_px[1] as i32 * 128 - shift];
     let mut row = rows[0];
     while row <= rows[1] {
         let mut column = columns[0];
@@ -183,7 +182,7 @@ impl Edges {
     }
 }
 
-/// What each lane adds: a vector covers `LANES / S` neighbouring pixels, all samples of each.
+/// What each lane adds: a vector covers all samples of `LANES / S` neighbouring pixels, or `LANES` of the samples of one.
 struct Lanes {
     /// To each edge function.
     edges: [[i32; LANES]; 3],
@@ -194,12 +193,12 @@ struct Lanes {
 
 impl Lanes {
     #[inline(always)]
-    fn new<const S: usize>(edges: &Edges) -> Self {
+    fn new<const S: usize>(edges: &Edges, first: usize) -> Self {
         let offsets = sample_offsets(S as u32);
         let (mut x, mut y) = ([0; LANES], [0; LANES]);
         for l in 0..LANES {
-            x[l] = 16 * (l / S) as i32 + offsets[l % S][0];
-            y[l] = offsets[l % S][1];
+            x[l] = 16 * (l / S) as i32 + (offsets[(first + l) % S][0] >> 4);
+            y[l] = offsets[(first + l) % S][1] >> 4;
         }
         let mut steps = [[0; LANES]; 3];
         for k in 0..3 {
@@ -222,15 +221,24 @@ struct Block {
 
 impl Block {
     #[inline(always)]
-    fn draw<const S: usize>(&self, setup: &Setup, edges: &Edges, lanes: &Lanes, id: u32, target: &mut impl Target) {
-        let pixels = (LANES / S) as i32;
+    fn draw<const S: usize>(
+        &self,
+        setup: &Setup,
+        edges: &Edges,
+        lanes: &[Lanes; 2],
+        id: u32,
+        target: &mut impl Target,
+    ) {
+        let pixels = (LANES / S).max(1) as i32;
         for y in 0..self.size[1] {
             let mut x = 0;
             while x < self.size[0] {
                 let at = target.band().index((self.column + x) as u32, (self.row + y) as u32, 0);
-                let outside = self.outside(edges, lanes, x, y);
                 let from = [self.corner[0] + 256 * x - setup.x[0], self.corner[1] + 256 * y - setup.y[0]];
-                target.offer(at, &outside, &setup.depth_lanes(lanes, from), id);
+                for part in 0..S.div_ceil(LANES) {
+                    let outside = self.outside(edges, &lanes[part], x, y);
+                    target.offer(at + LANES * part, &outside, &setup.depth_lanes(&lanes[part], from), id);
+                }
                 x += pixels;
             }
         }

@@ -18,7 +18,7 @@ const EMIT: &str = include_str!("../../../shaders/emit.wgsl");
 const EMIT_LAYER: &str = include_str!("../../../shaders/emit_layer.wgsl");
 const GROUP: &str = include_str!("../../../shaders/group.wgsl");
 
-/// What shade and layers have in common: from where a point lies to its colour.
+/// What shade, layers and line_light have in common: from where a point lies to its colour.
 const SHADE: &[&str] = &[
     include_str!("../../../shaders/barycentric.wgsl"),
     include_str!("../../../shaders/texture.wgsl"),
@@ -26,8 +26,6 @@ const SHADE: &[&str] = &[
     include_str!("../../../shaders/wire.wgsl"),
     include_str!("../../../shaders/debug.wgsl"),
     include_str!("../../../shaders/point.wgsl"),
-    GROUP,
-    LAYERED,
 ];
 
 impl Stage {
@@ -188,11 +186,13 @@ impl Stage {
                 [COMMON, TRIANGLE, SAMPLES, keep_nearest(write), &emit(into), kernel].concat()
             }
             Self::Layers => {
-                [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/layers.wgsl")]].concat().concat()
+                [&[COMMON, TRIANGLE], SHADE, &[GROUP, LAYERED, include_str!("../../../shaders/layers.wgsl")]]
+                    .concat()
+                    .concat()
             }
-            Self::Shade => {
-                [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/shade.wgsl")]].concat().concat()
-            }
+            Self::Shade => [&[COMMON, TRIANGLE], SHADE, &[GROUP, LAYERED, include_str!("../../../shaders/shade.wgsl")]]
+                .concat()
+                .concat(),
             Self::LineLight => {
                 [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/line_light.wgsl")]].concat().concat()
             }
@@ -216,23 +216,23 @@ impl Stage {
             | WIRES
             | PAINT
             | look::CLIPPED
-            | look::FOUR_SAMPLES
+            | look::SAMPLES
             | look::HULL_LOOKS
             | look::WIRES_ONLY;
         match self {
             Self::Transform => 0,
             Self::Clip => look::ROLES | look::LAYERS,
-            Self::Visibility { into: Into::Surface, .. } => look::FOUR_SAMPLES | look::ROLES,
+            Self::Visibility { into: Into::Surface, .. } => look::SAMPLES | look::ROLES,
             Self::Visibility { into: Into::Layer, .. } => {
-                look::FOUR_SAMPLES | look::ROLES | look::LAYERS | look::BEHIND_SURFACE
+                look::SAMPLES | look::ROLES | look::LAYERS | look::BEHIND_SURFACE
             }
-            Self::VisibilityTile { into: Into::Surface, .. } => look::FOUR_SAMPLES,
-            Self::VisibilityTile { into: Into::Layer, .. } => look::FOUR_SAMPLES | look::BEHIND_SURFACE,
+            Self::VisibilityTile { into: Into::Surface, .. } => look::SAMPLES,
+            Self::VisibilityTile { into: Into::Layer, .. } => look::SAMPLES | look::BEHIND_SURFACE,
             Self::Layers => SHADED | look::LAYERED_HULL,
             Self::Shade => SHADED | look::LAYERS,
             Self::LineLight => SHADED,
             Self::Ink => 0,
-            Self::Lines => look::CONTOURS | look::CLIPPED | look::FOUR_SAMPLES,
+            Self::Lines => look::CONTOURS | look::CLIPPED | look::SAMPLES,
             Self::Resolve => look::SURFACE | look::HULL | look::LINES | look::LIT_LINES,
         }
     }

@@ -11,7 +11,11 @@ pub const TRIANGLE_MATERIALS: u32 = 64;
 pub const EDGE_MASKS: u32 = 128;
 pub const LINES: u32 = 256;
 pub const CLIPPED: u32 = 2048;
+pub const EIGHT_SAMPLES: u32 = 512;
+pub const SIXTEEN_SAMPLES: u32 = 1024;
 pub const FOUR_SAMPLES: u32 = 4096;
+/// How many samples a pixel has.
+pub const SAMPLES: u32 = FOUR_SAMPLES | EIGHT_SAMPLES | SIXTEEN_SAMPLES;
 pub const LIT_LINES: u32 = 8192;
 pub const CONTOURS: u32 = 16384;
 pub const ROLES: u32 = 0x10_0000;
@@ -33,7 +37,7 @@ pub const VARYING: u32 = 0x4000_0000;
 pub fn look(plan: &DrawPlan<'_>) -> u32 {
     let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
     let count = plan.triangles.len();
-    let mut look = when(plan.projection.clip, CLIPPED) | when(plan.samples == 4, FOUR_SAMPLES);
+    let mut look = when(plan.projection.clip, CLIPPED) | samples(plan.samples);
     if let Some(surface) = &plan.surface {
         let all = surface.all_flags();
         look |= when(surface.is_shaded, SURFACE) | when(surface.triangle_materials.len() == count, TRIANGLE_MATERIALS);
@@ -53,6 +57,15 @@ pub fn look(plan: &DrawPlan<'_>) -> u32 {
     look | when(!plan.lines.is_empty(), LINES)
         | when(plan.lines.iter().any(|lines| lines.contour), CONTOURS)
         | when(plan.lights_lines(), LIT_LINES)
+}
+
+fn samples(count: u32) -> u32 {
+    match count {
+        1 => 0,
+        4 => FOUR_SAMPLES,
+        8 => EIGHT_SAMPLES,
+        _ => SIXTEEN_SAMPLES,
+    }
 }
 
 /// What changes over a triangle.
@@ -88,6 +101,8 @@ mod tests {
             ("EDGE_MASKS", EDGE_MASKS),
             ("LINES", LINES),
             ("CLIPPED", CLIPPED),
+            ("EIGHT_SAMPLES", EIGHT_SAMPLES),
+            ("SIXTEEN_SAMPLES", SIXTEEN_SAMPLES),
             ("FOUR_SAMPLES", FOUR_SAMPLES),
             ("LIT_LINES", LIT_LINES),
             ("CONTOURS", CONTOURS),

@@ -141,7 +141,7 @@ fn image() -> Vec<Field> {
         .default(()),
         value(
             "image.samples",
-            Kind::OneOf(&[1, 4]),
+            Kind::OneOf(&[1, 4, 8, 16]),
             |d: &mut Draft, v| (d.image.samples, d.open.samples) = (v, false),
             "Visibility samples a pixel.",
         )

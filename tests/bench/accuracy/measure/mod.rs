@@ -22,8 +22,8 @@ use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::{Gpu, GpuRenderer};
 
-/// Visibility samples a pixel. More can be added here as plans learn them.
-pub const SAMPLES: &[u32] = &[1, 4];
+/// Visibility samples a pixel.
+pub const SAMPLES: &[u32] = &[1, 4, 8, 16];
 
 /// Threads of the CPU's renderers; the first is the baseline's.
 const THREADS: [usize; 2] = [1, 2];
