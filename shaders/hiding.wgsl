@@ -192,17 +192,14 @@ fn lies_deep(s: Segment, range: vec2<f32>) -> bool {
 
 // Where a triangle's records are.
 fn corners_of_id(id: u32) -> vec3<u32> {
-    let is_hull = id >= frame.triangle_count;
-    let at = 3u * select(id, id - frame.triangle_count, is_hull);
-    return vec3(triangles[at], triangles[at + 1u], triangles[at + 2u]) + select(0u, frame.hull_base, is_hull);
+    return vec3(triangles[3u * id], triangles[3u * id + 1u], triangles[3u * id + 2u]);
 }
 
 // Where along the edge a triangle lies in front of it; empty (x >= y) where nowhere.
 fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     let none = vec2(1.0, 0.0);
     let v = corners_of_id(id);
-    let is_hull = id >= frame.triangle_count;
-    if !is_hull && any(v == vec3(edge.x)) && any(v == vec3(edge.y)) {
+    if any(v == vec3(edge.x)) && any(v == vec3(edge.y)) {
         return none;
     }
     let a = vertices[v.x];
@@ -214,7 +211,7 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     var r = vec4(f32(c.x), f32(c.y), c.z, 1.0);
     var is_clockwise: bool;
     if a.x == OUTSIDE || b.x == OUTSIDE || c.x == OUTSIDE {
-        if is_hull || !has(CLIPPED) {
+        if id >= frame.triangle_count || !has(CLIPPED) {
             return none;
         }
         p = homogeneous_of(v.x);

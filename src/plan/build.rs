@@ -2,12 +2,14 @@
 
 use std::borrow::Cow;
 
+use super::outline::Outlines;
 use super::parts::Parts;
+use super::rim;
 use super::skips::{SkipKind, Skips};
 use super::textures::TextureLoader;
 use super::{
-    CornerValues, DrawPlan, Faces, HullOffset, HullPass, LayersPass, PlanError, Projection, SurfacePass, flags, lights,
-    loose, materials, miter, wires,
+    CornerValues, DrawPlan, Faces, HullPass, LayersPass, PlanError, Projection, SurfacePass, Thickness, flags, lights,
+    loose, materials, wires,
 };
 use crate::limits::{Budget, Deadline, LimitExceeded};
 use crate::mesh::{Mesh, normals};
@@ -63,15 +65,16 @@ pub fn build_keeping<'a>(
     let lines =
         wires::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, &mut means)?;
     let surface = surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
-    let welded = surface.as_ref().and_then(|s| s.vertex_normals.as_ref()).filter(|_| mesh.normals.is_empty());
     let no_hull = skips.skip(SkipKind::Hull, !parts.has_hull(), "the look has no hull");
-    let welded = welded.map(|n| n.values.clone());
-    let hull = (!no_hull).then(|| hull_pass(mesh, &parts, welded, &projection(&camera, size_px, true)));
+    let hull = match (no_hull, parts.has_hull()) {
+        (true, _) => None,
+        (false, false) => Some(HullPass::default()),
+        (false, true) => {
+            Some(hull_pass(mesh, &parts, (&projection(&camera, size_px, true), size_px), &mut edges, &mut means)?)
+        }
+    };
     let layers = layers_pass(&parts, hull.is_some(), &mut skips);
-    let mut roles = parts.roles(mesh, surface.is_some(), layers.as_ref(), hull.is_some());
-    if let Some(HullPass { offset: HullOffset::Px(_), .. }) = hull {
-        miter::leave_out_fronts(mesh, &projection(&camera, size_px, true), roles.to_mut());
-    }
+    let roles = parts.roles(mesh, surface.is_some(), layers.as_ref());
     let unclipped = skips.skip(
         SkipKind::Clipping,
         camera.contains_mesh,
@@ -107,10 +110,9 @@ fn pay(mesh: &Mesh, size_px: [u32; 2], parts: &Parts<'_>, budget: &mut Budget) -
         budget.spend("lists of layers", mesh.triangles.len() as u64, 32)?;
     }
     let is_smooth = parts.looks.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::scene::Shading::Smooth));
-    if parts.has_hull() || (is_smooth && mesh.normals.is_empty()) {
-        // Sums in f64, then the unit normals in f32, perhaps a copy of them, and how far each moves; or where each is on
-        // screen, which way the silhouette goes there and how it turns, in place of the sums.
-        budget.spend("vertex normals", mesh.positions.len() as u64, 76)?;
+    if is_smooth && mesh.normals.is_empty() {
+        // Sums in f64, then the unit normals in f32.
+        budget.spend("vertex normals", mesh.positions.len() as u64, 36)?;
     }
     Ok(())
 }
@@ -131,9 +133,9 @@ pub(super) fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
         if let Some(outline) = &layers.outline {
             // Half of a contour lies on the surface itself.
             let share = if outline.method == OutlineMethod::Contour { 0.5 } else { 1.0 };
-            match outline_offset(mesh, outline) {
-                HullOffset::Object(grow) => border.grow = border.grow.max(share * f64::from(grow)),
-                HullOffset::Px(px) => border.px = border.px.max(share * f64::from(px)),
+            match thickness(mesh, outline) {
+                Thickness::Object(grow) => border.grow = border.grow.max(share * f64::from(grow)),
+                Thickness::Px(px) => border.px = border.px.max(share * f64::from(px)),
             }
         }
         if let Some(wire) = layers.wire.filter(|wire| wire.method == WireMethod::Exact) {
@@ -146,15 +148,15 @@ pub(super) fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
     border
 }
 
-fn outline_offset(mesh: &Mesh, outline: &Outline) -> HullOffset {
+fn thickness(mesh: &Mesh, outline: &Outline) -> Thickness {
     match outline.unit {
-        OutlineUnit::Px => HullOffset::Px(outline.thickness.unwrap_or(OUTLINE_PX)),
+        OutlineUnit::Px => Thickness::Px(outline.thickness.unwrap_or(OUTLINE_PX)),
         OutlineUnit::Object => {
             let [low, high] = mesh.bounds;
             let side = (0..3).map(|k| high[k] - low[k]).fold(0.0, f32::max);
-            let thickness = outline.thickness.map(|t| (f64::from(t) / mesh.to_file.scale) as f32);
-            // A hull thicker than the guard band is wide shows nothing but itself.
-            HullOffset::Object(thickness.unwrap_or(OUTLINE_OBJECT_SHARE * side).min(16.0))
+            let asked = outline.thickness.map(|t| (f64::from(t) / mesh.to_file.scale) as f32);
+            // An outline thicker than the guard band is wide shows nothing but itself.
+            Thickness::Object(asked.unwrap_or(OUTLINE_OBJECT_SHARE * side).min(16.0))
         }
     }
 }
@@ -162,9 +164,9 @@ fn outline_offset(mesh: &Mesh, outline: &Outline) -> HullOffset {
 /// Width of a contour in pixels; one in object units is as wide as at the mesh's centre.
 fn contour_px(mesh: &Mesh, outline: &Outline, camera: &Camera, size_px: [u32; 2]) -> f32 {
     const PX_MAX: f32 = 100.0;
-    match outline_offset(mesh, outline) {
-        HullOffset::Px(px) => px.min(PX_MAX),
-        HullOffset::Object(units) => ((f64::from(units) * camera.px_per_unit(size_px)) as f32).min(PX_MAX),
+    match thickness(mesh, outline) {
+        Thickness::Px(px) => px.min(PX_MAX),
+        Thickness::Object(units) => ((f64::from(units) * camera.px_per_unit(size_px)) as f32).min(PX_MAX),
     }
 }
 
@@ -280,29 +282,29 @@ fn layers_pass(parts: &Parts<'_>, has_hull: bool, skips: &mut Skips<'_>) -> Opti
 fn hull_pass<'a>(
     mesh: &'a Mesh,
     parts: &Parts<'_>,
-    welded: Option<Cow<'a, [[f32; 3]]>>,
-    projection: &Projection,
-) -> HullPass<'a> {
+    (projection, size_px): (&Projection, [u32; 2]),
+    edges: &mut wires::Edges,
+    means: &mut Means<'_>,
+) -> Result<HullPass<'a>, PlanError> {
     let outline = |m: usize| parts.layers[m].outline.filter(|o| o.method == OutlineMethod::Hull);
-    let offsets: Vec<Option<HullOffset>> =
-        (0..parts.layers.len()).map(|m| outline(m).map(|o| outline_offset(mesh, &o))).collect();
+    let thicknesses: Vec<Option<Thickness>> =
+        (0..parts.layers.len()).map(|m| outline(m).map(|o| thickness(mesh, &o))).collect();
     let mut colors: Vec<[f32; 4]> =
         (0..parts.layers.len()).map(|m| outline(m).map_or([0.0; 4], |o| o.color.premultiplied())).collect();
-    let used: Vec<[f32; 4]> = (0..colors.len()).filter(|&m| offsets[m].is_some()).map(|m| colors[m]).collect();
+    let used: Vec<[f32; 4]> = (0..colors.len()).filter(|&m| thicknesses[m].is_some()).map(|m| colors[m]).collect();
     let color = used.first().copied().unwrap_or_default();
     if used.iter().all(|c| *c == color) {
         colors = vec![color];
     }
-    let first = offsets.iter().flatten().next().copied().unwrap_or(HullOffset::Px(0.0));
-    let is_px = matches!(first, HullOffset::Px(_));
-    let is_same = offsets.iter().flatten().all(|offset| *offset == first);
-    let mut amounts = if is_same && !is_px { Vec::new() } else { miter::amounts(mesh, &offsets) };
-    // The file's normals may split at hard edges, where a hull that followed them would tear: always the welded ones.
-    let mut normals = welded.unwrap_or_else(|| normals::angle_weighted(mesh).into());
-    if is_px {
-        miter::miter(mesh, projection, &offsets, normals.to_mut(), &mut amounts);
-    }
     let tells_apart = colors.len() > 1 || (parts.layers_pass().is_some() && mesh.materials.len() > 1);
-    let triangle_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
-    HullPass { colors, normals, offset: first, amounts, triangle_materials }
+    let list = edges.of(mesh, means)?;
+    let view = rim::View::new(mesh, projection, means.budget)?;
+    let rims = view.rims(parts, &thicknesses, list, (means.budget, means.deadline))?;
+    let means = (&mut *means.budget, means.deadline);
+    let surface_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
+    let mut hull = Outlines::draw(&view, &thicknesses, size_px, &rims, means)?;
+    if !tells_apart {
+        hull.triangle_materials = Vec::new();
+    }
+    Ok(HullPass { colors, surface_materials, ..hull })
 }

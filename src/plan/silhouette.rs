@@ -11,7 +11,7 @@ use crate::mesh::edges::EdgeList;
 /// Contours' edges. Of an edge's faces only those count that are drawn.
 pub struct Silhouettes<'a> {
     mesh: &'a Mesh,
-    /// Parts that are not drawn while others are.
+    /// Parts that are not drawn while others are, and have no hull either.
     absent: Vec<bool>,
     /// All faces of the edges that have more than two.
     crowded: BTreeMap<u32, Vec<u32>>,
@@ -24,7 +24,8 @@ impl<'a> Silhouettes<'a> {
         budget.spend("edges of many faces", list.further_faces.len() as u64, 100)?;
         budget.spend("materials", parts.layers.len() as u64, 1)?;
         let has_fill = parts.has_fill();
-        let absent = (0..parts.layers.len()).map(|m| has_fill && parts.fill(m) == Fill::None).collect();
+        let is_absent = |m: usize| has_fill && parts.fill(m) == Fill::None && !parts.is_outlined(m);
+        let absent = (0..parts.layers.len()).map(is_absent).collect();
         let mut crowded: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for &[edge, face] in &list.further_faces {
             let first_two = list.edges[edge as usize].faces;

@@ -47,7 +47,8 @@ enum Class {
 pub struct Edges(Option<EdgeList>);
 
 impl Edges {
-    fn of(&mut self, mesh: &Mesh, means: &mut Means<'_>) -> Result<&EdgeList, PlanError> {
+    /// All of them.
+    pub fn of(&mut self, mesh: &Mesh, means: &mut Means<'_>) -> Result<&EdgeList, PlanError> {
         let list = match self.0.take() {
             Some(list) => list,
             None => {
@@ -74,7 +75,11 @@ pub fn passes(
     wants.extend(spec.topology.iter().flat_map(topology_wants));
     wants.extend(contour_wants(parts, contour_px));
     wants.retain(|want| want.width_px + want.smoothing_px > 0.0 && want.color[3] > 0.0);
-    if skips.skip(SkipKind::Adjacency, wants.is_empty(), "no line asks which triangles are neighbours") {
+    if skips.skip(
+        SkipKind::Adjacency,
+        wants.is_empty() && !parts.has_hull(),
+        "no line asks which triangles are neighbours",
+    ) {
         return Ok(Vec::new());
     }
     let list = edges.of(mesh, means)?;

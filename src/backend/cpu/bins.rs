@@ -10,7 +10,7 @@ use super::transform::{ScreenVertex, homogeneous};
 use super::visibility::{area, axis_bounds, is_wanted};
 use super::{CHUNK, Stages, contour};
 use crate::limits::Stopped;
-use crate::plan::{DrawPlan, Faces, LinePass, roles};
+use crate::plan::{DrawPlan, Faces, HullPass, LinePass, roles};
 
 /// What touches more bands than this is listed once for all of them, or large triangles on a tall picture would take
 /// gigabytes of lists.
@@ -112,8 +112,7 @@ pub fn bin(stages: &Stages<'_>, pool: Option<&rayon::ThreadPool>, [rows, margin]
 /// Triangles that are drawn for the same reason.
 struct Pass {
     ids: Range<usize>,
-    /// Added to a triangle's index to get its id.
-    id_base: usize,
+    /// The role that triangles must have; of a hull's none.
     role: u8,
     faces: Faces,
 }
@@ -126,10 +125,12 @@ impl Pass {
     /// Which faces of a triangle are drawn; None where it has another role.
     #[inline(always)]
     fn faces_of(&self, plan: &DrawPlan<'_>, id: usize) -> Option<Faces> {
-        match plan.roles.get(id - self.id_base) {
+        if self.role == 0 {
+            return Some(self.faces);
+        }
+        match plan.roles.get(id) {
             None => Some(self.faces),
             Some(role) if role & self.role == 0 => None,
-            _ if self.role == roles::HULL => Some(self.faces),
             Some(role) if role & roles::FRONT_ONLY != 0 => Some(Faces::Front),
             Some(role) if role & roles::BACK_ONLY != 0 => Some(Faces::Back),
             _ => Some(self.faces),
@@ -140,9 +141,9 @@ impl Pass {
 /// What goes into the visibility buffer, and what into the layers.
 fn passes(plan: &DrawPlan<'_>) -> (Vec<Pass>, Vec<Pass>) {
     let count = plan.triangles.len();
-    let surface = |role| plan.surface.as_ref().map(|s| Pass { ids: 0..count, id_base: 0, role, faces: s.faces });
-    let pushed = Pass { ids: count..2 * count, id_base: count, role: roles::HULL, faces: Faces::Back };
-    let hull = plan.hull.as_ref().map(|_| pushed);
+    let surface = |role| plan.surface.as_ref().map(|s| Pass { ids: 0..count, role, faces: s.faces });
+    let around = |hull: &HullPass<'_>| Pass { ids: count..count + hull.triangles.len(), role: 0, faces: Faces::Both };
+    let hull = plan.hull.as_ref().map(around);
     // Without roles, nothing is a layer.
     let layer = surface(roles::LAYER).filter(|_| plan.layers().is_some() && !plan.roles.is_empty());
     let (base_hull, layered_hull) = if plan.has_layered_hull() { (None, hull) } else { (hull, None) };
@@ -179,7 +180,7 @@ fn bin_triangles(stages: &Stages<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBi
 
 fn bin_clipped(stages: &Stages<'_>, rows: [u32; 2], id: u32, faces: Faces, bin: &mut TriangleBin) {
     let plan = stages.plan;
-    if !plan.projection.clip {
+    if !plan.projection.clip || stages.is_hull(id) {
         return;
     }
     let corners = stages.positions_of(id).map(|(position, _)| homogeneous(&plan.projection, position));

@@ -159,16 +159,15 @@ type Corner = [f32; 4];
 /// Where along the edge the triangle lies in front of it.
 #[inline(always)]
 fn hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, id: u32) -> Option<[f32; 2]> {
-    let (vertices, is_hull) = stages.triangle(id);
-    // A hull shares its vertices' numbers with the surface, but not their place.
-    if !is_hull && edge.vertices.iter().all(|v| vertices.contains(v)) {
+    let vertices = stages.triangle(id);
+    if edge.vertices.iter().all(|v| vertices.contains(v)) {
         return None;
     }
     let on_screen = stages.screen_triangle(id);
     let corners: [Corner; 3];
     let is_clockwise;
     if on_screen.iter().any(ScreenVertex::is_outside) {
-        if is_hull {
+        if stages.is_hull(id) {
             return None;
         }
         corners = vertices.map(|v| homogeneous(&stages.plan.projection, stages.plan.positions[v as usize]));

@@ -182,7 +182,7 @@ fn lay_sampled<const S: usize>(
                     ids[s] = id;
                     continue;
                 };
-                let bit = 1 << (hull.material((id % triangles) as usize) % 32);
+                let bit = 1 << (hull.material(id as usize) % 32);
                 if id < triangles || layers.materials[at] & bit == 0 {
                     ids[s] = id;
                 }

@@ -33,12 +33,7 @@ impl Stage {
     pub fn buffers(self) -> &'static [(Slot, Access)] {
         use Access::{Read, ReadWrite};
         match self {
-            Self::Transform => &[
-                (Slot::Positions, Read),
-                (Slot::HullNormals, Read),
-                (Slot::HullAmounts, Read),
-                (Slot::Vertices, ReadWrite),
-            ],
+            Self::Transform => &[(Slot::Positions, Read), (Slot::Vertices, ReadWrite)],
             Self::Visibility { into: Into::Surface, .. } => &[
                 (Slot::Triangles, Read),
                 (Slot::Roles, Read),
@@ -59,8 +54,6 @@ impl Stage {
             ],
             Self::Clip => &[
                 (Slot::Positions, Read),
-                (Slot::HullNormals, Read),
-                (Slot::HullAmounts, Read),
                 (Slot::Triangles, Read),
                 (Slot::Roles, Read),
                 (Slot::Vertices, Read),
@@ -227,8 +220,8 @@ impl Stage {
             | look::HULL_LOOKS
             | look::WIRES_ONLY;
         match self {
-            Self::Transform => look::HULL_PX | look::HULL_AMOUNTS,
-            Self::Clip => look::HULL_PX | look::HULL_AMOUNTS | look::ROLES | look::LAYERS,
+            Self::Transform => 0,
+            Self::Clip => look::ROLES | look::LAYERS,
             Self::Visibility { into: Into::Surface, .. } => look::SAMPLES | look::ROLES,
             Self::Visibility { into: Into::Layer, .. } => {
                 look::SAMPLES | look::ROLES | look::LAYERS | look::BEHIND_SURFACE

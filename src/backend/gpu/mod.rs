@@ -24,7 +24,7 @@ use std::sync::Arc;
 pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
-use self::params::{attributes, corner_triangles, edge_lists, hull_amounts, hull_looks};
+use self::params::{attributes, corner_triangles, edge_lists, hull_looks};
 use self::recorder::Recorder;
 use self::schedule::Schedule;
 use self::sizes::{
@@ -36,7 +36,7 @@ use self::step::{Band, Goal, Step};
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::{Image, srgb8_thresholds};
 use crate::limits::Deadline;
-use crate::plan::{DrawPlan, LinePass};
+use crate::plan::{DrawPlan, HullVertex, LinePass};
 
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
@@ -166,16 +166,15 @@ fn upload_geometry(
     plan: &DrawPlan<'_>,
     schedule: &Schedule,
 ) -> Result<(), DrawError> {
-    let vertices = plan.positions.len() as u64;
     buffers.upload(gpu, Slot::Positions, bytemuck::cast_slice(plan.positions))?;
-    buffers.upload(gpu, Slot::Triangles, bytemuck::cast_slice(plan.triangles))?;
+    let (corners, own) = plan.hull.as_ref().map_or((&[][..], &[][..]), |hull| (&hull.triangles, &hull.vertices));
+    let triangles = [bytemuck::cast_slice(plan.triangles), bytemuck::cast_slice(corners)];
+    buffers.upload_parts(gpu, Slot::Triangles, &triangles)?;
+    let transformed = plan.positions.len() as u64 * size_of::<HullVertex>() as u64;
+    buffers.upload_at(gpu, Slot::Vertices, transformed, bytemuck::cast_slice(own))?;
     if let Some(hull) = &plan.hull {
-        buffers.upload(gpu, Slot::HullNormals, bytemuck::cast_slice(&hull.normals))?;
-        buffers.upload(gpu, Slot::HullAmounts, bytemuck::cast_slice(&hull_amounts(hull)))?;
         buffers.upload(gpu, Slot::HullLooks, &hull_looks(hull))?;
     }
-    let copies = if plan.hull.is_some() { 2 } else { 1 };
-    buffers.reserve(gpu, Slot::Vertices, vertices * copies * 16)?;
     if !has_visibility(plan) {
         return Ok(());
     }

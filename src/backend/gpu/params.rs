@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::plan::{DrawPlan, Edge, Faces, HullOffset, HullPass, Lights, LinePass, Shown, SurfacePass};
+use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, Shown, SurfacePass};
 
 /// The plan's numbers.
 #[repr(C)]
@@ -22,7 +22,6 @@ pub struct Frame {
     background: [f32; 4],
     hull_color: [f32; 4],
     near_w: f32,
-    hull_push: f32,
     ambient: f32,
     lamp_count: u32,
     line_pass_count: u32,
@@ -31,7 +30,6 @@ pub struct Frame {
     height: u32,
     triangle_count: u32,
     vertex_count: u32,
-    hull_base: u32,
     masks_at: u32,
     material_count: u32,
     layer_fade: f32,
@@ -41,7 +39,7 @@ pub struct Frame {
     uv_triangles_at: u32,
     color_triangles_at: u32,
     /// WGSL rounds a struct up to its alignment.
-    padding: u32,
+    padding: [u32; 3],
 }
 
 /// A dispatch's numbers.
@@ -50,8 +48,6 @@ pub struct Frame {
 pub struct Batch {
     pub first: u32,
     pub count: u32,
-    pub id_base: u32,
-    pub vertex_base: u32,
     pub faces: u32,
     pub row_first: u32,
     pub row_end: u32,
@@ -116,7 +112,6 @@ impl Frame {
             width: plan.width_px,
             height: plan.height_px,
             triangle_count: plan.triangles.len() as u32,
-            hull_base: plan.positions.len() as u32,
             ..Self::default()
         };
         if let Some(surface) = &plan.surface {
@@ -125,10 +120,6 @@ impl Frame {
         if let Some(hull) = &plan.hull {
             frame.hull_color = hull.color(0);
             frame.hull_color_count = hull.colors.len() as u32;
-            frame.hull_push = match hull.offset {
-                HullOffset::Object(units) => units,
-                HullOffset::Px(px) => 256.0 * px,
-            };
         }
         frame.layer_fade = plan.layers().map_or(1.0, |layers| layers.fade);
         frame.line_pass_count = plan.lines.len() as u32;
@@ -151,18 +142,10 @@ impl Frame {
     }
 }
 
-/// The hull's colours, then its triangles' materials: what [`Frame::hull_color_count`] points into.
+/// The hull's colours, then the materials of the mesh's triangles and of its own: what [`Frame::hull_color_count`] points into.
 pub fn hull_looks(hull: &HullPass<'_>) -> Vec<u8> {
-    [bytemuck::cast_slice(&hull.colors), bytemuck::cast_slice::<u32, u8>(hull.triangle_materials)].concat()
-}
-
-/// How far each position moves, as [`Frame`] has it for all.
-pub fn hull_amounts(hull: &HullPass<'_>) -> Vec<f32> {
-    let unit = match hull.offset {
-        HullOffset::Object(_) => 1.0,
-        HullOffset::Px(_) => 256.0,
-    };
-    hull.amounts.iter().map(|amount| unit * amount).collect()
+    let materials = [hull.surface_materials, &hull.triangle_materials].map(bytemuck::cast_slice::<u32, u8>);
+    [bytemuck::cast_slice(&hull.colors), materials[0], materials[1]].concat()
 }
 
 /// Triangles' materials, then edge masks four to a word: what [`Frame::masks_at`] points into.
@@ -247,7 +230,7 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_shader() {
         assert_eq!(size_of::<Frame>(), 320);
-        assert_eq!(size_of::<Batch>(), 104);
+        assert_eq!(size_of::<Batch>(), 96);
     }
 
     #[test]

@@ -78,17 +78,14 @@ impl Schedule {
 
     fn transform(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits) -> Result<(), DrawError> {
         let count = plan.positions.len() as u32;
-        if plan.surface.is_some() || !plan.lines.is_empty() {
+        if has_visibility(plan) || !plan.lines.is_empty() {
             self.dispatch(device, Stage::Transform, count, Batch { count, ..Batch::default() })?;
-        }
-        if plan.hull.is_some() {
-            self.dispatch(device, Stage::Transform, count, Batch { count, vertex_base: count, ..Batch::default() })?;
         }
         Ok(())
     }
 
     fn visibility(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, rows: [u32; 2]) -> Result<(), DrawError> {
-        self.triangles(plan, device, rows, (Into::Surface, 0), Pass::of_surface(plan))
+        self.triangles(device, rows, (Into::Surface, 0), Pass::of_surface(plan))
     }
 
     /// One round a layer; a round does nothing where the one before has left nothing to find.
@@ -112,7 +109,7 @@ impl Schedule {
         let mut ends = Vec::new();
         for layer in 0..rounds {
             self.steps.push(Step::ClearLayer);
-            self.triangles(plan, device, rows, (Into::Layer, layer), Pass::of_layers(plan))?;
+            self.triangles(device, rows, (Into::Layer, layer), Pass::of_layers(plan))?;
             let batch = Batch { count, row_first: rows[0], row_end: rows[1], role, layer, ..Batch::default() };
             self.dispatch(device, Stage::Layers, count, batch)?;
             self.steps.push(Step::Submit);
@@ -132,28 +129,23 @@ impl Schedule {
 
     fn triangles(
         &mut self,
-        plan: &DrawPlan<'_>,
         device: &DeviceTraits,
         rows: [u32; 2],
         (into, layer): (Into, u32),
         passes: [Option<Pass>; 2],
     ) -> Result<(), DrawError> {
-        let clip = plan.projection.clip;
         let writes: &[Write] = if device.int64_atomics { &[Write::Both] } else { &[Write::Depth, Write::Id] };
-        let count = plan.triangles.len() as u32;
-        let (chunk, pieces) = if clip { (CHUNK_CLIP, PIECES_MAX) } else { (CHUNK, 1) };
         // Every depth must be known before the first id is compared with it.
         for &write in writes {
-            for Pass { id_base, vertex_base, faces, role } in passes.into_iter().flatten() {
-                for first in (0..count).step_by(chunk as usize) {
-                    let in_chunk = chunk.min(count - first);
+            for Pass { ids, clip, faces, role } in passes.iter().flatten().cloned() {
+                let (chunk, pieces) = if clip { (CHUNK_CLIP, PIECES_MAX) } else { (CHUNK, 1) };
+                for first in ids.clone().step_by(chunk as usize) {
+                    let in_chunk = chunk.min(ids.end - first);
                     let capacity = in_chunk * pieces;
                     self.work_items = self.work_items.max(capacity);
                     let batch = Batch {
                         first,
                         count: in_chunk,
-                        id_base,
-                        vertex_base,
                         faces: faces_code(faces),
                         row_first: rows[0],
                         row_end: rows[1],
@@ -171,7 +163,7 @@ impl Schedule {
                     }
                     let stage = Stage::VisibilityTile { write, into };
                     self.steps.push(Step::Tiles { stage, batch: self.batches.len() - 1 });
-                    if count > chunk {
+                    if ids.len() > chunk as usize {
                         self.steps.push(Step::Submit);
                     }
                 }

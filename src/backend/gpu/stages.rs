@@ -63,8 +63,7 @@ pub enum Into {
 #[repr(u32)]
 pub enum Slot {
     Positions,
-    HullNormals,
-    Triangles,
+    Triangles = 2,
     Vertices,
     Samples,
     Work,
@@ -88,11 +87,10 @@ pub enum Slot {
     Layer,
     Layered,
     Rounds,
-    HullAmounts,
 }
 
 /// Number of [`Slot`]s.
-pub const SLOTS: usize = 30;
+pub const SLOTS: usize = 29;
 
 /// Whether a kernel writes to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
