@@ -51,7 +51,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
 }
 
 fn id_at(sample: u32) -> u32 {
-    let word = samples[sample];
+    let word = samples[batch.samples_at + sample];
     return select(~word.x, NOTHING, word.y == 0u);
 }
 

@@ -10,7 +10,7 @@ const UNIT: f32 = 16384.0;
 const LIMIT: f32 = 16000.0;
 
 // Words of a pixel's strokes: sum of areas in 1/65536, sum of points, and the points of any.
-const STROKE_WORDS: u32 = 10u;
+override STROKE_WORDS: u32 = 0u;
 
 // Sums stop before they could wrap.
 const SUM_MAX: u32 = 0x80000000u;
@@ -120,12 +120,13 @@ fn is_full(pixel_at: u32) -> bool {
     if atomicLoad(&strokes[at - 1u]) <= 256u {
         return false;
     }
-    for (var w = 0u; w < 8u; w++) {
-        if atomicLoad(&strokes[at + w]) != 0xFFFFFFFFu {
-            return false;
-        }
+    // No loop: where loops are limited, the pixels found may be many.
+    let first = atomicLoad(&strokes[at]) & atomicLoad(&strokes[at + 1u]) & atomicLoad(&strokes[at + 2u]) & atomicLoad(&strokes[at + 3u]);
+    if first != 0xFFFFFFFFu {
+        return false;
     }
-    return true;
+    let last = atomicLoad(&strokes[at + 4u]) & atomicLoad(&strokes[at + 5u]) & atomicLoad(&strokes[at + 6u]) & atomicLoad(&strokes[at + 7u]);
+    return last == 0xFFFFFFFFu;
 }
 
 fn units(v: f32) -> i32 {

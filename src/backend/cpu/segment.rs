@@ -1,4 +1,4 @@
-//! Stage 4, an edge on screen: where it lies, and which pixels it passes. Twin of the segments of `shaders/lines.wgsl`.
+//! Stage 4, an edge on screen: where it lies, and which pixels it passes. Twin of `shaders/segment.wgsl`.
 
 use super::Stages;
 use super::clip::clip_segment;
