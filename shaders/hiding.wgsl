@@ -208,6 +208,9 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
         p = homogeneous_of(v.x);
         q = homogeneous_of(v.y);
         r = homogeneous_of(v.z);
+        if !is_moderate(p) || !is_moderate(q) || !is_moderate(r) {
+            return none;
+        }
         is_clockwise = volume_of(p, q, r) > 0.0;
     } else {
         let area = area_of(a, b, c);

@@ -3,7 +3,7 @@
 // Of the surface, a pixel each, over nothing; from the first line pass on over the background and the lines so far. Then the light
 // on the pass's lines, a pixel each.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
-// Of each pixel: sum of areas, sum of points, points of any.
+// Of each pixel, what stroke.wgsl says.
 @group(1) @binding(12) var<storage, read_write> strokes: array<u32>;
 // Of each pass.
 @group(1) @binding(17) var<storage, read> line_colors: array<vec4<f32>>;
@@ -40,24 +40,25 @@ fn over_background(i: u32) -> vec4<f32> {
 
 // How much of a pixel the strokes at `at` cover, 0 to the lines' peak. Leaves none for the next pass.
 fn coverage(at: u32) -> f32 {
-    let sum = strokes[at];
-    let all = strokes[at + 1u];
-    if (sum | all) == 0u {
+    let rounds = strokes[at + 2u];
+    let sum = vec2(strokes[at], rounds & 0xFFFFu);
+    let all = vec2(strokes[at + 1u], rounds >> 16u);
+    if (sum.x | all.x | rounds) == 0u {
         return 0.0;
     }
     var points = 0u;
-    for (var w = 2u; w < STROKE_WORDS; w++) {
+    for (var w = 3u; w < STROKE_WORDS; w++) {
         points += countOneBits(strokes[at + w]);
     }
     for (var w = 0u; w < STROKE_WORDS; w++) {
         strokes[at + w] = 0u;
     }
-    if points == 256u && all > 256u {
+    if points == 256u && (all.x > 256u || all.y > 0u) {
         return batch.line_peak;
     }
-    var covered = f32(sum) * (1.0 / 65536.0);
-    if all > points {
-        covered = covered * (f32(points) / f32(all));
+    var covered = wide_to_f32(sum) * (1.0 / 65536.0);
+    if all.x > points || all.y > 0u {
+        covered = covered * (f32(points) / wide_to_f32(all));
     }
     return min(covered, batch.line_peak);
 }

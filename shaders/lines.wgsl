@@ -227,7 +227,7 @@ fn draw_part(edge: vec4<u32>, s: Segment, window: Window, part: vec2<f32>) {
             at = u32((y - batch.row_first) * frame.width + x);
             x++;
             // What is full stays full, whatever else comes; only a lit line still asks whose it is.
-            found = touches(s.direction, start - center, end - center) && owns(s, window, center)
+            found = touches(place_of(s.direction, start - center, end - center)) && owns(s, window, center)
                 && (is_lit || !is_full(at));
         }
         if found && add_stroke(at, s.direction, start - center, end - center) && is_lit {

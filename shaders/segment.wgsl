@@ -58,14 +58,19 @@ fn homogeneous_of(v: u32) -> vec4<f32> {
 fn clip_segment(ends: vec2<u32>, a: ptr<function, Vertex>, b: ptr<function, Vertex>) -> bool {
     var p = homogeneous_of(ends.x);
     var q = homogeneous_of(ends.y);
+    if !is_moderate(p) || !is_moderate(q) {
+        return false;
+    }
     for (var plane = 0u; plane < 5u; plane++) {
         let d_p = plane_distance(plane, p);
         let d_q = plane_distance(plane, q);
-        if d_p >= 0.0 && d_q < 0.0 {
+        let has_p = d_p >= 0.0;
+        let has_q = d_q >= 0.0;
+        if has_p && !has_q {
             q = intersect(p, q, d_p, d_q);
-        } else if d_p < 0.0 && d_q >= 0.0 {
+        } else if !has_p && has_q {
             p = intersect(q, p, d_q, d_p);
-        } else if d_p < 0.0 {
+        } else if !has_p {
             return false;
         }
     }
