@@ -58,13 +58,11 @@ impl Backends {
         }
     }
 
-    /// Memory that drawing the plan takes beside what grows with its mesh, bytes.
+    /// Memory that drawing the plan takes beside what grows with its mesh, bytes. What a real GPU holds is its own.
     pub fn bands_bytes(&self, choice: BackendChoice, plan: &DrawPlan<'_>) -> u64 {
-        let cpu = || self.cpu.bands_bytes(plan);
         match choice {
-            BackendChoice::Cpu => cpu(),
+            BackendChoice::Cpu | BackendChoice::Auto => self.cpu.bands_bytes(plan),
             BackendChoice::Gpu => gpu::bands_bytes(plan),
-            BackendChoice::Auto => cpu().max(gpu::bands_bytes(plan)),
         }
     }
 

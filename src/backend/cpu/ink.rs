@@ -36,8 +36,8 @@ impl Ink {
         self.count += u64::from(count(mask));
     }
 
-    /// How much of the pixel is covered, 0 to the lines' `peak`: `area * points of the union / sum of the strokes' points`, a ratio estimate
-    /// whose error is that of the overlap alone.
+    /// How much of the pixel is covered, 0 to the lines' `peak`: `area * points of the union / sum of the strokes' points`, a
+    /// ratio estimate whose error is that of the overlap alone.
     #[inline(always)]
     pub fn coverage(&self, peak: f32) -> f32 {
         if self.area == 0 {
