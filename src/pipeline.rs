@@ -100,6 +100,8 @@ pub fn render(
         let detail = "the camera looks past the whole mesh, and the picture is blank".to_owned();
         warnings.push(Warning { code: "mesh_out_of_view", detail });
     }
+    let bands = backends.bands_bytes(spec.backend, &plan);
+    budget.spend("bands of the picture", bands, 1).map_err(PlanError::Limit)?;
     ended(Stage::Plan);
 
     let drawn = backends.draw(spec.backend, &plan, deadline)?;

@@ -4,6 +4,7 @@
 //! each omission is written down in [`DrawPlan::skips`].
 
 mod build;
+mod build_surface;
 mod choice;
 mod error;
 mod error_table;

@@ -101,7 +101,10 @@ pub fn passes(
         means.deadline.check()?;
         means.budget.spend("drawn edges", edges.len() as u64, 16)?;
         if !edges.is_empty() {
-            passes.extend(want.passes(&edges, hides, skip_back));
+            let drawn = want.passes(&edges, hides, skip_back);
+            // In the lists of up to four bands of the picture.
+            means.budget.spend("lists of edges", (drawn.len() * edges.len()) as u64, 16)?;
+            passes.extend(drawn);
         }
     }
     Ok(passes)
