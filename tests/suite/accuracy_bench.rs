@@ -67,10 +67,10 @@ fn outlines_and_faces_are_measured_too() {
         match scene.family {
             Family::Outlines => {
                 let (contour, hull) = (rmse(Technique::Contour), rmse(Technique::Hull));
-                assert!(contour < 20.0 && contour < hull, "{contour}, {hull}");
-                // A hull's strip is where it should be, but narrower at the corners of teeth.
+                assert!(contour < 20.0 && hull < 30.0, "{contour}, {hull}");
+                // A hull's strip is where it should be; what hides it where teeth stand close is not the same.
                 let ink = [Technique::Contour, Technique::Hull].map(|technique| at(technique).ink.unwrap());
-                assert!((ink[0] - 1.0).abs() < 0.02 && (0.8..1.05).contains(&ink[1]), "{ink:?}");
+                assert!((ink[0] - 1.0).abs() < 0.02 && (0.9..1.05).contains(&ink[1]), "{ink:?}");
             }
             _ => {
                 assert!(rmse(Technique::FaceNormals) < 0.4, "{}", rmse(Technique::FaceNormals));
