@@ -1,10 +1,8 @@
 //! Spec and mesh to plan: what each look needs, and what it does not.
 
-use super::outline::Outlines;
 use super::parts::Parts;
-use super::rim;
 use super::skips::{SkipKind, Skips};
-use super::{DrawPlan, HullPass, LayersPass, PlanError, Projection, Thickness, build_surface, loose, wires};
+use super::{DrawPlan, HullPass, LayersPass, PlanError, Projection, Thickness, build_surface, loose, outline, wires};
 use crate::limits::{Budget, Deadline, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::scene::camera::{Border, Camera};
@@ -63,9 +61,13 @@ pub fn build_keeping<'a>(
     let hull = match (no_hull, parts.has_hull()) {
         (true, _) => None,
         (false, false) => Some(HullPass::default()),
-        (false, true) => {
-            Some(hull_pass(mesh, &parts, (&projection(&camera, size_px, true), size_px), &mut edges, &mut means)?)
-        }
+        (false, true) => Some(outline::hull_pass(
+            mesh,
+            &parts,
+            (&projection(&camera, size_px, true), size_px),
+            &mut edges,
+            &mut means,
+        )?),
     };
     let layers = layers_pass(&parts, hull.is_some(), &mut skips);
     let roles = parts.roles(mesh, surface.is_some(), layers.as_ref());
@@ -143,7 +145,8 @@ pub(super) fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
     border
 }
 
-fn thickness(mesh: &Mesh, outline: &Outline) -> Thickness {
+/// How far an outline reaches.
+pub fn thickness(mesh: &Mesh, outline: &Outline) -> Thickness {
     match outline.unit {
         OutlineUnit::Px => Thickness::Px(outline.thickness.unwrap_or(OUTLINE_PX)),
         OutlineUnit::Object => {
@@ -173,34 +176,4 @@ fn layers_pass(parts: &Parts<'_>, has_hull: bool, skips: &mut Skips<'_>) -> Opti
     }
     let empty = LayersPass { count_max: 1, behind_surface: false, wires_only: false, fade: 1.0 };
     Some(needed.unwrap_or(empty))
-}
-
-fn hull_pass<'a>(
-    mesh: &'a Mesh,
-    parts: &Parts<'_>,
-    (projection, size_px): (&Projection, [u32; 2]),
-    edges: &mut wires::Edges,
-    means: &mut Means<'_>,
-) -> Result<HullPass<'a>, PlanError> {
-    let outline = |m: usize| parts.layers[m].outline.filter(|o| o.method == OutlineMethod::Hull);
-    let thicknesses: Vec<Option<Thickness>> =
-        (0..parts.layers.len()).map(|m| outline(m).map(|o| thickness(mesh, &o))).collect();
-    let mut colors: Vec<[f32; 4]> =
-        (0..parts.layers.len()).map(|m| outline(m).map_or([0.0; 4], |o| o.color.premultiplied())).collect();
-    let used: Vec<[f32; 4]> = (0..colors.len()).filter(|&m| thicknesses[m].is_some()).map(|m| colors[m]).collect();
-    let color = used.first().copied().unwrap_or_default();
-    if used.iter().all(|c| *c == color) {
-        colors = vec![color];
-    }
-    let tells_apart = colors.len() > 1 || (parts.layers_pass().is_some() && mesh.materials.len() > 1);
-    let list = edges.of(mesh, means)?;
-    let view = rim::View::new(mesh, projection, means.budget)?;
-    let rims = view.rims(parts, &thicknesses, list, (means.budget, means.deadline))?;
-    let means = (&mut *means.budget, means.deadline);
-    let surface_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
-    let mut hull = Outlines::draw(&view, &thicknesses, size_px, &rims, means)?;
-    if !tells_apart {
-        hull.triangle_materials = Vec::new();
-    }
-    Ok(HullPass { colors, surface_materials, ..hull })
 }

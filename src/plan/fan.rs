@@ -12,7 +12,7 @@ const SAGITTA: f64 = 4.0;
 
 /// Triangles of all fans up to which arcs are as round as they should be. With more of them they have fewer corners, as many in all and
 /// one for each arc.
-const TRIANGLES_MAX: f64 = (1 << 22) as f64;
+const TRIANGLES_MAX: f64 = (1 << 20) as f64;
 
 /// Gaps between two rims that are this narrow are what rounding makes of a needle's tip, around which its outline goes.
 const GAP_MIN: f64 = 1e-9;
@@ -153,5 +153,75 @@ fn draw(ends: &[End], fan: &Fan, coarser: f64, first: u32, hull: &mut HullPass<'
         hull.triangles.push([from.vertex, last, next]);
         hull.triangle_materials.push(from.material);
         last = next;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::limits::Limits;
+
+    /// Two rims that leave a vertex at these angles, nothing between the first and the second.
+    fn corner(vertex: u32, angles: [f64; 2], reach_px: f64) -> [End; 2] {
+        [1, -1].map(|free| End {
+            vertex,
+            outer: 7,
+            material: 0,
+            free,
+            angle: angles[usize::from(free < 0)],
+            turn: FRAC_PI_2,
+            middle: [0.0; 2],
+            reach: 256.0 * reach_px,
+            depth: 0.5,
+            inv_w: 1.0,
+        })
+    }
+
+    fn finish(ends: Vec<End>) -> (HullPass<'static>, Result<(), PlanError>) {
+        let mut hull = HullPass::default();
+        let result = Fans(ends).finish(10, &mut hull, &mut Budget::new(&Limits::default()));
+        (hull, result)
+    }
+
+    /// Sums of the angles of all fans.
+    fn swept(ends: Vec<End>) -> f64 {
+        let mut fans = Fans(ends);
+        let (mut hull, mut sum) = (HullPass::default(), 0.0);
+        fans.finish(10, &mut hull, &mut Budget::new(&Limits::default())).unwrap();
+        each_fan(&fans.0, |fan| sum += fan.sweep);
+        sum
+    }
+
+    #[test]
+    fn fans_fill_what_strips_leave() {
+        let near = |got: f64, want: f64| assert!((got - want).abs() < 1e-6, "{got}, not {want}");
+        // A corner of a square, where three quarters of a turn are free; one that turns inwards; a needle, and one that is rounded flat.
+        near(swept(corner(0, [0.0, 1.5 * PI], 4.0).into()), FRAC_PI_2);
+        near(swept(corner(0, [3.0, 3.0 + 1.5 * PI - TAU], 4.0).into()), FRAC_PI_2);
+        near(swept(corner(0, [0.0, FRAC_PI_2], 4.0).into()), 0.0);
+        near(swept(corner(0, [0.001, 0.0], 4.0).into()), PI - 0.001);
+        near(swept(corner(0, [1.0, 1.0], 4.0).into()), PI);
+        near(swept(corner(0, [1.0, 1.0 + 1e-15], 4.0).into()), PI);
+        // An end that meets none, and a rim with both sides free.
+        near(swept(corner(0, [1.0, 1.0], 4.0)[..1].to_vec()), FRAC_PI_2);
+        // Two squares that touch at a corner.
+        let two = [corner(0, [FRAC_PI_2, PI], 4.0), corner(0, [1.5 * PI, 2.0 * PI], 4.0)].concat();
+        near(swept(two), 0.0);
+    }
+
+    #[test]
+    fn however_many_corners_there_are_their_fans_are_bounded() {
+        let (few, result) = finish(corner(0, [0.0, 1.5 * PI], 32.0).into());
+        result.unwrap();
+        assert!((20..40).contains(&few.triangles.len()), "{}", few.triangles.len());
+        let count = 100_000;
+        let ends: Vec<End> = (0..count).flat_map(|v| corner(v, [0.0, 1.5 * PI], 32.0)).collect();
+        let (many, result) = finish(ends);
+        result.unwrap();
+        let triangles = many.triangles.len();
+        assert!((count as usize * 4..TRIANGLES_MAX as usize + count as usize).contains(&triangles), "{triangles}");
+        assert_eq!(many.triangle_materials.len(), triangles);
     }
 }

@@ -4,11 +4,15 @@
 //! Corners are round: a corner's outline is an arc around it, so short that it does not matter how sharp the corner is. Where a corner
 //! turns inwards the strips lie over each other.
 
+use super::build::{Means, thickness};
 use super::fan::{End, Fans};
+use super::parts::Parts;
 use super::rim::{CHECK_EVERY, Rim, View, row_dot};
-use super::{Edge, HullPass, HullVertex, Thickness};
+use super::{Edge, HullPass, HullVertex, Projection, Thickness, wires};
 use crate::limits::{Budget, Deadline};
+use crate::mesh::Mesh;
 use crate::plan::PlanError;
+use crate::scene::OutlineMethod;
 
 /// 1/256 px in a pixel.
 const PX: f64 = 256.0;
@@ -153,11 +157,11 @@ impl<'a> Outlines<'a> {
         let spots = ends.map(|[x, y, z, w]| [x / w, y / w, z / w, 1.0 / w]);
         let margin = spots.map(|spot| self.reach(rim.material, spot[3])).into_iter().fold(0.0, f64::max) + 2.0 * PX;
         let mut range = [0.0, 1.0];
-        for (half, (&from, &to)) in self.half.iter().zip(spots[0].iter().zip(&spots[1])) {
+        let (from, to) = (spots[0], spots[1]);
+        for (axis, half) in self.half.into_iter().enumerate() {
             let limit = half + margin;
-            for (from, to) in [(limit - from, limit - to), (limit + from, limit + to)] {
-                narrow(&mut range, from, to)?;
-            }
+            narrow(&mut range, limit - from[axis], limit - to[axis])?;
+            narrow(&mut range, limit + from[axis], limit + to[axis])?;
         }
         let cut = [range[0] > 0.0, range[1] < 1.0];
         let clipped = [0, 1].map(|k| if cut[k] { mix(&spots[0], &spots[1], range[k]) } else { spots[k] });
@@ -212,6 +216,37 @@ impl<'a> Outlines<'a> {
             depth.max(DEPTH_MIN)
         })
     }
+}
+
+/// The hull of the parts that have one.
+pub fn hull_pass<'a>(
+    mesh: &'a Mesh,
+    parts: &Parts<'_>,
+    (projection, size_px): (&Projection, [u32; 2]),
+    edges: &mut wires::Edges,
+    means: &mut Means<'_>,
+) -> Result<HullPass<'a>, PlanError> {
+    let outline = |m: usize| parts.layers[m].outline.filter(|o| o.method == OutlineMethod::Hull);
+    let thicknesses: Vec<Option<Thickness>> =
+        (0..parts.layers.len()).map(|m| outline(m).map(|o| thickness(mesh, &o))).collect();
+    let mut colors: Vec<[f32; 4]> =
+        (0..parts.layers.len()).map(|m| outline(m).map_or([0.0; 4], |o| o.color.premultiplied())).collect();
+    let used: Vec<[f32; 4]> = (0..colors.len()).filter(|&m| thicknesses[m].is_some()).map(|m| colors[m]).collect();
+    let color = used.first().copied().unwrap_or_default();
+    if used.iter().all(|c| *c == color) {
+        colors = vec![color];
+    }
+    let tells_apart = colors.len() > 1 || (parts.layers_pass().is_some() && mesh.materials.len() > 1);
+    let list = edges.of(mesh, means)?;
+    let view = View::new(mesh, projection, means.budget)?;
+    let rims = view.rims(parts, &thicknesses, list, (means.budget, means.deadline))?;
+    let means = (&mut *means.budget, means.deadline);
+    let surface_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
+    let mut hull = Outlines::draw(&view, &thicknesses, size_px, &rims, means)?;
+    if !tells_apart {
+        hull.triangle_materials = Vec::new();
+    }
+    Ok(HullPass { colors, surface_materials, ..hull })
 }
 
 /// The vertex at a spot, which lies in the guard band.
