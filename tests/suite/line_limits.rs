@@ -180,8 +180,9 @@ fn a_line_drawn_very_often_is_one_line() {
     let many = lines_of(&positions, &triangles, vec![[0, 1]; 200_000], false);
     let cpu = CpuRenderer::new(1).draw(&many, &Deadline::default()).unwrap();
     let gpu = GpuRenderer::new(gpus[0].clone()).draw(&many, &Deadline::default()).unwrap();
-    let step = Tolerance { max: 1, share: 1.0 };
-    Likeness::of(&few, &cpu).assert(step, "sums beyond 32 bits");
+    // Strokes that cover a corner of a pixel and no point of it add up: one or two pixels beside the line.
+    let corners = Tolerance { max: 255, share: 0.001 };
+    Likeness::of(&few, &cpu).assert(corners, "sums beyond 32 bits");
     Likeness::of(&cpu, &gpu).assert(Tolerance::TWINS, "on both");
     assert!(cpu.rgba.chunks(4).any(|p| (40..230).contains(&p[1])), "no pixel is half covered");
 }

@@ -42,7 +42,8 @@ impl Banding {
         let banding = |rows: u32| {
             let rows = rows.max(cached).clamp(1, plan.height_px.max(1));
             let one = Self { rows, margin, at_once: 1 };
-            Self { at_once: (BANDS_BYTES_MAX / one.bytes(plan).max(1)).clamp(1, threads.max(1)), ..one }
+            let most = threads.min(plan.height_px.div_ceil(rows) as usize).max(1);
+            Self { at_once: (BANDS_BYTES_MAX / one.bytes(plan).max(1)).clamp(1, most), ..one }
         };
         let is_small = |banding: &Self| banding.bytes(plan) <= BANDS_BYTES_MAX;
         // Rows that are shown of those that are drawn, by all threads.
@@ -233,7 +234,9 @@ mod tests {
                 let bytes = banding.bytes(plan);
                 assert!(bytes <= BANDS_BYTES_MAX, "{bytes}: {banding:?} on {threads}, {:?}", plan.lines.first());
                 assert!((1..=threads).contains(&banding.at_once) && banding.rows >= 1);
-                alone += usize::from(banding.at_once == 1 && threads > 1);
+                // Of less than two bands of rows and margins there is little to share.
+                let is_large = plan.height_px > 4 * banding.margin && plan.height_px > banding.rows;
+                alone += usize::from(banding.at_once == 1 && threads > 1 && is_large);
                 cases += 1;
             }
         });
