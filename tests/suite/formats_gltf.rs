@@ -61,21 +61,30 @@ fn lists_strips_and_fans() {
 #[test]
 fn every_component_type_and_normalisation() {
     let square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]];
+    let build = |component: u32, bytes: usize, one: i64, normalised: bool| {
+        let mut gltf = Gltf::default();
+        // A multiple of 4 bytes an element, as vertices are aligned.
+        let element = |c: &[i64; 3]| -> Vec<u8> {
+            let mut out: Vec<u8> = c.iter().flat_map(|c| (c * one).to_le_bytes()[..bytes].to_vec()).collect();
+            out.resize(out.len().next_multiple_of(4), 0);
+            out
+        };
+        let data: Vec<u8> = square.iter().flat_map(element).collect();
+        let position = gltf.accessor("VEC3", component, 4, &data);
+        gltf.json["accessors"][position]["normalized"] = normalised.into();
+        gltf.json["bufferViews"][0]["byteStride"] = (data.len() / 4).into();
+        let index = gltf.accessor("SCALAR", 5121, 6, &[0, 1, 2, 0, 2, 3]);
+        gltf.mesh(json!({ "attributes": { "POSITION": position }, "indices": index }));
+        gltf.json["nodes"] = json!([{ "mesh": 0 }]);
+        gltf
+    };
     let mut cases = 0;
-    for (component, bytes, largest) in
-        [(5120, 1, 127), (5121, 1, 255), (5122, 2, 32767), (5123, 2, 65535), (5125, 4, u32::MAX)]
-    {
+    for (component, bytes, largest) in [(5120, 1, 127), (5121, 1, 255), (5122, 2, 32767), (5123, 2, 65535)] {
         for normalised in [false, true] {
-            let mut gltf = Gltf::default();
-            let one = if normalised { largest } else { 100 };
-            let data: Vec<u8> =
-                square.iter().flatten().flat_map(|c| (c * one).to_le_bytes()[..bytes].to_vec()).collect();
-            let position = gltf.accessor("VEC3", component, 4, &data);
-            gltf.json["accessors"][position]["normalized"] = normalised.into();
-            let index = gltf.accessor("SCALAR", 5121, 6, &[0, 1, 2, 0, 2, 3]);
-            gltf.mesh(json!({ "attributes": { "POSITION": position }, "indices": index }));
-            gltf.json["nodes"] = json!([{ "mesh": 0 }]);
-            gltf.json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+            let mut gltf = build(component, bytes, if normalised { largest } else { 100 }, normalised);
+            let error = read(&gltf.glb()).unwrap_err();
+            assert!(error.detail.contains("KHR_mesh_quantization"), "{error}");
+            gltf.json["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
             let mesh = read(&gltf.glb()).unwrap();
             let side = if normalised { 1.0 } else { 100.0 };
             assert_eq!(corners(&mesh)[0][2][..2], [side; 2], "{component} {normalised}");
@@ -83,14 +92,23 @@ fn every_component_type_and_normalisation() {
             cases += 1;
         }
     }
+    // What no extension allows.
+    for (component, normalised) in [(5125, false), (5125, true), (5126, true), (5124, false)] {
+        let mut gltf = build(component, 4, 1, normalised);
+        gltf.json["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
+        assert_eq!(read(&gltf.glb()).unwrap_err().fault, MeshFault::Broken, "{component}");
+        cases += 1;
+    }
     // Signed ones reach down to -1, which the lowest value would exceed.
     let mut gltf = Gltf::default();
-    let low = gltf.accessor("VEC3", 5120, 3, &[0x80, 0, 0, 0x7f, 0, 0, 0, 0x7f, 0]);
+    let low = gltf.accessor("VEC3", 5120, 3, &[0x80, 0, 0, 9, 0x7f, 0, 0, 9, 0, 0x7f, 0, 9]);
     gltf.json["accessors"][low]["normalized"] = true.into();
+    gltf.json["bufferViews"][0]["byteStride"] = 4.into();
+    gltf.json["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
     gltf.mesh(json!({ "attributes": { "POSITION": low } }));
     gltf.json["nodes"] = json!([{ "mesh": 0 }]);
     assert_eq!(corners(&read(&gltf.glb()).unwrap())[0], [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
-    assert_eq!(cases, 10);
+    assert_eq!(cases, 12);
 }
 
 #[test]
@@ -209,6 +227,9 @@ fn materials_and_colours() {
     let rgb = gltf.accessor("VEC3", 5121, 6, &[255; 18]);
     let rgba: Vec<u16> = (0..24).map(|i| if i % 4 == 0 { 65535 } else { 0 }).collect();
     let rgba = gltf.shorts("VEC4", &rgba);
+    for accessor in [rgb, rgba] {
+        gltf.json["accessors"][accessor]["normalized"] = true.into();
+    }
     gltf.json["materials"] =
         json!([{ "name": "Glass", "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.25, 0, 0.5] } }, {}]);
     gltf.json["meshes"] = json!([{ "primitives": [

@@ -18,6 +18,7 @@ mod error_table;
 mod examples;
 mod formats;
 mod formats_bad;
+mod formats_corpus;
 mod formats_gltf;
 mod formats_gltf_document;
 mod formats_gltf_scene;
