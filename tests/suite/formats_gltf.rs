@@ -1,17 +1,8 @@
 //! glTF: primitive modes, accessor encodings, the node tree, buffers, extensions.
 
-use crate::mesh_files::{Gltf, read};
+use crate::mesh_files::{Gltf, corners, read};
 use meshsnap::mesh::{Mesh, MeshFault};
 use serde_json::{Value, json};
-
-/// The corners of all triangles in file space.
-fn corners(mesh: &Mesh) -> Vec<[[f64; 3]; 3]> {
-    let at = |v: u32| {
-        let p = mesh.positions[v as usize];
-        std::array::from_fn(|k| mesh.to_file.centre[k] + mesh.to_file.scale * f64::from(p[k]))
-    };
-    mesh.triangles.iter().map(|t| t.map(at)).collect()
-}
 
 /// Six points that make a zigzag band.
 const BAND: [f32; 18] = [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.5, 1.0, 1.0, 0.0, 2.0, 0.0, 0.25, 2.0, 1.0, 0.0];

@@ -21,6 +21,8 @@ mod formats_bad;
 mod formats_corpus;
 mod formats_gltf;
 mod formats_gltf_document;
+mod formats_gltf_packed;
+mod formats_gltf_pose;
 mod formats_gltf_scene;
 mod formats_gltf_surfaces;
 mod formats_hostile;
