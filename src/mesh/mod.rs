@@ -143,6 +143,10 @@ pub struct FileContent {
     pub vertices: u64,
     /// Their triangles.
     pub triangles: u64,
+    /// Their line segments, which are not drawn yet.
+    pub segments: u64,
+    /// Their points, which are not drawn yet.
+    pub points: u64,
 }
 
 /// Something in the file that was read around rather than refused.

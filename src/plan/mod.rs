@@ -16,6 +16,7 @@ mod parts;
 mod silhouette;
 mod skips;
 mod surface;
+mod texture_basis;
 mod texture_closeup;
 mod texture_decode;
 mod texture_half;

@@ -239,3 +239,23 @@ fn materials_and_colours() {
     gltf.json["meshes"][0]["primitives"][0]["material"] = 2.into();
     assert_eq!(read(&gltf.glb()).unwrap_err().fault, MeshFault::Broken);
 }
+
+#[test]
+fn what_is_not_drawn_is_counted() {
+    let mut gltf = Gltf::default();
+    let p = gltf.floats("VEC3", &BAND);
+    let i = gltf.shorts("SCALAR", &[0, 1, 2, 3, 4]);
+    let of = |mode: usize, indices: Option<usize>| json!({ "attributes": { "POSITION": p }, "mode": mode, "indices": indices });
+    let all: Vec<Value> = (0..7).flat_map(|mode| [of(mode, None), of(mode, Some(i))]).collect();
+    gltf.json["meshes"] = json!([{ "primitives": all }]);
+    // Shown twice, and counted once.
+    gltf.json["nodes"] = json!([{ "mesh": 0, "children": [1] }, { "mesh": 0 }]);
+    let mesh = read(&gltf.glb()).unwrap();
+    let content = mesh.report.content;
+    assert_eq!((content.draw_calls, content.vertices), (14, 14 * 6));
+    assert_eq!(content.points, 6 + 5);
+    assert_eq!(content.segments, (3 + 2) + (6 + 5) + (5 + 4));
+    assert_eq!(content.triangles, (2 + 1) + (4 + 3) + (4 + 3));
+    let codes: Vec<&str> = mesh.report.warnings.iter().map(|w| w.code).collect();
+    assert_eq!(codes, ["points_ignored", "lines_ignored"]);
+}

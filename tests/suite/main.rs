@@ -76,6 +76,7 @@ mod stress_views;
 mod structure;
 mod texture_formulas;
 mod textures;
+mod textures_basis;
 mod textures_closeup;
 mod truth;
 mod twins;

@@ -54,15 +54,15 @@ fn plan_of<'a>(mesh: &'a Mesh, keep: &[SkipKind], limits: &Limits) -> Result<Dra
 }
 
 /// All levels of the textures.
-fn textures(mesh: &Mesh) -> Textures {
+pub fn textures(mesh: &Mesh) -> Textures {
     plan_of(mesh, &[SkipKind::FineTextureLevels], &Limits::default()).unwrap().surface.unwrap().textures
 }
 
-fn error(mesh: &Mesh) -> PlanError {
+pub fn error(mesh: &Mesh) -> PlanError {
     plan_of(mesh, &[], &Limits::default()).unwrap_err()
 }
 
-fn value(half: u16) -> f64 {
+pub fn value(half: u16) -> f64 {
     let (exponent, fraction) = (i32::from(half >> 10 & 31), f64::from(half & 1023));
     assert!(half < 0x7c00, "neither negative nor infinite");
     if exponent == 0 { fraction * 2.0_f64.powi(-24) } else { (1.0 + fraction / 1024.0) * 2.0_f64.powi(exponent - 15) }
@@ -264,7 +264,7 @@ fn broken_images_are_named() {
         (good[..good.len() / 2].to_vec(), "image 0 of the mesh cannot be decoded"),
         (good[..30].to_vec(), "image 0 of the mesh cannot be decoded"),
         (flipped, "image 0 of the mesh cannot be decoded"),
-        (b"GIF89a and so on".to_vec(), "image 0 of the mesh is neither a PNG, a JPEG nor a WebP image"),
+        (b"GIF89a and so on".to_vec(), "image 0 of the mesh is neither a PNG, a JPEG, a WebP nor a KTX2 image"),
         (vec![0], "neither a PNG"),
         (b"\xff\xd8\xff\xe0 no JPEG".to_vec(), "cannot be decoded"),
         (b"RIFF\0\0\0\0WEBPVP8 no".to_vec(), "cannot be decoded"),

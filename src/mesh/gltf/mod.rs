@@ -39,7 +39,7 @@ use self::scene::Instance;
 use self::shape::Shape;
 use self::skin::Skins;
 use self::transform::Affine;
-use self::tree::Document;
+use self::tree::{Document, mode};
 use super::import::Context;
 use super::raw::RawMesh;
 use super::{FileContent, Format, MaterialSlot, MeshError, Warning};
@@ -178,6 +178,15 @@ fn content(doc: &Document) -> FileContent {
         content.draw_calls += 1;
         content.vertices = content.vertices.saturating_add(vertices);
         content.triangles = content.triangles.saturating_add(triangles::count(primitive.mode(), corners));
+        let (segments, points) = match primitive.mode() {
+            mode::POINTS => (0, corners),
+            mode::LINES => (corners / 2, 0),
+            mode::LINE_LOOP if corners > 1 => (corners, 0),
+            mode::LINE_STRIP => (corners.saturating_sub(1), 0),
+            _ => (0, 0),
+        };
+        content.segments = content.segments.saturating_add(segments);
+        content.points = content.points.saturating_add(points);
     }
     content
 }
