@@ -86,7 +86,8 @@ pub fn render(
 ) -> Result<Output, RenderError> {
     let mut budget = Budget::new(limits);
 
-    let mut mesh = mesh::import(job.bundle, job.format_in, limits, &mut budget, deadline)?;
+    let options = mesh::Options { format: job.format_in, time_s: job.spec.time_s };
+    let mut mesh = mesh::import(job.bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
 
     let mut warnings = std::mem::take(&mut mesh.report.warnings);

@@ -33,7 +33,7 @@ pub use bundle::{Bundle, BundleFile};
 pub use counted::counted;
 pub use error::{MeshError, MeshFault};
 pub use folder::Folder;
-pub use import::{Format, import};
+pub use import::{Format, Options, import, survey};
 pub use loose::Loose;
 pub use material::MaterialSlot;
 
@@ -150,6 +150,8 @@ pub struct ImportReport {
     pub format: Format,
     /// Vertices in the file, before welding.
     pub file_vertices: u64,
+    /// What the file's meshes say that they have, whether shown, hidden or shown many times; glTF alone.
+    pub content: FileContent,
     /// Polygons in the file: `polygons_by_arity[k]` counts those with `k` corners (12 and more share the last place).
     pub polygons_by_arity: [u64; 13],
     /// Faces dropped because a corner is NaN or infinite.
@@ -163,6 +165,21 @@ pub struct ImportReport {
     pub dropped_loose: u64,
     /// Things a user should know; each with a stable code.
     pub warnings: Vec<Warning>,
+}
+
+/// How much the meshes of a file hold by their own account, each counted once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FileContent {
+    /// Parts that are drawn with one material each.
+    pub draw_calls: u64,
+    /// Their vertices.
+    pub vertices: u64,
+    /// Their triangles.
+    pub triangles: u64,
+    /// Their line segments, which are not drawn yet.
+    pub segments: u64,
+    /// Their points, which are not drawn yet.
+    pub points: u64,
 }
 
 /// Something in the file that was read around rather than refused.

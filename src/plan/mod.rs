@@ -20,6 +20,7 @@ mod rim;
 mod silhouette;
 mod skips;
 mod surface;
+mod texture_basis;
 mod texture_closeup;
 mod texture_decode;
 mod texture_half;

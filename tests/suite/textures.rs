@@ -62,7 +62,7 @@ pub fn error(mesh: &Mesh) -> PlanError {
     plan_of(mesh, &[], &Limits::default()).unwrap_err()
 }
 
-fn value(half: u16) -> f64 {
+pub fn value(half: u16) -> f64 {
     let (exponent, fraction) = (i32::from(half >> 10 & 31), f64::from(half & 1023));
     assert!(half < 0x7c00, "neither negative nor infinite");
     if exponent == 0 { fraction * 2.0_f64.powi(-24) } else { (1.0 + fraction / 1024.0) * 2.0_f64.powi(exponent - 15) }

@@ -52,7 +52,7 @@ fn broken_images_are_named() {
         (good[..good.len() / 2].to_vec(), "image 0 of the mesh cannot be decoded"),
         (good[..30].to_vec(), "image 0 of the mesh cannot be decoded"),
         (flipped, "image 0 of the mesh cannot be decoded"),
-        (b"GIF89a and so on".to_vec(), "image 0 of the mesh is neither a PNG, a JPEG nor a WebP image"),
+        (b"GIF89a and so on".to_vec(), "image 0 of the mesh is neither a PNG, a JPEG, a WebP nor a KTX2 image"),
         (vec![0], "neither a PNG"),
         (b"\xff\xd8\xff\xe0 no JPEG".to_vec(), "cannot be decoded"),
         (b"RIFF\0\0\0\0WEBPVP8 no".to_vec(), "cannot be decoded"),
