@@ -2,7 +2,7 @@
 
 use super::bundle::Bundle;
 use super::normalise::normalise;
-use super::{Folder, Mesh, MeshError, MeshFault, entry, gltf, obj, ply, stl, unzip};
+use super::{Folder, Mesh, MeshError, MeshFault, entry, gltf, obj, off, ply, stl, unzip};
 use crate::limits::{Budget, Deadline, Limits};
 
 /// The mesh formats that are read.
@@ -21,14 +21,16 @@ pub enum Format {
     StlAscii,
     /// PLY of any encoding.
     Ply,
+    /// Geomview's object file format, text or binary.
+    Off,
 }
 
 impl Format {
     /// The names that [`Format::from_name`] knows.
-    pub const NAMES: [&str; 5] = ["obj", "gltf", "glb", "stl", "ply"];
+    pub const NAMES: [&str; 6] = ["obj", "gltf", "glb", "stl", "ply", "off"];
 
     /// All of them, for a sentence.
-    pub const ALL: &str = "OBJ, STL, PLY, glTF or GLB";
+    pub const ALL: &str = "OBJ, STL, PLY, OFF, glTF or GLB";
 
     /// From a file extension or a query value. `stl` may be either kind: the importer looks.
     pub fn from_name(name: &str) -> Option<Self> {
@@ -38,6 +40,7 @@ impl Format {
             "glb" => Some(Self::Glb),
             "stl" => Some(Self::StlBinary),
             "ply" => Some(Self::Ply),
+            "off" => Some(Self::Off),
             _ => None,
         }
     }
@@ -50,6 +53,7 @@ impl Format {
             Self::Glb => "glb",
             Self::StlBinary | Self::StlAscii => "stl",
             Self::Ply => "ply",
+            Self::Off => "off",
         }
     }
 }
@@ -63,6 +67,7 @@ impl std::fmt::Display for Format {
             Self::StlBinary => "binary STL",
             Self::StlAscii => "ASCII STL",
             Self::Ply => "PLY",
+            Self::Off => "OFF",
         })
     }
 }
@@ -93,6 +98,7 @@ pub fn import(
         Format::Obj => obj::read(bytes, &mut cx)?,
         Format::StlBinary | Format::StlAscii => stl::read(bytes, &mut cx)?,
         Format::Ply => ply::read(bytes, &mut cx)?,
+        Format::Off => off::read(bytes, &mut cx)?,
         Format::Gltf | Format::Glb => gltf::read(bytes, &mut cx)?,
     };
     normalise(raw, &mut cx)

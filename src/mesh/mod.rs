@@ -1,12 +1,13 @@
 //! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
 //!
 //! Reading order: [`bundle`] (what comes in), `folder` (what names in it mean), [`raw`] (what an importer fills), `import` (opens the bundle, sniffs the format
-//! and calls one), `obj`, `stl`, `ply` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
+//! and calls one), `obj`, `stl`, `ply`, `off` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
 //! [`topology`], for whoever needs them.
 
 mod attributes;
 pub mod bundle;
 mod coarse;
+mod corners;
 mod counted;
 pub mod edges;
 mod entry;
@@ -19,6 +20,7 @@ pub mod material;
 mod normalise;
 pub mod normals;
 mod obj;
+mod off;
 mod ply;
 mod polygon;
 mod pow2;

@@ -1,6 +1,6 @@
 //! Which format some bytes are in, from the bytes alone: names and content types lie.
 
-use super::{Format, MeshError, MeshFault, ply, stl};
+use super::{Format, MeshError, MeshFault, off, ply, stl};
 
 /// How far into a text its first telling line may be. Exporters write long comment headers.
 const TEXT_SNIFF_BYTES: usize = 1 << 20;
@@ -16,6 +16,9 @@ pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
     }
     if ply::is_ply(bytes) {
         return Ok(Format::Ply);
+    }
+    if off::is_off(bytes) {
+        return Ok(Format::Off);
     }
     let text = trim_start(bytes);
     if text.starts_with(b"{") {
@@ -91,7 +94,6 @@ fn is_corner(word: &str) -> bool {
 fn known_but_unread(bytes: &[u8]) -> Option<&'static str> {
     let starts = |magic: &[u8]| bytes.starts_with(magic);
     [
-        (starts(b"OFF") || starts(b"COFF"), "OFF"),
         (starts(b"Kaydara FBX"), "FBX"),
         (starts(b"PK\x03\x04"), "a zip file (3MF or a bundle)"),
         (starts(b"\x89PNG") || starts(b"\xFF\xD8\xFF") || starts(b"RIFF"), "a picture"),

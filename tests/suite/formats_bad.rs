@@ -36,7 +36,7 @@ fn what_is_not_a_mesh_is_unrecognised() {
         b"{\"a\": 1}",
         b"[1, 2]",
         b"\x89PNG\r\n\x1a\n",
-        b"OFF\n3 1 0\n",
+        b"OFF the record\n",
         b"solid as a rock",
         b"<html></html>",
         b"gl",
@@ -46,7 +46,8 @@ fn what_is_not_a_mesh_is_unrecognised() {
         assert_eq!(error.fault, MeshFault::Unrecognised, "{:?}: {error}", String::from_utf8_lossy(input));
     }
     assert!(read(b"").unwrap_err().detail.contains("empty"));
-    assert!(read(b"OFF\n3 1 0\n").unwrap_err().detail.contains("OFF, which is not read: convert it to OBJ, STL, PLY"));
+    let blend = read(b"BLENDER-v300").unwrap_err().detail;
+    assert!(blend.contains("a Blender file, which is not read: convert it to OBJ, STL, PLY"), "{blend}");
     for format in FORMATS {
         assert_eq!(read_as(b"", Some(format)).unwrap_err().fault, MeshFault::Unrecognised);
         assert!(read_as(b"# only comments\n", Some(format)).is_err());

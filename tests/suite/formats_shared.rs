@@ -16,7 +16,7 @@ fn all_models_import() {
     let mut imported = 0;
     let mut refused = Vec::new();
     for path in files(&folder) {
-        if !["obj", "stl", "ply", "glb", "gltf"].contains(&extension(&path).as_str()) {
+        if !["obj", "stl", "ply", "off", "glb", "gltf"].contains(&extension(&path).as_str()) {
             continue;
         }
         let name = path.strip_prefix(&folder).unwrap().to_string_lossy().into_owned();
@@ -53,7 +53,7 @@ fn all_models_import() {
     ];
     let refused: Vec<(&str, MeshFault)> = refused.iter().map(|(n, e)| (n.as_str(), e.fault.clone())).collect();
     assert_eq!(refused, expected);
-    assert_eq!(imported, 31);
+    assert_eq!(imported, 34);
 }
 
 #[test]
