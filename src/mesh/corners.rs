@@ -1,14 +1,19 @@
-//! How polygons get into a raw mesh, for importers that read face by face.
+//! Polygons whose corners have attributes of their own, and how they get into a raw mesh: for importers that read face by
+//! face.
 
 use super::import::Context;
 use super::polygon::Triangulator;
 use super::raw::RawMesh;
 use super::{MeshError, Warning};
+use rapidhash::RapidHashMap;
+use std::collections::hash_map::Entry;
 
 /// Corners between two looks at the deadline and at the number of triangles.
 const CORNERS_PER_LOOK: u64 = 65_536;
 /// What a triangle takes in a raw mesh, whose lists double when they grow.
 const TRIANGLE_BYTES: u64 = 2 * (12 + 1 + 4);
+/// What a corner takes in the set, while that grows.
+const CORNER_BYTES: u64 = 2 * (16 + 4 + 1) + 4;
 
 /// Adds polygons to a raw mesh, paid and counted.
 #[derive(Debug, Default)]
@@ -60,5 +65,52 @@ impl Polygons {
             });
         }
         Ok(())
+    }
+}
+
+/// Gives every combination of indices (of a position, a normal ...) that corners have a vertex of its own, once.
+#[derive(Debug, Default)]
+pub struct CornerSet {
+    numbers: RapidHashMap<[u32; 4], u32>,
+    unpaid: u64,
+}
+
+impl CornerSet {
+    /// The vertex of a corner, and whether it is new: the next after `count`.
+    pub fn vertex(&mut self, key: [u32; 4], count: usize) -> (u32, bool) {
+        match self.numbers.entry(key) {
+            Entry::Occupied(known) => (*known.get(), false),
+            Entry::Vacant(place) => {
+                self.unpaid += 1;
+                (*place.insert(count as u32), true)
+            }
+        }
+    }
+
+    /// Pays for the vertices since the last time, each `vertex_bytes` large in the raw mesh; `corners` more may follow until
+    /// the next.
+    pub fn pay(&mut self, corners: usize, vertex_bytes: u64, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        if self.unpaid + corners as u64 >= CORNERS_PER_LOOK {
+            self.pay_all(vertex_bytes, cx)?;
+            if corners as u64 >= CORNERS_PER_LOOK {
+                cx.budget.spend("a face of very many corners", corners as u64, CORNER_BYTES + 2 * vertex_bytes)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Pays for the vertices since the last time.
+    pub fn pay_all(&mut self, vertex_bytes: u64, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        cx.budget.spend("the vertices of the file", self.unpaid, CORNER_BYTES + 2 * vertex_bytes)?;
+        self.unpaid = 0;
+        if self.numbers.len() >= u32::MAX as usize - CORNERS_PER_LOOK as usize {
+            return Err(MeshError::broken("the file has more than 4 billion different corners"));
+        }
+        Ok(())
+    }
+
+    /// Forgets them all, for a part that shares nothing with those before it.
+    pub fn clear(&mut self) {
+        self.numbers.clear();
     }
 }

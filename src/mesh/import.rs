@@ -2,7 +2,7 @@
 
 use super::bundle::Bundle;
 use super::normalise::normalise;
-use super::{Folder, Mesh, MeshError, MeshFault, entry, gltf, obj, off, ply, stl, unzip};
+use super::{Folder, Mesh, MeshError, MeshFault, entry, fbx, gltf, obj, off, ply, stl, unzip};
 use crate::limits::{Budget, Deadline, Limits};
 
 /// The mesh formats that are read.
@@ -23,14 +23,16 @@ pub enum Format {
     Ply,
     /// Geomview's object file format, text or binary.
     Off,
+    /// Autodesk FBX, binary or ASCII.
+    Fbx,
 }
 
 impl Format {
     /// The names that [`Format::from_name`] knows.
-    pub const NAMES: [&str; 6] = ["obj", "gltf", "glb", "stl", "ply", "off"];
+    pub const NAMES: [&str; 7] = ["obj", "gltf", "glb", "stl", "ply", "off", "fbx"];
 
     /// All of them, for a sentence.
-    pub const ALL: &str = "OBJ, STL, PLY, OFF, glTF or GLB";
+    pub const ALL: &str = "OBJ, STL, PLY, OFF, FBX, glTF or GLB";
 
     /// From a file extension or a query value. `stl` may be either kind: the importer looks.
     pub fn from_name(name: &str) -> Option<Self> {
@@ -41,6 +43,7 @@ impl Format {
             "stl" => Some(Self::StlBinary),
             "ply" => Some(Self::Ply),
             "off" => Some(Self::Off),
+            "fbx" => Some(Self::Fbx),
             _ => None,
         }
     }
@@ -54,6 +57,7 @@ impl Format {
             Self::StlBinary | Self::StlAscii => "stl",
             Self::Ply => "ply",
             Self::Off => "off",
+            Self::Fbx => "fbx",
         }
     }
 }
@@ -68,6 +72,7 @@ impl std::fmt::Display for Format {
             Self::StlAscii => "ASCII STL",
             Self::Ply => "PLY",
             Self::Off => "OFF",
+            Self::Fbx => "FBX",
         })
     }
 }
@@ -99,6 +104,7 @@ pub fn import(
         Format::StlBinary | Format::StlAscii => stl::read(bytes, &mut cx)?,
         Format::Ply => ply::read(bytes, &mut cx)?,
         Format::Off => off::read(bytes, &mut cx)?,
+        Format::Fbx => fbx::read(bytes, &mut cx)?,
         Format::Gltf | Format::Glb => gltf::read(bytes, &mut cx)?,
     };
     normalise(raw, &mut cx)

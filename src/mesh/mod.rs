@@ -1,9 +1,10 @@
 //! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
 //!
 //! Reading order: [`bundle`] (what comes in), `folder` (what names in it mean), [`raw`] (what an importer fills), `import` (opens the bundle, sniffs the format
-//! and calls one), `obj`, `stl`, `ply`, `off` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
+//! and calls one), `obj`, `stl`, `ply`, `off`, `fbx` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
 //! [`topology`], for whoever needs them.
 
+mod affine;
 mod attributes;
 pub mod bundle;
 mod coarse;
@@ -12,6 +13,7 @@ mod counted;
 pub mod edges;
 mod entry;
 mod error;
+mod fbx;
 mod folder;
 mod gltf;
 mod import;

@@ -1,6 +1,6 @@
 //! Which format some bytes are in, from the bytes alone: names and content types lie.
 
-use super::{Format, MeshError, MeshFault, off, ply, stl};
+use super::{Format, MeshError, MeshFault, fbx, off, ply, stl};
 
 /// How far into a text its first telling line may be. Exporters write long comment headers.
 const TEXT_SNIFF_BYTES: usize = 1 << 20;
@@ -19,6 +19,9 @@ pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
     }
     if off::is_off(bytes) {
         return Ok(Format::Off);
+    }
+    if fbx::is_fbx(bytes) {
+        return Ok(Format::Fbx);
     }
     let text = trim_start(bytes);
     if text.starts_with(b"{") {
@@ -94,7 +97,6 @@ fn is_corner(word: &str) -> bool {
 fn known_but_unread(bytes: &[u8]) -> Option<&'static str> {
     let starts = |magic: &[u8]| bytes.starts_with(magic);
     [
-        (starts(b"Kaydara FBX"), "FBX"),
         (starts(b"PK\x03\x04"), "a zip file (3MF or a bundle)"),
         (starts(b"\x89PNG") || starts(b"\xFF\xD8\xFF") || starts(b"RIFF"), "a picture"),
         (starts(b"BLENDER"), "a Blender file"),
