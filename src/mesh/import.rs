@@ -2,7 +2,7 @@
 
 use super::bundle::Bundle;
 use super::normalise::normalise;
-use super::{Folder, Mesh, MeshError, MeshFault, entry, fbx, gltf, obj, off, ply, stl, unzip};
+use super::{Folder, Mesh, MeshError, MeshFault, entry, fbx, gltf, obj, off, ply, stl, three_mf, unzip};
 use crate::limits::{Budget, Deadline, Limits};
 
 /// The mesh formats that are read.
@@ -25,14 +25,16 @@ pub enum Format {
     Off,
     /// Autodesk FBX, binary or ASCII.
     Fbx,
+    /// 3MF, a zip package of XML.
+    ThreeMf,
 }
 
 impl Format {
     /// The names that [`Format::from_name`] knows.
-    pub const NAMES: [&str; 7] = ["obj", "gltf", "glb", "stl", "ply", "off", "fbx"];
+    pub const NAMES: [&str; 8] = ["obj", "gltf", "glb", "stl", "ply", "off", "fbx", "3mf"];
 
     /// All of them, for a sentence.
-    pub const ALL: &str = "OBJ, STL, PLY, OFF, FBX, glTF or GLB";
+    pub const ALL: &str = "OBJ, STL, PLY, OFF, FBX, 3MF, glTF or GLB";
 
     /// From a file extension or a query value. `stl` may be either kind: the importer looks.
     pub fn from_name(name: &str) -> Option<Self> {
@@ -44,6 +46,7 @@ impl Format {
             "ply" => Some(Self::Ply),
             "off" => Some(Self::Off),
             "fbx" => Some(Self::Fbx),
+            "3mf" => Some(Self::ThreeMf),
             _ => None,
         }
     }
@@ -58,6 +61,7 @@ impl Format {
             Self::Ply => "ply",
             Self::Off => "off",
             Self::Fbx => "fbx",
+            Self::ThreeMf => "3mf",
         }
     }
 }
@@ -73,6 +77,7 @@ impl std::fmt::Display for Format {
             Self::Ply => "PLY",
             Self::Off => "OFF",
             Self::Fbx => "FBX",
+            Self::ThreeMf => "3MF",
         })
     }
 }
@@ -105,6 +110,7 @@ pub fn import(
         Format::Ply => ply::read(bytes, &mut cx)?,
         Format::Off => off::read(bytes, &mut cx)?,
         Format::Fbx => fbx::read(bytes, &mut cx)?,
+        Format::ThreeMf => three_mf::read(&mut cx)?,
         Format::Gltf | Format::Glb => gltf::read(bytes, &mut cx)?,
     };
     normalise(raw, &mut cx)

@@ -1,7 +1,7 @@
 //! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
 //!
 //! Reading order: [`bundle`] (what comes in), `folder` (what names in it mean), [`raw`] (what an importer fills), `import` (opens the bundle, sniffs the format
-//! and calls one), `obj`, `stl`, `ply`, `off`, `fbx` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
+//! and calls one), `obj`, `stl`, `ply`, `off`, `fbx`, `three_mf` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
 //! [`topology`], for whoever needs them.
 
 mod affine;
@@ -29,6 +29,8 @@ mod pow2;
 pub mod raw;
 mod sniff;
 mod stl;
+mod text;
+mod three_mf;
 pub mod topology;
 mod unzip;
 mod weld;

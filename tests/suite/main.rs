@@ -19,6 +19,7 @@ mod error_table;
 mod examples;
 mod fbx_files;
 mod formats;
+mod formats_3mf;
 mod formats_bad;
 mod formats_fbx;
 mod formats_gltf;
