@@ -14,7 +14,7 @@ use self::clean::Cleaner;
 use super::import::Context;
 use super::polygon::Triangulator;
 use super::raw::{RawMesh, extend_attribute, srgb_to_linear};
-use super::{Format, MaterialSlot, MeshError, Warning};
+use super::{Format, MaterialSlot, MeshError, Warning, text};
 use std::path::Path;
 use tobj::{LoadError, LoadOptions};
 
@@ -23,7 +23,8 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     // tobj would fan polygons, which is wrong for concave ones. With one index for all attributes, models whose faces all
     // have the same form get arrays of equal length; the cleaner starts a new model where the form changes.
     let options = LoadOptions { single_index: true, triangulate: false, ignore_points: true, ignore_lines: true };
-    let mut cleaner = Cleaner::new(bytes, cx);
+    let text = text::to_utf8(bytes, cx)?;
+    let mut cleaner = Cleaner::new(&text, cx);
     let loaded = tobj::load_obj_buf(&mut cleaner, &options, material_of_its_own);
     let summary = cleaner.finish(loaded.as_ref().err().copied())?;
     let (models, _) = loaded.map_err(|e| MeshError::broken(format!("the OBJ file cannot be read: {e}")))?;
