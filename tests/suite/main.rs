@@ -36,6 +36,7 @@ mod formats_ply_hostile;
 mod formats_ply_surfaces;
 mod formats_polygons;
 mod formats_shared;
+mod formats_stl;
 mod golden;
 mod http;
 mod http_bad;
