@@ -11,6 +11,7 @@ mod accuracy_shading;
 mod accuracy_wires;
 mod ask;
 mod bundles;
+mod bundles_hostile;
 mod bundles_http;
 mod bundles_zip;
 mod cli;
