@@ -167,8 +167,8 @@ fn nothing_to_draw_says_what_there_was() {
     let no_faces: String = solid.obj().lines().filter(|l| !l.starts_with('f')).map(|l| format!("{l}\n")).collect();
     let cases: [(&[u8], &str); 8] = [
         (no_faces.as_bytes(), "8 vertices and 0 faces"),
-        (b"v 0 0 0\nv 1 0 0\nl 1 2\n", "polylines are not drawn (lines in the file: 1)"),
-        (b"v 0 0 0\np 1\n", "points are not drawn"),
+        (b"v 0 0 0\nv 1 0 0\nl 1 1\nl 2\n", "2 vertices and 0 faces"),
+        (b"v nan 0 0\np 1\n", "1 vertex and 0 faces"),
         (
             b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
             "3 vertices and 1 face, of whose triangles 1 has a NaN or infinite corner and 0 have no area",

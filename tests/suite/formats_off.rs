@@ -149,13 +149,13 @@ fn broken_files_are_told_with_their_line() {
         (off("COFF\n8 6 0\n", " 1 1 1 1 1", ""), MeshFault::Broken, "6 numbers, or one more for alpha"),
         ("4OFF\n8 6 0\n".into(), MeshFault::Unsupported, "4OFF"),
         ("nOFF 3\n8 6 0\n".into(), MeshFault::Unsupported, "nOFF"),
-        ("OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n".into(), MeshFault::Empty, "3 vertices and 0 faces"),
+        ("OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n".into(), MeshFault::Empty, "3 vertices and 1 face"),
     ];
     for (text, fault, part) in &cases {
         let error = read(text.as_bytes()).unwrap_err();
         assert!(error.fault == *fault && error.detail.contains(part), "{text}: {error}");
     }
-    let more = plain().replace("8 6 12", "8 7 12") + "2 0 1\n" + "left over\n";
+    let more = plain().replace("8 6 12", "8 7 12") + "2 1 1\n" + "left over\n";
     let mesh = read(more.as_bytes()).unwrap();
     assert_eq!(codes(&mesh), ["short_faces_ignored", "trailing_bytes"]);
     for limits in [Limits { triangles: 11, ..Limits::default() }, Limits { memory_bytes: 100, ..Limits::default() }] {

@@ -28,6 +28,7 @@ mod formats_gltf_document;
 mod formats_gltf_scene;
 mod formats_gltf_surfaces;
 mod formats_hostile;
+mod formats_loose;
 mod formats_mtl;
 mod formats_obj;
 mod formats_off;

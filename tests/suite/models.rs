@@ -44,7 +44,7 @@ fn every_model_is_drawn_in_every_style_alike_on_both_back_ends() {
     sheet.store();
 }
 
-/// The models that this version reads: OBJ, STL, PLY, OFF, GLB and single-file glTF without compression.
+/// The models that this version reads: OBJ, STL, PLY, OFF, GLB and single-file glTF without compression, and not of points alone.
 fn readable(folder: &std::path::Path) -> Vec<(String, Mesh)> {
     let kinds = ["obj", "stl", "ply", "off", "glb", "gltf"];
     let is_mesh = |path: &std::path::PathBuf| {
@@ -54,7 +54,8 @@ fn readable(folder: &std::path::Path) -> Vec<(String, Mesh)> {
         .into_iter()
         .filter(is_mesh)
         .filter_map(|path| {
-            let mesh = scenes::mesh_of(&std::fs::read(&path).unwrap()).ok()?;
+            let mesh =
+                scenes::mesh_of(&std::fs::read(&path).unwrap()).ok().filter(|mesh| !mesh.triangles.is_empty())?;
             Some((path.file_name().unwrap().to_string_lossy().into_owned(), mesh))
         })
         .collect()

@@ -3,8 +3,9 @@
 use crate::mesh::affine::Affine;
 use crate::mesh::corners::{CornerSet, Polygons};
 use crate::mesh::import::Context;
+use crate::mesh::loose::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
 use crate::mesh::raw::{RawMesh, srgb_to_linear};
-use crate::mesh::{MeshError, Warning};
+use crate::mesh::{Loose, MeshError, Warning};
 use rapidhash::RapidHashMap;
 use ufbx::{Matrix, Mesh, Node, Scene};
 
@@ -40,7 +41,7 @@ pub fn read(scene: &Scene, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Us
     let shown = |node: &&Node| node.mesh.is_some() && node.visible;
     let hidden = scene.nodes.into_iter().filter(|node| node.mesh.is_some() && !node.visible).count();
     // Counted as often as they are shown, before any is.
-    let of_node = |node: &Node| node.mesh.as_ref().map_or(0, |mesh| mesh.num_triangles as u64);
+    let of_node = |node: &Node| node.mesh.as_ref().map_or(0, |mesh| triangles_of(mesh));
     let triangles = scene.nodes.into_iter().filter(shown).map(of_node).fold(0, u64::saturating_add);
     cx.check_triangles(triangles)?;
     let mut part = Part::default();
@@ -51,17 +52,19 @@ pub fn read(scene: &Scene, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Us
         }
     }
     part.polygons.finish(raw, cx)?;
+    curves(scene, &mut used, raw, cx)?;
     let notes = [
         (hidden as u64, "hidden_ignored", "meshes that the file hides are not drawn (meshes in the file:"),
-        (
-            part.short_faces,
-            "short_faces_ignored",
-            "faces with fewer than three corners are not drawn (faces in the file:",
-        ),
+        (part.short_faces, "short_faces_ignored", "faces without corners are not drawn (faces in the file:"),
     ];
     let met = notes.into_iter().filter(|(count, ..)| *count > 0);
     raw.report.warnings.extend(met.map(|(count, code, what)| Warning { code, detail: format!("{what} {count})") }));
     Ok(used)
+}
+
+fn triangles_of(mesh: &Mesh) -> u64 {
+    let (lines, points) = (mesh.num_line_faces as u64, mesh.num_point_faces as u64);
+    mesh.num_triangles as u64 + lines * SEGMENT_TRIANGLES + points * POINT_TRIANGLES
 }
 
 #[derive(Default)]
@@ -88,11 +91,12 @@ impl Part {
         attributes.begin(raw, cx)?;
         for (number, face) in mesh.faces.iter().enumerate() {
             let (begin, count) = (face.index_begin as usize, face.num_indices as usize);
-            if count < 3 {
+            // Points and lines come as faces, too.
+            if count == 0 {
                 self.short_faces += 1;
                 continue;
             }
-            self.polygons.pay(count, cx)?;
+            self.polygons.pay(count.max(3), cx)?;
             self.set.pay(count, VERTEX_BYTES, cx)?;
             self.corners.clear();
             for index in begin..begin.saturating_add(count) {
@@ -103,14 +107,63 @@ impl Part {
                 }
                 self.corners.push(vertex);
             }
+            let material = mesh.face_material.get(number).and_then(|&slot| material(mesh, node, slot));
+            let material = used.slot(material);
+            if let [a] | [a, _] = self.corners[..] {
+                raw.loose.push(Loose { ends: [a, self.corners[count - 1]], material });
+                continue;
+            }
             if place.is_mirroring {
                 self.corners.reverse();
             }
-            let material = mesh.face_material.get(number).and_then(|&slot| material(mesh, node, slot));
-            self.polygons.add(raw, &self.corners, used.slot(material));
+            self.polygons.add(raw, &self.corners, material);
         }
         self.set.pay_all(VERTEX_BYTES, cx)?;
-        attributes.end(raw, cx)
+        complete(raw);
+        Ok(())
+    }
+}
+
+/// Lines that are no edges of a mesh, as often as nodes show them.
+fn curves(scene: &Scene, used: &mut Used, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
+    for curve in &scene.line_curves {
+        for node in &curve.element.instances {
+            cx.deadline.check()?;
+            let place = Place::of(&node.geometry_to_world);
+            let base = raw.positions.len();
+            let (points, indices) = (curve.control_points.len(), curve.point_indices.len());
+            let lines = (raw.loose.len() + indices) as u64;
+            cx.check_triangles((raw.triangles.len() as u64).saturating_add(lines * SEGMENT_TRIANGLES))?;
+            cx.budget.spend("the lines of the FBX file", points as u64, 2 * VERTEX_BYTES)?;
+            cx.budget.spend("the lines of the FBX file", indices as u64, 2 * size_of::<Loose>() as u64)?;
+            raw.report.file_vertices += points as u64;
+            raw.positions.extend(curve.control_points.iter().map(|p| place.points.point([p.x, p.y, p.z])));
+            let material = used.slot(None);
+            for segment in curve.segments.iter() {
+                let begin = segment.index_begin as usize;
+                let segment = begin.checked_add(segment.num_indices as usize);
+                let Some(own) = segment.and_then(|end| curve.point_indices.get(begin..end)) else { continue };
+                let is_there = |pair: &&[u32]| pair[0] != pair[1] && pair.iter().all(|&v| (v as usize) < points);
+                let ends = own.windows(2).filter(is_there).map(|pair| [pair[0], pair[1]].map(|v| v + base as u32));
+                raw.loose.extend(ends.map(|ends| Loose { ends, material }));
+            }
+        }
+    }
+    complete(raw);
+    Ok(())
+}
+
+/// Gives all vertices the attributes that some have.
+fn complete(raw: &mut RawMesh) {
+    let count = raw.positions.len();
+    if !raw.normals.is_empty() {
+        raw.normals.resize(count, [0.0; 3]);
+    }
+    if !raw.uvs.is_empty() {
+        raw.uvs.resize(count, [0.0; 2]);
+    }
+    if !raw.colors.is_empty() {
+        raw.colors.resize(count, [1.0; 4]);
     }
 }
 
@@ -195,22 +248,6 @@ impl<'a> Attributes<'a> {
         missing(self.has_normals, raw.normals.is_empty(), 12)
             + missing(self.has_uvs, raw.uvs.is_empty(), 8)
             + missing(self.has_colors, raw.colors.is_empty(), 16)
-    }
-
-    /// And what is here those that only others have.
-    fn end(&self, raw: &mut RawMesh, cx: &Context<'_>) -> Result<(), MeshError> {
-        cx.deadline.check()?;
-        let count = raw.positions.len();
-        if !raw.normals.is_empty() {
-            raw.normals.resize(count, [0.0; 3]);
-        }
-        if !raw.uvs.is_empty() {
-            raw.uvs.resize(count, [0.0; 2]);
-        }
-        if !raw.colors.is_empty() {
-            raw.colors.resize(count, [1.0; 4]);
-        }
-        Ok(())
     }
 
     fn push(&self, [position, normal, uv, color]: [u32; 4], place: &Place, raw: &mut RawMesh) -> Option<()> {

@@ -115,7 +115,6 @@ fn up_axis(scene: &Scene) -> UpAxis {
 fn ignored(scene: &Scene) -> Vec<Warning> {
     let nurbs = scene.nurbs_curves.len() + scene.nurbs_surfaces.len();
     let all = [
-        (scene.line_curves.len(), "lines_ignored", "lines are not drawn (lines in the file:"),
         (nurbs, "curves_ignored", "free-form curves and surfaces are not drawn (in the file:"),
         (
             scene.skin_deformers.len() + scene.blend_deformers.len(),

@@ -5,7 +5,7 @@ use super::{Counts, Source};
 use crate::mesh::corners::Polygons;
 use crate::mesh::import::Context;
 use crate::mesh::raw::RawMesh;
-use crate::mesh::{MeshError, Warning};
+use crate::mesh::{Loose, MeshError, Warning};
 
 /// What a face's colour and a vertex that only faces of one colour share take at most.
 const COLORED_BYTES: u64 = COLOR_BYTES + 4 + 16;
@@ -53,8 +53,14 @@ impl Faces {
             for &number in &numbers {
                 corners.push(self.vertex(number).map_err(|what| source.broken(&what))?);
             }
+            match corners[..] {
+                [] => self.short_faces += 1,
+                [vertex] => raw.loose.push(Loose::point(vertex, 0)),
+                [a, b] if a != b => raw.loose.push(Loose { ends: [a, b], material: 0 }),
+                [_, _] => self.short_faces += 1,
+                _ => {}
+            }
             if corners.len() < 3 {
-                self.short_faces += 1;
                 continue;
             }
             let is_color = matches!(color.len(), 3 | 4);
@@ -79,8 +85,12 @@ impl Faces {
         Ok(())
     }
 
-    /// Gives the vertices their faces' colours. How many faces have no area.
+    /// Gives the vertices their faces' colours, and a cloud of points its points. How many faces are nothing.
     pub fn finish(self, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<u64, MeshError> {
+        if self.count == 0 {
+            cx.budget.spend("lines and points", u64::from(self.vertices), size_of::<Loose>() as u64)?;
+            raw.loose.extend((0..self.vertices).map(|vertex| Loose::point(vertex, 0)));
+        }
         self.polygons.finish(raw, cx)?;
         if let Some(split) = self.colors {
             cx.budget.spend("the colours of OFF faces", split.unpaid, VERTEX_BYTES)?;

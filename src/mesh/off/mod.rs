@@ -75,7 +75,11 @@ fn read_from(source: &mut impl Source, header: &Header, cx: &mut Context<'_>) ->
     faces.read(source, &mut raw, cx)?;
     let short_faces = faces.finish(&mut raw, cx)?;
     let notes = [
-        (short_faces, "short_faces_ignored", "faces with fewer than three corners are not drawn (faces in the file:"),
+        (
+            short_faces,
+            "short_faces_ignored",
+            "faces without corners, or with two that are one, are not drawn (faces in the file:",
+        ),
         (source.trailing_bytes() as u64, "trailing_bytes", "what comes after the last OFF face is ignored (bytes:"),
     ];
     let met = notes.into_iter().filter(|(count, ..)| *count > 0);
