@@ -59,7 +59,7 @@ pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
 /// The format of a file that lies among others, few of which are meshes. What only resembles a binary STL is one if it
 /// `may_be_stl` by its name.
 pub fn sniff_among_others(bytes: &[u8], may_be_stl: bool) -> Option<Format> {
-    if known_but_unread(bytes).is_some() {
+    if known_but_unread(bytes).is_some() && !text::is_utf16(bytes) {
         return stl::is_exact_binary(bytes).then_some(Format::StlBinary);
     }
     let format = sniff(bytes).ok()?;

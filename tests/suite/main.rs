@@ -31,6 +31,7 @@ mod formats_hostile;
 mod formats_loose;
 mod formats_mtl;
 mod formats_obj;
+mod formats_obj_wild;
 mod formats_off;
 mod formats_ply;
 mod formats_ply_bad;
