@@ -3,7 +3,9 @@
 use super::bundle::Bundle;
 use super::normalise::normalise;
 use super::raw::RawMesh;
-use super::{Folder, ImportReport, Mesh, MeshError, MeshFault, Warning, entry, gltf, obj, ply, stl, unzip};
+use super::{
+    Folder, ImportReport, Mesh, MeshError, MeshFault, Warning, entry, fbx, gltf, obj, off, ply, stl, three_mf, unzip,
+};
 use crate::limits::{Budget, Deadline, Limits};
 
 /// The mesh formats that are read.
@@ -22,14 +24,20 @@ pub enum Format {
     StlAscii,
     /// PLY of any encoding.
     Ply,
+    /// Geomview's object file format, text or binary.
+    Off,
+    /// Autodesk FBX, binary or ASCII.
+    Fbx,
+    /// 3MF, a zip package of XML.
+    ThreeMf,
 }
 
 impl Format {
     /// The names that [`Format::from_name`] knows.
-    pub const NAMES: [&str; 5] = ["obj", "gltf", "glb", "stl", "ply"];
+    pub const NAMES: [&str; 8] = ["obj", "gltf", "glb", "stl", "ply", "off", "fbx", "3mf"];
 
     /// All of them, for a sentence.
-    pub const ALL: &str = "OBJ, STL, PLY, glTF or GLB";
+    pub const ALL: &str = "OBJ, STL, PLY, OFF, FBX, 3MF, glTF or GLB";
 
     /// From a file extension or a query value. `stl` may be either kind: the importer looks.
     pub fn from_name(name: &str) -> Option<Self> {
@@ -39,6 +47,9 @@ impl Format {
             "glb" => Some(Self::Glb),
             "stl" => Some(Self::StlBinary),
             "ply" => Some(Self::Ply),
+            "off" => Some(Self::Off),
+            "fbx" => Some(Self::Fbx),
+            "3mf" => Some(Self::ThreeMf),
             _ => None,
         }
     }
@@ -51,6 +62,9 @@ impl Format {
             Self::Glb => "glb",
             Self::StlBinary | Self::StlAscii => "stl",
             Self::Ply => "ply",
+            Self::Off => "off",
+            Self::Fbx => "fbx",
+            Self::ThreeMf => "3mf",
         }
     }
 }
@@ -64,6 +78,9 @@ impl std::fmt::Display for Format {
             Self::StlBinary => "binary STL",
             Self::StlAscii => "ASCII STL",
             Self::Ply => "PLY",
+            Self::Off => "OFF",
+            Self::Fbx => "FBX",
+            Self::ThreeMf => "3MF",
         })
     }
 }
@@ -132,6 +149,9 @@ fn open<T>(
         Format::Obj => obj::read(bytes, &mut cx)?,
         Format::StlBinary | Format::StlAscii => stl::read(bytes, &mut cx)?,
         Format::Ply => ply::read(bytes, &mut cx)?,
+        Format::Off => off::read(bytes, &mut cx)?,
+        Format::Fbx => fbx::read(bytes, &mut cx)?,
+        Format::ThreeMf => three_mf::read(&mut cx)?,
         Format::Gltf | Format::Glb => gltf::read(bytes, &mut cx)?,
     };
     if options.time_s.is_some() && !matches!(format, Format::Gltf | Format::Glb) {

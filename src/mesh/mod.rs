@@ -1,16 +1,19 @@
 //! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
 //!
 //! Reading order: [`bundle`] (what comes in), `folder` (what names in it mean), [`raw`] (what an importer fills), `import` (opens the bundle, sniffs the format
-//! and calls one), `obj`, `stl`, `ply` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
+//! and calls one), `obj`, `stl`, `ply`, `off`, `fbx`, `three_mf` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
 //! [`topology`], for whoever needs them.
 
+mod affine;
 mod attributes;
 pub mod bundle;
 mod coarse;
+mod corners;
 mod counted;
 pub mod edges;
 mod entry;
 mod error;
+mod fbx;
 mod folder;
 mod gltf;
 mod import;
@@ -19,12 +22,15 @@ pub mod material;
 mod normalise;
 pub mod normals;
 mod obj;
+mod off;
 mod ply;
 mod polygon;
 mod pow2;
 pub mod raw;
 mod sniff;
 mod stl;
+mod text;
+mod three_mf;
 pub mod topology;
 mod unzip;
 mod weld;
