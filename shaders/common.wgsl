@@ -86,6 +86,8 @@ const SKIP_BACK: u32 = 4u;
 const CONTOUR: u32 = 8u;
 const LIT_PASS: u32 = 16u;
 const FIRST_PASS: u32 = 32u;
+// It is the fronts of faces that look away, because the surface is inside out.
+const INSIDE_OUT: u32 = 64u;
 
 const SURFACE: u32 = 1u;
 const HULL: u32 = 2u;

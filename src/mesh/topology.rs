@@ -40,8 +40,19 @@ impl Topology {
     }
 }
 
-/// Whether every component of a closed mesh has its faces' fronts outside: none encloses a negative volume.
-pub fn is_outward(mesh: &Mesh) -> bool {
+/// Which way the fronts of a closed mesh's faces look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fronts {
+    /// Outwards: no component encloses a negative volume.
+    Outside,
+    /// Inwards: none encloses a positive one.
+    Inside,
+    /// Some so, some so.
+    Mixed,
+}
+
+/// Which way they look, all components of the mesh together.
+pub fn fronts(mesh: &Mesh) -> Fronts {
     let roots = union(mesh).0;
     let mut volumes = vec![0.0_f64; mesh.positions.len()];
     for t in mesh.own_triangles() {
@@ -49,7 +60,13 @@ pub fn is_outward(mesh: &Mesh) -> bool {
         let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
         volumes[roots[t[0] as usize] as usize] += (a[0] * cross[0] + a[1] * cross[1]) + a[2] * cross[2];
     }
-    volumes.iter().all(|&volume| volume >= 0.0)
+    if volumes.iter().all(|&volume| volume >= 0.0) {
+        Fronts::Outside
+    } else if volumes.iter().all(|&volume| volume <= 0.0) {
+        Fronts::Inside
+    } else {
+        Fronts::Mixed
+    }
 }
 
 fn components(mesh: &Mesh) -> u64 {

@@ -35,7 +35,7 @@ pub use choice::{Choice, Chosen, choose};
 pub use error::PlanError;
 use hull::Thickness;
 pub use hull::{HullPass, HullVertex};
-pub use lines::{Edge, LinePass, Shown};
+pub use lines::{Edge, LinePass, Shown, Side};
 pub use loose::thicken;
 pub use skips::{Skip, SkipKind};
 pub use surface::{

@@ -136,7 +136,7 @@ fn lines_of<'a>(
         smoothing_px: 0.0,
         color: [1.0, 0.0, 0.0, 1.0],
         shown: Shown::Visible,
-        skip_back_edges: false,
+        unseen_side: None,
         contour: false,
         lit: false,
     };

@@ -74,7 +74,7 @@ impl<'a> LineDrawer<'a> {
     pub fn draw(&mut self, edge: &Edge, LineTarget { ink, owners }: &mut LineTarget<'_>) {
         let Some(segment) = Segment::new(self.stages, edge) else { return };
         let mut direction = None;
-        let owner = if self.lines.lit && !owners.is_empty() { self.stages.lit_by(edge) } else { 0 };
+        let owner = if self.lines.lit && !owners.is_empty() { self.stages.lit_by(self.lines, edge) } else { 0 };
         let windows = if self.is_hidden { (segment.length * self.windows) as u32 + 1 } else { 1 };
         let step = recip(windows as f32);
         for window in 0..windows {

@@ -175,7 +175,7 @@ mod tests {
             smoothing_px: 0.0,
             color: zero,
             shown,
-            skip_back_edges: false,
+            unseen_side: None,
             contour: false,
             lit: false,
         };

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, Shown, SurfacePass};
+use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, Shown, Side, SurfacePass};
 
 /// The plan's numbers.
 #[repr(C)]
@@ -80,9 +80,10 @@ pub fn line_flags(lines: &LinePass, something_hides: bool, lights_lines: bool) -
         Shown::Hidden => 2,
     };
     shown
-        | u32::from(lines.skip_back_edges) << 2
+        | u32::from(lines.unseen_side.is_some()) << 2
         | u32::from(lines.contour) << 3
         | u32::from(lines.lit && lights_lines) << 4
+        | u32::from(lines.unseen_side == Some(Side::Front)) << 6
 }
 
 /// Bit of [`Batch::line_flags`]: no pass has laid anything over the background yet.

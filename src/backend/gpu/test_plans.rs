@@ -37,7 +37,7 @@ pub fn lines(edges: Arc<[Edge]>, width_px: f32, shown: Shown) -> LinePass {
         smoothing_px: 1.0,
         color: [1.0; 4],
         shown,
-        skip_back_edges: false,
+        unseen_side: None,
         contour: false,
         lit: true,
     }
