@@ -16,6 +16,9 @@ fn clip(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) 
     corners[0] = homogeneous_corner(triangles[3u * t]);
     corners[1] = homogeneous_corner(triangles[3u * t + 1u]);
     corners[2] = homogeneous_corner(triangles[3u * t + 2u]);
+    if !is_moderate(corners[0]) || !is_moderate(corners[1]) || !is_moderate(corners[2]) {
+        return;
+    }
     // Half of the array holds the polygon, the other half takes what a plane leaves of it.
     var len = 3u;
     for (var plane = 0u; plane < 5u; plane++) {

@@ -17,7 +17,6 @@ struct Frame {
     near_w: f32,
     ambient: f32,
     lamp_count: u32,
-    line_pass_count: u32,
     // Always 0, which the compiler cannot know.
     zero: u32,
     width: i32,
@@ -56,7 +55,7 @@ struct Batch {
     huge_end: u32,
     // Edges that a workgroup draws.
     edges_per_group: u32,
-    // Of the line pass: pixels, pixels, bits, and, below, where its coverage starts.
+    // Of the line pass: pixels, pixels, bits, and, below, which it is.
     line_width: f32,
     line_smoothing: f32,
     line_flags: u32,
@@ -67,12 +66,13 @@ struct Batch {
     line_slices: u32,
     // Coverage in the middle of a line.
     line_peak: f32,
-    // Of so many dispatches over the same long edges, which this is.
-    line_turns: u32,
-    line_turn: u32,
-    ink_at: u32,
-    // Where the faces whose light falls on lines start in the ink.
-    owners_at: u32,
+    // Parts of edges that a thread looks for and draws before it says how far it has come.
+    line_units: u32,
+    line_pass: u32,
+    // Which rows the visibility buffer holds, where that is more than the batch's, and where the first of the batch's begins in it.
+    seen_first: i32,
+    seen_end: i32,
+    samples_at: u32,
     // The role that drawn triangles have, where the plan has roles; 0: the hull's, which have none.
     role: u32,
     // Number of the layer that is looked for; 0 also for the visibility buffer.
@@ -85,8 +85,7 @@ const SHOWN_HIDDEN: u32 = 2u;
 const SKIP_BACK: u32 = 4u;
 const CONTOUR: u32 = 8u;
 const LIT_PASS: u32 = 16u;
-const LONG_ONLY: u32 = 32u;
-const SHORT_ONLY: u32 = 64u;
+const FIRST_PASS: u32 = 32u;
 
 const SURFACE: u32 = 1u;
 const HULL: u32 = 2u;

@@ -44,7 +44,7 @@ impl Topology {
 pub fn is_outward(mesh: &Mesh) -> bool {
     let roots = union(mesh).0;
     let mut volumes = vec![0.0_f64; mesh.positions.len()];
-    for t in &mesh.triangles {
+    for t in mesh.own_triangles() {
         let [a, b, c] = t.map(|v| mesh.positions[v as usize].map(f64::from));
         let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
         volumes[roots[t[0] as usize] as usize] += (a[0] * cross[0] + a[1] * cross[1]) + a[2] * cross[2];
@@ -68,7 +68,7 @@ fn union(mesh: &Mesh) -> (Vec<u32>, u64) {
         v
     };
     let mut count = mesh.positions.len() as u64;
-    for t in &mesh.triangles {
+    for t in mesh.own_triangles() {
         for v in [t[1], t[2]] {
             let (a, b) = (find(t[0], &mut parent), find(v, &mut parent));
             if a != b {

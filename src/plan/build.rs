@@ -1,18 +1,12 @@
 //! Spec and mesh to plan: what each look needs, and what it does not.
 
-use std::borrow::Cow;
-
 use super::parts::Parts;
 use super::skips::{SkipKind, Skips};
-use super::textures::TextureLoader;
-use super::{
-    CornerValues, DrawPlan, Faces, HullPass, LayersPass, PlanError, Projection, SurfacePass, Thickness, flags, lights,
-    materials, outline, wires,
-};
+use super::{DrawPlan, HullPass, LayersPass, PlanError, Projection, Thickness, build_surface, loose, outline, wires};
 use crate::limits::{Budget, Deadline, LimitExceeded};
-use crate::mesh::{Mesh, normals};
+use crate::mesh::Mesh;
 use crate::scene::camera::{Border, Camera};
-use crate::scene::{Cull, Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
+use crate::scene::{Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
 
 /// Width of an outline in pixels where the request does not say.
 const OUTLINE_PX: f32 = 3.0;
@@ -62,7 +56,7 @@ pub fn build_keeping<'a>(
     let mut edges = wires::Edges::default();
     let lines =
         wires::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, &mut means)?;
-    let surface = surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
+    let surface = build_surface::surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
     let no_hull = skips.skip(SkipKind::Hull, !parts.has_hull(), "the look has no hull");
     let hull = match (no_hull, parts.has_hull()) {
         (true, _) => None,
@@ -119,7 +113,8 @@ fn pay(mesh: &Mesh, size_px: [u32; 2], parts: &Parts<'_>, budget: &mut Budget) -
     Ok(())
 }
 
-fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection {
+/// The camera's rows.
+pub fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection {
     let [x, y, z, w] = camera.rows(size_px);
     let [right, up, back] = camera.axes.map(|axis| axis.as_vec3().to_array());
     // In an orthographic view W is 1 and nothing is behind the eye.
@@ -128,8 +123,9 @@ fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection {
 }
 
 /// What the widest outline and the widest line ask for.
-fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
-    let mut border = Border::default();
+pub(super) fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
+    let mut border =
+        Border { px: if mesh.loose.is_empty() { 0.0 } else { 0.5 * loose::POINT_PX }, ..Border::default() };
     for layers in &parts.looks {
         if let Some(outline) = &layers.outline {
             // Half of a contour lies on the surface itself.
@@ -169,105 +165,6 @@ fn contour_px(mesh: &Mesh, outline: &Outline, camera: &Camera, size_px: [u32; 2]
     match thickness(mesh, outline) {
         Thickness::Px(px) => px.min(PX_MAX),
         Thickness::Object(units) => ((f64::from(units) * camera.px_per_unit(size_px)) as f32).min(PX_MAX),
-    }
-}
-
-fn surface_pass<'a>(
-    mesh: &'a Mesh,
-    spec: &Spec,
-    parts: &Parts<'_>,
-    camera: &Camera,
-    edges: &mut wires::Edges,
-    skips: &mut Skips<'_>,
-    means: &mut Means<'_>,
-) -> Result<Option<SurfacePass<'a>>, PlanError> {
-    let is_seen = parts.has_fill() || parts.has_barycentric_wire();
-    let is_needless = !is_seen && !parts.needs_occluder();
-    let why = "the look has no filled surface, and no line that one could hide";
-    if skips.skip(SkipKind::Surface, is_needless, why) {
-        return Ok(None);
-    }
-    let is_shaded = !skips.skip(SkipKind::Shading, !is_seen, "the surface is not seen: it only hides lines");
-    let edge_masks = if parts.has_barycentric_wire() || parts.shows_edge_distance() {
-        wires::edge_masks(mesh, parts, edges, means)?
-    } else {
-        Vec::new()
-    };
-    let mut loader = TextureLoader::new(mesh, means);
-    let mut looks = Vec::with_capacity(mesh.materials.len());
-    let used = used_materials(mesh);
-    for (index, (slot, layers)) in mesh.materials.iter().zip(&parts.layers).enumerate() {
-        loader.for_material(index, used[index]);
-        looks.push(materials::look(mesh, slot, layers, &mut loader)?);
-    }
-    let samples = looks.iter().any(materials::samples);
-    if !skips.skip(SkipKind::Textures, !samples, "nothing samples one") && !samples {
-        for (index, slot) in mesh.materials.iter().enumerate() {
-            loader.for_material(index, used[index]);
-            materials::load_all(slot, &mut loader)?;
-        }
-    }
-    let size_px = [spec.image.width_px, spec.image.height_px];
-    let textures = loader.finish(&projection(camera, size_px, true), skips)?;
-    let is_one = looks.iter().all(|look| *look == looks[0]);
-    let one_material = skips.skip(SkipKind::MaterialIndices, is_one, "every triangle has the same material");
-    if one_material {
-        looks.truncate(1);
-    }
-    let mut pass = SurfacePass {
-        faces: match parts.common_cull() {
-            Cull::None => Faces::Both,
-            Cull::Back => Faces::Front,
-            Cull::Front => Faces::Back,
-        },
-        is_shaded,
-        materials: looks,
-        triangle_materials: if one_material { &[] } else { &mesh.triangle_materials },
-        face_normals: &[],
-        vertex_normals: None,
-        uvs: None,
-        colors: None,
-        edge_masks: Cow::Owned(edge_masks),
-        textures,
-        lights: lights::lights(&spec.light, camera),
-    };
-    attributes(mesh, &mut pass, skips);
-    Ok(Some(pass))
-}
-
-/// Whether any triangle has a material.
-fn used_materials(mesh: &Mesh) -> Vec<bool> {
-    let mut used = vec![false; mesh.materials.len()];
-    for &material in &mesh.triangle_materials {
-        if let Some(used) = used.get_mut(material as usize) {
-            *used = true;
-        }
-    }
-    used
-}
-
-/// Gives the pass the arrays that its materials read.
-fn attributes<'a>(mesh: &'a Mesh, pass: &mut SurfacePass<'a>, skips: &mut Skips<'_>) {
-    let all = pass.all_flags();
-    let reads = |flag: u32| pass.is_shaded && all & flag != 0;
-    let faceless = !reads(flags::FACE_NORMALS);
-    if !skips.skip(SkipKind::FaceNormals, faceless, "no material is lit by them") {
-        pass.face_normals = &mesh.face_normals;
-    }
-    if !skips.skip(SkipKind::VertexNormals, !reads(flags::VERTEX_NORMALS), "no material is shaded smoothly") {
-        let (values, triangles) = normals::smooth(mesh);
-        pass.vertex_normals = Some(CornerValues { values, triangles });
-    }
-    let samples = pass.is_shaded && pass.materials.iter().any(materials::samples);
-    let shows_uvs = pass.materials.iter().any(|m| m.flags & flags::DEBUG == 5 << flags::DEBUG_SHIFT);
-    if !mesh.uvs.is_empty() && !skips.skip(SkipKind::Uvs, !samples && !shows_uvs, "nothing samples a texture") {
-        let values = Cow::Borrowed(mesh.uvs.as_slice());
-        pass.uvs = Some(CornerValues { values, triangles: &mesh.attribute_triangles });
-    }
-    let colorless = !reads(flags::VERTEX_COLORS);
-    if !mesh.colors.is_empty() && !skips.skip(SkipKind::VertexColors, colorless, "no material shows them") {
-        let values = Cow::Borrowed(mesh.colors.as_slice());
-        pass.colors = Some(CornerValues { values, triangles: &mesh.attribute_triangles });
     }
 }
 

@@ -4,6 +4,7 @@
 //! each omission is written down in [`DrawPlan::skips`].
 
 mod build;
+mod build_surface;
 mod choice;
 mod error;
 mod error_table;
@@ -11,6 +12,7 @@ mod fan;
 mod hull;
 mod lights;
 mod lines;
+mod loose;
 mod materials;
 mod outline;
 mod parts;
@@ -18,6 +20,7 @@ mod rim;
 mod silhouette;
 mod skips;
 mod surface;
+mod texture_basis;
 mod texture_closeup;
 mod texture_decode;
 mod texture_half;
@@ -33,6 +36,7 @@ pub use error::PlanError;
 use hull::Thickness;
 pub use hull::{HullPass, HullVertex};
 pub use lines::{Edge, LinePass, Shown};
+pub use loose::thicken;
 pub use skips::{Skip, SkipKind};
 pub use surface::{
     CornerValues, Lamp, Lights, MaterialLook, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, flags, slots,

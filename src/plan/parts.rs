@@ -159,7 +159,14 @@ impl<'a> Parts<'a> {
         if pass.is_none() && by_part.iter().all(|&role| usual(role)) {
             return Cow::Borrowed(&[]);
         }
-        mesh.triangle_materials.iter().map(|&m| by_part.get(m as usize).copied().unwrap_or(roles::SURFACE)).collect()
+        let own = mesh.own_triangles().len();
+        let role = |m: u32| by_part.get(m as usize).copied().unwrap_or(roles::SURFACE);
+        let mut all: Vec<u8> = mesh.triangle_materials.iter().map(|&m| role(m)).collect();
+        for role in all.iter_mut().skip(own) {
+            // Lines and points face the viewer.
+            *role &= roles::SURFACE | roles::LAYER;
+        }
+        all.into()
     }
 }
 

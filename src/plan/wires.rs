@@ -101,7 +101,10 @@ pub fn passes(
         means.deadline.check()?;
         means.budget.spend("drawn edges", edges.len() as u64, 16)?;
         if !edges.is_empty() {
-            passes.extend(want.passes(&edges, hides, skip_back));
+            let drawn = want.passes(&edges, hides, skip_back);
+            // In the lists of up to four bands of the picture.
+            means.budget.spend("lists of edges", (drawn.len() * edges.len()) as u64, 16)?;
+            passes.extend(drawn);
         }
     }
     Ok(passes)
@@ -131,14 +134,18 @@ pub fn edge_masks(
     let classes: Vec<Class> =
         parts.layers.iter().map(|layers| layers.wire.as_ref().map_or(Class::All, class_of)).collect();
     let is_polygonal = mesh.edge_masks.iter().any(|&mask| mask != 0b111);
-    if classes.iter().all(|class| *class == Class::All || (*class == Class::Polygon && !is_polygonal)) {
+    let own = mesh.own_triangles().len();
+    let is_all = own == mesh.triangles.len();
+    if is_all && classes.iter().all(|class| *class == Class::All || (*class == Class::Polygon && !is_polygonal)) {
         return Ok(Vec::new());
     }
     means.budget.spend("edge masks", mesh.triangles.len() as u64, 1)?;
     let class_at = |t: usize| classes.get(mesh.triangle_materials[t] as usize).copied().unwrap_or(Class::All);
     let mut masks: Vec<u8> = (0..mesh.triangles.len())
         .map(|t| match class_at(t) {
-            Class::All => 0b111,
+            // Lines and points have no edges.
+            Class::All if t < own => 0b111,
+            Class::All => 0,
             Class::Polygon => mesh.edge_masks[t],
             _ => 0,
         })

@@ -40,20 +40,18 @@ fn all_models_import() {
             }
         }
     }
-    // Compressed, in several files, or points alone.
+    // In several files, or points alone.
     let expected = [
-        ("BoxDraco/BoxDraco.gltf", MeshFault::Unsupported),
-        ("BoxMeshopt.glb", MeshFault::Unsupported),
-        ("DenseSphere.glb", MeshFault::Unsupported),
+        ("BoxDraco/BoxDraco.gltf", MeshFault::OutsideBundle),
         ("PalmTree/PalmTree.gltf", MeshFault::OutsideBundle),
         ("meshopt-fallback/meshopt-fallback.gltf", MeshFault::OutsideBundle),
-        ("meshopt-no-fallback/meshopt-no-fallback.gltf", MeshFault::Unsupported),
+        ("meshopt-no-fallback/meshopt-no-fallback.gltf", MeshFault::OutsideBundle),
         ("points_ascii.ply", MeshFault::Empty),
         ("points_bin.ply", MeshFault::Empty),
     ];
     let refused: Vec<(&str, MeshFault)> = refused.iter().map(|(n, e)| (n.as_str(), e.fault.clone())).collect();
     assert_eq!(refused, expected);
-    assert_eq!(imported, 31);
+    assert_eq!(imported, 33);
 }
 
 #[test]

@@ -33,14 +33,19 @@ impl Stages<'_> {
         if face == Edge::NO_FACE {
             return true;
         }
-        let vertices = self.screen_triangle(face);
-        !vertices.iter().any(ScreenVertex::is_outside) && area(&vertices) > 0
+        self.area_of(face).is_some_and(|area| area > 0)
     }
 
     /// Whether a face has no area on screen.
     fn is_edge_on(&self, face: u32) -> bool {
+        self.area_of(face) == Some(0)
+    }
+
+    /// A face's area on screen, if all of its corners are there.
+    #[inline(always)]
+    fn area_of(&self, face: u32) -> Option<i64> {
         let vertices = self.screen_triangle(face);
-        !vertices.iter().any(ScreenVertex::is_outside) && area(&vertices) == 0
+        (!vertices.iter().any(ScreenVertex::is_outside)).then(|| area(&vertices))
     }
 
     /// Whether the edge's faces lie on one side of it on screen, and none on the other: there the surface ends, or turns back

@@ -4,6 +4,7 @@
 //! interval. The triangles that are asked are those that the visibility buffer shows along the edge.
 
 use super::Stages;
+use super::clip::is_moderate;
 use super::contour::volume;
 use super::samples::{NOTHING, SampleBand};
 use super::segment::Segment;
@@ -167,10 +168,13 @@ fn hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, id: u32) -> Op
     let corners: [Corner; 3];
     let is_clockwise;
     if on_screen.iter().any(ScreenVertex::is_outside) {
-        if stages.is_hull(id) {
+        if stages.is_hull(id) || !stages.plan.projection.clip {
             return None;
         }
         corners = vertices.map(|v| homogeneous(&stages.plan.projection, stages.plan.positions[v as usize]));
+        if !corners.iter().all(is_moderate) {
+            return None;
+        }
         is_clockwise = volume(&corners) > 0.0;
     } else {
         let [a, b, c] = &on_screen;

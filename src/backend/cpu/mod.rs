@@ -37,11 +37,13 @@ mod wire;
 
 pub use isa::Isa;
 
+use std::sync::{Mutex, PoisonError};
+
 use rayon::prelude::*;
 
 use self::bins::Bins;
 use self::resolve::SrgbEncoder;
-use self::scratch::{BandScratch, ScratchPool};
+use self::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, ScratchPool};
 use self::transform::ScreenVertex;
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::Image;
@@ -110,17 +112,36 @@ impl CpuRenderer {
         deadline.check()?;
         self.transform(plan);
         let stages = self.stages(plan, deadline);
-        let rows = scratch::rows_per_band(plan);
-        let bins = bins::bin(&stages, self.pool.as_ref(), [rows, plan.line_margin_rows()])?;
-        let row_len = out.len() / plan.height_px as usize;
-        let items = out.chunks_mut(row_len * rows as usize).enumerate().collect();
-        run(self.pool.as_ref(), items, |(band, out)| {
-            if deadline.check().is_ok() {
-                self.scratch.with(plan, rows, |scratch| each(&stages, scratch, &bins, band, out));
-            }
+        let banding = Banding::new(plan, self.threads());
+        let drawn = bins::bin(&stages, self.pool.as_ref(), [banding.rows, banding.margin]).map(|bins| {
+            let row_len = out.len() / plan.height_px as usize;
+            let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
+            run_few(self.pool.as_ref(), banding.at_once, items, |(band, out)| {
+                if deadline.check().is_ok() {
+                    self.scratch.with(plan, banding, |scratch| each(&stages, scratch, &bins, band, out));
+                }
+            });
         });
-        self.scratch.trim();
+        self.trim();
+        drawn?;
         Ok(deadline.check()?)
+    }
+
+    /// Lets go of what is too large to keep for another picture.
+    fn trim(&mut self) {
+        self.scratch.trim();
+        if self.vertices.capacity() * size_of::<ScreenVertex>() > KEPT_BYTES_MAX {
+            self.vertices = Vec::new();
+        }
+    }
+
+    fn threads(&self) -> usize {
+        self.pool.as_ref().map_or(1, rayon::ThreadPool::current_num_threads)
+    }
+
+    /// Memory that drawing the plan takes beside what grows with its mesh, bytes.
+    pub fn bands_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
+        Banding::new(plan, self.threads()).bytes(plan) as u64
     }
 }
 
@@ -184,4 +205,26 @@ fn run<T: Send>(pool: Option<&rayon::ThreadPool>, items: Vec<T>, each: impl Fn(T
         Some(pool) => pool.install(|| items.into_par_iter().for_each(each)),
         None => items.into_iter().for_each(each),
     }
+}
+
+/// The same for as many items at once as `at_once`.
+fn run_few<T: Send>(
+    pool: Option<&rayon::ThreadPool>,
+    at_once: usize,
+    items: impl Iterator<Item = T> + Send,
+    each: impl Fn(T) + Sync + Send,
+) {
+    let Some(pool) = pool else {
+        items.for_each(each);
+        return;
+    };
+    let items = Mutex::new(items);
+    let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
+    pool.install(|| {
+        (0..at_once).into_par_iter().for_each(|_| {
+            while let Some(item) = next() {
+                each(item);
+            }
+        });
+    });
 }

@@ -1,11 +1,13 @@
 //! What each kernel is made of: its buffers, its source, and what of a plan it is specialised to.
 
 use super::look;
+use super::sizes::STROKES_BYTES;
 use super::stages::{Access, Into, Slot, Stage, Write};
 
 const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 const CONTOUR: &str = include_str!("../../../shaders/contour.wgsl");
 const HIDING: &str = include_str!("../../../shaders/hiding.wgsl");
+const SEGMENT: &str = include_str!("../../../shaders/segment.wgsl");
 const STROKE: &str = include_str!("../../../shaders/stroke.wgsl");
 const PLANES: &str = include_str!("../../../shaders/planes.wgsl");
 const WORK: &str = include_str!("../../../shaders/work.wgsl");
@@ -106,10 +108,11 @@ impl Stage {
                 (Slot::Vertices, Read),
                 (Slot::Samples, Read),
                 (Slot::Edges, Read),
-                (Slot::Ink, ReadWrite),
+                (Slot::Owners, ReadWrite),
                 (Slot::Strokes, ReadWrite),
+                (Slot::Progress, ReadWrite),
             ],
-            Self::Ink => &[(Slot::Ink, ReadWrite), (Slot::Strokes, ReadWrite)],
+            Self::Ink => &[(Slot::Colors, ReadWrite), (Slot::Strokes, ReadWrite), (Slot::LineColors, Read)],
             Self::LineLight => &[
                 (Slot::Positions, Read),
                 (Slot::Triangles, Read),
@@ -124,15 +127,9 @@ impl Stage {
                 (Slot::VertexColors, Read),
                 (Slot::Texels, Read),
                 (Slot::Colors, ReadWrite),
-                (Slot::Ink, Read),
+                (Slot::Owners, ReadWrite),
             ],
-            Self::Resolve => &[
-                (Slot::Colors, Read),
-                (Slot::Ink, Read),
-                (Slot::Thresholds, Read),
-                (Slot::Rgba, ReadWrite),
-                (Slot::LineColors, Read),
-            ],
+            Self::Resolve => &[(Slot::Colors, Read), (Slot::Thresholds, Read), (Slot::Rgba, ReadWrite)],
         }
     }
 
@@ -197,8 +194,8 @@ impl Stage {
                 [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/line_light.wgsl")]].concat().concat()
             }
             Self::Lines => {
-                [COMMON, TRIANGLE, PLANES, CONTOUR, HIDING, STROKE, include_str!("../../../shaders/lines.wgsl")]
-                    .concat()
+                let kernel = include_str!("../../../shaders/lines.wgsl");
+                [COMMON, TRIANGLE, PLANES, CONTOUR, SEGMENT, HIDING, STROKE, kernel].concat()
             }
             Self::Ink => [COMMON, include_str!("../../../shaders/ink.wgsl")].concat(),
             Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
@@ -231,9 +228,9 @@ impl Stage {
             Self::Layers => SHADED | look::LAYERED_HULL,
             Self::Shade => SHADED | look::LAYERS,
             Self::LineLight => SHADED,
-            Self::Ink => 0,
+            Self::Ink => look::SURFACE | look::HULL,
             Self::Lines => look::CONTOURS | look::CLIPPED | look::SAMPLES,
-            Self::Resolve => look::SURFACE | look::HULL | look::LINES | look::LIT_LINES,
+            Self::Resolve => look::SURFACE | look::HULL | look::LINES,
         }
     }
 
@@ -247,6 +244,7 @@ impl Stage {
             Self::Visibility { write: Write::Id, .. } | Self::VisibilityTile { write: Write::Id, .. } => {
                 vec![look, ("PHASE", 1.0)]
             }
+            Self::Lines | Self::Ink => vec![look, ("STROKE_WORDS", (STROKES_BYTES / 4) as f64)],
             _ => vec![look],
         }
     }

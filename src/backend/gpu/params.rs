@@ -24,7 +24,6 @@ pub struct Frame {
     near_w: f32,
     ambient: f32,
     lamp_count: u32,
-    line_pass_count: u32,
     zero: u32,
     width: u32,
     height: u32,
@@ -38,8 +37,6 @@ pub struct Frame {
     normal_triangles_at: u32,
     uv_triangles_at: u32,
     color_triangles_at: u32,
-    /// WGSL rounds a struct up to its alignment.
-    padding: [u32; 3],
 }
 
 /// A dispatch's numbers.
@@ -64,10 +61,11 @@ pub struct Batch {
     pub line_windows: f32,
     pub line_slices: u32,
     pub line_peak: f32,
-    pub line_turns: u32,
-    pub line_turn: u32,
-    pub ink_at: u32,
-    pub owners_at: u32,
+    pub line_units: u32,
+    pub line_pass: u32,
+    pub seen_first: u32,
+    pub seen_end: u32,
+    pub samples_at: u32,
     pub role: u32,
     pub layer: u32,
 }
@@ -87,10 +85,8 @@ pub fn line_flags(lines: &LinePass, something_hides: bool, lights_lines: bool) -
         | u32::from(lines.lit && lights_lines) << 4
 }
 
-/// Bits of [`Batch::line_flags`] for a dispatch that draws only edges that a workgroup shares, or only others.
-pub const LONG_ONLY: u32 = 32;
-/// See [`LONG_ONLY`].
-pub const SHORT_ONLY: u32 = 64;
+/// Bit of [`Batch::line_flags`]: no pass has laid anything over the background yet.
+pub const FIRST_PASS: u32 = 32;
 
 /// Distance between [`Batch`]es in their buffer: every device can bind at multiples of this.
 pub const BATCH_STRIDE: usize = 256;
@@ -122,7 +118,6 @@ impl Frame {
             frame.hull_color_count = hull.colors.len() as u32;
         }
         frame.layer_fade = plan.layers().map_or(1.0, |layers| layers.fade);
-        frame.line_pass_count = plan.lines.len() as u32;
         frame
     }
 
@@ -225,30 +220,19 @@ mod tests {
     use std::borrow::Cow;
 
     use super::*;
+    use crate::backend::gpu::test_plans::{edges, lines};
     use crate::plan::CornerValues;
 
     #[test]
     fn sizes_are_those_of_the_shader() {
-        assert_eq!(size_of::<Frame>(), 320);
-        assert_eq!(size_of::<Batch>(), 96);
+        assert_eq!(size_of::<Frame>(), 304);
+        assert_eq!(size_of::<Batch>(), 100);
     }
 
     #[test]
     fn a_list_of_edges_is_uploaded_once() {
-        let list = |count: u32| -> Arc<[Edge]> {
-            (0..count).map(|v| Edge { vertices: [v, v + 1], faces: [Edge::NO_FACE; 2] }).collect()
-        };
-        let (long, short) = (list(5), list(3));
-        let passes = [&long, &short, &long, &list(3), &short].map(|edges| LinePass {
-            edges: edges.clone(),
-            width_px: 1.0,
-            smoothing_px: 1.0,
-            color: [1.0; 4],
-            shown: Shown::All,
-            skip_back_edges: false,
-            contour: false,
-            lit: false,
-        });
+        let (long, short) = (edges(5), edges(3));
+        let passes = [&long, &short, &long, &edges(3), &short].map(|list| lines(list.clone(), 1.0, Shown::All));
         let (lists, starts) = edge_lists(&passes);
         assert_eq!(lists.iter().map(|list| list.len()).collect::<Vec<_>>(), [5, 3, 3]);
         assert_eq!(starts, [0, 5, 0, 8, 5]);
