@@ -431,7 +431,7 @@ fn every_encoding_gives_the_same_picture() {
         for (i, gltf) in packed.iter().enumerate() {
             let difference = mean_difference(&plain, &draw(&gltf.glb(), style));
             println!("{style} {i}: {difference}");
-            assert!(difference < 1.5, "{style} {i}: {difference}");
+            assert!(difference < 0.15, "{style} {i}: {difference}");
             cases += 1;
         }
     }

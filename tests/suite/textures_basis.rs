@@ -30,14 +30,14 @@ const BASIS: [&str; 8] = [
     "...####...#...#...###...#####...###.....",
 ];
 
-/// Row 14 on, of the one and the other: the top of E and of 1, and of A and S.
+/// Row 14 of the one and the other, where they say what they are.
 const ETC1S_TOP: &str = "...#####..#####...###.....#.....###.....";
 const UASTC_TOP: &str = "...#...#....#.....###...#####...###.....";
 
 #[test]
 fn both_codecs_show_what_was_encoded() {
     let Some([_, etc1s, uastc]) = pictures() else { return };
-    for (bytes, first, top) in [(etc1s, 14, ETC1S_TOP), (uastc, 13, UASTC_TOP)] {
+    for (bytes, top) in [(etc1s, ETC1S_TOP), (uastc, UASTC_TOP)] {
         let textures = textures(&model_of(&bytes));
         let image = &textures.images[0];
         assert_eq!((image.width, image.height), (40, 40));
@@ -46,7 +46,7 @@ fn both_codecs_show_what_was_encoded() {
         let row = |y: usize| (0..40).map(|x| if texel(x, y)[2] > 0.15 { '#' } else { '.' }).collect::<String>();
         let rows: Vec<String> = (0..40).map(row).collect();
         assert_eq!(rows[3..11], BASIS);
-        assert_eq!(rows[first], top);
+        assert_eq!(rows[14], top);
         assert!(rows[..3].iter().chain(&rows[22..]).all(|row| !row.contains('#')));
         assert!((0..1600).all(|i| texel(i % 40, i / 40)[3] == 1.0));
     }
