@@ -283,7 +283,7 @@ fn stated_defaults_are_the_defaults() {
         assert_eq!(json(&with.to_string()).unwrap(), json(&without.to_string()).unwrap(), "{}", field.key);
         checked += 1;
     }
-    assert_eq!(checked, 44);
+    assert_eq!(checked, 45);
 }
 
 #[test]

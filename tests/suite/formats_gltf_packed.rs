@@ -2,8 +2,12 @@
 
 use crate::bundles::read_bundle;
 use crate::mesh_files::{Gltf, Noise, Solid, assert_close, corners, read, read_limited, set};
+use crate::scenes;
 use crate::shared::folder;
-use meshsnap::limits::Limits;
+use meshsnap::backend::Renderer;
+use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::image::Image;
+use meshsnap::limits::{Deadline, Limits};
 use meshsnap::mesh::{Bundle, BundleFile, Mesh, MeshError, MeshFault};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
@@ -398,4 +402,38 @@ fn known_compressed_models_are_read() {
     let radius = |p: &[f32; 3]| p.iter().map(|c| c * c).sum::<f32>().sqrt();
     let (small, large) = sphere.positions.iter().map(radius).fold((9.0_f32, 0.0_f32), |(a, b), r| (a.min(r), b.max(r)));
     assert!(large / small < 1.02, "{small} to {large}");
+}
+
+/// The mean difference of two pictures' channels, /255.
+fn mean_difference(a: &Image, b: &Image) -> f64 {
+    let sum: u64 = a.rgba.iter().zip(&b.rgba).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    sum as f64 / a.rgba.len() as f64
+}
+
+#[test]
+fn every_encoding_gives_the_same_picture() {
+    let draw = |bytes: &[u8], style: &str| {
+        let spec = scenes::spec(&[("style", style), ("size", "128")]);
+        CpuRenderer::new(1).draw(&scenes::plan(&read(bytes).unwrap(), &spec), &Deadline::default()).unwrap()
+    };
+    let sheet = Sheet::new();
+    let packed = [
+        sheet.quantised(),
+        sheet.meshopt("EXT_meshopt_compression"),
+        sheet.meshopt("KHR_meshopt_compression"),
+        sheet.draco(),
+    ];
+    let mut cases = 0;
+    for style in ["smooth", "wire"] {
+        let plain = draw(&sheet.plain().glb(), style);
+        let blank = Image { rgba: vec![255; plain.rgba.len()], ..plain.clone() };
+        assert!(mean_difference(&plain, &blank) > 5.0, "there is something to see");
+        for (i, gltf) in packed.iter().enumerate() {
+            let difference = mean_difference(&plain, &draw(&gltf.glb(), style));
+            println!("{style} {i}: {difference}");
+            assert!(difference < 0.15, "{style} {i}: {difference}");
+            cases += 1;
+        }
+    }
+    assert_eq!(cases, 8);
 }

@@ -2,6 +2,7 @@
 
 use crate::formats_gltf_surfaces::codes;
 use crate::mesh_files::{Gltf, assert_close, corners, read, read_at, set};
+use crate::server::Server;
 use crate::shared::folder;
 use meshsnap::mesh::MeshFault;
 use serde_json::{Value, json};
@@ -243,4 +244,23 @@ fn known_models_move() {
     let stress = std::fs::read(folder.join("MorphStressTest.gltf")).unwrap();
     let [a, b] = [0.1, 0.6].map(|time_s| read_at(&stress, time_s).unwrap());
     assert_ne!(a.positions, b.positions);
+}
+
+#[test]
+fn the_service_draws_a_moment() {
+    let server = Server::start(&[]);
+    let mut gltf = triangle();
+    // Stretched to a flagpole: the fitted picture changes with it.
+    animate(&mut gltf, "scale", "LINEAR", "VEC3", &[1.0, 1.0, 1.0, 1.0, 9.0, 1.0, 1.0, 9.0, 1.0]);
+    let etag = |query: &str| {
+        let answer = server.post(&format!("/v1/render?size=32&view=front{query}"), &gltf.glb());
+        assert_eq!(answer.status, 200, "{query}");
+        answer.header("etag").unwrap().to_owned()
+    };
+    let [still, start, middle, end, late] =
+        ["", "&scene.time_s=0", "&scene.time_s=1.5", "&scene.time_s=2", "&scene.time_s=1000"].map(etag);
+    assert_eq!(still, start);
+    assert_eq!(end, late);
+    assert!(start != middle && middle != end && start != end);
+    assert_eq!(server.post("/v1/render?scene.time_s=-1", &gltf.glb()).status, 400);
 }

@@ -40,7 +40,7 @@ fn every_model_is_drawn_in_every_style_alike_on_both_back_ends() {
     }
     println!("{drawn} pictures drawn, {compared} compared");
     assert_eq!(drawn, meshes.len() * STYLES.len());
-    assert_eq!(meshes.len(), 34, "models that this version reads");
+    assert_eq!(meshes.len(), 36, "models that this version reads");
     sheet.store();
 }
 
