@@ -1,8 +1,8 @@
 //! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
 //!
 //! Reading order: [`bundle`] (what comes in), `folder` (what names in it mean), [`raw`] (what an importer fills), `import` (opens the bundle, sniffs the format
-//! and calls one), `obj`, `stl`, `ply` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
-//! [`topology`], for whoever needs them.
+//! and calls one), `obj`, `stl`, `ply` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`],
+//! [`topology`] and [`measure`], for whoever needs them.
 
 mod attributes;
 pub mod bundle;
@@ -11,10 +11,12 @@ mod counted;
 pub mod edges;
 mod entry;
 mod error;
+mod facts;
 mod folder;
 mod gltf;
 mod import;
 pub mod material;
+pub mod measure;
 mod normalise;
 pub mod normals;
 mod obj;
@@ -22,6 +24,7 @@ mod ply;
 mod polygon;
 mod pow2;
 pub mod raw;
+mod sets;
 mod sniff;
 mod stl;
 pub mod topology;
@@ -31,6 +34,7 @@ mod weld;
 pub use bundle::{Bundle, BundleFile};
 pub use counted::counted;
 pub use error::{MeshError, MeshFault};
+pub use facts::FileFacts;
 pub use folder::Folder;
 pub use import::{Format, import};
 pub use material::MaterialSlot;
@@ -130,6 +134,8 @@ pub struct ImportReport {
     pub dropped_collapsed_faces: u64,
     /// Things a user should know; each with a stable code.
     pub warnings: Vec<Warning>,
+    /// What the file says of itself.
+    pub facts: FileFacts,
 }
 
 /// Something in the file that was read around rather than refused.

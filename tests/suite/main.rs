@@ -52,6 +52,7 @@ mod oracle_parts;
 mod oracle_scenes;
 mod ply_files;
 mod raster;
+mod report;
 mod scenes;
 mod schema;
 mod seen;

@@ -8,6 +8,7 @@ mod buffers;
 mod cameras;
 mod container;
 mod document;
+mod facts;
 mod images;
 mod materials;
 mod model;
@@ -65,6 +66,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     if uses_default {
         raw.materials.push(MaterialSlot::default());
     }
+    raw.report.facts = facts::facts(json);
     Ok(raw)
 }
 

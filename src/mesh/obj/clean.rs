@@ -20,6 +20,10 @@ pub struct Summary {
     pub materials: Vec<Vec<u8>>,
     /// What `mtllib` lines say.
     pub libraries: Vec<Vec<u8>>,
+    /// `l` lines and `p` lines.
+    pub lines: u64,
+    /// As above.
+    pub points: u64,
     /// What was left out.
     pub warnings: Vec<Warning>,
 }
@@ -83,8 +87,9 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         let detail = match error {
             None => {
                 let warnings = self.left_out.warnings();
-                let Self { counts, materials, libraries, .. } = self;
-                return Ok(Summary { vertices: counts.v, materials, libraries, warnings });
+                let Self { counts, materials, libraries, left_out, .. } = self;
+                let LeftOut { lines, points, .. } = left_out;
+                return Ok(Summary { vertices: counts.v, materials, libraries, lines, points, warnings });
             }
             Some(LoadError::PositionParseError) => here("a vertex needs three numbers"),
             Some(LoadError::NormalParseError) => here("a normal needs three numbers"),

@@ -14,7 +14,7 @@ use self::clean::Cleaner;
 use super::import::Context;
 use super::polygon::Triangulator;
 use super::raw::{RawMesh, extend_attribute, srgb_to_linear};
-use super::{Format, MaterialSlot, MeshError, Warning};
+use super::{FileFacts, Format, MaterialSlot, MeshError, Warning, facts};
 use std::path::Path;
 use tobj::{LoadError, LoadOptions};
 
@@ -32,6 +32,8 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     raw.report.format = Format::Obj;
     raw.report.file_vertices = summary.vertices;
     raw.report.warnings = summary.warnings;
+    let generator = facts::first_comment(bytes, b"#", |_| false);
+    raw.report.facts = FileFacts { lines: summary.lines, points: summary.points, ..FileFacts::by(generator) };
     let mut triangulator = Triangulator::default();
     for model in models {
         cx.deadline.check()?;

@@ -26,7 +26,7 @@ use self::text::Text;
 use self::vertices::Vertices;
 use super::import::Context;
 use super::raw::RawMesh;
-use super::{Format, MeshError, Warning};
+use super::{FileFacts, Format, MeshError, Warning, facts};
 
 /// Reads a PLY file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
@@ -41,6 +41,8 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut raw = RawMesh::default();
     raw.report.format = Format::Ply;
     raw.report.warnings = body.warnings();
+    let generator = facts::first_comment(&bytes[..at], b"comment", |comment| header::texture_file(comment).is_some());
+    raw.report.facts = FileFacts { lines: body.edges, points: body.points(), ..FileFacts::by(generator) };
     let textures = assemble::assemble(body.vertices, &body.faces, &mut raw, cx)?;
     textures::apply(&header.textures, &textures, &mut raw, cx)?;
     Ok(raw)
@@ -104,11 +106,15 @@ fn read_body<S: Source>(source: &mut S, header: &Header, cx: &mut Context<'_>) -
 }
 
 impl Body {
+    /// Vertices are points where there are no faces.
+    fn points(&self) -> u64 {
+        if self.faces.arities.is_empty() { self.vertices.positions.len() as u64 } else { 0 }
+    }
+
     /// One for each kind of thing that is not drawn.
     fn warnings(&self) -> Vec<Warning> {
-        let points = if self.faces.arities.is_empty() { self.vertices.positions.len() as u64 } else { 0 };
         let all = [
-            (points, "points_ignored", "points are not drawn (points in the file:"),
+            (self.points(), "points_ignored", "points are not drawn (points in the file:"),
             (self.edges, "lines_ignored", "edges on their own are not drawn (edges in the file:"),
             (
                 self.faces.short_faces,
