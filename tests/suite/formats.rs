@@ -11,8 +11,8 @@ use serde_json::json;
 
 /// The edge list, with default limits.
 pub fn edges(mesh: &Mesh) -> EdgeList {
-    let limits = meshsnap::limits::Limits::default();
-    EdgeList::of(mesh, &mut meshsnap::limits::Budget::new(&limits)).unwrap()
+    let limits = Limits::default();
+    EdgeList::of(mesh, &mut Budget::new(&limits)).unwrap()
 }
 
 /// What must not depend on the format.

@@ -231,8 +231,8 @@ fn a_million_hostile_triangles_are_counted_in_time() {
         let given = serde_json::to_value(of(&mesh, 0)).unwrap();
         let took = start.elapsed();
         println!("{name}: {took:?}");
-        // Half a second in a release build on one busy core; ten times that for an unoptimised one.
-        assert!(took < Duration::from_secs(5), "{name}: {took:?}");
+        // About a second on a busy machine, and three for noise, which is at home in no cache.
+        assert!(took < Duration::from_secs(10), "{name}: {took:?}");
         let t = &given["topology"];
         let count = |key: &str| t[key].as_u64().unwrap();
         let n = u64::from(n);

@@ -6,8 +6,8 @@
 use super::face::{Corner, Counts, parse_corner, show, write_face};
 use super::left_out::LeftOut;
 use super::lines::Lines;
+use crate::mesh::MeshError;
 use crate::mesh::import::Context;
-use crate::mesh::{MeshError, Warning};
 use rapidhash::RapidHashMap;
 use std::io::{BufRead, Read};
 use tobj::LoadError;
@@ -20,12 +20,8 @@ pub struct Summary {
     pub materials: Vec<Vec<u8>>,
     /// What `mtllib` lines say.
     pub libraries: Vec<Vec<u8>>,
-    /// `l` lines and `p` lines.
-    pub lines: u64,
-    /// As above.
-    pub points: u64,
     /// What was left out.
-    pub warnings: Vec<Warning>,
+    pub left_out: LeftOut,
 }
 
 /// Implements [`BufRead`] for `tobj`.
@@ -86,10 +82,8 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         let here = |what: &str| format!("line {} of the OBJ file: {what}", self.lines.number);
         let detail = match error {
             None => {
-                let warnings = self.left_out.warnings();
                 let Self { counts, materials, libraries, left_out, .. } = self;
-                let LeftOut { lines, points, .. } = left_out;
-                return Ok(Summary { vertices: counts.v, materials, libraries, lines, points, warnings });
+                return Ok(Summary { vertices: counts.v, materials, libraries, left_out });
             }
             Some(LoadError::PositionParseError) => here("a vertex needs three numbers"),
             Some(LoadError::NormalParseError) => here("a normal needs three numbers"),

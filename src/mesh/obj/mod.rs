@@ -31,9 +31,10 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut raw = RawMesh::default();
     raw.report.format = Format::Obj;
     raw.report.file_vertices = summary.vertices;
-    raw.report.warnings = summary.warnings;
+    raw.report.warnings = summary.left_out.warnings();
     let generator = facts::first_comment(bytes, b"#", |_| false);
-    raw.report.facts = FileFacts { lines: summary.lines, points: summary.points, ..FileFacts::by(generator) };
+    raw.report.facts =
+        FileFacts { lines: summary.left_out.lines, points: summary.left_out.points, ..FileFacts::by(generator) };
     let mut triangulator = Triangulator::default();
     for model in models {
         cx.deadline.check()?;
