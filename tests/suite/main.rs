@@ -31,6 +31,7 @@ mod formats_ply_hostile;
 mod formats_ply_surfaces;
 mod formats_polygons;
 mod formats_shared;
+mod fuzzed;
 mod golden;
 mod http;
 mod http_bad;
