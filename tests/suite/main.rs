@@ -33,6 +33,7 @@ mod formats_polygons;
 mod formats_shared;
 mod fuzzed;
 mod golden;
+mod hostile;
 mod http;
 mod http_bad;
 mod jobs;
