@@ -13,6 +13,7 @@
 //! - [`backend`]: two ways to fill a plan, stage by stage the same.
 //! - [`image`] and [`encode`]: the picture and its bytes.
 //! - [`pipeline`]: all of the above, in order.
+//! - [`report`]: what is in a file, for whoever asks instead of drawing it.
 //! - [`request`]: the request document, from JSON and dotted keys to a [`scene::Spec`].
 //! - [`jobs`]: the bounded queue and the workers.
 //! - [`http`], [`cli`], [`config`], [`telemetry`]: the edges.
@@ -28,6 +29,7 @@ pub mod limits;
 pub mod mesh;
 pub mod pipeline;
 pub mod plan;
+pub mod report;
 pub mod request;
 pub mod scene;
 pub mod telemetry;

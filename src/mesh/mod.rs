@@ -1,8 +1,8 @@
 //! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
 //!
 //! Reading order: [`bundle`] (what comes in), `folder` (what names in it mean), [`raw`] (what an importer fills), `import` (opens the bundle, sniffs the format
-//! and calls one), `obj`, `stl`, `ply`, `off`, `fbx`, `three_mf` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`] and
-//! [`topology`], for whoever needs them.
+//! and calls one), `obj`, `stl`, `ply`, `off`, `fbx`, `three_mf` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`],
+//! [`edges`], [`topology`] and [`measure`], for whoever needs them.
 
 mod affine;
 mod attributes;
@@ -13,12 +13,14 @@ mod counted;
 pub mod edges;
 mod entry;
 mod error;
+mod facts;
 mod fbx;
 mod folder;
 mod gltf;
 mod import;
 pub mod loose;
 pub mod material;
+pub mod measure;
 mod normalise;
 pub mod normals;
 mod obj;
@@ -27,6 +29,7 @@ mod ply;
 mod polygon;
 mod pow2;
 pub mod raw;
+mod sets;
 mod sniff;
 mod stl;
 mod text;
@@ -38,6 +41,7 @@ mod weld;
 pub use bundle::{Bundle, BundleFile};
 pub use counted::counted;
 pub use error::{MeshError, MeshFault};
+pub use facts::FileFacts;
 pub use folder::Folder;
 pub use import::{Format, Options, import, survey};
 pub use loose::Loose;
@@ -171,6 +175,8 @@ pub struct ImportReport {
     pub dropped_loose: u64,
     /// Things a user should know; each with a stable code.
     pub warnings: Vec<Warning>,
+    /// What the file says of itself.
+    pub facts: FileFacts,
 }
 
 /// How much the meshes of a file hold by their own account, each counted once.
@@ -182,9 +188,9 @@ pub struct FileContent {
     pub vertices: u64,
     /// Their triangles.
     pub triangles: u64,
-    /// Their line segments, which are not drawn yet.
+    /// Their line segments.
     pub segments: u64,
-    /// Their points, which are not drawn yet.
+    /// Their points.
     pub points: u64,
 }
 

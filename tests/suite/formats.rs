@@ -3,6 +3,7 @@
 
 use crate::mesh_files::{Gltf, Solid, read, read_as};
 use crate::ply_files::Encoding;
+use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::edges::EdgeList;
 use meshsnap::mesh::topology::Topology;
 use meshsnap::mesh::{Format, Mesh, UpAxis};
@@ -10,8 +11,8 @@ use serde_json::json;
 
 /// The edge list, with default limits.
 pub fn edges(mesh: &Mesh) -> EdgeList {
-    let limits = meshsnap::limits::Limits::default();
-    EdgeList::of(mesh, &mut meshsnap::limits::Budget::new(&limits)).unwrap()
+    let limits = Limits::default();
+    EdgeList::of(mesh, &mut Budget::new(&limits)).unwrap()
 }
 
 /// What must not depend on the format.
@@ -74,7 +75,8 @@ fn one_shape_in_every_format_is_one_mesh() {
 fn a_box_is_watertight_and_its_quads_stay_quads() {
     let mesh = read(Solid::cuboid().obj().as_bytes()).unwrap();
     let edges = edges(&mesh);
-    let topology = Topology::of(&mesh, &edges);
+    let mut budget = Budget::new(&Limits::default());
+    let topology = Topology::of(&mesh, &edges, &mut budget, &Deadline::default()).unwrap();
     assert_eq!((topology.components, topology.euler_characteristic, topology.is_watertight), (1, 2, true));
     assert_eq!((mesh.triangles.len(), topology.edges), (12, 18));
     assert_eq!(edges.edges.iter().filter(|e| e.is_polygon_edge).count(), 12);

@@ -13,6 +13,7 @@ mod check;
 mod container;
 mod document;
 mod draco;
+mod facts;
 mod images;
 mod instancing;
 mod materials;
@@ -39,7 +40,7 @@ use self::scene::Instance;
 use self::shape::Shape;
 use self::skin::Skins;
 use self::transform::Affine;
-use self::tree::{Document, mode};
+use self::tree::Document;
 use super::import::Context;
 use super::raw::RawMesh;
 use super::{FileContent, Format, MaterialSlot, MeshError, Warning};
@@ -85,6 +86,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     if uses_default {
         raw.materials.push(MaterialSlot::default());
     }
+    raw.report.facts = facts::facts(json);
     Ok(raw)
 }
 
@@ -178,13 +180,7 @@ fn content(doc: &Document) -> FileContent {
         content.draw_calls += 1;
         content.vertices = content.vertices.saturating_add(vertices);
         content.triangles = content.triangles.saturating_add(triangles::count(primitive.mode(), corners));
-        let (segments, points) = match primitive.mode() {
-            mode::POINTS => (0, corners),
-            mode::LINES => (corners / 2, 0),
-            mode::LINE_LOOP if corners > 1 => (corners, 0),
-            mode::LINE_STRIP => (corners.saturating_sub(1), 0),
-            _ => (0, 0),
-        };
+        let [segments, points] = triangles::count_loose(primitive.mode(), corners);
         content.segments = content.segments.saturating_add(segments);
         content.points = content.points.saturating_add(points);
     }

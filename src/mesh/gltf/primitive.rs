@@ -11,9 +11,10 @@ use super::triangles;
 use super::vertices::Vertices;
 use super::warn_once;
 use crate::mesh::import::Context;
+use crate::mesh::loose::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
 use crate::mesh::polygon::ALL_EDGES;
 use crate::mesh::raw::{RawMesh, extend_attribute};
-use crate::mesh::{MeshError, Warning};
+use crate::mesh::{Loose, MeshError, Warning};
 
 /// Decoded data of one primitive.
 #[derive(Debug, Default)]
@@ -27,6 +28,8 @@ pub struct Primitive {
     uvs: Vec<[f64; 2]>,
     colors: Vec<[f64; 4]>,
     triangles: Vec<[u32; 3]>,
+    /// Ends of line segments; of points, the vertex twice.
+    loose: Vec<[u32; 2]>,
     /// As [`RawMesh::edge_masks`]; empty where every edge is a polygon's.
     edge_masks: Vec<u8>,
     /// As [`crate::mesh::ImportReport::polygons_by_arity`].
@@ -69,15 +72,6 @@ impl Primitive {
         cx: &mut Context<'_>,
     ) -> Result<Option<Self>, MeshError> {
         let (what, json) = (&source.what, source.json);
-        let ignored = match json.mode() {
-            mode::POINTS => Some(("points_ignored", "points are not drawn")),
-            mode::LINES | mode::LINE_LOOP | mode::LINE_STRIP => Some(("lines_ignored", "lines are not drawn")),
-            _ => None,
-        };
-        if let Some((code, detail)) = ignored {
-            warn_once(warnings, code, format!("{detail}, such as {what}"));
-            return Ok(None);
-        }
         if !json.attributes.contains_key("POSITION") {
             warn_once(warnings, "no_positions", format!("{what} has no positions and is not drawn"));
             return Ok(None);
@@ -107,6 +101,7 @@ impl Primitive {
         let indices = vertices.indices(reader, cx)?;
         let count = out.positions.len();
         out.triangles = triangles::of(what, vertices.mode(), indices.as_deref(), count, cx)?;
+        out.loose = triangles::loose(vertices.mode(), indices.as_deref(), count, cx)?;
         if source.has_ngons && vertices.mode() == mode::TRIANGLES {
             cx.budget.spend("glTF polygons", out.triangles.len() as u64, 1)?;
             (out.edge_masks, out.polygons_by_arity) = ngons::edge_masks(&out.triangles);
@@ -128,7 +123,7 @@ impl Primitive {
         let before = raw.positions.len();
         let after = before + self.positions.len();
         cx.deadline.check()?;
-        cx.check_triangles(raw.triangles.len() as u64 + self.triangles.len() as u64)?;
+        cx.check_triangles(raw.triangles.len() as u64 + self.triangle_count())?;
         // Lists double when they grow.
         cx.budget.spend("glTF vertices", self.positions.len() as u64, 2 * (24 + 12 + 8 + 16))?;
         cx.budget.spend("glTF triangles", self.triangles.len() as u64, 2 * (12 + 1 + 4))?;
@@ -152,7 +147,10 @@ impl Primitive {
         let masks = self.edge_masks.iter().zip(&self.triangles);
         raw.edge_masks.extend(masks.map(|(&m, t)| if mirrored(t) { ngons::mirrored(m) } else { m }));
         raw.edge_masks.resize(raw.triangles.len(), ALL_EDGES);
-        raw.triangle_materials.resize(raw.triangles.len(), self.material.unwrap_or(default_material) as u32);
+        let material = self.material.unwrap_or(default_material) as u32;
+        raw.triangle_materials.resize(raw.triangles.len(), material);
+        cx.budget.spend("glTF lines and points", self.loose.len() as u64, 2 * size_of::<Loose>() as u64)?;
+        raw.loose.extend(self.loose.iter().map(|ends| Loose { ends: ends.map(|v| v + base), material }));
         raw.report.file_vertices += self.positions.len() as u64;
         for (all, own) in raw.report.polygons_by_arity.iter_mut().zip(self.polygons_by_arity) {
             *all += own;
@@ -165,9 +163,10 @@ impl Primitive {
         self.material
     }
 
-    /// How many triangles it has.
+    /// How many triangles it has, with those that its lines and points become.
     pub fn triangle_count(&self) -> u64 {
-        self.triangles.len() as u64
+        let of = |ends: &[u32; 2]| if ends[0] == ends[1] { POINT_TRIANGLES } else { SEGMENT_TRIANGLES };
+        self.triangles.len() as u64 + self.loose.iter().map(of).sum::<u64>()
     }
 }
 

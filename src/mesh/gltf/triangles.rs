@@ -1,7 +1,8 @@
-//! Lists, strips and fans of triangles.
+//! Lists, strips and fans of triangles; lists, strips and loops of lines; points.
 
 use super::tree::mode;
 use crate::mesh::import::Context;
+use crate::mesh::loose::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
 use crate::mesh::{MeshError, counted};
 
 /// How many triangles so many corners make up. Corners that do not make up a whole triangle are left over.
@@ -11,6 +12,40 @@ pub fn count(mode: usize, corners: u64) -> u64 {
         mode::TRIANGLE_STRIP | mode::TRIANGLE_FAN => corners.saturating_sub(2),
         _ => 0,
     }
+}
+
+/// How many line segments and how many points so many corners make up.
+pub fn count_loose(mode: usize, corners: u64) -> [u64; 2] {
+    match mode {
+        mode::POINTS => [0, corners],
+        mode::LINES => [corners / 2, 0],
+        mode::LINE_LOOP if corners > 1 => [corners, 0],
+        mode::LINE_STRIP => [corners.saturating_sub(1), 0],
+        _ => [0; 2],
+    }
+}
+
+/// The ends of line segments and points among so many corners, given or all vertices in turn; points have one vertex at both.
+pub fn loose(
+    mode: usize,
+    indices: Option<&[u32]>,
+    vertices: usize,
+    cx: &mut Context<'_>,
+) -> Result<Vec<[u32; 2]>, MeshError> {
+    let corners = indices.map_or(vertices, <[u32]>::len);
+    let [segments, points] = count_loose(mode, corners as u64);
+    cx.check_triangles(SEGMENT_TRIANGLES * segments + POINT_TRIANGLES * points)?;
+    cx.budget.spend("glTF lines and points", segments + points, 8)?;
+    let at = |i: usize| indices.map_or(i as u32, |list| list[i]);
+    Ok((0..(segments + points) as usize)
+        .map(|i| match mode {
+            mode::POINTS => [at(i); 2],
+            mode::LINES => [at(2 * i), at(2 * i + 1)],
+            _ => [at(i), at((i + 1) % corners)],
+        })
+        // Of a segment that ends where it begins nothing is seen.
+        .filter(|ends| mode == mode::POINTS || ends[0] != ends[1])
+        .collect())
 }
 
 /// The triangles of `what`, whose vertices are as many as `vertices` says.

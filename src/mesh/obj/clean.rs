@@ -6,9 +6,10 @@
 use super::face::{Corner, Counts, parse_corner, show, write_face};
 use super::left_out::LeftOut;
 use super::lines::Lines;
+use crate::mesh::Loose;
+use crate::mesh::MeshError;
 use crate::mesh::import::Context;
 use crate::mesh::loose::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
-use crate::mesh::{Loose, MeshError, Warning};
 use rapidhash::RapidHashMap;
 use std::io::{BufRead, Read};
 use tobj::LoadError;
@@ -22,7 +23,7 @@ pub struct Summary {
     /// What `mtllib` lines say.
     pub libraries: Vec<Vec<u8>>,
     /// What was left out.
-    pub warnings: Vec<Warning>,
+    pub left_out: LeftOut,
 }
 
 /// Implements [`BufRead`] for `tobj`.
@@ -83,9 +84,8 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         let here = |what: &str| format!("line {} of the OBJ file: {what}", self.lines.number);
         let detail = match error {
             None => {
-                let warnings = self.left_out.warnings();
-                let Self { counts, materials, libraries, .. } = self;
-                return Ok(Summary { vertices: counts.v, materials, libraries, warnings });
+                let Self { counts, materials, libraries, left_out, .. } = self;
+                return Ok(Summary { vertices: counts.v, materials, libraries, left_out });
             }
             Some(LoadError::PositionParseError) => here("a vertex needs three numbers"),
             Some(LoadError::NormalParseError) => here("a normal needs three numbers"),

@@ -14,7 +14,7 @@ use self::clean::Cleaner;
 use super::import::Context;
 use super::polygon::Triangulator;
 use super::raw::{RawMesh, extend_attribute, srgb_to_linear};
-use super::{Format, Loose, MaterialSlot, MeshError, Warning, text};
+use super::{FileFacts, Format, Loose, MaterialSlot, MeshError, Warning, facts, text};
 use std::path::Path;
 use tobj::{LoadError, LoadOptions};
 
@@ -32,7 +32,9 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut raw = RawMesh::default();
     raw.report.format = Format::Obj;
     raw.report.file_vertices = summary.vertices;
-    raw.report.warnings = summary.warnings;
+    raw.report.warnings = summary.left_out.warnings();
+    let generator = facts::first_comment(bytes, b"#", |_| false);
+    raw.report.facts = FileFacts::by(generator);
     let mut triangulator = Triangulator::default();
     for model in models {
         cx.deadline.check()?;

@@ -292,7 +292,7 @@ fn split_word(text: &[u8]) -> (&[u8], &[u8]) {
 }
 
 /// The name in `TextureFile NAME`, which may have spaces.
-fn texture_file(comment: &[u8]) -> Option<Vec<u8>> {
+pub fn texture_file(comment: &[u8]) -> Option<Vec<u8>> {
     let (keyword, name) = split_word(comment);
     (keyword.eq_ignore_ascii_case(b"TextureFile") && !name.is_empty()).then(|| name.to_vec())
 }

@@ -28,7 +28,7 @@ use self::text::Text;
 use self::vertices::Vertices;
 use super::import::Context;
 use super::raw::RawMesh;
-use super::{Format, MeshError, Warning};
+use super::{FileFacts, Format, MeshError, Warning, facts};
 
 /// Reads a PLY file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
@@ -43,6 +43,8 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut raw = RawMesh::default();
     raw.report.format = Format::Ply;
     raw.report.warnings = body.warnings();
+    let generator = facts::first_comment(&bytes[..at], b"comment", |comment| header::texture_file(comment).is_some());
+    raw.report.facts = FileFacts::by(generator);
     let textures = assemble::assemble(body.vertices, &body.faces, &mut raw, cx)?;
     if body.faces.arities.is_empty() {
         body.edges.apply(&mut raw, cx)?;

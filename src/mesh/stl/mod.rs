@@ -7,7 +7,7 @@ use self::color::Colors;
 use super::import::Context;
 use super::polygon::ALL_EDGES;
 use super::raw::RawMesh;
-use super::{Format, MaterialSlot, MeshError, UpAxis, Warning, counted};
+use super::{FileFacts, Format, MaterialSlot, MeshError, UpAxis, Warning, counted, facts};
 
 /// An 80-byte header and a count come before the triangles.
 const HEADER_BYTES: usize = 84;
@@ -99,6 +99,7 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
             bytes.len()
         )));
     }
+    raw.report.facts = FileFacts::by(facts::tidy(&bytes[..80]));
     if declared < bytes.len() as u64 {
         raw.report.warnings.push(Warning {
             code: "trailing_bytes",
@@ -142,6 +143,8 @@ fn paint(raw: &mut RawMesh, header: &[u8], body: &[u8], cx: &mut Context<'_>) ->
 /// ASCII is read by its words alone: exporters disagree on lines and indentation, but every corner is `vertex x y z`.
 fn read_ascii(text: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut raw = new_mesh(Format::StlAscii);
+    let name = text.split(|&b| b == b'\n').next().and_then(|line| line.get(5..)).unwrap_or_default();
+    raw.report.facts = FileFacts::by(facts::tidy(name));
     // The shortest triangle that a text can hold says how many it can have at most.
     let count_max = text.len() as u64 / 30 + 1;
     cx.budget.spend("the STL triangles", count_max, 3 * 24 + 12 + 1 + 4)?;

@@ -1,0 +1,145 @@
+//! What every fuzz target does with its bytes. The suite includes this file and runs all seeds and all former finds through it,
+//! so it may use meshsnap and `serde_json` alone.
+
+#![allow(clippy::panic, clippy::unwrap_used, clippy::expect_used)] // a broken promise is a find
+
+use meshsnap::backend::{Backends, GpuHost, HardwareHint};
+use meshsnap::limits::{BackendChoice, Budget, Deadline, Limits};
+use meshsnap::mesh::{Bundle, BundleFile, Format, Mesh, import};
+use meshsnap::pipeline::{self, Job, RenderError};
+use meshsnap::report::Report;
+use meshsnap::request::{self, Rules};
+use std::cell::RefCell;
+use std::sync::Arc;
+
+/// Every target: one for each name that a mesh format has, and what takes more than a mesh.
+pub const TARGETS: [&str; 8] = ["obj", "stl", "ply", "gltf", "glb", "zip", "request", "pipeline"];
+
+/// Between an OBJ file and the MTL file that it calls `a.mtl`.
+const MTL_MARK: &[u8] = b"\n%mtl\n";
+
+/// Runs one input. It may be refused; it may not panic, take long, or come out as something that no mesh may be.
+pub fn run(target: &str, bytes: &[u8]) {
+    match target {
+        "request" => run_request(bytes),
+        "pipeline" => run_pipeline(bytes),
+        "zip" => run_import(&Bundle::zip(bytes.to_vec()), None),
+        "obj" => run_import(&obj(bytes), Some(Format::Obj)),
+        name => {
+            let format = Format::from_name(name).unwrap_or_else(|| panic!("{name} is no target"));
+            run_import(&Bundle::of_one(bytes.to_vec()), Some(format));
+        }
+    }
+}
+
+/// Small enough that what breaks a limit does so soon, and large enough for every seed.
+fn limits() -> Limits {
+    Limits {
+        memory_bytes: 64 << 20,
+        triangles: 50_000,
+        nodes: 2_000,
+        image_px: 64,
+        texture_px: 256,
+        texture_total_px: 1 << 18,
+        bundle_bytes: 4 << 20,
+        bundle_entries: 50,
+        ..Limits::default()
+    }
+}
+
+fn obj(bytes: &[u8]) -> Bundle {
+    let mark = bytes.windows(MTL_MARK.len()).position(|window| window == MTL_MARK);
+    let Some(mark) = mark else { return Bundle::of_one(bytes.to_vec()) };
+    let file = |name: &str, bytes: &[u8]| BundleFile::new(name, bytes.to_vec()).expect("a good name");
+    let files = vec![file("a.obj", &bytes[..mark]), file("a.mtl", &bytes[mark + MTL_MARK.len()..])];
+    Bundle::of_files(files).with_entry(Some("a.obj".into()))
+}
+
+fn run_import(bundle: &Bundle, format: Option<Format>) {
+    let limits = limits();
+    let mut budget = Budget::new(&limits);
+    match import(bundle, format, &limits, &mut budget, &Deadline::default()) {
+        Ok(mesh) => {
+            check(&mesh);
+            let report = Report::of(&mesh, bundle.bytes_len(), &mut budget, &Deadline::default());
+            let Ok(report) = report else { return };
+            assert!(!report.text().is_empty());
+            serde_json::to_vec(&report).expect("a report is JSON");
+        }
+        Err(error) => assert!(!error.detail.is_empty() && error.detail.len() < 20_000, "{}", error.detail.len()),
+    }
+}
+
+/// What is true of every mesh, whatever file it comes from.
+fn check(mesh: &Mesh) {
+    let (positions, triangles) = (mesh.positions.len(), mesh.triangles.len());
+    assert!(triangles > 0 && mesh.face_normals.len() == triangles && mesh.edge_masks.len() == triangles);
+    assert!(mesh.triangle_materials.len() == triangles && !mesh.materials.is_empty());
+    assert!(mesh.positions.iter().flatten().all(|c| c.abs() <= 0.5));
+    for [a, b, c] in &mesh.triangles {
+        assert!(a != b && b != c && c != a && [a, b, c].iter().all(|v| (**v as usize) < positions));
+    }
+    assert!(mesh.triangle_materials.iter().all(|m| (*m as usize) < mesh.materials.len()));
+    assert!(mesh.face_normals.iter().flatten().all(|c| c.is_finite()));
+    let attributes = [mesh.normals.len(), mesh.uvs.len(), mesh.colors.len()];
+    let count = attributes.into_iter().max().unwrap_or(0);
+    assert!(attributes.iter().all(|n| *n == 0 || *n == count));
+    assert!(count == 0 || mesh.attribute_triangles.len() == triangles);
+    assert!(mesh.attribute_triangles.iter().flatten().all(|v| (*v as usize) < count));
+    assert!(mesh.normals.iter().flatten().chain(mesh.uvs.iter().flatten()).all(|c| c.is_finite()));
+    assert!(mesh.colors.iter().flatten().all(|c| c.is_finite()));
+    let slots = &mesh.materials;
+    let textures =
+        slots.iter().flat_map(|m| [m.base_texture, m.metallic_roughness_texture, m.normal_texture, m.emissive_texture]);
+    assert!(textures.flatten().all(|texture| (texture.image as usize) < mesh.images.len()));
+    assert!(mesh.to_file.scale > 0.0 && mesh.to_file.centre.iter().all(|c| c.is_finite()));
+}
+
+/// A document, and behind a zero byte dotted keys with their values, one a line.
+fn run_request(bytes: &[u8]) {
+    let (document, keys) = split(bytes);
+    let keys = String::from_utf8_lossy(keys);
+    let overrides: Vec<(String, String)> =
+        keys.lines().filter_map(|line| line.split_once('=')).map(|(k, v)| (k.into(), v.into())).collect();
+    let rules = Rules { limits: limits(), backend: BackendChoice::Cpu };
+    match request::read((!document.is_empty()).then_some(document), &overrides, &rules) {
+        Ok(spec) => {
+            let side_max = rules.limits.image_px;
+            assert!((1..=side_max).contains(&u64::from(spec.image.width_px)));
+            assert!((1..=side_max).contains(&u64::from(spec.image.height_px)));
+        }
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+/// A document, and behind a zero byte a mesh of any format: drawn small, on the CPU.
+fn run_pipeline(bytes: &[u8]) {
+    thread_local! {
+        static BACKENDS: RefCell<Backends> = RefCell::new(Backends::new(no_gpu(), 1));
+    }
+    let (document, mesh) = split(bytes);
+    let rules = Rules { limits: limits(), backend: BackendChoice::Cpu };
+    let fixed = [("image.width", "32"), ("image.height", "32"), ("backend", "cpu")];
+    let overrides = fixed.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let Ok(spec) = request::read((!document.is_empty()).then_some(document), &overrides, &rules) else { return };
+    let bundle = Bundle::of_one(mesh.to_vec());
+    let job = Job { bundle: &bundle, format_in: None, spec: &spec };
+    let deadline = Deadline::default();
+    let drawn =
+        BACKENDS.with_borrow_mut(|backends| pipeline::render(job, backends, &rules.limits, &deadline, &mut |_| {}));
+    match drawn {
+        Ok(output) => assert!(!output.bytes.is_empty()),
+        Err(RenderError::Mesh(_) | RenderError::Plan(_)) => {}
+        Err(ours) => panic!("{ours}"),
+    }
+}
+
+fn no_gpu() -> Arc<GpuHost> {
+    Arc::new(GpuHost::new(HardwareHint::None { reason: "targets draw on the CPU".into() }))
+}
+
+/// What is before the first zero byte, and what is behind it.
+fn split(bytes: &[u8]) -> (&[u8], &[u8]) {
+    let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
+    (&bytes[..end], bytes.get(end + 1..).unwrap_or_default())
+}

@@ -1,0 +1,210 @@
+//! The report on a mesh: everything that is known of a file without drawing it, in the one shape that `meshsnap inspect --json`
+//! prints and HTTP answers with. Its field names are public.
+
+mod bounds;
+mod image_header;
+mod text;
+mod topology;
+
+use self::bounds::Bounds;
+use self::topology::TopologyReport;
+use crate::limits::{Budget, Deadline};
+use crate::mesh::edges::EdgeList;
+use crate::mesh::material::{FileLens, ImageContent, ImageSource};
+use crate::mesh::measure::Measures;
+use crate::mesh::topology::Topology;
+use crate::mesh::{FileFacts, Mesh, MeshError, UpAxis};
+use serde::Serialize;
+
+/// What is in a file. Counts are null where the format has no such thing.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    format: &'static str,
+    generator: Option<String>,
+    file_bytes: u64,
+    up: &'static str,
+    scenes: Option<u64>,
+    nodes: Option<u64>,
+    meshes: Option<u64>,
+    primitives: Option<u64>,
+    file_vertices: u64,
+    positions: u64,
+    triangles: u64,
+    polygons: u64,
+    /// How many polygons have 3, 4, ... corners; the last place holds all larger ones.
+    polygons_by_arity: Vec<Arity>,
+    lines: u64,
+    points: u64,
+    /// Names; empty where a material has none.
+    materials: Vec<String>,
+    /// The images that drawn materials use.
+    textures: Vec<TextureReport>,
+    animations: Option<u64>,
+    skins: Option<u64>,
+    cameras: Option<u64>,
+    /// Those that the drawn scene shows, in its order: what a request may look through.
+    scene_cameras: Vec<CameraReport>,
+    extensions_used: Vec<String>,
+    extensions_required: Vec<String>,
+    has_normals: bool,
+    has_uvs: bool,
+    has_colors: bool,
+    bounds: Bounds,
+    topology: TopologyReport,
+    /// In square file units; null where an f64 cannot hold it.
+    area: Option<f64>,
+    /// In cubic file units, negative where the surface is inside out; null unless the mesh is watertight.
+    volume: Option<f64>,
+    dropped_nonfinite_faces: u64,
+    dropped_degenerate_faces: u64,
+    dropped_collapsed_faces: u64,
+    warnings: Vec<WarningReport>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct Arity {
+    corners: usize,
+    count: u64,
+}
+
+/// An image as its header has it; nulls where it is not in the upload, or in no format that is known.
+#[derive(Clone, Debug, Serialize)]
+struct TextureReport {
+    name: String,
+    format: Option<&'static str>,
+    width_px: Option<u32>,
+    height_px: Option<u32>,
+    file_bytes: Option<u64>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct CameraReport {
+    name: String,
+    projection: &'static str,
+    /// Of a perspective camera.
+    fov_deg: Option<f64>,
+    /// Of an orthographic one, file units.
+    height: Option<f64>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct WarningReport {
+    code: &'static str,
+    detail: String,
+}
+
+impl Report {
+    /// On a mesh that was read from `file_bytes` bytes.
+    pub fn of(mesh: &Mesh, file_bytes: u64, budget: &mut Budget, deadline: &Deadline) -> Result<Self, MeshError> {
+        deadline.check()?;
+        let edges = EdgeList::of(mesh, budget)?;
+        deadline.check()?;
+        let topology = Topology::of(mesh, &edges, budget, deadline)?;
+        drop(edges);
+        // Names and warnings are in memory as the mesh has them, and here once more, and as text.
+        let names = mesh.materials.iter().map(|m| m.name.len() + size_of::<String>());
+        let images = mesh.images.iter().map(|image| image.name.len() + size_of::<TextureReport>());
+        let cameras = mesh.cameras.iter().map(|camera| camera.name.len() + size_of::<CameraReport>());
+        budget.spend("the report", names.chain(images).chain(cameras).sum::<usize>() as u64, 4)?;
+        Ok(Self::new(mesh, file_bytes, topology))
+    }
+
+    /// For a person to read: a line for each thing that there is.
+    pub fn text(&self) -> String {
+        text::text(self)
+    }
+
+    fn new(mesh: &Mesh, file_bytes: u64, topology: Topology) -> Self {
+        let import = &mesh.report;
+        let FileFacts {
+            generator,
+            scenes,
+            nodes,
+            meshes,
+            primitives,
+            animations,
+            skins,
+            cameras,
+            extensions_used,
+            extensions_required,
+        } = import.facts.clone();
+        let arities = import.polygons_by_arity.iter().enumerate().filter(|&(_, &count)| count > 0);
+        let warnings = import.warnings.iter();
+        let measures = Measures::of(mesh);
+        let points = mesh.loose.iter().filter(|one| one.is_point()).count() as u64;
+        Self {
+            format: import.format.name(),
+            generator,
+            file_bytes,
+            up: up(mesh.up),
+            scenes,
+            nodes,
+            meshes,
+            primitives,
+            file_vertices: import.file_vertices,
+            positions: mesh.positions.len() as u64,
+            triangles: mesh.triangles.len() as u64,
+            polygons: import.polygons_by_arity.iter().sum(),
+            polygons_by_arity: arities.map(|(corners, &count)| Arity { corners, count }).collect(),
+            lines: mesh.loose.len() as u64 - points,
+            points,
+            materials: mesh.materials.iter().map(|m| m.name.clone()).collect(),
+            textures: mesh.images.iter().map(texture).collect(),
+            animations,
+            skins,
+            cameras,
+            scene_cameras: mesh.cameras.iter().map(|c| camera(c.name.clone(), c.lens)).collect(),
+            extensions_used,
+            extensions_required,
+            has_normals: !mesh.normals.is_empty(),
+            has_uvs: !mesh.uvs.is_empty(),
+            has_colors: !mesh.colors.is_empty(),
+            bounds: Bounds::of(mesh),
+            area: measures.area,
+            volume: measures.volume.filter(|_| topology.is_watertight),
+            topology: TopologyReport::new(topology, import.dropped_degenerate_faces + import.dropped_collapsed_faces),
+            dropped_nonfinite_faces: import.dropped_nonfinite_faces,
+            dropped_degenerate_faces: import.dropped_degenerate_faces,
+            dropped_collapsed_faces: import.dropped_collapsed_faces,
+            warnings: warnings.map(|w| WarningReport { code: w.code, detail: w.detail.clone() }).collect(),
+        }
+    }
+}
+
+fn texture(image: &ImageSource) -> TextureReport {
+    let name = image.name.clone();
+    let ImageContent::Encoded(bytes) = &image.content else {
+        return TextureReport { name, format: None, width_px: None, height_px: None, file_bytes: None };
+    };
+    let header = image_header::read(bytes);
+    TextureReport {
+        name,
+        format: header.format,
+        width_px: header.size_px.map(|size| size[0]),
+        height_px: header.size_px.map(|size| size[1]),
+        file_bytes: Some(bytes.len() as u64),
+    }
+}
+
+fn camera(name: String, lens: FileLens) -> CameraReport {
+    match lens {
+        FileLens::Perspective { fov_deg } => {
+            CameraReport { name, projection: "perspective", fov_deg: Some(fov_deg), height: None }
+        }
+        FileLens::Orthographic { height } => {
+            CameraReport { name, projection: "orthographic", fov_deg: None, height: Some(height) }
+        }
+    }
+}
+
+/// As `camera.up` has it.
+fn up(axis: UpAxis) -> &'static str {
+    match axis {
+        UpAxis::X => "x",
+        UpAxis::NegX => "-x",
+        UpAxis::Y => "y",
+        UpAxis::NegY => "-y",
+        UpAxis::Z => "z",
+        UpAxis::NegZ => "-z",
+    }
+}

@@ -1,0 +1,118 @@
+//! The report's part on how triangles hang together, after welding.
+
+use crate::mesh::counted;
+use crate::mesh::topology::Topology;
+use serde::Serialize;
+
+/// As [`Topology`] has it, and what was dropped before.
+#[derive(Clone, Debug, Serialize)]
+pub struct TopologyReport {
+    /// Parts that share no vertex.
+    pub components: u64,
+    /// Unique edges.
+    pub edges: u64,
+    /// Edges with one face.
+    pub open_edges: u64,
+    /// Closed chains of open edges.
+    pub boundary_loops: u64,
+    /// Edges with three faces or more.
+    pub nonmanifold_edges: u64,
+    /// Vertices where surfaces touch that share no edge there.
+    pub nonmanifold_vertices: u64,
+    /// Faces with the same three vertices as an earlier one.
+    pub duplicate_faces: u64,
+    /// Faces without area, and those that collapse in 24 bits; they are not drawn.
+    pub degenerate_faces: u64,
+    /// Edges between faces of opposite winding.
+    pub inconsistent_edges: u64,
+    /// Vertices - edges + triangles.
+    pub euler_characteristic: i64,
+    /// Handles in all; null unless the mesh is made of closed, orientable surfaces that do not touch.
+    pub genus: Option<u64>,
+    /// The closed, orientable surfaces, by genus.
+    pub closed_surfaces: Vec<ClosedSurfaces>,
+    /// Whether faces can be turned so that neighbours agree.
+    pub is_orientable: bool,
+    /// Every edge has two faces of opposite directions.
+    pub is_watertight: bool,
+}
+
+/// Surfaces of equal genus.
+#[derive(Clone, Debug, Serialize)]
+pub struct ClosedSurfaces {
+    /// Handles of each.
+    pub genus: u64,
+    /// How many there are.
+    pub count: u64,
+}
+
+impl TopologyReport {
+    /// Of what was counted.
+    pub fn new(topology: Topology, degenerate_faces: u64) -> Self {
+        let Topology {
+            components,
+            edges,
+            open_edges,
+            boundary_loops,
+            nonmanifold_edges,
+            nonmanifold_vertices,
+            duplicate_faces,
+            inconsistent_edges,
+            euler_characteristic,
+            is_watertight,
+            is_orientable,
+            genus,
+            closed_surfaces,
+        } = topology;
+        let closed_surfaces = closed_surfaces.into_iter();
+        Self {
+            components,
+            edges,
+            open_edges,
+            boundary_loops,
+            nonmanifold_edges,
+            nonmanifold_vertices,
+            duplicate_faces,
+            degenerate_faces,
+            inconsistent_edges,
+            euler_characteristic,
+            genus,
+            closed_surfaces: closed_surfaces.map(|(genus, count)| ClosedSurfaces { genus, count }).collect(),
+            is_orientable,
+            is_watertight,
+        }
+    }
+
+    /// In words.
+    pub fn text(&self) -> String {
+        let mut said = vec![counted(self.components, "part", "parts")];
+        let edges = counted(self.edges, "edge", "edges");
+        if self.is_watertight {
+            said.extend(["watertight".to_owned(), edges]);
+        } else {
+            let Self { open_edges, nonmanifold_edges, inconsistent_edges, .. } = self;
+            said.push(format!(
+                "{edges}: {open_edges} open, {nonmanifold_edges} non-manifold, \
+                 {inconsistent_edges} between faces of opposite winding"
+            ));
+        }
+        said.push(format!("Euler characteristic {}", self.euler_characteristic));
+        said.extend(self.genus.map(|genus| format!("genus {genus}")));
+        said.join(", ")
+    }
+
+    /// What else is not as it is on the skin of a solid; None where all is.
+    pub fn faults(&self) -> Option<String> {
+        let faults = [
+            (self.boundary_loops, "boundary loop", "boundary loops"),
+            (self.nonmanifold_vertices, "non-manifold vertex", "non-manifold vertices"),
+            (self.duplicate_faces, "duplicate face", "duplicate faces"),
+        ];
+        let met = faults.into_iter().filter(|(count, ..)| *count > 0);
+        let mut said: Vec<String> = met.map(|(count, one, more)| counted(count, one, more)).collect();
+        if !self.is_orientable {
+            said.push("a surface with one side only".to_owned());
+        }
+        (!said.is_empty()).then(|| said.join(", "))
+    }
+}
