@@ -146,15 +146,15 @@ fn from_inside_a_closed_mesh_every_sample_is_covered() {
 }
 
 #[test]
-fn meshes_that_are_a_point_or_a_line_are_refused() {
+fn faces_that_are_a_point_or_a_line_are_refused() {
     let files = [
         "v 1 2 3\nf 1 1 1\n",
         "v 1 2 3\nv 1 2 3\nv 1 2 3\nf 1 2 3\n",
         "v 0 0 0\nv 1 1 1\nv 3 3 3\nf 1 2 3\n",
         "v 0 0 0\nv 1 0 0\nv 1e9 0 0\nv 1e-9 0 0\nf 1 2 3 4\n",
         "v 0 0 0\nv 1 0 0\nf 1 2 1\nf 2 1 2\n",
-        "v 1 2 3\nv 4 5 6\nl 1 2\n",
-        "v 1 2 3\np 1\n",
+        "v 1 2 3\nl 1 1\n",
+        "v nan 2 3\np 1\n",
     ];
     for file in files {
         let error = read(file.as_bytes()).unwrap_err();
