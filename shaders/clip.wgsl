@@ -2,8 +2,6 @@
 // a fan of up to six triangles. Twin of src/backend/cpu/clip.rs.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
-@group(1) @binding(1) var<storage, read> hull_normals: array<f32>;
-@group(1) @binding(29) var<storage, read> hull_amounts: array<f32>;
 
 @compute @workgroup_size(64)
 fn clip(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -18,6 +16,9 @@ fn clip(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) 
     corners[0] = homogeneous_corner(triangles[3u * t]);
     corners[1] = homogeneous_corner(triangles[3u * t + 1u]);
     corners[2] = homogeneous_corner(triangles[3u * t + 2u]);
+    if !is_moderate(corners[0]) || !is_moderate(corners[1]) || !is_moderate(corners[2]) {
+        return;
+    }
     // Half of the array holds the polygon, the other half takes what a plane leaves of it.
     var len = 3u;
     for (var plane = 0u; plane < 5u; plane++) {
@@ -67,19 +68,10 @@ fn draw_piece(v: Corners, t: u32) {
     let bounds = pixel_bounds(vec3(v.a.x, v.b.x, v.c.x), vec3(v.a.y, v.b.y, v.c.y));
     let area = area_of(v.a, v.b, v.c);
     if bounds.x <= bounds.z && bounds.y <= bounds.w && is_wanted(t, area) {
-        postpone(setup_of(v.a, v.b, v.c, area), bounds.zw - bounds.xy, t + batch.id_base);
+        postpone(setup_of(v.a, v.b, v.c, area), bounds.zw - bounds.xy, t);
     }
 }
 
 fn homogeneous_corner(v: u32) -> vec4<f32> {
-    var p = vec3(positions[3u * v], positions[3u * v + 1u], positions[3u * v + 2u]);
-    if batch.vertex_base != 0u && !has(HULL_PX) {
-        var t = frame.hull_push;
-        if has(HULL_AMOUNTS) {
-            t = hull_amounts[v];
-        }
-        let n = vec3(hull_normals[3u * v], hull_normals[3u * v + 1u], hull_normals[3u * v + 2u]);
-        p = vec3(p.x + rn(t * n.x), p.y + rn(t * n.y), p.z + rn(t * n.z));
-    }
-    return homogeneous(p);
+    return homogeneous(vec3(positions[3u * v], positions[3u * v + 1u], positions[3u * v + 2u]));
 }

@@ -15,25 +15,20 @@ struct Frame {
     background: vec4<f32>,
     hull_color: vec4<f32>,
     near_w: f32,
-    // Units of the box along the normal, or 1/256 px on screen.
-    hull_push: f32,
     ambient: f32,
     lamp_count: u32,
-    line_pass_count: u32,
     // Always 0, which the compiler cannot know.
     zero: u32,
     width: i32,
     height: i32,
     triangle_count: u32,
     vertex_count: u32,
-    // Added to a vertex index to get the hull's record.
-    hull_base: u32,
     // Where edge masks start in the attributes; triangles' materials start at 0.
     masks_at: u32,
     material_count: u32,
     // What remains of wires from the second layer on.
     layer_fade: f32,
-    // Colours at the start of the hull's looks; its triangles' materials follow.
+    // Colours at the start of the hull's looks; triangles' materials follow.
     hull_color_count: u32,
     // Textures; what each is, is in front of the texels.
     image_count: u32,
@@ -47,10 +42,6 @@ struct Frame {
 struct Batch {
     first: u32,
     count: u32,
-    // Added to a triangle's index to get its id.
-    id_base: u32,
-    // Added to a vertex index to get its record.
-    vertex_base: u32,
     // 0 both, 1 front, 2 back.
     faces: u32,
     row_first: i32,
@@ -64,7 +55,7 @@ struct Batch {
     huge_end: u32,
     // Edges that a workgroup draws.
     edges_per_group: u32,
-    // Of the line pass: pixels, pixels, bits, and, below, where its coverage starts.
+    // Of the line pass: pixels, pixels, bits, and, below, which it is.
     line_width: f32,
     line_smoothing: f32,
     line_flags: u32,
@@ -75,13 +66,14 @@ struct Batch {
     line_slices: u32,
     // Coverage in the middle of a line.
     line_peak: f32,
-    // Of so many dispatches over the same long edges, which this is.
-    line_turns: u32,
-    line_turn: u32,
-    ink_at: u32,
-    // Where the faces whose light falls on lines start in the ink.
-    owners_at: u32,
-    // The role that drawn triangles have, where the plan has roles.
+    // Parts of edges that a thread looks for and draws before it says how far it has come.
+    line_units: u32,
+    line_pass: u32,
+    // Which rows the visibility buffer holds, where that is more than the batch's, and where the first of the batch's begins in it.
+    seen_first: i32,
+    seen_end: i32,
+    samples_at: u32,
+    // The role that drawn triangles have, where the plan has roles; 0: the hull's, which have none.
     role: u32,
     // Number of the layer that is looked for; 0 also for the visibility buffer.
     layer: u32,
@@ -93,12 +85,12 @@ const SHOWN_HIDDEN: u32 = 2u;
 const SKIP_BACK: u32 = 4u;
 const CONTOUR: u32 = 8u;
 const LIT_PASS: u32 = 16u;
-const LONG_ONLY: u32 = 32u;
-const SHORT_ONLY: u32 = 64u;
+const FIRST_PASS: u32 = 32u;
+// It is the fronts of faces that look away, because the surface is inside out.
+const INSIDE_OUT: u32 = 64u;
 
 const SURFACE: u32 = 1u;
 const HULL: u32 = 2u;
-const HULL_PX: u32 = 4u;
 const FACE_NORMALS: u32 = 8u;
 const VERTEX_NORMALS: u32 = 16u;
 const WIRES: u32 = 32u;
@@ -113,7 +105,6 @@ const LIT_LINES: u32 = 8192u;
 // Whether any line pass is a contour.
 const CONTOURS: u32 = 16384u;
 const ROLES: u32 = 0x100000u;
-const HULL_AMOUNTS: u32 = 0x200000u;
 const HULL_LOOKS: u32 = 0x400000u;
 const LAYERS: u32 = 0x800000u;
 const BEHIND_SURFACE: u32 = 0x1000000u;
@@ -122,7 +113,6 @@ const LAYERED_HULL: u32 = 0x4000000u;
 
 // src/plan/mod.rs explains these bits of a triangle's role.
 const ROLE_LAYER: u32 = 2u;
-const ROLE_HULL: u32 = 4u;
 const ROLE_FRONT_ONLY: u32 = 8u;
 const ROLE_BACK_ONLY: u32 = 16u;
 const DERIVATIVE_NORMALS: u32 = 65536u;
@@ -213,11 +203,6 @@ fn round_to_i32(v: f32) -> i32 {
 // row . (p, 1)
 fn row_dot(row: vec4<f32>, p: vec3<f32>) -> f32 {
     return rn(rn(rn(row.x * p.x) + rn(row.y * p.y)) + rn(row.z * p.z)) + row.w;
-}
-
-// row . (n, 0)
-fn row_dot3(row: vec4<f32>, n: vec3<f32>) -> f32 {
-    return rn(rn(row.x * n.x) + rn(row.y * n.y)) + rn(row.z * n.z);
 }
 
 // a . b

@@ -88,5 +88,5 @@ fn looks_away(face: u32) -> bool {
         return false;
     }
     let area = area_of(a, b, c);
-    return !is_negative(area) && !is_zero(area);
+    return !is_zero(area) && is_negative(area) == ((batch.line_flags & INSIDE_OUT) != 0u);
 }

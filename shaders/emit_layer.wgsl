@@ -9,7 +9,7 @@ fn emit(index: u32, z: f32, id: u32) {
     if batch.layer > 0u && !is_below(word, layered[index].previous) {
         return;
     }
-    if !has(BEHIND_SURFACE) && !is_below(base[index], word) {
+    if !has(BEHIND_SURFACE) && !is_below(base[batch.samples_at + index], word) {
         return;
     }
     keep_nearest(index, z, id);

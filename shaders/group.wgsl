@@ -2,7 +2,7 @@
 // triangle a sample sees.
 
 @group(1) @binding(24) var<storage, read> roles: array<u32>;
-// Colours, then triangles' materials.
+// Colours, then the materials of the surface's triangles and of the hull's.
 @group(1) @binding(25) var<storage, read> hull_looks: array<u32>;
 
 const NOTHING: u32 = 0xFFFFFFFFu;
@@ -49,7 +49,7 @@ fn group_color(g: Group, pixel: vec2<i32>, show: Show) -> vec4<f32> {
         return vec4(0.0);
     }
     if g.id >= frame.triangle_count {
-        return hull_color(g.id - frame.triangle_count);
+        return hull_color(g.id);
     }
     if !has(SURFACE) {
         return vec4(0.0);
@@ -58,17 +58,18 @@ fn group_color(g: Group, pixel: vec2<i32>, show: Show) -> vec4<f32> {
     return point_color(g.id, vec2<f32>(pixel_corner(pixel)) + mean, show);
 }
 
-fn hull_material(t: u32) -> u32 {
+// Of an id, the hull's or not.
+fn hull_material(id: u32) -> u32 {
     if has(HULL_LOOKS) {
-        return hull_looks[4u * frame.hull_color_count + t];
+        return hull_looks[4u * frame.hull_color_count + id];
     }
     return 0u;
 }
 
-fn hull_color(t: u32) -> vec4<f32> {
+fn hull_color(id: u32) -> vec4<f32> {
     if !has(HULL_LOOKS) {
         return frame.hull_color;
     }
-    let at = 4u * min(hull_material(t), frame.hull_color_count - 1u);
+    let at = 4u * min(hull_material(id), frame.hull_color_count - 1u);
     return bitcast<vec4<f32>>(vec4(hull_looks[at], hull_looks[at + 1u], hull_looks[at + 2u], hull_looks[at + 3u]));
 }

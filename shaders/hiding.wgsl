@@ -22,8 +22,10 @@ struct Search {
     range: vec2<f32>,
     // Pixels beside and beyond the edge whose triangles are asked too.
     radius: u32,
-    // From where on parts are still to be found.
+    // From where on parts are still to be found; at the range's end there are no more.
     begin: f32,
+    // Where the hidden part begins that is being followed to its end.
+    hidden_from: f32,
     // What has been found out already: nothing, that the range is one part, or where it is hidden.
     state: u32,
 };
@@ -31,6 +33,9 @@ struct Search {
 const UNASKED: u32 = 0u;
 const WHOLE: u32 = 1u;
 const PARTS: u32 = 2u;
+
+// More than any place on an edge.
+const BEYOND: f32 = 2.0;
 
 // What triangles hide of a range, as far as one look from `begin` on shows it.
 struct Look {
@@ -43,59 +48,51 @@ struct Look {
 
 fn begin_search(s: Segment, range: vec2<f32>) -> Search {
     if (batch.line_flags & (SHOWN_VISIBLE | SHOWN_HIDDEN)) == 0u {
-        return Search(range, 0u, range.x, WHOLE);
+        return Search(range, 0u, range.x, BEYOND, WHOLE);
     }
     if lies_deep(s, range) {
         let shows_hidden = (batch.line_flags & SHOWN_HIDDEN) != 0u;
-        return Search(range, 0u, select(range.y, range.x, shows_hidden), WHOLE);
+        return Search(range, 0u, select(range.y, range.x, shows_hidden), BEYOND, WHOLE);
     }
-    return Search(range, 0u, range.x, UNASKED);
+    return Search(range, 0u, range.x, BEYOND, UNASKED);
 }
 
-// The next part to draw; empty (x >= y) where there is none.
+// Looks along the edge once, from where the search is: a part to draw; empty (x >= y) where this look has found none.
 fn next_part(edge: vec4<u32>, s: Segment, search: ptr<function, Search>) -> vec2<f32> {
     let range = (*search).range;
+    let begin = (*search).begin;
+    if (*search).state == WHOLE {
+        (*search).begin = range.y;
+        return range;
+    }
+    let look = look_along(edge, s, *search);
     let shows_visible = (batch.line_flags & SHOWN_VISIBLE) != 0u;
-    // Where the hidden part begins that is being followed to its end.
-    var hidden_from = 2.0;
-    while (*search).begin < range.y {
-        let begin = (*search).begin;
-        if (*search).state == WHOLE {
+    if (*search).state == UNASKED {
+        if !look.any {
             (*search).begin = range.y;
-            return range;
+            return select(vec2(0.0), range, shows_visible);
         }
-        let look = look_along(edge, s, *search);
-        if (*search).state == UNASKED {
-            if !look.any {
-                (*search).state = WHOLE;
-                (*search).begin = select(range.y, range.x, shows_visible);
-            } else {
-                // Where an edge dives under another surface, a sliver of that may have its samples beside the edge.
-                (*search).state = PARTS;
-                (*search).radius = 1u;
-            }
-            continue;
-        }
-        if look.until > begin {
-            // Hidden from here on, perhaps farther than this look has shown.
-            hidden_from = min(hidden_from, begin);
-            (*search).begin = look.until;
-            continue;
-        }
-        if !shows_visible && hidden_from < begin {
-            return vec2(hidden_from, begin);
-        }
-        let end = min(look.next, range.y);
-        (*search).begin = end;
-        let is_gap = begin > range.x && end < range.y;
-        if shows_visible && end - begin > rn(s.inverse_length * select(CRUMB_PX, GAP_PX, is_gap)) {
-            return vec2(begin, end);
-        }
+        // Where an edge dives under another surface, a sliver of that may have its samples beside the edge.
+        (*search).state = PARTS;
+        (*search).radius = 1u;
+        return vec2(0.0);
     }
-    if !shows_visible && hidden_from < range.y {
-        return vec2(hidden_from, range.y);
+    let hidden_from = (*search).hidden_from;
+    if look.until > begin {
+        // Hidden from here on, perhaps farther than this look has shown.
+        (*search).hidden_from = min(hidden_from, begin);
+        (*search).begin = look.until;
+        return select(vec2(0.0), vec2(min(hidden_from, begin), range.y), !shows_visible && look.until >= range.y);
     }
-    return vec2(0.0);
+    let end = min(look.next, range.y);
+    (*search).begin = end;
+    (*search).hidden_from = BEYOND;
+    if !shows_visible {
+        return vec2(hidden_from, begin);
+    }
+    let is_gap = begin > range.x && end < range.y;
+    let is_part = end - begin > rn(s.inverse_length * select(CRUMB_PX, GAP_PX, is_gap));
+    return select(vec2(0.0), vec2(begin, end), is_part);
 }
 
 // Asks each triangle that is seen along the edge what it hides.
@@ -138,22 +135,12 @@ fn look_along(edge: vec4<u32>, s: Segment, search: Search) -> Look {
     return look;
 }
 
-fn walk_steps(s: Segment, range: vec2<f32>) -> u32 {
-    return u32(rn(rn(s.length * (range.y - range.x)) * 2.0)) + 1u;
-}
-
-// Where step i along a range of the edge lies; left of or above the picture, or outside of the rows, (-1, -1).
-fn walk_pixel(s: Segment, range: vec2<f32>, i: u32) -> vec2<i32> {
-    let p = point_at(s, min(range.x + rn(f32(i) * (0.5 * s.inverse_length)), range.y));
-    return select(vec2(-1), vec2<i32>(p), all(p >= vec2(0.0)));
-}
-
 // Id and depth (its bits) that a sample of a pixel sees.
 fn seen_at(pixel: vec2<i32>, sample: u32) -> vec2<u32> {
-    if pixel.x < 0 || pixel.x >= frame.width || pixel.y < batch.row_first || pixel.y >= batch.row_end {
+    if pixel.x < 0 || pixel.x >= frame.width || pixel.y < batch.seen_first || pixel.y >= batch.seen_end {
         return vec2(NOTHING, 0u);
     }
-    let word = samples[u32((pixel.y - batch.row_first) * frame.width + pixel.x) * u32(sample_count()) + sample];
+    let word = samples[u32((pixel.y - batch.seen_first) * frame.width + pixel.x) * u32(sample_count()) + sample];
     return vec2(select(~word.x, NOTHING, word.y == 0u), word.y);
 }
 
@@ -166,7 +153,8 @@ fn lies_deep(s: Segment, range: vec2<f32>) -> bool {
     let steps = walk_steps(s, range);
     for (var i = 0u; i <= steps; i++) {
         let pixel = walk_pixel(s, range, i);
-        if all(pixel == last) || pixel.x < 0 || pixel.x >= frame.width || pixel.y < batch.row_first || pixel.y >= batch.row_end {
+        if all(pixel == last) || pixel.x < 0 || pixel.x >= frame.width
+            || pixel.y < batch.seen_first || pixel.y >= batch.seen_end {
             continue;
         }
         last = pixel;
@@ -192,17 +180,14 @@ fn lies_deep(s: Segment, range: vec2<f32>) -> bool {
 
 // Where a triangle's records are.
 fn corners_of_id(id: u32) -> vec3<u32> {
-    let is_hull = id >= frame.triangle_count;
-    let at = 3u * select(id, id - frame.triangle_count, is_hull);
-    return vec3(triangles[at], triangles[at + 1u], triangles[at + 2u]) + select(0u, frame.hull_base, is_hull);
+    return vec3(triangles[3u * id], triangles[3u * id + 1u], triangles[3u * id + 2u]);
 }
 
 // Where along the edge a triangle lies in front of it; empty (x >= y) where nowhere.
 fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     let none = vec2(1.0, 0.0);
     let v = corners_of_id(id);
-    let is_hull = id >= frame.triangle_count;
-    if !is_hull && any(v == vec3(edge.x)) && any(v == vec3(edge.y)) {
+    if any(v == vec3(edge.x)) && any(v == vec3(edge.y)) {
         return none;
     }
     let a = vertices[v.x];
@@ -214,12 +199,15 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     var r = vec4(f32(c.x), f32(c.y), c.z, 1.0);
     var is_clockwise: bool;
     if a.x == OUTSIDE || b.x == OUTSIDE || c.x == OUTSIDE {
-        if is_hull || !has(CLIPPED) {
+        if id >= frame.triangle_count || !has(CLIPPED) {
             return none;
         }
         p = homogeneous_of(v.x);
         q = homogeneous_of(v.y);
         r = homogeneous_of(v.z);
+        if !is_moderate(p) || !is_moderate(q) || !is_moderate(r) {
+            return none;
+        }
         is_clockwise = volume_of(p, q, r) > 0.0;
     } else {
         let area = area_of(a, b, c);

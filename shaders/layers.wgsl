@@ -65,7 +65,7 @@ fn take(sample: u32) -> u32 {
     var id = select(~word.x, NOTHING, word.y == 0u);
     if has(LAYERED_HULL) && id != NOTHING {
         let is_hull = id >= frame.triangle_count;
-        let bit = 1u << (hull_material(id - select(0u, frame.triangle_count, is_hull)) & 31u);
+        let bit = 1u << (hull_material(id) & 31u);
         if is_hull && (so_far.materials & bit) != 0u {
             id = NOTHING;
         }

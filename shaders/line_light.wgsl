@@ -7,8 +7,8 @@
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
 // Of the surface, a pixel each; then gain and gloss of the light on lines, a pixel each.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
-// Of each line pass, a pixel each; then the owners: a face of a lit line, plus 1.
-@group(1) @binding(11) var<storage, read> ink: array<u32>;
+// A pixel each: a face of the pass's line there, plus 1.
+@group(1) @binding(11) var<storage, read_write> owners: array<u32>;
 
 @compute @workgroup_size(64)
 fn line_light(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -16,16 +16,18 @@ fn line_light(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
     if i >= batch.count {
         return;
     }
-    let owner = ink[frame.line_pass_count * batch.count + i];
+    let owner = owners[i];
     if owner == 0u {
         return;
     }
+    // For the next pass.
+    owners[i] = 0u;
     let corner = pixel_corner(vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width));
     let samples_px = u32(sample_count());
     var sum = vec2(0.0);
     var count = 0.0;
     for (var s = 0u; s < samples_px; s++) {
-        let word = samples[i * samples_px + s];
+        let word = samples[batch.samples_at + i * samples_px + s];
         // Neither a hull nor nothing.
         if word.y != 0u && ~word.x < frame.triangle_count {
             sum += point_light(~word.x, vec2<f32>(corner + sample_offset(i32(s))));

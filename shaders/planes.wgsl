@@ -30,3 +30,9 @@ fn snap_clipped(p: vec4<f32>) -> Vertex {
     let y = clamp(rn(p.y * r), -BOUND, BOUND);
     return Vertex(round_to_i32(x), round_to_i32(y), rn(p.z * r), r);
 }
+
+// Whether all coordinates are numbers below 2^64, by their exponents, because what compilers make of comparisons with others is
+// theirs. No step of clipping overflows then; what has others is not drawn.
+fn is_moderate(p: vec4<f32>) -> bool {
+    return all((bitcast<vec4<u32>>(p) & vec4(0x7F800000u)) < vec4(0x5F800000u));
+}

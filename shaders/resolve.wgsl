@@ -1,12 +1,10 @@
-// Stage 5, a pixel: surface over background, ink over both, to sRGB bytes. Twin of src/backend/cpu/resolve.rs.
+// Stage 5, a pixel: surface over background, to sRGB bytes. Twin of src/backend/cpu/resolve.rs.
 
+// Of the surface over nothing; where there are lines, of everything.
 @group(1) @binding(9) var<storage, read> colors: array<vec4<f32>>;
-@group(1) @binding(11) var<storage, read> ink: array<u32>;
 // thresholds[k] is the smallest linear value that is stored as k + 1 or more.
 @group(1) @binding(13) var<storage, read> thresholds: array<f32>;
 @group(1) @binding(14) var<storage, read_write> rgba: array<u32>;
-// Of each pass its colour, and whether it is lit.
-@group(1) @binding(17) var<storage, read> line_colors: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -15,26 +13,13 @@ fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroup
         return;
     }
     var c = frame.background;
-    if has(SURFACE | HULL) {
+    if has(LINES) {
+        c = colors[i];
+    } else if has(SURFACE | HULL) {
         let color = colors[i];
         c = color + rn4(frame.background * (1.0 - color.w));
     }
-    if has(LINES) {
-        for (var n = 0u; n < frame.line_pass_count; n++) {
-            let cover = bitcast<f32>(ink[n * batch.count + i]);
-            var color = line_colors[2u * n];
-            if has(LIT_LINES) && line_colors[2u * n + 1u].x != 0.0 {
-                color = lit_color(color, colors[batch.count + i].xy);
-            }
-            c = rn4(cover * color) + rn4(c * (1.0 - rn(cover * color.w)));
-        }
-    }
     rgba[i] = encode(c);
-}
-
-// A premultiplied colour under light (A, B).
-fn lit_color(c: vec4<f32>, light: vec2<f32>) -> vec4<f32> {
-    return vec4(clamp(rn3(c.xyz * light.x) + rn(light.y * c.w), vec3(0.0), vec3(c.w)), c.w);
 }
 
 fn encode(c: vec4<f32>) -> u32 {

@@ -59,7 +59,7 @@ fn uncovered(first: u32, same: u32) -> f32 {
 }
 
 fn seen(sample: u32) -> u32 {
-    let word = samples[sample];
+    let word = samples[batch.samples_at + sample];
     return select(~word.x, NOTHING, word.y == 0u);
 }
 

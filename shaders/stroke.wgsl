@@ -9,11 +9,9 @@ const UNIT: f32 = 16384.0;
 // Largest scaled area.
 const LIMIT: f32 = 16000.0;
 
-// Words of a pixel's strokes: sum of areas in 1/65536, sum of points, and the points of any.
-const STROKE_WORDS: u32 = 10u;
-
-// Sums stop before they could wrap.
-const SUM_MAX: u32 = 0x80000000u;
+// Words of a pixel's strokes: sum of areas in 1/65536, sum of points, how often either has gone round (areas in the lower half), and
+// the points of any.
+override STROKE_WORDS: u32 = 0u;
 
 // A stroke seen from a pixel: bounds of what its points are compared with, a value each where the line has no ramp.
 struct Stroke {
@@ -48,30 +46,41 @@ fn radius_at(level: u32) -> f32 {
     return rn(half_width + half_ramp) - rn(share * (2.0 * half_ramp));
 }
 
-// Whether a piece of an edge comes as close to a pixel as its line reaches.
-fn touches(along: vec2<f32>, start: vec2<f32>, end: vec2<f32>) -> bool {
-    let reach = reach_of_line();
+// Where a pixel's centre lies in the direction of a piece of an edge.
+struct Place {
+    // How far from the line.
+    across: f32,
+    // How far past the start, and past the end.
+    past: vec2<f32>,
+    // How far beyond either.
+    beyond: f32,
+};
+
+// `start` and `end` are the piece's, in pixels from the pixel's centre, `along` the edge's direction.
+fn place_of(along: vec2<f32>, start: vec2<f32>, end: vec2<f32>) -> Place {
     let across = rn(along.y * start.x) - rn(along.x * start.y);
     let past_start = -(rn(along.x * start.x) + rn(along.y * start.y));
     let past_end = -(rn(along.x * end.x) + rn(along.y * end.y));
-    let beyond = max(max(-past_start, past_end), 0.0);
-    return rn(across * across) + rn(beyond * beyond) <= rn(reach * reach);
+    return Place(across, vec2(past_start, past_end), max(max(-past_start, past_end), 0.0));
 }
 
-// Adds what a piece of an edge covers of a pixel that it touches to its strokes. `start` and `end` are the piece's, in pixels from the pixel's
-// centre, `along` the edge's direction. Whether it covers anything.
+// Whether a piece of an edge comes as close to a pixel as its line reaches.
+fn touches(place: Place) -> bool {
+    let reach = reach_of_line();
+    return rn(place.across * place.across) + rn(place.beyond * place.beyond) <= rn(reach * reach);
+}
+
+// Adds what a piece of an edge covers of a pixel that it touches to its strokes. Whether it covers anything.
 fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>) -> bool {
     let reach = reach_of_line();
-    let across = rn(along.y * start.x) - rn(along.x * start.y);
-    let past_start = -(rn(along.x * start.x) + rn(along.y * start.y));
-    let past_end = -(rn(along.x * end.x) + rn(along.y * end.y));
-    let beyond = max(max(-past_start, past_end), 0.0);
+    let place = place_of(along, start, end);
+    let across = place.across;
     let box_along = select(MIN_POSITIVE, 0.5 * (abs(along.x) + abs(along.y)), any(along != vec2(0.0)));
     var stroke: Stroke;
     stroke.along = vec2(round_to_i32(along.x * UNIT), round_to_i32(along.y * UNIT));
     stroke.across = across;
-    let is_past_end = past_end > -box_along;
-    let reaches = vec2(past_start < box_along, is_past_end);
+    let is_past_end = place.past.y > -box_along;
+    let reaches = vec2(place.past.x < box_along, is_past_end);
     var area = 0.0;
     if !any(reaches) {
         area = strip_area(vec2(-along.y, along.x), abs(across));
@@ -82,10 +91,10 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
         stroke.last = 0x8000;
         stroke.has_strip = true;
     } else {
-        stroke.first = units(-past_start);
-        stroke.last = units(-past_end);
+        stroke.first = units(-place.past.x);
+        stroke.last = units(-place.past.y);
         // An edge that is a point has no sides, only the disc around it.
-        stroke.has_strip = any(along != vec2(0.0)) && beyond < box_along;
+        stroke.has_strip = any(along != vec2(0.0)) && place.beyond < box_along;
         stroke.away = vec2(rn(start.x * start.x) + rn(start.y * start.y), rn(end.x * end.x) + rn(end.y * end.y));
         stroke.discs = reaches & (stroke.away <= vec2(rn(reach * reach)));
         stroke.from_start = scaled(select(vec2(0.0), start, stroke.discs.x));
@@ -97,7 +106,7 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
         let mask = points_of(stroke, 2u * w) | (points_of(stroke, 2u * w + 1u) << 16u);
         if mask != 0u {
             points += countOneBits(mask);
-            atomicOr(&strokes[at + 2u + w], mask);
+            atomicOr(&strokes[at + 3u + w], mask);
         }
     }
     if any(reaches) {
@@ -106,26 +115,38 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
         }
         area = f32(points) * (batch.line_peak * (1.0 / 256.0));
     }
-    if atomicLoad(&strokes[at]) < SUM_MAX && atomicLoad(&strokes[at + 1u]) < SUM_MAX {
-        atomicAdd(&strokes[at], u32(area * 65536.0 + 0.5));
-        atomicAdd(&strokes[at + 1u], points);
+    let scaled_area = u32(area * 65536.0 + 0.5);
+    // A sum that has gone round is smaller than what was added.
+    var rounds = 0u;
+    if atomicAdd(&strokes[at], scaled_area) + scaled_area < scaled_area {
+        rounds = 1u;
+    }
+    if atomicAdd(&strokes[at + 1u], points) + points < points {
+        rounds += 0x10000u;
+    }
+    if rounds > 0u {
+        atomicAdd(&strokes[at + 2u], rounds);
     }
     return true;
 }
 
 // Whether all points of a pixel are covered, so that nothing that comes can change anything.
 fn is_full(pixel_at: u32) -> bool {
-    let at = pixel_at * STROKE_WORDS + 2u;
+    let counts = pixel_at * STROKE_WORDS + 1u;
+    let at = counts + 2u;
     // One stroke may cover all points and yet leave a corner.
-    if atomicLoad(&strokes[at - 1u]) <= 256u {
+    if atomicLoad(&strokes[counts]) <= 256u && atomicLoad(&strokes[counts + 1u]) < 0x10000u {
         return false;
     }
-    for (var w = 0u; w < 8u; w++) {
-        if atomicLoad(&strokes[at + w]) != 0xFFFFFFFFu {
-            return false;
-        }
+    // No loop: where loops are limited, the pixels found may be many.
+    let first = atomicLoad(&strokes[at]) & atomicLoad(&strokes[at + 1u])
+        & atomicLoad(&strokes[at + 2u]) & atomicLoad(&strokes[at + 3u]);
+    if first != 0xFFFFFFFFu {
+        return false;
     }
-    return true;
+    let last = atomicLoad(&strokes[at + 4u]) & atomicLoad(&strokes[at + 5u])
+        & atomicLoad(&strokes[at + 6u]) & atomicLoad(&strokes[at + 7u]);
+    return last == 0xFFFFFFFFu;
 }
 
 fn units(v: f32) -> i32 {

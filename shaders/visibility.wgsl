@@ -30,9 +30,9 @@ fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
     let size_y = max(max(y.x, y.y), y.z) - min(min(y.x, y.y), y.z);
     let setup = setup_of(v.a, v.b, v.c, area);
     if max(size_x, size_y) <= SMALL {
-        draw_small(setup, bounds, t + batch.id_base);
+        draw_small(setup, bounds, t);
     } else {
-        postpone(setup, bounds.zw - bounds.xy, t + batch.id_base);
+        postpone(setup, bounds.zw - bounds.xy, t);
     }
 }
 

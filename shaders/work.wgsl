@@ -26,11 +26,10 @@ struct Corners {
 };
 
 fn screen_triangle(t: u32) -> Corners {
-    let base = batch.vertex_base;
     return Corners(
-        vertices[base + triangles[3u * t]],
-        vertices[base + triangles[3u * t + 1u]],
-        vertices[base + triangles[3u * t + 2u]],
+        vertices[triangles[3u * t]],
+        vertices[triangles[3u * t + 1u]],
+        vertices[triangles[3u * t + 2u]],
     );
 }
 
@@ -44,12 +43,12 @@ fn is_wanted(t: u32, area: vec2<u32>) -> bool {
         return false;
     }
     var faces = batch.faces;
-    if has(ROLES) {
+    if has(ROLES) && batch.role != 0u {
         let role = roles[t / 4u] >> (8u * (t & 3u));
         if (role & batch.role) == 0u {
             return false;
         }
-        if batch.role != ROLE_HULL && (role & (ROLE_FRONT_ONLY | ROLE_BACK_ONLY)) != 0u {
+        if (role & (ROLE_FRONT_ONLY | ROLE_BACK_ONLY)) != 0u {
             faces = select(2u, 1u, (role & ROLE_FRONT_ONLY) != 0u);
         }
     }

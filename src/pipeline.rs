@@ -86,7 +86,8 @@ pub fn render(
 ) -> Result<Output, RenderError> {
     let mut budget = Budget::new(limits);
 
-    let mut mesh = mesh::import(job.bundle, job.format_in, limits, &mut budget, deadline)?;
+    let options = mesh::Options { format: job.format_in, time_s: job.spec.time_s };
+    let mut mesh = mesh::import(job.bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
 
     let mut warnings = std::mem::take(&mut mesh.report.warnings);
@@ -94,11 +95,14 @@ pub fn render(
     let mut chosen = plan::choose(job.spec, mesh.triangles.len(), backends.has_gpu());
     warnings.extend(chosen.iter_mut().flat_map(|chosen| std::mem::take(&mut chosen.warnings)));
     let spec = chosen.as_ref().map_or(job.spec, |chosen| &chosen.spec);
+    warnings.extend(plan::thicken(&mut mesh, spec, &mut budget, deadline)?);
     let plan = plan::build(&mesh, spec, &mut budget, deadline)?;
     if plan::is_out_of_view(&plan) {
         let detail = "the camera looks past the whole mesh, and the picture is blank".to_owned();
         warnings.push(Warning { code: "mesh_out_of_view", detail });
     }
+    let bands = backends.bands_bytes(spec.backend, &plan);
+    budget.spend("bands of the picture", bands, 1).map_err(PlanError::Limit)?;
     ended(Stage::Plan);
 
     let drawn = backends.draw(spec.backend, &plan, deadline)?;

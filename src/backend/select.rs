@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::device::{GpuDevice, let_go};
 use super::gpu::GpuKind;
 use super::host::GpuHost;
-use super::{BackendKind, DrawError, Renderer, cpu};
+use super::{BackendKind, DrawError, Renderer, cpu, gpu};
 use crate::image::Image;
 use crate::limits::{BackendChoice, Deadline};
 use crate::plan::DrawPlan;
@@ -60,6 +60,14 @@ impl Backends {
                     self.draw_on_cpu(plan, deadline)
                 }
             },
+        }
+    }
+
+    /// Memory that drawing the plan takes beside what grows with its mesh, bytes. What a real GPU holds is its own.
+    pub fn bands_bytes(&self, choice: BackendChoice, plan: &DrawPlan<'_>) -> u64 {
+        match choice {
+            BackendChoice::Cpu | BackendChoice::Auto => self.cpu.bands_bytes(plan),
+            BackendChoice::Gpu => gpu::bands_bytes(plan),
         }
     }
 

@@ -23,7 +23,7 @@ use crate::telemetry;
 /// Arguments of `render`.
 #[derive(Args)]
 pub struct RenderArgs {
-    /// Mesh file (OBJ, STL, PLY, glTF, GLB) and the files it refers to, or a .zip of them; `-` for standard input
+    /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB) and the files it refers to, or a .zip of them; `-` for standard input
     #[arg(required = true, value_name = "MESH")]
     meshes: Vec<String>,
     /// Image file, `-` for standard output; its extension chooses the format unless --format does
@@ -47,7 +47,7 @@ pub struct RenderArgs {
     up: Option<String>,
     #[arg(long, help = format!("Image format: {}", one_of::<ImageFormat>()))]
     format: Option<String>,
-    /// Format of the mesh, where its bytes do not tell: obj, gltf, glb, stl or ply
+    /// Format of the mesh, where its bytes do not tell: obj, gltf, glb, stl, ply, off, fbx or 3mf
     #[arg(long, value_name = "FORMAT")]
     format_in: Option<String>,
     /// Which of several files is the mesh, where more than one could be

@@ -54,6 +54,7 @@ fn spec() -> Spec {
         layers: Layers::default(),
         materials: Vec::new(),
         topology: None,
+        time_s: None,
         camera,
         light,
         image,

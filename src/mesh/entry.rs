@@ -1,7 +1,7 @@
 //! Which file of a bundle is the mesh.
 
 use super::bundle::{BundleFile, show, show_all};
-use super::{Folder, Format, MeshError, MeshFault, sniff};
+use super::{Folder, Format, MeshError, MeshFault, sniff, three_mf};
 use crate::limits::Deadline;
 
 /// Finds the mesh among the files: the one that `entry` names, or the only one that is a mesh. `format` overrides sniffing.
@@ -11,6 +11,10 @@ pub fn choose(
     format: Option<Format>,
     deadline: &Deadline,
 ) -> Result<(Folder, Format), MeshError> {
+    let is_open = entry.is_none() && format.is_none_or(|format| format == Format::ThreeMf);
+    if let Some(number) = three_mf::start_part(&files).filter(|_| is_open) {
+        return Ok((Folder::new(files, number), Format::ThreeMf));
+    }
     let folder = Folder::new(files.clone(), 0);
     let number = match entry {
         Some(name) => folder
@@ -61,9 +65,6 @@ fn is_mesh(file: &BundleFile, format: Option<Format>) -> bool {
 fn no_mesh(files: &[BundleFile]) -> String {
     if files.is_empty() {
         return format!("the bundle has no files in it; send a mesh ({}) and what belongs to it", Format::ALL);
-    }
-    if files.iter().any(|file| file.path.to_ascii_lowercase().ends_with(".model")) {
-        return format!("the zip archive is a 3MF file, which is not read: convert it to {}", Format::ALL);
     }
     let names = show_all(files.iter().map(|file| file.path.as_str()));
     format!("no file of the bundle is a mesh in a known format ({}): there is {names}", Format::ALL)

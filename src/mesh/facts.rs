@@ -24,9 +24,9 @@ pub struct FileFacts {
     pub skins: Option<u64>,
     /// Cameras, shown or not.
     pub cameras: Option<u64>,
-    /// Lines beside faces, as the format counts them: polylines in OBJ, segments elsewhere.
+    /// Line segments that are not among the mesh's [`Loose`](super::Loose) ones.
     pub lines: u64,
-    /// Points that are drawn as such.
+    /// Points, the same.
     pub points: u64,
     /// Extensions that the file says it uses.
     pub extensions_used: Vec<String>,

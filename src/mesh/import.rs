@@ -2,7 +2,10 @@
 
 use super::bundle::Bundle;
 use super::normalise::normalise;
-use super::{Folder, Mesh, MeshError, MeshFault, entry, gltf, obj, ply, stl, unzip};
+use super::raw::RawMesh;
+use super::{
+    Folder, ImportReport, Mesh, MeshError, MeshFault, Warning, entry, fbx, gltf, obj, off, ply, stl, three_mf, unzip,
+};
 use crate::limits::{Budget, Deadline, Limits};
 
 /// The mesh formats that are read.
@@ -21,14 +24,20 @@ pub enum Format {
     StlAscii,
     /// PLY of any encoding.
     Ply,
+    /// Geomview's object file format, text or binary.
+    Off,
+    /// Autodesk FBX, binary or ASCII.
+    Fbx,
+    /// 3MF, a zip package of XML.
+    ThreeMf,
 }
 
 impl Format {
     /// The names that [`Format::from_name`] knows.
-    pub const NAMES: [&str; 5] = ["obj", "gltf", "glb", "stl", "ply"];
+    pub const NAMES: [&str; 8] = ["obj", "gltf", "glb", "stl", "ply", "off", "fbx", "3mf"];
 
     /// All of them, for a sentence.
-    pub const ALL: &str = "OBJ, STL, PLY, glTF or GLB";
+    pub const ALL: &str = "OBJ, STL, PLY, OFF, FBX, 3MF, glTF or GLB";
 
     /// From a file extension or a query value. `stl` may be either kind: the importer looks.
     pub fn from_name(name: &str) -> Option<Self> {
@@ -38,6 +47,9 @@ impl Format {
             "glb" => Some(Self::Glb),
             "stl" => Some(Self::StlBinary),
             "ply" => Some(Self::Ply),
+            "off" => Some(Self::Off),
+            "fbx" => Some(Self::Fbx),
+            "3mf" => Some(Self::ThreeMf),
             _ => None,
         }
     }
@@ -50,6 +62,9 @@ impl Format {
             Self::Glb => "glb",
             Self::StlBinary | Self::StlAscii => "stl",
             Self::Ply => "ply",
+            Self::Off => "off",
+            Self::Fbx => "fbx",
+            Self::ThreeMf => "3mf",
         }
     }
 }
@@ -63,18 +78,59 @@ impl std::fmt::Display for Format {
             Self::StlBinary => "binary STL",
             Self::StlAscii => "ASCII STL",
             Self::Ply => "PLY",
+            Self::Off => "OFF",
+            Self::Fbx => "FBX",
+            Self::ThreeMf => "3MF",
         })
     }
 }
 
-/// Reads the mesh of a bundle. `format` overrides sniffing.
+/// What is said of a mesh beside its bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Overrides sniffing.
+    pub format: Option<Format>,
+    /// The moment of the file's first animation that is drawn, seconds; None: the file as its animations find it.
+    pub time_s: Option<f64>,
+}
+
+impl From<Option<Format>> for Options {
+    fn from(format: Option<Format>) -> Self {
+        Self { format, time_s: None }
+    }
+}
+
+/// Reads the mesh of a bundle.
 pub fn import(
     bundle: &Bundle,
-    format: Option<Format>,
+    options: impl Into<Options>,
     limits: &Limits,
     budget: &mut Budget,
     deadline: &Deadline,
 ) -> Result<Mesh, MeshError> {
+    open(bundle, options.into(), limits, budget, deadline, normalise)
+}
+
+/// Reads all of a file that [`import`] reads, and reports what is in it, whether there is anything to draw or not.
+pub fn survey(
+    bundle: &Bundle,
+    options: impl Into<Options>,
+    limits: &Limits,
+    budget: &mut Budget,
+    deadline: &Deadline,
+) -> Result<ImportReport, MeshError> {
+    open(bundle, options.into(), limits, budget, deadline, |raw, _| Ok(raw.report))
+}
+
+/// Finds the mesh of a bundle, reads it, and has it finished.
+fn open<T>(
+    bundle: &Bundle,
+    options: Options,
+    limits: &Limits,
+    budget: &mut Budget,
+    deadline: &Deadline,
+    finish: impl FnOnce(RawMesh, &mut Context<'_>) -> Result<T, MeshError>,
+) -> Result<T, MeshError> {
     let files = match bundle.files.as_slice() {
         [archive] if bundle.is_zip => unzip::unzip(&archive.bytes, limits, budget, deadline)?,
         [single] if single.bytes.is_empty() => {
@@ -86,16 +142,23 @@ pub fn import(
         // Clones of shared bytes.
         files => files.to_vec(),
     };
-    let (folder, format) = entry::choose(files, bundle.entry.as_deref(), format, deadline)?;
+    let (folder, format) = entry::choose(files, bundle.entry.as_deref(), options.format, deadline)?;
     let bytes = &folder.entry().bytes;
-    let mut cx = Context { limits, budget, deadline, bundle: &folder };
-    let raw = match format {
+    let mut cx = Context { limits, budget, deadline, bundle: &folder, time_s: options.time_s };
+    let mut raw = match format {
         Format::Obj => obj::read(bytes, &mut cx)?,
         Format::StlBinary | Format::StlAscii => stl::read(bytes, &mut cx)?,
         Format::Ply => ply::read(bytes, &mut cx)?,
+        Format::Off => off::read(bytes, &mut cx)?,
+        Format::Fbx => fbx::read(bytes, &mut cx)?,
+        Format::ThreeMf => three_mf::read(&mut cx)?,
         Format::Gltf | Format::Glb => gltf::read(bytes, &mut cx)?,
     };
-    normalise(raw, &mut cx)
+    if options.time_s.is_some() && !matches!(format, Format::Gltf | Format::Glb) {
+        let detail = format!("scene.time_s is given, and {format} files have no animation");
+        raw.report.warnings.push(Warning { code: "animation_missing", detail });
+    }
+    finish(raw, &mut cx)
 }
 
 /// What every importer is given beside the bytes.
@@ -108,6 +171,8 @@ pub struct Context<'a> {
     pub deadline: &'a Deadline,
     /// The files that names in the mesh may mean.
     pub bundle: &'a Folder,
+    /// As [`Options::time_s`].
+    pub time_s: Option<f64>,
 }
 
 impl Context<'_> {

@@ -1,25 +1,30 @@
 //! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
 //!
 //! Reading order: [`bundle`] (what comes in), `folder` (what names in it mean), [`raw`] (what an importer fills), `import` (opens the bundle, sniffs the format
-//! and calls one), `obj`, `stl`, `ply` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`],
+//! and calls one), `obj`, `stl`, `ply`, `off`, `fbx`, `three_mf` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`], [`edges`],
 //! [`topology`] and [`measure`], for whoever needs them.
 
+mod affine;
 mod attributes;
 pub mod bundle;
 mod coarse;
+mod corners;
 mod counted;
 pub mod edges;
 mod entry;
 mod error;
 mod facts;
+mod fbx;
 mod folder;
 mod gltf;
 mod import;
+pub mod loose;
 pub mod material;
 pub mod measure;
 mod normalise;
 pub mod normals;
 mod obj;
+mod off;
 mod ply;
 mod polygon;
 mod pow2;
@@ -27,6 +32,8 @@ pub mod raw;
 mod sets;
 mod sniff;
 mod stl;
+mod text;
+mod three_mf;
 pub mod topology;
 mod unzip;
 mod weld;
@@ -36,7 +43,8 @@ pub use counted::counted;
 pub use error::{MeshError, MeshFault};
 pub use facts::FileFacts;
 pub use folder::Folder;
-pub use import::{Format, import};
+pub use import::{Format, Options, import, survey};
+pub use loose::Loose;
 pub use material::MaterialSlot;
 
 use material::{FileCamera, ImageSource};
@@ -67,6 +75,12 @@ pub struct Mesh {
     pub cameras: Vec<FileCamera>,
     /// Three indices into the attribute arrays a triangle. Empty where there is no attribute at all.
     pub attribute_triangles: Vec<[u32; 3]>,
+    /// Line segments and points, their ends indices into `positions`; none is shorter than 24 bits can tell.
+    pub loose: Vec<Loose>,
+    /// Two indices into the attribute arrays each. Empty where there is no attribute at all.
+    pub loose_attributes: Vec<[u32; 2]>,
+    /// Set once `loose` has been given an area for one view: where what the file has ends in the arrays.
+    pub thickened: Option<Thickened>,
     /// Unit vertex normals of the file; empty where it has none.
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates, (0, 0) the upper left corner of the image and v down; empty where the file has none.
@@ -81,6 +95,29 @@ pub struct Mesh {
     pub up: UpAxis,
     /// What the importer saw, dropped and repaired.
     pub report: ImportReport,
+}
+
+/// How many of a mesh's positions and triangles are the file's own; what follows them draws its lines and points in one view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Thickened {
+    /// Positions of the file.
+    pub positions: usize,
+    /// Triangles of the file.
+    pub triangles: usize,
+}
+
+impl Mesh {
+    /// The file's own positions.
+    pub fn own_positions(&self) -> &[[f32; 3]] {
+        let end = self.thickened.map_or(self.positions.len(), |own| own.positions);
+        self.positions.get(..end).unwrap_or(&self.positions)
+    }
+
+    /// The file's own triangles: these have edges, outlines and a topology.
+    pub fn own_triangles(&self) -> &[[u32; 3]] {
+        let end = self.thickened.map_or(self.triangles.len(), |own| own.triangles);
+        self.triangles.get(..end).unwrap_or(&self.triangles)
+    }
 }
 
 /// `file = centre + scale * unit`. The scale is a power of two, so going there and back rounds nothing.
@@ -123,6 +160,8 @@ pub struct ImportReport {
     pub format: Format,
     /// Vertices in the file, before welding.
     pub file_vertices: u64,
+    /// What the file's meshes say that they have, whether shown, hidden or shown many times; glTF alone.
+    pub content: FileContent,
     /// Polygons in the file: `polygons_by_arity[k]` counts those with `k` corners (12 and more share the last place).
     pub polygons_by_arity: [u64; 13],
     /// Faces dropped because a corner is NaN or infinite.
@@ -132,10 +171,27 @@ pub struct ImportReport {
     /// Faces dropped because welding made two of their corners one: so small beside the whole mesh that 24 bits cannot tell
     /// them apart.
     pub dropped_collapsed_faces: u64,
+    /// Line segments and points dropped: with NaN or infinite ends, or segments without a length.
+    pub dropped_loose: u64,
     /// Things a user should know; each with a stable code.
     pub warnings: Vec<Warning>,
     /// What the file says of itself.
     pub facts: FileFacts,
+}
+
+/// How much the meshes of a file hold by their own account, each counted once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FileContent {
+    /// Parts that are drawn with one material each.
+    pub draw_calls: u64,
+    /// Their vertices.
+    pub vertices: u64,
+    /// Their triangles.
+    pub triangles: u64,
+    /// Their line segments, which are not drawn yet.
+    pub segments: u64,
+    /// Their points, which are not drawn yet.
+    pub points: u64,
 }
 
 /// Something in the file that was read around rather than refused.

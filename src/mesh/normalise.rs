@@ -8,37 +8,40 @@ use super::import::Context;
 use super::pow2::{Pow2, exponent, is_usable, max_abs};
 use super::raw::RawMesh;
 use super::weld::PositionSet;
-use super::{ImportReport, MaterialSlot, Mesh, MeshError, MeshFault, ToFile, counted};
+use super::{ImportReport, Loose, MaterialSlot, Mesh, MeshError, MeshFault, ToFile, counted, loose};
 
 /// Brings an imported mesh into its final form.
 pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshError> {
-    cx.check_triangles(raw.triangles.len() as u64)?;
+    cx.check_triangles(raw.triangles.len() as u64 + loose::triangles(&raw.loose))?;
     cx.budget.spend("the triangles", raw.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
+    cx.budget.spend("lines and points", raw.loose.len() as u64, BYTES_PER_LOOSE)?;
     cx.budget.spend("the welded vertices", raw.positions.len() as u64, BYTES_PER_VERTEX)?;
 
     raw.report.warnings.extend(coarse::warning(&raw));
     cx.deadline.check()?;
+    raw.report.dropped_loose = loose::drop_bad(&mut raw);
     let file_exponent = scale_down(&mut raw);
     let faces = pick_faces(&mut raw);
     cx.deadline.check()?;
-    if faces.is_empty() {
+    if faces.is_empty() && raw.loose.is_empty() {
         return Err(empty(&raw.report));
     }
     let unit_box = UnitBox::around(&raw, &faces);
     let mut mesh = weld(&mut raw, &faces, &unit_box);
     cx.deadline.check()?;
-    if mesh.triangles.is_empty() {
+    if mesh.triangles.is_empty() && mesh.loose.is_empty() {
         return Err(empty(&raw.report));
     }
     mesh.bounds = bounds(&mesh.positions);
     mesh.to_file = unit_box.to_file(file_exponent);
     let Attributes { normals, uvs, colors } = attributes::repair(&mut raw, &mesh);
     if normals.is_empty() && uvs.is_empty() && colors.is_empty() {
-        mesh.attribute_triangles = Vec::new();
+        (mesh.attribute_triangles, mesh.loose_attributes) = (Vec::new(), Vec::new());
     }
     (mesh.normals, mesh.uvs, mesh.colors) = (normals, uvs, colors);
     mesh.materials = raw.materials;
-    let slots = mesh.triangle_materials.iter().copied().max().unwrap_or(0) as usize + 1;
+    let loose = mesh.loose.iter().map(|one| one.material);
+    let slots = mesh.triangle_materials.iter().copied().chain(loose).max().unwrap_or(0) as usize + 1;
     while mesh.materials.len() < slots {
         mesh.materials.push(MaterialSlot::default());
     }
@@ -50,6 +53,8 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshErr
 
 /// A face, its normal, and two index triples, next to those of the raw mesh.
 const BYTES_PER_TRIANGLE: u64 = 20 + 12 + 12 + 12 + 1 + 4;
+/// Its ends among the positions and among the attributes, and its material.
+const BYTES_PER_LOOSE: u64 = 8 + 8 + 4;
 /// A welded position, its place in the raw mesh's map, and its slots in the set while that grows.
 const BYTES_PER_VERTEX: u64 = 12 + 4 + 16;
 
@@ -68,6 +73,9 @@ fn scale_down(raw: &mut RawMesh) -> i32 {
         if corners.iter().all(|p| is_usable(p)) {
             largest = corners.iter().fold(largest, |m, p| m.max(max_abs(p)));
         }
+    }
+    for v in raw.loose.iter().flat_map(|one| one.ends) {
+        largest = largest.max(max_abs(&raw.positions[v as usize]));
     }
     if largest == 0.0 {
         return 0;
@@ -139,16 +147,17 @@ struct UnitBox {
 impl UnitBox {
     fn around(raw: &RawMesh, faces: &[Face]) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for face in faces {
-            for v in raw.triangles[face.triangle as usize] {
-                let p = raw.positions[v as usize];
-                for k in 0..3 {
-                    low[k] = low[k].min(p[k]);
-                    high[k] = high[k].max(p[k]);
-                }
+        let of_faces = faces.iter().flat_map(|face| raw.triangles[face.triangle as usize]);
+        for v in of_faces.chain(raw.loose.iter().flat_map(|one| one.ends)) {
+            let p = raw.positions[v as usize];
+            for k in 0..3 {
+                low[k] = low[k].min(p[k]);
+                high[k] = high[k].max(p[k]);
             }
         }
-        let exponent = exponent(max_abs(&sub(high, low)));
+        let size = max_abs(&sub(high, low));
+        // A single point has no size.
+        let exponent = if size > 0.0 { exponent(size) } else { 0 };
         Self { centre: std::array::from_fn(|k| low[k] * 0.5 + high[k] * 0.5), exponent, down: Pow2::new(-exponent) }
     }
 
@@ -168,7 +177,7 @@ impl UnitBox {
     }
 }
 
-/// Positions numbered in the order of their first use, and the triangles that still have three corners.
+/// Positions numbered in the order of their first use, and the triangles that still have three corners, and segments two ends.
 fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
     const UNSEEN: u32 = u32::MAX;
     let mut mesh = Mesh::default();
@@ -177,15 +186,16 @@ fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
     let mut set = PositionSet::with_capacity(raw.positions.len().min(faces.len() / 2 + 2));
     reserve(&mut mesh, faces.len());
     let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
+    let mut welded = |v: u32| {
+        let known = &mut welded_of_raw[v as usize];
+        if *known == UNSEEN {
+            *known = set.number(unit_box.to_unit(raw.positions[v as usize]));
+        }
+        *known
+    };
     for face in faces {
         let i = face.triangle as usize;
-        let corners = raw.triangles[i].map(|v| {
-            let known = &mut welded_of_raw[v as usize];
-            if *known == UNSEEN {
-                *known = set.number(unit_box.to_unit(raw.positions[v as usize]));
-            }
-            *known
-        });
+        let corners = raw.triangles[i].map(&mut welded);
         if corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0] {
             raw.report.dropped_collapsed_faces += 1;
             continue;
@@ -198,8 +208,19 @@ fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
             mesh.attribute_triangles.push(raw.triangles[i]);
         }
     }
+    for one in &raw.loose {
+        let ends = one.ends.map(&mut welded);
+        if ends[0] == ends[1] && !one.is_point() {
+            raw.report.dropped_loose += 1;
+            continue;
+        }
+        mesh.loose.push(Loose { ends, ..*one });
+        if has_attributes {
+            mesh.loose_attributes.push(one.ends);
+        }
+    }
     mesh.positions = set.positions;
-    if raw.report.dropped_collapsed_faces > 0 {
+    if raw.report.dropped_collapsed_faces + raw.report.dropped_loose > 0 {
         drop_unused(&mut mesh);
     }
     mesh
@@ -212,12 +233,13 @@ fn reserve(mesh: &mut Mesh, faces: usize) {
     mesh.triangle_materials.reserve_exact(faces);
 }
 
-/// A dropped face may have been the only one to use a position.
+/// What was dropped may have been the only one to use a position.
 fn drop_unused(mesh: &mut Mesh) {
     const UNSEEN: u32 = u32::MAX;
     let mut new_of_old = vec![UNSEEN; mesh.positions.len()];
     let mut positions = Vec::with_capacity(mesh.positions.len());
-    for v in mesh.triangles.iter_mut().flatten() {
+    let of_loose = mesh.loose.iter_mut().flat_map(|one| &mut one.ends);
+    for v in mesh.triangles.iter_mut().flatten().chain(of_loose) {
         let new = &mut new_of_old[*v as usize];
         if *new == UNSEEN {
             *new = positions.len() as u32;

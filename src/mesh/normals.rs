@@ -1,4 +1,4 @@
-//! Vertex normals, for meshes that bring none and for hulls.
+//! Vertex normals, for meshes that bring none.
 
 use super::Mesh;
 use std::borrow::Cow;

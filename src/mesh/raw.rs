@@ -1,7 +1,7 @@
 //! What an importer fills in, before normalisation.
 
 use super::material::{FileCamera, ImageSource};
-use super::{ImportReport, MaterialSlot, UpAxis};
+use super::{ImportReport, Loose, MaterialSlot, UpAxis};
 
 /// A mesh as the file has it: file units, f64, nothing welded, nothing dropped.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +22,8 @@ pub struct RawMesh {
     pub edge_masks: Vec<u8>,
     /// Index into `materials`, one a triangle.
     pub triangle_materials: Vec<u32>,
+    /// Line segments and points, by vertex; as checked as the triangles.
+    pub loose: Vec<Loose>,
     /// The file's materials; may be empty if every index above is 0.
     pub materials: Vec<MaterialSlot>,
     /// The images that the materials refer to, still encoded.

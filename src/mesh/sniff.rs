@@ -1,6 +1,6 @@
 //! Which format some bytes are in, from the bytes alone: names and content types lie.
 
-use super::{Format, MeshError, MeshFault, ply, stl};
+use super::{Format, MeshError, MeshFault, fbx, off, ply, stl, text};
 
 /// How far into a text its first telling line may be. Exporters write long comment headers.
 const TEXT_SNIFF_BYTES: usize = 1 << 20;
@@ -16,6 +16,16 @@ pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
     }
     if ply::is_ply(bytes) {
         return Ok(Format::Ply);
+    }
+    if off::is_off(bytes) {
+        return Ok(Format::Off);
+    }
+    if fbx::is_fbx(bytes) {
+        return Ok(Format::Fbx);
+    }
+    // Notepad's "Unicode". Of the text formats, OBJ is the one that people edit.
+    if text::is_utf16(bytes) && looks_like_obj(&text::head(bytes, TEXT_SNIFF_BYTES)) {
+        return Ok(Format::Obj);
     }
     let text = trim_start(bytes);
     if text.starts_with(b"{") {
@@ -49,7 +59,7 @@ pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
 /// The format of a file that lies among others, few of which are meshes. What only resembles a binary STL is one if it
 /// `may_be_stl` by its name.
 pub fn sniff_among_others(bytes: &[u8], may_be_stl: bool) -> Option<Format> {
-    if known_but_unread(bytes).is_some() {
+    if known_but_unread(bytes).is_some() && !text::is_utf16(bytes) {
         return stl::is_exact_binary(bytes).then_some(Format::StlBinary);
     }
     let format = sniff(bytes).ok()?;
@@ -91,12 +101,10 @@ fn is_corner(word: &str) -> bool {
 fn known_but_unread(bytes: &[u8]) -> Option<&'static str> {
     let starts = |magic: &[u8]| bytes.starts_with(magic);
     [
-        (starts(b"OFF") || starts(b"COFF"), "OFF"),
-        (starts(b"Kaydara FBX"), "FBX"),
-        (starts(b"PK\x03\x04"), "a zip file (3MF or a bundle)"),
+        (starts(b"PK\x03\x04"), "a zip archive (a bundle or a 3MF file), inside of another"),
         (starts(b"\x89PNG") || starts(b"\xFF\xD8\xFF") || starts(b"RIFF"), "a picture"),
         (starts(b"BLENDER"), "a Blender file"),
-        (starts(b"\xFF\xFE") || starts(b"\xFE\xFF"), "UTF-16 text"),
+        (starts(b"\xFF\xFE") || starts(b"\xFE\xFF"), "UTF-16 text but not OBJ"),
     ]
     .into_iter()
     .find_map(|(is, name)| is.then_some(name))

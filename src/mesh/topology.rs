@@ -50,15 +50,15 @@ pub struct Topology {
 
 /// The largest of what is held at once: the corners' sets and marks, the faces' sets, sums and flags.
 const BYTES_PER_TRIANGLE: u64 = 3 * (4 + 1) + 4 + 4 + 1;
-/// A vertex' set and count.
+/// A vertex' set and mark.
 const BYTES_PER_VERTEX: u64 = 4 + 1;
 
 impl Topology {
     /// Counts.
     pub fn of(mesh: &Mesh, edges: &EdgeList, budget: &mut Budget, deadline: &Deadline) -> Result<Self, MeshError> {
-        budget.spend("the topology", mesh.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
+        budget.spend("the topology", mesh.own_triangles().len() as u64, BYTES_PER_TRIANGLE)?;
         budget.spend("the topology", mesh.positions.len() as u64, BYTES_PER_VERTEX)?;
-        let components = components(mesh).1;
+        let (_, components, vertices) = components(mesh);
         deadline.check()?;
         let duplicate_faces = duplicates(mesh);
         deadline.check()?;
@@ -79,39 +79,60 @@ impl Topology {
             nonmanifold_vertices,
             duplicate_faces,
             inconsistent_edges: count(|faces, alike| faces == 2 && alike),
-            euler_characteristic: mesh.positions.len() as i64 - edges.edges.len() as i64 + mesh.triangles.len() as i64,
-            is_watertight: edges.is_closed(),
+            euler_characteristic: vertices as i64 - edges.edges.len() as i64 + mesh.own_triangles().len() as i64,
+            is_watertight: !edges.edges.is_empty() && edges.is_closed(),
             is_orientable: surfaces.is_orientable,
-            genus: surfaces.genus().filter(|_| nonmanifold_vertices == 0),
+            genus: surfaces.genus().filter(|_| nonmanifold_vertices == 0 && !edges.edges.is_empty()),
             closed_surfaces: surfaces.closed.into_iter().collect(),
         })
     }
 }
 
-/// Whether every component of a closed mesh has its faces' fronts outside: none encloses a negative volume.
-pub fn is_outward(mesh: &Mesh) -> bool {
+/// Which way the fronts of a closed mesh's faces look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fronts {
+    /// Outwards: no component encloses a negative volume.
+    Outside,
+    /// Inwards: none encloses a positive one.
+    Inside,
+    /// Some so, some so.
+    Mixed,
+}
+
+/// Which way they look, all components of the mesh together.
+pub fn fronts(mesh: &Mesh) -> Fronts {
     let mut sets = components(mesh).0;
     let mut volumes = vec![0.0_f64; mesh.positions.len()];
-    for t in &mesh.triangles {
+    for t in mesh.own_triangles() {
         let [a, b, c] = t.map(|v| mesh.positions[v as usize].map(f64::from));
         let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
         volumes[sets.find(t[0]) as usize] += (a[0] * cross[0] + a[1] * cross[1]) + a[2] * cross[2];
     }
-    volumes.iter().all(|&volume| volume >= 0.0)
+    if volumes.iter().all(|&volume| volume >= 0.0) {
+        Fronts::Outside
+    } else if volumes.iter().all(|&volume| volume <= 0.0) {
+        Fronts::Inside
+    } else {
+        Fronts::Mixed
+    }
 }
 
-/// Vertices that triangles connect, and how many sets they are.
-fn components(mesh: &Mesh) -> (Sets, u64) {
+/// Vertices that triangles connect, how many sets they are, and how many vertices: those of lines and points belong to no face.
+fn components(mesh: &Mesh) -> (Sets, u64, u64) {
     let mut sets = Sets::new(mesh.positions.len());
-    let mut count = mesh.positions.len() as u64;
-    for t in &mesh.triangles {
-        count -= u64::from(sets.unite(t[0], t[1])) + u64::from(sets.unite(t[0], t[2]));
+    let mut is_met = vec![false; mesh.positions.len()];
+    let (mut united, mut vertices) = (0, 0);
+    for t in mesh.own_triangles() {
+        united += u64::from(sets.unite(t[0], t[1])) + u64::from(sets.unite(t[0], t[2]));
+        for v in *t {
+            vertices += u64::from(!std::mem::replace(&mut is_met[v as usize], true));
+        }
     }
-    (sets, count)
+    (sets, vertices - united, vertices)
 }
 
 fn duplicates(mesh: &Mesh) -> u64 {
-    let mut faces = mesh.triangles.clone();
+    let mut faces = mesh.own_triangles().to_vec();
     faces.iter_mut().for_each(|face| face.sort_unstable());
     faces.sort_unstable();
     faces.windows(2).filter(|pair| pair[0] == pair[1]).count() as u64

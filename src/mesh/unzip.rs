@@ -15,6 +15,9 @@ use zip::unstable::read::ZipIterable;
 const LOCAL_HEADER_BYTES: u64 = 30;
 /// Deflate makes at most 258 bytes from two bits: no honest entry is larger than this times its packed form.
 const RATIO_MAX: u64 = 1032;
+/// And no mesh or texture of this size, in bytes, is that much larger: what is was made to fill memory.
+const BOMB_BYTES: u64 = 16 << 20;
+const BOMB_RATIO: u64 = 200;
 
 /// The files of the archive, without what archivers leave in it.
 pub fn unzip(
@@ -34,18 +37,31 @@ pub fn unzip(
     let entries: Vec<_> = directory.files().map_err(unreadable)?.collect::<Result<_, _>>().map_err(unreadable)?;
     check_apart(archive, &entries)?;
 
-    let mut files = Vec::new();
+    // All of them are looked at before the first is unpacked.
+    let (mut files, mut wanted_entries) = (Vec::new(), Vec::new());
     let mut total = 0_u64;
     for entry in entries {
         deadline.check()?;
-        let Some(mut file) = wanted(&entry)? else { continue };
+        let Some(file) = wanted(&entry)? else { continue };
         file.check_new(&files).map_err(|error| broken(error.to_string()))?;
         total = total.saturating_add(entry.size());
         let what = "the size of the zip archive's files, in bytes,";
         limits::check(what, total, limits.bundle_bytes, "--limit-bundle-bytes")?;
-        budget.spend("the files of the zip archive", entry.size(), 1)?;
-        file.bytes = inflate(archive, entry, deadline)?.into();
         files.push(file);
+        wanted_entries.push(entry);
+    }
+    budget.spend("the files of the zip archive", total, 1)?;
+    for (entry, file) in wanted_entries.iter().zip(&files) {
+        if entry.size() > BOMB_BYTES && entry.size() / BOMB_RATIO > entry.compressed_size() {
+            let name = show(&file.path);
+            return Err(broken(format!(
+                "the entry \"{name}\" of the zip archive is more than {BOMB_RATIO} times as large as its packed form, which \
+                 archives of meshes are not; send the file itself"
+            )));
+        }
+    }
+    for (entry, file) in wanted_entries.into_iter().zip(&mut files) {
+        file.bytes = inflate(archive, entry, deadline)?.into();
     }
     Ok(files)
 }

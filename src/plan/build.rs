@@ -1,18 +1,12 @@
 //! Spec and mesh to plan: what each look needs, and what it does not.
 
-use std::borrow::Cow;
-
 use super::parts::Parts;
 use super::skips::{SkipKind, Skips};
-use super::textures::TextureLoader;
-use super::{
-    CornerValues, DrawPlan, Faces, HullOffset, HullPass, LayersPass, PlanError, Projection, SurfacePass, flags, lights,
-    materials, miter, wires,
-};
+use super::{DrawPlan, HullPass, LayersPass, PlanError, Projection, Thickness, build_surface, loose, outline, wires};
 use crate::limits::{Budget, Deadline, LimitExceeded};
-use crate::mesh::{Mesh, normals};
+use crate::mesh::Mesh;
 use crate::scene::camera::{Border, Camera};
-use crate::scene::{Cull, Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
+use crate::scene::{Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
 
 /// Width of an outline in pixels where the request does not say.
 const OUTLINE_PX: f32 = 3.0;
@@ -62,16 +56,21 @@ pub fn build_keeping<'a>(
     let mut edges = wires::Edges::default();
     let lines =
         wires::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, &mut means)?;
-    let surface = surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
-    let welded = surface.as_ref().and_then(|s| s.vertex_normals.as_ref()).filter(|_| mesh.normals.is_empty());
+    let surface = build_surface::surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
     let no_hull = skips.skip(SkipKind::Hull, !parts.has_hull(), "the look has no hull");
-    let welded = welded.map(|n| n.values.clone());
-    let hull = (!no_hull).then(|| hull_pass(mesh, &parts, welded, &projection(&camera, size_px, true)));
+    let hull = match (no_hull, parts.has_hull()) {
+        (true, _) => None,
+        (false, false) => Some(HullPass::default()),
+        (false, true) => Some(outline::hull_pass(
+            mesh,
+            &parts,
+            (&projection(&camera, size_px, true), size_px),
+            &mut edges,
+            &mut means,
+        )?),
+    };
     let layers = layers_pass(&parts, hull.is_some(), &mut skips);
-    let mut roles = parts.roles(mesh, surface.is_some(), layers.as_ref(), hull.is_some());
-    if let Some(HullPass { offset: HullOffset::Px(_), .. }) = hull {
-        miter::leave_out_fronts(mesh, &projection(&camera, size_px, true), roles.to_mut());
-    }
+    let roles = parts.roles(mesh, surface.is_some(), layers.as_ref());
     let unclipped = skips.skip(
         SkipKind::Clipping,
         camera.contains_mesh,
@@ -107,15 +106,15 @@ fn pay(mesh: &Mesh, size_px: [u32; 2], parts: &Parts<'_>, budget: &mut Budget) -
         budget.spend("lists of layers", mesh.triangles.len() as u64, 32)?;
     }
     let is_smooth = parts.looks.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::scene::Shading::Smooth));
-    if parts.has_hull() || (is_smooth && mesh.normals.is_empty()) {
-        // Sums in f64, then the unit normals in f32, perhaps a copy of them, and how far each moves; or where each is on
-        // screen, which way the silhouette goes there and how it turns, in place of the sums.
-        budget.spend("vertex normals", mesh.positions.len() as u64, 76)?;
+    if is_smooth && mesh.normals.is_empty() {
+        // Sums in f64, then the unit normals in f32.
+        budget.spend("vertex normals", mesh.positions.len() as u64, 36)?;
     }
     Ok(())
 }
 
-fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection {
+/// The camera's rows.
+pub fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection {
     let [x, y, z, w] = camera.rows(size_px);
     let [right, up, back] = camera.axes.map(|axis| axis.as_vec3().to_array());
     // In an orthographic view W is 1 and nothing is behind the eye.
@@ -124,15 +123,16 @@ fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection {
 }
 
 /// What the widest outline and the widest line ask for.
-fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
-    let mut border = Border::default();
+pub(super) fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
+    let mut border =
+        Border { px: if mesh.loose.is_empty() { 0.0 } else { 0.5 * loose::POINT_PX }, ..Border::default() };
     for layers in &parts.looks {
         if let Some(outline) = &layers.outline {
             // Half of a contour lies on the surface itself.
             let share = if outline.method == OutlineMethod::Contour { 0.5 } else { 1.0 };
-            match outline_offset(mesh, outline) {
-                HullOffset::Object(grow) => border.grow = border.grow.max(share * f64::from(grow)),
-                HullOffset::Px(px) => border.px = border.px.max(share * f64::from(px)),
+            match thickness(mesh, outline) {
+                Thickness::Object(grow) => border.grow = border.grow.max(share * f64::from(grow)),
+                Thickness::Px(px) => border.px = border.px.max(share * f64::from(px)),
             }
         }
         if let Some(wire) = layers.wire.filter(|wire| wire.method == WireMethod::Exact) {
@@ -145,15 +145,16 @@ fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
     border
 }
 
-fn outline_offset(mesh: &Mesh, outline: &Outline) -> HullOffset {
+/// How far an outline reaches.
+pub fn thickness(mesh: &Mesh, outline: &Outline) -> Thickness {
     match outline.unit {
-        OutlineUnit::Px => HullOffset::Px(outline.thickness.unwrap_or(OUTLINE_PX)),
+        OutlineUnit::Px => Thickness::Px(outline.thickness.unwrap_or(OUTLINE_PX)),
         OutlineUnit::Object => {
             let [low, high] = mesh.bounds;
             let side = (0..3).map(|k| high[k] - low[k]).fold(0.0, f32::max);
-            let thickness = outline.thickness.map(|t| (f64::from(t) / mesh.to_file.scale) as f32);
-            // A hull thicker than the guard band is wide shows nothing but itself.
-            HullOffset::Object(thickness.unwrap_or(OUTLINE_OBJECT_SHARE * side).min(16.0))
+            let asked = outline.thickness.map(|t| (f64::from(t) / mesh.to_file.scale) as f32);
+            // An outline thicker than the guard band is wide shows nothing but itself.
+            Thickness::Object(asked.unwrap_or(OUTLINE_OBJECT_SHARE * side).min(16.0))
         }
     }
 }
@@ -161,108 +162,9 @@ fn outline_offset(mesh: &Mesh, outline: &Outline) -> HullOffset {
 /// Width of a contour in pixels; one in object units is as wide as at the mesh's centre.
 fn contour_px(mesh: &Mesh, outline: &Outline, camera: &Camera, size_px: [u32; 2]) -> f32 {
     const PX_MAX: f32 = 100.0;
-    match outline_offset(mesh, outline) {
-        HullOffset::Px(px) => px.min(PX_MAX),
-        HullOffset::Object(units) => ((f64::from(units) * camera.px_per_unit(size_px)) as f32).min(PX_MAX),
-    }
-}
-
-fn surface_pass<'a>(
-    mesh: &'a Mesh,
-    spec: &Spec,
-    parts: &Parts<'_>,
-    camera: &Camera,
-    edges: &mut wires::Edges,
-    skips: &mut Skips<'_>,
-    means: &mut Means<'_>,
-) -> Result<Option<SurfacePass<'a>>, PlanError> {
-    let is_seen = parts.has_fill() || parts.has_barycentric_wire();
-    let is_needless = !is_seen && !parts.needs_occluder();
-    let why = "the look has no filled surface, and no line that one could hide";
-    if skips.skip(SkipKind::Surface, is_needless, why) {
-        return Ok(None);
-    }
-    let is_shaded = !skips.skip(SkipKind::Shading, !is_seen, "the surface is not seen: it only hides lines");
-    let edge_masks = if parts.has_barycentric_wire() || parts.shows_edge_distance() {
-        wires::edge_masks(mesh, parts, edges, means)?
-    } else {
-        Vec::new()
-    };
-    let mut loader = TextureLoader::new(mesh, means);
-    let mut looks = Vec::with_capacity(mesh.materials.len());
-    let used = used_materials(mesh);
-    for (index, (slot, layers)) in mesh.materials.iter().zip(&parts.layers).enumerate() {
-        loader.for_material(index, used[index]);
-        looks.push(materials::look(mesh, slot, layers, &mut loader)?);
-    }
-    let samples = looks.iter().any(materials::samples);
-    if !skips.skip(SkipKind::Textures, !samples, "nothing samples one") && !samples {
-        for (index, slot) in mesh.materials.iter().enumerate() {
-            loader.for_material(index, used[index]);
-            materials::load_all(slot, &mut loader)?;
-        }
-    }
-    let size_px = [spec.image.width_px, spec.image.height_px];
-    let textures = loader.finish(&projection(camera, size_px, true), skips)?;
-    let is_one = looks.iter().all(|look| *look == looks[0]);
-    let one_material = skips.skip(SkipKind::MaterialIndices, is_one, "every triangle has the same material");
-    if one_material {
-        looks.truncate(1);
-    }
-    let mut pass = SurfacePass {
-        faces: match parts.common_cull() {
-            Cull::None => Faces::Both,
-            Cull::Back => Faces::Front,
-            Cull::Front => Faces::Back,
-        },
-        is_shaded,
-        materials: looks,
-        triangle_materials: if one_material { &[] } else { &mesh.triangle_materials },
-        face_normals: &[],
-        vertex_normals: None,
-        uvs: None,
-        colors: None,
-        edge_masks: Cow::Owned(edge_masks),
-        textures,
-        lights: lights::lights(&spec.light, camera),
-    };
-    attributes(mesh, &mut pass, skips);
-    Ok(Some(pass))
-}
-
-/// Whether any triangle has a material.
-fn used_materials(mesh: &Mesh) -> Vec<bool> {
-    let mut used = vec![false; mesh.materials.len()];
-    for &material in &mesh.triangle_materials {
-        if let Some(used) = used.get_mut(material as usize) {
-            *used = true;
-        }
-    }
-    used
-}
-
-/// Gives the pass the arrays that its materials read.
-fn attributes<'a>(mesh: &'a Mesh, pass: &mut SurfacePass<'a>, skips: &mut Skips<'_>) {
-    let all = pass.all_flags();
-    let reads = |flag: u32| pass.is_shaded && all & flag != 0;
-    let faceless = !reads(flags::FACE_NORMALS);
-    if !skips.skip(SkipKind::FaceNormals, faceless, "no material is lit by them") {
-        pass.face_normals = &mesh.face_normals;
-    }
-    if !skips.skip(SkipKind::VertexNormals, !reads(flags::VERTEX_NORMALS), "no material is shaded smoothly") {
-        let (values, triangles) = normals::smooth(mesh);
-        pass.vertex_normals = Some(CornerValues { values, triangles });
-    }
-    let samples = pass.is_shaded && pass.materials.iter().any(materials::samples);
-    let shows_uvs = pass.materials.iter().any(|m| m.flags & flags::DEBUG == 5 << flags::DEBUG_SHIFT);
-    if !mesh.uvs.is_empty() && !skips.skip(SkipKind::Uvs, !samples && !shows_uvs, "nothing samples a texture") {
-        let values = Cow::Borrowed(mesh.uvs.as_slice());
-        pass.uvs = Some(CornerValues { values, triangles: &mesh.attribute_triangles });
-    }
-    let colorless = !reads(flags::VERTEX_COLORS);
-    if !mesh.colors.is_empty() && !skips.skip(SkipKind::VertexColors, colorless, "no material shows them") {
-        let values = Cow::Borrowed(mesh.colors.as_slice());
-        pass.colors = Some(CornerValues { values, triangles: &mesh.attribute_triangles });
+    match thickness(mesh, outline) {
+        Thickness::Px(px) => px.min(PX_MAX),
+        Thickness::Object(units) => ((f64::from(units) * camera.px_per_unit(size_px)) as f32).min(PX_MAX),
     }
 }
 
@@ -274,34 +176,4 @@ fn layers_pass(parts: &Parts<'_>, has_hull: bool, skips: &mut Skips<'_>) -> Opti
     }
     let empty = LayersPass { count_max: 1, behind_surface: false, wires_only: false, fade: 1.0 };
     Some(needed.unwrap_or(empty))
-}
-
-fn hull_pass<'a>(
-    mesh: &'a Mesh,
-    parts: &Parts<'_>,
-    welded: Option<Cow<'a, [[f32; 3]]>>,
-    projection: &Projection,
-) -> HullPass<'a> {
-    let outline = |m: usize| parts.layers[m].outline.filter(|o| o.method == OutlineMethod::Hull);
-    let offsets: Vec<Option<HullOffset>> =
-        (0..parts.layers.len()).map(|m| outline(m).map(|o| outline_offset(mesh, &o))).collect();
-    let mut colors: Vec<[f32; 4]> =
-        (0..parts.layers.len()).map(|m| outline(m).map_or([0.0; 4], |o| o.color.premultiplied())).collect();
-    let used: Vec<[f32; 4]> = (0..colors.len()).filter(|&m| offsets[m].is_some()).map(|m| colors[m]).collect();
-    let color = used.first().copied().unwrap_or_default();
-    if used.iter().all(|c| *c == color) {
-        colors = vec![color];
-    }
-    let first = offsets.iter().flatten().next().copied().unwrap_or(HullOffset::Px(0.0));
-    let is_px = matches!(first, HullOffset::Px(_));
-    let is_same = offsets.iter().flatten().all(|offset| *offset == first);
-    let mut amounts = if is_same && !is_px { Vec::new() } else { miter::amounts(mesh, &offsets) };
-    // The file's normals may split at hard edges, where a hull that followed them would tear: always the welded ones.
-    let mut normals = welded.unwrap_or_else(|| normals::angle_weighted(mesh).into());
-    if is_px {
-        miter::miter(mesh, projection, &offsets, normals.to_mut(), &mut amounts);
-    }
-    let tells_apart = colors.len() > 1 || (parts.layers_pass().is_some() && mesh.materials.len() > 1);
-    let triangle_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
-    HullPass { colors, normals, offset: first, amounts, triangle_materials }
 }

@@ -17,8 +17,8 @@ pub struct LinePass {
     pub color: [f32; 4],
     /// Which parts of the edges, as the visibility buffer has it.
     pub shown: Shown,
-    /// Whether an edge whose faces all look away can be left out: true for closed surfaces.
-    pub skip_back_edges: bool,
+    /// The side of its faces that a closed surface shows no one: an edge whose faces all show the viewer that one is left out.
+    pub unseen_side: Option<Side>,
     /// Whether only edges of this view's silhouette are drawn: those whose faces all lie on one side of them on screen.
     pub contour: bool,
     /// Whether the surface's light falls on the line; without a surface that is seen there is none, and the colour stays.
@@ -69,6 +69,15 @@ impl DrawPlan<'_> {
     pub fn lights_lines(&self) -> bool {
         self.surface.as_ref().is_some_and(|surface| surface.is_shaded) && self.lines.iter().any(|lines| lines.lit)
     }
+}
+
+/// A side of a face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Where its corners run counter-clockwise.
+    Front,
+    /// Where they run clockwise.
+    Back,
 }
 
 /// Which parts of an edge are drawn.

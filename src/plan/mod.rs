@@ -4,18 +4,23 @@
 //! each omission is written down in [`DrawPlan::skips`].
 
 mod build;
+mod build_surface;
 mod choice;
 mod error;
 mod error_table;
+mod fan;
 mod hull;
 mod lights;
 mod lines;
+mod loose;
 mod materials;
-mod miter;
+mod outline;
 mod parts;
+mod rim;
 mod silhouette;
 mod skips;
 mod surface;
+mod texture_basis;
 mod texture_closeup;
 mod texture_decode;
 mod texture_half;
@@ -28,8 +33,10 @@ mod wires;
 pub use build::{build, build_keeping};
 pub use choice::{Choice, Chosen, choose};
 pub use error::PlanError;
-pub use hull::{HullOffset, HullPass};
-pub use lines::{Edge, LinePass, Shown};
+use hull::Thickness;
+pub use hull::{HullPass, HullVertex};
+pub use lines::{Edge, LinePass, Shown, Side};
+pub use loose::thicken;
 pub use skips::{Skip, SkipKind};
 pub use surface::{
     CornerValues, Lamp, Lights, MaterialLook, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, flags, slots,
@@ -52,9 +59,10 @@ pub struct DrawPlan<'a> {
     pub samples: u32,
     /// Positions in the unit box.
     pub positions: &'a [[f32; 3]],
-    /// Triangles over `positions`. An id in the visibility buffer is an index here, plus `triangles.len()` for the hull.
+    /// Triangles over `positions`. An id in the visibility buffer is an index here, or past them one into
+    /// the hull's.
     pub triangles: &'a [[u32; 3]],
-    /// What each triangle takes part in: bits of [`roles`]. Empty where all are [`roles::SURFACE`] and [`roles::HULL`].
+    /// What each triangle takes part in: bits of [`roles`]. Empty where all are [`roles::SURFACE`].
     pub roles: Cow<'a, [u8]>,
     /// Unit box to screen.
     pub projection: Projection,
@@ -62,7 +70,7 @@ pub struct DrawPlan<'a> {
     pub surface: Option<SurfacePass<'a>>,
     /// What lies over the surface and lets it shine through; None where nothing does.
     pub layers: Option<LayersPass>,
-    /// The pushed-out back faces; None where a look has none.
+    /// The outline around the surface; None where a look has none.
     pub hull: Option<HullPass<'a>>,
     /// Lines of exact width, drawn over all else, in this order.
     pub lines: Vec<LinePass>,
@@ -104,8 +112,6 @@ pub mod roles {
     pub const SURFACE: u8 = 1;
     /// Drawn into the layers, if the plan has layers.
     pub const LAYER: u8 = 2;
-    /// Its back is drawn, pushed out, if the plan has a hull.
-    pub const HULL: u8 = 4;
     /// As surface or layer only where it faces the viewer, whatever [`SurfacePass::faces`](super::SurfacePass) says.
     pub const FRONT_ONLY: u8 = 8;
     /// The same for its other side.
@@ -131,7 +137,7 @@ pub enum Faces {
 ///
 /// Where layers do not go on behind the surface, hull triangles are not in the visibility buffer but in the layers; one adds
 /// nothing (but counts as a layer) where a nearer layer of the same sample belongs to the same material (modulo 32), because a
-/// glass must not show the back of its own outline. Where they do, everything filled is opaque, and so may the hull be.
+/// glass must not show its own outline on its far side. Where they do, everything filled is opaque, and so may the hull be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayersPass {
     /// Layers that are looked for; what lies behind the last of them is not drawn.
@@ -183,7 +189,7 @@ impl<'a> DrawPlan<'a> {
     /// What a triangle takes part in.
     #[inline(always)]
     pub fn role(&self, triangle: usize) -> u8 {
-        self.roles.get(triangle).copied().unwrap_or(roles::SURFACE | roles::HULL)
+        self.roles.get(triangle).copied().unwrap_or(roles::SURFACE)
     }
 
     /// Whether any sample gets a colour.

@@ -73,7 +73,12 @@ impl<'a> Parts<'a> {
         self.has_fill
     }
 
-    /// Whether any part has an inverted hull.
+    /// Whether a part has a hull.
+    pub fn is_outlined(&self, material: usize) -> bool {
+        self.layers.get(material).is_some_and(|layers| has_hull(layers))
+    }
+
+    /// Whether any part has one.
     pub fn has_hull(&self) -> bool {
         self.looks.iter().any(|layers| has_hull(layers))
     }
@@ -129,9 +134,6 @@ impl<'a> Parts<'a> {
         if pass.is_some_and(|pass| pass.wires_only) && wire.is_some_and(|hidden| hidden != Hidden::Hide) {
             role |= roles::LAYER;
         }
-        if has_hull(layers) {
-            role |= roles::HULL;
-        }
         match layers.surface.map_or(Cull::None, |s| s.cull) {
             cull if cull == common => {}
             Cull::None => {}
@@ -149,18 +151,22 @@ impl<'a> Parts<'a> {
     }
 
     /// [`DrawPlan::roles`](super::DrawPlan::roles) of a plan that has these passes.
-    pub fn roles(&self, mesh: &Mesh, surface: bool, pass: Option<&LayersPass>, hull: bool) -> Cow<'static, [u8]> {
+    pub fn roles(&self, mesh: &Mesh, surface: bool, pass: Option<&LayersPass>) -> Cow<'static, [u8]> {
         let common = self.common_cull();
         let by_part: Vec<u8> = (0..self.layers.len()).map(|m| self.role(m, pass, common)).collect();
-        let usual = |role: u8| {
-            (role & roles::SURFACE != 0 || !surface)
-                && (role & roles::HULL != 0 || !hull)
-                && role & (roles::FRONT_ONLY | roles::BACK_ONLY) == 0
-        };
+        let usual =
+            |role: u8| (role & roles::SURFACE != 0 || !surface) && role & (roles::FRONT_ONLY | roles::BACK_ONLY) == 0;
         if pass.is_none() && by_part.iter().all(|&role| usual(role)) {
             return Cow::Borrowed(&[]);
         }
-        mesh.triangle_materials.iter().map(|&m| by_part.get(m as usize).copied().unwrap_or(roles::SURFACE)).collect()
+        let own = mesh.own_triangles().len();
+        let role = |m: u32| by_part.get(m as usize).copied().unwrap_or(roles::SURFACE);
+        let mut all: Vec<u8> = mesh.triangle_materials.iter().map(|&m| role(m)).collect();
+        for role in all.iter_mut().skip(own) {
+            // Lines and points face the viewer.
+            *role &= roles::SURFACE | roles::LAYER;
+        }
+        all.into()
     }
 }
 

@@ -2,16 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use super::Edge;
 use super::parts::{Fill, Parts};
+use super::{Edge, Side};
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
+use crate::mesh::topology::{Fronts, fronts};
+use crate::scene::{Cull, Layers};
 
 /// Contours' edges. Of an edge's faces only those count that are drawn.
 pub struct Silhouettes<'a> {
     mesh: &'a Mesh,
-    /// Parts that are not drawn while others are.
+    /// Parts that are not drawn while others are, and have no hull either.
     absent: Vec<bool>,
     /// All faces of the edges that have more than two.
     crowded: BTreeMap<u32, Vec<u32>>,
@@ -24,7 +26,8 @@ impl<'a> Silhouettes<'a> {
         budget.spend("edges of many faces", list.further_faces.len() as u64, 100)?;
         budget.spend("materials", parts.layers.len() as u64, 1)?;
         let has_fill = parts.has_fill();
-        let absent = (0..parts.layers.len()).map(|m| has_fill && parts.fill(m) == Fill::None).collect();
+        let is_absent = |m: usize| has_fill && parts.fill(m) == Fill::None && !parts.is_outlined(m);
+        let absent = (0..parts.layers.len()).map(is_absent).collect();
         let mut crowded: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for &[edge, face] in &list.further_faces {
             let first_two = list.edges[edge as usize].faces;
@@ -96,4 +99,19 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
+}
+
+/// The side that is seen of no face: inside a closed surface, all of which is drawn from outside and lets nothing through.
+pub fn unseen_side(mesh: &Mesh, parts: &Parts<'_>, list: &EdgeList) -> Option<Side> {
+    let covers = if parts.has_fill() { Fill::Opaque } else { Fill::None };
+    if (0..parts.layers.len()).any(|m| parts.fill(m) != covers) || !list.is_closed() {
+        return None;
+    }
+    let (unseen, culled) = match fronts(mesh) {
+        Fronts::Outside => (Side::Back, Cull::Front),
+        Fronts::Inside => (Side::Front, Cull::Back),
+        Fronts::Mixed => return None,
+    };
+    let is_drawn = |layers: &&Layers| layers.surface.is_none_or(|s| s.cull != culled);
+    parts.layers.iter().all(is_drawn).then_some(unseen)
 }

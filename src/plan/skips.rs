@@ -18,7 +18,7 @@ pub enum SkipKind {
     Surface,
     /// Colours of a surface that only hides lines.
     Shading,
-    /// Pushed-out back faces.
+    /// Outlines around surfaces.
     Hull,
     /// Transparent layers and their blending.
     Layers,

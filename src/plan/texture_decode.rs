@@ -6,6 +6,7 @@
 use std::io::{BufRead, Cursor, Seek};
 
 use super::PlanError;
+use super::texture_basis::{self, BasisHeader, KTX2_MAGIC};
 use super::texture_png::Essentials;
 use crate::image::srgb_to_linear;
 use ::image::{ColorType, ImageDecoder, ImageFormat, ImageReader, ImageResult, Limits};
@@ -14,13 +15,22 @@ use ::image::{ColorType, ImageDecoder, ImageFormat, ImageReader, ImageResult, Li
 #[derive(Clone, Copy, Debug)]
 pub struct Header {
     /// How it is encoded.
-    pub format: ImageFormat,
+    encoding: Encoding,
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
     /// Memory that decoding takes, the result included.
     pub decoding_bytes: u64,
+}
+
+/// How an image is encoded.
+#[derive(Clone, Copy, Debug)]
+enum Encoding {
+    /// As pictures are.
+    Picture(ImageFormat),
+    /// As textures are.
+    Basis(BasisHeader),
 }
 
 /// Decoded pixels as the file has them.
@@ -49,13 +59,20 @@ const ALLOWANCE_BYTES: u64 = 4 << 20;
 
 /// Reads what is needed to know the size, and no more. `name` is for errors.
 pub fn header(name: &str, bytes: &[u8]) -> Result<Header, PlanError> {
-    let format = sniff(bytes)
-        .ok_or_else(|| PlanError::Texture(format!("{name} of the mesh is neither a PNG, a JPEG nor a WebP image")))?;
+    if bytes.starts_with(KTX2_MAGIC) {
+        let basis = texture_basis::header(name, bytes)?;
+        let BasisHeader { width, height, decoding_bytes } = basis;
+        return Ok(Header { encoding: Encoding::Basis(basis), width, height, decoding_bytes });
+    }
+    let format = sniff(bytes).ok_or_else(|| {
+        PlanError::Texture(format!("{name} of the mesh is neither a PNG, a JPEG, a WebP nor a KTX2 image"))
+    })?;
+    let encoding = Encoding::Picture(format);
     let decoder = match (open(bytes, format, ALLOWANCE_BYTES), png_size(bytes)) {
         (Ok(decoder), _) => decoder,
         // A row alone is more than the decoder may have: whoever asked knows how large a texture may be.
         (Err(::image::ImageError::Limits(_)), Some([width, height])) if format == ImageFormat::Png => {
-            return Ok(Header { format, width, height, decoding_bytes: u64::MAX });
+            return Ok(Header { encoding, width, height, decoding_bytes: u64::MAX });
         }
         (Err(error), _) => return Err(broken(name, &error)),
     };
@@ -66,13 +83,20 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<Header, PlanError> {
     // Beside the result, JPEG keeps coefficients of 16 bits, WebP its planes, and both a copy of the input.
     let times = if format == ImageFormat::Png { 1 } else { 4 };
     let decoding_bytes = decoder.total_bytes().saturating_mul(times).saturating_add(bytes.len() as u64);
-    Ok(Header { format, width, height, decoding_bytes })
+    Ok(Header { encoding, width, height, decoding_bytes })
 }
 
 /// Decodes; the caller has paid for it.
 pub fn decode(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, PlanError> {
+    let format = match &header.encoding {
+        Encoding::Picture(format) => *format,
+        Encoding::Basis(basis) => {
+            let bytes = texture_basis::decode(name, bytes, basis)?;
+            return Ok(Pixels { width: basis.width, height: basis.height, channels: 4, is_wide: false, bytes });
+        }
+    };
     let limit_bytes = header.decoding_bytes.saturating_add(ALLOWANCE_BYTES);
-    let decoder = open(bytes, header.format, limit_bytes).map_err(|error| broken(name, &error))?;
+    let decoder = open(bytes, format, limit_bytes).map_err(|error| broken(name, &error))?;
     let (width, height) = decoder.dimensions();
     let (channels, is_wide) = match decoder.color_type() {
         ColorType::L8 => (1, false),

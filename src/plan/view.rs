@@ -1,13 +1,13 @@
 //! Whether a picture can show anything of its mesh.
 
-use super::{DrawPlan, HullOffset};
+use super::DrawPlan;
 
 /// Whether each triangle lies behind the eye or wholly beyond one side of the picture: an explicit camera may look past the mesh.
 ///
 /// Where it says so the picture is blank; a mesh that is missed by a hair may go unnoticed.
 pub fn is_out_of_view(plan: &DrawPlan<'_>) -> bool {
-    // How far a hull in units of the mesh reaches, is not known here.
-    let has_hull = plan.hull.as_ref().is_some_and(|hull| matches!(hull.offset, HullOffset::Object(_)));
+    // Of a hull there is only what may be in the picture.
+    let has_hull = plan.hull.as_ref().is_some_and(|hull| !hull.triangles.is_empty());
     let p = &plan.projection;
     if has_hull || plan.triangles.is_empty() {
         return false;
@@ -26,12 +26,7 @@ pub fn is_out_of_view(plan: &DrawPlan<'_>) -> bool {
     })
 }
 
-/// How far lines and a hull in pixels are drawn beside the mesh at most, and more.
+/// How far lines are drawn beside the mesh at most, and more.
 fn reach_px(plan: &DrawPlan<'_>) -> f32 {
-    let lines = plan.lines.iter().map(|lines| lines.width_px + lines.smoothing_px);
-    let hull = plan.hull.as_ref().and_then(|hull| match hull.offset {
-        HullOffset::Px(px) => Some(hull.amounts.iter().fold(px, |most, amount| most.max(*amount))),
-        HullOffset::Object(_) => None,
-    });
-    lines.chain(hull).fold(1.0, f32::max)
+    plan.lines.iter().map(|lines| lines.width_px + lines.smoothing_px).fold(1.0, f32::max)
 }

@@ -3,15 +3,14 @@
 use std::sync::Arc;
 
 use super::build::Means;
-use super::parts::{FADE, Fill, Parts};
-use super::silhouette::Silhouettes;
+use super::parts::{FADE, Parts};
+use super::silhouette::{Silhouettes, unseen_side};
 use super::skips::{SkipKind, Skips};
-use super::{Edge, LinePass, PlanError, Shown};
+use super::{Edge, LinePass, PlanError, Shown, Side};
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge, NO_FACE};
-use crate::mesh::topology::is_outward;
 use crate::scene::color::Rgba;
-use crate::scene::{Cull, Hidden, Outline, OutlineMethod, Spec, Topology, Wire, WireEdges, WireMethod};
+use crate::scene::{Hidden, Outline, OutlineMethod, Spec, Topology, Wire, WireEdges, WireMethod};
 
 /// How much wider than the polygons' edges those that tell of a fault are.
 const FAULT_WIDTH: f32 = 2.5;
@@ -47,7 +46,8 @@ enum Class {
 pub struct Edges(Option<EdgeList>);
 
 impl Edges {
-    fn of(&mut self, mesh: &Mesh, means: &mut Means<'_>) -> Result<&EdgeList, PlanError> {
+    /// All of them.
+    pub fn of(&mut self, mesh: &Mesh, means: &mut Means<'_>) -> Result<&EdgeList, PlanError> {
         let list = match self.0.take() {
             Some(list) => list,
             None => {
@@ -74,13 +74,17 @@ pub fn passes(
     wants.extend(spec.topology.iter().flat_map(topology_wants));
     wants.extend(contour_wants(parts, contour_px));
     wants.retain(|want| want.width_px + want.smoothing_px > 0.0 && want.color[3] > 0.0);
-    if skips.skip(SkipKind::Adjacency, wants.is_empty(), "no line asks which triangles are neighbours") {
+    if skips.skip(
+        SkipKind::Adjacency,
+        wants.is_empty() && !parts.has_hull(),
+        "no line asks which triangles are neighbours",
+    ) {
         return Ok(Vec::new());
     }
     let list = edges.of(mesh, means)?;
     let hides = parts.has_fill() || parts.needs_occluder();
-    let skip_back =
-        hides && is_outside && wants.iter().any(|w| w.hidden == Hidden::Hide) && is_solid(mesh, parts, list);
+    let may_skip = hides && is_outside && wants.iter().any(|w| w.hidden == Hidden::Hide);
+    let unseen_side = if may_skip { unseen_side(mesh, parts, list) } else { None };
     let silhouettes = match wants.iter().any(|want| want.contour) {
         true => Some(Silhouettes::new(mesh, parts, list, means.budget)?),
         false => None,
@@ -96,19 +100,13 @@ pub fn passes(
         means.deadline.check()?;
         means.budget.spend("drawn edges", edges.len() as u64, 16)?;
         if !edges.is_empty() {
-            passes.extend(want.passes(&edges, hides, skip_back));
+            let drawn = want.passes(&edges, hides, unseen_side);
+            // In the lists of up to four bands of the picture.
+            means.budget.spend("lists of edges", (drawn.len() * edges.len()) as u64, 16)?;
+            passes.extend(drawn);
         }
     }
     Ok(passes)
-}
-
-/// Whether what looks away is hidden: on a closed surface, its fronts outside, all of which is drawn and lets nothing through.
-fn is_solid(mesh: &Mesh, parts: &Parts<'_>, list: &EdgeList) -> bool {
-    let mut all = 0..parts.layers.len();
-    let covers = if parts.has_fill() { Fill::Opaque } else { Fill::None };
-    all.all(|m| parts.fill(m) == covers && parts.layers[m].surface.is_none_or(|s| s.cull != Cull::Front))
-        && list.is_closed()
-        && is_outward(mesh)
 }
 
 /// Premultiplied, opacity included.
@@ -126,14 +124,18 @@ pub fn edge_masks(
     let classes: Vec<Class> =
         parts.layers.iter().map(|layers| layers.wire.as_ref().map_or(Class::All, class_of)).collect();
     let is_polygonal = mesh.edge_masks.iter().any(|&mask| mask != 0b111);
-    if classes.iter().all(|class| *class == Class::All || (*class == Class::Polygon && !is_polygonal)) {
+    let own = mesh.own_triangles().len();
+    let is_all = own == mesh.triangles.len();
+    if is_all && classes.iter().all(|class| *class == Class::All || (*class == Class::Polygon && !is_polygonal)) {
         return Ok(Vec::new());
     }
     means.budget.spend("edge masks", mesh.triangles.len() as u64, 1)?;
     let class_at = |t: usize| classes.get(mesh.triangle_materials[t] as usize).copied().unwrap_or(Class::All);
     let mut masks: Vec<u8> = (0..mesh.triangles.len())
         .map(|t| match class_at(t) {
-            Class::All => 0b111,
+            // Lines and points have no edges.
+            Class::All if t < own => 0b111,
+            Class::All => 0,
             Class::Polygon => mesh.edge_masks[t],
             _ => 0,
         })
@@ -249,14 +251,14 @@ impl Want {
         (self.looks.is_empty() || faces.any(|face| self.looks[look(face)])) && is_of(self.class, mesh, edge)
     }
 
-    fn passes(&self, edges: &Arc<[Edge]>, hides: bool, skip_back: bool) -> Vec<LinePass> {
+    fn passes(&self, edges: &Arc<[Edge]>, hides: bool, unseen_side: Option<Side>) -> Vec<LinePass> {
         let pass = |shown, color| LinePass {
             edges: edges.clone(),
             width_px: self.width_px,
             smoothing_px: self.smoothing_px,
             color,
             shown,
-            skip_back_edges: skip_back && self.hidden == Hidden::Hide,
+            unseen_side: unseen_side.filter(|_| self.hidden == Hidden::Hide),
             contour: self.contour,
             lit: self.lit,
         };

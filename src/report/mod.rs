@@ -33,6 +33,7 @@ pub struct Report {
     polygons: u64,
     /// How many polygons have 3, 4, ... corners; the last place holds all larger ones.
     polygons_by_arity: Vec<Arity>,
+    /// Segments.
     lines: u64,
     points: u64,
     /// Names; empty where a material has none.
@@ -58,6 +59,7 @@ pub struct Report {
     dropped_nonfinite_faces: u64,
     dropped_degenerate_faces: u64,
     dropped_collapsed_faces: u64,
+    dropped_loose: u64,
     warnings: Vec<WarningReport>,
 }
 
@@ -133,6 +135,8 @@ impl Report {
         let arities = import.polygons_by_arity.iter().enumerate().filter(|&(_, &count)| count > 0);
         let warnings = import.warnings.iter();
         let measures = Measures::of(mesh);
+        // What is drawn of them, or what the file says that it has.
+        let loose = |is_point| mesh.loose.iter().filter(|one| one.is_point() == is_point).count() as u64;
         Self {
             format: import.format.name(),
             generator,
@@ -143,12 +147,12 @@ impl Report {
             meshes,
             primitives,
             file_vertices: import.file_vertices,
-            positions: mesh.positions.len() as u64,
-            triangles: mesh.triangles.len() as u64,
+            positions: mesh.own_positions().len() as u64,
+            triangles: mesh.own_triangles().len() as u64,
             polygons: import.polygons_by_arity.iter().sum(),
             polygons_by_arity: arities.map(|(corners, &count)| Arity { corners, count }).collect(),
-            lines,
-            points,
+            lines: lines.max(loose(false)),
+            points: points.max(loose(true)),
             materials: mesh.materials.iter().map(|m| m.name.clone()).collect(),
             textures: mesh.images.iter().map(texture).collect(),
             animations,
@@ -167,6 +171,7 @@ impl Report {
             dropped_nonfinite_faces: import.dropped_nonfinite_faces,
             dropped_degenerate_faces: import.dropped_degenerate_faces,
             dropped_collapsed_faces: import.dropped_collapsed_faces,
+            dropped_loose: import.dropped_loose,
             warnings: warnings.map(|w| WarningReport { code: w.code, detail: w.detail.clone() }).collect(),
         }
     }

@@ -20,6 +20,8 @@ pub struct Draft {
     pub look: Look,
     /// The topology layer, if it is on.
     pub topology: Option<Topology>,
+    /// See [`Spec::time_s`].
+    pub time_s: Option<f64>,
     /// See [`Spec::camera`].
     pub camera: CameraSpec,
     /// See [`Spec::light`]; but for the ambient share.
@@ -44,6 +46,7 @@ impl Draft {
         Self {
             look: Look::new(style),
             topology: (style == Style::Topology).then(default_topology),
+            time_s: None,
             camera: CAMERA,
             light: Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3 },
             ambient: None,
@@ -68,8 +71,19 @@ impl Draft {
 
     /// Settles what depends on several keys. Each material has a name.
     pub fn finish(self, materials: Vec<(String, Look)>) -> Result<Spec, RequestError> {
-        let Self { look, topology, camera, mut light, ambient, image, backend, max_error, max_time_ms, mut open } =
-            self;
+        let Self {
+            look,
+            topology,
+            time_s,
+            camera,
+            mut light,
+            ambient,
+            image,
+            backend,
+            max_error,
+            max_time_ms,
+            mut open,
+        } = self;
         open.wire = look.has_open_wire();
         open.material_wires = materials.iter().map(|(_, look)| look.has_open_wire()).collect();
         let is_asked = max_error.is_some() || max_time_ms.is_some();
@@ -84,7 +98,7 @@ impl Draft {
         check_camera(&camera)?;
         let has_lamps = light.preset != LightPreset::None;
         light.ambient = ambient.unwrap_or(if has_lamps { 0.3 } else { 1.0 });
-        Ok(Spec { layers, materials, topology, camera, light, image, backend, ask })
+        Ok(Spec { layers, materials, topology, time_s, camera, light, image, backend, ask })
     }
 }
 

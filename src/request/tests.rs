@@ -101,6 +101,7 @@ fn every_key_reaches_its_field() {
                  "feature_angle_deg":45,"hidden":"show"},
         "outline": {"method":"contour","color":"#fff","thickness":3,"unit":"px"},
         "topology": {"polygon":null,"crease":"#00f","open":"#0f0","nonmanifold":null,"crease_angle_deg":60,"thickness":2},
+        "scene": {"time_s":1.25},
         "camera": {"view":"top","azimuth_deg":10,"elevation_deg":-20,"projection":"orthographic","fov_deg":50,
                    "height":2.5,"up":"-z","margin":0.1,"eye":[1,2,3],"target":[0,0,0.5]},
         "light": {"preset":"three-point","direction":[0,-1,0.5],"intensity":2,"ambient":0.1},
@@ -130,6 +131,7 @@ fn every_key_reaches_its_field() {
     assert_eq!((topology.crease, topology.open), (Rgba::parse("#00f"), Rgba::parse("#0f0")));
     assert_eq!((topology.crease_angle_deg, topology.thickness), (60.0, 2.0));
     assert_eq!((spec.light.preset, spec.light.direction), (LightPreset::ThreePoint, Some([0.0, -1.0, 0.5])));
+    assert_eq!(spec.time_s, Some(1.25));
     let camera = spec.camera;
     assert_eq!((camera.view, camera.up, camera.height), (View::Top, Some(UpAxis::NegZ), Some(2.5)));
     assert_eq!((camera.azimuth_deg, camera.elevation_deg), (Some(10.0), Some(-20.0)));
@@ -193,7 +195,7 @@ fn null_is_the_default_or_as_if_the_key_were_not_there() {
         }
         query(&[(key, "null")]).unwrap_or_else(|error| panic!("{error}"));
     }
-    assert_eq!(keys.len(), 59);
+    assert_eq!(keys.len(), 60);
     for document in [r#"{"style":null}"#, r#"{"camera":null,"light":null,"image":null}"#, r#"{"materials":null}"#] {
         assert_eq!(json(document).unwrap(), json("{}").unwrap(), "{document}");
     }

@@ -153,7 +153,7 @@ impl Extents {
 }
 
 fn positions(mesh: &Mesh, axes: [DVec3; 3]) -> impl Iterator<Item = DVec3> {
-    mesh.positions.iter().map(move |p| {
+    mesh.own_positions().iter().map(move |p| {
         let p = DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
         DVec3::new(axes[0].dot(p), axes[1].dot(p), axes[2].dot(p))
     })

@@ -166,7 +166,7 @@ pub enum OutlineUnit {
 /// How an outline is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OutlineMethod {
-    /// An inverted hull: the back faces, pushed out, in one colour.
+    /// What an inverted hull is for: a border around the surface, in one colour, that what lies before it hides.
     Hull,
     /// The true silhouette and boundary edges, as lines of exact width.
     Contour,

@@ -17,6 +17,8 @@ pub struct Spec {
     pub materials: Vec<(String, Layers)>,
     /// Edges that say how the mesh hangs together, if any.
     pub topology: Option<Topology>,
+    /// The moment of the file's first animation, seconds; None: the file as its animations find it.
+    pub time_s: Option<f64>,
     /// Where from.
     pub camera: CameraSpec,
     /// Lit how.

@@ -67,8 +67,9 @@ fn outlines_and_faces_are_measured_too() {
         match scene.family {
             Family::Outlines => {
                 let (contour, hull) = (rmse(Technique::Contour), rmse(Technique::Hull));
-                assert!(contour < 20.0 && contour < hull, "{contour}, {hull}");
-                // A hull's strip is where it should be, but narrower at the corners of teeth.
+                // A hull's border is as its samples have it; and between the teeth it stays behind those beside it, where a flat strip
+                // would lie over them.
+                assert!(contour < 20.0 && contour < hull && hull < 48.0, "{contour}, {hull}");
                 let ink = [Technique::Contour, Technique::Hull].map(|technique| at(technique).ink.unwrap());
                 assert!((ink[0] - 1.0).abs() < 0.02 && (0.8..1.05).contains(&ink[1]), "{ink:?}");
             }

@@ -32,7 +32,7 @@ pub fn line_plan<'a>(positions: &'a [[f32; 3]], edges: &[[u32; 2]], width_px: f3
         smoothing_px: 0.0,
         color: [1.0; 4],
         shown: Shown::All,
-        skip_back_edges: false,
+        unseen_side: None,
         contour: false,
         lit: false,
     };

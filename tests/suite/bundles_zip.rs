@@ -10,27 +10,27 @@ use crate::server::{CUBE_OBJ, Server};
 
 /// An entry of an archive made by hand, which may lie.
 #[derive(Clone)]
-struct Raw {
-    name: Vec<u8>,
-    packed: Vec<u8>,
-    size: u32,
-    crc: u32,
-    method: u16,
-    flags: u16,
-    mode: u32,
+pub struct Raw {
+    pub name: Vec<u8>,
+    pub packed: Vec<u8>,
+    pub size: u32,
+    pub crc: u32,
+    pub method: u16,
+    pub flags: u16,
+    pub mode: u32,
     /// Where the directory says that it begins, instead of where it does.
-    start: Option<u32>,
+    pub start: Option<u32>,
 }
 
 impl Raw {
-    fn stored(name: &str, bytes: &[u8]) -> Self {
+    pub fn stored(name: &str, bytes: &[u8]) -> Self {
         let crc = crc32(bytes);
         let (name, packed, size) = (name.into(), bytes.to_vec(), bytes.len() as u32);
         Self { name, packed, size, crc, method: 0, flags: 0, mode: 0o100_644, start: None }
     }
 
     /// Deflated as an honest archiver does it.
-    fn deflated(name: &str, bytes: &[u8]) -> Self {
+    pub fn deflated(name: &str, bytes: &[u8]) -> Self {
         let archive = zipped(&[("x", bytes)]);
         let length = u32::from_le_bytes(archive[18..22].try_into().unwrap()) as usize;
         let start = 30 + 1 + usize::from(u16::from_le_bytes([archive[28], archive[29]]));
@@ -40,7 +40,7 @@ impl Raw {
     }
 }
 
-fn crc32(bytes: &[u8]) -> u32 {
+pub fn crc32(bytes: &[u8]) -> u32 {
     let step = |crc: u32, &byte: &u8| {
         (0..8).fold(crc ^ u32::from(byte), |c, _| if c & 1 == 1 { c >> 1 ^ 0xEDB8_8320 } else { c >> 1 })
     };
@@ -48,7 +48,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 }
 
 /// An archive of such entries, whose end says that there are `count`.
-fn archive(entries: &[Raw], count: u16) -> Vec<u8> {
+pub fn archive(entries: &[Raw], count: u16) -> Vec<u8> {
     let (mut out, mut directory) = (Vec::new(), Vec::new());
     for raw in entries {
         let start = raw.start.unwrap_or(out.len() as u32);
@@ -161,7 +161,7 @@ fn dishonest_archives_are_refused_for_what_they_are() {
             archive(&[Raw::stored("a.png", b"\x89PNG"), Raw::stored("b.txt", b"b")], 2),
             "\"a.png\", \"b.txt\"",
         ),
-        ("3MF", archive(&[Raw::stored("3D/3dmodel.model", b"<?xml"), Raw::stored("_rels/.rels", b"<")], 2), "3MF"),
+        ("3MF", archive(&[Raw::stored("3D/3dmodel.model", b"<?xml"), Raw::stored("b.txt", b"<")], 2), "3dmodel.model"),
     ];
     for (name, bytes, part) in nothing {
         let (fault, detail) = fault(bytes, &Limits::default());

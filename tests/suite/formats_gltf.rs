@@ -1,17 +1,8 @@
 //! glTF: primitive modes, accessor encodings, the node tree, buffers, extensions.
 
-use crate::mesh_files::{Gltf, read};
+use crate::mesh_files::{Gltf, corners, read};
 use meshsnap::mesh::{Mesh, MeshFault};
 use serde_json::{Value, json};
-
-/// The corners of all triangles in file space.
-fn corners(mesh: &Mesh) -> Vec<[[f64; 3]; 3]> {
-    let at = |v: u32| {
-        let p = mesh.positions[v as usize];
-        std::array::from_fn(|k| mesh.to_file.centre[k] + mesh.to_file.scale * f64::from(p[k]))
-    };
-    mesh.triangles.iter().map(|t| t.map(at)).collect()
-}
 
 /// Six points that make a zigzag band.
 const BAND: [f32; 18] = [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.5, 1.0, 1.0, 0.0, 2.0, 0.0, 0.25, 2.0, 1.0, 0.0];
@@ -61,21 +52,30 @@ fn lists_strips_and_fans() {
 #[test]
 fn every_component_type_and_normalisation() {
     let square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]];
+    let build = |component: u32, bytes: usize, one: i64, normalised: bool| {
+        let mut gltf = Gltf::default();
+        // A multiple of 4 bytes an element, as vertices are aligned.
+        let element = |c: &[i64; 3]| -> Vec<u8> {
+            let mut out: Vec<u8> = c.iter().flat_map(|c| (c * one).to_le_bytes()[..bytes].to_vec()).collect();
+            out.resize(out.len().next_multiple_of(4), 0);
+            out
+        };
+        let data: Vec<u8> = square.iter().flat_map(element).collect();
+        let position = gltf.accessor("VEC3", component, 4, &data);
+        gltf.json["accessors"][position]["normalized"] = normalised.into();
+        gltf.json["bufferViews"][0]["byteStride"] = (data.len() / 4).into();
+        let index = gltf.accessor("SCALAR", 5121, 6, &[0, 1, 2, 0, 2, 3]);
+        gltf.mesh(json!({ "attributes": { "POSITION": position }, "indices": index }));
+        gltf.json["nodes"] = json!([{ "mesh": 0 }]);
+        gltf
+    };
     let mut cases = 0;
-    for (component, bytes, largest) in
-        [(5120, 1, 127), (5121, 1, 255), (5122, 2, 32767), (5123, 2, 65535), (5125, 4, u32::MAX)]
-    {
+    for (component, bytes, largest) in [(5120, 1, 127), (5121, 1, 255), (5122, 2, 32767), (5123, 2, 65535)] {
         for normalised in [false, true] {
-            let mut gltf = Gltf::default();
-            let one = if normalised { largest } else { 100 };
-            let data: Vec<u8> =
-                square.iter().flatten().flat_map(|c| (c * one).to_le_bytes()[..bytes].to_vec()).collect();
-            let position = gltf.accessor("VEC3", component, 4, &data);
-            gltf.json["accessors"][position]["normalized"] = normalised.into();
-            let index = gltf.accessor("SCALAR", 5121, 6, &[0, 1, 2, 0, 2, 3]);
-            gltf.mesh(json!({ "attributes": { "POSITION": position }, "indices": index }));
-            gltf.json["nodes"] = json!([{ "mesh": 0 }]);
-            gltf.json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+            let mut gltf = build(component, bytes, if normalised { largest } else { 100 }, normalised);
+            let error = read(&gltf.glb()).unwrap_err();
+            assert!(error.detail.contains("KHR_mesh_quantization"), "{error}");
+            gltf.json["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
             let mesh = read(&gltf.glb()).unwrap();
             let side = if normalised { 1.0 } else { 100.0 };
             assert_eq!(corners(&mesh)[0][2][..2], [side; 2], "{component} {normalised}");
@@ -83,14 +83,23 @@ fn every_component_type_and_normalisation() {
             cases += 1;
         }
     }
+    // What no extension allows.
+    for (component, normalised) in [(5125, false), (5125, true), (5126, true), (5124, false)] {
+        let mut gltf = build(component, 4, 1, normalised);
+        gltf.json["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
+        assert_eq!(read(&gltf.glb()).unwrap_err().fault, MeshFault::Broken, "{component}");
+        cases += 1;
+    }
     // Signed ones reach down to -1, which the lowest value would exceed.
     let mut gltf = Gltf::default();
-    let low = gltf.accessor("VEC3", 5120, 3, &[0x80, 0, 0, 0x7f, 0, 0, 0, 0x7f, 0]);
+    let low = gltf.accessor("VEC3", 5120, 3, &[0x80, 0, 0, 9, 0x7f, 0, 0, 9, 0, 0x7f, 0, 9]);
     gltf.json["accessors"][low]["normalized"] = true.into();
+    gltf.json["bufferViews"][0]["byteStride"] = 4.into();
+    gltf.json["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
     gltf.mesh(json!({ "attributes": { "POSITION": low } }));
     gltf.json["nodes"] = json!([{ "mesh": 0 }]);
     assert_eq!(corners(&read(&gltf.glb()).unwrap())[0], [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
-    assert_eq!(cases, 10);
+    assert_eq!(cases, 12);
 }
 
 #[test]
@@ -209,6 +218,9 @@ fn materials_and_colours() {
     let rgb = gltf.accessor("VEC3", 5121, 6, &[255; 18]);
     let rgba: Vec<u16> = (0..24).map(|i| if i % 4 == 0 { 65535 } else { 0 }).collect();
     let rgba = gltf.shorts("VEC4", &rgba);
+    for accessor in [rgb, rgba] {
+        gltf.json["accessors"][accessor]["normalized"] = true.into();
+    }
     gltf.json["materials"] =
         json!([{ "name": "Glass", "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.25, 0, 0.5] } }, {}]);
     gltf.json["meshes"] = json!([{ "primitives": [
@@ -226,4 +238,24 @@ fn materials_and_colours() {
     assert_eq!((color(0), color(4), color(9)), ([1.0; 4], [1.0, 0.0, 0.0, 0.0], [1.0; 4]));
     gltf.json["meshes"][0]["primitives"][0]["material"] = 2.into();
     assert_eq!(read(&gltf.glb()).unwrap_err().fault, MeshFault::Broken);
+}
+
+#[test]
+fn what_is_not_drawn_is_counted() {
+    let mut gltf = Gltf::default();
+    let p = gltf.floats("VEC3", &BAND);
+    let i = gltf.shorts("SCALAR", &[0, 1, 2, 3, 4]);
+    let of = |mode: usize, indices: Option<usize>| json!({ "attributes": { "POSITION": p }, "mode": mode, "indices": indices });
+    let all: Vec<Value> = (0..7).flat_map(|mode| [of(mode, None), of(mode, Some(i))]).collect();
+    gltf.json["meshes"] = json!([{ "primitives": all }]);
+    // Shown twice, and counted once.
+    gltf.json["nodes"] = json!([{ "mesh": 0, "children": [1] }, { "mesh": 0 }]);
+    let mesh = read(&gltf.glb()).unwrap();
+    let content = mesh.report.content;
+    assert_eq!((content.draw_calls, content.vertices), (14, 14 * 6));
+    assert_eq!(content.points, 6 + 5);
+    assert_eq!(content.segments, (3 + 2) + (6 + 5) + (5 + 4));
+    assert_eq!(content.triangles, (2 + 1) + (4 + 3) + (4 + 3));
+    let codes: Vec<&str> = mesh.report.warnings.iter().map(|w| w.code).collect();
+    assert_eq!(codes, ["points_ignored", "lines_ignored"]);
 }

@@ -26,6 +26,13 @@ fn counts_are_paid_before_they_are_believed() {
     let mut empty = triangle();
     empty.json["accessors"][0] = json!({ "type": "VEC3", "componentType": 5126, "count": 4_000_000_000_000_u64 });
     is_limit(&empty.glb());
+    // The same, with a sparse part that replaces as many as it says.
+    for replaced in [1, 4_000_000_000_000_u64] {
+        let mut sparse = empty.clone();
+        sparse.json["accessors"][0]["sparse"] = json!({ "count": replaced, "indices": { "bufferView": 0, "componentType": 5125 },
+                                                        "values": { "bufferView": 0 } });
+        is_limit(&sparse.glb());
+    }
     // Twice as many nodes a level: 2^40 triangles in 2 kB.
     let mut doubling = triangle();
     let mut nodes = vec![json!({ "mesh": 0 })];

@@ -210,10 +210,9 @@ fn what_can_be_read_around_is() {
         let trailing = format!("what comes after the last PLY element is ignored (bytes: {trailing})");
         assert_eq!(details(&bytes), [short, &trailing]);
 
-        let points = vertices(encoding).bytes();
-        let error = read(&points).unwrap_err();
-        let expected =
-            "the PLY file has nothing to draw: 3 vertices and 0 faces; points are not drawn (points in the file: 3)";
+        let nothing = Ply::new(encoding).element("vertex", &XYZ, &[]).bytes();
+        let error = read(&nothing).unwrap_err();
+        let expected = "the PLY file has nothing to draw: 0 vertices and 0 faces";
         assert_eq!((error.fault, error.detail.as_str()), (MeshFault::Empty, expected));
     }
     assert_eq!(read(b"ply\nformat ascii 1.0\nend_header\n").unwrap_err().fault, MeshFault::Empty);
@@ -223,26 +222,27 @@ fn what_can_be_read_around_is() {
 fn shared_files_have_their_known_counts() {
     let Some(models) = folder("models") else { return };
     let Some(corpus) = folder("corpus/emptyIO") else { return };
-    let read_at = |path: std::path::PathBuf| read(&std::fs::read(path).unwrap());
-    let mesh = read_at(models.join("cube_blender_uv.ply")).unwrap();
+    let read_at = |path: std::path::PathBuf| read(&std::fs::read(path).unwrap()).unwrap();
+    let mesh = read_at(models.join("cube_blender_uv.ply"));
     assert_eq!((mesh.report.file_vertices, mesh.positions.len(), mesh.triangles.len()), (24, 8, 12));
     assert_eq!((mesh.report.polygons_by_arity[4], mesh.normals.len(), mesh.uvs.len()), (6, 24, 24));
-    let mesh = read_at(models.join("featuretype.ply")).unwrap();
+    let mesh = read_at(models.join("featuretype.ply"));
     assert_eq!((mesh.report.file_vertices, mesh.triangles.len(), mesh.normals.len()), (5096, 3476, 5096));
-    let stl = read_at(models.join("featuretype.STL")).unwrap();
+    let stl = read_at(models.join("featuretype.STL"));
     assert_eq!((mesh.positions.len(), mesh.report.warnings.len()), (stl.positions.len(), 0));
-    let points = [
+    let clouds = [
         (models.join("points_ascii.ply"), 5),
         (models.join("points_bin.ply"), 5),
         (corpus.join("ply_points_ascii.ply"), 8),
         (corpus.join("ply_points_bin.ply"), 8),
-        (corpus.join("ply_empty_ascii.ply"), 0),
-        (corpus.join("ply_empty_bin.ply"), 0),
-        (corpus.join("ply_empty_header.ply"), 0),
     ];
-    for (path, count) in points {
-        let error = read_at(path.clone()).unwrap_err();
-        assert_eq!(error.fault, MeshFault::Empty, "{}", path.display());
-        assert!(error.detail.contains(&format!("{count} vertices and 0 faces")), "{error}");
+    for (path, count) in clouds {
+        let mesh = read_at(path.clone());
+        assert_eq!((mesh.loose.len(), mesh.triangles.len()), (count, 0), "{}", path.display());
+    }
+    for name in ["ply_empty_ascii.ply", "ply_empty_bin.ply", "ply_empty_header.ply"] {
+        let error = read(&std::fs::read(corpus.join(name)).unwrap()).unwrap_err();
+        assert_eq!(error.fault, MeshFault::Empty, "{name}");
+        assert!(error.detail.contains("0 vertices and 0 faces"), "{error}");
     }
 }

@@ -7,7 +7,7 @@ use meshsnap::backend::cpu::{CpuRenderer, Isa};
 use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::image::{Image, srgb8_thresholds};
 use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, Faces, HullOffset, LayersPass, MaterialLook, SurfacePass, flags, roles};
+use meshsnap::plan::{DrawPlan, Faces, LayersPass, MaterialLook, SurfacePass, flags, roles};
 
 use crate::likeness::{Likeness, Tolerance};
 use crate::soups::{KINDS, Kind, Random, Soup, View};
@@ -44,7 +44,6 @@ struct Layered {
     soup: Soup,
     roles: Vec<u8>,
     materials: Vec<u32>,
-    amounts: Vec<f32>,
 }
 
 impl Layered {
@@ -52,9 +51,7 @@ impl Layered {
         let kinds = [
             roles::LAYER,
             roles::LAYER,
-            roles::LAYER | roles::HULL,
             roles::SURFACE,
-            roles::SURFACE | roles::HULL,
             roles::SURFACE | roles::LAYER,
             roles::LAYER | roles::FRONT_ONLY,
             roles::LAYER | roles::BACK_ONLY,
@@ -63,8 +60,7 @@ impl Layered {
         ];
         let roles = soup.triangles.iter().map(|_| kinds[random.below(kinds.len())]).collect();
         let materials = soup.triangles.iter().map(|_| random.below(5) as u32).collect();
-        let amounts = soup.positions.iter().map(|_| 0.06 * random.signed().abs()).collect();
-        Self { soup, roles, materials, amounts }
+        Self { soup, roles, materials }
     }
 
     fn plan(&self, view: &View, pass: LayersPass) -> DrawPlan<'_> {
@@ -77,11 +73,8 @@ impl Layered {
         }
         if let Some(hull) = &mut plan.hull {
             hull.colors = (0..5).map(|m| [0.0, 0.02 * m as f32, 0.1, 1.0]).collect();
-            hull.triangle_materials = &self.materials;
-            hull.amounts = match hull.offset {
-                HullOffset::Object(_) => self.amounts.clone(),
-                HullOffset::Px(_) => self.amounts.iter().map(|v| 80.0 * v).collect(),
-            };
+            hull.surface_materials = &self.materials;
+            hull.triangle_materials = self.materials.iter().flat_map(|&m| [m; 2]).collect();
         }
         plan
     }
@@ -122,7 +115,7 @@ fn compare(plan: &DrawPlan<'_>, what: &str) -> usize {
 fn layers_of_soups_are_the_same() {
     let mut random = Random(0xABCD_EF01_2345);
     let (mut cases, mut seen) = (0, 0);
-    let hulls = [None, Some(HullOffset::Object(0.03)), Some(HullOffset::Px(3.0))];
+    let hulls = [None, Some(0.0), Some(3.0)];
     for kind in KINDS {
         for samples in [1, 4, 8, 16] {
             // From the side, from afar, and from within, where triangles reach behind the eye.
@@ -130,7 +123,7 @@ fn layers_of_soups_are_the_same() {
                 let count = if kind == Kind::Tiny { 400 } else { 30 };
                 let soup = Layered::new(Soup::new(kind, count, 0.7, &mut random), &mut random);
                 let view = View::new([90, 70], samples, distance, &mut random);
-                let view = View { hull: hulls[cases % 3], ..view };
+                let view = View { hull_px: hulls[cases % 3], ..view };
                 let pass = LayersPass { behind_surface: cases % 4 == 3, ..PASS };
                 seen += compare(&soup.plan(&view, pass), &format!("{kind:?} {samples} {distance}"));
                 cases += 1;
@@ -162,8 +155,8 @@ fn pictures_with_layers_agree() {
         for samples in [1, 4, 8, 16] {
             for distance in [3.0, 0.4] {
                 let soup = Layered::new(Soup::new(kind, 40, 0.7, &mut random), &mut random);
-                let hull = [None, Some(HullOffset::Px(2.0)), Some(HullOffset::Object(0.03))][(cases / 2) % 3];
-                let view = View { hull, ..View::new([120, 90], samples, distance, &mut random) };
+                let hull_px = [None, Some(2.0), Some(0.0)][(cases / 2) % 3];
+                let view = View { hull_px, ..View::new([120, 90], samples, distance, &mut random) };
                 let through = i % 3 == 2;
                 let pass = LayersPass {
                     count_max: 1 + random.below(16) as u32,

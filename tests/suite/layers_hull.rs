@@ -85,7 +85,8 @@ fn glass_shows_the_outlines_of_others_behind_it() {
     let shown = draw(&plan, "another's outline behind glass");
     let mut merged = scenes::plan(&mesh, &spec);
     if let Some(hull) = &mut merged.hull {
-        hull.triangle_materials = &[];
+        hull.surface_materials = &[];
+        hull.triangle_materials = Vec::new();
     }
     let hidden = draw(&merged, "its own outline behind glass");
     let darker = shown.rgba.chunks(4).zip(hidden.rgba.chunks(4)).filter(|(a, b)| a[3] > b[3] + 20).count();

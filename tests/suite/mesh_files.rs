@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::{Bundle, Format, Mesh, MeshError, import};
+use meshsnap::mesh::{Bundle, Format, Mesh, MeshError, Options, import};
 use serde_json::{Value, json};
 
 /// Imports with default limits.
@@ -18,6 +18,40 @@ pub fn read_as(bytes: &[u8], format: Option<Format>) -> Result<Mesh, MeshError> 
 /// Imports with limits.
 pub fn read_limited(bytes: &[u8], format: Option<Format>, limits: &Limits) -> Result<Mesh, MeshError> {
     import(&Bundle::of_one(bytes.to_vec()), format, limits, &mut Budget::new(limits), &Deadline::default())
+}
+
+/// Imports at a moment of the file's first animation.
+pub fn read_at(bytes: &[u8], time_s: f64) -> Result<Mesh, MeshError> {
+    let (limits, options) = (Limits::default(), Options { format: None, time_s: Some(time_s) });
+    import(&Bundle::of_one(bytes.to_vec()), options, &limits, &mut Budget::new(&limits), &Deadline::default())
+}
+
+/// The corners of all triangles in file space.
+pub fn corners(mesh: &Mesh) -> Vec<[[f64; 3]; 3]> {
+    let at = |v: u32| {
+        let p = mesh.positions[v as usize];
+        std::array::from_fn(|k| mesh.to_file.centre[k] + mesh.to_file.scale * f64::from(p[k]))
+    };
+    mesh.triangles.iter().map(|t| t.map(at)).collect()
+}
+
+/// Sets the value at a place of a document, whether there is one already or not.
+pub fn set(json: &mut Value, place: &str, value: Value) {
+    let (parent, key) = place.rsplit_once('/').unwrap();
+    match json.pointer_mut(parent).unwrap() {
+        Value::Array(list) => list[key.parse::<usize>().unwrap()] = value,
+        object => object[key] = value,
+    }
+}
+
+/// Fails where two meshes have not the same triangles, within a distance.
+pub fn assert_close(a: &Mesh, b: &Mesh, tolerance: f64) {
+    let (a, b) = (corners(a), corners(b));
+    assert_eq!(a.len(), b.len());
+    let coordinates = |triangles: &[[[f64; 3]; 3]]| triangles.iter().flatten().flatten().copied().collect::<Vec<f64>>();
+    for (a, b) in coordinates(&a).into_iter().zip(coordinates(&b)) {
+        assert!((a - b).abs() <= tolerance, "{a} is not {b}");
+    }
 }
 
 /// Polygons over positions that f32 and short decimals hold exactly.
@@ -187,6 +221,7 @@ fn components(kind: &str) -> usize {
         "SCALAR" => 1,
         "VEC2" => 2,
         "VEC3" => 3,
+        "MAT4" => 16,
         _ => 4,
     }
 }

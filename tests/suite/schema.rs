@@ -43,7 +43,7 @@ fn the_schema_is_valid_and_describes_every_key() {
         assert!(property["description"].as_str().is_some_and(|text| text.ends_with('.')), "{key}: {property}");
         described += 1;
     }
-    assert_eq!(described, 65);
+    assert_eq!(described, 66);
 }
 
 /// Documents that are understood.
@@ -51,6 +51,8 @@ const GOOD: &[&str] = &[
     "{}",
     r#"{"max_error":0.001}"#,
     r#"{"image":{"max_error":255,"max_time_ms":86400000}}"#,
+    r#"{"scene":{"time_s":0}}"#,
+    r#"{"scene":{"time_s":null}}"#,
     r#"{"style":"topology"}"#,
     r##"{"surface":{"shading":"smooth","normals":"derivative","color":"#c8ccd2","metallic":0,"roughness":0.6,
         "emissive":"#000","opacity":1,"textures":true,"cull":"back","debug":"edge-distance"}}"##,
@@ -109,6 +111,8 @@ const BAD: &[&str] = &[
     r#"{"image":{"max_error":256}}"#,
     r#"{"image":{"max_time_ms":-1}}"#,
     r#"{"max_time_ms":1}"#,
+    r#"{"scene":{"time_s":-1}}"#,
+    r#"{"scene":{"time":1}}"#,
     r#"{"surface":true}"#,
     r#"{"surface":[]}"#,
     r#"{"surface":{"metalic":1}}"#,
@@ -168,7 +172,7 @@ fn the_schema_and_the_reader_are_of_one_mind() {
         assert!(request::read(Some(document.as_bytes()), &[], &rules()).is_err(), "the reader takes {document}");
         assert!(!complaints(&validator, document).is_empty(), "the schema takes {document}");
     }
-    assert_eq!((GOOD.len(), BAD.len()), (44, 55));
+    assert_eq!((GOOD.len(), BAD.len()), (46, 57));
 }
 
 /// Documents made at random from pieces of both kinds: as many as both refuse or take; none where they differ.

@@ -1,8 +1,6 @@
 //! Random triangles to disagree about, and how they are looked at.
 
-use std::borrow::Cow;
-
-use meshsnap::plan::{DrawPlan, Faces, HullOffset, HullPass, MaterialLook, Projection, SurfacePass};
+use meshsnap::plan::{DrawPlan, Faces, HullPass, HullVertex, MaterialLook, Projection, SurfacePass};
 
 /// xorshift64*: the tests must draw the same soups everywhere.
 pub struct Random(pub u64);
@@ -111,15 +109,31 @@ impl Soup {
         DrawPlan {
             samples: view.samples,
             surface: view.surface.map(flat_surface),
-            hull: view.hull.map(|offset| HullPass {
-                colors: vec![[0.0, 0.0, 0.0, 1.0]],
-                normals: Cow::Borrowed(&self.normals),
-                offset,
-                amounts: Vec::new(),
-                triangle_materials: &[],
-            }),
+            hull: view.hull_px.map(|px| self.hull(view, px)),
             background: [1.0; 4],
             ..DrawPlan::new([view.width, view.height], &self.positions, &self.triangles, view.projection)
+        }
+    }
+}
+
+impl Soup {
+    /// For each triangle one between its first edge and a corner pushed out, and one of three that are pushed out.
+    fn hull(&self, view: &View, px: f32) -> HullPass<'static> {
+        let row = |r: &[f32; 4], p: [f32; 3]| ((r[0] * p[0] + r[1] * p[1]) + r[2] * p[2]) + r[3];
+        let projection = &view.projection;
+        let pushed = self.positions.iter().zip(&self.normals).map(|(&p, n)| {
+            let w = row(&projection.w, p).max(projection.near_w);
+            let at = |r, n: f32| (row(r, p) / w + 256.0 * px * n).clamp(-1e6, 1e6).round() as i32;
+            let z = row(&projection.z, p) / w * (1.0 + 0.01 * n[2]);
+            HullVertex { x: at(&projection.x, n[0]), y: at(&projection.y, n[1]), z, inv_w: 1.0 / w }
+        });
+        let count = self.positions.len() as u32;
+        let both = |t: &[u32; 3]| [[t[0], t[1], count + t[2]], t.map(|v| count + v)];
+        HullPass {
+            colors: vec![[0.0, 0.0, 0.0, 1.0]],
+            vertices: pushed.collect(),
+            triangles: self.triangles.iter().flat_map(both).collect(),
+            ..HullPass::default()
         }
     }
 }
@@ -136,7 +150,8 @@ pub struct View {
     pub samples: u32,
     pub projection: Projection,
     pub surface: Option<Faces>,
-    pub hull: Option<HullOffset>,
+    /// How far the hull's own corners lie from the mesh's.
+    pub hull_px: Option<f32>,
 }
 
 impl View {
@@ -160,7 +175,7 @@ impl View {
             screen_up: up,
             screen_right: right,
         };
-        Self { width: size[0], height: size[1], samples, projection, surface: Some(Faces::Both), hull: None }
+        Self { width: size[0], height: size[1], samples, projection, surface: Some(Faces::Both), hull_px: None }
     }
 }
 

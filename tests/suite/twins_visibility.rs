@@ -4,7 +4,7 @@ use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, Faces, HullOffset, sample_offsets};
+use meshsnap::plan::{DrawPlan, Faces, sample_offsets};
 
 use crate::soups::{KINDS, Kind, Random, Soup, View};
 use crate::twins::gpus;
@@ -68,14 +68,14 @@ fn visibility_with_faces_and_hulls_is_the_same() {
     }
     let mut random = Random(77);
     let (mut cases, mut seen) = (0, 0);
-    let hulls = [None, Some(HullOffset::Object(0.05)), Some(HullOffset::Px(3.0))];
+    let hulls = [None, Some(0.0), Some(3.0)];
     for surface in [None, Some(Faces::Both), Some(Faces::Front), Some(Faces::Back)] {
-        for hull in hulls {
+        for hull_px in hulls {
             for distance in [0.0, 0.4, 3.0] {
                 let soup = Soup::new(Kind::Mixed, 300, 0.7, &mut random);
                 let view = View::new([200, 150], 4, distance, &mut random);
-                let view = View { surface, hull, ..view };
-                seen += compare(&soup.plan(&view), &format!("{surface:?} {hull:?} {distance}"));
+                let view = View { surface, hull_px, ..view };
+                seen += compare(&soup.plan(&view), &format!("{surface:?} {hull_px:?} {distance}"));
                 cases += 1;
             }
         }
@@ -147,8 +147,8 @@ fn plans_with_nothing_to_draw_are_background() {
     let alone = Soup { positions: vec![[0.0; 3]], normals: vec![[0.0, 0.0, 1.0]], triangles: vec![[0, 0, 0]] };
     let mut cases = 0;
     for soup in [&empty, &alone] {
-        for (surface, hull) in [(None, None), (Some(Faces::Both), None), (None, Some(HullOffset::Px(1.0)))] {
-            let view = View { surface, hull, ..View::new([33, 7], 4, 3.0, &mut random) };
+        for (surface, hull_px) in [(None, None), (Some(Faces::Both), None), (None, Some(1.0))] {
+            let view = View { surface, hull_px, ..View::new([33, 7], 4, 3.0, &mut random) };
             let plan = soup.plan(&view);
             let mut renderer = GpuRenderer::new(gpus[0].clone());
             let image = renderer.draw(&plan, &Deadline::default()).unwrap();

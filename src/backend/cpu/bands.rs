@@ -6,11 +6,10 @@ use super::isa::dispatch;
 use super::layers::{self, LayerBand};
 use super::light::Light;
 use super::lines::{LineDrawer, LineTarget};
-use super::resolve::resolve;
 use super::samples::SampleBand;
 use super::scratch::BandScratch;
 use super::visibility::{self, Nearest, Setup};
-use super::{Stages, line_light, shade};
+use super::{Stages, line_light, resolve, shade};
 use crate::plan::LinePass;
 
 /// Triangles or edges between two looks at the deadline: at most some 10 ms of triangles, however large each is. Edges of wide
@@ -25,13 +24,14 @@ pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: u
     scratch.colors.clear();
     scratch.colors.resize(pixels, [0.0; 4]);
     if let Some(pass) = plan.layers() {
-        let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples));
+        let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples, scratch.rows));
         layers::draw(stages, pass, (&bins.layers, band), &scratch.samples, layers, &mut scratch.colors);
     } else if plan.is_shaded() {
         shade_band(isa, stages, &scratch.samples, &mut scratch.colors);
     }
-    draw_lines(stages, scratch, bins, band, pixels);
-    resolve(plan, stages.srgb, &scratch.colors, &scratch.coverage, &scratch.light, rgba);
+    resolve::lay_over_background(plan, &mut scratch.colors);
+    draw_lines(stages, scratch, bins, band);
+    resolve::encode(stages.srgb, &scratch.colors, rgba);
 }
 
 /// Draws band number `band` of the visibility buffer alone, as [`Renderer::draw_visibility`](super::Renderer) says.
@@ -52,30 +52,31 @@ pub fn draw_layer(
 ) {
     fill_samples(stages, scratch, bins, band);
     if let Some(pass) = stages.plan.layers() {
-        let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples));
+        let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples, scratch.rows));
         let found = layers::find(stages, pass, (&bins.layers, band), &scratch.samples, layers, layer);
-        for_each_sample(&scratch.samples, words, |at| found[at]);
+        for_each_sample(&layers.found, words, |at| found[at]);
     }
 }
 
-/// Finds how much of each pixel the lines of each pass cover, and their light.
-fn draw_lines(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, pixels: usize) {
+/// Lays the lines of each pass over the colours, one pass after the other: what they need is the same however many there are.
+fn draw_lines(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
     let plan = stages.plan;
-    scratch.owners.clear();
-    scratch.owners.resize(if plan.lights_lines() { pixels } else { 0 }, 0);
-    scratch.coverage.clear();
+    let pixels = scratch.colors.len();
     for (pass, bins) in plan.lines.iter().zip(&bins.edges) {
+        if bins.iter().all(|chunk| chunk.items_in(band).next().is_none()) {
+            continue;
+        }
+        let lit_pixels = if pass.lit && plan.lights_lines() { pixels } else { 0 };
         scratch.ink.clear();
         scratch.ink.resize(pixels, Ink::default());
+        scratch.owners.clear();
+        scratch.owners.resize(lit_pixels, 0);
         let target = &mut LineTarget { ink: &mut scratch.ink, owners: &mut scratch.owners };
         draw_edges(stages.isa, stages, pass, bins, band, &scratch.samples, target);
-        let peak = pass.peak();
-        scratch.coverage.extend(scratch.ink.iter().map(|ink| ink.coverage(peak)));
-    }
-    scratch.light.clear();
-    if plan.lights_lines() {
-        scratch.light.resize(pixels, Light::NONE);
+        scratch.light.clear();
+        scratch.light.resize(lit_pixels, Light::NONE);
         line_light::light_lines(stages, &scratch.samples, &scratch.owners, &mut scratch.light);
+        resolve::lay_lines(pass, &scratch.ink, &scratch.light, &mut scratch.colors);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Where a point lies in its triangle. Twin of `shaders/barycentric.wgsl`.
 
 use super::Stages;
-use super::transform::{ScreenVertex, homogeneous, hull_position, recip};
+use super::transform::{ScreenVertex, homogeneous, recip};
 use crate::plan::DrawPlan;
 
 /// A corner relative to the shaded point: homogeneous (x, y, w), and the factor that its barycentric takes besides.
@@ -139,15 +139,8 @@ impl Quad {
 }
 
 impl Stages<'_> {
-    /// Unit-box corners of a triangle of the surface or the hull, and their vertex indices.
+    /// Unit-box corners of a triangle of the surface, and their vertex indices.
     pub(super) fn positions_of(&self, id: u32) -> [([f32; 3], u32); 3] {
-        let (triangle, is_hull) = self.triangle(id);
-        triangle.map(|v| {
-            let position = self.plan.positions[v as usize];
-            match &self.plan.hull {
-                Some(hull) if is_hull => (hull_position(hull, position, v as usize), v),
-                _ => (position, v),
-            }
-        })
+        self.triangle(id).map(|v| (self.plan.positions[v as usize], v))
     }
 }

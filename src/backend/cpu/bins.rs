@@ -10,11 +10,14 @@ use super::transform::{ScreenVertex, homogeneous};
 use super::visibility::{area, axis_bounds, is_wanted};
 use super::{CHUNK, Stages, contour};
 use crate::limits::Stopped;
-use crate::plan::{DrawPlan, Faces, LinePass, roles};
+use crate::plan::{DrawPlan, Faces, HullPass, LinePass, roles};
 
-/// What touches more bands than this is listed once for all of them, or large triangles on a tall picture would take
-/// gigabytes of lists.
+/// A triangle that touches as many bands is listed once for all of them, or large ones on a tall picture would take gigabytes
+/// of lists.
 const TALL_BANDS: usize = 8;
+
+/// The same for edges, whose lists are a line pass's own.
+const TALL_EDGE_BANDS: usize = 4;
 
 /// What each band has to draw, chunk by chunk in ascending order.
 pub struct Bins {
@@ -43,15 +46,17 @@ pub struct Bin {
     by_band: Vec<Vec<u32>>,
     /// Items that touch many bands, with the first and last.
     tall: Vec<(u32, [u32; 2])>,
+    /// How many bands are many.
+    tall_bands: usize,
 }
 
 impl Bin {
-    fn new(bands: usize) -> Self {
-        Self { by_band: vec![Vec::new(); bands], tall: Vec::new() }
+    fn new(bands: usize, tall_bands: usize) -> Self {
+        Self { by_band: vec![Vec::new(); bands], tall: Vec::new(), tall_bands }
     }
 
     fn push(&mut self, item: u32, [first, last]: [usize; 2]) {
-        if last - first >= TALL_BANDS {
+        if last - first >= self.tall_bands {
             self.tall.push((item, [first as u32, last as u32]));
             return;
         }
@@ -85,19 +90,19 @@ impl TriangleBin {
     }
 }
 
-/// Sorts the plan's triangles and edges into bands of `rows`; triangles also into those to which they are as close as
-/// `margin` rows.
+/// Sorts the plan's triangles and edges into bands of `rows`; triangles of the visibility buffer also into those to which they
+/// are as close as `margin` rows.
 pub fn bin(stages: &Stages<'_>, pool: Option<&rayon::ThreadPool>, [rows, margin]: [u32; 2]) -> Result<Bins, Stopped> {
     let plan = stages.plan;
     let (base, layers) = passes(plan);
-    let bin_all = |passes: Vec<Pass>| {
+    let bin_all = |passes: Vec<Pass>, margin: u32| {
         let jobs = passes.into_iter().flat_map(Pass::chunks).collect();
         map(pool, jobs, |pass| match stages.deadline.check() {
             Ok(()) => bin_triangles(stages, [rows, margin], &pass),
             Err(Stopped) => TriangleBin::default(),
         })
     };
-    let (triangles, layers) = (bin_all(base), bin_all(layers));
+    let (triangles, layers) = (bin_all(base, margin), bin_all(layers, 0));
     let bin_pass = |pass: &LinePass| {
         map(pool, chunks(0..pass.edges.len()).collect(), |range| match stages.deadline.check() {
             Ok(()) => bin_edges(stages, pass, rows, range),
@@ -112,8 +117,7 @@ pub fn bin(stages: &Stages<'_>, pool: Option<&rayon::ThreadPool>, [rows, margin]
 /// Triangles that are drawn for the same reason.
 struct Pass {
     ids: Range<usize>,
-    /// Added to a triangle's index to get its id.
-    id_base: usize,
+    /// The role that triangles must have; of a hull's none.
     role: u8,
     faces: Faces,
 }
@@ -126,10 +130,12 @@ impl Pass {
     /// Which faces of a triangle are drawn; None where it has another role.
     #[inline(always)]
     fn faces_of(&self, plan: &DrawPlan<'_>, id: usize) -> Option<Faces> {
-        match plan.roles.get(id - self.id_base) {
+        if self.role == 0 {
+            return Some(self.faces);
+        }
+        match plan.roles.get(id) {
             None => Some(self.faces),
             Some(role) if role & self.role == 0 => None,
-            _ if self.role == roles::HULL => Some(self.faces),
             Some(role) if role & roles::FRONT_ONLY != 0 => Some(Faces::Front),
             Some(role) if role & roles::BACK_ONLY != 0 => Some(Faces::Back),
             _ => Some(self.faces),
@@ -140,9 +146,9 @@ impl Pass {
 /// What goes into the visibility buffer, and what into the layers.
 fn passes(plan: &DrawPlan<'_>) -> (Vec<Pass>, Vec<Pass>) {
     let count = plan.triangles.len();
-    let surface = |role| plan.surface.as_ref().map(|s| Pass { ids: 0..count, id_base: 0, role, faces: s.faces });
-    let pushed = Pass { ids: count..2 * count, id_base: count, role: roles::HULL, faces: Faces::Back };
-    let hull = plan.hull.as_ref().map(|_| pushed);
+    let surface = |role| plan.surface.as_ref().map(|s| Pass { ids: 0..count, role, faces: s.faces });
+    let around = |hull: &HullPass<'_>| Pass { ids: count..count + hull.triangles.len(), role: 0, faces: Faces::Both };
+    let hull = plan.hull.as_ref().map(around);
     // Without roles, nothing is a layer.
     let layer = surface(roles::LAYER).filter(|_| plan.layers().is_some() && !plan.roles.is_empty());
     let (base_hull, layered_hull) = if plan.has_layered_hull() { (None, hull) } else { (hull, None) };
@@ -162,7 +168,11 @@ fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
 fn bin_triangles(stages: &Stages<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBin {
     let plan = stages.plan;
     let bands = band_count(plan, rows[0]);
-    let mut bin = TriangleBin { whole: Bin::new(bands), pieces: Vec::new(), piece_bands: Bin::new(bands) };
+    let mut bin = TriangleBin {
+        whole: Bin::new(bands, TALL_BANDS),
+        pieces: Vec::new(),
+        piece_bands: Bin::new(bands, TALL_BANDS),
+    };
     for id in pass.ids.clone() {
         let Some(faces) = pass.faces_of(plan, id) else { continue };
         let vertices = stages.screen_triangle(id as u32);
@@ -179,7 +189,7 @@ fn bin_triangles(stages: &Stages<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBi
 
 fn bin_clipped(stages: &Stages<'_>, rows: [u32; 2], id: u32, faces: Faces, bin: &mut TriangleBin) {
     let plan = stages.plan;
-    if !plan.projection.clip {
+    if !plan.projection.clip || stages.is_hull(id) {
         return;
     }
     let corners = stages.positions_of(id).map(|(position, _)| homogeneous(&plan.projection, position));
@@ -202,7 +212,7 @@ fn bands_of(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], v: &[ScreenVertex; 3]
 }
 
 fn bin_edges(stages: &Stages<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> Bin {
-    let mut bin = Bin::new(band_count(stages.plan, rows));
+    let mut bin = Bin::new(band_count(stages.plan, rows), TALL_EDGE_BANDS);
     let reach = pass.reach_px();
     for i in range {
         let edge = &pass.edges[i];
@@ -236,7 +246,8 @@ mod tests {
 
     #[test]
     fn each_band_lists_the_pieces_that_touch_it() {
-        let mut bin = TriangleBin { whole: Bin::new(20), pieces: Vec::new(), piece_bands: Bin::new(20) };
+        let new = || Bin::new(20, TALL_BANDS);
+        let mut bin = TriangleBin { whole: new(), pieces: Vec::new(), piece_bands: new() };
         let spans = [[0, 0], [2, 4], [0, 19], [3, 3], [5, 15]];
         for (id, span) in (100..).zip(spans) {
             bin.push_piece(id, [ScreenVertex::default(); 3], span);

@@ -11,6 +11,9 @@ pub const CORNERS_MAX: usize = 8;
 
 /// Clips the homogeneous triangle and calls `draw` for each triangle of the fan that is left.
 pub fn clip_triangle(projection: &Projection, corners: [[f32; 4]; 3], mut draw: impl FnMut([ScreenVertex; 3])) {
+    if !corners.iter().all(is_moderate) {
+        return;
+    }
     let mut polygon = Polygon { corners: [[0.0; 4]; CORNERS_MAX], len: 3 };
     polygon.corners[..3].copy_from_slice(&corners);
     for plane in 0..5 {
@@ -25,6 +28,9 @@ pub fn clip_triangle(projection: &Projection, corners: [[f32; 4]; 3], mut draw: 
 /// Clips a homogeneous segment; None if nothing is left.
 pub fn clip_segment(projection: &Projection, ends: [[f32; 4]; 2]) -> Option<[ScreenVertex; 2]> {
     let [mut a, mut b] = ends;
+    if !(is_moderate(&a) && is_moderate(&b)) {
+        return None;
+    }
     for plane in 0..5 {
         let (da, db) = (distance(projection.near_w, plane, &a), distance(projection.near_w, plane, &b));
         match (da >= 0.0, db >= 0.0) {
@@ -35,6 +41,13 @@ pub fn clip_segment(projection: &Projection, ends: [[f32; 4]; 2]) -> Option<[Scr
         }
     }
     Some([snap(a), snap(b)])
+}
+
+/// Whether all coordinates are numbers below 2^64: no step of clipping overflows then. What has others is not drawn.
+pub fn is_moderate(p: &[f32; 4]) -> bool {
+    const BOUND: f32 = 18_446_744_073_709_551_616.0;
+    // Comparisons with what is not a number are false.
+    p.iter().all(|v| v.abs() < BOUND)
 }
 
 struct Polygon {

@@ -4,15 +4,15 @@
 use super::Stages;
 use super::transform::{ScreenVertex, homogeneous};
 use super::visibility::area;
-use crate::plan::{Edge, LinePass};
+use crate::plan::{Edge, LinePass, Side};
 
 /// Whether the pass draws the edge in this view: not on the far side of a closed surface, where nothing of it can be seen;
 /// and of a contour only the silhouette.
 #[inline(always)]
 pub fn is_drawn(stages: &Stages<'_>, lines: &LinePass, edge: &Edge) -> bool {
     // Of a contour, what is seen from its very edge shows nothing either: its line would lie on that of the side it hides behind.
-    let is_hidden = |face| stages.looks_away(face) || (lines.contour && stages.is_edge_on(face));
-    if lines.skip_back_edges && edge.faces.into_iter().all(is_hidden) {
+    let is_hidden = |face| stages.looks_away(lines, face) || (lines.contour && stages.is_edge_on(face));
+    if lines.unseen_side.is_some() && edge.faces.into_iter().all(is_hidden) {
         return false;
     }
     !lines.contour || stages.is_silhouette(edge)
@@ -21,26 +21,32 @@ pub fn is_drawn(stages: &Stages<'_>, lines: &LinePass, edge: &Edge) -> bool {
 impl Stages<'_> {
     /// The face whose light falls on an edge's line where the pixel sees no surface, plus 1: of those that look at the viewer
     /// the one with the highest id, so that the order of edges does not matter; of any, where none does.
-    pub fn lit_by(&self, edge: &Edge) -> u32 {
-        let towards = |face: u32| if self.looks_away(face) { 0 } else { face + 1 };
+    pub fn lit_by(&self, lines: &LinePass, edge: &Edge) -> u32 {
+        let towards = |face: u32| if self.looks_away(lines, face) { 0 } else { face + 1 };
         let best = towards(edge.faces[0]).max(towards(edge.faces[1]));
         if best > 0 { best } else { edge.faces[0].wrapping_add(1) }
     }
 
     /// Whether a face is certainly turned away. A missing face is: it shows nothing.
     #[inline(always)]
-    fn looks_away(&self, face: u32) -> bool {
+    fn looks_away(&self, lines: &LinePass, face: u32) -> bool {
         if face == Edge::NO_FACE {
             return true;
         }
-        let vertices = self.screen_triangle(face);
-        !vertices.iter().any(ScreenVertex::is_outside) && area(&vertices) > 0
+        let is_inside_out = lines.unseen_side == Some(Side::Front);
+        self.area_of(face).is_some_and(|area| area != 0 && (area < 0) == is_inside_out)
     }
 
     /// Whether a face has no area on screen.
     fn is_edge_on(&self, face: u32) -> bool {
+        self.area_of(face) == Some(0)
+    }
+
+    /// A face's area on screen, if all of its corners are there.
+    #[inline(always)]
+    fn area_of(&self, face: u32) -> Option<i64> {
         let vertices = self.screen_triangle(face);
-        !vertices.iter().any(ScreenVertex::is_outside) && area(&vertices) == 0
+        (!vertices.iter().any(ScreenVertex::is_outside)).then(|| area(&vertices))
     }
 
     /// Whether the edge's faces lie on one side of it on screen, and none on the other: there the surface ends, or turns back

@@ -4,6 +4,7 @@
 //! interval. The triangles that are asked are those that the visibility buffer shows along the edge.
 
 use super::Stages;
+use super::clip::is_moderate;
 use super::contour::volume;
 use super::samples::{NOTHING, SampleBand};
 use super::segment::Segment;
@@ -159,19 +160,21 @@ type Corner = [f32; 4];
 /// Where along the edge the triangle lies in front of it.
 #[inline(always)]
 fn hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, id: u32) -> Option<[f32; 2]> {
-    let (vertices, is_hull) = stages.triangle(id);
-    // A hull shares its vertices' numbers with the surface, but not their place.
-    if !is_hull && edge.vertices.iter().all(|v| vertices.contains(v)) {
+    let vertices = stages.triangle(id);
+    if edge.vertices.iter().all(|v| vertices.contains(v)) {
         return None;
     }
     let on_screen = stages.screen_triangle(id);
     let corners: [Corner; 3];
     let is_clockwise;
     if on_screen.iter().any(ScreenVertex::is_outside) {
-        if is_hull {
+        if stages.is_hull(id) || !stages.plan.projection.clip {
             return None;
         }
         corners = vertices.map(|v| homogeneous(&stages.plan.projection, stages.plan.positions[v as usize]));
+        if !corners.iter().all(is_moderate) {
+            return None;
+        }
         is_clockwise = volume(&corners) > 0.0;
     } else {
         let [a, b, c] = &on_screen;

@@ -9,16 +9,13 @@ use super::stroke::{Mask, POINTS, WORDS, count};
 /// Steps to the pixel of a sum of areas.
 const AREA_UNIT: f32 = 65_536.0;
 
-/// Sums stop before they could wrap. Only lit lines come close, in a pixel that 32,768 of them cover: others stop when all points
-/// are covered.
-const SUM_MAX: u32 = 1 << 31;
-
 /// A pixel's strokes.
 #[derive(Clone, Copy, Default)]
 pub struct Ink {
     mask: Mask,
-    area: u32,
-    count: u32,
+    /// Of all strokes: no number of them comes near the end of 64 bits.
+    area: u64,
+    count: u64,
 }
 
 impl Ink {
@@ -26,7 +23,7 @@ impl Ink {
     /// stroke may cover them all and yet leave a corner of the pixel; more than one are taken to have covered it.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
-        self.count > POINTS && self.mask == [u16::MAX; WORDS]
+        self.count > u64::from(POINTS) && self.mask == [u16::MAX; WORDS]
     }
 
     /// Adds a stroke.
@@ -35,14 +32,12 @@ impl Ink {
         for l in 0..WORDS {
             self.mask[l] |= mask[l];
         }
-        if self.area < SUM_MAX && self.count < SUM_MAX {
-            self.area += (area * AREA_UNIT + 0.5) as u32;
-            self.count += count(mask);
-        }
+        self.area += u64::from((area * AREA_UNIT + 0.5) as u32);
+        self.count += u64::from(count(mask));
     }
 
-    /// How much of the pixel is covered, 0 to the lines' `peak`: `area * points of the union / sum of the strokes' points`, a ratio estimate
-    /// whose error is that of the overlap alone.
+    /// How much of the pixel is covered, 0 to the lines' `peak`: `area * points of the union / sum of the strokes' points`, a
+    /// ratio estimate whose error is that of the overlap alone.
     #[inline(always)]
     pub fn coverage(&self, peak: f32) -> f32 {
         if self.area == 0 {
@@ -52,8 +47,14 @@ impl Ink {
             return peak;
         }
         let union = count(&self.mask);
-        let area = self.area as f32 * (1.0 / AREA_UNIT);
-        let share = if self.count > union { union as f32 / self.count as f32 } else { 1.0 };
+        let area = to_f32(self.area) * (1.0 / AREA_UNIT);
+        let share = if self.count > u64::from(union) { union as f32 / to_f32(self.count) } else { 1.0 };
         (area * share).min(peak)
     }
+}
+
+/// As the shaders round a number of two words.
+#[inline(always)]
+fn to_f32(v: u64) -> f32 {
+    (v >> 32) as f32 * 4_294_967_296.0 + (v as u32) as f32
 }

@@ -12,8 +12,10 @@ use super::samples::{NOTHING, SampleBand, for_samples};
 use super::shade::Shader;
 use crate::plan::{LayersPass, roles};
 
-/// What a band's layers need beside its samples.
+/// What a band's layers need beside its samples: rows that are shown, and none of those beyond them.
 pub struct LayerBand {
+    /// Where its first sample is among the band's.
+    base_at: usize,
     /// This round's layer; begins as a copy of what it must lie before.
     pub found: SampleBand,
     /// The last round's; depth 0 where a sample is done.
@@ -30,20 +32,26 @@ impl LayerBand {
     /// Bytes a sample: two depths and ids, a colour, and materials.
     pub const SAMPLE_BYTES: usize = 8 + 8 + 16 + 4;
 
-    /// For bands like this one.
-    pub fn new(base: &SampleBand) -> Self {
-        // A picture's last band has fewer rows than it has room for.
-        let len = base.depth.len();
-        let like = || SampleBand { depth: vec![0.0; len], ids: vec![NOTHING; len], ..*base };
+    /// For bands like this one, of which so many rows are shown.
+    pub fn new(base: &SampleBand, rows: u32) -> Self {
+        let like = || SampleBand::new(base.size_px, 0, rows, base.samples);
+        let len = base.stride * rows as usize;
         let (colors, materials) = (vec![[0.0; 4]; len], vec![0; len]);
-        Self { found: like(), previous: like(), colors, materials, pending: Vec::new() }
+        Self { base_at: 0, found: like(), previous: like(), colors, materials, pending: Vec::new() }
     }
 
-    /// Forgets everything, and moves to where `base` is.
+    /// What it holds on to, bytes.
+    pub fn bytes(&self) -> usize {
+        self.colors.len() * Self::SAMPLE_BYTES + self.pending.capacity()
+    }
+
+    /// Forgets everything, and moves to what is shown of `base`.
     fn begin(&mut self, base: &SampleBand) {
         for samples in [&mut self.found, &mut self.previous] {
-            (samples.first_row, samples.rows, samples.shown) = (base.first_row, base.rows, base.shown);
+            (samples.first_row, samples.rows, samples.shown) =
+                (base.shown[0], base.shown[1] - base.shown[0], base.shown);
         }
+        self.base_at = base.index(0, base.shown[0], 0);
         self.previous.depth.fill(f32::INFINITY);
         self.previous.ids.fill(0);
         self.colors.fill([0.0; 4]);
@@ -55,8 +63,9 @@ impl LayerBand {
     fn begin_round(&mut self, base: Option<&SampleBand>) {
         match base {
             Some(base) => {
-                self.found.depth.copy_from_slice(&base.depth);
-                self.found.ids.copy_from_slice(&base.ids);
+                let own = self.base_at..self.base_at + self.found.depth.len();
+                self.found.depth.copy_from_slice(&base.depth[own.clone()]);
+                self.found.ids.copy_from_slice(&base.ids[own]);
             }
             None => self.found.clear(),
         }
@@ -66,7 +75,8 @@ impl LayerBand {
     #[inline(always)]
     fn take(&mut self, base: Option<&SampleBand>, at: usize) -> Option<u32> {
         let (depth, id) = (self.found.depth[at], self.found.ids[at]);
-        let (base_depth, base_id) = base.map_or((0.0, NOTHING), |base| (base.depth[at], base.ids[at]));
+        let in_base = self.base_at + at;
+        let (base_depth, base_id) = base.map_or((0.0, NOTHING), |base| (base.depth[in_base], base.ids[in_base]));
         if depth == base_depth && id == base_id {
             self.previous.depth[at] = 0.0;
             return None;
@@ -126,7 +136,7 @@ pub fn find(
 ) -> Vec<u64> {
     layers.begin(base);
     let floor = (!pass.behind_surface).then_some(base);
-    let mut words = vec![0; base.depth.len()];
+    let mut words = vec![0; layers.found.depth.len()];
     for _ in 0..=layer {
         layers.begin_round(floor);
         peel(stages.isa, stages, bins, layers);
@@ -182,7 +192,7 @@ fn lay_sampled<const S: usize>(
                     ids[s] = id;
                     continue;
                 };
-                let bit = 1 << (hull.material((id % triangles) as usize) % 32);
+                let bit = 1 << (hull.material(id as usize) % 32);
                 if id < triangles || layers.materials[at] & bit == 0 {
                     ids[s] = id;
                 }
@@ -218,10 +228,10 @@ fn under_sampled<const S: usize>(stages: &Stages<'_>, base: &SampleBand, layers:
     for y in base.shown[0]..base.shown[1] {
         for x in 0..base.size_px[0] {
             let Some(out) = colors.next() else { return };
-            let first = base.index(x, y, 0);
+            let (in_base, first) = (base.index(x, y, 0), layers.found.index(x, y, 0));
             let mut ids = [NOTHING; S];
             for s in 0..S {
-                ids[s] = base.ids[first + s];
+                ids[s] = base.ids[in_base + s];
                 let over = layers.colors[first + s];
                 for k in 0..4 {
                     out[k] += share * over[k];

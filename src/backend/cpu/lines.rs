@@ -74,7 +74,7 @@ impl<'a> LineDrawer<'a> {
     pub fn draw(&mut self, edge: &Edge, LineTarget { ink, owners }: &mut LineTarget<'_>) {
         let Some(segment) = Segment::new(self.stages, edge) else { return };
         let mut direction = None;
-        let owner = if self.lines.lit && !owners.is_empty() { self.stages.lit_by(edge) } else { 0 };
+        let owner = if self.lines.lit && !owners.is_empty() { self.stages.lit_by(self.lines, edge) } else { 0 };
         let windows = if self.is_hidden { (segment.length * self.windows) as u32 + 1 } else { 1 };
         let step = recip(windows as f32);
         for window in 0..windows {
@@ -100,13 +100,22 @@ impl<'a> LineDrawer<'a> {
                     if (owner == 0 && ink[at].is_full()) || !windowed.owns(center) {
                         continue;
                     }
-                    for &[a, b] in &self.parts {
-                        let (a, b) = (segment.point(a), segment.point(b));
+                    let [low, high] = windowed.reached(center, self.pen.reach);
+                    for &[from, to] in &self.parts {
+                        if to < low {
+                            continue;
+                        }
+                        if from > high {
+                            break;
+                        }
+                        let (a, b) = (segment.point(from), segment.point(to));
                         let ends = [[a[0] - center[0], a[1] - center[1]], [b[0] - center[0], b[1] - center[1]]];
                         if let Some((area, mask)) = stroke::cover(&self.pen, direction, ends) {
                             ink[at].add(area, &mask);
                             if owner > 0 {
                                 owners[at] = owners[at].max(owner);
+                            } else if ink[at].is_full() {
+                                break;
                             }
                         }
                     }
@@ -160,6 +169,15 @@ impl Window<'_> {
             high = high.min(center + spread);
         }
         [(low as i32).max(0), (high as i32).min(width_px as i32 - 1)]
+    }
+
+    /// Which range of the edge may reach a pixel, and somewhat more: parts beyond it need not be looked at.
+    #[inline(always)]
+    fn reached(&self, center: [f32; 2], reach: f32) -> [f32; 2] {
+        let s = self.segment;
+        let from_start = [center[0] - s.start[0], center[1] - s.start[1]];
+        let way = (from_start[0] * s.along[0] + from_start[1] * s.along[1]) * s.inverse_length;
+        [(way - reach - 1.0) * s.inverse_length, (way + reach + 1.0) * s.inverse_length]
     }
 
     /// Whether of all windows of the edge the pixel is this one's.

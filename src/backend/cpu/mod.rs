@@ -37,11 +37,13 @@ mod wire;
 
 pub use isa::Isa;
 
+use std::sync::{Mutex, PoisonError};
+
 use rayon::prelude::*;
 
 use self::bins::Bins;
 use self::resolve::SrgbEncoder;
-use self::scratch::{BandScratch, ScratchPool};
+use self::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, ScratchPool};
 use self::transform::ScreenVertex;
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::Image;
@@ -56,7 +58,6 @@ pub struct CpuRenderer {
     isa: Isa,
     pool: Option<rayon::ThreadPool>,
     vertices: Vec<ScreenVertex>,
-    hull_vertices: Vec<ScreenVertex>,
     scratch: ScratchPool,
     srgb: SrgbEncoder,
 }
@@ -65,8 +66,8 @@ pub struct CpuRenderer {
 pub struct Stages<'a> {
     plan: &'a DrawPlan<'a>,
     deadline: &'a Deadline,
+    /// The positions', then the hull's own.
     vertices: &'a [ScreenVertex],
-    hull_vertices: &'a [ScreenVertex],
     isa: Isa,
     srgb: &'a SrgbEncoder,
 }
@@ -82,43 +83,22 @@ impl CpuRenderer {
         // One thread needs no pool; and if the system gives no threads, one is what there is.
         let build = || rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("raster-{i}"));
         let pool = if threads > 1 { build().build().ok() } else { None };
-        Self {
-            isa,
-            pool,
-            vertices: Vec::new(),
-            hull_vertices: Vec::new(),
-            scratch: ScratchPool::default(),
-            srgb: SrgbEncoder::new(),
-        }
+        Self { isa, pool, vertices: Vec::new(), scratch: ScratchPool::default(), srgb: SrgbEncoder::new() }
     }
 
     /// Transforms the plan's vertices; afterwards [`Stages`] can be made.
     fn transform(&mut self, plan: &DrawPlan<'_>) {
         let isa = self.isa;
         let pool = self.pool.as_ref();
+        let own = plan.hull.as_ref().map_or(&[][..], |hull| &hull.vertices);
         self.vertices.resize(plan.positions.len(), ScreenVertex::default());
         let chunks = plan.positions.chunks(CHUNK).zip(self.vertices.chunks_mut(CHUNK)).collect();
         run(pool, chunks, |(positions, out)| transform::transform(isa, &plan.projection, positions, out));
-
-        self.hull_vertices.clear();
-        if let Some(hull) = &plan.hull {
-            self.hull_vertices.resize(plan.positions.len(), ScreenVertex::default());
-            let chunks = self.hull_vertices.chunks_mut(CHUNK).enumerate().collect();
-            run(pool, chunks, |(i, out)| {
-                transform::transform_hull(&plan.projection, hull, plan.positions, i * CHUNK, out);
-            });
-        }
+        self.vertices.extend(own.iter().map(ScreenVertex::from));
     }
 
     fn stages<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> Stages<'a> {
-        Stages {
-            plan,
-            deadline,
-            vertices: &self.vertices,
-            hull_vertices: &self.hull_vertices,
-            isa: self.isa,
-            srgb: &self.srgb,
-        }
+        Stages { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb }
     }
 
     /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside it.
@@ -132,17 +112,36 @@ impl CpuRenderer {
         deadline.check()?;
         self.transform(plan);
         let stages = self.stages(plan, deadline);
-        let rows = scratch::rows_per_band(plan);
-        let bins = bins::bin(&stages, self.pool.as_ref(), [rows, plan.line_margin_rows()])?;
-        let row_len = out.len() / plan.height_px as usize;
-        let items = out.chunks_mut(row_len * rows as usize).enumerate().collect();
-        run(self.pool.as_ref(), items, |(band, out)| {
-            if deadline.check().is_ok() {
-                self.scratch.with(plan, rows, |scratch| each(&stages, scratch, &bins, band, out));
-            }
+        let banding = Banding::new(plan, self.threads());
+        let drawn = bins::bin(&stages, self.pool.as_ref(), [banding.rows, banding.margin]).map(|bins| {
+            let row_len = out.len() / plan.height_px as usize;
+            let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
+            run_few(self.pool.as_ref(), banding.at_once, items, |(band, out)| {
+                if deadline.check().is_ok() {
+                    self.scratch.with(plan, banding, |scratch| each(&stages, scratch, &bins, band, out));
+                }
+            });
         });
-        self.scratch.trim();
+        self.trim();
+        drawn?;
         Ok(deadline.check()?)
+    }
+
+    /// Lets go of what is too large to keep for another picture.
+    fn trim(&mut self) {
+        self.scratch.trim();
+        if self.vertices.capacity() * size_of::<ScreenVertex>() > KEPT_BYTES_MAX {
+            self.vertices = Vec::new();
+        }
+    }
+
+    fn threads(&self) -> usize {
+        self.pool.as_ref().map_or(1, rayon::ThreadPool::current_num_threads)
+    }
+
+    /// Memory that drawing the plan takes beside what grows with its mesh, bytes.
+    pub fn bands_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
+        Banding::new(plan, self.threads()).bytes(plan) as u64
     }
 }
 
@@ -158,23 +157,27 @@ impl CpuRenderer {
 }
 
 impl Stages<'_> {
-    /// The vertex indices of an id, and whether it is a hull triangle.
+    /// Where the corners of an id are among the vertices.
     #[inline(always)]
-    fn triangle(&self, id: u32) -> ([u32; 3], bool) {
-        let count = self.plan.triangles.len() as u32;
-        if id < count {
-            (self.plan.triangles[id as usize], false)
-        } else {
-            (self.plan.triangles[(id - count) as usize], true)
+    fn triangle(&self, id: u32) -> [u32; 3] {
+        let id = id as usize;
+        match (self.plan.triangles.get(id), &self.plan.hull) {
+            (Some(triangle), _) => *triangle,
+            (None, Some(hull)) => hull.triangles[id - self.plan.triangles.len()],
+            (None, None) => [0; 3],
         }
+    }
+
+    /// Whether an id is the hull's.
+    #[inline(always)]
+    fn is_hull(&self, id: u32) -> bool {
+        id as usize >= self.plan.triangles.len()
     }
 
     /// The vertices of an id on screen.
     #[inline(always)]
     fn screen_triangle(&self, id: u32) -> [ScreenVertex; 3] {
-        let (triangle, is_hull) = self.triangle(id);
-        let vertices = if is_hull { self.hull_vertices } else { self.vertices };
-        triangle.map(|v| vertices[v as usize])
+        self.triangle(id).map(|v| self.vertices[v as usize])
     }
 }
 
@@ -202,4 +205,26 @@ fn run<T: Send>(pool: Option<&rayon::ThreadPool>, items: Vec<T>, each: impl Fn(T
         Some(pool) => pool.install(|| items.into_par_iter().for_each(each)),
         None => items.into_iter().for_each(each),
     }
+}
+
+/// The same for as many items at once as `at_once`.
+fn run_few<T: Send>(
+    pool: Option<&rayon::ThreadPool>,
+    at_once: usize,
+    items: impl Iterator<Item = T> + Send,
+    each: impl Fn(T) + Sync + Send,
+) {
+    let Some(pool) = pool else {
+        items.for_each(each);
+        return;
+    };
+    let items = Mutex::new(items);
+    let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
+    pool.install(|| {
+        (0..at_once).into_par_iter().for_each(|_| {
+            while let Some(item) = next() {
+                each(item);
+            }
+        });
+    });
 }

@@ -1,9 +1,10 @@
 //! Stage 5, a pixel: surface over background, ink over both, to sRGB bytes. Twin of `shaders/resolve.wgsl`.
 
+use super::ink::Ink;
 use super::light::Light;
 use super::transform::recip;
 use crate::image::srgb8_thresholds;
-use crate::plan::DrawPlan;
+use crate::plan::{DrawPlan, LinePass};
 
 /// Linear light to sRGB bytes by the 255 thresholds, with a first guess from a small table.
 pub struct SrgbEncoder {
@@ -34,38 +35,39 @@ impl SrgbEncoder {
     }
 }
 
-/// Resolves a band into `rgba`; `coverage` is that by one line pass after the other, `light` what falls on those that are lit (empty
-/// where none is).
-#[inline(always)]
-pub fn resolve(
-    plan: &DrawPlan<'_>,
-    srgb: &SrgbEncoder,
-    colors: &[[f32; 4]],
-    coverage: &[f32],
-    light: &[Light],
-    rgba: &mut [u8],
-) {
-    let mut last = ([f32::NAN; 4], [0; 4]);
-    for (i, (color, out)) in colors.iter().zip(rgba.chunks_exact_mut(4)).enumerate() {
-        let mut c: [f32; 4] = std::array::from_fn(|k| color[k] + plan.background[k] * (1.0 - color[3]));
-        for (lines, coverage) in plan.lines.iter().zip(coverage.chunks_exact(colors.len())) {
-            let cover = coverage[i];
-            if cover > 0.0 {
-                let light = light.get(i).filter(|_| lines.lit);
-                let color = light.map_or(lines.color, |light| light.on_premultiplied(lines.color));
-                c = std::array::from_fn(|k| cover * color[k] + c[k] * (1.0 - cover * color[3]));
-            }
+/// Lays the surface's colours over the background.
+pub fn lay_over_background(plan: &DrawPlan<'_>, colors: &mut [[f32; 4]]) {
+    for color in colors {
+        *color = std::array::from_fn(|k| color[k] + plan.background[k] * (1.0 - color[3]));
+    }
+}
+
+/// Lays the lines of a pass over what is there; `light` is what falls on them (empty where they are not lit).
+pub fn lay_lines(lines: &LinePass, ink: &[Ink], light: &[Light], colors: &mut [[f32; 4]]) {
+    let peak = lines.peak();
+    for (i, (ink, c)) in ink.iter().zip(colors).enumerate() {
+        let cover = ink.coverage(peak);
+        if cover > 0.0 {
+            let color = light.get(i).map_or(lines.color, |light| light.on_premultiplied(lines.color));
+            *c = std::array::from_fn(|k| cover * color[k] + c[k] * (1.0 - cover * color[3]));
         }
+    }
+}
+
+/// Writes a band's colours as sRGB bytes.
+pub fn encode(srgb: &SrgbEncoder, colors: &[[f32; 4]], rgba: &mut [u8]) {
+    let mut last = ([f32::NAN; 4], [0; 4]);
+    for (&c, out) in colors.iter().zip(rgba.chunks_exact_mut(4)) {
         // Neighbours are often the same colour to the bit: flat faces, background.
         if c != last.0 {
-            last = (c, encode(srgb, c));
+            last = (c, encode_pixel(srgb, c));
         }
         out.copy_from_slice(&last.1);
     }
 }
 
 #[inline(always)]
-fn encode(srgb: &SrgbEncoder, c: [f32; 4]) -> [u8; 4] {
+fn encode_pixel(srgb: &SrgbEncoder, c: [f32; 4]) -> [u8; 4] {
     let alpha = c[3];
     if alpha >= 1.0 {
         return [srgb.encode(c[0]), srgb.encode(c[1]), srgb.encode(c[2]), 255];

@@ -3,6 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::ink::Ink;
+use super::isa::LANES;
 use super::layers::LayerBand;
 use super::light::Light;
 use super::samples::SampleBand;
@@ -11,27 +12,69 @@ use crate::plan::DrawPlan;
 /// Memory of a band, bytes: half of a common 1 MiB second-level cache.
 const BAND_BYTES: usize = 512 << 10;
 
-/// Largest scratch that is kept from picture to picture, bytes. Only a wide row of very many line passes needs more.
-const KEPT_BYTES_MAX: usize = 8 << 20;
+/// Memory of all bands that are drawn at once, bytes, whatever is drawn on however many threads.
+pub const BANDS_BYTES_MAX: usize = 256 << 20;
+
+/// What is kept from picture to picture, bytes: of a band's scratch, and of vertices.
+pub const KEPT_BYTES_MAX: usize = 8 << 20;
 
 /// Bytes of a sample: depth and id.
 const SAMPLE_BYTES: usize = 8;
 
-/// Bytes of a sample, its layers included.
-const LAYERED_SAMPLE_BYTES: usize = SAMPLE_BYTES + LayerBand::SAMPLE_BYTES;
+/// How a picture is cut into bands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Banding {
+    /// Rows in each band but the last.
+    pub rows: u32,
+    /// Rows beyond a band that its lines look at.
+    pub margin: u32,
+    /// Bands that are drawn at once.
+    pub at_once: usize,
+}
 
-/// Rows in each band but the last.
-pub fn rows_per_band(plan: &DrawPlan<'_>) -> u32 {
-    let sample_bytes = if plan.layers().is_some() { LAYERED_SAMPLE_BYTES } else { SAMPLE_BYTES };
-    let light_bytes = if plan.lights_lines() { size_of::<Light>() } else { 0 };
-    let ink_bytes = plan.lines.len() * size_of::<f32>() + if plan.lines.is_empty() { 0 } else { size_of::<Ink>() };
-    let owner_bytes = if plan.lights_lines() { size_of::<u32>() } else { 0 };
-    let colors_bytes = size_of::<[f32; 4]>() + light_bytes + owner_bytes;
-    let pixel_bytes = plan.samples as usize * sample_bytes + colors_bytes + ink_bytes;
-    let row_bytes = plan.width_px as usize * pixel_bytes;
-    // Where samples beyond the band are drawn too, at least as many in it: or most of the work would be done twice.
-    let least = (2 * plan.line_margin_rows()).max(1);
-    ((BAND_BYTES / row_bytes.max(1)) as u32).max(least).min(plan.height_px.max(1))
+impl Banding {
+    /// For so many threads. Bands fit the cache, unless their lines look far beyond them: then a band has as many rows as lets
+    /// the threads do the most in [`BANDS_BYTES_MAX`], because small bands draw most samples for their neighbours, and of large
+    /// ones there are few at once.
+    pub fn new(plan: &DrawPlan<'_>, threads: usize) -> Self {
+        let margin = plan.line_margin_rows();
+        let cached = (BAND_BYTES / (row_bytes(plan, 1) + row_bytes(plan, 0)).max(1)).max(1) as u32;
+        let banding = |rows: u32| {
+            let rows = rows.max(cached).clamp(1, plan.height_px.max(1));
+            let one = Self { rows, margin, at_once: 1 };
+            let most = threads.min(plan.height_px.div_ceil(rows) as usize).max(1);
+            Self { at_once: (BANDS_BYTES_MAX / one.bytes(plan).max(1)).clamp(1, most), ..one }
+        };
+        let is_small = |banding: &Self| banding.bytes(plan) <= BANDS_BYTES_MAX;
+        // Rows that are shown of those that are drawn, by all threads.
+        let yields = |b: &Self| b.at_once as u64 * (u64::from(b.rows) << 20) / u64::from(b.rows + 2 * b.margin);
+        let mut best = banding(0);
+        for share in (0..8).rev() {
+            let other = banding((2 * margin) >> share);
+            if !is_small(&best) || (is_small(&other) && yields(&other) >= yields(&best)) {
+                best = other;
+            }
+        }
+        best
+    }
+
+    /// Memory of the bands that are drawn at once.
+    pub fn bytes(&self, plan: &DrawPlan<'_>) -> usize {
+        let all = (self.rows + 2 * self.margin) as usize;
+        self.at_once * (all * row_bytes(plan, 0) + self.rows as usize * row_bytes(plan, 1))
+    }
+}
+
+/// Bytes of a row: of its samples (0), or of what there is only where a row is shown (1).
+fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
+    let samples = plan.width_px as usize * plan.samples as usize + LANES;
+    if part == 0 {
+        return samples * SAMPLE_BYTES;
+    }
+    let light = if plan.lights_lines() { size_of::<Light>() + size_of::<u32>() } else { 0 };
+    let ink = if plan.lines.is_empty() { 0 } else { size_of::<Ink>() };
+    let layers = if plan.layers().is_some() { LayerBand::SAMPLE_BYTES } else { 0 };
+    plan.width_px as usize * (size_of::<[f32; 4]>() + light + ink) + samples * layers
 }
 
 /// A band's buffers, kept from band to band.
@@ -48,22 +91,32 @@ pub struct BandScratch {
     pub colors: Vec<[f32; 4]>,
     /// Of the line pass that is drawn just now.
     pub ink: Vec<Ink>,
-    /// Coverage by lines, 0 to 1, of one pass after the other.
-    pub coverage: Vec<f32>,
-    /// Where lines are lit, whose light falls on them.
+    /// Where that is lit, whose light falls on its lines.
     pub owners: Vec<u32>,
-    /// A pixel, where lines are lit.
+    /// A pixel, where it is lit.
     pub light: Vec<Light>,
 }
 
 impl BandScratch {
+    fn new(plan: &DrawPlan<'_>, Banding { rows, margin, .. }: Banding) -> Self {
+        Self {
+            samples: SampleBand::new([plan.width_px, plan.height_px], 0, rows + 2 * margin, plan.samples),
+            rows,
+            margin,
+            layers: None,
+            colors: Vec::new(),
+            ink: Vec::new(),
+            owners: Vec::new(),
+            light: Vec::new(),
+        }
+    }
+
     /// What it holds on to, bytes.
     fn bytes(&self) -> usize {
-        let layered = if self.layers.is_some() { LAYERED_SAMPLE_BYTES } else { SAMPLE_BYTES };
-        self.samples.depth.len() * layered
+        self.samples.depth.len() * SAMPLE_BYTES
+            + self.layers.as_ref().map_or(0, LayerBand::bytes)
             + self.colors.capacity() * size_of::<[f32; 4]>()
             + self.ink.capacity() * size_of::<Ink>()
-            + self.coverage.capacity() * size_of::<f32>()
             + self.owners.capacity() * size_of::<u32>()
             + self.light.capacity() * size_of::<Light>()
     }
@@ -75,23 +128,15 @@ pub struct ScratchPool(Mutex<Vec<BandScratch>>);
 
 impl ScratchPool {
     /// Lends a scratch that fits the plan.
-    pub fn with(&self, plan: &DrawPlan<'_>, rows: u32, each: impl FnOnce(&mut BandScratch)) {
-        let (size_px, margin) = ([plan.width_px, plan.height_px], plan.line_margin_rows());
+    pub fn with(&self, plan: &DrawPlan<'_>, banding: Banding, each: impl FnOnce(&mut BandScratch)) {
+        let size_px = [plan.width_px, plan.height_px];
         let fits = |s: &BandScratch| {
-            s.samples.size_px == size_px && s.rows == rows && s.margin == margin && s.samples.samples == plan.samples
+            s.samples.size_px == size_px
+                && (s.rows, s.margin) == (banding.rows, banding.margin)
+                && s.samples.samples == plan.samples
         };
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().filter(fits);
-        let mut scratch = kept.unwrap_or_else(|| BandScratch {
-            samples: SampleBand::new(size_px, 0, rows + 2 * margin, plan.samples),
-            rows,
-            margin,
-            layers: None,
-            colors: Vec::new(),
-            ink: Vec::new(),
-            coverage: Vec::new(),
-            owners: Vec::new(),
-            light: Vec::new(),
-        });
+        let mut scratch = kept.unwrap_or_else(|| BandScratch::new(plan, banding));
         each(&mut scratch);
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
     }
@@ -107,7 +152,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::plan::{LinePass, Projection, Shown};
+    use crate::plan::{Faces, LayersPass, LinePass, Projection, Shown, SurfacePass};
 
     fn plan(size_px: [u32; 2], passes: usize) -> DrawPlan<'static> {
         let zero = [0.0; 4];
@@ -130,7 +175,7 @@ mod tests {
             smoothing_px: 0.0,
             color: zero,
             shown,
-            skip_back_edges: false,
+            unseen_side: None,
             contour: false,
             lit: false,
         };
@@ -140,13 +185,12 @@ mod tests {
 
     /// Draws nothing in all of a band's buffers; whether they are kept for the next picture, after how many bytes.
     fn is_kept(plan: &DrawPlan<'_>) -> (bool, usize) {
-        let (pool, rows) = (ScratchPool::default(), rows_per_band(plan));
-        let pixels = (plan.width_px * rows) as usize;
+        let (pool, banding) = (ScratchPool::default(), Banding::new(plan, 1));
+        let pixels = (plan.width_px * banding.rows) as usize;
         let mut bytes = 0;
-        pool.with(plan, rows, |scratch| {
+        pool.with(plan, banding, |scratch| {
             scratch.colors.resize(pixels, [0.0; 4]);
             scratch.ink.resize(pixels, Ink::default());
-            scratch.coverage.resize(pixels * plan.lines.len(), 0.0);
             bytes = scratch.bytes();
         });
         pool.trim();
@@ -154,17 +198,82 @@ mod tests {
     }
 
     #[test]
-    fn a_band_and_all_its_ink_fit_the_cache() {
-        for (passes, rows) in [(0, 10), (12, 3), (500, 1)] {
-            assert_eq!(rows_per_band(&plan([1000, 900], passes)), rows, "{passes} passes");
+    fn a_band_fits_the_cache_however_many_lines_there_are() {
+        for (passes, rows) in [(0, 10), (1, 5), (12, 5), (500, 5)] {
+            let banding = Banding::new(&plan([1000, 900], passes), 8);
+            assert_eq!(banding, Banding { rows, margin: 0, at_once: 8 }, "{passes} passes");
         }
+    }
+
+    /// All kinds of plans whose lines look far beyond a band.
+    fn with_wide_lines(each: &mut impl FnMut(&DrawPlan<'_>)) {
+        for size_px in [[4096, 4096], [4096, 100], [100, 4096], [1, 1], [640, 480]] {
+            for (samples, width_px) in [1, 4, 8, 16].into_iter().flat_map(|s| [1.0, 9.0, 110.0].map(|w| (s, w))) {
+                for (layered, passes) in [(false, 1), (true, 1), (false, 128), (true, 8192)] {
+                    let mut plan = plan(size_px, passes);
+                    let mut surface = SurfacePass::new(Faces::Both, Vec::new());
+                    surface.is_shaded = true;
+                    plan.surface = Some(surface);
+                    for lines in &mut plan.lines {
+                        (lines.width_px, lines.shown, lines.lit) = (width_px, Shown::Hidden, true);
+                    }
+                    let layers = LayersPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
+                    plan.layers = Some(layers).filter(|_| layered);
+                    each(&DrawPlan { samples, ..plan });
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bands_never_take_more_than_they_may() {
+        let (mut cases, mut alone) = (0, 0);
+        with_wide_lines(&mut |plan| {
+            for threads in [1, 2, 8, 64, 1024] {
+                let banding = Banding::new(plan, threads);
+                let bytes = banding.bytes(plan);
+                assert!(bytes <= BANDS_BYTES_MAX, "{bytes}: {banding:?} on {threads}, {:?}", plan.lines.first());
+                assert!((1..=threads).contains(&banding.at_once) && banding.rows >= 1);
+                // Of less than two bands of rows and margins there is little to share.
+                let is_large = plan.height_px > 4 * banding.margin && plan.height_px > banding.rows;
+                alone += usize::from(banding.at_once == 1 && threads > 1 && is_large);
+                cases += 1;
+            }
+        });
+        assert_eq!(cases, 5 * 12 * 4 * 5);
+        assert!(alone < cases / 20, "{alone} of {cases} pictures are drawn by one thread alone");
+    }
+
+    #[test]
+    fn a_band_takes_what_it_was_said_to() {
+        let mut cases = 0;
+        with_wide_lines(&mut |plan| {
+            let banding = Banding::new(plan, 1);
+            if banding.bytes(plan) > 32 << 20 {
+                return;
+            }
+            ScratchPool::default().with(plan, banding, |scratch| {
+                let pixels = (plan.width_px * banding.rows) as usize;
+                scratch.colors = Vec::with_capacity(pixels);
+                scratch.ink = Vec::with_capacity(pixels);
+                scratch.owners = Vec::with_capacity(pixels);
+                scratch.light = Vec::with_capacity(pixels);
+                scratch.layers = plan.layers().map(|_| LayerBand::new(&scratch.samples, scratch.rows));
+                assert_eq!(scratch.bytes(), banding.bytes(plan));
+            });
+            cases += 1;
+        });
+        assert!(cases > 100, "{cases}");
     }
 
     #[test]
     fn only_what_is_small_is_kept() {
         let (kept, bytes) = is_kept(&plan([1000, 900], 12));
         assert!(kept && (300_000..700_000).contains(&bytes), "{bytes}");
-        let (kept, bytes) = is_kept(&plan([8192, 10], 300));
+        let mut wide = plan([4096, 500], 1);
+        wide.surface = Some(SurfacePass::new(Faces::Both, Vec::new()));
+        (wide.lines[0].width_px, wide.lines[0].shown) = (50.0, Shown::Visible);
+        let (kept, bytes) = is_kept(&wide);
         assert!(!kept && bytes > KEPT_BYTES_MAX, "{bytes}");
     }
 }

@@ -1,4 +1,4 @@
-//! Stage 4, an edge on screen: where it lies, and which pixels it passes. Twin of the segments of `shaders/lines.wgsl`.
+//! Stage 4, an edge on screen: where it lies, and which pixels it passes. Twin of `shaders/segment.wgsl`.
 
 use super::Stages;
 use super::clip::clip_segment;
@@ -130,5 +130,9 @@ pub fn rows(a: f32, b: f32, reach: f32, [first, end]: [i32; 2]) -> [i32; 2] {
 
 fn clip(stages: &Stages<'_>, edge: &Edge) -> Option<[ScreenVertex; 2]> {
     let projection = &stages.plan.projection;
+    // Where nothing is to be clipped, what is outside is not drawn: of triangles neither.
+    if !projection.clip {
+        return None;
+    }
     clip_segment(projection, edge.vertices.map(|v| homogeneous(projection, stages.plan.positions[v as usize])))
 }

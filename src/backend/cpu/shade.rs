@@ -114,9 +114,9 @@ impl<'a> Shader<'a> {
         let scale = recip(count as f32);
         let corner = [x as i32 * 256 - plan.width_px as i32 * 128, y as i32 * 256 - plan.height_px as i32 * 128];
         let at = [corner[0] as f32 + offset_sum[0] as f32 * scale, corner[1] as f32 + offset_sum[1] as f32 * scale];
-        match (id.checked_sub(plan.triangles.len() as u32), &plan.surface, &plan.hull) {
-            (None, Some(surface), _) if surface.is_shaded => self.points.color(surface, id, at),
-            (Some(triangle), _, Some(hull)) => hull.color(triangle as usize),
+        match (self.stages.is_hull(id), &plan.surface, &plan.hull) {
+            (false, Some(surface), _) if surface.is_shaded => self.points.color(surface, id, at),
+            (true, _, Some(hull)) => hull.color(id as usize),
             _ => [0.0; 4],
         }
     }

@@ -4,7 +4,7 @@
 //! operations").
 
 use super::isa::{LANES, dispatch};
-use crate::plan::{HullOffset, HullPass, Projection};
+use crate::plan::{HullVertex, Projection};
 
 /// Farthest a snapped coordinate may lie from the picture's centre, in 1/256 px: 4096 px.
 pub const GUARD: f32 = 1_048_576.0;
@@ -21,6 +21,12 @@ pub struct ScreenVertex {
     pub z: f32,
     /// 1 / W.
     pub inv_w: f32,
+}
+
+impl From<&HullVertex> for ScreenVertex {
+    fn from(&HullVertex { x, y, z, inv_w }: &HullVertex) -> Self {
+        Self { x, y, z, inv_w }
+    }
 }
 
 /// `x` of a vertex that is behind the near plane or beyond the guard band.
@@ -76,52 +82,15 @@ pub fn row_dot(row: &[f32; 4], p: [f32; 3]) -> f32 {
     ((row[0] * p[0] + row[1] * p[1]) + row[2] * p[2]) + row[3]
 }
 
-/// `row . (n, 0)`.
-#[inline(always)]
-fn row_dot3(row: &[f32; 4], n: [f32; 3]) -> f32 {
-    (row[0] * n[0] + row[1] * n[1]) + row[2] * n[2]
-}
-
 /// Homogeneous screen position: X, Y, Z, W.
 #[inline(always)]
 pub fn homogeneous(projection: &Projection, p: [f32; 3]) -> [f32; 4] {
     [row_dot(&projection.x, p), row_dot(&projection.y, p), row_dot(&projection.z, p), row_dot(&projection.w, p)]
 }
 
-/// Where a hull vertex stands in the unit box: pushed out already if the push is in object units.
-#[inline(always)]
-pub fn hull_position(hull: &HullPass<'_>, position: [f32; 3], vertex: usize) -> [f32; 3] {
-    match hull.offset_at(vertex) {
-        HullOffset::Object(t) => {
-            let n = hull.normals[vertex];
-            [position[0] + t * n[0], position[1] + t * n[1], position[2] + t * n[2]]
-        }
-        HullOffset::Px(_) => position,
-    }
-}
-
 dispatch! {
     /// Transforms `positions` into `out`, of the same length.
     pub fn transform(projection: &Projection, positions: &[[f32; 3]], out: &mut [ScreenVertex]) = transform_lanes
-}
-
-/// Transforms hull vertices: `out[i]` is position `first + i`, pushed out.
-pub fn transform_hull(
-    projection: &Projection,
-    hull: &HullPass<'_>,
-    positions: &[[f32; 3]],
-    first: usize,
-    out: &mut [ScreenVertex],
-) {
-    for (i, slot) in out.iter_mut().enumerate() {
-        let vertex = first + i;
-        let position = hull_position(hull, positions[vertex], vertex);
-        let push = match hull.offset_at(vertex) {
-            HullOffset::Object(_) => None,
-            HullOffset::Px(px) => Some((hull.normals[vertex], 256.0 * px)),
-        };
-        *slot = transform_one(projection, position, push);
-    }
 }
 
 #[inline(always)]
@@ -132,32 +101,20 @@ fn transform_lanes(projection: &Projection, positions: &[[f32; 3]], out: &mut [S
         // Vertex by vertex inside a fixed-size loop: the compiler turns this into one vector a component.
         let mut records = [ScreenVertex::default(); LANES];
         for lane in 0..LANES {
-            records[lane] = transform_one(projection, group[lane], None);
+            records[lane] = transform_one(projection, group[lane]);
         }
         slots.copy_from_slice(&records);
     }
     for (position, slot) in groups.remainder().iter().zip(outs.into_remainder()) {
-        *slot = transform_one(projection, *position, None);
+        *slot = transform_one(projection, *position);
     }
 }
 
 #[inline(always)]
-fn transform_one(projection: &Projection, p: [f32; 3], push: Option<([f32; 3], f32)>) -> ScreenVertex {
+fn transform_one(projection: &Projection, p: [f32; 3]) -> ScreenVertex {
     let [x, y, z, w] = homogeneous(projection, p);
     let r = recip(w);
-    let (mut sx, mut sy) = (x * r, y * r);
-    if let Some((normal, units)) = push {
-        // The direction in which the projected point moves along the normal: d(X/W) = (dX - (X/W) dW) / W.
-        let dw = row_dot3(&projection.w, normal);
-        let dx = row_dot3(&projection.x, normal) - sx * dw;
-        let dy = row_dot3(&projection.y, normal) - sy * dw;
-        let length_squared = dx * dx + dy * dy;
-        if length_squared >= 1e-20 {
-            let q = rsqrt(length_squared);
-            sx += units * (dx * q);
-            sy += units * (dy * q);
-        }
-    }
+    let (sx, sy) = (x * r, y * r);
     // One test with non-short-circuiting ands; NaN compares false and lands outside.
     let inside = (w >= projection.near_w) & (sx.abs() <= GUARD) & (sy.abs() <= GUARD);
     if inside {

@@ -64,6 +64,15 @@ impl Buffers {
         Ok(())
     }
 
+    /// Reserves a buffer and fills it with whole words from a place on; what is before them is for a kernel to write.
+    pub fn upload_at(&mut self, gpu: &Gpu, slot: Slot, at: u64, bytes: &[u8]) -> Result<(), DrawError> {
+        let buffer = self.reserve(gpu, slot, at + bytes.len() as u64)?;
+        if !bytes.is_empty() {
+            gpu.queue.write_buffer(buffer, at, bytes);
+        }
+        Ok(())
+    }
+
     /// The slot's buffer, or an empty one where the plan needs none.
     pub fn storage(&mut self, gpu: &Gpu, slot: Slot) -> Result<&wgpu::Buffer, DrawError> {
         self.reserve(gpu, slot, 0)

@@ -1,11 +1,13 @@
 //! What each kernel is made of: its buffers, its source, and what of a plan it is specialised to.
 
 use super::look;
+use super::sizes::STROKES_BYTES;
 use super::stages::{Access, Into, Slot, Stage, Write};
 
 const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 const CONTOUR: &str = include_str!("../../../shaders/contour.wgsl");
 const HIDING: &str = include_str!("../../../shaders/hiding.wgsl");
+const SEGMENT: &str = include_str!("../../../shaders/segment.wgsl");
 const STROKE: &str = include_str!("../../../shaders/stroke.wgsl");
 const PLANES: &str = include_str!("../../../shaders/planes.wgsl");
 const WORK: &str = include_str!("../../../shaders/work.wgsl");
@@ -33,12 +35,7 @@ impl Stage {
     pub fn buffers(self) -> &'static [(Slot, Access)] {
         use Access::{Read, ReadWrite};
         match self {
-            Self::Transform => &[
-                (Slot::Positions, Read),
-                (Slot::HullNormals, Read),
-                (Slot::HullAmounts, Read),
-                (Slot::Vertices, ReadWrite),
-            ],
+            Self::Transform => &[(Slot::Positions, Read), (Slot::Vertices, ReadWrite)],
             Self::Visibility { into: Into::Surface, .. } => &[
                 (Slot::Triangles, Read),
                 (Slot::Roles, Read),
@@ -59,8 +56,6 @@ impl Stage {
             ],
             Self::Clip => &[
                 (Slot::Positions, Read),
-                (Slot::HullNormals, Read),
-                (Slot::HullAmounts, Read),
                 (Slot::Triangles, Read),
                 (Slot::Roles, Read),
                 (Slot::Vertices, Read),
@@ -113,10 +108,11 @@ impl Stage {
                 (Slot::Vertices, Read),
                 (Slot::Samples, Read),
                 (Slot::Edges, Read),
-                (Slot::Ink, ReadWrite),
+                (Slot::Owners, ReadWrite),
                 (Slot::Strokes, ReadWrite),
+                (Slot::Progress, ReadWrite),
             ],
-            Self::Ink => &[(Slot::Ink, ReadWrite), (Slot::Strokes, ReadWrite)],
+            Self::Ink => &[(Slot::Colors, ReadWrite), (Slot::Strokes, ReadWrite), (Slot::LineColors, Read)],
             Self::LineLight => &[
                 (Slot::Positions, Read),
                 (Slot::Triangles, Read),
@@ -131,15 +127,9 @@ impl Stage {
                 (Slot::VertexColors, Read),
                 (Slot::Texels, Read),
                 (Slot::Colors, ReadWrite),
-                (Slot::Ink, Read),
+                (Slot::Owners, ReadWrite),
             ],
-            Self::Resolve => &[
-                (Slot::Colors, Read),
-                (Slot::Ink, Read),
-                (Slot::Thresholds, Read),
-                (Slot::Rgba, ReadWrite),
-                (Slot::LineColors, Read),
-            ],
+            Self::Resolve => &[(Slot::Colors, Read), (Slot::Thresholds, Read), (Slot::Rgba, ReadWrite)],
         }
     }
 
@@ -204,8 +194,8 @@ impl Stage {
                 [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../shaders/line_light.wgsl")]].concat().concat()
             }
             Self::Lines => {
-                [COMMON, TRIANGLE, PLANES, CONTOUR, HIDING, STROKE, include_str!("../../../shaders/lines.wgsl")]
-                    .concat()
+                let kernel = include_str!("../../../shaders/lines.wgsl");
+                [COMMON, TRIANGLE, PLANES, CONTOUR, SEGMENT, HIDING, STROKE, kernel].concat()
             }
             Self::Ink => [COMMON, include_str!("../../../shaders/ink.wgsl")].concat(),
             Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
@@ -227,8 +217,8 @@ impl Stage {
             | look::HULL_LOOKS
             | look::WIRES_ONLY;
         match self {
-            Self::Transform => look::HULL_PX | look::HULL_AMOUNTS,
-            Self::Clip => look::HULL_PX | look::HULL_AMOUNTS | look::ROLES | look::LAYERS,
+            Self::Transform => 0,
+            Self::Clip => look::ROLES | look::LAYERS,
             Self::Visibility { into: Into::Surface, .. } => look::SAMPLES | look::ROLES,
             Self::Visibility { into: Into::Layer, .. } => {
                 look::SAMPLES | look::ROLES | look::LAYERS | look::BEHIND_SURFACE
@@ -238,9 +228,9 @@ impl Stage {
             Self::Layers => SHADED | look::LAYERED_HULL,
             Self::Shade => SHADED | look::LAYERS,
             Self::LineLight => SHADED,
-            Self::Ink => 0,
+            Self::Ink => look::SURFACE | look::HULL,
             Self::Lines => look::CONTOURS | look::CLIPPED | look::SAMPLES,
-            Self::Resolve => look::SURFACE | look::HULL | look::LINES | look::LIT_LINES,
+            Self::Resolve => look::SURFACE | look::HULL | look::LINES,
         }
     }
 
@@ -254,6 +244,7 @@ impl Stage {
             Self::Visibility { write: Write::Id, .. } | Self::VisibilityTile { write: Write::Id, .. } => {
                 vec![look, ("PHASE", 1.0)]
             }
+            Self::Lines | Self::Ink => vec![look, ("STROKE_WORDS", (STROKES_BYTES / 4) as f64)],
             _ => vec![look],
         }
     }

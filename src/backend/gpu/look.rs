@@ -1,10 +1,9 @@
 //! What a plan has: the shaders' `LOOK`, a constant of each pipeline, so that a kernel contains only what its plan needs.
 
-use crate::plan::{DrawPlan, HullOffset, SurfacePass, flags};
+use crate::plan::{DrawPlan, SurfacePass, flags};
 
 pub const SURFACE: u32 = 1;
 pub const HULL: u32 = 2;
-pub const HULL_PX: u32 = 4;
 pub const FACE_NORMALS: u32 = 8;
 pub const VERTEX_NORMALS: u32 = 16;
 pub const WIRES: u32 = 32;
@@ -20,7 +19,6 @@ pub const SAMPLES: u32 = FOUR_SAMPLES | EIGHT_SAMPLES | SIXTEEN_SAMPLES;
 pub const LIT_LINES: u32 = 8192;
 pub const CONTOURS: u32 = 16384;
 pub const ROLES: u32 = 0x10_0000;
-pub const HULL_AMOUNTS: u32 = 0x20_0000;
 pub const HULL_LOOKS: u32 = 0x40_0000;
 pub const LAYERS: u32 = 0x80_0000;
 pub const BEHIND_SURFACE: u32 = 0x100_0000;
@@ -49,9 +47,8 @@ pub fn look(plan: &DrawPlan<'_>) -> u32 {
         look |= when(all & flags::WIRES != 0, WIRES) | when(surface.edge_masks.len() == count, EDGE_MASKS);
     }
     if let Some(hull) = &plan.hull {
-        look |= HULL | when(matches!(hull.offset, HullOffset::Px(_)), HULL_PX);
-        look |= when(hull.amounts.len() == plan.positions.len(), HULL_AMOUNTS);
-        look |= when(hull.triangle_materials.len() == count, HULL_LOOKS) | when(plan.has_layered_hull(), LAYERED_HULL);
+        look |= HULL | when(!hull.triangle_materials.is_empty(), HULL_LOOKS);
+        look |= when(plan.has_layered_hull(), LAYERED_HULL);
     }
     look |= when(plan.roles.len() == count && count > 0, ROLES);
     if let Some(layers) = plan.layers() {
@@ -97,7 +94,6 @@ mod tests {
         let all = [
             ("SURFACE", SURFACE),
             ("HULL", HULL),
-            ("HULL_PX", HULL_PX),
             ("FACE_NORMALS", FACE_NORMALS),
             ("VERTEX_NORMALS", VERTEX_NORMALS),
             ("WIRES", WIRES),
@@ -111,7 +107,6 @@ mod tests {
             ("LIT_LINES", LIT_LINES),
             ("CONTOURS", CONTOURS),
             ("ROLES", ROLES),
-            ("HULL_AMOUNTS", HULL_AMOUNTS),
             ("HULL_LOOKS", HULL_LOOKS),
             ("LAYERS", LAYERS),
             ("BEHIND_SURFACE", BEHIND_SURFACE),

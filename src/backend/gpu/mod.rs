@@ -9,6 +9,7 @@
 mod buffers;
 mod device;
 mod kernels;
+mod line_shares;
 mod look;
 mod params;
 mod passes;
@@ -17,18 +18,21 @@ mod schedule;
 mod sizes;
 mod stages;
 mod step;
+#[cfg(test)]
+mod test_plans;
 mod tiles;
 
 use std::sync::Arc;
 
 pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
+pub use self::sizes::bands_bytes;
 
 use self::buffers::Buffers;
-use self::params::{attributes, corner_triangles, edge_lists, hull_amounts, hull_looks};
+use self::params::{attributes, corner_triangles, edge_lists, hull_looks};
 use self::recorder::Recorder;
 use self::schedule::Schedule;
 use self::sizes::{
-    DeviceTraits, LAYERED_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, ink_bytes, samples,
+    DeviceTraits, LAYERED_BYTES, OWNER_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, samples,
     work_bytes,
 };
 use self::stages::Slot;
@@ -36,7 +40,7 @@ use self::step::{Band, Goal, Step};
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::{Image, srgb8_thresholds};
 use crate::limits::Deadline;
-use crate::plan::{DrawPlan, LinePass};
+use crate::plan::{DrawPlan, HullVertex};
 
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
@@ -86,7 +90,7 @@ impl GpuRenderer {
         self.job(|gpu, buffers| {
             let schedule = Schedule::new(plan, &traits(gpu), goal)?;
             upload_geometry(gpu, buffers, plan, &schedule)?;
-            buffers.staging(gpu, schedule.band_rows as u64 * row_words as u64 * 8)?;
+            buffers.staging(gpu, u64::from(schedule.banding.rows) * row_words as u64 * 8)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
             let mut words = Vec::with_capacity(len);
             execute(&mut recorder, plan, &schedule, |recorder, band| {
@@ -129,10 +133,9 @@ impl Renderer for GpuRenderer {
             upload_looks(gpu, buffers, plan, &schedule)?;
             buffers.staging(gpu, size)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
-            execute(&mut recorder, plan, &schedule, |recorder, Band { rows: [first, end], buffer_first }| {
-                let from = u64::from(first - buffer_first) * row_bytes;
+            execute(&mut recorder, plan, &schedule, |recorder, Band { rows: [first, end] }| {
                 let to = u64::from(first) * row_bytes;
-                recorder.copy_out(Slot::Rgba, from, u64::from(end - first) * row_bytes, to)?;
+                recorder.copy_out(Slot::Rgba, 0, u64::from(end - first) * row_bytes, to)?;
                 recorder.submit()
             })?;
             recorder.read_staging(size, |bytes| image.rgba = bytes.to_vec())?;
@@ -166,22 +169,22 @@ fn upload_geometry(
     plan: &DrawPlan<'_>,
     schedule: &Schedule,
 ) -> Result<(), DrawError> {
-    let vertices = plan.positions.len() as u64;
     buffers.upload(gpu, Slot::Positions, bytemuck::cast_slice(plan.positions))?;
-    buffers.upload(gpu, Slot::Triangles, bytemuck::cast_slice(plan.triangles))?;
+    let (corners, own) = plan.hull.as_ref().map_or((&[][..], &[][..]), |hull| (&hull.triangles, &hull.vertices));
+    let triangles = [bytemuck::cast_slice(plan.triangles), bytemuck::cast_slice(corners)];
+    buffers.upload_parts(gpu, Slot::Triangles, &triangles)?;
+    let transformed = plan.positions.len() as u64 * size_of::<HullVertex>() as u64;
+    buffers.upload_at(gpu, Slot::Vertices, transformed, bytemuck::cast_slice(own))?;
     if let Some(hull) = &plan.hull {
-        buffers.upload(gpu, Slot::HullNormals, bytemuck::cast_slice(&hull.normals))?;
-        buffers.upload(gpu, Slot::HullAmounts, bytemuck::cast_slice(&hull_amounts(hull)))?;
         buffers.upload(gpu, Slot::HullLooks, &hull_looks(hull))?;
     }
-    let copies = if plan.hull.is_some() { 2 } else { 1 };
-    buffers.reserve(gpu, Slot::Vertices, vertices * copies * 16)?;
     if !has_visibility(plan) {
         return Ok(());
     }
     buffers.upload(gpu, Slot::Roles, &plan.roles)?;
-    let samples = samples(plan, schedule.band_rows);
-    buffers.reserve(gpu, Slot::Samples, samples * SAMPLE_BYTES)?;
+    let seen = samples(plan, schedule.banding.seen_rows(plan));
+    buffers.reserve(gpu, Slot::Samples, seen * SAMPLE_BYTES)?;
+    let samples = samples(plan, schedule.banding.rows);
     if plan.layers().is_some() {
         buffers.reserve(gpu, Slot::Layer, samples * SAMPLE_BYTES)?;
         buffers.reserve(gpu, Slot::Layered, samples * LAYERED_BYTES)?;
@@ -193,8 +196,8 @@ fn upload_geometry(
 
 /// Puts what shade, lines and resolve read on the GPU, and makes room for what they write.
 fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
-    let band_pixels = u64::from(plan.width_px) * u64::from(schedule.band_rows);
-    if has_visibility(plan) {
+    let band_pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);
+    if has_visibility(plan) || !plan.lines.is_empty() {
         buffers.reserve(gpu, Slot::Colors, band_pixels * color_bytes(plan))?;
     }
     if let Some(surface) = &plan.surface {
@@ -218,12 +221,14 @@ fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule:
     }
     if !plan.lines.is_empty() {
         let edges: Vec<&[u8]> = edge_lists(&plan.lines).0.into_iter().map(bytemuck::cast_slice).collect();
-        let lit = |lines: &LinePass| [f32::from(u8::from(lines.lit)), 0.0, 0.0, 0.0];
-        let colors: Vec<[f32; 4]> = plan.lines.iter().flat_map(|lines| [lines.color, lit(lines)]).collect();
+        let colors: Vec<[f32; 4]> = plan.lines.iter().map(|lines| lines.color).collect();
         buffers.upload_parts(gpu, Slot::Edges, &edges)?;
         buffers.upload(gpu, Slot::LineColors, bytemuck::cast_slice(&colors))?;
         buffers.reserve(gpu, Slot::Strokes, band_pixels * STROKES_BYTES)?;
-        buffers.reserve(gpu, Slot::Ink, band_pixels * ink_bytes(plan))?;
+        buffers.reserve(gpu, Slot::Progress, schedule.progress_bytes)?;
+        if plan.lights_lines() {
+            buffers.reserve(gpu, Slot::Owners, band_pixels * OWNER_BYTES)?;
+        }
     }
     buffers.upload(gpu, Slot::Thresholds, bytemuck::cast_slice(&srgb8_thresholds()))?;
     buffers.reserve(gpu, Slot::Rgba, band_pixels * 4)?;
@@ -242,7 +247,9 @@ fn execute<'a>(
         next += 1;
         match *step {
             Step::ClearBand => clear_band(recorder, plan, schedule)?,
-            Step::ClearLayer => recorder.clear(Slot::Layer, samples(plan, schedule.band_rows) * SAMPLE_BYTES)?,
+            Step::ClearLayer => {
+                recorder.clear(Slot::Layer, samples(plan, schedule.banding.rows) * SAMPLE_BYTES)?;
+            }
             Step::EndLayer { layer, end } => {
                 if recorder.read_word(Slot::Rounds, layer)? == 0 {
                     next = end;
@@ -250,6 +257,9 @@ fn execute<'a>(
             }
             Step::ClearWork => recorder.clear(Slot::Work, 8)?,
             Step::Dispatch { stage, batch, workgroups } => recorder.dispatch(stage, batch, workgroups)?,
+            Step::Lines { batch, workgroups } => {
+                recorder.lines_in_rounds(batch, workgroups, schedule.progress_bytes)?;
+            }
             Step::Tiles { stage, batch } if schedule.tiles.in_rounds => {
                 recorder.tiles_in_rounds(stage, &schedule.batches[batch], &schedule.tiles)?;
             }
@@ -262,17 +272,18 @@ fn execute<'a>(
 }
 
 fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
-    let rows = schedule.band_rows;
     if schedule.layers > 0 {
         recorder.clear(Slot::Rounds, u64::from(schedule.layers) * 4)?;
     }
     if has_visibility(plan) {
-        recorder.clear(Slot::Samples, samples(plan, rows) * SAMPLE_BYTES)?;
+        recorder.clear(Slot::Samples, samples(plan, schedule.banding.seen_rows(plan)) * SAMPLE_BYTES)?;
     }
     if !plan.lines.is_empty() {
-        let pixels = u64::from(plan.width_px) * u64::from(rows);
-        recorder.clear(Slot::Ink, pixels * ink_bytes(plan))?;
+        let pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);
         recorder.clear(Slot::Strokes, pixels * STROKES_BYTES)?;
+        if plan.lights_lines() {
+            recorder.clear(Slot::Owners, pixels * OWNER_BYTES)?;
+        }
     }
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::plan::{DrawPlan, Edge, Faces, HullOffset, HullPass, Lights, LinePass, Shown, SurfacePass};
+use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, Shown, Side, SurfacePass};
 
 /// The plan's numbers.
 #[repr(C)]
@@ -22,16 +22,13 @@ pub struct Frame {
     background: [f32; 4],
     hull_color: [f32; 4],
     near_w: f32,
-    hull_push: f32,
     ambient: f32,
     lamp_count: u32,
-    line_pass_count: u32,
     zero: u32,
     width: u32,
     height: u32,
     triangle_count: u32,
     vertex_count: u32,
-    hull_base: u32,
     masks_at: u32,
     material_count: u32,
     layer_fade: f32,
@@ -40,8 +37,6 @@ pub struct Frame {
     normal_triangles_at: u32,
     uv_triangles_at: u32,
     color_triangles_at: u32,
-    /// WGSL rounds a struct up to its alignment.
-    padding: u32,
 }
 
 /// A dispatch's numbers.
@@ -50,8 +45,6 @@ pub struct Frame {
 pub struct Batch {
     pub first: u32,
     pub count: u32,
-    pub id_base: u32,
-    pub vertex_base: u32,
     pub faces: u32,
     pub row_first: u32,
     pub row_end: u32,
@@ -68,10 +61,11 @@ pub struct Batch {
     pub line_windows: f32,
     pub line_slices: u32,
     pub line_peak: f32,
-    pub line_turns: u32,
-    pub line_turn: u32,
-    pub ink_at: u32,
-    pub owners_at: u32,
+    pub line_units: u32,
+    pub line_pass: u32,
+    pub seen_first: u32,
+    pub seen_end: u32,
+    pub samples_at: u32,
     pub role: u32,
     pub layer: u32,
 }
@@ -86,15 +80,14 @@ pub fn line_flags(lines: &LinePass, something_hides: bool, lights_lines: bool) -
         Shown::Hidden => 2,
     };
     shown
-        | u32::from(lines.skip_back_edges) << 2
+        | u32::from(lines.unseen_side.is_some()) << 2
         | u32::from(lines.contour) << 3
         | u32::from(lines.lit && lights_lines) << 4
+        | u32::from(lines.unseen_side == Some(Side::Front)) << 6
 }
 
-/// Bits of [`Batch::line_flags`] for a dispatch that draws only edges that a workgroup shares, or only others.
-pub const LONG_ONLY: u32 = 32;
-/// See [`LONG_ONLY`].
-pub const SHORT_ONLY: u32 = 64;
+/// Bit of [`Batch::line_flags`]: no pass has laid anything over the background yet.
+pub const FIRST_PASS: u32 = 32;
 
 /// Distance between [`Batch`]es in their buffer: every device can bind at multiples of this.
 pub const BATCH_STRIDE: usize = 256;
@@ -116,7 +109,6 @@ impl Frame {
             width: plan.width_px,
             height: plan.height_px,
             triangle_count: plan.triangles.len() as u32,
-            hull_base: plan.positions.len() as u32,
             ..Self::default()
         };
         if let Some(surface) = &plan.surface {
@@ -125,13 +117,8 @@ impl Frame {
         if let Some(hull) = &plan.hull {
             frame.hull_color = hull.color(0);
             frame.hull_color_count = hull.colors.len() as u32;
-            frame.hull_push = match hull.offset {
-                HullOffset::Object(units) => units,
-                HullOffset::Px(px) => 256.0 * px,
-            };
         }
         frame.layer_fade = plan.layers().map_or(1.0, |layers| layers.fade);
-        frame.line_pass_count = plan.lines.len() as u32;
         frame
     }
 
@@ -151,18 +138,10 @@ impl Frame {
     }
 }
 
-/// The hull's colours, then its triangles' materials: what [`Frame::hull_color_count`] points into.
+/// The hull's colours, then the materials of the mesh's triangles and of its own: what [`Frame::hull_color_count`] points into.
 pub fn hull_looks(hull: &HullPass<'_>) -> Vec<u8> {
-    [bytemuck::cast_slice(&hull.colors), bytemuck::cast_slice::<u32, u8>(hull.triangle_materials)].concat()
-}
-
-/// How far each position moves, as [`Frame`] has it for all.
-pub fn hull_amounts(hull: &HullPass<'_>) -> Vec<f32> {
-    let unit = match hull.offset {
-        HullOffset::Object(_) => 1.0,
-        HullOffset::Px(_) => 256.0,
-    };
-    hull.amounts.iter().map(|amount| unit * amount).collect()
+    let materials = [hull.surface_materials, &hull.triangle_materials].map(bytemuck::cast_slice::<u32, u8>);
+    [bytemuck::cast_slice(&hull.colors), materials[0], materials[1]].concat()
 }
 
 /// Triangles' materials, then edge masks four to a word: what [`Frame::masks_at`] points into.
@@ -242,30 +221,19 @@ mod tests {
     use std::borrow::Cow;
 
     use super::*;
+    use crate::backend::gpu::test_plans::{edges, lines};
     use crate::plan::CornerValues;
 
     #[test]
     fn sizes_are_those_of_the_shader() {
-        assert_eq!(size_of::<Frame>(), 320);
-        assert_eq!(size_of::<Batch>(), 104);
+        assert_eq!(size_of::<Frame>(), 304);
+        assert_eq!(size_of::<Batch>(), 100);
     }
 
     #[test]
     fn a_list_of_edges_is_uploaded_once() {
-        let list = |count: u32| -> Arc<[Edge]> {
-            (0..count).map(|v| Edge { vertices: [v, v + 1], faces: [Edge::NO_FACE; 2] }).collect()
-        };
-        let (long, short) = (list(5), list(3));
-        let passes = [&long, &short, &long, &list(3), &short].map(|edges| LinePass {
-            edges: edges.clone(),
-            width_px: 1.0,
-            smoothing_px: 1.0,
-            color: [1.0; 4],
-            shown: Shown::All,
-            skip_back_edges: false,
-            contour: false,
-            lit: false,
-        });
+        let (long, short) = (edges(5), edges(3));
+        let passes = [&long, &short, &long, &edges(3), &short].map(|list| lines(list.clone(), 1.0, Shown::All));
         let (lists, starts) = edge_lists(&passes);
         assert_eq!(lists.iter().map(|list| list.len()).collect::<Vec<_>>(), [5, 3, 3]);
         assert_eq!(starts, [0, 5, 0, 8, 5]);

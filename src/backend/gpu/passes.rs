@@ -1,17 +1,19 @@
 //! Which triangles go where: the GPU's side of a plan's roles.
 
+use std::ops::Range;
+
 use crate::plan::{DrawPlan, Faces, roles};
 
 /// Triangles that are drawn for the same reason.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Pass {
-    /// Added to a triangle's index to get its id.
-    pub id_base: u32,
-    /// Added to a vertex index to get its record.
-    pub vertex_base: u32,
+    /// Which.
+    pub ids: Range<u32>,
+    /// Whether any of them may need clipping.
+    pub clip: bool,
     /// Which side, unless a triangle's role says.
     pub faces: Faces,
-    /// The role that triangles must have.
+    /// The role that triangles must have; of a hull's none.
     pub role: u8,
 }
 
@@ -28,11 +30,15 @@ impl Pass {
     }
 
     fn surface(plan: &DrawPlan<'_>, role: u8) -> Option<Self> {
-        plan.surface.as_ref().map(|s| Self { id_base: 0, vertex_base: 0, faces: s.faces, role })
+        let (ids, clip) = (0..plan.triangles.len() as u32, plan.projection.clip);
+        plan.surface.as_ref().map(|s| Self { ids, clip, faces: s.faces, role })
     }
 
     fn hull(plan: &DrawPlan<'_>) -> Option<Self> {
-        let (id_base, vertex_base) = (plan.triangles.len() as u32, plan.positions.len() as u32);
-        plan.hull.as_ref().map(|_| Self { id_base, vertex_base, faces: Faces::Back, role: roles::HULL })
+        let first = plan.triangles.len() as u32;
+        plan.hull.as_ref().map(|hull| {
+            let ids = first..first + hull.triangles.len() as u32;
+            Self { ids, clip: false, faces: Faces::Both, role: 0 }
+        })
     }
 }

@@ -107,6 +107,18 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
+    /// Draws lines until no thread has anything left to do.
+    pub fn lines_in_rounds(&mut self, batch: usize, workgroups: [u32; 2], bytes: u64) -> Result<(), DrawError> {
+        self.clear(Slot::Progress, bytes)?;
+        loop {
+            self.dispatch(Stage::Lines, batch, workgroups)?;
+            if self.read_word(Slot::Progress, 0)? == 0 {
+                return Ok(());
+            }
+            self.clear(Slot::Progress, 4)?;
+        }
+    }
+
     /// Reads one word of a buffer, when all that was recorded is done.
     pub fn read_word(&mut self, slot: Slot, index: u32) -> Result<u32, DrawError> {
         let (from, to) = (self.buffers.storage(self.gpu, slot)?.clone(), self.buffers.counts(self.gpu).clone());

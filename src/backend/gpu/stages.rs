@@ -28,13 +28,13 @@ pub enum Stage {
     Layers,
     /// Samples to colours.
     Shade,
-    /// Edges to ink.
+    /// Edges to strokes.
     Lines,
-    /// Unites the strokes of a line pass in each pixel.
+    /// Unites the strokes of a line pass in each pixel, and lays them over the colours.
     Ink,
-    /// Samples and ink to the light on lines.
+    /// Samples to the light on a line pass.
     LineLight,
-    /// Colours and ink to bytes.
+    /// Colours to bytes.
     Resolve,
 }
 
@@ -63,8 +63,7 @@ pub enum Into {
 #[repr(u32)]
 pub enum Slot {
     Positions,
-    HullNormals,
-    Triangles,
+    Triangles = 2,
     Vertices,
     Samples,
     Work,
@@ -73,7 +72,7 @@ pub enum Slot {
     Attributes,
     Colors,
     Edges,
-    Ink,
+    Owners,
     Strokes,
     Thresholds,
     Rgba,
@@ -83,16 +82,16 @@ pub enum Slot {
     Uvs,
     VertexColors,
     Texels,
+    Progress,
     Roles = 24,
     HullLooks,
     Layer,
     Layered,
     Rounds,
-    HullAmounts,
 }
 
 /// Number of [`Slot`]s.
-pub const SLOTS: usize = 30;
+pub const SLOTS: usize = 29;
 
 /// Whether a kernel writes to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -28,6 +28,13 @@ pub enum Step {
         /// How often.
         workgroups: [u32; 2],
     },
+    /// Draws lines, in as many rounds as that takes.
+    Lines {
+        /// Index of its numbers.
+        batch: usize,
+        /// How often.
+        workgroups: [u32; 2],
+    },
     /// Draws the large triangles of the batch.
     Tiles {
         /// The kernel.
@@ -46,8 +53,6 @@ pub enum Step {
 pub struct Band {
     /// First row, and the row after the last.
     pub rows: [u32; 2],
-    /// The first row that the buffers hold: rows beyond the band hide lines that reach into it.
-    pub buffer_first: u32,
 }
 
 /// What is wanted of a plan.

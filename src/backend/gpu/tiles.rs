@@ -1,10 +1,7 @@
-//! How much a thread is given at a time: how often the kernel that draws large triangles is run, and how many edges one that
-//! draws lines takes.
+//! How often the kernel that draws large triangles is run.
 
-use super::params::{LONG_ONLY, SHORT_ONLY};
-use super::schedule::WORKGROUP;
 use super::sizes::DeviceTraits;
-use crate::plan::{DrawPlan, LinePass};
+use crate::plan::DrawPlan;
 
 /// Sample tests that may be handed to the device without looking at how many it really is: a second or so of work.
 const BLIND_TESTS_MAX: u64 = 1 << 38;
@@ -56,46 +53,6 @@ impl Tiles {
             .collect()
     }
 }
-
-/// Threads that share a window of an edge, where the line is so wide that it has many pixels.
-pub fn slices(lines: &LinePass, device: &DeviceTraits) -> u32 {
-    let side = lines.window_px() + 2.0 * lines.reach_px();
-    // Few edges leave most of a GPU idle, so threads may look along them twice; a processor has nothing to spare.
-    let is_idle = !device.loops_are_limited && lines.edges.len() < BUSY_EDGES;
-    let pixels = if is_idle { 64.0 } else { 400.0 };
-    (side * 2.0 * lines.reach_px() / pixels).ceil().clamp(1.0, 64.0) as u32
-}
-
-/// Edges that keep all of a GPU busy.
-const BUSY_EDGES: usize = 1 << 15;
-
-/// How the kernel that draws lines is run over its edges: with which flag, how many edges a workgroup, and in how many turns,
-/// each of which draws its part of the shares.
-///
-/// Where a thread's loops are limited, edges that a workgroup shares come by themselves, few at a time.
-pub fn edges_per_group(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> Vec<(u32, u32, u32)> {
-    if !device.loops_are_limited {
-        let edges = (lines.edges.len() as u32).div_ceil(BUSY_GROUPS).clamp(1, WORKGROUP);
-        return vec![(0, edges, 1)];
-    }
-    let (reach, window, slices) = (lines.reach_px(), lines.window_px(), slices(lines, device) as f32);
-    let side = plan.width_px.max(plan.height_px) as f32;
-    let shares = ((1.5 * side / window + 2.0) * slices / WORKGROUP as f32).ceil();
-    let length = window + 2.0 * (reach + 1.0);
-    // Steps of half a pixel, and at each pixel the samples of three; then a loop over a mask's words for each pixel.
-    let look = 2.0 * length + 1.5 * 3.0 * plan.samples as f32 * length;
-    let draw = (window + 2.0 * reach) / slices * (2.0 + 10.0 * (2.0 * reach + 1.0));
-    let iterations = shares * (LOOKS * look + LOOKS / 4.0 * draw);
-    let shared = (ITERATIONS_MAX as f32 / iterations).clamp(1.0, WORKGROUP as f32) as u32;
-    let turns = (iterations / ITERATIONS_MAX as f32).ceil().clamp(1.0, shares) as u32;
-    vec![(SHORT_ONLY, WORKGROUP, 1), (LONG_ONLY, shared, turns)]
-}
-
-/// Workgroups that keep all of a GPU busy.
-const BUSY_GROUPS: u32 = 1024;
-
-/// Looks along an edge in a window that are made room for: a few for each part, and between letters or leaves there are many.
-const LOOKS: f32 = 16.0;
 
 #[cfg(test)]
 mod tests {

@@ -1,19 +1,23 @@
-//! The bytes of buffers and buffer views. Buffers are decoded when first asked for, so that one that nothing drawn needs
-//! (a texture's, or a file outside the upload) costs nothing.
+//! The bytes of buffers and buffer views. Buffers are decoded and views decompressed when first asked for, so that what nothing drawn
+//! needs (a texture's buffer, or a file outside the upload) costs nothing.
 
+use super::meshopt;
+use super::tree::{Buffer, BufferView, Document};
 use crate::mesh::import::Context;
 use crate::mesh::{MeshError, MeshFault};
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use gltf::json::{Root, buffer};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// All buffers of a file.
 pub struct Buffers<'a> {
-    root: &'a Root,
+    doc: &'a Document,
     bin: Option<&'a [u8]>,
     decoded: Vec<Option<Rc<Cow<'a, [u8]>>>>,
+    /// By the index of their view.
+    decompressed: BTreeMap<usize, Rc<Cow<'a, [u8]>>>,
 }
 
 /// A buffer view, checked to lie in its buffer.
@@ -21,6 +25,8 @@ pub struct View<'a> {
     buffer: Rc<Cow<'a, [u8]>>,
     start: usize,
     length: usize,
+    /// Where it begins in what elements are aligned to.
+    pub offset_bytes: u64,
     /// Bytes from one element to the next, where the view says so.
     pub stride_bytes: Option<u64>,
 }
@@ -33,34 +39,63 @@ impl View<'_> {
 }
 
 impl<'a> Buffers<'a> {
-    /// The buffers of `root`; `bin` is the binary chunk of a GLB.
-    pub fn new(root: &'a Root, bin: Option<&'a [u8]>) -> Self {
-        Self { root, bin, decoded: vec![None; root.buffers.len()] }
+    /// The buffers of `doc`; `bin` is the binary chunk of a GLB.
+    pub fn new(doc: &'a Document, bin: Option<&'a [u8]>) -> Self {
+        Self { doc, bin, decoded: vec![None; doc.buffers.len()], decompressed: BTreeMap::new() }
     }
 
     /// The view with the given index.
     pub fn view(&mut self, index: usize, cx: &mut Context<'_>) -> Result<View<'a>, MeshError> {
-        let root = self.root;
-        let view: &buffer::View = root
+        let doc = self.doc;
+        let view: &BufferView = doc
             .buffer_views
             .get(index)
             .ok_or_else(|| MeshError::broken(format!("there is no buffer view {index} in the glTF file")))?;
-        let buffer = self.buffer(view.buffer.value(), cx)?;
-        let start = view.byte_offset.map_or(0, |o| o.0);
-        let length = view.byte_length.0;
+        let stride_bytes = view.byte_stride.map(|stride| stride.0).filter(|&stride| stride > 0);
+        let compressed = view.extensions.ext_meshopt.as_ref().or(view.extensions.khr_meshopt.as_ref());
+        if let Some(packed) = compressed {
+            let buffer = match self.decompressed.get(&index) {
+                Some(done) => Rc::clone(done),
+                None => {
+                    let what = format!("the compressed data of buffer view {index}");
+                    let from = self.span(&what, packed.buffer.0, packed.byte_offset.0, packed.byte_length.0, cx)?;
+                    let has_colors = view.extensions.khr_meshopt.is_some();
+                    let bytes = meshopt::decode(index, packed, has_colors, from.bytes(), view.byte_length.0, cx)?;
+                    let bytes = Rc::new(Cow::Owned(bytes));
+                    self.decompressed.insert(index, Rc::clone(&bytes));
+                    bytes
+                }
+            };
+            let length = buffer.len();
+            return Ok(View { buffer, start: 0, length, offset_bytes: 0, stride_bytes });
+        }
+        let what = format!("buffer view {index}");
+        let view = self.span(&what, view.buffer.0, view.byte_offset.0, view.byte_length.0, cx)?;
+        Ok(View { stride_bytes, ..view })
+    }
+
+    /// Some bytes of a buffer.
+    fn span(
+        &mut self,
+        what: &str,
+        buffer: usize,
+        start: u64,
+        length: u64,
+        cx: &mut Context<'_>,
+    ) -> Result<View<'a>, MeshError> {
+        let buffer = self.buffer(buffer, cx)?;
         if start.checked_add(length).is_none_or(|end| end > buffer.len() as u64) {
             return Err(MeshError::broken(format!(
-                "buffer view {index} of the glTF file spans bytes {start} to {start} + {length}, and its buffer has {}",
+                "{what} of the glTF file spans bytes {start} to {start} + {length}, and its buffer has {}",
                 buffer.len()
             )));
         }
-        let stride_bytes = view.byte_stride.map(|s| s.0 as u64).filter(|&s| s > 0);
-        Ok(View { buffer, start: start as usize, length: length as usize, stride_bytes })
+        Ok(View { buffer, start: start as usize, length: length as usize, offset_bytes: start, stride_bytes: None })
     }
 
     fn buffer(&mut self, index: usize, cx: &mut Context<'_>) -> Result<Rc<Cow<'a, [u8]>>, MeshError> {
-        let buffer = self
-            .root
+        let buffer: &Buffer = self
+            .doc
             .buffers
             .get(index)
             .ok_or_else(|| MeshError::broken(format!("there is no buffer {index} in the glTF file")))?;
@@ -74,9 +109,8 @@ impl<'a> Buffers<'a> {
             },
             (None, Some(bin)) if index == 0 => Cow::Borrowed(bin),
             (None, _) => {
-                return Err(super::document::compression(self.root).unwrap_or_else(|| {
-                    MeshError::broken(format!("buffer {index} of the glTF file has neither a URI nor a GLB chunk"))
-                }));
+                let detail = format!("buffer {index} of the glTF file has neither a URI nor a GLB chunk");
+                return Err(MeshError::broken(detail));
             }
         };
         if buffer.byte_length.0 > bytes.len() as u64 {

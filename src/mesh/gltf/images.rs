@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 pub struct Images {
     /// In the order of their first use.
     pub sources: Vec<ImageSource>,
-    /// Index into `sources` by the file's image index, and whether it is in a format that is not read.
-    known: BTreeMap<(usize, bool), u32>,
+    /// Index into `sources` by the file's image index.
+    known: BTreeMap<usize, u32>,
 }
 
 impl Images {
@@ -37,19 +37,14 @@ impl Images {
         }
         let texture: model::Texture = entry("texture", &lists.textures, index)?;
         let in_other = |other: &Option<model::OtherSource>| other.as_ref().and_then(|other| other.source);
-        let (image, is_unread) = match (in_other(&texture.extensions.webp), texture.source) {
-            (Some(webp), _) => (webp.0, false),
-            (None, Some(source)) => (source.0, false),
-            (None, None) => match in_other(&texture.extensions.basisu) {
-                Some(basisu) => (basisu.0, true),
-                None => {
-                    let detail = format!("texture {index} has no image that is read; it is drawn as if it were white");
-                    super::warn_once(warnings, "texture_without_image", detail);
-                    return Ok(None);
-                }
-            },
+        // Basis Universal last: what else there is has lost less.
+        let image = in_other(&texture.extensions.webp).or(texture.source).or(in_other(&texture.extensions.basisu));
+        let Some(image) = image else {
+            let detail = format!("texture {index} has no image that is read; it is drawn as if it were white");
+            super::warn_once(warnings, "texture_without_image", detail);
+            return Ok(None);
         };
-        let image = self.image(index, image, is_unread, lists, reader, cx)?;
+        let image = self.image(index, image.0, lists, reader, cx)?;
         let sampler = match texture.sampler {
             Some(sampler) => entry::<model::Sampler>("sampler", &lists.samplers, sampler.0)?,
             None => model::Sampler::default(),
@@ -66,12 +61,11 @@ impl Images {
         &mut self,
         texture: usize,
         index: usize,
-        is_unread: bool,
         lists: &Lists<'_>,
         reader: &mut Reader<'_>,
         cx: &mut Context<'_>,
     ) -> Result<u32, MeshError> {
-        if let Some(&known) = self.known.get(&(index, is_unread)) {
+        if let Some(&known) = self.known.get(&index) {
             return Ok(known);
         }
         if index >= lists.images.len() {
@@ -85,17 +79,11 @@ impl Images {
         cx.budget.spend("a glTF image's description", raw_bytes, 1)?;
         let image: model::Image = entry("image", &lists.images, index)?;
         let name = name(index, &image);
-        let content = if is_unread {
-            ImageContent::Missing(format!(
-                "{name} is a Basis Universal texture (KHR_texture_basisu), which is not read: export the model with PNG, JPEG or WebP images"
-            ))
-        } else {
-            content(&name, index, &image, reader, cx)?
-        };
+        let content = content(&name, index, &image, reader, cx)?;
         cx.budget.spend("images", 1, size_of::<ImageSource>() as u64 * 2 + 64)?;
         let place = self.sources.len() as u32;
         self.sources.push(ImageSource { name, content });
-        self.known.insert((index, is_unread), place);
+        self.known.insert(index, place);
         Ok(place)
     }
 }

@@ -181,8 +181,17 @@ const UNDRAWN: &[(&str, &str)] = &[
     ("KHR_materials_sheen", "sheen_ignored"),
     ("KHR_materials_specular", "specular_ignored"),
     ("KHR_materials_transmission", "transmission_ignored"),
+    ("KHR_materials_volume_scatter", "volume_scatter_ignored"),
     ("KHR_materials_volume", "volume_ignored"),
 ];
+
+/// Extensions of materials that are drawn.
+const DRAWN: &[&str] = &["KHR_materials_emissive_strength", "KHR_materials_unlit", SPECULAR_GLOSSINESS];
+
+/// Whether an extension of materials is drawn, or known and told of in a warning.
+pub fn is_known(extension: &str) -> bool {
+    DRAWN.contains(&extension) || UNDRAWN.iter().any(|(name, _)| *name == extension)
+}
 
 fn warn_of_undrawn(what: &str, json: &model::Material<'_>, warnings: &mut Vec<Warning>) {
     for name in json.extensions.keys() {

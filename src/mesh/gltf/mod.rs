@@ -1,30 +1,49 @@
-//! glTF 2.0, as JSON or GLB. The `gltf` crate gives the typed JSON model; what the model says is checked and read here.
+//! glTF 2.0, as JSON or GLB.
 //!
-//! Reading order: [`container`], [`document`], [`scene`] (which nodes are shown, and where), [`primitive`], [`accessor`],
-//! [`buffers`]; and for surfaces [`model`] (the document's other half), [`materials`], [`images`], [`cameras`].
+//! Reading order: [`container`], [`document`], [`tree`] (what is where) and [`check`], [`pose`] (the moment that is drawn), [`scene`]
+//! (which nodes are shown), [`primitive`] and [`vertices`], [`shape`] (morphed and held by joints), [`accessor`], [`buffers`]; for
+//! surfaces [`model`] (the document's other half), [`materials`], [`images`], [`cameras`].
 
 mod accessor;
+mod animation;
+mod attribute;
 mod buffers;
 mod cameras;
+mod check;
 mod container;
 mod document;
+mod draco;
 mod facts;
 mod images;
+mod instancing;
 mod materials;
+mod meshopt;
+mod meshopt_filters;
 mod model;
 mod ngons;
+mod pose;
 mod primitive;
 mod scene;
+mod shape;
+mod skin;
 mod transform;
+mod tree;
+mod triangles;
+mod vertices;
 
 use self::accessor::Reader;
 use self::materials::Materials;
 use self::model::Lists;
+use self::pose::Pose;
 use self::primitive::Primitive;
+use self::scene::Instance;
+use self::shape::Shape;
+use self::skin::Skins;
+use self::transform::Affine;
+use self::tree::{Document, mode};
 use super::import::Context;
 use super::raw::RawMesh;
-use super::{Format, MaterialSlot, MeshError, Warning};
-use gltf::json::Root;
+use super::{FileContent, Format, MaterialSlot, MeshError, Warning};
 use std::rc::Rc;
 
 /// Reads either kind.
@@ -39,29 +58,30 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
         raw.report.format = Format::Gltf;
         (bytes, None)
     };
-    let root = document::parse(json, cx)?;
+    let doc = document::parse(json, cx)?;
     let lists = Lists::of(json);
-    let scene = scene::scene(&root, cx)?;
+    check::check(&doc, &lists)?;
+    raw.report.content = content(&doc);
+    let mut reader = Reader::new(&doc, bin);
+    let pose = Pose::new(&doc, &lists, &mut reader, &mut raw.report.warnings, cx)?;
+    let scene = scene::scene(&doc, &pose, cx)?;
     raw.cameras = cameras::cameras(&scene.cameras, &lists, &mut raw.report.warnings);
 
-    let mut primitives = Primitives {
-        root: &root,
-        lists: &lists,
-        reader: Reader::new(&root, bin),
+    let mut meshes = Meshes {
+        doc: &doc,
+        pose: &pose,
+        reader,
+        skins: Skins::new(&doc),
         materials: Materials::new(&lists, cx)?,
-        of_mesh: vec![None; root.meshes.len()],
+        of_mesh: vec![None; doc.meshes.len()],
+        uses_default_material: false,
     };
-    let default_material = primitives.materials.count();
-    let mut uses_default = false;
     for instance in &scene.instances {
-        for primitive in primitives.of(instance.mesh, &mut raw.report.warnings, cx)?.iter() {
-            uses_default |= primitive.material().is_none();
-            primitive.append(&mut raw, &instance.transform, default_material, cx)?;
-        }
+        meshes.show(instance, &mut raw, cx)?;
     }
     raw.is_f32 = true;
-    warn_of_unread(&root, &mut raw.report.warnings);
-    let (slots, images) = primitives.materials.into_slots();
+    let uses_default = meshes.uses_default_material;
+    let (slots, images) = meshes.materials.into_slots();
     (raw.materials, raw.images) = (slots, images.sources);
     if uses_default {
         raw.materials.push(MaterialSlot::default());
@@ -70,37 +90,76 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     Ok(raw)
 }
 
-/// The decoded primitives of the meshes that were asked for.
-struct Primitives<'a> {
-    root: &'a Root,
-    lists: &'a Lists<'a>,
+/// What is shown of the meshes so far.
+struct Meshes<'a> {
+    doc: &'a Document,
+    pose: &'a Pose<'a>,
     reader: Reader<'a>,
+    skins: Skins<'a>,
     materials: Materials<'a>,
     of_mesh: Vec<Option<Rc<Vec<Primitive>>>>,
+    uses_default_material: bool,
 }
 
-impl Primitives<'_> {
-    fn of(
+impl Meshes<'_> {
+    /// Adds a mesh as one node shows it.
+    fn show(&mut self, instance: &Instance, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        let primitives = self.primitives(instance.mesh, &mut raw.report.warnings, cx)?;
+        let node = instance.node.and_then(|index| self.doc.nodes.get(index));
+        let weights = self.pose.weights(instance.mesh, instance.node);
+        let joints = match node.and_then(|node| node.skin) {
+            Some(skin) => Some(self.skins.joints(skin.0, self.pose, &mut self.reader, cx)?),
+            None => None,
+        };
+        // What joints hold is where they are: the transform of the node itself means nothing to it.
+        let transform = if joints.is_some() { Affine::IDENTITY } else { instance.transform };
+        let placements = match node.and_then(|node| node.extensions.instancing.as_ref()) {
+            Some(instancing) => {
+                let own = primitives.iter().map(Primitive::triangle_count).sum();
+                let counts = [raw.triangles.len() as u64, own];
+                let index = instance.node.unwrap_or_default();
+                instancing::placements(index, instancing, &transform, counts, &mut self.reader, cx)?
+            }
+            None => vec![transform],
+        };
+        let default_material = self.materials.count();
+        for primitive in primitives.iter() {
+            self.uses_default_material |= primitive.material().is_none();
+            let mut shape = Shape::of(primitive);
+            shape.morph(primitive, weights, &mut self.reader, cx)?;
+            if let Some(joints) = &joints {
+                shape.skin(&primitive.what, &primitive.influences, joints, cx)?;
+            }
+            for placement in &placements {
+                primitive.append(&shape, raw, placement, default_material, cx)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The decoded primitives of a mesh.
+    fn primitives(
         &mut self,
         mesh: usize,
         warnings: &mut Vec<Warning>,
         cx: &mut Context<'_>,
     ) -> Result<Rc<Vec<Primitive>>, MeshError> {
         let json = self
-            .root
+            .doc
             .meshes
             .get(mesh)
             .ok_or_else(|| MeshError::broken(format!("there is no mesh {mesh} in the glTF file")))?;
         if let Some(done) = &self.of_mesh[mesh] {
             return Ok(Rc::clone(done));
         }
-        let has_ngons = self.ngons(mesh);
+        let ngons_are_used = self.doc.uses("FB_ngon_encoding");
         let mut primitives = Vec::new();
         for (i, primitive) in json.primitives.iter().enumerate() {
             let source = primitive::Source {
                 what: format!("primitive {i} of mesh {mesh}"),
                 json: primitive,
-                has_ngons: has_ngons.get(i).copied().unwrap_or(false),
+                has_ngons: ngons_are_used && primitive.extensions.ngons.is_some(),
+                has_skins: !self.doc.skins.is_empty(),
             };
             primitives.extend(Primitive::read(&source, &mut self.reader, &mut self.materials, warnings, cx)?);
         }
@@ -108,15 +167,30 @@ impl Primitives<'_> {
         self.of_mesh[mesh] = Some(Rc::clone(&primitives));
         Ok(primitives)
     }
+}
 
-    /// Which primitives of a mesh keep their polygons in the order of triangles.
-    fn ngons(&self, mesh: usize) -> Vec<bool> {
-        if !self.root.extensions_used.iter().any(|name| name == "FB_ngon_encoding") {
-            return Vec::new();
-        }
-        let json: model::MeshExtensions = model::entry("mesh", &self.lists.meshes, mesh).unwrap_or_default();
-        json.primitives.iter().map(|primitive| primitive.extensions.ngons.is_some()).collect()
+/// What the document's meshes say that they have.
+fn content(doc: &Document) -> FileContent {
+    let mut content = FileContent::default();
+    let count = |accessor: usize| doc.accessors.get(accessor).map_or(0, |accessor| accessor.count.0);
+    for primitive in doc.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        let vertices = primitive.attributes.get("POSITION").or_else(|| primitive.attributes.values().next());
+        let vertices = vertices.map_or(0, |accessor| count(accessor.0));
+        let corners = primitive.indices.map_or(vertices, |accessor| count(accessor.0));
+        content.draw_calls += 1;
+        content.vertices = content.vertices.saturating_add(vertices);
+        content.triangles = content.triangles.saturating_add(triangles::count(primitive.mode(), corners));
+        let (segments, points) = match primitive.mode() {
+            mode::POINTS => (0, corners),
+            mode::LINES => (corners / 2, 0),
+            mode::LINE_LOOP if corners > 1 => (corners, 0),
+            mode::LINE_STRIP => (corners.saturating_sub(1), 0),
+            _ => (0, 0),
+        };
+        content.segments = content.segments.saturating_add(segments);
+        content.points = content.points.saturating_add(points);
     }
+    content
 }
 
 /// A file may have 100,000 primitives of a kind that is not drawn.
@@ -124,16 +198,4 @@ fn warn_once(warnings: &mut Vec<Warning>, code: &'static str, detail: String) {
     if warnings.iter().all(|w| w.code != code) {
         warnings.push(Warning { code, detail });
     }
-}
-
-fn warn_of_unread(root: &Root, warnings: &mut Vec<Warning>) {
-    let skinned = root.nodes.iter().any(|node| node.skin.is_some());
-    let morphed = root.meshes.iter().flat_map(|mesh| &mesh.primitives).any(|primitive| primitive.targets.is_some());
-    let unread = [
-        (skinned, "skins_ignored", "skins are not applied: vertices are where the mesh has them"),
-        (morphed, "morph_targets_ignored", "morph targets are not applied"),
-        (!root.animations.is_empty(), "animations_ignored", "animations are not applied"),
-    ];
-    let unread = unread.into_iter().filter(|u| u.0);
-    warnings.extend(unread.map(|(_, code, detail)| Warning { code, detail: detail.into() }));
 }

@@ -1,5 +1,5 @@
-//! The parts of the document that say what surfaces look like, in types of our own: the `gltf` crate's would refuse a whole
-//! file for one odd value in a material that nothing uses. Here an entry is parsed when something drawn asks for it.
+//! The parts of the document that say what surfaces look like, cameras and animations: one odd value in a material that nothing uses
+//! is no reason to refuse a file, so an entry is parsed when something drawn asks for it.
 
 use crate::mesh::MeshError;
 use serde::Deserialize;
@@ -20,8 +20,8 @@ pub struct Lists<'a> {
     pub images: Vec<&'a RawValue>,
     /// `cameras`
     pub cameras: Vec<&'a RawValue>,
-    /// `meshes`, for the extensions of primitives.
-    pub meshes: Vec<&'a RawValue>,
+    /// `animations`
+    pub animations: Vec<&'a RawValue>,
 }
 
 impl<'a> Lists<'a> {
@@ -41,7 +41,7 @@ impl<'a> Lists<'a> {
             #[serde(borrow)]
             cameras: Option<&'a RawValue>,
             #[serde(borrow)]
-            meshes: Option<&'a RawValue>,
+            animations: Option<&'a RawValue>,
         }
         let raw: Raw<'a> = serde_json::from_slice(super::super::sniff::trim_start(json)).unwrap_or_default();
         let list = |raw: Option<&'a RawValue>| -> Vec<&'a RawValue> {
@@ -53,7 +53,7 @@ impl<'a> Lists<'a> {
             samplers: list(raw.samplers),
             images: list(raw.images),
             cameras: list(raw.cameras),
-            meshes: list(raw.meshes),
+            animations: list(raw.animations),
         }
     }
 }
@@ -219,26 +219,4 @@ pub struct Perspective {
 #[derive(Debug, Deserialize)]
 pub struct Orthographic {
     pub ymag: f64,
-}
-
-/// `mesh`, as far as the extensions of its primitives go.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct MeshExtensions {
-    pub primitives: Vec<PrimitiveExtensions>,
-}
-
-/// `mesh.primitive`, the same.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct PrimitiveExtensions {
-    pub extensions: PrimitiveMarks,
-}
-
-/// Extensions of `mesh.primitive`.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-pub struct PrimitiveMarks {
-    #[serde(rename = "FB_ngon_encoding")]
-    pub ngons: Option<IgnoredAny>,
 }

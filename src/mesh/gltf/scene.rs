@@ -1,17 +1,20 @@
 //! Which meshes the default scene shows, and where.
 
 use super::cameras::Placed;
+use super::pose::Pose;
 use super::transform::Affine;
+use super::tree::Document;
 use crate::limits;
 use crate::mesh::MeshError;
 use crate::mesh::import::Context;
-use gltf::json::Root;
 
 /// One showing of a mesh.
 #[derive(Debug)]
 pub struct Instance {
     /// Index of the mesh.
     pub mesh: usize,
+    /// Index of the node, if the file has any.
+    pub node: Option<usize>,
     /// From mesh to scene space.
     pub transform: Affine,
 }
@@ -26,37 +29,38 @@ pub struct Scene {
 }
 
 /// The default scene. A file without nodes shows all its meshes.
-pub fn scene(root: &Root, cx: &mut Context<'_>) -> Result<Scene, MeshError> {
-    if root.nodes.is_empty() && root.scenes.is_empty() {
-        let all = 0..root.meshes.len();
-        let instances = all.map(|mesh| Instance { mesh, transform: Affine::IDENTITY }).collect();
+pub fn scene(doc: &Document, pose: &Pose<'_>, cx: &mut Context<'_>) -> Result<Scene, MeshError> {
+    if doc.nodes.is_empty() && doc.scenes.is_empty() {
+        let all = 0..doc.meshes.len();
+        let instances = all.map(|mesh| Instance { mesh, node: None, transform: Affine::IDENTITY }).collect();
         return Ok(Scene { instances, cameras: Vec::new() });
     }
-    let roots = roots(root)?;
-    Walk { root, on_path: vec![false; root.nodes.len()], met: 0, found: Scene::default() }.run(roots, cx)
+    let roots = roots(doc)?;
+    Walk { doc, pose, on_path: vec![false; doc.nodes.len()], met: 0, found: Scene::default() }.run(roots, cx)
 }
 
 /// The root nodes of the default scene: the named one, or the first, or all nodes that are no node's child.
-fn roots(root: &Root) -> Result<Vec<usize>, MeshError> {
-    let index = root.scene.map_or(0, |scene| scene.value());
-    match root.scenes.get(index) {
-        Some(scene) => Ok(scene.nodes.iter().map(|node| node.value()).collect()),
-        None if root.scene.is_some() => Err(MeshError::broken(format!("there is no scene {index} in the glTF file"))),
+fn roots(doc: &Document) -> Result<Vec<usize>, MeshError> {
+    let index = doc.scene.map_or(0, |scene| scene.0);
+    match doc.scenes.get(index) {
+        Some(scene) => Ok(scene.nodes.iter().map(|node| node.0).collect()),
+        None if doc.scene.is_some() => Err(MeshError::broken(format!("there is no scene {index} in the glTF file"))),
         None => {
-            let mut is_child = vec![false; root.nodes.len()];
-            for child in root.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
-                if let Some(flag) = is_child.get_mut(child.value()) {
+            let mut is_child = vec![false; doc.nodes.len()];
+            for child in doc.nodes.iter().flat_map(|node| &node.children) {
+                if let Some(flag) = is_child.get_mut(child.0) {
                     *flag = true;
                 }
             }
-            Ok((0..root.nodes.len()).filter(|&node| !is_child[node]).collect())
+            Ok((0..doc.nodes.len()).filter(|&node| !is_child[node]).collect())
         }
     }
 }
 
 /// A depth-first walk with its own stack, since a hostile file may be 100,000 nodes deep.
 struct Walk<'a> {
-    root: &'a Root,
+    doc: &'a Document,
+    pose: &'a Pose<'a>,
     on_path: Vec<bool>,
     met: u64,
     found: Scene,
@@ -94,26 +98,30 @@ impl Walk<'_> {
         cx: &mut Context<'_>,
     ) -> Result<(), MeshError> {
         let node = self
-            .root
+            .doc
             .nodes
             .get(index)
             .ok_or_else(|| MeshError::broken(format!("there is no node {index} in the glTF file")))?;
         if std::mem::replace(&mut self.on_path[index], true) {
             return Err(MeshError::broken(format!("node {index} of the glTF file is its own ancestor")));
         }
-        let transform = parent.after(&Affine::of(node));
+        // What a hidden node has below it is hidden too; joints there still hold what is shown.
+        if node.extensions.visibility.as_ref().is_some_and(|v| v.visible == Some(false)) {
+            self.on_path[index] = false;
+            return Ok(());
+        }
+        let transform = parent.after(&self.pose.local(index));
         if let Some(mesh) = node.mesh {
-            self.found.instances.push(Instance { mesh: mesh.value(), transform });
+            self.found.instances.push(Instance { mesh: mesh.0, node: Some(index), transform });
         }
         if let Some(camera) = node.camera {
             cx.budget.spend("cameras", 1, 1024)?;
             let name = node.name.as_deref().map(|name| name.chars().take(200).collect());
-            self.found.cameras.push(Placed { camera: camera.value(), name, transform });
+            self.found.cameras.push(Placed { camera: camera.0, name, transform });
         }
         steps.push(Step::Leave(index));
-        let children = node.children.as_deref().unwrap_or_default();
-        self.meet(children.len(), cx)?;
-        steps.extend(children.iter().rev().map(|child| Step::Enter(child.value(), transform)));
+        self.meet(node.children.len(), cx)?;
+        steps.extend(node.children.iter().rev().map(|child| Step::Enter(child.0, transform)));
         Ok(())
     }
 }

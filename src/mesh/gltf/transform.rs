@@ -1,12 +1,49 @@
 //! Node transforms, in f64.
 
-use gltf::json::Node;
+use super::tree::Node;
 
 /// An affine map: a 3 x 3 matrix by rows, and a translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine {
     linear: [[f64; 3]; 3],
     translation: [f64; 3],
+}
+
+/// A translation, a rotation (x, y, z, w) and a scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trs {
+    /// Applied last.
+    pub translation: [f64; 3],
+    /// A quaternion, which exporters do not always normalise.
+    pub rotation: [f64; 4],
+    /// Applied first.
+    pub scale: [f64; 3],
+}
+
+impl Trs {
+    /// No change.
+    pub const IDENTITY: Self = Self { translation: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0], scale: [1.0; 3] };
+
+    /// What a node without a matrix has.
+    pub fn of(node: &Node) -> Self {
+        Self {
+            translation: node.translation.unwrap_or(Self::IDENTITY.translation),
+            rotation: node.rotation.unwrap_or(Self::IDENTITY.rotation),
+            scale: node.scale.unwrap_or(Self::IDENTITY.scale),
+        }
+    }
+}
+
+impl From<Trs> for Affine {
+    fn from(trs: Trs) -> Self {
+        let mut linear = rotation(trs.rotation);
+        for row in &mut linear {
+            for (c, s) in row.iter_mut().zip(trs.scale) {
+                *c *= s;
+            }
+        }
+        Self { linear, translation: trs.translation }
+    }
 }
 
 impl Affine {
@@ -16,21 +53,15 @@ impl Affine {
 
     /// A node's own transform.
     pub fn of(node: &Node) -> Self {
-        if let Some(m) = node.matrix {
-            let m = m.map(f64::from); // by columns
-            return Self {
-                linear: std::array::from_fn(|row| std::array::from_fn(|column| m[column * 4 + row])),
-                translation: [m[12], m[13], m[14]],
-            };
+        node.matrix.map_or_else(|| Trs::of(node).into(), Self::of_columns)
+    }
+
+    /// Of a 4 x 4 matrix by columns, whose last row is taken to be (0, 0, 0, 1).
+    pub fn of_columns(m: [f64; 16]) -> Self {
+        Self {
+            linear: std::array::from_fn(|row| std::array::from_fn(|column| m[column * 4 + row])),
+            translation: [m[12], m[13], m[14]],
         }
-        let mut linear = rotation(node.rotation.unwrap_or_default().0.map(f64::from));
-        let scale = node.scale.unwrap_or([1.0; 3]).map(f64::from);
-        for row in &mut linear {
-            for (c, s) in row.iter_mut().zip(scale) {
-                *c *= s;
-            }
-        }
-        Self { linear, translation: node.translation.unwrap_or_default().map(f64::from) }
     }
 
     /// First `inner`, then `self`.
@@ -39,6 +70,20 @@ impl Affine {
             std::array::from_fn(|column| (0..3).map(|k| self.linear[row][k] * inner.linear[k][column]).sum())
         });
         Self { linear, translation: self.point(inner.translation) }
+    }
+
+    /// The sum of maps, each with its weight.
+    pub fn blend(maps: impl Iterator<Item = (Self, f64)>) -> Self {
+        let mut sum = Self { linear: [[0.0; 3]; 3], translation: [0.0; 3] };
+        for (map, weight) in maps {
+            for (sum, c) in sum.linear.iter_mut().flatten().zip(map.linear.iter().flatten()) {
+                *sum += weight * c;
+            }
+            for (sum, c) in sum.translation.iter_mut().zip(map.translation) {
+                *sum += weight * c;
+            }
+        }
+        sum
     }
 
     /// Where the three axes lead.
@@ -75,7 +120,7 @@ impl Affine {
     }
 }
 
-/// Of a quaternion (x, y, z, w), which exporters do not always normalise.
+/// Of a quaternion; a turn by nothing if it has no length.
 fn rotation(q: [f64; 4]) -> [[f64; 3]; 3] {
     let length = q.iter().map(|c| c * c).sum::<f64>().sqrt();
     if length == 0.0 || !length.is_finite() {

@@ -1,13 +1,14 @@
 //! A reader that hands `tobj` one clean line after the other.
 //!
-//! Only `v`, `vt`, `vn`, `f` and material lines get through, in canonical form, checked and paid for. What `tobj` would
+//! Only `v`, `vt`, `vn`, `f`, `l`, `p` and material lines get through, in canonical form, checked and paid for. What `tobj` would
 //! refuse but is harmless (bytes that are not UTF-8, empty faces, partial colours) is dropped or completed on the way.
 
 use super::face::{Corner, Counts, parse_corner, show, write_face};
 use super::left_out::LeftOut;
 use super::lines::Lines;
-use crate::mesh::MeshError;
 use crate::mesh::import::Context;
+use crate::mesh::loose::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
+use crate::mesh::{Loose, MeshError};
 use rapidhash::RapidHashMap;
 use std::io::{BufRead, Read};
 use tobj::LoadError;
@@ -134,8 +135,8 @@ impl<'a, 'b> Cleaner<'a, 'b> {
                 self.numbers(b"vn", words, 3)?;
             }
             b"f" | b"fo" => self.face(words)?,
-            b"l" => self.left_out.lines += 1,
-            b"p" => self.left_out.points += 1,
+            b"l" => self.loose(words, true)?,
+            b"p" => self.loose(words, false)?,
             b"curv" | b"curv2" | b"surf" => self.left_out.curves += 1,
             b"mtllib" => self.library(line.trim_ascii_start()[6..].trim_ascii()),
             b"usemtl" => self.material(line.trim_ascii_start()[6..].trim_ascii()),
@@ -204,12 +205,7 @@ impl<'a, 'b> Cleaner<'a, 'b> {
     fn face<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), MeshError> {
         self.corners.clear();
         for word in words {
-            let corner = parse_corner(word, self.counts).map_err(|why| self.broken(&why))?;
-            for (largest, index) in self.largest.iter_mut().zip([Some(corner.v), corner.vt, corner.vn]) {
-                if index.is_some_and(|i| i > largest.0) {
-                    *largest = (index.unwrap_or(0), self.lines.number);
-                }
-            }
+            let corner = self.corner(word)?;
             self.corners.push(corner);
             // One line may be the whole file.
             if self.corners.len().is_multiple_of(65536) {
@@ -224,17 +220,56 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         self.triangles += n - 2;
         // A face that gives an attribute for some corners only has none.
         let form = (self.corners.iter().all(|c| c.vt.is_some()), self.corners.iter().all(|c| c.vn.is_some()));
-        if self.form.is_some_and(|old| old != form) {
-            self.out.extend_from_slice(b"o\n");
-            self.unpaid_bytes += 1024;
-        }
-        self.form = Some(form);
+        self.begin_form(form);
         // tobj's own face (its list doubles), then per corner its index and, with attributes, a vertex and a hash entry of
         // its own; then ours.
         let per_corner = if form == (false, false) { 40 } else { 200 };
         self.unpaid_bytes += 208 + n * (per_corner + if n > 4 { 48 } else { 0 });
         write_face(&mut self.out, &self.corners, form);
         Ok(())
+    }
+
+    /// A polyline as its segments, or points, in the only form in which tobj reads them: as faces with too few corners.
+    fn loose<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>, are_joined: bool) -> Result<(), MeshError> {
+        let mut before: Option<Corner> = None;
+        for (number, word) in (1_u64..).zip(words) {
+            let corner = self.corner(word)?;
+            let corner = Corner { v: corner.v, ..Corner::default() };
+            let ends = [before.unwrap_or(corner), corner];
+            before = Some(corner);
+            // One line may be the whole file.
+            if number.is_multiple_of(65536) {
+                self.cx.deadline.check()?;
+                self.cx.budget.spend("the corners of an OBJ polyline", 65536, 300)?;
+            }
+            if are_joined && (number == 1 || ends[0].v == ends[1].v) {
+                continue;
+            }
+            self.begin_form((false, false));
+            self.triangles += if are_joined { SEGMENT_TRIANGLES } else { POINT_TRIANGLES };
+            self.unpaid_bytes += 208 + 2 * 40 + size_of::<Loose>() as u64 * 2;
+            write_face(&mut self.out, if are_joined { &ends } else { &ends[1..] }, (false, false));
+        }
+        Ok(())
+    }
+
+    /// A new model where the form of faces changes.
+    fn begin_form(&mut self, form: (bool, bool)) {
+        if self.form.is_some_and(|old| old != form) {
+            self.out.extend_from_slice(b"o\n");
+            self.unpaid_bytes += 1024;
+        }
+        self.form = Some(form);
+    }
+
+    fn corner(&mut self, word: &[u8]) -> Result<Corner, MeshError> {
+        let corner = parse_corner(word, self.counts).map_err(|why| self.broken(&why))?;
+        for (largest, index) in self.largest.iter_mut().zip([Some(corner.v), corner.vt, corner.vn]) {
+            if index.is_some_and(|i| i > largest.0) {
+                *largest = (index.unwrap_or(0), self.lines.number);
+            }
+        }
+        Ok(corner)
     }
 
     fn material(&mut self, name: &[u8]) {

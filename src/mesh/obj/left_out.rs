@@ -5,10 +5,6 @@ use crate::mesh::Warning;
 /// Counts of lines that were passed over.
 #[derive(Debug, Default)]
 pub struct LeftOut {
-    /// `p` lines.
-    pub points: u64,
-    /// `l` lines.
-    pub lines: u64,
     /// `f` lines with fewer than three corners.
     pub short_faces: u64,
     /// Free-form geometry.
@@ -21,8 +17,6 @@ impl LeftOut {
     /// One warning for each kind that occurred.
     pub fn warnings(&self) -> Vec<Warning> {
         [
-            (self.points, "points_ignored", "points are not drawn"),
-            (self.lines, "lines_ignored", "polylines are not drawn"),
             (self.short_faces, "short_faces_ignored", "faces with fewer than three corners are not drawn"),
             (self.curves, "curves_ignored", "free-form curves and surfaces are not drawn"),
             (self.colors, "colors_incomplete", "vertices differ from the first one in having a colour or not"),

@@ -9,7 +9,7 @@ use crate::mesh::bundle::show_all;
 use crate::mesh::import::Context;
 use crate::mesh::material::{AlphaMode, ImageContent, ImageSource, TextureRef};
 use crate::mesh::raw::RawMesh;
-use crate::mesh::{Folder, MaterialSlot, MeshError, Warning};
+use crate::mesh::{Folder, MaterialSlot, MeshError, Warning, text};
 use rapidhash::{RapidHashMap, RapidHashSet};
 use std::borrow::Cow;
 
@@ -32,7 +32,8 @@ pub fn read(
     let numbers: RapidHashMap<&[u8], usize> = names.iter().enumerate().map(|(i, name)| (name.as_slice(), i)).collect();
     let mut found: Vec<Option<(Material, usize)>> = vec![None; names.len()];
     for &file in &files {
-        let passed = mtl::read(&cx.bundle.file(file).bytes, &numbers, &mut found, file, cx)?;
+        let library = text::to_utf8(&cx.bundle.file(file).bytes, cx)?;
+        let passed = mtl::read(&library, &numbers, &mut found, file, cx)?;
         reader.notes.add(passed);
     }
     let mut slots = Vec::with_capacity(names.len());

@@ -14,7 +14,7 @@ use self::clean::Cleaner;
 use super::import::Context;
 use super::polygon::Triangulator;
 use super::raw::{RawMesh, extend_attribute, srgb_to_linear};
-use super::{FileFacts, Format, MaterialSlot, MeshError, Warning, facts};
+use super::{FileFacts, Format, Loose, MaterialSlot, MeshError, Warning, facts, text};
 use std::path::Path;
 use tobj::{LoadError, LoadOptions};
 
@@ -22,8 +22,9 @@ use tobj::{LoadError, LoadOptions};
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     // tobj would fan polygons, which is wrong for concave ones. With one index for all attributes, models whose faces all
     // have the same form get arrays of equal length; the cleaner starts a new model where the form changes.
-    let options = LoadOptions { single_index: true, triangulate: false, ignore_points: true, ignore_lines: true };
-    let mut cleaner = Cleaner::new(bytes, cx);
+    let options = LoadOptions { single_index: true, triangulate: false, ignore_points: false, ignore_lines: false };
+    let text = text::to_utf8(bytes, cx)?;
+    let mut cleaner = Cleaner::new(&text, cx);
     let loaded = tobj::load_obj_buf(&mut cleaner, &options, material_of_its_own);
     let summary = cleaner.finish(loaded.as_ref().err().copied())?;
     let (models, _) = loaded.map_err(|e| MeshError::broken(format!("the OBJ file cannot be read: {e}")))?;
@@ -32,9 +33,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     raw.report.format = Format::Obj;
     raw.report.file_vertices = summary.vertices;
     raw.report.warnings = summary.left_out.warnings();
-    let generator = facts::first_comment(bytes, b"#", |_| false);
-    raw.report.facts =
-        FileFacts { lines: summary.left_out.lines, points: summary.left_out.points, ..FileFacts::by(generator) };
+    raw.report.facts = FileFacts::by(facts::first_comment(&text, b"#", |_| false));
     let mut triangulator = Triangulator::default();
     for model in models {
         cx.deadline.check()?;
@@ -50,10 +49,12 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     linearise(&mut raw.colors);
     let slots = materials::read(&summary.materials, &summary.libraries, &mut raw, cx)?;
     // Slot 0 is for faces before the first `usemtl`; without such faces it would only be confusing.
-    let uses_unnamed = raw.triangle_materials.contains(&0) || slots.is_empty();
+    let loose_unnamed = raw.loose.iter().any(|one| one.material == 0);
+    let uses_unnamed = raw.triangle_materials.contains(&0) || loose_unnamed || slots.is_empty();
     raw.materials = std::iter::once(MaterialSlot::default()).chain(slots).skip(usize::from(!uses_unnamed)).collect();
     if !uses_unnamed {
         raw.triangle_materials.iter_mut().for_each(|m| *m -= 1);
+        raw.loose.iter_mut().for_each(|one| one.material -= 1);
     }
     Ok(raw)
 }
@@ -94,6 +95,10 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh, triangulator: &mut Triangulator)
         at += arity;
         corners.clear();
         corners.extend(indices.iter().map(|i| base + i));
+        if let [a] | [a, _] = corners[..] {
+            raw.loose.push(Loose { ends: [a, corners[arity - 1]], material });
+            continue;
+        }
         raw.report.polygons_by_arity[arity.min(12)] += 1;
         triangulator.split(&corners, &raw.positions, &mut |triangle, mask| {
             raw.triangles.push(triangle);

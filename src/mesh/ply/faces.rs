@@ -154,7 +154,7 @@ fn slot(name: &str) -> Option<Slot> {
 }
 
 /// A vertex index that is one. Lists may be of any type, so it may be negative, a fraction or NaN.
-fn vertex(item: f64, vertices: u32) -> Result<u32, String> {
+pub fn vertex(item: f64, vertices: u32) -> Result<u32, String> {
     let index = item as u32;
     if f64::from(index) == item && index < vertices {
         return Ok(index);

@@ -2,11 +2,12 @@
 //! and Blender added by custom: texture coordinates a corner (`texcoord`), textures (`comment TextureFile`, `texnumber`), strips.
 //!
 //! The header may declare any properties of any types in any order, so it is compiled first: [`header`] is what it says,
-//! [`layout`] the steps through a record. [`source`] walks through the records of a [`text`] or [`binary`] body; [`vertices`]
-//! and [`faces`] keep what they know, and [`assemble`] makes a mesh of it, with the materials of [`textures`]; [`stored`] is how colours are.
+//! [`layout`] the steps through a record. [`source`] walks through the records of a [`text`] or [`binary`] body; [`vertices`],
+//! [`faces`] and [`edges`] keep what they know, and [`assemble`] makes a mesh of it, with the materials of [`textures`]; [`stored`] is how colours are.
 
 mod assemble;
 mod binary;
+mod edges;
 mod faces;
 mod header;
 mod layout;
@@ -19,6 +20,7 @@ mod vertices;
 pub use header::is_ply;
 
 use self::binary::Binary;
+use self::edges::Edges;
 use self::faces::Faces;
 use self::header::{Element, Encoding, Header};
 use self::source::{Meter, Source, pass_over};
@@ -42,8 +44,11 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     raw.report.format = Format::Ply;
     raw.report.warnings = body.warnings();
     let generator = facts::first_comment(&bytes[..at], b"comment", |comment| header::texture_file(comment).is_some());
-    raw.report.facts = FileFacts { lines: body.edges, points: body.points(), ..FileFacts::by(generator) };
+    raw.report.facts = FileFacts { lines: body.edges.ends.len() as u64, ..FileFacts::by(generator) };
     let textures = assemble::assemble(body.vertices, &body.faces, &mut raw, cx)?;
+    if body.faces.arities.is_empty() {
+        body.edges.apply(&mut raw, cx)?;
+    }
     textures::apply(&header.textures, &textures, &mut raw, cx)?;
     Ok(raw)
 }
@@ -53,7 +58,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
 struct Body {
     vertices: Vertices,
     faces: Faces,
-    edges: u64,
+    edges: Edges,
     trailing_bytes: usize,
 }
 
@@ -93,12 +98,8 @@ fn read_body<S: Source>(source: &mut S, header: &Header, cx: &mut Context<'_>) -
             "vertex" => body.vertices = vertices::read(source, element, &mut meter, cx)?,
             "face" => body.faces.read(source, element, count, &mut meter, cx)?,
             "tristrips" => body.faces.read_strips(source, element, count, &mut meter, cx)?,
-            name => {
-                if name == "edge" {
-                    body.edges = element.count;
-                }
-                pass_over(source, element, &mut meter, cx)?;
-            }
+            "edge" => body.edges.read(source, element, count, &mut meter, cx)?,
+            _ => pass_over(source, element, &mut meter, cx)?,
         }
     }
     body.trailing_bytes = source.trailing_bytes();
@@ -106,16 +107,12 @@ fn read_body<S: Source>(source: &mut S, header: &Header, cx: &mut Context<'_>) -
 }
 
 impl Body {
-    /// Vertices are points where there are no faces.
-    fn points(&self) -> u64 {
-        if self.faces.arities.is_empty() { self.vertices.positions.len() as u64 } else { 0 }
-    }
-
     /// One for each kind of thing that is not drawn.
     fn warnings(&self) -> Vec<Warning> {
+        // Beside faces they are most often edges of these, and would be drawn over them.
+        let edges = if self.faces.arities.is_empty() { 0 } else { self.edges.ends.len() as u64 };
         let all = [
-            (self.points(), "points_ignored", "points are not drawn (points in the file:"),
-            (self.edges, "lines_ignored", "edges on their own are not drawn (edges in the file:"),
+            (edges, "lines_ignored", "edges are drawn where there are no faces (edges in the file:"),
             (
                 self.faces.short_faces,
                 "short_faces_ignored",

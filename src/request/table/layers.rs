@@ -141,7 +141,7 @@ fn outline() -> Vec<Field> {
         words(
             "outline.method",
             |l: &mut Look, v| l.outline().method = v,
-            "hull: the back faces, pushed out along the normals, in one colour; contour: silhouette \
+            "hull: a border in one colour around what ends, its corners round; contour: silhouette \
              and boundary edges, as lines of exact width.",
         )
         .default("hull"),

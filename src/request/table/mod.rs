@@ -30,6 +30,7 @@ pub const LAYERS: &[Layer] = &[
 
 /// What else is told.
 pub const GROUPS: &[Group] = &[
+    Group { name: "scene", about: "Which state of the file is drawn." },
     Group { name: "camera", about: "Where the picture is taken from; by default the mesh is fitted into it." },
     Group { name: "light", about: "Lamps over light that comes from everywhere." },
     Group { name: "image", about: "The picture." },
@@ -81,7 +82,7 @@ mod tests {
             assert_eq!(layer.is_some_and(Layer::is_for_materials), field.is_for_materials(), "{}", field.key);
             keys += 1;
         }
-        assert_eq!(keys, 53);
+        assert_eq!(keys, 54);
         assert!(SHORT.iter().all(|(_, long)| FIELDS.iter().any(|f| f.key == *long)));
     }
 }

@@ -1,4 +1,4 @@
-//! Keys of the camera, the light and the picture.
+//! Keys of the scene, the camera, the light and the picture.
 
 use super::super::draft::Draft;
 use super::super::fields::{Field, optional, optional_words, value, words};
@@ -8,8 +8,23 @@ use crate::limits::JOB_MS_MAX;
 
 /// In the order of the document.
 pub fn fields() -> Vec<Field> {
-    [camera(), light(), image()].into_iter().flatten().collect()
+    [scene(), camera(), light(), image()].into_iter().flatten().collect()
 }
+
+fn scene() -> Vec<Field> {
+    vec![
+        optional(
+            "scene.time_s",
+            number(0.0, TIME_S_MAX),
+            |d: &mut Draft, v| d.time_s = v,
+            "Moment of the file's first animation, in seconds; null: the file without its animations.",
+        )
+        .default(()),
+    ]
+}
+
+/// Later than any animation ends.
+const TIME_S_MAX: f64 = 1e9;
 
 fn camera() -> Vec<Field> {
     vec![

@@ -1,9 +1,13 @@
-//! STL, binary and ASCII. The stored normals are ignored: they repeat what the corners say, or lie.
+//! STL, binary and ASCII, with the two kinds of colours that binary files have ([`color`]). The stored normals are ignored:
+//! they repeat what the corners say, or lie.
 
+mod color;
+
+use self::color::Colors;
 use super::import::Context;
 use super::polygon::ALL_EDGES;
 use super::raw::RawMesh;
-use super::{FileFacts, Format, MeshError, UpAxis, Warning, counted, facts};
+use super::{FileFacts, Format, MaterialSlot, MeshError, UpAxis, Warning, counted, facts};
 
 /// An 80-byte header and a count come before the triangles.
 const HEADER_BYTES: usize = 84;
@@ -25,6 +29,9 @@ pub fn is_exact_binary(bytes: &[u8]) -> bool {
 /// roughly.
 pub fn is_loose_binary(bytes: &[u8]) -> bool {
     let len = bytes.len() as u64;
+    if uncounted(bytes).is_some() {
+        return true;
+    }
     match declared_bytes(bytes) {
         Some(declared) if declared > HEADER_BYTES as u64 => {
             if declared > len {
@@ -35,6 +42,18 @@ pub fn is_loose_binary(bytes: &[u8]) -> bool {
         }
         _ => false,
     }
+}
+
+/// The triangles of a file whose count was never filled in, as programs leave it that write as they go: 0 or all ones, with
+/// whole triangles behind it, the first of which is one.
+fn uncounted(bytes: &[u8]) -> Option<u64> {
+    let count = bytes.get(80..HEADER_BYTES)?;
+    let body = bytes.get(HEADER_BYTES..).filter(|body| body.len().is_multiple_of(TRIANGLE_BYTES))?;
+    let first: Vec<f32> =
+        body.get(12..48)?.chunks_exact(4).map(|c| f32::from_le_bytes([c[0], c[1], c[2], c[3]])).collect();
+    let is_plausible = first.iter().all(|v| *v == 0.0 || (1e-20..1e20).contains(&v.abs()));
+    let is_unset = count == [0; 4] || count == [0xFF; 4];
+    (is_unset && is_plausible && first.iter().any(|v| *v != 0.0)).then_some((body.len() / TRIANGLE_BYTES) as u64)
 }
 
 /// Whether the text begins as an ASCII STL and goes on as one.
@@ -61,6 +80,17 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
             counted(bytes.len(), "byte", "bytes")
         )));
     };
+    let mut raw = new_mesh(Format::StlBinary);
+    let declared = match uncounted(bytes) {
+        None => declared,
+        Some(count) => {
+            let detail = format!(
+                "the STL header does not say how many triangles follow, which are {count} by the file's length"
+            );
+            raw.report.warnings.push(Warning { code: "count_missing", detail });
+            bytes.len() as u64
+        }
+    };
     let count = (declared - HEADER_BYTES as u64) / TRIANGLE_BYTES as u64;
     if declared > bytes.len() as u64 {
         return Err(MeshError::broken(format!(
@@ -69,7 +99,6 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
             bytes.len()
         )));
     }
-    let mut raw = new_mesh(Format::StlBinary);
     raw.report.facts = FileFacts::by(facts::tidy(&bytes[..80]));
     if declared < bytes.len() as u64 {
         raw.report.warnings.push(Warning {
@@ -93,7 +122,22 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
         }
         push_triangle(&mut raw);
     }
+    paint(&mut raw, &bytes[..80], body, cx)?;
     finish(raw)
+}
+
+/// Gives each triangle's vertices, which are its own, the colour in its attribute bytes.
+fn paint(raw: &mut RawMesh, header: &[u8], body: &[u8], cx: &mut Context<'_>) -> Result<(), MeshError> {
+    let attributes =
+        || body.chunks_exact(TRIANGLE_BYTES).map(|triangle| u16::from_le_bytes([triangle[48], triangle[49]]));
+    let Some(colors) = Colors::of(header, attributes()) else { return Ok(()) };
+    cx.deadline.check()?;
+    cx.budget.spend("the colours of STL triangles", raw.positions.len() as u64, 16)?;
+    raw.colors.reserve_exact(raw.positions.len());
+    raw.colors.extend(attributes().flat_map(|attribute| [colors.color(attribute); 3]));
+    // These are what to show, not a tint for the grey of files without colours.
+    raw.materials = vec![MaterialSlot { base_color: Some([1.0; 4]), ..MaterialSlot::default() }];
+    Ok(())
 }
 
 /// ASCII is read by its words alone: exporters disagree on lines and indentation, but every corner is `vertex x y z`.

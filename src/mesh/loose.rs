@@ -1,0 +1,46 @@
+//! Line segments and points: what a file draws without area.
+
+use super::pow2::is_usable;
+use super::raw::RawMesh;
+
+/// Triangles that a segment becomes when it is drawn.
+pub const SEGMENT_TRIANGLES: u64 = 2;
+/// Triangles that a point becomes when it is drawn.
+pub const POINT_TRIANGLES: u64 = 4;
+
+/// A line segment, or a point where both ends are one vertex.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Loose {
+    /// Its ends: indices of vertices, or of positions once they are welded.
+    pub ends: [u32; 2],
+    /// Index of its material.
+    pub material: u32,
+}
+
+impl Loose {
+    /// A point.
+    pub fn point(vertex: u32, material: u32) -> Self {
+        Self { ends: [vertex; 2], material }
+    }
+
+    /// Whether it is one.
+    pub fn is_point(&self) -> bool {
+        self.ends[0] == self.ends[1]
+    }
+}
+
+/// Triangles that all of them become when they are drawn.
+pub fn triangles(loose: &[Loose]) -> u64 {
+    loose.iter().map(|one| if one.is_point() { POINT_TRIANGLES } else { SEGMENT_TRIANGLES }).sum()
+}
+
+/// Drops those with an end that cannot be computed with, and segments whose ends are in one place; returns how many.
+pub fn drop_bad(raw: &mut RawMesh) -> u64 {
+    let before = raw.loose.len();
+    let positions = &raw.positions;
+    raw.loose.retain(|one| {
+        let [a, b] = one.ends.map(|v| &positions[v as usize]);
+        is_usable(a) && is_usable(b) && (one.is_point() || a != b)
+    });
+    (before - raw.loose.len()) as u64
+}

@@ -1,0 +1,295 @@
+//! One model part: its objects, what it builds, and the colours of its property groups.
+
+use super::xml::{Element, Visitor};
+use crate::mesh::affine::Affine;
+use crate::mesh::import::Context;
+use crate::mesh::raw::srgb_to_linear;
+use crate::mesh::{MaterialSlot, MeshError};
+use rapidhash::RapidHashMap;
+
+/// No property.
+pub const NONE: u32 = u32::MAX;
+/// Vertices or triangles that are paid for at once.
+const PAID_AT_ONCE: usize = 1024;
+/// Longest name that is kept, characters.
+const NAME_MAX: usize = 256;
+
+/// A part, as the file has it.
+#[derive(Debug, Default)]
+pub struct Model {
+    /// Objects by their numbers.
+    pub objects: RapidHashMap<u32, Object>,
+    /// Numbers of the objects, in the file's order.
+    pub order: Vec<u32>,
+    /// What is built.
+    pub items: Vec<Placed>,
+    /// Colours by the numbers of their groups.
+    pub groups: RapidHashMap<u32, Group>,
+    /// Groups of properties that are not read.
+    pub unread_groups: u64,
+    open: Open,
+}
+
+/// An object: a mesh or components, or, where a file does not keep to the rules, both.
+#[derive(Debug, Default)]
+pub struct Object {
+    /// Its vertices.
+    pub vertices: Vec<[f64; 3]>,
+    /// Its triangles.
+    pub triangles: Vec<Triangle>,
+    /// Other objects in it.
+    pub components: Vec<Placed>,
+    property: [u32; 2],
+}
+
+/// A triangle and its properties: a group, and an index into it for each corner.
+#[derive(Clone, Copy, Debug)]
+pub struct Triangle {
+    /// Vertices of the object, all in range.
+    pub corners: [u32; 3],
+    /// Number of the group, or [`NONE`].
+    pub group: u32,
+    /// Indices into it; not yet checked.
+    pub indices: [u32; 3],
+}
+
+/// An object somewhere.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    /// Its number in its part.
+    pub object: u32,
+    /// Path of another part (production extension), or empty.
+    pub path: String,
+    /// Where it goes.
+    pub transform: Affine,
+}
+
+/// Colours that triangles refer to.
+#[derive(Debug, Default)]
+pub struct Group {
+    /// Linear RGBA.
+    pub colors: Vec<[f32; 4]>,
+    /// Names of base materials; none for a colour group.
+    pub names: Option<Vec<String>>,
+}
+
+/// Where the visitor is.
+#[derive(Debug, Default)]
+struct Open {
+    object: Option<u32>,
+    group: Option<u32>,
+    unpaid: usize,
+}
+
+impl Visitor for Model {
+    fn begin(&mut self, element: &Element<'_>, depth: usize, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        if depth == 0 {
+            return if element.name() == "model" { Ok(()) } else { Err(element.broken("a part begins with <model>")) };
+        }
+        match element.name() {
+            "object" => self.object(element, cx),
+            "vertex" => self.vertex(element, cx),
+            "triangle" => self.triangle(element, cx),
+            "component" => {
+                let placed = placed(element, cx)?;
+                if let Some(object) = self.open_object() {
+                    object.components.push(placed);
+                }
+                Ok(())
+            }
+            "item" => {
+                self.items.push(placed(element, cx)?);
+                Ok(())
+            }
+            "basematerials" => self.group(element, Some(Vec::new()), cx),
+            "colorgroup" => self.group(element, None, cx),
+            "base" => self.color(element, "displaycolor", cx),
+            "color" => self.color(element, "color", cx),
+            "texture2dgroup" | "compositematerials" | "multiproperties" => {
+                self.unread_groups += 1;
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn end(&mut self, name: &str, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        match name {
+            "object" => {
+                if let Some(object) = self.open_object() {
+                    object.finish()?;
+                }
+                self.open.object = None;
+            }
+            "basematerials" | "colorgroup" => self.open.group = None,
+            "mesh" => cx.deadline.check()?,
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+impl Model {
+    fn open_object(&mut self) -> Option<&mut Object> {
+        self.open.object.and_then(|id| self.objects.get_mut(&id))
+    }
+
+    fn object(&mut self, element: &Element<'_>, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        let id: u32 = element.needed("id")?;
+        cx.budget.spend("the objects of the 3MF file", 1, 2 * (size_of::<Object>() as u64 + 16))?;
+        let pid = element.number("pid")?.unwrap_or(NONE);
+        let pindex = element.number("pindex")?.unwrap_or(NONE);
+        let object = Object { property: [pid, pindex], ..Object::default() };
+        if self.objects.insert(id, object).is_some() {
+            return Err(element.broken(&format!("two objects have the number {id}")));
+        }
+        self.order.push(id);
+        self.open.object = Some(id);
+        Ok(())
+    }
+
+    fn vertex(&mut self, element: &Element<'_>, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        let mut position = [None; 3];
+        element.each(|name, value| {
+            if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == name) {
+                position[axis] = Some(element.parse(name, value)?);
+            }
+            Ok(())
+        })?;
+        let [Some(x), Some(y), Some(z)] = position else { return Err(element.broken("a vertex needs x, y and z")) };
+        self.pay(cx)?;
+        if let Some(object) = self.open_object() {
+            object.vertices.push([x, y, z]);
+        }
+        Ok(())
+    }
+
+    fn triangle(&mut self, element: &Element<'_>, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        let mut corners = [NONE; 3];
+        let mut property = [NONE; 4];
+        element.each(|name, value| {
+            if let Some(k) = ["v1", "v2", "v3"].iter().position(|known| *known == name) {
+                corners[k] = element.parse(name, value)?;
+            } else if let Some(k) = ["pid", "p1", "p2", "p3"].iter().position(|known| *known == name) {
+                property[k] = element.parse(name, value)?;
+            }
+            Ok(())
+        })?;
+        if corners.contains(&NONE) {
+            return Err(element.broken("a triangle needs v1, v2 and v3"));
+        }
+        self.pay(cx)?;
+        let Some(object) = self.open_object() else { return Ok(()) };
+        let [pid, p1, p2, p3] = property;
+        let or = |own: u32, other: u32| if own == NONE { other } else { own };
+        let first = or(p1, object.property[1]);
+        let group = or(pid, object.property[0]);
+        object.triangles.push(Triangle { corners, group, indices: [first, or(p2, first), or(p3, first)] });
+        let count = object.triangles.len() as u64;
+        if count.is_multiple_of(PAID_AT_ONCE as u64) {
+            cx.check_triangles(count)?;
+        }
+        Ok(())
+    }
+
+    fn pay(&mut self, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        if self.open.unpaid == 0 {
+            self.open.unpaid = PAID_AT_ONCE;
+            // A vertex takes no more than a triangle, and lists double when they grow.
+            let bytes = 2 * size_of::<Triangle>() as u64;
+            cx.budget.spend("the meshes of the 3MF file", PAID_AT_ONCE as u64, bytes)?;
+        }
+        self.open.unpaid -= 1;
+        Ok(())
+    }
+
+    fn group(
+        &mut self,
+        element: &Element<'_>,
+        names: Option<Vec<String>>,
+        cx: &mut Context<'_>,
+    ) -> Result<(), MeshError> {
+        let id: u32 = element.needed("id")?;
+        cx.budget.spend("the colours of the 3MF file", 1, 2 * (size_of::<Group>() as u64 + 16))?;
+        self.groups.insert(id, Group { colors: Vec::new(), names });
+        self.open.group = Some(id);
+        Ok(())
+    }
+
+    fn color(&mut self, element: &Element<'_>, attribute: &str, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        let Some(group) = self.open.group.and_then(|id| self.groups.get_mut(&id)) else { return Ok(()) };
+        let text = element.text(attribute)?.unwrap_or_default();
+        let color = color(&text).ok_or_else(|| element.broken("a colour is #RRGGBB or #RRGGBBAA"))?;
+        let name: String = element.text("name")?.unwrap_or_default().chars().take(NAME_MAX).collect();
+        // A base material may become a slot.
+        let slot = if group.names.is_some() { size_of::<MaterialSlot>() as u64 + 64 } else { 0 };
+        cx.budget.spend("the colours of the 3MF file", 1, 2 * (16 + 24 + name.len() as u64 + slot))?;
+        group.colors.push(color);
+        if let Some(names) = &mut group.names {
+            names.push(name);
+        }
+        Ok(())
+    }
+}
+
+impl Object {
+    /// Vertices may come after the triangles that use them.
+    fn finish(&self) -> Result<(), MeshError> {
+        let count = self.vertices.len();
+        match self.triangles.iter().flat_map(|triangle| triangle.corners).find(|&v| v as usize >= count) {
+            None => Ok(()),
+            Some(v) => Err(MeshError::broken(format!(
+                "a triangle of the 3MF file refers to vertex {v}, and its object has {count}, the first of them 0"
+            ))),
+        }
+    }
+}
+
+fn placed(element: &Element<'_>, cx: &mut Context<'_>) -> Result<Placed, MeshError> {
+    let object = element.needed("objectid")?;
+    let path = element.text("path")?.unwrap_or_default();
+    cx.budget.spend("the components of the 3MF file", 1, 2 * (size_of::<Placed>() + path.len()) as u64)?;
+    let transform = match element.text("transform")? {
+        None => Affine::IDENTITY,
+        Some(text) => transform(&text).ok_or_else(|| element.broken("a transform has twelve numbers"))?,
+    };
+    Ok(Placed { object, path, transform })
+}
+
+/// Twelve numbers: where the three axes go, and the translation.
+fn transform(text: &str) -> Option<Affine> {
+    let mut numbers = [0.0; 12];
+    let mut words = text.split_ascii_whitespace();
+    for number in &mut numbers {
+        *number = words.next()?.parse().ok()?;
+    }
+    let linear = std::array::from_fn(|row| std::array::from_fn(|column| numbers[3 * column + row]));
+    words.next().is_none().then_some(Affine { linear, translation: [numbers[9], numbers[10], numbers[11]] })
+}
+
+/// sRGB and, where there are eight digits, alpha.
+fn color(text: &str) -> Option<[f32; 4]> {
+    let digits = text.trim_ascii().strip_prefix('#').filter(|digits| matches!(digits.len(), 6 | 8))?;
+    let byte = |at: usize| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok();
+    let channel = |at: usize| byte(at).map(|byte| srgb_to_linear(f64::from(byte) / 255.0) as f32);
+    let alpha = if digits.len() == 8 { f32::from(byte(6)?) / 255.0 } else { 1.0 };
+    Some([channel(0)?, channel(2)?, channel(4)?, alpha])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_and_transforms() {
+        assert_eq!(color("#FF0000"), Some([1.0, 0.0, 0.0, 1.0]));
+        assert_eq!(color(" #00ff0033 "), Some([0.0, 1.0, 0.0, 0.2]));
+        for bad in ["", "#", "FF0000", "#FF000", "#FF00000", "#GG0000", "#ünïc"] {
+            assert_eq!(color(bad), None, "{bad}");
+        }
+        let map = transform("1 2 3  4 5 6  7 8 9  10 11 12").unwrap();
+        assert_eq!(map.point([1.0, 0.0, 0.0]), [11.0, 13.0, 15.0]);
+        assert_eq!(map.point([0.0, 0.0, 1.0]), [17.0, 19.0, 21.0]);
+        assert!(transform("1 2 3").is_none() && transform("1 2 3 4 5 6 7 8 9 10 11 12 13").is_none());
+    }
+}

@@ -1,0 +1,156 @@
+//! Where surfaces end in a view: the edges along which outlines run, and on which side of each nothing is.
+
+use super::parts::{Fill, Parts};
+use super::silhouette::Silhouettes;
+use super::{Edge, Projection, Thickness};
+use crate::limits::{Budget, Deadline};
+use crate::mesh::Mesh;
+use crate::mesh::edges::EdgeList;
+use crate::plan::PlanError;
+use crate::scene::Cull;
+
+/// Edges that are looked at between two looks at the deadline.
+pub const CHECK_EVERY: usize = 1 << 16;
+
+/// An edge beside which an outline is drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Rim {
+    /// Its ends.
+    pub vertices: [u32; 2],
+    /// Its faces that are drawn.
+    pub faces: [u32; 2],
+    /// The side that is free, as the sign of `(end - start) x (point - end)` on screen, where y points down.
+    pub free: i8,
+    /// Whose outline it is.
+    pub material: u32,
+}
+
+/// A mesh on screen.
+pub struct View<'a> {
+    /// What is seen.
+    pub mesh: &'a Mesh,
+    /// How it is seen.
+    pub projection: &'a Projection,
+    /// X, Y and W of each position.
+    pub places: Vec<[f64; 3]>,
+    /// Of each face: -1 front, 1 back, 0 edge on.
+    facing: Vec<i8>,
+}
+
+impl<'a> View<'a> {
+    /// Looks at a mesh.
+    pub fn new(mesh: &'a Mesh, projection: &'a Projection, budget: &mut Budget) -> Result<Self, PlanError> {
+        budget.spend("an outline", mesh.positions.len() as u64, size_of::<[f64; 3]>() as u64)?;
+        budget.spend("an outline", mesh.triangles.len() as u64, 1)?;
+        let places: Vec<[f64; 3]> = mesh
+            .positions
+            .iter()
+            .map(|p| [&projection.x, &projection.y, &projection.w].map(|row| row_dot(row, *p)))
+            .collect();
+        let facing = mesh.triangles.iter().map(|triangle| facing(mesh, &places, *triangle)).collect();
+        Ok(Self { mesh, projection, places, facing })
+    }
+
+    /// The rims of the parts that have an outline, by material.
+    pub fn rims(
+        &self,
+        parts: &Parts<'_>,
+        outlines: &[Option<Thickness>],
+        list: &EdgeList,
+        (budget, deadline): (&mut Budget, &Deadline),
+    ) -> Result<Vec<Rim>, PlanError> {
+        let silhouettes = Silhouettes::new(self.mesh, parts, list, budget)?;
+        let culls: Vec<Cull> = (0..parts.layers.len()).map(|m| cull(parts, m)).collect();
+        let mut rims: Vec<Rim> = Vec::new();
+        for (i, edge) in list.edges.iter().enumerate() {
+            if i % CHECK_EVERY == 0 {
+                deadline.check()?;
+            }
+            let edge = Edge::new(&self.mesh.positions, edge.vertices, edge.faces);
+            let Some(edge) = silhouettes.edge(i as u32, edge) else { continue };
+            let faces = self.drawn(edge.faces, &culls);
+            let Some(material) = self.material(faces, outlines) else { continue };
+            for &free in self.free_sides(edge.vertices, faces) {
+                if rims.len() == rims.capacity() {
+                    // Twice the old ones and the old ones, while they are copied.
+                    let more = rims.len().max(1024);
+                    budget.spend("an outline's edges", more as u64, 2 * size_of::<Rim>() as u64)?;
+                    rims.reserve_exact(more);
+                }
+                rims.push(Rim { vertices: edge.vertices, faces, free, material });
+            }
+        }
+        Ok(rims)
+    }
+
+    /// Those of two faces that are not left out because of the side that they show, the first of them first.
+    fn drawn(&self, faces: [u32; 2], culls: &[Cull]) -> [u32; 2] {
+        let [a, b] = faces.map(|face| {
+            let Some(&facing) = self.facing.get(face as usize) else { return Edge::NO_FACE };
+            let material = self.mesh.triangle_materials[face as usize] as usize;
+            match culls.get(material) {
+                Some(Cull::Back) if facing > 0 => Edge::NO_FACE,
+                Some(Cull::Front) if facing < 0 => Edge::NO_FACE,
+                _ => face,
+            }
+        });
+        if a == Edge::NO_FACE { [b, a] } else { [a, b] }
+    }
+
+    /// The material with the lowest index that has an outline, of two faces.
+    fn material(&self, faces: [u32; 2], outlines: &[Option<Thickness>]) -> Option<u32> {
+        let of = |face: &u32| self.mesh.triangle_materials.get(*face as usize).copied();
+        faces.iter().filter_map(of).filter(|&m| outlines.get(m as usize).is_some_and(Option::is_some)).min()
+    }
+
+    /// The sides of an edge on which its surface ends: both of an only face that is seen edge on.
+    fn free_sides(&self, vertices: [u32; 2], faces: [u32; 2]) -> &'static [i8] {
+        let [a, b] = faces.map(|face| self.side_of(vertices, face));
+        match (a < 0 || b < 0, a > 0 || b > 0) {
+            (true, false) => &[1],
+            (false, true) => &[-1],
+            (false, false) if faces[1] == Edge::NO_FACE => &[-1, 1],
+            _ => &[],
+        }
+    }
+
+    /// On which side of an edge a face lies.
+    fn side_of(&self, [from, to]: [u32; 2], face: u32) -> i8 {
+        let Some(&facing) = self.facing.get(face as usize) else { return 0 };
+        let corners = self.mesh.triangles[face as usize];
+        let runs_along = (0..3).any(|k| corners[k] == from && corners[(k + 1) % 3] == to);
+        if runs_along { facing } else { -facing }
+    }
+}
+
+/// `row . (p, 1)`, in f64.
+pub fn row_dot(row: &[f32; 4], p: [f32; 3]) -> f64 {
+    let (row, p) = (row.map(f64::from), p.map(f64::from));
+    ((row[0] * p[0] + row[1] * p[1]) + row[2] * p[2]) + row[3]
+}
+
+/// Which side of a part is left out, if it is filled.
+fn cull(parts: &Parts<'_>, material: usize) -> Cull {
+    match parts.fill(material) {
+        Fill::None => Cull::None,
+        _ => parts.layers[material].surface.map_or(Cull::None, |surface| surface.cull),
+    }
+}
+
+/// Which side a triangle shows: the sign of the volume that it spans with the eye, which is right for corners behind the eye too.
+fn facing(mesh: &Mesh, places: &[[f64; 3]], triangle: [u32; 3]) -> i8 {
+    // In an order of its own, so that it is rounded alike whichever corner comes first and whichever way it is wound.
+    let mut sorted = triangle;
+    let mut is_even = true;
+    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+        if mesh.positions[sorted[i] as usize] > mesh.positions[sorted[j] as usize] {
+            sorted.swap(i, j);
+            is_even = !is_even;
+        }
+    }
+    let [a, b, c] = sorted.map(|v| places[v as usize]);
+    let (x, y, w) = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
+    let volume = (x * c[0] + y * c[1]) + w * c[2];
+    let sign = i8::from(volume > 0.0) - i8::from(volume < 0.0);
+    if is_even { sign } else { -sign }
+}

@@ -1,0 +1,401 @@
+//! glTF: one shape in several encodings, compressed and not, and instances.
+
+use crate::bundles::read_bundle;
+use crate::mesh_files::{Gltf, Noise, Solid, assert_close, corners, read, read_limited, set};
+use crate::shared::folder;
+use meshsnap::limits::Limits;
+use meshsnap::mesh::{Bundle, BundleFile, Mesh, MeshError, MeshFault};
+use serde_json::{Value, json};
+use std::time::{Duration, Instant};
+
+/// A wavy sheet with normals, and its triangles.
+struct Sheet {
+    positions: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    indices: Vec<u32>,
+}
+
+impl Sheet {
+    fn new() -> Self {
+        let solid = Solid::grid(20);
+        let unit = |p: &[f64; 3]| [(p[0] - 10.0) / 16.0, 0.5, (p[2] + p[1]) / 32.0];
+        let normal = |p: &[f64; 3]| {
+            let v = unit(p);
+            let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+            v.map(|c| (c / length) as f32)
+        };
+        let quads = solid.polygons.iter().flat_map(|q| [q[0], q[1], q[2], q[0], q[2], q[3]]);
+        Self {
+            positions: solid.positions.iter().map(|p| p.map(|c| c as f32)).collect(),
+            normals: solid.positions.iter().map(normal).collect(),
+            indices: quads.collect(),
+        }
+    }
+
+    /// Nothing compressed: what all others are compared with.
+    fn plain(&self) -> Gltf {
+        let mut gltf = Gltf::default();
+        let p = gltf.floats("VEC3", &self.positions.concat());
+        let n = gltf.floats("VEC3", &self.normals.concat());
+        let indices: Vec<u16> = self.indices.iter().map(|&i| i as u16).collect();
+        let i = gltf.shorts("SCALAR", &indices);
+        gltf.mesh(json!({ "attributes": { "POSITION": p, "NORMAL": n }, "indices": i }));
+        gltf.json["nodes"] = json!([{ "mesh": 0 }]);
+        gltf
+    }
+
+    /// Positions as shorts of 1/1000, normals as normalised bytes, both padded to four bytes, or padded to four components.
+    fn small(&self) -> (Vec<[i16; 4]>, Vec<[i8; 4]>) {
+        let position = |p: &[f32; 3]| [0, 1, 2, 3].map(|k| p.get(k).map_or(0, |c| (c * 1000.0).round() as i16));
+        let normal = |n: &[f32; 3]| [0, 1, 2, 3].map(|k| n.get(k).map_or(0, |c| (c * 127.0).round() as i8));
+        (self.positions.iter().map(position).collect(), self.normals.iter().map(normal).collect())
+    }
+
+    fn quantised(&self) -> Gltf {
+        let (positions, normals) = self.small();
+        let bytes: Vec<u8> = positions.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+        let mut gltf = self.plain();
+        put(&mut gltf, 0, 5122, &bytes, 8);
+        let bytes: Vec<u8> = normals.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+        put(&mut gltf, 1, 5120, &bytes, 4);
+        gltf.json["accessors"][1]["normalized"] = true.into();
+        gltf.json["nodes"][0]["scale"] = json!([0.001, 0.001, 0.001]);
+        gltf.json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+        gltf.json["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
+        gltf
+    }
+
+    /// `name` is either extension's.
+    fn meshopt(&self, name: &str) -> Gltf {
+        let mut gltf = self.quantised();
+        let (positions, _) = self.small();
+        let packed = meshopt::encode_vertex_buffer_level(&positions, 2, Some(0)).unwrap();
+        let view = gltf.json["accessors"][0]["bufferView"].as_u64().unwrap() as usize;
+        pack(&mut gltf, name, view, &packed, [positions.len(), 8], ["ATTRIBUTES", "NONE"]);
+        let with_w: Vec<[f32; 4]> = self.normals.iter().map(|n| [n[0], n[1], n[2], 0.0]).collect();
+        let normals: Vec<[i8; 4]> = meshopt::encode_filter_oct(&with_w, 8);
+        let packed = meshopt::encode_vertex_buffer_level(&normals, 2, Some(0)).unwrap();
+        let view = gltf.json["accessors"][1]["bufferView"].as_u64().unwrap() as usize;
+        pack(&mut gltf, name, view, &packed, [normals.len(), 4], ["ATTRIBUTES", "OCTAHEDRAL"]);
+        let packed = meshopt::encode_index_buffer(&self.indices, self.positions.len()).unwrap();
+        let view = gltf.json["accessors"][2]["bufferView"].as_u64().unwrap() as usize;
+        pack(&mut gltf, name, view, &packed, [self.indices.len(), 2], ["TRIANGLES", "NONE"]);
+        gltf.json["extensionsRequired"] = json!(["KHR_mesh_quantization", name]);
+        gltf
+    }
+
+    fn draco(&self) -> Gltf {
+        use draco_core::{DataType, EncoderBuffer, EncoderOptions, GeometryAttributeType, MeshEncoder, PointAttribute};
+        let mut mesh = draco_core::Mesh::new();
+        mesh.set_num_points(self.positions.len());
+        for (kind, values) in
+            [(GeometryAttributeType::Position, &self.positions), (GeometryAttributeType::Normal, &self.normals)]
+        {
+            let mut attribute = PointAttribute::new();
+            attribute.init(kind, 3, DataType::Float32, false, values.len());
+            let bytes: Vec<u8> = values.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+            attribute.buffer_mut().update(&bytes, Some(0));
+            mesh.add_attribute(attribute);
+        }
+        mesh.set_num_faces(self.indices.len() / 3);
+        mesh.set_faces_from_flat_indices(&self.indices);
+        let mut encoder = MeshEncoder::new();
+        encoder.set_mesh(mesh);
+        let mut out = EncoderBuffer::new();
+        let mut options = EncoderOptions::new();
+        options.set_attribute_int(0, "quantization_bits", 14);
+        options.set_attribute_int(1, "quantization_bits", 10);
+        encoder.encode(&options, &mut out).unwrap();
+        let mut gltf = self.plain();
+        let view = gltf.view(out.data());
+        for accessor in gltf.json["accessors"].as_array_mut().unwrap() {
+            accessor.as_object_mut().unwrap().remove("bufferView");
+        }
+        gltf.json["meshes"][0]["primitives"][0]["extensions"] = json!({
+            "KHR_draco_mesh_compression": { "bufferView": view, "attributes": { "POSITION": 0, "NORMAL": 1 } }
+        });
+        gltf.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
+        gltf
+    }
+}
+
+/// Gives an accessor new data with a stride.
+fn put(gltf: &mut Gltf, accessor: usize, component: u32, bytes: &[u8], stride: usize) {
+    let view = gltf.view(bytes);
+    gltf.json["bufferViews"][view]["byteStride"] = stride.into();
+    gltf.json["accessors"][accessor]["bufferView"] = view.into();
+    gltf.json["accessors"][accessor]["componentType"] = component.into();
+}
+
+/// Replaces the data of a view by packed bytes; its own buffer becomes one that has none.
+fn pack(
+    gltf: &mut Gltf,
+    name: &str,
+    view: usize,
+    packed: &[u8],
+    [count, stride]: [usize; 2],
+    [mode, filter]: [&str; 2],
+) {
+    let from = gltf.view(packed);
+    let source = gltf.json["bufferViews"][from].clone();
+    let view = &mut gltf.json["bufferViews"][view];
+    (view["buffer"], view["byteOffset"], view["byteLength"]) = (1.into(), 0.into(), (count * stride).into());
+    view["extensions"][name] = json!({
+        "buffer": 0, "byteOffset": source["byteOffset"], "byteLength": packed.len(),
+        "byteStride": stride, "count": count, "mode": mode, "filter": filter,
+    });
+    let own = gltf.json["buffers"][0].clone();
+    gltf.json["buffers"] = json!([own, { "byteLength": 1_000_000, "extensions": { name: { "fallback": true } } }]);
+}
+
+fn normals_close(a: &Mesh, b: &Mesh, tolerance: f32) {
+    // Sorted: encodings may number vertices anew.
+    let corners_of = |mesh: &Mesh| -> Vec<[f32; 3]> {
+        mesh.attribute_triangles.iter().flatten().map(|&v| mesh.normals[v as usize]).collect()
+    };
+    let (a, b) = (corners_of(a), corners_of(b));
+    assert_eq!(a.len(), b.len());
+    let far = a.iter().zip(&b).filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| (a - b).abs() > tolerance)).count();
+    assert_eq!(far, 0, "{far} normals of {}", a.len());
+}
+
+/// Triangles in the order of their corners, each from its smallest on, since encoders turn and reorder them. The sheet's corners lie
+/// on multiples of 1/8.
+fn in_order(mut mesh: Mesh) -> Mesh {
+    let all = corners(&mesh);
+    let key = |t: &[[f64; 3]; 3]| {
+        let mut key: Vec<[i64; 3]> = t.iter().map(|p| p.map(|c| (c * 8.0).round() as i64)).collect();
+        key.sort_unstable();
+        key
+    };
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    order.sort_by_key(|&i| key(&all[i]));
+    let turn = |i: usize| {
+        let smallest = (0..3).min_by_key(|&k| all[i][k].map(|c| (c * 8.0).round() as i64)).unwrap();
+        [0, 1, 2].map(|k| (k + smallest) % 3)
+    };
+    let sorted = |triangles: &[[u32; 3]]| order.iter().map(|&i| turn(i).map(|k| triangles[i][k])).collect::<Vec<_>>();
+    (mesh.triangles, mesh.attribute_triangles) = (sorted(&mesh.triangles), sorted(&mesh.attribute_triangles));
+    mesh
+}
+
+#[test]
+fn every_encoding_holds_the_same_shape() {
+    let sheet = Sheet::new();
+    let plain = read(&sheet.plain().glb()).unwrap();
+    let mut cases = 0;
+    // Positions within half a step; normals within what eight bits a side of an octahedron tell, about a degree.
+    for gltf in [sheet.quantised(), sheet.meshopt("EXT_meshopt_compression"), sheet.meshopt("KHR_meshopt_compression")]
+    {
+        let mesh = read(&gltf.glb()).unwrap();
+        assert_close(&in_order(plain.clone()), &in_order(mesh.clone()), 0.5e-3 + 1e-6);
+        normals_close(&in_order(plain.clone()), &in_order(mesh), 2.5 / 127.0);
+        cases += 1;
+    }
+    // 14 bits over a range of 20.
+    let mesh = read(&sheet.draco().glb()).unwrap();
+    assert_close(&in_order(plain.clone()), &in_order(mesh.clone()), 20.0 / 16383.0);
+    normals_close(&in_order(plain), &in_order(mesh), 6.0 / 1023.0);
+    assert_eq!(cases, 3);
+}
+
+#[test]
+fn compressed_views_that_lie_are_refused() {
+    let good = Sheet::new().meshopt("EXT_meshopt_compression");
+    let view = good.json["accessors"][0]["bufferView"].as_u64().unwrap();
+    let normal = good.json["accessors"][1]["bufferView"].as_u64().unwrap();
+    let index = good.json["accessors"][2]["bufferView"].as_u64().unwrap();
+    let mut cases = 0;
+    let mut refuse = |view: u64, key: &str, value: Value, word: &str| {
+        let mut gltf = good.clone();
+        let place = format!("/bufferViews/{view}/extensions/EXT_meshopt_compression/{key}");
+        set(&mut gltf.json, &place, value);
+        let error = read(&gltf.glb()).unwrap_err();
+        assert_eq!(error.fault, MeshFault::Broken, "{place}: {error}");
+        assert!(error.detail.contains(word), "{place}: {error}");
+        cases += 1;
+    };
+    refuse(view, "count", json!(442), "the view has");
+    refuse(view, "count", json!(4_000_000_000_000_u64), "the view has");
+    refuse(view, "count", json!(9_007_199_254_740_991_u64), "the view has");
+    refuse(view, "byteStride", json!(7), "the view has");
+    refuse(view, "mode", json!("TRIANGLES"), "stride");
+    refuse(view, "mode", json!("SOMETHING"), "stride");
+    refuse(index, "mode", json!("SOMETHING"), "unknown mode");
+    refuse(index, "mode", json!("INDICES"), "decompressed");
+    refuse(view, "filter", json!("OCTAGONAL"), "filter");
+    refuse(normal, "filter", json!("QUATERNION"), "filter");
+    refuse(normal, "filter", json!("COLOR"), "filter");
+    refuse(index, "filter", json!("EXPONENTIAL"), "filter");
+    refuse(view, "buffer", json!(7), "buffer 7");
+    refuse(view, "buffer", json!(1), "neither a URI");
+    refuse(view, "byteLength", json!(20), "decompressed");
+    refuse(view, "byteOffset", json!(1_000_000_000), "spans");
+    assert_eq!(cases, 16);
+
+    // A view that says so much, and a buffer that would have it: paid for before it is unpacked.
+    let mut bomb = good.clone();
+    let huge = 500_000_000_u64;
+    bomb.json["buffers"][1]["byteLength"] = (huge * 8).into();
+    bomb.json["bufferViews"][view as usize]["byteLength"] = (huge * 8).into();
+    bomb.json["bufferViews"][view as usize]["extensions"]["EXT_meshopt_compression"]["count"] = huge.into();
+    assert!(matches!(read(&bomb.glb()).unwrap_err().fault, MeshFault::Limit(_)));
+}
+
+#[test]
+fn compressed_indices_are_checked_like_others() {
+    let mut sheet = Sheet::new();
+    sheet.indices[7] = 441;
+    let error = read(&sheet.meshopt("KHR_meshopt_compression").glb()).unwrap_err();
+    assert!(error.detail.contains("vertex index 441, and 441 vertices"), "{error}");
+}
+
+#[test]
+fn draco_data_must_be_what_accessors_say() {
+    let good = Sheet::new().draco();
+    let mut cases = 0;
+    let mut refuse = |place: &str, value: Value, word: &str| {
+        let mut gltf = good.clone();
+        set(&mut gltf.json, place, value);
+        let error = read(&gltf.glb()).unwrap_err();
+        assert!(error.detail.contains(word), "{place}: {error}");
+        cases += 1;
+    };
+    refuse("/accessors/2/count", json!(2397), "cannot be decompressed");
+    refuse("/accessors/2/count", json!(2403), "has 800 triangles");
+    refuse("/accessors/0/count", json!(442), "441 vertices");
+    refuse("/accessors/2/count", json!(3_000_000_000_u64), "limit");
+    refuse("/accessors/0/count", json!(3_000_000_000_u64), "limit");
+    let draco = "/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression";
+    refuse(&format!("{draco}/bufferView"), json!(77), "buffer view 77");
+    refuse(&format!("{draco}/bufferView"), json!(0), "cannot be decompressed");
+    refuse(&format!("{draco}/attributes/NORMAL"), json!(7), "no attribute 7");
+    refuse("/accessors/1/type", json!("VEC2"), "Vec2");
+    refuse("/meshes/0/primitives/0/mode", json!(6), "neither a list nor a strip");
+    assert_eq!(cases, 10);
+}
+
+/// Every byte of the compressed data matters to somebody; none may bring the decoder down.
+#[test]
+fn damaged_compressed_data_is_refused_or_read_in_time() {
+    let (mut noise, start, mut cases) = (Noise(7), Instant::now(), 0);
+    let sheet = Sheet::new();
+    for gltf in [sheet.draco(), sheet.meshopt("EXT_meshopt_compression")] {
+        let whole = gltf.glb();
+        let from = whole.len() - gltf.bin.len();
+        for _ in 0..400 {
+            let mut bytes = whole.clone();
+            for _ in 0..1 + noise.next() % 3 {
+                let at = from + (noise.next() as usize) % gltf.bin.len();
+                bytes[at] ^= 1 << (noise.next() % 8);
+            }
+            _ = read(&bytes);
+            cases += 1;
+        }
+        // Cut off: the header says less.
+        let view = gltf.json["bufferViews"].as_array().unwrap().len() - 1;
+        for cut in 1..60 {
+            let mut gltf = gltf.clone();
+            let length = gltf.json["bufferViews"][view]["byteLength"].as_u64().unwrap();
+            gltf.json["bufferViews"][view]["byteLength"] = (length * cut / 60).into();
+            _ = read(&gltf.glb());
+            cases += 1;
+        }
+    }
+    assert_eq!(cases, 2 * (400 + 59));
+    assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
+}
+
+fn instanced() -> Gltf {
+    let mut gltf = Solid::cuboid().triangulated(&[[0, 2, 3], [4, 5, 7]]).gltf();
+    let t = gltf.floats("VEC3", &[0.0, 0.0, 0.0, 10.0, 0.0, 0.0, 0.0, 20.0, 0.0]);
+    let r = gltf.accessor("VEC4", 5120, 3, &[0, 0, 0, 127, 0, 0, 127, 0, 0, 0, 0, 127]);
+    gltf.json["accessors"][r]["normalized"] = true.into();
+    let s = gltf.floats("VEC3", &[1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, -2.0]);
+    gltf.json["nodes"][0]["scale"] = json!([2, 2, 2]);
+    gltf.json["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": t, "ROTATION": r, "SCALE": s, "_ID": t } } });
+    gltf.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
+    gltf
+}
+
+#[test]
+fn instances_stand_where_their_attributes_say() {
+    let gltf = instanced();
+    let mesh = read(&gltf.glb()).unwrap();
+    let mut one = gltf.clone();
+    one.json["nodes"][0].as_object_mut().unwrap().remove("extensions");
+    let first = corners(&read(&one.glb()).unwrap());
+    let all = corners(&mesh);
+    assert_eq!((first.len(), all.len()), (2, 6));
+    let near = |a: [[f64; 3]; 3], b: [[f64; 3]; 3]| {
+        assert!(a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-4), "{a:?} is not {b:?}");
+    };
+    for (t, &shape) in first.iter().enumerate() {
+        near(all[t], shape);
+        near(all[2 + t], shape.map(|[x, y, z]| [20.0 - x, -y, z]));
+        let [a, b, c] = shape.map(|[x, y, z]| [2.0 * x, 40.0 + 2.0 * y, -2.0 * z]);
+        near(all[4 + t], [a, c, b]);
+    }
+    // Counted before they are read: as many as would be drawn.
+    let exact = |triangles| read_limited(&gltf.glb(), None, &Limits { triangles, ..Limits::default() });
+    assert!(exact(6).is_ok());
+    assert!(matches!(exact(5).unwrap_err().fault, MeshFault::Limit(_)));
+    let refuse = |change: &dyn Fn(&mut Value)| -> MeshError {
+        let mut gltf = instanced();
+        change(&mut gltf.json);
+        read(&gltf.glb()).unwrap_err()
+    };
+    let many = refuse(&|json| {
+        for accessor in [2, 3, 4] {
+            json["accessors"][accessor] =
+                json!({ "type": "VEC3", "componentType": 5126, "count": 4_000_000_000_000_u64 });
+        }
+    });
+    assert!(matches!(many.fault, MeshFault::Limit(_)) && many.detail.contains("triangles"), "{many}");
+    assert!(refuse(&|json| json["accessors"][2]["count"] = 2.into()).detail.contains("equally many"));
+    assert!(refuse(&|json| json["accessors"][3]["normalized"] = false.into()).detail.contains("ROTATION"));
+    assert!(refuse(&|json| json["accessors"][4]["type"] = "VEC2".into()).detail.contains("SCALE"));
+}
+
+#[test]
+fn hidden_nodes_hide_what_is_below_them() {
+    let mut gltf = Solid::cuboid().triangulated(&[[0, 2, 3], [4, 5, 7]]).gltf();
+    gltf.json["nodes"] = json!([
+        { "children": [1, 2] },
+        { "mesh": 0, "translation": [9, 0, 0], "children": [3], "extensions": { "KHR_node_visibility": { "visible": false } } },
+        { "mesh": 0, "extensions": { "KHR_node_visibility": {} } },
+        { "mesh": 0, "extensions": { "KHR_node_visibility": { "visible": true } } },
+    ]);
+    gltf.json["extensionsRequired"] = json!(["KHR_node_visibility"]);
+    let mesh = read(&gltf.glb()).unwrap();
+    assert_eq!(mesh.triangles.len(), 2);
+    assert_eq!(mesh.report.content.triangles, 2);
+    gltf.json["nodes"][0]["extensions"] = json!({ "KHR_node_visibility": { "visible": false } });
+    assert_eq!(read(&gltf.glb()).unwrap_err().fault, MeshFault::Empty);
+}
+
+#[test]
+fn known_compressed_models_are_read() {
+    let Some(folder) = folder("models") else { return };
+    let bundle = |place: &str, names: &[&str]| {
+        let file = |name: &&str| BundleFile::new(name, std::fs::read(folder.join(place).join(name)).unwrap()).unwrap();
+        read_bundle(&Bundle::of_files(names.iter().map(file).collect()))
+    };
+    let of_one = |name: &str| read(&std::fs::read(folder.join(name)).unwrap()).unwrap();
+    let boxes = [bundle("BoxDraco", &["BoxDraco.gltf", "0.bin"]).unwrap(), of_one("BoxMeshopt.glb")];
+    for mesh in boxes {
+        assert_eq!(mesh.triangles.len(), 12);
+        let [low, high] = mesh.bounds;
+        assert!((0..3).all(|k| (high[k] - low[k] - (high[0] - low[0])).abs() < 1e-3), "{:?}", mesh.bounds);
+    }
+    // The fallback's file may be missing: what is compressed is all there.
+    let with = bundle("meshopt-fallback", &["meshopt-fallback.gltf", "meshopt-fallback.bin"]).unwrap();
+    let without = bundle("meshopt-no-fallback", &["meshopt-no-fallback.gltf", "meshopt-no-fallback.bin"]).unwrap();
+    assert!(with.triangles.len() > 10);
+    assert_close(&with, &without, 1e-6);
+    // Quantised twins of nothing: a sphere is round.
+    let sphere = of_one("DenseSphere.glb");
+    let radius = |p: &[f32; 3]| p.iter().map(|c| c * c).sum::<f32>().sqrt();
+    let (small, large) = sphere.positions.iter().map(radius).fold((9.0_f32, 0.0_f32), |(a, b), r| (a.min(r), b.max(r)));
+    assert!(large / small < 1.02, "{small} to {large}");
+}
