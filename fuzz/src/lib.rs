@@ -13,7 +13,7 @@ use std::cell::RefCell;
 use std::sync::Arc;
 
 /// Every target: one for each name that a mesh format has, and what takes more than a mesh.
-pub const TARGETS: [&str; 8] = ["obj", "stl", "ply", "gltf", "glb", "zip", "request", "pipeline"];
+pub const TARGETS: [&str; 11] = ["obj", "stl", "ply", "off", "fbx", "3mf", "gltf", "glb", "zip", "request", "pipeline"];
 
 /// Between an OBJ file and the MTL file that it calls `a.mtl`.
 const MTL_MARK: &[u8] = b"\n%mtl\n";
@@ -23,7 +23,8 @@ pub fn run(target: &str, bytes: &[u8]) {
     match target {
         "request" => run_request(bytes),
         "pipeline" => run_pipeline(bytes),
-        "zip" => run_import(&Bundle::zip(bytes.to_vec()), None),
+        // A package is a bundle that says what it is.
+        "zip" | "3mf" => run_import(&Bundle::zip(bytes.to_vec()), None),
         "obj" => run_import(&obj(bytes), Some(Format::Obj)),
         name => {
             let format = Format::from_name(name).unwrap_or_else(|| panic!("{name} is no target"));
@@ -73,12 +74,18 @@ fn run_import(bundle: &Bundle, format: Option<Format>) {
 /// What is true of every mesh, whatever file it comes from.
 fn check(mesh: &Mesh) {
     let (positions, triangles) = (mesh.positions.len(), mesh.triangles.len());
-    assert!(triangles > 0 && mesh.face_normals.len() == triangles && mesh.edge_masks.len() == triangles);
+    assert!(
+        (triangles > 0 || !mesh.loose.is_empty())
+            && mesh.face_normals.len() == triangles
+            && mesh.edge_masks.len() == triangles
+    );
     assert!(mesh.triangle_materials.len() == triangles && !mesh.materials.is_empty());
     assert!(mesh.positions.iter().flatten().all(|c| c.abs() <= 0.5));
     for [a, b, c] in &mesh.triangles {
         assert!(a != b && b != c && c != a && [a, b, c].iter().all(|v| (**v as usize) < positions));
     }
+    let ends_are_good = mesh.loose.iter().flat_map(|one| one.ends).all(|v| (v as usize) < positions);
+    assert!(ends_are_good && mesh.loose.iter().all(|one| (one.material as usize) < mesh.materials.len()));
     assert!(mesh.triangle_materials.iter().all(|m| (*m as usize) < mesh.materials.len()));
     assert!(mesh.face_normals.iter().flatten().all(|c| c.is_finite()));
     let attributes = [mesh.normals.len(), mesh.uvs.len(), mesh.colors.len()];

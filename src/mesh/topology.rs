@@ -50,15 +50,15 @@ pub struct Topology {
 
 /// The largest of what is held at once: the corners' sets and marks, the faces' sets, sums and flags.
 const BYTES_PER_TRIANGLE: u64 = 3 * (4 + 1) + 4 + 4 + 1;
-/// A vertex' set and count.
+/// A vertex' set and mark.
 const BYTES_PER_VERTEX: u64 = 4 + 1;
 
 impl Topology {
     /// Counts.
     pub fn of(mesh: &Mesh, edges: &EdgeList, budget: &mut Budget, deadline: &Deadline) -> Result<Self, MeshError> {
-        budget.spend("the topology", mesh.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
+        budget.spend("the topology", mesh.own_triangles().len() as u64, BYTES_PER_TRIANGLE)?;
         budget.spend("the topology", mesh.positions.len() as u64, BYTES_PER_VERTEX)?;
-        let components = components(mesh).1;
+        let (_, components, vertices) = components(mesh);
         deadline.check()?;
         let duplicate_faces = duplicates(mesh);
         deadline.check()?;
@@ -79,10 +79,10 @@ impl Topology {
             nonmanifold_vertices,
             duplicate_faces,
             inconsistent_edges: count(|faces, alike| faces == 2 && alike),
-            euler_characteristic: mesh.positions.len() as i64 - edges.edges.len() as i64 + mesh.triangles.len() as i64,
-            is_watertight: edges.is_closed(),
+            euler_characteristic: vertices as i64 - edges.edges.len() as i64 + mesh.own_triangles().len() as i64,
+            is_watertight: !edges.edges.is_empty() && edges.is_closed(),
             is_orientable: surfaces.is_orientable,
-            genus: surfaces.genus().filter(|_| nonmanifold_vertices == 0),
+            genus: surfaces.genus().filter(|_| nonmanifold_vertices == 0 && !edges.edges.is_empty()),
             closed_surfaces: surfaces.closed.into_iter().collect(),
         })
     }
@@ -117,18 +117,22 @@ pub fn fronts(mesh: &Mesh) -> Fronts {
     }
 }
 
-/// Vertices that triangles connect, and how many sets they are.
-fn components(mesh: &Mesh) -> (Sets, u64) {
+/// Vertices that triangles connect, how many sets they are, and how many vertices: those of lines and points belong to no face.
+fn components(mesh: &Mesh) -> (Sets, u64, u64) {
     let mut sets = Sets::new(mesh.positions.len());
-    let mut count = mesh.positions.len() as u64;
+    let mut is_met = vec![false; mesh.positions.len()];
+    let (mut united, mut vertices) = (0, 0);
     for t in mesh.own_triangles() {
-        count -= u64::from(sets.unite(t[0], t[1])) + u64::from(sets.unite(t[0], t[2]));
+        united += u64::from(sets.unite(t[0], t[1])) + u64::from(sets.unite(t[0], t[2]));
+        for v in *t {
+            vertices += u64::from(!std::mem::replace(&mut is_met[v as usize], true));
+        }
     }
-    (sets, count)
+    (sets, vertices - united, vertices)
 }
 
 fn duplicates(mesh: &Mesh) -> u64 {
-    let mut faces = mesh.triangles.clone();
+    let mut faces = mesh.own_triangles().to_vec();
     faces.iter_mut().for_each(|face| face.sort_unstable());
     faces.sort_unstable();
     faces.windows(2).filter(|pair| pair[0] == pair[1]).count() as u64

@@ -33,6 +33,7 @@ pub struct Report {
     polygons: u64,
     /// How many polygons have 3, 4, ... corners; the last place holds all larger ones.
     polygons_by_arity: Vec<Arity>,
+    /// Segments.
     lines: u64,
     points: u64,
     /// Names; empty where a material has none.
@@ -58,6 +59,7 @@ pub struct Report {
     dropped_nonfinite_faces: u64,
     dropped_degenerate_faces: u64,
     dropped_collapsed_faces: u64,
+    dropped_loose: u64,
     warnings: Vec<WarningReport>,
 }
 
@@ -142,8 +144,8 @@ impl Report {
             meshes,
             primitives,
             file_vertices: import.file_vertices,
-            positions: mesh.positions.len() as u64,
-            triangles: mesh.triangles.len() as u64,
+            positions: mesh.own_positions().len() as u64,
+            triangles: mesh.own_triangles().len() as u64,
             polygons: import.polygons_by_arity.iter().sum(),
             polygons_by_arity: arities.map(|(corners, &count)| Arity { corners, count }).collect(),
             lines: mesh.loose.len() as u64 - points,
@@ -166,6 +168,7 @@ impl Report {
             dropped_nonfinite_faces: import.dropped_nonfinite_faces,
             dropped_degenerate_faces: import.dropped_degenerate_faces,
             dropped_collapsed_faces: import.dropped_collapsed_faces,
+            dropped_loose: import.dropped_loose,
             warnings: warnings.map(|w| WarningReport { code: w.code, detail: w.detail.clone() }).collect(),
         }
     }

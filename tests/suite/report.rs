@@ -156,8 +156,8 @@ fn every_format_says_who_wrote_it() {
 #[test]
 fn lines_points_and_textures_are_told() {
     let (given, text) = report(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\nl 1 2 3\np 1\n");
-    assert_eq!((&given["lines"], &given["points"]), (&json!(2), &json!(1)));
-    assert!(text.contains("beside       2 lines, 1 point\n"), "{text}");
+    assert_eq!((&given["lines"], &given["points"]), (&json!(3), &json!(1)));
+    assert!(text.contains("beside       3 lines, 1 point\n"), "{text}");
 
     let mut png = std::io::Cursor::new(Vec::new());
     image::RgbImage::new(5, 3).write_to(&mut png, image::ImageFormat::Png).unwrap();

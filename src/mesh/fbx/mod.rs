@@ -8,7 +8,7 @@ mod materials;
 
 use super::import::Context;
 use super::raw::RawMesh;
-use super::{Format, MeshError, MeshFault, UpAxis, Warning, sniff};
+use super::{FileFacts, Format, MeshError, MeshFault, UpAxis, Warning, facts, sniff};
 use crate::limits;
 use ufbx::{
     AllocatorOpts, CoordinateAxis, Error, ErrorType, FileFormat, LoadOpts, OpenFileCb, ProgressCb, ProgressResult,
@@ -39,6 +39,15 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     limits::check("the number of scene nodes", scene.nodes.len() as u64, cx.limits.nodes, "--limit-nodes")?;
     let mut raw = RawMesh::default();
     raw.report.format = Format::Fbx;
+    raw.report.facts = FileFacts {
+        generator: facts::tidy(scene.metadata.creator.as_bytes()),
+        nodes: Some(scene.nodes.len() as u64),
+        meshes: Some(scene.meshes.len() as u64),
+        animations: Some(scene.anim_stacks.len() as u64),
+        skins: Some(scene.skin_deformers.len() as u64),
+        cameras: Some(scene.cameras.len() as u64),
+        ..FileFacts::default()
+    };
     raw.up = up_axis(&scene);
     let materials = geometry::read(&scene, &mut raw, cx)?;
     materials::read(&scene, &materials, &mut raw, cx)?;

@@ -6,10 +6,9 @@
 use super::face::{Corner, Counts, parse_corner, show, write_face};
 use super::left_out::LeftOut;
 use super::lines::Lines;
-use crate::mesh::Loose;
-use crate::mesh::MeshError;
 use crate::mesh::import::Context;
 use crate::mesh::loose::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
+use crate::mesh::{Loose, MeshError};
 use rapidhash::RapidHashMap;
 use std::io::{BufRead, Read};
 use tobj::LoadError;

@@ -33,8 +33,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     raw.report.format = Format::Obj;
     raw.report.file_vertices = summary.vertices;
     raw.report.warnings = summary.left_out.warnings();
-    let generator = facts::first_comment(bytes, b"#", |_| false);
-    raw.report.facts = FileFacts::by(generator);
+    raw.report.facts = FileFacts::by(facts::first_comment(&text, b"#", |_| false));
     let mut triangulator = Triangulator::default();
     for model in models {
         cx.deadline.check()?;

@@ -19,7 +19,7 @@ use self::header::Header;
 use self::words::Words;
 use super::import::Context;
 use super::raw::RawMesh;
-use super::{Format, MaterialSlot, MeshError, Warning};
+use super::{FileFacts, Format, MaterialSlot, MeshError, Warning, facts};
 
 /// How many there are of what, as the file has it.
 #[derive(Clone, Copy, Debug)]
@@ -58,10 +58,11 @@ trait Source {
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let header = header::parse(bytes)?;
     if header.is_binary {
-        read_from(&mut Binary::new(bytes, header.body_at), &header, cx)
-    } else {
-        read_from(&mut Words::new(bytes, header.body_at), &header, cx)
+        return read_from(&mut Binary::new(bytes, header.body_at), &header, cx);
     }
+    let mut raw = read_from(&mut Words::new(bytes, header.body_at), &header, cx)?;
+    raw.report.facts = FileFacts::by(facts::first_comment(bytes, b"#", |_| false));
+    Ok(raw)
 }
 
 fn read_from(source: &mut impl Source, header: &Header, cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
