@@ -174,7 +174,7 @@ fn lines_points_and_textures_are_told() {
     gltf.json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
     gltf.mesh(json!({ "attributes": { "POSITION": position }, "material": 0 }));
     gltf.mesh(json!({ "attributes": { "POSITION": position }, "mode": 3 }));
-    gltf.json["nodes"] = json!([{ "mesh": 0, "children": [1] }, { "camera": 0, "name": "eye" }]);
+    gltf.json["nodes"] = json!([{ "mesh": 0, "children": [1] }, { "camera": 0, "name": "eye", "mesh": 1 }]);
     gltf.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 0.5, "znear": 0.1 } }]);
     let (given, text) = report(&gltf.glb());
     let textures = given["textures"].as_array().unwrap();

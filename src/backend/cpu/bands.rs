@@ -6,9 +6,10 @@ use super::isa::dispatch;
 use super::layers::{self, LayerBand};
 use super::light::Light;
 use super::lines::{LineDrawer, LineTarget};
+use super::nearest::Nearest;
 use super::samples::SampleBand;
 use super::scratch::BandScratch;
-use super::visibility::{self, Nearest, Setup};
+use super::visibility::{self, Setup};
 use super::{Stages, line_light, resolve, shade};
 use crate::plan::LinePass;
 

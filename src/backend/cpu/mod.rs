@@ -20,6 +20,7 @@ mod layers;
 mod light;
 mod line_light;
 mod lines;
+mod nearest;
 mod peel;
 mod point;
 mod profile;

@@ -3,7 +3,9 @@
 //! Only `v`, `vt`, `vn`, `f`, `l`, `p` and material lines get through, in canonical form, checked and paid for. What `tobj` would
 //! refuse but is harmless (bytes that are not UTF-8, empty faces, partial colours) is dropped or completed on the way.
 
-use super::face::{Corner, Counts, parse_corner, show, write_face};
+mod numbers;
+
+use super::face::{Corner, Counts, parse_corner, write_face};
 use super::left_out::LeftOut;
 use super::lines::Lines;
 use crate::mesh::import::Context;
@@ -145,63 +147,6 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         Ok(())
     }
 
-    fn vertex<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), MeshError> {
-        let mut all: [&[u8]; 7] = [b""; 7];
-        let mut count = 0;
-        for word in words.take(7) {
-            all[count] = word;
-            count += 1;
-        }
-        self.numbers(b"v", all[..count].iter().copied(), 3)?;
-        let color = Some(&all[3..6]).filter(|c| count >= 6 && c.iter().all(|w| number(w).is_some()));
-        let colored = *self.colored.get_or_insert(color.is_some());
-        self.left_out.colors += u64::from(colored != color.is_some());
-        // Six or seven numbers are a position and a colour; four are x y z w, and tobj divides by w.
-        let more: &[&[u8]] = match color {
-            Some(color) if colored => color,
-            None if colored => &[b"1", b"1", b"1"],
-            _ if count == 4 && number(all[3]).is_some_and(|w| w != 0.0) => &all[3..4],
-            _ => &[],
-        };
-        if !more.is_empty() {
-            self.unpaid_bytes += 48 + 16;
-            self.out.pop();
-            for word in more {
-                self.out.push(b' ');
-                self.out.extend_from_slice(word);
-            }
-            self.out.push(b'\n');
-        }
-        Ok(())
-    }
-
-    /// Writes a line with exactly `count` numbers; `tobj` parses them.
-    fn numbers<'w>(
-        &mut self,
-        keyword: &[u8],
-        mut words: impl Iterator<Item = &'w [u8]>,
-        count: usize,
-    ) -> Result<(), MeshError> {
-        self.out.extend_from_slice(keyword);
-        for i in 0..count {
-            let word = match words.next() {
-                // What Microsoft's C library prints for a NaN: 1.#IND, -nan(ind).
-                Some(word) if word.iter().any(|b| matches!(b, b'#' | b'(')) => b"nan",
-                Some(word) if word.is_ascii() => word,
-                // A one-dimensional texture coordinate is legal.
-                None if count == 2 && i == 1 => b"0",
-                other => {
-                    let given = other.map_or(format!("it has {i}"), |w| format!("\"{}\" is none", show(w)));
-                    return Err(self.broken(&format!("\"{}\" needs {count} numbers, and {given}", show(keyword))));
-                }
-            };
-            self.out.push(b' ');
-            self.out.extend_from_slice(word);
-        }
-        self.out.push(b'\n');
-        Ok(())
-    }
-
     fn face<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), MeshError> {
         self.corners.clear();
         for word in words {
@@ -299,10 +244,6 @@ impl<'a, 'b> Cleaner<'a, 'b> {
     fn broken(&self, what: &str) -> MeshError {
         MeshError::broken(format!("line {} of the OBJ file: {what}", self.lines.number))
     }
-}
-
-fn number(word: &[u8]) -> Option<f64> {
-    std::str::from_utf8(word).ok()?.parse().ok().filter(|v: &f64| v.is_finite())
 }
 
 impl BufRead for Cleaner<'_, '_> {

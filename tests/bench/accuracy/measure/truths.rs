@@ -54,7 +54,7 @@ pub struct Errors {
 pub struct Apart {
     /// Share of pixels that differ at all.
     pub share: f64,
-    /// The largest difference, /255.
+    /// The largest difference, /255, of colours times their alpha: of what is hardly there the colour says nothing.
     pub max: u8,
     pub flip: f64,
 }
@@ -123,7 +123,10 @@ impl Apart {
     pub fn of(a: &Image, b: &Image) -> Self {
         let pairs = || a.rgba.chunks(4).zip(b.rgba.chunks(4));
         let differ = pairs().filter(|(p, q)| p != q).count();
-        let max = a.rgba.iter().zip(&b.rgba).map(|(p, q)| p.abs_diff(*q)).max().unwrap_or(0);
+        let shown =
+            |p: &[u8], k: usize| if k == 3 { u32::from(p[3]) } else { (u32::from(p[k]) * u32::from(p[3]) + 127) / 255 };
+        let largest = pairs().flat_map(|(p, q)| (0..4).map(move |k| shown(p, k).abs_diff(shown(q, k)))).max();
+        let max = largest.unwrap_or(0) as u8;
         let linear = |image: &Image| -> Vec<V3> {
             let channel = |p: &[u8], k: usize| srgb::to_linear(f64::from(p[k]) / 255.0) * f64::from(p[3]) / 255.0;
             image.rgba.chunks(4).map(|p| [0, 1, 2].map(|k| channel(p, k))).collect()
