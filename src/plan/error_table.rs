@@ -79,7 +79,7 @@ mod tests {
         let mut found = 0;
         for technique in techniques {
             for backend in ["cpu", "gpu"] {
-                for samples in [1, 4] {
+                for samples in [1, 4, 8, 16] {
                     let row = table.row(technique, backend, samples).unwrap();
                     let [thumbnail, measured, large] = [64.0, 512.0, 2048.0].map(|s: f64| table.error(row, s * s));
                     assert!(measured > 0.0 && measured <= thumbnail && thumbnail <= 255.0, "{row:?}");
@@ -90,6 +90,6 @@ mod tests {
                 }
             }
         }
-        assert_eq!(found, 36);
+        assert_eq!(found, 72);
     }
 }

@@ -8,7 +8,7 @@ use meshsnap::request::{self, Rules};
 
 use crate::measure::scenes::{SCENES, UNSEEN};
 use crate::measure::techniques::{Family, Technique};
-use crate::measure::{Effort, back_ends, condensed, rounds};
+use crate::measure::{Effort, SAMPLES, back_ends, condensed, rounds};
 use crate::truth::cases;
 
 /// Sides of pictures.
@@ -90,6 +90,6 @@ fn expected_errors_hold_on_meshes_that_the_table_was_not_made_from() {
     println!("at worst {worst:.3} times what is expected");
     let techniques = |family: Family| UNSEEN.iter().filter(|s| s.family == family).count() * family.techniques().len();
     let all = [Family::Wires, Family::Outlines, Family::Pictures].map(techniques);
-    assert_eq!((compared, all), (2 * 45 * sizes_px.len(), [25, 6, 14]));
+    assert_eq!((compared, all), (SAMPLES.len() * 45 * sizes_px.len(), [25, 6, 14]));
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }

@@ -185,7 +185,7 @@ fn lines_points_and_textures_are_told() {
     }
     assert!(textures[0]["name"].as_str().unwrap().contains("wood"));
     assert_eq!((&textures[1]["format"], &textures[1]["width_px"]), (&json!("png"), &Value::Null));
-    assert_eq!((&given["materials"], &given["lines"], &given["meshes"]), (&json!(["Wood"]), &json!(2), &json!(2)));
+    assert_eq!((&given["materials"], &given["lines"], &given["meshes"]), (&json!(["Wood", ""]), &json!(2), &json!(2)));
     assert_eq!(given["extensions_required"], json!(["KHR_mesh_quantization"]));
     assert_eq!((&given["cameras"], &given["scene_cameras"][0]["name"]), (&json!(1), &json!("eye")));
     for part in ["5x3 png", "(broken png)", "KHR_mesh_quantization (required), KHR_materials_unlit", "28.6 degrees"] {
