@@ -116,7 +116,8 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
                 draw_part(edge, s, window, part);
             }
         }
-        if search.begin >= search.range.y {
+        // Also where it is no number.
+        if !(search.begin < search.range.y) {
             next += THREADS;
             has_share = false;
         }

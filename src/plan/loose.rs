@@ -43,6 +43,7 @@ pub fn thicken(
         return Ok(Some(Warning { code: "lines_not_drawn", detail }));
     }
     budget.spend("lines and points", triangles(&mesh.loose), TRIANGLE_BYTES)?;
+    reserve(mesh);
     let size_px = [spec.image.width_px, spec.image.height_px];
     let camera = Camera::place(&spec.camera, mesh, size_px, border(mesh, &parts, spec));
     mesh.thickened = Some(Thickened { positions: mesh.positions.len(), triangles: mesh.triangles.len() });
@@ -54,6 +55,20 @@ pub fn thicken(
         brush.draw(i);
     }
     Ok(None)
+}
+
+/// Room for just what is added: lists that grow by themselves would double.
+fn reserve(mesh: &mut Mesh) {
+    let added = triangles(&mesh.loose) as usize;
+    let corners: usize = mesh.loose.iter().map(|one| if one.is_point() { 6 } else { 4 }).sum();
+    mesh.positions.reserve_exact(corners);
+    mesh.triangles.reserve_exact(added);
+    mesh.face_normals.reserve_exact(added);
+    mesh.edge_masks.reserve_exact(added);
+    mesh.triangle_materials.reserve_exact(added);
+    if !mesh.loose_attributes.is_empty() {
+        mesh.attribute_triangles.reserve_exact(added);
+    }
 }
 
 struct Brush<'m> {

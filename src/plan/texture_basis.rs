@@ -44,15 +44,18 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<BasisHeader, PlanError> {
         return Err(broken(name, "is a KTX2 file that is not one flat picture"));
     }
     let blocks = u64::from(width.div_ceil(4)) * u64::from(height.div_ceil(4));
-    let mut decoding_bytes = blocks * (16 * 4 + BLOCK_BYTES) + CODE_BOOK_BYTES + bytes.len() as u64;
+    // Sizes are checked later: 2^60 blocks may be claimed here.
+    let decoded_bytes = blocks.saturating_mul(16 * 4 + BLOCK_BYTES);
+    let mut decoding_bytes = decoded_bytes.saturating_add(CODE_BOOK_BYTES + bytes.len() as u64);
     if scheme == ZSTANDARD {
         // The decoder takes the file's word for how long the largest image is.
         let unpacked = u64::from(word(96)?) | u64::from(word(100)?) << 32;
-        if unpacked != blocks * BLOCK_BYTES {
-            let detail = format!("says that it unpacks to {unpacked} bytes, and it should be {}", blocks * BLOCK_BYTES);
+        let expected = blocks.saturating_mul(BLOCK_BYTES);
+        if unpacked != expected {
+            let detail = format!("says that it unpacks to {unpacked} bytes, and it should be {expected}");
             return Err(broken(name, &detail));
         }
-        decoding_bytes += ZSTANDARD_BYTES;
+        decoding_bytes = decoding_bytes.saturating_add(ZSTANDARD_BYTES);
     }
     Ok(BasisHeader { width, height, decoding_bytes })
 }

@@ -157,7 +157,7 @@ pub struct Wire {
 /// Unit of an outline's thickness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OutlineUnit {
-    /// Model units, along the normal.
+    /// Model units, as they are at the depth of the silhouette.
     Object,
     /// Pixels, on screen.
     Px,

@@ -28,7 +28,8 @@ impl Tiles {
     /// For the bands of a plan.
     pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, band_rows: u32) -> Self {
         let pixels = u64::from(plan.width_px) * u64::from(plan.height_px);
-        let tests = (plan.triangles.len() as u64).saturating_mul(pixels * u64::from(plan.samples));
+        let hull = plan.hull.as_ref().map_or(0, |hull| hull.triangles.len());
+        let tests = ((plan.triangles.len() + hull) as u64).saturating_mul(pixels * u64::from(plan.samples));
         Self {
             in_rounds: device.loops_are_limited || tests > BLIND_TESTS_MAX,
             workgroups: device.tile_workgroups.min(device.workgroups_max),
