@@ -18,6 +18,7 @@ const SAMPLES: &str = include_str!("../../../shaders/samples.wgsl");
 const LAYERED: &str = include_str!("../../../shaders/layered.wgsl");
 const EMIT: &str = include_str!("../../../shaders/emit.wgsl");
 const EMIT_LAYER: &str = include_str!("../../../shaders/emit_layer.wgsl");
+const OVER: &str = include_str!("../../../shaders/over.wgsl");
 const GROUP: &str = include_str!("../../../shaders/group.wgsl");
 
 /// What shade, layers and line_light have in common: from where a point lies to its colour.
@@ -112,7 +113,14 @@ impl Stage {
                 (Slot::Strokes, ReadWrite),
                 (Slot::Progress, ReadWrite),
             ],
-            Self::Ink => &[(Slot::Colors, ReadWrite), (Slot::Strokes, ReadWrite), (Slot::LineColors, Read)],
+            Self::Ink => &[
+                (Slot::Samples, Read),
+                (Slot::Colors, ReadWrite),
+                (Slot::Strokes, ReadWrite),
+                (Slot::LineColors, Read),
+                (Slot::Layered, Read),
+                (Slot::Cells, Read),
+            ],
             Self::LineLight => &[
                 (Slot::Positions, Read),
                 (Slot::Triangles, Read),
@@ -197,8 +205,8 @@ impl Stage {
                 let kernel = include_str!("../../../shaders/lines.wgsl");
                 [COMMON, TRIANGLE, PLANES, CONTOUR, SEGMENT, HIDING, STROKE, kernel].concat()
             }
-            Self::Ink => [COMMON, include_str!("../../../shaders/ink.wgsl")].concat(),
-            Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
+            Self::Ink => [COMMON, OVER, LAYERED, include_str!("../../../shaders/ink.wgsl")].concat(),
+            Self::Resolve => [COMMON, OVER, include_str!("../../../shaders/resolve.wgsl")].concat(),
         }
     }
 
@@ -228,7 +236,7 @@ impl Stage {
             Self::Layers => SHADED | look::LAYERED_HULL,
             Self::Shade => SHADED | look::LAYERS,
             Self::LineLight => SHADED,
-            Self::Ink => look::SURFACE | look::HULL,
+            Self::Ink => look::SURFACE | look::HULL | look::LAYERS | look::SAMPLES,
             Self::Lines => look::CONTOURS | look::CLIPPED | look::SAMPLES,
             Self::Resolve => look::SURFACE | look::HULL | look::LINES,
         }

@@ -28,7 +28,7 @@ pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
 pub use self::sizes::bands_bytes;
 
 use self::buffers::Buffers;
-use self::params::{attributes, corner_triangles, edge_lists, hull_looks};
+use self::params::{attributes, cell_masks, corner_triangles, edge_lists, hull_looks};
 use self::recorder::Recorder;
 use self::schedule::Schedule;
 use self::sizes::{
@@ -224,6 +224,7 @@ fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule:
         let colors: Vec<[f32; 4]> = plan.lines.iter().map(|lines| lines.color).collect();
         buffers.upload_parts(gpu, Slot::Edges, &edges)?;
         buffers.upload(gpu, Slot::LineColors, bytemuck::cast_slice(&colors))?;
+        buffers.upload(gpu, Slot::Cells, bytemuck::cast_slice(&cell_masks(plan.samples)))?;
         buffers.reserve(gpu, Slot::Strokes, band_pixels * STROKES_BYTES)?;
         buffers.reserve(gpu, Slot::Progress, schedule.progress_bytes)?;
         if plan.lights_lines() {
