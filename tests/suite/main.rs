@@ -7,6 +7,7 @@ mod accuracy_behind_eye;
 mod accuracy_bench;
 mod accuracy_geometry;
 mod accuracy_outlines;
+mod accuracy_over;
 mod accuracy_shading;
 mod accuracy_wires;
 mod ask;
