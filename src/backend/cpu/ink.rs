@@ -27,7 +27,8 @@ pub struct Ink {
     mask: Mask,
     /// Of all strokes: no number of them comes near the end of 64 bits.
     area: u64,
-    count: u64,
+    /// So many that this ends at its largest have long been told by `slack` what they cover.
+    count: u32,
     /// Most that the area of a stroke differs from its points'.
     slack: u32,
 }
@@ -37,7 +38,7 @@ impl Ink {
     /// stroke may cover them all and yet leave a corner of the pixel; more than one are taken to have covered it.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
-        self.count > u64::from(POINTS) && self.mask == [u16::MAX; WORDS]
+        self.count > POINTS && self.mask == [u16::MAX; WORDS]
     }
 
     /// Adds a stroke of a line with this peak.
@@ -48,7 +49,7 @@ impl Ink {
         }
         let (area, count) = ((area * AREA_UNIT + 0.5) as u32, count(mask));
         self.area += u64::from(area);
-        self.count += u64::from(count);
+        self.count = self.count.saturating_add(count);
         self.slack = self.slack.max(area.abs_diff((count as f32 * (peak * (AREA_UNIT / POINTS as f32)) + 0.5) as u32));
     }
 
@@ -65,7 +66,7 @@ impl Ink {
         }
         let union = count(&self.mask);
         let area = to_f32(self.area) * (1.0 / AREA_UNIT);
-        let share = if self.count > u64::from(union) { union as f32 / to_f32(self.count) } else { 1.0 };
+        let share = if self.count > union { union as f32 / self.count as f32 } else { 1.0 };
         let points = union as f32 * (peak * (1.0 / POINTS as f32));
         let slack = self.slack as f32 * (BESIDE / AREA_UNIT);
         (area * share).max(points - slack).min(points + slack).min(peak)
