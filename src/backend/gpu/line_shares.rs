@@ -83,8 +83,8 @@ fn unit_iterations(samples: u32, lines: &LinePass, slices: u32) -> u32 {
     let steps = (2.0 * length) as u32 + 2;
     let look = steps * (1 + samples) + steps * (1 + 3 * samples);
     let pixels = ((length as u32).div_ceil(slices) + 1) * (length as u32 + 1);
-    // Each is found, while the others wait, and has eight words of its mask filled.
-    look + pixels * (LANES + 1 + 8) + WORKGROUP
+    // Each is found, while the others wait, and has eight words of its mask filled by halves.
+    look + pixels * (LANES + 1 + 8 * 3) + WORKGROUP
 }
 
 impl Schedule {
