@@ -8,7 +8,7 @@ trap 'rm -f "$log"' EXIT
 cargo test --locked --test suite -- --nocapture accuracy_ golden:: skips:: > "$log" 2>&1 || { cat "$log"; exit 1; }
 
 # Lines are "goal N: what was measured". Tests end in any order.
-grep -oE 'goal [0-9]+: .*' "$log" | sort -u | awk -F '|' '
+grep -oE 'goal [0-9]+: .*' "$log" | LC_ALL=C sort -u | awk -F '|' '
     NR == FNR {
         number = $0
         sub(/^goal /, "", number)
