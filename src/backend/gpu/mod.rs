@@ -1,11 +1,12 @@
 //! The wgpu back-end: the CPU's stages as compute shaders, headless.
 //!
 //! In reading order: [`device`] opens a GPU; [`schedule`] decides what is dispatched for a plan; [`recorder`] turns that
-//! into commands; [`kernels`] says what each stage is made of, [`stages`] are their pipelines, [`params`] their numbers,
+//! into commands; [`kernels`] and [`bindings`] say what each stage is made of, [`stages`] are their pipelines, [`params`] their numbers,
 //! [`buffers`] their memory and [`sizes`] how much of it.
 //!
 //! Architecture invariant: a job's use of the device stays on the thread that draws it, because wgpu's error scopes do.
 
+mod bindings;
 mod buffers;
 mod device;
 mod kernels;
