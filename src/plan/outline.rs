@@ -98,9 +98,9 @@ impl<'a> Outlines<'a> {
         }
         let along = way.map(|v| v / length);
         let out = f64::from(rim.free);
-        // Tangent to the circles around both ends, of which one may be nearer and larger.
-        let narrows = (reach[0] - reach[1]) / length;
-        let sine = if narrows.abs() < 0.95 { narrows } else { 0.0 };
+        // Tangent to the circles around both ends, of which one may be nearer and larger. Where it surrounds the other the strip is empty,
+        // and the nearer end's fan reaches around to it.
+        let sine = ((reach[0] - reach[1]) / length).clamp(-1.0, 1.0);
         let cosine = (1.0 - sine * sine).sqrt();
         let normal = [sine * along[0] - cosine * out * along[1], sine * along[1] + cosine * out * along[0]];
         let depths = self.depths(rim, ends, [along[0], along[1], length], normal, reach);

@@ -67,10 +67,13 @@ fn outlines_and_faces_are_measured_too() {
         match scene.family {
             Family::Outlines => {
                 let (contour, hull) = (rmse(Technique::Contour), rmse(Technique::Hull));
-                // A hull's border is as its samples have it; and between the teeth it stays behind those beside it, where a flat strip
-                // would lie over them.
+                for row in rows.iter().filter(|row| row.technique == Technique::Hull) {
+                    println!("{} {} hull {:?}", row.back_end, row.samples, row.errors);
+                }
+                // A hull's border is as its samples have it, a contour's is exact.
                 assert!(contour < 20.0 && contour < hull && hull < 48.0, "{contour}, {hull}");
                 let ink = [Technique::Contour, Technique::Hull].map(|technique| at(technique).ink.unwrap());
+                println!("{ink:?}");
                 assert!((ink[0] - 1.0).abs() < 0.02 && (0.8..1.05).contains(&ink[1]), "{ink:?}");
             }
             _ => {

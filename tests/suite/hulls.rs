@@ -4,12 +4,15 @@ use std::time::{Duration, Instant};
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use meshsnap::plan;
 
-use crate::scenes;
+use crate::likeness::{Likeness, Tolerance};
 use crate::soups::Random;
+use crate::twins::gpus;
+use crate::{scenes, shapes};
 
 /// As much as a job may go on after its deadline: far longer than what lies between two looks at it, on a machine that does other work.
 const SOON: Duration = Duration::from_millis(1000);
@@ -79,4 +82,40 @@ fn hulls_of_many_edges_have_few_triangles_where_there_are_few_pixels() {
     let (few, many) = (triangles("32", "8"), triangles("512", "8"));
     assert!((400_000..480_000).contains(&few), "{few}");
     assert!((few + 400_000..1_600_000).contains(&many), "{many}");
+}
+
+#[test]
+fn hulls_are_the_same_on_both_back_ends_with_any_samples() {
+    let Some(gpus) = gpus() else { return };
+    let mut cases = 0;
+    for (name, obj) in [("gear", shapes::gear(9)), ("sheet", shapes::sheet(6)), ("balls", shapes::two_balls())] {
+        let mesh = scenes::mesh(&obj);
+        for samples in ["1", "4", "8", "16"] {
+            for (unit, thickness, opacity) in [("px", "5", "1"), ("object", "0.07", "1"), ("px", "2.5", "0.4")] {
+                let spec = scenes::spec(&[
+                    ("style", "outline"),
+                    ("size", "140x110"),
+                    ("samples", samples),
+                    ("outline.method", "hull"),
+                    ("outline.unit", unit),
+                    ("outline.thickness", thickness),
+                    ("outline.color", "d03010"),
+                    ("surface.opacity", opacity),
+                    ("background", "transparent"),
+                ]);
+                let plan = scenes::plan(&mesh, &spec);
+                let what = format!("{name}, {samples} samples, {thickness} {unit}, opacity {opacity}");
+                let cpu = CpuRenderer::new(2).draw(&plan, &Deadline::default()).unwrap();
+                let is_red = |p: &&[u8]| p[3] > 0 && p[0] > 150 && p[1] < 80;
+                let red = cpu.rgba.chunks(4).filter(is_red).count();
+                assert!(red > 300, "{what}: {red} pixels of an outline");
+                for gpu in gpus {
+                    let gpu = GpuRenderer::new(gpu.clone()).draw(&plan, &Deadline::default()).unwrap();
+                    Likeness::of(&cpu, &gpu).assert(Tolerance::TWINS, &what);
+                    cases += 1;
+                }
+            }
+        }
+    }
+    assert_eq!(cases, 3 * 4 * 3 * gpus.len());
 }
