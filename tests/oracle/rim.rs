@@ -1,6 +1,8 @@
 //! Part 3e: what a hull should show: all points within its width of an edge where the surface ends, on the side where the surface is
 //! not, and nearer than any surface there.
 //!
+//! Around a corner it goes as far as the next edge where the surface ends.
+//!
 //! A hull recedes. Where it ends it lies half its width behind the edge, so that what is next to the edge hides it and what is far
 //! behind does not. A face that turns away faster than that is continued beyond its edge, up to five times as fast, and the hull
 //! lies a twentieth of its width behind that: a hull of what goes on elsewhere in the same plane does not lie over it. Depth is even
@@ -23,7 +25,7 @@ const FOLLOWS_UP_TO: f64 = 2.5;
 const BEHIND_WHAT_IT_FOLLOWS: f64 = 0.05;
 
 /// An edge where the surface ends, and the hull beyond.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Rim {
     /// x and y in pixels, and depth, of both ends.
     ends: [V3; 2],
@@ -31,6 +33,8 @@ pub struct Rim {
     far: [f64; 2],
     /// Away from the surface that ends here, at right angles.
     outward: V2,
+    /// By end: in which directions edges leave it where the surface ends too.
+    others: [Vec<V2>; 2],
 }
 
 /// Everywhere that a scene's surface ends; for hulls so many pixels wide.
@@ -38,8 +42,14 @@ pub fn rims(scene: &Scene, width: f64) -> Vec<Rim> {
     let camera = &scene.camera;
     let at = |v: u32| camera.homogeneous(scene.positions[v as usize]);
     let thirds = thirds(scene);
+    let edges = contour(scene);
+    let mut at_vertex: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for &[a, b] in &edges {
+        at_vertex.entry(a).or_default().push(b);
+        at_vertex.entry(b).or_default().push(a);
+    }
     let mut rims = Vec::new();
-    for edge in contour(scene) {
+    for edge in edges {
         let [a, b] = match camera.in_front(&edge.map(at))[..] {
             [a, b] => [a, b],
             _ => continue,
@@ -60,9 +70,21 @@ pub fn rims(scene: &Scene, width: f64) -> Vec<Rim> {
             let planes = thirds.iter().filter_map(|&third| plane_at([ends[0], ends[1], third], beyond));
             far_depth(camera, [a, b][k], width, planes.fold(f64::INFINITY, f64::min))
         });
-        rims.push(Rim { ends, far, outward });
+        let leave = |k: usize| {
+            let others = at_vertex[&edge[k]].iter().filter(|v| !edge.contains(v));
+            let ends = others.map(|&v| at(v)).filter(|h| h[3] >= camera.near_w).map(project);
+            ends.map(|v| [v[0], v[1]]).collect::<Vec<V2>>()
+        };
+        let others = [0, 1].map(|k| leave(k).into_iter().map(|v| sub(v, [ends[k][0], ends[k][1]])).collect());
+        rims.push(Rim { ends, far, outward, others });
     }
     rims
+}
+
+/// Whether a direction lies between two that are less than half a turn apart.
+fn is_between(way: V2, [a, b]: [V2; 2]) -> bool {
+    let turn = cross2(a, b);
+    turn != 0.0 && cross2(a, way) / turn > 0.0 && cross2(way, b) / turn > 0.0
 }
 
 /// Depth where a hull ends that begins at `edge`; of what continues its farther face there, `plane`.
@@ -111,7 +133,15 @@ fn is_inked(p: V2, near: &[&Rim], pieces: &[&Piece], width: f64) -> bool {
         let (distance, t) = rim.nearest(p);
         let [x, y, depth] = mix(rim.ends[0], rim.ends[1], t);
         let far = rim.far[0] + t * (rim.far[1] - rim.far[0]);
-        let is_beyond = dot(rim.outward, sub(p, [x, y])) >= 0.0;
+        let way = sub(p, [x, y]);
+        // Past an end, only as far around it as the next edge.
+        let along = sub([rim.ends[1][0], rim.ends[1][1]], [rim.ends[0][0], rim.ends[0][1]]);
+        let (own, others): (V2, &[V2]) = match t {
+            _ if t <= 0.0 => (along, &rim.others[0]),
+            _ if t >= 1.0 => (along.map(|v| -v), &rim.others[1]),
+            _ => (along, &[]),
+        };
+        let is_beyond = dot(rim.outward, way) >= 0.0 && !others.iter().any(|other| is_between(*other, [own, way]));
         distance <= width && is_beyond && depth + distance / width * (far - depth) > surface
     })
 }
