@@ -1,7 +1,7 @@
 // Stage 4, an edge: lines of exact width. Twin of src/backend/cpu/lines.rs.
 //
 // Edges are cut into windows and those into slices of rows: shares, which are dealt out to the threads of a workgroup. A thread
-// works in units: it looks along its window once, and draws the part that it has found. Where a dispatch may not take too long,
+// works in units: in each it looks along its window once, and when it has found a part, draws it. Where a dispatch may not take too long,
 // it ends after a number of them, and the next one goes on from there.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
@@ -92,7 +92,6 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
     var window: Window;
     var search: Search;
     while next < all && units > 0u {
-        units--;
         if !has_share {
             let slot = edge_of_share(next);
             edge = edges[first + slot];
@@ -110,11 +109,19 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
             }
             has_share = true;
         }
-        if search.begin < search.range.y {
-            let part = next_part(edge, s, &search);
-            if part.x < part.y {
-                draw_part(edge, s, window, part);
-            }
+        // Threads that have found a part wait here for those that have not.
+        let units_before = units;
+        var part = vec2(0.0);
+        while search.begin < search.range.y && part.x >= part.y && units > 0u {
+            units--;
+            part = next_part(edge, s, &search);
+        }
+        if units == units_before {
+            // To begin a share is work too.
+            units--;
+        }
+        if part.x < part.y {
+            draw_part(edge, s, window, part);
         }
         // Also where it is no number.
         if !(search.begin < search.range.y) {

@@ -102,8 +102,12 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
     }
     let at = pixel_at * STROKE_WORDS;
     var points = 0u;
-    for (var w = 0u; w < 8u; w++) {
-        let mask = points_of(stroke, 2u * w) | (points_of(stroke, 2u * w + 1u) << 16u);
+    // Zero is a number that compilers do not know: where they unroll this, they take twice as long.
+    for (var w = 0u; w < 8u + frame.zero; w++) {
+        var mask = 0u;
+        for (var half = 0u; half < 2u + frame.zero; half++) {
+            mask |= points_of(stroke, 2u * w + half) << (16u * half);
+        }
         if mask != 0u {
             points += countOneBits(mask);
             atomicOr(&strokes[at + 3u + w], mask);

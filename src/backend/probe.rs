@@ -63,10 +63,10 @@ pub enum ProbeError {
     },
 }
 
-/// Draws the probe with 1 and 4 samples a pixel: samples must be right to the bit, colours to one step in 255.
+/// Draws the probe with the fewest samples a pixel, as many as usual, and the most: samples must be right to the bit, colours to one step in 255.
 pub fn probe(renderer: &mut dyn Renderer) -> Result<(), ProbeError> {
     let deadline = Deadline::default();
-    for samples in [1, 4] {
+    for samples in [1, 4, 16] {
         let plan = plan(samples);
         let (want, got) = (expected_words(samples), renderer.draw_visibility(&plan, &deadline)?);
         let wrong = count_differing(&want, &got, |a, b| a == b);

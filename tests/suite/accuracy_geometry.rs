@@ -12,7 +12,7 @@ use crate::oracle::coverage::{Coverage, classify, snap};
 use crate::oracle::vector::V3;
 use crate::scenes;
 use crate::shapes::Random;
-use crate::truth::{cases, renderers};
+use crate::truth::{cases, goal, renderers};
 
 /// Samples that belong to no triangle and to more than one, and how many were looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -83,7 +83,7 @@ pub fn jittered_net(n: u32, size_px: [u32; 2], random: &mut Random) -> (Vec<[f32
 #[test]
 fn shared_edges_own_every_sample_once() {
     let mut missed = Vec::new();
-    let (mut edges, mut random) = (0, Random(11));
+    let (mut edges, mut random, mut all) = (0, Random(11), Ownership::default());
     for mut renderer in renderers() {
         for (n, size, samples) in
             [(12, 256, 4), (100, 256, 1), (100, 256, 4), (100, 256, 8), (100, 256, 16), (590, 512, 4)]
@@ -91,10 +91,13 @@ fn shared_edges_own_every_sample_once() {
             let (positions, triangles) = jittered_net(n, [size; 2], &mut random);
             let plan = scenes::screen_plan([size; 2], samples, 1.0, &positions, &triangles);
             let what = format!("6 net of {} triangles, {}", triangles.len(), renderer.kind().name());
-            missed.extend(Ownership::of(&plan, renderer.as_mut()).check(&what).err());
+            let found = Ownership::of(&plan, renderer.as_mut());
+            missed.extend(found.check(&what).err());
+            all.add(found);
             edges += 3 * n as usize * n as usize - 2 * n as usize;
         }
     }
+    goal(6, &format!("{} missing, {} double of {edges} shared edges", all.missing, all.double));
     assert!(edges >= 1_000_000, "{edges}");
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
@@ -102,6 +105,7 @@ fn shared_edges_own_every_sample_once() {
 #[test]
 fn fans_own_every_sample_once_beyond_the_guard_band_too() {
     let mut missed = Vec::new();
+    let mut sum = Ownership::default();
     let mut random = Random(12);
     let (mut fans, count) = (0, cases(40, 400));
     for mut renderer in renderers() {
@@ -117,9 +121,11 @@ fn fans_own_every_sample_once_beyond_the_guard_band_too() {
                 all.add(Ownership::of(&plan, renderer.as_mut()));
                 fans += 1;
             }
+            sum.add(all);
             missed.extend(all.check(&format!("6 fans that reach {reach} px, {}", renderer.kind().name())).err());
         }
     }
+    goal(6, &format!("{} and {} in {fans} fans that reach 200 to 1,000,000 px", sum.missing, sum.double));
     assert_eq!(fans, renderers().len() * 4 * count);
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
@@ -158,6 +164,7 @@ fn a_shell_around_the_eye_owns_every_sample_once() {
         all.add(Ownership { missing, double, samples: owners.len() });
         shells += 1;
     }
+    goal(6, &format!("{} and {} in {shells} shells around the eye", all.missing, all.double));
     assert_eq!(shells, count);
     all.check("6 shells around the eye, cpu").unwrap();
 }

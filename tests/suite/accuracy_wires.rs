@@ -10,7 +10,7 @@ use crate::lines_scenes::{CONTOURS, MESHES, MESHES_GOAL, MeshScene, plan_keys};
 use crate::oracle::visible::Segment;
 use crate::oracle::{capsule, strip};
 use crate::scenes;
-use crate::truth::{Errors, Gate, cases, drawn_ink, renderers, true_ink};
+use crate::truth::{Errors, Gate, cases, drawn_ink, goal, renderers, true_ink};
 
 /// Goal 1.
 const ISOLATED_GOAL: Gate = Gate { rmse: 0.35, max: 1.0, ink: f64::INFINITY };
@@ -75,6 +75,7 @@ fn isolated_lines_have_their_exact_coverage() {
     let mut missed = Vec::new();
     let mut drawn = 0;
     let mut wanted = 0;
+    let [mut rmse, mut max, mut bias] = [0.0_f64; 3];
     for mut renderer in renderers() {
         let count = if renderer.kind().name() == "cpu" { 64 } else { cases(4, 16) };
         for width in WIDTHS_PX {
@@ -95,8 +96,10 @@ fn isolated_lines_have_their_exact_coverage() {
             if bias_px.abs() > WIDTH_GOAL_PX {
                 missed.push(format!("{what}: {bias_px} px too wide"));
             }
+            (rmse, max, bias) = (rmse.max(errors.rmse()), max.max(errors.max()), bias.max(bias_px.abs()));
         }
     }
+    goal(1, &format!("RMSE <= {rmse:.2}/255, largest {max:.2}/255, width within {bias:.4} px of {drawn} lines"));
     assert_eq!(drawn, wanted);
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
@@ -105,6 +108,7 @@ fn isolated_lines_have_their_exact_coverage() {
 fn lines_end_in_round_caps() {
     let mut missed = Vec::new();
     let mut drawn = 0;
+    let [mut rmse, mut max] = [0.0_f64; 2];
     let count = 2 * renderers().len() * WIDTHS_PX.len();
     for mut renderer in renderers() {
         for length in [9.0, 0.7] {
@@ -121,10 +125,12 @@ fn lines_end_in_round_caps() {
                 }
                 let what = format!("- ends, {length} px long, {width} px, {}", renderer.kind().name());
                 missed.extend(errors.check(&what, ENDS_NOW).err());
+                (rmse, max) = (rmse.max(errors.rmse()), max.max(errors.max()));
                 drawn += 1;
             }
         }
     }
+    goal(1, &format!("round ends: RMSE <= {rmse:.2}, largest {max:.1}"));
     assert_eq!(drawn, count);
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }

@@ -21,6 +21,11 @@ pub fn cases<T>(short: T, long: T) -> T {
     if is_long() { long } else { short }
 }
 
+/// Says what was measured for a goal of docs/accuracy.md; `docs/goals.sh` collects it.
+pub fn goal(number: u32, measured: &str) {
+    println!("goal {number}: {measured}");
+}
+
 /// Both back-ends, or the CPU alone where there is no Vulkan.
 pub fn renderers() -> Vec<Box<dyn Renderer>> {
     let mut all: Vec<Box<dyn Renderer>> = vec![Box::new(CpuRenderer::new(2))];

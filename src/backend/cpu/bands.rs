@@ -10,12 +10,12 @@ use super::nearest::Nearest;
 use super::samples::SampleBand;
 use super::scratch::BandScratch;
 use super::visibility::{self, Setup};
+use super::watch::Watch;
 use super::{Stages, line_light, resolve, shade};
 use crate::plan::LinePass;
 
-/// Triangles or edges between two looks at the deadline: at most some 10 ms of triangles, however large each is. Edges of wide
-/// lines count their pixels too.
-pub const CHECK_EVERY: usize = 256;
+/// Edges between two looks at the deadline. Those of wide lines count their pixels too.
+const EDGES_A_LOOK: usize = 256;
 
 /// Draws band number `band` into its rows of the picture.
 pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, rgba: &mut [u8]) {
@@ -129,27 +129,25 @@ dispatch! {
 
 #[inline(always)]
 fn triangles_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) {
+    let mut watch = Watch::new(stages.deadline);
     for chunk in &bins.triangles {
         // What is not in ascending order comes with ties looked at.
         let ordered = chunk.whole.is_ordered() && !stages.plan.projection.clip;
-        for (i, (id, piece)) in chunk.pieces_in(band).enumerate() {
-            if i % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
+        for (id, piece) in chunk.pieces_in(band) {
+            let setup = Setup::new(piece);
+            if watch.is_over(setup.map_or(0, |setup| visibility::draw(&setup, id, &mut Nearest::<true>(samples)))) {
                 return;
-            }
-            if let Some(setup) = Setup::new(piece) {
-                visibility::draw(&setup, id, &mut Nearest::<true>(samples));
             }
         }
-        for (i, id) in chunk.whole.items_in(band).enumerate() {
-            if i % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
+        for id in chunk.whole.items_in(band) {
+            let setup = Setup::new(&stages.screen_triangle(id));
+            let looked_at = match setup {
+                Some(setup) if ordered => visibility::draw(&setup, id, &mut Nearest::<false>(samples)),
+                Some(setup) => visibility::draw(&setup, id, &mut Nearest::<true>(samples)),
+                None => 0,
+            };
+            if watch.is_over(looked_at) {
                 return;
-            }
-            if let Some(setup) = Setup::new(&stages.screen_triangle(id)) {
-                if ordered {
-                    visibility::draw(&setup, id, &mut Nearest::<false>(samples));
-                } else {
-                    visibility::draw(&setup, id, &mut Nearest::<true>(samples));
-                }
             }
         }
     }
@@ -168,7 +166,7 @@ fn edges_kernel(
     for chunk in bins {
         for (i, edge) in chunk.items_in(band).enumerate() {
             // A wide line's edge is as much work as hundreds of others.
-            if (i % CHECK_EVERY == 0 || drawer.has_looked_far()) && stages.deadline.check().is_err() {
+            if (i % EDGES_A_LOOK == 0 || drawer.has_looked_far()) && stages.deadline.check().is_err() {
                 return;
             }
             drawer.draw(&pass.edges[edge as usize], target);

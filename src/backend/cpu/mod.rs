@@ -34,6 +34,7 @@ mod texture;
 mod transform;
 mod vector;
 mod visibility;
+mod watch;
 mod wire;
 
 pub use isa::Isa;

@@ -1,13 +1,13 @@
 //! Stage 2 once more, a round a layer: the nearest triangle behind the layer before. Twin of `shaders/emit_layer.wgsl`.
 
 use super::Stages;
-use super::bands::CHECK_EVERY;
 use super::bins::TriangleBin;
 use super::isa::{LANES, dispatch};
 use super::layers::LayerBand;
 use super::samples::SampleBand;
 use super::transform::ScreenVertex;
 use super::visibility::{self, Setup, Target};
+use super::watch::Watch;
 
 dispatch! {
     /// Finds the next layer of a band.
@@ -57,26 +57,25 @@ impl Target for Behind<'_> {
 #[inline(always)]
 fn peel_kernel(stages: &Stages<'_>, (bins, band): (&[TriangleBin], usize), layers: &mut LayerBand) {
     let LayerBand { found, previous, pending, .. } = layers;
+    let mut watch = Watch::new(stages.deadline);
     let mut item = 0;
     for chunk in bins {
         for (id, piece) in chunk.pieces_in(band) {
-            if item % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
+            if watch.is_over(offer(item, id, || *piece, found, previous, pending)) {
                 return;
             }
-            offer(item, id, || *piece, found, previous, pending);
             item += 1;
         }
         for id in chunk.whole.items_in(band) {
-            if item % CHECK_EVERY == 0 && stages.deadline.check().is_err() {
+            if watch.is_over(offer(item, id, || stages.screen_triangle(id), found, previous, pending)) {
                 return;
             }
-            offer(item, id, || stages.screen_triangle(id), found, previous, pending);
             item += 1;
         }
     }
 }
 
-/// Draws the band's triangle number `item`, unless an earlier round has seen the last of it.
+/// Draws the band's triangle number `item`, unless an earlier round has seen the last of it. Among how many samples it was looked for.
 #[inline(always)]
 fn offer(
     item: usize,
@@ -85,17 +84,16 @@ fn offer(
     found: &mut SampleBand,
     previous: &SampleBand,
     pending: &mut Vec<bool>,
-) {
+) -> u64 {
     if pending.get(item) == Some(&false) {
-        return;
+        return 0;
     }
     let mut target = Behind { found, previous, pending: [0; LANES] };
-    if let Some(setup) = Setup::new(&corners()) {
-        visibility::draw(&setup, id, &mut target);
-    }
+    let looked_at = Setup::new(&corners()).map_or(0, |setup| visibility::draw(&setup, id, &mut target));
     let is_pending = target.pending != [0; LANES];
     match pending.get_mut(item) {
         Some(kept) => *kept = is_pending,
         None => pending.push(is_pending),
     }
+    looked_at
 }

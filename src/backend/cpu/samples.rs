@@ -58,9 +58,7 @@ impl SampleBand {
     pub fn index(&self, x: u32, y: u32, s: u32) -> usize {
         (y - self.first_row) as usize * self.stride + (x * self.samples + s) as usize
     }
-}
 
-impl SampleBand {
     /// What a sample sees, in one number: nearer is larger, of equal depths the lower id.
     #[inline(always)]
     pub fn word(&self, at: usize) -> u64 {

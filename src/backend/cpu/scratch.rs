@@ -12,6 +12,9 @@ use crate::plan::DrawPlan;
 /// Memory of a band, bytes: half of a common 1 MiB second-level cache.
 const BAND_BYTES: usize = 512 << 10;
 
+/// Rows of a band, at least, of a picture that has as many: a tall triangle is looked at once for each band.
+const ROWS_MIN: u32 = 4;
+
 /// Memory of all bands that are drawn at once, bytes, whatever is drawn on however many threads.
 pub const BANDS_BYTES_MAX: usize = 256 << 20;
 
@@ -38,9 +41,9 @@ impl Banding {
     /// ones there are few at once.
     pub fn new(plan: &DrawPlan<'_>, threads: usize) -> Self {
         let margin = plan.line_margin_rows();
-        let cached = (BAND_BYTES / (row_bytes(plan, 1) + row_bytes(plan, 0)).max(1)).max(1) as u32;
+        let cached = (BAND_BYTES / (row_bytes(plan, 1) + row_bytes(plan, 0)).max(1)) as u32;
         let banding = |rows: u32| {
-            let rows = rows.max(cached).clamp(1, plan.height_px.max(1));
+            let rows = rows.max(cached).max(ROWS_MIN).clamp(1, plan.height_px.max(1));
             let one = Self { rows, margin, at_once: 1 };
             let most = threads.min(plan.height_px.div_ceil(rows) as usize).max(1);
             Self { at_once: (BANDS_BYTES_MAX / one.bytes(plan).max(1)).clamp(1, most), ..one }

@@ -93,16 +93,16 @@ pub trait Target {
     fn offer(&mut self, at: usize, outside: &[i32; LANES], z: &[f32; LANES], id: u32);
 }
 
-/// Draws a triangle into the target.
+/// Draws a triangle into the target. Among how many samples it was looked for.
 #[inline(always)]
-pub fn draw(setup: &Setup, id: u32, target: &mut impl Target) {
+pub fn draw(setup: &Setup, id: u32, target: &mut impl Target) -> u64 {
     for_samples!(target.band().samples, draw_sampled(setup, id, target))
 }
 
 #[inline(always)]
-fn draw_sampled<const S: usize>(setup: &Setup, id: u32, target: &mut impl Target) {
+fn draw_sampled<const S: usize>(setup: &Setup, id: u32, target: &mut impl Target) -> u64 {
     let band = target.band();
-    let Some([columns, rows]) = setup.bounds(band) else { return };
+    let Some([columns, rows]) = setup.bounds(band) else { return 0 };
     let edges = Edges::new(setup);
     let lanes = [Lanes::new::<S>(&edges, 0), Lanes::new::<S>(&edges, LANES)];
     // All samples lie multiples of 1/16 px from here.
@@ -122,6 +122,7 @@ fn draw_sampled<const S: usize>(setup: &Setup, id: u32, target: &mut impl Target
         }
         row += BLOCK;
     }
+    (columns[1] - columns[0] + 1) as u64 * (rows[1] - rows[0] + 1) as u64 * S as u64
 }
 
 /// Pixels along a side of a block, in which edge functions fit 32 bits.

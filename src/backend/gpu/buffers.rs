@@ -1,14 +1,36 @@
-//! A worker's GPU buffers, kept from job to job.
+//! A job's GPU buffers, kept for the jobs that follow.
+
+use std::sync::{Mutex, PoisonError};
 
 use super::device::Gpu;
 use super::stages::{SLOTS, Slot};
 use crate::backend::DrawError;
 
-/// What a worker keeps between jobs, at most; a job that needed more gives it all back.
+/// What is kept of a job's buffers, at most; a job that needed more gives all of them back.
 const KEPT_BYTES_MAX: u64 = 256 << 20;
 
 /// Smallest buffer: a binding may not be empty, and a struct must fit in.
 const SIZE_MIN: u64 = 256;
+
+/// Buffers that no job uses just now: as many sets as jobs ever ran at once.
+///
+/// The set that was used last is lent first. Workers take turns with jobs; if each had a set of its own, most of the memory would lie idle,
+/// and the first job of each would wait for more.
+#[derive(Default)]
+pub struct SpareBuffers(Mutex<Vec<Buffers>>);
+
+impl SpareBuffers {
+    /// A set for a job.
+    pub fn take(&self) -> Buffers {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
+    }
+
+    /// A set that a finished job used.
+    pub fn give_back(&self, mut buffers: Buffers) {
+        buffers.trim();
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(buffers);
+    }
+}
 
 /// Buffers that grow as jobs need.
 #[derive(Default)]
@@ -107,8 +129,8 @@ impl Buffers {
         grow(gpu, &mut self.counts, 8, SIZE_MIN, U::MAP_READ | U::COPY_DST)
     }
 
-    /// Gives everything back if it is more than a worker may keep.
-    pub fn trim(&mut self) {
+    /// Gives everything back if it is more than may be kept.
+    fn trim(&mut self) {
         let all = self.storage.iter().chain([&self.frame, &self.batches, &self.staging, &self.counts]);
         let total: u64 = all.flatten().map(wgpu::Buffer::size).sum();
         if total > KEPT_BYTES_MAX {

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 
+use super::buffers::SpareBuffers;
 use super::stages::Stages;
 use crate::backend::DrawError;
 use crate::limits::Deadline;
@@ -45,6 +46,7 @@ pub struct Gpu {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub(super) stages: Stages,
+    pub(super) spare_buffers: SpareBuffers,
     pub(super) limits: wgpu::Limits,
     pub(super) int64_atomics: bool,
     info: GpuInfo,
@@ -111,6 +113,7 @@ impl Gpu {
             device,
             queue,
             stages: Stages::default(),
+            spare_buffers: SpareBuffers::default(),
             limits,
             int64_atomics,
             info,

@@ -12,6 +12,12 @@ use crate::plan::{DrawPlan, LinePass};
 /// Edges a dispatch.
 const EDGE_CHUNK: u32 = 1 << 20;
 
+/// The same where each may cross a large picture.
+const EDGE_CHUNK_LONG: u32 = 1 << 17;
+
+/// Looks at samples that a dispatch may take at most, if it is not known how long its edges are: a second or so of work.
+const BLIND_LOOKS_MAX: u64 = 1 << 34;
+
 /// Edges that keep all of a GPU busy.
 const BUSY_EDGES: usize = 1 << 15;
 
@@ -45,6 +51,8 @@ pub struct LineShares {
     pub slices: u32,
     /// Edges that the threads of a workgroup share.
     pub edges_per_group: u32,
+    /// Edges a dispatch, at most.
+    pub edges: u32,
     /// Looks along an edge, each with what it has found to draw, after which a thread pauses until the next round.
     pub units: u32,
 }
@@ -64,16 +72,23 @@ impl LineShares {
             false if lines.reach_px() > WIDE_PX => (ITERATIONS_MAX_HARDWARE / unit).max(1),
             false => NO_LIMIT,
         };
-        let edges = lines.edges.len().min(EDGE_CHUNK as usize) as u32;
-        Self { slices, edges_per_group: edges.div_ceil(groups).clamp(1, WORKGROUP), units }
+        let edges = edges_a_dispatch(plan, lines);
+        Self { slices, edges_per_group: edges.div_ceil(groups).clamp(1, WORKGROUP), edges, units }
     }
 
     /// Bytes of what paused threads remember.
-    pub fn progress_bytes(&self, lines: &LinePass) -> u64 {
-        let edges = lines.edges.len().min(EDGE_CHUNK as usize) as u32;
-        let threads = edges.div_ceil(self.edges_per_group) * WORKGROUP;
+    pub fn progress_bytes(&self) -> u64 {
+        let threads = self.edges.div_ceil(self.edges_per_group) * WORKGROUP;
         if self.units == NO_LIMIT { 0 } else { 4 + 16 * u64::from(threads) }
     }
+}
+
+fn edges_a_dispatch(plan: &DrawPlan<'_>, lines: &LinePass) -> u32 {
+    // Half a pixel a step, the samples of up to three pixels in each.
+    let longest = 2 * u64::from(plan.width_px + plan.height_px) * 3 * u64::from(plan.samples);
+    let looks = longest.saturating_mul(lines.edges.len() as u64);
+    let most = if looks > BLIND_LOOKS_MAX { EDGE_CHUNK_LONG } else { EDGE_CHUNK };
+    lines.edges.len().min(most as usize) as u32
 }
 
 /// Loop iterations that one unit of work takes at most: a window is begun, looked along, and a part of the edge drawn.
@@ -83,8 +98,8 @@ fn unit_iterations(samples: u32, lines: &LinePass, slices: u32) -> u32 {
     let steps = (2.0 * length) as u32 + 2;
     let look = steps * (1 + samples) + steps * (1 + 3 * samples);
     let pixels = ((length as u32).div_ceil(slices) + 1) * (length as u32 + 1);
-    // Each is found, while the others wait, and has eight words of its mask filled.
-    look + pixels * (LANES + 1 + 8) + WORKGROUP
+    // Each is found, while the others wait, and has eight words of its mask filled by halves.
+    look + pixels * (LANES + 1 + 8 * 3) + WORKGROUP
 }
 
 impl Schedule {
@@ -114,19 +129,19 @@ impl Schedule {
                 ..pixels
             };
             let edges = lines.edges.len() as u32;
-            for first in (0..edges).step_by(EDGE_CHUNK as usize) {
-                let count = EDGE_CHUNK.min(edges - first);
+            for first in (0..edges).step_by(shares.edges.max(1) as usize) {
+                let count = shares.edges.min(edges - first);
                 let batch = Batch { first: edges_first.saturating_add(first), count, ..lined };
                 let groups = count.div_ceil(shares.edges_per_group);
                 self.dispatch_groups(device, Stage::Lines, groups, batch)?;
-                let progress_bytes = shares.progress_bytes(lines);
+                let progress_bytes = shares.progress_bytes();
                 if let (Some(Step::Dispatch { batch, workgroups, .. }), true) =
                     (self.steps.last().copied(), progress_bytes > 0)
                 {
                     self.steps.pop();
                     self.steps.push(Step::Lines { batch, workgroups });
                     self.progress_bytes = self.progress_bytes.max(progress_bytes);
-                } else if edges > EDGE_CHUNK {
+                } else if edges > shares.edges {
                     self.steps.push(Step::Submit);
                 }
             }
@@ -142,7 +157,23 @@ impl Schedule {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::gpu::test_plans::{DEVICE, each_case};
+    use crate::backend::gpu::step::Goal;
+    use crate::backend::gpu::test_plans::{Case, DEVICE, LARGEST, each_case, edges, lines, plan};
+    use crate::plan::Shown;
+
+    #[test]
+    fn edges_that_may_be_long_are_drawn_few_at_a_time() {
+        for (count, size_px, most) in [(2 << 20, 512, 1 << 17), (200_000, 512, 200_000), (200_000, 4096, 1 << 17)] {
+            let case = Case { size_px: [size_px; 2], ..LARGEST };
+            let mut plan = plan(&[], case);
+            plan.lines = vec![lines(edges(count), 1.0, Shown::Visible)];
+            assert_eq!(LineShares::new(&plan, &plan.lines[0], &DEVICE).edges, most, "{count} edges, {size_px} px");
+            let schedule = Schedule::new(&plan, &DEVICE, Goal::Picture).unwrap();
+            let drawn = schedule.steps.iter().filter(|step| matches!(step, Step::Lines { .. })).count();
+            let bands = size_px.div_ceil(schedule.banding.rows);
+            assert_eq!(drawn as u32, bands * count.div_ceil(most));
+        }
+    }
 
     #[test]
     fn a_unit_of_work_ends_before_a_loop_would_be_left() {

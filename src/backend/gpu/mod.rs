@@ -48,16 +48,15 @@ const TILE_WORKGROUPS: u32 = 1024;
 /// The same on a processor, where each costs time even if it finds nothing to do.
 const TILE_WORKGROUPS_SOFTWARE: u32 = 64;
 
-/// Draws on the GPU. A worker's own: buffers are kept from job to job, the device is shared.
+/// Draws on the GPU. A worker's own; the device and what is kept from job to job are shared.
 pub struct GpuRenderer {
     gpu: Arc<Gpu>,
-    buffers: Buffers,
 }
 
 impl GpuRenderer {
     /// A renderer on an opened GPU.
     pub fn new(gpu: Arc<Gpu>) -> Self {
-        Self { gpu, buffers: Buffers::default() }
+        Self { gpu }
     }
 
     /// The GPU that it draws on.
@@ -105,14 +104,14 @@ impl GpuRenderer {
     }
 
     /// Runs `job` with errors caught and buffers tidied up afterwards.
-    fn job<T>(&mut self, job: impl FnOnce(&Gpu, &mut Buffers) -> Result<T, DrawError>) -> Result<T, DrawError> {
+    fn job<T>(&self, job: impl FnOnce(&Gpu, &mut Buffers) -> Result<T, DrawError>) -> Result<T, DrawError> {
         self.gpu.check()?;
-        let result = self.gpu.scoped(|| job(&self.gpu, &mut self.buffers));
+        let mut buffers = self.gpu.spare_buffers.take();
+        let result = self.gpu.scoped(|| job(&self.gpu, &mut buffers));
         self.gpu.job_ended();
-        match &result {
-            Ok(_) => self.buffers.trim(),
-            // Work may still be running on them, and the staging buffer may be half mapped.
-            Err(_) => self.buffers = Buffers::default(),
+        // After an error work may still be running on them, and the staging buffer may be half mapped.
+        if result.is_ok() {
+            self.gpu.spare_buffers.give_back(buffers);
         }
         result
     }

@@ -238,6 +238,9 @@ mod tests {
         let wide = schedule(&triangles, wide).unwrap();
         assert!(wide.banding.margin > 100 && wide.banding.rows == all.banding.rows, "{:?}", wide.banding);
         assert_eq!(wide.batches.len(), all.batches.len());
+        // A sample more is a row less in a band.
+        let fine = schedule(&triangles, Case { samples: 16, passes: 64, ..LARGEST }).unwrap();
+        assert!(fine.banding.rows < all.banding.rows, "{:?}", fine.banding);
         let few = &triangles[..1];
         assert!(schedule(few, Case { passes: 4096, ..LARGEST }).is_ok());
         let refused = schedule(few, Case { passes: 16_384, ..LARGEST }).unwrap_err();

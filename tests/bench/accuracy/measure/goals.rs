@@ -47,7 +47,7 @@ const GOALS: [Goal; 10] = [
         number: 5,
         measure: "outlines of 1 to 32 px against the exact dilated contour",
         goal: "mean +-0.05 px, 99th percentile <= 0.25 px, no gaps",
-        by: By::Suite("accuracy_wires::silhouettes"),
+        by: By::Suite("accuracy_outlines"),
     },
     Goal {
         number: 6,

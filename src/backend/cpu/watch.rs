@@ -1,0 +1,56 @@
+//! When to look at the deadline.
+
+use crate::limits::Deadline;
+
+/// Work between two looks, samples: some 10 ms.
+const WORK_A_LOOK: u64 = 1 << 22;
+
+/// What a triangle costs however small it is, samples.
+const WORK_A_TRIANGLE: u64 = 1 << 12;
+
+/// Looks at a deadline after so much work, because a triangle may have one sample or millions.
+pub struct Watch<'a> {
+    deadline: &'a Deadline,
+    left: u64,
+}
+
+impl<'a> Watch<'a> {
+    /// Looks at once, then after each [`WORK_A_LOOK`].
+    pub fn new(deadline: &'a Deadline) -> Self {
+        Self { deadline, left: 0 }
+    }
+
+    /// Whether the time is over, when a triangle has been looked for among so many samples. Once it is, nobody asks again.
+    #[inline(always)]
+    pub fn is_over(&mut self, samples: u64) -> bool {
+        let work = samples + WORK_A_TRIANGLE;
+        if work <= self.left {
+            self.left -= work;
+            return false;
+        }
+        self.left = WORK_A_LOOK;
+        self.deadline.check().is_err()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Triangles of so many samples until the end of time is noticed, when it comes after the first.
+    fn triangles_until_noticed(samples: u64) -> u64 {
+        let deadline = Deadline::default();
+        let mut watch = Watch::new(&deadline);
+        assert!(!watch.is_over(samples));
+        deadline.stop();
+        (1..).find(|_| watch.is_over(samples)).unwrap_or(0)
+    }
+
+    #[test]
+    fn large_triangles_are_fewer_between_two_looks() {
+        for (samples, most) in [(0, 1025), (1, 1025), (1 << 12, 513), (1 << 20, 5), (1 << 22, 1), (1 << 28, 1)] {
+            let triangles = triangles_until_noticed(samples);
+            assert!((most / 2..=most).contains(&triangles), "{triangles} of {samples} samples");
+        }
+    }
+}
