@@ -66,7 +66,7 @@ struct Batch {
     line_slices: u32,
     // Coverage in the middle of a line.
     line_peak: f32,
-    // Parts of edges that a thread looks for and draws before it says how far it has come.
+    // Looks along edges, or shares begun, after which a thread says how far it has come.
     line_units: u32,
     line_pass: u32,
     // Which rows the visibility buffer holds, where that is more than the batch's, and where the first of the batch's begins in it.

@@ -94,6 +94,9 @@ fn covered_points(at: u32) -> u32 {
 
 // How much of a pixel the strokes cover, 0 to the lines' peak.
 fn coverage(sum: vec2<u32>, all: vec2<u32>, points: u32, slack: u32) -> f32 {
+    if (sum.x | sum.y) == 0u {
+        return 0.0;
+    }
     if points == POINTS && (all.x > POINTS || all.y > 0u) {
         return batch.line_peak;
     }
@@ -134,7 +137,7 @@ fn weight(i: u32, points: u32, opacity: f32) -> f32 {
             for (var w = 0u; w < MASK_WORDS; w++) {
                 covered += countOneBits(mask_word(at, w) & cells[MASK_WORDS * s + w]);
             }
-            surface += rn(alpha * (f32(POINTS) / f32(count)));
+            surface += rn(alpha * f32(POINTS / count));
             surface_covered += rn(alpha * f32(covered));
         }
     }

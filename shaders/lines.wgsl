@@ -109,12 +109,16 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
             }
             has_share = true;
         }
-        // Threads that have found a part wait here for those that have not.
+        // Threads that have found a part wait here for those that have not; not where loops are limited, since each look of one would
+        // count for all.
         let units_before = units;
         var part = vec2(0.0);
         while search.begin < search.range.y && part.x >= part.y && units > 0u {
             units--;
             part = next_part(edge, s, &search);
+            if may_pause {
+                break;
+            }
         }
         if units == units_before {
             // To begin a share is work too.

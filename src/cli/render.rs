@@ -55,7 +55,7 @@ pub struct RenderArgs {
     entry: Option<String>,
     #[arg(long, help = format!("Who draws: {}", one_of::<BackendChoice>()))]
     backend: Option<String>,
-    /// Samples a pixel: 1 or 4
+    /// Samples a pixel: 1, 4, 8 or 16
     #[arg(long)]
     samples: Option<String>,
     /// #rgb, #rrggbb, #rrggbbaa or transparent

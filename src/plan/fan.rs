@@ -13,9 +13,12 @@ use crate::plan::PlanError;
 const SAGITTA: f64 = 4.0;
 
 /// Triangles of all fans up to which arcs are as round as they should be, and how many for each pixel of the picture. With more of them
-/// they have fewer corners, as many in all and one for each arc.
+/// they have fewer corners, as many in all and up to four for each arc.
 const TRIANGLES_MAX: f64 = (1 << 20) as f64;
 const TRIANGLES_MAX_PER_PX: f64 = 16.0;
+
+/// Angle of a chord, at most: of half a turn no triangle would be left.
+const CHORD_MAX: f64 = FRAC_PI_2;
 
 /// Gaps between two rims that are this narrow are what rounding makes of a needle's tip, around which its outline goes.
 const GAP_MIN: f64 = 1e-9;
@@ -172,7 +175,8 @@ fn step(from: &End, fan: &Fan, ends: &[End]) -> f64 {
 
 /// Into how many triangles a fan is cut.
 fn chords(ends: &[End], fan: &Fan, coarser: f64) -> u32 {
-    (fan.sweep / (step(&ends[fan.from], fan, ends) * coarser)).max(0.0) as u32 + 1
+    let chord = (step(&ends[fan.from], fan, ends) * coarser).min(CHORD_MAX);
+    (fan.sweep / chord).max(0.0) as u32 + 1
 }
 
 fn draw(ends: &[End], fan: &Fan, coarser: f64, first: u32, hull: &mut HullPass<'_>) {

@@ -119,7 +119,7 @@ pub struct ImageSpec {
     pub height_px: u32,
     /// None: whoever asks decides (extension, Accept, then PNG).
     pub format: Option<ImageFormat>,
-    /// Visibility samples a pixel: 1 or 4.
+    /// Visibility samples a pixel: 1, 4, 8 or 16.
     pub samples: u32,
     /// What is behind the mesh; alpha 0 is transparent.
     pub background: Rgba,

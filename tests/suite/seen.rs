@@ -2,7 +2,7 @@
 
 use meshsnap::plan::{DrawPlan, Faces, Shown, SurfacePass};
 
-use crate::oracle::camera::Camera;
+use crate::oracle::camera::{Camera, project};
 use crate::oracle::coverage::{Coverage, classify, snap};
 use crate::oracle::light::{Lamp, Lights, Material};
 use crate::oracle::rays::nearest;
@@ -37,8 +37,23 @@ pub fn scene(plan: &DrawPlan<'_>) -> Scene {
 
 /// What of the edges of the plan's only line pass is drawn.
 pub fn segments(plan: &DrawPlan<'_>) -> Vec<Segment> {
-    let [pass] = &plan.lines[..] else { panic!("{} line passes", plan.lines.len()) };
+    segments_of(plan, scene(plan))
+}
+
+/// The same of vertices on the lattice of 1/256 px on which triangles are drawn; all must be in front of the eye. Depth is affine on
+/// screen, so that what hides what stays the same but for what is seen nearly edge on.
+pub fn snapped_segments(plan: &DrawPlan<'_>) -> Vec<Segment> {
     let mut scene = scene(plan);
+    for position in &mut scene.positions {
+        let [x, y, depth] = project(scene.camera.homogeneous(*position));
+        *position = [(x * 256.0).round() / 256.0, (y * 256.0).round() / 256.0, depth];
+    }
+    scene.camera = Camera::of_pixels(scene.camera.size_px);
+    segments_of(plan, scene)
+}
+
+fn segments_of(plan: &DrawPlan<'_>, mut scene: Scene) -> Vec<Segment> {
+    let [pass] = &plan.lines[..] else { panic!("{} line passes", plan.lines.len()) };
     if pass.contour {
         scene.edges = visible::contour(&scene);
     }

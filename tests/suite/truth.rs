@@ -8,6 +8,8 @@ use meshsnap::limits::Deadline;
 use meshsnap::plan::DrawPlan;
 
 use crate::oracle::ink::ink;
+use crate::oracle::visible::Segment;
+use crate::seen::snapped_segments;
 pub use crate::seen::{scene, segments};
 use crate::twins::gpus;
 
@@ -42,7 +44,16 @@ pub fn points_per_side() -> u32 {
 
 /// The coverage of each pixel by the plan's only line pass.
 pub fn true_ink(plan: &DrawPlan<'_>) -> Vec<f64> {
-    ink([plan.width_px, plan.height_px], &segments(plan), f64::from(plan.lines[0].width_px), points_per_side())
+    ink_of(plan, &segments(plan))
+}
+
+/// The same of vertices on the lattice of 1/256 px.
+pub fn snapped_ink(plan: &DrawPlan<'_>) -> Vec<f64> {
+    ink_of(plan, &snapped_segments(plan))
+}
+
+fn ink_of(plan: &DrawPlan<'_>, segments: &[Segment]) -> Vec<f64> {
+    ink([plan.width_px, plan.height_px], segments, f64::from(plan.lines[0].width_px), points_per_side())
 }
 
 /// The coverage that a back-end draws. The plan's lines are opaque white on nothing, so that alpha is their coverage.
@@ -116,9 +127,12 @@ impl Errors {
     pub fn check(&self, what: &str, gate: Gate) -> Result<(), String> {
         let measured = format!("{what:<44} rmse {:7.3}  max {:7.2}  ink {:8.4}", self.rmse(), self.max(), self.ink());
         println!("{measured}  (gate {gate:?})");
-        let is_met =
-            self.pixels > 0 && self.rmse() <= gate.rmse && self.max <= gate.max && (self.ink() - 1.0).abs() <= gate.ink;
-        if is_met { Ok(()) } else { Err(format!("{measured}, but {gate:?}")) }
+        if self.is_within(gate) { Ok(()) } else { Err(format!("{measured}, but {gate:?}")) }
+    }
+
+    /// Whether a gate lets them pass.
+    pub fn is_within(&self, gate: Gate) -> bool {
+        self.pixels > 0 && self.rmse() <= gate.rmse && self.max <= gate.max && (self.ink() - 1.0).abs() <= gate.ink
     }
 }
 

@@ -27,7 +27,7 @@ pub struct Ink {
     mask: Mask,
     /// Of all strokes: no number of them comes near the end of 64 bits.
     area: u64,
-    /// So many that this ends at its largest have long been told by `slack` what they cover.
+    /// Where so many strokes meet that this ends at its largest, `slack` says what they cover.
     count: u32,
     /// Most that the area of a stroke differs from its points'.
     slack: u32,

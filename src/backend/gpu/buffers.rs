@@ -6,8 +6,8 @@ use super::device::Gpu;
 use super::stages::{SLOTS, Slot};
 use crate::backend::DrawError;
 
-/// What is kept of a job's buffers, at most; a job that needed more gives all of them back.
-const KEPT_BYTES_MAX: u64 = 256 << 20;
+/// What is kept of the buffers of all jobs, at most.
+const KEPT_BYTES_MAX: u64 = 1 << 30;
 
 /// Smallest buffer: a binding may not be empty, and a struct must fit in.
 const SIZE_MIN: u64 = 256;
@@ -25,10 +25,13 @@ impl SpareBuffers {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
     }
 
-    /// A set that a finished job used.
-    pub fn give_back(&self, mut buffers: Buffers) {
-        buffers.trim();
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(buffers);
+    /// A set that a finished job used. It goes where it, or all sets together, would be more than may be kept.
+    pub fn give_back(&self, buffers: Buffers) {
+        let mut spare = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept: u64 = spare.iter().map(Buffers::bytes).sum();
+        if kept + buffers.bytes() <= KEPT_BYTES_MAX {
+            spare.push(buffers);
+        }
     }
 }
 
@@ -129,13 +132,9 @@ impl Buffers {
         grow(gpu, &mut self.counts, 8, SIZE_MIN, U::MAP_READ | U::COPY_DST)
     }
 
-    /// Gives everything back if it is more than may be kept.
-    fn trim(&mut self) {
+    fn bytes(&self) -> u64 {
         let all = self.storage.iter().chain([&self.frame, &self.batches, &self.staging, &self.counts]);
-        let total: u64 = all.flatten().map(wgpu::Buffer::size).sum();
-        if total > KEPT_BYTES_MAX {
-            *self = Self::default();
-        }
+        all.flatten().map(wgpu::Buffer::size).sum()
     }
 }
 

@@ -53,7 +53,7 @@ pub struct LineShares {
     pub edges_per_group: u32,
     /// Edges a dispatch, at most.
     pub edges: u32,
-    /// Looks along an edge, each with what it has found to draw, after which a thread pauses until the next round.
+    /// Looks along an edge, each with what it has found to draw, and shares without a look, after which a thread pauses until the next round.
     pub units: u32,
 }
 

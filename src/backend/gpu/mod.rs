@@ -279,7 +279,7 @@ fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, schedule: &Sched
     if has_visibility(plan) {
         recorder.clear(Slot::Samples, samples(plan, schedule.banding.seen_rows(plan)) * SAMPLE_BYTES)?;
     }
-    if !plan.lines.is_empty() {
+    if schedule.goal == Goal::Picture && !plan.lines.is_empty() {
         let pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);
         recorder.clear(Slot::Strokes, pixels * STROKES_BYTES)?;
         if plan.lights_lines() {

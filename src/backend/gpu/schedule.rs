@@ -46,6 +46,8 @@ pub struct Schedule {
     pub tiles: Tiles,
     /// What threads that draw lines remember from round to round.
     pub progress_bytes: u64,
+    /// What is wanted.
+    pub goal: Goal,
 }
 
 impl Schedule {
@@ -55,7 +57,7 @@ impl Schedule {
         let tiles = Tiles::new(plan, device, banding.seen_rows(plan));
         let edge_starts = edge_lists(&plan.lines).1;
         let (steps, batches) = (Vec::new(), Vec::new());
-        let mut schedule = Self { steps, batches, banding, work_items: 0, layers: 0, tiles, progress_bytes: 0 };
+        let mut schedule = Self { steps, batches, banding, work_items: 0, layers: 0, tiles, progress_bytes: 0, goal };
         schedule.transform(plan, device)?;
         for first in (0..plan.height_px).step_by(banding.rows as usize) {
             let end = plan.height_px.min(first + banding.rows);
@@ -238,7 +240,7 @@ mod tests {
         let wide = schedule(&triangles, wide).unwrap();
         assert!(wide.banding.margin > 100 && wide.banding.rows == all.banding.rows, "{:?}", wide.banding);
         assert_eq!(wide.batches.len(), all.batches.len());
-        // A sample more is a row less in a band.
+        // More samples are fewer rows in a band.
         let fine = schedule(&triangles, Case { samples: 16, passes: 64, ..LARGEST }).unwrap();
         assert!(fine.banding.rows < all.banding.rows, "{:?}", fine.banding);
         let few = &triangles[..1];

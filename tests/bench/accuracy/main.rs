@@ -17,9 +17,10 @@
 mod measure;
 #[path = "../../oracle/mod.rs"]
 mod oracle;
+// The suite uses more of these.
+#[allow(dead_code)]
 #[path = "../../suite/seen.rs"]
 mod seen;
-// The suite uses more of it.
 #[allow(dead_code)]
 #[path = "../../suite/shapes.rs"]
 mod shapes;
