@@ -13,12 +13,12 @@ use crate::plan::PlanError;
 const SAGITTA: f64 = 4.0;
 
 /// Triangles of all fans up to which arcs are as round as they should be, and how many for each pixel of the picture. With more of them
-/// they have fewer corners, as many in all and up to four for each arc.
+/// they have fewer corners, as many in all and up to three for each arc.
 const TRIANGLES_MAX: f64 = (1 << 20) as f64;
 const TRIANGLES_MAX_PER_PX: f64 = 16.0;
 
-/// Angle of a chord, at most: of half a turn no triangle would be left.
-const CHORD_MAX: f64 = FRAC_PI_2;
+/// Angle of a chord, at most: of half a turn, 3.14, no triangle would be left.
+const CHORD_MAX: f64 = 2.8;
 
 /// Gaps between two rims that are this narrow are what rounding makes of a needle's tip, around which its outline goes.
 const GAP_MIN: f64 = 1e-9;

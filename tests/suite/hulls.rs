@@ -78,9 +78,9 @@ fn hulls_of_many_edges_have_few_triangles_where_there_are_few_pixels() {
         let spec = scenes::spec(&[&keys[..], &[("outline.thickness", px)]].concat());
         scenes::plan(&mesh, &spec).hull.unwrap().triangles.len()
     };
-    // Three strips and three fans, however wide.
+    // Three strips and three fans, or six at needles, however wide.
     let (few, many) = (triangles("32", "8"), triangles("512", "8"));
-    assert!((400_000..480_000).contains(&few), "{few}");
+    assert!((400_000..520_000).contains(&few), "{few}");
     assert!((few + 400_000..1_600_000).contains(&many), "{many}");
 }
 

@@ -74,7 +74,7 @@ fn however_many_corners_there_are_their_fans_are_bounded() {
         let (many, result) = finish(ends, size_px);
         result.unwrap();
         let triangles = many.triangles.len();
-        let range = count as usize..more as usize + 4 * count as usize + 1;
+        let range = count as usize..more as usize + 3 * count as usize + 1;
         assert!(range.contains(&triangles) && triangles as f64 > 0.5 * more, "{triangles}");
         assert_eq!(many.triangle_materials.len(), triangles);
     }
