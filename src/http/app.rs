@@ -92,8 +92,8 @@ impl App {
 }
 
 /// Where the work is done; these paths want a key where keys are configured.
-pub fn paths() -> Vec<&'static str> {
-    resources().into_iter().map(|(path, _)| path).collect()
+pub fn paths() -> Vec<String> {
+    resources().into_iter().map(|(path, _)| path.replace("{picture}", "render.{png|webp|jpg}")).collect()
 }
 
 fn resources() -> [(&'static str, MethodRouter<Arc<App>>); 9] {

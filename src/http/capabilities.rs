@@ -22,7 +22,7 @@ pub struct CapabilitiesDto {
     schema: &'static str,
     request_keys: Vec<&'static str>,
     request_words: BTreeMap<&'static str, Vec<&'static str>>,
-    paths: Vec<&'static str>,
+    paths: Vec<String>,
     backend: BackendDto,
     workers: u64,
     load: LoadDto,

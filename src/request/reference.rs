@@ -73,7 +73,7 @@ mod tests {
         let digest = "0123456789abcdef".repeat(4);
         let cases = [
             (format!(r#"{{"mesh":"{digest}"}}"#), true),
-            (format!(r#" \n{{"style":"wire","image":{{"width":8}},"mesh":"{digest}"}}"#), true),
+            (format!("\t\r\n {{\"style\":\"wire\",\"image\":{{\"width\":8}},\"mesh\":\"{digest}\"}}"), true),
             (format!(r#"{{"mesh":"{}"}}"#, digest.to_uppercase()), true),
             (format!(r#"{{"asset":{{"version":"2.0"}},"mesh":"{digest}"}}"#), true),
             (format!(r#"{{"mesh":"{digest}","mesh":1}}"#), true),

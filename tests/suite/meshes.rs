@@ -255,7 +255,9 @@ fn capabilities_and_keys_know_of_meshes() {
     assert_eq!((&limits["mesh_bytes"], &limits["mesh_count"]), (&(2 << 20).into(), &7.into()));
     assert_eq!(capabilities["load"]["stored_meshes"], 0);
     let paths: Vec<&str> = capabilities["paths"].as_array().unwrap().iter().map(|p| p.as_str().unwrap()).collect();
-    for path in ["/v1/meshes", "/v1/meshes/{sha256}", "/v1/meshes/{sha256}/{picture}", "/v1/render", "/v1/jobs"] {
+    for path in
+        ["/v1/meshes", "/v1/meshes/{sha256}", "/v1/meshes/{sha256}/render.{png|webp|jpg}", "/v1/render", "/v1/jobs"]
+    {
         assert!(paths.contains(&path), "{path}: {paths:?}");
     }
 }

@@ -107,14 +107,14 @@ fn who_has_the_picture_costs_no_worker() {
     std::thread::scope(|scope| {
         let client = scope.spawn(|| server.post("/v1/render?size=4096", CUBE_OBJ));
         server.wait_for_load(|load| load["running"] == 1);
+        // There is no worker to be had.
+        server.get(&path).problem(429, "queue_full");
         let unmodified = server.request("GET", &path, &[&known], b"");
         assert_eq!((unmodified.status, unmodified.body.len()), (304, 0));
         assert_eq!(unmodified.header("etag"), drawn.header("etag"));
         assert_eq!(unmodified.header("cache-control"), drawn.header("cache-control"));
         assert_eq!(head(&server, &path, &[&known]).status, 304);
         assert_eq!(head(&server, &path, &[]).status, 200);
-        // And there was none to be had.
-        server.get(&path).problem(429, "queue_full");
         client.join().unwrap().picture(4096, 4096);
     });
     assert_eq!(server.request("GET", &path, &["If-None-Match: \"other\""], b"").body, drawn.body);
