@@ -109,12 +109,15 @@ impl From<BodiesFull> for ApiError {
 
 impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
-        let (status, code) = match error {
-            StoreError::TooLarge { .. } => (StatusCode::PAYLOAD_TOO_LARGE, "mesh_too_large"),
-            StoreError::Busy => (StatusCode::TOO_MANY_REQUESTS, "meshes_full"),
-        };
-        let answer = Self::new(status, code, error.to_string()).flag(Some("--mesh-bytes"));
-        if error == StoreError::Busy { answer.retry_after(1) } else { answer }
+        let detail = error.to_string();
+        match error {
+            StoreError::TooLarge { .. } => {
+                Self::new(StatusCode::PAYLOAD_TOO_LARGE, "mesh_too_large", detail).flag(Some("--mesh-bytes"))
+            }
+            StoreError::Busy { flag } => {
+                Self::new(StatusCode::TOO_MANY_REQUESTS, "meshes_full", detail).flag(Some(flag)).retry_after(1)
+            }
+        }
     }
 }
 

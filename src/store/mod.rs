@@ -65,7 +65,10 @@ pub enum StoreError {
     },
     /// What is being drawn takes the room.
     #[error("meshes that are being drawn take all the room for stored meshes; try again shortly")]
-    Busy,
+    Busy {
+        /// The flag that gives more.
+        flag: &'static str,
+    },
 }
 
 /// What the store holds at this moment.
@@ -120,11 +123,11 @@ impl Store {
             return Ok(false);
         }
         while inner.meshes.len() >= self.count {
-            inner.evict().ok_or(StoreError::Busy)?;
+            inner.evict().ok_or(StoreError::Busy { flag: "--mesh-count" })?;
         }
         let mut memory = self.memory.reserve();
         while memory.grow(bytes).is_err() {
-            inner.evict().ok_or(StoreError::Busy)?;
+            inner.evict().ok_or(StoreError::Busy { flag: "--mesh-bytes" })?;
         }
         inner.add(StoredMesh { mesh, memory: Arc::new(memory) });
         Ok(true)

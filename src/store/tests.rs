@@ -39,6 +39,11 @@ fn no_more_than_the_count_stay() {
     assert!(store.remove(Digest::of(b"b")) && !store.remove(Digest::of(b"b")));
     assert_eq!(store.load(), StoreLoad { count: 1, bytes: 5 });
     assert_eq!(store.lock().by_use.len(), 1);
+    store.insert(mesh("d", 5)).unwrap();
+    let held = ["c", "d"].map(|name| store.find(Digest::of(name.as_bytes())).unwrap());
+    assert_eq!(store.insert(mesh("e", 5)), Err(StoreError::Busy { flag: "--mesh-count" }));
+    drop(held);
+    assert_eq!(store.insert(mesh("e", 5)), Ok(true));
 }
 
 #[test]
@@ -53,7 +58,7 @@ fn what_is_held_stays_and_counts_until_it_is_let_go() {
     store.find(Digest::of(b"b")).unwrap();
     assert_eq!(store.insert(mesh("c", 40)), Ok(true));
     assert_eq!(has(&store, &["a", "b", "c"]), [true, false, true], "the oldest is held");
-    assert_eq!(store.insert(mesh("d", 80)), Err(StoreError::Busy));
+    assert_eq!(store.insert(mesh("d", 80)), Err(StoreError::Busy { flag: "--mesh-bytes" }));
     assert!(store.remove(Digest::of(b"a")), "forgotten");
     assert_eq!(store.load().bytes, 40, "and still there");
     drop(memory);
