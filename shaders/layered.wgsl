@@ -1,4 +1,4 @@
-// What the layers have made of a sample so far. Written by layers.wgsl, read by emit_layer.wgsl and shade.wgsl.
+// What the layers have made of a sample so far. Written by layers.wgsl, read by emit_layer.wgsl, shade.wgsl and ink.wgsl.
 
 struct Layered {
     // Premultiplied linear RGBA.

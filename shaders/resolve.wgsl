@@ -1,6 +1,6 @@
-// Stage 5, a pixel: surface over background, to sRGB bytes. Twin of src/backend/cpu/resolve.rs.
+// Stage 5, a pixel: surface over background, where no ink has been laid over both, to sRGB bytes. Twin of src/backend/cpu/resolve.rs.
 
-// Of the surface over nothing; where there are lines, of everything.
+// Of the surface over nothing, or of everything, which over.wgsl tells apart.
 @group(1) @binding(9) var<storage, read> colors: array<vec4<f32>>;
 // thresholds[k] is the smallest linear value that is stored as k + 1 or more.
 @group(1) @binding(13) var<storage, read> thresholds: array<f32>;
@@ -13,11 +13,13 @@ fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroup
         return;
     }
     var c = frame.background;
-    if has(LINES) {
+    if has(SURFACE | HULL | LINES) {
         c = colors[i];
-    } else if has(SURFACE | HULL) {
-        let color = colors[i];
-        c = color + rn4(frame.background * (1.0 - color.w));
+        if has(LINES) && is_laid(c) {
+            c = flipped(c);
+        } else {
+            c = lay_over(c, frame.background);
+        }
     }
     rgba[i] = encode(c);
 }

@@ -9,8 +9,8 @@ const UNIT: f32 = 16384.0;
 // Largest scaled area.
 const LIMIT: f32 = 16000.0;
 
-// Words of a pixel's strokes: sum of areas in 1/65536, sum of points, how often either has gone round (areas in the lower half), and
-// the points of any.
+// Words of a pixel's strokes: sum of areas in 1/65536, sum of points, how often either has gone round (areas in the lower half), eight
+// of the points of any, and the most that an area differs from its points'.
 override STROKE_WORDS: u32 = 0u;
 
 // A stroke seen from a pixel: bounds of what its points are compared with, a value each where the line has no ramp.
@@ -120,6 +120,8 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
         area = f32(points) * (batch.line_peak * (1.0 / 256.0));
     }
     let scaled_area = u32(area * 65536.0 + 0.5);
+    let of_points = u32(rn(f32(points) * (batch.line_peak * 256.0)) + 0.5);
+    atomicMax(&strokes[at + 11u], max(scaled_area, of_points) - min(scaled_area, of_points));
     // A sum that has gone round is smaller than what was added.
     var rounds = 0u;
     if atomicAdd(&strokes[at], scaled_area) + scaled_area < scaled_area {

@@ -3,6 +3,7 @@
 //!
 //! Architecture invariant: nothing here knows a mesh or a scene, and the two back-ends do not know each other.
 
+mod cells;
 pub mod cpu;
 mod device;
 pub mod gpu;

@@ -1,5 +1,6 @@
 //! Spec and mesh to plan: what each look needs, and what it does not.
 
+use super::edges::Edges;
 use super::parts::Parts;
 use super::skips::{SkipKind, Skips};
 use super::{DrawPlan, HullPass, LayersPass, PlanError, Projection, Thickness, build_surface, loose, outline, wires};
@@ -14,6 +15,16 @@ const OUTLINE_PX: f32 = 3.0;
 /// Thickness of an outline where the request does not say, as a share of the mesh's longest side: 0.03 for a model of
 /// side 2.
 const OUTLINE_OBJECT_SHARE: f32 = 0.015;
+
+/// Bytes that a back-end takes for a vertex on screen.
+pub(super) const VERTEX_BYTES: u64 = 32;
+
+/// Bytes for a triangle: up to eight entries in the lists of what each part of the picture has to draw.
+pub(super) const LISTED_BYTES: u64 = 8 * 4;
+
+/// Bytes more where a plan has layers: a triangle may be in the visibility buffer's lists and in theirs, and each thread notes which are
+/// done with.
+pub(super) const LAYERED_BYTES: u64 = 32;
 
 /// What a plan may spend.
 pub struct Means<'m> {
@@ -53,7 +64,7 @@ pub fn build_keeping<'a>(
     let mut skips = Skips::new(keep);
     let camera = Camera::place(&spec.camera, mesh, size_px, border(mesh, &parts, spec));
     let contour_px = |outline: &Outline| contour_px(mesh, outline, &camera, size_px);
-    let mut edges = wires::Edges::default();
+    let mut edges = Edges::default();
     let lines =
         wires::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, &mut means)?;
     let surface = build_surface::surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
@@ -97,13 +108,12 @@ pub fn build_keeping<'a>(
 fn pay(mesh: &Mesh, size_px: [u32; 2], parts: &Parts<'_>, budget: &mut Budget) -> Result<(), LimitExceeded> {
     let pixels = u64::from(size_px[0]) * u64::from(size_px[1]);
     budget.spend("the picture", pixels, 4)?;
-    budget.spend("vertices on screen", mesh.positions.len() as u64, 32)?;
-    // Up to eight 4-byte entries in the lists of what each part of the picture has to draw, and a role.
-    budget.spend("lists of triangles", mesh.triangles.len() as u64, 33)?;
+    budget.spend("vertices on screen", mesh.positions.len() as u64, VERTEX_BYTES)?;
+    // And a role.
+    budget.spend("lists of triangles", mesh.triangles.len() as u64, LISTED_BYTES + 1)?;
     if parts.layers_pass().is_some() {
-        // A triangle may be in the visibility buffer's lists and in the layers', and each thread notes which are done with.
         // What layers need a sample is bounded: they are drawn band by band.
-        budget.spend("lists of layers", mesh.triangles.len() as u64, 32)?;
+        budget.spend("lists of layers", mesh.triangles.len() as u64, LAYERED_BYTES)?;
     }
     let is_smooth = parts.looks.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::scene::Shading::Smooth));
     if is_smooth && mesh.normals.is_empty() {

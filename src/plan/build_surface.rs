@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use super::build::{Means, projection};
+use super::edges::Edges;
 use super::parts::Parts;
 use super::skips::{SkipKind, Skips};
 use super::textures::TextureLoader;
@@ -17,7 +18,7 @@ pub fn surface_pass<'a>(
     spec: &Spec,
     parts: &Parts<'_>,
     camera: &Camera,
-    edges: &mut wires::Edges,
+    edges: &mut Edges<'_>,
     skips: &mut Skips<'_>,
     means: &mut Means<'_>,
 ) -> Result<Option<SurfacePass<'a>>, PlanError> {

@@ -3,16 +3,19 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use super::HullPass;
+use super::build::Means;
 use super::outline::snapped;
-use crate::limits::Budget;
+use super::rim::CHECK_EVERY;
+use crate::limits::{Budget, Deadline, Stopped};
 use crate::plan::PlanError;
 
 /// How far an arc may lie from its chords, 1/256 px: 1/64 px.
 const SAGITTA: f64 = 4.0;
 
-/// Triangles of all fans up to which arcs are as round as they should be. With more of them they have fewer corners, as many in all and
-/// one for each arc.
+/// Triangles of all fans up to which arcs are as round as they should be, and how many for each pixel of the picture. With more of them
+/// they have fewer corners, as many in all and one for each arc.
 const TRIANGLES_MAX: f64 = (1 << 20) as f64;
+const TRIANGLES_MAX_PER_PX: f64 = 16.0;
 
 /// Gaps between two rims that are this narrow are what rounding makes of a needle's tip, around which its outline goes.
 const GAP_MIN: f64 = 1e-9;
@@ -43,7 +46,10 @@ pub struct End {
 }
 
 /// Ends of rims, and what is between them.
-pub struct Fans(Vec<End>);
+pub struct Fans {
+    ends: Vec<End>,
+    triangles_max: f64,
+}
 
 /// A fan: from an end's outer corner on, by an angle; to another end's, if there is one.
 struct Fan {
@@ -53,41 +59,74 @@ struct Fan {
 }
 
 impl Fans {
-    /// Of so many ends.
-    pub fn with_capacity(ends: usize) -> Self {
-        Self(Vec::with_capacity(ends))
+    /// Of so many ends at most, around what is seen in a picture of this size.
+    pub fn with_capacity(ends: usize, size_px: [u32; 2]) -> Self {
+        let pixels = size_px.map(f64::from);
+        let triangles_max = TRIANGLES_MAX.min(TRIANGLES_MAX_PER_PX * pixels[0] * pixels[1]);
+        Self { ends: Vec::with_capacity(ends), triangles_max }
     }
 
     /// Adds an end.
     pub fn push(&mut self, end: End) {
-        self.0.push(end);
+        self.ends.push(end);
     }
 
     /// Adds the fans of all vertices to the hull, whose own vertices are numbered from `first` on.
-    pub fn finish(&mut self, first: u32, hull: &mut HullPass<'_>, budget: &mut Budget) -> Result<(), PlanError> {
-        // Of two ends in one direction the one whose rim is free below comes first: the gap from the other to it is a whole turn.
-        let order = |e: &End| (e.vertex, e.free);
-        self.0.sort_unstable_by(|a, b| {
-            a.vertex.cmp(&b.vertex).then(a.angle.total_cmp(&b.angle)).then(order(a).cmp(&order(b)))
-        });
-        let ends = &self.0;
-        let (mut count, mut steps) = (0_u64, 0.0);
-        each_fan(ends, |fan| {
-            count += 1;
-            steps += fan.sweep / step(&ends[fan.from], &fan, ends);
-        });
-        let coarser = (steps / TRIANGLES_MAX).max(1.0);
-        // A triangle with its material, and the corner that it adds.
-        budget.spend("an outline's corners", count + (steps / coarser) as u64, 32)?;
-        each_fan(ends, |fan| draw(ends, &fan, coarser, first, hull));
+    pub fn finish(&mut self, first: u32, hull: &mut HullPass<'_>, means: &mut Means<'_>) -> Result<(), PlanError> {
+        let deadline = means.deadline;
+        sort(&mut self.ends, deadline)?;
+        let ends = &self.ends;
+        let mut steps = 0.0;
+        each_fan(ends, deadline, |fan| steps += fan.sweep / step(&ends[fan.from], &fan, ends))?;
+        let coarser = (steps / self.triangles_max).max(1.0);
+        let (mut vertices, mut triangles) = (0, 0);
+        each_fan(ends, deadline, |fan| {
+            let count = chords(ends, &fan, coarser);
+            triangles += count as usize;
+            vertices += count as usize - usize::from(fan.to.is_some());
+        })?;
+        grow("an outline's corners", &mut hull.vertices, vertices, means.budget)?;
+        grow("an outline's corners", &mut hull.triangles, triangles, means.budget)?;
+        grow("an outline's corners", &mut hull.triangle_materials, triangles, means.budget)?;
+        each_fan(ends, deadline, |fan| draw(ends, &fan, coarser, first, hull))?;
         Ok(())
     }
 }
 
+/// By vertex and angle. In parts, which are put in order one by one, so that the deadline can be looked at in between.
+fn sort(ends: &mut [End], deadline: &Deadline) -> Result<(), Stopped> {
+    // Of two ends in one direction the one whose rim is free below comes first: the gap from the other to it is a whole turn.
+    let order =
+        |a: &End, b: &End| (a.vertex.cmp(&b.vertex)).then(a.angle.total_cmp(&b.angle)).then(a.free.cmp(&b.free));
+    deadline.check()?;
+    if ends.len() <= CHECK_EVERY {
+        ends.sort_unstable_by(order);
+        return Ok(());
+    }
+    let (low, _, high) = ends.select_nth_unstable_by(ends.len() / 2, order);
+    sort(low, deadline)?;
+    sort(high, deadline)
+}
+
+/// Makes room for so many more, and no others. While a list moves to where there is room, it is there twice.
+fn grow<T>(what: &str, list: &mut Vec<T>, more: usize, budget: &mut Budget) -> Result<(), PlanError> {
+    if list.capacity() - list.len() < more {
+        budget.spend(what, (list.len() + more) as u64, size_of::<T>() as u64)?;
+        list.reserve_exact(more);
+    }
+    Ok(())
+}
+
 /// Calls `each` with every fan, vertex by vertex.
-fn each_fan(ends: &[End], mut each: impl FnMut(Fan)) {
+fn each_fan(ends: &[End], deadline: &Deadline, mut each: impl FnMut(Fan)) -> Result<(), Stopped> {
+    let mut unchecked = CHECK_EVERY;
     for (first, group) in groups(ends) {
         let count = group.len();
+        unchecked += count;
+        if unchecked >= CHECK_EVERY {
+            unchecked = 0;
+            deadline.check()?;
+        }
         for (i, end) in group.iter().enumerate() {
             // The next one on the free side, and how far it is.
             let next = if end.free > 0 { (i + 1) % count } else { (i + count - 1) % count };
@@ -113,6 +152,7 @@ fn each_fan(ends: &[End], mut each: impl FnMut(Fan)) {
             }
         }
     }
+    Ok(())
 }
 
 /// The ends at each vertex, and where they begin.
@@ -130,12 +170,17 @@ fn step(from: &End, fan: &Fan, ends: &[End]) -> f64 {
     (8.0 * SAGITTA / reach.max(1.0)).sqrt().min(FRAC_PI_4)
 }
 
+/// Into how many triangles a fan is cut.
+fn chords(ends: &[End], fan: &Fan, coarser: f64) -> u32 {
+    (fan.sweep / (step(&ends[fan.from], fan, ends) * coarser)).max(0.0) as u32 + 1
+}
+
 fn draw(ends: &[End], fan: &Fan, coarser: f64, first: u32, hull: &mut HullPass<'_>) {
     let from = &ends[fan.from];
     let (reach, depth) = fan.to.map_or((from.reach, from.depth), |to| (ends[to].reach, ends[to].depth));
     let free = f64::from(from.free);
     let start = from.angle + free * from.turn;
-    let count = (fan.sweep / (step(from, fan, ends) * coarser)).max(0.0) as u32 + 1;
+    let count = chords(ends, fan, coarser);
     let mut last = from.outer;
     for i in 1..=count {
         let share = f64::from(i) / f64::from(count);
@@ -157,71 +202,4 @@ fn draw(ends: &[End], fan: &Fan, coarser: f64, first: u32, hull: &mut HullPass<'
 }
 
 #[cfg(test)]
-mod tests {
-    use std::f64::consts::PI;
-
-    use super::*;
-    use crate::limits::Limits;
-
-    /// Two rims that leave a vertex at these angles, nothing between the first and the second.
-    fn corner(vertex: u32, angles: [f64; 2], reach_px: f64) -> [End; 2] {
-        [1, -1].map(|free| End {
-            vertex,
-            outer: 7,
-            material: 0,
-            free,
-            angle: angles[usize::from(free < 0)],
-            turn: FRAC_PI_2,
-            middle: [0.0; 2],
-            reach: 256.0 * reach_px,
-            depth: 0.5,
-            inv_w: 1.0,
-        })
-    }
-
-    fn finish(ends: Vec<End>) -> (HullPass<'static>, Result<(), PlanError>) {
-        let mut hull = HullPass::default();
-        let result = Fans(ends).finish(10, &mut hull, &mut Budget::new(&Limits::default()));
-        (hull, result)
-    }
-
-    /// Sums of the angles of all fans.
-    fn swept(ends: Vec<End>) -> f64 {
-        let mut fans = Fans(ends);
-        let (mut hull, mut sum) = (HullPass::default(), 0.0);
-        fans.finish(10, &mut hull, &mut Budget::new(&Limits::default())).unwrap();
-        each_fan(&fans.0, |fan| sum += fan.sweep);
-        sum
-    }
-
-    #[test]
-    fn fans_fill_what_strips_leave() {
-        let near = |got: f64, want: f64| assert!((got - want).abs() < 1e-6, "{got}, not {want}");
-        // A corner of a square, where three quarters of a turn are free; one that turns inwards; a needle, and one that is rounded flat.
-        near(swept(corner(0, [0.0, 1.5 * PI], 4.0).into()), FRAC_PI_2);
-        near(swept(corner(0, [3.0, 3.0 + 1.5 * PI - TAU], 4.0).into()), FRAC_PI_2);
-        near(swept(corner(0, [0.0, FRAC_PI_2], 4.0).into()), 0.0);
-        near(swept(corner(0, [0.001, 0.0], 4.0).into()), PI - 0.001);
-        near(swept(corner(0, [1.0, 1.0], 4.0).into()), PI);
-        near(swept(corner(0, [1.0, 1.0 + 1e-15], 4.0).into()), PI);
-        // An end that meets none, and a rim with both sides free.
-        near(swept(corner(0, [1.0, 1.0], 4.0)[..1].to_vec()), FRAC_PI_2);
-        // Two squares that touch at a corner.
-        let two = [corner(0, [FRAC_PI_2, PI], 4.0), corner(0, [1.5 * PI, 2.0 * PI], 4.0)].concat();
-        near(swept(two), 0.0);
-    }
-
-    #[test]
-    fn however_many_corners_there_are_their_fans_are_bounded() {
-        let (few, result) = finish(corner(0, [0.0, 1.5 * PI], 32.0).into());
-        result.unwrap();
-        assert!((20..40).contains(&few.triangles.len()), "{}", few.triangles.len());
-        let count = 100_000;
-        let ends: Vec<End> = (0..count).flat_map(|v| corner(v, [0.0, 1.5 * PI], 32.0)).collect();
-        let (many, result) = finish(ends);
-        result.unwrap();
-        let triangles = many.triangles.len();
-        assert!((count as usize * 4..TRIANGLES_MAX as usize + count as usize).contains(&triangles), "{triangles}");
-        assert_eq!(many.triangle_materials.len(), triangles);
-    }
-}
+mod tests;

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 
 use super::PlanError;
 use super::build::border;
-use super::parts::Parts;
+use super::parts::{PART_BYTES, Parts};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::loose::triangles;
 use crate::mesh::{Loose, Mesh, Thickened, Warning};
@@ -37,6 +37,7 @@ pub fn thicken(
     if mesh.loose.is_empty() {
         return Ok(None);
     }
+    budget.spend("materials", mesh.materials.len() as u64, PART_BYTES)?;
     let parts = Parts::new(mesh, spec);
     if !parts.has_fill() {
         let detail = "lines and points are drawn with the surface, and the look has none".to_owned();

@@ -6,6 +6,7 @@
 mod build;
 mod build_surface;
 mod choice;
+mod edges;
 mod error;
 mod error_table;
 mod fan;

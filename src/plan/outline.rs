@@ -4,12 +4,13 @@
 //! Corners are round: a corner's outline is an arc around it, so short that it does not matter how sharp the corner is. Where a corner
 //! turns inwards the strips lie over each other.
 
-use super::build::{Means, thickness};
+use super::build::{LAYERED_BYTES, LISTED_BYTES, Means, VERTEX_BYTES, thickness};
+use super::edges::Edges;
 use super::fan::{End, Fans};
 use super::parts::Parts;
 use super::rim::{CHECK_EVERY, Rim, View, row_dot};
-use super::{Edge, HullPass, HullVertex, Projection, Thickness, wires};
-use crate::limits::{Budget, Deadline};
+use super::{Edge, HullPass, HullVertex, Projection, Thickness};
+use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::plan::PlanError;
 use crate::scene::OutlineMethod;
@@ -57,25 +58,31 @@ impl<'a> Outlines<'a> {
         thicknesses: &'a [Option<Thickness>],
         size_px: [u32; 2],
         rims: &[Rim],
-        (budget, deadline): (&mut Budget, &Deadline),
+        means: &mut Means<'_>,
     ) -> Result<HullPass<'static>, PlanError> {
         let p = view.projection;
         let along = |row: &[f32; 4]| (0..3).map(|k| f64::from(row[k]) * f64::from(p.to_viewer[k])).sum::<f64>();
         let scale = (0..3).map(|k| f64::from(p.x[k]) * f64::from(p.x[k])).sum::<f64>().sqrt();
         let half = size_px.map(|size| 0.5 * PX * f64::from(size));
-        // Strips of four corners and two triangles with a material, and what fans are told of both ends.
-        let bytes = 4 * size_of::<HullVertex>() + 2 * 16 + 2 * size_of::<End>();
-        budget.spend("an outline's strips", rims.len() as u64, bytes as u64)?;
-        let (fans, hull) = (Fans::with_capacity(2 * rims.len()), HullPass::default());
+        // Strips of at most four corners, and two triangles with a material; and what fans are told of both ends.
+        let bytes = 4 * size_of::<HullVertex>() + 2 * (size_of::<[u32; 3]>() + 4) + 2 * size_of::<End>();
+        means.budget.spend("an outline's strips", rims.len() as u64, bytes as u64)?;
+        let hull = HullPass {
+            vertices: Vec::with_capacity(4 * rims.len()),
+            triangles: Vec::with_capacity(2 * rims.len()),
+            triangle_materials: Vec::with_capacity(2 * rims.len()),
+            ..HullPass::default()
+        };
+        let fans = Fans::with_capacity(2 * rims.len(), size_px);
         let nearer = [along(&p.z), along(&p.w)];
         let mut outlines = Self { view, thicknesses, half, scale, nearer, fans, hull };
         for (i, rim) in rims.iter().enumerate() {
             if i % CHECK_EVERY == 0 {
-                deadline.check()?;
+                means.deadline.check()?;
             }
             outlines.strip(rim);
         }
-        outlines.fans.finish(view.mesh.positions.len() as u32, &mut outlines.hull, budget)?;
+        outlines.fans.finish(view.mesh.positions.len() as u32, &mut outlines.hull, means)?;
         Ok(outlines.hull)
     }
 
@@ -91,9 +98,9 @@ impl<'a> Outlines<'a> {
         }
         let along = way.map(|v| v / length);
         let out = f64::from(rim.free);
-        // Tangent to the circles around both ends, of which one may be nearer and larger.
-        let narrows = (reach[0] - reach[1]) / length;
-        let sine = if narrows.abs() < 0.95 { narrows } else { 0.0 };
+        // Tangent to the circles around both ends, of which one may be nearer and larger. Where it surrounds the other the strip is empty,
+        // and the nearer end's fan reaches around to it.
+        let sine = ((reach[0] - reach[1]) / length).clamp(-1.0, 1.0);
         let cosine = (1.0 - sine * sine).sqrt();
         let normal = [sine * along[0] - cosine * out * along[1], sine * along[1] + cosine * out * along[0]];
         let depths = self.depths(rim, ends, [along[0], along[1], length], normal, reach);
@@ -223,7 +230,7 @@ pub fn hull_pass<'a>(
     mesh: &'a Mesh,
     parts: &Parts<'_>,
     (projection, size_px): (&Projection, [u32; 2]),
-    edges: &mut wires::Edges,
+    edges: &mut Edges<'a>,
     means: &mut Means<'_>,
 ) -> Result<HullPass<'a>, PlanError> {
     let outline = |m: usize| parts.layers[m].outline.filter(|o| o.method == OutlineMethod::Hull);
@@ -237,16 +244,24 @@ pub fn hull_pass<'a>(
         colors = vec![color];
     }
     let tells_apart = colors.len() > 1 || (parts.layers_pass().is_some() && mesh.materials.len() > 1);
-    let list = edges.of(mesh, means)?;
-    let view = View::new(mesh, projection, means.budget)?;
-    let rims = view.rims(parts, &thicknesses, list, (means.budget, means.deadline))?;
-    let means = (&mut *means.budget, means.deadline);
+    let found = edges.with_silhouettes(mesh, parts, means)?;
+    let view = View::new(mesh, projection, means)?;
+    let rims = view.rims(parts, &thicknesses, found, means)?;
     let surface_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
     let mut hull = Outlines::draw(&view, &thicknesses, size_px, &rims, means)?;
+    pay_drawing(hull.vertices.len() as u64, hull.triangles.len() as u64, parts, means.budget)?;
     if !tells_apart {
         hull.triangle_materials = Vec::new();
     }
     Ok(HullPass { colors, surface_materials, ..hull })
+}
+
+/// Spends what both back-ends will allocate for a hull: as for the mesh's own vertices and triangles.
+fn pay_drawing(vertices: u64, triangles: u64, parts: &Parts<'_>, budget: &mut Budget) -> Result<(), LimitExceeded> {
+    budget.spend("an outline's vertices on screen", vertices, VERTEX_BYTES)?;
+    budget.spend("lists of an outline's triangles", triangles, LISTED_BYTES)?;
+    let layers = if parts.layers_pass().is_some() { LAYERED_BYTES } else { 0 };
+    budget.spend("lists of an outline's layers", triangles, layers)
 }
 
 /// The vertex at a spot, which lies in the guard band.
@@ -272,3 +287,6 @@ fn narrow(range: &mut [f64; 2], from: f64, to: f64) -> Option<()> {
     }
     (range[0] < range[1]).then_some(())
 }
+
+#[cfg(test)]
+mod tests;

@@ -15,6 +15,9 @@ const LAYERS_MAX: u32 = 16;
 /// What remains of hidden lines that fade.
 pub const FADE: f32 = 0.25;
 
+/// Bytes that each material takes among [`Parts`].
+pub const PART_BYTES: u64 = size_of::<&Layers>() as u64 + 4 + 1;
+
 /// The parts of a mesh, by material index.
 pub struct Parts<'a> {
     /// What is drawn of each.

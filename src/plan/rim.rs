@@ -1,9 +1,10 @@
 //! Where surfaces end in a view: the edges along which outlines run, and on which side of each nothing is.
 
+use super::build::Means;
 use super::parts::{Fill, Parts};
 use super::silhouette::Silhouettes;
 use super::{Edge, Projection, Thickness};
-use crate::limits::{Budget, Deadline};
+use crate::limits::Stopped;
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
 use crate::plan::PlanError;
@@ -39,16 +40,22 @@ pub struct View<'a> {
 
 impl<'a> View<'a> {
     /// Looks at a mesh.
-    pub fn new(mesh: &'a Mesh, projection: &'a Projection, budget: &mut Budget) -> Result<Self, PlanError> {
+    pub fn new(mesh: &'a Mesh, projection: &'a Projection, means: &mut Means<'_>) -> Result<Self, PlanError> {
+        let Means { budget, deadline } = means;
         budget.spend("an outline", mesh.positions.len() as u64, size_of::<[f64; 3]>() as u64)?;
         budget.spend("an outline", mesh.triangles.len() as u64, 1)?;
-        let places: Vec<[f64; 3]> = mesh
-            .positions
-            .iter()
-            .map(|p| [&projection.x, &projection.y, &projection.w].map(|row| row_dot(row, *p)))
-            .collect();
-        let facing = mesh.triangles.iter().map(|triangle| facing(mesh, &places, *triangle)).collect();
-        Ok(Self { mesh, projection, places, facing })
+        let mut places = Vec::with_capacity(mesh.positions.len());
+        for positions in mesh.positions.chunks(CHECK_EVERY) {
+            deadline.check()?;
+            let rows = [&projection.x, &projection.y, &projection.w];
+            places.extend(positions.iter().map(|p| rows.map(|row| row_dot(row, *p))));
+        }
+        let mut sides = Vec::with_capacity(mesh.triangles.len());
+        for triangles in mesh.triangles.chunks(CHECK_EVERY) {
+            deadline.check()?;
+            sides.extend(triangles.iter().map(|triangle| facing(mesh, &places, *triangle)));
+        }
+        Ok(Self { mesh, projection, places, facing: sides })
     }
 
     /// The rims of the parts that have an outline, by material.
@@ -56,30 +63,31 @@ impl<'a> View<'a> {
         &self,
         parts: &Parts<'_>,
         outlines: &[Option<Thickness>],
-        list: &EdgeList,
-        (budget, deadline): (&mut Budget, &Deadline),
+        (list, silhouettes): (&EdgeList, &Silhouettes<'_>),
+        means: &mut Means<'_>,
     ) -> Result<Vec<Rim>, PlanError> {
-        let silhouettes = Silhouettes::new(self.mesh, parts, list, budget)?;
+        means.budget.spend("materials", parts.layers.len() as u64, 1)?;
         let culls: Vec<Cull> = (0..parts.layers.len()).map(|m| cull(parts, m)).collect();
-        let mut rims: Vec<Rim> = Vec::new();
-        for (i, edge) in list.edges.iter().enumerate() {
-            if i % CHECK_EVERY == 0 {
-                deadline.check()?;
-            }
-            let edge = Edge::new(&self.mesh.positions, edge.vertices, edge.faces);
-            let Some(edge) = silhouettes.edge(i as u32, edge) else { continue };
-            let faces = self.drawn(edge.faces, &culls);
-            let Some(material) = self.material(faces, outlines) else { continue };
-            for &free in self.free_sides(edge.vertices, faces) {
-                if rims.len() == rims.capacity() {
-                    // Twice the old ones and the old ones, while they are copied.
-                    let more = rims.len().max(1024);
-                    budget.spend("an outline's edges", more as u64, 2 * size_of::<Rim>() as u64)?;
-                    rims.reserve_exact(more);
+        let each = |each: &mut dyn FnMut(Rim)| {
+            for (i, edge) in list.edges.iter().enumerate() {
+                if i % CHECK_EVERY == 0 {
+                    means.deadline.check()?;
                 }
-                rims.push(Rim { vertices: edge.vertices, faces, free, material });
+                let edge = Edge::new(&self.mesh.positions, edge.vertices, edge.faces);
+                let Some(edge) = silhouettes.edge(i as u32, edge) else { continue };
+                let faces = self.drawn(edge.faces, &culls);
+                let Some(material) = self.material(faces, outlines) else { continue };
+                for &free in self.free_sides(edge.vertices, faces) {
+                    each(Rim { vertices: edge.vertices, faces, free, material });
+                }
             }
-        }
+            Ok::<(), Stopped>(())
+        };
+        let mut count = 0;
+        each(&mut |_| count += 1)?;
+        means.budget.spend("an outline's edges", count, size_of::<Rim>() as u64)?;
+        let mut rims = Vec::with_capacity(count as usize);
+        each(&mut |rim| rims.push(rim))?;
         Ok(rims)
     }
 

@@ -97,7 +97,7 @@ impl Camera {
         let reach = (extents.high - self.center.extend(0.0)).abs().max((extents.low - self.center.extend(0.0)).abs());
         let w = if self.kind == Kind::Perspective { nearest } else { 1.0 };
         let px = (DVec2::new(reach.x, reach.y) + grow) / (self.half_size * w) * size_px * 0.5;
-        // Half of the guard band: hulls of constant pixel width still find room.
+        // Half of the guard band, which f32 cannot round out of it. Hulls ask for no room: the plan cuts them to what may be in the picture.
         self.contains_mesh = nearest > 0.0 && px.max_element() < 2048.0;
     }
 

@@ -1,98 +1,170 @@
-//! Part 3e: what a pushed-out hull should show: the outer half of a contour, the strip beside the silhouette on the side where
-//! its surface is not.
+//! Part 3e: what a hull should show: all points within its width of an edge where the surface ends, on the side where the surface is
+//! not, and nearer than any surface there.
+//!
+//! Around a corner it goes as far as the next edge where the surface ends.
+//!
+//! A hull recedes. Where it ends it lies half its width behind the edge, so that what is next to the edge hides it and what is far
+//! behind does not. A face that turns away faster than that is continued beyond its edge, up to five times as fast, and the hull
+//! lies a twentieth of its width behind that: a hull of what goes on elsewhere in the same plane does not lie over it. Depth is even
+//! in between.
 
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::camera::project;
+use super::camera::{Camera, Homogeneous, project};
 use super::lattice;
 use super::rays::nearest;
-use super::screen::{Piece, Scene, Screen, is_front};
-use super::vector::{V2, dot, mix, sub};
-use super::visible::{contour, on_screen, visible_parts};
+use super::screen::{Piece, Scene, Screen};
+use super::vector::{V2, V3, cross2, dot, length, mix, sub};
+use super::visible::contour;
 
-/// A visible piece of the silhouette.
-#[derive(Clone, Copy, Debug)]
+/// How far a hull recedes, as shares of its width in units of the model.
+const RECEDES: f64 = 0.5;
+const FOLLOWS_UP_TO: f64 = 2.5;
+const BEHIND_WHAT_IT_FOLLOWS: f64 = 0.05;
+
+/// An edge where the surface ends, and the hull beyond.
+#[derive(Clone, Debug)]
 pub struct Rim {
     /// x and y in pixels, and depth, of both ends.
-    ends: [[f64; 3]; 2],
+    ends: [V3; 2],
+    /// Depths of the hull where it ends, beyond both.
+    far: [f64; 2],
     /// Away from the surface that ends here, at right angles.
     outward: V2,
-    /// Of the whole edge.
-    vertices: [u32; 2],
+    /// By end: in which directions edges leave it where the surface ends too.
+    others: [Vec<V2>; 2],
 }
 
-/// All visible pieces of a scene's silhouette.
-pub fn rims(scene: &Scene, screen: &Screen) -> Vec<Rim> {
-    let inner = inner_vertices(scene);
+/// Everywhere that a scene's surface ends; for hulls so many pixels wide.
+pub fn rims(scene: &Scene, width: f64) -> Vec<Rim> {
+    let camera = &scene.camera;
+    let at = |v: u32| camera.homogeneous(scene.positions[v as usize]);
+    let thirds = thirds(scene);
+    let edges = contour(scene);
+    let mut at_vertex: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for &[a, b] in &edges {
+        at_vertex.entry(a).or_default().push(b);
+        at_vertex.entry(b).or_default().push(a);
+    }
     let mut rims = Vec::new();
-    for vertices in contour(scene) {
-        let (Some([a, b]), Some(&inner)) = (on_screen(scene, vertices), inner.get(&vertices)) else { continue };
-        let [x, y, _] = project(scene.camera.homogeneous(scene.positions[inner as usize]));
-        let side = [a[1] - b[1], b[0] - a[0]];
-        let sign = if dot(side, sub([x, y], [a[0], a[1]])) < 0.0 { 1.0 } else { -1.0 };
+    for edge in edges {
+        let [a, b] = match camera.in_front(&edge.map(at))[..] {
+            [a, b] => [a, b],
+            _ => continue,
+        };
+        let ends = [project(a), project(b)];
+        let along = sub([ends[1][0], ends[1][1]], [ends[0][0], ends[0][1]]);
+        let thirds: Vec<V3> =
+            thirds[&edge].iter().map(|&v| at(v)).filter(|h| h[3] >= camera.near_w).map(project).collect();
+        let side = [along[1], -along[0]].map(|v| v / length(along));
+        let across = |third: &V3| dot(side, sub([third[0], third[1]], [ends[0][0], ends[0][1]]));
+        // Of a face that is seen edge on, rounding says on which side it is.
+        let farthest = thirds.iter().map(across).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let (Some(inner), true) = (farthest, length(along) > 0.0) else { continue };
+        let sign = if inner < 0.0 { 1.0 } else { -1.0 };
         let outward = side.map(|v| sign * v);
-        let parts = visible_parts(screen, vertices, [a, b]);
-        rims.extend(parts.into_iter().map(|part| Rim { ends: part.map(|t| mix(a, b, t)), outward, vertices }));
+        let far = [0, 1].map(|k| {
+            let beyond = [0, 1].map(|axis| ends[k][axis] + width * outward[axis]);
+            let planes = thirds.iter().filter_map(|&third| plane_at([ends[0], ends[1], third], beyond));
+            far_depth(camera, [a, b][k], width, planes.fold(f64::INFINITY, f64::min))
+        });
+        let leave = |k: usize| {
+            let others = at_vertex[&edge[k]].iter().filter(|v| !edge.contains(v));
+            let ends = others.map(|&v| at(v)).filter(|h| h[3] >= camera.near_w).map(project);
+            ends.map(|v| [v[0], v[1]]).collect::<Vec<V2>>()
+        };
+        let others = [0, 1].map(|k| leave(k).into_iter().map(|v| sub(v, [ends[k][0], ends[k][1]])).collect());
+        rims.push(Rim { ends, far, outward, others });
     }
     rims
 }
 
-/// The share of each pixel, row by row, that lies within `thickness` of a rim, beyond it, and not behind another surface;
-/// `side * side` points a pixel.
-pub fn ink(screen: &Screen, rims: &[Rim], thickness: f64, side: u32) -> Vec<f64> {
+/// Whether a direction lies between two that are less than half a turn apart.
+fn is_between(way: V2, [a, b]: [V2; 2]) -> bool {
+    let turn = cross2(a, b);
+    turn != 0.0 && cross2(a, way) / turn > 0.0 && cross2(way, b) / turn > 0.0
+}
+
+/// Depth where a hull ends that begins at `edge`; of what continues its farther face there, `plane`.
+fn far_depth(camera: &Camera, edge: Homogeneous, width: f64, plane: f64) -> f64 {
+    let gradient = |row: [f64; 4]| [row[0], row[1], row[2]];
+    let nearer = gradient(camera.z);
+    let change = |row: [f64; 4]| dot(gradient(row), nearer) / length(nearer);
+    let units = width * edge[3] / length(gradient(camera.x));
+    let receded = |share: f64| {
+        let away = share * units;
+        (edge[2] - away * change(camera.z)) / (edge[3] - away * change(camera.w))
+    };
+    let follows = plane < receded(RECEDES) && plane > receded(FOLLOWS_UP_TO);
+    if follows { plane - (receded(0.0) - receded(BEHIND_WHAT_IT_FOLLOWS)) } else { receded(RECEDES) }
+}
+
+/// Depth of a triangle's plane at a point on screen; None of one that is seen edge on.
+fn plane_at(corners: [V3; 3], p: V2) -> Option<f64> {
+    let [a, b, c] = corners.map(|v| [v[0], v[1]]);
+    let area = cross2(sub(b, a), sub(c, a));
+    let weights = [cross2(sub(b, p), sub(c, p)), cross2(sub(c, p), sub(a, p)), cross2(sub(a, p), sub(b, p))];
+    (area != 0.0).then(|| (0..3).map(|k| weights[k] / area * corners[k][2]).sum())
+}
+
+/// The share of each pixel, row by row, that a hull covers; `side * side` points a pixel.
+pub fn ink(screen: &Screen, rims: &[Rim], width: f64, side: u32) -> Vec<f64> {
     let points = lattice::points(side);
-    let [width, height] = screen.camera.size_px;
+    let [columns, rows] = screen.camera.size_px;
     let pixel = |x: u32, y: u32| {
         let corner = [f64::from(x), f64::from(y)];
         let center = corner.map(|v| v + 0.5);
-        let near: Vec<&Rim> = rims.iter().filter(|rim| rim.distance(center).0 < thickness + 0.71).collect();
+        let near: Vec<&Rim> = rims.iter().filter(|rim| rim.nearest(center).0 < width + 0.71).collect();
         if near.is_empty() {
             return 0.0;
         }
         let pieces = screen.near(&[corner, corner.map(|v| v + 1.0)]);
-        let inked = points.iter().filter(|p| is_inked([corner[0] + p[0], corner[1] + p[1]], &near, &pieces, thickness));
+        let inked = points.iter().filter(|p| is_inked([corner[0] + p[0], corner[1] + p[1]], &near, &pieces, width));
         inked.count() as f64 / points.len() as f64
     };
-    (0..height).into_par_iter().flat_map_iter(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect()
+    (0..rows).into_par_iter().flat_map_iter(|y| (0..columns).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect()
 }
 
-fn is_inked(p: V2, near: &[&Rim], pieces: &[&Piece], thickness: f64) -> bool {
-    let surface = nearest(pieces, p);
+fn is_inked(p: V2, near: &[&Rim], pieces: &[&Piece], width: f64) -> bool {
+    let surface = nearest(pieces, p).map_or(0.0, |(_, depth)| depth);
     near.iter().any(|rim| {
-        let (distance, depth) = rim.distance(p);
-        let is_beyond = dot(rim.outward, sub(p, [rim.ends[0][0], rim.ends[0][1]])) >= 0.0;
-        let is_free = surface
-            .is_none_or(|(piece, nearest)| nearest < depth && !piece.vertices.iter().any(|v| rim.vertices.contains(v)));
-        distance <= thickness && is_beyond && is_free
+        let (distance, t) = rim.nearest(p);
+        let [x, y, depth] = mix(rim.ends[0], rim.ends[1], t);
+        let far = rim.far[0] + t * (rim.far[1] - rim.far[0]);
+        let way = sub(p, [x, y]);
+        // Past an end, only as far around it as the next edge.
+        let along = sub([rim.ends[1][0], rim.ends[1][1]], [rim.ends[0][0], rim.ends[0][1]]);
+        let (own, others): (V2, &[V2]) = match t {
+            _ if t <= 0.0 => (along, &rim.others[0]),
+            _ if t >= 1.0 => (along.map(|v| -v), &rim.others[1]),
+            _ => (along, &[]),
+        };
+        let is_beyond = dot(rim.outward, way) >= 0.0 && !others.iter().any(|other| is_between(*other, [own, way]));
+        distance <= width && is_beyond && depth + distance / width * (far - depth) > surface
     })
 }
 
 impl Rim {
-    /// How far a point is from it on screen, and the depth of its nearest point.
-    fn distance(&self, p: V2) -> (f64, f64) {
-        let [a, b] = self.ends;
-        let along = [b[0] - a[0], b[1] - a[1]];
+    /// How far a point is from it on screen, and where along it.
+    fn nearest(&self, p: V2) -> (f64, f64) {
+        let [a, b] = self.ends.map(|end| [end[0], end[1]]);
+        let along = sub(b, a);
         let squared = dot(along, along);
-        let t = if squared > 0.0 { (dot(sub(p, [a[0], a[1]]), along) / squared).clamp(0.0, 1.0) } else { 0.0 };
-        let [x, y, depth] = mix(a, b, t);
-        ((p[0] - x).hypot(p[1] - y), depth)
+        let t = if squared > 0.0 { (dot(sub(p, a), along) / squared).clamp(0.0, 1.0) } else { 0.0 };
+        (length(sub(p, mix(a, b, t))), t)
     }
 }
 
-/// By edge: the third vertex of a face that has it, of one that looks at the viewer if there is one.
-fn inner_vertices(scene: &Scene) -> BTreeMap<[u32; 2], u32> {
-    let mut inner = BTreeMap::new();
-    for wanted in [false, true] {
-        for t in &scene.triangles {
-            if (is_front(&scene.camera, t.map(|v| scene.positions[v as usize])) == Some(true)) == wanted {
-                for k in 0..3 {
-                    let (a, b) = (t[k], t[(k + 1) % 3]);
-                    inner.insert([a.min(b), a.max(b)], t[(k + 2) % 3]);
-                }
-            }
+/// By edge: the third vertices of the faces that have it.
+fn thirds(scene: &Scene) -> BTreeMap<[u32; 2], Vec<u32>> {
+    let mut thirds: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
+    for t in &scene.triangles {
+        for k in 0..3 {
+            let (a, b) = (t[k], t[(k + 1) % 3]);
+            thirds.entry([a.min(b), a.max(b)]).or_default().push(t[(k + 2) % 3]);
         }
     }
-    inner
+    thirds
 }

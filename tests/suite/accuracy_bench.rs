@@ -62,16 +62,22 @@ fn outlines_and_faces_are_measured_too() {
     let mut measured = 0;
     for scene in SCENES.iter().filter(|scene| scene.is_quick && scene.family != Family::Wires) {
         let rows = rounds::measure(scene, EFFORT, &mut back_ends);
-        let at = |technique| rows.iter().find(|row| row.technique == technique && row.samples == 4).unwrap().errors;
+        let errors = |technique, samples| {
+            rows.iter().find(|row| row.technique == technique && row.samples == samples).unwrap().errors
+        };
+        let at = |technique| errors(technique, 4);
         let rmse = |technique| at(technique).rmse;
         match scene.family {
             Family::Outlines => {
                 let (contour, hull) = (rmse(Technique::Contour), rmse(Technique::Hull));
-                // A hull's border is as its samples have it; and between the teeth it stays behind those beside it, where a flat strip
-                // would lie over them.
-                assert!(contour < 20.0 && contour < hull && hull < 48.0, "{contour}, {hull}");
+                // A contour's border is exact and a hull's as its samples have it, which known straight edges show to cost 26/255 with 4
+                // and 12/255 with 16. What is left beside are pixels at the roots of teeth, where edges that the gear itself hides
+                // nearly meet those that are seen.
+                assert!(contour < 1.0 && contour < hull && hull < 22.0, "{contour}, {hull}");
+                let most = errors(Technique::Hull, 16).rmse;
+                assert!(most < 14.5, "{most}");
                 let ink = [Technique::Contour, Technique::Hull].map(|technique| at(technique).ink.unwrap());
-                assert!((ink[0] - 1.0).abs() < 0.02 && (0.8..1.05).contains(&ink[1]), "{ink:?}");
+                assert!(ink.iter().all(|ink| (ink - 1.0).abs() < 0.02), "{ink:?}");
             }
             _ => {
                 assert!(rmse(Technique::FaceNormals) < 0.4, "{}", rmse(Technique::FaceNormals));

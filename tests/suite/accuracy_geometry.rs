@@ -114,7 +114,8 @@ fn fans_own_every_sample_once_beyond_the_guard_band_too() {
             for i in 0..count {
                 let spokes = [3, 4, 7, 48, 300][i % 5];
                 let (positions, triangles) = fan(spokes, reach, &mut random);
-                let mut plan = scenes::screen_plan([96, 64], 4, 1.0, &positions, &triangles);
+                let samples = [4, 1, 8, 16][i / 5 % 4];
+                let mut plan = scenes::screen_plan([96, 64], samples, 1.0, &positions, &triangles);
                 plan.projection.clip = true;
                 // One depth: the same bits wherever a triangle is clipped.
                 plan.projection.z = [0.0, 0.0, 0.0, 0.5];

@@ -174,15 +174,14 @@ fn a_line_drawn_very_often_is_one_line() {
     let Some(gpus) = twins::gpus() else { return };
     let positions = [[-3.3, -2.2, 0.5], [4.4, 3.1, 0.5], [-9.0, 9.0, 0.5]];
     let triangles = [[0, 1, 2]];
-    // Twice, because one stroke may leave a corner of a pixel that more are taken to have covered.
-    let few = lines_of(&positions, &triangles, vec![[0, 1]; 2], false);
+    // Four times: one stroke may leave a corner of a pixel that more are taken to have covered, and in a corner that none of its points
+    // is in, up to four are taken to lie beside each other.
+    let few = lines_of(&positions, &triangles, vec![[0, 1]; 4], false);
     let few = CpuRenderer::new(1).draw(&few, &Deadline::default()).unwrap();
     let many = lines_of(&positions, &triangles, vec![[0, 1]; 200_000], false);
     let cpu = CpuRenderer::new(1).draw(&many, &Deadline::default()).unwrap();
     let gpu = GpuRenderer::new(gpus[0].clone()).draw(&many, &Deadline::default()).unwrap();
-    // Strokes that cover a corner of a pixel and no point of it add up: one or two pixels beside the line.
-    let corners = Tolerance { max: 255, share: 0.001 };
-    Likeness::of(&few, &cpu).assert(corners, "sums beyond 32 bits");
+    Likeness::of(&few, &cpu).assert(Tolerance { max: 0, share: 0.0 }, "sums beyond 32 bits");
     Likeness::of(&cpu, &gpu).assert(Tolerance::TWINS, "on both");
     assert!(cpu.rgba.chunks(4).any(|p| (40..230).contains(&p[1])), "no pixel is half covered");
 }

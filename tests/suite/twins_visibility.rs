@@ -72,10 +72,11 @@ fn visibility_with_faces_and_hulls_is_the_same() {
     for surface in [None, Some(Faces::Both), Some(Faces::Front), Some(Faces::Back)] {
         for hull_px in hulls {
             for distance in [0.0, 0.4, 3.0] {
+                let samples = [1, 4, 8, 16][cases % 4];
                 let soup = Soup::new(Kind::Mixed, 300, 0.7, &mut random);
-                let view = View::new([200, 150], 4, distance, &mut random);
+                let view = View::new([200, 150], samples, distance, &mut random);
                 let view = View { surface, hull_px, ..view };
-                seen += compare(&soup.plan(&view), &format!("{surface:?} {hull_px:?} {distance}"));
+                seen += compare(&soup.plan(&view), &format!("{surface:?} {hull_px:?} {samples} {distance}"));
                 cases += 1;
             }
         }
@@ -95,7 +96,7 @@ fn visibility_behind_the_eye_and_off_screen_is_the_same() {
         for distance in [0.05, 0.3, 1.0] {
             for reach in [0.5, 3.0, 50.0] {
                 let soup = Soup::new(kind, 300, reach, &mut random);
-                let mut view = View::new([320, 240], 1 + 3 * (cases as u32 % 2), distance, &mut random);
+                let mut view = View::new([320, 240], [1, 4, 8, 16][cases % 4], distance, &mut random);
                 view.projection.clip = true;
                 seen += compare(&soup.plan(&view), &format!("{kind:?} {distance} {reach}"));
                 cases += 1;
@@ -130,9 +131,9 @@ fn more_triangles_than_a_dispatch_takes() {
     let mut random = Random(2024);
     let mut cases = 0;
     // The dispatch takes 2^20 triangles, and 2^17 where they may need clipping.
-    for (count, distance) in [(1_100_000, 3.0), (150_000, 0.5)] {
+    for (count, distance, samples) in [(1_100_000, 3.0, 4), (150_000, 0.5, 16)] {
         let soup = Soup::new(Kind::Tiny, count, 0.7, &mut random);
-        let view = View::new([100, 80], 4, distance, &mut random);
+        let view = View::new([100, 80], samples, distance, &mut random);
         assert!(compare(&soup.plan(&view), &format!("{count} triangles")) > 10_000);
         cases += 1;
     }

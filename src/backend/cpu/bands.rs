@@ -1,7 +1,7 @@
 //! Bands of rows: how one is drawn from start to finish.
 
 use super::bins::{Bin, Bins};
-use super::ink::Ink;
+use super::ink::{Ink, Inker};
 use super::isa::dispatch;
 use super::layers::{self, LayerBand};
 use super::light::Light;
@@ -30,8 +30,8 @@ pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: u
     } else if plan.is_shaded() {
         shade_band(isa, stages, &scratch.samples, &mut scratch.colors);
     }
-    resolve::lay_over_background(plan, &mut scratch.colors);
     draw_lines(stages, scratch, bins, band);
+    resolve::lay_over_background(plan, &mut scratch.colors);
     resolve::encode(stages.srgb, &scratch.colors, rgba);
 }
 
@@ -63,6 +63,7 @@ pub fn draw_layer(
 fn draw_lines(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
     let plan = stages.plan;
     let pixels = scratch.colors.len();
+    let inker = Inker::new(plan, &scratch.samples, scratch.layers.as_ref());
     for (pass, bins) in plan.lines.iter().zip(&bins.edges) {
         if bins.iter().all(|chunk| chunk.items_in(band).next().is_none()) {
             continue;
@@ -77,7 +78,7 @@ fn draw_lines(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band:
         scratch.light.clear();
         scratch.light.resize(lit_pixels, Light::NONE);
         line_light::light_lines(stages, &scratch.samples, &scratch.owners, &mut scratch.light);
-        resolve::lay_lines(pass, &scratch.ink, &scratch.light, &mut scratch.colors);
+        inker.lay(pass, &scratch.ink, &scratch.light, &mut scratch.colors);
     }
 }
 

@@ -45,6 +45,12 @@ impl LayerBand {
         self.colors.len() * Self::SAMPLE_BYTES + self.pending.capacity()
     }
 
+    /// How much of a sample of the picture's pixel (x, y) lies under them, 0 to 1.
+    #[inline(always)]
+    pub fn alpha(&self, x: u32, y: u32, s: u32) -> f32 {
+        self.colors[self.found.index(x, y, s)][3]
+    }
+
     /// Forgets everything, and moves to what is shown of `base`.
     fn begin(&mut self, base: &SampleBand) {
         for samples in [&mut self.found, &mut self.previous] {

@@ -111,7 +111,7 @@ impl<'a> LineDrawer<'a> {
                         let (a, b) = (segment.point(from), segment.point(to));
                         let ends = [[a[0] - center[0], a[1] - center[1]], [b[0] - center[0], b[1] - center[1]]];
                         if let Some((area, mask)) = stroke::cover(&self.pen, direction, ends) {
-                            ink[at].add(area, &mask);
+                            ink[at].add(area, &mask, self.pen.peak);
                             if owner > 0 {
                                 owners[at] = owners[at].max(owner);
                             } else if ink[at].is_full() {

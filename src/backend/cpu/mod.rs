@@ -93,6 +93,9 @@ impl CpuRenderer {
         let isa = self.isa;
         let pool = self.pool.as_ref();
         let own = plan.hull.as_ref().map_or(&[][..], |hull| &hull.vertices);
+        // Room for just what there is: a list that grows by itself would double.
+        self.vertices.clear();
+        self.vertices.reserve_exact(plan.positions.len() + own.len());
         self.vertices.resize(plan.positions.len(), ScreenVertex::default());
         let chunks = plan.positions.chunks(CHUNK).zip(self.vertices.chunks_mut(CHUNK)).collect();
         run(pool, chunks, |(positions, out)| transform::transform(isa, &plan.projection, positions, out));

@@ -1,10 +1,8 @@
-//! Stage 5, a pixel: surface over background, ink over both, to sRGB bytes. Twin of `shaders/resolve.wgsl`.
+//! Stage 5, a pixel: surface over background, where no ink has been laid over both, to sRGB bytes. Twin of `shaders/resolve.wgsl`.
 
-use super::ink::Ink;
-use super::light::Light;
 use super::transform::recip;
 use crate::image::srgb8_thresholds;
-use crate::plan::{DrawPlan, LinePass};
+use crate::plan::DrawPlan;
 
 /// Linear light to sRGB bytes by the 255 thresholds, with a first guess from a small table.
 pub struct SrgbEncoder {
@@ -35,21 +33,25 @@ impl SrgbEncoder {
     }
 }
 
-/// Lays the surface's colours over the background.
-pub fn lay_over_background(plan: &DrawPlan<'_>, colors: &mut [[f32; 4]]) {
-    for color in colors {
-        *color = std::array::from_fn(|k| color[k] + plan.background[k] * (1.0 - color[3]));
-    }
+/// Whether a pixel's colour is that of everything: then the sign of its alpha is set. Else it is the surface's over nothing.
+#[inline(always)]
+pub fn is_laid(color: &[f32; 4]) -> bool {
+    color[3].is_sign_negative()
 }
 
-/// Lays the lines of a pass over what is there; `light` is what falls on them (empty where they are not lit).
-pub fn lay_lines(lines: &LinePass, ink: &[Ink], light: &[Light], colors: &mut [[f32; 4]]) {
-    let peak = lines.peak();
-    for (i, (ink, c)) in ink.iter().zip(colors).enumerate() {
-        let cover = ink.coverage(peak);
-        if cover > 0.0 {
-            let color = light.get(i).map_or(lines.color, |light| light.on_premultiplied(lines.color));
-            *c = std::array::from_fn(|k| cover * color[k] + c[k] * (1.0 - cover * color[3]));
+/// The surface's colour over the background.
+#[inline(always)]
+pub fn lay_over(surface: [f32; 4], background: [f32; 4]) -> [f32; 4] {
+    std::array::from_fn(|k| surface[k] + background[k] * (1.0 - surface[3]))
+}
+
+/// Lays the surface over the background wherever no line has been laid over both.
+pub fn lay_over_background(plan: &DrawPlan<'_>, colors: &mut [[f32; 4]]) {
+    for color in colors {
+        if is_laid(color) {
+            color[3] = -color[3];
+        } else {
+            *color = lay_over(*color, plan.background);
         }
     }
 }

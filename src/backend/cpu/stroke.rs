@@ -7,6 +7,7 @@
 
 use super::profile::Profile;
 use super::transform::{round_to_i32, rsqrt};
+use crate::backend::cells::{self, GENERATORS};
 use crate::plan::LinePass;
 
 /// Words of a mask: as many values of 16 bits as an AVX2 register has.
@@ -14,7 +15,7 @@ pub const WORDS: usize = 16;
 /// Bits of a word.
 const BITS: usize = 16;
 /// Points in a pixel.
-pub const POINTS: u32 = (WORDS * BITS) as u32;
+pub const POINTS: u32 = cells::POINTS as u32;
 
 /// Which points of a pixel are covered: bit `15 - j` of word l is point `16 j + l`.
 pub type Mask = [u16; WORDS];
@@ -22,10 +23,8 @@ pub type Mask = [u16; WORDS];
 /// A number for each point: of bit j of word l, at `[j][l]`.
 type PerPoint = [[i16; WORDS]; BITS];
 
-/// Where the points lie, in 1/65536 px right of and below the pixel's middle: a rank-1 lattice (Korobov's), no two of whose
-/// points share a row or a column. On a square grid, lines along its rows would be off by half a row. The generator is the one
-/// whose counts of half planes are closest to their areas.
-static LATTICE: [PerPoint; 2] = [lattice(1), lattice(181)];
+/// Where the points lie, in 1/65536 px right of and below the pixel's middle.
+static LATTICE: [PerPoint; 2] = [lattice(GENERATORS[0]), lattice(GENERATORS[1])];
 
 /// Steps to the pixel in which along and across are measured.
 const UNIT: f32 = 16_384.0;
@@ -52,7 +51,7 @@ pub struct Pen {
     /// From the middle of the line to the farthest pixel's centre that it touches, pixels.
     pub reach: f32,
     /// Coverage in the middle of a line, where only its ramp is wider than a pixel.
-    peak: f32,
+    pub peak: f32,
     /// Half the width at each of a ramp's levels, a word of the mask each.
     radius: [f32; WORDS],
     /// Scale of areas, so that the largest fits 16 bits.

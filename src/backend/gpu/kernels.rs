@@ -1,8 +1,8 @@
-//! What each kernel is made of: its buffers, its source, and what of a plan it is specialised to.
+//! What each kernel is made of: its source, and what of a plan it is specialised to.
 
 use super::look;
 use super::sizes::STROKES_BYTES;
-use super::stages::{Access, Into, Slot, Stage, Write};
+use super::stages::{Into, Stage, Write};
 
 const COMMON: &str = include_str!("../../../shaders/common.wgsl");
 const CONTOUR: &str = include_str!("../../../shaders/contour.wgsl");
@@ -18,6 +18,7 @@ const SAMPLES: &str = include_str!("../../../shaders/samples.wgsl");
 const LAYERED: &str = include_str!("../../../shaders/layered.wgsl");
 const EMIT: &str = include_str!("../../../shaders/emit.wgsl");
 const EMIT_LAYER: &str = include_str!("../../../shaders/emit_layer.wgsl");
+const OVER: &str = include_str!("../../../shaders/over.wgsl");
 const GROUP: &str = include_str!("../../../shaders/group.wgsl");
 
 /// What shade, layers and line_light have in common: from where a point lies to its colour.
@@ -31,123 +32,6 @@ const SHADE: &[&str] = &[
 ];
 
 impl Stage {
-    /// The buffers of group 1 that the kernel declares.
-    pub fn buffers(self) -> &'static [(Slot, Access)] {
-        use Access::{Read, ReadWrite};
-        match self {
-            Self::Transform => &[(Slot::Positions, Read), (Slot::Vertices, ReadWrite)],
-            Self::Visibility { into: Into::Surface, .. } => &[
-                (Slot::Triangles, Read),
-                (Slot::Roles, Read),
-                (Slot::Vertices, Read),
-                (Slot::Samples, ReadWrite),
-                (Slot::Work, ReadWrite),
-                (Slot::Rounds, Read),
-            ],
-            Self::Visibility { into: Into::Layer, .. } => &[
-                (Slot::Triangles, Read),
-                (Slot::Roles, Read),
-                (Slot::Vertices, Read),
-                (Slot::Samples, ReadWrite),
-                (Slot::Work, ReadWrite),
-                (Slot::Rounds, Read),
-                (Slot::Layer, Read),
-                (Slot::Layered, Read),
-            ],
-            Self::Clip => &[
-                (Slot::Positions, Read),
-                (Slot::Triangles, Read),
-                (Slot::Roles, Read),
-                (Slot::Vertices, Read),
-                (Slot::Work, ReadWrite),
-                (Slot::Rounds, Read),
-            ],
-            Self::VisibilityTile { into: Into::Surface, .. } => &[(Slot::Samples, ReadWrite), (Slot::Work, Read)],
-            Self::VisibilityTile { into: Into::Layer, .. } => {
-                &[(Slot::Samples, ReadWrite), (Slot::Work, Read), (Slot::Layer, Read), (Slot::Layered, Read)]
-            }
-            Self::Layers => &[
-                (Slot::Positions, Read),
-                (Slot::Triangles, Read),
-                (Slot::Vertices, Read),
-                (Slot::Normals, Read),
-                (Slot::CornerTriangles, Read),
-                (Slot::Attributes, Read),
-                (Slot::Materials, Read),
-                (Slot::FaceNormals, Read),
-                (Slot::Uvs, Read),
-                (Slot::VertexColors, Read),
-                (Slot::Texels, Read),
-                (Slot::Roles, Read),
-                (Slot::HullLooks, Read),
-                (Slot::Layer, Read),
-                (Slot::Layered, ReadWrite),
-                (Slot::Rounds, ReadWrite),
-            ],
-            Self::Shade => &[
-                (Slot::Positions, Read),
-                (Slot::Triangles, Read),
-                (Slot::Vertices, Read),
-                (Slot::Samples, Read),
-                (Slot::Normals, Read),
-                (Slot::CornerTriangles, Read),
-                (Slot::Attributes, Read),
-                (Slot::Materials, Read),
-                (Slot::FaceNormals, Read),
-                (Slot::Roles, Read),
-                (Slot::HullLooks, Read),
-                (Slot::Layered, Read),
-                (Slot::Uvs, Read),
-                (Slot::VertexColors, Read),
-                (Slot::Texels, Read),
-                (Slot::Colors, ReadWrite),
-            ],
-            Self::Lines => &[
-                (Slot::Positions, Read),
-                (Slot::Triangles, Read),
-                (Slot::Vertices, Read),
-                (Slot::Samples, Read),
-                (Slot::Edges, Read),
-                (Slot::Owners, ReadWrite),
-                (Slot::Strokes, ReadWrite),
-                (Slot::Progress, ReadWrite),
-            ],
-            Self::Ink => &[(Slot::Colors, ReadWrite), (Slot::Strokes, ReadWrite), (Slot::LineColors, Read)],
-            Self::LineLight => &[
-                (Slot::Positions, Read),
-                (Slot::Triangles, Read),
-                (Slot::Vertices, Read),
-                (Slot::Samples, Read),
-                (Slot::Normals, Read),
-                (Slot::CornerTriangles, Read),
-                (Slot::Attributes, Read),
-                (Slot::Materials, Read),
-                (Slot::FaceNormals, Read),
-                (Slot::Uvs, Read),
-                (Slot::VertexColors, Read),
-                (Slot::Texels, Read),
-                (Slot::Colors, ReadWrite),
-                (Slot::Owners, ReadWrite),
-            ],
-            Self::Resolve => &[(Slot::Colors, Read), (Slot::Thresholds, Read), (Slot::Rgba, ReadWrite)],
-        }
-    }
-
-    /// The buffer that is bound at a slot's number: a kernel that looks for a layer writes it where others write samples, and
-    /// reads these where others find layers.
-    pub fn bound_at(self, slot: Slot) -> Slot {
-        match (self, slot) {
-            (Self::Visibility { into: Into::Layer, .. } | Self::VisibilityTile { into: Into::Layer, .. }, slot) => {
-                match slot {
-                    Slot::Samples => Slot::Layer,
-                    Slot::Layer => Slot::Samples,
-                    slot => slot,
-                }
-            }
-            _ => slot,
-        }
-    }
-
     /// Name of the entry point, and of the file in shaders/.
     pub fn entry(self) -> &'static str {
         match self {
@@ -197,8 +81,8 @@ impl Stage {
                 let kernel = include_str!("../../../shaders/lines.wgsl");
                 [COMMON, TRIANGLE, PLANES, CONTOUR, SEGMENT, HIDING, STROKE, kernel].concat()
             }
-            Self::Ink => [COMMON, include_str!("../../../shaders/ink.wgsl")].concat(),
-            Self::Resolve => [COMMON, include_str!("../../../shaders/resolve.wgsl")].concat(),
+            Self::Ink => [COMMON, OVER, LAYERED, include_str!("../../../shaders/ink.wgsl")].concat(),
+            Self::Resolve => [COMMON, OVER, include_str!("../../../shaders/resolve.wgsl")].concat(),
         }
     }
 
@@ -228,7 +112,7 @@ impl Stage {
             Self::Layers => SHADED | look::LAYERED_HULL,
             Self::Shade => SHADED | look::LAYERS,
             Self::LineLight => SHADED,
-            Self::Ink => look::SURFACE | look::HULL,
+            Self::Ink => look::SURFACE | look::HULL | look::LAYERS | look::SAMPLES,
             Self::Lines => look::CONTOURS | look::CLIPPED | look::SAMPLES,
             Self::Resolve => look::SURFACE | look::HULL | look::LINES,
         }

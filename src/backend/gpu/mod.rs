@@ -1,11 +1,12 @@
 //! The wgpu back-end: the CPU's stages as compute shaders, headless.
 //!
 //! In reading order: [`device`] opens a GPU; [`schedule`] decides what is dispatched for a plan; [`recorder`] turns that
-//! into commands; [`kernels`] says what each stage is made of, [`stages`] are their pipelines, [`params`] their numbers,
+//! into commands; [`kernels`] and [`bindings`] say what each stage is made of, [`stages`] are their pipelines, [`params`] their numbers,
 //! [`buffers`] their memory and [`sizes`] how much of it.
 //!
 //! Architecture invariant: a job's use of the device stays on the thread that draws it, because wgpu's error scopes do.
 
+mod bindings;
 mod buffers;
 mod device;
 mod kernels;
@@ -28,7 +29,7 @@ pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
 pub use self::sizes::bands_bytes;
 
 use self::buffers::Buffers;
-use self::params::{attributes, corner_triangles, edge_lists, hull_looks};
+use self::params::{attributes, cell_masks, corner_triangles, edge_lists, hull_looks};
 use self::recorder::Recorder;
 use self::schedule::Schedule;
 use self::sizes::{
@@ -223,6 +224,7 @@ fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule:
         let colors: Vec<[f32; 4]> = plan.lines.iter().map(|lines| lines.color).collect();
         buffers.upload_parts(gpu, Slot::Edges, &edges)?;
         buffers.upload(gpu, Slot::LineColors, bytemuck::cast_slice(&colors))?;
+        buffers.upload(gpu, Slot::Cells, bytemuck::cast_slice(&cell_masks(plan.samples)))?;
         buffers.reserve(gpu, Slot::Strokes, band_pixels * STROKES_BYTES)?;
         buffers.reserve(gpu, Slot::Progress, schedule.progress_bytes)?;
         if plan.lights_lines() {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::backend::cells::{POINTS, cells};
 use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, Shown, Side, SurfacePass};
 
 /// The plan's numbers.
@@ -194,6 +195,16 @@ pub fn edge_lists(passes: &[LinePass]) -> (Vec<&[Edge]>, Vec<u32>) {
     (lists.into_iter().map(|(list, _)| &list[..]).collect(), starts)
 }
 
+/// The points that stand with each of a pixel's samples, eight words a sample, numbered as shaders/stroke.wgsl numbers them.
+pub fn cell_masks(samples: u32) -> Vec<u32> {
+    let mut masks = vec![0; samples as usize * POINTS / 32];
+    for (point, &cell) in cells(samples).iter().enumerate() {
+        let (word, bit) = (point % 16, point / 16);
+        masks[usize::from(cell) * (POINTS / 32) + word / 2] |= 1 << (bit + 16 * (word % 2));
+    }
+    masks
+}
+
 fn xyz(v: [f32; 3]) -> [f32; 4] {
     [v[0], v[1], v[2], 0.0]
 }
@@ -228,6 +239,19 @@ mod tests {
     fn sizes_are_those_of_the_shader() {
         assert_eq!(size_of::<Frame>(), 304);
         assert_eq!(size_of::<Batch>(), 100);
+    }
+
+    #[test]
+    fn each_point_stands_with_one_sample() {
+        for samples in [1, 4, 8, 16] {
+            let masks = cell_masks(samples);
+            assert_eq!(masks.len(), samples as usize * 8);
+            for w in 0..8 {
+                let words = masks.iter().skip(w).step_by(8);
+                assert_eq!(words.clone().fold(0, |all, word| all | word), u32::MAX, "{samples}, word {w}");
+                assert_eq!(words.map(|word| word.count_ones()).sum::<u32>(), 32, "{samples}, word {w}");
+            }
+        }
     }
 
     #[test]

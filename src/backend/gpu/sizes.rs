@@ -22,8 +22,9 @@ pub const LAYERED_BYTES: u64 = 32;
 /// Bytes of a sample of the visibility buffer, or of a layer.
 pub const SAMPLE_BYTES: u64 = 8;
 
-/// Bytes of a pixel's strokes: two sums, how often they have gone round, and a bit for each of 256 points.
-pub const STROKES_BYTES: u64 = 44;
+/// Bytes of a pixel's strokes: two sums, how often they have gone round, a bit for each of 256 points, and the most that an area
+/// differs from its points'.
+pub const STROKES_BYTES: u64 = 48;
 
 /// Bytes of a pixel of lit lines: whose light falls on them.
 pub const OWNER_BYTES: u64 = 4;

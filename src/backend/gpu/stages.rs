@@ -88,10 +88,11 @@ pub enum Slot {
     Layer,
     Layered,
     Rounds,
+    Cells,
 }
 
 /// Number of [`Slot`]s.
-pub const SLOTS: usize = 29;
+pub const SLOTS: usize = 30;
 
 /// Whether a kernel writes to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

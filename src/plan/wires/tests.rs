@@ -1,5 +1,6 @@
 //! Classes of edges.
 
+use super::class::cos_deg;
 use super::*;
 use crate::limits::Budget;
 use crate::limits::{Deadline, Limits};

@@ -195,9 +195,8 @@ pub fn sentences(rows: &[Row]) -> [String; 5] {
              {BASELINE_SAMPLES} samples exact goes from {exact_1} to {exact}, fwidth from {fwidth_1} to {fwidth}."
         ),
         format!(
-            "A contour errs by {:.2}/255 and a hull, measured against flat strips where it recedes, by {:.2}/255; where a pixel \
-             shows one face alone, normals by faces err by {:.2}/255 (rounding to bytes leaves that much) and normals by derivatives by \
-             {:.2}/255 in {:.1} times the time.",
+            "A contour errs by {:.2}/255 and a hull by {:.2}/255; where a pixel shows one face alone, normals by faces err \
+             by {:.2}/255 (rounding to bytes leaves that much) and normals by derivatives by {:.2}/255 in {:.1} times the time.",
             error(Family::Outlines, Technique::Contour),
             error(Family::Outlines, Technique::Hull),
             error(Family::Faces, Technique::FaceNormals),

@@ -73,7 +73,7 @@ impl Truth {
             (_, Technique::Hull) => {
                 let scene = scene(lines);
                 let screen = Screen::new(&scene);
-                let ink = rim::ink(&screen, &rim::rims(&scene, &screen), width_px, points);
+                let ink = rim::ink(&screen, &rim::rims(&scene, width_px), width_px, points);
                 (Kind::WhiteOnBlack, gray(ink), None)
             }
             _ => (Kind::Alpha, gray(ink(size, &segments(lines), width_px, points)), None),

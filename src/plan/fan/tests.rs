@@ -1,0 +1,92 @@
+//! Fans around corners.
+
+use std::f64::consts::PI;
+
+use super::*;
+use crate::limits::Limits;
+
+/// Two rims that leave a vertex at these angles, nothing between the first and the second.
+fn corner(vertex: u32, angles: [f64; 2], reach_px: f64) -> [End; 2] {
+    [1, -1].map(|free| End {
+        vertex,
+        outer: 7,
+        material: 0,
+        free,
+        angle: angles[usize::from(free < 0)],
+        turn: FRAC_PI_2,
+        middle: [0.0; 2],
+        reach: 256.0 * reach_px,
+        depth: 0.5,
+        inv_w: 1.0,
+    })
+}
+
+const SIZE_PX: [u32; 2] = [1000, 800];
+
+fn fans(ends: Vec<End>, size_px: [u32; 2]) -> Fans {
+    Fans { ends, ..Fans::with_capacity(0, size_px) }
+}
+
+fn finish(ends: Vec<End>, size_px: [u32; 2]) -> (HullPass<'static>, Result<(), PlanError>) {
+    let mut hull = HullPass::default();
+    let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
+    let result = fans(ends, size_px).finish(10, &mut hull, &mut Means { budget: &mut budget, deadline: &deadline });
+    let exact = [hull.vertices.capacity(), hull.triangles.capacity()];
+    assert_eq!(exact, [hull.vertices.len(), hull.triangles.len()], "room for what there is");
+    (hull, result)
+}
+
+/// Sums of the angles of all fans.
+fn swept(ends: Vec<End>) -> f64 {
+    let mut fans = fans(ends, SIZE_PX);
+    let (mut hull, mut sum) = (HullPass::default(), 0.0);
+    let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
+    fans.finish(10, &mut hull, &mut Means { budget: &mut budget, deadline: &deadline }).unwrap();
+    each_fan(&fans.ends, &deadline, |fan| sum += fan.sweep).unwrap();
+    sum
+}
+
+#[test]
+fn fans_fill_what_strips_leave() {
+    let near = |got: f64, want: f64| assert!((got - want).abs() < 1e-6, "{got}, not {want}");
+    // A corner of a square, where three quarters of a turn are free; one that turns inwards; a needle, and one that is rounded flat.
+    near(swept(corner(0, [0.0, 1.5 * PI], 4.0).into()), FRAC_PI_2);
+    near(swept(corner(0, [3.0, 3.0 + 1.5 * PI - TAU], 4.0).into()), FRAC_PI_2);
+    near(swept(corner(0, [0.0, FRAC_PI_2], 4.0).into()), 0.0);
+    near(swept(corner(0, [0.001, 0.0], 4.0).into()), PI - 0.001);
+    near(swept(corner(0, [1.0, 1.0], 4.0).into()), PI);
+    near(swept(corner(0, [1.0, 1.0 + 1e-15], 4.0).into()), PI);
+    // An end that meets none, and a rim with both sides free.
+    near(swept(corner(0, [1.0, 1.0], 4.0)[..1].to_vec()), FRAC_PI_2);
+    // Two squares that touch at a corner.
+    let two = [corner(0, [FRAC_PI_2, PI], 4.0), corner(0, [1.5 * PI, 2.0 * PI], 4.0)].concat();
+    near(swept(two), 0.0);
+}
+
+#[test]
+fn however_many_corners_there_are_their_fans_are_bounded() {
+    let (few, result) = finish(corner(0, [0.0, 1.5 * PI], 32.0).into(), SIZE_PX);
+    result.unwrap();
+    assert!((20..40).contains(&few.triangles.len()), "{}", few.triangles.len());
+    let count = 100_000;
+    for (size_px, more) in [(SIZE_PX, TRIANGLES_MAX), ([100, 50], 80_000.0)] {
+        let ends: Vec<End> = (0..count).flat_map(|v| corner(v, [0.0, 1.5 * PI], 32.0)).collect();
+        let (many, result) = finish(ends, size_px);
+        result.unwrap();
+        let triangles = many.triangles.len();
+        let range = count as usize..more as usize + count as usize + 1;
+        assert!(range.contains(&triangles) && triangles as f64 > 0.5 * more, "{triangles}");
+        assert_eq!(many.triangle_materials.len(), triangles);
+    }
+}
+
+#[test]
+fn fans_end_when_the_job_does() {
+    let ends: Vec<End> = (0..1000).flat_map(|v| corner(v, [0.0, 1.5 * PI], 32.0)).collect();
+    let (mut hull, mut budget, deadline) = (HullPass::default(), Budget::new(&Limits::default()), Deadline::default());
+    deadline.stop();
+    let mut means = Means { budget: &mut budget, deadline: &deadline };
+    let result = fans(ends, SIZE_PX).finish(10, &mut hull, &mut means);
+    assert!(matches!(result, Err(PlanError::Stopped(_))), "{result:?}");
+    assert!(hull.triangles.is_empty());
+}
