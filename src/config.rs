@@ -44,6 +44,10 @@ pub struct Config {
     pub result_bytes: u64,
     /// Results of jobs in memory.
     pub result_count: u64,
+    /// Stored meshes in memory, bytes.
+    pub mesh_bytes: u64,
+    /// Stored meshes.
+    pub mesh_count: u64,
     /// What is logged, in `tracing` filter syntax.
     pub log: String,
     /// Whether the log is JSON; None: where standard error is no terminal.
@@ -69,6 +73,8 @@ impl Default for Config {
             result_ttl_ms: 600_000,
             result_bytes: 256 << 20,
             result_count: 10_000,
+            mesh_bytes: 256 << 20,
+            mesh_count: 1000,
             log: "info".into(),
             log_json: None,
             limits: Limits::default(),

@@ -16,6 +16,7 @@
 //! - [`report`]: what is in a file, for whoever asks instead of drawing it.
 //! - [`request`]: the request document, from JSON and dotted keys to a [`scene::Spec`].
 //! - [`jobs`]: the bounded queue and the workers.
+//! - [`store`]: meshes that stay, named by what is in them.
 //! - [`http`], [`cli`], [`config`], [`telemetry`]: the edges.
 
 pub mod backend;
@@ -32,4 +33,5 @@ pub mod plan;
 pub mod report;
 pub mod request;
 pub mod scene;
+pub mod store;
 pub mod telemetry;

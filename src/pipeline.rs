@@ -1,6 +1,7 @@
 //! The whole program in one function: bytes -> Mesh -> DrawPlan -> Image -> encoded bytes.
 //!
-//! The command line, the synchronous HTTP handler and the job workers all call [`render`].
+//! The command line, the synchronous HTTP handler and the job workers all call [`render`]; who asks what is in a file instead
+//! of drawing it calls [`inspect`].
 //!
 //! Architecture invariant: nothing from here down reads a clock, a file, the environment, or knows an async runtime.
 
@@ -13,6 +14,7 @@ use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::{self, Bundle, Format, Mesh, MeshError, Warning};
 use crate::plan::{self, Skip};
 pub use crate::plan::{Choice, PlanError};
+use crate::report::Report;
 use crate::scene::Spec;
 
 /// What comes in.
@@ -74,6 +76,9 @@ pub enum RenderError {
     /// We are: the encoder failed.
     #[error(transparent)]
     Encode(#[from] EncodeError),
+    /// We are: the report could not be written.
+    #[error("the report could not be written: {0}")]
+    Report(#[from] serde_json::Error),
 }
 
 /// Turns a mesh into a picture.
@@ -115,6 +120,20 @@ pub fn render(
     let skips = plan.skips;
     let choice = chosen.map(|chosen| chosen.choice);
     Ok(Output { bytes, format, backend: drawn.backend, skips, warnings, choice })
+}
+
+/// Says what is in a file.
+pub fn inspect(
+    bundle: &Bundle,
+    format_in: Option<Format>,
+    limits: &Limits,
+    deadline: &Deadline,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Report, MeshError> {
+    let mut budget = Budget::new(limits);
+    let mesh = mesh::import(bundle, format_in, limits, &mut budget, deadline)?;
+    ended(Stage::Parse);
+    Report::of(&mesh, bundle.bytes_len(), &mut budget, deadline)
 }
 
 /// A look for a material that the mesh does not have is most likely a misspelt name.

@@ -53,9 +53,10 @@ impl From<RenderError> for Complaint {
     fn from(error: RenderError) -> Self {
         match error {
             RenderError::Mesh(_) | RenderError::Plan(_) => Self::input(error.to_string()),
-            RenderError::Draw(DrawError::Stopped(_)) | RenderError::Stopped(_) | RenderError::Encode(_) => {
-                Self::ours(error.to_string())
-            }
+            RenderError::Draw(DrawError::Stopped(_))
+            | RenderError::Stopped(_)
+            | RenderError::Encode(_)
+            | RenderError::Report(_) => Self::ours(error.to_string()),
             RenderError::Draw(detail) => Self::ours(format!("{detail}; try --backend cpu")),
         }
     }

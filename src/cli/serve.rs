@@ -28,7 +28,7 @@ pub fn run(arguments: &ServeArgs) -> Result<(), Complaint> {
     let config = resolve(arguments)?;
     telemetry::init(&config.log, config.log_json).map_err(Complaint::usage)?;
     if config.data_dir.is_some() {
-        tracing::warn!("this version keeps jobs in memory and stores nothing in --data-dir");
+        tracing::warn!("this version keeps jobs and meshes in memory and stores nothing in --data-dir");
     }
     http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
         ServeError::Unprotected(_) => Complaint::usage(error.to_string()),

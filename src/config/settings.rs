@@ -49,6 +49,8 @@ pub const SETTINGS: &[Setting] = &[
     number("result-ttl-ms", "How long a job's result is kept", 0, MS_MAX, |c| &mut c.result_ttl_ms),
     number("result-bytes", "Memory for results of jobs", 0, u64::MAX, |c| &mut c.result_bytes),
     number("result-count", "Results of jobs in memory", 1, 1 << 24, |c| &mut c.result_count),
+    number("mesh-bytes", "Memory for stored meshes", 0, u64::MAX, |c| &mut c.mesh_bytes),
+    number("mesh-count", "Stored meshes; the least recently used go first", 1, 1 << 20, |c| &mut c.mesh_count),
     text(
         "log",
         "What is logged: error, warn, info, debug, or a tracing filter",

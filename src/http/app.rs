@@ -6,16 +6,17 @@ use std::time::Duration;
 
 use axum::Router;
 use axum::middleware;
-use axum::routing::{get, post};
+use axum::routing::{MethodRouter, get, post};
 
 use super::error::ApiError;
 use super::schema::{self, Schema};
-use super::{auth, health, jobs, observe, render};
+use super::{auth, health, jobs, meshes, observe, pictures, render};
 use crate::backend::{GpuHost, HardwareHint};
 use crate::config::{Config, cores, why_no_gpu};
 use crate::jobs::{Bodies, Engine, Jobs, Settings, pipeline_engine};
 use crate::limits::Limits;
 use crate::request::Rules;
+use crate::store::Store;
 
 /// What handlers share.
 pub struct App {
@@ -29,6 +30,8 @@ pub struct App {
     pub gpu: Arc<GpuHost>,
     /// Memory of uploads.
     pub bodies: Arc<Bodies>,
+    /// Meshes that stay.
+    pub meshes: Store,
     /// For the whole of a request's body.
     pub body_timeout: Duration,
     /// Threads that draw.
@@ -68,6 +71,7 @@ impl App {
             jobs: Jobs::start(settings, engine)?,
             gpu,
             bodies: Bodies::new(config.uploads_bytes),
+            meshes: Store::new(config.mesh_bytes, to_usize(config.mesh_count)),
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             workers: config.workers,
             api_keys: config.api_keys.clone(),
@@ -87,15 +91,31 @@ impl App {
     }
 }
 
+/// Where the work is done; these paths want a key where keys are configured.
+pub fn paths() -> Vec<String> {
+    resources().into_iter().map(|(path, _)| path.replace("{picture}", "render.{png|webp|jpg}")).collect()
+}
+
+fn resources() -> [(&'static str, MethodRouter<Arc<App>>); 9] {
+    [
+        ("/v1/render", post(render::post)),
+        ("/v1/meshes", post(meshes::post)),
+        ("/v1/meshes/{sha256}", get(meshes::get).put(meshes::put).delete(meshes::delete)),
+        // The last part is render.png and so on: the router matches whole parts.
+        ("/v1/meshes/{sha256}/{picture}", get(pictures::get)),
+        ("/v1/jobs", post(jobs::post)),
+        ("/v1/jobs/{id}", get(jobs::get).delete(jobs::delete)),
+        ("/v1/jobs/{id}/result", get(jobs::result)),
+        (schema::PATH, get(schema::get)),
+        ("/v1/capabilities", get(health::capabilities)),
+    ]
+}
+
 /// Every path there is.
 pub fn router(app: &Arc<App>) -> Router {
-    let api = Router::new()
-        .route("/v1/render", post(render::post))
-        .route("/v1/jobs", post(jobs::post))
-        .route("/v1/jobs/{id}", get(jobs::get).delete(jobs::delete))
-        .route("/v1/jobs/{id}/result", get(jobs::result))
-        .route(schema::PATH, get(schema::get))
-        .route("/v1/capabilities", get(health::capabilities))
+    let api = resources()
+        .into_iter()
+        .fold(Router::new(), |router, (path, methods)| router.route(path, methods))
         .route_layer(middleware::from_fn_with_state(app.clone(), auth::check));
     Router::new()
         .route("/healthz", get(health::healthz))

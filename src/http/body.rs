@@ -18,10 +18,23 @@ use crate::mesh::{Bundle, BundleFile};
 pub struct Upload {
     /// The mesh and what came along with it.
     pub bundle: Bundle,
+    /// How it came.
+    pub kind: BodyKind,
     /// The request document, if the body is a multipart form that has one.
     pub document: Option<Bytes>,
     /// The memory that the two take.
     pub reservation: Reservation,
+}
+
+/// What a body is, as its `Content-Type` has it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BodyKind {
+    /// The bytes of a file.
+    Raw,
+    /// Those of a zip archive.
+    Archive,
+    /// A form with files.
+    Form,
 }
 
 /// Within which a body is read.
@@ -38,8 +51,7 @@ pub struct BodyLimits<'a> {
 
 /// Refuses what can be refused from the header alone, before a byte is read and before `100 Continue` is sent.
 pub fn check_header(headers: &HeaderMap, bytes_max: u64) -> Result<(), ApiError> {
-    let length = headers.get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()).and_then(|v| v.parse::<u64>().ok());
-    if length.is_some_and(|length| length > bytes_max) {
+    if length(headers).is_some_and(|length| length > bytes_max) {
         return Err(ApiError::body_too_large(bytes_max));
     }
     if headers.get(header::CONTENT_ENCODING).is_some_and(|v| !v.as_bytes().eq_ignore_ascii_case(b"identity")) {
@@ -47,6 +59,16 @@ pub fn check_header(headers: &HeaderMap, bytes_max: u64) -> Result<(), ApiError>
         return Err(ApiError::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "content_encoding", detail));
     }
     Ok(())
+}
+
+/// The length that is announced, if one is.
+pub fn length(headers: &HeaderMap) -> Option<u64> {
+    headers.get(header::CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
+}
+
+/// Whether the body is said to be JSON.
+pub fn is_json(headers: &HeaderMap) -> bool {
+    media_type(headers).is_some_and(|t| t.eq_ignore_ascii_case("application/json"))
 }
 
 /// Whether the body is a form.
@@ -67,8 +89,11 @@ pub async fn read(request: Request, limits: BodyLimits<'_>) -> Result<Upload, Ap
         } else {
             let bytes = whole(metered(body, meter.clone()), &meter).await?;
             // An archive stays closed until a worker opens it: unpacking is work.
-            let bundle = if is_zip { Bundle::zip(bytes) } else { Bundle::of_one(bytes) };
-            Ok(Upload { bundle, document: None, reservation: meter.reservation() })
+            let (bundle, kind) = match is_zip {
+                true => (Bundle::zip(bytes), BodyKind::Archive),
+                false => (Bundle::of_one(bytes), BodyKind::Raw),
+            };
+            Ok(Upload { bundle, kind, document: None, reservation: meter.reservation() })
         }
     };
     tokio::time::timeout(limits.time, reading).await.unwrap_or_else(|_| Err(too_slow(limits.time)))
@@ -115,7 +140,8 @@ async fn form(request: Request, meter: &Meter, files_max: u64) -> Result<Upload,
     if files.is_empty() {
         return Err(bad_form("the form has no `file` part; send the mesh as one".into()));
     }
-    Ok(Upload { bundle: Bundle::of_files(files), document, reservation: meter.reservation() })
+    let bundle = Bundle::of_files(files);
+    Ok(Upload { bundle, kind: BodyKind::Form, document, reservation: meter.reservation() })
 }
 
 /// An empty file by the name that its part gives. One part needs no name.
@@ -128,7 +154,8 @@ fn named(name: Option<&str>, before: usize) -> Result<BundleFile, ApiError> {
     BundleFile::new(name, Bytes::new()).map_err(|error| bad_form(error.to_string()))
 }
 
-fn bad_form(detail: String) -> ApiError {
+/// A form that is none, or not what is wanted here.
+pub fn bad_form(detail: String) -> ApiError {
     ApiError::new(StatusCode::BAD_REQUEST, "bad_form", detail)
 }
 

@@ -1,19 +1,13 @@
 //! What goes over the wire as JSON. Domain types do not serialise themselves.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 
 use super::error::ApiError;
-use super::schema;
-use crate::backend::GpuStatus;
 use crate::image::ImageFormat;
-use crate::jobs::{Job, Load, State, Timings};
-use crate::limits::BackendChoice;
-use crate::limits::Limits;
-use crate::mesh::Format;
+use crate::jobs::{Job, State, Timings};
+use crate::mesh::Bundle;
 use crate::pipeline::Choice;
-use crate::request::{self, Style, word_for, words_of};
+use crate::store::Digest;
 
 /// RFC 9457.
 #[derive(Serialize)]
@@ -137,7 +131,7 @@ impl JobDto {
                 let ApiError { status, code, detail, flag, .. } = ApiError::from(&**failure);
                 (None, Some(JobErrorDto { status: status.as_u16(), code, detail, flag }))
             }
-            State::Queued | State::Running | State::Cancelled => (None, None),
+            State::Queued | State::Running | State::Inspected(_) | State::Cancelled => (None, None),
         };
         let (id, accepted_unix_ms) = (job.id.to_string(), job.accepted_unix_ms);
         Self { id, state: state.name(), accepted_unix_ms, result, error }
@@ -174,116 +168,29 @@ impl VersionDto {
     }
 }
 
-/// `/v1/capabilities`.
+/// A mesh that is stored.
 #[derive(Serialize)]
-pub struct CapabilitiesDto {
-    version: &'static str,
-    mesh_formats: [&'static str; Format::NAMES.len()],
-    image_formats: [&'static str; 3],
-    styles: Vec<&'static str>,
-    schema: &'static str,
-    request_keys: Vec<&'static str>,
-    request_words: BTreeMap<&'static str, Vec<&'static str>>,
-    backend: BackendDto,
-    workers: u64,
-    load: LoadDto,
-    limits: LimitsDto,
+pub struct MeshDto {
+    sha256: String,
+    /// Of its files, as they came.
+    size_bytes: u64,
+    files: usize,
+    /// Where its report is.
+    pub url: String,
+    render_url: String,
 }
 
-/// Who draws.
-#[derive(Serialize)]
-pub struct BackendDto {
-    default: &'static str,
-    choices: Vec<&'static str>,
-    gpu: GpuDto,
-}
-
-#[derive(Serialize)]
-struct GpuDto {
-    state: &'static str,
-    name: Option<String>,
-    driver: Option<String>,
-    device_type: Option<&'static str>,
-    features: Vec<&'static str>,
-    reason: Option<String>,
-}
-
-impl BackendDto {
-    /// The back-end of a request that names none, and how it stands with the GPU.
-    pub fn new(default: BackendChoice, gpu: GpuStatus) -> Self {
-        let GpuStatus { state, info, reason } = gpu;
-        let (name, driver, device_type, features) = match info {
-            Some(info) => (Some(info.name), Some(info.driver), Some(info.device_type), info.features),
-            None => (None, None, None, Vec::new()),
-        };
+impl MeshDto {
+    /// Under this name.
+    pub fn new(digest: Digest, bundle: &Bundle) -> Self {
+        let url = format!("/v1/meshes/{digest}");
+        let render_url = format!("{url}/render.png");
         Self {
-            default: word_for(default),
-            choices: words_of::<BackendChoice>(),
-            gpu: GpuDto { state: state.name(), name, driver, device_type, features, reason },
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct LoadDto {
-    queued: usize,
-    running: usize,
-    kept_results: usize,
-    kept_result_bytes: u64,
-}
-
-#[derive(Serialize)]
-struct LimitsDto {
-    body_bytes: u64,
-    memory_bytes: u64,
-    triangles: u64,
-    nodes: u64,
-    json_depth: u64,
-    image_px: u64,
-    texture_px: u64,
-    texture_total_px: u64,
-    bundle_bytes: u64,
-    bundle_entries: u64,
-    job_ms: u64,
-    queue_per_worker: u64,
-}
-
-impl CapabilitiesDto {
-    /// What this process can do.
-    pub fn new(limits: &Limits, backend: BackendDto, workers: u64, load: Load) -> Self {
-        let Limits { body_bytes, memory_bytes, triangles, nodes, json_depth, image_px, .. } = *limits;
-        let Limits { bundle_bytes, bundle_entries, job_ms, queue_per_worker, .. } = *limits;
-        let Limits { texture_px, texture_total_px, .. } = *limits;
-        Self {
-            version: env!("CARGO_PKG_VERSION"),
-            mesh_formats: Format::NAMES,
-            image_formats: ["png", "webp", "jpeg"],
-            styles: words_of::<Style>(),
-            schema: schema::PATH,
-            request_keys: request::keys(),
-            request_words: request::vocabulary(),
-            backend,
-            workers,
-            load: LoadDto {
-                queued: load.queued,
-                running: load.running,
-                kept_results: load.kept,
-                kept_result_bytes: load.kept_bytes,
-            },
-            limits: LimitsDto {
-                body_bytes,
-                memory_bytes,
-                triangles,
-                nodes,
-                json_depth,
-                image_px,
-                texture_px,
-                texture_total_px,
-                bundle_bytes,
-                bundle_entries,
-                job_ms,
-                queue_per_worker,
-            },
+            sha256: digest.to_string(),
+            size_bytes: bundle.bytes_len(),
+            files: bundle.files().len(),
+            url,
+            render_url,
         }
     }
 }

@@ -13,6 +13,7 @@ use crate::mesh::{MeshError, MeshFault};
 use crate::pipeline::PlanError;
 use crate::pipeline::RenderError;
 use crate::request::RequestError;
+use crate::store::StoreError;
 
 /// An answer that is not what the client wanted.
 #[derive(Clone, Debug)]
@@ -106,6 +107,20 @@ impl From<BodiesFull> for ApiError {
     }
 }
 
+impl From<StoreError> for ApiError {
+    fn from(error: StoreError) -> Self {
+        let detail = error.to_string();
+        match error {
+            StoreError::TooLarge { .. } => {
+                Self::new(StatusCode::PAYLOAD_TOO_LARGE, "mesh_too_large", detail).flag(Some("--mesh-bytes"))
+            }
+            StoreError::Busy { flag } => {
+                Self::new(StatusCode::TOO_MANY_REQUESTS, "meshes_full", detail).flag(Some(flag)).retry_after(1)
+            }
+        }
+    }
+}
+
 impl From<&Failure> for ApiError {
     fn from(failure: &Failure) -> Self {
         match failure {
@@ -137,7 +152,7 @@ impl From<&RenderError> for ApiError {
                 let detail = "the GPU of this server cannot draw this; ask for backend=auto or backend=cpu";
                 Self::new(StatusCode::UNPROCESSABLE_ENTITY, "backend_unavailable", detail)
             }
-            RenderError::Encode(_) => Self::internal(),
+            RenderError::Encode(_) | RenderError::Report(_) => Self::internal(),
         }
     }
 }

@@ -8,7 +8,8 @@ use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
 use super::app::App;
-use super::dto::{BackendDto, CapabilitiesDto, StatusDto, VersionDto};
+use super::capabilities::{BackendDto, CapabilitiesDto};
+use super::dto::{StatusDto, VersionDto};
 use super::error::ApiError;
 
 /// The process is alive.
@@ -30,11 +31,11 @@ pub async fn version() -> Response {
     fresh(Json(VersionDto::new()))
 }
 
-/// Formats, styles, keys, limits and load.
+/// Formats, styles, keys, paths, limits and load.
 pub async fn capabilities(State(app): State<Arc<App>>) -> Response {
     let rules = &app.rules;
     let backend = BackendDto::new(rules.backend, app.gpu.status());
-    fresh(Json(CapabilitiesDto::new(&rules.limits, backend, app.workers, app.jobs.load())))
+    fresh(Json(CapabilitiesDto::new(&rules.limits, backend, app.workers, app.jobs.load(), &app.meshes)))
 }
 
 fn fresh(body: impl IntoResponse) -> Response {

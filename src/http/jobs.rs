@@ -60,6 +60,8 @@ pub async fn result(State(app): State<Arc<App>>, id: JobPath) -> Result<Response
         JobState::Queued | JobState::Running => {
             Err(conflict("not_finished", "the job has not ended yet; ask again shortly").retry_after(1))
         }
+        // Who has a mesh inspected waits for it, and nobody else hears of that job.
+        JobState::Inspected(_) => Err(ApiError::internal()),
         JobState::Cancelled => Err(conflict("cancelled", "the job was cancelled, so it has no result")),
     }
 }

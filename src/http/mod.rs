@@ -1,7 +1,8 @@
 //! The daemon: HTTP in front of [`crate::jobs`].
 //!
-//! Reading order: [`app`] (what handlers share, and every path), [`render`], [`jobs`] and [`schema`] (the resources), [`receive`] (a
-//! request to work, in the order of refusals), [`body`], [`negotiate`], [`error`] (the only status map), [`observe`] and
+//! Reading order: [`app`] (what handlers share, and every path), [`render`], [`meshes`], [`pictures`], [`jobs`] and [`schema`] (the
+//! resources), [`receive`] (a request to work, in the order of refusals), [`query`], [`body`], [`upload`] (a body to what is
+//! stored), [`negotiate`], [`conditional`], [`error`] (the only status map), [`observe`] and
 //! [`lent`] (around every request), [`accept`] and [`io`] (connections).
 //!
 //! Architecture invariant: axum and hyper are used nowhere else.
@@ -10,17 +11,23 @@ mod accept;
 mod app;
 mod auth;
 mod body;
+mod capabilities;
+mod conditional;
 mod dto;
 mod error;
 mod health;
 mod io;
 mod jobs;
 mod lent;
+mod meshes;
 mod negotiate;
 mod observe;
+mod pictures;
+mod query;
 mod receive;
 mod render;
 mod schema;
+mod upload;
 
 use std::net::SocketAddr;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! `POST /v1/render`: a mesh in, a picture out.
+//! `POST /v1/render`: a mesh in, or the name of one, and a picture out.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use super::app::App;
 use super::dto::media_type;
 use super::error::ApiError;
 use super::{jobs, negotiate, receive};
-use crate::jobs::{Failure, Finished, Job, Jobs, State as JobState};
+use crate::jobs::{Failure, Finished, Job, Jobs, State as JobState, Work};
 
 /// Draws while the client waits.
 pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Response, ApiError> {
@@ -23,11 +23,18 @@ pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Respo
         response.headers_mut().insert("preference-applied", applied);
         return Ok(response);
     }
+    match done(&app, work).await? {
+        JobState::Done(finished) => Ok(picture(&finished)),
+        _ => Err(ApiError::internal()),
+    }
+}
+
+/// Has work done while the client waits.
+pub async fn done(app: &App, work: Work) -> Result<JobState, ApiError> {
     let waiting = Waiting { job: app.jobs.submit(work, false)?, jobs: app.jobs.clone() };
     match waiting.job.ended().await {
-        JobState::Done(finished) => Ok(picture(&finished)),
         JobState::Failed(failure) => Err(failed(&waiting.job, &failure)),
-        JobState::Queued | JobState::Running | JobState::Cancelled => Err(ApiError::internal()),
+        ended => Ok(ended),
     }
 }
 

@@ -8,6 +8,7 @@ use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 
 use super::app::App;
+use super::conditional;
 use super::render::digest;
 use crate::request::{self, Rules};
 
@@ -32,15 +33,12 @@ impl Schema {
 /// The schema, or 304 for who has it.
 pub async fn get(State(app): State<Arc<App>>, headers: HeaderMap) -> Response {
     let Schema { body, etag } = &app.schema;
-    let is_known = headers.get_all(header::IF_NONE_MATCH).iter().filter_map(|v| v.to_str().ok()).any(|line| {
-        line.split(',').map(|tag| tag.trim().trim_start_matches("W/")).any(|tag| tag == "*" || tag == etag)
-    });
     let of = [
-        (header::ETAG, HeaderValue::from_str(etag).unwrap_or_else(|_| HeaderValue::from_static("\"\""))),
+        conditional::etag(etag),
         // It changes with a restart of the server; asking again costs next to nothing.
         (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
     ];
-    if is_known {
+    if conditional::is_known(&headers, etag) {
         return (StatusCode::NOT_MODIFIED, of).into_response();
     }
     let media_type = [(header::CONTENT_TYPE, HeaderValue::from_static("application/schema+json"))];

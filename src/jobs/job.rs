@@ -44,13 +44,31 @@ pub struct Work {
     pub bundle: Bundle,
     /// Overrides sniffing.
     pub format_in: Option<Format>,
-    /// What to draw.
-    pub spec: Spec,
-    /// The memory that `bundle` was granted.
-    pub reservation: Reservation,
+    /// What to do with it.
+    pub task: Task,
+    /// The memory that `bundle` was granted. Shared where others hold the same bytes.
+    pub memory: Arc<Reservation>,
 }
 
-/// How far a job is. The last three are final.
+/// What is wanted of a mesh.
+#[derive(Clone, Debug)]
+pub enum Task {
+    /// A picture.
+    Draw(Box<Spec>),
+    /// A report on what is in it.
+    Inspect,
+}
+
+/// What a worker made.
+#[derive(Debug)]
+pub enum Product {
+    /// For [`Task::Draw`].
+    Picture(Output),
+    /// For [`Task::Inspect`]: JSON.
+    Report(String),
+}
+
+/// How far a job is. All but the first two are final.
 #[derive(Clone, Debug)]
 pub enum State {
     /// Waits for a worker.
@@ -59,6 +77,8 @@ pub enum State {
     Running,
     /// There is a picture.
     Done(Arc<Finished>),
+    /// There is a report: JSON; clones share it.
+    Inspected(Bytes),
     /// There is none, and never will be.
     Failed(Arc<Failure>),
     /// Whoever asked no longer wants it.
@@ -110,7 +130,7 @@ pub enum Failure {
 impl State {
     /// Whether nothing will change any more.
     pub fn is_final(&self) -> bool {
-        matches!(self, Self::Done(_) | Self::Failed(_) | Self::Cancelled)
+        !matches!(self, Self::Queued | Self::Running)
     }
 
     /// `queued`, `running`, `done`, `failed` or `cancelled`.
@@ -118,7 +138,7 @@ impl State {
         match self {
             Self::Queued => "queued",
             Self::Running => "running",
-            Self::Done(_) => "done",
+            Self::Done(_) | Self::Inspected(_) => "done",
             Self::Failed(_) => "failed",
             Self::Cancelled => "cancelled",
         }

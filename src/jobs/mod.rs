@@ -1,4 +1,4 @@
-//! Rendering as jobs: a bounded queue, worker threads that each own their renderers, and what became of every job.
+//! Rendering, and the inspection of what is to be stored, as jobs: a bounded queue, worker threads that each own their renderers, and what became of every job.
 //!
 //! Architecture invariants: a full queue is a typed refusal at once, never a wait. A job that was accepted is never
 //! dropped before it ended. A panic costs its job alone. Nothing here knows HTTP.
@@ -15,7 +15,7 @@ mod tests;
 mod worker;
 
 pub use bodies::{Bodies, BodiesFull, Reservation};
-pub use job::{Failure, Finished, Job, JobId, State, Timings, Work};
+pub use job::{Failure, Finished, Job, JobId, Product, State, Task, Timings, Work};
 pub use worker::{Engine, Renderer, pipeline_engine};
 
 use std::sync::{Arc, Mutex, PoisonError};

@@ -30,7 +30,8 @@ fn settings() -> Settings {
 fn work(bodies: &Arc<Bodies>, mesh: &'static [u8]) -> Work {
     let mut reservation = bodies.reserve();
     reservation.grow(mesh.len() as u64).unwrap();
-    Work { bundle: Bundle::of_one(Bytes::from_static(mesh)), format_in: None, spec: spec(), reservation }
+    let (bundle, task) = (Bundle::of_one(Bytes::from_static(mesh)), Task::Draw(Box::new(spec())));
+    Work { bundle, format_in: None, task, memory: Arc::new(reservation) }
 }
 
 /// What is drawn does not matter here.
@@ -106,7 +107,7 @@ fn bench(settings: Settings) -> Bench {
             ended(Stage::Parse);
             let output = act(work, deadline, &gate)?;
             ended(Stage::Encode);
-            Ok(output)
+            Ok(Product::Picture(output))
         })
     });
     Bench { jobs: Jobs::start(settings, engine).unwrap(), bodies: Bodies::new(1 << 20), open, renderers }

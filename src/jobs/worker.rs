@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::board::Board;
-use super::job::{Failure, Finished, Job, State, Timings, Work};
+use super::job::{Failure, Finished, Job, Product, State, Task, Timings, Work};
 use crate::backend::{Backends, GpuHost};
 use crate::limits::{Deadline, Limits};
-use crate::pipeline::{self, Output, RenderError, Stage};
+use crate::pipeline::{self, RenderError, Stage};
 
-/// What draws one job after the other on one thread.
-pub type Renderer = Box<dyn FnMut(&Work, &Deadline, &mut dyn FnMut(Stage)) -> Result<Output, RenderError>>;
+/// What does one job after the other on one thread.
+pub type Renderer = Box<dyn FnMut(&Work, &Deadline, &mut dyn FnMut(Stage)) -> Result<Product, RenderError>>;
 
 /// Makes a worker's renderer, on the worker's own thread: devices do not move between threads.
 pub type Engine = Arc<dyn Fn() -> Renderer + Send + Sync>;
@@ -22,8 +22,17 @@ pub fn pipeline_engine(gpu: Arc<GpuHost>, threads: usize, limits: Limits) -> Eng
         let mut backends = Backends::new(gpu.clone(), threads);
         let limits = limits.clone();
         Box::new(move |work, deadline, ended| {
-            let job = pipeline::Job { bundle: &work.bundle, format_in: work.format_in, spec: &work.spec };
-            pipeline::render(job, &mut backends, &limits, deadline, ended)
+            let Work { bundle, format_in, task, .. } = work;
+            match task {
+                Task::Draw(spec) => {
+                    let job = pipeline::Job { bundle, format_in: *format_in, spec };
+                    pipeline::render(job, &mut backends, &limits, deadline, ended).map(Product::Picture)
+                }
+                Task::Inspect => {
+                    let report = pipeline::inspect(bundle, *format_in, &limits, deadline, ended)?;
+                    Ok(Product::Report(report.json()?))
+                }
+            }
         })
     })
 }
@@ -60,7 +69,8 @@ fn draw(renderer: &mut Renderer, job: &Job, work: &Work, started: Instant) -> St
         stage_began = now;
     });
     match result {
-        Ok(output) => State::Done(Arc::new(Finished::new(output, timings))),
+        Ok(Product::Picture(output)) => State::Done(Arc::new(Finished::new(output, timings))),
+        Ok(Product::Report(json)) => State::Inspected(json.into()),
         Err(error) => State::Failed(Arc::new(Failure::Render(error))),
     }
 }

@@ -58,6 +58,16 @@ impl Bundle {
         &self.files
     }
 
+    /// Whether it is an archive that is still closed.
+    pub fn is_zip(&self) -> bool {
+        self.is_zip
+    }
+
+    /// Its files, for who makes another bundle of them.
+    pub fn into_files(self) -> Vec<BundleFile> {
+        self.files
+    }
+
     /// The size of all of it.
     pub fn bytes_len(&self) -> u64 {
         self.files.iter().map(|file| file.bytes.len() as u64).sum()

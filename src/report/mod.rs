@@ -111,6 +111,11 @@ impl Report {
         Ok(Self::new(mesh, file_bytes, topology))
     }
 
+    /// As `inspect --json` prints it and HTTP answers with it, to the byte.
+    pub fn json(&self) -> Result<String, serde_json::Error> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+
     /// For a person to read: a line for each thing that there is.
     pub fn text(&self) -> String {
         text::text(self)

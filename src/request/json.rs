@@ -9,7 +9,7 @@ use super::unique::{Fault, parse};
 use super::value::Given;
 
 /// Longest document: a thousand times what anybody writes by hand, and small when parsed.
-const DOCUMENT_BYTES_MAX: usize = 1 << 20;
+pub const DOCUMENT_BYTES_MAX: usize = 1 << 20;
 
 /// Parses a document and flattens its objects, in document order of the sorted keys.
 pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestError> {

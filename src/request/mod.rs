@@ -11,6 +11,7 @@ mod fields;
 mod item;
 mod json;
 mod look;
+mod reference;
 mod schema;
 mod suggest;
 mod table;
@@ -25,6 +26,7 @@ mod value;
 mod words;
 
 pub use error::{RequestError, RequestFault};
+pub use reference::{bad_mesh_name, names_mesh};
 pub use schema::schema;
 pub use words::{Style, Words, word_for, words_of};
 
@@ -64,10 +66,29 @@ pub type Overrides = [(String, String)];
 
 /// Reads a document and the dotted keys that override it, in order.
 pub fn read(document: Option<&[u8]>, overrides: &Overrides, rules: &Rules) -> Result<Spec, RequestError> {
-    let mut items = match document {
+    let items = match document {
         Some(bytes) => json::flatten(bytes, rules.limits.json_depth)?,
         None => Vec::new(),
     };
+    read_items(items, overrides, rules)
+}
+
+/// Reads a document that also names its mesh, as [`names_mesh`] says, and the dotted keys that override it. The mesh's name is
+/// as it was given.
+pub fn read_with_mesh(document: &[u8], overrides: &Overrides, rules: &Rules) -> Result<(String, Spec), RequestError> {
+    let mut items = json::flatten(document, rules.limits.json_depth)?;
+    let at = items.iter().position(|item| item.material.is_none() && item.key == reference::KEY);
+    let mesh = match at.map(|at| items.remove(at).given) {
+        Some(Given::Json(serde_json::Value::String(name))) => name,
+        other => {
+            let given = other.map_or_else(|| "not there".to_owned(), |given| given.show());
+            return Err(RequestError::new(RequestFault::WrongType, reference::KEY, given, reference::ALLOWED));
+        }
+    };
+    Ok((mesh, read_items(items, overrides, rules)?))
+}
+
+fn read_items(mut items: Vec<Item>, overrides: &Overrides, rules: &Rules) -> Result<Spec, RequestError> {
     items.extend(overrides.iter().map(|(key, text)| Item::dotted(key, text)));
     let (of_materials, mut items): (Vec<Item>, Vec<Item>) = items.into_iter().partition(|i| i.material.is_some());
 

@@ -61,6 +61,10 @@ mod loose;
 #[path = "../bench/accuracy/measure/mod.rs"]
 mod measure;
 mod mesh_files;
+mod meshes;
+mod meshes_bad;
+mod meshes_pictures;
+mod meshes_room;
 mod models;
 mod mutations;
 #[path = "../oracle/mod.rs"]

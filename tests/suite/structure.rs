@@ -13,12 +13,14 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("plan", &["scene", "mesh", "image", "limits"]),
     ("backend", &["plan", "image", "limits"]),
     ("encode", &["image"]),
-    ("pipeline", &["encode", "backend", "plan", "scene", "mesh", "image", "limits"]),
+    ("pipeline", &["report", "encode", "backend", "plan", "scene", "mesh", "image", "limits"]),
     ("request", &["scene", "mesh", "image", "limits"]),
     ("jobs", &["pipeline", "backend", "scene", "mesh", "encode", "image", "limits"]),
+    ("store", &["jobs", "mesh", "limits"]),
     (
         "http",
         &[
+            "store",
             "jobs",
             "pipeline",
             "report",
@@ -58,6 +60,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
 const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("wgpu::", &["backend/gpu/"]),
     ("axum::", &["http/"]),
+    ("sha2::", &["store/"]),
     ("clap::", &["cli", "main.rs", "config"]),
     ("tokio::", &["http/", "jobs/", "main.rs", "cli", "telemetry"]),
     ("std::fs", &["cli", "config", "main.rs", "http/"]),

@@ -1,0 +1,146 @@
+//! `/v1/meshes`: meshes that stay, so that each is sent once.
+//!
+//! A stored mesh is its bytes. How they are read (`format_in`, `entry`) is said wherever they are, so that every address with
+//! its query means the same for ever.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::body::{Body, Bytes};
+use axum::extract::rejection::PathRejection;
+use axum::extract::{Path, Request, State};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+
+use super::app::App;
+use super::body;
+use super::conditional::{self, day, etag};
+use super::dto::MeshDto;
+use super::error::ApiError;
+use super::query::Query;
+use super::upload::{self, Named};
+use super::{receive, render};
+use crate::jobs::{Reservation, State as JobState, Task, Work};
+use crate::mesh::Bundle;
+use crate::store::{Digest, NewMesh, Reading, StoredMesh};
+
+/// What the path says in place of a digest; not even text, perhaps.
+pub type MeshPath = Result<Path<String>, PathRejection>;
+
+/// Stores a mesh under its digest.
+pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Response, ApiError> {
+    store(&app, request, None).await
+}
+
+/// Stores a mesh whose digest the client has worked out.
+pub async fn put(State(app): State<Arc<App>>, id: MeshPath, request: Request) -> Result<Response, ApiError> {
+    let digest = id.ok().and_then(|Path(id)| Digest::parse(&id)).ok_or_else(|| {
+        let detail = "the path does not end in a SHA-256, which is 64 lower-case hexadecimal digits";
+        ApiError::new(StatusCode::BAD_REQUEST, "bad_digest", detail)
+    })?;
+    store(&app, request, Some(digest)).await
+}
+
+/// The report on a mesh. HEAD only asks whether it is there.
+pub async fn get(
+    State(app): State<Arc<App>>,
+    id: MeshPath,
+    method: Method,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    let reading = Query::reading(&uri)?;
+    let stored = find(&app, id.ok().map(|Path(id)| id).as_deref())?;
+    let tag = tag(stored.mesh.digest, &reading);
+    let cached = [etag(&tag), day(!app.api_keys.is_empty())];
+    if conditional::is_known(&headers, &tag) {
+        return Ok((StatusCode::NOT_MODIFIED, cached).into_response());
+    }
+    let body = if stored.mesh.reading == reading {
+        Body::from(stored.mesh.report.clone())
+    } else if method == Method::HEAD {
+        unmade()
+    } else {
+        Body::from(inspect(&app, stored.mesh.bundle.clone(), reading, stored.memory.clone()).await?)
+    };
+    let media_type = [(header::CONTENT_TYPE, HeaderValue::from_static("application/json"))];
+    Ok((cached, media_type, body).into_response())
+}
+
+/// Forgets a mesh. Who draws it can go on.
+pub async fn delete(State(app): State<Arc<App>>, id: MeshPath) -> Result<Response, ApiError> {
+    let digest = id.ok().and_then(|Path(id)| Digest::parse(&id));
+    match digest.is_some_and(|digest| app.meshes.remove(digest)) {
+        true => Ok(StatusCode::NO_CONTENT.into_response()),
+        false => Err(unknown()),
+    }
+}
+
+/// The stored mesh of this name.
+pub fn find(app: &App, name: Option<&str>) -> Result<Arc<StoredMesh>, ApiError> {
+    name.and_then(Digest::parse).and_then(|digest| app.meshes.find(digest)).ok_or_else(unknown)
+}
+
+/// What a worker does with a stored mesh.
+pub fn work(stored: &StoredMesh, reading: Reading, task: Task) -> Work {
+    let Reading { format_in, entry } = reading;
+    let bundle = stored.mesh.bundle.clone().with_entry(entry);
+    Work { bundle, format_in, task, memory: stored.memory.clone() }
+}
+
+/// The body of an answer to HEAD where what GET would send has not been made: its length is not known.
+pub fn unmade() -> Body {
+    Body::from_stream(futures_util::stream::empty::<Result<Bytes, std::convert::Infallible>>())
+}
+
+async fn store(app: &Arc<App>, request: Request, wanted: Option<Digest>) -> Result<Response, ApiError> {
+    let reading = Query::reading(request.uri())?;
+    body::check_header(request.headers(), app.rules.limits.body_bytes)?;
+    if let Some(length) = body::length(request.headers()).filter(|_| !body::is_multipart(request.headers())) {
+        app.meshes.check_size(length)?;
+    }
+    app.jobs.would_accept()?;
+    let Named { digest, bundle, memory } = upload::name(receive::body(app, request).await?).await?;
+    if let Some(wanted) = wanted.filter(|wanted| *wanted != digest) {
+        let detail = format!("the path says {wanted}, and the SHA-256 of what was sent is {digest}");
+        return Err(ApiError::new(StatusCode::UNPROCESSABLE_ENTITY, "digest_mismatch", detail));
+    }
+    app.meshes.check_size(bundle.bytes_len())?;
+    let body = MeshDto::new(digest, &bundle);
+    // What was once read like this need not be read again.
+    let is_known = app.meshes.find(digest).is_some_and(|stored| stored.mesh.reading == reading);
+    let is_new = !is_known && {
+        let report = inspect(app, bundle.clone(), reading.clone(), memory.clone()).await?;
+        app.meshes.insert(NewMesh { digest, bundle, reading, report })?
+    };
+    let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
+    let location = HeaderValue::from_str(&body.url).unwrap_or_else(|_| HeaderValue::from_static("/v1/meshes"));
+    let no_store = HeaderValue::from_static("no-store");
+    let headers =
+        [etag(&tag(digest, &Reading::default())), (header::LOCATION, location), (header::CACHE_CONTROL, no_store)];
+    Ok((status, headers, Json(body)).into_response())
+}
+
+/// Has a worker say what is in a bundle; that it is a mesh, in the first place.
+async fn inspect(app: &App, bundle: Bundle, reading: Reading, memory: Arc<Reservation>) -> Result<Bytes, ApiError> {
+    let Reading { format_in, entry } = reading;
+    let work = Work { bundle: bundle.with_entry(entry), format_in, task: Task::Inspect, memory };
+    match render::done(app, work).await? {
+        JobState::Inspected(report) => Ok(report),
+        _ => Err(ApiError::internal()),
+    }
+}
+
+/// The mesh's name; where it is read in a way of its own, that too.
+fn tag(digest: Digest, reading: &Reading) -> String {
+    if *reading == Reading::default() {
+        return format!("\"{digest}\"");
+    }
+    format!("\"{}\"", Digest::of(format!("{digest} {reading:?}").as_bytes()))
+}
+
+fn unknown() -> ApiError {
+    let detail =
+        "no mesh of this name is stored: it never was, or was deleted, or made room for others; send it to /v1/meshes";
+    ApiError::new(StatusCode::NOT_FOUND, "mesh_unknown", detail)
+}

@@ -1,0 +1,85 @@
+//! `/v1/meshes/{sha256}/render.{png|webp|jpg}`: pictures of stored meshes, for caches and `<img>`.
+
+use std::sync::Arc;
+
+use axum::extract::rejection::PathRejection;
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+
+use super::app::App;
+use super::conditional::{self, day, etag};
+use super::dto::media_type;
+use super::error::ApiError;
+use super::query::Query;
+use super::{meshes, render};
+use crate::image::ImageFormat;
+use crate::jobs::{State as JobState, Task};
+use crate::limits::BackendChoice;
+use crate::request;
+use crate::scene::Spec;
+use crate::store::{Digest, Reading};
+
+/// Draws a stored mesh, unless the client has the picture. HEAD draws nothing.
+pub async fn get(
+    State(app): State<Arc<App>>,
+    path: Result<Path<(String, String)>, PathRejection>,
+    method: Method,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    let path = path.ok().map(|Path(path)| path);
+    let format = path.as_ref().and_then(|(_, name)| format_of(name)).ok_or_else(|| {
+        ApiError::not_found("pictures of a stored mesh are called render.png, render.webp and render.jpg")
+    })?;
+    let Query { reading, overrides } = Query::read(&uri)?;
+    let mut spec = request::read(None, &overrides, &app.rules)?;
+    request::set_format(&mut spec, format);
+
+    let stored = meshes::find(&app, path.as_ref().map(|(id, _)| id.as_str()))?;
+    let tag = tag(&app, stored.mesh.digest, &reading, &spec);
+    let cached = [etag(&tag), day(!app.api_keys.is_empty())];
+    if conditional::is_known(&headers, &tag) {
+        return Ok((StatusCode::NOT_MODIFIED, cached).into_response());
+    }
+    let mut response = if method == Method::HEAD {
+        let media_type = HeaderValue::from_static(media_type(format));
+        ([(header::CONTENT_TYPE, media_type)], meshes::unmade()).into_response()
+    } else {
+        match render::done(&app, meshes::work(&stored, reading, Task::Draw(Box::new(spec)))).await? {
+            JobState::Done(finished) => render::picture(&finished),
+            _ => return Err(ApiError::internal()),
+        }
+    };
+    // In place of the picture's own tag, which nobody can know beforehand.
+    for (name, value) in cached {
+        response.headers_mut().insert(name, value);
+    }
+    Ok(response)
+}
+
+fn format_of(name: &str) -> Option<ImageFormat> {
+    match name.strip_prefix("render.")? {
+        "png" => Some(ImageFormat::Png),
+        "webp" => Some(ImageFormat::Webp),
+        "jpg" | "jpeg" => Some(ImageFormat::Jpeg),
+        _ => None,
+    }
+}
+
+/// The render key: everything that decides the picture, hashed, so that it is known before anything is drawn. Requests that
+/// come to the same, whatever order or short names they use, have the same key.
+///
+/// The CPU's bytes are the same on every machine, so its tag is a strong one. Two GPUs, or a GPU and the CPU that steps in for
+/// it, may differ in the last place: where one may draw, the tag is weak.
+fn tag(app: &App, digest: Digest, reading: &Reading, spec: &Spec) -> String {
+    let may_be_gpu = match spec.backend {
+        BackendChoice::Cpu => false,
+        BackendChoice::Auto => app.gpu.may_have_hardware(),
+        BackendChoice::Gpu => true,
+    };
+    // Debug writes every field, numbers so that they come back the same, and text in quotes: different specs differ here.
+    let key = format!("{} {digest} {reading:?} {spec:?} {may_be_gpu}", env!("CARGO_PKG_VERSION"));
+    let weak = if may_be_gpu { "W/" } else { "" };
+    format!("{weak}\"{}\"", Digest::of(key.as_bytes()))
+}
