@@ -111,6 +111,11 @@ impl CornerSet {
 
     /// Forgets them all, for a part that shares nothing with those before it.
     pub fn clear(&mut self) {
-        self.numbers.clear();
+        // Emptying takes as long as the table is large: after a large part, many small ones must not each pay for it.
+        if self.numbers.len() < self.numbers.capacity() / 16 {
+            self.numbers = RapidHashMap::default();
+        } else {
+            self.numbers.clear();
+        }
     }
 }

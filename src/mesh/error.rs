@@ -1,6 +1,10 @@
 //! Why bytes could not become a mesh.
 
+use super::text;
 use crate::limits::{LimitExceeded, Stopped};
+
+/// Longest detail of an error or a warning, characters. Whatever a file repeats in a sentence about it has ended long before.
+pub const DETAIL_CHARS_MAX: usize = 1000;
 
 /// An import that failed. It is always the input's fault; the detail is safe to show to a client.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -38,18 +42,21 @@ pub enum MeshFault {
 impl MeshError {
     /// The file is of the format but its content is broken.
     pub fn broken(detail: impl Into<String>) -> Self {
-        Self { fault: MeshFault::Broken, detail: detail.into() }
+        Self::new(MeshFault::Broken, detail)
     }
 
     /// An error of the given kind.
     pub fn new(fault: MeshFault, detail: impl Into<String>) -> Self {
-        Self { fault, detail: detail.into() }
+        let detail: String = detail.into();
+        // Most are short, and need no copy.
+        let detail = if detail.len() > DETAIL_CHARS_MAX { text::cut(detail, DETAIL_CHARS_MAX) } else { detail };
+        Self { fault, detail }
     }
 }
 
 impl From<LimitExceeded> for MeshError {
     fn from(limit: LimitExceeded) -> Self {
-        Self { detail: limit.to_string(), fault: MeshFault::Limit(limit) }
+        Self::new(MeshFault::Limit(limit.clone()), limit.to_string())
     }
 }
 

@@ -1,10 +1,12 @@
 //! Opens a bundle, finds its mesh, sniffs the format from the bytes and calls its importer.
 
 use super::bundle::Bundle;
+use super::error::DETAIL_CHARS_MAX;
 use super::normalise::normalise;
 use super::raw::RawMesh;
 use super::{
-    Folder, ImportReport, Mesh, MeshError, MeshFault, Warning, entry, fbx, gltf, obj, off, ply, stl, three_mf, unzip,
+    Folder, ImportReport, Mesh, MeshError, MeshFault, Warning, entry, fbx, gltf, obj, off, ply, stl, text, three_mf,
+    unzip,
 };
 use crate::limits::{Budget, Deadline, Limits};
 
@@ -157,6 +159,10 @@ fn open<T>(
     if options.time_s.is_some() && !matches!(format, Format::Gltf | Format::Glb) {
         let detail = format!("scene.time_s is given, and {format} files have no animation");
         raw.report.warnings.push(Warning { code: "animation_missing", detail });
+    }
+    // As with errors: what a file repeats here has ended long before.
+    for warning in raw.report.warnings.iter_mut().filter(|warning| warning.detail.len() > DETAIL_CHARS_MAX) {
+        warning.detail = text::cut(&warning.detail, DETAIL_CHARS_MAX);
     }
     finish(raw, &mut cx)
 }

@@ -62,11 +62,15 @@ impl Triangulator {
         self.load(corners, positions);
         let n = self.ring.len();
         let is_flat = n < 3 || !project(&mut self.ring, positions);
-        if is_flat {
+        if is_flat && n > 3 && !self.is_on_a_line(positions) {
+            // What crosses itself so that its parts cancel out.
+            self.fan(emit);
+        } else if is_flat {
             emit([corners[0], corners[1], corners[2]], ALL_EDGES);
         } else if n == 4 && self.is_convex() {
             self.split_quad(positions, emit);
         } else if n > CORNERS_MAX {
+            self.fanned += 1;
             self.fan(emit);
         } else {
             self.clip_ears(emit);
@@ -120,8 +124,21 @@ impl Triangulator {
         }
     }
 
-    fn fan(&mut self, emit: &mut impl FnMut([u32; 3], u8)) {
-        self.fanned += 1;
+    /// Whether all corners lie on one line, of which there are two different ones at least.
+    fn is_on_a_line(&self, positions: &[[f64; 3]]) -> bool {
+        let at = |corner: &Corner| positions[corner.vertex as usize];
+        let origin = at(&self.ring[0]);
+        let offset = |corner: &Corner| std::array::from_fn::<f64, 3, _>(|k| at(corner)[k] - origin[k]);
+        let extent = self.ring.iter().map(|corner| max_abs(&offset(corner))).fold(0.0, f64::max);
+        let unit = Pow2::new(-exponent(extent));
+        let a = unit.of3(offset(&self.ring[1]));
+        self.ring[2..].iter().all(|corner| {
+            let b = unit.of3(offset(corner));
+            (0..3).all(|k| a[k] * b[(k + 1) % 3] == a[(k + 1) % 3] * b[k])
+        })
+    }
+
+    fn fan(&self, emit: &mut impl FnMut([u32; 3], u8)) {
         let mut i = self.ring[0].next;
         let start = self.ring[0].prev;
         let mut mask = 0b011;

@@ -1,8 +1,61 @@
-//! Text that is not UTF-8: UTF-16 with a byte order mark, in either order.
+//! Text out of files: in UTF-16 with a byte order mark, in either order, and cut to a length before it is kept or shown.
 
 use super::MeshError;
 use super::import::Context;
 use std::borrow::Cow;
+use std::fmt::{Display, Write};
+
+/// Longest name that is kept of what a file names, characters.
+const NAME_CHARS_MAX: usize = 200;
+/// Longest that is told of an error of another library: some repeat whole strings of the file.
+const FOREIGN_CHARS_MAX: usize = 200;
+
+/// A name as it is kept.
+pub fn name(name: &str) -> String {
+    cut(name, NAME_CHARS_MAX)
+}
+
+/// The error of another library as it is shown.
+pub fn foreign(error: impl Display) -> String {
+    cut(error, FOREIGN_CHARS_MAX)
+}
+
+/// The first characters of a text; the rest is not even written.
+pub fn cut(text: impl Display, chars_max: usize) -> String {
+    struct Cut {
+        text: String,
+        left: usize,
+    }
+    impl Write for Cut {
+        fn write_str(&mut self, more: &str) -> std::fmt::Result {
+            for c in more.chars() {
+                self.left = self.left.checked_sub(1).ok_or(std::fmt::Error)?;
+                self.text.push(c);
+            }
+            Ok(())
+        }
+    }
+    let mut cut = Cut { text: String::new(), left: chars_max };
+    // An error says that the text is longer, and that is what this is for.
+    let _ = write!(cut, "{text}");
+    cut.text
+}
+
+/// Whether a word is what C libraries print for what is no number: `1.#IND` (Microsoft's, and its infinity is none of use
+/// either), `-nan(ind)`.
+pub fn is_c_nan(word: &[u8]) -> bool {
+    let word = word.strip_prefix(b"-").or(word.strip_prefix(b"+")).unwrap_or(word);
+    let is_hashed = word.first().is_some_and(u8::is_ascii_digit) && word[1..].starts_with(b".#");
+    is_hashed || word.get(..4).is_some_and(|head| head.eq_ignore_ascii_case(b"nan("))
+}
+
+/// A word up to where a comment begins in it, which is not where a number says that it is none.
+pub fn before_comment(word: &[u8]) -> &[u8] {
+    match word.iter().position(|b| *b == b'#') {
+        Some(at) if !is_c_nan(word) => &word[..at],
+        _ => word,
+    }
+}
 
 /// Whether the bytes begin with a mark of UTF-16.
 pub fn is_utf16(bytes: &[u8]) -> bool {
@@ -40,6 +93,25 @@ fn decode(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn comments_end_words_and_nan_begins_none() {
+        for nan in [&b"1.#IND"[..], b"-1.#QNAN", b"1.#INF000", b"nan(ind)", b"-NaN(snan)"] {
+            assert!(is_c_nan(nan) && before_comment(nan) == nan, "{nan:?}");
+        }
+        for word in [&b"1"[..], b"", b"-", b"#", b"1#", b"1.5#c", b"3#1.#IND", b"nan", b"(1)", b"x.#"] {
+            assert!(!is_c_nan(word), "{word:?}");
+        }
+        assert_eq!([before_comment(b"3#c"), before_comment(b"#"), before_comment(b"3")], [&b"3"[..], b"", b"3"]);
+    }
+
+    #[test]
+    fn texts_are_cut_at_characters() {
+        assert_eq!(cut("äöü", 2), "äö");
+        assert_eq!(cut("äöü", 3), "äöü");
+        assert_eq!(cut(format_args!("{}{}", "ab", "cd"), 3), "abc");
+        assert_eq!((name(&"x".repeat(5000)).len(), foreign("y".repeat(5000)).len()), (200, 200));
+    }
 
     #[test]
     fn both_orders_are_read() {

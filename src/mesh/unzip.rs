@@ -2,7 +2,7 @@
 //! walked entry by entry, entries must not share bytes, and what comes out is counted as it does.
 
 use super::bundle::{BundleFile, show};
-use super::{MeshError, MeshFault};
+use super::{MeshError, MeshFault, text};
 use crate::limits::{self, Budget, Deadline, Limits};
 use bytes::Bytes;
 use std::io::{Cursor, Read as _};
@@ -71,7 +71,9 @@ fn wanted(entry: &ZipFileEntry<'_>) -> Result<Option<BundleFile>, MeshError> {
     if entry.is_dir() {
         return Ok(None);
     }
-    let name = entry.name().map_err(|error| broken(format!("a file name in the zip archive is no text: {error}")))?;
+    let name = entry
+        .name()
+        .map_err(|error| broken(format!("a file name in the zip archive is no text: {}", text::foreign(error))))?;
     let refuse = |why: &str| Err(broken(format!("the entry \"{}\" of the zip archive {why}", show(&name))));
     let file =
         BundleFile::new(&name, Bytes::new()).map_err(|e| broken(format!("a zip archive that is refused: {e}")))?;
@@ -148,7 +150,7 @@ fn inflate(archive: &Bytes, entry: ZipFileEntry<'_>, deadline: &Deadline) -> Res
 }
 
 fn unreadable(error: ZipError) -> MeshError {
-    broken(format!("the zip archive cannot be read: {error}"))
+    broken(format!("the zip archive cannot be read: {}", text::foreign(error)))
 }
 
 fn broken(detail: String) -> MeshError {

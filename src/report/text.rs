@@ -14,7 +14,7 @@ pub fn text(report: &Report) -> String {
         // Writing to a string cannot fail.
         let _ = value.map(|value| writeln!(out, "{name:<12} {value}"));
     };
-    let point = |p: [f64; 3]| format!("{} {} {}", p[0], p[1], p[2]);
+    let point = |p: [f64; 3]| p.map(plain).join(" ");
     line("format", Some(format!("{} ({} bytes)", report.format, report.file_bytes)));
     line("generator", report.generator.clone());
     line("scene", scene(report));
@@ -22,7 +22,8 @@ pub fn text(report: &Report) -> String {
     line("triangles", Some(report.triangles.to_string()));
     let arity = |a: &Arity| format!("{} x {}{}", a.count, a.corners, if a.corners == 12 { "+" } else { "" });
     let arities: Vec<String> = report.polygons_by_arity.iter().map(arity).collect();
-    line("polygons", Some(format!("{} ({} corners)", report.polygons, arities.join(", "))));
+    let arities = if arities.is_empty() { String::new() } else { format!(" ({} corners)", arities.join(", ")) };
+    line("polygons", Some(format!("{}{arities}", report.polygons)));
     line("beside", beside(report));
     let attributes = [(report.has_normals, "normals"), (report.has_uvs, "UVs"), (report.has_colors, "colours")];
     let attributes: Vec<&str> = attributes.into_iter().filter_map(|(has, name)| has.then_some(name)).collect();
@@ -77,7 +78,7 @@ fn camera(camera: &CameraReport) -> String {
     let name = if camera.name.is_empty() { "(unnamed)".to_owned() } else { printable(&camera.name) };
     match (camera.fov_deg, camera.height) {
         (Some(fov_deg), _) => format!("{name} ({}, {fov_deg:.1} degrees)", camera.projection),
-        (None, Some(height)) => format!("{name} ({}, height {height})", camera.projection),
+        (None, Some(height)) => format!("{name} ({}, height {})", camera.projection, plain(height)),
         (None, None) => format!("{name} ({})", camera.projection),
     }
 }
@@ -89,11 +90,17 @@ fn extensions(report: &Report) -> Option<String> {
 }
 
 fn measures(report: &Report) -> Option<String> {
-    let area = report.area.map(|area| format!("area {}", short(area)));
+    let area = report.area.map(|area| format!("area {}", plain(short(area))));
     let volume = report
         .volume
-        .map(|volume| format!("volume {}{}", short(volume), if volume < 0.0 { " (inside out)" } else { "" }));
+        .map(|volume| format!("volume {}{}", plain(short(volume)), if volume < 0.0 { " (inside out)" } else { "" }));
     said(area.into_iter().chain(volume))
+}
+
+/// As it is, unless that were hundreds of digits.
+fn plain(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 || (1e-9..1e16).contains(&size) { value.to_string() } else { format!("{value:e}") }
 }
 
 /// Seven digits: positions are kept in 24 bits.
@@ -101,7 +108,7 @@ fn short(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }
 
-/// Which faces are not drawn, and why.
+/// What is not drawn, and why.
 fn dropped(report: &Report) -> Option<String> {
     let reasons = [
         (report.dropped_nonfinite_faces, "with NaN or infinite corners"),
@@ -109,7 +116,9 @@ fn dropped(report: &Report) -> Option<String> {
         (report.dropped_collapsed_faces, "too small beside the whole mesh"),
     ];
     let met = reasons.into_iter().filter(|(count, _)| *count > 0);
-    said(met.map(|(count, why)| format!("{} {why}", counted(count, "face", "faces"))))
+    let faces = met.map(|(count, why)| format!("{} {why}", counted(count, "face", "faces")));
+    let loose = Some(report.dropped_loose).filter(|count| *count > 0);
+    said(faces.chain(loose.map(|count| counted(count, "line or point", "lines and points"))))
 }
 
 fn said(parts: impl Iterator<Item = String>) -> Option<String> {
@@ -128,4 +137,25 @@ fn list<T>(all: &[T], name: impl Fn(&T) -> String) -> String {
 /// A name from the file may hold what moves a terminal's cursor.
 fn printable(name: &str) -> String {
     name.chars().take(200).map(|c| if c.is_control() { '\u{FFFD}' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_never_hundreds_of_digits() {
+        let cases = [
+            (0.0, "0"),
+            (-2.5, "-2.5"),
+            (1e15, "1000000000000000"),
+            (1e300, "1e300"),
+            (-1.25e-200, "-1.25e-200"),
+            (f64::MAX, "1.7976931348623157e308"),
+        ];
+        for (value, expected) in cases {
+            assert_eq!(plain(value), expected);
+        }
+        assert_eq!(cases.len(), 6);
+    }
 }

@@ -155,6 +155,46 @@ fn materials_and_colours_are_read() {
     assert_eq!(codes(&mesh), ["properties_ignored"]);
 }
 
+const SLICE: &str = "http://schemas.microsoft.com/3dmanufacturing/slice/2015/07";
+const BEAMS: &str = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02";
+
+#[test]
+fn elements_of_other_namespaces_are_passed_over() {
+    let plain = read_model(&cube_model(ITEM)).unwrap();
+    let with = |declared: &str, before: &str| {
+        let text = cube_model(ITEM).replace("<resources>", &format!("<resources>{before}"));
+        text.replacen("<model ", &format!("<model {declared} "), 1)
+    };
+    let slices = "<s:slicestack id=\"9\"><s:slice><s:vertices><s:vertex x=\"1\" y=\"2\"/></s:vertices><s:object/></s:slice></s:slicestack>";
+    let own = format!("<slicestack xmlns=\"{SLICE}\"><vertex x=\"1\"/><object/></slicestack><!-- and back -->");
+    let lattice =
+        "</triangles><b:beamlattice radius=\"1\"><b:beams><b:beam v1=\"0\" v2=\"1\"/></b:beams></b:beamlattice>";
+    let spaces = format!("xmlns:s=\"{SLICE}\" xmlns:b=\"{BEAMS}\"");
+    let cases = [
+        (with(&spaces, slices), vec![]),
+        (with("", &own), vec![]),
+        (with(&spaces, "<s:colorgroup id=\"6\"><s:color color=\"no colour\"/></s:colorgroup>"), vec![]),
+        (with(&spaces, "").replace("</triangles>", lattice), vec!["beams_ignored"]),
+        (with("requiredextensions=\" p m\" recommendedextensions=\"s\"", ""), vec![]),
+    ];
+    for (text, expected) in &cases {
+        let mesh = read_model(text).unwrap_or_else(|error| panic!("{error}: {text}"));
+        assert_same_shape(&plain, &mesh, text);
+        assert_eq!(&codes(&mesh), expected, "{text}");
+    }
+    assert_eq!(cases.len(), 5);
+    for (required, part) in [("b", BEAMS), ("p s", SLICE), ("unknown", "\"unknown\"")] {
+        let error = read_model(&with(&format!("{spaces} requiredextensions=\"{required}\""), "")).unwrap_err();
+        assert_eq!(error.fault, MeshFault::Unsupported);
+        assert!(error.detail.contains(part) && !error.detail.contains("production"), "{error}");
+    }
+    let many: String = (0..70).map(|i| format!("xmlns:a{i}=\"x\" ")).collect();
+    assert!(read_model(&with(&many, "")).unwrap_err().detail.contains("too many declarations"));
+    // Of a kind whose names it uses itself, and its own by another name.
+    let foreign = cube_model(ITEM).replacen("core/2015/02", "other", 1);
+    assert!(read_model(&foreign).unwrap_err().detail.contains("begins with <model>"));
+}
+
 #[test]
 fn what_is_broken_is_told() {
     let good = cube_model(ITEM);
@@ -211,18 +251,22 @@ fn what_doubles_and_deepens_is_counted_first() {
         }
         model(&resources, &format!("<item objectid=\"{levels}\"/>"))
     };
+    let rising: String = (1..=400).map(|i| format!("<item objectid=\"{}\"/>", i * 50)).collect();
     let cases = [
         (chain(50, 2, &cube), "--limit-triangles"),
         (chain(50, 2, "<mesh><vertices/><triangles/></mesh>"), "--limit-nodes"),
         (chain(100, 1, &cube), "64 deep"),
+        // Each a little deeper than one that is known by then, and the last too deep for any stack.
+        (chain(20_000, 1, &cube).replace("<item objectid=\"20000\"/>", &rising), "64 deep"),
+        (chain(66, 1, &cube).replace("<item", "<item objectid=\"65\"/><item"), "64 deep"),
         (format!("<model>{}", "<a>".repeat(100_000)), "64 deep"),
     ];
     for (text, part) in &cases {
         let error = read_model(text).unwrap_err();
         assert!(error.detail.contains(part), "{error}");
     }
-    assert_eq!(cases.len(), 4);
-    assert_eq!(read_model(&chain(60, 1, &cube)).unwrap().triangles.len(), 12);
+    assert_eq!(cases.len(), 6);
+    assert_eq!(read_model(&chain(65, 1, &cube)).unwrap().triangles.len(), 12);
     let bytes = package(cube_model(ITEM).as_bytes());
     for limits in [Limits { triangles: 11, ..Limits::default() }, Limits { memory_bytes: 1000, ..Limits::default() }] {
         assert!(matches!(read_limited(&bytes, None, &limits).unwrap_err().fault, MeshFault::Limit(_)));

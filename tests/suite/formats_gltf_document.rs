@@ -101,3 +101,26 @@ fn scenes_may_be_left_out() {
     gltf.json["scenes"] = json!([{}]);
     assert_eq!(read(&gltf.glb()).unwrap_err().fault, MeshFault::Empty);
 }
+
+/// Some readers pass over a text without a look at it, and others do not: then lists were empty that are not.
+#[test]
+fn bytes_that_are_no_text_are_named_wherever_they_are() {
+    let mut gltf = Solid::cuboid().triangulated(&[[0, 2, 3]]).gltf();
+    gltf.json["materials"] = json!([{ "name": "Gr?n" }]);
+    gltf.json["meshes"][0]["primitives"][0]["material"] = 0.into();
+    gltf.json["animations"] = json!([{ "name": "g?n" }]);
+    gltf.json["extras"] = json!("x?y");
+    let text = gltf.gltf();
+    assert_eq!(read(text.as_bytes()).unwrap().materials[0].name, "Gr?n");
+    let mut cases = 0;
+    for (at, _) in text.match_indices('?') {
+        let mut bytes = text.clone().into_bytes();
+        bytes[at] = 0xFC;
+        let error = read(&bytes).unwrap_err();
+        assert!(error.detail.contains(&format!("byte {at} of the glTF JSON is not UTF-8")), "{error}");
+        cases += 1;
+    }
+    assert_eq!(cases, 3);
+    let twice = text.replacen("{", "{\"materials\":[],", 1);
+    assert!(read(twice.as_bytes()).unwrap_err().detail.contains("duplicate field"));
+}

@@ -125,3 +125,26 @@ fn traps_of_the_parser_beneath_are_no_traps_here() {
         assert!(error.detail.starts_with("line 5 of the OBJ file"), "{bad}: {error}");
     }
 }
+
+#[test]
+fn comments_may_touch_what_is_before_them() {
+    let plain = read(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\n").unwrap();
+    let touched = "v 0 0 0#c\nv 1 0 0 #1 2 3\nv 0 1 0#c 1 0 0\nv 5 5 5 # c\nusemtl red # c\nf 1 2 3#c 4\n";
+    let mesh = read(touched.as_bytes()).unwrap();
+    assert_same_shape(&plain, &mesh, "touched");
+    assert!(mesh.colors.is_empty() && mesh.materials[0].name == "red", "{:?}", mesh.materials);
+    let named = read(touched.replace("red # c", "Material #25").as_bytes()).unwrap();
+    assert_eq!(named.materials[0].name, "Material #25");
+    // What Microsoft's C library prints is no comment.
+    let nan = read(touched.replace("v 5 5 5 # c", "v 1.#IND -1.#QNAN nan(ind)").as_bytes()).unwrap();
+    assert_same_shape(&plain, &nan, "NaN");
+    for broken in ["v 0 0#c\n", "v 0 0 #1\n", "v 1 2 3(\n"] {
+        assert!(read(format!("{broken}{touched}").as_bytes()).is_err(), "{broken}");
+    }
+    let off = "OFF 3 1 0#c\n0 0 0#c\n1 0 0 # 1\n0 1 0\n3 0 1 2#c 4\n";
+    assert_eq!(read(off.as_bytes()).unwrap().triangles.len(), 1);
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+               element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    assert_eq!(read(ply.as_bytes()).unwrap().triangles.len(), 1);
+    assert!(read(ply.replace("1 0 0", "1 0 0#c").as_bytes()).unwrap_err().detail.contains("0#c"));
+}

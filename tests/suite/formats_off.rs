@@ -48,6 +48,28 @@ fn codes(mesh: &Mesh) -> Vec<&'static str> {
 }
 
 #[test]
+fn prefixes_in_the_order_of_meshlab_put_colours_before_normals() {
+    let cases = [
+        ("CNOFF\n8 6 0\n", " 0 0 1 255 0 0"),
+        ("NCOFF\n8 6 0\n", " 255 0 0 255 0 0 1"),
+        ("NCOFF\n8 6 0\n", " 255 0 0 0 0 1"),
+        ("NCSTOFF\n8 6 0\n", " 255 0 0 255 0 0 1 0.25 0.75"),
+        ("CSTOFF\n8 6 0\n", " 255 0 0 255 0.25 0.75"),
+        ("STCNOFF\n8 6 0\n", " 0 0 1 255 0 0 255 0.25 0.75"),
+    ];
+    for (head, extra) in cases {
+        let mesh = read(off(head, extra, "").as_bytes()).unwrap_or_else(|error| panic!("{head}: {error}"));
+        assert_eq!(mesh.triangles.len(), 12, "{head}");
+        assert!(mesh.colors.iter().all(|color| *color == [1.0, 0.0, 0.0, 1.0]), "{head}: {:?}", mesh.colors);
+        assert!(mesh.normals.iter().all(|normal| *normal == [0.0, 0.0, 1.0]), "{head}: {:?}", mesh.normals);
+        assert_eq!((mesh.normals.is_empty(), mesh.uvs.is_empty()), (!head.contains('N'), !head.contains("ST")));
+        assert!(mesh.uvs.iter().all(|uv| *uv == [0.25, 0.25]), "{head}: {:?}", mesh.uvs);
+    }
+    assert_eq!(cases.len(), 6);
+    assert!(read(off("NCOFF\n8 6 0\n", " 255 0 0 0 0", "").as_bytes()).is_err());
+}
+
+#[test]
 fn off_in_all_its_forms_is_the_same_shape_as_obj() {
     let obj = read(Solid::cuboid().obj().as_bytes()).unwrap();
     let forms = [

@@ -99,3 +99,15 @@ fn convex_quads_are_cut_along_the_shorter_diagonal() {
         assert_eq!((a[0] - b[0]).abs() * 4.0, 2.0, "from (3, 0) to (1, 1)");
     }
 }
+
+/// Its two halves cancel out, so that it has no normal of its own; it is not nothing.
+#[test]
+fn polygons_that_cross_themselves_are_drawn() {
+    let points = "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nv 3 0 0\n";
+    let bow = read(format!("{points}f 1 2 3 4\n").as_bytes()).unwrap();
+    assert_eq!((bow.triangles.len(), bow.report.dropped_degenerate_faces), (2, 0));
+    assert_eq!(bow.edge_masks, [0b011, 0b110]);
+    // On one line there is nothing to draw, and that is one face.
+    let line = read(format!("{points}f 1 3 6 5\nf 1 2 3\n").as_bytes()).unwrap();
+    assert_eq!((line.triangles.len(), line.report.dropped_degenerate_faces), (1, 1));
+}

@@ -83,6 +83,21 @@ fn headers_that_lie_are_seen_through() {
     for (from, to) in [("endloop", "vertex 0 0 0\nendloop"), ("endsolid a test\n", ""), ("vertex 1.5", "vertex 1.5x")] {
         assert_eq!(read(text.replacen(from, to, 1).as_bytes()).unwrap_err().fault, MeshFault::Broken, "{to}");
     }
+    // Line ends of old Macs, one line, and names that look like more.
+    let expected = read(text.as_bytes()).unwrap();
+    let texts = [
+        text.replace('\n', "\r"),
+        text.replace('\n', " "),
+        text.replace("solid a test", "solid facet vertex endfacet"),
+        text.replace('\n', " ").replace("solid a test", "solid facet of vertex 1"),
+    ];
+    for text in &texts {
+        assert_same_shape(&expected, &read(text.as_bytes()).unwrap_or_else(|error| panic!("{error}: {text}")), text);
+    }
+    assert_eq!(texts.len(), 4);
+    assert_eq!(read(texts[1].as_bytes()).unwrap().report.facts.generator.as_deref(), Some("a test"));
+    assert_eq!(read(texts[1].repeat(2).as_bytes()).unwrap().triangles.len(), 6, "two solids on a line");
+    assert!(read(texts[1].split("endsolid").next().unwrap().as_bytes()).unwrap_err().detail.contains("cut off"));
     let shouting = text.to_ascii_uppercase().replace('\n', "\r\n");
     assert_eq!(read(shouting.as_bytes()).unwrap().report.format, Format::StlAscii);
 }

@@ -1,5 +1,6 @@
 //! The meshes of a scene, each as often as nodes show it, where those put it.
 
+use super::shown::{Fate, Fates};
 use crate::mesh::affine::Affine;
 use crate::mesh::corners::{CornerSet, Polygons};
 use crate::mesh::import::Context;
@@ -38,8 +39,10 @@ impl Used {
 /// Fills in the geometry, and gives the materials that it has.
 pub fn read(scene: &Scene, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Used, MeshError> {
     let mut used = Used::default();
-    let shown = |node: &&Node| node.mesh.is_some() && node.visible;
-    let hidden = scene.nodes.into_iter().filter(|node| node.mesh.is_some() && !node.visible).count();
+    let fates = Fates::of(scene, cx)?;
+    let shown = |node: &&Node| node.mesh.is_some() && fates.at(node) == Fate::Shown;
+    let count =
+        |fate: Fate| scene.nodes.into_iter().filter(|node| node.mesh.is_some() && fates.at(node) == fate).count();
     // Counted as often as they are shown, before any is.
     let of_node = |node: &Node| node.mesh.as_ref().map_or(0, |mesh| triangles_of(mesh));
     let triangles = scene.nodes.into_iter().filter(shown).map(of_node).fold(0, u64::saturating_add);
@@ -52,9 +55,14 @@ pub fn read(scene: &Scene, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Us
         }
     }
     part.polygons.finish(raw, cx)?;
-    curves(scene, &mut used, raw, cx)?;
+    curves(scene, &fates, &mut used, raw, cx)?;
     let notes = [
-        (hidden as u64, "hidden_ignored", "meshes that the file hides are not drawn (meshes in the file:"),
+        (count(Fate::Hidden) as u64, "hidden_ignored", "meshes that the file hides are not drawn (meshes in the file:"),
+        (
+            count(Fate::OtherLevel) as u64,
+            "levels_ignored",
+            "of a mesh in several levels of detail the first is drawn (meshes of other levels in the file:",
+        ),
         (part.short_faces, "short_faces_ignored", "faces without corners are not drawn (faces in the file:"),
     ];
     let met = notes.into_iter().filter(|(count, ..)| *count > 0);
@@ -125,9 +133,15 @@ impl Part {
 }
 
 /// Lines that are no edges of a mesh, as often as nodes show them.
-fn curves(scene: &Scene, used: &mut Used, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
+fn curves(
+    scene: &Scene,
+    fates: &Fates,
+    used: &mut Used,
+    raw: &mut RawMesh,
+    cx: &mut Context<'_>,
+) -> Result<(), MeshError> {
     for curve in &scene.line_curves {
-        for node in &curve.element.instances {
+        for node in curve.element.instances.into_iter().filter(|node| fates.at(node) == Fate::Shown) {
             cx.deadline.check()?;
             let place = Place::of(&node.geometry_to_world);
             let base = raw.positions.len();

@@ -8,7 +8,7 @@ use crate::mesh::bundle::show_all;
 use crate::mesh::import::Context;
 use crate::mesh::material::{AlphaMode, ImageContent, ImageSource, TextureRef, Wrap};
 use crate::mesh::raw::{RawMesh, srgb_to_linear};
-use crate::mesh::{MaterialSlot, MeshError, Warning};
+use crate::mesh::{MaterialSlot, MeshError, Warning, text};
 use rapidhash::RapidHashMap;
 use ufbx::{Material, MaterialMap, Scene, Texture, WrapMode};
 
@@ -80,10 +80,12 @@ impl Reader {
         };
         let strength = factor(&pbr.emission_factor);
         let exponent = Some(&material.fbx.specular_exponent).filter(|map| !is_pbr && map.has_value);
-        let roughness = Some(&pbr.roughness).filter(|map| is_pbr && map.has_value).map(|map| map.value_vec4.x);
-        let metallic = Some(&pbr.metalness).filter(|map| is_pbr && map.has_value).map(|map| map.value_vec4.x);
+        // Clamping would leave a NaN as it is.
+        let said =
+            |map: &MaterialMap| Some(map.value_vec4.x).filter(|value| is_pbr && map.has_value && value.is_finite());
+        let (roughness, metallic) = (said(&pbr.roughness), said(&pbr.metalness));
         Ok(MaterialSlot {
-            name: material.element.name.to_string(),
+            name: text::name(&material.element.name),
             base_color,
             metallic: metallic.map(|v| v.clamp(0.0, 1.0) as f32),
             roughness: roughness.or(exponent.map(roughness_of)).map(|v| v.clamp(0.0, 1.0) as f32),

@@ -1,14 +1,16 @@
 //! Autodesk FBX, binary and ASCII, parsed by `ufbx`: it gets bytes, a cap on memory and a look at the deadline, and opens
 //! nothing. What it gives is checked again where it is an index.
 //!
-//! [`geometry`] places the meshes of the scene and cuts their polygons, [`materials`] are their slots and images.
+//! [`costs`] refuses what would take it too long, [`shown`] says what is hidden, [`geometry`] places the meshes of the scene and cuts their polygons, [`materials`] are their slots and images.
 
+mod costs;
 mod geometry;
 mod materials;
+mod shown;
 
 use super::import::Context;
 use super::raw::RawMesh;
-use super::{FileFacts, Format, MeshError, MeshFault, UpAxis, Warning, facts, sniff};
+use super::{FileFacts, Format, MeshError, MeshFault, UpAxis, Warning, facts, sniff, text};
 use crate::limits;
 use ufbx::{
     AllocatorOpts, CoordinateAxis, Error, ErrorType, FileFormat, LoadOpts, OpenFileCb, ProgressCb, ProgressResult,
@@ -35,6 +37,7 @@ pub fn is_fbx(bytes: &[u8]) -> bool {
 
 /// Reads an FBX file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    costs::check(bytes, cx)?;
     let scene = load(bytes, cx)?;
     limits::check("the number of scene nodes", scene.nodes.len() as u64, cx.limits.nodes, "--limit-nodes")?;
     let mut raw = RawMesh::default();
@@ -104,7 +107,10 @@ fn told(error: &Error, left: u64, cx: &mut Context<'_>) -> MeshError {
         _ => {
             let info = error.info();
             let info = if info.is_empty() { String::new() } else { format!(" ({info})") };
-            MeshError::broken(format!("the FBX file cannot be read: {}{info}", &*error.description))
+            MeshError::broken(format!(
+                "the FBX file cannot be read: {}",
+                text::foreign(format_args!("{}{info}", &*error.description))
+            ))
         }
     }
 }

@@ -4,7 +4,7 @@
 use super::meshopt;
 use super::tree::{Buffer, BufferView, Document};
 use crate::mesh::import::Context;
-use crate::mesh::{MeshError, MeshFault};
+use crate::mesh::{MeshError, MeshFault, text};
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use std::borrow::Cow;
@@ -158,7 +158,12 @@ pub fn from_uri(uri: &str, what: &str, cx: &mut Context<'_>) -> Result<Uri, Mesh
     cx.budget.spend("a data URI of the glTF file", base64.len() as u64, 1)?;
     let lenient = GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent);
     GeneralPurpose::new(&base64::alphabet::STANDARD, lenient).decode(base64.trim_ascii()).map(Uri::Bytes).map_err(
-        |error| MeshError::broken(format!("the data URI of {what} of the glTF file is not valid base64: {error}")),
+        |error| {
+            MeshError::broken(format!(
+                "the data URI of {what} of the glTF file is not valid base64: {}",
+                text::foreign(error)
+            ))
+        },
     )
 }
 

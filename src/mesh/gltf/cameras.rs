@@ -2,8 +2,10 @@
 
 use super::model::{self, Lists, entry};
 use super::transform::Affine;
+use crate::mesh::import::Context;
 use crate::mesh::material::{FileCamera, FileLens};
-use crate::mesh::{MeshError, Warning};
+use crate::mesh::{MeshError, Warning, text};
+use std::collections::BTreeMap;
 
 /// A node that shows a camera.
 #[derive(Debug)]
@@ -17,39 +19,72 @@ pub struct Placed {
 }
 
 /// Reads the cameras of the default scene. A broken one is left out: most pictures are taken through none of them.
-pub fn cameras(placed: &[Placed], lists: &Lists<'_>, warnings: &mut Vec<Warning>) -> Vec<FileCamera> {
+///
+/// Each is parsed once, however many nodes show it, and its places were paid for with names of their full length.
+pub fn cameras(
+    placed: &[Placed],
+    lists: &Lists<'_>,
+    warnings: &mut Vec<Warning>,
+    cx: &mut Context<'_>,
+) -> Result<Vec<FileCamera>, MeshError> {
+    let mut known: BTreeMap<usize, Result<Known, MeshError>> = BTreeMap::new();
     let mut cameras = Vec::new();
     for place in placed {
-        match camera(place, lists) {
+        cx.deadline.check()?;
+        let index = place.camera;
+        if let std::collections::btree_map::Entry::Vacant(new) = known.entry(index) {
+            let json_bytes = lists.cameras.get(index).map_or(0, |json| json.get().len());
+            cx.budget.spend("a camera's description", json_bytes as u64 + 1024, 1)?;
+            new.insert(parse(index, lists));
+        }
+        let camera = match known.get(&index) {
+            Some(Ok(known)) => show(place, known),
+            Some(Err(error)) => Err(error.clone()),
+            None => continue,
+        };
+        match camera {
             Ok(camera) => cameras.push(camera),
             Err(error) => super::warn_once(warnings, "camera_ignored", format!("a camera is left out: {error}")),
         }
     }
-    cameras
+    Ok(cameras)
 }
 
-fn camera(place: &Placed, lists: &Lists<'_>) -> Result<FileCamera, MeshError> {
-    let index = place.camera;
+/// What does not depend on where it is shown.
+struct Known {
+    name: String,
+    lens: FileLens,
+}
+
+fn parse(index: usize, lists: &Lists<'_>) -> Result<Known, MeshError> {
     let json: model::Camera = entry("camera", &lists.cameras, index)?;
-    let broken = |what: &str| MeshError::broken(format!("camera {index} of the glTF file {what}"));
     let lens = match (&json.perspective, &json.orthographic) {
         (Some(lens), _) if lens.yfov > 0.0 && lens.yfov < std::f64::consts::PI => {
             FileLens::Perspective { fov_deg: lens.yfov.to_degrees() }
         }
-        (Some(_), _) => return Err(broken("has a field of view that is not between 0 and half a turn")),
+        (Some(_), _) => return Err(broken(index, "has a field of view that is not between 0 and half a turn")),
         (None, Some(lens)) if lens.ymag != 0.0 && (2.0 * lens.ymag).is_finite() => {
             FileLens::Orthographic { height: 2.0 * lens.ymag.abs() }
         }
-        (None, Some(_)) => return Err(broken("has no height")),
-        (None, None) => return Err(broken("has neither a perspective nor an orthographic lens")),
+        (None, Some(_)) => return Err(broken(index, "has no height")),
+        (None, None) => return Err(broken(index, "has neither a perspective nor an orthographic lens")),
     };
+    Ok(Known { name: text::name(json.name.as_deref().unwrap_or_default()), lens })
+}
+
+fn show(place: &Placed, known: &Known) -> Result<FileCamera, MeshError> {
+    let index = place.camera;
     let eye = place.transform.point([0.0; 3]);
-    let axes = axes(&place.transform).ok_or_else(|| broken("is scaled to nothing"))?;
+    let axes = axes(&place.transform).ok_or_else(|| broken(index, "is scaled to nothing"))?;
     if !eye.iter().all(|c| c.is_finite()) {
-        return Err(broken("is infinitely far away"));
+        return Err(broken(index, "is infinitely far away"));
     }
-    let name = json.name.filter(|name| !name.is_empty()).or_else(|| place.name.clone()).unwrap_or_default();
-    Ok(FileCamera { name, eye, axes, lens })
+    let name = Some(&known.name).filter(|name| !name.is_empty()).or(place.name.as_ref());
+    Ok(FileCamera { name: name.cloned().unwrap_or_default(), eye, axes, lens: known.lens })
+}
+
+fn broken(index: usize, what: &str) -> MeshError {
+    MeshError::broken(format!("camera {index} of the glTF file {what}"))
 }
 
 /// Cameras look along -Z with +Y up. Scales and mirrorings of a node do not reach the picture.

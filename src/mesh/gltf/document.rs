@@ -3,7 +3,7 @@
 use super::tree::Document;
 use crate::limits;
 use crate::mesh::import::Context;
-use crate::mesh::{MeshError, MeshFault};
+use crate::mesh::{MeshError, MeshFault, text};
 
 /// Memory that an object of the document may take once parsed: the largest of the types, in a list that doubles.
 const BYTES_PER_OBJECT: u64 = 1024;
@@ -12,6 +12,7 @@ const BYTES_PER_VALUE: u64 = 64;
 
 /// Parses the document and checks what the file demands of its reader.
 pub fn parse(json: &[u8], cx: &mut Context<'_>) -> Result<Document, MeshError> {
+    let all_bytes = json.len();
     let json = crate::mesh::sniff::trim_start(json);
     let size = measure(json);
     limits::check("the nesting depth of the JSON", size.depth, cx.limits.json_depth, "--limit-json-depth")?;
@@ -19,10 +20,19 @@ pub fn parse(json: &[u8], cx: &mut Context<'_>) -> Result<Document, MeshError> {
     cx.budget.spend("the glTF JSON", size.objects, BYTES_PER_OBJECT)?;
     cx.budget.spend("the glTF JSON", size.commas, BYTES_PER_VALUE)?;
     cx.deadline.check()?;
-    let doc = serde_json::from_slice(json)
-        .map_err(|error| MeshError::broken(format!("the glTF JSON cannot be read: {error}")))?;
+    // What nothing reads is passed over without a look at its characters, by some readers of the document and not by others.
+    if let Err(error) = std::str::from_utf8(json) {
+        let at = all_bytes - json.len() + error.valid_up_to();
+        return Err(MeshError::broken(format!("byte {at} of the glTF JSON is not UTF-8")));
+    }
+    let doc = serde_json::from_slice(json).map_err(unread)?;
     check_demands(&doc)?;
     Ok(doc)
+}
+
+/// What is said of a document that is no JSON, or has other types than glTF.
+pub fn unread(error: serde_json::Error) -> MeshError {
+    MeshError::broken(format!("the glTF JSON cannot be read: {}", text::foreign(error)))
 }
 
 #[derive(Debug, Default, PartialEq, Eq)]

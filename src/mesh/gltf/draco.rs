@@ -4,8 +4,8 @@
 use super::accessor::{Reader, Shape};
 use super::attribute::{INDICES, Rule};
 use super::tree::{Draco, Primitive, mode};
-use crate::mesh::MeshError;
 use crate::mesh::import::Context;
+use crate::mesh::{MeshError, text};
 use draco_core::draco_types::DataType;
 use draco_core::geometry_attribute::PointAttribute;
 use draco_core::geometry_indices::PointIndex;
@@ -51,10 +51,9 @@ impl<'a> Unpacked<'a> {
             .with_max_decoded_bytes(points.saturating_mul(POINT_VALUE_BYTES));
         let mut buffer = DecoderBuffer::new(view.bytes()).with_limits(limits);
         let mut mesh = draco_core::Mesh::new();
-        MeshDecoder::new().decode(&mut buffer, &mut mesh).map_err(|error| {
-            let why: String = error.to_string().chars().take(200).collect();
-            broken(&what, &format!("cannot be decompressed: {why}"))
-        })?;
+        MeshDecoder::new()
+            .decode(&mut buffer, &mut mesh)
+            .map_err(|error| broken(&what, &format!("cannot be decompressed: {}", text::foreign(error))))?;
         cx.deadline.check()?;
         let has = [mesh.num_faces() as u64, mesh.num_points() as u64];
         // A strip repeats corners where it jumps; what that leaves has no area and is not compressed.

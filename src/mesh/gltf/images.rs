@@ -6,6 +6,8 @@ use super::model::{self, Lists, TextureInfo, Transform, entry};
 use crate::mesh::import::Context;
 use crate::mesh::material::{ImageContent, ImageSource, TextureRef, Wrap};
 use crate::mesh::{MeshError, Warning};
+use serde::Deserialize;
+use serde_json::value::RawValue;
 use std::collections::BTreeMap;
 
 /// The images that drawn materials use, collected while they are read.
@@ -15,6 +17,9 @@ pub struct Images {
     pub sources: Vec<ImageSource>,
     /// Index into `sources` by the file's image index.
     known: BTreeMap<usize, u32>,
+    /// What was parsed, by the file's indices: materials may share one whose description is long.
+    textures: BTreeMap<usize, model::Texture>,
+    samplers: BTreeMap<usize, model::Sampler>,
 }
 
 impl Images {
@@ -35,7 +40,8 @@ impl Images {
                 lists.textures.len()
             )));
         }
-        let texture: model::Texture = entry("texture", &lists.textures, index)?;
+        cx.deadline.check()?;
+        let texture: model::Texture = once(&mut self.textures, "texture", &lists.textures, index, cx)?;
         let in_other = |other: &Option<model::OtherSource>| other.as_ref().and_then(|other| other.source);
         // Basis Universal last: what else there is has lost less.
         let image = in_other(&texture.extensions.webp).or(texture.source).or(in_other(&texture.extensions.basisu));
@@ -46,7 +52,7 @@ impl Images {
         };
         let image = self.image(index, image.0, lists, reader, cx)?;
         let sampler = match texture.sampler {
-            Some(sampler) => entry::<model::Sampler>("sampler", &lists.samplers, sampler.0)?,
+            Some(sampler) => once(&mut self.samplers, "sampler", &lists.samplers, sampler.0, cx)?,
             None => model::Sampler::default(),
         };
         Ok(Some(TextureRef {
@@ -86,6 +92,23 @@ impl Images {
         self.known.insert(index, place);
         Ok(place)
     }
+}
+
+/// An entry of a list, parsed when it is first asked for.
+fn once<'a, T: Clone + Deserialize<'a>>(
+    known: &mut BTreeMap<usize, T>,
+    kind: &str,
+    list: &[&'a RawValue],
+    index: usize,
+    cx: &mut Context<'_>,
+) -> Result<T, MeshError> {
+    if let Some(known) = known.get(&index) {
+        return Ok(known.clone());
+    }
+    cx.budget.spend("the textures of the glTF file", 1, 2 * size_of::<T>() as u64 + 64)?;
+    let parsed: T = entry(kind, list, index)?;
+    known.insert(index, parsed.clone());
+    Ok(parsed)
 }
 
 /// The bytes of an image, still encoded.

@@ -5,7 +5,7 @@ use super::images::Images;
 use super::model::{self, EmissiveStrength, Lists, SpecularGlossiness, TextureInfo, entry};
 use crate::mesh::import::Context;
 use crate::mesh::material::{AlphaMode, TextureRef};
-use crate::mesh::{MaterialSlot, MeshError, Warning};
+use crate::mesh::{MaterialSlot, MeshError, Warning, text};
 use serde::Deserialize;
 
 /// The materials of a file.
@@ -74,7 +74,7 @@ impl<'a> Materials<'a> {
     pub fn into_slots(self) -> (Vec<MaterialSlot>, Images) {
         let unused = |index: usize| {
             let json = entry::<Named>("material", &self.lists.materials, index).unwrap_or_default();
-            MaterialSlot { name: json.name.unwrap_or_default(), ..MaterialSlot::default() }
+            MaterialSlot { name: text::name(json.name.as_deref().unwrap_or_default()), ..MaterialSlot::default() }
         };
         let slots = self.used.into_iter().enumerate();
         let slots = slots.map(|(index, used)| used.map_or_else(|| unused(index), |used| used.slot)).collect();
@@ -101,7 +101,8 @@ struct Textures<'t, 'a, 'r, 'c> {
 
 impl Textures<'_, '_, '_, '_> {
     fn slot(&mut self, json: &model::Material<'_>) -> Result<MaterialSlot, MeshError> {
-        let mut slot = MaterialSlot { name: json.name.clone().unwrap_or_default(), ..MaterialSlot::default() };
+        let name = text::name(json.name.as_deref().unwrap_or_default());
+        let mut slot = MaterialSlot { name, ..MaterialSlot::default() };
         match (&json.pbr_metallic_roughness, self.extension::<SpecularGlossiness>(json, SPECULAR_GLOSSINESS)?) {
             (None, Some(other)) => {
                 slot.base_color = Some(color(other.diffuse_factor.unwrap_or([1.0; 4])));
@@ -160,7 +161,8 @@ impl Textures<'_, '_, '_, '_> {
     ) -> Result<Option<T>, MeshError> {
         let Some(raw) = json.extensions.get(name) else { return Ok(None) };
         serde_json::from_str(raw.get()).map(Some).map_err(|error| {
-            MeshError::broken(format!("{name} of {} of the glTF file cannot be read: {error}", self.what))
+            let why = text::foreign(error);
+            MeshError::broken(format!("{name} of {} of the glTF file cannot be read: {why}", self.what))
         })
     }
 }

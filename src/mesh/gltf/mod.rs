@@ -59,13 +59,13 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
         (bytes, None)
     };
     let doc = document::parse(json, cx)?;
-    let lists = Lists::of(json);
+    let lists = Lists::of(json)?;
     check::check(&doc, &lists)?;
     raw.report.content = content(&doc);
     let mut reader = Reader::new(&doc, bin);
     let pose = Pose::new(&doc, &lists, &mut reader, &mut raw.report.warnings, cx)?;
     let scene = scene::scene(&doc, &pose, cx)?;
-    raw.cameras = cameras::cameras(&scene.cameras, &lists, &mut raw.report.warnings);
+    raw.cameras = cameras::cameras(&scene.cameras, &lists, &mut raw.report.warnings, cx)?;
 
     let mut meshes = Meshes {
         doc: &doc,
@@ -104,6 +104,7 @@ struct Meshes<'a> {
 impl Meshes<'_> {
     /// Adds a mesh as one node shows it.
     fn show(&mut self, instance: &Instance, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        cx.deadline.check()?;
         let primitives = self.primitives(instance.mesh, &mut raw.report.warnings, cx)?;
         let node = instance.node.and_then(|index| self.doc.nodes.get(index));
         let weights = self.pose.weights(instance.mesh, instance.node);
@@ -122,6 +123,10 @@ impl Meshes<'_> {
             }
             None => vec![transform],
         };
+        // What is nowhere is neither morphed nor skinned.
+        if placements.is_empty() {
+            return Ok(());
+        }
         let default_material = self.materials.count();
         for primitive in primitives.iter() {
             self.uses_default_material |= primitive.material().is_none();

@@ -1,7 +1,7 @@
 //! The parts of the document that say what surfaces look like, cameras and animations: one odd value in a material that nothing uses
 //! is no reason to refuse a file, so an entry is parsed when something drawn asks for it.
 
-use crate::mesh::MeshError;
+use crate::mesh::{MeshError, text};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::value::RawValue;
@@ -26,7 +26,7 @@ pub struct Lists<'a> {
 
 impl<'a> Lists<'a> {
     /// Of a document that was measured and parsed before. What is no list is an empty one: only its use is an error.
-    pub fn of(json: &'a [u8]) -> Self {
+    pub fn of(json: &'a [u8]) -> Result<Self, MeshError> {
         #[derive(Default, Deserialize)]
         #[serde(default)]
         struct Raw<'a> {
@@ -43,18 +43,19 @@ impl<'a> Lists<'a> {
             #[serde(borrow)]
             animations: Option<&'a RawValue>,
         }
-        let raw: Raw<'a> = serde_json::from_slice(super::super::sniff::trim_start(json)).unwrap_or_default();
+        let raw: Raw<'a> =
+            serde_json::from_slice(super::super::sniff::trim_start(json)).map_err(super::document::unread)?;
         let list = |raw: Option<&'a RawValue>| -> Vec<&'a RawValue> {
             raw.and_then(|raw| serde_json::from_str(raw.get()).ok()).unwrap_or_default()
         };
-        Self {
+        Ok(Self {
             materials: list(raw.materials),
             textures: list(raw.textures),
             samplers: list(raw.samplers),
             images: list(raw.images),
             cameras: list(raw.cameras),
             animations: list(raw.animations),
-        }
+        })
     }
 }
 
@@ -62,8 +63,9 @@ impl<'a> Lists<'a> {
 pub fn entry<'a, T: Deserialize<'a>>(kind: &str, list: &[&'a RawValue], index: usize) -> Result<T, MeshError> {
     let raw =
         list.get(index).ok_or_else(|| MeshError::broken(format!("there is no {kind} {index} in the glTF file")))?;
-    serde_json::from_str(raw.get())
-        .map_err(|error| MeshError::broken(format!("{kind} {index} of the glTF file cannot be read: {error}")))
+    serde_json::from_str(raw.get()).map_err(|error| {
+        MeshError::broken(format!("{kind} {index} of the glTF file cannot be read: {}", text::foreign(error)))
+    })
 }
 
 /// An index; `1.0` is a good integer in JSON.
@@ -157,7 +159,7 @@ pub struct Transform {
 }
 
 /// `texture`
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct Texture {
     pub source: Option<Index>,
@@ -166,7 +168,7 @@ pub struct Texture {
 }
 
 /// Extensions of `texture`: images in other formats.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct TextureExtensions {
     #[serde(rename = "EXT_texture_webp")]
@@ -176,14 +178,14 @@ pub struct TextureExtensions {
 }
 
 /// An image in another format.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct OtherSource {
     pub source: Option<Index>,
 }
 
 /// `sampler`
-#[derive(Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 pub struct Sampler {
     pub mag_filter: Option<f64>,

@@ -5,8 +5,8 @@ use super::pose::Pose;
 use super::transform::Affine;
 use super::tree::Document;
 use crate::limits;
-use crate::mesh::MeshError;
 use crate::mesh::import::Context;
+use crate::mesh::{MeshError, text};
 
 /// One showing of a mesh.
 #[derive(Debug)]
@@ -115,8 +115,9 @@ impl Walk<'_> {
             self.found.instances.push(Instance { mesh: mesh.0, node: Some(index), transform });
         }
         if let Some(camera) = node.camera {
-            cx.budget.spend("cameras", 1, 1024)?;
-            let name = node.name.as_deref().map(|name| name.chars().take(200).collect());
+            // Here and in the mesh, each with a name.
+            cx.budget.spend("cameras", 1, 2 * 1024)?;
+            let name = node.name.as_deref().map(text::name);
             self.found.cameras.push(Placed { camera: camera.0, name, transform });
         }
         steps.push(Step::Leave(index));

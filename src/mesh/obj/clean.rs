@@ -7,9 +7,10 @@ mod numbers;
 
 use super::face::{Corner, Counts, parse_corner, write_face};
 use super::left_out::LeftOut;
-use super::lines::Lines;
+use super::lines::{Lines, uncommented};
 use crate::mesh::import::Context;
 use crate::mesh::loose::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
+use crate::mesh::text::before_comment;
 use crate::mesh::{Loose, MeshError};
 use rapidhash::RapidHashMap;
 use std::io::{BufRead, Read};
@@ -118,7 +119,14 @@ impl<'a, 'b> Cleaner<'a, 'b> {
 
     fn clean(&mut self, line: &[u8]) -> Result<(), MeshError> {
         let words = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
-        let mut words = words.take_while(|w| !w.starts_with(b"#"));
+        // A comment may begin in a word, and then that is the last.
+        let mut is_over = false;
+        let mut words = words.map_while(move |word| {
+            let kept = before_comment(word);
+            let is_word = !is_over && !kept.is_empty();
+            is_over |= kept.len() < word.len();
+            is_word.then_some(kept)
+        });
         let Some(keyword) = words.next() else { return Ok(()) };
         match keyword {
             b"v" => {
@@ -140,8 +148,8 @@ impl<'a, 'b> Cleaner<'a, 'b> {
             b"l" => self.loose(words, true)?,
             b"p" => self.loose(words, false)?,
             b"curv" | b"curv2" | b"surf" => self.left_out.curves += 1,
-            b"mtllib" => self.library(line.trim_ascii_start()[6..].trim_ascii()),
-            b"usemtl" => self.material(line.trim_ascii_start()[6..].trim_ascii()),
+            b"mtllib" => self.library(name(line)),
+            b"usemtl" => self.material(name(line)),
             _ => {}
         }
         Ok(())
@@ -270,4 +278,9 @@ impl Read for Cleaner<'_, '_> {
         self.consume(n);
         Ok(n)
     }
+}
+
+/// What follows the keyword of a line, six letters long: one name, spaces and all.
+fn name(line: &[u8]) -> &[u8] {
+    uncommented(line.trim_ascii_start().get(6..).unwrap_or_default().trim_ascii())
 }

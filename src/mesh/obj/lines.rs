@@ -10,6 +10,14 @@ pub struct Lines<'a> {
     pub number: u64,
 }
 
+/// A name without the comment after it. Names may have a `#` of their own (`Material #25`): a comment's stands alone.
+pub fn uncommented(name: &[u8]) -> &[u8] {
+    let is_space = |at: Option<usize>| at.and_then(|at| name.get(at)).is_none_or(u8::is_ascii_whitespace);
+    let mark = |&at: &usize| name[at] == b'#' && is_space(at.checked_sub(1)) && is_space(Some(at + 1));
+    let end = (0..name.len()).find(mark).unwrap_or(name.len());
+    name[..end].trim_ascii_end()
+}
+
 impl<'a> Lines<'a> {
     /// The lines of a file.
     pub fn new(bytes: &'a [u8]) -> Self {
@@ -52,5 +60,25 @@ impl<'a> Iterator for Lines<'a> {
             joined.extend_from_slice(self.physical());
         }
         Some(Cow::Owned(joined))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_keep_their_own_marks() {
+        let cases = [
+            ("red # c", "red"),
+            ("red #", "red"),
+            ("# red", ""),
+            ("Material #25", "Material #25"),
+            ("a#b # c # d", "a#b"),
+        ];
+        for (given, expected) in cases {
+            assert_eq!(uncommented(given.as_bytes()), expected.as_bytes(), "{given}");
+        }
+        assert_eq!(cases.len(), 5);
     }
 }

@@ -39,7 +39,7 @@ pub fn read(
     let mut slots = Vec::with_capacity(names.len());
     for (name, found) in names.iter().zip(found) {
         cx.deadline.check()?;
-        let name = String::from_utf8_lossy(name).into_owned();
+        let name = text::name(&String::from_utf8_lossy(name));
         let slot = match found {
             Some((material, library)) => reader.slot(&material, library, cx)?,
             None => {

@@ -1,7 +1,7 @@
 //! MTL, the material library of OBJ, line by line. Only materials that the mesh uses are kept, so that a library costs no
 //! more than the names that the mesh has paid for; a line that makes no sense is counted and passed over.
 
-use super::lines::Lines;
+use super::lines::{Lines, uncommented};
 use super::map::{Map, number, split_word};
 use crate::mesh::MeshError;
 use crate::mesh::import::Context;
@@ -65,7 +65,7 @@ pub fn read<T: Copy>(
         }
         let (keyword, rest) = split_word(line.trim_ascii());
         if keyword.eq_ignore_ascii_case(b"newmtl") {
-            current = numbers.get(rest).copied().filter(|&number| found[number].is_none());
+            current = numbers.get(uncommented(rest)).copied().filter(|&number| found[number].is_none());
             if let Some(number) = current {
                 found[number] = Some((Material::default(), library));
             }

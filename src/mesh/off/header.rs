@@ -12,6 +12,8 @@ pub struct Header {
     pub has_colors: bool,
     /// `ST`
     pub has_uvs: bool,
+    /// MeshLab's order: with `N` before `C`, colours come before normals.
+    pub colors_first: bool,
     /// Followed by the word `BINARY`.
     pub is_binary: bool,
     /// Where the counts begin.
@@ -21,12 +23,13 @@ pub struct Header {
 impl Header {
     /// Numbers of a vertex before its colour.
     pub fn before_color(&self) -> usize {
-        if self.has_normals { 6 } else { 3 }
+        if self.has_normals && !self.colors_first { 6 } else { 3 }
     }
 
     /// Numbers of a vertex after its colour.
     pub fn after_color(&self) -> usize {
-        if self.has_uvs { 2 } else { 0 }
+        let normal = if self.has_normals && self.colors_first { 3 } else { 0 };
+        normal + if self.has_uvs { 2 } else { 0 }
     }
 
     /// Numbers of a vertex, of whose colour it may have one more.
@@ -59,7 +62,10 @@ pub fn parse(bytes: &[u8]) -> Result<Header, MeshError> {
     for letter in prefix {
         match letter {
             b'S' => header.has_uvs = true,
-            b'C' => header.has_colors = true,
+            b'C' => {
+                header.has_colors = true;
+                header.colors_first = header.has_normals;
+            }
             b'N' => header.has_normals = true,
             b'4' => return Err(unsupported("4", "homogeneous coordinates")),
             b'n' => return Err(unsupported("n", "a number of dimensions of their own")),
@@ -78,13 +84,13 @@ fn unsupported(letter: &str, what: &str) -> MeshError {
     MeshError::new(MeshFault::Unsupported, detail)
 }
 
-/// The prefix, `[ST][C][N][4][n]`, of a keyword, and what is joined to its end: some files have the first count there.
+/// The prefix of a keyword, and what is joined to its end: some files have the first count there. Geomview's prefix is
+/// `[ST][C][N][4][n]`; vcglib, and so MeshLab, write `[N][C][ST]`.
 fn keyword(word: &[u8]) -> Option<(&[u8], &[u8])> {
     let mut at = 0;
-    for part in [&b"ST"[..], b"C", b"N", b"4", b"n"] {
-        if word[at..].starts_with(part) {
-            at += part.len();
-        }
+    let mut left = vec![&b"ST"[..], b"C", b"N", b"4", b"n"];
+    while let Some(i) = left.iter().position(|part| word[at..].starts_with(part)) {
+        at += left.swap_remove(i).len();
     }
     let rest = word[at..].strip_prefix(b"OFF")?;
     rest.iter().all(u8::is_ascii_digit).then_some((&word[..at], rest))
@@ -96,16 +102,27 @@ mod tests {
 
     #[test]
     fn keywords_and_words_that_are_none() {
-        for yes in
-            ["OFF 3 1 0", "OFF\n# c\n\n3 1", "STCN4nOFF\n3", "OFF3 1 0", "\u{feff}# c\nCOFF # d\n8", "NOFF BINARY\n"]
-        {
+        for yes in [
+            "NCOFF 3",
+            "CSTOFF 3",
+            "NCSTOFF\n3",
+            "OFF 3 1 0",
+            "OFF\n# c\n\n3 1",
+            "STCN4nOFF\n3",
+            "OFF3 1 0",
+            "\u{feff}# c\nCOFF # d\n8",
+            "NOFF BINARY\n",
+        ] {
             assert!(is_off(yes.as_bytes()), "{yes}");
         }
-        for no in ["OFFICE", "OFF the road", "NCOFF 3", "off 3", "", "CSTOFF 3", "3 1 0"] {
+        for no in ["OFFICE", "OFF the road", "NNOFF 3", "off 3", "", "CSTCOFF 3", "3 1 0"] {
             assert!(!is_off(no.as_bytes()), "{no}");
         }
         let header = parse(b"STCNOFF\n3 1 0").unwrap();
         assert!(header.has_uvs && header.has_colors && header.has_normals && header.numbers_min() == 11);
+        assert!(!header.colors_first && header.before_color() == 6);
+        let other = parse(b"NCSTOFF\n3 1 0").unwrap();
+        assert_eq!((other.before_color(), other.after_color(), other.numbers_min()), (3, 5, 11));
         assert_eq!(parse(b"OFF3 1 0").unwrap().body_at, 3);
         assert_eq!(parse(b"OFF BINARY\nx").unwrap().body_at, 11);
         assert_eq!(parse(b"4OFF 1").unwrap_err().fault, MeshFault::Unsupported);

@@ -38,7 +38,8 @@ pub fn read(
         let value = |at: usize| numbers[at].value;
         raw.positions.push([value(0), value(1), value(2)]);
         if header.has_normals {
-            raw.normals.push([value(3) as f32, value(4) as f32, value(5) as f32]);
+            let at = if header.colors_first { numbers.len() - header.after_color() } else { 3 };
+            raw.normals.push([value(at) as f32, value(at + 1) as f32, value(at + 2) as f32]);
         }
         if header.has_uvs {
             // v runs up in the file, and down in a mesh.

@@ -2,9 +2,8 @@
 
 use super::header::Header;
 use super::{Counts, Number, Source};
-use crate::mesh::MeshError;
 use crate::mesh::import::Context;
-use std::borrow::Cow;
+use crate::mesh::{MeshError, text};
 
 /// Corners of one face between two payments.
 const CORNERS_PER_LOOK: usize = 65_536;
@@ -35,8 +34,10 @@ impl<'a> Words<'a> {
             return None;
         }
         let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
-        self.at += begin + end;
-        Some(&rest[..end])
+        // Where a comment begins in a word, it is what comes next.
+        let word = text::before_comment(&rest[..end]);
+        self.at += begin + word.len();
+        Some(word)
     }
 
     /// The next word, whatever line it is on.
@@ -156,9 +157,6 @@ fn is_end(byte: u8) -> bool {
 
 /// A number as C prints it, NaN of any kind included.
 fn parse(word: &[u8]) -> Option<Number> {
-    let text: Cow<'_, str> = match word.iter().any(|b| matches!(b, b'#' | b'(')) {
-        true => "nan".into(),
-        false => std::str::from_utf8(word).ok()?.into(),
-    };
-    Some(Number { value: text.parse().ok()?, is_whole: word.iter().all(u8::is_ascii_digit) })
+    let value = if text::is_c_nan(word) { f64::NAN } else { std::str::from_utf8(word).ok()?.parse().ok()? };
+    Some(Number { value, is_whole: word.iter().all(u8::is_ascii_digit) })
 }

@@ -3,7 +3,7 @@
 use super::header::{Kind, word};
 use super::layout::Layout;
 use super::source::{Columns, Source};
-use std::borrow::Cow;
+use crate::mesh::text;
 
 /// Reads numbers.
 pub struct Text<'a> {
@@ -91,15 +91,14 @@ impl Source for Text<'_> {
     }
 }
 
-/// A number as C prints it. What Microsoft's C library prints for a NaN, `1.#IND` or `-nan(ind)`, is one.
+/// A number as C prints it, NaN of any kind included. There are no comments in a body.
 fn parse(word: &[u8]) -> Option<f64> {
     // Most words are indices.
     if (1..10).contains(&word.len()) && word.iter().all(u8::is_ascii_digit) {
         return Some(f64::from(word.iter().fold(0, |value: u32, digit| value * 10 + u32::from(digit - b'0'))));
     }
-    let text: Cow<'_, str> = match word.iter().any(|b| matches!(b, b'#' | b'(')) {
-        true => "nan".into(),
-        false => std::str::from_utf8(word).ok()?.into(),
-    };
-    text.parse().ok()
+    if text::is_c_nan(word) {
+        return Some(f64::NAN);
+    }
+    std::str::from_utf8(word).ok()?.parse().ok()
 }

@@ -143,20 +143,29 @@ fn paint(raw: &mut RawMesh, header: &[u8], body: &[u8], cx: &mut Context<'_>) ->
 /// ASCII is read by its words alone: exporters disagree on lines and indentation, but every corner is `vertex x y z`.
 fn read_ascii(text: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut raw = new_mesh(Format::StlAscii);
-    let name = text.split(|&b| b == b'\n').next().and_then(|line| line.get(5..)).unwrap_or_default();
-    raw.report.facts = FileFacts::by(facts::tidy(name));
+    // Line ends of old Macs, where there are no others.
+    let newline = if text.contains(&b'\n') { b'\n' } else { b'\r' };
+    raw.report.facts = FileFacts::by(facts::tidy(name(text, newline)));
     // The shortest triangle that a text can hold says how many it can have at most.
     let count_max = text.len() as u64 / 30 + 1;
     cx.budget.spend("the STL triangles", count_max, 3 * 24 + 12 + 1 + 4)?;
     let mut corners = 0_usize;
     let mut ended = false;
-    for (number, line) in text.split(|&b| b == b'\n').enumerate() {
-        if number % 65536 == 0 {
-            cx.deadline.check()?;
-        }
+    let mut met = 0_u64;
+    for (number, line) in text.split(|&b| b == newline).enumerate() {
         let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|w| !w.is_empty());
+        // Behind "solid" and "endsolid" is a name, which may be any words. It ends with the line, or where facets begin.
+        let mut is_name = false;
         while let Some(word) = words.next() {
-            if word.eq_ignore_ascii_case(b"vertex") {
+            if met.is_multiple_of(65_536) {
+                cx.deadline.check()?;
+            }
+            met += 1;
+            if is_name {
+                let begins = word.eq_ignore_ascii_case(b"facet")
+                    && words.clone().next().is_some_and(|word| word.eq_ignore_ascii_case(b"normal"));
+                (is_name, ended) = (!begins, ended && !begins);
+            } else if word.eq_ignore_ascii_case(b"vertex") {
                 let mut position = [0.0; 3];
                 for value in &mut position {
                     *value = parse(words.next()).ok_or_else(|| bad_line(number, "a vertex needs three numbers"))?;
@@ -171,7 +180,7 @@ fn read_ascii(text: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
                 push_triangle(&mut raw);
             } else if word.eq_ignore_ascii_case(b"solid") || word.eq_ignore_ascii_case(b"endsolid") {
                 ended = word.len() == 8;
-                break; // the rest of the line is a name, which may be any words
+                is_name = true;
             }
         }
     }
@@ -180,6 +189,14 @@ fn read_ascii(text: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     }
     cx.check_triangles(raw.triangles.len() as u64)?;
     finish(raw)
+}
+
+/// What follows the first word: up to the end of the line, or of what is before the first facet where that is on the same.
+fn name(text: &[u8], newline: u8) -> &[u8] {
+    let line = text.split(|&b| b == newline).next().and_then(|line| line.get(5..)).unwrap_or_default();
+    let head = &line[..line.len().min(4096)];
+    let facet = head.windows(13).position(|window| window.eq_ignore_ascii_case(b" facet normal"));
+    &line[..facet.unwrap_or(line.len())]
 }
 
 fn parse(word: Option<&[u8]>) -> Option<f64> {

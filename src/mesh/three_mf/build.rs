@@ -51,9 +51,12 @@ struct Count {
     objects: u64,
     triangles: u64,
     vertices: u64,
+    /// Levels of objects below this one.
+    height: usize,
 }
 
 impl Count {
+    /// Adds what is beside it.
     fn add(&mut self, other: Self) {
         self.objects = self.objects.saturating_add(other.objects);
         self.triangles = self.triangles.saturating_add(other.triangles);
@@ -69,21 +72,26 @@ struct Counter<'a> {
 
 impl Counter<'_> {
     fn count(&mut self, key: Key, object: &Object, depth: usize) -> Result<Count, MeshError> {
-        match self.known.get(&key) {
-            Some(Some(count)) => return Ok(*count),
-            Some(None) => return Err(MeshError::broken(format!("object {} of the 3MF file is in itself", key.1))),
-            None => {}
+        let known = self.known.get(&key).copied();
+        if let Some(None) = known {
+            return Err(MeshError::broken(format!("object {} of the 3MF file is in itself", key.1)));
         }
-        if depth > DEPTH_MAX {
+        // What is known already may be deep itself.
+        if depth + known.flatten().map_or(0, |count| count.height) > DEPTH_MAX {
             return Err(MeshError::broken(format!("objects of the 3MF file are more than {DEPTH_MAX} deep")));
         }
+        if let Some(Some(count)) = known {
+            return Ok(count);
+        }
         self.known.insert(key, None);
-        let mut count =
-            Count { objects: 1, triangles: object.triangles.len() as u64, vertices: object.vertices.len() as u64 };
+        let (triangles, vertices) = (object.triangles.len() as u64, object.vertices.len() as u64);
+        let mut count = Count { objects: 1, triangles, vertices, height: 0 };
         let parts = self.parts;
         for placed in &object.components {
             let (inner, object) = parts.find(key.0, placed)?;
-            count.add(self.count(inner, object, depth + 1)?);
+            let part = self.count(inner, object, depth + 1)?;
+            count.add(part);
+            count.height = count.height.max(part.height + 1);
         }
         self.known.insert(key, Some(count));
         Ok(count)

@@ -1,13 +1,15 @@
 //! 3MF, the format of 3D printing (3MF Consortium, "3D Manufacturing Format Core Specification" 1.3, "Production Extension" 1.1,
 //! and of "Materials and Properties Extension" 1.2 the colour groups): a zip package whose model parts are XML.
 //!
-//! [`package`] finds the part to begin with, [`xml`] is how elements and attributes are read, [`model`] keeps one part,
+//! [`package`] finds the part to begin with, [`xml`] is how elements and attributes are read, [`spaces`] whose they are, [`model`] keeps one part,
 //! [`parts`] all that it refers to, and [`build`] places them.
 
 mod build;
 mod model;
 mod package;
 mod parts;
+mod spaces;
+mod values;
 mod xml;
 
 pub use package::start_part;

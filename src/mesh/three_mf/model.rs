@@ -1,18 +1,18 @@
 //! One model part: its objects, what it builds, and the colours of its property groups.
 
+use super::spaces::Space;
+use super::values::{color, transform};
 use super::xml::{Element, Visitor};
 use crate::mesh::affine::Affine;
+use crate::mesh::bundle::show_all;
 use crate::mesh::import::Context;
-use crate::mesh::raw::srgb_to_linear;
-use crate::mesh::{MaterialSlot, MeshError};
+use crate::mesh::{MaterialSlot, MeshError, MeshFault, text};
 use rapidhash::RapidHashMap;
 
 /// No property.
 pub const NONE: u32 = u32::MAX;
 /// Vertices or triangles that are paid for at once.
 const PAID_AT_ONCE: usize = 1024;
-/// Longest name that is kept, characters.
-const NAME_MAX: usize = 256;
 
 /// A part, as the file has it.
 #[derive(Debug, Default)]
@@ -27,6 +27,8 @@ pub struct Model {
     pub groups: RapidHashMap<u32, Group>,
     /// Groups of properties that are not read.
     pub unread_groups: u64,
+    /// Meshes with a lattice of beams.
+    pub beam_lattices: u64,
     open: Open,
 }
 
@@ -83,10 +85,23 @@ struct Open {
 
 impl Visitor for Model {
     fn begin(&mut self, element: &Element<'_>, depth: usize, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        let space = element.space();
         if depth == 0 {
-            return if element.name() == "model" { Ok(()) } else { Err(element.broken("a part begins with <model>")) };
+            return root(element, space);
         }
         match element.name() {
+            "beamlattice" if space == Space::Beams => {
+                self.beam_lattices += 1;
+                Ok(())
+            }
+            "colorgroup" if space.is_materials() => self.group(element, None, cx),
+            "color" if space.is_materials() => self.color(element, "color", cx),
+            "texture2dgroup" | "compositematerials" | "multiproperties" if space.is_materials() => {
+                self.unread_groups += 1;
+                Ok(())
+            }
+            // Slices and the like have vertices and names of their own.
+            _ if !space.is_core() => Ok(()),
             "object" => self.object(element, cx),
             "vertex" => self.vertex(element, cx),
             "triangle" => self.triangle(element, cx),
@@ -102,31 +117,41 @@ impl Visitor for Model {
                 Ok(())
             }
             "basematerials" => self.group(element, Some(Vec::new()), cx),
-            "colorgroup" => self.group(element, None, cx),
             "base" => self.color(element, "displaycolor", cx),
-            "color" => self.color(element, "color", cx),
-            "texture2dgroup" | "compositematerials" | "multiproperties" => {
-                self.unread_groups += 1;
-                Ok(())
-            }
             _ => Ok(()),
         }
     }
 
-    fn end(&mut self, name: &str, cx: &mut Context<'_>) -> Result<(), MeshError> {
+    fn end(&mut self, name: &str, space: Space, cx: &mut Context<'_>) -> Result<(), MeshError> {
         match name {
+            "colorgroup" if space.is_materials() => self.open.group = None,
+            _ if !space.is_core() => {}
             "object" => {
                 if let Some(object) = self.open_object() {
                     object.finish()?;
                 }
                 self.open.object = None;
             }
-            "basematerials" | "colorgroup" => self.open.group = None,
+            "basematerials" => self.open.group = None,
             "mesh" => cx.deadline.check()?,
             _ => {}
         }
         Ok(())
     }
+}
+
+/// The root, and what it says that a reader has to know.
+fn root(element: &Element<'_>, space: Space) -> Result<(), MeshError> {
+    if element.name() != "model" || !space.is_core() {
+        return Err(element.broken("a part begins with <model>"));
+    }
+    let unread = element.unread(&element.text("requiredextensions")?.unwrap_or_default());
+    if unread.is_empty() {
+        return Ok(());
+    }
+    let names = show_all(unread.iter().map(String::as_str));
+    let detail = format!("the 3MF file requires extensions that are not read: {names}");
+    Err(MeshError::new(MeshFault::Unsupported, detail))
 }
 
 impl Model {
@@ -220,7 +245,7 @@ impl Model {
         let Some(group) = self.open.group.and_then(|id| self.groups.get_mut(&id)) else { return Ok(()) };
         let text = element.text(attribute)?.unwrap_or_default();
         let color = color(&text).ok_or_else(|| element.broken("a colour is #RRGGBB or #RRGGBBAA"))?;
-        let name: String = element.text("name")?.unwrap_or_default().chars().take(NAME_MAX).collect();
+        let name = text::name(&element.text("name")?.unwrap_or_default());
         // A base material may become a slot.
         let slot = if group.names.is_some() { size_of::<MaterialSlot>() as u64 + 64 } else { 0 };
         cx.budget.spend("the colours of the 3MF file", 1, 2 * (16 + 24 + name.len() as u64 + slot))?;
@@ -254,42 +279,4 @@ fn placed(element: &Element<'_>, cx: &mut Context<'_>) -> Result<Placed, MeshErr
         Some(text) => transform(&text).ok_or_else(|| element.broken("a transform has twelve numbers"))?,
     };
     Ok(Placed { object, path, transform })
-}
-
-/// Twelve numbers: where the three axes go, and the translation.
-fn transform(text: &str) -> Option<Affine> {
-    let mut numbers = [0.0; 12];
-    let mut words = text.split_ascii_whitespace();
-    for number in &mut numbers {
-        *number = words.next()?.parse().ok()?;
-    }
-    let linear = std::array::from_fn(|row| std::array::from_fn(|column| numbers[3 * column + row]));
-    words.next().is_none().then_some(Affine { linear, translation: [numbers[9], numbers[10], numbers[11]] })
-}
-
-/// sRGB and, where there are eight digits, alpha.
-fn color(text: &str) -> Option<[f32; 4]> {
-    let digits = text.trim_ascii().strip_prefix('#').filter(|digits| matches!(digits.len(), 6 | 8))?;
-    let byte = |at: usize| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok();
-    let channel = |at: usize| byte(at).map(|byte| srgb_to_linear(f64::from(byte) / 255.0) as f32);
-    let alpha = if digits.len() == 8 { f32::from(byte(6)?) / 255.0 } else { 1.0 };
-    Some([channel(0)?, channel(2)?, channel(4)?, alpha])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn colours_and_transforms() {
-        assert_eq!(color("#FF0000"), Some([1.0, 0.0, 0.0, 1.0]));
-        assert_eq!(color(" #00ff0033 "), Some([0.0, 1.0, 0.0, 0.2]));
-        for bad in ["", "#", "FF0000", "#FF000", "#FF00000", "#GG0000", "#ünïc"] {
-            assert_eq!(color(bad), None, "{bad}");
-        }
-        let map = transform("1 2 3  4 5 6  7 8 9  10 11 12").unwrap();
-        assert_eq!(map.point([1.0, 0.0, 0.0]), [11.0, 13.0, 15.0]);
-        assert_eq!(map.point([0.0, 0.0, 1.0]), [17.0, 19.0, 21.0]);
-        assert!(transform("1 2 3").is_none() && transform("1 2 3 4 5 6 7 8 9 10 11 12 13").is_none());
-    }
 }

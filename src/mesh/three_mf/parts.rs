@@ -53,13 +53,17 @@ pub fn read(raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Parts, MeshError>
         }
         at += 1;
     }
-    let unread: u64 = parts.models.iter().map(|model| model.unread_groups).sum();
-    if unread > 0 {
-        raw.report.warnings.push(Warning {
-            code: "properties_ignored",
-            detail: format!("textures and mixed materials of 3MF are not drawn (groups in the file: {unread})"),
-        });
-    }
+    let sum = |of: fn(&Model) -> u64| parts.models.iter().map(of).sum::<u64>();
+    let notes = [
+        (
+            sum(|model| model.unread_groups),
+            "properties_ignored",
+            "textures and mixed materials of 3MF are not drawn (groups in the file:",
+        ),
+        (sum(|model| model.beam_lattices), "beams_ignored", "beam lattices are not drawn (meshes in the file:"),
+    ];
+    let met = notes.into_iter().filter(|(count, ..)| *count > 0);
+    raw.report.warnings.extend(met.map(|(count, code, what)| Warning { code, detail: format!("{what} {count})") }));
     Ok(parts)
 }
 

@@ -1,9 +1,11 @@
-//! Elements and attributes of an XML part, by their names without prefixes. Nothing is expanded: a part with a DTD is refused.
+//! Elements and attributes of an XML part, by their names without prefixes, and what namespace an element's prefix means. Nothing is expanded: a part with a DTD is refused.
 
+use super::spaces::{Space, Spaces};
 use crate::mesh::bundle::show;
 use crate::mesh::import::Context;
 use crate::mesh::{MeshError, text};
 use quick_xml::events::{BytesStart, Event};
+use quick_xml::name::{Prefix, QName};
 use quick_xml::{Reader, XmlVersion};
 
 /// Elements within elements. The format needs seven.
@@ -18,6 +20,7 @@ pub struct Element<'e> {
     event: &'e BytesStart<'e>,
     part: &'e str,
     at: u64,
+    spaces: &'e Spaces,
 }
 
 /// What becomes of a part's elements.
@@ -25,7 +28,7 @@ pub trait Visitor {
     /// An element begins; `depth` is 0 for the root.
     fn begin(&mut self, element: &Element<'_>, depth: usize, cx: &mut Context<'_>) -> Result<(), MeshError>;
     /// And ends.
-    fn end(&mut self, name: &str, cx: &mut Context<'_>) -> Result<(), MeshError>;
+    fn end(&mut self, name: &str, space: Space, cx: &mut Context<'_>) -> Result<(), MeshError>;
 }
 
 /// Walks through the part of this name.
@@ -37,6 +40,7 @@ pub fn walk(part: &str, bytes: &[u8], visitor: &mut impl Visitor, cx: &mut Conte
     let document = std::str::from_utf8(bytes)
         .map_err(|error| broken(error.valid_up_to() as u64, "the text is neither UTF-8 nor UTF-16"))?;
     let mut reader = Reader::from_str(document);
+    let mut spaces = Spaces::default();
     let (mut depth, mut met, mut has_root) = (0, 0_u64, false);
     loop {
         met += 1;
@@ -44,11 +48,11 @@ pub fn walk(part: &str, bytes: &[u8], visitor: &mut impl Visitor, cx: &mut Conte
             cx.deadline.check()?;
         }
         let at = reader.buffer_position();
-        let event = reader.read_event().map_err(|error| broken(reader.error_position(), &error.to_string()))?;
+        let event = reader.read_event().map_err(|error| broken(reader.error_position(), &text::foreign(error)))?;
         match event {
             Event::Start(event) => {
                 has_root = true;
-                visitor.begin(&element(&event, part, at)?, depth, cx)?;
+                visitor.begin(&element(&event, part, at, &mut spaces, depth)?, depth, cx)?;
                 depth += 1;
                 if depth > DEPTH_MAX {
                     return Err(broken(at, &format!("elements are more than {DEPTH_MAX} deep")));
@@ -56,12 +60,14 @@ pub fn walk(part: &str, bytes: &[u8], visitor: &mut impl Visitor, cx: &mut Conte
             }
             Event::Empty(event) => {
                 has_root = true;
-                visitor.begin(&element(&event, part, at)?, depth, cx)?;
-                visitor.end(event.local_name().into_inner(), cx)?;
+                visitor.begin(&element(&event, part, at, &mut spaces, depth)?, depth, cx)?;
+                visitor.end(event.local_name().into_inner(), space(&spaces, event.name()), cx)?;
+                spaces.end(depth);
             }
             Event::End(event) => {
                 depth = depth.saturating_sub(1);
-                visitor.end(event.local_name().into_inner(), cx)?;
+                visitor.end(event.local_name().into_inner(), space(&spaces, event.name()), cx)?;
+                spaces.end(depth);
             }
             Event::DocType(_) => return Err(broken(at, "a DTD is not allowed in 3MF")),
             Event::Eof if depth > 0 => return Err(broken(at, "the text is cut off")),
@@ -74,12 +80,25 @@ pub fn walk(part: &str, bytes: &[u8], visitor: &mut impl Visitor, cx: &mut Conte
     }
 }
 
-fn element<'e>(event: &'e BytesStart<'e>, part: &'e str, at: u64) -> Result<Element<'e>, MeshError> {
-    let element = Element { event, part, at };
-    if event.attributes_raw().len() > ATTRIBUTES_BYTES_MAX {
-        return Err(element.broken("the element's attributes are too long"));
+fn element<'e>(
+    event: &'e BytesStart<'e>,
+    part: &'e str,
+    at: u64,
+    spaces: &'e mut Spaces,
+    depth: usize,
+) -> Result<Element<'e>, MeshError> {
+    let is_short = event.attributes_raw().len() <= ATTRIBUTES_BYTES_MAX;
+    let are_few = !is_short || spaces.begin(event, depth);
+    let element = Element { event, part, at, spaces };
+    match (is_short, are_few) {
+        (true, true) => Ok(element),
+        (false, _) => Err(element.broken("the element's attributes are too long")),
+        (true, false) => Err(element.broken("there are too many declarations of namespaces")),
     }
-    Ok(element)
+}
+
+fn space(spaces: &Spaces, name: QName<'_>) -> Space {
+    spaces.of(name.prefix().map_or("", Prefix::into_inner))
 }
 
 impl Element<'_> {
@@ -88,12 +107,22 @@ impl Element<'_> {
         self.event.local_name().into_inner()
     }
 
+    /// Whose it is.
+    pub fn space(&self) -> Space {
+        space(self.spaces, self.event.name())
+    }
+
+    /// The namespaces of a list of prefixes that a file may not require.
+    pub fn unread(&self, prefixes: &str) -> Vec<String> {
+        self.spaces.unread(prefixes)
+    }
+
     /// Gives each attribute, by its name without a prefix, as it is in the file.
     pub fn each(&self, mut take: impl FnMut(&str, &str) -> Result<(), MeshError>) -> Result<(), MeshError> {
         let mut attributes = self.event.attributes();
         // Checking for duplicates is quadratic.
         for attribute in attributes.with_checks(false) {
-            let attribute = attribute.map_err(|error| self.broken(&error.to_string()))?;
+            let attribute = attribute.map_err(|error| self.broken(&text::foreign(error)))?;
             take(attribute.key.local_name().into_inner(), &attribute.value)?;
         }
         Ok(())
@@ -103,10 +132,10 @@ impl Element<'_> {
     pub fn text(&self, name: &str) -> Result<Option<String>, MeshError> {
         let mut attributes = self.event.attributes();
         for attribute in attributes.with_checks(false) {
-            let attribute = attribute.map_err(|error| self.broken(&error.to_string()))?;
+            let attribute = attribute.map_err(|error| self.broken(&text::foreign(error)))?;
             if attribute.key.local_name().into_inner() == name {
                 let value = attribute.normalized_value(XmlVersion::Implicit1_0);
-                return value.map(|value| Some(value.into_owned())).map_err(|error| self.broken(&error.to_string()));
+                return value.map(|value| Some(value.into_owned())).map_err(|error| self.broken(&text::foreign(error)));
             }
         }
         Ok(None)

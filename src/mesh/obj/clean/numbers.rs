@@ -2,7 +2,7 @@
 
 use super::super::face::show;
 use super::Cleaner;
-use crate::mesh::MeshError;
+use crate::mesh::{MeshError, text};
 
 impl Cleaner<'_, '_> {
     /// Writes a position, with its colour or its weight.
@@ -46,8 +46,7 @@ impl Cleaner<'_, '_> {
         self.out.extend_from_slice(keyword);
         for i in 0..count {
             let word = match words.next() {
-                // What Microsoft's C library prints for a NaN: 1.#IND, -nan(ind).
-                Some(word) if word.iter().any(|b| matches!(b, b'#' | b'(')) => b"nan",
+                Some(word) if text::is_c_nan(word) => b"nan",
                 Some(word) if word.is_ascii() => word,
                 // A one-dimensional texture coordinate is legal.
                 None if count == 2 && i == 1 => b"0",
