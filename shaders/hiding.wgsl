@@ -218,7 +218,9 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     }
     let at_start = sides_of(p, q, r, s.ends.xy, is_clockwise);
     let at_end = sides_of(p, q, r, s.ends.zw, is_clockwise);
-    if any((at_start <= vec3(0.0)) & (at_end <= vec3(0.0))) {
+    // What lies on a side from end to end is hidden: two triangles that share it would leave it between them.
+    let is_along = (at_start == vec3(0.0)) & (at_end == vec3(0.0));
+    if any((at_start <= vec3(0.0)) & (at_end <= vec3(0.0)) & !is_along) {
         return none;
     }
     var part = vec2(0.0, 1.0);

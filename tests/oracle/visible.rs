@@ -14,6 +14,9 @@ pub type Segment = [V2; 2];
 /// two surfaces that are not meant to touch.
 const NEARER: f64 = 1e-9;
 
+/// Twice the area that a side spans with a point on it, as f64 rounds it, square pixels.
+const ON_SIDE: f64 = 1e-8;
+
 /// What is left of an edge by rounding alone, where it ends at what hides it. Its round caps would show as a dot.
 const CRUMB_PX: f64 = 1e-4;
 
@@ -90,7 +93,11 @@ pub fn visible_parts(screen: &Screen, edge: [u32; 2], [a, b]: [V3; 2]) -> Vec<[f
 fn hidden_by(piece: &Piece, a: V3, b: V3) -> Option<[f64; 2]> {
     let (mut from, mut to) = (0.0, 1.0);
     for k in 0..3 {
-        narrow(&mut from, &mut to, piece.side(k, xy(a)), piece.side(k, xy(b)))?;
+        let [at_a, at_b] = [a, b].map(|p| piece.side(k, xy(p)));
+        // What lies on a side from end to end is hidden, or two triangles that share it would leave it between them.
+        if at_a.abs().max(at_b.abs()) > ON_SIDE {
+            narrow(&mut from, &mut to, at_a, at_b)?;
+        }
     }
     // Depths are compared only where the edge is inside, so that thin triangles need not be continued far.
     let nearer = |t: f64| {

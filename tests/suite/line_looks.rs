@@ -129,3 +129,28 @@ fn transparent_wireframes_composite_to_the_opaque_picture() {
     }
     assert_eq!(compared, 2 * 3 * 150 * 110);
 }
+
+/// From where a box is seen by default the edge behind its top lies along that face's diagonal, which no file has and nobody draws.
+#[test]
+fn what_lies_behind_a_diagonal_is_hidden() {
+    const TOP_AND_WALLS: &str = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\
+        f 4 8 7 3\nf 1 4 3 2\nf 5 6 7 8\nf 1 5 8 4\nf 2 3 7 6\n";
+    let whole = format!("{TOP_AND_WALLS}f 1 2 6 5\n");
+    let keys = [("style", "wireframe"), ("size", "160"), ("wire.edges", "polygons"), ("wire.hidden", "hide")];
+    let mut renderers: Vec<Box<dyn Renderer>> = vec![Box::new(CpuRenderer::new(1))];
+    renderers.extend(twins::gpus().map(|gpus| Box::new(GpuRenderer::new(Arc::clone(&gpus[0]))) as Box<dyn Renderer>));
+    let mut cases = 0;
+    for azimuth in ["45", "135", "225", "315", "50"] {
+        let spec = scenes::spec(&[&keys[..], &[("camera.azimuth_deg", azimuth)]].concat());
+        for renderer in &mut renderers {
+            // Of a closed box no edge is asked that looks away; of an open one all are, and its faces hide the same.
+            let [closed, open] = [&whole, TOP_AND_WALLS].map(|obj| {
+                let mesh = scenes::mesh(obj);
+                renderer.draw(&scenes::plan(&mesh, &spec), &Deadline::default()).unwrap()
+            });
+            assert!(closed == open, "{azimuth} degrees, {}", renderer.kind().name());
+            cases += 1;
+        }
+    }
+    assert_eq!(cases, 5 * renderers.len());
+}

@@ -187,14 +187,18 @@ fn hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, id: u32) -> Op
     }
     let [start, end] = segment.ends();
     let sides = [sides(&corners, start, is_clockwise), sides(&corners, end, is_clockwise)];
+    // What lies on a side from end to end is hidden: two triangles that share it would leave it between them.
+    let is_along = |k: usize| (sides[0][k] == 0.0) & (sides[1][k] == 0.0);
     for k in 0..3 {
-        if (sides[0][k] <= 0.0) & (sides[1][k] <= 0.0) {
+        if (sides[0][k] <= 0.0) & (sides[1][k] <= 0.0) & !is_along(k) {
             return None;
         }
     }
     let mut range = [0.0, 1.0];
     for k in 0..3 {
-        narrow(&mut range, [sides[0][k], sides[1][k]])?;
+        if !is_along(k) {
+            narrow(&mut range, [sides[0][k], sides[1][k]])?;
+        }
     }
     // Depths are compared only where the edge is inside, so that thin triangles need not be continued far.
     let nearer = |t: f32| {
