@@ -6,13 +6,16 @@ use super::device::Gpu;
 use super::stages::{SLOTS, Slot};
 use crate::backend::DrawError;
 
-/// What is kept of the buffers of all jobs, at most.
-const KEPT_BYTES_MAX: u64 = 1 << 30;
+/// What is kept of a job's buffers, at most; a job that needed more gives all of them back.
+const SET_BYTES_MAX: u64 = 256 << 20;
+
+/// What is kept of all jobs' buffers, at most: on a processor that plays GPU it is the process's memory.
+const KEPT_BYTES_MAX: u64 = 2 * SET_BYTES_MAX;
 
 /// Smallest buffer: a binding may not be empty, and a struct must fit in.
 const SIZE_MIN: u64 = 256;
 
-/// Buffers that no job uses just now: as many sets as jobs ever ran at once.
+/// Buffers that no job uses just now.
 ///
 /// The set that was used last is lent first. Workers take turns with jobs; if each had a set of its own, most of the memory would lie idle,
 /// and the first job of each would wait for more.
@@ -25,11 +28,12 @@ impl SpareBuffers {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
     }
 
-    /// A set that a finished job used. It goes where it, or all sets together, would be more than may be kept.
+    /// A set that a finished job used. It is not kept where it, or all sets together, would be too much.
     pub fn give_back(&self, buffers: Buffers) {
         let mut spare = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let kept: u64 = spare.iter().map(Buffers::bytes).sum();
-        if kept + buffers.bytes() <= KEPT_BYTES_MAX {
+        let more = buffers.bytes();
+        if more <= SET_BYTES_MAX && kept + more <= KEPT_BYTES_MAX {
             spare.push(buffers);
         }
     }
