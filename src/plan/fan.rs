@@ -1,11 +1,13 @@
-//! Round corners of outlines: the fan around a vertex between the strips of two rims that meet there.
+//! Round corners of outlines: the fan around a vertex between the strips of two rims that meet there, where none of its faces is.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use super::HullPass;
 use super::build::Means;
+use super::order::sort;
 use super::outline::snapped;
-use super::rim::CHECK_EVERY;
+use super::rim::{CHECK_EVERY, View};
+use super::sectors::{Sectors, turn as turned};
 use crate::limits::{Budget, Deadline, Stopped};
 use crate::plan::PlanError;
 
@@ -22,6 +24,9 @@ const CHORD_MAX: f64 = 2.8;
 
 /// Gaps between two rims that are this narrow are what rounding makes of a needle's tip, around which its outline goes.
 const GAP_MIN: f64 = 1e-9;
+
+/// The narrowest piece of a fan, as an angle.
+const PIECE_MIN: f64 = 1e-9;
 
 /// An end of a rim that has a strip.
 #[derive(Clone, Copy, Debug)]
@@ -54,11 +59,13 @@ pub struct Fans {
     triangles_max: f64,
 }
 
-/// A fan: from an end's outer corner on, by an angle; to another end's, if there is one.
+/// A fan: from an end's outer corner on, by an angle; to another end's, if there is one. Of it, what lies between two of its angles is
+/// drawn.
 struct Fan {
     from: usize,
     sweep: f64,
     to: Option<usize>,
+    piece: [f64; 2],
 }
 
 impl Fans {
@@ -74,41 +81,46 @@ impl Fans {
         self.ends.push(end);
     }
 
-    /// Adds the fans of all vertices to the hull, whose own vertices are numbered from `first` on.
-    pub fn finish(&mut self, first: u32, hull: &mut HullPass<'_>, means: &mut Means<'_>) -> Result<(), PlanError> {
-        let deadline = means.deadline;
-        sort(&mut self.ends, deadline)?;
-        let ends = &self.ends;
+    /// Adds the fans of all vertices to the hull.
+    pub fn finish(&mut self, view: &View<'_>, hull: &mut HullPass<'_>, means: &mut Means<'_>) -> Result<(), PlanError> {
+        self.sort(means.deadline)?;
+        let vertices = self.ends.chunk_by(|a, b| a.vertex == b.vertex).map(|group| group[0].vertex);
+        let sectors = Sectors::around(vertices, view, means)?;
+        self.draw(&sectors, view.mesh.positions.len() as u32, hull, means)
+    }
+
+    /// Puts the ends in order, by vertex and angle.
+    fn sort(&mut self, deadline: &Deadline) -> Result<(), Stopped> {
+        // Of two ends in one direction the one whose rim is free below comes first: the gap from the other to it is a whole turn.
+        let order =
+            |a: &End, b: &End| (a.vertex.cmp(&b.vertex)).then(a.angle.total_cmp(&b.angle)).then(a.free.cmp(&b.free));
+        sort(&mut self.ends, &order, deadline)
+    }
+
+    /// Adds the fans; the hull's own vertices are numbered from `first` on.
+    fn draw(
+        &self,
+        sectors: &Sectors,
+        first: u32,
+        hull: &mut HullPass<'_>,
+        means: &mut Means<'_>,
+    ) -> Result<(), PlanError> {
+        let (ends, deadline) = (&self.ends, means.deadline);
         let mut steps = 0.0;
-        each_fan(ends, deadline, |fan| steps += fan.sweep / step(&ends[fan.from], &fan, ends))?;
+        each_fan(ends, sectors, deadline, |fan| steps += fan.angle() / step(ends, &fan))?;
         let coarser = (steps / self.triangles_max).max(1.0);
         let (mut vertices, mut triangles) = (0, 0);
-        each_fan(ends, deadline, |fan| {
-            let count = chords(ends, &fan, coarser);
-            triangles += count as usize;
-            vertices += count as usize - usize::from(fan.to.is_some());
+        each_fan(ends, sectors, deadline, |fan| {
+            let count = chords(ends, &fan, coarser) as usize;
+            triangles += count;
+            vertices += count + 1 - usize::from(fan.begins()) - usize::from(fan.meets().is_some());
         })?;
         grow("an outline's corners", &mut hull.vertices, vertices, means.budget)?;
         grow("an outline's corners", &mut hull.triangles, triangles, means.budget)?;
         grow("an outline's corners", &mut hull.triangle_materials, triangles, means.budget)?;
-        each_fan(ends, deadline, |fan| draw(ends, &fan, coarser, first, hull))?;
+        each_fan(ends, sectors, deadline, |fan| draw(ends, &fan, coarser, first, hull))?;
         Ok(())
     }
-}
-
-/// By vertex and angle. In parts, which are put in order one by one, so that the deadline can be looked at in between.
-fn sort(ends: &mut [End], deadline: &Deadline) -> Result<(), Stopped> {
-    // Of two ends in one direction the one whose rim is free below comes first: the gap from the other to it is a whole turn.
-    let order =
-        |a: &End, b: &End| (a.vertex.cmp(&b.vertex)).then(a.angle.total_cmp(&b.angle)).then(a.free.cmp(&b.free));
-    deadline.check()?;
-    if ends.len() <= CHECK_EVERY {
-        ends.sort_unstable_by(order);
-        return Ok(());
-    }
-    let (low, _, high) = ends.select_nth_unstable_by(ends.len() / 2, order);
-    sort(low, deadline)?;
-    sort(high, deadline)
 }
 
 /// Makes room for so many more, and no others. While a list moves to where there is room, it is there twice.
@@ -120,8 +132,38 @@ fn grow<T>(what: &str, list: &mut Vec<T>, more: usize, budget: &mut Budget) -> R
     Ok(())
 }
 
-/// Calls `each` with every fan, vertex by vertex.
-fn each_fan(ends: &[End], deadline: &Deadline, mut each: impl FnMut(Fan)) -> Result<(), Stopped> {
+impl Fan {
+    /// How wide the piece is that is drawn.
+    fn angle(&self) -> f64 {
+        self.piece[1] - self.piece[0]
+    }
+
+    /// Whether it is drawn from the end's outer corner on.
+    fn begins(&self) -> bool {
+        self.piece[0] <= 0.0
+    }
+
+    /// The other end, if it is drawn up to there.
+    fn meets(&self) -> Option<usize> {
+        self.to.filter(|_| self.piece[1] >= self.sweep)
+    }
+}
+
+/// Calls `each` with every piece of a fan, vertex by vertex.
+fn each_fan(ends: &[End], sectors: &Sectors, deadline: &Deadline, mut each: impl FnMut(Fan)) -> Result<(), Stopped> {
+    let mut each_piece = |from: usize, sweep: f64, to: Option<usize>| {
+        let End { vertex, free, angle, turn, .. } = ends[from];
+        let (start, free) = (angle + f64::from(free) * turn, f64::from(free));
+        let low = turned(if free > 0.0 { start } else { start - sweep });
+        sectors.gaps(vertex, [low, low + sweep], |[a, b]| {
+            let [a, b] = if free > 0.0 { [a - low, b - low] } else { [low + sweep - b, low + sweep - a] };
+            // What rounding leaves of a fan whose corner lies where a face ends is none.
+            let piece = [if a < PIECE_MIN { 0.0 } else { a }, if b > sweep - PIECE_MIN { sweep } else { b }];
+            if piece[1] - piece[0] > PIECE_MIN {
+                each(Fan { from, sweep, to, piece });
+            }
+        });
+    };
     let mut unchecked = CHECK_EVERY;
     for (first, group) in groups(ends) {
         let count = group.len();
@@ -145,12 +187,12 @@ fn each_fan(ends: &[End], deadline: &Deadline, mut each: impl FnMut(Fan)) -> Res
             if meets && end.free > 0 {
                 let sweep = gap - end.turn - group[next].turn;
                 if sweep > 0.0 {
-                    each(Fan { from: first + i, sweep, to: Some(first + next) });
+                    each_piece(first + i, sweep, Some(first + next));
                 }
             } else if !meets {
                 let sweep = (gap - end.turn).min(FRAC_PI_2);
                 if sweep > 0.0 {
-                    each(Fan { from: first + i, sweep, to: None });
+                    each_piece(first + i, sweep, None);
                 }
             }
         }
@@ -168,15 +210,16 @@ fn groups(ends: &[End]) -> impl Iterator<Item = (usize, &[End])> {
 }
 
 /// The angle between the corners of an arc: its chords are `SAGITTA` away from it, `r (1 - cos(a / 2))`.
-fn step(from: &End, fan: &Fan, ends: &[End]) -> f64 {
+fn step(ends: &[End], fan: &Fan) -> f64 {
+    let from = &ends[fan.from];
     let reach = fan.to.map_or(from.reach, |to| ends[to].reach.max(from.reach));
     (8.0 * SAGITTA / reach.max(1.0)).sqrt().min(FRAC_PI_4)
 }
 
 /// Into how many triangles a fan is cut.
 fn chords(ends: &[End], fan: &Fan, coarser: f64) -> u32 {
-    let chord = (step(&ends[fan.from], fan, ends) * coarser).min(CHORD_MAX);
-    (fan.sweep / chord).max(0.0) as u32 + 1
+    let chord = (step(ends, fan) * coarser).min(CHORD_MAX);
+    (fan.angle() / chord).max(0.0) as u32 + 1
 }
 
 fn draw(ends: &[End], fan: &Fan, coarser: f64, first: u32, hull: &mut HullPass<'_>) {
@@ -184,20 +227,20 @@ fn draw(ends: &[End], fan: &Fan, coarser: f64, first: u32, hull: &mut HullPass<'
     let (reach, depth) = fan.to.map_or((from.reach, from.depth), |to| (ends[to].reach, ends[to].depth));
     let free = f64::from(from.free);
     let start = from.angle + free * from.turn;
+    let mut corner = |swept: f64| {
+        let (angle, share) = (start + free * swept, swept / fan.sweep);
+        let reach = from.reach + share * (reach - from.reach);
+        let at = [libm::cos(angle), libm::sin(angle)];
+        let [x, y] = [0, 1].map(|k| from.middle[k] + reach * at[k]);
+        hull.vertices.push(snapped([x, y, from.depth + share * (depth - from.depth), from.inv_w]));
+        first + hull.vertices.len() as u32 - 1
+    };
     let count = chords(ends, fan, coarser);
-    let mut last = from.outer;
+    let mut last = if fan.begins() { from.outer } else { corner(fan.piece[0]) };
     for i in 1..=count {
-        let share = f64::from(i) / f64::from(count);
-        let next = match fan.to {
+        let next = match fan.meets() {
             Some(to) if i == count => ends[to].outer,
-            _ => {
-                let angle = start + free * share * fan.sweep;
-                let reach = from.reach + share * (reach - from.reach);
-                let at = [libm::cos(angle), libm::sin(angle)];
-                let [x, y] = [0, 1].map(|k| from.middle[k] + reach * at[k]);
-                hull.vertices.push(snapped([x, y, from.depth + share * (depth - from.depth), from.inv_w]));
-                first + hull.vertices.len() as u32 - 1
-            }
+            _ => corner(fan.piece[0] + fan.angle() * (f64::from(i) / f64::from(count))),
         };
         hull.triangles.push([from.vertex, last, next]);
         hull.triangle_materials.push(from.material);

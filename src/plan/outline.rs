@@ -82,7 +82,7 @@ impl<'a> Outlines<'a> {
             }
             outlines.strip(rim);
         }
-        outlines.fans.finish(view.mesh.positions.len() as u32, &mut outlines.hull, means)?;
+        outlines.fans.finish(view, &mut outlines.hull, means)?;
         Ok(outlines.hull)
     }
 
@@ -245,8 +245,8 @@ pub fn hull_pass<'a>(
     }
     let tells_apart = colors.len() > 1 || (parts.layers_pass().is_some() && mesh.materials.len() > 1);
     let found = edges.with_silhouettes(mesh, parts, means)?;
-    let view = View::new(mesh, projection, means)?;
-    let rims = view.rims(parts, &thicknesses, found, means)?;
+    let view = View::new(mesh, parts, projection, means)?;
+    let rims = view.rims(&thicknesses, found, means)?;
     let surface_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
     let mut hull = Outlines::draw(&view, &thicknesses, size_px, &rims, means)?;
     pay_drawing(hull.vertices.len() as u64, hull.triangles.len() as u64, parts, means.budget)?;

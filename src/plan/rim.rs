@@ -36,14 +36,22 @@ pub struct View<'a> {
     pub places: Vec<[f64; 3]>,
     /// Of each face: -1 front, 1 back, 0 edge on.
     facing: Vec<i8>,
+    /// By material: the side that is left out.
+    culls: Vec<Cull>,
 }
 
 impl<'a> View<'a> {
     /// Looks at a mesh.
-    pub fn new(mesh: &'a Mesh, projection: &'a Projection, means: &mut Means<'_>) -> Result<Self, PlanError> {
+    pub fn new(
+        mesh: &'a Mesh,
+        parts: &Parts<'_>,
+        projection: &'a Projection,
+        means: &mut Means<'_>,
+    ) -> Result<Self, PlanError> {
         let Means { budget, deadline } = means;
         budget.spend("an outline", mesh.positions.len() as u64, size_of::<[f64; 3]>() as u64)?;
         budget.spend("an outline", mesh.triangles.len() as u64, 1)?;
+        budget.spend("materials", parts.layers.len() as u64, 1)?;
         let mut places = Vec::with_capacity(mesh.positions.len());
         for positions in mesh.positions.chunks(CHECK_EVERY) {
             deadline.check()?;
@@ -55,19 +63,17 @@ impl<'a> View<'a> {
             deadline.check()?;
             sides.extend(triangles.iter().map(|triangle| facing(mesh, &places, *triangle)));
         }
-        Ok(Self { mesh, projection, places, facing: sides })
+        let culls = (0..parts.layers.len()).map(|m| cull(parts, m)).collect();
+        Ok(Self { mesh, projection, places, facing: sides, culls })
     }
 
     /// The rims of the parts that have an outline, by material.
     pub fn rims(
         &self,
-        parts: &Parts<'_>,
         outlines: &[Option<Thickness>],
         (list, silhouettes): (&EdgeList, &Silhouettes<'_>),
         means: &mut Means<'_>,
     ) -> Result<Vec<Rim>, PlanError> {
-        means.budget.spend("materials", parts.layers.len() as u64, 1)?;
-        let culls: Vec<Cull> = (0..parts.layers.len()).map(|m| cull(parts, m)).collect();
         let each = |each: &mut dyn FnMut(Rim)| {
             for (i, edge) in list.edges.iter().enumerate() {
                 if i % CHECK_EVERY == 0 {
@@ -75,7 +81,7 @@ impl<'a> View<'a> {
                 }
                 let edge = Edge::new(&self.mesh.positions, edge.vertices, edge.faces);
                 let Some(edge) = silhouettes.edge(i as u32, edge) else { continue };
-                let faces = self.drawn(edge.faces, &culls);
+                let faces = self.drawn(edge.faces);
                 let Some(material) = self.material(faces, outlines) else { continue };
                 for &free in self.free_sides(edge.vertices, faces) {
                     each(Rim { vertices: edge.vertices, faces, free, material });
@@ -91,17 +97,20 @@ impl<'a> View<'a> {
         Ok(rims)
     }
 
-    /// Those of two faces that are not left out because of the side that they show, the first of them first.
-    fn drawn(&self, faces: [u32; 2], culls: &[Cull]) -> [u32; 2] {
-        let [a, b] = faces.map(|face| {
-            let Some(&facing) = self.facing.get(face as usize) else { return Edge::NO_FACE };
-            let material = self.mesh.triangle_materials[face as usize] as usize;
-            match culls.get(material) {
-                Some(Cull::Back) if facing > 0 => Edge::NO_FACE,
-                Some(Cull::Front) if facing < 0 => Edge::NO_FACE,
-                _ => face,
-            }
-        });
+    /// Which side a face shows: -1 its front, 1 its back, 0 neither; None of one that is left out because of that side, or of no face.
+    pub fn shown(&self, face: u32) -> Option<i8> {
+        let facing = *self.facing.get(face as usize)?;
+        let material = self.mesh.triangle_materials[face as usize] as usize;
+        match self.culls.get(material) {
+            Some(Cull::Back) if facing > 0 => None,
+            Some(Cull::Front) if facing < 0 => None,
+            _ => Some(facing),
+        }
+    }
+
+    /// Those of two faces that are drawn, the first of them first.
+    fn drawn(&self, faces: [u32; 2]) -> [u32; 2] {
+        let [a, b] = faces.map(|face| self.shown(face).map_or(Edge::NO_FACE, |_| face));
         if a == Edge::NO_FACE { [b, a] } else { [a, b] }
     }
 

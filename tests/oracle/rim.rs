@@ -1,7 +1,7 @@
 //! Part 3e: what a hull should show: all points within its width of an edge where the surface ends, on the side where the surface is
 //! not, and nearer than any surface there.
 //!
-//! Around a corner it goes as far as the next edge where the surface ends.
+//! Around a corner it goes as far as the next edge where the surface ends, or as the next face that has this corner.
 //!
 //! A hull recedes. Where it ends it lies half its width behind the edge, so that what is next to the edge hides it and what is far
 //! behind does not. A face that turns away faster than that is continued beyond its edge, up to five times as fast, and the hull
@@ -35,6 +35,8 @@ pub struct Rim {
     outward: V2,
     /// By end: in which directions edges leave it where the surface ends too.
     others: [Vec<V2>; 2],
+    /// By end: in which directions the two edges leave it of each face that has it.
+    faces: [Vec<[V2; 2]>; 2],
 }
 
 /// Everywhere that a scene's surface ends; for hulls so many pixels wide.
@@ -47,6 +49,12 @@ pub fn rims(scene: &Scene, width: f64) -> Vec<Rim> {
     for &[a, b] in &edges {
         at_vertex.entry(a).or_default().push(b);
         at_vertex.entry(b).or_default().push(a);
+    }
+    let mut opposite: BTreeMap<u32, Vec<[u32; 2]>> = BTreeMap::new();
+    for t in &scene.triangles {
+        for k in (0..3).filter(|&k| at_vertex.contains_key(&t[k])) {
+            opposite.entry(t[k]).or_default().push([t[(k + 1) % 3], t[(k + 2) % 3]]);
+        }
     }
     let mut rims = Vec::new();
     for edge in edges {
@@ -76,7 +84,14 @@ pub fn rims(scene: &Scene, width: f64) -> Vec<Rim> {
             ends.map(|v| [v[0], v[1]]).collect::<Vec<V2>>()
         };
         let others = [0, 1].map(|k| leave(k).into_iter().map(|v| sub(v, [ends[k][0], ends[k][1]])).collect());
-        rims.push(Rim { ends, far, outward, others });
+        let sectors = |k: usize| {
+            let faces = opposite[&edge[k]].iter().filter_map(|&[b, c]| match camera.in_front(&[at(b), at(c)])[..] {
+                [b, c] => Some([project(b), project(c)].map(|v| sub([v[0], v[1]], [ends[k][0], ends[k][1]]))),
+                _ => None,
+            });
+            faces.collect::<Vec<[V2; 2]>>()
+        };
+        rims.push(Rim { ends, far, outward, others, faces: [0, 1].map(sectors) });
     }
     rims
 }
@@ -134,14 +149,16 @@ fn is_inked(p: V2, near: &[&Rim], pieces: &[&Piece], width: f64) -> bool {
         let [x, y, depth] = mix(rim.ends[0], rim.ends[1], t);
         let far = rim.far[0] + t * (rim.far[1] - rim.far[0]);
         let way = sub(p, [x, y]);
-        // Past an end, only as far around it as the next edge.
+        // Past an end, only as far around it as the next edge, and where none of its faces is.
         let along = sub([rim.ends[1][0], rim.ends[1][1]], [rim.ends[0][0], rim.ends[0][1]]);
-        let (own, others): (V2, &[V2]) = match t {
-            _ if t <= 0.0 => (along, &rim.others[0]),
-            _ if t >= 1.0 => (along.map(|v| -v), &rim.others[1]),
-            _ => (along, &[]),
+        let (own, others, faces): (V2, &[V2], &[[V2; 2]]) = match t {
+            _ if t <= 0.0 => (along, &rim.others[0], &rim.faces[0]),
+            _ if t >= 1.0 => (along.map(|v| -v), &rim.others[1], &rim.faces[1]),
+            _ => (along, &[], &[]),
         };
-        let is_beyond = dot(rim.outward, way) >= 0.0 && !others.iter().any(|other| is_between(*other, [own, way]));
+        let is_passed = || others.iter().any(|other| is_between(*other, [own, way]));
+        let is_covered = || faces.iter().any(|face| is_between(way, *face));
+        let is_beyond = dot(rim.outward, way) >= 0.0 && !is_passed() && !is_covered();
         distance <= width && is_beyond && depth + distance / width * (far - depth) > surface
     })
 }

@@ -5,11 +5,13 @@ use std::time::{Duration, Instant};
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::GpuRenderer;
+use meshsnap::image::Image;
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use meshsnap::plan;
 
 use crate::likeness::{Likeness, Tolerance};
+use crate::outline_shapes::SHAPES;
 use crate::soups::Random;
 use crate::twins::gpus;
 use crate::{scenes, shapes};
@@ -118,4 +120,45 @@ fn hulls_are_the_same_on_both_back_ends_with_any_samples() {
         }
     }
     assert_eq!(cases, 3 * 4 * 3 * gpus.len());
+}
+
+/// How many pieces the dark pixels of a picture are of, where those that touch at a corner are one.
+fn dark_pieces(picture: &Image) -> usize {
+    let [width, height] = [picture.width_px as usize, picture.height_px as usize];
+    let mut is_left: Vec<bool> = picture.rgba.chunks(4).map(|pixel| pixel[0] < 128).collect();
+    let mut pieces = 0;
+    for first in 0..is_left.len() {
+        pieces += usize::from(is_left[first]);
+        let mut reached = vec![first];
+        while let Some(at) = reached.pop() {
+            if !std::mem::take(&mut is_left[at]) {
+                continue;
+            }
+            let (x, y) = (at % width, at / width);
+            let beside = |v: usize, size: usize| v.saturating_sub(1)..(v + 2).min(size);
+            let around = beside(y, height).flat_map(|y| beside(x, width).map(move |x| y * width + x));
+            reached.extend(around.filter(|&i| is_left[i]));
+        }
+    }
+    pieces
+}
+
+#[test]
+fn lines_that_end_inside_a_shape_leave_nothing_beside_their_ends() {
+    let mut renderer = CpuRenderer::new(2);
+    let mut cases = 0;
+    for (name, eye) in [("L", "5,-4,4"), ("L", "4,-4,5"), ("star", "0.5,-5,3.5"), ("star", "0.3,-4,3")] {
+        let shape = SHAPES.iter().find(|shape| shape.name == name).unwrap();
+        let mesh = scenes::mesh(&(shape.obj)());
+        for px in ["4", "8", "12"] {
+            let keys = [("style", "outline"), ("outline.unit", "px"), ("outline.thickness", px), ("samples", "8")];
+            let view = [("camera.eye", eye), ("camera.target", "0,0,0"), ("size", "240x200"), ("background", "fff")];
+            let spec = scenes::spec(&[&keys[..], &view, &[("surface.color", "fff")]].concat());
+            let picture = renderer.draw(&scenes::plan(&mesh, &spec), &Deadline::default()).unwrap();
+            // Each line inside begins at the outer border.
+            assert_eq!(dark_pieces(&picture), 1, "{name} from {eye}, {px} px");
+            cases += 1;
+        }
+    }
+    assert_eq!(cases, 12);
 }

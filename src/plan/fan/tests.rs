@@ -30,7 +30,10 @@ fn fans(ends: Vec<End>, size_px: [u32; 2]) -> Fans {
 fn finish(ends: Vec<End>, size_px: [u32; 2]) -> (HullPass<'static>, Result<(), PlanError>) {
     let mut hull = HullPass::default();
     let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
-    let result = fans(ends, size_px).finish(10, &mut hull, &mut Means { budget: &mut budget, deadline: &deadline });
+    let mut fans = fans(ends, size_px);
+    fans.sort(&deadline).unwrap();
+    let mut means = Means { budget: &mut budget, deadline: &deadline };
+    let result = fans.draw(&Sectors::default(), 10, &mut hull, &mut means);
     let exact = [hull.vertices.capacity(), hull.triangles.capacity()];
     assert_eq!(exact, [hull.vertices.len(), hull.triangles.len()], "room for what there is");
     (hull, result)
@@ -39,10 +42,9 @@ fn finish(ends: Vec<End>, size_px: [u32; 2]) -> (HullPass<'static>, Result<(), P
 /// Sums of the angles of all fans.
 fn swept(ends: Vec<End>) -> f64 {
     let mut fans = fans(ends, SIZE_PX);
-    let (mut hull, mut sum) = (HullPass::default(), 0.0);
-    let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
-    fans.finish(10, &mut hull, &mut Means { budget: &mut budget, deadline: &deadline }).unwrap();
-    each_fan(&fans.ends, &deadline, |fan| sum += fan.sweep).unwrap();
+    let (mut sum, deadline) = (0.0, Deadline::default());
+    fans.sort(&deadline).unwrap();
+    each_fan(&fans.ends, &Sectors::default(), &deadline, |fan| sum += fan.angle()).unwrap();
     sum
 }
 
@@ -86,7 +88,7 @@ fn fans_end_when_the_job_does() {
     let (mut hull, mut budget, deadline) = (HullPass::default(), Budget::new(&Limits::default()), Deadline::default());
     deadline.stop();
     let mut means = Means { budget: &mut budget, deadline: &deadline };
-    let result = fans(ends, SIZE_PX).finish(10, &mut hull, &mut means);
+    let result = fans(ends, SIZE_PX).draw(&Sectors::default(), 10, &mut hull, &mut means);
     assert!(matches!(result, Err(PlanError::Stopped(_))), "{result:?}");
     assert!(hull.triangles.is_empty());
 }

@@ -41,9 +41,9 @@ fn a_hull_takes_no_more_than_it_spends() {
         let mut edges = Edges::default();
         let found = edges.with_silhouettes(&mesh, &parts, &mut means).unwrap();
         let before = means.budget.spent_bytes();
-        let view = View::new(&mesh, &rows, &mut means).unwrap();
+        let view = View::new(&mesh, &parts, &rows, &mut means).unwrap();
         let thicknesses = [Some(Thickness::Px(3.0))];
-        let rims = view.rims(&parts, &thicknesses, found, &mut means).unwrap();
+        let rims = view.rims(&thicknesses, found, &mut means).unwrap();
         let hull = Outlines::draw(&view, &thicknesses, size_px, &rims, &mut means).unwrap();
         assert_eq!((rims.len(), rims.capacity()), (3 * count, 3 * count));
         assert!(hull.triangles.len() >= 9 * count, "{} triangles", hull.triangles.len());
@@ -87,13 +87,13 @@ fn every_step_ends_when_the_job_does() {
     stopped.stop();
     let mut means = Means { budget: &mut budget, deadline: &deadline };
     let found = edges.with_silhouettes(&mesh, &parts, &mut means).unwrap();
-    let view = View::new(&mesh, &rows, &mut means).unwrap();
+    let view = View::new(&mesh, &parts, &rows, &mut means).unwrap();
     let thicknesses = [Some(Thickness::Px(3.0))];
-    let rims = view.rims(&parts, &thicknesses, found, &mut means).unwrap();
+    let rims = view.rims(&thicknesses, found, &mut means).unwrap();
     let mut late = Means { budget: means.budget, deadline: &stopped };
     let results = [
-        View::new(&mesh, &rows, &mut late).err(),
-        view.rims(&parts, &thicknesses, found, &mut late).err(),
+        View::new(&mesh, &parts, &rows, &mut late).err(),
+        view.rims(&thicknesses, found, &mut late).err(),
         Outlines::draw(&view, &thicknesses, size_px, &rims, &mut late).err(),
     ];
     assert_eq!(results, [const { Some(PlanError::Stopped(Stopped)) }; 3]);
