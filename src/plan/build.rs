@@ -72,7 +72,7 @@ pub fn build_keeping<'a>(
     let surface = build_surface::surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
     let all_clipped = projection(&camera, size_px, true);
     let hides = surface.is_some() || parts.has_hull();
-    let margin_px = margin::margin_px(mesh, (&all_clipped, size_px), (&lines, hides), &mut skips, &means)?;
+    let margin_px = margin::margin_px(mesh, (&all_clipped, size_px), (&lines, hides), &mut skips, deadline)?;
     let no_hull = skips.skip(SkipKind::Hull, !parts.has_hull(), "the look has no hull");
     let hull = match (no_hull, parts.has_hull()) {
         (true, _) => None,

@@ -5,11 +5,10 @@
 //! on beyond the picture, the visibility buffer does too: by as much as bands of rows look at each other, because then a pixel's ink is
 //! that of the same pixel in the middle of a larger picture. Nothing else is drawn there.
 
-use super::build::Means;
 use super::rim::{CHECK_EVERY, row_dot};
 use super::skips::{SkipKind, Skips};
 use super::{DrawPlan, LinePass, Projection};
-use crate::limits::Stopped;
+use crate::limits::{Deadline, Stopped};
 use crate::mesh::Mesh;
 
 /// How far from the picture's border a mesh lies that lies inside, 1/256 px: lines ask a pixel beside an edge too, and vertices are
@@ -28,22 +27,22 @@ pub fn margin_px(
     (projection, size_px): (&Projection, [u32; 2]),
     (lines, hides): (&[LinePass], bool),
     skips: &mut Skips<'_>,
-    means: &Means<'_>,
+    deadline: &Deadline,
 ) -> Result<u32, Stopped> {
     let needed = lines.iter().map(LinePass::margin_rows).filter(|_| hides).max().unwrap_or(0);
     let (is_unneeded, why) = match needed {
         0 => (true, "no line asks what hides it"),
-        _ => (lies_inside(mesh, projection, size_px, means)?, "the whole mesh lies inside the picture"),
+        _ => (lies_inside(mesh, projection, size_px, deadline)?, "the whole mesh lies inside the picture"),
     };
-    let skips = skips.skip(SkipKind::Margin, is_unneeded, why);
-    Ok(if skips { 0 } else { needed.max(KEPT_PX) })
+    let is_skipped = skips.skip(SkipKind::Margin, is_unneeded, why);
+    Ok(if is_skipped { 0 } else { needed.max(KEPT_PX) })
 }
 
 /// Whether all of a mesh is before the eye and inside the picture.
-fn lies_inside(mesh: &Mesh, projection: &Projection, size_px: [u32; 2], means: &Means<'_>) -> Result<bool, Stopped> {
+fn lies_inside(mesh: &Mesh, projection: &Projection, size_px: [u32; 2], deadline: &Deadline) -> Result<bool, Stopped> {
     let half = size_px.map(|size| 128.0 * f64::from(size) - INSIDE);
     for positions in mesh.positions.chunks(CHECK_EVERY) {
-        means.deadline.check()?;
+        deadline.check()?;
         let is_inside = |p: &[f32; 3]| {
             let [x, y, w] = [&projection.x, &projection.y, &projection.w].map(|row| row_dot(row, *p));
             w >= f64::from(projection.near_w) && x.abs() <= half[0] * w && y.abs() <= half[1] * w

@@ -58,7 +58,7 @@ pub struct DrawPlan<'a> {
     /// Rows, at most 4096.
     pub height_px: u32,
     /// Pixels beyond the picture, on each side, that have visibility samples too: what is there hides the middle of lines whose flanks are
-    /// in the picture. See [`margin`].
+    /// in the picture. Nothing else is drawn there.
     pub margin_px: u32,
     /// Visibility samples a pixel: 1, 4, 8 or 16.
     pub samples: u32,
