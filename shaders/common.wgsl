@@ -77,6 +77,11 @@ struct Batch {
     role: u32,
     // Number of the layer that is looked for; 0 also for the visibility buffer.
     layer: u32,
+    // Columns in which triangles are drawn, and before which it ends: also those beyond the picture that the visibility buffer has.
+    column_first: i32,
+    column_end: i32,
+    // How many these are, on each side.
+    seen_margin: i32,
 };
 
 // Bits of `line_flags`.
@@ -139,6 +144,12 @@ fn has(flag: u32) -> bool {
 // Samples a pixel.
 fn sample_count() -> i32 {
     return select(select(select(1, 4, has(FOUR_SAMPLES)), 8, has(EIGHT_SAMPLES)), 16, has(SIXTEEN_SAMPLES));
+}
+
+// Where the visibility buffer has the first sample of the pixel that is number i of the batch's rows.
+fn first_seen(i: u32) -> u32 {
+    let row = u32(i32(i) / frame.width);
+    return batch.samples_at + u32(sample_count()) * (i + 2u * u32(batch.seen_margin) * row);
 }
 
 struct Vertex {

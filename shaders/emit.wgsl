@@ -1,5 +1,5 @@
 // Where the visibility stage's samples go: into the visibility buffer.
 
-fn emit(index: u32, z: f32, id: u32) {
-    keep_nearest(index, z, id);
+fn emit(pixel: vec2<i32>, n: i32, z: f32, id: u32) {
+    keep_nearest(sample_index(pixel.x, pixel.y, n), z, id);
 }

@@ -103,7 +103,7 @@ fn look_along(edge: vec4<u32>, s: Segment, search: Search) -> Look {
     let across = select(vec2(1, 0), vec2(0, 1), abs(s.along.x) >= abs(s.along.y));
     var look = Look(search.begin, 2.0, false);
     var recent = vec4(NOTHING);
-    var last = vec2(-1);
+    var last = vec2(OUTSIDE);
     let beyond = f32(search.radius) * s.inverse_length;
     let walked = vec2(search.range.x - beyond, search.range.y + beyond);
     let steps = walk_steps(s, walked);
@@ -137,11 +137,18 @@ fn look_along(edge: vec4<u32>, s: Segment, search: Search) -> Look {
 
 // Id and depth (its bits) that a sample of a pixel sees.
 fn seen_at(pixel: vec2<i32>, sample: u32) -> vec2<u32> {
-    if pixel.x < 0 || pixel.x >= frame.width || pixel.y < batch.seen_first || pixel.y >= batch.seen_end {
+    if !has_samples(pixel) {
         return vec2(NOTHING, 0u);
     }
-    let word = samples[u32((pixel.y - batch.seen_first) * frame.width + pixel.x) * u32(sample_count()) + sample];
+    let row = (pixel.y - batch.seen_first) * (frame.width + 2 * batch.seen_margin);
+    let word = samples[u32(row + pixel.x + batch.seen_margin) * u32(sample_count()) + sample];
     return vec2(select(~word.x, NOTHING, word.y == 0u), word.y);
+}
+
+// Whether a pixel of the picture, or beyond, is in the visibility buffer.
+fn has_samples(pixel: vec2<i32>) -> bool {
+    return all(pixel >= vec2(-batch.seen_margin, batch.seen_first))
+        && all(pixel < vec2(frame.width + batch.seen_margin, batch.seen_end));
 }
 
 // Whether all triangles that are seen along the edge are nearer than any of it.
@@ -149,12 +156,11 @@ fn lies_deep(s: Segment, range: vec2<f32>) -> bool {
     let nearest = rn(max(depth_of(s, 0.0), depth_of(s, 1.0)) * NEARER);
     let count = u32(sample_count());
     var last_id = NOTHING;
-    var last = vec2(-1);
+    var last = vec2(OUTSIDE);
     let steps = walk_steps(s, range);
     for (var i = 0u; i <= steps; i++) {
         let pixel = walk_pixel(s, range, i);
-        if all(pixel == last) || pixel.x < 0 || pixel.x >= frame.width
-            || pixel.y < batch.seen_first || pixel.y >= batch.seen_end {
+        if all(pixel == last) || !has_samples(pixel) {
             continue;
         }
         last = pixel;

@@ -130,8 +130,9 @@ fn weight(i: u32, points: u32, opacity: f32) -> f32 {
     // In points.
     var surface = 0.0;
     var surface_covered = 0.0;
+    let in_base = first_seen(i);
     for (var s = 0u; s < count; s++) {
-        let alpha = shown(i * count + s);
+        let alpha = shown(in_base + s, i * count + s);
         if alpha > 0.0 {
             var covered = 0u;
             for (var w = 0u; w < MASK_WORDS; w++) {
@@ -149,9 +150,9 @@ fn weight(i: u32, points: u32, opacity: f32) -> f32 {
     return rn(rn(f32(POINTS) * left) * recip(rn(of_pixel * surface)));
 }
 
-// How much surface a sample sees, 0 to 1.
-fn shown(sample: u32) -> f32 {
-    if samples[batch.samples_at + sample].y != 0u {
+// How much surface a sample sees, 0 to 1, given where it is in the visibility buffer, and among those of the batch.
+fn shown(in_base: u32, sample: u32) -> f32 {
+    if samples[in_base].y != 0u {
         return 1.0;
     }
     if has(LAYERS) {

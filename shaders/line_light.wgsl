@@ -24,10 +24,11 @@ fn line_light(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
     owners[i] = 0u;
     let corner = pixel_corner(vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width));
     let samples_px = u32(sample_count());
+    let in_base = first_seen(i);
     var sum = vec2(0.0);
     var count = 0.0;
     for (var s = 0u; s < samples_px; s++) {
-        let word = samples[batch.samples_at + i * samples_px + s];
+        let word = samples[in_base + s];
         // Neither a hull nor nothing.
         if word.y != 0u && ~word.x < frame.triangle_count {
             sum += point_light(~word.x, vec2<f32>(corner + sample_offset(i32(s))));

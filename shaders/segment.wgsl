@@ -89,8 +89,8 @@ fn walk_steps(s: Segment, range: vec2<f32>) -> u32 {
     return u32(rn(rn(s.length * (range.y - range.x)) * 2.0)) + 1u;
 }
 
-// Where step i along a range of the edge lies; left of or above the picture, or outside of the rows, (-1, -1).
+// The pixel in which step i along a range of the edge lies, in the picture or beyond.
 fn walk_pixel(s: Segment, range: vec2<f32>, i: u32) -> vec2<i32> {
     let p = point_at(s, min(range.x + rn(f32(i) * (0.5 * s.inverse_length)), range.y));
-    return select(vec2(-1), vec2<i32>(p), all(p >= vec2(0.0)));
+    return vec2<i32>(floor(p));
 }

@@ -15,7 +15,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
     }
     let pixel = vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width);
     if sample_count() == 1 {
-        let id = seen(i);
+        let id = seen(first_seen(i));
         var color = group_color(lone_group(id), pixel, surface_show(id));
         if has(LAYERS) {
             color = layered[i].color + rn4((1.0 - layered[i].color.w) * color);
@@ -24,6 +24,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         return;
     }
     let first = u32(sample_count()) * i;
+    let in_base = first_seen(i);
     // A power of two.
     let share = 1.0 / f32(sample_count());
     var sum = vec4(0.0);
@@ -34,9 +35,9 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         sum = rn4(share * sum);
     }
     // Once for each triangle among the samples.
-    var left = seeing(first);
+    var left = seeing(in_base);
     while left != 0u {
-        let group = first_group(first, left);
+        let group = first_group(in_base, left);
         left &= ~group.same;
         var weight = f32(group.count);
         if has(LAYERS) {
@@ -59,7 +60,7 @@ fn uncovered(first: u32, same: u32) -> f32 {
 }
 
 fn seen(sample: u32) -> u32 {
-    let word = samples[batch.samples_at + sample];
+    let word = samples[sample];
     return select(~word.x, NOTHING, word.y == 0u);
 }
 

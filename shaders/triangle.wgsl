@@ -55,13 +55,13 @@ fn depth_at(s: Setup, p: vec2<i32>) -> f32 {
     return min(max(z, s.depth_range.x), s.depth_range.y);
 }
 
-// First and last pixel (x, y, x, y) that three corners span inside the batch's rows; empty if first > last.
+// First and last pixel (x, y, x, y) that three corners span inside the batch's columns and rows; empty if first > last.
 fn pixel_bounds(x: vec3<i32>, y: vec3<i32>) -> vec4<i32> {
     let half = vec2(frame.width, frame.height) * 128;
     let low = vec2(min(min(x.x, x.y), x.z), min(min(y.x, y.y), y.z));
     let high = vec2(max(max(x.x, x.y), x.z), max(max(y.x, y.y), y.z));
-    let first = max((low + half) >> vec2(8u), vec2(0, batch.row_first));
-    let last = min((high + half) >> vec2(8u), vec2(frame.width, batch.row_end) - 1);
+    let first = max((low + half) >> vec2(8u), vec2(batch.column_first, batch.row_first));
+    let last = min((high + half) >> vec2(8u), vec2(batch.column_end, batch.row_end) - 1);
     return vec4(first, last);
 }
 

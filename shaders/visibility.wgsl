@@ -48,7 +48,7 @@ fn draw_small(s: Setup, bounds: vec4<i32>, id: u32) {
                 if (value.x | value.y | value.z) >= 0 {
                     let z = depth_at(s, corner + 16 * at);
                     if z > 0.0 {
-                        emit(sample_index(x, y, n), z, id);
+                        emit(vec2(x, y), n, z, id);
                     }
                 }
             }

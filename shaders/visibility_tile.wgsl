@@ -87,7 +87,7 @@ fn draw_pixel(s: Setup, e: Edges, values: vec3<i32>, in_block: vec2<i32>, pixel:
         if (value.x | value.y | value.z) >= 0 {
             let z = depth_at(s, corner + 16 * offset);
             if z > 0.0 {
-                emit(sample_index(pixel.x, pixel.y, n), z, id);
+                emit(pixel, n, z, id);
             }
         }
     }

@@ -3,7 +3,9 @@
 use super::edges::Edges;
 use super::parts::Parts;
 use super::skips::{SkipKind, Skips};
-use super::{DrawPlan, HullPass, LayersPass, PlanError, Projection, Thickness, build_surface, loose, outline, wires};
+use super::{
+    DrawPlan, HullPass, LayersPass, PlanError, Projection, Thickness, build_surface, loose, margin, outline, wires,
+};
 use crate::limits::{Budget, Deadline, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::scene::camera::{Border, Camera};
@@ -68,17 +70,16 @@ pub fn build_keeping<'a>(
     let lines =
         wires::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, &mut means)?;
     let surface = build_surface::surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
+    let all_clipped = projection(&camera, size_px, true);
+    let hides = surface.is_some() || parts.has_hull();
+    let margin_px = margin::margin_px(mesh, (&all_clipped, size_px), (&lines, hides), &mut skips, deadline)?;
     let no_hull = skips.skip(SkipKind::Hull, !parts.has_hull(), "the look has no hull");
     let hull = match (no_hull, parts.has_hull()) {
         (true, _) => None,
         (false, false) => Some(HullPass::default()),
-        (false, true) => Some(outline::hull_pass(
-            mesh,
-            &parts,
-            (&projection(&camera, size_px, true), size_px),
-            &mut edges,
-            &mut means,
-        )?),
+        (false, true) => {
+            Some(outline::hull_pass(mesh, &parts, (&all_clipped, size_px, margin_px), &mut edges, &mut means)?)
+        }
     };
     let layers = layers_pass(&parts, hull.is_some(), &mut skips);
     let roles = parts.roles(mesh, surface.is_some(), layers.as_ref());
@@ -90,6 +91,7 @@ pub fn build_keeping<'a>(
     Ok(DrawPlan {
         width_px: size_px[0],
         height_px: size_px[1],
+        margin_px,
         samples: spec.image.samples,
         positions: &mesh.positions,
         triangles: &mesh.triangles,

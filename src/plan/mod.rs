@@ -14,6 +14,7 @@ mod hull;
 mod lights;
 mod lines;
 mod loose;
+mod margin;
 mod materials;
 mod order;
 mod outline;
@@ -58,6 +59,9 @@ pub struct DrawPlan<'a> {
     pub width_px: u32,
     /// Rows, at most 4096.
     pub height_px: u32,
+    /// Pixels beyond the picture, on each side, that have visibility samples too: what is there hides the middle of lines whose flanks are
+    /// in the picture. Nothing else is drawn there.
+    pub margin_px: u32,
     /// Visibility samples a pixel: 1, 4, 8 or 16.
     pub samples: u32,
     /// Positions in the unit box.
@@ -164,6 +168,7 @@ impl<'a> DrawPlan<'a> {
         Self {
             width_px: size_px[0],
             height_px: size_px[1],
+            margin_px: 0,
             samples: 1,
             positions,
             triangles,

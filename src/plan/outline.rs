@@ -41,7 +41,7 @@ type Spot = [f64; 4];
 pub struct Outlines<'a> {
     view: &'a View<'a>,
     thicknesses: &'a [Option<Thickness>],
-    /// Half the picture, 1/256 px.
+    /// Half of the picture and of what is beyond it and seen, 1/256 px.
     half: [f64; 2],
     /// 1/256 px a unit of the box at W = 1.
     scale: f64,
@@ -56,14 +56,14 @@ impl<'a> Outlines<'a> {
     pub fn draw(
         view: &'a View<'a>,
         thicknesses: &'a [Option<Thickness>],
-        size_px: [u32; 2],
+        (size_px, margin_px): ([u32; 2], u32),
         rims: &[Rim],
         means: &mut Means<'_>,
     ) -> Result<HullPass<'static>, PlanError> {
         let p = view.projection;
         let along = |row: &[f32; 4]| (0..3).map(|k| f64::from(row[k]) * f64::from(p.to_viewer[k])).sum::<f64>();
         let scale = (0..3).map(|k| f64::from(p.x[k]) * f64::from(p.x[k])).sum::<f64>().sqrt();
-        let half = size_px.map(|size| 0.5 * PX * f64::from(size));
+        let half = size_px.map(|size| 0.5 * PX * f64::from(size + 2 * margin_px));
         // Strips of at most four corners, and two triangles with a material; and what fans are told of both ends.
         let bytes = 4 * size_of::<HullVertex>() + 2 * (size_of::<[u32; 3]>() + 4) + 2 * size_of::<End>();
         means.budget.spend("an outline's strips", rims.len() as u64, bytes as u64)?;
@@ -229,7 +229,7 @@ impl<'a> Outlines<'a> {
 pub fn hull_pass<'a>(
     mesh: &'a Mesh,
     parts: &Parts<'_>,
-    (projection, size_px): (&Projection, [u32; 2]),
+    (projection, size_px, margin_px): (&Projection, [u32; 2], u32),
     edges: &mut Edges<'a>,
     means: &mut Means<'_>,
 ) -> Result<HullPass<'a>, PlanError> {
@@ -248,7 +248,7 @@ pub fn hull_pass<'a>(
     let view = View::new(mesh, parts, projection, means)?;
     let rims = view.rims(&thicknesses, found, means)?;
     let surface_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
-    let mut hull = Outlines::draw(&view, &thicknesses, size_px, &rims, means)?;
+    let mut hull = Outlines::draw(&view, &thicknesses, (size_px, margin_px), &rims, means)?;
     pay_drawing(hull.vertices.len() as u64, hull.triangles.len() as u64, parts, means.budget)?;
     if !tells_apart {
         hull.triangle_materials = Vec::new();

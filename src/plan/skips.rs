@@ -40,6 +40,8 @@ pub enum SkipKind {
     Adjacency,
     /// Clipping at the near plane and the guard band.
     Clipping,
+    /// Visibility samples beyond the picture.
+    Margin,
 }
 
 impl SkipKind {
@@ -58,6 +60,7 @@ impl SkipKind {
         Self::MaterialIndices,
         Self::Adjacency,
         Self::Clipping,
+        Self::Margin,
     ];
 }
 
@@ -77,6 +80,7 @@ impl fmt::Display for SkipKind {
             Self::MaterialIndices => "material indices",
             Self::Adjacency => "adjacency",
             Self::Clipping => "clipping",
+            Self::Margin => "samples beyond the picture",
         })
     }
 }

@@ -56,6 +56,7 @@ mod jobs;
 mod layers;
 mod layers_hull;
 mod likeness;
+mod line_borders;
 mod line_limits;
 mod line_looks;
 mod lines_scenes;

@@ -86,8 +86,8 @@ fn draw_lines(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band:
 fn for_each_sample(band: &SampleBand, words: &mut [u64], word: impl Fn(usize) -> u64) {
     for (i, out) in words.iter_mut().enumerate() {
         let (pixel, s) = (i as u32 / band.samples, i as u32 % band.samples);
-        let (x, row) = (pixel % band.size_px[0], pixel / band.size_px[0]);
-        *out = word(band.index(x, band.shown[0] + row, s));
+        let (x, y) = (pixel % band.size_px[0], band.shown[0] + pixel / band.size_px[0]);
+        *out = word(band.index(x as i32, y as i32, s));
     }
 }
 
@@ -98,8 +98,9 @@ fn fill_samples(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, ban
     let end = (first + scratch.rows).min(plan.height_px);
     let samples = &mut scratch.samples;
     samples.shown = [first, end];
-    samples.first_row = first.saturating_sub(scratch.margin);
-    samples.rows = (end + scratch.margin).min(plan.height_px) - samples.first_row;
+    let [top, bottom] = plan.seen_range(plan.height_px);
+    samples.first_row = (first as i32 - scratch.margin as i32).max(top);
+    samples.rows = ((end + scratch.margin) as i32).min(bottom).abs_diff(samples.first_row);
     if plan.surface.is_some() || plan.hull.is_some() {
         scratch.samples.clear();
         draw_triangles(stages.isa, stages, bins, band, &mut scratch.samples);

@@ -202,13 +202,14 @@ fn bin_clipped(stages: &Stages<'_>, rows: [u32; 2], id: u32, faces: Faces, bin: 
     });
 }
 
-/// First and last band that a triangle on screen touches; None if it lies beside, above or below the picture.
+/// First and last band that a triangle on screen touches, or comes as close to as `margin` rows; None if it lies beside, above or
+/// below all that has samples.
 #[inline(always)]
 fn bands_of(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], v: &[ScreenVertex; 3]) -> Option<[usize; 2]> {
-    axis_bounds(&v.map(|v| v.x), plan.width_px, 0, plan.width_px)?;
-    let [first, last] = axis_bounds(&v.map(|v| v.y), plan.height_px, 0, plan.height_px)?;
-    let (first, last) = ((first as u32).saturating_sub(margin), (last as u32 + margin).min(plan.height_px - 1));
-    Some([first, last].map(|row| (row / rows) as usize))
+    axis_bounds(&v.map(|v| v.x), plan.width_px, plan.seen_range(plan.width_px))?;
+    let [first, last] = axis_bounds(&v.map(|v| v.y), plan.height_px, plan.seen_range(plan.height_px))?;
+    let (first, last) = ((first - margin as i32).max(0), (last + margin as i32).min(plan.height_px as i32 - 1));
+    (first <= last).then(|| [first, last].map(|row| row as usize / rows as usize))
 }
 
 fn bin_edges(stages: &Stages<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> Bin {

@@ -63,14 +63,14 @@ impl Hiding {
         band: &SampleBand,
         (edge, segment): (&Edge, &Segment),
         range: [f32; 2],
-        radius: u32,
+        radius: i32,
     ) {
         let mut recent = [NOTHING; RECENT];
         let across = segment.across();
         let beyond = radius as f32 * segment.inverse_length;
         for [x, y] in segment.walk([range[0] - beyond, range[1] + beyond]) {
-            for y in y.saturating_sub(radius * across[1])..=y + radius * across[1] {
-                for x in x.saturating_sub(radius * across[0])..=x + radius * across[0] {
+            for y in y - radius * across[1]..=y + radius * across[1] {
+                for x in x - radius * across[0]..=x + radius * across[0] {
                     if !band.has(x, y) {
                         continue;
                     }

@@ -129,7 +129,7 @@ impl<'a> Inker<'a> {
         let [x, y] = [pixel as u32 % self.band.size_px[0], self.band.shown[0] + pixel as u32 / self.band.size_px[0]];
         let shown = |s: usize| {
             let over = self.layers.map_or(0.0, |layers| layers.alpha(x, y, s as u32));
-            if self.band.pixel(x, y).0[s] == NOTHING { over } else { 1.0 }
+            if self.band.pixel(x as i32, y as i32).0[s] == NOTHING { over } else { 1.0 }
         };
         let weight = weight(&self.cells, shown, mask, opacity);
         [surface[0] * weight, surface[1] * weight, surface[2] * weight, (surface[3] * weight).min(1.0)]

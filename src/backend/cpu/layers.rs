@@ -14,8 +14,6 @@ use crate::plan::{LayersPass, roles};
 
 /// What a band's layers need beside its samples: rows that are shown, and none of those beyond them.
 pub struct LayerBand {
-    /// Where its first sample is among the band's.
-    base_at: usize,
     /// This round's layer; begins as a copy of what it must lie before.
     pub found: SampleBand,
     /// The last round's; depth 0 where a sample is done.
@@ -35,9 +33,9 @@ impl LayerBand {
     /// For bands like this one, of which so many rows are shown.
     pub fn new(base: &SampleBand, rows: u32) -> Self {
         let like = || SampleBand::new(base.size_px, 0, rows, base.samples);
-        let len = base.stride * rows as usize;
-        let (colors, materials) = (vec![[0.0; 4]; len], vec![0; len]);
-        Self { base_at: 0, found: like(), previous: like(), colors, materials, pending: Vec::new() }
+        let (found, previous) = (like(), like());
+        let (colors, materials) = (vec![[0.0; 4]; found.depth.len()], vec![0; found.depth.len()]);
+        Self { found, previous, colors, materials, pending: Vec::new() }
     }
 
     /// What it holds on to, bytes.
@@ -48,16 +46,15 @@ impl LayerBand {
     /// How much of a sample of the picture's pixel (x, y) lies under them, 0 to 1.
     #[inline(always)]
     pub fn alpha(&self, x: u32, y: u32, s: u32) -> f32 {
-        self.colors[self.found.index(x, y, s)][3]
+        self.colors[self.found.index(x as i32, y as i32, s)][3]
     }
 
     /// Forgets everything, and moves to what is shown of `base`.
     fn begin(&mut self, base: &SampleBand) {
         for samples in [&mut self.found, &mut self.previous] {
             (samples.first_row, samples.rows, samples.shown) =
-                (base.shown[0], base.shown[1] - base.shown[0], base.shown);
+                (base.shown[0] as i32, base.shown[1] - base.shown[0], base.shown);
         }
-        self.base_at = base.index(0, base.shown[0], 0);
         self.previous.depth.fill(f32::INFINITY);
         self.previous.ids.fill(0);
         self.colors.fill([0.0; 4]);
@@ -69,19 +66,25 @@ impl LayerBand {
     fn begin_round(&mut self, base: Option<&SampleBand>) {
         match base {
             Some(base) => {
-                let own = self.base_at..self.base_at + self.found.depth.len();
-                self.found.depth.copy_from_slice(&base.depth[own.clone()]);
-                self.found.ids.copy_from_slice(&base.ids[own]);
+                let stride = self.found.stride;
+                let depths = self.found.depth.chunks_exact_mut(stride);
+                for ((y, depths), ids) in (0..).zip(depths).zip(self.found.ids.chunks_exact_mut(stride)) {
+                    // Rows that the last band of a picture does not have are nobody's.
+                    if y < self.found.rows as i32 {
+                        let from = base.index(0, self.found.first_row + y, 0);
+                        depths.copy_from_slice(&base.depth[from..from + stride]);
+                        ids.copy_from_slice(&base.ids[from..from + stride]);
+                    }
+                }
             }
             None => self.found.clear(),
         }
     }
 
-    /// Takes a sample's find as its last layer: its id, or None if the sample is done.
+    /// Takes the find of sample `at`, which is at `in_base` among the base's, as its last layer: its id, or None if the sample is done.
     #[inline(always)]
-    fn take(&mut self, base: Option<&SampleBand>, at: usize) -> Option<u32> {
+    fn take(&mut self, base: Option<&SampleBand>, at: usize, in_base: usize) -> Option<u32> {
         let (depth, id) = (self.found.depth[at], self.found.ids[at]);
-        let in_base = self.base_at + at;
         let (base_depth, base_id) = base.map_or((0.0, NOTHING), |base| (base.depth[in_base], base.ids[in_base]));
         if depth == base_depth && id == base_id {
             self.previous.depth[at] = 0.0;
@@ -146,8 +149,11 @@ pub fn find(
     for _ in 0..=layer {
         layers.begin_round(floor);
         peel(stages.isa, stages, bins, layers);
-        for (at, word) in words.iter_mut().enumerate() {
-            *word = if layers.take(floor, at).is_some() { layers.found.word(at) } else { 0 };
+        let (rows, stride) = (layers.found.rows as usize, layers.found.stride);
+        for (at, word) in words.iter_mut().take(rows * stride).enumerate() {
+            let y = layers.found.first_row + (at / stride) as i32;
+            let in_base = base.index(0, y, 0) + at % stride;
+            *word = if layers.take(floor, at, in_base).is_some() { layers.found.word(at) } else { 0 };
         }
     }
     words
@@ -187,12 +193,13 @@ fn lay_sampled<const S: usize>(
     let mut shader = Shader::new(stages);
     for y in layers.found.shown[0]..layers.found.shown[1] {
         for x in 0..layers.found.size_px[0] {
-            let first = layers.found.index(x, y, 0);
+            let first = layers.found.index(x as i32, y as i32, 0);
+            let in_base = floor.map_or(0, |base| base.index(x as i32, y as i32, 0));
             let mut ids = [NOTHING; S];
             let mut any = false;
             for s in 0..S {
                 let at = first + s;
-                let Some(id) = layers.take(floor, at) else { continue };
+                let Some(id) = layers.take(floor, at, in_base + s) else { continue };
                 any = true;
                 let Some(hull) = hull else {
                     ids[s] = id;
@@ -234,7 +241,7 @@ fn under_sampled<const S: usize>(stages: &Stages<'_>, base: &SampleBand, layers:
     for y in base.shown[0]..base.shown[1] {
         for x in 0..base.size_px[0] {
             let Some(out) = colors.next() else { return };
-            let (in_base, first) = (base.index(x, y, 0), layers.found.index(x, y, 0));
+            let [in_base, first] = [base, &layers.found].map(|band| band.index(x as i32, y as i32, 0));
             let mut ids = [NOTHING; S];
             for s in 0..S {
                 ids[s] = base.ids[in_base + s];

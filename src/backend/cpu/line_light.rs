@@ -26,7 +26,7 @@ fn pixel(stages: &Stages<'_>, surface: &SurfacePass<'_>, band: &SampleBand, [x, 
     let plan = stages.plan;
     let corner = [x as i32 * 256 - plan.width_px as i32 * 128, y as i32 * 256 - plan.height_px as i32 * 128];
     let (mut sum, mut count) = (Light { gain: 0.0, gloss: 0.0 }, 0.0_f32);
-    for (&id, offset) in band.pixel(x, y).0.iter().zip(sample_offsets(band.samples)) {
+    for (&id, offset) in band.pixel(x as i32, y as i32).0.iter().zip(sample_offsets(band.samples)) {
         // Neither a hull nor nothing.
         if id < plan.triangles.len() as u32 {
             let at = [(corner[0] + offset[0]) as f32, (corner[1] + offset[1]) as f32];

@@ -22,8 +22,10 @@ pub const NOTHING: u32 = u32::MAX;
 pub struct SampleBand {
     /// Picture size, pixels.
     pub size_px: [u32; 2],
-    /// First row of the band.
-    pub first_row: u32,
+    /// Columns beyond the picture, left and right of it.
+    pub margin: u32,
+    /// First row of the band; negative above the picture.
+    pub first_row: i32,
     /// Rows in the band.
     pub rows: u32,
     /// First row that is shown, and the row after the last; what lies beyond them in the band hides lines that reach into it.
@@ -39,12 +41,12 @@ pub struct SampleBand {
 }
 
 impl SampleBand {
-    /// An empty band.
-    pub fn new(size_px: [u32; 2], first_row: u32, rows: u32, samples: u32) -> Self {
-        let stride = size_px[0] as usize * samples as usize + LANES;
+    /// An empty band at the top of a picture, with so many columns beyond it on each side.
+    pub fn new(size_px: [u32; 2], margin: u32, rows: u32, samples: u32) -> Self {
+        let stride = (size_px[0] + 2 * margin) as usize * samples as usize + LANES;
         let len = stride * rows as usize;
-        let shown = [first_row, first_row + rows];
-        Self { size_px, first_row, rows, shown, samples, stride, depth: vec![0.0; len], ids: vec![NOTHING; len] }
+        let (depth, ids) = (vec![0.0; len], vec![NOTHING; len]);
+        Self { size_px, margin, first_row: 0, rows, shown: [0, rows], samples, stride, depth, ids }
     }
 
     /// Empties the band.
@@ -53,10 +55,18 @@ impl SampleBand {
         self.ids.fill(NOTHING);
     }
 
-    /// Index of sample `s` of the pixel at column `x`, row `y` of the picture.
+    /// Columns, and rows, from the first to before the last, counted as the picture's are.
     #[inline(always)]
-    pub fn index(&self, x: u32, y: u32, s: u32) -> usize {
-        (y - self.first_row) as usize * self.stride + (x * self.samples + s) as usize
+    pub fn range(&self) -> [[i32; 2]; 2] {
+        let margin = self.margin as i32;
+        [[-margin, self.size_px[0] as i32 + margin], [self.first_row, self.first_row + self.rows as i32]]
+    }
+
+    /// Index of sample `s` of the pixel at column `x`, row `y` of the picture, or beyond it.
+    #[inline(always)]
+    pub fn index(&self, x: i32, y: i32, s: u32) -> usize {
+        let column = (x + self.margin as i32) as u32;
+        (y - self.first_row) as usize * self.stride + (column * self.samples + s) as usize
     }
 
     /// What a sample sees, in one number: nearer is larger, of equal depths the lower id.
@@ -68,13 +78,14 @@ impl SampleBand {
 
     /// Whether a pixel of the picture, or beyond, is in the band.
     #[inline(always)]
-    pub fn has(&self, x: u32, y: u32) -> bool {
-        (x < self.size_px[0]) & (y >= self.first_row) & (y < self.first_row + self.rows)
+    pub fn has(&self, x: i32, y: i32) -> bool {
+        let [columns, rows] = self.range();
+        (x >= columns[0]) & (x < columns[1]) & (y >= rows[0]) & (y < rows[1])
     }
 
     /// Ids and depths of a pixel's samples.
     #[inline(always)]
-    pub fn pixel(&self, x: u32, y: u32) -> (&[u32], &[f32]) {
+    pub fn pixel(&self, x: i32, y: i32) -> (&[u32], &[f32]) {
         let first = self.index(x, y, 0);
         let samples = first..first + self.samples as usize;
         (&self.ids[samples.clone()], &self.depth[samples])

@@ -70,14 +70,14 @@ impl Banding {
 
 /// Bytes of a row: of its samples (0), or of what there is only where a row is shown (1).
 fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
-    let samples = plan.width_px as usize * plan.samples as usize + LANES;
+    let samples = |columns: u32| columns as usize * plan.samples as usize + LANES;
     if part == 0 {
-        return samples * SAMPLE_BYTES;
+        return samples(plan.width_px + 2 * plan.margin_px) * SAMPLE_BYTES;
     }
     let light = if plan.lights_lines() { size_of::<Light>() + size_of::<u32>() } else { 0 };
     let ink = if plan.lines.is_empty() { 0 } else { size_of::<Ink>() };
     let layers = if plan.layers().is_some() { LayerBand::SAMPLE_BYTES } else { 0 };
-    plan.width_px as usize * (size_of::<[f32; 4]>() + light + ink) + samples * layers
+    plan.width_px as usize * (size_of::<[f32; 4]>() + light + ink) + samples(plan.width_px) * layers
 }
 
 /// A band's buffers, kept from band to band.
@@ -103,7 +103,7 @@ pub struct BandScratch {
 impl BandScratch {
     fn new(plan: &DrawPlan<'_>, Banding { rows, margin, .. }: Banding) -> Self {
         Self {
-            samples: SampleBand::new([plan.width_px, plan.height_px], 0, rows + 2 * margin, plan.samples),
+            samples: SampleBand::new([plan.width_px, plan.height_px], plan.margin_px, rows + 2 * margin, plan.samples),
             rows,
             margin,
             layers: None,
@@ -136,6 +136,7 @@ impl ScratchPool {
         let fits = |s: &BandScratch| {
             s.samples.size_px == size_px
                 && (s.rows, s.margin) == (banding.rows, banding.margin)
+                && s.samples.margin == plan.margin_px
                 && s.samples.samples == plan.samples
         };
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().filter(fits);
@@ -222,7 +223,11 @@ mod tests {
                     }
                     let layers = LayersPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
                     plan.layers = Some(layers).filter(|_| layered);
-                    each(&DrawPlan { samples, ..plan });
+                    plan.samples = samples;
+                    each(&plan);
+                    // Where the mesh goes on beyond the picture.
+                    plan.margin_px = plan.line_margin_rows();
+                    each(&plan);
                 }
             }
         }
@@ -243,7 +248,7 @@ mod tests {
                 cases += 1;
             }
         });
-        assert_eq!(cases, 5 * 12 * 4 * 5);
+        assert_eq!(cases, 2 * 5 * 12 * 4 * 5);
         assert!(alone < cases / 20, "{alone} of {cases} pictures are drawn by one thread alone");
     }
 

@@ -81,7 +81,7 @@ impl Segment {
 
     /// The axis that the edge runs across more than along.
     #[inline(always)]
-    pub fn across(&self) -> [u32; 2] {
+    pub fn across(&self) -> [i32; 2] {
         if self.along[0].abs() >= self.along[1].abs() { [0, 1] } else { [1, 0] }
     }
 
@@ -89,7 +89,7 @@ impl Segment {
     #[inline(always)]
     pub fn walk(&self, [from, to]: [f32; 2]) -> Walk {
         let steps = (self.length * (to - from) * 2.0) as u32 + 1;
-        Walk { segment: *self, from, to, step: 0.5 * self.inverse_length, next: 0, steps, last: [u32::MAX; 2] }
+        Walk { segment: *self, from, to, step: 0.5 * self.inverse_length, next: 0, steps, last: [i32::MIN; 2] }
     }
 }
 
@@ -101,24 +101,32 @@ pub struct Walk {
     step: f32,
     next: u32,
     steps: u32,
-    last: [u32; 2],
+    last: [i32; 2],
 }
 
 impl Iterator for Walk {
-    type Item = [u32; 2];
+    type Item = [i32; 2];
 
     #[inline(always)]
-    fn next(&mut self) -> Option<[u32; 2]> {
+    fn next(&mut self) -> Option<[i32; 2]> {
         while self.next <= self.steps {
-            let [x, y] = self.segment.point((self.from + self.next as f32 * self.step).min(self.to));
+            let at = self.segment.point((self.from + self.next as f32 * self.step).min(self.to));
+            let pixel = at.map(floor);
             self.next += 1;
-            if x >= 0.0 && y >= 0.0 && [x as u32, y as u32] != self.last {
-                self.last = [x as u32, y as u32];
-                return Some(self.last);
+            if pixel != self.last {
+                self.last = pixel;
+                return Some(pixel);
             }
         }
         None
     }
+}
+
+/// The largest integer that is not greater: left of and above the picture there are pixels too.
+#[inline(always)]
+fn floor(v: f32) -> i32 {
+    let towards_zero = v as i32;
+    towards_zero - i32::from(towards_zero as f32 > v)
 }
 
 /// First and last row, from `first` to before `end`, that a line between these heights may touch; empty if first > last.

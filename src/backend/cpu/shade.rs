@@ -43,7 +43,7 @@ impl<'a> Shader<'a> {
 
     #[inline(always)]
     fn pixel<const S: usize>(&mut self, band: &SampleBand, x: u32, y: u32) -> [f32; 4] {
-        let at = band.index(x, y, 0);
+        let at = band.index(x as i32, y as i32, 0);
         let mut ids = [band.ids[at]; S];
         let mut is_mixed = false;
         for s in 1..S {

@@ -63,18 +63,17 @@ impl Setup {
     /// First and last pixel column and row that the triangle may touch, inside the band; None if none.
     #[inline(always)]
     fn bounds(&self, band: &SampleBand) -> Option<[[i32; 2]; 2]> {
-        let columns = axis_bounds(&self.x, band.size_px[0], 0, band.size_px[0])?;
-        let rows = axis_bounds(&self.y, band.size_px[1], band.first_row, band.first_row + band.rows)?;
-        Some([columns, rows])
+        let [columns, rows] = band.range();
+        Some([axis_bounds(&self.x, band.size_px[0], columns)?, axis_bounds(&self.y, band.size_px[1], rows)?])
     }
 }
 
-/// First and last pixel along an axis of `size_px` pixels that the three coordinates span, within `from..to`.
+/// First and last pixel along an axis of `size_px` pixels that the three coordinates span, from `from` to before `to`.
 #[inline(always)]
-pub fn axis_bounds(v: &[i32; 3], size_px: u32, from: u32, to: u32) -> Option<[i32; 2]> {
+pub fn axis_bounds(v: &[i32; 3], size_px: u32, [from, to]: [i32; 2]) -> Option<[i32; 2]> {
     let half = size_px as i32 * 128;
-    let first = ((v[0].min(v[1]).min(v[2]) + half) >> 8).max(from as i32);
-    let last = ((v[0].max(v[1]).max(v[2]) + half) >> 8).min(to as i32 - 1);
+    let first = ((v[0].min(v[1]).min(v[2]) + half) >> 8).max(from);
+    let last = ((v[0].max(v[1]).max(v[2]) + half) >> 8).min(to - 1);
     (first <= last).then_some([first, last])
 }
 
@@ -214,7 +213,7 @@ impl Block {
         for y in 0..self.size[1] {
             let mut x = 0;
             while x < self.size[0] {
-                let at = target.band().index((self.column + x) as u32, (self.row + y) as u32, 0);
+                let at = target.band().index(self.column + x, self.row + y, 0);
                 let from = [self.corner[0] + 256 * x - setup.x[0], self.corner[1] + 256 * y - setup.y[0]];
                 for part in 0..S.div_ceil(LANES) {
                     let outside = self.outside(edges, &lanes[part], x, y);

@@ -182,8 +182,7 @@ fn upload_geometry(
         return Ok(());
     }
     buffers.upload(gpu, Slot::Roles, &plan.roles)?;
-    let seen = samples(plan, schedule.banding.seen_rows(plan));
-    buffers.reserve(gpu, Slot::Samples, seen * SAMPLE_BYTES)?;
+    buffers.reserve(gpu, Slot::Samples, schedule.banding.seen_samples(plan) * SAMPLE_BYTES)?;
     let samples = samples(plan, schedule.banding.rows);
     if plan.layers().is_some() {
         buffers.reserve(gpu, Slot::Layer, samples * SAMPLE_BYTES)?;
@@ -277,7 +276,7 @@ fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, schedule: &Sched
         recorder.clear(Slot::Rounds, u64::from(schedule.layers) * 4)?;
     }
     if has_visibility(plan) {
-        recorder.clear(Slot::Samples, samples(plan, schedule.banding.seen_rows(plan)) * SAMPLE_BYTES)?;
+        recorder.clear(Slot::Samples, schedule.banding.seen_samples(plan) * SAMPLE_BYTES)?;
     }
     if schedule.goal == Goal::Picture && !plan.lines.is_empty() {
         let pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);

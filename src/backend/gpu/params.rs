@@ -47,8 +47,8 @@ pub struct Batch {
     pub first: u32,
     pub count: u32,
     pub faces: u32,
-    pub row_first: u32,
-    pub row_end: u32,
+    pub row_first: i32,
+    pub row_end: i32,
     pub capacity: u32,
     pub large_first: u32,
     pub large_end: u32,
@@ -64,11 +64,14 @@ pub struct Batch {
     pub line_peak: f32,
     pub line_units: u32,
     pub line_pass: u32,
-    pub seen_first: u32,
-    pub seen_end: u32,
+    pub seen_first: i32,
+    pub seen_end: i32,
     pub samples_at: u32,
     pub role: u32,
     pub layer: u32,
+    pub column_first: i32,
+    pub column_end: i32,
+    pub seen_margin: i32,
 }
 
 /// Bits of [`Batch::line_flags`].
@@ -238,7 +241,7 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_shader() {
         assert_eq!(size_of::<Frame>(), 304);
-        assert_eq!(size_of::<Batch>(), 100);
+        assert_eq!(size_of::<Batch>(), 112);
     }
 
     #[test]

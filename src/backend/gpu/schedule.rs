@@ -54,26 +54,38 @@ impl Schedule {
     /// The commands for what is wanted of `plan`.
     pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Result<Self, DrawError> {
         let banding = Banding::new(plan, device, goal)?;
-        let tiles = Tiles::new(plan, device, banding.seen_rows(plan));
+        let tiles = Tiles::new(plan, device, banding);
         let edge_starts = edge_lists(&plan.lines).1;
         let (steps, batches) = (Vec::new(), Vec::new());
         let mut schedule = Self { steps, batches, banding, work_items: 0, layers: 0, tiles, progress_bytes: 0, goal };
         schedule.transform(plan, device)?;
         for first in (0..plan.height_px).step_by(banding.rows as usize) {
             let end = plan.height_px.min(first + banding.rows);
-            let seen = [first.saturating_sub(banding.margin), plan.height_px.min(end + banding.margin)];
+            let [beyond, margin] = [banding.beyond, banding.margin].map(|px| px as i32);
+            let [row_first, row_end] = [first as i32, end as i32];
+            let seen = [row_first - margin, row_end + margin].map(|y| y.clamp(-beyond, plan.height_px as i32 + beyond));
             // What is done pixel by pixel is done for the band's own rows.
             let band = Batch {
-                row_first: first,
-                row_end: end,
+                row_first,
+                row_end,
+                column_end: plan.width_px as i32,
                 seen_first: seen[0],
                 seen_end: seen[1],
-                samples_at: plan.width_px * plan.samples * (first - seen[0]),
+                seen_margin: beyond,
+                samples_at: plan.samples * (banding.seen_columns(plan) * row_first.abs_diff(seen[0]) + banding.beyond),
                 ..Batch::default()
             };
             schedule.steps.push(Step::ClearBand);
             if has_visibility(plan) {
-                let all = Batch { row_first: seen[0], row_end: seen[1], samples_at: 0, ..band };
+                let columns = [-beyond, band.column_end + beyond];
+                let all = Batch {
+                    row_first: seen[0],
+                    row_end: seen[1],
+                    column_first: columns[0],
+                    column_end: columns[1],
+                    samples_at: 0,
+                    ..band
+                };
                 schedule.triangles(device, all, Into::Surface, Pass::of_surface(plan))?;
                 schedule.layers(plan, device, band, goal)?;
             }
@@ -102,7 +114,7 @@ impl Schedule {
             Goal::Layer(layer) => layer + 1,
         };
         self.layers = rounds;
-        let count = plan.width_px * (band.row_end - band.row_first);
+        let count = plan.width_px * band.row_end.abs_diff(band.row_first);
         // A layer that is wanted for itself is not shaded: then no sample is done before its last triangle.
         let role = if goal == Goal::Picture { u32::from(roles::LAYER) } else { 0 };
         let mut ends = Vec::new();
@@ -176,7 +188,7 @@ impl Schedule {
         band: Batch,
         edge_starts: &[u32],
     ) -> Result<(), DrawError> {
-        let count = plan.width_px * (band.row_end - band.row_first);
+        let count = plan.width_px * band.row_end.abs_diff(band.row_first);
         let pixels = Batch { count, ..band };
         if plan.is_shaded() {
             self.dispatch(device, Stage::Shade, count, pixels)?;

@@ -54,41 +54,63 @@ pub struct Banding {
     pub rows: u32,
     /// Rows beyond a band, above and below, that its lines look at.
     pub margin: u32,
+    /// Pixels beyond the picture, on each side, of which the visibility buffer holds those that are in a band's rows and margins.
+    pub beyond: u32,
 }
 
 impl Banding {
     /// So that no buffer is large or breaks the device's limit. Fails where the device has no room for a row and what its lines
-    /// look at.
+    /// look at in the picture. Where it has none only for what they look at beyond the picture, they go without: better a border at
+    /// which a line shows that something beyond it hides than no picture.
     pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Result<Self, DrawError> {
-        let width = u64::from(plan.width_px);
-        let rows_in = |bytes: u64, pixel_bytes: u64| bytes.min(device.binding_bytes_max) / (width * pixel_bytes).max(1);
-        let rows = rows_in(BAND_BYTES, pixel_bytes(plan)).min(u64::from(plan.height_px)).max(1);
-        let beyond = if goal == Goal::Picture { plan.line_margin_rows() } else { 0 };
-        let seen = rows_in(SEEN_BYTES, seen_bytes(plan));
-        if rows >= u64::from(plan.height_px) && rows <= seen {
-            return Ok(Self { rows: rows as u32, margin: 0 });
+        if goal != Goal::Picture {
+            return Self::with_margin(plan, device, [0, 0]);
         }
-        let room = seen.saturating_sub(2 * u64::from(beyond));
+        let margin = plan.line_margin_rows();
+        Self::with_margin(plan, device, [margin, plan.margin_px])
+            .or_else(|_| Self::with_margin(plan, device, [margin, 0]))
+    }
+
+    /// The same with so many rows beyond a band, and pixels beyond the picture.
+    fn with_margin(plan: &DrawPlan<'_>, device: &DeviceTraits, [margin, beyond]: [u32; 2]) -> Result<Self, DrawError> {
+        let rows_in = |bytes: u64, row_bytes: u64| bytes.min(device.binding_bytes_max) / row_bytes.max(1);
+        let rows = rows_in(BAND_BYTES, u64::from(plan.width_px) * pixel_bytes(plan));
+        let rows = rows.min(u64::from(plan.height_px)).max(1);
+        let seen = rows_in(SEEN_BYTES, u64::from(plan.width_px + 2 * beyond) * seen_bytes(plan));
+        let whole = Self { rows: plan.height_px, margin: margin.min(beyond), beyond };
+        if rows >= u64::from(plan.height_px) && u64::from(whole.seen_rows(plan)) <= seen {
+            return Ok(whole);
+        }
+        let room = seen.saturating_sub(2 * u64::from(margin));
         if room == 0 {
             let why = "the device has no room for what lines so wide look at in a picture so wide";
             return Err(DrawError::Device(why.to_owned()));
         }
-        Ok(Self { rows: rows.min(room) as u32, margin: beyond })
+        Ok(Self { rows: rows.min(room) as u32, margin, beyond })
     }
 
-    /// Rows that the visibility buffer holds.
+    /// Columns of the visibility buffer.
+    pub fn seen_columns(&self, plan: &DrawPlan<'_>) -> u32 {
+        plan.width_px + 2 * self.beyond
+    }
+
+    /// Rows that it holds.
     pub fn seen_rows(&self, plan: &DrawPlan<'_>) -> u32 {
-        (self.rows + 2 * self.margin).min(plan.height_px)
+        (self.rows + 2 * self.margin).min(plan.height_px + 2 * self.beyond)
+    }
+
+    /// Samples that it holds.
+    pub fn seen_samples(&self, plan: &DrawPlan<'_>) -> u64 {
+        u64::from(self.seen_columns(plan)) * u64::from(self.seen_rows(plan)) * u64::from(plan.samples)
     }
 
     /// Bytes of all buffers that hold a band.
     pub fn bytes(&self, plan: &DrawPlan<'_>) -> u64 {
-        let seen = if has_visibility(plan) { seen_bytes(plan) } else { 0 };
+        let seen = if has_visibility(plan) { self.seen_samples(plan) * SAMPLE_BYTES } else { 0 };
         let layers = if plan.layers().is_some() { LAYERED_BYTES + SAMPLE_BYTES } else { 0 };
         let (strokes, owners) = if plan.lines.is_empty() { (0, 0) } else { (STROKES_BYTES, OWNER_BYTES) };
         let pixel = u64::from(plan.samples) * layers + color_bytes(plan) + strokes + owners + RGBA_BYTES;
-        let width = u64::from(plan.width_px);
-        width * (u64::from(self.seen_rows(plan)) * seen + u64::from(self.rows) * pixel)
+        seen + u64::from(plan.width_px) * u64::from(self.rows) * pixel
     }
 }
 
@@ -147,7 +169,7 @@ mod tests {
 
     #[test]
     fn bands_never_take_more_than_they_may() {
-        let (mut cases, mut refused) = (0, 0);
+        let (mut cases, mut refused, mut without) = (0, 0, 0);
         each_case(|plan, case| {
             assert!(bands_bytes(plan) <= ALL_BYTES_MAX / 4 * 5, "{case:?}");
             let small = DeviceTraits { binding_bytes_max: 128 << 20, ..DEVICE };
@@ -160,12 +182,18 @@ mod tests {
                     continue;
                 };
                 assert!(banding.bytes(plan) <= ALL_BYTES_MAX, "{}: {banding:?} {case:?}", banding.bytes(plan));
-                assert!(samples(plan, banding.seen_rows(plan)) * SAMPLE_BYTES <= device.binding_bytes_max);
+                assert!(banding.seen_samples(plan) * SAMPLE_BYTES <= device.binding_bytes_max);
                 assert!(banding.rows >= 1 && banding.rows <= plan.height_px);
                 // What lies beyond a band is there in whole, unless the band is all there is.
-                assert!(banding.margin == plan.line_margin_rows() || banding.rows == plan.height_px, "{case:?}");
+                let is_all = banding.rows == plan.height_px && case.beyond == 0;
+                assert!(banding.margin == plan.line_margin_rows() || is_all, "{case:?}");
+                if banding.beyond < case.beyond {
+                    without += 1;
+                    assert!(case.samples > 8 && case.width_px > 80.0 && device.binding_bytes_max < 256 << 20);
+                }
             }
         });
         assert!(cases >= 500 && refused < cases / 20, "{refused} of {cases} refused");
+        assert!(without < cases / 20, "{without} of {cases} without what is beyond the picture");
     }
 }

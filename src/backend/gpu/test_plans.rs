@@ -23,11 +23,13 @@ pub struct Case {
     pub passes: usize,
     pub width_px: f32,
     pub shown: Shown,
+    /// Pixels beyond the picture.
+    pub beyond: u32,
 }
 
 /// The largest picture at 4 samples, with thin lines that nothing hides.
 pub const LARGEST: Case =
-    Case { size_px: [4096; 2], samples: 4, is_layered: true, passes: 1, width_px: 1.0, shown: Shown::All };
+    Case { size_px: [4096; 2], samples: 4, is_layered: true, passes: 1, width_px: 1.0, shown: Shown::All, beyond: 0 };
 
 /// Some lines of a width, lit.
 pub fn lines(edges: Arc<[Edge]>, width_px: f32, shown: Shown) -> LinePass {
@@ -56,6 +58,7 @@ pub fn plan<'a>(triangles: &'a [[u32; 3]], case: Case) -> DrawPlan<'a> {
     let clip = Projection { x, y, z, w, near_w: 0.1, clip: true, to_viewer, screen_up, screen_right };
     let mut plan = DrawPlan::new(case.size_px, &[[0.0; 3]], triangles, clip);
     plan.samples = case.samples;
+    plan.margin_px = case.beyond;
     plan.surface = Some(SurfacePass { is_shaded: true, ..SurfacePass::new(Faces::Both, Vec::new()) });
     if case.is_layered {
         plan.roles = vec![roles::SURFACE | roles::LAYER; triangles.len()].into();
@@ -73,8 +76,12 @@ pub fn each_case(mut each: impl FnMut(&DrawPlan<'_>, Case)) {
                 [(1.0, Shown::All), (100.0, Shown::All), (9.0, Shown::Hidden), (100.0, Shown::Visible)]
             {
                 for (is_layered, passes) in [(false, 1), (true, 1), (false, 128), (true, 0)] {
-                    let case = Case { size_px, samples, is_layered, passes, width_px, shown };
+                    let mut case = Case { size_px, samples, is_layered, passes, width_px, shown, beyond: 0 };
                     each(&plan(&[[0; 3]], case), case);
+                    case.beyond = plan(&[[0; 3]], case).line_margin_rows();
+                    if case.beyond > 0 {
+                        each(&plan(&[[0; 3]], case), case);
+                    }
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! How often the kernel that draws large triangles is run.
 
-use super::sizes::DeviceTraits;
+use super::sizes::{Banding, DeviceTraits};
 use crate::plan::DrawPlan;
 
 /// Sample tests that may be handed to the device without looking at how many it really is: a second or so of work.
@@ -26,8 +26,9 @@ pub struct Tiles {
 
 impl Tiles {
     /// For the bands of a plan.
-    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, band_rows: u32) -> Self {
-        let pixels = u64::from(plan.width_px) * u64::from(plan.height_px);
+    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, banding: Banding) -> Self {
+        let seen = [banding.seen_columns(plan), banding.seen_rows(plan)];
+        let pixels = u64::from(seen[0]) * u64::from(seen[1].max(plan.height_px));
         let hull = plan.hull.as_ref().map_or(0, |hull| hull.triangles.len());
         let tests = ((plan.triangles.len() + hull) as u64).saturating_mul(pixels * u64::from(plan.samples));
         Self {
@@ -35,7 +36,7 @@ impl Tiles {
             workgroups: device.tile_workgroups.min(device.workgroups_max),
             // 64 blocks, in each the samples; and as much again for the way there.
             tile_iterations: 64 * (u64::from(plan.samples) + 1) + 64,
-            band_tiles: u64::from(plan.width_px / 64 + 2) * u64::from(band_rows / 64 + 2),
+            band_tiles: u64::from(seen[0] / 64 + 2) * u64::from(seen[1] / 64 + 2),
         }
     }
 

@@ -44,7 +44,7 @@ fn a_hull_takes_no_more_than_it_spends() {
         let view = View::new(&mesh, &parts, &rows, &mut means).unwrap();
         let thicknesses = [Some(Thickness::Px(3.0))];
         let rims = view.rims(&thicknesses, found, &mut means).unwrap();
-        let hull = Outlines::draw(&view, &thicknesses, size_px, &rims, &mut means).unwrap();
+        let hull = Outlines::draw(&view, &thicknesses, (size_px, 0), &rims, &mut means).unwrap();
         assert_eq!((rims.len(), rims.capacity()), (3 * count, 3 * count));
         assert!(hull.triangles.len() >= 9 * count, "{} triangles", hull.triangles.len());
         let taken = size_of::<Rim>() * rims.capacity()
@@ -94,7 +94,7 @@ fn every_step_ends_when_the_job_does() {
     let results = [
         View::new(&mesh, &parts, &rows, &mut late).err(),
         view.rims(&thicknesses, found, &mut late).err(),
-        Outlines::draw(&view, &thicknesses, size_px, &rims, &mut late).err(),
+        Outlines::draw(&view, &thicknesses, (size_px, 0), &rims, &mut late).err(),
     ];
     assert_eq!(results, [const { Some(PlanError::Stopped(Stopped)) }; 3]);
 }
