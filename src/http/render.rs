@@ -70,6 +70,14 @@ pub fn picture(finished: &Finished) -> Response {
         (HeaderName::from_static("x-render-backend"), HeaderValue::from_static(finished.backend.name())),
         (HeaderName::from_static("server-timing"), text(&timings.join(", "))),
     ];
+    // Codes alone: sentences belong into bodies, and a job's state has them.
+    let mut codes: Vec<&str> = Vec::new();
+    for warning in &finished.warnings {
+        if !codes.contains(&warning.code) {
+            codes.push(warning.code);
+        }
+    }
+    let warnings = (!codes.is_empty()).then(|| (HeaderName::from_static("x-warnings"), text(&codes.join(", "))));
     let chosen = finished.choice.as_ref().map(|choice| {
         [
             (HeaderName::from_static("x-expected-error"), text(&choice.expected_error.to_string())),
@@ -77,7 +85,7 @@ pub fn picture(finished: &Finished) -> Response {
         ]
     });
     let mut response = (StatusCode::OK, headers, finished.picture.clone()).into_response();
-    response.headers_mut().extend(chosen.into_iter().flatten());
+    response.headers_mut().extend(chosen.into_iter().flatten().chain(warnings));
     response
 }
 
