@@ -32,7 +32,7 @@ pub async fn get(
     let format = path.as_ref().and_then(|(_, name)| format_of(name)).ok_or_else(|| {
         ApiError::not_found("pictures of a stored mesh are called render.png, render.webp and render.jpg")
     })?;
-    let Query { reading, overrides } = Query::read(&uri)?;
+    let Query { reading, overrides } = Query::read(&uri, &app.rules)?;
     let mut spec = request::read(None, &overrides, &app.rules)?;
     request::set_format(&mut spec, format);
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use axum::extract::Request;
+use axum::http::HeaderMap;
 
 use super::app::App;
 use super::body::{self, BodyKind, BodyLimits, Upload};
@@ -18,7 +19,7 @@ use crate::store::{Digest, Reading};
 /// Reads a request for a picture, and says everything that can be wrong with it before it costs a worker's time.
 pub async fn receive(app: &Arc<App>, request: Request) -> Result<Work, ApiError> {
     body::check_header(request.headers(), app.rules.limits.body_bytes)?;
-    let Query { reading, overrides } = Query::read(request.uri())?;
+    let Query { reading, overrides } = Query::read(request.uri(), &app.rules)?;
     // A form brings its document with it, and JSON may be one; without one, the query is all there is and can be judged
     // before the upload.
     if !body::is_multipart(request.headers()) && !body::is_json(request.headers()) {
@@ -33,10 +34,7 @@ pub async fn receive(app: &Arc<App>, request: Request) -> Result<Work, ApiError>
         request::set_format(&mut spec, format);
         Ok::<_, ApiError>(Task::Draw(Box::new(spec)))
     };
-    if let Some(document) = upload.bundle.files().first().map(|file| &file.bytes)
-        && upload.kind == BodyKind::Raw
-        && request::names_mesh(document)
-    {
+    if let Some(document) = document_of(&upload, &reading, &headers) {
         let (name, spec) = request::read_with_mesh(document, &overrides, &app.rules)?;
         if Digest::parse(&name).is_none() {
             return Err(request::bad_mesh_name(&name).into());
@@ -44,9 +42,17 @@ pub async fn receive(app: &Arc<App>, request: Request) -> Result<Work, ApiError>
         let task = finish(spec)?;
         return Ok(meshes::work(&*meshes::find(app, Some(&name))?, reading, task));
     }
+    upload.bundle.check_sent().map_err(|error| ApiError::from(&error))?;
     let task = finish(request::read(upload.document.as_deref(), &overrides, &app.rules)?)?;
     let Reading { format_in, entry } = reading;
     Ok(Work { bundle: upload.bundle.with_entry(entry), format_in, task, memory: Arc::new(upload.reservation) })
+}
+
+/// The body, if it is a request document in place of a mesh. Who says how the mesh in it is to be read sent one.
+fn document_of<'u>(upload: &'u Upload, reading: &Reading, headers: &HeaderMap) -> Option<&'u [u8]> {
+    let body = upload.bundle.files().first().filter(|_| upload.kind == BodyKind::Raw)?.bytes.as_ref();
+    let is_faulty = || reading.format_in.is_none() && request::is_faulty_document(body, body::is_json(headers));
+    (request::names_mesh(body) || is_faulty()).then_some(body)
 }
 
 /// Reads a body within this server's limits.

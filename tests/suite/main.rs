@@ -51,6 +51,7 @@ mod golden;
 mod hostile;
 mod http;
 mod http_bad;
+mod http_mistakes;
 mod hulls;
 mod jobs;
 mod layers;
