@@ -5,7 +5,7 @@ use axum::http::{StatusCode, Uri};
 
 use super::error::ApiError;
 use crate::mesh::Format;
-use crate::request::{self, Overrides, Rules};
+use crate::request::{self, Overrides, RequestError, RequestFault, Rules};
 use crate::store::Reading;
 
 /// A query.
@@ -53,6 +53,20 @@ impl Query {
             }
         }
     }
+}
+
+/// A part of a query, with what means something there percent-encoded (RFC 3986, 3.4).
+pub fn escape(text: &str) -> String {
+    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~,:/".contains(&byte);
+    text.bytes().map(|byte| if plain(byte) { char::from(byte).into() } else { format!("%{byte:02X}") }).collect()
+}
+
+/// What a query is told about a key that there is not: the request module knows of the document's keys alone.
+pub fn told(mut error: RequestError) -> ApiError {
+    if error.fault == RequestFault::UnknownKey && !error.key.contains('.') {
+        error.allowed.push_str("; of the mesh, a query says `format_in` and `entry`");
+    }
+    error.into()
 }
 
 /// The value of a key that is about the mesh and not about the picture.

@@ -9,13 +9,14 @@ use axum::response::{IntoResponse, Response};
 use super::app::App;
 use super::dto::media_type;
 use super::error::ApiError;
-use super::{jobs, negotiate, receive};
+use super::receive::Received;
+use super::{conditional, jobs, negotiate, receive};
 use crate::jobs::{Failure, Finished, Job, Jobs, State as JobState, Work};
 
 /// Draws while the client waits.
 pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Response, ApiError> {
     let respond_async = negotiate::prefer(request.headers()).respond_async;
-    let work = receive::receive(&app, request).await?;
+    let Received { work, address } = receive::receive(&app, request).await?;
     if respond_async {
         let job = app.jobs.submit(work, true)?;
         let mut response = jobs::accepted(&job);
@@ -23,10 +24,18 @@ pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Respo
         response.headers_mut().insert("preference-applied", applied);
         return Ok(response);
     }
-    match done(&app, work).await? {
-        JobState::Done(finished) => Ok(picture(&finished)),
-        _ => Err(ApiError::internal()),
+    let mut response = match done(&app, work).await? {
+        JobState::Done(finished) => picture(&finished),
+        _ => return Err(ApiError::internal()),
+    };
+    if let Some((location, (name, etag))) =
+        address.and_then(|at| Some((HeaderValue::from_str(&at.url).ok()?, conditional::etag(&at.etag))))
+    {
+        // What is sent is what is there, so it has the tag that it has there.
+        response.headers_mut().insert(header::CONTENT_LOCATION, location);
+        response.headers_mut().insert(name, etag);
     }
+    Ok(response)
 }
 
 /// Has work done while the client waits.

@@ -5,6 +5,7 @@
 //! A layer that is `null` is off; of any other key `null` is its default, or as if the key were not there.
 //! [`table`] is the table of keys; a new key is a line there, and [`schema()`] writes it out for others.
 
+mod dotted;
 mod draft;
 mod error;
 mod fields;
@@ -26,6 +27,7 @@ mod unique;
 mod value;
 mod words;
 
+pub use dotted::all_dotted;
 pub use error::{RequestError, RequestFault};
 pub use reference::{bad_mesh_name, is_faulty_document, names_mesh};
 pub use schema::schema;
@@ -255,9 +257,14 @@ fn apply(target: &mut Target<'_>, item: &Item, rules: &Rules) -> Result<(), Requ
 /// Something else where an object belongs. In a query or a flag, there is a way to give one of its keys alone.
 fn no_object(item: &Item, allowed: &str, others: &str) -> RequestError {
     let whole = item.whole_key();
+    let key = match &item.material {
+        None if item.key == MATERIALS.name => "NAME.LAYER.KEY",
+        Some(_) if item.key.is_empty() => "LAYER.KEY",
+        _ => "KEY",
+    };
     let how = match &item.given {
         Given::Json(_) => String::new(),
-        Given::Text(_) => format!(" as JSON, such as {{\"KEY\": VALUE}} (one key alone is {whole}.KEY=VALUE)"),
+        Given::Text(_) => format!(" as JSON, such as {{\"KEY\": VALUE}} (one key alone is {whole}.{key}=VALUE)"),
     };
     RequestError::new(RequestFault::WrongType, &whole, item.given.show(), format!("{allowed}{how}, {others}"))
 }

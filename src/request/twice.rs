@@ -30,8 +30,14 @@ fn meanings(item: &Item) -> Vec<&str> {
     if item.material.is_none() && key == "size" {
         return OF_SIZE.to_vec();
     }
+    vec![long(item)]
+}
+
+/// The long name of an item's key.
+pub fn long(item: &Item) -> &str {
+    let key = item.key.as_str();
     let long = SHORT.iter().find(|&&(short, _)| short == key && item.material.is_none());
-    vec![long.map_or(key, |&(_, long)| long)]
+    long.map_or(key, |&(_, long)| long)
 }
 
 fn twice(first: &Item, again: &Item) -> RequestError {

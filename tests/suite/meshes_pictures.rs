@@ -181,6 +181,57 @@ fn a_document_names_a_stored_mesh() {
     );
 }
 
+/// A picture that is made from a document is one that GET finds.
+#[test]
+fn a_picture_of_a_stored_mesh_says_where_it_is() {
+    let server = Server::start(&[]);
+    let two = zipped(&[("a.obj", CUBE_OBJ), ("b.obj", Solid::cuboid().obj().as_bytes())]);
+    server.post("/v1/meshes", CUBE_OBJ);
+    server.post("/v1/meshes?entry=a.obj", &two);
+    let (cube, pair) = (Digest::of(CUBE_OBJ), Digest::of(&two));
+    let cases = [
+        (cube, r#""size":24"#, "", ".png?size=24"),
+        (
+            cube,
+            r##""style":"wire","size":24,"wire":{"color":"#f00"},"format":"webp""##,
+            "",
+            ".webp?size=24&style=wire&wire.color=%23f00",
+        ),
+        (cube, r#""style":"wire","size":24"#, "?style=flat", ".png?size=24&style=flat"),
+        (
+            cube,
+            r#""size":24,"camera":{"eye":[3,2,1],"target":[0,0,0]}"#,
+            "?format=jpeg",
+            ".jpg?camera.eye=%5B3,2,1%5D&camera.target=%5B0,0,0%5D&size=24",
+        ),
+        (
+            pair,
+            r#""size":24,"materials":{"Ä&=1":{"wire":{}}}"#,
+            "?entry=b.obj",
+            ".png?materials.%C3%84%26%3D1.wire=%7B%7D&size=24&entry=b.obj",
+        ),
+        (cube, r#""size":24"#, "?format_in=obj", ".png?size=24&format_in=obj"),
+    ];
+    for (digest, document, query, expected) in cases {
+        let document = format!(r#"{{"mesh":"{digest}",{document}}}"#);
+        let drawn = server.request("POST", &format!("/v1/render{query}"), &[JSON], document.as_bytes());
+        drawn.picture(24, 24);
+        let location = drawn.header("content-location").expect("Content-Location").to_owned();
+        assert_eq!(location, format!("/v1/meshes/{digest}/render{expected}"));
+        let there = server.get(&location);
+        assert_eq!((there.status, &there.body), (200, &drawn.body), "{location}");
+        assert_eq!(there.header("etag"), drawn.header("etag"), "{location}");
+        assert_eq!(there.header("content-type"), drawn.header("content-type"), "{location}");
+    }
+    assert_eq!(cases.len(), 6);
+    // No query says this, and what was sent is nowhere.
+    let document = format!(r#"{{"mesh":"{cube}","size":24}}"#);
+    let mixed = server.request("POST", "/v1/render?image.width=16", &[JSON], document.as_bytes());
+    mixed.picture(16, 24);
+    assert_eq!(mixed.header("content-location"), None);
+    assert_eq!(server.post("/v1/render?size=24", CUBE_OBJ).header("content-location"), None);
+}
+
 #[test]
 fn documents_that_name_no_stored_mesh() {
     let server = Server::start(&[]);
