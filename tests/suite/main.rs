@@ -72,6 +72,7 @@ mod meshes_pictures;
 mod meshes_room;
 mod models;
 mod mutations;
+mod openapi;
 #[path = "../oracle/mod.rs"]
 mod oracle;
 mod oracle_flip;
