@@ -36,7 +36,7 @@ impl Query {
     /// Reads a query that asks what is in a mesh: how it is read, and at which moment of its animation.
     pub fn moment(uri: &Uri, rules: &Rules) -> Result<(Reading, Option<f64>), ApiError> {
         let Self { reading, overrides } = Self::read(uri, rules)?;
-        Ok((reading, request::read_moment(&overrides, rules)?))
+        Ok((reading, request::read_moment(&overrides, rules).map_err(told)?))
     }
 
     /// Reads a query where nothing is drawn.

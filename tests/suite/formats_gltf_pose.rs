@@ -274,7 +274,8 @@ fn the_report_can_be_of_a_moment() {
     assert_eq!(tags.len(), 3, "a moment has a tag of its own, none has the mesh's");
     server.get(&format!("{url}?scene.time_s=-1")).problem(400, "out_of_range");
     server.get(&format!("{url}?scene.time_s=1&scene.time_s=2")).problem(400, "conflicting_keys");
-    server.get(&format!("{url}?size=8")).problem(400, "unknown_key");
+    let detail = server.get(&format!("{url}?size=8")).problem(400, "unknown_key");
+    assert!(detail.contains("scene.time_s") && detail.contains("`entry`"), "{detail}");
     server.post("/v1/meshes?scene.time_s=1", &gltf.glb()).problem(400, "unknown_key");
 }
 
