@@ -125,13 +125,13 @@ pub fn render(
 /// Says what is in a file.
 pub fn inspect(
     bundle: &Bundle,
-    format_in: Option<Format>,
+    options: impl Into<mesh::Options>,
     limits: &Limits,
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Report, MeshError> {
     let mut budget = Budget::new(limits);
-    let mesh = mesh::import(bundle, format_in, limits, &mut budget, deadline)?;
+    let mesh = mesh::import(bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
     Report::of(&mesh, bundle.bytes_len(), &mut budget, deadline)
 }

@@ -22,6 +22,9 @@ pub fn read(names: &[String], entry: Option<String>, limits: &Limits) -> Result<
     }
     if let [single] = names {
         let bytes = Bytes::from(files::read(single, limits.memory_bytes)?);
+        if single == "-" {
+            return Ok(Bundle::of_one(bytes).with_entry(entry));
+        }
         let file = BundleFile::new(&relative_to(&folder_of(single)?, single)?, bytes.clone());
         // A name that no file of a bundle may have matters to nobody where there is one file.
         let bundle = file.map_or_else(|_| Bundle::of_one(bytes), |file| Bundle::of_files(vec![file]));

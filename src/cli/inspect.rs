@@ -4,17 +4,18 @@ use clap::Args;
 
 use super::complaint::Complaint;
 use super::progress::Progress;
-use super::render::format_in;
+use super::render::{format_in, pairs};
 use super::settings::LimitSettings;
 use super::{bundle, files};
-use crate::limits::Deadline;
-use crate::pipeline;
+use crate::limits::{BackendChoice, Deadline};
+use crate::request::{self, Rules};
+use crate::{mesh, pipeline};
 
 /// Arguments of `inspect`.
 #[derive(Args)]
 pub struct InspectArgs {
     /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB; known by its bytes, whatever its name) and the files it refers to, or
-    /// a .zip of them; `-` for standard input. An animated file is measured as it stands when nothing moves it
+    /// a .zip of them; `-` for standard input
     #[arg(required = true, value_name = "MESH")]
     meshes: Vec<String>,
     /// Print JSON
@@ -26,6 +27,9 @@ pub struct InspectArgs {
     /// Which of several files is the mesh, where more than one could be
     #[arg(long, value_name = "FILE")]
     entry: Option<String>,
+    /// scene.time_s=SECONDS: an animated file as it stands at that moment; otherwise as it stands when nothing moves it
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
     #[command(flatten)]
     limits: LimitSettings,
 }
@@ -34,13 +38,16 @@ pub struct InspectArgs {
 pub fn run(arguments: &InspectArgs) -> Result<(), Complaint> {
     let limits = arguments.limits.config().limits;
     let format = format_in(arguments.format_in.as_deref())?;
+    let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
+    let time_s = request::read_moment(&pairs(&arguments.set)?, &rules)?;
     let progress = Progress::start("reading");
     let mesh_name = bundle::name(&arguments.meshes);
     let bundle = bundle::read(&arguments.meshes, arguments.entry.clone(), &limits)?;
     progress.next("parsing");
     let mut parsed = |_| progress.next("counting edges");
-    let report = pipeline::inspect(&bundle, format, &limits, &Deadline::default(), &mut parsed)
-        .map_err(|error| Complaint::from(error).about(mesh_name))?;
+    let report =
+        pipeline::inspect(&bundle, mesh::Options { format, time_s }, &limits, &Deadline::default(), &mut parsed)
+            .map_err(|error| Complaint::from(error).about(mesh_name))?;
     drop(progress);
     let text =
         if arguments.json { report.json().map_err(|error| Complaint::ours(error.to_string()))? } else { report.text() };

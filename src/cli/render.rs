@@ -35,7 +35,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE.json")]
     request: Option<PathBuf>,
     /// Dotted key of the request document, such as wire.color=#f00, outline={}, wire=null or
-    /// materials.Glass.surface.opacity=0.3; may be repeated
+    /// materials.Glass.surface.opacity=0.3, or a whole section as JSON: outline={"thickness":8}. May be repeated; a later one
+    /// overrides an earlier one, and the flags beside it
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// N or WxH, in pixels
@@ -132,18 +133,24 @@ fn read_spec(arguments: &RenderArgs, limits: &Limits) -> Result<Spec, Complaint>
     ];
     let mut overrides: Vec<(String, String)> =
         short.iter().filter_map(|&(key, value)| Some((key.to_owned(), value.clone()?))).collect();
-    for pair in &arguments.set {
-        let (key, value) = pair
-            .split_once('=')
-            .ok_or_else(|| Complaint::usage(format!("--set {pair}: write KEY=VALUE, such as wire.color=#f00")))?;
-        overrides.push((key.to_owned(), value.to_owned()));
-    }
+    overrides.extend(pairs(&arguments.set)?);
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
     let mut spec = request::read(document.as_deref(), &overrides, &rules)?;
-    let chosen = overrides.iter().any(|(key, _)| key == "format" || key == "image.format");
+    // What is said here, and not in the document, counts for more than the output's name.
+    overrides.retain(|(key, _)| ["format", "image.format", "image"].contains(&key.as_str()));
+    let chosen = request::read(None, &overrides, &rules)?.image.format.is_some();
     let format = if chosen { spec.image.format } else { by_extension(&arguments.output, spec.image.format)? };
     request::set_format(&mut spec, format.unwrap_or(ImageFormat::Png));
     Ok(spec)
+}
+
+/// What `--set` was given.
+pub fn pairs(set: &[String]) -> Result<Vec<(String, String)>, Complaint> {
+    let pair = |text: &String| match text.split_once('=') {
+        Some((key, value)) => Ok((key.to_owned(), value.to_owned())),
+        None => Err(Complaint::usage(format!("--set {text}: write KEY=VALUE, such as wire.color=#f00"))),
+    };
+    set.iter().map(pair).collect()
 }
 
 /// The format that the output's name asks for, else the document's.

@@ -121,9 +121,12 @@ pub fn router(app: &Arc<App>) -> Router {
         .route("/healthz", get(health::healthz))
         .route("/readyz", get(health::readyz))
         .route("/version", get(health::version))
+        .route(schema::OPENAPI_PATH, get(schema::openapi))
         .merge(api)
         .fallback(|| async {
-            ApiError::not_found("there is nothing at this path; the work is done at POST /v1/render")
+            ApiError::not_found(
+                "there is nothing at this path; the work is done at POST /v1/render, and /openapi.json lists the paths",
+            )
         })
         .layer(middleware::from_fn(observe::observe))
         .with_state(app.clone())

@@ -16,8 +16,8 @@ use crate::jobs::{Job, JobId, State as JobState};
 
 /// Accepts a job, always with 202.
 pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Response, ApiError> {
-    let work = receive::receive(&app, request).await?;
-    let job = app.jobs.submit(work, true)?;
+    let received = receive::receive(&app, request).await?;
+    let job = app.jobs.submit(received.work, true)?;
     Ok(accepted(&job))
 }
 

@@ -20,8 +20,7 @@ use super::error::ApiError;
 use super::query::Query;
 use super::upload::{self, Named};
 use super::{receive, render};
-use crate::jobs::{Reservation, State as JobState, Task, Work};
-use crate::mesh::Bundle;
+use crate::jobs::{State as JobState, Task, Work};
 use crate::store::{Digest, NewMesh, Reading, StoredMesh};
 
 /// What the path says in place of a digest; not even text, perhaps.
@@ -34,10 +33,7 @@ pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Respo
 
 /// Stores a mesh whose digest the client has worked out.
 pub async fn put(State(app): State<Arc<App>>, id: MeshPath, request: Request) -> Result<Response, ApiError> {
-    let digest = id.ok().and_then(|Path(id)| Digest::parse(&id)).ok_or_else(|| {
-        let detail = "the path does not end in a SHA-256, which is 64 lower-case hexadecimal digits";
-        ApiError::new(StatusCode::BAD_REQUEST, "bad_digest", detail)
-    })?;
+    let digest = digest(id.ok().map(|Path(id)| id).as_deref())?;
     store(&app, request, Some(digest)).await
 }
 
@@ -49,19 +45,19 @@ pub async fn get(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let reading = Query::reading(&uri)?;
+    let (reading, time_s) = Query::moment(&uri, &app.rules)?;
     let stored = find(&app, id.ok().map(|Path(id)| id).as_deref())?;
-    let tag = tag(stored.mesh.digest, &reading);
+    let tag = tag(stored.mesh.digest, &reading, time_s);
     let cached = [etag(&tag), day(!app.api_keys.is_empty())];
     if conditional::is_known(&headers, &tag) {
         return Ok((StatusCode::NOT_MODIFIED, cached).into_response());
     }
-    let body = if stored.mesh.reading == reading {
+    let body = if stored.mesh.reading == reading && time_s.is_none() {
         Body::from(stored.mesh.report.clone())
     } else if method == Method::HEAD {
         unmade()
     } else {
-        Body::from(inspect(&app, stored.mesh.bundle.clone(), reading, stored.memory.clone()).await?)
+        Body::from(done(&app, work(&stored, reading, Task::Inspect { time_s })).await?)
     };
     let media_type = [(header::CONTENT_TYPE, HeaderValue::from_static("application/json"))];
     Ok((cached, media_type, body).into_response())
@@ -69,8 +65,7 @@ pub async fn get(
 
 /// Forgets a mesh. Who draws it can go on.
 pub async fn delete(State(app): State<Arc<App>>, id: MeshPath) -> Result<Response, ApiError> {
-    let digest = id.ok().and_then(|Path(id)| Digest::parse(&id));
-    match digest.is_some_and(|digest| app.meshes.remove(digest)) {
+    match app.meshes.remove(digest(id.ok().map(|Path(id)| id).as_deref())?) {
         true => Ok(StatusCode::NO_CONTENT.into_response()),
         false => Err(unknown()),
     }
@@ -78,7 +73,15 @@ pub async fn delete(State(app): State<Arc<App>>, id: MeshPath) -> Result<Respons
 
 /// The stored mesh of this name.
 pub fn find(app: &App, name: Option<&str>) -> Result<Arc<StoredMesh>, ApiError> {
-    name.and_then(Digest::parse).and_then(|digest| app.meshes.find(digest)).ok_or_else(unknown)
+    app.meshes.find(digest(name)?).ok_or_else(unknown)
+}
+
+/// The digest that a path names.
+fn digest(name: Option<&str>) -> Result<Digest, ApiError> {
+    name.and_then(Digest::parse).ok_or_else(|| {
+        let detail = "the path names no SHA-256, which is 64 lower-case hexadecimal digits";
+        ApiError::new(StatusCode::BAD_REQUEST, "bad_digest", detail)
+    })
 }
 
 /// What a worker does with a stored mesh.
@@ -94,7 +97,7 @@ pub fn unmade() -> Body {
 }
 
 async fn store(app: &Arc<App>, request: Request, wanted: Option<Digest>) -> Result<Response, ApiError> {
-    let reading = Query::reading(request.uri())?;
+    let reading = Query::reading(request.uri(), &app.rules)?;
     body::check_header(request.headers(), app.rules.limits.body_bytes)?;
     if let Some(length) = body::length(request.headers()).filter(|_| !body::is_multipart(request.headers())) {
         app.meshes.check_size(length)?;
@@ -110,33 +113,38 @@ async fn store(app: &Arc<App>, request: Request, wanted: Option<Digest>) -> Resu
     // What was once read like this need not be read again.
     let is_known = app.meshes.find(digest).is_some_and(|stored| stored.mesh.reading == reading);
     let is_new = !is_known && {
-        let report = inspect(app, bundle.clone(), reading.clone(), memory.clone()).await?;
+        let Reading { format_in, entry } = reading.clone();
+        let task = Task::Inspect { time_s: None };
+        let work = Work { bundle: bundle.clone().with_entry(entry), format_in, task, memory: memory.clone() };
+        let report = done(app, work).await?;
         app.meshes.insert(NewMesh { digest, bundle, reading, report })?
     };
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
     let location = HeaderValue::from_str(&body.url).unwrap_or_else(|_| HeaderValue::from_static("/v1/meshes"));
     let no_store = HeaderValue::from_static("no-store");
-    let headers =
-        [etag(&tag(digest, &Reading::default())), (header::LOCATION, location), (header::CACHE_CONTROL, no_store)];
+    let headers = [
+        etag(&tag(digest, &Reading::default(), None)),
+        (header::LOCATION, location),
+        (header::CACHE_CONTROL, no_store),
+    ];
     Ok((status, headers, Json(body)).into_response())
 }
 
 /// Has a worker say what is in a bundle; that it is a mesh, in the first place.
-async fn inspect(app: &App, bundle: Bundle, reading: Reading, memory: Arc<Reservation>) -> Result<Bytes, ApiError> {
-    let Reading { format_in, entry } = reading;
-    let work = Work { bundle: bundle.with_entry(entry), format_in, task: Task::Inspect, memory };
+async fn done(app: &App, work: Work) -> Result<Bytes, ApiError> {
     match render::done(app, work).await? {
         JobState::Inspected(report) => Ok(report),
         _ => Err(ApiError::internal()),
     }
 }
 
-/// The mesh's name; where it is read in a way of its own, that too.
-fn tag(digest: Digest, reading: &Reading) -> String {
-    if *reading == Reading::default() {
+/// The mesh's name; where it is read in a way of its own or at a moment, that too.
+fn tag(digest: Digest, reading: &Reading, time_s: Option<f64>) -> String {
+    if *reading == Reading::default() && time_s.is_none() {
         return format!("\"{digest}\"");
     }
-    format!("\"{}\"", Digest::of(format!("{digest} {reading:?}").as_bytes()))
+    let moment = time_s.map_or_else(String::new, |time_s| format!(" {time_s:?}"));
+    format!("\"{}\"", Digest::of(format!("{digest} {reading:?}{moment}").as_bytes()))
 }
 
 fn unknown() -> ApiError {

@@ -11,7 +11,7 @@ use super::app::App;
 use super::conditional::{self, day, etag};
 use super::dto::media_type;
 use super::error::ApiError;
-use super::query::Query;
+use super::query::{self, Query};
 use super::{meshes, render};
 use crate::image::ImageFormat;
 use crate::jobs::{State as JobState, Task};
@@ -32,8 +32,8 @@ pub async fn get(
     let format = path.as_ref().and_then(|(_, name)| format_of(name)).ok_or_else(|| {
         ApiError::not_found("pictures of a stored mesh are called render.png, render.webp and render.jpg")
     })?;
-    let Query { reading, overrides } = Query::read(&uri)?;
-    let mut spec = request::read(None, &overrides, &app.rules)?;
+    let Query { reading, overrides } = Query::read(&uri, &app.rules)?;
+    let mut spec = request::read(None, &overrides, &app.rules).map_err(query::told)?;
     request::set_format(&mut spec, format);
 
     let stored = meshes::find(&app, path.as_ref().map(|(id, _)| id.as_str()))?;
@@ -56,6 +56,38 @@ pub async fn get(
         response.headers_mut().insert(name, value);
     }
     Ok(response)
+}
+
+/// Where a picture of a stored mesh is, and the tag that it has there. None where no address of a sane length says it.
+pub fn address(
+    app: &App,
+    digest: Digest,
+    reading: &Reading,
+    spec: &Spec,
+    keys: &[(String, String)],
+) -> Option<Address> {
+    const URL_BYTES_MAX: usize = 2000;
+    let extension = match spec.image.format? {
+        ImageFormat::Png => "png",
+        ImageFormat::Webp => "webp",
+        ImageFormat::Jpeg => "jpg",
+    };
+    let format_in = reading.format_in.map(|format| ("format_in", format.name()));
+    let entry = reading.entry.as_deref().map(|entry| ("entry", entry));
+    let keys = keys.iter().map(|(key, text)| (key.as_str(), text.as_str())).chain(format_in).chain(entry);
+    let query: Vec<String> =
+        keys.map(|(key, text)| format!("{}={}", query::escape(key), query::escape(text))).collect();
+    let mark = if query.is_empty() { "" } else { "?" };
+    let url = format!("/v1/meshes/{digest}/render.{extension}{mark}{}", query.join("&"));
+    (url.len() <= URL_BYTES_MAX).then(|| Address { url, etag: tag(app, digest, reading, spec) })
+}
+
+/// Of a picture that can be had again.
+pub struct Address {
+    /// Where.
+    pub url: String,
+    /// Its tag there.
+    pub etag: String,
 }
 
 fn format_of(name: &str) -> Option<ImageFormat> {

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use axum::extract::Request;
+use axum::http::HeaderMap;
 
 use super::app::App;
 use super::body::{self, BodyKind, BodyLimits, Upload};
 use super::error::ApiError;
-use super::query::Query;
+use super::pictures::{self, Address};
+use super::query::{self, Query};
 use super::{meshes, negotiate};
 use crate::jobs::{Task, Work};
 use crate::limits::Limits;
@@ -15,14 +17,22 @@ use crate::request;
 use crate::scene::Spec;
 use crate::store::{Digest, Reading};
 
+/// What is to be done.
+pub struct Received {
+    /// For a worker.
+    pub work: Work,
+    /// Where the picture of a stored mesh can be had again.
+    pub address: Option<Address>,
+}
+
 /// Reads a request for a picture, and says everything that can be wrong with it before it costs a worker's time.
-pub async fn receive(app: &Arc<App>, request: Request) -> Result<Work, ApiError> {
+pub async fn receive(app: &Arc<App>, request: Request) -> Result<Received, ApiError> {
     body::check_header(request.headers(), app.rules.limits.body_bytes)?;
-    let Query { reading, overrides } = Query::read(request.uri())?;
+    let Query { reading, overrides } = Query::read(request.uri(), &app.rules)?;
     // A form brings its document with it, and JSON may be one; without one, the query is all there is and can be judged
     // before the upload.
     if !body::is_multipart(request.headers()) && !body::is_json(request.headers()) {
-        request::read(None, &overrides, &app.rules)?;
+        request::read(None, &overrides, &app.rules).map_err(query::told)?;
     }
     app.jobs.would_accept()?;
 
@@ -31,22 +41,29 @@ pub async fn receive(app: &Arc<App>, request: Request) -> Result<Work, ApiError>
     let finish = |mut spec: Spec| {
         let format = negotiate::image_format(spec.image.format, &headers)?;
         request::set_format(&mut spec, format);
-        Ok::<_, ApiError>(Task::Draw(Box::new(spec)))
+        Ok::<_, ApiError>(Box::new(spec))
     };
-    if let Some(document) = upload.bundle.files().first().map(|file| &file.bytes)
-        && upload.kind == BodyKind::Raw
-        && request::names_mesh(document)
-    {
+    if let Some(document) = document_of(&upload, &reading, &headers) {
         let (name, spec) = request::read_with_mesh(document, &overrides, &app.rules)?;
-        if Digest::parse(&name).is_none() {
-            return Err(request::bad_mesh_name(&name).into());
-        }
-        let task = finish(spec)?;
-        return Ok(meshes::work(&*meshes::find(app, Some(&name))?, reading, task));
+        let digest = Digest::parse(&name).ok_or_else(|| request::bad_mesh_name(&name))?;
+        let spec = finish(spec)?;
+        let stored = meshes::find(app, Some(&name))?;
+        let keys = request::all_dotted(document, &overrides, &spec, &app.rules);
+        let address = keys.and_then(|keys| pictures::address(app, digest, &reading, &spec, &keys));
+        return Ok(Received { work: meshes::work(&stored, reading, Task::Draw(spec)), address });
     }
-    let task = finish(request::read(upload.document.as_deref(), &overrides, &app.rules)?)?;
+    upload.bundle.check_sent().map_err(|error| ApiError::from(&error))?;
+    let spec = finish(request::read(upload.document.as_deref(), &overrides, &app.rules)?)?;
     let Reading { format_in, entry } = reading;
-    Ok(Work { bundle: upload.bundle.with_entry(entry), format_in, task, memory: Arc::new(upload.reservation) })
+    let (bundle, task, memory) = (upload.bundle.with_entry(entry), Task::Draw(spec), Arc::new(upload.reservation));
+    Ok(Received { work: Work { bundle, format_in, task, memory }, address: None })
+}
+
+/// The body, if it is a request document in place of a mesh. Who says how the mesh in it is to be read sent one.
+fn document_of<'u>(upload: &'u Upload, reading: &Reading, headers: &HeaderMap) -> Option<&'u [u8]> {
+    let body = upload.bundle.files().first().filter(|_| upload.kind == BodyKind::Raw)?.bytes.as_ref();
+    let is_faulty = || reading.format_in.is_none() && request::is_faulty_document(body, body::is_json(headers));
+    (request::names_mesh(body) || is_faulty()).then_some(body)
 }
 
 /// Reads a body within this server's limits.

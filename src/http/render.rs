@@ -9,13 +9,14 @@ use axum::response::{IntoResponse, Response};
 use super::app::App;
 use super::dto::media_type;
 use super::error::ApiError;
-use super::{jobs, negotiate, receive};
+use super::receive::Received;
+use super::{conditional, jobs, negotiate, receive};
 use crate::jobs::{Failure, Finished, Job, Jobs, State as JobState, Work};
 
 /// Draws while the client waits.
 pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Response, ApiError> {
     let respond_async = negotiate::prefer(request.headers()).respond_async;
-    let work = receive::receive(&app, request).await?;
+    let Received { work, address } = receive::receive(&app, request).await?;
     if respond_async {
         let job = app.jobs.submit(work, true)?;
         let mut response = jobs::accepted(&job);
@@ -23,10 +24,18 @@ pub async fn post(State(app): State<Arc<App>>, request: Request) -> Result<Respo
         response.headers_mut().insert("preference-applied", applied);
         return Ok(response);
     }
-    match done(&app, work).await? {
-        JobState::Done(finished) => Ok(picture(&finished)),
-        _ => Err(ApiError::internal()),
+    let mut response = match done(&app, work).await? {
+        JobState::Done(finished) => picture(&finished),
+        _ => return Err(ApiError::internal()),
+    };
+    if let Some((location, (name, etag))) =
+        address.and_then(|at| Some((HeaderValue::from_str(&at.url).ok()?, conditional::etag(&at.etag))))
+    {
+        // What is sent is what is there, so it has the tag that it has there.
+        response.headers_mut().insert(header::CONTENT_LOCATION, location);
+        response.headers_mut().insert(name, etag);
     }
+    Ok(response)
 }
 
 /// Has work done while the client waits.
@@ -70,6 +79,14 @@ pub fn picture(finished: &Finished) -> Response {
         (HeaderName::from_static("x-render-backend"), HeaderValue::from_static(finished.backend.name())),
         (HeaderName::from_static("server-timing"), text(&timings.join(", "))),
     ];
+    // Codes alone: sentences belong into bodies, and a job's state has them.
+    let mut codes: Vec<&str> = Vec::new();
+    for warning in &finished.warnings {
+        if !codes.contains(&warning.code) {
+            codes.push(warning.code);
+        }
+    }
+    let warnings = (!codes.is_empty()).then(|| (HeaderName::from_static("x-warnings"), text(&codes.join(", "))));
     let chosen = finished.choice.as_ref().map(|choice| {
         [
             (HeaderName::from_static("x-expected-error"), text(&choice.expected_error.to_string())),
@@ -77,7 +94,7 @@ pub fn picture(finished: &Finished) -> Response {
         ]
     });
     let mut response = (StatusCode::OK, headers, finished.picture.clone()).into_response();
-    response.headers_mut().extend(chosen.into_iter().flatten());
+    response.headers_mut().extend(chosen.into_iter().flatten().chain(warnings));
     response
 }
 

@@ -1,6 +1,7 @@
-//! `GET /v1/schema`: the request document as a JSON Schema, with this server's own limits.
+//! What the interface says of itself: `GET /v1/schema`, the request document as a JSON Schema with this server's own limits, and
+//! `GET /openapi.json`.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -12,35 +13,53 @@ use super::conditional;
 use super::render::digest;
 use crate::request::{self, Rules};
 
-/// Where it is found.
+/// Where the schema is found.
 pub const PATH: &str = "/v1/schema";
 
-/// The schema as it is sent: it does not change while the process runs.
+/// Where the whole interface is described.
+pub const OPENAPI_PATH: &str = "/openapi.json";
+
+static OPENAPI: LazyLock<Schema> =
+    LazyLock::new(|| Schema::of(Bytes::from_static(include_bytes!("../../api/openapi.json")), "application/json"));
+
+/// A description as it is sent: it does not change while the process runs.
 pub struct Schema {
     body: Bytes,
     etag: String,
+    media_type: &'static str,
 }
 
 impl Schema {
     /// Of documents that are understood under these rules.
     pub fn new(rules: &Rules) -> Self {
-        let body = Bytes::from(format!("{:#}\n", request::schema(rules)));
+        Self::of(Bytes::from(format!("{:#}\n", request::schema(rules))), "application/schema+json")
+    }
+
+    fn of(body: Bytes, media_type: &'static str) -> Self {
         let etag = format!("\"{:032x}\"", digest(&body));
-        Self { body, etag }
+        Self { body, etag, media_type }
+    }
+
+    fn answer(&self, headers: &HeaderMap) -> Response {
+        let of = [
+            conditional::etag(&self.etag),
+            // It changes with a restart of the server; asking again costs next to nothing.
+            (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
+        ];
+        if conditional::is_known(headers, &self.etag) {
+            return (StatusCode::NOT_MODIFIED, of).into_response();
+        }
+        let media_type = [(header::CONTENT_TYPE, HeaderValue::from_static(self.media_type))];
+        (of, media_type, self.body.clone()).into_response()
     }
 }
 
 /// The schema, or 304 for who has it.
 pub async fn get(State(app): State<Arc<App>>, headers: HeaderMap) -> Response {
-    let Schema { body, etag } = &app.schema;
-    let of = [
-        conditional::etag(etag),
-        // It changes with a restart of the server; asking again costs next to nothing.
-        (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
-    ];
-    if conditional::is_known(&headers, etag) {
-        return (StatusCode::NOT_MODIFIED, of).into_response();
-    }
-    let media_type = [(header::CONTENT_TYPE, HeaderValue::from_static("application/schema+json"))];
-    (of, media_type, body.clone()).into_response()
+    app.schema.answer(&headers)
+}
+
+/// The description of the interface, which needs no key: it is the same for everybody.
+pub async fn openapi(headers: HeaderMap) -> Response {
+    OPENAPI.answer(&headers)
 }

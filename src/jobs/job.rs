@@ -56,7 +56,10 @@ pub enum Task {
     /// A picture.
     Draw(Box<Spec>),
     /// A report on what is in it.
-    Inspect,
+    Inspect {
+        /// As [`Spec::time_s`].
+        time_s: Option<f64>,
+    },
 }
 
 /// What a worker made.

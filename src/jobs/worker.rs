@@ -8,6 +8,7 @@ use super::board::Board;
 use super::job::{Failure, Finished, Job, Product, State, Task, Timings, Work};
 use crate::backend::{Backends, GpuHost};
 use crate::limits::{Deadline, Limits};
+use crate::mesh;
 use crate::pipeline::{self, RenderError, Stage};
 
 /// What does one job after the other on one thread.
@@ -28,8 +29,9 @@ pub fn pipeline_engine(gpu: Arc<GpuHost>, threads: usize, limits: Limits) -> Eng
                     let job = pipeline::Job { bundle, format_in: *format_in, spec };
                     pipeline::render(job, &mut backends, &limits, deadline, ended).map(Product::Picture)
                 }
-                Task::Inspect => {
-                    let report = pipeline::inspect(bundle, *format_in, &limits, deadline, ended)?;
+                Task::Inspect { time_s } => {
+                    let options = mesh::Options { format: *format_in, time_s: *time_s };
+                    let report = pipeline::inspect(bundle, options, &limits, deadline, ended)?;
                     Ok(Product::Report(report.json()?))
                 }
             }

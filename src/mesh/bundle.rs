@@ -1,9 +1,13 @@
 //! What was uploaded: files that belong together, under names that any folder could give them.
 
+use super::{Format, MeshError, MeshFault};
 use bytes::Bytes;
 
 /// Longest path of a file in a bundle, bytes: what file systems allow, roughly.
 const PATH_BYTES_MAX: usize = 1024;
+
+/// What a file is called that nobody named.
+pub const UNNAMED: &str = "mesh";
 
 /// What was uploaded: one file, several, or a zip archive that is still closed.
 #[derive(Clone, Debug, Default)]
@@ -33,7 +37,7 @@ impl Bundle {
     pub fn of_one(bytes: impl Into<Bytes>) -> Self {
         let bytes = bytes.into();
         let is_zip = bytes.starts_with(b"PK\x03\x04");
-        Self { files: vec![BundleFile { path: "mesh".into(), bytes }], entry: None, is_zip }
+        Self { files: vec![BundleFile { path: UNNAMED.into(), bytes }], entry: None, is_zip }
     }
 
     /// A zip archive, whatever its bytes say.
@@ -51,6 +55,17 @@ impl Bundle {
     #[must_use]
     pub fn with_entry(self, entry: Option<String>) -> Self {
         Self { entry, ..self }
+    }
+
+    /// Refuses a single file without a byte in it: nobody need open it to know.
+    pub fn check_sent(&self) -> Result<(), MeshError> {
+        match self.files.as_slice() {
+            [single] if single.bytes.is_empty() => Err(MeshError::new(
+                MeshFault::Unrecognised,
+                format!("the body is empty: send the bytes of a mesh file ({})", Format::ALL),
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// Its files, as they came: an archive is still one.
@@ -132,7 +147,7 @@ pub fn show(name: &str) -> String {
 
 /// The first few of some names, for a sentence.
 pub fn show_all<'n>(names: impl ExactSizeIterator<Item = &'n str>) -> String {
-    const SHOWN: usize = 8;
+    const SHOWN: usize = 10;
     let count = names.len();
     let mut text = names.take(SHOWN).map(|name| format!("\"{}\"", show(name))).collect::<Vec<_>>().join(", ");
     if count > SHOWN {

@@ -1,6 +1,6 @@
 //! Which file of a bundle is the mesh.
 
-use super::bundle::{BundleFile, show, show_all};
+use super::bundle::{BundleFile, UNNAMED, show, show_all};
 use super::{Folder, Format, MeshError, MeshFault, sniff, three_mf};
 use crate::limits::Deadline;
 
@@ -28,7 +28,13 @@ pub fn choose(
     };
     let format = match format {
         Some(format) => format,
-        None => sniff::sniff(&files[number].bytes)?,
+        None => {
+            let file = &files[number];
+            // Who sends a file without a name knows which one is meant.
+            let is_named = files.len() > 1 || file.path != UNNAMED;
+            let what = if is_named { format!("\"{}\"", show(&file.path)) } else { "the body".into() };
+            sniff::sniff(&file.bytes, &what)?
+        }
     };
     Ok((folder.with_entry(number), format))
 }
@@ -67,7 +73,9 @@ fn no_mesh(files: &[BundleFile]) -> String {
         return format!("the bundle has no files in it; send a mesh ({}) and what belongs to it", Format::ALL);
     }
     let names = show_all(files.iter().map(|file| file.path.as_str()));
-    format!("no file of the bundle is a mesh in a known format ({}): there is {names}", Format::ALL)
+    let inner = files.iter().find(|file| sniff::is_zip(&file.bytes));
+    let inner = inner.map_or_else(String::new, |file| format!("; \"{}\" is {}", show(&file.path), sniff::INNER_ZIP));
+    format!("no file of the bundle is a mesh in a known format ({}): there is {names}{inner}", Format::ALL)
 }
 
 fn unknown(name: &str, files: &[BundleFile]) -> MeshError {

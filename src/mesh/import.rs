@@ -5,8 +5,7 @@ use super::error::DETAIL_CHARS_MAX;
 use super::normalise::normalise;
 use super::raw::RawMesh;
 use super::{
-    Folder, ImportReport, Mesh, MeshError, MeshFault, Warning, entry, fbx, gltf, obj, off, ply, stl, text, three_mf,
-    unzip,
+    Folder, ImportReport, Mesh, MeshError, Warning, entry, fbx, gltf, obj, off, ply, stl, text, three_mf, unzip,
 };
 use crate::limits::{Budget, Deadline, Limits};
 
@@ -135,14 +134,11 @@ fn open<T>(
 ) -> Result<T, MeshError> {
     let files = match bundle.files.as_slice() {
         [archive] if bundle.is_zip => unzip::unzip(&archive.bytes, limits, budget, deadline)?,
-        [single] if single.bytes.is_empty() => {
-            return Err(MeshError::new(
-                MeshFault::Unrecognised,
-                format!("the body is empty: send the bytes of a mesh file ({})", Format::ALL),
-            ));
-        }
         // Clones of shared bytes.
-        files => files.to_vec(),
+        files => {
+            bundle.check_sent()?;
+            files.to_vec()
+        }
     };
     let (folder, format) = entry::choose(files, bundle.entry.as_deref(), options.format, deadline)?;
     let bytes = &folder.entry().bytes;

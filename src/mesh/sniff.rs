@@ -5,11 +5,19 @@ use super::{Format, MeshError, MeshFault, fbx, off, ply, stl, text};
 /// How far into a text its first telling line may be. Exporters write long comment headers.
 const TEXT_SNIFF_BYTES: usize = 1 << 20;
 
-/// The format of `bytes`, or why none fits.
-pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
+/// What an archive is where only files are looked at.
+pub const INNER_ZIP: &str = "a zip archive (a bundle or a 3MF file) among other files or inside of another archive, and only \
+                             one that is the whole upload is opened: send it alone, or the files that are in it";
+
+/// The format of `bytes`, or why none fits; `what` is what an error calls them.
+pub fn sniff(bytes: &[u8], what: &str) -> Result<Format, MeshError> {
     // Before anything that looks at text: a binary STL may well begin with "solid".
     if stl::is_exact_binary(bytes) {
         return Ok(Format::StlBinary);
+    }
+    // Before text: what an archive stores without packing it may read as a mesh.
+    if is_zip(bytes) {
+        return Err(unrecognised(&format!("{what} is {INNER_ZIP}")));
     }
     if bytes.starts_with(b"glTF") {
         return Ok(Format::Glb);
@@ -32,7 +40,7 @@ pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
         return if contains(text, b"\"asset\"") {
             Ok(Format::Gltf)
         } else {
-            Err(unrecognised("the body is JSON but not glTF: there is no \"asset\" property"))
+            Err(unrecognised(&format!("{what} is JSON but not glTF: there is no \"asset\" property")))
         };
     }
     if stl::is_ascii(text) {
@@ -46,12 +54,12 @@ pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
     }
     if let Some(name) = known_but_unread(bytes) {
         return Err(unrecognised(&format!(
-            "the body looks like {name}, which is not read: convert it to {}",
+            "{what} looks like {name}, which is not read: convert it to {}",
             Format::ALL
         )));
     }
     Err(unrecognised(&format!(
-        "the body is not a mesh in a known format ({}); if it is one, name it with format_in",
+        "{what} is not a mesh in a known format ({}); if it is one, name it with format_in",
         Format::ALL
     )))
 }
@@ -59,16 +67,21 @@ pub fn sniff(bytes: &[u8]) -> Result<Format, MeshError> {
 /// The format of a file that lies among others, few of which are meshes. What only resembles a binary STL is one if it
 /// `may_be_stl` by its name.
 pub fn sniff_among_others(bytes: &[u8], may_be_stl: bool) -> Option<Format> {
-    if known_but_unread(bytes).is_some() && !text::is_utf16(bytes) {
+    if is_zip(bytes) || known_but_unread(bytes).is_some() && !text::is_utf16(bytes) {
         return stl::is_exact_binary(bytes).then_some(Format::StlBinary);
     }
-    let format = sniff(bytes).ok()?;
+    let format = sniff(bytes, "").ok()?;
     (format != Format::StlBinary || may_be_stl || stl::is_exact_binary(bytes)).then_some(format)
 }
 
 /// Without a byte order mark and leading white space.
 pub fn trim_start(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start()
+}
+
+/// Whether this is a zip archive with something in it.
+pub fn is_zip(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PK\x03\x04")
 }
 
 fn unrecognised(detail: &str) -> MeshError {
@@ -101,7 +114,6 @@ fn is_corner(word: &str) -> bool {
 fn known_but_unread(bytes: &[u8]) -> Option<&'static str> {
     let starts = |magic: &[u8]| bytes.starts_with(magic);
     [
-        (starts(b"PK\x03\x04"), "a zip archive (a bundle or a 3MF file), inside of another"),
         (starts(b"\x89PNG") || starts(b"\xFF\xD8\xFF") || starts(b"RIFF"), "a picture"),
         (starts(b"BLENDER"), "a Blender file"),
         (starts(b"\xFF\xFE") || starts(b"\xFE\xFF"), "UTF-16 text but not OBJ"),

@@ -30,6 +30,8 @@ pub enum RequestFault {
     NotJson,
     /// Two keys that contradict each other.
     Conflict,
+    /// A key that has to be there is not.
+    Missing,
 }
 
 impl RequestFault {
@@ -41,6 +43,7 @@ impl RequestFault {
             Self::WrongType => "wrong_type",
             Self::NotJson => "not_json",
             Self::Conflict => "conflicting_keys",
+            Self::Missing => "missing_key",
         }
     }
 }
@@ -63,6 +66,7 @@ impl fmt::Display for RequestError {
             }
             RequestFault::NotJson => write!(f, "the request document is {given}, and allowed is {allowed}"),
             RequestFault::Conflict => write!(f, "`{key}` is {given}, and {allowed}"),
+            RequestFault::Missing => write!(f, "`{key}` is missing: {allowed}"),
         }?;
         match self.flag {
             Some(flag) => write!(f, " (raise it with {flag})"),

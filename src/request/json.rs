@@ -5,6 +5,7 @@ use serde_json::Value as Json;
 use super::error::{RequestError, RequestFault};
 use super::item::Item;
 use super::table::{GROUPS, LAYERS, MATERIALS, SCHEMA};
+use super::twice;
 use super::unique::{Fault, parse};
 use super::value::Given;
 
@@ -24,7 +25,8 @@ pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestErro
         return Err(error);
     }
     let json = parse(document).map_err(|fault| match fault {
-        Fault::NotJson(e) => not_json(format!("not JSON ({e})"), "a JSON object".into()),
+        Fault::NotJson(_) if document.trim_ascii().is_empty() => not_json("empty".into(), "a JSON object".into()),
+        Fault::NotJson(e) => not_json(not_json_at(&e), "a JSON object".into()),
         Fault::Repeated(key) => {
             RequestError::new(RequestFault::Conflict, &key, "given twice", "an object has a key once")
         }
@@ -43,15 +45,68 @@ pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestErro
             other if key == SCHEMA => {
                 return Err(RequestError::new(RequestFault::WrongType, SCHEMA, other, "a string"));
             }
-            Json::Object(materials) if key == MATERIALS.name => {
-                for (name, value) in materials {
-                    flatten_material(name, value, &mut items)?;
-                }
-            }
-            other => flatten_object(None, key, other, &mut items),
+            other => flatten_key(key, other, &mut items)?,
         }
     }
+    twice::check(&items)?;
     Ok(items)
+}
+
+/// What a dotted key and its text come to: one item, or, where the text is an object with keys of its own
+/// (`outline={"thickness":8}`), what the same object in a document comes to.
+pub fn flatten_override(key: &str, text: &str, depth_max: u64) -> Result<Vec<Item>, RequestError> {
+    let item = Item::dotted(key, text);
+    let may_hold_keys = match &item.material {
+        None => item.key == MATERIALS.name || holds_keys(&item.key),
+        Some(_) => item.key.is_empty() || holds_keys(&item.key),
+    };
+    if !may_hold_keys || !text.trim_start().starts_with('{') || text.len() > DOCUMENT_BYTES_MAX {
+        return Ok(vec![item]);
+    }
+    let whole = item.whole_key();
+    let wrong = |why: String| {
+        let allowed =
+            format!("an object as JSON, such as {{\"KEY\": VALUE}} (one key alone is {whole}.KEY=VALUE){why}");
+        RequestError::new(RequestFault::WrongType, &whole, item.given.show(), allowed)
+    };
+    // Before the parser, whose recursion costs stack.
+    if depth(text.as_bytes()) > depth_max {
+        return Err(wrong(format!(", at most {depth_max} deep")));
+    }
+    let value = parse(text.as_bytes()).map_err(|fault| match fault {
+        Fault::NotJson(e) => wrong(format!("; this is {}", not_json_at(&e))),
+        Fault::Repeated(key) => {
+            let key = format!("{whole}.{key}");
+            RequestError::new(RequestFault::Conflict, &key, "given twice", "an object has a key once")
+        }
+    })?;
+    let mut items = Vec::new();
+    match item.material {
+        None => flatten_key(item.key, value, &mut items)?,
+        Some(name) if item.key.is_empty() => flatten_material(name, value, &mut items)?,
+        Some(name) => flatten_object(Some(&name), item.key, value, &mut items),
+    }
+    Ok(items)
+}
+
+/// Where a text stops being JSON, and then why: the place is what must not be cut off.
+fn not_json_at(error: &serde_json::Error) -> String {
+    let said = error.to_string();
+    let why = said.split(" at line ").next().unwrap_or_default();
+    format!("not JSON at line {}, column {} ({why})", error.line(), error.column())
+}
+
+/// A key of the document itself.
+fn flatten_key(key: String, value: Json, items: &mut Vec<Item>) -> Result<(), RequestError> {
+    match value {
+        Json::Object(materials) if key == MATERIALS.name && !materials.is_empty() => {
+            materials.into_iter().try_for_each(|(name, value)| flatten_material(name, value, items))
+        }
+        other => {
+            flatten_object(None, key, other, items);
+            Ok(())
+        }
+    }
 }
 
 fn flatten_material(name: String, value: Json, items: &mut Vec<Item>) -> Result<(), RequestError> {
@@ -71,14 +126,18 @@ fn flatten_material(name: String, value: Json, items: &mut Vec<Item>) -> Result<
 
 /// The keys of a layer or a group, one by one; anything else as it is.
 fn flatten_object(material: Option<&String>, key: String, value: Json, items: &mut Vec<Item>) {
-    let holds_keys = LAYERS.iter().map(|l| l.name).chain(GROUPS.iter().map(|g| g.name)).any(|name| name == key);
     let item = |key, value| Item { material: material.cloned(), key, given: Given::Json(value) };
     match value {
-        Json::Object(inner) if holds_keys && !inner.is_empty() => {
+        Json::Object(inner) if holds_keys(&key) && !inner.is_empty() => {
             items.extend(inner.into_iter().map(|(name, value)| item(format!("{key}.{name}"), value)));
         }
         other => items.push(item(key, other)),
     }
+}
+
+/// Whether this is a layer or a group.
+fn holds_keys(key: &str) -> bool {
+    LAYERS.iter().map(|layer| layer.name).chain(GROUPS.iter().map(|group| group.name)).any(|name| name == key)
 }
 
 fn dotted(prefix: &str, key: &str, value: &Json) -> RequestError {

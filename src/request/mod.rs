@@ -5,6 +5,7 @@
 //! A layer that is `null` is off; of any other key `null` is its default, or as if the key were not there.
 //! [`table`] is the table of keys; a new key is a line there, and [`schema()`] writes it out for others.
 
+mod dotted;
 mod draft;
 mod error;
 mod fields;
@@ -21,12 +22,14 @@ mod tests;
 mod tests_bad;
 #[cfg(test)]
 mod tests_materials;
+mod twice;
 mod unique;
 mod value;
 mod words;
 
+pub use dotted::all_dotted;
 pub use error::{RequestError, RequestFault};
-pub use reference::{bad_mesh_name, names_mesh};
+pub use reference::{bad_mesh_name, is_faulty_document, names_mesh};
 pub use schema::schema;
 pub use words::{Style, Words, word_for, words_of};
 
@@ -40,7 +43,7 @@ use draft::Draft;
 use fields::{Layer, Target};
 use item::Item;
 use look::Look;
-use table::{FIELDS, GROUPS, LAYERS, MATERIALS, SHORT};
+use table::{FIELDS, GROUPS, LAYERS, MATERIALS, SCHEMA, SHORT};
 use value::{Given, Kind, Value};
 
 /// The style of a request that names none.
@@ -78,18 +81,47 @@ pub fn read(document: Option<&[u8]>, overrides: &Overrides, rules: &Rules) -> Re
 pub fn read_with_mesh(document: &[u8], overrides: &Overrides, rules: &Rules) -> Result<(String, Spec), RequestError> {
     let mut items = json::flatten(document, rules.limits.json_depth)?;
     let at = items.iter().position(|item| item.material.is_none() && item.key == reference::KEY);
-    let mesh = match at.map(|at| items.remove(at).given) {
-        Some(Given::Json(serde_json::Value::String(name))) => name,
-        other => {
-            let given = other.map_or_else(|| "not there".to_owned(), |given| given.show());
-            return Err(RequestError::new(RequestFault::WrongType, reference::KEY, given, reference::ALLOWED));
+    let given = at.map(|at| items.remove(at).given);
+    // A misspelt `mesh` is an unknown key, and not only missing.
+    let spec = read_items(items, overrides, rules).map_err(|mut error| {
+        if error.fault == RequestFault::UnknownKey && !error.key.contains('.') {
+            error.allowed = suggest::allowed(&error.key, &keys());
         }
-    };
-    Ok((mesh, read_items(items, overrides, rules)?))
+        error
+    })?;
+    match given {
+        Some(Given::Json(serde_json::Value::String(name))) => Ok((name, spec)),
+        Some(other) => {
+            Err(RequestError::new(RequestFault::WrongType, reference::KEY, other.show(), reference::ALLOWED))
+        }
+        None => Err(RequestError::new(RequestFault::Missing, reference::KEY, "", reference::WHY)),
+    }
+}
+
+/// Refuses dotted keys two of which say the same. A query is written at once; on a command line, later flags override earlier
+/// ones.
+pub fn check_once(overrides: &Overrides, rules: &Rules) -> Result<(), RequestError> {
+    let mut items = Vec::new();
+    for (key, text) in overrides {
+        items.extend(json::flatten_override(key, text, rules.limits.json_depth)?);
+    }
+    twice::check(&items)
+}
+
+/// Reads the dotted keys of who asks what is in a file: the moment of its animation alone can be said.
+pub fn read_moment(overrides: &Overrides, rules: &Rules) -> Result<Option<f64>, RequestError> {
+    const MOMENT: &str = "scene.time_s";
+    if let Some((key, text)) = overrides.iter().find(|(key, _)| key != MOMENT) {
+        let allowed = format!("nothing is drawn here: of the keys of a request, allowed is {MOMENT}");
+        return Err(RequestError::new(RequestFault::UnknownKey, key, format!("\"{text}\""), allowed));
+    }
+    Ok(read(None, overrides, rules)?.time_s)
 }
 
 fn read_items(mut items: Vec<Item>, overrides: &Overrides, rules: &Rules) -> Result<Spec, RequestError> {
-    items.extend(overrides.iter().map(|(key, text)| Item::dotted(key, text)));
+    for (key, text) in overrides {
+        items.extend(json::flatten_override(key, text, rules.limits.json_depth)?);
+    }
     let (of_materials, mut items): (Vec<Item>, Vec<Item>) = items.into_iter().partition(|i| i.material.is_some());
 
     let mut style = STYLE_DEFAULT;
@@ -123,7 +155,8 @@ pub fn keys() -> Vec<&'static str> {
     let mut keys: Vec<_> = FIELDS.iter().map(|f| f.key).collect();
     keys.extend(LAYERS.iter().map(|layer| layer.name));
     keys.extend(SHORT.iter().map(|&(key, _)| key));
-    keys.extend([MATERIALS.name, "style"]);
+    keys.extend(GROUPS.iter().map(|group| group.name));
+    keys.extend([MATERIALS.name, reference::KEY, "style"]);
     keys.sort_unstable();
     keys
 }
@@ -175,8 +208,11 @@ fn apply(target: &mut Target<'_>, item: &Item, rules: &Rules) -> Result<(), Requ
             layer.turn(target, !given.is_null());
             return Ok(());
         }
-        let allowed = "an object with the layer's keys, {} for its defaults, or null to turn the layer off";
-        return Err(RequestError::new(RequestFault::WrongType, &item.whole_key(), given.show(), allowed));
+        return Err(no_object(
+            item,
+            "an object with the layer's keys",
+            "{} for its defaults, or null to turn the layer off",
+        ));
     }
     let allowed = match target {
         Target::Material(_) => key.is_empty().then_some("an object with the layers surface, wire and outline"),
@@ -184,8 +220,11 @@ fn apply(target: &mut Target<'_>, item: &Item, rules: &Rules) -> Result<(), Requ
         Target::Document(_) => GROUPS.iter().any(|group| group.name == key).then_some("an object"),
     };
     if let Some(allowed) = allowed {
-        let error = || RequestError::new(RequestFault::WrongType, &item.whole_key(), given.show(), allowed);
-        return if given.is_empty_object() || given.is_null() { Ok(()) } else { Err(error()) };
+        return if given.is_empty_object() || given.is_null() {
+            Ok(())
+        } else {
+            Err(no_object(item, allowed, "or null"))
+        };
     }
     let long = SHORT.iter().find(|&&(short, _)| short == key && !target.is_material()).map_or(key, |&(_, long)| long);
     let field = FIELDS.iter().find(|f| f.key == long && (!target.is_material() || f.is_for_materials()));
@@ -215,8 +254,31 @@ fn apply(target: &mut Target<'_>, item: &Item, rules: &Rules) -> Result<(), Requ
     Ok(())
 }
 
+/// Something else where an object belongs. In a query or a flag, there is a way to give one of its keys alone.
+fn no_object(item: &Item, allowed: &str, others: &str) -> RequestError {
+    let whole = item.whole_key();
+    let key = match &item.material {
+        None if item.key == MATERIALS.name => "NAME.LAYER.KEY",
+        Some(_) if item.key.is_empty() => "LAYER.KEY",
+        _ => "KEY",
+    };
+    let how = match &item.given {
+        Given::Json(_) => String::new(),
+        Given::Text(_) => format!(" as JSON, such as {{\"KEY\": VALUE}} (one key alone is {whole}.{key}=VALUE)"),
+    };
+    RequestError::new(RequestFault::WrongType, &whole, item.given.show(), format!("{allowed}{how}, {others}"))
+}
+
 fn unknown(key: &str, given: &Given) -> RequestError {
-    RequestError::new(RequestFault::UnknownKey, key, given.show(), suggest::allowed(key, &keys()))
+    if key == reference::KEY {
+        return RequestError::new(RequestFault::UnknownKey, key, given.show(), reference::ELSEWHERE);
+    }
+    let mut known = keys();
+    known.retain(|&known| known != reference::KEY);
+    if let Given::Json(_) = given {
+        known.insert(0, SCHEMA);
+    }
+    RequestError::new(RequestFault::UnknownKey, key, given.show(), suggest::allowed(key, &known))
 }
 
 fn unknown_of_material(item: &Item) -> RequestError {

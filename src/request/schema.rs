@@ -1,7 +1,8 @@
 //! The request document as a JSON Schema (draft 2020-12), written from the table of keys.
 //!
 //! It says all that the reader checks but for what no schema can say: that `eye` and `target` differ, that the hulls of
-//! several materials share a unit, and what a material's key means together with keys of the document.
+//! several materials share a unit, what a material's key means together with keys of the document, that a short name and the
+//! key it stands for are not both there, and where a document may name its mesh.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -10,7 +11,7 @@ use super::look::{MULTIPLE_MAX, OUTLINE_PX_MAX};
 use super::table::{FIELDS, GROUPS, LAYERS, MATERIALS, SCHEMA, SHORT, STYLE_ABOUT};
 use super::value::{COORDINATE_MAX, Kind};
 use super::words::{Style, word_for, words_of};
-use super::{MATERIAL_NAME_CHARS_MAX, MATERIALS_MAX, Rules, STYLE_DEFAULT};
+use super::{MATERIAL_NAME_CHARS_MAX, MATERIALS_MAX, Rules, STYLE_DEFAULT, reference as mesh};
 
 /// The schema of documents that [`super::read`] understands under these rules.
 pub fn schema(rules: &Rules) -> Json {
@@ -40,6 +41,8 @@ pub fn schema(rules: &Rules) -> Json {
             properties.insert((*short).into(), property);
         }
     }
+    let digest = json!({ "description": mesh::ABOUT, "type": "string", "pattern": "^[0-9a-f]{64}$" });
+    properties.insert(mesh::KEY.into(), digest);
     let own = json!({ "description": "Where an editor finds this schema.", "type": ["string", "null"] });
     properties.insert(SCHEMA.into(), own);
     json!({

@@ -37,7 +37,10 @@ pub fn nearest(key: &str, known: &[&'static str]) -> Vec<&'static str> {
     }
     let scored = known.iter().map(|&k| (distance(key, k), k));
     let longer = |k: &str| k.len().max(key.len());
-    let best = scored.min().filter(|&(d, k)| d <= 2.max(k.len() / 4) && 2 * d <= longer(k));
+    // Whoever writes `wire.x` knows of `wire`.
+    let home = key.rsplit_once('.').map(|(home, _)| home);
+    let best =
+        scored.filter(|&(_, k)| Some(k) != home).min().filter(|&(d, k)| d <= 2.max(k.len() / 4) && 2 * d <= longer(k));
     best.map(|(_, k)| vec![k]).unwrap_or_default()
 }
 
@@ -87,6 +90,13 @@ mod tests {
         assert!(said.starts_with("the keys of wire are color, edges") && !said.contains("camera"), "{said}");
         let said = allowed("wire.colour", &known);
         assert!(said.contains("the keys of wire are color, edges") && !said.contains("camera"), "{said}");
+        let said = allowed("wire.x", &known);
+        assert!(said.starts_with("the keys of wire are color, edges"), "{said}");
+        // Every key of the document's own object, whether it holds a value or others.
+        let said = allowed("zzzzzzzzzzz", &known);
+        for key in ["backend", "camera", "image", "light", "materials", "mesh", "scene", "size", "style", "surface"] {
+            assert!(said.contains(&format!(" {key},")), "{key}: {said}");
+        }
         assert!(allowed(&"x".repeat(1_000_000), &known).starts_with("the keys are"));
     }
 }

@@ -136,6 +136,9 @@ pub enum Value {
     Flag(bool),
 }
 
+/// How a point is written.
+const POINT_FORMS: &str = "as [x, y, z] or, in a query or a flag, x,y,z";
+
 /// Largest magnitude of a coordinate: squares of it still fit an f64 many times over.
 pub const COORDINATE_MAX: f64 = 1e30;
 
@@ -152,14 +155,36 @@ impl Kind {
             Self::Color => {
                 "a colour: #rgb, #rgba, #rrggbb, #rrggbbaa (with # written as %23 in a URL) or transparent".into()
             }
-            Self::Point => "three finite numbers of at most 1e30, as [x, y, z]".into(),
-            Self::Direction => "three finite numbers of at most 1e30, not all zero, as [x, y, z]".into(),
+            Self::Point => format!("three finite numbers of at most 1e30, {POINT_FORMS}"),
+            Self::Direction => format!("three finite numbers of at most 1e30, not all zero, {POINT_FORMS}"),
             Self::Flag => "true or false".into(),
         }
     }
 
     /// Checks what was given for `key`.
     pub fn read(&self, key: &str, given: &Given, image_px_max: u64) -> Result<Value, RequestError> {
+        self.check(key, given, image_px_max).map_err(|mut error| {
+            if let Given::Json(Json::String(text)) = given
+                && let Some(what) = self.bare()
+                && self.check(key, &Given::Text(text.clone()), image_px_max).is_ok()
+            {
+                error.given = format!("{}, {what} in quotes", error.given);
+                error.allowed.push_str(", without quotes");
+            }
+            error
+        })
+    }
+
+    /// What JSON writes without quotes and a query, where everything is text, knows no quotes for.
+    fn bare(&self) -> Option<&'static str> {
+        match self {
+            Self::Number { .. } | Self::Above0 { .. } | Self::OneOf(_) | Self::Pixels => Some("a number"),
+            Self::Flag => Some("a truth value"),
+            Self::Size | Self::Words(_) | Self::Color | Self::Point | Self::Direction => None,
+        }
+    }
+
+    fn check(&self, key: &str, given: &Given, image_px_max: u64) -> Result<Value, RequestError> {
         let fail = |fault| RequestError::new(fault, key, given.show(), self.allowed(image_px_max));
         let wrong_type = || fail(RequestFault::WrongType);
         let out_of_range = || fail(RequestFault::OutOfRange);

@@ -6,6 +6,7 @@ use meshsnap::mesh::material::ImageContent;
 use meshsnap::mesh::{Bundle, BundleFile, Folder, Format, Mesh, MeshError, MeshFault, import};
 use std::io::{Cursor, Write as _};
 
+use crate::bundles_zip::{Raw, archive};
 use crate::server::CUBE_OBJ;
 use crate::shared::folder;
 
@@ -135,7 +136,7 @@ fn the_mesh_among_the_files_is_found_or_asked_for() {
     for (entry, fault, part) in [
         ("three.obj", MeshFault::EntryUnclear, "\"a/one.obj\""),
         ("", MeshFault::EntryUnclear, "\"a/one.obj\""),
-        ("t.png", MeshFault::Unrecognised, "a picture"),
+        ("t.png", MeshFault::Unrecognised, "\"t.png\" looks like a picture"),
     ] {
         let error = asked(entry).unwrap_err();
         assert!(error.fault == fault && error.detail.contains(part), "{entry}: {error}");
@@ -143,6 +144,10 @@ fn the_mesh_among_the_files_is_found_or_asked_for() {
     let error = read_bundle(&Bundle::of_files(files(&[("a.mtl", b"newmtl a\nKd 1 1 1\n"), ("t.png", &noise)])));
     let error = error.unwrap_err();
     assert!(error.fault == MeshFault::Unrecognised && error.detail.contains("\"a.mtl\", \"t.png\""), "{error}");
+    let many: Vec<(String, &[u8])> = (0..13).map(|i| (format!("{i:02}.txt"), b"x" as &[u8])).collect();
+    let many: Vec<(&str, &[u8])> = many.iter().map(|(name, bytes)| (name.as_str(), *bytes)).collect();
+    let error = read_bundle(&Bundle::of_files(files(&many))).unwrap_err();
+    assert!(error.detail.ends_with("\"00.txt\", \"01.txt\", \"02.txt\", \"03.txt\", \"04.txt\", \"05.txt\", \"06.txt\", \"07.txt\", \"08.txt\", \"09.txt\" and 3 more"), "{error}");
     // What only resembles an STL is one if it says so, not if it is called a texture.
     let mut loose = vec![0; 84 + 50 * 2 + 3];
     loose[80] = 2;
@@ -222,4 +227,42 @@ fn gltf_finds_its_buffers() {
     let bundle = |gltf, bin| Bundle::of_files(files(&[(gltf, out.as_bytes()), (bin, &[0; 36])]));
     assert_eq!(read_bundle(&bundle("x.gltf", "x.bin")).unwrap_err().fault, MeshFault::OutsideBundle);
     assert_eq!(read_bundle(&bundle("m/x.gltf", "x.bin")).unwrap_err().fault, MeshFault::Empty, "three equal points");
+}
+
+/// The files of an archive, and parts of what is said of it.
+type Case<'a> = (Vec<(&'a str, &'a [u8])>, &'a [&'a str]);
+
+/// What an archive stores without packing it is there to be read, but nobody asked for it.
+#[test]
+fn archives_in_archives_and_archives_without_a_mesh_are_said_to_be_that() {
+    let inner = archive(&[Raw::stored("cube.obj", CUBE_OBJ)], 1);
+    let picture = b"\x89PNG\r\n\x1a\n".as_slice();
+    let cases: [Case; 6] = [
+        (vec![("inner.zip", &inner)], &["\"inner.zip\" is a zip archive", "send it alone"]),
+        (vec![("model.3mf", &inner)], &["\"model.3mf\" is a zip archive"]),
+        (
+            vec![("a.txt", b"hello"), ("inner.zip", &inner)],
+            &["\"a.txt\", \"inner.zip\"; \"inner.zip\" is a zip archive"],
+        ),
+        (vec![("read me.txt", b"hello")], &["\"read me.txt\" is not a mesh in a known format"]),
+        (vec![("t.png", picture)], &["\"t.png\" looks like a picture"]),
+        (vec![("a.txt", b"a"), ("t.png", picture)], &["no file of the bundle is a mesh", "\"a.txt\", \"t.png\""]),
+    ];
+    let mut read = 0;
+    for (files, parts) in &cases {
+        let stored: Vec<Raw> = files.iter().map(|(name, bytes)| Raw::stored(name, bytes)).collect();
+        let count = stored.len() as u16;
+        for bundle in [Bundle::of_one(archive(&stored, count)), Bundle::of_files(self::files(files))] {
+            // In a form, an archive that is the only file is the whole upload.
+            if files.len() == 1 && bundle.is_zip() && bundle.files()[0].path != "mesh" {
+                assert_eq!(read_bundle(&bundle).unwrap().triangles.len(), 12);
+                continue;
+            }
+            let error = read_bundle(&bundle).unwrap_err();
+            assert_eq!(error.fault, MeshFault::Unrecognised, "{error}");
+            assert!(parts.iter().all(|part| error.detail.contains(part)), "{error}");
+            read += 1;
+        }
+    }
+    assert_eq!((cases.len(), read), (6, 10));
 }

@@ -102,7 +102,8 @@ fn the_entry_is_found_or_asked_for() {
     cube.picture(16, 16);
     triangle.picture(16, 16);
     assert_ne!(cube.body, triangle.body);
-    assert_eq!(get("entry=tri.obj&entry=cube.obj").body, cube.body);
+    assert_eq!(get("entry=cube.obj").body, cube.body);
+    get("entry=tri.obj&entry=cube.obj").problem(400, "conflicting_keys");
     get("entry=gone.obj").problem(422, "entry_unclear");
     get("entry=%00").problem(422, "entry_unclear");
     get("entry=../../etc/passwd").problem(422, "entry_unclear");

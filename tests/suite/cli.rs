@@ -92,6 +92,37 @@ fn a_request_file_is_overridden_by_flags_and_those_by_set() {
 }
 
 #[test]
+fn a_section_can_be_set_as_json_and_later_flags_override_earlier_ones() {
+    let draw = |more: &[&str]| {
+        let arguments = [&["render", "-", "-o", "-", "--size", "48", "--backend", "cpu"], more].concat();
+        let output = run(&arguments, CUBE_OBJ);
+        assert!(output.status.success(), "{more:?}: {}", String::from_utf8_lossy(&output.stderr));
+        output.stdout
+    };
+    let plain = draw(&[]);
+    let same: [[&[&str]; 2]; 5] = [
+        [
+            &["--set", r#"outline={"thickness":8,"unit":"px"}"#],
+            &["--set", "outline.thickness=8", "--set", "outline.unit=px"],
+        ],
+        [&["--set", r##"wire= {"color":"#f00"} "##], &["--set", "wire.color=#f00"]],
+        [
+            &["--set", r#"camera={"eye":[3,2,1],"target":[0,0,0]}"#],
+            &["--set", "camera.eye=3,2,1", "--set", "camera.target=0,0,0"],
+        ],
+        [&["--set", r#"materials={"default":{"wire":{}}}"#], &["--set", "materials.default.wire={}"]],
+        [&["--style", "flat", "--set", "style=smooth", "--set", "style=wire"], &["--style", "wire"]],
+    ];
+    for [left, right] in same {
+        assert!(draw(left) == draw(right), "{left:?} is not {right:?}");
+        assert!(draw(left) != plain || left[1].starts_with("materials"), "{left:?} does nothing");
+    }
+    assert_eq!(same.len(), 5);
+    let webp = draw(&["--set", r#"image={"format":"webp"}"#]);
+    assert_eq!(image::guess_format(&webp).unwrap(), image::ImageFormat::WebP);
+}
+
+#[test]
 fn failures_are_one_sentence_with_the_right_exit_code() {
     let directory = tempfile::tempdir().unwrap();
     let nowhere = directory.path().join("no/such/out.png");
@@ -108,6 +139,11 @@ fn failures_are_one_sentence_with_the_right_exit_code() {
         (&["render", "-", "-o", nowhere, "--size", "8"], CUBE_OBJ, 2, "out.png"),
         (&["render", "-", "-o", "out.bmp"], CUBE_OBJ, 2, "bmp"),
         (&["render", "-", "-o", "-", "--set", "wire"], CUBE_OBJ, 2, "KEY=VALUE"),
+        (&["render", "-", "-o", "-", "--set", "wire=on"], CUBE_OBJ, 1, "one key alone is wire.KEY=VALUE"),
+        (&["render", "-", "-o", "-", "--set", "wire={thickness:8}"], CUBE_OBJ, 1, "not JSON at line 1, column 2"),
+        (&["render", "-", "-o", "-", "--set", "wire={\"lit\":1}"], CUBE_OBJ, 1, "`wire.lit` is 1"),
+        (&["inspect", "-", "--set", "size=8"], CUBE_OBJ, 1, "scene.time_s"),
+        (&["inspect", "-", "--set", "scene.time_s=-1"], CUBE_OBJ, 1, "`scene.time_s`"),
         (&["render", "-", "-o", "-", "--format-in", "dae"], CUBE_OBJ, 2, "obj"),
         (&["render", "-", "-", "-o", "-"], b"", 2, "once"),
         (&["render"], b"", 2, "MESH"),
@@ -126,7 +162,7 @@ fn failures_are_one_sentence_with_the_right_exit_code() {
         let stderr = fails(arguments, stdin, *code);
         assert!(stderr.contains(part), "{arguments:?}: {stderr}");
     }
-    assert_eq!(cases.len(), 24);
+    assert_eq!(cases.len(), 29);
     assert!(!Path::new(nowhere).exists());
 }
 

@@ -2,7 +2,7 @@
 
 use crate::formats_gltf_surfaces::codes;
 use crate::mesh_files::{Gltf, assert_close, corners, read, read_at, set};
-use crate::server::Server;
+use crate::server::{Server, meshsnap};
 use crate::shared::folder;
 use meshsnap::mesh::MeshFault;
 use serde_json::{Value, json};
@@ -244,6 +244,39 @@ fn known_models_move() {
     let stress = std::fs::read(folder.join("MorphStressTest.gltf")).unwrap();
     let [a, b] = [0.1, 0.6].map(|time_s| read_at(&stress, time_s).unwrap());
     assert_ne!(a.positions, b.positions);
+}
+
+#[test]
+fn the_report_can_be_of_a_moment() {
+    let server = Server::start(&[]);
+    let mut gltf = triangle();
+    animate(&mut gltf, "scale", "LINEAR", "VEC3", &[1.0, 1.0, 1.0, 1.0, 9.0, 1.0, 1.0, 9.0, 1.0]);
+    let stored = server.post("/v1/meshes", &gltf.glb());
+    let url = stored.json()["url"].as_str().unwrap().to_owned();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flagpole.glb");
+    std::fs::write(&path, gltf.glb()).unwrap();
+    let mut tags = std::collections::BTreeSet::new();
+    for (query, set, height) in [
+        ("", None, 1.0),
+        ("?scene.time_s=null", Some("scene.time_s=null"), 1.0),
+        ("?scene.time_s=1.5", Some("scene.time_s=1.5"), 5.0),
+        ("?scene.time_s=2", Some("scene.time_s=2"), 9.0),
+    ] {
+        let report = server.get(&format!("{url}{query}"));
+        let mut command = meshsnap();
+        command.args(["inspect", "--json"]).arg(&path).args(set.iter().flat_map(|set| ["--set", set]));
+        let printed = command.output().unwrap();
+        assert_eq!(String::from_utf8_lossy(&report.body), String::from_utf8_lossy(&printed.stdout), "{query}");
+        assert_eq!(report.json()["bounds"]["size"][1], height, "{query}");
+        tags.insert(report.header("etag").unwrap().to_owned());
+    }
+    assert_eq!(tags.len(), 3, "a moment has a tag of its own, none has the mesh's");
+    server.get(&format!("{url}?scene.time_s=-1")).problem(400, "out_of_range");
+    server.get(&format!("{url}?scene.time_s=1&scene.time_s=2")).problem(400, "conflicting_keys");
+    let detail = server.get(&format!("{url}?size=8")).problem(400, "unknown_key");
+    assert!(detail.contains("scene.time_s") && detail.contains("`entry`"), "{detail}");
+    server.post("/v1/meshes?scene.time_s=1", &gltf.glb()).problem(400, "unknown_key");
 }
 
 #[test]

@@ -43,7 +43,7 @@ fn the_schema_is_valid_and_describes_every_key() {
         assert!(property["description"].as_str().is_some_and(|text| text.ends_with('.')), "{key}: {property}");
         described += 1;
     }
-    assert_eq!(described, 66);
+    assert_eq!(described, 71);
 }
 
 /// Documents that are understood.
@@ -243,7 +243,18 @@ fn the_schema_is_served_with_the_servers_own_limits() {
     assert_eq!(answer.header("cache-control"), Some("no-cache"));
     let schema = answer.json();
     assert_eq!(schema["properties"]["image"]["properties"]["width"]["maximum"], 640);
-    assert_eq!(server.get("/v1/capabilities").json()["schema"], "/v1/schema");
+    let capabilities = server.get("/v1/capabilities").json();
+    assert_eq!(capabilities["schema"], "/v1/schema");
+    // Every key that stands in a document by itself is in both lists.
+    let listed = capabilities["request_keys"].as_array().unwrap();
+    let top = schema["properties"].as_object().unwrap().keys().filter(|key| *key != "$schema");
+    let mut keys = 0;
+    for key in top {
+        assert!(listed.contains(&key.as_str().into()), "{key}");
+        keys += 1;
+    }
+    assert_eq!(keys, 19);
+    assert_eq!(schema["properties"]["mesh"]["pattern"], "^[0-9a-f]{64}$");
 
     let etag = answer.header("etag").unwrap().to_owned();
     let mut cases = 0;
