@@ -10,6 +10,7 @@ mod accuracy_outlines;
 mod accuracy_over;
 mod accuracy_shading;
 mod accuracy_wires;
+mod agreement;
 mod ask;
 mod bundles;
 mod bundles_hostile;
