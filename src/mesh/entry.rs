@@ -28,7 +28,8 @@ pub fn choose(
     };
     let format = match format {
         Some(format) => format,
-        None => sniff::sniff(&files[number].bytes)?,
+        None => sniff::sniff(&files[number].bytes)
+            .map_err(|error| archive_among(&files[number..=number]).unwrap_or(error))?,
     };
     Ok((folder.with_entry(number), format))
 }
@@ -43,7 +44,7 @@ fn only_mesh(files: &[BundleFile], format: Option<Format>, deadline: &Deadline) 
     }
     match meshes[..] {
         [number] => Ok(number),
-        [] => Err(MeshError::new(MeshFault::Unrecognised, no_mesh(files))),
+        [] => Err(archive_among(files).unwrap_or_else(|| MeshError::new(MeshFault::Unrecognised, no_mesh(files)))),
         _ => {
             let names = show_all(meshes.iter().map(|&number| files[number].path.as_str()));
             let detail = format!("several files of the bundle are meshes: {names}; say which one to draw with `entry`");
@@ -60,6 +61,15 @@ fn is_mesh(file: &BundleFile, format: Option<Format>) -> bool {
         Some(format) => [by_name, sniffed].into_iter().flatten().any(|found| found.name() == format.name()),
         None => sniffed.is_some(),
     }
+}
+
+/// An archive in the place of a mesh may hold another, and that one a third: none is opened but the upload itself.
+fn archive_among(files: &[BundleFile]) -> Option<MeshError> {
+    let archive = files.iter().find(|file| file.bytes.starts_with(b"PK\x03\x04"))?;
+    let name = show(&archive.path);
+    let detail =
+        format!("\"{name}\" is an archive inside of the bundle, which is not opened: send what is in it, or it alone");
+    Some(MeshError::new(MeshFault::BundleBroken, detail))
 }
 
 fn no_mesh(files: &[BundleFile]) -> String {
