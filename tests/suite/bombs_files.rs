@@ -1,7 +1,8 @@
 //! Bombs: files that are small as they are sent, and large, deep or endless as soon as somebody believes them.
 
 use crate::bundles_zip::{Raw, archive, crc32};
-use crate::mesh_files::{Gltf, glb};
+use crate::fbx_files::{self, file, geometry, model};
+use crate::mesh_files::{Gltf, Solid, glb};
 use crate::server::CUBE_OBJ;
 use serde_json::{Value, json};
 
@@ -16,7 +17,7 @@ pub struct Bomb {
 const HUGE: u64 = 4_000_000_000_000;
 
 pub fn all() -> Vec<Bomb> {
-    let groups = [archives(), images(), json_texts(), graphs(), counts()];
+    let groups = [archives(), images(), json_texts(), graphs(), counts(), packed()];
     groups.into_iter().flatten().map(|(name, body, code)| Bomb { name, body, code }).collect()
 }
 
@@ -207,5 +208,21 @@ fn counts() -> Vec<Case> {
         ("PLY text, 4e12 vertices and faces", ply("ascii").into_bytes(), broken),
         ("PLY binary, 4e12 vertices and faces", ply("binary_little_endian").into_bytes(), broken),
         ("OFF, 4e12 vertices and faces", format!("OFF\n{HUGE} {HUGE} 0\n0 0 0\n").into_bytes(), broken),
+    ]
+}
+
+/// Small arrays that unpack to large ones, and data that is not there.
+fn packed() -> Vec<Case> {
+    let zeros = |count: usize| {
+        let mut gltf = triangle();
+        gltf.json["accessors"][0] = json!({ "type": "VEC3", "componentType": 5126, "count": count });
+        gltf.glb()
+    };
+    let mut mesh = geometry(1, &Solid::cuboid(), vec![]);
+    mesh.children[0].values = vec![fbx_files::Value::Packed(b'd', vec![0; 96_000_000])];
+    let fbx = fbx_files::binary(&file(1, vec![mesh, model(2, "Mesh", vec![])], &[(2, 0, ""), (1, 2, "")]));
+    vec![
+        ("FBX, 12,000,000 coordinates, 1000:1", fbx, "mesh_broken"),
+        ("glTF, 20,000,000 vertices without data", zeros(20_000_000), "mesh_broken"),
     ]
 }

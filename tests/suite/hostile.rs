@@ -62,9 +62,18 @@ struct Watch {
 
 impl Watch {
     fn run(&mut self, name: &str, bytes: &[u8]) {
-        let start = Instant::now();
-        targets::run(self.target, bytes);
-        let took = start.elapsed();
+        let timed = || {
+            let start = Instant::now();
+            targets::run(self.target, bytes);
+            start.elapsed()
+        };
+        let mut took = timed();
+        // Once more, and again: what is slow every time is slow, and not the machine busy with something else.
+        for _ in 0..2 {
+            if took > self.slowest.0 {
+                took = took.min(timed());
+            }
+        }
         if took > self.slowest.0 {
             self.slowest = (took, name.to_owned());
         }
