@@ -49,7 +49,7 @@ fn only_mesh(files: &[BundleFile], format: Option<Format>, deadline: &Deadline) 
     }
     match meshes[..] {
         [number] => Ok(number),
-        [] => Err(MeshError::new(MeshFault::Unrecognised, no_mesh(files))),
+        [] => Err(no_mesh(files)),
         _ => {
             let names = show_all(meshes.iter().map(|&number| files[number].path.as_str()));
             let detail = format!("several files of the bundle are meshes: {names}; say which one to draw with `entry`");
@@ -68,14 +68,21 @@ fn is_mesh(file: &BundleFile, format: Option<Format>) -> bool {
     }
 }
 
-fn no_mesh(files: &[BundleFile]) -> String {
+fn no_mesh(files: &[BundleFile]) -> MeshError {
     if files.is_empty() {
-        return format!("the bundle has no files in it; send a mesh ({}) and what belongs to it", Format::ALL);
+        let detail = format!("the bundle has no files in it; send a mesh ({}) and what belongs to it", Format::ALL);
+        return MeshError::new(MeshFault::Unrecognised, detail);
     }
     let names = show_all(files.iter().map(|file| file.path.as_str()));
-    let inner = files.iter().find(|file| sniff::is_zip(&file.bytes));
-    let inner = inner.map_or_else(String::new, |file| format!("; \"{}\" is {}", show(&file.path), sniff::INNER_ZIP));
-    format!("no file of the bundle is a mesh in a known format ({}): there is {names}{inner}", Format::ALL)
+    let detail = format!("no file of the bundle is a mesh in a known format ({}): there is {names}", Format::ALL);
+    // An archive in the place of a mesh may hold another, and that one a third: none is opened but the upload itself.
+    match files.iter().find(|file| sniff::is_zip(&file.bytes)) {
+        Some(file) => {
+            let detail = format!("{detail}; \"{}\" is {}", show(&file.path), sniff::INNER_ZIP);
+            MeshError::new(MeshFault::BundleBroken, detail)
+        }
+        None => MeshError::new(MeshFault::Unrecognised, detail),
+    }
 }
 
 fn unknown(name: &str, files: &[BundleFile]) -> MeshError {

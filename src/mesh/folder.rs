@@ -44,6 +44,11 @@ impl Folder {
         &self.files[self.entry]
     }
 
+    /// How much all files are together.
+    pub fn bytes_len(&self) -> u64 {
+        self.files.iter().map(|file| file.bytes.len() as u64).sum()
+    }
+
     /// The file with this number.
     pub fn file(&self, number: usize) -> &BundleFile {
         &self.files[number]

@@ -30,8 +30,8 @@ impl Loose {
 }
 
 /// Triangles that all of them become when they are drawn.
-pub fn triangles(loose: &[Loose]) -> u64 {
-    loose.iter().map(|one| if one.is_point() { POINT_TRIANGLES } else { SEGMENT_TRIANGLES }).sum()
+pub fn triangles<'a>(loose: impl IntoIterator<Item = &'a Loose>) -> u64 {
+    loose.into_iter().map(|one| if one.is_point() { POINT_TRIANGLES } else { SEGMENT_TRIANGLES }).sum()
 }
 
 /// Drops those with an end that cannot be computed with, and segments whose ends are in one place; returns how many.

@@ -48,6 +48,7 @@ pub use loose::Loose;
 pub use material::MaterialSlot;
 
 use material::{FileCamera, ImageSource};
+use serde::Serialize;
 
 /// A triangle mesh in its normal form.
 ///
@@ -160,8 +161,9 @@ pub struct ImportReport {
     pub format: Format,
     /// Vertices in the file, before welding.
     pub file_vertices: u64,
-    /// What the file's meshes say that they have, whether shown, hidden or shown many times; glTF alone.
-    pub content: FileContent,
+    /// What the file's meshes say that they have, whether shown, hidden or shown many times; None where the format counts nothing of
+    /// its own: all but glTF.
+    pub content: Option<FileContent>,
     /// Polygons in the file: `polygons_by_arity[k]` counts those with `k` corners (12 and more share the last place).
     pub polygons_by_arity: [u64; 13],
     /// Faces dropped because a corner is NaN or infinite.
@@ -180,7 +182,7 @@ pub struct ImportReport {
 }
 
 /// How much the meshes of a file hold by their own account, each counted once.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct FileContent {
     /// Parts that are drawn with one material each.
     pub draw_calls: u64,
@@ -189,6 +191,7 @@ pub struct FileContent {
     /// Their triangles.
     pub triangles: u64,
     /// Their line segments.
+    #[serde(rename = "lines")]
     pub segments: u64,
     /// Their points.
     pub points: u64,

@@ -17,7 +17,7 @@ pub fn sniff(bytes: &[u8], what: &str) -> Result<Format, MeshError> {
     }
     // Before text: what an archive stores without packing it may read as a mesh.
     if is_zip(bytes) {
-        return Err(unrecognised(&format!("{what} is {INNER_ZIP}")));
+        return Err(MeshError::new(MeshFault::BundleBroken, format!("{what} is {INNER_ZIP}")));
     }
     if bytes.starts_with(b"glTF") {
         return Ok(Format::Glb);

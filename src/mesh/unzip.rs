@@ -15,7 +15,7 @@ use zip::unstable::read::ZipIterable;
 const LOCAL_HEADER_BYTES: u64 = 30;
 /// Deflate makes at most 258 bytes from two bits: no honest entry is larger than this times its packed form.
 const RATIO_MAX: u64 = 1032;
-/// And no mesh or texture of this size, in bytes, is that much larger: what is was made to fill memory.
+/// And no meshes and textures of this size together, in bytes, are that much larger: what is was made to fill memory.
 const BOMB_BYTES: u64 = 16 << 20;
 const BOMB_RATIO: u64 = 200;
 
@@ -51,15 +51,7 @@ pub fn unzip(
         wanted_entries.push(entry);
     }
     budget.spend("the files of the zip archive", total, 1)?;
-    for (entry, file) in wanted_entries.iter().zip(&files) {
-        if entry.size() > BOMB_BYTES && entry.size() / BOMB_RATIO > entry.compressed_size() {
-            let name = show(&file.path);
-            return Err(broken(format!(
-                "the entry \"{name}\" of the zip archive is more than {BOMB_RATIO} times as large as its packed form, which \
-                 archives of meshes are not; send the file itself"
-            )));
-        }
-    }
+    check_honest(&wanted_entries, &files)?;
     for (entry, file) in wanted_entries.into_iter().zip(&mut files) {
         file.bytes = inflate(archive, entry, deadline)?.into();
     }
@@ -96,6 +88,26 @@ fn wanted(entry: &ZipFileEntry<'_>) -> Result<Option<BundleFile>, MeshError> {
         CompressionMethod::Stored | CompressionMethod::Deflated => Ok(Some(file)),
         _ => refuse("is packed by a method that is not read; use Deflate (what `zip` does) or none"),
     }
+}
+
+/// Entries that hardly anything is left of when packed: one large one, or many.
+fn check_honest(entries: &[ZipFileEntry<'_>], files: &[BundleFile]) -> Result<(), MeshError> {
+    let mut total = 0_u64;
+    for (entry, file) in entries.iter().zip(files) {
+        if entry.size() / BOMB_RATIO <= entry.compressed_size() {
+            continue;
+        }
+        total = total.saturating_add(entry.size());
+        if total > BOMB_BYTES {
+            let others = if total > entry.size() { ", and others before it," } else { "" };
+            return Err(broken(format!(
+                "the entry \"{}\" of the zip archive{others} is more than {BOMB_RATIO} times as large as its packed form, which \
+                 archives of meshes are not; send the file itself",
+                show(&file.path)
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Entries that share bytes are how a small archive becomes a large one.

@@ -3,11 +3,12 @@
 use super::edges::Edges;
 use super::parts::Parts;
 use super::skips::{SkipKind, Skips};
+use super::wires::loose::POINT_WIDTH;
 use super::{
     DrawPlan, HullPass, LayersPass, PlanError, Projection, Thickness, build_surface, loose, margin, outline, wires,
 };
 use crate::limits::{Budget, Deadline, LimitExceeded};
-use crate::mesh::Mesh;
+use crate::mesh::{Loose, Mesh};
 use crate::scene::camera::{Border, Camera};
 use crate::scene::{Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
 
@@ -139,16 +140,19 @@ pub(super) fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
     let mut border =
         Border { px: if mesh.loose.is_empty() { 0.0 } else { 0.5 * loose::POINT_PX }, ..Border::default() };
     for layers in &parts.looks {
+        // Points that no fill draws are wider than lines.
+        let has_dots = layers.surface.is_none() && mesh.loose.iter().any(Loose::is_point);
+        let dots = if has_dots { POINT_WIDTH } else { 1.0 };
         if let Some(outline) = &layers.outline {
-            // Half of a contour lies on the surface itself.
-            let share = if outline.method == OutlineMethod::Contour { 0.5 } else { 1.0 };
+            // Half of a contour lies on the surface itself; a point has nothing but its own.
+            let share = if outline.method == OutlineMethod::Contour { 0.5 * f64::from(dots) } else { 1.0 };
             match thickness(mesh, outline) {
                 Thickness::Object(grow) => border.grow = border.grow.max(share * f64::from(grow)),
                 Thickness::Px(px) => border.px = border.px.max(share * f64::from(px)),
             }
         }
         if let Some(wire) = layers.wire.filter(|wire| wire.method == WireMethod::Exact) {
-            border.px = border.px.max(f64::from(0.5 * (wire.thickness + wire.smoothing)));
+            border.px = border.px.max(f64::from(0.5 * (dots * wire.thickness + wire.smoothing)));
         }
     }
     if let Some(topology) = &spec.topology {

@@ -1,11 +1,13 @@
 //! Lines and points of a file get an area: strips and hexagons that face the camera of one picture, as wide as they are in pixels. To
-//! everything after this they are triangles, but without edges, outlines or a topology.
+//! everything after this they are triangles, but without edges, outlines or a topology. Those of parts without a fill are lines instead, see
+//! `plan/wires/loose.rs`.
 
 use glam::{DVec2, DVec3};
 
 use super::PlanError;
 use super::build::border;
 use super::parts::{PART_BYTES, Parts};
+use super::wires::loose::{is_filled, is_line};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::loose::triangles;
 use crate::mesh::{Loose, Mesh, Thickened, Warning};
@@ -13,7 +15,7 @@ use crate::scene::camera::Camera;
 use crate::scene::{Projection, Spec};
 
 /// Width of a line, pixels.
-const LINE_PX: f64 = 1.5;
+pub(super) const LINE_PX: f64 = 1.5;
 
 /// Diameter of a point, pixels.
 pub(super) const POINT_PX: f64 = 3.0;
@@ -27,7 +29,8 @@ const LIFT_PX: f64 = 1.0;
 /// Bytes of a triangle: corners, normal, edge mask, material, attributes; and up to two positions.
 const TRIANGLE_BYTES: u64 = 12 + 12 + 1 + 4 + 12 + 24;
 
-/// Gives the mesh's lines and points an area in the picture that `spec` asks for; a warning where they are not drawn.
+/// Gives the mesh's lines and points, where they belong to a fill, an area in the picture that `spec` asks for; a warning where any are not
+/// drawn at all.
 pub fn thicken(
     mesh: &mut Mesh,
     spec: &Spec,
@@ -38,30 +41,39 @@ pub fn thicken(
         return Ok(None);
     }
     budget.spend("materials", mesh.materials.len() as u64, PART_BYTES)?;
+    budget.spend("lines and points", mesh.loose.len() as u64, 1)?;
     let parts = Parts::new(mesh, spec);
-    if !parts.has_fill() {
-        let detail = "lines and points are drawn with the surface, and the look has none".to_owned();
-        return Ok(Some(Warning { code: "lines_not_drawn", detail }));
+    let undrawn = mesh.loose.iter().any(|one| !is_filled(&parts, one) && !is_line(&parts, one));
+    let warning = undrawn.then(|| {
+        let detail =
+            "lines and points are drawn with a surface, a wire or an outline, and the look has none".to_owned();
+        Warning { code: "lines_not_drawn", detail }
+    });
+    let own: Vec<bool> = mesh.loose.iter().map(|one| is_filled(&parts, one)).collect();
+    if !own.contains(&true) {
+        return Ok(warning);
     }
-    budget.spend("lines and points", triangles(&mesh.loose), TRIANGLE_BYTES)?;
-    reserve(mesh);
+    let filled = || mesh.loose.iter().zip(&own).filter(|(_, own)| **own).map(|(one, _)| one);
+    budget.spend("lines and points", triangles(filled()), TRIANGLE_BYTES)?;
+    let room = [triangles(filled()) as usize, filled().map(|one| if one.is_point() { 6 } else { 4 }).sum()];
+    reserve(mesh, room);
     let size_px = [spec.image.width_px, spec.image.height_px];
     let camera = Camera::place(&spec.camera, mesh, size_px, border(mesh, &parts, spec));
     mesh.thickened = Some(Thickened { positions: mesh.positions.len(), triangles: mesh.triangles.len() });
     let mut brush = Brush { camera, px: 2.0 * camera.half_size.y / f64::from(size_px[1]), mesh };
-    for i in 0..brush.mesh.loose.len() {
+    for (i, is_own) in own.into_iter().enumerate() {
         if i % 65_536 == 0 {
             deadline.check()?;
         }
-        brush.draw(i);
+        if is_own {
+            brush.draw(i);
+        }
     }
-    Ok(None)
+    Ok(warning)
 }
 
 /// Room for just what is added: lists that grow by themselves would double.
-fn reserve(mesh: &mut Mesh) {
-    let added = triangles(&mesh.loose) as usize;
-    let corners: usize = mesh.loose.iter().map(|one| if one.is_point() { 6 } else { 4 }).sum();
+fn reserve(mesh: &mut Mesh, [added, corners]: [usize; 2]) {
     mesh.positions.reserve_exact(corners);
     mesh.triangles.reserve_exact(added);
     mesh.face_normals.reserve_exact(added);

@@ -1,6 +1,7 @@
 //! Which edges are drawn as lines, once each, in which style.
 
 mod class;
+pub mod loose;
 mod wants;
 
 use class::{Class, class_of, is_of};
@@ -31,20 +32,21 @@ pub fn passes<'a>(
 ) -> Result<Vec<LinePass>, PlanError> {
     let mut wants = wire_wants(parts);
     wants.extend(spec.topology.iter().flat_map(topology_wants));
-    wants.extend(contour_wants(parts, contour_px));
-    wants.retain(|want| want.width_px + want.smoothing_px > 0.0 && want.color[3] > 0.0);
+    wants.extend(contour_wants(parts, &contour_px));
+    wants.retain(Want::is_seen);
+    let hides = parts.has_fill() || parts.needs_occluder();
+    let loose = loose::passes(mesh, parts, contour_px, hides, means)?;
     if skips.skip(
         SkipKind::Adjacency,
         wants.is_empty() && !parts.has_hull(),
         "no line asks which triangles are neighbours",
     ) {
-        return Ok(Vec::new());
+        return Ok(loose);
     }
     let (list, silhouettes) = match wants.iter().any(|want| want.contour) {
         true => edges.with_silhouettes(mesh, parts, means).map(|(list, found)| (list, Some(found)))?,
         false => (edges.of(mesh, means)?, None),
     };
-    let hides = parts.has_fill() || parts.needs_occluder();
     let may_skip = hides && is_outside && wants.iter().any(|w| w.hidden == Hidden::Hide);
     let unseen_side = if may_skip { unseen_side(mesh, parts, list) } else { None };
     let source = Source { mesh, parts, list, silhouettes };
@@ -63,6 +65,7 @@ pub fn passes<'a>(
             passes.extend(drawn);
         }
     }
+    passes.extend(loose);
     Ok(passes)
 }
 

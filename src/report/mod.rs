@@ -13,7 +13,7 @@ use crate::mesh::edges::EdgeList;
 use crate::mesh::material::{FileLens, ImageContent, ImageSource};
 use crate::mesh::measure::Measures;
 use crate::mesh::topology::Topology;
-use crate::mesh::{FileFacts, Mesh, MeshError, UpAxis};
+use crate::mesh::{FileContent, FileFacts, Mesh, MeshError, UpAxis};
 use serde::Serialize;
 
 /// What is in a file. Counts are null where the format has no such thing.
@@ -27,6 +27,8 @@ pub struct Report {
     nodes: Option<u64>,
     meshes: Option<u64>,
     primitives: Option<u64>,
+    /// As the file's meshes count it, each once, whether shown or not: what other readers of the format total.
+    file_content: Option<FileContent>,
     file_vertices: u64,
     positions: u64,
     triangles: u64,
@@ -149,6 +151,7 @@ impl Report {
             nodes,
             meshes,
             primitives,
+            file_content: import.content,
             file_vertices: import.file_vertices,
             positions: mesh.own_positions().len() as u64,
             triangles: mesh.own_triangles().len() as u64,

@@ -181,10 +181,10 @@ fn hostile_forms_are_refused_precisely() {
     send(&[("file", None, CUBE_OBJ)]).picture(16, 16);
     send(&[a, ("file", Some("b.mtl"), b"newmtl A\nKd 0.5\n"), ("request", None, b"{\"style\":\"wire\"}")])
         .picture(16, 16);
-    // An archive in a form is the same archive; beside other files it is a file like any.
+    // An archive in a form is the same archive; beside other files nobody opens it.
     let zip = zipped(&[("cube.obj", CUBE_OBJ)]);
     send(&[("file", Some("x.zip"), &zip)]).picture(16, 16);
-    send(&[("file", Some("x.zip"), &zip), ("file", Some("b.txt"), b"b")]).problem(415, "mesh_unrecognised");
+    send(&[("file", Some("x.zip"), &zip), ("file", Some("b.txt"), b"b")]).problem(422, "bundle_broken");
     send(&[("file", Some("x.zip"), &zip), a]).picture(16, 16);
 }
 

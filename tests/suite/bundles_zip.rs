@@ -145,6 +145,12 @@ fn dishonest_archives_are_refused_for_what_they_are() {
         ("more than there are", archive(&[cube()], 7), "entries"),
         ("cut off", whole[..whole.len() - 5].to_vec(), "cannot be read"),
         ("a header alone", b"PK\x03\x04".to_vec(), "cannot be read"),
+        ("nested", archive(&[Raw::stored("inner.zip", &whole)], 1), "\"inner.zip\" is a zip archive"),
+        (
+            "nested beside others",
+            archive(&[Raw::stored("b.txt", b"b"), Raw::stored("inner.zip", &whole)], 2),
+            "\"inner.zip\" is a zip archive",
+        ),
     ];
     for (name, bytes, part) in &cases {
         let (fault, detail) = fault(bytes.clone(), &Limits::default());
@@ -152,9 +158,8 @@ fn dishonest_archives_are_refused_for_what_they_are() {
         assert!(detail.to_lowercase().contains(part), "{name}: {detail}");
         assert!(detail.len() < 300, "{name}: {detail}");
     }
-    assert_eq!(cases.len(), 23);
-    let nothing: [(&str, Vec<u8>, &str); 4] = [
-        ("nested", archive(&[Raw::stored("inner.zip", &whole)], 1), "zip"),
+    assert_eq!(cases.len(), 25);
+    let nothing: [(&str, Vec<u8>, &str); 3] = [
         ("empty", archive(&[Raw::stored("folder/", b"")], 1), "no files"),
         (
             "pictures",
@@ -193,6 +198,11 @@ fn bombs_break_a_limit_before_they_go_off() {
         let (fault, detail) = fault(bytes, limits);
         assert!(matches!(&fault, MeshFault::Limit(limit) if limit.flag == flag), "{name}: {detail}");
     }
+    // Many entries, each a little too small to be a bomb by itself.
+    let small_bomb = Raw::deflated("zeros.bin", &zeros[..15 << 20]);
+    let several = (0..3).map(|i| Raw { name: format!("{i}.bin").into(), ..small_bomb.clone() }).collect::<Vec<_>>();
+    let (fault_of_many, detail) = fault(archive(&several, 3), &Limits::default());
+    assert!(fault_of_many == MeshFault::BundleBroken && detail.contains("and others before it"), "{detail}");
     // It says that it is small and is not.
     let (fault_of_liar, detail) = fault(archive(&[Raw { size: 1000, ..bomb.clone() }], 1), &Limits::default());
     assert!(fault_of_liar == MeshFault::BundleBroken && detail.contains("larger"), "{detail}");
@@ -235,7 +245,7 @@ fn a_server_that_got_a_bomb_goes_on() {
         (bomb, 422, "limit_exceeded", Some("--limit-bundle-bytes")),
         (archive(&many, 4), 422, "limit_exceeded", Some("--limit-bundle-entries")),
         (archive(&[Raw::stored("../x.obj", CUBE_OBJ)], 1), 422, "bundle_broken", None),
-        (archive(&[Raw::stored("inner.zip", &zipped(&[("x.obj", CUBE_OBJ)]))], 1), 415, "mesh_unrecognised", None),
+        (archive(&[Raw::stored("inner.zip", &zipped(&[("x.obj", CUBE_OBJ)]))], 1), 422, "bundle_broken", None),
     ];
     let before = server.resident_bytes();
     for _ in 0..5 {

@@ -1,5 +1,6 @@
 //! FBX files, ASCII and binary, made from one description.
 
+use crate::bundles_zip::Raw;
 use crate::mesh_files::Solid;
 
 /// A value of a node.
@@ -14,6 +15,8 @@ pub enum Value {
     Ints(Vec<i32>),
     Floats(Vec<f64>),
     Raw(Vec<u8>),
+    /// An array of this kind, deflated; the binary form alone has them.
+    Packed(u8, Vec<u8>),
 }
 
 /// A node of the tree that an FBX file is.
@@ -172,6 +175,7 @@ fn write_ascii(node: &Node, depth: usize, out: &mut String) {
         Value::Ints(v) => format!("*{} {{ a: {} }}", v.len(), words(&mut v.iter().map(ToString::to_string))),
         Value::Floats(v) => format!("*{} {{ a: {} }}", v.len(), words(&mut v.iter().map(ToString::to_string))),
         Value::Raw(v) => format!(",\"{}\"", base64::engine::general_purpose::STANDARD.encode(v)),
+        Value::Packed(..) => panic!("text is not packed"),
     });
     *out += &format!("{}{}: {}", "\t".repeat(depth), node.name, values.collect::<Vec<_>>().join(","));
     if !node.children.is_empty() {
@@ -180,6 +184,19 @@ fn write_ascii(node: &Node, depth: usize, out: &mut String) {
         *out += &format!("{}}}", "\t".repeat(depth));
     }
     *out += "\n";
+}
+
+/// RFC 1950 around an honest archiver's RFC 1951.
+fn zlib(bytes: &[u8]) -> Vec<u8> {
+    let mut out = vec![0x78, 0x9c];
+    out.extend(Raw::deflated("x", bytes).packed);
+    let (mut a, mut b) = (1_u32, 0_u32);
+    for byte in bytes {
+        a = (a + u32::from(*byte)) % 65_521;
+        b = (b + a) % 65_521;
+    }
+    out.extend((b << 16 | a).to_be_bytes());
+    out
 }
 
 /// The binary form, version 7.4.
@@ -226,6 +243,13 @@ fn write_binary(node: &Node, out: &mut Vec<u8>) {
             Value::Ints(v) => array(b'i', v.len(), v.iter().flat_map(|v| v.to_le_bytes()).collect(), out),
             Value::Floats(v) => array(b'd', v.len(), v.iter().flat_map(|v| v.to_le_bytes()).collect(), out),
             Value::Raw(v) => bytes(b'R', v, out),
+            Value::Packed(kind, v) => {
+                let size = if matches!(kind, b'd' | b'l') { 8 } else { 4 };
+                let packed = zlib(v);
+                out.push(*kind);
+                [(v.len() / size) as u32, 1, packed.len() as u32].iter().for_each(|v| out.extend(v.to_le_bytes()));
+                out.extend(packed);
+            }
         }
     }
     let values = out.len() - values;

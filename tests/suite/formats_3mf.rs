@@ -307,7 +307,7 @@ fn the_service_reads_it_by_its_bytes_and_by_its_name() {
     server.post("/v1/render?size=32", &bytes[..bytes.len() - 9]).problem(422, "bundle_broken");
     server.post("/v1/render?size=32&format_in=3mf", b"v 0 0 0\n").problem(422, "mesh_broken");
     let nested = zipped(&[("a.3mf", &bytes), ("readme.txt", b"two")]);
-    server.post("/v1/render?size=32", &nested).problem(415, "mesh_unrecognised");
+    server.post("/v1/render?size=32", &nested).problem(422, "bundle_broken");
     let formats = server.get("/v1/capabilities").json()["mesh_formats"].clone();
     assert!(formats.as_array().unwrap().contains(&"3mf".into()), "{formats}");
 }

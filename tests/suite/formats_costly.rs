@@ -1,7 +1,7 @@
 //! Small files that would cost a lot: what is shown many times and read once, and what grows with the square of its number.
 
 use crate::fbx_files::{Node, Value, ascii, binary, file, geometry, model, node, text};
-use crate::mesh_files::{Gltf, Solid, read, read_limited};
+use crate::mesh_files::{Gltf, Noise, Solid, read, read_limited};
 use meshsnap::limits::Limits;
 use meshsnap::mesh::{MeshError, MeshFault};
 use serde_json::{Value as Json, json};
@@ -168,4 +168,43 @@ fn fbx_files_that_take_the_square_of_their_size_are_refused() {
         }
     }
     assert_eq!(ran, 8);
+}
+
+#[test]
+fn packed_fbx_arrays_are_read_and_bombs_among_them_are_not() {
+    let with = |vertices: Value| {
+        let mut mesh = geometry(1, &Solid::cuboid(), vec![]);
+        mesh.children[0].values = vec![vertices];
+        read(&binary(&file(1, vec![mesh, model(2, "Mesh", vec![])], &[(2, 0, ""), (1, 2, "")])))
+    };
+    let bytes = |floats: &[f64]| floats.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
+    let mut floats: Vec<f64> = Solid::cuboid().positions.iter().flatten().copied().collect();
+    assert_eq!(with(Value::Packed(b'd', bytes(&floats))).unwrap().triangles.len(), 12);
+    // Vertices that nothing uses: 16 MB of zeros are read, and more are a bomb.
+    floats.resize(2_000_001, 0.0);
+    assert_eq!(with(Value::Packed(b'd', bytes(&floats))).unwrap().triangles.len(), 12);
+    floats.resize(2_200_002, 0.0);
+    let error = with(Value::Packed(b'd', bytes(&floats))).unwrap_err();
+    assert!(error.fault == MeshFault::Broken && error.detail.contains("17600016 bytes or more together"), "{error}");
+    // As large and as it is: no bomb.
+    let noise = Noise(5).bytes(17_600_016);
+    let floats: Vec<f64> = noise.chunks_exact(8).map(|b| f64::from(b[0])).collect();
+    assert!(with(Value::Packed(b'd', bytes(&floats))).is_ok());
+}
+
+#[test]
+fn zeros_without_data_are_as_many_as_the_file_has_bytes() {
+    let of = |count: u64, pad: usize| {
+        let mut gltf = triangle();
+        gltf.json["accessors"] =
+            json!([gltf.json["accessors"][0], { "type": "VEC3", "componentType": 5126, "count": count }]);
+        let first = gltf.json["meshes"][0]["primitives"][0].clone();
+        gltf.json["meshes"][0]["primitives"] = json!([first, { "attributes": { "POSITION": 1 } }]);
+        gltf.json["extras"] = "x".repeat(pad).into();
+        read(&gltf.glb())
+    };
+    assert_eq!(of(65_536, 0).unwrap().triangles.len(), 1);
+    assert_eq!(of(300_000, 300_000).unwrap().triangles.len(), 1);
+    let error = of(300_000, 0).unwrap_err();
+    assert!(error.fault == MeshFault::Broken && error.detail.contains("300000 elements and no data"), "{error}");
 }

@@ -250,7 +250,7 @@ fn what_a_file_has_is_counted() {
     // Shown twice, and counted once.
     gltf.json["nodes"] = json!([{ "mesh": 0, "children": [1] }, { "mesh": 0 }]);
     let mesh = read(&gltf.glb()).unwrap();
-    let content = mesh.report.content;
+    let content = mesh.report.content.unwrap();
     assert_eq!((content.draw_calls, content.vertices), (14, 14 * 6));
     assert_eq!(content.points, 6 + 5);
     assert_eq!(content.segments, (3 + 2) + (6 + 5) + (5 + 4));

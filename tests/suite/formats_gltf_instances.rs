@@ -68,7 +68,7 @@ fn hidden_nodes_hide_what_is_below_them() {
     gltf.json["extensionsRequired"] = json!(["KHR_node_visibility"]);
     let mesh = read(&gltf.glb()).unwrap();
     assert_eq!(mesh.triangles.len(), 2);
-    assert_eq!(mesh.report.content.triangles, 2);
+    assert_eq!(mesh.report.content.unwrap().triangles, 2);
     gltf.json["nodes"][0]["extensions"] = json!({ "KHR_node_visibility": { "visible": false } });
     assert_eq!(read(&gltf.glb()).unwrap_err().fault, MeshFault::Empty);
 }

@@ -34,7 +34,7 @@ fn cpu_pictures_equal_the_stored_ones_to_the_byte() {
     }
     goal(7, &format!("identical: {compared} pictures with {isas:?} instructions on {THREADS:?} threads"));
     assert_eq!(compared, SCENES.len() * 2 * THREADS.len() * 2);
-    assert_eq!(SCENES.len(), 40);
+    assert_eq!(SCENES.len(), 41);
 }
 
 /// Draws a scene.

@@ -13,22 +13,22 @@ use std::time::{Duration, Instant};
 const CHANGES: u64 = 2000;
 /// How much fewer those are whose inputs are drawn.
 const SLOWER_PIPELINE: u64 = 20;
-/// The longest that a small file may take, on a busy machine and without optimisation.
-const ANSWER_MAX: Duration = Duration::from_secs(5);
+/// The longest that a small file may take; on a busy machine and without optimisation, where it is no measure, and with it.
+const ANSWER_MAX: Duration = Duration::from_secs(if cfg!(debug_assertions) { 5 } else { 1 });
 
 #[test]
 fn cut_and_changed_files_are_answered_in_time_and_memory() {
     let asked = std::env::var("MESHSNAP_HOSTILE").ok();
     let changes = asked.as_ref().map_or(CHANGES, |text| text.parse().expect("MESHSNAP_HOSTILE is a number"));
-    println!("target       cuts  changes   slowest       of                resident MB, before and after");
-    let mut done = 0;
+    println!("target       cuts  changes   seconds   slowest       of                resident MB, before and after");
+    let (began, mut done, mut executions) = (Instant::now(), 0, 0);
     for target in targets::TARGETS {
         let seeds = files(&root().join("fuzz/seeds").join(target));
         let changes = if target == "pipeline" { changes.div_ceil(SLOWER_PIPELINE) } else { changes };
         let mut watch = Watch { target, slowest: (Duration::ZERO, String::new()), runs: 0 };
         // What is kept from job to job, and what the allocator keeps, is there before the count begins.
         change(&mut watch, &seeds, (changes / 10).clamp(20, 2000), 1);
-        let before = resident_bytes();
+        let (before, start) = (resident_bytes(), Instant::now());
         let warm = watch.runs;
         cut(&mut watch, &seeds);
         let cuts = watch.runs - warm;
@@ -36,7 +36,8 @@ fn cut_and_changed_files_are_answered_in_time_and_memory() {
         let after = resident_bytes();
         let ((took, name), megabytes) = (&watch.slowest, |bytes: u64| bytes as f64 / 1e6);
         println!(
-            "{target:<10} {cuts:>6} {changes:>8} {took:>9.1?}       {name:<20} {:.1} {:.1}",
+            "{target:<10} {cuts:>6} {changes:>8} {:>9.1} {took:>9.1?}       {name:<20} {:.1} {:.1}",
+            start.elapsed().as_secs_f64(),
             megabytes(before),
             megabytes(after)
         );
@@ -46,8 +47,9 @@ fn cut_and_changed_files_are_answered_in_time_and_memory() {
         if asked.is_some() {
             assert!(after <= before + before / 20, "{target}: {before} bytes grew to {after}");
         }
-        done += 1;
+        (done, executions) = (done + 1, executions + watch.runs);
     }
+    println!("{executions} executions of {done} targets in {:.0?}; none panicked", began.elapsed());
     assert_eq!(done, targets::TARGETS.len());
 }
 
@@ -60,9 +62,18 @@ struct Watch {
 
 impl Watch {
     fn run(&mut self, name: &str, bytes: &[u8]) {
-        let start = Instant::now();
-        targets::run(self.target, bytes);
-        let took = start.elapsed();
+        let timed = || {
+            let start = Instant::now();
+            targets::run(self.target, bytes);
+            start.elapsed()
+        };
+        let mut took = timed();
+        // Once more, and again: what is slow every time is slow, and not the machine busy with something else.
+        for _ in 0..2 {
+            if took > self.slowest.0 {
+                took = took.min(timed());
+            }
+        }
         if took > self.slowest.0 {
             self.slowest = (took, name.to_owned());
         }

@@ -156,11 +156,96 @@ fn both_back_ends_draw_them_alike() {
     assert_eq!(cases, 12);
 }
 
+/// Looks without a surface, and how wide they draw lines.
+const BARE: [(&[(&str, &str)], f64); 6] = [
+    (&[("style", "wireframe"), ("wire.thickness", "2")], 2.0),
+    (&[("style", "wireframe"), ("wire.hidden", "hide")], 1.0),
+    (&[("style", "wireframe"), ("wire.hidden", "fade"), ("wire.thickness", "3")], 3.0),
+    // In multiples of what only a triangle has.
+    (&[("style", "wireframe"), ("wire.method", "fwidth")], LINE_PX),
+    (&[("surface", "null"), ("style", "outline"), ("outline.method", "contour"), ("outline.unit", "px")], 3.0),
+    (&[("surface", "null"), ("style", "outline"), ("outline.unit", "px"), ("outline.thickness", "4")], 4.0),
+];
+
 #[test]
-fn a_look_without_a_surface_says_that_it_leaves_them_out() {
+fn looks_without_a_surface_draw_them_as_lines() {
+    let positions = [[-0.4, -0.3, 0.5], [0.45, 0.2, -0.5], [0.1, 0.4, 0.3], [-0.3, -0.5, -0.2]];
+    let mut cases = 0;
+    for (look, width) in BARE {
+        for (a, b) in [(0, 1), (2, 3), (0, 0), (3, 3)] {
+            let mut mesh = alone(&positions, &[segment(a, b)]);
+            let size: &[(&str, &str)] = &[("size", "200x160"), ("wire.opacity", "1")];
+            let size = if look.iter().any(|(key, _)| key.starts_with("outline")) { &size[..1] } else { size };
+            let spec = scenes::spec(&[look, size].concat());
+            assert_eq!((thicken(&mut mesh, &spec), mesh.thickened), (None, None));
+            let plan = scenes::plan(&mesh, &spec);
+            let [from, to] = [a, b].map(|v| on_screen(&plan, v as usize));
+            let length = (from[0] - to[0]).hypot(from[1] - to[1]);
+            // With round ends; a point is twice as wide as a line.
+            let disc = |width: f64| std::f64::consts::PI * 0.25 * width * width;
+            let expected = if a == b { disc(2.0 * width) } else { length * width + disc(width) };
+            let ink = ink_px2(&draw(&plan));
+            assert!((ink / expected - 1.0).abs() < 0.04, "{look:?} {a} {b}: {ink} px^2 instead of {expected}");
+            cases += 1;
+        }
+    }
+    assert_eq!(cases, 24);
+}
+
+#[test]
+fn both_back_ends_draw_them_alike_without_a_surface() {
+    let Some(gpus) = twins::gpus() else { return };
+    let mut cases = 0;
+    for gpu in gpus {
+        let mut gpu = GpuRenderer::new(Arc::clone(gpu));
+        for (look, _) in BARE {
+            // With a cube, and with nothing else.
+            for is_alone in [false, true] {
+                let spec = scenes::spec(&[look, &[("size", "160x120")]].concat());
+                let mut mesh = cube();
+                if is_alone {
+                    mesh = alone(&mesh.positions, &mesh.loose);
+                }
+                assert_eq!(thicken(&mut mesh, &spec), None);
+                let plan = scenes::plan(&mesh, &spec);
+                let (picture, other) = (draw(&plan), gpu.draw(&plan, &Deadline::default()).unwrap());
+                assert!(ink_px2(&picture) > 20.0, "{look:?} {is_alone}");
+                Likeness::of(&picture, &other).assert(Tolerance::TWINS, &format!("{look:?} {is_alone}"));
+                cases += 1;
+            }
+        }
+    }
+    assert_eq!(cases, 24);
+}
+
+#[test]
+fn parts_with_and_without_a_fill_draw_their_own() {
+    // The second part has no surface: its line is a line, and the first's an area.
+    let positions = [[-0.4, -0.3, 0.0], [0.4, -0.3, 0.0], [-0.4, 0.3, 0.0], [0.4, 0.3, 0.0]];
+    let mut mesh = alone(&positions, &[segment(0, 1), Loose { ends: [2, 3], material: 1 }]);
+    mesh.materials[0].name = "filled".into();
+    mesh.materials.push(Default::default());
+    let mut spec =
+        scenes::spec(&[("style", "wireframe"), ("wire.hidden", "show"), ("view", "front"), ("size", "200x160")]);
+    spec.materials = vec![("filled".into(), scenes::spec(BLACK).layers)];
+    assert_eq!(thicken(&mut mesh, &spec), None);
+    let plan = scenes::plan(&mesh, &spec);
+    assert_eq!((plan.triangles.len(), plan.lines.len(), plan.lines[0].edges.len()), (2, 1, 1));
+    assert_eq!(plan.lines[0].edges[0].vertices, [2, 3]);
+    let length = on_screen(&plan, 1)[0] - on_screen(&plan, 0)[0];
+    let ink = ink_px2(&draw(&plan));
+    let expected = (length + LINE_PX) * LINE_PX + length + 0.8;
+    assert!((ink / expected - 1.0).abs() < 0.04, "{ink} px^2 instead of {expected}");
+}
+
+#[test]
+fn a_look_of_nothing_says_that_it_leaves_them_out() {
+    let mut nothing = scenes::spec(&[("style", "wireframe")]);
+    nothing.layers.wire = None;
     let mut mesh = cube();
-    let warning = thicken(&mut mesh, &scenes::spec(&[("style", "wireframe")])).unwrap();
+    let warning = thicken(&mut mesh, &nothing).unwrap();
     assert_eq!((warning.code, mesh.thickened), ("lines_not_drawn", None));
+    assert!(scenes::plan(&mesh, &nothing).lines.is_empty());
     let mut plain = scenes::mesh(&shapes::cube());
-    assert_eq!(thicken(&mut plain, &scenes::spec(&[("style", "wireframe")])), None);
+    assert_eq!(thicken(&mut plain, &nothing), None);
 }

@@ -70,6 +70,11 @@ pub const SCENES: &[Scene] = &[
     scene("gear-feature-fade", gear, FEATURE_FADE),
     scene("fin-topology", fin, &[SIZE, ("style", "topology")]),
     scene("torus-wire-lit", torus, LIT_RED),
+    scene(
+        "spring-wireframe",
+        spring,
+        &[SIZE, ("style", "wireframe"), ("wire.color", "2060c0"), ("wire.thickness", "2")],
+    ),
     scene("sheet-boundary", sheet, &[SIZE, ("style", "wire"), ("wire.edges", "boundary"), ("wire.thickness", "2")]),
 ];
 
@@ -151,6 +156,24 @@ fn torus() -> String {
 
 fn fin() -> String {
     shapes::FIN.to_owned()
+}
+
+/// A cube in a spring of lines, with points between them.
+fn spring() -> String {
+    let mut obj = shapes::cube();
+    let around = |i: u32, r: f64| {
+        let a = std::f64::consts::TAU * f64::from(i) / 32.0;
+        format!("v {} {} {}\n", r * libm::cos(a), f64::from(i) / 48.0 - 1.5, r * libm::sin(a))
+    };
+    for i in 0..=144 {
+        obj += &around(i, 2.0);
+    }
+    obj += &format!("l {}\n", (9..=153).map(|v| v.to_string()).collect::<Vec<_>>().join(" "));
+    for i in 0..12 {
+        obj += &around(i * 12, 1.7);
+        obj += "p -1\n";
+    }
+    obj
 }
 
 fn gear() -> String {

@@ -162,8 +162,9 @@ impl Answer {
         let mut bytes = Vec::new();
         let mut byte = [0];
         while !bytes.ends_with(b"\r\n\r\n") {
-            match stream.read(&mut byte) {
-                Ok(1) => bytes.push(byte[0]),
+            // Where a signal interrupts it, this goes on.
+            match stream.read_exact(&mut byte) {
+                Ok(()) => bytes.push(byte[0]),
                 other => panic!("no whole answer, but {:?} and then {other:?}", String::from_utf8_lossy(&bytes)),
             }
         }

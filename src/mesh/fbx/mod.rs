@@ -6,6 +6,7 @@
 mod costs;
 mod geometry;
 mod materials;
+mod packed;
 mod shown;
 
 use super::import::Context;
@@ -38,6 +39,7 @@ pub fn is_fbx(bytes: &[u8]) -> bool {
 /// Reads an FBX file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     costs::check(bytes, cx)?;
+    packed::check(bytes, cx.deadline)?;
     let scene = load(bytes, cx)?;
     limits::check("the number of scene nodes", scene.nodes.len() as u64, cx.limits.nodes, "--limit-nodes")?;
     let mut raw = RawMesh::default();

@@ -6,6 +6,9 @@ use super::tree::{Accessor, Document, Sparse};
 use crate::mesh::MeshError;
 use crate::mesh::import::Context;
 
+/// Elements without data that a file may have however small it is.
+const ZEROS_MAX: u64 = 1 << 16;
+
 /// Reads accessors of one file.
 pub struct Reader<'a> {
     doc: &'a Document,
@@ -66,6 +69,7 @@ impl<'a> Reader<'a> {
         }
         let size = shape.component.bytes();
         cx.budget.spend("glTF vertices", shape.count, N as u64 * 8)?;
+        self.check_zeros(index, cx)?;
         let mut out = vec![[0.0; N]; shape.count as usize];
         self.each(index, &shape, cx, |at, bytes| {
             out[at] =
@@ -83,6 +87,7 @@ impl<'a> Reader<'a> {
             return Err(broken(index, "holds vertex indices, and its buffer view has a stride"));
         }
         cx.budget.spend("glTF indices", shape.count, 4)?;
+        self.check_zeros(index, cx)?;
         let mut out = vec![0; shape.count as usize];
         self.each(index, &shape, cx, |at, bytes| out[at] = decode_unsigned(bytes))?;
         Ok(out)
@@ -93,6 +98,20 @@ impl<'a> Reader<'a> {
             .accessors
             .get(index)
             .ok_or_else(|| MeshError::broken(format!("there is no accessor {index} in the glTF file")))
+    }
+
+    /// An accessor without data stands for zeros, and may stand for as many as the upload has bytes: no mesh has more vertices.
+    fn check_zeros(&self, index: usize, cx: &Context<'_>) -> Result<(), MeshError> {
+        let accessor = self.accessor(index)?;
+        let count = accessor.count.0;
+        if accessor.buffer_view.is_some() || count <= ZEROS_MAX {
+            return Ok(());
+        }
+        let most = ZEROS_MAX.saturating_add(cx.bundle.bytes_len());
+        if count <= most {
+            return Ok(());
+        }
+        Err(broken(index, &format!("has {count} elements and no data, in an upload that has room for {most}")))
     }
 
     /// Hands every element's bytes to `take`: those of the buffer view, then those that the sparse part replaces.

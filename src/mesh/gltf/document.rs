@@ -25,6 +25,10 @@ pub fn parse(json: &[u8], cx: &mut Context<'_>) -> Result<Document, MeshError> {
         let at = all_bytes - json.len() + error.valid_up_to();
         return Err(MeshError::broken(format!("byte {at} of the glTF JSON is not UTF-8")));
     }
+    // Few documents have so many objects at all, and only they are counted: a node that nobody shows takes memory too.
+    if size.objects > cx.limits.nodes {
+        limits::check("the number of nodes in the glTF file", nodes(json), cx.limits.nodes, "--limit-nodes")?;
+    }
     let doc = serde_json::from_slice(json).map_err(unread)?;
     check_demands(&doc)?;
     Ok(doc)
@@ -69,6 +73,17 @@ fn measure(json: &[u8]) -> Size {
         }
     }
     size
+}
+
+/// How many there are; 0 in what is no glTF, and fails later.
+fn nodes(json: &[u8]) -> u64 {
+    #[derive(Default, serde::Deserialize)]
+    #[serde(default)]
+    struct Nodes {
+        // Takes no memory.
+        nodes: Vec<serde::de::IgnoredAny>,
+    }
+    serde_json::from_slice::<Nodes>(json).map_or(0, |counted| counted.nodes.len() as u64)
 }
 
 fn check_demands(root: &Document) -> Result<(), MeshError> {
@@ -129,6 +144,13 @@ mod tests {
     fn measures_depth_outside_strings_only() {
         let size = measure(br#"{"a":[[1,2],{"b":"[[[{{,,\"[["}]}"#);
         assert_eq!(size, Size { depth: 3, objects: 2, commas: 2 });
+    }
+
+    #[test]
+    fn counts_nodes_without_reading_them() {
+        assert_eq!(nodes(br#"{"nodes":[{"a":[{}]},{},{}],"scenes":[{"nodes":[0]}]}"#), 3);
+        assert_eq!(nodes(b"{}"), 0);
+        assert_eq!(nodes(b"{\"nodes\":[{}"), 0);
     }
 
     #[test]

@@ -61,7 +61,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let doc = document::parse(json, cx)?;
     let lists = Lists::of(json)?;
     check::check(&doc, &lists)?;
-    raw.report.content = content(&doc);
+    raw.report.content = Some(content(&doc));
     let mut reader = Reader::new(&doc, bin);
     let pose = Pose::new(&doc, &lists, &mut reader, &mut raw.report.warnings, cx)?;
     let scene = scene::scene(&doc, &pose, cx)?;

@@ -32,6 +32,17 @@ pub struct Want {
 }
 
 impl Want {
+    /// Lines of a style, not lit, along all edges that they are given.
+    pub fn everywhere(width_px: f32, smoothing_px: f32, color: [f32; 4], hidden: Hidden) -> Self {
+        let (lit, contour, class, looks) = (false, false, Class::All, Vec::new());
+        Self { width_px, smoothing_px, color, hidden, lit, contour, class, looks }
+    }
+
+    /// Whether they leave a trace.
+    pub fn is_seen(&self) -> bool {
+        self.width_px + self.smoothing_px > 0.0 && self.color[3] > 0.0
+    }
+
     /// Whether an edge is one of them.
     pub fn draws(&self, mesh: &Mesh, parts: &Parts<'_>, edge: &MeshEdge) -> bool {
         let mut faces = edge.faces.into_iter().filter(|&face| face != NO_FACE);
