@@ -9,6 +9,10 @@ const NOTHING: u32 = 0xFFFFFFFFu;
 // How much nearer than the edge a surface must be, as a share of depth: what f32 may lose on the way.
 const NEARER: f32 = 1.0000019073486328;
 
+// How far what is on screen may lie from where it should, 1/256 px: half a unit each in which a triangle and an edge are rounded, and some
+// for f32.
+const SNAPPED: f32 = 1.25;
+
 // Parts shorter than this are what rounding leaves of an edge beside what hides it. Their round ends would show as dots.
 const CRUMB_PX: f32 = 0.0625;
 
@@ -236,11 +240,15 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     if part.x >= part.y {
         return none;
     }
+    let slack = slack_of(p, q, r);
+    if slack < 0.0 {
+        return none;
+    }
     // Depths are compared only where the edge is inside, so that thin triangles need not be continued far.
     let depths = vec3(p.z, q.z, r.z);
     let ws = vec3(p.w, q.w, r.w);
-    let first = nearer_by(s, at_start, at_end, depths, ws, part.x);
-    let last = nearer_by(s, at_start, at_end, depths, ws, part.y);
+    let first = nearer_by(s, at_start, at_end, depths, ws, slack, part.x);
+    let last = nearer_by(s, at_start, at_end, depths, ws, slack, part.y);
     if first <= 0.0 && last <= 0.0 {
         return none;
     }
@@ -260,6 +268,37 @@ fn may_lie_behind(s: Segment, a: Vertex, b: Vertex, c: Vertex) -> bool {
         && all(low <= max(s.ends.xy, s.ends.zw)) && all(high >= min(s.ends.xy, s.ends.zw));
 }
 
+// How much the depth of a triangle's plane may be off because of where its corners and the edge are on screen; -1 of one without area.
+fn slack_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
+    // So that nothing overflows, by exponents: 2^31.
+    let exponents = max(max(exponents_of(p), exponents_of(q)), exponents_of(r));
+    if any(exponents >= vec4(0x4F000000u)) {
+        return 0.0;
+    }
+    let in_x = vec3(p.x, q.x, r.x);
+    let in_z = vec3(p.z, q.z, r.z);
+    let x = cofactors(vec3(p.y, q.y, r.y), vec3(p.w, q.w, r.w));
+    let y = cofactors(vec3(p.w, q.w, r.w), in_x);
+    let volume = abs(sum3(rn3(x * in_x)));
+    if volume > MIN_POSITIVE {
+        return rn(rn((abs(sum3(rn3(x * in_z))) + abs(sum3(rn3(y * in_z)))) * recip(volume)) * SNAPPED);
+    }
+    return -1.0;
+}
+
+fn exponents_of(p: vec4<f32>) -> vec4<u32> {
+    return bitcast<vec4<u32>>(p) & vec4(0x7F800000u);
+}
+
+// What each corner has in common with the other two: a x b of its neighbours.
+fn cofactors(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
+    return rn3(a.yzx * b.zxy) - rn3(b.yzx * a.zxy);
+}
+
+fn sum3(v: vec3<f32>) -> f32 {
+    return rn(v.x + v.y) + v.z;
+}
+
 // Of each side of a triangle, twice the area that it spans with a point; positive inside.
 fn sides_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, at: vec2<f32>, is_clockwise: bool) -> vec3<f32> {
     let a = rn2(p.xy - rn2(at * p.w));
@@ -270,14 +309,16 @@ fn sides_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, at: vec2<f32>, is_clockwis
 }
 
 // By how much the triangle is nearer than the edge at t of the way.
-fn nearer_by(s: Segment, at_start: vec3<f32>, at_end: vec3<f32>, depths: vec3<f32>, ws: vec3<f32>, t: f32) -> f32 {
+fn nearer_by(
+    s: Segment, at_start: vec3<f32>, at_end: vec3<f32>, depths: vec3<f32>, ws: vec3<f32>, slack: f32, t: f32,
+) -> f32 {
     let weights = max(at_start + rn3(t * (at_end - at_start)), vec3(0.0));
     let z = rn3(weights * depths);
     let w = rn3(weights * ws);
     let depth = rn(rn(z.x + z.y) + z.z);
     let scale = rn(rn(w.x + w.y) + w.z);
     if scale > MIN_POSITIVE {
-        return rn(depth * recip(scale)) - rn(depth_of(s, t) * NEARER);
+        return (rn(depth * recip(scale)) - rn(depth_of(s, t) * NEARER)) - slack;
     }
     return -1.0;
 }

@@ -15,6 +15,14 @@ use crate::plan::Edge;
 /// How much nearer than the edge a surface must be, as a share of depth: what f32 may lose on the way.
 const NEARER: f32 = 1.0 + 1.0 / 524_288.0;
 
+/// How far what is on screen may lie from where it should, 1/256 px: half a unit each in which a triangle and an edge are rounded, and some
+/// for f32. A surface hides an edge only if it were nearer even so much farther down its slope: else what lies in its plane, as the foot of
+/// what stands on it does, would be hidden or not as roundings fall.
+const SNAPPED: f32 = 1.25;
+
+/// Corners behind the eye may lie anywhere: 2^31.
+const FAR: f32 = 2_147_483_648.0;
+
 /// Parts shorter than this are what rounding leaves of an edge beside what hides it. Their round ends would show as dots.
 const CRUMB_PX: f32 = 1.0 / 16.0;
 
@@ -200,18 +208,38 @@ fn hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, id: u32) -> Op
             narrow(&mut range, [sides[0][k], sides[1][k]])?;
         }
     }
+    let slack = slack(&corners)?;
     // Depths are compared only where the edge is inside, so that thin triangles need not be continued far.
     let nearer = |t: f32| {
         let weight = |k: usize| (sides[0][k] + t * (sides[1][k] - sides[0][k])).max(0.0);
         let [a, b, c] = [weight(0), weight(1), weight(2)];
         let z = (a * corners[0][2] + b * corners[1][2]) + c * corners[2][2];
         let w = (a * corners[0][3] + b * corners[1][3]) + c * corners[2][3];
-        if w > f32::MIN_POSITIVE { z * recip(w) - segment.depth(t) * NEARER } else { -1.0 }
+        if w > f32::MIN_POSITIVE { (z * recip(w) - segment.depth(t) * NEARER) - slack } else { -1.0 }
     };
     let mut part = [0.0, 1.0];
     narrow(&mut part, [nearer(range[0]), nearer(range[1])])?;
     let length = range[1] - range[0];
     Some([range[0] + part[0] * length, range[0] + part[1] * length])
+}
+
+/// How much the depth of a triangle's plane may be off because of where its corners and the edge are on screen; None of one without area.
+/// Depth is `z = gx x + gy y + c` for all corners, times W: Cramer's rule.
+#[inline(always)]
+fn slack(corners: &[Corner; 3]) -> Option<f32> {
+    // So that nothing overflows; of what reaches farther, rounding says less than f32 does.
+    if corners.iter().flatten().any(|v| v.abs() >= FAR) {
+        return Some(0.0);
+    }
+    let [p, q, r] = corners;
+    let cofactors = |i: usize, j: usize| {
+        let cofactor = |a: &Corner, b: &Corner| a[i] * b[j] - a[j] * b[i];
+        [cofactor(q, r), cofactor(r, p), cofactor(p, q)]
+    };
+    let (x, y) = (cofactors(1, 3), cofactors(3, 0));
+    let sum = |c: [f32; 3], k: usize| (c[0] * p[k] + c[1] * q[k]) + c[2] * r[k];
+    let volume = sum(x, 0).abs();
+    (volume > f32::MIN_POSITIVE).then(|| (sum(x, 2).abs() + sum(y, 2).abs()) * recip(volume) * SNAPPED)
 }
 
 /// Of each side of a triangle, twice the area that it spans with a point; positive inside. It is right for corners behind
