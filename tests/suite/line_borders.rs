@@ -22,7 +22,10 @@ const MORE_PX: u32 = 64;
 /// What the other origin of coordinates in pixels may round differently.
 const SAME: Tolerance = Tolerance { max: 1, share: 0.002 };
 
-const CAMERAS: &[&[(&str, &str)]] = &[
+/// What a request says.
+type Keys<'k> = &'k [(&'k str, &'k str)];
+
+const CAMERAS: &[Keys<'_>] = &[
     &[("camera.eye", "0.2,0.35,0.3"), ("camera.target", "-0.8,0,-0.9"), ("camera.fov_deg", "80")],
     &[("camera.projection", "orthographic"), ("camera.height", "0.9"), ("camera.azimuth_deg", "20")],
     &[("camera.eye", "1.2,0.9,1.4"), ("camera.target", "0.3,0.1,0"), ("camera.fov_deg", "25")],
@@ -185,7 +188,7 @@ fn only_where_the_mesh_goes_on_there_are_samples_beyond_the_picture() {
     let mesh = scenes::mesh(&shapes::gear(9));
     let close = ("camera.eye", "0.9,0.7,1.1");
     let wide = ("wire.thickness", "20");
-    let cases: [(&[(&str, &str)], bool, &str); 5] = [
+    let cases: [(Keys<'_>, bool, &str); 5] = [
         (&[("style", "wire")], false, "the whole mesh lies inside the picture"),
         (&[("style", "wire"), wide, close, ("camera.target", "0,0,0")], true, ""),
         (&[("style", "flat"), close, ("camera.target", "0,0,0")], false, "no line asks what hides it"),
