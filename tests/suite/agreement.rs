@@ -50,6 +50,7 @@ fn the_validator_and_meshsnap_agree_or_it_is_said_why_not() {
     assert_eq!(rows.len(), 206);
     assert_eq!(rows.iter().filter(|row| row.validator.is_some()).count(), 97);
     assert_eq!(rows.iter().filter(|row| row.status == 200).count(), 93);
+    assert_eq!(rows.iter().filter(|row| row.is_counted()).count(), 62);
     assert_eq!(rows.iter().filter(|row| row.likeness.is_some()).count(), if bench.has_gpu { 93 } else { 0 });
 }
 
@@ -191,6 +192,11 @@ fn picture(answer: &Answer) -> Image {
 }
 
 impl Row {
+    /// Whether its totals were compared with the validator's.
+    fn is_counted(&self) -> bool {
+        self.totals.is_some() && self.validator.is_some()
+    }
+
     /// What is wrong with it.
     fn judge(&mut self, answer: &Answer) {
         let mut faults = Vec::new();
@@ -251,11 +257,14 @@ fn print(rows: &[Row]) {
     let count = |is: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count();
     let compared = count(&|row| row.likeness.is_some());
     println!(
-        "\n{} files: {} drawn, {compared} of them on both back-ends; {} refused; {} explained; slowest {:.1?} ({})",
+        "\n{} files: {} drawn, {compared} of them on both back-ends; {} refused; {} explained; {} of {} with the validator's \
+         totals; slowest {:.1?} ({})",
         rows.len(),
         count(&|row| row.status == 200),
         count(&|row| row.status != 200),
         count(&|row| row.why.is_some()),
+        count(&|row| row.is_counted() && row.faults.is_empty()),
+        count(&Row::is_counted),
         slowest.took,
         slowest.name,
     );
