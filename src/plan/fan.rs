@@ -1,4 +1,5 @@
-//! Round corners of outlines: the fan around a vertex between the strips of two rims that meet there, where none of its faces is.
+//! Round corners of outlines: the fan around a vertex between the strips of two rims that meet there. Where the vertex's own faces hide one
+//! of the two, only where none of its faces is.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
@@ -51,6 +52,10 @@ pub struct End {
     pub depth: f64,
     /// 1 / W
     pub inv_w: f64,
+    /// How depth changes along the rim, away from here, each 1/256 px.
+    pub slope: f64,
+    /// Whether a face of the vertex hides the rim.
+    pub is_hidden: bool,
 }
 
 /// Ends of rims, and what is between them.
@@ -84,8 +89,7 @@ impl Fans {
     /// Adds the fans of all vertices to the hull.
     pub fn finish(&mut self, view: &View<'_>, hull: &mut HullPass<'_>, means: &mut Means<'_>) -> Result<(), PlanError> {
         self.sort(means.deadline)?;
-        let vertices = self.ends.chunk_by(|a, b| a.vertex == b.vertex).map(|group| group[0].vertex);
-        let sectors = Sectors::around(vertices, view, means)?;
+        let sectors = Sectors::around(&mut self.ends, view, means)?;
         self.draw(&sectors, view.mesh.positions.len() as u32, hull, means)
     }
 
@@ -151,7 +155,10 @@ impl Fan {
 
 /// Calls `each` with every piece of a fan, vertex by vertex.
 fn each_fan(ends: &[End], sectors: &Sectors, deadline: &Deadline, mut each: impl FnMut(Fan)) -> Result<(), Stopped> {
-    let mut each_piece = |from: usize, sweep: f64, to: Option<usize>| {
+    let mut each_piece = |from: usize, sweep: f64, next: usize, to: Option<usize>| {
+        if !ends[from].is_hidden && !ends[next].is_hidden {
+            return each(Fan { from, sweep, to, piece: [0.0, sweep] });
+        }
         let End { vertex, free, angle, turn, .. } = ends[from];
         let (start, free) = (angle + f64::from(free) * turn, f64::from(free));
         let low = turned(if free > 0.0 { start } else { start - sweep });
@@ -187,12 +194,12 @@ fn each_fan(ends: &[End], sectors: &Sectors, deadline: &Deadline, mut each: impl
             if meets && end.free > 0 {
                 let sweep = gap - end.turn - group[next].turn;
                 if sweep > 0.0 {
-                    each_piece(first + i, sweep, Some(first + next));
+                    each_piece(first + i, sweep, first + next, Some(first + next));
                 }
             } else if !meets {
                 let sweep = (gap - end.turn).min(FRAC_PI_2);
                 if sweep > 0.0 {
-                    each_piece(first + i, sweep, None);
+                    each_piece(first + i, sweep, first + next, None);
                 }
             }
         }

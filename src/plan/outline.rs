@@ -124,6 +124,8 @@ impl<'a> Outlines<'a> {
                 reach: reach[k],
                 depth: depths[k],
                 inv_w: ends[k][3],
+                slope: sign * (b[2] - a[2]) / length,
+                is_hidden: false,
             });
         }
     }

@@ -1,17 +1,25 @@
-//! Which directions around a vertex its own faces take up on screen.
+//! Which directions around a vertex its own faces take up on screen, and which edges there they hide.
 //!
-//! A contour that ends inside a shape, where the surface folds, ends at a vertex around which the surface goes on: there nothing is free,
-//! and no outline belongs. Where the outline has a corner that is free, no face of its vertex is in the way.
+//! A contour that ends inside a shape, where the surface folds, ends at a vertex around which the surface goes on, and where the fold's
+//! other edge leaves that this surface hides: between the two nothing is free, and no outline belongs. Between two edges that are seen
+//! nothing of the vertex is in the way, unless it lies behind.
 
 use std::f64::consts::TAU;
 
 use super::build::Means;
+use super::fan::End;
 use super::order::sort;
-use super::rim::{CHECK_EVERY, View};
+use super::rim::{CHECK_EVERY, View, row_dot};
 use crate::limits::Stopped;
 use crate::plan::PlanError;
 
-/// The directions that a vertex's own faces take up: arcs that do not touch, by vertex and angle.
+/// Ends times faces at a vertex up to which each is compared with each. Around a vertex of more, all ends count as seen.
+const PAIRS_MAX: usize = 1 << 12;
+
+/// What rounding makes of two angles that are equal, and of two slopes, as a share of them.
+const EQUAL: f64 = 1e-9;
+
+/// The directions that a vertex's own faces take up, by vertex and angle: arcs that do not touch.
 #[derive(Debug, Default)]
 pub struct Sectors {
     arcs: Vec<Arc>,
@@ -23,45 +31,31 @@ struct Arc {
     vertex: u32,
     from: f64,
     to: f64,
+    /// How depth changes across the face, each 1/256 px right and down.
+    slope: [f64; 2],
 }
 
 impl Sectors {
-    /// Around these vertices, which are in order.
-    pub fn around(
-        vertices: impl Iterator<Item = u32>,
-        view: &View<'_>,
-        means: &mut Means<'_>,
-    ) -> Result<Self, PlanError> {
-        let words = view.mesh.positions.len().div_ceil(64);
-        means.budget.spend("an outline's corners", words as u64, 8)?;
-        let mut is_asked = vec![0_u64; words];
-        let mut any = false;
-        for vertex in vertices {
-            is_asked[vertex as usize / 64] |= 1 << (vertex % 64);
-            any = true;
-        }
-        if !any {
+    /// Around the vertices of ends, which are in the order of these. Says of each end whether a face of its vertex hides it.
+    pub fn around(ends: &mut [End], view: &View<'_>, means: &mut Means<'_>) -> Result<Self, PlanError> {
+        if ends.is_empty() {
             return Ok(Self::default());
         }
-        let each = |each: &mut dyn FnMut(Arc)| {
-            for (i, triangle) in view.mesh.triangles.iter().enumerate() {
-                if i % CHECK_EVERY == 0 {
-                    means.deadline.check()?;
-                }
-                let asked = |v: u32| is_asked[v as usize / 64] >> (v % 64) & 1 == 1;
-                for k in (0..3).filter(|&k| asked(triangle[k])) {
-                    let corners = [0, 1, 2].map(|j| triangle[(k + j) % 3]);
-                    sector(view, i as u32, corners).into_iter().flatten().for_each(&mut *each);
-                }
-            }
-            Ok::<(), Stopped>(())
-        };
-        let mut count = 0;
-        each(&mut |_| count += 1)?;
-        means.budget.spend("an outline's corners", count, size_of::<Arc>() as u64)?;
-        let mut arcs = Vec::with_capacity(count as usize);
-        each(&mut |arc| arcs.push(arc))?;
+        let mut arcs = arcs(ends, view, means)?;
         sort(&mut arcs, &|a, b| a.vertex.cmp(&b.vertex).then(a.from.total_cmp(&b.from)), means.deadline)?;
+        let mut rest = &arcs[..];
+        for (i, group) in ends.chunk_by_mut(|a, b| a.vertex == b.vertex).enumerate() {
+            if i % CHECK_EVERY == 0 {
+                means.deadline.check()?;
+            }
+            let skipped = rest.partition_point(|arc| arc.vertex < group[0].vertex);
+            let count = rest[skipped..].partition_point(|arc| arc.vertex == group[0].vertex);
+            let (own, after) = rest[skipped..].split_at(count);
+            rest = after;
+            if group.len() * own.len() <= PAIRS_MAX {
+                group.iter_mut().for_each(|end| end.is_hidden = own.iter().any(|arc| arc.hides(end)));
+            }
+        }
         arcs.dedup_by(|next, last| {
             let is_one = next.vertex == last.vertex && next.from <= last.to;
             if is_one {
@@ -93,6 +87,45 @@ impl Sectors {
     }
 }
 
+impl Arc {
+    /// Whether the face goes on under an edge that leaves its corner, nearer than the edge.
+    fn hides(&self, end: &End) -> bool {
+        let angle = turn(end.angle);
+        let slope = self.slope[0] * libm::cos(angle) + self.slope[1] * libm::sin(angle);
+        let rounded = EQUAL * (self.slope[0].abs() + self.slope[1].abs() + end.slope.abs());
+        angle >= self.from - EQUAL && angle <= self.to + EQUAL && slope > end.slope + rounded
+    }
+}
+
+/// The arcs of all faces around the vertices of ends.
+fn arcs(ends: &[End], view: &View<'_>, means: &mut Means<'_>) -> Result<Vec<Arc>, PlanError> {
+    let words = view.mesh.positions.len().div_ceil(64);
+    means.budget.spend("an outline's corners", words as u64, 8)?;
+    let mut is_asked = vec![0_u64; words];
+    for end in ends {
+        is_asked[end.vertex as usize / 64] |= 1 << (end.vertex % 64);
+    }
+    let each = |each: &mut dyn FnMut(Arc)| {
+        for (i, triangle) in view.mesh.triangles.iter().enumerate() {
+            if i % CHECK_EVERY == 0 {
+                means.deadline.check()?;
+            }
+            let asked = |v: u32| is_asked[v as usize / 64] >> (v % 64) & 1 == 1;
+            for k in (0..3).filter(|&k| asked(triangle[k])) {
+                let corners = [0, 1, 2].map(|j| triangle[(k + j) % 3]);
+                sector(view, i as u32, corners).into_iter().flatten().for_each(&mut *each);
+            }
+        }
+        Ok::<(), Stopped>(())
+    };
+    let mut count = 0;
+    each(&mut |_| count += 1)?;
+    means.budget.spend("an outline's corners", count, size_of::<Arc>() as u64)?;
+    let mut arcs = Vec::with_capacity(count as usize);
+    each(&mut |arc| arcs.push(arc))?;
+    Ok(arcs)
+}
+
 /// The arc that a face takes up around its first corner, in two where it goes past a whole turn; nothing of a face that is not drawn or
 /// seen edge on.
 fn sector(view: &View<'_>, face: u32, [at, next, last]: [u32; 3]) -> [Option<Arc>; 2] {
@@ -116,8 +149,23 @@ fn sector(view: &View<'_>, face: u32, [at, next, last]: [u32; 3]) -> [Option<Arc
         return [None; 2];
     }
     let from = turn(from);
-    let arc = |from: f64, to: f64| (from < to).then_some(Arc { vertex: at, from, to });
+    let slope = slope(view, [at, next, last]);
+    let arc = |from: f64, to: f64| (from < to).then_some(Arc { vertex: at, from, to, slope });
     [arc(from, (from + width).min(TAU)), arc(0.0, from + width - TAU)]
+}
+
+/// How a face's depth changes right and down: `Z = (gx x + gy y + c) W` for all corners, by Cramer's rule.
+fn slope(view: &View<'_>, corners: [u32; 3]) -> [f64; 2] {
+    let [p, q, r] = corners.map(|v| {
+        let [x, y, w] = view.places[v as usize];
+        [x, y, row_dot(&view.projection.z, view.mesh.positions[v as usize]), w]
+    });
+    let determinant = |[a, b, c]: [usize; 3]| {
+        let minor = |i: usize, j: usize| q[i] * r[j] - q[j] * r[i];
+        p[a] * minor(b, c) + p[b] * minor(c, a) + p[c] * minor(a, b)
+    };
+    let whole = determinant([0, 1, 3]);
+    [determinant([2, 1, 3]) / whole, determinant([0, 2, 3]) / whole]
 }
 
 /// The same angle, from 0 to a whole turn.

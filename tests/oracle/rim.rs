@@ -1,7 +1,8 @@
 //! Part 3e: what a hull should show: all points within its width of an edge where the surface ends, on the side where the surface is
 //! not, and nearer than any surface there.
 //!
-//! Around a corner it goes as far as the next edge where the surface ends, or as the next face that has this corner.
+//! Around a corner it goes as far as the next edge where the surface ends. Where faces of this corner hide one of the two, the surface goes
+//! on between them: there it is not where such a face is.
 //!
 //! A hull recedes. Where it ends it lies half its width behind the edge, so that what is next to the edge hides it and what is far
 //! behind does not. A face that turns away faster than that is continued beyond its edge, up to five times as fast, and the hull
@@ -33,10 +34,19 @@ pub struct Rim {
     far: [f64; 2],
     /// Away from the surface that ends here, at right angles.
     outward: V2,
-    /// By end: in which directions edges leave it where the surface ends too.
-    others: [Vec<V2>; 2],
-    /// By end: in which directions the two edges leave it of each face that has it.
-    faces: [Vec<[V2; 2]>; 2],
+    /// By end: what is around it.
+    around: [Around; 2],
+}
+
+/// What is around an end of an edge where the surface ends.
+#[derive(Clone, Debug)]
+struct Around {
+    /// Whether a face that has this corner hides the edge.
+    is_hidden: bool,
+    /// In which directions other edges leave where the surface ends too, and whether such a face hides them.
+    others: Vec<(V2, bool)>,
+    /// In which directions the two edges leave of each face.
+    faces: Vec<[V2; 2]>,
 }
 
 /// Everywhere that a scene's surface ends; for hulls so many pixels wide.
@@ -78,22 +88,38 @@ pub fn rims(scene: &Scene, width: f64) -> Vec<Rim> {
             let planes = thirds.iter().filter_map(|&third| plane_at([ends[0], ends[1], third], beyond));
             far_depth(camera, [a, b][k], width, planes.fold(f64::INFINITY, f64::min))
         });
-        let leave = |k: usize| {
-            let others = at_vertex[&edge[k]].iter().filter(|v| !edge.contains(v));
-            let ends = others.map(|&v| at(v)).filter(|h| h[3] >= camera.near_w).map(project);
-            ends.map(|v| [v[0], v[1]]).collect::<Vec<V2>>()
-        };
-        let others = [0, 1].map(|k| leave(k).into_iter().map(|v| sub(v, [ends[k][0], ends[k][1]])).collect());
-        let sectors = |k: usize| {
-            let faces = opposite[&edge[k]].iter().filter_map(|&[b, c]| match camera.in_front(&[at(b), at(c)])[..] {
-                [b, c] => Some([project(b), project(c)].map(|v| sub([v[0], v[1]], [ends[k][0], ends[k][1]]))),
-                _ => None,
-            });
-            faces.collect::<Vec<[V2; 2]>>()
-        };
-        rims.push(Rim { ends, far, outward, others, faces: [0, 1].map(sectors) });
+        let around = [0, 1].map(|k| {
+            let on_screen = |v: u32| Some(at(v)).filter(|h| h[3] >= camera.near_w).map(project);
+            let (here, other_end) = (ends[k], ends[1 - k]);
+            let faces: Vec<[V3; 2]> =
+                opposite[&edge[k]].iter().filter_map(|&[b, c]| Some([on_screen(b)?, on_screen(c)?])).collect();
+            let others = at_vertex[&edge[k]].iter().filter(|v| !edge.contains(v)).filter_map(|&v| on_screen(v));
+            Around {
+                is_hidden: is_hidden(here, other_end, &faces),
+                others: others.map(|v| (way(here, v), is_hidden(here, v, &faces))).collect(),
+                faces: faces.iter().map(|face| face.map(|v| way(here, v))).collect(),
+            }
+        });
+        rims.push(Rim { ends, far, outward, around });
     }
     rims
+}
+
+/// From one point to another on screen.
+fn way(from: V3, to: V3) -> V2 {
+    sub([to[0], to[1]], [from[0], from[1]])
+}
+
+/// Whether one of the faces around a corner lies nearer than an edge that leaves it.
+fn is_hidden(here: V3, end: V3, faces: &[[V3; 2]]) -> bool {
+    let along = way(here, end);
+    faces.iter().any(|&[b, c]| {
+        let sides = [way(here, b), way(here, c)];
+        let is_over =
+            is_between(along, sides) || sides.iter().any(|s| cross2(*s, along) == 0.0 && dot(*s, along) > 0.0);
+        let depth = plane_at([here, b, c], [end[0], end[1]]);
+        is_over && depth.is_some_and(|depth| depth - end[2] > 1e-9 * (depth - here[2]).abs())
+    })
 }
 
 /// Whether a direction lies between two that are less than half a turn apart.
@@ -149,18 +175,29 @@ fn is_inked(p: V2, near: &[&Rim], pieces: &[&Piece], width: f64) -> bool {
         let [x, y, depth] = mix(rim.ends[0], rim.ends[1], t);
         let far = rim.far[0] + t * (rim.far[1] - rim.far[0]);
         let way = sub(p, [x, y]);
-        // Past an end, only as far around it as the next edge, and where none of its faces is.
         let along = sub([rim.ends[1][0], rim.ends[1][1]], [rim.ends[0][0], rim.ends[0][1]]);
-        let (own, others, faces): (V2, &[V2], &[[V2; 2]]) = match t {
-            _ if t <= 0.0 => (along, &rim.others[0], &rim.faces[0]),
-            _ if t >= 1.0 => (along.map(|v| -v), &rim.others[1], &rim.faces[1]),
-            _ => (along, &[], &[]),
+        let is_free = match t {
+            _ if t <= 0.0 => rim.around[0].is_free(along, way),
+            _ if t >= 1.0 => rim.around[1].is_free(along.map(|v| -v), way),
+            _ => true,
         };
-        let is_passed = || others.iter().any(|other| is_between(*other, [own, way]));
-        let is_covered = || faces.iter().any(|face| is_between(way, *face));
-        let is_beyond = dot(rim.outward, way) >= 0.0 && !is_passed() && !is_covered();
+        let is_beyond = dot(rim.outward, way) >= 0.0 && is_free;
         distance <= width && is_beyond && depth + distance / width * (far - depth) > surface
     })
+}
+
+impl Around {
+    /// Whether the hull of an edge that leaves in direction `own` goes around its end as far as to another one.
+    fn is_free(&self, own: V2, way: V2) -> bool {
+        let turning = cross2(own, way).signum();
+        let turned = |v: V2| (turning * cross2(own, v)).atan2(dot(own, v)).rem_euclid(std::f64::consts::TAU);
+        let next = self.others.iter().min_by(|a, b| turned(a.0).total_cmp(&turned(b.0)));
+        if next.is_some_and(|(next, _)| is_between(*next, [own, way])) {
+            return false;
+        }
+        let goes_on = self.is_hidden || next.is_some_and(|(_, is_hidden)| *is_hidden);
+        !goes_on || !self.faces.iter().any(|face| is_between(way, *face))
+    }
 }
 
 impl Rim {

@@ -34,6 +34,15 @@ const POLYGONS: Keys = &[("wire.edges", "polygons")];
 const SEE_THROUGH: Keys = &[("wire.hidden", "show")];
 const INSIDE: Keys = &[("camera.eye", "0.2,0.35,0.3"), ("camera.target", "-0.8,0,-0.9"), ("camera.fov_deg", "80")];
 
+const FROM_ABOVE: Keys = &[("camera.azimuth_deg", "20"), ("camera.elevation_deg", "28")];
+const IN_ROOM: Keys = &[
+    ("camera.eye", "0.9,-0.4,1.1"),
+    ("camera.target", "-0.6,0.7,-1"),
+    ("camera.fov_deg", "90"),
+    ("wire.edges", "polygons"),
+];
+const IN_CORNER: Keys = &[("camera.eye", "-1.2,1.1,1.3"), ("camera.target", "0.7,0.5,-0.6"), ("camera.fov_deg", "100")];
+
 /// Goal 2's scenes.
 pub const MESHES: &[MeshScene] = &[
     scene("triangle", triangle, FLAT),
@@ -48,6 +57,12 @@ pub const MESHES: &[MeshScene] = &[
     scene("torus", torus, SOLID),
     scene("gear", gear, SOLID),
     scene("torus, see-through", torus, SEE_THROUGH),
+    scene("boxes on a floor", shapes::boxes_on_a_floor, POLYGONS),
+    scene("boxes on a floor, triangles", shapes::boxes_on_a_floor, FROM_ABOVE),
+    scene("box on box", shapes::stacked_boxes, POLYGONS),
+    scene("box on box, triangles", shapes::stacked_boxes, FROM_ABOVE),
+    scene("room with T-junctions", shapes::room_with_t_junctions, IN_ROOM),
+    scene("room with T-junctions, triangles", shapes::room_with_t_junctions, IN_CORNER),
 ];
 
 /// Goal 3's scenes: lines on the silhouette alone. The goal is 0.01 of the ink, and the same RMSE as of other lines.

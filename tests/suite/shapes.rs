@@ -26,6 +26,16 @@ impl Obj {
         self.text
     }
 
+    /// A closed box of six quads.
+    pub fn cuboid(&mut self, low: [f64; 3], high: [f64; 3]) {
+        let corners: [usize; 8] = std::array::from_fn(|i| {
+            self.vertex(std::array::from_fn(|k| if i >> k & 1 == 1 { high[k] } else { low[k] }))
+        });
+        for face in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+            self.face(&face.map(|i: usize| corners[i]));
+        }
+    }
+
     /// A closed ball: quads, and triangles at its poles.
     pub fn ball(&mut self, centre: [f64; 3], radius: f64, n: usize) {
         let at = |i: usize, j: usize| {
@@ -76,12 +86,38 @@ pub const FIN: &str = "v 0 0 0\nv 0 1 0\nv 1 0 .2\nv 1 1 .2\nv -1 0 .4\nv -1 1 .
 /// Six quads.
 pub fn cube() -> String {
     let mut obj = Obj::default();
-    for i in 0..8 {
-        obj.vertex([0, 1, 2].map(|k| f64::from(i >> k & 1) * 2.0 - 1.0));
+    obj.cuboid([-1.0; 3], [1.0; 3]);
+    obj.finish()
+}
+
+/// Two boxes on a floor.
+pub fn boxes_on_a_floor() -> String {
+    let mut obj = Obj::default();
+    let floor = [[-3.0, -3.0], [-3.0, 3.0], [3.0, 3.0], [3.0, -3.0]].map(|[x, z]| obj.vertex([x, 0.0, z]));
+    obj.face(&floor);
+    obj.cuboid([-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]);
+    obj.cuboid([1.2, 0.0, 0.8], [1.8, 1.5, 1.6]);
+    obj.finish()
+}
+
+/// A box on a box, and one beside them that touches its side.
+pub fn stacked_boxes() -> String {
+    let mut obj = Obj::default();
+    obj.cuboid([-1.0; 3], [1.0; 3]);
+    obj.cuboid([-0.5, 1.0, -0.5], [0.5, 2.0, 0.5]);
+    obj.cuboid([1.0, -1.0, -0.25], [2.0, 0.25, 0.75]);
+    obj.finish()
+}
+
+/// A room whose ceiling is of nine quads, so that three of their sides lie on one of each wall's.
+pub fn room_with_t_junctions() -> String {
+    let mut obj = Obj::default();
+    let corners: [usize; 8] =
+        std::array::from_fn(|i| obj.vertex([0, 1, 2].map(|k| f64::from((i >> k & 1) as u8) * 3.0 - 1.5)));
+    for face in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [0, 4, 6, 2], [1, 3, 7, 5]] {
+        obj.face(&face.map(|i: usize| corners[i]));
     }
-    for face in [[1, 3, 4, 2], [5, 6, 8, 7], [1, 2, 6, 5], [3, 7, 8, 4], [1, 5, 7, 3], [2, 4, 8, 6]] {
-        obj.face(&face);
-    }
+    obj.grid([3, 3], [false, false], |u, v| [(3.0 * u).round() - 1.5, 1.5, 1.5 - (3.0 * v).round()]);
     obj.finish()
 }
 

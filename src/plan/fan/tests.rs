@@ -18,6 +18,8 @@ fn corner(vertex: u32, angles: [f64; 2], reach_px: f64) -> [End; 2] {
         reach: 256.0 * reach_px,
         depth: 0.5,
         inv_w: 1.0,
+        slope: 0.0,
+        is_hidden: false,
     })
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use super::*;
 
 fn sectors(arcs: &[[f64; 2]]) -> Sectors {
-    Sectors { arcs: arcs.iter().map(|&[from, to]| Arc { vertex: 3, from, to }).collect() }
+    Sectors { arcs: arcs.iter().map(|&[from, to]| Arc { vertex: 3, from, to, slope: [0.0; 2] }).collect() }
 }
 
 fn gaps(arcs: &[[f64; 2]], range: [f64; 2]) -> Vec<[f64; 2]> {
