@@ -146,11 +146,7 @@ fn dishonest_archives_are_refused_for_what_they_are() {
         ("cut off", whole[..whole.len() - 5].to_vec(), "cannot be read"),
         ("a header alone", b"PK\x03\x04".to_vec(), "cannot be read"),
         ("nested", archive(&[Raw::stored("inner.zip", &whole)], 1), "\"inner.zip\" is an archive inside"),
-        (
-            "nested beside others",
-            archive(&[Raw::stored("b.txt", b"b"), Raw::stored("inner.zip", &whole)], 2),
-            "\"inner.zip\" is an archive inside",
-        ),
+        ("beside", archive(&[Raw::stored("b", b"b"), Raw::stored("inner.zip", &whole)], 2), "\"inner.zip\" is an"),
     ];
     for (name, bytes, part) in &cases {
         let (fault, detail) = fault(bytes.clone(), &Limits::default());
