@@ -30,7 +30,7 @@ const GAP_MIN: f64 = 1e-9;
 const PIECE_MIN: f64 = 1e-9;
 
 /// An end of a rim that has a strip.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct End {
     /// Where it ends.
     pub vertex: u32,

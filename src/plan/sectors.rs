@@ -66,6 +66,12 @@ impl Sectors {
         Ok(Self { arcs })
     }
 
+    /// That of one face.
+    #[cfg(test)]
+    pub fn of_one(vertex: u32, [from, to]: [f64; 2]) -> Self {
+        Self { arcs: vec![Arc { vertex, from, to, slope: [0.0; 2] }] }
+    }
+
     /// Calls `each` with the parts of a range of angles around a vertex that no face takes up. It begins between 0 and a whole turn,
     /// and is at most one long.
     pub fn gaps(&self, vertex: u32, [from, to]: [f64; 2], mut each: impl FnMut([f64; 2])) {

@@ -169,7 +169,8 @@ pub fn ink(screen: &Screen, rims: &[Rim], width: f64, side: u32) -> Vec<f64> {
 }
 
 fn is_inked(p: V2, near: &[&Rim], pieces: &[&Piece], width: f64) -> bool {
-    let surface = nearest(pieces, p).map_or(0.0, |(_, depth)| depth);
+    // Before nothing it is seen however far it recedes.
+    let surface = nearest(pieces, p).map_or(f64::NEG_INFINITY, |(_, depth)| depth);
     near.iter().any(|rim| {
         let (distance, t) = rim.nearest(p);
         let [x, y, depth] = mix(rim.ends[0], rim.ends[1], t);

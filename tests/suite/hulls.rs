@@ -11,11 +11,8 @@ use meshsnap::mesh::Mesh;
 use meshsnap::plan;
 
 use crate::likeness::{Likeness, Tolerance};
-use crate::oracle::screen::Screen;
-use crate::oracle::{rim, srgb};
 use crate::outline_shapes::SHAPES;
 use crate::soups::Random;
-use crate::truth::scene;
 use crate::twins::gpus;
 use crate::{scenes, shapes};
 
@@ -164,35 +161,4 @@ fn lines_that_end_inside_a_shape_leave_nothing_beside_their_ends() {
         }
     }
     assert_eq!(cases, 12);
-}
-
-/// Neither crumbs nor wedges, where contours end inside a shape and where they turn.
-#[test]
-fn hulls_are_where_the_oracle_sees_them() {
-    const POINTS: u32 = 6;
-    let mut renderer = CpuRenderer::new(2);
-    let mut cases = 0;
-    for shape in &SHAPES {
-        let mesh = scenes::mesh(&(shape.obj)());
-        for px in ["3", "8", "20"] {
-            let keys =
-                [("style", "unlit"), ("outline.method", "hull"), ("outline.unit", "px"), ("outline.color", "000")];
-            let view = [("camera.eye", shape.eye), ("camera.target", "0,0,0"), ("size", "180x150"), ("samples", "16")];
-            let colors = [("background", "fff"), ("surface.color", "fff"), ("outline.thickness", px)];
-            let spec = scenes::spec(&[&keys[..], &view, &colors].concat());
-            let plan = scenes::plan(&mesh, &spec);
-            let picture = renderer.draw(&plan, &Deadline::default()).unwrap();
-            let scene = scene(&scenes::plan(&mesh, &scenes::spec(&[&[("style", "unlit")][..], &view].concat())));
-            let width: f64 = px.parse().unwrap();
-            let truth = rim::ink(&Screen::new(&scene), &rim::rims(&scene, width), width, POINTS);
-            let drawn = picture.rgba.chunks(4).map(|p| 1.0 - srgb::to_linear(f64::from(p[0]) / 255.0));
-            let off: Vec<f64> = drawn.zip(&truth).map(|(d, t)| (d - t).abs()).filter(|e| *e > 0.5).collect();
-            let inked = truth.iter().filter(|t| **t > 0.5).count();
-            println!("hull of {px} px around {}: {} of {inked} pixels are off", shape.name, off.len());
-            assert!(inked > 300, "{} shows almost nothing", shape.name);
-            assert!(off.len() * 500 <= inked, "{}, {px} px: {} of {inked} pixels are off", shape.name, off.len());
-            cases += 1;
-        }
-    }
-    assert_eq!(cases, 3 * SHAPES.len());
 }

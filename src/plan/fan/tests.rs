@@ -67,6 +67,23 @@ fn fans_fill_what_strips_leave() {
     near(swept(two), 0.0);
 }
 
+/// Of a fan of a quarter of a turn a face that takes up most of it leaves both borders, if one of the two rims is hidden.
+#[test]
+fn faces_cut_fans_beside_rims_that_they_hide() {
+    let sectors = Sectors::of_one(0, [FRAC_PI_2 + 0.2, PI - 0.3]);
+    let deadline = Deadline::default();
+    for (is_hidden, want) in
+        [([false, false], vec![FRAC_PI_2]), ([true, false], vec![0.2, 0.3]), ([false, true], vec![0.2, 0.3])]
+    {
+        let mut ends = corner(0, [0.0, 1.5 * PI], 4.0);
+        (0..2).for_each(|k| ends[k].is_hidden = is_hidden[k]);
+        let mut angles = Vec::new();
+        each_fan(&ends, &sectors, &deadline, |fan| angles.push(fan.angle())).unwrap();
+        let is_near = angles.len() == want.len() && angles.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-6);
+        assert!(is_near, "{angles:?}, not {want:?}");
+    }
+}
+
 #[test]
 fn however_many_corners_there_are_their_fans_are_bounded() {
     let (few, result) = finish(corner(0, [0.0, 1.5 * PI], 32.0).into(), SIZE_PX);

@@ -38,3 +38,24 @@ fn angles_are_within_a_turn() {
         assert!((turn(angle) - want).abs() < 1e-12);
     }
 }
+
+#[test]
+fn an_end_is_hidden_by_what_is_nearer_in_its_direction() {
+    let end = |angle: f64, slope: f64| End { angle, slope, ..End::default() };
+    // Nearer to the right, by 2 each unit.
+    let face = Arc { vertex: 3, from: 0.0, to: FRAC_PI_2, slope: [2.0, 0.0] };
+    let cases = [
+        (0.5, 1.0, true),
+        (0.5, 2.0, false),
+        (1.5, 1.0, false),
+        (0.0, 1.0, true),
+        // Along its side, as deep: its own.
+        (0.0, 2.0, false),
+        (2.0, -9.0, false),
+        (-0.5, 1.0, false),
+        (0.5 - TAU, 1.0, true),
+    ];
+    for (angle, slope, is_hidden) in cases {
+        assert_eq!(face.hides(&end(angle, slope)), is_hidden, "{angle} {slope}");
+    }
+}
