@@ -185,7 +185,7 @@ mod tests {
                 assert!(banding.seen_samples(plan) * SAMPLE_BYTES <= device.binding_bytes_max);
                 assert!(banding.rows >= 1 && banding.rows <= plan.height_px);
                 // What lies beyond a band is there in whole, unless the band is all there is.
-                let is_all = banding.rows == plan.height_px && case.beyond == 0;
+                let is_all = banding.rows == plan.height_px && banding.beyond == 0;
                 assert!(banding.margin == plan.line_margin_rows() || is_all, "{case:?}");
                 if banding.beyond < case.beyond {
                     without += 1;
