@@ -25,7 +25,8 @@ fn intersect(inside: vec4<f32>, outside: vec4<f32>, d_inside: f32, d_outside: f3
 }
 
 fn snap_clipped(p: vec4<f32>) -> Vertex {
-    let r = recip(p.w);
+    // Where the near plane is far nearer than f32 is exact, rounding may leave W behind it, or behind the eye.
+    let r = recip(max(p.w, frame.near_w));
     let x = clamp(rn(p.x * r), -BOUND, BOUND);
     let y = clamp(rn(p.y * r), -BOUND, BOUND);
     return Vertex(round_to_i32(x), round_to_i32(y), rn(p.z * r), r);

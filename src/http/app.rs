@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use axum::Router;
+use axum::extract::DefaultBodyLimit;
 use axum::middleware;
 use axum::routing::{MethodRouter, get, post};
 
@@ -128,6 +129,8 @@ pub fn router(app: &Arc<App>) -> Router {
                 "there is nothing at this path; the work is done at POST /v1/render, and /openapi.json lists the paths",
             )
         })
+        // Bodies are metered as they are read, forms too: axum's own limit of 2 MB would come before `--limit-body-bytes`.
+        .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn(observe::observe))
         .with_state(app.clone())
 }

@@ -153,6 +153,20 @@ fn folders_on_the_command_line_are_those_of_the_bundle() {
     assert_eq!(warnings(&files[..2])[0]["code"], "textures_missing");
 }
 
+/// A form may be as large as any other upload, and no larger.
+#[test]
+fn forms_are_limited_as_all_uploads_are() {
+    let server = Server::start(&["--limit-body-bytes", "6000000"]);
+    let mut large = CUBE_OBJ.to_vec();
+    large.extend(b"# a comment line of forty-two characters .\n".repeat(120_000));
+    assert!((5_000_000..6_000_000).contains(&large.len()));
+    let form =
+        |bytes: &[u8]| server.request("POST", "/v1/render?size=16", &[FORM], &files_form(&[("cube.obj", bytes)]));
+    assert_eq!(form(&large).body, form(CUBE_OBJ).body);
+    large.resize(7_000_000, b'\n');
+    form(&large).problem(413, "body_too_large");
+}
+
 #[test]
 fn hostile_forms_are_refused_precisely() {
     let server = Server::start(&["--limit-bundle-entries", "5"]);

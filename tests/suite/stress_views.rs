@@ -145,6 +145,28 @@ fn from_inside_a_closed_mesh_every_sample_is_covered() {
     assert_eq!(all, insides.len() * 6 * 3);
 }
 
+/// The near plane is then far nearer than f32 can tell from the eye.
+#[test]
+fn with_the_eye_on_a_corner_of_the_mesh_both_back_ends_see_the_same() {
+    let mut renderers = renderers();
+    let mut cases = 0;
+    for (mesh, eye) in [(0, "1.4,0,0"), (0, "-0.6,0,0"), (3, "1,1,1"), (3, "-1,1,-1"), (4, "0,1,0")] {
+        let mesh = scenes::mesh(&MESHES[mesh].1());
+        for target in ["0,0,0", "0.3,-0.2,0.1", "5,0.5,0.2"] {
+            for (_, look) in LOOKS {
+                let keys =
+                    [("size", "48x40"), ("camera.eye", eye), ("camera.target", target), ("camera.fov_deg", "70")];
+                let plan = plan(&mesh, &[look, &keys].concat());
+                let mut all = renderers.iter_mut().map(|r| r.draw_visibility(&plan, &Deadline::default()).unwrap());
+                let words = all.next().unwrap();
+                assert!(all.all(|other| other == words), "{eye} to {target}, {look:?}: other samples");
+                cases += 1;
+            }
+        }
+    }
+    assert_eq!(cases, 5 * 3 * LOOKS.len());
+}
+
 #[test]
 fn faces_that_are_a_point_or_a_line_are_refused() {
     let files = [

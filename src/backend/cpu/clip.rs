@@ -19,7 +19,7 @@ pub fn clip_triangle(projection: &Projection, corners: [[f32; 4]; 3], mut draw: 
     for plane in 0..5 {
         polygon = polygon.cut(|p| distance(projection.near_w, plane, p));
     }
-    let vertices: [ScreenVertex; CORNERS_MAX] = polygon.corners.map(snap);
+    let vertices: [ScreenVertex; CORNERS_MAX] = polygon.corners.map(|p| snap(projection.near_w, p));
     for i in 2..polygon.len {
         draw([vertices[0], vertices[i - 1], vertices[i]]);
     }
@@ -40,7 +40,7 @@ pub fn clip_segment(projection: &Projection, ends: [[f32; 4]; 2]) -> Option<[Scr
             (false, false) => return None,
         }
     }
-    Some([snap(a), snap(b)])
+    Some([a, b].map(|p| snap(projection.near_w, p)))
 }
 
 /// Whether all coordinates are numbers below 2^64: no step of clipping overflows then. What has others is not drawn.
@@ -96,8 +96,9 @@ fn intersect(inside: &[f32; 4], outside: &[f32; 4], d_inside: f32, d_outside: f3
     std::array::from_fn(|k| inside[k] + t * (outside[k] - inside[k]))
 }
 
-fn snap(p: [f32; 4]) -> ScreenVertex {
-    let r = recip(p[3]);
+fn snap(near_w: f32, p: [f32; 4]) -> ScreenVertex {
+    // Where the near plane is far nearer than f32 is exact, rounding may leave W behind it, or behind the eye.
+    let r = recip(p[3].max(near_w));
     // The clamp only ever takes away what rounding added.
     let bound = |v: f32| v.clamp(-BOUND, BOUND);
     ScreenVertex { x: round_to_i32(bound(p[0] * r)), y: round_to_i32(bound(p[1] * r)), z: p[2] * r, inv_w: r }
