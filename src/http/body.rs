@@ -109,13 +109,19 @@ async fn whole(chunks: impl Stream<Item = Result<Bytes, Broken>>, meter: &Meter)
     Ok(bytes.into())
 }
 
+/// What a form may have before a part's content: its boundary and headers. They are looked for from the start with every chunk that comes.
+const BETWEEN_PARTS_MAX: u64 = 256 << 10;
+
 async fn form(request: Request, meter: &Meter, files_max: u64) -> Result<Upload, ApiError> {
     let broken = |error: axum::extract::multipart::MultipartError| {
         meter.fault_or(|| bad_form(format!("the form cannot be read: {}", error.body_text())))
     };
     let mut form = Multipart::from_request(request, &()).await.map_err(|e| bad_form(e.body_text()))?;
     let (mut files, mut document): (Vec<BundleFile>, _) = (Vec::new(), None);
-    while let Some(field) = form.next_field().await.map_err(broken)? {
+    loop {
+        meter.is_between_parts(true);
+        let Some(field) = form.next_field().await.map_err(broken)? else { break };
+        meter.is_between_parts(false);
         match field.name().unwrap_or_default() {
             "file" => {
                 let count = files.len() as u64 + 1;
@@ -174,21 +180,29 @@ struct Meter {
 
 struct MeterState {
     seen: u64,
+    /// What came while the next part of a form was looked for.
+    seen_between_parts: Option<u64>,
     reservation: Reservation,
     fault: Option<ApiError>,
 }
 
 impl Meter {
     fn new(limit: u64, bodies: &Arc<Bodies>) -> Self {
-        let state = MeterState { seen: 0, reservation: bodies.reserve(), fault: None };
+        let state = MeterState { seen: 0, seen_between_parts: None, reservation: bodies.reserve(), fault: None };
         Self { limit, inner: Arc::new(Mutex::new(state)), bodies: bodies.clone() }
     }
 
     fn count(&self, bytes: u64) -> Result<(), Broken> {
         let mut state = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
         state.seen += bytes;
+        let before = state.seen_between_parts;
+        state.seen_between_parts = before.map(|seen| seen + bytes);
         let counted = if state.seen > self.limit {
             Err(ApiError::body_too_large(self.limit))
+        } else if before.is_some_and(|seen| seen > BETWEEN_PARTS_MAX) {
+            let detail =
+                format!("the form has no part within {BETWEEN_PARTS_MAX} bytes; is its boundary the announced one?");
+            Err(bad_form(detail))
         } else {
             state.reservation.grow(bytes).map_err(ApiError::from)
         };
@@ -196,6 +210,12 @@ impl Meter {
             state.fault = Some(fault);
             Broken
         })
+    }
+
+    /// Whether the next part of a form is looked for, or one is read.
+    fn is_between_parts(&self, is_between: bool) {
+        let mut state = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        state.seen_between_parts = is_between.then_some(0);
     }
 
     fn fault_or(&self, otherwise: impl FnOnce() -> ApiError) -> ApiError {

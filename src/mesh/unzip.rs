@@ -18,6 +18,8 @@ const RATIO_MAX: u64 = 1032;
 /// And no meshes and textures of this size together, in bytes, are that much larger: what is was made to fill memory.
 const BOMB_BYTES: u64 = 16 << 20;
 const BOMB_RATIO: u64 = 200;
+/// Of several of them: pictures of one colour each are honest.
+const BOMBS_BYTES: u64 = 32 << 20;
 
 /// The files of the archive, without what archivers leave in it.
 pub fn unzip(
@@ -98,8 +100,8 @@ fn check_honest(entries: &[ZipFileEntry<'_>], files: &[BundleFile]) -> Result<()
             continue;
         }
         total = total.saturating_add(entry.size());
-        if total > BOMB_BYTES {
-            let others = if total > entry.size() { ", and others before it," } else { "" };
+        if entry.size() > BOMB_BYTES || total > BOMBS_BYTES {
+            let others = if entry.size() <= BOMB_BYTES { ", and others before it," } else { "" };
             return Err(broken(format!(
                 "the entry \"{}\" of the zip archive{others} is more than {BOMB_RATIO} times as large as its packed form, which \
                  archives of meshes are not; send the file itself",

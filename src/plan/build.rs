@@ -139,9 +139,10 @@ pub fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection 
 pub(super) fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
     let mut border =
         Border { px: if mesh.loose.is_empty() { 0.0 } else { 0.5 * loose::POINT_PX }, ..Border::default() };
+    let has_points = mesh.loose.iter().any(Loose::is_point);
     for layers in &parts.looks {
         // Points that no fill draws are wider than lines.
-        let has_dots = layers.surface.is_none() && mesh.loose.iter().any(Loose::is_point);
+        let has_dots = layers.surface.is_none() && has_points;
         let dots = if has_dots { POINT_WIDTH } else { 1.0 };
         if let Some(outline) = &layers.outline {
             // Half of a contour lies on the surface itself; a point has nothing but its own.

@@ -99,7 +99,9 @@ impl Arc {
         let angle = turn(end.angle);
         let slope = self.slope[0] * libm::cos(angle) + self.slope[1] * libm::sin(angle);
         let rounded = EQUAL * (self.slope[0].abs() + self.slope[1].abs() + end.slope.abs());
-        angle >= self.from - EQUAL && angle <= self.to + EQUAL && slope > end.slope + rounded
+        // One that goes past a whole turn is two arcs, and to the right is both ends of the turn.
+        let is_within = |angle: f64| angle >= self.from - EQUAL && angle <= self.to + EQUAL;
+        [angle, angle + TAU, angle - TAU].into_iter().any(is_within) && slope > end.slope + rounded
     }
 }
 

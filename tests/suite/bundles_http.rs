@@ -165,6 +165,12 @@ fn forms_are_limited_as_all_uploads_are() {
     assert_eq!(form(&large).body, form(CUBE_OBJ).body);
     large.resize(7_000_000, b'\n');
     form(&large).problem(413, "body_too_large");
+    // What is looked through for a part's beginning is little.
+    for beginning in ["-", "--XX\r\nX: "] {
+        let endless = [beginning.as_bytes(), &vec![b'-'; 5_000_000]].concat();
+        let detail = server.request("POST", "/v1/render", &[FORM], &endless).problem(400, "bad_form");
+        assert!(detail.contains("no part within") || detail.contains("cannot be read"), "{detail}");
+    }
 }
 
 #[test]

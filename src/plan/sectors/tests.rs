@@ -54,6 +54,8 @@ fn an_end_is_hidden_by_what_is_nearer_in_its_direction() {
         (2.0, -9.0, false),
         (-0.5, 1.0, false),
         (0.5 - TAU, 1.0, true),
+        (TAU, 1.0, true),
+        (-1e-20, 1.0, true),
     ];
     for (angle, slope, is_hidden) in cases {
         assert_eq!(face.hides(&end(angle, slope)), is_hidden, "{angle} {slope}");

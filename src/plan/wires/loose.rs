@@ -8,6 +8,7 @@ use crate::mesh::{Loose, Mesh};
 use crate::plan::build::Means;
 use crate::plan::loose::{LINE_PX, POINT_PX};
 use crate::plan::parts::{Fill, Parts};
+use crate::plan::rim::CHECK_EVERY;
 use crate::plan::{Edge, LinePass, PlanError};
 use crate::scene::{Hidden, Layers, Outline, WireMethod};
 
@@ -40,30 +41,42 @@ pub fn passes(
     if mesh.loose.is_empty() {
         return Ok(passes);
     }
-    for (look, layers) in parts.looks.iter().enumerate() {
-        for is_point in [false, true] {
-            let Some(want) = want(layers, &contour_px, is_point).filter(Want::is_seen) else { continue };
-            means.deadline.check()?;
-            let is_of = |one: &&Loose| {
-                let own = parts.look_of.get(one.material as usize).is_some_and(|&of| of as usize == look);
-                own && one.is_point() == is_point && is_line(parts, one)
-            };
-            let count = mesh.loose.iter().filter(is_of).count() as u64;
-            if count == 0 {
-                continue;
-            }
-            means.budget.spend("drawn lines and points", count, 2 * size_of::<Edge>() as u64)?;
-            let mut edges = Vec::with_capacity(count as usize);
-            edges.extend(
-                mesh.loose.iter().filter(is_of).map(|one| Edge::new(&mesh.positions, one.ends, [Edge::NO_FACE; 2])),
-            );
-            let drawn = want.passes(&Arc::from(edges), hides, None);
-            // In the lists of up to four bands of the picture.
-            means.budget.spend("lists of lines and points", drawn.len() as u64 * count, 16)?;
-            passes.extend(drawn);
-        }
+    for (kind, edges) in by_kind(mesh, parts, means)?.into_iter().enumerate() {
+        let (layers, is_point) = (&parts.looks[kind / 2], kind % 2 == 1);
+        let want = want(layers, &contour_px, is_point).filter(Want::is_seen);
+        let Some(want) = want.filter(|_| !edges.is_empty()) else { continue };
+        let count = edges.len() as u64;
+        let drawn = want.passes(&Arc::from(edges), hides, None);
+        // In the lists of up to four bands of the picture.
+        means.budget.spend("lists of lines and points", drawn.len() as u64 * count, 16)?;
+        passes.extend(drawn);
     }
     Ok(passes)
+}
+
+/// Of each look the lines, then the points. There may be many looks: all are looked for at once.
+fn by_kind(mesh: &Mesh, parts: &Parts<'_>, means: &mut Means<'_>) -> Result<Vec<Vec<Edge>>, PlanError> {
+    let kind_of = |one: &Loose| {
+        let look = *parts.look_of.get(one.material as usize)? as usize;
+        (look < parts.looks.len() && is_line(parts, one)).then_some(2 * look + usize::from(one.is_point()))
+    };
+    let mut counts = vec![0_usize; 2 * parts.looks.len()];
+    for some in mesh.loose.chunks(CHECK_EVERY) {
+        means.deadline.check()?;
+        some.iter().filter_map(kind_of).for_each(|kind| counts[kind] += 1);
+    }
+    let count = counts.iter().sum::<usize>() as u64;
+    means.budget.spend("drawn lines and points", count, 2 * size_of::<Edge>() as u64)?;
+    let mut edges: Vec<Vec<Edge>> = counts.into_iter().map(Vec::with_capacity).collect();
+    for some in mesh.loose.chunks(CHECK_EVERY) {
+        means.deadline.check()?;
+        for one in some {
+            if let Some(kind) = kind_of(one) {
+                edges[kind].push(Edge::new(&mesh.positions, one.ends, [Edge::NO_FACE; 2]));
+            }
+        }
+    }
+    Ok(edges)
 }
 
 /// The style of a part's lines, or else of its outline. An edge that begins where it ends is a dot.
