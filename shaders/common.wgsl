@@ -1,5 +1,5 @@
 // What every stage shares: the plan's numbers, and arithmetic that gives the CPU's bits (ARCHITECTURE.md, "Rounded
-// operations"). Prepended to each stage by src/backend/gpu/stages.rs.
+// operations"). Prepended to each stage by src/backend/gpu/pipelines/mod.rs.
 
 struct Frame {
     x_row: vec4<f32>,

@@ -144,14 +144,3 @@ impl Deadline {
         if self.0.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
     }
 }
-
-/// Who draws.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BackendChoice {
-    /// A hardware GPU if there is one, the CPU otherwise.
-    Auto,
-    /// Any GPU, a software Vulkan included.
-    Gpu,
-    /// The CPU rasterizer.
-    Cpu,
-}

@@ -5,17 +5,20 @@
 //!
 //! Architecture invariant: nothing from here down reads a clock, a file, the environment, or knows an async runtime.
 
+use crate::import;
 use std::collections::BTreeSet;
 
 use crate::backend::{BackendKind, Backends, DrawError};
 use crate::encode::{self, EncodeError};
 use crate::image::ImageFormat;
+use crate::import::{Bundle, Format, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
-use crate::mesh::{self, Bundle, Format, Mesh, MeshError, Warning};
+use crate::mesh::Mesh;
 use crate::plan::{self, Skip};
 pub use crate::plan::{Choice, PlanError};
 use crate::report::Report;
-use crate::scene::Spec;
+use crate::spec::Spec;
+use crate::warning::Warning;
 
 /// What comes in.
 #[derive(Clone, Copy, Debug)]
@@ -91,8 +94,8 @@ pub fn render(
 ) -> Result<Output, RenderError> {
     let mut budget = Budget::new(limits);
 
-    let options = mesh::Options { format: job.format_in, time_s: job.spec.time_s };
-    let mut mesh = mesh::import(job.bundle, options, limits, &mut budget, deadline)?;
+    let options = import::Options { format: job.format_in, time_s: job.spec.time_s };
+    let mut mesh = import::import(job.bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
 
     let mut warnings = std::mem::take(&mut mesh.report.warnings);
@@ -125,13 +128,13 @@ pub fn render(
 /// Says what is in a file.
 pub fn inspect(
     bundle: &Bundle,
-    options: impl Into<mesh::Options>,
+    options: impl Into<import::Options>,
     limits: &Limits,
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Report, MeshError> {
     let mut budget = Budget::new(limits);
-    let mesh = mesh::import(bundle, options, limits, &mut budget, deadline)?;
+    let mesh = import::import(bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
     Report::of(&mesh, bundle.bytes_len(), &mut budget, deadline)
 }

@@ -4,12 +4,16 @@
 #![allow(clippy::panic, clippy::unwrap_used, clippy::expect_used)] // a broken promise is a find
 
 use meshsnap::backend::{Backends, GpuHost, HardwareHint};
-use meshsnap::limits::{BackendChoice, Budget, Deadline, Limits};
+use meshsnap::import::{Bundle, BundleFile, Format, MeshError, Options, import};
+use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap::mesh::Mesh;
 use meshsnap::mesh::material::{AlphaMode, FileLens};
-use meshsnap::mesh::{Bundle, BundleFile, Format, Mesh, MeshError, Options, import};
-use meshsnap::pipeline::{self, Job, RenderError};
+use meshsnap::pipeline;
+use meshsnap::pipeline::{Job, RenderError};
 use meshsnap::report::Report;
-use meshsnap::request::{self, Rules};
+use meshsnap::request;
+use meshsnap::request::Rules;
+use meshsnap::spec::BackendChoice;
 use std::cell::RefCell;
 use std::sync::Arc;
 

@@ -3,12 +3,12 @@
 //!
 //! Architecture invariant: nothing here knows a mesh or a scene, and the two back-ends do not know each other.
 
-mod cells;
 pub mod cpu;
 mod device;
 pub mod gpu;
 mod host;
 pub mod probe;
+pub(crate) mod sample_partition;
 mod select;
 
 pub use device::{GpuDevice, GpuState, GpuStatus, HardwareHint, Opener};

@@ -8,8 +8,9 @@ use super::gpu::GpuKind;
 use super::host::GpuHost;
 use super::{BackendKind, DrawError, Renderer, cpu, gpu};
 use crate::image::Image;
-use crate::limits::{BackendChoice, Deadline};
+use crate::limits::Deadline;
 use crate::plan::DrawPlan;
+use crate::spec::BackendChoice;
 
 /// A worker's renderers. Stays on its thread.
 pub struct Backends {

@@ -4,10 +4,10 @@ use std::path::{Component, Path, PathBuf};
 
 use bytes::Bytes;
 
-use super::complaint::Complaint;
 use super::files;
+use crate::cli::error::Complaint;
+use crate::import::{Bundle, BundleFile};
 use crate::limits::{self, Limits};
-use crate::mesh::{Bundle, BundleFile};
 
 /// How to speak of them.
 pub fn name(names: &[String]) -> &str {

@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io::{self, ErrorKind, IsTerminal as _, Read, Write as _};
 
-use super::complaint::Complaint;
+use crate::cli::error::Complaint;
 
 /// Reads a whole file, or standard input for `-`, of at most `bytes_max`.
 pub fn read(name: &str, bytes_max: u64) -> Result<Vec<u8>, Complaint> {

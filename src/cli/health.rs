@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::complaint::Complaint;
+use crate::cli::error::Complaint;
 
 /// Arguments of `health`.
 #[derive(Args)]

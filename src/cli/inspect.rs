@@ -1,15 +1,17 @@
 //! `meshsnap inspect`.
 
+use crate::import;
 use clap::Args;
 
-use super::complaint::Complaint;
 use super::progress::Progress;
 use super::render::{format_in, pairs};
 use super::settings::LimitSettings;
 use super::{bundle, files};
-use crate::limits::{BackendChoice, Deadline};
+use crate::cli::error::Complaint;
+use crate::limits::Deadline;
+use crate::pipeline;
 use crate::request::{self, Rules};
-use crate::{mesh, pipeline};
+use crate::spec::BackendChoice;
 
 /// Arguments of `inspect`.
 #[derive(Args)]
@@ -46,7 +48,7 @@ pub fn run(arguments: &InspectArgs) -> Result<(), Complaint> {
     progress.next("parsing");
     let mut parsed = |_| progress.next("counting edges");
     let report =
-        pipeline::inspect(&bundle, mesh::Options { format, time_s }, &limits, &Deadline::default(), &mut parsed)
+        pipeline::inspect(&bundle, import::Options { format, time_s }, &limits, &Deadline::default(), &mut parsed)
             .map_err(|error| Complaint::from(error).about(mesh_name))?;
     drop(progress);
     let text =

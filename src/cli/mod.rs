@@ -4,7 +4,7 @@
 //! standard error.
 
 mod bundle;
-mod complaint;
+pub(crate) mod error;
 mod files;
 mod health;
 mod inspect;
@@ -19,7 +19,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
-use complaint::Complaint;
+use error::Complaint;
 
 /// Turns 3D meshes into images, here or as an HTTP service.
 #[derive(Parser)]

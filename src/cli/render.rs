@@ -6,18 +6,20 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 
-use super::complaint::Complaint;
 use super::progress::Progress;
 use super::settings::LimitSettings;
 use super::{bundle, files};
 use crate::backend::{Backends, GpuHost, GpuStatus, HardwareHint};
+use crate::cli::error::Complaint;
 use crate::config::{cores, why_no_gpu};
 use crate::image::ImageFormat;
-use crate::limits::{BackendChoice, Deadline, Limits};
-use crate::mesh::{Format, UpAxis};
+use crate::import::Format;
+use crate::limits::{Deadline, Limits};
+use crate::mesh::UpAxis;
 use crate::pipeline::{self, Job, Output, Stage};
 use crate::request::{self, Rules, Style, Words, words_of};
-use crate::scene::{Spec, View};
+use crate::spec::BackendChoice;
+use crate::spec::{Spec, View};
 use crate::telemetry;
 
 /// Arguments of `render`.

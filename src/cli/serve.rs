@@ -6,11 +6,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::complaint::Complaint;
 use super::files;
 use super::settings::AllSettings;
+use crate::cli::error::Complaint;
 use crate::config::{Config, SETTINGS};
-use crate::http::{self, ServeError};
+use crate::service::http;
+use crate::service::http::ServeError;
 use crate::telemetry;
 
 /// Arguments of `serve`.

@@ -1,7 +1,8 @@
 //! The table of settings: a line for each, with what it allows and where it goes.
 
 use super::Config;
-use crate::limits::{BackendChoice, IMAGE_PX_MAX, JOB_MS_MAX};
+use crate::limits::{IMAGE_PX_MAX, JOB_MS_MAX};
+use crate::spec::BackendChoice;
 
 /// A setting's place in the configuration, and how its text is read and written.
 #[derive(Clone, Copy)]

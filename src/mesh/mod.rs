@@ -1,52 +1,20 @@
-//! Bytes to [`Mesh`]: what every importer ends in, and the only form that anything after it knows.
-//!
-//! Reading order: [`bundle`] (what comes in), `folder` (what names in it mean), [`raw`] (what an importer fills), `import` (opens the bundle, sniffs the format
-//! and calls one), `obj`, `stl`, `ply`, `off`, `fbx`, `three_mf` and `gltf` (the importers), `normalise` (raw to `Mesh`), then [`normals`],
-//! [`edges`], [`topology`] and [`measure`], for whoever needs them.
+//! The [`Mesh`] that every importer ends in, and what can be asked of it: [`normals`], [`edges`], [`topology`], [`measure`].
 
-mod affine;
-mod attributes;
-pub mod bundle;
-mod coarse;
-mod corners;
-mod counted;
 pub mod edges;
-mod entry;
-mod error;
-mod facts;
-mod fbx;
-mod folder;
-mod gltf;
-mod import;
-pub mod loose;
 pub mod material;
 pub mod measure;
-mod normalise;
+mod metadata;
 pub mod normals;
-mod obj;
-mod off;
-mod ply;
-mod polygon;
-mod pow2;
-pub mod raw;
-mod sets;
-mod sniff;
-mod stl;
-mod text;
-mod three_mf;
+pub mod primitives;
 pub mod topology;
-mod unzip;
-mod weld;
+pub(crate) mod union_find;
 
-pub use bundle::{Bundle, BundleFile};
-pub use counted::counted;
-pub use error::{MeshError, MeshFault};
-pub use facts::FileFacts;
-pub use folder::Folder;
-pub use import::{Format, Options, import, survey};
-pub use loose::Loose;
 pub use material::MaterialSlot;
+pub use metadata::FileMetadata;
+pub use primitives::LineOrPoint;
 
+use crate::import::Format;
+use crate::warning::Warning;
 use material::{FileCamera, ImageSource};
 use serde::Serialize;
 
@@ -77,7 +45,7 @@ pub struct Mesh {
     /// Three indices into the attribute arrays a triangle. Empty where there is no attribute at all.
     pub attribute_triangles: Vec<[u32; 3]>,
     /// Line segments and points, their ends indices into `positions`; none is shorter than 24 bits can tell.
-    pub loose: Vec<Loose>,
+    pub loose: Vec<LineOrPoint>,
     /// Two indices into the attribute arrays each. Empty where there is no attribute at all.
     pub loose_attributes: Vec<[u32; 2]>,
     /// Set once `loose` has been given an area for one view: where what the file has ends in the arrays.
@@ -178,7 +146,7 @@ pub struct ImportReport {
     /// Things a user should know; each with a stable code.
     pub warnings: Vec<Warning>,
     /// What the file says of itself.
-    pub facts: FileFacts,
+    pub facts: FileMetadata,
 }
 
 /// How much the meshes of a file hold by their own account, each counted once.
@@ -195,13 +163,4 @@ pub struct FileContent {
     pub segments: u64,
     /// Their points.
     pub points: u64,
-}
-
-/// Something in the file that was read around rather than refused.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Warning {
-    /// Stable, snake case: `lines_ignored`.
-    pub code: &'static str,
-    /// One sentence.
-    pub detail: String,
 }

@@ -1,16 +1,16 @@
 //! Spec and mesh to plan: what each look needs, and what it does not.
 
+use super::context::PlanContext;
 use super::edges::Edges;
-use super::parts::Parts;
 use super::skips::{SkipKind, Skips};
-use super::wires::loose::POINT_WIDTH;
-use super::{
-    DrawPlan, HullPass, LayersPass, PlanError, Projection, Thickness, build_surface, loose, margin, outline, wires,
-};
+use super::{DrawPlan, HullPass, LayersPass, PlanError, Projection, Thickness, margin};
+use super::{lines, outline, primitives, surface};
 use crate::limits::{Budget, Deadline, LimitExceeded};
-use crate::mesh::{Loose, Mesh};
+use crate::mesh::{LineOrPoint, Mesh};
+use crate::plan::lines::primitives::POINT_WIDTH;
 use crate::scene::camera::{Border, Camera};
-use crate::scene::{Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
+use crate::scene::material_groups::Parts;
+use crate::spec::{Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
 
 /// Width of an outline in pixels where the request does not say.
 const OUTLINE_PX: f32 = 3.0;
@@ -28,14 +28,6 @@ pub(super) const LISTED_BYTES: u64 = 8 * 4;
 /// Bytes more where a plan has layers: a triangle may be in the visibility buffer's lists and in theirs, and each thread notes which are
 /// done with.
 pub(super) const LAYERED_BYTES: u64 = 32;
-
-/// What a plan may spend.
-pub struct Means<'m> {
-    /// Bytes.
-    pub budget: &'m mut Budget,
-    /// Time.
-    pub deadline: &'m Deadline,
-}
 
 /// Decides what is drawn.
 pub fn build<'a>(
@@ -55,7 +47,7 @@ pub fn build_keeping<'a>(
     deadline: &Deadline,
     keep: &[SkipKind],
 ) -> Result<DrawPlan<'a>, PlanError> {
-    let mut means = Means { budget, deadline };
+    let mut means = PlanContext { budget, deadline };
     let size_px = [spec.image.width_px, spec.image.height_px];
     means.budget.spend("materials", mesh.materials.len() as u64, 272)?;
     let parts = Parts::new(mesh, spec);
@@ -69,8 +61,8 @@ pub fn build_keeping<'a>(
     let contour_px = |outline: &Outline| contour_px(mesh, outline, &camera, size_px);
     let mut edges = Edges::default();
     let lines =
-        wires::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, &mut means)?;
-    let surface = build_surface::surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
+        lines::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, &mut means)?;
+    let surface = surface::surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
     let all_clipped = projection(&camera, size_px, true);
     let hides = surface.is_some() || parts.has_hull();
     let margin_px = margin::margin_px(mesh, (&all_clipped, size_px), (&lines, hides), &mut skips, deadline)?;
@@ -118,7 +110,7 @@ fn pay(mesh: &Mesh, size_px: [u32; 2], parts: &Parts<'_>, budget: &mut Budget) -
         // What layers need a sample is bounded: they are drawn band by band.
         budget.spend("lists of layers", mesh.triangles.len() as u64, LAYERED_BYTES)?;
     }
-    let is_smooth = parts.looks.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::scene::Shading::Smooth));
+    let is_smooth = parts.looks.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::spec::Shading::Smooth));
     if is_smooth && mesh.normals.is_empty() {
         // Sums in f64, then the unit normals in f32.
         budget.spend("vertex normals", mesh.positions.len() as u64, 36)?;
@@ -138,8 +130,8 @@ pub fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection 
 /// What the widest outline and the widest line ask for.
 pub(super) fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
     let mut border =
-        Border { px: if mesh.loose.is_empty() { 0.0 } else { 0.5 * loose::POINT_PX }, ..Border::default() };
-    let has_points = mesh.loose.iter().any(Loose::is_point);
+        Border { px: if mesh.loose.is_empty() { 0.0 } else { 0.5 * primitives::POINT_PX }, ..Border::default() };
+    let has_points = mesh.loose.iter().any(LineOrPoint::is_point);
     for layers in &parts.looks {
         // Points that no fill draws are wider than lines.
         let has_dots = layers.surface.is_none() && has_points;

@@ -5,11 +5,12 @@
 //! on beyond the picture, the visibility buffer does too: by as much as bands of rows look at each other, because then a pixel's ink is
 //! that of the same pixel in the middle of a larger picture. Nothing else is drawn there.
 
-use super::rim::{CHECK_EVERY, row_dot};
 use super::skips::{SkipKind, Skips};
 use super::{DrawPlan, LinePass, Projection};
 use crate::limits::{Deadline, Stopped};
 use crate::mesh::Mesh;
+use crate::plan::context::CHECK_EVERY;
+use crate::plan::outline::silhouette_edges::row_dot;
 
 /// How far from the picture's border a mesh lies that lies inside, 1/256 px: lines ask a pixel beside an edge too, and vertices are
 /// snapped.

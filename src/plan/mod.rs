@@ -4,48 +4,31 @@
 //! each omission is written down in [`DrawPlan::skips`].
 
 mod build;
-mod build_surface;
-mod choice;
+pub(crate) mod context;
 mod edges;
 mod error;
-mod error_table;
-mod fan;
-mod hull;
-mod lights;
 mod lines;
-mod loose;
 mod margin;
-mod materials;
-mod order;
+mod out_of_view;
 mod outline;
-mod parts;
-mod rim;
-mod sectors;
-mod silhouette;
+mod primitives;
+mod quality;
 mod skips;
+mod sort;
 mod surface;
-mod texture_basis;
-mod texture_closeup;
-mod texture_decode;
-mod texture_half;
-mod texture_levels;
-mod texture_png;
-mod textures;
-mod view;
-mod wires;
 
 pub use build::{build, build_keeping};
-pub use choice::{Choice, Chosen, choose};
 pub use error::PlanError;
-use hull::Thickness;
-pub use hull::{HullPass, HullVertex};
 pub use lines::{Edge, LinePass, Shown, Side};
-pub use loose::thicken;
+pub use out_of_view::is_out_of_view;
+use outline::Thickness;
+pub use outline::{HullPass, HullVertex};
+pub use primitives::thicken;
+pub use quality::{Choice, Chosen, choose};
 pub use skips::{Skip, SkipKind};
 pub use surface::{
     CornerValues, Lamp, Lights, MaterialLook, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, flags, slots,
 };
-pub use view::is_out_of_view;
 
 use std::borrow::Cow;
 

@@ -8,12 +8,13 @@ mod topology;
 
 use self::bounds::Bounds;
 use self::topology::TopologyReport;
+use crate::import::MeshError;
 use crate::limits::{Budget, Deadline};
 use crate::mesh::edges::EdgeList;
 use crate::mesh::material::{FileLens, ImageContent, ImageSource};
 use crate::mesh::measure::Measures;
 use crate::mesh::topology::Topology;
-use crate::mesh::{FileContent, FileFacts, Mesh, MeshError, UpAxis};
+use crate::mesh::{FileContent, FileMetadata, Mesh, UpAxis};
 use serde::Serialize;
 
 /// What is in a file. Counts are null where the format has no such thing.
@@ -126,7 +127,7 @@ impl Report {
 
     fn new(mesh: &Mesh, file_bytes: u64, topology: Topology) -> Self {
         let import = &mesh.report;
-        let FileFacts {
+        let FileMetadata {
             generator,
             scenes,
             nodes,

@@ -1,7 +1,7 @@
 //! The report for a person: a name and a value a line.
 
 use super::{Arity, CameraReport, Report, TextureReport};
-use crate::mesh::counted;
+use crate::pluralise::counted;
 use std::fmt::Write as _;
 
 /// Most entries of a list that are written out.

@@ -1,7 +1,7 @@
 //! The report's part on how triangles hang together, after welding.
 
-use crate::mesh::counted;
 use crate::mesh::topology::Topology;
+use crate::pluralise::counted;
 use serde::Serialize;
 
 /// As [`Topology`] has it, and what was dropped before.

@@ -1,13 +1,13 @@
 //! A [`Spec`] in the making: defaults, presets, and what can only be settled when every key is known.
 
 use super::error::{RequestError, RequestFault};
-use super::look::Look;
-use super::words::{Style, Words, word_for};
-use crate::limits::BackendChoice;
-use crate::scene::color::Rgba;
-use crate::scene::{
-    Ask, CameraSpec, ImageSpec, Layers, Light, LightPreset, Open, OutlineMethod, Projection, Spec, Topology, View,
-    WireMethod,
+use crate::request::layer_draft::Look;
+use crate::request::table::words::{Style, Words, word_for};
+use crate::spec::BackendChoice;
+use crate::spec::color::Rgba;
+use crate::spec::{
+    CameraSpec, ImageSpec, Layers, Light, LightPreset, Open, OutlineMethod, Projection, QualityTarget, Spec, Topology,
+    View, WireMethod,
 };
 
 /// Different exact wires and contours in one picture.
@@ -32,9 +32,9 @@ pub struct Draft {
     pub image: ImageSpec,
     /// See [`Spec::backend`].
     pub backend: BackendChoice,
-    /// See [`Ask::max_error`].
+    /// See [`QualityTarget::max_error`].
     pub max_error: Option<f64>,
-    /// See [`Ask::max_time_ms`].
+    /// See [`QualityTarget::max_time_ms`].
     pub max_time_ms: Option<f64>,
     /// What nobody has settled yet; but for the wires.
     pub open: Open,
@@ -87,7 +87,7 @@ impl Draft {
         open.wire = look.has_open_wire();
         open.material_wires = materials.iter().map(|(_, look)| look.has_open_wire()).collect();
         let is_asked = max_error.is_some() || max_time_ms.is_some();
-        let ask = is_asked.then_some(Ask { max_error, max_time_ms, open });
+        let ask = is_asked.then_some(QualityTarget { max_error, max_time_ms, open });
         let layers = look.finish("")?;
         let materials = materials.into_iter().map(|(name, look)| {
             let layers = look.finish(&format!("materials.{name}."))?;

@@ -5,46 +5,36 @@
 //! A layer that is `null` is off; of any other key `null` is its default, or as if the key were not there.
 //! [`table`] is the table of keys; a new key is a line there, and [`schema()`] writes it out for others.
 
-mod dotted;
+pub(crate) mod document;
 mod draft;
 mod error;
-mod fields;
-mod item;
-mod json;
-mod look;
-mod reference;
+pub(crate) mod layer_draft;
 mod schema;
 mod suggest;
 mod table;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod tests_bad;
-#[cfg(test)]
-mod tests_materials;
-mod twice;
-mod unique;
-mod value;
-mod words;
 
-pub use dotted::all_dotted;
+pub use crate::request::document::dotted::all_dotted;
+pub use crate::request::document::mesh_reference::{bad_mesh_name, is_faulty_document, names_mesh};
+use document::{duplicate_keys, json, mesh_reference};
 pub use error::{RequestError, RequestFault};
-pub use reference::{bad_mesh_name, is_faulty_document, names_mesh};
 pub use schema::schema;
-pub use words::{Style, Words, word_for, words_of};
+pub use table::words::{Style, Words, word_for, words_of};
 
 use std::collections::BTreeMap;
 
 use crate::image::ImageFormat;
-use crate::limits::{BackendChoice, IMAGE_PX_MAX, Limits};
-use crate::scene::Spec;
-use crate::scene::color::Rgba;
+use crate::limits::{IMAGE_PX_MAX, Limits};
+use crate::request::document::item::Item;
+use crate::spec::BackendChoice;
+use crate::spec::Spec;
+use crate::spec::color::Rgba;
 use draft::Draft;
-use fields::{Layer, Target};
-use item::Item;
-use look::Look;
+use layer_draft::Look;
+use table::fields::{Layer, Target};
+use table::value::{Given, Kind, Value};
 use table::{FIELDS, GROUPS, LAYERS, MATERIALS, SCHEMA, SHORT};
-use value::{Given, Kind, Value};
 
 /// The style of a request that names none.
 const STYLE_DEFAULT: Style = Style::Flat;
@@ -80,7 +70,7 @@ pub fn read(document: Option<&[u8]>, overrides: &Overrides, rules: &Rules) -> Re
 /// as it was given.
 pub fn read_with_mesh(document: &[u8], overrides: &Overrides, rules: &Rules) -> Result<(String, Spec), RequestError> {
     let mut items = json::flatten(document, rules.limits.json_depth)?;
-    let at = items.iter().position(|item| item.material.is_none() && item.key == reference::KEY);
+    let at = items.iter().position(|item| item.material.is_none() && item.key == mesh_reference::KEY);
     let given = at.map(|at| items.remove(at).given);
     // A misspelt `mesh` is an unknown key, and not only missing.
     let spec = read_items(items, overrides, rules).map_err(|mut error| {
@@ -92,9 +82,9 @@ pub fn read_with_mesh(document: &[u8], overrides: &Overrides, rules: &Rules) -> 
     match given {
         Some(Given::Json(serde_json::Value::String(name))) => Ok((name, spec)),
         Some(other) => {
-            Err(RequestError::new(RequestFault::WrongType, reference::KEY, other.show(), reference::ALLOWED))
+            Err(RequestError::new(RequestFault::WrongType, mesh_reference::KEY, other.show(), mesh_reference::ALLOWED))
         }
-        None => Err(RequestError::new(RequestFault::Missing, reference::KEY, "", reference::WHY)),
+        None => Err(RequestError::new(RequestFault::Missing, mesh_reference::KEY, "", mesh_reference::WHY)),
     }
 }
 
@@ -105,7 +95,7 @@ pub fn check_once(overrides: &Overrides, rules: &Rules) -> Result<(), RequestErr
     for (key, text) in overrides {
         items.extend(json::flatten_override(key, text, rules.limits.json_depth)?);
     }
-    twice::check(&items)
+    duplicate_keys::check(&items)
 }
 
 /// Reads the dotted keys of who asks what is in a file: the moment of its animation alone can be said.
@@ -156,14 +146,14 @@ pub fn keys() -> Vec<&'static str> {
     keys.extend(LAYERS.iter().map(|layer| layer.name));
     keys.extend(SHORT.iter().map(|&(key, _)| key));
     keys.extend(GROUPS.iter().map(|group| group.name));
-    keys.extend([MATERIALS.name, reference::KEY, "style"]);
+    keys.extend([MATERIALS.name, mesh_reference::KEY, "style"]);
     keys.sort_unstable();
     keys
 }
 
 /// The keys whose values are words, and those words.
 pub fn vocabulary() -> BTreeMap<&'static str, Vec<&'static str>> {
-    let of_field = |field: &'static fields::Field| match &field.kind {
+    let of_field = |field: &'static table::fields::Field| match &field.kind {
         Kind::Words(words) => Some((field.key, words.clone())),
         _ => None,
     };
@@ -270,11 +260,11 @@ fn no_object(item: &Item, allowed: &str, others: &str) -> RequestError {
 }
 
 fn unknown(key: &str, given: &Given) -> RequestError {
-    if key == reference::KEY {
-        return RequestError::new(RequestFault::UnknownKey, key, given.show(), reference::ELSEWHERE);
+    if key == mesh_reference::KEY {
+        return RequestError::new(RequestFault::UnknownKey, key, given.show(), mesh_reference::ELSEWHERE);
     }
     let mut known = keys();
-    known.retain(|&known| known != reference::KEY);
+    known.retain(|&known| known != mesh_reference::KEY);
     if let Given::Json(_) = given {
         known.insert(0, SCHEMA);
     }

@@ -6,12 +6,13 @@
 
 use serde_json::{Map, Value as Json, json};
 
-use super::fields::{Field, Layer};
-use super::look::{MULTIPLE_MAX, OUTLINE_PX_MAX};
 use super::table::{FIELDS, GROUPS, LAYERS, MATERIALS, SCHEMA, SHORT, STYLE_ABOUT};
-use super::value::{COORDINATE_MAX, Kind};
-use super::words::{Style, word_for, words_of};
-use super::{MATERIAL_NAME_CHARS_MAX, MATERIALS_MAX, Rules, STYLE_DEFAULT, reference as mesh};
+use super::{MATERIAL_NAME_CHARS_MAX, MATERIALS_MAX, Rules, STYLE_DEFAULT};
+use crate::request::document::mesh_reference as mesh;
+use crate::request::layer_draft::{MULTIPLE_MAX, OUTLINE_PX_MAX};
+use crate::request::table::fields::{Field, Layer};
+use crate::request::table::value::{COORDINATE_MAX, Kind};
+use crate::request::table::words::{Style, word_for, words_of};
 
 /// The schema of documents that [`super::read`] understands under these rules.
 pub fn schema(rules: &Rules) -> Json {

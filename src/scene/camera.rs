@@ -6,9 +6,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{CameraSpec, Projection as Kind, View};
 use crate::mesh::material::{FileCamera, FileLens};
 use crate::mesh::{Mesh, UpAxis};
+use crate::spec::{CameraSpec, Projection as Kind, View};
 
 /// A placed camera. Lengths in units of the mesh's box.
 #[derive(Clone, Copy, Debug)]

@@ -8,34 +8,14 @@
 #![allow(clippy::needless_range_loop)]
 
 mod bands;
-mod barycentric;
-mod bins;
-mod clip;
-mod contour;
-mod debug;
-mod hiding;
-mod ink;
+mod deadline_poll;
+mod geometry;
 mod isa;
-mod layers;
-mod light;
-mod line_light;
 mod lines;
-mod nearest;
-mod peel;
-mod point;
-mod profile;
+mod peeling;
 mod resolve;
-mod samples;
-mod scratch;
-mod segment;
-mod shade;
-mod stroke;
-mod texture;
-mod transform;
+mod surface;
 mod vector;
-mod visibility;
-mod watch;
-mod wire;
 
 pub use isa::Isa;
 
@@ -43,11 +23,11 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use self::bins::Bins;
+use self::bands::bins::Bins;
+use self::bands::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, ScratchPool};
 use self::resolve::SrgbEncoder;
-use self::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, ScratchPool};
-use self::transform::ScreenVertex;
 use super::{BackendKind, DrawError, Renderer};
+use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::image::Image;
 use crate::limits::Deadline;
 use crate::plan::DrawPlan;
@@ -98,7 +78,7 @@ impl CpuRenderer {
         self.vertices.reserve_exact(plan.positions.len() + own.len());
         self.vertices.resize(plan.positions.len(), ScreenVertex::default());
         let chunks = plan.positions.chunks(CHUNK).zip(self.vertices.chunks_mut(CHUNK)).collect();
-        run(pool, chunks, |(positions, out)| transform::transform(isa, &plan.projection, positions, out));
+        run(pool, chunks, |(positions, out)| geometry::transform::transform(isa, &plan.projection, positions, out));
         self.vertices.extend(own.iter().map(ScreenVertex::from));
     }
 
@@ -118,7 +98,7 @@ impl CpuRenderer {
         self.transform(plan);
         let stages = self.stages(plan, deadline);
         let banding = Banding::new(plan, self.threads());
-        let drawn = bins::bin(&stages, self.pool.as_ref(), [banding.rows, banding.margin]).map(|bins| {
+        let drawn = bands::bins::bin(&stages, self.pool.as_ref(), [banding.rows, banding.margin]).map(|bins| {
             let row_len = out.len() / plan.height_px as usize;
             let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
             run_few(self.pool.as_ref(), banding.at_once, items, |(band, out)| {

@@ -1,6 +1,6 @@
 //! Stage 5, a pixel: surface over background, where no ink has been laid over both, to sRGB bytes. Twin of `shaders/resolve.wgsl`.
 
-use super::transform::recip;
+use crate::backend::cpu::geometry::transform::recip;
 use crate::image::srgb8_thresholds;
 use crate::plan::DrawPlan;
 

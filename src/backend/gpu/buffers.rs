@@ -3,8 +3,8 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::device::Gpu;
-use super::stages::{SLOTS, Slot};
 use crate::backend::DrawError;
+use crate::backend::gpu::pipelines::{SLOTS, Slot};
 
 /// What is kept of a job's buffers, at most; a job that needed more gives all of them back.
 const SET_BYTES_MAX: u64 = 256 << 20;

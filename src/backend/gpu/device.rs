@@ -6,8 +6,8 @@ use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 
 use super::buffers::SpareBuffers;
-use super::stages::Stages;
 use crate::backend::DrawError;
+use crate::backend::gpu::pipelines::Stages;
 use crate::limits::Deadline;
 
 /// Which adapters may be opened.

@@ -6,38 +6,29 @@
 //!
 //! Architecture invariant: a job's use of the device stays on the thread that draws it, because wgpu's error scopes do.
 
-mod bindings;
 mod buffers;
 mod device;
-mod kernels;
-mod line_shares;
-mod look;
 mod params;
-mod passes;
+pub(crate) mod pass_mask;
+pub(crate) mod pipelines;
 mod recorder;
 mod schedule;
-mod sizes;
-mod stages;
-mod step;
-#[cfg(test)]
-mod test_plans;
-mod tiles;
 
 use std::sync::Arc;
 
 pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
-pub use self::sizes::bands_bytes;
+pub use self::schedule::sizes::bands_bytes;
 
 use self::buffers::Buffers;
 use self::params::{attributes, cell_masks, corner_triangles, edge_lists, hull_looks};
+use self::pipelines::Slot;
 use self::recorder::Recorder;
 use self::schedule::Schedule;
-use self::sizes::{
+use self::schedule::sizes::{
     DeviceTraits, LAYERED_BYTES, OWNER_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, samples,
     work_bytes,
 };
-use self::stages::Slot;
-use self::step::{Band, Goal, Step};
+use self::schedule::step::{Band, Goal, Step};
 use super::{BackendKind, DrawError, Renderer};
 use crate::image::{Image, srgb8_thresholds};
 use crate::limits::Deadline;

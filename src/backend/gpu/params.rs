@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::backend::cells::{POINTS, cells};
+use crate::backend::sample_partition::{POINTS, cells};
 use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, Shown, Side, SurfacePass};
 
 /// The plan's numbers.
@@ -198,7 +198,7 @@ pub fn edge_lists(passes: &[LinePass]) -> (Vec<&[Edge]>, Vec<u32>) {
     (lists.into_iter().map(|(list, _)| &list[..]).collect(), starts)
 }
 
-/// The points that stand with each of a pixel's samples, eight words a sample, numbered as shaders/stroke.wgsl numbers them.
+/// The points that stand with each of a pixel's samples, eight words a sample, numbered as shaders/lines/stroke.wgsl numbers them.
 pub fn cell_masks(samples: u32) -> Vec<u32> {
     let mut masks = vec![0; samples as usize * POINTS / 32];
     for (point, &cell) in cells(samples).iter().enumerate() {
@@ -235,7 +235,7 @@ mod tests {
     use std::borrow::Cow;
 
     use super::*;
-    use crate::backend::gpu::test_plans::{edges, lines};
+    use crate::backend::gpu::schedule::test_plans::{edges, lines};
     use crate::plan::CornerValues;
 
     #[test]

@@ -6,11 +6,11 @@ use std::sync::mpsc;
 
 use super::buffers::Buffers;
 use super::device::Gpu;
-use super::look::look;
 use super::params::{BATCH_STRIDE, Batch, Frame, pack};
-use super::stages::{Pipeline, Slot, Stage, uniforms_layout};
-use super::tiles::Tiles;
 use crate::backend::DrawError;
+use crate::backend::gpu::pipelines::key::look;
+use crate::backend::gpu::pipelines::{Pipeline, Slot, Stage, uniforms_layout};
+use crate::backend::gpu::schedule::tiles::Tiles;
 use crate::limits::Deadline;
 use crate::plan::DrawPlan;
 

@@ -2,7 +2,7 @@
 
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge, NO_FACE};
-use crate::mesh::sets::Sets;
+use crate::mesh::union_find::Sets;
 
 /// The corners of all triangles (three each, numbered triangle by triangle), united where their triangles share an edge at the
 /// corners' vertex.

@@ -3,7 +3,7 @@
 use super::fans::Fans;
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, NO_FACE};
-use crate::mesh::sets::SidedSets;
+use crate::mesh::union_find::SidedSets;
 use std::collections::BTreeMap;
 
 /// What is known of all surfaces.

@@ -1,8 +1,8 @@
 //! Small meshes whose numbers are known.
 
 use super::*;
+use crate::import::MeshFault;
 use crate::limits::Limits;
-use crate::mesh::MeshFault;
 
 fn mesh(triangles: &[[u32; 3]]) -> Mesh {
     let count = triangles.iter().flatten().max().map_or(0, |m| m + 1);

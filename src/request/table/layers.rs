@@ -1,10 +1,10 @@
 //! Keys of the layers.
 
 use super::super::draft::Draft;
-use super::super::fields::{Field, optional, value, words};
-use super::super::look::Look;
-use super::super::value::Kind;
 use super::{SHARE, number};
+use crate::request::layer_draft::Look;
+use crate::request::table::fields::{Field, optional, value, words};
+use crate::request::table::value::Kind;
 
 /// In the order of the document.
 pub fn fields() -> Vec<Field> {

@@ -1,15 +1,18 @@
 //! The table of keys: everything that a request document may say. Reading, error messages, the JSON Schema and the list of
 //! capabilities all follow from it.
 
+pub(crate) mod fields;
 mod layers;
 mod scene;
+pub(crate) mod value;
+pub(crate) mod words;
 
 use std::sync::LazyLock;
 
+use self::fields::{Field, Group, Layer};
+use self::value::Kind;
 use super::draft::Draft;
-use super::fields::{Field, Group, Layer};
-use super::look::Look;
-use super::value::Kind;
+use crate::request::layer_draft::Look;
 
 /// Every key with a value. `style` is read before them, since presets come first.
 pub static FIELDS: LazyLock<Vec<Field>> =

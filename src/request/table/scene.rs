@@ -1,10 +1,10 @@
 //! Keys of the scene, the camera, the light and the picture.
 
 use super::super::draft::Draft;
-use super::super::fields::{Field, optional, optional_words, value, words};
-use super::super::value::Kind;
 use super::{SHARE, number};
 use crate::limits::JOB_MS_MAX;
+use crate::request::table::fields::{Field, optional, optional_words, value, words};
+use crate::request::table::value::Kind;
 
 /// In the order of the document.
 pub fn fields() -> Vec<Field> {

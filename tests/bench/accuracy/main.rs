@@ -4,7 +4,7 @@
 //!     cargo bench --bench accuracy -- --quick                 # few and small scenes, few rounds; under a minute
 //!     cargo bench --bench accuracy -- --scene 'deep rings'    # one scene, as often as it is named
 //!     cargo bench --bench accuracy -- --write                 # all, and docs/accuracy.{json,md}, docs/work-precision.svg
-//!                                                             # and src/plan/error_table.json
+//!                                                             # and src/plan/quality/error_table.json
 //!     cargo bench --bench accuracy -- --table-only            # the last of these, from docs/accuracy.json as it is
 //!
 //! What is true and how errors are counted: `measure/truths.rs`. What each technique is asked for: `measure/techniques.rs`.
@@ -19,11 +19,11 @@ mod measure;
 mod oracle;
 // The suite uses more of these.
 #[allow(dead_code)]
-#[path = "../../suite/seen.rs"]
-mod seen;
-#[allow(dead_code)]
-#[path = "../../suite/shapes.rs"]
-mod shapes;
+#[path = "../../suite/support"]
+mod support {
+    pub mod seen;
+    pub mod shapes;
+}
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -121,6 +121,6 @@ fn write_table() {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(root.join("docs/accuracy.json")).expect("docs/accuracy.json");
     let document = serde_json::from_str(&text).expect("docs/accuracy.json is JSON");
-    std::fs::write(root.join("src/plan/error_table.json"), condensed::table(&document)).expect("a table");
-    println!("wrote src/plan/error_table.json");
+    std::fs::write(root.join("src/plan/quality/error_table.json"), condensed::table(&document)).expect("a table");
+    println!("wrote src/plan/quality/error_table.json");
 }

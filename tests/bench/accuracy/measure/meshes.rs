@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use crate::oracle::obj::Shape;
 use crate::oracle::vector::{V3, unit};
-use crate::shapes::Random;
+use crate::support::shapes::Random;
 
 /// Straight lines across the whole picture, no two of which are near each other in it: a zigzag whose corners lie outside.
 pub fn lines(size_px: u32) -> String {

@@ -141,7 +141,7 @@ fn truths(scene: &Scene, effort: Effort, mesh: &Mesh, baseline: &Case<'_>, cases
 
 /// Half of the heights of all triangles on screen, three each, are larger.
 fn median_height_px(plan: &DrawPlan<'_>) -> f64 {
-    let screen = Screen::new(&crate::seen::scene(plan));
+    let screen = Screen::new(&crate::support::seen::scene(plan));
     let heights = screen.pieces.iter().flat_map(|piece| {
         let corner = |k: usize| [piece.corners[k % 3][0], piece.corners[k % 3][1]];
         let twice_area = piece.side(0, corner(0));

@@ -2,15 +2,19 @@
 
 use std::path::PathBuf;
 
-use meshsnap::limits::{BackendChoice, Budget, Deadline, Limits};
-use meshsnap::mesh::{self, Bundle, Mesh};
-use meshsnap::plan::{self, DrawPlan};
-use meshsnap::request::{self, Rules};
-use meshsnap::scene::Spec;
+use meshsnap::import::Bundle;
+use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap::mesh::Mesh;
+use meshsnap::plan;
+use meshsnap::plan::DrawPlan;
+use meshsnap::request;
+use meshsnap::request::Rules;
+use meshsnap::spec::BackendChoice;
+use meshsnap::spec::Spec;
 
 use super::meshes;
 use super::techniques::Family;
-use crate::shapes;
+use crate::support::shapes;
 
 /// A scene, measured with each technique of its family.
 #[derive(Clone, Copy, Debug)]
@@ -95,7 +99,7 @@ impl Scene {
     pub fn mesh(&self, size_px: u32) -> Mesh {
         let limits = Limits::default();
         let bundle = Bundle::of_one(self.bytes(size_px));
-        mesh::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default())
+        meshsnap::import::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default())
             .unwrap_or_else(|e| panic!("{}: {e}", self.name))
     }
 

@@ -11,7 +11,7 @@ use crate::oracle::rays::{Pen, picture};
 use crate::oracle::screen::{Screen, is_front};
 use crate::oracle::vector::{V3, sub};
 use crate::oracle::{rim, srgb};
-use crate::seen::{lights, material, only_triangle, scene, segments};
+use crate::support::seen::{lights, material, only_triangle, scene, segments};
 
 /// A picture as it should be.
 pub struct Truth {

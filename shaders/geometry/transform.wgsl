@@ -1,0 +1,30 @@
+// Stage 1, a vertex: unit box to snapped screen coordinates. Twin of src/backend/cpu/geometry/transform.rs.
+
+@group(1) @binding(0) var<storage, read> positions: array<f32>;
+@group(1) @binding(3) var<storage, read_write> vertices: array<Vertex>;
+
+// Farthest a snapped coordinate may lie from the picture's centre: 4096 px.
+const GUARD: f32 = 1048576.0;
+
+@compute @workgroup_size(64)
+fn transform(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = gid.x + gid.y * groups.x * 64u;
+    if i >= batch.count {
+        return;
+    }
+    vertices[i] = snap_vertex(vec3(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]));
+}
+
+fn snap_vertex(p: vec3<f32>) -> Vertex {
+    let h = homogeneous(p);
+    if !(h.w >= frame.near_w) {
+        return Vertex(OUTSIDE, 0, 0.0, 0.0);
+    }
+    let r = recip(h.w);
+    let sx = rn(h.x * r);
+    let sy = rn(h.y * r);
+    if abs(sx) <= GUARD && abs(sy) <= GUARD {
+        return Vertex(round_to_i32(sx), round_to_i32(sy), rn(h.z * r), r);
+    }
+    return Vertex(OUTSIDE, 0, 0.0, 0.0);
+}

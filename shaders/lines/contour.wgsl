@@ -1,0 +1,92 @@
+// Stage 4, an edge's faces: which side of the surface an edge belongs to, and whether the surface ends there. Twin of
+// src/backend/cpu/lines/contour.rs; lines.wgsl declares the buffers.
+
+const NO_FACE: u32 = 0xFFFFFFFFu;
+
+// Whether the pass draws the edge in this view: not on the far side of a closed surface; of a contour only the silhouette.
+fn is_drawn(edge: vec4<u32>) -> bool {
+    let is_contour = is_contour_pass();
+    if (batch.line_flags & SKIP_BACK) == 0u && !is_contour {
+        return true;
+    }
+    if (batch.line_flags & SKIP_BACK) != 0u && is_hidden(edge.z, is_contour) && is_hidden(edge.w, is_contour) {
+        return false;
+    }
+    if !is_contour {
+        return true;
+    }
+    // The faces lie on one side of the edge on screen, and none on the other; or there is only one, even if that is seen from
+    // its very edge.
+    if edge.w == NO_FACE {
+        return true;
+    }
+    let a = side_of(edge, edge.z);
+    let b = side_of(edge, edge.w);
+    return (a < 0 || b < 0) != (a > 0 || b > 0);
+}
+
+fn is_contour_pass() -> bool {
+    return has(CONTOURS) && (batch.line_flags & CONTOUR) != 0u;
+}
+
+// Whether a face of a closed surface shows nothing of its edges. Of a contour, one seen from its very edge does not either.
+fn is_hidden(face: u32, is_contour: bool) -> bool {
+    return looks_away(face) || (is_contour && is_edge_on(face));
+}
+
+fn is_edge_on(face: u32) -> bool {
+    let a = vertices[triangles[3u * face]];
+    let b = vertices[triangles[3u * face + 1u]];
+    let c = vertices[triangles[3u * face + 2u]];
+    return a.x != OUTSIDE && b.x != OUTSIDE && c.x != OUTSIDE && is_zero(area_of(a, b, c));
+}
+
+// On which side of the edge a face lies on screen: -1, 1, or 0 where it is seen from its very edge or is not there.
+fn side_of(edge: vec4<u32>, face: u32) -> i32 {
+    if face == NO_FACE {
+        return 0;
+    }
+    let t = vec3(triangles[3u * face], triangles[3u * face + 1u], triangles[3u * face + 2u]);
+    let is_end = (t == vec3(edge.x)) | (t == vec3(edge.y));
+    let corner = select(select(t.z, t.y, !is_end.y), t.x, !is_end.x);
+    let a = vertices[edge.x];
+    let b = vertices[edge.y];
+    let c = vertices[corner];
+    if a.x != OUTSIDE && b.x != OUTSIDE && c.x != OUTSIDE {
+        let area = area_of(a, b, c);
+        return select(select(1, -1, is_negative(area)), 0, is_zero(area));
+    }
+    // Where a corner is behind the eye, by the side of the face's plane on which the eye is.
+    let volume = volume_of(homogeneous_of(edge.x), homogeneous_of(edge.y), homogeneous_of(corner));
+    return i32(volume > 0.0) - i32(volume < 0.0);
+}
+
+// Six times the volume that three points on screen, times W, span with the eye.
+fn volume_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
+    let x = rn(p.y * q.w) - rn(p.w * q.y);
+    let y = rn(p.w * q.x) - rn(p.x * q.w);
+    let w = rn(p.x * q.y) - rn(p.y * q.x);
+    return (rn(rn(x) * r.x) + rn(rn(y) * r.y)) + rn(rn(w) * r.w);
+}
+
+// The face whose light falls on the edge's line where the pixel sees no surface, plus 1: of those that look at the viewer the one
+// with the highest id, so that the order of edges does not matter; of any, where none does.
+fn lit_by(edge: vec4<u32>) -> u32 {
+    let best = max(select(edge.z + 1u, 0u, looks_away(edge.z)), select(edge.w + 1u, 0u, looks_away(edge.w)));
+    return select(edge.z + 1u, best, best > 0u);
+}
+
+// Whether a face is certainly turned away. A missing face is: it shows nothing.
+fn looks_away(face: u32) -> bool {
+    if face == NO_FACE {
+        return true;
+    }
+    let a = vertices[triangles[3u * face]];
+    let b = vertices[triangles[3u * face + 1u]];
+    let c = vertices[triangles[3u * face + 2u]];
+    if a.x == OUTSIDE || b.x == OUTSIDE || c.x == OUTSIDE {
+        return false;
+    }
+    let area = area_of(a, b, c);
+    return !is_zero(area) && is_negative(area) == ((batch.line_flags & INSIDE_OUT) != 0u);
+}

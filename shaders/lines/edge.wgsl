@@ -1,0 +1,260 @@
+// Stage 4, an edge: lines of exact width. Twin of src/backend/cpu/lines/edge.rs.
+//
+// Edges are cut into windows and those into slices of rows: shares, which are dealt out to the threads of a workgroup. A thread
+// works in units: in each it looks along its window once, and when it has found a part, draws it. Where a dispatch may not take too long,
+// it ends after a number of them, and the next one goes on from there.
+
+@group(1) @binding(0) var<storage, read> positions: array<f32>;
+@group(1) @binding(2) var<storage, read> triangles: array<u32>;
+@group(1) @binding(3) var<storage, read> vertices: array<Vertex>;
+// Low word: complement of the id. High word: depth.
+@group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
+// Two vertices, two faces.
+@group(1) @binding(10) var<storage, read> edges: array<vec4<u32>>;
+// Of each pixel, whose light falls on the pass's lines.
+@group(1) @binding(11) var<storage, read_write> owners: array<atomic<u32>>;
+// Of each pixel, what stroke.wgsl says.
+@group(1) @binding(12) var<storage, read_write> strokes: array<atomic<u32>>;
+// How many threads have something left to do; then how far each has come.
+@group(1) @binding(21) var<storage, read_write> progress: Progress;
+
+struct Progress {
+    left: atomic<u32>,
+    threads: array<Paused>,
+};
+
+// A thread that is not done, or all zeros.
+struct Paused {
+    // Its next share, plus 1.
+    share: u32,
+    // Of the search in that share: `state` and `radius`, plus 1, or 0 where it has not begun.
+    search: u32,
+    begin: f32,
+    hidden_from: f32,
+};
+
+// `line_units` where a dispatch may take as long as it takes.
+const NO_LIMIT: u32 = 0xFFFFFFFFu;
+
+const THREADS: u32 = 64u;
+
+// Of the workgroup's edges, one a thread: where its shares end among those of all.
+var<workgroup> share_ends: array<u32, 64>;
+
+@compute @workgroup_size(64)
+fn lines(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let group = workgroup.x + workgroup.y * groups.x;
+    let i = group * batch.edges_per_group + thread;
+    var shares = 0u;
+    if thread < batch.edges_per_group && i < batch.count {
+        shares = shares_of(edges[batch.first + i]);
+    }
+    share_ends[thread] = shares;
+    workgroupBarrier();
+    for (var step = 1u; step < THREADS; step *= 2u) {
+        var before = 0u;
+        if thread >= step {
+            before = share_ends[thread - step];
+        }
+        workgroupBarrier();
+        share_ends[thread] += before;
+        workgroupBarrier();
+    }
+    if share_ends[THREADS - 1u] > 0u {
+        draw_shares(batch.first + group * batch.edges_per_group, group * THREADS + thread, thread);
+    }
+}
+
+fn shares_of(edge: vec4<u32>) -> u32 {
+    let s = segment_of(edge);
+    let rows = rows_of(s.start.y, s.start.y + s.along.y);
+    return select(0u, window_count(s) * batch.line_slices, s.drawn && rows.x <= rows.y);
+}
+
+// Draws every 64th share of the workgroup's, whose edges begin at `first`, from where the thread paused.
+fn draw_shares(first: u32, self_at: u32, thread: u32) {
+    let all = share_ends[THREADS - 1u];
+    let may_pause = batch.line_units != NO_LIMIT;
+    var next = thread;
+    var paused = Paused(0u, 0u, 0.0, 0.0);
+    if may_pause {
+        paused = progress.threads[self_at];
+        next = select(thread, paused.share - 1u, paused.share > 0u);
+    }
+    var units = batch.line_units;
+    var has_share = false;
+    var edge = vec4(0u);
+    var s: Segment;
+    var window: Window;
+    var search: Search;
+    while next < all && units > 0u {
+        if !has_share {
+            let slot = edge_of_share(next);
+            edge = edges[first + slot];
+            s = segment_of(edge);
+            window = window_of(s, next - select(0u, share_ends[max(slot, 1u) - 1u], slot > 0u));
+            let range = widened(s, window.range);
+            if paused.search > 0u {
+                let found = paused.search - 1u;
+                search = Search(range, found / 4u, paused.begin, paused.hidden_from, found % 4u);
+                paused.search = 0u;
+            } else if window.rows.x <= window.rows.y {
+                search = begin_search(s, range);
+            } else {
+                search = Search(range, 0u, range.y, BEYOND, WHOLE);
+            }
+            has_share = true;
+        }
+        // Threads that have found a part wait here for those that have not; not where loops are limited, since each look of one would
+        // count for all.
+        let units_before = units;
+        var part = vec2(0.0);
+        while search.begin < search.range.y && part.x >= part.y && units > 0u {
+            units--;
+            part = next_part(edge, s, &search);
+            if may_pause {
+                break;
+            }
+        }
+        if units == units_before {
+            // To begin a share is work too.
+            units--;
+        }
+        if part.x < part.y {
+            draw_part(edge, s, window, part);
+        }
+        // Also where it is no number.
+        if !(search.begin < search.range.y) {
+            next += THREADS;
+            has_share = false;
+        }
+    }
+    if may_pause {
+        var left = Paused(all + THREADS, 0u, 0.0, 0.0);
+        if next < all {
+            atomicAdd(&progress.left, 1u);
+            left.share = next + 1u;
+            if has_share {
+                left.search = search.radius * 4u + search.state + 1u;
+                left.begin = search.begin;
+                left.hidden_from = search.hidden_from;
+            }
+        }
+        progress.threads[self_at] = left;
+    }
+}
+
+// Which of the workgroup's edges a share is of: the first that ends after it.
+fn edge_of_share(share: u32) -> u32 {
+    var slot = 0u;
+    for (var step = THREADS / 2u; step > 0u; step /= 2u) {
+        if share_ends[slot + step - 1u] <= share {
+            slot += step;
+        }
+    }
+    return slot;
+}
+
+// Windows of an edge: what is visible close to a pixel is found close to it.
+fn window_count(s: Segment) -> u32 {
+    return u32(rn(s.length * batch.line_windows)) + 1u;
+}
+
+// The range of an edge that is a window's, 0 to 1.
+fn window_range(window: u32, count: u32) -> vec2<f32> {
+    let step = recip(f32(count));
+    return vec2(rn(f32(window) * step), rn(f32(window + 1u) * step));
+}
+
+// The range as far as it touches the window's pixels; where nothing hides lines, all of the edge.
+fn widened(s: Segment, range: vec2<f32>) -> vec2<f32> {
+    if (batch.line_flags & (SHOWN_VISIBLE | SHOWN_HIDDEN)) == 0u {
+        return vec2(0.0, 1.0);
+    }
+    let beyond = rn((reach_of_line() + 1.0) * s.inverse_length);
+    return vec2(max(range.x - beyond, 0.0), min(range.y + beyond, 1.0));
+}
+
+// First and last column whose pixel centre may lie within reach in pixel row y.
+fn columns_of(s: Segment, ends: vec4<f32>, y: i32) -> vec2<i32> {
+    let reach = reach_of_line() + SLACK_PX;
+    var low = min(ends.x, ends.z) - reach;
+    var high = max(ends.x, ends.z) + reach;
+    // A steep or slanted line touches only a short piece of each row.
+    if s.along.y * s.along.y > 1e-6 {
+        let slope = s.along.x / s.along.y;
+        let center = ends.x + (f32(y) + 0.5 - ends.y) * slope;
+        let spread = reach * sqrt(1.0 + slope * slope);
+        low = max(low, center - spread);
+        high = min(high, center + spread);
+    }
+    return vec2(max(i32(low), 0), min(i32(high), frame.width - 1));
+}
+
+// A share of an edge: every slices-th row of one of its windows.
+struct Window {
+    number: u32,
+    count: u32,
+    range: vec2<f32>,
+    ends: vec4<f32>,
+    rows: vec2<i32>,
+    // The share's first row.
+    first: i32,
+};
+
+fn window_of(s: Segment, share: u32) -> Window {
+    let count = window_count(s);
+    let number = share / batch.line_slices;
+    let range = window_range(number, count);
+    let ends = vec4(point_at(s, range.x), point_at(s, range.y));
+    let rows = rows_of(ends.y, ends.w);
+    return Window(number, count, range, ends, rows, rows.x + i32(share % batch.line_slices));
+}
+
+// Draws a part of an edge into the pixels of a share.
+fn draw_part(edge: vec4<u32>, s: Segment, window: Window, part: vec2<f32>) {
+    let is_lit = (batch.line_flags & LIT_PASS) != 0u;
+    let start = point_at(s, part.x);
+    let end = point_at(s, part.y);
+    var y = window.first;
+    var columns = columns_of(s, window.ends, y);
+    var x = columns.x;
+    while y <= window.rows.y {
+        // Finding a pixel is far cheaper than covering it: threads that have found theirs wait here for those that have not.
+        var center = vec2(0.0);
+        var at = 0u;
+        var found = false;
+        while !found && y <= window.rows.y {
+            if x > columns.y {
+                y += i32(batch.line_slices);
+                columns = columns_of(s, window.ends, y);
+                x = columns.x;
+                continue;
+            }
+            center = vec2(f32(x), f32(y)) + 0.5;
+            at = u32((y - batch.row_first) * frame.width + x);
+            x++;
+            // What is full stays full, whatever else comes; only a lit line still asks whose it is.
+            found = touches(place_of(s.direction, start - center, end - center)) && owns(s, window, center)
+                && (is_lit || !is_full(at));
+        }
+        if found && add_stroke(at, s.direction, start - center, end - center) && is_lit {
+            atomicMax(&owners[at], lit_by(edge));
+        }
+    }
+}
+
+// Whether of all windows of the edge the pixel is this one's.
+fn owns(s: Segment, window: Window, center: vec2<f32>) -> bool {
+    if window.count == 1u {
+        return true;
+    }
+    let from_start = center - s.start;
+    let way = rn((rn(from_start.x * s.along.x) + rn(from_start.y * s.along.y)) * s.inverse_length);
+    let at = rn(rn(way * s.inverse_length) * f32(window.count));
+    return min(u32(max(at, 0.0)), window.count - 1u) == window.number;
+}

@@ -1,0 +1,334 @@
+// Stage 4, a piece of an edge: which parts of it nothing hides. Twin of src/backend/cpu/lines/hidden_lines.rs; lines.wgsl declares the
+// buffers.
+//
+// The CPU sorts all intervals in which something hides the edge. Here there is no room to keep them, so each part is found by
+// looking again.
+
+const NOTHING: u32 = 0xFFFFFFFFu;
+
+// How much nearer than the edge a surface must be, as a share of depth: what f32 may lose on the way.
+const NEARER: f32 = 1.0000019073486328;
+
+// How far what is on screen may lie from where it should, 1/256 px: half a unit each in which a triangle and an edge are rounded, and some
+// for f32.
+const SNAPPED: f32 = 1.25;
+
+// Parts shorter than this are what rounding leaves of an edge beside what hides it. Their round ends would show as dots.
+const CRUMB_PX: f32 = 0.0625;
+
+// Between two surfaces that hide it: there a sliver of surface may have no sample.
+const GAP_PX: f32 = 0.25;
+
+const MIN_POSITIVE: f32 = 1.17549435e-38;
+
+// How the edge's parts in a range of it are found.
+struct Search {
+    range: vec2<f32>,
+    // Pixels beside and beyond the edge whose triangles are asked too.
+    radius: u32,
+    // From where on parts are still to be found; at the range's end there are no more.
+    begin: f32,
+    // Where the hidden part begins that is being followed to its end.
+    hidden_from: f32,
+    // What has been found out already: nothing, that the range is one part, or where it is hidden.
+    state: u32,
+};
+
+const UNASKED: u32 = 0u;
+const WHOLE: u32 = 1u;
+const PARTS: u32 = 2u;
+
+// More than any place on an edge.
+const BEYOND: f32 = 2.0;
+
+// What triangles hide of a range, as far as one look from `begin` on shows it.
+struct Look {
+    // Up to where the edge is hidden without a gap.
+    until: f32,
+    // Where the next interval begins.
+    next: f32,
+    any: bool,
+};
+
+fn begin_search(s: Segment, range: vec2<f32>) -> Search {
+    if (batch.line_flags & (SHOWN_VISIBLE | SHOWN_HIDDEN)) == 0u {
+        return Search(range, 0u, range.x, BEYOND, WHOLE);
+    }
+    if lies_deep(s, range) {
+        let shows_hidden = (batch.line_flags & SHOWN_HIDDEN) != 0u;
+        return Search(range, 0u, select(range.y, range.x, shows_hidden), BEYOND, WHOLE);
+    }
+    return Search(range, 0u, range.x, BEYOND, UNASKED);
+}
+
+// Looks along the edge once, from where the search is: a part to draw; empty (x >= y) where this look has found none.
+fn next_part(edge: vec4<u32>, s: Segment, search: ptr<function, Search>) -> vec2<f32> {
+    let range = (*search).range;
+    let begin = (*search).begin;
+    if (*search).state == WHOLE {
+        (*search).begin = range.y;
+        return range;
+    }
+    let look = look_along(edge, s, *search);
+    let shows_visible = (batch.line_flags & SHOWN_VISIBLE) != 0u;
+    if (*search).state == UNASKED {
+        if !look.any {
+            (*search).begin = range.y;
+            return select(vec2(0.0), range, shows_visible);
+        }
+        // Where an edge dives under another surface, a sliver of that may have its samples beside the edge.
+        (*search).state = PARTS;
+        (*search).radius = 1u;
+        return vec2(0.0);
+    }
+    let hidden_from = (*search).hidden_from;
+    if look.until > begin {
+        // Hidden from here on, perhaps farther than this look has shown.
+        (*search).hidden_from = min(hidden_from, begin);
+        (*search).begin = look.until;
+        return select(vec2(0.0), vec2(min(hidden_from, begin), range.y), !shows_visible && look.until >= range.y);
+    }
+    let end = min(look.next, range.y);
+    (*search).begin = end;
+    (*search).hidden_from = BEYOND;
+    if !shows_visible {
+        return vec2(hidden_from, begin);
+    }
+    let is_gap = begin > range.x && end < range.y;
+    let is_part = end - begin > rn(s.inverse_length * select(CRUMB_PX, GAP_PX, is_gap));
+    return select(vec2(0.0), vec2(begin, end), is_part);
+}
+
+// Asks each triangle that is seen along the edge what it hides.
+fn look_along(edge: vec4<u32>, s: Segment, search: Search) -> Look {
+    let count = u32(sample_count());
+    // Of the pixel itself, and of one on each side of it across the edge.
+    let words = count * (2u * search.radius + 1u);
+    let across = select(vec2(1, 0), vec2(0, 1), abs(s.along.x) >= abs(s.along.y));
+    var look = Look(search.begin, 2.0, false);
+    var recent = vec4(NOTHING);
+    var last = vec2(OUTSIDE);
+    let beyond = f32(search.radius) * s.inverse_length;
+    let walked = vec2(search.range.x - beyond, search.range.y + beyond);
+    let steps = walk_steps(s, walked);
+    for (var i = 0u; i <= steps; i++) {
+        let pixel = walk_pixel(s, walked, i);
+        if all(pixel == last) {
+            continue;
+        }
+        last = pixel;
+        for (var n = 0u; n < words; n++) {
+            let id = seen_at(pixel + (i32(n / count) - i32(search.radius)) * across, n % count).x;
+            if id == NOTHING || any(recent == vec4(id)) {
+                continue;
+            }
+            recent = vec4(id, recent.xyz);
+            var part = hidden_by(edge, s, id);
+            part = vec2(max(part.x, search.range.x), min(part.y, search.range.y));
+            if part.x >= part.y {
+                continue;
+            }
+            look.any = true;
+            if part.x <= look.until {
+                look.until = max(look.until, part.y);
+            } else {
+                look.next = min(look.next, part.x);
+            }
+        }
+    }
+    return look;
+}
+
+// Id and depth (its bits) that a sample of a pixel sees.
+fn seen_at(pixel: vec2<i32>, sample: u32) -> vec2<u32> {
+    if !has_samples(pixel) {
+        return vec2(NOTHING, 0u);
+    }
+    let row = (pixel.y - batch.seen_first) * (frame.width + 2 * batch.seen_margin);
+    let word = samples[u32(row + pixel.x + batch.seen_margin) * u32(sample_count()) + sample];
+    return vec2(select(~word.x, NOTHING, word.y == 0u), word.y);
+}
+
+// Whether a pixel of the picture, or beyond, is in the visibility buffer.
+fn has_samples(pixel: vec2<i32>) -> bool {
+    return all(pixel >= vec2(-batch.seen_margin, batch.seen_first))
+        && all(pixel < vec2(frame.width + batch.seen_margin, batch.seen_end));
+}
+
+// Whether all triangles that are seen along the edge are nearer than any of it.
+fn lies_deep(s: Segment, range: vec2<f32>) -> bool {
+    let nearest = rn(max(depth_of(s, 0.0), depth_of(s, 1.0)) * NEARER);
+    let count = u32(sample_count());
+    var last_id = NOTHING;
+    var last = vec2(OUTSIDE);
+    let steps = walk_steps(s, range);
+    for (var i = 0u; i <= steps; i++) {
+        let pixel = walk_pixel(s, range, i);
+        if all(pixel == last) || !has_samples(pixel) {
+            continue;
+        }
+        last = pixel;
+        for (var n = 0u; n < count; n++) {
+            let seen = seen_at(pixel, n);
+            if seen.x == NOTHING || bitcast<f32>(seen.y) <= nearest {
+                return false;
+            }
+            if seen.x != last_id {
+                last_id = seen.x;
+                let corners = corners_of_id(seen.x);
+                let a = vertices[corners.x];
+                let b = vertices[corners.y];
+                let c = vertices[corners.z];
+                if a.x == OUTSIDE || b.x == OUTSIDE || c.x == OUTSIDE || min(min(a.z, b.z), c.z) <= nearest {
+                    return false;
+                }
+            }
+        }
+    }
+    return last_id != NOTHING;
+}
+
+// Where a triangle's records are.
+fn corners_of_id(id: u32) -> vec3<u32> {
+    return vec3(triangles[3u * id], triangles[3u * id + 1u], triangles[3u * id + 2u]);
+}
+
+// Where along the edge a triangle lies in front of it; empty (x >= y) where nowhere.
+fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
+    let none = vec2(1.0, 0.0);
+    let v = corners_of_id(id);
+    if any(v == vec3(edge.x)) && any(v == vec3(edge.y)) {
+        return none;
+    }
+    let a = vertices[v.x];
+    let b = vertices[v.y];
+    let c = vertices[v.z];
+    // X, Y, Z, W of each corner.
+    var p = vec4(f32(a.x), f32(a.y), a.z, 1.0);
+    var q = vec4(f32(b.x), f32(b.y), b.z, 1.0);
+    var r = vec4(f32(c.x), f32(c.y), c.z, 1.0);
+    var is_clockwise: bool;
+    if a.x == OUTSIDE || b.x == OUTSIDE || c.x == OUTSIDE {
+        if id >= frame.triangle_count || !has(CLIPPED) {
+            return none;
+        }
+        p = homogeneous_of(v.x);
+        q = homogeneous_of(v.y);
+        r = homogeneous_of(v.z);
+        if !is_moderate(p) || !is_moderate(q) || !is_moderate(r) {
+            return none;
+        }
+        is_clockwise = volume_of(p, q, r) > 0.0;
+    } else {
+        let area = area_of(a, b, c);
+        if is_zero(area) || !may_lie_behind(s, a, b, c) {
+            return none;
+        }
+        is_clockwise = !is_negative(area);
+    }
+    let at_start = sides_of(p, q, r, s.ends.xy, is_clockwise);
+    let at_end = sides_of(p, q, r, s.ends.zw, is_clockwise);
+    // What lies on a side from end to end is hidden: two triangles that share it would leave it between them.
+    let is_along = (at_start == vec3(0.0)) & (at_end == vec3(0.0));
+    if any((at_start <= vec3(0.0)) & (at_end <= vec3(0.0)) & !is_along) {
+        return none;
+    }
+    var part = vec2(0.0, 1.0);
+    part = narrowed(part, at_start.x, at_end.x);
+    part = narrowed(part, at_start.y, at_end.y);
+    part = narrowed(part, at_start.z, at_end.z);
+    if part.x >= part.y {
+        return none;
+    }
+    let slack = slack_of(p, q, r);
+    if slack < 0.0 {
+        return none;
+    }
+    // Depths are compared only where the edge is inside, so that thin triangles need not be continued far.
+    let depths = vec3(p.z, q.z, r.z);
+    let ws = vec3(p.w, q.w, r.w);
+    let first = nearer_by(s, at_start, at_end, depths, ws, slack, part.x);
+    let last = nearer_by(s, at_start, at_end, depths, ws, slack, part.y);
+    if first <= 0.0 && last <= 0.0 {
+        return none;
+    }
+    let share = narrowed(vec2(0.0, 1.0), first, last);
+    if share.x >= share.y {
+        return none;
+    }
+    let length = part.y - part.x;
+    return vec2(part.x + rn(share.x * length), part.x + rn(share.y * length));
+}
+
+// Whether the triangle is not farther away than all of the edge, nor beside its box.
+fn may_lie_behind(s: Segment, a: Vertex, b: Vertex, c: Vertex) -> bool {
+    let low = vec2<f32>(vec2(min(min(a.x, b.x), c.x), min(min(a.y, b.y), c.y)));
+    let high = vec2<f32>(vec2(max(max(a.x, b.x), c.x), max(max(a.y, b.y), c.y)));
+    return max(max(a.z, b.z), c.z) > min(s.depths.x, s.depths.y)
+        && all(low <= max(s.ends.xy, s.ends.zw)) && all(high >= min(s.ends.xy, s.ends.zw));
+}
+
+// How much the depth of a triangle's plane may be off because of where its corners and the edge are on screen; -1 of one without area.
+fn slack_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
+    // So that nothing overflows, by exponents: 2^31.
+    let exponents = max(max(exponents_of(p), exponents_of(q)), exponents_of(r));
+    if any(exponents >= vec4(0x4F000000u)) {
+        return 0.0;
+    }
+    let in_x = vec3(p.x, q.x, r.x);
+    let in_z = vec3(p.z, q.z, r.z);
+    let x = cofactors(vec3(p.y, q.y, r.y), vec3(p.w, q.w, r.w));
+    let y = cofactors(vec3(p.w, q.w, r.w), in_x);
+    let volume = abs(sum3(rn3(x * in_x)));
+    if volume > MIN_POSITIVE {
+        return rn(rn((abs(sum3(rn3(x * in_z))) + abs(sum3(rn3(y * in_z)))) * recip(volume)) * SNAPPED);
+    }
+    return -1.0;
+}
+
+fn exponents_of(p: vec4<f32>) -> vec4<u32> {
+    return bitcast<vec4<u32>>(p) & vec4(0x7F800000u);
+}
+
+// What each corner has in common with the other two: a x b of its neighbours.
+fn cofactors(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
+    return rn3(a.yzx * b.zxy) - rn3(b.yzx * a.zxy);
+}
+
+fn sum3(v: vec3<f32>) -> f32 {
+    return rn(v.x + v.y) + v.z;
+}
+
+// Of each side of a triangle, twice the area that it spans with a point; positive inside.
+fn sides_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, at: vec2<f32>, is_clockwise: bool) -> vec3<f32> {
+    let a = rn2(p.xy - rn2(at * p.w));
+    let b = rn2(q.xy - rn2(at * q.w));
+    let c = rn2(r.xy - rn2(at * r.w));
+    let sides = rn3(vec3(b.x, c.x, a.x) * vec3(c.y, a.y, b.y)) - rn3(vec3(b.y, c.y, a.y) * vec3(c.x, a.x, b.x));
+    return select(-sides, sides, is_clockwise);
+}
+
+// By how much the triangle is nearer than the edge at t of the way.
+fn nearer_by(
+    s: Segment, at_start: vec3<f32>, at_end: vec3<f32>, depths: vec3<f32>, ws: vec3<f32>, slack: f32, t: f32,
+) -> f32 {
+    let weights = max(at_start + rn3(t * (at_end - at_start)), vec3(0.0));
+    let z = rn3(weights * depths);
+    let w = rn3(weights * ws);
+    let depth = rn(rn(z.x + z.y) + z.z);
+    let scale = rn(rn(w.x + w.y) + w.z);
+    if scale > MIN_POSITIVE {
+        return (rn(depth * recip(scale)) - rn(depth_of(s, t) * NEARER)) - slack;
+    }
+    return -1.0;
+}
+
+// A range cut down to where the affine function with these values at 0 and 1 is positive.
+fn narrowed(range: vec2<f32>, at_0: f32, at_1: f32) -> vec2<f32> {
+    if at_0 < 0.0 {
+        return vec2(max(range.x, rn(-at_0 * recip(at_1 - at_0))), range.y);
+    } else if at_1 < 0.0 {
+        return vec2(range.x, min(range.y, rn(at_0 * recip(at_0 - at_1))));
+    }
+    return range;
+}

@@ -1,0 +1,252 @@
+// Stage 4, a stroke in a pixel: how much of the pixel it covers, and where. Twin of src/backend/cpu/lines/stroke.rs.
+
+// Farthest from the middle of a unit box to its corner.
+const BOX_RADIUS: f32 = 0.70710678;
+
+// Steps to the pixel in which along and across are measured.
+const UNIT: f32 = 16384.0;
+
+// Largest scaled area.
+const LIMIT: f32 = 16000.0;
+
+// Words of a pixel's strokes: sum of areas in 1/65536, sum of points, how often either has gone round (areas in the lower half), eight
+// of the points of any, and the most that an area differs from its points'.
+override STROKE_WORDS: u32 = 0u;
+
+// A stroke seen from a pixel: bounds of what its points are compared with, a value each where the line has no ramp.
+struct Stroke {
+    // Unit vector along, in 1/16384.
+    along: vec2<i32>,
+    // Of the pixel's centre, pixels: how far from the line.
+    across: f32,
+    // Bounds along.
+    first: i32,
+    last: i32,
+    // Whether the pixel reaches past the start, and past the end, whose discs then count.
+    discs: vec2<bool>,
+    // Whether the strip touches the pixel at all.
+    has_strip: bool,
+    // From the ends to the pixel's centre, scaled.
+    from_start: vec2<i32>,
+    from_end: vec2<i32>,
+    // Squares of their lengths, pixels.
+    away: vec2<f32>,
+};
+
+// From the middle of the line to the farthest pixel's centre that it touches.
+fn reach_of_line() -> f32 {
+    return 0.5 * batch.line_width + 0.5 * batch.line_smoothing + BOX_RADIUS;
+}
+
+// Half the width where the line is as dense as a level, a share of its peak.
+fn radius_at(level: u32) -> f32 {
+    let half_width = 0.5 * batch.line_width;
+    let half_ramp = 0.5 * batch.line_smoothing;
+    let share = rn(((f32((level * 7u) % 16u) + 0.5) * 0.0625) * batch.line_peak);
+    return rn(half_width + half_ramp) - rn(share * (2.0 * half_ramp));
+}
+
+// Where a pixel's centre lies in the direction of a piece of an edge.
+struct Place {
+    // How far from the line.
+    across: f32,
+    // How far past the start, and past the end.
+    past: vec2<f32>,
+    // How far beyond either.
+    beyond: f32,
+};
+
+// `start` and `end` are the piece's, in pixels from the pixel's centre, `along` the edge's direction.
+fn place_of(along: vec2<f32>, start: vec2<f32>, end: vec2<f32>) -> Place {
+    let across = rn(along.y * start.x) - rn(along.x * start.y);
+    let past_start = -(rn(along.x * start.x) + rn(along.y * start.y));
+    let past_end = -(rn(along.x * end.x) + rn(along.y * end.y));
+    return Place(across, vec2(past_start, past_end), max(max(-past_start, past_end), 0.0));
+}
+
+// Whether a piece of an edge comes as close to a pixel as its line reaches.
+fn touches(place: Place) -> bool {
+    let reach = reach_of_line();
+    return rn(place.across * place.across) + rn(place.beyond * place.beyond) <= rn(reach * reach);
+}
+
+// Adds what a piece of an edge covers of a pixel that it touches to its strokes. Whether it covers anything.
+fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>) -> bool {
+    let reach = reach_of_line();
+    let place = place_of(along, start, end);
+    let across = place.across;
+    let box_along = select(MIN_POSITIVE, 0.5 * (abs(along.x) + abs(along.y)), any(along != vec2(0.0)));
+    var stroke: Stroke;
+    stroke.along = vec2(round_to_i32(along.x * UNIT), round_to_i32(along.y * UNIT));
+    stroke.across = across;
+    let is_past_end = place.past.y > -box_along;
+    let reaches = vec2(place.past.x < box_along, is_past_end);
+    var area = 0.0;
+    if !any(reaches) {
+        area = strip_area(vec2(-along.y, along.x), abs(across));
+        if area == 0.0 {
+            return false;
+        }
+        stroke.first = -0x8000;
+        stroke.last = 0x8000;
+        stroke.has_strip = true;
+    } else {
+        stroke.first = units(-place.past.x);
+        stroke.last = units(-place.past.y);
+        // An edge that is a point has no sides, only the disc around it.
+        stroke.has_strip = any(along != vec2(0.0)) && place.beyond < box_along;
+        stroke.away = vec2(rn(start.x * start.x) + rn(start.y * start.y), rn(end.x * end.x) + rn(end.y * end.y));
+        stroke.discs = reaches & (stroke.away <= vec2(rn(reach * reach)));
+        stroke.from_start = scaled(select(vec2(0.0), start, stroke.discs.x));
+        stroke.from_end = scaled(select(vec2(0.0), end, stroke.discs.y));
+    }
+    let at = pixel_at * STROKE_WORDS;
+    var points = 0u;
+    // Zero is a number that compilers do not know: where they unroll this, they take twice as long.
+    for (var w = 0u; w < 8u + frame.zero; w++) {
+        var mask = 0u;
+        for (var half = 0u; half < 2u + frame.zero; half++) {
+            mask |= points_of(stroke, 2u * w + half) << (16u * half);
+        }
+        if mask != 0u {
+            points += countOneBits(mask);
+            atomicOr(&strokes[at + 3u + w], mask);
+        }
+    }
+    if any(reaches) {
+        if points == 0u {
+            return false;
+        }
+        area = f32(points) * (batch.line_peak * (1.0 / 256.0));
+    }
+    let scaled_area = u32(area * 65536.0 + 0.5);
+    let of_points = u32(rn(f32(points) * (batch.line_peak * 256.0)) + 0.5);
+    atomicMax(&strokes[at + 11u], max(scaled_area, of_points) - min(scaled_area, of_points));
+    // A sum that has gone round is smaller than what was added.
+    var rounds = 0u;
+    if atomicAdd(&strokes[at], scaled_area) + scaled_area < scaled_area {
+        rounds = 1u;
+    }
+    if atomicAdd(&strokes[at + 1u], points) + points < points {
+        rounds += 0x10000u;
+    }
+    if rounds > 0u {
+        atomicAdd(&strokes[at + 2u], rounds);
+    }
+    return true;
+}
+
+// Whether all points of a pixel are covered, so that nothing that comes can change anything.
+fn is_full(pixel_at: u32) -> bool {
+    let counts = pixel_at * STROKE_WORDS + 1u;
+    let at = counts + 2u;
+    // One stroke may cover all points and yet leave a corner.
+    if atomicLoad(&strokes[counts]) <= 256u && atomicLoad(&strokes[counts + 1u]) < 0x10000u {
+        return false;
+    }
+    // No loop: where loops are limited, the pixels found may be many.
+    let first = atomicLoad(&strokes[at]) & atomicLoad(&strokes[at + 1u])
+        & atomicLoad(&strokes[at + 2u]) & atomicLoad(&strokes[at + 3u]);
+    if first != 0xFFFFFFFFu {
+        return false;
+    }
+    let last = atomicLoad(&strokes[at + 4u]) & atomicLoad(&strokes[at + 5u])
+        & atomicLoad(&strokes[at + 6u]) & atomicLoad(&strokes[at + 7u]);
+    return last == 0xFFFFFFFFu;
+}
+
+fn units(v: f32) -> i32 {
+    return round_to_i32(clamp(v, -1.0, 1.0) * UNIT);
+}
+
+fn square_unit() -> f32 {
+    return f32(1u << batch.line_exponent);
+}
+
+fn scaled(end: vec2<f32>) -> vec2<i32> {
+    return vec2(round_to_i32(-end.x * square_unit()), round_to_i32(-end.y * square_unit()));
+}
+
+fn limit_of(radius: f32, away: f32) -> i32 {
+    return round_to_i32(clamp(rn(0.5 * (rn(radius * radius) - away)) * square_unit(), -LIMIT, LIMIT));
+}
+
+// The bounds that the sixteen points of a word of the mask are compared with: across, and for the discs.
+struct Bounds {
+    low: i32,
+    high: i32,
+    discs: vec2<i32>,
+};
+
+fn bounds_of(stroke: Stroke, word: u32) -> Bounds {
+    var radius = 0.5 * batch.line_width;
+    if batch.line_smoothing > 0.0 {
+        radius = radius_at(word);
+    }
+    let discs = vec2(limit_of(radius, stroke.away.x), limit_of(radius, stroke.away.y));
+    return Bounds(units(-radius - stroke.across), units(radius - stroke.across), discs);
+}
+
+// Which points of a word a stroke covers.
+fn points_of(stroke: Stroke, word: u32) -> u32 {
+    let bounds = bounds_of(stroke, word);
+    return four_points(stroke, bounds, word, 0u) | four_points(stroke, bounds, word, 4u)
+        | four_points(stroke, bounds, word, 8u) | four_points(stroke, bounds, word, 12u);
+}
+
+// Bit j of word l is point 16 j + l, here for j from `first` on. Where a point lies: i steps to the right, 181 i down.
+fn four_points(stroke: Stroke, bounds: Bounds, word: u32, first: u32) -> u32 {
+    let i = 16u * (vec4(first) + vec4(0u, 1u, 2u, 3u)) + word;
+    let x = (2 * vec4<i32>(i) - 255) * 128;
+    let y = (2 * vec4<i32>((181u * i) & vec4(255u)) - 255) * 128;
+    var covered = vec4(false);
+    if stroke.has_strip {
+        let across = ((-stroke.along.y * x) >> vec4(16u)) + ((stroke.along.x * y) >> vec4(16u));
+        let along = ((stroke.along.x * x) >> vec4(16u)) + ((stroke.along.y * y) >> vec4(16u));
+        covered = (across >= vec4(bounds.low)) & (across <= vec4(bounds.high))
+            & (along >= vec4(stroke.first)) & (along <= vec4(stroke.last));
+    }
+    if any(stroke.discs) {
+        let half_square = (((x * x) >> vec4(16u)) + ((y * y) >> vec4(16u))) >> vec4(17u - batch.line_exponent);
+        if stroke.discs.x {
+            covered = covered | (half_square + product(stroke.from_start, x, y) <= vec4(bounds.discs.x));
+        }
+        if stroke.discs.y {
+            covered = covered | (half_square + product(stroke.from_end, x, y) <= vec4(bounds.discs.y));
+        }
+    }
+    let bits = select(vec4(0u), vec4(1u, 2u, 4u, 8u), covered);
+    return ((bits.x | bits.y) | (bits.z | bits.w)) << first;
+}
+
+fn product(v: vec2<i32>, x: vec4<i32>, y: vec4<i32>) -> vec4<i32> {
+    return ((v.x * x) >> vec4(16u)) + ((v.y * y) >> vec4(16u));
+}
+
+// Coverage of a pixel's box by a strip whose middle is that far away: the integral over the strip's width of a trapezoid of
+// area 1.
+fn strip_area(normal: vec2<f32>, distance: f32) -> f32 {
+    let n = abs(normal);
+    let half_ramp = 0.5 * batch.line_smoothing;
+    let half_width = 0.5 * batch.line_width;
+    let foot = 0.5 * (n.x + n.y) + half_ramp;
+    let top = abs(0.5 * abs(n.x - n.y) - half_ramp);
+    let height = 1.0 / (foot + top);
+    var flank = 0.0;
+    if foot > top {
+        flank = 0.5 * height / (foot - top);
+    }
+    if distance >= half_width + foot {
+        return 0.0;
+    }
+    let outer = half_integral(foot, top, height, flank, distance + half_width);
+    return clamp(outer - half_integral(foot, top, height, flank, distance - half_width), 0.0, 1.0);
+}
+
+// Integral of the trapezoid from its middle to u.
+fn half_integral(foot: f32, top: f32, height: f32, flank: f32, u: f32) -> f32 {
+    let a = min(abs(u), foot);
+    let past = max(a - top, 0.0);
+    let half = height * a - flank * past * past;
+    return select(half, -half, u < 0.0);
+}

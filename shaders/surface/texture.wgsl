@@ -1,0 +1,169 @@
+// Texture lookups. Twin of src/backend/cpu/surface/texture.rs: the same bits, because texels decide what a mask leaves and where
+// nearest texels change.
+
+@group(1) @binding(18) var<storage, read> uvs: array<vec2<f32>>;
+// Four items an image, as src/plan/surface/mod.rs has them; then texels, two halves a word.
+@group(1) @binding(20) var<storage, read> texels: array<vec2<u32>>;
+
+// Coordinates beyond this have no fraction worth speaking of.
+const UV_MAX: f32 = 1048576.0;
+
+// Texture coordinates at a point, and how they change a pixel to the right and a pixel down.
+struct Uv {
+    at: vec2<f32>,
+    dx: vec2<f32>,
+    dy: vec2<f32>,
+};
+
+fn uv_of(id: u32, b: Barycentrics) -> Uv {
+    let first = frame.uv_triangles_at + 3u * id;
+    let p = uvs[corner_triangles[first]];
+    let q = uvs[corner_triangles[first + 1u]];
+    let r = uvs[corner_triangles[first + 2u]];
+    return Uv(blend2(b.value, p, q, r), blend2(b.dx, p, q, r), blend2(b.dy, p, q, r));
+}
+
+// A material's use of a texture.
+struct Use {
+    // Rows of the transform.
+    u: vec3<f32>,
+    v: vec3<f32>,
+    texture: u32,
+    sampler: u32,
+};
+
+fn use_of(m: u32, slot: u32) -> Use {
+    let head = materials[m].textures[2u * slot];
+    let tail = materials[m].textures[2u * slot + 1u];
+    let u = bitcast<vec3<f32>>(head.xyz);
+    return Use(u, vec3(bitcast<f32>(head.w), bitcast<vec2<f32>>(tail.xy)), tail.z, tail.w);
+}
+
+// A difference of coordinates, as the texture sees it.
+fn turned(used: Use, d: vec2<f32>) -> vec2<f32> {
+    return vec2(rn(used.u.x * d.x) + rn(used.u.y * d.y), rn(used.v.x * d.x) + rn(used.v.y * d.y));
+}
+
+struct Image {
+    size: vec2<u32>,
+    first_level: u32,
+    levels: u32,
+    first_texel: u32,
+};
+
+// Linear RGBA of a texture, trilinear; white where there is none.
+fn sample_texture(m: u32, slot: u32, uv: Uv) -> vec4<f32> {
+    let used = use_of(m, slot);
+    if used.texture >= frame.image_count {
+        return vec4(1.0);
+    }
+    let words = texels[4u * used.texture + 1u];
+    let first = texels[4u * used.texture + 2u].x + 4u * frame.image_count;
+    let image = Image(texels[4u * used.texture], words.x, words.y, first);
+    let at = bounded(turned(used, uv.at) + vec2(used.u.z, used.v.z), UV_MAX);
+    let size = vec2<f32>(image.size);
+    let x = rn2(turned(used, uv.dx) * size);
+    let y = rn2(turned(used, uv.dy) * size);
+    let step = max(rn(x.x * x.x) + rn(x.y * x.y), rn(y.x * y.x) + rn(y.y * y.y));
+    let lod = max(min(half_log2(step), f32(image.levels) - 1.0), f32(image.first_level));
+    if (used.sampler & 16u) != 0u {
+        return nearest(image, u32(lod + 0.5), at, used.sampler);
+    }
+    let level = u32(lod);
+    let share = lod - f32(level);
+    let fine = bilinear(image, level, at, used.sampler);
+    if share > 0.0 {
+        return mixed(fine, bilinear(image, level + 1u, at, used.sampler), share);
+    }
+    return fine;
+}
+
+// Finite, and near enough to have a fraction.
+fn bounded(v: vec2<f32>, most: f32) -> vec2<f32> {
+    return clamp(select(vec2(0.0), v, abs(v) <= vec2(1e30)), vec2(-most), vec2(most));
+}
+
+// Half the binary logarithm, to 1e-4: exact at powers of two, a polynomial in between.
+fn half_log2(v: f32) -> f32 {
+    let bits = bitcast<u32>(select(1e30, max(v, 1e-30), v < 1e30));
+    let t = bitcast<f32>((bits & 0x7FFFFFu) | 0x3F800000u) - 1.0;
+    let bend = 0.43807 + rn(t * (rn(t * 0.0803) - 0.23669));
+    return 0.5 * (f32(i32(bits >> 23u) - 127) + (t + rn(rn(t * (1.0 - t)) * bend)));
+}
+
+fn bilinear(image: Image, level_in: u32, at: vec2<f32>, sampler: u32) -> vec4<f32> {
+    let level = min(level_in, max(image.levels, 1u) - 1u);
+    let size = level_size(image, level);
+    let across = neighbours(at.x, size.x, sampler & 3u);
+    let down = neighbours(at.y, size.y, (sampler >> 2u) & 3u);
+    let first = i32(level_start(image, level));
+    let upper_row = first + down.low * size.x;
+    let lower_row = first + down.high * size.x;
+    let upper = mixed(texel(upper_row + across.low), texel(upper_row + across.high), across.share);
+    let lower = mixed(texel(lower_row + across.low), texel(lower_row + across.high), across.share);
+    return mixed(upper, lower, down.share);
+}
+
+fn nearest(image: Image, level_in: u32, at: vec2<f32>, sampler: u32) -> vec4<f32> {
+    let level = min(level_in, max(image.levels, 1u) - 1u);
+    let size = level_size(image, level);
+    let modes = vec2(sampler & 3u, (sampler >> 2u) & 3u);
+    let x = texel_index(i32(floor(rn(wrapped(at.x, modes.x) * f32(size.x)))), size.x, modes.x);
+    let y = texel_index(i32(floor(rn(wrapped(at.y, modes.y) * f32(size.y)))), size.y, modes.y);
+    return texel(i32(level_start(image, level)) + y * size.x + x);
+}
+
+fn level_size(image: Image, level: u32) -> vec2<i32> {
+    return vec2<i32>(max(image.size >> vec2(level), vec2(1u)));
+}
+
+fn level_start(image: Image, level: u32) -> u32 {
+    var start = image.first_texel;
+    for (var k = image.first_level; k < min(level, 32u); k++) {
+        let size = max(image.size >> vec2(k), vec2(1u));
+        start += size.x * size.y;
+    }
+    return start;
+}
+
+// The two texels around a coordinate, and how far it is from the first to the second.
+struct Neighbours {
+    low: i32,
+    high: i32,
+    share: f32,
+};
+
+fn neighbours(u: f32, size: i32, mode: u32) -> Neighbours {
+    let s = rn(wrapped(u, mode) * f32(size)) - 0.5;
+    let i = floor(s);
+    return Neighbours(texel_index(i32(i), size, mode), texel_index(i32(i) + 1, size, mode), s - i);
+}
+
+// A coordinate in 0 to 1.
+fn wrapped(u: f32, mode: u32) -> f32 {
+    if mode == 0u {
+        return u - floor(u);
+    }
+    if mode == 1u {
+        return 1.0 - abs((u - 2.0 * floor(0.5 * u)) - 1.0);
+    }
+    return clamp(u, 0.0, 1.0);
+}
+
+// A texel that may lie one beyond the edge.
+fn texel_index(i: i32, size: i32, mode: u32) -> i32 {
+    if mode == 0u {
+        return select(select(i, i - size, i >= size), i + size, i < 0);
+    }
+    // The mirror's first texel beyond the edge is the last before it.
+    return clamp(i, 0, size - 1);
+}
+
+fn texel(index: i32) -> vec4<f32> {
+    let halves = texels[index];
+    return vec4(unpack2x16float(halves.x), unpack2x16float(halves.y));
+}
+
+fn mixed(a: vec4<f32>, b: vec4<f32>, share: f32) -> vec4<f32> {
+    return a + rn4((b - a) * share);
+}

@@ -1,0 +1,183 @@
+//! Bands of rows: how one is drawn from start to finish.
+
+pub(crate) mod bins;
+pub(crate) mod scratch;
+use self::bins::{Bin, Bins};
+use self::scratch::BandScratch;
+use super::isa::dispatch;
+use super::{Stages, resolve};
+use crate::backend::cpu::deadline_poll::Watch;
+use crate::backend::cpu::geometry::nearest::Nearest;
+use crate::backend::cpu::geometry::samples::SampleBand;
+use crate::backend::cpu::geometry::visibility;
+use crate::backend::cpu::geometry::visibility::Setup;
+use crate::backend::cpu::lines::coverage::{Ink, Inker};
+use crate::backend::cpu::lines::edge::{LineDrawer, LineTarget};
+use crate::backend::cpu::lines::line_light;
+use crate::backend::cpu::peeling::composite;
+use crate::backend::cpu::peeling::composite::LayerBand;
+use crate::backend::cpu::surface::light::Light;
+use crate::backend::cpu::surface::shade;
+use crate::plan::LinePass;
+
+/// Edges between two looks at the deadline. Those of wide lines count their pixels too.
+const EDGES_A_LOOK: usize = 256;
+
+/// Draws band number `band` into its rows of the picture.
+pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, rgba: &mut [u8]) {
+    let (plan, isa) = (stages.plan, stages.isa);
+    let pixels = rgba.len() / 4;
+    fill_samples(stages, scratch, bins, band);
+    scratch.colors.clear();
+    scratch.colors.resize(pixels, [0.0; 4]);
+    if let Some(pass) = plan.layers() {
+        let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples, scratch.rows));
+        composite::draw(stages, pass, (&bins.layers, band), &scratch.samples, layers, &mut scratch.colors);
+    } else if plan.is_shaded() {
+        shade_band(isa, stages, &scratch.samples, &mut scratch.colors);
+    }
+    draw_lines(stages, scratch, bins, band);
+    resolve::lay_over_background(plan, &mut scratch.colors);
+    resolve::encode(stages.srgb, &scratch.colors, rgba);
+}
+
+/// Draws band number `band` of the visibility buffer alone, as [`Renderer::draw_visibility`](super::Renderer) says.
+pub fn draw_visibility(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, words: &mut [u64]) {
+    fill_samples(stages, scratch, bins, band);
+    let samples = &scratch.samples;
+    for_each_sample(samples, words, |at| samples.word(at));
+}
+
+/// Draws band number `band` of a layer alone, likewise.
+pub fn draw_layer(
+    stages: &Stages<'_>,
+    scratch: &mut BandScratch,
+    bins: &Bins,
+    band: usize,
+    layer: u32,
+    words: &mut [u64],
+) {
+    fill_samples(stages, scratch, bins, band);
+    if let Some(pass) = stages.plan.layers() {
+        let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples, scratch.rows));
+        let found = composite::find(stages, pass, (&bins.layers, band), &scratch.samples, layers, layer);
+        for_each_sample(&layers.found, words, |at| found[at]);
+    }
+}
+
+/// Lays the lines of each pass over the colours, one pass after the other: what they need is the same however many there are.
+fn draw_lines(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
+    let plan = stages.plan;
+    let pixels = scratch.colors.len();
+    let inker = Inker::new(plan, &scratch.samples, scratch.layers.as_ref());
+    for (pass, bins) in plan.lines.iter().zip(&bins.edges) {
+        if bins.iter().all(|chunk| chunk.items_in(band).next().is_none()) {
+            continue;
+        }
+        let lit_pixels = if pass.lit && plan.lights_lines() { pixels } else { 0 };
+        scratch.ink.clear();
+        scratch.ink.resize(pixels, Ink::default());
+        scratch.owners.clear();
+        scratch.owners.resize(lit_pixels, 0);
+        let target = &mut LineTarget { ink: &mut scratch.ink, owners: &mut scratch.owners };
+        draw_edges(stages.isa, stages, pass, bins, band, &scratch.samples, target);
+        scratch.light.clear();
+        scratch.light.resize(lit_pixels, Light::NONE);
+        line_light::light_lines(stages, &scratch.samples, &scratch.owners, &mut scratch.light);
+        inker.lay(pass, &scratch.ink, &scratch.light, &mut scratch.colors);
+    }
+}
+
+/// Fills the words of a band's samples, given where each is.
+fn for_each_sample(band: &SampleBand, words: &mut [u64], word: impl Fn(usize) -> u64) {
+    for (i, out) in words.iter_mut().enumerate() {
+        let (pixel, s) = (i as u32 / band.samples, i as u32 % band.samples);
+        let (x, y) = (pixel % band.size_px[0], band.shown[0] + pixel / band.size_px[0]);
+        *out = word(band.index(x as i32, y as i32, s));
+    }
+}
+
+/// Moves the scratch to the band and fills its samples, unless nothing in the plan reads them.
+fn fill_samples(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
+    let plan = stages.plan;
+    let first = band as u32 * scratch.rows;
+    let end = (first + scratch.rows).min(plan.height_px);
+    let samples = &mut scratch.samples;
+    samples.shown = [first, end];
+    let [top, bottom] = plan.seen_range(plan.height_px);
+    samples.first_row = (first as i32 - scratch.margin as i32).max(top);
+    samples.rows = ((end + scratch.margin) as i32).min(bottom).abs_diff(samples.first_row);
+    if plan.surface.is_some() || plan.hull.is_some() {
+        scratch.samples.clear();
+        draw_triangles(stages.isa, stages, bins, band, &mut scratch.samples);
+    }
+}
+
+dispatch! {
+    /// The visibility stage of a band.
+    pub fn draw_triangles(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) = triangles_kernel
+}
+
+dispatch! {
+    /// The shade stage of a band.
+    pub fn shade_band(stages: &Stages<'_>, samples: &SampleBand, colors: &mut [[f32; 4]]) = shade::shade
+}
+
+dispatch! {
+    /// The line stage of a band.
+    pub fn draw_edges(
+        stages: &Stages<'_>,
+        pass: &LinePass,
+        bins: &[Bin],
+        band: usize,
+        samples: &SampleBand,
+        target: &mut LineTarget<'_>,
+    ) = edges_kernel
+}
+
+#[inline(always)]
+fn triangles_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) {
+    let mut watch = Watch::new(stages.deadline);
+    for chunk in &bins.triangles {
+        // What is not in ascending order comes with ties looked at.
+        let ordered = chunk.whole.is_ordered() && !stages.plan.projection.clip;
+        for (id, piece) in chunk.pieces_in(band) {
+            let setup = Setup::new(piece);
+            if watch.is_over(setup.map_or(0, |setup| visibility::draw(&setup, id, &mut Nearest::<true>(samples)))) {
+                return;
+            }
+        }
+        for id in chunk.whole.items_in(band) {
+            let setup = Setup::new(&stages.screen_triangle(id));
+            let looked_at = match setup {
+                Some(setup) if ordered => visibility::draw(&setup, id, &mut Nearest::<false>(samples)),
+                Some(setup) => visibility::draw(&setup, id, &mut Nearest::<true>(samples)),
+                None => 0,
+            };
+            if watch.is_over(looked_at) {
+                return;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn edges_kernel(
+    stages: &Stages<'_>,
+    pass: &LinePass,
+    bins: &[Bin],
+    band: usize,
+    samples: &SampleBand,
+    target: &mut LineTarget<'_>,
+) {
+    let mut drawer = LineDrawer::new(stages, pass, samples, samples.shown);
+    for chunk in bins {
+        for (i, edge) in chunk.items_in(band).enumerate() {
+            // A wide line's edge is as much work as hundreds of others.
+            if (i % EDGES_A_LOOK == 0 || drawer.has_looked_far()) && stages.deadline.check().is_err() {
+                return;
+            }
+            drawer.draw(&pass.edges[edge as usize], target);
+        }
+    }
+}

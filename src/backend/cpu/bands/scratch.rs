@@ -1,0 +1,287 @@
+//! Memory of bands: how large they are, and their buffers.
+
+use std::sync::{Mutex, PoisonError};
+
+use crate::backend::cpu::geometry::samples::SampleBand;
+use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::lines::coverage::Ink;
+use crate::backend::cpu::peeling::composite::LayerBand;
+use crate::backend::cpu::surface::light::Light;
+use crate::plan::DrawPlan;
+
+/// Memory of a band, bytes: half of a common 1 MiB second-level cache.
+const BAND_BYTES: usize = 512 << 10;
+
+/// Rows of a band, at least, of a picture that has as many: a tall triangle is looked at once for each band.
+const ROWS_MIN: u32 = 4;
+
+/// Memory of all bands that are drawn at once, bytes, whatever is drawn on however many threads.
+pub const BANDS_BYTES_MAX: usize = 256 << 20;
+
+/// What is kept from picture to picture, bytes: of a band's scratch, and of vertices.
+pub const KEPT_BYTES_MAX: usize = 8 << 20;
+
+/// Bytes of a sample: depth and id.
+const SAMPLE_BYTES: usize = 8;
+
+/// How a picture is cut into bands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Banding {
+    /// Rows in each band but the last.
+    pub rows: u32,
+    /// Rows beyond a band that its lines look at.
+    pub margin: u32,
+    /// Bands that are drawn at once.
+    pub at_once: usize,
+}
+
+impl Banding {
+    /// For so many threads. Bands fit the cache, unless their lines look far beyond them: then a band has as many rows as lets
+    /// the threads do the most in [`BANDS_BYTES_MAX`], because small bands draw most samples for their neighbours, and of large
+    /// ones there are few at once.
+    pub fn new(plan: &DrawPlan<'_>, threads: usize) -> Self {
+        let margin = plan.line_margin_rows();
+        let cached = (BAND_BYTES / (row_bytes(plan, 1) + row_bytes(plan, 0)).max(1)) as u32;
+        let banding = |rows: u32| {
+            let rows = rows.max(cached).max(ROWS_MIN).clamp(1, plan.height_px.max(1));
+            let one = Self { rows, margin, at_once: 1 };
+            let most = threads.min(plan.height_px.div_ceil(rows) as usize).max(1);
+            Self { at_once: (BANDS_BYTES_MAX / one.bytes(plan).max(1)).clamp(1, most), ..one }
+        };
+        let is_small = |banding: &Self| banding.bytes(plan) <= BANDS_BYTES_MAX;
+        // Rows that are shown of those that are drawn, by all threads.
+        let yields = |b: &Self| b.at_once as u64 * (u64::from(b.rows) << 20) / u64::from(b.rows + 2 * b.margin);
+        let mut best = banding(0);
+        for share in (0..8).rev() {
+            let other = banding((2 * margin) >> share);
+            if !is_small(&best) || (is_small(&other) && yields(&other) >= yields(&best)) {
+                best = other;
+            }
+        }
+        best
+    }
+
+    /// Memory of the bands that are drawn at once.
+    pub fn bytes(&self, plan: &DrawPlan<'_>) -> usize {
+        let all = (self.rows + 2 * self.margin) as usize;
+        self.at_once * (all * row_bytes(plan, 0) + self.rows as usize * row_bytes(plan, 1))
+    }
+}
+
+/// Bytes of a row: of its samples (0), or of what there is only where a row is shown (1).
+fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
+    let samples = |columns: u32| columns as usize * plan.samples as usize + LANES;
+    if part == 0 {
+        return samples(plan.width_px + 2 * plan.margin_px) * SAMPLE_BYTES;
+    }
+    let light = if plan.lights_lines() { size_of::<Light>() + size_of::<u32>() } else { 0 };
+    let ink = if plan.lines.is_empty() { 0 } else { size_of::<Ink>() };
+    let layers = if plan.layers().is_some() { LayerBand::SAMPLE_BYTES } else { 0 };
+    plan.width_px as usize * (size_of::<[f32; 4]>() + light + ink) + samples(plan.width_px) * layers
+}
+
+/// A band's buffers, kept from band to band.
+pub struct BandScratch {
+    /// What each sample sees.
+    pub samples: SampleBand,
+    /// Rows that are shown; the last band of a picture may use fewer.
+    pub rows: u32,
+    /// Rows beyond these, above and below, that `samples` has room for too.
+    pub margin: u32,
+    /// Where the plan has layers.
+    pub layers: Option<LayerBand>,
+    /// A pixel, premultiplied linear RGBA.
+    pub colors: Vec<[f32; 4]>,
+    /// Of the line pass that is drawn just now.
+    pub ink: Vec<Ink>,
+    /// Where that is lit, whose light falls on its lines.
+    pub owners: Vec<u32>,
+    /// A pixel, where it is lit.
+    pub light: Vec<Light>,
+}
+
+impl BandScratch {
+    fn new(plan: &DrawPlan<'_>, Banding { rows, margin, .. }: Banding) -> Self {
+        Self {
+            samples: SampleBand::new([plan.width_px, plan.height_px], plan.margin_px, rows + 2 * margin, plan.samples),
+            rows,
+            margin,
+            layers: None,
+            colors: Vec::new(),
+            ink: Vec::new(),
+            owners: Vec::new(),
+            light: Vec::new(),
+        }
+    }
+
+    /// What it holds on to, bytes.
+    fn bytes(&self) -> usize {
+        self.samples.depth.len() * SAMPLE_BYTES
+            + self.layers.as_ref().map_or(0, LayerBand::bytes)
+            + self.colors.capacity() * size_of::<[f32; 4]>()
+            + self.ink.capacity() * size_of::<Ink>()
+            + self.owners.capacity() * size_of::<u32>()
+            + self.light.capacity() * size_of::<Light>()
+    }
+}
+
+/// Buffers of bands that nobody draws just now.
+#[derive(Default)]
+pub struct ScratchPool(Mutex<Vec<BandScratch>>);
+
+impl ScratchPool {
+    /// Lends a scratch that fits the plan.
+    pub fn with(&self, plan: &DrawPlan<'_>, banding: Banding, each: impl FnOnce(&mut BandScratch)) {
+        let size_px = [plan.width_px, plan.height_px];
+        let fits = |s: &BandScratch| {
+            s.samples.size_px == size_px
+                && (s.rows, s.margin) == (banding.rows, banding.margin)
+                && s.samples.margin == plan.margin_px
+                && s.samples.samples == plan.samples
+        };
+        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().filter(fits);
+        let mut scratch = kept.unwrap_or_else(|| BandScratch::new(plan, banding));
+        each(&mut scratch);
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
+    }
+
+    /// Lets go of what is too large to keep for another picture.
+    pub fn trim(&self) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).retain(|scratch| scratch.bytes() <= KEPT_BYTES_MAX);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::plan::{Faces, LayersPass, LinePass, Projection, Shown, SurfacePass};
+
+    fn plan(size_px: [u32; 2], passes: usize) -> DrawPlan<'static> {
+        let zero = [0.0; 4];
+        let axis = [0.0; 3];
+        let projection = Projection {
+            x: zero,
+            y: zero,
+            z: zero,
+            w: zero,
+            near_w: 0.5,
+            clip: false,
+            to_viewer: axis,
+            screen_up: axis,
+            screen_right: axis,
+        };
+        let (edges, shown) = (Arc::from([]), Shown::All);
+        let pass = LinePass {
+            edges,
+            width_px: 1.0,
+            smoothing_px: 0.0,
+            color: zero,
+            shown,
+            unseen_side: None,
+            contour: false,
+            lit: false,
+        };
+        let plan = DrawPlan::new(size_px, &[], &[], projection);
+        DrawPlan { samples: 4, lines: vec![pass; passes], ..plan }
+    }
+
+    /// Draws nothing in all of a band's buffers; whether they are kept for the next picture, after how many bytes.
+    fn is_kept(plan: &DrawPlan<'_>) -> (bool, usize) {
+        let (pool, banding) = (ScratchPool::default(), Banding::new(plan, 1));
+        let pixels = (plan.width_px * banding.rows) as usize;
+        let mut bytes = 0;
+        pool.with(plan, banding, |scratch| {
+            scratch.colors.resize(pixels, [0.0; 4]);
+            scratch.ink.resize(pixels, Ink::default());
+            bytes = scratch.bytes();
+        });
+        pool.trim();
+        (!pool.0.lock().unwrap_or_else(PoisonError::into_inner).is_empty(), bytes)
+    }
+
+    #[test]
+    fn a_band_fits_the_cache_however_many_lines_there_are() {
+        for (passes, rows) in [(0, 10), (1, 5), (12, 5), (500, 5)] {
+            let banding = Banding::new(&plan([1000, 900], passes), 8);
+            assert_eq!(banding, Banding { rows, margin: 0, at_once: 8 }, "{passes} passes");
+        }
+    }
+
+    /// All kinds of plans whose lines look far beyond a band.
+    fn with_wide_lines(each: &mut impl FnMut(&DrawPlan<'_>)) {
+        for size_px in [[4096, 4096], [4096, 100], [100, 4096], [1, 1], [640, 480]] {
+            for (samples, width_px) in [1, 4, 8, 16].into_iter().flat_map(|s| [1.0, 9.0, 110.0].map(|w| (s, w))) {
+                for (layered, passes) in [(false, 1), (true, 1), (false, 128), (true, 8192)] {
+                    let mut plan = plan(size_px, passes);
+                    let mut surface = SurfacePass::new(Faces::Both, Vec::new());
+                    surface.is_shaded = true;
+                    plan.surface = Some(surface);
+                    for lines in &mut plan.lines {
+                        (lines.width_px, lines.shown, lines.lit) = (width_px, Shown::Hidden, true);
+                    }
+                    let layers = LayersPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
+                    plan.layers = Some(layers).filter(|_| layered);
+                    plan.samples = samples;
+                    each(&plan);
+                    // Where the mesh goes on beyond the picture.
+                    plan.margin_px = plan.line_margin_rows();
+                    each(&plan);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bands_never_take_more_than_they_may() {
+        let (mut cases, mut alone) = (0, 0);
+        with_wide_lines(&mut |plan| {
+            for threads in [1, 2, 8, 64, 1024] {
+                let banding = Banding::new(plan, threads);
+                let bytes = banding.bytes(plan);
+                assert!(bytes <= BANDS_BYTES_MAX, "{bytes}: {banding:?} on {threads}, {:?}", plan.lines.first());
+                assert!((1..=threads).contains(&banding.at_once) && banding.rows >= 1);
+                // Of less than two bands of rows and margins there is little to share.
+                let is_large = plan.height_px > 4 * banding.margin && plan.height_px > banding.rows;
+                alone += usize::from(banding.at_once == 1 && threads > 1 && is_large);
+                cases += 1;
+            }
+        });
+        assert_eq!(cases, 2 * 5 * 12 * 4 * 5);
+        assert!(alone < cases / 20, "{alone} of {cases} pictures are drawn by one thread alone");
+    }
+
+    #[test]
+    fn a_band_takes_what_it_was_said_to() {
+        let mut cases = 0;
+        with_wide_lines(&mut |plan| {
+            let banding = Banding::new(plan, 1);
+            if banding.bytes(plan) > 32 << 20 {
+                return;
+            }
+            ScratchPool::default().with(plan, banding, |scratch| {
+                let pixels = (plan.width_px * banding.rows) as usize;
+                scratch.colors = Vec::with_capacity(pixels);
+                scratch.ink = Vec::with_capacity(pixels);
+                scratch.owners = Vec::with_capacity(pixels);
+                scratch.light = Vec::with_capacity(pixels);
+                scratch.layers = plan.layers().map(|_| LayerBand::new(&scratch.samples, scratch.rows));
+                assert_eq!(scratch.bytes(), banding.bytes(plan));
+            });
+            cases += 1;
+        });
+        assert!(cases > 100, "{cases}");
+    }
+
+    #[test]
+    fn only_what_is_small_is_kept() {
+        let (kept, bytes) = is_kept(&plan([1000, 900], 12));
+        assert!(kept && (300_000..700_000).contains(&bytes), "{bytes}");
+        let mut wide = plan([4096, 500], 1);
+        wide.surface = Some(SurfacePass::new(Faces::Both, Vec::new()));
+        (wide.lines[0].width_px, wide.lines[0].shown) = (50.0, Shown::Visible);
+        let (kept, bytes) = is_kept(&wide);
+        assert!(!kept && bytes > KEPT_BYTES_MAX, "{bytes}");
+    }
+}

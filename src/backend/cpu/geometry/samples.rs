@@ -1,0 +1,93 @@
+//! The visibility buffer of a band: what every sample sees, and how near it is.
+
+use crate::backend::cpu::isa::LANES;
+
+/// Calls `f::<S>` for `S` samples a pixel, so that its loops over them have a constant length.
+macro_rules! for_samples {
+    ($samples:expr, $($f:ident).+ ($($argument:expr),* $(,)?)) => {
+        match $samples {
+            1 => $($f).+::<1>($($argument),*),
+            4 => $($f).+::<4>($($argument),*),
+            8 => $($f).+::<8>($($argument),*),
+            _ => $($f).+::<16>($($argument),*),
+        }
+    };
+}
+pub(crate) use for_samples;
+
+/// No triangle.
+pub const NOTHING: u32 = u32::MAX;
+
+/// Rows of samples of one horizontal band of the picture.
+pub struct SampleBand {
+    /// Picture size, pixels.
+    pub size_px: [u32; 2],
+    /// Columns beyond the picture, left and right of it.
+    pub margin: u32,
+    /// First row of the band; negative above the picture.
+    pub first_row: i32,
+    /// Rows in the band.
+    pub rows: u32,
+    /// First row that is shown, and the row after the last; what lies beyond them in the band hides lines that reach into it.
+    pub shown: [u32; 2],
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Samples in a row, padded so that a vector may hang over the right edge.
+    pub stride: usize,
+    /// Reversed depth at `row * stride + x * samples + s`; 0 where there is nothing.
+    pub depth: Vec<f32>,
+    /// Triangle id, laid out likewise.
+    pub ids: Vec<u32>,
+}
+
+impl SampleBand {
+    /// An empty band at the top of a picture, with so many columns beyond it on each side.
+    pub fn new(size_px: [u32; 2], margin: u32, rows: u32, samples: u32) -> Self {
+        let stride = (size_px[0] + 2 * margin) as usize * samples as usize + LANES;
+        let len = stride * rows as usize;
+        let (depth, ids) = (vec![0.0; len], vec![NOTHING; len]);
+        Self { size_px, margin, first_row: 0, rows, shown: [0, rows], samples, stride, depth, ids }
+    }
+
+    /// Empties the band.
+    pub fn clear(&mut self) {
+        self.depth.fill(0.0);
+        self.ids.fill(NOTHING);
+    }
+
+    /// Columns, and rows, from the first to before the last, counted as the picture's are.
+    #[inline(always)]
+    pub fn range(&self) -> [[i32; 2]; 2] {
+        let margin = self.margin as i32;
+        [[-margin, self.size_px[0] as i32 + margin], [self.first_row, self.first_row + self.rows as i32]]
+    }
+
+    /// Index of sample `s` of the pixel at column `x`, row `y` of the picture, or beyond it.
+    #[inline(always)]
+    pub fn index(&self, x: i32, y: i32, s: u32) -> usize {
+        let column = (x + self.margin as i32) as u32;
+        (y - self.first_row) as usize * self.stride + (column * self.samples + s) as usize
+    }
+
+    /// What a sample sees, in one number: nearer is larger, of equal depths the lower id.
+    #[inline(always)]
+    pub fn word(&self, at: usize) -> u64 {
+        let id = self.ids[at];
+        if id == NOTHING { 0 } else { u64::from(self.depth[at].to_bits()) << 32 | u64::from(!id) }
+    }
+
+    /// Whether a pixel of the picture, or beyond, is in the band.
+    #[inline(always)]
+    pub fn has(&self, x: i32, y: i32) -> bool {
+        let [columns, rows] = self.range();
+        (x >= columns[0]) & (x < columns[1]) & (y >= rows[0]) & (y < rows[1])
+    }
+
+    /// Ids and depths of a pixel's samples.
+    #[inline(always)]
+    pub fn pixel(&self, x: i32, y: i32) -> (&[u32], &[f32]) {
+        let first = self.index(x, y, 0);
+        let samples = first..first + self.samples as usize;
+        (&self.ids[samples.clone()], &self.depth[samples])
+    }
+}

@@ -1,0 +1,260 @@
+//! Stage 2, a triangle: which samples it owns, and how near it is there. Twin of `shaders/geometry/visibility.wgsl`.
+//!
+//! Coverage is exact integer arithmetic on snapped vertices with the top-left rule: of two triangles that share an edge,
+//! every sample belongs to exactly one. Depth is evaluated from integer offsets, never incrementally, so it does not
+//! depend on where a traversal began.
+
+use super::samples::{SampleBand, for_samples};
+use super::transform::{ScreenVertex, recip};
+use crate::backend::cpu::isa::LANES;
+use crate::plan::{Faces, sample_offsets};
+
+/// A triangle, ready to be drawn and to have its depth evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct Setup {
+    /// Snapped corners, in an order that makes the area positive.
+    pub x: [i32; 3],
+    /// As `x`.
+    pub y: [i32; 3],
+    /// Depth at corner 0, and its change per 1/256 px.
+    pub depth: [f32; 3],
+    /// Smallest and largest depth of the corners.
+    pub depth_range: [f32; 2],
+}
+
+/// Twice the signed area in 1/65536 px; negative is counter-clockwise on screen, the front.
+#[inline(always)]
+pub fn area(v: &[ScreenVertex; 3]) -> i64 {
+    let d = |a: i32, b: i32| i64::from(a) - i64::from(b);
+    d(v[1].x, v[0].x) * d(v[2].y, v[0].y) - d(v[2].x, v[0].x) * d(v[1].y, v[0].y)
+}
+
+/// Whether `faces` wants a triangle of this area.
+#[inline(always)]
+pub fn is_wanted(faces: Faces, area: i64) -> bool {
+    match faces {
+        Faces::Both => area != 0,
+        Faces::Front => area < 0,
+        Faces::Back => area > 0,
+    }
+}
+
+impl Setup {
+    /// None where the triangle has no area.
+    #[inline(always)]
+    pub fn new(corners: &[ScreenVertex; 3]) -> Option<Self> {
+        let area = area(corners);
+        if area == 0 {
+            return None;
+        }
+        let [a, b, c] = if area > 0 { *corners } else { [corners[0], corners[2], corners[1]] };
+        let (dx1, dy1) = ((b.x - a.x) as f32, (b.y - a.y) as f32);
+        let (dx2, dy2) = ((c.x - a.x) as f32, (c.y - a.y) as f32);
+        let (dz1, dz2) = (b.z - a.z, c.z - a.z);
+        let inverse = recip(wide_to_f32(area.unsigned_abs()));
+        Some(Self {
+            x: [a.x, b.x, c.x],
+            y: [a.y, b.y, c.y],
+            depth: [a.z, (dz1 * dy2 - dz2 * dy1) * inverse, (dz2 * dx1 - dz1 * dx2) * inverse],
+            depth_range: [a.z.min(b.z).min(c.z), a.z.max(b.z).max(c.z)],
+        })
+    }
+
+    /// First and last pixel column and row that the triangle may touch, inside the band; None if none.
+    #[inline(always)]
+    fn bounds(&self, band: &SampleBand) -> Option<[[i32; 2]; 2]> {
+        let [columns, rows] = band.range();
+        Some([axis_bounds(&self.x, band.size_px[0], columns)?, axis_bounds(&self.y, band.size_px[1], rows)?])
+    }
+}
+
+/// First and last pixel along an axis of `size_px` pixels that the three coordinates span, from `from` to before `to`.
+#[inline(always)]
+pub fn axis_bounds(v: &[i32; 3], size_px: u32, [from, to]: [i32; 2]) -> Option<[i32; 2]> {
+    let half = size_px as i32 * 128;
+    let first = ((v[0].min(v[1]).min(v[2]) + half) >> 8).max(from);
+    let last = ((v[0].max(v[1]).max(v[2]) + half) >> 8).min(to - 1);
+    (first <= last).then_some([first, last])
+}
+
+/// The f32 of a wide integer, by the same two roundings as a GPU that has no 64-bit numbers.
+#[inline(always)]
+pub fn wide_to_f32(v: u64) -> f32 {
+    ((v >> 32) as u32 as f32) * 4_294_967_296.0 + (v as u32 as f32)
+}
+
+/// Where a triangle's samples go.
+pub trait Target {
+    /// Its rows of samples.
+    fn band(&self) -> &SampleBand;
+
+    /// Offers triangle `id` to the samples from index `at` on: its depth at each, and which lie outside it (negative).
+    fn offer(&mut self, at: usize, outside: &[i32; LANES], z: &[f32; LANES], id: u32);
+}
+
+/// Draws a triangle into the target. Among how many samples it was looked for.
+#[inline(always)]
+pub fn draw(setup: &Setup, id: u32, target: &mut impl Target) -> u64 {
+    for_samples!(target.band().samples, draw_sampled(setup, id, target))
+}
+
+#[inline(always)]
+fn draw_sampled<const S: usize>(setup: &Setup, id: u32, target: &mut impl Target) -> u64 {
+    let band = target.band();
+    let Some([columns, rows]) = setup.bounds(band) else { return 0 };
+    let edges = Edges::new(setup);
+    let lanes = [Lanes::new::<S>(&edges, 0), Lanes::new::<S>(&edges, LANES)];
+    // All samples lie multiples of 1/16 px from here.
+    let shift = sample_offsets(S as u32)[0][0] & 15;
+    let origin = [band.size_px[0] as i32 * 128 - shift, band.size_px[1] as i32 * 128 - shift];
+    let mut row = rows[0];
+    while row <= rows[1] {
+        let mut column = columns[0];
+        while column <= columns[1] {
+            let corner = [column * 256 - origin[0], row * 256 - origin[1]];
+            if let Some(values) = edges.at(corner) {
+                let size = [(columns[1] - column + 1).min(BLOCK), (rows[1] - row + 1).min(BLOCK)];
+                let block = Block { column, row, size, corner, values };
+                block.draw::<S>(setup, &edges, &lanes, id, target);
+            }
+            column += BLOCK;
+        }
+        row += BLOCK;
+    }
+    (columns[1] - columns[0] + 1) as u64 * (rows[1] - rows[0] + 1) as u64 * S as u64
+}
+
+/// Pixels along a side of a block, in which edge functions fit 32 bits.
+const BLOCK: i32 = 8;
+
+/// Edge functions of a triangle: `dx`, `dy` and the top-left bias of each edge.
+struct Edges {
+    dx: [i32; 3],
+    dy: [i32; 3],
+    start: [[i32; 2]; 3],
+    bias: [i64; 3],
+}
+
+impl Edges {
+    #[inline(always)]
+    fn new(s: &Setup) -> Self {
+        let dx = std::array::from_fn(|k| s.x[(k + 1) % 3] - s.x[k]);
+        let dy: [i32; 3] = std::array::from_fn(|k| s.y[(k + 1) % 3] - s.y[k]);
+        let bias = std::array::from_fn(|k| if dy[k] < 0 || (dy[k] == 0 && dx[k] > 0) { 0 } else { -1 });
+        Self { dx, dy, start: std::array::from_fn(|k| [s.x[k], s.y[k]]), bias }
+    }
+
+    /// Edge values in sixteenths at a pixel corner, for the 8 x 8 pixels from there; None where they lie outside an edge.
+    #[inline(always)]
+    fn at(&self, corner: [i32; 2]) -> Option<[i32; 3]> {
+        const SPAN: i64 = 127; // (8 pixels) * 16 - 1
+        let mut values = [0; 3];
+        for k in 0..3 {
+            let (dx, dy) = (i64::from(self.dx[k]), i64::from(self.dy[k]));
+            let (px, py) = (i64::from(corner[0] - self.start[k][0]), i64::from(corner[1] - self.start[k][1]));
+            let c = (dx * py - dy * px + self.bias[k]) >> 4;
+            if c + (dx * SPAN).max(0) + (-dy * SPAN).max(0) < 0 {
+                return None;
+            }
+            values[k] = c.clamp(-(1 << 30), 1 << 30) as i32;
+        }
+        Some(values)
+    }
+}
+
+/// What each lane adds: a vector covers all samples of `LANES / S` neighbouring pixels, or `LANES` of the samples of one.
+struct Lanes {
+    /// To each edge function.
+    edges: [[i32; LANES]; 3],
+    /// To the position, in 1/256 px.
+    x: [i32; LANES],
+    y: [i32; LANES],
+}
+
+impl Lanes {
+    #[inline(always)]
+    fn new<const S: usize>(edges: &Edges, first: usize) -> Self {
+        let offsets = sample_offsets(S as u32);
+        let (mut x, mut y) = ([0; LANES], [0; LANES]);
+        for l in 0..LANES {
+            x[l] = 16 * (l / S) as i32 + (offsets[(first + l) % S][0] >> 4);
+            y[l] = offsets[(first + l) % S][1] >> 4;
+        }
+        let mut steps = [[0; LANES]; 3];
+        for k in 0..3 {
+            for l in 0..LANES {
+                steps[k][l] = edges.dx[k] * y[l] - edges.dy[k] * x[l];
+            }
+        }
+        Self { edges: steps, x: x.map(|v| 16 * v), y: y.map(|v| 16 * v) }
+    }
+}
+
+/// Up to 8 x 8 pixels.
+struct Block {
+    column: i32,
+    row: i32,
+    size: [i32; 2],
+    corner: [i32; 2],
+    values: [i32; 3],
+}
+
+impl Block {
+    #[inline(always)]
+    fn draw<const S: usize>(
+        &self,
+        setup: &Setup,
+        edges: &Edges,
+        lanes: &[Lanes; 2],
+        id: u32,
+        target: &mut impl Target,
+    ) {
+        let pixels = (LANES / S).max(1) as i32;
+        for y in 0..self.size[1] {
+            let mut x = 0;
+            while x < self.size[0] {
+                let at = target.band().index(self.column + x, self.row + y, 0);
+                let from = [self.corner[0] + 256 * x - setup.x[0], self.corner[1] + 256 * y - setup.y[0]];
+                for part in 0..S.div_ceil(LANES) {
+                    let outside = self.outside(edges, &lanes[part], x, y);
+                    target.offer(at + LANES * part, &outside, &setup.depth_lanes(&lanes[part], from), id);
+                }
+                x += pixels;
+            }
+        }
+    }
+
+    /// Negative where a lane's sample lies outside an edge.
+    #[inline(always)]
+    fn outside(&self, edges: &Edges, lanes: &Lanes, x: i32, y: i32) -> [i32; LANES] {
+        let mut outside = [0_i32; LANES];
+        for k in 0..3 {
+            let base = self.values[k] + 16 * (edges.dx[k] * y - edges.dy[k] * x);
+            let steps = &lanes.edges[k];
+            for l in 0..LANES {
+                outside[l] |= base.wrapping_add(steps[l]);
+            }
+        }
+        outside
+    }
+}
+
+impl Setup {
+    /// Depth at each lane's sample; `from` is the vector's pixel corner relative to corner 0.
+    #[inline(always)]
+    fn depth_lanes(&self, lanes: &Lanes, from: [i32; 2]) -> [f32; LANES] {
+        let mut z = [0.0; LANES];
+        for l in 0..LANES {
+            let (x, y) = ((from[0] + lanes.x[l]) as f32, (from[1] + lanes.y[l]) as f32);
+            z[l] = clamp((self.depth[0] + self.depth[1] * x) + self.depth[2] * y, self.depth_range);
+        }
+        z
+    }
+}
+
+/// `min` and `max` in the order that maps to two machine instructions; no input is NaN.
+#[inline(always)]
+fn clamp(v: f32, range: [f32; 2]) -> f32 {
+    let v = if v > range[0] { v } else { range[0] };
+    if v < range[1] { v } else { range[1] }
+}

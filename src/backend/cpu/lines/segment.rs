@@ -1,0 +1,146 @@
+//! Stage 4, an edge on screen: where it lies, and which pixels it passes. Twin of `shaders/lines/segment.wgsl`.
+
+use crate::backend::cpu::Stages;
+use crate::backend::cpu::geometry::clip::clip_segment;
+use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, rsqrt};
+use crate::plan::Edge;
+
+/// Slack for roundings where only too much is harmless, pixels.
+pub const SLACK_PX: f32 = 0.05;
+
+/// An edge on screen.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment {
+    /// Ends, in 1/256 px from the picture's centre.
+    ends: [[f32; 2]; 2],
+    depths: [f32; 2],
+    /// First end, pixels from the picture's upper left corner.
+    pub start: [f32; 2],
+    /// The way from there to the other, pixels.
+    pub along: [f32; 2],
+    /// Pixels.
+    pub length: f32,
+    /// One over it; 0 where it is a point.
+    pub inverse_length: f32,
+}
+
+impl Segment {
+    /// None where the edge is out of the picture.
+    #[inline(always)]
+    pub fn new(stages: &Stages<'_>, edge: &Edge) -> Option<Self> {
+        let [a, b] = edge.vertices.map(|v| stages.vertices[v as usize]);
+        let [a, b] = if a.is_outside() || b.is_outside() { clip(stages, edge)? } else { [a, b] };
+        let plan = stages.plan;
+        let half = [plan.width_px as i32 * 128, plan.height_px as i32 * 128];
+        let px = |v: &ScreenVertex| [(v.x + half[0]) as f32 * (1.0 / 256.0), (v.y + half[1]) as f32 * (1.0 / 256.0)];
+        let (start, end) = (px(&a), px(&b));
+        let along = [end[0] - start[0], end[1] - start[1]];
+        let squared = along[0] * along[0] + along[1] * along[1];
+        let inverse_length = if squared > 0.0 { rsqrt(squared) } else { 0.0 };
+        let ends = [a, b].map(|v| [v.x as f32, v.y as f32]);
+        Some(Self { ends, depths: [a.z, b.z], start, along, length: squared * inverse_length, inverse_length })
+    }
+
+    /// First and last picture row that a line of this reach may touch; empty if first > last.
+    #[inline(always)]
+    pub fn rows(&self, reach: f32, height_px: u32) -> [i32; 2] {
+        let (a, b) = (self.start[1], self.start[1] + self.along[1]);
+        rows(a, b, reach, [0, height_px as i32])
+    }
+
+    /// Ends, in 1/256 px from the picture's centre.
+    #[inline(always)]
+    pub fn ends(&self) -> [[f32; 2]; 2] {
+        self.ends
+    }
+
+    /// Whether the triangle is not farther away than all of the edge, nor beside its box.
+    #[inline(always)]
+    pub fn may_lie_behind(&self, [a, b, c]: &[ScreenVertex; 3]) -> bool {
+        let [start, end] = self.ends;
+        let overlaps = |k: usize, a: i32, b: i32, c: i32| {
+            let (low, high) = (a.min(b).min(c) as f32, a.max(b).max(c) as f32);
+            (low <= start[k].max(end[k])) & (high >= start[k].min(end[k]))
+        };
+        (a.z.max(b.z).max(c.z) > self.depths[0].min(self.depths[1]))
+            & overlaps(0, a.x, b.x, c.x)
+            & overlaps(1, a.y, b.y, c.y)
+    }
+
+    /// Depth at `t` of the way.
+    #[inline(always)]
+    pub fn depth(&self, t: f32) -> f32 {
+        self.depths[0] + t * (self.depths[1] - self.depths[0])
+    }
+
+    /// The point at `t` of the way, pixels from the picture's upper left corner.
+    #[inline(always)]
+    pub fn point(&self, t: f32) -> [f32; 2] {
+        [self.start[0] + t * self.along[0], self.start[1] + t * self.along[1]]
+    }
+
+    /// The axis that the edge runs across more than along.
+    #[inline(always)]
+    pub fn across(&self) -> [i32; 2] {
+        if self.along[0].abs() >= self.along[1].abs() { [0, 1] } else { [1, 0] }
+    }
+
+    /// The pixels that the edge passes in a range of it, some twice.
+    #[inline(always)]
+    pub fn walk(&self, [from, to]: [f32; 2]) -> Walk {
+        let steps = (self.length * (to - from) * 2.0) as u32 + 1;
+        Walk { segment: *self, from, to, step: 0.5 * self.inverse_length, next: 0, steps, last: [i32::MIN; 2] }
+    }
+}
+
+/// Steps of half a pixel along an edge.
+pub struct Walk {
+    segment: Segment,
+    from: f32,
+    to: f32,
+    step: f32,
+    next: u32,
+    steps: u32,
+    last: [i32; 2],
+}
+
+impl Iterator for Walk {
+    type Item = [i32; 2];
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[i32; 2]> {
+        while self.next <= self.steps {
+            let at = self.segment.point((self.from + self.next as f32 * self.step).min(self.to));
+            let pixel = at.map(floor);
+            self.next += 1;
+            if pixel != self.last {
+                self.last = pixel;
+                return Some(pixel);
+            }
+        }
+        None
+    }
+}
+
+/// The largest integer that is not greater: left of and above the picture there are pixels too.
+#[inline(always)]
+fn floor(v: f32) -> i32 {
+    let towards_zero = v as i32;
+    towards_zero - i32::from(towards_zero as f32 > v)
+}
+
+/// First and last row, from `first` to before `end`, that a line between these heights may touch; empty if first > last.
+#[inline(always)]
+pub fn rows(a: f32, b: f32, reach: f32, [first, end]: [i32; 2]) -> [i32; 2] {
+    let reach = reach + SLACK_PX;
+    [((a.min(b) - reach) as i32).max(first), ((a.max(b) + reach) as i32).min(end - 1)]
+}
+
+fn clip(stages: &Stages<'_>, edge: &Edge) -> Option<[ScreenVertex; 2]> {
+    let projection = &stages.plan.projection;
+    // Where nothing is to be clipped, what is outside is not drawn: of triangles neither.
+    if !projection.clip {
+        return None;
+    }
+    clip_segment(projection, edge.vertices.map(|v| homogeneous(projection, stages.plan.positions[v as usize])))
+}

@@ -1,0 +1,100 @@
+//! Stage 2 once more, a round a layer: the nearest triangle behind the layer before. Twin of `shaders/peeling/emit_layer.wgsl`.
+
+use crate::backend::cpu::Stages;
+use crate::backend::cpu::bands::bins::TriangleBin;
+use crate::backend::cpu::deadline_poll::Watch;
+use crate::backend::cpu::geometry::samples::SampleBand;
+use crate::backend::cpu::geometry::transform::ScreenVertex;
+use crate::backend::cpu::geometry::visibility;
+use crate::backend::cpu::geometry::visibility::{Setup, Target};
+use crate::backend::cpu::isa::{LANES, dispatch};
+use crate::backend::cpu::peeling::composite::LayerBand;
+
+dispatch! {
+    /// Finds the next layer of a band.
+    pub fn peel(stages: &Stages<'_>, bins: (&[TriangleBin], usize), layers: &mut LayerBand) = peel_kernel
+}
+
+/// Keeps the nearest of what lies behind the last layer.
+struct Behind<'a> {
+    found: &'a mut SampleBand,
+    previous: &'a SampleBand,
+    /// Not 0 where the triangle lies behind the last layer of some sample.
+    pending: [u32; LANES],
+}
+
+impl Target for Behind<'_> {
+    #[inline(always)]
+    fn band(&self) -> &SampleBand {
+        self.found
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, at: usize, outside: &[i32; LANES], z: &[f32; LANES], id: u32) {
+        let lanes = (
+            self.found.depth.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>()),
+            self.found.ids.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>()),
+            self.previous.depth.get(at..).and_then(|d| d.first_chunk::<LANES>()),
+            self.previous.ids.get(at..).and_then(|d| d.first_chunk::<LANES>()),
+        );
+        let (Some(depths), Some(ids), Some(last_depths), Some(last_ids)) = lanes else { return };
+        let (old_depths, old_ids) = (*depths, *ids);
+        let mut keep = [0_u32; LANES];
+        for l in 0..LANES {
+            let behind = (z[l] < last_depths[l]) | ((z[l] == last_depths[l]) & (id > last_ids[l]));
+            let nearer = (z[l] > old_depths[l]) | ((z[l] == old_depths[l]) & (id < old_ids[l]));
+            let open = !((outside[l] >> 31) as u32) & u32::from(behind & (z[l] > 0.0)).wrapping_neg();
+            self.pending[l] |= open;
+            // All ones where the old sample stays.
+            keep[l] = !(open & u32::from(nearer).wrapping_neg());
+        }
+        for l in 0..LANES {
+            depths[l] = f32::from_bits((old_depths[l].to_bits() & keep[l]) | (z[l].to_bits() & !keep[l]));
+            ids[l] = (old_ids[l] & keep[l]) | (id & !keep[l]);
+        }
+    }
+}
+
+#[inline(always)]
+fn peel_kernel(stages: &Stages<'_>, (bins, band): (&[TriangleBin], usize), layers: &mut LayerBand) {
+    let LayerBand { found, previous, pending, .. } = layers;
+    let mut watch = Watch::new(stages.deadline);
+    let mut item = 0;
+    for chunk in bins {
+        for (id, piece) in chunk.pieces_in(band) {
+            if watch.is_over(offer(item, id, || *piece, found, previous, pending)) {
+                return;
+            }
+            item += 1;
+        }
+        for id in chunk.whole.items_in(band) {
+            if watch.is_over(offer(item, id, || stages.screen_triangle(id), found, previous, pending)) {
+                return;
+            }
+            item += 1;
+        }
+    }
+}
+
+/// Draws the band's triangle number `item`, unless an earlier round has seen the last of it. Among how many samples it was looked for.
+#[inline(always)]
+fn offer(
+    item: usize,
+    id: u32,
+    corners: impl Fn() -> [ScreenVertex; 3],
+    found: &mut SampleBand,
+    previous: &SampleBand,
+    pending: &mut Vec<bool>,
+) -> u64 {
+    if pending.get(item) == Some(&false) {
+        return 0;
+    }
+    let mut target = Behind { found, previous, pending: [0; LANES] };
+    let looked_at = Setup::new(&corners()).map_or(0, |setup| visibility::draw(&setup, id, &mut target));
+    let is_pending = target.pending != [0; LANES];
+    match pending.get_mut(item) {
+        Some(kept) => *kept = is_pending,
+        None => pending.push(is_pending),
+    }
+    looked_at
+}

@@ -1,0 +1,4 @@
+//! TODO room.
+
+pub(crate) mod composite;
+pub(crate) mod emit_layer;

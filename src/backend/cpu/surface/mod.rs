@@ -1,0 +1,9 @@
+//! TODO room.
+
+pub(crate) mod barycentric;
+pub(crate) mod debug;
+pub(crate) mod light;
+pub(crate) mod point;
+pub(crate) mod shade;
+pub(crate) mod texture;
+pub(crate) mod wire;

@@ -1,0 +1,182 @@
+//! Texture lookups. Twin of `shaders/surface/texture.wgsl`.
+//!
+//! The same bits on both back-ends, because texels decide what a mask leaves and where nearest texels change.
+
+use super::barycentric::Barycentrics;
+use crate::plan::{CornerValues, Texture, TextureUse, Textures};
+
+/// Coordinates beyond this have no fraction worth speaking of.
+const UV_MAX: f32 = 1_048_576.0;
+
+/// Texture coordinates at a point, and how they change a pixel to the right and a pixel down.
+pub struct Uv {
+    /// There.
+    pub at: [f32; 2],
+    d: [[f32; 2]; 2],
+}
+
+impl Uv {
+    /// Of triangle `id`.
+    pub fn new(uvs: &CornerValues<'_, [f32; 2]>, id: u32, b: &Barycentrics) -> Self {
+        let corners = uvs.triangles[id as usize].map(|i| uvs.values[i as usize]);
+        Self { at: blend(corners, b.value), d: b.derivatives().map(|d| blend(corners, d)) }
+    }
+}
+
+/// `w0 p0 + w1 p1 + w2 p2`.
+pub fn blend<const N: usize>([p, q, r]: [[f32; N]; 3], w: [f32; 3]) -> [f32; N] {
+    std::array::from_fn(|k| (w[0] * p[k] + w[1] * q[k]) + w[2] * r[k])
+}
+
+/// Linear RGBA of a texture, trilinear; white where there is none ([`TEXTURE_NONE`](crate::plan::TEXTURE_NONE)).
+pub fn sample(textures: &Textures, used: &TextureUse, uv: &Uv) -> [f32; 4] {
+    let Some(image) = textures.images.get(used.texture as usize) else {
+        return [1.0; 4];
+    };
+    let at = used.transform.map(|[a, b, c]| bounded((a * uv.at[0] + b * uv.at[1]) + c));
+    let size = [image.width as f32, image.height as f32];
+    let steps = uv.d.map(|d| {
+        let texels: [f32; 2] = std::array::from_fn(|k| {
+            let [a, b, _] = used.transform[k];
+            (a * d[0] + b * d[1]) * size[k]
+        });
+        texels[0] * texels[0] + texels[1] * texels[1]
+    });
+    let lod = half_log2(steps[0].max(steps[1])).min(image.levels as f32 - 1.0).max(image.first_level as f32);
+    if used.sampler & 16 != 0 {
+        return nearest(textures, image, (lod + 0.5) as u32, at, used.sampler);
+    }
+    let level = lod as u32;
+    let share = lod - level as f32;
+    let fine = bilinear(textures, image, level, at, used.sampler);
+    if share > 0.0 { mix(fine, bilinear(textures, image, level + 1, at, used.sampler), share) } else { fine }
+}
+
+/// Finite, and near enough to have a fraction.
+fn bounded(v: f32) -> f32 {
+    if v.abs() <= 1e30 { v.clamp(-UV_MAX, UV_MAX) } else { 0.0 }
+}
+
+/// Half the binary logarithm, to 1e-4: exact at powers of two, a polynomial in between.
+fn half_log2(v: f32) -> f32 {
+    let bits = if v < 1e30 { v.max(1e-30) } else { 1e30 }.to_bits();
+    let t = f32::from_bits(bits & 0x007F_FFFF | 0x3F80_0000) - 1.0;
+    let bend = 0.43807 + t * (t * 0.0803 - 0.23669);
+    0.5 * (((bits >> 23) as i32 - 127) as f32 + (t + (t * (1.0 - t)) * bend))
+}
+
+fn bilinear(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], sampler: u32) -> [f32; 4] {
+    let (first, size) = level_of(image, level);
+    let (mut low, mut high, mut share) = ([0; 2], [0; 2], [0.0; 2]);
+    for k in 0..2 {
+        let wrap = sampler >> (2 * k) & 3;
+        let s = wrapped(at[k], wrap) * size[k] as f32 - 0.5;
+        let i = floor(s);
+        share[k] = s - i as f32;
+        low[k] = texel_index(i, size[k], wrap);
+        high[k] = texel_index(i + 1, size[k], wrap);
+    }
+    let texel = |x: i32, y: i32| texel(textures, first + (y * size[0] + x) as u32);
+    let upper = mix(texel(low[0], low[1]), texel(high[0], low[1]), share[0]);
+    let lower = mix(texel(low[0], high[1]), texel(high[0], high[1]), share[0]);
+    mix(upper, lower, share[1])
+}
+
+fn nearest(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], sampler: u32) -> [f32; 4] {
+    let (first, size) = level_of(image, level);
+    let [x, y] = [0, 1].map(|k| {
+        let wrap = sampler >> (2 * k) & 3;
+        texel_index(floor(wrapped(at[k], wrap) * size[k] as f32), size[k], wrap)
+    });
+    texel(textures, first + (y * size[0] + x) as u32)
+}
+
+/// Where a level starts and how large it is.
+fn level_of(image: &Texture, level: u32) -> (u32, [i32; 2]) {
+    let size = |level: u32| [image.width, image.height].map(|side| (side >> level).max(1));
+    let level = level.min(image.levels.max(1) - 1);
+    let before = |level: u32| size(level)[0] * size(level)[1];
+    (image.first_texel + (image.first_level..level).map(before).sum::<u32>(), size(level).map(|side| side as i32))
+}
+
+/// A coordinate in 0 to 1.
+fn wrapped(u: f32, wrap: u32) -> f32 {
+    match wrap {
+        0 => u - floor(u) as f32,
+        1 => 1.0 - ((u - 2.0 * floor(0.5 * u) as f32) - 1.0).abs(),
+        _ => u.clamp(0.0, 1.0),
+    }
+}
+
+/// A texel that may lie one beyond the edge.
+fn texel_index(i: i32, size: i32, wrap: u32) -> i32 {
+    if wrap == 0 {
+        return if i < 0 {
+            i + size
+        } else if i >= size {
+            i - size
+        } else {
+            i
+        };
+    }
+    // The mirror's first texel beyond the edge is the last before it.
+    i.min(size - 1).max(0)
+}
+
+fn texel(textures: &Textures, index: u32) -> [f32; 4] {
+    textures.texels.get(index as usize).map_or([1.0; 4], |texel| texel.map(half_to_f32))
+}
+
+/// Exact for finite halves: the bits moved into place, and the exponents' difference multiplied in.
+fn half_to_f32(half: u16) -> f32 {
+    let size = f32::from_bits(u32::from(half & 0x7FFF) << 13) * f32::from_bits((112 + 127) << 23);
+    if half & 0x8000 == 0 { size } else { -size }
+}
+
+fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
+    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
+}
+
+/// For |v| < 2^31; the standard one is a call where the baseline's instructions have none.
+pub fn floor(v: f32) -> i32 {
+    let i = v as i32;
+    if i as f32 > v { i - 1 } else { i }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_are_exact() {
+        for (half, want) in [(0, 0.0), (0x3C00, 1.0), (0x3555, 0.333_251_95), (0x7BFF, 65504.0), (1, 5.960_464_5e-8)] {
+            assert_eq!(half_to_f32(half), want);
+            assert_eq!(half_to_f32(half | 0x8000), -want);
+        }
+    }
+
+    #[test]
+    fn logarithms_are_close_and_without_steps() {
+        let mut last = half_log2(1e-6);
+        for i in 1..20_000 {
+            let v = 1e-6 * libm::exp2f(i as f32 * 0.003);
+            let log = half_log2(v);
+            assert!((log - 0.5 * libm::log2f(v)).abs() < 2e-4, "{v}: {log}");
+            assert!(log >= last && log - last < 0.003, "a step at {v}");
+            last = log;
+        }
+        assert_eq!([half_log2(f32::NAN), half_log2(f32::INFINITY)], [half_log2(1e30); 2]);
+    }
+
+    #[test]
+    fn coordinates_wrap_as_the_names_say() {
+        for (u, repeat, mirror, clamp) in
+            [(0.25, 0.25, 0.25, 0.25), (1.25, 0.25, 0.75, 1.0), (-0.25, 0.75, 0.25, 0.0), (-1.25, 0.75, 0.75, 0.0)]
+        {
+            assert_eq!([0, 1, 2].map(|wrap| wrapped(u, wrap)), [repeat, mirror, clamp], "{u}");
+        }
+        assert_eq!([0, 1, 2].map(|wrap| texel_index(-1, 4, wrap)), [3, 0, 0]);
+        assert_eq!([0, 1, 2].map(|wrap| texel_index(4, 4, wrap)), [0, 3, 3]);
+        assert_eq!([f32::NAN, f32::INFINITY, 1e30, -1e7].map(bounded), [0.0, 0.0, UV_MAX, -UV_MAX]);
+    }
+}

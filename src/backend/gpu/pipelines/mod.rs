@@ -1,0 +1,191 @@
+//! The compute pipelines, made when a plan first needs them.
+
+pub(crate) mod bindings;
+pub(crate) mod kernels;
+pub(crate) mod key;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A kernel, in one of its variants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Vertices to the screen.
+    Transform,
+    /// Triangles to samples: small ones, and a list of the large ones.
+    Visibility {
+        /// How samples are written.
+        write: Write,
+        /// Where to.
+        into: Into,
+    },
+    /// What is left of triangles behind the eye, to the same list.
+    Clip,
+    /// Large triangles to samples.
+    VisibilityTile {
+        /// As above.
+        write: Write,
+        /// As above.
+        into: Into,
+    },
+    /// A layer's samples to colours, under those of the layers before it.
+    Layers,
+    /// Samples to colours.
+    Shade,
+    /// Edges to strokes.
+    Lines,
+    /// Unites the strokes of a line pass in each pixel, and lays them over the colours.
+    Ink,
+    /// Samples to the light on a line pass.
+    LineLight,
+    /// Colours to bytes.
+    Resolve,
+}
+
+/// How a visibility kernel writes samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Write {
+    /// Depth and id in one 64-bit maximum.
+    Both,
+    /// The maximum of the depths.
+    Depth,
+    /// The lowest id of those that have that depth.
+    Id,
+}
+
+/// What a visibility kernel's samples are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Into {
+    /// The visibility buffer.
+    Surface,
+    /// A layer.
+    Layer,
+}
+
+/// Buffers by their binding number in group 1 of every shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u32)]
+pub enum Slot {
+    Positions,
+    Triangles = 2,
+    Vertices,
+    Samples,
+    Work,
+    Normals,
+    CornerTriangles,
+    Attributes,
+    Colors,
+    Edges,
+    Owners,
+    Strokes,
+    Thresholds,
+    Rgba,
+    Materials,
+    FaceNormals,
+    LineColors,
+    Uvs,
+    VertexColors,
+    Texels,
+    Progress,
+    Roles = 24,
+    HullLooks,
+    Layer,
+    Layered,
+    Rounds,
+    Cells,
+}
+
+/// Number of [`Slot`]s.
+pub const SLOTS: usize = 30;
+
+/// Whether a kernel writes to a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    Read,
+    ReadWrite,
+}
+
+/// A pipeline and the layout of its group 1.
+pub struct Pipeline {
+    pub pipeline: wgpu::ComputePipeline,
+    pub buffers: wgpu::BindGroupLayout,
+}
+
+/// All pipelines of a device so far.
+#[derive(Default)]
+pub struct Stages {
+    made: Mutex<HashMap<(Stage, u32), Arc<Pipeline>>>,
+}
+
+impl Stages {
+    /// The pipeline of a stage for a plan of this look.
+    pub fn get(&self, device: &wgpu::Device, stage: Stage, look: u32) -> Arc<Pipeline> {
+        let look = look & stage.looks();
+        // Held while compiling: two workers that begin together want the same pipelines.
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        made.entry((stage, look)).or_insert_with(|| Arc::new(stage.compile(device, look))).clone()
+    }
+
+    /// Forgets all pipelines; jobs that use one keep it until they are done.
+    pub fn clear(&self) {
+        self.made.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
+}
+
+/// The layout of group 0: the plan's numbers, and at a dynamic offset the dispatch's.
+pub fn uniforms_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, has_dynamic_offset| {
+        layout_entry(
+            binding,
+            wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Uniform,
+                has_dynamic_offset,
+                min_binding_size: None,
+            },
+        )
+    };
+    let entries = [entry(0, false), entry(1, true)];
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("uniforms"), entries: &entries })
+}
+
+fn layout_entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
+}
+
+impl Stage {
+    fn compile(self, device: &wgpu::Device, look: u32) -> Pipeline {
+        let label = Some(self.entry());
+        let source = wgpu::ShaderSource::Wgsl(self.source().into());
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
+        let entries: Vec<_> = self.buffers().iter().map(|&(slot, access)| buffer_entry(slot, access)).collect();
+        let buffers = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: &[Some(&uniforms_layout(device)), Some(&buffers)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label,
+            layout: Some(&layout),
+            module: &module,
+            entry_point: label,
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &self.constants(look),
+                // The kernels write their workgroup memory before they read it.
+                zero_initialize_workgroup_memory: false,
+            },
+            cache: None,
+        });
+        Pipeline { pipeline, buffers }
+    }
+}
+
+fn buffer_entry(slot: Slot, access: Access) -> wgpu::BindGroupLayoutEntry {
+    layout_entry(
+        slot as u32,
+        wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Storage { read_only: access == Access::Read },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+    )
+}

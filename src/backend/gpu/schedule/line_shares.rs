@@ -1,0 +1,190 @@
+//! How lines are dealt out to threads: edges to workgroups, and of each window of an edge so many slices; and after how much work a
+//! dispatch ends.
+
+use super::sizes::{DeviceTraits, has_visibility};
+use super::step::Step;
+use crate::backend::DrawError;
+use crate::backend::gpu::params::{Batch, FIRST_PASS, line_flags};
+use crate::backend::gpu::pipelines::Stage;
+use crate::backend::gpu::schedule::{Schedule, WORKGROUP};
+use crate::plan::{DrawPlan, LinePass};
+
+/// Edges a dispatch.
+const EDGE_CHUNK: u32 = 1 << 20;
+
+/// The same where each may cross a large picture.
+const EDGE_CHUNK_LONG: u32 = 1 << 17;
+
+/// Looks at samples that a dispatch may take at most, if it is not known how long its edges are: a second or so of work.
+const BLIND_LOOKS_MAX: u64 = 1 << 34;
+
+/// Edges that keep all of a GPU busy.
+const BUSY_EDGES: usize = 1 << 15;
+
+/// Workgroups that keep all of a GPU busy, and all of a processor.
+const BUSY_GROUPS: u32 = 1024;
+const BUSY_GROUPS_SOFTWARE: u32 = 16;
+
+/// Slices of a window, at most.
+const SLICES_MAX: f32 = 64.0;
+
+/// Loop iterations that a thread may run in a dispatch where they are limited: llvmpipe (Mesa 22) leaves all loops of a thread
+/// after 65,535 iterations, silently.
+const ITERATIONS_MAX: u32 = 60_000;
+
+/// The same on a real device, where a dispatch should end in time for the deadline.
+const ITERATIONS_MAX_HARDWARE: u32 = 1 << 24;
+
+/// Lines from this reach on may take long on a real device too, pixels.
+const WIDE_PX: f32 = 8.0;
+
+/// Threads that run in step on a processor: while one of them is in a loop, the others wait in it, and it counts for all.
+const LANES: u32 = 16;
+
+/// Units of work without end.
+const NO_LIMIT: u32 = u32::MAX;
+
+/// How the kernel that draws lines is run over a pass's edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LineShares {
+    /// Threads that share a window of an edge, by rows, where the line is so wide that it has many pixels.
+    pub slices: u32,
+    /// Edges that the threads of a workgroup share.
+    pub edges_per_group: u32,
+    /// Edges a dispatch, at most.
+    pub edges: u32,
+    /// Looks along an edge, each with what it has found to draw, and shares without a look, after which a thread pauses until the next round.
+    pub units: u32,
+}
+
+impl LineShares {
+    /// Of a pass of the plan.
+    pub fn new(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> Self {
+        let side = lines.window_px() + 2.0 * lines.reach_px();
+        // Few edges leave most of a GPU idle, so threads may look along them twice; a processor has nothing to spare.
+        let is_idle = !device.loops_are_limited && lines.edges.len() < BUSY_EDGES;
+        let pixels = if is_idle { 64.0 } else { 400.0 };
+        let slices = (side * 2.0 * lines.reach_px() / pixels).ceil().clamp(1.0, SLICES_MAX) as u32;
+        let groups = if device.loops_are_limited { BUSY_GROUPS_SOFTWARE } else { BUSY_GROUPS };
+        let unit = unit_iterations(plan.samples, lines, slices);
+        let units = match device.loops_are_limited {
+            true => (ITERATIONS_MAX / unit).max(1),
+            false if lines.reach_px() > WIDE_PX => (ITERATIONS_MAX_HARDWARE / unit).max(1),
+            false => NO_LIMIT,
+        };
+        let edges = edges_a_dispatch(plan, lines);
+        Self { slices, edges_per_group: edges.div_ceil(groups).clamp(1, WORKGROUP), edges, units }
+    }
+
+    /// Bytes of what paused threads remember.
+    pub fn progress_bytes(&self) -> u64 {
+        let threads = self.edges.div_ceil(self.edges_per_group) * WORKGROUP;
+        if self.units == NO_LIMIT { 0 } else { 4 + 16 * u64::from(threads) }
+    }
+}
+
+fn edges_a_dispatch(plan: &DrawPlan<'_>, lines: &LinePass) -> u32 {
+    // Half a pixel a step, the samples of up to three pixels in each.
+    let longest = 2 * u64::from(plan.width_px + plan.height_px) * 3 * u64::from(plan.samples);
+    let looks = longest.saturating_mul(lines.edges.len() as u64);
+    let most = if looks > BLIND_LOOKS_MAX { EDGE_CHUNK_LONG } else { EDGE_CHUNK };
+    lines.edges.len().min(most as usize) as u32
+}
+
+/// Loop iterations that one unit of work takes at most: a window is begun, looked along, and a part of the edge drawn.
+fn unit_iterations(samples: u32, lines: &LinePass, slices: u32) -> u32 {
+    let length = lines.window_px() + 2.0 * lines.reach_px() + 4.0;
+    // Half a pixel a step; its samples when it is begun, then those of three pixels side by side.
+    let steps = (2.0 * length) as u32 + 2;
+    let look = steps * (1 + samples) + steps * (1 + 3 * samples);
+    let pixels = ((length as u32).div_ceil(slices) + 1) * (length as u32 + 1);
+    // Each is found, while the others wait, and has eight words of its mask filled by halves.
+    look + pixels * (LANES + 1 + 8 * 3) + WORKGROUP
+}
+
+impl Schedule {
+    /// All passes of lines, one after the other, into rows of a band.
+    pub(crate) fn lines(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        device: &DeviceTraits,
+        pixels: Batch,
+        edge_starts: &[u32],
+    ) -> Result<(), DrawError> {
+        for (pass, (lines, &edges_first)) in (0..).zip(plan.lines.iter().zip(edge_starts)) {
+            let shares = LineShares::new(plan, lines, device);
+            let is_lit = lines.lit && plan.lights_lines();
+            let first = if pass == 0 { FIRST_PASS } else { 0 };
+            let lined = Batch {
+                edges_per_group: shares.edges_per_group,
+                line_exponent: lines.square_exponent(),
+                line_windows: 1.0 / lines.window_px(),
+                line_slices: shares.slices,
+                line_units: shares.units,
+                line_peak: lines.peak(),
+                line_width: lines.width_px,
+                line_smoothing: lines.smoothing_px,
+                line_flags: line_flags(lines, has_visibility(plan), plan.lights_lines()) | first,
+                line_pass: pass,
+                ..pixels
+            };
+            let edges = lines.edges.len() as u32;
+            for first in (0..edges).step_by(shares.edges.max(1) as usize) {
+                let count = shares.edges.min(edges - first);
+                let batch = Batch { first: edges_first.saturating_add(first), count, ..lined };
+                let groups = count.div_ceil(shares.edges_per_group);
+                self.dispatch_groups(device, Stage::Lines, groups, batch)?;
+                let progress_bytes = shares.progress_bytes();
+                if let (Some(Step::Dispatch { batch, workgroups, .. }), true) =
+                    (self.steps.last().copied(), progress_bytes > 0)
+                {
+                    self.steps.pop();
+                    self.steps.push(Step::Lines { batch, workgroups });
+                    self.progress_bytes = self.progress_bytes.max(progress_bytes);
+                } else if edges > shares.edges {
+                    self.steps.push(Step::Submit);
+                }
+            }
+            if is_lit {
+                self.dispatch(device, Stage::LineLight, pixels.count, lined)?;
+            }
+            self.dispatch(device, Stage::Ink, pixels.count, lined)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::gpu::schedule::step::Goal;
+    use crate::backend::gpu::schedule::test_plans::{Case, DEVICE, LARGEST, each_case, edges, lines, plan};
+    use crate::plan::Shown;
+
+    #[test]
+    fn edges_that_may_be_long_are_drawn_few_at_a_time() {
+        for (count, size_px, most) in [(2 << 20, 512, 1 << 17), (200_000, 512, 200_000), (200_000, 4096, 1 << 17)] {
+            let case = Case { size_px: [size_px; 2], ..LARGEST };
+            let mut plan = plan(&[], case);
+            plan.lines = vec![lines(edges(count), 1.0, Shown::Visible)];
+            assert_eq!(LineShares::new(&plan, &plan.lines[0], &DEVICE).edges, most, "{count} edges, {size_px} px");
+            let schedule = Schedule::new(&plan, &DEVICE, Goal::Picture).unwrap();
+            let drawn = schedule.steps.iter().filter(|step| matches!(step, Step::Lines { .. })).count();
+            let bands = size_px.div_ceil(schedule.banding.rows);
+            assert_eq!(drawn as u32, bands * count.div_ceil(most));
+        }
+    }
+
+    #[test]
+    fn a_unit_of_work_ends_before_a_loop_would_be_left() {
+        let mut cases = 0;
+        each_case(|plan, case| {
+            let Some(lines) = plan.lines.first() else { return };
+            let LineShares { slices, units, .. } = LineShares::new(plan, lines, &DEVICE);
+            let iterations = unit_iterations(plan.samples, lines, slices);
+            assert!(units >= 1 && u64::from(units) * u64::from(iterations) <= 65_535, "{iterations}: {case:?}");
+            cases += 1;
+        });
+        assert!(cases > 100, "{cases}");
+    }
+}

@@ -1,0 +1,269 @@
+//! What is dispatched for a plan, in order: pure arithmetic, no device.
+//!
+//! The picture is cut into horizontal bands whose sample buffer stays small, triangles into chunks whose work list does.
+//! After each chunk of a large mesh, and each band, the commands go to the device, so that no single submission takes
+//! long and the deadline is looked at in between.
+
+pub(crate) mod line_shares;
+pub(crate) mod sizes;
+pub(crate) mod step;
+#[cfg(test)]
+pub(crate) mod test_plans;
+pub(crate) mod tiles;
+use self::sizes::{Banding, DeviceTraits, has_visibility};
+use self::step::{Band, Goal, Step};
+use self::tiles::Tiles;
+use super::params::{Batch, edge_lists, faces_code};
+use crate::backend::DrawError;
+use crate::backend::gpu::pass_mask::Pass;
+use crate::backend::gpu::pipelines::{Into, Stage, Write};
+use crate::plan::{DrawPlan, roles};
+
+/// Triangles a dispatch, where none needs clipping; each may leave one item in the work list.
+const CHUNK: u32 = 1 << 20;
+
+/// Triangles a dispatch where all may need clipping, into at most six pieces each.
+const CHUNK_CLIP: u32 = 1 << 17;
+const PIECES_MAX: u32 = 6;
+
+/// Different numbers that dispatches may have, each 256 bytes on the GPU: 128 MiB.
+///
+/// The most that a job within all other limits takes: of 4096 rows at 4 samples, layers make 32 bands of 128 rows. In each, 10
+/// million triangles that may need clipping are 77 chunks, for the surface and 16 layers, filled and hull, in two phases:
+/// 17 * 77 * 2 * 2 = 5236. 64 passes of 30 million edges are 29 chunks each and three more for the ink, 2048. That makes 0.23
+/// million. Rows beyond a band that wide lines look at are no bands of their own: they do not add to it.
+const BATCHES_MAX: usize = 1 << 19;
+
+/// Threads of a workgroup, in every kernel.
+pub const WORKGROUP: u32 = 64;
+
+/// All commands for a plan.
+#[derive(Debug)]
+pub struct Schedule {
+    pub steps: Vec<Step>,
+    pub batches: Vec<Batch>,
+    /// Rows of the largest band, and beyond it.
+    pub banding: Banding,
+    /// Items that the work list must hold.
+    pub work_items: u32,
+    /// Layers that are looked for in each band.
+    pub layers: u32,
+    /// How the tile kernel is run.
+    pub tiles: Tiles,
+    /// What threads that draw lines remember from round to round.
+    pub progress_bytes: u64,
+    /// What is wanted.
+    pub goal: Goal,
+}
+
+impl Schedule {
+    /// The commands for what is wanted of `plan`.
+    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Result<Self, DrawError> {
+        let banding = Banding::new(plan, device, goal)?;
+        let tiles = Tiles::new(plan, device, banding);
+        let edge_starts = edge_lists(&plan.lines).1;
+        let (steps, batches) = (Vec::new(), Vec::new());
+        let mut schedule = Self { steps, batches, banding, work_items: 0, layers: 0, tiles, progress_bytes: 0, goal };
+        schedule.transform(plan, device)?;
+        for first in (0..plan.height_px).step_by(banding.rows as usize) {
+            let end = plan.height_px.min(first + banding.rows);
+            let [beyond, margin] = [banding.beyond, banding.margin].map(|px| px as i32);
+            let [row_first, row_end] = [first as i32, end as i32];
+            let seen = [row_first - margin, row_end + margin].map(|y| y.clamp(-beyond, plan.height_px as i32 + beyond));
+            // What is done pixel by pixel is done for the band's own rows.
+            let band = Batch {
+                row_first,
+                row_end,
+                column_end: plan.width_px as i32,
+                seen_first: seen[0],
+                seen_end: seen[1],
+                seen_margin: beyond,
+                samples_at: plan.samples * (banding.seen_columns(plan) * row_first.abs_diff(seen[0]) + banding.beyond),
+                ..Batch::default()
+            };
+            schedule.steps.push(Step::ClearBand);
+            if has_visibility(plan) {
+                let columns = [-beyond, band.column_end + beyond];
+                let all = Batch {
+                    row_first: seen[0],
+                    row_end: seen[1],
+                    column_first: columns[0],
+                    column_end: columns[1],
+                    samples_at: 0,
+                    ..band
+                };
+                schedule.triangles(device, all, Into::Surface, Pass::of_surface(plan))?;
+                schedule.layers(plan, device, band, goal)?;
+            }
+            if goal == Goal::Picture {
+                schedule.picture_stages(plan, device, band, &edge_starts)?;
+            }
+            schedule.steps.push(Step::EndBand(Band { rows: [first, end] }));
+        }
+        Ok(schedule)
+    }
+
+    fn transform(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits) -> Result<(), DrawError> {
+        let count = plan.positions.len() as u32;
+        if has_visibility(plan) || !plan.lines.is_empty() {
+            self.dispatch(device, Stage::Transform, count, Batch { count, ..Batch::default() })?;
+        }
+        Ok(())
+    }
+
+    /// One round a layer; a round does nothing where the one before has left nothing to find.
+    fn layers(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, band: Batch, goal: Goal) -> Result<(), DrawError> {
+        let Some(pass) = plan.layers() else { return Ok(()) };
+        let rounds = match goal {
+            Goal::Picture => pass.count_max,
+            Goal::Samples => 0,
+            Goal::Layer(layer) => layer + 1,
+        };
+        self.layers = rounds;
+        let count = plan.width_px * band.row_end.abs_diff(band.row_first);
+        // A layer that is wanted for itself is not shaded: then no sample is done before its last triangle.
+        let role = if goal == Goal::Picture { u32::from(roles::LAYER) } else { 0 };
+        let mut ends = Vec::new();
+        for layer in 0..rounds {
+            self.steps.push(Step::ClearLayer);
+            self.triangles(device, Batch { layer, ..band }, Into::Layer, Pass::of_layers(plan))?;
+            let batch = Batch { count, role, layer, ..band };
+            self.dispatch(device, Stage::Layers, count, batch)?;
+            self.steps.push(Step::Submit);
+            if self.tiles.in_rounds && goal == Goal::Picture {
+                ends.push(self.steps.len());
+                self.steps.push(Step::EndLayer { layer, end: 0 });
+            }
+        }
+        let last = self.steps.len();
+        for at in ends {
+            if let Some(Step::EndLayer { end, .. }) = self.steps.get_mut(at) {
+                *end = last;
+            }
+        }
+        Ok(())
+    }
+
+    fn triangles(
+        &mut self,
+        device: &DeviceTraits,
+        band: Batch,
+        into: Into,
+        passes: [Option<Pass>; 2],
+    ) -> Result<(), DrawError> {
+        let writes: &[Write] = if device.int64_atomics { &[Write::Both] } else { &[Write::Depth, Write::Id] };
+        // Every depth must be known before the first id is compared with it.
+        for &write in writes {
+            for Pass { ids, clip, faces, role } in passes.iter().flatten().cloned() {
+                let (chunk, pieces) = if clip { (CHUNK_CLIP, PIECES_MAX) } else { (CHUNK, 1) };
+                for first in ids.clone().step_by(chunk as usize) {
+                    let in_chunk = chunk.min(ids.end - first);
+                    let capacity = in_chunk * pieces;
+                    self.work_items = self.work_items.max(capacity);
+                    let batch = Batch {
+                        first,
+                        count: in_chunk,
+                        faces: faces_code(faces),
+                        capacity,
+                        large_end: u32::MAX,
+                        huge_end: u32::MAX,
+                        role: u32::from(role),
+                        ..band
+                    };
+                    self.steps.push(Step::ClearWork);
+                    self.dispatch(device, Stage::Visibility { write, into }, in_chunk, batch)?;
+                    if clip {
+                        self.dispatch(device, Stage::Clip, in_chunk, batch)?;
+                    }
+                    let stage = Stage::VisibilityTile { write, into };
+                    self.steps.push(Step::Tiles { stage, batch: self.batches.len() - 1 });
+                    if ids.len() > chunk as usize {
+                        self.steps.push(Step::Submit);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What follows visibility, for a band.
+    fn picture_stages(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        device: &DeviceTraits,
+        band: Batch,
+        edge_starts: &[u32],
+    ) -> Result<(), DrawError> {
+        let count = plan.width_px * band.row_end.abs_diff(band.row_first);
+        let pixels = Batch { count, ..band };
+        if plan.is_shaded() {
+            self.dispatch(device, Stage::Shade, count, pixels)?;
+        }
+        self.lines(plan, device, pixels, edge_starts)?;
+        self.dispatch(device, Stage::Resolve, count, pixels)
+    }
+
+    pub(crate) fn dispatch(
+        &mut self,
+        device: &DeviceTraits,
+        stage: Stage,
+        threads: u32,
+        batch: Batch,
+    ) -> Result<(), DrawError> {
+        self.dispatch_groups(device, stage, threads.div_ceil(WORKGROUP), batch)
+    }
+
+    pub(crate) fn dispatch_groups(
+        &mut self,
+        device: &DeviceTraits,
+        stage: Stage,
+        workgroups: u32,
+        batch: Batch,
+    ) -> Result<(), DrawError> {
+        if workgroups == 0 {
+            return Ok(());
+        }
+        // Neighbours may share theirs: triangles are drawn and clipped by the same numbers.
+        if self.batches.last() != Some(&batch) {
+            if self.batches.len() == BATCHES_MAX {
+                return Err(DrawError::Device(format!("it takes more than {BATCHES_MAX} dispatches")));
+            }
+            self.batches.push(batch);
+        }
+        let x = workgroups.min(device.workgroups_max);
+        let batch = self.batches.len() - 1;
+        self.steps.push(Step::Dispatch { stage, batch, workgroups: [x, workgroups.div_ceil(x)] });
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::gpu::schedule::test_plans::{Case, DEVICE, LARGEST, plan};
+    use crate::plan::Shown;
+
+    fn schedule(triangles: &[[u32; 3]], case: Case) -> Result<Schedule, DrawError> {
+        Schedule::new(&plan(triangles, case), &DEVICE, Goal::Picture)
+    }
+
+    #[test]
+    fn the_largest_job_is_scheduled_and_what_goes_beyond_is_refused() {
+        let triangles = vec![[0; 3]; 10_000_000];
+        let all = schedule(&triangles, Case { passes: 64, ..LARGEST }).unwrap();
+        assert!(all.batches.len() > BATCHES_MAX / 8, "{}: the limit is far too high", all.batches.len());
+        assert!(all.steps.len() < 8 * BATCHES_MAX);
+        // Wide lines look far beyond their band, which costs no more bands.
+        let wide = Case { passes: 64, width_px: 100.0, shown: Shown::Visible, ..LARGEST };
+        let wide = schedule(&triangles, wide).unwrap();
+        assert!(wide.banding.margin > 100 && wide.banding.rows == all.banding.rows, "{:?}", wide.banding);
+        assert_eq!(wide.batches.len(), all.batches.len());
+        // More samples are fewer rows in a band.
+        let fine = schedule(&triangles, Case { samples: 16, passes: 64, ..LARGEST }).unwrap();
+        assert!(fine.banding.rows < all.banding.rows, "{:?}", fine.banding);
+        let few = &triangles[..1];
+        assert!(schedule(few, Case { passes: 4096, ..LARGEST }).is_ok());
+        let refused = schedule(few, Case { passes: 16_384, ..LARGEST }).unwrap_err();
+        assert!(matches!(&refused, DrawError::Device(reason) if reason.contains("dispatches")), "{refused}");
+    }
+}

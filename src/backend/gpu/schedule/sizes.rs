@@ -1,0 +1,199 @@
+//! What a device allows, and how large buffers are: bytes a pixel, a sample, an item, and the rows that this leaves room for.
+
+use super::step::Goal;
+use crate::backend::DrawError;
+use crate::plan::DrawPlan;
+
+/// Largest buffer that holds a band of the picture, bytes.
+const BAND_BYTES: u64 = 64 << 20;
+
+/// The same for the visibility buffer, which wide lines look at far beyond their band.
+const SEEN_BYTES: u64 = 256 << 20;
+
+/// Bytes of the work list before its items.
+const WORK_HEAD_BYTES: u64 = 16;
+
+/// Bytes of one of its items.
+const WORK_ITEM_BYTES: u64 = 48;
+
+/// Bytes of what layers make of a sample.
+pub const LAYERED_BYTES: u64 = 32;
+
+/// Bytes of a sample of the visibility buffer, or of a layer.
+pub const SAMPLE_BYTES: u64 = 8;
+
+/// Bytes of a pixel's strokes: two sums, how often they have gone round, a bit for each of 256 points, and the most that an area
+/// differs from its points'.
+pub const STROKES_BYTES: u64 = 48;
+
+/// Bytes of a pixel of lit lines: whose light falls on them.
+pub const OWNER_BYTES: u64 = 4;
+
+/// Bytes of a pixel of the picture.
+const RGBA_BYTES: u64 = 4;
+
+/// What a device allows, and which way it goes.
+#[derive(Clone, Copy, Debug)]
+pub struct DeviceTraits {
+    /// Largest buffer that can be bound, bytes.
+    pub binding_bytes_max: u64,
+    /// Workgroups in one direction.
+    pub workgroups_max: u32,
+    /// Workgroups that share the large triangles.
+    pub tile_workgroups: u32,
+    /// 64-bit atomics.
+    pub int64_atomics: bool,
+    /// Whether a thread's loops are cut off after a while: see [`Tiles`](super::tiles::Tiles).
+    pub loops_are_limited: bool,
+}
+
+/// How the picture is cut into bands of rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Banding {
+    /// Rows of each band but the last.
+    pub rows: u32,
+    /// Rows beyond a band, above and below, that its lines look at.
+    pub margin: u32,
+    /// Pixels beyond the picture, on each side, of which the visibility buffer holds those that are in a band's rows and margins.
+    pub beyond: u32,
+}
+
+impl Banding {
+    /// So that no buffer is large or breaks the device's limit. Fails where the device has no room for a row and what its lines
+    /// look at in the picture. Where it has none only for what they look at beyond the picture, they go without: better a border at
+    /// which a line shows that something beyond it hides than no picture.
+    pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Result<Self, DrawError> {
+        if goal != Goal::Picture {
+            return Self::with_margin(plan, device, [0, 0]);
+        }
+        let margin = plan.line_margin_rows();
+        Self::with_margin(plan, device, [margin, plan.margin_px])
+            .or_else(|_| Self::with_margin(plan, device, [margin, 0]))
+    }
+
+    /// The same with so many rows beyond a band, and pixels beyond the picture.
+    fn with_margin(plan: &DrawPlan<'_>, device: &DeviceTraits, [margin, beyond]: [u32; 2]) -> Result<Self, DrawError> {
+        let rows_in = |bytes: u64, row_bytes: u64| bytes.min(device.binding_bytes_max) / row_bytes.max(1);
+        let rows = rows_in(BAND_BYTES, u64::from(plan.width_px) * pixel_bytes(plan));
+        let rows = rows.min(u64::from(plan.height_px)).max(1);
+        let seen = rows_in(SEEN_BYTES, u64::from(plan.width_px + 2 * beyond) * seen_bytes(plan));
+        let whole = Self { rows: plan.height_px, margin: margin.min(beyond), beyond };
+        if rows >= u64::from(plan.height_px) && u64::from(whole.seen_rows(plan)) <= seen {
+            return Ok(whole);
+        }
+        let room = seen.saturating_sub(2 * u64::from(margin));
+        if room == 0 {
+            let why = "the device has no room for what lines so wide look at in a picture so wide";
+            return Err(DrawError::Device(why.to_owned()));
+        }
+        Ok(Self { rows: rows.min(room) as u32, margin, beyond })
+    }
+
+    /// Columns of the visibility buffer.
+    pub fn seen_columns(&self, plan: &DrawPlan<'_>) -> u32 {
+        plan.width_px + 2 * self.beyond
+    }
+
+    /// Rows that it holds.
+    pub fn seen_rows(&self, plan: &DrawPlan<'_>) -> u32 {
+        (self.rows + 2 * self.margin).min(plan.height_px + 2 * self.beyond)
+    }
+
+    /// Samples that it holds.
+    pub fn seen_samples(&self, plan: &DrawPlan<'_>) -> u64 {
+        u64::from(self.seen_columns(plan)) * u64::from(self.seen_rows(plan)) * u64::from(plan.samples)
+    }
+
+    /// Bytes of all buffers that hold a band.
+    pub fn bytes(&self, plan: &DrawPlan<'_>) -> u64 {
+        let seen = if has_visibility(plan) { self.seen_samples(plan) * SAMPLE_BYTES } else { 0 };
+        let layers = if plan.layers().is_some() { LAYERED_BYTES + SAMPLE_BYTES } else { 0 };
+        let (strokes, owners) = if plan.lines.is_empty() { (0, 0) } else { (STROKES_BYTES, OWNER_BYTES) };
+        let pixel = u64::from(plan.samples) * layers + color_bytes(plan) + strokes + owners + RGBA_BYTES;
+        seen + u64::from(plan.width_px) * u64::from(self.rows) * pixel
+    }
+}
+
+/// Bytes of all buffers that hold a band, on a device that allows whatever is asked of it.
+pub fn bands_bytes(plan: &DrawPlan<'_>) -> u64 {
+    let device = DeviceTraits {
+        binding_bytes_max: u64::MAX,
+        workgroups_max: u32::MAX,
+        tile_workgroups: 1,
+        int64_atomics: true,
+        loops_are_limited: false,
+    };
+    // Buffers are made a quarter larger than they need to be.
+    Banding::new(plan, &device, Goal::Picture).map_or(0, |banding| banding.bytes(plan) / 4 * 5)
+}
+
+/// Whether a plan needs the sample buffer at all.
+pub fn has_visibility(plan: &DrawPlan<'_>) -> bool {
+    plan.surface.is_some() || plan.hull.is_some()
+}
+
+/// Samples of so many rows.
+pub fn samples(plan: &DrawPlan<'_>, rows: u32) -> u64 {
+    u64::from(plan.width_px) * u64::from(rows) * u64::from(plan.samples)
+}
+
+/// Bytes a pixel of colours: the surface's, then everything's, and the light on lines where they are lit.
+pub fn color_bytes(plan: &DrawPlan<'_>) -> u64 {
+    if plan.lights_lines() { 32 } else { 16 }
+}
+
+/// Bytes of a work list.
+pub fn work_bytes(items: u32) -> u64 {
+    WORK_HEAD_BYTES + u64::from(items) * WORK_ITEM_BYTES
+}
+
+/// Bytes a pixel of the visibility buffer.
+fn seen_bytes(plan: &DrawPlan<'_>) -> u64 {
+    u64::from(plan.samples) * SAMPLE_BYTES
+}
+
+/// Bytes a pixel of the largest buffer that holds a band.
+fn pixel_bytes(plan: &DrawPlan<'_>) -> u64 {
+    let strokes = if plan.lines.is_empty() { 0 } else { STROKES_BYTES };
+    let sample = if plan.layers().is_some() { LAYERED_BYTES } else { SAMPLE_BYTES };
+    (u64::from(plan.samples) * sample).max(color_bytes(plan)).max(strokes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::gpu::schedule::test_plans::{Case, DEVICE, each_case};
+
+    /// All buffers that hold a band, whatever is drawn.
+    const ALL_BYTES_MAX: u64 = 512 << 20;
+
+    #[test]
+    fn bands_never_take_more_than_they_may() {
+        let (mut cases, mut refused, mut without) = (0, 0, 0);
+        each_case(|plan, case| {
+            assert!(bands_bytes(plan) <= ALL_BYTES_MAX / 4 * 5, "{case:?}");
+            let small = DeviceTraits { binding_bytes_max: 128 << 20, ..DEVICE };
+            for device in [DeviceTraits { binding_bytes_max: 4 << 30, ..DEVICE }, small] {
+                cases += 1;
+                let Ok(banding) = Banding::new(plan, &device, Goal::Picture) else {
+                    refused += 1;
+                    let Case { samples: at, width_px, .. } = case;
+                    assert!(at > 8 && width_px > 80.0 && device.binding_bytes_max < 256 << 20, "{case:?}");
+                    continue;
+                };
+                assert!(banding.bytes(plan) <= ALL_BYTES_MAX, "{}: {banding:?} {case:?}", banding.bytes(plan));
+                assert!(banding.seen_samples(plan) * SAMPLE_BYTES <= device.binding_bytes_max);
+                assert!(banding.rows >= 1 && banding.rows <= plan.height_px);
+                // What lies beyond a band is there in whole, unless the band is all there is.
+                let is_all = banding.rows == plan.height_px && banding.beyond == 0;
+                assert!(banding.margin == plan.line_margin_rows() || is_all, "{case:?}");
+                if banding.beyond < case.beyond {
+                    without += 1;
+                    assert!(case.samples > 8 && case.width_px > 80.0 && device.binding_bytes_max < 256 << 20);
+                }
+            }
+        });
+        assert!(cases >= 500 && refused < cases / 20, "{refused} of {cases} refused");
+        assert!(without < cases / 20, "{without} of {cases} without what is beyond the picture");
+    }
+}

@@ -1,0 +1,228 @@
+//! What `serve` can be told, as a table: every setting is a flag, an environment variable `MESHSNAP_*` and a key of the
+//! TOML file, under one name. Flag beats variable beats file beats default.
+//!
+//! A new setting is a field of [`Config`], its default, and a line in [`SETTINGS`].
+
+mod hardware;
+mod settings;
+
+use std::path::PathBuf;
+
+pub use hardware::why_no_gpu;
+
+use crate::limits::Limits;
+use crate::spec::BackendChoice;
+pub use settings::{Access, SETTINGS, Setting};
+
+/// The settings of a process.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Config {
+    /// Address to listen on.
+    pub listen: String,
+    /// Where meshes and results will be stored by a version that stores any.
+    pub data_dir: Option<PathBuf>,
+    /// Threads that draw.
+    pub workers: u64,
+    /// Threads within one CPU render; 0 means the cores divided by the workers.
+    pub worker_threads: u64,
+    /// The back-end of a request that names none.
+    pub backend: BackendChoice,
+    /// Bearer tokens of clients; empty: everybody.
+    pub api_keys: Vec<String>,
+    /// Serve everybody even beyond loopback.
+    pub no_auth: bool,
+    /// Connections at once.
+    pub connections: u64,
+    /// Uploads in memory at once, bytes.
+    pub uploads_bytes: u64,
+    /// For the header of a request, milliseconds; also how long an idle connection is kept.
+    pub header_timeout_ms: u64,
+    /// For the body of a request, milliseconds.
+    pub body_timeout_ms: u64,
+    /// How long results of jobs can be fetched, milliseconds.
+    pub result_ttl_ms: u64,
+    /// Results of jobs in memory, bytes.
+    pub result_bytes: u64,
+    /// Results of jobs in memory.
+    pub result_count: u64,
+    /// Stored meshes in memory, bytes.
+    pub mesh_bytes: u64,
+    /// Stored meshes.
+    pub mesh_count: u64,
+    /// What is logged, in `tracing` filter syntax.
+    pub log: String,
+    /// Whether the log is JSON; None: where standard error is no terminal.
+    pub log_json: Option<bool>,
+    /// What a job may use.
+    pub limits: Limits,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            listen: "127.0.0.1:8080".into(),
+            data_dir: None,
+            workers: cores(),
+            worker_threads: 0,
+            backend: BackendChoice::Auto,
+            api_keys: Vec::new(),
+            no_auth: false,
+            connections: 512,
+            uploads_bytes: 1 << 30,
+            header_timeout_ms: 10_000,
+            body_timeout_ms: 60_000,
+            result_ttl_ms: 600_000,
+            result_bytes: 256 << 20,
+            result_count: 10_000,
+            mesh_bytes: 256 << 20,
+            mesh_count: 1000,
+            log: "info".into(),
+            log_json: None,
+            limits: Limits::default(),
+        }
+    }
+}
+
+/// Processors that this process may use.
+pub fn cores() -> u64 {
+    std::thread::available_parallelism().map_or(1, |n| n.get() as u64)
+}
+
+/// A setting that cannot be.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ConfigError {
+    /// No such key.
+    #[error("{source_name} has no setting `{key}`; the settings are {known}")]
+    Unknown {
+        /// Where it was found.
+        source_name: String,
+        /// The key.
+        key: String,
+        /// All keys.
+        known: String,
+    },
+    /// A value that is not allowed.
+    #[error("`{key}` from {source_name} is \"{value}\", and allowed is {allowed}")]
+    Value {
+        /// Where it was found.
+        source_name: String,
+        /// The key.
+        key: String,
+        /// What was given.
+        value: String,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// Not TOML, or a table where a value should be.
+    #[error("{source_name} cannot be read as a configuration: {detail}")]
+    File {
+        /// Which file.
+        source_name: String,
+        /// Why.
+        detail: String,
+    },
+}
+
+impl Config {
+    /// Applies one value; `source_name` says where it comes from ("the command line", a file name ...).
+    pub fn apply(&mut self, source_name: &str, key: &str, value: &str) -> Result<(), ConfigError> {
+        let Some(setting) = SETTINGS.iter().find(|s| s.key == key) else {
+            let known = SETTINGS.iter().map(|s| s.key).collect::<Vec<_>>().join(", ");
+            return Err(ConfigError::Unknown { source_name: source_name.into(), key: key.into(), known });
+        };
+        setting.set(self, value).map_err(|allowed| {
+            let (source_name, key, value) = (source_name.into(), key.into(), value.into());
+            ConfigError::Value { source_name, key, value, allowed }
+        })
+    }
+
+    /// Applies a TOML file's text. Keys may be written with `-` or `_`.
+    pub fn apply_toml(&mut self, source_name: &str, text: &str) -> Result<(), ConfigError> {
+        let file_error = |detail: String| ConfigError::File { source_name: source_name.into(), detail };
+        let table: toml::Table = text.parse().map_err(|e: toml::de::Error| file_error(e.to_string()))?;
+        for (key, value) in table {
+            let value = toml_text(&value).ok_or_else(|| file_error(format!("`{key}` must be a plain value")))?;
+            self.apply(source_name, &key.replace('_', "-"), &value)?;
+        }
+        Ok(())
+    }
+}
+
+fn toml_text(value: &toml::Value) -> Option<String> {
+    match value {
+        toml::Value::String(text) => Some(text.clone()),
+        toml::Value::Integer(number) => Some(number.to_string()),
+        toml::Value::Boolean(on) => Some(on.to_string()),
+        toml::Value::Array(list) => Some(list.iter().map(toml_text).collect::<Option<Vec<_>>>()?.join(",")),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_default_is_allowed_and_survives_being_written_and_read() {
+        let mut checked = 0;
+        for setting in SETTINGS.iter().filter(|s| s.has_flag && s.key != "data-dir") {
+            let (default, mut copy) = (Config::default(), Config::default());
+            setting.set(&mut copy, &setting.show(&default)).unwrap_or_else(|e| panic!("{}: {e}", setting.key));
+            assert_eq!(copy, default, "{}", setting.key);
+            checked += 1;
+        }
+        assert_eq!(checked, SETTINGS.len() - 2);
+    }
+
+    #[test]
+    fn every_limit_has_its_flag() {
+        let count = SETTINGS.iter().filter(|s| s.key.starts_with("limit-")).count();
+        let Limits {
+            body_bytes: _,
+            memory_bytes: _,
+            triangles: _,
+            nodes: _,
+            json_depth: _,
+            image_px: _,
+            texture_px: _,
+            texture_total_px: _,
+            bundle_bytes: _,
+            bundle_entries: _,
+            job_ms: _,
+            queue_per_worker: _,
+        } = Limits::default();
+        assert_eq!(count, 12, "a limit without a flag, or a flag without a limit");
+    }
+
+    #[test]
+    fn a_file_sets_everything_that_a_flag_does() {
+        let mut config = Config::default();
+        let text = "listen = \"0.0.0.0:99\"\nworkers = 3\nno_auth = true\nlimit-body-bytes = \"2MiB\"\n\
+                    api-keys = [\"a\", \"b\"]\nbackend = \"cpu\"\nlog-format = \"json\"\nqueue = 5\n";
+        config.apply_toml("test.toml", text).unwrap();
+        assert_eq!((config.listen.as_str(), config.workers, config.no_auth), ("0.0.0.0:99", 3, true));
+        assert_eq!((config.limits.body_bytes, config.limits.queue_per_worker), (2 << 20, 5));
+        assert_eq!(config.api_keys, ["a", "b"]);
+        assert_eq!((config.backend, config.log_json), (BackendChoice::Cpu, Some(true)));
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let cases = [
+            ("worker = 3", "no setting `worker`"),
+            ("workers = 0", "from 1 to 1024"),
+            ("workers = -1", "from 1 to 1024"),
+            ("workers = 1.5", "must be a plain value"),
+            ("backend = \"cuda\"", "auto, gpu, cpu"),
+            ("limit-image-px = 8192", "from 1 to 4096"),
+            ("limit-body-bytes = \"99999999999GiB\"", "whole number"),
+            ("no-auth = \"maybe\"", "true or false"),
+            ("listen = ", "cannot be read"),
+            ("[limits]", "must be a plain value"),
+        ];
+        for (text, part) in cases {
+            let error = Config::default().apply_toml("x.toml", text).unwrap_err().to_string();
+            assert!(error.contains(part) && error.contains("x.toml"), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Which file of a bundle is the mesh.
+
+use crate::import::bundle::{BundleFile, UNNAMED, show, show_all};
+use crate::import::{Folder, Format, MeshError, MeshFault, sniff, three_mf};
+use crate::limits::Deadline;
+
+/// Finds the mesh among the files: the one that `entry` names, or the only one that is a mesh. `format` overrides sniffing.
+pub fn choose(
+    files: Vec<BundleFile>,
+    entry: Option<&str>,
+    format: Option<Format>,
+    deadline: &Deadline,
+) -> Result<(Folder, Format), MeshError> {
+    let is_open = entry.is_none() && format.is_none_or(|format| format == Format::ThreeMf);
+    if let Some(number) = three_mf::start_part(&files).filter(|_| is_open) {
+        return Ok((Folder::new(files, number), Format::ThreeMf));
+    }
+    let folder = Folder::new(files.clone(), 0);
+    let number = match entry {
+        Some(name) => folder
+            .at("", name)
+            .ok()
+            .flatten()
+            .or_else(|| folder.of_base_name(name))
+            .ok_or_else(|| unknown(name, &files))?,
+        None if files.len() == 1 => 0,
+        None => only_mesh(&files, format, deadline)?,
+    };
+    let format = match format {
+        Some(format) => format,
+        None => {
+            let file = &files[number];
+            // Who sends a file without a name knows which one is meant.
+            let is_named = files.len() > 1 || file.path != UNNAMED;
+            let what = if is_named { format!("\"{}\"", show(&file.path)) } else { "the body".into() };
+            sniff::sniff(&file.bytes, &what)?
+        }
+    };
+    Ok((folder.with_entry(number), format))
+}
+
+fn only_mesh(files: &[BundleFile], format: Option<Format>, deadline: &Deadline) -> Result<usize, MeshError> {
+    let mut meshes = Vec::new();
+    for (number, file) in files.iter().enumerate() {
+        deadline.check()?;
+        if is_mesh(file, format) {
+            meshes.push(number);
+        }
+    }
+    match meshes[..] {
+        [number] => Ok(number),
+        [] => Err(no_mesh(files)),
+        _ => {
+            let names = show_all(meshes.iter().map(|&number| files[number].path.as_str()));
+            let detail = format!("several files of the bundle are meshes: {names}; say which one to draw with `entry`");
+            Err(MeshError::new(MeshFault::EntryUnclear, detail))
+        }
+    }
+}
+
+/// Whether a file is a mesh beyond doubt: among other files, what only resembles an STL is more likely a texture.
+fn is_mesh(file: &BundleFile, format: Option<Format>) -> bool {
+    let by_name = Format::from_name(&file.extension());
+    let sniffed = sniff::sniff_among_others(&file.bytes, by_name == Some(Format::StlBinary));
+    match format {
+        Some(format) => [by_name, sniffed].into_iter().flatten().any(|found| found.name() == format.name()),
+        None => sniffed.is_some(),
+    }
+}
+
+fn no_mesh(files: &[BundleFile]) -> MeshError {
+    if files.is_empty() {
+        let detail = format!("the bundle has no files in it; send a mesh ({}) and what belongs to it", Format::ALL);
+        return MeshError::new(MeshFault::Unrecognised, detail);
+    }
+    let names = show_all(files.iter().map(|file| file.path.as_str()));
+    let detail = format!("no file of the bundle is a mesh in a known format ({}): there is {names}", Format::ALL);
+    // An archive in the place of a mesh may hold another, and that one a third: none is opened but the upload itself.
+    match files.iter().find(|file| sniff::is_zip(&file.bytes)) {
+        Some(file) => {
+            let detail = format!("{detail}; \"{}\" is {}", show(&file.path), sniff::INNER_ZIP);
+            MeshError::new(MeshFault::BundleBroken, detail)
+        }
+        None => MeshError::new(MeshFault::Unrecognised, detail),
+    }
+}
+
+fn unknown(name: &str, files: &[BundleFile]) -> MeshError {
+    let names = show_all(files.iter().map(|file| file.path.as_str()));
+    let detail = format!("`entry` is \"{}\", and the bundle has no such file: there is {names}", show(name));
+    MeshError::new(MeshFault::EntryUnclear, detail)
+}

@@ -1,0 +1,168 @@
+//! The folder that a bundle makes, for whoever follows a name in one of its files.
+//!
+//! Everything here is names and bytes. A name that leads out of the folder leads nowhere: no file is opened for it.
+
+use crate::import::bundle::{BundleFile, base_name, has_drive, show};
+use crate::import::{MeshError, MeshFault};
+use rapidhash::RapidHashMap;
+use std::collections::hash_map::Entry;
+
+/// The files of a bundle, unpacked, and which of them is the mesh.
+#[derive(Debug)]
+pub struct Folder {
+    files: Vec<BundleFile>,
+    entry: usize,
+    by_path: RapidHashMap<String, usize>,
+    /// Lower-case paths, and base names as they are and in lower case. None where several files have it.
+    by_lower_path: RapidHashMap<String, Option<usize>>,
+    by_base_name: RapidHashMap<String, Option<usize>>,
+    by_lower_base_name: RapidHashMap<String, Option<usize>>,
+}
+
+impl Folder {
+    /// Of some files; `entry` is one of them.
+    pub fn new(files: Vec<BundleFile>, entry: usize) -> Self {
+        let mut folder = Self {
+            entry,
+            by_path: RapidHashMap::default(),
+            by_lower_path: RapidHashMap::default(),
+            by_base_name: RapidHashMap::default(),
+            by_lower_base_name: RapidHashMap::default(),
+            files,
+        };
+        for (i, file) in folder.files.iter().enumerate() {
+            folder.by_path.insert(file.path.clone(), i);
+            insert_unique(&mut folder.by_lower_path, file.path.to_lowercase(), i);
+            insert_unique(&mut folder.by_base_name, file.base_name().to_owned(), i);
+            insert_unique(&mut folder.by_lower_base_name, file.base_name().to_lowercase(), i);
+        }
+        folder
+    }
+
+    /// The mesh.
+    pub fn entry(&self) -> &BundleFile {
+        &self.files[self.entry]
+    }
+
+    /// How much all files are together.
+    pub fn bytes_len(&self) -> u64 {
+        self.files.iter().map(|file| file.bytes.len() as u64).sum()
+    }
+
+    /// The file with this number.
+    pub fn file(&self, number: usize) -> &BundleFile {
+        &self.files[number]
+    }
+
+    /// The same files with another entry.
+    #[must_use]
+    pub fn with_entry(self, entry: usize) -> Self {
+        Self { entry, ..self }
+    }
+
+    /// The file that a URI in the entry means, relative to the entry's folder, if the bundle has it.
+    ///
+    /// Percent escapes are decoded and backslashes are slashes. Where no path fits exactly, one in other letter case does;
+    /// where none does, the only file of that base name, because uploads of single files lose their folders. A URI that
+    /// leads out of the bundle is an error. `data:` URIs are the caller's to decode.
+    pub fn resolve(&self, uri: &str) -> Result<Option<&BundleFile>, MeshError> {
+        let found = match self.at(self.entry().folder(), uri)? {
+            Some(number) => Some(number),
+            None => self.of_base_name(uri),
+        };
+        Ok(found.map(|number| self.file(number)))
+    }
+
+    /// The file at a relative path from `folder`, in the wrong letter case if need be.
+    pub fn at(&self, folder: &str, uri: &str) -> Result<Option<usize>, MeshError> {
+        if has_scheme(uri) {
+            return Ok(None);
+        }
+        let mut outside = None;
+        for path in readings(uri) {
+            match join(folder, &path) {
+                Ok(path) => {
+                    let other_case = || self.by_lower_path.get(&path.to_lowercase()).copied().flatten();
+                    if let Some(number) = self.by_path.get(&path).copied().or_else(other_case) {
+                        return Ok(Some(number));
+                    }
+                }
+                Err(error) => outside = Some(error),
+            }
+        }
+        outside.map_or(Ok(None), Err)
+    }
+
+    /// The only file with the base name of `uri`, whatever its folder.
+    pub fn of_base_name(&self, uri: &str) -> Option<usize> {
+        if has_scheme(uri) {
+            return None;
+        }
+        readings(uri).find_map(|path| {
+            let name = base_name(&path);
+            let exact = self.by_base_name.get(name).copied().flatten();
+            exact.or_else(|| self.by_lower_base_name.get(&name.to_lowercase()).copied().flatten())
+        })
+    }
+}
+
+fn insert_unique(map: &mut RapidHashMap<String, Option<usize>>, key: String, number: usize) {
+    match map.entry(key) {
+        Entry::Vacant(place) => drop(place.insert(Some(number))),
+        Entry::Occupied(mut place) => *place.get_mut() = None,
+    }
+}
+
+/// `https:` and the like; a single letter is a drive.
+fn has_scheme(uri: &str) -> bool {
+    uri.split_once(':').is_some_and(|(scheme, _)| {
+        scheme.len() > 1 && scheme.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'+' | b'-' | b'.'))
+    })
+}
+
+/// A URI with its percent escapes decoded, then as it is: many exporters escape nothing.
+fn readings(uri: &str) -> impl Iterator<Item = String> {
+    let decoded = if uri.contains('%') { percent_decode(uri) } else { None };
+    decoded.into_iter().chain(std::iter::once(uri.to_owned()))
+}
+
+/// None where the result is no text.
+fn percent_decode(uri: &str) -> Option<String> {
+    let digit = |b: Option<&u8>| b.and_then(|&b| char::from(b).to_digit(16));
+    let bytes = uri.as_bytes();
+    let mut out = Vec::with_capacity(bytes.len());
+    let mut at = 0;
+    while let Some(&byte) = bytes.get(at) {
+        match (byte, digit(bytes.get(at + 1)), digit(bytes.get(at + 2))) {
+            (b'%', Some(high), Some(low)) => {
+                out.push((high * 16 + low) as u8);
+                at += 3;
+            }
+            _ => {
+                out.push(byte);
+                at += 1;
+            }
+        }
+    }
+    String::from_utf8(out).ok()
+}
+
+/// `folder` and then `path`, without `.` and `..`.
+fn join(folder: &str, path: &str) -> Result<String, MeshError> {
+    let outside = || {
+        let detail = format!("the name \"{}\" leads out of the upload, and nothing outside it is read", show(path));
+        MeshError::new(MeshFault::OutsideBundle, detail)
+    };
+    if path.starts_with(['/', '\\']) || has_drive(path) {
+        return Err(outside());
+    }
+    let mut parts: Vec<&str> = folder.split('/').filter(|part| !part.is_empty()).collect();
+    for part in path.split(['/', '\\']) {
+        match part {
+            "" | "." => {}
+            ".." => drop(parts.pop().ok_or_else(outside)?),
+            part => parts.push(part),
+        }
+    }
+    Ok(parts.join("/"))
+}

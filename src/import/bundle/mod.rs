@@ -1,0 +1,172 @@
+//! What was uploaded: files that belong together, under names that any folder could give them.
+
+pub(crate) mod entry;
+pub(crate) mod folder;
+pub(crate) mod unzip;
+pub use folder::Folder;
+
+use super::{Format, MeshError, MeshFault};
+use bytes::Bytes;
+
+/// Longest path of a file in a bundle, bytes: what file systems allow, roughly.
+const PATH_BYTES_MAX: usize = 1024;
+
+/// What a file is called that nobody named.
+pub const UNNAMED: &str = "mesh";
+
+/// What was uploaded: one file, several, or a zip archive that is still closed.
+#[derive(Clone, Debug, Default)]
+pub struct Bundle {
+    pub(crate) files: Vec<BundleFile>,
+    /// The mesh among the files, if the client says which.
+    pub(crate) entry: Option<String>,
+    pub(crate) is_zip: bool,
+}
+
+/// One file of a bundle.
+#[derive(Clone, Debug)]
+pub struct BundleFile {
+    /// Where it is in the bundle: components with `/` between them, none of them `.` or `..`.
+    pub path: String,
+    /// What is in it; clones share it.
+    pub bytes: Bytes,
+}
+
+/// A path that no file of a bundle may have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct BadPath(String);
+
+impl Bundle {
+    /// A bundle of one file without a name, or a zip archive if that is what the bytes are.
+    pub fn of_one(bytes: impl Into<Bytes>) -> Self {
+        let bytes = bytes.into();
+        let is_zip = bytes.starts_with(b"PK\x03\x04");
+        Self { files: vec![BundleFile { path: UNNAMED.into(), bytes }], entry: None, is_zip }
+    }
+
+    /// A zip archive, whatever its bytes say.
+    pub fn zip(bytes: impl Into<Bytes>) -> Self {
+        Self { is_zip: true, ..Self::of_one(bytes) }
+    }
+
+    /// Several files; a single one may be a zip archive.
+    pub fn of_files(files: Vec<BundleFile>) -> Self {
+        let is_zip = files.len() == 1 && files[0].bytes.starts_with(b"PK\x03\x04");
+        Self { files, entry: None, is_zip }
+    }
+
+    /// The same with the mesh named among the files.
+    #[must_use]
+    pub fn with_entry(self, entry: Option<String>) -> Self {
+        Self { entry, ..self }
+    }
+
+    /// Refuses a single file without a byte in it: nobody need open it to know.
+    pub fn check_sent(&self) -> Result<(), MeshError> {
+        match self.files.as_slice() {
+            [single] if single.bytes.is_empty() => Err(MeshError::new(
+                MeshFault::Unrecognised,
+                format!("the body is empty: send the bytes of a mesh file ({})", Format::ALL),
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Its files, as they came: an archive is still one.
+    pub fn files(&self) -> &[BundleFile] {
+        &self.files
+    }
+
+    /// Whether it is an archive that is still closed.
+    pub fn is_zip(&self) -> bool {
+        self.is_zip
+    }
+
+    /// Its files, for who makes another bundle of them.
+    pub fn into_files(self) -> Vec<BundleFile> {
+        self.files
+    }
+
+    /// The size of all of it.
+    pub fn bytes_len(&self) -> u64 {
+        self.files.iter().map(|file| file.bytes.len() as u64).sum()
+    }
+}
+
+impl BundleFile {
+    /// A file under a checked name: relative, with slashes of either kind.
+    pub fn new(name: &str, bytes: impl Into<Bytes>) -> Result<Self, BadPath> {
+        let bad = |why: &str| Err(BadPath(format!("the file name \"{}\" {why}", show(name))));
+        if name.len() > PATH_BYTES_MAX {
+            return bad(&format!("is longer than {PATH_BYTES_MAX} bytes"));
+        }
+        if name.chars().any(char::is_control) {
+            return bad("has control characters in it");
+        }
+        if name.starts_with(['/', '\\']) {
+            return bad("is absolute; names are relative to the bundle");
+        }
+        if has_drive(name) {
+            return bad("begins with a drive letter; names are relative to the bundle");
+        }
+        let parts: Vec<&str> = name.split(['/', '\\']).filter(|part| !matches!(*part, "" | ".")).collect();
+        if parts.contains(&"..") {
+            return bad("has `..` in it; names go down from the bundle only");
+        }
+        if parts.is_empty() {
+            return bad("is empty");
+        }
+        Ok(Self { path: parts.join("/"), bytes: bytes.into() })
+    }
+
+    /// Refuses a name that another file has already.
+    pub fn check_new(&self, others: &[Self]) -> Result<(), BadPath> {
+        if others.iter().any(|other| other.path == self.path) {
+            return Err(BadPath(format!("two files are named \"{}\"", show(&self.path))));
+        }
+        Ok(())
+    }
+
+    /// The path without its last component; empty at the top.
+    pub fn folder(&self) -> &str {
+        self.path.rsplit_once('/').map_or("", |(folder, _)| folder)
+    }
+
+    /// The last component of its path.
+    pub fn base_name(&self) -> &str {
+        base_name(&self.path)
+    }
+
+    /// What follows the last dot of its name, in lower case; empty without one.
+    pub fn extension(&self) -> String {
+        self.base_name().rsplit_once('.').map_or_else(String::new, |(_, e)| e.to_ascii_lowercase())
+    }
+}
+
+/// A short, printable form of a name that a client chose.
+pub fn show(name: &str) -> String {
+    let shown = name.chars().map(|c| if c.is_control() { '\u{FFFD}' } else { c });
+    if name.chars().nth(80).is_some() { shown.take(77).chain("...".chars()).collect() } else { shown.collect() }
+}
+
+/// The first few of some names, for a sentence.
+pub fn show_all<'n>(names: impl ExactSizeIterator<Item = &'n str>) -> String {
+    const SHOWN: usize = 10;
+    let count = names.len();
+    let mut text = names.take(SHOWN).map(|name| format!("\"{}\"", show(name))).collect::<Vec<_>>().join(", ");
+    if count > SHOWN {
+        text += &format!(" and {} more", count - SHOWN);
+    }
+    text
+}
+
+/// The last component, after a slash of either kind.
+pub fn base_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+/// Whether a path begins with a drive letter.
+pub fn has_drive(path: &str) -> bool {
+    matches!(path.as_bytes(), [letter, b':', ..] if letter.is_ascii_alphabetic())
+}

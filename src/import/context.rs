@@ -1,0 +1,26 @@
+//! What every importer is given beside the bytes of its file.
+
+use super::bundle::Folder;
+use super::error::MeshError;
+use crate::limits::{Budget, Deadline, Limits};
+
+/// What every importer is given beside the bytes.
+pub struct Context<'a> {
+    /// The caps.
+    pub limits: &'a Limits,
+    /// Bytes that may still be allocated.
+    pub budget: &'a mut Budget,
+    /// Looked at inside long loops.
+    pub deadline: &'a Deadline,
+    /// The files that names in the mesh may mean.
+    pub bundle: &'a Folder,
+    /// As [`super::Options::time_s`].
+    pub time_s: Option<f64>,
+}
+
+impl Context<'_> {
+    /// Refuses more triangles than the limit allows.
+    pub fn check_triangles(&self, count: u64) -> Result<(), MeshError> {
+        Ok(crate::limits::check("the number of triangles", count, self.limits.triangles, "--limit-triangles")?)
+    }
+}

@@ -1,0 +1,185 @@
+//! glTF 2.0, as JSON or GLB.
+//!
+//! Reading order: [`container`], [`document`], [`tree`] (what is where) and [`check`], [`pose`] (the moment that is drawn), [`scene`]
+//! (which nodes are shown), [`primitive`] and [`vertices`], [`shape`] (morphed and held by joints), [`accessor`], [`buffers`]; for
+//! surfaces [`model`] (the document's other half), [`materials`], [`images`], [`cameras`].
+
+mod container;
+pub(crate) mod data;
+mod document;
+pub(crate) mod material;
+mod primitive;
+mod scene;
+
+use self::document::check;
+use self::document::model::Lists;
+use self::document::tree::Document;
+use self::material::Materials;
+use self::primitive::Primitive;
+use self::primitive::triangles;
+use self::scene::Instance;
+use self::scene::pose::Pose;
+use self::scene::shape::Shape;
+use self::scene::skin::Skins;
+use self::scene::transform::Affine;
+use self::scene::{cameras, instancing};
+use super::raw::RawMesh;
+use super::{Format, MeshError};
+use crate::import::context::Context;
+use crate::import::gltf::data::accessor::Reader;
+use crate::mesh::{FileContent, MaterialSlot};
+use crate::warning::Warning;
+use std::rc::Rc;
+
+/// Reads either kind.
+pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    let mut raw = RawMesh::default();
+    let (json, bin) = if bytes.starts_with(b"glTF") {
+        raw.report.format = Format::Glb;
+        let glb = container::split(bytes)?;
+        raw.report.warnings = glb.warnings;
+        (glb.json, glb.bin)
+    } else {
+        raw.report.format = Format::Gltf;
+        (bytes, None)
+    };
+    let doc = document::parse(json, cx)?;
+    let lists = Lists::of(json)?;
+    check::check(&doc, &lists)?;
+    raw.report.content = Some(content(&doc));
+    let mut reader = Reader::new(&doc, bin);
+    let pose = Pose::new(&doc, &lists, &mut reader, &mut raw.report.warnings, cx)?;
+    let scene = scene::scene(&doc, &pose, cx)?;
+    raw.cameras = cameras::cameras(&scene.cameras, &lists, &mut raw.report.warnings, cx)?;
+
+    let mut meshes = Meshes {
+        doc: &doc,
+        pose: &pose,
+        reader,
+        skins: Skins::new(&doc),
+        materials: Materials::new(&lists, cx)?,
+        of_mesh: vec![None; doc.meshes.len()],
+        uses_default_material: false,
+    };
+    for instance in &scene.instances {
+        meshes.show(instance, &mut raw, cx)?;
+    }
+    raw.is_f32 = true;
+    let uses_default = meshes.uses_default_material;
+    let (slots, images) = meshes.materials.into_slots();
+    (raw.materials, raw.images) = (slots, images.sources);
+    if uses_default {
+        raw.materials.push(MaterialSlot::default());
+    }
+    raw.report.facts = document::metadata::metadata(json);
+    Ok(raw)
+}
+
+/// What is shown of the meshes so far.
+struct Meshes<'a> {
+    doc: &'a Document,
+    pose: &'a Pose<'a>,
+    reader: Reader<'a>,
+    skins: Skins<'a>,
+    materials: Materials<'a>,
+    of_mesh: Vec<Option<Rc<Vec<Primitive>>>>,
+    uses_default_material: bool,
+}
+
+impl Meshes<'_> {
+    /// Adds a mesh as one node shows it.
+    fn show(&mut self, instance: &Instance, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        cx.deadline.check()?;
+        let primitives = self.primitives(instance.mesh, &mut raw.report.warnings, cx)?;
+        let node = instance.node.and_then(|index| self.doc.nodes.get(index));
+        let weights = self.pose.weights(instance.mesh, instance.node);
+        let joints = match node.and_then(|node| node.skin) {
+            Some(skin) => Some(self.skins.joints(skin.0, self.pose, &mut self.reader, cx)?),
+            None => None,
+        };
+        // What joints hold is where they are: the transform of the node itself means nothing to it.
+        let transform = if joints.is_some() { Affine::IDENTITY } else { instance.transform };
+        let placements = match node.and_then(|node| node.extensions.instancing.as_ref()) {
+            Some(instancing) => {
+                let own = primitives.iter().map(Primitive::triangle_count).sum();
+                let counts = [raw.triangles.len() as u64, own];
+                let index = instance.node.unwrap_or_default();
+                instancing::placements(index, instancing, &transform, counts, &mut self.reader, cx)?
+            }
+            None => vec![transform],
+        };
+        // What is nowhere is neither morphed nor skinned.
+        if placements.is_empty() {
+            return Ok(());
+        }
+        let default_material = self.materials.count();
+        for primitive in primitives.iter() {
+            self.uses_default_material |= primitive.material().is_none();
+            let mut shape = Shape::of(primitive);
+            shape.morph(primitive, weights, &mut self.reader, cx)?;
+            if let Some(joints) = &joints {
+                shape.skin(&primitive.what, &primitive.influences, joints, cx)?;
+            }
+            for placement in &placements {
+                primitive.append(&shape, raw, placement, default_material, cx)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The decoded primitives of a mesh.
+    fn primitives(
+        &mut self,
+        mesh: usize,
+        warnings: &mut Vec<Warning>,
+        cx: &mut Context<'_>,
+    ) -> Result<Rc<Vec<Primitive>>, MeshError> {
+        let json = self
+            .doc
+            .meshes
+            .get(mesh)
+            .ok_or_else(|| MeshError::broken(format!("there is no mesh {mesh} in the glTF file")))?;
+        if let Some(done) = &self.of_mesh[mesh] {
+            return Ok(Rc::clone(done));
+        }
+        let ngons_are_used = self.doc.uses("FB_ngon_encoding");
+        let mut primitives = Vec::new();
+        for (i, primitive) in json.primitives.iter().enumerate() {
+            let source = primitive::Source {
+                what: format!("primitive {i} of mesh {mesh}"),
+                json: primitive,
+                has_ngons: ngons_are_used && primitive.extensions.ngons.is_some(),
+                has_skins: !self.doc.skins.is_empty(),
+            };
+            primitives.extend(Primitive::read(&source, &mut self.reader, &mut self.materials, warnings, cx)?);
+        }
+        let primitives = Rc::new(primitives);
+        self.of_mesh[mesh] = Some(Rc::clone(&primitives));
+        Ok(primitives)
+    }
+}
+
+/// What the document's meshes say that they have.
+fn content(doc: &Document) -> FileContent {
+    let mut content = FileContent::default();
+    let count = |accessor: usize| doc.accessors.get(accessor).map_or(0, |accessor| accessor.count.0);
+    for primitive in doc.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        let vertices = primitive.attributes.get("POSITION").or_else(|| primitive.attributes.values().next());
+        let vertices = vertices.map_or(0, |accessor| count(accessor.0));
+        let corners = primitive.indices.map_or(vertices, |accessor| count(accessor.0));
+        content.draw_calls += 1;
+        content.vertices = content.vertices.saturating_add(vertices);
+        content.triangles = content.triangles.saturating_add(triangles::count(primitive.mode(), corners));
+        let [segments, points] = triangles::count_loose(primitive.mode(), corners);
+        content.segments = content.segments.saturating_add(segments);
+        content.points = content.points.saturating_add(points);
+    }
+    content
+}
+
+/// A file may have 100,000 primitives of a kind that is not drawn.
+fn warn_once(warnings: &mut Vec<Warning>, code: &'static str, detail: String) {
+    if warnings.iter().all(|w| w.code != code) {
+        warnings.push(Warning { code, detail });
+    }
+}

@@ -1,0 +1,183 @@
+//! A primitive: its triangles and vertices, decoded once however many nodes show it.
+
+pub(crate) mod draco;
+pub(crate) mod ngons;
+pub(crate) mod triangles;
+pub(crate) mod vertices;
+use self::vertices::Vertices;
+use super::warn_once;
+use crate::import::MeshError;
+use crate::import::context::Context;
+use crate::import::gltf::data::accessor::Reader;
+use crate::import::gltf::data::attribute;
+use crate::import::gltf::document::tree;
+use crate::import::gltf::document::tree::mode;
+use crate::import::gltf::material::Materials;
+use crate::import::gltf::scene::shape::{Influences, Shape};
+use crate::import::gltf::scene::transform::Affine;
+use crate::import::polygon::ALL_EDGES;
+use crate::import::raw::{RawMesh, extend_attribute};
+use crate::mesh::LineOrPoint;
+use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
+use crate::warning::Warning;
+
+/// Decoded data of one primitive.
+#[derive(Debug, Default)]
+pub struct Primitive {
+    /// How errors speak of it.
+    pub what: String,
+    /// One a vertex.
+    pub positions: Vec<[f64; 3]>,
+    /// One a vertex, or empty.
+    pub normals: Vec<[f64; 3]>,
+    uvs: Vec<[f64; 2]>,
+    colors: Vec<[f64; 4]>,
+    triangles: Vec<[u32; 3]>,
+    /// Ends of line segments; of points, the vertex twice.
+    loose: Vec<[u32; 2]>,
+    /// As [`RawMesh::edge_masks`]; empty where every edge is a polygon's.
+    edge_masks: Vec<u8>,
+    /// As [`crate::mesh::ImportReport::polygons_by_arity`].
+    polygons_by_arity: [u64; 13],
+    material: Option<usize>,
+    /// Accessors of the morph targets.
+    pub targets: Vec<Target>,
+    /// Sets of joints and weights; empty where the file has no skin.
+    pub influences: Vec<Influences>,
+}
+
+/// The accessors of one morph target.
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    /// What to add to positions.
+    pub positions: Option<usize>,
+    /// What to add to normals.
+    pub normals: Option<usize>,
+}
+
+/// Where a primitive comes from.
+pub struct Source<'a> {
+    /// How errors speak of it.
+    pub what: String,
+    /// The document's part.
+    pub json: &'a tree::Primitive,
+    /// Whether the order of its triangles tells its polygons.
+    pub has_ngons: bool,
+    /// Whether the file has skins that may hold it.
+    pub has_skins: bool,
+}
+
+impl Primitive {
+    /// Decodes a primitive. None if it has nothing that is drawn.
+    pub fn read(
+        source: &Source<'_>,
+        reader: &mut Reader<'_>,
+        materials: &mut Materials<'_>,
+        warnings: &mut Vec<Warning>,
+        cx: &mut Context<'_>,
+    ) -> Result<Option<Self>, MeshError> {
+        let (what, json) = (&source.what, source.json);
+        if !json.attributes.contains_key("POSITION") {
+            warn_once(warnings, "no_positions", format!("{what} has no positions and is not drawn"));
+            return Ok(None);
+        }
+        let material = json.material.map(|m| m.0);
+        let uv_set = match material {
+            Some(index) => materials.uv_set(what, index, reader, warnings, cx)?,
+            None => None,
+        };
+        let mut vertices = Vertices::new(source, reader, cx)?;
+        let positions = vertices.attribute::<3>("POSITION", &attribute::POSITION, reader, cx)?.unwrap_or_default();
+        vertices.count = Some(positions.len());
+        let mut out = Self { what: what.clone(), positions, material, ..Self::default() };
+        out.normals = vertices.attribute("NORMAL", &attribute::NORMAL, reader, cx)?.unwrap_or_default();
+        let name = format!("TEXCOORD_{}", uv_set.unwrap_or(0));
+        let uvs = vertices.attribute(&name, &attribute::TEXCOORD, reader, cx)?;
+        if uvs.is_none() && uv_set.is_some() {
+            let detail = format!("{what} has a texture and no {name} that says where it goes");
+            warn_once(warnings, "uvs_missing", detail);
+        }
+        out.uvs = uvs.unwrap_or_default();
+        out.colors = vertices.colors(reader, cx)?;
+        if source.has_skins {
+            out.influences = vertices.influences(reader, cx)?;
+        }
+        out.targets = vertices.targets(reader)?;
+        let indices = vertices.indices(reader, cx)?;
+        let count = out.positions.len();
+        out.triangles = triangles::of(what, vertices.mode(), indices.as_deref(), count, cx)?;
+        out.loose = triangles::loose(vertices.mode(), indices.as_deref(), count, cx)?;
+        if source.has_ngons && vertices.mode() == mode::TRIANGLES {
+            cx.budget.spend("glTF polygons", out.triangles.len() as u64, 1)?;
+            (out.edge_masks, out.polygons_by_arity) = ngons::edge_masks(&out.triangles);
+        } else {
+            out.polygons_by_arity[3] = out.triangles.len() as u64;
+        }
+        Ok(Some(out))
+    }
+
+    /// Adds an instance of the primitive, in a shape of its own, moved by `transform`.
+    pub fn append(
+        &self,
+        shape: &Shape<'_>,
+        raw: &mut RawMesh,
+        transform: &Affine,
+        default_material: usize,
+        cx: &mut Context<'_>,
+    ) -> Result<(), MeshError> {
+        let before = raw.positions.len();
+        let after = before + self.positions.len();
+        cx.deadline.check()?;
+        cx.check_triangles(raw.triangles.len() as u64 + self.triangle_count())?;
+        // Lists double when they grow.
+        cx.budget.spend("glTF vertices", self.positions.len() as u64, 2 * (24 + 12 + 8 + 16))?;
+        cx.budget.spend("glTF triangles", self.triangles.len() as u64, 2 * (12 + 1 + 4))?;
+        if after >= u32::MAX as usize {
+            return Err(MeshError::broken("the glTF file has more than 4 billion vertices, with its instances"));
+        }
+        raw.positions.extend(shape.positions.iter().map(|p| transform.point(*p)));
+        let matrix = transform.normal_matrix();
+        let normals = shape.normals.iter().map(|n| turn(&matrix, n));
+        extend_attribute(&mut raw.normals, before, after, [0.0; 3], normals);
+        extend_attribute(&mut raw.uvs, before, after, [0.0; 2], self.uvs.iter().map(|t| t.map(|c| c as f32)));
+        extend_attribute(&mut raw.colors, before, after, [1.0; 4], self.colors.iter().map(|c| c.map(|v| v as f32)));
+
+        let base = before as u32;
+        let turns = transform.is_mirroring();
+        let mirrored = |t: &[u32; 3]| turns != shape.mirrored.get(t[0] as usize).copied().unwrap_or(false);
+        raw.triangles.extend(self.triangles.iter().map(|t| {
+            let [a, b, c] = if mirrored(t) { [t[0], t[2], t[1]] } else { *t };
+            [a + base, b + base, c + base]
+        }));
+        let masks = self.edge_masks.iter().zip(&self.triangles);
+        raw.edge_masks.extend(masks.map(|(&m, t)| if mirrored(t) { ngons::mirrored(m) } else { m }));
+        raw.edge_masks.resize(raw.triangles.len(), ALL_EDGES);
+        let material = self.material.unwrap_or(default_material) as u32;
+        raw.triangle_materials.resize(raw.triangles.len(), material);
+        cx.budget.spend("glTF lines and points", self.loose.len() as u64, 2 * size_of::<LineOrPoint>() as u64)?;
+        raw.loose.extend(self.loose.iter().map(|ends| LineOrPoint { ends: ends.map(|v| v + base), material }));
+        raw.report.file_vertices += self.positions.len() as u64;
+        for (all, own) in raw.report.polygons_by_arity.iter_mut().zip(self.polygons_by_arity) {
+            *all += own;
+        }
+        Ok(())
+    }
+
+    /// The index of its material.
+    pub fn material(&self) -> Option<usize> {
+        self.material
+    }
+
+    /// How many triangles it has, with those that its lines and points become.
+    pub fn triangle_count(&self) -> u64 {
+        let of = |ends: &[u32; 2]| if ends[0] == ends[1] { POINT_TRIANGLES } else { SEGMENT_TRIANGLES };
+        self.triangles.len() as u64 + self.loose.iter().map(of).sum::<u64>()
+    }
+}
+
+/// A turned unit normal, or zero if it has no direction. Unit already here: after a scale of 1e-30, f32 could not hold it.
+fn turn(m: &[[f64; 3]; 3], n: &[f64; 3]) -> [f32; 3] {
+    let v: [f64; 3] = std::array::from_fn(|r| m[r][0] * n[0] + m[r][1] * n[1] + m[r][2] * n[2]);
+    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    if length > 0.0 && length.is_finite() { v.map(|c| (c / length) as f32) } else { [0.0; 3] }
+}

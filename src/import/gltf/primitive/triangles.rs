@@ -1,0 +1,78 @@
+//! Lists, strips and fans of triangles; lists, strips and loops of lines; points.
+
+use crate::import::MeshError;
+use crate::import::context::Context;
+use crate::import::gltf::document::tree::mode;
+use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
+use crate::pluralise::counted;
+
+/// How many triangles so many corners make up. Corners that do not make up a whole triangle are left over.
+pub fn count(mode: usize, corners: u64) -> u64 {
+    match mode {
+        mode::TRIANGLES => corners / 3,
+        mode::TRIANGLE_STRIP | mode::TRIANGLE_FAN => corners.saturating_sub(2),
+        _ => 0,
+    }
+}
+
+/// How many line segments and how many points so many corners make up.
+pub fn count_loose(mode: usize, corners: u64) -> [u64; 2] {
+    match mode {
+        mode::POINTS => [0, corners],
+        mode::LINES => [corners / 2, 0],
+        mode::LINE_LOOP if corners > 1 => [corners, 0],
+        mode::LINE_STRIP => [corners.saturating_sub(1), 0],
+        _ => [0; 2],
+    }
+}
+
+/// The ends of line segments and points among so many corners, given or all vertices in turn; points have one vertex at both.
+pub fn loose(
+    mode: usize,
+    indices: Option<&[u32]>,
+    vertices: usize,
+    cx: &mut Context<'_>,
+) -> Result<Vec<[u32; 2]>, MeshError> {
+    let corners = indices.map_or(vertices, <[u32]>::len);
+    let [segments, points] = count_loose(mode, corners as u64);
+    cx.check_triangles(SEGMENT_TRIANGLES * segments + POINT_TRIANGLES * points)?;
+    cx.budget.spend("glTF lines and points", segments + points, 8)?;
+    let at = |i: usize| indices.map_or(i as u32, |list| list[i]);
+    Ok((0..(segments + points) as usize)
+        .map(|i| match mode {
+            mode::POINTS => [at(i); 2],
+            mode::LINES => [at(2 * i), at(2 * i + 1)],
+            _ => [at(i), at((i + 1) % corners)],
+        })
+        // Of a segment that ends where it begins nothing is seen.
+        .filter(|ends| mode == mode::POINTS || ends[0] != ends[1])
+        .collect())
+}
+
+/// The triangles of `what`, whose vertices are as many as `vertices` says.
+pub fn of(
+    what: &str,
+    mode: usize,
+    indices: Option<&[u32]>,
+    vertices: usize,
+    cx: &mut Context<'_>,
+) -> Result<Vec<[u32; 3]>, MeshError> {
+    if let Some(bad) = indices.into_iter().flatten().find(|&&i| i as usize >= vertices) {
+        return Err(MeshError::broken(format!(
+            "{what} of the glTF file has the vertex index {bad}, and {}",
+            counted(vertices, "vertex", "vertices")
+        )));
+    }
+    let corners = indices.map_or(vertices, <[u32]>::len);
+    let count = count(mode, corners as u64);
+    cx.check_triangles(count)?;
+    cx.budget.spend("glTF triangles", count, 12)?;
+    let at = |i: usize| indices.map_or(i as u32, |list| list[i]);
+    Ok((0..count as usize)
+        .map(|i| match mode {
+            mode::TRIANGLE_STRIP => [at(i), at(i + 1 + i % 2), at(i + 2 - i % 2)],
+            mode::TRIANGLE_FAN => [at(i + 1), at(i + 2), at(0)],
+            _ => [at(3 * i), at(3 * i + 1), at(3 * i + 2)],
+        })
+        .collect())
+}

@@ -1,0 +1,80 @@
+//! Colours as OFF files store them: whole numbers to 255, or fractions to 1.
+
+use super::Number;
+use crate::import::raw::srgb_to_linear;
+
+/// Of what has no colour where others have one.
+pub const WHITE: [f32; 4] = [1.0; 4];
+
+/// Colours of one kind of thing, as read. What is above 1 anywhere in the file says what 1 means.
+#[derive(Debug, Default)]
+pub struct Colors {
+    /// Components as they are in the file; alpha is negative where it has none.
+    stored: Vec<[f32; 4]>,
+    /// Whether all components are written as whole numbers.
+    whole: Vec<bool>,
+    whole_max: f32,
+    fraction_max: f32,
+}
+
+/// What a colour takes.
+pub const COLOR_BYTES: u64 = 16 + 1;
+
+impl Colors {
+    /// Room for `count`.
+    pub fn reserve(&mut self, count: usize) {
+        self.stored.reserve_exact(count);
+        self.whole.reserve_exact(count);
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.stored.len()
+    }
+
+    /// Whether two are equal; false for numbers that no colour has.
+    pub fn are_same(&self, a: u32, b: u32) -> bool {
+        let of = |number: u32| self.stored.get(number as usize).zip(self.whole.get(number as usize));
+        // White is not a number, and equal to itself.
+        let bits = |number: u32| of(number).map(|(color, whole)| (color.map(f32::to_bits), whole));
+        bits(a).is_some() && bits(a) == bits(b)
+    }
+
+    /// Appends a colour of three or four components. Any other number of them is no colour, and white: a single one is an index
+    /// into a table that is not in the file.
+    pub fn push(&mut self, components: &[Number]) {
+        let mut color = [0.0, 0.0, 0.0, -1.0];
+        if !(3..=4).contains(&components.len()) {
+            return self.push_white();
+        }
+        for (place, number) in color.iter_mut().zip(components) {
+            *place = number.value as f32;
+        }
+        let is_whole = components.iter().all(|number| number.is_whole);
+        let largest = color.into_iter().filter(|c| c.is_finite()).fold(0.0, f32::max);
+        let max = if is_whole { &mut self.whole_max } else { &mut self.fraction_max };
+        *max = max.max(largest);
+        self.stored.push(color);
+        self.whole.push(is_whole);
+    }
+
+    /// Appends what has no colour.
+    pub fn push_white(&mut self) {
+        self.stored.push([f32::NAN, 1.0, 1.0, -1.0]);
+        self.whole.push(false);
+    }
+
+    /// Linear RGBA of each, 0 to 1.
+    pub fn linear(self) -> impl ExactSizeIterator<Item = [f32; 4]> {
+        let scale = |max: f32| if max > 1.0 { 255.0 } else { 1.0 };
+        let scales = [scale(self.fraction_max), scale(self.whole_max)];
+        self.stored.into_iter().zip(self.whole).map(move |([r, g, b, alpha], is_whole)| {
+            let scale = scales[usize::from(is_whole)];
+            if r.is_nan() {
+                return WHITE;
+            }
+            let [r, g, b] = [r, g, b].map(|c| srgb_to_linear(f64::from(c.clamp(0.0, scale)) / f64::from(scale)) as f32);
+            [r, g, b, if alpha < 0.0 { 1.0 } else { alpha / scale }]
+        })
+    }
+}

@@ -1,0 +1,131 @@
+//! The keyword: what vertices have, and where the counts begin.
+
+use super::words::Words;
+use crate::import::{MeshError, MeshFault, sniff};
+
+/// What the keyword says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Header {
+    /// `N`
+    pub has_normals: bool,
+    /// `C`
+    pub has_colors: bool,
+    /// `ST`
+    pub has_uvs: bool,
+    /// MeshLab's order: with `N` before `C`, colours come before normals.
+    pub colors_first: bool,
+    /// Followed by the word `BINARY`.
+    pub is_binary: bool,
+    /// Where the counts begin.
+    pub body_at: usize,
+}
+
+impl Header {
+    /// Numbers of a vertex before its colour.
+    pub fn before_color(&self) -> usize {
+        if self.has_normals && !self.colors_first { 6 } else { 3 }
+    }
+
+    /// Numbers of a vertex after its colour.
+    pub fn after_color(&self) -> usize {
+        let normal = if self.has_normals && self.colors_first { 3 } else { 0 };
+        normal + if self.has_uvs { 2 } else { 0 }
+    }
+
+    /// Numbers of a vertex, of whose colour it may have one more.
+    pub fn numbers_min(&self) -> usize {
+        self.before_color() + if self.has_colors { 3 } else { 0 } + self.after_color()
+    }
+}
+
+/// Whether the bytes begin with a keyword of OFF, and go on with what follows one.
+pub fn is_off(bytes: &[u8]) -> bool {
+    let mut words = Words::new(bytes, bytes.len() - sniff::trim_start(bytes).len());
+    let Some(first) = words.next_word() else { return false };
+    let Some((_, rest)) = keyword(first) else { return false };
+    let next = if rest.is_empty() { words.next_word() } else { Some(rest) };
+    next.is_none_or(|word| word == b"BINARY" || word.iter().all(u8::is_ascii_digit))
+}
+
+/// Reads the keyword. By the format's own rules it may be missing, if it is known what the file is.
+pub fn parse(bytes: &[u8]) -> Result<Header, MeshError> {
+    let begin = bytes.len() - sniff::trim_start(bytes).len();
+    let mut words = Words::new(bytes, begin);
+    let first = words.next_word().ok_or_else(|| MeshError::broken("the OFF file is empty"))?;
+    let Some((prefix, rest)) = keyword(first) else {
+        if first.iter().all(u8::is_ascii_digit) {
+            return Ok(Header { body_at: begin, ..Header::default() });
+        }
+        return Err(MeshError::broken("the OFF file begins with neither its keyword nor the number of its vertices"));
+    };
+    let mut header = Header { body_at: words.at - rest.len(), ..Header::default() };
+    for letter in prefix {
+        match letter {
+            b'S' => header.has_uvs = true,
+            b'C' => {
+                header.has_colors = true;
+                header.colors_first = header.has_normals;
+            }
+            b'N' => header.has_normals = true,
+            b'4' => return Err(unsupported("4", "homogeneous coordinates")),
+            b'n' => return Err(unsupported("n", "a number of dimensions of their own")),
+            _ => {}
+        }
+    }
+    if words.next_on_line() == Some(b"BINARY") {
+        header.is_binary = true;
+        header.body_at = words.after_line();
+    }
+    Ok(header)
+}
+
+fn unsupported(letter: &str, what: &str) -> MeshError {
+    let detail = format!("vertices with {what} (the {letter} of {letter}OFF) are not read: write them with x, y and z");
+    MeshError::new(MeshFault::Unsupported, detail)
+}
+
+/// The prefix of a keyword, and what is joined to its end: some files have the first count there. Geomview's prefix is
+/// `[ST][C][N][4][n]`; vcglib, and so MeshLab, write `[N][C][ST]`.
+fn keyword(word: &[u8]) -> Option<(&[u8], &[u8])> {
+    let mut at = 0;
+    let mut left = vec![&b"ST"[..], b"C", b"N", b"4", b"n"];
+    while let Some(i) = left.iter().position(|part| word[at..].starts_with(part)) {
+        at += left.swap_remove(i).len();
+    }
+    let rest = word[at..].strip_prefix(b"OFF")?;
+    rest.iter().all(u8::is_ascii_digit).then_some((&word[..at], rest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keywords_and_words_that_are_none() {
+        for yes in [
+            "NCOFF 3",
+            "CSTOFF 3",
+            "NCSTOFF\n3",
+            "OFF 3 1 0",
+            "OFF\n# c\n\n3 1",
+            "STCN4nOFF\n3",
+            "OFF3 1 0",
+            "\u{feff}# c\nCOFF # d\n8",
+            "NOFF BINARY\n",
+        ] {
+            assert!(is_off(yes.as_bytes()), "{yes}");
+        }
+        for no in ["OFFICE", "OFF the road", "NNOFF 3", "off 3", "", "CSTCOFF 3", "3 1 0"] {
+            assert!(!is_off(no.as_bytes()), "{no}");
+        }
+        let header = parse(b"STCNOFF\n3 1 0").unwrap();
+        assert!(header.has_uvs && header.has_colors && header.has_normals && header.numbers_min() == 11);
+        assert!(!header.colors_first && header.before_color() == 6);
+        let other = parse(b"NCSTOFF\n3 1 0").unwrap();
+        assert_eq!((other.before_color(), other.after_color(), other.numbers_min()), (3, 5, 11));
+        assert_eq!(parse(b"OFF3 1 0").unwrap().body_at, 3);
+        assert_eq!(parse(b"OFF BINARY\nx").unwrap().body_at, 11);
+        assert_eq!(parse(b"4OFF 1").unwrap_err().fault, MeshFault::Unsupported);
+        assert!(parse(b"nOFF 4 1").unwrap_err().detail.contains("nOFF"));
+    }
+}

@@ -1,0 +1,214 @@
+//! A body, record by record, whatever its encoding: the one place that believes no count, keeps time and pays.
+
+use super::header::{Element, Kind};
+use super::layout::{Layout, Row, Step, VALUES_MAX};
+use crate::import::MeshError;
+use crate::import::context::Context;
+
+/// Records, or items of one list, between two looks at the deadline.
+const RECORDS_PER_LOOK: u64 = 65_536;
+/// Bytes that are paid for together.
+const PAY_BYTES: u64 = 1 << 20;
+
+/// The values of some records by slot, each in a row of its own.
+pub type Columns = [Vec<f64>; VALUES_MAX];
+
+/// The numbers of a body, one after the other. What gives None leaves the place as it is, for [`Source::why`] to look at.
+pub trait Source {
+    /// The next number.
+    fn value(&mut self, kind: Kind) -> Option<f64>;
+    /// Appends the next `count` numbers to `items`.
+    fn values(&mut self, kind: Kind, count: usize, items: &mut Vec<f64>) -> Option<()>;
+    /// Passes over so many numbers, which take so many bytes in a binary body.
+    fn skip(&mut self, numbers: usize, bytes: usize) -> Option<()>;
+    /// Reads records of a fixed size at once, in place of what `columns` holds.
+    fn columns(&mut self, layout: &Layout, rows: usize, columns: &mut Columns) -> Option<()>;
+    /// Whether [`Source::columns`] works.
+    fn is_in_columns(&self) -> bool;
+    /// How many more numbers there can be at most.
+    fn numbers_left(&self, kind: Kind) -> u64;
+    /// Bytes read so far.
+    fn at(&self) -> usize;
+    /// A place in words.
+    fn place(&self, at: usize) -> String;
+    /// Why there was no next number; the record's name follows.
+    fn why(&self) -> String;
+    /// Bytes after the place where the reading stands that mean something.
+    fn trailing_bytes(&self) -> usize;
+}
+
+/// What has been read and not been paid for yet.
+#[derive(Debug, Default)]
+pub struct Meter {
+    unpaid_bytes: u64,
+    /// Triangles so far, at least.
+    triangles: u64,
+}
+
+/// What memory the records of an element take once read, bytes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cost {
+    /// Each.
+    pub record: u64,
+    /// And for each item of its lists.
+    pub item: u64,
+}
+
+/// Reads all records of an element. `keep` is given each, and says how many triangles it has or what is wrong with it.
+pub fn each_record<S: Source>(
+    source: &mut S,
+    element: &Element,
+    layout: &Layout,
+    (cost, meter): (Cost, &mut Meter),
+    cx: &mut Context<'_>,
+    mut keep: impl FnMut(&Row) -> Result<u64, String>,
+) -> Result<(), MeshError> {
+    if layout.steps.is_empty() {
+        return Ok(()); // however many there are
+    }
+    let mut row = Row::default();
+    for number in 0..element.count {
+        if number % RECORDS_PER_LOOK == 0 {
+            cx.deadline.check()?;
+        }
+        let begin = source.at();
+        read_record(source, layout, &mut row, cx).map_err(|fault| match fault {
+            Fault::NoValue => {
+                let (place, why) = (source.place(source.at()), source.why());
+                MeshError::broken(format!("{place}: {why} {}", name(element, number)))
+            }
+            Fault::Says(what) => {
+                let place = source.place(begin);
+                MeshError::broken(format!("{place}: {} {what}", name(element, number)))
+            }
+            Fault::Is(error) => *error,
+        })?;
+        // Before anything is kept: one list may be the whole file.
+        let items = row.lists.iter().map(|list| list.len() as u64).sum::<u64>();
+        meter.unpaid_bytes += cost.record + cost.item * items;
+        if meter.unpaid_bytes > PAY_BYTES {
+            meter.pay(cx)?;
+        }
+        meter.triangles += keep(&row).map_err(|what| {
+            let place = source.place(begin);
+            MeshError::broken(format!("{place}: {} {what}", name(element, number)))
+        })?;
+    }
+    meter.pay(cx)
+}
+
+/// Passes over an element.
+pub fn pass_over<S: Source>(
+    source: &mut S,
+    element: &Element,
+    meter: &mut Meter,
+    cx: &mut Context<'_>,
+) -> Result<(), MeshError> {
+    let layout = Layout::new(element, |_| None);
+    // A binary element without lists is one step, or none.
+    if let (Some(stride), true) = (layout.stride, source.is_in_columns()) {
+        let bytes = element.count.checked_mul(stride as u64).and_then(|bytes| usize::try_from(bytes).ok());
+        return bytes.and_then(|bytes| source.skip(0, bytes)).ok_or_else(|| ends_within(source, element, stride, 0));
+    }
+    each_record(source, element, &layout, (Cost::default(), meter), cx, |_| Ok(0))
+}
+
+/// The error for records of a fixed size, the next of which is number `next`, where the file ends too soon.
+pub fn ends_within<S: Source>(source: &S, element: &Element, stride: usize, next: u64) -> MeshError {
+    let whole = source.trailing_bytes() / stride.max(1);
+    let place = source.place(source.at() + whole * stride);
+    MeshError::broken(format!("{place}: the file ends within {}", name(element, next + whole as u64)))
+}
+
+/// `vertex 3 of 8`, counted from 1.
+fn name(element: &Element, number: u64) -> String {
+    format!("{} {} of {}", super::header::word(element.name.as_bytes()), number + 1, element.count)
+}
+
+/// Why a record could not be read. Small: it goes through hot loops.
+enum Fault {
+    /// The source knows.
+    NoValue,
+    /// What follows the record's name.
+    Says(Box<str>),
+    /// Something else entirely.
+    Is(Box<MeshError>),
+}
+
+fn read_record<S: Source>(source: &mut S, layout: &Layout, row: &mut Row, cx: &mut Context<'_>) -> Result<(), Fault> {
+    for step in &layout.steps {
+        match *step {
+            Step::Skip { numbers, bytes } => source.skip(numbers, bytes).ok_or(Fault::NoValue)?,
+            Step::Value { kind, slot, .. } => row.values[slot] = source.value(kind).ok_or(Fault::NoValue)?,
+            Step::List { count, item, slot } => {
+                let given = source.value(count).ok_or(Fault::NoValue)?;
+                let count = list_length(source, given, item)?;
+                match slot {
+                    Some(slot) => read_list(source, item, count, &mut row.lists[slot], cx)?,
+                    None => skip_list(source, item, count, cx)?,
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A count that the rest of the file can keep.
+fn list_length<S: Source>(source: &S, given: f64, item: Kind) -> Result<usize, Fault> {
+    let count = given as u32;
+    if f64::from(count) != given {
+        return Err(Fault::Says(format!("has a list of {given} items").into()));
+    }
+    if u64::from(count) > source.numbers_left(item) {
+        let left = source.trailing_bytes();
+        return Err(Fault::Says(format!("has a list of {count} items, and only {left} bytes follow").into()));
+    }
+    Ok(count as usize)
+}
+
+fn read_list<S: Source>(
+    source: &mut S,
+    item: Kind,
+    count: usize,
+    list: &mut Vec<f64>,
+    cx: &mut Context<'_>,
+) -> Result<(), Fault> {
+    list.clear();
+    if count > list.capacity() {
+        let more = (count - list.capacity()) as u64;
+        cx.budget.spend("a list of the PLY file", more, 8).map_err(boxed)?;
+        list.reserve_exact(count);
+    }
+    in_pieces(count, cx, |piece| source.values(item, piece, list))
+}
+
+fn skip_list<S: Source>(source: &mut S, item: Kind, count: usize, cx: &Context<'_>) -> Result<(), Fault> {
+    in_pieces(count, cx, |piece| source.skip(piece, piece * item.bytes()))
+}
+
+/// Calls `read` with at most so many items at a time as may go by between two looks at the deadline.
+fn in_pieces(count: usize, cx: &Context<'_>, mut read: impl FnMut(usize) -> Option<()>) -> Result<(), Fault> {
+    let mut left = count;
+    loop {
+        let piece = left.min(RECORDS_PER_LOOK as usize);
+        read(piece).ok_or(Fault::NoValue)?;
+        left -= piece;
+        if left == 0 {
+            return Ok(());
+        }
+        cx.deadline.check().map_err(boxed)?;
+    }
+}
+
+fn boxed(error: impl Into<MeshError>) -> Fault {
+    Fault::Is(Box::new(error.into()))
+}
+
+impl Meter {
+    fn pay(&mut self, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        cx.check_triangles(self.triangles)?;
+        cx.budget.spend("the PLY file", self.unpaid_bytes, 1)?;
+        self.unpaid_bytes = 0;
+        Ok(())
+    }
+}

@@ -1,0 +1,74 @@
+//! Colours in the two attribute bytes of binary STL: 5 bits a channel, in the two ways that programs agree on, and what they
+//! mean for the whole file.
+
+use crate::import::raw::srgb_to_linear;
+
+/// The header of Materialise Magics, and what follows it: RGBA, a byte each, of what has no colour of its own.
+const MAGICS: &[u8] = b"COLOR=";
+/// Bit 15.
+const FLAG: u16 = 0x8000;
+/// Of what has no colour where others have one.
+const WHITE: [f32; 4] = [1.0; 4];
+
+/// How a file stores its colours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Colors {
+    /// VisCAM and SolidView: blue in the lowest bits; a triangle has a colour if bit 15 is set.
+    VisCam,
+    /// Materialise Magics: red in the lowest bits; a triangle has a colour if bit 15 is clear.
+    Magics {
+        /// Of the other triangles, linear RGBA.
+        object: [f32; 4],
+    },
+}
+
+impl Colors {
+    /// What the header and the triangles' attribute bytes say. None where no triangle has a colour.
+    pub fn of(header: &[u8], mut attributes: impl Iterator<Item = u16>) -> Option<Self> {
+        let at = header.windows(MAGICS.len()).position(|word| word == MAGICS);
+        if let Some(bytes) = at.and_then(|at| header.get(at + MAGICS.len()..at + MAGICS.len() + 3)) {
+            let [r, g, b] = [bytes[0], bytes[1], bytes[2]].map(|byte| linear(f64::from(byte) / 255.0));
+            return Some(Self::Magics { object: [r, g, b, 1.0] });
+        }
+        attributes.any(|attribute| attribute & FLAG != 0).then_some(Self::VisCam)
+    }
+
+    /// Linear RGBA of a triangle. Programs that know Magics' header and not its colours leave 0, which would be black.
+    pub fn color(self, attribute: u16) -> [f32; 4] {
+        let channel = |shift: u16| linear(f64::from(attribute >> shift & 31) / 31.0);
+        match self {
+            Self::VisCam if attribute & FLAG != 0 => [channel(10), channel(5), channel(0), 1.0],
+            Self::VisCam => WHITE,
+            Self::Magics { .. } if attribute != 0 && attribute & FLAG == 0 => {
+                [channel(0), channel(5), channel(10), 1.0]
+            }
+            Self::Magics { object } => object,
+        }
+    }
+}
+
+fn linear(v: f64) -> f32 {
+    srgb_to_linear(v) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_ways_are_told_apart() {
+        let mut header = [b' '; 80];
+        assert_eq!(Colors::of(&header, [0, 1, 0x7FFF].into_iter()), None);
+        let viscam = Colors::of(&header, [0, FLAG].into_iter()).unwrap();
+        assert_eq!(viscam.color(FLAG | 31), [0.0, 0.0, 1.0, 1.0]);
+        assert_eq!((viscam.color(FLAG | 31 << 10), viscam.color(31)), ([1.0, 0.0, 0.0, 1.0], WHITE));
+        header[40..50].copy_from_slice(b"COLOR=\xFF\x00\x00\xFF");
+        let magics = Colors::of(&header, [].into_iter()).unwrap();
+        assert_eq!(magics.color(31 << 10), [0.0, 0.0, 1.0, 1.0]);
+        assert_eq!([magics.color(0), magics.color(FLAG), magics.color(FLAG | 31)], [[1.0, 0.0, 0.0, 1.0]; 3]);
+        // Cut off by the header's end.
+        header[40..50].fill(b' ');
+        header[74..].copy_from_slice(MAGICS);
+        assert_eq!(Colors::of(&header, [].into_iter()), None);
+    }
+}

@@ -1,0 +1,239 @@
+//! STL, binary and ASCII, with the two kinds of colours that binary files have ([`color`]). The stored normals are ignored:
+//! they repeat what the corners say, or lie.
+
+mod color;
+
+use self::color::Colors;
+use super::polygon::ALL_EDGES;
+use super::raw::RawMesh;
+use super::{Format, MeshError};
+use crate::import::context::Context;
+use crate::import::metadata;
+use crate::mesh::{FileMetadata, MaterialSlot, UpAxis};
+use crate::pluralise::counted;
+use crate::warning::Warning;
+
+/// An 80-byte header and a count come before the triangles.
+const HEADER_BYTES: usize = 84;
+/// A normal, three corners and two attribute bytes.
+const TRIANGLE_BYTES: usize = 50;
+
+/// Reads either kind.
+pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    let text = super::sniff::trim_start(bytes);
+    if !is_exact_binary(bytes) && is_ascii(text) { read_ascii(text, cx) } else { read_binary(bytes, cx) }
+}
+
+/// Whether the length is exactly what the count in the header asks for. Noise never is.
+pub fn is_exact_binary(bytes: &[u8]) -> bool {
+    declared_bytes(bytes) == Some(bytes.len() as u64)
+}
+
+/// Whether the bytes look like a binary STL that was cut off or has something after its end: the count fits the length
+/// roughly.
+pub fn is_loose_binary(bytes: &[u8]) -> bool {
+    let len = bytes.len() as u64;
+    if uncounted(bytes).is_some() {
+        return true;
+    }
+    match declared_bytes(bytes) {
+        Some(declared) if declared > HEADER_BYTES as u64 => {
+            if declared > len {
+                declared / 16 <= len
+            } else {
+                len - declared <= 512.max(len / 8)
+            }
+        }
+        _ => false,
+    }
+}
+
+/// The triangles of a file whose count was never filled in, as programs leave it that write as they go: 0 or all ones, with
+/// whole triangles behind it, the first of which is one.
+fn uncounted(bytes: &[u8]) -> Option<u64> {
+    let count = bytes.get(80..HEADER_BYTES)?;
+    let body = bytes.get(HEADER_BYTES..).filter(|body| body.len().is_multiple_of(TRIANGLE_BYTES))?;
+    let first: Vec<f32> =
+        body.get(12..48)?.chunks_exact(4).map(|c| f32::from_le_bytes([c[0], c[1], c[2], c[3]])).collect();
+    let is_plausible = first.iter().all(|v| *v == 0.0 || (1e-20..1e20).contains(&v.abs()));
+    let is_unset = count == [0; 4] || count == [0xFF; 4];
+    (is_unset && is_plausible && first.iter().any(|v| *v != 0.0)).then_some((body.len() / TRIANGLE_BYTES) as u64)
+}
+
+/// Whether the text begins as an ASCII STL and goes on as one.
+pub fn is_ascii(text: &[u8]) -> bool {
+    let begins = text.len() >= 5 && text[..5].eq_ignore_ascii_case(b"solid");
+    if !begins || text.get(5).is_some_and(|b| !b.is_ascii_whitespace()) {
+        return false;
+    }
+    let head = &text[..text.len().min(4096)];
+    head.split(|b| b.is_ascii_whitespace())
+        .any(|w| w.eq_ignore_ascii_case(b"facet") || w.eq_ignore_ascii_case(b"endsolid"))
+}
+
+fn declared_bytes(bytes: &[u8]) -> Option<u64> {
+    let count = bytes.get(80..HEADER_BYTES)?;
+    let count = u32::from_le_bytes(count.try_into().ok()?);
+    Some(HEADER_BYTES as u64 + TRIANGLE_BYTES as u64 * u64::from(count))
+}
+
+fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    let Some(declared) = declared_bytes(bytes) else {
+        return Err(MeshError::broken(format!(
+            "the STL file is {} long, and its header alone is {HEADER_BYTES}",
+            counted(bytes.len(), "byte", "bytes")
+        )));
+    };
+    let mut raw = new_mesh(Format::StlBinary);
+    let declared = match uncounted(bytes) {
+        None => declared,
+        Some(count) => {
+            let detail = format!(
+                "the STL header does not say how many triangles follow, which are {count} by the file's length"
+            );
+            raw.report.warnings.push(Warning { code: "count_missing", detail });
+            bytes.len() as u64
+        }
+    };
+    let count = (declared - HEADER_BYTES as u64) / TRIANGLE_BYTES as u64;
+    if declared > bytes.len() as u64 {
+        return Err(MeshError::broken(format!(
+            "the STL header at byte 80 says {}, which needs {declared} bytes, and the file has {}",
+            counted(count, "triangle", "triangles"),
+            bytes.len()
+        )));
+    }
+    raw.report.facts = FileMetadata::by(metadata::tidy(&bytes[..80]));
+    if declared < bytes.len() as u64 {
+        raw.report.warnings.push(Warning {
+            code: "trailing_bytes",
+            detail: format!(
+                "ignored: {} after the last STL triangle",
+                counted(bytes.len() as u64 - declared, "byte", "bytes")
+            ),
+        });
+    }
+    raw.is_f32 = true;
+    reserve(&mut raw, count, cx)?;
+    let body = &bytes[HEADER_BYTES..declared as usize];
+    for (i, triangle) in body.chunks_exact(TRIANGLE_BYTES).enumerate() {
+        if i % 65536 == 0 {
+            cx.deadline.check()?;
+        }
+        for corner in triangle[12..48].chunks_exact(12) {
+            let c = |k: usize| f64::from(f32::from_le_bytes([corner[k], corner[k + 1], corner[k + 2], corner[k + 3]]));
+            raw.positions.push([c(0), c(4), c(8)]);
+        }
+        push_triangle(&mut raw);
+    }
+    paint(&mut raw, &bytes[..80], body, cx)?;
+    finish(raw)
+}
+
+/// Gives each triangle's vertices, which are its own, the colour in its attribute bytes.
+fn paint(raw: &mut RawMesh, header: &[u8], body: &[u8], cx: &mut Context<'_>) -> Result<(), MeshError> {
+    let attributes =
+        || body.chunks_exact(TRIANGLE_BYTES).map(|triangle| u16::from_le_bytes([triangle[48], triangle[49]]));
+    let Some(colors) = Colors::of(header, attributes()) else { return Ok(()) };
+    cx.deadline.check()?;
+    cx.budget.spend("the colours of STL triangles", raw.positions.len() as u64, 16)?;
+    raw.colors.reserve_exact(raw.positions.len());
+    raw.colors.extend(attributes().flat_map(|attribute| [colors.color(attribute); 3]));
+    // These are what to show, not a tint for the grey of files without colours.
+    raw.materials = vec![MaterialSlot { base_color: Some([1.0; 4]), ..MaterialSlot::default() }];
+    Ok(())
+}
+
+/// ASCII is read by its words alone: exporters disagree on lines and indentation, but every corner is `vertex x y z`.
+fn read_ascii(text: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    let mut raw = new_mesh(Format::StlAscii);
+    // Line ends of old Macs, where there are no others.
+    let newline = if text.contains(&b'\n') { b'\n' } else { b'\r' };
+    raw.report.facts = FileMetadata::by(metadata::tidy(name(text, newline)));
+    // The shortest triangle that a text can hold says how many it can have at most.
+    let count_max = text.len() as u64 / 30 + 1;
+    cx.budget.spend("the STL triangles", count_max, 3 * 24 + 12 + 1 + 4)?;
+    let mut corners = 0_usize;
+    let mut ended = false;
+    let mut met = 0_u64;
+    for (number, line) in text.split(|&b| b == newline).enumerate() {
+        let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|w| !w.is_empty());
+        // Behind "solid" and "endsolid" is a name, which may be any words. It ends with the line, or where facets begin.
+        let mut is_name = false;
+        while let Some(word) = words.next() {
+            if met.is_multiple_of(65_536) {
+                cx.deadline.check()?;
+            }
+            met += 1;
+            if is_name {
+                let begins = word.eq_ignore_ascii_case(b"facet")
+                    && words.clone().next().is_some_and(|word| word.eq_ignore_ascii_case(b"normal"));
+                (is_name, ended) = (!begins, ended && !begins);
+            } else if word.eq_ignore_ascii_case(b"vertex") {
+                let mut position = [0.0; 3];
+                for value in &mut position {
+                    *value = parse(words.next()).ok_or_else(|| bad_line(number, "a vertex needs three numbers"))?;
+                }
+                raw.positions.push(position);
+                corners += 1;
+            } else if word.eq_ignore_ascii_case(b"endfacet") {
+                if corners != 3 {
+                    return Err(bad_line(number, &format!("a facet needs three vertices, and this one has {corners}")));
+                }
+                corners = 0;
+                push_triangle(&mut raw);
+            } else if word.eq_ignore_ascii_case(b"solid") || word.eq_ignore_ascii_case(b"endsolid") {
+                ended = word.len() == 8;
+                is_name = true;
+            }
+        }
+    }
+    if corners != 0 || !ended {
+        return Err(MeshError::broken("the STL text has no \"endsolid\" at its end: it seems to be cut off"));
+    }
+    cx.check_triangles(raw.triangles.len() as u64)?;
+    finish(raw)
+}
+
+/// What follows the first word: up to the end of the line, or of what is before the first facet where that is on the same.
+fn name(text: &[u8], newline: u8) -> &[u8] {
+    let line = text.split(|&b| b == newline).next().and_then(|line| line.get(5..)).unwrap_or_default();
+    let head = &line[..line.len().min(4096)];
+    let facet = head.windows(13).position(|window| window.eq_ignore_ascii_case(b" facet normal"));
+    &line[..facet.unwrap_or(line.len())]
+}
+
+fn parse(word: Option<&[u8]>) -> Option<f64> {
+    std::str::from_utf8(word?).ok()?.parse().ok()
+}
+
+fn bad_line(index: usize, what: &str) -> MeshError {
+    MeshError::broken(format!("line {} of the STL text: {what}", index + 1))
+}
+
+fn new_mesh(format: Format) -> RawMesh {
+    let mut raw = RawMesh { up: UpAxis::Z, ..RawMesh::default() };
+    raw.report.format = format;
+    raw
+}
+
+fn reserve(raw: &mut RawMesh, count: u64, cx: &mut Context<'_>) -> Result<(), MeshError> {
+    cx.check_triangles(count)?;
+    cx.budget.spend("the STL triangles", count, 3 * 24 + 12 + 1 + 4)?;
+    raw.positions.reserve_exact(count as usize * 3);
+    raw.triangles.reserve_exact(count as usize);
+    Ok(())
+}
+
+fn push_triangle(raw: &mut RawMesh) {
+    let end = raw.positions.len() as u32;
+    raw.triangles.push([end - 3, end - 2, end - 1]);
+}
+
+fn finish(mut raw: RawMesh) -> Result<RawMesh, MeshError> {
+    raw.edge_masks = vec![ALL_EDGES; raw.triangles.len()];
+    raw.triangle_materials = vec![0; raw.triangles.len()];
+    raw.report.file_vertices = raw.positions.len() as u64;
+    raw.report.polygons_by_arity[3] = raw.triangles.len() as u64;
+    Ok(raw)
+}

@@ -1,0 +1,230 @@
+//! Places the objects that are built, with all that is in them. Counted before it is done: components of components double with
+//! every level.
+
+use super::model::{Group, NONE, Object, Triangle};
+use super::parts::{Key, Parts};
+use crate::import::MeshError;
+use crate::import::affine::Affine;
+use crate::import::context::Context;
+use crate::import::corners::CornerSet;
+use crate::import::polygon::ALL_EDGES;
+use crate::import::raw::RawMesh;
+use crate::limits;
+use crate::mesh::MaterialSlot;
+use crate::mesh::material::AlphaMode;
+use rapidhash::RapidHashMap;
+
+/// Objects within objects. Writers use two levels.
+const DEPTH_MAX: usize = 64;
+const VERTEX_BYTES: u64 = 24 + 16;
+const TRIANGLE_BYTES: u64 = 12 + 1 + 4;
+const WHITE: [f32; 4] = [1.0; 4];
+
+/// Fills in everything that is built.
+pub fn assemble(parts: &Parts, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
+    let roots = parts.roots();
+    let mut counter = Counter { parts, known: RapidHashMap::default() };
+    let mut total = Count::default();
+    for root in &roots {
+        let (key, object) = parts.find(0, root)?;
+        total.add(counter.count(key, object, 0)?);
+    }
+    cx.check_triangles(total.triangles)?;
+    limits::check("the number of scene nodes", total.objects, cx.limits.nodes, "--limit-nodes")?;
+    cx.budget.spend("the 3MF triangles", total.triangles, TRIANGLE_BYTES)?;
+    raw.triangles.reserve_exact(total.triangles as usize);
+    raw.edge_masks.reserve_exact(total.triangles as usize);
+    raw.triangle_materials.reserve_exact(total.triangles as usize);
+    let mut builder = Builder { parts, slots: Slots::default(), set: CornerSet::default() };
+    for root in &roots {
+        let (key, object) = parts.find(0, root)?;
+        builder.add(key.0, object, &root.transform, raw, cx)?;
+    }
+    raw.report.file_vertices = total.vertices;
+    raw.report.polygons_by_arity[3] = raw.triangles.len() as u64;
+    builder.slots.finish(raw);
+    Ok(())
+}
+
+/// What an object comes to with all that is in it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Count {
+    objects: u64,
+    triangles: u64,
+    vertices: u64,
+    /// Levels of objects below this one.
+    height: usize,
+}
+
+impl Count {
+    /// Adds what is beside it.
+    fn add(&mut self, other: Self) {
+        self.objects = self.objects.saturating_add(other.objects);
+        self.triangles = self.triangles.saturating_add(other.triangles);
+        self.vertices = self.vertices.saturating_add(other.vertices);
+    }
+}
+
+struct Counter<'a> {
+    parts: &'a Parts,
+    /// None while the object is being counted.
+    known: RapidHashMap<Key, Option<Count>>,
+}
+
+impl Counter<'_> {
+    fn count(&mut self, key: Key, object: &Object, depth: usize) -> Result<Count, MeshError> {
+        let known = self.known.get(&key).copied();
+        if let Some(None) = known {
+            return Err(MeshError::broken(format!("object {} of the 3MF file is in itself", key.1)));
+        }
+        // What is known already may be deep itself.
+        if depth + known.flatten().map_or(0, |count| count.height) > DEPTH_MAX {
+            return Err(MeshError::broken(format!("objects of the 3MF file are more than {DEPTH_MAX} deep")));
+        }
+        if let Some(Some(count)) = known {
+            return Ok(count);
+        }
+        self.known.insert(key, None);
+        let (triangles, vertices) = (object.triangles.len() as u64, object.vertices.len() as u64);
+        let mut count = Count { objects: 1, triangles, vertices, height: 0 };
+        let parts = self.parts;
+        for placed in &object.components {
+            let (inner, object) = parts.find(key.0, placed)?;
+            let part = self.count(inner, object, depth + 1)?;
+            count.add(part);
+            count.height = count.height.max(part.height + 1);
+        }
+        self.known.insert(key, Some(count));
+        Ok(count)
+    }
+}
+
+struct Builder<'a> {
+    parts: &'a Parts,
+    slots: Slots,
+    set: CornerSet,
+}
+
+impl Builder<'_> {
+    /// Adds an object; its depth and number were counted.
+    fn add(
+        &mut self,
+        part: usize,
+        object: &Object,
+        transform: &Affine,
+        raw: &mut RawMesh,
+        cx: &mut Context<'_>,
+    ) -> Result<(), MeshError> {
+        cx.deadline.check()?;
+        self.mesh(part, object, transform, raw, cx)?;
+        let parts = self.parts;
+        for placed in &object.components {
+            let ((part, _), inner) = parts.find(part, placed)?;
+            self.add(part, inner, &transform.after(&placed.transform), raw, cx)?;
+        }
+        Ok(())
+    }
+
+    fn mesh(
+        &mut self,
+        part: usize,
+        object: &Object,
+        transform: &Affine,
+        raw: &mut RawMesh,
+        cx: &mut Context<'_>,
+    ) -> Result<(), MeshError> {
+        let model = self.parts.model(part);
+        let mirrors = transform.is_mirroring();
+        self.set.clear();
+        for (i, triangle) in object.triangles.iter().enumerate() {
+            if i % 65_536 == 0 {
+                cx.deadline.check()?;
+            }
+            self.set.pay(3, VERTEX_BYTES, cx)?;
+            let group = model.groups.get(&triangle.group);
+            let material = self.slots.of((part, triangle.group, triangle.indices[0]), group);
+            let mut corners = [0; 3];
+            for (k, corner) in corners.iter_mut().enumerate() {
+                let (key, color) = corner_color(triangle, k, group);
+                let (vertex, is_new) = self.set.vertex(key, raw.positions.len());
+                if is_new {
+                    let position = object.vertices.get(triangle.corners[k] as usize).copied().unwrap_or_default();
+                    raw.positions.push(transform.point(position));
+                    if let Some(color) = color {
+                        raw.colors.resize(raw.positions.len() - 1, WHITE);
+                        raw.colors.push(color);
+                    }
+                }
+                *corner = vertex;
+            }
+            let [a, b, c] = corners;
+            raw.triangles.push(if mirrors { [a, c, b] } else { corners });
+            raw.edge_masks.push(ALL_EDGES);
+            raw.triangle_materials.push(material);
+        }
+        self.set.pay_all(VERTEX_BYTES, cx)?;
+        if !raw.colors.is_empty() {
+            raw.colors.resize(raw.positions.len(), WHITE);
+        }
+        Ok(())
+    }
+}
+
+/// What tells a corner from others at its vertex, and its colour if it has one of its own.
+fn corner_color(triangle: &Triangle, corner: usize, group: Option<&Group>) -> ([u32; 4], Option<[f32; 4]>) {
+    let vertex = triangle.corners[corner];
+    let index = triangle.indices[corner];
+    let colors = group.filter(|group| group.names.is_none()).map(|group| &group.colors);
+    match colors.and_then(|colors| colors.get(index as usize)) {
+        Some(&color) => ([vertex, triangle.group, index, 0], Some(color)),
+        None => ([vertex, NONE, NONE, 0], None),
+    }
+}
+
+/// A base material: its part, its group and its place there.
+type Base = (usize, u32, u32);
+
+/// Material slots, made as triangles need them.
+#[derive(Default)]
+struct Slots {
+    all: Vec<MaterialSlot>,
+    /// None: what has no base material.
+    known: RapidHashMap<Option<Base>, u32>,
+    has_plain: Option<usize>,
+}
+
+impl Slots {
+    fn of(&mut self, (part, number, index): Base, group: Option<&Group>) -> u32 {
+        let base = group.and_then(|group| {
+            let name = group.names.as_ref()?.get(index as usize)?;
+            Some((name, *group.colors.get(index as usize)?))
+        });
+        let key = base.map(|_| (part, number, index));
+        let next = self.all.len() as u32;
+        let slot = *self.known.entry(key).or_insert(next);
+        if slot < next {
+            return slot;
+        }
+        self.all.push(match base {
+            Some((name, color)) => MaterialSlot {
+                name: name.clone(),
+                base_color: Some(color),
+                alpha: if color[3] < 1.0 { AlphaMode::Blend } else { AlphaMode::Opaque },
+                ..MaterialSlot::default()
+            },
+            None => MaterialSlot::default(),
+        });
+        if base.is_none() {
+            self.has_plain = Some(slot as usize);
+        }
+        slot
+    }
+
+    fn finish(mut self, raw: &mut RawMesh) {
+        // Colours of vertices are what to show, not a tint for the grey of files without colours.
+        if let Some(plain) = self.has_plain.filter(|_| !raw.colors.is_empty()) {
+            self.all[plain].base_color = Some(WHITE);
+        }
+        raw.materials = self.all;
+    }
+}

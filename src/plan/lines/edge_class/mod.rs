@@ -1,0 +1,62 @@
+//! Kinds of edges.
+
+use crate::mesh::Mesh;
+use crate::mesh::edges::MeshEdge;
+use crate::spec::{Wire, WireEdges};
+
+/// A kind of edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Class {
+    /// Each.
+    All,
+    /// Of the file's polygons.
+    Polygon,
+    /// Faces meet at an angle whose cosine is below this, or there are not two.
+    Feature(f64),
+    /// Two faces that meet so.
+    Crease(f64),
+    /// With one face.
+    Boundary,
+    /// With more than two faces, or with two that disagree which side is out.
+    Nonmanifold,
+}
+
+/// The kind that a wire follows.
+pub fn class_of(wire: &Wire) -> Class {
+    match wire.edges {
+        WireEdges::Triangles => Class::All,
+        WireEdges::Polygons => Class::Polygon,
+        WireEdges::Feature => Class::Feature(cos_deg(wire.feature_angle_deg)),
+        WireEdges::Boundary => Class::Boundary,
+    }
+}
+
+/// Whether an edge is of a kind.
+pub fn is_of(class: Class, mesh: &Mesh, edge: &MeshEdge) -> bool {
+    let bends = |limit: f64| {
+        let [a, b] = edge.faces.map(|face| mesh.face_normals[face as usize].map(f64::from));
+        let cos = (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+        if a == [0.0; 3] || b == [0.0; 3] {
+            // A face without area has no direction to bend from.
+            return false;
+        }
+        // Two faces that disagree which side is out bend the other way round.
+        (if edge.is_wound_alike { -cos } else { cos }) < limit
+    };
+    match class {
+        Class::All => true,
+        Class::Polygon => edge.is_polygon_edge,
+        Class::Feature(limit) => edge.face_count != 2 || bends(limit),
+        Class::Crease(limit) => edge.face_count == 2 && bends(limit),
+        Class::Boundary => edge.face_count == 1,
+        Class::Nonmanifold => edge.face_count > 2 || (edge.face_count == 2 && edge.is_wound_alike),
+    }
+}
+
+/// The cosine of degrees.
+pub fn cos_deg(degrees: f64) -> f64 {
+    libm::cos(degrees.to_radians())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,101 @@
+//! Hulls spend before they allocate, and end when the job does.
+
+use super::*;
+use crate::import::{Bundle, import};
+use crate::limits::{Deadline, Limits, Stopped};
+use crate::plan::build::projection;
+use crate::request::{self, Rules};
+use crate::scene::camera::{Border, Camera};
+use crate::spec::BackendChoice;
+use crate::spec::Spec;
+
+/// A mesh of so many triangles that touch nothing.
+fn triangles(count: usize) -> Mesh {
+    use std::fmt::Write;
+    let mut obj = String::new();
+    for i in 0..count {
+        let (x, y, z) = ((i % 300) as f64, (i / 300) as f64, (i * 7919 % 1000) as f64);
+        writeln!(obj, "v {x} {y} {z}\nv {} {y} {z}\nv {x} {} {z}", x + 0.8, y + 0.7).unwrap();
+        writeln!(obj, "f -3 -2 -1").unwrap();
+    }
+    let limits = Limits::default();
+    let bundle = Bundle::of_one(obj.into_bytes());
+    import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap()
+}
+
+fn spec() -> Spec {
+    let keys = [("style", "outline"), ("outline.method", "hull"), ("size", "200x160")];
+    let keys: Vec<(String, String)> = keys.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
+    let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
+    request::read(None, &keys, &rules).unwrap()
+}
+
+#[test]
+fn a_hull_takes_no_more_than_it_spends() {
+    for count in [1, 10, 20_000] {
+        let (mesh, spec) = (triangles(count), spec());
+        let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
+        let parts = Parts::new(&mesh, &spec);
+        let size_px = [200, 160];
+        let rows = projection(&Camera::place(&spec.camera, &mesh, size_px, Border::default()), size_px, true);
+        let mut means = PlanContext { budget: &mut budget, deadline: &deadline };
+        let mut edges = Edges::default();
+        let found = edges.with_silhouettes(&mesh, &parts, &mut means).unwrap();
+        let before = means.budget.spent_bytes();
+        let view = View::new(&mesh, &parts, &rows, &mut means).unwrap();
+        let thicknesses = [Some(Thickness::Px(3.0))];
+        let rims = view.rims(&thicknesses, found, &mut means).unwrap();
+        let hull = Outlines::draw(&view, &thicknesses, (size_px, 0), &rims, &mut means).unwrap();
+        assert_eq!((rims.len(), rims.capacity()), (3 * count, 3 * count));
+        assert!(hull.triangles.len() >= 9 * count, "{} triangles", hull.triangles.len());
+        let taken = size_of::<Rim>() * rims.capacity()
+            + 2 * size_of::<End>() * rims.len()
+            + size_of::<[f64; 3]>() * view.places.capacity()
+            + mesh.triangles.len()
+            + size_of::<HullVertex>() * hull.vertices.capacity()
+            + 12 * hull.triangles.capacity()
+            + 4 * hull.triangle_materials.capacity();
+        let spent = means.budget.spent_bytes() - before;
+        assert!((taken as u64) <= spent, "{taken} bytes of {spent}");
+    }
+}
+
+#[test]
+fn a_budget_that_is_too_small_is_refused_at_every_step() {
+    let (mesh, spec) = (triangles(500), spec());
+    let plan = |memory_bytes| {
+        let mut budget = Budget::new(&Limits { memory_bytes, ..Limits::default() });
+        let result = crate::plan::build(&mesh, &spec, &mut budget, &Deadline::default());
+        result.map(|_| budget.spent_bytes()).map_err(|error| error.to_string())
+    };
+    let enough = plan(1 << 30).unwrap();
+    assert_eq!(plan(enough), Ok(enough));
+    let refused: std::collections::BTreeSet<String> = (0..enough).step_by(1000).filter_map(|b| plan(b).err()).collect();
+    let words = |what: &str| refused.iter().any(|error| error.contains(what));
+    for what in ["outline's edges", "outline's strips", "outline's corners", "outline's triangles", "the edges"] {
+        assert!(words(what), "nothing of {what}: {refused:?}");
+    }
+}
+
+#[test]
+fn every_step_ends_when_the_job_does() {
+    let (mesh, spec) = (triangles(100), spec());
+    let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
+    let parts = Parts::new(&mesh, &spec);
+    let size_px = [200, 160];
+    let rows = projection(&Camera::place(&spec.camera, &mesh, size_px, Border::default()), size_px, true);
+    let (mut edges, stopped) = (Edges::default(), Deadline::default());
+    stopped.stop();
+    let mut means = PlanContext { budget: &mut budget, deadline: &deadline };
+    let found = edges.with_silhouettes(&mesh, &parts, &mut means).unwrap();
+    let view = View::new(&mesh, &parts, &rows, &mut means).unwrap();
+    let thicknesses = [Some(Thickness::Px(3.0))];
+    let rims = view.rims(&thicknesses, found, &mut means).unwrap();
+    let mut late = PlanContext { budget: means.budget, deadline: &stopped };
+    let results = [
+        View::new(&mesh, &parts, &rows, &mut late).err(),
+        view.rims(&thicknesses, found, &mut late).err(),
+        Outlines::draw(&view, &thicknesses, (size_px, 0), &rims, &mut late).err(),
+    ];
+    assert_eq!(results, [const { Some(PlanError::Stopped(Stopped)) }; 3]);
+}

@@ -1,0 +1,18 @@
+//! Putting long lists in order.
+
+use std::cmp::Ordering;
+
+use crate::limits::{Deadline, Stopped};
+use crate::plan::context::CHECK_EVERY;
+
+/// Sorts. In parts, which are put in order one by one, so that the deadline can be looked at in between.
+pub fn sort<T>(items: &mut [T], order: &impl Fn(&T, &T) -> Ordering, deadline: &Deadline) -> Result<(), Stopped> {
+    deadline.check()?;
+    if items.len() <= CHECK_EVERY {
+        items.sort_unstable_by(order);
+        return Ok(());
+    }
+    let (low, _, high) = items.select_nth_unstable_by(items.len() / 2, order);
+    sort(low, order, deadline)?;
+    sort(high, order, deadline)
+}

@@ -1,0 +1,160 @@
+//! A material of the file and a part's layers to what the shaders read.
+
+use super::textures::TextureLoader;
+use crate::mesh::material::{AlphaMode, TextureRef};
+use crate::mesh::{MaterialSlot, Mesh};
+use crate::plan::lines::build;
+use crate::plan::{MaterialLook, PlanError, TEXTURE_NONE, flags, slots};
+use crate::spec::color::Rgba;
+use crate::spec::{DebugView, FlatNormals, Layers, Shading, Surface, Wire, WireMethod};
+
+/// Surfaces for which neither the request nor the file names a colour: `#c8ccd2`, a calm light grey.
+const DEFAULT_COLOR: [u8; 4] = [0xc8, 0xcc, 0xd2, 0xff];
+
+/// Neither a mirror nor chalk.
+const DEFAULT_ROUGHNESS: f32 = 0.6;
+
+/// What a part looks like.
+pub fn look(
+    mesh: &Mesh,
+    slot: &MaterialSlot,
+    layers: &Layers,
+    textures: &mut TextureLoader<'_>,
+) -> Result<MaterialLook, PlanError> {
+    let mut look = MaterialLook::unlit([0.0; 4]);
+    look.flags = 0;
+    if let Some(surface) = &layers.surface {
+        look.flags = flags::FILL | shading_flags(slot, surface);
+        fill(&mut look, mesh, slot, surface);
+        if surface.textures && surface.debug == DebugView::None {
+            sample(&mut look, slot, surface, textures)?;
+        }
+    }
+    if let Some(wire) = layers.wire.as_ref().filter(|wire| wire.method != WireMethod::Exact) {
+        wire_of(&mut look, wire);
+    }
+    Ok(look)
+}
+
+/// Loads all textures of a material that samples none.
+pub fn load_all(slot: &MaterialSlot, textures: &mut TextureLoader<'_>) -> Result<(), PlanError> {
+    let all = [
+        (&slot.base_texture, true),
+        (&slot.metallic_roughness_texture, false),
+        (&slot.normal_texture, false),
+        (&slot.emissive_texture, true),
+    ];
+    for (texture, is_color) in all {
+        if let Some(texture) = texture {
+            textures.load(texture, is_color)?;
+        }
+    }
+    Ok(())
+}
+
+fn fill(look: &mut MaterialLook, mesh: &Mesh, slot: &MaterialSlot, surface: &Surface) {
+    // A picture or the vertices' colours say it all: grey would only darken them.
+    let is_painted = slot.base_texture.is_some() || !mesh.colors.is_empty();
+    let none = if is_painted { [1.0; 4] } else { Rgba::from_srgb8(DEFAULT_COLOR).0 };
+    let file = slot.base_color.unwrap_or(none);
+    look.base_color = surface.color.map_or(file, |color| color.0);
+    look.opacity = if surface.debug == DebugView::None { surface.opacity } else { 1.0 };
+    look.metallic = surface.metallic.or(slot.metallic).unwrap_or(0.0);
+    look.roughness = surface.roughness.or(slot.roughness).unwrap_or(DEFAULT_ROUGHNESS);
+    look.normal_scale = slot.normal_scale.unwrap_or(1.0);
+    look.emissive = match surface.emissive {
+        Some(Rgba([r, g, b, a])) => [r, g, b].map(|v| v * a),
+        None => slot.emissive.unwrap_or_default(),
+    };
+    // A request's own colour takes the place of all that the file says about colour.
+    if surface.color.is_none() && !mesh.colors.is_empty() {
+        look.flags |= flags::VERTEX_COLORS;
+    }
+    let alpha = if surface.color.is_some() { AlphaMode::Blend } else { slot.alpha };
+    look.flags |= match alpha {
+        _ if surface.debug != DebugView::None => 0,
+        AlphaMode::Mask(cutoff) => {
+            look.alpha_cutoff = cutoff;
+            flags::MASK
+        }
+        AlphaMode::Blend => flags::BLEND,
+        AlphaMode::Opaque => 0,
+    };
+    if surface.metallic.is_some() {
+        look.flags |= flags::OWN_METALLIC;
+    }
+    if surface.roughness.is_some() {
+        look.flags |= flags::OWN_ROUGHNESS;
+    }
+    if surface.debug == DebugView::VertexColor && !mesh.colors.is_empty() {
+        look.flags |= flags::VERTEX_COLORS;
+    }
+}
+
+fn shading_flags(slot: &MaterialSlot, surface: &Surface) -> u32 {
+    let debug = match surface.debug {
+        DebugView::None => 0,
+        DebugView::Barycentric => 1,
+        DebugView::MinBarycentric => 2,
+        DebugView::EdgeDistance => 3,
+        DebugView::Normal => 4,
+        DebugView::Uv => 5,
+        DebugView::FaceOrientation => 6,
+        DebugView::VertexColor => 7,
+    };
+    let normals = match (surface.shading, surface.normals) {
+        (_, FlatNormals::Face) if surface.debug == DebugView::FaceOrientation => flags::FACE_NORMALS,
+        (Shading::Flat, FlatNormals::Face) => flags::FACE_NORMALS,
+        (Shading::Flat, FlatNormals::Derivative) => flags::DERIVATIVE_NORMALS,
+        // Light is painted into such a material's colours; smooth shading shows the asset as its author means it.
+        (Shading::Smooth, _) if slot.unlit && surface.debug == DebugView::None => 0,
+        (Shading::Smooth, _) => flags::VERTEX_NORMALS,
+        (Shading::Unlit, _) if surface.debug == DebugView::Normal => flags::FACE_NORMALS,
+        (Shading::Unlit, _) => 0,
+    };
+    normals | debug << flags::DEBUG_SHIFT
+}
+
+fn sample(
+    look: &mut MaterialLook,
+    slot: &MaterialSlot,
+    surface: &Surface,
+    textures: &mut TextureLoader<'_>,
+) -> Result<(), PlanError> {
+    let is_lit = look.flags & (flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_NORMALS) != 0;
+    let asks_gloss = surface.metallic.is_none() || surface.roughness.is_none();
+    let wanted: [(usize, bool, &Option<TextureRef>, bool); 4] = [
+        (slots::BASE, surface.color.is_none(), &slot.base_texture, true),
+        (slots::METALLIC_ROUGHNESS, is_lit && asks_gloss, &slot.metallic_roughness_texture, false),
+        // The other kinds of normals are there to show the faces as they are.
+        (slots::NORMAL, look.flags & flags::VERTEX_NORMALS != 0, &slot.normal_texture, false),
+        (slots::EMISSIVE, surface.emissive.is_none() && look.emissive != [0.0; 3], &slot.emissive_texture, true),
+    ];
+    for (place, is_needed, texture, is_color) in wanted {
+        if let Some(texture) = texture.as_ref().filter(|_| is_needed) {
+            look.textures[place] = textures.load(texture, is_color)?;
+        }
+    }
+    Ok(())
+}
+
+fn wire_of(look: &mut MaterialLook, wire: &Wire) {
+    look.wire_color = build::color(wire);
+    look.wire_thickness = wire.thickness;
+    look.wire_smoothing = wire.smoothing;
+    look.flags |= match wire.method {
+        WireMethod::Exact => 0,
+        WireMethod::Fwidth => flags::WIRE_FWIDTH,
+        WireMethod::FwidthMin => flags::WIRE_FWIDTH_MIN,
+        WireMethod::Barycentric => flags::WIRE_BARYCENTRIC,
+        WireMethod::Threshold => flags::WIRE_THRESHOLD,
+    };
+    if wire.lit {
+        look.flags |= flags::WIRE_LIT;
+    }
+}
+
+/// Whether a material samples anything at all.
+pub fn samples(look: &MaterialLook) -> bool {
+    look.textures.iter().any(|texture| texture.texture != TEXTURE_NONE)
+}

@@ -1,0 +1,262 @@
+//! The filled surface: what a visible sample needs to know to become a colour.
+
+pub(crate) mod build;
+pub(crate) mod closeup;
+pub(crate) mod lights;
+pub(crate) mod materials;
+pub(crate) mod textures;
+
+pub use build::surface_pass;
+use std::borrow::Cow;
+
+use super::Faces;
+
+/// The filled surface. Arrays that no material reads are empty.
+#[derive(Debug)]
+pub struct SurfacePass<'a> {
+    /// Which faces are drawn.
+    pub faces: Faces,
+    /// Whether it is seen. Where not, it only hides lines.
+    pub is_shaded: bool,
+    /// What parts look like; at least one.
+    pub materials: Vec<MaterialLook>,
+    /// Index into `materials` a triangle; empty where there is one material.
+    pub triangle_materials: &'a [u32],
+    /// A unit normal a triangle.
+    pub face_normals: &'a [[f32; 3]],
+    /// Unit normals, interpolated between corners.
+    pub vertex_normals: Option<CornerValues<'a, [f32; 3]>>,
+    /// Texture coordinates.
+    pub uvs: Option<CornerValues<'a, [f32; 2]>>,
+    /// Linear RGBA vertex colours, straight alpha.
+    pub colors: Option<CornerValues<'a, [f32; 4]>>,
+    /// Which edges of each triangle barycentric wires follow (bit i: corner i to i + 1); empty where all.
+    pub edge_masks: Cow<'a, [u8]>,
+    /// What materials sample.
+    pub textures: Textures,
+    /// What shines.
+    pub lights: Lights,
+}
+
+/// Values of triangle corners, with their own index.
+#[derive(Clone, Debug)]
+pub struct CornerValues<'a, T: Clone> {
+    /// The values.
+    pub values: Cow<'a, [T]>,
+    /// Three indices into `values` a triangle.
+    pub triangles: &'a [[u32; 3]],
+}
+
+/// A material as the shaders read it, field for field.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct MaterialLook {
+    /// Linear RGBA, straight alpha.
+    pub base_color: [f32; 4],
+    /// Linear RGB that it gives off.
+    pub emissive: [f32; 3],
+    /// For [`flags::MASK`]: the smallest alpha that is there.
+    pub alpha_cutoff: f32,
+    /// Of a barycentric wire: premultiplied linear RGBA, opacity included.
+    pub wire_color: [f32; 4],
+    /// t
+    pub wire_thickness: f32,
+    /// s
+    pub wire_smoothing: f32,
+    /// 0 to 1.
+    pub metallic: f32,
+    /// 0 to 1.
+    pub roughness: f32,
+    /// Multiplies the normal texture's x and y.
+    pub normal_scale: f32,
+    /// Bits of [`flags`].
+    pub flags: u32,
+    /// Multiplies whatever alpha comes to, 0 to 1.
+    pub opacity: f32,
+    /// 0
+    pub padding: u32,
+    /// By [`slots`].
+    pub textures: [TextureUse; 4],
+}
+
+/// A material's use of a texture.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct TextureUse {
+    /// `[u', v'] = [[a, b, c], [d, e, f]] (u, v, 1)`.
+    pub transform: [[f32; 3]; 2],
+    /// Index into [`Textures::images`], or [`TEXTURE_NONE`].
+    pub texture: u32,
+    /// Bits 0 to 1: wrap across (0 repeat, 1 mirror, 2 clamp); bits 2 to 3: wrap down; bit 4: nearest texel.
+    pub sampler: u32,
+}
+
+/// No texture.
+pub const TEXTURE_NONE: u32 = u32::MAX;
+
+/// Places in [`MaterialLook::textures`].
+pub mod slots {
+    /// Base colour and alpha.
+    pub const BASE: usize = 0;
+    /// Roughness in green, metallic in blue.
+    pub const METALLIC_ROUGHNESS: usize = 1;
+    /// Tangent-space normal.
+    pub const NORMAL: usize = 2;
+    /// Light given off.
+    pub const EMISSIVE: usize = 3;
+}
+
+/// Bits of [`MaterialLook::flags`].
+pub mod flags {
+    /// There is a fill. Without it only wires show.
+    pub const FILL: u32 = 1;
+    /// Lit by a normal a triangle. None of this and the next two: unlit.
+    pub const FACE_NORMALS: u32 = 2;
+    /// Lit by the cross product of screen-space derivatives of the position.
+    pub const DERIVATIVE_NORMALS: u32 = 4;
+    /// Lit by interpolated vertex normals.
+    pub const VERTEX_NORMALS: u32 = 8;
+    /// Any normal.
+    pub const LIT: u32 = FACE_NORMALS | DERIVATIVE_NORMALS | VERTEX_NORMALS;
+    /// Vertex colours multiply the base colour.
+    pub const VERTEX_COLORS: u32 = 16;
+    /// Alpha is 0 below the cutoff and 1 from it on.
+    pub const MASK: u32 = 32;
+    /// Alpha is what it is. Without this and `MASK`: 1; the opacity multiplies it.
+    pub const BLEND: u32 = 64;
+    /// A wire where any `b < 0.02 t`.
+    pub const WIRE_THRESHOLD: u32 = 128;
+    /// A wire by `smoothstep(0, 0.1 t, min b)`.
+    pub const WIRE_BARYCENTRIC: u32 = 256;
+    /// A wire by fwidth of the smallest coordinate.
+    pub const WIRE_FWIDTH_MIN: u32 = 512;
+    /// A wire by fwidth of each coordinate.
+    pub const WIRE_FWIDTH: u32 = 1024;
+    /// The wire is mixed into the base colour before lighting.
+    pub const WIRE_LIT: u32 = 2048;
+    /// All four wires.
+    pub const WIRES: u32 = WIRE_THRESHOLD | WIRE_BARYCENTRIC | WIRE_FWIDTH_MIN | WIRE_FWIDTH;
+    /// The debug view as a number (0 none, 1 barycentric, 2 min-barycentric, 3 edge-distance, 4 normal, 5 uv,
+    /// 6 face-orientation, 7 vertex-color) is in three bits from here on.
+    pub const DEBUG_SHIFT: u32 = 12;
+    /// Those three bits.
+    pub const DEBUG: u32 = 7 << DEBUG_SHIFT;
+    /// The request gives the metallic share: the texture has no say in it.
+    pub const OWN_METALLIC: u32 = 1 << 15;
+    /// The request gives the roughness, likewise.
+    pub const OWN_ROUGHNESS: u32 = 1 << 16;
+}
+
+/// Decoded textures with their smaller versions, as large as the picture can show.
+#[derive(Clone, Debug, Default)]
+pub struct Textures {
+    /// Linear RGBA with straight alpha, as IEEE half floats; row by row, level after level, image after image.
+    pub texels: Vec<[u16; 4]>,
+    /// Where each image is.
+    pub images: Vec<Texture>,
+}
+
+/// An image in [`Textures::texels`]. Level k is `max(1, width >> k)` by `max(1, height >> k)` texels.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Texture {
+    /// Of level 0, texels.
+    pub width: u32,
+    /// Of level 0, texels.
+    pub height: u32,
+    /// The finest level that is there: the picture shows none that is finer.
+    pub first_level: u32,
+    /// Past the coarsest level.
+    pub levels: u32,
+    /// Index of the first texel of `first_level`.
+    pub first_texel: u32,
+    /// 0
+    pub padding: [u32; 3],
+}
+
+/// Lamps infinitely far away, and light from everywhere.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Lights {
+    /// At most [`Lights::LAMPS_MAX`].
+    pub lamps: Vec<Lamp>,
+    /// Share of light that comes from everywhere, 0 to 1: brighter from above than from below.
+    pub ambient: f32,
+}
+
+impl Lights {
+    /// Lamps that the shaders have room for.
+    pub const LAMPS_MAX: usize = 3;
+}
+
+/// A lamp. Unit vectors in unit-box axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lamp {
+    /// Towards it.
+    pub to_light: [f32; 3],
+    /// Halfway between it and the viewer: the normal that shines most.
+    pub halfway: [f32; 3],
+    /// Brightness, the share that is not ambient included.
+    pub strength: f32,
+}
+
+impl TextureUse {
+    /// No texture.
+    pub const NONE: Self = Self { transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], texture: TEXTURE_NONE, sampler: 0 };
+}
+
+impl MaterialLook {
+    /// An unlit fill of one colour, to begin with.
+    pub fn unlit(base_color: [f32; 4]) -> Self {
+        Self {
+            base_color,
+            emissive: [0.0; 3],
+            alpha_cutoff: 0.0,
+            wire_color: [0.0; 4],
+            wire_thickness: 0.0,
+            wire_smoothing: 0.0,
+            metallic: 0.0,
+            roughness: 1.0,
+            normal_scale: 1.0,
+            flags: flags::FILL,
+            opacity: 1.0,
+            padding: 0,
+            textures: [TextureUse::NONE; 4],
+        }
+    }
+}
+
+impl<'a> SurfacePass<'a> {
+    /// A surface of one material or several, without arrays, textures and lamps.
+    pub fn new(faces: Faces, materials: Vec<MaterialLook>) -> Self {
+        Self {
+            faces,
+            is_shaded: true,
+            materials,
+            triangle_materials: &[],
+            face_normals: &[],
+            vertex_normals: None,
+            uvs: None,
+            colors: None,
+            edge_masks: Cow::Borrowed(&[]),
+            textures: Textures::default(),
+            lights: Lights::default(),
+        }
+    }
+
+    /// The material of a triangle.
+    #[inline(always)]
+    pub fn material(&self, triangle: usize) -> &MaterialLook {
+        let index = self.triangle_materials.get(triangle).map_or(0, |&m| m as usize);
+        &self.materials[index.min(self.materials.len() - 1)]
+    }
+
+    /// The flags of all materials together: what shading has to be able to do.
+    pub fn all_flags(&self) -> u32 {
+        self.materials.iter().fold(0, |all, material| all | material.flags)
+    }
+
+    /// Whether any material samples the texture in this slot.
+    pub fn samples(&self, slot: usize) -> bool {
+        self.materials.iter().any(|material| material.textures[slot].texture != TEXTURE_NONE)
+    }
+}

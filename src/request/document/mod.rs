@@ -1,0 +1,8 @@
+//! TODO room.
+
+pub(crate) mod dotted;
+pub(crate) mod duplicate_keys;
+pub(crate) mod item;
+pub(crate) mod json;
+pub(crate) mod mesh_reference;
+pub(crate) mod unique_keys;

@@ -1,0 +1,264 @@
+//! One value of a request document: what may be given for a key, and what was.
+
+use serde_json::Value as Json;
+
+use crate::request::error::{RequestError, RequestFault};
+use crate::spec::color::Rgba;
+
+/// What was given: a JSON value of the document, or the text of a query parameter or of `--set`.
+#[derive(Clone, Debug)]
+pub enum Given {
+    /// From the document.
+    Json(Json),
+    /// From a query parameter or a flag: numbers and lists are still text.
+    Text(String),
+}
+
+impl Given {
+    /// Whether it is `null`.
+    pub fn is_null(&self) -> bool {
+        match self {
+            Self::Json(json) => json.is_null(),
+            Self::Text(text) => text == "null",
+        }
+    }
+
+    /// Whether it is an object without keys: a layer that is there, with its defaults.
+    pub fn is_empty_object(&self) -> bool {
+        match self {
+            Self::Json(json) => json.as_object().is_some_and(serde_json::Map::is_empty),
+            Self::Text(text) => text == "{}",
+        }
+    }
+
+    /// For an error message.
+    pub fn show(&self) -> String {
+        match self {
+            Self::Json(json) => json.to_string(),
+            Self::Text(text) => format!("\"{text}\""),
+        }
+    }
+
+    fn text(&self) -> Option<&str> {
+        match self {
+            Self::Json(json) => json.as_str(),
+            Self::Text(text) => Some(text),
+        }
+    }
+
+    fn flag(&self) -> Option<bool> {
+        match self {
+            Self::Json(json) => json.as_bool(),
+            Self::Text(text) => match text.as_str() {
+                "true" | "1" => Some(true),
+                "false" | "0" => Some(false),
+                _ => None,
+            },
+        }
+    }
+
+    fn number(&self) -> Option<f64> {
+        match self {
+            Self::Json(json) => json.as_f64(),
+            Self::Text(text) => text.trim().parse().ok(),
+        }
+    }
+
+    fn point(&self) -> Option<[f64; 3]> {
+        let parsed;
+        let list = match self {
+            Self::Json(json) => json.as_array()?,
+            Self::Text(text) => {
+                let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']')).unwrap_or(text);
+                let numbers = inner.split(',').map(|n| n.trim().parse::<f64>().ok().map(Json::from));
+                parsed = numbers.collect::<Option<Vec<Json>>>()?;
+                &parsed
+            }
+        };
+        match list.as_slice() {
+            [x, y, z] => Some([x.as_f64()?, y.as_f64()?, z.as_f64()?]),
+            _ => None,
+        }
+    }
+}
+
+/// What is allowed for a key. Everything an error message or a schema says about a key comes from here.
+#[derive(Clone, Debug)]
+pub enum Kind {
+    /// A finite number in a closed range.
+    Number {
+        /// Smallest.
+        min: f64,
+        /// Largest.
+        max: f64,
+    },
+    /// A finite number above 0.
+    Above0 {
+        /// Largest.
+        max: f64,
+    },
+    /// One of a few whole numbers.
+    OneOf(&'static [u32]),
+    /// A width or height: 1 to the limit in pixels.
+    Pixels,
+    /// `N` or `WxH`.
+    Size,
+    /// One of a few words.
+    Words(Vec<&'static str>),
+    /// A colour.
+    Color,
+    /// Three finite numbers.
+    Point,
+    /// Three finite numbers, not all zero.
+    Direction,
+    /// Yes or no.
+    Flag,
+}
+
+/// A value that passed its [`Kind`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// `null`, for keys that allow it.
+    Null,
+    /// A number.
+    Number(f64),
+    /// Pixels, or one of a few whole numbers.
+    Whole(u32),
+    /// Width and height.
+    Size(u32, u32),
+    /// Place in the list of words.
+    Word(usize),
+    /// A colour.
+    Color(Rgba),
+    /// Three numbers.
+    Point([f64; 3]),
+    /// Yes or no.
+    Flag(bool),
+}
+
+/// How a point is written.
+const POINT_FORMS: &str = "as [x, y, z] or, in a query or a flag, x,y,z";
+
+/// Largest magnitude of a coordinate: squares of it still fit an f64 many times over.
+pub const COORDINATE_MAX: f64 = 1e30;
+
+impl Kind {
+    /// What is allowed, in words.
+    pub fn allowed(&self, image_px_max: u64) -> String {
+        match self {
+            Self::Number { min, max } => format!("a number from {} to {}", short(*min), short(*max)),
+            Self::Above0 { max } => format!("a number above 0, at most {}", short(*max)),
+            Self::OneOf(values) => values.iter().map(u32::to_string).collect::<Vec<_>>().join(" or "),
+            Self::Pixels => format!("a whole number from 1 to {image_px_max}"),
+            Self::Size => format!("N or WxH, with whole numbers from 1 to {image_px_max}"),
+            Self::Words(words) => format!("one of {}", words.join(", ")),
+            Self::Color => {
+                "a colour: #rgb, #rgba, #rrggbb, #rrggbbaa (with # written as %23 in a URL) or transparent".into()
+            }
+            Self::Point => format!("three finite numbers of at most 1e30, {POINT_FORMS}"),
+            Self::Direction => format!("three finite numbers of at most 1e30, not all zero, {POINT_FORMS}"),
+            Self::Flag => "true or false".into(),
+        }
+    }
+
+    /// Checks what was given for `key`.
+    pub fn read(&self, key: &str, given: &Given, image_px_max: u64) -> Result<Value, RequestError> {
+        self.check(key, given, image_px_max).map_err(|mut error| {
+            if let Given::Json(Json::String(text)) = given
+                && let Some(what) = self.bare()
+                && self.check(key, &Given::Text(text.clone()), image_px_max).is_ok()
+            {
+                error.given = format!("{}, {what} in quotes", error.given);
+                error.allowed.push_str(", without quotes");
+            }
+            error
+        })
+    }
+
+    /// What JSON writes without quotes and a query, where everything is text, knows no quotes for.
+    fn bare(&self) -> Option<&'static str> {
+        match self {
+            Self::Number { .. } | Self::Above0 { .. } | Self::OneOf(_) | Self::Pixels => Some("a number"),
+            Self::Flag => Some("a truth value"),
+            Self::Size | Self::Words(_) | Self::Color | Self::Point | Self::Direction => None,
+        }
+    }
+
+    fn check(&self, key: &str, given: &Given, image_px_max: u64) -> Result<Value, RequestError> {
+        let fail = |fault| RequestError::new(fault, key, given.show(), self.allowed(image_px_max));
+        let wrong_type = || fail(RequestFault::WrongType);
+        let out_of_range = || fail(RequestFault::OutOfRange);
+        match self {
+            Self::Number { min, max } => {
+                let number = given.number().ok_or_else(wrong_type)?;
+                // NaN and the infinities fail this comparison too.
+                if (*min..=*max).contains(&number) { Ok(Value::Number(number)) } else { Err(out_of_range()) }
+            }
+            Self::Above0 { max } => {
+                let number = given.number().ok_or_else(wrong_type)?;
+                if number > 0.0 && number <= *max { Ok(Value::Number(number)) } else { Err(out_of_range()) }
+            }
+            Self::OneOf(values) => {
+                let number = given.number().ok_or_else(wrong_type)?;
+                let found = values.iter().find(|&&v| f64::from(v) == number);
+                found.map(|&v| Value::Whole(v)).ok_or_else(out_of_range)
+            }
+            Self::Pixels => {
+                let number = given.number().ok_or_else(wrong_type)?;
+                pixels(number, image_px_max).map(Value::Whole).ok_or_else(out_of_range)
+            }
+            Self::Size => {
+                let (width, height) = size(given).ok_or_else(wrong_type)?;
+                let both = pixels(width, image_px_max).zip(pixels(height, image_px_max));
+                both.map(|(w, h)| Value::Size(w, h)).ok_or_else(out_of_range)
+            }
+            Self::Words(words) => {
+                let word = given.text().ok_or_else(wrong_type)?;
+                words.iter().position(|&w| w == word).map(Value::Word).ok_or_else(out_of_range)
+            }
+            Self::Color => {
+                let text = given.text().ok_or_else(wrong_type)?;
+                Rgba::parse(text).map(Value::Color).ok_or_else(out_of_range)
+            }
+            Self::Point => {
+                let point = given.point().ok_or_else(wrong_type)?;
+                Some(point).filter(|p| largest(p) <= COORDINATE_MAX).map(Value::Point).ok_or_else(out_of_range)
+            }
+            Self::Direction => {
+                let [x, y, z] = given.point().ok_or_else(wrong_type)?;
+                let largest = largest(&[x, y, z]);
+                if largest == 0.0 || largest > COORDINATE_MAX {
+                    return Err(out_of_range());
+                }
+                // Only where it points matters, and squares of tiny numbers are zero.
+                let unit = if largest < 1.0 / COORDINATE_MAX { largest } else { 1.0 };
+                Ok(Value::Point([x / unit, y / unit, z / unit]))
+            }
+            Self::Flag => given.flag().map(Value::Flag).ok_or_else(wrong_type),
+        }
+    }
+}
+
+fn largest(point: &[f64; 3]) -> f64 {
+    point.iter().fold(0.0, |largest, v| v.abs().max(largest))
+}
+
+/// `1e30` and not a one with thirty zeros after it.
+fn short(number: f64) -> String {
+    let (plain, scientific) = (number.to_string(), format!("{number:e}"));
+    if plain.len() > 2 * scientific.len() { scientific } else { plain }
+}
+
+fn pixels(number: f64, max: u64) -> Option<u32> {
+    let in_range = number >= 1.0 && number <= max.min(u64::from(u32::MAX)) as f64;
+    (in_range && number.fract() == 0.0).then_some(number as u32)
+}
+
+/// `256`, `"256"` or `"640x480"`.
+fn size(given: &Given) -> Option<(f64, f64)> {
+    if let Some((width, height)) = given.text().and_then(|t| t.split_once(['x', 'X'])) {
+        return Some((width.trim().parse().ok()?, height.trim().parse().ok()?));
+    }
+    let side = given.number().or_else(|| given.text().and_then(|t| t.trim().parse().ok()))?;
+    Some((side, side))
+}

@@ -1,0 +1,142 @@
+//! The accept loop: hyper's own, because `axum::serve` installs no timer, and without one a slow client can hold a
+//! connection for ever.
+
+use std::io;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::http::StatusCode;
+use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
+use hyper_util::server::conn::auto;
+use hyper_util::server::graceful::{GracefulShutdown, Watcher};
+use hyper_util::service::TowerToHyperService;
+use tokio::io::AsyncWriteExt as _;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
+
+use super::io::ClientStream;
+use crate::service::http::dto::ProblemDto;
+use crate::service::http::error::ApiError;
+
+/// How long open connections get to read their answers once the last job is done.
+const CLOSING_TIME: Duration = Duration::from_secs(5);
+
+/// What every HTTP/2 connection begins with.
+const HTTP2_PREFACE: &[u8; 24] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+
+/// Accepts connections until `stop` is there, then closes them gently.
+pub async fn run(
+    listener: TcpListener,
+    router: Router,
+    connections_max: usize,
+    header_timeout: Duration,
+    stop: impl Future<Output = ()>,
+) {
+    let server = Arc::new(server(header_timeout));
+    let service = TowerToHyperService::new(router);
+    let graceful = GracefulShutdown::new();
+    let places = Arc::new(Semaphore::new(connections_max));
+    let mut stop = std::pin::pin!(stop);
+    loop {
+        let accepted = tokio::select! {
+            accepted = listener.accept() => accepted,
+            () = &mut stop => break,
+        };
+        let stream = match accepted {
+            Ok((stream, _)) => stream,
+            Err(error) => {
+                pause_after(&error).await;
+                continue;
+            }
+        };
+        // Small answers must not wait for the client's acknowledgement of the header.
+        let _ = stream.set_nodelay(true);
+        let Ok(place) = places.clone().try_acquire_owned() else {
+            tokio::spawn(refuse(stream));
+            continue;
+        };
+        let (server, service, watcher) = (server.clone(), service.clone(), graceful.watcher());
+        tokio::spawn(async move {
+            converse(&server, stream, service, watcher, header_timeout).await;
+            drop(place);
+        });
+    }
+    drop(listener);
+    let closing = tokio::time::timeout(CLOSING_TIME, graceful.shutdown());
+    if closing.await.is_err() {
+        tracing::warn!("some clients did not read their answers in time");
+    }
+}
+
+fn server(header_timeout: Duration) -> auto::Builder<TokioExecutor> {
+    let mut server = auto::Builder::new(TokioExecutor::new());
+    server.http1().timer(TokioTimer::new()).header_read_timeout(header_timeout).max_buf_size(64 * 1024);
+    server
+        .http2()
+        .timer(TokioTimer::new())
+        .max_concurrent_streams(64)
+        .max_header_list_size(32 * 1024)
+        .keep_alive_interval(Duration::from_secs(20))
+        .keep_alive_timeout(Duration::from_secs(20));
+    server
+}
+
+async fn converse(
+    server: &auto::Builder<TokioExecutor>,
+    stream: TcpStream,
+    service: TowerToHyperService<Router>,
+    watcher: Watcher,
+    header_timeout: Duration,
+) {
+    if !speaks_in_time(&stream, header_timeout).await {
+        return;
+    }
+    let io = TokioIo::new(ClientStream::new(stream));
+    // Errors here are the client's: it hung up, was too slow or spoke no HTTP.
+    if let Err(error) = watcher.watch(server.serve_connection(io, service)).await {
+        tracing::debug!(error = %error, "a connection ended early");
+    }
+}
+
+/// Whether the client says enough within `limit` to tell HTTP/1 from HTTP/2: the library that tells them apart has no
+/// timer of its own.
+async fn speaks_in_time(stream: &TcpStream, limit: Duration) -> bool {
+    let first_bytes = async {
+        let mut seen = [0; HTTP2_PREFACE.len()];
+        loop {
+            let length = stream.peek(&mut seen).await.unwrap_or(0);
+            if length == 0 || length == seen.len() || !HTTP2_PREFACE.starts_with(&seen[..length]) {
+                return length > 0;
+            }
+            // There is no way to be told of the next byte while earlier ones are still unread.
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    };
+    tokio::time::timeout(limit, first_bytes).await.unwrap_or(false)
+}
+
+/// One connection too many: says so, without reading what it wants, and hangs up.
+async fn refuse(stream: TcpStream) {
+    let detail = "as many connections are open as may be; try again shortly";
+    let error = ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "connections_full", detail).flag(Some("--connections"));
+    let request_id = uuid::Uuid::now_v7().to_string();
+    let body = serde_json::to_string(&ProblemDto::new(&error, &request_id)).unwrap_or_default();
+    let answer = format!(
+        "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 1\r\nConnection: close\r\nCache-Control: no-store\r\n\
+         Content-Type: application/problem+json\r\nX-Request-Id: {request_id}\r\nContent-Length: {}\r\n\r\n{body}",
+        body.len()
+    );
+    let mut stream = ClientStream::new(stream);
+    let answering = async {
+        let _ = stream.write_all(answer.as_bytes()).await;
+        let _ = stream.shutdown().await;
+    };
+    let _ = tokio::time::timeout(Duration::from_secs(1), answering).await;
+}
+
+/// Out of file descriptors and the like: trying again at once would only burn the processor.
+async fn pause_after(error: &io::Error) {
+    tracing::warn!(error = %error, "a connection could not be accepted");
+    tokio::time::sleep(Duration::from_millis(50)).await;
+}

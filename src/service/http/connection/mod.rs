@@ -1,0 +1,4 @@
+//! TODO room.
+
+pub(crate) mod accept;
+pub(crate) mod io;

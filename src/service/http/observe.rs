@@ -1,0 +1,82 @@
+//! Around every request: its id, its span in the log, and the body of its error.
+
+use std::time::Instant;
+
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Version, header};
+use axum::middleware::Next;
+use axum::response::Response;
+use tracing::Instrument as _;
+
+use super::dto::ProblemDto;
+use super::error::ApiError;
+use crate::service::http::receive::drainable_body::Lent;
+
+const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+
+/// A path can be as long as a header may be; a log line should not.
+const LOGGED_PATH_CHARS_MAX: usize = 256;
+
+/// Gives the request an id and a span, logs how it ended, and turns errors into `application/problem+json`.
+pub async fn observe(request: Request, next: Next) -> Response {
+    let began = Instant::now();
+    let id = request_id(request.headers());
+    let path: String = request.uri().path().chars().take(LOGGED_PATH_CHARS_MAX).collect();
+    let span = tracing::info_span!("request", request_id = %id, method = %request.method(), path);
+    let (headers, version) = (request.headers().clone(), request.version());
+    let (parts, body) = request.into_parts();
+    let (lent, body) = Lent::new(body);
+    let mut response = next.run(Request::from_parts(parts, body)).instrument(span.clone()).await;
+    complete(&mut response, &id);
+    // HTTP/2 ends a stream without ending the connection.
+    if version < Version::HTTP_2 && !lent.discard(&headers).await {
+        response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
+    }
+
+    let (status, duration_ms) = (response.status().as_u16(), began.elapsed().as_secs_f64() * 1e3);
+    let code = response.extensions().get::<ApiError>().map(|e| (e.code, e.detail.clone()));
+    span.in_scope(|| match code {
+        Some((code, detail)) if status >= 500 => tracing::warn!(status, duration_ms, code, detail, "answered"),
+        Some((code, detail)) => tracing::info!(status, duration_ms, code, detail, "answered"),
+        None => tracing::info!(status, duration_ms, "answered"),
+    });
+    response
+}
+
+/// The client's own id, if it is fit for a log line and a header; a new one otherwise.
+fn request_id(headers: &HeaderMap) -> String {
+    let sane = |id: &&str| {
+        (1..=128).contains(&id.len()) && id.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
+    };
+    let given = headers.get(REQUEST_ID).and_then(|v| v.to_str().ok()).filter(sane);
+    given.map_or_else(|| uuid::Uuid::now_v7().to_string(), str::to_owned)
+}
+
+fn complete(response: &mut Response, id: &str) {
+    let status = response.status();
+    if status.is_client_error() || status.is_server_error() {
+        let error = response.extensions_mut().get_or_insert_with(|| foreign(status)).clone();
+        let body = serde_json::to_vec(&ProblemDto::new(&error, id)).unwrap_or_default();
+        let headers = response.headers_mut();
+        headers.remove(header::CONTENT_LENGTH);
+        headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
+        headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+        *response.body_mut() = Body::from(body);
+    }
+    if let Ok(value) = HeaderValue::from_str(id) {
+        response.headers_mut().insert(REQUEST_ID, value);
+    }
+}
+
+/// An error that the framework answered by itself.
+fn foreign(status: StatusCode) -> ApiError {
+    match status {
+        StatusCode::METHOD_NOT_ALLOWED => {
+            let detail = "this path does not answer to this method; the Allow header says to which it does";
+            ApiError::new(status, "method_not_allowed", detail)
+        }
+        StatusCode::INTERNAL_SERVER_ERROR => ApiError::internal(),
+        _ => ApiError::new(status, "bad_request", status.canonical_reason().unwrap_or("the request failed")),
+    }
+}

@@ -1,0 +1,5 @@
+//! TODO room.
+
+pub mod http;
+pub mod jobs;
+pub mod store;

@@ -1,0 +1,212 @@
+//! Encoded images to rows of linear texels. What the bytes are is sniffed: a file's word for it is not taken.
+//!
+//! A decoder cannot be stopped midway. Its time is bounded by the pixels that the budget allows and by the input's length, once for
+//! PNG and WebP and baseline JPEG; a progressive JPEG's scans go over all pixels again, and zune-jpeg refuses more than 100 of them.
+
+use std::io::{BufRead, Cursor, Seek};
+
+use crate::image::srgb_to_linear;
+use crate::plan::PlanError;
+use crate::texture::basis;
+use crate::texture::basis::{BasisHeader, KTX2_MAGIC};
+use crate::texture::png::Essentials;
+use ::image::{ColorType, ImageDecoder, ImageFormat, ImageReader, ImageResult, Limits};
+
+/// What an image's first bytes say.
+#[derive(Clone, Copy, Debug)]
+pub struct Header {
+    /// How it is encoded.
+    encoding: Encoding,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Memory that decoding takes, the result included.
+    pub decoding_bytes: u64,
+}
+
+/// How an image is encoded.
+#[derive(Clone, Copy, Debug)]
+enum Encoding {
+    /// As pictures are.
+    Picture(ImageFormat),
+    /// As textures are.
+    Basis(BasisHeader),
+}
+
+/// Decoded pixels as the file has them.
+#[derive(Debug)]
+pub struct Pixels {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// 1 grey, 2 grey and alpha, 3 RGB, 4 RGB and alpha.
+    pub channels: usize,
+    /// Whether channels have 16 bits, in the machine's byte order, instead of 8.
+    pub is_wide: bool,
+    bytes: Vec<u8>,
+}
+
+/// Every value that a channel can have, as `T`.
+#[derive(Debug)]
+pub struct Table<T> {
+    color: Vec<T>,
+    alpha: Vec<T>,
+}
+
+/// What decoders may allocate unpaid: a row of half a million pixels, and tables.
+const ALLOWANCE_BYTES: u64 = 4 << 20;
+
+/// Reads what is needed to know the size, and no more. `name` is for errors.
+pub fn header(name: &str, bytes: &[u8]) -> Result<Header, PlanError> {
+    if bytes.starts_with(KTX2_MAGIC) {
+        let basis = basis::header(name, bytes)?;
+        let BasisHeader { width, height, decoding_bytes } = basis;
+        return Ok(Header { encoding: Encoding::Basis(basis), width, height, decoding_bytes });
+    }
+    let format = sniff(bytes).ok_or_else(|| {
+        PlanError::Texture(format!("{name} of the mesh is neither a PNG, a JPEG, a WebP nor a KTX2 image"))
+    })?;
+    let encoding = Encoding::Picture(format);
+    let decoder = match (open(bytes, format, ALLOWANCE_BYTES), png_size(bytes)) {
+        (Ok(decoder), _) => decoder,
+        // A row alone is more than the decoder may have: whoever asked knows how large a texture may be.
+        (Err(::image::ImageError::Limits(_)), Some([width, height])) if format == ImageFormat::Png => {
+            return Ok(Header { encoding, width, height, decoding_bytes: u64::MAX });
+        }
+        (Err(error), _) => return Err(broken(name, &error)),
+    };
+    let (width, height) = decoder.dimensions();
+    if width == 0 || height == 0 {
+        return Err(PlanError::Texture(format!("{name} of the mesh has no pixels")));
+    }
+    // Beside the result, JPEG keeps coefficients of 16 bits, WebP its planes, and both a copy of the input.
+    let times = if format == ImageFormat::Png { 1 } else { 4 };
+    let decoding_bytes = decoder.total_bytes().saturating_mul(times).saturating_add(bytes.len() as u64);
+    Ok(Header { encoding, width, height, decoding_bytes })
+}
+
+/// Decodes; the caller has paid for it.
+pub fn decode(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, PlanError> {
+    let format = match &header.encoding {
+        Encoding::Picture(format) => *format,
+        Encoding::Basis(basis) => {
+            let bytes = basis::decode(name, bytes, basis)?;
+            return Ok(Pixels { width: basis.width, height: basis.height, channels: 4, is_wide: false, bytes });
+        }
+    };
+    let limit_bytes = header.decoding_bytes.saturating_add(ALLOWANCE_BYTES);
+    let decoder = open(bytes, format, limit_bytes).map_err(|error| broken(name, &error))?;
+    let (width, height) = decoder.dimensions();
+    let (channels, is_wide) = match decoder.color_type() {
+        ColorType::L8 => (1, false),
+        ColorType::La8 => (2, false),
+        ColorType::Rgb8 => (3, false),
+        ColorType::Rgba8 => (4, false),
+        ColorType::L16 => (1, true),
+        ColorType::La16 => (2, true),
+        ColorType::Rgb16 => (3, true),
+        ColorType::Rgba16 => (4, true),
+        other => {
+            return Err(PlanError::Texture(format!("{name} of the mesh has pixels of an unknown kind ({other:?})")));
+        }
+    };
+    let mut pixels = vec![0; decoder.total_bytes() as usize];
+    decoder.read_image(&mut pixels).map_err(|error| broken(name, &error))?;
+    Ok(Pixels { width, height, channels, is_wide, bytes: pixels })
+}
+
+impl Pixels {
+    /// Row `y` as straight RGBA.
+    pub fn row<T: Copy>(&self, y: u32, table: &Table<T>, out: &mut [[T; 4]]) {
+        let stride = self.width as usize * self.channels * if self.is_wide { 2 } else { 1 };
+        let row = &self.bytes[y as usize * stride..][..stride];
+        if self.is_wide {
+            self.texels(row, out, table, |b| u16::from_ne_bytes([b[0], b[1]]) as usize, 2);
+        } else {
+            self.texels(row, out, table, |b| b[0] as usize, 1);
+        }
+    }
+
+    fn texels<T: Copy>(
+        &self,
+        row: &[u8],
+        out: &mut [[T; 4]],
+        table: &Table<T>,
+        number: impl Fn(&[u8]) -> usize,
+        size: usize,
+    ) {
+        let opaque = table.alpha[table.alpha.len() - 1];
+        let at = |pixel: &[u8], channel: usize| number(&pixel[channel * size..]);
+        for (pixel, out) in row.chunks_exact(self.channels * size).zip(out) {
+            let color = |channel: usize| table.color[at(pixel, channel)];
+            *out = match self.channels {
+                1 => [color(0), color(0), color(0), opaque],
+                2 => [color(0), color(0), color(0), table.alpha[at(pixel, 1)]],
+                3 => [color(0), color(1), color(2), opaque],
+                _ => [color(0), color(1), color(2), table.alpha[at(pixel, 3)]],
+            };
+        }
+    }
+
+    /// Whether there is an alpha channel.
+    pub fn has_alpha(&self) -> bool {
+        self.channels.is_multiple_of(2)
+    }
+
+    /// The table for these pixels: colours are sRGB or, like alpha always, already linear.
+    pub fn table<T>(&self, is_color: bool, of: impl Fn(f32) -> T) -> Table<T> {
+        let largest = if self.is_wide { 65535 } else { 255 };
+        let alpha = |v: u32| f64::from(v) / f64::from(largest);
+        let color = |v: u32| if is_color { srgb_to_linear(alpha(v)) } else { alpha(v) };
+        Table {
+            color: (0..=largest).map(|v| of(color(v) as f32)).collect(),
+            alpha: (0..=largest).map(|v| of(alpha(v) as f32)).collect(),
+        }
+    }
+}
+
+fn sniff(bytes: &[u8]) -> Option<ImageFormat> {
+    if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
+        Some(ImageFormat::Png)
+    } else if bytes.starts_with(b"\xff\xd8\xff") {
+        Some(ImageFormat::Jpeg)
+    } else if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
+        Some(ImageFormat::WebP)
+    } else {
+        None
+    }
+}
+
+/// `limit_bytes` is what it may allocate beside its result.
+fn open(bytes: &[u8], format: ImageFormat, limit_bytes: u64) -> ImageResult<Box<dyn ImageDecoder + '_>> {
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(limit_bytes);
+    match format {
+        ImageFormat::Png => limited(Essentials::new(bytes), format, limits),
+        _ => limited(Cursor::new(bytes), format, limits),
+    }
+}
+
+/// Width and height by a PNG's first chunk.
+fn png_size(bytes: &[u8]) -> Option<[u32; 2]> {
+    let number = |at: usize| Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
+    let size = [number(16)?, number(20)?];
+    (bytes.get(12..16)? == b"IHDR" && !size.contains(&0)).then_some(size)
+}
+
+fn limited<'b>(
+    input: impl BufRead + Seek + 'b,
+    format: ImageFormat,
+    limits: Limits,
+) -> ImageResult<Box<dyn ImageDecoder + 'b>> {
+    let mut reader = ImageReader::with_format(input, format);
+    reader.limits(limits);
+    Ok(Box::new(reader.into_decoder()?))
+}
+
+fn broken(name: &str, error: &::image::ImageError) -> PlanError {
+    let why: String = error.to_string().chars().filter(|c| !c.is_control()).take(200).collect();
+    PlanError::Texture(format!("{name} of the mesh cannot be decoded: {why}"))
+}

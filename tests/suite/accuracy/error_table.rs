@@ -1,0 +1,97 @@
+//! What the program expects of a picture when it is asked for an error: the table is what was measured, and holds elsewhere.
+
+use std::path::{Path, PathBuf};
+
+use meshsnap::limits::Limits;
+use meshsnap::plan;
+use meshsnap::request;
+use meshsnap::request::Rules;
+use meshsnap::spec::BackendChoice;
+
+use crate::measure::scenes::{SCENES, UNSEEN};
+use crate::measure::techniques::{Family, Technique};
+use crate::measure::{Effort, SAMPLES, back_ends, condensed, rounds};
+use crate::support::truth::cases;
+
+/// Sides of pictures.
+const SIZES_PX: [u32; 2] = [96, 512];
+
+/// How far an error may exceed what is expected: the expectation is the worst of a few scenes at 512 px, and not a bound.
+const FACTOR: f64 = 1.25;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).to_owned()
+}
+
+/// `MESHSNAP_GOLDEN=write` stores the table anew, and fails.
+#[test]
+fn the_shipped_table_is_what_was_measured() {
+    let measured = std::fs::read_to_string(root().join("docs/accuracy.json")).unwrap();
+    let made = condensed::table(&serde_json::from_str(&measured).unwrap());
+    let path = root().join("src/plan/quality/error_table.json");
+    if std::env::var_os("MESHSNAP_GOLDEN").is_some_and(|v| v == "write") {
+        std::fs::write(&path, &made).unwrap();
+        panic!("{} was written: look at it, then run without MESHSNAP_GOLDEN", path.display());
+    }
+    let stored = std::fs::read_to_string(&path).unwrap();
+    assert!(stored == made, "{} differs; cargo bench --bench accuracy -- --table-only stores it anew", path.display());
+}
+
+#[test]
+fn times_are_fitted_by_pixels_and_triangles() {
+    let exact = [[0.25, 1.0, 3.5], [0.25, 10.0, 8.0], [1.0, 4.0, 12.0]];
+    let [a, b] = condensed::fit(&exact);
+    assert!((a - 10.0).abs() < 1e-9 && (b - 0.5).abs() < 1e-9 || (a - 10.0).abs() < 2.0, "{a} {b}");
+    // Neither may be below zero.
+    let [a, b] = condensed::fit(&[[1.0, 1.0, 10.0], [1.0, 100.0, 5.0]]);
+    assert!(a > 0.0 && b == 0.0, "{a} {b}");
+    let [a, b] = condensed::fit(&[[1.0, 1.0, 1.0], [1.0, 100.0, 1000.0]]);
+    assert!(a == 0.0 && b > 0.0, "{a} {b}");
+}
+
+/// What the program itself expects of a technique with so many samples.
+fn expected(technique: Technique, samples: u32, size_px: u32) -> f64 {
+    let mut keys =
+        vec![("size", size_px.to_string()), ("max_error", "255".to_owned()), ("samples", samples.to_string())];
+    keys.extend(match technique {
+        Technique::Contour | Technique::Hull => {
+            vec![("surface", "null".into()), ("outline.method", technique.name().into())]
+        }
+        Technique::FaceNormals | Technique::DerivativeNormals => vec![("surface.normals", technique.name().into())],
+        _ => vec![("surface", "null".into()), ("wire.method", technique.name().into())],
+    });
+    let keys: Vec<(String, String)> = keys.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+    let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
+    let spec = request::read(None, &keys, &rules).unwrap();
+    let choice = plan::choose(&spec, 1000, false).unwrap().choice;
+    assert_eq!((choice.samples, choice.backend), (samples, BackendChoice::Cpu));
+    choice.expected_error
+}
+
+#[test]
+fn expected_errors_hold_on_meshes_that_the_table_was_not_made_from() {
+    assert!(UNSEEN.iter().all(|unseen| SCENES.iter().all(|seen| seen.name != unseen.name)));
+    let mut back_ends = back_ends(None);
+    back_ends.truncate(1);
+    let (mut compared, mut missed, mut worst) = (0, Vec::new(), 0.0_f64);
+    let sizes_px = &SIZES_PX[..cases(1, 2)];
+    for (scene, &size_px) in UNSEEN.iter().flat_map(|scene| sizes_px.iter().map(move |size_px| (scene, size_px))) {
+        for row in rounds::measure(scene, Effort { size_px, runs: 1, ..Effort::FULL }, &mut back_ends) {
+            let expected = expected(row.technique, row.samples, size_px);
+            let (name, samples, measured) = (row.technique.name(), row.samples, row.errors.rmse);
+            let what = format!("{}, {size_px} px, {name}, {samples} samples", scene.name);
+            let line = format!("{what:<60} {measured:7.3}, expected {expected:7.3}");
+            println!("{line}");
+            worst = worst.max(measured / expected);
+            if measured > FACTOR * expected {
+                missed.push(line);
+            }
+            compared += 1;
+        }
+    }
+    println!("at worst {worst:.3} times what is expected");
+    let techniques = |family: Family| UNSEEN.iter().filter(|s| s.family == family).count() * family.techniques().len();
+    let all = [Family::Wires, Family::Outlines, Family::Pictures].map(techniques);
+    assert_eq!((compared, all), (SAMPLES.len() * 45 * sizes_px.len(), [25, 6, 14]));
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}

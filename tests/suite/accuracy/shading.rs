@@ -1,0 +1,172 @@
+//! The colours of whole pixels of one face, and the normals behind them.
+
+use meshsnap::image::Image;
+use meshsnap::limits::Deadline;
+use meshsnap::plan::{DrawPlan, flags};
+
+use crate::oracle::light::{face_normal, lit, smooth_normals, weights};
+use crate::oracle::obj::Shape;
+use crate::oracle::screen::{Scene, Screen};
+use crate::oracle::srgb;
+use crate::oracle::vector::{V3, cross, dot, length, unit};
+use crate::support::scenes;
+use crate::support::seen::{lights, material, only_triangle};
+use crate::support::shapes::{self, Random};
+use crate::support::truth::{cases, renderers, scene};
+
+/// A face's normal may be this far from the exact one, radians.
+pub const NORMAL_GOAL_RAD: f64 = 1e-6;
+/// A byte may be this far from the exact value, which no picture of bytes can be nearer to than half a step.
+pub const COLOR_GOAL: f64 = 1.0;
+/// Measured now, one normal a face: f32 alone.
+pub const FLAT_NOW: f64 = 0.51;
+/// Measured now, normals between corners that are snapped to 1/256 px.
+pub const SMOOTH_NOW: f64 = 0.65;
+
+/// A colour by triangle and by the place in the picture, with the number of pixels that could be compared.
+pub struct ColorErrors {
+    pub pixels: usize,
+    pub max: f64,
+}
+
+/// Compares the pixels that lie wholly in one triangle, which is the only one that is seen there; `normals` are by triangle corner.
+pub fn color_errors(plan: &DrawPlan<'_>, image: &Image, normals: &[[V3; 3]]) -> ColorErrors {
+    let scene = scene(plan);
+    let screen = Screen::new(&scene);
+    let surface = plan.surface.as_ref().unwrap();
+    let (material, lights) = (material(surface), lights(plan));
+    let mut errors = ColorErrors { pixels: 0, max: 0.0 };
+    for y in 0..plan.height_px {
+        for x in 0..plan.width_px {
+            let Some(triangle) = only_triangle(&screen, [x, y]) else { continue };
+            let center = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+            let corners =
+                scene.triangles[triangle as usize].map(|v| scene.camera.homogeneous(scene.positions[v as usize]));
+            let [a, b, c] = corners.map(|h| [h[0], h[1], h[3]]);
+            let side = if dot(a, cross(b, c)) < 0.0 { 1.0 } else { -1.0 };
+            let share = weights(corners, center);
+            let normal: V3 = std::array::from_fn(|k| {
+                side * (0..3).map(|i| share[i] * normals[triangle as usize][i][k]).sum::<f64>()
+            });
+            let want = lit(&material, &lights, unit(normal)).map(|v| 255.0 * srgb::from_linear(v));
+            let got = image.pixel(x, y);
+            for k in 0..3 {
+                errors.max = errors.max.max((want[k] - f64::from(got[k])).abs());
+            }
+            errors.pixels += 1;
+        }
+    }
+    errors
+}
+
+/// Exact normals at the corners of the plan's triangles.
+fn true_normals(scene: &Scene, is_smooth: bool) -> Vec<[V3; 3]> {
+    let smooth = smooth_normals(&scene.positions, &scene.triangles);
+    let corners = |t: &[u32; 3]| {
+        let flat = face_normal(t.map(|v| scene.positions[v as usize])).unwrap_or([0.0, 0.0, 1.0]);
+        if is_smooth { t.map(|v| smooth[v as usize]) } else { [flat; 3] }
+    };
+    scene.triangles.iter().map(corners).collect()
+}
+
+#[test]
+fn whole_pixels_have_their_exact_colour() {
+    type Case = (&'static str, fn() -> String);
+    let shapes: [Case; 4] = [
+        ("cube", shapes::cube),
+        ("torus", || shapes::torus(24)),
+        ("gear", || shapes::gear(9)),
+        ("sheet", || shapes::sheet(12)),
+    ];
+    let mut missed = Vec::new();
+    let (mut drawn, mut pixels) = (0, 0);
+    let mut renderers = renderers();
+    for (name, obj) in shapes {
+        let mesh = scenes::mesh(&obj());
+        for (style, light, roughness) in
+            [("flat", "headlight", "0.6"), ("flat", "three-point", "0.15"), ("smooth", "headlight", "0.3")]
+        {
+            let spec = scenes::spec(&[
+                ("size", "200x160"),
+                ("style", style),
+                ("light.preset", light),
+                ("surface.roughness", roughness),
+                ("surface.metallic", "0"),
+                ("surface.color", "c08040"),
+            ]);
+            let plan = scenes::plan(&mesh, &spec);
+            let normals = true_normals(&scene(&plan), style == "smooth");
+            for renderer in &mut renderers {
+                let errors = color_errors(&plan, &renderer.draw(&plan, &Deadline::default()).unwrap(), &normals);
+                let what = format!("- {name}, {style}, {light}, {}", renderer.kind().name());
+                let gate = if style == "smooth" { SMOOTH_NOW } else { FLAT_NOW };
+                println!(
+                    "{what:<44} max {:.3} of {} pixels (gate {gate}, goal {COLOR_GOAL})",
+                    errors.max, errors.pixels
+                );
+                if errors.max > gate {
+                    missed.push(format!("{what}: {}", errors.max));
+                }
+                pixels += errors.pixels;
+                drawn += 1;
+            }
+        }
+    }
+    assert_eq!(drawn, 12 * renderers.len());
+    assert!(pixels > 5000 * renderers.len(), "{pixels}");
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+/// Slivers up to `aspect` times as long as high, all alike to look at, far from the origin.
+pub fn slivers(aspect: f64, offset: f64, random: &mut Random) -> Shape {
+    let mut shape = Shape::default();
+    for _ in 0..40 {
+        let axis = unit([0; 3].map(|_| random.range(-1.0, 1.0)));
+        let side = unit(cross(axis, [0.3, -0.5, 0.8]));
+        let start = [0; 3].map(|_| offset + random.range(-1.0, 1.0));
+        let at = |along: f64, across: f64| std::array::from_fn(|k| start[k] + along * axis[k] + across * side[k]);
+        let corners = [at(0.0, 0.0), at(1.0, 0.0), at(random.range(0.2, 0.8), 1.0 / aspect)];
+        let corners = corners.map(|p| shape.vertex(p));
+        shape.polygons.push(corners.to_vec());
+    }
+    shape
+}
+
+/// The largest angle between a plan's face normals and the exact ones of the file, radians.
+pub fn normal_error(shape: &Shape, face_normals: &[[f32; 3]]) -> f64 {
+    assert_eq!(shape.polygons.len(), face_normals.len());
+    let angle = |(polygon, normal): (&Vec<usize>, &[f32; 3])| {
+        let exact = face_normal([0, 1, 2].map(|k| shape.vertices[polygon[k]])).unwrap();
+        let normal = normal.map(f64::from);
+        length(cross(exact, normal)).atan2(dot(exact, normal))
+    };
+    shape.polygons.iter().zip(face_normals).map(angle).fold(0.0, f64::max)
+}
+
+#[test]
+fn normals_of_slivers_are_exact() {
+    let mut missed = Vec::new();
+    let (mut measured, mut random) = (0, Random(21));
+    for aspect in [1e1, 1e3, 1e5, 1e7] {
+        for offset in [0.0, 1e3, 1e5] {
+            let mut worst = 0.0_f64;
+            for _ in 0..cases(5, 100) {
+                let shape = slivers(aspect, offset, &mut random);
+                let mesh = scenes::mesh(&shape.text());
+                let plan_spec = scenes::spec(&[("style", "flat")]);
+                let plan = scenes::plan(&mesh, &plan_spec);
+                let surface = plan.surface.as_ref().unwrap();
+                assert!(surface.all_flags() & flags::FACE_NORMALS != 0);
+                worst = worst.max(normal_error(&shape, surface.face_normals));
+            }
+            let what = format!("- slivers of aspect {aspect:e}, {offset:e} away");
+            println!("{what:<44} normal off by {worst:.2e} rad (gate {NORMAL_GOAL_RAD:e})");
+            if worst > NORMAL_GOAL_RAD {
+                missed.push(format!("{what}: {worst:e} rad"));
+            }
+            measured += 1;
+        }
+    }
+    assert_eq!(measured, 12);
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}

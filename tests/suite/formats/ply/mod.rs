@@ -1,0 +1,6 @@
+//! PLY.
+
+pub mod bad;
+pub mod hostile;
+pub mod properties;
+pub mod surfaces;

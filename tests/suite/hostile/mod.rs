@@ -1,0 +1,5 @@
+//! Bytes that were made to do harm.
+
+pub mod bombs;
+pub mod cut;
+pub mod fuzzed;

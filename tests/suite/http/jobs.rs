@@ -1,0 +1,189 @@
+//! The daemon under load and over time: queue, deadline, cancellation, drain.
+
+use std::io::Write as _;
+use std::time::{Duration, Instant};
+
+use crate::support::server::{Answer, CUBE_OBJ, PATIENCE, Server, meshsnap};
+
+/// The largest picture: slow enough to be caught at it.
+const SLOW: &str = "/v1/render?size=4096";
+
+#[test]
+fn a_job_is_accepted_watched_and_fetched() {
+    let server = Server::start(&[]);
+    let accepted = server.post("/v1/jobs?style=wire&size=64", CUBE_OBJ);
+    assert_eq!(accepted.status, 202);
+    let location = accepted.header("location").unwrap().to_owned();
+    assert_eq!(location, format!("/v1/jobs/{}", accepted.json()["id"].as_str().unwrap()));
+
+    let waited = server.request("GET", &location, &["Prefer: wait=30"], b"");
+    assert_eq!(waited.header("preference-applied"), Some("wait=30"));
+    let state = waited.json();
+    assert_eq!(state["state"], "done", "{state}");
+    assert_eq!(state["result"]["content_type"], "image/png");
+    assert_eq!(state["result"]["url"], format!("{location}/result"));
+
+    let result = server.get(&format!("{location}/result"));
+    result.picture(64, 64);
+    let same = server.post("/v1/render?style=wire&size=64", CUBE_OBJ);
+    assert_eq!(result.body, same.body);
+    assert_eq!(result.header("etag"), same.header("etag"));
+    assert_eq!(server.request("DELETE", &location, &[], b"").json()["state"], "done", "nothing left to cancel");
+}
+
+#[test]
+fn a_failed_job_says_why_as_the_waiting_client_would_have_heard() {
+    let server = Server::start(&[]);
+    let location = server.post("/v1/jobs", b"no mesh").header("location").unwrap().to_owned();
+    let state = server.request("GET", &location, &["Prefer: wait=30"], b"").json();
+    assert_eq!((state["state"].as_str(), state["error"]["status"].as_u64()), (Some("failed"), Some(415)), "{state}");
+    server.get(&format!("{location}/result")).problem(415, "mesh_unrecognised");
+    server.post("/v1/jobs?size=0", CUBE_OBJ).problem(400, "out_of_range");
+}
+
+#[test]
+fn respond_async_turns_a_render_into_a_job() {
+    let server = Server::start(&[]);
+    let answer = server.request("POST", "/v1/render?size=32", &["Prefer: respond-async"], CUBE_OBJ);
+    assert_eq!((answer.status, answer.header("preference-applied")), (202, Some("respond-async")));
+    let location = answer.header("location").unwrap();
+    server.request("GET", location, &["Prefer: wait=30"], b"");
+    server.get(&format!("{location}/result")).picture(32, 32);
+}
+
+#[test]
+fn unfinished_and_cancelled_results_are_a_409() {
+    let server = Server::start(&["--workers", "1"]);
+    let jobs = [0; 4].map(|_| {
+        server.post("/v1/jobs?size=4096", CUBE_OBJ).header("location").expect("a free place in the queue").to_owned()
+    });
+    let unfinished = server.get(&format!("{}/result", jobs[3]));
+    unfinished.problem(409, "not_finished");
+    assert!(unfinished.header("retry-after").is_some());
+    for job in &jobs {
+        let state = server.request("DELETE", job, &[], b"").json();
+        assert!(state["state"] == "cancelled" || *job == jobs[0] && state["state"] == "done", "{state}");
+    }
+    server.get(&format!("{}/result", jobs[3])).problem(409, "cancelled");
+    let began = Instant::now();
+    server.post("/v1/render?size=16", CUBE_OBJ).picture(16, 16);
+    assert!(began.elapsed() < PATIENCE / 2);
+}
+
+#[test]
+fn a_full_queue_is_a_429_at_once_and_loses_nothing() {
+    let server = Server::start(&["--workers", "1", "--queue", "1"]);
+    let answers: Vec<Answer> = std::thread::scope(|scope| {
+        let clients: Vec<_> = (0..12).map(|_| scope.spawn(|| server.post(SLOW, CUBE_OBJ))).collect();
+        clients.into_iter().map(|c| c.join().unwrap()).collect()
+    });
+    let (mut drawn, mut refused) = (0, 0);
+    for answer in &answers {
+        if answer.status == 200 {
+            drawn += 1;
+        } else {
+            let detail = answer.problem(429, "queue_full");
+            let seconds: u64 = answer.header("retry-after").unwrap().parse().unwrap();
+            assert!((1..=30).contains(&seconds), "{detail}");
+            refused += 1;
+        }
+    }
+    assert!(drawn >= 2 && refused >= 1 && drawn + refused == 12, "{drawn} drawn, {refused} refused");
+    server.post("/v1/render?size=16", CUBE_OBJ).picture(16, 16);
+}
+
+#[test]
+fn health_answers_while_every_worker_is_busy() {
+    let server = Server::start(&["--workers", "1"]);
+    std::thread::scope(|scope| {
+        let client = scope.spawn(|| server.post(SLOW, CUBE_OBJ));
+        server.wait_for_load(|load| load["running"] == 1);
+        let began = Instant::now();
+        assert_eq!(server.get("/healthz").status, 200);
+        assert_eq!(server.get("/readyz").status, 200);
+        assert!(began.elapsed() < Duration::from_secs(2), "{:?}", began.elapsed());
+        assert_eq!(client.join().unwrap().status, 200);
+    });
+}
+
+#[test]
+fn a_job_out_of_time_is_a_504() {
+    let server = Server::start(&["--limit-job-ms", "1"]);
+    let answer = server.post(SLOW, CUBE_OBJ);
+    let detail = answer.problem(504, "deadline");
+    assert!(answer.json()["flag"] == "--limit-job-ms" && detail.contains("1 ms"), "{detail}");
+    let patient = Server::start(&["--workers", "1", "--limit-job-ms", "20000"]);
+    patient.post("/v1/render?size=16", CUBE_OBJ).picture(16, 16);
+}
+
+#[test]
+fn a_client_that_hangs_up_frees_its_worker() {
+    let server = Server::start(&["--workers", "1"]);
+    for _ in 0..5 {
+        let mut stream = server.connect();
+        let length = CUBE_OBJ.len();
+        write!(stream, "POST {SLOW} HTTP/1.1\r\nHost: x\r\nContent-Length: {length}\r\n\r\n").unwrap();
+        stream.write_all(CUBE_OBJ).unwrap();
+        drop(stream);
+    }
+    server.wait_for_load(|load| load["queued"] == 0 && load["running"] == 0);
+    server.post("/v1/render?size=16", CUBE_OBJ).picture(16, 16);
+}
+
+#[test]
+fn a_terminated_server_finishes_what_it_accepted() {
+    let mut server = Server::start(&["--workers", "1"]);
+    let kept = server.connect();
+    std::thread::scope(|scope| {
+        let clients: Vec<_> = (0..3).map(|_| scope.spawn(|| server.post(SLOW, CUBE_OBJ))).collect();
+        server.wait_for_load(|load| load["running"] == 1 && load["queued"] == 2);
+        server.terminate();
+        let began = Instant::now();
+        loop {
+            let ready = server.get("/readyz");
+            if ready.status == 503 {
+                ready.problem(503, "draining");
+                assert!(ready.header("retry-after").is_some());
+                break;
+            }
+            assert!(began.elapsed() < PATIENCE, "still ready");
+        }
+        let refused = server.post("/v1/render?size=16", CUBE_OBJ);
+        refused.problem(503, "draining");
+        assert!(refused.header("retry-after").is_some());
+        assert_eq!(server.get("/healthz").status, 200);
+        for client in clients {
+            client.join().unwrap().picture(4096, 4096);
+        }
+    });
+    assert_eq!(server.wait().code(), Some(0));
+    drop(kept);
+}
+
+#[test]
+fn results_are_forgotten_in_time() {
+    let server = Server::start(&["--result-ttl-ms", "100"]);
+    let location = server.post("/v1/jobs?size=16", CUBE_OBJ).header("location").unwrap().to_owned();
+    let began = Instant::now();
+    while server.get(&location).status != 404 {
+        assert!(began.elapsed() < PATIENCE, "still there");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    server.get(&format!("{location}/result")).problem(404, "not_found");
+}
+
+/// The whole program from a cold start; the best of a few, because other tests run beside this one.
+#[test]
+fn it_starts_quickly_and_idles_small() {
+    let starts: Vec<_> = (0..5)
+        .map(|_| {
+            let server = Server::start_with(meshsnap().args(["serve", "--listen", "127.0.0.1:0"]));
+            assert_eq!(server.get("/readyz").status, 200);
+            (server.start_took, server.resident_bytes())
+        })
+        .collect();
+    let (fastest, smallest) = (starts.iter().map(|s| s.0).min().unwrap(), starts.iter().map(|s| s.1).min().unwrap());
+    println!("start to listening {fastest:?}, resident {} kB", smallest / 1024);
+    assert!(fastest < Duration::from_millis(100), "{fastest:?}");
+    assert!(smallest < 40_000_000, "{smallest} bytes");
+}

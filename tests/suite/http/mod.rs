@@ -1,0 +1,13 @@
+//! The real server over HTTP.
+
+pub mod answers;
+pub mod bad;
+pub mod jobs;
+pub mod meshes;
+pub mod meshes_bad;
+pub mod meshes_pictures;
+pub mod meshes_room;
+pub mod mistakes;
+pub mod openapi;
+pub mod quality_target;
+pub mod schema;

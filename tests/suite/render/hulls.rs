@@ -1,0 +1,164 @@
+//! Hulls of very many edges: what they are made of is bounded, and they end soon when their job does.
+
+use std::time::{Duration, Instant};
+
+use meshsnap::backend::Renderer;
+use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::backend::gpu::GpuRenderer;
+use meshsnap::image::Image;
+use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap::mesh::Mesh;
+use meshsnap::plan;
+
+use crate::render::twins::pictures::gpus;
+use crate::support::likeness::{Likeness, Tolerance};
+use crate::support::outline_shapes::SHAPES;
+use crate::support::soups::Random;
+use crate::support::{scenes, shapes};
+
+/// As much as a job may go on after its deadline: far longer than what lies between two looks at it, on a machine that does other work.
+const SOON: Duration = Duration::from_millis(1000);
+
+/// A mesh of so many triangles in the unit box, up to `size` long, that share no edge: STL.
+fn disjoint(count: u32, size: f32) -> Mesh {
+    let mut random = Random(5);
+    let mut stl = vec![0; 80];
+    stl.extend(count.to_le_bytes());
+    for _ in 0..count {
+        let center = random.point(1.0);
+        stl.extend([0; 12]);
+        for _ in 0..3 {
+            let corner = random.point(size);
+            stl.extend((0..3).flat_map(|k| (center[k] + corner[k]).to_le_bytes()));
+        }
+        stl.extend([0; 2]);
+    }
+    scenes::mesh_of(&stl).unwrap()
+}
+
+/// Runs `job` to its end, then again with a deadline that is raised at moments all over the time that it took: how often it was stopped.
+fn stop_all_over<T>(moments: u32, mut job: impl FnMut(&Deadline) -> Option<T>) -> u32 {
+    let begun = Instant::now();
+    assert!(job(&Deadline::default()).is_some());
+    let whole = begun.elapsed();
+    let mut stopped = 0;
+    for moment in 0..moments {
+        let deadline = Deadline::default();
+        std::thread::scope(|scope| {
+            let raised = scope.spawn(|| {
+                std::thread::sleep(whole * moment / moments);
+                deadline.stop();
+                Instant::now()
+            });
+            let is_stopped = job(&deadline).is_none();
+            let ended = Instant::now();
+            let late = ended.saturating_duration_since(raised.join().unwrap());
+            assert!(late < SOON, "{late:?} after its end, {moment} of {moments} parts of {whole:?}");
+            stopped += u32::from(is_stopped);
+        });
+    }
+    stopped
+}
+
+#[test]
+fn hulls_of_many_edges_end_soon_after_their_job() {
+    let mesh = disjoint(200_000, 0.02);
+    let spec = scenes::spec(&[("style", "outline"), ("outline.method", "hull"), ("size", "128")]);
+    let build = |deadline: &Deadline| plan::build(&mesh, &spec, &mut Budget::new(&Limits::default()), deadline).ok();
+    // One that is raised late in a time that varies may come after the end.
+    assert!(stop_all_over(8, build) >= 4);
+    let plan = scenes::plan(&mesh, &spec);
+    let mut renderer = CpuRenderer::new(2);
+    assert!(stop_all_over(4, |deadline| renderer.draw(&plan, deadline).ok()) >= 2);
+}
+
+#[test]
+fn hulls_of_many_edges_have_few_triangles_where_there_are_few_pixels() {
+    let mesh = disjoint(50_000, 0.02);
+    let triangles = |size: &str, px: &str| {
+        let keys = [("style", "outline"), ("outline.method", "hull"), ("size", size), ("outline.unit", "px")];
+        let spec = scenes::spec(&[&keys[..], &[("outline.thickness", px)]].concat());
+        scenes::plan(&mesh, &spec).hull.unwrap().triangles.len()
+    };
+    // Three strips and three fans, or six at needles, however wide.
+    let (few, many) = (triangles("32", "8"), triangles("512", "8"));
+    assert!((400_000..520_000).contains(&few), "{few}");
+    assert!((few + 400_000..1_600_000).contains(&many), "{many}");
+}
+
+#[test]
+fn hulls_are_the_same_on_both_back_ends_with_any_samples() {
+    let Some(gpus) = gpus() else { return };
+    let mut cases = 0;
+    for (name, obj) in [("gear", shapes::gear(9)), ("sheet", shapes::sheet(6)), ("balls", shapes::two_balls())] {
+        let mesh = scenes::mesh(&obj);
+        for samples in ["1", "4", "8", "16"] {
+            for (unit, thickness, opacity) in [("px", "5", "1"), ("object", "0.07", "1"), ("px", "2.5", "0.4")] {
+                let spec = scenes::spec(&[
+                    ("style", "outline"),
+                    ("size", "140x110"),
+                    ("samples", samples),
+                    ("outline.method", "hull"),
+                    ("outline.unit", unit),
+                    ("outline.thickness", thickness),
+                    ("outline.color", "d03010"),
+                    ("surface.opacity", opacity),
+                    ("background", "transparent"),
+                ]);
+                let plan = scenes::plan(&mesh, &spec);
+                let what = format!("{name}, {samples} samples, {thickness} {unit}, opacity {opacity}");
+                let cpu = CpuRenderer::new(2).draw(&plan, &Deadline::default()).unwrap();
+                let is_red = |p: &&[u8]| p[3] > 0 && p[0] > 150 && p[1] < 80;
+                let red = cpu.rgba.chunks(4).filter(is_red).count();
+                assert!(red > 300, "{what}: {red} pixels of an outline");
+                for gpu in gpus {
+                    let gpu = GpuRenderer::new(gpu.clone()).draw(&plan, &Deadline::default()).unwrap();
+                    Likeness::of(&cpu, &gpu).assert(Tolerance::TWINS, &what);
+                    cases += 1;
+                }
+            }
+        }
+    }
+    assert_eq!(cases, 3 * 4 * 3 * gpus.len());
+}
+
+/// How many pieces the dark pixels of a picture are of, where those that touch at a corner are one.
+fn dark_pieces(picture: &Image) -> usize {
+    let [width, height] = [picture.width_px as usize, picture.height_px as usize];
+    let mut is_left: Vec<bool> = picture.rgba.chunks(4).map(|pixel| pixel[0] < 128).collect();
+    let mut pieces = 0;
+    for first in 0..is_left.len() {
+        pieces += usize::from(is_left[first]);
+        let mut reached = vec![first];
+        while let Some(at) = reached.pop() {
+            if !std::mem::take(&mut is_left[at]) {
+                continue;
+            }
+            let (x, y) = (at % width, at / width);
+            let beside = |v: usize, size: usize| v.saturating_sub(1)..(v + 2).min(size);
+            let around = beside(y, height).flat_map(|y| beside(x, width).map(move |x| y * width + x));
+            reached.extend(around.filter(|&i| is_left[i]));
+        }
+    }
+    pieces
+}
+
+#[test]
+fn lines_that_end_inside_a_shape_leave_nothing_beside_their_ends() {
+    let mut renderer = CpuRenderer::new(2);
+    let mut cases = 0;
+    for (name, eye) in [("L", "5,-4,4"), ("L", "4,-4,5"), ("star", "0.5,-5,3.5"), ("star", "0.3,-4,3")] {
+        let shape = SHAPES.iter().find(|shape| shape.name == name).unwrap();
+        let mesh = scenes::mesh(&(shape.obj)());
+        for px in ["4", "8", "12"] {
+            let keys = [("style", "outline"), ("outline.unit", "px"), ("outline.thickness", px), ("samples", "8")];
+            let view = [("camera.eye", eye), ("camera.target", "0,0,0"), ("size", "240x200"), ("background", "fff")];
+            let spec = scenes::spec(&[&keys[..], &view, &[("surface.color", "fff")]].concat());
+            let picture = renderer.draw(&scenes::plan(&mesh, &spec), &Deadline::default()).unwrap();
+            // Each line inside begins at the outer border.
+            assert_eq!(dark_pieces(&picture), 1, "{name} from {eye}, {px} px");
+            cases += 1;
+        }
+    }
+    assert_eq!(cases, 12);
+}

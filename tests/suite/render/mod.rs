@@ -1,0 +1,19 @@
+//! Pictures: the same on every back-end, and as they should be.
+
+pub mod examples;
+pub mod golden;
+pub mod hulls;
+pub mod layers;
+pub mod layers_hull;
+pub mod line_borders;
+pub mod line_limits;
+pub mod line_looks;
+pub mod lines_and_points;
+pub mod models;
+pub mod raster;
+pub mod select;
+pub mod skips;
+pub mod textures;
+pub mod twins;
+pub mod views;
+pub mod wire_formulas;

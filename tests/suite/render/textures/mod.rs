@@ -1,0 +1,7 @@
+//! Textures.
+
+pub mod bad;
+pub mod basis;
+pub mod closeup;
+pub mod formulas;
+pub mod levels;

@@ -1,0 +1,83 @@
+//! The picture is the mesh's, not the file's: the order of faces and vertices and their winding leave no trace.
+
+use crate::oracle::obj::Shape;
+use crate::support::moved_meshes::{LOOKS, MESHES, differing, draw, is_blank, shape};
+use crate::support::scenes;
+use crate::support::shapes::Random;
+use crate::support::truth::{cases, renderers};
+
+fn shuffle<T>(items: &mut [T], random: &mut Random) {
+    for i in (1..items.len()).rev() {
+        items.swap(i, (random.next() % (i as u64 + 1)) as usize);
+    }
+}
+
+fn flipped(mut shape: Shape) -> Shape {
+    shape.polygons.iter_mut().for_each(|p| p.reverse());
+    shape
+}
+
+fn with_faces_shuffled(mut shape: Shape, random: &mut Random) -> Shape {
+    shuffle(&mut shape.polygons, random);
+    shape
+}
+
+fn renumbered(shape: &Shape, random: &mut Random) -> Shape {
+    let mut order: Vec<usize> = (0..shape.vertices.len()).collect();
+    shuffle(&mut order, random);
+    let mut new_of_old = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(new, &old)| new_of_old[old] = new);
+    Shape {
+        vertices: order.iter().map(|&old| shape.vertices[old]).collect(),
+        polygons: shape.polygons.iter().map(|p| p.iter().map(|&v| new_of_old[v]).collect()).collect(),
+    }
+}
+
+/// Every face begun at another corner.
+fn turned(mut shape: Shape, random: &mut Random) -> Shape {
+    shape.polygons.iter_mut().for_each(|p| p.rotate_left((random.next() % 3) as usize));
+    shape
+}
+
+fn others(shape: &Shape, random: &mut Random) -> Vec<(&'static str, Shape)> {
+    let all = flipped(renumbered(&turned(with_faces_shuffled(shape.clone(), random), random), random));
+    vec![
+        ("flipped", flipped(shape.clone())),
+        ("faces shuffled", with_faces_shuffled(shape.clone(), random)),
+        ("vertices renumbered", renumbered(shape, random)),
+        ("corners turned", turned(shape.clone(), random)),
+        ("all of it", all),
+    ]
+}
+
+#[test]
+fn order_and_winding_leave_no_trace() {
+    let (mut compared, mut wanted) = (0, 0);
+    let mut wrong = Vec::new();
+    let mut random = Random(61);
+    let mut renderers = renderers();
+    for (name, obj) in MESHES {
+        // Triangles, because a polygon's corners decide how it is cut.
+        let original = shape(&obj()).triangulated();
+        let first = scenes::mesh(&original.text());
+        for _ in 0..cases(1, 20) {
+            for (how, other) in others(&original, &mut random) {
+                let other = scenes::mesh(&other.text());
+                for (look, keys) in LOOKS {
+                    for renderer in &mut renderers {
+                        let [want, got] = [&first, &other].map(|mesh| draw(mesh, keys, "128x96", renderer.as_mut()));
+                        assert!(!is_blank(&want), "{name}, {look}");
+                        let count = differing(&want, &got);
+                        if count > 0 {
+                            wrong.push(format!("{name}, {how}, {look}, {}: {count} pixels", renderer.kind().name()));
+                        }
+                        compared += 1;
+                    }
+                }
+                wanted += 1;
+            }
+        }
+    }
+    assert_eq!(compared, wanted * LOOKS.len() * renderers.len());
+    assert!(wrong.is_empty(), "{} of {compared} differ:\n{}", wrong.len(), wrong.join("\n"));
+}

@@ -1,0 +1,94 @@
+//! A model is the same model in millimetres and in light years.
+
+use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::mesh::Mesh;
+
+use crate::support::moved_meshes::{LOOKS, MESHES, differing, draw, is_blank, shape};
+use crate::support::scenes;
+use crate::support::truth::{cases, renderers};
+
+/// Share of pixels, where the scale is no power of two.
+const DIFFERING_MAX: f64 = 1e-4;
+/// The same of one picture: a vertex that lies between two multiples of 1/256 px may be snapped to the other one, and then
+/// every line that it ends moves by that, which is one step of a byte.
+const DIFFERING_IN_ONE_MAX: f64 = 1e-3;
+
+fn scaled(obj: &str, factor: f64) -> Mesh {
+    scenes::mesh(&shape(obj).map(|v| v.map(|c| c * factor)).text())
+}
+
+#[test]
+fn powers_of_two_give_the_same_mesh() {
+    let mut compared = 0;
+    for (name, obj) in MESHES {
+        let obj = obj();
+        let want = scaled(&obj, 1.0);
+        for k in -100..=100 {
+            let factor = f64::powi(2.0, k);
+            let got = scaled(&obj, factor);
+            assert!(got.positions == want.positions && got.face_normals == want.face_normals, "{name} times 2^{k}");
+            assert!(got.triangles == want.triangles && got.bounds == want.bounds, "{name} times 2^{k}");
+            assert_eq!(got.to_file.scale, want.to_file.scale * factor, "{name} times 2^{k}");
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 5 * 201);
+}
+
+#[test]
+fn powers_of_two_give_the_same_bytes() {
+    let exponents: Vec<i32> =
+        cases(vec![-100, -1, 100], (-100..=100).filter(|k: &i32| k % 10 == 0 || k.abs() < 4).collect());
+    let mut compared = 0;
+    let mut renderers = renderers();
+    for (name, obj) in MESHES {
+        let obj = obj();
+        let original = scaled(&obj, 1.0);
+        let copies: Vec<Mesh> = exponents.iter().map(|&k| scaled(&obj, f64::powi(2.0, k))).collect();
+        for (look, keys) in LOOKS {
+            for renderer in &mut renderers {
+                let want = draw(&original, keys, "96x80", renderer.as_mut());
+                assert!(!is_blank(&want), "{name}, {look}");
+                for (copy, k) in copies.iter().zip(&exponents) {
+                    let got = draw(copy, keys, "96x80", renderer.as_mut());
+                    let kind = renderer.kind().name();
+                    assert!(want.rgba == got.rgba, "{name} times 2^{k}, {look}, {kind}: other bytes");
+                    compared += 1;
+                }
+            }
+        }
+    }
+    assert_eq!(compared, MESHES.len() * LOOKS.len() * renderers.len() * exponents.len());
+}
+
+#[test]
+fn other_scales_differ_in_hardly_a_pixel() {
+    let (mut compared, mut pixels, mut different) = (0, 0, 0);
+    let mut missed = Vec::new();
+    let mut renderer = CpuRenderer::new(2);
+    for (name, obj) in MESHES {
+        let obj = obj();
+        let original = scaled(&obj, 1.0);
+        for factor in [1e30, 1e-30] {
+            let copy = scaled(&obj, factor);
+            for (look, keys) in LOOKS {
+                let want = draw(&original, keys, "512", &mut renderer);
+                let count = differing(&want, &draw(&copy, keys, "512", &mut renderer));
+                let share = count as f64 / want.rgba.len() as f64 * 4.0;
+                println!(
+                    "- {name} times {factor:e}, {look:<40} {count} pixels differ (gate {DIFFERING_IN_ONE_MAX} of them)"
+                );
+                if share > DIFFERING_IN_ONE_MAX {
+                    missed.push(format!("{name} times {factor}, {look}: {count} pixels differ"));
+                }
+                pixels += want.rgba.len() / 4;
+                different += count;
+                compared += 1;
+            }
+        }
+    }
+    println!("- other scales: {different} of {pixels} pixels differ");
+    assert_eq!(compared, MESHES.len() * 2 * LOOKS.len());
+    assert!(different as f64 <= DIFFERING_MAX * pixels as f64, "{different} of {pixels} pixels differ");
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}

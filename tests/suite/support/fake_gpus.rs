@@ -1,0 +1,169 @@
+//! A machine whose GPUs are missing, wrong, lost or refuse, as a test tells them.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, OnceLock};
+
+use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::backend::gpu::{GpuInfo, GpuKind};
+use meshsnap::backend::{BackendKind, DrawError, GpuDevice, GpuHost, HardwareHint, Opener, Renderer};
+use meshsnap::image::Image;
+use meshsnap::limits::Deadline;
+use meshsnap::plan::DrawPlan;
+
+use crate::support::scenes;
+
+/// What an attempt to open finds.
+#[derive(Clone, Copy, Debug)]
+pub enum Open {
+    Hardware,
+    Software,
+    /// Hardware that computes wrong numbers.
+    Wrong,
+    /// Hardware that breaks while it is probed.
+    Broken,
+    Absent,
+    Panics,
+}
+
+/// What happens to a job on a device. Where nothing is said it is drawn.
+#[derive(Clone, Copy, Debug)]
+pub enum Act {
+    Draws,
+    Loses,
+    Refuses,
+    Panics,
+    /// As wgpu does on a lost device.
+    PanicsLost,
+    Stops,
+}
+
+/// A machine whose devices do as they are told.
+#[derive(Clone, Default)]
+pub struct Machine(pub Arc<Mutex<Story>>);
+
+#[derive(Default)]
+pub struct Story {
+    opens: VecDeque<Open>,
+    acts: VecDeque<Act>,
+    opened: Vec<GpuKind>,
+    pub devices: Vec<Arc<Fake>>,
+    pub renderers: usize,
+}
+
+impl Machine {
+    pub fn new(opens: &[Open], acts: &[Act]) -> Self {
+        let machine = Self::default();
+        let mut story = machine.0.lock().unwrap();
+        (story.opens, story.acts) = (opens.iter().copied().collect(), acts.iter().copied().collect());
+        drop(story);
+        machine
+    }
+
+    pub fn host(&self, hint: HardwareHint) -> Arc<GpuHost> {
+        let machine = self.clone();
+        let open: Box<Opener> = Box::new(move |kind| machine.open(kind));
+        Arc::new(GpuHost::with_opener(hint, open))
+    }
+
+    fn open(&self, kind: GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> {
+        let mut story = self.0.lock().unwrap();
+        story.opened.push(kind);
+        let open = story.opens.pop_front().expect("an opening too many");
+        match open {
+            Open::Absent => return Err(DrawError::NoGpu("nothing there".into())),
+            Open::Software if kind == GpuKind::Hardware => return Err(DrawError::NoGpu("software alone".into())),
+            _ => {}
+        }
+        let software = matches!(open, Open::Software);
+        let info = GpuInfo {
+            name: format!("fake {}", story.opened.len()),
+            driver: "fake 1.0".into(),
+            device_type: if software { "software" } else { "discrete" },
+            features: vec!["int64-atomics"],
+        };
+        let fake = Arc::new(Fake { machine: self.clone(), open, info, lost: OnceLock::new() });
+        story.devices.push(fake.clone());
+        drop(story);
+        assert!(!matches!(open, Open::Panics), "this driver panics");
+        Ok(fake)
+    }
+
+    pub fn opened(&self) -> Vec<GpuKind> {
+        self.0.lock().unwrap().opened.clone()
+    }
+}
+
+pub struct Fake {
+    machine: Machine,
+    open: Open,
+    info: GpuInfo,
+    pub lost: OnceLock<String>,
+}
+
+impl GpuDevice for Fake {
+    fn info(&self) -> &GpuInfo {
+        &self.info
+    }
+
+    fn is_software(&self) -> bool {
+        matches!(self.open, Open::Software)
+    }
+
+    fn lost(&self) -> Option<&str> {
+        self.lost.get().map(String::as_str)
+    }
+
+    fn renderer(self: Arc<Self>) -> Box<dyn Renderer> {
+        self.machine.0.lock().unwrap().renderers += 1;
+        Box::new(FakeRenderer(self))
+    }
+}
+
+struct FakeRenderer(Arc<Fake>);
+
+impl Renderer for FakeRenderer {
+    fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
+        let fake = &self.0;
+        let gone = || DrawError::DeviceLost(fake.lost.get_or_init(|| "pulled out".into()).clone());
+        if fake.lost.get().is_some() {
+            return Err(gone());
+        }
+        // Anything else is the probe.
+        let act = if plan.width_px == JOB_PX { fake.machine.0.lock().unwrap().acts.pop_front() } else { None };
+        match act.unwrap_or(Act::Draws) {
+            Act::Draws => {}
+            Act::Loses => return Err(gone()),
+            Act::Refuses => return Err(DrawError::Device("out of memory".into())),
+            Act::Panics => panic!("a bug"),
+            Act::PanicsLost => {
+                let _ = gone();
+                panic!("as wgpu does");
+            }
+            Act::Stops => deadline.stop(),
+        }
+        deadline.check()?;
+        let mut image = CpuRenderer::new(1).draw(plan, deadline)?;
+        if matches!(fake.open, Open::Wrong) {
+            image.rgba[0] ^= 0x80;
+        }
+        Ok(image)
+    }
+
+    fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
+        if matches!(self.0.open, Open::Broken) {
+            return Err(DrawError::Device("no such shader".into()));
+        }
+        CpuRenderer::new(1).draw_visibility(plan, deadline)
+    }
+
+    fn kind(&self) -> BackendKind {
+        BackendKind::Gpu
+    }
+}
+
+const JOB_PX: u32 = 5;
+
+pub fn job() -> DrawPlan<'static> {
+    let positions = &[[-9.0, 9.0, 0.5], [9.0, 9.0, 0.5], [0.0, -2.0, 0.5]];
+    scenes::screen_plan([JOB_PX; 2], 1, 1.0, positions, &[[0, 1, 2]])
+}

@@ -1,0 +1,245 @@
+//! The fixed scenes that every back-end draws, and how to make a mesh, a spec and a plan in a test.
+
+use meshsnap::import::Bundle;
+use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap::mesh::Mesh;
+use meshsnap::plan;
+use meshsnap::plan::{DrawPlan, Faces, MaterialLook, Projection, SurfacePass};
+use meshsnap::request;
+use meshsnap::request::Rules;
+use meshsnap::spec::BackendChoice;
+use meshsnap::spec::color::Rgba;
+use meshsnap::spec::{DebugView, Layers, Spec};
+
+use crate::support::shapes;
+
+/// A picture with a name.
+pub struct Scene {
+    pub name: &'static str,
+    pub obj: fn() -> String,
+    pub keys: &'static [(&'static str, &'static str)],
+    /// What the keys do not say.
+    pub edit: fn(&mut Spec),
+}
+
+impl Scene {
+    /// The keys, understood, and what they do not say.
+    pub fn spec(&self) -> Spec {
+        let mut spec = spec(self.keys);
+        (self.edit)(&mut spec);
+        spec
+    }
+}
+
+const SIZE: (&str, &str) = ("size", "200x160");
+
+/// Every style, both wire techniques, polygons, both outline units, the views, and the awkward cameras.
+pub const SCENES: &[Scene] = &[
+    scene("torus-flat", torus, &[SIZE, ("style", "flat")]),
+    scene("torus-smooth", torus, &[SIZE, ("style", "smooth")]),
+    scene("torus-unlit", torus, &[SIZE, ("style", "unlit"), ("surface.color", "c40")]),
+    scene("torus-wire", torus, &[SIZE, ("style", "wire"), ("wire.edges", "polygons")]),
+    scene("torus-wire-wide", torus, &[SIZE, ("style", "wire"), ("wire.thickness", "3.5")]),
+    scene("torus-fwidth", torus, &[SIZE, ("style", "wire"), ("wire.method", "fwidth")]),
+    scene("torus-wireframe", torus, &[SIZE, ("style", "wireframe"), ("background", "transparent")]),
+    scene("gear-outline-px", gear, &[SIZE, ("style", "outline"), ("outline.unit", "px")]),
+    scene("gear-outline-object", gear, &[SIZE, ("style", "outline"), ("outline.thickness", "0.04")]),
+    scene("gear-hidden-line", gear, &[SIZE, ("style", "hidden-line"), ("view", "front")]),
+    scene("cube-flat-one-sample", shapes::cube, &[SIZE, ("style", "flat"), ("samples", "1")]),
+    scene("cube-wire-polygons", shapes::cube, &[SIZE, ("style", "wire"), ("wire.edges", "polygons")]),
+    scene("sheet-wire-red", sheet, &[SIZE, ("style", "wire"), ("wire.color", "e02020"), ("view", "right")]),
+    scene("sheet-back-faces", sheet, &[SIZE, ("style", "flat"), ("view", "bottom")]),
+    scene("sheet-orthographic", sheet, &[SIZE, ("style", "wire"), ("camera.projection", "orthographic")]),
+    scene("sheet-from-inside", sheet, INSIDE),
+    scene("sheet-wire-from-inside", sheet, INSIDE_WIRE),
+    edited(scene("torus-glass", torus, &[SIZE, ("style", "smooth")]), glass),
+    edited(scene("gear-glass-outline", gear, &[SIZE, ("style", "outline")]), glass),
+    scene("torus-wireframe-fwidth-show", torus, FWIDTH_SHOW),
+    scene("torus-wireframe-fwidth-fade", torus, FWIDTH_FADE),
+    scene("torus-wire-fwidth-fade", torus, FWIDTH_FILLED),
+    edited(scene("two-one-outlined", two, &[SIZE, ("style", "outline"), ("outline.unit", "px")]), left_outlined),
+    edited(scene("two-one-glass", two, &[SIZE, ("style", "flat"), ("view", "left")]), left_glass),
+    scene("torus-derivative", torus, &[SIZE, ("style", "flat"), ("surface.normals", "derivative"), METAL]),
+    scene("gear-metal", gear, &[SIZE, ("style", "flat"), METAL, ("surface.color", "d9a441"), SHINY]),
+    scene("torus-metal", torus, &[SIZE, ("style", "smooth"), METAL, ("light.preset", "three-point"), SHINY]),
+    scene("sheet-threshold", sheet, &[SIZE, ("style", "wire"), ("wire.method", "threshold"), ("samples", "1")]),
+    scene("gear-fwidth-min", gear, &[SIZE, ("style", "wire"), ("wire.method", "fwidth-min"), ("view", "front")]),
+    edited(scene("gear-barycentric-lit", gear, BARYCENTRIC_RED), |spec| spec.layers.wire.as_mut().unwrap().lit = true),
+    edited(scene("torus-debug-normal", torus, &[SIZE, ("style", "smooth")]), |spec| debug(spec, DebugView::Normal)),
+    edited(scene("gear-debug-edge-distance", gear, &[SIZE]), |spec| debug(spec, DebugView::EdgeDistance)),
+    edited(scene("sheet-debug-barycentric", sheet, INSIDE), |spec| debug(spec, DebugView::Barycentric)),
+    edited(scene("sheet-debug-face-orientation", sheet, LOW), |spec| debug(spec, DebugView::FaceOrientation)),
+    scene("torus-contour", torus, CONTOUR),
+    scene("gear-contour", gear, CONTOUR),
+    scene("gear-feature-fade", gear, FEATURE_FADE),
+    scene("fin-topology", fin, &[SIZE, ("style", "topology")]),
+    scene("torus-wire-lit", torus, LIT_RED),
+    scene(
+        "spring-wireframe",
+        spring,
+        &[SIZE, ("style", "wireframe"), ("wire.color", "2060c0"), ("wire.thickness", "2")],
+    ),
+    scene("sheet-boundary", sheet, &[SIZE, ("style", "wire"), ("wire.edges", "boundary"), ("wire.thickness", "2")]),
+];
+
+const CONTOUR: &[(&str, &str)] =
+    &[SIZE, ("style", "outline"), ("outline.method", "contour"), ("outline.unit", "px"), ("outline.thickness", "3")];
+const FEATURE_FADE: &[(&str, &str)] =
+    &[SIZE, ("style", "wire"), ("wire.edges", "feature"), ("wire.hidden", "fade"), ("wire.thickness", "1.5")];
+const LIT_RED: &[(&str, &str)] = &[
+    SIZE,
+    ("style", "wire"),
+    ("wire.edges", "polygons"),
+    ("wire.color", "e02020"),
+    ("wire.thickness", "2.5"),
+    ("wire.lit", "true"),
+];
+
+const FWIDTH_SHOW: &[(&str, &str)] = &[SIZE, ("style", "wireframe"), ("wire.method", "fwidth")];
+const FWIDTH_FADE: &[(&str, &str)] =
+    &[SIZE, ("style", "wireframe"), ("wire.method", "fwidth"), ("wire.hidden", "fade"), ("wire.edges", "polygons")];
+const FWIDTH_FILLED: &[(&str, &str)] =
+    &[SIZE, ("style", "wire"), ("wire.method", "fwidth"), ("wire.hidden", "fade"), ("wire.edges", "polygons")];
+
+const METAL: (&str, &str) = ("surface.metallic", "1");
+const SHINY: (&str, &str) = ("surface.roughness", "0.25");
+const LOW: &[(&str, &str)] = &[SIZE, ("style", "flat"), ("camera.elevation_deg", "-4")];
+const BARYCENTRIC_RED: &[(&str, &str)] =
+    &[SIZE, ("style", "wire"), ("wire.method", "barycentric"), ("wire.color", "c02020"), ("wire.thickness", "3")];
+
+const INSIDE: &[(&str, &str)] = &[
+    SIZE,
+    ("style", "smooth"),
+    ("camera.eye", "0.2,0.35,0.3"),
+    ("camera.target", "-0.8,0,-0.9"),
+    ("camera.fov_deg", "80"),
+];
+const INSIDE_WIRE: &[(&str, &str)] = &[
+    SIZE,
+    ("style", "wire"),
+    ("camera.eye", "0.2,0.35,0.3"),
+    ("camera.target", "-0.8,0,-0.9"),
+    ("camera.fov_deg", "80"),
+];
+
+const fn scene(name: &'static str, obj: fn() -> String, keys: &'static [(&'static str, &'static str)]) -> Scene {
+    Scene { name, obj, keys, edit: |_| () }
+}
+
+const fn edited(scene: Scene, edit: fn(&mut Spec)) -> Scene {
+    Scene { edit, ..scene }
+}
+
+fn glass(spec: &mut Spec) {
+    spec.layers.surface.iter_mut().for_each(|surface| surface.opacity = 0.4);
+}
+
+/// The part named "left" has the outline, the other has none.
+fn left_outlined(spec: &mut Spec) {
+    spec.materials = vec![("right".into(), Layers { outline: None, ..spec.layers })];
+}
+
+/// The part named "left" is glass.
+fn left_glass(spec: &mut Spec) {
+    let mut layers = spec.layers;
+    layers.surface.iter_mut().for_each(|s| (s.opacity, s.color) = (0.45, Some(Rgba([0.1, 0.3, 0.8, 1.0]))));
+    spec.materials = vec![("left".into(), layers)];
+}
+
+fn two() -> String {
+    shapes::two_balls()
+}
+
+fn debug(spec: &mut Spec, view: DebugView) {
+    spec.layers.surface.as_mut().unwrap().debug = view;
+}
+
+fn torus() -> String {
+    shapes::torus(36)
+}
+
+fn fin() -> String {
+    shapes::FIN.to_owned()
+}
+
+/// A cube in a spring of lines, with points between them.
+fn spring() -> String {
+    let mut obj = shapes::cube();
+    let around = |i: u32, r: f64| {
+        let a = std::f64::consts::TAU * f64::from(i) / 32.0;
+        format!("v {} {} {}\n", r * libm::cos(a), f64::from(i) / 48.0 - 1.5, r * libm::sin(a))
+    };
+    for i in 0..=144 {
+        obj += &around(i, 2.0);
+    }
+    obj += &format!("l {}\n", (9..=153).map(|v| v.to_string()).collect::<Vec<_>>().join(" "));
+    for i in 0..12 {
+        obj += &around(i * 12, 1.7);
+        obj += "p -1\n";
+    }
+    obj
+}
+
+fn gear() -> String {
+    shapes::gear(14)
+}
+
+fn sheet() -> String {
+    shapes::sheet(18)
+}
+
+/// Imports an OBJ that must be good.
+pub fn mesh(obj: &str) -> Mesh {
+    mesh_of(obj.as_bytes()).unwrap()
+}
+
+/// Imports with default limits.
+pub fn mesh_of(bytes: &[u8]) -> Result<Mesh, meshsnap::import::MeshError> {
+    let limits = Limits::default();
+    meshsnap::import::import(
+        &Bundle::of_one(bytes.to_vec()),
+        None,
+        &limits,
+        &mut Budget::new(&limits),
+        &Deadline::default(),
+    )
+}
+
+/// Reads dotted keys that must be good.
+pub fn spec(keys: &[(&str, &str)]) -> Spec {
+    let keys: Vec<_> = keys.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
+    let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
+    request::read(None, &keys, &rules).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Plans with default limits.
+pub fn plan<'a>(mesh: &'a Mesh, spec: &Spec) -> DrawPlan<'a> {
+    plan::build(mesh, spec, &mut Budget::new(&Limits::default()), &Deadline::default()).unwrap()
+}
+
+/// A plan made by hand: positions are pixels from the picture's centre over `scale`, y down, and a depth; unlit white on black.
+pub fn screen_plan<'a>(
+    size_px: [u32; 2],
+    samples: u32,
+    scale: f32,
+    positions: &'a [[f32; 3]],
+    triangles: &'a [[u32; 3]],
+) -> DrawPlan<'a> {
+    let projection = Projection {
+        x: [scale * 256.0, 0.0, 0.0, 0.0],
+        y: [0.0, scale * 256.0, 0.0, 0.0],
+        z: [0.0, 0.0, 1.0, 0.0],
+        w: [0.0, 0.0, 0.0, 1.0],
+        near_w: 0.5,
+        clip: false,
+        to_viewer: [0.0, 0.0, 1.0],
+        screen_up: [0.0, 1.0, 0.0],
+        screen_right: [1.0, 0.0, 0.0],
+    };
+    DrawPlan {
+        samples,
+        surface: Some(SurfacePass::new(Faces::Both, vec![MaterialLook::unlit([1.0; 4])])),
+        background: [0.0, 0.0, 0.0, 1.0],
+        ..DrawPlan::new(size_px, positions, triangles, projection)
+    }
+}
