@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 /// `1 face`, `2 faces`.
-pub fn counted(count: impl Copy + Display + TryInto<u64>, one: &str, more: &str) -> String {
+pub fn pluralise(count: impl Copy + Display + TryInto<u64>, one: &str, more: &str) -> String {
     let is_one = count.try_into().is_ok_and(|count| count == 1);
     format!("{count} {}", if is_one { one } else { more })
 }
@@ -14,8 +14,8 @@ mod tests {
 
     #[test]
     fn one_is_no_plural() {
-        let said = [0_usize, 1, 2].map(|n| counted(n, "vertex", "vertices"));
+        let said = [0_usize, 1, 2].map(|n| pluralise(n, "vertex", "vertices"));
         assert_eq!(said, ["0 vertices", "1 vertex", "2 vertices"]);
-        assert_eq!(counted(u64::MAX, "face", "faces"), format!("{} faces", u64::MAX));
+        assert_eq!(pluralise(u64::MAX, "face", "faces"), format!("{} faces", u64::MAX));
     }
 }

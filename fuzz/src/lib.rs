@@ -110,7 +110,7 @@ fn is_short(detail: &str) -> bool {
 fn check(mesh: &Mesh) {
     let (positions, triangles) = (mesh.positions.len(), mesh.triangles.len());
     assert!(
-        (triangles > 0 || !mesh.loose.is_empty())
+        (triangles > 0 || !mesh.lines_and_points.is_empty())
             && mesh.face_normals.len() == triangles
             && mesh.edge_masks.len() == triangles
     );
@@ -120,8 +120,8 @@ fn check(mesh: &Mesh) {
     for [a, b, c] in &mesh.triangles {
         assert!(a != b && b != c && c != a && [a, b, c].iter().all(|v| (**v as usize) < positions));
     }
-    let ends_are_good = mesh.loose.iter().flat_map(|one| one.ends).all(|v| (v as usize) < positions);
-    assert!(ends_are_good && mesh.loose.iter().all(|one| (one.material as usize) < mesh.materials.len()));
+    let ends_are_good = mesh.lines_and_points.iter().flat_map(|one| one.ends).all(|v| (v as usize) < positions);
+    assert!(ends_are_good && mesh.lines_and_points.iter().all(|one| (one.material as usize) < mesh.materials.len()));
     assert!(mesh.triangle_materials.iter().all(|m| (*m as usize) < mesh.materials.len()));
     assert!(mesh.face_normals.iter().flatten().all(|c| c.is_finite()));
     let attributes = [mesh.normals.len(), mesh.uvs.len(), mesh.colors.len()];

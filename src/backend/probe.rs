@@ -7,7 +7,7 @@
 use super::{DrawError, Renderer};
 use crate::image::srgb8_thresholds;
 use crate::limits::Deadline;
-use crate::plan::{DrawPlan, Faces, MaterialLook, Projection, SurfacePass, sample_offsets};
+use crate::plan::{DrawPlan, Faces, Projection, ShadedMaterial, SurfacePass, sample_offsets};
 
 /// Side of the picture: large enough for a triangle that goes the way of large triangles.
 const SIZE_PX: u32 = 24;
@@ -143,7 +143,7 @@ fn plan(samples: u32) -> DrawPlan<'static> {
         screen_up: [0.0, 1.0, 0.0],
         screen_right: [1.0, 0.0, 0.0],
     };
-    let materials = COLORS.iter().map(|&color| MaterialLook::unlit(color)).collect();
+    let materials = COLORS.iter().map(|&color| ShadedMaterial::unlit(color)).collect();
     let surface = SurfacePass { triangle_materials: &MATERIALS, ..SurfacePass::new(Faces::Front, materials) };
     DrawPlan {
         samples,

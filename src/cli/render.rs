@@ -19,7 +19,7 @@ use crate::mesh::UpAxis;
 use crate::pipeline::{self, Job, Output, Stage};
 use crate::request::{self, Rules, Style, Words, words_of};
 use crate::spec::BackendChoice;
-use crate::spec::{Spec, View};
+use crate::spec::{NamedView, Spec};
 use crate::telemetry;
 
 /// Arguments of `render`.
@@ -44,7 +44,7 @@ pub struct RenderArgs {
     /// N or WxH, in pixels
     #[arg(long, value_name = "N|WxH")]
     size: Option<String>,
-    #[arg(long, help = format!("Named direction: {}", one_of::<View>()))]
+    #[arg(long, help = format!("Named direction: {}", one_of::<NamedView>()))]
     view: Option<String>,
     #[arg(long, allow_hyphen_values = true, help = format!("Axis that points up: {}", one_of::<UpAxis>()))]
     up: Option<String>,

@@ -23,7 +23,7 @@ pub struct RawMesh {
     /// Index into `materials`, one a triangle.
     pub triangle_materials: Vec<u32>,
     /// Line segments and points, by vertex; as checked as the triangles.
-    pub loose: Vec<LineOrPoint>,
+    pub lines_and_points: Vec<LineOrPoint>,
     /// The file's materials; may be empty if every index above is 0.
     pub materials: Vec<MaterialSlot>,
     /// The images that the materials refer to, still encoded.

@@ -45,9 +45,9 @@ pub struct Mesh {
     /// Three indices into the attribute arrays a triangle. Empty where there is no attribute at all.
     pub attribute_triangles: Vec<[u32; 3]>,
     /// Line segments and points, their ends indices into `positions`; none is shorter than 24 bits can tell.
-    pub loose: Vec<LineOrPoint>,
+    pub lines_and_points: Vec<LineOrPoint>,
     /// Two indices into the attribute arrays each. Empty where there is no attribute at all.
-    pub loose_attributes: Vec<[u32; 2]>,
+    pub line_point_attributes: Vec<[u32; 2]>,
     /// Set once `loose` has been given an area for one view: where what the file has ends in the arrays.
     pub thickened: Option<Thickened>,
     /// Unit vertex normals of the file; empty where it has none.
@@ -142,11 +142,11 @@ pub struct ImportReport {
     /// them apart.
     pub dropped_collapsed_faces: u64,
     /// Line segments and points dropped: with NaN or infinite ends, or segments without a length.
-    pub dropped_loose: u64,
+    pub dropped_lines_and_points: u64,
     /// Things a user should know; each with a stable code.
     pub warnings: Vec<Warning>,
     /// What the file says of itself.
-    pub facts: FileMetadata,
+    pub metadata: FileMetadata,
 }
 
 /// How much the meshes of a file hold by their own account, each counted once.

@@ -3,13 +3,13 @@
 use super::context::PlanContext;
 use super::edges::Edges;
 use super::skips::{SkipKind, Skips};
-use super::{DrawPlan, HullPass, LayersPass, PlanError, Projection, Thickness, margin};
+use super::{DrawPlan, HullPass, PeelingPass, PlanError, Projection, Thickness, margin};
 use super::{lines, outline, primitives, surface};
 use crate::limits::{Budget, Deadline, LimitExceeded};
 use crate::mesh::{LineOrPoint, Mesh};
 use crate::plan::lines::primitives::POINT_WIDTH;
 use crate::scene::camera::{Border, Camera};
-use crate::scene::material_groups::Parts;
+use crate::scene::material_groups::MaterialGroups;
 use crate::spec::{Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
 
 /// Width of an outline in pixels where the request does not say.
@@ -47,35 +47,35 @@ pub fn build_keeping<'a>(
     deadline: &Deadline,
     keep: &[SkipKind],
 ) -> Result<DrawPlan<'a>, PlanError> {
-    let mut means = PlanContext { budget, deadline };
+    let mut cx = PlanContext { budget, deadline };
     let size_px = [spec.image.width_px, spec.image.height_px];
-    means.budget.spend("materials", mesh.materials.len() as u64, 272)?;
-    let parts = Parts::new(mesh, spec);
-    pay(mesh, size_px, &parts, means.budget)?;
+    cx.budget.spend("materials", mesh.materials.len() as u64, 272)?;
+    let groups = MaterialGroups::new(mesh, spec);
+    pay(mesh, size_px, &groups, cx.budget)?;
     if spec.camera.from_file && mesh.cameras.is_empty() {
         return Err(PlanError::NoCamera);
     }
 
     let mut skips = Skips::new(keep);
-    let camera = Camera::place(&spec.camera, mesh, size_px, border(mesh, &parts, spec));
+    let camera = Camera::place(&spec.camera, mesh, size_px, border(mesh, &groups, spec));
     let contour_px = |outline: &Outline| contour_px(mesh, outline, &camera, size_px);
     let mut edges = Edges::default();
     let lines =
-        lines::passes(mesh, spec, &parts, (contour_px, camera.contains_mesh), &mut edges, &mut skips, &mut means)?;
-    let surface = surface::surface_pass(mesh, spec, &parts, &camera, &mut edges, &mut skips, &mut means)?;
+        lines::passes(mesh, spec, &groups, (contour_px, camera.contains_mesh), &mut edges, &mut skips, &mut cx)?;
+    let surface = surface::surface_pass(mesh, spec, &groups, &camera, &mut edges, &mut skips, &mut cx)?;
     let all_clipped = projection(&camera, size_px, true);
-    let hides = surface.is_some() || parts.has_hull();
+    let hides = surface.is_some() || groups.has_hull();
     let margin_px = margin::margin_px(mesh, (&all_clipped, size_px), (&lines, hides), &mut skips, deadline)?;
-    let no_hull = skips.skip(SkipKind::Hull, !parts.has_hull(), "the look has no hull");
-    let hull = match (no_hull, parts.has_hull()) {
+    let no_hull = skips.skip(SkipKind::Hull, !groups.has_hull(), "the look has no hull");
+    let hull = match (no_hull, groups.has_hull()) {
         (true, _) => None,
         (false, false) => Some(HullPass::default()),
         (false, true) => {
-            Some(outline::hull_pass(mesh, &parts, (&all_clipped, size_px, margin_px), &mut edges, &mut means)?)
+            Some(outline::hull_pass(mesh, &groups, (&all_clipped, size_px, margin_px), &mut edges, &mut cx)?)
         }
     };
-    let layers = layers_pass(&parts, hull.is_some(), &mut skips);
-    let roles = parts.roles(mesh, surface.is_some(), layers.as_ref());
+    let layers = layers_pass(&groups, hull.is_some(), &mut skips);
+    let pass_masks = groups.pass_masks(mesh, surface.is_some(), layers.as_ref());
     let unclipped = skips.skip(
         SkipKind::Clipping,
         camera.contains_mesh,
@@ -88,10 +88,10 @@ pub fn build_keeping<'a>(
         samples: spec.image.samples,
         positions: &mesh.positions,
         triangles: &mesh.triangles,
-        roles,
+        pass_masks,
         projection: projection(&camera, size_px, !unclipped),
         surface,
-        layers,
+        peeling: layers,
         hull,
         lines,
         background: spec.image.background.premultiplied(),
@@ -100,17 +100,17 @@ pub fn build_keeping<'a>(
 }
 
 /// Spends what the plan and both back-ends will allocate.
-fn pay(mesh: &Mesh, size_px: [u32; 2], parts: &Parts<'_>, budget: &mut Budget) -> Result<(), LimitExceeded> {
+fn pay(mesh: &Mesh, size_px: [u32; 2], groups: &MaterialGroups<'_>, budget: &mut Budget) -> Result<(), LimitExceeded> {
     let pixels = u64::from(size_px[0]) * u64::from(size_px[1]);
     budget.spend("the picture", pixels, 4)?;
     budget.spend("vertices on screen", mesh.positions.len() as u64, VERTEX_BYTES)?;
     // And a role.
     budget.spend("lists of triangles", mesh.triangles.len() as u64, LISTED_BYTES + 1)?;
-    if parts.layers_pass().is_some() {
+    if groups.layers_pass().is_some() {
         // What layers need a sample is bounded: they are drawn band by band.
         budget.spend("lists of layers", mesh.triangles.len() as u64, LAYERED_BYTES)?;
     }
-    let is_smooth = parts.looks.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::spec::Shading::Smooth));
+    let is_smooth = groups.looks.iter().any(|l| l.surface.is_some_and(|s| s.shading == crate::spec::Shading::Smooth));
     if is_smooth && mesh.normals.is_empty() {
         // Sums in f64, then the unit normals in f32.
         budget.spend("vertex normals", mesh.positions.len() as u64, 36)?;
@@ -128,11 +128,13 @@ pub fn projection(camera: &Camera, size_px: [u32; 2], clip: bool) -> Projection 
 }
 
 /// What the widest outline and the widest line ask for.
-pub(super) fn border(mesh: &Mesh, parts: &Parts<'_>, spec: &Spec) -> Border {
-    let mut border =
-        Border { px: if mesh.loose.is_empty() { 0.0 } else { 0.5 * primitives::POINT_PX }, ..Border::default() };
-    let has_points = mesh.loose.iter().any(LineOrPoint::is_point);
-    for layers in &parts.looks {
+pub(super) fn border(mesh: &Mesh, groups: &MaterialGroups<'_>, spec: &Spec) -> Border {
+    let mut border = Border {
+        px: if mesh.lines_and_points.is_empty() { 0.0 } else { 0.5 * primitives::POINT_PX },
+        ..Border::default()
+    };
+    let has_points = mesh.lines_and_points.iter().any(LineOrPoint::is_point);
+    for layers in &groups.looks {
         // Points that no fill draws are wider than lines.
         let has_dots = layers.surface.is_none() && has_points;
         let dots = if has_dots { POINT_WIDTH } else { 1.0 };
@@ -177,12 +179,12 @@ fn contour_px(mesh: &Mesh, outline: &Outline, camera: &Camera, size_px: [u32; 2]
     }
 }
 
-fn layers_pass(parts: &Parts<'_>, has_hull: bool, skips: &mut Skips<'_>) -> Option<LayersPass> {
-    let needed = parts.layers_pass();
+fn layers_pass(groups: &MaterialGroups<'_>, has_hull: bool, skips: &mut Skips<'_>) -> Option<PeelingPass> {
+    let needed = groups.layers_pass();
     // Hulls are drawn in another way where there are layers.
     if skips.skip(SkipKind::Layers, needed.is_none(), "nothing shines through") || (needed.is_none() && has_hull) {
         return None;
     }
-    let empty = LayersPass { count_max: 1, behind_surface: false, wires_only: false, fade: 1.0 };
+    let empty = PeelingPass { count_max: 1, behind_surface: false, wires_only: false, fade: 1.0 };
     Some(needed.unwrap_or(empty))
 }

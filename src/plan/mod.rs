@@ -27,7 +27,7 @@ pub use primitives::thicken;
 pub use quality::{Choice, Chosen, choose};
 pub use skips::{Skip, SkipKind};
 pub use surface::{
-    CornerValues, Lamp, Lights, MaterialLook, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, flags, slots,
+    CornerValues, Lamp, Lights, ShadedMaterial, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, flags, slots,
 };
 
 use std::borrow::Cow;
@@ -52,14 +52,14 @@ pub struct DrawPlan<'a> {
     /// Triangles over `positions`. An id in the visibility buffer is an index here, or past them one into
     /// the hull's.
     pub triangles: &'a [[u32; 3]],
-    /// What each triangle takes part in: bits of [`roles`]. Empty where all are [`roles::SURFACE`].
-    pub roles: Cow<'a, [u8]>,
+    /// What each triangle takes part in: bits of [`pass_mask`]. Empty where all are [`pass_mask::SURFACE`].
+    pub pass_masks: Cow<'a, [u8]>,
     /// Unit box to screen.
     pub projection: Projection,
     /// The filled surface; None where a look has none.
     pub surface: Option<SurfacePass<'a>>,
     /// What lies over the surface and lets it shine through; None where nothing does.
-    pub layers: Option<LayersPass>,
+    pub peeling: Option<PeelingPass>,
     /// The outline around the surface; None where a look has none.
     pub hull: Option<HullPass<'a>>,
     /// Lines of exact width, drawn over all else, in this order.
@@ -97,7 +97,7 @@ pub struct Projection {
 }
 
 /// What a triangle takes part in.
-pub mod roles {
+pub mod pass_mask {
     /// Drawn into the visibility buffer, if the plan has a surface.
     pub const SURFACE: u8 = 1;
     /// Drawn into the layers, if the plan has layers.
@@ -121,7 +121,7 @@ pub enum Faces {
 
 /// Transparent surfaces, peeled off sample by sample.
 ///
-/// Layer 0 of a sample is the nearest triangle with [`roles::LAYER`] (or hull triangle, see below), layer k the nearest behind
+/// Layer 0 of a sample is the nearest triangle with [`pass_mask::LAYER`] (or hull triangle, see below), layer k the nearest behind
 /// layer k - 1 by (depth, lowest id first), all of them in front of the visibility buffer's surface unless `behind_surface`. Each is
 /// shaded as the surface is, and they lie over each other and over what the visibility buffer shows, nearest on top.
 ///
@@ -129,12 +129,12 @@ pub enum Faces {
 /// nothing (but counts as a layer) where a nearer layer of the same sample belongs to the same material (modulo 32), because a
 /// glass must not show its own outline on its far side. Where they do, everything filled is opaque, and so may the hull be.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LayersPass {
+pub struct PeelingPass {
     /// Layers that are looked for; what lies behind the last of them is not drawn.
     pub count_max: u32,
     /// Whether layers go on behind the surface: for wires that show through it.
     pub behind_surface: bool,
-    /// Whether layers show wires alone, and the visibility buffer what has [`roles::LAYER`] without its wires.
+    /// Whether layers show wires alone, and the visibility buffer what has [`pass_mask::LAYER`] without its wires.
     pub wires_only: bool,
     /// What remains of wires from the second layer on, 0 to 1.
     pub fade: f32,
@@ -155,10 +155,10 @@ impl<'a> DrawPlan<'a> {
             samples: 1,
             positions,
             triangles,
-            roles: Cow::Borrowed(&[]),
+            pass_masks: Cow::Borrowed(&[]),
             projection,
             surface: None,
-            layers: None,
+            peeling: None,
             hull: None,
             lines: Vec::new(),
             background: [0.0; 4],
@@ -167,20 +167,20 @@ impl<'a> DrawPlan<'a> {
     }
 
     /// The layers, where there are any to look for.
-    pub fn layers(&self) -> Option<&LayersPass> {
+    pub fn peeling(&self) -> Option<&PeelingPass> {
         let has_triangles = self.surface.is_some() || self.hull.is_some();
-        self.layers.as_ref().filter(|layers| layers.count_max > 0 && has_triangles)
+        self.peeling.as_ref().filter(|layers| layers.count_max > 0 && has_triangles)
     }
 
     /// Whether the hull is drawn into the layers and not into the visibility buffer.
-    pub fn has_layered_hull(&self) -> bool {
-        self.hull.is_some() && self.layers().is_some_and(|layers| !layers.behind_surface)
+    pub fn has_peeled_hull(&self) -> bool {
+        self.hull.is_some() && self.peeling().is_some_and(|layers| !layers.behind_surface)
     }
 
     /// What a triangle takes part in.
     #[inline(always)]
-    pub fn role(&self, triangle: usize) -> u8 {
-        self.roles.get(triangle).copied().unwrap_or(roles::SURFACE)
+    pub fn pass_mask(&self, triangle: usize) -> u8 {
+        self.pass_masks.get(triangle).copied().unwrap_or(pass_mask::SURFACE)
     }
 
     /// Whether any sample gets a colour.

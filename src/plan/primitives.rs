@@ -11,8 +11,8 @@ use crate::mesh::primitives::triangles;
 use crate::mesh::{LineOrPoint, Mesh, Thickened};
 use crate::plan::lines::primitives::{is_filled, is_line};
 use crate::scene::camera::Camera;
-use crate::scene::material_groups::{PART_BYTES, Parts};
-use crate::spec::{Projection, Spec};
+use crate::scene::material_groups::{GROUP_BYTES, MaterialGroups};
+use crate::spec::{ProjectionKind, Spec};
 use crate::warning::Warning;
 
 /// Width of a line, pixels.
@@ -38,28 +38,28 @@ pub fn thicken(
     budget: &mut Budget,
     deadline: &Deadline,
 ) -> Result<Option<Warning>, PlanError> {
-    if mesh.loose.is_empty() {
+    if mesh.lines_and_points.is_empty() {
         return Ok(None);
     }
-    budget.spend("materials", mesh.materials.len() as u64, PART_BYTES)?;
-    budget.spend("lines and points", mesh.loose.len() as u64, 1)?;
-    let parts = Parts::new(mesh, spec);
-    let undrawn = mesh.loose.iter().any(|one| !is_filled(&parts, one) && !is_line(&parts, one));
+    budget.spend("materials", mesh.materials.len() as u64, GROUP_BYTES)?;
+    budget.spend("lines and points", mesh.lines_and_points.len() as u64, 1)?;
+    let groups = MaterialGroups::new(mesh, spec);
+    let undrawn = mesh.lines_and_points.iter().any(|one| !is_filled(&groups, one) && !is_line(&groups, one));
     let warning = undrawn.then(|| {
         let detail =
             "lines and points are drawn with a surface, a wire or an outline, and the look has none".to_owned();
         Warning { code: "lines_not_drawn", detail }
     });
-    let own: Vec<bool> = mesh.loose.iter().map(|one| is_filled(&parts, one)).collect();
+    let own: Vec<bool> = mesh.lines_and_points.iter().map(|one| is_filled(&groups, one)).collect();
     if !own.contains(&true) {
         return Ok(warning);
     }
-    let filled = || mesh.loose.iter().zip(&own).filter(|(_, own)| **own).map(|(one, _)| one);
+    let filled = || mesh.lines_and_points.iter().zip(&own).filter(|(_, own)| **own).map(|(one, _)| one);
     budget.spend("lines and points", triangles(filled()), TRIANGLE_BYTES)?;
     let room = [triangles(filled()) as usize, filled().map(|one| if one.is_point() { 6 } else { 4 }).sum()];
     reserve(mesh, room);
     let size_px = [spec.image.width_px, spec.image.height_px];
-    let camera = Camera::place(&spec.camera, mesh, size_px, border(mesh, &parts, spec));
+    let camera = Camera::place(&spec.camera, mesh, size_px, border(mesh, &groups, spec));
     mesh.thickened = Some(Thickened { positions: mesh.positions.len(), triangles: mesh.triangles.len() });
     let mut brush = Brush { camera, px: 2.0 * camera.half_size.y / f64::from(size_px[1]), mesh };
     for (i, is_own) in own.into_iter().enumerate() {
@@ -80,7 +80,7 @@ fn reserve(mesh: &mut Mesh, [added, corners]: [usize; 2]) {
     mesh.face_normals.reserve_exact(added);
     mesh.edge_masks.reserve_exact(added);
     mesh.triangle_materials.reserve_exact(added);
-    if !mesh.loose_attributes.is_empty() {
+    if !mesh.line_point_attributes.is_empty() {
         mesh.attribute_triangles.reserve_exact(added);
     }
 }
@@ -103,8 +103,8 @@ struct End {
 
 impl Brush<'_> {
     fn draw(&mut self, i: usize) {
-        let one = self.mesh.loose[i];
-        let attributes = self.mesh.loose_attributes.get(i).copied().unwrap_or_default();
+        let one = self.mesh.lines_and_points[i];
+        let attributes = self.mesh.line_point_attributes.get(i).copied().unwrap_or_default();
         self.face_viewer(attributes);
         let [a, b] = [0, 1].map(|k| self.camera_space(one.ends[k]));
         if one.is_point() {
@@ -132,7 +132,7 @@ impl Brush<'_> {
     }
 
     fn w(&self, at: DVec3) -> f64 {
-        if self.camera.kind == Projection::Perspective { self.camera.distance - at.z } else { 1.0 }
+        if self.camera.kind == ProjectionKind::Perspective { self.camera.distance - at.z } else { 1.0 }
     }
 
     fn end(&self, at: DVec3, attribute: u32) -> End {
@@ -193,7 +193,7 @@ impl Brush<'_> {
         mesh.face_normals.push(normal.unwrap_or(self.camera.axes[2].as_vec3().to_array()));
         mesh.edge_masks.push(0);
         mesh.triangle_materials.push(material);
-        if !mesh.loose_attributes.is_empty() {
+        if !mesh.line_point_attributes.is_empty() {
             mesh.attribute_triangles.push(corners.map(|(_, attribute)| attribute));
         }
     }

@@ -62,7 +62,7 @@ pub struct Report {
     dropped_nonfinite_faces: u64,
     dropped_degenerate_faces: u64,
     dropped_collapsed_faces: u64,
-    dropped_loose: u64,
+    dropped_lines_and_points: u64,
     warnings: Vec<WarningReport>,
 }
 
@@ -138,11 +138,11 @@ impl Report {
             cameras,
             extensions_used,
             extensions_required,
-        } = import.facts.clone();
+        } = import.metadata.clone();
         let arities = import.polygons_by_arity.iter().enumerate().filter(|&(_, &count)| count > 0);
         let warnings = import.warnings.iter();
         let measures = Measures::of(mesh);
-        let points = mesh.loose.iter().filter(|one| one.is_point()).count() as u64;
+        let points = mesh.lines_and_points.iter().filter(|one| one.is_point()).count() as u64;
         Self {
             format: import.format.name(),
             generator,
@@ -158,7 +158,7 @@ impl Report {
             triangles: mesh.own_triangles().len() as u64,
             polygons: import.polygons_by_arity.iter().sum(),
             polygons_by_arity: arities.map(|(corners, &count)| Arity { corners, count }).collect(),
-            lines: mesh.loose.len() as u64 - points,
+            lines: mesh.lines_and_points.len() as u64 - points,
             points,
             materials: mesh.materials.iter().map(|m| m.name.clone()).collect(),
             textures: mesh.images.iter().map(texture).collect(),
@@ -178,7 +178,7 @@ impl Report {
             dropped_nonfinite_faces: import.dropped_nonfinite_faces,
             dropped_degenerate_faces: import.dropped_degenerate_faces,
             dropped_collapsed_faces: import.dropped_collapsed_faces,
-            dropped_loose: import.dropped_loose,
+            dropped_lines_and_points: import.dropped_lines_and_points,
             warnings: warnings.map(|w| WarningReport { code: w.code, detail: w.detail.clone() }).collect(),
         }
     }

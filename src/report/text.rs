@@ -1,7 +1,7 @@
 //! The report for a person: a name and a value a line.
 
 use super::{Arity, CameraReport, Report, TextureReport};
-use crate::pluralise::counted;
+use crate::pluralise::pluralise;
 use std::fmt::Write as _;
 
 /// Most entries of a list that are written out.
@@ -55,13 +55,13 @@ fn scene(report: &Report) -> Option<String> {
         (report.skins.filter(|n| *n > 0), "skin", "skins"),
         (report.cameras.filter(|n| *n > 0), "camera", "cameras"),
     ];
-    said(counts.into_iter().filter_map(|(count, one, more)| Some(counted(count?, one, more))))
+    said(counts.into_iter().filter_map(|(count, one, more)| Some(pluralise(count?, one, more))))
 }
 
 /// What lies beside the faces.
 fn beside(report: &Report) -> Option<String> {
     let counts = [(report.lines, "line", "lines"), (report.points, "point", "points")];
-    said(counts.into_iter().filter(|(count, ..)| *count > 0).map(|(count, one, more)| counted(count, one, more)))
+    said(counts.into_iter().filter(|(count, ..)| *count > 0).map(|(count, one, more)| pluralise(count, one, more)))
 }
 
 fn texture(texture: &TextureReport) -> String {
@@ -116,9 +116,9 @@ fn dropped(report: &Report) -> Option<String> {
         (report.dropped_collapsed_faces, "too small beside the whole mesh"),
     ];
     let met = reasons.into_iter().filter(|(count, _)| *count > 0);
-    let faces = met.map(|(count, why)| format!("{} {why}", counted(count, "face", "faces")));
-    let loose = Some(report.dropped_loose).filter(|count| *count > 0);
-    said(faces.chain(loose.map(|count| counted(count, "line or point", "lines and points"))))
+    let faces = met.map(|(count, why)| format!("{} {why}", pluralise(count, "face", "faces")));
+    let loose = Some(report.dropped_lines_and_points).filter(|count| *count > 0);
+    said(faces.chain(loose.map(|count| pluralise(count, "line or point", "lines and points"))))
 }
 
 fn said(parts: impl Iterator<Item = String>) -> Option<String> {

@@ -1,7 +1,7 @@
 //! The report's part on how triangles hang together, after welding.
 
 use crate::mesh::topology::Topology;
-use crate::pluralise::counted;
+use crate::pluralise::pluralise;
 use serde::Serialize;
 
 /// As [`Topology`] has it, and what was dropped before.
@@ -85,8 +85,8 @@ impl TopologyReport {
 
     /// In words.
     pub fn text(&self) -> String {
-        let mut said = vec![counted(self.components, "part", "parts")];
-        let edges = counted(self.edges, "edge", "edges");
+        let mut said = vec![pluralise(self.components, "part", "parts")];
+        let edges = pluralise(self.edges, "edge", "edges");
         if self.is_watertight {
             said.extend(["watertight".to_owned(), edges]);
         } else {
@@ -109,7 +109,7 @@ impl TopologyReport {
             (self.duplicate_faces, "duplicate face", "duplicate faces"),
         ];
         let met = faults.into_iter().filter(|(count, ..)| *count > 0);
-        let mut said: Vec<String> = met.map(|(count, one, more)| counted(count, one, more)).collect();
+        let mut said: Vec<String> = met.map(|(count, one, more)| pluralise(count, one, more)).collect();
         if !self.is_orientable {
             said.push("a surface with one side only".to_owned());
         }

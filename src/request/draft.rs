@@ -6,8 +6,8 @@ use crate::request::table::words::{Style, Words, word_for};
 use crate::spec::BackendChoice;
 use crate::spec::color::Rgba;
 use crate::spec::{
-    CameraSpec, ImageSpec, Layers, Light, LightPreset, Open, OutlineMethod, Projection, QualityTarget, Spec, Topology,
-    View, WireMethod,
+    CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, Open, OutlineMethod, ProjectionKind, QualityTarget,
+    Spec, Topology, WireMethod,
 };
 
 /// Different exact wires and contours in one picture.
@@ -177,10 +177,10 @@ fn default_topology() -> Topology {
 }
 
 const CAMERA: CameraSpec = CameraSpec {
-    view: View::Iso,
+    view: NamedView::Iso,
     azimuth_deg: None,
     elevation_deg: None,
-    projection: Projection::Perspective,
+    projection: ProjectionKind::Perspective,
     fov_deg: 35.0,
     height: None,
     up: None,

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 
 use crate::mesh::material::{FileCamera, FileLens};
 use crate::mesh::{Mesh, UpAxis};
-use crate::spec::{CameraSpec, Projection as Kind, View};
+use crate::spec::{CameraSpec, NamedView, ProjectionKind as Kind};
 
 /// A placed camera. Lengths in units of the mesh's box.
 #[derive(Clone, Copy, Debug)]
@@ -211,13 +211,13 @@ fn file_axes(mesh: &Mesh, camera: &FileCamera) -> ([DVec3; 3], Explicit) {
 
 fn named_axes(spec: &CameraSpec, up: UpAxis) -> [DVec3; 3] {
     let (azimuth, elevation) = match spec.view {
-        View::Iso => (45.0, 30.0),
-        View::Front => (0.0, 0.0),
-        View::Back => (180.0, 0.0),
-        View::Left => (-90.0, 0.0),
-        View::Right => (90.0, 0.0),
-        View::Top => (0.0, 90.0),
-        View::Bottom => (0.0, -90.0),
+        NamedView::Iso => (45.0, 30.0),
+        NamedView::Front => (0.0, 0.0),
+        NamedView::Back => (180.0, 0.0),
+        NamedView::Left => (-90.0, 0.0),
+        NamedView::Right => (90.0, 0.0),
+        NamedView::Top => (0.0, 90.0),
+        NamedView::Bottom => (0.0, -90.0),
     };
     let (sin_a, cos_a) = sin_cos_deg(spec.azimuth_deg.unwrap_or(azimuth));
     let (sin_e, cos_e) = sin_cos_deg(spec.elevation_deg.unwrap_or(elevation));

@@ -6,7 +6,7 @@ use rapidhash::RapidHashMap;
 
 use crate::mesh::Mesh;
 use crate::mesh::material::AlphaMode;
-use crate::plan::{LayersPass, roles};
+use crate::plan::{PeelingPass, pass_mask};
 use crate::spec::{Cull, DebugView, Hidden, Layers, OutlineMethod, Spec, Wire, WireMethod};
 
 /// Layers that are peeled off before what is left counts as unseen.
@@ -15,11 +15,11 @@ const LAYERS_MAX: u32 = 16;
 /// What remains of hidden lines that fade.
 pub const FADE: f32 = 0.25;
 
-/// Bytes that each material takes among [`Parts`].
-pub const PART_BYTES: u64 = size_of::<&Layers>() as u64 + 4 + 1;
+/// Bytes that each material takes among [`MaterialGroups`].
+pub const GROUP_BYTES: u64 = size_of::<&Layers>() as u64 + 4 + 1;
 
 /// The parts of a mesh, by material index.
-pub struct Parts<'a> {
+pub struct MaterialGroups<'a> {
     /// What is drawn of each.
     pub layers: Vec<&'a Layers>,
     /// Index of each part's layers in `looks`.
@@ -42,7 +42,7 @@ pub enum Fill {
     Transparent,
 }
 
-impl<'a> Parts<'a> {
+impl<'a> MaterialGroups<'a> {
     /// Finds each material's look by its name.
     pub fn new(mesh: &Mesh, spec: &'a Spec) -> Self {
         let named: RapidHashMap<&str, u32> = spec.materials.iter().map(|(name, _)| name.as_str()).zip(1..).collect();
@@ -102,7 +102,7 @@ impl<'a> Parts<'a> {
     }
 
     /// The layers, if any part needs them.
-    pub fn layers_pass(&self) -> Option<LayersPass> {
+    pub fn layers_pass(&self) -> Option<PeelingPass> {
         let transparent = self.fills.contains(&Fill::Transparent);
         let wires = || self.layers.iter().zip(&self.fills).filter_map(|(l, fill)| Some((barycentric_wire(l)?, *fill)));
         let bare = wires().any(|(_, fill)| fill == Fill::None);
@@ -115,7 +115,7 @@ impl<'a> Parts<'a> {
         let wires_only = through && !transparent;
         let fades = wires().any(|(wire, _)| wire == Hidden::Fade);
         let hides = !transparent && !wires_only && wires().all(|(wire, _)| wire == Hidden::Hide);
-        Some(LayersPass {
+        Some(PeelingPass {
             count_max: if hides { 1 } else { LAYERS_MAX },
             behind_surface: wires_only,
             wires_only,
@@ -123,25 +123,25 @@ impl<'a> Parts<'a> {
         })
     }
 
-    /// The bits of [`roles`] of each part, given the plan's layers; `faces` is what the surface pass draws anyway.
-    fn role(&self, material: usize, pass: Option<&LayersPass>, common: Cull) -> u8 {
+    /// The bits of [`pass_mask`] of each part, given the plan's layers; `faces` is what the surface pass draws anyway.
+    fn pass_mask(&self, material: usize, pass: Option<&PeelingPass>, common: Cull) -> u8 {
         let layers = self.layers[material];
         let wire = barycentric_wire(layers);
         let mut role = match self.fill(material) {
-            Fill::Opaque => roles::SURFACE,
-            Fill::Transparent => roles::LAYER,
-            Fill::None if wire.is_some() => roles::LAYER,
-            Fill::None if self.needs_occluder() => roles::SURFACE,
+            Fill::Opaque => pass_mask::SURFACE,
+            Fill::Transparent => pass_mask::LAYER,
+            Fill::None if wire.is_some() => pass_mask::LAYER,
+            Fill::None if self.needs_occluder() => pass_mask::SURFACE,
             Fill::None => 0,
         };
         if pass.is_some_and(|pass| pass.wires_only) && wire.is_some_and(|hidden| hidden != Hidden::Hide) {
-            role |= roles::LAYER;
+            role |= pass_mask::LAYER;
         }
         match layers.surface.map_or(Cull::None, |s| s.cull) {
             cull if cull == common => {}
             Cull::None => {}
-            Cull::Back => role |= roles::FRONT_ONLY,
-            Cull::Front => role |= roles::BACK_ONLY,
+            Cull::Back => role |= pass_mask::FRONT_ONLY,
+            Cull::Front => role |= pass_mask::BACK_ONLY,
         }
         role
     }
@@ -153,21 +153,22 @@ impl<'a> Parts<'a> {
         if all.all(|cull| cull == first) { first } else { Cull::None }
     }
 
-    /// [`DrawPlan::roles`](crate::plan::DrawPlan::roles) of a plan that has these passes.
-    pub fn roles(&self, mesh: &Mesh, surface: bool, pass: Option<&LayersPass>) -> Cow<'static, [u8]> {
+    /// [`DrawPlan::pass_masks`](crate::plan::DrawPlan::pass_masks) of a plan that has these passes.
+    pub fn pass_masks(&self, mesh: &Mesh, surface: bool, pass: Option<&PeelingPass>) -> Cow<'static, [u8]> {
         let common = self.common_cull();
-        let by_part: Vec<u8> = (0..self.layers.len()).map(|m| self.role(m, pass, common)).collect();
-        let usual =
-            |role: u8| (role & roles::SURFACE != 0 || !surface) && role & (roles::FRONT_ONLY | roles::BACK_ONLY) == 0;
+        let by_part: Vec<u8> = (0..self.layers.len()).map(|m| self.pass_mask(m, pass, common)).collect();
+        let usual = |role: u8| {
+            (role & pass_mask::SURFACE != 0 || !surface) && role & (pass_mask::FRONT_ONLY | pass_mask::BACK_ONLY) == 0
+        };
         if pass.is_none() && by_part.iter().all(|&role| usual(role)) {
             return Cow::Borrowed(&[]);
         }
         let own = mesh.own_triangles().len();
-        let role = |m: u32| by_part.get(m as usize).copied().unwrap_or(roles::SURFACE);
+        let role = |m: u32| by_part.get(m as usize).copied().unwrap_or(pass_mask::SURFACE);
         let mut all: Vec<u8> = mesh.triangle_materials.iter().map(|&m| role(m)).collect();
         for role in all.iter_mut().skip(own) {
             // Lines and points face the viewer.
-            *role &= roles::SURFACE | roles::LAYER;
+            *role &= pass_mask::SURFACE | pass_mask::LAYER;
         }
         all.into()
     }

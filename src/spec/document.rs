@@ -32,7 +32,7 @@ pub struct Spec {
 
 /// Named directions to look from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum View {
+pub enum NamedView {
     /// From the front right, above: azimuth 45 degrees, elevation 30.
     Iso,
     /// Azimuth 0.
@@ -51,7 +51,7 @@ pub enum View {
 
 /// How depth becomes size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Projection {
+pub enum ProjectionKind {
     /// Farther is smaller.
     Perspective,
     /// It is not.
@@ -62,13 +62,13 @@ pub enum Projection {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraSpec {
     /// A named direction; azimuth and elevation override its angles.
-    pub view: View,
+    pub view: NamedView,
     /// Angle around the up axis, degrees; 0 is the front, 90 the right.
     pub azimuth_deg: Option<f64>,
     /// Angle above the horizon, degrees, -90 to 90.
     pub elevation_deg: Option<f64>,
     /// Perspective or orthographic.
-    pub projection: Projection,
+    pub projection: ProjectionKind,
     /// Vertical field of view, degrees, 0.01 to 179.
     pub fov_deg: f64,
     /// Orthographic view height in file units; None fits.

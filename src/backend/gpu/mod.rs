@@ -58,7 +58,7 @@ impl GpuRenderer {
 
     /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare back-ends sample for sample.
     pub fn draw_layer(&mut self, plan: &DrawPlan<'_>, layer: u32, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
-        match plan.layers() {
+        match plan.peeling() {
             Some(_) => self.words(plan, Goal::Layer(layer), Slot::Layer, deadline),
             None => Ok(vec![0; plan.width_px as usize * plan.samples as usize * plan.height_px as usize]),
         }
@@ -172,10 +172,10 @@ fn upload_geometry(
     if !has_visibility(plan) {
         return Ok(());
     }
-    buffers.upload(gpu, Slot::Roles, &plan.roles)?;
+    buffers.upload(gpu, Slot::Roles, &plan.pass_masks)?;
     buffers.reserve(gpu, Slot::Samples, schedule.banding.seen_samples(plan) * SAMPLE_BYTES)?;
     let samples = samples(plan, schedule.banding.rows);
-    if plan.layers().is_some() {
+    if plan.peeling().is_some() {
         buffers.reserve(gpu, Slot::Layer, samples * SAMPLE_BYTES)?;
         buffers.reserve(gpu, Slot::Layered, samples * LAYERED_BYTES)?;
         buffers.reserve(gpu, Slot::Rounds, u64::from(schedule.layers) * 4)?;

@@ -122,7 +122,7 @@ impl Frame {
             frame.hull_color = hull.color(0);
             frame.hull_color_count = hull.colors.len() as u32;
         }
-        frame.layer_fade = plan.layers().map_or(1.0, |layers| layers.fade);
+        frame.layer_fade = plan.peeling().map_or(1.0, |layers| layers.fade);
         frame
     }
 

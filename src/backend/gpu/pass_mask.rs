@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::plan::{DrawPlan, Faces, roles};
+use crate::plan::{DrawPlan, Faces, pass_mask};
 
 /// Triangles that are drawn for the same reason.
 #[derive(Clone, Debug)]
@@ -20,13 +20,13 @@ pub struct Pass {
 impl Pass {
     /// What goes into the visibility buffer.
     pub fn of_surface(plan: &DrawPlan<'_>) -> [Option<Self>; 2] {
-        [Self::surface(plan, roles::SURFACE), Self::hull(plan).filter(|_| !plan.has_layered_hull())]
+        [Self::surface(plan, pass_mask::SURFACE), Self::hull(plan).filter(|_| !plan.has_peeled_hull())]
     }
 
     /// What goes into the layers. Without roles, no surface does.
     pub fn of_layers(plan: &DrawPlan<'_>) -> [Option<Self>; 2] {
-        let surface = Self::surface(plan, roles::LAYER).filter(|_| !plan.roles.is_empty());
-        [surface, Self::hull(plan).filter(|_| plan.has_layered_hull())]
+        let surface = Self::surface(plan, pass_mask::LAYER).filter(|_| !plan.pass_masks.is_empty());
+        [surface, Self::hull(plan).filter(|_| plan.has_peeled_hull())]
     }
 
     fn surface(plan: &DrawPlan<'_>, role: u8) -> Option<Self> {

@@ -120,7 +120,7 @@ impl Part {
             let material = mesh.face_material.get(number).and_then(|&slot| material(mesh, node, slot));
             let material = used.slot(material);
             if let [a] | [a, _] = self.corners[..] {
-                raw.loose.push(LineOrPoint { ends: [a, self.corners[count - 1]], material });
+                raw.lines_and_points.push(LineOrPoint { ends: [a, self.corners[count - 1]], material });
                 continue;
             }
             if place.is_mirroring {
@@ -148,7 +148,7 @@ fn curves(
             let place = Place::of(&node.geometry_to_world);
             let base = raw.positions.len();
             let (points, indices) = (curve.control_points.len(), curve.point_indices.len());
-            let lines = (raw.loose.len() + indices) as u64;
+            let lines = (raw.lines_and_points.len() + indices) as u64;
             cx.check_triangles((raw.triangles.len() as u64).saturating_add(lines * SEGMENT_TRIANGLES))?;
             cx.budget.spend("the lines of the FBX file", points as u64, 2 * VERTEX_BYTES)?;
             cx.budget.spend("the lines of the FBX file", indices as u64, 2 * size_of::<LineOrPoint>() as u64)?;
@@ -161,7 +161,7 @@ fn curves(
                 let Some(own) = segment.and_then(|end| curve.point_indices.get(begin..end)) else { continue };
                 let is_there = |pair: &&[u32]| pair[0] != pair[1] && pair.iter().all(|&v| (v as usize) < points);
                 let ends = own.windows(2).filter(is_there).map(|pair| [pair[0], pair[1]].map(|v| v + base as u32));
-                raw.loose.extend(ends.map(|ends| LineOrPoint { ends, material }));
+                raw.lines_and_points.extend(ends.map(|ends| LineOrPoint { ends, material }));
             }
         }
     }

@@ -47,7 +47,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     limits::check("the number of scene nodes", scene.nodes.len() as u64, cx.limits.nodes, "--limit-nodes")?;
     let mut raw = RawMesh::default();
     raw.report.format = Format::Fbx;
-    raw.report.facts = FileMetadata {
+    raw.report.metadata = FileMetadata {
         generator: metadata::tidy(scene.metadata.creator.as_bytes()),
         nodes: Some(scene.nodes.len() as u64),
         meshes: Some(scene.meshes.len() as u64),

@@ -2,7 +2,7 @@
 //! chunks of unknown types, which the specification wants ignored.
 
 use crate::import::{MeshError, MeshFault};
-use crate::pluralise::counted;
+use crate::pluralise::pluralise;
 use crate::warning::Warning;
 
 /// What a GLB file holds.
@@ -24,7 +24,7 @@ pub fn split(bytes: &[u8]) -> Result<Glb<'_>, MeshError> {
     let (Some(version), Some(length)) = (u32_at(bytes, 4), u32_at(bytes, 8)) else {
         return Err(MeshError::broken(format!(
             "the GLB file is {} long, and its header alone is {HEADER_BYTES}",
-            counted(bytes.len(), "byte", "bytes")
+            pluralise(bytes.len(), "byte", "bytes")
         )));
     };
     if !bytes.starts_with(b"glTF") {
@@ -40,7 +40,7 @@ pub fn split(bytes: &[u8]) -> Result<Glb<'_>, MeshError> {
     let bytes = match usize::try_from(length).ok().and_then(|n| bytes.get(..n).map(|b| (b, bytes.len() - n))) {
         Some((inside, 0)) => inside,
         Some((inside, more)) => {
-            let detail = format!("ignored: {} after the end of the GLB container", counted(more, "byte", "bytes"));
+            let detail = format!("ignored: {} after the end of the GLB container", pluralise(more, "byte", "bytes"));
             warnings.push(Warning { code: "trailing_bytes", detail });
             inside
         }

@@ -71,7 +71,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     if uses_default {
         raw.materials.push(MaterialSlot::default());
     }
-    raw.report.facts = document::metadata::metadata(json);
+    raw.report.metadata = document::metadata::metadata(json);
     Ok(raw)
 }
 

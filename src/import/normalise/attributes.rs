@@ -72,7 +72,7 @@ fn repair_normals(raw: &mut RawMesh, mesh: &Mesh) -> Vec<[f32; 3]> {
             }
         }
     }
-    used_good += mesh.loose_attributes.iter().flatten().filter(|&&v| !is_bad[v as usize]).count() as u64;
+    used_good += mesh.line_point_attributes.iter().flatten().filter(|&&v| !is_bad[v as usize]).count() as u64;
     if used_good == 0 {
         return Vec::new();
     }

@@ -13,39 +13,39 @@ use super::raw::RawMesh;
 use super::{MeshError, MeshFault};
 use crate::import::context::Context;
 use crate::mesh::{ImportReport, LineOrPoint, MaterialSlot, Mesh, ToFile, primitives};
-use crate::pluralise::counted;
+use crate::pluralise::pluralise;
 
 /// Brings an imported mesh into its final form.
 pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshError> {
-    cx.check_triangles(raw.triangles.len() as u64 + primitives::triangles(&raw.loose))?;
+    cx.check_triangles(raw.triangles.len() as u64 + primitives::triangles(&raw.lines_and_points))?;
     cx.budget.spend("the triangles", raw.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
-    cx.budget.spend("lines and points", raw.loose.len() as u64, BYTES_PER_LOOSE)?;
+    cx.budget.spend("lines and points", raw.lines_and_points.len() as u64, BYTES_PER_LOOSE)?;
     cx.budget.spend("the welded vertices", raw.positions.len() as u64, BYTES_PER_VERTEX)?;
 
     raw.report.warnings.extend(precision::warning(&raw));
     cx.deadline.check()?;
-    raw.report.dropped_loose = drop_bad(&mut raw);
+    raw.report.dropped_lines_and_points = drop_bad(&mut raw);
     let file_exponent = scale_down(&mut raw);
     let faces = pick_faces(&mut raw);
     cx.deadline.check()?;
-    if faces.is_empty() && raw.loose.is_empty() {
+    if faces.is_empty() && raw.lines_and_points.is_empty() {
         return Err(empty(&raw.report));
     }
     let unit_box = UnitBox::around(&raw, &faces);
     let mut mesh = weld(&mut raw, &faces, &unit_box);
     cx.deadline.check()?;
-    if mesh.triangles.is_empty() && mesh.loose.is_empty() {
+    if mesh.triangles.is_empty() && mesh.lines_and_points.is_empty() {
         return Err(empty(&raw.report));
     }
     mesh.bounds = bounds(&mesh.positions);
     mesh.to_file = unit_box.to_file(file_exponent);
     let Attributes { normals, uvs, colors } = attributes::repair(&mut raw, &mesh);
     if normals.is_empty() && uvs.is_empty() && colors.is_empty() {
-        (mesh.attribute_triangles, mesh.loose_attributes) = (Vec::new(), Vec::new());
+        (mesh.attribute_triangles, mesh.line_point_attributes) = (Vec::new(), Vec::new());
     }
     (mesh.normals, mesh.uvs, mesh.colors) = (normals, uvs, colors);
     mesh.materials = raw.materials;
-    let loose = mesh.loose.iter().map(|one| one.material);
+    let loose = mesh.lines_and_points.iter().map(|one| one.material);
     let slots = mesh.triangle_materials.iter().copied().chain(loose).max().unwrap_or(0) as usize + 1;
     while mesh.materials.len() < slots {
         mesh.materials.push(MaterialSlot::default());
@@ -79,7 +79,7 @@ fn scale_down(raw: &mut RawMesh) -> i32 {
             largest = corners.iter().fold(largest, |m, p| m.max(max_abs(p)));
         }
     }
-    for v in raw.loose.iter().flat_map(|one| one.ends) {
+    for v in raw.lines_and_points.iter().flat_map(|one| one.ends) {
         largest = largest.max(max_abs(&raw.positions[v as usize]));
     }
     if largest == 0.0 {
@@ -153,7 +153,7 @@ impl UnitBox {
     fn around(raw: &RawMesh, faces: &[Face]) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         let of_faces = faces.iter().flat_map(|face| raw.triangles[face.triangle as usize]);
-        for v in of_faces.chain(raw.loose.iter().flat_map(|one| one.ends)) {
+        for v in of_faces.chain(raw.lines_and_points.iter().flat_map(|one| one.ends)) {
             let p = raw.positions[v as usize];
             for k in 0..3 {
                 low[k] = low[k].min(p[k]);
@@ -213,19 +213,19 @@ fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
             mesh.attribute_triangles.push(raw.triangles[i]);
         }
     }
-    for one in &raw.loose {
+    for one in &raw.lines_and_points {
         let ends = one.ends.map(&mut welded);
         if ends[0] == ends[1] && !one.is_point() {
-            raw.report.dropped_loose += 1;
+            raw.report.dropped_lines_and_points += 1;
             continue;
         }
-        mesh.loose.push(LineOrPoint { ends, ..*one });
+        mesh.lines_and_points.push(LineOrPoint { ends, ..*one });
         if has_attributes {
-            mesh.loose_attributes.push(one.ends);
+            mesh.line_point_attributes.push(one.ends);
         }
     }
     mesh.positions = set.positions;
-    if raw.report.dropped_collapsed_faces + raw.report.dropped_loose > 0 {
+    if raw.report.dropped_collapsed_faces + raw.report.dropped_lines_and_points > 0 {
         drop_unused(&mut mesh);
     }
     mesh
@@ -243,7 +243,7 @@ fn drop_unused(mesh: &mut Mesh) {
     const UNSEEN: u32 = u32::MAX;
     let mut new_of_old = vec![UNSEEN; mesh.positions.len()];
     let mut positions = Vec::with_capacity(mesh.positions.len());
-    let of_loose = mesh.loose.iter_mut().flat_map(|one| &mut one.ends);
+    let of_loose = mesh.lines_and_points.iter_mut().flat_map(|one| &mut one.ends);
     for v in mesh.triangles.iter_mut().flatten().chain(of_loose) {
         let new = &mut new_of_old[*v as usize];
         if *new == UNSEEN {
@@ -265,15 +265,15 @@ fn empty(report: &ImportReport) -> MeshError {
     let faces: u64 = report.polygons_by_arity.iter().sum();
     let (nonfinite, degenerate) = (report.dropped_nonfinite_faces, report.dropped_degenerate_faces);
     let collapsed = report.dropped_collapsed_faces;
-    let (vertices, faces) = (counted(report.file_vertices, "vertex", "vertices"), counted(faces, "face", "faces"));
+    let (vertices, faces) = (pluralise(report.file_vertices, "vertex", "vertices"), pluralise(faces, "face", "faces"));
     let mut detail = format!("the {} file has nothing to draw: {vertices} and {faces}", report.format);
     if nonfinite + degenerate + collapsed > 0 {
-        let has = |count| counted(count, "has", "have");
+        let has = |count| pluralise(count, "has", "have");
         let (nonfinite, degenerate) = (has(nonfinite), has(degenerate));
         detail += &format!(", of whose triangles {nonfinite} a NaN or infinite corner and {degenerate} no area");
     }
     if collapsed > 0 {
-        let are = counted(collapsed, "is", "are");
+        let are = pluralise(collapsed, "is", "are");
         detail += &format!("; {are} thinner than 24 bits can tell beside the size of the whole");
     }
     for warning in &report.warnings {
@@ -285,11 +285,11 @@ fn empty(report: &ImportReport) -> MeshError {
 
 /// Drops lines and points with an end that cannot be computed with, and segments whose ends are in one place; returns how many.
 fn drop_bad(raw: &mut RawMesh) -> u64 {
-    let before = raw.loose.len();
+    let before = raw.lines_and_points.len();
     let positions = &raw.positions;
-    raw.loose.retain(|one| {
+    raw.lines_and_points.retain(|one| {
         let [a, b] = one.ends.map(|v| &positions[v as usize]);
         is_usable(a) && is_usable(b) && (one.is_point() || a != b)
     });
-    (before - raw.loose.len()) as u64
+    (before - raw.lines_and_points.len()) as u64
 }

@@ -36,7 +36,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     raw.report.format = Format::Obj;
     raw.report.file_vertices = summary.vertices;
     raw.report.warnings = summary.left_out.warnings();
-    raw.report.facts = FileMetadata::by(metadata::first_comment(&text, b"#", |_| false));
+    raw.report.metadata = FileMetadata::by(metadata::first_comment(&text, b"#", |_| false));
     let mut triangulator = Triangulator::default();
     for model in models {
         cx.deadline.check()?;
@@ -52,12 +52,12 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     linearise(&mut raw.colors);
     let slots = materials::read(&summary.materials, &summary.libraries, &mut raw, cx)?;
     // Slot 0 is for faces before the first `usemtl`; without such faces it would only be confusing.
-    let loose_unnamed = raw.loose.iter().any(|one| one.material == 0);
+    let loose_unnamed = raw.lines_and_points.iter().any(|one| one.material == 0);
     let uses_unnamed = raw.triangle_materials.contains(&0) || loose_unnamed || slots.is_empty();
     raw.materials = std::iter::once(MaterialSlot::default()).chain(slots).skip(usize::from(!uses_unnamed)).collect();
     if !uses_unnamed {
         raw.triangle_materials.iter_mut().for_each(|m| *m -= 1);
-        raw.loose.iter_mut().for_each(|one| one.material -= 1);
+        raw.lines_and_points.iter_mut().for_each(|one| one.material -= 1);
     }
     Ok(raw)
 }
@@ -99,7 +99,7 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh, triangulator: &mut Triangulator)
         corners.clear();
         corners.extend(indices.iter().map(|i| base + i));
         if let [a] | [a, _] = corners[..] {
-            raw.loose.push(LineOrPoint { ends: [a, corners[arity - 1]], material });
+            raw.lines_and_points.push(LineOrPoint { ends: [a, corners[arity - 1]], material });
             continue;
         }
         raw.report.polygons_by_arity[arity.min(12)] += 1;

@@ -57,8 +57,8 @@ impl Faces {
             }
             match corners[..] {
                 [] => self.short_faces += 1,
-                [vertex] => raw.loose.push(LineOrPoint::point(vertex, 0)),
-                [a, b] if a != b => raw.loose.push(LineOrPoint { ends: [a, b], material: 0 }),
+                [vertex] => raw.lines_and_points.push(LineOrPoint::point(vertex, 0)),
+                [a, b] if a != b => raw.lines_and_points.push(LineOrPoint { ends: [a, b], material: 0 }),
                 [_, _] => self.short_faces += 1,
                 _ => {}
             }
@@ -91,7 +91,7 @@ impl Faces {
     pub fn finish(self, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<u64, MeshError> {
         if self.count == 0 {
             cx.budget.spend("lines and points", u64::from(self.vertices), size_of::<LineOrPoint>() as u64)?;
-            raw.loose.extend((0..self.vertices).map(|vertex| LineOrPoint::point(vertex, 0)));
+            raw.lines_and_points.extend((0..self.vertices).map(|vertex| LineOrPoint::point(vertex, 0)));
         }
         self.polygons.finish(raw, cx)?;
         if let Some(split) = self.colors {

@@ -64,7 +64,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
         return read_from(&mut Binary::new(bytes, header.body_at), &header, cx);
     }
     let mut raw = read_from(&mut Words::new(bytes, header.body_at), &header, cx)?;
-    raw.report.facts = FileMetadata::by(metadata::first_comment(bytes, b"#", |_| false));
+    raw.report.metadata = FileMetadata::by(metadata::first_comment(bytes, b"#", |_| false));
     Ok(raw)
 }
 

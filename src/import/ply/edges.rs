@@ -47,12 +47,12 @@ impl Edges {
     pub fn apply(&self, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
         let count = if self.ends.is_empty() { raw.positions.len() } else { self.ends.len() };
         cx.budget.spend("lines and points", count as u64, size_of::<LineOrPoint>() as u64)?;
-        raw.loose.reserve_exact(count);
+        raw.lines_and_points.reserve_exact(count);
         if self.ends.is_empty() {
-            raw.loose.extend((0..raw.positions.len() as u32).map(|vertex| LineOrPoint::point(vertex, 0)));
+            raw.lines_and_points.extend((0..raw.positions.len() as u32).map(|vertex| LineOrPoint::point(vertex, 0)));
         } else {
             let proper = self.ends.iter().filter(|[a, b]| a != b);
-            raw.loose.extend(proper.map(|&ends| LineOrPoint { ends, material: 0 }));
+            raw.lines_and_points.extend(proper.map(|&ends| LineOrPoint { ends, material: 0 }));
         }
         Ok(())
     }

@@ -48,7 +48,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     raw.report.warnings = body.warnings();
     let generator =
         metadata::first_comment(&bytes[..at], b"comment", |comment| header::texture_file(comment).is_some());
-    raw.report.facts = FileMetadata::by(generator);
+    raw.report.metadata = FileMetadata::by(generator);
     let textures = assemble::assemble(body.vertices, &body.faces, &mut raw, cx)?;
     if body.faces.arities.is_empty() {
         body.edges.apply(&mut raw, cx)?;

@@ -10,7 +10,7 @@ use super::{Format, MeshError};
 use crate::import::context::Context;
 use crate::import::metadata;
 use crate::mesh::{FileMetadata, MaterialSlot, UpAxis};
-use crate::pluralise::counted;
+use crate::pluralise::pluralise;
 use crate::warning::Warning;
 
 /// An 80-byte header and a count come before the triangles.
@@ -81,7 +81,7 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
     let Some(declared) = declared_bytes(bytes) else {
         return Err(MeshError::broken(format!(
             "the STL file is {} long, and its header alone is {HEADER_BYTES}",
-            counted(bytes.len(), "byte", "bytes")
+            pluralise(bytes.len(), "byte", "bytes")
         )));
     };
     let mut raw = new_mesh(Format::StlBinary);
@@ -99,17 +99,17 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
     if declared > bytes.len() as u64 {
         return Err(MeshError::broken(format!(
             "the STL header at byte 80 says {}, which needs {declared} bytes, and the file has {}",
-            counted(count, "triangle", "triangles"),
+            pluralise(count, "triangle", "triangles"),
             bytes.len()
         )));
     }
-    raw.report.facts = FileMetadata::by(metadata::tidy(&bytes[..80]));
+    raw.report.metadata = FileMetadata::by(metadata::tidy(&bytes[..80]));
     if declared < bytes.len() as u64 {
         raw.report.warnings.push(Warning {
             code: "trailing_bytes",
             detail: format!(
                 "ignored: {} after the last STL triangle",
-                counted(bytes.len() as u64 - declared, "byte", "bytes")
+                pluralise(bytes.len() as u64 - declared, "byte", "bytes")
             ),
         });
     }
@@ -149,7 +149,7 @@ fn read_ascii(text: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut raw = new_mesh(Format::StlAscii);
     // Line ends of old Macs, where there are no others.
     let newline = if text.contains(&b'\n') { b'\n' } else { b'\r' };
-    raw.report.facts = FileMetadata::by(metadata::tidy(name(text, newline)));
+    raw.report.metadata = FileMetadata::by(metadata::tidy(name(text, newline)));
     // The shortest triangle that a text can hold says how many it can have at most.
     let count_max = text.len() as u64 / 30 + 1;
     cx.budget.spend("the STL triangles", count_max, 3 * 24 + 12 + 1 + 4)?;

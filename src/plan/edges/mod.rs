@@ -6,7 +6,7 @@ use super::PlanError;
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
 use crate::plan::context::PlanContext;
-use crate::scene::material_groups::Parts;
+use crate::scene::material_groups::MaterialGroups;
 
 /// A mesh's edges and silhouettes, found once each, and then kept.
 #[derive(Default)]
@@ -17,29 +17,29 @@ pub struct Edges<'a> {
 
 impl<'a> Edges<'a> {
     /// All edges.
-    pub fn of(&mut self, mesh: &Mesh, means: &mut PlanContext<'_>) -> Result<&EdgeList, PlanError> {
+    pub fn of(&mut self, mesh: &Mesh, cx: &mut PlanContext<'_>) -> Result<&EdgeList, PlanError> {
         let list = match self.list.take() {
             Some(list) => list,
             None => {
-                means.deadline.check()?;
-                EdgeList::of(mesh, means.budget)?
+                cx.deadline.check()?;
+                EdgeList::of(mesh, cx.budget)?
             }
         };
         Ok(self.list.insert(list))
     }
 
-    /// All edges, and which of them may be silhouettes: for contours and hulls, which are those of the same parts.
+    /// All edges, and which of them may be silhouettes: for contours and hulls, which are those of the same groups.
     pub fn with_silhouettes(
         &mut self,
         mesh: &'a Mesh,
-        parts: &Parts<'_>,
-        means: &mut PlanContext<'_>,
+        groups: &MaterialGroups<'_>,
+        cx: &mut PlanContext<'_>,
     ) -> Result<(&EdgeList, &Silhouettes<'a>), PlanError> {
-        self.of(mesh, means)?;
+        self.of(mesh, cx)?;
         let list = self.list.get_or_insert_default();
         let silhouettes = match self.silhouettes.take() {
             Some(silhouettes) => silhouettes,
-            None => Silhouettes::new(mesh, parts, list, means.budget)?,
+            None => Silhouettes::new(mesh, groups, list, cx.budget)?,
         };
         Ok((list, self.silhouettes.insert(silhouettes)))
     }

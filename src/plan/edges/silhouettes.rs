@@ -7,13 +7,13 @@ use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::{Fronts, fronts};
 use crate::plan::{Edge, Side};
-use crate::scene::material_groups::{Fill, Parts};
+use crate::scene::material_groups::{Fill, MaterialGroups};
 use crate::spec::{Cull, Layers};
 
 /// Contours' edges. Of an edge's faces only those count that are drawn.
 pub struct Silhouettes<'a> {
     mesh: &'a Mesh,
-    /// Parts that are not drawn while others are, and have no hull either.
+    /// MaterialGroups that are not drawn while others are, and have no hull either.
     absent: Vec<bool>,
     /// All faces of the edges that have more than two.
     crowded: BTreeMap<u32, Vec<u32>>,
@@ -21,13 +21,18 @@ pub struct Silhouettes<'a> {
 
 impl<'a> Silhouettes<'a> {
     /// Those of a mesh.
-    pub fn new(mesh: &'a Mesh, parts: &Parts<'_>, list: &EdgeList, budget: &mut Budget) -> Result<Self, LimitExceeded> {
+    pub fn new(
+        mesh: &'a Mesh,
+        groups: &MaterialGroups<'_>,
+        list: &EdgeList,
+        budget: &mut Budget,
+    ) -> Result<Self, LimitExceeded> {
         // A list for each edge, and a place in the map.
         budget.spend("edges of many faces", list.further_faces.len() as u64, 100)?;
-        budget.spend("materials", parts.layers.len() as u64, 1)?;
-        let has_fill = parts.has_fill();
-        let is_absent = |m: usize| has_fill && parts.fill(m) == Fill::None && !parts.is_outlined(m);
-        let absent = (0..parts.layers.len()).map(is_absent).collect();
+        budget.spend("materials", groups.layers.len() as u64, 1)?;
+        let has_fill = groups.has_fill();
+        let is_absent = |m: usize| has_fill && groups.fill(m) == Fill::None && !groups.is_outlined(m);
+        let absent = (0..groups.layers.len()).map(is_absent).collect();
         let mut crowded: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for &[edge, face] in &list.further_faces {
             let first_two = list.edges[edge as usize].faces;
@@ -102,9 +107,9 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// The side that is seen of no face: inside a closed surface, all of which is drawn from outside and lets nothing through.
-pub fn unseen_side(mesh: &Mesh, parts: &Parts<'_>, list: &EdgeList) -> Option<Side> {
-    let covers = if parts.has_fill() { Fill::Opaque } else { Fill::None };
-    if (0..parts.layers.len()).any(|m| parts.fill(m) != covers) || !list.is_closed() {
+pub fn unseen_side(mesh: &Mesh, groups: &MaterialGroups<'_>, list: &EdgeList) -> Option<Side> {
+    let covers = if groups.has_fill() { Fill::Opaque } else { Fill::None };
+    if (0..groups.layers.len()).any(|m| groups.fill(m) != covers) || !list.is_closed() {
         return None;
     }
     let (unseen, culled) = match fronts(mesh) {
@@ -113,5 +118,5 @@ pub fn unseen_side(mesh: &Mesh, parts: &Parts<'_>, list: &EdgeList) -> Option<Si
         Fronts::Mixed => return None,
     };
     let is_drawn = |layers: &&Layers| layers.surface.is_none_or(|s| s.cull != culled);
-    parts.layers.iter().all(is_drawn).then_some(unseen)
+    groups.layers.iter().all(is_drawn).then_some(unseen)
 }

@@ -13,7 +13,7 @@ use crate::plan::edges::Edges;
 use crate::plan::edges::silhouettes::{Silhouettes, unseen_side};
 use crate::plan::skips::{SkipKind, Skips};
 use crate::plan::{Edge, LinePass, PlanError};
-use crate::scene::material_groups::Parts;
+use crate::scene::material_groups::MaterialGroups;
 use crate::spec::{Hidden, Outline, Spec, Wire};
 
 /// The passes of a scene. `contour_px` is the width of a contour; `is_outside` says that the eye is
@@ -21,44 +21,44 @@ use crate::spec::{Hidden, Outline, Spec, Wire};
 pub fn passes<'a>(
     mesh: &'a Mesh,
     spec: &Spec,
-    parts: &Parts<'_>,
+    groups: &MaterialGroups<'_>,
     (contour_px, is_outside): (impl Fn(&Outline) -> f32, bool),
     edges: &mut Edges<'a>,
     skips: &mut Skips<'_>,
-    means: &mut PlanContext<'_>,
+    cx: &mut PlanContext<'_>,
 ) -> Result<Vec<LinePass>, PlanError> {
-    let mut wants = wire_wants(parts);
+    let mut wants = wire_wants(groups);
     wants.extend(spec.topology.iter().flat_map(topology_wants));
-    wants.extend(contour_wants(parts, &contour_px));
+    wants.extend(contour_wants(groups, &contour_px));
     wants.retain(Want::is_seen);
-    let hides = parts.has_fill() || parts.needs_occluder();
-    let loose = primitives::passes(mesh, parts, contour_px, hides, means)?;
+    let hides = groups.has_fill() || groups.needs_occluder();
+    let loose = primitives::passes(mesh, groups, contour_px, hides, cx)?;
     if skips.skip(
         SkipKind::Adjacency,
-        wants.is_empty() && !parts.has_hull(),
+        wants.is_empty() && !groups.has_hull(),
         "no line asks which triangles are neighbours",
     ) {
         return Ok(loose);
     }
     let (list, silhouettes) = match wants.iter().any(|want| want.contour) {
-        true => edges.with_silhouettes(mesh, parts, means).map(|(list, found)| (list, Some(found)))?,
-        false => (edges.of(mesh, means)?, None),
+        true => edges.with_silhouettes(mesh, groups, cx).map(|(list, found)| (list, Some(found)))?,
+        false => (edges.of(mesh, cx)?, None),
     };
     let may_skip = hides && is_outside && wants.iter().any(|w| w.hidden == Hidden::Hide);
-    let unseen_side = if may_skip { unseen_side(mesh, parts, list) } else { None };
-    let source = Source { mesh, parts, list, silhouettes };
+    let unseen_side = if may_skip { unseen_side(mesh, groups, list) } else { None };
+    let source = Source { mesh, groups, list, silhouettes };
     let mut passes = Vec::new();
     for want in &wants {
         let mut count = 0;
-        source.each(want, means.deadline, |_| count += 1)?;
+        source.each(want, cx.deadline, |_| count += 1)?;
         if count > 0 {
             // Once as they are found, and once as they are shared.
-            means.budget.spend("drawn edges", count, 2 * size_of::<Edge>() as u64)?;
+            cx.budget.spend("drawn edges", count, 2 * size_of::<Edge>() as u64)?;
             let mut edges = Vec::with_capacity(count as usize);
-            source.each(want, means.deadline, |edge| edges.push(edge))?;
+            source.each(want, cx.deadline, |edge| edges.push(edge))?;
             let drawn = want.passes(&edges.into(), hides, unseen_side);
             // In the lists of up to four bands of the picture.
-            means.budget.spend("lists of edges", drawn.len() as u64 * count, 16)?;
+            cx.budget.spend("lists of edges", drawn.len() as u64 * count, 16)?;
             passes.extend(drawn);
         }
     }
@@ -69,7 +69,7 @@ pub fn passes<'a>(
 /// Where edges that are drawn come from.
 struct Source<'s> {
     mesh: &'s Mesh,
-    parts: &'s Parts<'s>,
+    groups: &'s MaterialGroups<'s>,
     list: &'s EdgeList,
     /// Where any lines are contours.
     silhouettes: Option<&'s Silhouettes<'s>>,
@@ -83,7 +83,7 @@ impl Source<'_> {
             if (i as usize).is_multiple_of(CHECK_EVERY) {
                 deadline.check()?;
             }
-            if want.draws(self.mesh, self.parts, edge) {
+            if want.draws(self.mesh, self.groups, edge) {
                 let all = Edge::new(&self.mesh.positions, edge.vertices, edge.faces);
                 if let Some(edge) = silhouettes.map_or(Some(all), |s| s.edge(i, all)) {
                     each(edge);
@@ -102,19 +102,19 @@ pub fn color(wire: &Wire) -> [f32; 4] {
 /// Which edges of each triangle its part's wire follows; empty where it is all of them.
 pub fn edge_masks(
     mesh: &Mesh,
-    parts: &Parts<'_>,
+    groups: &MaterialGroups<'_>,
     edges: &mut Edges<'_>,
-    means: &mut PlanContext<'_>,
+    cx: &mut PlanContext<'_>,
 ) -> Result<Vec<u8>, PlanError> {
     let classes: Vec<Class> =
-        parts.layers.iter().map(|layers| layers.wire.as_ref().map_or(Class::All, class_of)).collect();
+        groups.layers.iter().map(|layers| layers.wire.as_ref().map_or(Class::All, class_of)).collect();
     let is_polygonal = mesh.edge_masks.iter().any(|&mask| mask != 0b111);
     let own = mesh.own_triangles().len();
     let is_all = own == mesh.triangles.len();
     if is_all && classes.iter().all(|class| *class == Class::All || (*class == Class::Polygon && !is_polygonal)) {
         return Ok(Vec::new());
     }
-    means.budget.spend("edge masks", mesh.triangles.len() as u64, 1)?;
+    cx.budget.spend("edge masks", mesh.triangles.len() as u64, 1)?;
     let class_at = |t: usize| classes.get(mesh.triangle_materials[t] as usize).copied().unwrap_or(Class::All);
     let mut masks: Vec<u8> = (0..mesh.triangles.len())
         .map(|t| match class_at(t) {
@@ -127,7 +127,7 @@ pub fn edge_masks(
         .collect();
     let asks = |class: &Class| !matches!(class, Class::All | Class::Polygon);
     if classes.iter().any(asks) {
-        mark(mesh, edges.of(mesh, means)?, &mut masks, class_at);
+        mark(mesh, edges.of(mesh, cx)?, &mut masks, class_at);
     }
     Ok(masks)
 }

@@ -6,7 +6,7 @@ use crate::mesh::Mesh;
 use crate::mesh::edges::{MeshEdge, NO_FACE};
 use crate::plan::lines::edge_class::{Class, class_of, cos_deg, is_of};
 use crate::plan::{Edge, LinePass, Shown, Side};
-use crate::scene::material_groups::{FADE, Parts};
+use crate::scene::material_groups::{FADE, MaterialGroups};
 use crate::spec::color::Rgba;
 use crate::spec::{Hidden, Outline, OutlineMethod, Topology, Wire, WireMethod};
 
@@ -27,7 +27,7 @@ pub struct Want {
     /// As [`LinePass::contour`].
     pub contour: bool,
     class: Class,
-    /// Edges of which of [`Parts::looks`]; empty: all.
+    /// Edges of which of [`MaterialGroups::looks`]; empty: all.
     looks: Vec<bool>,
 }
 
@@ -44,9 +44,9 @@ impl Want {
     }
 
     /// Whether an edge is one of them.
-    pub fn draws(&self, mesh: &Mesh, parts: &Parts<'_>, edge: &MeshEdge) -> bool {
+    pub fn draws(&self, mesh: &Mesh, groups: &MaterialGroups<'_>, edge: &MeshEdge) -> bool {
         let mut faces = edge.faces.into_iter().filter(|&face| face != NO_FACE);
-        let look = |face: u32| parts.look_of[mesh.triangle_materials[face as usize] as usize] as usize;
+        let look = |face: u32| groups.look_of[mesh.triangle_materials[face as usize] as usize] as usize;
         (self.looks.is_empty() || faces.any(|face| self.looks[look(face)])) && is_of(self.class, mesh, edge)
     }
 
@@ -74,12 +74,12 @@ impl Want {
 }
 
 /// Lines of exact width along the edges of surfaces, each style once.
-pub fn wire_wants(parts: &Parts<'_>) -> Vec<Want> {
+pub fn wire_wants(groups: &MaterialGroups<'_>) -> Vec<Want> {
     let mut kinds: Vec<(Wire, Vec<bool>)> = Vec::new();
-    for (look, layers) in parts.looks.iter().enumerate() {
+    for (look, layers) in groups.looks.iter().enumerate() {
         let Some(wire) = layers.wire.filter(|wire| wire.method == WireMethod::Exact) else { continue };
         let at = kinds.iter().position(|(kind, _)| *kind == wire).unwrap_or_else(|| {
-            kinds.push((wire, vec![false; parts.looks.len()]));
+            kinds.push((wire, vec![false; groups.looks.len()]));
             kinds.len() - 1
         });
         kinds[at].1[look] = true;
@@ -123,13 +123,13 @@ pub fn topology_wants(topology: &Topology) -> Vec<Want> {
 }
 
 /// Contours, each style once.
-pub fn contour_wants(parts: &Parts<'_>, contour_px: impl Fn(&Outline) -> f32) -> Vec<Want> {
+pub fn contour_wants(groups: &MaterialGroups<'_>, contour_px: impl Fn(&Outline) -> f32) -> Vec<Want> {
     let mut wants: Vec<Want> = Vec::new();
-    for (look, layers) in parts.looks.iter().enumerate() {
+    for (look, layers) in groups.looks.iter().enumerate() {
         let Some(outline) = layers.outline.filter(|o| o.method == OutlineMethod::Contour) else { continue };
         let (width_px, color) = (contour_px(&outline), outline.color.premultiplied());
         let at = wants.iter().position(|w| w.width_px == width_px && w.color == color).unwrap_or_else(|| {
-            let looks = vec![false; parts.looks.len()];
+            let looks = vec![false; groups.looks.len()];
             let class = Class::All;
             wants.push(Want {
                 width_px,

@@ -20,7 +20,7 @@ pub struct HullPass<'a> {
     /// outside the picture: nothing needs clipping.
     pub triangles: Vec<[u32; 3]>,
     /// Material index a triangle of the mesh; empty where all are the same. Unlike the surface's, never merged because they look alike:
-    /// it also says what hides which hull, see [`LayersPass`](super::LayersPass).
+    /// it also says what hides which hull, see [`PeelingPass`](super::PeelingPass).
     pub surface_materials: &'a [u32],
     /// The same of `triangles`.
     pub triangle_materials: Vec<u32>,

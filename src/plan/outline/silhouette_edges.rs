@@ -8,7 +8,7 @@ use crate::plan::context::CHECK_EVERY;
 use crate::plan::context::PlanContext;
 use crate::plan::edges::silhouettes::Silhouettes;
 use crate::plan::{Edge, Projection, Thickness};
-use crate::scene::material_groups::{Fill, Parts};
+use crate::scene::material_groups::{Fill, MaterialGroups};
 use crate::spec::Cull;
 
 /// An edge beside which an outline is drawn.
@@ -42,14 +42,14 @@ impl<'a> View<'a> {
     /// Looks at a mesh.
     pub fn new(
         mesh: &'a Mesh,
-        parts: &Parts<'_>,
+        groups: &MaterialGroups<'_>,
         projection: &'a Projection,
-        means: &mut PlanContext<'_>,
+        cx: &mut PlanContext<'_>,
     ) -> Result<Self, PlanError> {
-        let PlanContext { budget, deadline } = means;
+        let PlanContext { budget, deadline } = cx;
         budget.spend("an outline", mesh.positions.len() as u64, size_of::<[f64; 3]>() as u64)?;
         budget.spend("an outline", mesh.triangles.len() as u64, 1)?;
-        budget.spend("materials", parts.layers.len() as u64, 1)?;
+        budget.spend("materials", groups.layers.len() as u64, 1)?;
         let mut places = Vec::with_capacity(mesh.positions.len());
         for positions in mesh.positions.chunks(CHECK_EVERY) {
             deadline.check()?;
@@ -61,7 +61,7 @@ impl<'a> View<'a> {
             deadline.check()?;
             sides.extend(triangles.iter().map(|triangle| facing(mesh, &places, *triangle)));
         }
-        let culls = (0..parts.layers.len()).map(|m| cull(parts, m)).collect();
+        let culls = (0..groups.layers.len()).map(|m| cull(groups, m)).collect();
         Ok(Self { mesh, projection, places, facing: sides, culls })
     }
 
@@ -70,12 +70,12 @@ impl<'a> View<'a> {
         &self,
         outlines: &[Option<Thickness>],
         (list, silhouettes): (&EdgeList, &Silhouettes<'_>),
-        means: &mut PlanContext<'_>,
+        cx: &mut PlanContext<'_>,
     ) -> Result<Vec<Rim>, PlanError> {
         let each = |each: &mut dyn FnMut(Rim)| {
             for (i, edge) in list.edges.iter().enumerate() {
                 if i % CHECK_EVERY == 0 {
-                    means.deadline.check()?;
+                    cx.deadline.check()?;
                 }
                 let edge = Edge::new(&self.mesh.positions, edge.vertices, edge.faces);
                 let Some(edge) = silhouettes.edge(i as u32, edge) else { continue };
@@ -89,7 +89,7 @@ impl<'a> View<'a> {
         };
         let mut count = 0;
         each(&mut |_| count += 1)?;
-        means.budget.spend("an outline's edges", count, size_of::<Rim>() as u64)?;
+        cx.budget.spend("an outline's edges", count, size_of::<Rim>() as u64)?;
         let mut rims = Vec::with_capacity(count as usize);
         each(&mut |rim| rims.push(rim))?;
         Ok(rims)
@@ -145,10 +145,10 @@ pub fn row_dot(row: &[f32; 4], p: [f32; 3]) -> f64 {
 }
 
 /// Which side of a part is left out, if it is filled.
-fn cull(parts: &Parts<'_>, material: usize) -> Cull {
-    match parts.fill(material) {
+fn cull(groups: &MaterialGroups<'_>, material: usize) -> Cull {
+    match groups.fill(material) {
         Fill::None => Cull::None,
-        _ => parts.layers[material].surface.map_or(Cull::None, |surface| surface.cull),
+        _ => groups.layers[material].surface.map_or(Cull::None, |surface| surface.cull),
     }
 }
 

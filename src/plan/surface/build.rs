@@ -12,35 +12,35 @@ use crate::plan::lines::build;
 use crate::plan::skips::{SkipKind, Skips};
 use crate::plan::{CornerValues, Faces, PlanError, SurfacePass, flags};
 use crate::scene::camera::Camera;
-use crate::scene::material_groups::Parts;
+use crate::scene::material_groups::MaterialGroups;
 use crate::spec::{Cull, Spec};
 
 /// What is filled, or only hides lines; None where the look has neither.
 pub fn surface_pass<'a>(
     mesh: &'a Mesh,
     spec: &Spec,
-    parts: &Parts<'_>,
+    groups: &MaterialGroups<'_>,
     camera: &Camera,
     edges: &mut Edges<'_>,
     skips: &mut Skips<'_>,
-    means: &mut PlanContext<'_>,
+    cx: &mut PlanContext<'_>,
 ) -> Result<Option<SurfacePass<'a>>, PlanError> {
-    let is_seen = parts.has_fill() || parts.has_barycentric_wire();
-    let is_needless = !is_seen && !parts.needs_occluder();
+    let is_seen = groups.has_fill() || groups.has_barycentric_wire();
+    let is_needless = !is_seen && !groups.needs_occluder();
     let why = "the look has no filled surface, and no line that one could hide";
     if skips.skip(SkipKind::Surface, is_needless, why) {
         return Ok(None);
     }
     let is_shaded = !skips.skip(SkipKind::Shading, !is_seen, "the surface is not seen: it only hides lines");
-    let edge_masks = if parts.has_barycentric_wire() || parts.shows_edge_distance() {
-        build::edge_masks(mesh, parts, edges, means)?
+    let edge_masks = if groups.has_barycentric_wire() || groups.shows_edge_distance() {
+        build::edge_masks(mesh, groups, edges, cx)?
     } else {
         Vec::new()
     };
-    let mut loader = TextureLoader::new(mesh, means);
+    let mut loader = TextureLoader::new(mesh, cx);
     let mut looks = Vec::with_capacity(mesh.materials.len());
     let used = used_materials(mesh);
-    for (index, (slot, layers)) in mesh.materials.iter().zip(&parts.layers).enumerate() {
+    for (index, (slot, layers)) in mesh.materials.iter().zip(&groups.layers).enumerate() {
         loader.for_material(index, used[index]);
         looks.push(materials::look(mesh, slot, layers, &mut loader)?);
     }
@@ -59,7 +59,7 @@ pub fn surface_pass<'a>(
         looks.truncate(1);
     }
     let mut pass = SurfacePass {
-        faces: match parts.common_cull() {
+        faces: match groups.common_cull() {
             Cull::None => Faces::Both,
             Cull::Back => Faces::Front,
             Cull::Front => Faces::Back,

@@ -4,7 +4,7 @@ use super::textures::TextureLoader;
 use crate::mesh::material::{AlphaMode, TextureRef};
 use crate::mesh::{MaterialSlot, Mesh};
 use crate::plan::lines::build;
-use crate::plan::{MaterialLook, PlanError, TEXTURE_NONE, flags, slots};
+use crate::plan::{PlanError, ShadedMaterial, TEXTURE_NONE, flags, slots};
 use crate::spec::color::Rgba;
 use crate::spec::{DebugView, FlatNormals, Layers, Shading, Surface, Wire, WireMethod};
 
@@ -20,8 +20,8 @@ pub fn look(
     slot: &MaterialSlot,
     layers: &Layers,
     textures: &mut TextureLoader<'_>,
-) -> Result<MaterialLook, PlanError> {
-    let mut look = MaterialLook::unlit([0.0; 4]);
+) -> Result<ShadedMaterial, PlanError> {
+    let mut look = ShadedMaterial::unlit([0.0; 4]);
     look.flags = 0;
     if let Some(surface) = &layers.surface {
         look.flags = flags::FILL | shading_flags(slot, surface);
@@ -52,7 +52,7 @@ pub fn load_all(slot: &MaterialSlot, textures: &mut TextureLoader<'_>) -> Result
     Ok(())
 }
 
-fn fill(look: &mut MaterialLook, mesh: &Mesh, slot: &MaterialSlot, surface: &Surface) {
+fn fill(look: &mut ShadedMaterial, mesh: &Mesh, slot: &MaterialSlot, surface: &Surface) {
     // A picture or the vertices' colours say it all: grey would only darken them.
     let is_painted = slot.base_texture.is_some() || !mesh.colors.is_empty();
     let none = if is_painted { [1.0; 4] } else { Rgba::from_srgb8(DEFAULT_COLOR).0 };
@@ -116,7 +116,7 @@ fn shading_flags(slot: &MaterialSlot, surface: &Surface) -> u32 {
 }
 
 fn sample(
-    look: &mut MaterialLook,
+    look: &mut ShadedMaterial,
     slot: &MaterialSlot,
     surface: &Surface,
     textures: &mut TextureLoader<'_>,
@@ -138,7 +138,7 @@ fn sample(
     Ok(())
 }
 
-fn wire_of(look: &mut MaterialLook, wire: &Wire) {
+fn wire_of(look: &mut ShadedMaterial, wire: &Wire) {
     look.wire_color = build::color(wire);
     look.wire_thickness = wire.thickness;
     look.wire_smoothing = wire.smoothing;
@@ -155,6 +155,6 @@ fn wire_of(look: &mut MaterialLook, wire: &Wire) {
 }
 
 /// Whether a material samples anything at all.
-pub fn samples(look: &MaterialLook) -> bool {
+pub fn samples(look: &ShadedMaterial) -> bool {
     look.textures.iter().any(|texture| texture.texture != TEXTURE_NONE)
 }

@@ -19,7 +19,7 @@ pub struct SurfacePass<'a> {
     /// Whether it is seen. Where not, it only hides lines.
     pub is_shaded: bool,
     /// What parts look like; at least one.
-    pub materials: Vec<MaterialLook>,
+    pub materials: Vec<ShadedMaterial>,
     /// Index into `materials` a triangle; empty where there is one material.
     pub triangle_materials: &'a [u32],
     /// A unit normal a triangle.
@@ -50,7 +50,7 @@ pub struct CornerValues<'a, T: Clone> {
 /// A material as the shaders read it, field for field.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct MaterialLook {
+pub struct ShadedMaterial {
     /// Linear RGBA, straight alpha.
     pub base_color: [f32; 4],
     /// Linear RGB that it gives off.
@@ -94,7 +94,7 @@ pub struct TextureUse {
 /// No texture.
 pub const TEXTURE_NONE: u32 = u32::MAX;
 
-/// Places in [`MaterialLook::textures`].
+/// Places in [`ShadedMaterial::textures`].
 pub mod slots {
     /// Base colour and alpha.
     pub const BASE: usize = 0;
@@ -106,7 +106,7 @@ pub mod slots {
     pub const EMISSIVE: usize = 3;
 }
 
-/// Bits of [`MaterialLook::flags`].
+/// Bits of [`ShadedMaterial::flags`].
 pub mod flags {
     /// There is a fill. Without it only wires show.
     pub const FILL: u32 = 1;
@@ -204,7 +204,7 @@ impl TextureUse {
     pub const NONE: Self = Self { transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], texture: TEXTURE_NONE, sampler: 0 };
 }
 
-impl MaterialLook {
+impl ShadedMaterial {
     /// An unlit fill of one colour, to begin with.
     pub fn unlit(base_color: [f32; 4]) -> Self {
         Self {
@@ -227,7 +227,7 @@ impl MaterialLook {
 
 impl<'a> SurfacePass<'a> {
     /// A surface of one material or several, without arrays, textures and lamps.
-    pub fn new(faces: Faces, materials: Vec<MaterialLook>) -> Self {
+    pub fn new(faces: Faces, materials: Vec<ShadedMaterial>) -> Self {
         Self {
             faces,
             is_shaded: true,
@@ -245,7 +245,7 @@ impl<'a> SurfacePass<'a> {
 
     /// The material of a triangle.
     #[inline(always)]
-    pub fn material(&self, triangle: usize) -> &MaterialLook {
+    pub fn material(&self, triangle: usize) -> &ShadedMaterial {
         let index = self.triangle_materials.get(triangle).map_or(0, |&m| m as usize);
         &self.materials[index.min(self.materials.len() - 1)]
     }

@@ -42,11 +42,11 @@ struct Wanted {
 
 impl<'a> TextureLoader<'a> {
     /// Nothing so far.
-    pub fn new(mesh: &'a Mesh, means: &'a mut PlanContext<'_>) -> Self {
+    pub fn new(mesh: &'a Mesh, cx: &'a mut PlanContext<'_>) -> Self {
         Self {
             mesh,
-            budget: means.budget,
-            deadline: means.deadline,
+            budget: cx.budget,
+            deadline: cx.deadline,
             material: 0,
             is_used: true,
             wanted: Vec::new(),

@@ -4,7 +4,7 @@ use crate::image::ImageFormat;
 use crate::mesh::UpAxis;
 use crate::spec::BackendChoice;
 use crate::spec::{
-    Cull, DebugView, FlatNormals, Hidden, LightPreset, OutlineMethod, OutlineUnit, Projection, Shading, View,
+    Cull, DebugView, FlatNormals, Hidden, LightPreset, NamedView, OutlineMethod, OutlineUnit, ProjectionKind, Shading,
     WireEdges, WireMethod,
 };
 
@@ -110,7 +110,7 @@ impl Words for OutlineUnit {
     const ALL: &'static [(&'static str, Self)] = &[("object", Self::Object), ("px", Self::Px)];
 }
 
-impl Words for View {
+impl Words for NamedView {
     const ALL: &'static [(&'static str, Self)] = &[
         ("iso", Self::Iso),
         ("front", Self::Front),
@@ -122,7 +122,7 @@ impl Words for View {
     ];
 }
 
-impl Words for Projection {
+impl Words for ProjectionKind {
     const ALL: &'static [(&'static str, Self)] =
         &[("perspective", Self::Perspective), ("orthographic", Self::Orthographic)];
 }

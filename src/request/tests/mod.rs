@@ -5,7 +5,7 @@ mod refused;
 use super::*;
 use crate::mesh::UpAxis;
 use crate::spec::{
-    DebugView, FlatNormals, Hidden, LightPreset, Outline, OutlineMethod, OutlineUnit, Shading, View, WireEdges,
+    DebugView, FlatNormals, Hidden, LightPreset, NamedView, Outline, OutlineMethod, OutlineUnit, Shading, WireEdges,
     WireMethod,
 };
 
@@ -137,7 +137,7 @@ fn every_key_reaches_its_field() {
     assert_eq!((spec.light.preset, spec.light.direction), (LightPreset::ThreePoint, Some([0.0, -1.0, 0.5])));
     assert_eq!(spec.time_s, Some(1.25));
     let camera = spec.camera;
-    assert_eq!((camera.view, camera.up, camera.height), (View::Top, Some(UpAxis::NegZ), Some(2.5)));
+    assert_eq!((camera.view, camera.up, camera.height), (NamedView::Top, Some(UpAxis::NegZ), Some(2.5)));
     assert_eq!((camera.azimuth_deg, camera.elevation_deg), (Some(10.0), Some(-20.0)));
     assert_eq!((camera.eye, camera.target), (Some([1.0, 2.0, 3.0]), Some([0.0, 0.0, 0.5])));
     assert_eq!((spec.light.intensity, spec.light.ambient), (2.0, 0.1));

@@ -18,7 +18,7 @@ use crate::request::Rules;
 use crate::service::http::resources::schema;
 use crate::service::http::resources::schema::Schema;
 use crate::service::http::resources::{health, jobs, meshes, pictures, render};
-use crate::service::jobs::{Bodies, Engine, Jobs, Settings, pipeline_engine};
+use crate::service::jobs::{Engine, Jobs, Settings, UploadBudget, pipeline_engine};
 use crate::service::store::Store;
 
 /// What handlers share.
@@ -32,7 +32,7 @@ pub struct App {
     /// The GPU, if there is one.
     pub gpu: Arc<GpuHost>,
     /// Memory of uploads.
-    pub bodies: Arc<Bodies>,
+    pub bodies: Arc<UploadBudget>,
     /// Meshes that stay.
     pub meshes: Store,
     /// For the whole of a request's body.
@@ -73,7 +73,7 @@ impl App {
             rules,
             jobs: Jobs::start(settings, engine)?,
             gpu,
-            bodies: Bodies::new(config.uploads_bytes),
+            bodies: UploadBudget::new(config.uploads_bytes),
             meshes: Store::new(config.mesh_bytes, to_usize(config.mesh_count)),
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             workers: config.workers,
@@ -131,7 +131,7 @@ pub fn router(app: &Arc<App>) -> Router {
                 "there is nothing at this path; the work is done at POST /v1/render, and /openapi.json lists the paths",
             )
         })
-        // Bodies are metered as they are read, forms too: axum's own limit of 2 MB would come before `--limit-body-bytes`.
+        // UploadBudget are metered as they are read, forms too: axum's own limit of 2 MB would come before `--limit-body-bytes`.
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn(observe::observe))
         .with_state(app.clone())

@@ -12,7 +12,7 @@ use crate::limits::LimitExceeded;
 use crate::pipeline::PlanError;
 use crate::pipeline::RenderError;
 use crate::request::RequestError;
-use crate::service::jobs::{BodiesFull, Failure, Refusal};
+use crate::service::jobs::{Failure, Refusal, UploadBudgetFull};
 use crate::service::store::StoreError;
 
 /// An answer that is not what the client wanted.
@@ -100,8 +100,8 @@ impl From<Refusal> for ApiError {
     }
 }
 
-impl From<BodiesFull> for ApiError {
-    fn from(full: BodiesFull) -> Self {
+impl From<UploadBudgetFull> for ApiError {
+    fn from(full: UploadBudgetFull) -> Self {
         let error = Self::new(StatusCode::TOO_MANY_REQUESTS, "uploads_full", full.to_string());
         error.flag(Some("--uploads-bytes")).retry_after(1)
     }

@@ -15,14 +15,14 @@ pub(crate) mod upload_budget;
 mod worker;
 
 pub use job::{Failure, Finished, Job, JobId, Product, State, Task, Timings, Work};
-pub use upload_budget::{Bodies, BodiesFull, Reservation};
+pub use upload_budget::{Reservation, UploadBudget, UploadBudgetFull};
 pub use worker::{Engine, Renderer, pipeline_engine};
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use registry::Board;
+use registry::Registry;
 
 /// How many, how long, how much.
 #[derive(Clone, Debug)]
@@ -73,7 +73,7 @@ pub struct Load {
 /// The job service. Clones are handles to the same one; its threads end after [`Jobs::drain`].
 #[derive(Clone)]
 pub struct Jobs {
-    board: Arc<Board>,
+    board: Arc<Registry>,
     workers: Arc<Mutex<Vec<JoinHandle<()>>>>,
 }
 
@@ -81,7 +81,7 @@ impl Jobs {
     /// Starts the workers and the clock.
     pub fn start(settings: Settings, engine: Engine) -> std::io::Result<Self> {
         let workers = settings.workers.max(1);
-        let board = Arc::new(Board::new(settings));
+        let board = Arc::new(Registry::new(settings));
         let mut threads = Vec::new();
         for index in 0..workers {
             let (board, engine) = (board.clone(), engine.clone());

@@ -14,7 +14,7 @@ use super::job::{Job, JobId, State, Work};
 use super::{Load, Refusal, Settings};
 
 /// The jobs and what their threads wait for.
-pub struct Board {
+pub struct Registry {
     pub(crate) settings: Settings,
     inner: Mutex<Inner>,
     /// Something was queued, or draining began.
@@ -41,7 +41,7 @@ struct Inner {
     mean: Duration,
 }
 
-impl Board {
+impl Registry {
     pub fn new(settings: Settings) -> Self {
         let outstanding = watch::Sender::new(0);
         Self { settings, inner: Mutex::default(), work: Condvar::new(), clock: Condvar::new(), outstanding }

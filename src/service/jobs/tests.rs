@@ -13,7 +13,7 @@ use crate::limits::{Deadline, Stopped};
 use crate::pipeline::{Output, RenderError, Stage};
 use crate::spec::BackendChoice;
 use crate::spec::color::Rgba;
-use crate::spec::{CameraSpec, ImageSpec, Layers, Light, LightPreset, Projection, Spec, View};
+use crate::spec::{CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, ProjectionKind, Spec};
 
 const SOON: Duration = Duration::from_secs(10);
 
@@ -28,7 +28,7 @@ fn settings() -> Settings {
     }
 }
 
-fn work(bodies: &Arc<Bodies>, mesh: &'static [u8]) -> Work {
+fn work(bodies: &Arc<UploadBudget>, mesh: &'static [u8]) -> Work {
     let mut reservation = bodies.reserve();
     reservation.grow(mesh.len() as u64).unwrap();
     let (bundle, task) = (Bundle::of_one(Bytes::from_static(mesh)), Task::Draw(Box::new(spec())));
@@ -38,10 +38,10 @@ fn work(bodies: &Arc<Bodies>, mesh: &'static [u8]) -> Work {
 /// What is drawn does not matter here.
 fn spec() -> Spec {
     let camera = CameraSpec {
-        view: View::Iso,
+        view: NamedView::Iso,
         azimuth_deg: None,
         elevation_deg: None,
-        projection: Projection::Perspective,
+        projection: ProjectionKind::Perspective,
         fov_deg: 35.0,
         height: None,
         up: None,
@@ -91,7 +91,7 @@ fn act(work: &Work, deadline: &Deadline, gate: &Mutex<Receiver<()>>) -> Result<O
 
 struct Bench {
     jobs: Jobs,
-    bodies: Arc<Bodies>,
+    bodies: Arc<UploadBudget>,
     open: Sender<()>,
     renderers: Arc<AtomicUsize>,
 }
@@ -111,7 +111,7 @@ fn bench(settings: Settings) -> Bench {
             Ok(Product::Picture(output))
         })
     });
-    Bench { jobs: Jobs::start(settings, engine).unwrap(), bodies: Bodies::new(1 << 20), open, renderers }
+    Bench { jobs: Jobs::start(settings, engine).unwrap(), bodies: UploadBudget::new(1 << 20), open, renderers }
 }
 
 impl Bench {

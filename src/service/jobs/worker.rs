@@ -9,7 +9,7 @@ use super::job::{Failure, Finished, Job, Product, State, Task, Timings, Work};
 use crate::backend::{Backends, GpuHost};
 use crate::limits::{Deadline, Limits};
 use crate::pipeline::{self, RenderError, Stage};
-use crate::service::jobs::registry::Board;
+use crate::service::jobs::registry::Registry;
 
 /// What does one job after the other on one thread.
 pub type Renderer = Box<dyn FnMut(&Work, &Deadline, &mut dyn FnMut(Stage)) -> Result<Product, RenderError>>;
@@ -40,7 +40,7 @@ pub fn pipeline_engine(gpu: Arc<GpuHost>, threads: usize, limits: Limits) -> Eng
 }
 
 /// Works until the board is drained.
-pub fn run(board: &Board, engine: &Engine) {
+pub fn run(board: &Registry, engine: &Engine) {
     // Made with the first job: an idle process holds no renderer.
     let mut renderer: Option<Renderer> = None;
     while let Some((job, work)) = board.take() {

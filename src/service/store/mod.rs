@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use bytes::Bytes;
 
 use crate::import::{Bundle, Format};
-use crate::service::jobs::{Bodies, Reservation};
+use crate::service::jobs::{Reservation, UploadBudget};
 
 /// How a bundle is read: what is said of it beside its bytes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -83,7 +83,7 @@ pub struct StoreLoad {
 /// The meshes. When there is no room for another, the least recently used that nobody holds goes.
 #[derive(Debug)]
 pub struct Store {
-    memory: Arc<Bodies>,
+    memory: Arc<UploadBudget>,
     bytes: u64,
     count: usize,
     inner: Mutex<Inner>,
@@ -106,7 +106,7 @@ struct Entry {
 impl Store {
     /// Room for `count` meshes that take `bytes` together.
     pub fn new(bytes: u64, count: usize) -> Self {
-        Self { memory: Bodies::new(bytes), bytes, count: count.max(1), inner: Mutex::default() }
+        Self { memory: UploadBudget::new(bytes), bytes, count: count.max(1), inner: Mutex::default() }
     }
 
     /// The mesh of this name, used now.

@@ -100,7 +100,7 @@ fn measure(name: &str, obj: &str, opacity: f64) {
         for samples in [1, 4, 8, 16] {
             let spec = spec(lines, width_px, samples, opacity);
             let plan = scenes::plan(&mesh, &spec);
-            assert_eq!(plan.layers().is_some(), opacity < 1.0);
+            assert_eq!(plan.peeling().is_some(), opacity < 1.0);
             let mut pictures = Vec::new();
             for renderer in &mut renderers {
                 let image = renderer.draw(&plan, &Deadline::default()).unwrap();

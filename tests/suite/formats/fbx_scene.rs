@@ -83,7 +83,7 @@ fn lines_are_hidden_as_meshes_are() {
             model(201, "Line", properties),
         ];
         let nodes = file(1, objects, &[(200, 0, ""), (100, 200, ""), (201, 0, ""), (101, 201, "")]);
-        assert_eq!(read(&ascii(&nodes)).unwrap().loose.len(), expected);
+        assert_eq!(read(&ascii(&nodes)).unwrap().lines_and_points.len(), expected);
     }
 }
 

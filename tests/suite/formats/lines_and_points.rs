@@ -17,7 +17,7 @@ fn loose(mesh: &Mesh) -> Vec<End> {
         let p = mesh.positions[v as usize];
         std::array::from_fn(|k| mesh.to_file.centre[k] + mesh.to_file.scale * f64::from(p[k]))
     };
-    mesh.loose.iter().map(|one| (one.ends.map(to_file), one.material)).collect()
+    mesh.lines_and_points.iter().map(|one| (one.ends.map(to_file), one.material)).collect()
 }
 
 fn codes(mesh: &Mesh) -> Vec<&'static str> {
@@ -49,8 +49,8 @@ fn obj_lines_and_points() {
         // Of what has no normals beside what has.
         let repaired = if text.contains("//") { vec!["normals_repaired"] } else { vec![] };
         assert_eq!(codes(&mesh), repaired, "{text}");
-        let attributes = if mesh.attribute_triangles.is_empty() { 0 } else { mesh.loose.len() };
-        assert_eq!(mesh.loose_attributes.len(), attributes, "{text}");
+        let attributes = if mesh.attribute_triangles.is_empty() { 0 } else { mesh.lines_and_points.len() };
+        assert_eq!(mesh.line_point_attributes.len(), attributes, "{text}");
     }
     assert_eq!(cases.len(), 8);
     for (text, part) in [("l 1 4\n", "vertex index 4 is out of range"), ("p 0\n", "is 0"), ("l 1 x\n", "\"x\"")] {
@@ -87,8 +87,8 @@ fn ply_clouds_and_edges() {
     let properties = [&XYZ[..], &["uchar red", "uchar green", "uchar blue"]].concat();
     let mesh = read(&Ply::new(ENCODINGS[0]).element("vertex", &properties, &colored).bytes()).unwrap();
     let of = |v: u32| mesh.colors[v as usize];
-    assert!(mesh.loose_attributes.iter().all(|ends| ends.map(of) == [[1.0, 0.0, 0.0, 1.0]; 2]));
-    assert_eq!(mesh.loose_attributes.len(), 3);
+    assert!(mesh.line_point_attributes.iter().all(|ends| ends.map(of) == [[1.0, 0.0, 0.0, 1.0]; 2]));
+    assert_eq!(mesh.line_point_attributes.len(), 3);
     // Too many to draw, and told before they are.
     let few = Limits { triangles: 11, ..Limits::default() };
     let cloud = Ply::new(ENCODINGS[1]).element("vertex", &XYZ, &points).bytes();
@@ -96,8 +96,8 @@ fn ply_clouds_and_edges() {
     let Some(models) = folder("models") else { return };
     for name in ["points_ascii.ply", "points_bin.ply"] {
         let mesh = read(&std::fs::read(models.join(name)).unwrap()).unwrap();
-        assert_eq!(mesh.loose.len() as u64, mesh.report.file_vertices, "{name}");
-        assert!(mesh.loose.len() > 3 && mesh.loose.iter().all(|one| one.is_point()), "{name}");
+        assert_eq!(mesh.lines_and_points.len() as u64, mesh.report.file_vertices, "{name}");
+        assert!(mesh.lines_and_points.len() > 3 && mesh.lines_and_points.iter().all(|one| one.is_point()), "{name}");
     }
 }
 
@@ -108,7 +108,7 @@ fn off_and_fbx_have_them_too() {
     assert_eq!((loose(&mesh), mesh.triangles.len()), (vec![([A, B], 0), ([C, C], 0)], 1));
     let cloud = read(b"COFF\n3 0 0\n0 0 0 1 0 0\n2 0 0 1 0 0\n0 1 0.5 1 0 0\n").unwrap();
     assert_eq!(loose(&cloud), [([A, A], 0), ([B, B], 0), ([C, C], 0)]);
-    assert_eq!(cloud.loose_attributes.len(), 3);
+    assert_eq!(cloud.line_point_attributes.len(), 3);
 
     let solid = Solid { positions: vec![A, B, C], polygons: vec![vec![0, 1], vec![2], vec![0, 1, 2]] };
     let curve = node(

@@ -25,7 +25,7 @@ fn all_models_import() {
             Ok(mesh) => {
                 imported += 1;
                 let count = mesh.triangles.len();
-                assert!(count > 0 || !mesh.loose.is_empty(), "{name}");
+                assert!(count > 0 || !mesh.lines_and_points.is_empty(), "{name}");
                 assert_eq!([mesh.face_normals.len(), mesh.edge_masks.len(), mesh.triangle_materials.len()], [count; 3]);
                 let positions = mesh.positions.len() as u32;
                 assert!(mesh.triangles.iter().flatten().all(|&v| v < positions), "{name}");

@@ -96,7 +96,7 @@ fn headers_that_lie_are_seen_through() {
         assert_same_shape(&expected, &read(text.as_bytes()).unwrap_or_else(|error| panic!("{error}: {text}")), text);
     }
     assert_eq!(texts.len(), 4);
-    assert_eq!(read(texts[1].as_bytes()).unwrap().report.facts.generator.as_deref(), Some("a test"));
+    assert_eq!(read(texts[1].as_bytes()).unwrap().report.metadata.generator.as_deref(), Some("a test"));
     assert_eq!(read(texts[1].repeat(2).as_bytes()).unwrap().triangles.len(), 6, "two solids on a line");
     assert!(read(texts[1].split("endsolid").next().unwrap().as_bytes()).unwrap_err().detail.contains("cut off"));
     let shouting = text.to_ascii_uppercase().replace('\n', "\r\n");

@@ -55,7 +55,7 @@ fn every_seed_is_read_to_the_end() {
             let Some(result) = targets::imported(target, &bytes) else { continue };
             match (result, REFUSED.iter().find(|(known, _)| *known == seed)) {
                 (Ok(mesh), None) => {
-                    assert!(!mesh.triangles.is_empty() || !mesh.loose.is_empty(), "{seed}");
+                    assert!(!mesh.triangles.is_empty() || !mesh.lines_and_points.is_empty(), "{seed}");
                     read += 1;
                 }
                 (Err(error), Some((_, why))) => {

@@ -7,17 +7,17 @@ use meshsnap::backend::cpu::{CpuRenderer, Isa};
 use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::image::{Image, srgb8_thresholds};
 use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, Faces, LayersPass, MaterialLook, SurfacePass, flags, roles};
+use meshsnap::plan::{DrawPlan, Faces, PeelingPass, ShadedMaterial, SurfacePass, flags, pass_mask};
 
 use crate::render::twins::pictures::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::soups::{KINDS, Kind, Random, Soup, View};
 
-const PASS: LayersPass = LayersPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
+const PASS: PeelingPass = PeelingPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
 
 /// Looks of a soup's parts: half of them let something through, one is wires alone.
-fn materials() -> Vec<MaterialLook> {
-    let wire = |look: MaterialLook| MaterialLook {
+fn materials() -> Vec<ShadedMaterial> {
+    let wire = |look: ShadedMaterial| ShadedMaterial {
         wire_color: [0.4, 0.1, 0.05, 0.8],
         wire_thickness: 1.0,
         wire_smoothing: 1.0,
@@ -25,8 +25,8 @@ fn materials() -> Vec<MaterialLook> {
         ..look
     };
     let fill = |color| {
-        let look = MaterialLook::unlit(color);
-        MaterialLook { flags: look.flags | flags::BLEND, ..look }
+        let look = ShadedMaterial::unlit(color);
+        ShadedMaterial { flags: look.flags | flags::BLEND, ..look }
     };
     let mut bare = wire(fill([0.0; 4]));
     bare.flags &= !flags::FILL;
@@ -49,24 +49,24 @@ struct Layered {
 impl Layered {
     fn new(soup: Soup, random: &mut Random) -> Self {
         let kinds = [
-            roles::LAYER,
-            roles::LAYER,
-            roles::SURFACE,
-            roles::SURFACE | roles::LAYER,
-            roles::LAYER | roles::FRONT_ONLY,
-            roles::LAYER | roles::BACK_ONLY,
-            roles::SURFACE | roles::FRONT_ONLY,
+            pass_mask::LAYER,
+            pass_mask::LAYER,
+            pass_mask::SURFACE,
+            pass_mask::SURFACE | pass_mask::LAYER,
+            pass_mask::LAYER | pass_mask::FRONT_ONLY,
+            pass_mask::LAYER | pass_mask::BACK_ONLY,
+            pass_mask::SURFACE | pass_mask::FRONT_ONLY,
             0,
         ];
-        let roles = soup.triangles.iter().map(|_| kinds[random.below(kinds.len())]).collect();
+        let pass_masks = soup.triangles.iter().map(|_| kinds[random.below(kinds.len())]).collect();
         let materials = soup.triangles.iter().map(|_| random.below(5) as u32).collect();
         Self { soup, roles, materials }
     }
 
-    fn plan(&self, view: &View, pass: LayersPass) -> DrawPlan<'_> {
+    fn plan(&self, view: &View, pass: PeelingPass) -> DrawPlan<'_> {
         let mut plan = self.soup.plan(view);
-        plan.roles = Cow::Borrowed(&self.roles);
-        plan.layers = Some(pass);
+        plan.pass_masks = Cow::Borrowed(&self.pass_masks);
+        plan.peeling = Some(pass);
         if let Some(surface) = &mut plan.surface {
             *surface = SurfacePass::new(surface.faces, materials());
             surface.triangle_materials = &self.materials;
@@ -124,7 +124,7 @@ fn layers_of_soups_are_the_same() {
                 let soup = Layered::new(Soup::new(kind, count, 0.7, &mut random), &mut random);
                 let view = View::new([90, 70], samples, distance, &mut random);
                 let view = View { hull_px: hulls[cases % 3], ..view };
-                let pass = LayersPass { behind_surface: cases % 4 == 3, ..PASS };
+                let pass = PeelingPass { behind_surface: cases % 4 == 3, ..PASS };
                 seen += compare(&soup.plan(&view, pass), &format!("{kind:?} {samples} {distance}"));
                 cases += 1;
             }
@@ -158,7 +158,7 @@ fn pictures_with_layers_agree() {
                 let hull_px = [None, Some(2.0), Some(0.0)][(cases / 2) % 3];
                 let view = View { hull_px, ..View::new([120, 90], samples, distance, &mut random) };
                 let through = i % 3 == 2;
-                let pass = LayersPass {
+                let pass = PeelingPass {
                     count_max: 1 + random.below(16) as u32,
                     behind_surface: through,
                     wires_only: through,
@@ -194,13 +194,13 @@ fn layers_are_what_sorting_each_sample_gives() {
             for distance in [0.0, 3.0, 0.5] {
                 let mut soup = Layered::new(Soup::new(kind, 60, 0.7, &mut random), &mut random);
                 // Mostly layers: what is opaque hides them.
-                for role in soup.roles.iter_mut().filter(|role| **role & roles::SURFACE != 0) {
-                    *role = if random.below(6) == 0 { *role } else { roles::LAYER };
+                for role in soup.pass_masks.iter_mut().filter(|role| **role & pass_mask::SURFACE != 0) {
+                    *role = if random.below(6) == 0 { *role } else { pass_mask::LAYER };
                 }
                 // Colours must not depend on where in its pixel a triangle is shaded.
                 soup.materials.iter_mut().for_each(|m| *m %= 2);
                 let view = View::new([50, 40], samples, distance, &mut random);
-                let plan = soup.plan(&view, LayersPass { count_max: 64, ..PASS });
+                let plan = soup.plan(&view, PeelingPass { count_max: 64, ..PASS });
                 let (want, depth) = sorted(&plan);
                 deepest = deepest.max(depth);
                 let got = CpuRenderer::new(2).draw(&plan, &Deadline::default()).unwrap();
@@ -220,20 +220,20 @@ fn sorted(plan: &DrawPlan<'_>) -> (Image, usize) {
     let len = (plan.width_px * plan.height_px * plan.samples) as usize;
     let mut owners: Vec<Vec<(u32, u32, bool)>> = vec![Vec::new(); len];
     for (id, triangle) in plan.triangles.iter().enumerate() {
-        let role = plan.roles[id];
+        let role = plan.pass_masks[id];
         let faces = match role {
-            r if r & roles::FRONT_ONLY != 0 => Faces::Front,
-            r if r & roles::BACK_ONLY != 0 => Faces::Back,
+            r if r & pass_mask::FRONT_ONLY != 0 => Faces::Front,
+            r if r & pass_mask::BACK_ONLY != 0 => Faces::Back,
             _ => Faces::Both,
         };
         let alone = [*triangle];
         let mut single = DrawPlan::new([plan.width_px, plan.height_px], plan.positions, &alone, plan.projection);
         single.samples = plan.samples;
-        single.surface = Some(SurfacePass::new(faces, vec![MaterialLook::unlit([1.0; 4])]));
+        single.surface = Some(SurfacePass::new(faces, vec![ShadedMaterial::unlit([1.0; 4])]));
         let words = CpuRenderer::new(1).draw_visibility(&single, &Deadline::default()).unwrap();
         for (owners, word) in owners.iter_mut().zip(words).filter(|(_, word)| *word != 0) {
             let depth = (word >> 32) as u32;
-            for (bit, is_opaque) in [(roles::SURFACE, true), (roles::LAYER, false)] {
+            for (bit, is_opaque) in [(pass_mask::SURFACE, true), (pass_mask::LAYER, false)] {
                 if role & bit != 0 {
                     owners.push((depth, id as u32, is_opaque));
                 }

@@ -73,13 +73,13 @@ fn glass_shows_the_outlines_of_others_behind_it() {
     // From the left, the ball named "right" is larger and behind the other.
     let mesh = scenes::mesh(&shapes::two_balls());
     let mut spec = outlined("left");
-    spec.camera.projection = meshsnap::spec::Projection::Orthographic;
+    spec.camera.projection = meshsnap::spec::ProjectionKind::Orthographic;
     glass(&mut spec.layers);
     let mut rear = spec.layers;
     spec.layers.outline = None;
     rear.outline.iter_mut().for_each(|outline| outline.thickness = Some(2.0));
     spec.materials = vec![("left".into(), rear)];
-    spec.camera.view = meshsnap::spec::View::Right;
+    spec.camera.view = meshsnap::spec::NamedView::Right;
     // Now the one named "left", which has an outline, is behind.
     let plan = scenes::plan(&mesh, &spec);
     let shown = draw(&plan, "another's outline behind glass");
@@ -151,7 +151,7 @@ fn a_part_that_hides_its_wires_keeps_those_in_front_where_another_shows_all() {
     shows.wire.iter_mut().for_each(|wire| wire.hidden = Hidden::Show);
     spec.materials = vec![("right".into(), shows)];
     let plan = scenes::plan(&mesh, &spec);
-    assert!(plan.layers.is_some_and(|layers| layers.wires_only && layers.behind_surface));
+    assert!(plan.peeling.is_some_and(|layers| layers.wires_only && layers.behind_surface));
     let one_shows = draw(&plan, "one shows");
     let differing = |right: bool| {
         let pixels = all_hide.rgba.chunks(4).zip(one_shows.rgba.chunks(4)).enumerate();

@@ -33,8 +33,8 @@ fn cube() -> Mesh {
     let mut mesh = scenes::mesh(&shapes::cube());
     let first = mesh.positions.len() as u32;
     mesh.positions.extend([[0.0, 0.1, 1.4], [0.0, 0.0, -1.4], [0.9, -0.5, 0.0], [0.9, 0.5, 0.3]]);
-    mesh.loose = vec![segment(first, first + 1), segment(first + 2, first + 3)];
-    mesh.loose.extend((0..8).map(|v| LineOrPoint::point(v, 0)));
+    mesh.lines_and_points = vec![segment(first, first + 1), segment(first + 2, first + 3)];
+    mesh.lines_and_points.extend((0..8).map(|v| LineOrPoint::point(v, 0)));
     mesh
 }
 
@@ -123,7 +123,7 @@ fn they_have_neither_edges_nor_outlines() {
         let spec = scenes::spec(&[keys, &[("size", "160x120")]].concat());
         // Seen by the same camera.
         let (mut bare, mut mesh) = (cube(), cube());
-        bare.loose.clear();
+        bare.lines_and_points.clear();
         thicken(&mut mesh, &spec);
         let (without, with) = (scenes::plan(&bare, &spec), scenes::plan(&mesh, &spec));
         assert_eq!(with.triangles.len(), without.triangles.len() + 2 * 2 + 8 * 4);
@@ -207,7 +207,7 @@ fn both_back_ends_draw_them_alike_without_a_surface() {
                 let spec = scenes::spec(&[look, &[("size", "160x120")]].concat());
                 let mut mesh = cube();
                 if is_alone {
-                    mesh = alone(&mesh.positions, &mesh.loose);
+                    mesh = alone(&mesh.positions, &mesh.lines_and_points);
                 }
                 assert_eq!(thicken(&mut mesh, &spec), None);
                 let plan = scenes::plan(&mesh, &spec);

@@ -6,7 +6,7 @@ use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
-use meshsnap::plan::{DrawPlan, MaterialLook, flags};
+use meshsnap::plan::{DrawPlan, ShadedMaterial, flags};
 
 use crate::render::twins::pictures as twins;
 use crate::support::{scenes, shapes};
@@ -93,12 +93,12 @@ fn check(method: u32, formula: Formula) {
         let positions = corners.map(|[x, y, far]| [x / SCALE, y / SCALE, far]);
         let triangle = Triangle::new(positions);
         for [t, s] in PARAMETERS {
-            let look = MaterialLook {
+            let look = ShadedMaterial {
                 wire_color: [0.0, 0.0, 0.0, 1.0],
                 wire_thickness: t as f32,
                 wire_smoothing: s as f32,
                 flags: flags::FILL | method,
-                ..MaterialLook::unlit([1.0; 4])
+                ..ShadedMaterial::unlit([1.0; 4])
             };
             let mut plan = scenes::screen_plan(SIZE, 1, SCALE, &positions, &[[0, 1, 2]]);
             plan.projection.w = [0.0, 0.0, 1.0, 1.0];

@@ -26,7 +26,7 @@ fn projection() -> Projection {
         center: DVec2::ZERO,
         distance: 0.0,
         half_size: DVec2::splat(1.25),
-        kind: spec::Projection::Perspective,
+        kind: spec::ProjectionKind::Perspective,
         near: 0.5 * NEAREST,
         far: 2.0 * FARTHEST,
         contains_mesh: true,

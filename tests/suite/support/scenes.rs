@@ -4,7 +4,7 @@ use meshsnap::import::Bundle;
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use meshsnap::plan;
-use meshsnap::plan::{DrawPlan, Faces, MaterialLook, Projection, SurfacePass};
+use meshsnap::plan::{DrawPlan, Faces, Projection, ShadedMaterial, SurfacePass};
 use meshsnap::request;
 use meshsnap::request::Rules;
 use meshsnap::spec::BackendChoice;
@@ -238,7 +238,7 @@ pub fn screen_plan<'a>(
     };
     DrawPlan {
         samples,
-        surface: Some(SurfacePass::new(Faces::Both, vec![MaterialLook::unlit([1.0; 4])])),
+        surface: Some(SurfacePass::new(Faces::Both, vec![ShadedMaterial::unlit([1.0; 4])])),
         background: [0.0, 0.0, 0.0, 1.0],
         ..DrawPlan::new(size_px, positions, triangles, projection)
     }

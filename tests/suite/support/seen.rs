@@ -11,7 +11,10 @@ use crate::oracle::visible::{self, Segment};
 
 /// The plan's numbers and nothing else: its geometry, and the edges of its first line pass.
 pub fn scene(plan: &DrawPlan<'_>) -> Scene {
-    assert!(plan.roles.is_empty() && plan.layers.is_none() && plan.hull.is_none(), "the oracle draws one surface");
+    assert!(
+        plan.pass_masks.is_empty() && plan.peeling.is_none() && plan.hull.is_none(),
+        "the oracle draws one surface"
+    );
     let row = |r: [f32; 4], scale: f64| r.map(|v| f64::from(v) * scale);
     let p = &plan.projection;
     let sides = plan.surface.as_ref().map_or(Sides::Neither, |surface| match surface.faces {

@@ -1,6 +1,6 @@
 //! Random triangles to disagree about, and how they are looked at.
 
-use meshsnap::plan::{DrawPlan, Faces, HullPass, HullVertex, MaterialLook, Projection, SurfacePass};
+use meshsnap::plan::{DrawPlan, Faces, HullPass, HullVertex, Projection, ShadedMaterial, SurfacePass};
 
 /// xorshift64*: the tests must draw the same soups everywhere.
 pub struct Random(pub u64);
@@ -139,7 +139,7 @@ impl Soup {
 }
 
 pub fn flat_surface(faces: Faces) -> SurfacePass<'static> {
-    SurfacePass::new(faces, vec![MaterialLook::unlit([0.5, 0.25, 0.125, 1.0])])
+    SurfacePass::new(faces, vec![ShadedMaterial::unlit([0.5, 0.25, 0.125, 1.0])])
 }
 
 /// How a soup is looked at.

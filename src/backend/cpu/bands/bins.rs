@@ -11,7 +11,7 @@ use crate::backend::cpu::lines::contour;
 use crate::backend::cpu::lines::segment::Segment;
 use crate::backend::cpu::{CHUNK, Stages};
 use crate::limits::Stopped;
-use crate::plan::{DrawPlan, Faces, HullPass, LinePass, roles};
+use crate::plan::{DrawPlan, Faces, HullPass, LinePass, pass_mask};
 
 /// A triangle that touches as many bands is listed once for all of them, or large ones on a tall picture would take gigabytes
 /// of lists.
@@ -134,11 +134,11 @@ impl Pass {
         if self.role == 0 {
             return Some(self.faces);
         }
-        match plan.roles.get(id) {
+        match plan.pass_masks.get(id) {
             None => Some(self.faces),
             Some(role) if role & self.role == 0 => None,
-            Some(role) if role & roles::FRONT_ONLY != 0 => Some(Faces::Front),
-            Some(role) if role & roles::BACK_ONLY != 0 => Some(Faces::Back),
+            Some(role) if role & pass_mask::FRONT_ONLY != 0 => Some(Faces::Front),
+            Some(role) if role & pass_mask::BACK_ONLY != 0 => Some(Faces::Back),
             _ => Some(self.faces),
         }
     }
@@ -151,10 +151,10 @@ fn passes(plan: &DrawPlan<'_>) -> (Vec<Pass>, Vec<Pass>) {
     let around = |hull: &HullPass<'_>| Pass { ids: count..count + hull.triangles.len(), role: 0, faces: Faces::Both };
     let hull = plan.hull.as_ref().map(around);
     // Without roles, nothing is a layer.
-    let layer = surface(roles::LAYER).filter(|_| plan.layers().is_some() && !plan.roles.is_empty());
-    let (base_hull, layered_hull) = if plan.has_layered_hull() { (None, hull) } else { (hull, None) };
+    let layer = surface(pass_mask::LAYER).filter(|_| plan.peeling().is_some() && !plan.pass_masks.is_empty());
+    let (base_hull, layered_hull) = if plan.has_peeled_hull() { (None, hull) } else { (hull, None) };
     let collect = |passes: [Option<Pass>; 2]| passes.into_iter().flatten().collect();
-    (collect([surface(roles::SURFACE), base_hull]), collect([layer, layered_hull]))
+    (collect([surface(pass_mask::SURFACE), base_hull]), collect([layer, layered_hull]))
 }
 
 fn chunks(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {

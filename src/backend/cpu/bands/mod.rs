@@ -30,7 +30,7 @@ pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: u
     fill_samples(stages, scratch, bins, band);
     scratch.colors.clear();
     scratch.colors.resize(pixels, [0.0; 4]);
-    if let Some(pass) = plan.layers() {
+    if let Some(pass) = plan.peeling() {
         let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples, scratch.rows));
         composite::draw(stages, pass, (&bins.layers, band), &scratch.samples, layers, &mut scratch.colors);
     } else if plan.is_shaded() {
@@ -58,7 +58,7 @@ pub fn draw_layer(
     words: &mut [u64],
 ) {
     fill_samples(stages, scratch, bins, band);
-    if let Some(pass) = stages.plan.layers() {
+    if let Some(pass) = stages.plan.peeling() {
         let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples, scratch.rows));
         let found = composite::find(stages, pass, (&bins.layers, band), &scratch.samples, layers, layer);
         for_each_sample(&layers.found, words, |at| found[at]);

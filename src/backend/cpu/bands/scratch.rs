@@ -76,7 +76,7 @@ fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
     }
     let light = if plan.lights_lines() { size_of::<Light>() + size_of::<u32>() } else { 0 };
     let ink = if plan.lines.is_empty() { 0 } else { size_of::<Ink>() };
-    let layers = if plan.layers().is_some() { LayerBand::SAMPLE_BYTES } else { 0 };
+    let layers = if plan.peeling().is_some() { LayerBand::SAMPLE_BYTES } else { 0 };
     plan.width_px as usize * (size_of::<[f32; 4]>() + light + ink) + samples(plan.width_px) * layers
 }
 
@@ -156,7 +156,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::plan::{Faces, LayersPass, LinePass, Projection, Shown, SurfacePass};
+    use crate::plan::{Faces, LinePass, PeelingPass, Projection, Shown, SurfacePass};
 
     fn plan(size_px: [u32; 2], passes: usize) -> DrawPlan<'static> {
         let zero = [0.0; 4];
@@ -221,8 +221,8 @@ mod tests {
                     for lines in &mut plan.lines {
                         (lines.width_px, lines.shown, lines.lit) = (width_px, Shown::Hidden, true);
                     }
-                    let layers = LayersPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
-                    plan.layers = Some(layers).filter(|_| layered);
+                    let layers = PeelingPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
+                    plan.peeling = Some(layers).filter(|_| layered);
                     plan.samples = samples;
                     each(&plan);
                     // Where the mesh goes on beyond the picture.
@@ -266,7 +266,7 @@ mod tests {
                 scratch.ink = Vec::with_capacity(pixels);
                 scratch.owners = Vec::with_capacity(pixels);
                 scratch.light = Vec::with_capacity(pixels);
-                scratch.layers = plan.layers().map(|_| LayerBand::new(&scratch.samples, scratch.rows));
+                scratch.layers = plan.peeling().map(|_| LayerBand::new(&scratch.samples, scratch.rows));
                 assert_eq!(scratch.bytes(), banding.bytes(plan));
             });
             cases += 1;

@@ -97,7 +97,7 @@ impl<'a> Inker<'a> {
     pub fn new(plan: &'a DrawPlan<'a>, band: &'a SampleBand, layers: Option<&'a LayerBand>) -> Self {
         let samples = if plan.is_shaded() && !plan.lines.is_empty() { plan.samples } else { 0 };
         // Those of another plan may be left there.
-        let layers = layers.filter(|_| plan.layers().is_some());
+        let layers = layers.filter(|_| plan.peeling().is_some());
         Self { plan, band, layers, cells: (0..samples).map(|s| cell(samples, s)).collect() }
     }
 

@@ -10,7 +10,7 @@ use crate::backend::cpu::isa::dispatch;
 use crate::backend::cpu::peeling::emit_layer::peel;
 use crate::backend::cpu::surface::point::Show;
 use crate::backend::cpu::surface::shade::Shader;
-use crate::plan::{LayersPass, roles};
+use crate::plan::{PeelingPass, pass_mask};
 
 /// What a band's layers need beside its samples: rows that are shown, and none of those beyond them.
 pub struct LayerBand {
@@ -113,7 +113,7 @@ impl LayerBand {
 /// Shades the band: its layers, and the surface under them.
 pub fn draw(
     stages: &Stages<'_>,
-    pass: &LayersPass,
+    pass: &PeelingPass,
     bins: (&[TriangleBin], usize),
     base: &SampleBand,
     layers: &mut LayerBand,
@@ -137,7 +137,7 @@ pub fn draw(
 /// Leaves layer number `layer` in `found`, unshaded: id [`NOTHING`] where a sample has none.
 pub fn find(
     stages: &Stages<'_>,
-    pass: &LayersPass,
+    pass: &PeelingPass,
     bins: (&[TriangleBin], usize),
     base: &SampleBand,
     layers: &mut LayerBand,
@@ -188,7 +188,7 @@ fn lay_sampled<const S: usize>(
     layers: &mut LayerBand,
     is_open: &mut bool,
 ) {
-    let hull = stages.plan.hull.as_ref().filter(|_| stages.plan.has_layered_hull());
+    let hull = stages.plan.hull.as_ref().filter(|_| stages.plan.has_peeled_hull());
     let triangles = stages.plan.triangles.len() as u32;
     let mut shader = Shader::new(stages);
     for y in layers.found.shown[0]..layers.found.shown[1] {
@@ -230,8 +230,8 @@ fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colo
 #[inline(always)]
 fn under_sampled<const S: usize>(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colors: &mut [[f32; 4]]) {
     let plan = stages.plan;
-    let wires_only = plan.layers().is_some_and(|pass| pass.wires_only);
-    let show = |id: u32| match wires_only && plan.role(id as usize) & roles::LAYER != 0 {
+    let wires_only = plan.peeling().is_some_and(|pass| pass.wires_only);
+    let show = |id: u32| match wires_only && plan.pass_mask(id as usize) & pass_mask::LAYER != 0 {
         true => Show { fill: true, wires: 0.0 },
         false => Show::ALL,
     };

@@ -6,10 +6,10 @@ use super::point::{lit, normal};
 use super::texture::{Uv, blend, floor};
 use super::wire::{Place, edge_mask, is_drawn};
 use crate::backend::cpu::vector::dot;
-use crate::plan::{MaterialLook, SurfacePass, flags};
+use crate::plan::{ShadedMaterial, SurfacePass, flags};
 
 /// What the material's debug view shows at a point: opaque linear RGBA.
-pub fn color(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<'_>, corners: &[Corner; 3]) -> [f32; 4] {
+pub fn color(surface: &SurfacePass<'_>, look: &ShadedMaterial, place: &Place<'_>, corners: &[Corner; 3]) -> [f32; 4] {
     let b = place.b.value;
     let projection = &place.stages.plan.projection;
     match (look.flags & flags::DEBUG) >> flags::DEBUG_SHIFT {

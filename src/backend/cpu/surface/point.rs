@@ -9,7 +9,7 @@ use crate::backend::cpu::Stages;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::area;
 use crate::backend::cpu::vector::{across, cross, facing, sub, turned_to_viewer, unit_or};
-use crate::plan::{MaterialLook, SurfacePass, TEXTURE_NONE, flags, slots};
+use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, slots};
 
 /// What the common looks do without, textures aside.
 const RICH: u32 = flags::DERIVATIVE_NORMALS
@@ -82,7 +82,7 @@ impl<'a> PointShader<'a> {
     }
 
     /// One base colour, smooth or with a wire by fwidth.
-    fn common(&self, surface: &SurfacePass<'_>, look: &MaterialLook, id: u32, at: [f32; 2]) -> [f32; 4] {
+    fn common(&self, surface: &SurfacePass<'_>, look: &ShadedMaterial, id: u32, at: [f32; 2]) -> [f32; 4] {
         let b = Barycentrics::new(&corners(self.stages, id, at));
         let base = self.with_alpha(look, look.base_color);
         let mut light = Light::NONE;
@@ -112,7 +112,7 @@ impl<'a> PointShader<'a> {
     fn rich(
         &self,
         surface: &SurfacePass<'_>,
-        look: &MaterialLook,
+        look: &ShadedMaterial,
         id: u32,
         at: [f32; 2],
         is_textured: bool,
@@ -161,7 +161,7 @@ impl<'a> PointShader<'a> {
     }
 
     /// What the material makes of alpha.
-    fn with_alpha(&self, look: &MaterialLook, mut base: [f32; 4]) -> [f32; 4] {
+    fn with_alpha(&self, look: &ShadedMaterial, mut base: [f32; 4]) -> [f32; 4] {
         // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.
         base[3] = if base[3] > 0.0 { base[3].min(1.0) } else { 0.0 };
         let is_cut = look.flags & flags::MASK != 0 && base[3] < look.alpha_cutoff;
@@ -185,7 +185,7 @@ impl<'a> PointShader<'a> {
     fn bumped(
         &self,
         surface: &SurfacePass<'_>,
-        look: &MaterialLook,
+        look: &ShadedMaterial,
         place: &Place<'_>,
         uv: &Uv,
         n: [f32; 3],
@@ -224,7 +224,7 @@ impl<'a> PointShader<'a> {
 }
 
 /// The unit normal on the viewer's side, without normal textures.
-pub fn normal(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<'_>) -> [f32; 3] {
+pub fn normal(surface: &SurfacePass<'_>, look: &ShadedMaterial, place: &Place<'_>) -> [f32; 3] {
     let Place { stages, id, b, .. } = place;
     let to_viewer = stages.plan.projection.to_viewer;
     if look.flags & flags::DERIVATIVE_NORMALS != 0 {
@@ -258,7 +258,7 @@ fn derivative_normal(place: &Place<'_>) -> [f32; 3] {
 }
 
 /// Base colour with straight alpha.
-fn base_color(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<'_>, texel: [f32; 4]) -> [f32; 4] {
+fn base_color(surface: &SurfacePass<'_>, look: &ShadedMaterial, place: &Place<'_>, texel: [f32; 4]) -> [f32; 4] {
     let tint = match &surface.colors {
         Some(colors) if look.flags & flags::VERTEX_COLORS != 0 => {
             blend(colors.triangles[place.id as usize].map(|i| colors.values[i as usize]), place.b.value)

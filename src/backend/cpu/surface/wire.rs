@@ -2,7 +2,7 @@
 
 use super::barycentric::{Barycentrics, Quad};
 use crate::backend::cpu::Stages;
-use crate::plan::{MaterialLook, SurfacePass, flags};
+use crate::plan::{ShadedMaterial, SurfacePass, flags};
 
 /// Where a point lies in its triangle, and which triangle that is.
 pub struct Place<'a> {
@@ -17,7 +17,7 @@ pub struct Place<'a> {
 }
 
 /// 1 on the wire, 0 away from it.
-pub fn wire_cover(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<'_>) -> f32 {
+pub fn wire_cover(surface: &SurfacePass<'_>, look: &ShadedMaterial, place: &Place<'_>) -> f32 {
     let mask = edge_mask(surface, place.id);
     let b = &place.b;
     if look.flags & flags::WIRE_FWIDTH != 0 {
@@ -40,7 +40,7 @@ pub fn wire_cover(surface: &SurfacePass<'_>, look: &MaterialLook, place: &Place<
 
 /// The smoothstep of each coordinate by its own exact width, and the minimum of the three.
 #[inline(always)]
-pub fn fwidth_cover(mask: u8, look: &MaterialLook, b: &Barycentrics) -> f32 {
+pub fn fwidth_cover(mask: u8, look: &ShadedMaterial, b: &Barycentrics) -> f32 {
     let (thickness, end) = (look.wire_thickness, look.wire_thickness + look.wire_smoothing);
     let mut away = 1.0_f32;
     for i in 0..3 {

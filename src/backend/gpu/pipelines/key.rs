@@ -48,10 +48,10 @@ pub fn look(plan: &DrawPlan<'_>) -> u32 {
     }
     if let Some(hull) = &plan.hull {
         look |= HULL | when(!hull.triangle_materials.is_empty(), HULL_LOOKS);
-        look |= when(plan.has_layered_hull(), LAYERED_HULL);
+        look |= when(plan.has_peeled_hull(), LAYERED_HULL);
     }
-    look |= when(plan.roles.len() == count && count > 0, ROLES);
-    if let Some(layers) = plan.layers() {
+    look |= when(plan.pass_masks.len() == count && count > 0, ROLES);
+    if let Some(layers) = plan.peeling() {
         look |= LAYERS | when(layers.behind_surface, BEHIND_SURFACE) | when(layers.wires_only, WIRES_ONLY);
     }
     look | when(!plan.lines.is_empty(), LINES)

@@ -17,7 +17,7 @@ use super::params::{Batch, edge_lists, faces_code};
 use crate::backend::DrawError;
 use crate::backend::gpu::pass_mask::Pass;
 use crate::backend::gpu::pipelines::{Into, Stage, Write};
-use crate::plan::{DrawPlan, roles};
+use crate::plan::{DrawPlan, pass_mask};
 
 /// Triangles a dispatch, where none needs clipping; each may leave one item in the work list.
 const CHUNK: u32 = 1 << 20;
@@ -113,7 +113,7 @@ impl Schedule {
 
     /// One round a layer; a round does nothing where the one before has left nothing to find.
     fn layers(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, band: Batch, goal: Goal) -> Result<(), DrawError> {
-        let Some(pass) = plan.layers() else { return Ok(()) };
+        let Some(pass) = plan.peeling() else { return Ok(()) };
         let rounds = match goal {
             Goal::Picture => pass.count_max,
             Goal::Samples => 0,
@@ -122,7 +122,7 @@ impl Schedule {
         self.layers = rounds;
         let count = plan.width_px * band.row_end.abs_diff(band.row_first);
         // A layer that is wanted for itself is not shaded: then no sample is done before its last triangle.
-        let role = if goal == Goal::Picture { u32::from(roles::LAYER) } else { 0 };
+        let role = if goal == Goal::Picture { u32::from(pass_mask::LAYER) } else { 0 };
         let mut ends = Vec::new();
         for layer in 0..rounds {
             self.steps.push(Step::ClearLayer);

@@ -107,7 +107,7 @@ impl Banding {
     /// Bytes of all buffers that hold a band.
     pub fn bytes(&self, plan: &DrawPlan<'_>) -> u64 {
         let seen = if has_visibility(plan) { self.seen_samples(plan) * SAMPLE_BYTES } else { 0 };
-        let layers = if plan.layers().is_some() { LAYERED_BYTES + SAMPLE_BYTES } else { 0 };
+        let layers = if plan.peeling().is_some() { LAYERED_BYTES + SAMPLE_BYTES } else { 0 };
         let (strokes, owners) = if plan.lines.is_empty() { (0, 0) } else { (STROKES_BYTES, OWNER_BYTES) };
         let pixel = u64::from(plan.samples) * layers + color_bytes(plan) + strokes + owners + RGBA_BYTES;
         seen + u64::from(plan.width_px) * u64::from(self.rows) * pixel
@@ -155,7 +155,7 @@ fn seen_bytes(plan: &DrawPlan<'_>) -> u64 {
 /// Bytes a pixel of the largest buffer that holds a band.
 fn pixel_bytes(plan: &DrawPlan<'_>) -> u64 {
     let strokes = if plan.lines.is_empty() { 0 } else { STROKES_BYTES };
-    let sample = if plan.layers().is_some() { LAYERED_BYTES } else { SAMPLE_BYTES };
+    let sample = if plan.peeling().is_some() { LAYERED_BYTES } else { SAMPLE_BYTES };
     (u64::from(plan.samples) * sample).max(color_bytes(plan)).max(strokes)
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::sizes::DeviceTraits;
-use crate::plan::{DrawPlan, Edge, Faces, LayersPass, LinePass, Projection, Shown, SurfacePass, roles};
+use crate::plan::{DrawPlan, Edge, Faces, LinePass, PeelingPass, Projection, Shown, SurfacePass, pass_mask};
 
 /// A software adapter.
 pub const DEVICE: DeviceTraits = DeviceTraits {
@@ -61,8 +61,8 @@ pub fn plan<'a>(triangles: &'a [[u32; 3]], case: Case) -> DrawPlan<'a> {
     plan.margin_px = case.beyond;
     plan.surface = Some(SurfacePass { is_shaded: true, ..SurfacePass::new(Faces::Both, Vec::new()) });
     if case.is_layered {
-        plan.roles = vec![roles::SURFACE | roles::LAYER; triangles.len()].into();
-        plan.layers = Some(LayersPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 });
+        plan.pass_masks = vec![pass_mask::SURFACE | pass_mask::LAYER; triangles.len()].into();
+        plan.peeling = Some(PeelingPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 });
     }
     plan.lines = vec![lines(edges(3), case.width_px, case.shown); case.passes];
     plan

@@ -34,7 +34,7 @@ pub struct Primitive {
     colors: Vec<[f64; 4]>,
     triangles: Vec<[u32; 3]>,
     /// Ends of line segments; of points, the vertex twice.
-    loose: Vec<[u32; 2]>,
+    lines_and_points: Vec<[u32; 2]>,
     /// As [`RawMesh::edge_masks`]; empty where every edge is a polygon's.
     edge_masks: Vec<u8>,
     /// As [`crate::mesh::ImportReport::polygons_by_arity`].
@@ -106,7 +106,7 @@ impl Primitive {
         let indices = vertices.indices(reader, cx)?;
         let count = out.positions.len();
         out.triangles = triangles::of(what, vertices.mode(), indices.as_deref(), count, cx)?;
-        out.loose = triangles::loose(vertices.mode(), indices.as_deref(), count, cx)?;
+        out.lines_and_points = triangles::lines_and_points(vertices.mode(), indices.as_deref(), count, cx)?;
         if source.has_ngons && vertices.mode() == mode::TRIANGLES {
             cx.budget.spend("glTF polygons", out.triangles.len() as u64, 1)?;
             (out.edge_masks, out.polygons_by_arity) = ngons::edge_masks(&out.triangles);
@@ -154,8 +154,13 @@ impl Primitive {
         raw.edge_masks.resize(raw.triangles.len(), ALL_EDGES);
         let material = self.material.unwrap_or(default_material) as u32;
         raw.triangle_materials.resize(raw.triangles.len(), material);
-        cx.budget.spend("glTF lines and points", self.loose.len() as u64, 2 * size_of::<LineOrPoint>() as u64)?;
-        raw.loose.extend(self.loose.iter().map(|ends| LineOrPoint { ends: ends.map(|v| v + base), material }));
+        cx.budget.spend(
+            "glTF lines and points",
+            self.lines_and_points.len() as u64,
+            2 * size_of::<LineOrPoint>() as u64,
+        )?;
+        raw.lines_and_points
+            .extend(self.lines_and_points.iter().map(|ends| LineOrPoint { ends: ends.map(|v| v + base), material }));
         raw.report.file_vertices += self.positions.len() as u64;
         for (all, own) in raw.report.polygons_by_arity.iter_mut().zip(self.polygons_by_arity) {
             *all += own;
@@ -171,7 +176,7 @@ impl Primitive {
     /// How many triangles it has, with those that its lines and points become.
     pub fn triangle_count(&self) -> u64 {
         let of = |ends: &[u32; 2]| if ends[0] == ends[1] { POINT_TRIANGLES } else { SEGMENT_TRIANGLES };
-        self.triangles.len() as u64 + self.loose.iter().map(of).sum::<u64>()
+        self.triangles.len() as u64 + self.lines_and_points.iter().map(of).sum::<u64>()
     }
 }
 

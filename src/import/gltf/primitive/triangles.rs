@@ -4,7 +4,7 @@ use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::gltf::document::tree::mode;
 use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
-use crate::pluralise::counted;
+use crate::pluralise::pluralise;
 
 /// How many triangles so many corners make up. Corners that do not make up a whole triangle are left over.
 pub fn count(mode: usize, corners: u64) -> u64 {
@@ -27,7 +27,7 @@ pub fn count_loose(mode: usize, corners: u64) -> [u64; 2] {
 }
 
 /// The ends of line segments and points among so many corners, given or all vertices in turn; points have one vertex at both.
-pub fn loose(
+pub fn lines_and_points(
     mode: usize,
     indices: Option<&[u32]>,
     vertices: usize,
@@ -60,7 +60,7 @@ pub fn of(
     if let Some(bad) = indices.into_iter().flatten().find(|&&i| i as usize >= vertices) {
         return Err(MeshError::broken(format!(
             "{what} of the glTF file has the vertex index {bad}, and {}",
-            counted(vertices, "vertex", "vertices")
+            pluralise(vertices, "vertex", "vertices")
         )));
     }
     let corners = indices.map_or(vertices, <[u32]>::len);

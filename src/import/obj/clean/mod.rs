@@ -146,8 +146,8 @@ impl<'a, 'b> Cleaner<'a, 'b> {
                 self.numbers(b"vn", words, 3)?;
             }
             b"f" | b"fo" => self.face(words)?,
-            b"l" => self.loose(words, true)?,
-            b"p" => self.loose(words, false)?,
+            b"l" => self.lines_and_points(words, true)?,
+            b"p" => self.lines_and_points(words, false)?,
             b"curv" | b"curv2" | b"surf" => self.left_out.curves += 1,
             b"mtllib" => self.library(name(line)),
             b"usemtl" => self.material(name(line)),
@@ -184,7 +184,11 @@ impl<'a, 'b> Cleaner<'a, 'b> {
     }
 
     /// A polyline as its segments, or points, in the only form in which tobj reads them: as faces with too few corners.
-    fn loose<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>, are_joined: bool) -> Result<(), MeshError> {
+    fn lines_and_points<'w>(
+        &mut self,
+        words: impl Iterator<Item = &'w [u8]>,
+        are_joined: bool,
+    ) -> Result<(), MeshError> {
         let mut before: Option<Corner> = None;
         for (number, word) in (1_u64..).zip(words) {
             let corner = self.corner(word)?;

@@ -14,7 +14,7 @@ use crate::plan::edges::Edges;
 use crate::plan::outline::round_join::{End, Fans};
 use crate::plan::outline::silhouette_edges::{Rim, View, row_dot};
 use crate::plan::{Edge, HullPass, HullVertex, Projection, Thickness};
-use crate::scene::material_groups::Parts;
+use crate::scene::material_groups::MaterialGroups;
 use crate::spec::OutlineMethod;
 
 /// 1/256 px in a pixel.
@@ -60,7 +60,7 @@ impl<'a> Outlines<'a> {
         thicknesses: &'a [Option<Thickness>],
         (size_px, margin_px): ([u32; 2], u32),
         rims: &[Rim],
-        means: &mut PlanContext<'_>,
+        cx: &mut PlanContext<'_>,
     ) -> Result<HullPass<'static>, PlanError> {
         let p = view.projection;
         let along = |row: &[f32; 4]| (0..3).map(|k| f64::from(row[k]) * f64::from(p.to_viewer[k])).sum::<f64>();
@@ -68,7 +68,7 @@ impl<'a> Outlines<'a> {
         let half = size_px.map(|size| 0.5 * PX * f64::from(size + 2 * margin_px));
         // Strips of at most four corners, and two triangles with a material; and what fans are told of both ends.
         let bytes = 4 * size_of::<HullVertex>() + 2 * (size_of::<[u32; 3]>() + 4) + 2 * size_of::<End>();
-        means.budget.spend("an outline's strips", rims.len() as u64, bytes as u64)?;
+        cx.budget.spend("an outline's strips", rims.len() as u64, bytes as u64)?;
         let hull = HullPass {
             vertices: Vec::with_capacity(4 * rims.len()),
             triangles: Vec::with_capacity(2 * rims.len()),
@@ -80,11 +80,11 @@ impl<'a> Outlines<'a> {
         let mut outlines = Self { view, thicknesses, half, scale, nearer, fans, hull };
         for (i, rim) in rims.iter().enumerate() {
             if i % CHECK_EVERY == 0 {
-                means.deadline.check()?;
+                cx.deadline.check()?;
             }
             outlines.strip(rim);
         }
-        outlines.fans.finish(view, &mut outlines.hull, means)?;
+        outlines.fans.finish(view, &mut outlines.hull, cx)?;
         Ok(outlines.hull)
     }
 
@@ -232,28 +232,28 @@ impl<'a> Outlines<'a> {
 /// The hull of the parts that have one.
 pub fn hull_pass<'a>(
     mesh: &'a Mesh,
-    parts: &Parts<'_>,
+    groups: &MaterialGroups<'_>,
     (projection, size_px, margin_px): (&Projection, [u32; 2], u32),
     edges: &mut Edges<'a>,
-    means: &mut PlanContext<'_>,
+    cx: &mut PlanContext<'_>,
 ) -> Result<HullPass<'a>, PlanError> {
-    let outline = |m: usize| parts.layers[m].outline.filter(|o| o.method == OutlineMethod::Hull);
+    let outline = |m: usize| groups.layers[m].outline.filter(|o| o.method == OutlineMethod::Hull);
     let thicknesses: Vec<Option<Thickness>> =
-        (0..parts.layers.len()).map(|m| outline(m).map(|o| thickness(mesh, &o))).collect();
+        (0..groups.layers.len()).map(|m| outline(m).map(|o| thickness(mesh, &o))).collect();
     let mut colors: Vec<[f32; 4]> =
-        (0..parts.layers.len()).map(|m| outline(m).map_or([0.0; 4], |o| o.color.premultiplied())).collect();
+        (0..groups.layers.len()).map(|m| outline(m).map_or([0.0; 4], |o| o.color.premultiplied())).collect();
     let used: Vec<[f32; 4]> = (0..colors.len()).filter(|&m| thicknesses[m].is_some()).map(|m| colors[m]).collect();
     let color = used.first().copied().unwrap_or_default();
     if used.iter().all(|c| *c == color) {
         colors = vec![color];
     }
-    let tells_apart = colors.len() > 1 || (parts.layers_pass().is_some() && mesh.materials.len() > 1);
-    let found = edges.with_silhouettes(mesh, parts, means)?;
-    let view = View::new(mesh, parts, projection, means)?;
-    let rims = view.rims(&thicknesses, found, means)?;
+    let tells_apart = colors.len() > 1 || (groups.layers_pass().is_some() && mesh.materials.len() > 1);
+    let found = edges.with_silhouettes(mesh, groups, cx)?;
+    let view = View::new(mesh, groups, projection, cx)?;
+    let rims = view.rims(&thicknesses, found, cx)?;
     let surface_materials: &[u32] = if tells_apart { &mesh.triangle_materials } else { &[] };
-    let mut hull = Outlines::draw(&view, &thicknesses, (size_px, margin_px), &rims, means)?;
-    pay_drawing(hull.vertices.len() as u64, hull.triangles.len() as u64, parts, means.budget)?;
+    let mut hull = Outlines::draw(&view, &thicknesses, (size_px, margin_px), &rims, cx)?;
+    pay_drawing(hull.vertices.len() as u64, hull.triangles.len() as u64, groups, cx.budget)?;
     if !tells_apart {
         hull.triangle_materials = Vec::new();
     }
@@ -261,10 +261,15 @@ pub fn hull_pass<'a>(
 }
 
 /// Spends what both back-ends will allocate for a hull: as for the mesh's own vertices and triangles.
-fn pay_drawing(vertices: u64, triangles: u64, parts: &Parts<'_>, budget: &mut Budget) -> Result<(), LimitExceeded> {
+fn pay_drawing(
+    vertices: u64,
+    triangles: u64,
+    groups: &MaterialGroups<'_>,
+    budget: &mut Budget,
+) -> Result<(), LimitExceeded> {
     budget.spend("an outline's vertices on screen", vertices, VERTEX_BYTES)?;
     budget.spend("lists of an outline's triangles", triangles, LISTED_BYTES)?;
-    let layers = if parts.layers_pass().is_some() { LAYERED_BYTES } else { 0 };
+    let layers = if groups.layers_pass().is_some() { LAYERED_BYTES } else { 0 };
     budget.spend("lists of an outline's layers", triangles, layers)
 }
 

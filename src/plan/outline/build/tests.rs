@@ -35,17 +35,17 @@ fn a_hull_takes_no_more_than_it_spends() {
     for count in [1, 10, 20_000] {
         let (mesh, spec) = (triangles(count), spec());
         let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
-        let parts = Parts::new(&mesh, &spec);
+        let groups = MaterialGroups::new(&mesh, &spec);
         let size_px = [200, 160];
         let rows = projection(&Camera::place(&spec.camera, &mesh, size_px, Border::default()), size_px, true);
-        let mut means = PlanContext { budget: &mut budget, deadline: &deadline };
+        let mut cx = PlanContext { budget: &mut budget, deadline: &deadline };
         let mut edges = Edges::default();
-        let found = edges.with_silhouettes(&mesh, &parts, &mut means).unwrap();
-        let before = means.budget.spent_bytes();
-        let view = View::new(&mesh, &parts, &rows, &mut means).unwrap();
+        let found = edges.with_silhouettes(&mesh, &groups, &mut cx).unwrap();
+        let before = cx.budget.spent_bytes();
+        let view = View::new(&mesh, &groups, &rows, &mut cx).unwrap();
         let thicknesses = [Some(Thickness::Px(3.0))];
-        let rims = view.rims(&thicknesses, found, &mut means).unwrap();
-        let hull = Outlines::draw(&view, &thicknesses, (size_px, 0), &rims, &mut means).unwrap();
+        let rims = view.rims(&thicknesses, found, &mut cx).unwrap();
+        let hull = Outlines::draw(&view, &thicknesses, (size_px, 0), &rims, &mut cx).unwrap();
         assert_eq!((rims.len(), rims.capacity()), (3 * count, 3 * count));
         assert!(hull.triangles.len() >= 9 * count, "{} triangles", hull.triangles.len());
         let taken = size_of::<Rim>() * rims.capacity()
@@ -55,7 +55,7 @@ fn a_hull_takes_no_more_than_it_spends() {
             + size_of::<HullVertex>() * hull.vertices.capacity()
             + 12 * hull.triangles.capacity()
             + 4 * hull.triangle_materials.capacity();
-        let spent = means.budget.spent_bytes() - before;
+        let spent = cx.budget.spent_bytes() - before;
         assert!((taken as u64) <= spent, "{taken} bytes of {spent}");
     }
 }
@@ -81,19 +81,19 @@ fn a_budget_that_is_too_small_is_refused_at_every_step() {
 fn every_step_ends_when_the_job_does() {
     let (mesh, spec) = (triangles(100), spec());
     let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
-    let parts = Parts::new(&mesh, &spec);
+    let groups = MaterialGroups::new(&mesh, &spec);
     let size_px = [200, 160];
     let rows = projection(&Camera::place(&spec.camera, &mesh, size_px, Border::default()), size_px, true);
     let (mut edges, stopped) = (Edges::default(), Deadline::default());
     stopped.stop();
-    let mut means = PlanContext { budget: &mut budget, deadline: &deadline };
-    let found = edges.with_silhouettes(&mesh, &parts, &mut means).unwrap();
-    let view = View::new(&mesh, &parts, &rows, &mut means).unwrap();
+    let mut cx = PlanContext { budget: &mut budget, deadline: &deadline };
+    let found = edges.with_silhouettes(&mesh, &groups, &mut cx).unwrap();
+    let view = View::new(&mesh, &groups, &rows, &mut cx).unwrap();
     let thicknesses = [Some(Thickness::Px(3.0))];
-    let rims = view.rims(&thicknesses, found, &mut means).unwrap();
-    let mut late = PlanContext { budget: means.budget, deadline: &stopped };
+    let rims = view.rims(&thicknesses, found, &mut cx).unwrap();
+    let mut late = PlanContext { budget: cx.budget, deadline: &stopped };
     let results = [
-        View::new(&mesh, &parts, &rows, &mut late).err(),
+        View::new(&mesh, &groups, &rows, &mut late).err(),
         view.rims(&thicknesses, found, &mut late).err(),
         Outlines::draw(&view, &thicknesses, (size_px, 0), &rims, &mut late).err(),
     ];

@@ -92,11 +92,11 @@ impl Fans {
         &mut self,
         view: &View<'_>,
         hull: &mut HullPass<'_>,
-        means: &mut PlanContext<'_>,
+        cx: &mut PlanContext<'_>,
     ) -> Result<(), PlanError> {
-        self.sort(means.deadline)?;
-        let sectors = Sectors::around(&mut self.ends, view, means)?;
-        self.draw(&sectors, view.mesh.positions.len() as u32, hull, means)
+        self.sort(cx.deadline)?;
+        let sectors = Sectors::around(&mut self.ends, view, cx)?;
+        self.draw(&sectors, view.mesh.positions.len() as u32, hull, cx)
     }
 
     /// Puts the ends in order, by vertex and angle.
@@ -113,9 +113,9 @@ impl Fans {
         sectors: &Sectors,
         first: u32,
         hull: &mut HullPass<'_>,
-        means: &mut PlanContext<'_>,
+        cx: &mut PlanContext<'_>,
     ) -> Result<(), PlanError> {
-        let (ends, deadline) = (&self.ends, means.deadline);
+        let (ends, deadline) = (&self.ends, cx.deadline);
         let mut steps = 0.0;
         each_fan(ends, sectors, deadline, |fan| steps += fan.angle() / step(ends, &fan))?;
         let coarser = (steps / self.triangles_max).max(1.0);
@@ -125,9 +125,9 @@ impl Fans {
             triangles += count;
             vertices += count + 1 - usize::from(fan.begins()) - usize::from(fan.meets().is_some());
         })?;
-        grow("an outline's corners", &mut hull.vertices, vertices, means.budget)?;
-        grow("an outline's corners", &mut hull.triangles, triangles, means.budget)?;
-        grow("an outline's corners", &mut hull.triangle_materials, triangles, means.budget)?;
+        grow("an outline's corners", &mut hull.vertices, vertices, cx.budget)?;
+        grow("an outline's corners", &mut hull.triangles, triangles, cx.budget)?;
+        grow("an outline's corners", &mut hull.triangle_materials, triangles, cx.budget)?;
         each_fan(ends, sectors, deadline, |fan| draw(ends, &fan, coarser, first, hull))?;
         Ok(())
     }

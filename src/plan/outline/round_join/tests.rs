@@ -34,8 +34,8 @@ fn finish(ends: Vec<End>, size_px: [u32; 2]) -> (HullPass<'static>, Result<(), P
     let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
     let mut fans = fans(ends, size_px);
     fans.sort(&deadline).unwrap();
-    let mut means = PlanContext { budget: &mut budget, deadline: &deadline };
-    let result = fans.draw(&Sectors::default(), 10, &mut hull, &mut means);
+    let mut cx = PlanContext { budget: &mut budget, deadline: &deadline };
+    let result = fans.draw(&Sectors::default(), 10, &mut hull, &mut cx);
     let exact = [hull.vertices.capacity(), hull.triangles.capacity()];
     assert_eq!(exact, [hull.vertices.len(), hull.triangles.len()], "room for what there is");
     (hull, result)
@@ -106,8 +106,8 @@ fn fans_end_when_the_job_does() {
     let ends: Vec<End> = (0..1000).flat_map(|v| corner(v, [0.0, 1.5 * PI], 32.0)).collect();
     let (mut hull, mut budget, deadline) = (HullPass::default(), Budget::new(&Limits::default()), Deadline::default());
     deadline.stop();
-    let mut means = PlanContext { budget: &mut budget, deadline: &deadline };
-    let result = fans(ends, SIZE_PX).draw(&Sectors::default(), 10, &mut hull, &mut means);
+    let mut cx = PlanContext { budget: &mut budget, deadline: &deadline };
+    let result = fans(ends, SIZE_PX).draw(&Sectors::default(), 10, &mut hull, &mut cx);
     assert!(matches!(result, Err(PlanError::Stopped(_))), "{result:?}");
     assert!(hull.triangles.is_empty());
 }

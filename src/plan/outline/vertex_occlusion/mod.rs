@@ -38,16 +38,16 @@ struct Arc {
 
 impl Sectors {
     /// Around the vertices of ends, which are in the order of these. Says of each end whether a face of its vertex hides it.
-    pub fn around(ends: &mut [End], view: &View<'_>, means: &mut PlanContext<'_>) -> Result<Self, PlanError> {
+    pub fn around(ends: &mut [End], view: &View<'_>, cx: &mut PlanContext<'_>) -> Result<Self, PlanError> {
         if ends.is_empty() {
             return Ok(Self::default());
         }
-        let mut arcs = arcs(ends, view, means)?;
-        sort(&mut arcs, &|a, b| a.vertex.cmp(&b.vertex).then(a.from.total_cmp(&b.from)), means.deadline)?;
+        let mut arcs = arcs(ends, view, cx)?;
+        sort(&mut arcs, &|a, b| a.vertex.cmp(&b.vertex).then(a.from.total_cmp(&b.from)), cx.deadline)?;
         let mut rest = &arcs[..];
         for (i, group) in ends.chunk_by_mut(|a, b| a.vertex == b.vertex).enumerate() {
             if i % CHECK_EVERY == 0 {
-                means.deadline.check()?;
+                cx.deadline.check()?;
             }
             let skipped = rest.partition_point(|arc| arc.vertex < group[0].vertex);
             let count = rest[skipped..].partition_point(|arc| arc.vertex == group[0].vertex);
@@ -107,9 +107,9 @@ impl Arc {
 }
 
 /// The arcs of all faces around the vertices of ends.
-fn arcs(ends: &[End], view: &View<'_>, means: &mut PlanContext<'_>) -> Result<Vec<Arc>, PlanError> {
+fn arcs(ends: &[End], view: &View<'_>, cx: &mut PlanContext<'_>) -> Result<Vec<Arc>, PlanError> {
     let words = view.mesh.positions.len().div_ceil(64);
-    means.budget.spend("an outline's corners", words as u64, 8)?;
+    cx.budget.spend("an outline's corners", words as u64, 8)?;
     let mut is_asked = vec![0_u64; words];
     for end in ends {
         is_asked[end.vertex as usize / 64] |= 1 << (end.vertex % 64);
@@ -117,7 +117,7 @@ fn arcs(ends: &[End], view: &View<'_>, means: &mut PlanContext<'_>) -> Result<Ve
     let each = |each: &mut dyn FnMut(Arc)| {
         for (i, triangle) in view.mesh.triangles.iter().enumerate() {
             if i % CHECK_EVERY == 0 {
-                means.deadline.check()?;
+                cx.deadline.check()?;
             }
             let asked = |v: u32| is_asked[v as usize / 64] >> (v % 64) & 1 == 1;
             for k in (0..3).filter(|&k| asked(triangle[k])) {
@@ -129,7 +129,7 @@ fn arcs(ends: &[End], view: &View<'_>, means: &mut PlanContext<'_>) -> Result<Ve
     };
     let mut count = 0;
     each(&mut |_| count += 1)?;
-    means.budget.spend("an outline's corners", count, size_of::<Arc>() as u64)?;
+    cx.budget.spend("an outline's corners", count, size_of::<Arc>() as u64)?;
     let mut arcs = Vec::with_capacity(count as usize);
     each(&mut |arc| arcs.push(arc))?;
     Ok(arcs)

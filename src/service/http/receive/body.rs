@@ -11,7 +11,7 @@ use futures_util::{Stream, StreamExt as _};
 use crate::import::{Bundle, BundleFile};
 use crate::limits;
 use crate::service::http::error::ApiError;
-use crate::service::jobs::{Bodies, Reservation};
+use crate::service::jobs::{Reservation, UploadBudget};
 
 /// What a body holds.
 #[derive(Debug)]
@@ -46,7 +46,7 @@ pub struct BodyLimits<'a> {
     /// For all of it.
     pub time: Duration,
     /// Memory shared with other uploads.
-    pub bodies: &'a Arc<Bodies>,
+    pub bodies: &'a Arc<UploadBudget>,
 }
 
 /// Refuses what can be refused from the header alone, before a byte is read and before `100 Continue` is sent.
@@ -175,7 +175,7 @@ struct Broken;
 struct Meter {
     limit: u64,
     inner: Arc<Mutex<MeterState>>,
-    bodies: Arc<Bodies>,
+    bodies: Arc<UploadBudget>,
 }
 
 struct MeterState {
@@ -187,7 +187,7 @@ struct MeterState {
 }
 
 impl Meter {
-    fn new(limit: u64, bodies: &Arc<Bodies>) -> Self {
+    fn new(limit: u64, bodies: &Arc<UploadBudget>) -> Self {
         let state = MeterState { seen: 0, seen_between_parts: None, reservation: bodies.reserve(), fault: None };
         Self { limit, inner: Arc::new(Mutex::new(state)), bodies: bodies.clone() }
     }

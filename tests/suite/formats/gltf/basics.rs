@@ -42,8 +42,12 @@ fn lists_strips_and_fans() {
     }
     for (mode, expected) in [(0, [0, 6]), (1, [3, 0]), (2, [6, 0]), (3, [5, 0])] {
         let mesh = band(None, mode).unwrap();
-        let points = mesh.loose.iter().filter(|one| one.is_point()).count();
-        assert_eq!(([mesh.loose.len() - points, points], mesh.triangles.len()), (expected, 0), "mode {mode}");
+        let points = mesh.lines_and_points.iter().filter(|one| one.is_point()).count();
+        assert_eq!(
+            ([mesh.lines_and_points.len() - points, points], mesh.triangles.len()),
+            (expected, 0),
+            "mode {mode}"
+        );
     }
     assert_eq!(band(None, 7).unwrap_err().fault, MeshFault::Broken);
 }
@@ -256,6 +260,6 @@ fn what_a_file_has_is_counted() {
     assert_eq!(content.points, 6 + 5);
     assert_eq!(content.segments, (3 + 2) + (6 + 5) + (5 + 4));
     assert_eq!(content.triangles, (2 + 1) + (4 + 3) + (4 + 3));
-    assert_eq!(mesh.loose.len() as u64, 2 * (content.points + content.segments));
+    assert_eq!(mesh.lines_and_points.len() as u64, 2 * (content.points + content.segments));
     assert_eq!(mesh.report.warnings, []);
 }

@@ -6,7 +6,9 @@ use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
-use meshsnap::plan::{CornerValues, DrawPlan, Lamp, Lights, MaterialLook, Texture, TextureUse, Textures, flags, slots};
+use meshsnap::plan::{
+    CornerValues, DrawPlan, Lamp, Lights, ShadedMaterial, Texture, TextureUse, Textures, flags, slots,
+};
 
 use crate::support::scenes;
 
@@ -36,7 +38,7 @@ fn texels_are_where_they_belong() {
     for (from, step, sampler, expected) in cases {
         let uvs = square_uvs(from / 16.0, (from + 16.0 * step) / 16.0);
         let used = TextureUse { texture: 0, sampler, ..TextureUse::NONE };
-        let mut look = MaterialLook::unlit([1.0; 4]);
+        let mut look = ShadedMaterial::unlit([1.0; 4]);
         look.textures[slots::BASE] = used;
         let picture = draw(&uvs, look, image(SIDE, |x, y| [ramp(x), ramp(y), 0, ONE]));
         for (y, x) in (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (y, x))) {
@@ -58,7 +60,7 @@ fn smaller_levels_blend_without_steps() {
         textures.texels.extend((0..side * side).map(|_| [ramp(k), 0, 0, ONE]));
     }
     textures.images.push(Texture { width: 16, height: 16, levels: 5, ..bare() });
-    let mut look = MaterialLook::unlit([1.0; 4]);
+    let mut look = ShadedMaterial::unlit([1.0; 4]);
     look.textures[slots::BASE] = TextureUse { texture: 0, ..TextureUse::NONE };
     let mut last = 0.0;
     let mut checked = 0;
@@ -80,7 +82,7 @@ fn a_bump_leans_to_where_the_texture_says() {
     // Leaning right and up in the image, by 45 degrees in all.
     let leaning = |x: f32, y: f32| image(1, |_, _| [half(0.5 + 0.5 * x), half(0.5 + 0.5 * y), half(0.9), ONE]);
     let brightness = |uvs: &[[f32; 2]], textures: Textures, to_light: [f32; 3]| {
-        let mut look = MaterialLook { flags: flags::FILL | flags::FACE_NORMALS, ..MaterialLook::unlit([0.5; 4]) };
+        let mut look = ShadedMaterial { flags: flags::FILL | flags::FACE_NORMALS, ..ShadedMaterial::unlit([0.5; 4]) };
         look.textures[slots::NORMAL] = TextureUse { texture: 0, ..TextureUse::NONE };
         lit(uvs, look, textures, to_light)
     };
@@ -108,7 +110,7 @@ const RIGHT: [f32; 3] = [0.6, 0.0, 0.8];
 const UP: [f32; 3] = [0.0, -0.6, 0.8];
 
 /// Red of the middle under one lamp.
-fn lit(uvs: &[[f32; 2]], look: MaterialLook, textures: Textures, to_light: [f32; 3]) -> u8 {
+fn lit(uvs: &[[f32; 2]], look: ShadedMaterial, textures: Textures, to_light: [f32; 3]) -> u8 {
     let lamp = Lamp { to_light, halfway: [0.0, 0.0, 1.0], strength: 0.8 };
     let normals = [[0.0, 0.0, 1.0]; 2];
     let mut plan = plan(uvs, look, textures);
@@ -118,11 +120,11 @@ fn lit(uvs: &[[f32; 2]], look: MaterialLook, textures: Textures, to_light: [f32;
     CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap().pixel(7, 7)[0]
 }
 
-fn draw(uvs: &[[f32; 2]], look: MaterialLook, textures: Textures) -> Image {
+fn draw(uvs: &[[f32; 2]], look: ShadedMaterial, textures: Textures) -> Image {
     CpuRenderer::new(1).draw(&plan(uvs, look, textures), &Deadline::default()).unwrap()
 }
 
-fn plan<'a>(uvs: &'a [[f32; 2]], look: MaterialLook, textures: Textures) -> DrawPlan<'a> {
+fn plan<'a>(uvs: &'a [[f32; 2]], look: ShadedMaterial, textures: Textures) -> DrawPlan<'a> {
     let mut plan = scenes::screen_plan([SIDE; 2], 1, 1.0, &POSITIONS, &TRIANGLES);
     let surface = plan.surface.as_mut().unwrap();
     surface.materials = vec![look];

@@ -8,7 +8,7 @@ use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
-use meshsnap::plan::{MaterialLook, Projection, flags};
+use meshsnap::plan::{Projection, ShadedMaterial, flags};
 
 use crate::render::twins::pictures as twins;
 use crate::support::shapes::{self, Random};
@@ -102,30 +102,30 @@ fn faces_of_many_normals_have_the_same_bytes() {
 const MATERIALS: usize = 500;
 
 /// What makes a material.
-type Kind = (&'static str, fn(&mut Random) -> MaterialLook);
+type Kind = (&'static str, fn(&mut Random) -> ShadedMaterial);
 
 const KINDS: &[Kind] = &[
-    ("matte", |random| MaterialLook { roughness: unit(random), ..painted(random) }),
-    ("metal", |random| MaterialLook { metallic: 1.0, roughness: unit(random), ..painted(random) }),
-    ("half metal", |random| MaterialLook { metallic: unit(random), roughness: unit(random), ..painted(random) }),
-    ("emissive", |random| MaterialLook { emissive: [unit(random), 0.1 * unit(random), 0.0], ..painted(random) }),
+    ("matte", |random| ShadedMaterial { roughness: unit(random), ..painted(random) }),
+    ("metal", |random| ShadedMaterial { metallic: 1.0, roughness: unit(random), ..painted(random) }),
+    ("half metal", |random| ShadedMaterial { metallic: unit(random), roughness: unit(random), ..painted(random) }),
+    ("emissive", |random| ShadedMaterial { emissive: [unit(random), 0.1 * unit(random), 0.0], ..painted(random) }),
     ("glass", |random| {
         let look = painted(random);
-        MaterialLook { opacity: unit(random), flags: look.flags | flags::BLEND, ..look }
+        ShadedMaterial { opacity: unit(random), flags: look.flags | flags::BLEND, ..look }
     }),
     ("face-orientation", |random| {
         let look = painted(random);
-        MaterialLook { roughness: unit(random), flags: look.flags | 6 << flags::DEBUG_SHIFT, ..look }
+        ShadedMaterial { roughness: unit(random), flags: look.flags | 6 << flags::DEBUG_SHIFT, ..look }
     }),
     ("normal", |random| {
         let look = painted(random);
-        MaterialLook { flags: look.flags | 4 << flags::DEBUG_SHIFT, ..look }
+        ShadedMaterial { flags: look.flags | 4 << flags::DEBUG_SHIFT, ..look }
     }),
 ];
 
-fn painted(random: &mut Random) -> MaterialLook {
-    let look = MaterialLook::unlit([unit(random), unit(random), unit(random), unit(random)]);
-    MaterialLook { flags: flags::FILL | flags::FACE_NORMALS, ..look }
+fn painted(random: &mut Random) -> ShadedMaterial {
+    let look = ShadedMaterial::unlit([unit(random), unit(random), unit(random), unit(random)]);
+    ShadedMaterial { flags: flags::FILL | flags::FACE_NORMALS, ..look }
 }
 
 fn unit(random: &mut Random) -> f32 {

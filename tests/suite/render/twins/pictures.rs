@@ -6,7 +6,7 @@ use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
 use meshsnap::backend::{DrawError, Renderer};
 use meshsnap::limits::Deadline;
-use meshsnap::plan::MaterialLook;
+use meshsnap::plan::ShadedMaterial;
 
 use crate::render::golden;
 use crate::support::likeness::{Likeness, Tolerance};
@@ -158,7 +158,7 @@ fn materials_masks_and_normals_agree() {
                 let surface = plan.surface.as_mut().unwrap();
                 let colors = [[0.8, 0.1, 0.1, 1.0], [0.1, 0.7, 0.2, 1.0], [0.2, 0.2, 0.9, 0.5]];
                 let first = surface.materials[0];
-                surface.materials = colors.map(|base_color| MaterialLook { base_color, ..first }).to_vec();
+                surface.materials = colors.map(|base_color| ShadedMaterial { base_color, ..first }).to_vec();
                 surface.triangle_materials = &materials;
                 plan.background = [0.0; 4];
                 let cpu = CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap();

@@ -8,7 +8,7 @@ use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
-use meshsnap::plan::{CornerValues, DrawPlan, MaterialLook, Texture, TextureUse, Textures, flags, slots};
+use meshsnap::plan::{CornerValues, DrawPlan, ShadedMaterial, Texture, TextureUse, Textures, flags, slots};
 
 use crate::render::twins::pictures as twins;
 use crate::support::likeness::{Likeness, Tolerance};
@@ -16,7 +16,7 @@ use crate::support::scenes;
 use crate::support::shapes::{self, Random};
 
 /// A look, and what makes it.
-type Look = (&'static str, fn(&mut MaterialLook));
+type Look = (&'static str, fn(&mut ShadedMaterial));
 
 const CHECKER: u32 = 0;
 const BUMPS: u32 = 1;
@@ -148,8 +148,8 @@ fn hostile_coordinates_and_textures_agree() {
         let surface = plan.surface.as_mut().unwrap();
         surface.uvs = Some(CornerValues { values: Cow::Owned(bad), triangles: plan.triangles });
         let uses = [used(CHECKER, 0), turned(CHECKER, f32::MAX), used(COARSE, 5), used(77, 0)];
-        let look = MaterialLook { textures: uses, flags: SMOOTH | flags::MASK, alpha_cutoff: 0.1, ..base_look() };
-        surface.materials = vec![MaterialLook { emissive: [1e30, 2.0, 0.0], ..look }];
+        let look = ShadedMaterial { textures: uses, flags: SMOOTH | flags::MASK, alpha_cutoff: 0.1, ..base_look() };
+        surface.materials = vec![ShadedMaterial { emissive: [1e30, 2.0, 0.0], ..look }];
         let cpu = CpuRenderer::new(1).draw(plan, &Deadline::default()).unwrap();
         let gpu = GpuRenderer::new(gpus[0].clone()).draw(plan, &Deadline::default()).unwrap();
         assert!(colors(&cpu) > 1, "{view}: blank");
@@ -180,7 +180,7 @@ fn alpha_that_rounds_below_nothing_agrees() {
             let surface = plan.surface.as_mut().unwrap();
             surface.colors = Some(CornerValues { values: Cow::Borrowed(&values), triangles: &triangles });
             let flags = flags::FILL | flags::VERTEX_COLORS | bits;
-            surface.materials = vec![MaterialLook { flags, wire_thickness: 1.0, ..base_look() }];
+            surface.materials = vec![ShadedMaterial { flags, wire_thickness: 1.0, ..base_look() }];
             let picture = CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap();
             assert!(colors(&picture) > 15, "{bits}: too plain");
             let other = gpu.draw(&plan, &Deadline::default()).unwrap();
@@ -201,7 +201,7 @@ fn normals_and_colours_that_go_by_different_indices_agree() {
     each_view(|view, plan| {
         let (own, count) = (plan.triangles, plan.triangles.len());
         let surface = plan.surface.as_mut().unwrap();
-        surface.materials = vec![MaterialLook { flags: SMOOTH | flags::VERTEX_COLORS, ..base_look() }];
+        surface.materials = vec![ShadedMaterial { flags: SMOOTH | flags::VERTEX_COLORS, ..base_look() }];
         let by_position = surface.vertex_normals.clone().unwrap();
         assert!(std::ptr::eq(by_position.triangles, own), "{view}: the normals have an index of their own");
         let all: Vec<[f32; 3]> = own.iter().flatten().map(|&v| by_position.values[v as usize]).collect();
@@ -253,11 +253,11 @@ fn dress<'a>(mesh: &'a Mesh, plan: &mut DrawPlan<'a>) {
     surface.textures = textures();
 }
 
-fn base_look() -> MaterialLook {
-    MaterialLook { roughness: 0.5, wire_smoothing: 1.0, ..MaterialLook::unlit([0.7, 0.6, 0.5, 0.9]) }
+fn base_look() -> ShadedMaterial {
+    ShadedMaterial { roughness: 0.5, wire_smoothing: 1.0, ..ShadedMaterial::unlit([0.7, 0.6, 0.5, 0.9]) }
 }
 
-fn with(mut look: MaterialLook, change: fn(&mut MaterialLook)) -> MaterialLook {
+fn with(mut look: ShadedMaterial, change: fn(&mut ShadedMaterial)) -> ShadedMaterial {
     change(&mut look);
     look
 }
@@ -271,11 +271,11 @@ fn turned(texture: u32, scale: f32) -> TextureUse {
     TextureUse { transform, texture, sampler: 0 }
 }
 
-fn wire(look: &mut MaterialLook, bits: u32, thickness: f32) {
+fn wire(look: &mut ShadedMaterial, bits: u32, thickness: f32) {
     (look.flags, look.wire_color, look.wire_thickness) = (bits, [0.5, 0.0, 0.2, 0.8], thickness);
 }
 
-fn debug(look: &mut MaterialLook, bits: u32, view: u32) {
+fn debug(look: &mut ShadedMaterial, bits: u32, view: u32) {
     look.flags = bits | view << flags::DEBUG_SHIFT;
 }
 
