@@ -42,7 +42,7 @@ fn materials() -> Vec<ShadedMaterial> {
 /// A soup's plan with layers, roles and materials at random, and what it borrows.
 struct Layered {
     soup: Soup,
-    roles: Vec<u8>,
+    pass_masks: Vec<u8>,
     materials: Vec<u32>,
 }
 
@@ -60,7 +60,7 @@ impl Layered {
         ];
         let pass_masks = soup.triangles.iter().map(|_| kinds[random.below(kinds.len())]).collect();
         let materials = soup.triangles.iter().map(|_| random.below(5) as u32).collect();
-        Self { soup, roles, materials }
+        Self { soup, pass_masks, materials }
     }
 
     fn plan(&self, view: &View, pass: PeelingPass) -> DrawPlan<'_> {

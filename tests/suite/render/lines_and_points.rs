@@ -23,7 +23,7 @@ const POINT_PX: f64 = 3.0;
 
 /// A mesh of nothing but these.
 fn alone(positions: &[[f32; 3]], loose: &[LineOrPoint]) -> Mesh {
-    let mut mesh = Mesh { positions: positions.to_vec(), loose: loose.to_vec(), ..Mesh::default() };
+    let mut mesh = Mesh { positions: positions.to_vec(), lines_and_points: loose.to_vec(), ..Mesh::default() };
     mesh.materials.push(Default::default());
     mesh
 }
