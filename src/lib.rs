@@ -1,40 +1,96 @@
 //! meshsnap turns a 3D mesh and a little material JSON into an image.
 //!
+//! From bytes to a picture in ten lines:
+//!
+//! ```
+//! use meshsnap::{Mesh, Renderer, Spec};
+//!
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let bytes = std::fs::read("api/examples/knot.obj")?;
+//!     let mesh = Mesh::read(&bytes)?;
+//!     let image = Renderer::cpu().render(&mesh, &Spec::wire())?;
+//!     let png = image.to_png()?;
+//!     assert!(png.starts_with(b"\x89PNG"));
+//!     Ok(())
+//! }
+//! ```
+//!
+//! - [`Mesh`] is read once, from the bytes of any format that is known, and drawn as often as needed.
+//! - [`Spec`] says what to draw: a style, and the keys of the request document.
+//! - [`Renderer`] draws, on the CPU or on a GPU, and gives an [`Image`].
+//! - [`Error`] says what went wrong; [`Error::fault`] says who can mend it.
+//!
+//! # Features
+//!
+//! All are on by default. Without any, the crate is a renderer on the CPU in pure Rust.
+//!
+//! | feature | adds | costs |
+//! |---|---|---|
+//! | `gpu` | drawing on a GPU, by Vulkan | wgpu |
+//! | `service` | the HTTP service | tokio, axum |
+//! | `cli` | the program `meshsnap`; includes `service` | clap |
+//! | `fbx` | reading FBX | a C compiler |
+//! | `meshopt` | reading glTF compressed by meshoptimizer | a C++ compiler |
+//! | `draco` | reading glTF compressed by Draco | |
+//! | `basis` | reading Basis Universal textures | |
+//!
+//! # How it works
+//!
 //! ```text
 //! bytes -> Mesh -> Scene -> DrawPlan -> backend (gpu | cpu) -> Image -> encoded bytes
 //! ```
 //!
-//! That line is the whole program, and [`pipeline::render`] shows it in one function. In reading order:
-//!
-//! - [`limits`]: every cap, and what a job may spend.
-//! - [`mesh`]: importers, and the one `Mesh` that they end in.
-//! - [`scene`]: what a request says, the camera, colour.
-//! - [`plan`]: what is drawn and what is skipped, decided before any pixel.
-//! - [`backend`]: two ways to fill a plan, stage by stage the same.
-//! - [`image`] and [`encode`]: the picture and its bytes.
-//! - [`pipeline`]: all of the above, in order.
-//! - [`report`]: what is in a file, for whoever asks instead of drawing it.
-//! - [`request`]: the request document, from JSON and dotted keys to a [`scene::Spec`].
-//! - [`jobs`]: the bounded queue and the workers.
-//! - [`store`]: meshes that stay, named by what is in them.
-//! - [`http`], [`cli`], [`config`], [`telemetry`]: the edges.
+//! That line is the whole program. ARCHITECTURE.md in the repository is the map of it.
 
+// Everything below is how it works: public for the program's own tests and tools, and free to change.
+#[doc(hidden)]
 pub mod backend;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod cli;
+#[cfg(feature = "service")]
+#[doc(hidden)]
 pub mod config;
+#[doc(hidden)]
 pub mod encode;
+#[doc(hidden)]
 pub mod image;
+#[doc(hidden)]
 pub mod import;
+mod library;
+#[doc(hidden)]
 pub mod limits;
+#[doc(hidden)]
 pub mod mesh;
+#[doc(hidden)]
 pub mod pipeline;
+#[doc(hidden)]
 pub mod plan;
-pub(crate) mod pluralise;
+mod pluralise;
+#[doc(hidden)]
 pub mod report;
+#[doc(hidden)]
 pub mod request;
+#[doc(hidden)]
 pub mod scene;
+#[cfg(feature = "service")]
+#[doc(hidden)]
 pub mod service;
+#[doc(hidden)]
 pub mod spec;
+#[cfg(feature = "service")]
+#[doc(hidden)]
 pub mod telemetry;
-pub(crate) mod texture;
+mod texture;
+#[doc(hidden)]
 pub mod warning;
+
+pub use backend::{BackendKind, DrawError};
+pub use encode::EncodeError;
+pub use image::{Image, ImageFormat};
+pub use import::{Format, MeshError, MeshFault};
+pub use library::{Error, Fault, Mesh, MeshReader, Picture, Renderer, Spec};
+pub use limits::{Deadline, LimitExceeded, Limits, Stopped};
+pub use plan::{PlanError, Skip, SkipKind};
+pub use request::{RequestError, RequestFault};
+pub use warning::Warning;

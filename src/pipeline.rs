@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 use crate::backend::{BackendKind, Backends, DrawError};
 use crate::encode::{self, EncodeError};
-use crate::image::ImageFormat;
+use crate::image::{Image, ImageFormat};
 use crate::import::{Bundle, Format, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
@@ -84,7 +84,22 @@ pub enum RenderError {
     Report(#[from] serde_json::Error),
 }
 
-/// Turns a mesh into a picture.
+/// A mesh's picture, not yet encoded.
+#[derive(Debug)]
+pub struct Drawn {
+    /// The picture.
+    pub image: Image,
+    /// The back-end that drew it.
+    pub backend: BackendKind,
+    /// What the plan left out, and why.
+    pub skips: Vec<Skip>,
+    /// What of the request does not go with the mesh.
+    pub warnings: Vec<Warning>,
+    /// What was chosen for a request that asks for an error or a time; None for others.
+    pub choice: Option<Choice>,
+}
+
+/// Turns a file into the bytes of a picture.
 pub fn render(
     job: Job<'_>,
     backends: &mut Backends,
@@ -95,16 +110,36 @@ pub fn render(
     let mut budget = Budget::new(limits);
 
     let options = import::Options { format: job.format_in, time_s: job.spec.time_s };
-    let mut mesh = import::import(job.bundle, options, limits, &mut budget, deadline)?;
+    let mesh = import::import(job.bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
 
-    let mut warnings = std::mem::take(&mut mesh.report.warnings);
-    warnings.extend(unknown_materials(&mesh, job.spec));
-    let mut chosen = plan::choose(job.spec, mesh.triangles.len(), backends.has_gpu());
+    let drawn = draw(&mesh, job.spec, backends, &mut budget, deadline, ended)?;
+
+    let format = job.spec.image.format.unwrap_or(ImageFormat::Png);
+    let bytes = encode::encode(&drawn.image, format)?;
+    ended(Stage::Encode);
+
+    let warnings = [mesh.report.warnings, drawn.warnings].concat();
+    let Drawn { backend, skips, choice, .. } = drawn;
+    Ok(Output { bytes, format, backend, skips, warnings, choice })
+}
+
+/// Turns a mesh into a picture.
+pub fn draw(
+    mesh: &Mesh,
+    spec: &Spec,
+    backends: &mut Backends,
+    budget: &mut Budget,
+    deadline: &Deadline,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Drawn, RenderError> {
+    let mut mesh = mesh.clone();
+    let mut warnings: Vec<Warning> = unknown_materials(&mesh, spec).into_iter().collect();
+    let mut chosen = plan::choose(spec, mesh.triangles.len(), backends.has_gpu());
     warnings.extend(chosen.iter_mut().flat_map(|chosen| std::mem::take(&mut chosen.warnings)));
-    let spec = chosen.as_ref().map_or(job.spec, |chosen| &chosen.spec);
-    warnings.extend(plan::thicken(&mut mesh, spec, &mut budget, deadline)?);
-    let plan = plan::build(&mesh, spec, &mut budget, deadline)?;
+    let spec = chosen.as_ref().map_or(spec, |chosen| &chosen.spec);
+    warnings.extend(plan::thicken(&mut mesh, spec, budget, deadline)?);
+    let plan = plan::build(&mesh, spec, budget, deadline)?;
     if plan::is_out_of_view(&plan) {
         let detail = "the camera looks past the whole mesh, and the picture is blank".to_owned();
         warnings.push(Warning { code: "mesh_out_of_view", detail });
@@ -116,13 +151,8 @@ pub fn render(
     let drawn = backends.draw(spec.backend, &plan, deadline)?;
     ended(Stage::Render);
 
-    let format = job.spec.image.format.unwrap_or(ImageFormat::Png);
-    let bytes = encode::encode(&drawn.image, format)?;
-    ended(Stage::Encode);
-
-    let skips = plan.skips;
     let choice = chosen.map(|chosen| chosen.choice);
-    Ok(Output { bytes, format, backend: drawn.backend, skips, warnings, choice })
+    Ok(Drawn { image: drawn.image, backend: drawn.backend, skips: plan.skips, warnings, choice })
 }
 
 /// Says what is in a file.

@@ -3,7 +3,6 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use super::gpu::{Gpu, GpuInfo, GpuKind, GpuRenderer};
 use super::{DrawError, Renderer};
 
 /// What is known about the machine before any driver is loaded. Loading Vulkan to find out costs time, and a software one
@@ -24,6 +23,28 @@ impl HardwareHint {
     pub fn unless(reason: Option<String>) -> Self {
         reason.map_or(Self::Maybe, |reason| Self::None { reason })
     }
+}
+
+/// Which adapters may be opened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GpuKind {
+    /// Any, a software Vulkan included.
+    Any,
+    /// Hardware alone.
+    Hardware,
+}
+
+/// What was opened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GpuInfo {
+    /// The adapter's name.
+    pub name: String,
+    /// Driver and its version.
+    pub driver: String,
+    /// `discrete`, `integrated`, `virtual`, `software` or `other`.
+    pub device_type: &'static str,
+    /// Optional features that are used.
+    pub features: Vec<&'static str>,
 }
 
 /// An opened device, as far as choosing a back-end goes.
@@ -77,24 +98,6 @@ impl GpuState {
             Self::None => "none",
             Self::Failed => "failed",
         }
-    }
-}
-
-impl GpuDevice for Gpu {
-    fn info(&self) -> &GpuInfo {
-        Self::info(self)
-    }
-
-    fn is_software(&self) -> bool {
-        Self::info(self).device_type == "software"
-    }
-
-    fn lost(&self) -> Option<&str> {
-        Self::lost(self)
-    }
-
-    fn renderer(self: Arc<Self>) -> Box<dyn Renderer> {
-        Box::new(GpuRenderer::new(self))
     }
 }
 

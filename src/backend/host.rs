@@ -5,8 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::DrawError;
-use super::device::{GpuDevice, GpuState, GpuStatus, HardwareHint, Opener, let_go};
-use super::gpu::{AtomicsChoice, Gpu, GpuKind};
+use super::device::{GpuDevice, GpuKind, GpuState, GpuStatus, HardwareHint, Opener, let_go};
 use super::probe::probe;
 
 /// Jobs in a row that lost the device, after which `auto` goes on with the CPU.
@@ -45,7 +44,7 @@ enum OpenError {
 impl GpuHost {
     /// The host of Vulkan's GPUs. Nothing is loaded yet.
     pub fn new(hint: HardwareHint) -> Self {
-        Self::with_opener(hint, Box::new(|kind| Ok(Arc::new(Gpu::open(kind, AtomicsChoice::Best)?))))
+        Self::with_opener(hint, Box::new(open))
     }
 
     /// The host of whatever `open` opens.
@@ -219,6 +218,17 @@ impl GpuHost {
         catch_unwind(AssertUnwindSafe(attempt))
             .unwrap_or_else(|_| Err(OpenError::Unusable("opening the GPU panicked; the log has more".to_owned())))
     }
+}
+
+#[cfg(feature = "gpu")]
+fn open(kind: GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> {
+    use super::gpu::{AtomicsChoice, Gpu};
+    Ok(Arc::new(Gpu::open(kind, AtomicsChoice::Best)?))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn open(_: GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> {
+    Err(DrawError::NoGpu("this program was built without the feature `gpu`".to_owned()))
 }
 
 impl std::fmt::Debug for GpuHost {

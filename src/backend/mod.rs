@@ -5,13 +5,14 @@
 
 pub mod cpu;
 mod device;
+#[cfg(feature = "gpu")]
 pub mod gpu;
 mod host;
 pub mod probe;
 pub(crate) mod sample_partition;
 mod select;
 
-pub use device::{GpuDevice, GpuState, GpuStatus, HardwareHint, Opener};
+pub use device::{GpuDevice, GpuInfo, GpuKind, GpuState, GpuStatus, HardwareHint, Opener};
 pub use host::GpuHost;
 pub use select::{Backends, Chosen};
 

@@ -3,10 +3,11 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 
-use super::device::{GpuDevice, let_go};
-use super::gpu::GpuKind;
+use super::device::{GpuDevice, GpuKind, let_go};
+#[cfg(feature = "gpu")]
+use super::gpu;
 use super::host::GpuHost;
-use super::{BackendKind, DrawError, Renderer, cpu, gpu};
+use super::{BackendKind, DrawError, Renderer, cpu};
 use crate::image::Image;
 use crate::limits::Deadline;
 use crate::plan::DrawPlan;
@@ -68,7 +69,11 @@ impl Backends {
     pub fn bands_bytes(&self, choice: BackendChoice, plan: &DrawPlan<'_>) -> u64 {
         match choice {
             BackendChoice::Cpu | BackendChoice::Auto => self.cpu.bands_bytes(plan),
+            #[cfg(feature = "gpu")]
             BackendChoice::Gpu => gpu::bands_bytes(plan),
+            // Nothing is drawn then.
+            #[cfg(not(feature = "gpu"))]
+            BackendChoice::Gpu => 0,
         }
     }
 

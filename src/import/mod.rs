@@ -23,7 +23,7 @@ mod stl;
 mod text;
 mod three_mf;
 
-pub use bundle::{Bundle, BundleFile, Folder};
+pub use bundle::{BadPath, Bundle, BundleFile, Folder};
 pub use error::{MeshError, MeshFault};
 pub use formats::Format;
 

@@ -6,18 +6,9 @@ use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 
 use super::buffers::SpareBuffers;
-use crate::backend::DrawError;
 use crate::backend::gpu::pipelines::Stages;
+use crate::backend::{DrawError, GpuDevice, GpuInfo, GpuKind, Renderer};
 use crate::limits::Deadline;
-
-/// Which adapters may be opened.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GpuKind {
-    /// Any, a software Vulkan included.
-    Any,
-    /// Hardware alone.
-    Hardware,
-}
 
 /// How visibility samples are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,19 +17,6 @@ pub enum AtomicsChoice {
     Best,
     /// Two passes of 32-bit atomics, as on a device without; for tests.
     Force32,
-}
-
-/// What was opened.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GpuInfo {
-    /// The adapter's name.
-    pub name: String,
-    /// Driver and its version.
-    pub driver: String,
-    /// `discrete`, `integrated`, `virtual`, `software` or `other`.
-    pub device_type: &'static str,
-    /// Optional features that are used.
-    pub features: Vec<&'static str>,
 }
 
 /// An opened GPU.
@@ -242,5 +220,23 @@ fn type_name(device_type: wgpu::DeviceType) -> &'static str {
         wgpu::DeviceType::VirtualGpu => "virtual",
         wgpu::DeviceType::Cpu => "software",
         wgpu::DeviceType::Other => "other",
+    }
+}
+
+impl GpuDevice for Gpu {
+    fn info(&self) -> &GpuInfo {
+        Self::info(self)
+    }
+
+    fn is_software(&self) -> bool {
+        Self::info(self).device_type == "software"
+    }
+
+    fn lost(&self) -> Option<&str> {
+        Self::lost(self)
+    }
+
+    fn renderer(self: Arc<Self>) -> Box<dyn Renderer> {
+        Box::new(super::GpuRenderer::new(self))
     }
 }

@@ -16,8 +16,9 @@ mod schedule;
 
 use std::sync::Arc;
 
-pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
+pub use self::device::{AtomicsChoice, Gpu};
 pub use self::schedule::sizes::bands_bytes;
+pub use crate::backend::{GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
 use self::params::{attributes, cell_masks, corner_triangles, edge_lists, hull_looks};
