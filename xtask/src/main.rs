@@ -21,6 +21,8 @@ cargo xtask COMMAND
   gallery [cpu|gpu]          draw docs/gallery anew
   fuzz SECONDS [TARGET...]   fuzz all targets, or the named ones
   lint                       formatting, clippy, documentation, and cargo-deny where it is installed
+  features                   check the crate without features, with each alone, and with all
+  package [OPTIONS]          make and build the crate's archive, and look at what is in it
   help                       this text
 
 CONTRIBUTING.md says when to use which.";
@@ -40,6 +42,8 @@ fn main() -> ExitCode {
         ["gallery", rest @ ..] => tasks::script("docs/gallery.sh", rest),
         ["fuzz", rest @ ..] => tasks::script("fuzz/run", rest),
         ["lint"] => tasks::lint(),
+        ["features"] => tasks::features(),
+        ["package", rest @ ..] => tasks::package(rest),
         _ => Err(format!("there is no command `{}`\n\n{HELP}", words.join(" "))),
     };
     match result {

@@ -41,6 +41,9 @@ const STORED: [Stored; 4] = [
     },
 ];
 
+/// The largest archive of the crate, bytes.
+const ARCHIVE_BYTES_MAX: u64 = 2_000_000;
+
 /// All tests, the quick tier, or those of the suite whose names contain a filter.
 pub fn test(filters: &[&str]) -> Result {
     match filters {
@@ -96,6 +99,52 @@ pub fn lint() -> Result {
         println!("cargo-deny is not installed, so dependencies were not checked (cargo install cargo-deny)");
         Ok(())
     }
+}
+
+/// Checks the library and its programs without features, with each alone, and with all.
+pub fn features() -> Result {
+    let check = ["check", "--locked", "--package", "meshsnap"];
+    run(cargo(&[&check[..], &["--no-default-features"]].concat()))?;
+    for feature in &feature_names()? {
+        run(cargo(&[&check[..], &["--no-default-features", "--features", feature]].concat()))?;
+    }
+    run(cargo(&[&check[..], &["--all-features"]].concat()))
+}
+
+/// The names in the `[features]` table of the manifest, but for `default`.
+fn feature_names() -> std::result::Result<Vec<String>, String> {
+    let path = root().join("Cargo.toml");
+    let manifest = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let table = manifest.lines().skip_while(|line| line.trim() != "[features]").skip(1);
+    let names = table.take_while(|line| !line.starts_with('[')).filter_map(|line| line.split_once(" = ["));
+    let names = names.map(|(name, _)| name.trim().to_owned());
+    Ok(names.filter(|name| !name.starts_with('#') && name != "default").collect())
+}
+
+/// Makes the archive that a registry would get, builds it, and looks at what is in it.
+pub fn package(options: &[&str]) -> Result {
+    let of_crate = ["--locked", "--package", "meshsnap"];
+    let mut list = cargo(&[&["package", "--list"], &of_crate[..], options].concat());
+    let listed = list.current_dir(root()).stderr(Stdio::inherit()).output();
+    let listed = listed.map_err(|error| format!("cargo package cannot be run: {error}"))?;
+    let files = String::from_utf8_lossy(&listed.stdout);
+    let is_stray = |file: &&str| {
+        let is_under = |folder| file.starts_with(folder);
+        ["tests/", "fuzz/", "xtask/"].into_iter().any(is_under) || file.ends_with(".png") || file.ends_with(".webp")
+    };
+    if let Some(stray) = files.lines().find(is_stray) {
+        return Err(format!("the archive would hold {stray}: see `exclude` in Cargo.toml"));
+    }
+    run(cargo(&[&["package"], &of_crate[..], options].concat()))?;
+    let folder = root().join("target/package");
+    let archives = std::fs::read_dir(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let archives = archives.flatten().filter(|entry| entry.path().extension().is_some_and(|e| e == "crate"));
+    let bytes = archives.filter_map(|entry| entry.metadata().ok()).map(|data| data.len()).max().unwrap_or(0);
+    println!("{} files, {bytes} bytes", files.lines().count());
+    if bytes > ARCHIVE_BYTES_MAX {
+        return Err(format!("the archive has {bytes} bytes, and the most is {ARCHIVE_BYTES_MAX}"));
+    }
+    Ok(())
 }
 
 /// A script of the repository.
