@@ -181,7 +181,7 @@ pub fn sentences(rows: &[Row]) -> [String; 5] {
     let error = |family, technique| mean(family, technique).map_or(f64::NAN, |p| p.error);
     let time = |family, technique| mean(family, technique).map_or(f64::NAN, |p| p.time);
     [
-        "Each line is one technique on one back-end, its points are numbers of samples a pixel, and each point is the geometric mean over \
+        "Each line is one technique on one back-end, its points are numbers of samples per pixel, and each point is the geometric mean over \
          the scenes of its family, so that lower left is better."
             .to_owned(),
         format!(

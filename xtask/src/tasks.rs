@@ -1,0 +1,198 @@
+//! The commands. Each says what it runs, runs it in the repository's root, and stops at the first failure.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// What went wrong, for standard error.
+type Result = std::result::Result<(), String>;
+
+/// Something that tests compare with, and that they can store anew.
+struct Stored {
+    /// Its name on the command line.
+    name: &'static str,
+    /// The tests that store it.
+    filter: &'static str,
+    /// The environment variable and value that make these tests write.
+    write: (&'static str, &'static str),
+    /// Where it lies.
+    path: &'static str,
+}
+
+/// Everything that `bless` knows.
+const STORED: [Stored; 4] = [
+    Stored { name: "pictures", filter: "render::golden::", write: ("MESHSNAP_GOLDEN", "write"), path: "tests/golden" },
+    Stored {
+        name: "schema",
+        filter: "the_stored_schema_is_the_generated_one",
+        write: ("MESHSNAP_GOLDEN", "write"),
+        path: "api/material.schema.json",
+    },
+    Stored {
+        name: "tables",
+        filter: "the_shipped_table_is_what_was_measured",
+        write: ("MESHSNAP_GOLDEN", "write"),
+        path: "src/plan/quality/error_table.json",
+    },
+    Stored {
+        name: "examples",
+        filter: "is_what_its_generator_makes",
+        write: ("MESHSNAP_WRITE_EXAMPLES", "1"),
+        path: "api/examples",
+    },
+];
+
+/// The largest archive of the crate, bytes.
+const ARCHIVE_BYTES_MAX: u64 = 2_000_000;
+
+/// All tests, the quick tier, or those of the suite whose names contain a filter.
+pub fn test(filters: &[&str]) -> Result {
+    match filters {
+        [] => script("tests/run", &[]),
+        ["quick"] => script("tests/run", &["quick"]),
+        filters => run(suite(filters)),
+    }
+}
+
+/// Stores what tests compare with, and tests against it.
+pub fn bless(name: &str) -> Result {
+    let Some(stored) = STORED.iter().find(|stored| stored.name == name) else {
+        let known: Vec<&str> = STORED.iter().map(|stored| stored.name).collect();
+        return Err(format!("`{name}` cannot be blessed; known are {}", known.join(", ")));
+    };
+    let mut write = suite(&[stored.filter]);
+    // The output would alarm without need: a test that has written its own truth always fails.
+    write.env(stored.write.0, stored.write.1).stdout(Stdio::null()).stderr(Stdio::null());
+    if run(write).is_ok() {
+        return Err(format!("the tests `{}` passed while writing, so they did not write", stored.filter));
+    }
+    run(suite(&[stored.filter]))?;
+    println!("\nChanged files under {} (look at each before you commit it):", stored.path);
+    let mut changes = Command::new("git");
+    changes.args(["status", "--short", "--", stored.path]);
+    run(changes)
+}
+
+/// A benchmark by name; accuracy where none is named.
+pub fn bench(arguments: &[&str]) -> Result {
+    let (name, options) = match arguments {
+        [name @ ("accuracy" | "load"), options @ ..] => (*name, options),
+        options => ("accuracy", options),
+    };
+    let mut command = cargo(&["bench", "--locked", "--bench", name, "--"]);
+    command.args(options);
+    run(command)
+}
+
+/// Formatting, lints, documentation, and dependencies' licences and sources.
+pub fn lint() -> Result {
+    run(cargo(&["fmt", "--all", "--check"]))?;
+    run(cargo(&["clippy", "--locked", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
+    // Private modules are documented too, so a link to one resolves.
+    let mut doc = cargo(&["doc", "--locked", "--workspace", "--no-deps", "--document-private-items"]);
+    doc.env("RUSTDOCFLAGS", "-D warnings -A rustdoc::private_intra_doc_links");
+    run(doc)?;
+    let is_installed = cargo(&["deny", "--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    if is_installed.is_ok_and(|status| status.success()) {
+        // Advisories need a network; the hosted workflow looks at them.
+        run(cargo(&["deny", "--locked", "check", "licenses", "bans", "sources"]))
+    } else {
+        println!("cargo-deny is not installed, so dependencies were not checked (cargo install cargo-deny)");
+        Ok(())
+    }
+}
+
+/// Checks the library and its programs without features, with each alone, and with all.
+pub fn features() -> Result {
+    let check = ["check", "--locked", "--package", "meshsnap"];
+    run(cargo(&[&check[..], &["--no-default-features"]].concat()))?;
+    for feature in &feature_names()? {
+        run(cargo(&[&check[..], &["--no-default-features", "--features", feature]].concat()))?;
+    }
+    run(cargo(&[&check[..], &["--all-features"]].concat()))
+}
+
+/// The names in the `[features]` table of the manifest, but for `default`.
+fn feature_names() -> std::result::Result<Vec<String>, String> {
+    let path = root().join("Cargo.toml");
+    let manifest = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let table = manifest.lines().skip_while(|line| line.trim() != "[features]").skip(1);
+    let names = table.take_while(|line| !line.starts_with('[')).filter_map(|line| line.split_once(" = ["));
+    let names = names.map(|(name, _)| name.trim().to_owned());
+    Ok(names.filter(|name| !name.starts_with('#') && name != "default").collect())
+}
+
+/// Makes the archive that a registry would get, builds it, and looks at what is in it.
+pub fn package(options: &[&str]) -> Result {
+    let of_crate = ["--locked", "--package", "meshsnap"];
+    let mut list = cargo(&[&["package", "--list"], &of_crate[..], options].concat());
+    let listed = list.current_dir(root()).stderr(Stdio::inherit()).output();
+    let listed = listed.map_err(|error| format!("cargo package cannot be run: {error}"))?;
+    let files = String::from_utf8_lossy(&listed.stdout);
+    let is_stray = |file: &&str| {
+        let is_under = |folder| file.starts_with(folder);
+        ["tests/", "fuzz/", "xtask/"].into_iter().any(is_under) || file.ends_with(".png") || file.ends_with(".webp")
+    };
+    if let Some(stray) = files.lines().find(is_stray) {
+        return Err(format!("the archive would hold {stray}: see `exclude` in Cargo.toml"));
+    }
+    run(cargo(&[&["package"], &of_crate[..], options].concat()))?;
+    let folder = root().join("target/package");
+    let archives = std::fs::read_dir(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let archives = archives.flatten().filter(|entry| entry.path().extension().is_some_and(|e| e == "crate"));
+    let bytes = archives.filter_map(|entry| entry.metadata().ok()).map(|data| data.len()).max().unwrap_or(0);
+    println!("{} files, {bytes} bytes", files.lines().count());
+    if bytes > ARCHIVE_BYTES_MAX {
+        return Err(format!("the archive has {bytes} bytes, and the most is {ARCHIVE_BYTES_MAX}"));
+    }
+    Ok(())
+}
+
+/// A script of the repository.
+pub fn script(path: &str, arguments: &[&str]) -> Result {
+    let mut command = Command::new(root().join(path));
+    command.args(arguments);
+    run(command)
+}
+
+/// The suite's tests whose names contain one of the filters.
+fn suite(filters: &[&str]) -> Command {
+    let mut command = cargo(&["test", "--locked", "--test", "suite", "--"]);
+    command.args(filters);
+    command
+}
+
+fn cargo(arguments: &[&str]) -> Command {
+    // The cargo that runs this, so that the toolchain is the same.
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.args(arguments);
+    command
+}
+
+fn run(mut command: Command) -> Result {
+    let line = shown(&command);
+    println!("$ {line}");
+    match command.current_dir(root()).status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(format!("`{line}` failed ({status})")),
+        Err(error) => Err(format!("`{line}` cannot be run: {error}")),
+    }
+}
+
+/// A command as one would type it.
+fn shown(command: &Command) -> String {
+    let variables = command
+        .get_envs()
+        .filter_map(|(name, value)| Some(format!("{}={:?}", name.to_string_lossy(), value?.to_string_lossy())));
+    let program = Path::new(command.get_program());
+    let program = program.strip_prefix(root()).unwrap_or(program);
+    let program = if program.is_absolute() { program.file_name().map(Path::new).unwrap_or(program) } else { program };
+    let words = std::iter::once(program.as_os_str()).chain(command.get_args());
+    let words = words.map(|word| word.to_string_lossy().into_owned());
+    variables.chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// The repository: the folder that this package's folder lies in.
+fn root() -> &'static Path {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    package.parent().unwrap_or(package)
+}
