@@ -12,6 +12,7 @@ cargo xtask COMMAND
 
   test                       all tests, as tests/run
   test quick                 the quick tier: under a minute after the build
+  test long                  all tests the long way; minutes to hours
   test FILTER...             tests of the suite whose names contain a filter
   bless pictures|schema|tables|examples
                              store what tests compare with anew, then test against it

@@ -44,11 +44,11 @@ const STORED: [Stored; 4] = [
 /// The largest archive of the crate, bytes.
 const ARCHIVE_BYTES_MAX: u64 = 2_000_000;
 
-/// All tests, the quick tier, or those of the suite whose names contain a filter.
+/// All tests, a tier of `tests/run`, or those of the suite whose names contain a filter.
 pub fn test(filters: &[&str]) -> Result {
     match filters {
         [] => script("tests/run", &[]),
-        ["quick"] => script("tests/run", &["quick"]),
+        [tier @ ("quick" | "all" | "long")] => script("tests/run", &[tier]),
         filters => run(suite(filters)),
     }
 }
