@@ -4,7 +4,7 @@
 
 use crate::limits::{Deadline, Stopped};
 use crate::texture::decode::{LookupTable, Pixels};
-use crate::texture::half::half;
+use half::f16;
 
 /// The number of levels of an image, down to a single texel.
 pub fn count(width: u32, height: u32) -> u32 {
@@ -151,5 +151,54 @@ impl Sum {
         let [r, g, b] = self.plain;
         let [wr, wg, wb, a] = self.weighted;
         if by_alpha && a > 0.0 { [wr / a, wg / a, wb / a, a] } else { [r, g, b, a] }
+    }
+}
+
+/// The nearest IEEE 754 half float, ties to even. Too large values become infinite.
+///
+/// The `const` conversion never uses a processor's own instruction, so it has the same bits everywhere.
+fn half(v: f32) -> u16 {
+    f16::from_f32_const(v).to_bits()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::half;
+
+    /// The value of a half float, by the definition of the format.
+    fn value(half: u16) -> f64 {
+        let (exponent, fraction) = (i32::from(half >> 10 & 31), f64::from(half & 1023));
+        let magnitude = match exponent {
+            0 => fraction * 2.0_f64.powi(-24),
+            31 => f64::INFINITY,
+            e => (1.0 + fraction / 1024.0) * 2.0_f64.powi(e - 15),
+        };
+        if half & 0x8000 == 0 { magnitude } else { -magnitude }
+    }
+
+    #[test]
+    fn every_half_and_every_midpoint_rounds_as_it_should() {
+        let mut checked = 0;
+        for sign in [0, 0x8000] {
+            for low in 0..0x7c00_u16 {
+                let next = low + 1;
+                let (a, b) = (value(low), if next == 0x7c00 { 65536.0 } else { value(next) });
+                let signed = |v: f64| if sign == 0 { v as f32 } else { -v as f32 };
+                let middle = signed((a + b) / 2.0);
+                assert_eq!(f64::from(middle).abs(), (a + b) / 2.0, "a midpoint is an f32");
+                let even = if low % 2 == 0 { low } else { next };
+                assert_eq!(half(signed(a)), low | sign);
+                assert_eq!(half(middle), even | sign, "midpoint above {low:#06x}");
+                assert_eq!(half(f32::from_bits(middle.to_bits() - 1)), low | sign);
+                assert_eq!(half(f32::from_bits(middle.to_bits() + 1)), next | sign);
+                checked += 4;
+            }
+        }
+        assert_eq!(checked, 2 * 4 * 0x7c00);
+        assert_eq!(half(f32::INFINITY), 0x7c00);
+        assert_eq!(half(f32::NEG_INFINITY), 0xfc00);
+        assert_eq!(half(f32::MAX), 0x7c00);
+        assert_eq!(half(f32::NAN) & 0x7fff, 0x7e00);
+        assert_eq!(half(f32::MIN_POSITIVE), 0);
     }
 }

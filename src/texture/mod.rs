@@ -19,7 +19,6 @@
 pub(crate) mod basis;
 pub(crate) mod decode;
 pub(crate) mod fit;
-pub(crate) mod half;
 pub(crate) mod mips;
 pub(crate) mod png;
 
