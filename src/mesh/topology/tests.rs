@@ -1,8 +1,7 @@
 //! Small meshes whose numbers are known.
 
 use super::*;
-use crate::import::MeshFault;
-use crate::limits::Limits;
+use crate::limits::{Limits, Stopped};
 
 fn mesh(triangles: &[[u32; 3]]) -> Mesh {
     let count = triangles.iter().flatten().max().map_or(0, |m| m + 1);
@@ -184,9 +183,9 @@ fn memory_and_time_are_limited() {
     let edges = EdgeList::of(&mesh, &mut Budget::new(&Limits::default())).unwrap();
     let poor = Limits { memory_bytes: 4 * 24 + 4 * 5 - 1, ..Limits::default() };
     let error = Topology::of(&mesh, &edges, &mut Budget::new(&poor), &Deadline::default()).unwrap_err();
-    assert!(matches!(error.fault, MeshFault::Limit(_)), "{error}");
+    assert!(matches!(error, Exhausted::Limit(_)), "{error}");
     let stopped = Deadline::default();
     stopped.stop();
     let error = Topology::of(&mesh, &edges, &mut Budget::new(&Limits::default()), &stopped).unwrap_err();
-    assert_eq!(error.fault, MeshFault::Stopped);
+    assert_eq!(error, Exhausted::Stopped(Stopped));
 }
