@@ -43,10 +43,11 @@ pub enum ImageFormat {
     Jpeg,
 }
 
-/// The 255 linear values at which the stored sRGB byte changes: `thresholds[k]` is the smallest that is stored as
-/// `k + 1` or more.
+/// The 255 linear values at which the stored sRGB byte changes: `thresholds[k]` is the smallest
+/// that is stored as `k + 1` or more.
 ///
-/// Both back-ends search this table to round to the nearest of 256 levels, so both store the same byte.
+/// Both back-ends search this table to round to the nearest of 256 levels, so both store the same
+/// byte.
 pub fn srgb8_thresholds() -> [f32; 255] {
     std::array::from_fn(|k| srgb_to_linear((k as f64 + 0.5) / 255.0) as f32)
 }

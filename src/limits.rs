@@ -1,12 +1,14 @@
-//! Every cap in one place, and the two things that a job spends: bytes ([`Budget`]) and time ([`Deadline`]).
+//! Every cap in one place, and the two things that a job spends: bytes ([`Budget`]) and time
+//! ([`Deadline`]).
 //!
-//! **Invariant**: an allocation whose size follows from the input is first spent from the job's [`Budget`]. A count in
-//! a client's file is never trusted.
+//! **Invariant**: an allocation whose size follows from the input is first spent from the job's
+//! [`Budget`]. A count in a client's file is never trusted.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What a job or a request may use. The defaults are those of the public contract, and each can be configured.
+/// What a job or a request may use. The defaults are those of the public contract, and each can be
+/// configured.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// The largest request body that is accepted, bytes.
@@ -54,10 +56,12 @@ impl Default for Limits {
     }
 }
 
-/// The largest side of a picture that the rasterizers' fixed-point coordinates can address, pixels. No setting exceeds it.
+/// The largest side of a picture that the rasterizers' fixed-point coordinates can address, pixels.
+/// No setting exceeds it.
 pub const IMAGE_PX_MAX: u64 = 4096;
 
-/// The longest time that a setting can give a job, milliseconds: a day, so that no sum of times overflows.
+/// The longest time that a setting can give a job, milliseconds: a day, so that no sum of times
+/// overflows.
 pub const JOB_MS_MAX: u64 = 24 * 3600 * 1000;
 
 /// A cap that the input exceeds.
@@ -82,7 +86,8 @@ pub fn check(what: &str, given: u64, limit: u64, flag: &'static str) -> Result<(
     Ok(())
 }
 
-/// Bytes that one job may still allocate and pixels that it may still decode. Spend first, allocate after.
+/// Bytes that one job may still allocate and pixels that it may still decode. Spend first, allocate
+/// after.
 #[derive(Debug)]
 pub struct Budget {
     spent: u64,
@@ -140,8 +145,8 @@ pub enum Exhausted {
     Stopped(#[from] Stopped),
 }
 
-/// A flag that says "stop", raised by the job's owner. The pipeline has no clock: it polls the flag between stages and
-/// inside long loops.
+/// A flag that says "stop", raised by the job's owner. The pipeline has no clock: it polls the flag
+/// between stages and inside long loops.
 #[derive(Clone, Debug, Default)]
 pub struct Deadline(Arc<AtomicBool>);
 

@@ -17,16 +17,19 @@ pub struct MeshEdge {
     pub face_count: u32,
     /// Whether the file's polygon has this edge; false for a diagonal that triangulation added.
     pub is_polygon_edge: bool,
-    /// Whether a further face runs along the edge in the first one's direction, so that one of the two is inside out.
+    /// Whether a further face runs along the edge in the first one's direction, so that one of the
+    /// two is inside out.
     pub has_inconsistent_winding: bool,
 }
 
-/// All edges of a mesh, in the order of the first triangles at them. Neighbours in the list are near on the mesh.
+/// All edges of a mesh, in the order of the first triangles at them. Neighbours in the list are
+/// near on the mesh.
 #[derive(Clone, Debug, Default)]
 pub struct EdgeList {
     /// The edges.
     pub edges: Vec<MeshEdge>,
-    /// The third and further faces at non-manifold edges: the edge's index and the face, in mesh order.
+    /// The third and further faces at non-manifold edges: the edge's index and the face, in mesh
+    /// order.
     pub further_faces: Vec<[u32; 2]>,
 }
 
@@ -41,14 +44,15 @@ impl EdgeList {
         Ok(collect(mesh, &first_half_edges))
     }
 
-    /// Whether every edge has exactly two faces, which run along it in opposite directions: then the mesh bounds a solid.
+    /// Whether every edge has exactly two faces, which run along it in opposite directions: then
+    /// the mesh bounds a solid.
     pub fn is_closed(&self) -> bool {
         self.edges.iter().all(|e| e.face_count == 2 && !e.has_inconsistent_winding)
     }
 }
 
-/// Half-edges in buckets by their lower vertex, filled by counting sort. Half-edge `3 t + i` of triangle `t` goes from
-/// corner `i` to corner `i + 1`.
+/// Half-edges in buckets by their lower vertex, filled by counting sort. Half-edge `3 t + i` of
+/// triangle `t` goes from corner `i` to corner `i + 1`.
 struct Buckets {
     /// The end of each vertex's bucket in `half_edges`.
     ends: Vec<u32>,
@@ -89,7 +93,8 @@ impl Buckets {
         for &end in &self.ends {
             let bucket = &mut self.half_edges[start..end as usize];
             start = end as usize;
-            // A bucket holds about three entries, but the hub of a hostile fan millions: no quadratic search.
+            // A bucket holds about three entries, but the hub of a hostile fan millions: no
+            // quadratic search.
             bucket.sort_unstable();
             let mut first = (u32::MAX, 0);
             for &(upper, half_edge) in bucket.iter() {

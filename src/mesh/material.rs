@@ -1,6 +1,7 @@
 //! Materials of a file, with their textures and images, and the file's cameras.
 //!
-//! Images stay encoded here and are decoded when a picture samples them. A texture that is not shown costs nothing.
+//! Images stay encoded here and are decoded when a picture samples them. A texture that is not
+//! shown costs nothing.
 
 use std::sync::Arc;
 
@@ -50,8 +51,8 @@ pub enum AlphaMode {
 pub struct TextureRef {
     /// Index into [`Mesh::images`](super::Mesh::images).
     pub image: u32,
-    /// KHR_texture_transform, or the identity: `[u', v'] = [[a, b, c], [d, e, f]] (u, v, 1)`. (0, 0) is the upper left
-    /// corner of the image, and v runs down.
+    /// KHR_texture_transform, or the identity: `[u', v'] = [[a, b, c], [d, e, f]] (u, v, 1)`. (0,
+    /// 0) is the upper left corner of the image, and v runs down.
     pub transform: [[f32; 3]; 2],
     /// How the image continues beyond 0 and 1, across and down.
     pub wrap: [Wrap; 2],
@@ -95,8 +96,8 @@ pub struct ImageSource {
 pub enum ImageContent {
     /// The bytes as the file has them: PNG, JPEG, WebP or KTX2 if the file is valid.
     Encoded(Arc<[u8]>),
-    /// The upload lacks the image, and by the format's rules the model is incomplete without it. Sampling it is an error,
-    /// with this sentence.
+    /// The upload lacks the image, and by the format's rules the model is incomplete without it.
+    /// Sampling it is an error, with this sentence.
     Missing(String),
     /// The upload lacks the image, and by the format's custom the model is shown without it.
     Absent,

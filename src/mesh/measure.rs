@@ -8,16 +8,17 @@ use super::vector::{cross, dot, sub};
 pub struct Measures {
     /// The sum of the faces' areas, square file units.
     pub area: Option<f64>,
-    /// Signed volume, cubic file units: positive where faces look outwards. Only watertight meshes have a volume; for
-    /// others the number means nothing.
+    /// Signed volume, cubic file units: positive where faces look outwards. Only watertight meshes
+    /// have a volume; for others the number means nothing.
     pub volume: Option<f64>,
 }
 
 impl Measures {
-    /// Sums over all triangles: half the length of the edges' cross product for the area, and by the divergence theorem
-    /// `a . (b x c) / 6` for the volume.
+    /// Sums over all triangles: half the length of the edges' cross product for the area, and by
+    /// the divergence theorem `a . (b x c) / 6` for the volume.
     ///
-    /// The sums are taken in the unit box, where nothing overflows, and a mesh far from the file's origin loses no digits.
+    /// The sums are taken in the unit box, where nothing overflows, and a mesh far from the file's
+    /// origin loses no digits.
     pub fn of(mesh: &Mesh) -> Self {
         let (mut area, mut volume) = (0.0, 0.0);
         for t in mesh.own_triangles() {
@@ -31,7 +32,8 @@ impl Measures {
     }
 }
 
-/// `value` times all factors; None where that overflows or loses digits below the smallest normal number.
+/// `value` times all factors; None where that overflows or loses digits below the smallest normal
+/// number.
 fn product(value: f64, factors: [f64; 3]) -> Option<f64> {
     let product = factors.into_iter().fold(value, |product, factor| product * factor);
     (product.is_normal() || value == 0.0).then_some(product)

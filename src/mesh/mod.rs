@@ -1,5 +1,5 @@
-//! The [`Mesh`], the one form that every importer produces, and what is computed from it: [`normals`], [`edges`],
-//! [`topology`], [`measure`].
+//! The [`Mesh`], the one form that every importer produces, and what is computed from it:
+//! [`normals`], [`edges`], [`topology`], [`measure`].
 //!
 //! **Invariant**: nothing in this room, and nothing after it, depends on the file format.
 
@@ -24,19 +24,22 @@ use serde::Serialize;
 
 /// A triangle mesh in its normal form.
 ///
-/// Positions are f32 in a box around the origin whose sides are at most 1. [`Mesh::to_file`] leads back to the file's own
-/// space. Positions are welded: no two are equal, so indices alone say which triangles are neighbours. Attributes
-/// (normals, UVs, colours) have an index of their own, because a file may give one position several normals.
+/// Positions are f32 in a box around the origin whose sides are at most 1. [`Mesh::to_file`] leads
+/// back to the file's own space. Positions are welded: no two are equal, so indices alone say which
+/// triangles are neighbours. Attributes (normals, UVs, colours) have an index of their own, because
+/// a file may give one position several normals.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Welded positions in the unit box. Finite.
     pub positions: Vec<[f32; 3]>,
-    /// Three indices into `positions` per triangle, counter-clockwise seen from the front, no two equal. In file order.
+    /// Three indices into `positions` per triangle, counter-clockwise seen from the front, no two
+    /// equal. In file order.
     pub triangles: Vec<[u32; 3]>,
-    /// A unit normal per triangle, computed in f64 from the file's own positions. Zero where the face has no area.
+    /// A unit normal per triangle, computed in f64 from the file's own positions. Zero where the
+    /// face has no area.
     pub face_normals: Vec<[f32; 3]>,
-    /// A polygon edge mask per triangle. Bit `i` is set where the edge from corner `i` to corner `i + 1` is an edge of the
-    /// file's polygon, and clear where triangulation added it.
+    /// A polygon edge mask per triangle. Bit `i` is set where the edge from corner `i` to corner
+    /// `i + 1` is an edge of the file's polygon, and clear where triangulation added it.
     pub edge_masks: Vec<u8>,
     /// An index into `materials` per triangle.
     pub triangle_materials: Vec<u32>,
@@ -46,17 +49,21 @@ pub struct Mesh {
     pub images: Vec<ImageSource>,
     /// The file's cameras, in the order of the scene.
     pub cameras: Vec<FileCamera>,
-    /// Three indices into the attribute arrays per triangle. Empty where the mesh has no attributes.
+    /// Three indices into the attribute arrays per triangle. Empty where the mesh has no
+    /// attributes.
     pub attribute_triangles: Vec<[u32; 3]>,
-    /// Line segments and points. Their ends are indices into `positions`; segments too short for f32 were dropped.
+    /// Line segments and points. Their ends are indices into `positions`; segments too short for
+    /// f32 were dropped.
     pub lines_and_points: Vec<LineOrPoint>,
-    /// Two indices into the attribute arrays per line or point. Empty where the mesh has no attributes.
+    /// Two indices into the attribute arrays per line or point. Empty where the mesh has no
+    /// attributes.
     pub line_point_attributes: Vec<[u32; 2]>,
     /// Set once `loose` has been given an area for one view: where what the file has ends in the arrays.
     pub thickened: Option<Thickened>,
     /// Unit vertex normals of the file; empty where it has none.
     pub normals: Vec<[f32; 3]>,
-    /// Texture coordinates, (0, 0) the upper left corner of the image and v down; empty where the file has none.
+    /// Texture coordinates, (0, 0) the upper left corner of the image and v down; empty where the
+    /// file has none.
     pub uvs: Vec<[f32; 2]>,
     /// Linear RGBA vertex colours; empty where the file has none.
     pub colors: Vec<[f32; 4]>,
@@ -93,8 +100,8 @@ impl Mesh {
     }
 }
 
-/// The way from the unit box to the file's space: `file = centre + scale * unit`. The scale is a power of two, so that
-/// scaling rounds nothing.
+/// The way from the unit box to the file's space: `file = centre + scale * unit`. The scale is a
+/// power of two, so that scaling rounds nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToFile {
     /// The middle of the file's bounding box, in file units.

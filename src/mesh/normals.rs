@@ -4,7 +4,8 @@ use super::Mesh;
 use super::vector::{dot, sub};
 use std::borrow::Cow;
 
-/// Normals to shade smoothly with, and the index that goes with them: the file's own, or angle-weighted ones.
+/// Normals to shade smoothly with, and the index that goes with them: the file's own, or
+/// angle-weighted ones.
 pub fn smooth(mesh: &Mesh) -> (Cow<'_, [[f32; 3]]>, &[[u32; 3]]) {
     if mesh.normals.is_empty() {
         (Cow::Owned(angle_weighted(mesh)), &mesh.triangles)
@@ -13,8 +14,8 @@ pub fn smooth(mesh: &Mesh) -> (Cow<'_, [[f32; 3]]>, &[[u32; 3]]) {
     }
 }
 
-/// A unit normal a welded position: the mean of its faces' normals, each weighted by the angle of the corner there, so that
-/// it does not depend on how a flat region was cut into triangles.
+/// A unit normal a welded position: the mean of its faces' normals, each weighted by the angle of
+/// the corner there, so that it does not depend on how a flat region was cut into triangles.
 pub fn angle_weighted(mesh: &Mesh) -> Vec<[f32; 3]> {
     let mut sums = vec![[0.0_f64; 3]; mesh.positions.len()];
     for (triangle, normal) in mesh.triangles.iter().zip(&mesh.face_normals) {
@@ -28,7 +29,8 @@ pub fn angle_weighted(mesh: &Mesh) -> Vec<[f32; 3]> {
         }
     }
     let mut normals: Vec<[f32; 3]> = sums.iter().map(|s| unit(*s).unwrap_or_default()).collect();
-    // Where faces cancel each other, as on the two sides of a sheet, the first face's normal is taken.
+    // Where faces cancel each other, as on the two sides of a sheet, the first face's normal is
+    // taken.
     for (triangle, face_normal) in mesh.triangles.iter().zip(&mesh.face_normals) {
         for &v in triangle {
             if normals[v as usize] == [0.0; 3] {
@@ -39,7 +41,8 @@ pub fn angle_weighted(mesh: &Mesh) -> Vec<[f32; 3]> {
     normals
 }
 
-/// The squared length, in radians, up to which a sum of weighted normals counts as cancelled: the rest is rounding.
+/// The squared length, in radians, up to which a sum of weighted normals counts as cancelled: the
+/// rest is rounding.
 const CANCELLED_SQUARED: f64 = 1e-12;
 
 /// The unit vector of a sum of weighted normals; None where they cancel each other.
@@ -62,9 +65,11 @@ fn corner_angles([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
     [angle(ca, ab, length[2] * length[0]), angle(ab, bc, length[0] * length[1]), angle(bc, ca, length[1] * length[2])]
 }
 
-/// The arc cosine in radians, to within 5e-8: Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.46.
+/// The arc cosine in radians, to within 5e-8: Abramowitz and Stegun, Handbook of Mathematical
+/// Functions, 4.4.46.
 ///
-/// It has the same bits on every machine and is several times faster than `libm::acos`. Weights need no more digits.
+/// It has the same bits on every machine and is several times faster than `libm::acos`. Weights
+/// need no more digits.
 fn acos(x: f64) -> f64 {
     let t = x.abs();
     let series = [-0.0012624911, 0.0066700901, -0.0170881256, 0.0308918810, -0.0501743046, 0.0889789874, -0.2145988016]

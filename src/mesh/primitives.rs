@@ -1,6 +1,7 @@
 //! Line segments and points: primitives of a file that have no area.
 //!
-//! The plan draws them as thin triangles. Importers count these triangles against the limit beforehand.
+//! The plan draws them as thin triangles. Importers count these triangles against the limit
+//! beforehand.
 
 /// The number of triangles that a segment is drawn as.
 pub const SEGMENT_TRIANGLES: u64 = 2;
@@ -10,7 +11,8 @@ pub const POINT_TRIANGLES: u64 = 4;
 /// A line segment, or a point: a segment whose ends are the same vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineOrPoint {
-    /// Indices of the two ends: of the file's vertices during import, of welded positions in a [`Mesh`](super::Mesh).
+    /// Indices of the two ends: of the file's vertices during import, of welded positions in a
+    /// [`Mesh`](super::Mesh).
     pub ends: [u32; 2],
     /// Index of the material.
     pub material: u32,

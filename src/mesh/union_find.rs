@@ -28,15 +28,18 @@ impl UnionFind {
     /// Unites the sets of `a` and `b`. Returns whether they were different.
     pub fn unite(&mut self, a: u32, b: u32) -> bool {
         let (a, b) = (self.find(a), self.find(b));
-        // No ranks are kept: taking the lower number keeps trees shallow for meshes in any usual order.
+        // No ranks are kept: taking the lower number keeps trees shallow for meshes in any usual
+        // order.
         self.parent[a.max(b) as usize] = a.min(b);
         a != b
     }
 }
 
-/// A partition with parity: each member of a set is on one of two sides, known relative to the other members.
+/// A partition with parity: each member of a set is on one of two sides, known relative to the
+/// other members.
 ///
-/// Members are faces, and the side says whether a face has to be turned over to agree with the representative.
+/// Members are faces, and the side says whether a face has to be turned over to agree with the
+/// representative.
 #[derive(Debug)]
 pub struct ParityUnionFind {
     /// Twice the parent's number, plus 1 if the parent is on the other side.
@@ -64,7 +67,8 @@ impl ParityUnionFind {
         }
     }
 
-    /// Unites the sets of `a` and `b`, which are on opposite sides or not. If the sets are one already, nothing changes.
+    /// Unites the sets of `a` and `b`, which are on opposite sides or not. If the sets are one
+    /// already, nothing changes.
     pub fn unite(&mut self, a: u32, b: u32, are_opposite: bool) {
         let ((a, a_side), (b, b_side)) = (self.find(a), self.find(b));
         if a != b {

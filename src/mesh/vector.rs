@@ -1,6 +1,7 @@
 //! Vectors of three f64, each operation rounded by itself and in the written order.
 //!
-//! glam's own are not used here: these sums decide edges and volumes, so their order is part of the result.
+//! glam's own are not used here: these sums decide edges and volumes, so their order is part of the
+//! result.
 
 /// `a - b`
 pub fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

@@ -1,4 +1,5 @@
-//! KTX2 files with Basis Universal data, as KHR_texture_basisu has them: the largest image, transcoded to RGBA.
+//! KTX2 files with Basis Universal data, as KHR_texture_basisu has them: the largest image,
+//! transcoded to RGBA.
 //!
 //! Offsets and field names are those of the KTX File Format, version 2.0, section 3
 //! (<https://registry.khronos.org/KTX/specs/2.0/ktxspec.v2.html>).
@@ -22,7 +23,8 @@ pub struct BasisHeader {
 /// The first bytes of every KTX2 file.
 pub const KTX2_MAGIC: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
 
-/// `supercompressionScheme` of Zstandard. Smaller numbers are BasisLZ (1) and none (0); glTF allows no larger one.
+/// `supercompressionScheme` of Zstandard. Smaller numbers are BasisLZ (1) and none (0); glTF allows
+/// no larger one.
 const ZSTANDARD: u32 = 2;
 /// The largest window that the Zstandard decoder allocates, and its tables.
 const ZSTANDARD_BYTES: u64 = 128 << 20;
@@ -51,7 +53,8 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<BasisHeader, TextureError> {
     let decoded_bytes = blocks.saturating_mul(16 * 4 + BLOCK_BYTES);
     let mut decoding_bytes = decoded_bytes.saturating_add(CODE_BOOK_BYTES + bytes.len() as u64);
     if scheme == ZSTANDARD {
-        // The decoder allocates the uncompressed length that the file claims, so the claim is checked.
+        // The decoder allocates the uncompressed length that the file claims, so the claim is
+        // checked.
         let unpacked = u64::from(word(96)?) | u64::from(word(100)?) << 32;
         let expected = blocks.saturating_mul(BLOCK_BYTES);
         if unpacked != expected {
@@ -63,7 +66,8 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<BasisHeader, TextureError> {
     Ok(BasisHeader { width, height, decoding_bytes })
 }
 
-/// Transcodes to straight RGBA with 8 bits per channel. The caller has spent [`BasisHeader::decoding_bytes`].
+/// Transcodes to straight RGBA with 8 bits per channel. The caller has spent
+/// [`BasisHeader::decoding_bytes`].
 pub fn decode(name: &str, bytes: &[u8], header: &BasisHeader) -> Result<Vec<u8>, TextureError> {
     // The crate is young and its input is hostile: a panic in it counts as a broken file.
     let texels = catch_unwind(|| {

@@ -1,8 +1,8 @@
 //! Encoded images to rows of linear texels.
 //!
-//! A decoder cannot be stopped midway. Its time is bounded by the pixels that the budget allows and by
-//! the input's length: PNG, WebP and baseline JPEG are read once. A progressive JPEG's scans go over
-//! all pixels again, and zune-jpeg refuses more than 100 scans.
+//! A decoder cannot be stopped midway. Its time is bounded by the pixels that the budget allows and
+//! by the input's length: PNG, WebP and baseline JPEG are read once. A progressive JPEG's scans go
+//! over all pixels again, and zune-jpeg refuses more than 100 scans.
 
 use std::io::{BufRead, Cursor, Seek};
 
@@ -54,7 +54,8 @@ pub struct LookupTable<T> {
     alpha: Vec<T>,
 }
 
-/// Memory that a decoder may take beside what the budget paid: a row of half a million pixels, and tables.
+/// Memory that a decoder may take beside what the budget paid: a row of half a million pixels, and
+/// tables.
 const ALLOWANCE_BYTES: u64 = 4 << 20;
 
 /// Reads the header alone. `name` is the image's, for errors.
@@ -155,8 +156,8 @@ impl Pixels {
         self.channels.is_multiple_of(2)
     }
 
-    /// The table for these pixels. Colours are stored as sRGB if `is_color`; else they, like alpha always, are linear.
-    /// `of` converts a linear value.
+    /// The table for these pixels. Colours are stored as sRGB if `is_color`; else they, like alpha
+    /// always, are linear. `of` converts a linear value.
     pub fn lookup_table<T>(&self, is_color: bool, of: impl Fn(f32) -> T) -> LookupTable<T> {
         let largest = if self.is_wide { 65535 } else { 255 };
         let alpha = |v: u32| f64::from(v) / f64::from(largest);

@@ -1,6 +1,7 @@
 //! Mip levels. A texel of the next level is the mean of the area that it covers, in linear light.
 //!
-//! Colours are weighted by alpha, so that the colour of transparent texels does not bleed into their neighbours.
+//! Colours are weighted by alpha, so that the colour of transparent texels does not bleed into
+//! their neighbours.
 
 use crate::limits::{Deadline, Stopped};
 use crate::texture::decode::{LookupTable, Pixels};
@@ -21,7 +22,8 @@ pub fn side(texels: u32, level: u32) -> u32 {
     (texels >> level).max(1)
 }
 
-/// Memory that [`append`] takes beside its result, bytes: levels 1 and 2 as f32, a row, and the lookup tables.
+/// Memory that [`append`] takes beside its result, bytes: levels 1 and 2 as f32, a row, and the
+/// lookup tables.
 pub fn working_bytes(width: u32, height: u32) -> u64 {
     let texels = |level| u64::from(side(width, level)) * u64::from(side(height, level));
     (texels(1) + texels(2)).saturating_mul(16).saturating_add(64 * u64::from(width) + (4 << 16))
@@ -96,7 +98,8 @@ fn shrink(
     Ok(out)
 }
 
-/// Filter taps in one direction: the texels that a texel of the next level covers, with weights that add up to 1.
+/// Filter taps in one direction: the texels that a texel of the next level covers, with weights
+/// that add up to 1.
 struct Taps {
     first: u32,
     count: usize,
@@ -104,8 +107,8 @@ struct Taps {
 }
 
 impl Taps {
-    /// The taps of texel `at` of the next level, where this level has `from` texels. An odd side of 2 m + 1 texels becomes
-    /// m, so that each covers 2 + 1/m.
+    /// The taps of texel `at` of the next level, where this level has `from` texels. An odd side of
+    /// 2 m + 1 texels becomes m, so that each covers 2 + 1/m.
     fn of(from: u32, at: u32) -> Self {
         if from == 1 {
             return Self { first: 0, count: 1, weights: [1.0, 0.0, 0.0] };
@@ -156,7 +159,8 @@ impl Sum {
 
 /// The nearest IEEE 754 half float, ties to even. Too large values become infinite.
 ///
-/// The `const` conversion never uses a processor's own instruction, so it has the same bits everywhere.
+/// The `const` conversion never uses a processor's own instruction, so it has the same bits
+/// everywhere.
 fn half(v: f32) -> u16 {
     f16::from_f32_const(v).to_bits()
 }

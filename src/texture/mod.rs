@@ -11,10 +11,11 @@
 //! - [`fit`]: chooses the finest level of each image, so that all textures of a picture fit.
 //!
 //! Memory is paid for first. A header says how much decoding takes, the caller spends that from the
-//! job's budget, and only then are pixels decoded. The plan decides which images a picture needs and
-//! how close it comes to each.
+//! job's budget, and only then are pixels decoded. The plan decides which images a picture needs
+//! and how close it comes to each.
 //!
-//! **Invariant**: the encoding is sniffed from the bytes. A file name or a declared type is not trusted.
+//! **Invariant**: the encoding is sniffed from the bytes. A file name or a declared type is not
+//! trusted.
 
 pub(crate) mod basis;
 pub(crate) mod decode;
@@ -32,7 +33,8 @@ pub struct Textures {
     pub images: Vec<Texture>,
 }
 
-/// An image in [`Textures::texels`]. Level k has `max(1, width >> k)` by `max(1, height >> k)` texels.
+/// An image in [`Textures::texels`]. Level k has `max(1, width >> k)` by `max(1, height >> k)`
+/// texels.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Texture {
@@ -52,7 +54,8 @@ pub struct Texture {
 
 /// An image that cannot become a texture.
 ///
-/// The upload is always at fault. Each text is one sentence that names the image and is safe to show to a client.
+/// The upload is always at fault. Each text is one sentence that names the image and is safe to
+/// show to a client.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TextureError {
     /// The upload lacks the image, and the format says that the model is incomplete without it.

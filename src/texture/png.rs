@@ -1,12 +1,13 @@
 //! A reader that drops a PNG's ancillary chunks.
 //!
-//! A colour profile or a text chunk may be large, or inflate to any size, and decoders read them before
-//! the first row. Textures need neither. Dropped here, they cost nothing and cannot fail an image whose
-//! pixels are fine.
+//! A colour profile or a text chunk may be large, or inflate to any size, and decoders read them
+//! before the first row. Textures need neither. Dropped here, they cost nothing and cannot fail an
+//! image whose pixels are fine.
 
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
 
-/// Reads a PNG's signature, its critical chunks and `tRNS`, the one ancillary chunk that changes pixels.
+/// Reads a PNG's signature, its critical chunks and `tRNS`, the one ancillary chunk that changes
+/// pixels.
 #[derive(Debug)]
 pub struct CriticalChunks<'b> {
     /// Unread bytes of the signature or of the current chunk.
@@ -22,8 +23,8 @@ impl<'b> CriticalChunks<'b> {
         Self { current, rest }
     }
 
-    /// Moves on to the next chunk that is kept, once the current one is read. A truncated chunk is passed on as it is,
-    /// and the decoder reports it.
+    /// Moves on to the next chunk that is kept, once the current one is read. A truncated chunk is
+    /// passed on as it is, and the decoder reports it.
     fn advance(&mut self) {
         /// Length, type and checksum around a chunk's data.
         const FRAME_BYTES: usize = 12;
@@ -36,7 +37,8 @@ impl<'b> CriticalChunks<'b> {
                 _ => (self.rest, &[][..]),
             };
             self.rest = rest;
-            // The type of an ancillary chunk begins with a lower-case letter. A truncated type counts as critical.
+            // The type of an ancillary chunk begins with a lower-case letter. A truncated type
+            // counts as critical.
             let is_ancillary = chunk.get(4..8).is_some_and(|name| name[0] & 0x20 != 0 && name != b"tRNS");
             if !is_ancillary {
                 self.current = chunk;

@@ -1,14 +1,14 @@
 //! The fans of faces around vertices.
 //!
-//! A fan is a set of faces at a vertex that are connected through edges at this vertex. A vertex of a manifold surface
-//! has one fan; a vertex where two surfaces touch has two.
+//! A fan is a set of faces at a vertex that are connected through edges at this vertex. A vertex of
+//! a manifold surface has one fan; a vertex where two surfaces touch has two.
 
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge, NO_FACE};
 use crate::mesh::union_find::UnionFind;
 
-/// The fans of a mesh, as sets of triangle corners. Corner `3 t + i` is corner `i` of triangle `t`. Two corners at a vertex
-/// are in one set where an edge at this vertex connects their triangles.
+/// The fans of a mesh, as sets of triangle corners. Corner `3 t + i` is corner `i` of triangle `t`.
+/// Two corners at a vertex are in one set where an edge at this vertex connects their triangles.
 pub struct Fans<'a> {
     triangles: &'a [[u32; 3]],
     vertices: usize,
@@ -46,8 +46,9 @@ impl<'a> Fans<'a> {
         fans.iter().filter(|count| **count > 1).count() as u64
     }
 
-    /// The number of closed chains that open edges form. Within a chain, edges connect fans rather than vertices, so that
-    /// loops which touch in a vertex of one fan are one. The count unites fans, and so it consumes them.
+    /// The number of closed chains that open edges form. Within a chain, edges connect fans rather
+    /// than vertices, so that loops which touch in a vertex of one fan are one. The count unites
+    /// fans, and so it consumes them.
     pub fn into_boundary_loops(mut self, edges: &EdgeList) -> u64 {
         let mut is_met = vec![false; self.triangles.len() * 3];
         let mut loops = 0;

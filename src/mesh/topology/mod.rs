@@ -1,7 +1,8 @@
-//! The topology of a mesh: components, open and non-manifold edges, boundary loops, Euler characteristic, genus.
+//! The topology of a mesh: components, open and non-manifold edges, boundary loops, Euler
+//! characteristic, genus.
 //!
-//! Union-find and sorting find everything in O(n log n), whatever the mesh. [`fans`] groups the faces around each
-//! vertex, [`surfaces`] the faces of each surface.
+//! Union-find and sorting find everything in O(n log n), whatever the mesh. [`fans`] groups the
+//! faces around each vertex, [`surfaces`] the faces of each surface.
 
 mod fans;
 mod surfaces;
@@ -25,8 +26,8 @@ pub struct Topology {
     pub edges: u64,
     /// Edges with one face.
     pub open_edges: u64,
-    /// Closed chains of open edges: 1 for a disc, 3 for a sphere with three holes. Two holes that touch in a vertex make
-    /// one chain, which passes the vertex twice.
+    /// Closed chains of open edges: 1 for a disc, 3 for a sphere with three holes. Two holes that
+    /// touch in a vertex make one chain, which passes the vertex twice.
     pub boundary_loops: u64,
     /// Edges with three faces or more.
     pub nonmanifold_edges: u64,
@@ -34,18 +35,22 @@ pub struct Topology {
     pub nonmanifold_vertices: u64,
     /// Faces with the same three vertices as an earlier face, in any order.
     pub duplicate_faces: u64,
-    /// Edges with two faces that run along them in the same direction, so that one face is inside out.
+    /// Edges with two faces that run along them in the same direction, so that one face is inside
+    /// out.
     pub inconsistent_edges: u64,
-    /// Vertices - edges + triangles: 2 for a sphere, 0 for a torus. Only vertices of triangles count.
+    /// Vertices - edges + triangles: 2 for a sphere, 0 for a torus. Only vertices of triangles
+    /// count.
     pub euler_characteristic: i64,
     /// Every edge has exactly two faces, which run along it in opposite directions.
     pub is_watertight: bool,
-    /// Faces can be turned over so that any two faces at a manifold edge agree. A Moebius strip is not orientable.
+    /// Faces can be turned over so that any two faces at a manifold edge agree. A Moebius strip is
+    /// not orientable.
     pub is_orientable: bool,
-    /// Handles of all surfaces together: 0 for a sphere, 1 for a torus. None unless the mesh consists of closed,
-    /// orientable surfaces that do not touch each other.
+    /// Handles of all surfaces together: 0 for a sphere, 1 for a torus. None unless the mesh
+    /// consists of closed, orientable surfaces that do not touch each other.
     pub genus: Option<u64>,
-    /// The closed, orientable surfaces in the mesh, by genus: pairs of a genus and the number of such surfaces.
+    /// The closed, orientable surfaces in the mesh, by genus: pairs of a genus and the number of
+    /// such surfaces.
     pub closed_surfaces: Vec<(u64, u64)>,
 }
 
@@ -100,7 +105,8 @@ pub enum Orientation {
     Mixed,
 }
 
-/// The orientation of a closed mesh, by the signed volume of each component: the sum of `a . (b x c)` over its faces.
+/// The orientation of a closed mesh, by the signed volume of each component: the sum of
+/// `a . (b x c)` over its faces.
 pub fn orientation(mesh: &Mesh) -> Orientation {
     let mut sets = components(mesh).0;
     let mut volumes = vec![0.0_f64; mesh.positions.len()];
@@ -117,8 +123,8 @@ pub fn orientation(mesh: &Mesh) -> Orientation {
     }
 }
 
-/// The vertices as sets that triangles connect, the number of these sets, and the number of vertices in them. Vertices
-/// of lines and points alone do not count.
+/// The vertices as sets that triangles connect, the number of these sets, and the number of
+/// vertices in them. Vertices of lines and points alone do not count.
 fn components(mesh: &Mesh) -> (UnionFind, u64, u64) {
     let mut sets = UnionFind::new(mesh.positions.len());
     let mut is_met = vec![false; mesh.positions.len()];

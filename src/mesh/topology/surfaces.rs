@@ -1,4 +1,5 @@
-//! The surfaces of a mesh: faces that are connected through manifold edges, and cut apart at all other edges.
+//! The surfaces of a mesh: faces that are connected through manifold edges, and cut apart at all
+//! other edges.
 
 use super::fans::Fans;
 use crate::mesh::Mesh;
@@ -29,8 +30,8 @@ impl Surfaces {
         for edge in edges.edges.iter().filter(|edge| edge.face_count == 2) {
             faces.unite(edge.faces[0], edge.faces[1], edge.has_inconsistent_winding);
         }
-        // Euler characteristic and flags, at the representative face of each surface. Fans count as vertices, because a
-        // surface that is cut apart at a vertex has that vertex twice.
+        // Euler characteristic and flags, at the representative face of each surface. Fans count as
+        // vertices, because a surface that is cut apart at a vertex has that vertex twice.
         let (mut euler, mut flags) = (vec![0_i32; count], vec![0_u8; count]);
         for edge in &edges.edges {
             let (surface, side) = faces.find(edge.faces[0]);
