@@ -78,6 +78,7 @@ pub mod scene;
 pub mod service;
 #[doc(hidden)]
 pub mod spec;
+mod srgb;
 #[cfg(feature = "service")]
 #[doc(hidden)]
 pub mod telemetry;

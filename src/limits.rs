@@ -1,37 +1,39 @@
-//! Every cap in one place, and the two things a job spends: bytes ([`Budget`]) and time ([`Deadline`]).
+//! Every cap in one place, and the two things that a job spends: bytes ([`Budget`]) and time
+//! ([`Deadline`]).
 //!
-//! A client's bytes are never trusted to say how much memory they need: whoever is about to allocate by a count from
-//! the input first spends that many bytes from the job's [`Budget`].
+//! **Invariant**: an allocation whose size follows from the input is first spent from the job's
+//! [`Budget`]. A count in a client's file is never trusted.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What a job or a request may use. Defaults are those of the public contract; every one can be configured.
+/// What a job or a request may use. The defaults are those of the public contract, and each can be
+/// configured.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Largest accepted request body, bytes.
+    /// The largest request body that is accepted, bytes.
     pub body_bytes: u64,
-    /// Decoded memory one job may hold at once, bytes: meshes, plans, frame buffers.
+    /// Memory that one job may hold at once, bytes: mesh, plan, frame buffers.
     pub memory_bytes: u64,
     /// Triangles after triangulation and instancing.
     pub triangles: u64,
-    /// Nodes of a scene graph, counted as often as they are instanced.
+    /// Nodes of a scene graph, each counted as often as it is instanced.
     pub nodes: u64,
     /// Nesting of JSON objects and arrays.
     pub json_depth: u64,
-    /// Output image width and height, pixels each.
+    /// Width and height of a picture, pixels each.
     pub image_px: u64,
     /// Width and height of a texture, pixels each.
     pub texture_px: u64,
-    /// All textures that one picture decodes, pixels.
+    /// Pixels of all textures that one picture decodes, together.
     pub texture_total_px: u64,
-    /// Files of a bundle once unpacked, bytes.
+    /// Files of a bundle once unpacked, bytes together.
     pub bundle_bytes: u64,
-    /// Files of one bundle; of a zip archive every entry counts.
+    /// Files of one bundle. Every entry of a zip archive counts, folders too.
     pub bundle_entries: u64,
     /// Wall-clock time for one job, from acceptance to encoded image, milliseconds.
     pub job_ms: u64,
-    /// Jobs waiting for each worker. A full queue is refused at once, never waited for.
+    /// Jobs that wait per worker. A full queue refuses a job at once and never blocks.
     pub queue_per_worker: u64,
 }
 
@@ -54,21 +56,23 @@ impl Default for Limits {
     }
 }
 
-/// The largest picture side that the rasterizers' fixed point can address; no setting goes beyond it.
+/// The largest side of a picture that the rasterizers' fixed-point coordinates can address, pixels.
+/// No setting exceeds it.
 pub const IMAGE_PX_MAX: u64 = 4096;
 
-/// The longest time that a job can be given, milliseconds: a day, so that no sum of times overflows.
+/// The longest time that a setting can give a job, milliseconds: a day, so that no sum of times
+/// overflows.
 pub const JOB_MS_MAX: u64 = 24 * 3600 * 1000;
 
-/// A cap that the input ran into.
+/// A cap that the input exceeds.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what} is {given}, and the limit is {limit} (raise it with {flag})")]
 pub struct LimitExceeded {
-    /// What was counted, in words: "the number of triangles".
+    /// The thing that was counted, in words: "the number of triangles".
     pub what: String,
-    /// How much the input wants.
+    /// The count that the input asks for.
     pub given: u64,
-    /// How much is allowed.
+    /// The largest count that is allowed.
     pub limit: u64,
     /// The `serve` flag that raises the limit.
     pub flag: &'static str,
@@ -82,7 +86,8 @@ pub fn check(what: &str, given: u64, limit: u64, flag: &'static str) -> Result<(
     Ok(())
 }
 
-/// Bytes that one job may still allocate, and pixels that it may decode. Spend first, allocate after.
+/// Bytes that one job may still allocate and pixels that it may still decode. Spend first, allocate
+/// after.
 #[derive(Debug)]
 pub struct Budget {
     spent: u64,
@@ -93,7 +98,7 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// A fresh budget of `limits.memory_bytes` and of the limits on textures.
+    /// An unspent budget of `limits.memory_bytes`, with the limits on textures.
     pub fn new(limits: &Limits) -> Self {
         let Limits { memory_bytes, texture_px, texture_total_px, .. } = *limits;
         Self { spent: 0, limit: memory_bytes, texture_px, texture_total_px, textures_px: 0 }
@@ -107,7 +112,7 @@ impl Budget {
         Ok(())
     }
 
-    /// Takes the pixels of a texture, or refuses; `what` names it: "image 3".
+    /// Takes the pixels of a texture from the budget, or refuses. `what` names it: "image 3".
     pub fn spend_texture(&mut self, what: &str, width_px: u32, height_px: u32) -> Result<(), LimitExceeded> {
         let side = u64::from(width_px.max(height_px));
         check(&format!("the longer side of {what}, in pixels,"), side, self.texture_px, "--limit-texture-px")?;
@@ -129,7 +134,19 @@ impl Budget {
 #[error("the job was stopped before it finished")]
 pub struct Stopped;
 
-/// A flag that whoever keeps the clock raises; the pipeline only looks at it, between stages and inside long loops.
+/// One of the two things that a job spends is used up.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Exhausted {
+    /// The budget, or another cap.
+    #[error(transparent)]
+    Limit(#[from] LimitExceeded),
+    /// The time.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
+
+/// A flag that says "stop", raised by the job's owner. The pipeline has no clock: it polls the flag
+/// between stages and inside long loops.
 #[derive(Clone, Debug, Default)]
 pub struct Deadline(Arc<AtomicBool>);
 

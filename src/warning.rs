@@ -1,10 +1,10 @@
-//! Warnings: what a picture or a report was made in spite of.
+//! Warnings: faults of an input that do not prevent a picture or a report.
 
-/// Something in the file that was read around rather than refused.
+/// A fault in the file or the request that was tolerated rather than refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
-    /// Stable, snake case: `lines_ignored`.
+    /// A stable name in snake case: `lines_ignored`.
     pub code: &'static str,
-    /// One sentence.
+    /// One sentence for the user.
     pub detail: String,
 }

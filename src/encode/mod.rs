@@ -1,4 +1,5 @@
-//! A finished [`Image`] to the bytes of a file. The same picture always gives the same bytes.
+//! Encoders: a finished [`Image`] to the bytes of a file. The same picture always gives the same
+//! bytes.
 
 use image::ImageEncoder as _;
 use image::codecs::jpeg::JpegEncoder;
@@ -8,16 +9,19 @@ use image::{ExtendedColorType, ImageError};
 
 use crate::image::{Image, ImageFormat};
 
-/// Where JPEG's artefacts around thin dark lines stop being visible at normal viewing distance.
+/// The lowest quality at which artefacts around thin dark lines are invisible at normal viewing
+/// distance.
 const JPEG_QUALITY: u8 = 85;
 
-/// The encoder refused; never the client's fault.
+/// The encoder failed, which is never the client's fault.
 #[derive(Debug, thiserror::Error)]
 #[error("the picture could not be encoded: {0}")]
 pub struct EncodeError(String);
 
-/// Encodes. PNG and WebP are lossless and drop the alpha channel of an opaque picture; JPEG has none, so what is
-/// transparent is laid over white.
+/// Encodes a picture.
+///
+/// PNG and WebP are lossless, and an opaque picture is stored without alpha. JPEG has no alpha, so
+/// transparent pixels are laid over white.
 pub fn encode(image: &Image, format: ImageFormat) -> Result<Vec<u8>, EncodeError> {
     let (width, height) = (image.width_px, image.height_px);
     let rgb;
@@ -30,7 +34,8 @@ pub fn encode(image: &Image, format: ImageFormat) -> Result<Vec<u8>, EncodeError
     };
     let mut bytes = Vec::new();
     match format {
-        // Fast: six times quicker than Balanced for twice the size, and thumbnails are made more often than sent twice.
+        // Fast takes a sixth of Balanced's time for twice its size. Pictures are rendered more
+        // often than stored.
         ImageFormat::Png => PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
             .write_image(pixels, width, height, color),
         ImageFormat::Webp => WebPEncoder::new_lossless(&mut bytes).encode(pixels, width, height, color),
@@ -42,8 +47,11 @@ pub fn encode(image: &Image, format: ImageFormat) -> Result<Vec<u8>, EncodeError
     Ok(bytes)
 }
 
-/// RGB, rows from the top. Opaque pixels keep their bytes. For JPEG, whoever picks that format has already made the
-/// background opaque in linear light, so a blend in sRGB space is only a last resort for pictures from elsewhere.
+/// The picture as RGB over white, rows from the top. Opaque pixels keep their bytes.
+///
+/// The blend is in sRGB space, which is not exact. Our own pictures for JPEG never need it, because
+/// a request for JPEG gets an opaque background, blended in linear light. It serves pictures from
+/// elsewhere.
 fn over_white(image: &Image) -> Vec<u8> {
     let over = |value: u8, alpha: u8| {
         let (value, alpha) = (u32::from(value), u32::from(alpha));

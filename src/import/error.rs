@@ -1,7 +1,7 @@
 //! Why bytes could not become a mesh.
 
 use super::text;
-use crate::limits::{LimitExceeded, Stopped};
+use crate::limits::{Exhausted, LimitExceeded, Stopped};
 
 /// Longest detail of an error or a warning, characters. Whatever a file repeats in a sentence about it has ended long before.
 pub const DETAIL_CHARS_MAX: usize = 1000;
@@ -63,5 +63,14 @@ impl From<LimitExceeded> for MeshError {
 impl From<Stopped> for MeshError {
     fn from(stopped: Stopped) -> Self {
         Self { detail: stopped.to_string(), fault: MeshFault::Stopped }
+    }
+}
+
+impl From<Exhausted> for MeshError {
+    fn from(exhausted: Exhausted) -> Self {
+        match exhausted {
+            Exhausted::Limit(limit) => limit.into(),
+            Exhausted::Stopped(stopped) => stopped.into(),
+        }
     }
 }

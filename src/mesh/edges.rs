@@ -3,30 +3,33 @@
 use super::Mesh;
 use crate::limits::{Budget, LimitExceeded};
 
-/// In [`MeshEdge::faces`]: there is no such face.
+/// The place of a missing face in [`MeshEdge::faces`].
 pub const NO_FACE: u32 = u32::MAX;
 
-/// An undirected edge.
+/// An undirected edge and its first two faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshEdge {
-    /// Its ends, in the direction in which the first face runs along it.
+    /// The two ends, in the direction in which the first face runs along the edge.
     pub vertices: [u32; 2],
-    /// The first two faces at it, in mesh order; [`NO_FACE`] where there is only one.
+    /// The first two faces at the edge, in mesh order; [`NO_FACE`] where there is only one.
     pub faces: [u32; 2],
-    /// How many faces there are: 1 is an open edge, 2 the normal case, more is non-manifold.
+    /// The number of faces: 1 for an open edge, 2 for a manifold one, more for a non-manifold one.
     pub face_count: u32,
-    /// Whether the file drew it: false for a diagonal that triangulation made up.
+    /// Whether the file's polygon has this edge; false for a diagonal that triangulation added.
     pub is_polygon_edge: bool,
-    /// Whether a second face runs along it in the first one's direction, so that one of the two is inside out.
-    pub is_wound_alike: bool,
+    /// Whether a further face runs along the edge in the first one's direction, so that one of the
+    /// two is inside out.
+    pub has_inconsistent_winding: bool,
 }
 
-/// All edges, in the order in which the triangles first meet them, so that neighbours in the list are near on the mesh.
+/// All edges of a mesh, in the order of the first triangles at them. Neighbours in the list are
+/// near on the mesh.
 #[derive(Clone, Debug, Default)]
 pub struct EdgeList {
     /// The edges.
     pub edges: Vec<MeshEdge>,
-    /// The third face and more at an edge: the edge's index and the face, in mesh order.
+    /// The third and further faces at non-manifold edges: the edge's index and the face, in mesh
+    /// order.
     pub further_faces: Vec<[u32; 2]>,
 }
 
@@ -37,21 +40,23 @@ impl EdgeList {
         budget.spend("the edges", half_edges, 8 + 4 + size_of::<MeshEdge>() as u64)?;
         budget.spend("the edges", mesh.positions.len() as u64 + 1, 4)?;
         let buckets = Buckets::of(mesh);
-        let leaders = buckets.leaders(half_edges as usize);
-        Ok(collect(mesh, &leaders))
+        let first_half_edges = buckets.first_half_edges(half_edges as usize);
+        Ok(collect(mesh, &first_half_edges))
     }
 
-    /// Whether every edge has exactly two faces, of opposite directions: then the mesh is the skin of a solid.
+    /// Whether every edge has exactly two faces, which run along it in opposite directions: then
+    /// the mesh bounds a solid.
     pub fn is_closed(&self) -> bool {
-        self.edges.iter().all(|e| e.face_count == 2 && !e.is_wound_alike)
+        self.edges.iter().all(|e| e.face_count == 2 && !e.has_inconsistent_winding)
     }
 }
 
-/// Half-edges (three a triangle, numbered triangle by triangle) sorted by their lower vertex, by counting.
+/// Half-edges in buckets by their lower vertex, filled by counting sort. Half-edge `3 t + i` of
+/// triangle `t` goes from corner `i` to corner `i + 1`.
 struct Buckets {
-    /// Where each vertex's half-edges end.
+    /// The end of each vertex's bucket in `half_edges`.
     ends: Vec<u32>,
-    /// The upper vertex and the half-edge's number.
+    /// The upper vertex and the number of each half-edge.
     half_edges: Vec<(u32, u32)>,
 }
 
@@ -68,7 +73,7 @@ impl Buckets {
         }
         let mut half_edges = vec![(0, 0); mesh.own_triangles().len() * 3];
         let mut number = 0;
-        // `ends[v]` is the bucket's start until it is full, and then its end.
+        // Filling a bucket moves `ends[v]` from the bucket's start to its end.
         for t in mesh.own_triangles() {
             for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
                 let slot = &mut ends[a.min(b) as usize];
@@ -81,48 +86,50 @@ impl Buckets {
         Self { ends, half_edges }
     }
 
-    /// For each half-edge the first one on the same edge.
-    fn leaders(mut self, count: usize) -> Vec<u32> {
-        let mut leaders = vec![0; count];
+    /// The first half-edge on the same edge, for each half-edge.
+    fn first_half_edges(mut self, count: usize) -> Vec<u32> {
+        let mut first_half_edges = vec![0; count];
         let mut start = 0;
         for &end in &self.ends {
             let bucket = &mut self.half_edges[start..end as usize];
             start = end as usize;
-            // Buckets hold about three entries; but the hub of a hostile fan has millions.
+            // A bucket holds about three entries, but the hub of a hostile fan millions: no
+            // quadratic search.
             bucket.sort_unstable();
-            let mut leader = (u32::MAX, 0);
+            let mut first = (u32::MAX, 0);
             for &(upper, half_edge) in bucket.iter() {
-                if upper != leader.0 {
-                    leader = (upper, half_edge);
+                if upper != first.0 {
+                    first = (upper, half_edge);
                 }
-                leaders[half_edge as usize] = leader.1;
+                first_half_edges[half_edge as usize] = first.1;
             }
         }
-        leaders
+        first_half_edges
     }
 }
 
-fn collect(mesh: &Mesh, leaders: &[u32]) -> EdgeList {
-    let mut edges: Vec<MeshEdge> = Vec::with_capacity(leaders.len() / 2 + 1);
+/// Makes an edge of each half-edge that comes first on its edge, and adds the others to it.
+fn collect(mesh: &Mesh, first_half_edges: &[u32]) -> EdgeList {
+    let mut edges: Vec<MeshEdge> = Vec::with_capacity(first_half_edges.len() / 2 + 1);
     let mut further_faces = Vec::new();
-    let mut edge_of_half_edge = vec![0_u32; leaders.len()];
-    for (i, &leader) in leaders.iter().enumerate() {
+    let mut edge_of_half_edge = vec![0_u32; first_half_edges.len()];
+    for (i, &first) in first_half_edges.iter().enumerate() {
         let (face, corner) = (i / 3, i % 3);
         let t = mesh.triangles[face];
         let vertices = [t[corner], t[(corner + 1) % 3]];
         let is_polygon_edge = mesh.edge_masks[face] >> corner & 1 != 0;
-        if leader as usize == i {
+        if first as usize == i {
             edge_of_half_edge[i] = edges.len() as u32;
             edges.push(MeshEdge {
                 vertices,
                 faces: [face as u32, NO_FACE],
                 face_count: 1,
                 is_polygon_edge,
-                is_wound_alike: false,
+                has_inconsistent_winding: false,
             });
         } else {
-            // A leader comes before all that it leads.
-            let number = edge_of_half_edge[leader as usize];
+            // The first half-edge has a lower number, so its edge exists.
+            let number = edge_of_half_edge[first as usize];
             let edge = &mut edges[number as usize];
             if edge.face_count == 1 {
                 edge.faces[1] = face as u32;
@@ -131,7 +138,7 @@ fn collect(mesh: &Mesh, leaders: &[u32]) -> EdgeList {
             }
             edge.face_count += 1;
             edge.is_polygon_edge |= is_polygon_edge;
-            edge.is_wound_alike |= edge.vertices == vertices;
+            edge.has_inconsistent_winding |= edge.vertices == vertices;
         }
     }
     EdgeList { edges, further_faces }
@@ -162,11 +169,11 @@ mod tests {
         assert_eq!(list.edges[0].faces, [0, 3]);
         let flipped = edges(&[[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 2, 3]], &[7; 4]);
         assert!(!flipped.is_closed());
-        assert_eq!(flipped.edges.iter().filter(|e| e.is_wound_alike).count(), 3);
+        assert_eq!(flipped.edges.iter().filter(|e| e.has_inconsistent_winding).count(), 3);
     }
 
     #[test]
-    fn a_quad_has_one_diagonal_and_an_open_rim() {
+    fn a_quad_has_one_diagonal_and_four_open_edges() {
         let list = edges(&[[0, 1, 2], [0, 2, 3]], &[0b011, 0b110]);
         assert_eq!(list.edges.len(), 5);
         assert_eq!(list.edges.iter().filter(|e| !e.is_polygon_edge).count(), 1);
@@ -179,7 +186,7 @@ mod tests {
         let list = edges(&[[0, 1, 2], [1, 0, 3], [0, 1, 4]], &[7; 3]);
         let hinge = list.edges[0];
         assert_eq!((hinge.face_count, hinge.faces), (3, [0, 1]));
-        assert!(hinge.is_wound_alike);
+        assert!(hinge.has_inconsistent_winding);
         assert_eq!(list.further_faces, [[0, 2]]);
     }
 

@@ -1,13 +1,14 @@
-//! What a file says about its surfaces: factors, textures, the images they come from, and its cameras.
+//! Materials of a file, with their textures and images, and the file's cameras.
 //!
-//! Images stay encoded here. Whoever samples one decodes it, so that a texture that no picture shows costs nothing.
+//! Images stay encoded here and are decoded when a picture samples them. A texture that is not
+//! shown costs nothing.
 
 use std::sync::Arc;
 
-/// A material as the file has it. `None` and the default mean that the file does not say.
+/// A material of the file. `None` and defaults mean that the file gives no value.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MaterialSlot {
-    /// The asset's own name; empty where it gives none.
+    /// The name in the file; empty where it gives none.
     pub name: String,
     /// Linear RGBA base colour, straight alpha.
     pub base_color: Option<[f32; 4]>,
@@ -15,11 +16,11 @@ pub struct MaterialSlot {
     pub metallic: Option<f32>,
     /// 0 to 1.
     pub roughness: Option<f32>,
-    /// Linear RGB that the surface gives off, its strength included; may be above 1.
+    /// Emitted linear RGB, its strength included; may exceed 1.
     pub emissive: Option<[f32; 3]>,
-    /// What the base colour's alpha means.
+    /// The meaning of the base colour's alpha.
     pub alpha: AlphaMode,
-    /// Shown without light (KHR_materials_unlit).
+    /// Whether the material is shown without light (KHR_materials_unlit).
     pub unlit: bool,
     /// sRGB colour and alpha, times `base_color`.
     pub base_texture: Option<TextureRef>,
@@ -27,105 +28,105 @@ pub struct MaterialSlot {
     pub metallic_roughness_texture: Option<TextureRef>,
     /// Tangent-space normals: x right, y up in texture space, z out.
     pub normal_texture: Option<TextureRef>,
-    /// Multiplies the normal texture's x and y; None: 1.
+    /// A factor of the normal texture's x and y. None: 1.
     pub normal_scale: Option<f32>,
     /// sRGB colour, times `emissive`.
     pub emissive_texture: Option<TextureRef>,
 }
 
-/// What alpha means.
+/// The meaning of alpha.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum AlphaMode {
     /// Nothing: the surface is opaque.
     #[default]
     Opaque,
-    /// Below this the surface is not there, from it on it is opaque.
+    /// A cutoff: the surface is absent where alpha is below it, and opaque elsewhere.
     Mask(f32),
-    /// Share of the surface over what is behind it.
+    /// The share of the surface in the colour, over what lies behind it.
     Blend,
 }
 
-/// A use of an image.
+/// A use of an image by a material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureRef {
     /// Index into [`Mesh::images`](super::Mesh::images).
     pub image: u32,
-    /// `[u', v'] = [[a, b, c], [d, e, f]] (u, v, 1)`: KHR_texture_transform, or the identity. (0, 0) is the upper left
-    /// corner of the image, v runs down.
+    /// KHR_texture_transform, or the identity: `[u', v'] = [[a, b, c], [d, e, f]] (u, v, 1)`. (0,
+    /// 0) is the upper left corner of the image, and v runs down.
     pub transform: [[f32; 3]; 2],
-    /// What lies beyond 0 and 1, across and down.
+    /// How the image continues beyond 0 and 1, across and down.
     pub wrap: [Wrap; 2],
-    /// Whether a texel is shown as a square instead of blending into its neighbours.
+    /// Whether the nearest texel is sampled, instead of a blend of neighbours.
     pub nearest: bool,
 }
 
 impl TextureRef {
-    /// No change of coordinates.
+    /// The transform that changes no coordinates.
     pub const IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
-    /// The image as it is, repeated, smoothed.
+    /// A use without transform, repeated and filtered.
     pub fn new(image: u32) -> Self {
         Self { image, transform: Self::IDENTITY, wrap: [Wrap::Repeat; 2], nearest: false }
     }
 }
 
-/// How a texture goes on beyond its edge.
+/// How a texture continues beyond its edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// From the start.
+    /// It starts again.
     #[default]
     Repeat,
-    /// Back and forth.
+    /// It is mirrored, back and forth.
     Mirror,
-    /// With its last row or column.
+    /// Its last row or column continues.
     Clamp,
 }
 
 /// An image of the file, still encoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImageSource {
-    /// How to speak of it: `image 3 ("wood.png")`.
+    /// Its name in messages: `image 3 ("wood.png")`.
     pub name: String,
     /// Its bytes.
     pub content: ImageContent,
 }
 
-/// Where an image's bytes are.
+/// The bytes of an image, or why there are none.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ImageContent {
-    /// Here: PNG, JPEG or WebP, unless the file lies.
+    /// The bytes as the file has them: PNG, JPEG, WebP or KTX2 if the file is valid.
     Encoded(Arc<[u8]>),
-    /// Not in the upload, and the format says that the model is incomplete without: an error for whoever samples it. Holds
-    /// the sentence.
+    /// The upload lacks the image, and by the format's rules the model is incomplete without it.
+    /// Sampling it is an error, with this sentence.
     Missing(String),
-    /// Not in the upload, and by the format's custom the model is shown without it.
+    /// The upload lacks the image, and by the format's custom the model is shown without it.
     Absent,
 }
 
 /// A camera of the file, in file space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileCamera {
-    /// The asset's own name; empty where it gives none.
+    /// The name in the file; empty where it gives none.
     pub name: String,
     /// Position.
     pub eye: [f64; 3],
-    /// Picture right, picture up and towards the viewer: unit vectors, right-handed.
+    /// Right in the picture, up in the picture, and towards the viewer: unit vectors, right-handed.
     pub axes: [[f64; 3]; 3],
-    /// How it projects.
+    /// The projection.
     pub lens: FileLens,
 }
 
-/// A camera's projection.
+/// The projection of a file's camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FileLens {
-    /// Vertical field of view, degrees.
+    /// Perspective.
     Perspective {
-        /// As above.
+        /// Vertical field of view, degrees.
         fov_deg: f64,
     },
-    /// Height of the view, file units.
+    /// Orthographic.
     Orthographic {
-        /// As above.
+        /// Height of the view, file units.
         height: f64,
     },
 }

@@ -1,4 +1,7 @@
-//! The [`Mesh`] that every importer ends in, and what can be asked of it: [`normals`], [`edges`], [`topology`], [`measure`].
+//! The [`Mesh`], the one form that every importer produces, and what is computed from it:
+//! [`normals`], [`edges`], [`topology`], [`measure`].
+//!
+//! **Invariant**: nothing in this room, and nothing after it, depends on the file format.
 
 pub mod edges;
 pub mod material;
@@ -8,6 +11,7 @@ pub mod normals;
 pub mod primitives;
 pub mod topology;
 pub(crate) mod union_find;
+pub(crate) mod vector;
 
 pub use material::MaterialSlot;
 pub use metadata::FileMetadata;
@@ -20,21 +24,24 @@ use serde::Serialize;
 
 /// A triangle mesh in its normal form.
 ///
-/// Positions lie in a box of at most 1 unit a side around the origin, in f32. [`Mesh::to_file`] leads back to the file's
-/// own space. Positions are welded: no two are equal, so that indices alone tell which triangles are neighbours.
-/// Attributes (normals, UVs, colours) have their own index, because a file may give one position several normals.
+/// Positions are f32 in a box around the origin whose sides are at most 1. [`Mesh::to_file`] leads
+/// back to the file's own space. Positions are welded: no two are equal, so indices alone say which
+/// triangles are neighbours. Attributes (normals, UVs, colours) have an index of their own, because
+/// a file may give one position several normals.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Welded positions in the unit box. Finite.
     pub positions: Vec<[f32; 3]>,
-    /// Three indices into `positions` a triangle, counter-clockwise seen from the front, no two equal. In file order.
+    /// Three indices into `positions` per triangle, counter-clockwise seen from the front, no two
+    /// equal. In file order.
     pub triangles: Vec<[u32; 3]>,
-    /// A unit normal a triangle, computed in f64 from the file's own positions. Zero where the face has no area.
+    /// A unit normal per triangle, computed in f64 from the file's own positions. Zero where the
+    /// face has no area.
     pub face_normals: Vec<[f32; 3]>,
-    /// A polygon edge mask a triangle: bit `i` is set where the edge from corner `i` to corner `i + 1` is an edge of the
-    /// file's polygon, clear where triangulation made it up.
+    /// A polygon edge mask per triangle. Bit `i` is set where the edge from corner `i` to corner
+    /// `i + 1` is an edge of the file's polygon, and clear where triangulation added it.
     pub edge_masks: Vec<u8>,
-    /// Index into `materials` a triangle.
+    /// An index into `materials` per triangle.
     pub triangle_materials: Vec<u32>,
     /// The file's materials; at least one.
     pub materials: Vec<MaterialSlot>,
@@ -42,17 +49,21 @@ pub struct Mesh {
     pub images: Vec<ImageSource>,
     /// The file's cameras, in the order of the scene.
     pub cameras: Vec<FileCamera>,
-    /// Three indices into the attribute arrays a triangle. Empty where there is no attribute at all.
+    /// Three indices into the attribute arrays per triangle. Empty where the mesh has no
+    /// attributes.
     pub attribute_triangles: Vec<[u32; 3]>,
-    /// Line segments and points, their ends indices into `positions`; none is shorter than 24 bits can tell.
+    /// Line segments and points. Their ends are indices into `positions`; segments too short for
+    /// f32 were dropped.
     pub lines_and_points: Vec<LineOrPoint>,
-    /// Two indices into the attribute arrays each. Empty where there is no attribute at all.
+    /// Two indices into the attribute arrays per line or point. Empty where the mesh has no
+    /// attributes.
     pub line_point_attributes: Vec<[u32; 2]>,
     /// Set once `loose` has been given an area for one view: where what the file has ends in the arrays.
     pub thickened: Option<Thickened>,
     /// Unit vertex normals of the file; empty where it has none.
     pub normals: Vec<[f32; 3]>,
-    /// Texture coordinates, (0, 0) the upper left corner of the image and v down; empty where the file has none.
+    /// Texture coordinates, (0, 0) the upper left corner of the image and v down; empty where the
+    /// file has none.
     pub uvs: Vec<[f32; 2]>,
     /// Linear RGBA vertex colours; empty where the file has none.
     pub colors: Vec<[f32; 4]>,
@@ -89,12 +100,13 @@ impl Mesh {
     }
 }
 
-/// `file = centre + scale * unit`. The scale is a power of two, so going there and back rounds nothing.
+/// The way from the unit box to the file's space: `file = centre + scale * unit`. The scale is a
+/// power of two, so that scaling rounds nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToFile {
-    /// Middle of the file's bounding box, in file units.
+    /// The middle of the file's bounding box, in file units.
     pub centre: [f64; 3],
-    /// File units in a unit of the box.
+    /// File units per unit of the box.
     pub scale: f64,
 }
 
@@ -104,21 +116,21 @@ impl Default for ToFile {
     }
 }
 
-/// Which way is up.
+/// The axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UpAxis {
-    /// +X
+    /// +X.
     X,
-    /// -X
+    /// -X.
     NegX,
     /// +Y: glTF and, by custom, OBJ.
     #[default]
     Y,
-    /// -Y
+    /// -Y.
     NegY,
     /// +Z: STL, by custom.
     Z,
-    /// -Z
+    /// -Z.
     NegZ,
 }
 

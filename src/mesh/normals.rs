@@ -1,9 +1,11 @@
 //! Vertex normals, for meshes that bring none.
 
 use super::Mesh;
+use super::vector::{dot, sub};
 use std::borrow::Cow;
 
-/// Normals to shade smoothly with, and the index that goes with them: the file's own, or angle-weighted ones.
+/// Normals to shade smoothly with, and the index that goes with them: the file's own, or
+/// angle-weighted ones.
 pub fn smooth(mesh: &Mesh) -> (Cow<'_, [[f32; 3]]>, &[[u32; 3]]) {
     if mesh.normals.is_empty() {
         (Cow::Owned(angle_weighted(mesh)), &mesh.triangles)
@@ -12,8 +14,8 @@ pub fn smooth(mesh: &Mesh) -> (Cow<'_, [[f32; 3]]>, &[[u32; 3]]) {
     }
 }
 
-/// A unit normal a welded position: the mean of its faces' normals, each weighted by the angle of the corner there, so that
-/// it does not depend on how a flat region was cut into triangles.
+/// A unit normal a welded position: the mean of its faces' normals, each weighted by the angle of
+/// the corner there, so that it does not depend on how a flat region was cut into triangles.
 pub fn angle_weighted(mesh: &Mesh) -> Vec<[f32; 3]> {
     let mut sums = vec![[0.0_f64; 3]; mesh.positions.len()];
     for (triangle, normal) in mesh.triangles.iter().zip(&mesh.face_normals) {
@@ -27,7 +29,8 @@ pub fn angle_weighted(mesh: &Mesh) -> Vec<[f32; 3]> {
         }
     }
     let mut normals: Vec<[f32; 3]> = sums.iter().map(|s| unit(*s).unwrap_or_default()).collect();
-    // Where faces cancel each other, as on both sides of a sheet, any of them is better than none.
+    // Where faces cancel each other, as on the two sides of a sheet, the first face's normal is
+    // taken.
     for (triangle, face_normal) in mesh.triangles.iter().zip(&mesh.face_normals) {
         for &v in triangle {
             if normals[v as usize] == [0.0; 3] {
@@ -38,31 +41,35 @@ pub fn angle_weighted(mesh: &Mesh) -> Vec<[f32; 3]> {
     normals
 }
 
-/// Relative to the weights themselves, what is left of faces that cancel each other is rounding, not a direction.
-const CANCELLED2: f64 = 1e-12;
+/// The squared length, in radians, up to which a sum of weighted normals counts as cancelled: the
+/// rest is rounding.
+const CANCELLED_SQUARED: f64 = 1e-12;
 
+/// The unit vector of a sum of weighted normals; None where they cancel each other.
 fn unit(v: [f64; 3]) -> Option<[f32; 3]> {
-    let length2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    (length2 > CANCELLED2).then(|| {
+    let length2 = dot(v, v);
+    (length2 > CANCELLED_SQUARED).then(|| {
         let length = length2.sqrt();
         v.map(|c| (c / length) as f32)
     })
 }
 
+/// The angles of a triangle's corners, radians.
 fn corner_angles([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
-    let sub = |p: [f64; 3], q: [f64; 3]| [q[0] - p[0], q[1] - p[1], q[2] - p[2]];
-    let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
-    let (ab, bc, ca) = (sub(a, b), sub(b, c), sub(c, a));
+    let (ab, bc, ca) = (sub(b, a), sub(c, b), sub(a, c));
     let length = [dot(ab, ab), dot(bc, bc), dot(ca, ca)].map(f64::sqrt);
     let angle = |u: [f64; 3], v: [f64; 3], scale: f64| {
-        // Positions differ after welding, so the lengths are not 0.
+        // Welded positions differ, so no length is 0.
         acos((-dot(u, v) / scale).clamp(-1.0, 1.0))
     };
     [angle(ca, ab, length[2] * length[0]), angle(ab, bc, length[0] * length[1]), angle(bc, ca, length[1] * length[2])]
 }
 
-/// Within 5e-8 of the angle; the same on every machine, and several times faster than a full arc cosine.
-/// Abramowitz and Stegun, 4.4.46.
+/// The arc cosine in radians, to within 5e-8: Abramowitz and Stegun, Handbook of Mathematical
+/// Functions, 4.4.46.
+///
+/// It has the same bits on every machine and is several times faster than `libm::acos`. Weights
+/// need no more digits.
 fn acos(x: f64) -> f64 {
     let t = x.abs();
     let series = [-0.0012624911, 0.0066700901, -0.0170881256, 0.0308918810, -0.0501743046, 0.0889789874, -0.2145988016]

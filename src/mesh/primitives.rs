@@ -1,16 +1,20 @@
-//! Line segments and points: what a file draws without area.
+//! Line segments and points: primitives of a file that have no area.
+//!
+//! The plan draws them as thin triangles. Importers count these triangles against the limit
+//! beforehand.
 
-/// Triangles that a segment becomes when it is drawn.
+/// The number of triangles that a segment is drawn as.
 pub const SEGMENT_TRIANGLES: u64 = 2;
-/// Triangles that a point becomes when it is drawn.
+/// The number of triangles that a point is drawn as.
 pub const POINT_TRIANGLES: u64 = 4;
 
-/// A line segment, or a point where both ends are one vertex.
+/// A line segment, or a point: a segment whose ends are the same vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineOrPoint {
-    /// Its ends: indices of vertices, or of positions once they are welded.
+    /// Indices of the two ends: of the file's vertices during import, of welded positions in a
+    /// [`Mesh`](super::Mesh).
     pub ends: [u32; 2],
-    /// Index of its material.
+    /// Index of the material.
     pub material: u32,
 }
 
@@ -20,13 +24,13 @@ impl LineOrPoint {
         Self { ends: [vertex; 2], material }
     }
 
-    /// Whether it is one.
+    /// Whether this is a point.
     pub fn is_point(&self) -> bool {
         self.ends[0] == self.ends[1]
     }
 }
 
-/// Triangles that all of them become when they are drawn.
-pub fn triangles<'a>(loose: impl IntoIterator<Item = &'a LineOrPoint>) -> u64 {
-    loose.into_iter().map(|one| if one.is_point() { POINT_TRIANGLES } else { SEGMENT_TRIANGLES }).sum()
+/// The number of triangles that all of `primitives` together are drawn as.
+pub fn triangles<'a>(primitives: impl IntoIterator<Item = &'a LineOrPoint>) -> u64 {
+    primitives.into_iter().map(|one| if one.is_point() { POINT_TRIANGLES } else { SEGMENT_TRIANGLES }).sum()
 }

@@ -1,18 +1,21 @@
-//! Union-find: which things are connected. Paths are halved, so that any order of any number of steps takes n log n.
+//! Union-find (disjoint sets): finds what is connected.
+//!
+//! Paths are halved at each search, so n steps take at most O(n log n), whatever their order
+//! (Tarjan and van Leeuwen, Worst-case analysis of set union algorithms, 1984).
 
-/// A partition of the numbers below a count.
+/// A partition of the numbers `0..count` into disjoint sets.
 #[derive(Debug)]
-pub struct Sets {
+pub struct UnionFind {
     parent: Vec<u32>,
 }
 
-impl Sets {
-    /// Each number by itself.
+impl UnionFind {
+    /// Each number in a set of its own.
     pub fn new(count: usize) -> Self {
         Self { parent: (0..count as u32).collect() }
     }
 
-    /// The number that stands for the set of `v`: its lowest.
+    /// The representative of the set of `v`: its lowest number.
     pub fn find(&mut self, mut v: u32) -> u32 {
         while self.parent[v as usize] != v {
             let up = self.parent[self.parent[v as usize] as usize];
@@ -22,29 +25,34 @@ impl Sets {
         v
     }
 
-    /// Makes one set of two. Whether they were two.
+    /// Unites the sets of `a` and `b`. Returns whether they were different.
     pub fn unite(&mut self, a: u32, b: u32) -> bool {
         let (a, b) = (self.find(a), self.find(b));
-        // The lower number wins, which keeps trees shallow for meshes in any sensible order.
+        // No ranks are kept: taking the lower number keeps trees shallow for meshes in any usual
+        // order.
         self.parent[a.max(b) as usize] = a.min(b);
         a != b
     }
 }
 
-/// A partition whose members are on one of two sides each, known relative to each other: faces that are turned alike or not.
+/// A partition with parity: each member of a set is on one of two sides, known relative to the
+/// other members.
+///
+/// Members are faces, and the side says whether a face has to be turned over to agree with the
+/// representative.
 #[derive(Debug)]
-pub struct SidedSets {
-    /// The parent, times two, and one if it is on the other side.
+pub struct ParityUnionFind {
+    /// Twice the parent's number, plus 1 if the parent is on the other side.
     parent: Vec<u32>,
 }
 
-impl SidedSets {
-    /// Each number by itself. Counts are below 2^31.
+impl ParityUnionFind {
+    /// Each number in a set of its own. `count` is below 2^31.
     pub fn new(count: usize) -> Self {
         Self { parent: (0..count as u32).map(|v| v << 1).collect() }
     }
 
-    /// The number that stands for the set of `v`, and whether `v` is on its other side.
+    /// The representative of the set of `v`, and whether `v` is on the other side than it.
     pub fn find(&mut self, mut v: u32) -> (u32, bool) {
         let mut is_other = 0;
         loop {
@@ -59,7 +67,8 @@ impl SidedSets {
         }
     }
 
-    /// Makes one set of two; where they already are one, what is known of their sides stays.
+    /// Unites the sets of `a` and `b`, which are on opposite sides or not. If the sets are one
+    /// already, nothing changes.
     pub fn unite(&mut self, a: u32, b: u32, are_opposite: bool) {
         let ((a, a_side), (b, b_side)) = (self.find(a), self.find(b));
         if a != b {
@@ -76,7 +85,7 @@ mod tests {
     fn a_chain_in_either_order_is_one_set() {
         let n = 100_000;
         for is_reversed in [false, true] {
-            let (mut sets, mut sided) = (Sets::new(n as usize), SidedSets::new(n as usize));
+            let (mut sets, mut sided) = (UnionFind::new(n as usize), ParityUnionFind::new(n as usize));
             for i in 0..n - 1 {
                 let v = if is_reversed { n - 2 - i } else { i };
                 assert!(sets.unite(v, v + 1));
@@ -94,9 +103,9 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 8) % n
         };
-        // Each number's side is given beforehand; unions tell pairs only.
+        // The sides are fixed beforehand; unions state pairs only.
         let side: Vec<bool> = (0..1000).map(|_| random(2) == 1).collect();
-        let mut sets = SidedSets::new(1000);
+        let mut sets = ParityUnionFind::new(1000);
         for _ in 0..5000 {
             let (a, b) = (random(1000), random(1000));
             sets.unite(a, b, side[a as usize] != side[b as usize]);

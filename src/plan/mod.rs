@@ -17,6 +17,7 @@ mod skips;
 mod sort;
 mod surface;
 
+pub use crate::texture::{Texture, TextureError, Textures};
 pub use build::{build, build_keeping};
 pub use error::PlanError;
 pub use lines::{Edge, LinePass, Shown, Side};
@@ -26,9 +27,7 @@ pub use outline::{HullPass, HullVertex};
 pub use primitives::thicken;
 pub use quality::{Choice, Chosen, choose};
 pub use skips::{Skip, SkipKind};
-pub use surface::{
-    CornerValues, Lamp, Lights, ShadedMaterial, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, flags, slots,
-};
+pub use surface::{CornerValues, Lamp, Lights, ShadedMaterial, SurfacePass, TEXTURE_NONE, TextureUse, flags, slots};
 
 use std::borrow::Cow;
 

@@ -1,21 +1,21 @@
-//! The report's box around the mesh, in the file's own space.
+//! The bounding box of a mesh in a report, in the file's own space.
 
 use crate::mesh::Mesh;
 use serde::Serialize;
 
-/// Axis-aligned, file units.
+/// An axis-aligned box, file units.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Bounds {
-    /// Its lower corner.
+    /// The lower corner.
     pub min: [f64; 3],
-    /// Its upper corner.
+    /// The upper corner.
     pub max: [f64; 3],
-    /// From one to the other.
+    /// The lengths of the sides.
     pub size: [f64; 3],
 }
 
 impl Bounds {
-    /// Around a mesh. A size that an f64 cannot hold is the largest that it can.
+    /// The box of a mesh. Numbers that an f64 cannot hold become the largest that it can.
     pub fn of(mesh: &Mesh) -> Self {
         let to_file = |unit: [f32; 3]| {
             let at = |axis: usize| mesh.to_file.centre[axis] + mesh.to_file.scale * f64::from(unit[axis]);
@@ -29,7 +29,8 @@ impl Bounds {
     }
 }
 
-/// Without the digits that mean nothing in a mesh this large: positions are kept in 24 bits.
+/// Rounds `value` to the digits that are significant in a mesh of size `largest`: positions have 24
+/// bits, about 7 digits.
 fn without_rounding(value: f64, largest: f64) -> f64 {
     let magnitude = |v: f64| libm::floor(libm::log10(v.abs()));
     let digits = magnitude(value) - magnitude(largest) + 6.0;

@@ -1,6 +1,7 @@
-//! The size of an encoded image from its header alone: nothing is decoded and nothing allocated.
+//! Format and size of an encoded image, from its header alone. Nothing is decoded and nothing
+//! allocated.
 
-/// What the first bytes say; None for what they do not.
+/// The format and the size that an image's first bytes state; None where they state none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImageHeader {
     /// `png`, `jpeg`, `webp` or `ktx2`.
@@ -9,7 +10,7 @@ pub struct ImageHeader {
     pub size_px: Option<[u32; 2]>,
 }
 
-/// Reads the header.
+/// Reads the header of an image.
 pub fn read(bytes: &[u8]) -> ImageHeader {
     let is_webp = bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP");
     let (format, size_px) = if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
@@ -26,13 +27,14 @@ pub fn read(bytes: &[u8]) -> ImageHeader {
     ImageHeader { format: Some(format), size_px: size_px.filter(|size| !size.contains(&0)) }
 }
 
-/// ISO/IEC 15948, 11.2.2: IHDR is the first chunk.
+/// The size of a PNG. ISO/IEC 15948, 11.2.2: IHDR is the first chunk.
 fn png(bytes: &[u8]) -> Option<[u32; 2]> {
     (bytes.get(12..16)? == b"IHDR").then_some(())?;
     Some([u32::from_be_bytes(at(bytes, 16)?), u32::from_be_bytes(at(bytes, 20)?)])
 }
 
-/// ITU-T T.81, B.1.1 and B.2.2: segments with their lengths, up to the one that begins a frame.
+/// The size of a JPEG. ITU-T T.81, B.1.1 and B.2.2: segments with their lengths, up to the one that
+/// begins a frame.
 fn jpeg(bytes: &[u8]) -> Option<[u32; 2]> {
     let mut rest = bytes.get(2..)?;
     loop {
@@ -46,14 +48,14 @@ fn jpeg(bytes: &[u8]) -> Option<[u32; 2]> {
                 let [height, width] = [u16::from_be_bytes(at(after, 3)?), u16::from_be_bytes(at(after, 5)?)];
                 return Some([u32::from(width), u32::from(height)]);
             }
-            // The picture begins or ends, and there was no frame.
+            // A scan begins or the image ends before any frame header.
             0xd8..=0xda => return None,
             _ => rest = after.get(usize::from(u16::from_be_bytes(at(after, 0)?)).max(2)..)?,
         }
     }
 }
 
-/// RFC 9649, 2.5 to 2.7.
+/// The size of a WebP. RFC 9649, 2.5 to 2.7.
 fn webp(bytes: &[u8]) -> Option<[u32; 2]> {
     match bytes.get(12..16)? {
         b"VP8 " => {
@@ -74,11 +76,12 @@ fn webp(bytes: &[u8]) -> Option<[u32; 2]> {
     }
 }
 
-/// KTX File Format 2.0, 3: pixelWidth and pixelHeight.
+/// The size of a KTX2. KTX File Format 2.0, 3: pixelWidth and pixelHeight.
 fn ktx2(bytes: &[u8]) -> Option<[u32; 2]> {
     Some([u32::from_le_bytes(at(bytes, 20)?), u32::from_le_bytes(at(bytes, 24)?)])
 }
 
+/// The `N` bytes from `start` on.
 fn at<const N: usize>(bytes: &[u8], start: usize) -> Option<[u8; N]> {
     bytes.get(start..)?.first_chunk().copied()
 }
@@ -105,7 +108,7 @@ mod tests {
                 let bytes = encoded(width, height, format);
                 let expected = ImageHeader { format: Some(name), size_px: Some([width, height]) };
                 assert_eq!(read(&bytes), expected);
-                // Cut off anywhere it gives the size or none, and never another.
+                // A truncated file gives the same size or none.
                 for end in 0..bytes.len().min(700) {
                     let size = read(&bytes[..end]).size_px;
                     assert!(size.is_none() || size == expected.size_px, "{name} {end}");
@@ -145,7 +148,7 @@ mod tests {
         for bytes in cases {
             assert_eq!(read(bytes).size_px, None);
         }
-        // A million fill bytes end.
+        // A million fill bytes do not loop for ever.
         let fill = [b"\xff\xd8".as_slice(), &vec![0xff; 1_000_000]].concat();
         assert_eq!(read(&fill).size_px, None);
     }

@@ -1,5 +1,7 @@
-//! The report on a mesh: everything that is known of a file without drawing it, in the one shape that `meshsnap inspect --json`
-//! prints and HTTP answers with. Its field names are public.
+//! The report on a mesh: everything that is known of a file without drawing it.
+//!
+//! `meshsnap inspect --json` prints it and HTTP answers with it, in one shape. These are data
+//! transfer objects, and their field names are part of the public interface.
 
 mod bounds;
 mod image_header;
@@ -17,7 +19,7 @@ use crate::mesh::topology::Topology;
 use crate::mesh::{FileContent, FileMetadata, Mesh, UpAxis};
 use serde::Serialize;
 
-/// What is in a file. Counts are null where the format has no such thing.
+/// The contents of a file. Counts are null where the format has no such thing.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     format: &'static str,
@@ -28,25 +30,25 @@ pub struct Report {
     nodes: Option<u64>,
     meshes: Option<u64>,
     primitives: Option<u64>,
-    /// As the file's meshes count it, each once, whether shown or not: what other readers of the format total.
+    /// The totals that other readers of the format give: each mesh of the file once, shown or not.
     file_content: Option<FileContent>,
     file_vertices: u64,
     positions: u64,
     triangles: u64,
     polygons: u64,
-    /// How many polygons have 3, 4, ... corners; the last place holds all larger ones.
+    /// The numbers of polygons with 3, 4, ... corners. The last entry counts all larger ones.
     polygons_by_arity: Vec<Arity>,
-    /// Segments.
+    /// Line segments.
     lines: u64,
     points: u64,
-    /// Names; empty where a material has none.
+    /// Names; empty for a material without one.
     materials: Vec<String>,
     /// The images that drawn materials use.
     textures: Vec<TextureReport>,
     animations: Option<u64>,
     skins: Option<u64>,
     cameras: Option<u64>,
-    /// Those that the drawn scene shows, in its order: what a request may look through.
+    /// The cameras of the drawn scene, in its order. A request can choose one of them.
     scene_cameras: Vec<CameraReport>,
     extensions_used: Vec<String>,
     extensions_required: Vec<String>,
@@ -55,9 +57,10 @@ pub struct Report {
     has_colors: bool,
     bounds: Bounds,
     topology: TopologyReport,
-    /// In square file units; null where an f64 cannot hold it.
+    /// Square file units; null where an f64 cannot hold the number.
     area: Option<f64>,
-    /// In cubic file units, negative where the surface is inside out; null unless the mesh is watertight.
+    /// Cubic file units, negative where the surface is inside out; null unless the mesh is
+    /// watertight.
     volume: Option<f64>,
     dropped_nonfinite_faces: u64,
     dropped_degenerate_faces: u64,
@@ -72,7 +75,8 @@ struct Arity {
     count: u64,
 }
 
-/// An image as its header has it; nulls where it is not in the upload, or in no format that is known.
+/// An image by its header. Fields are null where the upload lacks the image or the format is
+/// unknown.
 #[derive(Clone, Debug, Serialize)]
 struct TextureReport {
     name: String,
@@ -86,9 +90,9 @@ struct TextureReport {
 struct CameraReport {
     name: String,
     projection: &'static str,
-    /// Of a perspective camera.
+    /// Vertical field of view of a perspective camera, degrees.
     fov_deg: Option<f64>,
-    /// Of an orthographic one, file units.
+    /// Height of the view of an orthographic camera, file units.
     height: Option<f64>,
 }
 
@@ -106,16 +110,15 @@ impl Report {
         deadline.check()?;
         let topology = Topology::of(mesh, &edges, budget, deadline)?;
         drop(edges);
-        // Names and warnings are in memory as the mesh has them, and here once more, and as text.
         let names = mesh.materials.iter().map(|m| m.name.len() + size_of::<String>());
         let images = mesh.images.iter().map(|image| image.name.len() + size_of::<TextureReport>());
         let cameras = mesh.cameras.iter().map(|camera| camera.name.len() + size_of::<CameraReport>());
-        // Here once, and each byte of a name as six where JSON escapes it.
+        // A name is copied once into the report, and JSON may escape each of its bytes as six.
         budget.spend("the report", names.chain(images).chain(cameras).sum::<usize>() as u64, 1 + 6)?;
         Ok(Self::new(mesh, file_bytes, topology))
     }
 
-    /// As `inspect --json` prints it and HTTP answers with it, to the byte.
+    /// The report as JSON, byte for byte as `inspect --json` prints it and HTTP answers.
     pub fn json(&self) -> Result<String, serde_json::Error> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
@@ -210,7 +213,7 @@ fn camera(name: String, lens: FileLens) -> CameraReport {
     }
 }
 
-/// As `camera.up` has it.
+/// The axis in the words of the request's `camera.up`.
 fn up(axis: UpAxis) -> &'static str {
     match axis {
         UpAxis::X => "x",

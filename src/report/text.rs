@@ -1,13 +1,13 @@
-//! The report for a person: a name and a value a line.
+//! The report as text for a person: a name and a value per line.
 
 use super::{Arity, CameraReport, Report, TextureReport};
 use crate::pluralise::pluralise;
 use std::fmt::Write as _;
 
-/// Most entries of a list that are written out.
+/// The most entries of a list that are written out.
 const SHOWN_MAX: usize = 40;
 
-/// One line for each thing that there is.
+/// The report as text. Properties without a value have no line.
 pub fn text(report: &Report) -> String {
     let mut out = String::new();
     let mut line = |name: &str, value: Option<String>| {
@@ -55,13 +55,13 @@ fn scene(report: &Report) -> Option<String> {
         (report.skins.filter(|n| *n > 0), "skin", "skins"),
         (report.cameras.filter(|n| *n > 0), "camera", "cameras"),
     ];
-    said(counts.into_iter().filter_map(|(count, one, more)| Some(pluralise(count?, one, more))))
+    joined(counts.into_iter().filter_map(|(count, one, more)| Some(pluralise(count?, one, more))))
 }
 
-/// What lies beside the faces.
+/// Lines and points, which lie beside the faces.
 fn beside(report: &Report) -> Option<String> {
     let counts = [(report.lines, "line", "lines"), (report.points, "point", "points")];
-    said(counts.into_iter().filter(|(count, ..)| *count > 0).map(|(count, one, more)| pluralise(count, one, more)))
+    joined(counts.into_iter().filter(|(count, ..)| *count > 0).map(|(count, one, more)| pluralise(count, one, more)))
 }
 
 fn texture(texture: &TextureReport) -> String {
@@ -94,21 +94,22 @@ fn measures(report: &Report) -> Option<String> {
     let volume = report
         .volume
         .map(|volume| format!("volume {}{}", plain(short(volume)), if volume < 0.0 { " (inside out)" } else { "" }));
-    said(area.into_iter().chain(volume))
+    joined(area.into_iter().chain(volume))
 }
 
-/// As it is, unless that were hundreds of digits.
+/// A number in decimal notation, or with an exponent where that would take more than about 16
+/// digits.
 fn plain(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 || (1e-9..1e16).contains(&size) { value.to_string() } else { format!("{value:e}") }
 }
 
-/// Seven digits: positions are kept in 24 bits.
+/// A number rounded to 7 digits, because positions have 24 bits.
 fn short(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }
 
-/// What is not drawn, and why.
+/// Faces, lines and points that are not drawn, with the reason.
 fn dropped(report: &Report) -> Option<String> {
     let reasons = [
         (report.dropped_nonfinite_faces, "with NaN or infinite corners"),
@@ -117,11 +118,12 @@ fn dropped(report: &Report) -> Option<String> {
     ];
     let met = reasons.into_iter().filter(|(count, _)| *count > 0);
     let faces = met.map(|(count, why)| format!("{} {why}", pluralise(count, "face", "faces")));
-    let loose = Some(report.dropped_lines_and_points).filter(|count| *count > 0);
-    said(faces.chain(loose.map(|count| pluralise(count, "line or point", "lines and points"))))
+    let primitives = Some(report.dropped_lines_and_points).filter(|count| *count > 0);
+    joined(faces.chain(primitives.map(|count| pluralise(count, "line or point", "lines and points"))))
 }
 
-fn said(parts: impl Iterator<Item = String>) -> Option<String> {
+/// All parts in one line; None where there is none.
+fn joined(parts: impl Iterator<Item = String>) -> Option<String> {
     let parts: Vec<String> = parts.collect();
     (!parts.is_empty()).then(|| parts.join(", "))
 }
@@ -134,7 +136,7 @@ fn list<T>(all: &[T], name: impl Fn(&T) -> String) -> String {
     shown.join(", ")
 }
 
-/// A name from the file may hold what moves a terminal's cursor.
+/// A name from the file without control characters, which could move a terminal's cursor.
 fn printable(name: &str) -> String {
     name.chars().take(200).map(|c| if c.is_control() { '\u{FFFD}' } else { c }).collect()
 }

@@ -1,15 +1,15 @@
-//! The report's part on how triangles hang together, after welding.
+//! The topology part of a report, after welding.
 
 use crate::mesh::topology::Topology;
 use crate::pluralise::pluralise;
 use serde::Serialize;
 
-/// As [`Topology`] has it, and what was dropped before.
+/// [`Topology`] under the names that clients read, with the faces that were dropped before.
 #[derive(Clone, Debug, Serialize)]
 pub struct TopologyReport {
-    /// Parts that share no vertex.
+    /// Connected components: sets of faces that share no vertex.
     pub components: u64,
-    /// Unique edges.
+    /// Undirected edges, each counted once.
     pub edges: u64,
     /// Edges with one face.
     pub open_edges: u64,
@@ -19,35 +19,36 @@ pub struct TopologyReport {
     pub nonmanifold_edges: u64,
     /// Vertices where surfaces touch that share no edge there.
     pub nonmanifold_vertices: u64,
-    /// Faces with the same three vertices as an earlier one.
+    /// Faces with the same three vertices as an earlier face.
     pub duplicate_faces: u64,
-    /// Faces without area, and those that collapse in 24 bits; they are not drawn.
+    /// Faces without area, and faces whose corners coincide in f32. They are not drawn.
     pub degenerate_faces: u64,
-    /// Edges between faces of opposite winding.
+    /// Edges between two faces of opposite winding.
     pub inconsistent_edges: u64,
     /// Vertices - edges + triangles.
     pub euler_characteristic: i64,
-    /// Handles in all; null unless the mesh is made of closed, orientable surfaces that do not touch.
+    /// Handles of all surfaces; null unless the mesh consists of closed, orientable surfaces that
+    /// do not touch.
     pub genus: Option<u64>,
-    /// The closed, orientable surfaces, by genus.
+    /// The closed, orientable surfaces in the mesh, by genus.
     pub closed_surfaces: Vec<ClosedSurfaces>,
-    /// Whether faces can be turned so that neighbours agree.
+    /// Whether faces can be turned over so that all neighbours agree.
     pub is_orientable: bool,
-    /// Every edge has two faces of opposite directions.
+    /// Whether every edge has exactly two faces, which run along it in opposite directions.
     pub is_watertight: bool,
 }
 
 /// Surfaces of equal genus.
 #[derive(Clone, Debug, Serialize)]
 pub struct ClosedSurfaces {
-    /// Handles of each.
+    /// Handles of each surface.
     pub genus: u64,
-    /// How many there are.
+    /// The number of these surfaces.
     pub count: u64,
 }
 
 impl TopologyReport {
-    /// Of what was counted.
+    /// The report on a topology.
     pub fn new(topology: Topology, degenerate_faces: u64) -> Self {
         let Topology {
             components,
@@ -83,7 +84,7 @@ impl TopologyReport {
         }
     }
 
-    /// In words.
+    /// One line for a person: components, edges with their faults, characteristic, genus.
     pub fn text(&self) -> String {
         let mut said = vec![pluralise(self.components, "part", "parts")];
         let edges = pluralise(self.edges, "edge", "edges");
@@ -101,7 +102,8 @@ impl TopologyReport {
         said.join(", ")
     }
 
-    /// What else is not as it is on the skin of a solid; None where all is.
+    /// One line with the further faults of a surface that should bound a solid; None where there is
+    /// none.
     pub fn faults(&self) -> Option<String> {
         let faults = [
             (self.boundary_loops, "boundary loop", "boundary loops"),

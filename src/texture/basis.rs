@@ -1,54 +1,60 @@
-//! Basis Universal textures in KTX2 files, as KHR_texture_basisu has them: the largest image, transcoded to RGBA.
-//! <https://registry.khronos.org/KTX/specs/2.0/ktxspec.v2.html>
+//! KTX2 files with Basis Universal data, as KHR_texture_basisu has them: the largest image,
+//! transcoded to RGBA.
+//!
+//! Offsets and field names are those of the KTX File Format, version 2.0, section 3
+//! (<https://registry.khronos.org/KTX/specs/2.0/ktxspec.v2.html>).
 
 use std::panic::catch_unwind;
 
-use crate::plan::PlanError;
+use crate::texture::TextureError;
 use basisu::{DecodeFlags, TargetFormat, Transcoder};
 
 /// What a KTX2 file's header says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BasisHeader {
-    /// Columns.
+    /// Columns, texels.
     pub width: u32,
-    /// Rows.
+    /// Rows, texels.
     pub height: u32,
     /// Memory that transcoding takes, the result included.
     pub decoding_bytes: u64,
 }
 
-/// The first bytes of any KTX2 file.
+/// The first bytes of every KTX2 file.
 pub const KTX2_MAGIC: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
 
-/// Zstandard, as supercompression; below it BasisLZ and none, above it what glTF does not have.
+/// `supercompressionScheme` of Zstandard. Smaller numbers are BasisLZ (1) and none (0); glTF allows
+/// no larger one.
 const ZSTANDARD: u32 = 2;
-/// The largest window that the decoder of Zstandard gives itself, and tables.
+/// The largest window that the Zstandard decoder allocates, and its tables.
 const ZSTANDARD_BYTES: u64 = 128 << 20;
-/// Code books, of 16-bit counts, and tables.
+/// BasisLZ's code books, whose entries are counted in 16 bits, and their tables.
 const CODE_BOOK_BYTES: u64 = 8 << 20;
-/// A block of 4 x 4 texels of the less compressed of the two codecs.
+/// One block of 4 x 4 texels in UASTC, the larger of the two codecs.
 const BLOCK_BYTES: u64 = 16;
 
-/// Reads what is needed to know the cost, and no more. `name` is for errors.
-pub fn header(name: &str, bytes: &[u8]) -> Result<BasisHeader, PlanError> {
+/// Reads the header alone, which tells what transcoding costs. `name` is the image's, for errors.
+pub fn header(name: &str, bytes: &[u8]) -> Result<BasisHeader, TextureError> {
     let word = |at: usize| {
         let word = bytes.get(at..at + 4).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
         word.ok_or_else(|| broken(name, "is cut off"))
     };
     let [width, height, depth] = [word(20)?, word(24)?, word(28)?];
     let [layers, faces, scheme] = [word(32)?, word(36)?, word(44)?];
+    // Basis Universal data has `vkFormat` 0.
     if word(12)? != 0 || scheme > ZSTANDARD {
-        return Err(broken(name, "is a KTX2 file that is not of Basis Universal: those alone are read"));
+        return Err(unsupported(name, "is a KTX2 file that is not of Basis Universal: those alone are read"));
     }
     if width == 0 || height == 0 || depth > 0 || layers > 1 || faces != 1 {
-        return Err(broken(name, "is a KTX2 file that is not one flat picture"));
+        return Err(unsupported(name, "is a KTX2 file that is not one flat picture"));
     }
     let blocks = u64::from(width.div_ceil(4)) * u64::from(height.div_ceil(4));
-    // Sizes are checked later: 2^60 blocks may be claimed here.
+    // The caller checks the size later, so a header may claim 2^60 blocks here.
     let decoded_bytes = blocks.saturating_mul(16 * 4 + BLOCK_BYTES);
     let mut decoding_bytes = decoded_bytes.saturating_add(CODE_BOOK_BYTES + bytes.len() as u64);
     if scheme == ZSTANDARD {
-        // The decoder takes the file's word for how long the largest image is.
+        // The decoder allocates the uncompressed length that the file claims, so the claim is
+        // checked.
         let unpacked = u64::from(word(96)?) | u64::from(word(100)?) << 32;
         let expected = blocks.saturating_mul(BLOCK_BYTES);
         if unpacked != expected {
@@ -60,9 +66,10 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<BasisHeader, PlanError> {
     Ok(BasisHeader { width, height, decoding_bytes })
 }
 
-/// Transcodes to straight RGBA, 8 bits a channel; the caller has paid for it.
-pub fn decode(name: &str, bytes: &[u8], header: &BasisHeader) -> Result<Vec<u8>, PlanError> {
-    // A young crate with a large input: what it does not survive is the file's fault, not ours.
+/// Transcodes to straight RGBA with 8 bits per channel. The caller has spent
+/// [`BasisHeader::decoding_bytes`].
+pub fn decode(name: &str, bytes: &[u8], header: &BasisHeader) -> Result<Vec<u8>, TextureError> {
+    // The crate is young and its input is hostile: a panic in it counts as a broken file.
     let texels = catch_unwind(|| {
         let texture = Transcoder::new(bytes).ok()?;
         let same = texture.base_dimensions() == (header.width, header.height);
@@ -73,6 +80,10 @@ pub fn decode(name: &str, bytes: &[u8], header: &BasisHeader) -> Result<Vec<u8>,
     texels.ok_or_else(|| broken(name, "cannot be transcoded: its data is broken, or of a kind that is not read"))
 }
 
-fn broken(name: &str, detail: &str) -> PlanError {
-    PlanError::Texture(format!("{name} of the mesh {detail}"))
+fn broken(name: &str, detail: &str) -> TextureError {
+    TextureError::Broken(format!("{name} of the mesh {detail}"))
+}
+
+fn unsupported(name: &str, detail: &str) -> TextureError {
+    TextureError::Unsupported(format!("{name} of the mesh {detail}"))
 }

@@ -1,94 +1,94 @@
-//! Encoded images to rows of linear texels. What the bytes are is sniffed: a file's word for it is not taken.
+//! Encoded images to rows of linear texels.
 //!
-//! A decoder cannot be stopped midway. Its time is bounded by the pixels that the budget allows and by the input's length, once for
-//! PNG and WebP and baseline JPEG; a progressive JPEG's scans go over all pixels again, and zune-jpeg refuses more than 100 of them.
+//! A decoder cannot be stopped midway. Its time is bounded by the pixels that the budget allows and
+//! by the input's length: PNG, WebP and baseline JPEG are read once. A progressive JPEG's scans go
+//! over all pixels again, and zune-jpeg refuses more than 100 scans.
 
 use std::io::{BufRead, Cursor, Seek};
 
-use crate::image::srgb_to_linear;
-use crate::plan::PlanError;
-use crate::texture::basis;
-use crate::texture::basis::{BasisHeader, KTX2_MAGIC};
-use crate::texture::png::Essentials;
-use ::image::{ColorType, ImageDecoder, ImageFormat, ImageReader, ImageResult, Limits};
+use crate::srgb::srgb_to_linear;
+use crate::texture::TextureError;
+use crate::texture::basis::{self, BasisHeader, KTX2_MAGIC};
+use crate::texture::png::CriticalChunks;
+use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits};
 
-/// What an image's first bytes say.
+/// The size of an image and the cost of decoding it, from its first bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Header {
-    /// How it is encoded.
     encoding: Encoding,
-    /// Columns.
+    /// Columns, texels.
     pub width: u32,
-    /// Rows.
+    /// Rows, texels.
     pub height: u32,
     /// Memory that decoding takes, the result included.
     pub decoding_bytes: u64,
 }
 
-/// How an image is encoded.
+/// The decoder that an image needs.
 #[derive(Clone, Copy, Debug)]
 enum Encoding {
-    /// As pictures are.
+    /// PNG, JPEG or WebP, by the `image` crate.
     Picture(ImageFormat),
-    /// As textures are.
+    /// Basis Universal in KTX2.
     Basis(BasisHeader),
 }
 
-/// Decoded pixels as the file has them.
+/// Decoded pixels, with the channels and the depth that the file has.
 #[derive(Debug)]
 pub struct Pixels {
-    /// Columns.
+    /// Columns, texels.
     pub width: u32,
-    /// Rows.
+    /// Rows, texels.
     pub height: u32,
-    /// 1 grey, 2 grey and alpha, 3 RGB, 4 RGB and alpha.
+    /// 1: grey, 2: grey and alpha, 3: RGB, 4: RGB and alpha.
     pub channels: usize,
-    /// Whether channels have 16 bits, in the machine's byte order, instead of 8.
+    /// Whether a channel has 16 bits, in the machine's byte order, instead of 8.
     pub is_wide: bool,
     bytes: Vec<u8>,
 }
 
-/// Every value that a channel can have, as `T`.
+/// The linear value of each number that a channel can hold, as `T`.
 #[derive(Debug)]
-pub struct Table<T> {
+pub struct LookupTable<T> {
     color: Vec<T>,
     alpha: Vec<T>,
 }
 
-/// What decoders may allocate unpaid: a row of half a million pixels, and tables.
+/// Memory that a decoder may take beside what the budget paid: a row of half a million pixels, and
+/// tables.
 const ALLOWANCE_BYTES: u64 = 4 << 20;
 
-/// Reads what is needed to know the size, and no more. `name` is for errors.
-pub fn header(name: &str, bytes: &[u8]) -> Result<Header, PlanError> {
+/// Reads the header alone. `name` is the image's, for errors.
+pub fn header(name: &str, bytes: &[u8]) -> Result<Header, TextureError> {
     if bytes.starts_with(KTX2_MAGIC) {
         let basis = basis::header(name, bytes)?;
         let BasisHeader { width, height, decoding_bytes } = basis;
         return Ok(Header { encoding: Encoding::Basis(basis), width, height, decoding_bytes });
     }
     let format = sniff(bytes).ok_or_else(|| {
-        PlanError::Texture(format!("{name} of the mesh is neither a PNG, a JPEG, a WebP nor a KTX2 image"))
+        TextureError::Unsupported(format!("{name} of the mesh is neither a PNG, a JPEG, a WebP nor a KTX2 image"))
     })?;
     let encoding = Encoding::Picture(format);
     let decoder = match (open(bytes, format, ALLOWANCE_BYTES), png_size(bytes)) {
         (Ok(decoder), _) => decoder,
-        // A row alone is more than the decoder may have: whoever asked knows how large a texture may be.
-        (Err(::image::ImageError::Limits(_)), Some([width, height])) if format == ImageFormat::Png => {
+        // A single row exceeds the allowance. The caller refuses the size with a better sentence.
+        (Err(ImageError::Limits(_)), Some([width, height])) if format == ImageFormat::Png => {
             return Ok(Header { encoding, width, height, decoding_bytes: u64::MAX });
         }
         (Err(error), _) => return Err(broken(name, &error)),
     };
     let (width, height) = decoder.dimensions();
     if width == 0 || height == 0 {
-        return Err(PlanError::Texture(format!("{name} of the mesh has no pixels")));
+        return Err(TextureError::Broken(format!("{name} of the mesh has no pixels")));
     }
-    // Beside the result, JPEG keeps coefficients of 16 bits, WebP its planes, and both a copy of the input.
+    // Beside the result, JPEG keeps 16-bit coefficients and WebP its planes; both copy the input.
     let times = if format == ImageFormat::Png { 1 } else { 4 };
     let decoding_bytes = decoder.total_bytes().saturating_mul(times).saturating_add(bytes.len() as u64);
     Ok(Header { encoding, width, height, decoding_bytes })
 }
 
-/// Decodes; the caller has paid for it.
-pub fn decode(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, PlanError> {
+/// Decodes all pixels. The caller has spent [`Header::decoding_bytes`].
+pub fn decode(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, TextureError> {
     let format = match &header.encoding {
         Encoding::Picture(format) => *format,
         Encoding::Basis(basis) => {
@@ -109,7 +109,8 @@ pub fn decode(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, PlanE
         ColorType::Rgb16 => (3, true),
         ColorType::Rgba16 => (4, true),
         other => {
-            return Err(PlanError::Texture(format!("{name} of the mesh has pixels of an unknown kind ({other:?})")));
+            let detail = format!("{name} of the mesh has pixels of an unknown kind ({other:?})");
+            return Err(TextureError::Unsupported(detail));
         }
     };
     let mut pixels = vec![0; decoder.total_bytes() as usize];
@@ -118,8 +119,8 @@ pub fn decode(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, PlanE
 }
 
 impl Pixels {
-    /// Row `y` as straight RGBA.
-    pub fn row<T: Copy>(&self, y: u32, table: &Table<T>, out: &mut [[T; 4]]) {
+    /// Writes row `y` to `out` as straight RGBA.
+    pub fn row<T: Copy>(&self, y: u32, table: &LookupTable<T>, out: &mut [[T; 4]]) {
         let stride = self.width as usize * self.channels * if self.is_wide { 2 } else { 1 };
         let row = &self.bytes[y as usize * stride..][..stride];
         if self.is_wide {
@@ -133,7 +134,7 @@ impl Pixels {
         &self,
         row: &[u8],
         out: &mut [[T; 4]],
-        table: &Table<T>,
+        table: &LookupTable<T>,
         number: impl Fn(&[u8]) -> usize,
         size: usize,
     ) {
@@ -150,17 +151,18 @@ impl Pixels {
         }
     }
 
-    /// Whether there is an alpha channel.
+    /// Whether the file has an alpha channel.
     pub fn has_alpha(&self) -> bool {
         self.channels.is_multiple_of(2)
     }
 
-    /// The table for these pixels: colours are sRGB or, like alpha always, already linear.
-    pub fn table<T>(&self, is_color: bool, of: impl Fn(f32) -> T) -> Table<T> {
+    /// The table for these pixels. Colours are stored as sRGB if `is_color`; else they, like alpha
+    /// always, are linear. `of` converts a linear value.
+    pub fn lookup_table<T>(&self, is_color: bool, of: impl Fn(f32) -> T) -> LookupTable<T> {
         let largest = if self.is_wide { 65535 } else { 255 };
         let alpha = |v: u32| f64::from(v) / f64::from(largest);
         let color = |v: u32| if is_color { srgb_to_linear(alpha(v)) } else { alpha(v) };
-        Table {
+        LookupTable {
             color: (0..=largest).map(|v| of(color(v) as f32)).collect(),
             alpha: (0..=largest).map(|v| of(alpha(v) as f32)).collect(),
         }
@@ -179,17 +181,17 @@ fn sniff(bytes: &[u8]) -> Option<ImageFormat> {
     }
 }
 
-/// `limit_bytes` is what it may allocate beside its result.
+/// A decoder that may allocate `limit_bytes` beside its result.
 fn open(bytes: &[u8], format: ImageFormat, limit_bytes: u64) -> ImageResult<Box<dyn ImageDecoder + '_>> {
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(limit_bytes);
     match format {
-        ImageFormat::Png => limited(Essentials::new(bytes), format, limits),
+        ImageFormat::Png => limited(CriticalChunks::new(bytes), format, limits),
         _ => limited(Cursor::new(bytes), format, limits),
     }
 }
 
-/// Width and height by a PNG's first chunk.
+/// Width and height from a PNG's first chunk.
 fn png_size(bytes: &[u8]) -> Option<[u32; 2]> {
     let number = |at: usize| Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
     let size = [number(16)?, number(20)?];
@@ -206,7 +208,8 @@ fn limited<'b>(
     Ok(Box::new(reader.into_decoder()?))
 }
 
-fn broken(name: &str, error: &::image::ImageError) -> PlanError {
+/// The decoder's message can quote the file, so control characters and length are cut.
+fn broken(name: &str, error: &ImageError) -> TextureError {
     let why: String = error.to_string().chars().filter(|c| !c.is_control()).take(200).collect();
-    PlanError::Texture(format!("{name} of the mesh cannot be decoded: {why}"))
+    TextureError::Broken(format!("{name} of the mesh cannot be decoded: {why}"))
 }

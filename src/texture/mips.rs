@@ -1,32 +1,35 @@
-//! Smaller versions of a texture: each texel of the next level is the mean of the area it covers, in linear light, colours
-//! weighted by alpha, so that what is transparent does not bleed.
+//! Mip levels. A texel of the next level is the mean of the area that it covers, in linear light.
+//!
+//! Colours are weighted by alpha, so that the colour of transparent texels does not bleed into
+//! their neighbours.
 
 use crate::limits::{Deadline, Stopped};
-use crate::texture::decode::{Pixels, Table};
-use crate::texture::half::half;
+use crate::texture::decode::{LookupTable, Pixels};
+use half::f16;
 
-/// How many levels an image has, down to a single texel.
+/// The number of levels of an image, down to a single texel.
 pub fn count(width: u32, height: u32) -> u32 {
     32 - width.max(height).leading_zeros()
 }
 
-/// Texels of the levels from `first` on.
+/// The number of texels in all levels from `first` on.
 pub fn texels(width: u32, height: u32, first: u32) -> u64 {
     (first..count(width, height)).map(|k| u64::from(side(width, k)) * u64::from(side(height, k))).sum()
 }
 
-/// The size of a side at a level.
-pub fn side(px: u32, level: u32) -> u32 {
-    (px >> level).max(1)
+/// The length of a side at a level, given its length at level 0.
+pub fn side(texels: u32, level: u32) -> u32 {
+    (texels >> level).max(1)
 }
 
-/// Memory that [`append`] takes beside its result: the first smaller level and the next one.
+/// Memory that [`append`] takes beside its result, bytes: levels 1 and 2 as f32, a row, and the
+/// lookup tables.
 pub fn working_bytes(width: u32, height: u32) -> u64 {
-    let px = |level| u64::from(side(width, level)) * u64::from(side(height, level));
-    (px(1) + px(2)).saturating_mul(16).saturating_add(64 * u64::from(width) + (4 << 16))
+    let texels = |level| u64::from(side(width, level)) * u64::from(side(height, level));
+    (texels(1) + texels(2)).saturating_mul(16).saturating_add(64 * u64::from(width) + (4 << 16))
 }
 
-/// Appends the levels from `first` on as half floats.
+/// Appends the levels from `first` on to `out`, as half floats.
 pub fn append(
     pixels: &Pixels,
     is_color: bool,
@@ -36,7 +39,7 @@ pub fn append(
 ) -> Result<(), Stopped> {
     let (width, height) = (pixels.width, pixels.height);
     if first == 0 {
-        let table = pixels.table(is_color, half);
+        let table = pixels.lookup_table(is_color, half);
         let start = out.len();
         out.resize(start + width as usize * height as usize, [0; 4]);
         for (y, row) in (0..height).zip(out[start..].chunks_exact_mut(width as usize)) {
@@ -47,10 +50,10 @@ pub fn append(
     if count(width, height) == 1 {
         return Ok(());
     }
-    // In a normal or a metallic map, alpha means nothing.
-    let weigh = is_color && pixels.has_alpha();
-    let table: Table<f32> = pixels.table(is_color, |v| v);
-    let mut level = shrink([width, height], weigh, deadline, |y, row| pixels.row(y, &table, row))?;
+    // The alpha channel of a normal map or a metallic map has no meaning.
+    let by_alpha = is_color && pixels.has_alpha();
+    let table: LookupTable<f32> = pixels.lookup_table(is_color, |v| v);
+    let mut level = shrink([width, height], by_alpha, deadline, |y, row| pixels.row(y, &table, row))?;
     for k in 1.. {
         if k >= first {
             out.extend(level.iter().map(|texel| texel.map(half)));
@@ -60,15 +63,16 @@ pub fn append(
         }
         let size = [side(width, k), side(height, k)];
         let stride = size[0] as usize;
-        level = shrink(size, weigh, deadline, |y, row| row.copy_from_slice(&level[y as usize * stride..][..stride]))?;
+        level =
+            shrink(size, by_alpha, deadline, |y, row| row.copy_from_slice(&level[y as usize * stride..][..stride]))?;
     }
     Ok(())
 }
 
-/// The next level of an image whose rows `read` gives.
+/// The level after one of `size` texels, whose rows `read` writes.
 fn shrink(
     size: [u32; 2],
-    weigh: bool,
+    by_alpha: bool,
     deadline: &Deadline,
     mut read: impl FnMut(u32, &mut [[f32; 4]]),
 ) -> Result<Vec<[f32; 4]>, Stopped> {
@@ -85,16 +89,17 @@ fn shrink(
             read(row, &mut line);
             for (sum, taps) in sums.iter_mut().zip(&columns) {
                 for (texel, across) in line[taps.first as usize..].iter().zip(taps.weights()) {
-                    sum.add(texel, down * across, weigh);
+                    sum.add(texel, down * across, by_alpha);
                 }
             }
         }
-        out.extend(sums.iter().map(|sum| sum.mean(weigh)));
+        out.extend(sums.iter().map(|sum| sum.mean(by_alpha)));
     }
     Ok(out)
 }
 
-/// The texels that one of the next level covers, and how much of each; the weights add up to 1.
+/// Filter taps in one direction: the texels that a texel of the next level covers, with weights
+/// that add up to 1.
 struct Taps {
     first: u32,
     count: usize,
@@ -102,7 +107,8 @@ struct Taps {
 }
 
 impl Taps {
-    /// Of texel `at` of the next level of a side of `from` texels. An odd side 2 m + 1 becomes m: each covers 2 + 1/m.
+    /// The taps of texel `at` of the next level, where this level has `from` texels. An odd side of
+    /// 2 m + 1 texels becomes m, so that each covers 2 + 1/m.
     fn of(from: u32, at: u32) -> Self {
         if from == 1 {
             return Self { first: 0, count: 1, weights: [1.0, 0.0, 0.0] };
@@ -120,31 +126,83 @@ impl Taps {
     }
 }
 
+/// A weighted sum of texels.
 #[derive(Clone, Copy, Default)]
 struct Sum {
     /// Colour times alpha, and alpha.
     weighted: [f32; 4],
+    /// Colour alone, for texels whose alpha does not count or adds up to 0.
     plain: [f32; 3],
 }
 
 impl Sum {
     #[inline(always)]
-    fn add(&mut self, texel: &[f32; 4], weight: f32, weigh: bool) {
+    fn add(&mut self, texel: &[f32; 4], weight: f32, by_alpha: bool) {
         let [r, g, b, a] = *texel;
         for (sum, v) in self.plain.iter_mut().zip([r, g, b]) {
             *sum += weight * v;
         }
         self.weighted[3] += weight * a;
-        if weigh {
+        if by_alpha {
             for (sum, v) in self.weighted.iter_mut().zip([r, g, b]) {
                 *sum += weight * a * v;
             }
         }
     }
 
-    fn mean(&self, weigh: bool) -> [f32; 4] {
+    fn mean(&self, by_alpha: bool) -> [f32; 4] {
         let [r, g, b] = self.plain;
         let [wr, wg, wb, a] = self.weighted;
-        if weigh && a > 0.0 { [wr / a, wg / a, wb / a, a] } else { [r, g, b, a] }
+        if by_alpha && a > 0.0 { [wr / a, wg / a, wb / a, a] } else { [r, g, b, a] }
+    }
+}
+
+/// The nearest IEEE 754 half float, ties to even. Too large values become infinite.
+///
+/// The `const` conversion never uses a processor's own instruction, so it has the same bits
+/// everywhere.
+fn half(v: f32) -> u16 {
+    f16::from_f32_const(v).to_bits()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::half;
+
+    /// The value of a half float, by the definition of the format.
+    fn value(half: u16) -> f64 {
+        let (exponent, fraction) = (i32::from(half >> 10 & 31), f64::from(half & 1023));
+        let magnitude = match exponent {
+            0 => fraction * 2.0_f64.powi(-24),
+            31 => f64::INFINITY,
+            e => (1.0 + fraction / 1024.0) * 2.0_f64.powi(e - 15),
+        };
+        if half & 0x8000 == 0 { magnitude } else { -magnitude }
+    }
+
+    #[test]
+    fn every_half_and_every_midpoint_rounds_as_it_should() {
+        let mut checked = 0;
+        for sign in [0, 0x8000] {
+            for low in 0..0x7c00_u16 {
+                let next = low + 1;
+                let (a, b) = (value(low), if next == 0x7c00 { 65536.0 } else { value(next) });
+                let signed = |v: f64| if sign == 0 { v as f32 } else { -v as f32 };
+                let middle = signed((a + b) / 2.0);
+                assert_eq!(f64::from(middle).abs(), (a + b) / 2.0, "a midpoint is an f32");
+                let even = if low % 2 == 0 { low } else { next };
+                assert_eq!(half(signed(a)), low | sign);
+                assert_eq!(half(middle), even | sign, "midpoint above {low:#06x}");
+                assert_eq!(half(f32::from_bits(middle.to_bits() - 1)), low | sign);
+                assert_eq!(half(f32::from_bits(middle.to_bits() + 1)), next | sign);
+                checked += 4;
+            }
+        }
+        assert_eq!(checked, 2 * 4 * 0x7c00);
+        assert_eq!(half(f32::INFINITY), 0x7c00);
+        assert_eq!(half(f32::NEG_INFINITY), 0xfc00);
+        assert_eq!(half(f32::MAX), 0x7c00);
+        assert_eq!(half(f32::NAN) & 0x7fff, 0x7e00);
+        assert_eq!(half(f32::MIN_POSITIVE), 0);
     }
 }

@@ -1,29 +1,32 @@
-//! The chunks of a PNG that say what its pixels are.
+//! A reader that drops a PNG's ancillary chunks.
 //!
-//! A colour profile or a text chunk may inflate to any size, or be large itself, before the first row; nothing here reads
-//! them. Dropped before the decoder sees them, they cost nothing, and fail no picture that is otherwise fine.
+//! A colour profile or a text chunk may be large, or inflate to any size, and decoders read them
+//! before the first row. Textures need neither. Dropped here, they cost nothing and cannot fail an
+//! image whose pixels are fine.
 
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
 
-/// Reads a PNG without its ancillary chunks, other than the one for transparency.
+/// Reads a PNG's signature, its critical chunks and `tRNS`, the one ancillary chunk that changes
+/// pixels.
 #[derive(Debug)]
-pub struct Essentials<'b> {
-    /// What remains of the signature or of a chunk that is kept.
+pub struct CriticalChunks<'b> {
+    /// Unread bytes of the signature or of the current chunk.
     current: &'b [u8],
-    /// The chunks behind it.
+    /// The chunks after it.
     rest: &'b [u8],
 }
 
-impl<'b> Essentials<'b> {
-    /// Of a whole file.
+impl<'b> CriticalChunks<'b> {
+    /// A reader of a whole file.
     pub fn new(bytes: &'b [u8]) -> Self {
         let (current, rest) = bytes.split_at(bytes.len().min(8));
         Self { current, rest }
     }
 
-    /// Goes on to the next chunk that is kept. What is cut short stays so: the decoder says what is wrong with it.
+    /// Moves on to the next chunk that is kept, once the current one is read. A truncated chunk is
+    /// passed on as it is, and the decoder reports it.
     fn advance(&mut self) {
-        /// Length, type and checksum.
+        /// Length, type and checksum around a chunk's data.
         const FRAME_BYTES: usize = 12;
         while self.current.is_empty() && !self.rest.is_empty() {
             let (chunk, rest) = match *self.rest {
@@ -34,7 +37,8 @@ impl<'b> Essentials<'b> {
                 _ => (self.rest, &[][..]),
             };
             self.rest = rest;
-            // Chunks whose name starts with a small letter are ancillary. Half a name is none.
+            // The type of an ancillary chunk begins with a lower-case letter. A truncated type
+            // counts as critical.
             let is_ancillary = chunk.get(4..8).is_some_and(|name| name[0] & 0x20 != 0 && name != b"tRNS");
             if !is_ancillary {
                 self.current = chunk;
@@ -43,7 +47,7 @@ impl<'b> Essentials<'b> {
     }
 }
 
-impl Read for Essentials<'_> {
+impl Read for CriticalChunks<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let count = self.fill_buf()?.read(out)?;
         self.consume(count);
@@ -51,7 +55,7 @@ impl Read for Essentials<'_> {
     }
 }
 
-impl BufRead for Essentials<'_> {
+impl BufRead for CriticalChunks<'_> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         self.advance();
         Ok(self.current)
@@ -62,8 +66,8 @@ impl BufRead for Essentials<'_> {
     }
 }
 
-impl Seek for Essentials<'_> {
-    /// The decoder asks for this ability, and reads from front to back.
+impl Seek for CriticalChunks<'_> {
+    /// The decoder's bounds ask for `Seek`, but it only reads from front to back.
     fn seek(&mut self, _: SeekFrom) -> io::Result<u64> {
         Err(io::ErrorKind::Unsupported.into())
     }
@@ -79,12 +83,12 @@ mod tests {
 
     fn kept(bytes: &[u8]) -> Vec<u8> {
         let mut out = Vec::new();
-        assert!(Essentials::new(bytes).read_to_end(&mut out).is_ok());
+        assert!(CriticalChunks::new(bytes).read_to_end(&mut out).is_ok());
         out
     }
 
     #[test]
-    fn only_what_pixels_need_is_kept() {
+    fn only_chunks_that_change_pixels_are_kept() {
         let signature = b"signatur";
         let [ihdr, plte, trns, idat] = [b"IHDR", b"PLTE", b"tRNS", b"IDAT"].map(|kind| chunk(kind, 30));
         let [iccp, ztxt, exif] = [b"iCCP", b"zTXt", b"eXIf"].map(|kind| chunk(kind, 100_000));
@@ -92,11 +96,11 @@ mod tests {
         let want = [&signature[..], &ihdr, &plte, &trns, &idat, &idat].concat();
         assert_eq!(kept(&all), want);
         assert_eq!(kept(&want), want);
-        // Cut anywhere, nothing new comes of it.
+        // A truncated file passes through unchanged.
         for cut in 0..want.len() {
             assert_eq!(kept(&want[..cut]), want[..cut]);
         }
-        // A length that lies takes the rest of the file.
+        // A false length swallows the rest of the file.
         let lie = [&signature[..], &u32::MAX.to_be_bytes(), b"iCCP", &idat].concat();
         assert_eq!(kept(&lie), signature);
     }

@@ -1,22 +1,25 @@
-//! The fans of faces around vertices. A vertex of a clean surface has one; where two surfaces touch in a vertex it has two.
+//! The fans of faces around vertices.
+//!
+//! A fan is a set of faces at a vertex that are connected through edges at this vertex. A vertex of
+//! a manifold surface has one fan; a vertex where two surfaces touch has two.
 
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge, NO_FACE};
-use crate::mesh::union_find::Sets;
+use crate::mesh::union_find::UnionFind;
 
-/// The corners of all triangles (three each, numbered triangle by triangle), united where their triangles share an edge at the
-/// corners' vertex.
+/// The fans of a mesh, as sets of triangle corners. Corner `3 t + i` is corner `i` of triangle `t`.
+/// Two corners at a vertex are in one set where an edge at this vertex connects their triangles.
 pub struct Fans<'a> {
     triangles: &'a [[u32; 3]],
     vertices: usize,
-    corners: Sets,
+    corners: UnionFind,
 }
 
 impl<'a> Fans<'a> {
-    /// Of a mesh and its edges.
+    /// The fans of `mesh`, whose edges are `edges`.
     pub fn of(mesh: &'a Mesh, edges: &EdgeList) -> Self {
         let (triangles, vertices) = (mesh.own_triangles(), mesh.positions.len());
-        let mut fans = Self { triangles, vertices, corners: Sets::new(triangles.len() * 3) };
+        let mut fans = Self { triangles, vertices, corners: UnionFind::new(triangles.len() * 3) };
         for edge in edges.edges.iter().filter(|edge| edge.faces[1] != NO_FACE) {
             fans.unite(edge, edge.faces[1]);
         }
@@ -26,13 +29,13 @@ impl<'a> Fans<'a> {
         fans
     }
 
-    /// Whether a corner stands for its fan: one of each fan's does. Its number is three times its face's and a bit.
-    pub fn is_first(&mut self, corner: u32) -> bool {
+    /// Whether a corner is the representative of its fan. Each fan has exactly one.
+    pub fn is_representative(&mut self, corner: u32) -> bool {
         self.corners.find(corner) == corner
     }
 
-    /// How many vertices have more than one fan.
-    pub fn vertices_with_several(&mut self) -> u64 {
+    /// The number of vertices that have more than one fan.
+    pub fn count_nonmanifold_vertices(&mut self) -> u64 {
         let mut fans = vec![0_u8; self.vertices];
         for (face, triangle) in (0_u32..).zip(self.triangles) {
             for (corner, &vertex) in (face * 3..).zip(triangle) {
@@ -43,7 +46,9 @@ impl<'a> Fans<'a> {
         fans.iter().filter(|count| **count > 1).count() as u64
     }
 
-    /// How many chains the open edges make: what is connected by them, with a fan for a vertex. Ends the fans, which it unites.
+    /// The number of closed chains that open edges form. Within a chain, edges connect fans rather
+    /// than vertices, so that loops which touch in a vertex of one fan are one. The count unites
+    /// fans, and so it consumes them.
     pub fn into_boundary_loops(mut self, edges: &EdgeList) -> u64 {
         let mut is_met = vec![false; self.triangles.len() * 3];
         let mut loops = 0;
@@ -58,12 +63,14 @@ impl<'a> Fans<'a> {
         loops
     }
 
+    /// Unites the fans of the edge's first face and of `face`, at both ends of the edge.
     fn unite(&mut self, edge: &MeshEdge, face: u32) {
         for vertex in edge.vertices {
             self.corners.unite(self.corner(edge.faces[0], vertex), self.corner(face, vertex));
         }
     }
 
+    /// The number of the corner that `face` has at `vertex`.
     fn corner(&self, face: u32, vertex: u32) -> u32 {
         let [a, b, _] = self.triangles[face as usize];
         face * 3

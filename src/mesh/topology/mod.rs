@@ -1,7 +1,8 @@
-//! How a mesh hangs together, for `inspect`.
+//! The topology of a mesh: components, open and non-manifold edges, boundary loops, Euler
+//! characteristic, genus.
 //!
-//! Everything is found by union-find and sorting: n log n, whatever the mesh. Vertices are told apart by their fans ([`fans`]), and
-//! faces by the surfaces that they make ([`surfaces`]).
+//! Union-find and sorting find everything in O(n log n), whatever the mesh. [`fans`] groups the
+//! faces around each vertex, [`surfaces`] the faces of each surface.
 
 mod fans;
 mod surfaces;
@@ -12,51 +13,55 @@ use self::fans::Fans;
 use self::surfaces::Surfaces;
 use super::Mesh;
 use super::edges::EdgeList;
-use crate::import::MeshError;
-use crate::limits::{Budget, Deadline};
-use crate::mesh::union_find::Sets;
+use crate::limits::{Budget, Deadline, Exhausted};
+use crate::mesh::union_find::UnionFind;
+use crate::mesh::vector::{cross, dot};
 
-/// Counts over a welded mesh.
+/// The topology of a welded mesh.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Topology {
-    /// Parts that share no vertex.
+    /// Connected components: sets of faces that share no vertex with each other.
     pub components: u64,
-    /// Unique edges.
+    /// Undirected edges, each counted once.
     pub edges: u64,
     /// Edges with one face.
     pub open_edges: u64,
-    /// Closed chains of open edges: 1 for a disc, 3 for a sphere with three holes. Two holes that touch in a vertex are one chain, which
-    /// passes there twice.
+    /// Closed chains of open edges: 1 for a disc, 3 for a sphere with three holes. Two holes that
+    /// touch in a vertex make one chain, which passes the vertex twice.
     pub boundary_loops: u64,
     /// Edges with three faces or more.
     pub nonmanifold_edges: u64,
-    /// Vertices where surfaces touch that share no edge there: the knot of a bow tie.
+    /// Vertices where surfaces touch that share no edge there, like the centre of a bow tie.
     pub nonmanifold_vertices: u64,
-    /// Faces that have the same three vertices as an earlier one, in whatever order.
+    /// Faces with the same three vertices as an earlier face, in any order.
     pub duplicate_faces: u64,
-    /// Edges whose two faces run along them in the same direction, so that one is inside out.
+    /// Edges with two faces that run along them in the same direction, so that one face is inside
+    /// out.
     pub inconsistent_edges: u64,
-    /// Vertices - edges + triangles: 2 for a sphere, 0 for a torus.
+    /// Vertices - edges + triangles: 2 for a sphere, 0 for a torus. Only vertices of triangles
+    /// count.
     pub euler_characteristic: i64,
-    /// Every edge has two faces of opposite directions.
+    /// Every edge has exactly two faces, which run along it in opposite directions.
     pub is_watertight: bool,
-    /// Faces can be turned so that any two that share an edge with no third agree: not so for a Moebius strip.
+    /// Faces can be turned over so that any two faces at a manifold edge agree. A Moebius strip is
+    /// not orientable.
     pub is_orientable: bool,
-    /// Handles of all surfaces together: 0 for a sphere, 1 for a torus. None unless the mesh is made of closed, orientable surfaces that
-    /// do not touch each other.
+    /// Handles of all surfaces together: 0 for a sphere, 1 for a torus. None unless the mesh
+    /// consists of closed, orientable surfaces that do not touch each other.
     pub genus: Option<u64>,
-    /// The closed, orientable surfaces among what the mesh is made of, by their genus: genus and how many.
+    /// The closed, orientable surfaces in the mesh, by genus: pairs of a genus and the number of
+    /// such surfaces.
     pub closed_surfaces: Vec<(u64, u64)>,
 }
 
-/// The largest of what is held at once: the corners' sets and marks, the faces' sets, sums and flags.
+/// Memory at the peak: sets and marks of the three corners; set, Euler sum and flags of the face.
 const BYTES_PER_TRIANGLE: u64 = 3 * (4 + 1) + 4 + 4 + 1;
-/// A vertex' set and mark.
+/// Memory at the peak: the vertex's set and mark.
 const BYTES_PER_VERTEX: u64 = 4 + 1;
 
 impl Topology {
-    /// Counts.
-    pub fn of(mesh: &Mesh, edges: &EdgeList, budget: &mut Budget, deadline: &Deadline) -> Result<Self, MeshError> {
+    /// Finds the topology of `mesh`, whose edges are `edges`.
+    pub fn of(mesh: &Mesh, edges: &EdgeList, budget: &mut Budget, deadline: &Deadline) -> Result<Self, Exhausted> {
         budget.spend("the topology", mesh.own_triangles().len() as u64, BYTES_PER_TRIANGLE)?;
         budget.spend("the topology", mesh.positions.len() as u64, BYTES_PER_VERTEX)?;
         let (_, components, vertices) = components(mesh);
@@ -64,12 +69,12 @@ impl Topology {
         let duplicate_faces = duplicates(mesh);
         deadline.check()?;
         let mut fans = Fans::of(mesh, edges);
-        let nonmanifold_vertices = fans.vertices_with_several();
+        let nonmanifold_vertices = fans.count_nonmanifold_vertices();
         deadline.check()?;
         let surfaces = Surfaces::of(mesh, edges, &mut fans);
         deadline.check()?;
         let count = |test: fn(u32, bool) -> bool| {
-            edges.edges.iter().filter(|e| test(e.face_count, e.is_wound_alike)).count() as u64
+            edges.edges.iter().filter(|e| test(e.face_count, e.has_inconsistent_winding)).count() as u64
         };
         Ok(Self {
             components,
@@ -79,7 +84,7 @@ impl Topology {
             nonmanifold_edges: count(|faces, _| faces > 2),
             nonmanifold_vertices,
             duplicate_faces,
-            inconsistent_edges: count(|faces, alike| faces == 2 && alike),
+            inconsistent_edges: count(|faces, is_inconsistent| faces == 2 && is_inconsistent),
             euler_characteristic: vertices as i64 - edges.edges.len() as i64 + mesh.own_triangles().len() as i64,
             is_watertight: !edges.edges.is_empty() && edges.is_closed(),
             is_orientable: surfaces.is_orientable,
@@ -89,38 +94,39 @@ impl Topology {
     }
 }
 
-/// Which way the fronts of a closed mesh's faces look.
+/// The orientation of a closed mesh: the side to which the fronts of its faces look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fronts {
+pub enum Orientation {
     /// Outwards: no component encloses a negative volume.
-    Outside,
-    /// Inwards: none encloses a positive one.
-    Inside,
-    /// Some so, some so.
+    Outward,
+    /// Inwards: no component encloses a positive volume.
+    Inward,
+    /// Outwards for some components, inwards for others.
     Mixed,
 }
 
-/// Which way they look, all components of the mesh together.
-pub fn fronts(mesh: &Mesh) -> Fronts {
+/// The orientation of a closed mesh, by the signed volume of each component: the sum of
+/// `a . (b x c)` over its faces.
+pub fn orientation(mesh: &Mesh) -> Orientation {
     let mut sets = components(mesh).0;
     let mut volumes = vec![0.0_f64; mesh.positions.len()];
     for t in mesh.own_triangles() {
         let [a, b, c] = t.map(|v| mesh.positions[v as usize].map(f64::from));
-        let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
-        volumes[sets.find(t[0]) as usize] += (a[0] * cross[0] + a[1] * cross[1]) + a[2] * cross[2];
+        volumes[sets.find(t[0]) as usize] += dot(a, cross(b, c));
     }
     if volumes.iter().all(|&volume| volume >= 0.0) {
-        Fronts::Outside
+        Orientation::Outward
     } else if volumes.iter().all(|&volume| volume <= 0.0) {
-        Fronts::Inside
+        Orientation::Inward
     } else {
-        Fronts::Mixed
+        Orientation::Mixed
     }
 }
 
-/// Vertices that triangles connect, how many sets they are, and how many vertices: those of lines and points belong to no face.
-fn components(mesh: &Mesh) -> (Sets, u64, u64) {
-    let mut sets = Sets::new(mesh.positions.len());
+/// The vertices as sets that triangles connect, the number of these sets, and the number of
+/// vertices in them. Vertices of lines and points alone do not count.
+fn components(mesh: &Mesh) -> (UnionFind, u64, u64) {
+    let mut sets = UnionFind::new(mesh.positions.len());
     let mut is_met = vec![false; mesh.positions.len()];
     let (mut united, mut vertices) = (0, 0);
     for t in mesh.own_triangles() {
@@ -132,6 +138,7 @@ fn components(mesh: &Mesh) -> (Sets, u64, u64) {
     (sets, vertices - united, vertices)
 }
 
+/// The number of faces with the vertices of an earlier face.
 fn duplicates(mesh: &Mesh) -> u64 {
     let mut faces = mesh.own_triangles().to_vec();
     faces.iter_mut().for_each(|face| face.sort_unstable());

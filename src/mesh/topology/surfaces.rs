@@ -1,40 +1,43 @@
-//! The surfaces that a mesh is made of: faces that are connected through edges of two faces, and cut apart everywhere else.
+//! The surfaces of a mesh: faces that are connected through manifold edges, and cut apart at all
+//! other edges.
 
 use super::fans::Fans;
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, NO_FACE};
-use crate::mesh::union_find::SidedSets;
+use crate::mesh::union_find::ParityUnionFind;
 use std::collections::BTreeMap;
 
-/// What is known of all surfaces.
+/// Orientability and genus of a mesh's surfaces.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Surfaces {
-    /// No surface has one side only.
+    /// No surface is one-sided, as a Moebius strip is.
     pub is_orientable: bool,
-    /// How many closed, orientable ones there are, by genus.
+    /// The number of closed, orientable surfaces, by genus.
     pub closed: BTreeMap<u64, u64>,
     is_all_closed: bool,
 }
 
-/// Flags of a surface: it has an edge with one face or with more than two; it has one side only.
+/// Flag of a surface: it has an edge with one face, or with more than two.
 const IS_OPEN: u8 = 1;
+/// Flag of a surface: it is one-sided.
 const IS_ONE_SIDED: u8 = 2;
 
 impl Surfaces {
-    /// Cuts a mesh into its surfaces.
+    /// Finds the surfaces of `mesh`, whose edges and fans are given.
     pub fn of(mesh: &Mesh, edges: &EdgeList, fans: &mut Fans<'_>) -> Self {
         let count = mesh.own_triangles().len();
-        let mut faces = SidedSets::new(count);
+        let mut faces = ParityUnionFind::new(count);
         for edge in edges.edges.iter().filter(|edge| edge.face_count == 2) {
-            faces.unite(edge.faces[0], edge.faces[1], edge.is_wound_alike);
+            faces.unite(edge.faces[0], edge.faces[1], edge.has_inconsistent_winding);
         }
-        // Vertices, of which each fan counts, less edges and plus faces; by the face that stands for the surface.
+        // Euler characteristic and flags, at the representative face of each surface. Fans count as
+        // vertices, because a surface that is cut apart at a vertex has that vertex twice.
         let (mut euler, mut flags) = (vec![0_i32; count], vec![0_u8; count]);
         for edge in &edges.edges {
             let (surface, side) = faces.find(edge.faces[0]);
             if edge.face_count == 2 {
                 euler[surface as usize] -= 1;
-                let agrees = side ^ faces.find(edge.faces[1]).1 == edge.is_wound_alike;
+                let agrees = side ^ faces.find(edge.faces[1]).1 == edge.has_inconsistent_winding;
                 flags[surface as usize] |= if agrees { 0 } else { IS_ONE_SIDED };
             } else {
                 flags[surface as usize] |= IS_OPEN;
@@ -47,8 +50,8 @@ impl Surfaces {
             flags[faces.find(face).0 as usize] |= IS_OPEN;
         }
         for face in 0..count as u32 {
-            let own_fans = (face * 3..face * 3 + 3).filter(|&corner| fans.is_first(corner)).count();
-            euler[faces.find(face).0 as usize] += own_fans as i32 + 1;
+            let fans_here = (face * 3..face * 3 + 3).filter(|&corner| fans.is_representative(corner)).count();
+            euler[faces.find(face).0 as usize] += fans_here as i32 + 1;
         }
         let mut all = Self { is_orientable: true, closed: BTreeMap::new(), is_all_closed: true };
         for face in 0..count as u32 {
@@ -59,7 +62,7 @@ impl Surfaces {
         all
     }
 
-    /// Handles in all; None where a surface is open or has one side only.
+    /// Handles of all surfaces together; None where a surface is open or one-sided.
     pub fn genus(&self) -> Option<u64> {
         self.is_all_closed.then(|| self.closed.iter().map(|(genus, count)| genus * count).sum())
     }
@@ -68,7 +71,7 @@ impl Surfaces {
         self.is_orientable &= flags & IS_ONE_SIDED == 0;
         self.is_all_closed &= flags == 0;
         if flags == 0 {
-            // A closed, orientable surface of genus g has the characteristic 2 - 2g.
+            // The Euler characteristic of a closed, orientable surface of genus g is 2 - 2g.
             let genus = u64::try_from((2 - euler) / 2).unwrap_or(0);
             *self.closed.entry(genus).or_insert(0) += 1;
         }

@@ -1,8 +1,7 @@
 //! Small meshes whose numbers are known.
 
 use super::*;
-use crate::import::MeshFault;
-use crate::limits::Limits;
+use crate::limits::{Limits, Stopped};
 
 fn mesh(triangles: &[[u32; 3]]) -> Mesh {
     let count = triangles.iter().flatten().max().map_or(0, |m| m + 1);
@@ -30,7 +29,8 @@ fn cube(names: [u32; 8]) -> Vec<[u32; 3]> {
     halves.map(|t| t.map(|v: usize| names[v])).collect()
 }
 
-/// A grid of quads, halved, whose right side meets its left and whose upper side its lower, turned over or not.
+/// A grid of quads, halved, whose right side meets its left and whose upper side its lower, turned
+/// over or not.
 fn closed_grid(n: [u32; 2], wraps: [bool; 2], is_flipped: bool) -> Vec<[u32; 3]> {
     let points = [n[0] + u32::from(!wraps[0]), n[1] + u32::from(!wraps[1])];
     let at = |x: u32, y: u32| {
@@ -134,7 +134,8 @@ fn cubes_that_share_an_edge_or_a_vertex_or_a_face() {
     let vertex = with([7, 8, 9, 10, 11, 12, 13, 14]);
     assert_eq!((vertex.nonmanifold_edges, vertex.nonmanifold_vertices, vertex.components), (0, 1, 1));
     assert_eq!((vertex.genus, vertex.closed_surfaces), (None, vec![(0, 2)]));
-    // The face x = 1 of the first is the face x = 0 of the second: its triangles are there twice, with four faces at each edge.
+    // The face x = 1 of the first is the face x = 0 of the second: its triangles are there twice,
+    // with four faces at each edge.
     let face = with([1, 8, 3, 9, 5, 10, 7, 11]);
     assert_eq!((face.nonmanifold_edges, face.duplicate_faces, face.edges), (5, 2, 31));
     assert_eq!((face.components, face.genus), (1, None));
@@ -184,9 +185,9 @@ fn memory_and_time_are_limited() {
     let edges = EdgeList::of(&mesh, &mut Budget::new(&Limits::default())).unwrap();
     let poor = Limits { memory_bytes: 4 * 24 + 4 * 5 - 1, ..Limits::default() };
     let error = Topology::of(&mesh, &edges, &mut Budget::new(&poor), &Deadline::default()).unwrap_err();
-    assert!(matches!(error.fault, MeshFault::Limit(_)), "{error}");
+    assert!(matches!(error, Exhausted::Limit(_)), "{error}");
     let stopped = Deadline::default();
     stopped.stop();
     let error = Topology::of(&mesh, &edges, &mut Budget::new(&Limits::default()), &stopped).unwrap_err();
-    assert_eq!(error.fault, MeshFault::Stopped);
+    assert_eq!(error, Exhausted::Stopped(Stopped));
 }

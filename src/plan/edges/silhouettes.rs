@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
-use crate::mesh::topology::{Fronts, fronts};
+use crate::mesh::topology::{Orientation, orientation};
+use crate::mesh::vector::{cross, dot};
 use crate::plan::{Edge, Side};
 use crate::scene::material_groups::{Fill, MaterialGroups};
 use crate::spec::{Cull, Layers};
@@ -98,24 +99,16 @@ fn least_axis(v: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|k| if Some(k) == least { 1.0 } else { 0.0 })
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
-}
-
 /// The side that is seen of no face: inside a closed surface, all of which is drawn from outside and lets nothing through.
 pub fn unseen_side(mesh: &Mesh, groups: &MaterialGroups<'_>, list: &EdgeList) -> Option<Side> {
     let covers = if groups.has_fill() { Fill::Opaque } else { Fill::None };
     if (0..groups.layers.len()).any(|m| groups.fill(m) != covers) || !list.is_closed() {
         return None;
     }
-    let (unseen, culled) = match fronts(mesh) {
-        Fronts::Outside => (Side::Back, Cull::Front),
-        Fronts::Inside => (Side::Front, Cull::Back),
-        Fronts::Mixed => return None,
+    let (unseen, culled) = match orientation(mesh) {
+        Orientation::Outward => (Side::Back, Cull::Front),
+        Orientation::Inward => (Side::Front, Cull::Back),
+        Orientation::Mixed => return None,
     };
     let is_drawn = |layers: &&Layers| layers.surface.is_none_or(|s| s.cull != culled);
     groups.layers.iter().all(is_drawn).then_some(unseen)

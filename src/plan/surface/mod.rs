@@ -10,6 +10,7 @@ pub use build::surface_pass;
 use std::borrow::Cow;
 
 use super::Faces;
+use crate::texture::Textures;
 
 /// The filled surface. Arrays that no material reads are empty.
 #[derive(Debug)]
@@ -145,33 +146,6 @@ pub mod flags {
     pub const OWN_METALLIC: u32 = 1 << 15;
     /// The request gives the roughness, likewise.
     pub const OWN_ROUGHNESS: u32 = 1 << 16;
-}
-
-/// Decoded textures with their smaller versions, as large as the picture can show.
-#[derive(Clone, Debug, Default)]
-pub struct Textures {
-    /// Linear RGBA with straight alpha, as IEEE half floats; row by row, level after level, image after image.
-    pub texels: Vec<[u16; 4]>,
-    /// Where each image is.
-    pub images: Vec<Texture>,
-}
-
-/// An image in [`Textures::texels`]. Level k is `max(1, width >> k)` by `max(1, height >> k)` texels.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Texture {
-    /// Of level 0, texels.
-    pub width: u32,
-    /// Of level 0, texels.
-    pub height: u32,
-    /// The finest level that is there: the picture shows none that is finer.
-    pub first_level: u32,
-    /// Past the coarsest level.
-    pub levels: u32,
-    /// Index of the first texel of `first_level`.
-    pub first_texel: u32,
-    /// 0
-    pub padding: [u32; 3],
 }
 
 /// Lamps infinitely far away, and light from everywhere.

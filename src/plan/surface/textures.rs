@@ -1,10 +1,6 @@
 //! Images to textures: decoded only if sampled, each once for each way it is read, and only as large as the picture can show.
-//!
-//! All textures of a picture together have at most [`TEXELS_MAX`] texels: while they have more, the largest one loses its
-//! finest level.
 
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
@@ -13,13 +9,9 @@ use crate::plan::context::PlanContext;
 use crate::plan::skips::{SkipKind, Skips};
 use crate::plan::surface::closeup;
 use crate::plan::surface::closeup::Use;
-use crate::plan::{PlanError, Projection, Texture, TextureUse, Textures};
-use crate::texture::decode;
-use crate::texture::decode::Header;
-use crate::texture::mips;
-
-/// 96 MiB of half floats: bindings of 128 MiB are the most that every GPU has.
-pub const TEXELS_MAX: u64 = (96 << 20) / 8;
+use crate::plan::{PlanError, Projection, TextureUse};
+use crate::texture::decode::{self, Header};
+use crate::texture::{Texture, TextureError, Textures, fit, mips};
 
 /// Collects what materials ask for, and decodes it at the end.
 pub struct TextureLoader<'a> {
@@ -71,7 +63,7 @@ impl<'a> TextureLoader<'a> {
         };
         let bytes = match &image.content {
             ImageContent::Encoded(bytes) => bytes,
-            ImageContent::Missing(sentence) => return Err(PlanError::Texture(sentence.clone())),
+            ImageContent::Missing(sentence) => return Err(TextureError::Missing(sentence.clone()).into()),
             ImageContent::Absent => return Ok(TextureUse::NONE),
         };
         let index = match self.known.get(&(texture.image, is_color)) {
@@ -105,7 +97,7 @@ impl<'a> TextureLoader<'a> {
         }
         let is_unneeded = finest.iter().any(|&level| level > 0);
         let skip = skips.skip(SkipKind::FineTextureLevels, is_unneeded, "no pixel comes close enough to see them");
-        let first_levels = first_levels(&sizes, &finest, skip);
+        let first_levels = fit::first_levels(&sizes, &finest, skip);
 
         let texels = |w: &Wanted, first: u32| mips::texels(w.header.width, w.header.height, first);
         let total: u64 = wanted.iter().zip(&first_levels).map(|(w, &first)| texels(w, first)).sum();
@@ -139,53 +131,4 @@ fn sampler(texture: &TextureRef) -> u32 {
         Wrap::Clamp => 2,
     };
     wrap(texture.wrap[0]) | wrap(texture.wrap[1]) << 2 | u32::from(texture.nearest) << 4
-}
-
-/// The level from which each texture is kept, given the finest that the picture can show. With or without finer levels
-/// (`skip`), the picture is the same: what the cap takes from the picture does not depend on it.
-fn first_levels(sizes: &[[u32; 2]], finest: &[u32], skip: bool) -> Vec<u32> {
-    let mut shown = finest.to_vec();
-    halve(sizes, &mut shown, |_| u32::MAX);
-    if skip {
-        return shown;
-    }
-    let mut kept: Vec<u32> = shown.iter().zip(finest).map(|(&s, &f)| if s > f { s } else { 0 }).collect();
-    halve(sizes, &mut kept, |i| shown[i]);
-    kept
-}
-
-/// Takes the finest level from the largest texture (of equal ones the first) until all fit; none beyond `last`.
-fn halve(sizes: &[[u32; 2]], first: &mut [u32], last: impl Fn(usize) -> u32) {
-    let texels = |i: usize, first: u32| mips::texels(sizes[i][0], sizes[i][1], first);
-    let mut total: u64 = (0..sizes.len()).map(|i| texels(i, first[i])).sum();
-    let mut heap: BinaryHeap<(u64, Reverse<usize>)> =
-        (0..sizes.len()).map(|i| (texels(i, first[i]), Reverse(i))).collect();
-    while total > TEXELS_MAX {
-        let Some((before, Reverse(i))) = heap.pop() else { return };
-        if first[i] < last(i) && first[i] + 1 < mips::count(sizes[i][0], sizes[i][1]) {
-            first[i] += 1;
-            let after = texels(i, first[i]);
-            total -= before - after;
-            heap.push((after, Reverse(i)));
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_largest_are_halved_until_all_fit() {
-        let sizes = [[4096, 4096], [2048, 2048], [64, 64], [4096, 4096]];
-        // With their smaller levels 22.4 + 5.6 + 22.4 million texels; 12.6 are allowed.
-        assert_eq!(first_levels(&sizes, &[0; 4], true), [2, 1, 0, 1]);
-        assert_eq!(first_levels(&sizes, &[0; 4], false), [2, 1, 0, 1]);
-        // What is not shown does not count, and what is kept beyond that takes nothing from what is.
-        assert_eq!(first_levels(&sizes, &[2, 0, 3, 2], true), [2, 0, 3, 2]);
-        let kept = first_levels(&sizes, &[2, 0, 3, 2], false);
-        assert_eq!(kept, [2, 0, 0, 2]);
-        let total: u64 = sizes.iter().zip(&kept).map(|(s, &k)| mips::texels(s[0], s[1], k)).sum();
-        assert!(total <= TEXELS_MAX);
-    }
 }

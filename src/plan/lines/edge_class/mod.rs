@@ -41,7 +41,7 @@ pub fn is_of(class: Class, mesh: &Mesh, edge: &MeshEdge) -> bool {
             return false;
         }
         // Two faces that disagree which side is out bend the other way round.
-        (if edge.is_wound_alike { -cos } else { cos }) < limit
+        (if edge.has_inconsistent_winding { -cos } else { cos }) < limit
     };
     match class {
         Class::All => true,
@@ -49,7 +49,7 @@ pub fn is_of(class: Class, mesh: &Mesh, edge: &MeshEdge) -> bool {
         Class::Feature(limit) => edge.face_count != 2 || bends(limit),
         Class::Crease(limit) => edge.face_count == 2 && bends(limit),
         Class::Boundary => edge.face_count == 1,
-        Class::Nonmanifold => edge.face_count > 2 || (edge.face_count == 2 && edge.is_wound_alike),
+        Class::Nonmanifold => edge.face_count > 2 || (edge.face_count == 2 && edge.has_inconsistent_winding),
     }
 }
 

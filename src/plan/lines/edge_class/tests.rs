@@ -38,7 +38,7 @@ fn classes_of_edges() {
 }
 
 #[test]
-fn a_strip_with_half_a_twist_has_one_seam_that_is_wound_alike() {
+fn a_strip_with_half_a_twist_has_one_seam_of_inconsistent_winding() {
     use std::fmt::Write;
     const N: usize = 24;
     let mut obj = String::new();

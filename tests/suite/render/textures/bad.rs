@@ -60,7 +60,8 @@ fn broken_images_are_named() {
     ];
     for (bytes, part) in &cases {
         let mesh = model_of(bytes);
-        let PlanError::Texture(sentence) = error(&mesh) else { panic!("{part}") };
+        let PlanError::Texture(error) = error(&mesh) else { panic!("{part}") };
+        let sentence = error.to_string();
         assert!(sentence.contains(part), "{sentence}");
         // A look that does not sample it never looks at it.
         let spec = scenes::spec(&[("style", "smooth"), ("surface.color", "888")]);

@@ -9,7 +9,7 @@ use image::{DynamicImage, ImageFormat};
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use meshsnap::plan;
-use meshsnap::plan::{DrawPlan, PlanError, SkipKind, TEXTURE_NONE, Texture, Textures, slots};
+use meshsnap::plan::{DrawPlan, PlanError, SkipKind, TEXTURE_NONE, Texture, TextureError, Textures, slots};
 use serde_json::{Value, json};
 
 /// Triangles with texture coordinates, and one material with one image.
@@ -242,7 +242,7 @@ fn materials_without_triangles_load_nothing() {
     let places = [0, 1].map(|m| surface.materials[m].textures[slots::BASE].texture);
     assert_eq!((places, surface.textures.images.len()), ([TEXTURE_NONE, 0], 1));
     mesh.triangle_materials.fill(0);
-    assert_eq!(error(&mesh), PlanError::Texture("lost".to_owned()));
+    assert_eq!(error(&mesh), PlanError::Texture(TextureError::Missing("lost".to_owned())));
 }
 
 #[test]
