@@ -1,33 +1,34 @@
-//! The table of settings: a line for each, with what it allows and where it goes.
+//! The table of settings: one line for each, with the values it allows and the field it sets.
 
 use super::Config;
 use crate::limits::{IMAGE_PX_MAX, JOB_MS_MAX};
 use crate::spec::BackendChoice;
+use crate::spec::words::{Words as _, word_for};
 
-/// A setting's place in the configuration, and how its text is read and written.
+/// The type of a setting, and access to its field of [`Config`].
 #[derive(Clone, Copy)]
 pub enum Access {
-    /// A whole number in a closed range.
+    /// A whole number between two bounds, which are allowed too.
     Number(u64, u64, fn(&mut Config) -> &mut u64),
     /// On or off.
     Switch(fn(&mut Config) -> &mut bool),
-    /// Anything else: how to set it, and how to show it.
+    /// Any other type: a function that sets it, and one that writes it.
     Text(fn(&mut Config, &str) -> Result<(), String>, fn(&Config) -> String),
 }
 
 /// One setting.
 pub struct Setting {
-    /// Kebab case, as in the flag.
+    /// The name of the flag, without its hyphens in front.
     pub key: &'static str,
-    /// One sentence.
+    /// One line of help.
     pub help: &'static str,
-    /// Where and how.
+    /// The type, and the field.
     pub access: Access,
-    /// Whether there is a flag: secrets have none, because every user of the machine can read a command line.
+    /// Whether there is a flag. Secrets have none, because every user of the machine can read command lines.
     pub has_flag: bool,
 }
 
-/// Longest time that can be set.
+/// Longest time of any setting, milliseconds.
 const MS_MAX: u64 = JOB_MS_MAX;
 
 /// The largest side of a JPEG.
@@ -40,7 +41,7 @@ pub const SETTINGS: &[Setting] = &[
     number("workers", "Threads that draw", 1, 1024, |c| &mut c.workers),
     number("worker-threads", "Threads within one CPU render; 0: cores / workers", 0, 1024, |c| &mut c.worker_threads),
     number("queue", "Jobs that may wait for each worker", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
-    text("backend", "Who draws unless a request says: auto, gpu or cpu", set_backend, |c| word(BACKENDS, c.backend)),
+    text("backend", "Who draws unless a request says: auto, gpu or cpu", set_backend, |c| word_for(c.backend).into()),
     secret("api-keys", "Bearer tokens of clients, separated by commas", set_api_keys),
     switch("no-auth", "Serve without keys even beyond loopback", |c| &mut c.no_auth),
     number("connections", "Connections at once", 1, 1 << 20, |c| &mut c.connections),
@@ -63,7 +64,7 @@ pub const SETTINGS: &[Setting] = &[
     number("limit-memory-bytes", "Memory for one job", 1, u64::MAX, |c| &mut c.limits.memory_bytes),
     number("limit-triangles", "Triangles of one mesh", 1, u64::MAX, |c| &mut c.limits.triangles),
     number("limit-nodes", "Nodes of one scene graph", 1, u64::MAX, |c| &mut c.limits.nodes),
-    // 128 is where the JSON parser itself stops.
+    // The JSON parser itself stops at 128.
     number("limit-json-depth", "Nesting of JSON", 1, 128, |c| &mut c.limits.json_depth),
     number("limit-image-px", "Width and height of a picture", 1, IMAGE_PX_MAX, |c| &mut c.limits.image_px),
     number("limit-texture-px", "Width and height of a texture", 1, TEXTURE_PX_MAX, |c| &mut c.limits.texture_px),
@@ -77,12 +78,12 @@ pub const SETTINGS: &[Setting] = &[
 ];
 
 impl Setting {
-    /// The environment variable.
+    /// The name of the environment variable.
     pub fn variable(&self) -> String {
         format!("MESHSNAP_{}", self.key.to_ascii_uppercase().replace('-', "_"))
     }
 
-    /// Reads `value` into `config`, or says what is allowed.
+    /// Sets `value` in `config`. The error is the allowed values, in words.
     pub fn set(&self, config: &mut Config, value: &str) -> Result<(), String> {
         match self.access {
             Access::Number(min, max, at) => {
@@ -98,7 +99,7 @@ impl Setting {
         }
     }
 
-    /// The value in `config`, as text.
+    /// The value in `config` as text.
     pub fn show(&self, config: &Config) -> String {
         let mut copy = config.clone();
         match self.access {
@@ -109,12 +110,10 @@ impl Setting {
     }
 }
 
-const BACKENDS: &[(&str, BackendChoice)] =
-    &[("auto", BackendChoice::Auto), ("gpu", BackendChoice::Gpu), ("cpu", BackendChoice::Cpu)];
-
+/// The words of `log-format` and their values of [`Config::log_json`].
 const LOG_FORMATS: &[(&str, Option<bool>)] = &[("auto", None), ("text", Some(false)), ("json", Some(true))];
 
-/// `1000`, `1_000` or `64MiB`.
+/// Reads `1000`, `1_000` or `64MiB`.
 fn parse_number(text: &str) -> Option<u64> {
     let units = [("KiB", 10), ("MiB", 20), ("GiB", 30)];
     let unit = units.iter().find_map(|&(name, shift)| text.strip_suffix(name).map(|rest| (rest.trim_end(), shift)));
@@ -150,7 +149,7 @@ fn word<T: Copy + PartialEq>(words: &[(&str, T)], value: T) -> String {
 }
 
 fn set_backend(config: &mut Config, value: &str) -> Result<(), String> {
-    set_word(&mut config.backend, BACKENDS, value)
+    set_word(&mut config.backend, BackendChoice::ALL, value)
 }
 
 fn set_log_format(config: &mut Config, value: &str) -> Result<(), String> {

@@ -10,7 +10,10 @@ use std::fmt;
 
 use self::error_table::ErrorTable;
 use crate::spec::BackendChoice;
-use crate::spec::{FlatNormals, Hidden, Layers, OutlineMethod, QualityTarget, Shading, Spec, Wire, WireMethod};
+use crate::spec::words::word_for;
+use crate::spec::{
+    FlatNormals, Hidden, Layers, OutlineMethod, QualityTarget, Shading, Spec, WIRE_METHODS, Wire, WireMethod,
+};
 use crate::warning::Warning;
 
 /// A request with what it left open filled in.
@@ -49,12 +52,9 @@ impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "image.samples={}", self.samples)?;
         self.wire_methods.iter().try_for_each(|name| write!(f, ", wire.method={name}"))?;
-        write!(f, ", backend={}", backend_name(self.backend))
+        write!(f, ", backend={}", word_for(self.backend))
     }
 }
-
-/// The methods whose width can be given in pixels. The others' depends on each triangle's size.
-const METHODS: [WireMethod; 3] = [WireMethod::Exact, WireMethod::Fwidth, WireMethod::FwidthMin];
 
 fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Chosen> {
     let target = spec.quality_target.as_ref()?;
@@ -88,7 +88,7 @@ fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool)
         warnings.push(Warning { code: "max_time_ms_unmet", detail });
     }
     let (spec, [expected_error, expected_time_ms]) = chosen.clone();
-    let mut wire_methods: Vec<&str> = wires(&spec).map(|wire| method_name(wire.method)).collect();
+    let mut wire_methods: Vec<&str> = wires(&spec).map(|wire| word_for(wire.method)).collect();
     wire_methods.sort_unstable();
     wire_methods.dedup();
     let (samples, backend) = (spec.image.samples, spec.backend);
@@ -109,7 +109,9 @@ fn candidates(
 ) -> Vec<Candidate> {
     let samples = if target.open.samples { vec![1, 4, 8, 16] } else { vec![spec.image.samples] };
     let has_open_wire = target.open.wire || target.open.material_wires.contains(&true);
-    let methods = if has_open_wire { METHODS.map(Some).to_vec() } else { vec![None] };
+    // The width of the other methods depends on each triangle's size.
+    let in_pixels = WIRE_METHODS.iter().map(|row| row.method).filter(|method| method.has_pixel_width());
+    let methods = if has_open_wire { in_pixels.map(Some).collect() } else { vec![None] };
     let backends = match (target.open.backend, has_gpu && table.knows_gpu()) {
         (false, _) => vec![spec.backend],
         (true, false) => vec![BackendChoice::Cpu],
@@ -162,7 +164,7 @@ fn as_wide(wire: &Wire, method: WireMethod) -> Option<Wire> {
 /// The error and the time of a look; None where the table does not know one of its techniques.
 fn expect(table: &ErrorTable, spec: &Spec, backend: &str, triangles: usize) -> Option<[f64; 2]> {
     let mut techniques: Vec<&str> = looks(spec).flat_map(techniques).collect();
-    techniques.extend(spec.topology.map(|_| method_name(WireMethod::Exact)));
+    techniques.extend(spec.topology.map(|_| word_for(WireMethod::Exact)));
     techniques.sort_unstable();
     techniques.dedup();
     let pixels = f64::from(spec.image.width_px) * f64::from(spec.image.height_px);
@@ -181,7 +183,7 @@ fn techniques(layers: &Layers) -> Vec<&'static str> {
         (Shading::Flat, FlatNormals::Derivative) => "derivative",
         _ => "face",
     });
-    let wire = layers.wire.map(|wire| method_name(wire.method));
+    let wire = layers.wire.map(|wire| word_for(wire.method));
     let outline = layers.outline.map(|outline| match outline.method {
         OutlineMethod::Hull => "hull",
         OutlineMethod::Contour => "contour",
@@ -195,24 +197,6 @@ fn looks(spec: &Spec) -> impl Iterator<Item = &Layers> {
 
 fn wires(spec: &Spec) -> impl Iterator<Item = &Wire> {
     looks(spec).filter_map(|layers| layers.wire.as_ref())
-}
-
-fn method_name(method: WireMethod) -> &'static str {
-    match method {
-        WireMethod::Exact => "exact",
-        WireMethod::Fwidth => "fwidth",
-        WireMethod::FwidthMin => "fwidth-min",
-        WireMethod::Barycentric => "barycentric",
-        WireMethod::Threshold => "threshold",
-    }
-}
-
-fn backend_name(backend: BackendChoice) -> &'static str {
-    match backend {
-        BackendChoice::Auto => "auto",
-        BackendChoice::Gpu => "gpu",
-        BackendChoice::Cpu => "cpu",
-    }
 }
 
 #[cfg(test)]

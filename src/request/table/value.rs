@@ -1,16 +1,16 @@
-//! One value of a request document: what may be given for a key, and what was.
+//! Values of a request: as they are given, the kinds that keys allow, and what is left after the check.
 
 use serde_json::Value as Json;
 
 use crate::request::error::{RequestError, RequestFault};
 use crate::spec::color::Rgba;
 
-/// What was given: a JSON value of the document, or the text of a query parameter or of `--set`.
+/// A value as it is given: JSON of a document, or the text of a query parameter or of `--set`.
 #[derive(Clone, Debug)]
 pub enum Given {
-    /// From the document.
+    /// A value of a document.
     Json(Json),
-    /// From a query parameter or a flag: numbers and lists are still text.
+    /// The text of a query parameter or a flag, also for numbers and lists.
     Text(String),
 }
 
@@ -23,7 +23,7 @@ impl Given {
         }
     }
 
-    /// Whether it is an object without keys: a layer that is there, with its defaults.
+    /// Whether it is an object without keys, which turns a layer on with its defaults.
     pub fn is_empty_object(&self) -> bool {
         match self {
             Self::Json(json) => json.as_object().is_some_and(serde_json::Map::is_empty),
@@ -31,7 +31,7 @@ impl Given {
         }
     }
 
-    /// For an error message.
+    /// The value, for error messages.
     pub fn show(&self) -> String {
         match self {
             Self::Json(json) => json.to_string(),
@@ -82,19 +82,19 @@ impl Given {
     }
 }
 
-/// What is allowed for a key. Everything an error message or a schema says about a key comes from here.
+/// The values that a key allows. Error messages and the schema are made from it.
 #[derive(Clone, Debug)]
 pub enum Kind {
     /// A finite number in a closed range.
     Number {
-        /// Smallest.
+        /// The smallest, which is allowed.
         min: f64,
-        /// Largest.
+        /// The largest, which is allowed.
         max: f64,
     },
     /// A finite number above 0.
     Above0 {
-        /// Largest.
+        /// The largest, which is allowed.
         max: f64,
     },
     /// One of a few whole numbers.
@@ -111,7 +111,7 @@ pub enum Kind {
     Point,
     /// Three finite numbers, not all zero.
     Direction,
-    /// Yes or no.
+    /// True or false.
     Flag,
 }
 
@@ -126,24 +126,24 @@ pub enum Value {
     Whole(u32),
     /// Width and height.
     Size(u32, u32),
-    /// Place in the list of words.
+    /// Index in the list of words.
     Word(usize),
     /// A colour.
     Color(Rgba),
     /// Three numbers.
     Point([f64; 3]),
-    /// Yes or no.
+    /// True or false.
     Flag(bool),
 }
 
-/// How a point is written.
+/// The notations for points.
 const POINT_FORMS: &str = "as [x, y, z] or, in a query or a flag, x,y,z";
 
 /// Largest magnitude of a coordinate: squares of it still fit an f64 many times over.
 pub const COORDINATE_MAX: f64 = 1e30;
 
 impl Kind {
-    /// What is allowed, in words.
+    /// The allowed values, in words.
     pub fn allowed(&self, image_px_max: u64) -> String {
         match self {
             Self::Number { min, max } => format!("a number from {} to {}", short(*min), short(*max)),
@@ -161,7 +161,7 @@ impl Kind {
         }
     }
 
-    /// Checks what was given for `key`.
+    /// Checks the value that is given for `key`.
     pub fn read(&self, key: &str, given: &Given, image_px_max: u64) -> Result<Value, RequestError> {
         self.check(key, given, image_px_max).map_err(|mut error| {
             if let Given::Json(Json::String(text)) = given
@@ -175,7 +175,7 @@ impl Kind {
         })
     }
 
-    /// What JSON writes without quotes and a query, where everything is text, knows no quotes for.
+    /// The name of a kind that JSON writes without quotes, for the advice about quotes.
     fn bare(&self) -> Option<&'static str> {
         match self {
             Self::Number { .. } | Self::Above0 { .. } | Self::OneOf(_) | Self::Pixels => Some("a number"),
@@ -230,7 +230,7 @@ impl Kind {
                 if largest == 0.0 || largest > COORDINATE_MAX {
                     return Err(out_of_range());
                 }
-                // Only where it points matters, and squares of tiny numbers are zero.
+                // Only the direction counts. Scaled up, because squares of tiny numbers are zero.
                 let unit = if largest < 1.0 / COORDINATE_MAX { largest } else { 1.0 };
                 Ok(Value::Point([x / unit, y / unit, z / unit]))
             }
@@ -239,22 +239,24 @@ impl Kind {
     }
 }
 
+/// The largest magnitude of three coordinates.
 fn largest(point: &[f64; 3]) -> f64 {
     point.iter().fold(0.0, |largest, v| v.abs().max(largest))
 }
 
-/// `1e30` and not a one with thirty zeros after it.
+/// A number in its shorter notation: `1e30` rather than thirty zeros.
 fn short(number: f64) -> String {
     let (plain, scientific) = (number.to_string(), format!("{number:e}"));
     if plain.len() > 2 * scientific.len() { scientific } else { plain }
 }
 
+/// A whole number from 1 to `max`.
 fn pixels(number: f64, max: u64) -> Option<u32> {
     let in_range = number >= 1.0 && number <= max.min(u64::from(u32::MAX)) as f64;
     (in_range && number.fract() == 0.0).then_some(number as u32)
 }
 
-/// `256`, `"256"` or `"640x480"`.
+/// Reads `256`, `"256"` or `"640x480"`.
 fn size(given: &Given) -> Option<(f64, f64)> {
     if let Some((width, height)) = given.text().and_then(|t| t.split_once(['x', 'X'])) {
         return Some((width.trim().parse().ok()?, height.trim().parse().ok()?));
