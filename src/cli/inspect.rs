@@ -1,13 +1,13 @@
-//! `meshsnap inspect`.
+//! `meshsnap inspect`: reports the content of a mesh file.
 
-use crate::import;
 use clap::Args;
 
 use super::progress::Progress;
 use super::render::{format_in, pairs};
 use super::settings::LimitSettings;
 use super::{bundle, files};
-use crate::cli::error::Complaint;
+use crate::cli::error::CliError;
+use crate::import;
 use crate::limits::Deadline;
 use crate::pipeline;
 use crate::request::{self, Rules};
@@ -36,8 +36,8 @@ pub struct InspectArgs {
     limits: LimitSettings,
 }
 
-/// Prints what is in a file.
-pub fn run(arguments: &InspectArgs) -> Result<(), Complaint> {
+/// Prints the report.
+pub fn run(arguments: &InspectArgs) -> Result<(), CliError> {
     let limits = arguments.limits.config().limits;
     let format = format_in(arguments.format_in.as_deref())?;
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
@@ -49,9 +49,9 @@ pub fn run(arguments: &InspectArgs) -> Result<(), Complaint> {
     let mut parsed = |_| progress.next("counting edges");
     let report =
         pipeline::inspect(&bundle, import::Options { format, time_s }, &limits, &Deadline::default(), &mut parsed)
-            .map_err(|error| Complaint::from(error).about(mesh_name))?;
+            .map_err(|error| CliError::from(error).about(mesh_name))?;
     drop(progress);
     let text =
-        if arguments.json { report.json().map_err(|error| Complaint::ours(error.to_string()))? } else { report.text() };
+        if arguments.json { report.json().map_err(|error| CliError::ours(error.to_string()))? } else { report.text() };
     files::print(text.as_bytes())
 }
