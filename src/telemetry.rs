@@ -4,8 +4,8 @@ use std::io::IsTerminal as _;
 
 use tracing_subscriber::EnvFilter;
 
-/// Starts the log. `filter` has the syntax of `tracing`: `info`, or `warn,meshsnap::service=debug`. If `json` is None, the log
-/// is JSON unless standard error is a terminal.
+/// Starts the log. `filter` has the syntax of `tracing`: `info`, or `warn,meshsnap::service=debug`.
+/// If `json` is None, the log is JSON unless standard error is a terminal.
 pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
     let parsed = EnvFilter::try_new(filter).map_err(|e| {
         format!("`log` is \"{filter}\", which is no filter ({e}); use error, warn, info, debug or trace")
@@ -23,7 +23,8 @@ pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
     Ok(())
 }
 
-/// Sends panic messages to the log, in the log's format. The panics themselves are caught where jobs run.
+/// Sends panic messages to the log, in the log's format. The panics themselves are caught where
+/// jobs run.
 fn log_panics() {
     std::panic::set_hook(Box::new(|info| {
         let place = info.location().map(ToString::to_string).unwrap_or_default();

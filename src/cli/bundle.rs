@@ -1,4 +1,5 @@
-//! Reads the files named on the command line as one bundle. Files that a mesh refers to must be named too.
+//! Reads the files named on the command line as one bundle. Files that a mesh refers to must be
+//! named too.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -14,8 +15,8 @@ pub fn name(names: &[String]) -> &str {
     names.first().map_or("", String::as_str)
 }
 
-/// Reads the files. Their paths in the bundle are relative to the folder that they have in common, so that references between
-/// them work as on disk.
+/// Reads the files. Their paths in the bundle are relative to the folder that they have in common,
+/// so that references between them work as on disk.
 pub fn read(names: &[String], entry: Option<String>, limits: &Limits) -> Result<Bundle, CliError> {
     if names.iter().filter(|name| *name == "-").count() > 1 {
         return Err(CliError::usage("`-`, standard input, can be given once"));
@@ -54,7 +55,8 @@ fn folder_of(name: &str) -> Result<PathBuf, CliError> {
     Ok(absolute(name)?.parent().map(Path::to_path_buf).unwrap_or_default())
 }
 
-/// The absolute path without `.` and `..`; links are not followed. Standard input is in the current folder.
+/// The absolute path without `.` and `..`; links are not followed. Standard input is in the current
+/// folder.
 fn absolute(name: &str) -> Result<PathBuf, CliError> {
     let path = std::path::absolute(name).map_err(|error| CliError::input(format!("{name}: {error}")))?;
     let mut plain = PathBuf::new();

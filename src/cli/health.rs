@@ -9,7 +9,8 @@ use crate::cli::error::CliError;
 /// Arguments of `health`.
 #[derive(Args)]
 pub struct HealthArgs {
-    /// What to ask [default: /healthz at the port of MESHSNAP_LISTEN, or http://127.0.0.1:8080/healthz]
+    /// URL to ask [default: /healthz at the port of MESHSNAP_LISTEN, or
+    /// http://127.0.0.1:8080/healthz]
     url: Option<String>,
 }
 

@@ -16,8 +16,8 @@ use crate::spec::BackendChoice;
 /// Arguments of `inspect`.
 #[derive(Args)]
 pub struct InspectArgs {
-    /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB; known by its bytes, whatever its name) and the files it refers to, or
-    /// a .zip of them; `-` for standard input
+    /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB; known by its bytes, whatever its name)
+    /// and the files it refers to, or a .zip of them; `-` for standard input
     #[arg(required = true, value_name = "MESH")]
     meshes: Vec<String>,
     /// Print JSON
@@ -26,10 +26,10 @@ pub struct InspectArgs {
     /// Format of the mesh, where its bytes do not tell: obj, gltf, glb, stl, ply, off, fbx or 3mf
     #[arg(long, value_name = "FORMAT")]
     format_in: Option<String>,
-    /// Which of several files is the mesh, where more than one could be
+    /// The mesh among several files, where more than one could be
     #[arg(long, value_name = "FILE")]
     entry: Option<String>,
-    /// scene.time_s=SECONDS: an animated file as it stands at that moment; otherwise as it stands when nothing moves it
+    /// scene.time_s=SECONDS: an animated file at that moment; without it, the rest pose
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     #[command(flatten)]

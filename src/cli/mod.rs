@@ -1,7 +1,8 @@
 //! The command line.
 //!
-//! Exit codes: 0 success; 1 a fault of the mesh or the request; 2 a fault of the command line or the configuration; 3 a fault
-//! of meshsnap or the machine. Every error is one sentence on standard error.
+//! Exit codes: 0 success; 1 a fault of the mesh or the request; 2 a fault of the command line or
+//! the configuration; 3 a fault of meshsnap or the machine. Every error is one sentence on standard
+//! error.
 
 mod bundle;
 pub(crate) mod error;
@@ -33,11 +34,11 @@ struct Cli {
 enum Command {
     /// Draw a mesh into an image file
     Render(Box<render::RenderArgs>),
-    /// Say what is in a mesh file
+    /// Report the content of a mesh file
     Inspect(inspect::InspectArgs),
     /// Serve renders over HTTP
     Serve(serve::ServeArgs),
-    /// Ask a running server whether it is well, for container health checks
+    /// Ask a running server whether it is healthy, for container health checks
     Health(health::HealthArgs),
     /// Print a completion script for a shell
     Completions {

@@ -24,7 +24,8 @@ use crate::telemetry;
 /// Arguments of `render`.
 #[derive(Args)]
 pub struct RenderArgs {
-    /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB) and the files it refers to, or a .zip of them; `-` for standard input
+    /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB) and the files it refers to, or a .zip of
+    /// them; `-` for standard input
     #[arg(required = true, value_name = "MESH")]
     meshes: Vec<String>,
     /// Image file, `-` for standard output; its extension chooses the format unless --format does
@@ -36,8 +37,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE.json")]
     request: Option<PathBuf>,
     /// Dotted key of the request document, such as wire.color=#f00, outline={}, wire=null or
-    /// materials.Glass.surface.opacity=0.3, or a whole section as JSON: outline={"thickness":8}. May be repeated; a later one
-    /// overrides an earlier one, and the flags beside it
+    /// materials.Glass.surface.opacity=0.3, or a whole section as JSON: outline={"thickness":8}.
+    /// May be repeated; a later one overrides an earlier one, and the flags beside it
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// N or WxH, in pixels
@@ -52,12 +53,12 @@ pub struct RenderArgs {
     /// Format of the mesh, where its bytes do not tell: obj, gltf, glb, stl, ply, off, fbx or 3mf
     #[arg(long, value_name = "FORMAT")]
     format_in: Option<String>,
-    /// Which of several files is the mesh, where more than one could be
+    /// The mesh among several files, where more than one could be
     #[arg(long, value_name = "FILE")]
     entry: Option<String>,
-    #[arg(long, help = format!("Who draws: {}", one_of::<BackendChoice>()))]
+    #[arg(long, help = format!("Back-end: {}", one_of::<BackendChoice>()))]
     backend: Option<String>,
-    /// Samples a pixel: 1, 4, 8 or 16
+    /// Samples per pixel: 1, 4, 8 or 16
     #[arg(long)]
     samples: Option<String>,
     /// #rgb, #rrggbb, #rrggbbaa or transparent
@@ -66,7 +67,7 @@ pub struct RenderArgs {
     /// Threads of the CPU renderer [default: one for each processor]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Print what the picture did not need, and how long each stage took
+    /// Print the work that was skipped, and the time of each stage
     #[arg(long)]
     explain: bool,
     #[command(flatten)]
@@ -137,7 +138,8 @@ fn read_spec(arguments: &RenderArgs, limits: &Limits) -> Result<Spec, CliError> 
     overrides.extend(pairs(&arguments.set)?);
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
     let mut spec = request::read(document.as_deref(), &overrides, &rules)?;
-    // A format on the command line overrides the output's extension, which overrides the document's format.
+    // A format on the command line overrides the output's extension, which overrides the document's
+    // format.
     overrides.retain(|(key, _)| ["format", "image.format", "image"].contains(&key.as_str()));
     let is_given = request::read(None, &overrides, &rules)?.image.format.is_some();
     let format = if is_given { spec.image.format } else { by_extension(&arguments.output, spec.image.format)? };

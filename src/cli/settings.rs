@@ -10,7 +10,8 @@ use crate::config::{Access, Config, SETTINGS, Setting};
 #[derive(Clone, Debug, Default)]
 pub struct AllSettings(Given);
 
-/// The settings of `render` and `inspect`: those whose names begin with `limit-`, except the limits of jobs.
+/// The settings of `render` and `inspect`: those whose names begin with `limit-`, except the limits
+/// of jobs.
 #[derive(Clone, Debug, Default)]
 pub struct LimitSettings(Given);
 

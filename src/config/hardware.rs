@@ -1,11 +1,12 @@
-//! Finds out whether this machine can have a hardware GPU, from its device nodes and without loading a driver.
+//! Finds out whether this machine can have a hardware GPU, from its device nodes and without
+//! loading a driver.
 
 use std::path::Path;
 
 /// The reason why there cannot be a hardware GPU here; None if there may be one.
 ///
-/// On Linux every driver needs a node under `/dev`, and a container has it only if it was passed in. On other systems only the
-/// driver knows.
+/// On Linux every driver needs a node under `/dev`, and a container has it only if it was passed
+/// in. On other systems only the driver knows.
 pub fn why_no_gpu() -> Option<String> {
     if cfg!(target_os = "linux") { why_no_gpu_under(Path::new("/dev")) } else { None }
 }

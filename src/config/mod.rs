@@ -1,5 +1,6 @@
-//! The settings of `serve`. Each is a flag, an environment variable `MESHSNAP_*` and a key of the TOML file, under one name. A
-//! flag overrides a variable, which overrides the file, which overrides the default.
+//! The settings of `serve`. Each is a flag, an environment variable `MESHSNAP_*` and a key of the
+//! TOML file, under one name. A flag overrides a variable, which overrides the file, which
+//! overrides the default.
 //!
 //! A new setting is a field of [`Config`], its default, and one line of [`SETTINGS`].
 
@@ -35,7 +36,8 @@ pub struct Config {
     pub connections: u64,
     /// Most bytes of uploads in memory at a time.
     pub uploads_bytes: u64,
-    /// Longest time for the header of a request, milliseconds; also the longest time that a connection is idle.
+    /// Longest time for the header of a request, milliseconds; also the longest time that a
+    /// connection is idle.
     pub header_timeout_ms: u64,
     /// Longest time for the body of a request, milliseconds.
     pub body_timeout_ms: u64,
@@ -51,7 +53,7 @@ pub struct Config {
     pub mesh_count: u64,
     /// Filter of the log, in the syntax of `tracing`.
     pub log: String,
-    /// Whether the log is JSON. None: unless standard error is a terminal.
+    /// True for a JSON log, false for text. None: text if standard error is a terminal.
     pub log_json: Option<bool>,
     /// Limits of a single job.
     pub limits: Limits,

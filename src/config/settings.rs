@@ -24,7 +24,8 @@ pub struct Setting {
     pub help: &'static str,
     /// The type, and the field.
     pub access: Access,
-    /// Whether there is a flag. Secrets have none, because every user of the machine can read command lines.
+    /// True if there is a flag. Secrets have none, because every user of the machine can read
+    /// command lines.
     pub has_flag: bool,
 }
 
@@ -37,43 +38,54 @@ const TEXTURE_PX_MAX: u64 = 65_535;
 /// Every setting.
 pub const SETTINGS: &[Setting] = &[
     text("listen", "Address and port to listen on", |c, v| set(&mut c.listen, v), |c| c.listen.clone()),
-    text("data-dir", "Where meshes and results are stored (this version keeps them in memory)", set_data_dir, data_dir),
-    number("workers", "Threads that draw", 1, 1024, |c| &mut c.workers),
+    text(
+        "data-dir",
+        "Folder for meshes and results (reserved: this version keeps them in memory)",
+        set_data_dir,
+        data_dir,
+    ),
+    number("workers", "Number of threads that draw", 1, 1024, |c| &mut c.workers),
     number("worker-threads", "Threads within one CPU render; 0: cores / workers", 0, 1024, |c| &mut c.worker_threads),
-    number("queue", "Jobs that may wait for each worker", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
-    text("backend", "Who draws unless a request says: auto, gpu or cpu", set_backend, |c| word_for(c.backend).into()),
+    number("queue", "Most jobs that wait for each worker", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
+    text("backend", "Back-end of requests that name none: auto, gpu or cpu", set_backend, |c| {
+        word_for(c.backend).into()
+    }),
     secret("api-keys", "Bearer tokens of clients, separated by commas", set_api_keys),
-    switch("no-auth", "Serve without keys even beyond loopback", |c| &mut c.no_auth),
-    number("connections", "Connections at once", 1, 1 << 20, |c| &mut c.connections),
-    number("uploads-bytes", "Uploads in memory at once", 1, u64::MAX, |c| &mut c.uploads_bytes),
-    number("header-timeout-ms", "Time for a request's header", 1, MS_MAX, |c| &mut c.header_timeout_ms),
-    number("body-timeout-ms", "Time for a request's body", 1, MS_MAX, |c| &mut c.body_timeout_ms),
-    number("result-ttl-ms", "How long a job's result is kept", 0, MS_MAX, |c| &mut c.result_ttl_ms),
-    number("result-bytes", "Memory for results of jobs", 0, u64::MAX, |c| &mut c.result_bytes),
-    number("result-count", "Results of jobs in memory", 1, 1 << 24, |c| &mut c.result_count),
-    number("mesh-bytes", "Memory for stored meshes", 0, u64::MAX, |c| &mut c.mesh_bytes),
-    number("mesh-count", "Stored meshes; the least recently used go first", 1, 1 << 20, |c| &mut c.mesh_count),
+    switch("no-auth", "Allow clients without tokens on addresses other than loopback", |c| &mut c.no_auth),
+    number("connections", "Most connections at a time", 1, 1 << 20, |c| &mut c.connections),
+    number("uploads-bytes", "Most bytes of uploads in memory at a time", 1, u64::MAX, |c| &mut c.uploads_bytes),
+    number("header-timeout-ms", "Longest time for the header of a request", 1, MS_MAX, |c| &mut c.header_timeout_ms),
+    number("body-timeout-ms", "Longest time for the body of a request", 1, MS_MAX, |c| &mut c.body_timeout_ms),
+    number("result-ttl-ms", "Time for which the result of a job is kept", 0, MS_MAX, |c| &mut c.result_ttl_ms),
+    number("result-bytes", "Most bytes of results in memory", 0, u64::MAX, |c| &mut c.result_bytes),
+    number("result-count", "Most results in memory", 1, 1 << 24, |c| &mut c.result_count),
+    number("mesh-bytes", "Most bytes of stored meshes in memory", 0, u64::MAX, |c| &mut c.mesh_bytes),
+    number("mesh-count", "Most stored meshes; the least recently used is dropped first", 1, 1 << 20, |c| {
+        &mut c.mesh_count
+    }),
     text(
         "log",
-        "What is logged: error, warn, info, debug, or a tracing filter",
+        "Filter of the log: error, warn, info, debug, or the syntax of tracing",
         |c, v| set(&mut c.log, v),
         |c| c.log.clone(),
     ),
-    text("log-format", "auto, text or json", set_log_format, |c| word(LOG_FORMATS, c.log_json)),
+    text("log-format", "Format of the log: auto, text or json", set_log_format, |c| word(LOG_FORMATS, c.log_json)),
     number("limit-body-bytes", "Largest request body", 1, u64::MAX, |c| &mut c.limits.body_bytes),
-    number("limit-memory-bytes", "Memory for one job", 1, u64::MAX, |c| &mut c.limits.memory_bytes),
-    number("limit-triangles", "Triangles of one mesh", 1, u64::MAX, |c| &mut c.limits.triangles),
-    number("limit-nodes", "Nodes of one scene graph", 1, u64::MAX, |c| &mut c.limits.nodes),
+    number("limit-memory-bytes", "Most bytes of memory for one job", 1, u64::MAX, |c| &mut c.limits.memory_bytes),
+    number("limit-triangles", "Most triangles of one mesh", 1, u64::MAX, |c| &mut c.limits.triangles),
+    number("limit-nodes", "Most nodes of one scene graph", 1, u64::MAX, |c| &mut c.limits.nodes),
     // The JSON parser itself stops at 128.
-    number("limit-json-depth", "Nesting of JSON", 1, 128, |c| &mut c.limits.json_depth),
-    number("limit-image-px", "Width and height of a picture", 1, IMAGE_PX_MAX, |c| &mut c.limits.image_px),
-    number("limit-texture-px", "Width and height of a texture", 1, TEXTURE_PX_MAX, |c| &mut c.limits.texture_px),
-    number("limit-texture-total-px", "Pixels of all textures of one picture", 1, u64::MAX, |c| {
+    number("limit-json-depth", "Deepest nesting of JSON", 1, 128, |c| &mut c.limits.json_depth),
+    number("limit-image-px", "Largest width and height of a picture", 1, IMAGE_PX_MAX, |c| &mut c.limits.image_px),
+    number("limit-texture-px", "Largest width and height of a texture", 1, TEXTURE_PX_MAX, |c| {
+        &mut c.limits.texture_px
+    }),
+    number("limit-texture-total-px", "Most pixels of all textures of one picture", 1, u64::MAX, |c| {
         &mut c.limits.texture_total_px
     }),
-    number("limit-bundle-bytes", "Files of a bundle, unpacked", 1, u64::MAX, |c| &mut c.limits.bundle_bytes),
-    number("limit-bundle-entries", "Files of a bundle", 1, 1 << 16, |c| &mut c.limits.bundle_entries),
-    number("limit-job-ms", "Time for one job, waiting included", 1, MS_MAX, |c| &mut c.limits.job_ms),
+    number("limit-bundle-bytes", "Most bytes of a bundle, unpacked", 1, u64::MAX, |c| &mut c.limits.bundle_bytes),
+    number("limit-bundle-entries", "Most files of a bundle", 1, 1 << 16, |c| &mut c.limits.bundle_entries),
+    number("limit-job-ms", "Longest time for one job, including the queue", 1, MS_MAX, |c| &mut c.limits.job_ms),
     number("limit-queue-per-worker", "The same as --queue", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
 ];
 

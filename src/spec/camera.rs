@@ -22,7 +22,7 @@ word_enums! {
         Bottom = "bottom",
     }
 
-    /// How depth becomes size.
+    /// The relation of distance and size.
     pub enum ProjectionKind {
         /// Distant objects are smaller.
         Perspective = "perspective",

@@ -1,4 +1,5 @@
-//! The layers that a picture consists of: surface, wire, outline, topology. A layer that is `Some` is drawn.
+//! The layers that a picture consists of: surface, wire, outline, topology. A layer that is `Some`
+//! is drawn.
 
 use super::color::Rgba;
 use super::wire_method::WireMethod;
@@ -16,7 +17,7 @@ pub struct Layers {
 }
 
 word_enums! {
-    /// How light falls on a surface.
+    /// The lighting of a surface.
     pub enum Shading {
         /// One normal per triangle.
         Flat = "flat",
@@ -30,7 +31,8 @@ word_enums! {
     pub enum FlatNormals {
         /// The corners of the triangle, in f64.
         Face = "face",
-        /// Screen-space derivatives of the position in blocks of 2 x 2 pixels, as a GPU's `dFdx` gives them.
+        /// Screen-space derivatives of the position in blocks of 2 x 2 pixels, as a GPU's `dFdx`
+        /// gives them.
         Derivative = "derivative",
     }
 
@@ -68,11 +70,12 @@ word_enums! {
 /// The filled surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// How light falls on it.
+    /// Its lighting.
     pub shading: Shading,
     /// Source of the normals of [`Shading::Flat`].
     pub normals: FlatNormals,
-    /// Overrides the file's own base colours and their textures; None keeps them (grey where there are none).
+    /// Overrides the file's own base colours and their textures; None keeps them (grey where there
+    /// are none).
     pub color: Option<Rgba>,
     /// Metallic share, 0 to 1; None: the file's, or 0.
     pub metallic: Option<f32>,
@@ -82,7 +85,7 @@ pub struct Surface {
     pub emissive: Option<Rgba>,
     /// Multiplies the file's own opacity, 0 to 1.
     pub opacity: f32,
-    /// Whether the file's textures are shown.
+    /// Shows the file's textures.
     pub textures: bool,
     /// Shown instead of the shaded colour.
     pub debug: DebugView,
@@ -114,13 +117,14 @@ word_enums! {
         Triangles = "triangles",
         /// Edges of the file's polygons: no triangulation diagonals.
         Polygons = "polygons",
-        /// Edges whose faces meet at more than `feature_angle_deg`, and those without exactly two faces.
+        /// Edges whose faces meet at more than `feature_angle_deg`, and those without exactly two
+        /// faces.
         Feature = "feature",
         /// Edges with one face.
         Boundary = "boundary",
     }
 
-    /// How edges behind a surface are drawn.
+    /// The treatment of edges behind a surface.
     pub enum Hidden {
         /// Not drawn.
         Hide = "hide",
@@ -134,23 +138,25 @@ word_enums! {
 /// Lines along the mesh's edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wire {
-    /// How it is drawn.
+    /// The method of drawing it.
     pub method: WireMethod,
     /// Line colour.
     pub color: Rgba,
     /// `exact`: full width, pixels, 0 to 100. Other methods: t, in the method's unit, 0 to 10.
     pub thickness: f32,
-    /// `exact`: extra ramp, pixels. `fwidth` and `fwidth-min`: s, width of the smoothstep in multiples of `d`. 0 to 10.
+    /// `exact`: extra ramp, pixels. `fwidth` and `fwidth-min`: s, width of the smoothstep in
+    /// multiples of `d`. 0 to 10.
     pub smoothing: f32,
     /// Multiplies the colour's own opacity, 0 to 1.
     pub opacity: f32,
-    /// Whether light falls on the wire as on the surface.
+    /// Lights the wire like the surface.
     pub lit: bool,
     /// Edges that it follows.
     pub edges: WireEdges,
-    /// For [`WireEdges::Feature`]: the smallest angle between two faces' normals that makes an edge, 0 to 180.
+    /// For [`WireEdges::Feature`]: the smallest angle between two faces' normals that makes an
+    /// edge, 0 to 180.
     pub feature_angle_deg: f64,
-    /// How hidden edges are drawn.
+    /// The treatment of hidden edges.
     pub hidden: Hidden,
 }
 
@@ -179,9 +185,10 @@ word_enums! {
         Px = "px",
     }
 
-    /// How an outline is made.
+    /// The shape of an outline.
     pub enum OutlineMethod {
-        /// A border in one colour around the surface, as an inverted hull gives it. Nearer surfaces hide it.
+        /// A border in one colour around the surface, as an inverted hull gives it. Nearer surfaces
+        /// hide it.
         Hull = "hull",
         /// Silhouette and boundary edges, as lines of exact width.
         Contour = "contour",
@@ -191,7 +198,7 @@ word_enums! {
 /// The line around the shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outline {
-    /// How it is made.
+    /// Its shape.
     pub method: OutlineMethod,
     /// Line colour.
     pub color: Rgba,

@@ -19,8 +19,8 @@ word_enums! {
 pub struct Light {
     /// The set of lamps.
     pub preset: LightPreset,
-    /// Direction in which the key light shines, in file space and never zero. None: the preset's direction, relative to the
-    /// camera.
+    /// Direction in which the key light shines, in file space and never zero. None: the preset's
+    /// direction, relative to the camera.
     pub direction: Option<[f64; 3]>,
     /// Strength of the lamps, 0 to 10.
     pub intensity: f32,

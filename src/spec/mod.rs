@@ -1,5 +1,5 @@
-//! The meaning of a request: a [`Spec`] says what to draw of any mesh, and how. Every value is in range; units are in the
-//! names.
+//! The meaning of a request: a [`Spec`] says what to draw of any mesh, and how. Every value is in
+//! range; units are in the names.
 
 mod camera;
 pub mod color;
@@ -22,10 +22,10 @@ use words::word_enums;
 /// Everything a request says, with styles applied and defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spec {
-    /// What is drawn for materials that `materials` does not name.
+    /// The layers of materials that `materials` does not name.
     pub layers: Layers,
-    /// What is drawn for materials of these names. Each entry is complete and takes nothing from `layers`. Of equal names the
-    /// last counts.
+    /// The layers of materials of these names. Each entry is complete and takes nothing from
+    /// `layers`. Of equal names the last counts.
     pub materials: Vec<(String, Layers)>,
     /// Edges coloured by how the mesh is connected, if any.
     pub topology: Option<Topology>,
@@ -39,7 +39,8 @@ pub struct Spec {
     pub image: ImageSpec,
     /// The back-end that draws.
     pub backend: BackendChoice,
-    /// An error or a time to reach by choosing what [`QualityTarget::open`] names. None: nothing is chosen.
+    /// An error or a time to reach by choosing what [`QualityTarget::open`] names. None: nothing is
+    /// chosen.
     pub quality_target: Option<QualityTarget>,
 }
 

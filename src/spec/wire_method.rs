@@ -1,16 +1,17 @@
-//! The table of wire methods. The words of requests, their schema, the quality selection and the accuracy benchmark follow
-//! from it; CONTRIBUTING.md lists what else a new method needs.
+//! The table of wire methods. The words of requests, their schema, the quality selection and the
+//! accuracy benchmark follow from it; CONTRIBUTING.md lists what else a new method needs.
 
 use super::words::Words;
 
-/// How wires are drawn.
+/// A method of drawing wires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum WireMethod {
     /// Full width in pixels by exact box-filter coverage.
     Exact,
     /// `min_i smoothstep(t d_i, (t + s) d_i, b_i)` with `d = fwidth(b)`.
     Fwidth,
-    /// `smoothstep(t d, (t + s) d, m)` with `m = min_i b_i` and `d = fwidth(m)`: shows artefacts near corners.
+    /// `smoothstep(t d, (t + s) d, m)` with `m = min_i b_i` and `d = fwidth(m)`: shows artefacts
+    /// near corners.
     FwidthMin,
     /// `smoothstep(0, 0.1 t, min_i b_i)`: the width is proportional to the triangle's size.
     Barycentric,
@@ -36,10 +37,12 @@ pub struct WireMethodInfo {
 pub enum ThicknessUnit {
     /// Pixels. Drawn as lines of exact width: `plan/lines`, `backend/*/lines`.
     Pixels,
-    /// Multiples of `|db/dx| + |db/dy|`, which is one pixel for an edge along an axis. Drawn while the surface is shaded:
-    /// `plan/surface/materials.rs`, `wire.rs` and `wire.wgsl` under `surface`.
+    /// Multiples of `|db/dx| + |db/dy|`, which is one pixel for an edge along an axis. Drawn while
+    /// the surface is shaded: `plan/surface/materials.rs`, `wire.rs` and `wire.wgsl` under
+    /// `surface`.
     Derivatives,
-    /// This share of the triangle's height, where the wire is half gone. Drawn while the surface is shaded.
+    /// This share of the triangle's height, where the wire is half gone. Drawn while the surface is
+    /// shaded.
     TriangleHeight(f64),
 }
 
@@ -54,19 +57,19 @@ pub const WIRE_METHODS: &[WireMethodInfo] = &[
     WireMethodInfo {
         method: WireMethod::Fwidth,
         name: "fwidth",
-        about: "smoothstep in multiples of |db/dx| + |db/dy|, a coordinate at a time",
+        about: "smoothstep in multiples of |db/dx| + |db/dy|, for each coordinate",
         unit: ThicknessUnit::Derivatives,
     },
     WireMethodInfo {
         method: WireMethod::FwidthMin,
         name: "fwidth-min",
-        about: "of the least one",
+        about: "likewise, for the smallest coordinate",
         unit: ThicknessUnit::Derivatives,
     },
     WireMethodInfo {
         method: WireMethod::Barycentric,
         name: "barycentric",
-        about: "a share of the triangle",
+        about: "width as a share of the triangle",
         unit: ThicknessUnit::TriangleHeight(0.05),
     },
     WireMethodInfo {
@@ -83,7 +86,7 @@ impl WireMethod {
         WIRE_METHODS.iter().find(|row| row.method == self).unwrap_or(&WIRE_METHODS[0])
     }
 
-    /// Whether a width in pixels can be asked of it.
+    /// True if a width in pixels can be translated into its thickness.
     pub fn has_pixel_width(self) -> bool {
         !matches!(self.info().unit, ThicknessUnit::TriangleHeight(_))
     }
