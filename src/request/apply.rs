@@ -10,7 +10,8 @@ use crate::request::suggest;
 use crate::request::table::value::{Given, Kind, Value};
 use crate::request::table::{self, FIELDS, MATERIALS, SCHEMA, SECTIONS};
 
-/// Puts the value of an item into a draft: the document's, or that of the material which the item is about.
+/// Puts the value of an item into a draft: the document's, or that of the material which the item
+/// is about.
 pub fn apply(draft: &mut Draft, item: &Item, rules: &Rules) -> Result<(), RequestError> {
     let (key, given) = (item.key.as_str(), &item.given);
     let of_material = item.material.is_some();
@@ -70,7 +71,8 @@ pub fn keys() -> Vec<&'static str> {
     keys
 }
 
-/// The error for another value where an object is expected. In a query or a flag, it says how to give one key alone.
+/// The error for another value where an object is expected. In a query or a flag, it says how to
+/// give one key alone.
 fn no_object(item: &Item, expected: &str, others: &str) -> RequestError {
     let whole = item.whole_key();
     let key = match &item.material {

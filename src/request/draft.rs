@@ -13,7 +13,8 @@ use crate::spec::{
 /// Different exact wires and contours in one picture.
 const LINE_STYLES_MAX: usize = 64;
 
-/// A spec whose dependent defaults are still open. A material is one too, of which only the layers count.
+/// A spec whose dependent defaults are still open. A material is one too, of which only the layers
+/// count.
 #[derive(Clone, Debug)]
 pub struct Draft {
     /// The document's own layers; each of its materials begins from them.
@@ -89,7 +90,8 @@ impl Draft {
         self.topology.get_or_insert_default()
     }
 
-    /// Settles what depends on several keys. Each material has a name. `backend` is the server's default.
+    /// Settles what depends on several keys. Each material has a name. `backend` is the server's
+    /// default.
     pub fn finish(self, materials: Vec<(String, LayersDraft)>, backend: BackendChoice) -> Result<Spec, RequestError> {
         let quality_target = self.quality_target(&materials, backend);
         let layers = self.layers.finish("")?;

@@ -1,4 +1,5 @@
-//! Errors of requests. Each is one sentence that names the key, the given value and the allowed ones.
+//! Errors of requests. Each is one sentence that names the key, the given value and the allowed
+//! ones.
 
 use std::fmt;
 
@@ -77,7 +78,8 @@ impl fmt::Display for RequestError {
 
 impl std::error::Error for RequestError {}
 
-/// Shortens a key in the middle: a material's name may be long, and its layer and key are at the end.
+/// Shortens a key in the middle: a material's name may be long, and its layer and key are at the
+/// end.
 fn shorten_key(key: &str) -> String {
     const CHARS_MAX: usize = 120;
     let count = key.chars().count();

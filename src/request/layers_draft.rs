@@ -21,14 +21,14 @@ pub struct LayersDraft {
     pub wire: Option<WireDraft>,
     /// The line around the shape.
     pub outline: Option<Outline>,
-    /// How hidden edges are drawn unless a request says: it depends on the style.
+    /// The style's treatment of hidden edges, unless the request gives one.
     hidden: Hidden,
 }
 
 /// A wire whose dependent defaults are still open.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WireDraft {
-    /// What depends on nothing else.
+    /// The values that depend on no other key.
     pub line: Wire,
     /// By default exact, unless a quality target chooses.
     pub method: Dependent<WireMethod>,
@@ -57,12 +57,13 @@ impl LayersDraft {
         Self { surface, wire, outline, hidden }
     }
 
-    /// Whether there is a wire whose method may be chosen.
+    /// True if there is a wire whose method may be chosen.
     pub fn has_open_wire(&self) -> bool {
         self.wire.is_some_and(|wire| !wire.method.is_given() && !wire.smoothing.is_given())
     }
 
-    /// Settles defaults and limits that depend on several keys. `prefix` precedes the keys of a material.
+    /// Settles defaults and limits that depend on several keys. `prefix` precedes the keys of a
+    /// material.
     pub fn finish(&self, prefix: &str) -> Result<Layers, RequestError> {
         let too_thick = |key: &str, given: f32, allowed: String| {
             Err(RequestError::new(RequestFault::OutOfRange, &format!("{prefix}{key}"), given, allowed))

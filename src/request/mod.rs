@@ -1,8 +1,9 @@
 //! Reads requests: a JSON document and dotted keys become a [`Spec`].
 //!
-//! Each of these overrides what precedes it: defaults, the style, the document, the dotted keys of a query or of `--set`.
-//! Materials begin from the document's own layers, as they are after all of these. `null` turns a layer off; for any other key
-//! `null` is its default, or the same as leaving the key out. [`table`] is the table of keys, from which [`schema()`] follows.
+//! Each of these overrides what precedes it: defaults, the style, the document, the dotted keys of
+//! a query or of `--set`. Materials begin from the document's own layers, as they are after all of
+//! these. `null` turns a layer off; for any other key `null` is its default, or the same as leaving
+//! the key out. [`table`] is the table of keys, from which [`schema()`] follows.
 
 mod apply;
 pub(crate) mod document;
@@ -67,8 +68,8 @@ pub fn read(document: Option<&[u8]>, overrides: &Overrides, rules: &Rules) -> Re
     read_items(items, overrides, rules)
 }
 
-/// Reads a document that also names its mesh, as [`names_mesh`] finds, and the dotted keys that override it. Returns the mesh's
-/// name as it was given.
+/// Reads a document that also names its mesh, as [`names_mesh`] finds, and the dotted keys that
+/// override it. Returns the mesh's name as it was given.
 pub fn read_with_mesh(document: &[u8], overrides: &Overrides, rules: &Rules) -> Result<(String, Spec), RequestError> {
     let mut items = json::flatten(document, rules.limits.json_depth)?;
     let at = items.iter().position(|item| item.material.is_none() && item.key == mesh_reference::KEY);
@@ -89,12 +90,14 @@ pub fn read_with_mesh(document: &[u8], overrides: &Overrides, rules: &Rules) -> 
     }
 }
 
-/// Refuses duplicates among the dotted keys of a query. On a command line, in contrast, later flags override earlier ones.
+/// Refuses duplicates among the dotted keys of a query. On a command line, in contrast, later flags
+/// override earlier ones.
 pub fn check_once(overrides: &Overrides, rules: &Rules) -> Result<(), RequestError> {
     duplicate_keys::check(&flatten_all(Vec::new(), overrides, rules)?)
 }
 
-/// Reads the dotted keys of a request for a report about a file: only the moment of its animation is allowed.
+/// Reads the dotted keys of a request for a report about a file: only the moment of its animation
+/// is allowed.
 pub fn read_moment(overrides: &Overrides, rules: &Rules) -> Result<Option<f64>, RequestError> {
     const MOMENT: &str = "scene.time_s";
     if let Some((key, text)) = overrides.iter().find(|(key, _)| key != MOMENT) {
@@ -104,7 +107,8 @@ pub fn read_moment(overrides: &Overrides, rules: &Rules) -> Result<Option<f64>, 
     Ok(read(None, overrides, rules)?.time_s)
 }
 
-/// Sets the picture's format. JPEG has no alpha, so the background is blended over white here, in linear light.
+/// Sets the picture's format. JPEG has no alpha, so the background is blended over white here, in
+/// linear light.
 pub fn set_format(spec: &mut Spec, format: ImageFormat) {
     spec.image.format = Some(format);
     if format == ImageFormat::Jpeg {

@@ -1,8 +1,9 @@
 //! The JSON Schema (draft 2020-12) of request documents, written from the table of keys.
 //!
-//! It states what the reader checks, except what a schema cannot express: `eye` and `target` differ; the hulls of several
-//! materials share a unit; limits of a material's key that depend on keys of the document; a short name and its key are not
-//! both given; the places where a document may name its mesh.
+//! It states what the reader checks, except what a schema cannot express: `eye` and `target`
+//! differ; the hulls of several materials share a unit; limits of a material's key that depend on
+//! keys of the document; a short name and its key are not both given; the places where a document
+//! may name its mesh.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -45,14 +46,14 @@ pub fn schema(rules: &Rules) -> Json {
     }
     let digest = json!({ "description": mesh::ABOUT, "type": "string", "pattern": "^[0-9a-f]{64}$" });
     properties.insert(mesh::KEY.into(), digest);
-    let own = json!({ "description": "Where an editor finds this schema.", "type": ["string", "null"] });
+    let own = json!({ "description": "Address of this schema, for editors.", "type": ["string", "null"] });
     properties.insert(SCHEMA.into(), own);
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "meshsnap request",
         "description": "How to turn a mesh into an image. A layer that is present is drawn, null turns it off; any other key \
-                        that is null is as if it were not there, unless it says what null means. A query's dotted \
-                        keys (wire.color) and the short names override the document.",
+                        that is null counts as absent, unless its description says otherwise. Dotted keys of a query \
+                        (wire.color) and short names override the document.",
         "type": "object",
         "properties": properties,
         "additionalProperties": false,

@@ -1,4 +1,5 @@
-//! Writes a document and the dotted keys that override it as dotted keys alone, for use in an address.
+//! Writes a document and the dotted keys that override it as dotted keys alone, for use in an
+//! address.
 
 use serde_json::Value as Json;
 
@@ -12,8 +13,8 @@ use crate::spec::Spec;
 /// Most keys: an address has no room for more.
 const KEYS_MAX: usize = 200;
 
-/// The dotted keys that mean `spec`, which a document (with or without its mesh) and its overrides mean too; without the
-/// picture's format. None where no query can express it.
+/// The dotted keys that mean `spec`, which a document (with or without its mesh) and its overrides
+/// mean too; without the picture's format. None where no query can express it.
 pub fn all_dotted(document: &[u8], overrides: &Overrides, spec: &Spec, rules: &Rules) -> Option<Vec<(String, String)>> {
     let mut items = flatten(document, rules.limits.json_depth).ok()?;
     for (key, text) in overrides {
@@ -29,7 +30,8 @@ pub fn all_dotted(document: &[u8], overrides: &Overrides, spec: &Spec, rules: &R
     let kept: Vec<&Item> = (0..items.len()).filter(|&at| !has_later(at)).map(|at| &items[at]).collect();
     let pairs: Vec<(String, String)> = kept.into_iter().map(|item| (item.whole_key(), text(&item.given))).collect();
 
-    // Read the result back: dots in a material's name may change the meaning of its key, and so may a key left out.
+    // Read the result back: dots in a material's name may change the meaning of its key, and so may
+    // a key left out.
     check_once(&pairs, rules).ok()?;
     let mut again = read(None, &pairs, rules).ok()?;
     set_format(&mut again, spec.image.format?);

@@ -1,4 +1,5 @@
-//! Refuses duplicate keys, under the same name or under a short and a long one: the sender meant both, and one would be lost.
+//! Refuses duplicate keys, under the same name or under a short and a long one: the sender meant
+//! both, and one would be lost.
 
 use std::collections::BTreeMap;
 

@@ -15,7 +15,8 @@ pub struct Item {
 }
 
 impl Item {
-    /// Reads a dotted key. A material's name may contain dots, so the end decides: a layer, or a layer and one of its keys.
+    /// Reads a dotted key. A material's name may contain dots, so the end decides: a layer, or a
+    /// layer and one of its keys.
     pub fn dotted(key: &str, text: &str) -> Self {
         let given = Given::Text(text.to_owned());
         let Some(rest) = key.strip_prefix(MATERIALS.name).and_then(|rest| rest.strip_prefix('.')) else {

@@ -48,8 +48,8 @@ pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestErro
     Ok(items)
 }
 
-/// Flattens a dotted key and its text: to one item, or, if the text is an object with keys (`outline={"thickness":8}`), to the
-/// same items as that object in a document.
+/// Flattens a dotted key and its text: to one item, or, if the text is an object with keys
+/// (`outline={"thickness":8}`), to the same items as that object in a document.
 pub fn flatten_override(key: &str, text: &str, depth_max: u64) -> Result<Vec<Item>, RequestError> {
     let item = Item::dotted(key, text);
     let may_hold_keys = match &item.material {
@@ -84,7 +84,8 @@ fn repeated(key: &str) -> RequestError {
     RequestError::new(RequestFault::Conflict, key, "given twice", "an object has a key once")
 }
 
-/// Where and why a text is not JSON. The place comes first, because long errors are cut off at the end.
+/// The place and the reason why a text is not JSON. The place comes first, because long errors are
+/// cut off at the end.
 fn not_json_at(error: &serde_json::Error) -> String {
     let said = error.to_string();
     let why = said.split(" at line ").next().unwrap_or_default();

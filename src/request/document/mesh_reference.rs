@@ -16,7 +16,7 @@ pub const KEY: &str = "mesh";
 pub const ALLOWED: &str = "the SHA-256 of a stored mesh, 64 lower-case hexadecimal digits";
 
 /// Its description in the schema.
-pub const ABOUT: &str = "SHA-256 of a stored mesh, in a JSON body that is sent in place of a mesh; nowhere else.";
+pub const ABOUT: &str = "SHA-256 of a stored mesh; only in a JSON body that is sent in place of a mesh.";
 
 /// The error where it is missing.
 pub const WHY: &str = "a JSON body is a request document and names the mesh to draw by the SHA-256 under which it is stored, \
@@ -25,14 +25,15 @@ pub const WHY: &str = "a JSON body is a request document and names the mesh to d
 /// The error where it is not allowed.
 pub const ELSEWHERE: &str = "it names a stored mesh in a JSON body that is sent in place of a mesh, and nowhere else";
 
-/// Whether a body is a request document that names its mesh: a JSON object with `mesh`. An object that also has `asset` may be
-/// a glTF file, so there the value of `mesh` must be 64 hexadecimal digits.
+/// True for a request document that names its mesh: a JSON object with `mesh`. An object
+/// that also has `asset` may be a glTF file, so there the value of `mesh` must be 64 hexadecimal
+/// digits.
 pub fn names_mesh(body: &[u8]) -> bool {
     begins_object(body) && peek(body).is_some_and(|seen| seen.has_digest || seen.has_mesh && !seen.has_asset)
 }
 
-/// Whether a body that names no mesh can only be a request document with a mistake. `is_declared_json`: the client declares it
-/// as JSON. If not, it must contain `"mesh"`.
+/// True if a body that names no mesh can only be a request document with a mistake.
+/// `is_declared_json`: the client declares it as JSON. If not, it must contain `"mesh"`.
 pub fn is_faulty_document(body: &[u8], is_declared_json: bool) -> bool {
     let text = body.trim_ascii_start();
     if text.is_empty() || !begins_object(body) {
@@ -41,7 +42,8 @@ pub fn is_faulty_document(body: &[u8], is_declared_json: bool) -> bool {
     }
     match peek(body) {
         Some(seen) => is_declared_json && !seen.has_asset,
-        // Importers explain faults of files: broken glTF, and binary STL whose header begins like an object.
+        // Importers explain faults of files: broken glTF, and binary STL whose header begins like
+        // an object.
         None if contains(text, b"\"asset\"") || text.contains(&0) => false,
         None => is_declared_json || contains(text, b"\"mesh\""),
     }

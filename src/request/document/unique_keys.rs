@@ -1,4 +1,5 @@
-//! Parses JSON and refuses objects with duplicate keys: RFC 8259 leaves open which of two values counts.
+//! Parses JSON and refuses objects with duplicate keys: RFC 8259 leaves open which of two values
+//! counts.
 
 use std::fmt;
 
@@ -12,7 +13,8 @@ pub enum Fault {
     TooDeep(u64),
     /// It is not JSON.
     NotJson(serde_json::Error),
-    /// An object has this key twice. The keys of the objects around it precede it, with dots between.
+    /// An object has this key twice. The keys of the objects around it precede it, with dots
+    /// between.
     Repeated(String),
 }
 
@@ -101,7 +103,8 @@ impl<'de> Visitor<'de> for Place<'_> {
     }
 }
 
-/// Deepest nesting of objects and arrays, without recursion. Exact for valid JSON; the parser refuses anything else.
+/// Deepest nesting of objects and arrays, without recursion. Exact for valid JSON; the parser
+/// refuses anything else.
 fn depth(bytes: &[u8]) -> u64 {
     let (mut depth, mut deepest, mut in_string, mut escaped) = (0_u64, 0, false, false);
     for &byte in bytes {

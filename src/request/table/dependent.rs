@@ -10,7 +10,7 @@ impl<T> Dependent<T> {
         Self(Some(value))
     }
 
-    /// Whether the request gives it.
+    /// True if the request gives it.
     pub fn is_given(&self) -> bool {
         self.0.is_some()
     }

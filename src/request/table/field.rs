@@ -18,13 +18,16 @@ pub struct Field {
     pub about: String,
     /// The values that are allowed.
     pub kind: Kind,
-    /// Whether `null` is a value, and not the absence of one.
+    /// True if `null` is a value, and not the absence of one.
     pub nullable: bool,
     /// The meaning of a document without the key; None where that depends on other keys.
     pub default: Option<Json>,
     /// Puts a value that passed `kind` in its place.
-    pub set: Box<dyn Fn(&mut Draft, Value) + Send + Sync>,
+    pub set: Setter,
 }
+
+/// Puts a value in its place in a draft.
+type Setter = Box<dyn Fn(&mut Draft, Value) + Send + Sync>;
 
 /// An object of the document that holds keys.
 pub struct Section {
@@ -34,16 +37,16 @@ pub struct Section {
     pub about: &'static str,
     /// Turns a layer on or off; None: the section is no layer.
     pub turn: Option<fn(&mut Draft, bool)>,
-    /// Whether materials have it too.
+    /// True if materials have it too.
     pub is_for_materials: bool,
 }
 
 /// A type of [`Draft`]'s fields that a key can set.
 pub trait Place: Sized + 'static {
-    /// Whether `null` is a value.
+    /// True if `null` is a value.
     const NULLABLE: bool = false;
 
-    /// What is allowed, unless the key says otherwise.
+    /// The values that are allowed, unless the key says otherwise.
     fn kind() -> Kind;
 
     /// The content of a value of that kind.
@@ -62,7 +65,7 @@ impl Field {
         Self { key, short: None, about: about.into(), kind, nullable: T::NULLABLE, default: None, set }
     }
 
-    /// Whether materials have it too.
+    /// True if materials have it too.
     pub fn is_for_materials(&self) -> bool {
         self.section().is_some_and(|section| section.is_for_materials)
     }
@@ -129,8 +132,9 @@ impl<T: Place> Place for Dependent<T> {
     }
 }
 
-/// Writes a list of [`Field`]s, one or two lines for each: the key, the place in a draft that it sets, then in any case what
-/// differs from [`Place::kind`], a short name, and the default unless it depends on other keys; at last one line on what it does.
+/// Writes a list of [`Field`]s. An entry is the key and the place in a draft that it sets; then, as
+/// needed, the allowed values (`in`) if they differ from [`Place::kind`], a short name and the
+/// default; then the description.
 macro_rules! fields {
     ($(
         $key:literal |$draft:ident| $place:expr

@@ -1,5 +1,6 @@
-//! The table of keys: everything that a request document may contain. The reader, its error messages, the JSON Schema and the
-//! list of capabilities follow from it. A new key is one entry of [`keys`], beside the field of the spec that it sets.
+//! The table of keys: everything that a request document may contain. The reader, its error
+//! messages, the JSON Schema and the list of capabilities follow from it. A new key is one entry of
+//! [`keys`], beside the field of the spec that it sets.
 
 pub(crate) mod dependent;
 pub(crate) mod field;
@@ -35,13 +36,13 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "topology",
-        about: "Edges that say how the mesh hangs together, each kind in its own colour; null draws none of a kind.",
+        about: "Edges coloured by how the mesh is connected; kinds whose colour is null are not drawn.",
         turn: Some(|d, on| d.topology = on.then(|| *d.topology())),
         is_for_materials: false,
     },
-    group("scene", "Which state of the file is drawn."),
-    group("camera", "Where the picture is taken from; by default the mesh is fitted into it."),
-    group("light", "Lamps over light that comes from everywhere."),
+    group("scene", "State of the file that is drawn."),
+    group("camera", "Position and lens; by default the mesh is fitted into the picture."),
+    group("light", "Lamps and ambient light."),
     group("image", "The picture."),
 ];
 

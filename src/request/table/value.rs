@@ -1,4 +1,5 @@
-//! Values of a request: as they are given, the kinds that keys allow, and what is left after the check.
+//! Values of a request: as they are given, the kinds that keys allow, and what is left after the
+//! check.
 
 use serde_json::Value as Json;
 
@@ -15,7 +16,7 @@ pub enum Given {
 }
 
 impl Given {
-    /// Whether it is `null`.
+    /// True for `null`.
     pub fn is_null(&self) -> bool {
         match self {
             Self::Json(json) => json.is_null(),
@@ -23,7 +24,7 @@ impl Given {
         }
     }
 
-    /// Whether it is an object without keys, which turns a layer on with its defaults.
+    /// True for an object without keys, which turns a layer on with its defaults.
     pub fn is_empty_object(&self) -> bool {
         match self {
             Self::Json(json) => json.as_object().is_some_and(serde_json::Map::is_empty),

@@ -21,7 +21,8 @@ fn materials_begin_from_the_document_wherever_they_stand() {
     assert_eq!((glass.outline, spec.layers.outline.is_some()), (None, true));
     assert!(material(&spec, "Frame").wire.is_some() && spec.layers.wire.is_none());
     assert_eq!(material(&spec, "Same"), &spec.layers);
-    // An override of the document affects its materials too; one of a material affects only that material.
+    // An override of the document affects its materials too; one of a material affects only that
+    // material.
     let over = [("materials.Glass.surface.opacity", "0.5"), ("surface.color", "0f0"), ("materials.Frame.wire", "null")];
     let over = over.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let spec = read(Some(document.as_bytes()), &over, &rules()).unwrap();

@@ -300,6 +300,6 @@ fn the_vocabulary_has_every_word() {
     let vocabulary = vocabulary();
     assert_eq!(vocabulary["style"].len(), 8);
     assert_eq!(vocabulary["surface.debug"].len(), 8);
-    assert_eq!(vocabulary["wire.method"], ["exact", "fwidth", "fwidth-min", "barycentric", "threshold"]);
+    assert_eq!(vocabulary["wire.method"], words_of::<WireMethod>());
     assert_eq!(vocabulary.len(), 16);
 }
