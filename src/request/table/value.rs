@@ -66,20 +66,14 @@ impl Given {
     }
 
     fn point(&self) -> Option<[f64; 3]> {
-        let parsed;
-        let list = match self {
-            Self::Json(json) => json.as_array()?,
+        let numbers: Option<Vec<f64>> = match self {
+            Self::Json(json) => json.as_array()?.iter().map(Json::as_f64).collect(),
             Self::Text(text) => {
                 let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']')).unwrap_or(text);
-                let numbers = inner.split(',').map(|n| n.trim().parse::<f64>().ok().map(Json::from));
-                parsed = numbers.collect::<Option<Vec<Json>>>()?;
-                &parsed
+                inner.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect()
             }
         };
-        match list.as_slice() {
-            [x, y, z] => Some([x.as_f64()?, y.as_f64()?, z.as_f64()?]),
-            _ => None,
-        }
+        numbers?.try_into().ok()
     }
 }
 
@@ -164,16 +158,20 @@ impl Kind {
 
     /// Checks the value that is given for `key`.
     pub fn read(&self, key: &str, given: &Given, image_px_max: u64) -> Result<Value, RequestError> {
-        self.check(key, given, image_px_max).map_err(|mut error| {
-            if let Given::Json(Json::String(text)) = given
-                && let Some(what) = self.bare()
-                && self.check(key, &Given::Text(text.clone()), image_px_max).is_ok()
-            {
-                error.given = format!("{}, {what} in quotes", error.given);
-                error.allowed.push_str(", without quotes");
-            }
-            error
-        })
+        let fault = match self.check(given, image_px_max) {
+            Some(Some(value)) => return Ok(value),
+            Some(None) => RequestFault::OutOfRange,
+            None => RequestFault::WrongType,
+        };
+        let mut error = RequestError::new(fault, key, given.show(), self.allowed(image_px_max));
+        if let Given::Json(Json::String(text)) = given
+            && let Some(what) = self.bare()
+            && self.check(&Given::Text(text.clone()), image_px_max).flatten().is_some()
+        {
+            error.given = format!("{}, {what} in quotes", error.given);
+            error.allowed.push_str(", without quotes");
+        }
+        Err(error)
     }
 
     /// The name of a kind that JSON writes without quotes, for the advice about quotes.
@@ -185,59 +183,39 @@ impl Kind {
         }
     }
 
-    fn check(&self, key: &str, given: &Given, image_px_max: u64) -> Result<Value, RequestError> {
-        let fail = |fault| RequestError::new(fault, key, given.show(), self.allowed(image_px_max));
-        let wrong_type = || fail(RequestFault::WrongType);
-        let out_of_range = || fail(RequestFault::OutOfRange);
-        match self {
-            Self::Number { min, max } => {
-                let number = given.number().ok_or_else(wrong_type)?;
-                // NaN and the infinities fail this comparison too.
-                if (*min..=*max).contains(&number) { Ok(Value::Number(number)) } else { Err(out_of_range()) }
-            }
-            Self::Above0 { max } => {
-                let number = given.number().ok_or_else(wrong_type)?;
-                if number > 0.0 && number <= *max { Ok(Value::Number(number)) } else { Err(out_of_range()) }
-            }
+    /// The value; None inside if it is out of range, None outside if it is of the wrong type.
+    fn check(&self, given: &Given, px_max: u64) -> Option<Option<Value>> {
+        Some(match self {
+            // NaN and the infinities are in no range.
+            Self::Number { min, max } => Some(given.number()?).filter(|n| (*min..=*max).contains(n)).map(Value::Number),
+            Self::Above0 { max } => Some(given.number()?).filter(|n| *n > 0.0 && n <= max).map(Value::Number),
             Self::OneOf(values) => {
-                let number = given.number().ok_or_else(wrong_type)?;
-                let found = values.iter().find(|&&v| f64::from(v) == number);
-                found.map(|&v| Value::Whole(v)).ok_or_else(out_of_range)
+                let number = given.number()?;
+                values.iter().find(|&&v| f64::from(v) == number).map(|&v| Value::Whole(v))
             }
-            Self::Pixels => {
-                let number = given.number().ok_or_else(wrong_type)?;
-                pixels(number, image_px_max).map(Value::Whole).ok_or_else(out_of_range)
-            }
+            Self::Pixels => pixels(given.number()?, px_max).map(Value::Whole),
             Self::Size => {
-                let (width, height) = size(given).ok_or_else(wrong_type)?;
-                let both = pixels(width, image_px_max).zip(pixels(height, image_px_max));
-                both.map(|(w, h)| Value::Size(w, h)).ok_or_else(out_of_range)
+                let (width, height) = size(given)?;
+                pixels(width, px_max).zip(pixels(height, px_max)).map(|(w, h)| Value::Size(w, h))
             }
             Self::Words(words) => {
-                let word = given.text().ok_or_else(wrong_type)?;
-                words.iter().position(|&w| w == word).map(Value::Word).ok_or_else(out_of_range)
+                let word = given.text()?;
+                words.iter().position(|&w| w == word).map(Value::Word)
             }
-            Self::Color => {
-                let text = given.text().ok_or_else(wrong_type)?;
-                Rgba::parse(text).map(Value::Color).ok_or_else(out_of_range)
-            }
-            Self::Point => {
-                let point = given.point().ok_or_else(wrong_type)?;
-                Some(point).filter(|p| largest(p) <= COORDINATE_MAX).map(Value::Point).ok_or_else(out_of_range)
-            }
-            Self::Direction => {
-                let [x, y, z] = given.point().ok_or_else(wrong_type)?;
-                let largest = largest(&[x, y, z]);
-                if largest == 0.0 || largest > COORDINATE_MAX {
-                    return Err(out_of_range());
-                }
-                // Only the direction counts. Scaled up, because squares of tiny numbers are zero.
-                let unit = if largest < 1.0 / COORDINATE_MAX { largest } else { 1.0 };
-                Ok(Value::Point([x / unit, y / unit, z / unit]))
-            }
-            Self::Flag => given.flag().map(Value::Flag).ok_or_else(wrong_type),
-        }
+            Self::Color => Rgba::parse(given.text()?).map(Value::Color),
+            Self::Point => Some(given.point()?).filter(|p| largest(p) <= COORDINATE_MAX).map(Value::Point),
+            Self::Direction => direction(given.point()?).map(Value::Point),
+            Self::Flag => Some(Value::Flag(given.flag()?)),
+        })
     }
+}
+
+/// A direction that is not zero. Only where it points counts, so tiny ones are scaled up: squares of
+/// tiny numbers are zero.
+fn direction([x, y, z]: [f64; 3]) -> Option<[f64; 3]> {
+    let largest = largest(&[x, y, z]);
+    let unit = if largest < 1.0 / COORDINATE_MAX { largest } else { 1.0 };
+    (largest > 0.0 && largest <= COORDINATE_MAX).then(|| [x / unit, y / unit, z / unit])
 }
 
 /// The largest magnitude of three coordinates.
