@@ -78,7 +78,8 @@ pub mod scene;
 pub mod service;
 #[doc(hidden)]
 pub mod spec;
-mod srgb;
+#[doc(hidden)]
+pub mod srgb;
 #[cfg(feature = "service")]
 #[doc(hidden)]
 pub mod telemetry;

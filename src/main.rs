@@ -1,4 +1,4 @@
-//! The `meshsnap` binary: arguments to `serve`, `render`, `inspect` or `health`.
+//! The `meshsnap` binary. [`meshsnap::cli`] does everything.
 
 fn main() -> std::process::ExitCode {
     meshsnap::cli::run(std::env::args_os())

@@ -1,11 +1,11 @@
-//! The log: text on a terminal, an object a line elsewhere, always on standard error.
+//! The log on standard error: text on a terminal, one JSON object per line elsewhere.
 
 use std::io::IsTerminal as _;
 
 use tracing_subscriber::EnvFilter;
 
-/// Starts logging. `filter` is in `tracing` syntax: `info`, or `warn,meshsnap::http=debug`. `json` of None means: where
-/// standard error is no terminal.
+/// Starts the log. `filter` has the syntax of `tracing`: `info`, or `warn,meshsnap::service=debug`.
+/// If `json` is None, the log is JSON unless standard error is a terminal.
 pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
     let parsed = EnvFilter::try_new(filter).map_err(|e| {
         format!("`log` is \"{filter}\", which is no filter ({e}); use error, warn, info, debug or trace")
@@ -23,7 +23,8 @@ pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
     Ok(())
 }
 
-/// Panics are caught where jobs run, but what they said belongs in the log, in the log's own form.
+/// Sends panic messages to the log, in the log's format. The panics themselves are caught where
+/// jobs run.
 fn log_panics() {
     std::panic::set_hook(Box::new(|info| {
         let place = info.location().map(ToString::to_string).unwrap_or_default();

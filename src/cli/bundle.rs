@@ -1,24 +1,25 @@
-//! The files named on the command line, as one bundle. Only what is named is read: a mesh brings no other file along.
+//! Reads the files named on the command line as one bundle. Files that a mesh refers to must be
+//! named too.
 
 use std::path::{Component, Path, PathBuf};
 
 use bytes::Bytes;
 
 use super::files;
-use crate::cli::error::Complaint;
+use crate::cli::error::CliError;
 use crate::import::{Bundle, BundleFile};
 use crate::limits::{self, Limits};
 
-/// How to speak of them.
+/// The name of a bundle in messages: its first file.
 pub fn name(names: &[String]) -> &str {
     names.first().map_or("", String::as_str)
 }
 
-/// Reads the files. Their paths in the bundle begin at the folder that all of them have in common, so that they find each
-/// other as they would on disk.
-pub fn read(names: &[String], entry: Option<String>, limits: &Limits) -> Result<Bundle, Complaint> {
+/// Reads the files. Their paths in the bundle are relative to the folder that they have in common,
+/// so that references between them work as on disk.
+pub fn read(names: &[String], entry: Option<String>, limits: &Limits) -> Result<Bundle, CliError> {
     if names.iter().filter(|name| *name == "-").count() > 1 {
-        return Err(Complaint::usage("`-`, standard input, can be given once"));
+        return Err(CliError::usage("`-`, standard input, can be given once"));
     }
     if let [single] = names {
         let bytes = Bytes::from(files::read(single, limits.memory_bytes)?);
@@ -26,13 +27,13 @@ pub fn read(names: &[String], entry: Option<String>, limits: &Limits) -> Result<
             return Ok(Bundle::of_one(bytes).with_entry(entry));
         }
         let file = BundleFile::new(&relative_to(&folder_of(single)?, single)?, bytes.clone());
-        // A name that no file of a bundle may have matters to nobody where there is one file.
+        // A single file may have any name, also one that no file of a bundle may have.
         let bundle = file.map_or_else(|_| Bundle::of_one(bytes), |file| Bundle::of_files(vec![file]));
         return Ok(bundle.with_entry(entry));
     }
     let count = names.len() as u64;
     limits::check("the number of files", count, limits.bundle_entries, "--limit-bundle-entries")
-        .map_err(|limit| Complaint::input(limit.to_string()))?;
+        .map_err(|limit| CliError::input(limit.to_string()))?;
     let mut common = folder_of(name(names))?;
     for name in names {
         let folder = folder_of(name)?;
@@ -43,20 +44,21 @@ pub fn read(names: &[String], entry: Option<String>, limits: &Limits) -> Result<
         let bytes = files::read(name, left)?;
         left -= bytes.len() as u64;
         let file = BundleFile::new(&relative_to(&common, name)?, bytes);
-        let file = file.map_err(|error| Complaint::input(format!("{name}: {error}")))?;
-        file.check_new(&all).map_err(|error| Complaint::usage(format!("{name}: {error}")))?;
+        let file = file.map_err(|error| CliError::input(format!("{name}: {error}")))?;
+        file.check_new(&all).map_err(|error| CliError::usage(format!("{name}: {error}")))?;
         all.push(file);
     }
     Ok(Bundle::of_files(all).with_entry(entry))
 }
 
-fn folder_of(name: &str) -> Result<PathBuf, Complaint> {
+fn folder_of(name: &str) -> Result<PathBuf, CliError> {
     Ok(absolute(name)?.parent().map(Path::to_path_buf).unwrap_or_default())
 }
 
-/// From the root, without `.` and `..`; links are not followed. Standard input lies in the current folder.
-fn absolute(name: &str) -> Result<PathBuf, Complaint> {
-    let path = std::path::absolute(name).map_err(|error| Complaint::input(format!("{name}: {error}")))?;
+/// The absolute path without `.` and `..`; links are not followed. Standard input is in the current
+/// folder.
+fn absolute(name: &str) -> Result<PathBuf, CliError> {
+    let path = std::path::absolute(name).map_err(|error| CliError::input(format!("{name}: {error}")))?;
     let mut plain = PathBuf::new();
     for component in path.components() {
         match component {
@@ -68,7 +70,7 @@ fn absolute(name: &str) -> Result<PathBuf, Complaint> {
     Ok(plain)
 }
 
-fn relative_to(folder: &Path, name: &str) -> Result<String, Complaint> {
+fn relative_to(folder: &Path, name: &str) -> Result<String, CliError> {
     let path = absolute(name)?;
     Ok(path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned())
 }

@@ -1,55 +1,55 @@
-//! What a command has to complain about, and with which exit code.
+//! Errors of commands, with their exit codes.
 
 use crate::backend::DrawError;
 use crate::import::MeshError;
 use crate::pipeline::RenderError;
 use crate::request::RequestError;
 
-/// One sentence for standard error, and how the process ends.
+/// A sentence for standard error, and an exit code.
 #[derive(Debug)]
-pub struct Complaint {
-    /// What is wrong, where, and what to do.
+pub struct CliError {
+    /// The fault, its place, and what to do about it.
     pub sentence: String,
-    /// 1, 2 or 3.
+    /// 1 to 3; see [`crate::cli`].
     pub exit_code: u8,
 }
 
-impl Complaint {
-    /// The mesh or the request is at fault.
+impl CliError {
+    /// A fault of the mesh or the request.
     pub fn input(sentence: impl Into<String>) -> Self {
         Self { sentence: sentence.into(), exit_code: 1 }
     }
 
-    /// The command line or the configuration is at fault.
+    /// A fault of the command line or the configuration.
     pub fn usage(sentence: impl Into<String>) -> Self {
         Self { sentence: sentence.into(), exit_code: 2 }
     }
 
-    /// We or the machine are at fault.
+    /// A fault of meshsnap or the machine.
     pub fn ours(sentence: impl Into<String>) -> Self {
         Self { sentence: sentence.into(), exit_code: 3 }
     }
 
-    /// The same, about a file.
+    /// Adds the name of the file that it is about.
     pub fn about(mut self, name: &str) -> Self {
         self.sentence = format!("{name}: {}", self.sentence);
         self
     }
 }
 
-impl From<RequestError> for Complaint {
+impl From<RequestError> for CliError {
     fn from(error: RequestError) -> Self {
         Self::input(error.to_string())
     }
 }
 
-impl From<MeshError> for Complaint {
+impl From<MeshError> for CliError {
     fn from(error: MeshError) -> Self {
         Self::input(error.to_string())
     }
 }
 
-impl From<RenderError> for Complaint {
+impl From<RenderError> for CliError {
     fn from(error: RenderError) -> Self {
         match error {
             RenderError::Mesh(_) | RenderError::Plan(_) => Self::input(error.to_string()),

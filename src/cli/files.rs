@@ -1,13 +1,13 @@
-//! Files and standard streams, with `-` for the latter.
+//! Reads and writes files; the name `-` means a standard stream.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, IsTerminal as _, Read, Write as _};
 
-use crate::cli::error::Complaint;
+use crate::cli::error::CliError;
 
 /// Reads a whole file, or standard input for `-`, of at most `bytes_max`.
-pub fn read(name: &str, bytes_max: u64) -> Result<Vec<u8>, Complaint> {
-    let failed = |error: io::Error| Complaint::input(format!("{name}: cannot be read: {error}"));
+pub fn read(name: &str, bytes_max: u64) -> Result<Vec<u8>, CliError> {
+    let failed = |error: io::Error| CliError::input(format!("{name}: cannot be read: {error}"));
     let mut bytes = Vec::new();
     let limited =
         |reader: &mut dyn Read, bytes: &mut Vec<u8>| reader.take(bytes_max.saturating_add(1)).read_to_end(bytes);
@@ -18,17 +18,15 @@ pub fn read(name: &str, bytes_max: u64) -> Result<Vec<u8>, Complaint> {
     }
     if bytes.len() as u64 > bytes_max {
         let sentence = format!("{name}: is larger than {bytes_max} bytes (raise it with --limit-memory-bytes)");
-        return Err(Complaint::input(sentence));
+        return Err(CliError::input(sentence));
     }
     Ok(bytes)
 }
 
 /// Writes a whole file, or standard output for `-`.
-pub fn write(name: &str, bytes: &[u8]) -> Result<(), Complaint> {
+pub fn write(name: &str, bytes: &[u8]) -> Result<(), CliError> {
     if name == "-" && io::stdout().is_terminal() {
-        return Err(Complaint::usage(
-            "standard output is a terminal, which shows no pictures; give -o FILE, or a pipe",
-        ));
+        return Err(CliError::usage("standard output is a terminal, which shows no pictures; give -o FILE, or a pipe"));
     }
     if name == "-" {
         return print(bytes);
@@ -36,18 +34,18 @@ pub fn write(name: &str, bytes: &[u8]) -> Result<(), Complaint> {
     std::fs::write(name, bytes).map_err(|error| {
         let sentence = format!("{name}: cannot be written: {error}");
         match error.kind() {
-            ErrorKind::NotFound | ErrorKind::PermissionDenied | ErrorKind::IsADirectory => Complaint::usage(sentence),
-            _ => Complaint::ours(sentence),
+            ErrorKind::NotFound | ErrorKind::PermissionDenied | ErrorKind::IsADirectory => CliError::usage(sentence),
+            _ => CliError::ours(sentence),
         }
     })
 }
 
-/// Writes to standard output. A reader who has seen enough (`| head`) is no failure.
-pub fn print(bytes: &[u8]) -> Result<(), Complaint> {
+/// Writes to standard output. A reader that stops early, such as `head`, is not an error.
+pub fn print(bytes: &[u8]) -> Result<(), CliError> {
     let mut out = io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(Complaint::ours(format!("standard output cannot be written: {error}")))
+            Err(CliError::ours(format!("standard output cannot be written: {error}")))
         }
         _ => Ok(()),
     }

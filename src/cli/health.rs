@@ -1,25 +1,26 @@
-//! `meshsnap health`.
+//! `meshsnap health`: asks a running server whether it is healthy.
 
 use std::time::Duration;
 
 use clap::Args;
 
-use crate::cli::error::Complaint;
+use crate::cli::error::CliError;
 
 /// Arguments of `health`.
 #[derive(Args)]
 pub struct HealthArgs {
-    /// What to ask [default: /healthz at the port of MESHSNAP_LISTEN, or http://127.0.0.1:8080/healthz]
+    /// URL to ask [default: /healthz at the port of MESHSNAP_LISTEN, or
+    /// http://127.0.0.1:8080/healthz]
     url: Option<String>,
 }
 
-/// Succeeds if the answer is 200 within three seconds.
-pub fn run(arguments: &HealthArgs) -> Result<(), Complaint> {
+/// Succeeds if the server answers 200 within three seconds.
+pub fn run(arguments: &HealthArgs) -> Result<(), CliError> {
     let url = full_url(arguments.url.as_deref(), std::env::var("MESHSNAP_LISTEN").ok().as_deref());
     let agent = ureq::Agent::config_builder().timeout_global(Some(Duration::from_secs(3))).build().new_agent();
     match agent.get(&url).call() {
         Ok(_) => Ok(()),
-        Err(error) => Err(Complaint::input(format!("{url}: not healthy: {error}"))),
+        Err(error) => Err(CliError::input(format!("{url}: not healthy: {error}"))),
     }
 }
 

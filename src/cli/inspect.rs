@@ -1,13 +1,13 @@
-//! `meshsnap inspect`.
+//! `meshsnap inspect`: reports the content of a mesh file.
 
-use crate::import;
 use clap::Args;
 
 use super::progress::Progress;
 use super::render::{format_in, pairs};
 use super::settings::LimitSettings;
 use super::{bundle, files};
-use crate::cli::error::Complaint;
+use crate::cli::error::CliError;
+use crate::import;
 use crate::limits::Deadline;
 use crate::pipeline;
 use crate::request::{self, Rules};
@@ -16,8 +16,8 @@ use crate::spec::BackendChoice;
 /// Arguments of `inspect`.
 #[derive(Args)]
 pub struct InspectArgs {
-    /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB; known by its bytes, whatever its name) and the files it refers to, or
-    /// a .zip of them; `-` for standard input
+    /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB; known by its bytes, whatever its name)
+    /// and the files it refers to, or a .zip of them; `-` for standard input
     #[arg(required = true, value_name = "MESH")]
     meshes: Vec<String>,
     /// Print JSON
@@ -26,18 +26,18 @@ pub struct InspectArgs {
     /// Format of the mesh, where its bytes do not tell: obj, gltf, glb, stl, ply, off, fbx or 3mf
     #[arg(long, value_name = "FORMAT")]
     format_in: Option<String>,
-    /// Which of several files is the mesh, where more than one could be
+    /// The mesh among several files, where more than one could be
     #[arg(long, value_name = "FILE")]
     entry: Option<String>,
-    /// scene.time_s=SECONDS: an animated file as it stands at that moment; otherwise as it stands when nothing moves it
+    /// scene.time_s=SECONDS: an animated file at that moment; without it, the rest pose
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     #[command(flatten)]
     limits: LimitSettings,
 }
 
-/// Prints what is in a file.
-pub fn run(arguments: &InspectArgs) -> Result<(), Complaint> {
+/// Prints the report.
+pub fn run(arguments: &InspectArgs) -> Result<(), CliError> {
     let limits = arguments.limits.config().limits;
     let format = format_in(arguments.format_in.as_deref())?;
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
@@ -49,9 +49,9 @@ pub fn run(arguments: &InspectArgs) -> Result<(), Complaint> {
     let mut parsed = |_| progress.next("counting edges");
     let report =
         pipeline::inspect(&bundle, import::Options { format, time_s }, &limits, &Deadline::default(), &mut parsed)
-            .map_err(|error| Complaint::from(error).about(mesh_name))?;
+            .map_err(|error| CliError::from(error).about(mesh_name))?;
     drop(progress);
     let text =
-        if arguments.json { report.json().map_err(|error| Complaint::ours(error.to_string()))? } else { report.text() };
+        if arguments.json { report.json().map_err(|error| CliError::ours(error.to_string()))? } else { report.text() };
     files::print(text.as_bytes())
 }

@@ -1,7 +1,8 @@
 //! The command line.
 //!
-//! Exit codes: 0 done, 1 the mesh or the request is at fault, 2 usage, 3 our fault. Whatever fails is one sentence on
-//! standard error.
+//! Exit codes: 0 success; 1 a fault of the mesh or the request; 2 a fault of the command line or
+//! the configuration; 3 a fault of meshsnap or the machine. Every error is one sentence on standard
+//! error.
 
 mod bundle;
 pub(crate) mod error;
@@ -19,7 +20,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
-use error::Complaint;
+use error::CliError;
 
 /// Turns 3D meshes into images, here or as an HTTP service.
 #[derive(Parser)]
@@ -33,11 +34,11 @@ struct Cli {
 enum Command {
     /// Draw a mesh into an image file
     Render(Box<render::RenderArgs>),
-    /// Say what is in a mesh file
+    /// Report the content of a mesh file
     Inspect(inspect::InspectArgs),
     /// Serve renders over HTTP
     Serve(serve::ServeArgs),
-    /// Ask a running server whether it is well, for container health checks
+    /// Ask a running server whether it is healthy, for container health checks
     Health(health::HealthArgs),
     /// Print a completion script for a shell
     Completions {
@@ -51,31 +52,31 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
-            // Help and version are no errors; clap knows where each belongs.
+            // Help and version come here too; clap prints them to standard output.
             let _ = error.print();
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
-    let commanded = || match cli.command {
+    let command = || match cli.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
         Command::Completions { shell } => completions(shell),
     };
-    // A panic is a bug of ours, and has its exit code; its message has been printed by then.
-    let bug = |_| Err(Complaint::ours("this is a bug in meshsnap; please report it with the mesh and the request"));
-    match catch_unwind(AssertUnwindSafe(commanded)).unwrap_or_else(bug) {
+    // The panic hook has printed the message already.
+    let bug = |_| Err(CliError::ours("this is a bug in meshsnap; please report it with the mesh and the request"));
+    match catch_unwind(AssertUnwindSafe(command)).unwrap_or_else(bug) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(complaint) => {
-            eprintln!("meshsnap: {}", complaint.sentence);
-            ExitCode::from(complaint.exit_code)
+        Err(error) => {
+            eprintln!("meshsnap: {}", error.sentence);
+            ExitCode::from(error.exit_code)
         }
     }
 }
 
-fn completions(shell: clap_complete::Shell) -> Result<(), Complaint> {
-    // Into memory first: the generator panics where a pipe is closed.
+fn completions(shell: clap_complete::Shell) -> Result<(), CliError> {
+    // The generator panics on a closed pipe, so it writes to memory.
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "meshsnap", &mut script);
     files::print(&script)

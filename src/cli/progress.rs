@@ -1,4 +1,4 @@
-//! A spinner for long work, on a terminal only.
+//! A spinner for long work, shown on terminals only.
 
 use std::io::IsTerminal as _;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -7,55 +7,56 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 
-/// Work that takes less shows nothing.
-const PATIENCE: Duration = Duration::from_millis(500);
+/// Time until the spinner appears.
+const DELAY: Duration = Duration::from_millis(500);
+/// Time between two frames of the spinner.
 const TICK: Duration = Duration::from_millis(100);
 
-/// Shows what is being done until it is dropped.
+/// Shows the current step until it is dropped.
 pub struct Progress {
     shown: Option<(Sender<&'static str>, JoinHandle<()>)>,
 }
 
 impl Progress {
-    /// Starts to wait; nothing is shown yet.
+    /// Starts with the first step; nothing is shown yet.
     pub fn start(first: &'static str) -> Self {
         if !std::io::stderr().is_terminal() {
             return Self { shown: None };
         }
-        let (tell, news) = channel::<&'static str>();
+        let (steps, received) = channel::<&'static str>();
         let thread = std::thread::spawn(move || {
-            let mut doing = first;
+            let mut step = first;
             let mut bar: Option<ProgressBar> = None;
             loop {
-                match news.recv_timeout(if bar.is_some() { TICK } else { PATIENCE }) {
-                    Ok(next) => doing = next,
+                match received.recv_timeout(if bar.is_some() { TICK } else { DELAY }) {
+                    Ok(next) => step = next,
                     Err(RecvTimeoutError::Timeout) => bar.get_or_insert_with(ProgressBar::new_spinner).tick(),
                     Err(RecvTimeoutError::Disconnected) => break,
                 }
                 if let Some(bar) = &bar {
-                    bar.set_message(doing);
+                    bar.set_message(step);
                 }
             }
             if let Some(bar) = bar {
                 bar.finish_and_clear();
             }
         });
-        Self { shown: Some((tell, thread)) }
+        Self { shown: Some((steps, thread)) }
     }
 
-    /// The next thing that is being done.
-    pub fn next(&self, doing: &'static str) {
-        if let Some((tell, _)) = &self.shown {
-            // The thread only ends when we do.
-            let _ = tell.send(doing);
+    /// Begins the next step.
+    pub fn next(&self, step: &'static str) {
+        if let Some((steps, _)) = &self.shown {
+            // Cannot fail: the thread receives until `steps` is dropped.
+            let _ = steps.send(step);
         }
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Some((tell, thread)) = self.shown.take() {
-            drop(tell);
+        if let Some((steps, thread)) = self.shown.take() {
+            drop(steps);
             let _ = thread.join();
         }
     }

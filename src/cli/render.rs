@@ -1,4 +1,4 @@
-//! `meshsnap render`.
+//! `meshsnap render`: draws a mesh into an image file.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use super::progress::Progress;
 use super::settings::LimitSettings;
 use super::{bundle, files};
 use crate::backend::{Backends, GpuHost, GpuStatus, HardwareHint};
-use crate::cli::error::Complaint;
+use crate::cli::error::CliError;
 use crate::config::{cores, why_no_gpu};
 use crate::image::ImageFormat;
 use crate::import::Format;
@@ -18,14 +18,14 @@ use crate::limits::{Deadline, Limits};
 use crate::mesh::UpAxis;
 use crate::pipeline::{self, Job, Output, Stage};
 use crate::request::{self, Rules, Style, Words, words_of};
-use crate::spec::BackendChoice;
-use crate::spec::{NamedView, Spec};
+use crate::spec::{BackendChoice, NamedView, Spec};
 use crate::telemetry;
 
 /// Arguments of `render`.
 #[derive(Args)]
 pub struct RenderArgs {
-    /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB) and the files it refers to, or a .zip of them; `-` for standard input
+    /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB) and the files it refers to, or a .zip of
+    /// them; `-` for standard input
     #[arg(required = true, value_name = "MESH")]
     meshes: Vec<String>,
     /// Image file, `-` for standard output; its extension chooses the format unless --format does
@@ -37,8 +37,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE.json")]
     request: Option<PathBuf>,
     /// Dotted key of the request document, such as wire.color=#f00, outline={}, wire=null or
-    /// materials.Glass.surface.opacity=0.3, or a whole section as JSON: outline={"thickness":8}. May be repeated; a later one
-    /// overrides an earlier one, and the flags beside it
+    /// materials.Glass.surface.opacity=0.3, or a whole section as JSON: outline={"thickness":8}.
+    /// May be repeated; a later one overrides an earlier one, and the flags beside it
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// N or WxH, in pixels
@@ -53,12 +53,12 @@ pub struct RenderArgs {
     /// Format of the mesh, where its bytes do not tell: obj, gltf, glb, stl, ply, off, fbx or 3mf
     #[arg(long, value_name = "FORMAT")]
     format_in: Option<String>,
-    /// Which of several files is the mesh, where more than one could be
+    /// The mesh among several files, where more than one could be
     #[arg(long, value_name = "FILE")]
     entry: Option<String>,
-    #[arg(long, help = format!("Who draws: {}", one_of::<BackendChoice>()))]
+    #[arg(long, help = format!("Back-end: {}", one_of::<BackendChoice>()))]
     backend: Option<String>,
-    /// Samples a pixel: 1, 4, 8 or 16
+    /// Samples per pixel: 1, 4, 8 or 16
     #[arg(long)]
     samples: Option<String>,
     /// #rgb, #rrggbb, #rrggbbaa or transparent
@@ -67,23 +67,23 @@ pub struct RenderArgs {
     /// Threads of the CPU renderer [default: one for each processor]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Print what the picture did not need, and how long each stage took
+    /// Print the work that was skipped, and the time of each stage
     #[arg(long)]
     explain: bool,
     #[command(flatten)]
     limits: LimitSettings,
 }
 
-/// The words of the request document, for a line of help.
+/// The words of an enumeration, for a line of help.
 fn one_of<T: Words>() -> String {
     words_of::<T>().join(", ")
 }
 
-/// Draws one mesh, with what belongs to it, into one file.
-pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
+/// Draws one mesh, with the files that it refers to, into one image file.
+pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
     let filter = std::env::var("MESHSNAP_LOG").unwrap_or_default();
     let filter = if filter.is_empty() { "warn" } else { &filter };
-    telemetry::init(filter, Some(false)).map_err(Complaint::usage)?;
+    telemetry::init(filter, Some(false)).map_err(CliError::usage)?;
     let mesh_name = bundle::name(&arguments.meshes);
     let limits = arguments.limits.config().limits;
     let format_in = format_in(arguments.format_in.as_deref())?;
@@ -104,7 +104,7 @@ pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
     let mut backends = Backends::new(gpu.clone(), threads);
     let job = Job { bundle: &bundle, format_in, spec: &spec };
     let output = pipeline::render(job, &mut backends, &limits, &Deadline::default(), &mut ended)
-        .map_err(|error| Complaint::from(error).about(mesh_name))?;
+        .map_err(|error| CliError::from(error).about(mesh_name))?;
     drop(progress);
 
     files::write(&arguments.output, &output.bytes)?;
@@ -117,8 +117,8 @@ pub fn run(arguments: &RenderArgs) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// The request document, then the short flags, then `--set`, each over what came before.
-fn read_spec(arguments: &RenderArgs, limits: &Limits) -> Result<Spec, Complaint> {
+/// Reads the request document, the short flags and `--set`; each overrides those before it.
+fn read_spec(arguments: &RenderArgs, limits: &Limits) -> Result<Spec, CliError> {
     let document = match &arguments.request {
         Some(path) => Some(files::read(&path.to_string_lossy(), limits.memory_bytes)?),
         None => None,
@@ -138,47 +138,49 @@ fn read_spec(arguments: &RenderArgs, limits: &Limits) -> Result<Spec, Complaint>
     overrides.extend(pairs(&arguments.set)?);
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
     let mut spec = request::read(document.as_deref(), &overrides, &rules)?;
-    // What is said here, and not in the document, counts for more than the output's name.
+    // A format on the command line overrides the output's extension, which overrides the document's
+    // format.
     overrides.retain(|(key, _)| ["format", "image.format", "image"].contains(&key.as_str()));
-    let chosen = request::read(None, &overrides, &rules)?.image.format.is_some();
-    let format = if chosen { spec.image.format } else { by_extension(&arguments.output, spec.image.format)? };
+    let is_given = request::read(None, &overrides, &rules)?.image.format.is_some();
+    let format = if is_given { spec.image.format } else { by_extension(&arguments.output, spec.image.format)? };
     request::set_format(&mut spec, format.unwrap_or(ImageFormat::Png));
     Ok(spec)
 }
 
-/// What `--set` was given.
-pub fn pairs(set: &[String]) -> Result<Vec<(String, String)>, Complaint> {
+/// The keys and values given with `--set`.
+pub fn pairs(set: &[String]) -> Result<Vec<(String, String)>, CliError> {
     let pair = |text: &String| match text.split_once('=') {
         Some((key, value)) => Ok((key.to_owned(), value.to_owned())),
-        None => Err(Complaint::usage(format!("--set {text}: write KEY=VALUE, such as wire.color=#f00"))),
+        None => Err(CliError::usage(format!("--set {text}: write KEY=VALUE, such as wire.color=#f00"))),
     };
     set.iter().map(pair).collect()
 }
 
-/// The format that the output's name asks for, else the document's.
-fn by_extension(output: &str, asked: Option<ImageFormat>) -> Result<Option<ImageFormat>, Complaint> {
+/// The format of the output's extension, else that of the document.
+fn by_extension(output: &str, of_document: Option<ImageFormat>) -> Result<Option<ImageFormat>, CliError> {
     let extension = Path::new(output).extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     match extension.as_deref() {
         Some("png") => Ok(Some(ImageFormat::Png)),
         Some("webp") => Ok(Some(ImageFormat::Webp)),
         Some("jpg" | "jpeg") => Ok(Some(ImageFormat::Jpeg)),
-        None => Ok(asked),
-        _ if asked.is_some() => Ok(asked),
+        None => Ok(of_document),
+        _ if of_document.is_some() => Ok(of_document),
         Some(other) => {
             let sentence =
                 format!("{output}: no image format is called `{other}`; write png, webp or jpg, or give --format");
-            Err(Complaint::usage(sentence))
+            Err(CliError::usage(sentence))
         }
     }
 }
 
-/// The mesh format that a flag names.
-pub fn format_in(name: Option<&str>) -> Result<Option<Format>, Complaint> {
+/// The mesh format that `--format-in` names.
+pub fn format_in(name: Option<&str>) -> Result<Option<Format>, CliError> {
     let Some(name) = name else { return Ok(None) };
-    let unknown = || Complaint::usage(format!("--format-in {name}: allowed is one of {}", Format::NAMES.join(", ")));
+    let unknown = || CliError::usage(format!("--format-in {name}: allowed is one of {}", Format::NAMES.join(", ")));
     Format::from_name(name).map(Some).ok_or_else(unknown)
 }
 
+/// The name of the step that follows a stage, for the spinner.
 fn after(stage: Stage) -> &'static str {
     match stage {
         Stage::Parse => "planning",
@@ -188,6 +190,7 @@ fn after(stage: Stage) -> &'static str {
     }
 }
 
+/// Prints what `--explain` asks for.
 fn explain(output: &Output, gpu: &GpuStatus, times: &[(Stage, Duration)], total: Duration) {
     eprintln!("drawn by {}", output.backend.name());
     if let Some(choice) = &output.choice {

@@ -1,4 +1,4 @@
-//! `meshsnap serve`.
+//! `meshsnap serve`: serves renders over HTTP.
 
 use std::io::ErrorKind;
 use std::net::SocketAddr;
@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::files;
 use super::settings::AllSettings;
-use crate::cli::error::Complaint;
+use crate::cli::error::CliError;
 use crate::config::{Config, SETTINGS};
 use crate::service::http;
 use crate::service::http::ServeError;
@@ -24,47 +24,47 @@ pub struct ServeArgs {
     settings: AllSettings,
 }
 
-/// Serves until told to stop.
-pub fn run(arguments: &ServeArgs) -> Result<(), Complaint> {
+/// Serves until a signal stops the process.
+pub fn run(arguments: &ServeArgs) -> Result<(), CliError> {
     let config = resolve(arguments)?;
-    telemetry::init(&config.log, config.log_json).map_err(Complaint::usage)?;
+    telemetry::init(&config.log, config.log_json).map_err(CliError::usage)?;
     if config.data_dir.is_some() {
         tracing::warn!("this version keeps jobs and meshes in memory and stores nothing in --data-dir");
     }
     http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
-        ServeError::Unprotected(_) => Complaint::usage(error.to_string()),
+        ServeError::Unprotected(_) => CliError::usage(error.to_string()),
         ServeError::Listen { error: ref cause, .. } if cause.kind() == ErrorKind::InvalidInput => {
-            Complaint::usage(error.to_string())
+            CliError::usage(error.to_string())
         }
-        ServeError::Listen { .. } | ServeError::Start(_) => Complaint::ours(error.to_string()),
+        ServeError::Listen { .. } | ServeError::Start(_) => CliError::ours(error.to_string()),
     })
 }
 
-/// Defaults, then the file, then variables and flags.
-fn resolve(arguments: &ServeArgs) -> Result<Config, Complaint> {
+/// The configuration: flags override variables, these the file, and this the defaults.
+fn resolve(arguments: &ServeArgs) -> Result<Config, CliError> {
     let mut config = Config::default();
     if let Some(path) = &arguments.config {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path)
-            .map_err(|error| Complaint::usage(format!("{name}: the configuration cannot be read: {error}")))?;
-        config.apply_toml(&name, &text).map_err(|error| Complaint::usage(error.to_string()))?;
+            .map_err(|error| CliError::usage(format!("{name}: the configuration cannot be read: {error}")))?;
+        config.apply_toml(&name, &text).map_err(|error| CliError::usage(error.to_string()))?;
     }
     for setting in SETTINGS.iter().filter(|s| !s.has_flag) {
         let variable = setting.variable();
         if let Some(value) = std::env::var(&variable).ok().filter(|v| !v.is_empty()) {
-            config.apply(&variable, setting.key, &value).map_err(|error| Complaint::usage(error.to_string()))?;
+            config.apply(&variable, setting.key, &value).map_err(|error| CliError::usage(error.to_string()))?;
         }
     }
     for (key, value) in arguments.settings.given() {
-        config.apply("the command line", key, value).map_err(|error| Complaint::usage(error.to_string()))?;
+        config.apply("the command line", key, value).map_err(|error| CliError::usage(error.to_string()))?;
     }
     Ok(config)
 }
 
-/// Two lines for people: where we are, and a command that shows it, to be pasted as it is.
+/// Prints two lines for the user: the address, and a command to try it with.
 fn announce(address: SocketAddr, config: &Config) {
     let host = match address {
-        // Every address of this machine: name one that works from here.
+        // The address that stands for all interfaces cannot be connected to everywhere.
         _ if address.ip().is_unspecified() => format!("127.0.0.1:{}", address.port()),
         _ => address.to_string(),
     };
@@ -73,6 +73,6 @@ fn announce(address: SocketAddr, config: &Config) {
         "listening on http://{address}\n\
          curl{key} --data-binary @api/examples/knot.obj 'http://{host}/v1/render?style=wire' -o out.png\n"
     );
-    // Nobody reading it is no reason not to serve.
+    // Serve even if standard output is closed.
     let _ = files::print(lines.as_bytes());
 }

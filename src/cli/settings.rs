@@ -1,4 +1,4 @@
-//! The table of settings as command-line arguments.
+//! Makes command-line arguments of the table of settings.
 
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
@@ -6,30 +6,31 @@ use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 
 use crate::config::{Access, Config, SETTINGS, Setting};
 
-/// Every setting that `serve` knows, as given by flags and environment variables.
+/// The settings of `serve`, given by flags and environment variables.
 #[derive(Clone, Debug, Default)]
 pub struct AllSettings(Given);
 
-/// The settings whose names begin with `limit-`: what `render` and `inspect` know.
+/// The settings of `render` and `inspect`: those whose names begin with `limit-`, except the limits
+/// of jobs.
 #[derive(Clone, Debug, Default)]
 pub struct LimitSettings(Given);
 
-/// Key and value, in the order of the table.
+/// Keys and values, in the order of the table.
 type Given = Vec<(&'static str, String)>;
 
 impl AllSettings {
-    /// The values, to be applied over those of a file.
+    /// Keys and values, which override those of a file.
     pub fn given(&self) -> &[(&'static str, String)] {
         &self.0
     }
 }
 
 impl LimitSettings {
-    /// Defaults with what was given over them.
+    /// The defaults, overridden by the values that are given.
     pub fn config(&self) -> Config {
         let mut config = Config::default();
         for (key, value) in &self.0 {
-            // Cannot fail: the same value passed on the way in.
+            // Cannot fail: `collect` has applied the same value before.
             let _ = config.apply("the command line", key, value);
         }
         config
@@ -51,7 +52,7 @@ fn augment(command: Command, settings: impl Iterator<Item = &'static Setting>) -
         let shown = if default.is_empty() { String::new() } else { format!(" [default: {default}]") };
         let argument = Arg::new(setting.key)
             .long(setting.key)
-            // clap wants names that live for ever; there are as many as settings.
+            // clap needs static names; one small string per setting is leaked.
             .env(&*setting.variable().leak())
             .hide_env_values(true)
             .help(format!("{}{shown}", setting.help));
@@ -69,7 +70,7 @@ fn collect(matches: &ArgMatches, settings: impl Iterator<Item = &'static Setting
         let Some(value) = matches.get_one::<String>(setting.key) else { continue };
         let from_variable = matches.value_source(setting.key) == Some(ValueSource::EnvVariable);
         if from_variable && value.is_empty() {
-            continue; // an empty variable is how compose files say "not set"
+            continue; // compose files write an empty variable for one that is not set
         }
         let source = if from_variable { setting.variable() } else { "the command line".to_owned() };
         let checked = Config::default().apply(&source, setting.key, value);

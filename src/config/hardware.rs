@@ -1,17 +1,18 @@
-//! Whether this machine can have a hardware GPU at all, told by its device nodes: no driver is loaded to find out.
+//! Finds out whether this machine can have a hardware GPU, from its device nodes and without
+//! loading a driver.
 
 use std::path::Path;
 
-/// Why there cannot be a hardware GPU here; None where there may be one.
+/// The reason why there cannot be a hardware GPU here; None if there may be one.
 ///
-/// On Linux every driver needs a node under `/dev`, and containers have it only if it was passed to them. Elsewhere it
-/// takes the driver to know.
+/// On Linux every driver needs a node under `/dev`, and a container has it only if it was passed
+/// in. On other systems only the driver knows.
 pub fn why_no_gpu() -> Option<String> {
     if cfg!(target_os = "linux") { why_no_gpu_under(Path::new("/dev")) } else { None }
 }
 
 fn why_no_gpu_under(dev: &Path) -> Option<String> {
-    // Without the right to list /dev nothing is known; then the driver has to tell.
+    // If /dev cannot be listed, only the driver knows.
     let names = |folder: &Path| -> std::io::Result<Vec<String>> {
         std::fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned())).collect()
     };

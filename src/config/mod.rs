@@ -1,7 +1,8 @@
-//! What `serve` can be told, as a table: every setting is a flag, an environment variable `MESHSNAP_*` and a key of the
-//! TOML file, under one name. Flag beats variable beats file beats default.
+//! The settings of `serve`. Each is a flag, an environment variable `MESHSNAP_*` and a key of the
+//! TOML file, under one name. A flag overrides a variable, which overrides the file, which
+//! overrides the default.
 //!
-//! A new setting is a field of [`Config`], its default, and a line in [`SETTINGS`].
+//! A new setting is a field of [`Config`], its default, and one line of [`SETTINGS`].
 
 mod hardware;
 mod settings;
@@ -19,41 +20,42 @@ pub use settings::{Access, SETTINGS, Setting};
 pub struct Config {
     /// Address to listen on.
     pub listen: String,
-    /// Where meshes and results will be stored by a version that stores any.
+    /// Folder for meshes and results. Reserved: this version keeps them in memory.
     pub data_dir: Option<PathBuf>,
-    /// Threads that draw.
+    /// Number of threads that draw.
     pub workers: u64,
     /// Threads within one CPU render; 0 means the cores divided by the workers.
     pub worker_threads: u64,
     /// The back-end of a request that names none.
     pub backend: BackendChoice,
-    /// Bearer tokens of clients; empty: everybody.
+    /// Bearer tokens of clients. Empty: no client needs one.
     pub api_keys: Vec<String>,
-    /// Serve everybody even beyond loopback.
+    /// Allows clients without tokens on addresses other than loopback.
     pub no_auth: bool,
-    /// Connections at once.
+    /// Most connections at a time.
     pub connections: u64,
-    /// Uploads in memory at once, bytes.
+    /// Most bytes of uploads in memory at a time.
     pub uploads_bytes: u64,
-    /// For the header of a request, milliseconds; also how long an idle connection is kept.
+    /// Longest time for the header of a request, milliseconds; also the longest time that a
+    /// connection is idle.
     pub header_timeout_ms: u64,
-    /// For the body of a request, milliseconds.
+    /// Longest time for the body of a request, milliseconds.
     pub body_timeout_ms: u64,
-    /// How long results of jobs can be fetched, milliseconds.
+    /// Time for which the result of a job can be fetched, milliseconds.
     pub result_ttl_ms: u64,
-    /// Results of jobs in memory, bytes.
+    /// Most bytes of results in memory.
     pub result_bytes: u64,
-    /// Results of jobs in memory.
+    /// Most results in memory.
     pub result_count: u64,
-    /// Stored meshes in memory, bytes.
+    /// Most bytes of stored meshes in memory.
     pub mesh_bytes: u64,
-    /// Stored meshes.
+    /// Most stored meshes.
     pub mesh_count: u64,
-    /// What is logged, in `tracing` filter syntax.
+    /// Filter of the log, in the syntax of `tracing`.
     pub log: String,
-    /// Whether the log is JSON; None: where standard error is no terminal.
+    /// True for a JSON log, false for text. None: text if standard error is a terminal.
     pub log_json: Option<bool>,
-    /// What a job may use.
+    /// Limits of a single job.
     pub limits: Limits,
 }
 
@@ -83,18 +85,18 @@ impl Default for Config {
     }
 }
 
-/// Processors that this process may use.
+/// Number of processors that this process may use.
 pub fn cores() -> u64 {
     std::thread::available_parallelism().map_or(1, |n| n.get() as u64)
 }
 
-/// A setting that cannot be.
+/// A setting that is refused.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ConfigError {
     /// No such key.
     #[error("{source_name} has no setting `{key}`; the settings are {known}")]
     Unknown {
-        /// Where it was found.
+        /// Its source, such as a file or "the command line".
         source_name: String,
         /// The key.
         key: String,
@@ -104,27 +106,27 @@ pub enum ConfigError {
     /// A value that is not allowed.
     #[error("`{key}` from {source_name} is \"{value}\", and allowed is {allowed}")]
     Value {
-        /// Where it was found.
+        /// Its source, such as a file or "the command line".
         source_name: String,
         /// The key.
         key: String,
-        /// What was given.
+        /// The value.
         value: String,
-        /// What is allowed.
+        /// The values that are allowed.
         allowed: String,
     },
     /// Not TOML, or a table where a value should be.
     #[error("{source_name} cannot be read as a configuration: {detail}")]
     File {
-        /// Which file.
+        /// The file.
         source_name: String,
-        /// Why.
+        /// The reason.
         detail: String,
     },
 }
 
 impl Config {
-    /// Applies one value; `source_name` says where it comes from ("the command line", a file name ...).
+    /// Sets one value. `source_name` names its source in errors: "the command line", a file.
     pub fn apply(&mut self, source_name: &str, key: &str, value: &str) -> Result<(), ConfigError> {
         let Some(setting) = SETTINGS.iter().find(|s| s.key == key) else {
             let known = SETTINGS.iter().map(|s| s.key).collect::<Vec<_>>().join(", ");
@@ -136,7 +138,7 @@ impl Config {
         })
     }
 
-    /// Applies a TOML file's text. Keys may be written with `-` or `_`.
+    /// Sets all values of a TOML file. Its keys may be written with `-` or `_`.
     pub fn apply_toml(&mut self, source_name: &str, text: &str) -> Result<(), ConfigError> {
         let file_error = |detail: String| ConfigError::File { source_name: source_name.into(), detail };
         let table: toml::Table = text.parse().map_err(|e: toml::de::Error| file_error(e.to_string()))?;

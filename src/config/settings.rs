@@ -1,33 +1,35 @@
-//! The table of settings: a line for each, with what it allows and where it goes.
+//! The table of settings: one line for each, with the values it allows and the field it sets.
 
 use super::Config;
 use crate::limits::{IMAGE_PX_MAX, JOB_MS_MAX};
 use crate::spec::BackendChoice;
+use crate::spec::words::{Words as _, word_for};
 
-/// A setting's place in the configuration, and how its text is read and written.
+/// The type of a setting, and access to its field of [`Config`].
 #[derive(Clone, Copy)]
 pub enum Access {
-    /// A whole number in a closed range.
+    /// A whole number between two bounds, which are allowed too.
     Number(u64, u64, fn(&mut Config) -> &mut u64),
     /// On or off.
     Switch(fn(&mut Config) -> &mut bool),
-    /// Anything else: how to set it, and how to show it.
+    /// Any other type: a function that sets it, and one that writes it.
     Text(fn(&mut Config, &str) -> Result<(), String>, fn(&Config) -> String),
 }
 
 /// One setting.
 pub struct Setting {
-    /// Kebab case, as in the flag.
+    /// The name of the flag, without its hyphens in front.
     pub key: &'static str,
-    /// One sentence.
+    /// One line of help.
     pub help: &'static str,
-    /// Where and how.
+    /// The type, and the field.
     pub access: Access,
-    /// Whether there is a flag: secrets have none, because every user of the machine can read a command line.
+    /// True if there is a flag. Secrets have none, because every user of the machine can read
+    /// command lines.
     pub has_flag: bool,
 }
 
-/// Longest time that can be set.
+/// Longest time of any setting, milliseconds.
 const MS_MAX: u64 = JOB_MS_MAX;
 
 /// The largest side of a JPEG.
@@ -36,53 +38,64 @@ const TEXTURE_PX_MAX: u64 = 65_535;
 /// Every setting.
 pub const SETTINGS: &[Setting] = &[
     text("listen", "Address and port to listen on", |c, v| set(&mut c.listen, v), |c| c.listen.clone()),
-    text("data-dir", "Where meshes and results are stored (this version keeps them in memory)", set_data_dir, data_dir),
-    number("workers", "Threads that draw", 1, 1024, |c| &mut c.workers),
+    text(
+        "data-dir",
+        "Folder for meshes and results (reserved: this version keeps them in memory)",
+        set_data_dir,
+        data_dir,
+    ),
+    number("workers", "Number of threads that draw", 1, 1024, |c| &mut c.workers),
     number("worker-threads", "Threads within one CPU render; 0: cores / workers", 0, 1024, |c| &mut c.worker_threads),
-    number("queue", "Jobs that may wait for each worker", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
-    text("backend", "Who draws unless a request says: auto, gpu or cpu", set_backend, |c| word(BACKENDS, c.backend)),
+    number("queue", "Most jobs that wait for each worker", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
+    text("backend", "Back-end of requests that name none: auto, gpu or cpu", set_backend, |c| {
+        word_for(c.backend).into()
+    }),
     secret("api-keys", "Bearer tokens of clients, separated by commas", set_api_keys),
-    switch("no-auth", "Serve without keys even beyond loopback", |c| &mut c.no_auth),
-    number("connections", "Connections at once", 1, 1 << 20, |c| &mut c.connections),
-    number("uploads-bytes", "Uploads in memory at once", 1, u64::MAX, |c| &mut c.uploads_bytes),
-    number("header-timeout-ms", "Time for a request's header", 1, MS_MAX, |c| &mut c.header_timeout_ms),
-    number("body-timeout-ms", "Time for a request's body", 1, MS_MAX, |c| &mut c.body_timeout_ms),
-    number("result-ttl-ms", "How long a job's result is kept", 0, MS_MAX, |c| &mut c.result_ttl_ms),
-    number("result-bytes", "Memory for results of jobs", 0, u64::MAX, |c| &mut c.result_bytes),
-    number("result-count", "Results of jobs in memory", 1, 1 << 24, |c| &mut c.result_count),
-    number("mesh-bytes", "Memory for stored meshes", 0, u64::MAX, |c| &mut c.mesh_bytes),
-    number("mesh-count", "Stored meshes; the least recently used go first", 1, 1 << 20, |c| &mut c.mesh_count),
+    switch("no-auth", "Allow clients without tokens on addresses other than loopback", |c| &mut c.no_auth),
+    number("connections", "Most connections at a time", 1, 1 << 20, |c| &mut c.connections),
+    number("uploads-bytes", "Most bytes of uploads in memory at a time", 1, u64::MAX, |c| &mut c.uploads_bytes),
+    number("header-timeout-ms", "Longest time for the header of a request", 1, MS_MAX, |c| &mut c.header_timeout_ms),
+    number("body-timeout-ms", "Longest time for the body of a request", 1, MS_MAX, |c| &mut c.body_timeout_ms),
+    number("result-ttl-ms", "Time for which the result of a job is kept", 0, MS_MAX, |c| &mut c.result_ttl_ms),
+    number("result-bytes", "Most bytes of results in memory", 0, u64::MAX, |c| &mut c.result_bytes),
+    number("result-count", "Most results in memory", 1, 1 << 24, |c| &mut c.result_count),
+    number("mesh-bytes", "Most bytes of stored meshes in memory", 0, u64::MAX, |c| &mut c.mesh_bytes),
+    number("mesh-count", "Most stored meshes; the least recently used is dropped first", 1, 1 << 20, |c| {
+        &mut c.mesh_count
+    }),
     text(
         "log",
-        "What is logged: error, warn, info, debug, or a tracing filter",
+        "Filter of the log: error, warn, info, debug, or the syntax of tracing",
         |c, v| set(&mut c.log, v),
         |c| c.log.clone(),
     ),
-    text("log-format", "auto, text or json", set_log_format, |c| word(LOG_FORMATS, c.log_json)),
+    text("log-format", "Format of the log: auto, text or json", set_log_format, |c| word(LOG_FORMATS, c.log_json)),
     number("limit-body-bytes", "Largest request body", 1, u64::MAX, |c| &mut c.limits.body_bytes),
-    number("limit-memory-bytes", "Memory for one job", 1, u64::MAX, |c| &mut c.limits.memory_bytes),
-    number("limit-triangles", "Triangles of one mesh", 1, u64::MAX, |c| &mut c.limits.triangles),
-    number("limit-nodes", "Nodes of one scene graph", 1, u64::MAX, |c| &mut c.limits.nodes),
-    // 128 is where the JSON parser itself stops.
-    number("limit-json-depth", "Nesting of JSON", 1, 128, |c| &mut c.limits.json_depth),
-    number("limit-image-px", "Width and height of a picture", 1, IMAGE_PX_MAX, |c| &mut c.limits.image_px),
-    number("limit-texture-px", "Width and height of a texture", 1, TEXTURE_PX_MAX, |c| &mut c.limits.texture_px),
-    number("limit-texture-total-px", "Pixels of all textures of one picture", 1, u64::MAX, |c| {
+    number("limit-memory-bytes", "Most bytes of memory for one job", 1, u64::MAX, |c| &mut c.limits.memory_bytes),
+    number("limit-triangles", "Most triangles of one mesh", 1, u64::MAX, |c| &mut c.limits.triangles),
+    number("limit-nodes", "Most nodes of one scene graph", 1, u64::MAX, |c| &mut c.limits.nodes),
+    // The JSON parser itself stops at 128.
+    number("limit-json-depth", "Deepest nesting of JSON", 1, 128, |c| &mut c.limits.json_depth),
+    number("limit-image-px", "Largest width and height of a picture", 1, IMAGE_PX_MAX, |c| &mut c.limits.image_px),
+    number("limit-texture-px", "Largest width and height of a texture", 1, TEXTURE_PX_MAX, |c| {
+        &mut c.limits.texture_px
+    }),
+    number("limit-texture-total-px", "Most pixels of all textures of one picture", 1, u64::MAX, |c| {
         &mut c.limits.texture_total_px
     }),
-    number("limit-bundle-bytes", "Files of a bundle, unpacked", 1, u64::MAX, |c| &mut c.limits.bundle_bytes),
-    number("limit-bundle-entries", "Files of a bundle", 1, 1 << 16, |c| &mut c.limits.bundle_entries),
-    number("limit-job-ms", "Time for one job, waiting included", 1, MS_MAX, |c| &mut c.limits.job_ms),
+    number("limit-bundle-bytes", "Most bytes of a bundle, unpacked", 1, u64::MAX, |c| &mut c.limits.bundle_bytes),
+    number("limit-bundle-entries", "Most files of a bundle", 1, 1 << 16, |c| &mut c.limits.bundle_entries),
+    number("limit-job-ms", "Longest time for one job, including the queue", 1, MS_MAX, |c| &mut c.limits.job_ms),
     number("limit-queue-per-worker", "The same as --queue", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
 ];
 
 impl Setting {
-    /// The environment variable.
+    /// The name of the environment variable.
     pub fn variable(&self) -> String {
         format!("MESHSNAP_{}", self.key.to_ascii_uppercase().replace('-', "_"))
     }
 
-    /// Reads `value` into `config`, or says what is allowed.
+    /// Sets `value` in `config`. The error is the allowed values, in words.
     pub fn set(&self, config: &mut Config, value: &str) -> Result<(), String> {
         match self.access {
             Access::Number(min, max, at) => {
@@ -98,7 +111,7 @@ impl Setting {
         }
     }
 
-    /// The value in `config`, as text.
+    /// The value in `config` as text.
     pub fn show(&self, config: &Config) -> String {
         let mut copy = config.clone();
         match self.access {
@@ -109,12 +122,10 @@ impl Setting {
     }
 }
 
-const BACKENDS: &[(&str, BackendChoice)] =
-    &[("auto", BackendChoice::Auto), ("gpu", BackendChoice::Gpu), ("cpu", BackendChoice::Cpu)];
-
+/// The words of `log-format` and their values of [`Config::log_json`].
 const LOG_FORMATS: &[(&str, Option<bool>)] = &[("auto", None), ("text", Some(false)), ("json", Some(true))];
 
-/// `1000`, `1_000` or `64MiB`.
+/// Reads `1000`, `1_000` or `64MiB`.
 fn parse_number(text: &str) -> Option<u64> {
     let units = [("KiB", 10), ("MiB", 20), ("GiB", 30)];
     let unit = units.iter().find_map(|&(name, shift)| text.strip_suffix(name).map(|rest| (rest.trim_end(), shift)));
@@ -150,7 +161,7 @@ fn word<T: Copy + PartialEq>(words: &[(&str, T)], value: T) -> String {
 }
 
 fn set_backend(config: &mut Config, value: &str) -> Result<(), String> {
-    set_word(&mut config.backend, BACKENDS, value)
+    set_word(&mut config.backend, BackendChoice::ALL, value)
 }
 
 fn set_log_format(config: &mut Config, value: &str) -> Result<(), String> {

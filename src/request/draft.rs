@@ -1,115 +1,137 @@
-//! A [`Spec`] in the making: defaults, presets, and what can only be settled when every key is known.
+//! A [`Spec`] in the making: its defaults, and what can only be settled when every key is known.
 
 use super::error::{RequestError, RequestFault};
-use crate::request::layer_draft::Look;
-use crate::request::table::words::{Style, Words, word_for};
-use crate::spec::BackendChoice;
-use crate::spec::color::Rgba;
+use crate::request::layers_draft::{LayersDraft, WireDraft};
+use crate::request::style::Style;
+use crate::request::table::dependent::Dependent;
+use crate::spec::words::{Words, word_for};
 use crate::spec::{
-    CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, Open, OutlineMethod, ProjectionKind, QualityTarget,
-    Spec, Topology, WireMethod,
+    BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, Open, Outline, OutlineMethod, QualityTarget,
+    Spec, Surface, Topology, Wire, WireMethod,
 };
 
 /// Different exact wires and contours in one picture.
 const LINE_STYLES_MAX: usize = 64;
 
-/// A spec whose dependent defaults are still open.
+/// A spec whose dependent defaults are still open. A material is one too, of which only the layers
+/// count.
 #[derive(Clone, Debug)]
 pub struct Draft {
     /// The document's own layers; each of its materials begins from them.
-    pub look: Look,
+    pub layers: LayersDraft,
     /// The topology layer, if it is on.
     pub topology: Option<Topology>,
     /// See [`Spec::time_s`].
     pub time_s: Option<f64>,
     /// See [`Spec::camera`].
     pub camera: CameraSpec,
-    /// See [`Spec::light`]; but for the ambient share.
+    /// See [`Spec::light`].
     pub light: Light,
-    /// None: 0.3 where there are lamps, 1 where there are none.
-    pub ambient: Option<f32>,
+    /// By default 0.3 where there are lamps, 1 where there are none.
+    pub ambient: Dependent<f32>,
     /// See [`Spec::image`].
     pub image: ImageSpec,
-    /// See [`Spec::backend`].
-    pub backend: BackendChoice,
+    /// Columns and rows.
+    pub size_px: [u32; 2],
+    /// By default 4, unless a quality target chooses.
+    pub samples: Dependent<u32>,
+    /// By default the server's, unless a quality target chooses.
+    pub backend: Dependent<BackendChoice>,
     /// See [`QualityTarget::max_error`].
     pub max_error: Option<f64>,
     /// See [`QualityTarget::max_time_ms`].
     pub max_time_ms: Option<f64>,
-    /// What nobody has settled yet; but for the wires.
-    pub open: Open,
 }
 
 impl Draft {
-    /// The defaults, and a style's layers.
-    pub fn new(style: Style, backend: BackendChoice) -> Self {
+    /// The defaults and a style's layers, for pictures of at most so many pixels on a side.
+    pub fn new(style: Style, side_px_max: u64) -> Self {
+        let image = ImageSpec::default();
+        let side_px_max = u32::try_from(side_px_max).unwrap_or(u32::MAX);
         Self {
-            look: Look::new(style),
-            topology: (style == Style::Topology).then(default_topology),
+            layers: LayersDraft::new(style),
+            topology: (style == Style::Topology).then(Topology::default),
             time_s: None,
-            camera: CAMERA,
-            light: Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3 },
-            ambient: None,
-            image: IMAGE,
-            backend,
+            camera: CameraSpec::default(),
+            light: Light::default(),
+            ambient: Dependent::default(),
+            image,
+            // The default size must not be larger than what a request may ask for.
+            size_px: [image.width_px, image.height_px].map(|side| side.min(side_px_max)),
+            samples: Dependent::default(),
+            backend: Dependent::default(),
             max_error: None,
             max_time_ms: None,
-            // Whoever runs a server with one back-end has a reason.
-            open: Open { samples: true, backend: backend == BackendChoice::Auto, ..Open::default() },
         }
     }
 
-    /// The topology layer, turned on by being spoken of.
+    /// The surface layer, which any of its keys turns on.
+    pub fn surface(&mut self) -> &mut Surface {
+        self.layers.surface.get_or_insert_default()
+    }
+
+    /// The wire layer's dependent values; any of its keys turns it on.
+    pub fn wire_draft(&mut self) -> &mut WireDraft {
+        self.layers.wire.get_or_insert_default()
+    }
+
+    /// The wire layer's other values.
+    pub fn wire(&mut self) -> &mut Wire {
+        &mut self.wire_draft().line
+    }
+
+    /// The outline layer, which any of its keys turns on.
+    pub fn outline(&mut self) -> &mut Outline {
+        self.layers.outline.get_or_insert_default()
+    }
+
+    /// The topology layer, which any of its keys turns on.
     pub fn topology(&mut self) -> &mut Topology {
-        self.topology.get_or_insert_with(default_topology)
+        self.topology.get_or_insert_default()
     }
 
-    /// Turns the topology layer on or off.
-    pub fn turn_topology(&mut self, on: bool) {
-        self.topology = on.then(|| *self.topology());
-    }
-
-    /// Settles what depends on several keys. Each material has a name.
-    pub fn finish(self, materials: Vec<(String, Look)>) -> Result<Spec, RequestError> {
-        let Self {
-            look,
-            topology,
-            time_s,
-            camera,
-            mut light,
-            ambient,
-            image,
-            backend,
-            max_error,
-            max_time_ms,
-            mut open,
-        } = self;
-        open.wire = look.has_open_wire();
-        open.material_wires = materials.iter().map(|(_, look)| look.has_open_wire()).collect();
-        let is_asked = max_error.is_some() || max_time_ms.is_some();
-        let ask = is_asked.then_some(QualityTarget { max_error, max_time_ms, open });
-        let layers = look.finish("")?;
-        let materials = materials.into_iter().map(|(name, look)| {
-            let layers = look.finish(&format!("materials.{name}."))?;
+    /// Settles what depends on several keys. Each material has a name. `backend` is the server's
+    /// default.
+    pub fn finish(self, materials: Vec<(String, LayersDraft)>, backend: BackendChoice) -> Result<Spec, RequestError> {
+        let quality_target = self.quality_target(&materials, backend);
+        let layers = self.layers.finish("")?;
+        let materials = materials.into_iter().map(|(name, layers)| {
+            let layers = layers.finish(&format!("materials.{name}."))?;
             Ok((name, layers))
         });
         let materials = materials.collect::<Result<Vec<_>, _>>()?;
-        check_parts(&layers, &materials)?;
-        check_camera(&camera)?;
-        let has_lamps = light.preset != LightPreset::None;
-        light.ambient = ambient.unwrap_or(if has_lamps { 0.3 } else { 1.0 });
-        Ok(Spec { layers, materials, topology, time_s, camera, light, image, backend, ask })
+        check_layers(&layers, &materials)?;
+        check_camera(&self.camera)?;
+        let has_lamps = self.light.preset != LightPreset::None;
+        let light = Light { ambient: self.ambient.or(if has_lamps { 0.3 } else { 1.0 }), ..self.light };
+        let ([width_px, height_px], samples) = (self.size_px, self.samples.or(self.image.samples));
+        let image = ImageSpec { width_px, height_px, samples, ..self.image };
+        let Self { topology, time_s, camera, .. } = self;
+        let backend = self.backend.or(backend);
+        Ok(Spec { layers, materials, topology, time_s, camera, light, image, backend, quality_target })
+    }
+
+    fn quality_target(&self, materials: &[(String, LayersDraft)], backend: BackendChoice) -> Option<QualityTarget> {
+        let &Self { max_error, max_time_ms, .. } = self;
+        let open = Open {
+            samples: !self.samples.is_given(),
+            // A server whose default is not `auto` has a reason for it.
+            backend: !self.backend.is_given() && backend == BackendChoice::Auto,
+            wire: self.layers.has_open_wire(),
+            material_wires: materials.iter().map(|(_, layers)| layers.has_open_wire()).collect(),
+        };
+        (max_error.is_some() || max_time_ms.is_some()).then_some(QualityTarget { max_error, max_time_ms, open })
     }
 }
 
-/// What all parts of a picture share.
-fn check_parts(layers: &Layers, materials: &[(String, Layers)]) -> Result<(), RequestError> {
+/// Checks what all materials of a picture have in common.
+fn check_layers(layers: &Layers, materials: &[(String, Layers)]) -> Result<(), RequestError> {
     let unit = |layers: &Layers| layers.outline.filter(|o| o.method == OutlineMethod::Hull).map(|o| o.unit);
     check_shared(layers, materials, "outline.unit", unit, "all hulls of one picture have the same unit")?;
     let hidden = |layers: &Layers| layers.wire.filter(|w| w.method != WireMethod::Exact).map(|w| w.hidden);
     check_shared(layers, materials, "wire.hidden", hidden, "all wires by barycentrics do the same in one picture")?;
 
-    // Each is a pass over the picture.
+    // Each different line is a pass over the picture.
     let exact = |layers: &Layers| layers.wire.filter(|wire| wire.method == WireMethod::Exact);
     let contour = |layers: &Layers| layers.outline.filter(|outline| outline.method == OutlineMethod::Contour);
     let (mut wires, mut contours) = (Vec::new(), Vec::new());
@@ -125,7 +147,7 @@ fn check_parts(layers: &Layers, materials: &[(String, Layers)]) -> Result<(), Re
     Ok(())
 }
 
-/// Fails where two parts that have a value of this key have different ones.
+/// Fails if two materials have different values of this key.
 fn check_shared<T: Words + PartialEq>(
     layers: &Layers,
     materials: &[(String, Layers)],
@@ -163,31 +185,3 @@ fn check_camera(camera: &CameraSpec) -> Result<(), RequestError> {
         _ => Ok(()),
     }
 }
-
-/// Faults in colours that stand out from each other and from any calm surface; edges of polygons recede.
-fn default_topology() -> Topology {
-    Topology {
-        polygon: Some(Rgba::from_srgb8([0x33, 0x3a, 0x44, 0x99])),
-        crease: None,
-        open: Some(Rgba::from_srgb8([0xf0, 0x5a, 0x1e, 0xff])),
-        nonmanifold: Some(Rgba::from_srgb8([0xd0, 0x1c, 0x9b, 0xff])),
-        crease_angle_deg: 30.0,
-        thickness: 1.0,
-    }
-}
-
-const CAMERA: CameraSpec = CameraSpec {
-    view: NamedView::Iso,
-    azimuth_deg: None,
-    elevation_deg: None,
-    projection: ProjectionKind::Perspective,
-    fov_deg: 35.0,
-    height: None,
-    up: None,
-    margin: 0.05,
-    eye: None,
-    target: None,
-    from_file: false,
-};
-
-const IMAGE: ImageSpec = ImageSpec { width_px: 512, height_px: 512, format: None, samples: 4, background: Rgba::WHITE };

@@ -1,41 +1,42 @@
-//! What is wrong with a request document: always one sentence that names the key, what was given and what is allowed.
+//! Errors of requests. Each is one sentence that names the key, the given value and the allowed
+//! ones.
 
 use std::fmt;
 
-/// A request that cannot be understood. It is the client's fault, and the text is safe to show.
+/// A fault of a request. The sentence is meant for the client and safe to show.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RequestError {
-    /// What kind of fault.
+    /// The kind of fault.
     pub fault: RequestFault,
     /// The dotted key, such as `wire.color`; `request` for the document as a whole.
     pub key: String,
-    /// What was given, shortened.
+    /// The given value, shortened.
     pub given: String,
-    /// What would have been understood.
+    /// The allowed values, or other advice.
     pub allowed: String,
-    /// The flag of `serve` that allows more, where one does.
+    /// The flag of `serve` that raises the limit, if there is one.
     pub flag: Option<&'static str>,
 }
 
 /// The kinds of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RequestFault {
-    /// No such key.
+    /// There is no such key.
     UnknownKey,
-    /// Right type, wrong value.
+    /// The type is right, the value is not allowed.
     OutOfRange,
-    /// A string for a number, an object for a colour ...
+    /// The type is wrong: a string for a number, an object for a colour.
     WrongType,
-    /// The document is not JSON, or too deep or too long to look at.
+    /// The document is not JSON, too deep, or too long.
     NotJson,
-    /// Two keys that contradict each other.
+    /// Two keys contradict each other, or one is given twice.
     Conflict,
-    /// A key that has to be there is not.
+    /// A required key is missing.
     Missing,
 }
 
 impl RequestFault {
-    /// Stable, snake case.
+    /// The stable code of the fault, in snake case.
     pub fn code(self) -> &'static str {
         match self {
             Self::UnknownKey => "unknown_key",
@@ -49,7 +50,7 @@ impl RequestFault {
 }
 
 impl RequestError {
-    /// An error of the given kind; `given` is shortened here.
+    /// Makes an error; `key` and `given` are shortened here.
     pub fn new(fault: RequestFault, key: &str, given: impl fmt::Display, allowed: impl Into<String>) -> Self {
         let given = shorten(&given.to_string());
         Self { fault, key: shorten_key(key), given, allowed: allowed.into(), flag: None }
@@ -77,7 +78,8 @@ impl fmt::Display for RequestError {
 
 impl std::error::Error for RequestError {}
 
-/// A material's name may be long, and what is asked of it stands at the key's end: what is left out is in the middle.
+/// Shortens a key in the middle: a material's name may be long, and its layer and key are at the
+/// end.
 fn shorten_key(key: &str) -> String {
     const CHARS_MAX: usize = 120;
     let count = key.chars().count();
@@ -92,7 +94,7 @@ fn shorten(text: &str) -> String {
     shorten_to(text, 80)
 }
 
-/// Keeps an answer short and printable, whatever was sent.
+/// Shortens a text and replaces control characters, so that answers stay short and printable.
 fn shorten_to(text: &str, chars_max: usize) -> String {
     let mut short: String = text.chars().take(chars_max).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
     if text.chars().nth(chars_max).is_some() {

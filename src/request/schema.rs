@@ -1,18 +1,20 @@
-//! The request document as a JSON Schema (draft 2020-12), written from the table of keys.
+//! The JSON Schema (draft 2020-12) of request documents, written from the table of keys.
 //!
-//! It says all that the reader checks but for what no schema can say: that `eye` and `target` differ, that the hulls of
-//! several materials share a unit, what a material's key means together with keys of the document, that a short name and the
-//! key it stands for are not both there, and where a document may name its mesh.
+//! It states what the reader checks, except what a schema cannot express: `eye` and `target`
+//! differ; the hulls of several materials share a unit; limits of a material's key that depend on
+//! keys of the document; a short name and its key are not both given; the places where a document
+//! may name its mesh.
 
 use serde_json::{Map, Value as Json, json};
 
-use super::table::{FIELDS, GROUPS, LAYERS, MATERIALS, SCHEMA, SHORT, STYLE_ABOUT};
+use super::table::{FIELDS, MATERIALS, SCHEMA, SECTIONS, STYLE_ABOUT};
 use super::{MATERIAL_NAME_CHARS_MAX, MATERIALS_MAX, Rules, STYLE_DEFAULT};
 use crate::request::document::mesh_reference as mesh;
-use crate::request::layer_draft::{MULTIPLE_MAX, OUTLINE_PX_MAX};
-use crate::request::table::fields::{Field, Layer};
+use crate::request::layers_draft::{MULTIPLE_MAX, OUTLINE_PX_MAX};
+use crate::request::style::Style;
+use crate::request::table::field::{Field, Section};
 use crate::request::table::value::{COORDINATE_MAX, Kind};
-use crate::request::table::words::{Style, word_for, words_of};
+use crate::spec::words::{word_for, words_of};
 
 /// The schema of documents that [`super::read`] understands under these rules.
 pub fn schema(rules: &Rules) -> Json {
@@ -22,36 +24,36 @@ pub fn schema(rules: &Rules) -> Json {
     let style = json!({
         "description": STYLE_ABOUT, "enum": words_of::<Style>(), "default": word_for(STYLE_DEFAULT),
     });
-    let style = or_null(style);
-    properties.insert("style".into(), style);
-    for layer in LAYERS {
-        definitions.insert(layer.name.into(), object(layer.name, layer.about, &["object", "null"], image_px));
-        properties.insert(layer.name.into(), reference(layer.name));
-    }
-    for group in GROUPS {
-        properties.insert(group.name.into(), object(group.name, group.about, &["object", "null"], image_px));
+    properties.insert("style".into(), or_null(style));
+    for section in SECTIONS {
+        let mut object = object(section, image_px);
+        // Materials refer to layers.
+        if section.turn.is_some() {
+            definitions.insert(section.name.into(), object);
+            object = reference(section.name);
+        }
+        properties.insert(section.name.into(), object);
     }
     properties.insert(MATERIALS.name.into(), materials());
-    for field in FIELDS.iter().filter(|field| !field.key.contains('.')) {
-        properties.insert(field.key.into(), property(field, image_px));
-    }
-    for (short, long) in SHORT {
-        if let Some(field) = FIELDS.iter().find(|field| field.key == *long) {
-            let mut property = property(field, image_px);
-            property["description"] = format!("Short for {long}.").into();
-            properties.insert((*short).into(), property);
+    for field in FIELDS.iter() {
+        let mut property = property(field, image_px);
+        if !field.key.contains('.') {
+            properties.insert(field.key.into(), property);
+        } else if let Some(short) = field.short {
+            property["description"] = format!("Short for {}.", field.key).into();
+            properties.insert(short.into(), property);
         }
     }
     let digest = json!({ "description": mesh::ABOUT, "type": "string", "pattern": "^[0-9a-f]{64}$" });
     properties.insert(mesh::KEY.into(), digest);
-    let own = json!({ "description": "Where an editor finds this schema.", "type": ["string", "null"] });
+    let own = json!({ "description": "Address of this schema, for editors.", "type": ["string", "null"] });
     properties.insert(SCHEMA.into(), own);
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "meshsnap request",
         "description": "How to turn a mesh into an image. A layer that is present is drawn, null turns it off; any other key \
-                        that is null is as if it were not there, unless it says what null means. A query's dotted \
-                        keys (wire.color) and the short names override the document.",
+                        that is null counts as absent, unless its description says otherwise. Dotted keys of a query \
+                        (wire.color) and short names override the document.",
         "type": "object",
         "properties": properties,
         "additionalProperties": false,
@@ -64,7 +66,7 @@ fn reference(name: &str) -> Json {
 }
 
 fn materials() -> Json {
-    let layers = LAYERS.iter().filter(|layer| Layer::is_for_materials(layer));
+    let layers = SECTIONS.iter().filter(|section| section.is_for_materials);
     let layers: Map<String, Json> = layers.map(|layer| (layer.name.to_owned(), reference(layer.name))).collect();
     json!({
         "description": MATERIALS.about,
@@ -75,17 +77,20 @@ fn materials() -> Json {
     })
 }
 
-/// A layer or a group with its keys, and what those ask of each other.
-fn object(name: &str, about: &str, types: &[&str], image_px: u64) -> Json {
-    let of_it = |field: &&Field| field.key.split_once('.').is_some_and(|(home, _)| home == name);
-    let last = |field: &Field| field.key.rsplit('.').next().unwrap_or_default().to_owned();
+/// A section with its keys, and the conditions between them.
+fn object(section: &Section, image_px: u64) -> Json {
+    let fields = FIELDS.iter().filter_map(|field| Some((field.key.split_once('.')?, field)));
+    let fields = fields.filter(|((home, _), _)| *home == section.name);
     let properties: Map<String, Json> =
-        FIELDS.iter().filter(of_it).map(|field| (last(field), property(field, image_px))).collect();
+        fields.map(|((_, key), field)| (key.to_owned(), property(field, image_px))).collect();
     let mut schema = json!({
-        "description": about, "type": types, "properties": properties, "additionalProperties": false,
+        "description": section.about,
+        "type": ["object", "null"],
+        "properties": properties,
+        "additionalProperties": false,
     });
     let given = |key: &str, is: Json| json!({ "properties": { key: is }, "required": [key] });
-    let rules = match name {
+    let rules = match section.name {
         "wire" => {
             let thin = json!({ "properties": { "thickness": { "maximum": MULTIPLE_MAX } } });
             vec![json!({ "if": given("method", json!({ "not": { "enum": ["exact", null] } })), "then": thin })]
@@ -112,7 +117,7 @@ fn object(name: &str, about: &str, types: &[&str], image_px: u64) -> Json {
 
 fn property(field: &Field, image_px: u64) -> Json {
     let mut schema = or_null(of_kind(&field.kind, image_px));
-    schema["description"] = field.about.into();
+    schema["description"] = field.about.as_str().into();
     if let Some(default) = &field.default {
         schema["default"] = default.clone();
     }
@@ -157,7 +162,7 @@ fn of_kind(kind: &Kind, image_px: u64) -> Json {
         Kind::Point => coordinates(),
         Kind::Direction => {
             let mut schema = coordinates();
-            // The type is said here too: `items` alone would be true of null.
+            // Without the type, this would also exclude null.
             schema["not"] = json!({ "type": "array", "items": { "const": 0 } });
             schema
         }

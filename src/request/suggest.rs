@@ -1,9 +1,9 @@
-//! "Did you mean": the nearest known keys to a misspelt one.
+//! Suggests the nearest known keys for a misspelt one.
 
-/// Longer keys are not compared: whoever sends them made no typing mistake.
+/// Longest key that is compared: a longer one is no typing mistake.
 const KEY_CHARS_MAX: usize = 64;
 
-/// What to do about an unknown key, in words: the nearest key, and those of the object that it stands in.
+/// The advice for an unknown key: the nearest keys, and all keys of the object that it is in.
 pub fn allowed(key: &str, known: &[&'static str]) -> String {
     let group = key.rsplit_once('.').map_or("", |(group, _)| group);
     let siblings: Vec<&str> = match group {
@@ -22,7 +22,7 @@ pub fn allowed(key: &str, known: &[&'static str]) -> String {
     }
 }
 
-/// The known keys that were most likely meant; none where nothing is near.
+/// The known keys that were probably meant; empty if none is near.
 pub fn nearest(key: &str, known: &[&'static str]) -> Vec<&'static str> {
     if key.chars().count() > KEY_CHARS_MAX {
         return Vec::new();
@@ -35,29 +35,13 @@ pub fn nearest(key: &str, known: &[&'static str]) -> Vec<&'static str> {
     if !same_end.is_empty() {
         return same_end;
     }
-    let scored = known.iter().map(|&k| (distance(key, k), k));
+    let scored = known.iter().map(|&k| (strsim::levenshtein(key, k), k));
     let longer = |k: &str| k.len().max(key.len());
-    // Whoever writes `wire.x` knows of `wire`.
+    // `wire` is no help for `wire.x`.
     let home = key.rsplit_once('.').map(|(home, _)| home);
     let best =
         scored.filter(|&(_, k)| Some(k) != home).min().filter(|&(d, k)| d <= 2.max(k.len() / 4) && 2 * d <= longer(k));
     best.map(|(_, k)| vec![k]).unwrap_or_default()
-}
-
-/// Levenshtein.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, &cb) in b.iter().enumerate() {
-            let substituted = diagonal + usize::from(ca != cb);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]
@@ -92,7 +76,7 @@ mod tests {
         assert!(said.contains("the keys of wire are color, edges") && !said.contains("camera"), "{said}");
         let said = allowed("wire.x", &known);
         assert!(said.starts_with("the keys of wire are color, edges"), "{said}");
-        // Every key of the document's own object, whether it holds a value or others.
+        // The keys of the document's own object include sections.
         let said = allowed("zzzzzzzzzzz", &known);
         for key in ["backend", "camera", "image", "light", "materials", "mesh", "scene", "size", "style", "surface"] {
             assert!(said.contains(&format!(" {key},")), "{key}: {said}");

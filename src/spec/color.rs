@@ -1,4 +1,4 @@
-//! Colour: sRGB in documents and files, linear light everywhere between.
+//! Colours: sRGB in documents and files, linear light inside the program.
 
 use crate::srgb::srgb_to_linear;
 

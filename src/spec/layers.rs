@@ -1,10 +1,11 @@
-//! The layers of a look: surface, wire, outline, topology.
-//!
-//! A layer that is `Some` is drawn. Units are in the names.
+//! The layers that a picture consists of: surface, wire, outline, topology. A layer that is `Some`
+//! is drawn.
 
 use super::color::Rgba;
+use super::wire_method::WireMethod;
+use super::words::word_enums;
 
-/// What is drawn of a part.
+/// The layers of one material.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Layers {
     /// The filled surface, if any.
@@ -15,177 +16,205 @@ pub struct Layers {
     pub outline: Option<Outline>,
 }
 
-/// How a surface takes light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shading {
-    /// One normal a triangle.
-    Flat,
-    /// Interpolated vertex normals.
-    Smooth,
-    /// The base colour, as it is.
-    Unlit,
-}
+word_enums! {
+    /// The lighting of a surface.
+    pub enum Shading {
+        /// One normal per triangle.
+        Flat = "flat",
+        /// Interpolated vertex normals.
+        Smooth = "smooth",
+        /// The base colour without any light.
+        Unlit = "unlit",
+    }
 
-/// Where flat shading gets its normals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FlatNormals {
-    /// The triangle's own corners, in f64.
-    Face,
-    /// Screen-space derivatives of the position in blocks of 2 x 2 pixels, as a GPU's `dFdx` gives them.
-    Derivative,
-}
+    /// Source of the normals of flat shading.
+    pub enum FlatNormals {
+        /// The corners of the triangle, in f64.
+        Face = "face",
+        /// Screen-space derivatives of the position in blocks of 2 x 2 pixels, as a GPU's `dFdx`
+        /// gives them.
+        Derivative = "derivative",
+    }
 
-/// What to show instead of the surface's colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DebugView {
-    /// The colour.
-    None,
-    /// The three barycentric coordinates as red, green, blue.
-    Barycentric,
-    /// The smallest barycentric coordinate as grey, white at 1/3.
-    MinBarycentric,
-    /// Distance to the triangle's nearest drawn edge as grey: black on it, white from 8 px on.
-    EdgeDistance,
-    /// The normal on the viewer's side, in the camera's axes, as `0.5 + 0.5 n`.
-    Normal,
-    /// A checker of texture coordinates, eight squares a unit, tinted by the coordinates.
-    Uv,
-    /// Front faces blue, back faces red, lit.
-    FaceOrientation,
-    /// Vertex colours, unlit; grey where there are none.
-    VertexColor,
-}
+    /// Data of the mesh, shown instead of the surface's colour.
+    pub enum DebugView {
+        /// No data: the colour.
+        None = "none",
+        /// The three barycentric coordinates as red, green, blue.
+        Barycentric = "barycentric",
+        /// The smallest barycentric coordinate as grey, white at 1/3.
+        MinBarycentric = "min-barycentric",
+        /// Distance to the triangle's nearest drawn edge as grey: black on it, white from 8 px on.
+        EdgeDistance = "edge-distance",
+        /// The normal on the viewer's side, in the camera's axes, as `0.5 + 0.5 n`.
+        Normal = "normal",
+        /// A checker of texture coordinates, eight squares per unit, tinted by the coordinates.
+        Uv = "uv",
+        /// Front faces blue, back faces red, lit.
+        FaceOrientation = "face-orientation",
+        /// Vertex colours, unlit; grey where there are none.
+        VertexColor = "vertex-color",
+    }
 
-/// Which faces are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cull {
-    /// Both sides.
-    None,
-    /// Front faces only.
-    Back,
-    /// Back faces only.
-    Front,
+    /// Faces that are left out.
+    pub enum Cull {
+        /// None: both sides are drawn.
+        None = "none",
+        /// Back faces.
+        Back = "back",
+        /// Front faces.
+        Front = "front",
+    }
 }
 
 /// The filled surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// How it takes light.
+    /// Its lighting.
     pub shading: Shading,
-    /// Where [`Shading::Flat`] gets its normals.
+    /// Source of the normals of [`Shading::Flat`].
     pub normals: FlatNormals,
-    /// Overrides the file's own base colours and their textures; None keeps them (or a calm grey where there are none).
+    /// Overrides the file's own base colours and their textures; None keeps them (grey where there
+    /// are none).
     pub color: Option<Rgba>,
-    /// 0 to 1; None: the file's, or 0.
+    /// Metallic share, 0 to 1; None: the file's, or 0.
     pub metallic: Option<f32>,
-    /// 0 to 1; None: the file's, or 0.6.
+    /// Roughness, 0 to 1; None: the file's, or 0.6.
     pub roughness: Option<f32>,
     /// Light that the surface gives off; None: the file's.
     pub emissive: Option<Rgba>,
     /// Multiplies the file's own opacity, 0 to 1.
     pub opacity: f32,
-    /// Whether the file's textures are shown.
+    /// Shows the file's textures.
     pub textures: bool,
-    /// Shown instead of all this.
+    /// Shown instead of the shaded colour.
     pub debug: DebugView,
-    /// Which faces are drawn.
+    /// Faces that are left out.
     pub cull: Cull,
 }
 
-/// How wires are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WireMethod {
-    /// Full width in pixels by exact box-filter coverage.
-    Exact,
-    /// `min_i smoothstep(t d_i, (t + s) d_i, b_i)` with `d = fwidth(b)`.
-    Fwidth,
-    /// `smoothstep(t d, (t + s) d, m)` with `m = min_i b_i` and `d = fwidth(m)`: shows artefacts near corners.
-    FwidthMin,
-    /// `smoothstep(0, 0.1 t, min_i b_i)`: as wide as its triangle is large.
-    Barycentric,
-    /// Coloured where any `b_i < 0.02 t`: no smoothing at all.
-    Threshold,
+impl Default for Surface {
+    fn default() -> Self {
+        Self {
+            shading: Shading::Flat,
+            normals: FlatNormals::Face,
+            color: None,
+            metallic: None,
+            roughness: None,
+            emissive: None,
+            opacity: 1.0,
+            textures: true,
+            debug: DebugView::None,
+            cull: Cull::None,
+        }
+    }
 }
 
-/// Which edges a wire follows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WireEdges {
-    /// Every triangle's edges.
-    Triangles,
-    /// Edges of the file's polygons: no triangulation diagonals.
-    Polygons,
-    /// Edges whose faces meet at more than `feature_angle_deg`, and those without exactly two faces.
-    Feature,
-    /// Edges with one face.
-    Boundary,
-}
+word_enums! {
+    /// Edges that a wire follows.
+    pub enum WireEdges {
+        /// Every triangle's edges.
+        Triangles = "triangles",
+        /// Edges of the file's polygons: no triangulation diagonals.
+        Polygons = "polygons",
+        /// Edges whose faces meet at more than `feature_angle_deg`, and those without exactly two
+        /// faces.
+        Feature = "feature",
+        /// Edges with one face.
+        Boundary = "boundary",
+    }
 
-/// What becomes of edges behind a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hidden {
-    /// Not drawn.
-    Hide,
-    /// Drawn as if nothing lay in front.
-    Show,
-    /// Drawn faintly.
-    Fade,
+    /// The treatment of edges behind a surface.
+    pub enum Hidden {
+        /// Not drawn.
+        Hide = "hide",
+        /// Drawn as if nothing were in front of them.
+        Show = "show",
+        /// Drawn faintly.
+        Fade = "fade",
+    }
 }
 
 /// Lines along the mesh's edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wire {
-    /// The technique.
+    /// The method of drawing it.
     pub method: WireMethod,
     /// Line colour.
     pub color: Rgba,
-    /// `exact`: full width, pixels, 0 to 100. Else t, in multiples of what the method measures in, 0 to 10.
+    /// `exact`: full width, pixels, 0 to 100. Other methods: t, in the method's unit, 0 to 10.
     pub thickness: f32,
-    /// `exact`: extra ramp, pixels. `fwidth` and `fwidth-min`: s, width of the smoothstep in multiples of `d`. 0 to 10.
+    /// `exact`: extra ramp, pixels. `fwidth` and `fwidth-min`: s, width of the smoothstep in
+    /// multiples of `d`. 0 to 10.
     pub smoothing: f32,
-    /// 0 to 1.
+    /// Multiplies the colour's own opacity, 0 to 1.
     pub opacity: f32,
-    /// Whether the surface's light falls on the wire too.
+    /// Lights the wire like the surface.
     pub lit: bool,
-    /// Which edges.
+    /// Edges that it follows.
     pub edges: WireEdges,
-    /// For [`WireEdges::Feature`]: the smallest angle between two faces' normals that makes an edge, 0 to 180.
+    /// For [`WireEdges::Feature`]: the smallest angle between two faces' normals that makes an
+    /// edge, 0 to 180.
     pub feature_angle_deg: f64,
-    /// What becomes of hidden edges.
+    /// The treatment of hidden edges.
     pub hidden: Hidden,
 }
 
-/// Unit of an outline's thickness.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OutlineUnit {
-    /// Model units, as they are at the depth of the silhouette.
-    Object,
-    /// Pixels, on screen.
-    Px,
+impl Default for Wire {
+    fn default() -> Self {
+        Self {
+            method: WireMethod::Exact,
+            color: Rgba::BLACK,
+            thickness: 1.0,
+            smoothing: 0.0,
+            opacity: 1.0,
+            lit: false,
+            edges: WireEdges::Triangles,
+            feature_angle_deg: 30.0,
+            hidden: Hidden::Hide,
+        }
+    }
 }
 
-/// How an outline is made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OutlineMethod {
-    /// What an inverted hull is for: a border around the surface, in one colour, that what lies before it hides.
-    Hull,
-    /// The true silhouette and boundary edges, as lines of exact width.
-    Contour,
+word_enums! {
+    /// Unit of an outline's thickness.
+    pub enum OutlineUnit {
+        /// Model units, measured at the depth of the silhouette.
+        Object = "object",
+        /// Pixels on screen.
+        Px = "px",
+    }
+
+    /// The shape of an outline.
+    pub enum OutlineMethod {
+        /// A border in one colour around the surface, as an inverted hull gives it. Nearer surfaces
+        /// hide it.
+        Hull = "hull",
+        /// Silhouette and boundary edges, as lines of exact width.
+        Contour = "contour",
+    }
 }
 
 /// The line around the shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outline {
-    /// How it is made.
+    /// Its shape.
     pub method: OutlineMethod,
     /// Line colour.
     pub color: Rgba,
-    /// In `unit`. None: 3 px; or in object units, 0.03 for a model whose longest side is 2, and in proportion for others.
+    /// In `unit`. None: 3 px, or in object units 3/200 of the model's longest side.
     pub thickness: Option<f32>,
     /// Unit of `thickness`.
     pub unit: OutlineUnit,
 }
 
-/// Edges that say how the mesh hangs together, each kind in its own colour; None is not drawn.
+impl Default for Outline {
+    fn default() -> Self {
+        Self { method: OutlineMethod::Hull, color: Rgba::BLACK, thickness: None, unit: OutlineUnit::Object }
+    }
+}
+
+/// Edges coloured by how the mesh is connected. Kinds whose colour is None are not drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Topology {
     /// Edges of polygons.
@@ -194,10 +223,24 @@ pub struct Topology {
     pub crease: Option<Rgba>,
     /// Edges with one face.
     pub open: Option<Rgba>,
-    /// Edges with more than two faces, or with two that disagree which side is out.
+    /// Edges with more than two faces, or with two faces that disagree which side is out.
     pub nonmanifold: Option<Rgba>,
-    /// See `crease`, 0 to 180.
+    /// The smallest angle of a crease, 0 to 180.
     pub crease_angle_deg: f64,
     /// Full width of polygon edges, pixels; the others are drawn wider.
     pub thickness: f32,
+}
+
+impl Default for Topology {
+    /// Faults stand out from each other and from a plain surface; edges of polygons recede.
+    fn default() -> Self {
+        Self {
+            polygon: Some(Rgba::from_srgb8([0x33, 0x3a, 0x44, 0x99])),
+            crease: None,
+            open: Some(Rgba::from_srgb8([0xf0, 0x5a, 0x1e, 0xff])),
+            nonmanifold: Some(Rgba::from_srgb8([0xd0, 0x1c, 0x9b, 0xff])),
+            crease_angle_deg: 30.0,
+            thickness: 1.0,
+        }
+    }
 }

@@ -1,10 +1,57 @@
-//! What is to be drawn, in the user's terms: a [`Spec`] (looks, camera, light, image) for a mesh.
+//! The meaning of a request: a [`Spec`] says what to draw of any mesh, and how. Every value is in
+//! range; units are in the names.
 
+mod camera;
 pub mod color;
-mod document;
+mod image;
 mod layers;
-pub(crate) mod quality;
+mod light;
+mod quality;
+mod wire_method;
+pub(crate) mod words;
 
-pub use document::*;
+pub use camera::*;
+pub use image::*;
 pub use layers::*;
+pub use light::*;
 pub use quality::*;
+pub use wire_method::*;
+
+use words::word_enums;
+
+/// Everything a request says, with styles applied and defaults filled in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spec {
+    /// The layers of materials that `materials` does not name.
+    pub layers: Layers,
+    /// The layers of materials of these names. Each entry is complete and takes nothing from
+    /// `layers`. Of equal names the last counts.
+    pub materials: Vec<(String, Layers)>,
+    /// Edges coloured by how the mesh is connected, if any.
+    pub topology: Option<Topology>,
+    /// The moment of the file's first animation, seconds. None: the rest pose.
+    pub time_s: Option<f64>,
+    /// Position and lens.
+    pub camera: CameraSpec,
+    /// Lamps and ambient light.
+    pub light: Light,
+    /// Size, format, sampling, background.
+    pub image: ImageSpec,
+    /// The back-end that draws.
+    pub backend: BackendChoice,
+    /// An error or a time to reach by choosing what [`QualityTarget::open`] names. None: nothing is
+    /// chosen.
+    pub quality_target: Option<QualityTarget>,
+}
+
+word_enums! {
+    /// The back-end that draws.
+    pub enum BackendChoice {
+        /// A hardware GPU if there is one, the CPU otherwise.
+        Auto = "auto",
+        /// Any GPU, a software Vulkan included.
+        Gpu = "gpu",
+        /// The CPU rasterizer.
+        Cpu = "cpu",
+    }
+}

@@ -1,24 +1,27 @@
-//! What a request asks for in place of techniques: an error, a time, or both.
+//! A target for error or time, which replaces the choice of techniques.
 
-/// How good and how soon; at least one of the two is given. What is left open is chosen where spec becomes plan.
+/// The largest error, the longest time, or both. The plan chooses what the request leaves open, so
+/// as to reach them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct QualityTarget {
-    /// Largest expected error: root mean square of the pixels that are drawn, /255. Above 0, at most 255.
+    /// Largest expected error: root mean square over the pixels that are drawn, /255. Above 0, at
+    /// most 255.
     pub max_error: Option<f64>,
     /// Longest expected time to draw, milliseconds. Above 0.
     pub max_time_ms: Option<f64>,
-    /// What may be chosen.
+    /// The keys whose values may be chosen.
     pub open: Open,
 }
 
-/// What a request leaves open.
+/// Keys that a request does not give, so that their values may be chosen.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Open {
     /// `image.samples`.
     pub samples: bool,
-    /// `backend`; not where the server has one that is not `auto`.
+    /// `backend`. Never open where the server has a default other than `auto`.
     pub backend: bool,
-    /// How the document's own wires are drawn: neither `wire.method` is given nor `wire.smoothing`, whose meaning depends on it.
+    /// `wire.method` of the document's own layers. Not open if `wire.smoothing` is given, because
+    /// its meaning depends on the method.
     pub wire: bool,
     /// The same for each of the spec's materials, in their order.
     pub material_wires: Vec<bool>,

@@ -10,7 +10,10 @@ use std::fmt;
 
 use self::error_table::ErrorTable;
 use crate::spec::BackendChoice;
-use crate::spec::{FlatNormals, Hidden, Layers, OutlineMethod, QualityTarget, Shading, Spec, Wire, WireMethod};
+use crate::spec::words::word_for;
+use crate::spec::{
+    FlatNormals, Hidden, Layers, OutlineMethod, QualityTarget, Shading, Spec, WIRE_METHODS, Wire, WireMethod,
+};
 use crate::warning::Warning;
 
 /// A request with what it left open filled in.
@@ -49,38 +52,35 @@ impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "image.samples={}", self.samples)?;
         self.wire_methods.iter().try_for_each(|name| write!(f, ", wire.method={name}"))?;
-        write!(f, ", backend={}", backend_name(self.backend))
+        write!(f, ", backend={}", word_for(self.backend))
     }
 }
 
-/// The methods whose width can be given in pixels. The others' depends on each triangle's size.
-const METHODS: [WireMethod; 3] = [WireMethod::Exact, WireMethod::Fwidth, WireMethod::FwidthMin];
-
 fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Chosen> {
-    let ask = spec.ask.as_ref()?;
-    let all = candidates(table, spec, ask, triangles, has_gpu);
+    let target = spec.quality_target.as_ref()?;
+    let all = candidates(table, spec, target, triangles, has_gpu);
     let time = |(_, [_, time_ms]): &Candidate| *time_ms;
     let error = |(_, [error, _]): &Candidate| *error;
-    let is_in_time = |c: &&Candidate| ask.max_time_ms.is_none_or(|max| time(c) <= max);
-    let is_exact = |c: &&Candidate| ask.max_error.is_none_or(|max| error(c) <= max);
+    let is_in_time = |c: &&Candidate| target.max_time_ms.is_none_or(|max| time(c) <= max);
+    let is_exact = |c: &&Candidate| target.max_error.is_none_or(|max| error(c) <= max);
     let cheapest = |a: &&Candidate, b: &&Candidate| time(a).total_cmp(&time(b)).then(error(a).total_cmp(&error(b)));
     let best = |a: &&Candidate, b: &&Candidate| error(a).total_cmp(&error(b)).then(time(a).total_cmp(&time(b)));
     let in_time = || all.iter().filter(is_in_time);
-    let wanted = match ask.max_error {
+    let wanted = match target.max_error {
         Some(_) => in_time().filter(is_exact).min_by(cheapest),
         None => None,
     };
     let chosen = wanted.or_else(|| in_time().min_by(best)).or_else(|| all.iter().min_by(cheapest))?;
 
     let mut warnings = Vec::new();
-    if let Some(max) = ask.max_error.filter(|_| !is_exact(&chosen)) {
+    if let Some(max) = target.max_error.filter(|_| !is_exact(&chosen)) {
         let detail = format!(
             "an error of at most {max}/255 is asked for, and the best of what may be chosen is expected to have {}/255",
             error(chosen)
         );
         warnings.push(Warning { code: "max_error_unmet", detail });
     }
-    if let Some(max) = ask.max_time_ms.filter(|_| !is_in_time(&chosen)) {
+    if let Some(max) = target.max_time_ms.filter(|_| !is_in_time(&chosen)) {
         let detail = format!(
             "at most {max} ms are asked for, and the fastest of what may be chosen is expected to take {} ms",
             time(chosen)
@@ -88,7 +88,7 @@ fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool)
         warnings.push(Warning { code: "max_time_ms_unmet", detail });
     }
     let (spec, [expected_error, expected_time_ms]) = chosen.clone();
-    let mut wire_methods: Vec<&str> = wires(&spec).map(|wire| method_name(wire.method)).collect();
+    let mut wire_methods: Vec<&str> = wires(&spec).map(|wire| word_for(wire.method)).collect();
     wire_methods.sort_unstable();
     wire_methods.dedup();
     let (samples, backend) = (spec.image.samples, spec.backend);
@@ -100,11 +100,19 @@ fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool)
 type Candidate = (Spec, [f64; 2]);
 
 /// Every way to fill in what is open, with what is expected of it.
-fn candidates(table: &ErrorTable, spec: &Spec, ask: &QualityTarget, triangles: usize, has_gpu: bool) -> Vec<Candidate> {
-    let samples = if ask.open.samples { vec![1, 4, 8, 16] } else { vec![spec.image.samples] };
-    let has_open_wire = ask.open.wire || ask.open.material_wires.contains(&true);
-    let methods = if has_open_wire { METHODS.map(Some).to_vec() } else { vec![None] };
-    let backends = match (ask.open.backend, has_gpu && table.knows_gpu()) {
+fn candidates(
+    table: &ErrorTable,
+    spec: &Spec,
+    target: &QualityTarget,
+    triangles: usize,
+    has_gpu: bool,
+) -> Vec<Candidate> {
+    let samples = if target.open.samples { vec![1, 4, 8, 16] } else { vec![spec.image.samples] };
+    let has_open_wire = target.open.wire || target.open.material_wires.contains(&true);
+    // The width of the other methods depends on each triangle's size.
+    let in_pixels = WIRE_METHODS.iter().map(|row| row.method).filter(|method| method.has_pixel_width());
+    let methods = if has_open_wire { in_pixels.map(Some).collect() } else { vec![None] };
+    let backends = match (target.open.backend, has_gpu && table.knows_gpu()) {
         (false, _) => vec![spec.backend],
         (true, false) => vec![BackendChoice::Cpu],
         (true, true) => vec![BackendChoice::Cpu, BackendChoice::Auto],
@@ -117,7 +125,7 @@ fn candidates(table: &ErrorTable, spec: &Spec, ask: &QualityTarget, triangles: u
                 let mut spec = spec.clone();
                 spec.image.samples = samples;
                 spec.backend = backend;
-                if method.is_none_or(|method| set_method(&mut spec, ask, method)) {
+                if method.is_none_or(|method| set_method(&mut spec, target, method)) {
                     let known = expect(table, &spec, if is_gpu { "gpu" } else { "cpu" }, triangles);
                     all.extend(known.map(|expected| (spec, expected)));
                 }
@@ -128,9 +136,9 @@ fn candidates(table: &ErrorTable, spec: &Spec, ask: &QualityTarget, triangles: u
 }
 
 /// Draws the open wires so; false where that would not be the same lines.
-fn set_method(spec: &mut Spec, ask: &QualityTarget, method: WireMethod) -> bool {
-    let material_wires = spec.materials.iter_mut().map(|(_, layers)| layers).zip(&ask.open.material_wires);
-    let open = std::iter::once((&mut spec.layers, &ask.open.wire)).chain(material_wires);
+fn set_method(spec: &mut Spec, target: &QualityTarget, method: WireMethod) -> bool {
+    let material_wires = spec.materials.iter_mut().map(|(_, layers)| layers).zip(&target.open.material_wires);
+    let open = std::iter::once((&mut spec.layers, &target.open.wire)).chain(material_wires);
     for wire in open.filter(|(_, is_open)| **is_open).filter_map(|(layers, _)| layers.wire.as_mut()) {
         match as_wide(wire, method) {
             Some(same) => *wire = same,
@@ -156,7 +164,7 @@ fn as_wide(wire: &Wire, method: WireMethod) -> Option<Wire> {
 /// The error and the time of a look; None where the table does not know one of its techniques.
 fn expect(table: &ErrorTable, spec: &Spec, backend: &str, triangles: usize) -> Option<[f64; 2]> {
     let mut techniques: Vec<&str> = looks(spec).flat_map(techniques).collect();
-    techniques.extend(spec.topology.map(|_| method_name(WireMethod::Exact)));
+    techniques.extend(spec.topology.map(|_| word_for(WireMethod::Exact)));
     techniques.sort_unstable();
     techniques.dedup();
     let pixels = f64::from(spec.image.width_px) * f64::from(spec.image.height_px);
@@ -175,7 +183,7 @@ fn techniques(layers: &Layers) -> Vec<&'static str> {
         (Shading::Flat, FlatNormals::Derivative) => "derivative",
         _ => "face",
     });
-    let wire = layers.wire.map(|wire| method_name(wire.method));
+    let wire = layers.wire.map(|wire| word_for(wire.method));
     let outline = layers.outline.map(|outline| match outline.method {
         OutlineMethod::Hull => "hull",
         OutlineMethod::Contour => "contour",
@@ -189,24 +197,6 @@ fn looks(spec: &Spec) -> impl Iterator<Item = &Layers> {
 
 fn wires(spec: &Spec) -> impl Iterator<Item = &Wire> {
     looks(spec).filter_map(|layers| layers.wire.as_ref())
-}
-
-fn method_name(method: WireMethod) -> &'static str {
-    match method {
-        WireMethod::Exact => "exact",
-        WireMethod::Fwidth => "fwidth",
-        WireMethod::FwidthMin => "fwidth-min",
-        WireMethod::Barycentric => "barycentric",
-        WireMethod::Threshold => "threshold",
-    }
-}
-
-fn backend_name(backend: BackendChoice) -> &'static str {
-    match backend {
-        BackendChoice::Auto => "auto",
-        BackendChoice::Gpu => "gpu",
-        BackendChoice::Cpu => "cpu",
-    }
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! A document and the dotted keys that override it as dotted keys alone: the same request as an address.
+//! Writes a document and the dotted keys that override it as dotted keys alone, for use in an
+//! address.
 
 use serde_json::Value as Json;
 
@@ -9,11 +10,11 @@ use crate::request::table::value::Given;
 use crate::request::{Overrides, Rules, check_once, read, set_format};
 use crate::spec::Spec;
 
-/// More keys than an address has room for.
+/// Most keys: an address has no room for more.
 const KEYS_MAX: usize = 200;
 
-/// The dotted keys that come to `spec`, as a document that may name its mesh and its overrides do; without the picture's
-/// format. None where no query can say it.
+/// The dotted keys that mean `spec`, which a document (with or without its mesh) and its overrides
+/// mean too; without the picture's format. None where no query can express it.
 pub fn all_dotted(document: &[u8], overrides: &Overrides, spec: &Spec, rules: &Rules) -> Option<Vec<(String, String)>> {
     let mut items = flatten(document, rules.limits.json_depth).ok()?;
     for (key, text) in overrides {
@@ -24,12 +25,13 @@ pub fn all_dotted(document: &[u8], overrides: &Overrides, spec: &Spec, rules: &R
     if items.len() > KEYS_MAX {
         return None;
     }
-    // Of what is said twice, the later counts; a query says it once.
-    let said_later = |at: usize| items[at + 1..].iter().any(|later| same_key(&items[at], later));
-    let kept: Vec<&Item> = (0..items.len()).filter(|&at| !said_later(at)).map(|at| &items[at]).collect();
+    // Of duplicates the last counts; a query must not have any.
+    let has_later = |at: usize| items[at + 1..].iter().any(|later| same_key(&items[at], later));
+    let kept: Vec<&Item> = (0..items.len()).filter(|&at| !has_later(at)).map(|at| &items[at]).collect();
     let pairs: Vec<(String, String)> = kept.into_iter().map(|item| (item.whole_key(), text(&item.given))).collect();
 
-    // A material's name may be such that its dotted key means another, and a key such that leaving it out matters.
+    // Read the result back: dots in a material's name may change the meaning of its key, and so may
+    // a key left out.
     check_once(&pairs, rules).ok()?;
     let mut again = read(None, &pairs, rules).ok()?;
     set_format(&mut again, spec.image.format?);
@@ -40,7 +42,7 @@ fn same_key(a: &Item, b: &Item) -> bool {
     a.material == b.material && duplicate_keys::long(a) == duplicate_keys::long(b)
 }
 
-/// As a query writes it.
+/// The value as a query writes it.
 fn text(given: &Given) -> String {
     match given {
         Given::Json(Json::String(text)) | Given::Text(text) => text.clone(),
@@ -63,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn a_document_is_said_in_dotted_keys() {
+    fn a_document_becomes_dotted_keys() {
         let cases = [
             (r#"{"mesh":"x"}"#, &[][..], Some("")),
             (
@@ -86,14 +88,14 @@ mod tests {
                 &[],
                 Some("materials.B={}&materials.Glass v2.1.surface.opacity=0.5"),
             ),
-            // The query counts for more.
+            // The query overrides the document.
             (
                 r#"{"mesh":"x","style":"wire","samples":1}"#,
                 &[("image.samples", "4"), ("style", "flat")],
                 Some("image.samples=4&style=flat"),
             ),
             (r#"{"mesh":"x","wire":{"color":"f00"}}"#, &[("wire", "null")], Some("wire.color=f00&wire=null")),
-            // None of these can be said.
+            // No query can express these.
             (r#"{"mesh":"x","size":64}"#, &[("image.width", "32")], None),
             (r#"{"mesh":"x","materials":{"A.b":{}}}"#, &[], None),
         ];

@@ -1,30 +1,31 @@
-//! Keys that are given twice, under one name or under two: whoever wrote both meant both, and only one can count.
+//! Refuses duplicate keys, under the same name or under a short and a long one: the sender meant
+//! both, and one would be lost.
 
 use std::collections::BTreeMap;
 
 use super::item::Item;
 use crate::request::error::{RequestError, RequestFault};
-use crate::request::table::SHORT;
+use crate::request::table;
 use crate::request::table::value::Given;
 
-/// What `size` says.
+/// The keys that `size` sets.
 const OF_SIZE: &[&str] = &["image.width", "image.height"];
 
-/// Refuses items two of which say the same. In a document, `null` says nothing.
+/// Refuses items two of which set the same key. In a document, `null` sets nothing.
 pub fn check(items: &[Item]) -> Result<(), RequestError> {
     let mut seen: BTreeMap<(Option<&str>, &str), &Item> = BTreeMap::new();
-    let says_nothing = |item: &&Item| matches!(&item.given, Given::Json(json) if json.is_null());
-    for item in items.iter().filter(|item| !says_nothing(item)) {
+    let sets_nothing = |item: &&Item| matches!(&item.given, Given::Json(json) if json.is_null());
+    for item in items.iter().filter(|item| !sets_nothing(item)) {
         let material = item.material.as_deref();
         for key in meanings(item) {
             let Some(first) = seen.insert((material, key), item) else { continue };
-            return Err(twice(first, item));
+            return Err(duplicate(first, item));
         }
     }
     Ok(())
 }
 
-/// The long keys that an item gives values to.
+/// The long names of the keys that an item sets.
 fn meanings(item: &Item) -> Vec<&str> {
     let key = item.key.as_str();
     if item.material.is_none() && key == "size" {
@@ -35,12 +36,10 @@ fn meanings(item: &Item) -> Vec<&str> {
 
 /// The long name of an item's key.
 pub fn long(item: &Item) -> &str {
-    let key = item.key.as_str();
-    let long = SHORT.iter().find(|&&(short, _)| short == key && item.material.is_none());
-    long.map_or(key, |&(_, long)| long)
+    table::field(&item.key, item.material.is_some()).map_or(&item.key, |field| field.key)
 }
 
-fn twice(first: &Item, again: &Item) -> RequestError {
+fn duplicate(first: &Item, again: &Item) -> RequestError {
     let (first_key, key) = (first.whole_key(), again.whole_key());
     if first_key == key {
         return RequestError::new(RequestFault::Conflict, &key, "given twice", "each key is given once");
@@ -54,7 +53,7 @@ mod tests {
     use crate::request::{RequestFault, check_once, tests};
 
     #[test]
-    fn what_is_said_twice_is_refused_under_both_names() {
+    fn duplicates_are_refused_under_both_names() {
         let cases: &[(&[&str], &str, &str)] = &[
             (&["style=wire", "style=flat"], "style", "given twice"),
             (&["style=wire", "style=wire"], "style", "given twice"),
@@ -90,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn a_document_says_everything_once_too() {
+    fn duplicates_in_a_document_are_refused_too() {
         let cases = [
             (r#"{"size":64,"image":{"width":32}}"#, Some("size")),
             (r#"{"size":64,"image":{"width":null,"samples":1}}"#, None),

@@ -1,33 +1,33 @@
-//! A key of a request and what was given for it, wherever in the request it stood.
+//! One key of a request and its value, from the document or from a query.
 
 use crate::request::table::value::Given;
-use crate::request::table::{LAYERS, MATERIALS};
+use crate::request::table::{self, MATERIALS};
 
 /// A key and its value.
 #[derive(Clone, Debug)]
 pub struct Item {
-    /// The material that it is about; None: the document itself.
+    /// The material that it belongs to; None: the document itself.
     pub material: Option<String>,
-    /// A layer, or a layer and its key with a dot between, or another key of the document. Of a material, nothing stands for
-    /// the whole of it.
+    /// Dotted, such as `wire` or `wire.color`. Empty for a material as a whole.
     pub key: String,
     /// Its value.
     pub given: Given,
 }
 
 impl Item {
-    /// From a dotted key. A material's name may have dots of its own: the key ends in a layer, or in a layer and its key.
+    /// Reads a dotted key. A material's name may contain dots, so the end decides: a layer, or a
+    /// layer and one of its keys.
     pub fn dotted(key: &str, text: &str) -> Self {
         let given = Given::Text(text.to_owned());
         let Some(rest) = key.strip_prefix(MATERIALS.name).and_then(|rest| rest.strip_prefix('.')) else {
             return Self { material: None, key: key.to_owned(), given };
         };
-        let is_layer = |name: &str| LAYERS.iter().any(|layer| layer.name == name);
+        let is_layer = |name: &str| table::section(name).is_some_and(|section| section.turn.is_some());
         let (name, inner) = match rest.rsplit_once('.') {
             Some((name, last)) if is_layer(last) => (name, last),
             Some((before, last)) => match before.rsplit_once('.') {
                 Some((name, _)) => (name, &rest[name.len() + 1..]),
-                // Neither can be a layer of a material: refused where it is looked up.
+                // Neither is a layer of a material, which the look-up will refuse.
                 None => (before, last),
             },
             None => (rest, ""),
@@ -35,7 +35,7 @@ impl Item {
         Self { material: Some(name.to_owned()), key: inner.to_owned(), given }
     }
 
-    /// The whole key, as error messages name it.
+    /// The whole dotted key, for error messages.
     pub fn whole_key(&self) -> String {
         match &self.material {
             None => self.key.clone(),

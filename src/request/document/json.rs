@@ -1,4 +1,4 @@
-//! The JSON document as a flat list of dotted keys.
+//! Turns a JSON document into a flat list of dotted keys.
 
 use serde_json::Value as Json;
 
@@ -7,29 +7,25 @@ use crate::request::document::duplicate_keys;
 use crate::request::document::unique_keys::{Fault, parse};
 use crate::request::error::{RequestError, RequestFault};
 use crate::request::table::value::Given;
-use crate::request::table::{GROUPS, LAYERS, MATERIALS, SCHEMA};
+use crate::request::table::{self, MATERIALS, SCHEMA};
 
-/// Longest document: a thousand times what anybody writes by hand, and small when parsed.
+/// Longest document: a thousand times the usual length, and still small when parsed.
 pub const DOCUMENT_BYTES_MAX: usize = 1 << 20;
 
-/// Parses a document and flattens its objects, in document order of the sorted keys.
+/// Parses a document and flattens its objects; keys are in alphabetical order.
 pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestError> {
     let not_json = |given: String, allowed: String| RequestError::new(RequestFault::NotJson, "request", given, allowed);
     if document.len() > DOCUMENT_BYTES_MAX {
         return Err(not_json(format!("{} bytes long", document.len()), format!("{DOCUMENT_BYTES_MAX} bytes")));
     }
-    // Before the parser, whose recursion costs stack.
-    if depth(document) > depth_max {
-        let mut error = not_json(format!("nested {} deep", depth(document)), format!("a depth of {depth_max}"));
-        error.flag = Some("--limit-json-depth");
-        return Err(error);
-    }
-    let json = parse(document).map_err(|fault| match fault {
+    let json = parse(document, depth_max).map_err(|fault| match fault {
+        Fault::TooDeep(depth) => {
+            let error = not_json(format!("nested {depth} deep"), format!("a depth of {depth_max}"));
+            RequestError { flag: Some("--limit-json-depth"), ..error }
+        }
         Fault::NotJson(_) if document.trim_ascii().is_empty() => not_json("empty".into(), "a JSON object".into()),
         Fault::NotJson(e) => not_json(not_json_at(&e), "a JSON object".into()),
-        Fault::Repeated(key) => {
-            RequestError::new(RequestFault::Conflict, &key, "given twice", "an object has a key once")
-        }
+        Fault::Repeated(key) => repeated(&key),
     })?;
     let Json::Object(object) = json else {
         return Err(not_json(Given::Json(json).show(), "a JSON object".into()));
@@ -40,7 +36,7 @@ pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestErro
             return Err(dotted("", &key, &value));
         }
         match value {
-            // Editors write it to find the schema.
+            // Editors use it to find the schema.
             Json::String(_) | Json::Null if key == SCHEMA => {}
             other if key == SCHEMA => {
                 return Err(RequestError::new(RequestFault::WrongType, SCHEMA, other, "a string"));
@@ -52,13 +48,13 @@ pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestErro
     Ok(items)
 }
 
-/// What a dotted key and its text come to: one item, or, where the text is an object with keys of its own
-/// (`outline={"thickness":8}`), what the same object in a document comes to.
+/// Flattens a dotted key and its text: to one item, or, if the text is an object with keys
+/// (`outline={"thickness":8}`), to the same items as that object in a document.
 pub fn flatten_override(key: &str, text: &str, depth_max: u64) -> Result<Vec<Item>, RequestError> {
     let item = Item::dotted(key, text);
     let may_hold_keys = match &item.material {
-        None => item.key == MATERIALS.name || holds_keys(&item.key),
-        Some(_) => item.key.is_empty() || holds_keys(&item.key),
+        None => item.key == MATERIALS.name || table::section(&item.key).is_some(),
+        Some(_) => item.key.is_empty() || table::section(&item.key).is_some(),
     };
     if !may_hold_keys || !text.trim_start().starts_with('{') || text.len() > DOCUMENT_BYTES_MAX {
         return Ok(vec![item]);
@@ -69,16 +65,10 @@ pub fn flatten_override(key: &str, text: &str, depth_max: u64) -> Result<Vec<Ite
             format!("an object as JSON, such as {{\"KEY\": VALUE}} (one key alone is {whole}.KEY=VALUE){why}");
         RequestError::new(RequestFault::WrongType, &whole, item.given.show(), allowed)
     };
-    // Before the parser, whose recursion costs stack.
-    if depth(text.as_bytes()) > depth_max {
-        return Err(wrong(format!(", at most {depth_max} deep")));
-    }
-    let value = parse(text.as_bytes()).map_err(|fault| match fault {
+    let value = parse(text.as_bytes(), depth_max).map_err(|fault| match fault {
+        Fault::TooDeep(_) => wrong(format!(", at most {depth_max} deep")),
         Fault::NotJson(e) => wrong(format!("; this is {}", not_json_at(&e))),
-        Fault::Repeated(key) => {
-            let key = format!("{whole}.{key}");
-            RequestError::new(RequestFault::Conflict, &key, "given twice", "an object has a key once")
-        }
+        Fault::Repeated(key) => repeated(&format!("{whole}.{key}")),
     })?;
     let mut items = Vec::new();
     match item.material {
@@ -89,14 +79,20 @@ pub fn flatten_override(key: &str, text: &str, depth_max: u64) -> Result<Vec<Ite
     Ok(items)
 }
 
-/// Where a text stops being JSON, and then why: the place is what must not be cut off.
+/// The error for a key that an object has twice.
+fn repeated(key: &str) -> RequestError {
+    RequestError::new(RequestFault::Conflict, key, "given twice", "an object has a key once")
+}
+
+/// The place and the reason why a text is not JSON. The place comes first, because long errors are
+/// cut off at the end.
 fn not_json_at(error: &serde_json::Error) -> String {
     let said = error.to_string();
     let why = said.split(" at line ").next().unwrap_or_default();
     format!("not JSON at line {}, column {} ({why})", error.line(), error.column())
 }
 
-/// A key of the document itself.
+/// Flattens a key of the document itself.
 fn flatten_key(key: String, value: Json, items: &mut Vec<Item>) -> Result<(), RequestError> {
     match value {
         Json::Object(materials) if key == MATERIALS.name && !materials.is_empty() => {
@@ -124,60 +120,27 @@ fn flatten_material(name: String, value: Json, items: &mut Vec<Item>) -> Result<
     Ok(())
 }
 
-/// The keys of a layer or a group, one by one; anything else as it is.
+/// Flattens a section into its keys. Any other value becomes one item.
 fn flatten_object(material: Option<&String>, key: String, value: Json, items: &mut Vec<Item>) {
     let item = |key, value| Item { material: material.cloned(), key, given: Given::Json(value) };
     match value {
-        Json::Object(inner) if holds_keys(&key) && !inner.is_empty() => {
+        Json::Object(inner) if table::section(&key).is_some() && !inner.is_empty() => {
             items.extend(inner.into_iter().map(|(name, value)| item(format!("{key}.{name}"), value)));
         }
         other => items.push(item(key, other)),
     }
 }
 
-/// Whether this is a layer or a group.
-fn holds_keys(key: &str) -> bool {
-    LAYERS.iter().map(|layer| layer.name).chain(GROUPS.iter().map(|group| group.name)).any(|name| name == key)
-}
-
+/// The error for a dotted key in a document.
 fn dotted(prefix: &str, key: &str, value: &Json) -> RequestError {
     let nested = key.split_once('.').map_or(String::new(), |(a, b)| format!("{{\"{a}\": {{\"{b}\": ...}}}}"));
     let allowed = format!("dotted keys are for query parameters and --set; write {nested} in the document");
     RequestError::new(RequestFault::UnknownKey, &format!("{prefix}{key}"), value, allowed)
 }
 
-/// Deepest nesting of objects and arrays, without recursion. Exact for valid JSON; for anything else the parser speaks.
-fn depth(bytes: &[u8]) -> u64 {
-    let (mut depth, mut deepest, mut in_string, mut escaped) = (0_u64, 0, false, false);
-    for &byte in bytes {
-        match byte {
-            _ if escaped => escaped = false,
-            b'\\' if in_string => escaped = true,
-            b'"' => in_string = !in_string,
-            _ if in_string => {}
-            b'{' | b'[' => {
-                depth += 1;
-                deepest = deepest.max(depth);
-            }
-            b'}' | b']' => depth = depth.saturating_sub(1),
-            _ => {}
-        }
-    }
-    deepest
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn depth_counts_brackets_outside_strings() {
-        let cases: [(&str, u64); 6] =
-            [("{}", 1), ("[[[]]]", 3), (r#"{"a":"[[[["}"#, 1), (r#"{"a":"\"[[","b":[]}"#, 2), ("1", 0), ("]]][", 1)];
-        for (text, expected) in cases {
-            assert_eq!(depth(text.as_bytes()), expected, "{text}");
-        }
-    }
 
     #[test]
     fn a_document_100_000_deep_is_refused_before_it_is_parsed() {

@@ -1,4 +1,4 @@
-//! A document in place of a mesh: it names one that is stored, under the key `mesh`.
+//! Request documents that are sent in place of a mesh: they name a stored one under the key `mesh`.
 
 use std::fmt;
 
@@ -9,41 +9,43 @@ use serde_json::Value as Json;
 use super::json::DOCUMENT_BYTES_MAX;
 use crate::request::error::{RequestError, RequestFault};
 
-/// The key of the mesh's name.
+/// The key that names the mesh.
 pub const KEY: &str = "mesh";
 
-/// What stands there.
+/// Its allowed values, for errors.
 pub const ALLOWED: &str = "the SHA-256 of a stored mesh, 64 lower-case hexadecimal digits";
 
-/// One line on what it does.
-pub const ABOUT: &str = "SHA-256 of a stored mesh, in a JSON body that is sent in place of a mesh; nowhere else.";
+/// Its description in the schema.
+pub const ABOUT: &str = "SHA-256 of a stored mesh; only in a JSON body that is sent in place of a mesh.";
 
-/// Why it has to be there.
+/// The error where it is missing.
 pub const WHY: &str = "a JSON body is a request document and names the mesh to draw by the SHA-256 under which it is stored, \
                        {\"mesh\": \"64 hexadecimal digits\", ...}; or it is a glTF file, which has `asset`";
 
-/// Why it must not be there.
+/// The error where it is not allowed.
 pub const ELSEWHERE: &str = "it names a stored mesh in a JSON body that is sent in place of a mesh, and nowhere else";
 
-/// Whether a body is a request document that names its mesh rather than a mesh: a JSON object with `mesh`. A glTF file, which
-/// is a JSON object with `asset`, is one only if there are 64 hexadecimal digits under that key.
+/// True for a request document that names its mesh: a JSON object with `mesh`. An object
+/// that also has `asset` may be a glTF file, so there the value of `mesh` must be 64 hexadecimal
+/// digits.
 pub fn names_mesh(body: &[u8]) -> bool {
     begins_object(body) && peek(body).is_some_and(|seen| seen.has_digest || seen.has_mesh && !seen.has_asset)
 }
 
-/// Whether a body that names no mesh can only be a request document with a mistake in it. `said_json` is what the client says
-/// that it is; without that it must at least look as if it named a mesh.
-pub fn is_faulty_document(body: &[u8], said_json: bool) -> bool {
+/// True if a body that names no mesh can only be a request document with a mistake.
+/// `is_declared_json`: the client declares it as JSON. If not, it must contain `"mesh"`.
+pub fn is_faulty_document(body: &[u8], is_declared_json: bool) -> bool {
     let text = body.trim_ascii_start();
     if text.is_empty() || !begins_object(body) {
-        // Anything else that is said to be JSON may be a mesh whose sender does not care.
-        return said_json && (text.is_empty() || text.starts_with(b"[") || text.starts_with(b"\""));
+        // Any other text may be a mesh with a wrong content type.
+        return is_declared_json && (text.is_empty() || text.starts_with(b"[") || text.starts_with(b"\""));
     }
     match peek(body) {
-        Some(seen) => said_json && !seen.has_asset,
-        // Files are the importers' to explain: broken glTF, and a binary STL whose header begins like an object.
+        Some(seen) => is_declared_json && !seen.has_asset,
+        // Importers explain faults of files: broken glTF, and binary STL whose header begins like
+        // an object.
         None if contains(text, b"\"asset\"") || text.contains(&0) => false,
-        None => said_json || contains(text, b"\"mesh\""),
+        None => is_declared_json || contains(text, b"\"mesh\""),
     }
 }
 
@@ -55,7 +57,7 @@ fn contains(text: &[u8], part: &[u8]) -> bool {
     text.windows(part.len()).any(|window| window == part)
 }
 
-/// None where it is not JSON.
+/// The keys of an object that matter here; None if the body is not JSON.
 fn peek(body: &[u8]) -> Option<Seen> {
     let mut parser = serde_json::Deserializer::from_slice(body);
     let seen = parser.deserialize_map(Peek).ok()?;
@@ -67,6 +69,7 @@ pub fn bad_mesh_name(name: &str) -> RequestError {
     RequestError::new(RequestFault::OutOfRange, KEY, format!("{name:?}"), ALLOWED)
 }
 
+/// Keys that an object has.
 #[derive(Default)]
 struct Seen {
     has_asset: bool,
@@ -75,7 +78,7 @@ struct Seen {
     has_digest: bool,
 }
 
-/// Looks at the keys of an object and skips what is in it.
+/// A visitor that looks at the keys of an object and skips their values.
 struct Peek;
 
 impl<'de> Visitor<'de> for Peek {
@@ -136,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_document_with_a_mistake_is_told_from_a_mesh() {
-        // The body, and whether it is one: said to be JSON, and not.
+        // The body, and the answers if it is declared as JSON and if it is not.
         let cases: [(&[u8], bool, bool); 16] = [
             (b"", true, false),
             (b" \n", true, false),

@@ -1,4 +1,4 @@
-//! TODO room.
+//! Requests as they are sent: JSON documents and dotted keys, flattened to one list of items.
 
 pub(crate) mod dotted;
 pub(crate) mod duplicate_keys;

@@ -1,4 +1,5 @@
-//! JSON whose objects have no key twice. RFC 8259 leaves open which of two values counts, and whoever wrote both meant both.
+//! Parses JSON and refuses objects with duplicate keys: RFC 8259 leaves open which of two values
+//! counts.
 
 use std::fmt;
 
@@ -6,16 +7,24 @@ use serde::Deserializer;
 use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value as Json};
 
-/// Why bytes are no such document.
+/// The reason why a document is refused.
 pub enum Fault {
-    /// They are not JSON.
+    /// It is nested this deep.
+    TooDeep(u64),
+    /// It is not JSON.
     NotJson(serde_json::Error),
-    /// This key, with those of the objects around it before it, stands twice in an object.
+    /// An object has this key twice. The keys of the objects around it precede it, with dots
+    /// between.
     Repeated(String),
 }
 
-/// Parses; whoever calls has looked at the depth.
-pub fn parse(document: &[u8]) -> Result<Json, Fault> {
+/// Parses a document of at most this depth.
+pub fn parse(document: &[u8], depth_max: u64) -> Result<Json, Fault> {
+    // Checked before the parser runs, because it is recursive.
+    let depth = depth(document);
+    if depth > depth_max {
+        return Err(Fault::TooDeep(depth));
+    }
     let mut repeated = None;
     let mut parser = serde_json::Deserializer::from_slice(document);
     let parsed = Place { path: "", repeated: &mut repeated }.deserialize(&mut parser);
@@ -26,7 +35,7 @@ pub fn parse(document: &[u8]) -> Result<Json, Fault> {
     }
 }
 
-/// Where in the document a value is read, and where to say that a key is there again.
+/// The path of the value that is read, and the place for the first duplicate key.
 struct Place<'a> {
     path: &'a str,
     repeated: &'a mut Option<String>,
@@ -40,6 +49,15 @@ impl<'de> DeserializeSeed<'de> for Place<'_> {
     }
 }
 
+/// Visits values that hold no others.
+macro_rules! plain {
+    ($($visit:ident($type:ty))*) => {
+        $(fn $visit<E: Error>(self, value: $type) -> Result<Json, E> {
+            Ok(value.into())
+        })*
+    };
+}
+
 impl<'de> Visitor<'de> for Place<'_> {
     type Value = Json;
 
@@ -51,25 +69,7 @@ impl<'de> Visitor<'de> for Place<'_> {
         Ok(Json::Null)
     }
 
-    fn visit_bool<E: Error>(self, value: bool) -> Result<Json, E> {
-        Ok(value.into())
-    }
-
-    fn visit_i64<E: Error>(self, value: i64) -> Result<Json, E> {
-        Ok(value.into())
-    }
-
-    fn visit_u64<E: Error>(self, value: u64) -> Result<Json, E> {
-        Ok(value.into())
-    }
-
-    fn visit_f64<E: Error>(self, value: f64) -> Result<Json, E> {
-        Ok(value.into())
-    }
-
-    fn visit_str<E: Error>(self, value: &str) -> Result<Json, E> {
-        Ok(value.into())
-    }
+    plain! { visit_bool(bool) visit_i64(i64) visit_u64(u64) visit_f64(f64) visit_str(&str) }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Json, A::Error> {
         let mut values = Vec::new();
@@ -94,9 +94,39 @@ impl<'de> Visitor<'de> for Place<'_> {
     }
 }
 
+/// Deepest nesting of objects and arrays, without recursion. Exact for valid JSON; the parser
+/// refuses anything else.
+fn depth(bytes: &[u8]) -> u64 {
+    let (mut depth, mut deepest, mut in_string, mut escaped) = (0_u64, 0, false, false);
+    for &byte in bytes {
+        match byte {
+            _ if escaped => escaped = false,
+            b'\\' if in_string => escaped = true,
+            b'"' => in_string = !in_string,
+            _ if in_string => {}
+            b'{' | b'[' => {
+                depth += 1;
+                deepest = deepest.max(depth);
+            }
+            b'}' | b']' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+    }
+    deepest
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn depth_counts_brackets_outside_strings() {
+        let cases: [(&str, u64); 6] =
+            [("{}", 1), ("[[[]]]", 3), (r#"{"a":"[[[["}"#, 1), (r#"{"a":"\"[[","b":[]}"#, 2), ("1", 0), ("]]][", 1)];
+        for (text, expected) in cases {
+            assert_eq!(depth(text.as_bytes()), expected, "{text}");
+        }
+    }
 
     #[test]
     fn what_is_read_is_what_serde_reads() {
@@ -115,12 +145,12 @@ mod tests {
         let mut cases = 0;
         for text in texts {
             let want: Json = serde_json::from_str(text).unwrap();
-            assert!(matches!(parse(text.as_bytes()), Ok(json) if json == want), "{text}");
+            assert!(matches!(parse(text.as_bytes(), 128), Ok(json) if json == want), "{text}");
             cases += 1;
         }
         assert_eq!(cases, 10);
         for text in ["", "{", "[1,]", "1 2", "{\"a\":1}}", "nul", "\"\u{1}\"", "1e999"] {
-            assert!(matches!(parse(text.as_bytes()), Err(Fault::NotJson(_))), "{text}");
+            assert!(matches!(parse(text.as_bytes(), 128), Err(Fault::NotJson(_))), "{text}");
         }
     }
 
@@ -135,7 +165,7 @@ mod tests {
             (r#"{"":1,"":2}"#, ""),
         ];
         for (text, key) in cases {
-            assert!(matches!(parse(text.as_bytes()), Err(Fault::Repeated(named)) if named == key), "{text}");
+            assert!(matches!(parse(text.as_bytes(), 128), Err(Fault::Repeated(named)) if named == key), "{text}");
         }
     }
 }

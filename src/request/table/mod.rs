@@ -1,72 +1,79 @@
-//! The table of keys: everything that a request document may say. Reading, error messages, the JSON Schema and the list of
-//! capabilities all follow from it.
+//! The table of keys: everything that a request document may contain. The reader, its error
+//! messages, the JSON Schema and the list of capabilities follow from it. A new key is one entry of
+//! [`keys`], beside the field of the spec that it sets.
 
-pub(crate) mod fields;
-mod layers;
-mod scene;
+pub(crate) mod dependent;
+pub(crate) mod field;
+mod keys;
 pub(crate) mod value;
-pub(crate) mod words;
 
 use std::sync::LazyLock;
 
-use self::fields::{Field, Group, Layer};
-use self::value::Kind;
-use super::draft::Draft;
-use crate::request::layer_draft::Look;
+use self::field::{Field, Section};
 
-/// Every key with a value. `style` is read before them, since presets come first.
-pub static FIELDS: LazyLock<Vec<Field>> =
-    LazyLock::new(|| layers::fields().into_iter().chain(scene::fields()).collect());
+/// Every key that holds a value, except `style`: it is read before all others, which override it.
+pub static FIELDS: LazyLock<Vec<Field>> = LazyLock::new(keys::all);
 
-/// What is drawn.
-pub const LAYERS: &[Layer] = &[
-    Layer::of_looks("surface", "The filled surface.", Look::turn_surface),
-    Layer::of_looks("wire", "Lines along the mesh's edges.", Look::turn_wire),
-    Layer::of_looks("outline", "The line around the shape.", Look::turn_outline),
-    Layer::of_document(
-        "topology",
-        "Edges that say how the mesh hangs together, each kind in its own colour; null draws none \
-             of a kind.",
-        Draft::turn_topology,
-    ),
-];
-
-/// What else is told.
-pub const GROUPS: &[Group] = &[
-    Group { name: "scene", about: "Which state of the file is drawn." },
-    Group { name: "camera", about: "Where the picture is taken from; by default the mesh is fitted into it." },
-    Group { name: "light", about: "Lamps over light that comes from everywhere." },
-    Group { name: "image", about: "The picture." },
+/// The objects that hold keys: layers, then groups.
+pub const SECTIONS: &[Section] = &[
+    Section {
+        name: "surface",
+        about: "The filled surface.",
+        turn: Some(|d, on| d.layers.surface = on.then(|| *d.surface())),
+        is_for_materials: true,
+    },
+    Section {
+        name: "wire",
+        about: "Lines along the mesh's edges.",
+        turn: Some(|d, on| d.layers.wire = on.then(|| *d.wire_draft())),
+        is_for_materials: true,
+    },
+    Section {
+        name: "outline",
+        about: "The line around the shape.",
+        turn: Some(|d, on| d.layers.outline = on.then(|| *d.outline())),
+        is_for_materials: true,
+    },
+    Section {
+        name: "topology",
+        about: "Edges coloured by how the mesh is connected; kinds whose colour is null are not drawn.",
+        turn: Some(|d, on| d.topology = on.then(|| *d.topology())),
+        is_for_materials: false,
+    },
+    group("scene", "State of the file that is drawn."),
+    group("camera", "Position and lens; by default the mesh is fitted into the picture."),
+    group("light", "Lamps and ambient light."),
+    group("image", "The picture."),
 ];
 
 /// Layers by the asset's own material names.
-pub const MATERIALS: Group = Group {
-    name: "materials",
-    about: "Layers for the asset's materials of these names, over the document's own: \
-            {\"Glass\": {\"surface\": {\"opacity\": 0.3}, \"outline\": null}}.",
-};
+pub const MATERIALS: Section = group(
+    "materials",
+    "Layers for the asset's materials of these names, over the document's own: {\"Glass\": {\"surface\": {\"opacity\": \
+     0.3}, \"outline\": null}}.",
+);
 
-/// Where an editor finds the schema of a document; nothing to a picture.
+/// The key under which editors find the schema of a document. It has no effect on the picture.
 pub const SCHEMA: &str = "$schema";
 
-/// What [`super::Style`] chooses.
+/// The description of `style`.
 pub const STYLE_ABOUT: &str = "A preset of layers, which the layers then override.";
 
-/// Short names, and the keys they stand for.
-pub const SHORT: &[(&str, &str)] = &[
-    ("format", "image.format"),
-    ("samples", "image.samples"),
-    ("background", "image.background"),
-    ("max_error", "image.max_error"),
-    ("view", "camera.view"),
-    ("up", "camera.up"),
-];
+/// The section of this name.
+pub fn section(name: &str) -> Option<&'static Section> {
+    SECTIONS.iter().find(|section| section.name == name)
+}
 
-/// A share, such as an opacity.
-const SHARE: Kind = Kind::Number { min: 0.0, max: 1.0 };
+/// The field that a key or a short name stands for. Materials have no short names.
+pub fn field(key: &str, of_material: bool) -> Option<&'static Field> {
+    FIELDS.iter().find(|field| match of_material {
+        true => field.key == key && field.is_for_materials(),
+        false => field.key == key || field.short == Some(key),
+    })
+}
 
-fn number(min: f64, max: f64) -> Kind {
-    Kind::Number { min, max }
+const fn group(name: &'static str, about: &'static str) -> Section {
+    Section { name, about, turn: None, is_for_materials: false }
 }
 
 #[cfg(test)]
@@ -75,17 +82,14 @@ mod tests {
 
     #[test]
     fn every_key_belongs_somewhere_and_says_what_it_does() {
-        let homes: Vec<&str> = LAYERS.iter().map(|l| l.name).chain(GROUPS.iter().map(|g| g.name)).collect();
         let mut keys = 0;
         for field in FIELDS.iter() {
-            let home = field.key.split_once('.').map(|(home, _)| home);
-            assert!(home.is_none_or(|home| homes.contains(&home)), "{}", field.key);
+            assert_eq!(field.key.contains('.'), field.section().is_some(), "{}", field.key);
             assert!(field.about.ends_with('.') && !field.about.contains('\n'), "{}", field.key);
-            let layer = LAYERS.iter().find(|l| home == Some(l.name));
-            assert_eq!(layer.is_some_and(Layer::is_for_materials), field.is_for_materials(), "{}", field.key);
+            assert!(field.section().is_none_or(|s| s.turn.is_some() || !s.is_for_materials), "{}", field.key);
             keys += 1;
         }
         assert_eq!(keys, 54);
-        assert!(SHORT.iter().all(|(_, long)| FIELDS.iter().any(|f| f.key == *long)));
+        assert_eq!(FIELDS.iter().filter(|field| field.short.is_some()).count(), 6);
     }
 }

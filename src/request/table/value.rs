@@ -1,21 +1,22 @@
-//! One value of a request document: what may be given for a key, and what was.
+//! Values of a request: as they are given, the kinds that keys allow, and what is left after the
+//! check.
 
 use serde_json::Value as Json;
 
 use crate::request::error::{RequestError, RequestFault};
 use crate::spec::color::Rgba;
 
-/// What was given: a JSON value of the document, or the text of a query parameter or of `--set`.
+/// A value as it is given: JSON of a document, or the text of a query parameter or of `--set`.
 #[derive(Clone, Debug)]
 pub enum Given {
-    /// From the document.
+    /// A value of a document.
     Json(Json),
-    /// From a query parameter or a flag: numbers and lists are still text.
+    /// The text of a query parameter or a flag, also for numbers and lists.
     Text(String),
 }
 
 impl Given {
-    /// Whether it is `null`.
+    /// True for `null`.
     pub fn is_null(&self) -> bool {
         match self {
             Self::Json(json) => json.is_null(),
@@ -23,7 +24,7 @@ impl Given {
         }
     }
 
-    /// Whether it is an object without keys: a layer that is there, with its defaults.
+    /// True for an object without keys, which turns a layer on with its defaults.
     pub fn is_empty_object(&self) -> bool {
         match self {
             Self::Json(json) => json.as_object().is_some_and(serde_json::Map::is_empty),
@@ -31,7 +32,7 @@ impl Given {
         }
     }
 
-    /// For an error message.
+    /// The value, for error messages.
     pub fn show(&self) -> String {
         match self {
             Self::Json(json) => json.to_string(),
@@ -65,36 +66,30 @@ impl Given {
     }
 
     fn point(&self) -> Option<[f64; 3]> {
-        let parsed;
-        let list = match self {
-            Self::Json(json) => json.as_array()?,
+        let numbers: Option<Vec<f64>> = match self {
+            Self::Json(json) => json.as_array()?.iter().map(Json::as_f64).collect(),
             Self::Text(text) => {
                 let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']')).unwrap_or(text);
-                let numbers = inner.split(',').map(|n| n.trim().parse::<f64>().ok().map(Json::from));
-                parsed = numbers.collect::<Option<Vec<Json>>>()?;
-                &parsed
+                inner.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect()
             }
         };
-        match list.as_slice() {
-            [x, y, z] => Some([x.as_f64()?, y.as_f64()?, z.as_f64()?]),
-            _ => None,
-        }
+        numbers?.try_into().ok()
     }
 }
 
-/// What is allowed for a key. Everything an error message or a schema says about a key comes from here.
+/// The values that a key allows. Error messages and the schema are made from it.
 #[derive(Clone, Debug)]
 pub enum Kind {
     /// A finite number in a closed range.
     Number {
-        /// Smallest.
+        /// The smallest, which is allowed.
         min: f64,
-        /// Largest.
+        /// The largest, which is allowed.
         max: f64,
     },
     /// A finite number above 0.
     Above0 {
-        /// Largest.
+        /// The largest, which is allowed.
         max: f64,
     },
     /// One of a few whole numbers.
@@ -111,7 +106,7 @@ pub enum Kind {
     Point,
     /// Three finite numbers, not all zero.
     Direction,
-    /// Yes or no.
+    /// True or false.
     Flag,
 }
 
@@ -126,24 +121,24 @@ pub enum Value {
     Whole(u32),
     /// Width and height.
     Size(u32, u32),
-    /// Place in the list of words.
+    /// Index in the list of words.
     Word(usize),
     /// A colour.
     Color(Rgba),
     /// Three numbers.
     Point([f64; 3]),
-    /// Yes or no.
+    /// True or false.
     Flag(bool),
 }
 
-/// How a point is written.
+/// The notations for points.
 const POINT_FORMS: &str = "as [x, y, z] or, in a query or a flag, x,y,z";
 
 /// Largest magnitude of a coordinate: squares of it still fit an f64 many times over.
 pub const COORDINATE_MAX: f64 = 1e30;
 
 impl Kind {
-    /// What is allowed, in words.
+    /// The allowed values, in words.
     pub fn allowed(&self, image_px_max: u64) -> String {
         match self {
             Self::Number { min, max } => format!("a number from {} to {}", short(*min), short(*max)),
@@ -161,21 +156,25 @@ impl Kind {
         }
     }
 
-    /// Checks what was given for `key`.
+    /// Checks the value that is given for `key`.
     pub fn read(&self, key: &str, given: &Given, image_px_max: u64) -> Result<Value, RequestError> {
-        self.check(key, given, image_px_max).map_err(|mut error| {
-            if let Given::Json(Json::String(text)) = given
-                && let Some(what) = self.bare()
-                && self.check(key, &Given::Text(text.clone()), image_px_max).is_ok()
-            {
-                error.given = format!("{}, {what} in quotes", error.given);
-                error.allowed.push_str(", without quotes");
-            }
-            error
-        })
+        let fault = match self.check(given, image_px_max) {
+            Some(Some(value)) => return Ok(value),
+            Some(None) => RequestFault::OutOfRange,
+            None => RequestFault::WrongType,
+        };
+        let mut error = RequestError::new(fault, key, given.show(), self.allowed(image_px_max));
+        if let Given::Json(Json::String(text)) = given
+            && let Some(what) = self.bare()
+            && self.check(&Given::Text(text.clone()), image_px_max).flatten().is_some()
+        {
+            error.given = format!("{}, {what} in quotes", error.given);
+            error.allowed.push_str(", without quotes");
+        }
+        Err(error)
     }
 
-    /// What JSON writes without quotes and a query, where everything is text, knows no quotes for.
+    /// The name of a kind that JSON writes without quotes, for the advice about quotes.
     fn bare(&self) -> Option<&'static str> {
         match self {
             Self::Number { .. } | Self::Above0 { .. } | Self::OneOf(_) | Self::Pixels => Some("a number"),
@@ -184,77 +183,59 @@ impl Kind {
         }
     }
 
-    fn check(&self, key: &str, given: &Given, image_px_max: u64) -> Result<Value, RequestError> {
-        let fail = |fault| RequestError::new(fault, key, given.show(), self.allowed(image_px_max));
-        let wrong_type = || fail(RequestFault::WrongType);
-        let out_of_range = || fail(RequestFault::OutOfRange);
-        match self {
-            Self::Number { min, max } => {
-                let number = given.number().ok_or_else(wrong_type)?;
-                // NaN and the infinities fail this comparison too.
-                if (*min..=*max).contains(&number) { Ok(Value::Number(number)) } else { Err(out_of_range()) }
-            }
-            Self::Above0 { max } => {
-                let number = given.number().ok_or_else(wrong_type)?;
-                if number > 0.0 && number <= *max { Ok(Value::Number(number)) } else { Err(out_of_range()) }
-            }
+    /// The value; None inside if it is out of range, None outside if it is of the wrong type.
+    fn check(&self, given: &Given, px_max: u64) -> Option<Option<Value>> {
+        Some(match self {
+            // NaN and the infinities are in no range.
+            Self::Number { min, max } => Some(given.number()?).filter(|n| (*min..=*max).contains(n)).map(Value::Number),
+            Self::Above0 { max } => Some(given.number()?).filter(|n| *n > 0.0 && n <= max).map(Value::Number),
             Self::OneOf(values) => {
-                let number = given.number().ok_or_else(wrong_type)?;
-                let found = values.iter().find(|&&v| f64::from(v) == number);
-                found.map(|&v| Value::Whole(v)).ok_or_else(out_of_range)
+                let number = given.number()?;
+                values.iter().find(|&&v| f64::from(v) == number).map(|&v| Value::Whole(v))
             }
-            Self::Pixels => {
-                let number = given.number().ok_or_else(wrong_type)?;
-                pixels(number, image_px_max).map(Value::Whole).ok_or_else(out_of_range)
-            }
+            Self::Pixels => pixels(given.number()?, px_max).map(Value::Whole),
             Self::Size => {
-                let (width, height) = size(given).ok_or_else(wrong_type)?;
-                let both = pixels(width, image_px_max).zip(pixels(height, image_px_max));
-                both.map(|(w, h)| Value::Size(w, h)).ok_or_else(out_of_range)
+                let (width, height) = size(given)?;
+                pixels(width, px_max).zip(pixels(height, px_max)).map(|(w, h)| Value::Size(w, h))
             }
             Self::Words(words) => {
-                let word = given.text().ok_or_else(wrong_type)?;
-                words.iter().position(|&w| w == word).map(Value::Word).ok_or_else(out_of_range)
+                let word = given.text()?;
+                words.iter().position(|&w| w == word).map(Value::Word)
             }
-            Self::Color => {
-                let text = given.text().ok_or_else(wrong_type)?;
-                Rgba::parse(text).map(Value::Color).ok_or_else(out_of_range)
-            }
-            Self::Point => {
-                let point = given.point().ok_or_else(wrong_type)?;
-                Some(point).filter(|p| largest(p) <= COORDINATE_MAX).map(Value::Point).ok_or_else(out_of_range)
-            }
-            Self::Direction => {
-                let [x, y, z] = given.point().ok_or_else(wrong_type)?;
-                let largest = largest(&[x, y, z]);
-                if largest == 0.0 || largest > COORDINATE_MAX {
-                    return Err(out_of_range());
-                }
-                // Only where it points matters, and squares of tiny numbers are zero.
-                let unit = if largest < 1.0 / COORDINATE_MAX { largest } else { 1.0 };
-                Ok(Value::Point([x / unit, y / unit, z / unit]))
-            }
-            Self::Flag => given.flag().map(Value::Flag).ok_or_else(wrong_type),
-        }
+            Self::Color => Rgba::parse(given.text()?).map(Value::Color),
+            Self::Point => Some(given.point()?).filter(|p| largest(p) <= COORDINATE_MAX).map(Value::Point),
+            Self::Direction => direction(given.point()?).map(Value::Point),
+            Self::Flag => Some(Value::Flag(given.flag()?)),
+        })
     }
 }
 
+/// A direction that is not zero. Only where it points counts, so tiny ones are scaled up: squares of
+/// tiny numbers are zero.
+fn direction([x, y, z]: [f64; 3]) -> Option<[f64; 3]> {
+    let largest = largest(&[x, y, z]);
+    let unit = if largest < 1.0 / COORDINATE_MAX { largest } else { 1.0 };
+    (largest > 0.0 && largest <= COORDINATE_MAX).then(|| [x / unit, y / unit, z / unit])
+}
+
+/// The largest magnitude of three coordinates.
 fn largest(point: &[f64; 3]) -> f64 {
     point.iter().fold(0.0, |largest, v| v.abs().max(largest))
 }
 
-/// `1e30` and not a one with thirty zeros after it.
+/// A number in its shorter notation: `1e30` rather than thirty zeros.
 fn short(number: f64) -> String {
     let (plain, scientific) = (number.to_string(), format!("{number:e}"));
     if plain.len() > 2 * scientific.len() { scientific } else { plain }
 }
 
+/// A whole number from 1 to `max`.
 fn pixels(number: f64, max: u64) -> Option<u32> {
     let in_range = number >= 1.0 && number <= max.min(u64::from(u32::MAX)) as f64;
     (in_range && number.fract() == 0.0).then_some(number as u32)
 }
 
-/// `256`, `"256"` or `"640x480"`.
+/// Reads `256`, `"256"` or `"640x480"`.
 fn size(given: &Given) -> Option<(f64, f64)> {
     if let Some((width, height)) = given.text().and_then(|t| t.split_once(['x', 'X'])) {
         return Some((width.trim().parse().ok()?, height.trim().parse().ok()?));

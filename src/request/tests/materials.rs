@@ -1,4 +1,4 @@
-//! Layers of a material, and what they begin from.
+//! Layers of materials, which begin from those of the document.
 
 use crate::request::tests::{json, query, rules};
 use crate::request::*;
@@ -21,7 +21,8 @@ fn materials_begin_from_the_document_wherever_they_stand() {
     assert_eq!((glass.outline, spec.layers.outline.is_some()), (None, true));
     assert!(material(&spec, "Frame").wire.is_some() && spec.layers.wire.is_none());
     assert_eq!(material(&spec, "Same"), &spec.layers);
-    // Overrides of the document reach its materials too, and those of a material that one alone.
+    // An override of the document affects its materials too; one of a material affects only that
+    // material.
     let over = [("materials.Glass.surface.opacity", "0.5"), ("surface.color", "0f0"), ("materials.Frame.wire", "null")];
     let over = over.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let spec = read(Some(document.as_bytes()), &over, &rules()).unwrap();
@@ -49,7 +50,7 @@ fn dependent_defaults_and_limits_are_settled_for_each_material() {
     assert_eq!((smoothing("A"), smoothing("B")), (1.0, 0.0));
     let document = r#"{"wire":{"smoothing":0.5},"materials":{"A":{"wire":{"method":"fwidth"}}}}"#;
     assert_eq!(material(&json(document).unwrap(), "A").wire.unwrap().smoothing, 0.5);
-    // A contour is no hull: its unit is its own business.
+    // Contours may differ in their units; hulls may not.
     let document = r#"{"style":"outline","materials":{"A":{"outline":{"method":"contour","unit":"px"}}}}"#;
     assert_eq!(material(&json(document).unwrap(), "A").outline.unwrap().unit, OutlineUnit::Px);
 }
@@ -59,7 +60,7 @@ fn materials_share_what_one_picture_can_do_in_one_way() {
     let hidden = r#"{"style":"wire","wire":{"method":"fwidth"},"materials":{"A":{"wire":{"hidden":"fade"}}}}"#;
     let error = json(hidden).unwrap_err();
     assert_eq!((error.fault, error.key.as_str()), (RequestFault::Conflict, "materials.A.wire.hidden"));
-    // Exact wires may differ, though not without end.
+    // Exact wires may differ, up to a limit.
     let many = |count: usize| {
         let wires: Vec<_> = (0..count).map(|i| format!(r#""M{i}":{{"wire":{{"thickness":{}}}}}"#, i + 1)).collect();
         json(&format!(r#"{{"materials":{{{}}}}}"#, wires.join(",")))

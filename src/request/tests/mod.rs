@@ -1,7 +1,8 @@
-#[cfg(test)]
+//! Documents and dotted keys, read into specs.
+
 mod materials;
-#[cfg(test)]
 mod refused;
+
 use super::*;
 use crate::mesh::UpAxis;
 use crate::spec::{
@@ -20,6 +21,10 @@ pub fn query(pairs: &[(&str, &str)]) -> Result<Spec, RequestError> {
 
 pub fn json(text: &str) -> Result<Spec, RequestError> {
     read(Some(text.as_bytes()), &[], &rules())
+}
+
+fn is_layer(name: &str) -> bool {
+    table::section(name).is_some_and(|section| section.turn.is_some())
 }
 
 #[test]
@@ -72,7 +77,7 @@ fn null_turns_a_layer_off_and_presence_turns_it_on() {
     assert!(json(r#"{"style":"topology","topology":null}"#).unwrap().topology.is_none());
     assert!(json(r#"{"topology":{"open":null}}"#).unwrap().topology.is_some_and(|t| t.open.is_none()));
     assert!(json(r#"{"camera":{},"light":{},"image":{},"materials":{}}"#).is_ok());
-    // What a layer was is forgotten when it is turned off.
+    // A layer that is turned off forgets its values.
     let pairs = [("wire.smoothing", "3"), ("wire.hidden", "show"), ("wire", "null"), ("wire", "{}")];
     let wire = query(&pairs).unwrap().layers.wire.unwrap();
     assert_eq!((wire.smoothing, wire.hidden), (0.0, Hidden::Hide));
@@ -185,15 +190,15 @@ fn defaults_depend_on_other_keys_where_the_contract_says_so() {
 
 #[test]
 fn null_is_the_default_or_as_if_the_key_were_not_there() {
-    let keys: Vec<_> = FIELDS.iter().map(|field| field.key).chain(SHORT.iter().map(|&(key, _)| key)).collect();
+    let keys: Vec<_> = FIELDS.iter().flat_map(|field| [Some(field.key), field.short]).flatten().collect();
     for key in &keys {
-        let home = key.split_once('.').map(|(home, _)| home).filter(|home| LAYERS.iter().any(|l| l.name == *home));
+        let home = key.split_once('.').map(|(home, _)| home).filter(|home| is_layer(home));
         let (inner, without) = match key.split_once('.') {
             Some((home, key)) => (format!(r#"{{"{home}":{{"{key}":null}}}}"#), format!(r#"{{"{home}":{{}}}}"#)),
             None => (format!(r#"{{"{key}":null}}"#), "{}".to_owned()),
         };
         let spec = json(&inner).unwrap_or_else(|error| panic!("{error}"));
-        // What draws none of a kind of edge says so.
+        // Here null is a value: this kind of edge is not drawn.
         if home != Some("topology") || key.ends_with("_deg") || key.ends_with("thickness") {
             assert_eq!(spec, json(&without).unwrap(), "{key}");
         }
@@ -260,7 +265,7 @@ fn flags_are_words_or_digits_in_text_and_booleans_in_json() {
     assert!(json(r#"{"surface":{"textures":false}}"#).unwrap().layers.surface.is_some_and(|s| !s.textures));
 }
 
-/// However short it is, a direction points somewhere.
+/// Even a tiny vector has a direction.
 #[test]
 fn tiny_directions_are_scaled() {
     let direction = |text| query(&[("light.direction", text)]).unwrap().light.direction.unwrap();
@@ -269,7 +274,7 @@ fn tiny_directions_are_scaled() {
     assert_eq!(direction("0,-2,0"), [0.0, -2.0, 0.0]);
 }
 
-/// Every default that the table states is what a key that is not given means.
+/// The defaults that the table states are those that the reader uses.
 #[test]
 fn stated_defaults_are_the_defaults() {
     let mut checked = 0;
@@ -277,7 +282,7 @@ fn stated_defaults_are_the_defaults() {
         let Some(default) = &field.default else { continue };
         let layer = field.key.split_once('.').map_or("", |(layer, _)| layer);
         let (mut with, mut without) = (serde_json::json!({}), serde_json::json!({}));
-        if LAYERS.iter().any(|l| l.name == layer) {
+        if is_layer(layer) {
             without[layer] = serde_json::json!({});
         }
         match field.key.split_once('.') {
@@ -295,6 +300,6 @@ fn the_vocabulary_has_every_word() {
     let vocabulary = vocabulary();
     assert_eq!(vocabulary["style"].len(), 8);
     assert_eq!(vocabulary["surface.debug"].len(), 8);
-    assert_eq!(vocabulary["wire.method"], ["exact", "fwidth", "fwidth-min", "barycentric", "threshold"]);
+    assert_eq!(vocabulary["wire.method"], words_of::<WireMethod>());
     assert_eq!(vocabulary.len(), 16);
 }

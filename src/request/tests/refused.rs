@@ -1,4 +1,4 @@
-//! Requests that are refused, and by which name.
+//! Requests that are refused, and the key that each error names.
 
 use crate::request::tests::{json, query, rules};
 use crate::request::*;
@@ -228,12 +228,12 @@ fn materials_are_bounded_in_number_and_name() {
     assert_eq!(fault, RequestFault::OutOfRange);
     assert!(named.starts_with("materials.\u{e9}") && named.ends_with(".surface.opacity"), "{named}");
     assert!(sentence.contains("257 characters long") && sentence.contains("at most 256"), "{sentence}");
-    // A long name hides neither the layer nor the key.
+    // A long name is shortened; the layer and the key stay.
     let (_, named, _) = refused(&[(&key(200), "2")]);
     assert!(named.starts_with("materials.\u{e9}") && named.ends_with(".surface.opacity"), "{named}");
 }
 
-/// Neither a query nor a document can do more than be refused, whatever is in it.
+/// Random queries and documents are read or refused, and never panic.
 #[test]
 fn noise_is_refused_without_a_panic() {
     let mut state = 7_u64;

@@ -61,7 +61,7 @@ fn spec() -> Spec {
         light,
         image,
         backend: BackendChoice::Cpu,
-        ask: None,
+        quality_target: None,
     }
 }
 

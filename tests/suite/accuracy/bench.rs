@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use meshsnap::spec::WireMethod;
+
 use crate::measure::scenes::{SCENES, SMALL, Scene};
 use crate::measure::table::{Machine, table};
 use crate::measure::techniques::{Family, Technique};
@@ -42,7 +44,7 @@ fn every_technique_is_measured_and_exact_wires_err_least() {
         assert_eq!(row.twin.is_some(), row.back_end == "gpu");
     }
     let mut compared = 0;
-    for exact in rows().iter().filter(|row| row.technique == Technique::Exact) {
+    for exact in rows().iter().filter(|row| row.technique == Technique::Wire(WireMethod::Exact)) {
         let is_other = |row: &&Row| {
             (row.scene, row.back_end, row.samples) == (exact.scene, exact.back_end, exact.samples)
                 && row.technique != exact.technique

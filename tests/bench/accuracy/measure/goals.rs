@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use meshsnap::spec::WireMethod;
+
 use super::summary::{lead, point, range};
 use super::table::{Machine, method};
 use super::techniques::{Family, Technique};
@@ -126,8 +128,8 @@ fn each(of: impl Fn(&str) -> Option<String>) -> String {
 
 fn wires(rows: &[Row]) -> String {
     each(|back_end| {
-        let [_, rmse] = range(rows, Technique::Exact, back_end, |row| Some(row.errors.rmse))?;
-        let [low, high] = range(rows, Technique::Exact, back_end, |row| row.errors.ink)?;
+        let [_, rmse] = range(rows, Technique::Wire(WireMethod::Exact), back_end, |row| Some(row.errors.rmse))?;
+        let [low, high] = range(rows, Technique::Wire(WireMethod::Exact), back_end, |row| row.errors.ink)?;
         Some(format!("RMSE <= {rmse:.2}/255, ink {low:.4} to {high:.4}"))
     })
 }
@@ -171,10 +173,10 @@ pub fn sentences(rows: &[Row]) -> [String; 5] {
     let at = |technique, samples| point(rows, Family::Wires, technique, "cpu-1", samples);
     let least = SAMPLES[0];
     let [exact_1, exact, fwidth_1, fwidth] = [
-        at(Technique::Exact, least),
-        at(Technique::Exact, BASELINE_SAMPLES),
-        at(Technique::Fwidth, least),
-        at(Technique::Fwidth, BASELINE_SAMPLES),
+        at(Technique::Wire(WireMethod::Exact), least),
+        at(Technique::Wire(WireMethod::Exact), BASELINE_SAMPLES),
+        at(Technique::Wire(WireMethod::Fwidth), least),
+        at(Technique::Wire(WireMethod::Fwidth), BASELINE_SAMPLES),
     ]
     .map(|p| p.map_or_else(|| "?".to_owned(), |p| format!("{:.2}/255 at time {:.2}", p.error, p.time)));
     let mean = |family, technique| point(rows, family, technique, "cpu-1", BASELINE_SAMPLES);
@@ -187,7 +189,7 @@ pub fn sentences(rows: &[Row]) -> [String; 5] {
         format!(
             "Time 1 is exact wires on one thread of the CPU with {BASELINE_SAMPLES} samples on the same mesh, {:.1} ms in the mean over the \
              wire scenes.",
-            at(Technique::Exact, BASELINE_SAMPLES).map_or(f64::NAN, |p| p.time_ms)
+            at(Technique::Wire(WireMethod::Exact), BASELINE_SAMPLES).map_or(f64::NAN, |p| p.time_ms)
         ),
         format!("Exact wires on one thread err by {}.", leads_in_words(rows)),
         format!(
@@ -207,7 +209,7 @@ pub fn sentences(rows: &[Row]) -> [String; 5] {
 }
 
 fn leads_in_words(rows: &[Row]) -> String {
-    let exact = point(rows, Family::Wires, Technique::Exact, "cpu-1", BASELINE_SAMPLES);
+    let exact = point(rows, Family::Wires, Technique::Wire(WireMethod::Exact), "cpu-1", BASELINE_SAMPLES);
     match (exact, lead(rows, "cpu-1")) {
         (Some(exact), Some(lead)) => format!(
             "{:.2}/255, {:.0} times less than the next best, {}, in {:.2} times its time",

@@ -213,12 +213,11 @@ fn words(technique: Technique) -> &'static str {
 
 /// Mid tones: at least 3 : 1 against white and against black.
 fn color(technique: Technique) -> &'static str {
+    const WIRES: [&str; 6] = ["#2f81f7", "#d9730d", "#a8800c", "#c545a8", "#768390", "#2da15f"];
     match technique {
-        Technique::Exact | Technique::Contour => "#2f81f7",
-        Technique::Fwidth | Technique::Hull => "#d9730d",
-        Technique::FwidthMin => "#a8800c",
-        Technique::Barycentric => "#c545a8",
-        Technique::Threshold => "#768390",
+        Technique::Wire(method) => WIRES[method as usize % WIRES.len()],
+        Technique::Contour => "#2f81f7",
+        Technique::Hull => "#d9730d",
         Technique::FaceNormals => "#2da15f",
         Technique::DerivativeNormals => "#c545a8",
     }

@@ -7,6 +7,7 @@ use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
 use meshsnap::plan::DrawPlan;
+use meshsnap::spec::WireMethod;
 
 use super::scenes::{Scene, plan};
 use super::techniques::{Family, Technique};
@@ -100,7 +101,7 @@ fn rounds(cases: &[Case<'_>], baseline: &Case<'_>, runs: usize, back_ends: &mut 
 /// Exact wires of the scene's own width, or 1 px wide where it has none.
 fn baseline<'a>(scene: &Scene, effort: Effort, mesh: &'a Mesh) -> Case<'a> {
     let width_px = if scene.family == Family::Wires { scene.width_px } else { 1.0 };
-    case(scene, effort, mesh, Technique::Exact, BASELINE_SAMPLES, width_px)
+    case(scene, effort, mesh, Technique::Wire(WireMethod::Exact), BASELINE_SAMPLES, width_px)
 }
 
 fn case<'a>(
@@ -124,7 +125,7 @@ fn truths(scene: &Scene, effort: Effort, mesh: &Mesh, baseline: &Case<'_>, cases
     };
     let techniques = scene.family.techniques();
     match scene.family {
-        Family::Wires => vec![of(Technique::Exact, &baseline.plan); techniques.len()],
+        Family::Wires => vec![of(Technique::Wire(WireMethod::Exact), &baseline.plan); techniques.len()],
         Family::Faces | Family::Pictures => vec![of(Technique::FaceNormals, &cases[0].plan); techniques.len()],
         // Each in its own view: room is left for what sticks out.
         Family::Outlines => {

@@ -1,5 +1,7 @@
 //! Rows of many scenes as one point, and what follows from them.
 
+use meshsnap::spec::WireMethod;
+
 use super::techniques::{Family, Technique};
 use super::{Row, SAMPLES};
 
@@ -68,8 +70,8 @@ pub struct Lead {
 /// At the samples of the baseline; None where wires were not measured there.
 pub fn lead(rows: &[Row], back_end: &str) -> Option<Lead> {
     let at = |technique| point(rows, Family::Wires, technique, back_end, super::BASELINE_SAMPLES);
-    let exact = at(Technique::Exact)?;
-    let others = Family::Wires.techniques().iter().filter(|&&t| t != Technique::Exact);
+    let exact = at(Technique::Wire(WireMethod::Exact))?;
+    let others = Family::Wires.techniques().iter().filter(|&&t| t != Technique::Wire(WireMethod::Exact));
     let (other, best) =
         others.filter_map(|&t| Some((t, at(t)?))).min_by(|(_, a), (_, b)| a.error.total_cmp(&b.error))?;
     Some(Lead { other, error_factor: best.error / exact.error, time_factor: exact.time / best.time })

@@ -1,4 +1,4 @@
-//! What is compared, and how each technique is asked for the same thing.
+//! The techniques that are compared, and the requests that ask each of them for the same picture.
 //!
 //! Lines are w pixels wide in truth. The approximating wire methods have no such number; each gets the parameters with which it
 //! is w wide where its own measure is right:
@@ -8,6 +8,10 @@
 //! - `barycentric`: half gone at b = 0.05 t, so that with h the height of a triangle on screen it is 0.1 t h wide.
 //! - `threshold`: gone at b = 0.02 t, so 0.04 t h wide. For both h is the scene's median, and t at most 10.
 //! - `hull`: a strip of w pixels beyond the silhouette; `contour`: w pixels, half of them inside.
+
+use std::sync::LazyLock;
+
+use meshsnap::spec::{ThicknessUnit, WIRE_METHODS, WireMethod};
 
 use super::scenes::Scene;
 
@@ -27,23 +31,21 @@ pub enum Family {
 /// A way to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Technique {
-    Exact,
-    Fwidth,
-    FwidthMin,
-    Barycentric,
-    Threshold,
+    Wire(WireMethod),
     Contour,
     Hull,
     FaceNormals,
     DerivativeNormals,
 }
 
-use Technique::{Barycentric, Contour, DerivativeNormals, Exact, FaceNormals, Fwidth, FwidthMin, Hull, Threshold};
+use Technique::{Contour, DerivativeNormals, FaceNormals, Hull, Wire};
+
+static WIRES: LazyLock<Vec<Technique>> = LazyLock::new(|| WIRE_METHODS.iter().map(|row| Wire(row.method)).collect());
 
 impl Family {
     pub fn techniques(self) -> &'static [Technique] {
         match self {
-            Self::Wires => &[Exact, Fwidth, FwidthMin, Barycentric, Threshold],
+            Self::Wires => &WIRES,
             Self::Outlines => &[Contour, Hull],
             Self::Faces | Self::Pictures => &[FaceNormals, DerivativeNormals],
         }
@@ -63,11 +65,7 @@ impl Technique {
     /// As requests name it.
     pub fn name(self) -> &'static str {
         match self {
-            Exact => "exact",
-            Fwidth => "fwidth",
-            FwidthMin => "fwidth-min",
-            Barycentric => "barycentric",
-            Threshold => "threshold",
+            Wire(method) => method.info().name,
             Contour => "contour",
             Hull => "hull",
             FaceNormals => "face",
@@ -77,13 +75,13 @@ impl Technique {
 
     /// The thickness to ask for; `height_px` is the median height of the scene's triangles on screen.
     pub fn thickness(self, width_px: f64, height_px: f64) -> f64 {
-        let share = width_px / height_px;
-        match self {
-            Exact | Contour | Hull => width_px,
-            Fwidth | FwidthMin => 0.5 * (width_px - width_px.min(1.0)),
-            Barycentric => (share / 0.1).min(10.0),
-            Threshold => (share / 0.04).min(10.0),
-            FaceNormals | DerivativeNormals => 0.0,
+        let unit = if let Wire(method) = self { method.info().unit } else { ThicknessUnit::Pixels };
+        match (self, unit) {
+            (FaceNormals | DerivativeNormals, _) => 0.0,
+            (_, ThicknessUnit::Pixels) => width_px,
+            (_, ThicknessUnit::Derivatives) => 0.5 * (width_px - width_px.min(1.0)),
+            // Both triangles of an edge draw the wire.
+            (_, ThicknessUnit::TriangleHeight(share)) => (width_px / height_px / (2.0 * share)).min(10.0),
         }
     }
 
@@ -91,7 +89,7 @@ impl Technique {
     /// white on a black one.
     pub fn keys(self, scene: &Scene, samples: u32, thickness: f64) -> Vec<(&'static str, String)> {
         let mut keys: Vec<(&str, &str)> = match self {
-            Exact | Fwidth | FwidthMin | Barycentric | Threshold => vec![
+            Wire(_) => vec![
                 ("style", "wireframe"),
                 ("wire.method", self.name()),
                 ("wire.hidden", "hide"),
@@ -114,10 +112,11 @@ impl Technique {
         }
         let mut keys: Vec<(&str, String)> = keys.into_iter().map(|(k, v)| (k, v.to_owned())).collect();
         match self {
-            Exact | Barycentric | Threshold => keys.push(("wire.thickness", thickness.to_string())),
-            Fwidth | FwidthMin => {
+            Wire(method) => {
                 keys.push(("wire.thickness", thickness.to_string()));
-                keys.push(("wire.smoothing", scene.width_px.min(1.0).to_string()));
+                if method.info().unit == ThicknessUnit::Derivatives {
+                    keys.push(("wire.smoothing", scene.width_px.min(1.0).to_string()));
+                }
             }
             Contour | Hull => keys.push(("outline.thickness", thickness.to_string())),
             FaceNormals | DerivativeNormals => {}

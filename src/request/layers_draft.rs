@@ -1,0 +1,91 @@
+//! [`Layers`] in the making: those of a style, of the document, or of one of its materials.
+
+use super::error::{RequestError, RequestFault};
+use crate::request::style::Style;
+use crate::request::table::dependent::Dependent;
+use crate::spec::color::Rgba;
+use crate::spec::{Hidden, Layers, Outline, OutlineUnit, Shading, Surface, Wire, WireMethod};
+
+/// Largest thickness of a wire whose method does not measure it in pixels.
+pub const MULTIPLE_MAX: f32 = 10.0;
+
+/// Largest outline in pixels: wider than any picture needs, and far from overflowing fixed point.
+pub const OUTLINE_PX_MAX: f32 = 100.0;
+
+/// Layers whose dependent defaults are still open.
+#[derive(Clone, Debug)]
+pub struct LayersDraft {
+    /// The filled surface.
+    pub surface: Option<Surface>,
+    /// Lines along edges.
+    pub wire: Option<WireDraft>,
+    /// The line around the shape.
+    pub outline: Option<Outline>,
+    /// The style's treatment of hidden edges, unless the request gives one.
+    hidden: Hidden,
+}
+
+/// A wire whose dependent defaults are still open.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WireDraft {
+    /// The values that depend on no other key.
+    pub line: Wire,
+    /// By default exact, unless a quality target chooses.
+    pub method: Dependent<WireMethod>,
+    /// By default 0 for exact lines and 1 for the others.
+    pub smoothing: Dependent<f32>,
+    /// By default as the style has it.
+    pub hidden: Dependent<Hidden>,
+}
+
+impl LayersDraft {
+    /// The layers of a style.
+    pub fn new(style: Style) -> Self {
+        let surface = |shading| Some(Surface { shading, ..Surface::default() });
+        let white = || surface(Shading::Unlit).map(|surface| Surface { color: Some(Rgba::WHITE), ..surface });
+        let wire = Some(WireDraft::default());
+        let (surface, wire, outline) = match style {
+            Style::Flat | Style::Topology => (surface(Shading::Flat), None, None),
+            Style::Smooth => (surface(Shading::Smooth), None, None),
+            Style::Unlit => (surface(Shading::Unlit), None, None),
+            Style::Wire => (surface(Shading::Flat), wire, None),
+            Style::Wireframe => (None, wire, None),
+            Style::Outline => (surface(Shading::Smooth), None, Some(Outline::default())),
+            Style::HiddenLine => (white(), wire, None),
+        };
+        let hidden = if style == Style::Wireframe { Hidden::Fade } else { Hidden::Hide };
+        Self { surface, wire, outline, hidden }
+    }
+
+    /// True if there is a wire whose method may be chosen.
+    pub fn has_open_wire(&self) -> bool {
+        self.wire.is_some_and(|wire| !wire.method.is_given() && !wire.smoothing.is_given())
+    }
+
+    /// Settles defaults and limits that depend on several keys. `prefix` precedes the keys of a
+    /// material.
+    pub fn finish(&self, prefix: &str) -> Result<Layers, RequestError> {
+        let too_thick = |key: &str, given: f32, allowed: String| {
+            Err(RequestError::new(RequestFault::OutOfRange, &format!("{prefix}{key}"), given, allowed))
+        };
+        let wire = self.wire.map(|WireDraft { line, method, smoothing, hidden }| {
+            let method = method.or(WireMethod::Exact);
+            let smoothing = smoothing.or(if method == WireMethod::Exact { 0.0 } else { 1.0 });
+            Wire { method, smoothing, hidden: hidden.or(self.hidden), ..line }
+        });
+        if let Some(Wire { method, thickness, .. }) = wire
+            && method != WireMethod::Exact
+            && thickness > MULTIPLE_MAX
+        {
+            let allowed = format!("a number from 0 to {MULTIPLE_MAX} where `{prefix}wire.method` is not exact");
+            return too_thick("wire.thickness", thickness, allowed);
+        }
+        if let Some(Outline { unit: OutlineUnit::Px, thickness: Some(thickness), .. }) = self.outline
+            && thickness > OUTLINE_PX_MAX
+        {
+            let allowed = format!("a number from 0 to {OUTLINE_PX_MAX} where `{prefix}outline.unit` is px");
+            return too_thick("outline.thickness", thickness, allowed);
+        }
+        Ok(Layers { surface: self.surface, wire, outline: self.outline })
+    }
+}

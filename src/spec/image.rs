@@ -1,0 +1,25 @@
+//! Size, format, sampling and background of the picture, as a request describes them.
+
+use super::color::Rgba;
+pub use crate::image::ImageFormat;
+
+/// The picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImageSpec {
+    /// Columns.
+    pub width_px: u32,
+    /// Rows.
+    pub height_px: u32,
+    /// None: the caller decides, by file extension or Accept header, and else takes PNG.
+    pub format: Option<ImageFormat>,
+    /// Visibility samples per pixel: 1, 4, 8 or 16.
+    pub samples: u32,
+    /// The colour behind the mesh; alpha 0 is transparent.
+    pub background: Rgba,
+}
+
+impl Default for ImageSpec {
+    fn default() -> Self {
+        Self { width_px: 512, height_px: 512, format: None, samples: 4, background: Rgba::WHITE }
+    }
+}
