@@ -4,10 +4,7 @@
 //! Offsets and field names are those of the KTX File Format, version 2.0, section 3
 //! (<https://registry.khronos.org/KTX/specs/2.0/ktxspec.v2.html>).
 
-use std::panic::catch_unwind;
-
 use crate::texture::TextureError;
-use basisu::{DecodeFlags, TargetFormat, Transcoder};
 
 /// What a KTX2 file's header says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,9 +65,11 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<BasisHeader, TextureError> {
 
 /// Transcodes to straight RGBA with 8 bits per channel. The caller has spent
 /// [`BasisHeader::decoding_bytes`].
+#[cfg(feature = "basis")]
 pub fn decode(name: &str, bytes: &[u8], header: &BasisHeader) -> Result<Vec<u8>, TextureError> {
+    use basisu::{DecodeFlags, TargetFormat, Transcoder};
     // The crate is young and its input is hostile: a panic in it counts as a broken file.
-    let texels = catch_unwind(|| {
+    let texels = std::panic::catch_unwind(|| {
         let texture = Transcoder::new(bytes).ok()?;
         let same = texture.base_dimensions() == (header.width, header.height);
         same.then(|| texture.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).ok())?
@@ -78,6 +77,12 @@ pub fn decode(name: &str, bytes: &[u8], header: &BasisHeader) -> Result<Vec<u8>,
     let wanted = header.width as usize * header.height as usize * 4;
     let texels = texels.ok().flatten().filter(|texels| texels.len() == wanted);
     texels.ok_or_else(|| broken(name, "cannot be transcoded: its data is broken, or of a kind that is not read"))
+}
+
+/// Refuses: this build has no transcoder.
+#[cfg(not(feature = "basis"))]
+pub fn decode(name: &str, _: &[u8], _: &BasisHeader) -> Result<Vec<u8>, TextureError> {
+    Err(unsupported(name, "is a Basis Universal texture, and this program was built without the feature `basis`"))
 }
 
 fn broken(name: &str, detail: &str) -> TextureError {
