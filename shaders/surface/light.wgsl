@@ -8,6 +8,11 @@ struct Light {
     gloss: f32,
 };
 
+// A straight colour under light, as bright as can be shown.
+fn lit(base: vec4<f32>, light_here: Light) -> vec4<f32> {
+    return vec4(clamp(rn3(base.xyz * light_here.gain) + light_here.gloss, vec3(0.0), vec3(1.0)), base.w);
+}
+
 // Light on a surface with unit normal n.
 fn light(metallic: f32, roughness: f32, n: vec3<f32>) -> Light {
     let alpha = max(rn(roughness * roughness), 0.0025);

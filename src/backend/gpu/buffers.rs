@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::device::Gpu;
+use super::handles::Handles;
 use crate::backend::DrawError;
 use crate::backend::gpu::pipelines::{SLOTS, Slot};
 
@@ -55,7 +55,7 @@ pub struct Buffers {
 
 impl Buffers {
     /// A buffer of at least `size` bytes for the slot; what it held is lost if it had to grow.
-    pub fn reserve(&mut self, gpu: &Gpu, slot: Slot, size: u64) -> Result<&wgpu::Buffer, DrawError> {
+    pub fn reserve(&mut self, gpu: &Handles, slot: Slot, size: u64) -> Result<&wgpu::Buffer, DrawError> {
         use wgpu::BufferUsages as U;
         let limit = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
         if size > limit {
@@ -68,7 +68,7 @@ impl Buffers {
     }
 
     /// Reserves and fills a buffer. The length is rounded up to whole words with zeros.
-    pub fn upload(&mut self, gpu: &Gpu, slot: Slot, bytes: &[u8]) -> Result<(), DrawError> {
+    pub fn upload(&mut self, gpu: &Handles, slot: Slot, bytes: &[u8]) -> Result<(), DrawError> {
         let buffer = self.reserve(gpu, slot, bytes.len().next_multiple_of(4) as u64)?;
         let (words, rest) = bytes.split_at(bytes.len() & !3);
         if !words.is_empty() {
@@ -83,7 +83,7 @@ impl Buffers {
     }
 
     /// Reserves a buffer and fills it with slices of whole words, one after the other.
-    pub fn upload_parts(&mut self, gpu: &Gpu, slot: Slot, parts: &[&[u8]]) -> Result<(), DrawError> {
+    pub fn upload_parts(&mut self, gpu: &Handles, slot: Slot, parts: &[&[u8]]) -> Result<(), DrawError> {
         let buffer = self.reserve(gpu, slot, parts.iter().map(|part| part.len() as u64).sum())?;
         let mut at = 0;
         for part in parts.iter().filter(|part| !part.is_empty()) {
@@ -94,7 +94,7 @@ impl Buffers {
     }
 
     /// Reserves a buffer and fills it with whole words from a place on; what is before them is for a kernel to write.
-    pub fn upload_at(&mut self, gpu: &Gpu, slot: Slot, at: u64, bytes: &[u8]) -> Result<(), DrawError> {
+    pub fn upload_at(&mut self, gpu: &Handles, slot: Slot, at: u64, bytes: &[u8]) -> Result<(), DrawError> {
         let buffer = self.reserve(gpu, slot, at + bytes.len() as u64)?;
         if !bytes.is_empty() {
             gpu.queue.write_buffer(buffer, at, bytes);
@@ -103,25 +103,25 @@ impl Buffers {
     }
 
     /// The slot's buffer, or an empty one where the plan needs none.
-    pub fn storage(&mut self, gpu: &Gpu, slot: Slot) -> Result<&wgpu::Buffer, DrawError> {
+    pub fn storage(&mut self, gpu: &Handles, slot: Slot) -> Result<&wgpu::Buffer, DrawError> {
         self.reserve(gpu, slot, 0)
     }
 
     /// Fills a uniform buffer.
-    pub fn upload_uniform<'a>(gpu: &Gpu, slot: &'a mut Option<wgpu::Buffer>, bytes: &[u8]) -> &'a wgpu::Buffer {
+    pub fn upload_uniform<'a>(gpu: &Handles, slot: &'a mut Option<wgpu::Buffer>, bytes: &[u8]) -> &'a wgpu::Buffer {
         let buffer = Self::uniform(gpu, slot, bytes.len() as u64);
         gpu.queue.write_buffer(buffer, 0, bytes);
         buffer
     }
 
     /// A uniform buffer of at least `size` bytes.
-    pub fn uniform<'a>(gpu: &Gpu, slot: &'a mut Option<wgpu::Buffer>, size: u64) -> &'a wgpu::Buffer {
+    pub fn uniform<'a>(gpu: &Handles, slot: &'a mut Option<wgpu::Buffer>, size: u64) -> &'a wgpu::Buffer {
         use wgpu::BufferUsages as U;
         grow(gpu, slot, size, gpu.limits.max_buffer_size, U::UNIFORM | U::COPY_DST)
     }
 
     /// A buffer of at least `size` bytes that the CPU can map.
-    pub fn staging(&mut self, gpu: &Gpu, size: u64) -> Result<&wgpu::Buffer, DrawError> {
+    pub fn staging(&mut self, gpu: &Handles, size: u64) -> Result<&wgpu::Buffer, DrawError> {
         use wgpu::BufferUsages as U;
         let limit = gpu.limits.max_buffer_size;
         if size > limit {
@@ -131,7 +131,7 @@ impl Buffers {
     }
 
     /// A small buffer that the CPU can map.
-    pub fn counts(&mut self, gpu: &Gpu) -> &wgpu::Buffer {
+    pub fn counts(&mut self, gpu: &Handles) -> &wgpu::Buffer {
         use wgpu::BufferUsages as U;
         grow(gpu, &mut self.counts, 8, SIZE_MIN, U::MAP_READ | U::COPY_DST)
     }
@@ -143,7 +143,7 @@ impl Buffers {
 }
 
 fn grow<'a>(
-    gpu: &Gpu,
+    gpu: &Handles,
     slot: &'a mut Option<wgpu::Buffer>,
     size: u64,
     limit: u64,

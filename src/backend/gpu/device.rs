@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 
 use super::buffers::SpareBuffers;
+use super::handles::Handles;
 use crate::backend::DrawError;
 use crate::backend::gpu::pipelines::Stages;
 use crate::limits::Deadline;
@@ -43,11 +44,9 @@ pub struct GpuInfo {
 
 /// An opened GPU.
 pub struct Gpu {
-    pub(super) device: wgpu::Device,
-    pub(super) queue: wgpu::Queue,
+    pub(super) handles: Handles,
     pub(super) stages: Stages,
     pub(super) spare_buffers: SpareBuffers,
-    pub(super) limits: wgpu::Limits,
     pub(super) int64_atomics: bool,
     info: GpuInfo,
     lost: Lost,
@@ -110,11 +109,9 @@ impl Gpu {
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
         Ok(Self {
-            device,
-            queue,
+            handles: Handles { device, queue, limits },
             stages: Stages::default(),
             spare_buffers: SpareBuffers::default(),
-            limits,
             int64_atomics,
             info,
             lost,
@@ -153,7 +150,7 @@ impl Gpu {
     /// Runs `work` and turns what the device complains about meanwhile, on this thread, into an error.
     pub(super) fn scoped<T>(&self, work: impl FnOnce() -> Result<T, DrawError>) -> Result<T, DrawError> {
         use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
-        let [a, b, c] = [Internal, OutOfMemory, Validation].map(|filter| self.device.push_error_scope(filter));
+        let [a, b, c] = [Internal, OutOfMemory, Validation].map(|filter| self.handles.device.push_error_scope(filter));
         let result = work();
         // Innermost first. On wgpu's own back-ends these futures are ready at once.
         let errors = [c, b, a].map(|scope| pollster::block_on(scope.pop()));
@@ -177,7 +174,7 @@ impl Gpu {
             deadline.check()?;
             self.check()?;
             // Real device loss panics inside poll, whatever handlers are set.
-            match catch_unwind(AssertUnwindSafe(|| self.device.poll(wgpu::PollType::Poll))) {
+            match catch_unwind(AssertUnwindSafe(|| self.handles.device.poll(wgpu::PollType::Poll))) {
                 Ok(Ok(_)) => {}
                 Ok(Err(error)) => return Err(DrawError::Device(error.to_string())),
                 Err(_) => return Err(self.declare_lost("polling it failed")),

@@ -8,6 +8,7 @@
 
 mod buffers;
 mod device;
+mod handles;
 mod params;
 pub(crate) mod pass_mask;
 pub(crate) mod pipelines;
@@ -20,6 +21,7 @@ pub use self::device::{AtomicsChoice, Gpu, GpuInfo, GpuKind};
 pub use self::schedule::sizes::bands_bytes;
 
 use self::buffers::Buffers;
+use self::handles::Handles;
 use self::params::{attributes, cell_masks, corner_triangles, edge_lists, hull_looks};
 use self::pipelines::Slot;
 use self::recorder::Recorder;
@@ -80,8 +82,8 @@ impl GpuRenderer {
         }
         self.job(|gpu, buffers| {
             let schedule = Schedule::new(plan, &traits(gpu), goal)?;
-            upload_geometry(gpu, buffers, plan, &schedule)?;
-            buffers.staging(gpu, u64::from(schedule.banding.rows) * row_words as u64 * 8)?;
+            upload_geometry(&gpu.handles, buffers, plan, &schedule)?;
+            buffers.staging(&gpu.handles, u64::from(schedule.banding.rows) * row_words as u64 * 8)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
             let mut words = Vec::with_capacity(len);
             execute(&mut recorder, plan, &schedule, |recorder, band| {
@@ -120,9 +122,9 @@ impl Renderer for GpuRenderer {
         }
         self.job(|gpu, buffers| {
             let schedule = Schedule::new(plan, &traits(gpu), Goal::Picture)?;
-            upload_geometry(gpu, buffers, plan, &schedule)?;
-            upload_looks(gpu, buffers, plan, &schedule)?;
-            buffers.staging(gpu, size)?;
+            upload_geometry(&gpu.handles, buffers, plan, &schedule)?;
+            upload_looks(&gpu.handles, buffers, plan, &schedule)?;
+            buffers.staging(&gpu.handles, size)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
             execute(&mut recorder, plan, &schedule, |recorder, Band { rows: [first, end] }| {
                 let to = u64::from(first) * row_bytes;
@@ -145,8 +147,8 @@ impl Renderer for GpuRenderer {
 
 fn traits(gpu: &Gpu) -> DeviceTraits {
     DeviceTraits {
-        binding_bytes_max: gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size),
-        workgroups_max: gpu.limits.max_compute_workgroups_per_dimension,
+        binding_bytes_max: gpu.handles.limits.max_storage_buffer_binding_size.min(gpu.handles.limits.max_buffer_size),
+        workgroups_max: gpu.handles.limits.max_compute_workgroups_per_dimension,
         tile_workgroups: if gpu.is_software() { TILE_WORKGROUPS_SOFTWARE } else { TILE_WORKGROUPS },
         int64_atomics: gpu.int64_atomics,
         loops_are_limited: gpu.is_software(),
@@ -155,7 +157,7 @@ fn traits(gpu: &Gpu) -> DeviceTraits {
 
 /// Puts what transform and visibility read on the GPU, and makes room for what they write.
 fn upload_geometry(
-    gpu: &Gpu,
+    gpu: &Handles,
     buffers: &mut Buffers,
     plan: &DrawPlan<'_>,
     schedule: &Schedule,
@@ -185,7 +187,12 @@ fn upload_geometry(
 }
 
 /// Puts what shade, lines and resolve read on the GPU, and makes room for what they write.
-fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
+fn upload_looks(
+    gpu: &Handles,
+    buffers: &mut Buffers,
+    plan: &DrawPlan<'_>,
+    schedule: &Schedule,
+) -> Result<(), DrawError> {
     let band_pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);
     if has_visibility(plan) || !plan.lines.is_empty() {
         buffers.reserve(gpu, Slot::Colors, band_pixels * color_bytes(plan))?;

@@ -6,6 +6,7 @@ use std::sync::mpsc;
 
 use super::buffers::Buffers;
 use super::device::Gpu;
+use super::handles::Handles;
 use super::params::{BATCH_STRIDE, Batch, Frame, pack};
 use crate::backend::DrawError;
 use crate::backend::gpu::pipelines::key::look;
@@ -38,14 +39,14 @@ impl<'a> Recorder<'a> {
         batches: &[Batch],
     ) -> Self {
         let frame = Frame::new(plan);
-        let frame = Buffers::upload_uniform(gpu, &mut buffers.frame, bytemuck::bytes_of(&frame)).clone();
+        let frame = Buffers::upload_uniform(&gpu.handles, &mut buffers.frame, bytemuck::bytes_of(&frame)).clone();
         // One more, for dispatches whose numbers are known only on the way.
         let spare_batch = batches.len();
-        let batches = upload_batches(gpu, &mut buffers.batches, batches).clone();
+        let batches = upload_batches(&gpu.handles, &mut buffers.batches, batches).clone();
         let one = wgpu::BufferBinding { buffer: &batches, offset: 0, size: wgpu::BufferSize::new(BATCH_STRIDE as u64) };
-        let uniforms = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        let uniforms = gpu.handles.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
-            layout: &uniforms_layout(&gpu.device),
+            layout: &uniforms_layout(&gpu.handles.device),
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: frame.as_entire_binding() },
                 wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(one) },
@@ -84,7 +85,10 @@ impl<'a> Recorder<'a> {
     /// Draws what the work list holds: reads how long it is, then runs the kernel in rounds of known length.
     pub fn tiles_in_rounds(&mut self, stage: Stage, batch: &Batch, tiles: &Tiles) -> Result<(), DrawError> {
         let mut counts = [0; 2];
-        let (work, to) = (self.buffers.storage(self.gpu, Slot::Work)?.clone(), self.buffers.counts(self.gpu).clone());
+        let (work, to) = (
+            self.buffers.storage(&self.gpu.handles, Slot::Work)?.clone(),
+            self.buffers.counts(&self.gpu.handles).clone(),
+        );
         self.encoder().copy_buffer_to_buffer(&work, 0, &to, 0, Some(8));
         self.read(&to, 8, |bytes| counts = bytemuck::pod_read_unaligned(bytes))?;
         let [large, huge] = counts.map(|count: u32| count.min(batch.capacity));
@@ -98,7 +102,7 @@ impl<'a> Recorder<'a> {
             };
             if let Some(batches) = &self.buffers.batches {
                 let offset = (self.spare_batch * BATCH_STRIDE) as u64;
-                self.gpu.queue.write_buffer(batches, offset, bytemuck::bytes_of(&range));
+                self.gpu.handles.queue.write_buffer(batches, offset, bytemuck::bytes_of(&range));
             }
             self.dispatch(stage, self.spare_batch, [tiles.workgroups, 1])?;
             // Writes to buffers come before all commands of a submission: one round each.
@@ -121,7 +125,8 @@ impl<'a> Recorder<'a> {
 
     /// Reads one word of a buffer, when all that was recorded is done.
     pub fn read_word(&mut self, slot: Slot, index: u32) -> Result<u32, DrawError> {
-        let (from, to) = (self.buffers.storage(self.gpu, slot)?.clone(), self.buffers.counts(self.gpu).clone());
+        let (from, to) =
+            (self.buffers.storage(&self.gpu.handles, slot)?.clone(), self.buffers.counts(&self.gpu.handles).clone());
         self.encoder().copy_buffer_to_buffer(&from, u64::from(index) * 4, &to, 0, Some(4));
         let mut word = 0;
         self.read(&to, 4, |bytes| word = bytemuck::pod_read_unaligned(bytes))?;
@@ -130,14 +135,14 @@ impl<'a> Recorder<'a> {
 
     /// Fills the first `size` bytes of a buffer with zeros.
     pub fn clear(&mut self, slot: Slot, size: u64) -> Result<(), DrawError> {
-        let buffer = self.buffers.storage(self.gpu, slot)?.clone();
+        let buffer = self.buffers.storage(&self.gpu.handles, slot)?.clone();
         self.encoder().clear_buffer(&buffer, 0, Some(size));
         Ok(())
     }
 
     /// Copies `size` bytes of a buffer, from `first` on, to `offset` in the staging buffer.
     pub fn copy_out(&mut self, slot: Slot, first: u64, size: u64, offset: u64) -> Result<(), DrawError> {
-        let from = self.buffers.storage(self.gpu, slot)?.clone();
+        let from = self.buffers.storage(&self.gpu.handles, slot)?.clone();
         if let Some(to) = self.buffers.staging.clone() {
             self.encoder().copy_buffer_to_buffer(&from, first, &to, offset, Some(size));
         }
@@ -153,7 +158,7 @@ impl<'a> Recorder<'a> {
                 // A job that gave up does not listen any more.
                 let _ = sender.send(());
             });
-            self.gpu.queue.submit([encoder.finish()]);
+            self.gpu.handles.queue.submit([encoder.finish()]);
             if let Some(before) = self.in_flight.replace(done) {
                 self.gpu.wait(&before, self.deadline)?;
             }
@@ -186,16 +191,16 @@ impl<'a> Recorder<'a> {
     }
 
     fn kernel(&mut self, stage: Stage) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
-        let pipeline = self.gpu.stages.get(&self.gpu.device, stage, self.look);
+        let pipeline = self.gpu.stages.get(&self.gpu.handles.device, stage, self.look);
         let mut bound = Vec::new();
         for &(slot, _) in stage.buffers() {
-            bound.push((slot, self.buffers.storage(self.gpu, stage.bound_at(slot))?.clone()));
+            bound.push((slot, self.buffers.storage(&self.gpu.handles, stage.bound_at(slot))?.clone()));
         }
         let entries: Vec<_> = bound
             .iter()
             .map(|(slot, buffer)| wgpu::BindGroupEntry { binding: *slot as u32, resource: buffer.as_entire_binding() })
             .collect();
-        let group = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        let group = self.gpu.handles.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &pipeline.buffers,
             entries: &entries,
@@ -215,13 +220,13 @@ impl<'a> Recorder<'a> {
     fn encoder(&mut self) -> &mut wgpu::CommandEncoder {
         self.pass = None;
         self.encoder.get_or_insert_with(|| {
-            self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None })
+            self.gpu.handles.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None })
         })
     }
 }
 
 /// Uploads batches, a share at a time, into a buffer with room for one more.
-fn upload_batches<'a>(gpu: &Gpu, slot: &'a mut Option<wgpu::Buffer>, batches: &[Batch]) -> &'a wgpu::Buffer {
+fn upload_batches<'a>(gpu: &Handles, slot: &'a mut Option<wgpu::Buffer>, batches: &[Batch]) -> &'a wgpu::Buffer {
     let buffer = Buffers::uniform(gpu, slot, (batches.len() + 1) as u64 * BATCH_STRIDE as u64);
     let mut at = 0;
     for share in batches.chunks(4096) {

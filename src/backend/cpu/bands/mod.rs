@@ -15,7 +15,7 @@ use crate::backend::cpu::lines::coverage::{Ink, Inker};
 use crate::backend::cpu::lines::edge::{LineDrawer, LineTarget};
 use crate::backend::cpu::lines::line_light;
 use crate::backend::cpu::peeling::composite;
-use crate::backend::cpu::peeling::composite::LayerBand;
+use crate::backend::cpu::peeling::state::LayerBand;
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::cpu::surface::shade;
 use crate::plan::LinePass;

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::isa::LANES;
 use crate::backend::cpu::lines::coverage::Ink;
-use crate::backend::cpu::peeling::composite::LayerBand;
+use crate::backend::cpu::peeling::state::LayerBand;
 use crate::backend::cpu::surface::light::Light;
 use crate::plan::DrawPlan;
 

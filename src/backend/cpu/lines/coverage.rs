@@ -8,7 +8,7 @@
 use super::stroke::{Mask, POINTS, WORDS, count};
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::recip;
-use crate::backend::cpu::peeling::composite::LayerBand;
+use crate::backend::cpu::peeling::state::LayerBand;
 use crate::backend::cpu::resolve::{is_laid, lay_over};
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::sample_partition::cells;

@@ -8,7 +8,7 @@ use crate::backend::cpu::Stages;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::surface::barycentric::{Barycentrics, corners};
 use crate::backend::cpu::surface::light::{Light, light as light_on};
-use crate::backend::cpu::surface::point::normal;
+use crate::backend::cpu::surface::normal::normal;
 use crate::backend::cpu::surface::wire::Place;
 use crate::plan::{SurfacePass, flags, sample_offsets};
 

@@ -8,7 +8,7 @@ use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility;
 use crate::backend::cpu::geometry::visibility::{Setup, Target};
 use crate::backend::cpu::isa::{LANES, dispatch};
-use crate::backend::cpu::peeling::composite::LayerBand;
+use crate::backend::cpu::peeling::state::LayerBand;
 
 dispatch! {
     /// Finds the next layer of a band.

@@ -2,3 +2,4 @@
 
 pub(crate) mod composite;
 pub(crate) mod emit_layer;
+pub(crate) mod state;

@@ -1,8 +1,8 @@
 //! Views that show a triangle's numbers as colours. Twin of `shaders/surface/debug.wgsl`.
 
 use super::barycentric::{Corner, edge_distances_px};
-use super::light::light;
-use super::point::{lit, normal};
+use super::light::{light, lit};
+use super::normal::normal;
 use super::texture::{Uv, blend, floor};
 use super::wire::{Place, edge_mask, is_drawn};
 use crate::backend::cpu::vector::dot;

@@ -31,6 +31,12 @@ impl Light {
     }
 }
 
+/// A straight colour under light, as bright as can be shown.
+pub fn lit(base: [f32; 4], light: Light) -> [f32; 4] {
+    let [r, g, b] = [0, 1, 2].map(|k| (base[k] * light.gain + light.gloss).clamp(0.0, 1.0));
+    [r, g, b, base[3]]
+}
+
 /// Light on a surface with unit normal `n`: the bits of the other back-end.
 #[inline(always)]
 pub fn light(lights: &Lights, projection: &Projection, metallic: f32, roughness: f32, n: [f32; 3]) -> Light {

@@ -27,6 +27,7 @@ const SHADE: &[&str] = &[
     include_str!("../../../../shaders/surface/texture.wgsl"),
     include_str!("../../../../shaders/surface/light.wgsl"),
     include_str!("../../../../shaders/surface/wire.wgsl"),
+    include_str!("../../../../shaders/surface/normal.wgsl"),
     include_str!("../../../../shaders/surface/debug.wgsl"),
     include_str!("../../../../shaders/surface/point.wgsl"),
 ];
