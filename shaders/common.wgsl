@@ -74,7 +74,7 @@ struct Batch {
     seen_end: i32,
     samples_at: u32,
     // The role that drawn triangles have, where the plan has roles; 0: the hull's, which have none.
-    role: u32,
+    pass_bit: u32,
     // Number of the layer that is looked for; 0 also for the visibility buffer.
     layer: u32,
     // Columns in which triangles are drawn, and before which it ends: also those beyond the picture that the visibility buffer has.
@@ -83,6 +83,17 @@ struct Batch {
     // How many these are, on each side.
     seen_margin: i32,
 };
+
+// Threads of a workgroup, in every kernel.
+const WORKGROUP: u32 = 64u;
+
+// Vectors of four words per item of the work list.
+const ITEM_VECTORS: u32 = 3u;
+
+// Values of `faces`.
+const FACES_BOTH: u32 = 0u;
+const FACES_FRONT: u32 = 1u;
+const FACES_BACK: u32 = 2u;
 
 // Bits of `line_flags`.
 const SHOWN_VISIBLE: u32 = 1u;
@@ -109,17 +120,17 @@ const FOUR_SAMPLES: u32 = 4096u;
 const LIT_LINES: u32 = 8192u;
 // Whether any line pass is a contour.
 const CONTOURS: u32 = 16384u;
-const ROLES: u32 = 0x100000u;
-const HULL_LOOKS: u32 = 0x400000u;
-const LAYERS: u32 = 0x800000u;
+const PASS_MASKS: u32 = 0x100000u;
+const HULL_MATERIALS: u32 = 0x400000u;
+const PEELING: u32 = 0x800000u;
 const BEHIND_SURFACE: u32 = 0x1000000u;
 const WIRES_ONLY: u32 = 0x2000000u;
-const LAYERED_HULL: u32 = 0x4000000u;
+const PEELED_HULL: u32 = 0x4000000u;
 
 // src/plan/mod.rs explains these bits of a triangle's role.
-const ROLE_LAYER: u32 = 2u;
-const ROLE_FRONT_ONLY: u32 = 8u;
-const ROLE_BACK_ONLY: u32 = 16u;
+const PASS_LAYER: u32 = 2u;
+const PASS_FRONT_ONLY: u32 = 8u;
+const PASS_BACK_ONLY: u32 = 16u;
 const DERIVATIVE_NORMALS: u32 = 65536u;
 const VERTEX_COLORS: u32 = 131072u;
 const UVS: u32 = 262144u;
@@ -132,13 +143,13 @@ const DEBUG: u32 = 0x20000000u;
 const VARYING: u32 = 0x40000000u;
 
 // What the plan has, of the above. A constant of the pipeline, so that a kernel contains only what its plan needs.
-override LOOK: u32 = 0u;
+override PIPELINE_KEY: u32 = 0u;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> batch: Batch;
 
 fn has(flag: u32) -> bool {
-    return (LOOK & flag) != 0u;
+    return (PIPELINE_KEY & flag) != 0u;
 }
 
 // Samples a pixel.
@@ -147,7 +158,7 @@ fn sample_count() -> i32 {
 }
 
 // Where the visibility buffer has the first sample of the pixel that is number i of the batch's rows.
-fn first_seen(i: u32) -> u32 {
+fn first_visibility_sample(i: u32) -> u32 {
     let row = u32(i32(i) / frame.width);
     return batch.samples_at + u32(sample_count()) * (i + 2u * u32(batch.seen_margin) * row);
 }
@@ -255,21 +266,34 @@ fn wide_to_f32(v: vec2<u32>) -> f32 {
     return rn(f32(v.y) * 4294967296.0) + f32(v.x);
 }
 
+// Places of samples as sample_offsets() in src/plan/mod.rs has them, in 1/16 px: a nibble per sample, the first lowest.
+const ONE_SAMPLE_XY: u32 = 0x8u;
+const FOUR_SAMPLES_X: u32 = 0xA2E6u;
+const FOUR_SAMPLES_Y: u32 = 0xEA62u;
+const EIGHT_SAMPLES_X: u32 = 0xFB135D79u;
+const EIGHT_SAMPLES_Y: u32 = 0x1F7D39B5u;
+const SIXTEEN_SAMPLES_X_FIRST: u32 = 0xBDA3C579u;
+const SIXTEEN_SAMPLES_X_LAST: u32 = 0x1EF02486u;
+const SIXTEEN_SAMPLES_Y_FIRST: u32 = 0x3BD67A59u;
+const SIXTEEN_SAMPLES_Y_LAST: u32 = 0x0F48C21Eu;
+// What all of 16 samples' places leave modulo 1/16 px, in 1/256 px.
+const SIXTEEN_SAMPLES_SHIFT: i32 = 8;
+
 // Where sample s is, in 1/16 px from sample_corner(): a nibble a sample, the first lowest, as sample_offsets() in src/plan/mod.rs.
 fn sample_step(s: i32) -> vec2<i32> {
-    var x = 0x8u;
-    var y = 0x8u;
+    var x = ONE_SAMPLE_XY;
+    var y = ONE_SAMPLE_XY;
     if has(FOUR_SAMPLES) {
-        x = 0xA2E6u;
-        y = 0xEA62u;
+        x = FOUR_SAMPLES_X;
+        y = FOUR_SAMPLES_Y;
     }
     if has(EIGHT_SAMPLES) {
-        x = 0xFB135D79u;
-        y = 0x1F7D39B5u;
+        x = EIGHT_SAMPLES_X;
+        y = EIGHT_SAMPLES_Y;
     }
     if has(SIXTEEN_SAMPLES) {
-        x = select(0xBDA3C579u, 0x1EF02486u, s >= 8);
-        y = select(0x3BD67A59u, 0x0F48C21Eu, s >= 8);
+        x = select(SIXTEEN_SAMPLES_X_FIRST, SIXTEEN_SAMPLES_X_LAST, s >= 8);
+        y = select(SIXTEEN_SAMPLES_Y_FIRST, SIXTEEN_SAMPLES_Y_LAST, s >= 8);
     }
     let nibble = 4u * u32(s & 7);
     return vec2<i32>(vec2((x >> nibble) & 15u, (y >> nibble) & 15u));
@@ -281,7 +305,7 @@ fn sample_offset(s: i32) -> vec2<i32> {
 }
 
 fn sample_shift() -> i32 {
-    return select(0, 8, has(SIXTEEN_SAMPLES));
+    return select(0, SIXTEEN_SAMPLES_SHIFT, has(SIXTEEN_SAMPLES));
 }
 
 // Upper left corner of a pixel in 1/256 px from the picture's centre.

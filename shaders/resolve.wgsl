@@ -6,19 +6,19 @@
 @group(1) @binding(13) var<storage, read> thresholds: array<f32>;
 @group(1) @binding(14) var<storage, read_write> rgba: array<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * 64u;
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
     }
     var c = frame.background;
     if has(SURFACE | HULL | LINES) {
         c = colors[i];
-        if has(LINES) && is_laid(c) {
-            c = flipped(c);
+        if has(LINES) && is_composited(c) {
+            c = flip_alpha_sign(c);
         } else {
-            c = lay_over(c, frame.background);
+            c = over_background(c, frame.background);
         }
     }
     rgba[i] = encode(c);

@@ -1,6 +1,9 @@
 // Stage 2, large triangles: a workgroup at a time, tile by tile of 64 x 64 pixels. First each thread tests a block of 8 x 8
 // pixels against the edges, then all threads together fill the blocks that are left, a thread a pixel.
 
+// Pixels along a side of a tile.
+const TILE_PX: i32 = 64;
+
 struct WorkList {
     large: u32,
     huge: u32,
@@ -10,10 +13,10 @@ struct WorkList {
 @group(1) @binding(5) var<storage, read> work: WorkList;
 
 // Edge values at the corner of each block that is not empty, and which block it is.
-var<workgroup> blocks: array<vec4<i32>, 64>;
+var<workgroup> blocks: array<vec4<i32>, WORKGROUP>;
 var<workgroup> block_count: atomic<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn visibility_tile(
     @builtin(workgroup_id) workgroup: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
@@ -33,9 +36,9 @@ fn visibility_tile(
 
 // Draws every step-th tile of an item.
 fn draw_item(item: u32, thread: i32, start: i32, step: i32) {
-    let x = work.items[3u * item];
-    let y = work.items[3u * item + 1u];
-    let depth = work.items[3u * item + 2u];
+    let x = work.items[ITEM_VECTORS * item];
+    let y = work.items[ITEM_VECTORS * item + 1u];
+    let depth = work.items[ITEM_VECTORS * item + 2u];
     let s = Setup(
         bitcast<vec3<i32>>(x.xyz),
         bitcast<vec3<i32>>(y.xyz),
@@ -44,9 +47,9 @@ fn draw_item(item: u32, thread: i32, start: i32, step: i32) {
     );
     let e = edges_of(s);
     let bounds = pixel_bounds(s.x, s.y);
-    let tiles = (bounds.zw - bounds.xy) / 64 + 1;
+    let tiles = (bounds.zw - bounds.xy) / TILE_PX + 1;
     for (var i = start; i < tiles.x * tiles.y; i += step) {
-        draw_tile(s, e, bounds, bounds.xy + 64 * vec2(i % tiles.x, i / tiles.x), thread, x.w);
+        draw_tile(s, e, bounds, bounds.xy + TILE_PX * vec2(i % tiles.x, i / tiles.x), thread, x.w);
     }
 }
 

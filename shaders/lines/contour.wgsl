@@ -31,7 +31,7 @@ fn is_contour_pass() -> bool {
 
 // Whether a face of a closed surface shows nothing of its edges. Of a contour, one seen from its very edge does not either.
 fn is_hidden(face: u32, is_contour: bool) -> bool {
-    return looks_away(face) || (is_contour && is_edge_on(face));
+    return faces_away(face) || (is_contour && is_edge_on(face));
 }
 
 fn is_edge_on(face: u32) -> bool {
@@ -71,13 +71,13 @@ fn volume_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
 
 // The face whose light falls on the edge's line where the pixel sees no surface, plus 1: of those that look at the viewer the one
 // with the highest id, so that the order of edges does not matter; of any, where none does.
-fn lit_by(edge: vec4<u32>) -> u32 {
-    let best = max(select(edge.z + 1u, 0u, looks_away(edge.z)), select(edge.w + 1u, 0u, looks_away(edge.w)));
+fn lighting_face(edge: vec4<u32>) -> u32 {
+    let best = max(select(edge.z + 1u, 0u, faces_away(edge.z)), select(edge.w + 1u, 0u, faces_away(edge.w)));
     return select(edge.z + 1u, best, best > 0u);
 }
 
-// Whether a face is certainly turned away. A missing face is: it shows nothing.
-fn looks_away(face: u32) -> bool {
+// Whether a face is certainly transformed away. A missing face is: it shows nothing.
+fn faces_away(face: u32) -> bool {
     if face == NO_FACE {
         return true;
     }

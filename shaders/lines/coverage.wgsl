@@ -3,7 +3,7 @@
 // What each sample sees; 0 where it sees nothing.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
 // What lies over each sample.
-@group(1) @binding(27) var<storage, read> layered: array<Layered>;
+@group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
 // Of the surface, a pixel each, over nothing; where a line is, over the background and under the lines so far, which over.wgsl
 // tells apart. Then the light on the pass's lines, a pixel each.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
@@ -12,30 +12,24 @@
 // Of each pass.
 @group(1) @binding(17) var<storage, read> line_colors: array<vec4<f32>>;
 // Of each sample, the points that stand with it, as stroke.wgsl numbers them.
-@group(1) @binding(29) var<storage, read> cells: array<u32>;
-
-override STROKE_WORDS: u32 = 0u;
-
-// Words of the points of a pixel.
-const MASK_WORDS: u32 = 8u;
-const POINTS: u32 = 256u;
+@group(1) @binding(29) var<storage, read> sample_masks: array<u32>;
 
 // Strokes beside each other in a pixel whose areas may all be as far from their points as the farthest. Of more, some lie over
 // others.
-const BESIDE: f32 = 4.0;
+const STROKES_SIDE_BY_SIDE: f32 = 4.0;
 
 // Surfaces that show less than this leave no trace: a tenth of a byte's last step in the most transparent of pictures.
 const ALPHA_MIN: f32 = 1e-4;
 
-@compute @workgroup_size(64)
-fn ink(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * 64u;
+@compute @workgroup_size(WORKGROUP)
+fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
     }
     // Where there is no surface, nobody has written anything yet.
     if (batch.line_flags & FIRST_PASS) != 0u && !has(SURFACE | HULL) {
-        colors[i] = flipped(frame.background);
+        colors[i] = flip_alpha_sign(frame.background);
     }
     let at = STROKE_WORDS * i;
     let sum = area_sum(at);
@@ -44,19 +38,19 @@ fn ink(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) g
         return;
     }
     let points = covered_points(at);
-    let cover = coverage(sum, all, points, slack_of(at));
+    let cover = covered_share(sum, all, points, slack_of(at));
     if cover > 0.0 {
         var color = line_colors[batch.line_pass];
         var under = colors[i];
-        if is_laid(under) {
-            under = flipped(under);
+        if is_composited(under) {
+            under = flip_alpha_sign(under);
         } else {
-            under = lay_over(uncovered(i, under, points, rn(color.w * batch.line_peak)), frame.background);
+            under = over_background(uncovered(i, under, points, rn(color.w * batch.line_peak)), frame.background);
         }
         if (batch.line_flags & LIT_PASS) != 0u {
             color = lit_color(color, colors[batch.count + i].xy);
         }
-        colors[i] = flipped(rn4(cover * color) + rn4(under * (1.0 - rn(cover * color.w))));
+        colors[i] = flip_alpha_sign(rn4(cover * color) + rn4(under * (1.0 - rn(cover * color.w))));
     }
     // For the next pass.
     for (var w = 0u; w < STROKE_WORDS; w++) {
@@ -66,22 +60,22 @@ fn ink(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) g
 
 // Of the strokes at `at`: the sum of their areas, two words.
 fn area_sum(at: u32) -> vec2<u32> {
-    return vec2(strokes[at], strokes[at + 2u] & 0xFFFFu);
+    return vec2(strokes[at + AREA_WORD], strokes[at + CARRY_WORD] & 0xFFFFu);
 }
 
 // The sum of their points.
 fn point_sum(at: u32) -> vec2<u32> {
-    return vec2(strokes[at + 1u], strokes[at + 2u] >> 16u);
+    return vec2(strokes[at + COUNT_WORD], strokes[at + CARRY_WORD] >> 16u);
 }
 
 // Most that the area of one of them differs from its points'.
 fn slack_of(at: u32) -> u32 {
-    return strokes[at + 11u];
+    return strokes[at + SLACK_WORD];
 }
 
 // A word of the points that any of them covers.
 fn mask_word(at: u32, w: u32) -> u32 {
-    return strokes[at + 3u + w];
+    return strokes[at + MASK_WORD + w];
 }
 
 fn covered_points(at: u32) -> u32 {
@@ -93,19 +87,19 @@ fn covered_points(at: u32) -> u32 {
 }
 
 // How much of a pixel the strokes cover, 0 to the lines' peak.
-fn coverage(sum: vec2<u32>, all: vec2<u32>, points: u32, slack: u32) -> f32 {
+fn covered_share(sum: vec2<u32>, all: vec2<u32>, points: u32, slack: u32) -> f32 {
     if (sum.x | sum.y) == 0u {
         return 0.0;
     }
     if points == POINTS && (all.x > POINTS || all.y > 0u) {
         return batch.line_peak;
     }
-    var covered = wide_to_f32(sum) * (1.0 / 65536.0);
+    var covered = wide_to_f32(sum) * (1.0 / AREA_UNIT);
     if all.x > points || all.y > 0u {
         covered = rn(covered * (f32(points) / wide_to_f32(all)));
     }
     let of_points = rn(f32(points) * (batch.line_peak * (1.0 / 256.0)));
-    let beyond = rn(f32(slack) * (BESIDE / 65536.0));
+    let beyond = rn(f32(slack) * (STROKES_SIDE_BY_SIDE / AREA_UNIT));
     return min(min(max(covered, of_points - beyond), of_points + beyond), batch.line_peak);
 }
 
@@ -130,13 +124,13 @@ fn weight(i: u32, points: u32, opacity: f32) -> f32 {
     // In points.
     var surface = 0.0;
     var surface_covered = 0.0;
-    let in_base = first_seen(i);
+    let in_base = first_visibility_sample(i);
     for (var s = 0u; s < count; s++) {
         let alpha = shown(in_base + s, i * count + s);
         if alpha > 0.0 {
             var covered = 0u;
             for (var w = 0u; w < MASK_WORDS; w++) {
-                covered += countOneBits(mask_word(at, w) & cells[MASK_WORDS * s + w]);
+                covered += countOneBits(mask_word(at, w) & sample_masks[MASK_WORDS * s + w]);
             }
             surface += rn(alpha * f32(POINTS / count));
             surface_covered += rn(alpha * f32(covered));
@@ -155,8 +149,8 @@ fn shown(in_base: u32, sample: u32) -> f32 {
     if samples[in_base].y != 0u {
         return 1.0;
     }
-    if has(LAYERS) {
-        return layered[sample].color.w;
+    if has(PEELING) {
+        return peel_state[sample].color.w;
     }
     return 0.0;
 }

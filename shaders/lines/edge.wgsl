@@ -36,13 +36,11 @@ struct Paused {
 // `line_units` where a dispatch may take as long as it takes.
 const NO_LIMIT: u32 = 0xFFFFFFFFu;
 
-const THREADS: u32 = 64u;
-
 // Of the workgroup's edges, one a thread: where its shares end among those of all.
-var<workgroup> share_ends: array<u32, 64>;
+var<workgroup> share_ends: array<u32, WORKGROUP>;
 
-@compute @workgroup_size(64)
-fn lines(
+@compute @workgroup_size(WORKGROUP)
+fn edge(
     @builtin(workgroup_id) workgroup: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
@@ -55,7 +53,7 @@ fn lines(
     }
     share_ends[thread] = shares;
     workgroupBarrier();
-    for (var step = 1u; step < THREADS; step *= 2u) {
+    for (var step = 1u; step < WORKGROUP; step *= 2u) {
         var before = 0u;
         if thread >= step {
             before = share_ends[thread - step];
@@ -64,8 +62,8 @@ fn lines(
         share_ends[thread] += before;
         workgroupBarrier();
     }
-    if share_ends[THREADS - 1u] > 0u {
-        draw_shares(batch.first + group * batch.edges_per_group, group * THREADS + thread, thread);
+    if share_ends[WORKGROUP - 1u] > 0u {
+        draw_shares(batch.first + group * batch.edges_per_group, group * WORKGROUP + thread, thread);
     }
 }
 
@@ -77,7 +75,7 @@ fn shares_of(edge: vec4<u32>) -> u32 {
 
 // Draws every 64th share of the workgroup's, whose edges begin at `first`, from where the thread paused.
 fn draw_shares(first: u32, self_at: u32, thread: u32) {
-    let all = share_ends[THREADS - 1u];
+    let all = share_ends[WORKGROUP - 1u];
     let may_pause = batch.line_units != NO_LIMIT;
     var next = thread;
     var paused = Paused(0u, 0u, 0.0, 0.0);
@@ -112,10 +110,10 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
         // Threads that have found a part wait here for those that have not; not where loops are limited, since each look of one would
         // count for all.
         let units_before = units;
-        var part = vec2(0.0);
-        while search.begin < search.range.y && part.x >= part.y && units > 0u {
+        var interval = vec2(0.0);
+        while search.begin < search.range.y && interval.x >= interval.y && units > 0u {
             units--;
-            part = next_part(edge, s, &search);
+            interval = next_interval(edge, s, &search);
             if may_pause {
                 break;
             }
@@ -124,17 +122,17 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
             // To begin a share is work too.
             units--;
         }
-        if part.x < part.y {
-            draw_part(edge, s, window, part);
+        if interval.x < interval.y {
+            draw_interval(edge, s, window, interval);
         }
         // Also where it is no number.
         if !(search.begin < search.range.y) {
-            next += THREADS;
+            next += WORKGROUP;
             has_share = false;
         }
     }
     if may_pause {
-        var left = Paused(all + THREADS, 0u, 0.0, 0.0);
+        var left = Paused(all + WORKGROUP, 0u, 0.0, 0.0);
         if next < all {
             atomicAdd(&progress.left, 1u);
             left.share = next + 1u;
@@ -151,7 +149,7 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
 // Which of the workgroup's edges a share is of: the first that ends after it.
 fn edge_of_share(share: u32) -> u32 {
     var slot = 0u;
-    for (var step = THREADS / 2u; step > 0u; step /= 2u) {
+    for (var step = WORKGROUP / 2u; step > 0u; step /= 2u) {
         if share_ends[slot + step - 1u] <= share {
             slot += step;
         }
@@ -216,10 +214,10 @@ fn window_of(s: Segment, share: u32) -> Window {
 }
 
 // Draws a part of an edge into the pixels of a share.
-fn draw_part(edge: vec4<u32>, s: Segment, window: Window, part: vec2<f32>) {
+fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32>) {
     let is_lit = (batch.line_flags & LIT_PASS) != 0u;
-    let start = point_at(s, part.x);
-    let end = point_at(s, part.y);
+    let start = point_at(s, interval.x);
+    let end = point_at(s, interval.y);
     var y = window.first;
     var columns = columns_of(s, window.ends, y);
     var x = columns.x;
@@ -243,7 +241,7 @@ fn draw_part(edge: vec4<u32>, s: Segment, window: Window, part: vec2<f32>) {
                 && (is_lit || !is_full(at));
         }
         if found && add_stroke(at, s.direction, start - center, end - center) && is_lit {
-            atomicMax(&owners[at], lit_by(edge));
+            atomicMax(&owners[at], lighting_face(edge));
         }
     }
 }

@@ -7,17 +7,17 @@
 const NOTHING: u32 = 0xFFFFFFFFu;
 
 // How much nearer than the edge a surface must be, as a share of depth: what f32 may lose on the way.
-const NEARER: f32 = 1.0000019073486328;
+const NEARER_RATIO: f32 = 1.0000019073486328;
 
 // How far what is on screen may lie from where it should, 1/256 px: half a unit each in which a triangle and an edge are rounded, and some
 // for f32.
-const SNAPPED: f32 = 1.25;
+const SNAP_ERROR: f32 = 1.25;
 
 // Parts shorter than this are what rounding leaves of an edge beside what hides it. Their round ends would show as dots.
-const CRUMB_PX: f32 = 0.0625;
+const INTERVAL_MIN_PX: f32 = 0.0625;
 
 // Between two surfaces that hide it: there a sliver of surface may have no sample.
-const GAP_PX: f32 = 0.25;
+const GAP_MIN_PX: f32 = 0.25;
 
 const MIN_POSITIVE: f32 = 1.17549435e-38;
 
@@ -34,15 +34,15 @@ struct Search {
     state: u32,
 };
 
-const UNASKED: u32 = 0u;
+const UNSCANNED: u32 = 0u;
 const WHOLE: u32 = 1u;
-const PARTS: u32 = 2u;
+const INTERVALS: u32 = 2u;
 
 // More than any place on an edge.
 const BEYOND: f32 = 2.0;
 
 // What triangles hide of a range, as far as one look from `begin` on shows it.
-struct Look {
+struct Scan {
     // Up to where the edge is hidden without a gap.
     until: f32,
     // Where the next interval begins.
@@ -54,58 +54,58 @@ fn begin_search(s: Segment, range: vec2<f32>) -> Search {
     if (batch.line_flags & (SHOWN_VISIBLE | SHOWN_HIDDEN)) == 0u {
         return Search(range, 0u, range.x, BEYOND, WHOLE);
     }
-    if lies_deep(s, range) {
+    if is_fully_hidden(s, range) {
         let shows_hidden = (batch.line_flags & SHOWN_HIDDEN) != 0u;
         return Search(range, 0u, select(range.y, range.x, shows_hidden), BEYOND, WHOLE);
     }
-    return Search(range, 0u, range.x, BEYOND, UNASKED);
+    return Search(range, 0u, range.x, BEYOND, UNSCANNED);
 }
 
 // Looks along the edge once, from where the search is: a part to draw; empty (x >= y) where this look has found none.
-fn next_part(edge: vec4<u32>, s: Segment, search: ptr<function, Search>) -> vec2<f32> {
+fn next_interval(edge: vec4<u32>, s: Segment, search: ptr<function, Search>) -> vec2<f32> {
     let range = (*search).range;
     let begin = (*search).begin;
     if (*search).state == WHOLE {
         (*search).begin = range.y;
         return range;
     }
-    let look = look_along(edge, s, *search);
+    let scan = scan_along(edge, s, *search);
     let shows_visible = (batch.line_flags & SHOWN_VISIBLE) != 0u;
-    if (*search).state == UNASKED {
-        if !look.any {
+    if (*search).state == UNSCANNED {
+        if !scan.any {
             (*search).begin = range.y;
             return select(vec2(0.0), range, shows_visible);
         }
         // Where an edge dives under another surface, a sliver of that may have its samples beside the edge.
-        (*search).state = PARTS;
+        (*search).state = INTERVALS;
         (*search).radius = 1u;
         return vec2(0.0);
     }
     let hidden_from = (*search).hidden_from;
-    if look.until > begin {
+    if scan.until > begin {
         // Hidden from here on, perhaps farther than this look has shown.
         (*search).hidden_from = min(hidden_from, begin);
-        (*search).begin = look.until;
-        return select(vec2(0.0), vec2(min(hidden_from, begin), range.y), !shows_visible && look.until >= range.y);
+        (*search).begin = scan.until;
+        return select(vec2(0.0), vec2(min(hidden_from, begin), range.y), !shows_visible && scan.until >= range.y);
     }
-    let end = min(look.next, range.y);
+    let end = min(scan.next, range.y);
     (*search).begin = end;
     (*search).hidden_from = BEYOND;
     if !shows_visible {
         return vec2(hidden_from, begin);
     }
     let is_gap = begin > range.x && end < range.y;
-    let is_part = end - begin > rn(s.inverse_length * select(CRUMB_PX, GAP_PX, is_gap));
-    return select(vec2(0.0), vec2(begin, end), is_part);
+    let is_interval = end - begin > rn(s.inverse_length * select(INTERVAL_MIN_PX, GAP_MIN_PX, is_gap));
+    return select(vec2(0.0), vec2(begin, end), is_interval);
 }
 
 // Asks each triangle that is seen along the edge what it hides.
-fn look_along(edge: vec4<u32>, s: Segment, search: Search) -> Look {
+fn scan_along(edge: vec4<u32>, s: Segment, search: Search) -> Scan {
     let count = u32(sample_count());
     // Of the pixel itself, and of one on each side of it across the edge.
     let words = count * (2u * search.radius + 1u);
     let across = select(vec2(1, 0), vec2(0, 1), abs(s.along.x) >= abs(s.along.y));
-    var look = Look(search.begin, 2.0, false);
+    var scan = Scan(search.begin, 2.0, false);
     var recent = vec4(NOTHING);
     var last = vec2(OUTSIDE);
     let beyond = f32(search.radius) * s.inverse_length;
@@ -123,20 +123,20 @@ fn look_along(edge: vec4<u32>, s: Segment, search: Search) -> Look {
                 continue;
             }
             recent = vec4(id, recent.xyz);
-            var part = hidden_by(edge, s, id);
-            part = vec2(max(part.x, search.range.x), min(part.y, search.range.y));
-            if part.x >= part.y {
+            var interval = hidden_by(edge, s, id);
+            interval = vec2(max(interval.x, search.range.x), min(interval.y, search.range.y));
+            if interval.x >= interval.y {
                 continue;
             }
-            look.any = true;
-            if part.x <= look.until {
-                look.until = max(look.until, part.y);
+            scan.any = true;
+            if interval.x <= scan.until {
+                scan.until = max(scan.until, interval.y);
             } else {
-                look.next = min(look.next, part.x);
+                scan.next = min(scan.next, interval.x);
             }
         }
     }
-    return look;
+    return scan;
 }
 
 // Id and depth (its bits) that a sample of a pixel sees.
@@ -156,8 +156,8 @@ fn has_samples(pixel: vec2<i32>) -> bool {
 }
 
 // Whether all triangles that are seen along the edge are nearer than any of it.
-fn lies_deep(s: Segment, range: vec2<f32>) -> bool {
-    let nearest = rn(max(depth_of(s, 0.0), depth_of(s, 1.0)) * NEARER);
+fn is_fully_hidden(s: Segment, range: vec2<f32>) -> bool {
+    let nearest = rn(max(depth_of(s, 0.0), depth_of(s, 1.0)) * NEARER_RATIO);
     let count = u32(sample_count());
     var last_id = NOTHING;
     var last = vec2(OUTSIDE);
@@ -221,7 +221,7 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
         is_clockwise = volume_of(p, q, r) > 0.0;
     } else {
         let area = area_of(a, b, c);
-        if is_zero(area) || !may_lie_behind(s, a, b, c) {
+        if is_zero(area) || !may_be_hidden_by(s, a, b, c) {
             return none;
         }
         is_clockwise = !is_negative(area);
@@ -233,11 +233,11 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     if any((at_start <= vec3(0.0)) & (at_end <= vec3(0.0)) & !is_along) {
         return none;
     }
-    var part = vec2(0.0, 1.0);
-    part = narrowed(part, at_start.x, at_end.x);
-    part = narrowed(part, at_start.y, at_end.y);
-    part = narrowed(part, at_start.z, at_end.z);
-    if part.x >= part.y {
+    var interval = vec2(0.0, 1.0);
+    interval = narrowed(interval, at_start.x, at_end.x);
+    interval = narrowed(interval, at_start.y, at_end.y);
+    interval = narrowed(interval, at_start.z, at_end.z);
+    if interval.x >= interval.y {
         return none;
     }
     let slack = slack_of(p, q, r);
@@ -247,8 +247,8 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     // Depths are compared only where the edge is inside, so that thin triangles need not be continued far.
     let depths = vec3(p.z, q.z, r.z);
     let ws = vec3(p.w, q.w, r.w);
-    let first = nearer_by(s, at_start, at_end, depths, ws, slack, part.x);
-    let last = nearer_by(s, at_start, at_end, depths, ws, slack, part.y);
+    let first = nearer_by(s, at_start, at_end, depths, ws, slack, interval.x);
+    let last = nearer_by(s, at_start, at_end, depths, ws, slack, interval.y);
     if first <= 0.0 && last <= 0.0 {
         return none;
     }
@@ -256,12 +256,12 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     if share.x >= share.y {
         return none;
     }
-    let length = part.y - part.x;
-    return vec2(part.x + rn(share.x * length), part.x + rn(share.y * length));
+    let length = interval.y - interval.x;
+    return vec2(interval.x + rn(share.x * length), interval.x + rn(share.y * length));
 }
 
 // Whether the triangle is not farther away than all of the edge, nor beside its box.
-fn may_lie_behind(s: Segment, a: Vertex, b: Vertex, c: Vertex) -> bool {
+fn may_be_hidden_by(s: Segment, a: Vertex, b: Vertex, c: Vertex) -> bool {
     let low = vec2<f32>(vec2(min(min(a.x, b.x), c.x), min(min(a.y, b.y), c.y)));
     let high = vec2<f32>(vec2(max(max(a.x, b.x), c.x), max(max(a.y, b.y), c.y)));
     return max(max(a.z, b.z), c.z) > min(s.depths.x, s.depths.y)
@@ -281,7 +281,7 @@ fn slack_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
     let y = cofactors(vec3(p.w, q.w, r.w), in_x);
     let volume = abs(sum3(rn3(x * in_x)));
     if volume > MIN_POSITIVE {
-        return rn(rn((abs(sum3(rn3(x * in_z))) + abs(sum3(rn3(y * in_z)))) * recip(volume)) * SNAPPED);
+        return rn(rn((abs(sum3(rn3(x * in_z))) + abs(sum3(rn3(y * in_z)))) * recip(volume)) * SNAP_ERROR);
     }
     return -1.0;
 }
@@ -318,7 +318,7 @@ fn nearer_by(
     let depth = rn(rn(z.x + z.y) + z.z);
     let scale = rn(rn(w.x + w.y) + w.z);
     if scale > MIN_POSITIVE {
-        return (rn(depth * recip(scale)) - rn(depth_of(s, t) * NEARER)) - slack;
+        return (rn(depth * recip(scale)) - rn(depth_of(s, t) * NEARER_RATIO)) - slack;
     }
     return -1.0;
 }

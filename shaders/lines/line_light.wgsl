@@ -10,9 +10,9 @@
 // A pixel each: a face of the pass's line there, plus 1.
 @group(1) @binding(11) var<storage, read_write> owners: array<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn line_light(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * 64u;
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
     }
@@ -24,7 +24,7 @@ fn line_light(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
     owners[i] = 0u;
     let corner = pixel_corner(vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width));
     let samples_px = u32(sample_count());
-    let in_base = first_seen(i);
+    let in_base = first_visibility_sample(i);
     var sum = vec2(0.0);
     var count = 0.0;
     for (var s = 0u; s < samples_px; s++) {

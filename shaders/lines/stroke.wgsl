@@ -9,10 +9,6 @@ const UNIT: f32 = 16384.0;
 // Largest scaled area.
 const LIMIT: f32 = 16000.0;
 
-// Words of a pixel's strokes: sum of areas in 1/65536, sum of points, how often either has gone round (areas in the lower half), eight
-// of the points of any, and the most that an area differs from its points'.
-override STROKE_WORDS: u32 = 0u;
-
 // A stroke seen from a pixel: bounds of what its points are compared with, a value each where the line has no ramp.
 struct Stroke {
     // Unit vector along, in 1/16384.
@@ -103,14 +99,14 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
     let at = pixel_at * STROKE_WORDS;
     var points = 0u;
     // Zero is a number that compilers do not know: where they unroll this, they take twice as long.
-    for (var w = 0u; w < 8u + frame.zero; w++) {
+    for (var w = 0u; w < MASK_WORDS + frame.zero; w++) {
         var mask = 0u;
         for (var half = 0u; half < 2u + frame.zero; half++) {
             mask |= points_of(stroke, 2u * w + half) << (16u * half);
         }
         if mask != 0u {
             points += countOneBits(mask);
-            atomicOr(&strokes[at + 3u + w], mask);
+            atomicOr(&strokes[at + MASK_WORD + w], mask);
         }
     }
     if any(reaches) {
@@ -119,29 +115,29 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
         }
         area = f32(points) * (batch.line_peak * (1.0 / 256.0));
     }
-    let scaled_area = u32(area * 65536.0 + 0.5);
+    let scaled_area = u32(area * AREA_UNIT + 0.5);
     let of_points = u32(rn(f32(points) * (batch.line_peak * 256.0)) + 0.5);
-    atomicMax(&strokes[at + 11u], max(scaled_area, of_points) - min(scaled_area, of_points));
+    atomicMax(&strokes[at + SLACK_WORD], max(scaled_area, of_points) - min(scaled_area, of_points));
     // A sum that has gone round is smaller than what was added.
     var rounds = 0u;
-    if atomicAdd(&strokes[at], scaled_area) + scaled_area < scaled_area {
+    if atomicAdd(&strokes[at + AREA_WORD], scaled_area) + scaled_area < scaled_area {
         rounds = 1u;
     }
-    if atomicAdd(&strokes[at + 1u], points) + points < points {
+    if atomicAdd(&strokes[at + COUNT_WORD], points) + points < points {
         rounds += 0x10000u;
     }
     if rounds > 0u {
-        atomicAdd(&strokes[at + 2u], rounds);
+        atomicAdd(&strokes[at + CARRY_WORD], rounds);
     }
     return true;
 }
 
 // Whether all points of a pixel are covered, so that nothing that comes can change anything.
 fn is_full(pixel_at: u32) -> bool {
-    let counts = pixel_at * STROKE_WORDS + 1u;
-    let at = counts + 2u;
+    let pixel = pixel_at * STROKE_WORDS;
+    let at = pixel + MASK_WORD;
     // One stroke may cover all points and yet leave a corner.
-    if atomicLoad(&strokes[counts]) <= 256u && atomicLoad(&strokes[counts + 1u]) < 0x10000u {
+    if atomicLoad(&strokes[pixel + COUNT_WORD]) <= POINTS && atomicLoad(&strokes[pixel + CARRY_WORD]) < 0x10000u {
         return false;
     }
     // No loop: where loops are limited, the pixels found may be many.
@@ -198,7 +194,7 @@ fn points_of(stroke: Stroke, word: u32) -> u32 {
 fn four_points(stroke: Stroke, bounds: Bounds, word: u32, first: u32) -> u32 {
     let i = 16u * (vec4(first) + vec4(0u, 1u, 2u, 3u)) + word;
     let x = (2 * vec4<i32>(i) - 255) * 128;
-    let y = (2 * vec4<i32>((181u * i) & vec4(255u)) - 255) * 128;
+    let y = (2 * vec4<i32>((GENERATOR * i) & vec4(POINTS - 1u)) - 255) * 128;
     var covered = vec4(false);
     if stroke.has_strip {
         let across = ((-stroke.along.y * x) >> vec4(16u)) + ((stroke.along.x * y) >> vec4(16u));

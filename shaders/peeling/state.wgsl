@@ -1,6 +1,6 @@
 // What the layers have made of a sample so far. Written by layers.wgsl, read by emit_layer.wgsl, shade.wgsl and ink.wgsl.
 
-struct Layered {
+struct PeelState {
     // Premultiplied linear RGBA.
     color: vec4<f32>,
     // The word of the last layer; 0 where the sample is done.

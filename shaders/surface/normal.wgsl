@@ -53,15 +53,15 @@ fn quad_position(id: u32, b: vec3<f32>) -> vec3<f32> {
 }
 
 // The normal that the normal texture makes of n. Its axes are the triangle's own: where u grows, and where v shrinks.
-fn bumped(id: u32, m: u32, front: bool, uv: Uv, n: vec3<f32>) -> vec3<f32> {
+fn normal_mapped(id: u32, m: u32, front: bool, uv: Uv, n: vec3<f32>) -> vec3<f32> {
     let used = use_of(m, SLOT_NORMAL);
     let p = corner_position(id, 0u);
     let e1 = corner_position(id, 1u) - p;
     let e2 = corner_position(id, 2u) - p;
     let first = frame.uv_triangles_at + 3u * id;
-    let t = turned(used, uvs[corner_triangles[first]]);
-    let d1 = turned(used, uvs[corner_triangles[first + 1u]]) - t;
-    let d2 = turned(used, uvs[corner_triangles[first + 2u]]) - t;
+    let t = transformed(used, uvs[corner_triangles[first]]);
+    let d1 = transformed(used, uvs[corner_triangles[first + 1u]]) - t;
+    let d2 = transformed(used, uvs[corner_triangles[first + 2u]]) - t;
     let turn = rn(d1.x * d2.y) - rn(d2.x * d1.y);
     if !(abs(turn) > 1e-30 && abs(turn) < 1e30) {
         return n;

@@ -10,8 +10,8 @@
 // src/plan/surface/mod.rs explains the fields.
 struct Material {
     base_color: vec4<f32>,
-    // Emissive colour, alpha cutoff.
-    emissive: vec4<f32>,
+    emissive: vec3<f32>,
+    alpha_cutoff: f32,
     wire_color: vec4<f32>,
     wire_thickness: f32,
     wire_smoothing: f32,
@@ -67,7 +67,7 @@ fn point_color(id: u32, at: vec2<f32>, show: Show) -> vec4<f32> {
         let normal = turned_to_viewer(face_normal(id), is_front(id, at));
         light_here = light(materials[m].metallic, materials[m].roughness, normal);
     }
-    return premultiplied(lit(base, light_here), materials[m].emissive.xyz);
+    return premultiplied(lit(base, light_here), materials[m].emissive);
 }
 
 fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
@@ -107,12 +107,12 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
             let own = vec2(flags & MATERIAL_OWN_ROUGHNESS, flags & MATERIAL_OWN_METALLIC) != vec2(0u);
             gloss *= select(textured, vec2(1.0), own);
             if use_of(m, SLOT_NORMAL).texture < frame.image_count {
-                n = bumped(id, m, b.front, uv, n);
+                n = normal_mapped(id, m, b.front, uv, n);
             }
         }
         light_here = light(gloss.y, gloss.x, n);
     }
-    var emissive = materials[m].emissive.xyz;
+    var emissive = materials[m].emissive;
     if has(TEXTURES) {
         emissive = rn3(emissive * sample_texture(m, SLOT_EMISSIVE, uv).xyz);
     }
@@ -141,7 +141,7 @@ fn with_alpha(m: u32, base: vec4<f32>, show: Show) -> vec4<f32> {
     let flags = materials[m].flags;
     // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.
     let alpha = clamp(base.w, 0.0, 1.0);
-    let is_cut = (flags & MATERIAL_MASK) != 0u && alpha < materials[m].emissive.w;
+    let is_cut = (flags & MATERIAL_MASK) != 0u && alpha < materials[m].alpha_cutoff;
     if is_cut || !show.fill || (flags & MATERIAL_FILL) == 0u {
         return vec4(0.0);
     }

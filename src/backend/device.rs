@@ -99,6 +99,6 @@ impl GpuDevice for Gpu {
 }
 
 /// Drops what belongs to a device that may be gone: wgpu may panic then, which is nobody's concern any more.
-pub(super) fn let_go<T>(thing: T) {
+pub(super) fn drop_catching_panics<T>(thing: T) {
     let _ = catch_unwind(AssertUnwindSafe(|| drop(thing)));
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::DrawError;
-use super::device::{GpuDevice, GpuState, GpuStatus, HardwareHint, Opener, let_go};
+use super::device::{GpuDevice, GpuState, GpuStatus, HardwareHint, Opener, drop_catching_panics};
 use super::gpu::{AtomicsChoice, Gpu, GpuKind};
 use super::probe::probe;
 
@@ -202,7 +202,7 @@ impl GpuHost {
             status.state = GpuState::Failed;
             status.reason = Some(format!("the GPU was lost: {reason}"));
         });
-        let_go(device);
+        drop_catching_panics(device);
     }
 
     fn open_and_probe(&self, kind: GpuKind) -> Result<Arc<dyn GpuDevice>, OpenError> {

@@ -69,3 +69,6 @@ pub enum DrawError {
     #[error("the GPU cannot draw this: {0}")]
     Device(String),
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,12 +13,12 @@ pub const POINTS: usize = 256;
 pub const GENERATORS: [usize; 2] = [1, 181];
 
 /// The number of a sample for each point.
-pub type Cells = [u8; POINTS];
+pub type SamplePartition = [u8; POINTS];
 
 /// The cells of so many samples: equally large, because samples weigh the same, and as close around their samples as that allows.
-pub fn cells(samples: u32) -> &'static Cells {
-    static CELLS: [OnceLock<Cells>; 4] = [const { OnceLock::new() }; 4];
-    let [one, four, eight, sixteen] = &CELLS;
+pub fn sample_partition(samples: u32) -> &'static SamplePartition {
+    static PARTITIONS: [OnceLock<SamplePartition>; 4] = [const { OnceLock::new() }; 4];
+    let [one, four, eight, sixteen] = &PARTITIONS;
     let made = match samples {
         1 => one,
         4 => four,
@@ -30,35 +30,35 @@ pub fn cells(samples: u32) -> &'static Cells {
 
 /// Gives each point to the nearest sample that has room, nearest first; then two points change places for as long as that brings
 /// them closer to their samples. All in integers, so that it is the same everywhere.
-fn divide(samples: &[[i32; 2]]) -> Cells {
+fn divide(samples: &[[i32; 2]]) -> SamplePartition {
     let away = |point: usize, sample: u8| away(point, samples[usize::from(sample)]);
     let numbers = 0..samples.len() as u8;
     let mut pairs: Vec<(usize, u8)> = (0..POINTS).flat_map(|p| numbers.clone().map(move |s| (p, s))).collect();
     pairs.sort_by_key(|&(p, s)| (away(p, s), p, s));
-    let mut cells: [Option<u8>; POINTS] = [None; POINTS];
+    let mut partition: [Option<u8>; POINTS] = [None; POINTS];
     let mut room = vec![POINTS / samples.len(); samples.len()];
     for (p, s) in pairs {
         let room = &mut room[usize::from(s)];
-        if cells[p].is_none() && *room > 0 {
-            cells[p] = Some(s);
+        if partition[p].is_none() && *room > 0 {
+            partition[p] = Some(s);
             *room -= 1;
         }
     }
-    let mut cells = cells.map(Option::unwrap_or_default);
+    let mut partition = partition.map(Option::unwrap_or_default);
     let mut has_changed = true;
     while has_changed {
         has_changed = false;
         for p in 0..POINTS {
             for q in 0..p {
-                let (a, b) = (cells[p], cells[q]);
+                let (a, b) = (partition[p], partition[q]);
                 if away(p, b) + away(q, a) < away(p, a) + away(q, b) {
-                    (cells[p], cells[q]) = (b, a);
+                    (partition[p], partition[q]) = (b, a);
                     has_changed = true;
                 }
             }
         }
     }
-    cells
+    partition
 }
 
 /// The square of a point's distance from a sample, which is in 1/256 px: in 1/512 px, where points lie in the middle of theirs.
@@ -74,13 +74,13 @@ mod tests {
     const PX: i32 = 512;
 
     #[test]
-    fn cells_are_equally_large_and_around_their_samples() {
+    fn parts_are_equally_large_and_around_their_samples() {
         // As far as the farthest point of a cell may be, in 1/100 px.
         for (samples, farthest) in [(1, 71), (4, 41), (8, 37), (16, 26)] {
-            let (cells, offsets) = (cells(samples), sample_offsets(samples));
+            let (partition, offsets) = (sample_partition(samples), sample_offsets(samples));
             let mut counts = vec![0; samples as usize];
             let (mut moved, mut most) = (0, 0);
-            for (p, &s) in cells.iter().enumerate() {
+            for (p, &s) in partition.iter().enumerate() {
                 counts[usize::from(s)] += 1;
                 let own = away(p, offsets[usize::from(s)]);
                 let nearest = offsets.iter().map(|&at| away(p, at)).min().unwrap();

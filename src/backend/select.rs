@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 
-use super::device::{GpuDevice, let_go};
+use super::device::{GpuDevice, drop_catching_panics};
 use super::gpu::GpuKind;
 use super::host::GpuHost;
 use super::{BackendKind, DrawError, Renderer, cpu, gpu};
@@ -98,7 +98,7 @@ impl Backends {
     ) -> Result<Image, DrawError> {
         if self.gpu.as_ref().is_some_and(|(_, device)| device.lost().is_some()) {
             // What is left here would keep a device alive that nobody draws on any more.
-            let_go(self.gpu.take());
+            drop_catching_panics(self.gpu.take());
         }
         let found = self.host.device(kind);
         if let (Err(DrawError::DeviceLost(reason)), Attempt::First) = (&found, attempt) {
@@ -124,7 +124,7 @@ impl Backends {
         let (mut renderer, device) = match self.gpu.take() {
             Some((renderer, own)) if Arc::ptr_eq(&own, device) => (renderer, own),
             old => {
-                let_go(old);
+                drop_catching_panics(old);
                 (device.clone().renderer(), device.clone())
             }
         };
@@ -134,12 +134,12 @@ impl Backends {
             (Ok(result), _) => result,
             (Err(_), Some(reason)) => Err(DrawError::DeviceLost(reason.to_owned())),
             (Err(panic), None) => {
-                let_go(renderer);
+                drop_catching_panics(renderer);
                 resume_unwind(panic);
             }
         };
         match result {
-            Err(DrawError::DeviceLost(_)) => let_go(renderer),
+            Err(DrawError::DeviceLost(_)) => drop_catching_panics(renderer),
             _ => self.gpu = Some((renderer, device)),
         }
         result

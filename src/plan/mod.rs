@@ -27,7 +27,8 @@ pub use primitives::thicken;
 pub use quality::{Choice, Chosen, choose};
 pub use skips::{Skip, SkipKind};
 pub use surface::{
-    CornerValues, Lamp, Lights, ShadedMaterial, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, flags, slots,
+    CornerValues, Lamp, Lights, ShadedMaterial, SurfacePass, TEXTURE_NONE, Texture, TextureUse, Textures, debug_views,
+    flags, samplers, slots,
 };
 
 use std::borrow::Cow;

@@ -1,6 +1,6 @@
 //! The CPU rasterizer: the reference for bytes.
 //!
-//! Stages, each a file: [`transform`] (with [`clip`] where needed), [`visibility`], [`layers`] (with [`peel`]), [`shade`],
+//! RasterContext, each a file: [`transform`] (with [`clip`] where needed), [`visibility`], [`layers`] (with [`peel`]), [`shade`],
 //! [`lines`], [`resolve`]. The picture is cut
 //! into bands of rows that fit a core's cache; threads take bands, and nothing a band draws depends on another.
 
@@ -9,12 +9,12 @@
 
 mod bands;
 mod deadline_poll;
-mod geometry;
+pub(super) mod geometry;
 mod isa;
-mod lines;
+pub(super) mod lines;
 mod peeling;
 mod resolve;
-mod surface;
+pub(super) mod surface;
 mod vector;
 
 pub use isa::Isa;
@@ -45,7 +45,7 @@ pub struct CpuRenderer {
 }
 
 /// What every stage reads: the plan and the vertices on screen.
-pub struct Stages<'a> {
+pub struct RasterContext<'a> {
     plan: &'a DrawPlan<'a>,
     deadline: &'a Deadline,
     /// The positions', then the hull's own.
@@ -68,7 +68,7 @@ impl CpuRenderer {
         Self { isa, pool, vertices: Vec::new(), scratch: ScratchPool::default(), srgb: SrgbEncoder::new() }
     }
 
-    /// Transforms the plan's vertices; afterwards [`Stages`] can be made.
+    /// Transforms the plan's vertices; afterwards [`RasterContext`] can be made.
     fn transform(&mut self, plan: &DrawPlan<'_>) {
         let isa = self.isa;
         let pool = self.pool.as_ref();
@@ -82,8 +82,8 @@ impl CpuRenderer {
         self.vertices.extend(own.iter().map(ScreenVertex::from));
     }
 
-    fn stages<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> Stages<'a> {
-        Stages { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb }
+    fn context<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> RasterContext<'a> {
+        RasterContext { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb }
     }
 
     /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside it.
@@ -92,18 +92,18 @@ impl CpuRenderer {
         plan: &DrawPlan<'_>,
         deadline: &Deadline,
         out: &mut [T],
-        each: impl Fn(&Stages<'_>, &mut BandScratch, &Bins, usize, &mut [T]) + Sync + Send,
+        each: impl Fn(&RasterContext<'_>, &mut BandScratch, &Bins, usize, &mut [T]) + Sync + Send,
     ) -> Result<(), DrawError> {
         deadline.check()?;
         self.transform(plan);
-        let stages = self.stages(plan, deadline);
+        let context = self.context(plan, deadline);
         let banding = Banding::new(plan, self.threads());
-        let drawn = bands::bins::bin(&stages, self.pool.as_ref(), [banding.rows, banding.margin]).map(|bins| {
+        let drawn = bands::bins::bin(&context, self.pool.as_ref(), [banding.rows, banding.margin]).map(|bins| {
             let row_len = out.len() / plan.height_px as usize;
             let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
             run_few(self.pool.as_ref(), banding.at_once, items, |(band, out)| {
                 if deadline.check().is_ok() {
-                    self.scratch.with(plan, banding, |scratch| each(&stages, scratch, &bins, band, out));
+                    self.scratch.with(plan, banding, |scratch| each(&context, scratch, &bins, band, out));
                 }
             });
         });
@@ -134,14 +134,14 @@ impl CpuRenderer {
     /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare back-ends sample for sample.
     pub fn draw_layer(&mut self, plan: &DrawPlan<'_>, layer: u32, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
         let mut words = vec![0_u64; plan.width_px as usize * plan.height_px as usize * plan.samples as usize];
-        self.draw_bands(plan, deadline, &mut words, |stages, scratch, bins, band, words| {
-            bands::draw_layer(stages, scratch, bins, band, layer, words);
+        self.draw_bands(plan, deadline, &mut words, |context, scratch, bins, band, words| {
+            bands::draw_layer(context, scratch, bins, band, layer, words);
         })?;
         Ok(words)
     }
 }
 
-impl Stages<'_> {
+impl RasterContext<'_> {
     /// Where the corners of an id are among the vertices.
     #[inline(always)]
     fn triangle(&self, id: u32) -> [u32; 3] {

@@ -35,23 +35,23 @@ impl SrgbEncoder {
 
 /// Whether a pixel's colour is that of everything: then the sign of its alpha is set. Else it is the surface's over nothing.
 #[inline(always)]
-pub fn is_laid(color: &[f32; 4]) -> bool {
+pub fn is_composited(color: &[f32; 4]) -> bool {
     color[3].is_sign_negative()
 }
 
 /// The surface's colour over the background.
 #[inline(always)]
-pub fn lay_over(surface: [f32; 4], background: [f32; 4]) -> [f32; 4] {
+pub fn over_background(surface: [f32; 4], background: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|k| surface[k] + background[k] * (1.0 - surface[3]))
 }
 
 /// Lays the surface over the background wherever no line has been laid over both.
-pub fn lay_over_background(plan: &DrawPlan<'_>, colors: &mut [[f32; 4]]) {
+pub fn composite_background(plan: &DrawPlan<'_>, colors: &mut [[f32; 4]]) {
     for color in colors {
-        if is_laid(color) {
+        if is_composited(color) {
             color[3] = -color[3];
         } else {
-            *color = lay_over(*color, plan.background);
+            *color = over_background(*color, plan.background);
         }
     }
 }

@@ -83,7 +83,7 @@ impl Buffers {
     }
 
     /// Reserves a buffer and fills it with slices of whole words, one after the other.
-    pub fn upload_parts(&mut self, gpu: &Handles, slot: Slot, parts: &[&[u8]]) -> Result<(), DrawError> {
+    pub fn upload_slices(&mut self, gpu: &Handles, slot: Slot, parts: &[&[u8]]) -> Result<(), DrawError> {
         let buffer = self.reserve(gpu, slot, parts.iter().map(|part| part.len() as u64).sum())?;
         let mut at = 0;
         for part in parts.iter().filter(|part| !part.is_empty()) {

@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::buffers::SpareBuffers;
 use super::handles::Handles;
 use crate::backend::DrawError;
-use crate::backend::gpu::pipelines::Stages;
+use crate::backend::gpu::pipelines::PipelineCache;
 use crate::limits::Deadline;
 
 /// Which adapters may be opened.
@@ -45,7 +45,7 @@ pub struct GpuInfo {
 /// An opened GPU.
 pub struct Gpu {
     pub(super) handles: Handles,
-    pub(super) stages: Stages,
+    pub(super) pipelines: PipelineCache,
     pub(super) spare_buffers: SpareBuffers,
     pub(super) int64_atomics: bool,
     info: GpuInfo,
@@ -110,7 +110,7 @@ impl Gpu {
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
         Ok(Self {
             handles: Handles { device, queue, limits },
-            stages: Stages::default(),
+            pipelines: PipelineCache::default(),
             spare_buffers: SpareBuffers::default(),
             int64_atomics,
             info,
@@ -143,7 +143,7 @@ impl Gpu {
     pub(super) fn job_ended(&self) {
         let count = self.jobs_ended.fetch_add(1, Ordering::Relaxed).wrapping_add(1);
         if self.is_software() && count.is_multiple_of(SOFTWARE_PIPELINE_JOBS) {
-            self.stages.clear();
+            self.pipelines.clear();
         }
     }
 

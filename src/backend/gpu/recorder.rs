@@ -9,8 +9,8 @@ use super::device::Gpu;
 use super::handles::Handles;
 use super::params::{BATCH_STRIDE, Batch, Frame, pack};
 use crate::backend::DrawError;
-use crate::backend::gpu::pipelines::key::look;
-use crate::backend::gpu::pipelines::{Pipeline, Slot, Stage, uniforms_layout};
+use crate::backend::gpu::pipelines::key::pipeline_key;
+use crate::backend::gpu::pipelines::{Kernel, Pipeline, Slot, uniforms_layout};
 use crate::backend::gpu::schedule::tiles::Tiles;
 use crate::limits::Deadline;
 use crate::plan::DrawPlan;
@@ -22,8 +22,8 @@ pub struct Recorder<'a> {
     buffers: &'a mut Buffers,
     uniforms: wgpu::BindGroup,
     spare_batch: usize,
-    look: u32,
-    kernels: HashMap<Stage, (Arc<Pipeline>, wgpu::BindGroup)>,
+    key: u32,
+    kernels: HashMap<Kernel, (Arc<Pipeline>, wgpu::BindGroup)>,
     encoder: Option<wgpu::CommandEncoder>,
     pass: Option<wgpu::ComputePass<'static>>,
     in_flight: Option<mpsc::Receiver<()>>,
@@ -58,7 +58,7 @@ impl<'a> Recorder<'a> {
             buffers,
             uniforms,
             spare_batch,
-            look: look(plan),
+            key: pipeline_key(plan),
             kernels: HashMap::new(),
             encoder: None,
             pass: None,
@@ -67,13 +67,13 @@ impl<'a> Recorder<'a> {
     }
 
     /// Runs a kernel.
-    pub fn dispatch(&mut self, stage: Stage, batch: usize, workgroups: [u32; 2]) -> Result<(), DrawError> {
-        if !self.kernels.contains_key(&stage) {
-            let kernel = self.kernel(stage)?;
-            self.kernels.insert(stage, kernel);
+    pub fn dispatch(&mut self, kernel: Kernel, batch: usize, workgroups: [u32; 2]) -> Result<(), DrawError> {
+        if !self.kernels.contains_key(&kernel) {
+            let bound = self.bind(kernel)?;
+            self.kernels.insert(kernel, bound);
         }
         self.begin_pass();
-        if let (Some(pass), Some((pipeline, group))) = (&mut self.pass, self.kernels.get(&stage)) {
+        if let (Some(pass), Some((pipeline, group))) = (&mut self.pass, self.kernels.get(&kernel)) {
             pass.set_pipeline(&pipeline.pipeline);
             pass.set_bind_group(0, &self.uniforms, &[(batch * BATCH_STRIDE) as u32]);
             pass.set_bind_group(1, group, &[]);
@@ -83,7 +83,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// Draws what the work list holds: reads how long it is, then runs the kernel in rounds of known length.
-    pub fn tiles_in_rounds(&mut self, stage: Stage, batch: &Batch, tiles: &Tiles) -> Result<(), DrawError> {
+    pub fn tiles_in_rounds(&mut self, kernel: Kernel, batch: &Batch, tiles: &Tiles) -> Result<(), DrawError> {
         let mut counts = [0; 2];
         let (work, to) = (
             self.buffers.storage(&self.gpu.handles, Slot::Work)?.clone(),
@@ -104,7 +104,7 @@ impl<'a> Recorder<'a> {
                 let offset = (self.spare_batch * BATCH_STRIDE) as u64;
                 self.gpu.handles.queue.write_buffer(batches, offset, bytemuck::bytes_of(&range));
             }
-            self.dispatch(stage, self.spare_batch, [tiles.workgroups, 1])?;
+            self.dispatch(kernel, self.spare_batch, [tiles.workgroups, 1])?;
             // Writes to buffers come before all commands of a submission: one round each.
             self.submit()?;
         }
@@ -115,7 +115,7 @@ impl<'a> Recorder<'a> {
     pub fn lines_in_rounds(&mut self, batch: usize, workgroups: [u32; 2], bytes: u64) -> Result<(), DrawError> {
         self.clear(Slot::Progress, bytes)?;
         loop {
-            self.dispatch(Stage::Lines, batch, workgroups)?;
+            self.dispatch(Kernel::Edge, batch, workgroups)?;
             if self.read_word(Slot::Progress, 0)? == 0 {
                 return Ok(());
             }
@@ -190,11 +190,11 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    fn kernel(&mut self, stage: Stage) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
-        let pipeline = self.gpu.stages.get(&self.gpu.handles.device, stage, self.look);
+    fn bind(&mut self, kernel: Kernel) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
+        let pipeline = self.gpu.pipelines.get(&self.gpu.handles.device, kernel, self.key);
         let mut bound = Vec::new();
-        for &(slot, _) in stage.buffers() {
-            bound.push((slot, self.buffers.storage(&self.gpu.handles, stage.bound_at(slot))?.clone()));
+        for &(slot, _) in kernel.buffers() {
+            bound.push((slot, self.buffers.storage(&self.gpu.handles, kernel.bound_at(slot))?.clone()));
         }
         let entries: Vec<_> = bound
             .iter()

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 
 use crate::backend::cpu::geometry::clip::clip_triangle;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous};
-use crate::backend::cpu::geometry::visibility::{area, axis_bounds, is_wanted};
+use crate::backend::cpu::geometry::visibility::{area, axis_bounds, passes_culling};
 use crate::backend::cpu::lines::contour;
 use crate::backend::cpu::lines::segment::Segment;
-use crate::backend::cpu::{CHUNK, Stages};
+use crate::backend::cpu::{CHUNK, RasterContext};
 use crate::limits::Stopped;
 use crate::plan::{DrawPlan, Faces, HullPass, LinePass, pass_mask};
 
@@ -25,7 +25,7 @@ pub struct Bins {
     /// For the visibility buffer.
     pub triangles: Vec<TriangleBin>,
     /// For the layers over it.
-    pub layers: Vec<TriangleBin>,
+    pub peel: Vec<TriangleBin>,
     /// By line pass.
     pub edges: Vec<Vec<Bin>>,
 }
@@ -93,33 +93,37 @@ impl TriangleBin {
 
 /// Sorts the plan's triangles and edges into bands of `rows`; triangles of the visibility buffer also into those to which they
 /// are as close as `margin` rows.
-pub fn bin(stages: &Stages<'_>, pool: Option<&rayon::ThreadPool>, [rows, margin]: [u32; 2]) -> Result<Bins, Stopped> {
-    let plan = stages.plan;
-    let (base, layers) = passes(plan);
+pub fn bin(
+    context: &RasterContext<'_>,
+    pool: Option<&rayon::ThreadPool>,
+    [rows, margin]: [u32; 2],
+) -> Result<Bins, Stopped> {
+    let plan = context.plan;
+    let (base, peel) = passes(plan);
     let bin_all = |passes: Vec<Pass>, margin: u32| {
         let jobs = passes.into_iter().flat_map(Pass::chunks).collect();
-        map(pool, jobs, |pass| match stages.deadline.check() {
-            Ok(()) => bin_triangles(stages, [rows, margin], &pass),
+        map(pool, jobs, |pass| match context.deadline.check() {
+            Ok(()) => bin_triangles(context, [rows, margin], &pass),
             Err(Stopped) => TriangleBin::default(),
         })
     };
-    let (triangles, layers) = (bin_all(base, margin), bin_all(layers, 0));
+    let (triangles, peel) = (bin_all(base, margin), bin_all(peel, 0));
     let bin_pass = |pass: &LinePass| {
-        map(pool, chunks(0..pass.edges.len()).collect(), |range| match stages.deadline.check() {
-            Ok(()) => bin_edges(stages, pass, rows, range),
+        map(pool, chunks(0..pass.edges.len()).collect(), |range| match context.deadline.check() {
+            Ok(()) => bin_edges(context, pass, rows, range),
             Err(Stopped) => Bin::default(),
         })
     };
     let edges = plan.lines.iter().map(bin_pass).collect();
-    stages.deadline.check()?;
-    Ok(Bins { triangles, layers, edges })
+    context.deadline.check()?;
+    Ok(Bins { triangles, peel, edges })
 }
 
 /// Triangles that are drawn for the same reason.
 struct Pass {
     ids: Range<usize>,
     /// The role that triangles must have; of a hull's none.
-    role: u8,
+    pass_bit: u8,
     faces: Faces,
 }
 
@@ -131,14 +135,14 @@ impl Pass {
     /// Which faces of a triangle are drawn; None where it has another role.
     #[inline(always)]
     fn faces_of(&self, plan: &DrawPlan<'_>, id: usize) -> Option<Faces> {
-        if self.role == 0 {
+        if self.pass_bit == 0 {
             return Some(self.faces);
         }
         match plan.pass_masks.get(id) {
             None => Some(self.faces),
-            Some(role) if role & self.role == 0 => None,
-            Some(role) if role & pass_mask::FRONT_ONLY != 0 => Some(Faces::Front),
-            Some(role) if role & pass_mask::BACK_ONLY != 0 => Some(Faces::Back),
+            Some(mask) if mask & self.pass_bit == 0 => None,
+            Some(mask) if mask & pass_mask::FRONT_ONLY != 0 => Some(Faces::Front),
+            Some(mask) if mask & pass_mask::BACK_ONLY != 0 => Some(Faces::Back),
             _ => Some(self.faces),
         }
     }
@@ -147,14 +151,15 @@ impl Pass {
 /// What goes into the visibility buffer, and what into the layers.
 fn passes(plan: &DrawPlan<'_>) -> (Vec<Pass>, Vec<Pass>) {
     let count = plan.triangles.len();
-    let surface = |role| plan.surface.as_ref().map(|s| Pass { ids: 0..count, role, faces: s.faces });
-    let around = |hull: &HullPass<'_>| Pass { ids: count..count + hull.triangles.len(), role: 0, faces: Faces::Both };
+    let surface = |pass_bit| plan.surface.as_ref().map(|s| Pass { ids: 0..count, pass_bit, faces: s.faces });
+    let around =
+        |hull: &HullPass<'_>| Pass { ids: count..count + hull.triangles.len(), pass_bit: 0, faces: Faces::Both };
     let hull = plan.hull.as_ref().map(around);
     // Without roles, nothing is a layer.
     let layer = surface(pass_mask::LAYER).filter(|_| plan.peeling().is_some() && !plan.pass_masks.is_empty());
-    let (base_hull, layered_hull) = if plan.has_peeled_hull() { (None, hull) } else { (hull, None) };
+    let (base_hull, peeled_hull) = if plan.has_peeled_hull() { (None, hull) } else { (hull, None) };
     let collect = |passes: [Option<Pass>; 2]| passes.into_iter().flatten().collect();
-    (collect([surface(pass_mask::SURFACE), base_hull]), collect([layer, layered_hull]))
+    (collect([surface(pass_mask::SURFACE), base_hull]), collect([layer, peeled_hull]))
 }
 
 fn chunks(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
@@ -166,8 +171,8 @@ fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
     plan.height_px.div_ceil(rows) as usize
 }
 
-fn bin_triangles(stages: &Stages<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBin {
-    let plan = stages.plan;
+fn bin_triangles(context: &RasterContext<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBin {
+    let plan = context.plan;
     let bands = band_count(plan, rows[0]);
     let mut bin = TriangleBin {
         whole: Bin::new(bands, TALL_BANDS),
@@ -176,10 +181,10 @@ fn bin_triangles(stages: &Stages<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBi
     };
     for id in pass.ids.clone() {
         let Some(faces) = pass.faces_of(plan, id) else { continue };
-        let vertices = stages.screen_triangle(id as u32);
+        let vertices = context.screen_triangle(id as u32);
         if vertices.iter().any(ScreenVertex::is_outside) {
-            bin_clipped(stages, rows, id as u32, faces, &mut bin);
-        } else if is_wanted(faces, area(&vertices))
+            bin_clipped(context, rows, id as u32, faces, &mut bin);
+        } else if passes_culling(faces, area(&vertices))
             && let Some(bands) = bands_of(plan, rows, &vertices)
         {
             bin.whole.push(id as u32, bands);
@@ -188,14 +193,14 @@ fn bin_triangles(stages: &Stages<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBi
     bin
 }
 
-fn bin_clipped(stages: &Stages<'_>, rows: [u32; 2], id: u32, faces: Faces, bin: &mut TriangleBin) {
-    let plan = stages.plan;
-    if !plan.projection.clip || stages.is_hull(id) {
+fn bin_clipped(context: &RasterContext<'_>, rows: [u32; 2], id: u32, faces: Faces, bin: &mut TriangleBin) {
+    let plan = context.plan;
+    if !plan.projection.clip || context.is_hull(id) {
         return;
     }
-    let corners = stages.positions_of(id).map(|(position, _)| homogeneous(&plan.projection, position));
+    let corners = context.positions_of(id).map(|(position, _)| homogeneous(&plan.projection, position));
     clip_triangle(&plan.projection, corners, |piece| {
-        if is_wanted(faces, area(&piece))
+        if passes_culling(faces, area(&piece))
             && let Some(bands) = bands_of(plan, rows, &piece)
         {
             bin.push_piece(id, piece, bands);
@@ -213,16 +218,16 @@ fn bands_of(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], v: &[ScreenVertex; 3]
     (first <= last).then(|| [first, last].map(|row| row as usize / rows as usize))
 }
 
-fn bin_edges(stages: &Stages<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> Bin {
-    let mut bin = Bin::new(band_count(stages.plan, rows), TALL_EDGE_BANDS);
+fn bin_edges(context: &RasterContext<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> Bin {
+    let mut bin = Bin::new(band_count(context.plan, rows), TALL_EDGE_BANDS);
     let reach = pass.reach_px();
     for i in range {
         let edge = &pass.edges[i];
-        if !contour::is_drawn(stages, pass, edge) {
+        if !contour::is_drawn(context, pass, edge) {
             continue;
         }
-        if let Some(segment) = Segment::new(stages, edge) {
-            let [first, last] = segment.rows(reach, stages.plan.height_px);
+        if let Some(segment) = Segment::new(context, edge) {
+            let [first, last] = segment.rows(reach, context.plan.height_px);
             if first <= last {
                 bin.push(i as u32, [first, last].map(|row| row as usize / rows as usize));
             }

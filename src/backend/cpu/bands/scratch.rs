@@ -4,8 +4,8 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::isa::LANES;
-use crate::backend::cpu::lines::coverage::Ink;
-use crate::backend::cpu::peeling::state::LayerBand;
+use crate::backend::cpu::lines::coverage::LineCoverage;
+use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::light::Light;
 use crate::plan::DrawPlan;
 
@@ -29,14 +29,14 @@ const SAMPLE_BYTES: usize = 8;
 pub struct Banding {
     /// Rows in each band but the last.
     pub rows: u32,
-    /// Rows beyond a band that its lines look at.
+    /// Rows beyond a band that its lines material at.
     pub margin: u32,
     /// Bands that are drawn at once.
     pub at_once: usize,
 }
 
 impl Banding {
-    /// For so many threads. Bands fit the cache, unless their lines look far beyond them: then a band has as many rows as lets
+    /// For so many threads. Bands fit the cache, unless their lines material far beyond them: then a band has as many rows as lets
     /// the threads do the most in [`BANDS_BYTES_MAX`], because small bands draw most samples for their neighbours, and of large
     /// ones there are few at once.
     pub fn new(plan: &DrawPlan<'_>, threads: usize) -> Self {
@@ -75,9 +75,9 @@ fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
         return samples(plan.width_px + 2 * plan.margin_px) * SAMPLE_BYTES;
     }
     let light = if plan.lights_lines() { size_of::<Light>() + size_of::<u32>() } else { 0 };
-    let ink = if plan.lines.is_empty() { 0 } else { size_of::<Ink>() };
-    let layers = if plan.peeling().is_some() { LayerBand::SAMPLE_BYTES } else { 0 };
-    plan.width_px as usize * (size_of::<[f32; 4]>() + light + ink) + samples(plan.width_px) * layers
+    let coverage = if plan.lines.is_empty() { 0 } else { size_of::<LineCoverage>() };
+    let peel = if plan.peeling().is_some() { PeelBand::SAMPLE_BYTES } else { 0 };
+    plan.width_px as usize * (size_of::<[f32; 4]>() + light + coverage) + samples(plan.width_px) * peel
 }
 
 /// A band's buffers, kept from band to band.
@@ -89,11 +89,11 @@ pub struct BandScratch {
     /// Rows beyond these, above and below, that `samples` has room for too.
     pub margin: u32,
     /// Where the plan has layers.
-    pub layers: Option<LayerBand>,
+    pub peel: Option<PeelBand>,
     /// A pixel, premultiplied linear RGBA.
     pub colors: Vec<[f32; 4]>,
     /// Of the line pass that is drawn just now.
-    pub ink: Vec<Ink>,
+    pub coverage: Vec<LineCoverage>,
     /// Where that is lit, whose light falls on its lines.
     pub owners: Vec<u32>,
     /// A pixel, where it is lit.
@@ -106,9 +106,9 @@ impl BandScratch {
             samples: SampleBand::new([plan.width_px, plan.height_px], plan.margin_px, rows + 2 * margin, plan.samples),
             rows,
             margin,
-            layers: None,
+            peel: None,
             colors: Vec::new(),
-            ink: Vec::new(),
+            coverage: Vec::new(),
             owners: Vec::new(),
             light: Vec::new(),
         }
@@ -117,9 +117,9 @@ impl BandScratch {
     /// What it holds on to, bytes.
     fn bytes(&self) -> usize {
         self.samples.depth.len() * SAMPLE_BYTES
-            + self.layers.as_ref().map_or(0, LayerBand::bytes)
+            + self.peel.as_ref().map_or(0, PeelBand::bytes)
             + self.colors.capacity() * size_of::<[f32; 4]>()
-            + self.ink.capacity() * size_of::<Ink>()
+            + self.coverage.capacity() * size_of::<LineCoverage>()
             + self.owners.capacity() * size_of::<u32>()
             + self.light.capacity() * size_of::<Light>()
     }
@@ -194,7 +194,7 @@ mod tests {
         let mut bytes = 0;
         pool.with(plan, banding, |scratch| {
             scratch.colors.resize(pixels, [0.0; 4]);
-            scratch.ink.resize(pixels, Ink::default());
+            scratch.coverage.resize(pixels, LineCoverage::default());
             bytes = scratch.bytes();
         });
         pool.trim();
@@ -209,7 +209,7 @@ mod tests {
         }
     }
 
-    /// All kinds of plans whose lines look far beyond a band.
+    /// All kinds of plans whose lines material far beyond a band.
     fn with_wide_lines(each: &mut impl FnMut(&DrawPlan<'_>)) {
         for size_px in [[4096, 4096], [4096, 100], [100, 4096], [1, 1], [640, 480]] {
             for (samples, width_px) in [1, 4, 8, 16].into_iter().flat_map(|s| [1.0, 9.0, 110.0].map(|w| (s, w))) {
@@ -221,8 +221,8 @@ mod tests {
                     for lines in &mut plan.lines {
                         (lines.width_px, lines.shown, lines.lit) = (width_px, Shown::Hidden, true);
                     }
-                    let layers = PeelingPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
-                    plan.peeling = Some(layers).filter(|_| layered);
+                    let peel = PeelingPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
+                    plan.peeling = Some(peel).filter(|_| layered);
                     plan.samples = samples;
                     each(&plan);
                     // Where the mesh goes on beyond the picture.
@@ -263,10 +263,10 @@ mod tests {
             ScratchPool::default().with(plan, banding, |scratch| {
                 let pixels = (plan.width_px * banding.rows) as usize;
                 scratch.colors = Vec::with_capacity(pixels);
-                scratch.ink = Vec::with_capacity(pixels);
+                scratch.coverage = Vec::with_capacity(pixels);
                 scratch.owners = Vec::with_capacity(pixels);
                 scratch.light = Vec::with_capacity(pixels);
-                scratch.layers = plan.peeling().map(|_| LayerBand::new(&scratch.samples, scratch.rows));
+                scratch.peel = plan.peeling().map(|_| PeelBand::new(&scratch.samples, scratch.rows));
                 assert_eq!(scratch.bytes(), banding.bytes(plan));
             });
             cases += 1;

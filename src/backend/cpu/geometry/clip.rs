@@ -4,7 +4,7 @@ use super::transform::{ScreenVertex, recip, round_to_i32};
 use crate::plan::Projection;
 
 /// Bound of clipped coordinates, a little inside the guard band so that rounding cannot leave it.
-const BOUND: f32 = 1_048_576.0 - 512.0;
+pub const BOUND: f32 = 1_048_576.0 - 512.0;
 
 /// A triangle cut by five planes has at most eight corners.
 pub const CORNERS_MAX: usize = 8;

@@ -31,7 +31,7 @@ pub fn area(v: &[ScreenVertex; 3]) -> i64 {
 
 /// Whether `faces` wants a triangle of this area.
 #[inline(always)]
-pub fn is_wanted(faces: Faces, area: i64) -> bool {
+pub fn passes_culling(faces: Faces, area: i64) -> bool {
     match faces {
         Faces::Both => area != 0,
         Faces::Front => area < 0,

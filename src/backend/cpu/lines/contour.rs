@@ -1,7 +1,7 @@
 //! Stage 4, an edge's faces: which side of the surface an edge belongs to, and whether the surface ends there. Twin of
 //! `shaders/lines/contour.wgsl`.
 
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous};
 use crate::backend::cpu::geometry::visibility::area;
 use crate::plan::{Edge, LinePass, Side};
@@ -9,27 +9,27 @@ use crate::plan::{Edge, LinePass, Side};
 /// Whether the pass draws the edge in this view: not on the far side of a closed surface, where nothing of it can be seen;
 /// and of a contour only the silhouette.
 #[inline(always)]
-pub fn is_drawn(stages: &Stages<'_>, lines: &LinePass, edge: &Edge) -> bool {
+pub fn is_drawn(context: &RasterContext<'_>, lines: &LinePass, edge: &Edge) -> bool {
     // Of a contour, what is seen from its very edge shows nothing either: its line would lie on that of the side it hides behind.
-    let is_hidden = |face| stages.looks_away(lines, face) || (lines.contour && stages.is_edge_on(face));
+    let is_hidden = |face| context.faces_away(lines, face) || (lines.contour && context.is_edge_on(face));
     if lines.unseen_side.is_some() && edge.faces.into_iter().all(is_hidden) {
         return false;
     }
-    !lines.contour || stages.is_silhouette(edge)
+    !lines.contour || context.is_silhouette(edge)
 }
 
-impl Stages<'_> {
-    /// The face whose light falls on an edge's line where the pixel sees no surface, plus 1: of those that look at the viewer
+impl RasterContext<'_> {
+    /// The face whose light falls on an edge's line where the pixel sees no surface, plus 1: of those that material at the viewer
     /// the one with the highest id, so that the order of edges does not matter; of any, where none does.
-    pub fn lit_by(&self, lines: &LinePass, edge: &Edge) -> u32 {
-        let towards = |face: u32| if self.looks_away(lines, face) { 0 } else { face + 1 };
+    pub fn lighting_face(&self, lines: &LinePass, edge: &Edge) -> u32 {
+        let towards = |face: u32| if self.faces_away(lines, face) { 0 } else { face + 1 };
         let best = towards(edge.faces[0]).max(towards(edge.faces[1]));
         if best > 0 { best } else { edge.faces[0].wrapping_add(1) }
     }
 
-    /// Whether a face is certainly turned away. A missing face is: it shows nothing.
+    /// Whether a face is certainly transformed away. A missing face is: it shows nothing.
     #[inline(always)]
-    fn looks_away(&self, lines: &LinePass, face: u32) -> bool {
+    fn faces_away(&self, lines: &LinePass, face: u32) -> bool {
         if face == Edge::NO_FACE {
             return true;
         }

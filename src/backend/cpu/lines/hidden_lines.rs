@@ -5,7 +5,7 @@
 
 use super::contour::volume;
 use super::segment::Segment;
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::is_moderate;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
@@ -13,50 +13,50 @@ use crate::backend::cpu::geometry::visibility::area;
 use crate::plan::Edge;
 
 /// How much nearer than the edge a surface must be, as a share of depth: what f32 may lose on the way.
-const NEARER: f32 = 1.0 + 1.0 / 524_288.0;
+pub const NEARER_RATIO: f32 = 1.0 + 1.0 / 524_288.0;
 
 /// How far what is on screen may lie from where it should, 1/256 px: half a unit each in which a triangle and an edge are rounded, and some
 /// for f32. A surface hides an edge only if it were nearer even so much farther down its slope: else what lies in its plane, as the foot of
 /// what stands on it does, would be hidden or not as roundings fall.
-const SNAPPED: f32 = 1.25;
+pub const SNAP_ERROR: f32 = 1.25;
 
 /// Corners behind the eye may lie anywhere: 2^31.
 const FAR: f32 = 2_147_483_648.0;
 
 /// Parts shorter than this are what rounding leaves of an edge beside what hides it. Their round ends would show as dots.
-const CRUMB_PX: f32 = 1.0 / 16.0;
+pub const INTERVAL_MIN_PX: f32 = 1.0 / 16.0;
 
 /// Between two surfaces that hide it: there a sliver of surface may have no sample.
-const GAP_PX: f32 = 1.0 / 4.0;
+pub const GAP_MIN_PX: f32 = 1.0 / 4.0;
 
 /// Triangles that are remembered as done with.
 const RECENT: usize = 8;
 
 /// Intervals along an edge in which something hides it, kept from edge to edge.
 #[derive(Default)]
-pub struct Hiding {
+pub struct HiddenIntervals {
     hidden: Vec<[f32; 2]>,
 }
 
-impl Hiding {
+impl HiddenIntervals {
     /// Finds what hides the edge in a range of it (0 to 1).
     #[inline(always)]
     pub fn find(
         &mut self,
-        (stages, band): (&Stages<'_>, &SampleBand),
+        (context, band): (&RasterContext<'_>, &SampleBand),
         edge: &Edge,
         segment: &Segment,
         range: [f32; 2],
     ) {
         self.hidden.clear();
-        if lies_deep((stages, band), segment, range) {
+        if is_fully_hidden((context, band), segment, range) {
             self.hidden.push(range);
             return;
         }
-        self.ask_around(stages, band, (edge, segment), range, 0);
+        self.collect_around(context, band, (edge, segment), range, 0);
         if !self.hidden.is_empty() && self.hidden[0] != range {
             // Where an edge dives under another surface, a sliver of that may have its samples beside the edge.
-            self.ask_around(stages, band, (edge, segment), range, 1);
+            self.collect_around(context, band, (edge, segment), range, 1);
         }
         if self.hidden.len() > 1 {
             self.hidden.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
@@ -65,9 +65,9 @@ impl Hiding {
 
     /// Asks each triangle that is seen along the edge, or within `radius` pixels of it, what it hides.
     #[inline(always)]
-    fn ask_around(
+    fn collect_around(
         &mut self,
-        stages: &Stages<'_>,
+        context: &RasterContext<'_>,
         band: &SampleBand,
         (edge, segment): (&Edge, &Segment),
         range: [f32; 2],
@@ -88,7 +88,7 @@ impl Hiding {
                         }
                         recent.copy_within(..RECENT - 1, 1);
                         recent[0] = id;
-                        let Some([start, end]) = hidden_by(stages, edge, segment, id) else { continue };
+                        let Some([start, end]) = hidden_by(context, edge, segment, id) else { continue };
                         let (start, end) = (start.max(range[0]), end.min(range[1]));
                         if [start, end] == range {
                             self.hidden.clear();
@@ -107,29 +107,29 @@ impl Hiding {
     /// Adds the parts of the range that nothing hides to `parts`, in order, but for crumbs and gaps; `px` is a pixel's share of
     /// the edge.
     #[inline(always)]
-    pub fn visible(&self, range: [f32; 2], px: f32, parts: &mut Vec<[f32; 2]>) {
+    pub fn visible(&self, range: [f32; 2], px: f32, intervals: &mut Vec<[f32; 2]>) {
         if self.hidden.is_empty() {
-            parts.push(range);
+            intervals.push(range);
             return;
         }
         let mut from = range[0];
         for &[start, end] in &self.hidden {
-            if start - from > px * if from > range[0] { GAP_PX } else { CRUMB_PX } {
-                parts.push([from, start]);
+            if start - from > px * if from > range[0] { GAP_MIN_PX } else { INTERVAL_MIN_PX } {
+                intervals.push([from, start]);
             }
             from = from.max(end);
         }
-        if range[1] - from > px * CRUMB_PX {
-            parts.push([from, range[1]]);
+        if range[1] - from > px * INTERVAL_MIN_PX {
+            intervals.push([from, range[1]]);
         }
     }
 
     /// Adds the parts that something hides.
-    pub fn hidden(&self, parts: &mut Vec<[f32; 2]>) {
+    pub fn hidden(&self, intervals: &mut Vec<[f32; 2]>) {
         for &[start, end] in &self.hidden {
-            match parts.last_mut() {
-                Some(part) if start <= part[1] => part[1] = part[1].max(end),
-                _ => parts.push([start, end]),
+            match intervals.last_mut() {
+                Some(interval) if start <= interval[1] => interval[1] = interval[1].max(end),
+                _ => intervals.push([start, end]),
             }
         }
     }
@@ -138,8 +138,8 @@ impl Hiding {
 /// Whether all triangles that are seen along the edge are nearer than any of it: then there is no need to ask what exactly
 /// they hide.
 #[inline(always)]
-fn lies_deep((stages, band): (&Stages<'_>, &SampleBand), segment: &Segment, range: [f32; 2]) -> bool {
-    let nearest = segment.depth(0.0).max(segment.depth(1.0)) * NEARER;
+fn is_fully_hidden((context, band): (&RasterContext<'_>, &SampleBand), segment: &Segment, range: [f32; 2]) -> bool {
+    let nearest = segment.depth(0.0).max(segment.depth(1.0)) * NEARER_RATIO;
     let mut last = NOTHING;
     for [x, y] in segment.walk(range) {
         if !band.has(x, y) {
@@ -152,7 +152,7 @@ fn lies_deep((stages, band): (&Stages<'_>, &SampleBand), segment: &Segment, rang
             }
             if id != last {
                 last = id;
-                let [a, b, c] = &stages.screen_triangle(id);
+                let [a, b, c] = &context.screen_triangle(id);
                 if a.is_outside() | b.is_outside() | c.is_outside() | (a.z.min(b.z).min(c.z) <= nearest) {
                     return false;
                 }
@@ -167,19 +167,19 @@ type Corner = [f32; 4];
 
 /// Where along the edge the triangle lies in front of it.
 #[inline(always)]
-fn hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, id: u32) -> Option<[f32; 2]> {
-    let vertices = stages.triangle(id);
+fn hidden_by(context: &RasterContext<'_>, edge: &Edge, segment: &Segment, id: u32) -> Option<[f32; 2]> {
+    let vertices = context.triangle(id);
     if edge.vertices.iter().all(|v| vertices.contains(v)) {
         return None;
     }
-    let on_screen = stages.screen_triangle(id);
+    let on_screen = context.screen_triangle(id);
     let corners: [Corner; 3];
     let is_clockwise;
     if on_screen.iter().any(ScreenVertex::is_outside) {
-        if stages.is_hull(id) || !stages.plan.projection.clip {
+        if context.is_hull(id) || !context.plan.projection.clip {
             return None;
         }
-        corners = vertices.map(|v| homogeneous(&stages.plan.projection, stages.plan.positions[v as usize]));
+        corners = vertices.map(|v| homogeneous(&context.plan.projection, context.plan.positions[v as usize]));
         if !corners.iter().all(is_moderate) {
             return None;
         }
@@ -188,7 +188,7 @@ fn hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, id: u32) -> Op
         let [a, b, c] = &on_screen;
         corners = [corner(a), corner(b), corner(c)];
         let area = area(&on_screen);
-        if area == 0 || !segment.may_lie_behind(&on_screen) {
+        if area == 0 || !segment.may_be_hidden_by(&on_screen) {
             return None;
         }
         is_clockwise = area > 0;
@@ -215,12 +215,12 @@ fn hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, id: u32) -> Op
         let [a, b, c] = [weight(0), weight(1), weight(2)];
         let z = (a * corners[0][2] + b * corners[1][2]) + c * corners[2][2];
         let w = (a * corners[0][3] + b * corners[1][3]) + c * corners[2][3];
-        if w > f32::MIN_POSITIVE { (z * recip(w) - segment.depth(t) * NEARER) - slack } else { -1.0 }
+        if w > f32::MIN_POSITIVE { (z * recip(w) - segment.depth(t) * NEARER_RATIO) - slack } else { -1.0 }
     };
-    let mut part = [0.0, 1.0];
-    narrow(&mut part, [nearer(range[0]), nearer(range[1])])?;
+    let mut interval = [0.0, 1.0];
+    narrow(&mut interval, [nearer(range[0]), nearer(range[1])])?;
     let length = range[1] - range[0];
-    Some([range[0] + part[0] * length, range[0] + part[1] * length])
+    Some([range[0] + interval[0] * length, range[0] + interval[1] * length])
 }
 
 /// How much the depth of a triangle's plane may be off because of where its corners and the edge are on screen; None of one without area.
@@ -239,7 +239,7 @@ fn slack(corners: &[Corner; 3]) -> Option<f32> {
     let (x, y) = (cofactors(1, 3), cofactors(3, 0));
     let sum = |c: [f32; 3], k: usize| (c[0] * p[k] + c[1] * q[k]) + c[2] * r[k];
     let volume = sum(x, 0).abs();
-    (volume > f32::MIN_POSITIVE).then(|| (sum(x, 2).abs() + sum(y, 2).abs()) * recip(volume) * SNAPPED)
+    (volume > f32::MIN_POSITIVE).then(|| (sum(x, 2).abs() + sum(y, 2).abs()) * recip(volume) * SNAP_ERROR)
 }
 
 /// Of each side of a triangle, twice the area that it spans with a point; positive inside. It is right for corners behind

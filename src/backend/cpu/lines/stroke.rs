@@ -28,10 +28,10 @@ type PerPoint = [[i16; WORDS]; BITS];
 static LATTICE: [PerPoint; 2] = [lattice(GENERATORS[0]), lattice(GENERATORS[1])];
 
 /// Steps to the pixel in which along and across are measured.
-const UNIT: f32 = 16_384.0;
+pub const UNIT: f32 = 16_384.0;
 
 /// Largest scaled area: two of them differ by less than 16 bits hold.
-const LIMIT: f32 = LinePass::SCALED_MAX;
+pub const LIMIT: f32 = LinePass::SCALED_MAX;
 
 const fn lattice(generator: usize) -> PerPoint {
     let mut at = [[0; WORDS]; BITS];

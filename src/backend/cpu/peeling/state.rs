@@ -3,7 +3,7 @@
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 
 /// What a band's layers need beside its samples: rows that are shown, and none of those beyond them.
-pub struct LayerBand {
+pub struct PeelBand {
     /// This round's layer; begins as a copy of what it must lie before.
     pub found: SampleBand,
     /// The last round's; depth 0 where a sample is done.
@@ -16,7 +16,7 @@ pub struct LayerBand {
     pub pending: Vec<bool>,
 }
 
-impl LayerBand {
+impl PeelBand {
     /// Bytes a sample: two depths and ids, a colour, and materials.
     pub const SAMPLE_BYTES: usize = 8 + 8 + 16 + 4;
 
@@ -40,7 +40,7 @@ impl LayerBand {
     }
 
     /// Forgets everything, and moves to what is shown of `base`.
-    pub fn begin(&mut self, base: &SampleBand) {
+    pub fn reset(&mut self, base: &SampleBand) {
         for samples in [&mut self.found, &mut self.previous] {
             (samples.first_row, samples.rows, samples.shown) =
                 (base.shown[0] as i32, base.shown[1] - base.shown[0], base.shown);
@@ -73,7 +73,7 @@ impl LayerBand {
 
     /// Takes the find of sample `at`, which is at `in_base` among the base's, as its last layer: its id, or None if the sample is done.
     #[inline(always)]
-    pub fn take(&mut self, base: Option<&SampleBand>, at: usize, in_base: usize) -> Option<u32> {
+    pub fn take_layer(&mut self, base: Option<&SampleBand>, at: usize, in_base: usize) -> Option<u32> {
         let (depth, id) = (self.found.depth[at], self.found.ids[at]);
         let (base_depth, base_id) = base.map_or((0.0, NOTHING), |base| (base.depth[in_base], base.ids[in_base]));
         if depth == base_depth && id == base_id {
@@ -86,7 +86,7 @@ impl LayerBand {
 
     /// Lays a colour under what some samples of the pixel at `first` have so far.
     #[inline(always)]
-    pub fn lay<const S: usize>(&mut self, first: usize, same: [bool; S], color: [f32; 4]) {
+    pub fn accumulate<const S: usize>(&mut self, first: usize, same: [bool; S], color: [f32; 4]) {
         for s in (0..S).filter(|&s| same[s]) {
             let so_far = &mut self.colors[first + s];
             let rest = 1.0 - so_far[3];

@@ -1,6 +1,6 @@
 //! Where a point lies in its triangle. Twin of `shaders/surface/barycentric.wgsl`.
 
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
 use crate::plan::DrawPlan;
 
@@ -16,11 +16,11 @@ pub struct Corner {
 /// The corners of a triangle seen from point `at`. Snapped corners where there are some; where one is behind the eye,
 /// the homogeneous ones, which stay right there.
 #[inline]
-pub fn corners(stages: &Stages<'_>, id: u32, at: [f32; 2]) -> [Corner; 3] {
-    let vertices = stages.screen_triangle(id);
+pub fn corners(context: &RasterContext<'_>, id: u32, at: [f32; 2]) -> [Corner; 3] {
+    let vertices = context.screen_triangle(id);
     if vertices.iter().any(ScreenVertex::is_outside) {
-        return stages.positions_of(id).map(|(position, _)| {
-            let [x, y, _, w] = homogeneous(&stages.plan.projection, position);
+        return context.positions_of(id).map(|(position, _)| {
+            let [x, y, _, w] = homogeneous(&context.plan.projection, position);
             Corner { x: x - at[0] * w, y: y - at[1] * w, w, weight: 1.0 }
         });
     }
@@ -133,12 +133,12 @@ impl Quad {
     }
 
     /// A triangle's exact barycentrics at the three points, continued beyond its edges.
-    pub fn barycentrics(&self, stages: &Stages<'_>, id: u32) -> [[f32; 3]; 3] {
-        self.points.map(|at| Barycentrics::exact(&corners(stages, id, at)).value)
+    pub fn barycentrics(&self, context: &RasterContext<'_>, id: u32) -> [[f32; 3]; 3] {
+        self.points.map(|at| Barycentrics::exact(&corners(context, id, at)).value)
     }
 }
 
-impl Stages<'_> {
+impl RasterContext<'_> {
     /// Unit-box corners of a triangle of the surface, and their vertex indices.
     pub(crate) fn positions_of(&self, id: u32) -> [([f32; 3], u32); 3] {
         self.triangle(id).map(|v| (self.plan.positions[v as usize], v))

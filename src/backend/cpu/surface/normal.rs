@@ -7,13 +7,13 @@ use crate::backend::cpu::vector::{across, cross, facing, sub, turned_to_viewer, 
 use crate::plan::{ShadedMaterial, SurfacePass, flags, slots};
 
 /// The unit normal on the viewer's side, without normal textures.
-pub fn normal(surface: &SurfacePass<'_>, look: &ShadedMaterial, place: &Place<'_>) -> [f32; 3] {
-    let Place { stages, id, b, .. } = place;
-    let to_viewer = stages.plan.projection.to_viewer;
-    if look.flags & flags::DERIVATIVE_NORMALS != 0 {
+pub fn normal(surface: &SurfacePass<'_>, material: &ShadedMaterial, place: &Place<'_>) -> [f32; 3] {
+    let Place { context, id, b, .. } = place;
+    let to_viewer = context.plan.projection.to_viewer;
+    if material.flags & flags::DERIVATIVE_NORMALS != 0 {
         return derivative_normal(place);
     }
-    if look.flags & flags::FACE_NORMALS != 0 {
+    if material.flags & flags::FACE_NORMALS != 0 {
         return turned_to_viewer(surface.face_normals[*id as usize], b.front);
     }
     match &surface.vertex_normals {
@@ -28,23 +28,29 @@ pub fn normal(surface: &SurfacePass<'_>, look: &ShadedMaterial, place: &Place<'_
 /// The cross product of the position's fine derivatives in a block of 2 x 2 pixels, as a GPU's rasterizer has them: in f32,
 /// errors and all. (The same errors on both back-ends.)
 fn derivative_normal(place: &Place<'_>) -> [f32; 3] {
-    let Place { stages, id, at, .. } = place;
-    let quad = Quad::around(stages.plan, *at);
-    let corners = stages.positions_of(*id).map(|(position, _)| position);
+    let Place { context, id, at, .. } = place;
+    let quad = Quad::around(context.plan, *at);
+    let corners = context.positions_of(*id).map(|(position, _)| position);
     // A neighbour beyond the horizon of the triangle's plane is as far away as that.
     let bounded = |b: [f32; 3]| b.map(|v| v.clamp(-1e6, 1e6));
-    let [own, across, down] = quad.barycentrics(stages, *id).map(|b| blend(corners, bounded(b)));
+    let [own, across, down] = quad.barycentrics(context, *id).map(|b| blend(corners, bounded(b)));
     // Large enough that no square vanishes.
     let step = |p: [f32; 3], sign: f32| sub(p, own).map(|v| v * (4096.0 * sign));
     let (dx, dy) = (step(across, quad.sign[0]), step(down, quad.sign[1]));
-    unit_or(cross(dy, dx), stages.plan.projection.to_viewer)
+    unit_or(cross(dy, dx), context.plan.projection.to_viewer)
 }
 
 /// The normal that the normal texture makes of `n`. Its axes are the triangle's own: where u grows, and where v shrinks.
-pub fn bumped(surface: &SurfacePass<'_>, look: &ShadedMaterial, place: &Place<'_>, uv: &Uv, n: [f32; 3]) -> [f32; 3] {
+pub fn normal_mapped(
+    surface: &SurfacePass<'_>,
+    material: &ShadedMaterial,
+    place: &Place<'_>,
+    uv: &Uv,
+    n: [f32; 3],
+) -> [f32; 3] {
     let Some(uvs) = &surface.uvs else { return n };
-    let used = &look.textures[slots::NORMAL];
-    let p = place.stages.positions_of(place.id).map(|(position, _)| position);
+    let used = &material.textures[slots::NORMAL];
+    let p = place.context.positions_of(place.id).map(|(position, _)| position);
     let [t0, t1, t2] = uvs.triangles[place.id as usize].map(|i| {
         let [u, v] = uvs.values[i as usize];
         used.transform.map(|[a, b, _]| a * u + b * v)
@@ -62,6 +68,6 @@ pub fn bumped(surface: &SurfacePass<'_>, look: &ShadedMaterial, place: &Place<'_
     let tangent = unit_or(across(along_u, n), [0.0; 3]);
     let up = unit_or(across(across(along_up, n), tangent), [0.0; 3]);
     let [x, y, z, _] = sample(&surface.textures, used, uv).map(|v| 2.0 * v - 1.0);
-    let (x, y) = (x * look.normal_scale, y * look.normal_scale);
+    let (x, y) = (x * material.normal_scale, y * material.normal_scale);
     unit_or(std::array::from_fn(|k| (x * tangent[k] + y * up[k]) + z * n[k]), n)
 }

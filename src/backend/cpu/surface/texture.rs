@@ -3,10 +3,10 @@
 //! The same bits on both back-ends, because texels decide what a mask leaves and where nearest texels change.
 
 use super::barycentric::Barycentrics;
-use crate::plan::{CornerValues, Texture, TextureUse, Textures};
+use crate::plan::{CornerValues, Texture, TextureUse, Textures, samplers};
 
 /// Coordinates beyond this have no fraction worth speaking of.
-const UV_MAX: f32 = 1_048_576.0;
+pub const UV_MAX: f32 = 1_048_576.0;
 
 /// Texture coordinates at a point, and how they change a pixel to the right and a pixel down.
 pub struct Uv {
@@ -43,7 +43,7 @@ pub fn sample(textures: &Textures, used: &TextureUse, uv: &Uv) -> [f32; 4] {
         texels[0] * texels[0] + texels[1] * texels[1]
     });
     let lod = half_log2(steps[0].max(steps[1])).min(image.levels as f32 - 1.0).max(image.first_level as f32);
-    if used.sampler & 16 != 0 {
+    if used.sampler & samplers::NEAREST != 0 {
         return nearest(textures, image, (lod + 0.5) as u32, at, used.sampler);
     }
     let level = lod as u32;
@@ -69,7 +69,7 @@ fn bilinear(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], samp
     let (first, size) = level_of(image, level);
     let (mut low, mut high, mut share) = ([0; 2], [0; 2], [0.0; 2]);
     for k in 0..2 {
-        let wrap = sampler >> (2 * k) & 3;
+        let wrap = sampler >> (samplers::DOWN_SHIFT * k as u32) & samplers::WRAP_BITS;
         let s = wrapped(at[k], wrap) * size[k] as f32 - 0.5;
         let i = floor(s);
         share[k] = s - i as f32;
@@ -85,7 +85,7 @@ fn bilinear(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], samp
 fn nearest(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], sampler: u32) -> [f32; 4] {
     let (first, size) = level_of(image, level);
     let [x, y] = [0, 1].map(|k| {
-        let wrap = sampler >> (2 * k) & 3;
+        let wrap = sampler >> (samplers::DOWN_SHIFT * k as u32) & samplers::WRAP_BITS;
         texel_index(floor(wrapped(at[k], wrap) * size[k] as f32), size[k], wrap)
     });
     texel(textures, first + (y * size[0] + x) as u32)
@@ -102,15 +102,15 @@ fn level_of(image: &Texture, level: u32) -> (u32, [i32; 2]) {
 /// A coordinate in 0 to 1.
 fn wrapped(u: f32, wrap: u32) -> f32 {
     match wrap {
-        0 => u - floor(u) as f32,
-        1 => 1.0 - ((u - 2.0 * floor(0.5 * u) as f32) - 1.0).abs(),
+        samplers::REPEAT => u - floor(u) as f32,
+        samplers::MIRROR => 1.0 - ((u - 2.0 * floor(0.5 * u) as f32) - 1.0).abs(),
         _ => u.clamp(0.0, 1.0),
     }
 }
 
 /// A texel that may lie one beyond the edge.
 fn texel_index(i: i32, size: i32, wrap: u32) -> i32 {
-    if wrap == 0 {
+    if wrap == samplers::REPEAT {
         return if i < 0 {
             i + size
         } else if i >= size {

@@ -4,8 +4,8 @@
 use super::sizes::{DeviceTraits, has_visibility};
 use super::step::Step;
 use crate::backend::DrawError;
-use crate::backend::gpu::params::{Batch, FIRST_PASS, line_flags};
-use crate::backend::gpu::pipelines::Stage;
+use crate::backend::gpu::params::{Batch, line_flags};
+use crate::backend::gpu::pipelines::Kernel;
 use crate::backend::gpu::schedule::{Schedule, WORKGROUP};
 use crate::plan::{DrawPlan, LinePass};
 
@@ -42,7 +42,13 @@ const WIDE_PX: f32 = 8.0;
 const LANES: u32 = 16;
 
 /// Units of work without end.
-const NO_LIMIT: u32 = u32::MAX;
+pub const NO_LIMIT: u32 = u32::MAX;
+
+/// Bytes before what paused threads remember: how many there are.
+pub const PROGRESS_HEAD_BYTES: u64 = 4;
+
+/// Bytes of what a paused thread remembers.
+pub const PAUSED_BYTES: u64 = 16;
 
 /// How the kernel that draws lines is run over a pass's edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,15 +85,15 @@ impl LineShares {
     /// Bytes of what paused threads remember.
     pub fn progress_bytes(&self) -> u64 {
         let threads = self.edges.div_ceil(self.edges_per_group) * WORKGROUP;
-        if self.units == NO_LIMIT { 0 } else { 4 + 16 * u64::from(threads) }
+        if self.units == NO_LIMIT { 0 } else { PROGRESS_HEAD_BYTES + PAUSED_BYTES * u64::from(threads) }
     }
 }
 
 fn edges_a_dispatch(plan: &DrawPlan<'_>, lines: &LinePass) -> u32 {
     // Half a pixel a step, the samples of up to three pixels in each.
     let longest = 2 * u64::from(plan.width_px + plan.height_px) * 3 * u64::from(plan.samples);
-    let looks = longest.saturating_mul(lines.edges.len() as u64);
-    let most = if looks > BLIND_LOOKS_MAX { EDGE_CHUNK_LONG } else { EDGE_CHUNK };
+    let key_bits = longest.saturating_mul(lines.edges.len() as u64);
+    let most = if key_bits > BLIND_LOOKS_MAX { EDGE_CHUNK_LONG } else { EDGE_CHUNK };
     lines.edges.len().min(most as usize) as u32
 }
 
@@ -96,10 +102,10 @@ fn unit_iterations(samples: u32, lines: &LinePass, slices: u32) -> u32 {
     let length = lines.window_px() + 2.0 * lines.reach_px() + 4.0;
     // Half a pixel a step; its samples when it is begun, then those of three pixels side by side.
     let steps = (2.0 * length) as u32 + 2;
-    let look = steps * (1 + samples) + steps * (1 + 3 * samples);
+    let key = steps * (1 + samples) + steps * (1 + 3 * samples);
     let pixels = ((length as u32).div_ceil(slices) + 1) * (length as u32 + 1);
     // Each is found, while the others wait, and has eight words of its mask filled by halves.
-    look + pixels * (LANES + 1 + 8 * 3) + WORKGROUP
+    key + pixels * (LANES + 1 + 8 * 3) + WORKGROUP
 }
 
 impl Schedule {
@@ -114,7 +120,7 @@ impl Schedule {
         for (pass, (lines, &edges_first)) in (0..).zip(plan.lines.iter().zip(edge_starts)) {
             let shares = LineShares::new(plan, lines, device);
             let is_lit = lines.lit && plan.lights_lines();
-            let first = if pass == 0 { FIRST_PASS } else { 0 };
+            let first = if pass == 0 { line_flags::FIRST_PASS } else { 0 };
             let lined = Batch {
                 edges_per_group: shares.edges_per_group,
                 line_exponent: lines.square_exponent(),
@@ -124,7 +130,7 @@ impl Schedule {
                 line_peak: lines.peak(),
                 line_width: lines.width_px,
                 line_smoothing: lines.smoothing_px,
-                line_flags: line_flags(lines, has_visibility(plan), plan.lights_lines()) | first,
+                line_flags: line_flags::of(lines, has_visibility(plan), plan.lights_lines()) | first,
                 line_pass: pass,
                 ..pixels
             };
@@ -133,7 +139,7 @@ impl Schedule {
                 let count = shares.edges.min(edges - first);
                 let batch = Batch { first: edges_first.saturating_add(first), count, ..lined };
                 let groups = count.div_ceil(shares.edges_per_group);
-                self.dispatch_groups(device, Stage::Lines, groups, batch)?;
+                self.dispatch_groups(device, Kernel::Edge, groups, batch)?;
                 let progress_bytes = shares.progress_bytes();
                 if let (Some(Step::Dispatch { batch, workgroups, .. }), true) =
                     (self.steps.last().copied(), progress_bytes > 0)
@@ -146,9 +152,9 @@ impl Schedule {
                 }
             }
             if is_lit {
-                self.dispatch(device, Stage::LineLight, pixels.count, lined)?;
+                self.dispatch(device, Kernel::LineLight, pixels.count, lined)?;
             }
-            self.dispatch(device, Stage::Ink, pixels.count, lined)?;
+            self.dispatch(device, Kernel::Coverage, pixels.count, lined)?;
         }
         Ok(())
     }

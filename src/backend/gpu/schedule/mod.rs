@@ -16,7 +16,7 @@ use self::tiles::Tiles;
 use super::params::{Batch, edge_lists, faces_code};
 use crate::backend::DrawError;
 use crate::backend::gpu::pass_mask::Pass;
-use crate::backend::gpu::pipelines::{Into, Stage, Write};
+use crate::backend::gpu::pipelines::{Kernel, SampleTarget, SampleWrite};
 use crate::plan::{DrawPlan, pass_mask};
 
 /// Triangles a dispatch, where none needs clipping; each may leave one item in the work list.
@@ -24,7 +24,7 @@ const CHUNK: u32 = 1 << 20;
 
 /// Triangles a dispatch where all may need clipping, into at most six pieces each.
 const CHUNK_CLIP: u32 = 1 << 17;
-const PIECES_MAX: u32 = 6;
+pub const PIECES_MAX: u32 = 6;
 
 /// Different numbers that dispatches may have, each 256 bytes on the GPU: 128 MiB.
 ///
@@ -92,7 +92,7 @@ impl Schedule {
                     samples_at: 0,
                     ..band
                 };
-                schedule.triangles(device, all, Into::Surface, Pass::of_surface(plan))?;
+                schedule.triangles(device, all, SampleTarget::Visibility, Pass::of_visibility(plan))?;
                 schedule.layers(plan, device, band, goal)?;
             }
             if goal == Goal::Picture {
@@ -106,7 +106,7 @@ impl Schedule {
     fn transform(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits) -> Result<(), DrawError> {
         let count = plan.positions.len() as u32;
         if has_visibility(plan) || !plan.lines.is_empty() {
-            self.dispatch(device, Stage::Transform, count, Batch { count, ..Batch::default() })?;
+            self.dispatch(device, Kernel::Transform, count, Batch { count, ..Batch::default() })?;
         }
         Ok(())
     }
@@ -122,13 +122,13 @@ impl Schedule {
         self.layers = rounds;
         let count = plan.width_px * band.row_end.abs_diff(band.row_first);
         // A layer that is wanted for itself is not shaded: then no sample is done before its last triangle.
-        let role = if goal == Goal::Picture { u32::from(pass_mask::LAYER) } else { 0 };
+        let pass_bit = if goal == Goal::Picture { u32::from(pass_mask::LAYER) } else { 0 };
         let mut ends = Vec::new();
         for layer in 0..rounds {
             self.steps.push(Step::ClearLayer);
-            self.triangles(device, Batch { layer, ..band }, Into::Layer, Pass::of_layers(plan))?;
-            let batch = Batch { count, role, layer, ..band };
-            self.dispatch(device, Stage::Layers, count, batch)?;
+            self.triangles(device, Batch { layer, ..band }, SampleTarget::Layer, Pass::of_peeling(plan))?;
+            let batch = Batch { count, pass_bit, layer, ..band };
+            self.dispatch(device, Kernel::Composite, count, batch)?;
             self.steps.push(Step::Submit);
             if self.tiles.in_rounds && goal == Goal::Picture {
                 ends.push(self.steps.len());
@@ -148,13 +148,14 @@ impl Schedule {
         &mut self,
         device: &DeviceTraits,
         band: Batch,
-        into: Into,
+        target: SampleTarget,
         passes: [Option<Pass>; 2],
     ) -> Result<(), DrawError> {
-        let writes: &[Write] = if device.int64_atomics { &[Write::Both] } else { &[Write::Depth, Write::Id] };
+        let writes: &[SampleWrite] =
+            if device.int64_atomics { &[SampleWrite::Both] } else { &[SampleWrite::Depth, SampleWrite::Id] };
         // Every depth must be known before the first id is compared with it.
         for &write in writes {
-            for Pass { ids, clip, faces, role } in passes.iter().flatten().cloned() {
+            for Pass { ids, clip, faces, pass_bit } in passes.iter().flatten().cloned() {
                 let (chunk, pieces) = if clip { (CHUNK_CLIP, PIECES_MAX) } else { (CHUNK, 1) };
                 for first in ids.clone().step_by(chunk as usize) {
                     let in_chunk = chunk.min(ids.end - first);
@@ -167,16 +168,16 @@ impl Schedule {
                         capacity,
                         large_end: u32::MAX,
                         huge_end: u32::MAX,
-                        role: u32::from(role),
+                        pass_bit: u32::from(pass_bit),
                         ..band
                     };
                     self.steps.push(Step::ClearWork);
-                    self.dispatch(device, Stage::Visibility { write, into }, in_chunk, batch)?;
+                    self.dispatch(device, Kernel::Visibility { write, target }, in_chunk, batch)?;
                     if clip {
-                        self.dispatch(device, Stage::Clip, in_chunk, batch)?;
+                        self.dispatch(device, Kernel::Clip, in_chunk, batch)?;
                     }
-                    let stage = Stage::VisibilityTile { write, into };
-                    self.steps.push(Step::Tiles { stage, batch: self.batches.len() - 1 });
+                    let kernel = Kernel::VisibilityTile { write, target };
+                    self.steps.push(Step::Tiles { kernel, batch: self.batches.len() - 1 });
                     if ids.len() > chunk as usize {
                         self.steps.push(Step::Submit);
                     }
@@ -197,26 +198,26 @@ impl Schedule {
         let count = plan.width_px * band.row_end.abs_diff(band.row_first);
         let pixels = Batch { count, ..band };
         if plan.is_shaded() {
-            self.dispatch(device, Stage::Shade, count, pixels)?;
+            self.dispatch(device, Kernel::Shade, count, pixels)?;
         }
         self.lines(plan, device, pixels, edge_starts)?;
-        self.dispatch(device, Stage::Resolve, count, pixels)
+        self.dispatch(device, Kernel::Resolve, count, pixels)
     }
 
     pub(crate) fn dispatch(
         &mut self,
         device: &DeviceTraits,
-        stage: Stage,
+        kernel: Kernel,
         threads: u32,
         batch: Batch,
     ) -> Result<(), DrawError> {
-        self.dispatch_groups(device, stage, threads.div_ceil(WORKGROUP), batch)
+        self.dispatch_groups(device, kernel, threads.div_ceil(WORKGROUP), batch)
     }
 
     pub(crate) fn dispatch_groups(
         &mut self,
         device: &DeviceTraits,
-        stage: Stage,
+        kernel: Kernel,
         workgroups: u32,
         batch: Batch,
     ) -> Result<(), DrawError> {
@@ -232,7 +233,7 @@ impl Schedule {
         }
         let x = workgroups.min(device.workgroups_max);
         let batch = self.batches.len() - 1;
-        self.steps.push(Step::Dispatch { stage, batch, workgroups: [x, workgroups.div_ceil(x)] });
+        self.steps.push(Step::Dispatch { kernel, batch, workgroups: [x, workgroups.div_ceil(x)] });
         Ok(())
     }
 }

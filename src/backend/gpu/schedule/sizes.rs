@@ -11,13 +11,13 @@ const BAND_BYTES: u64 = 64 << 20;
 const SEEN_BYTES: u64 = 256 << 20;
 
 /// Bytes of the work list before its items.
-const WORK_HEAD_BYTES: u64 = 16;
+pub const WORK_HEAD_BYTES: u64 = 16;
 
 /// Bytes of one of its items.
-const WORK_ITEM_BYTES: u64 = 48;
+pub const WORK_ITEM_BYTES: u64 = 48;
 
 /// Bytes of what layers make of a sample.
-pub const LAYERED_BYTES: u64 = 32;
+pub const PEEL_STATE_BYTES: u64 = 32;
 
 /// Bytes of a sample of the visibility buffer, or of a layer.
 pub const SAMPLE_BYTES: u64 = 8;
@@ -83,7 +83,7 @@ impl Banding {
         }
         let room = seen.saturating_sub(2 * u64::from(margin));
         if room == 0 {
-            let why = "the device has no room for what lines so wide look at in a picture so wide";
+            let why = "the device has no room for what lines so wide key at in a picture so wide";
             return Err(DrawError::Device(why.to_owned()));
         }
         Ok(Self { rows: rows.min(room) as u32, margin, beyond })
@@ -107,7 +107,7 @@ impl Banding {
     /// Bytes of all buffers that hold a band.
     pub fn bytes(&self, plan: &DrawPlan<'_>) -> u64 {
         let seen = if has_visibility(plan) { self.seen_samples(plan) * SAMPLE_BYTES } else { 0 };
-        let layers = if plan.peeling().is_some() { LAYERED_BYTES + SAMPLE_BYTES } else { 0 };
+        let layers = if plan.peeling().is_some() { PEEL_STATE_BYTES + SAMPLE_BYTES } else { 0 };
         let (strokes, owners) = if plan.lines.is_empty() { (0, 0) } else { (STROKES_BYTES, OWNER_BYTES) };
         let pixel = u64::from(plan.samples) * layers + color_bytes(plan) + strokes + owners + RGBA_BYTES;
         seen + u64::from(plan.width_px) * u64::from(self.rows) * pixel
@@ -155,7 +155,7 @@ fn seen_bytes(plan: &DrawPlan<'_>) -> u64 {
 /// Bytes a pixel of the largest buffer that holds a band.
 fn pixel_bytes(plan: &DrawPlan<'_>) -> u64 {
     let strokes = if plan.lines.is_empty() { 0 } else { STROKES_BYTES };
-    let sample = if plan.peeling().is_some() { LAYERED_BYTES } else { SAMPLE_BYTES };
+    let sample = if plan.peeling().is_some() { PEEL_STATE_BYTES } else { SAMPLE_BYTES };
     (u64::from(plan.samples) * sample).max(color_bytes(plan)).max(strokes)
 }
 

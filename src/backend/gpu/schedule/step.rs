@@ -1,6 +1,6 @@
 //! What a [`Schedule`](crate::backend::gpu::schedule::Schedule) is made of, and for.
 
-use crate::backend::gpu::pipelines::Stage;
+use crate::backend::gpu::pipelines::Kernel;
 
 /// One command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub enum Step {
     /// Runs a kernel over `threads` threads with the batch at `batch`.
     Dispatch {
         /// Which.
-        stage: Stage,
+        kernel: Kernel,
         /// Index of its numbers.
         batch: usize,
         /// How often.
@@ -38,7 +38,7 @@ pub enum Step {
     /// Draws the large triangles of the batch.
     Tiles {
         /// The kernel.
-        stage: Stage,
+        kernel: Kernel,
         /// Index of its numbers.
         batch: usize,
     },
