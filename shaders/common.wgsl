@@ -1,5 +1,6 @@
-// What every stage shares: the plan's numbers, and arithmetic that gives the CPU's bits (ARCHITECTURE.md, "Rounded
-// operations"). Prepended to each stage by src/backend/gpu/pipelines/mod.rs.
+// Every stage: the uniforms, shared constants, and arithmetic that gives the CPU's bits
+// (ARCHITECTURE.md, "Rounded operations"). Prepended to each stage by
+// src/backend/gpu/pipelines/mod.rs.
 
 struct Frame {
     x_row: vec4<f32>,
@@ -17,28 +18,29 @@ struct Frame {
     near_w: f32,
     ambient: f32,
     lamp_count: u32,
-    // Always 0, which the compiler cannot know.
+    // Always 0, but unknown to the compiler.
     zero: u32,
     width: i32,
     height: i32,
     triangle_count: u32,
     vertex_count: u32,
-    // Where edge masks start in the attributes; triangles' materials start at 0.
+    // Start of the edge masks in the attributes; triangles' materials start at 0.
     masks_at: u32,
     material_count: u32,
-    // What remains of wires from the second layer on.
+    // Opacity of wires from the second layer on.
     layer_fade: f32,
-    // Colours at the start of the hull's looks; triangles' materials follow.
+    // Number of colours at the start of hull_materials; the triangles' materials follow.
     hull_color_count: u32,
     // Textures; what each is, is in front of the texels.
     image_count: u32,
-    // Where each kind of corner value has its indices among the corner triangles.
+    // Start of the indices of each kind of corner value in corner_triangles.
     normal_triangles_at: u32,
     uv_triangles_at: u32,
     color_triangles_at: u32,
 };
 
-// Which triangles, vertices or edges a dispatch handles, and which rows of the picture the buffers hold.
+// Parameters of a dispatch: its triangles, vertices or edges, and the rows of the picture that the
+// buffers hold.
 struct Batch {
     first: u32,
     count: u32,
@@ -48,7 +50,7 @@ struct Batch {
     row_end: i32,
     // Items that the work list holds.
     capacity: u32,
-    // Which of them a dispatch of the tile kernel draws.
+    // Range of items that a dispatch of the tile kernel draws.
     large_first: u32,
     large_end: u32,
     huge_first: u32,
@@ -66,21 +68,23 @@ struct Batch {
     line_slices: u32,
     // Coverage in the middle of a line.
     line_peak: f32,
-    // Looks along edges, or shares begun, after which a thread says how far it has come.
+    // Units of work after which a thread pauses.
     line_units: u32,
     line_pass: u32,
-    // Which rows the visibility buffer holds, where that is more than the batch's, and where the first of the batch's begins in it.
+    // Rows that the visibility buffer holds, which may be more than the batch's, and the index of
+    // the batch's first sample in it.
     seen_first: i32,
     seen_end: i32,
     samples_at: u32,
-    // The role that drawn triangles have, where the plan has roles; 0: the hull's, which have none.
+    // Bit that the pass mask of a drawn triangle has; 0 for the outline mesh, which has no masks.
     pass_bit: u32,
     // Number of the layer that is looked for; 0 also for the visibility buffer.
     layer: u32,
-    // Columns in which triangles are drawn, and before which it ends: also those beyond the picture that the visibility buffer has.
+    // First column in which triangles are drawn, and the column after the last; columns beyond the
+    // picture count.
     column_first: i32,
     column_end: i32,
-    // How many these are, on each side.
+    // Columns beyond the picture, on each side.
     seen_margin: i32,
 };
 
@@ -118,7 +122,7 @@ const EIGHT_SAMPLES: u32 = 512u;
 const SIXTEEN_SAMPLES: u32 = 1024u;
 const FOUR_SAMPLES: u32 = 4096u;
 const LIT_LINES: u32 = 8192u;
-// Whether any line pass is a contour.
+// A line pass is a contour.
 const CONTOURS: u32 = 16384u;
 const PASS_MASKS: u32 = 0x100000u;
 const HULL_MATERIALS: u32 = 0x400000u;
@@ -127,7 +131,7 @@ const BEHIND_SURFACE: u32 = 0x1000000u;
 const WIRES_ONLY: u32 = 0x2000000u;
 const PEELED_HULL: u32 = 0x4000000u;
 
-// src/plan/mod.rs explains these bits of a triangle's role.
+// Bits of a triangle's pass mask, see src/plan/mod.rs.
 const PASS_LAYER: u32 = 2u;
 const PASS_FRONT_ONLY: u32 = 8u;
 const PASS_BACK_ONLY: u32 = 16u;
@@ -139,10 +143,11 @@ const TEXTURES: u32 = 524288u;
 const WIRE_MINIMUM: u32 = 0x8000000u;
 const WIRE_LIT: u32 = 0x10000000u;
 const DEBUG: u32 = 0x20000000u;
-// Whether colours change over a triangle at all.
+// Colours vary over a triangle.
 const VARYING: u32 = 0x40000000u;
 
-// What the plan has, of the above. A constant of the pipeline, so that a kernel contains only what its plan needs.
+// Bits of the above. A constant of the pipeline, so that a kernel contains only the code that its
+// plan needs.
 override PIPELINE_KEY: u32 = 0u;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -157,7 +162,7 @@ fn sample_count() -> i32 {
     return select(select(select(1, 4, has(FOUR_SAMPLES)), 8, has(EIGHT_SAMPLES)), 16, has(SIXTEEN_SAMPLES));
 }
 
-// Where the visibility buffer has the first sample of the pixel that is number i of the batch's rows.
+// Index in the visibility buffer of the first sample of pixel number i of the batch's rows.
 fn first_visibility_sample(i: u32) -> u32 {
     let row = u32(i32(i) / frame.width);
     return batch.samples_at + u32(sample_count()) * (i + 2u * u32(batch.seen_margin) * row);
@@ -194,7 +199,8 @@ fn rn4(v: vec4<f32>) -> vec4<f32> {
 fn recip(w: f32) -> f32 {
     var r = bitcast<f32>(0x7EF311C7u - bitcast<u32>(w));
     for (var i = 0; i < 4; i++) {
-        // The residual is exact close to the end, so that recip(1) is 1 and not the number below it.
+        // The residual is exact close to the end, so that recip(1) is 1 and not the number below
+        // it.
         r = r + rn(r * (1.0 - rn(w * r)));
     }
     return r;
@@ -266,7 +272,8 @@ fn wide_to_f32(v: vec2<u32>) -> f32 {
     return rn(f32(v.y) * 4294967296.0) + f32(v.x);
 }
 
-// Places of samples as sample_offsets() in src/plan/mod.rs has them, in 1/16 px: a nibble per sample, the first lowest.
+// Places of samples as sample_offsets() in src/plan/mod.rs has them, in 1/16 px: a nibble per
+// sample, the first lowest.
 const ONE_SAMPLE_XY: u32 = 0x8u;
 const FOUR_SAMPLES_X: u32 = 0xA2E6u;
 const FOUR_SAMPLES_Y: u32 = 0xEA62u;
@@ -279,7 +286,7 @@ const SIXTEEN_SAMPLES_Y_LAST: u32 = 0x0F48C21Eu;
 // What all of 16 samples' places leave modulo 1/16 px, in 1/256 px.
 const SIXTEEN_SAMPLES_SHIFT: i32 = 8;
 
-// Where sample s is, in 1/16 px from sample_corner(): a nibble a sample, the first lowest, as sample_offsets() in src/plan/mod.rs.
+// Position of sample s, in 1/16 px from sample_corner().
 fn sample_step(s: i32) -> vec2<i32> {
     var x = ONE_SAMPLE_XY;
     var y = ONE_SAMPLE_XY;

@@ -1,5 +1,6 @@
-// Stage 1b, a triangle that reaches behind the eye or far outside the picture: what is left of it goes to the work list, as
-// a fan of up to six triangles. Twin of src/backend/cpu/geometry/clip.rs.
+// Stage transform, per triangle that reaches behind the eye or far outside the picture: clips it
+// and appends the rest, a fan of up to six triangles, to the work list. Twin of
+// src/backend/cpu/geometry/clip.rs.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 
@@ -55,7 +56,8 @@ fn cut(plane: u32, len: u32, base: u32) -> u32 {
             left++;
         }
         if (d_a >= 0.0) != (d_b >= 0.0) && left < CORNERS_MAX {
-            // Always from the inside to the outside: the neighbour across the edge gets the same point, bit for bit.
+            // Always from the inside to the outside: the neighbour across the edge gets the same
+            // point, bit for bit.
             let from_a = d_a >= 0.0;
             corners[to + left] = intersect(select(b, a, from_a), select(a, b, from_a), max(d_a, d_b), min(d_a, d_b));
             left++;

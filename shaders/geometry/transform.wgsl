@@ -1,4 +1,5 @@
-// Stage 1, a vertex: unit box to snapped screen coordinates. Twin of src/backend/cpu/geometry/transform.rs.
+// Stage transform, per vertex: unit box to snapped screen coordinates. Twin of
+// src/backend/cpu/geometry/transform.rs.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(3) var<storage, read_write> vertices: array<Vertex>;

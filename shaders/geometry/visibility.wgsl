@@ -1,6 +1,8 @@
-// Stage 2, a triangle: which samples it owns, and how near it is there. Twin of src/backend/cpu/geometry/visibility.rs.
+// Stage visibility, per triangle: the samples that it covers, and its depth at each. Twin of
+// src/backend/cpu/geometry/visibility.rs.
 //
-// A thread draws a triangle of up to 16 x 16 pixels itself; larger ones go to the work list for visibility_tile.wgsl.
+// A thread draws a triangle of up to 16 x 16 pixels itself; larger ones go to the work list for
+// visibility_tile.wgsl.
 
 // Triangles of this size in 1/256 px have edge values that fit 32 bits.
 const SMALL: i32 = 4096;

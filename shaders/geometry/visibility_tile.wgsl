@@ -1,5 +1,6 @@
-// Stage 2, large triangles: a workgroup at a time, tile by tile of 64 x 64 pixels. First each thread tests a block of 8 x 8
-// pixels against the edges, then all threads together fill the blocks that are left, a thread a pixel.
+// Stage visibility, per large triangle: a workgroup draws tile by tile of 64 x 64 pixels. No twin:
+// the CPU has one loop for all sizes. First each thread tests a block of 8 x 8 pixels against the
+// edges, then all threads together fill the blocks that are left, one thread per pixel.
 
 // Pixels along a side of a tile.
 const TILE_PX: i32 = 64;
@@ -28,7 +29,8 @@ fn visibility_tile(
     }
     let huge_end = min(work.huge, batch.huge_end);
     for (var i = batch.huge_first; i < huge_end; i++) {
-        // Every workgroup takes every n-th tile; beginning elsewhere for each triangle evens out the load.
+        // Every workgroup takes every n-th tile; beginning elsewhere for each triangle evens out
+        // the load.
         let start = (workgroup.x + i * 61u) % groups.x;
         draw_item(batch.capacity - 1u - i, i32(thread), i32(start), i32(groups.x));
     }
@@ -77,7 +79,7 @@ fn draw_tile(s: Setup, e: Edges, bounds: vec4<i32>, tile: vec2<i32>, thread: i32
             draw_pixel(s, e, found.xyz, in_block, pixel, id);
         }
     }
-    // Nobody may empty the list while another still reads it.
+    // The list must not be emptied while another thread reads it.
     workgroupBarrier();
 }
 

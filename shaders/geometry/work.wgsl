@@ -1,4 +1,5 @@
-// Where visibility.wgsl and clip.wgsl get triangles from, and the list of those that visibility_tile.wgsl draws.
+// Stage visibility: the triangles that visibility.wgsl and clip.wgsl read, and the work list of
+// large ones for visibility_tile.wgsl.
 
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;
@@ -11,9 +12,9 @@ struct Work {
 };
 
 @group(1) @binding(5) var<storage, read_write> work: Work;
-// A byte a triangle.
+// One byte per triangle.
 @group(1) @binding(24) var<storage, read> pass_masks: array<u32>;
-// By layer: whether there may be another behind it.
+// Per layer: 1 if there may be another behind it.
 @group(1) @binding(28) var<storage, read> peel_rounds: array<u32>;
 
 // Triangles of this many pixels, in the picture, are shared out over all workgroups.
@@ -37,7 +38,7 @@ fn is_outside(v: Corners) -> bool {
     return v.a.x == OUTSIDE || v.b.x == OUTSIDE || v.c.x == OUTSIDE;
 }
 
-// Whether the batch draws triangle t, which has this area.
+// True if the batch draws triangle t of this area: pass mask and face culling.
 fn passes_culling(t: u32, area: vec2<u32>) -> bool {
     if is_zero(area) {
         return false;
@@ -55,7 +56,7 @@ fn passes_culling(t: u32, area: vec2<u32>) -> bool {
     return faces == FACES_BOTH || (faces == FACES_FRONT) == is_negative(area);
 }
 
-// Whether the round before this one has found that there is nothing left.
+// True if the previous round of depth peeling has left nothing to find.
 fn is_peeling_done() -> bool {
     return has(PEELING) && batch.layer > 0u && peel_rounds[batch.layer - 1u] == 0u;
 }

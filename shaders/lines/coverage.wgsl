@@ -1,24 +1,26 @@
-// Stage 4, a pixel: the union of the strokes that touch it, laid over what is there. Twin of src/backend/cpu/lines/coverage.rs.
+// Stage lines, per pixel: the union of its strokes, composited over the colours. Twin of
+// src/backend/cpu/lines/coverage.rs.
 
-// What each sample sees; 0 where it sees nothing.
+// Visibility buffer; 0 where a sample shows nothing.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
-// What lies over each sample.
+// Peeled layers per sample.
 @group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
-// Of the surface, a pixel each, over nothing; where a line is, over the background and under the lines so far, which over.wgsl
-// tells apart. Then the light on the pass's lines, a pixel each.
+// Of the surface, one per pixel, over nothing; where a line is, over the background and under the
+// lines so far, which over.wgsl tells apart. Then the light on the pass's lines, one per pixel.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
-// Of each pixel, what stroke.wgsl says.
+// Strokes per pixel, as stroke_words.wgsl lays them out.
 @group(1) @binding(12) var<storage, read_write> strokes: array<u32>;
 // Of each pass.
 @group(1) @binding(17) var<storage, read> line_colors: array<vec4<f32>>;
-// Of each sample, the points that stand with it, as stroke.wgsl numbers them.
+// Per sample, the points assigned to it, as stroke.wgsl numbers them.
 @group(1) @binding(29) var<storage, read> sample_masks: array<u32>;
 
-// Strokes beside each other in a pixel whose areas may all be as far from their points as the farthest. Of more, some lie over
-// others.
+// Strokes in a pixel that may all differ from their points by the largest difference. Of more
+// strokes, some overlap.
 const STROKES_SIDE_BY_SIDE: f32 = 4.0;
 
-// Surfaces that show less than this leave no trace: a tenth of a byte's last step in the most transparent of pictures.
+// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
+// pictures.
 const ALPHA_MIN: f32 = 1e-4;
 
 @compute @workgroup_size(WORKGROUP)
@@ -27,7 +29,7 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
     if i >= batch.count {
         return;
     }
-    // Where there is no surface, nobody has written anything yet.
+    // Without a surface nothing has written the colours yet.
     if (batch.line_flags & FIRST_PASS) != 0u && !has(SURFACE | HULL) {
         colors[i] = flip_alpha_sign(frame.background);
     }
@@ -86,7 +88,7 @@ fn covered_points(at: u32) -> u32 {
     return points;
 }
 
-// How much of a pixel the strokes cover, 0 to the lines' peak.
+// Covered share of a pixel, 0 to the lines' peak.
 fn covered_share(sum: vec2<u32>, all: vec2<u32>, points: u32, slack: u32) -> f32 {
     if (sum.x | sum.y) == 0u {
         return 0.0;
@@ -103,8 +105,9 @@ fn covered_share(sum: vec2<u32>, all: vec2<u32>, points: u32, slack: u32) -> f32
     return min(min(max(covered, of_points - beyond), of_points + beyond), batch.line_peak);
 }
 
-// The surface's colour in a pixel, where it has the share of what lines leave uncovered that it has there. At its border that is
-// not its share of the pixel, because a line along the border covers one side as much as the other.
+// The surface's colour, weighted by its share of what lines leave uncovered. At the surface's
+// border this differs from its share of the pixel, because a line along the border covers both
+// sides alike.
 fn uncovered(i: u32, surface: vec4<f32>, points: u32, opacity: f32) -> vec4<f32> {
     if !has(SURFACE | HULL) || !(surface.w > ALPHA_MIN && surface.w < 1.0) {
         return surface;
@@ -113,8 +116,8 @@ fn uncovered(i: u32, surface: vec4<f32>, points: u32, opacity: f32) -> vec4<f32>
     return vec4(color.xyz, min(color.w, 1.0));
 }
 
-// How much more of what shows beside and through a line is surface than of the pixel. Of each point shows 1, or, where the line
-// covers it, 1 - opacity.
+// Ratio of the surface's share beside and through a line to its share of the pixel. A point counts
+// 1, or 1 - opacity where the line covers it.
 fn weight(i: u32, points: u32, opacity: f32) -> f32 {
     if points == 0u || points == POINTS {
         return 1.0;
@@ -144,7 +147,7 @@ fn weight(i: u32, points: u32, opacity: f32) -> f32 {
     return rn(rn(f32(POINTS) * left) * recip(rn(of_pixel * surface)));
 }
 
-// How much surface a sample sees, 0 to 1, given where it is in the visibility buffer, and among those of the batch.
+// Alpha of the surface at a sample, given its index in the visibility buffer and in the batch.
 fn shown(in_base: u32, sample: u32) -> f32 {
     if samples[in_base].y != 0u {
         return 1.0;

@@ -1,8 +1,9 @@
-// Stage 4, an edge: lines of exact width. Twin of src/backend/cpu/lines/edge.rs.
+// Stage lines, per edge: lines of exact width. Twin of src/backend/cpu/lines/edge.rs.
 //
-// Edges are cut into windows and those into slices of rows: shares, which are dealt out to the threads of a workgroup. A thread
-// works in units: in each it looks along its window once, and when it has found a part, draws it. Where a dispatch may not take too long,
-// it ends after a number of them, and the next one goes on from there.
+// Edges are cut into windows and those into slices of rows: shares, which are dealt out to the
+// threads of a workgroup. A thread works in units: one scan along its window, and the drawing of
+// the interval found. Where dispatches must be short, a thread pauses after a number of units and
+// the next dispatch continues there.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
@@ -11,11 +12,11 @@
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
 // Two vertices, two faces.
 @group(1) @binding(10) var<storage, read> edges: array<vec4<u32>>;
-// Of each pixel, whose light falls on the pass's lines.
+// Per pixel, the face that lights the pass's lines, plus 1.
 @group(1) @binding(11) var<storage, read_write> owners: array<atomic<u32>>;
-// Of each pixel, what stroke.wgsl says.
+// Strokes per pixel, as stroke_words.wgsl lays them out.
 @group(1) @binding(12) var<storage, read_write> strokes: array<atomic<u32>>;
-// How many threads have something left to do; then how far each has come.
+// Number of paused threads, then the state of each.
 @group(1) @binding(21) var<storage, read_write> progress: Progress;
 
 struct Progress {
@@ -36,7 +37,7 @@ struct Paused {
 // `line_units` where a dispatch may take as long as it takes.
 const NO_LIMIT: u32 = 0xFFFFFFFFu;
 
-// Of the workgroup's edges, one a thread: where its shares end among those of all.
+// Per edge of the workgroup, one per thread: end of its shares among all shares.
 var<workgroup> share_ends: array<u32, WORKGROUP>;
 
 @compute @workgroup_size(WORKGROUP)
@@ -73,7 +74,8 @@ fn shares_of(edge: vec4<u32>) -> u32 {
     return select(0u, window_count(s) * batch.line_slices, s.drawn && rows.x <= rows.y);
 }
 
-// Draws every 64th share of the workgroup's, whose edges begin at `first`, from where the thread paused.
+// Draws every 64th share of the workgroup's, whose edges begin at `first`, from where the thread
+// paused.
 fn draw_shares(first: u32, self_at: u32, thread: u32) {
     let all = share_ends[WORKGROUP - 1u];
     let may_pause = batch.line_units != NO_LIMIT;
@@ -107,8 +109,8 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
             }
             has_share = true;
         }
-        // Threads that have found a part wait here for those that have not; not where loops are limited, since each look of one would
-        // count for all.
+        // Threads that have found an interval wait here for those that have not. Not where loops
+        // are limited, because there an iteration of one thread counts for all.
         let units_before = units;
         var interval = vec2(0.0);
         while search.begin < search.range.y && interval.x >= interval.y && units > 0u {
@@ -119,7 +121,7 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
             }
         }
         if units == units_before {
-            // To begin a share is work too.
+            // Starting a share is work too.
             units--;
         }
         if interval.x < interval.y {
@@ -146,7 +148,7 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
     }
 }
 
-// Which of the workgroup's edges a share is of: the first that ends after it.
+// Edge of the workgroup that a share belongs to: the first whose shares end after it.
 fn edge_of_share(share: u32) -> u32 {
     var slot = 0u;
     for (var step = WORKGROUP / 2u; step > 0u; step /= 2u) {
@@ -222,7 +224,8 @@ fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32
     var columns = columns_of(s, window.ends, y);
     var x = columns.x;
     while y <= window.rows.y {
-        // Finding a pixel is far cheaper than covering it: threads that have found theirs wait here for those that have not.
+        // Finding a pixel is far cheaper than covering it: threads that have found theirs wait here
+        // for those that have not.
         var center = vec2(0.0);
         var at = 0u;
         var found = false;
@@ -236,7 +239,7 @@ fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32
             center = vec2(f32(x), f32(y)) + 0.5;
             at = u32((y - batch.row_first) * frame.width + x);
             x++;
-            // What is full stays full, whatever else comes; only a lit line still asks whose it is.
+            // A full pixel stays full. Only a lit line goes on, to find the face that lights it.
             found = touches(place_of(s.direction, start - center, end - center)) && owns(s, window, center)
                 && (is_lit || !is_full(at));
         }
@@ -246,7 +249,7 @@ fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32
     }
 }
 
-// Whether of all windows of the edge the pixel is this one's.
+// True if the pixel belongs to this window of the edge.
 fn owns(s: Segment, window: Window, center: vec2<f32>) -> bool {
     if window.count == 1u {
         return true;

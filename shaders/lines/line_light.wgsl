@@ -1,13 +1,14 @@
-// Stage 4, a pixel: the light that falls on lines which take the surface's. Twin of src/backend/cpu/lines/line_light.rs.
+// Stage lines, per pixel: the surface's light on lit lines. Twin of
+// src/backend/cpu/lines/line_light.rs.
 //
-// Light is affine in the colour that it falls on: the mean over the samples that see the surface, or, where none does, the
-// light on the line's own face.
+// Light is affine in the colour that it falls on: the mean over the samples that see the surface,
+// or, where none does, the light on the line's own face.
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
-// Of the surface, a pixel each; then gain and gloss of the light on lines, a pixel each.
+// Of the surface, one per pixel; then gain and gloss of the light on lines, one per pixel.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
-// A pixel each: a face of the pass's line there, plus 1.
+// Per pixel, the face that lights the pass's lines, plus 1.
 @group(1) @binding(11) var<storage, read_write> owners: array<u32>;
 
 @compute @workgroup_size(WORKGROUP)
@@ -42,7 +43,8 @@ fn line_light(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
     colors[batch.count + i] = vec4(sum / count, 0.0, 0.0);
 }
 
-// The light on a triangle at a point, in 1/256 px from the picture's centre, which may lie beside it.
+// The light on a triangle at a point, in 1/256 px from the picture's centre, which may lie beside
+// it.
 fn point_light(id: u32, at: vec2<f32>) -> vec2<f32> {
     let m = material_index(id);
     if (materials[m].flags & MATERIAL_LIT) == 0u {

@@ -1,7 +1,8 @@
-// The lines stage's buffer of strokes, as edge.wgsl adds to it and coverage.wgsl reads it. No twin: the CPU's is a struct,
-// LineCoverage in src/backend/cpu/lines/coverage.rs.
+// The lines stage's buffer of strokes, as edge.wgsl adds to it and coverage.wgsl reads it. No twin:
+// the CPU's is a struct, LineCoverage in src/backend/cpu/lines/coverage.rs.
 
-// Points in a pixel, and the lattice they lie on: point i is in column i and row GENERATOR * i, modulo POINTS.
+// Points in a pixel, and the lattice they lie on: point i is in column i and row GENERATOR * i,
+// modulo POINTS.
 const POINTS: u32 = 256u;
 const GENERATOR: u32 = 181u;
 

@@ -1,9 +1,10 @@
-// Stage 3b, a pixel: a layer's colours, under those of the layers before it. Twin of src/backend/cpu/peeling/composite.rs.
+// Stage shade, per pixel: composites a peeled layer's colours under those of the layers in front of
+// it. Twin of src/backend/cpu/peeling/composite.rs.
 
-// What was found, as in the visibility buffer.
+// The layer of this round, laid out as the visibility buffer.
 @group(1) @binding(26) var<storage, read> peel_layer: array<vec2<u32>>;
 @group(1) @binding(27) var<storage, read_write> peel_state: array<PeelState>;
-// By layer: whether there may be another behind it.
+// Per layer: 1 if there may be another behind it.
 @group(1) @binding(28) var<storage, read_write> peel_rounds: array<atomic<u32>>;
 
 @compute @workgroup_size(WORKGROUP)
@@ -17,7 +18,7 @@ fn composite(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgro
     }
     let pixel = vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width);
     if batch.pass_bit == 0u {
-        // The layer is wanted for itself.
+        // A test reads the layer itself: nothing is shaded.
         for (var s = 0u; s < u32(sample_count()); s++) {
             _ = take_layer(u32(sample_count()) * i + s);
         }
@@ -34,7 +35,7 @@ fn composite(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgro
     for (var s = 0; s < sample_count(); s++) {
         _ = take_layer(first + u32(s));
     }
-    // Once for each triangle among the samples.
+    // One iteration per triangle among the samples.
     var left = seen_samples(first);
     while left != 0u {
         let group = first_group(first, left);
@@ -49,12 +50,13 @@ fn composite(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgro
     flag_pending(first, u32(sample_count()));
 }
 
-// The id that was taken last.
+// The triangle of the previous layer at a sample.
 fn triangle_of_sample(sample: u32) -> u32 {
     return peel_state[sample].taken;
 }
 
-// Takes a sample's find as its last layer: its id, or NOTHING where there is none or where it adds nothing.
+// Moves the layer found at a sample to `previous`. Returns its id, or NOTHING where there is none
+// or where it adds no colour.
 fn take_layer(sample: u32) -> u32 {
     var so_far = PeelState(vec4(0.0), vec2(0u), 0u, 0u);
     if batch.layer > 0u {
@@ -76,7 +78,7 @@ fn take_layer(sample: u32) -> u32 {
     return id;
 }
 
-// Lays a colour under a sample's others.
+// Composites a colour under a sample's other layers.
 fn accumulate(sample: u32, color: vec4<f32>) {
     let so_far = peel_state[sample].color;
     let sum = so_far + rn4((1.0 - so_far.w) * color);
@@ -86,7 +88,7 @@ fn accumulate(sample: u32, color: vec4<f32>) {
     }
 }
 
-// Says whether any of some samples may have another layer.
+// Sets the round's flag if any of some samples may have another layer.
 fn flag_pending(first: u32, count: u32) {
     for (var s = first; s < first + count; s++) {
         if peel_state[s].previous.y != 0u && atomicLoad(&peel_rounds[batch.layer]) == 0u {

@@ -1,6 +1,7 @@
-// Where the visibility stage's samples go when it looks for a layer: into that, if they lie behind the layer before it.
+// Stage visibility, per sample of a peeled layer: keeps the nearest triangle behind the previous
+// layer. Twin of src/backend/cpu/peeling/emit_layer.rs.
 
-// The visibility buffer; `samples` is the layer.
+// The visibility buffer; `samples` is bound to the layer.
 @group(1) @binding(26) var<storage, read> base: array<vec2<u32>>;
 @group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
 

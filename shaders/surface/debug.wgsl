@@ -1,4 +1,5 @@
-// Views that show a triangle's numbers as colours. Twin of src/backend/cpu/surface/debug.rs.
+// Stage shade, per point: debug views, which show a triangle's numbers as colours. Twin of
+// src/backend/cpu/surface/debug.rs.
 
 // Values of the debug view in a material's flags.
 const DEBUG_BARYCENTRIC: u32 = 1u;
@@ -9,7 +10,7 @@ const DEBUG_UV: u32 = 5u;
 const DEBUG_FACE_ORIENTATION: u32 = 6u;
 const DEBUG_VERTEX_COLOR: u32 = 7u;
 
-// What the material's debug view shows at a point: opaque linear RGBA.
+// The material's debug view at a point: opaque linear RGBA.
 fn debug_color(view: u32, id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> vec4<f32> {
     let is_lit = (materials[m].flags & MATERIAL_LIT) != 0u;
     switch view {
@@ -56,7 +57,8 @@ fn checker(at: vec2<f32>) -> vec3<f32> {
     return rn3(bright * vec3(0.2 + rn2(0.8 * (uv - floor(uv))), 0.45));
 }
 
-// The linear colour that is stored as these values: sRGB decoding (IEC 61966-2-1), the same bits on both back-ends.
+// The linear colour that is stored as these values: sRGB decoding (IEC 61966-2-1), the same bits on
+// both back-ends.
 fn shown(display: vec3<f32>) -> vec4<f32> {
     let v = clamp(display, vec3(0.0), vec3(1.0));
     let t = rn3((v + 0.055) * 0.9478673);

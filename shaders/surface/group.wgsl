@@ -1,5 +1,5 @@
-// The samples of a pixel that see the same triangle, and their colour. Shared by shade and layers, whose seen(sample) says what
-// triangle a sample sees.
+// Stage shade, per pixel: groups the samples that show the same triangle. Shared by shade.wgsl and
+// composite.wgsl, each of which defines triangle_of_sample(sample).
 
 @group(1) @binding(24) var<storage, read> pass_masks: array<u32>;
 // Colours, then the materials of the surface's triangles and of the hull's.
@@ -9,14 +9,14 @@ const NOTHING: u32 = 0xFFFFFFFFu;
 
 struct Group {
     id: u32,
-    // Which of the pixel's samples, a bit each.
+    // Samples of the group, one bit each.
     same: u32,
     // Their number, and the sum of their offsets in 1/256 px.
     count: i32,
     offset_sum: vec2<i32>,
 };
 
-// Which samples of the pixel whose first one is given see a triangle, a bit each.
+// Samples of a pixel that show a triangle, one bit each.
 fn seen_samples(first: u32) -> u32 {
     var mask = 0u;
     for (var s = 0; s < sample_count(); s++) {

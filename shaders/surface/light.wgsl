@@ -1,8 +1,9 @@
-// Light without images. Twin of src/backend/cpu/surface/light.rs.
+// Stage shade, per point: light without images. Twin of src/backend/cpu/surface/light.rs.
 //
-// The CPU's bits: a whole flat face has one light, and that may lie on the threshold between two bytes.
+// The CPU's bits: a whole flat face has one light, and that may lie on the threshold between two
+// bytes.
 
-// What light makes of a base colour: base * gain + gloss, in each channel.
+// Effect of light on a base colour: base * gain + gloss, per channel.
 struct Light {
     gain: f32,
     gloss: f32,

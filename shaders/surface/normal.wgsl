@@ -1,9 +1,9 @@
-// The normal that a point of the surface is lit by. Twin of src/backend/cpu/surface/normal.rs.
+// Stage shade, per point: the normal for lighting. Twin of src/backend/cpu/surface/normal.rs.
 
 @group(1) @binding(6) var<storage, read> normals: array<f32>;
 @group(1) @binding(16) var<storage, read> face_normals: array<f32>;
 
-// Where normals begin whose index is the plan's own triangles.
+// Value of normal_triangles_at for normals that are indexed by the plan's own triangles.
 const OWN_TRIANGLES: u32 = 0xFFFFFFFFu;
 
 fn face_normal(id: u32) -> vec3<f32> {
@@ -35,8 +35,8 @@ fn normal(id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> vec3<f32> {
     return frame.to_viewer.xyz;
 }
 
-// The cross product of the position's fine derivatives in a block of 2 x 2 pixels, as a GPU's rasterizer has them: in f32,
-// errors and all. (The same errors on both back-ends.)
+// The cross product of the position's fine derivatives in a block of 2 x 2 pixels, as a GPU's
+// rasterizer has them: in f32, errors and all. (The same errors on both back-ends.)
 fn derivative_normal(id: u32, at: vec2<f32>) -> vec3<f32> {
     let quad = quad_around(id, at);
     let own = quad_position(id, quad.own);
@@ -52,7 +52,8 @@ fn quad_position(id: u32, b: vec3<f32>) -> vec3<f32> {
     return rn3(blend3(w, corner_position(id, 0u), corner_position(id, 1u), corner_position(id, 2u)));
 }
 
-// The normal that the normal texture makes of n. Its axes are the triangle's own: where u grows, and where v shrinks.
+// The normal that the normal texture makes of n. Its axes are the triangle's own: where u grows,
+// and where v shrinks.
 fn normal_mapped(id: u32, m: u32, front: bool, uv: Uv, n: vec3<f32>) -> vec3<f32> {
     let used = use_of(m, SLOT_NORMAL);
     let p = corner_position(id, 0u);
@@ -78,12 +79,12 @@ fn normal_mapped(id: u32, m: u32, front: bool, uv: Uv, n: vec3<f32>) -> vec3<f32
     return unit_or((x * tangent + y * up) + v.z * n, n);
 }
 
-// A face's normal on the viewer's side: at unit length already, so that it keeps its bits.
+// A face's unit normal on the viewer's side. It is not normalised again, so that it keeps its bits.
 fn turned_to_viewer(n: vec3<f32>, front: bool) -> vec3<f32> {
     return select(-n, n, front);
 }
 
-// The unit normal on the viewer's side, of what corners' normals blend to.
+// The unit normal on the viewer's side of interpolated corner normals.
 fn facing(n: vec3<f32>, front: bool) -> vec3<f32> {
     let length_squared = dot(n, n);
     var scale = 0.0;
@@ -101,7 +102,7 @@ fn unit_or(v: vec3<f32>, otherwise: vec3<f32>) -> vec3<f32> {
     return otherwise;
 }
 
-// What of v is at right angles to the unit vector n, at length about 1 where that is not nothing.
+// Component of v at right angles to the unit vector n; about unit length where it is not zero.
 fn across(v: vec3<f32>, n: vec3<f32>) -> vec3<f32> {
     let largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
     let scaled = select(v, v / largest, largest > 0.0);

@@ -1,8 +1,9 @@
-// The colour of one point of the surface: stage 3's formulas. Twin of src/backend/cpu/surface/point.rs.
+// Stage shade, per point: the colour of a point of the surface. Twin of
+// src/backend/cpu/surface/point.rs.
 
-// Three indices a triangle, for each kind of corner value that does not go by position.
+// Three indices per triangle, for each kind of corner value that does not go by position.
 @group(1) @binding(7) var<storage, read> corner_triangles: array<u32>;
-// Triangles' materials, then edge masks, a byte each.
+// Triangles' materials, then edge masks, one byte each.
 @group(1) @binding(8) var<storage, read> attributes: array<u32>;
 @group(1) @binding(15) var<storage, read> materials: array<Material>;
 @group(1) @binding(19) var<storage, read> vertex_colors: array<vec4<f32>>;
@@ -48,14 +49,15 @@ const SLOT_METALLIC_ROUGHNESS: u32 = 1u;
 const SLOT_NORMAL: u32 = 2u;
 const SLOT_EMISSIVE: u32 = 3u;
 
-// What of its material a point shows.
+// Parts of a material that a point shows.
 struct Show {
     fill: bool,
-    // How much of its wires, 0 to 1.
+    // Opacity of the wires, 0 to 1.
     wires: f32,
 };
 
-// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's centre.
+// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's
+// centre.
 fn point_color(id: u32, at: vec2<f32>, show: Show) -> vec4<f32> {
     let m = material_index(id);
     if has(VARYING) {
@@ -136,7 +138,7 @@ fn vertex_color(id: u32, b: Barycentrics) -> vec4<f32> {
     return blend4(b.value, p, q, vertex_colors[corner_triangles[first + 2u]]);
 }
 
-// What the material makes of alpha.
+// The base colour with the material's cutoff, blending and opacity applied to alpha.
 fn with_alpha(m: u32, base: vec4<f32>, show: Show) -> vec4<f32> {
     let flags = materials[m].flags;
     // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.

@@ -1,10 +1,11 @@
-// Stage 3, a pixel: the colour of each triangle that is seen there. Twin of src/backend/cpu/surface/shade.rs.
+// Stage shade, per pixel: the colour of each visible triangle. Twin of
+// src/backend/cpu/surface/shade.rs.
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
 
-// What lies over each sample.
+// Peeled layers per sample.
 @group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
 
 @compute @workgroup_size(WORKGROUP)
@@ -34,7 +35,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         }
         sum = rn4(share * sum);
     }
-    // Once for each triangle among the samples.
+    // One iteration per triangle among the samples.
     var left = seen_samples(in_base);
     while left != 0u {
         let group = first_group(in_base, left);
@@ -48,7 +49,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
     colors[i] = sum;
 }
 
-// What the layers over some samples leave of the surface, in samples.
+// Share of the surface that the layers leave visible at some samples, in samples.
 fn uncovered(first: u32, same: u32) -> f32 {
     var sum = 0.0;
     for (var s = 0; s < sample_count(); s++) {
@@ -64,7 +65,7 @@ fn triangle_of_sample(sample: u32) -> u32 {
     return select(~word.x, NOTHING, word.y == 0u);
 }
 
-// What of its material a surface triangle shows: where layers show wires, not these.
+// Parts of its material that a surface triangle shows: no wires where the peeled layers show them.
 fn surface_show(id: u32) -> Show {
     if has(WIRES_ONLY) && id < frame.triangle_count {
         let mask = pass_masks[id / 4u] >> (8u * (id & 3u));

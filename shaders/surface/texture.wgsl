@@ -1,5 +1,5 @@
-// Texture lookups. Twin of src/backend/cpu/surface/texture.rs: the same bits, because texels decide what a mask leaves and where
-// nearest texels change.
+// Stage shade, per point: texture lookups. Twin of src/backend/cpu/surface/texture.rs: the same
+// bits, because texels decide what a mask leaves and where nearest texels change.
 
 @group(1) @binding(18) var<storage, read> uvs: array<vec2<f32>>;
 // Four items an image, as src/plan/surface/mod.rs has them; then texels, two halves a word.
@@ -8,7 +8,8 @@
 // Items of the texels' buffer per image, in front of the texels.
 const IMAGE_VECTORS: u32 = 4u;
 
-// Bits of a texture use's sampler: a wrap mode across, one down, and whether the nearest texel is taken.
+// Bits of a texture use's sampler: a wrap mode across, one down, and whether the nearest texel is
+// taken.
 const WRAP_BITS: u32 = 3u;
 const WRAP_DOWN_SHIFT: u32 = 2u;
 const WRAP_REPEAT: u32 = 0u;

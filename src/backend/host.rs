@@ -1,4 +1,5 @@
-//! The process's one GPU: opened on first need, probed before it is used, opened again when it was lost.
+//! The process's one GPU: opened on first need, probed before it is used, opened again when it was
+//! lost.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -30,11 +31,11 @@ struct Slot {
     current: Option<Arc<dyn GpuDevice>>,
     /// Why the first opening failed; it is not tried again.
     failed: Option<String>,
-    /// Whether any opening ever succeeded. From then on a failure counts as a loss.
+    /// True once an opening has succeeded. From then on a failure counts as a loss.
     opened_before: bool,
 }
 
-/// How an opening failed.
+/// Reason of a failed opening.
 enum OpenError {
     /// There is no such device.
     Absent(String),
@@ -64,7 +65,7 @@ impl GpuHost {
         Self { open, without, device: Mutex::default(), status: Mutex::new(status), losses: AtomicU32::new(0) }
     }
 
-    /// How it stands. Does not wait for an opening.
+    /// The status. Does not wait for an opening.
     pub fn status(&self) -> GpuStatus {
         let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner).clone();
         // There is one then, of software or well again.
@@ -74,18 +75,20 @@ impl GpuHost {
         status
     }
 
-    /// Whether `auto` has not yet come to mean the CPU.
+    /// True as long as `auto` may choose a GPU.
     pub fn may_have_hardware(&self) -> bool {
         self.without.get().is_none()
     }
 
-    /// The device that a request of this kind draws on, opened now if need be; workers that come meanwhile wait for it.
+    /// The device that a request of this kind draws on, opened now if need be; workers that come
+    /// meanwhile wait for it.
     ///
-    /// `NoGpu` is for good. `DeviceLost` means that a device that was there is gone, and that another try may help.
+    /// `NoGpu` is for good. `DeviceLost` means that a device that was there is gone, and that
+    /// another try may help.
     pub fn device(&self, kind: GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> {
         self.check_auto(kind)?;
         let mut slot = self.device.lock().unwrap_or_else(PoisonError::into_inner);
-        // Decided, perhaps, by whoever held the lock.
+        // The previous holder of the lock may have decided it.
         self.check_auto(kind)?;
         if let Some(device) = slot.current.clone() {
             let Some(reason) = device.lost().map(str::to_owned) else { return Ok(device) };
@@ -168,7 +171,7 @@ impl GpuHost {
             return DrawError::DeviceLost(reason);
         }
         self.go_without(reason.clone(), state == GpuState::Failed);
-        // Where hardware alone is absent there may still be software.
+        // Without hardware there may still be a software implementation.
         if kind == GpuKind::Any || state == GpuState::Failed {
             slot.failed = Some(reason.clone());
         }

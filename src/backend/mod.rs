@@ -1,7 +1,8 @@
 //! Two ways to fill a [`DrawPlan`]: [`cpu`] and [`gpu`], with the same stages under the same names:
 //! transform, visibility, shade, lines, resolve.
 //!
-//! Architecture invariant: nothing here knows a mesh or a scene, and the two back-ends do not know each other.
+//! Architecture invariant: nothing here knows a mesh or a scene, and the two back-ends do not know
+//! each other.
 
 pub mod cpu;
 mod device;
@@ -26,15 +27,16 @@ pub trait Renderer {
 
     /// Fills the visibility buffer alone, for tests that compare back-ends sample for sample.
     ///
-    /// One word a sample at `(y * width + x) * samples + s`: depth bits in the upper half, the complement of the
-    /// triangle id in the lower (so that of equal depths the lowest id wins), 0 where there is nothing.
+    /// One word a sample at `(y * width + x) * samples + s`: depth bits in the upper half, the
+    /// complement of the triangle id in the lower (so that of equal depths the lowest id wins), 0
+    /// where there is nothing.
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError>;
 
     /// `cpu` or `gpu`.
     fn kind(&self) -> BackendKind;
 }
 
-/// Which back-end drew.
+/// A back-end, as reports name it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BackendKind {
     /// Our own rasterizer.

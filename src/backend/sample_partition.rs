@@ -1,4 +1,5 @@
-//! Which sample of its pixel a point in it stands with: how what lines cover is told apart into what each sample stands for.
+//! Assigns each of the 256 coverage points of a pixel to its nearest sample, so that the stage
+//! lines knows how much of each sample's share a line covers.
 
 use std::sync::OnceLock;
 
@@ -7,15 +8,17 @@ use crate::plan::sample_offsets;
 /// Points in a pixel.
 pub const POINTS: usize = 256;
 
-/// Where they lie: point i is the `g i`-th of as many columns (the first) and rows (the second), modulo their number. A rank-1
-/// lattice (Korobov's), no two of whose points share a row or a column: on a square grid, lines along its rows would be off by
-/// half a row. The generator is the one whose counts of half planes are closest to their areas.
+/// Their positions: point i is the `g i`-th of as many columns (the first) and rows (the second),
+/// modulo their number. A rank-1 lattice (Korobov's), no two of whose points share a row or a
+/// column: on a square grid, lines along its rows would be off by half a row. The generator is the
+/// one whose counts of half planes are closest to their areas.
 pub const GENERATORS: [usize; 2] = [1, 181];
 
-/// The number of a sample for each point.
+/// Index of the assigned sample per point.
 pub type SamplePartition = [u8; POINTS];
 
-/// The cells of so many samples: equally large, because samples weigh the same, and as close around their samples as that allows.
+/// The partition for `samples` samples. Its parts are equally large, because samples weigh the
+/// same, and as close to their samples as that allows.
 pub fn sample_partition(samples: u32) -> &'static SamplePartition {
     static PARTITIONS: [OnceLock<SamplePartition>; 4] = [const { OnceLock::new() }; 4];
     let [one, four, eight, sixteen] = &PARTITIONS;
@@ -28,8 +31,9 @@ pub fn sample_partition(samples: u32) -> &'static SamplePartition {
     made.get_or_init(|| divide(sample_offsets(samples)))
 }
 
-/// Gives each point to the nearest sample that has room, nearest first; then two points change places for as long as that brings
-/// them closer to their samples. All in integers, so that it is the same everywhere.
+/// Gives each point to the nearest sample that has room, nearest first; then two points change
+/// places for as long as that brings them closer to their samples. All in integers, so that it is
+/// the same everywhere.
 fn divide(samples: &[[i32; 2]]) -> SamplePartition {
     let away = |point: usize, sample: u8| away(point, samples[usize::from(sample)]);
     let numbers = 0..samples.len() as u8;
@@ -61,7 +65,8 @@ fn divide(samples: &[[i32; 2]]) -> SamplePartition {
     partition
 }
 
-/// The square of a point's distance from a sample, which is in 1/256 px: in 1/512 px, where points lie in the middle of theirs.
+/// The square of a point's distance from a sample, which is in 1/256 px: in 1/512 px, where points
+/// lie in the middle of theirs.
 fn away(point: usize, sample: [i32; 2]) -> i32 {
     let along = |k: usize| 2 * ((point * GENERATORS[k]) % POINTS) as i32 + 1 - 2 * sample[k];
     along(0) * along(0) + along(1) * along(1)
@@ -75,7 +80,7 @@ mod tests {
 
     #[test]
     fn parts_are_equally_large_and_around_their_samples() {
-        // As far as the farthest point of a cell may be, in 1/100 px.
+        // Largest distance of a point from its sample, in 1/100 px.
         for (samples, farthest) in [(1, 71), (4, 41), (8, 37), (16, 26)] {
             let (partition, offsets) = (sample_partition(samples), sample_offsets(samples));
             let mut counts = vec![0; samples as usize];
@@ -90,7 +95,8 @@ mod tests {
             assert_eq!(counts, vec![POINTS as i32 / samples as i32; samples as usize], "{samples}");
             let limit = farthest * PX / 100;
             assert!(most <= limit * limit, "{samples}: {} px", f64::from(most).sqrt() / f64::from(PX));
-            // Where the samples are symmetric, as many points are nearest to each, but for the lattice's own grain.
+            // Where the samples are symmetric, as many points are nearest to each, but for the
+            // lattice's own grain.
             assert!(moved <= if samples <= 4 { 6 } else { 32 }, "{samples}: {moved} points have a nearer sample");
         }
     }

@@ -1,4 +1,4 @@
-//! Which back-end draws a job, and what happens when the GPU fails it.
+//! Choice of a back-end per job, and recovery when the GPU fails.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
@@ -20,12 +20,12 @@ pub struct Backends {
     gpu: Option<(Box<dyn Renderer>, Arc<dyn GpuDevice>)>,
 }
 
-/// A picture and who drew it.
+/// A picture and the back-end that drew it.
 #[derive(Debug)]
 pub struct Chosen {
     /// The picture.
     pub image: Image,
-    /// Who drew it.
+    /// The back-end that drew it.
     pub backend: BackendKind,
 }
 
@@ -35,7 +35,7 @@ impl Backends {
         Self { cpu: cpu::CpuRenderer::new(threads), host, gpu: None }
     }
 
-    /// Whether `auto` may mean a GPU here. Opens none, so it may turn out that there is none.
+    /// True as long as `auto` may choose a GPU here. Opens none, so there may turn out to be none.
     pub fn has_gpu(&self) -> bool {
         self.host.may_have_hardware()
     }
@@ -64,7 +64,8 @@ impl Backends {
         }
     }
 
-    /// Memory that drawing the plan takes beside what grows with its mesh, bytes. What a real GPU holds is its own.
+    /// Memory that drawing the plan takes beside what grows with its mesh, bytes. What a real GPU
+    /// holds is its own.
     pub fn bands_bytes(&self, choice: BackendChoice, plan: &DrawPlan<'_>) -> u64 {
         match choice {
             BackendChoice::Cpu | BackendChoice::Auto => self.cpu.bands_bytes(plan),
@@ -97,7 +98,7 @@ impl Backends {
         attempt: Attempt,
     ) -> Result<Image, DrawError> {
         if self.gpu.as_ref().is_some_and(|(_, device)| device.lost().is_some()) {
-            // What is left here would keep a device alive that nobody draws on any more.
+            // The old renderer would keep a lost device alive.
             drop_catching_panics(self.gpu.take());
         }
         let found = self.host.device(kind);

@@ -1,8 +1,9 @@
-//! All that the shaders and the code around them must agree on: constants, structs in buffers, bindings, entry points.
+//! All that the shaders and the code around them must agree on: constants, structs in buffers,
+//! bindings, entry points.
 //!
-//! WGSL has no include and Rust cannot read it, so both sides write these down. Here the shaders are parsed and each
-//! constant, field and binding is compared; one that neither [`shared_constants`] nor [`SHADER_ONLY`] lists is a
-//! failure too.
+//! WGSL has no include and Rust cannot read it, so both sides write these down. Here the shaders
+//! are parsed and each constant, field and binding is compared; one that neither
+//! [`shared_constants`] nor [`SHADER_ONLY`] lists is a failure too.
 
 use std::collections::BTreeMap;
 use std::mem::offset_of;
@@ -91,7 +92,8 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     all
 }
 
-/// Constants that only shaders have: the states of a search, places in their own buffers, what fits their 32 bits.
+/// Constants that only shaders have: the states of a search, places in their own buffers, what fits
+/// their 32 bits.
 const SHADER_ONLY: &[&str] = &[
     "UNSCANNED",
     "WHOLE",

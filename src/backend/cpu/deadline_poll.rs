@@ -2,25 +2,26 @@
 
 use crate::limits::Deadline;
 
-/// Work between two looks, samples: some 10 ms.
+/// Work between two polls, samples: about 10 ms.
 const WORK_PER_POLL: u64 = 1 << 22;
 
-/// What a triangle costs however small it is, samples.
+/// Fixed cost per triangle, samples.
 const WORK_PER_TRIANGLE: u64 = 1 << 12;
 
-/// Looks at a deadline after so much work, because a triangle may have one sample or millions.
+/// Polls a deadline by amount of work, because a triangle may have one sample or millions.
 pub struct DeadlinePoll<'a> {
     deadline: &'a Deadline,
     left: u64,
 }
 
 impl<'a> DeadlinePoll<'a> {
-    /// Looks at once, then after each [`WORK_PER_POLL`].
+    /// Polls at once, then after each [`WORK_PER_POLL`].
     pub fn new(deadline: &'a Deadline) -> Self {
         Self { deadline, left: 0 }
     }
 
-    /// Whether the time is over, when a triangle has been looked for among so many samples. Once it is, nobody asks again.
+    /// True if the deadline has passed. To be called after each triangle with the number of samples
+    /// tested, and not again once it is true.
     #[inline(always)]
     pub fn is_expired(&mut self, samples: u64) -> bool {
         let work = samples + WORK_PER_TRIANGLE;
@@ -37,7 +38,8 @@ impl<'a> DeadlinePoll<'a> {
 mod tests {
     use super::*;
 
-    /// Triangles of so many samples until the end of time is noticed, when it comes after the first.
+    /// Triangles of so many samples until the end of time is noticed, when it comes after the
+    /// first.
     fn triangles_until_noticed(samples: u64) -> u64 {
         let deadline = Deadline::default();
         let mut poll = DeadlinePoll::new(&deadline);

@@ -1,18 +1,20 @@
 //! One source, several instruction sets.
 //!
-//! The hot loops of every stage are written once, over arrays of [`LANES`] values, and compiled once per instruction
-//! set. Rust neither fuses nor reorders floating-point operations, so all give the same bytes; only the speed differs.
+//! The hot loops of every stage are written once, over arrays of [`LANES`] values, and compiled
+//! once per instruction set. Rust neither fuses nor reorders floating-point operations, so all give
+//! the same bytes; only the speed differs.
 //!
-//! To add an instruction set (AVX-512, NEON): a variant of `Level` under its `cfg`, a list of features beside
-//! [`for_avx2_features`], a constructor that detects all of them, and an arm in [`dispatch`].
+//! To add an instruction set (AVX-512, NEON): a variant of `Level` under its `cfg`, a list of
+//! features beside [`for_avx2_features`], a constructor that detects all of them, and an arm in
+//! [`dispatch`].
 
 /// Values handled side by side: one AVX2 register of 32-bit numbers.
 pub const LANES: usize = 8;
 
 /// An instruction set that this processor is known to have.
 ///
-/// The type is opaque and its constructors detect what they return, so safe code cannot choose an instruction set that
-/// the processor lacks:
+/// The type is opaque and its constructors detect what they return, so safe code cannot choose an
+/// instruction set that the processor lacks:
 ///
 /// ```compile_fail
 /// let isa = meshsnap::backend::cpu::Isa::Avx2;
@@ -28,8 +30,9 @@ enum Level {
     Avx2,
 }
 
-/// Calls a macro with the features of the AVX2 level, followed by its own input: detection and compilation cannot name
-/// different ones. Those that AVX2 implies are named as well, because enabling it enables them.
+/// Calls a macro with the features of the AVX2 level, followed by its own input: detection and
+/// compilation cannot name different ones. Those that AVX2 implies are named as well, because
+/// enabling it enables them.
 macro_rules! for_avx2_features {
     ($($callback:ident)::+ ! { $($input:tt)* }) => {
         $($callback)::+! {
@@ -96,8 +99,8 @@ impl std::fmt::Debug for Isa {
     }
 }
 
-/// Defines `$name(isa, args...)`, which runs `$kernel(args...)` compiled for `isa`. The kernel and what it calls in its
-/// loops must be `#[inline(always)]`, or they stay compiled for the baseline.
+/// Defines `$name(isa, args...)`, which runs `$kernel(args...)` compiled for `isa`. The kernel and
+/// what it calls in its loops must be `#[inline(always)]`, or they stay compiled for the baseline.
 macro_rules! dispatch {
     ($($function:tt)*) => {
         $crate::backend::cpu::isa::for_avx2_features! { $crate::backend::cpu::isa::dispatch_to! { $($function)* } }
@@ -163,7 +166,8 @@ mod tests {
         }
     }
 
-    /// AVX2 without the bit-manipulation extensions, as some hypervisors present it, is the baseline.
+    /// AVX2 without the bit-manipulation extensions, as some hypervisors present it, is the
+    /// baseline.
     #[cfg(target_arch = "x86_64")]
     #[test]
     fn every_enabled_feature_is_detected() {

@@ -1,8 +1,8 @@
 //! The CPU rasterizer: the reference for bytes.
 //!
-//! RasterContext, each a file: [`transform`] (with [`clip`] where needed), [`visibility`], [`layers`] (with [`peel`]), [`shade`],
-//! [`lines`], [`resolve`]. The picture is cut
-//! into bands of rows that fit a core's cache; threads take bands, and nothing a band draws depends on another.
+//! RasterContext, each a file: [`transform`] (with [`clip`] where needed), [`visibility`],
+//! [`layers`] (with [`peel`]), [`shade`], [`lines`], [`resolve`]. The picture is cut into bands of
+//! rows that fit a core's cache; threads take bands, and nothing a band draws depends on another.
 
 // Loops over lanes and corners walk several arrays at once; an index says that best.
 #![allow(clippy::needless_range_loop)]
@@ -44,7 +44,7 @@ pub struct CpuRenderer {
     srgb: SrgbEncoder,
 }
 
-/// What every stage reads: the plan and the vertices on screen.
+/// Input of every stage: the plan and the vertices on screen.
 pub struct RasterContext<'a> {
     plan: &'a DrawPlan<'a>,
     deadline: &'a Deadline,
@@ -86,7 +86,8 @@ impl CpuRenderer {
         RasterContext { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb }
     }
 
-    /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside it.
+    /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside
+    /// it.
     fn draw_bands<T: Send>(
         &mut self,
         plan: &DrawPlan<'_>,
@@ -112,7 +113,7 @@ impl CpuRenderer {
         Ok(deadline.check()?)
     }
 
-    /// Lets go of what is too large to keep for another picture.
+    /// Frees buffers that are too large to keep for another picture.
     fn trim(&mut self) {
         self.scratch.trim();
         if self.vertices.capacity() * size_of::<ScreenVertex>() > KEPT_BYTES_MAX {
@@ -131,7 +132,8 @@ impl CpuRenderer {
 }
 
 impl CpuRenderer {
-    /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare back-ends sample for sample.
+    /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare
+    /// back-ends sample for sample.
     pub fn draw_layer(&mut self, plan: &DrawPlan<'_>, layer: u32, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
         let mut words = vec![0_u64; plan.width_px as usize * plan.height_px as usize * plan.samples as usize];
         self.draw_bands(plan, deadline, &mut words, |context, scratch, bins, band, words| {
@@ -142,7 +144,7 @@ impl CpuRenderer {
 }
 
 impl RasterContext<'_> {
-    /// Where the corners of an id are among the vertices.
+    /// Vertex indices of a triangle.
     #[inline(always)]
     fn triangle(&self, id: u32) -> [u32; 3] {
         let id = id as usize;
@@ -153,7 +155,7 @@ impl RasterContext<'_> {
         }
     }
 
-    /// Whether an id is the hull's.
+    /// True if a triangle belongs to the outline mesh.
     #[inline(always)]
     fn is_hull(&self, id: u32) -> bool {
         id as usize >= self.plan.triangles.len()

@@ -6,19 +6,19 @@ use super::handles::Handles;
 use crate::backend::DrawError;
 use crate::backend::gpu::pipelines::{SLOTS, Slot};
 
-/// What is kept of a job's buffers, at most; a job that needed more gives all of them back.
+/// Largest set of buffers that is kept, bytes. A larger one is freed after its job.
 const SET_BYTES_MAX: u64 = 256 << 20;
 
-/// What is kept of all jobs' buffers, at most: on a processor that plays GPU it is the process's memory.
+/// Largest memory of all kept sets, bytes: on a software implementation it is the process's memory.
 const KEPT_BYTES_MAX: u64 = 2 * SET_BYTES_MAX;
 
 /// Smallest buffer: a binding may not be empty, and a struct must fit in.
 const SIZE_MIN: u64 = 256;
 
-/// Buffers that no job uses just now.
+/// Unused sets of buffers.
 ///
-/// The set that was used last is lent first. Workers take turns with jobs; if each had a set of its own, most of the memory would lie idle,
-/// and the first job of each would wait for more.
+/// The set used last is taken first. Workers take turns with jobs; if each had a set of its own,
+/// most of the memory would lie idle, and the first job of each would wait for more.
 #[derive(Default)]
 pub struct SpareBuffers(Mutex<Vec<Buffers>>);
 
@@ -28,7 +28,8 @@ impl SpareBuffers {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
     }
 
-    /// A set that a finished job used. It is not kept where it, or all sets together, would be too much.
+    /// A set that a finished job used. It is not kept where it, or all sets together, would be too
+    /// much.
     pub fn give_back(&self, buffers: Buffers) {
         let mut spare = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let kept: u64 = spare.iter().map(Buffers::bytes).sum();
@@ -43,13 +44,13 @@ impl SpareBuffers {
 #[derive(Default)]
 pub struct Buffers {
     storage: [Option<wgpu::Buffer>; SLOTS],
-    /// The plan's numbers.
+    /// Uniforms of a plan.
     pub frame: Option<wgpu::Buffer>,
-    /// The dispatches' numbers.
+    /// Uniforms of the dispatches.
     pub batches: Option<wgpu::Buffer>,
-    /// Where results are read by the CPU.
+    /// Buffer from which the CPU reads results.
     pub staging: Option<wgpu::Buffer>,
-    /// Where the CPU reads how long the work list is.
+    /// Buffer from which the CPU reads the work list's length.
     counts: Option<wgpu::Buffer>,
 }
 
@@ -93,7 +94,8 @@ impl Buffers {
         Ok(())
     }
 
-    /// Reserves a buffer and fills it with whole words from a place on; what is before them is for a kernel to write.
+    /// Reserves a buffer and fills it with whole words from a place on; what is before them is for
+    /// a kernel to write.
     pub fn upload_at(&mut self, gpu: &Handles, slot: Slot, at: u64, bytes: &[u8]) -> Result<(), DrawError> {
         let buffer = self.reserve(gpu, slot, at + bytes.len() as u64)?;
         if !bytes.is_empty() {
@@ -151,7 +153,8 @@ fn grow<'a>(
 ) -> &'a wgpu::Buffer {
     let kept = slot.take().filter(|buffer| buffer.size() >= size);
     slot.insert(kept.unwrap_or_else(|| {
-        // A quarter more than asked for, so that a row of slowly growing jobs does not allocate each time.
+        // A quarter more than asked for, so that a row of slowly growing jobs does not allocate
+        // each time.
         let size = (size + size / 4).next_multiple_of(SIZE_MIN).clamp(SIZE_MIN, limit & !3);
         gpu.device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
     }))

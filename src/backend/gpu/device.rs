@@ -11,7 +11,7 @@ use crate::backend::DrawError;
 use crate::backend::gpu::pipelines::PipelineCache;
 use crate::limits::Deadline;
 
-/// Which adapters may be opened.
+/// Adapters that may be opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GpuKind {
     /// Any, a software Vulkan included.
@@ -29,7 +29,7 @@ pub enum AtomicsChoice {
     Force32,
 }
 
-/// What was opened.
+/// The opened device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GpuInfo {
     /// The adapter's name.
@@ -53,20 +53,21 @@ pub struct Gpu {
     jobs_ended: AtomicU32,
 }
 
-/// Jobs after which a software device gets new pipelines. llvmpipe compiles a kernel anew for every set of uniform values
-/// that its branches depend on, and keeps each copy (1 to 3 MiB a job) until the pipeline goes.
+/// Jobs after which a software device gets new pipelines. llvmpipe compiles a kernel anew for every
+/// set of uniform values that its branches depend on, and keeps each copy (1 to 3 MiB a job) until
+/// the pipeline goes.
 const SOFTWARE_PIPELINE_JOBS: u32 = 32;
 
-/// Why the device is gone, once it is.
+/// The reason once the device is lost.
 type Lost = Arc<OnceLock<String>>;
 
-/// Storage buffers that the hungriest stage binds.
+/// Storage buffers that a kernel binds, at most.
 const STORAGE_BUFFERS: u32 = 16;
 
-/// How often to look without a pause: a small picture takes a fraction of a millisecond.
+/// Polls without a pause: a small picture takes a fraction of a millisecond.
 const EAGER_POLLS: u32 = 64;
 
-/// Shortest and longest pause between two looks.
+/// Shortest and longest pause between two polls.
 const PAUSE_MIN: Duration = Duration::from_micros(20);
 const PAUSE_MAX: Duration = Duration::from_millis(2);
 
@@ -98,10 +99,12 @@ impl Gpu {
         let lost = Lost::default();
         let slot = lost.clone();
         device.set_device_lost_callback(move |reason, message| {
-            // Dropping the device reports "destroyed" here too; nobody looks at the slot any more then.
+            // Dropping the device reports "destroyed" here too; nobody looks at the slot any more
+            // then.
             let _ = slot.set(format!("{reason:?}: {message}"));
         });
-        // Without a handler wgpu panics. What a job causes is caught by that job's error scope; this is the rest.
+        // Without a handler wgpu panics. What a job causes is caught by that job's error scope;
+        // this is the rest.
         device
             .on_uncaptured_error(Arc::new(|error| tracing::error!(%error, "the GPU reported an error outside a job")));
 
@@ -119,12 +122,12 @@ impl Gpu {
         })
     }
 
-    /// What was opened.
+    /// The opened device.
     pub fn info(&self) -> &GpuInfo {
         &self.info
     }
 
-    /// Why the device is gone, if it is.
+    /// The reason if the device is lost.
     pub fn lost(&self) -> Option<&str> {
         self.lost.get().map(String::as_str)
     }
@@ -134,7 +137,7 @@ impl Gpu {
         self.lost().map_or(Ok(()), |reason| Err(DrawError::DeviceLost(reason.to_owned())))
     }
 
-    /// Whether this is a processor that plays GPU.
+    /// True for a software implementation on the CPU.
     pub fn is_software(&self) -> bool {
         self.info.device_type == type_name(wgpu::DeviceType::Cpu)
     }
@@ -147,7 +150,7 @@ impl Gpu {
         }
     }
 
-    /// Runs `work` and turns what the device complains about meanwhile, on this thread, into an error.
+    /// Runs `work` and turns the device's errors on this thread into an error.
     pub(super) fn scoped<T>(&self, work: impl FnOnce() -> Result<T, DrawError>) -> Result<T, DrawError> {
         use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
         let [a, b, c] = [Internal, OutOfMemory, Validation].map(|filter| self.handles.device.push_error_scope(filter));
@@ -163,11 +166,12 @@ impl Gpu {
         }
     }
 
-    /// Waits until a callback of the device has sent its news, looking at the deadline now and then.
+    /// Waits until a callback of the device has sent a value, and polls the deadline meanwhile.
     ///
-    /// Only ever polls without blocking. In wgpu-core 30.0.1 a wait with a timeout panics if it runs out just when another
-    /// thread's poll or submit finds the queue empty (device/resource.rs:948), and takes other jobs' callbacks down with
-    /// it; a wait without one could hang for ever.
+    /// Only ever polls without blocking. In wgpu-core 30.0.1 a wait with a timeout panics if it
+    /// runs out just when another thread's poll or submit finds the queue empty
+    /// (device/resource.rs:948), and takes other jobs' callbacks down with it; a wait without one
+    /// could hang for ever.
     pub(super) fn wait<T>(&self, news: &mpsc::Receiver<T>, deadline: &Deadline) -> Result<T, DrawError> {
         let (mut polls, mut waited) = (0_u32, Duration::ZERO);
         while waited < HUNG_AFTER {
@@ -206,7 +210,8 @@ fn find_adapter(kind: GpuKind) -> Result<wgpu::Adapter, DrawError> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::VULKAN;
     descriptor.flags = wgpu::InstanceFlags::empty();
-    // Refuse to allocate before the system begins to swap GPU memory: a refused job is better than a lost device.
+    // Refuse to allocate before the system begins to swap GPU memory: a refused job is better than
+    // a lost device.
     descriptor.memory_budget_thresholds =
         wgpu::MemoryBudgetThresholds { for_resource_creation: Some(90), for_device_loss: Some(99) };
     let instance = wgpu::Instance::new(descriptor);

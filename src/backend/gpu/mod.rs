@@ -1,10 +1,12 @@
 //! The wgpu back-end: the CPU's stages as compute shaders, headless.
 //!
-//! In reading order: [`device`] opens a GPU; [`schedule`] decides what is dispatched for a plan; [`recorder`] turns that
-//! into commands; [`kernels`] and [`bindings`] say what each stage is made of, [`stages`] are their pipelines, [`params`] their numbers,
-//! [`buffers`] their memory and [`sizes`] how much of it.
+//! In reading order: [`device`] opens a GPU; [`schedule`] decides what is dispatched for a plan;
+//! [`recorder`] turns that into commands; [`kernels`] and [`bindings`] say what each stage is made
+//! of, [`stages`] are their pipelines, [`params`] their numbers, [`buffers`] their memory and
+//! [`sizes`] how much of it.
 //!
-//! Architecture invariant: a job's use of the device stays on the thread that draws it, because wgpu's error scopes do.
+//! Architecture invariant: a job's use of the device stays on the thread that draws it, because
+//! wgpu's error scopes do.
 
 mod buffers;
 mod device;
@@ -58,7 +60,8 @@ impl GpuRenderer {
         &self.gpu
     }
 
-    /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare back-ends sample for sample.
+    /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare
+    /// back-ends sample for sample.
     pub fn draw_layer(&mut self, plan: &DrawPlan<'_>, layer: u32, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
         match plan.peeling() {
             Some(_) => self.words(plan, Goal::Layer(layer), Slot::PeelLayer, deadline),
@@ -103,7 +106,8 @@ impl GpuRenderer {
         let mut buffers = self.gpu.spare_buffers.take();
         let result = self.gpu.scoped(|| job(&self.gpu, &mut buffers));
         self.gpu.job_ended();
-        // After an error work may still be running on them, and the staging buffer may be half mapped.
+        // After an error work may still be running on them, and the staging buffer may be half
+        // mapped.
         if result.is_ok() {
             self.gpu.spare_buffers.give_back(buffers);
         }

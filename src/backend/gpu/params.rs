@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::backend::sample_partition::{POINTS, sample_partition};
 use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, SurfacePass};
 
-/// The plan's numbers.
+/// Uniforms of a plan.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Frame {
@@ -40,7 +40,7 @@ pub struct Frame {
     pub color_triangles_at: u32,
 }
 
-/// A dispatch's numbers.
+/// Uniforms of a dispatch.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Batch {
@@ -115,7 +115,7 @@ pub mod line_flags {
 pub const BATCH_STRIDE: usize = 256;
 
 impl Frame {
-    /// The numbers of a plan.
+    /// The uniforms of a plan.
     pub fn new(plan: &DrawPlan<'_>) -> Self {
         let p = &plan.projection;
         let mut frame = Self {
@@ -160,7 +160,8 @@ impl Frame {
     }
 }
 
-/// The hull's colours, then the materials of the mesh's triangles and of its own: what [`Frame::hull_color_count`] points into.
+/// The hull's colours, then the materials of the mesh's triangles and of its own: what
+/// [`Frame::hull_color_count`] points into.
 pub fn hull_materials(hull: &HullPass<'_>) -> Vec<u8> {
     let materials = [hull.surface_materials, &hull.triangle_materials].map(bytemuck::cast_slice::<u32, u8>);
     [bytemuck::cast_slice(&hull.colors), materials[0], materials[1]].concat()
@@ -171,13 +172,15 @@ pub fn attributes(surface: &SurfacePass<'_>) -> Vec<u8> {
     [bytemuck::cast_slice(surface.triangle_materials), &surface.edge_masks[..]].concat()
 }
 
-/// Where normals begin whose index is the plan's own triangles: those are on the GPU already.
+/// Value of `normal_triangles_at` for normals indexed by the plan's own triangles, which are on the
+/// GPU already.
 pub const OWN_TRIANGLES: u32 = u32::MAX;
 
-/// The index arrays of normals, texture coordinates and colours, each once, and where each of the three begins when they
-/// lie one after the other.
+/// The index arrays of normals, texture coordinates and colours, each once, and where each of the
+/// three begins when they lie one after the other.
 ///
-/// A mesh's normals go by position (`own`, the plan's triangles) or by what the other two go by: one array is all there is.
+/// A mesh's normals go by position (`own`, the plan's triangles) or by what the other two go by:
+/// one array is all there is.
 pub fn corner_triangles<'a>(surface: &SurfacePass<'a>, own: &[[u32; 3]]) -> (Vec<&'a [[u32; 3]]>, [u32; 3]) {
     let normals = surface.vertex_normals.as_ref().map(|v| v.triangles);
     let has_own = normals.is_some_and(|triangles| std::ptr::eq(triangles, own));
@@ -198,7 +201,8 @@ pub fn corner_triangles<'a>(surface: &SurfacePass<'a>, own: &[[u32; 3]]) -> (Vec
     (parts, [if has_own { OWN_TRIANGLES } else { normals }, uvs, colors])
 }
 
-/// The lists of edges of line passes, each once, and where each pass's begins when they lie one after the other.
+/// The lists of edges of line passes, each once, and where each pass's begins when they lie one
+/// after the other.
 pub fn edge_lists(passes: &[LinePass]) -> (Vec<&[Edge]>, Vec<u32>) {
     let mut lists: Vec<(&Arc<[Edge]>, u32)> = Vec::new();
     let mut next = 0_u32;
@@ -216,7 +220,8 @@ pub fn edge_lists(passes: &[LinePass]) -> (Vec<&[Edge]>, Vec<u32>) {
     (lists.into_iter().map(|(list, _)| &list[..]).collect(), starts)
 }
 
-/// The points that stand with each of a pixel's samples, eight words a sample, numbered as shaders/lines/stroke.wgsl numbers them.
+/// The points assigned to each of a pixel's samples, eight words per sample, numbered as
+/// shaders/lines/stroke.wgsl numbers them.
 pub fn sample_masks(samples: u32) -> Vec<u32> {
     let mut masks = vec![0; samples as usize * POINTS / 32];
     for (point, &cell) in sample_partition(samples).iter().enumerate() {

@@ -1,29 +1,29 @@
-//! Which triangles go where: the GPU's side of a plan's roles.
+//! Passes over triangles, selected by their pass masks.
 
 use std::ops::Range;
 
 use crate::plan::{DrawPlan, Faces, pass_mask};
 
-/// Triangles that are drawn for the same reason.
+/// Triangles of one pass.
 #[derive(Clone, Debug)]
 pub struct Pass {
-    /// Which.
+    /// Its index.
     pub ids: Range<u32>,
-    /// Whether any of them may need clipping.
+    /// True if any of them may need clipping.
     pub clip: bool,
-    /// Which side, unless a triangle's role says.
+    /// Drawn faces, unless a triangle's pass mask overrides them.
     pub faces: Faces,
-    /// The role that triangles must have; of a hull's none.
+    /// Bit that a triangle's pass mask must have; 0 for the outline mesh, which has no masks.
     pub pass_bit: u8,
 }
 
 impl Pass {
-    /// What goes into the visibility buffer.
+    /// The passes of the visibility buffer.
     pub fn of_visibility(plan: &DrawPlan<'_>) -> [Option<Self>; 2] {
         [Self::surface(plan, pass_mask::SURFACE), Self::hull(plan).filter(|_| !plan.has_peeled_hull())]
     }
 
-    /// What goes into the layers. Without roles, no surface does.
+    /// The passes of depth peeling. Without pass masks no surface is peeled.
     pub fn of_peeling(plan: &DrawPlan<'_>) -> [Option<Self>; 2] {
         let surface = Self::surface(plan, pass_mask::LAYER).filter(|_| !plan.pass_masks.is_empty());
         [surface, Self::hull(plan).filter(|_| plan.has_peeled_hull())]

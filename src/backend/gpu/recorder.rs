@@ -1,4 +1,5 @@
-//! Turns a [`Schedule`](super::schedule::Schedule)'s steps into commands and hands them to the device.
+//! Turns a [`Schedule`](super::schedule::Schedule)'s steps into commands and hands them to the
+//! device.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -40,7 +41,7 @@ impl<'a> Recorder<'a> {
     ) -> Self {
         let frame = Frame::new(plan);
         let frame = Buffers::upload_uniform(&gpu.handles, &mut buffers.frame, bytemuck::bytes_of(&frame)).clone();
-        // One more, for dispatches whose numbers are known only on the way.
+        // One more, for dispatches whose parameters are known only while recording.
         let spare_batch = batches.len();
         let batches = upload_batches(&gpu.handles, &mut buffers.batches, batches).clone();
         let one = wgpu::BufferBinding { buffer: &batches, offset: 0, size: wgpu::BufferSize::new(BATCH_STRIDE as u64) };
@@ -82,7 +83,8 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Draws what the work list holds: reads how long it is, then runs the kernel in rounds of known length.
+    /// Draws what the work list holds: reads how long it is, then runs the kernel in rounds of
+    /// known length.
     pub fn tiles_in_rounds(&mut self, kernel: Kernel, batch: &Batch, tiles: &Tiles) -> Result<(), DrawError> {
         let mut counts = [0; 2];
         let (work, to) = (
@@ -155,7 +157,7 @@ impl<'a> Recorder<'a> {
         if let Some(encoder) = self.encoder.take() {
             let (sender, done) = mpsc::channel();
             encoder.on_submitted_work_done(move || {
-                // A job that gave up does not listen any more.
+                // A job that has given up has dropped the receiver.
                 let _ = sender.send(());
             });
             self.gpu.handles.queue.submit([encoder.finish()]);
@@ -166,7 +168,7 @@ impl<'a> Recorder<'a> {
         Ok(self.deadline.check()?)
     }
 
-    /// Submits, waits, and lends the first `size` bytes of the staging buffer to `read`.
+    /// Submits, waits, and passes the first `size` bytes of the staging buffer to `read`.
     pub fn read_staging(&mut self, size: u64, read: impl FnOnce(&[u8])) -> Result<(), DrawError> {
         match self.buffers.staging.clone() {
             Some(staging) => self.read(&staging, size, read),
@@ -178,7 +180,7 @@ impl<'a> Recorder<'a> {
         self.submit()?;
         let (sender, mapped) = mpsc::channel();
         staging.map_async(wgpu::MapMode::Read, 0..size, move |result| {
-            // A job that gave up does not listen any more.
+            // A job that has given up has dropped the receiver.
             let _ = sender.send(result);
         });
         let mapped = self.gpu.wait(&mapped, self.deadline)?;

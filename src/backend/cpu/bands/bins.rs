@@ -1,4 +1,4 @@
-//! Which triangles and edges each band of rows sees.
+//! Sorting of triangles and edges into bands of rows, before the stage visibility.
 
 use std::ops::Range;
 
@@ -13,18 +13,18 @@ use crate::backend::cpu::{CHUNK, RasterContext};
 use crate::limits::Stopped;
 use crate::plan::{DrawPlan, Faces, HullPass, LinePass, pass_mask};
 
-/// A triangle that touches as many bands is listed once for all of them, or large ones on a tall picture would take gigabytes
-/// of lists.
+/// Triangles that touch this many bands are listed once for all of them. Otherwise large ones on a
+/// tall picture would take gigabytes of lists.
 const TALL_BANDS: usize = 8;
 
 /// The same for edges, whose lists are a line pass's own.
 const TALL_EDGE_BANDS: usize = 4;
 
-/// What each band has to draw, chunk by chunk in ascending order.
+/// Items per band, chunk by chunk in ascending order.
 pub struct Bins {
     /// For the visibility buffer.
     pub triangles: Vec<TriangleBin>,
-    /// For the layers over it.
+    /// For depth peeling.
     pub peel: Vec<TriangleBin>,
     /// By line pass.
     pub edges: Vec<Vec<Bin>>,
@@ -35,7 +35,7 @@ pub struct Bins {
 pub struct TriangleBin {
     /// Ids of triangles that need no clipping.
     pub whole: Bin,
-    /// What clipping left of others, and whose it is.
+    /// Id and pieces of clipped triangles.
     pieces: Vec<(u32, [ScreenVertex; 3])>,
     /// Indices into `pieces`.
     piece_bands: Bin,
@@ -47,7 +47,7 @@ pub struct Bin {
     by_band: Vec<Vec<u32>>,
     /// Items that touch many bands, with the first and last.
     tall: Vec<(u32, [u32; 2])>,
-    /// How many bands are many.
+    /// Number of bands from which an item is tall.
     tall_bands: usize,
 }
 
@@ -66,7 +66,7 @@ impl Bin {
         }
     }
 
-    /// Whether every band's items come in ascending order.
+    /// True if every band's items come in ascending order.
     pub fn is_ordered(&self) -> bool {
         self.tall.is_empty()
     }
@@ -85,14 +85,14 @@ impl TriangleBin {
         self.pieces.push((id, piece));
     }
 
-    /// The band's clipped pieces, and whose they are.
+    /// The band's clipped pieces with their ids.
     pub fn pieces_in(&self, band: usize) -> impl Iterator<Item = (u32, &[ScreenVertex; 3])> {
         self.piece_bands.items_in(band).map(|i| &self.pieces[i as usize]).map(|(id, piece)| (*id, piece))
     }
 }
 
-/// Sorts the plan's triangles and edges into bands of `rows`; triangles of the visibility buffer also into those to which they
-/// are as close as `margin` rows.
+/// Sorts the plan's triangles and edges into bands of `rows`; triangles of the visibility buffer
+/// also into those to which they are as close as `margin` rows.
 pub fn bin(
     context: &RasterContext<'_>,
     pool: Option<&rayon::ThreadPool>,
@@ -119,10 +119,10 @@ pub fn bin(
     Ok(Bins { triangles, peel, edges })
 }
 
-/// Triangles that are drawn for the same reason.
+/// Triangles of one pass.
 struct Pass {
     ids: Range<usize>,
-    /// The role that triangles must have; of a hull's none.
+    /// Bit that a triangle's pass mask must have; 0 for the outline mesh, which has no masks.
     pass_bit: u8,
     faces: Faces,
 }
@@ -132,7 +132,7 @@ impl Pass {
         chunks(self.ids.clone()).map(move |ids| Self { ids, ..self })
     }
 
-    /// Which faces of a triangle are drawn; None where it has another role.
+    /// Drawn faces of a triangle; None if the pass does not draw it.
     #[inline(always)]
     fn faces_of(&self, plan: &DrawPlan<'_>, id: usize) -> Option<Faces> {
         if self.pass_bit == 0 {
@@ -148,14 +148,14 @@ impl Pass {
     }
 }
 
-/// What goes into the visibility buffer, and what into the layers.
+/// The passes of the visibility buffer, and those of depth peeling.
 fn passes(plan: &DrawPlan<'_>) -> (Vec<Pass>, Vec<Pass>) {
     let count = plan.triangles.len();
     let surface = |pass_bit| plan.surface.as_ref().map(|s| Pass { ids: 0..count, pass_bit, faces: s.faces });
     let around =
         |hull: &HullPass<'_>| Pass { ids: count..count + hull.triangles.len(), pass_bit: 0, faces: Faces::Both };
     let hull = plan.hull.as_ref().map(around);
-    // Without roles, nothing is a layer.
+    // Without pass masks nothing is peeled.
     let layer = surface(pass_mask::LAYER).filter(|_| plan.peeling().is_some() && !plan.pass_masks.is_empty());
     let (base_hull, peeled_hull) = if plan.has_peeled_hull() { (None, hull) } else { (hull, None) };
     let collect = |passes: [Option<Pass>; 2]| passes.into_iter().flatten().collect();
@@ -208,8 +208,8 @@ fn bin_clipped(context: &RasterContext<'_>, rows: [u32; 2], id: u32, faces: Face
     });
 }
 
-/// First and last band that a triangle on screen touches, or comes as close to as `margin` rows; None if it lies beside, above or
-/// below all that has samples.
+/// First and last band that a triangle on screen touches, or comes as close to as `margin` rows;
+/// None if it lies beside, above or below all that has samples.
 #[inline(always)]
 fn bands_of(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], v: &[ScreenVertex; 3]) -> Option<[usize; 2]> {
     axis_bounds(&v.map(|v| v.x), plan.width_px, plan.seen_range(plan.width_px))?;
@@ -265,7 +265,7 @@ mod tests {
             let want = (100..).zip(spans).filter(|(_, [first, last])| (*first..=*last).contains(&band));
             assert_eq!(found, want.map(|(id, _)| id).collect::<Vec<u32>>(), "band {band}");
         }
-        // What touches few bands is not looked at in the others.
+        // Pieces that touch few bands are not visited in the others.
         assert_eq!(bin.piece_bands.tall.len(), 2);
     }
 }

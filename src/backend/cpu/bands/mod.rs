@@ -20,7 +20,7 @@ use crate::backend::cpu::surface::light::Light;
 use crate::backend::cpu::surface::shade;
 use crate::plan::LinePass;
 
-/// Edges between two looks at the deadline. Those of wide lines count their pixels too.
+/// Edges between two polls of the deadline. Wide lines count their pixels too.
 const EDGES_PER_POLL: usize = 256;
 
 /// Draws band number `band` into its rows of the picture.
@@ -41,7 +41,8 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
     resolve::encode(context.srgb, &scratch.colors, rgba);
 }
 
-/// Draws band number `band` of the visibility buffer alone, as [`Renderer::draw_visibility`](super::Renderer) says.
+/// Draws band number `band` of the visibility buffer alone, as
+/// [`Renderer::draw_visibility`](super::Renderer) says.
 pub fn draw_visibility(
     context: &RasterContext<'_>,
     scratch: &mut BandScratch,
@@ -71,7 +72,8 @@ pub fn draw_layer(
     }
 }
 
-/// Lays the lines of each pass over the colours, one pass after the other: what they need is the same however many there are.
+/// Composites the lines of each pass over the colours, one pass after the other, so that memory
+/// does not grow with their number.
 fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
     let plan = context.plan;
     let pixels = scratch.colors.len();
@@ -145,7 +147,7 @@ dispatch! {
 fn triangles_kernel(context: &RasterContext<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) {
     let mut poll = DeadlinePoll::new(context.deadline);
     for chunk in &bins.triangles {
-        // What is not in ascending order comes with ties looked at.
+        // Only ascending ids need no test for ties.
         let ordered = chunk.whole.is_ordered() && !context.plan.projection.clip;
         for (id, piece) in chunk.pieces_in(band) {
             let setup = Setup::new(piece);
@@ -179,7 +181,7 @@ fn edges_kernel(
     let mut drawer = LineDrawer::new(context, pass, samples, samples.shown);
     for chunk in bins {
         for (i, edge) in chunk.items_in(band).enumerate() {
-            // A wide line's edge is as much work as hundreds of others.
+            // An edge of a wide line is as much work as hundreds of others.
             if (i % EDGES_PER_POLL == 0 || drawer.is_poll_due()) && context.deadline.check().is_err() {
                 return;
             }

@@ -12,19 +12,20 @@ use crate::plan::DrawPlan;
 /// Memory of a band, bytes: half of a common 1 MiB second-level cache.
 const BAND_BYTES: usize = 512 << 10;
 
-/// Rows of a band, at least, of a picture that has as many: a tall triangle is looked at once for each band.
+/// Rows of a band, at least, of a picture that has as many: a tall triangle is looked at once for
+/// each band.
 const ROWS_MIN: u32 = 4;
 
 /// Memory of all bands that are drawn at once, bytes, whatever is drawn on however many threads.
 pub const BANDS_BYTES_MAX: usize = 256 << 20;
 
-/// What is kept from picture to picture, bytes: of a band's scratch, and of vertices.
+/// Memory kept from picture to picture, bytes: of a band's scratch, and of vertices.
 pub const KEPT_BYTES_MAX: usize = 8 << 20;
 
 /// Bytes of a sample: depth and id.
 const SAMPLE_BYTES: usize = 8;
 
-/// How a picture is cut into bands.
+/// Division of a picture into bands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Banding {
     /// Rows in each band but the last.
@@ -36,9 +37,9 @@ pub struct Banding {
 }
 
 impl Banding {
-    /// For so many threads. Bands fit the cache, unless their lines material far beyond them: then a band has as many rows as lets
-    /// the threads do the most in [`BANDS_BYTES_MAX`], because small bands draw most samples for their neighbours, and of large
-    /// ones there are few at once.
+    /// For so many threads. Bands fit the cache, unless their lines material far beyond them: then
+    /// a band has as many rows as lets the threads do the most in [`BANDS_BYTES_MAX`], because
+    /// small bands draw most samples for their neighbours, and of large ones there are few at once.
     pub fn new(plan: &DrawPlan<'_>, threads: usize) -> Self {
         let margin = plan.line_margin_rows();
         let cached = (BAND_BYTES / (row_bytes(plan, 1) + row_bytes(plan, 0)).max(1)) as u32;
@@ -82,21 +83,21 @@ fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
 
 /// A band's buffers, kept from band to band.
 pub struct BandScratch {
-    /// What each sample sees.
+    /// The visibility buffer.
     pub samples: SampleBand,
     /// Rows that are shown; the last band of a picture may use fewer.
     pub rows: u32,
     /// Rows beyond these, above and below, that `samples` has room for too.
     pub margin: u32,
-    /// Where the plan has layers.
+    /// Depth peeling, where the plan has it.
     pub peel: Option<PeelBand>,
-    /// A pixel, premultiplied linear RGBA.
+    /// Per pixel, premultiplied linear RGBA.
     pub colors: Vec<[f32; 4]>,
-    /// Of the line pass that is drawn just now.
+    /// Line coverage of the current line pass.
     pub coverage: Vec<LineCoverage>,
-    /// Where that is lit, whose light falls on its lines.
+    /// Per pixel, where the pass is lit: the face that lights its lines, plus 1.
     pub owners: Vec<u32>,
-    /// A pixel, where it is lit.
+    /// Per pixel, the light on its lines.
     pub light: Vec<Light>,
 }
 
@@ -114,7 +115,7 @@ impl BandScratch {
         }
     }
 
-    /// What it holds on to, bytes.
+    /// Allocated memory, bytes.
     fn bytes(&self) -> usize {
         self.samples.depth.len() * SAMPLE_BYTES
             + self.peel.as_ref().map_or(0, PeelBand::bytes)
@@ -125,12 +126,12 @@ impl BandScratch {
     }
 }
 
-/// Buffers of bands that nobody draws just now.
+/// Unused buffers of bands.
 #[derive(Default)]
 pub struct ScratchPool(Mutex<Vec<BandScratch>>);
 
 impl ScratchPool {
-    /// Lends a scratch that fits the plan.
+    /// Calls `each` with a scratch that fits the plan.
     pub fn with(&self, plan: &DrawPlan<'_>, banding: Banding, each: impl FnOnce(&mut BandScratch)) {
         let size_px = [plan.width_px, plan.height_px];
         let fits = |s: &BandScratch| {
@@ -145,7 +146,7 @@ impl ScratchPool {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
     }
 
-    /// Lets go of what is too large to keep for another picture.
+    /// Frees buffers that are too large to keep for another picture.
     pub fn trim(&self) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).retain(|scratch| scratch.bytes() <= KEPT_BYTES_MAX);
     }
@@ -187,7 +188,8 @@ mod tests {
         DrawPlan { samples: 4, lines: vec![pass; passes], ..plan }
     }
 
-    /// Draws nothing in all of a band's buffers; whether they are kept for the next picture, after how many bytes.
+    /// Draws nothing in all of a band's buffers; whether they are kept for the next picture, after
+    /// how many bytes.
     fn is_kept(plan: &DrawPlan<'_>) -> (bool, usize) {
         let (pool, banding) = (ScratchPool::default(), Banding::new(plan, 1));
         let pixels = (plan.width_px * banding.rows) as usize;

@@ -1,9 +1,11 @@
-//! Stage 4, a pixel: the union of the strokes that touch it, laid over what is there. Twin of `shaders/lines/coverage.wgsl`.
+//! Stage lines, per pixel: the union of its strokes, composited over the colours. Twin of
+//! `shaders/lines/coverage.wgsl`.
 //!
-//! Of all strokes four things are kept, in integers, so that their order does not matter: the sum of their areas, the sum of
-//! their counts of points, which points any of them covers, and how far an area is from its points at most. Where they do not
-//! overlap the sum of the areas is the answer; where they do, the share of the points that are left of the sum says how much of
-//! it is ([LineCoverage::coverage]).
+//! Four integers describe all strokes of a pixel, so that their order does not matter: the sum of
+//! areas, the sum of point counts, the mask of points that any stroke covers, and the largest
+//! difference between an area and its points. Where they do not overlap the sum of the areas is the
+//! answer; where they do, the share of the points that are left of the sum says how much of it is
+//! ([LineCoverage::coverage]).
 
 use super::stroke::{Mask, POINTS, WORDS, count};
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
@@ -17,25 +19,26 @@ use crate::plan::{DrawPlan, LinePass};
 /// Steps to the pixel of a sum of areas.
 pub const AREA_UNIT: f32 = 65_536.0;
 
-/// Strokes beside each other in a pixel whose areas may all be as far from their points as the farthest. Of more, some lie over
-/// others.
+/// Strokes in a pixel that may all differ from their points by the largest difference. Of more
+/// strokes, some overlap.
 pub const STROKES_SIDE_BY_SIDE: f32 = 4.0;
 
-/// A pixel's strokes.
+/// The strokes of a pixel.
 #[derive(Clone, Copy, Default)]
 pub struct LineCoverage {
     mask: Mask,
-    /// Of all strokes: no number of them comes near the end of 64 bits.
+    /// Sum of the strokes' areas; 64 bits hold any number of them.
     area: u64,
-    /// Where so many strokes meet that this ends at its largest, `slack` says what they cover.
+    /// Sum of the strokes' points. It saturates; then `slack` bounds the result.
     count: u32,
-    /// Most that the area of a stroke differs from its points'.
+    /// Largest difference between the area of a stroke and that of its points.
     slack: u32,
 }
 
 impl LineCoverage {
-    /// Whether all points are covered, so that nothing that comes can change anything but lines whose peak is less than 1. One
-    /// stroke may cover them all and yet leave a corner of the pixel; more than one are taken to have covered it.
+    /// True if all points are covered: further strokes change nothing unless the peak is below 1.
+    /// One stroke may cover all points and yet miss a corner of the pixel, so that at least two
+    /// must.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.count > POINTS && self.mask == [u16::MAX; WORDS]
@@ -53,9 +56,10 @@ impl LineCoverage {
         self.slack = self.slack.max(area.abs_diff((count as f32 * (peak * (AREA_UNIT / POINTS as f32)) + 0.5) as u32));
     }
 
-    /// How much of the pixel is covered, 0 to the lines' `peak`: `area * points of the union / sum of the strokes' points`, a
-    /// ratio estimate whose error is that of the overlap alone. However often a stroke is drawn that covers but a corner of the
-    /// pixel, and none of its points or few, the union is as far from its points as a few strokes are from theirs.
+    /// Covered share of the pixel, 0 to the lines' `peak`: `area * points of the union / sum of the
+    /// strokes' points`, a ratio estimate whose error is that of the overlap alone. However often a
+    /// stroke is drawn that covers but a corner of the pixel, and none of its points or few, the
+    /// union is as far from its points as a few strokes are from theirs.
     #[inline(always)]
     pub fn covered_share(&self, peak: f32) -> f32 {
         if self.area == 0 {
@@ -73,35 +77,36 @@ impl LineCoverage {
     }
 }
 
-/// As the shaders round a number of two words.
+/// Rounds as the shaders round a number of two words.
 #[inline(always)]
 fn to_f32(v: u64) -> f32 {
     (v >> 32) as f32 * 4_294_967_296.0 + (v as u32) as f32
 }
 
-/// Lays the strokes of line passes over a band's colours.
+/// Composites the strokes of line passes over a band's colours.
 pub struct LineCompositor<'a> {
     plan: &'a DrawPlan<'a>,
     band: &'a SampleBand,
-    /// What lies over its samples.
+    /// The peeled layers over its samples.
     peel: Option<&'a PeelBand>,
-    /// The points that stand with each sample; none where there is nothing for lines to cover.
+    /// The points assigned to each sample; empty where there is no surface under the lines.
     sample_masks: Vec<Mask>,
 }
 
-/// Surfaces that show less than this leave no trace: a tenth of a byte's last step in the most transparent of pictures.
+/// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
+/// pictures.
 pub const ALPHA_MIN: f32 = 1e-4;
 
 impl<'a> LineCompositor<'a> {
-    /// For a band, and the layers over it where the plan has any.
+    /// A compositor for a band and, where the plan has them, its peeled layers.
     pub fn new(plan: &'a DrawPlan<'a>, band: &'a SampleBand, peel: Option<&'a PeelBand>) -> Self {
         let samples = if plan.is_shaded() && !plan.lines.is_empty() { plan.samples } else { 0 };
-        // Those of another plan may be left there.
+        // The scratch may still hold the layers of another plan.
         let peel = peel.filter(|_| plan.peeling().is_some());
         Self { plan, band, peel, sample_masks: (0..samples).map(|s| points_of_sample(samples, s)).collect() }
     }
 
-    /// Lays the lines of a pass over what is there; `light` is what falls on them (empty where they are not lit).
+    /// Composites the lines of a pass over the colours. `light` is empty where they are not lit.
     pub fn composite(&self, lines: &LinePass, coverage: &[LineCoverage], light: &[Light], colors: &mut [[f32; 4]]) {
         let peak = lines.peak();
         for (i, (coverage, c)) in coverage.iter().zip(colors).enumerate() {
@@ -119,8 +124,9 @@ impl<'a> LineCompositor<'a> {
         }
     }
 
-    /// The surface's colour in a pixel, where it has the share of what lines leave uncovered that it has there. At its border that
-    /// is not its share of the pixel, because a line along the border covers one side as much as the other.
+    /// The surface's colour, weighted by its share of what lines leave uncovered. At the surface's
+    /// border this differs from its share of the pixel, because a line along the border covers both
+    /// sides alike.
     #[inline(always)]
     fn uncovered(&self, pixel: usize, surface: [f32; 4], mask: &Mask, opacity: f32) -> [f32; 4] {
         if self.sample_masks.is_empty() || !(surface[3] > ALPHA_MIN && surface[3] < 1.0) {
@@ -136,7 +142,7 @@ impl<'a> LineCompositor<'a> {
     }
 }
 
-/// The points of a sample's cell.
+/// The points assigned to a sample, as a mask.
 fn points_of_sample(samples: u32, sample: u32) -> Mask {
     let mut mask = [0; WORDS];
     for (point, &cell) in sample_partition(samples).iter().enumerate() {
@@ -147,8 +153,8 @@ fn points_of_sample(samples: u32, sample: u32) -> Mask {
     mask
 }
 
-/// How much more of what shows beside and through a line is surface than of the pixel, where `alpha` says how much surface a sample
-/// sees. Of each point shows 1, or, where the line covers it, 1 - opacity.
+/// Ratio of the surface's share beside and through a line to its share of the pixel. `alpha` gives
+/// the surface's alpha per sample. A point counts 1, or 1 - opacity where the line covers it.
 #[inline(always)]
 fn weight(sample_masks: &[Mask], alpha: impl Fn(usize) -> f32, mask: &Mask, opacity: f32) -> f32 {
     let covered = count(mask);

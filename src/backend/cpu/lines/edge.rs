@@ -1,8 +1,9 @@
-//! Stage 4, an edge: lines of exact width. Twin of `shaders/lines/edge.wgsl`.
+//! Stage lines, per edge: lines of exact width. Twin of `shaders/lines/edge.wgsl`.
 //!
-//! A line is all that lies within half its width of the visible parts of an edge ([`hiding`](crate::backend::cpu::lines::hidden_lines)): a stroke for
-//! each part ([`stroke`]), and in each pixel their union ([`ink`](crate::backend::cpu::lines::coverage)). What is visible of an edge close
-//! to a pixel is found close to it: long edges are looked at in windows.
+//! A line is all that lies within half its width of the visible parts of an edge
+//! ([`hidden_lines`](super::hidden_lines)): a stroke for each part ([`stroke`]), and in each pixel
+//! their union ([`coverage`](super::coverage)). Long edges are processed in windows, so that a
+//! pixel's lines depend only on what is near it.
 
 use super::segment::{SLACK_PX, Segment, rows};
 use super::stroke::{self, Direction, Pen};
@@ -13,11 +14,11 @@ use crate::backend::cpu::lines::coverage::LineCoverage;
 use crate::backend::cpu::lines::hidden_lines::HiddenIntervals;
 use crate::plan::{Edge, LinePass, Shown};
 
-/// Where a pass's lines go: rows of a band.
+/// Output of a line pass: rows of a band.
 pub struct LineTarget<'a> {
-    /// The strokes of each pixel.
+    /// Line coverage per pixel.
     pub coverage: &'a mut [LineCoverage],
-    /// Of each pixel, whose light falls on its lines; empty where none are lit.
+    /// Per pixel, the face that lights its lines, plus 1; empty where no lines are lit.
     pub owners: &'a mut [u32],
 }
 
@@ -29,21 +30,21 @@ pub struct LineDrawer<'a> {
     /// Rows of the picture that are drawn.
     rows: [i32; 2],
     pen: Pen,
-    /// Windows of an edge in a pixel of it.
+    /// Windows per pixel of an edge's length.
     windows: f32,
-    /// Whether something may hide a line.
+    /// True if a surface may hide a line.
     is_hidden: bool,
     hidden: HiddenIntervals,
-    /// Pixels since the deadline was last looked at.
+    /// Pixels since the last deadline poll.
     pixels_since_poll: i32,
-    /// Parts of the edge in the window.
+    /// Shown intervals of the edge in the window.
     intervals: Vec<[f32; 2]>,
 }
 
 impl<'a> LineDrawer<'a> {
-    /// A pass's, for the picture rows from `rows[0]` to before `rows[1]`.
+    /// A drawer for a pass and the picture rows from `rows[0]` to before `rows[1]`.
     pub fn new(context: &'a RasterContext<'a>, lines: &'a LinePass, band: &'a SampleBand, rows: [u32; 2]) -> Self {
-        // Where there is no surface there is nothing to hide behind, and no samples to ask.
+        // Without a surface nothing hides a line, and there is no visibility buffer to read.
         let something_hides = context.plan.surface.is_some() || context.plan.hull.is_some();
         Self {
             context,
@@ -59,7 +60,7 @@ impl<'a> LineDrawer<'a> {
         }
     }
 
-    /// Whether so many pixels have been looked at that the deadline should be too; then it counts from 0 again.
+    /// True after so many pixels that the deadline is to be polled; then counts from 0 again.
     #[inline(always)]
     pub fn is_poll_due(&mut self) -> bool {
         let is_far = self.pixels_since_poll > 100_000;
@@ -96,7 +97,8 @@ impl<'a> LineDrawer<'a> {
                 for x in from..=to {
                     let at = row + x as usize;
                     let center = [x as f32 + 0.5, y as f32 + 0.5];
-                    // What is full stays full, whatever else comes; only a lit line still asks whose it is.
+                    // A full pixel stays full. Only a lit line goes on, to find the face that
+                    // lights it.
                     if (owner == 0 && coverage[at].is_full()) || !windowed.owns(center) {
                         continue;
                     }
@@ -124,7 +126,8 @@ impl<'a> LineDrawer<'a> {
         }
     }
 
-    /// Finds what is drawn of the edge in a window, and as far beyond as it touches the window's pixels; whether anything is.
+    /// Collects the shown intervals of an edge in a window, and as far beyond as the line touches
+    /// the window's pixels. False if there are none.
     #[inline(always)]
     fn collect_intervals(&mut self, edge: &Edge, segment: &Segment, range: [f32; 2]) -> bool {
         self.intervals.clear();
@@ -171,7 +174,7 @@ impl Window<'_> {
         [(low as i32).max(0), (high as i32).min(width_px as i32 - 1)]
     }
 
-    /// Which range of the edge may reach a pixel, and somewhat more: parts beyond it need not be looked at.
+    /// Range of the edge that may reach a pixel, with a margin: intervals beyond it are skipped.
     #[inline(always)]
     fn reached(&self, center: [f32; 2], reach: f32) -> [f32; 2] {
         let s = self.segment;
@@ -180,7 +183,7 @@ impl Window<'_> {
         [(way - reach - 1.0) * s.inverse_length, (way + reach + 1.0) * s.inverse_length]
     }
 
-    /// Whether of all windows of the edge the pixel is this one's.
+    /// True if the pixel belongs to this window of the edge.
     #[inline(always)]
     fn owns(&self, center: [f32; 2]) -> bool {
         if self.count == 1 {

@@ -1,8 +1,10 @@
-//! Stage 4, a pixel: the light that falls on lines which take the surface's. Twin of `shaders/lines/line_light.wgsl`.
+//! Stage lines, per pixel: the surface's light on lit lines. Twin of
+//! `shaders/lines/line_light.wgsl`.
 //!
-//! Light is affine in the colour that it falls on, so one [`Light`] a pixel lights lines of any colour: the mean over the samples
-//! that see the surface. Where none does, beyond a silhouette, it is the light on the line's own face. Textures that change a
-//! material's normal or gloss do not touch its lines.
+//! Light is affine in the colour that it falls on, so one [`Light`] a pixel lights lines of any
+//! colour: the mean over the samples that see the surface. Where none does, beyond a silhouette, it
+//! is the light on the line's own face. Textures that change a material's normal or gloss do not
+//! touch its lines.
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
@@ -12,7 +14,7 @@ use crate::backend::cpu::surface::normal::normal;
 use crate::backend::cpu::surface::wire::Place;
 use crate::plan::{SurfacePass, flags, sample_offsets};
 
-/// The light of every pixel of the band that has an owner: a face of a lit line there, plus 1.
+/// The light of every pixel of the band that has an owner, the face that lights its lines, plus 1.
 pub fn light_lines(context: &RasterContext<'_>, band: &SampleBand, owners: &[u32], light: &mut [Light]) {
     let Some(surface) = &context.plan.surface else { return };
     for (i, (&owner, out)) in (0_u32..).zip(owners.iter().zip(light)) {
@@ -47,7 +49,8 @@ fn pixel(
     Light { gain: sum.gain / count, gloss: sum.gloss / count }
 }
 
-/// The light on a triangle at a point, in 1/256 px from the picture's centre, which may lie beside it.
+/// The light on a triangle at a point, in 1/256 px from the picture's centre, which may lie beside
+/// it.
 fn point(context: &RasterContext<'_>, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> Light {
     let material = surface.material(id as usize);
     if material.flags & flags::LIT == 0 {

@@ -1,4 +1,5 @@
-//! Stage 4, an edge on screen: where it lies, and which pixels it passes. Twin of `shaders/lines/segment.wgsl`.
+//! Stage lines, per edge: its position on screen and the pixels along it. Twin of
+//! `shaders/lines/segment.wgsl`.
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::clip_segment;
@@ -54,7 +55,7 @@ impl Segment {
         self.ends
     }
 
-    /// Whether the triangle is not farther away than all of the edge, nor beside its box.
+    /// False if the triangle is farther away than all of the edge, or beside its box.
     #[inline(always)]
     pub fn may_be_hidden_by(&self, [a, b, c]: &[ScreenVertex; 3]) -> bool {
         let [start, end] = self.ends;
@@ -129,7 +130,8 @@ fn floor(v: f32) -> i32 {
     towards_zero - i32::from(towards_zero as f32 > v)
 }
 
-/// First and last row, from `first` to before `end`, that a line between these heights may touch; empty if first > last.
+/// First and last row, from `first` to before `end`, that a line between these heights may touch;
+/// empty if first > last.
 #[inline(always)]
 pub fn rows(a: f32, b: f32, reach: f32, [first, end]: [i32; 2]) -> [i32; 2] {
     let reach = reach + SLACK_PX;
@@ -138,7 +140,7 @@ pub fn rows(a: f32, b: f32, reach: f32, [first, end]: [i32; 2]) -> [i32; 2] {
 
 fn clip(context: &RasterContext<'_>, edge: &Edge) -> Option<[ScreenVertex; 2]> {
     let projection = &context.plan.projection;
-    // Where nothing is to be clipped, what is outside is not drawn: of triangles neither.
+    // A plan without clipping draws nothing that is outside, neither edges nor triangles.
     if !projection.clip {
         return None;
     }

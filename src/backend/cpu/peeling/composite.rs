@@ -1,7 +1,9 @@
-//! Stage 3b, a sample: the layers over its surface, nearest first, and the surface under them. Twin of `shaders/peeling/composite.wgsl`.
+//! Stage shade, per sample: composites the peeled layers front to back, then the surface under
+//! them. Twin of `shaders/peeling/composite.wgsl`.
 //!
-//! Depth peeling (Everitt 2001, "Interactive order-independent transparency"), for each sample by itself: a round finds the
-//! greatest word (depth, lowest id) below the last round's, all words above the visibility buffer's.
+//! Depth peeling (Everitt 2001, "Interactive order-independent transparency"), for each sample by
+//! itself: a round finds the greatest word (depth, lowest id) below the last round's, all words
+//! above the visibility buffer's.
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::bins::TriangleBin;
@@ -13,7 +15,7 @@ use crate::backend::cpu::surface::point::Show;
 use crate::backend::cpu::surface::shade::Shader;
 use crate::plan::{PeelingPass, pass_mask};
 
-/// Shades the band: its layers, and the surface under them.
+/// Shades a band: the peeled layers, and the surface under them.
 pub fn draw(
     context: &RasterContext<'_>,
     pass: &PeelingPass,
@@ -37,7 +39,7 @@ pub fn draw(
     shade_surface(context.isa, context, base, peel, colors);
 }
 
-/// Leaves layer number `layer` in `found`, unshaded: id [`NOTHING`] where a sample has none.
+/// The visibility words of layer number `layer`, unshaded: 0 where a sample has none.
 pub fn find_layer(
     context: &RasterContext<'_>,
     pass: &PeelingPass,
@@ -63,7 +65,8 @@ pub fn find_layer(
 }
 
 dispatch! {
-    /// Shades the layer that was found and lays it under those before it; says whether there may be another.
+    /// Shades the layer that was found and composites it under those in front; sets `is_open` if
+    /// there may be another.
     pub fn shade_layer(
         context: &RasterContext<'_>,
         show: Show,
@@ -74,7 +77,7 @@ dispatch! {
 }
 
 dispatch! {
-    /// Shades the surface, lays it under the layers, and averages each pixel's samples.
+    /// Shades the surface, composites it under the layers, and averages each pixel's samples.
     pub fn shade_surface(context: &RasterContext<'_>, base: &SampleBand, peel: &PeelBand, colors: &mut [[f32; 4]]) = shade_surface_kernel
 }
 

@@ -1,4 +1,5 @@
-//! Stage 2 once more, a round a layer: the nearest triangle behind the layer before. Twin of `shaders/peeling/emit_layer.wgsl`.
+//! Stage visibility, one round per peeled layer: finds the nearest triangle behind the previous
+//! layer. Twin of `shaders/peeling/emit_layer.wgsl`.
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::bins::TriangleBin;
@@ -15,11 +16,11 @@ dispatch! {
     pub fn peel_layer(context: &RasterContext<'_>, bins: (&[TriangleBin], usize), peel: &mut PeelBand) = peel_layer_kernel
 }
 
-/// Keeps the nearest of what lies behind the last layer.
+/// Target that keeps the nearest triangle behind the previous layer.
 struct Behind<'a> {
     found: &'a mut SampleBand,
     previous: &'a SampleBand,
-    /// Not 0 where the triangle lies behind the last layer of some sample.
+    /// Not 0 if the triangle is behind the previous layer at some sample.
     pending: [u32; LANES],
 }
 
@@ -76,7 +77,8 @@ fn peel_layer_kernel(context: &RasterContext<'_>, (bins, band): (&[TriangleBin],
     }
 }
 
-/// Draws the band's triangle number `item`, unless an earlier round has seen the last of it. Among how many samples it was looked for.
+/// Draws the band's triangle number `item`, unless an earlier round has found all of its samples.
+/// Returns the number of samples tested.
 #[inline(always)]
 fn offer(
     item: usize,

@@ -1,26 +1,26 @@
-//! What depth peeling remembers of each sample of a band. Twin of `shaders/peeling/state.wgsl`.
+//! Stage shade, per sample: the state of depth peeling. Twin of `shaders/peeling/state.wgsl`.
 
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 
-/// What a band's layers need beside its samples: rows that are shown, and none of those beyond them.
+/// Depth peeling of a band: buffers for the rows that are shown, without the margin rows.
 pub struct PeelBand {
-    /// This round's layer; begins as a copy of what it must lie before.
+    /// The layer of this round; starts as a copy of the surface that hides all layers behind it.
     pub found: SampleBand,
-    /// The last round's; depth 0 where a sample is done.
+    /// The layer of the previous round; depth 0 where a sample is finished.
     pub previous: SampleBand,
     /// Premultiplied linear RGBA so far, laid out as the samples.
     pub colors: Vec<[f32; 4]>,
-    /// Materials so far, a bit each, modulo 32.
+    /// Materials of the layers so far, one bit each, modulo 32.
     pub materials: Vec<u32>,
-    /// Of each triangle of the band, in the order of its bins: whether it may be in a round to come.
+    /// Per triangle of the band, in the order of its bins: true if a later round may find it.
     pub pending: Vec<bool>,
 }
 
 impl PeelBand {
-    /// Bytes a sample: two depths and ids, a colour, and materials.
+    /// Bytes per sample: two depths and ids, a colour, and materials.
     pub const SAMPLE_BYTES: usize = 8 + 8 + 16 + 4;
 
-    /// For bands like this one, of which so many rows are shown.
+    /// Buffers for bands like `base` that show `rows` rows.
     pub fn new(base: &SampleBand, rows: u32) -> Self {
         let like = || SampleBand::new(base.size_px, 0, rows, base.samples);
         let (found, previous) = (like(), like());
@@ -28,18 +28,18 @@ impl PeelBand {
         Self { found, previous, colors, materials, pending: Vec::new() }
     }
 
-    /// What it holds on to, bytes.
+    /// Allocated memory, bytes.
     pub fn bytes(&self) -> usize {
         self.colors.len() * Self::SAMPLE_BYTES + self.pending.capacity()
     }
 
-    /// How much of a sample of the picture's pixel (x, y) lies under them, 0 to 1.
+    /// Alpha of the layers so far at a sample of pixel (x, y), 0 to 1.
     #[inline(always)]
     pub fn alpha(&self, x: u32, y: u32, s: u32) -> f32 {
         self.colors[self.found.index(x as i32, y as i32, s)][3]
     }
 
-    /// Forgets everything, and moves to what is shown of `base`.
+    /// Clears the state and moves it to the shown rows of `base`.
     pub fn reset(&mut self, base: &SampleBand) {
         for samples in [&mut self.found, &mut self.previous] {
             (samples.first_row, samples.rows, samples.shown) =
@@ -52,14 +52,14 @@ impl PeelBand {
         self.pending.clear();
     }
 
-    /// Empties the round: what it finds must lie before `base`, if there is one.
+    /// Starts a round. Its layer must be in front of `base`, if there is one.
     pub fn begin_round(&mut self, base: Option<&SampleBand>) {
         match base {
             Some(base) => {
                 let stride = self.found.stride;
                 let depths = self.found.depth.chunks_exact_mut(stride);
                 for ((y, depths), ids) in (0..).zip(depths).zip(self.found.ids.chunks_exact_mut(stride)) {
-                    // Rows that the last band of a picture does not have are nobody's.
+                    // The last band of a picture may have fewer rows than there is room for.
                     if y < self.found.rows as i32 {
                         let from = base.index(0, self.found.first_row + y, 0);
                         depths.copy_from_slice(&base.depth[from..from + stride]);
@@ -71,7 +71,8 @@ impl PeelBand {
         }
     }
 
-    /// Takes the find of sample `at`, which is at `in_base` among the base's, as its last layer: its id, or None if the sample is done.
+    /// Moves the layer found at sample `at` (index `in_base` in the base) to `previous`. Returns
+    /// its id, or None if the sample is finished.
     #[inline(always)]
     pub fn take_layer(&mut self, base: Option<&SampleBand>, at: usize, in_base: usize) -> Option<u32> {
         let (depth, id) = (self.found.depth[at], self.found.ids[at]);
@@ -84,7 +85,7 @@ impl PeelBand {
         Some(id)
     }
 
-    /// Lays a colour under what some samples of the pixel at `first` have so far.
+    /// Composites a colour under the colours so far of some samples of the pixel at `first`.
     #[inline(always)]
     pub fn accumulate<const S: usize>(&mut self, first: usize, same: [bool; S], color: [f32; 4]) {
         for s in (0..S).filter(|&s| same[s]) {

@@ -1,10 +1,12 @@
-//! Where a point lies in its triangle. Twin of `shaders/surface/barycentric.wgsl`.
+//! Stage shade, per point: its position in its triangle. Twin of
+//! `shaders/surface/barycentric.wgsl`.
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
 use crate::plan::DrawPlan;
 
-/// A corner relative to the shaded point: homogeneous (x, y, w), and the factor that its barycentric takes besides.
+/// A corner relative to the shaded point: homogeneous (x, y, w), and the factor that its
+/// barycentric takes besides.
 #[derive(Clone, Copy)]
 pub struct Corner {
     x: f32,
@@ -13,8 +15,8 @@ pub struct Corner {
     weight: f32,
 }
 
-/// The corners of a triangle seen from point `at`. Snapped corners where there are some; where one is behind the eye,
-/// the homogeneous ones, which stay right there.
+/// The corners of a triangle seen from point `at`. Snapped corners where there are some; where one
+/// is behind the eye, the homogeneous ones, which stay right there.
 #[inline]
 pub fn corners(context: &RasterContext<'_>, id: u32, at: [f32; 2]) -> [Corner; 3] {
     let vertices = context.screen_triangle(id);
@@ -57,18 +59,20 @@ pub struct Barycentrics {
     dx: [f32; 3],
     /// Change downwards, in 1/256 px.
     dy: [f32; 3],
-    /// Whether the triangle faces the viewer.
+    /// True if the triangle faces the viewer.
     pub front: bool,
 }
 
 impl Barycentrics {
-    /// `b_i` is proportional to the area opposite the corner, so that the derivatives are exact too.
+    /// `b_i` is proportional to the area opposite the corner, so that the derivatives are exact
+    /// too.
     #[inline(always)]
     pub fn new(c: &[Corner; 3]) -> Self {
         Self::divided(&Areas::new(c), |total| 1.0 / total)
     }
 
-    /// As [`Barycentrics::new`], with the same bits on both back-ends: for whatever is decided by them.
+    /// As [`Barycentrics::new`], with the same bits on both back-ends: for whatever is decided by
+    /// them.
     #[inline(always)]
     pub fn exact(c: &[Corner; 3]) -> Self {
         Self::divided(&Areas::new(c), |total| {
@@ -103,7 +107,8 @@ impl Barycentrics {
     }
 }
 
-/// Distance in pixels from the point to the line on screen that carries the edge opposite corner `i`, for each.
+/// Distance in pixels from the point to the line on screen that carries the edge opposite corner
+/// `i`, for each.
 pub fn edge_distances_px(c: &[Corner; 3]) -> [f32; 3] {
     let areas = Areas::new(c);
     std::array::from_fn(|i| {
@@ -112,11 +117,13 @@ pub fn edge_distances_px(c: &[Corner; 3]) -> [f32; 3] {
     })
 }
 
-/// Centres of the pixel that a point lies in and of its neighbours across and down in the same block of 2 x 2 pixels.
+/// Centres of the pixel that a point lies in and of its neighbours across and down in the same
+/// block of 2 x 2 pixels.
 pub struct Quad {
     /// In 1/256 px from the picture's centre: own, across, down.
     pub points: [[f32; 2]; 3],
-    /// 1 where the neighbour is right of the pixel (below it), -1 where it is left of it (above it).
+    /// 1 where the neighbour is right of the pixel (below it), -1 where it is left of it (above
+    /// it).
     pub sign: [f32; 2],
 }
 

@@ -1,4 +1,5 @@
-//! Views that show a triangle's numbers as colours. Twin of `shaders/surface/debug.wgsl`.
+//! Stage shade, per point: debug views, which show a triangle's numbers as colours. Twin of
+//! `shaders/surface/debug.wgsl`.
 
 use super::barycentric::{Corner, edge_distances_px};
 use super::light::{light, lit};
@@ -8,7 +9,7 @@ use super::wire::{Place, edge_mask, is_drawn};
 use crate::backend::cpu::vector::dot;
 use crate::plan::{ShadedMaterial, SurfacePass, debug_views, flags};
 
-/// What the material's debug view shows at a point: opaque linear RGBA.
+/// The material's debug view at a point: opaque linear RGBA.
 pub fn color(
     surface: &SurfacePass<'_>,
     material: &ShadedMaterial,
@@ -64,7 +65,8 @@ fn checker(uv: [f32; 2]) -> [f32; 3] {
     [bright * (0.2 + 0.8 * u), bright * (0.2 + 0.8 * v), bright * 0.45]
 }
 
-/// The linear colour that is stored as these values: sRGB decoding (IEC 61966-2-1), the same bits on both back-ends.
+/// The linear colour that is stored as these values: sRGB decoding (IEC 61966-2-1), the same bits
+/// on both back-ends.
 fn shown(display: [f32; 3]) -> [f32; 4] {
     let [r, g, b] = display.map(|v| {
         let v = v.clamp(0.0, 1.0);

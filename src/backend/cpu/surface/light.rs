@@ -1,15 +1,17 @@
-//! Light without images. Twin of `shaders/surface/light.wgsl`.
+//! Stage shade, per point: light without images. Twin of `shaders/surface/light.wgsl`.
 //!
-//! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have no diffuse colour, so
-//! they mirror a studio instead: bright above, a little brighter at the horizon, dark below, and blurred by roughness.
+//! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have
+//! no diffuse colour, so they mirror a studio instead: bright above, a little brighter at the
+//! horizon, dark below, and blurred by roughness.
 //!
-//! Both back-ends compute the same bits: a whole flat face has one light, and that may lie on the threshold between two bytes.
+//! Both back-ends compute the same bits: a whole flat face has one light, and that may lie on the
+//! threshold between two bytes.
 
 use crate::backend::cpu::geometry::transform::quick_recip;
 use crate::backend::cpu::vector::dot;
 use crate::plan::{Lights, Projection};
 
-/// What light makes of a base colour: `base * gain + gloss`, in each channel.
+/// Effect of light on a base colour: `base * gain + gloss`, per channel.
 #[derive(Clone, Copy, Debug)]
 pub struct Light {
     /// Of what the base colour tints.
@@ -22,7 +24,7 @@ impl Light {
     /// The base colour as it is.
     pub const NONE: Self = Self { gain: 1.0, gloss: 0.0 };
 
-    /// What it makes of a premultiplied colour: no channel brighter than alpha lets through.
+    /// The effect on a premultiplied colour; no channel exceeds alpha.
     #[inline(always)]
     pub fn on_premultiplied(self, c: [f32; 4]) -> [f32; 4] {
         // Not `f32::clamp`, which would not bear an alpha below 0.

@@ -1,4 +1,4 @@
-//! The normal that a point of the surface is lit by. Twin of `shaders/surface/normal.wgsl`.
+//! Stage shade, per point: the normal for lighting. Twin of `shaders/surface/normal.wgsl`.
 
 use super::barycentric::Quad;
 use super::texture::{Uv, blend, sample};
@@ -25,8 +25,8 @@ pub fn normal(surface: &SurfacePass<'_>, material: &ShadedMaterial, place: &Plac
     }
 }
 
-/// The cross product of the position's fine derivatives in a block of 2 x 2 pixels, as a GPU's rasterizer has them: in f32,
-/// errors and all. (The same errors on both back-ends.)
+/// The cross product of the position's fine derivatives in a block of 2 x 2 pixels, as a GPU's
+/// rasterizer has them: in f32, errors and all. (The same errors on both back-ends.)
 fn derivative_normal(place: &Place<'_>) -> [f32; 3] {
     let Place { context, id, at, .. } = place;
     let quad = Quad::around(context.plan, *at);
@@ -40,7 +40,8 @@ fn derivative_normal(place: &Place<'_>) -> [f32; 3] {
     unit_or(cross(dy, dx), context.plan.projection.to_viewer)
 }
 
-/// The normal that the normal texture makes of `n`. Its axes are the triangle's own: where u grows, and where v shrinks.
+/// The normal that the normal texture makes of `n`. Its axes are the triangle's own: where u grows,
+/// and where v shrinks.
 pub fn normal_mapped(
     surface: &SurfacePass<'_>,
     material: &ShadedMaterial,

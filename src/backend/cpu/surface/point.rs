@@ -1,4 +1,5 @@
-//! The colour of one point of the surface: stage 3's formulas. Twin of `shaders/surface/point.wgsl`.
+//! Stage shade, per point: the colour of a point of the surface. Twin of
+//! `shaders/surface/point.wgsl`.
 
 use super::barycentric::{Barycentrics, corners};
 use super::debug;
@@ -12,25 +13,26 @@ use crate::backend::cpu::geometry::visibility::area;
 use crate::backend::cpu::vector::{facing, turned_to_viewer};
 use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, slots};
 
-/// What the common looks do without, textures aside.
+/// Flags that the common materials do not have, textures aside.
 const GENERAL: u32 = flags::DERIVATIVE_NORMALS
     | flags::VERTEX_COLORS
     | flags::DEBUG
     | flags::WIRE_LIT
     | (flags::WIRES & !flags::WIRE_FWIDTH);
 
-/// What changes from point to point of a triangle in a common material.
+/// Flags by which the colour of a common material varies over a triangle.
 const VARYING: u32 = flags::VERTEX_NORMALS | flags::WIRE_FWIDTH;
 
-/// What decides by barycentrics rather than blends, textures aside: there both back-ends need the same bits.
+/// Flags by which barycentrics decide rather than blend, textures aside: both back-ends need the
+/// same bits there.
 const DECIDING: u32 = flags::VERTEX_COLORS | flags::WIRE_THRESHOLD | flags::DEBUG;
 
-/// What of its material a point shows.
+/// Parts of a material that a point shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Show {
-    /// Whether its fill.
+    /// True if the fill is shown.
     pub fill: bool,
-    /// How much of its wires, 0 to 1.
+    /// Opacity of the wires, 0 to 1.
     pub wires: f32,
 }
 
@@ -54,13 +56,15 @@ impl<'a> PointShader<'a> {
         Self { context, flat: None, show: Show::ALL }
     }
 
-    /// The colour of triangle `id` where it is known to be the same all over, and is the one that was shaded last.
+    /// The colour of triangle `id` where it is known to be the same all over, and is the one that
+    /// was shaded last.
     #[inline(always)]
     pub fn flat(&self, id: u32) -> Option<[f32; 4]> {
         self.flat.filter(|(last, _)| *last == id).map(|(_, color)| color)
     }
 
-    /// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's centre.
+    /// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the
+    /// picture's centre.
     pub fn color(&mut self, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> [f32; 4] {
         let material = surface.material(id as usize);
         let is_textured =
@@ -161,7 +165,7 @@ impl<'a> PointShader<'a> {
         over(cover, material.wire_color, premultiplied(lit(base, light), emissive))
     }
 
-    /// What the material makes of alpha.
+    /// The base colour with the material's cutoff, blending and opacity applied to alpha.
     fn with_alpha(&self, material: &ShadedMaterial, mut base: [f32; 4]) -> [f32; 4] {
         // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.
         base[3] = if base[3] > 0.0 { base[3].min(1.0) } else { 0.0 };
@@ -176,7 +180,7 @@ impl<'a> PointShader<'a> {
         base
     }
 
-    /// What light makes of a colour at a point with this normal.
+    /// Light at a point with this normal.
     #[inline(always)]
     pub fn light(&self, surface: &SurfacePass<'_>, metallic: f32, roughness: f32, normal: [f32; 3]) -> Light {
         light(&surface.lights, &self.context.plan.projection, metallic, roughness, normal)

@@ -1,7 +1,8 @@
-//! Stage 3, a pixel: the colour of each triangle that is seen there. Twin of `shaders/surface/shade.wgsl`.
+//! Stage shade, per pixel: the colour of each visible triangle. Twin of
+//! `shaders/surface/shade.wgsl`.
 //!
-//! Samples of a pixel that see the same triangle are shaded once, at their mean position ([`point`](super::point)), and
-//! weigh their share.
+//! Samples of a pixel that see the same triangle are shaded once, at their mean position
+//! ([`point`](super::point)), and weigh their share.
 
 use super::point::{PointShader, Show};
 use crate::backend::cpu::RasterContext;
@@ -9,7 +10,8 @@ use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
 use crate::backend::cpu::geometry::transform::recip;
 use crate::plan::sample_offsets;
 
-/// Shades every pixel of the band into `colors` (premultiplied linear RGBA, row by row, nothing behind it).
+/// Shades every pixel of the band into `colors` (premultiplied linear RGBA, row by row, nothing
+/// behind it).
 #[inline(always)]
 pub fn shade(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
     for_samples!(band.samples, shade_sampled(context, band, colors));
@@ -27,9 +29,9 @@ fn shade_sampled<const S: usize>(context: &RasterContext<'_>, band: &SampleBand,
     }
 }
 
-/// Finds out who is seen in a pixel, and where.
+/// Shades pixels of a band.
 pub struct Shader<'a> {
-    /// What it reads.
+    /// Input of the stage.
     context: &'a RasterContext<'a>,
     /// Finds out what they material like.
     points: PointShader<'a>,
@@ -72,8 +74,8 @@ impl<'a> Shader<'a> {
         sum
     }
 
-    /// Shades each triangle among a pixel's samples once, at the mean position of its samples, and calls `each` with which
-    /// samples these are, and its colour.
+    /// Shades each triangle among a pixel's samples once, at the mean position of its samples, and
+    /// calls `each` with which samples these are, and its colour.
     #[inline(always)]
     pub fn groups<const S: usize>(
         &mut self,
@@ -101,7 +103,8 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The colour of triangle `id` at the mean of `count` samples whose offsets in 1/256 px add up to `offset_sum`.
+    /// The colour of triangle `id` at the mean of `count` samples whose offsets in 1/256 px add up
+    /// to `offset_sum`.
     #[inline(always)]
     fn group(&mut self, id: u32, x: u32, y: u32, offset_sum: [i32; 2], count: i32) -> [f32; 4] {
         if id == NOTHING {

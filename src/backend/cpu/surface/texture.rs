@@ -1,6 +1,7 @@
-//! Texture lookups. Twin of `shaders/surface/texture.wgsl`.
+//! Stage shade, per point: texture lookups. Twin of `shaders/surface/texture.wgsl`.
 //!
-//! The same bits on both back-ends, because texels decide what a mask leaves and where nearest texels change.
+//! The same bits on both back-ends, because texels decide what a mask leaves and where nearest
+//! texels change.
 
 use super::barycentric::Barycentrics;
 use crate::plan::{CornerValues, Texture, TextureUse, Textures, samplers};
@@ -28,7 +29,8 @@ pub fn blend<const N: usize>([p, q, r]: [[f32; N]; 3], w: [f32; 3]) -> [f32; N] 
     std::array::from_fn(|k| (w[0] * p[k] + w[1] * q[k]) + w[2] * r[k])
 }
 
-/// Linear RGBA of a texture, trilinear; white where there is none ([`TEXTURE_NONE`](crate::plan::TEXTURE_NONE)).
+/// Linear RGBA of a texture, trilinear; white where there is none
+/// ([`TEXTURE_NONE`](crate::plan::TEXTURE_NONE)).
 pub fn sample(textures: &Textures, used: &TextureUse, uv: &Uv) -> [f32; 4] {
     let Some(image) = textures.images.get(used.texture as usize) else {
         return [1.0; 4];
@@ -91,7 +93,7 @@ fn nearest(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], sampl
     texel(textures, first + (y * size[0] + x) as u32)
 }
 
-/// Where a level starts and how large it is.
+/// First texel and size of a level.
 fn level_of(image: &Texture, level: u32) -> (u32, [i32; 2]) {
     let size = |level: u32| [image.width, image.height].map(|side| (side >> level).max(1));
     let level = level.min(image.levels.max(1) - 1);

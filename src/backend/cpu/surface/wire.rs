@@ -1,10 +1,10 @@
-//! Wires from barycentric coordinates. Twin of `shaders/surface/wire.wgsl`.
+//! Stage shade, per point: wires from barycentric coordinates. Twin of `shaders/surface/wire.wgsl`.
 
 use super::barycentric::{Barycentrics, Quad};
 use crate::backend::cpu::RasterContext;
 use crate::plan::{ShadedMaterial, SurfacePass, flags};
 
-/// Where a point lies in its triangle, and which triangle that is.
+/// A shaded point: its triangle and its position.
 pub struct Place<'a> {
     /// Everything that is drawn.
     pub context: &'a RasterContext<'a>,
@@ -26,7 +26,8 @@ pub fn wire_cover(surface: &SurfacePass<'_>, material: &ShadedMaterial, place: &
     let (thickness, end) = (material.wire_thickness, material.wire_thickness + material.wire_smoothing);
     let nearest = min_drawn(mask, b.value);
     if material.flags & flags::WIRE_FWIDTH_MIN != 0 {
-        // As a GPU's derivatives of the minimum would be: across a corner's bisector they mix two coordinates.
+        // As a GPU's derivatives of the minimum would be: across a corner's bisector they mix two
+        // coordinates.
         let quad = Quad::around(place.context.plan, place.at);
         let [own, across, down] = quad.barycentrics(place.context, place.id).map(|value| min_drawn(mask, value));
         let d = (across - own).abs() + (down - own).abs();
@@ -57,7 +58,8 @@ pub fn edge_mask(surface: &SurfacePass<'_>, id: u32) -> u8 {
     surface.edge_masks.get(id as usize).copied().unwrap_or(0b111)
 }
 
-/// Whether the edge opposite corner `i` is drawn, where coordinate i vanishes: it runs from corner i + 1 to i + 2.
+/// True if the edge opposite corner `i` is drawn, where coordinate i vanishes. It runs from corner
+/// i + 1 to i + 2.
 #[inline(always)]
 pub fn is_drawn(mask: u8, i: usize) -> bool {
     mask >> ((i + 1) % 3) & 1 == 1

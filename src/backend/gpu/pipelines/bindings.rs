@@ -1,10 +1,10 @@
-//! Which buffers each kernel binds.
+//! Buffers that each kernel binds.
 
 use crate::backend::gpu::pipelines::Access;
 use crate::backend::gpu::pipelines::Access::{Read, ReadWrite};
 use crate::backend::gpu::pipelines::{Kernel, SampleTarget, Slot};
 
-/// A buffer of group 1, and what the kernel does with it.
+/// A buffer of group 1 and the kernel's access to it.
 pub type Binding = (Slot, Access);
 
 impl Kernel {
@@ -26,8 +26,8 @@ impl Kernel {
         }
     }
 
-    /// The buffer that is bound at a slot's number: a kernel that looks for a layer writes it where others write samples, and
-    /// reads these where others find layers.
+    /// The buffer that is bound at a slot's number. Kernels that find a peeled layer write it where
+    /// others write the visibility buffer, and read that where others read the layer.
     pub fn bound_at(self, slot: Slot) -> Slot {
         match (self, slot) {
             (

@@ -1,4 +1,4 @@
-//! What each kernel is made of: its source, and what of a plan it is specialised to.
+//! Source of each kernel, and the bits of the pipeline key that it is specialised by.
 
 use crate::backend::gpu::pipelines::key;
 use crate::backend::gpu::pipelines::{Kernel, SampleTarget, SampleWrite};
@@ -21,7 +21,7 @@ const EMIT_LAYER: &str = include_str!("../../../../shaders/peeling/emit_layer.wg
 const OVER: &str = include_str!("../../../../shaders/over.wgsl");
 const GROUP: &str = include_str!("../../../../shaders/surface/group.wgsl");
 
-/// What shade, layers and line_light have in common: from where a point lies to its colour.
+/// Shared by shade, composite and line_light: from a point's position to its colour.
 const SHADE: &[&str] = &[
     include_str!("../../../../shaders/surface/barycentric.wgsl"),
     include_str!("../../../../shaders/surface/texture.wgsl"),
@@ -100,7 +100,7 @@ impl Kernel {
         }
     }
 
-    /// The flags that the kernel reads; there is a pipeline for every combination that a plan asks for.
+    /// Bits of the key that the kernel reads: there is a pipeline for every combination in use.
     pub fn key_bits(self) -> u32 {
         const NORMALS: u32 = key::FACE_NORMALS | key::VERTEX_NORMALS | key::DERIVATIVE_NORMALS;
         const WIRES: u32 = key::WIRES | key::WIRE_MINIMUM | key::WIRE_LIT | key::EDGE_MASKS;

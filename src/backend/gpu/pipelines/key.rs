@@ -1,4 +1,5 @@
-//! What a plan has: the shaders' `PIPELINE_KEY`, a constant of each pipeline, so that a kernel contains only what its plan needs.
+//! What a plan has: the shaders' `PIPELINE_KEY`, a constant of each pipeline, so that a kernel
+//! contains only what its plan needs.
 
 use crate::plan::{DrawPlan, SurfacePass, flags};
 
@@ -14,7 +15,7 @@ pub const CLIPPED: u32 = 2048;
 pub const EIGHT_SAMPLES: u32 = 512;
 pub const SIXTEEN_SAMPLES: u32 = 1024;
 pub const FOUR_SAMPLES: u32 = 4096;
-/// How many samples a pixel has.
+/// Number of samples per pixel.
 pub const SAMPLES: u32 = FOUR_SAMPLES | EIGHT_SAMPLES | SIXTEEN_SAMPLES;
 pub const LIT_LINES: u32 = 8192;
 pub const CONTOURS: u32 = 16384;
@@ -33,7 +34,7 @@ pub const WIRE_LIT: u32 = 0x1000_0000;
 pub const DEBUG: u32 = 0x2000_0000;
 pub const VARYING: u32 = 0x4000_0000;
 
-/// The flags of a plan.
+/// The key of a plan.
 pub fn pipeline_key(plan: &DrawPlan<'_>) -> u32 {
     let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
     let count = plan.triangles.len();
@@ -68,7 +69,7 @@ fn samples(count: u32) -> u32 {
     }
 }
 
-/// What changes over a triangle.
+/// Bits for colours that vary over a triangle.
 fn varying(surface: &SurfacePass<'_>, all: u32) -> u32 {
     let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
     let is_textured = (0..4).any(|slot| surface.samples(slot)) && surface.uvs.is_some();

@@ -13,12 +13,12 @@ pub enum Kernel {
     Transform,
     /// Triangles to samples: small ones, and a list of the large ones.
     Visibility {
-        /// How samples are written.
+        /// Phase of writing samples.
         write: SampleWrite,
-        /// Where to.
+        /// Buffer that is written.
         target: SampleTarget,
     },
-    /// What is left of triangles behind the eye, to the same list.
+    /// Clipped triangles to the same list.
     Clip,
     /// Large triangles to samples.
     VisibilityTile {
@@ -27,13 +27,13 @@ pub enum Kernel {
         /// As above.
         target: SampleTarget,
     },
-    /// A layer's samples to colours, under those of the layers before it.
+    /// Samples of a peeled layer to colours, under the layers in front of it.
     Composite,
     /// Samples to colours.
     Shade,
     /// Edges to strokes.
     Edge,
-    /// Unites the strokes of a line pass in each pixel, and lays them over the colours.
+    /// Unites the strokes of a line pass in each pixel and composites them over the colours.
     Coverage,
     /// Samples to the light on a line pass.
     LineLight,
@@ -52,12 +52,12 @@ pub enum SampleWrite {
     Id,
 }
 
-/// What a visibility kernel's samples are.
+/// Buffer that a visibility kernel writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SampleTarget {
     /// The visibility buffer.
     Visibility,
-    /// A layer.
+    /// A peeled layer.
     Layer,
 }
 
@@ -97,7 +97,7 @@ pub enum Slot {
 /// Number of [`Slot`]s.
 pub const SLOTS: usize = 30;
 
-/// Whether a kernel writes to a buffer.
+/// A kernel's access to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     Read,
@@ -117,7 +117,7 @@ pub struct PipelineCache {
 }
 
 impl PipelineCache {
-    /// The pipeline of a stage for a plan of this look.
+    /// The pipeline of a kernel for a plan with this key.
     pub fn get(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Arc<Pipeline> {
         let key = key & kernel.key_bits();
         // Held while compiling: two workers that begin together want the same pipelines.
@@ -125,13 +125,13 @@ impl PipelineCache {
         made.entry((kernel, key)).or_insert_with(|| Arc::new(kernel.compile(device, key))).clone()
     }
 
-    /// Forgets all pipelines; jobs that use one keep it until they are done.
+    /// Drops all pipelines; jobs that use one keep it until they end.
     pub fn clear(&self) {
         self.made.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
 }
 
-/// The layout of group 0: the plan's numbers, and at a dynamic offset the dispatch's.
+/// The layout of group 0: the plan's uniforms, and the dispatch's at a dynamic offset.
 pub fn uniforms_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let entry = |binding, has_dynamic_offset| {
         layout_entry(

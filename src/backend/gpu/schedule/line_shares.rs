@@ -1,5 +1,5 @@
-//! How lines are dealt out to threads: edges to workgroups, and of each window of an edge so many slices; and after how much work a
-//! dispatch ends.
+//! Distribution of lines over threads: edges per workgroup, slices per window of an edge, and work
+//! per dispatch.
 
 use super::sizes::{DeviceTraits, has_visibility};
 use super::step::Step;
@@ -9,13 +9,14 @@ use crate::backend::gpu::pipelines::Kernel;
 use crate::backend::gpu::schedule::{Schedule, WORKGROUP};
 use crate::plan::{DrawPlan, LinePass};
 
-/// Edges a dispatch.
+/// Edges per dispatch.
 const EDGE_CHUNK: u32 = 1 << 20;
 
 /// The same where each may cross a large picture.
 const EDGE_CHUNK_LONG: u32 = 1 << 17;
 
-/// Looks at samples that a dispatch may take at most, if it is not known how long its edges are: a second or so of work.
+/// Looks at samples that a dispatch may take at most, if it is not known how long its edges are: a
+/// second or so of work.
 const BLIND_LOOKS_MAX: u64 = 1 << 34;
 
 /// Edges that keep all of a GPU busy.
@@ -28,8 +29,8 @@ const BUSY_GROUPS_SOFTWARE: u32 = 16;
 /// Slices of a window, at most.
 const SLICES_MAX: f32 = 64.0;
 
-/// Loop iterations that a thread may run in a dispatch where they are limited: llvmpipe (Mesa 22) leaves all loops of a thread
-/// after 65,535 iterations, silently.
+/// Loop iterations that a thread may run in a dispatch where they are limited: llvmpipe (Mesa 22)
+/// leaves all loops of a thread after 65,535 iterations, silently.
 const ITERATIONS_MAX: u32 = 60_000;
 
 /// The same on a real device, where a dispatch should end in time for the deadline.
@@ -38,7 +39,8 @@ const ITERATIONS_MAX_HARDWARE: u32 = 1 << 24;
 /// Lines from this reach on may take long on a real device too, pixels.
 const WIDE_PX: f32 = 8.0;
 
-/// Threads that run in step on a processor: while one of them is in a loop, the others wait in it, and it counts for all.
+/// Threads that run in step on a processor: while one of them is in a loop, the others wait in it,
+/// and it counts for all.
 const LANES: u32 = 16;
 
 /// Units of work without end.
@@ -50,16 +52,18 @@ pub const PROGRESS_HEAD_BYTES: u64 = 4;
 /// Bytes of what a paused thread remembers.
 pub const PAUSED_BYTES: u64 = 16;
 
-/// How the kernel that draws lines is run over a pass's edges.
+/// Parameters of the edge kernel for a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineShares {
-    /// Threads that share a window of an edge, by rows, where the line is so wide that it has many pixels.
+    /// Threads that share a window of an edge, by rows, where the line is so wide that it has many
+    /// pixels.
     pub slices: u32,
     /// Edges that the threads of a workgroup share.
     pub edges_per_group: u32,
-    /// Edges a dispatch, at most.
+    /// Edges per dispatch, at most.
     pub edges: u32,
-    /// Looks along an edge, each with what it has found to draw, and shares without a look, after which a thread pauses until the next round.
+    /// Looks along an edge, each with what it has found to draw, and shares without a look, after
+    /// which a thread pauses until the next round.
     pub units: u32,
 }
 
@@ -67,7 +71,8 @@ impl LineShares {
     /// Of a pass of the plan.
     pub fn new(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> Self {
         let side = lines.window_px() + 2.0 * lines.reach_px();
-        // Few edges leave most of a GPU idle, so threads may look along them twice; a processor has nothing to spare.
+        // Few edges leave most of a GPU idle, so threads may look along them twice; a processor has
+        // nothing to spare.
         let is_idle = !device.loops_are_limited && lines.edges.len() < BUSY_EDGES;
         let pixels = if is_idle { 64.0 } else { 400.0 };
         let slices = (side * 2.0 * lines.reach_px() / pixels).ceil().clamp(1.0, SLICES_MAX) as u32;
@@ -97,7 +102,8 @@ fn edges_a_dispatch(plan: &DrawPlan<'_>, lines: &LinePass) -> u32 {
     lines.edges.len().min(most as usize) as u32
 }
 
-/// Loop iterations that one unit of work takes at most: a window is begun, looked along, and a part of the edge drawn.
+/// Loop iterations that one unit of work takes at most: a window is begun, looked along, and a part
+/// of the edge drawn.
 fn unit_iterations(samples: u32, lines: &LinePass, slices: u32) -> u32 {
     let length = lines.window_px() + 2.0 * lines.reach_px() + 4.0;
     // Half a pixel a step; its samples when it is begun, then those of three pixels side by side.

@@ -1,8 +1,8 @@
-//! What is dispatched for a plan, in order: pure arithmetic, no device.
+//! The dispatches for a plan, in the order of the stages: pure arithmetic, no device.
 //!
-//! The picture is cut into horizontal bands whose sample buffer stays small, triangles into chunks whose work list does.
-//! After each chunk of a large mesh, and each band, the commands go to the device, so that no single submission takes
-//! long and the deadline is looked at in between.
+//! The picture is cut into horizontal bands whose sample buffer stays small, triangles into chunks
+//! whose work list does. After each chunk of a large mesh, and each band, the commands go to the
+//! device, so that no single submission takes long and the deadline is looked at in between.
 
 pub(crate) mod line_shares;
 pub(crate) mod sizes;
@@ -19,19 +19,20 @@ use crate::backend::gpu::pass_mask::Pass;
 use crate::backend::gpu::pipelines::{Kernel, SampleTarget, SampleWrite};
 use crate::plan::{DrawPlan, pass_mask};
 
-/// Triangles a dispatch, where none needs clipping; each may leave one item in the work list.
+/// Triangles per dispatch, where none needs clipping; each may leave one item in the work list.
 const CHUNK: u32 = 1 << 20;
 
-/// Triangles a dispatch where all may need clipping, into at most six pieces each.
+/// Triangles per dispatch where all may need clipping, into at most six pieces each.
 const CHUNK_CLIP: u32 = 1 << 17;
 pub const PIECES_MAX: u32 = 6;
 
 /// Different numbers that dispatches may have, each 256 bytes on the GPU: 128 MiB.
 ///
-/// The most that a job within all other limits takes: of 4096 rows at 4 samples, layers make 32 bands of 128 rows. In each, 10
-/// million triangles that may need clipping are 77 chunks, for the surface and 16 layers, filled and hull, in two phases:
-/// 17 * 77 * 2 * 2 = 5236. 64 passes of 30 million edges are 29 chunks each and three more for the ink, 2048. That makes 0.23
-/// million. Rows beyond a band that wide lines look at are no bands of their own: they do not add to it.
+/// The most that a job within all other limits takes: of 4096 rows at 4 samples, layers make 32
+/// bands of 128 rows. In each, 10 million triangles that may need clipping are 77 chunks, for the
+/// surface and 16 layers, filled and hull, in two phases: 17 * 77 * 2 * 2 = 5236. 64 passes of 30
+/// million edges are 29 chunks each and three more for the ink, 2048. That makes 0.23 million. Rows
+/// beyond a band that wide lines look at are no bands of their own: they do not add to it.
 const BATCHES_MAX: usize = 1 << 19;
 
 /// Threads of a workgroup, in every kernel.
@@ -50,14 +51,14 @@ pub struct Schedule {
     pub layers: u32,
     /// How the tile kernel is run.
     pub tiles: Tiles,
-    /// What threads that draw lines remember from round to round.
+    /// Bytes for the state of paused threads of the edge kernel.
     pub progress_bytes: u64,
-    /// What is wanted.
+    /// The result.
     pub goal: Goal,
 }
 
 impl Schedule {
-    /// The commands for what is wanted of `plan`.
+    /// The commands that compute `goal` for `plan`.
     pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Result<Self, DrawError> {
         let banding = Banding::new(plan, device, goal)?;
         let tiles = Tiles::new(plan, device, banding);
@@ -111,7 +112,8 @@ impl Schedule {
         Ok(())
     }
 
-    /// One round a layer; a round does nothing where the one before has left nothing to find.
+    /// One round per peeled layer; a round does nothing if the previous one has left nothing to
+    /// find.
     fn layers(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, band: Batch, goal: Goal) -> Result<(), DrawError> {
         let Some(pass) = plan.peeling() else { return Ok(()) };
         let rounds = match goal {
@@ -121,7 +123,8 @@ impl Schedule {
         };
         self.layers = rounds;
         let count = plan.width_px * band.row_end.abs_diff(band.row_first);
-        // A layer that is wanted for itself is not shaded: then no sample is done before its last triangle.
+        // A layer that is wanted for itself is not shaded: then no sample is done before its last
+        // triangle.
         let pass_bit = if goal == Goal::Picture { u32::from(pass_mask::LAYER) } else { 0 };
         let mut ends = Vec::new();
         for layer in 0..rounds {
@@ -187,7 +190,7 @@ impl Schedule {
         Ok(())
     }
 
-    /// What follows visibility, for a band.
+    /// The stages after visibility, for a band.
     fn picture_stages(
         &mut self,
         plan: &DrawPlan<'_>,

@@ -14,7 +14,7 @@ pub const DEVICE: DeviceTraits = DeviceTraits {
     loops_are_limited: true,
 };
 
-/// What a plan has.
+/// Properties of a test plan.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     pub size_px: [u32; 2],

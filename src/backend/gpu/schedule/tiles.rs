@@ -1,9 +1,10 @@
-//! How often the kernel that draws large triangles is run.
+//! Number of runs of the kernel that draws large triangles.
 
 use super::sizes::{Banding, DeviceTraits};
 use crate::plan::DrawPlan;
 
-/// Sample tests that may be handed to the device without looking at how many it really is: a second or so of work.
+/// Sample tests that may be handed to the device without looking at how many it really is: a second
+/// or so of work.
 const BLIND_TESTS_MAX: u64 = 1 << 38;
 
 /// Pixels along a side of a tile, which a workgroup draws together.
@@ -12,20 +13,21 @@ pub const TILE_PX: u32 = 64;
 /// Triangles of this many pixels, wide or high, are shared out over all workgroups.
 pub const HUGE_PX: u32 = 128;
 
-/// Tiles of a large triangle, at most: three wide and high, because it need not begin where a tile does.
+/// Tiles of a large triangle, at most: three wide and high, because it need not begin where a tile
+/// does.
 const LARGE_TILES_MAX: u64 = (HUGE_PX as u64 / TILE_PX as u64 + 1).pow(2);
 
 /// Loop iterations a thread of the tile kernel may run in a dispatch of known extent.
 ///
-/// llvmpipe (Mesa 22) leaves all loops of a thread after 65,535 iterations, silently; and on real devices a dispatch
-/// should end in time for the deadline.
+/// llvmpipe (Mesa 22) leaves all loops of a thread after 65,535 iterations, silently; and on real
+/// devices a dispatch should end in time for the deadline.
 const ITERATIONS_MAX: u64 = 40_000;
 
-/// How the tile kernel is run: at once over whatever is in the work list, or, where that might take too long, in rounds
-/// whose number follows from the list's length, which is read back first.
+/// How the tile kernel is run: at once over whatever is in the work list, or, where that might take
+/// too long, in rounds whose number follows from the list's length, which is read back first.
 #[derive(Clone, Copy, Debug)]
 pub struct Tiles {
-    /// Whether to run in rounds.
+    /// True if the kernel runs in rounds.
     pub in_rounds: bool,
     /// Workgroups a dispatch.
     pub workgroups: u32,
