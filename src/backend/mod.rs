@@ -1,8 +1,12 @@
-//! Two ways to fill a [`DrawPlan`]: [`cpu`] and [`gpu`], with the same stages under the same names:
-//! transform, visibility, shade, lines, resolve.
+//! Two ways to fill a [`DrawPlan`]: [`cpu`] and [`gpu`], with the same stages in the same order:
+//! transform -> visibility -> shade -> lines -> resolve.
 //!
-//! Architecture invariant: nothing here knows a mesh or a scene, and the two back-ends do not know
-//! each other.
+//! Each stage is written twice, in twins of the same name: `shaders/ROOM/NAME.wgsl` and
+//! `src/backend/cpu/ROOM/NAME.rs`. The module's tests hold the constants, structs and bindings that
+//! the two share. [`select`] chooses a back-end per job, [`host`] owns the process's GPU, and [`probe`]
+//! checks a GPU before it is used.
+//!
+//! **Invariant:** nothing here imports a mesh or a scene, and the two back-ends do not import each other.
 
 pub mod cpu;
 mod device;

@@ -1,4 +1,4 @@
-//! When to material at the deadline.
+//! Every stage with a loop over triangles: polling of the deadline.
 
 use crate::limits::Deadline;
 

@@ -1,8 +1,11 @@
 //! The CPU rasterizer: the reference for bytes.
 //!
-//! RasterContext, each a file: [`transform`] (with [`clip`] where needed), [`visibility`],
-//! [`layers`] (with [`peel`]), [`shade`], [`lines`], [`resolve`]. The picture is cut into bands of
-//! rows that fit a core's cache; threads take bands, and nothing a band draws depends on another.
+//! Stages in order: transform and visibility in [`geometry`], shade in [`surface`] and, for transparent
+//! surfaces, in [`peeling`], [`lines`], [`resolve`]. [`bands`] runs them: the picture is cut into bands
+//! of rows that fit a core's cache, threads take bands, and no band depends on another. The hot loops
+//! are compiled once per instruction set ([`isa`]).
+//!
+//! **Invariant:** threads and instruction sets do not change a byte.
 
 // Loops over lanes and corners walk several arrays at once; an index says that best.
 #![allow(clippy::needless_range_loop)]

@@ -1,4 +1,4 @@
-//! Vectors of three.
+//! Vectors of three, for the stages shade and lines.
 
 /// Scalar product.
 pub fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {

@@ -1,12 +1,12 @@
 //! The wgpu back-end: the CPU's stages as compute shaders, headless.
 //!
-//! In reading order: [`device`] opens a GPU; [`schedule`] decides what is dispatched for a plan;
-//! [`recorder`] turns that into commands; [`kernels`] and [`bindings`] say what each stage is made
-//! of, [`stages`] are their pipelines, [`params`] their numbers, [`buffers`] their memory and
-//! [`sizes`] how much of it.
+//! In reading order: [`device`] opens a GPU; [`schedule`] computes the dispatches for a plan;
+//! [`recorder`] turns them into commands; [`pipelines`] holds each kernel's source, bindings and
+//! specialisation; [`params`] the uniforms, [`buffers`] the memory, [`pass_mask`] the passes over
+//! triangles.
 //!
-//! Architecture invariant: a job's use of the device stays on the thread that draws it, because
-//! wgpu's error scopes do.
+//! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
+//! thread.
 
 mod buffers;
 mod device;

@@ -1,4 +1,4 @@
-//! Passes over triangles, selected by their pass masks.
+//! Stage visibility: the passes over triangles, selected by their pass masks.
 
 use std::ops::Range;
 

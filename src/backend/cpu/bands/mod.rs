@@ -1,4 +1,7 @@
-//! Bands of rows: how one is drawn from start to finish.
+//! All stages of a band of rows, from visibility to resolve.
+//!
+//! A band fits a core's cache and depends on no other band. [`bins`] sorts triangles and edges into
+//! bands, [`scratch`] holds a band's buffers.
 
 pub(crate) mod bins;
 pub(crate) mod scratch;

@@ -1,4 +1,4 @@
-//! Memory of bands: how large they are, and their buffers.
+//! Sizes of bands, and their buffers.
 
 use std::sync::{Mutex, PoisonError};
 

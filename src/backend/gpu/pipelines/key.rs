@@ -1,37 +1,67 @@
-//! What a plan has: the shaders' `PIPELINE_KEY`, a constant of each pipeline, so that a kernel
-//! contains only what its plan needs.
+//! The pipeline key: the features of a plan as bits.
+//!
+//! It is the constant `PIPELINE_KEY` of each pipeline, so that a kernel contains only the code that its
+//! plan needs.
 
 use crate::plan::{DrawPlan, SurfacePass, flags};
 
+/// A shaded surface.
 pub const SURFACE: u32 = 1;
+/// An outline mesh.
 pub const HULL: u32 = 2;
+/// A material lit by face normals.
 pub const FACE_NORMALS: u32 = 8;
+/// A material lit by vertex normals.
 pub const VERTEX_NORMALS: u32 = 16;
+/// A material with barycentric wires.
 pub const WIRES: u32 = 32;
+/// A material index per triangle.
 pub const TRIANGLE_MATERIALS: u32 = 64;
+/// An edge mask per triangle.
 pub const EDGE_MASKS: u32 = 128;
+/// Line passes.
 pub const LINES: u32 = 256;
+/// Triangles may need clipping.
 pub const CLIPPED: u32 = 2048;
+/// 8 samples per pixel.
 pub const EIGHT_SAMPLES: u32 = 512;
+/// 16 samples per pixel.
 pub const SIXTEEN_SAMPLES: u32 = 1024;
+/// 4 samples per pixel; without any of the three it is 1.
 pub const FOUR_SAMPLES: u32 = 4096;
 /// Number of samples per pixel.
 pub const SAMPLES: u32 = FOUR_SAMPLES | EIGHT_SAMPLES | SIXTEEN_SAMPLES;
+/// A line pass is lit.
 pub const LIT_LINES: u32 = 8192;
+/// A line pass is a contour.
 pub const CONTOURS: u32 = 16384;
+/// A pass mask per triangle.
 pub const PASS_MASKS: u32 = 0x10_0000;
+/// A material index per triangle of the outline mesh.
 pub const HULL_MATERIALS: u32 = 0x40_0000;
+/// Depth peeling.
 pub const PEELING: u32 = 0x80_0000;
+/// Peeled layers behind the surface show too.
 pub const BEHIND_SURFACE: u32 = 0x100_0000;
+/// Peeled layers show wires alone.
 pub const WIRES_ONLY: u32 = 0x200_0000;
+/// The outline mesh is peeled too.
 pub const PEELED_HULL: u32 = 0x400_0000;
+/// A material lit by derivatives.
 pub const DERIVATIVE_NORMALS: u32 = 1 << 16;
+/// Vertex colours.
 pub const VERTEX_COLORS: u32 = 1 << 17;
+/// Texture coordinates.
 pub const UVS: u32 = 1 << 18;
+/// Textures.
 pub const TEXTURES: u32 = 1 << 19;
+/// Wires by the smallest coordinate.
 pub const WIRE_MINIMUM: u32 = 0x800_0000;
+/// Wires under the light.
 pub const WIRE_LIT: u32 = 0x1000_0000;
+/// A debug view.
 pub const DEBUG: u32 = 0x2000_0000;
+/// Colours vary over a triangle.
 pub const VARYING: u32 = 0x4000_0000;
 
 /// The key of a plan.
