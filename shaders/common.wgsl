@@ -57,7 +57,7 @@ struct Batch {
     huge_end: u32,
     // Edges that a workgroup draws.
     edges_per_group: u32,
-    // Of the line pass: pixels, pixels, bits, and, below, which it is.
+    // The line pass: width and ramp in pixels, and bits.
     line_width: f32,
     line_smoothing: f32,
     line_flags: u32,
@@ -157,7 +157,7 @@ fn has(flag: u32) -> bool {
     return (PIPELINE_KEY & flag) != 0u;
 }
 
-// Samples a pixel.
+// Samples per pixel.
 fn sample_count() -> i32 {
     return select(select(select(1, 4, has(FOUR_SAMPLES)), 8, has(EIGHT_SAMPLES)), 16, has(SIXTEEN_SAMPLES));
 }
@@ -267,12 +267,12 @@ fn sub_wide(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
     return vec2(a.x - b.x, a.y - b.y - select(0u, 1u, a.x < b.x));
 }
 
-// Of a value >= 0.
+// The f32 of a value >= 0.
 fn wide_to_f32(v: vec2<u32>) -> f32 {
     return rn(f32(v.y) * 4294967296.0) + f32(v.x);
 }
 
-// Places of samples as sample_offsets() in src/plan/mod.rs has them, in 1/16 px: a nibble per
+// Positions of samples as sample_offsets() in src/plan/mod.rs has them, in 1/16 px: a nibble per
 // sample, the first lowest.
 const ONE_SAMPLE_XY: u32 = 0x8u;
 const FOUR_SAMPLES_X: u32 = 0xA2E6u;
@@ -283,7 +283,7 @@ const SIXTEEN_SAMPLES_X_FIRST: u32 = 0xBDA3C579u;
 const SIXTEEN_SAMPLES_X_LAST: u32 = 0x1EF02486u;
 const SIXTEEN_SAMPLES_Y_FIRST: u32 = 0x3BD67A59u;
 const SIXTEEN_SAMPLES_Y_LAST: u32 = 0x0F48C21Eu;
-// What all of 16 samples' places leave modulo 1/16 px, in 1/256 px.
+// Common remainder of the 16 samples' positions modulo 1/16 px, in 1/256 px.
 const SIXTEEN_SAMPLES_SHIFT: i32 = 8;
 
 // Position of sample s, in 1/16 px from sample_corner().

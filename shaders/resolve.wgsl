@@ -1,7 +1,7 @@
 // Stage resolve, per pixel: surface over background, where no line has composited both, to sRGB
 // bytes. Twin of src/backend/cpu/resolve.rs.
 
-// Of the surface over nothing, or of everything, which over.wgsl tells apart.
+// Per pixel, the surface over nothing or the finished colour; over.wgsl tells them apart.
 @group(1) @binding(9) var<storage, read> colors: array<vec4<f32>>;
 // thresholds[k] is the smallest linear value that is stored as k + 1 or more.
 @group(1) @binding(13) var<storage, read> thresholds: array<f32>;

@@ -22,7 +22,7 @@ fn is_zero(v: vec2<u32>) -> bool {
     return (v.x | v.y) == 0u;
 }
 
-// Of a triangle whose area is not 0.
+// The setup of a triangle whose area is not 0.
 fn setup_of(a: Vertex, b_in: Vertex, c_in: Vertex, area: vec2<u32>) -> Setup {
     var b = b_in;
     var c = c_in;

@@ -5,12 +5,12 @@
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
 // Peeled layers per sample.
 @group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
-// Of the surface, one per pixel, over nothing; where a line is, over the background and under the
-// lines so far, which over.wgsl tells apart. Then the light on the pass's lines, one per pixel.
+// Per pixel, the surface over nothing or, where a line is, the finished colour so far; over.wgsl
+// tells them apart. Then, per pixel, the light on the pass's lines.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
 // Strokes per pixel, as stroke_words.wgsl lays them out.
 @group(1) @binding(12) var<storage, read_write> strokes: array<u32>;
-// Of each pass.
+// Per pass.
 @group(1) @binding(17) var<storage, read> line_colors: array<vec4<f32>>;
 // Per sample, the points assigned to it, as stroke.wgsl numbers them.
 @group(1) @binding(29) var<storage, read> sample_masks: array<u32>;
@@ -60,7 +60,7 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
     }
 }
 
-// Of the strokes at `at`: the sum of their areas, two words.
+// Sum of the areas of the strokes at `at`, two words.
 fn area_sum(at: u32) -> vec2<u32> {
     return vec2(strokes[at + AREA_WORD], strokes[at + CARRY_WORD] & 0xFFFFu);
 }

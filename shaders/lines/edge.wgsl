@@ -28,7 +28,7 @@ struct Progress {
 struct Paused {
     // Its next share, plus 1.
     share: u32,
-    // Of the search in that share: `state` and `radius`, plus 1, or 0 where it has not begun.
+    // `state` and `radius` of the search in that share, plus 1; 0 if it has not begun.
     search: u32,
     begin: f32,
     hidden_from: f32,
@@ -224,8 +224,8 @@ fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32
     var columns = columns_of(s, window.ends, y);
     var x = columns.x;
     while y <= window.rows.y {
-        // Finding a pixel is far cheaper than covering it: threads that have found theirs wait here
-        // for those that have not.
+        // Finding a pixel is far cheaper than covering it, so threads that have found theirs wait
+        // here for the others.
         var center = vec2(0.0);
         var at = 0u;
         var found = false;

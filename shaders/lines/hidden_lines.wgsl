@@ -106,7 +106,7 @@ fn next_interval(edge: vec4<u32>, s: Segment, search: ptr<function, Search>) -> 
 // Combines the hidden intervals of all triangles visible along the edge.
 fn scan_along(edge: vec4<u32>, s: Segment, search: Search) -> Scan {
     let count = u32(sample_count());
-    // Of the pixel itself, and of one on each side of it across the edge.
+    // Samples of the pixel itself and, with a radius, of one on each side of it across the edge.
     let words = count * (2u * search.radius + 1u);
     let across = select(vec2(1, 0), vec2(0, 1), abs(s.along.x) >= abs(s.along.y));
     var scan = Scan(search.begin, 2.0, false);

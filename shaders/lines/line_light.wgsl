@@ -6,7 +6,7 @@
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
-// Of the surface, one per pixel; then gain and gloss of the light on lines, one per pixel.
+// Per pixel, the surface's colour; then gain and gloss of the light on lines, one per pixel.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
 // Per pixel, the face that lights the pass's lines, plus 1.
 @group(1) @binding(11) var<storage, read_write> owners: array<u32>;
@@ -30,7 +30,7 @@ fn line_light(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
     var count = 0.0;
     for (var s = 0u; s < samples_px; s++) {
         let word = samples[in_base + s];
-        // Neither a hull nor nothing.
+        // A triangle of the surface, not of the outline mesh.
         if word.y != 0u && ~word.x < frame.triangle_count {
             sum += point_light(~word.x, vec2<f32>(corner + sample_offset(i32(s))));
             count += 1.0;
@@ -58,7 +58,7 @@ fn point_light(id: u32, at: vec2<f32>) -> vec2<f32> {
 
 // Barycentrics of a point of the triangle: those of one beside it do not extrapolate.
 fn inside(v: vec3<f32>) -> vec3<f32> {
-    // NaN, of a triangle seen from its very edge, becomes 0.
+    // NaN, of a triangle seen edge-on, becomes 0.
     let b = select(vec3(0.0), min(v, vec3(1.0)), v > vec3(0.0));
     let sum = (b.x + b.y) + b.z;
     if sum > 0.0 {

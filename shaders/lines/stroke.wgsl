@@ -10,12 +10,11 @@ const UNIT: f32 = 16384.0;
 // Largest scaled area.
 const LIMIT: f32 = 16000.0;
 
-// A stroke seen from a pixel: bounds of what its points are compared with, a value each where the
-// line has no ramp.
+// A stroke relative to a pixel: the bounds that the pixel's points are compared with.
 struct Stroke {
     // Unit vector along, in 1/16384.
     along: vec2<i32>,
-    // Of the pixel's centre, pixels: how far from the line.
+    // Distance of the pixel's centre from the line, pixels.
     across: f32,
     // Bounds along.
     first: i32,
@@ -46,11 +45,11 @@ fn radius_at(level: u32) -> f32 {
 
 // Position of a pixel's centre relative to a piece of an edge.
 struct Place {
-    // How far from the line.
+    // Distance from the line.
     across: f32,
-    // How far past the start, and past the end.
+    // Distances past the start and past the end.
     past: vec2<f32>,
-    // How far beyond either.
+    // Distance beyond either end; 0 between them.
     beyond: f32,
 };
 
@@ -101,7 +100,7 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
     }
     let at = pixel_at * STROKE_WORDS;
     var points = 0u;
-    // Zero is a number that compilers do not know: where they unroll this, they take twice as long.
+    // frame.zero keeps compilers from unrolling the loop, which would take twice as long to run.
     for (var w = 0u; w < MASK_WORDS + frame.zero; w++) {
         var mask = 0u;
         for (var half = 0u; half < 2u + frame.zero; half++) {

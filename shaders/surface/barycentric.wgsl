@@ -16,8 +16,7 @@ struct Corners {
     front: bool,
 };
 
-// Snapped corners where there are some; where one is behind the eye, the homogeneous ones, which
-// stay right there.
+// Snapped corners; if one is behind the eye, the homogeneous ones, which are valid there too.
 fn corners_of(id: u32, at: vec2<f32>) -> Corners {
     let a = vertices[triangles[3u * id]];
     let b = vertices[triangles[3u * id + 1u]];
@@ -68,7 +67,7 @@ fn areas_of(c: Corners) -> Areas {
 // Perspective-correct barycentrics at a point, and how they change a pixel to the right and a pixel
 // down.
 struct Barycentrics {
-    // They add up to 1: two are carried, the third is what is left.
+    // They add up to 1: two are computed, the third is the rest.
     value: vec3<f32>,
     dx: vec3<f32>,
     dy: vec3<f32>,

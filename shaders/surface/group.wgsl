@@ -58,7 +58,7 @@ fn group_color(g: Group, pixel: vec2<i32>, show: Show) -> vec4<f32> {
     return point_color(g.id, vec2<f32>(pixel_corner(pixel)) + mean, show);
 }
 
-// Of an id, the hull's or not.
+// Material index of a triangle, of the surface or of the outline mesh.
 fn hull_material(id: u32) -> u32 {
     if has(HULL_MATERIALS) {
         return hull_materials[4u * frame.hull_color_count + id];

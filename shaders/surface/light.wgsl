@@ -9,7 +9,7 @@ struct Light {
     gloss: f32,
 };
 
-// A straight colour under light, as bright as can be shown.
+// A colour with straight alpha under light, clamped to 1.
 fn lit(base: vec4<f32>, light_here: Light) -> vec4<f32> {
     return vec4(clamp(rn3(base.xyz * light_here.gain) + light_here.gloss, vec3(0.0), vec3(1.0)), base.w);
 }

@@ -36,24 +36,24 @@ fn normal(id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> vec3<f32> {
 }
 
 // The cross product of the position's fine derivatives in a block of 2 x 2 pixels, as a GPU's
-// rasterizer has them: in f32, errors and all. (The same errors on both back-ends.)
+// rasterizer has them: in f32, with the same rounding errors on both back-ends.
 fn derivative_normal(id: u32, at: vec2<f32>) -> vec3<f32> {
     let quad = quad_around(id, at);
     let own = quad_position(id, quad.own);
-    // Large enough that no square vanishes.
+    // The factor keeps squares from vanishing.
     let dx = rn3((quad_position(id, quad.across) - own) * (4096.0 * quad.sign.x));
     let dy = rn3((quad_position(id, quad.down) - own) * (4096.0 * quad.sign.y));
     return unit_or(rn3(dy.yzx * dx.zxy) - rn3(dy.zxy * dx.yzx), frame.to_viewer.xyz);
 }
 
 fn quad_position(id: u32, b: vec3<f32>) -> vec3<f32> {
-    // A neighbour beyond the horizon of the triangle's plane is as far away as that.
+    // Bounds a neighbour beyond the horizon of the triangle's plane.
     let w = clamp(b, vec3(-1e6), vec3(1e6));
     return rn3(blend3(w, corner_position(id, 0u), corner_position(id, 1u), corner_position(id, 2u)));
 }
 
-// The normal that the normal texture makes of n. Its axes are the triangle's own: where u grows,
-// and where v shrinks.
+// The normal n perturbed by the normal texture. The axes are the triangle's own: increasing u and
+// decreasing v.
 fn normal_mapped(id: u32, m: u32, front: bool, uv: Uv, n: vec3<f32>) -> vec3<f32> {
     let used = use_of(m, SLOT_NORMAL);
     let p = corner_position(id, 0u);
@@ -67,7 +67,7 @@ fn normal_mapped(id: u32, m: u32, front: bool, uv: Uv, n: vec3<f32>) -> vec3<f32
     if !(abs(turn) > 1e-30 && abs(turn) < 1e30) {
         return n;
     }
-    // Seen from behind, a bump is a dent. v runs down in the image, and the texture's y up.
+    // Seen from behind, bumps are dents. v runs down in the image, the texture's y up.
     let side = select(-1.0, 1.0, (turn > 0.0) == front);
     let along_u = side * (e1 * d2.y - e2 * d1.y);
     let along_up = side * (e1 * d2.x - e2 * d1.x);

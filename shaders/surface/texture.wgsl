@@ -16,7 +16,7 @@ const WRAP_REPEAT: u32 = 0u;
 const WRAP_MIRROR: u32 = 1u;
 const SAMPLER_NEAREST: u32 = 16u;
 
-// Coordinates beyond this have no fraction worth speaking of.
+// Largest coordinate: beyond it f32 has too few fractional bits.
 const UV_MAX: f32 = 1048576.0;
 
 // Texture coordinates at a point, and how they change a pixel to the right and a pixel down.
@@ -89,7 +89,7 @@ fn sample_texture(m: u32, slot: u32, uv: Uv) -> vec4<f32> {
     return fine;
 }
 
-// Finite, and near enough to have a fraction.
+// Clamps a coordinate to the range with fractional bits; NaN and infinity are 0.
 fn bounded(v: vec2<f32>, most: f32) -> vec2<f32> {
     return clamp(select(vec2(0.0), v, abs(v) <= vec2(1e30)), vec2(-most), vec2(most));
 }

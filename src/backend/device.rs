@@ -11,7 +11,7 @@ use super::{DrawError, Renderer};
 /// and a software one brings a whole compiler with it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HardwareHint {
-    /// There cannot be a hardware GPU.
+    /// There is certainly no hardware GPU.
     None {
         /// The reason.
         reason: String,
@@ -27,7 +27,7 @@ impl HardwareHint {
     }
 }
 
-/// An opened device, as far as choosing a back-end goes.
+/// An opened device, as the choice of a back-end needs it.
 pub trait GpuDevice: Send + Sync {
     /// The opened device.
     fn info(&self) -> &GpuInfo;
@@ -48,7 +48,7 @@ pub type Opener = dyn Fn(GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> + Sen
 /// Status of the GPU, for reports.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GpuStatus {
-    /// In one word.
+    /// The state.
     pub state: GpuState,
     /// The device opened last.
     pub info: Option<GpuInfo>,

@@ -49,7 +49,7 @@ impl GpuHost {
         Self::with_opener(hint, Box::new(|kind| Ok(Arc::new(Gpu::open(kind, AtomicsChoice::Best)?))))
     }
 
-    /// The host of whatever `open` opens.
+    /// A host whose devices `open` opens.
     pub fn with_opener(hint: HardwareHint, open: Box<Opener>) -> Self {
         let status = match &hint {
             HardwareHint::None { reason } => {
@@ -68,7 +68,7 @@ impl GpuHost {
     /// The status. Does not wait for an opening.
     pub fn status(&self) -> GpuStatus {
         let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        // There is one then, of software or well again.
+        // A GPU is ready then: a software one, or one that has recovered.
         if status.state == GpuState::Ready {
             status.reason = status.reason.map(|reason| format!("`auto` means the CPU all the same: {reason}"));
         }
@@ -80,11 +80,11 @@ impl GpuHost {
         self.without.get().is_none()
     }
 
-    /// The device that a request of this kind draws on, opened now if need be; workers that come
-    /// meanwhile wait for it.
+    /// The device for a request of this kind. It is opened on first use; other workers wait
+    /// meanwhile.
     ///
-    /// `NoGpu` is for good. `DeviceLost` means that a device that was there is gone, and that
-    /// another try may help.
+    /// `NoGpu` is final. `DeviceLost` means that a device that was there is gone, and that another
+    /// try may help.
     pub fn device(&self, kind: GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> {
         self.check_auto(kind)?;
         let mut slot = self.device.lock().unwrap_or_else(PoisonError::into_inner);
@@ -104,7 +104,7 @@ impl GpuHost {
         }
     }
 
-    /// A job found the device lost. Whether it is the first to say so.
+    /// Reports that a job found the device lost. True for the first report.
     pub fn note_lost(&self, device: &Arc<dyn GpuDevice>, reason: &str) -> bool {
         let mut slot = self.device.lock().unwrap_or_else(PoisonError::into_inner);
         let is_current = slot.current.as_ref().is_some_and(|current| Arc::ptr_eq(current, device));
@@ -156,7 +156,7 @@ impl GpuHost {
             self.go_without(format!("{} is no hardware", info.name), false);
         }
         slot.current = Some(device.clone());
-        // Only then, so that its memory is not opened twice.
+        // After it is stored, so that it is not opened twice.
         self.check_auto(kind)?;
         Ok(device)
     }
@@ -198,7 +198,7 @@ impl GpuHost {
         }
     }
 
-    /// Lets go of a lost device.
+    /// Drops a lost device and reports it.
     fn retire(&self, device: Option<Arc<dyn GpuDevice>>, reason: &str) {
         tracing::warn!(reason, "the GPU was lost");
         self.set_status(|status| {
@@ -218,7 +218,7 @@ impl GpuHost {
             probe(&mut *device.clone().renderer()).map_err(|error| OpenError::Unusable(format!("{name}: {error}")))?;
             Ok(device)
         };
-        // A driver that makes wgpu panic must cost the GPU, not the job.
+        // A panic in wgpu disables the GPU but does not fail the job.
         catch_unwind(AssertUnwindSafe(attempt))
             .unwrap_or_else(|_| Err(OpenError::Unusable("opening the GPU panicked; the log has more".to_owned())))
     }

@@ -3,10 +3,11 @@
 //!
 //! Each stage is written twice, in twins of the same name: `shaders/ROOM/NAME.wgsl` and
 //! `src/backend/cpu/ROOM/NAME.rs`. The module's tests hold the constants, structs and bindings that
-//! the two share. [`select`] chooses a back-end per job, [`host`] owns the process's GPU, and [`probe`]
-//! checks a GPU before it is used.
+//! the two share. [`select`] chooses a back-end per job, [`host`] owns the process's GPU, and
+//! [`probe`] checks a GPU before it is used.
 //!
-//! **Invariant:** nothing here imports a mesh or a scene, and the two back-ends do not import each other.
+//! **Invariant:** nothing here imports a mesh or a scene, and the two back-ends do not import each
+//! other.
 
 pub mod cpu;
 mod device;
@@ -59,16 +60,16 @@ impl BackendKind {
     }
 }
 
-/// Why a picture could not be filled. Never the client's fault, except that its time was up.
+/// Why a picture could not be filled. Never the client's fault, except for an exceeded deadline.
 #[derive(Debug, thiserror::Error)]
 pub enum DrawError {
-    /// The job's time was up.
+    /// The deadline has passed.
     #[error(transparent)]
     Stopped(#[from] Stopped),
     /// There is no GPU here to draw on.
     #[error("there is no GPU to draw on: {0}")]
     NoGpu(String),
-    /// The device is gone; a fresh one may work.
+    /// The device is lost; a new one may work.
     #[error("the GPU was lost: {0}")]
     DeviceLost(String),
     /// The device refused the work: out of memory, or a plan beyond its limits.

@@ -49,7 +49,7 @@ pub enum ProbeError {
         wrong: usize,
         /// Number of all.
         of: usize,
-        /// Samples a pixel.
+        /// Samples per pixel.
         samples: u32,
     },
     /// A pixel has another colour than it should.
@@ -59,7 +59,7 @@ pub enum ProbeError {
         wrong: usize,
         /// Number of all.
         of: usize,
-        /// Samples a pixel.
+        /// Samples per pixel.
         samples: u32,
     },
 }

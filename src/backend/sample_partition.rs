@@ -95,8 +95,8 @@ mod tests {
             assert_eq!(counts, vec![POINTS as i32 / samples as i32; samples as usize], "{samples}");
             let limit = farthest * PX / 100;
             assert!(most <= limit * limit, "{samples}: {} px", f64::from(most).sqrt() / f64::from(PX));
-            // Where the samples are symmetric, as many points are nearest to each, but for the
-            // lattice's own grain.
+            // Symmetric samples have equally many nearest points, except for the lattice's own
+            // grain.
             assert!(moved <= if samples <= 4 { 6 } else { 32 }, "{samples}: {moved} points have a nearer sample");
         }
     }

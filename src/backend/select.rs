@@ -54,7 +54,7 @@ impl Backends {
                 Ok(chosen) => Ok(chosen),
                 Err(DrawError::Stopped(stopped)) => Err(stopped.into()),
                 Err(error) => {
-                    // That there is none is no news: the host said so when it was decided.
+                    // A missing GPU is not logged again: the host has logged it.
                     if !matches!(error, DrawError::NoGpu(_)) {
                         tracing::warn!(%error, "the CPU draws this job");
                     }
@@ -108,7 +108,7 @@ impl Backends {
         let device = found?;
         let result = self.draw_on(&device, plan, deadline);
         if let Err(DrawError::DeviceLost(reason)) = &result {
-            // Workers that share a device lose it together: that is one loss.
+            // Workers that share a device lose it together, which counts as one loss.
             if self.host.note_lost(&device, reason) && attempt == Attempt::First {
                 self.host.count_loss(reason);
             }
@@ -129,7 +129,7 @@ impl Backends {
                 (device.clone().renderer(), device.clone())
             }
         };
-        // wgpu panics here and there on a device that is gone.
+        // wgpu may panic on a lost device.
         let drawn = catch_unwind(AssertUnwindSafe(|| renderer.draw(plan, deadline)));
         let result = match (drawn, device.lost()) {
             (Ok(result), _) => result,

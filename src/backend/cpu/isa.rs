@@ -42,7 +42,7 @@ macro_rules! for_avx2_features {
     };
 }
 
-/// Whether the processor reports every feature of a list.
+/// True if the processor reports every feature of a list.
 #[cfg(target_arch = "x86_64")]
 macro_rules! are_detected {
     ([$($feature:tt)+]) => {
@@ -51,7 +51,7 @@ macro_rules! are_detected {
 }
 
 impl Isa {
-    /// What every processor of this architecture has.
+    /// The instructions that every processor of this architecture has.
     pub fn baseline() -> Self {
         Self(Level::Baseline)
     }
@@ -75,7 +75,7 @@ impl Isa {
         }
     }
 
-    /// Whether code compiled for the AVX2 level may run.
+    /// True if code compiled for the AVX2 level may run.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     pub(in crate::backend::cpu) fn has_avx2(self) -> bool {

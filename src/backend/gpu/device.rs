@@ -20,7 +20,7 @@ pub enum GpuKind {
     Hardware,
 }
 
-/// How visibility samples are written.
+/// Atomics that write visibility samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AtomicsChoice {
     /// 64-bit atomics where the device has them.
@@ -99,8 +99,7 @@ impl Gpu {
         let lost = Lost::default();
         let slot = lost.clone();
         device.set_device_lost_callback(move |reason, message| {
-            // Dropping the device reports "destroyed" here too; nobody looks at the slot any more
-            // then.
+            // Dropping the device reports "destroyed" here too; the slot is not read any more then.
             let _ = slot.set(format!("{reason:?}: {message}"));
         });
         // Without a handler wgpu panics. What a job causes is caught by that job's error scope;

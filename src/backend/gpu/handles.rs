@@ -1,4 +1,4 @@
-//! What an opened GPU is used through: all that buffers need of it.
+//! Device, queue and limits of an opened GPU, in a file of their own because buffers need no more.
 
 /// Device, queue and limits of an opened GPU.
 pub struct Handles {

@@ -41,10 +41,10 @@ use crate::plan::{DrawPlan, HullVertex};
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
 
-/// The same on a processor, where each costs time even if it finds nothing to do.
+/// The same on a software implementation, where idle workgroups cost time.
 const TILE_WORKGROUPS_SOFTWARE: u32 = 64;
 
-/// Draws on the GPU. A worker's own; the device and what is kept from job to job are shared.
+/// Draws on the GPU. Each worker has its own; the device, its pipelines and buffers are shared.
 pub struct GpuRenderer {
     gpu: Arc<Gpu>,
 }
@@ -69,7 +69,7 @@ impl GpuRenderer {
         }
     }
 
-    /// What a buffer of samples holds in the end.
+    /// Final content of a buffer of samples.
     fn words(
         &mut self,
         plan: &DrawPlan<'_>,
@@ -100,13 +100,13 @@ impl GpuRenderer {
         })
     }
 
-    /// Runs `job` with errors caught and buffers tidied up afterwards.
+    /// Runs `job` in an error scope and returns its buffers afterwards.
     fn job<T>(&self, job: impl FnOnce(&Gpu, &mut Buffers) -> Result<T, DrawError>) -> Result<T, DrawError> {
         self.gpu.check()?;
         let mut buffers = self.gpu.spare_buffers.take();
         let result = self.gpu.scoped(|| job(&self.gpu, &mut buffers));
         self.gpu.job_ended();
-        // After an error work may still be running on them, and the staging buffer may be half
+        // After an error the buffers may still be in use, and the staging buffer may be half
         // mapped.
         if result.is_ok() {
             self.gpu.spare_buffers.give_back(buffers);
@@ -159,7 +159,7 @@ fn traits(gpu: &Gpu) -> DeviceTraits {
     }
 }
 
-/// Puts what transform and visibility read on the GPU, and makes room for what they write.
+/// Uploads the input of transform and visibility, and reserves their output.
 fn upload_geometry(
     gpu: &Handles,
     buffers: &mut Buffers,
@@ -190,7 +190,7 @@ fn upload_geometry(
     Ok(())
 }
 
-/// Puts what shade, lines and resolve read on the GPU, and makes room for what they write.
+/// Uploads the input of shade, lines and resolve, and reserves their output.
 fn upload_shading(
     gpu: &Handles,
     buffers: &mut Buffers,

@@ -211,7 +211,7 @@ pub fn edge_lists(passes: &[LinePass]) -> (Vec<&[Edge]>, Vec<u32>) {
             return *start;
         }
         lists.push((edges, next));
-        // Far more than a device has room for: then nothing is drawn.
+        // Saturates: no device has room for so many edges.
         let start = next;
         next = start.saturating_add(edges.len() as u32);
         start

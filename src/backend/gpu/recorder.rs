@@ -83,8 +83,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Draws what the work list holds: reads how long it is, then runs the kernel in rounds of
-    /// known length.
+    /// Draws the items of the work list: reads its length, then runs the kernel in rounds.
     pub fn tiles_in_rounds(&mut self, kernel: Kernel, batch: &Batch, tiles: &Tiles) -> Result<(), DrawError> {
         let mut counts = [0; 2];
         let (work, to) = (
@@ -113,7 +112,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Draws lines until no thread has anything left to do.
+    /// Draws lines in rounds until no thread is paused.
     pub fn lines_in_rounds(&mut self, batch: usize, workgroups: [u32; 2], bytes: u64) -> Result<(), DrawError> {
         self.clear(Slot::Progress, bytes)?;
         loop {

@@ -227,7 +227,7 @@ mod tests {
                     plan.peeling = Some(peel).filter(|_| layered);
                     plan.samples = samples;
                     each(&plan);
-                    // Where the mesh goes on beyond the picture.
+                    // The same with a mesh that continues beyond the picture.
                     plan.margin_px = plan.line_margin_rows();
                     each(&plan);
                 }

@@ -31,7 +31,7 @@ pub struct SampleBand {
     /// First row that is shown, and the row after the last; what lies beyond them in the band hides
     /// lines that reach into it.
     pub shown: [u32; 2],
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
     /// Samples in a row, padded so that a vector may hang over the right edge.
     pub stride: usize,

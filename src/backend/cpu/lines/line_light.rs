@@ -35,7 +35,7 @@ fn pixel(
     let corner = [x as i32 * 256 - plan.width_px as i32 * 128, y as i32 * 256 - plan.height_px as i32 * 128];
     let (mut sum, mut count) = (Light { gain: 0.0, gloss: 0.0 }, 0.0_f32);
     for (&id, offset) in band.pixel(x as i32, y as i32).0.iter().zip(sample_offsets(band.samples)) {
-        // Neither a hull nor nothing.
+        // A triangle of the surface, not of the outline mesh.
         if id < plan.triangles.len() as u32 {
             let at = [(corner[0] + offset[0]) as f32, (corner[1] + offset[1]) as f32];
             let light = point(context, surface, id, at);
@@ -64,7 +64,7 @@ fn point(context: &RasterContext<'_>, surface: &SurfacePass<'_>, id: u32, at: [f
 
 /// Barycentrics of a point of the triangle: those of one beside it do not extrapolate.
 fn inside(b: [f32; 3]) -> [f32; 3] {
-    // NaN, of a triangle seen from its very edge, becomes 0.
+    // NaN, of a triangle seen edge-on, becomes 0.
     let b = b.map(|v| if v > 0.0 { v.min(1.0) } else { 0.0 });
     let sum = (b[0] + b[1]) + b[2];
     if sum > 0.0 { b.map(|v| v / sum) } else { [1.0 / 3.0; 3] }

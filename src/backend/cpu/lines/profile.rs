@@ -16,8 +16,8 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Of a line with this unit normal, half as wide as `half_width` with a ramp half as wide as
-    /// `half_ramp`, pixels.
+    /// A profile of a line with this unit normal, half as wide as `half_width` with a ramp half as
+    /// wide as `half_ramp`, pixels.
     #[inline(always)]
     pub fn new(half_width: f32, half_ramp: f32, normal: [f32; 2]) -> Self {
         let (nx, ny) = (normal[0].abs(), normal[1].abs());

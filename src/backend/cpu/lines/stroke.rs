@@ -142,12 +142,12 @@ fn high(a: i16, b: i16) -> i16 {
     ((i32::from(a) * i32::from(b)) >> 16) as i16
 }
 
-/// A piece of an edge in a pixel: area (0 to 1) and mask. `ends` are the piece's, in pixels from
+/// Area (0 to 1) and mask of a piece of an edge in a pixel. `ends` are the piece's, in pixels from
 /// the pixel's centre.
 #[inline(always)]
 pub fn cover(pen: &Pen, direction: &Direction, ends: [[f32; 2]; 2]) -> Option<(f32, Mask)> {
     let [start, end] = ends;
-    // Of the pixel's centre: how far from the line, how far past the start and past the end.
+    // Distances of the pixel's centre: from the line, past the start and past the end.
     let across = direction.along[1] * start[0] - direction.along[0] * start[1];
     let past = |p: [f32; 2]| -(direction.along[0] * p[0] + direction.along[1] * p[1]);
     let (past_start, past_end) = (past(start), past(end));

@@ -15,8 +15,8 @@ pub struct Corner {
     weight: f32,
 }
 
-/// The corners of a triangle seen from point `at`. Snapped corners where there are some; where one
-/// is behind the eye, the homogeneous ones, which stay right there.
+/// The corners of a triangle seen from point `at`. Snapped corners; if one is behind the eye, the
+/// homogeneous ones, which are valid there too.
 #[inline]
 pub fn corners(context: &RasterContext<'_>, id: u32, at: [f32; 2]) -> [Corner; 3] {
     let vertices = context.screen_triangle(id);
@@ -53,7 +53,7 @@ impl Areas {
 
 /// Perspective-correct barycentrics at a point.
 pub struct Barycentrics {
-    /// They add up to 1: two are carried, the third is what is left.
+    /// They add up to 1: two are computed, the third is the rest.
     pub value: [f32; 3],
     /// Change to the right, in 1/256 px.
     dx: [f32; 3],
@@ -71,8 +71,8 @@ impl Barycentrics {
         Self::divided(&Areas::new(c), |total| 1.0 / total)
     }
 
-    /// As [`Barycentrics::new`], with the same bits on both back-ends: for whatever is decided by
-    /// them.
+    /// As [`Barycentrics::new`], with the same bits on both back-ends: for decisions such as
+    /// thresholds.
     #[inline(always)]
     pub fn exact(c: &[Corner; 3]) -> Self {
         Self::divided(&Areas::new(c), |total| {
@@ -95,13 +95,13 @@ impl Barycentrics {
         Self { value, dx, dy, front: total < 0.0 }
     }
 
-    /// `|db/dx| + |db/dy|` a pixel.
+    /// `|db/dx| + |db/dy|` per pixel.
     #[inline(always)]
     pub fn fwidth(&self, i: usize) -> f32 {
         256.0 * (self.dx[i].abs() + self.dy[i].abs())
     }
 
-    /// Change to the right and downwards, a pixel.
+    /// Change to the right and downwards, per pixel.
     pub fn derivatives(&self) -> [[f32; 3]; 2] {
         [self.dx, self.dy].map(|d| d.map(|v| 256.0 * v))
     }
@@ -128,7 +128,7 @@ pub struct Quad {
 }
 
 impl Quad {
-    /// Of the pixel that holds `at`.
+    /// The block of the pixel that holds `at`.
     pub fn around(plan: &DrawPlan<'_>, at: [f32; 2]) -> Self {
         let half = [plan.width_px, plan.height_px].map(|size| size as i32 * 128);
         let pixel = [0, 1].map(|k| (at[k] + half[k] as f32) as i32 >> 8);

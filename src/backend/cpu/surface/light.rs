@@ -14,9 +14,9 @@ use crate::plan::{Lights, Projection};
 /// Effect of light on a base colour: `base * gain + gloss`, per channel.
 #[derive(Clone, Copy, Debug)]
 pub struct Light {
-    /// Of what the base colour tints.
+    /// Factor of the base colour.
     pub gain: f32,
-    /// Of what it does not.
+    /// Light that the base colour does not tint.
     pub gloss: f32,
 }
 
@@ -33,7 +33,7 @@ impl Light {
     }
 }
 
-/// A straight colour under light, as bright as can be shown.
+/// A colour with straight alpha under light, clamped to 1.
 pub fn lit(base: [f32; 4], light: Light) -> [f32; 4] {
     let [r, g, b] = [0, 1, 2].map(|k| (base[k] * light.gain + light.gloss).clamp(0.0, 1.0));
     [r, g, b, base[3]]

@@ -26,22 +26,22 @@ pub fn normal(surface: &SurfacePass<'_>, material: &ShadedMaterial, place: &Plac
 }
 
 /// The cross product of the position's fine derivatives in a block of 2 x 2 pixels, as a GPU's
-/// rasterizer has them: in f32, errors and all. (The same errors on both back-ends.)
+/// rasterizer has them: in f32, with the same rounding errors on both back-ends.
 fn derivative_normal(place: &Place<'_>) -> [f32; 3] {
     let Place { context, id, at, .. } = place;
     let quad = Quad::around(context.plan, *at);
     let corners = context.positions_of(*id).map(|(position, _)| position);
-    // A neighbour beyond the horizon of the triangle's plane is as far away as that.
+    // Bounds a neighbour beyond the horizon of the triangle's plane.
     let bounded = |b: [f32; 3]| b.map(|v| v.clamp(-1e6, 1e6));
     let [own, across, down] = quad.barycentrics(context, *id).map(|b| blend(corners, bounded(b)));
-    // Large enough that no square vanishes.
+    // The factor keeps squares from vanishing.
     let step = |p: [f32; 3], sign: f32| sub(p, own).map(|v| v * (4096.0 * sign));
     let (dx, dy) = (step(across, quad.sign[0]), step(down, quad.sign[1]));
     unit_or(cross(dy, dx), context.plan.projection.to_viewer)
 }
 
-/// The normal that the normal texture makes of `n`. Its axes are the triangle's own: where u grows,
-/// and where v shrinks.
+/// The normal `n` perturbed by the normal texture. The axes are the triangle's own: increasing u
+/// and decreasing v.
 pub fn normal_mapped(
     surface: &SurfacePass<'_>,
     material: &ShadedMaterial,
@@ -62,7 +62,7 @@ pub fn normal_mapped(
     if !(turn.abs() > 1e-30 && turn.abs() < 1e30) {
         return n;
     }
-    // Seen from behind, a bump is a dent. v runs down in the image, and the texture's y up.
+    // Seen from behind, bumps are dents. v runs down in the image, the texture's y up.
     let side = if (turn > 0.0) == place.b.front { 1.0 } else { -1.0 };
     let along_u: [f32; 3] = std::array::from_fn(|k| side * (e1[k] * d2[1] - e2[k] * d1[1]));
     let along_up: [f32; 3] = std::array::from_fn(|k| side * (e1[k] * d2[0] - e2[k] * d1[0]));

@@ -46,7 +46,7 @@ pub struct PointShader<'a> {
     context: &'a RasterContext<'a>,
     /// Flat colours do not change over a triangle: the last one is kept.
     flat: Option<(u32, [f32; 4])>,
-    /// What is shown; the same for all points of a triangle.
+    /// Shown parts of the material; the same for all points of a triangle.
     pub show: Show,
 }
 

@@ -86,7 +86,7 @@ impl<'a> Shader<'a> {
     ) {
         let offsets = sample_offsets(S as u32);
         for s in 0..S {
-            // Each triangle is shaded at the first of its samples; the others are done with.
+            // Each triangle is shaded once, at the first of its samples.
             if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {
                 continue;
             }

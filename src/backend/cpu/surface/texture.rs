@@ -6,18 +6,18 @@
 use super::barycentric::Barycentrics;
 use crate::plan::{CornerValues, Texture, TextureUse, Textures, samplers};
 
-/// Coordinates beyond this have no fraction worth speaking of.
+/// Largest coordinate: beyond it f32 has too few fractional bits.
 pub const UV_MAX: f32 = 1_048_576.0;
 
 /// Texture coordinates at a point, and how they change a pixel to the right and a pixel down.
 pub struct Uv {
-    /// There.
+    /// At the point.
     pub at: [f32; 2],
     d: [[f32; 2]; 2],
 }
 
 impl Uv {
-    /// Of triangle `id`.
+    /// The coordinates of triangle `id` at these barycentrics.
     pub fn new(uvs: &CornerValues<'_, [f32; 2]>, id: u32, b: &Barycentrics) -> Self {
         let corners = uvs.triangles[id as usize].map(|i| uvs.values[i as usize]);
         Self { at: blend(corners, b.value), d: b.derivatives().map(|d| blend(corners, d)) }
@@ -54,7 +54,7 @@ pub fn sample(textures: &Textures, used: &TextureUse, uv: &Uv) -> [f32; 4] {
     if share > 0.0 { mix(fine, bilinear(textures, image, level + 1, at, used.sampler), share) } else { fine }
 }
 
-/// Finite, and near enough to have a fraction.
+/// Clamps a coordinate to the range with fractional bits; NaN and infinity are 0.
 fn bounded(v: f32) -> f32 {
     if v.abs() <= 1e30 { v.clamp(-UV_MAX, UV_MAX) } else { 0.0 }
 }

@@ -12,7 +12,7 @@ pub struct Place<'a> {
     pub id: u32,
     /// In 1/256 px from the picture's centre.
     pub at: [f32; 2],
-    /// There.
+    /// At the point.
     pub b: Barycentrics,
 }
 

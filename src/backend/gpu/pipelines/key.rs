@@ -1,7 +1,7 @@
 //! The pipeline key: the features of a plan as bits.
 //!
-//! It is the constant `PIPELINE_KEY` of each pipeline, so that a kernel contains only the code that its
-//! plan needs.
+//! It is the constant `PIPELINE_KEY` of each pipeline, so that a kernel contains only the code that
+//! its plan needs.
 
 use crate::plan::{DrawPlan, SurfacePass, flags};
 

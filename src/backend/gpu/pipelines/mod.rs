@@ -41,7 +41,7 @@ pub enum Kernel {
     Resolve,
 }
 
-/// How a visibility kernel writes samples.
+/// Phase of a visibility kernel: with 64-bit atomics one, otherwise two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SampleWrite {
     /// Depth and id in one 64-bit maximum.
@@ -120,7 +120,8 @@ impl PipelineCache {
     /// The pipeline of a kernel for a plan with this key.
     pub fn get(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Arc<Pipeline> {
         let key = key & kernel.key_bits();
-        // Held while compiling: two workers that begin together want the same pipelines.
+        // The lock is held while compiling, because workers that start together need the same
+        // pipelines.
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         made.entry((kernel, key)).or_insert_with(|| Arc::new(kernel.compile(device, key))).clone()
     }

@@ -15,8 +15,8 @@ const EDGE_CHUNK: u32 = 1 << 20;
 /// The same where each may cross a large picture.
 const EDGE_CHUNK_LONG: u32 = 1 << 17;
 
-/// Looks at samples that a dispatch may take at most, if it is not known how long its edges are: a
-/// second or so of work.
+/// Samples that a dispatch may read at most, if the length of its edges is not known: a second or
+/// so of work.
 const BLIND_LOOKS_MAX: u64 = 1 << 34;
 
 /// Edges that keep all of a GPU busy.
@@ -68,7 +68,7 @@ pub struct LineShares {
 }
 
 impl LineShares {
-    /// Of a pass of the plan.
+    /// The parameters of a pass of the plan.
     pub fn new(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> Self {
         let side = lines.window_px() + 2.0 * lines.reach_px();
         // Few edges leave most of a GPU idle, so threads may look along them twice; a processor has

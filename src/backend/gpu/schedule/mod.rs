@@ -26,13 +26,13 @@ const CHUNK: u32 = 1 << 20;
 const CHUNK_CLIP: u32 = 1 << 17;
 pub const PIECES_MAX: u32 = 6;
 
-/// Different numbers that dispatches may have, each 256 bytes on the GPU: 128 MiB.
+/// Largest number of batches, 256 bytes each on the GPU: 128 MiB.
 ///
 /// The most that a job within all other limits takes: of 4096 rows at 4 samples, layers make 32
 /// bands of 128 rows. In each, 10 million triangles that may need clipping are 77 chunks, for the
 /// surface and 16 layers, filled and hull, in two phases: 17 * 77 * 2 * 2 = 5236. 64 passes of 30
-/// million edges are 29 chunks each and three more for the ink, 2048. That makes 0.23 million. Rows
-/// beyond a band that wide lines look at are no bands of their own: they do not add to it.
+/// million edges are 29 chunks each and three more for their coverage, 2048. That makes 0.23
+/// million. Margin rows are no bands of their own and do not add to it.
 const BATCHES_MAX: usize = 1 << 19;
 
 /// Threads of a workgroup, in every kernel.
@@ -49,7 +49,7 @@ pub struct Schedule {
     pub work_items: u32,
     /// Layers that are looked for in each band.
     pub layers: u32,
-    /// How the tile kernel is run.
+    /// Runs of the tile kernel.
     pub tiles: Tiles,
     /// Bytes for the state of paused threads of the edge kernel.
     pub progress_bytes: u64,
@@ -71,7 +71,7 @@ impl Schedule {
             let [beyond, margin] = [banding.beyond, banding.margin].map(|px| px as i32);
             let [row_first, row_end] = [first as i32, end as i32];
             let seen = [row_first - margin, row_end + margin].map(|y| y.clamp(-beyond, plan.height_px as i32 + beyond));
-            // What is done pixel by pixel is done for the band's own rows.
+            // Kernels that run per pixel cover the band's own rows only.
             let band = Batch {
                 row_first,
                 row_end,
@@ -123,8 +123,7 @@ impl Schedule {
         };
         self.layers = rounds;
         let count = plan.width_px * band.row_end.abs_diff(band.row_first);
-        // A layer that is wanted for itself is not shaded: then no sample is done before its last
-        // triangle.
+        // A layer drawn for a test is not shaded, so no sample is finished early.
         let pass_bit = if goal == Goal::Picture { u32::from(pass_mask::LAYER) } else { 0 };
         let mut ends = Vec::new();
         for layer in 0..rounds {
@@ -156,7 +155,7 @@ impl Schedule {
     ) -> Result<(), DrawError> {
         let writes: &[SampleWrite] =
             if device.int64_atomics { &[SampleWrite::Both] } else { &[SampleWrite::Depth, SampleWrite::Id] };
-        // Every depth must be known before the first id is compared with it.
+        // The depth phase must be complete before the id phase compares with it.
         for &write in writes {
             for Pass { ids, clip, faces, pass_bit } in passes.iter().flatten().cloned() {
                 let (chunk, pieces) = if clip { (CHUNK_CLIP, PIECES_MAX) } else { (CHUNK, 1) };
@@ -227,7 +226,7 @@ impl Schedule {
         if workgroups == 0 {
             return Ok(());
         }
-        // Neighbours may share theirs: triangles are drawn and clipped by the same numbers.
+        // Consecutive dispatches with equal parameters share a batch.
         if self.batches.last() != Some(&batch) {
             if self.batches.len() == BATCHES_MAX {
                 return Err(DrawError::Device(format!("it takes more than {BATCHES_MAX} dispatches")));

@@ -7,7 +7,8 @@ use crate::plan::DrawPlan;
 /// Largest buffer that holds a band of the picture, bytes.
 const BAND_BYTES: u64 = 64 << 20;
 
-/// The same for the visibility buffer, which wide lines look at far beyond their band.
+/// The same for the visibility buffer, which hidden-line removal of wide lines reads far beyond
+/// their band.
 const SEEN_BYTES: u64 = 256 << 20;
 
 /// Bytes of the work list before its items.
@@ -53,7 +54,7 @@ pub struct DeviceTraits {
 pub struct Banding {
     /// Rows of each band but the last.
     pub rows: u32,
-    /// Rows beyond a band, above and below, that its lines look at.
+    /// Rows beyond a band, above and below, that hidden-line removal reads.
     pub margin: u32,
     /// Pixels beyond the picture, on each side, of which the visibility buffer holds those that are
     /// in a band's rows and margins.
@@ -61,10 +62,10 @@ pub struct Banding {
 }
 
 impl Banding {
-    /// So that no buffer is large or breaks the device's limit. Fails where the device has no room
-    /// for a row and what its lines look at in the picture. Where it has none only for what they
-    /// look at beyond the picture, they go without: better a border at which a line shows that
-    /// something beyond it hides than no picture.
+    /// Bands in which no buffer is large or exceeds the device's limit. Fails if the device has no
+    /// room for a row and the rows that its lines read in the picture. If only those beyond the
+    /// picture have no room, they are left out: a line at the border that something beyond it hides
+    /// may then show.
     pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Result<Self, DrawError> {
         if goal != Goal::Picture {
             return Self::with_margin(plan, device, [0, 0]);
@@ -117,7 +118,7 @@ impl Banding {
     }
 }
 
-/// Bytes of all buffers that hold a band, on a device that allows whatever is asked of it.
+/// Bytes of all buffers that hold a band, on a device without limits.
 pub fn bands_bytes(plan: &DrawPlan<'_>) -> u64 {
     let device = DeviceTraits {
         binding_bytes_max: u64::MAX,
@@ -188,7 +189,7 @@ mod tests {
                 assert!(banding.bytes(plan) <= ALL_BYTES_MAX, "{}: {banding:?} {case:?}", banding.bytes(plan));
                 assert!(banding.seen_samples(plan) * SAMPLE_BYTES <= device.binding_bytes_max);
                 assert!(banding.rows >= 1 && banding.rows <= plan.height_px);
-                // What lies beyond a band is there in whole, unless the band is all there is.
+                // The margin is complete unless one band is the whole picture.
                 let is_all = banding.rows == plan.height_px && banding.beyond == 0;
                 assert!(banding.margin == plan.line_margin_rows() || is_all, "{case:?}");
                 if banding.beyond < case.beyond {

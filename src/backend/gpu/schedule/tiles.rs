@@ -23,8 +23,8 @@ const LARGE_TILES_MAX: u64 = (HUGE_PX as u64 / TILE_PX as u64 + 1).pow(2);
 /// devices a dispatch should end in time for the deadline.
 const ITERATIONS_MAX: u64 = 40_000;
 
-/// How the tile kernel is run: at once over whatever is in the work list, or, where that might take
-/// too long, in rounds whose number follows from the list's length, which is read back first.
+/// Runs of the tile kernel: one over the whole work list, or, where that might take too long, in
+/// rounds whose number follows from the list's length, which is read back first.
 #[derive(Clone, Copy, Debug)]
 pub struct Tiles {
     /// True if the kernel runs in rounds.
