@@ -3,7 +3,7 @@
 //!
 //! Each stage is written twice, in twins of the same name: `shaders/ROOM/NAME.wgsl` and
 //! `src/backend/cpu/ROOM/NAME.rs`. The module's tests hold the constants, structs and bindings that
-//! the two share. [`select`] chooses a back-end per job, [`host`] owns the process's GPU, and
+//! the two share. `select` chooses a back-end per job, `host` owns the process's GPU, and
 //! [`probe`] checks a GPU before it is used.
 //!
 //! **Invariant:** nothing here imports a mesh or a scene, and the two back-ends do not import each

@@ -1,9 +1,9 @@
 //! The CPU rasterizer: the reference for bytes.
 //!
-//! Stages in order: transform and visibility in [`geometry`], shade in [`surface`] and, for
-//! transparent surfaces, in [`peeling`], [`lines`], [`resolve`]. [`bands`] runs them: the picture
+//! Stages in order: transform and visibility in `geometry`, shade in `surface` and, for
+//! transparent surfaces, in `peeling`, `lines`, `resolve`. `bands` runs them: the picture
 //! is cut into bands of rows that fit a core's cache, threads take bands, and no band depends on
-//! another. The hot loops are compiled once per instruction set ([`isa`]).
+//! another. The hot loops are compiled once per instruction set (`isa`).
 //!
 //! **Invariant:** threads and instruction sets do not change a byte.
 

@@ -1,8 +1,8 @@
 //! The wgpu back-end: the CPU's stages as compute shaders, headless.
 //!
-//! In reading order: [`device`] opens a GPU; [`schedule`] computes the dispatches for a plan;
-//! [`recorder`] turns them into commands; [`pipelines`] holds each kernel's source, bindings and
-//! specialisation; [`params`] the uniforms, [`buffers`] the memory, [`pass_mask`] the passes over
+//! In reading order: `device` opens a GPU; `schedule` computes the dispatches for a plan;
+//! `recorder` turns them into commands; `pipelines` holds each kernel's source, bindings and
+//! specialisation; `params` the uniforms, `buffers` the memory, `pass_mask` the passes over
 //! triangles.
 //!
 //! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
