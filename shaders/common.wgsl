@@ -1,5 +1,6 @@
-// What every stage shares: the plan's numbers, and arithmetic that gives the CPU's bits (ARCHITECTURE.md, "Rounded
-// operations"). Prepended to each stage by src/backend/gpu/pipelines/mod.rs.
+// Every stage: the uniforms, shared constants, and arithmetic that gives the CPU's bits
+// (ARCHITECTURE.md, "Rounded operations"). Prepended to each stage by
+// src/backend/gpu/pipelines/mod.rs.
 
 struct Frame {
     x_row: vec4<f32>,
@@ -17,28 +18,29 @@ struct Frame {
     near_w: f32,
     ambient: f32,
     lamp_count: u32,
-    // Always 0, which the compiler cannot know.
+    // Always 0, but unknown to the compiler.
     zero: u32,
     width: i32,
     height: i32,
     triangle_count: u32,
     vertex_count: u32,
-    // Where edge masks start in the attributes; triangles' materials start at 0.
+    // Start of the edge masks in the attributes; triangles' materials start at 0.
     masks_at: u32,
     material_count: u32,
-    // What remains of wires from the second layer on.
+    // Opacity of wires from the second layer on.
     layer_fade: f32,
-    // Colours at the start of the hull's looks; triangles' materials follow.
+    // Number of colours at the start of hull_materials; the triangles' materials follow.
     hull_color_count: u32,
     // Textures; what each is, is in front of the texels.
     image_count: u32,
-    // Where each kind of corner value has its indices among the corner triangles.
+    // Start of the indices of each kind of corner value in corner_triangles.
     normal_triangles_at: u32,
     uv_triangles_at: u32,
     color_triangles_at: u32,
 };
 
-// Which triangles, vertices or edges a dispatch handles, and which rows of the picture the buffers hold.
+// Parameters of a dispatch: its triangles, vertices or edges, and the rows of the picture that the
+// buffers hold.
 struct Batch {
     first: u32,
     count: u32,
@@ -48,14 +50,14 @@ struct Batch {
     row_end: i32,
     // Items that the work list holds.
     capacity: u32,
-    // Which of them a dispatch of the tile kernel draws.
+    // Range of items that a dispatch of the tile kernel draws.
     large_first: u32,
     large_end: u32,
     huge_first: u32,
     huge_end: u32,
     // Edges that a workgroup draws.
     edges_per_group: u32,
-    // Of the line pass: pixels, pixels, bits, and, below, which it is.
+    // The line pass: width and ramp in pixels, and bits.
     line_width: f32,
     line_smoothing: f32,
     line_flags: u32,
@@ -66,23 +68,36 @@ struct Batch {
     line_slices: u32,
     // Coverage in the middle of a line.
     line_peak: f32,
-    // Looks along edges, or shares begun, after which a thread says how far it has come.
+    // Units of work after which a thread pauses.
     line_units: u32,
     line_pass: u32,
-    // Which rows the visibility buffer holds, where that is more than the batch's, and where the first of the batch's begins in it.
+    // Rows that the visibility buffer holds, which may be more than the batch's, and the index of
+    // the batch's first sample in it.
     seen_first: i32,
     seen_end: i32,
     samples_at: u32,
-    // The role that drawn triangles have, where the plan has roles; 0: the hull's, which have none.
-    role: u32,
+    // Bit that the pass mask of a drawn triangle has; 0 for the outline mesh, which has no masks.
+    pass_bit: u32,
     // Number of the layer that is looked for; 0 also for the visibility buffer.
     layer: u32,
-    // Columns in which triangles are drawn, and before which it ends: also those beyond the picture that the visibility buffer has.
+    // First column in which triangles are drawn, and the column after the last; columns beyond the
+    // picture count.
     column_first: i32,
     column_end: i32,
-    // How many these are, on each side.
+    // Columns beyond the picture, on each side.
     seen_margin: i32,
 };
+
+// Threads of a workgroup, in every kernel.
+const WORKGROUP: u32 = 64u;
+
+// Vectors of four words per item of the work list.
+const ITEM_VECTORS: u32 = 3u;
+
+// Values of `faces`.
+const FACES_BOTH: u32 = 0u;
+const FACES_FRONT: u32 = 1u;
+const FACES_BACK: u32 = 2u;
 
 // Bits of `line_flags`.
 const SHOWN_VISIBLE: u32 = 1u;
@@ -107,19 +122,19 @@ const EIGHT_SAMPLES: u32 = 512u;
 const SIXTEEN_SAMPLES: u32 = 1024u;
 const FOUR_SAMPLES: u32 = 4096u;
 const LIT_LINES: u32 = 8192u;
-// Whether any line pass is a contour.
+// A line pass is a contour.
 const CONTOURS: u32 = 16384u;
-const ROLES: u32 = 0x100000u;
-const HULL_LOOKS: u32 = 0x400000u;
-const LAYERS: u32 = 0x800000u;
+const PASS_MASKS: u32 = 0x100000u;
+const HULL_MATERIALS: u32 = 0x400000u;
+const PEELING: u32 = 0x800000u;
 const BEHIND_SURFACE: u32 = 0x1000000u;
 const WIRES_ONLY: u32 = 0x2000000u;
-const LAYERED_HULL: u32 = 0x4000000u;
+const PEELED_HULL: u32 = 0x4000000u;
 
-// src/plan/mod.rs explains these bits of a triangle's role.
-const ROLE_LAYER: u32 = 2u;
-const ROLE_FRONT_ONLY: u32 = 8u;
-const ROLE_BACK_ONLY: u32 = 16u;
+// Bits of a triangle's pass mask, see src/plan/mod.rs.
+const PASS_LAYER: u32 = 2u;
+const PASS_FRONT_ONLY: u32 = 8u;
+const PASS_BACK_ONLY: u32 = 16u;
 const DERIVATIVE_NORMALS: u32 = 65536u;
 const VERTEX_COLORS: u32 = 131072u;
 const UVS: u32 = 262144u;
@@ -128,26 +143,27 @@ const TEXTURES: u32 = 524288u;
 const WIRE_MINIMUM: u32 = 0x8000000u;
 const WIRE_LIT: u32 = 0x10000000u;
 const DEBUG: u32 = 0x20000000u;
-// Whether colours change over a triangle at all.
+// Colours vary over a triangle.
 const VARYING: u32 = 0x40000000u;
 
-// What the plan has, of the above. A constant of the pipeline, so that a kernel contains only what its plan needs.
-override LOOK: u32 = 0u;
+// Bits of the above. A constant of the pipeline, so that a kernel contains only the code that its
+// plan needs.
+override PIPELINE_KEY: u32 = 0u;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> batch: Batch;
 
 fn has(flag: u32) -> bool {
-    return (LOOK & flag) != 0u;
+    return (PIPELINE_KEY & flag) != 0u;
 }
 
-// Samples a pixel.
+// Samples per pixel.
 fn sample_count() -> i32 {
     return select(select(select(1, 4, has(FOUR_SAMPLES)), 8, has(EIGHT_SAMPLES)), 16, has(SIXTEEN_SAMPLES));
 }
 
-// Where the visibility buffer has the first sample of the pixel that is number i of the batch's rows.
-fn first_seen(i: u32) -> u32 {
+// Index in the visibility buffer of the first sample of pixel number i of the batch's rows.
+fn first_visibility_sample(i: u32) -> u32 {
     let row = u32(i32(i) / frame.width);
     return batch.samples_at + u32(sample_count()) * (i + 2u * u32(batch.seen_margin) * row);
 }
@@ -183,7 +199,8 @@ fn rn4(v: vec4<f32>) -> vec4<f32> {
 fn recip(w: f32) -> f32 {
     var r = bitcast<f32>(0x7EF311C7u - bitcast<u32>(w));
     for (var i = 0; i < 4; i++) {
-        // The residual is exact close to the end, so that recip(1) is 1 and not the number below it.
+        // The residual is exact close to the end, so that recip(1) is 1 and not the number below
+        // it.
         r = r + rn(r * (1.0 - rn(w * r)));
     }
     return r;
@@ -250,26 +267,40 @@ fn sub_wide(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
     return vec2(a.x - b.x, a.y - b.y - select(0u, 1u, a.x < b.x));
 }
 
-// Of a value >= 0.
+// The f32 of a value >= 0.
 fn wide_to_f32(v: vec2<u32>) -> f32 {
     return rn(f32(v.y) * 4294967296.0) + f32(v.x);
 }
 
-// Where sample s is, in 1/16 px from sample_corner(): a nibble a sample, the first lowest, as sample_offsets() in src/plan/mod.rs.
+// Positions of samples as sample_offsets() in src/plan/mod.rs has them, in 1/16 px: a nibble per
+// sample, the first lowest.
+const ONE_SAMPLE_XY: u32 = 0x8u;
+const FOUR_SAMPLES_X: u32 = 0xA2E6u;
+const FOUR_SAMPLES_Y: u32 = 0xEA62u;
+const EIGHT_SAMPLES_X: u32 = 0xFB135D79u;
+const EIGHT_SAMPLES_Y: u32 = 0x1F7D39B5u;
+const SIXTEEN_SAMPLES_X_FIRST: u32 = 0xBDA3C579u;
+const SIXTEEN_SAMPLES_X_LAST: u32 = 0x1EF02486u;
+const SIXTEEN_SAMPLES_Y_FIRST: u32 = 0x3BD67A59u;
+const SIXTEEN_SAMPLES_Y_LAST: u32 = 0x0F48C21Eu;
+// Common remainder of the 16 samples' positions modulo 1/16 px, in 1/256 px.
+const SIXTEEN_SAMPLES_SHIFT: i32 = 8;
+
+// Position of sample s, in 1/16 px from sample_corner().
 fn sample_step(s: i32) -> vec2<i32> {
-    var x = 0x8u;
-    var y = 0x8u;
+    var x = ONE_SAMPLE_XY;
+    var y = ONE_SAMPLE_XY;
     if has(FOUR_SAMPLES) {
-        x = 0xA2E6u;
-        y = 0xEA62u;
+        x = FOUR_SAMPLES_X;
+        y = FOUR_SAMPLES_Y;
     }
     if has(EIGHT_SAMPLES) {
-        x = 0xFB135D79u;
-        y = 0x1F7D39B5u;
+        x = EIGHT_SAMPLES_X;
+        y = EIGHT_SAMPLES_Y;
     }
     if has(SIXTEEN_SAMPLES) {
-        x = select(0xBDA3C579u, 0x1EF02486u, s >= 8);
-        y = select(0x3BD67A59u, 0x0F48C21Eu, s >= 8);
+        x = select(SIXTEEN_SAMPLES_X_FIRST, SIXTEEN_SAMPLES_X_LAST, s >= 8);
+        y = select(SIXTEEN_SAMPLES_Y_FIRST, SIXTEEN_SAMPLES_Y_LAST, s >= 8);
     }
     let nibble = 4u * u32(s & 7);
     return vec2<i32>(vec2((x >> nibble) & 15u, (y >> nibble) & 15u));
@@ -281,7 +312,7 @@ fn sample_offset(s: i32) -> vec2<i32> {
 }
 
 fn sample_shift() -> i32 {
-    return select(0, 8, has(SIXTEEN_SAMPLES));
+    return select(0, SIXTEEN_SAMPLES_SHIFT, has(SIXTEEN_SAMPLES));
 }
 
 // Upper left corner of a pixel in 1/256 px from the picture's centre.

@@ -1,15 +1,17 @@
-// How a pixel's colours lie over each other. Shared by ink and resolve.
+// Stages lines and resolve: compositing over the background. The CPU's is in
+// src/backend/cpu/resolve.rs.
 
-// Whether a pixel's colour is that of everything: then the sign of its alpha is set. Else it is the surface's over nothing.
-fn is_laid(color: vec4<f32>) -> bool {
+// True if the background is part of a pixel's colour already: then the sign of its alpha is set.
+// Otherwise the colour is the surface's over nothing.
+fn is_composited(color: vec4<f32>) -> bool {
     return (bitcast<u32>(color.w) >> 31u) == 1u;
 }
 
-// Sets or unsets that sign.
-fn flipped(color: vec4<f32>) -> vec4<f32> {
+// Sets or clears that sign.
+fn flip_alpha_sign(color: vec4<f32>) -> vec4<f32> {
     return vec4(color.xyz, bitcast<f32>(bitcast<u32>(color.w) ^ 0x80000000u));
 }
 
-fn lay_over(surface: vec4<f32>, background: vec4<f32>) -> vec4<f32> {
+fn over_background(surface: vec4<f32>, background: vec4<f32>) -> vec4<f32> {
     return surface + rn4(background * (1.0 - surface.w));
 }

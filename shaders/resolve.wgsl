@@ -1,24 +1,25 @@
-// Stage 5, a pixel: surface over background, where no ink has been laid over both, to sRGB bytes. Twin of src/backend/cpu/resolve.rs.
+// Stage resolve, per pixel: surface over background, where no line has composited both, to sRGB
+// bytes. Twin of src/backend/cpu/resolve.rs.
 
-// Of the surface over nothing, or of everything, which over.wgsl tells apart.
+// Per pixel, the surface over nothing or the finished colour; over.wgsl tells them apart.
 @group(1) @binding(9) var<storage, read> colors: array<vec4<f32>>;
 // thresholds[k] is the smallest linear value that is stored as k + 1 or more.
 @group(1) @binding(13) var<storage, read> thresholds: array<f32>;
 @group(1) @binding(14) var<storage, read_write> rgba: array<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * 64u;
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
     }
     var c = frame.background;
     if has(SURFACE | HULL | LINES) {
         c = colors[i];
-        if has(LINES) && is_laid(c) {
-            c = flipped(c);
+        if has(LINES) && is_composited(c) {
+            c = flip_alpha_sign(c);
         } else {
-            c = lay_over(c, frame.background);
+            c = over_background(c, frame.background);
         }
     }
     rgba[i] = encode(c);
@@ -31,14 +32,15 @@ fn encode(c: vec4<f32>) -> u32 {
     var color = c.xyz;
     var alpha = 255u;
     if c.w < 1.0 {
-        // Of what is fainter no bit is left.
+        // The bound keeps recip in its range: fainter colours leave no bit.
         color = rn3(color * recip(max(c.w, 1e-30)));
         alpha = u32(rn(c.w * 255.0) + 0.5);
     }
     return srgb(color.x) | (srgb(color.y) << 8u) | (srgb(color.z) << 16u) | (alpha << 24u);
 }
 
-// How many thresholds are not above v. The formula comes within one step of it, the table decides.
+// Number of thresholds that are not above v. The formula is within one step of it; the table
+// decides.
 fn srgb(v: f32) -> u32 {
     let c = clamp(v, 0.0, 1.0);
     let encoded = select(1.055 * exp2(log2(max(c, 1e-6)) * (1.0 / 2.4)) - 0.055, 12.92 * c, c <= 0.0031308);

@@ -1,12 +1,13 @@
-// Stage 1b, a triangle that reaches behind the eye or far outside the picture: what is left of it goes to the work list, as
-// a fan of up to six triangles. Twin of src/backend/cpu/geometry/clip.rs.
+// Stage transform, per triangle that reaches behind the eye or far outside the picture: clips it
+// and appends the rest, a fan of up to six triangles, to the work list. Twin of
+// src/backend/cpu/geometry/clip.rs.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn clip(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * 64u;
-    if i >= batch.count || is_over() {
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
+    if i >= batch.count || is_peeling_done() {
         return;
     }
     let t = batch.first + i;
@@ -22,23 +23,25 @@ fn clip(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) 
     // Half of the array holds the polygon, the other half takes what a plane leaves of it.
     var len = 3u;
     for (var plane = 0u; plane < 5u; plane++) {
-        len = cut(plane, len, 8u * (plane & 1u));
+        len = cut(plane, len, CORNERS_MAX * (plane & 1u));
     }
-    let first = snap_clipped(corners[8]);
-    var before = snap_clipped(corners[9]);
+    let first = snap_clipped(corners[CORNERS_MAX]);
+    var before = snap_clipped(corners[CORNERS_MAX + 1u]);
     for (var k = 2u; k < len; k++) {
-        let next = snap_clipped(corners[8u + k]);
+        let next = snap_clipped(corners[CORNERS_MAX + k]);
         draw_piece(Corners(first, before, next), t);
         before = next;
     }
 }
 
 // A triangle cut by five planes has at most eight corners.
-var<private> corners: array<vec4<f32>, 16>;
+const CORNERS_MAX: u32 = 8u;
+
+var<private> corners: array<vec4<f32>, 2u * CORNERS_MAX>;
 
 // Cuts the polygon at `base` by a plane; returns how many corners are left.
 fn cut(plane: u32, len: u32, base: u32) -> u32 {
-    let to = 8u - base;
+    let to = CORNERS_MAX - base;
     var left = 0u;
     if len == 0u {
         return 0u;
@@ -48,12 +51,13 @@ fn cut(plane: u32, len: u32, base: u32) -> u32 {
     for (var i = 1u; i <= len; i++) {
         let b = corners[base + select(i, 0u, i == len)];
         let d_b = plane_distance(plane, b);
-        if d_a >= 0.0 && left < 8u {
+        if d_a >= 0.0 && left < CORNERS_MAX {
             corners[to + left] = a;
             left++;
         }
-        if (d_a >= 0.0) != (d_b >= 0.0) && left < 8u {
-            // Always from the inside to the outside: the neighbour across the edge gets the same point, bit for bit.
+        if (d_a >= 0.0) != (d_b >= 0.0) && left < CORNERS_MAX {
+            // Always from the inside to the outside: the neighbour across the edge gets the same
+            // point, bit for bit.
             let from_a = d_a >= 0.0;
             corners[to + left] = intersect(select(b, a, from_a), select(a, b, from_a), max(d_a, d_b), min(d_a, d_b));
             left++;
@@ -67,8 +71,8 @@ fn cut(plane: u32, len: u32, base: u32) -> u32 {
 fn draw_piece(v: Corners, t: u32) {
     let bounds = pixel_bounds(vec3(v.a.x, v.b.x, v.c.x), vec3(v.a.y, v.b.y, v.c.y));
     let area = area_of(v.a, v.b, v.c);
-    if bounds.x <= bounds.z && bounds.y <= bounds.w && is_wanted(t, area) {
-        postpone(setup_of(v.a, v.b, v.c, area), bounds.zw - bounds.xy, t);
+    if bounds.x <= bounds.z && bounds.y <= bounds.w && passes_culling(t, area) {
+        append_work_item(setup_of(v.a, v.b, v.c, area), bounds.zw - bounds.xy, t);
     }
 }
 

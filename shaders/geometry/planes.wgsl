@@ -1,4 +1,5 @@
-// Clipping in homogeneous coordinates: what triangles (clip.wgsl) and edges (lines.wgsl) share.
+// Stage transform: clipping in homogeneous coordinates, shared by triangles (clip.wgsl) and edges
+// (edge.wgsl).
 
 // Bound of clipped coordinates, a little inside the guard band so that rounding cannot leave it.
 const BOUND: f32 = 1048064.0;
@@ -25,15 +26,16 @@ fn intersect(inside: vec4<f32>, outside: vec4<f32>, d_inside: f32, d_outside: f3
 }
 
 fn snap_clipped(p: vec4<f32>) -> Vertex {
-    // Where the near plane is far nearer than f32 is exact, rounding may leave W behind it, or behind the eye.
+    // With a near plane below the precision of f32, rounding may move W behind it, or behind the
+    // eye.
     let r = recip(max(p.w, frame.near_w));
     let x = clamp(rn(p.x * r), -BOUND, BOUND);
     let y = clamp(rn(p.y * r), -BOUND, BOUND);
     return Vertex(round_to_i32(x), round_to_i32(y), rn(p.z * r), r);
 }
 
-// Whether all coordinates are numbers below 2^64, by their exponents, because what compilers make of comparisons with others is
-// theirs. No step of clipping overflows then; what has others is not drawn.
+// True if all coordinates are numbers below 2^64: then no step of clipping overflows. Tests
+// exponents, because compilers may treat comparisons with infinity and NaN as they like.
 fn is_moderate(p: vec4<f32>) -> bool {
     return all((bitcast<vec4<u32>>(p) & vec4(0x7F800000u)) < vec4(0x5F800000u));
 }

@@ -1,4 +1,4 @@
-// Visibility samples where the device has 64-bit atomics: one maximum takes depth and id together.
+// Stage visibility, per sample, with 64-bit atomics: one maximum takes depth and id together.
 
 @group(1) @binding(4) var<storage, read_write> samples: array<atomic<u64>>;
 

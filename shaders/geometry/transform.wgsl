@@ -1,4 +1,5 @@
-// Stage 1, a vertex: unit box to snapped screen coordinates. Twin of src/backend/cpu/geometry/transform.rs.
+// Stage transform, per vertex: unit box to snapped screen coordinates. Twin of
+// src/backend/cpu/geometry/transform.rs.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(3) var<storage, read_write> vertices: array<Vertex>;
@@ -6,9 +7,9 @@
 // Farthest a snapped coordinate may lie from the picture's centre: 4096 px.
 const GUARD: f32 = 1048576.0;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn transform(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * 64u;
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
     }

@@ -1,4 +1,4 @@
-// A triangle on screen: its area, depth plane and edge functions. Shared by visibility, shade and lines.
+// Stage visibility: a triangle's area, depth plane and edge functions. Shared with shade and lines.
 
 struct Setup {
     // Snapped corners, in an order that makes the area positive.
@@ -22,7 +22,7 @@ fn is_zero(v: vec2<u32>) -> bool {
     return (v.x | v.y) == 0u;
 }
 
-// Of a triangle whose area is not 0.
+// The setup of a triangle whose area is not 0.
 fn setup_of(a: Vertex, b_in: Vertex, c_in: Vertex, area: vec2<u32>) -> Setup {
     var b = b_in;
     var c = c_in;
@@ -55,7 +55,8 @@ fn depth_at(s: Setup, p: vec2<i32>) -> f32 {
     return min(max(z, s.depth_range.x), s.depth_range.y);
 }
 
-// First and last pixel (x, y, x, y) that three corners span inside the batch's columns and rows; empty if first > last.
+// First and last pixel (x, y, x, y) that three corners span inside the batch's columns and rows;
+// empty if first > last.
 fn pixel_bounds(x: vec3<i32>, y: vec3<i32>) -> vec4<i32> {
     let half = vec2(frame.width, frame.height) * 128;
     let low = vec2(min(min(x.x, x.y), x.z), min(min(y.x, y.y), y.z));

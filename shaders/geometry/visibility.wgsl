@@ -1,14 +1,16 @@
-// Stage 2, a triangle: which samples it owns, and how near it is there. Twin of src/backend/cpu/geometry/visibility.rs.
+// Stage visibility, per triangle: the samples that it covers, and its depth at each. Twin of
+// src/backend/cpu/geometry/visibility.rs.
 //
-// A thread draws a triangle of up to 16 x 16 pixels itself; larger ones go to the work list for visibility_tile.wgsl.
+// A thread draws a triangle of up to 16 x 16 pixels itself; larger ones go to the work list for
+// visibility_tile.wgsl.
 
 // Triangles of this size in 1/256 px have edge values that fit 32 bits.
 const SMALL: i32 = 4096;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * 64u;
-    if i >= batch.count || is_over() {
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
+    if i >= batch.count || is_peeling_done() {
         return;
     }
     let t = batch.first + i;
@@ -23,7 +25,7 @@ fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
         return;
     }
     let area = area_of(v.a, v.b, v.c);
-    if !is_wanted(t, area) {
+    if !passes_culling(t, area) {
         return;
     }
     let size_x = max(max(x.x, x.y), x.z) - min(min(x.x, x.y), x.z);
@@ -32,7 +34,7 @@ fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
     if max(size_x, size_y) <= SMALL {
         draw_small(setup, bounds, t);
     } else {
-        postpone(setup, bounds.zw - bounds.xy, t);
+        append_work_item(setup, bounds.zw - bounds.xy, t);
     }
 }
 

@@ -1,5 +1,9 @@
-// Stage 2, large triangles: a workgroup at a time, tile by tile of 64 x 64 pixels. First each thread tests a block of 8 x 8
-// pixels against the edges, then all threads together fill the blocks that are left, a thread a pixel.
+// Stage visibility, per large triangle: a workgroup draws tile by tile of 64 x 64 pixels. No twin:
+// the CPU has one loop for all sizes. First each thread tests a block of 8 x 8 pixels against the
+// edges, then all threads together fill the blocks that are left, one thread per pixel.
+
+// Pixels along a side of a tile.
+const TILE_PX: i32 = 64;
 
 struct WorkList {
     large: u32,
@@ -10,10 +14,10 @@ struct WorkList {
 @group(1) @binding(5) var<storage, read> work: WorkList;
 
 // Edge values at the corner of each block that is not empty, and which block it is.
-var<workgroup> blocks: array<vec4<i32>, 64>;
+var<workgroup> blocks: array<vec4<i32>, WORKGROUP>;
 var<workgroup> block_count: atomic<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn visibility_tile(
     @builtin(workgroup_id) workgroup: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
@@ -25,7 +29,8 @@ fn visibility_tile(
     }
     let huge_end = min(work.huge, batch.huge_end);
     for (var i = batch.huge_first; i < huge_end; i++) {
-        // Every workgroup takes every n-th tile; beginning elsewhere for each triangle evens out the load.
+        // Every workgroup takes every n-th tile; beginning elsewhere for each triangle evens out
+        // the load.
         let start = (workgroup.x + i * 61u) % groups.x;
         draw_item(batch.capacity - 1u - i, i32(thread), i32(start), i32(groups.x));
     }
@@ -33,9 +38,9 @@ fn visibility_tile(
 
 // Draws every step-th tile of an item.
 fn draw_item(item: u32, thread: i32, start: i32, step: i32) {
-    let x = work.items[3u * item];
-    let y = work.items[3u * item + 1u];
-    let depth = work.items[3u * item + 2u];
+    let x = work.items[ITEM_VECTORS * item];
+    let y = work.items[ITEM_VECTORS * item + 1u];
+    let depth = work.items[ITEM_VECTORS * item + 2u];
     let s = Setup(
         bitcast<vec3<i32>>(x.xyz),
         bitcast<vec3<i32>>(y.xyz),
@@ -44,9 +49,9 @@ fn draw_item(item: u32, thread: i32, start: i32, step: i32) {
     );
     let e = edges_of(s);
     let bounds = pixel_bounds(s.x, s.y);
-    let tiles = (bounds.zw - bounds.xy) / 64 + 1;
+    let tiles = (bounds.zw - bounds.xy) / TILE_PX + 1;
     for (var i = start; i < tiles.x * tiles.y; i += step) {
-        draw_tile(s, e, bounds, bounds.xy + 64 * vec2(i % tiles.x, i / tiles.x), thread, x.w);
+        draw_tile(s, e, bounds, bounds.xy + TILE_PX * vec2(i % tiles.x, i / tiles.x), thread, x.w);
     }
 }
 
@@ -74,7 +79,7 @@ fn draw_tile(s: Setup, e: Edges, bounds: vec4<i32>, tile: vec2<i32>, thread: i32
             draw_pixel(s, e, found.xyz, in_block, pixel, id);
         }
     }
-    // Nobody may empty the list while another still reads it.
+    // The list must not be emptied while another thread reads it.
     workgroupBarrier();
 }
 

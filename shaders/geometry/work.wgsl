@@ -1,4 +1,5 @@
-// Where visibility.wgsl and clip.wgsl get triangles from, and the list of those that visibility_tile.wgsl draws.
+// Stage visibility: the triangles that visibility.wgsl and clip.wgsl read, and the work list of
+// large ones for visibility_tile.wgsl.
 
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;
@@ -11,10 +12,10 @@ struct Work {
 };
 
 @group(1) @binding(5) var<storage, read_write> work: Work;
-// A byte a triangle.
-@group(1) @binding(24) var<storage, read> roles: array<u32>;
-// By layer: whether there may be another behind it.
-@group(1) @binding(28) var<storage, read> rounds: array<u32>;
+// One byte per triangle.
+@group(1) @binding(24) var<storage, read> pass_masks: array<u32>;
+// Per layer: 1 if there may be another behind it.
+@group(1) @binding(28) var<storage, read> peel_rounds: array<u32>;
 
 // Triangles of this many pixels, in the picture, are shared out over all workgroups.
 const HUGE_PX: i32 = 128;
@@ -37,37 +38,37 @@ fn is_outside(v: Corners) -> bool {
     return v.a.x == OUTSIDE || v.b.x == OUTSIDE || v.c.x == OUTSIDE;
 }
 
-// Whether the batch draws triangle t, which has this area.
-fn is_wanted(t: u32, area: vec2<u32>) -> bool {
+// True if the batch draws triangle t of this area: pass mask and face culling.
+fn passes_culling(t: u32, area: vec2<u32>) -> bool {
     if is_zero(area) {
         return false;
     }
     var faces = batch.faces;
-    if has(ROLES) && batch.role != 0u {
-        let role = roles[t / 4u] >> (8u * (t & 3u));
-        if (role & batch.role) == 0u {
+    if has(PASS_MASKS) && batch.pass_bit != 0u {
+        let mask = pass_masks[t / 4u] >> (8u * (t & 3u));
+        if (mask & batch.pass_bit) == 0u {
             return false;
         }
-        if (role & (ROLE_FRONT_ONLY | ROLE_BACK_ONLY)) != 0u {
-            faces = select(2u, 1u, (role & ROLE_FRONT_ONLY) != 0u);
+        if (mask & (PASS_FRONT_ONLY | PASS_BACK_ONLY)) != 0u {
+            faces = select(FACES_BACK, FACES_FRONT, (mask & PASS_FRONT_ONLY) != 0u);
         }
     }
-    return faces == 0u || (faces == 1u) == is_negative(area);
+    return faces == FACES_BOTH || (faces == FACES_FRONT) == is_negative(area);
 }
 
-// Whether the round before this one has found that there is nothing left.
-fn is_over() -> bool {
-    return has(LAYERS) && batch.layer > 0u && rounds[batch.layer - 1u] == 0u;
+// True if the previous round of depth peeling has left nothing to find.
+fn is_peeling_done() -> bool {
+    return has(PEELING) && batch.layer > 0u && peel_rounds[batch.layer - 1u] == 0u;
 }
 
-fn postpone(s: Setup, size: vec2<i32>, id: u32) {
+fn append_work_item(s: Setup, size: vec2<i32>, id: u32) {
     var slot: u32;
     if max(size.x, size.y) < HUGE_PX {
         slot = atomicAdd(&work.large, 1u);
     } else {
         slot = batch.capacity - 1u - atomicAdd(&work.huge, 1u);
     }
-    work.items[3u * slot] = vec4(bitcast<vec3<u32>>(s.x), id);
-    work.items[3u * slot + 1u] = vec4(bitcast<vec3<u32>>(s.y), bitcast<u32>(s.depth_range.x));
-    work.items[3u * slot + 2u] = vec4(bitcast<vec3<u32>>(s.depth), bitcast<u32>(s.depth_range.y));
+    work.items[ITEM_VECTORS * slot] = vec4(bitcast<vec3<u32>>(s.x), id);
+    work.items[ITEM_VECTORS * slot + 1u] = vec4(bitcast<vec3<u32>>(s.y), bitcast<u32>(s.depth_range.x));
+    work.items[ITEM_VECTORS * slot + 2u] = vec4(bitcast<vec3<u32>>(s.depth), bitcast<u32>(s.depth_range.y));
 }

@@ -1,9 +1,10 @@
-// Stage 4, an edge's faces: which side of the surface an edge belongs to, and whether the surface ends there. Twin of
-// src/backend/cpu/lines/contour.rs; lines.wgsl declares the buffers.
+// Stage lines, per edge: selects silhouettes and removes edges of faces that face away. Twin of
+// src/backend/cpu/lines/contour.rs; edge.wgsl declares the buffers.
 
 const NO_FACE: u32 = 0xFFFFFFFFu;
 
-// Whether the pass draws the edge in this view: not on the far side of a closed surface; of a contour only the silhouette.
+// True if the pass draws the edge in this view: not on the far side of a closed surface, and for a
+// contour only the silhouette.
 fn is_drawn(edge: vec4<u32>) -> bool {
     let is_contour = is_contour_pass();
     if (batch.line_flags & SKIP_BACK) == 0u && !is_contour {
@@ -15,8 +16,8 @@ fn is_drawn(edge: vec4<u32>) -> bool {
     if !is_contour {
         return true;
     }
-    // The faces lie on one side of the edge on screen, and none on the other; or there is only one, even if that is seen from
-    // its very edge.
+    // A silhouette: all faces lie on one side of the edge on screen, or there is only one face,
+    // even if it is seen edge-on.
     if edge.w == NO_FACE {
         return true;
     }
@@ -29,9 +30,9 @@ fn is_contour_pass() -> bool {
     return has(CONTOURS) && (batch.line_flags & CONTOUR) != 0u;
 }
 
-// Whether a face of a closed surface shows nothing of its edges. Of a contour, one seen from its very edge does not either.
+// True if a face of a closed surface hides its edges. For a contour, a face seen edge-on does too.
 fn is_hidden(face: u32, is_contour: bool) -> bool {
-    return looks_away(face) || (is_contour && is_edge_on(face));
+    return faces_away(face) || (is_contour && is_edge_on(face));
 }
 
 fn is_edge_on(face: u32) -> bool {
@@ -41,7 +42,7 @@ fn is_edge_on(face: u32) -> bool {
     return a.x != OUTSIDE && b.x != OUTSIDE && c.x != OUTSIDE && is_zero(area_of(a, b, c));
 }
 
-// On which side of the edge a face lies on screen: -1, 1, or 0 where it is seen from its very edge or is not there.
+// Side of the edge on which a face lies on screen: -1, 1, or 0 if it is seen edge-on or is missing.
 fn side_of(edge: vec4<u32>, face: u32) -> i32 {
     if face == NO_FACE {
         return 0;
@@ -56,7 +57,7 @@ fn side_of(edge: vec4<u32>, face: u32) -> i32 {
         let area = area_of(a, b, c);
         return select(select(1, -1, is_negative(area)), 0, is_zero(area));
     }
-    // Where a corner is behind the eye, by the side of the face's plane on which the eye is.
+    // With a corner behind the eye, the side of the face's plane on which the eye is decides.
     let volume = volume_of(homogeneous_of(edge.x), homogeneous_of(edge.y), homogeneous_of(corner));
     return i32(volume > 0.0) - i32(volume < 0.0);
 }
@@ -69,15 +70,15 @@ fn volume_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
     return (rn(rn(x) * r.x) + rn(rn(y) * r.y)) + rn(rn(w) * r.w);
 }
 
-// The face whose light falls on the edge's line where the pixel sees no surface, plus 1: of those that look at the viewer the one
-// with the highest id, so that the order of edges does not matter; of any, where none does.
-fn lit_by(edge: vec4<u32>) -> u32 {
-    let best = max(select(edge.z + 1u, 0u, looks_away(edge.z)), select(edge.w + 1u, 0u, looks_away(edge.w)));
+// The face that lights the edge's line where the pixel shows no surface, plus 1. Of the faces
+// towards the viewer it is the one with the highest id, so that the order of edges does not matter.
+fn lighting_face(edge: vec4<u32>) -> u32 {
+    let best = max(select(edge.z + 1u, 0u, faces_away(edge.z)), select(edge.w + 1u, 0u, faces_away(edge.w)));
     return select(edge.z + 1u, best, best > 0u);
 }
 
-// Whether a face is certainly turned away. A missing face is: it shows nothing.
-fn looks_away(face: u32) -> bool {
+// True if a face certainly faces away. A missing face does.
+fn faces_away(face: u32) -> bool {
     if face == NO_FACE {
         return true;
     }

@@ -1,41 +1,37 @@
-// Stage 4, a pixel: the union of the strokes that touch it, laid over what is there. Twin of src/backend/cpu/lines/coverage.rs.
+// Stage lines, per pixel: the union of its strokes, composited over the colours. Twin of
+// src/backend/cpu/lines/coverage.rs.
 
-// What each sample sees; 0 where it sees nothing.
+// Visibility buffer; 0 where a sample shows nothing.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
-// What lies over each sample.
-@group(1) @binding(27) var<storage, read> layered: array<Layered>;
-// Of the surface, a pixel each, over nothing; where a line is, over the background and under the lines so far, which over.wgsl
-// tells apart. Then the light on the pass's lines, a pixel each.
+// Peeled layers per sample.
+@group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
+// Per pixel, the surface over nothing or, where a line is, the finished colour so far; over.wgsl
+// tells them apart. Then, per pixel, the light on the pass's lines.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
-// Of each pixel, what stroke.wgsl says.
+// Strokes per pixel, as stroke_words.wgsl lays them out.
 @group(1) @binding(12) var<storage, read_write> strokes: array<u32>;
-// Of each pass.
+// Per pass.
 @group(1) @binding(17) var<storage, read> line_colors: array<vec4<f32>>;
-// Of each sample, the points that stand with it, as stroke.wgsl numbers them.
-@group(1) @binding(29) var<storage, read> cells: array<u32>;
+// Per sample, the points assigned to it, as stroke.wgsl numbers them.
+@group(1) @binding(29) var<storage, read> sample_masks: array<u32>;
 
-override STROKE_WORDS: u32 = 0u;
+// Strokes in a pixel that may all differ from their points by the largest difference. Of more
+// strokes, some overlap.
+const STROKES_SIDE_BY_SIDE: f32 = 4.0;
 
-// Words of the points of a pixel.
-const MASK_WORDS: u32 = 8u;
-const POINTS: u32 = 256u;
-
-// Strokes beside each other in a pixel whose areas may all be as far from their points as the farthest. Of more, some lie over
-// others.
-const BESIDE: f32 = 4.0;
-
-// Surfaces that show less than this leave no trace: a tenth of a byte's last step in the most transparent of pictures.
+// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
+// pictures.
 const ALPHA_MIN: f32 = 1e-4;
 
-@compute @workgroup_size(64)
-fn ink(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * 64u;
+@compute @workgroup_size(WORKGROUP)
+fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
     }
-    // Where there is no surface, nobody has written anything yet.
+    // Without a surface nothing has written the colours yet.
     if (batch.line_flags & FIRST_PASS) != 0u && !has(SURFACE | HULL) {
-        colors[i] = flipped(frame.background);
+        colors[i] = flip_alpha_sign(frame.background);
     }
     let at = STROKE_WORDS * i;
     let sum = area_sum(at);
@@ -44,19 +40,19 @@ fn ink(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) g
         return;
     }
     let points = covered_points(at);
-    let cover = coverage(sum, all, points, slack_of(at));
+    let cover = covered_share(sum, all, points, slack_of(at));
     if cover > 0.0 {
         var color = line_colors[batch.line_pass];
         var under = colors[i];
-        if is_laid(under) {
-            under = flipped(under);
+        if is_composited(under) {
+            under = flip_alpha_sign(under);
         } else {
-            under = lay_over(uncovered(i, under, points, rn(color.w * batch.line_peak)), frame.background);
+            under = over_background(uncovered(i, under, points, rn(color.w * batch.line_peak)), frame.background);
         }
         if (batch.line_flags & LIT_PASS) != 0u {
             color = lit_color(color, colors[batch.count + i].xy);
         }
-        colors[i] = flipped(rn4(cover * color) + rn4(under * (1.0 - rn(cover * color.w))));
+        colors[i] = flip_alpha_sign(rn4(cover * color) + rn4(under * (1.0 - rn(cover * color.w))));
     }
     // For the next pass.
     for (var w = 0u; w < STROKE_WORDS; w++) {
@@ -64,24 +60,24 @@ fn ink(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) g
     }
 }
 
-// Of the strokes at `at`: the sum of their areas, two words.
+// Sum of the areas of the strokes at `at`, two words.
 fn area_sum(at: u32) -> vec2<u32> {
-    return vec2(strokes[at], strokes[at + 2u] & 0xFFFFu);
+    return vec2(strokes[at + AREA_WORD], strokes[at + CARRY_WORD] & 0xFFFFu);
 }
 
 // The sum of their points.
 fn point_sum(at: u32) -> vec2<u32> {
-    return vec2(strokes[at + 1u], strokes[at + 2u] >> 16u);
+    return vec2(strokes[at + COUNT_WORD], strokes[at + CARRY_WORD] >> 16u);
 }
 
 // Most that the area of one of them differs from its points'.
 fn slack_of(at: u32) -> u32 {
-    return strokes[at + 11u];
+    return strokes[at + SLACK_WORD];
 }
 
 // A word of the points that any of them covers.
 fn mask_word(at: u32, w: u32) -> u32 {
-    return strokes[at + 3u + w];
+    return strokes[at + MASK_WORD + w];
 }
 
 fn covered_points(at: u32) -> u32 {
@@ -92,25 +88,26 @@ fn covered_points(at: u32) -> u32 {
     return points;
 }
 
-// How much of a pixel the strokes cover, 0 to the lines' peak.
-fn coverage(sum: vec2<u32>, all: vec2<u32>, points: u32, slack: u32) -> f32 {
+// Covered share of a pixel, 0 to the lines' peak.
+fn covered_share(sum: vec2<u32>, all: vec2<u32>, points: u32, slack: u32) -> f32 {
     if (sum.x | sum.y) == 0u {
         return 0.0;
     }
     if points == POINTS && (all.x > POINTS || all.y > 0u) {
         return batch.line_peak;
     }
-    var covered = wide_to_f32(sum) * (1.0 / 65536.0);
+    var covered = wide_to_f32(sum) * (1.0 / AREA_UNIT);
     if all.x > points || all.y > 0u {
         covered = rn(covered * (f32(points) / wide_to_f32(all)));
     }
     let of_points = rn(f32(points) * (batch.line_peak * (1.0 / 256.0)));
-    let beyond = rn(f32(slack) * (BESIDE / 65536.0));
+    let beyond = rn(f32(slack) * (STROKES_SIDE_BY_SIDE / AREA_UNIT));
     return min(min(max(covered, of_points - beyond), of_points + beyond), batch.line_peak);
 }
 
-// The surface's colour in a pixel, where it has the share of what lines leave uncovered that it has there. At its border that is
-// not its share of the pixel, because a line along the border covers one side as much as the other.
+// The surface's colour, weighted by its share of what lines leave uncovered. At the surface's
+// border this differs from its share of the pixel, because a line along the border covers both
+// sides alike.
 fn uncovered(i: u32, surface: vec4<f32>, points: u32, opacity: f32) -> vec4<f32> {
     if !has(SURFACE | HULL) || !(surface.w > ALPHA_MIN && surface.w < 1.0) {
         return surface;
@@ -119,8 +116,8 @@ fn uncovered(i: u32, surface: vec4<f32>, points: u32, opacity: f32) -> vec4<f32>
     return vec4(color.xyz, min(color.w, 1.0));
 }
 
-// How much more of what shows beside and through a line is surface than of the pixel. Of each point shows 1, or, where the line
-// covers it, 1 - opacity.
+// Ratio of the surface's share beside and through a line to its share of the pixel. A point counts
+// 1, or 1 - opacity where the line covers it.
 fn weight(i: u32, points: u32, opacity: f32) -> f32 {
     if points == 0u || points == POINTS {
         return 1.0;
@@ -130,13 +127,13 @@ fn weight(i: u32, points: u32, opacity: f32) -> f32 {
     // In points.
     var surface = 0.0;
     var surface_covered = 0.0;
-    let in_base = first_seen(i);
+    let in_base = first_visibility_sample(i);
     for (var s = 0u; s < count; s++) {
         let alpha = shown(in_base + s, i * count + s);
         if alpha > 0.0 {
             var covered = 0u;
             for (var w = 0u; w < MASK_WORDS; w++) {
-                covered += countOneBits(mask_word(at, w) & cells[MASK_WORDS * s + w]);
+                covered += countOneBits(mask_word(at, w) & sample_masks[MASK_WORDS * s + w]);
             }
             surface += rn(alpha * f32(POINTS / count));
             surface_covered += rn(alpha * f32(covered));
@@ -150,13 +147,13 @@ fn weight(i: u32, points: u32, opacity: f32) -> f32 {
     return rn(rn(f32(POINTS) * left) * recip(rn(of_pixel * surface)));
 }
 
-// How much surface a sample sees, 0 to 1, given where it is in the visibility buffer, and among those of the batch.
+// Alpha of the surface at a sample, given its index in the visibility buffer and in the batch.
 fn shown(in_base: u32, sample: u32) -> f32 {
     if samples[in_base].y != 0u {
         return 1.0;
     }
-    if has(LAYERS) {
-        return layered[sample].color.w;
+    if has(PEELING) {
+        return peel_state[sample].color.w;
     }
     return 0.0;
 }

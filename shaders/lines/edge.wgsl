@@ -1,8 +1,9 @@
-// Stage 4, an edge: lines of exact width. Twin of src/backend/cpu/lines/edge.rs.
+// Stage lines, per edge: lines of exact width. Twin of src/backend/cpu/lines/edge.rs.
 //
-// Edges are cut into windows and those into slices of rows: shares, which are dealt out to the threads of a workgroup. A thread
-// works in units: in each it looks along its window once, and when it has found a part, draws it. Where a dispatch may not take too long,
-// it ends after a number of them, and the next one goes on from there.
+// Edges are cut into windows and those into slices of rows: shares, which are dealt out to the
+// threads of a workgroup. A thread works in units: one scan along its window, and the drawing of
+// the interval found. Where dispatches must be short, a thread pauses after a number of units and
+// the next dispatch continues there.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
@@ -11,11 +12,11 @@
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
 // Two vertices, two faces.
 @group(1) @binding(10) var<storage, read> edges: array<vec4<u32>>;
-// Of each pixel, whose light falls on the pass's lines.
+// Per pixel, the face that lights the pass's lines, plus 1.
 @group(1) @binding(11) var<storage, read_write> owners: array<atomic<u32>>;
-// Of each pixel, what stroke.wgsl says.
+// Strokes per pixel, as stroke_words.wgsl lays them out.
 @group(1) @binding(12) var<storage, read_write> strokes: array<atomic<u32>>;
-// How many threads have something left to do; then how far each has come.
+// Number of paused threads, then the state of each.
 @group(1) @binding(21) var<storage, read_write> progress: Progress;
 
 struct Progress {
@@ -27,7 +28,7 @@ struct Progress {
 struct Paused {
     // Its next share, plus 1.
     share: u32,
-    // Of the search in that share: `state` and `radius`, plus 1, or 0 where it has not begun.
+    // `state` and `radius` of the search in that share, plus 1; 0 if it has not begun.
     search: u32,
     begin: f32,
     hidden_from: f32,
@@ -36,13 +37,11 @@ struct Paused {
 // `line_units` where a dispatch may take as long as it takes.
 const NO_LIMIT: u32 = 0xFFFFFFFFu;
 
-const THREADS: u32 = 64u;
+// Per edge of the workgroup, one per thread: end of its shares among all shares.
+var<workgroup> share_ends: array<u32, WORKGROUP>;
 
-// Of the workgroup's edges, one a thread: where its shares end among those of all.
-var<workgroup> share_ends: array<u32, 64>;
-
-@compute @workgroup_size(64)
-fn lines(
+@compute @workgroup_size(WORKGROUP)
+fn edge(
     @builtin(workgroup_id) workgroup: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
@@ -55,7 +54,7 @@ fn lines(
     }
     share_ends[thread] = shares;
     workgroupBarrier();
-    for (var step = 1u; step < THREADS; step *= 2u) {
+    for (var step = 1u; step < WORKGROUP; step *= 2u) {
         var before = 0u;
         if thread >= step {
             before = share_ends[thread - step];
@@ -64,8 +63,8 @@ fn lines(
         share_ends[thread] += before;
         workgroupBarrier();
     }
-    if share_ends[THREADS - 1u] > 0u {
-        draw_shares(batch.first + group * batch.edges_per_group, group * THREADS + thread, thread);
+    if share_ends[WORKGROUP - 1u] > 0u {
+        draw_shares(batch.first + group * batch.edges_per_group, group * WORKGROUP + thread, thread);
     }
 }
 
@@ -75,9 +74,10 @@ fn shares_of(edge: vec4<u32>) -> u32 {
     return select(0u, window_count(s) * batch.line_slices, s.drawn && rows.x <= rows.y);
 }
 
-// Draws every 64th share of the workgroup's, whose edges begin at `first`, from where the thread paused.
+// Draws every 64th share of the workgroup's, whose edges begin at `first`, from where the thread
+// paused.
 fn draw_shares(first: u32, self_at: u32, thread: u32) {
-    let all = share_ends[THREADS - 1u];
+    let all = share_ends[WORKGROUP - 1u];
     let may_pause = batch.line_units != NO_LIMIT;
     var next = thread;
     var paused = Paused(0u, 0u, 0.0, 0.0);
@@ -109,32 +109,32 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
             }
             has_share = true;
         }
-        // Threads that have found a part wait here for those that have not; not where loops are limited, since each look of one would
-        // count for all.
+        // Threads that have found an interval wait here for those that have not. Not where loops
+        // are limited, because there an iteration of one thread counts for all.
         let units_before = units;
-        var part = vec2(0.0);
-        while search.begin < search.range.y && part.x >= part.y && units > 0u {
+        var interval = vec2(0.0);
+        while search.begin < search.range.y && interval.x >= interval.y && units > 0u {
             units--;
-            part = next_part(edge, s, &search);
+            interval = next_interval(edge, s, &search);
             if may_pause {
                 break;
             }
         }
         if units == units_before {
-            // To begin a share is work too.
+            // Starting a share is work too.
             units--;
         }
-        if part.x < part.y {
-            draw_part(edge, s, window, part);
+        if interval.x < interval.y {
+            draw_interval(edge, s, window, interval);
         }
         // Also where it is no number.
         if !(search.begin < search.range.y) {
-            next += THREADS;
+            next += WORKGROUP;
             has_share = false;
         }
     }
     if may_pause {
-        var left = Paused(all + THREADS, 0u, 0.0, 0.0);
+        var left = Paused(all + WORKGROUP, 0u, 0.0, 0.0);
         if next < all {
             atomicAdd(&progress.left, 1u);
             left.share = next + 1u;
@@ -148,10 +148,10 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
     }
 }
 
-// Which of the workgroup's edges a share is of: the first that ends after it.
+// Edge of the workgroup that a share belongs to: the first whose shares end after it.
 fn edge_of_share(share: u32) -> u32 {
     var slot = 0u;
-    for (var step = THREADS / 2u; step > 0u; step /= 2u) {
+    for (var step = WORKGROUP / 2u; step > 0u; step /= 2u) {
         if share_ends[slot + step - 1u] <= share {
             slot += step;
         }
@@ -216,15 +216,16 @@ fn window_of(s: Segment, share: u32) -> Window {
 }
 
 // Draws a part of an edge into the pixels of a share.
-fn draw_part(edge: vec4<u32>, s: Segment, window: Window, part: vec2<f32>) {
+fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32>) {
     let is_lit = (batch.line_flags & LIT_PASS) != 0u;
-    let start = point_at(s, part.x);
-    let end = point_at(s, part.y);
+    let start = point_at(s, interval.x);
+    let end = point_at(s, interval.y);
     var y = window.first;
     var columns = columns_of(s, window.ends, y);
     var x = columns.x;
     while y <= window.rows.y {
-        // Finding a pixel is far cheaper than covering it: threads that have found theirs wait here for those that have not.
+        // Finding a pixel is far cheaper than covering it, so threads that have found theirs wait
+        // here for the others.
         var center = vec2(0.0);
         var at = 0u;
         var found = false;
@@ -238,17 +239,17 @@ fn draw_part(edge: vec4<u32>, s: Segment, window: Window, part: vec2<f32>) {
             center = vec2(f32(x), f32(y)) + 0.5;
             at = u32((y - batch.row_first) * frame.width + x);
             x++;
-            // What is full stays full, whatever else comes; only a lit line still asks whose it is.
+            // A full pixel stays full. Only a lit line goes on, to find the face that lights it.
             found = touches(place_of(s.direction, start - center, end - center)) && owns(s, window, center)
                 && (is_lit || !is_full(at));
         }
         if found && add_stroke(at, s.direction, start - center, end - center) && is_lit {
-            atomicMax(&owners[at], lit_by(edge));
+            atomicMax(&owners[at], lighting_face(edge));
         }
     }
 }
 
-// Whether of all windows of the edge the pixel is this one's.
+// True if the pixel belongs to this window of the edge.
 fn owns(s: Segment, window: Window, center: vec2<f32>) -> bool {
     if window.count == 1u {
         return true;

@@ -1,51 +1,53 @@
-// Stage 4, a piece of an edge: which parts of it nothing hides. Twin of src/backend/cpu/lines/hidden_lines.rs; lines.wgsl declares the
-// buffers.
+// Stage lines, per piece of an edge: hidden-line removal, which finds the intervals that no
+// triangle hides. Twin of src/backend/cpu/lines/hidden_lines.rs; edge.wgsl declares the buffers.
 //
-// The CPU sorts all intervals in which something hides the edge. Here there is no room to keep them, so each part is found by
-// looking again.
+// The CPU sorts all intervals in which something hides the edge. A thread here has no room for
+// them, so it finds one interval per scan along the edge.
 
 const NOTHING: u32 = 0xFFFFFFFFu;
 
-// How much nearer than the edge a surface must be, as a share of depth: what f32 may lose on the way.
-const NEARER: f32 = 1.0000019073486328;
+// Smallest ratio of a hiding surface's depth to the edge's: covers the rounding of f32.
+const NEARER_RATIO: f32 = 1.0000019073486328;
 
-// How far what is on screen may lie from where it should, 1/256 px: half a unit each in which a triangle and an edge are rounded, and some
-// for f32.
-const SNAPPED: f32 = 1.25;
+// Largest position error on screen, 1/256 px: half a unit each for the snapping of a triangle and
+// of an edge, and some for f32.
+const SNAP_ERROR: f32 = 1.25;
 
-// Parts shorter than this are what rounding leaves of an edge beside what hides it. Their round ends would show as dots.
-const CRUMB_PX: f32 = 0.0625;
+// Shortest visible interval, pixels. Shorter ones come from rounding, and their round ends would
+// show as dots.
+const INTERVAL_MIN_PX: f32 = 0.0625;
 
-// Between two surfaces that hide it: there a sliver of surface may have no sample.
-const GAP_PX: f32 = 0.25;
+// Shortest visible interval between two hidden ones, pixels: a sliver of surface there may have no
+// sample.
+const GAP_MIN_PX: f32 = 0.25;
 
 const MIN_POSITIVE: f32 = 1.17549435e-38;
 
-// How the edge's parts in a range of it are found.
+// State of the search for the shown intervals in a range of the edge.
 struct Search {
     range: vec2<f32>,
-    // Pixels beside and beyond the edge whose triangles are asked too.
+    // Pixels beside and beyond the edge whose triangles are candidates too.
     radius: u32,
-    // From where on parts are still to be found; at the range's end there are no more.
+    // Start of the rest to be searched; the range's end when finished.
     begin: f32,
-    // Where the hidden part begins that is being followed to its end.
+    // Start of the hidden interval whose end is not found yet.
     hidden_from: f32,
-    // What has been found out already: nothing, that the range is one part, or where it is hidden.
+    // UNSCANNED, WHOLE (the range is one interval), or INTERVALS.
     state: u32,
 };
 
-const UNASKED: u32 = 0u;
+const UNSCANNED: u32 = 0u;
 const WHOLE: u32 = 1u;
-const PARTS: u32 = 2u;
+const INTERVALS: u32 = 2u;
 
 // More than any place on an edge.
 const BEYOND: f32 = 2.0;
 
-// What triangles hide of a range, as far as one look from `begin` on shows it.
-struct Look {
-    // Up to where the edge is hidden without a gap.
+// Result of one scan along a range, from `begin` on.
+struct Scan {
+    // End of the hidden interval that starts at `begin`.
     until: f32,
-    // Where the next interval begins.
+    // Start of the next hidden interval.
     next: f32,
     any: bool,
 };
@@ -54,58 +56,60 @@ fn begin_search(s: Segment, range: vec2<f32>) -> Search {
     if (batch.line_flags & (SHOWN_VISIBLE | SHOWN_HIDDEN)) == 0u {
         return Search(range, 0u, range.x, BEYOND, WHOLE);
     }
-    if lies_deep(s, range) {
+    if is_fully_hidden(s, range) {
         let shows_hidden = (batch.line_flags & SHOWN_HIDDEN) != 0u;
         return Search(range, 0u, select(range.y, range.x, shows_hidden), BEYOND, WHOLE);
     }
-    return Search(range, 0u, range.x, BEYOND, UNASKED);
+    return Search(range, 0u, range.x, BEYOND, UNSCANNED);
 }
 
-// Looks along the edge once, from where the search is: a part to draw; empty (x >= y) where this look has found none.
-fn next_part(edge: vec4<u32>, s: Segment, search: ptr<function, Search>) -> vec2<f32> {
+// Scans along the edge once and returns an interval to draw; empty (x >= y) if this scan has
+// completed none.
+fn next_interval(edge: vec4<u32>, s: Segment, search: ptr<function, Search>) -> vec2<f32> {
     let range = (*search).range;
     let begin = (*search).begin;
     if (*search).state == WHOLE {
         (*search).begin = range.y;
         return range;
     }
-    let look = look_along(edge, s, *search);
+    let scan = scan_along(edge, s, *search);
     let shows_visible = (batch.line_flags & SHOWN_VISIBLE) != 0u;
-    if (*search).state == UNASKED {
-        if !look.any {
+    if (*search).state == UNSCANNED {
+        if !scan.any {
             (*search).begin = range.y;
             return select(vec2(0.0), range, shows_visible);
         }
-        // Where an edge dives under another surface, a sliver of that may have its samples beside the edge.
-        (*search).state = PARTS;
+        // Where an edge passes under another surface, a sliver of that may have its samples only
+        // beside the edge.
+        (*search).state = INTERVALS;
         (*search).radius = 1u;
         return vec2(0.0);
     }
     let hidden_from = (*search).hidden_from;
-    if look.until > begin {
-        // Hidden from here on, perhaps farther than this look has shown.
+    if scan.until > begin {
+        // Hidden from here on, perhaps farther than this scan has shown.
         (*search).hidden_from = min(hidden_from, begin);
-        (*search).begin = look.until;
-        return select(vec2(0.0), vec2(min(hidden_from, begin), range.y), !shows_visible && look.until >= range.y);
+        (*search).begin = scan.until;
+        return select(vec2(0.0), vec2(min(hidden_from, begin), range.y), !shows_visible && scan.until >= range.y);
     }
-    let end = min(look.next, range.y);
+    let end = min(scan.next, range.y);
     (*search).begin = end;
     (*search).hidden_from = BEYOND;
     if !shows_visible {
         return vec2(hidden_from, begin);
     }
     let is_gap = begin > range.x && end < range.y;
-    let is_part = end - begin > rn(s.inverse_length * select(CRUMB_PX, GAP_PX, is_gap));
-    return select(vec2(0.0), vec2(begin, end), is_part);
+    let is_interval = end - begin > rn(s.inverse_length * select(INTERVAL_MIN_PX, GAP_MIN_PX, is_gap));
+    return select(vec2(0.0), vec2(begin, end), is_interval);
 }
 
-// Asks each triangle that is seen along the edge what it hides.
-fn look_along(edge: vec4<u32>, s: Segment, search: Search) -> Look {
+// Combines the hidden intervals of all triangles visible along the edge.
+fn scan_along(edge: vec4<u32>, s: Segment, search: Search) -> Scan {
     let count = u32(sample_count());
-    // Of the pixel itself, and of one on each side of it across the edge.
+    // Samples of the pixel itself and, with a radius, of one on each side of it across the edge.
     let words = count * (2u * search.radius + 1u);
     let across = select(vec2(1, 0), vec2(0, 1), abs(s.along.x) >= abs(s.along.y));
-    var look = Look(search.begin, 2.0, false);
+    var scan = Scan(search.begin, 2.0, false);
     var recent = vec4(NOTHING);
     var last = vec2(OUTSIDE);
     let beyond = f32(search.radius) * s.inverse_length;
@@ -123,23 +127,23 @@ fn look_along(edge: vec4<u32>, s: Segment, search: Search) -> Look {
                 continue;
             }
             recent = vec4(id, recent.xyz);
-            var part = hidden_by(edge, s, id);
-            part = vec2(max(part.x, search.range.x), min(part.y, search.range.y));
-            if part.x >= part.y {
+            var interval = hidden_by(edge, s, id);
+            interval = vec2(max(interval.x, search.range.x), min(interval.y, search.range.y));
+            if interval.x >= interval.y {
                 continue;
             }
-            look.any = true;
-            if part.x <= look.until {
-                look.until = max(look.until, part.y);
+            scan.any = true;
+            if interval.x <= scan.until {
+                scan.until = max(scan.until, interval.y);
             } else {
-                look.next = min(look.next, part.x);
+                scan.next = min(scan.next, interval.x);
             }
         }
     }
-    return look;
+    return scan;
 }
 
-// Id and depth (its bits) that a sample of a pixel sees.
+// Id and depth bits of a sample.
 fn seen_at(pixel: vec2<i32>, sample: u32) -> vec2<u32> {
     if !has_samples(pixel) {
         return vec2(NOTHING, 0u);
@@ -149,15 +153,15 @@ fn seen_at(pixel: vec2<i32>, sample: u32) -> vec2<u32> {
     return vec2(select(~word.x, NOTHING, word.y == 0u), word.y);
 }
 
-// Whether a pixel of the picture, or beyond, is in the visibility buffer.
+// True if the visibility buffer holds a pixel of the picture or beyond.
 fn has_samples(pixel: vec2<i32>) -> bool {
     return all(pixel >= vec2(-batch.seen_margin, batch.seen_first))
         && all(pixel < vec2(frame.width + batch.seen_margin, batch.seen_end));
 }
 
-// Whether all triangles that are seen along the edge are nearer than any of it.
-fn lies_deep(s: Segment, range: vec2<f32>) -> bool {
-    let nearest = rn(max(depth_of(s, 0.0), depth_of(s, 1.0)) * NEARER);
+// True if every triangle visible along the edge is nearer than all of it.
+fn is_fully_hidden(s: Segment, range: vec2<f32>) -> bool {
+    let nearest = rn(max(depth_of(s, 0.0), depth_of(s, 1.0)) * NEARER_RATIO);
     let count = u32(sample_count());
     var last_id = NOTHING;
     var last = vec2(OUTSIDE);
@@ -188,12 +192,12 @@ fn lies_deep(s: Segment, range: vec2<f32>) -> bool {
     return last_id != NOTHING;
 }
 
-// Where a triangle's records are.
+// Vertex indices of a triangle.
 fn corners_of_id(id: u32) -> vec3<u32> {
     return vec3(triangles[3u * id], triangles[3u * id + 1u], triangles[3u * id + 2u]);
 }
 
-// Where along the edge a triangle lies in front of it; empty (x >= y) where nowhere.
+// Interval of the edge that a triangle hides; empty (x >= y) if none.
 fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     let none = vec2(1.0, 0.0);
     let v = corners_of_id(id);
@@ -221,34 +225,36 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
         is_clockwise = volume_of(p, q, r) > 0.0;
     } else {
         let area = area_of(a, b, c);
-        if is_zero(area) || !may_lie_behind(s, a, b, c) {
+        if is_zero(area) || !may_be_hidden_by(s, a, b, c) {
             return none;
         }
         is_clockwise = !is_negative(area);
     }
     let at_start = sides_of(p, q, r, s.ends.xy, is_clockwise);
     let at_end = sides_of(p, q, r, s.ends.zw, is_clockwise);
-    // What lies on a side from end to end is hidden: two triangles that share it would leave it between them.
+    // An edge along a side counts as inside. Otherwise two triangles that share the side would
+    // leave it visible between them.
     let is_along = (at_start == vec3(0.0)) & (at_end == vec3(0.0));
     if any((at_start <= vec3(0.0)) & (at_end <= vec3(0.0)) & !is_along) {
         return none;
     }
-    var part = vec2(0.0, 1.0);
-    part = narrowed(part, at_start.x, at_end.x);
-    part = narrowed(part, at_start.y, at_end.y);
-    part = narrowed(part, at_start.z, at_end.z);
-    if part.x >= part.y {
+    var interval = vec2(0.0, 1.0);
+    interval = narrowed(interval, at_start.x, at_end.x);
+    interval = narrowed(interval, at_start.y, at_end.y);
+    interval = narrowed(interval, at_start.z, at_end.z);
+    if interval.x >= interval.y {
         return none;
     }
     let slack = slack_of(p, q, r);
     if slack < 0.0 {
         return none;
     }
-    // Depths are compared only where the edge is inside, so that thin triangles need not be continued far.
+    // Depths are compared only where the edge is inside, so that thin triangles need not be
+    // continued far.
     let depths = vec3(p.z, q.z, r.z);
     let ws = vec3(p.w, q.w, r.w);
-    let first = nearer_by(s, at_start, at_end, depths, ws, slack, part.x);
-    let last = nearer_by(s, at_start, at_end, depths, ws, slack, part.y);
+    let first = nearer_by(s, at_start, at_end, depths, ws, slack, interval.x);
+    let last = nearer_by(s, at_start, at_end, depths, ws, slack, interval.y);
     if first <= 0.0 && last <= 0.0 {
         return none;
     }
@@ -256,19 +262,19 @@ fn hidden_by(edge: vec4<u32>, s: Segment, id: u32) -> vec2<f32> {
     if share.x >= share.y {
         return none;
     }
-    let length = part.y - part.x;
-    return vec2(part.x + rn(share.x * length), part.x + rn(share.y * length));
+    let length = interval.y - interval.x;
+    return vec2(interval.x + rn(share.x * length), interval.x + rn(share.y * length));
 }
 
-// Whether the triangle is not farther away than all of the edge, nor beside its box.
-fn may_lie_behind(s: Segment, a: Vertex, b: Vertex, c: Vertex) -> bool {
+// False if the triangle is farther away than all of the edge, or beside its box.
+fn may_be_hidden_by(s: Segment, a: Vertex, b: Vertex, c: Vertex) -> bool {
     let low = vec2<f32>(vec2(min(min(a.x, b.x), c.x), min(min(a.y, b.y), c.y)));
     let high = vec2<f32>(vec2(max(max(a.x, b.x), c.x), max(max(a.y, b.y), c.y)));
     return max(max(a.z, b.z), c.z) > min(s.depths.x, s.depths.y)
         && all(low <= max(s.ends.xy, s.ends.zw)) && all(high >= min(s.ends.xy, s.ends.zw));
 }
 
-// How much the depth of a triangle's plane may be off because of where its corners and the edge are on screen; -1 of one without area.
+// Depth error of a triangle's plane due to snapping; -1 without area.
 fn slack_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
     // So that nothing overflows, by exponents: 2^31.
     let exponents = max(max(exponents_of(p), exponents_of(q)), exponents_of(r));
@@ -281,7 +287,7 @@ fn slack_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>) -> f32 {
     let y = cofactors(vec3(p.w, q.w, r.w), in_x);
     let volume = abs(sum3(rn3(x * in_x)));
     if volume > MIN_POSITIVE {
-        return rn(rn((abs(sum3(rn3(x * in_z))) + abs(sum3(rn3(y * in_z)))) * recip(volume)) * SNAPPED);
+        return rn(rn((abs(sum3(rn3(x * in_z))) + abs(sum3(rn3(y * in_z)))) * recip(volume)) * SNAP_ERROR);
     }
     return -1.0;
 }
@@ -290,7 +296,7 @@ fn exponents_of(p: vec4<f32>) -> vec4<u32> {
     return bitcast<vec4<u32>>(p) & vec4(0x7F800000u);
 }
 
-// What each corner has in common with the other two: a x b of its neighbours.
+// Per corner, a x b of the other two corners.
 fn cofactors(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
     return rn3(a.yzx * b.zxy) - rn3(b.yzx * a.zxy);
 }
@@ -299,7 +305,7 @@ fn sum3(v: vec3<f32>) -> f32 {
     return rn(v.x + v.y) + v.z;
 }
 
-// Of each side of a triangle, twice the area that it spans with a point; positive inside.
+// Per side of a triangle, twice the area that it spans with a point; positive inside.
 fn sides_of(p: vec4<f32>, q: vec4<f32>, r: vec4<f32>, at: vec2<f32>, is_clockwise: bool) -> vec3<f32> {
     let a = rn2(p.xy - rn2(at * p.w));
     let b = rn2(q.xy - rn2(at * q.w));
@@ -318,7 +324,7 @@ fn nearer_by(
     let depth = rn(rn(z.x + z.y) + z.z);
     let scale = rn(rn(w.x + w.y) + w.z);
     if scale > MIN_POSITIVE {
-        return (rn(depth * recip(scale)) - rn(depth_of(s, t) * NEARER)) - slack;
+        return (rn(depth * recip(scale)) - rn(depth_of(s, t) * NEARER_RATIO)) - slack;
     }
     return -1.0;
 }

@@ -1,18 +1,19 @@
-// Stage 4, a pixel: the light that falls on lines which take the surface's. Twin of src/backend/cpu/lines/line_light.rs.
+// Stage lines, per pixel: the surface's light on lit lines. Twin of
+// src/backend/cpu/lines/line_light.rs.
 //
-// Light is affine in the colour that it falls on: the mean over the samples that see the surface, or, where none does, the
-// light on the line's own face.
+// Light is affine in the colour that it falls on: the mean over the samples that see the surface,
+// or, where none does, the light on the line's own face.
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
-// Of the surface, a pixel each; then gain and gloss of the light on lines, a pixel each.
+// Per pixel, the surface's colour; then gain and gloss of the light on lines, one per pixel.
 @group(1) @binding(9) var<storage, read_write> colors: array<vec4<f32>>;
-// A pixel each: a face of the pass's line there, plus 1.
+// Per pixel, the face that lights the pass's lines, plus 1.
 @group(1) @binding(11) var<storage, read_write> owners: array<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn line_light(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * 64u;
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
     }
@@ -24,12 +25,12 @@ fn line_light(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
     owners[i] = 0u;
     let corner = pixel_corner(vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width));
     let samples_px = u32(sample_count());
-    let in_base = first_seen(i);
+    let in_base = first_visibility_sample(i);
     var sum = vec2(0.0);
     var count = 0.0;
     for (var s = 0u; s < samples_px; s++) {
         let word = samples[in_base + s];
-        // Neither a hull nor nothing.
+        // A triangle of the surface, not of the outline mesh.
         if word.y != 0u && ~word.x < frame.triangle_count {
             sum += point_light(~word.x, vec2<f32>(corner + sample_offset(i32(s))));
             count += 1.0;
@@ -42,7 +43,8 @@ fn line_light(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
     colors[batch.count + i] = vec4(sum / count, 0.0, 0.0);
 }
 
-// The light on a triangle at a point, in 1/256 px from the picture's centre, which may lie beside it.
+// The light on a triangle at a point, in 1/256 px from the picture's centre, which may lie beside
+// it.
 fn point_light(id: u32, at: vec2<f32>) -> vec2<f32> {
     let m = material_index(id);
     if (materials[m].flags & MATERIAL_LIT) == 0u {
@@ -56,7 +58,7 @@ fn point_light(id: u32, at: vec2<f32>) -> vec2<f32> {
 
 // Barycentrics of a point of the triangle: those of one beside it do not extrapolate.
 fn inside(v: vec3<f32>) -> vec3<f32> {
-    // NaN, of a triangle seen from its very edge, becomes 0.
+    // NaN, of a triangle seen edge-on, becomes 0.
     let b = select(vec3(0.0), min(v, vec3(1.0)), v > vec3(0.0));
     let sum = (b.x + b.y) + b.z;
     if sum > 0.0 {

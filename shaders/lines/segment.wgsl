@@ -1,5 +1,5 @@
-// Stage 4, an edge on screen: where it lies, and which pixels it passes. Twin of src/backend/cpu/lines/segment.rs; lines.wgsl declares the
-// buffers.
+// Stage lines, per edge: its position on screen and the pixels along it. Twin of
+// src/backend/cpu/lines/segment.rs; edge.wgsl declares the buffers.
 
 // Slack for roundings where only too much is harmless, pixels.
 const SLACK_PX: f32 = 0.05;
@@ -54,7 +54,7 @@ fn homogeneous_of(v: u32) -> vec4<f32> {
     return homogeneous(vec3(positions[3u * v], positions[3u * v + 1u], positions[3u * v + 2u]));
 }
 
-// Whether anything is left of the segment; what that is.
+// Clips a segment in place. False if nothing is left.
 fn clip_segment(ends: vec2<u32>, a: ptr<function, Vertex>, b: ptr<function, Vertex>) -> bool {
     var p = homogeneous_of(ends.x);
     var q = homogeneous_of(ends.y);
@@ -79,7 +79,8 @@ fn clip_segment(ends: vec2<u32>, a: ptr<function, Vertex>, b: ptr<function, Vert
     return true;
 }
 
-// First and last picture row of the batch that a line between these heights may touch; empty if first > last.
+// First and last picture row of the batch that a line between these heights may touch; empty if
+// first > last.
 fn rows_of(a: f32, b: f32) -> vec2<i32> {
     let reach = reach_of_line() + SLACK_PX;
     return vec2(max(i32(min(a, b) - reach), batch.row_first), min(i32(max(a, b) + reach), batch.row_end - 1));

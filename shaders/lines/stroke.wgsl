@@ -1,4 +1,5 @@
-// Stage 4, a stroke in a pixel: how much of the pixel it covers, and where. Twin of src/backend/cpu/lines/stroke.rs.
+// Stage lines, per stroke and pixel: the covered area and the covered points. Twin of
+// src/backend/cpu/lines/stroke.rs.
 
 // Farthest from the middle of a unit box to its corner.
 const BOX_RADIUS: f32 = 0.70710678;
@@ -9,22 +10,18 @@ const UNIT: f32 = 16384.0;
 // Largest scaled area.
 const LIMIT: f32 = 16000.0;
 
-// Words of a pixel's strokes: sum of areas in 1/65536, sum of points, how often either has gone round (areas in the lower half), eight
-// of the points of any, and the most that an area differs from its points'.
-override STROKE_WORDS: u32 = 0u;
-
-// A stroke seen from a pixel: bounds of what its points are compared with, a value each where the line has no ramp.
+// A stroke relative to a pixel: the bounds that the pixel's points are compared with.
 struct Stroke {
     // Unit vector along, in 1/16384.
     along: vec2<i32>,
-    // Of the pixel's centre, pixels: how far from the line.
+    // Distance of the pixel's centre from the line, pixels.
     across: f32,
     // Bounds along.
     first: i32,
     last: i32,
-    // Whether the pixel reaches past the start, and past the end, whose discs then count.
+    // True where the pixel reaches past the start, and past the end, whose discs then count.
     discs: vec2<bool>,
-    // Whether the strip touches the pixel at all.
+    // True if the strip touches the pixel.
     has_strip: bool,
     // From the ends to the pixel's centre, scaled.
     from_start: vec2<i32>,
@@ -46,17 +43,18 @@ fn radius_at(level: u32) -> f32 {
     return rn(half_width + half_ramp) - rn(share * (2.0 * half_ramp));
 }
 
-// Where a pixel's centre lies in the direction of a piece of an edge.
+// Position of a pixel's centre relative to a piece of an edge.
 struct Place {
-    // How far from the line.
+    // Distance from the line.
     across: f32,
-    // How far past the start, and past the end.
+    // Distances past the start and past the end.
     past: vec2<f32>,
-    // How far beyond either.
+    // Distance beyond either end; 0 between them.
     beyond: f32,
 };
 
-// `start` and `end` are the piece's, in pixels from the pixel's centre, `along` the edge's direction.
+// `start` and `end` are the piece's, in pixels from the pixel's centre, `along` the edge's
+// direction.
 fn place_of(along: vec2<f32>, start: vec2<f32>, end: vec2<f32>) -> Place {
     let across = rn(along.y * start.x) - rn(along.x * start.y);
     let past_start = -(rn(along.x * start.x) + rn(along.y * start.y));
@@ -64,13 +62,13 @@ fn place_of(along: vec2<f32>, start: vec2<f32>, end: vec2<f32>) -> Place {
     return Place(across, vec2(past_start, past_end), max(max(-past_start, past_end), 0.0));
 }
 
-// Whether a piece of an edge comes as close to a pixel as its line reaches.
+// True if a piece of an edge is within the line's reach of a pixel.
 fn touches(place: Place) -> bool {
     let reach = reach_of_line();
     return rn(place.across * place.across) + rn(place.beyond * place.beyond) <= rn(reach * reach);
 }
 
-// Adds what a piece of an edge covers of a pixel that it touches to its strokes. Whether it covers anything.
+// Adds the stroke of a piece of an edge to a pixel that it touches. False if it covers nothing.
 fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>) -> bool {
     let reach = reach_of_line();
     let place = place_of(along, start, end);
@@ -102,15 +100,15 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
     }
     let at = pixel_at * STROKE_WORDS;
     var points = 0u;
-    // Zero is a number that compilers do not know: where they unroll this, they take twice as long.
-    for (var w = 0u; w < 8u + frame.zero; w++) {
+    // frame.zero keeps compilers from unrolling the loop, which would take twice as long to run.
+    for (var w = 0u; w < MASK_WORDS + frame.zero; w++) {
         var mask = 0u;
         for (var half = 0u; half < 2u + frame.zero; half++) {
             mask |= points_of(stroke, 2u * w + half) << (16u * half);
         }
         if mask != 0u {
             points += countOneBits(mask);
-            atomicOr(&strokes[at + 3u + w], mask);
+            atomicOr(&strokes[at + MASK_WORD + w], mask);
         }
     }
     if any(reaches) {
@@ -119,29 +117,29 @@ fn add_stroke(pixel_at: u32, along: vec2<f32>, start: vec2<f32>, end: vec2<f32>)
         }
         area = f32(points) * (batch.line_peak * (1.0 / 256.0));
     }
-    let scaled_area = u32(area * 65536.0 + 0.5);
+    let scaled_area = u32(area * AREA_UNIT + 0.5);
     let of_points = u32(rn(f32(points) * (batch.line_peak * 256.0)) + 0.5);
-    atomicMax(&strokes[at + 11u], max(scaled_area, of_points) - min(scaled_area, of_points));
+    atomicMax(&strokes[at + SLACK_WORD], max(scaled_area, of_points) - min(scaled_area, of_points));
     // A sum that has gone round is smaller than what was added.
     var rounds = 0u;
-    if atomicAdd(&strokes[at], scaled_area) + scaled_area < scaled_area {
+    if atomicAdd(&strokes[at + AREA_WORD], scaled_area) + scaled_area < scaled_area {
         rounds = 1u;
     }
-    if atomicAdd(&strokes[at + 1u], points) + points < points {
+    if atomicAdd(&strokes[at + COUNT_WORD], points) + points < points {
         rounds += 0x10000u;
     }
     if rounds > 0u {
-        atomicAdd(&strokes[at + 2u], rounds);
+        atomicAdd(&strokes[at + CARRY_WORD], rounds);
     }
     return true;
 }
 
-// Whether all points of a pixel are covered, so that nothing that comes can change anything.
+// True if all points of a pixel are covered, so that further strokes change nothing.
 fn is_full(pixel_at: u32) -> bool {
-    let counts = pixel_at * STROKE_WORDS + 1u;
-    let at = counts + 2u;
+    let pixel = pixel_at * STROKE_WORDS;
+    let at = pixel + MASK_WORD;
     // One stroke may cover all points and yet leave a corner.
-    if atomicLoad(&strokes[counts]) <= 256u && atomicLoad(&strokes[counts + 1u]) < 0x10000u {
+    if atomicLoad(&strokes[pixel + COUNT_WORD]) <= POINTS && atomicLoad(&strokes[pixel + CARRY_WORD]) < 0x10000u {
         return false;
     }
     // No loop: where loops are limited, the pixels found may be many.
@@ -171,7 +169,8 @@ fn limit_of(radius: f32, away: f32) -> i32 {
     return round_to_i32(clamp(rn(0.5 * (rn(radius * radius) - away)) * square_unit(), -LIMIT, LIMIT));
 }
 
-// The bounds that the sixteen points of a word of the mask are compared with: across, and for the discs.
+// The bounds that the sixteen points of a word of the mask are compared with: across, and for the
+// discs.
 struct Bounds {
     low: i32,
     high: i32,
@@ -187,18 +186,19 @@ fn bounds_of(stroke: Stroke, word: u32) -> Bounds {
     return Bounds(units(-radius - stroke.across), units(radius - stroke.across), discs);
 }
 
-// Which points of a word a stroke covers.
+// Points of a word that a stroke covers.
 fn points_of(stroke: Stroke, word: u32) -> u32 {
     let bounds = bounds_of(stroke, word);
     return four_points(stroke, bounds, word, 0u) | four_points(stroke, bounds, word, 4u)
         | four_points(stroke, bounds, word, 8u) | four_points(stroke, bounds, word, 12u);
 }
 
-// Bit j of word l is point 16 j + l, here for j from `first` on. Where a point lies: i steps to the right, 181 i down.
+// Bit j of word l is point 16 j + l, here for j from `first` on. Where a point lies: i steps to the
+// right, 181 i down.
 fn four_points(stroke: Stroke, bounds: Bounds, word: u32, first: u32) -> u32 {
     let i = 16u * (vec4(first) + vec4(0u, 1u, 2u, 3u)) + word;
     let x = (2 * vec4<i32>(i) - 255) * 128;
-    let y = (2 * vec4<i32>((181u * i) & vec4(255u)) - 255) * 128;
+    let y = (2 * vec4<i32>((GENERATOR * i) & vec4(POINTS - 1u)) - 255) * 128;
     var covered = vec4(false);
     if stroke.has_strip {
         let across = ((-stroke.along.y * x) >> vec4(16u)) + ((stroke.along.x * y) >> vec4(16u));
@@ -223,8 +223,8 @@ fn product(v: vec2<i32>, x: vec4<i32>, y: vec4<i32>) -> vec4<i32> {
     return ((v.x * x) >> vec4(16u)) + ((v.y * y) >> vec4(16u));
 }
 
-// Coverage of a pixel's box by a strip whose middle is that far away: the integral over the strip's width of a trapezoid of
-// area 1.
+// Coverage of a pixel's box by a strip whose middle is that far away: the integral over the strip's
+// width of a trapezoid of area 1.
 fn strip_area(normal: vec2<f32>, distance: f32) -> f32 {
     let n = abs(normal);
     let half_ramp = 0.5 * batch.line_smoothing;

@@ -1,69 +1,71 @@
-// Stage 3b, a pixel: a layer's colours, under those of the layers before it. Twin of src/backend/cpu/peeling/composite.rs.
+// Stage shade, per pixel: composites a peeled layer's colours under those of the layers in front of
+// it. Twin of src/backend/cpu/peeling/composite.rs.
 
-// What was found, as in the visibility buffer.
-@group(1) @binding(26) var<storage, read> layer: array<vec2<u32>>;
-@group(1) @binding(27) var<storage, read_write> layered: array<Layered>;
-// By layer: whether there may be another behind it.
-@group(1) @binding(28) var<storage, read_write> rounds: array<atomic<u32>>;
+// The layer of this round, laid out as the visibility buffer.
+@group(1) @binding(26) var<storage, read> peel_layer: array<vec2<u32>>;
+@group(1) @binding(27) var<storage, read_write> peel_state: array<PeelState>;
+// Per layer: 1 if there may be another behind it.
+@group(1) @binding(28) var<storage, read_write> peel_rounds: array<atomic<u32>>;
 
-@compute @workgroup_size(64)
-fn layers(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = gid.x + gid.y * groups.x * 64u;
+@compute @workgroup_size(WORKGROUP)
+fn composite(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
     }
-    if batch.layer > 0u && atomicLoad(&rounds[batch.layer - 1u]) == 0u {
+    if batch.layer > 0u && atomicLoad(&peel_rounds[batch.layer - 1u]) == 0u {
         return;
     }
     let pixel = vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width);
-    if batch.role == 0u {
-        // The layer is wanted for itself.
+    if batch.pass_bit == 0u {
+        // A test reads the layer itself: nothing is shaded.
         for (var s = 0u; s < u32(sample_count()); s++) {
-            _ = take(u32(sample_count()) * i + s);
+            _ = take_layer(u32(sample_count()) * i + s);
         }
-        proceed(u32(sample_count()) * i, u32(sample_count()));
+        flag_pending(u32(sample_count()) * i, u32(sample_count()));
         return;
     }
     let show = Show(!has(WIRES_ONLY), select(frame.layer_fade, 1.0, batch.layer == 0u));
     if sample_count() == 1 {
-        lay(i, group_color(lone_group(take(i)), pixel, show));
-        proceed(i, 1u);
+        accumulate(i, group_color(single_sample_group(take_layer(i)), pixel, show));
+        flag_pending(i, 1u);
         return;
     }
     let first = u32(sample_count()) * i;
     for (var s = 0; s < sample_count(); s++) {
-        _ = take(first + u32(s));
+        _ = take_layer(first + u32(s));
     }
-    // Once for each triangle among the samples.
-    var left = seeing(first);
+    // One iteration per triangle among the samples.
+    var left = seen_samples(first);
     while left != 0u {
         let group = first_group(first, left);
         left &= ~group.same;
         let color = group_color(group, pixel, show);
         for (var s = 0; s < sample_count(); s++) {
             if ((group.same >> u32(s)) & 1u) != 0u {
-                lay(first + u32(s), color);
+                accumulate(first + u32(s), color);
             }
         }
     }
-    proceed(first, u32(sample_count()));
+    flag_pending(first, u32(sample_count()));
 }
 
-// The id that was taken last.
-fn seen(sample: u32) -> u32 {
-    return layered[sample].taken;
+// The triangle of the previous layer at a sample.
+fn triangle_of_sample(sample: u32) -> u32 {
+    return peel_state[sample].taken;
 }
 
-// Takes a sample's find as its last layer: its id, or NOTHING where there is none or where it adds nothing.
-fn take(sample: u32) -> u32 {
-    var so_far = Layered(vec4(0.0), vec2(0u), 0u, 0u);
+// Moves the layer found at a sample to `previous`. Returns its id, or NOTHING where there is none
+// or where it adds no colour.
+fn take_layer(sample: u32) -> u32 {
+    var so_far = PeelState(vec4(0.0), vec2(0u), 0u, 0u);
     if batch.layer > 0u {
-        so_far = layered[sample];
+        so_far = peel_state[sample];
     }
-    let word = layer[sample];
+    let word = peel_layer[sample];
     so_far.previous = word;
     var id = select(~word.x, NOTHING, word.y == 0u);
-    if has(LAYERED_HULL) && id != NOTHING {
+    if has(PEELED_HULL) && id != NOTHING {
         let is_hull = id >= frame.triangle_count;
         let bit = 1u << (hull_material(id) & 31u);
         if is_hull && (so_far.materials & bit) != 0u {
@@ -72,25 +74,25 @@ fn take(sample: u32) -> u32 {
         so_far.materials |= bit;
     }
     so_far.taken = id;
-    layered[sample] = so_far;
+    peel_state[sample] = so_far;
     return id;
 }
 
-// Lays a colour under a sample's others.
-fn lay(sample: u32, color: vec4<f32>) {
-    let so_far = layered[sample].color;
+// Composites a colour under a sample's other layers.
+fn accumulate(sample: u32, color: vec4<f32>) {
+    let so_far = peel_state[sample].color;
     let sum = so_far + rn4((1.0 - so_far.w) * color);
-    layered[sample].color = sum;
+    peel_state[sample].color = sum;
     if sum.w >= 1.0 {
-        layered[sample].previous = vec2(0u);
+        peel_state[sample].previous = vec2(0u);
     }
 }
 
-// Says whether any of some samples may have another layer.
-fn proceed(first: u32, count: u32) {
+// Sets the round's flag if any of some samples may have another layer.
+fn flag_pending(first: u32, count: u32) {
     for (var s = first; s < first + count; s++) {
-        if layered[s].previous.y != 0u && atomicLoad(&rounds[batch.layer]) == 0u {
-            atomicStore(&rounds[batch.layer], 1u);
+        if peel_state[s].previous.y != 0u && atomicLoad(&peel_rounds[batch.layer]) == 0u {
+            atomicStore(&peel_rounds[batch.layer], 1u);
         }
     }
 }

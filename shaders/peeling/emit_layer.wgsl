@@ -1,15 +1,16 @@
-// Where the visibility stage's samples go when it looks for a layer: into that, if they lie behind the layer before it.
+// Stage visibility, per sample of a peeled layer: keeps the nearest triangle behind the previous
+// layer. Twin of src/backend/cpu/peeling/emit_layer.rs.
 
-// The visibility buffer; `samples` is the layer.
+// The visibility buffer; `samples` is bound to the layer.
 @group(1) @binding(26) var<storage, read> base: array<vec2<u32>>;
-@group(1) @binding(27) var<storage, read> layered: array<Layered>;
+@group(1) @binding(27) var<storage, read> peel_state: array<PeelState>;
 
 fn emit(pixel: vec2<i32>, n: i32, z: f32, id: u32) {
     let index = sample_index(pixel.x, pixel.y, n);
     // The visibility buffer's rows may be longer.
     let longer = u32(2 * batch.seen_margin * (pixel.y - batch.row_first) * sample_count());
     let word = vec2(~id, bitcast<u32>(z));
-    if batch.layer > 0u && !is_below(word, layered[index].previous) {
+    if batch.layer > 0u && !is_below(word, peel_state[index].previous) {
         return;
     }
     if !has(BEHIND_SURFACE) && !is_below(base[batch.samples_at + index + longer], word) {

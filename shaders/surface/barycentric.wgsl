@@ -1,10 +1,12 @@
-// Where a point lies in its triangle. Twin of src/backend/cpu/surface/barycentric.rs.
+// Stage shade, per point: its position in its triangle. Twin of
+// src/backend/cpu/surface/barycentric.rs.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
 @group(1) @binding(3) var<storage, read> vertices: array<Vertex>;
 
-// Corners relative to the shaded point, by corner: homogeneous x, y, w, and the factor that each barycentric takes besides.
+// Corners relative to the shaded point, by corner: homogeneous x, y, w, and the factor that each
+// barycentric takes besides.
 struct Corners {
     x: vec3<f32>,
     y: vec3<f32>,
@@ -14,7 +16,7 @@ struct Corners {
     front: bool,
 };
 
-// Snapped corners where there are some; where one is behind the eye, the homogeneous ones, which stay right there.
+// Snapped corners; if one is behind the eye, the homogeneous ones, which are valid there too.
 fn corners_of(id: u32, at: vec2<f32>) -> Corners {
     let a = vertices[triangles[3u * id]];
     let b = vertices[triangles[3u * id + 1u]];
@@ -62,9 +64,10 @@ fn areas_of(c: Corners) -> Areas {
     );
 }
 
-// Perspective-correct barycentrics at a point, and how they change a pixel to the right and a pixel down.
+// Perspective-correct barycentrics at a point, and how they change a pixel to the right and a pixel
+// down.
 struct Barycentrics {
-    // They add up to 1: two are carried, the third is what is left.
+    // They add up to 1: two are computed, the third is the rest.
     value: vec3<f32>,
     dx: vec3<f32>,
     dy: vec3<f32>,
@@ -75,8 +78,8 @@ fn barycentrics(id: u32, at: vec2<f32>) -> Barycentrics {
     return barycentrics_of(corners_of(id, at));
 }
 
-// b_i is proportional to the area opposite the corner, so that the derivatives are exact too. The CPU's bits, if not where
-// it may be quicker because nothing is decided by them.
+// b_i is proportional to the area opposite the corner, so that the derivatives are exact too. The
+// CPU's bits, if not where it may be quicker because nothing is decided by them.
 fn barycentrics_of(c: Corners) -> Barycentrics {
     let areas = areas_of(c);
     let total = (areas.u.x + areas.u.y) + areas.u.z;
@@ -95,15 +98,16 @@ fn barycentrics_of(c: Corners) -> Barycentrics {
     return Barycentrics(value, 256.0 * dx, 256.0 * dy, total < 0.0);
 }
 
-// Distance in pixels from the point to the line on screen that carries the edge opposite corner i, for each.
+// Distance in pixels from the point to the line on screen that carries the edge opposite corner i,
+// for each.
 fn edge_distances_px(c: Corners) -> vec3<f32> {
     let areas = areas_of(c);
     let slope = areas.dx * areas.dx + areas.dy * areas.dy;
     return abs(areas.u) / max(256.0 * sqrt(slope), vec3(1e-30));
 }
 
-// A triangle's barycentrics, continued beyond its edges, in a pixel's centre and in the centres of its neighbours across
-// and down in the same block of 2 x 2 pixels.
+// A triangle's barycentrics, continued beyond its edges, in a pixel's centre and in the centres of
+// its neighbours across and down in the same block of 2 x 2 pixels.
 struct Quad {
     own: vec3<f32>,
     across: vec3<f32>,

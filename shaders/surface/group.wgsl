@@ -1,35 +1,35 @@
-// The samples of a pixel that see the same triangle, and their colour. Shared by shade and layers, whose seen(sample) says what
-// triangle a sample sees.
+// Stage shade, per pixel: groups the samples that show the same triangle. Shared by shade.wgsl and
+// composite.wgsl, each of which defines triangle_of_sample(sample).
 
-@group(1) @binding(24) var<storage, read> roles: array<u32>;
+@group(1) @binding(24) var<storage, read> pass_masks: array<u32>;
 // Colours, then the materials of the surface's triangles and of the hull's.
-@group(1) @binding(25) var<storage, read> hull_looks: array<u32>;
+@group(1) @binding(25) var<storage, read> hull_materials: array<u32>;
 
 const NOTHING: u32 = 0xFFFFFFFFu;
 
 struct Group {
     id: u32,
-    // Which of the pixel's samples, a bit each.
+    // Samples of the group, one bit each.
     same: u32,
     // Their number, and the sum of their offsets in 1/256 px.
     count: i32,
     offset_sum: vec2<i32>,
 };
 
-// Which samples of the pixel whose first one is given see a triangle, a bit each.
-fn seeing(first: u32) -> u32 {
+// Samples of a pixel that show a triangle, one bit each.
+fn seen_samples(first: u32) -> u32 {
     var mask = 0u;
     for (var s = 0; s < sample_count(); s++) {
-        mask |= select(0u, 1u, seen(first + u32(s)) != NOTHING) << u32(s);
+        mask |= select(0u, 1u, triangle_of_sample(first + u32(s)) != NOTHING) << u32(s);
     }
     return mask;
 }
 
 // The triangle that the first of the samples `left` sees, of the pixel whose first sample is given.
 fn first_group(first: u32, left: u32) -> Group {
-    var g = Group(seen(first + firstTrailingBit(left)), 0u, 0, vec2(0));
+    var g = Group(triangle_of_sample(first + firstTrailingBit(left)), 0u, 0, vec2(0));
     for (var s = 0; s < sample_count(); s++) {
-        if seen(first + u32(s)) == g.id {
+        if triangle_of_sample(first + u32(s)) == g.id {
             g.same |= 1u << u32(s);
             g.count++;
             g.offset_sum += sample_offset(s);
@@ -39,7 +39,7 @@ fn first_group(first: u32, left: u32) -> Group {
 }
 
 // The only sample of a pixel.
-fn lone_group(id: u32) -> Group {
+fn single_sample_group(id: u32) -> Group {
     return Group(id, 1u, 1, sample_offset(0));
 }
 
@@ -58,18 +58,18 @@ fn group_color(g: Group, pixel: vec2<i32>, show: Show) -> vec4<f32> {
     return point_color(g.id, vec2<f32>(pixel_corner(pixel)) + mean, show);
 }
 
-// Of an id, the hull's or not.
+// Material index of a triangle, of the surface or of the outline mesh.
 fn hull_material(id: u32) -> u32 {
-    if has(HULL_LOOKS) {
-        return hull_looks[4u * frame.hull_color_count + id];
+    if has(HULL_MATERIALS) {
+        return hull_materials[4u * frame.hull_color_count + id];
     }
     return 0u;
 }
 
 fn hull_color(id: u32) -> vec4<f32> {
-    if !has(HULL_LOOKS) {
+    if !has(HULL_MATERIALS) {
         return frame.hull_color;
     }
     let at = 4u * min(hull_material(id), frame.hull_color_count - 1u);
-    return bitcast<vec4<f32>>(vec4(hull_looks[at], hull_looks[at + 1u], hull_looks[at + 2u], hull_looks[at + 3u]));
+    return bitcast<vec4<f32>>(vec4(hull_materials[at], hull_materials[at + 1u], hull_materials[at + 2u], hull_materials[at + 3u]));
 }

@@ -1,12 +1,18 @@
-// Light without images. Twin of src/backend/cpu/surface/light.rs.
+// Stage shade, per point: light without images. Twin of src/backend/cpu/surface/light.rs.
 //
-// The CPU's bits: a whole flat face has one light, and that may lie on the threshold between two bytes.
+// The CPU's bits: a whole flat face has one light, and that may lie on the threshold between two
+// bytes.
 
-// What light makes of a base colour: base * gain + gloss, in each channel.
+// Effect of light on a base colour: base * gain + gloss, per channel.
 struct Light {
     gain: f32,
     gloss: f32,
 };
+
+// A colour with straight alpha under light, clamped to 1.
+fn lit(base: vec4<f32>, light_here: Light) -> vec4<f32> {
+    return vec4(clamp(rn3(base.xyz * light_here.gain) + light_here.gloss, vec3(0.0), vec3(1.0)), base.w);
+}
 
 // Light on a surface with unit normal n.
 fn light(metallic: f32, roughness: f32, n: vec3<f32>) -> Light {

@@ -1,19 +1,18 @@
-// The colour of one point of the surface: stage 3's formulas. Twin of src/backend/cpu/surface/point.rs.
+// Stage shade, per point: the colour of a point of the surface. Twin of
+// src/backend/cpu/surface/point.rs.
 
-@group(1) @binding(6) var<storage, read> normals: array<f32>;
-// Three indices a triangle, for each kind of corner value that does not go by position.
+// Three indices per triangle, for each kind of corner value that does not go by position.
 @group(1) @binding(7) var<storage, read> corner_triangles: array<u32>;
-// Triangles' materials, then edge masks, a byte each.
+// Triangles' materials, then edge masks, one byte each.
 @group(1) @binding(8) var<storage, read> attributes: array<u32>;
 @group(1) @binding(15) var<storage, read> materials: array<Material>;
-@group(1) @binding(16) var<storage, read> face_normals: array<f32>;
 @group(1) @binding(19) var<storage, read> vertex_colors: array<vec4<f32>>;
 
 // src/plan/surface/mod.rs explains the fields.
 struct Material {
     base_color: vec4<f32>,
-    // Emissive colour, alpha cutoff.
-    emissive: vec4<f32>,
+    emissive: vec3<f32>,
+    alpha_cutoff: f32,
     wire_color: vec4<f32>,
     wire_thickness: f32,
     wire_smoothing: f32,
@@ -26,9 +25,6 @@ struct Material {
     // Four texture uses of eight words.
     textures: array<vec4<u32>, 8>,
 };
-
-// Where normals begin whose index is the plan's own triangles.
-const OWN_TRIANGLES: u32 = 0xFFFFFFFFu;
 
 // Bits of a material's flags.
 const MATERIAL_FILL: u32 = 1u;
@@ -53,14 +49,15 @@ const SLOT_METALLIC_ROUGHNESS: u32 = 1u;
 const SLOT_NORMAL: u32 = 2u;
 const SLOT_EMISSIVE: u32 = 3u;
 
-// What of its material a point shows.
+// Parts of a material that a point shows.
 struct Show {
     fill: bool,
-    // How much of its wires, 0 to 1.
+    // Opacity of the wires, 0 to 1.
     wires: f32,
 };
 
-// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's centre.
+// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's
+// centre.
 fn point_color(id: u32, at: vec2<f32>, show: Show) -> vec4<f32> {
     let m = material_index(id);
     if has(VARYING) {
@@ -72,7 +69,7 @@ fn point_color(id: u32, at: vec2<f32>, show: Show) -> vec4<f32> {
         let normal = turned_to_viewer(face_normal(id), is_front(id, at));
         light_here = light(materials[m].metallic, materials[m].roughness, normal);
     }
-    return premultiplied(lit(base, light_here), materials[m].emissive.xyz);
+    return premultiplied(lit(base, light_here), materials[m].emissive);
 }
 
 fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
@@ -112,12 +109,12 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
             let own = vec2(flags & MATERIAL_OWN_ROUGHNESS, flags & MATERIAL_OWN_METALLIC) != vec2(0u);
             gloss *= select(textured, vec2(1.0), own);
             if use_of(m, SLOT_NORMAL).texture < frame.image_count {
-                n = bumped(id, m, b.front, uv, n);
+                n = normal_mapped(id, m, b.front, uv, n);
             }
         }
         light_here = light(gloss.y, gloss.x, n);
     }
-    var emissive = materials[m].emissive.xyz;
+    var emissive = materials[m].emissive;
     if has(TEXTURES) {
         emissive = rn3(emissive * sample_texture(m, SLOT_EMISSIVE, uv).xyz);
     }
@@ -134,20 +131,6 @@ fn material_index(id: u32) -> u32 {
     return 0u;
 }
 
-fn face_normal(id: u32) -> vec3<f32> {
-    return vec3(face_normals[3u * id], face_normals[3u * id + 1u], face_normals[3u * id + 2u]);
-}
-
-fn normal_at(id: u32, corner: u32) -> vec3<f32> {
-    var v: u32;
-    if frame.normal_triangles_at == OWN_TRIANGLES {
-        v = triangles[3u * id + corner];
-    } else {
-        v = corner_triangles[frame.normal_triangles_at + 3u * id + corner];
-    }
-    return vec3(normals[3u * v], normals[3u * v + 1u], normals[3u * v + 2u]);
-}
-
 fn vertex_color(id: u32, b: Barycentrics) -> vec4<f32> {
     let first = frame.color_triangles_at + 3u * id;
     let p = vertex_colors[corner_triangles[first]];
@@ -155,79 +138,16 @@ fn vertex_color(id: u32, b: Barycentrics) -> vec4<f32> {
     return blend4(b.value, p, q, vertex_colors[corner_triangles[first + 2u]]);
 }
 
-// The unit normal on the viewer's side, without normal textures.
-fn normal(id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> vec3<f32> {
-    let flags = materials[m].flags;
-    if has(DERIVATIVE_NORMALS) && (flags & MATERIAL_DERIVATIVE_NORMALS) != 0u {
-        return derivative_normal(id, at);
-    }
-    if has(FACE_NORMALS) && (flags & MATERIAL_FACE_NORMALS) != 0u {
-        return turned_to_viewer(face_normal(id), b.front);
-    }
-    if has(VERTEX_NORMALS) {
-        return facing(blend3(b.value, normal_at(id, 0u), normal_at(id, 1u), normal_at(id, 2u)), b.front);
-    }
-    return frame.to_viewer.xyz;
-}
-
-// The cross product of the position's fine derivatives in a block of 2 x 2 pixels, as a GPU's rasterizer has them: in f32,
-// errors and all. (The same errors on both back-ends.)
-fn derivative_normal(id: u32, at: vec2<f32>) -> vec3<f32> {
-    let quad = quad_around(id, at);
-    let own = quad_position(id, quad.own);
-    // Large enough that no square vanishes.
-    let dx = rn3((quad_position(id, quad.across) - own) * (4096.0 * quad.sign.x));
-    let dy = rn3((quad_position(id, quad.down) - own) * (4096.0 * quad.sign.y));
-    return unit_or(rn3(dy.yzx * dx.zxy) - rn3(dy.zxy * dx.yzx), frame.to_viewer.xyz);
-}
-
-fn quad_position(id: u32, b: vec3<f32>) -> vec3<f32> {
-    // A neighbour beyond the horizon of the triangle's plane is as far away as that.
-    let w = clamp(b, vec3(-1e6), vec3(1e6));
-    return rn3(blend3(w, corner_position(id, 0u), corner_position(id, 1u), corner_position(id, 2u)));
-}
-
-// The normal that the normal texture makes of n. Its axes are the triangle's own: where u grows, and where v shrinks.
-fn bumped(id: u32, m: u32, front: bool, uv: Uv, n: vec3<f32>) -> vec3<f32> {
-    let used = use_of(m, SLOT_NORMAL);
-    let p = corner_position(id, 0u);
-    let e1 = corner_position(id, 1u) - p;
-    let e2 = corner_position(id, 2u) - p;
-    let first = frame.uv_triangles_at + 3u * id;
-    let t = turned(used, uvs[corner_triangles[first]]);
-    let d1 = turned(used, uvs[corner_triangles[first + 1u]]) - t;
-    let d2 = turned(used, uvs[corner_triangles[first + 2u]]) - t;
-    let turn = rn(d1.x * d2.y) - rn(d2.x * d1.y);
-    if !(abs(turn) > 1e-30 && abs(turn) < 1e30) {
-        return n;
-    }
-    // Seen from behind, a bump is a dent. v runs down in the image, and the texture's y up.
-    let side = select(-1.0, 1.0, (turn > 0.0) == front);
-    let along_u = side * (e1 * d2.y - e2 * d1.y);
-    let along_up = side * (e1 * d2.x - e2 * d1.x);
-    let tangent = unit_or(across(along_u, n), vec3(0.0));
-    let up = unit_or(across(across(along_up, n), tangent), vec3(0.0));
-    let v = 2.0 * sample_texture(m, SLOT_NORMAL, uv).xyz - 1.0;
-    let x = v.x * materials[m].normal_scale;
-    let y = v.y * materials[m].normal_scale;
-    return unit_or((x * tangent + y * up) + v.z * n, n);
-}
-
-// What the material makes of alpha.
+// The base colour with the material's cutoff, blending and opacity applied to alpha.
 fn with_alpha(m: u32, base: vec4<f32>, show: Show) -> vec4<f32> {
     let flags = materials[m].flags;
     // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.
     let alpha = clamp(base.w, 0.0, 1.0);
-    let is_cut = (flags & MATERIAL_MASK) != 0u && alpha < materials[m].emissive.w;
+    let is_cut = (flags & MATERIAL_MASK) != 0u && alpha < materials[m].alpha_cutoff;
     if is_cut || !show.fill || (flags & MATERIAL_FILL) == 0u {
         return vec4(0.0);
     }
     return vec4(base.xyz, rn(select(1.0, alpha, (flags & MATERIAL_BLEND) != 0u) * materials[m].opacity));
-}
-
-// A straight colour under light, as bright as can be shown.
-fn lit(base: vec4<f32>, light_here: Light) -> vec4<f32> {
-    return vec4(clamp(rn3(base.xyz * light_here.gain) + light_here.gloss, vec3(0.0), vec3(1.0)), base.w);
 }
 
 fn premultiplied(straight: vec4<f32>, emissive: vec3<f32>) -> vec4<f32> {
@@ -242,36 +162,6 @@ fn lit_wire(cover: f32, wire: vec4<f32>, base: vec4<f32>, light_here: Light, emi
     return vec4(clamp(lit, vec3(0.0), vec3(max(painted.w, 0.0))) + rn3(emissive * left), painted.w);
 }
 
-// A face's normal on the viewer's side: at unit length already, so that it keeps its bits.
-fn turned_to_viewer(n: vec3<f32>, front: bool) -> vec3<f32> {
-    return select(-n, n, front);
-}
-
-// The unit normal on the viewer's side, of what corners' normals blend to.
-fn facing(n: vec3<f32>, front: bool) -> vec3<f32> {
-    let length_squared = dot(n, n);
-    var scale = 0.0;
-    if length_squared > 1e-20 {
-        scale = 1.0 / sqrt(length_squared);
-    }
-    return n * select(-scale, scale, front);
-}
-
-fn unit_or(v: vec3<f32>, otherwise: vec3<f32>) -> vec3<f32> {
-    let length_squared = dot(v, v);
-    if length_squared > 1e-20 && length_squared < 1e30 {
-        return v / sqrt(length_squared);
-    }
-    return otherwise;
-}
-
 fn over(cover: f32, top: vec4<f32>, under: vec4<f32>) -> vec4<f32> {
     return rn4(cover * top) + rn4(under * (1.0 - rn(cover * top.w)));
-}
-
-// What of v is at right angles to the unit vector n, at length about 1 where that is not nothing.
-fn across(v: vec3<f32>, n: vec3<f32>) -> vec3<f32> {
-    let largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
-    let scaled = select(v, v / largest, largest > 0.0);
-    return scaled - dot(scaled, n) * n;
 }

@@ -1,11 +1,22 @@
-// Texture lookups. Twin of src/backend/cpu/surface/texture.rs: the same bits, because texels decide what a mask leaves and where
-// nearest texels change.
+// Stage shade, per point: texture lookups. Twin of src/backend/cpu/surface/texture.rs: the same
+// bits, because texels decide what a mask leaves and where nearest texels change.
 
 @group(1) @binding(18) var<storage, read> uvs: array<vec2<f32>>;
 // Four items an image, as src/plan/surface/mod.rs has them; then texels, two halves a word.
 @group(1) @binding(20) var<storage, read> texels: array<vec2<u32>>;
 
-// Coordinates beyond this have no fraction worth speaking of.
+// Items of the texels' buffer per image, in front of the texels.
+const IMAGE_VECTORS: u32 = 4u;
+
+// Bits of a texture use's sampler: a wrap mode across, one down, and whether the nearest texel is
+// taken.
+const WRAP_BITS: u32 = 3u;
+const WRAP_DOWN_SHIFT: u32 = 2u;
+const WRAP_REPEAT: u32 = 0u;
+const WRAP_MIRROR: u32 = 1u;
+const SAMPLER_NEAREST: u32 = 16u;
+
+// Largest coordinate: beyond it f32 has too few fractional bits.
 const UV_MAX: f32 = 1048576.0;
 
 // Texture coordinates at a point, and how they change a pixel to the right and a pixel down.
@@ -40,7 +51,7 @@ fn use_of(m: u32, slot: u32) -> Use {
 }
 
 // A difference of coordinates, as the texture sees it.
-fn turned(used: Use, d: vec2<f32>) -> vec2<f32> {
+fn transformed(used: Use, d: vec2<f32>) -> vec2<f32> {
     return vec2(rn(used.u.x * d.x) + rn(used.u.y * d.y), rn(used.v.x * d.x) + rn(used.v.y * d.y));
 }
 
@@ -57,16 +68,16 @@ fn sample_texture(m: u32, slot: u32, uv: Uv) -> vec4<f32> {
     if used.texture >= frame.image_count {
         return vec4(1.0);
     }
-    let words = texels[4u * used.texture + 1u];
-    let first = texels[4u * used.texture + 2u].x + 4u * frame.image_count;
-    let image = Image(texels[4u * used.texture], words.x, words.y, first);
-    let at = bounded(turned(used, uv.at) + vec2(used.u.z, used.v.z), UV_MAX);
+    let words = texels[IMAGE_VECTORS * used.texture + 1u];
+    let first = texels[IMAGE_VECTORS * used.texture + 2u].x + IMAGE_VECTORS * frame.image_count;
+    let image = Image(texels[IMAGE_VECTORS * used.texture], words.x, words.y, first);
+    let at = bounded(transformed(used, uv.at) + vec2(used.u.z, used.v.z), UV_MAX);
     let size = vec2<f32>(image.size);
-    let x = rn2(turned(used, uv.dx) * size);
-    let y = rn2(turned(used, uv.dy) * size);
+    let x = rn2(transformed(used, uv.dx) * size);
+    let y = rn2(transformed(used, uv.dy) * size);
     let step = max(rn(x.x * x.x) + rn(x.y * x.y), rn(y.x * y.x) + rn(y.y * y.y));
     let lod = max(min(half_log2(step), f32(image.levels) - 1.0), f32(image.first_level));
-    if (used.sampler & 16u) != 0u {
+    if (used.sampler & SAMPLER_NEAREST) != 0u {
         return nearest(image, u32(lod + 0.5), at, used.sampler);
     }
     let level = u32(lod);
@@ -78,7 +89,7 @@ fn sample_texture(m: u32, slot: u32, uv: Uv) -> vec4<f32> {
     return fine;
 }
 
-// Finite, and near enough to have a fraction.
+// Clamps a coordinate to the range with fractional bits; NaN and infinity are 0.
 fn bounded(v: vec2<f32>, most: f32) -> vec2<f32> {
     return clamp(select(vec2(0.0), v, abs(v) <= vec2(1e30)), vec2(-most), vec2(most));
 }
@@ -94,8 +105,8 @@ fn half_log2(v: f32) -> f32 {
 fn bilinear(image: Image, level_in: u32, at: vec2<f32>, sampler: u32) -> vec4<f32> {
     let level = min(level_in, max(image.levels, 1u) - 1u);
     let size = level_size(image, level);
-    let across = neighbours(at.x, size.x, sampler & 3u);
-    let down = neighbours(at.y, size.y, (sampler >> 2u) & 3u);
+    let across = neighbours(at.x, size.x, sampler & WRAP_BITS);
+    let down = neighbours(at.y, size.y, (sampler >> WRAP_DOWN_SHIFT) & WRAP_BITS);
     let first = i32(level_start(image, level));
     let upper_row = first + down.low * size.x;
     let lower_row = first + down.high * size.x;
@@ -107,7 +118,7 @@ fn bilinear(image: Image, level_in: u32, at: vec2<f32>, sampler: u32) -> vec4<f3
 fn nearest(image: Image, level_in: u32, at: vec2<f32>, sampler: u32) -> vec4<f32> {
     let level = min(level_in, max(image.levels, 1u) - 1u);
     let size = level_size(image, level);
-    let modes = vec2(sampler & 3u, (sampler >> 2u) & 3u);
+    let modes = vec2(sampler & WRAP_BITS, (sampler >> WRAP_DOWN_SHIFT) & WRAP_BITS);
     let x = texel_index(i32(floor(rn(wrapped(at.x, modes.x) * f32(size.x)))), size.x, modes.x);
     let y = texel_index(i32(floor(rn(wrapped(at.y, modes.y) * f32(size.y)))), size.y, modes.y);
     return texel(i32(level_start(image, level)) + y * size.x + x);
@@ -141,10 +152,10 @@ fn neighbours(u: f32, size: i32, mode: u32) -> Neighbours {
 
 // A coordinate in 0 to 1.
 fn wrapped(u: f32, mode: u32) -> f32 {
-    if mode == 0u {
+    if mode == WRAP_REPEAT {
         return u - floor(u);
     }
-    if mode == 1u {
+    if mode == WRAP_MIRROR {
         return 1.0 - abs((u - 2.0 * floor(0.5 * u)) - 1.0);
     }
     return clamp(u, 0.0, 1.0);
@@ -152,7 +163,7 @@ fn wrapped(u: f32, mode: u32) -> f32 {
 
 // A texel that may lie one beyond the edge.
 fn texel_index(i: i32, size: i32, mode: u32) -> i32 {
-    if mode == 0u {
+    if mode == WRAP_REPEAT {
         return select(select(i, i - size, i >= size), i + size, i < 0);
     }
     // The mirror's first texel beyond the edge is the last before it.

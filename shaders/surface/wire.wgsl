@@ -1,4 +1,5 @@
-// Wires from barycentric coordinates. Twin of src/backend/cpu/surface/wire.rs.
+// Stage shade, per point: wires from barycentric coordinates. Twin of
+// src/backend/cpu/surface/wire.rs.
 
 // 1 on the wire, 0 away from it.
 fn wire_cover(id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> f32 {
@@ -16,7 +17,8 @@ fn wire_cover(id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> f32 {
     }
     let nearest = min_drawn(drawn, b.value);
     if (flags & MATERIAL_WIRE_FWIDTH_MIN) != 0u {
-        // As a GPU's derivatives of the minimum would be: across a corner's bisector they mix two coordinates.
+        // As a GPU's derivatives of the minimum would be: across a corner's bisector they mix two
+        // coordinates.
         let quad = quad_around(id, at);
         let own = min_drawn(drawn, quad.own);
         let d = abs(min_drawn(drawn, quad.across) - own) + abs(min_drawn(drawn, quad.down) - own);

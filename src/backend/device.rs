@@ -1,17 +1,18 @@
-//! A GPU as seen by whoever chooses a back-end: what can be known before, and told after, it is opened.
+//! An opened GPU as the choice of a back-end needs it: the hint before it is opened, its status
+//! afterwards.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use super::{DrawError, Renderer};
 
-/// What is known about the machine before any driver is loaded. Loading Vulkan to find out costs time, and a software one
-/// brings a whole compiler with it.
+/// Knowledge about the machine before any driver is loaded. Loading Vulkan to find out costs time,
+/// and a software one brings a whole compiler with it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HardwareHint {
-    /// There cannot be a hardware GPU.
+    /// There is certainly no hardware GPU.
     None {
-        /// How that is known.
+        /// The reason.
         reason: String,
     },
     /// There may be one.
@@ -25,7 +26,7 @@ impl HardwareHint {
     }
 }
 
-/// Which adapters may be opened.
+/// Adapters that may be opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GpuKind {
     /// Any, a software Vulkan included.
@@ -34,7 +35,7 @@ pub enum GpuKind {
     Hardware,
 }
 
-/// What was opened.
+/// The opened device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GpuInfo {
     /// The adapter's name.
@@ -47,15 +48,15 @@ pub struct GpuInfo {
     pub features: Vec<&'static str>,
 }
 
-/// An opened device, as far as choosing a back-end goes.
+/// An opened device, as the choice of a back-end needs it.
 pub trait GpuDevice: Send + Sync {
-    /// What was opened.
+    /// The opened device.
     fn info(&self) -> &GpuInfo;
 
-    /// Whether it is a processor that plays GPU.
+    /// True for a software implementation on the CPU.
     fn is_software(&self) -> bool;
 
-    /// Why it is gone, if it is.
+    /// The reason if the device is lost.
     fn lost(&self) -> Option<&str>;
 
     /// A renderer on it, for one thread.
@@ -65,18 +66,18 @@ pub trait GpuDevice: Send + Sync {
 /// Opens a device.
 pub type Opener = dyn Fn(GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> + Send + Sync;
 
-/// How it stands with the GPU.
+/// Status of the GPU, for reports.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GpuStatus {
-    /// In one word.
+    /// The state.
     pub state: GpuState,
-    /// What was opened last.
+    /// The device opened last.
     pub info: Option<GpuInfo>,
     /// Why there is no GPU, or why `auto` means the CPU in spite of it.
     pub reason: Option<String>,
 }
 
-/// How it stands with the GPU, in one word.
+/// State of the GPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GpuState {
     /// No job needed it yet.
@@ -101,7 +102,7 @@ impl GpuState {
     }
 }
 
-/// Drops what belongs to a device that may be gone: wgpu may panic then, which is nobody's concern any more.
-pub(super) fn let_go<T>(thing: T) {
+/// Drops an object of a device that may be lost. wgpu may panic then; the panic is ignored.
+pub(super) fn drop_catching_panics<T>(thing: T) {
     let _ = catch_unwind(AssertUnwindSafe(|| drop(thing)));
 }

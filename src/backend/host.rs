@@ -1,11 +1,12 @@
-//! The process's one GPU: opened on first need, probed before it is used, opened again when it was lost.
+//! The process's one GPU: opened on first need, probed before it is used, opened again when it was
+//! lost.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::DrawError;
-use super::device::{GpuDevice, GpuKind, GpuState, GpuStatus, HardwareHint, Opener, let_go};
+use super::device::{GpuDevice, GpuKind, GpuState, GpuStatus, HardwareHint, Opener, drop_catching_panics};
 use super::probe::probe;
 
 /// Jobs in a row that lost the device, after which `auto` goes on with the CPU.
@@ -29,11 +30,11 @@ struct Slot {
     current: Option<Arc<dyn GpuDevice>>,
     /// Why the first opening failed; it is not tried again.
     failed: Option<String>,
-    /// Whether any opening ever succeeded. From then on a failure counts as a loss.
+    /// True once an opening has succeeded. From then on a failure counts as a loss.
     opened_before: bool,
 }
 
-/// How an opening failed.
+/// Reason of a failed opening.
 enum OpenError {
     /// There is no such device.
     Absent(String),
@@ -47,7 +48,7 @@ impl GpuHost {
         Self::with_opener(hint, Box::new(open))
     }
 
-    /// The host of whatever `open` opens.
+    /// A host whose devices `open` opens.
     pub fn with_opener(hint: HardwareHint, open: Box<Opener>) -> Self {
         let status = match &hint {
             HardwareHint::None { reason } => {
@@ -63,28 +64,30 @@ impl GpuHost {
         Self { open, without, device: Mutex::default(), status: Mutex::new(status), losses: AtomicU32::new(0) }
     }
 
-    /// How it stands. Does not wait for an opening.
+    /// The status. Does not wait for an opening.
     pub fn status(&self) -> GpuStatus {
         let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        // There is one then, of software or well again.
+        // A GPU is ready then: a software one, or one that has recovered.
         if status.state == GpuState::Ready {
             status.reason = status.reason.map(|reason| format!("`auto` means the CPU all the same: {reason}"));
         }
         status
     }
 
-    /// Whether `auto` has not yet come to mean the CPU.
+    /// True as long as `auto` may choose a GPU.
     pub fn may_have_hardware(&self) -> bool {
         self.without.get().is_none()
     }
 
-    /// The device that a request of this kind draws on, opened now if need be; workers that come meanwhile wait for it.
+    /// The device for a request of this kind. It is opened on first use; other workers wait
+    /// meanwhile.
     ///
-    /// `NoGpu` is for good. `DeviceLost` means that a device that was there is gone, and that another try may help.
+    /// `NoGpu` is final. `DeviceLost` means that a device that was there is gone, and that another
+    /// try may help.
     pub fn device(&self, kind: GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> {
         self.check_auto(kind)?;
         let mut slot = self.device.lock().unwrap_or_else(PoisonError::into_inner);
-        // Decided, perhaps, by whoever held the lock.
+        // The previous holder of the lock may have decided it.
         self.check_auto(kind)?;
         if let Some(device) = slot.current.clone() {
             let Some(reason) = device.lost().map(str::to_owned) else { return Ok(device) };
@@ -100,7 +103,7 @@ impl GpuHost {
         }
     }
 
-    /// A job found the device lost. Whether it is the first to say so.
+    /// Reports that a job found the device lost. True for the first report.
     pub fn note_lost(&self, device: &Arc<dyn GpuDevice>, reason: &str) -> bool {
         let mut slot = self.device.lock().unwrap_or_else(PoisonError::into_inner);
         let is_current = slot.current.as_ref().is_some_and(|current| Arc::ptr_eq(current, device));
@@ -152,7 +155,7 @@ impl GpuHost {
             self.go_without(format!("{} is no hardware", info.name), false);
         }
         slot.current = Some(device.clone());
-        // Only then, so that its memory is not opened twice.
+        // After it is stored, so that it is not opened twice.
         self.check_auto(kind)?;
         Ok(device)
     }
@@ -167,7 +170,7 @@ impl GpuHost {
             return DrawError::DeviceLost(reason);
         }
         self.go_without(reason.clone(), state == GpuState::Failed);
-        // Where hardware alone is absent there may still be software.
+        // Without hardware there may still be a software implementation.
         if kind == GpuKind::Any || state == GpuState::Failed {
             slot.failed = Some(reason.clone());
         }
@@ -194,14 +197,14 @@ impl GpuHost {
         }
     }
 
-    /// Lets go of a lost device.
+    /// Drops a lost device and reports it.
     fn retire(&self, device: Option<Arc<dyn GpuDevice>>, reason: &str) {
         tracing::warn!(reason, "the GPU was lost");
         self.set_status(|status| {
             status.state = GpuState::Failed;
             status.reason = Some(format!("the GPU was lost: {reason}"));
         });
-        let_go(device);
+        drop_catching_panics(device);
     }
 
     fn open_and_probe(&self, kind: GpuKind) -> Result<Arc<dyn GpuDevice>, OpenError> {
@@ -214,7 +217,7 @@ impl GpuHost {
             probe(&mut *device.clone().renderer()).map_err(|error| OpenError::Unusable(format!("{name}: {error}")))?;
             Ok(device)
         };
-        // A driver that makes wgpu panic must cost the GPU, not the job.
+        // A panic in wgpu disables the GPU but does not fail the job.
         catch_unwind(AssertUnwindSafe(attempt))
             .unwrap_or_else(|_| Err(OpenError::Unusable("opening the GPU panicked; the log has more".to_owned())))
     }

@@ -1,7 +1,13 @@
-//! Two ways to fill a [`DrawPlan`]: [`cpu`] and [`gpu`], with the same stages under the same names:
-//! transform, visibility, shade, lines, resolve.
+//! Two ways to fill a [`DrawPlan`]: [`cpu`] and [`gpu`], with the same stages in the same order:
+//! transform -> visibility -> shade -> lines -> resolve.
 //!
-//! Architecture invariant: nothing here knows a mesh or a scene, and the two back-ends do not know each other.
+//! Each stage is written twice, in twins of the same name: `shaders/ROOM/NAME.wgsl` and
+//! `src/backend/cpu/ROOM/NAME.rs`. The module's tests hold the constants, structs and bindings that
+//! the two share. `select` chooses a back-end per job, `host` owns the process's GPU, and
+//! [`probe`] checks a GPU before it is used.
+//!
+//! **Invariant:** nothing here imports a mesh or a scene, and the two back-ends do not import each
+//! other.
 
 pub mod cpu;
 mod device;
@@ -27,15 +33,16 @@ pub trait Renderer {
 
     /// Fills the visibility buffer alone, for tests that compare back-ends sample for sample.
     ///
-    /// One word a sample at `(y * width + x) * samples + s`: depth bits in the upper half, the complement of the
-    /// triangle id in the lower (so that of equal depths the lowest id wins), 0 where there is nothing.
+    /// One word a sample at `(y * width + x) * samples + s`: depth bits in the upper half, the
+    /// complement of the triangle id in the lower (so that of equal depths the lowest id wins), 0
+    /// where there is nothing.
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError>;
 
     /// `cpu` or `gpu`.
     fn kind(&self) -> BackendKind;
 }
 
-/// Which back-end drew.
+/// A back-end, as reports name it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BackendKind {
     /// Our own rasterizer.
@@ -54,19 +61,22 @@ impl BackendKind {
     }
 }
 
-/// Why a picture could not be filled. Never the client's fault, except that its time was up.
+/// Why a picture could not be filled. Never the client's fault, except for an exceeded deadline.
 #[derive(Debug, thiserror::Error)]
 pub enum DrawError {
-    /// The job's time was up.
+    /// The deadline has passed.
     #[error(transparent)]
     Stopped(#[from] Stopped),
     /// There is no GPU here to draw on.
     #[error("there is no GPU to draw on: {0}")]
     NoGpu(String),
-    /// The device is gone; a fresh one may work.
+    /// The device is lost; a new one may work.
     #[error("the GPU was lost: {0}")]
     DeviceLost(String),
     /// The device refused the work: out of memory, or a plan beyond its limits.
     #[error("the GPU cannot draw this: {0}")]
     Device(String),
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,8 +1,8 @@
-//! Draws a tiny plan on a freshly opened GPU and checks every sample and every pixel, so that a driver that computes wrong
-//! numbers is found out before a client sees them.
+//! Draws a tiny plan on a freshly opened GPU and checks every sample and every pixel, so that a
+//! driver that computes wrong numbers is found out before a client sees them.
 //!
-//! What is right follows from the scene by a formula below, not from the other back-end. Depths are powers of two and edges
-//! keep away from sample positions, so there is no rounding to argue about.
+//! The expected picture follows from a formula below, not from the other back-end. Depths are
+//! powers of two and edges keep away from sample positions, so there is no rounding to argue about.
 
 use super::{DrawError, Renderer};
 use crate::image::srgb8_thresholds;
@@ -12,8 +12,8 @@ use crate::plan::{DrawPlan, Faces, Projection, ShadedMaterial, SurfacePass, samp
 /// Side of the picture: large enough for a triangle that goes the way of large triangles.
 const SIZE_PX: u32 = 24;
 
-/// Pixels from the picture's centre, y up. A small triangle in front, one above all that turns its back, and a wall of two
-/// large triangles that leaves the last four columns free.
+/// Pixels from the picture's centre, y up. A small triangle in front, one above all that turns its
+/// back, and a wall of two large triangles that leaves the last four columns free.
 const POSITIONS: [[f32; 3]; 10] = [
     [-12.0, 12.0, NEAR],
     [-12.0, -0.1875, NEAR],
@@ -31,7 +31,8 @@ const MATERIALS: [u32; 4] = [0, 2, 1, 1];
 const NEAR: f32 = 0.5;
 const FAR: f32 = 0.25;
 
-/// Linear colours of the small triangle, of the wall, of what must not be seen; and of the background.
+/// Linear colours of the small triangle, of the wall, of what must not be seen; and of the
+/// background.
 const COLORS: [[f32; 4]; 3] = [[1.0, 0.25, 0.0, 1.0], [0.0, 0.25, 1.0, 1.0], [0.0, 1.0, 0.0, 1.0]];
 const BACKGROUND: [f32; 4] = [1.0, 1.0, 1.0, 1.0];
 
@@ -44,26 +45,27 @@ pub enum ProbeError {
     /// A sample sees something else than it should.
     #[error("it draws the probe wrong: {wrong} of {of} visibility samples at {samples} a pixel")]
     Samples {
-        /// How many.
+        /// Number of wrong ones.
         wrong: usize,
-        /// Of how many.
+        /// Number of all.
         of: usize,
-        /// Samples a pixel.
+        /// Samples per pixel.
         samples: u32,
     },
     /// A pixel has another colour than it should.
     #[error("it draws the probe wrong: {wrong} of {of} pixels where samples = {samples}")]
     Pixels {
-        /// How many.
+        /// Number of wrong ones.
         wrong: usize,
-        /// Of how many.
+        /// Number of all.
         of: usize,
-        /// Samples a pixel.
+        /// Samples per pixel.
         samples: u32,
     },
 }
 
-/// Draws the probe with the fewest samples a pixel, as many as usual, and the most: samples must be right to the bit, colours to one step in 255.
+/// Draws the probe with the fewest samples per pixel, as many as usual, and the most: samples must
+/// be right to the bit, colours to one step in 255.
 pub fn probe(renderer: &mut dyn Renderer) -> Result<(), ProbeError> {
     let deadline = Deadline::default();
     for samples in [1, 4, 16] {
@@ -89,7 +91,8 @@ fn count_differing<T>(want: &[T], got: &[T], same: impl Fn(&T, &T) -> bool) -> u
     missing + want.iter().zip(got).filter(|(a, b)| !same(a, b)).count()
 }
 
-/// The triangle at a sample, by the formula of the scene's edges; `x`, `y` in 1/256 px from the upper left corner.
+/// The triangle at a sample, by the formula of the scene's edges; `x`, `y` in 1/256 px from the
+/// upper left corner.
 fn seen_at([x, y]: [i32; 2]) -> Option<u32> {
     if x + y < 12 * 256 + 48 {
         Some(0)
@@ -102,7 +105,7 @@ fn seen_at([x, y]: [i32; 2]) -> Option<u32> {
     }
 }
 
-/// What each sample sees, in the order of the visibility buffer.
+/// Expected triangle per sample, in the order of the visibility buffer.
 fn samples_seen(samples: u32) -> impl Iterator<Item = Option<u32>> {
     let side = SIZE_PX as i32;
     let pixels = (0..side).flat_map(move |y| (0..side).map(move |x| [x * 256, y * 256]));

@@ -1,9 +1,9 @@
-//! Which back-end draws a job, and what happens when the GPU fails it.
+//! Choice of a back-end per job, and recovery when the GPU fails.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 
-use super::device::{GpuDevice, GpuKind, let_go};
+use super::device::{GpuDevice, GpuKind, drop_catching_panics};
 #[cfg(feature = "gpu")]
 use super::gpu;
 use super::host::GpuHost;
@@ -21,12 +21,12 @@ pub struct Backends {
     gpu: Option<(Box<dyn Renderer>, Arc<dyn GpuDevice>)>,
 }
 
-/// A picture and who drew it.
+/// A picture and the back-end that drew it.
 #[derive(Debug)]
 pub struct Chosen {
     /// The picture.
     pub image: Image,
-    /// Who drew it.
+    /// The back-end that drew it.
     pub backend: BackendKind,
 }
 
@@ -36,7 +36,7 @@ impl Backends {
         Self { cpu: cpu::CpuRenderer::new(threads), host, gpu: None }
     }
 
-    /// Whether `auto` may mean a GPU here. Opens none, so it may turn out that there is none.
+    /// True as long as `auto` may choose a GPU here. Opens none, so there may turn out to be none.
     pub fn has_gpu(&self) -> bool {
         self.host.may_have_hardware()
     }
@@ -55,7 +55,7 @@ impl Backends {
                 Ok(chosen) => Ok(chosen),
                 Err(DrawError::Stopped(stopped)) => Err(stopped.into()),
                 Err(error) => {
-                    // That there is none is no news: the host said so when it was decided.
+                    // A missing GPU is not logged again: the host has logged it.
                     if !matches!(error, DrawError::NoGpu(_)) {
                         tracing::warn!(%error, "the CPU draws this job");
                     }
@@ -65,7 +65,8 @@ impl Backends {
         }
     }
 
-    /// Memory that drawing the plan takes beside what grows with its mesh, bytes. What a real GPU holds is its own.
+    /// Memory that drawing the plan takes beside what grows with its mesh, bytes. What a real GPU
+    /// holds is its own.
     pub fn bands_bytes(&self, choice: BackendChoice, plan: &DrawPlan<'_>) -> u64 {
         match choice {
             BackendChoice::Cpu | BackendChoice::Auto => self.cpu.bands_bytes(plan),
@@ -102,8 +103,8 @@ impl Backends {
         attempt: Attempt,
     ) -> Result<Image, DrawError> {
         if self.gpu.as_ref().is_some_and(|(_, device)| device.lost().is_some()) {
-            // What is left here would keep a device alive that nobody draws on any more.
-            let_go(self.gpu.take());
+            // The old renderer would keep a lost device alive.
+            drop_catching_panics(self.gpu.take());
         }
         let found = self.host.device(kind);
         if let (Err(DrawError::DeviceLost(reason)), Attempt::First) = (&found, attempt) {
@@ -112,7 +113,7 @@ impl Backends {
         let device = found?;
         let result = self.draw_on(&device, plan, deadline);
         if let Err(DrawError::DeviceLost(reason)) = &result {
-            // Workers that share a device lose it together: that is one loss.
+            // Workers that share a device lose it together, which counts as one loss.
             if self.host.note_lost(&device, reason) && attempt == Attempt::First {
                 self.host.count_loss(reason);
             }
@@ -129,22 +130,22 @@ impl Backends {
         let (mut renderer, device) = match self.gpu.take() {
             Some((renderer, own)) if Arc::ptr_eq(&own, device) => (renderer, own),
             old => {
-                let_go(old);
+                drop_catching_panics(old);
                 (device.clone().renderer(), device.clone())
             }
         };
-        // wgpu panics here and there on a device that is gone.
+        // wgpu may panic on a lost device.
         let drawn = catch_unwind(AssertUnwindSafe(|| renderer.draw(plan, deadline)));
         let result = match (drawn, device.lost()) {
             (Ok(result), _) => result,
             (Err(_), Some(reason)) => Err(DrawError::DeviceLost(reason.to_owned())),
             (Err(panic), None) => {
-                let_go(renderer);
+                drop_catching_panics(renderer);
                 resume_unwind(panic);
             }
         };
         match result {
-            Err(DrawError::DeviceLost(_)) => let_go(renderer),
+            Err(DrawError::DeviceLost(_)) => drop_catching_panics(renderer),
             _ => self.gpu = Some((renderer, device)),
         }
         result

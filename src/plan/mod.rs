@@ -27,7 +27,10 @@ pub use outline::{HullPass, HullVertex};
 pub use primitives::thicken;
 pub use quality::{Choice, Chosen, choose};
 pub use skips::{Skip, SkipKind};
-pub use surface::{CornerValues, Lamp, Lights, ShadedMaterial, SurfacePass, TEXTURE_NONE, TextureUse, flags, slots};
+pub use surface::{
+    CornerValues, Lamp, Lights, ShadedMaterial, SurfacePass, TEXTURE_NONE, TextureUse, debug_views, flags, samplers,
+    slots,
+};
 
 use std::borrow::Cow;
 

@@ -1,34 +1,35 @@
-//! When to look at the deadline.
+//! Every stage with a loop over triangles: polling of the deadline.
 
 use crate::limits::Deadline;
 
-/// Work between two looks, samples: some 10 ms.
-const WORK_A_LOOK: u64 = 1 << 22;
+/// Work between two polls, samples: about 10 ms.
+const WORK_PER_POLL: u64 = 1 << 22;
 
-/// What a triangle costs however small it is, samples.
-const WORK_A_TRIANGLE: u64 = 1 << 12;
+/// Fixed cost per triangle, samples.
+const WORK_PER_TRIANGLE: u64 = 1 << 12;
 
-/// Looks at a deadline after so much work, because a triangle may have one sample or millions.
-pub struct Watch<'a> {
+/// Polls a deadline by amount of work, because a triangle may have one sample or millions.
+pub struct DeadlinePoll<'a> {
     deadline: &'a Deadline,
     left: u64,
 }
 
-impl<'a> Watch<'a> {
-    /// Looks at once, then after each [`WORK_A_LOOK`].
+impl<'a> DeadlinePoll<'a> {
+    /// Polls at once, then after each [`WORK_PER_POLL`].
     pub fn new(deadline: &'a Deadline) -> Self {
         Self { deadline, left: 0 }
     }
 
-    /// Whether the time is over, when a triangle has been looked for among so many samples. Once it is, nobody asks again.
+    /// True if the deadline has passed. To be called after each triangle with the number of samples
+    /// tested, and not again once it is true.
     #[inline(always)]
-    pub fn is_over(&mut self, samples: u64) -> bool {
-        let work = samples + WORK_A_TRIANGLE;
+    pub fn is_expired(&mut self, samples: u64) -> bool {
+        let work = samples + WORK_PER_TRIANGLE;
         if work <= self.left {
             self.left -= work;
             return false;
         }
-        self.left = WORK_A_LOOK;
+        self.left = WORK_PER_POLL;
         self.deadline.check().is_err()
     }
 }
@@ -37,13 +38,14 @@ impl<'a> Watch<'a> {
 mod tests {
     use super::*;
 
-    /// Triangles of so many samples until the end of time is noticed, when it comes after the first.
+    /// Triangles of so many samples until the end of time is noticed, when it comes after the
+    /// first.
     fn triangles_until_noticed(samples: u64) -> u64 {
         let deadline = Deadline::default();
-        let mut watch = Watch::new(&deadline);
-        assert!(!watch.is_over(samples));
+        let mut poll = DeadlinePoll::new(&deadline);
+        assert!(!poll.is_expired(samples));
         deadline.stop();
-        (1..5000).find(|_| watch.is_over(samples)).unwrap_or(5000)
+        (1..5000).find(|_| poll.is_expired(samples)).unwrap_or(5000)
     }
 
     #[test]

@@ -1,48 +1,131 @@
 //! One source, several instruction sets.
 //!
-//! The hot loops are written once, over arrays of [`LANES`] values, and compiled twice: for the baseline and for AVX2.
-//! Rust never fuses or reorders floating-point operations, so both give the same bytes; only the speed differs.
+//! The hot loops of every stage are written once, over arrays of [`LANES`] values, and compiled
+//! once per instruction set. Rust neither fuses nor reorders floating-point operations, so all give
+//! the same bytes; only the speed differs.
+//!
+//! To add an instruction set (AVX-512, NEON): a variant of `Level` under its `cfg`, a list of
+//! features beside [`for_avx2_features`], a constructor that detects all of them, and an arm in
+//! [`dispatch`].
 
 /// Values handled side by side: one AVX2 register of 32-bit numbers.
 pub const LANES: usize = 8;
 
-/// An instruction set to run on.
+/// An instruction set that this processor is known to have.
+///
+/// The type is opaque and its constructors detect what they return, so safe code cannot choose an
+/// instruction set that the processor lacks:
+///
+/// ```compile_fail
+/// let isa = meshsnap::backend::cpu::Isa::Avx2;
+/// ```
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Isa(Level);
+
+/// Never made outside of [`Isa`]'s constructors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Isa {
-    /// What every machine of this architecture has.
+enum Level {
     Baseline,
-    /// 256-bit integer and float vectors.
     #[cfg(target_arch = "x86_64")]
     Avx2,
 }
 
-impl Isa {
-    /// The widest that this machine has.
-    pub fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            return Self::Avx2;
+/// Calls a macro with the features of the AVX2 level, followed by its own input: detection and
+/// compilation cannot name different ones. Those that AVX2 implies are named as well, because
+/// enabling it enables them.
+macro_rules! for_avx2_features {
+    ($($callback:ident)::+ ! { $($input:tt)* }) => {
+        $($callback)::+! {
+            ["sse3" "ssse3" "sse4.1" "sse4.2" "avx" "avx2" "bmi1" "bmi2" "lzcnt" "popcnt"]
+            $($input)*
         }
-        Self::Baseline
+    };
+}
+
+/// True if the processor reports every feature of a list.
+#[cfg(target_arch = "x86_64")]
+macro_rules! are_detected {
+    ([$($feature:tt)+]) => {
+        $(std::arch::is_x86_feature_detected!($feature))&&+
+    };
+}
+
+impl Isa {
+    /// The instructions that every processor of this architecture has.
+    pub fn baseline() -> Self {
+        Self(Level::Baseline)
+    }
+
+    /// The widest that this processor has.
+    pub fn detect() -> Self {
+        Self::avx2().unwrap_or_else(Self::baseline)
+    }
+
+    /// All that this processor has, the baseline first: for tests that compare them.
+    pub fn available() -> Vec<Self> {
+        [Some(Self::baseline()), Self::avx2()].into_iter().flatten().collect()
+    }
+
+    /// The name used in reports.
+    pub fn name(self) -> &'static str {
+        match self.0 {
+            Level::Baseline => "baseline",
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => "avx2",
+        }
+    }
+
+    /// True if code compiled for the AVX2 level may run.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub(in crate::backend::cpu) fn has_avx2(self) -> bool {
+        self.0 == Level::Avx2
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    fn avx2() -> Option<Self> {
+        for_avx2_features!(are_detected! {}).then_some(Self(Level::Avx2))
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    fn avx2() -> Option<Self> {
+        None
     }
 }
 
-/// Defines `$name(isa, args...)`, which runs `$kernel(args...)` compiled for `isa`. The kernel and what it calls in its
-/// loops must be `#[inline(always)]`, or they stay compiled for the baseline.
+impl std::fmt::Debug for Isa {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Defines `$name(isa, args...)`, which runs `$kernel(args...)` compiled for `isa`. The kernel and
+/// what it calls in its loops must be `#[inline(always)]`, or they stay compiled for the baseline.
 macro_rules! dispatch {
-    ($(#[$doc:meta])* pub fn $name:ident($($arg:ident: $ty:ty),* $(,)?) = $kernel:path) => {
+    ($($function:tt)*) => {
+        $crate::backend::cpu::isa::for_avx2_features! { $crate::backend::cpu::isa::dispatch_to! { $($function)* } }
+    };
+}
+
+/// [`dispatch`], given the features.
+macro_rules! dispatch_to {
+    (
+        [$($feature:tt)+]
+        $(#[$doc:meta])* pub fn $name:ident($($arg:ident: $ty:ty),* $(,)?) = $kernel:path
+    ) => {
         $(#[$doc])*
         #[allow(unsafe_code)]
         pub fn $name(isa: $crate::backend::cpu::isa::Isa, $($arg: $ty),*) {
             #[cfg(target_arch = "x86_64")]
             {
-                #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+                $(#[target_feature(enable = $feature)])+
                 fn avx2($($arg: $ty),*) {
                     $kernel($($arg),*)
                 }
-                if isa == $crate::backend::cpu::isa::Isa::Avx2 {
-                    // SAFETY: `Isa::Avx2` is only made where the processor reports AVX2; every such processor has the
-                    // bit-manipulation extensions named beside it.
+                if isa.has_avx2() {
+                    // SAFETY: `has_avx2` is true only of a value that `Isa::avx2` has made, which it does where the
+                    // processor reports every feature that `avx2` above enables: both lists are
+                    // `for_avx2_features`'s.
                     return unsafe { avx2($($arg),*) };
                 }
             }
@@ -51,4 +134,49 @@ macro_rules! dispatch {
         }
     };
 }
-pub(super) use dispatch;
+
+pub(super) use {dispatch, dispatch_to, for_avx2_features};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    dispatch! {
+        /// Counts the bits of each value.
+        pub fn count_bits(values: &[u32], counts: &mut [u32]) = count_bits_kernel
+    }
+
+    #[inline(always)]
+    fn count_bits_kernel(values: &[u32], counts: &mut [u32]) {
+        for (value, count) in values.iter().zip(counts) {
+            *count = value.count_ones() + value.leading_zeros();
+        }
+    }
+
+    #[test]
+    fn each_available_instruction_set_gives_the_same() {
+        let all = Isa::available();
+        assert_eq!((all.first(), all.last()), (Some(&Isa::baseline()), Some(&Isa::detect())));
+        let values: Vec<u32> = (0..1000).map(|i: u32| i.wrapping_mul(0x9E37_79B9)).collect();
+        let want: Vec<u32> = values.iter().map(|v| v.count_ones() + v.leading_zeros()).collect();
+        for isa in all {
+            let mut counts = vec![0; values.len()];
+            count_bits(isa, &values, &mut counts);
+            assert_eq!(counts, want, "{isa:?}");
+        }
+    }
+
+    /// AVX2 without the bit-manipulation extensions, as some hypervisors present it, is the
+    /// baseline.
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn every_enabled_feature_is_detected() {
+        macro_rules! missing {
+            ([$($feature:tt)+]) => {
+                [$((!std::arch::is_x86_feature_detected!($feature)).then_some($feature)),+]
+            };
+        }
+        let missing: Vec<&str> = for_avx2_features!(missing! {}).into_iter().flatten().collect();
+        assert_eq!(missing.is_empty(), Isa::detect().has_avx2(), "{missing:?}");
+    }
+}

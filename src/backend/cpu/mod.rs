@@ -1,20 +1,23 @@
 //! The CPU rasterizer: the reference for bytes.
 //!
-//! Stages, each a file: [`transform`] (with [`clip`] where needed), [`visibility`], [`layers`] (with [`peel`]), [`shade`],
-//! [`lines`], [`resolve`]. The picture is cut
-//! into bands of rows that fit a core's cache; threads take bands, and nothing a band draws depends on another.
+//! Stages in order: transform and visibility in `geometry`, shade in `surface` and, for
+//! transparent surfaces, in `peeling`, `lines`, `resolve`. `bands` runs them: the picture
+//! is cut into bands of rows that fit a core's cache, threads take bands, and no band depends on
+//! another. The hot loops are compiled once per instruction set (`isa`).
+//!
+//! **Invariant:** threads and instruction sets do not change a byte.
 
 // Loops over lanes and corners walk several arrays at once; an index says that best.
 #![allow(clippy::needless_range_loop)]
 
 mod bands;
 mod deadline_poll;
-mod geometry;
+pub(super) mod geometry;
 mod isa;
-mod lines;
+pub(super) mod lines;
 mod peeling;
 mod resolve;
-mod surface;
+pub(super) mod surface;
 mod vector;
 
 pub use isa::Isa;
@@ -44,8 +47,8 @@ pub struct CpuRenderer {
     srgb: SrgbEncoder,
 }
 
-/// What every stage reads: the plan and the vertices on screen.
-pub struct Stages<'a> {
+/// Input of every stage: the plan and the vertices on screen.
+pub struct RasterContext<'a> {
     plan: &'a DrawPlan<'a>,
     deadline: &'a Deadline,
     /// The positions', then the hull's own.
@@ -68,7 +71,7 @@ impl CpuRenderer {
         Self { isa, pool, vertices: Vec::new(), scratch: ScratchPool::default(), srgb: SrgbEncoder::new() }
     }
 
-    /// Transforms the plan's vertices; afterwards [`Stages`] can be made.
+    /// Transforms the plan's vertices; afterwards [`RasterContext`] can be made.
     fn transform(&mut self, plan: &DrawPlan<'_>) {
         let isa = self.isa;
         let pool = self.pool.as_ref();
@@ -82,28 +85,29 @@ impl CpuRenderer {
         self.vertices.extend(own.iter().map(ScreenVertex::from));
     }
 
-    fn stages<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> Stages<'a> {
-        Stages { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb }
+    fn context<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> RasterContext<'a> {
+        RasterContext { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb }
     }
 
-    /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside it.
+    /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside
+    /// it.
     fn draw_bands<T: Send>(
         &mut self,
         plan: &DrawPlan<'_>,
         deadline: &Deadline,
         out: &mut [T],
-        each: impl Fn(&Stages<'_>, &mut BandScratch, &Bins, usize, &mut [T]) + Sync + Send,
+        each: impl Fn(&RasterContext<'_>, &mut BandScratch, &Bins, usize, &mut [T]) + Sync + Send,
     ) -> Result<(), DrawError> {
         deadline.check()?;
         self.transform(plan);
-        let stages = self.stages(plan, deadline);
+        let context = self.context(plan, deadline);
         let banding = Banding::new(plan, self.threads());
-        let drawn = bands::bins::bin(&stages, self.pool.as_ref(), [banding.rows, banding.margin]).map(|bins| {
+        let drawn = bands::bins::bin(&context, self.pool.as_ref(), [banding.rows, banding.margin]).map(|bins| {
             let row_len = out.len() / plan.height_px as usize;
             let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
             run_few(self.pool.as_ref(), banding.at_once, items, |(band, out)| {
                 if deadline.check().is_ok() {
-                    self.scratch.with(plan, banding, |scratch| each(&stages, scratch, &bins, band, out));
+                    self.scratch.with(plan, banding, |scratch| each(&context, scratch, &bins, band, out));
                 }
             });
         });
@@ -112,7 +116,7 @@ impl CpuRenderer {
         Ok(deadline.check()?)
     }
 
-    /// Lets go of what is too large to keep for another picture.
+    /// Frees buffers that are too large to keep for another picture.
     fn trim(&mut self) {
         self.scratch.trim();
         if self.vertices.capacity() * size_of::<ScreenVertex>() > KEPT_BYTES_MAX {
@@ -131,18 +135,19 @@ impl CpuRenderer {
 }
 
 impl CpuRenderer {
-    /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare back-ends sample for sample.
+    /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare
+    /// back-ends sample for sample.
     pub fn draw_layer(&mut self, plan: &DrawPlan<'_>, layer: u32, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
         let mut words = vec![0_u64; plan.width_px as usize * plan.height_px as usize * plan.samples as usize];
-        self.draw_bands(plan, deadline, &mut words, |stages, scratch, bins, band, words| {
-            bands::draw_layer(stages, scratch, bins, band, layer, words);
+        self.draw_bands(plan, deadline, &mut words, |context, scratch, bins, band, words| {
+            bands::draw_layer(context, scratch, bins, band, layer, words);
         })?;
         Ok(words)
     }
 }
 
-impl Stages<'_> {
-    /// Where the corners of an id are among the vertices.
+impl RasterContext<'_> {
+    /// Vertex indices of a triangle.
     #[inline(always)]
     fn triangle(&self, id: u32) -> [u32; 3] {
         let id = id as usize;
@@ -153,7 +158,7 @@ impl Stages<'_> {
         }
     }
 
-    /// Whether an id is the hull's.
+    /// True if a triangle belongs to the outline mesh.
     #[inline(always)]
     fn is_hull(&self, id: u32) -> bool {
         id as usize >= self.plan.triangles.len()

@@ -1,4 +1,5 @@
-//! Stage 5, a pixel: surface over background, where no ink has been laid over both, to sRGB bytes. Twin of `shaders/resolve.wgsl`.
+//! Stage resolve, per pixel: surface over background, where no line has composited both, to sRGB
+//! bytes. Twin of `shaders/resolve.wgsl`.
 
 use crate::backend::cpu::geometry::transform::recip;
 use crate::image::srgb8_thresholds;
@@ -33,25 +34,26 @@ impl SrgbEncoder {
     }
 }
 
-/// Whether a pixel's colour is that of everything: then the sign of its alpha is set. Else it is the surface's over nothing.
+/// True if the background is part of a pixel's colour already: then the sign of its alpha is set.
+/// Otherwise the colour is the surface's over nothing.
 #[inline(always)]
-pub fn is_laid(color: &[f32; 4]) -> bool {
+pub fn is_composited(color: &[f32; 4]) -> bool {
     color[3].is_sign_negative()
 }
 
 /// The surface's colour over the background.
 #[inline(always)]
-pub fn lay_over(surface: [f32; 4], background: [f32; 4]) -> [f32; 4] {
+pub fn over_background(surface: [f32; 4], background: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|k| surface[k] + background[k] * (1.0 - surface[3]))
 }
 
-/// Lays the surface over the background wherever no line has been laid over both.
-pub fn lay_over_background(plan: &DrawPlan<'_>, colors: &mut [[f32; 4]]) {
+/// Composites the surface over the background wherever no line has done so.
+pub fn composite_background(plan: &DrawPlan<'_>, colors: &mut [[f32; 4]]) {
     for color in colors {
-        if is_laid(color) {
+        if is_composited(color) {
             color[3] = -color[3];
         } else {
-            *color = lay_over(*color, plan.background);
+            *color = over_background(*color, plan.background);
         }
     }
 }
@@ -77,7 +79,7 @@ fn encode_pixel(srgb: &SrgbEncoder, c: [f32; 4]) -> [u8; 4] {
     if alpha <= 0.0 {
         return [0; 4];
     }
-    // Of what is fainter no bit is left.
+    // The bound keeps recip in its range: fainter colours leave no bit.
     let inverse = recip(alpha.max(1e-30));
     let a = (alpha * 255.0 + 0.5) as u8;
     [srgb.encode(c[0] * inverse), srgb.encode(c[1] * inverse), srgb.encode(c[2] * inverse), a]

@@ -2,23 +2,23 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::device::Gpu;
+use super::handles::Handles;
 use crate::backend::DrawError;
 use crate::backend::gpu::pipelines::{SLOTS, Slot};
 
-/// What is kept of a job's buffers, at most; a job that needed more gives all of them back.
+/// Largest set of buffers that is kept, bytes. A larger one is freed after its job.
 const SET_BYTES_MAX: u64 = 256 << 20;
 
-/// What is kept of all jobs' buffers, at most: on a processor that plays GPU it is the process's memory.
+/// Largest memory of all kept sets, bytes: on a software implementation it is the process's memory.
 const KEPT_BYTES_MAX: u64 = 2 * SET_BYTES_MAX;
 
 /// Smallest buffer: a binding may not be empty, and a struct must fit in.
 const SIZE_MIN: u64 = 256;
 
-/// Buffers that no job uses just now.
+/// Unused sets of buffers.
 ///
-/// The set that was used last is lent first. Workers take turns with jobs; if each had a set of its own, most of the memory would lie idle,
-/// and the first job of each would wait for more.
+/// The set used last is taken first. Workers take turns with jobs; if each had a set of its own,
+/// most of the memory would lie idle, and the first job of each would wait for more.
 #[derive(Default)]
 pub struct SpareBuffers(Mutex<Vec<Buffers>>);
 
@@ -28,7 +28,8 @@ impl SpareBuffers {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
     }
 
-    /// A set that a finished job used. It is not kept where it, or all sets together, would be too much.
+    /// A set that a finished job used. It is not kept where it, or all sets together, would be too
+    /// much.
     pub fn give_back(&self, buffers: Buffers) {
         let mut spare = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let kept: u64 = spare.iter().map(Buffers::bytes).sum();
@@ -43,19 +44,19 @@ impl SpareBuffers {
 #[derive(Default)]
 pub struct Buffers {
     storage: [Option<wgpu::Buffer>; SLOTS],
-    /// The plan's numbers.
+    /// Uniforms of a plan.
     pub frame: Option<wgpu::Buffer>,
-    /// The dispatches' numbers.
+    /// Uniforms of the dispatches.
     pub batches: Option<wgpu::Buffer>,
-    /// Where results are read by the CPU.
+    /// Buffer from which the CPU reads results.
     pub staging: Option<wgpu::Buffer>,
-    /// Where the CPU reads how long the work list is.
+    /// Buffer from which the CPU reads the work list's length.
     counts: Option<wgpu::Buffer>,
 }
 
 impl Buffers {
     /// A buffer of at least `size` bytes for the slot; what it held is lost if it had to grow.
-    pub fn reserve(&mut self, gpu: &Gpu, slot: Slot, size: u64) -> Result<&wgpu::Buffer, DrawError> {
+    pub fn reserve(&mut self, gpu: &Handles, slot: Slot, size: u64) -> Result<&wgpu::Buffer, DrawError> {
         use wgpu::BufferUsages as U;
         let limit = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
         if size > limit {
@@ -68,7 +69,7 @@ impl Buffers {
     }
 
     /// Reserves and fills a buffer. The length is rounded up to whole words with zeros.
-    pub fn upload(&mut self, gpu: &Gpu, slot: Slot, bytes: &[u8]) -> Result<(), DrawError> {
+    pub fn upload(&mut self, gpu: &Handles, slot: Slot, bytes: &[u8]) -> Result<(), DrawError> {
         let buffer = self.reserve(gpu, slot, bytes.len().next_multiple_of(4) as u64)?;
         let (words, rest) = bytes.split_at(bytes.len() & !3);
         if !words.is_empty() {
@@ -83,7 +84,7 @@ impl Buffers {
     }
 
     /// Reserves a buffer and fills it with slices of whole words, one after the other.
-    pub fn upload_parts(&mut self, gpu: &Gpu, slot: Slot, parts: &[&[u8]]) -> Result<(), DrawError> {
+    pub fn upload_slices(&mut self, gpu: &Handles, slot: Slot, parts: &[&[u8]]) -> Result<(), DrawError> {
         let buffer = self.reserve(gpu, slot, parts.iter().map(|part| part.len() as u64).sum())?;
         let mut at = 0;
         for part in parts.iter().filter(|part| !part.is_empty()) {
@@ -93,8 +94,9 @@ impl Buffers {
         Ok(())
     }
 
-    /// Reserves a buffer and fills it with whole words from a place on; what is before them is for a kernel to write.
-    pub fn upload_at(&mut self, gpu: &Gpu, slot: Slot, at: u64, bytes: &[u8]) -> Result<(), DrawError> {
+    /// Reserves a buffer and fills it with whole words from a place on; what is before them is for
+    /// a kernel to write.
+    pub fn upload_at(&mut self, gpu: &Handles, slot: Slot, at: u64, bytes: &[u8]) -> Result<(), DrawError> {
         let buffer = self.reserve(gpu, slot, at + bytes.len() as u64)?;
         if !bytes.is_empty() {
             gpu.queue.write_buffer(buffer, at, bytes);
@@ -103,25 +105,25 @@ impl Buffers {
     }
 
     /// The slot's buffer, or an empty one where the plan needs none.
-    pub fn storage(&mut self, gpu: &Gpu, slot: Slot) -> Result<&wgpu::Buffer, DrawError> {
+    pub fn storage(&mut self, gpu: &Handles, slot: Slot) -> Result<&wgpu::Buffer, DrawError> {
         self.reserve(gpu, slot, 0)
     }
 
     /// Fills a uniform buffer.
-    pub fn upload_uniform<'a>(gpu: &Gpu, slot: &'a mut Option<wgpu::Buffer>, bytes: &[u8]) -> &'a wgpu::Buffer {
+    pub fn upload_uniform<'a>(gpu: &Handles, slot: &'a mut Option<wgpu::Buffer>, bytes: &[u8]) -> &'a wgpu::Buffer {
         let buffer = Self::uniform(gpu, slot, bytes.len() as u64);
         gpu.queue.write_buffer(buffer, 0, bytes);
         buffer
     }
 
     /// A uniform buffer of at least `size` bytes.
-    pub fn uniform<'a>(gpu: &Gpu, slot: &'a mut Option<wgpu::Buffer>, size: u64) -> &'a wgpu::Buffer {
+    pub fn uniform<'a>(gpu: &Handles, slot: &'a mut Option<wgpu::Buffer>, size: u64) -> &'a wgpu::Buffer {
         use wgpu::BufferUsages as U;
         grow(gpu, slot, size, gpu.limits.max_buffer_size, U::UNIFORM | U::COPY_DST)
     }
 
     /// A buffer of at least `size` bytes that the CPU can map.
-    pub fn staging(&mut self, gpu: &Gpu, size: u64) -> Result<&wgpu::Buffer, DrawError> {
+    pub fn staging(&mut self, gpu: &Handles, size: u64) -> Result<&wgpu::Buffer, DrawError> {
         use wgpu::BufferUsages as U;
         let limit = gpu.limits.max_buffer_size;
         if size > limit {
@@ -131,7 +133,7 @@ impl Buffers {
     }
 
     /// A small buffer that the CPU can map.
-    pub fn counts(&mut self, gpu: &Gpu) -> &wgpu::Buffer {
+    pub fn counts(&mut self, gpu: &Handles) -> &wgpu::Buffer {
         use wgpu::BufferUsages as U;
         grow(gpu, &mut self.counts, 8, SIZE_MIN, U::MAP_READ | U::COPY_DST)
     }
@@ -143,7 +145,7 @@ impl Buffers {
 }
 
 fn grow<'a>(
-    gpu: &Gpu,
+    gpu: &Handles,
     slot: &'a mut Option<wgpu::Buffer>,
     size: u64,
     limit: u64,
@@ -151,7 +153,8 @@ fn grow<'a>(
 ) -> &'a wgpu::Buffer {
     let kept = slot.take().filter(|buffer| buffer.size() >= size);
     slot.insert(kept.unwrap_or_else(|| {
-        // A quarter more than asked for, so that a row of slowly growing jobs does not allocate each time.
+        // A quarter more than asked for, so that a row of slowly growing jobs does not allocate
+        // each time.
         let size = (size + size / 4).next_multiple_of(SIZE_MIN).clamp(SIZE_MIN, limit & !3);
         gpu.device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
     }))

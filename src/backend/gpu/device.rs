@@ -6,11 +6,12 @@ use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 
 use super::buffers::SpareBuffers;
-use crate::backend::gpu::pipelines::Stages;
+use super::handles::Handles;
+use crate::backend::gpu::pipelines::PipelineCache;
 use crate::backend::{DrawError, GpuDevice, GpuInfo, GpuKind, Renderer};
 use crate::limits::Deadline;
 
-/// How visibility samples are written.
+/// Atomics that write visibility samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AtomicsChoice {
     /// 64-bit atomics where the device has them.
@@ -21,31 +22,30 @@ pub enum AtomicsChoice {
 
 /// An opened GPU.
 pub struct Gpu {
-    pub(super) device: wgpu::Device,
-    pub(super) queue: wgpu::Queue,
-    pub(super) stages: Stages,
+    pub(super) handles: Handles,
+    pub(super) pipelines: PipelineCache,
     pub(super) spare_buffers: SpareBuffers,
-    pub(super) limits: wgpu::Limits,
     pub(super) int64_atomics: bool,
     info: GpuInfo,
     lost: Lost,
     jobs_ended: AtomicU32,
 }
 
-/// Jobs after which a software device gets new pipelines. llvmpipe compiles a kernel anew for every set of uniform values
-/// that its branches depend on, and keeps each copy (1 to 3 MiB a job) until the pipeline goes.
+/// Jobs after which a software device gets new pipelines. llvmpipe compiles a kernel anew for every
+/// set of uniform values that its branches depend on, and keeps each copy (1 to 3 MiB a job) until
+/// the pipeline goes.
 const SOFTWARE_PIPELINE_JOBS: u32 = 32;
 
-/// Why the device is gone, once it is.
+/// The reason once the device is lost.
 type Lost = Arc<OnceLock<String>>;
 
-/// Storage buffers that the hungriest stage binds.
+/// Storage buffers that a kernel binds, at most.
 const STORAGE_BUFFERS: u32 = 16;
 
-/// How often to look without a pause: a small picture takes a fraction of a millisecond.
+/// Polls without a pause: a small picture takes a fraction of a millisecond.
 const EAGER_POLLS: u32 = 64;
 
-/// Shortest and longest pause between two looks.
+/// Shortest and longest pause between two polls.
 const PAUSE_MIN: Duration = Duration::from_micros(20);
 const PAUSE_MAX: Duration = Duration::from_millis(2);
 
@@ -77,10 +77,11 @@ impl Gpu {
         let lost = Lost::default();
         let slot = lost.clone();
         device.set_device_lost_callback(move |reason, message| {
-            // Dropping the device reports "destroyed" here too; nobody looks at the slot any more then.
+            // Dropping the device reports "destroyed" here too; the slot is not read any more then.
             let _ = slot.set(format!("{reason:?}: {message}"));
         });
-        // Without a handler wgpu panics. What a job causes is caught by that job's error scope; this is the rest.
+        // Without a handler wgpu panics. What a job causes is caught by that job's error scope;
+        // this is the rest.
         device
             .on_uncaptured_error(Arc::new(|error| tracing::error!(%error, "the GPU reported an error outside a job")));
 
@@ -88,11 +89,9 @@ impl Gpu {
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
         Ok(Self {
-            device,
-            queue,
-            stages: Stages::default(),
+            handles: Handles { device, queue, limits },
+            pipelines: PipelineCache::default(),
             spare_buffers: SpareBuffers::default(),
-            limits,
             int64_atomics,
             info,
             lost,
@@ -100,12 +99,12 @@ impl Gpu {
         })
     }
 
-    /// What was opened.
+    /// The opened device.
     pub fn info(&self) -> &GpuInfo {
         &self.info
     }
 
-    /// Why the device is gone, if it is.
+    /// The reason if the device is lost.
     pub fn lost(&self) -> Option<&str> {
         self.lost.get().map(String::as_str)
     }
@@ -115,7 +114,7 @@ impl Gpu {
         self.lost().map_or(Ok(()), |reason| Err(DrawError::DeviceLost(reason.to_owned())))
     }
 
-    /// Whether this is a processor that plays GPU.
+    /// True for a software implementation on the CPU.
     pub fn is_software(&self) -> bool {
         self.info.device_type == type_name(wgpu::DeviceType::Cpu)
     }
@@ -124,14 +123,14 @@ impl Gpu {
     pub(super) fn job_ended(&self) {
         let count = self.jobs_ended.fetch_add(1, Ordering::Relaxed).wrapping_add(1);
         if self.is_software() && count.is_multiple_of(SOFTWARE_PIPELINE_JOBS) {
-            self.stages.clear();
+            self.pipelines.clear();
         }
     }
 
-    /// Runs `work` and turns what the device complains about meanwhile, on this thread, into an error.
+    /// Runs `work` and turns the device's errors on this thread into an error.
     pub(super) fn scoped<T>(&self, work: impl FnOnce() -> Result<T, DrawError>) -> Result<T, DrawError> {
         use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
-        let [a, b, c] = [Internal, OutOfMemory, Validation].map(|filter| self.device.push_error_scope(filter));
+        let [a, b, c] = [Internal, OutOfMemory, Validation].map(|filter| self.handles.device.push_error_scope(filter));
         let result = work();
         // Innermost first. On wgpu's own back-ends these futures are ready at once.
         let errors = [c, b, a].map(|scope| pollster::block_on(scope.pop()));
@@ -144,18 +143,19 @@ impl Gpu {
         }
     }
 
-    /// Waits until a callback of the device has sent its news, looking at the deadline now and then.
+    /// Waits until a callback of the device has sent a value, and polls the deadline meanwhile.
     ///
-    /// Only ever polls without blocking. In wgpu-core 30.0.1 a wait with a timeout panics if it runs out just when another
-    /// thread's poll or submit finds the queue empty (device/resource.rs:948), and takes other jobs' callbacks down with
-    /// it; a wait without one could hang for ever.
+    /// Only ever polls without blocking. In wgpu-core 30.0.1 a wait with a timeout panics if it
+    /// runs out just when another thread's poll or submit finds the queue empty
+    /// (device/resource.rs:948), and takes other jobs' callbacks down with it; a wait without one
+    /// could hang for ever.
     pub(super) fn wait<T>(&self, news: &mpsc::Receiver<T>, deadline: &Deadline) -> Result<T, DrawError> {
         let (mut polls, mut waited) = (0_u32, Duration::ZERO);
         while waited < HUNG_AFTER {
             deadline.check()?;
             self.check()?;
             // Real device loss panics inside poll, whatever handlers are set.
-            match catch_unwind(AssertUnwindSafe(|| self.device.poll(wgpu::PollType::Poll))) {
+            match catch_unwind(AssertUnwindSafe(|| self.handles.device.poll(wgpu::PollType::Poll))) {
                 Ok(Ok(_)) => {}
                 Ok(Err(error)) => return Err(DrawError::Device(error.to_string())),
                 Err(_) => return Err(self.declare_lost("polling it failed")),
@@ -187,7 +187,8 @@ fn find_adapter(kind: GpuKind) -> Result<wgpu::Adapter, DrawError> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::VULKAN;
     descriptor.flags = wgpu::InstanceFlags::empty();
-    // Refuse to allocate before the system begins to swap GPU memory: a refused job is better than a lost device.
+    // Refuse to allocate before the system begins to swap GPU memory: a refused job is better than
+    // a lost device.
     descriptor.memory_budget_thresholds =
         wgpu::MemoryBudgetThresholds { for_resource_creation: Some(90), for_device_loss: Some(99) };
     let instance = wgpu::Instance::new(descriptor);

@@ -1,18 +1,21 @@
 //! The wgpu back-end: the CPU's stages as compute shaders, headless.
 //!
-//! In reading order: [`device`] opens a GPU; [`schedule`] decides what is dispatched for a plan; [`recorder`] turns that
-//! into commands; [`kernels`] and [`bindings`] say what each stage is made of, [`stages`] are their pipelines, [`params`] their numbers,
-//! [`buffers`] their memory and [`sizes`] how much of it.
+//! In reading order: `device` opens a GPU; `schedule` computes the dispatches for a plan;
+//! `recorder` turns them into commands; `pipelines` holds each kernel's source, bindings and
+//! specialisation; `params` the uniforms, `buffers` the memory, `pass_mask` the passes over
+//! triangles.
 //!
-//! Architecture invariant: a job's use of the device stays on the thread that draws it, because wgpu's error scopes do.
+//! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
+//! thread.
 
 mod buffers;
 mod device;
-mod params;
+mod handles;
+pub(super) mod params;
 pub(crate) mod pass_mask;
 pub(crate) mod pipelines;
 mod recorder;
-mod schedule;
+pub(super) mod schedule;
 
 use std::sync::Arc;
 
@@ -21,12 +24,13 @@ pub use self::schedule::sizes::bands_bytes;
 pub use crate::backend::{GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
-use self::params::{attributes, cell_masks, corner_triangles, edge_lists, hull_looks};
+use self::handles::Handles;
+use self::params::{attributes, corner_triangles, edge_lists, hull_materials, sample_masks};
 use self::pipelines::Slot;
 use self::recorder::Recorder;
 use self::schedule::Schedule;
 use self::schedule::sizes::{
-    DeviceTraits, LAYERED_BYTES, OWNER_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, samples,
+    DeviceTraits, OWNER_BYTES, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, samples,
     work_bytes,
 };
 use self::schedule::step::{Band, Goal, Step};
@@ -38,10 +42,10 @@ use crate::plan::{DrawPlan, HullVertex};
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
 
-/// The same on a processor, where each costs time even if it finds nothing to do.
+/// The same on a software implementation, where idle workgroups cost time.
 const TILE_WORKGROUPS_SOFTWARE: u32 = 64;
 
-/// Draws on the GPU. A worker's own; the device and what is kept from job to job are shared.
+/// Draws on the GPU. Each worker has its own; the device, its pipelines and buffers are shared.
 pub struct GpuRenderer {
     gpu: Arc<Gpu>,
 }
@@ -57,15 +61,16 @@ impl GpuRenderer {
         &self.gpu
     }
 
-    /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare back-ends sample for sample.
+    /// Layer number `layer` alone, as [`Renderer::draw_visibility`] says, for tests that compare
+    /// back-ends sample for sample.
     pub fn draw_layer(&mut self, plan: &DrawPlan<'_>, layer: u32, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
         match plan.peeling() {
-            Some(_) => self.words(plan, Goal::Layer(layer), Slot::Layer, deadline),
+            Some(_) => self.words(plan, Goal::Layer(layer), Slot::PeelLayer, deadline),
             None => Ok(vec![0; plan.width_px as usize * plan.samples as usize * plan.height_px as usize]),
         }
     }
 
-    /// What a buffer of samples holds in the end.
+    /// Final content of a buffer of samples.
     fn words(
         &mut self,
         plan: &DrawPlan<'_>,
@@ -81,8 +86,8 @@ impl GpuRenderer {
         }
         self.job(|gpu, buffers| {
             let schedule = Schedule::new(plan, &traits(gpu), goal)?;
-            upload_geometry(gpu, buffers, plan, &schedule)?;
-            buffers.staging(gpu, u64::from(schedule.banding.rows) * row_words as u64 * 8)?;
+            upload_geometry(&gpu.handles, buffers, plan, &schedule)?;
+            buffers.staging(&gpu.handles, u64::from(schedule.banding.rows) * row_words as u64 * 8)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
             let mut words = Vec::with_capacity(len);
             execute(&mut recorder, plan, &schedule, |recorder, band| {
@@ -96,13 +101,14 @@ impl GpuRenderer {
         })
     }
 
-    /// Runs `job` with errors caught and buffers tidied up afterwards.
+    /// Runs `job` in an error scope and returns its buffers afterwards.
     fn job<T>(&self, job: impl FnOnce(&Gpu, &mut Buffers) -> Result<T, DrawError>) -> Result<T, DrawError> {
         self.gpu.check()?;
         let mut buffers = self.gpu.spare_buffers.take();
         let result = self.gpu.scoped(|| job(&self.gpu, &mut buffers));
         self.gpu.job_ended();
-        // After an error work may still be running on them, and the staging buffer may be half mapped.
+        // After an error the buffers may still be in use, and the staging buffer may be half
+        // mapped.
         if result.is_ok() {
             self.gpu.spare_buffers.give_back(buffers);
         }
@@ -121,9 +127,9 @@ impl Renderer for GpuRenderer {
         }
         self.job(|gpu, buffers| {
             let schedule = Schedule::new(plan, &traits(gpu), Goal::Picture)?;
-            upload_geometry(gpu, buffers, plan, &schedule)?;
-            upload_looks(gpu, buffers, plan, &schedule)?;
-            buffers.staging(gpu, size)?;
+            upload_geometry(&gpu.handles, buffers, plan, &schedule)?;
+            upload_shading(&gpu.handles, buffers, plan, &schedule)?;
+            buffers.staging(&gpu.handles, size)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
             execute(&mut recorder, plan, &schedule, |recorder, Band { rows: [first, end] }| {
                 let to = u64::from(first) * row_bytes;
@@ -146,17 +152,17 @@ impl Renderer for GpuRenderer {
 
 fn traits(gpu: &Gpu) -> DeviceTraits {
     DeviceTraits {
-        binding_bytes_max: gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size),
-        workgroups_max: gpu.limits.max_compute_workgroups_per_dimension,
+        binding_bytes_max: gpu.handles.limits.max_storage_buffer_binding_size.min(gpu.handles.limits.max_buffer_size),
+        workgroups_max: gpu.handles.limits.max_compute_workgroups_per_dimension,
         tile_workgroups: if gpu.is_software() { TILE_WORKGROUPS_SOFTWARE } else { TILE_WORKGROUPS },
         int64_atomics: gpu.int64_atomics,
         loops_are_limited: gpu.is_software(),
     }
 }
 
-/// Puts what transform and visibility read on the GPU, and makes room for what they write.
+/// Uploads the input of transform and visibility, and reserves their output.
 fn upload_geometry(
-    gpu: &Gpu,
+    gpu: &Handles,
     buffers: &mut Buffers,
     plan: &DrawPlan<'_>,
     schedule: &Schedule,
@@ -164,29 +170,34 @@ fn upload_geometry(
     buffers.upload(gpu, Slot::Positions, bytemuck::cast_slice(plan.positions))?;
     let (corners, own) = plan.hull.as_ref().map_or((&[][..], &[][..]), |hull| (&hull.triangles, &hull.vertices));
     let triangles = [bytemuck::cast_slice(plan.triangles), bytemuck::cast_slice(corners)];
-    buffers.upload_parts(gpu, Slot::Triangles, &triangles)?;
+    buffers.upload_slices(gpu, Slot::Triangles, &triangles)?;
     let transformed = plan.positions.len() as u64 * size_of::<HullVertex>() as u64;
     buffers.upload_at(gpu, Slot::Vertices, transformed, bytemuck::cast_slice(own))?;
     if let Some(hull) = &plan.hull {
-        buffers.upload(gpu, Slot::HullLooks, &hull_looks(hull))?;
+        buffers.upload(gpu, Slot::HullMaterials, &hull_materials(hull))?;
     }
     if !has_visibility(plan) {
         return Ok(());
     }
-    buffers.upload(gpu, Slot::Roles, &plan.pass_masks)?;
+    buffers.upload(gpu, Slot::PassMasks, &plan.pass_masks)?;
     buffers.reserve(gpu, Slot::Samples, schedule.banding.seen_samples(plan) * SAMPLE_BYTES)?;
     let samples = samples(plan, schedule.banding.rows);
     if plan.peeling().is_some() {
-        buffers.reserve(gpu, Slot::Layer, samples * SAMPLE_BYTES)?;
-        buffers.reserve(gpu, Slot::Layered, samples * LAYERED_BYTES)?;
-        buffers.reserve(gpu, Slot::Rounds, u64::from(schedule.layers) * 4)?;
+        buffers.reserve(gpu, Slot::PeelLayer, samples * SAMPLE_BYTES)?;
+        buffers.reserve(gpu, Slot::PeelState, samples * PEEL_STATE_BYTES)?;
+        buffers.reserve(gpu, Slot::PeelRounds, u64::from(schedule.layers) * 4)?;
     }
     buffers.reserve(gpu, Slot::Work, work_bytes(schedule.work_items))?;
     Ok(())
 }
 
-/// Puts what shade, lines and resolve read on the GPU, and makes room for what they write.
-fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
+/// Uploads the input of shade, lines and resolve, and reserves their output.
+fn upload_shading(
+    gpu: &Handles,
+    buffers: &mut Buffers,
+    plan: &DrawPlan<'_>,
+    schedule: &Schedule,
+) -> Result<(), DrawError> {
     let band_pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);
     if has_visibility(plan) || !plan.lines.is_empty() {
         buffers.reserve(gpu, Slot::Colors, band_pixels * color_bytes(plan))?;
@@ -206,16 +217,16 @@ fn upload_looks(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule:
         }
         let triangles = corner_triangles(surface, plan.triangles).0;
         let triangles: Vec<&[u8]> = triangles.into_iter().map(bytemuck::cast_slice).collect();
-        buffers.upload_parts(gpu, Slot::CornerTriangles, &triangles)?;
+        buffers.upload_slices(gpu, Slot::CornerTriangles, &triangles)?;
         let (images, texels) = (&surface.textures.images, &surface.textures.texels);
-        buffers.upload_parts(gpu, Slot::Texels, &[bytemuck::cast_slice(images), bytemuck::cast_slice(texels)])?;
+        buffers.upload_slices(gpu, Slot::Texels, &[bytemuck::cast_slice(images), bytemuck::cast_slice(texels)])?;
     }
     if !plan.lines.is_empty() {
         let edges: Vec<&[u8]> = edge_lists(&plan.lines).0.into_iter().map(bytemuck::cast_slice).collect();
         let colors: Vec<[f32; 4]> = plan.lines.iter().map(|lines| lines.color).collect();
-        buffers.upload_parts(gpu, Slot::Edges, &edges)?;
+        buffers.upload_slices(gpu, Slot::Edges, &edges)?;
         buffers.upload(gpu, Slot::LineColors, bytemuck::cast_slice(&colors))?;
-        buffers.upload(gpu, Slot::Cells, bytemuck::cast_slice(&cell_masks(plan.samples)))?;
+        buffers.upload(gpu, Slot::SampleMasks, bytemuck::cast_slice(&sample_masks(plan.samples)))?;
         buffers.reserve(gpu, Slot::Strokes, band_pixels * STROKES_BYTES)?;
         buffers.reserve(gpu, Slot::Progress, schedule.progress_bytes)?;
         if plan.lights_lines() {
@@ -240,22 +251,22 @@ fn execute<'a>(
         match *step {
             Step::ClearBand => clear_band(recorder, plan, schedule)?,
             Step::ClearLayer => {
-                recorder.clear(Slot::Layer, samples(plan, schedule.banding.rows) * SAMPLE_BYTES)?;
+                recorder.clear(Slot::PeelLayer, samples(plan, schedule.banding.rows) * SAMPLE_BYTES)?;
             }
             Step::EndLayer { layer, end } => {
-                if recorder.read_word(Slot::Rounds, layer)? == 0 {
+                if recorder.read_word(Slot::PeelRounds, layer)? == 0 {
                     next = end;
                 }
             }
             Step::ClearWork => recorder.clear(Slot::Work, 8)?,
-            Step::Dispatch { stage, batch, workgroups } => recorder.dispatch(stage, batch, workgroups)?,
+            Step::Dispatch { kernel, batch, workgroups } => recorder.dispatch(kernel, batch, workgroups)?,
             Step::Lines { batch, workgroups } => {
                 recorder.lines_in_rounds(batch, workgroups, schedule.progress_bytes)?;
             }
-            Step::Tiles { stage, batch } if schedule.tiles.in_rounds => {
-                recorder.tiles_in_rounds(stage, &schedule.batches[batch], &schedule.tiles)?;
+            Step::Tiles { kernel, batch } if schedule.tiles.in_rounds => {
+                recorder.tiles_in_rounds(kernel, &schedule.batches[batch], &schedule.tiles)?;
             }
-            Step::Tiles { stage, batch } => recorder.dispatch(stage, batch, [schedule.tiles.workgroups, 1])?,
+            Step::Tiles { kernel, batch } => recorder.dispatch(kernel, batch, [schedule.tiles.workgroups, 1])?,
             Step::Submit => recorder.submit()?,
             Step::EndBand(band) => end_band(recorder, band)?,
         }
@@ -265,7 +276,7 @@ fn execute<'a>(
 
 fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
     if schedule.layers > 0 {
-        recorder.clear(Slot::Rounds, u64::from(schedule.layers) * 4)?;
+        recorder.clear(Slot::PeelRounds, u64::from(schedule.layers) * 4)?;
     }
     if has_visibility(plan) {
         recorder.clear(Slot::Samples, schedule.banding.seen_samples(plan) * SAMPLE_BYTES)?;

@@ -4,43 +4,43 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::backend::sample_partition::{POINTS, cells};
-use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, Shown, Side, SurfacePass};
+use crate::backend::sample_partition::{POINTS, sample_partition};
+use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, SurfacePass};
 
-/// The plan's numbers.
+/// Uniforms of a plan.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Frame {
-    x_row: [f32; 4],
-    y_row: [f32; 4],
-    z_row: [f32; 4],
-    w_row: [f32; 4],
-    screen_up: [f32; 4],
-    screen_right: [f32; 4],
-    to_viewer: [f32; 4],
-    lamps: [[f32; 4]; Lights::LAMPS_MAX],
-    halfways: [[f32; 4]; Lights::LAMPS_MAX],
-    background: [f32; 4],
-    hull_color: [f32; 4],
-    near_w: f32,
-    ambient: f32,
-    lamp_count: u32,
-    zero: u32,
-    width: u32,
-    height: u32,
-    triangle_count: u32,
-    vertex_count: u32,
-    masks_at: u32,
-    material_count: u32,
-    layer_fade: f32,
-    hull_color_count: u32,
-    image_count: u32,
-    normal_triangles_at: u32,
-    uv_triangles_at: u32,
-    color_triangles_at: u32,
+    pub x_row: [f32; 4],
+    pub y_row: [f32; 4],
+    pub z_row: [f32; 4],
+    pub w_row: [f32; 4],
+    pub screen_up: [f32; 4],
+    pub screen_right: [f32; 4],
+    pub to_viewer: [f32; 4],
+    pub lamps: [[f32; 4]; Lights::LAMPS_MAX],
+    pub halfways: [[f32; 4]; Lights::LAMPS_MAX],
+    pub background: [f32; 4],
+    pub hull_color: [f32; 4],
+    pub near_w: f32,
+    pub ambient: f32,
+    pub lamp_count: u32,
+    pub zero: u32,
+    pub width: u32,
+    pub height: u32,
+    pub triangle_count: u32,
+    pub vertex_count: u32,
+    pub masks_at: u32,
+    pub material_count: u32,
+    pub layer_fade: f32,
+    pub hull_color_count: u32,
+    pub image_count: u32,
+    pub normal_triangles_at: u32,
+    pub uv_triangles_at: u32,
+    pub color_triangles_at: u32,
 }
 
-/// A dispatch's numbers.
+/// Uniforms of a dispatch.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Batch {
@@ -67,7 +67,7 @@ pub struct Batch {
     pub seen_first: i32,
     pub seen_end: i32,
     pub samples_at: u32,
-    pub role: u32,
+    pub pass_bit: u32,
     pub layer: u32,
     pub column_first: i32,
     pub column_end: i32,
@@ -75,29 +75,47 @@ pub struct Batch {
 }
 
 /// Bits of [`Batch::line_flags`].
-pub fn line_flags(lines: &LinePass, something_hides: bool, lights_lines: bool) -> u32 {
-    // Where there is no surface there is nothing to hide behind, and no samples to ask.
-    let shown = match lines.shown {
-        Shown::All => 0,
-        _ if !something_hides => 0,
-        Shown::Visible => 1,
-        Shown::Hidden => 2,
-    };
-    shown
-        | u32::from(lines.unseen_side.is_some()) << 2
-        | u32::from(lines.contour) << 3
-        | u32::from(lines.lit && lights_lines) << 4
-        | u32::from(lines.unseen_side == Some(Side::Front)) << 6
-}
+pub mod line_flags {
+    use crate::plan::{LinePass, Shown, Side};
 
-/// Bit of [`Batch::line_flags`]: no pass has laid anything over the background yet.
-pub const FIRST_PASS: u32 = 32;
+    /// Only what nothing hides is drawn.
+    pub const SHOWN_VISIBLE: u32 = 1;
+    /// Only what something hides is drawn.
+    pub const SHOWN_HIDDEN: u32 = 2;
+    /// Edges whose faces all face away are left out.
+    pub const SKIP_BACK: u32 = 4;
+    /// The pass draws silhouettes alone.
+    pub const CONTOUR: u32 = 8;
+    /// The surface's light falls on the lines.
+    pub const LIT_PASS: u32 = 16;
+    /// No pass has composited anything over the background yet.
+    pub const FIRST_PASS: u32 = 32;
+    /// The surface is inside out: the fronts of faces face away.
+    pub const INSIDE_OUT: u32 = 64;
+
+    /// The bits of a pass, [`FIRST_PASS`] aside.
+    pub fn of(lines: &LinePass, something_hides: bool, lights_lines: bool) -> u32 {
+        let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
+        // Without a surface nothing hides a line, and there is no visibility buffer to read.
+        let shown = match lines.shown {
+            Shown::All => 0,
+            _ if !something_hides => 0,
+            Shown::Visible => SHOWN_VISIBLE,
+            Shown::Hidden => SHOWN_HIDDEN,
+        };
+        shown
+            | when(lines.unseen_side.is_some(), SKIP_BACK)
+            | when(lines.contour, CONTOUR)
+            | when(lines.lit && lights_lines, LIT_PASS)
+            | when(lines.unseen_side == Some(Side::Front), INSIDE_OUT)
+    }
+}
 
 /// Distance between [`Batch`]es in their buffer: every device can bind at multiples of this.
 pub const BATCH_STRIDE: usize = 256;
 
 impl Frame {
-    /// The numbers of a plan.
+    /// The uniforms of a plan.
     pub fn new(plan: &DrawPlan<'_>) -> Self {
         let p = &plan.projection;
         let mut frame = Self {
@@ -142,8 +160,9 @@ impl Frame {
     }
 }
 
-/// The hull's colours, then the materials of the mesh's triangles and of its own: what [`Frame::hull_color_count`] points into.
-pub fn hull_looks(hull: &HullPass<'_>) -> Vec<u8> {
+/// The hull's colours, then the materials of the mesh's triangles and of its own: what
+/// [`Frame::hull_color_count`] points into.
+pub fn hull_materials(hull: &HullPass<'_>) -> Vec<u8> {
     let materials = [hull.surface_materials, &hull.triangle_materials].map(bytemuck::cast_slice::<u32, u8>);
     [bytemuck::cast_slice(&hull.colors), materials[0], materials[1]].concat()
 }
@@ -153,13 +172,15 @@ pub fn attributes(surface: &SurfacePass<'_>) -> Vec<u8> {
     [bytemuck::cast_slice(surface.triangle_materials), &surface.edge_masks[..]].concat()
 }
 
-/// Where normals begin whose index is the plan's own triangles: those are on the GPU already.
-const OWN_TRIANGLES: u32 = u32::MAX;
+/// Value of `normal_triangles_at` for normals indexed by the plan's own triangles, which are on the
+/// GPU already.
+pub const OWN_TRIANGLES: u32 = u32::MAX;
 
-/// The index arrays of normals, texture coordinates and colours, each once, and where each of the three begins when they
-/// lie one after the other.
+/// The index arrays of normals, texture coordinates and colours, each once, and where each of the
+/// three begins when they lie one after the other.
 ///
-/// A mesh's normals go by position (`own`, the plan's triangles) or by what the other two go by: one array is all there is.
+/// A mesh's normals go by position (`own`, the plan's triangles) or by what the other two go by:
+/// one array is all there is.
 pub fn corner_triangles<'a>(surface: &SurfacePass<'a>, own: &[[u32; 3]]) -> (Vec<&'a [[u32; 3]]>, [u32; 3]) {
     let normals = surface.vertex_normals.as_ref().map(|v| v.triangles);
     let has_own = normals.is_some_and(|triangles| std::ptr::eq(triangles, own));
@@ -180,7 +201,8 @@ pub fn corner_triangles<'a>(surface: &SurfacePass<'a>, own: &[[u32; 3]]) -> (Vec
     (parts, [if has_own { OWN_TRIANGLES } else { normals }, uvs, colors])
 }
 
-/// The lists of edges of line passes, each once, and where each pass's begins when they lie one after the other.
+/// The lists of edges of line passes, each once, and where each pass's begins when they lie one
+/// after the other.
 pub fn edge_lists(passes: &[LinePass]) -> (Vec<&[Edge]>, Vec<u32>) {
     let mut lists: Vec<(&Arc<[Edge]>, u32)> = Vec::new();
     let mut next = 0_u32;
@@ -189,7 +211,7 @@ pub fn edge_lists(passes: &[LinePass]) -> (Vec<&[Edge]>, Vec<u32>) {
             return *start;
         }
         lists.push((edges, next));
-        // Far more than a device has room for: then nothing is drawn.
+        // Saturates: no device has room for so many edges.
         let start = next;
         next = start.saturating_add(edges.len() as u32);
         start
@@ -198,10 +220,11 @@ pub fn edge_lists(passes: &[LinePass]) -> (Vec<&[Edge]>, Vec<u32>) {
     (lists.into_iter().map(|(list, _)| &list[..]).collect(), starts)
 }
 
-/// The points that stand with each of a pixel's samples, eight words a sample, numbered as shaders/lines/stroke.wgsl numbers them.
-pub fn cell_masks(samples: u32) -> Vec<u32> {
+/// The points assigned to each of a pixel's samples, eight words per sample, numbered as
+/// shaders/lines/stroke.wgsl numbers them.
+pub fn sample_masks(samples: u32) -> Vec<u32> {
     let mut masks = vec![0; samples as usize * POINTS / 32];
-    for (point, &cell) in cells(samples).iter().enumerate() {
+    for (point, &cell) in sample_partition(samples).iter().enumerate() {
         let (word, bit) = (point % 16, point / 16);
         masks[usize::from(cell) * (POINTS / 32) + word / 2] |= 1 << (bit + 16 * (word % 2));
     }
@@ -212,12 +235,19 @@ fn xyz(v: [f32; 3]) -> [f32; 4] {
     [v[0], v[1], v[2], 0.0]
 }
 
-/// The shaders' code for a choice of faces.
+/// Values of [`Batch::faces`].
+pub const FACES_BOTH: u32 = 0;
+/// As above.
+pub const FACES_FRONT: u32 = 1;
+/// As above.
+pub const FACES_BACK: u32 = 2;
+
+/// The shaders' value for a choice of faces.
 pub fn faces_code(faces: Faces) -> u32 {
     match faces {
-        Faces::Both => 0,
-        Faces::Front => 1,
-        Faces::Back => 2,
+        Faces::Both => FACES_BOTH,
+        Faces::Front => FACES_FRONT,
+        Faces::Back => FACES_BACK,
     }
 }
 
@@ -236,18 +266,12 @@ mod tests {
 
     use super::*;
     use crate::backend::gpu::schedule::test_plans::{edges, lines};
-    use crate::plan::CornerValues;
+    use crate::plan::{CornerValues, Shown};
 
     #[test]
-    fn sizes_are_those_of_the_shader() {
-        assert_eq!(size_of::<Frame>(), 304);
-        assert_eq!(size_of::<Batch>(), 112);
-    }
-
-    #[test]
-    fn each_point_stands_with_one_sample() {
+    fn each_point_belongs_to_one_sample() {
         for samples in [1, 4, 8, 16] {
-            let masks = cell_masks(samples);
+            let masks = sample_masks(samples);
             assert_eq!(masks.len(), samples as usize * 8);
             for w in 0..8 {
                 let words = masks.iter().skip(w).step_by(8);

@@ -1,4 +1,5 @@
-//! Turns a [`Schedule`](super::schedule::Schedule)'s steps into commands and hands them to the device.
+//! Turns a [`Schedule`](super::schedule::Schedule)'s steps into commands and hands them to the
+//! device.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -6,10 +7,11 @@ use std::sync::mpsc;
 
 use super::buffers::Buffers;
 use super::device::Gpu;
+use super::handles::Handles;
 use super::params::{BATCH_STRIDE, Batch, Frame, pack};
 use crate::backend::DrawError;
-use crate::backend::gpu::pipelines::key::look;
-use crate::backend::gpu::pipelines::{Pipeline, Slot, Stage, uniforms_layout};
+use crate::backend::gpu::pipelines::key::pipeline_key;
+use crate::backend::gpu::pipelines::{Kernel, Pipeline, Slot, uniforms_layout};
 use crate::backend::gpu::schedule::tiles::Tiles;
 use crate::limits::Deadline;
 use crate::plan::DrawPlan;
@@ -21,8 +23,8 @@ pub struct Recorder<'a> {
     buffers: &'a mut Buffers,
     uniforms: wgpu::BindGroup,
     spare_batch: usize,
-    look: u32,
-    kernels: HashMap<Stage, (Arc<Pipeline>, wgpu::BindGroup)>,
+    key: u32,
+    kernels: HashMap<Kernel, (Arc<Pipeline>, wgpu::BindGroup)>,
     encoder: Option<wgpu::CommandEncoder>,
     pass: Option<wgpu::ComputePass<'static>>,
     in_flight: Option<mpsc::Receiver<()>>,
@@ -38,14 +40,14 @@ impl<'a> Recorder<'a> {
         batches: &[Batch],
     ) -> Self {
         let frame = Frame::new(plan);
-        let frame = Buffers::upload_uniform(gpu, &mut buffers.frame, bytemuck::bytes_of(&frame)).clone();
-        // One more, for dispatches whose numbers are known only on the way.
+        let frame = Buffers::upload_uniform(&gpu.handles, &mut buffers.frame, bytemuck::bytes_of(&frame)).clone();
+        // One more, for dispatches whose parameters are known only while recording.
         let spare_batch = batches.len();
-        let batches = upload_batches(gpu, &mut buffers.batches, batches).clone();
+        let batches = upload_batches(&gpu.handles, &mut buffers.batches, batches).clone();
         let one = wgpu::BufferBinding { buffer: &batches, offset: 0, size: wgpu::BufferSize::new(BATCH_STRIDE as u64) };
-        let uniforms = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        let uniforms = gpu.handles.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
-            layout: &uniforms_layout(&gpu.device),
+            layout: &uniforms_layout(&gpu.handles.device),
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: frame.as_entire_binding() },
                 wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Buffer(one) },
@@ -57,7 +59,7 @@ impl<'a> Recorder<'a> {
             buffers,
             uniforms,
             spare_batch,
-            look: look(plan),
+            key: pipeline_key(plan),
             kernels: HashMap::new(),
             encoder: None,
             pass: None,
@@ -66,13 +68,13 @@ impl<'a> Recorder<'a> {
     }
 
     /// Runs a kernel.
-    pub fn dispatch(&mut self, stage: Stage, batch: usize, workgroups: [u32; 2]) -> Result<(), DrawError> {
-        if !self.kernels.contains_key(&stage) {
-            let kernel = self.kernel(stage)?;
-            self.kernels.insert(stage, kernel);
+    pub fn dispatch(&mut self, kernel: Kernel, batch: usize, workgroups: [u32; 2]) -> Result<(), DrawError> {
+        if !self.kernels.contains_key(&kernel) {
+            let bound = self.bind(kernel)?;
+            self.kernels.insert(kernel, bound);
         }
         self.begin_pass();
-        if let (Some(pass), Some((pipeline, group))) = (&mut self.pass, self.kernels.get(&stage)) {
+        if let (Some(pass), Some((pipeline, group))) = (&mut self.pass, self.kernels.get(&kernel)) {
             pass.set_pipeline(&pipeline.pipeline);
             pass.set_bind_group(0, &self.uniforms, &[(batch * BATCH_STRIDE) as u32]);
             pass.set_bind_group(1, group, &[]);
@@ -81,10 +83,13 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Draws what the work list holds: reads how long it is, then runs the kernel in rounds of known length.
-    pub fn tiles_in_rounds(&mut self, stage: Stage, batch: &Batch, tiles: &Tiles) -> Result<(), DrawError> {
+    /// Draws the items of the work list: reads its length, then runs the kernel in rounds.
+    pub fn tiles_in_rounds(&mut self, kernel: Kernel, batch: &Batch, tiles: &Tiles) -> Result<(), DrawError> {
         let mut counts = [0; 2];
-        let (work, to) = (self.buffers.storage(self.gpu, Slot::Work)?.clone(), self.buffers.counts(self.gpu).clone());
+        let (work, to) = (
+            self.buffers.storage(&self.gpu.handles, Slot::Work)?.clone(),
+            self.buffers.counts(&self.gpu.handles).clone(),
+        );
         self.encoder().copy_buffer_to_buffer(&work, 0, &to, 0, Some(8));
         self.read(&to, 8, |bytes| counts = bytemuck::pod_read_unaligned(bytes))?;
         let [large, huge] = counts.map(|count: u32| count.min(batch.capacity));
@@ -98,20 +103,20 @@ impl<'a> Recorder<'a> {
             };
             if let Some(batches) = &self.buffers.batches {
                 let offset = (self.spare_batch * BATCH_STRIDE) as u64;
-                self.gpu.queue.write_buffer(batches, offset, bytemuck::bytes_of(&range));
+                self.gpu.handles.queue.write_buffer(batches, offset, bytemuck::bytes_of(&range));
             }
-            self.dispatch(stage, self.spare_batch, [tiles.workgroups, 1])?;
+            self.dispatch(kernel, self.spare_batch, [tiles.workgroups, 1])?;
             // Writes to buffers come before all commands of a submission: one round each.
             self.submit()?;
         }
         Ok(())
     }
 
-    /// Draws lines until no thread has anything left to do.
+    /// Draws lines in rounds until no thread is paused.
     pub fn lines_in_rounds(&mut self, batch: usize, workgroups: [u32; 2], bytes: u64) -> Result<(), DrawError> {
         self.clear(Slot::Progress, bytes)?;
         loop {
-            self.dispatch(Stage::Lines, batch, workgroups)?;
+            self.dispatch(Kernel::Edge, batch, workgroups)?;
             if self.read_word(Slot::Progress, 0)? == 0 {
                 return Ok(());
             }
@@ -121,7 +126,8 @@ impl<'a> Recorder<'a> {
 
     /// Reads one word of a buffer, when all that was recorded is done.
     pub fn read_word(&mut self, slot: Slot, index: u32) -> Result<u32, DrawError> {
-        let (from, to) = (self.buffers.storage(self.gpu, slot)?.clone(), self.buffers.counts(self.gpu).clone());
+        let (from, to) =
+            (self.buffers.storage(&self.gpu.handles, slot)?.clone(), self.buffers.counts(&self.gpu.handles).clone());
         self.encoder().copy_buffer_to_buffer(&from, u64::from(index) * 4, &to, 0, Some(4));
         let mut word = 0;
         self.read(&to, 4, |bytes| word = bytemuck::pod_read_unaligned(bytes))?;
@@ -130,14 +136,14 @@ impl<'a> Recorder<'a> {
 
     /// Fills the first `size` bytes of a buffer with zeros.
     pub fn clear(&mut self, slot: Slot, size: u64) -> Result<(), DrawError> {
-        let buffer = self.buffers.storage(self.gpu, slot)?.clone();
+        let buffer = self.buffers.storage(&self.gpu.handles, slot)?.clone();
         self.encoder().clear_buffer(&buffer, 0, Some(size));
         Ok(())
     }
 
     /// Copies `size` bytes of a buffer, from `first` on, to `offset` in the staging buffer.
     pub fn copy_out(&mut self, slot: Slot, first: u64, size: u64, offset: u64) -> Result<(), DrawError> {
-        let from = self.buffers.storage(self.gpu, slot)?.clone();
+        let from = self.buffers.storage(&self.gpu.handles, slot)?.clone();
         if let Some(to) = self.buffers.staging.clone() {
             self.encoder().copy_buffer_to_buffer(&from, first, &to, offset, Some(size));
         }
@@ -150,10 +156,10 @@ impl<'a> Recorder<'a> {
         if let Some(encoder) = self.encoder.take() {
             let (sender, done) = mpsc::channel();
             encoder.on_submitted_work_done(move || {
-                // A job that gave up does not listen any more.
+                // A job that has given up has dropped the receiver.
                 let _ = sender.send(());
             });
-            self.gpu.queue.submit([encoder.finish()]);
+            self.gpu.handles.queue.submit([encoder.finish()]);
             if let Some(before) = self.in_flight.replace(done) {
                 self.gpu.wait(&before, self.deadline)?;
             }
@@ -161,7 +167,7 @@ impl<'a> Recorder<'a> {
         Ok(self.deadline.check()?)
     }
 
-    /// Submits, waits, and lends the first `size` bytes of the staging buffer to `read`.
+    /// Submits, waits, and passes the first `size` bytes of the staging buffer to `read`.
     pub fn read_staging(&mut self, size: u64, read: impl FnOnce(&[u8])) -> Result<(), DrawError> {
         match self.buffers.staging.clone() {
             Some(staging) => self.read(&staging, size, read),
@@ -173,7 +179,7 @@ impl<'a> Recorder<'a> {
         self.submit()?;
         let (sender, mapped) = mpsc::channel();
         staging.map_async(wgpu::MapMode::Read, 0..size, move |result| {
-            // A job that gave up does not listen any more.
+            // A job that has given up has dropped the receiver.
             let _ = sender.send(result);
         });
         let mapped = self.gpu.wait(&mapped, self.deadline)?;
@@ -185,17 +191,17 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    fn kernel(&mut self, stage: Stage) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
-        let pipeline = self.gpu.stages.get(&self.gpu.device, stage, self.look);
+    fn bind(&mut self, kernel: Kernel) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
+        let pipeline = self.gpu.pipelines.get(&self.gpu.handles.device, kernel, self.key);
         let mut bound = Vec::new();
-        for &(slot, _) in stage.buffers() {
-            bound.push((slot, self.buffers.storage(self.gpu, stage.bound_at(slot))?.clone()));
+        for &(slot, _) in kernel.buffers() {
+            bound.push((slot, self.buffers.storage(&self.gpu.handles, kernel.bound_at(slot))?.clone()));
         }
         let entries: Vec<_> = bound
             .iter()
             .map(|(slot, buffer)| wgpu::BindGroupEntry { binding: *slot as u32, resource: buffer.as_entire_binding() })
             .collect();
-        let group = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        let group = self.gpu.handles.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &pipeline.buffers,
             entries: &entries,
@@ -215,13 +221,13 @@ impl<'a> Recorder<'a> {
     fn encoder(&mut self) -> &mut wgpu::CommandEncoder {
         self.pass = None;
         self.encoder.get_or_insert_with(|| {
-            self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None })
+            self.gpu.handles.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None })
         })
     }
 }
 
 /// Uploads batches, a share at a time, into a buffer with room for one more.
-fn upload_batches<'a>(gpu: &Gpu, slot: &'a mut Option<wgpu::Buffer>, batches: &[Batch]) -> &'a wgpu::Buffer {
+fn upload_batches<'a>(gpu: &Handles, slot: &'a mut Option<wgpu::Buffer>, batches: &[Batch]) -> &'a wgpu::Buffer {
     let buffer = Buffers::uniform(gpu, slot, (batches.len() + 1) as u64 * BATCH_STRIDE as u64);
     let mut at = 0;
     for share in batches.chunks(4096) {

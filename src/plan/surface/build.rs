@@ -103,7 +103,8 @@ fn attributes<'a>(mesh: &'a Mesh, pass: &mut SurfacePass<'a>, skips: &mut Skips<
         pass.vertex_normals = Some(CornerValues { values, triangles });
     }
     let samples = pass.is_shaded && pass.materials.iter().any(materials::samples);
-    let shows_uvs = pass.materials.iter().any(|m| m.flags & flags::DEBUG == 5 << flags::DEBUG_SHIFT);
+    let shows_uvs =
+        pass.materials.iter().any(|m| m.flags & flags::DEBUG == super::debug_views::UV << flags::DEBUG_SHIFT);
     if !mesh.uvs.is_empty() && !skips.skip(SkipKind::Uvs, !samples && !shows_uvs, "nothing samples a texture") {
         let values = Cow::Borrowed(mesh.uvs.as_slice());
         pass.uvs = Some(CornerValues { values, triangles: &mesh.attribute_triangles });

@@ -94,13 +94,13 @@ fn fill(look: &mut ShadedMaterial, mesh: &Mesh, slot: &MaterialSlot, surface: &S
 fn shading_flags(slot: &MaterialSlot, surface: &Surface) -> u32 {
     let debug = match surface.debug {
         DebugView::None => 0,
-        DebugView::Barycentric => 1,
-        DebugView::MinBarycentric => 2,
-        DebugView::EdgeDistance => 3,
-        DebugView::Normal => 4,
-        DebugView::Uv => 5,
-        DebugView::FaceOrientation => 6,
-        DebugView::VertexColor => 7,
+        DebugView::Barycentric => super::debug_views::BARYCENTRIC,
+        DebugView::MinBarycentric => super::debug_views::MIN_BARYCENTRIC,
+        DebugView::EdgeDistance => super::debug_views::EDGE_DISTANCE,
+        DebugView::Normal => super::debug_views::NORMAL,
+        DebugView::Uv => super::debug_views::UV,
+        DebugView::FaceOrientation => super::debug_views::FACE_ORIENTATION,
+        DebugView::VertexColor => super::debug_views::VERTEX_COLOR,
     };
     let normals = match (surface.shading, surface.normals) {
         (_, FlatNormals::Face) if surface.debug == DebugView::FaceOrientation => flags::FACE_NORMALS,

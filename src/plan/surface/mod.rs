@@ -88,7 +88,7 @@ pub struct TextureUse {
     pub transform: [[f32; 3]; 2],
     /// Index into [`Textures::images`], or [`TEXTURE_NONE`].
     pub texture: u32,
-    /// Bits 0 to 1: wrap across (0 repeat, 1 mirror, 2 clamp); bits 2 to 3: wrap down; bit 4: nearest texel.
+    /// Bits of [`samplers`].
     pub sampler: u32,
 }
 
@@ -105,6 +105,40 @@ pub mod slots {
     pub const NORMAL: usize = 2;
     /// Light given off.
     pub const EMISSIVE: usize = 3;
+}
+
+/// Bits of [`TextureUse::sampler`]: a wrap mode across in the lowest, one down from [`samplers::DOWN_SHIFT`] on.
+pub mod samplers {
+    /// Bits of a wrap mode.
+    pub const WRAP_BITS: u32 = 3;
+    /// Where the wrap mode down begins.
+    pub const DOWN_SHIFT: u32 = 2;
+    /// Wrap mode: the image repeats.
+    pub const REPEAT: u32 = 0;
+    /// Wrap mode: every second copy is mirrored.
+    pub const MIRROR: u32 = 1;
+    /// Wrap mode: the border's texels go on.
+    pub const CLAMP: u32 = 2;
+    /// The nearest texel, unfiltered.
+    pub const NEAREST: u32 = 16;
+}
+
+/// Values of the debug view in [`ShadedMaterial::flags`]; 0 for none.
+pub mod debug_views {
+    /// Barycentric coordinates.
+    pub const BARYCENTRIC: u32 = 1;
+    /// The smallest barycentric coordinate.
+    pub const MIN_BARYCENTRIC: u32 = 2;
+    /// Distance to the nearest drawn edge.
+    pub const EDGE_DISTANCE: u32 = 3;
+    /// The normal in view axes.
+    pub const NORMAL: u32 = 4;
+    /// Texture coordinates.
+    pub const UV: u32 = 5;
+    /// Front or back.
+    pub const FACE_ORIENTATION: u32 = 6;
+    /// Vertex colours.
+    pub const VERTEX_COLOR: u32 = 7;
 }
 
 /// Bits of [`ShadedMaterial::flags`].
@@ -137,8 +171,7 @@ pub mod flags {
     pub const WIRE_LIT: u32 = 2048;
     /// All four wires.
     pub const WIRES: u32 = WIRE_THRESHOLD | WIRE_BARYCENTRIC | WIRE_FWIDTH_MIN | WIRE_FWIDTH;
-    /// The debug view as a number (0 none, 1 barycentric, 2 min-barycentric, 3 edge-distance, 4 normal, 5 uv,
-    /// 6 face-orientation, 7 vertex-color) is in three bits from here on.
+    /// The debug view, one of [`debug_views`](super::debug_views), is in three bits from here on.
     pub const DEBUG_SHIFT: u32 = 12;
     /// Those three bits.
     pub const DEBUG: u32 = 7 << DEBUG_SHIFT;

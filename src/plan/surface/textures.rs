@@ -126,9 +126,10 @@ impl<'a> TextureLoader<'a> {
 /// Bits as in [`TextureUse::sampler`].
 fn sampler(texture: &TextureRef) -> u32 {
     let wrap = |wrap: Wrap| match wrap {
-        Wrap::Repeat => 0,
-        Wrap::Mirror => 1,
-        Wrap::Clamp => 2,
+        Wrap::Repeat => super::samplers::REPEAT,
+        Wrap::Mirror => super::samplers::MIRROR,
+        Wrap::Clamp => super::samplers::CLAMP,
     };
-    wrap(texture.wrap[0]) | wrap(texture.wrap[1]) << 2 | u32::from(texture.nearest) << 4
+    let nearest = if texture.nearest { super::samplers::NEAREST } else { 0 };
+    wrap(texture.wrap[0]) | wrap(texture.wrap[1]) << super::samplers::DOWN_SHIFT | nearest
 }

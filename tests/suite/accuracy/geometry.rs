@@ -238,7 +238,7 @@ fn pictures_are_the_same_on_every_machine() {
         let plan_spec = scenes::spec(&plan_keys(scene, "1.5"));
         let plan = scenes::plan(&mesh, &plan_spec);
         let deadline = Deadline::default();
-        let want = CpuRenderer::with_isa(1, Isa::Baseline).draw(&plan, &deadline).unwrap();
+        let want = CpuRenderer::with_isa(1, Isa::baseline()).draw(&plan, &deadline).unwrap();
         for threads in [1, 2, 3, 8] {
             let got = CpuRenderer::new(threads).draw(&plan, &deadline).unwrap();
             assert!(want.rgba == got.rgba, "7 {}: {threads} threads", scene.name);

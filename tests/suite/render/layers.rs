@@ -84,7 +84,7 @@ impl Layered {
 fn compare(plan: &DrawPlan<'_>, what: &str) -> usize {
     let deadline = Deadline::default();
     let mut cpu = CpuRenderer::new(1);
-    let mut others = [CpuRenderer::new(2), CpuRenderer::new(7), CpuRenderer::with_isa(2, Isa::Baseline)];
+    let mut others = [CpuRenderer::new(2), CpuRenderer::new(7), CpuRenderer::with_isa(2, Isa::baseline())];
     let mut devices: Vec<GpuRenderer> = gpus().into_iter().flatten().map(|gpu| GpuRenderer::new(gpu.clone())).collect();
     let mut seen = 0;
     let base = cpu.draw_visibility(plan, &deadline).unwrap();
@@ -167,7 +167,7 @@ fn pictures_with_layers_agree() {
                 let plan = soup.plan(&view, pass);
                 let what = format!("{kind:?} {samples} {distance} {pass:?}");
                 let cpu = CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap();
-                for mut other in [CpuRenderer::new(7), CpuRenderer::with_isa(2, Isa::Baseline)] {
+                for mut other in [CpuRenderer::new(7), CpuRenderer::with_isa(2, Isa::baseline())] {
                     assert!(cpu.rgba == other.draw(&plan, &Deadline::default()).unwrap().rgba, "{what}");
                 }
                 for gpu in gpus().into_iter().flatten() {

@@ -40,7 +40,7 @@ fn soups_are_the_same_with_every_instruction_set_and_thread_count_and_have_the_n
         let (positions, triangles) = soup(seed);
         for samples in [1, 4, 8, 16] {
             let plan = plan(&positions, &triangles, samples);
-            let words = CpuRenderer::with_isa(1, Isa::Baseline).draw_visibility(&plan, &Deadline::default()).unwrap();
+            let words = CpuRenderer::with_isa(1, Isa::baseline()).draw_visibility(&plan, &Deadline::default()).unwrap();
             for renderer in [&mut CpuRenderer::new(1), &mut CpuRenderer::new(3)] {
                 assert_eq!(words, renderer.draw_visibility(&plan, &Deadline::default()).unwrap(), "seed {seed}");
             }

@@ -1,4 +1,4 @@
-//! Which triangles and edges each band of rows sees.
+//! Sorting of triangles and edges into bands of rows, before the stage visibility.
 
 use std::ops::Range;
 
@@ -6,26 +6,26 @@ use rayon::prelude::*;
 
 use crate::backend::cpu::geometry::clip::clip_triangle;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous};
-use crate::backend::cpu::geometry::visibility::{area, axis_bounds, is_wanted};
+use crate::backend::cpu::geometry::visibility::{area, axis_bounds, passes_culling};
 use crate::backend::cpu::lines::contour;
 use crate::backend::cpu::lines::segment::Segment;
-use crate::backend::cpu::{CHUNK, Stages};
+use crate::backend::cpu::{CHUNK, RasterContext};
 use crate::limits::Stopped;
 use crate::plan::{DrawPlan, Faces, HullPass, LinePass, pass_mask};
 
-/// A triangle that touches as many bands is listed once for all of them, or large ones on a tall picture would take gigabytes
-/// of lists.
+/// Triangles that touch this many bands are listed once for all of them. Otherwise large ones on a
+/// tall picture would take gigabytes of lists.
 const TALL_BANDS: usize = 8;
 
 /// The same for edges, whose lists are a line pass's own.
 const TALL_EDGE_BANDS: usize = 4;
 
-/// What each band has to draw, chunk by chunk in ascending order.
+/// Items per band, chunk by chunk in ascending order.
 pub struct Bins {
     /// For the visibility buffer.
     pub triangles: Vec<TriangleBin>,
-    /// For the layers over it.
-    pub layers: Vec<TriangleBin>,
+    /// For depth peeling.
+    pub peel: Vec<TriangleBin>,
     /// By line pass.
     pub edges: Vec<Vec<Bin>>,
 }
@@ -35,7 +35,7 @@ pub struct Bins {
 pub struct TriangleBin {
     /// Ids of triangles that need no clipping.
     pub whole: Bin,
-    /// What clipping left of others, and whose it is.
+    /// Id and pieces of clipped triangles.
     pieces: Vec<(u32, [ScreenVertex; 3])>,
     /// Indices into `pieces`.
     piece_bands: Bin,
@@ -47,7 +47,7 @@ pub struct Bin {
     by_band: Vec<Vec<u32>>,
     /// Items that touch many bands, with the first and last.
     tall: Vec<(u32, [u32; 2])>,
-    /// How many bands are many.
+    /// Number of bands from which an item is tall.
     tall_bands: usize,
 }
 
@@ -66,7 +66,7 @@ impl Bin {
         }
     }
 
-    /// Whether every band's items come in ascending order.
+    /// True if every band's items come in ascending order.
     pub fn is_ordered(&self) -> bool {
         self.tall.is_empty()
     }
@@ -85,41 +85,45 @@ impl TriangleBin {
         self.pieces.push((id, piece));
     }
 
-    /// The band's clipped pieces, and whose they are.
+    /// The band's clipped pieces with their ids.
     pub fn pieces_in(&self, band: usize) -> impl Iterator<Item = (u32, &[ScreenVertex; 3])> {
         self.piece_bands.items_in(band).map(|i| &self.pieces[i as usize]).map(|(id, piece)| (*id, piece))
     }
 }
 
-/// Sorts the plan's triangles and edges into bands of `rows`; triangles of the visibility buffer also into those to which they
-/// are as close as `margin` rows.
-pub fn bin(stages: &Stages<'_>, pool: Option<&rayon::ThreadPool>, [rows, margin]: [u32; 2]) -> Result<Bins, Stopped> {
-    let plan = stages.plan;
-    let (base, layers) = passes(plan);
+/// Sorts the plan's triangles and edges into bands of `rows`; triangles of the visibility buffer
+/// also into those to which they are as close as `margin` rows.
+pub fn bin(
+    context: &RasterContext<'_>,
+    pool: Option<&rayon::ThreadPool>,
+    [rows, margin]: [u32; 2],
+) -> Result<Bins, Stopped> {
+    let plan = context.plan;
+    let (base, peel) = passes(plan);
     let bin_all = |passes: Vec<Pass>, margin: u32| {
         let jobs = passes.into_iter().flat_map(Pass::chunks).collect();
-        map(pool, jobs, |pass| match stages.deadline.check() {
-            Ok(()) => bin_triangles(stages, [rows, margin], &pass),
+        map(pool, jobs, |pass| match context.deadline.check() {
+            Ok(()) => bin_triangles(context, [rows, margin], &pass),
             Err(Stopped) => TriangleBin::default(),
         })
     };
-    let (triangles, layers) = (bin_all(base, margin), bin_all(layers, 0));
+    let (triangles, peel) = (bin_all(base, margin), bin_all(peel, 0));
     let bin_pass = |pass: &LinePass| {
-        map(pool, chunks(0..pass.edges.len()).collect(), |range| match stages.deadline.check() {
-            Ok(()) => bin_edges(stages, pass, rows, range),
+        map(pool, chunks(0..pass.edges.len()).collect(), |range| match context.deadline.check() {
+            Ok(()) => bin_edges(context, pass, rows, range),
             Err(Stopped) => Bin::default(),
         })
     };
     let edges = plan.lines.iter().map(bin_pass).collect();
-    stages.deadline.check()?;
-    Ok(Bins { triangles, layers, edges })
+    context.deadline.check()?;
+    Ok(Bins { triangles, peel, edges })
 }
 
-/// Triangles that are drawn for the same reason.
+/// Triangles of one pass.
 struct Pass {
     ids: Range<usize>,
-    /// The role that triangles must have; of a hull's none.
-    role: u8,
+    /// Bit that a triangle's pass mask must have; 0 for the outline mesh, which has no masks.
+    pass_bit: u8,
     faces: Faces,
 }
 
@@ -128,33 +132,34 @@ impl Pass {
         chunks(self.ids.clone()).map(move |ids| Self { ids, ..self })
     }
 
-    /// Which faces of a triangle are drawn; None where it has another role.
+    /// Drawn faces of a triangle; None if the pass does not draw it.
     #[inline(always)]
     fn faces_of(&self, plan: &DrawPlan<'_>, id: usize) -> Option<Faces> {
-        if self.role == 0 {
+        if self.pass_bit == 0 {
             return Some(self.faces);
         }
         match plan.pass_masks.get(id) {
             None => Some(self.faces),
-            Some(role) if role & self.role == 0 => None,
-            Some(role) if role & pass_mask::FRONT_ONLY != 0 => Some(Faces::Front),
-            Some(role) if role & pass_mask::BACK_ONLY != 0 => Some(Faces::Back),
+            Some(mask) if mask & self.pass_bit == 0 => None,
+            Some(mask) if mask & pass_mask::FRONT_ONLY != 0 => Some(Faces::Front),
+            Some(mask) if mask & pass_mask::BACK_ONLY != 0 => Some(Faces::Back),
             _ => Some(self.faces),
         }
     }
 }
 
-/// What goes into the visibility buffer, and what into the layers.
+/// The passes of the visibility buffer, and those of depth peeling.
 fn passes(plan: &DrawPlan<'_>) -> (Vec<Pass>, Vec<Pass>) {
     let count = plan.triangles.len();
-    let surface = |role| plan.surface.as_ref().map(|s| Pass { ids: 0..count, role, faces: s.faces });
-    let around = |hull: &HullPass<'_>| Pass { ids: count..count + hull.triangles.len(), role: 0, faces: Faces::Both };
+    let surface = |pass_bit| plan.surface.as_ref().map(|s| Pass { ids: 0..count, pass_bit, faces: s.faces });
+    let around =
+        |hull: &HullPass<'_>| Pass { ids: count..count + hull.triangles.len(), pass_bit: 0, faces: Faces::Both };
     let hull = plan.hull.as_ref().map(around);
-    // Without roles, nothing is a layer.
+    // Without pass masks nothing is peeled.
     let layer = surface(pass_mask::LAYER).filter(|_| plan.peeling().is_some() && !plan.pass_masks.is_empty());
-    let (base_hull, layered_hull) = if plan.has_peeled_hull() { (None, hull) } else { (hull, None) };
+    let (base_hull, peeled_hull) = if plan.has_peeled_hull() { (None, hull) } else { (hull, None) };
     let collect = |passes: [Option<Pass>; 2]| passes.into_iter().flatten().collect();
-    (collect([surface(pass_mask::SURFACE), base_hull]), collect([layer, layered_hull]))
+    (collect([surface(pass_mask::SURFACE), base_hull]), collect([layer, peeled_hull]))
 }
 
 fn chunks(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
@@ -166,8 +171,8 @@ fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
     plan.height_px.div_ceil(rows) as usize
 }
 
-fn bin_triangles(stages: &Stages<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBin {
-    let plan = stages.plan;
+fn bin_triangles(context: &RasterContext<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBin {
+    let plan = context.plan;
     let bands = band_count(plan, rows[0]);
     let mut bin = TriangleBin {
         whole: Bin::new(bands, TALL_BANDS),
@@ -176,10 +181,10 @@ fn bin_triangles(stages: &Stages<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBi
     };
     for id in pass.ids.clone() {
         let Some(faces) = pass.faces_of(plan, id) else { continue };
-        let vertices = stages.screen_triangle(id as u32);
+        let vertices = context.screen_triangle(id as u32);
         if vertices.iter().any(ScreenVertex::is_outside) {
-            bin_clipped(stages, rows, id as u32, faces, &mut bin);
-        } else if is_wanted(faces, area(&vertices))
+            bin_clipped(context, rows, id as u32, faces, &mut bin);
+        } else if passes_culling(faces, area(&vertices))
             && let Some(bands) = bands_of(plan, rows, &vertices)
         {
             bin.whole.push(id as u32, bands);
@@ -188,14 +193,14 @@ fn bin_triangles(stages: &Stages<'_>, rows: [u32; 2], pass: &Pass) -> TriangleBi
     bin
 }
 
-fn bin_clipped(stages: &Stages<'_>, rows: [u32; 2], id: u32, faces: Faces, bin: &mut TriangleBin) {
-    let plan = stages.plan;
-    if !plan.projection.clip || stages.is_hull(id) {
+fn bin_clipped(context: &RasterContext<'_>, rows: [u32; 2], id: u32, faces: Faces, bin: &mut TriangleBin) {
+    let plan = context.plan;
+    if !plan.projection.clip || context.is_hull(id) {
         return;
     }
-    let corners = stages.positions_of(id).map(|(position, _)| homogeneous(&plan.projection, position));
+    let corners = context.positions_of(id).map(|(position, _)| homogeneous(&plan.projection, position));
     clip_triangle(&plan.projection, corners, |piece| {
-        if is_wanted(faces, area(&piece))
+        if passes_culling(faces, area(&piece))
             && let Some(bands) = bands_of(plan, rows, &piece)
         {
             bin.push_piece(id, piece, bands);
@@ -203,8 +208,8 @@ fn bin_clipped(stages: &Stages<'_>, rows: [u32; 2], id: u32, faces: Faces, bin: 
     });
 }
 
-/// First and last band that a triangle on screen touches, or comes as close to as `margin` rows; None if it lies beside, above or
-/// below all that has samples.
+/// First and last band that a triangle on screen touches, or comes as close to as `margin` rows;
+/// None if it lies beside, above or below all that has samples.
 #[inline(always)]
 fn bands_of(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], v: &[ScreenVertex; 3]) -> Option<[usize; 2]> {
     axis_bounds(&v.map(|v| v.x), plan.width_px, plan.seen_range(plan.width_px))?;
@@ -213,16 +218,16 @@ fn bands_of(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2], v: &[ScreenVertex; 3]
     (first <= last).then(|| [first, last].map(|row| row as usize / rows as usize))
 }
 
-fn bin_edges(stages: &Stages<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> Bin {
-    let mut bin = Bin::new(band_count(stages.plan, rows), TALL_EDGE_BANDS);
+fn bin_edges(context: &RasterContext<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> Bin {
+    let mut bin = Bin::new(band_count(context.plan, rows), TALL_EDGE_BANDS);
     let reach = pass.reach_px();
     for i in range {
         let edge = &pass.edges[i];
-        if !contour::is_drawn(stages, pass, edge) {
+        if !contour::is_drawn(context, pass, edge) {
             continue;
         }
-        if let Some(segment) = Segment::new(stages, edge) {
-            let [first, last] = segment.rows(reach, stages.plan.height_px);
+        if let Some(segment) = Segment::new(context, edge) {
+            let [first, last] = segment.rows(reach, context.plan.height_px);
             if first <= last {
                 bin.push(i as u32, [first, last].map(|row| row as usize / rows as usize));
             }
@@ -260,7 +265,7 @@ mod tests {
             let want = (100..).zip(spans).filter(|(_, [first, last])| (*first..=*last).contains(&band));
             assert_eq!(found, want.map(|(id, _)| id).collect::<Vec<u32>>(), "band {band}");
         }
-        // What touches few bands is not looked at in the others.
+        // Pieces that touch few bands are not visited in the others.
         assert_eq!(bin.piece_bands.tall.len(), 2);
     }
 }

@@ -1,90 +1,101 @@
-//! Bands of rows: how one is drawn from start to finish.
+//! All stages of a band of rows, from visibility to resolve.
+//!
+//! A band fits a core's cache and depends on no other band. [`bins`] sorts triangles and edges into
+//! bands, [`scratch`] holds a band's buffers.
 
 pub(crate) mod bins;
 pub(crate) mod scratch;
 use self::bins::{Bin, Bins};
 use self::scratch::BandScratch;
 use super::isa::dispatch;
-use super::{Stages, resolve};
-use crate::backend::cpu::deadline_poll::Watch;
+use super::{RasterContext, resolve};
+use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::nearest::Nearest;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::visibility;
 use crate::backend::cpu::geometry::visibility::Setup;
-use crate::backend::cpu::lines::coverage::{Ink, Inker};
+use crate::backend::cpu::lines::coverage::{LineCompositor, LineCoverage};
 use crate::backend::cpu::lines::edge::{LineDrawer, LineTarget};
 use crate::backend::cpu::lines::line_light;
 use crate::backend::cpu::peeling::composite;
-use crate::backend::cpu::peeling::composite::LayerBand;
+use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::cpu::surface::shade;
 use crate::plan::LinePass;
 
-/// Edges between two looks at the deadline. Those of wide lines count their pixels too.
-const EDGES_A_LOOK: usize = 256;
+/// Edges between two polls of the deadline. Wide lines count their pixels too.
+const EDGES_PER_POLL: usize = 256;
 
 /// Draws band number `band` into its rows of the picture.
-pub fn draw(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, rgba: &mut [u8]) {
-    let (plan, isa) = (stages.plan, stages.isa);
+pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, rgba: &mut [u8]) {
+    let (plan, isa) = (context.plan, context.isa);
     let pixels = rgba.len() / 4;
-    fill_samples(stages, scratch, bins, band);
+    fill_samples(context, scratch, bins, band);
     scratch.colors.clear();
     scratch.colors.resize(pixels, [0.0; 4]);
     if let Some(pass) = plan.peeling() {
-        let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples, scratch.rows));
-        composite::draw(stages, pass, (&bins.layers, band), &scratch.samples, layers, &mut scratch.colors);
+        let peel = scratch.peel.get_or_insert_with(|| PeelBand::new(&scratch.samples, scratch.rows));
+        composite::draw(context, pass, (&bins.peel, band), &scratch.samples, peel, &mut scratch.colors);
     } else if plan.is_shaded() {
-        shade_band(isa, stages, &scratch.samples, &mut scratch.colors);
+        shade_band(isa, context, &scratch.samples, &mut scratch.colors);
     }
-    draw_lines(stages, scratch, bins, band);
-    resolve::lay_over_background(plan, &mut scratch.colors);
-    resolve::encode(stages.srgb, &scratch.colors, rgba);
+    draw_lines(context, scratch, bins, band);
+    resolve::composite_background(plan, &mut scratch.colors);
+    resolve::encode(context.srgb, &scratch.colors, rgba);
 }
 
-/// Draws band number `band` of the visibility buffer alone, as [`Renderer::draw_visibility`](super::Renderer) says.
-pub fn draw_visibility(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, words: &mut [u64]) {
-    fill_samples(stages, scratch, bins, band);
+/// Draws band number `band` of the visibility buffer alone, as
+/// [`Renderer::draw_visibility`](super::Renderer) says.
+pub fn draw_visibility(
+    context: &RasterContext<'_>,
+    scratch: &mut BandScratch,
+    bins: &Bins,
+    band: usize,
+    words: &mut [u64],
+) {
+    fill_samples(context, scratch, bins, band);
     let samples = &scratch.samples;
     for_each_sample(samples, words, |at| samples.word(at));
 }
 
 /// Draws band number `band` of a layer alone, likewise.
 pub fn draw_layer(
-    stages: &Stages<'_>,
+    context: &RasterContext<'_>,
     scratch: &mut BandScratch,
     bins: &Bins,
     band: usize,
     layer: u32,
     words: &mut [u64],
 ) {
-    fill_samples(stages, scratch, bins, band);
-    if let Some(pass) = stages.plan.peeling() {
-        let layers = scratch.layers.get_or_insert_with(|| LayerBand::new(&scratch.samples, scratch.rows));
-        let found = composite::find(stages, pass, (&bins.layers, band), &scratch.samples, layers, layer);
-        for_each_sample(&layers.found, words, |at| found[at]);
+    fill_samples(context, scratch, bins, band);
+    if let Some(pass) = context.plan.peeling() {
+        let peel = scratch.peel.get_or_insert_with(|| PeelBand::new(&scratch.samples, scratch.rows));
+        let found = composite::find_layer(context, pass, (&bins.peel, band), &scratch.samples, peel, layer);
+        for_each_sample(&peel.found, words, |at| found[at]);
     }
 }
 
-/// Lays the lines of each pass over the colours, one pass after the other: what they need is the same however many there are.
-fn draw_lines(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
-    let plan = stages.plan;
+/// Composites the lines of each pass over the colours, one pass after the other, so that memory
+/// does not grow with their number.
+fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
+    let plan = context.plan;
     let pixels = scratch.colors.len();
-    let inker = Inker::new(plan, &scratch.samples, scratch.layers.as_ref());
+    let compositor = LineCompositor::new(plan, &scratch.samples, scratch.peel.as_ref());
     for (pass, bins) in plan.lines.iter().zip(&bins.edges) {
         if bins.iter().all(|chunk| chunk.items_in(band).next().is_none()) {
             continue;
         }
         let lit_pixels = if pass.lit && plan.lights_lines() { pixels } else { 0 };
-        scratch.ink.clear();
-        scratch.ink.resize(pixels, Ink::default());
+        scratch.coverage.clear();
+        scratch.coverage.resize(pixels, LineCoverage::default());
         scratch.owners.clear();
         scratch.owners.resize(lit_pixels, 0);
-        let target = &mut LineTarget { ink: &mut scratch.ink, owners: &mut scratch.owners };
-        draw_edges(stages.isa, stages, pass, bins, band, &scratch.samples, target);
+        let target = &mut LineTarget { coverage: &mut scratch.coverage, owners: &mut scratch.owners };
+        draw_edges(context.isa, context, pass, bins, band, &scratch.samples, target);
         scratch.light.clear();
         scratch.light.resize(lit_pixels, Light::NONE);
-        line_light::light_lines(stages, &scratch.samples, &scratch.owners, &mut scratch.light);
-        inker.lay(pass, &scratch.ink, &scratch.light, &mut scratch.colors);
+        line_light::light_lines(context, &scratch.samples, &scratch.owners, &mut scratch.light);
+        compositor.composite(pass, &scratch.coverage, &scratch.light, &mut scratch.colors);
     }
 }
 
@@ -98,8 +109,8 @@ fn for_each_sample(band: &SampleBand, words: &mut [u64], word: impl Fn(usize) ->
 }
 
 /// Moves the scratch to the band and fills its samples, unless nothing in the plan reads them.
-fn fill_samples(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
-    let plan = stages.plan;
+fn fill_samples(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
+    let plan = context.plan;
     let first = band as u32 * scratch.rows;
     let end = (first + scratch.rows).min(plan.height_px);
     let samples = &mut scratch.samples;
@@ -109,24 +120,24 @@ fn fill_samples(stages: &Stages<'_>, scratch: &mut BandScratch, bins: &Bins, ban
     samples.rows = ((end + scratch.margin) as i32).min(bottom).abs_diff(samples.first_row);
     if plan.surface.is_some() || plan.hull.is_some() {
         scratch.samples.clear();
-        draw_triangles(stages.isa, stages, bins, band, &mut scratch.samples);
+        draw_triangles(context.isa, context, bins, band, &mut scratch.samples);
     }
 }
 
 dispatch! {
     /// The visibility stage of a band.
-    pub fn draw_triangles(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) = triangles_kernel
+    pub fn draw_triangles(context: &RasterContext<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) = triangles_kernel
 }
 
 dispatch! {
     /// The shade stage of a band.
-    pub fn shade_band(stages: &Stages<'_>, samples: &SampleBand, colors: &mut [[f32; 4]]) = shade::shade
+    pub fn shade_band(context: &RasterContext<'_>, samples: &SampleBand, colors: &mut [[f32; 4]]) = shade::shade
 }
 
 dispatch! {
     /// The line stage of a band.
     pub fn draw_edges(
-        stages: &Stages<'_>,
+        context: &RasterContext<'_>,
         pass: &LinePass,
         bins: &[Bin],
         band: usize,
@@ -136,25 +147,25 @@ dispatch! {
 }
 
 #[inline(always)]
-fn triangles_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) {
-    let mut watch = Watch::new(stages.deadline);
+fn triangles_kernel(context: &RasterContext<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) {
+    let mut poll = DeadlinePoll::new(context.deadline);
     for chunk in &bins.triangles {
-        // What is not in ascending order comes with ties looked at.
-        let ordered = chunk.whole.is_ordered() && !stages.plan.projection.clip;
+        // Only ascending ids need no test for ties.
+        let ordered = chunk.whole.is_ordered() && !context.plan.projection.clip;
         for (id, piece) in chunk.pieces_in(band) {
             let setup = Setup::new(piece);
-            if watch.is_over(setup.map_or(0, |setup| visibility::draw(&setup, id, &mut Nearest::<true>(samples)))) {
+            if poll.is_expired(setup.map_or(0, |setup| visibility::draw(&setup, id, &mut Nearest::<true>(samples)))) {
                 return;
             }
         }
         for id in chunk.whole.items_in(band) {
-            let setup = Setup::new(&stages.screen_triangle(id));
+            let setup = Setup::new(&context.screen_triangle(id));
             let looked_at = match setup {
                 Some(setup) if ordered => visibility::draw(&setup, id, &mut Nearest::<false>(samples)),
                 Some(setup) => visibility::draw(&setup, id, &mut Nearest::<true>(samples)),
                 None => 0,
             };
-            if watch.is_over(looked_at) {
+            if poll.is_expired(looked_at) {
                 return;
             }
         }
@@ -163,18 +174,18 @@ fn triangles_kernel(stages: &Stages<'_>, bins: &Bins, band: usize, samples: &mut
 
 #[inline(always)]
 fn edges_kernel(
-    stages: &Stages<'_>,
+    context: &RasterContext<'_>,
     pass: &LinePass,
     bins: &[Bin],
     band: usize,
     samples: &SampleBand,
     target: &mut LineTarget<'_>,
 ) {
-    let mut drawer = LineDrawer::new(stages, pass, samples, samples.shown);
+    let mut drawer = LineDrawer::new(context, pass, samples, samples.shown);
     for chunk in bins {
         for (i, edge) in chunk.items_in(band).enumerate() {
-            // A wide line's edge is as much work as hundreds of others.
-            if (i % EDGES_A_LOOK == 0 || drawer.has_looked_far()) && stages.deadline.check().is_err() {
+            // An edge of a wide line is as much work as hundreds of others.
+            if (i % EDGES_PER_POLL == 0 || drawer.is_poll_due()) && context.deadline.check().is_err() {
                 return;
             }
             drawer.draw(&pass.edges[edge as usize], target);

@@ -1,44 +1,45 @@
-//! Memory of bands: how large they are, and their buffers.
+//! Sizes of bands, and their buffers.
 
 use std::sync::{Mutex, PoisonError};
 
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::isa::LANES;
-use crate::backend::cpu::lines::coverage::Ink;
-use crate::backend::cpu::peeling::composite::LayerBand;
+use crate::backend::cpu::lines::coverage::LineCoverage;
+use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::light::Light;
 use crate::plan::DrawPlan;
 
 /// Memory of a band, bytes: half of a common 1 MiB second-level cache.
 const BAND_BYTES: usize = 512 << 10;
 
-/// Rows of a band, at least, of a picture that has as many: a tall triangle is looked at once for each band.
+/// Rows of a band, at least, of a picture that has as many: a tall triangle is looked at once for
+/// each band.
 const ROWS_MIN: u32 = 4;
 
 /// Memory of all bands that are drawn at once, bytes, whatever is drawn on however many threads.
 pub const BANDS_BYTES_MAX: usize = 256 << 20;
 
-/// What is kept from picture to picture, bytes: of a band's scratch, and of vertices.
+/// Memory kept from picture to picture, bytes: of a band's scratch, and of vertices.
 pub const KEPT_BYTES_MAX: usize = 8 << 20;
 
 /// Bytes of a sample: depth and id.
 const SAMPLE_BYTES: usize = 8;
 
-/// How a picture is cut into bands.
+/// Division of a picture into bands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Banding {
     /// Rows in each band but the last.
     pub rows: u32,
-    /// Rows beyond a band that its lines look at.
+    /// Rows beyond a band that its lines material at.
     pub margin: u32,
     /// Bands that are drawn at once.
     pub at_once: usize,
 }
 
 impl Banding {
-    /// For so many threads. Bands fit the cache, unless their lines look far beyond them: then a band has as many rows as lets
-    /// the threads do the most in [`BANDS_BYTES_MAX`], because small bands draw most samples for their neighbours, and of large
-    /// ones there are few at once.
+    /// For so many threads. Bands fit the cache, unless their lines material far beyond them: then
+    /// a band has as many rows as lets the threads do the most in [`BANDS_BYTES_MAX`], because
+    /// small bands draw most samples for their neighbours, and of large ones there are few at once.
     pub fn new(plan: &DrawPlan<'_>, threads: usize) -> Self {
         let margin = plan.line_margin_rows();
         let cached = (BAND_BYTES / (row_bytes(plan, 1) + row_bytes(plan, 0)).max(1)) as u32;
@@ -75,28 +76,28 @@ fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
         return samples(plan.width_px + 2 * plan.margin_px) * SAMPLE_BYTES;
     }
     let light = if plan.lights_lines() { size_of::<Light>() + size_of::<u32>() } else { 0 };
-    let ink = if plan.lines.is_empty() { 0 } else { size_of::<Ink>() };
-    let layers = if plan.peeling().is_some() { LayerBand::SAMPLE_BYTES } else { 0 };
-    plan.width_px as usize * (size_of::<[f32; 4]>() + light + ink) + samples(plan.width_px) * layers
+    let coverage = if plan.lines.is_empty() { 0 } else { size_of::<LineCoverage>() };
+    let peel = if plan.peeling().is_some() { PeelBand::SAMPLE_BYTES } else { 0 };
+    plan.width_px as usize * (size_of::<[f32; 4]>() + light + coverage) + samples(plan.width_px) * peel
 }
 
 /// A band's buffers, kept from band to band.
 pub struct BandScratch {
-    /// What each sample sees.
+    /// The visibility buffer.
     pub samples: SampleBand,
     /// Rows that are shown; the last band of a picture may use fewer.
     pub rows: u32,
     /// Rows beyond these, above and below, that `samples` has room for too.
     pub margin: u32,
-    /// Where the plan has layers.
-    pub layers: Option<LayerBand>,
-    /// A pixel, premultiplied linear RGBA.
+    /// Depth peeling, where the plan has it.
+    pub peel: Option<PeelBand>,
+    /// Per pixel, premultiplied linear RGBA.
     pub colors: Vec<[f32; 4]>,
-    /// Of the line pass that is drawn just now.
-    pub ink: Vec<Ink>,
-    /// Where that is lit, whose light falls on its lines.
+    /// Line coverage of the current line pass.
+    pub coverage: Vec<LineCoverage>,
+    /// Per pixel, where the pass is lit: the face that lights its lines, plus 1.
     pub owners: Vec<u32>,
-    /// A pixel, where it is lit.
+    /// Per pixel, the light on its lines.
     pub light: Vec<Light>,
 }
 
@@ -106,31 +107,31 @@ impl BandScratch {
             samples: SampleBand::new([plan.width_px, plan.height_px], plan.margin_px, rows + 2 * margin, plan.samples),
             rows,
             margin,
-            layers: None,
+            peel: None,
             colors: Vec::new(),
-            ink: Vec::new(),
+            coverage: Vec::new(),
             owners: Vec::new(),
             light: Vec::new(),
         }
     }
 
-    /// What it holds on to, bytes.
+    /// Allocated memory, bytes.
     fn bytes(&self) -> usize {
         self.samples.depth.len() * SAMPLE_BYTES
-            + self.layers.as_ref().map_or(0, LayerBand::bytes)
+            + self.peel.as_ref().map_or(0, PeelBand::bytes)
             + self.colors.capacity() * size_of::<[f32; 4]>()
-            + self.ink.capacity() * size_of::<Ink>()
+            + self.coverage.capacity() * size_of::<LineCoverage>()
             + self.owners.capacity() * size_of::<u32>()
             + self.light.capacity() * size_of::<Light>()
     }
 }
 
-/// Buffers of bands that nobody draws just now.
+/// Unused buffers of bands.
 #[derive(Default)]
 pub struct ScratchPool(Mutex<Vec<BandScratch>>);
 
 impl ScratchPool {
-    /// Lends a scratch that fits the plan.
+    /// Calls `each` with a scratch that fits the plan.
     pub fn with(&self, plan: &DrawPlan<'_>, banding: Banding, each: impl FnOnce(&mut BandScratch)) {
         let size_px = [plan.width_px, plan.height_px];
         let fits = |s: &BandScratch| {
@@ -145,7 +146,7 @@ impl ScratchPool {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
     }
 
-    /// Lets go of what is too large to keep for another picture.
+    /// Frees buffers that are too large to keep for another picture.
     pub fn trim(&self) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).retain(|scratch| scratch.bytes() <= KEPT_BYTES_MAX);
     }
@@ -187,14 +188,15 @@ mod tests {
         DrawPlan { samples: 4, lines: vec![pass; passes], ..plan }
     }
 
-    /// Draws nothing in all of a band's buffers; whether they are kept for the next picture, after how many bytes.
+    /// Draws nothing in all of a band's buffers; whether they are kept for the next picture, after
+    /// how many bytes.
     fn is_kept(plan: &DrawPlan<'_>) -> (bool, usize) {
         let (pool, banding) = (ScratchPool::default(), Banding::new(plan, 1));
         let pixels = (plan.width_px * banding.rows) as usize;
         let mut bytes = 0;
         pool.with(plan, banding, |scratch| {
             scratch.colors.resize(pixels, [0.0; 4]);
-            scratch.ink.resize(pixels, Ink::default());
+            scratch.coverage.resize(pixels, LineCoverage::default());
             bytes = scratch.bytes();
         });
         pool.trim();
@@ -209,7 +211,7 @@ mod tests {
         }
     }
 
-    /// All kinds of plans whose lines look far beyond a band.
+    /// All kinds of plans whose lines material far beyond a band.
     fn with_wide_lines(each: &mut impl FnMut(&DrawPlan<'_>)) {
         for size_px in [[4096, 4096], [4096, 100], [100, 4096], [1, 1], [640, 480]] {
             for (samples, width_px) in [1, 4, 8, 16].into_iter().flat_map(|s| [1.0, 9.0, 110.0].map(|w| (s, w))) {
@@ -221,11 +223,11 @@ mod tests {
                     for lines in &mut plan.lines {
                         (lines.width_px, lines.shown, lines.lit) = (width_px, Shown::Hidden, true);
                     }
-                    let layers = PeelingPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
-                    plan.peeling = Some(layers).filter(|_| layered);
+                    let peel = PeelingPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
+                    plan.peeling = Some(peel).filter(|_| layered);
                     plan.samples = samples;
                     each(&plan);
-                    // Where the mesh goes on beyond the picture.
+                    // The same with a mesh that continues beyond the picture.
                     plan.margin_px = plan.line_margin_rows();
                     each(&plan);
                 }
@@ -263,10 +265,10 @@ mod tests {
             ScratchPool::default().with(plan, banding, |scratch| {
                 let pixels = (plan.width_px * banding.rows) as usize;
                 scratch.colors = Vec::with_capacity(pixels);
-                scratch.ink = Vec::with_capacity(pixels);
+                scratch.coverage = Vec::with_capacity(pixels);
                 scratch.owners = Vec::with_capacity(pixels);
                 scratch.light = Vec::with_capacity(pixels);
-                scratch.layers = plan.peeling().map(|_| LayerBand::new(&scratch.samples, scratch.rows));
+                scratch.peel = plan.peeling().map(|_| PeelBand::new(&scratch.samples, scratch.rows));
                 assert_eq!(scratch.bytes(), banding.bytes(plan));
             });
             cases += 1;

@@ -1,10 +1,11 @@
-//! Stage 1b, a triangle that reaches behind the eye or far outside the picture. Twin of `shaders/geometry/clip.wgsl`.
+//! Stage transform, per triangle that reaches behind the eye or far outside the picture: clipping.
+//! Twin of `shaders/geometry/clip.wgsl`.
 
 use super::transform::{ScreenVertex, recip, round_to_i32};
 use crate::plan::Projection;
 
 /// Bound of clipped coordinates, a little inside the guard band so that rounding cannot leave it.
-const BOUND: f32 = 1_048_576.0 - 512.0;
+pub const BOUND: f32 = 1_048_576.0 - 512.0;
 
 /// A triangle cut by five planes has at most eight corners.
 pub const CORNERS_MAX: usize = 8;
@@ -43,7 +44,8 @@ pub fn clip_segment(projection: &Projection, ends: [[f32; 4]; 2]) -> Option<[Scr
     Some([a, b].map(|p| snap(projection.near_w, p)))
 }
 
-/// Whether all coordinates are numbers below 2^64: no step of clipping overflows then. What has others is not drawn.
+/// True if all coordinates are numbers below 2^64: then no step of clipping overflows. Other
+/// triangles are not drawn.
 pub fn is_moderate(p: &[f32; 4]) -> bool {
     const BOUND: f32 = 18_446_744_073_709_551_616.0;
     // Comparisons with what is not a number are false.
@@ -65,8 +67,8 @@ impl Polygon {
                 out.push(*a);
             }
             if (da >= 0.0) != (db >= 0.0) {
-                // Always from the inside to the outside, whichever way this triangle runs round: the neighbour across
-                // the edge then gets the same point, bit for bit.
+                // Always from the inside to the outside, whichever way this triangle runs round:
+                // the neighbour across the edge then gets the same point, bit for bit.
                 out.push(if da >= 0.0 { intersect(a, b, da, db) } else { intersect(b, a, db, da) });
             }
         }
@@ -97,7 +99,8 @@ fn intersect(inside: &[f32; 4], outside: &[f32; 4], d_inside: f32, d_outside: f3
 }
 
 fn snap(near_w: f32, p: [f32; 4]) -> ScreenVertex {
-    // Where the near plane is far nearer than f32 is exact, rounding may leave W behind it, or behind the eye.
+    // With a near plane below the precision of f32, rounding may move W behind it, or behind the
+    // eye.
     let r = recip(p[3].max(near_w));
     // The clamp only ever takes away what rounding added.
     let bound = |v: f32| v.clamp(-BOUND, BOUND);

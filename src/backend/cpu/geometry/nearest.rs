@@ -1,11 +1,11 @@
-//! What the visibility buffer keeps of the triangles that are offered to it.
+//! Stage visibility, per sample: keeps the nearest triangle.
 
 use super::samples::SampleBand;
 use super::visibility::Target;
 use crate::backend::cpu::isa::LANES;
 
-/// Keeps the nearest. With `TIES`, of equal depths the lowest id wins whatever the order of drawing; without, the caller
-/// promises ascending ids.
+/// Keeps the nearest. With `TIES`, of equal depths the lowest id wins whatever the order of
+/// drawing; without, the caller promises ascending ids.
 pub struct Nearest<'a, const TIES: bool>(pub &'a mut SampleBand);
 
 impl<const TIES: bool> Target for Nearest<'_, TIES> {
@@ -24,8 +24,8 @@ impl<const TIES: bool> Target for Nearest<'_, TIES> {
     }
 }
 
-/// Keeps, lane by lane, the nearer of what is there and triangle `id`. Written as whole-array steps without branches,
-/// which is the form that compilers turn into vector instructions.
+/// Keeps, lane by lane, the nearer of what is there and triangle `id`. Written as whole-array steps
+/// without branches, which is the form that compilers turn into vector instructions.
 #[inline(always)]
 fn update<const TIES: bool>(
     outside: &[i32; LANES],

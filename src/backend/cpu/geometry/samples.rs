@@ -1,8 +1,8 @@
-//! The visibility buffer of a band: what every sample sees, and how near it is.
+//! Stage visibility: the buffer of a band, with the triangle id and depth of every sample.
 
 use crate::backend::cpu::isa::LANES;
 
-/// Calls `f::<S>` for `S` samples a pixel, so that its loops over them have a constant length.
+/// Calls `f::<S>` for `S` samples per pixel, so that its loops over them have a constant length.
 macro_rules! for_samples {
     ($samples:expr, $($f:ident).+ ($($argument:expr),* $(,)?)) => {
         match $samples {
@@ -28,9 +28,10 @@ pub struct SampleBand {
     pub first_row: i32,
     /// Rows in the band.
     pub rows: u32,
-    /// First row that is shown, and the row after the last; what lies beyond them in the band hides lines that reach into it.
+    /// First row that is shown, and the row after the last; what lies beyond them in the band hides
+    /// lines that reach into it.
     pub shown: [u32; 2],
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
     /// Samples in a row, padded so that a vector may hang over the right edge.
     pub stride: usize,
@@ -69,14 +70,14 @@ impl SampleBand {
         (y - self.first_row) as usize * self.stride + (column * self.samples + s) as usize
     }
 
-    /// What a sample sees, in one number: nearer is larger, of equal depths the lower id.
+    /// Depth and id of a sample in one number: nearer is larger; of equal depths the lower id is.
     #[inline(always)]
     pub fn word(&self, at: usize) -> u64 {
         let id = self.ids[at];
         if id == NOTHING { 0 } else { u64::from(self.depth[at].to_bits()) << 32 | u64::from(!id) }
     }
 
-    /// Whether a pixel of the picture, or beyond, is in the band.
+    /// True if the band holds a pixel of the picture or beyond.
     #[inline(always)]
     pub fn has(&self, x: i32, y: i32) -> bool {
         let [columns, rows] = self.range();

@@ -1,7 +1,8 @@
-//! Stage 1, a vertex: unit box to snapped screen coordinates. Twin of `shaders/geometry/transform.wgsl`.
+//! Stage transform, per vertex: unit box to snapped screen coordinates. Twin of
+//! `shaders/geometry/transform.wgsl`.
 //!
-//! Bit-exact on every machine and on both back-ends: only `+ - *`, each rounded by itself (ARCHITECTURE.md, "Rounded
-//! operations").
+//! Bit-exact on every machine and on both back-ends: only `+ - *`, each rounded by itself
+//! (ARCHITECTURE.md, "Rounded operations").
 
 use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::plan::{HullVertex, Projection};
@@ -33,19 +34,21 @@ impl From<&HullVertex> for ScreenVertex {
 pub const OUTSIDE: i32 = i32::MIN;
 
 impl ScreenVertex {
-    /// Whether the vertex cannot be drawn without clipping.
+    /// True if the vertex cannot be drawn without clipping.
     #[inline(always)]
     pub fn is_outside(&self) -> bool {
         self.x == OUTSIDE
     }
 }
 
-/// `1 / w` for positive normal `w`, the same bits everywhere: Newton's iteration from an integer guess.
+/// `1 / w` for positive normal `w`, the same bits everywhere: Newton's iteration from an integer
+/// guess.
 #[inline(always)]
 pub fn recip(w: f32) -> f32 {
     let mut r = f32::from_bits(0x7EF3_11C7_u32.wrapping_sub(w.to_bits()));
     for _ in 0..4 {
-        // The residual is exact close to the end, so that recip(1) is 1 and not the number below it.
+        // The residual is exact close to the end, so that recip(1) is 1 and not the number below
+        // it.
         r += r * (1.0 - w * r);
     }
     r
@@ -70,7 +73,8 @@ pub fn rsqrt(v: f32) -> f32 {
     r
 }
 
-/// To the nearest integer, ties to even, for |v| < 2^22: adding 1.5 * 2^23 leaves the integer in the low bits.
+/// To the nearest integer, ties to even, for |v| < 2^22: adding 1.5 * 2^23 leaves the integer in
+/// the low bits.
 #[inline(always)]
 pub fn round_to_i32(v: f32) -> i32 {
     ((v + 12_582_912.0).to_bits() as i32).wrapping_sub(0x4B40_0000)
@@ -98,7 +102,8 @@ fn transform_lanes(projection: &Projection, positions: &[[f32; 3]], out: &mut [S
     let mut groups = positions.chunks_exact(LANES);
     let mut outs = out.chunks_exact_mut(LANES);
     for (group, slots) in (&mut groups).zip(&mut outs) {
-        // Vertex by vertex inside a fixed-size loop: the compiler turns this into one vector a component.
+        // Vertex by vertex inside a fixed-size loop: the compiler turns this into one vector a
+        // component.
         let mut records = [ScreenVertex::default(); LANES];
         for lane in 0..LANES {
             records[lane] = transform_one(projection, group[lane]);

@@ -1,8 +1,9 @@
-//! Stage 2, a triangle: which samples it owns, and how near it is there. Twin of `shaders/geometry/visibility.wgsl`.
+//! Stage visibility, per triangle: the samples that it covers, and its depth at each. Twin of
+//! `shaders/geometry/visibility.wgsl`.
 //!
-//! Coverage is exact integer arithmetic on snapped vertices with the top-left rule: of two triangles that share an edge,
-//! every sample belongs to exactly one. Depth is evaluated from integer offsets, never incrementally, so it does not
-//! depend on where a traversal began.
+//! Coverage is exact integer arithmetic on snapped vertices with the top-left rule: of two
+//! triangles that share an edge, every sample belongs to exactly one. Depth is evaluated from
+//! integer offsets, never incrementally, so it does not depend on where a traversal began.
 
 use super::samples::{SampleBand, for_samples};
 use super::transform::{ScreenVertex, recip};
@@ -29,9 +30,9 @@ pub fn area(v: &[ScreenVertex; 3]) -> i64 {
     d(v[1].x, v[0].x) * d(v[2].y, v[0].y) - d(v[2].x, v[0].x) * d(v[1].y, v[0].y)
 }
 
-/// Whether `faces` wants a triangle of this area.
+/// True if face culling keeps a triangle of this area.
 #[inline(always)]
-pub fn is_wanted(faces: Faces, area: i64) -> bool {
+pub fn passes_culling(faces: Faces, area: i64) -> bool {
     match faces {
         Faces::Both => area != 0,
         Faces::Front => area < 0,
@@ -60,7 +61,8 @@ impl Setup {
         })
     }
 
-    /// First and last pixel column and row that the triangle may touch, inside the band; None if none.
+    /// First and last pixel column and row that the triangle may touch, inside the band; None if
+    /// none.
     #[inline(always)]
     fn bounds(&self, band: &SampleBand) -> Option<[[i32; 2]; 2]> {
         let [columns, rows] = band.range();
@@ -68,7 +70,8 @@ impl Setup {
     }
 }
 
-/// First and last pixel along an axis of `size_px` pixels that the three coordinates span, from `from` to before `to`.
+/// First and last pixel along an axis of `size_px` pixels that the three coordinates span, from
+/// `from` to before `to`.
 #[inline(always)]
 pub fn axis_bounds(v: &[i32; 3], size_px: u32, [from, to]: [i32; 2]) -> Option<[i32; 2]> {
     let half = size_px as i32 * 128;
@@ -83,16 +86,17 @@ pub fn wide_to_f32(v: u64) -> f32 {
     ((v >> 32) as u32 as f32) * 4_294_967_296.0 + (v as u32 as f32)
 }
 
-/// Where a triangle's samples go.
+/// Receives the samples of a triangle.
 pub trait Target {
     /// Its rows of samples.
     fn band(&self) -> &SampleBand;
 
-    /// Offers triangle `id` to the samples from index `at` on: its depth at each, and which lie outside it (negative).
+    /// Offers triangle `id` to the samples from index `at` on: its depth at each, and which lie
+    /// outside it (negative).
     fn offer(&mut self, at: usize, outside: &[i32; LANES], z: &[f32; LANES], id: u32);
 }
 
-/// Draws a triangle into the target. Among how many samples it was looked for.
+/// Draws a triangle into the target. Returns the number of samples tested.
 #[inline(always)]
 pub fn draw(setup: &Setup, id: u32, target: &mut impl Target) -> u64 {
     for_samples!(target.band().samples, draw_sampled(setup, id, target))
@@ -144,7 +148,8 @@ impl Edges {
         Self { dx, dy, start: std::array::from_fn(|k| [s.x[k], s.y[k]]), bias }
     }
 
-    /// Edge values in sixteenths at a pixel corner, for the 8 x 8 pixels from there; None where they lie outside an edge.
+    /// Edge values in sixteenths at a pixel corner, for the 8 x 8 pixels from there; None where
+    /// they lie outside an edge.
     #[inline(always)]
     fn at(&self, corner: [i32; 2]) -> Option<[i32; 3]> {
         const SPAN: i64 = 127; // (8 pixels) * 16 - 1
@@ -162,7 +167,8 @@ impl Edges {
     }
 }
 
-/// What each lane adds: a vector covers all samples of `LANES / S` neighbouring pixels, or `LANES` of the samples of one.
+/// Offsets per lane: a vector covers all samples of `LANES / S` neighbouring pixels, or `LANES` of
+/// the samples of one.
 struct Lanes {
     /// To each edge function.
     edges: [[i32; LANES]; 3],

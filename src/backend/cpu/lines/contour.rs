@@ -1,35 +1,37 @@
-//! Stage 4, an edge's faces: which side of the surface an edge belongs to, and whether the surface ends there. Twin of
+//! Stage lines, per edge: selects silhouettes and removes edges of faces that face away. Twin of
 //! `shaders/lines/contour.wgsl`.
 
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous};
 use crate::backend::cpu::geometry::visibility::area;
 use crate::plan::{Edge, LinePass, Side};
 
-/// Whether the pass draws the edge in this view: not on the far side of a closed surface, where nothing of it can be seen;
-/// and of a contour only the silhouette.
+/// True if the pass draws the edge in this view: not on the far side of a closed surface, and for a
+/// contour only the silhouette.
 #[inline(always)]
-pub fn is_drawn(stages: &Stages<'_>, lines: &LinePass, edge: &Edge) -> bool {
-    // Of a contour, what is seen from its very edge shows nothing either: its line would lie on that of the side it hides behind.
-    let is_hidden = |face| stages.looks_away(lines, face) || (lines.contour && stages.is_edge_on(face));
+pub fn is_drawn(context: &RasterContext<'_>, lines: &LinePass, edge: &Edge) -> bool {
+    // For a contour, a face seen edge-on counts as hidden too: its line would coincide with that of
+    // the visible side.
+    let is_hidden = |face| context.faces_away(lines, face) || (lines.contour && context.is_edge_on(face));
     if lines.unseen_side.is_some() && edge.faces.into_iter().all(is_hidden) {
         return false;
     }
-    !lines.contour || stages.is_silhouette(edge)
+    !lines.contour || context.is_silhouette(edge)
 }
 
-impl Stages<'_> {
-    /// The face whose light falls on an edge's line where the pixel sees no surface, plus 1: of those that look at the viewer
-    /// the one with the highest id, so that the order of edges does not matter; of any, where none does.
-    pub fn lit_by(&self, lines: &LinePass, edge: &Edge) -> u32 {
-        let towards = |face: u32| if self.looks_away(lines, face) { 0 } else { face + 1 };
+impl RasterContext<'_> {
+    /// The face whose light falls on an edge's line where the pixel sees no surface, plus 1: of
+    /// those that material at the viewer the one with the highest id, so that the order of edges
+    /// does not matter; of any, where none does.
+    pub fn lighting_face(&self, lines: &LinePass, edge: &Edge) -> u32 {
+        let towards = |face: u32| if self.faces_away(lines, face) { 0 } else { face + 1 };
         let best = towards(edge.faces[0]).max(towards(edge.faces[1]));
         if best > 0 { best } else { edge.faces[0].wrapping_add(1) }
     }
 
-    /// Whether a face is certainly turned away. A missing face is: it shows nothing.
+    /// True if a face certainly faces away. A missing face does.
     #[inline(always)]
-    fn looks_away(&self, lines: &LinePass, face: u32) -> bool {
+    fn faces_away(&self, lines: &LinePass, face: u32) -> bool {
         if face == Edge::NO_FACE {
             return true;
         }
@@ -37,7 +39,7 @@ impl Stages<'_> {
         self.area_of(face).is_some_and(|area| area != 0 && (area < 0) == is_inside_out)
     }
 
-    /// Whether a face has no area on screen.
+    /// True if a face has no area on screen.
     fn is_edge_on(&self, face: u32) -> bool {
         self.area_of(face) == Some(0)
     }
@@ -49,10 +51,10 @@ impl Stages<'_> {
         (!vertices.iter().any(ScreenVertex::is_outside)).then(|| area(&vertices))
     }
 
-    /// Whether the edge's faces lie on one side of it on screen, and none on the other: there the surface ends, or turns back
-    /// under itself. It does not matter which way the faces are wound.
+    /// True if all faces lie on one side of the edge on screen: there the surface ends, or turns
+    /// back under itself. The winding of faces does not matter.
     fn is_silhouette(&self, edge: &Edge) -> bool {
-        // Where there is only one face the surface ends, even if that is seen from its very edge.
+        // With only one face the surface ends here, even if that face is seen edge-on.
         if edge.faces[1] == Edge::NO_FACE {
             return true;
         }
@@ -60,7 +62,8 @@ impl Stages<'_> {
         (a < 0 || b < 0) != (a > 0 || b > 0)
     }
 
-    /// On which side of the edge a face lies on screen: -1, 1, or 0 where it is seen from its very edge or is not there.
+    /// Side of the edge on which a face lies on screen: -1, 1, or 0 if it is seen edge-on or is
+    /// missing.
     fn side_of(&self, edge: &Edge, face: u32) -> i32 {
         if face == Edge::NO_FACE {
             return 0;
@@ -83,15 +86,15 @@ impl Stages<'_> {
         if !vertices.iter().any(ScreenVertex::is_outside) {
             return area(&vertices).signum() as i32;
         }
-        // Where a corner is behind the eye, by the side of the face's plane on which the eye is.
+        // With a corner behind the eye, the side of the face's plane on which the eye is decides.
         let corners = corners.map(|v| homogeneous(&self.plan.projection, self.plan.positions[v as usize]));
         let volume = volume(&corners);
         i32::from(volume > 0.0) - i32::from(volume < 0.0)
     }
 }
 
-/// Six times the volume that three points on screen, times W, span with the eye: its sign is right for points behind the eye
-/// too.
+/// Six times the volume that three points on screen, times W, span with the eye: its sign is right
+/// for points behind the eye too.
 pub fn volume([a, b, c]: &[[f32; 4]; 3]) -> f32 {
     let (x, y, w) = (a[1] * b[3] - a[3] * b[1], a[3] * b[0] - a[0] * b[3], a[0] * b[1] - a[1] * b[0]);
     (x * c[0] + y * c[1]) + w * c[3]

@@ -1,41 +1,44 @@
-//! Stage 4, a pixel: the union of the strokes that touch it, laid over what is there. Twin of `shaders/lines/coverage.wgsl`.
+//! Stage lines, per pixel: the union of its strokes, composited over the colours. Twin of
+//! `shaders/lines/coverage.wgsl`.
 //!
-//! Of all strokes four things are kept, in integers, so that their order does not matter: the sum of their areas, the sum of
-//! their counts of points, which points any of them covers, and how far an area is from its points at most. Where they do not
-//! overlap the sum of the areas is the answer; where they do, the share of the points that are left of the sum says how much of
-//! it is ([Ink::coverage]).
+//! Four integers describe all strokes of a pixel, so that their order does not matter: the sum of
+//! areas, the sum of point counts, the mask of points that any stroke covers, and the largest
+//! difference between an area and its points. Where they do not overlap the sum of the areas is the
+//! answer; where they do, the share of the points that are left of the sum says how much of it is
+//! ([LineCoverage::coverage]).
 
 use super::stroke::{Mask, POINTS, WORDS, count};
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::recip;
-use crate::backend::cpu::peeling::composite::LayerBand;
-use crate::backend::cpu::resolve::{is_laid, lay_over};
+use crate::backend::cpu::peeling::state::PeelBand;
+use crate::backend::cpu::resolve::{is_composited, over_background};
 use crate::backend::cpu::surface::light::Light;
-use crate::backend::sample_partition::cells;
+use crate::backend::sample_partition::sample_partition;
 use crate::plan::{DrawPlan, LinePass};
 
 /// Steps to the pixel of a sum of areas.
-const AREA_UNIT: f32 = 65_536.0;
+pub const AREA_UNIT: f32 = 65_536.0;
 
-/// Strokes beside each other in a pixel whose areas may all be as far from their points as the farthest. Of more, some lie over
-/// others.
-const BESIDE: f32 = 4.0;
+/// Strokes in a pixel that may all differ from their points by the largest difference. Of more
+/// strokes, some overlap.
+pub const STROKES_SIDE_BY_SIDE: f32 = 4.0;
 
-/// A pixel's strokes.
+/// The strokes of a pixel.
 #[derive(Clone, Copy, Default)]
-pub struct Ink {
+pub struct LineCoverage {
     mask: Mask,
-    /// Of all strokes: no number of them comes near the end of 64 bits.
+    /// Sum of the strokes' areas; 64 bits hold any number of them.
     area: u64,
-    /// Where so many strokes meet that this ends at its largest, `slack` says what they cover.
+    /// Sum of the strokes' points. It saturates; then `slack` bounds the result.
     count: u32,
-    /// Most that the area of a stroke differs from its points'.
+    /// Largest difference between the area of a stroke and that of its points.
     slack: u32,
 }
 
-impl Ink {
-    /// Whether all points are covered, so that nothing that comes can change anything but lines whose peak is less than 1. One
-    /// stroke may cover them all and yet leave a corner of the pixel; more than one are taken to have covered it.
+impl LineCoverage {
+    /// True if all points are covered: further strokes change nothing unless the peak is below 1.
+    /// One stroke may cover all points and yet miss a corner of the pixel, so that at least two
+    /// must.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.count > POINTS && self.mask == [u16::MAX; WORDS]
@@ -53,11 +56,12 @@ impl Ink {
         self.slack = self.slack.max(area.abs_diff((count as f32 * (peak * (AREA_UNIT / POINTS as f32)) + 0.5) as u32));
     }
 
-    /// How much of the pixel is covered, 0 to the lines' `peak`: `area * points of the union / sum of the strokes' points`, a
-    /// ratio estimate whose error is that of the overlap alone. However often a stroke is drawn that covers but a corner of the
-    /// pixel, and none of its points or few, the union is as far from its points as a few strokes are from theirs.
+    /// Covered share of the pixel, 0 to the lines' `peak`: `area * points of the union / sum of the
+    /// strokes' points`, a ratio estimate whose error is that of the overlap alone. However often a
+    /// stroke is drawn that covers but a corner of the pixel, and none of its points or few, the
+    /// union is as far from its points as a few strokes are from theirs.
     #[inline(always)]
-    pub fn coverage(&self, peak: f32) -> f32 {
+    pub fn covered_share(&self, peak: f32) -> f32 {
         if self.area == 0 {
             return 0.0;
         }
@@ -68,49 +72,50 @@ impl Ink {
         let area = to_f32(self.area) * (1.0 / AREA_UNIT);
         let share = if self.count > union { union as f32 / self.count as f32 } else { 1.0 };
         let points = union as f32 * (peak * (1.0 / POINTS as f32));
-        let slack = self.slack as f32 * (BESIDE / AREA_UNIT);
+        let slack = self.slack as f32 * (STROKES_SIDE_BY_SIDE / AREA_UNIT);
         (area * share).max(points - slack).min(points + slack).min(peak)
     }
 }
 
-/// As the shaders round a number of two words.
+/// Rounds as the shaders round a number of two words.
 #[inline(always)]
 fn to_f32(v: u64) -> f32 {
     (v >> 32) as f32 * 4_294_967_296.0 + (v as u32) as f32
 }
 
-/// Lays the strokes of line passes over a band's colours.
-pub struct Inker<'a> {
+/// Composites the strokes of line passes over a band's colours.
+pub struct LineCompositor<'a> {
     plan: &'a DrawPlan<'a>,
     band: &'a SampleBand,
-    /// What lies over its samples.
-    layers: Option<&'a LayerBand>,
-    /// The points that stand with each sample; none where there is nothing for lines to cover.
-    cells: Vec<Mask>,
+    /// The peeled layers over its samples.
+    peel: Option<&'a PeelBand>,
+    /// The points assigned to each sample; empty where there is no surface under the lines.
+    sample_masks: Vec<Mask>,
 }
 
-/// Surfaces that show less than this leave no trace: a tenth of a byte's last step in the most transparent of pictures.
-const ALPHA_MIN: f32 = 1e-4;
+/// Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent
+/// pictures.
+pub const ALPHA_MIN: f32 = 1e-4;
 
-impl<'a> Inker<'a> {
-    /// For a band, and the layers over it where the plan has any.
-    pub fn new(plan: &'a DrawPlan<'a>, band: &'a SampleBand, layers: Option<&'a LayerBand>) -> Self {
+impl<'a> LineCompositor<'a> {
+    /// A compositor for a band and, where the plan has them, its peeled layers.
+    pub fn new(plan: &'a DrawPlan<'a>, band: &'a SampleBand, peel: Option<&'a PeelBand>) -> Self {
         let samples = if plan.is_shaded() && !plan.lines.is_empty() { plan.samples } else { 0 };
-        // Those of another plan may be left there.
-        let layers = layers.filter(|_| plan.peeling().is_some());
-        Self { plan, band, layers, cells: (0..samples).map(|s| cell(samples, s)).collect() }
+        // The scratch may still hold the layers of another plan.
+        let peel = peel.filter(|_| plan.peeling().is_some());
+        Self { plan, band, peel, sample_masks: (0..samples).map(|s| points_of_sample(samples, s)).collect() }
     }
 
-    /// Lays the lines of a pass over what is there; `light` is what falls on them (empty where they are not lit).
-    pub fn lay(&self, lines: &LinePass, ink: &[Ink], light: &[Light], colors: &mut [[f32; 4]]) {
+    /// Composites the lines of a pass over the colours. `light` is empty where they are not lit.
+    pub fn composite(&self, lines: &LinePass, coverage: &[LineCoverage], light: &[Light], colors: &mut [[f32; 4]]) {
         let peak = lines.peak();
-        for (i, (ink, c)) in ink.iter().zip(colors).enumerate() {
-            let cover = ink.coverage(peak);
+        for (i, (coverage, c)) in coverage.iter().zip(colors).enumerate() {
+            let cover = coverage.covered_share(peak);
             if cover > 0.0 {
-                let under = if is_laid(c) {
+                let under = if is_composited(c) {
                     [c[0], c[1], c[2], -c[3]]
                 } else {
-                    lay_over(self.uncovered(i, *c, &ink.mask, lines.color[3] * peak), self.plan.background)
+                    over_background(self.uncovered(i, *c, &coverage.mask, lines.color[3] * peak), self.plan.background)
                 };
                 let color = light.get(i).map_or(lines.color, |light| light.on_premultiplied(lines.color));
                 *c = std::array::from_fn(|k| cover * color[k] + under[k] * (1.0 - cover * color[3]));
@@ -119,27 +124,28 @@ impl<'a> Inker<'a> {
         }
     }
 
-    /// The surface's colour in a pixel, where it has the share of what lines leave uncovered that it has there. At its border that
-    /// is not its share of the pixel, because a line along the border covers one side as much as the other.
+    /// The surface's colour, weighted by its share of what lines leave uncovered. At the surface's
+    /// border this differs from its share of the pixel, because a line along the border covers both
+    /// sides alike.
     #[inline(always)]
     fn uncovered(&self, pixel: usize, surface: [f32; 4], mask: &Mask, opacity: f32) -> [f32; 4] {
-        if self.cells.is_empty() || !(surface[3] > ALPHA_MIN && surface[3] < 1.0) {
+        if self.sample_masks.is_empty() || !(surface[3] > ALPHA_MIN && surface[3] < 1.0) {
             return surface;
         }
         let [x, y] = [pixel as u32 % self.band.size_px[0], self.band.shown[0] + pixel as u32 / self.band.size_px[0]];
         let shown = |s: usize| {
-            let over = self.layers.map_or(0.0, |layers| layers.alpha(x, y, s as u32));
+            let over = self.peel.map_or(0.0, |peel| peel.alpha(x, y, s as u32));
             if self.band.pixel(x as i32, y as i32).0[s] == NOTHING { over } else { 1.0 }
         };
-        let weight = weight(&self.cells, shown, mask, opacity);
+        let weight = weight(&self.sample_masks, shown, mask, opacity);
         [surface[0] * weight, surface[1] * weight, surface[2] * weight, (surface[3] * weight).min(1.0)]
     }
 }
 
-/// The points of a sample's cell.
-fn cell(samples: u32, sample: u32) -> Mask {
+/// The points assigned to a sample, as a mask.
+fn points_of_sample(samples: u32, sample: u32) -> Mask {
     let mut mask = [0; WORDS];
-    for (point, &cell) in cells(samples).iter().enumerate() {
+    for (point, &cell) in sample_partition(samples).iter().enumerate() {
         if u32::from(cell) == sample {
             mask[point % WORDS] |= 0x8000 >> (point / WORDS);
         }
@@ -147,20 +153,20 @@ fn cell(samples: u32, sample: u32) -> Mask {
     mask
 }
 
-/// How much more of what shows beside and through a line is surface than of the pixel, where `alpha` says how much surface a sample
-/// sees. Of each point shows 1, or, where the line covers it, 1 - opacity.
+/// Ratio of the surface's share beside and through a line to its share of the pixel. `alpha` gives
+/// the surface's alpha per sample. A point counts 1, or 1 - opacity where the line covers it.
 #[inline(always)]
-fn weight(cells: &[Mask], alpha: impl Fn(usize) -> f32, mask: &Mask, opacity: f32) -> f32 {
+fn weight(sample_masks: &[Mask], alpha: impl Fn(usize) -> f32, mask: &Mask, opacity: f32) -> f32 {
     let covered = count(mask);
     if covered == 0 || covered == POINTS {
         return 1.0;
     }
     // In points.
     let (mut surface, mut surface_covered) = (0.0, 0.0);
-    for (s, cell) in cells.iter().enumerate() {
+    for (s, cell) in sample_masks.iter().enumerate() {
         let alpha = alpha(s);
         if alpha > 0.0 {
-            surface += alpha * (POINTS as f32 / cells.len() as f32);
+            surface += alpha * (POINTS as f32 / sample_masks.len() as f32);
             surface_covered += alpha * count(&std::array::from_fn(|l| mask[l] & cell[l])) as f32;
         }
     }
@@ -187,7 +193,7 @@ mod tests {
     /// Every point by itself: a line over a surface over a background.
     fn truth(samples: u32, alphas: &[f32], mask: &Mask, [surface, line, background]: [[f64; 4]; 3]) -> [f64; 4] {
         let mut sum = [0.0; 4];
-        for (point, &cell) in cells(samples).iter().enumerate() {
+        for (point, &cell) in sample_partition(samples).iter().enumerate() {
             let alpha = f64::from(alphas[usize::from(cell)]);
             let is_covered = mask[point % WORDS] >> (15 - point / WORDS) & 1 == 1;
             for k in 0..4 {
@@ -204,7 +210,7 @@ mod tests {
         let mut cases = 0;
         let (mut weighed, mut farthest) = (0, 0.0_f64);
         for samples in [1, 4, 8, 16] {
-            let masks: Vec<Mask> = (0..samples).map(|s| cell(samples, s)).collect();
+            let masks: Vec<Mask> = (0..samples).map(|s| points_of_sample(samples, s)).collect();
             for case in 0..2000 {
                 // Sparse, even and dense ones.
                 let mask: Mask = std::array::from_fn(|_| {
@@ -222,7 +228,7 @@ mod tests {
                 let background = [0.25_f32, 0.05, 0.5, 0.5];
                 let weight = weight(&masks, |s| alphas[s], &mask, opacity);
                 weighed += usize::from(weight != 1.0);
-                let below = lay_over(opaque.map(|v| v * share * weight), background);
+                let below = over_background(opaque.map(|v| v * share * weight), background);
                 let cover = count(&mask) as f32 / POINTS as f32;
                 let wide = [opaque, line, background].map(|c| c.map(f64::from));
                 let truth = truth(samples, &alphas, &mask, wide);
@@ -246,13 +252,17 @@ mod tests {
             let area = count(&beside) as f32 * peak / POINTS as f32;
             let mut last = 0.0;
             for copies in [0, 1, 4, 5, 100, 1_000_000] {
-                let mut ink = Ink::default();
-                ink.add(area, &beside, peak);
-                (0..copies).for_each(|_| ink.add(0.003, &Mask::default(), peak));
+                let mut coverage = LineCoverage::default();
+                coverage.add(area, &beside, peak);
+                (0..copies).for_each(|_| coverage.add(0.003, &Mask::default(), peak));
                 let expected = area + 0.003 * copies.min(4) as f32;
-                assert!((ink.coverage(peak) - expected).abs() < 1e-3, "{copies}: {}", ink.coverage(peak));
-                assert!(copies <= 4 || ink.coverage(peak) == last || copies == 5, "{copies}");
-                last = ink.coverage(peak);
+                assert!(
+                    (coverage.covered_share(peak) - expected).abs() < 1e-3,
+                    "{copies}: {}",
+                    coverage.covered_share(peak)
+                );
+                assert!(copies <= 4 || coverage.covered_share(peak) == last || copies == 5, "{copies}");
+                last = coverage.covered_share(peak);
                 cases += 1;
             }
         }

@@ -1,87 +1,88 @@
-//! Stage 4, an edge: lines of exact width. Twin of `shaders/lines/edge.wgsl`.
+//! Stage lines, per edge: lines of exact width. Twin of `shaders/lines/edge.wgsl`.
 //!
-//! A line is all that lies within half its width of the visible parts of an edge ([`hiding`](crate::backend::cpu::lines::hidden_lines)): a stroke for
-//! each part ([`stroke`]), and in each pixel their union ([`ink`](crate::backend::cpu::lines::coverage)). What is visible of an edge close
-//! to a pixel is found close to it: long edges are looked at in windows.
+//! A line is all that lies within half its width of the visible parts of an edge
+//! ([`hidden_lines`](super::hidden_lines)): a stroke for each part ([`stroke`]), and in each pixel
+//! their union ([`coverage`](super::coverage)). Long edges are processed in windows, so that a
+//! pixel's lines depend only on what is near it.
 
 use super::segment::{SLACK_PX, Segment, rows};
 use super::stroke::{self, Direction, Pen};
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;
-use crate::backend::cpu::lines::coverage::Ink;
-use crate::backend::cpu::lines::hidden_lines::Hiding;
+use crate::backend::cpu::lines::coverage::LineCoverage;
+use crate::backend::cpu::lines::hidden_lines::HiddenIntervals;
 use crate::plan::{Edge, LinePass, Shown};
 
-/// Where a pass's lines go: rows of a band.
+/// Output of a line pass: rows of a band.
 pub struct LineTarget<'a> {
-    /// The strokes of each pixel.
-    pub ink: &'a mut [Ink],
-    /// Of each pixel, whose light falls on its lines; empty where none are lit.
+    /// Line coverage per pixel.
+    pub coverage: &'a mut [LineCoverage],
+    /// Per pixel, the face that lights its lines, plus 1; empty where no lines are lit.
     pub owners: &'a mut [u32],
 }
 
 /// Draws the edges of a pass into a band.
 pub struct LineDrawer<'a> {
-    stages: &'a Stages<'a>,
+    context: &'a RasterContext<'a>,
     lines: &'a LinePass,
     band: &'a SampleBand,
     /// Rows of the picture that are drawn.
     rows: [i32; 2],
     pen: Pen,
-    /// Windows of an edge in a pixel of it.
+    /// Windows per pixel of an edge's length.
     windows: f32,
-    /// Whether something may hide a line.
+    /// True if a surface may hide a line.
     is_hidden: bool,
-    hiding: Hiding,
-    /// Pixels since the deadline was last looked at.
-    looked_at: i32,
-    /// Parts of the edge in the window.
-    parts: Vec<[f32; 2]>,
+    hidden: HiddenIntervals,
+    /// Pixels since the last deadline poll.
+    pixels_since_poll: i32,
+    /// Shown intervals of the edge in the window.
+    intervals: Vec<[f32; 2]>,
 }
 
 impl<'a> LineDrawer<'a> {
-    /// A pass's, for the picture rows from `rows[0]` to before `rows[1]`.
-    pub fn new(stages: &'a Stages<'a>, lines: &'a LinePass, band: &'a SampleBand, rows: [u32; 2]) -> Self {
-        // Where there is no surface there is nothing to hide behind, and no samples to ask.
-        let something_hides = stages.plan.surface.is_some() || stages.plan.hull.is_some();
+    /// A drawer for a pass and the picture rows from `rows[0]` to before `rows[1]`.
+    pub fn new(context: &'a RasterContext<'a>, lines: &'a LinePass, band: &'a SampleBand, rows: [u32; 2]) -> Self {
+        // Without a surface nothing hides a line, and there is no visibility buffer to read.
+        let something_hides = context.plan.surface.is_some() || context.plan.hull.is_some();
         Self {
-            stages,
+            context,
             lines,
             band,
             rows: rows.map(|row| row as i32),
             pen: Pen::new(lines),
             windows: 1.0 / lines.window_px(),
             is_hidden: something_hides && lines.shown != Shown::All,
-            hiding: Hiding::default(),
-            looked_at: 0,
-            parts: Vec::new(),
+            hidden: HiddenIntervals::default(),
+            pixels_since_poll: 0,
+            intervals: Vec::new(),
         }
     }
 
-    /// Whether so many pixels have been looked at that the deadline should be too; then it counts from 0 again.
+    /// True after so many pixels that the deadline is to be polled; then counts from 0 again.
     #[inline(always)]
-    pub fn has_looked_far(&mut self) -> bool {
-        let is_far = self.looked_at > 100_000;
+    pub fn is_poll_due(&mut self) -> bool {
+        let is_far = self.pixels_since_poll > 100_000;
         if is_far {
-            self.looked_at = 0;
+            self.pixels_since_poll = 0;
         }
         is_far
     }
 
     /// Draws one edge.
     #[inline(always)]
-    pub fn draw(&mut self, edge: &Edge, LineTarget { ink, owners }: &mut LineTarget<'_>) {
-        let Some(segment) = Segment::new(self.stages, edge) else { return };
+    pub fn draw(&mut self, edge: &Edge, LineTarget { coverage, owners }: &mut LineTarget<'_>) {
+        let Some(segment) = Segment::new(self.context, edge) else { return };
         let mut direction = None;
-        let owner = if self.lines.lit && !owners.is_empty() { self.stages.lit_by(self.lines, edge) } else { 0 };
+        let owner = if self.lines.lit && !owners.is_empty() { self.context.lighting_face(self.lines, edge) } else { 0 };
         let windows = if self.is_hidden { (segment.length * self.windows) as u32 + 1 } else { 1 };
         let step = recip(windows as f32);
         for window in 0..windows {
             let range = [window as f32 * step, (window + 1) as f32 * step];
             let [a, b] = range.map(|t| segment.point(t));
             let [first, last] = rows(a[1], b[1], self.pen.reach, self.rows);
-            if first > last || !self.find_parts(edge, &segment, range) {
+            if first > last || !self.collect_intervals(edge, &segment, range) {
                 continue;
             }
             if direction.is_none() {
@@ -92,16 +93,17 @@ impl<'a> LineDrawer<'a> {
             for y in first..=last {
                 let row = (y - self.rows[0]) as usize * self.band.size_px[0] as usize;
                 let [from, to] = windowed.columns(y, self.pen.reach, self.band.size_px[0]);
-                self.looked_at += (to - from).max(0);
+                self.pixels_since_poll += (to - from).max(0);
                 for x in from..=to {
                     let at = row + x as usize;
                     let center = [x as f32 + 0.5, y as f32 + 0.5];
-                    // What is full stays full, whatever else comes; only a lit line still asks whose it is.
-                    if (owner == 0 && ink[at].is_full()) || !windowed.owns(center) {
+                    // A full pixel stays full. Only a lit line goes on, to find the face that
+                    // lights it.
+                    if (owner == 0 && coverage[at].is_full()) || !windowed.owns(center) {
                         continue;
                     }
                     let [low, high] = windowed.reached(center, self.pen.reach);
-                    for &[from, to] in &self.parts {
+                    for &[from, to] in &self.intervals {
                         if to < low {
                             continue;
                         }
@@ -111,10 +113,10 @@ impl<'a> LineDrawer<'a> {
                         let (a, b) = (segment.point(from), segment.point(to));
                         let ends = [[a[0] - center[0], a[1] - center[1]], [b[0] - center[0], b[1] - center[1]]];
                         if let Some((area, mask)) = stroke::cover(&self.pen, direction, ends) {
-                            ink[at].add(area, &mask, self.pen.peak);
+                            coverage[at].add(area, &mask, self.pen.peak);
                             if owner > 0 {
                                 owners[at] = owners[at].max(owner);
-                            } else if ink[at].is_full() {
+                            } else if coverage[at].is_full() {
                                 break;
                             }
                         }
@@ -124,23 +126,24 @@ impl<'a> LineDrawer<'a> {
         }
     }
 
-    /// Finds what is drawn of the edge in a window, and as far beyond as it touches the window's pixels; whether anything is.
+    /// Collects the shown intervals of an edge in a window, and as far beyond as the line touches
+    /// the window's pixels. False if there are none.
     #[inline(always)]
-    fn find_parts(&mut self, edge: &Edge, segment: &Segment, range: [f32; 2]) -> bool {
-        self.parts.clear();
+    fn collect_intervals(&mut self, edge: &Edge, segment: &Segment, range: [f32; 2]) -> bool {
+        self.intervals.clear();
         if !self.is_hidden {
-            self.parts.push(range);
+            self.intervals.push(range);
             return true;
         }
         let beyond = (self.pen.reach + 1.0) * segment.inverse_length;
         let range = [(range[0] - beyond).max(0.0), (range[1] + beyond).min(1.0)];
-        self.hiding.find((self.stages, self.band), edge, segment, range);
+        self.hidden.find((self.context, self.band), edge, segment, range);
         if self.lines.shown == Shown::Visible {
-            self.hiding.visible(range, segment.inverse_length, &mut self.parts);
+            self.hidden.visible(range, segment.inverse_length, &mut self.intervals);
         } else {
-            self.hiding.hidden(&mut self.parts);
+            self.hidden.hidden(&mut self.intervals);
         }
-        !self.parts.is_empty()
+        !self.intervals.is_empty()
     }
 }
 
@@ -171,7 +174,7 @@ impl Window<'_> {
         [(low as i32).max(0), (high as i32).min(width_px as i32 - 1)]
     }
 
-    /// Which range of the edge may reach a pixel, and somewhat more: parts beyond it need not be looked at.
+    /// Range of the edge that may reach a pixel, with a margin: intervals beyond it are skipped.
     #[inline(always)]
     fn reached(&self, center: [f32; 2], reach: f32) -> [f32; 2] {
         let s = self.segment;
@@ -180,7 +183,7 @@ impl Window<'_> {
         [(way - reach - 1.0) * s.inverse_length, (way + reach + 1.0) * s.inverse_length]
     }
 
-    /// Whether of all windows of the edge the pixel is this one's.
+    /// True if the pixel belongs to this window of the edge.
     #[inline(always)]
     fn owns(&self, center: [f32; 2]) -> bool {
         if self.count == 1 {

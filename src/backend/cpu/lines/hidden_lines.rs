@@ -1,73 +1,80 @@
-//! Stage 4, a piece of an edge: which parts of it nothing hides. Twin of `shaders/lines/hidden_lines.wgsl`.
+//! Stage lines, per piece of an edge: hidden-line removal, which finds the intervals that no
+//! triangle hides. Twin of `shaders/lines/hidden_edge.wgsl`.
 //!
-//! On screen an edge and a triangle are straight and their depths are affine, so what a triangle hides of an edge is an
-//! interval. The triangles that are asked are those that the visibility buffer shows along the edge.
+//! On screen an edge and a triangle are straight and their depths are affine, so what a triangle
+//! hides of an edge is an interval. Candidates are the triangles that the visibility buffer shows
+//! along the edge.
 
 use super::contour::volume;
 use super::segment::Segment;
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::is_moderate;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
 use crate::backend::cpu::geometry::visibility::area;
 use crate::plan::Edge;
 
-/// How much nearer than the edge a surface must be, as a share of depth: what f32 may lose on the way.
-const NEARER: f32 = 1.0 + 1.0 / 524_288.0;
+/// Smallest ratio of a hiding surface's depth to the edge's: covers the rounding of f32.
+pub const NEARER_RATIO: f32 = 1.0 + 1.0 / 524_288.0;
 
-/// How far what is on screen may lie from where it should, 1/256 px: half a unit each in which a triangle and an edge are rounded, and some
-/// for f32. A surface hides an edge only if it were nearer even so much farther down its slope: else what lies in its plane, as the foot of
-/// what stands on it does, would be hidden or not as roundings fall.
-const SNAPPED: f32 = 1.25;
+/// Largest position error on screen, 1/256 px: half a unit each for the snapping of a triangle and
+/// of an edge, and some for f32. A surface hides an edge only if it is nearer even when moved this
+/// far down its slope. Otherwise rounding would decide whether edges in its plane are hidden, such
+/// as the foot of an object that stands on it.
+pub const SNAP_ERROR: f32 = 1.25;
 
 /// Corners behind the eye may lie anywhere: 2^31.
 const FAR: f32 = 2_147_483_648.0;
 
-/// Parts shorter than this are what rounding leaves of an edge beside what hides it. Their round ends would show as dots.
-const CRUMB_PX: f32 = 1.0 / 16.0;
+/// Shortest visible interval, pixels. Shorter ones come from rounding, and their round ends would
+/// show as dots.
+pub const INTERVAL_MIN_PX: f32 = 1.0 / 16.0;
 
-/// Between two surfaces that hide it: there a sliver of surface may have no sample.
-const GAP_PX: f32 = 1.0 / 4.0;
+/// Shortest visible interval between two hidden ones, pixels: a sliver of surface there may have no
+/// sample.
+pub const GAP_MIN_PX: f32 = 1.0 / 4.0;
 
-/// Triangles that are remembered as done with.
+/// Number of recent triangles that are not tested again.
 const RECENT: usize = 8;
 
 /// Intervals along an edge in which something hides it, kept from edge to edge.
 #[derive(Default)]
-pub struct Hiding {
+pub struct HiddenIntervals {
     hidden: Vec<[f32; 2]>,
 }
 
-impl Hiding {
-    /// Finds what hides the edge in a range of it (0 to 1).
+impl HiddenIntervals {
+    /// Finds the hidden intervals of a range of the edge (0 to 1).
     #[inline(always)]
     pub fn find(
         &mut self,
-        (stages, band): (&Stages<'_>, &SampleBand),
+        (context, band): (&RasterContext<'_>, &SampleBand),
         edge: &Edge,
         segment: &Segment,
         range: [f32; 2],
     ) {
         self.hidden.clear();
-        if lies_deep((stages, band), segment, range) {
+        if is_fully_hidden((context, band), segment, range) {
             self.hidden.push(range);
             return;
         }
-        self.ask_around(stages, band, (edge, segment), range, 0);
+        self.collect_around(context, band, (edge, segment), range, 0);
         if !self.hidden.is_empty() && self.hidden[0] != range {
-            // Where an edge dives under another surface, a sliver of that may have its samples beside the edge.
-            self.ask_around(stages, band, (edge, segment), range, 1);
+            // Where an edge passes under another surface, a sliver of that may have its samples
+            // only beside the edge.
+            self.collect_around(context, band, (edge, segment), range, 1);
         }
         if self.hidden.len() > 1 {
             self.hidden.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
         }
     }
 
-    /// Asks each triangle that is seen along the edge, or within `radius` pixels of it, what it hides.
+    /// Collects the hidden intervals of each triangle that is visible along the edge or within
+    /// `radius` pixels of it.
     #[inline(always)]
-    fn ask_around(
+    fn collect_around(
         &mut self,
-        stages: &Stages<'_>,
+        context: &RasterContext<'_>,
         band: &SampleBand,
         (edge, segment): (&Edge, &Segment),
         range: [f32; 2],
@@ -88,7 +95,7 @@ impl Hiding {
                         }
                         recent.copy_within(..RECENT - 1, 1);
                         recent[0] = id;
-                        let Some([start, end]) = hidden_by(stages, edge, segment, id) else { continue };
+                        let Some([start, end]) = hidden_by(context, edge, segment, id) else { continue };
                         let (start, end) = (start.max(range[0]), end.min(range[1]));
                         if [start, end] == range {
                             self.hidden.clear();
@@ -104,42 +111,42 @@ impl Hiding {
         }
     }
 
-    /// Adds the parts of the range that nothing hides to `parts`, in order, but for crumbs and gaps; `px` is a pixel's share of
-    /// the edge.
+    /// Appends the visible intervals of the range to `intervals`, in order, without those below the
+    /// smallest lengths. `px` is a pixel's share of the edge.
     #[inline(always)]
-    pub fn visible(&self, range: [f32; 2], px: f32, parts: &mut Vec<[f32; 2]>) {
+    pub fn visible(&self, range: [f32; 2], px: f32, intervals: &mut Vec<[f32; 2]>) {
         if self.hidden.is_empty() {
-            parts.push(range);
+            intervals.push(range);
             return;
         }
         let mut from = range[0];
         for &[start, end] in &self.hidden {
-            if start - from > px * if from > range[0] { GAP_PX } else { CRUMB_PX } {
-                parts.push([from, start]);
+            if start - from > px * if from > range[0] { GAP_MIN_PX } else { INTERVAL_MIN_PX } {
+                intervals.push([from, start]);
             }
             from = from.max(end);
         }
-        if range[1] - from > px * CRUMB_PX {
-            parts.push([from, range[1]]);
+        if range[1] - from > px * INTERVAL_MIN_PX {
+            intervals.push([from, range[1]]);
         }
     }
 
-    /// Adds the parts that something hides.
-    pub fn hidden(&self, parts: &mut Vec<[f32; 2]>) {
+    /// Appends the hidden intervals, merged.
+    pub fn hidden(&self, intervals: &mut Vec<[f32; 2]>) {
         for &[start, end] in &self.hidden {
-            match parts.last_mut() {
-                Some(part) if start <= part[1] => part[1] = part[1].max(end),
-                _ => parts.push([start, end]),
+            match intervals.last_mut() {
+                Some(interval) if start <= interval[1] => interval[1] = interval[1].max(end),
+                _ => intervals.push([start, end]),
             }
         }
     }
 }
 
-/// Whether all triangles that are seen along the edge are nearer than any of it: then there is no need to ask what exactly
-/// they hide.
+/// True if every triangle visible along the edge is nearer than all of it: then intervals need not
+/// be computed.
 #[inline(always)]
-fn lies_deep((stages, band): (&Stages<'_>, &SampleBand), segment: &Segment, range: [f32; 2]) -> bool {
-    let nearest = segment.depth(0.0).max(segment.depth(1.0)) * NEARER;
+fn is_fully_hidden((context, band): (&RasterContext<'_>, &SampleBand), segment: &Segment, range: [f32; 2]) -> bool {
+    let nearest = segment.depth(0.0).max(segment.depth(1.0)) * NEARER_RATIO;
     let mut last = NOTHING;
     for [x, y] in segment.walk(range) {
         if !band.has(x, y) {
@@ -152,7 +159,7 @@ fn lies_deep((stages, band): (&Stages<'_>, &SampleBand), segment: &Segment, rang
             }
             if id != last {
                 last = id;
-                let [a, b, c] = &stages.screen_triangle(id);
+                let [a, b, c] = &context.screen_triangle(id);
                 if a.is_outside() | b.is_outside() | c.is_outside() | (a.z.min(b.z).min(c.z) <= nearest) {
                     return false;
                 }
@@ -165,21 +172,21 @@ fn lies_deep((stages, band): (&Stages<'_>, &SampleBand), segment: &Segment, rang
 /// A corner on screen, times its W: X, Y, Z, W.
 type Corner = [f32; 4];
 
-/// Where along the edge the triangle lies in front of it.
+/// Interval of the edge that the triangle hides.
 #[inline(always)]
-fn hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, id: u32) -> Option<[f32; 2]> {
-    let vertices = stages.triangle(id);
+fn hidden_by(context: &RasterContext<'_>, edge: &Edge, segment: &Segment, id: u32) -> Option<[f32; 2]> {
+    let vertices = context.triangle(id);
     if edge.vertices.iter().all(|v| vertices.contains(v)) {
         return None;
     }
-    let on_screen = stages.screen_triangle(id);
+    let on_screen = context.screen_triangle(id);
     let corners: [Corner; 3];
     let is_clockwise;
     if on_screen.iter().any(ScreenVertex::is_outside) {
-        if stages.is_hull(id) || !stages.plan.projection.clip {
+        if context.is_hull(id) || !context.plan.projection.clip {
             return None;
         }
-        corners = vertices.map(|v| homogeneous(&stages.plan.projection, stages.plan.positions[v as usize]));
+        corners = vertices.map(|v| homogeneous(&context.plan.projection, context.plan.positions[v as usize]));
         if !corners.iter().all(is_moderate) {
             return None;
         }
@@ -188,14 +195,15 @@ fn hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, id: u32) -> Op
         let [a, b, c] = &on_screen;
         corners = [corner(a), corner(b), corner(c)];
         let area = area(&on_screen);
-        if area == 0 || !segment.may_lie_behind(&on_screen) {
+        if area == 0 || !segment.may_be_hidden_by(&on_screen) {
             return None;
         }
         is_clockwise = area > 0;
     }
     let [start, end] = segment.ends();
     let sides = [sides(&corners, start, is_clockwise), sides(&corners, end, is_clockwise)];
-    // What lies on a side from end to end is hidden: two triangles that share it would leave it between them.
+    // An edge along a side counts as inside. Otherwise two triangles that share the side would
+    // leave it visible between them.
     let is_along = |k: usize| (sides[0][k] == 0.0) & (sides[1][k] == 0.0);
     for k in 0..3 {
         if (sides[0][k] <= 0.0) & (sides[1][k] <= 0.0) & !is_along(k) {
@@ -209,25 +217,26 @@ fn hidden_by(stages: &Stages<'_>, edge: &Edge, segment: &Segment, id: u32) -> Op
         }
     }
     let slack = slack(&corners)?;
-    // Depths are compared only where the edge is inside, so that thin triangles need not be continued far.
+    // Depths are compared only where the edge is inside, so that thin triangles need not be
+    // continued far.
     let nearer = |t: f32| {
         let weight = |k: usize| (sides[0][k] + t * (sides[1][k] - sides[0][k])).max(0.0);
         let [a, b, c] = [weight(0), weight(1), weight(2)];
         let z = (a * corners[0][2] + b * corners[1][2]) + c * corners[2][2];
         let w = (a * corners[0][3] + b * corners[1][3]) + c * corners[2][3];
-        if w > f32::MIN_POSITIVE { (z * recip(w) - segment.depth(t) * NEARER) - slack } else { -1.0 }
+        if w > f32::MIN_POSITIVE { (z * recip(w) - segment.depth(t) * NEARER_RATIO) - slack } else { -1.0 }
     };
-    let mut part = [0.0, 1.0];
-    narrow(&mut part, [nearer(range[0]), nearer(range[1])])?;
+    let mut interval = [0.0, 1.0];
+    narrow(&mut interval, [nearer(range[0]), nearer(range[1])])?;
     let length = range[1] - range[0];
-    Some([range[0] + part[0] * length, range[0] + part[1] * length])
+    Some([range[0] + interval[0] * length, range[0] + interval[1] * length])
 }
 
-/// How much the depth of a triangle's plane may be off because of where its corners and the edge are on screen; None of one without area.
-/// Depth is `z = gx x + gy y + c` for all corners, times W: Cramer's rule.
+/// Depth error of a triangle's plane due to snapping; None without area. Depth is `z = gx x + gy y
+/// + c` for all corners, times W: Cramer's rule.
 #[inline(always)]
 fn slack(corners: &[Corner; 3]) -> Option<f32> {
-    // So that nothing overflows; of what reaches farther, rounding says less than f32 does.
+    // Prevents overflow; beyond this f32 is coarser than the snapping.
     if corners.iter().flatten().any(|v| v.abs() >= FAR) {
         return Some(0.0);
     }
@@ -239,11 +248,11 @@ fn slack(corners: &[Corner; 3]) -> Option<f32> {
     let (x, y) = (cofactors(1, 3), cofactors(3, 0));
     let sum = |c: [f32; 3], k: usize| (c[0] * p[k] + c[1] * q[k]) + c[2] * r[k];
     let volume = sum(x, 0).abs();
-    (volume > f32::MIN_POSITIVE).then(|| (sum(x, 2).abs() + sum(y, 2).abs()) * recip(volume) * SNAPPED)
+    (volume > f32::MIN_POSITIVE).then(|| (sum(x, 2).abs() + sum(y, 2).abs()) * recip(volume) * SNAP_ERROR)
 }
 
-/// Of each side of a triangle, twice the area that it spans with a point; positive inside. It is right for corners behind
-/// the eye too.
+/// Per side of a triangle, twice the area that it spans with a point; positive inside. Valid for
+/// corners behind the eye too.
 #[inline(always)]
 fn sides(corners: &[Corner; 3], [x, y]: [f32; 2], is_clockwise: bool) -> [f32; 3] {
     let from = |k: usize| [corners[k][0] - x * corners[k][3], corners[k][1] - y * corners[k][3]];

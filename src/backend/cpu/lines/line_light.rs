@@ -1,61 +1,70 @@
-//! Stage 4, a pixel: the light that falls on lines which take the surface's. Twin of `shaders/lines/line_light.wgsl`.
+//! Stage lines, per pixel: the surface's light on lit lines. Twin of
+//! `shaders/lines/line_light.wgsl`.
 //!
-//! Light is affine in the colour that it falls on, so one [`Light`] a pixel lights lines of any colour: the mean over the samples
-//! that see the surface. Where none does, beyond a silhouette, it is the light on the line's own face. Textures that change a
-//! material's normal or gloss do not touch its lines.
+//! Light is affine in the colour that it falls on, so one [`Light`] a pixel lights lines of any
+//! colour: the mean over the samples that see the surface. Where none does, beyond a silhouette, it
+//! is the light on the line's own face. Textures that change a material's normal or gloss do not
+//! touch its lines.
 
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::surface::barycentric::{Barycentrics, corners};
 use crate::backend::cpu::surface::light::{Light, light as light_on};
-use crate::backend::cpu::surface::point::normal;
+use crate::backend::cpu::surface::normal::normal;
 use crate::backend::cpu::surface::wire::Place;
 use crate::plan::{SurfacePass, flags, sample_offsets};
 
-/// The light of every pixel of the band that has an owner: a face of a lit line there, plus 1.
-pub fn light_lines(stages: &Stages<'_>, band: &SampleBand, owners: &[u32], light: &mut [Light]) {
-    let Some(surface) = &stages.plan.surface else { return };
+/// The light of every pixel of the band that has an owner, the face that lights its lines, plus 1.
+pub fn light_lines(context: &RasterContext<'_>, band: &SampleBand, owners: &[u32], light: &mut [Light]) {
+    let Some(surface) = &context.plan.surface else { return };
     for (i, (&owner, out)) in (0_u32..).zip(owners.iter().zip(light)) {
         if owner > 0 {
-            *out = pixel(stages, surface, band, [i % band.size_px[0], band.shown[0] + i / band.size_px[0]], owner - 1);
+            *out = pixel(context, surface, band, [i % band.size_px[0], band.shown[0] + i / band.size_px[0]], owner - 1);
         }
     }
 }
 
-fn pixel(stages: &Stages<'_>, surface: &SurfacePass<'_>, band: &SampleBand, [x, y]: [u32; 2], owner: u32) -> Light {
-    let plan = stages.plan;
+fn pixel(
+    context: &RasterContext<'_>,
+    surface: &SurfacePass<'_>,
+    band: &SampleBand,
+    [x, y]: [u32; 2],
+    owner: u32,
+) -> Light {
+    let plan = context.plan;
     let corner = [x as i32 * 256 - plan.width_px as i32 * 128, y as i32 * 256 - plan.height_px as i32 * 128];
     let (mut sum, mut count) = (Light { gain: 0.0, gloss: 0.0 }, 0.0_f32);
     for (&id, offset) in band.pixel(x as i32, y as i32).0.iter().zip(sample_offsets(band.samples)) {
-        // Neither a hull nor nothing.
+        // A triangle of the surface, not of the outline mesh.
         if id < plan.triangles.len() as u32 {
             let at = [(corner[0] + offset[0]) as f32, (corner[1] + offset[1]) as f32];
-            let light = point(stages, surface, id, at);
+            let light = point(context, surface, id, at);
             sum = Light { gain: sum.gain + light.gain, gloss: sum.gloss + light.gloss };
             count += 1.0;
         }
     }
     if count == 0.0 {
-        return point(stages, surface, owner, [(corner[0] + 128) as f32, (corner[1] + 128) as f32]);
+        return point(context, surface, owner, [(corner[0] + 128) as f32, (corner[1] + 128) as f32]);
     }
     Light { gain: sum.gain / count, gloss: sum.gloss / count }
 }
 
-/// The light on a triangle at a point, in 1/256 px from the picture's centre, which may lie beside it.
-fn point(stages: &Stages<'_>, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> Light {
-    let look = surface.material(id as usize);
-    if look.flags & flags::LIT == 0 {
+/// The light on a triangle at a point, in 1/256 px from the picture's centre, which may lie beside
+/// it.
+fn point(context: &RasterContext<'_>, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> Light {
+    let material = surface.material(id as usize);
+    if material.flags & flags::LIT == 0 {
         return Light::NONE;
     }
-    let mut b = Barycentrics::new(&corners(stages, id, at));
+    let mut b = Barycentrics::new(&corners(context, id, at));
     b.value = inside(b.value);
-    let normal = normal(surface, look, &Place { stages, id, at, b });
-    light_on(&surface.lights, &stages.plan.projection, look.metallic, look.roughness, normal)
+    let normal = normal(surface, material, &Place { context, id, at, b });
+    light_on(&surface.lights, &context.plan.projection, material.metallic, material.roughness, normal)
 }
 
 /// Barycentrics of a point of the triangle: those of one beside it do not extrapolate.
 fn inside(b: [f32; 3]) -> [f32; 3] {
-    // NaN, of a triangle seen from its very edge, becomes 0.
+    // NaN, of a triangle seen edge-on, becomes 0.
     let b = b.map(|v| if v > 0.0 { v.min(1.0) } else { 0.0 });
     let sum = (b[0] + b[1]) + b[2];
     if sum > 0.0 { b.map(|v| v / sum) } else { [1.0 / 3.0; 3] }

@@ -1,4 +1,10 @@
-//! TODO room.
+//! Stage lines: lines of exact width.
+//!
+//! For each [`edge`], [`contour`] tells if it is drawn in this view, [`segment`] is its position on
+//! screen, and [`hidden_lines`] finds the intervals to draw. Each interval is a [`stroke`] in the
+//! pixels that it touches; its area comes from [`profile`]. [`coverage`] unites a pixel's strokes
+//! and composites them over the colours, under the light of [`line_light`]. Twins are in
+//! `shaders/lines/`.
 
 pub(crate) mod contour;
 pub(crate) mod coverage;

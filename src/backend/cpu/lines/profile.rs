@@ -1,9 +1,11 @@
-//! Stage 4, a strip: how much of a pixel it covers. Twin of what `shaders/lines/stroke.wgsl` says of strips.
+//! Stage lines, per strip and pixel: the covered area. Twin of `strip_area` in
+//! `shaders/lines/stroke.wgsl`.
 
 /// Coverage of a pixel's box by a strip, as a function of the distance between their centres.
 ///
-/// The box filter's profile across a line with unit normal n is a trapezoid of area 1; its half supports are
-/// `(|nx| + |ny|) / 2` at the foot and `||nx| - |ny|| / 2` at the top. Coverage is its integral over the strip's width.
+/// The box filter's profile across a line with unit normal n is a trapezoid of area 1; its half
+/// supports are `(|nx| + |ny|) / 2` at the foot and `||nx| - |ny|| / 2` at the top. Coverage is its
+/// integral over the strip's width.
 pub struct Profile {
     half_width: f32,
     foot: f32,
@@ -14,7 +16,8 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Of a line with this unit normal, half as wide as `half_width` with a ramp half as wide as `half_ramp`, pixels.
+    /// A profile of a line with this unit normal, half as wide as `half_width` with a ramp half as
+    /// wide as `half_ramp`, pixels.
     #[inline(always)]
     pub fn new(half_width: f32, half_ramp: f32, normal: [f32; 2]) -> Self {
         let (nx, ny) = (normal[0].abs(), normal[1].abs());

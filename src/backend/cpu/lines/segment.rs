@@ -1,6 +1,7 @@
-//! Stage 4, an edge on screen: where it lies, and which pixels it passes. Twin of `shaders/lines/segment.wgsl`.
+//! Stage lines, per edge: its position on screen and the pixels along it. Twin of
+//! `shaders/lines/segment.wgsl`.
 
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::clip_segment;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, rsqrt};
 use crate::plan::Edge;
@@ -27,10 +28,10 @@ pub struct Segment {
 impl Segment {
     /// None where the edge is out of the picture.
     #[inline(always)]
-    pub fn new(stages: &Stages<'_>, edge: &Edge) -> Option<Self> {
-        let [a, b] = edge.vertices.map(|v| stages.vertices[v as usize]);
-        let [a, b] = if a.is_outside() || b.is_outside() { clip(stages, edge)? } else { [a, b] };
-        let plan = stages.plan;
+    pub fn new(context: &RasterContext<'_>, edge: &Edge) -> Option<Self> {
+        let [a, b] = edge.vertices.map(|v| context.vertices[v as usize]);
+        let [a, b] = if a.is_outside() || b.is_outside() { clip(context, edge)? } else { [a, b] };
+        let plan = context.plan;
         let half = [plan.width_px as i32 * 128, plan.height_px as i32 * 128];
         let px = |v: &ScreenVertex| [(v.x + half[0]) as f32 * (1.0 / 256.0), (v.y + half[1]) as f32 * (1.0 / 256.0)];
         let (start, end) = (px(&a), px(&b));
@@ -54,9 +55,9 @@ impl Segment {
         self.ends
     }
 
-    /// Whether the triangle is not farther away than all of the edge, nor beside its box.
+    /// False if the triangle is farther away than all of the edge, or beside its box.
     #[inline(always)]
-    pub fn may_lie_behind(&self, [a, b, c]: &[ScreenVertex; 3]) -> bool {
+    pub fn may_be_hidden_by(&self, [a, b, c]: &[ScreenVertex; 3]) -> bool {
         let [start, end] = self.ends;
         let overlaps = |k: usize, a: i32, b: i32, c: i32| {
             let (low, high) = (a.min(b).min(c) as f32, a.max(b).max(c) as f32);
@@ -129,18 +130,19 @@ fn floor(v: f32) -> i32 {
     towards_zero - i32::from(towards_zero as f32 > v)
 }
 
-/// First and last row, from `first` to before `end`, that a line between these heights may touch; empty if first > last.
+/// First and last row, from `first` to before `end`, that a line between these heights may touch;
+/// empty if first > last.
 #[inline(always)]
 pub fn rows(a: f32, b: f32, reach: f32, [first, end]: [i32; 2]) -> [i32; 2] {
     let reach = reach + SLACK_PX;
     [((a.min(b) - reach) as i32).max(first), ((a.max(b) + reach) as i32).min(end - 1)]
 }
 
-fn clip(stages: &Stages<'_>, edge: &Edge) -> Option<[ScreenVertex; 2]> {
-    let projection = &stages.plan.projection;
-    // Where nothing is to be clipped, what is outside is not drawn: of triangles neither.
+fn clip(context: &RasterContext<'_>, edge: &Edge) -> Option<[ScreenVertex; 2]> {
+    let projection = &context.plan.projection;
+    // A plan without clipping draws nothing that is outside, neither edges nor triangles.
     if !projection.clip {
         return None;
     }
-    clip_segment(projection, edge.vertices.map(|v| homogeneous(projection, stages.plan.positions[v as usize])))
+    clip_segment(projection, edge.vertices.map(|v| homogeneous(projection, context.plan.positions[v as usize])))
 }

@@ -1,9 +1,10 @@
-//! Stage 4, a stroke in a pixel: how much of the pixel it covers, and where. Twin of `shaders/lines/stroke.wgsl`.
+//! Stage lines, per stroke and pixel: the covered area and the covered points. Twin of
+//! `shaders/lines/stroke.wgsl`.
 //!
-//! A stroke is all that lies within half the line's width of a piece of an edge. Its area in a pixel is exact where only its
-//! sides cross the pixel: a strip under the box filter. Where it lies is said by [`POINTS`] points that fill the pixel evenly;
-//! which of them it covers is found in integers, so that both back-ends agree to the bit, and strokes can be united
-//! ([`ink`](crate::backend::cpu::lines::coverage)).
+//! A stroke is all that lies within half the line's width of a piece of an edge. Its area in a
+//! pixel is exact where only its sides cross the pixel: a strip under the box filter. Its position
+//! is described by those of [`POINTS`] evenly spread points that it covers, found in integers, so
+//! that both back-ends agree to the bit and strokes can be united ([`coverage`](super::coverage)).
 
 use super::profile::Profile;
 use crate::backend::cpu::geometry::transform::{round_to_i32, rsqrt};
@@ -18,20 +19,20 @@ const BITS: usize = 16;
 /// Points in a pixel.
 pub const POINTS: u32 = sample_partition::POINTS as u32;
 
-/// Which points of a pixel are covered: bit `15 - j` of word l is point `16 j + l`.
+/// Covered points of a pixel: bit `15 - j` of word l is point `16 j + l`.
 pub type Mask = [u16; WORDS];
 
 /// A number for each point: of bit j of word l, at `[j][l]`.
 type PerPoint = [[i16; WORDS]; BITS];
 
-/// Where the points lie, in 1/65536 px right of and below the pixel's middle.
+/// Positions of the points, in 1/65536 px right of and below the pixel's middle.
 static LATTICE: [PerPoint; 2] = [lattice(GENERATORS[0]), lattice(GENERATORS[1])];
 
 /// Steps to the pixel in which along and across are measured.
-const UNIT: f32 = 16_384.0;
+pub const UNIT: f32 = 16_384.0;
 
 /// Largest scaled area: two of them differ by less than 16 bits hold.
-const LIMIT: f32 = LinePass::SCALED_MAX;
+pub const LIMIT: f32 = LinePass::SCALED_MAX;
 
 const fn lattice(generator: usize) -> PerPoint {
     let mut at = [[0; WORDS]; BITS];
@@ -43,7 +44,7 @@ const fn lattice(generator: usize) -> PerPoint {
     at
 }
 
-/// What all strokes of a line pass have in common.
+/// Parameters of all strokes of a line pass.
 pub struct Pen {
     /// Half the width, pixels.
     half_width: f32,
@@ -82,9 +83,10 @@ impl Pen {
     }
 }
 
-/// The line's coverage across it is a box of its width under another of its ramp's: a trapezoid. Where it is at least
-/// as high as a level, within this distance of the middle, the points of that level are covered: so the denser of two lines
-/// that cross is what remains of both. Levels are shares of the line's peak, which is less than 1 where the ramp is wider.
+/// The line's coverage across it is a box of its width under another of its ramp's: a trapezoid.
+/// Where it is at least as high as a level, within this distance of the middle, the points of that
+/// level are covered: so the denser of two lines that cross is what remains of both. Levels are
+/// shares of the line's peak, which is less than 1 where the ramp is wider.
 fn radius(half_width: f32, half_ramp: f32, peak: f32, level: usize) -> f32 {
     // Neighbouring words far apart in level.
     let level = ((((level * 7) % WORDS) as f32 + 0.5) * (1.0 / WORDS as f32)) * peak;
@@ -99,7 +101,7 @@ pub struct Direction {
     across_at: PerPoint,
     along_at: PerPoint,
     profile: Profile,
-    /// How far a pixel reaches along from its middle.
+    /// Extent of a pixel along the direction, from its middle.
     box_along: f32,
 }
 
@@ -140,11 +142,12 @@ fn high(a: i16, b: i16) -> i16 {
     ((i32::from(a) * i32::from(b)) >> 16) as i16
 }
 
-/// A piece of an edge in a pixel: area (0 to 1) and mask. `ends` are the piece's, in pixels from the pixel's centre.
+/// Area (0 to 1) and mask of a piece of an edge in a pixel. `ends` are the piece's, in pixels from
+/// the pixel's centre.
 #[inline(always)]
 pub fn cover(pen: &Pen, direction: &Direction, ends: [[f32; 2]; 2]) -> Option<(f32, Mask)> {
     let [start, end] = ends;
-    // Of the pixel's centre: how far from the line, how far past the start and past the end.
+    // Distances of the pixel's centre: from the line, past the start and past the end.
     let across = direction.along[1] * start[0] - direction.along[0] * start[1];
     let past = |p: [f32; 2]| -(direction.along[0] * p[0] + direction.along[1] * p[1]);
     let (past_start, past_end) = (past(start), past(end));
@@ -152,7 +155,7 @@ pub fn cover(pen: &Pen, direction: &Direction, ends: [[f32; 2]; 2]) -> Option<(f
     if across * across + beyond * beyond > pen.reach * pen.reach {
         return None;
     }
-    // Whether the pixel reaches past the start, and past the end.
+    // Does the pixel reach past the start, and past the end?
     let reaches = [past_start < direction.box_along, past_end > -direction.box_along];
     let mut mask = [0; WORDS];
     if reaches == [false; 2] {
@@ -221,7 +224,8 @@ fn strip(pen: &Pen, direction: &Direction, across: f32, past: [f32; 2], is_endle
     }
 }
 
-/// Moves words up by a bit, and puts the signs of `of` below. A loop of nothing else is what compilers make vectors of.
+/// Moves words up by a bit, and puts the signs of `of` below. A loop of nothing else is what
+/// compilers make vectors of.
 #[inline(always)]
 fn push_signs(words: &mut [u16; WORDS], of: &[i16; WORDS]) {
     for l in 0..WORDS {

@@ -1,257 +1,174 @@
-//! Stage 3b, a sample: the layers over its surface, nearest first, and the surface under them. Twin of `shaders/peeling/composite.wgsl`.
+//! Stage shade, per sample: composites the peeled layers front to back, then the surface under
+//! them. Twin of `shaders/peeling/composite.wgsl`.
 //!
-//! Depth peeling (Everitt 2001, "Interactive order-independent transparency"), for each sample by itself: a round finds the
-//! greatest word (depth, lowest id) below the last round's, all words above the visibility buffer's.
+//! Depth peeling (Everitt 2001, "Interactive order-independent transparency"), for each sample by
+//! itself: a round finds the greatest word (depth, lowest id) below the last round's, all words
+//! above the visibility buffer's.
 
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::bins::TriangleBin;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
 use crate::backend::cpu::isa::dispatch;
-use crate::backend::cpu::peeling::emit_layer::peel;
+use crate::backend::cpu::peeling::emit_layer::peel_layer;
+use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::point::Show;
 use crate::backend::cpu::surface::shade::Shader;
 use crate::plan::{PeelingPass, pass_mask};
 
-/// What a band's layers need beside its samples: rows that are shown, and none of those beyond them.
-pub struct LayerBand {
-    /// This round's layer; begins as a copy of what it must lie before.
-    pub found: SampleBand,
-    /// The last round's; depth 0 where a sample is done.
-    pub previous: SampleBand,
-    /// Premultiplied linear RGBA so far, laid out as the samples.
-    colors: Vec<[f32; 4]>,
-    /// Materials so far, a bit each, modulo 32.
-    materials: Vec<u32>,
-    /// Of each triangle of the band, in the order of its bins: whether it may be in a round to come.
-    pub pending: Vec<bool>,
-}
-
-impl LayerBand {
-    /// Bytes a sample: two depths and ids, a colour, and materials.
-    pub const SAMPLE_BYTES: usize = 8 + 8 + 16 + 4;
-
-    /// For bands like this one, of which so many rows are shown.
-    pub fn new(base: &SampleBand, rows: u32) -> Self {
-        let like = || SampleBand::new(base.size_px, 0, rows, base.samples);
-        let (found, previous) = (like(), like());
-        let (colors, materials) = (vec![[0.0; 4]; found.depth.len()], vec![0; found.depth.len()]);
-        Self { found, previous, colors, materials, pending: Vec::new() }
-    }
-
-    /// What it holds on to, bytes.
-    pub fn bytes(&self) -> usize {
-        self.colors.len() * Self::SAMPLE_BYTES + self.pending.capacity()
-    }
-
-    /// How much of a sample of the picture's pixel (x, y) lies under them, 0 to 1.
-    #[inline(always)]
-    pub fn alpha(&self, x: u32, y: u32, s: u32) -> f32 {
-        self.colors[self.found.index(x as i32, y as i32, s)][3]
-    }
-
-    /// Forgets everything, and moves to what is shown of `base`.
-    fn begin(&mut self, base: &SampleBand) {
-        for samples in [&mut self.found, &mut self.previous] {
-            (samples.first_row, samples.rows, samples.shown) =
-                (base.shown[0] as i32, base.shown[1] - base.shown[0], base.shown);
-        }
-        self.previous.depth.fill(f32::INFINITY);
-        self.previous.ids.fill(0);
-        self.colors.fill([0.0; 4]);
-        self.materials.fill(0);
-        self.pending.clear();
-    }
-
-    /// Empties the round: what it finds must lie before `base`, if there is one.
-    fn begin_round(&mut self, base: Option<&SampleBand>) {
-        match base {
-            Some(base) => {
-                let stride = self.found.stride;
-                let depths = self.found.depth.chunks_exact_mut(stride);
-                for ((y, depths), ids) in (0..).zip(depths).zip(self.found.ids.chunks_exact_mut(stride)) {
-                    // Rows that the last band of a picture does not have are nobody's.
-                    if y < self.found.rows as i32 {
-                        let from = base.index(0, self.found.first_row + y, 0);
-                        depths.copy_from_slice(&base.depth[from..from + stride]);
-                        ids.copy_from_slice(&base.ids[from..from + stride]);
-                    }
-                }
-            }
-            None => self.found.clear(),
-        }
-    }
-
-    /// Takes the find of sample `at`, which is at `in_base` among the base's, as its last layer: its id, or None if the sample is done.
-    #[inline(always)]
-    fn take(&mut self, base: Option<&SampleBand>, at: usize, in_base: usize) -> Option<u32> {
-        let (depth, id) = (self.found.depth[at], self.found.ids[at]);
-        let (base_depth, base_id) = base.map_or((0.0, NOTHING), |base| (base.depth[in_base], base.ids[in_base]));
-        if depth == base_depth && id == base_id {
-            self.previous.depth[at] = 0.0;
-            return None;
-        }
-        (self.previous.depth[at], self.previous.ids[at]) = (depth, id);
-        Some(id)
-    }
-
-    /// Lays a colour under what some samples of the pixel at `first` have so far.
-    #[inline(always)]
-    fn lay<const S: usize>(&mut self, first: usize, same: [bool; S], color: [f32; 4]) {
-        for s in (0..S).filter(|&s| same[s]) {
-            let so_far = &mut self.colors[first + s];
-            let rest = 1.0 - so_far[3];
-            for k in 0..4 {
-                so_far[k] += rest * color[k];
-            }
-            if so_far[3] >= 1.0 {
-                self.previous.depth[first + s] = 0.0;
-            }
-        }
-    }
-}
-
-/// Shades the band: its layers, and the surface under them.
+/// Shades a band: the peeled layers, and the surface under them.
 pub fn draw(
-    stages: &Stages<'_>,
+    context: &RasterContext<'_>,
     pass: &PeelingPass,
     bins: (&[TriangleBin], usize),
     base: &SampleBand,
-    layers: &mut LayerBand,
+    peel: &mut PeelBand,
     colors: &mut [[f32; 4]],
 ) {
-    layers.begin(base);
+    peel.reset(base);
     let floor = (!pass.behind_surface).then_some(base);
     for layer in 0..pass.count_max {
-        layers.begin_round(floor);
-        peel(stages.isa, stages, bins, layers);
+        peel.begin_round(floor);
+        peel_layer(context.isa, context, bins, peel);
         let show = Show { fill: !pass.wires_only, wires: if layer == 0 { 1.0 } else { pass.fade } };
         let mut is_open = false;
-        lay(stages.isa, stages, show, floor, layers, &mut is_open);
-        if !is_open || stages.deadline.check().is_err() {
+        shade_layer(context.isa, context, show, floor, peel, &mut is_open);
+        if !is_open || context.deadline.check().is_err() {
             break;
         }
     }
-    under(stages.isa, stages, base, layers, colors);
+    shade_surface(context.isa, context, base, peel, colors);
 }
 
-/// Leaves layer number `layer` in `found`, unshaded: id [`NOTHING`] where a sample has none.
-pub fn find(
-    stages: &Stages<'_>,
+/// The visibility words of layer number `layer`, unshaded: 0 where a sample has none.
+pub fn find_layer(
+    context: &RasterContext<'_>,
     pass: &PeelingPass,
     bins: (&[TriangleBin], usize),
     base: &SampleBand,
-    layers: &mut LayerBand,
+    peel: &mut PeelBand,
     layer: u32,
 ) -> Vec<u64> {
-    layers.begin(base);
+    peel.reset(base);
     let floor = (!pass.behind_surface).then_some(base);
-    let mut words = vec![0; layers.found.depth.len()];
+    let mut words = vec![0; peel.found.depth.len()];
     for _ in 0..=layer {
-        layers.begin_round(floor);
-        peel(stages.isa, stages, bins, layers);
-        let (rows, stride) = (layers.found.rows as usize, layers.found.stride);
+        peel.begin_round(floor);
+        peel_layer(context.isa, context, bins, peel);
+        let (rows, stride) = (peel.found.rows as usize, peel.found.stride);
         for (at, word) in words.iter_mut().take(rows * stride).enumerate() {
-            let y = layers.found.first_row + (at / stride) as i32;
+            let y = peel.found.first_row + (at / stride) as i32;
             let in_base = base.index(0, y, 0) + at % stride;
-            *word = if layers.take(floor, at, in_base).is_some() { layers.found.word(at) } else { 0 };
+            *word = if peel.take_layer(floor, at, in_base).is_some() { peel.found.word(at) } else { 0 };
         }
     }
     words
 }
 
 dispatch! {
-    /// Shades the layer that was found and lays it under those before it; says whether there may be another.
-    pub fn lay(
-        stages: &Stages<'_>,
+    /// Shades the layer that was found and composites it under those in front; sets `is_open` if
+    /// there may be another.
+    pub fn shade_layer(
+        context: &RasterContext<'_>,
         show: Show,
         floor: Option<&SampleBand>,
-        layers: &mut LayerBand,
+        peel: &mut PeelBand,
         is_open: &mut bool,
-    ) = lay_kernel
+    ) = shade_layer_kernel
 }
 
 dispatch! {
-    /// Shades the surface, lays it under the layers, and averages each pixel's samples.
-    pub fn under(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colors: &mut [[f32; 4]]) = under_kernel
+    /// Shades the surface, composites it under the layers, and averages each pixel's samples.
+    pub fn shade_surface(context: &RasterContext<'_>, base: &SampleBand, peel: &PeelBand, colors: &mut [[f32; 4]]) = shade_surface_kernel
 }
 
 #[inline(always)]
-fn lay_kernel(stages: &Stages<'_>, show: Show, floor: Option<&SampleBand>, layers: &mut LayerBand, is_open: &mut bool) {
-    for_samples!(layers.found.samples, lay_sampled(stages, show, floor, layers, is_open));
-}
-
-#[inline(always)]
-fn lay_sampled<const S: usize>(
-    stages: &Stages<'_>,
+fn shade_layer_kernel(
+    context: &RasterContext<'_>,
     show: Show,
     floor: Option<&SampleBand>,
-    layers: &mut LayerBand,
+    peel: &mut PeelBand,
     is_open: &mut bool,
 ) {
-    let hull = stages.plan.hull.as_ref().filter(|_| stages.plan.has_peeled_hull());
-    let triangles = stages.plan.triangles.len() as u32;
-    let mut shader = Shader::new(stages);
-    for y in layers.found.shown[0]..layers.found.shown[1] {
-        for x in 0..layers.found.size_px[0] {
-            let first = layers.found.index(x as i32, y as i32, 0);
+    for_samples!(peel.found.samples, shade_layer_sampled(context, show, floor, peel, is_open));
+}
+
+#[inline(always)]
+fn shade_layer_sampled<const S: usize>(
+    context: &RasterContext<'_>,
+    show: Show,
+    floor: Option<&SampleBand>,
+    peel: &mut PeelBand,
+    is_open: &mut bool,
+) {
+    let hull = context.plan.hull.as_ref().filter(|_| context.plan.has_peeled_hull());
+    let triangles = context.plan.triangles.len() as u32;
+    let mut shader = Shader::new(context);
+    for y in peel.found.shown[0]..peel.found.shown[1] {
+        for x in 0..peel.found.size_px[0] {
+            let first = peel.found.index(x as i32, y as i32, 0);
             let in_base = floor.map_or(0, |base| base.index(x as i32, y as i32, 0));
             let mut ids = [NOTHING; S];
             let mut any = false;
             for s in 0..S {
                 let at = first + s;
-                let Some(id) = layers.take(floor, at, in_base + s) else { continue };
+                let Some(id) = peel.take_layer(floor, at, in_base + s) else { continue };
                 any = true;
                 let Some(hull) = hull else {
                     ids[s] = id;
                     continue;
                 };
                 let bit = 1 << (hull.material(id as usize) % 32);
-                if id < triangles || layers.materials[at] & bit == 0 {
+                if id < triangles || peel.materials[at] & bit == 0 {
                     ids[s] = id;
                 }
-                layers.materials[at] |= bit;
+                peel.materials[at] |= bit;
             }
             if !any {
                 continue;
             }
-            shader.groups(ids, [x, y], |_| show, |same, color| layers.lay(first, same, color));
+            shader.groups(ids, [x, y], |_| show, |same, color| peel.accumulate(first, same, color));
             for s in 0..S {
-                *is_open |= layers.previous.depth[first + s] > 0.0;
+                *is_open |= peel.previous.depth[first + s] > 0.0;
             }
         }
     }
 }
 
 #[inline(always)]
-fn under_kernel(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colors: &mut [[f32; 4]]) {
-    for_samples!(base.samples, under_sampled(stages, base, layers, colors));
+fn shade_surface_kernel(context: &RasterContext<'_>, base: &SampleBand, peel: &PeelBand, colors: &mut [[f32; 4]]) {
+    for_samples!(base.samples, shade_surface_sampled(context, base, peel, colors));
 }
 
 #[inline(always)]
-fn under_sampled<const S: usize>(stages: &Stages<'_>, base: &SampleBand, layers: &LayerBand, colors: &mut [[f32; 4]]) {
-    let plan = stages.plan;
+fn shade_surface_sampled<const S: usize>(
+    context: &RasterContext<'_>,
+    base: &SampleBand,
+    peel: &PeelBand,
+    colors: &mut [[f32; 4]],
+) {
+    let plan = context.plan;
     let wires_only = plan.peeling().is_some_and(|pass| pass.wires_only);
     let show = |id: u32| match wires_only && plan.pass_mask(id as usize) & pass_mask::LAYER != 0 {
         true => Show { fill: true, wires: 0.0 },
         false => Show::ALL,
     };
-    let mut shader = Shader::new(stages);
+    let mut shader = Shader::new(context);
     let share = 1.0 / S as f32;
     let mut colors = colors.iter_mut();
     for y in base.shown[0]..base.shown[1] {
         for x in 0..base.size_px[0] {
             let Some(out) = colors.next() else { return };
-            let [in_base, first] = [base, &layers.found].map(|band| band.index(x as i32, y as i32, 0));
+            let [in_base, first] = [base, &peel.found].map(|band| band.index(x as i32, y as i32, 0));
             let mut ids = [NOTHING; S];
             for s in 0..S {
                 ids[s] = base.ids[in_base + s];
-                let over = layers.colors[first + s];
+                let over = peel.colors[first + s];
                 for k in 0..4 {
                     out[k] += share * over[k];
                 }
             }
             shader.groups(ids, [x, y], show, |same, color| {
-                let rest = |s: usize| if same[s] { 1.0 - layers.colors[first + s][3] } else { 0.0 };
+                let rest = |s: usize| if same[s] { 1.0 - peel.colors[first + s][3] } else { 0.0 };
                 let weight = share * (0..S).map(rest).sum::<f32>();
                 for k in 0..4 {
                     out[k] += weight * color[k];

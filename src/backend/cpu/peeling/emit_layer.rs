@@ -1,25 +1,26 @@
-//! Stage 2 once more, a round a layer: the nearest triangle behind the layer before. Twin of `shaders/peeling/emit_layer.wgsl`.
+//! Stage visibility, one round per peeled layer: finds the nearest triangle behind the previous
+//! layer. Twin of `shaders/peeling/emit_layer.wgsl`.
 
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::bins::TriangleBin;
-use crate::backend::cpu::deadline_poll::Watch;
+use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility;
 use crate::backend::cpu::geometry::visibility::{Setup, Target};
 use crate::backend::cpu::isa::{LANES, dispatch};
-use crate::backend::cpu::peeling::composite::LayerBand;
+use crate::backend::cpu::peeling::state::PeelBand;
 
 dispatch! {
     /// Finds the next layer of a band.
-    pub fn peel(stages: &Stages<'_>, bins: (&[TriangleBin], usize), layers: &mut LayerBand) = peel_kernel
+    pub fn peel_layer(context: &RasterContext<'_>, bins: (&[TriangleBin], usize), peel: &mut PeelBand) = peel_layer_kernel
 }
 
-/// Keeps the nearest of what lies behind the last layer.
+/// Target that keeps the nearest triangle behind the previous layer.
 struct Behind<'a> {
     found: &'a mut SampleBand,
     previous: &'a SampleBand,
-    /// Not 0 where the triangle lies behind the last layer of some sample.
+    /// Not 0 if the triangle is behind the previous layer at some sample.
     pending: [u32; LANES],
 }
 
@@ -56,19 +57,19 @@ impl Target for Behind<'_> {
 }
 
 #[inline(always)]
-fn peel_kernel(stages: &Stages<'_>, (bins, band): (&[TriangleBin], usize), layers: &mut LayerBand) {
-    let LayerBand { found, previous, pending, .. } = layers;
-    let mut watch = Watch::new(stages.deadline);
+fn peel_layer_kernel(context: &RasterContext<'_>, (bins, band): (&[TriangleBin], usize), peel: &mut PeelBand) {
+    let PeelBand { found, previous, pending, .. } = peel;
+    let mut poll = DeadlinePoll::new(context.deadline);
     let mut item = 0;
     for chunk in bins {
         for (id, piece) in chunk.pieces_in(band) {
-            if watch.is_over(offer(item, id, || *piece, found, previous, pending)) {
+            if poll.is_expired(offer(item, id, || *piece, found, previous, pending)) {
                 return;
             }
             item += 1;
         }
         for id in chunk.whole.items_in(band) {
-            if watch.is_over(offer(item, id, || stages.screen_triangle(id), found, previous, pending)) {
+            if poll.is_expired(offer(item, id, || context.screen_triangle(id), found, previous, pending)) {
                 return;
             }
             item += 1;
@@ -76,7 +77,8 @@ fn peel_kernel(stages: &Stages<'_>, (bins, band): (&[TriangleBin], usize), layer
     }
 }
 
-/// Draws the band's triangle number `item`, unless an earlier round has seen the last of it. Among how many samples it was looked for.
+/// Draws the band's triangle number `item`, unless an earlier round has found all of its samples.
+/// Returns the number of samples tested.
 #[inline(always)]
 fn offer(
     item: usize,

@@ -1,10 +1,12 @@
-//! Where a point lies in its triangle. Twin of `shaders/surface/barycentric.wgsl`.
+//! Stage shade, per point: its position in its triangle. Twin of
+//! `shaders/surface/barycentric.wgsl`.
 
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
 use crate::plan::DrawPlan;
 
-/// A corner relative to the shaded point: homogeneous (x, y, w), and the factor that its barycentric takes besides.
+/// A corner relative to the shaded point: homogeneous (x, y, w), and the factor that its
+/// barycentric takes besides.
 #[derive(Clone, Copy)]
 pub struct Corner {
     x: f32,
@@ -13,14 +15,14 @@ pub struct Corner {
     weight: f32,
 }
 
-/// The corners of a triangle seen from point `at`. Snapped corners where there are some; where one is behind the eye,
-/// the homogeneous ones, which stay right there.
+/// The corners of a triangle seen from point `at`. Snapped corners; if one is behind the eye, the
+/// homogeneous ones, which are valid there too.
 #[inline]
-pub fn corners(stages: &Stages<'_>, id: u32, at: [f32; 2]) -> [Corner; 3] {
-    let vertices = stages.screen_triangle(id);
+pub fn corners(context: &RasterContext<'_>, id: u32, at: [f32; 2]) -> [Corner; 3] {
+    let vertices = context.screen_triangle(id);
     if vertices.iter().any(ScreenVertex::is_outside) {
-        return stages.positions_of(id).map(|(position, _)| {
-            let [x, y, _, w] = homogeneous(&stages.plan.projection, position);
+        return context.positions_of(id).map(|(position, _)| {
+            let [x, y, _, w] = homogeneous(&context.plan.projection, position);
             Corner { x: x - at[0] * w, y: y - at[1] * w, w, weight: 1.0 }
         });
     }
@@ -51,24 +53,26 @@ impl Areas {
 
 /// Perspective-correct barycentrics at a point.
 pub struct Barycentrics {
-    /// They add up to 1: two are carried, the third is what is left.
+    /// They add up to 1: two are computed, the third is the rest.
     pub value: [f32; 3],
     /// Change to the right, in 1/256 px.
     dx: [f32; 3],
     /// Change downwards, in 1/256 px.
     dy: [f32; 3],
-    /// Whether the triangle faces the viewer.
+    /// True if the triangle faces the viewer.
     pub front: bool,
 }
 
 impl Barycentrics {
-    /// `b_i` is proportional to the area opposite the corner, so that the derivatives are exact too.
+    /// `b_i` is proportional to the area opposite the corner, so that the derivatives are exact
+    /// too.
     #[inline(always)]
     pub fn new(c: &[Corner; 3]) -> Self {
         Self::divided(&Areas::new(c), |total| 1.0 / total)
     }
 
-    /// As [`Barycentrics::new`], with the same bits on both back-ends: for whatever is decided by them.
+    /// As [`Barycentrics::new`], with the same bits on both back-ends: for decisions such as
+    /// thresholds.
     #[inline(always)]
     pub fn exact(c: &[Corner; 3]) -> Self {
         Self::divided(&Areas::new(c), |total| {
@@ -91,19 +95,20 @@ impl Barycentrics {
         Self { value, dx, dy, front: total < 0.0 }
     }
 
-    /// `|db/dx| + |db/dy|` a pixel.
+    /// `|db/dx| + |db/dy|` per pixel.
     #[inline(always)]
     pub fn fwidth(&self, i: usize) -> f32 {
         256.0 * (self.dx[i].abs() + self.dy[i].abs())
     }
 
-    /// Change to the right and downwards, a pixel.
+    /// Change to the right and downwards, per pixel.
     pub fn derivatives(&self) -> [[f32; 3]; 2] {
         [self.dx, self.dy].map(|d| d.map(|v| 256.0 * v))
     }
 }
 
-/// Distance in pixels from the point to the line on screen that carries the edge opposite corner `i`, for each.
+/// Distance in pixels from the point to the line on screen that carries the edge opposite corner
+/// `i`, for each.
 pub fn edge_distances_px(c: &[Corner; 3]) -> [f32; 3] {
     let areas = Areas::new(c);
     std::array::from_fn(|i| {
@@ -112,16 +117,18 @@ pub fn edge_distances_px(c: &[Corner; 3]) -> [f32; 3] {
     })
 }
 
-/// Centres of the pixel that a point lies in and of its neighbours across and down in the same block of 2 x 2 pixels.
+/// Centres of the pixel that a point lies in and of its neighbours across and down in the same
+/// block of 2 x 2 pixels.
 pub struct Quad {
     /// In 1/256 px from the picture's centre: own, across, down.
     pub points: [[f32; 2]; 3],
-    /// 1 where the neighbour is right of the pixel (below it), -1 where it is left of it (above it).
+    /// 1 where the neighbour is right of the pixel (below it), -1 where it is left of it (above
+    /// it).
     pub sign: [f32; 2],
 }
 
 impl Quad {
-    /// Of the pixel that holds `at`.
+    /// The block of the pixel that holds `at`.
     pub fn around(plan: &DrawPlan<'_>, at: [f32; 2]) -> Self {
         let half = [plan.width_px, plan.height_px].map(|size| size as i32 * 128);
         let pixel = [0, 1].map(|k| (at[k] + half[k] as f32) as i32 >> 8);
@@ -133,12 +140,12 @@ impl Quad {
     }
 
     /// A triangle's exact barycentrics at the three points, continued beyond its edges.
-    pub fn barycentrics(&self, stages: &Stages<'_>, id: u32) -> [[f32; 3]; 3] {
-        self.points.map(|at| Barycentrics::exact(&corners(stages, id, at)).value)
+    pub fn barycentrics(&self, context: &RasterContext<'_>, id: u32) -> [[f32; 3]; 3] {
+        self.points.map(|at| Barycentrics::exact(&corners(context, id, at)).value)
     }
 }
 
-impl Stages<'_> {
+impl RasterContext<'_> {
     /// Unit-box corners of a triangle of the surface, and their vertex indices.
     pub(crate) fn positions_of(&self, id: u32) -> [([f32; 3], u32); 3] {
         self.triangle(id).map(|v| (self.plan.positions[v as usize], v))

@@ -1,44 +1,50 @@
-//! Views that show a triangle's numbers as colours. Twin of `shaders/surface/debug.wgsl`.
+//! Stage shade, per point: debug views, which show a triangle's numbers as colours. Twin of
+//! `shaders/surface/debug.wgsl`.
 
 use super::barycentric::{Corner, edge_distances_px};
-use super::light::light;
-use super::point::{lit, normal};
+use super::light::{light, lit};
+use super::normal::normal;
 use super::texture::{Uv, blend, floor};
 use super::wire::{Place, edge_mask, is_drawn};
 use crate::backend::cpu::vector::dot;
-use crate::plan::{ShadedMaterial, SurfacePass, flags};
+use crate::plan::{ShadedMaterial, SurfacePass, debug_views, flags};
 
-/// What the material's debug view shows at a point: opaque linear RGBA.
-pub fn color(surface: &SurfacePass<'_>, look: &ShadedMaterial, place: &Place<'_>, corners: &[Corner; 3]) -> [f32; 4] {
+/// The material's debug view at a point: opaque linear RGBA.
+pub fn color(
+    surface: &SurfacePass<'_>,
+    material: &ShadedMaterial,
+    place: &Place<'_>,
+    corners: &[Corner; 3],
+) -> [f32; 4] {
     let b = place.b.value;
-    let projection = &place.stages.plan.projection;
-    match (look.flags & flags::DEBUG) >> flags::DEBUG_SHIFT {
-        1 => shown(b),
-        2 => shown([3.0 * b[0].min(b[1]).min(b[2]); 3]),
-        3 => {
+    let projection = &place.context.plan.projection;
+    match (material.flags & flags::DEBUG) >> flags::DEBUG_SHIFT {
+        debug_views::BARYCENTRIC => shown(b),
+        debug_views::MIN_BARYCENTRIC => shown([3.0 * b[0].min(b[1]).min(b[2]); 3]),
+        debug_views::EDGE_DISTANCE => {
             let mask = edge_mask(surface, place.id);
             let px = edge_distances_px(corners);
             let nearest = (0..3).filter(|&i| is_drawn(mask, i)).fold(8.0_f32, |least, i| least.min(px[i]));
             shown([nearest / 8.0; 3])
         }
-        4 if look.flags & flags::LIT != 0 => {
-            let n = normal(surface, look, place);
+        debug_views::NORMAL if material.flags & flags::LIT != 0 => {
+            let n = normal(surface, material, place);
             let axes = [projection.screen_right, projection.screen_up, projection.to_viewer];
             shown(axes.map(|axis| 0.5 + 0.5 * dot(n, axis)))
         }
-        5 => match &surface.uvs {
+        debug_views::UV => match &surface.uvs {
             Some(uvs) => shown(checker(Uv::new(uvs, place.id, &place.b).at)),
             None => shown([0.5; 3]),
         },
-        6 => {
+        debug_views::FACE_ORIENTATION => {
             let paint = if place.b.front { [0.36, 0.56, 0.86] } else { [0.86, 0.30, 0.26] };
-            if look.flags & flags::LIT == 0 {
+            if material.flags & flags::LIT == 0 {
                 return shown(paint);
             }
-            let n = normal(surface, look, place);
-            lit(shown(paint), light(&surface.lights, projection, 0.0, look.roughness, n))
+            let n = normal(surface, material, place);
+            lit(shown(paint), light(&surface.lights, projection, 0.0, material.roughness, n))
         }
-        7 => match &surface.colors {
+        debug_views::VERTEX_COLOR => match &surface.colors {
             Some(colors) => {
                 let corners = colors.triangles[place.id as usize].map(|i| colors.values[i as usize]);
                 let [r, g, b, _] = blend(corners, b);
@@ -59,7 +65,8 @@ fn checker(uv: [f32; 2]) -> [f32; 3] {
     [bright * (0.2 + 0.8 * u), bright * (0.2 + 0.8 * v), bright * 0.45]
 }
 
-/// The linear colour that is stored as these values: sRGB decoding (IEC 61966-2-1), the same bits on both back-ends.
+/// The linear colour that is stored as these values: sRGB decoding (IEC 61966-2-1), the same bits
+/// on both back-ends.
 fn shown(display: [f32; 3]) -> [f32; 4] {
     let [r, g, b] = display.map(|v| {
         let v = v.clamp(0.0, 1.0);

@@ -1,20 +1,22 @@
-//! Light without images. Twin of `shaders/surface/light.wgsl`.
+//! Stage shade, per point: light without images. Twin of `shaders/surface/light.wgsl`.
 //!
-//! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have no diffuse colour, so
-//! they mirror a studio instead: bright above, a little brighter at the horizon, dark below, and blurred by roughness.
+//! Lambert plus the GGX lobe for each lamp, and a sky that is brighter than the ground. Metals have
+//! no diffuse colour, so they mirror a studio instead: bright above, a little brighter at the
+//! horizon, dark below, and blurred by roughness.
 //!
-//! Both back-ends compute the same bits: a whole flat face has one light, and that may lie on the threshold between two bytes.
+//! Both back-ends compute the same bits: a whole flat face has one light, and that may lie on the
+//! threshold between two bytes.
 
 use crate::backend::cpu::geometry::transform::quick_recip;
 use crate::backend::cpu::vector::dot;
 use crate::plan::{Lights, Projection};
 
-/// What light makes of a base colour: `base * gain + gloss`, in each channel.
+/// Effect of light on a base colour: `base * gain + gloss`, per channel.
 #[derive(Clone, Copy, Debug)]
 pub struct Light {
-    /// Of what the base colour tints.
+    /// Factor of the base colour.
     pub gain: f32,
-    /// Of what it does not.
+    /// Light that the base colour does not tint.
     pub gloss: f32,
 }
 
@@ -22,13 +24,19 @@ impl Light {
     /// The base colour as it is.
     pub const NONE: Self = Self { gain: 1.0, gloss: 0.0 };
 
-    /// What it makes of a premultiplied colour: no channel brighter than alpha lets through.
+    /// The effect on a premultiplied colour; no channel exceeds alpha.
     #[inline(always)]
     pub fn on_premultiplied(self, c: [f32; 4]) -> [f32; 4] {
         // Not `f32::clamp`, which would not bear an alpha below 0.
         let under = |v: f32| (v * self.gain + self.gloss * c[3]).max(0.0).min(c[3].max(0.0));
         [under(c[0]), under(c[1]), under(c[2]), c[3]]
     }
+}
+
+/// A colour with straight alpha under light, clamped to 1.
+pub fn lit(base: [f32; 4], light: Light) -> [f32; 4] {
+    let [r, g, b] = [0, 1, 2].map(|k| (base[k] * light.gain + light.gloss).clamp(0.0, 1.0));
+    [r, g, b, base[3]]
 }
 
 /// Light on a surface with unit normal `n`: the bits of the other back-end.

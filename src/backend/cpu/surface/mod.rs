@@ -1,8 +1,13 @@
-//! TODO room.
+//! Stage shade: from visible samples to colours.
+//!
+//! [`shade`] groups a pixel's samples by triangle, [`point`] shades each group once, at the mean of
+//! its samples. The rest is its formulas: [`barycentric`] coordinates, [`texture`] lookups, the
+//! [`normal`], [`light`], [`wire`] and [`debug`] views. Twins are in `shaders/surface/`.
 
 pub(crate) mod barycentric;
 pub(crate) mod debug;
 pub(crate) mod light;
+pub(crate) mod normal;
 pub(crate) mod point;
 pub(crate) mod shade;
 pub(crate) mod texture;

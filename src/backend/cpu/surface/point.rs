@@ -1,35 +1,38 @@
-//! The colour of one point of the surface: stage 3's formulas. Twin of `shaders/surface/point.wgsl`.
+//! Stage shade, per point: the colour of a point of the surface. Twin of
+//! `shaders/surface/point.wgsl`.
 
-use super::barycentric::{Barycentrics, Quad, corners};
+use super::barycentric::{Barycentrics, corners};
 use super::debug;
-use super::light::{Light, light, light_on_blend};
+use super::light::{Light, light, light_on_blend, lit};
+use super::normal::{normal, normal_mapped};
 use super::texture::{Uv, blend, sample};
 use super::wire::{Place, edge_mask, fwidth_cover, wire_cover};
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::area;
-use crate::backend::cpu::vector::{across, cross, facing, sub, turned_to_viewer, unit_or};
+use crate::backend::cpu::vector::{facing, turned_to_viewer};
 use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, slots};
 
-/// What the common looks do without, textures aside.
-const RICH: u32 = flags::DERIVATIVE_NORMALS
+/// Flags that the common materials do not have, textures aside.
+const GENERAL: u32 = flags::DERIVATIVE_NORMALS
     | flags::VERTEX_COLORS
     | flags::DEBUG
     | flags::WIRE_LIT
     | (flags::WIRES & !flags::WIRE_FWIDTH);
 
-/// What changes from point to point of a triangle in a common look.
+/// Flags by which the colour of a common material varies over a triangle.
 const VARYING: u32 = flags::VERTEX_NORMALS | flags::WIRE_FWIDTH;
 
-/// What decides by barycentrics rather than blends, textures aside: there both back-ends need the same bits.
+/// Flags by which barycentrics decide rather than blend, textures aside: both back-ends need the
+/// same bits there.
 const DECIDING: u32 = flags::VERTEX_COLORS | flags::WIRE_THRESHOLD | flags::DEBUG;
 
-/// What of its material a point shows.
+/// Parts of a material that a point shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Show {
-    /// Whether its fill.
+    /// True if the fill is shown.
     pub fill: bool,
-    /// How much of its wires, 0 to 1.
+    /// Opacity of the wires, 0 to 1.
     pub wires: f32,
 }
 
@@ -40,238 +43,167 @@ impl Show {
 
 /// Shades points of surface triangles.
 pub struct PointShader<'a> {
-    stages: &'a Stages<'a>,
+    context: &'a RasterContext<'a>,
     /// Flat colours do not change over a triangle: the last one is kept.
     flat: Option<(u32, [f32; 4])>,
-    /// What is shown; the same for all points of a triangle.
+    /// Shown parts of the material; the same for all points of a triangle.
     pub show: Show,
 }
 
 impl<'a> PointShader<'a> {
     /// One for a band.
-    pub fn new(stages: &'a Stages<'a>) -> Self {
-        Self { stages, flat: None, show: Show::ALL }
+    pub fn new(context: &'a RasterContext<'a>) -> Self {
+        Self { context, flat: None, show: Show::ALL }
     }
 
-    /// The colour of triangle `id` where it is known to be the same all over, and is the one that was shaded last.
+    /// The colour of triangle `id` where it is known to be the same all over, and is the one that
+    /// was shaded last.
     #[inline(always)]
     pub fn flat(&self, id: u32) -> Option<[f32; 4]> {
         self.flat.filter(|(last, _)| *last == id).map(|(_, color)| color)
     }
 
-    /// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's centre.
+    /// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the
+    /// picture's centre.
     pub fn color(&mut self, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> [f32; 4] {
-        let look = surface.material(id as usize);
+        let material = surface.material(id as usize);
         let is_textured =
-            !surface.textures.images.is_empty() && look.textures.iter().any(|used| used.texture != TEXTURE_NONE);
-        if look.flags & RICH != 0 || is_textured {
-            return self.rich(surface, look, id, at, is_textured);
+            !surface.textures.images.is_empty() && material.textures.iter().any(|used| used.texture != TEXTURE_NONE);
+        if material.flags & GENERAL != 0 || is_textured {
+            return self.general(surface, material, id, at, is_textured);
         }
-        if look.flags & VARYING != 0 {
-            return self.common(surface, look, id, at);
+        if material.flags & VARYING != 0 {
+            return self.common(surface, material, id, at);
         }
-        let base = self.with_alpha(look, look.base_color);
+        let base = self.with_alpha(material, material.base_color);
         let mut light = Light::NONE;
-        if look.flags & flags::FACE_NORMALS != 0 {
+        if material.flags & flags::FACE_NORMALS != 0 {
             let normal = turned_to_viewer(surface.face_normals[id as usize], self.is_front(id, at));
-            light = self.light(surface, look.metallic, look.roughness, normal);
+            light = self.light(surface, material.metallic, material.roughness, normal);
         }
-        let color = premultiplied(lit(base, light), look.emissive);
+        let color = premultiplied(lit(base, light), material.emissive);
         self.flat = Some((id, color));
         color
     }
 
     /// One base colour, smooth or with a wire by fwidth.
-    fn common(&self, surface: &SurfacePass<'_>, look: &ShadedMaterial, id: u32, at: [f32; 2]) -> [f32; 4] {
-        let b = Barycentrics::new(&corners(self.stages, id, at));
-        let base = self.with_alpha(look, look.base_color);
+    fn common(&self, surface: &SurfacePass<'_>, material: &ShadedMaterial, id: u32, at: [f32; 2]) -> [f32; 4] {
+        let b = Barycentrics::new(&corners(self.context, id, at));
+        let base = self.with_alpha(material, material.base_color);
         let mut light = Light::NONE;
-        if look.flags & flags::LIT != 0 {
-            let projection = &self.stages.plan.projection;
+        if material.flags & flags::LIT != 0 {
+            let projection = &self.context.plan.projection;
             light = match (&surface.vertex_normals, surface.face_normals.get(id as usize)) {
-                (Some(normals), _) if look.flags & flags::VERTEX_NORMALS != 0 => {
+                (Some(normals), _) if material.flags & flags::VERTEX_NORMALS != 0 => {
                     let corners = normals.triangles[id as usize].map(|i| normals.values[i as usize]);
                     let normal = facing(blend(corners, b.value), b.front);
-                    light_on_blend(&surface.lights, projection, look.metallic, look.roughness, normal)
+                    light_on_blend(&surface.lights, projection, material.metallic, material.roughness, normal)
                 }
                 (_, face) => {
                     let normal = face.map_or(projection.to_viewer, |normal| turned_to_viewer(*normal, b.front));
-                    self.light(surface, look.metallic, look.roughness, normal)
+                    self.light(surface, material.metallic, material.roughness, normal)
                 }
             };
         }
-        let color = premultiplied(lit(base, light), look.emissive);
-        if look.flags & flags::WIRE_FWIDTH == 0 || self.show.wires == 0.0 {
+        let color = premultiplied(lit(base, light), material.emissive);
+        if material.flags & flags::WIRE_FWIDTH == 0 || self.show.wires == 0.0 {
             return color;
         }
-        over(self.show.wires * fwidth_cover(edge_mask(surface, id), look, &b), look.wire_color, color)
+        over(self.show.wires * fwidth_cover(edge_mask(surface, id), material, &b), material.wire_color, color)
     }
 
-    /// Every look there is.
+    /// Every material there is.
     #[inline(never)]
-    fn rich(
+    fn general(
         &self,
         surface: &SurfacePass<'_>,
-        look: &ShadedMaterial,
+        material: &ShadedMaterial,
         id: u32,
         at: [f32; 2],
         is_textured: bool,
     ) -> [f32; 4] {
-        let c = corners(self.stages, id, at);
-        let is_deciding = is_textured || look.flags & DECIDING != 0;
+        let c = corners(self.context, id, at);
+        let is_deciding = is_textured || material.flags & DECIDING != 0;
         let b = if is_deciding { Barycentrics::exact(&c) } else { Barycentrics::new(&c) };
-        let place = Place { stages: self.stages, id, at, b };
-        let has_wire = look.flags & flags::WIRES != 0 && self.show.wires > 0.0;
-        let cover = if has_wire { self.show.wires * wire_cover(surface, look, &place) } else { 0.0 };
-        if look.flags & flags::DEBUG != 0 && !self.show.fill {
-            return look.wire_color.map(|v| cover * v);
+        let place = Place { context: self.context, id, at, b };
+        let has_wire = material.flags & flags::WIRES != 0 && self.show.wires > 0.0;
+        let cover = if has_wire { self.show.wires * wire_cover(surface, material, &place) } else { 0.0 };
+        if material.flags & flags::DEBUG != 0 && !self.show.fill {
+            return material.wire_color.map(|v| cover * v);
         }
-        if look.flags & flags::DEBUG != 0 {
-            return over(cover, look.wire_color, debug::color(surface, look, &place, &c));
+        if material.flags & flags::DEBUG != 0 {
+            return over(cover, material.wire_color, debug::color(surface, material, &place, &c));
         }
         let uv = surface.uvs.as_ref().filter(|_| is_textured).map(|uvs| Uv::new(uvs, id, &place.b));
         let texture = |slot: usize| match &uv {
-            Some(uv) if look.textures[slot].texture != TEXTURE_NONE => {
-                sample(&surface.textures, &look.textures[slot], uv)
+            Some(uv) if material.textures[slot].texture != TEXTURE_NONE => {
+                sample(&surface.textures, &material.textures[slot], uv)
             }
             _ => [1.0; 4],
         };
-        let base = self.with_alpha(look, base_color(surface, look, &place, texture(slots::BASE)));
+        let base = self.with_alpha(material, base_color(surface, material, &place, texture(slots::BASE)));
         if base[3] == 0.0 && cover == 0.0 {
             return [0.0; 4];
         }
         let mut light = Light::NONE;
-        if look.flags & flags::LIT != 0 {
+        if material.flags & flags::LIT != 0 {
             let [_, roughness, metallic, _] = texture(slots::METALLIC_ROUGHNESS);
-            let mut normal = normal(surface, look, &place);
-            if let Some(uv) = uv.as_ref().filter(|_| look.textures[slots::NORMAL].texture != TEXTURE_NONE) {
-                normal = self.bumped(surface, look, &place, uv, normal);
+            let mut normal = normal(surface, material, &place);
+            if let Some(uv) = uv.as_ref().filter(|_| material.textures[slots::NORMAL].texture != TEXTURE_NONE) {
+                normal = normal_mapped(surface, material, &place, uv, normal);
             }
-            let own = |flag: u32, textured: f32| if look.flags & flag != 0 { 1.0 } else { textured };
-            let metallic = look.metallic * own(flags::OWN_METALLIC, metallic);
-            let roughness = look.roughness * own(flags::OWN_ROUGHNESS, roughness);
+            let own = |flag: u32, textured: f32| if material.flags & flag != 0 { 1.0 } else { textured };
+            let metallic = material.metallic * own(flags::OWN_METALLIC, metallic);
+            let roughness = material.roughness * own(flags::OWN_ROUGHNESS, roughness);
             light = self.light(surface, metallic, roughness, normal);
         }
         let [r, g, b, _] = texture(slots::EMISSIVE);
-        let emissive = [look.emissive[0] * r, look.emissive[1] * g, look.emissive[2] * b];
-        if look.flags & flags::WIRE_LIT != 0 {
-            return lit_wire(cover, look.wire_color, base, light, emissive);
+        let emissive = [material.emissive[0] * r, material.emissive[1] * g, material.emissive[2] * b];
+        if material.flags & flags::WIRE_LIT != 0 {
+            return lit_wire(cover, material.wire_color, base, light, emissive);
         }
-        over(cover, look.wire_color, premultiplied(lit(base, light), emissive))
+        over(cover, material.wire_color, premultiplied(lit(base, light), emissive))
     }
 
-    /// What the material makes of alpha.
-    fn with_alpha(&self, look: &ShadedMaterial, mut base: [f32; 4]) -> [f32; 4] {
+    /// The base colour with the material's cutoff, blending and opacity applied to alpha.
+    fn with_alpha(&self, material: &ShadedMaterial, mut base: [f32; 4]) -> [f32; 4] {
         // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.
         base[3] = if base[3] > 0.0 { base[3].min(1.0) } else { 0.0 };
-        let is_cut = look.flags & flags::MASK != 0 && base[3] < look.alpha_cutoff;
-        if is_cut || !self.show.fill || look.flags & flags::FILL == 0 {
+        let is_cut = material.flags & flags::MASK != 0 && base[3] < material.alpha_cutoff;
+        if is_cut || !self.show.fill || material.flags & flags::FILL == 0 {
             return [0.0; 4];
         }
-        if look.flags & flags::BLEND == 0 {
+        if material.flags & flags::BLEND == 0 {
             base[3] = 1.0;
         }
-        base[3] *= look.opacity;
+        base[3] *= material.opacity;
         base
     }
 
-    /// What light makes of a colour at a point with this normal.
+    /// Light at a point with this normal.
     #[inline(always)]
     pub fn light(&self, surface: &SurfacePass<'_>, metallic: f32, roughness: f32, normal: [f32; 3]) -> Light {
-        light(&surface.lights, &self.stages.plan.projection, metallic, roughness, normal)
-    }
-
-    /// The normal that the normal texture makes of `n`. Its axes are the triangle's own: where u grows, and where v shrinks.
-    fn bumped(
-        &self,
-        surface: &SurfacePass<'_>,
-        look: &ShadedMaterial,
-        place: &Place<'_>,
-        uv: &Uv,
-        n: [f32; 3],
-    ) -> [f32; 3] {
-        let Some(uvs) = &surface.uvs else { return n };
-        let used = &look.textures[slots::NORMAL];
-        let p = place.stages.positions_of(place.id).map(|(position, _)| position);
-        let [t0, t1, t2] = uvs.triangles[place.id as usize].map(|i| {
-            let [u, v] = uvs.values[i as usize];
-            used.transform.map(|[a, b, _]| a * u + b * v)
-        });
-        let (e1, e2) = (sub(p[1], p[0]), sub(p[2], p[0]));
-        let (d1, d2) = ([t1[0] - t0[0], t1[1] - t0[1]], [t2[0] - t0[0], t2[1] - t0[1]]);
-        let turn = d1[0] * d2[1] - d2[0] * d1[1];
-        if !(turn.abs() > 1e-30 && turn.abs() < 1e30) {
-            return n;
-        }
-        // Seen from behind, a bump is a dent. v runs down in the image, and the texture's y up.
-        let side = if (turn > 0.0) == place.b.front { 1.0 } else { -1.0 };
-        let along_u: [f32; 3] = std::array::from_fn(|k| side * (e1[k] * d2[1] - e2[k] * d1[1]));
-        let along_up: [f32; 3] = std::array::from_fn(|k| side * (e1[k] * d2[0] - e2[k] * d1[0]));
-        let tangent = unit_or(across(along_u, n), [0.0; 3]);
-        let up = unit_or(across(across(along_up, n), tangent), [0.0; 3]);
-        let [x, y, z, _] = sample(&surface.textures, used, uv).map(|v| 2.0 * v - 1.0);
-        let (x, y) = (x * look.normal_scale, y * look.normal_scale);
-        unit_or(std::array::from_fn(|k| (x * tangent[k] + y * up[k]) + z * n[k]), n)
+        light(&surface.lights, &self.context.plan.projection, metallic, roughness, normal)
     }
 
     fn is_front(&self, id: u32, at: [f32; 2]) -> bool {
-        let vertices = self.stages.screen_triangle(id);
+        let vertices = self.context.screen_triangle(id);
         if vertices.iter().any(ScreenVertex::is_outside) {
-            return Barycentrics::new(&corners(self.stages, id, at)).front;
+            return Barycentrics::new(&corners(self.context, id, at)).front;
         }
         area(&vertices) < 0
     }
 }
 
-/// The unit normal on the viewer's side, without normal textures.
-pub fn normal(surface: &SurfacePass<'_>, look: &ShadedMaterial, place: &Place<'_>) -> [f32; 3] {
-    let Place { stages, id, b, .. } = place;
-    let to_viewer = stages.plan.projection.to_viewer;
-    if look.flags & flags::DERIVATIVE_NORMALS != 0 {
-        return derivative_normal(place);
-    }
-    if look.flags & flags::FACE_NORMALS != 0 {
-        return turned_to_viewer(surface.face_normals[*id as usize], b.front);
-    }
-    match &surface.vertex_normals {
-        Some(normals) => {
-            let corners = normals.triangles[*id as usize].map(|i| normals.values[i as usize]);
-            facing(blend(corners, b.value), b.front)
-        }
-        None => to_viewer,
-    }
-}
-
-/// The cross product of the position's fine derivatives in a block of 2 x 2 pixels, as a GPU's rasterizer has them: in f32,
-/// errors and all. (The same errors on both back-ends.)
-fn derivative_normal(place: &Place<'_>) -> [f32; 3] {
-    let Place { stages, id, at, .. } = place;
-    let quad = Quad::around(stages.plan, *at);
-    let corners = stages.positions_of(*id).map(|(position, _)| position);
-    // A neighbour beyond the horizon of the triangle's plane is as far away as that.
-    let bounded = |b: [f32; 3]| b.map(|v| v.clamp(-1e6, 1e6));
-    let [own, across, down] = quad.barycentrics(stages, *id).map(|b| blend(corners, bounded(b)));
-    // Large enough that no square vanishes.
-    let step = |p: [f32; 3], sign: f32| sub(p, own).map(|v| v * (4096.0 * sign));
-    let (dx, dy) = (step(across, quad.sign[0]), step(down, quad.sign[1]));
-    unit_or(cross(dy, dx), stages.plan.projection.to_viewer)
-}
-
 /// Base colour with straight alpha.
-fn base_color(surface: &SurfacePass<'_>, look: &ShadedMaterial, place: &Place<'_>, texel: [f32; 4]) -> [f32; 4] {
+fn base_color(surface: &SurfacePass<'_>, material: &ShadedMaterial, place: &Place<'_>, texel: [f32; 4]) -> [f32; 4] {
     let tint = match &surface.colors {
-        Some(colors) if look.flags & flags::VERTEX_COLORS != 0 => {
+        Some(colors) if material.flags & flags::VERTEX_COLORS != 0 => {
             blend(colors.triangles[place.id as usize].map(|i| colors.values[i as usize]), place.b.value)
         }
         _ => [1.0; 4],
     };
-    std::array::from_fn(|k| look.base_color[k] * tint[k] * texel[k])
-}
-
-/// A straight colour under light, as bright as can be shown.
-pub fn lit(base: [f32; 4], light: Light) -> [f32; 4] {
-    let [r, g, b] = [0, 1, 2].map(|k| (base[k] * light.gain + light.gloss).clamp(0.0, 1.0));
-    [r, g, b, base[3]]
+    std::array::from_fn(|k| material.base_color[k] * tint[k] * texel[k])
 }
 
 fn premultiplied(straight: [f32; 4], emissive: [f32; 3]) -> [f32; 4] {

@@ -1,24 +1,26 @@
-//! Stage 3, a pixel: the colour of each triangle that is seen there. Twin of `shaders/surface/shade.wgsl`.
+//! Stage shade, per pixel: the colour of each visible triangle. Twin of
+//! `shaders/surface/shade.wgsl`.
 //!
-//! Samples of a pixel that see the same triangle are shaded once, at their mean position ([`point`](super::point)), and
-//! weigh their share.
+//! Samples of a pixel that see the same triangle are shaded once, at their mean position
+//! ([`point`](super::point)), and weigh their share.
 
 use super::point::{PointShader, Show};
-use crate::backend::cpu::Stages;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
 use crate::backend::cpu::geometry::transform::recip;
 use crate::plan::sample_offsets;
 
-/// Shades every pixel of the band into `colors` (premultiplied linear RGBA, row by row, nothing behind it).
+/// Shades every pixel of the band into `colors` (premultiplied linear RGBA, row by row, nothing
+/// behind it).
 #[inline(always)]
-pub fn shade(stages: &Stages<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
-    for_samples!(band.samples, shade_sampled(stages, band, colors));
+pub fn shade(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
+    for_samples!(band.samples, shade_sampled(context, band, colors));
 }
 
 #[inline(always)]
-fn shade_sampled<const S: usize>(stages: &Stages<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
+fn shade_sampled<const S: usize>(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
     let width = band.size_px[0];
-    let mut shader = Shader::new(stages);
+    let mut shader = Shader::new(context);
     for y in band.shown[0]..band.shown[1] {
         let line = &mut colors[((y - band.shown[0]) * width) as usize..][..width as usize];
         for (x, color) in (0_u32..).zip(line) {
@@ -27,18 +29,18 @@ fn shade_sampled<const S: usize>(stages: &Stages<'_>, band: &SampleBand, colors:
     }
 }
 
-/// Finds out who is seen in a pixel, and where.
+/// Shades pixels of a band.
 pub struct Shader<'a> {
-    /// What it reads.
-    stages: &'a Stages<'a>,
-    /// Finds out what they look like.
+    /// Input of the stage.
+    context: &'a RasterContext<'a>,
+    /// Finds out what they material like.
     points: PointShader<'a>,
 }
 
 impl<'a> Shader<'a> {
     /// One for a band.
-    pub fn new(stages: &'a Stages<'a>) -> Self {
-        Self { stages, points: PointShader::new(stages) }
+    pub fn new(context: &'a RasterContext<'a>) -> Self {
+        Self { context, points: PointShader::new(context) }
     }
 
     #[inline(always)]
@@ -72,8 +74,8 @@ impl<'a> Shader<'a> {
         sum
     }
 
-    /// Shades each triangle among a pixel's samples once, at the mean position of its samples, and calls `each` with which
-    /// samples these are, and its colour.
+    /// Shades each triangle among a pixel's samples once, at the mean position of its samples, and
+    /// calls `each` with which samples these are, and its colour.
     #[inline(always)]
     pub fn groups<const S: usize>(
         &mut self,
@@ -84,7 +86,7 @@ impl<'a> Shader<'a> {
     ) {
         let offsets = sample_offsets(S as u32);
         for s in 0..S {
-            // Each triangle is shaded at the first of its samples; the others are done with.
+            // Each triangle is shaded once, at the first of its samples.
             if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {
                 continue;
             }
@@ -101,7 +103,8 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The colour of triangle `id` at the mean of `count` samples whose offsets in 1/256 px add up to `offset_sum`.
+    /// The colour of triangle `id` at the mean of `count` samples whose offsets in 1/256 px add up
+    /// to `offset_sum`.
     #[inline(always)]
     fn group(&mut self, id: u32, x: u32, y: u32, offset_sum: [i32; 2], count: i32) -> [f32; 4] {
         if id == NOTHING {
@@ -110,11 +113,11 @@ impl<'a> Shader<'a> {
         if let Some(color) = self.points.flat(id) {
             return color;
         }
-        let plan = self.stages.plan;
+        let plan = self.context.plan;
         let scale = recip(count as f32);
         let corner = [x as i32 * 256 - plan.width_px as i32 * 128, y as i32 * 256 - plan.height_px as i32 * 128];
         let at = [corner[0] as f32 + offset_sum[0] as f32 * scale, corner[1] as f32 + offset_sum[1] as f32 * scale];
-        match (self.stages.is_hull(id), &plan.surface, &plan.hull) {
+        match (self.context.is_hull(id), &plan.surface, &plan.hull) {
             (false, Some(surface), _) if surface.is_shaded => self.points.color(surface, id, at),
             (true, _, Some(hull)) => hull.color(id as usize),
             _ => [0.0; 4],

@@ -1,22 +1,23 @@
-//! Texture lookups. Twin of `shaders/surface/texture.wgsl`.
+//! Stage shade, per point: texture lookups. Twin of `shaders/surface/texture.wgsl`.
 //!
-//! The same bits on both back-ends, because texels decide what a mask leaves and where nearest texels change.
+//! The same bits on both back-ends, because texels decide what a mask leaves and where nearest
+//! texels change.
 
 use super::barycentric::Barycentrics;
-use crate::plan::{CornerValues, Texture, TextureUse, Textures};
+use crate::plan::{CornerValues, Texture, TextureUse, Textures, samplers};
 
-/// Coordinates beyond this have no fraction worth speaking of.
-const UV_MAX: f32 = 1_048_576.0;
+/// Largest coordinate: beyond it f32 has too few fractional bits.
+pub const UV_MAX: f32 = 1_048_576.0;
 
 /// Texture coordinates at a point, and how they change a pixel to the right and a pixel down.
 pub struct Uv {
-    /// There.
+    /// At the point.
     pub at: [f32; 2],
     d: [[f32; 2]; 2],
 }
 
 impl Uv {
-    /// Of triangle `id`.
+    /// The coordinates of triangle `id` at these barycentrics.
     pub fn new(uvs: &CornerValues<'_, [f32; 2]>, id: u32, b: &Barycentrics) -> Self {
         let corners = uvs.triangles[id as usize].map(|i| uvs.values[i as usize]);
         Self { at: blend(corners, b.value), d: b.derivatives().map(|d| blend(corners, d)) }
@@ -28,7 +29,8 @@ pub fn blend<const N: usize>([p, q, r]: [[f32; N]; 3], w: [f32; 3]) -> [f32; N] 
     std::array::from_fn(|k| (w[0] * p[k] + w[1] * q[k]) + w[2] * r[k])
 }
 
-/// Linear RGBA of a texture, trilinear; white where there is none ([`TEXTURE_NONE`](crate::plan::TEXTURE_NONE)).
+/// Linear RGBA of a texture, trilinear; white where there is none
+/// ([`TEXTURE_NONE`](crate::plan::TEXTURE_NONE)).
 pub fn sample(textures: &Textures, used: &TextureUse, uv: &Uv) -> [f32; 4] {
     let Some(image) = textures.images.get(used.texture as usize) else {
         return [1.0; 4];
@@ -43,7 +45,7 @@ pub fn sample(textures: &Textures, used: &TextureUse, uv: &Uv) -> [f32; 4] {
         texels[0] * texels[0] + texels[1] * texels[1]
     });
     let lod = half_log2(steps[0].max(steps[1])).min(image.levels as f32 - 1.0).max(image.first_level as f32);
-    if used.sampler & 16 != 0 {
+    if used.sampler & samplers::NEAREST != 0 {
         return nearest(textures, image, (lod + 0.5) as u32, at, used.sampler);
     }
     let level = lod as u32;
@@ -52,7 +54,7 @@ pub fn sample(textures: &Textures, used: &TextureUse, uv: &Uv) -> [f32; 4] {
     if share > 0.0 { mix(fine, bilinear(textures, image, level + 1, at, used.sampler), share) } else { fine }
 }
 
-/// Finite, and near enough to have a fraction.
+/// Clamps a coordinate to the range with fractional bits; NaN and infinity are 0.
 fn bounded(v: f32) -> f32 {
     if v.abs() <= 1e30 { v.clamp(-UV_MAX, UV_MAX) } else { 0.0 }
 }
@@ -69,7 +71,7 @@ fn bilinear(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], samp
     let (first, size) = level_of(image, level);
     let (mut low, mut high, mut share) = ([0; 2], [0; 2], [0.0; 2]);
     for k in 0..2 {
-        let wrap = sampler >> (2 * k) & 3;
+        let wrap = sampler >> (samplers::DOWN_SHIFT * k as u32) & samplers::WRAP_BITS;
         let s = wrapped(at[k], wrap) * size[k] as f32 - 0.5;
         let i = floor(s);
         share[k] = s - i as f32;
@@ -85,13 +87,13 @@ fn bilinear(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], samp
 fn nearest(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], sampler: u32) -> [f32; 4] {
     let (first, size) = level_of(image, level);
     let [x, y] = [0, 1].map(|k| {
-        let wrap = sampler >> (2 * k) & 3;
+        let wrap = sampler >> (samplers::DOWN_SHIFT * k as u32) & samplers::WRAP_BITS;
         texel_index(floor(wrapped(at[k], wrap) * size[k] as f32), size[k], wrap)
     });
     texel(textures, first + (y * size[0] + x) as u32)
 }
 
-/// Where a level starts and how large it is.
+/// First texel and size of a level.
 fn level_of(image: &Texture, level: u32) -> (u32, [i32; 2]) {
     let size = |level: u32| [image.width, image.height].map(|side| (side >> level).max(1));
     let level = level.min(image.levels.max(1) - 1);
@@ -102,15 +104,15 @@ fn level_of(image: &Texture, level: u32) -> (u32, [i32; 2]) {
 /// A coordinate in 0 to 1.
 fn wrapped(u: f32, wrap: u32) -> f32 {
     match wrap {
-        0 => u - floor(u) as f32,
-        1 => 1.0 - ((u - 2.0 * floor(0.5 * u) as f32) - 1.0).abs(),
+        samplers::REPEAT => u - floor(u) as f32,
+        samplers::MIRROR => 1.0 - ((u - 2.0 * floor(0.5 * u) as f32) - 1.0).abs(),
         _ => u.clamp(0.0, 1.0),
     }
 }
 
 /// A texel that may lie one beyond the edge.
 fn texel_index(i: i32, size: i32, wrap: u32) -> i32 {
-    if wrap == 0 {
+    if wrap == samplers::REPEAT {
         return if i < 0 {
             i + size
         } else if i >= size {

@@ -1,42 +1,44 @@
-//! Which buffers each kernel binds.
+//! Buffers that each kernel binds.
 
 use crate::backend::gpu::pipelines::Access;
 use crate::backend::gpu::pipelines::Access::{Read, ReadWrite};
-use crate::backend::gpu::pipelines::{Into, Slot, Stage};
+use crate::backend::gpu::pipelines::{Kernel, SampleTarget, Slot};
 
-/// A buffer of group 1, and what the kernel does with it.
+/// A buffer of group 1 and the kernel's access to it.
 pub type Binding = (Slot, Access);
 
-impl Stage {
+impl Kernel {
     /// The buffers of group 1 that the kernel declares.
     pub fn buffers(self) -> &'static [Binding] {
         match self {
             Self::Transform => TRANSFORM,
-            Self::Visibility { into: Into::Surface, .. } => VISIBILITY,
-            Self::Visibility { into: Into::Layer, .. } => VISIBILITY_OF_LAYER,
+            Self::Visibility { target: SampleTarget::Visibility, .. } => VISIBILITY,
+            Self::Visibility { target: SampleTarget::Layer, .. } => VISIBILITY_OF_LAYER,
             Self::Clip => CLIP,
-            Self::VisibilityTile { into: Into::Surface, .. } => TILE,
-            Self::VisibilityTile { into: Into::Layer, .. } => TILE_OF_LAYER,
-            Self::Layers => LAYERS,
+            Self::VisibilityTile { target: SampleTarget::Visibility, .. } => TILE,
+            Self::VisibilityTile { target: SampleTarget::Layer, .. } => TILE_OF_LAYER,
+            Self::Composite => COMPOSITE,
             Self::Shade => SHADE,
-            Self::Lines => LINES,
-            Self::Ink => INK,
+            Self::Edge => EDGE,
+            Self::Coverage => COVERAGE,
             Self::LineLight => LINE_LIGHT,
             Self::Resolve => RESOLVE,
         }
     }
 
-    /// The buffer that is bound at a slot's number: a kernel that looks for a layer writes it where others write samples, and
-    /// reads these where others find layers.
+    /// The buffer that is bound at a slot's number. Kernels that find a peeled layer write it where
+    /// others write the visibility buffer, and read that where others read the layer.
     pub fn bound_at(self, slot: Slot) -> Slot {
         match (self, slot) {
-            (Self::Visibility { into: Into::Layer, .. } | Self::VisibilityTile { into: Into::Layer, .. }, slot) => {
-                match slot {
-                    Slot::Samples => Slot::Layer,
-                    Slot::Layer => Slot::Samples,
-                    slot => slot,
-                }
-            }
+            (
+                Self::Visibility { target: SampleTarget::Layer, .. }
+                | Self::VisibilityTile { target: SampleTarget::Layer, .. },
+                slot,
+            ) => match slot {
+                Slot::Samples => Slot::PeelLayer,
+                Slot::PeelLayer => Slot::Samples,
+                slot => slot,
+            },
             _ => slot,
         }
     }
@@ -46,39 +48,39 @@ const TRANSFORM: &[Binding] = &[(Slot::Positions, Read), (Slot::Vertices, ReadWr
 
 const VISIBILITY: &[Binding] = &[
     (Slot::Triangles, Read),
-    (Slot::Roles, Read),
+    (Slot::PassMasks, Read),
     (Slot::Vertices, Read),
     (Slot::Samples, ReadWrite),
     (Slot::Work, ReadWrite),
-    (Slot::Rounds, Read),
+    (Slot::PeelRounds, Read),
 ];
 
 const VISIBILITY_OF_LAYER: &[Binding] = &[
     (Slot::Triangles, Read),
-    (Slot::Roles, Read),
+    (Slot::PassMasks, Read),
     (Slot::Vertices, Read),
     (Slot::Samples, ReadWrite),
     (Slot::Work, ReadWrite),
-    (Slot::Rounds, Read),
-    (Slot::Layer, Read),
-    (Slot::Layered, Read),
+    (Slot::PeelRounds, Read),
+    (Slot::PeelLayer, Read),
+    (Slot::PeelState, Read),
 ];
 
 const CLIP: &[Binding] = &[
     (Slot::Positions, Read),
     (Slot::Triangles, Read),
-    (Slot::Roles, Read),
+    (Slot::PassMasks, Read),
     (Slot::Vertices, Read),
     (Slot::Work, ReadWrite),
-    (Slot::Rounds, Read),
+    (Slot::PeelRounds, Read),
 ];
 
 const TILE: &[Binding] = &[(Slot::Samples, ReadWrite), (Slot::Work, Read)];
 
 const TILE_OF_LAYER: &[Binding] =
-    &[(Slot::Samples, ReadWrite), (Slot::Work, Read), (Slot::Layer, Read), (Slot::Layered, Read)];
+    &[(Slot::Samples, ReadWrite), (Slot::Work, Read), (Slot::PeelLayer, Read), (Slot::PeelState, Read)];
 
-const LAYERS: &[Binding] = &[
+const COMPOSITE: &[Binding] = &[
     (Slot::Positions, Read),
     (Slot::Triangles, Read),
     (Slot::Vertices, Read),
@@ -90,11 +92,11 @@ const LAYERS: &[Binding] = &[
     (Slot::Uvs, Read),
     (Slot::VertexColors, Read),
     (Slot::Texels, Read),
-    (Slot::Roles, Read),
-    (Slot::HullLooks, Read),
-    (Slot::Layer, Read),
-    (Slot::Layered, ReadWrite),
-    (Slot::Rounds, ReadWrite),
+    (Slot::PassMasks, Read),
+    (Slot::HullMaterials, Read),
+    (Slot::PeelLayer, Read),
+    (Slot::PeelState, ReadWrite),
+    (Slot::PeelRounds, ReadWrite),
 ];
 
 const SHADE: &[Binding] = &[
@@ -107,16 +109,16 @@ const SHADE: &[Binding] = &[
     (Slot::Attributes, Read),
     (Slot::Materials, Read),
     (Slot::FaceNormals, Read),
-    (Slot::Roles, Read),
-    (Slot::HullLooks, Read),
-    (Slot::Layered, Read),
+    (Slot::PassMasks, Read),
+    (Slot::HullMaterials, Read),
+    (Slot::PeelState, Read),
     (Slot::Uvs, Read),
     (Slot::VertexColors, Read),
     (Slot::Texels, Read),
     (Slot::Colors, ReadWrite),
 ];
 
-const LINES: &[Binding] = &[
+const EDGE: &[Binding] = &[
     (Slot::Positions, Read),
     (Slot::Triangles, Read),
     (Slot::Vertices, Read),
@@ -127,13 +129,13 @@ const LINES: &[Binding] = &[
     (Slot::Progress, ReadWrite),
 ];
 
-const INK: &[Binding] = &[
+const COVERAGE: &[Binding] = &[
     (Slot::Samples, Read),
     (Slot::Colors, ReadWrite),
     (Slot::Strokes, ReadWrite),
     (Slot::LineColors, Read),
-    (Slot::Layered, Read),
-    (Slot::Cells, Read),
+    (Slot::PeelState, Read),
+    (Slot::SampleMasks, Read),
 ];
 
 const LINE_LIGHT: &[Binding] = &[

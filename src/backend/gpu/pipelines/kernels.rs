@@ -1,13 +1,13 @@
-//! What each kernel is made of: its source, and what of a plan it is specialised to.
+//! Source of each kernel, and the bits of the pipeline key that it is specialised by.
 
 use crate::backend::gpu::pipelines::key;
-use crate::backend::gpu::pipelines::{Into, Stage, Write};
-use crate::backend::gpu::schedule::sizes::STROKES_BYTES;
+use crate::backend::gpu::pipelines::{Kernel, SampleTarget, SampleWrite};
 
 const COMMON: &str = include_str!("../../../../shaders/common.wgsl");
 const CONTOUR: &str = include_str!("../../../../shaders/lines/contour.wgsl");
-const HIDING: &str = include_str!("../../../../shaders/lines/hidden_lines.wgsl");
+const HIDDEN_LINES: &str = include_str!("../../../../shaders/lines/hidden_lines.wgsl");
 const SEGMENT: &str = include_str!("../../../../shaders/lines/segment.wgsl");
+const STROKE_WORDS: &str = include_str!("../../../../shaders/lines/stroke_words.wgsl");
 const STROKE: &str = include_str!("../../../../shaders/lines/stroke.wgsl");
 const PLANES: &str = include_str!("../../../../shaders/geometry/planes.wgsl");
 const WORK: &str = include_str!("../../../../shaders/geometry/work.wgsl");
@@ -15,34 +15,35 @@ const TRIANGLE: &str = include_str!("../../../../shaders/geometry/triangle.wgsl"
 const SAMPLES_32: &str = include_str!("../../../../shaders/geometry/samples32.wgsl");
 const SAMPLES_64: &str = include_str!("../../../../shaders/geometry/samples64.wgsl");
 const SAMPLES: &str = include_str!("../../../../shaders/geometry/samples.wgsl");
-const LAYERED: &str = include_str!("../../../../shaders/peeling/state.wgsl");
+const PEEL_STATE: &str = include_str!("../../../../shaders/peeling/state.wgsl");
 const EMIT: &str = include_str!("../../../../shaders/geometry/emit.wgsl");
 const EMIT_LAYER: &str = include_str!("../../../../shaders/peeling/emit_layer.wgsl");
 const OVER: &str = include_str!("../../../../shaders/over.wgsl");
 const GROUP: &str = include_str!("../../../../shaders/surface/group.wgsl");
 
-/// What shade, layers and line_light have in common: from where a point lies to its colour.
+/// Shared by shade, composite and line_light: from a point's position to its colour.
 const SHADE: &[&str] = &[
     include_str!("../../../../shaders/surface/barycentric.wgsl"),
     include_str!("../../../../shaders/surface/texture.wgsl"),
     include_str!("../../../../shaders/surface/light.wgsl"),
     include_str!("../../../../shaders/surface/wire.wgsl"),
+    include_str!("../../../../shaders/surface/normal.wgsl"),
     include_str!("../../../../shaders/surface/debug.wgsl"),
     include_str!("../../../../shaders/surface/point.wgsl"),
 ];
 
-impl Stage {
+impl Kernel {
     /// Name of the entry point, and of the file in shaders/.
     pub fn entry(self) -> &'static str {
         match self {
             Self::Transform => "transform",
             Self::Visibility { .. } => "visibility",
             Self::Clip => "clip",
-            Self::Layers => "layers",
+            Self::Composite => "composite",
             Self::VisibilityTile { .. } => "visibility_tile",
             Self::Shade => "shade",
-            Self::Lines => "lines",
-            Self::Ink => "ink",
+            Self::Edge => "edge",
+            Self::Coverage => "coverage",
             Self::LineLight => "line_light",
             Self::Resolve => "resolve",
         }
@@ -50,52 +51,57 @@ impl Stage {
 
     /// WGSL has no include: a kernel is its files, one after the other.
     pub fn source(self) -> String {
-        let keep_nearest = |write: Write| if write == Write::Both { SAMPLES_64 } else { SAMPLES_32 };
-        let emit = |into: Into| match into {
-            Into::Surface => EMIT.to_owned(),
-            Into::Layer => [LAYERED, EMIT_LAYER].concat(),
+        let keep_nearest = |write: SampleWrite| if write == SampleWrite::Both { SAMPLES_64 } else { SAMPLES_32 };
+        let emit = |target: SampleTarget| match target {
+            SampleTarget::Visibility => EMIT.to_owned(),
+            SampleTarget::Layer => [PEEL_STATE, EMIT_LAYER].concat(),
         };
         match self {
             Self::Transform => [COMMON, include_str!("../../../../shaders/geometry/transform.wgsl")].concat(),
-            Self::Visibility { write, into } => {
+            Self::Visibility { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility.wgsl");
-                [COMMON, TRIANGLE, WORK, SAMPLES, keep_nearest(write), &emit(into), kernel].concat()
+                [COMMON, TRIANGLE, WORK, SAMPLES, keep_nearest(write), &emit(target), kernel].concat()
             }
             Self::Clip => {
                 [COMMON, TRIANGLE, WORK, PLANES, include_str!("../../../../shaders/geometry/clip.wgsl")].concat()
             }
-            Self::VisibilityTile { write, into } => {
+            Self::VisibilityTile { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility_tile.wgsl");
-                [COMMON, TRIANGLE, SAMPLES, keep_nearest(write), &emit(into), kernel].concat()
+                [COMMON, TRIANGLE, SAMPLES, keep_nearest(write), &emit(target), kernel].concat()
             }
-            Self::Layers => [
+            Self::Composite => [
                 &[COMMON, TRIANGLE],
                 SHADE,
-                &[GROUP, LAYERED, include_str!("../../../../shaders/peeling/composite.wgsl")],
+                &[GROUP, PEEL_STATE, include_str!("../../../../shaders/peeling/composite.wgsl")],
             ]
             .concat()
             .concat(),
-            Self::Shade => {
-                [&[COMMON, TRIANGLE], SHADE, &[GROUP, LAYERED, include_str!("../../../../shaders/surface/shade.wgsl")]]
-                    .concat()
-                    .concat()
-            }
+            Self::Shade => [
+                &[COMMON, TRIANGLE],
+                SHADE,
+                &[GROUP, PEEL_STATE, include_str!("../../../../shaders/surface/shade.wgsl")],
+            ]
+            .concat()
+            .concat(),
             Self::LineLight => {
                 [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../../shaders/lines/line_light.wgsl")]]
                     .concat()
                     .concat()
             }
-            Self::Lines => {
+            Self::Edge => {
                 let kernel = include_str!("../../../../shaders/lines/edge.wgsl");
-                [COMMON, TRIANGLE, PLANES, CONTOUR, SEGMENT, HIDING, STROKE, kernel].concat()
+                [COMMON, TRIANGLE, PLANES, CONTOUR, SEGMENT, HIDDEN_LINES, STROKE_WORDS, STROKE, kernel].concat()
             }
-            Self::Ink => [COMMON, OVER, LAYERED, include_str!("../../../../shaders/lines/coverage.wgsl")].concat(),
+            Self::Coverage => {
+                [COMMON, OVER, STROKE_WORDS, PEEL_STATE, include_str!("../../../../shaders/lines/coverage.wgsl")]
+                    .concat()
+            }
             Self::Resolve => [COMMON, OVER, include_str!("../../../../shaders/resolve.wgsl")].concat(),
         }
     }
 
-    /// The flags that the kernel reads; there is a pipeline for every combination that a plan asks for.
-    pub fn looks(self) -> u32 {
+    /// Bits of the key that the kernel reads: there is a pipeline for every combination in use.
+    pub fn key_bits(self) -> u32 {
         const NORMALS: u32 = key::FACE_NORMALS | key::VERTEX_NORMALS | key::DERIVATIVE_NORMALS;
         const WIRES: u32 = key::WIRES | key::WIRE_MINIMUM | key::WIRE_LIT | key::EDGE_MASKS;
         const PAINT: u32 = key::VERTEX_COLORS | key::UVS | key::TEXTURES | key::DEBUG | key::VARYING;
@@ -106,36 +112,38 @@ impl Stage {
             | PAINT
             | key::CLIPPED
             | key::SAMPLES
-            | key::HULL_LOOKS
+            | key::HULL_MATERIALS
             | key::WIRES_ONLY;
         match self {
             Self::Transform => 0,
-            Self::Clip => key::ROLES | key::LAYERS,
-            Self::Visibility { into: Into::Surface, .. } => key::SAMPLES | key::ROLES,
-            Self::Visibility { into: Into::Layer, .. } => key::SAMPLES | key::ROLES | key::LAYERS | key::BEHIND_SURFACE,
-            Self::VisibilityTile { into: Into::Surface, .. } => key::SAMPLES,
-            Self::VisibilityTile { into: Into::Layer, .. } => key::SAMPLES | key::BEHIND_SURFACE,
-            Self::Layers => SHADED | key::LAYERED_HULL,
-            Self::Shade => SHADED | key::LAYERS,
+            Self::Clip => key::PASS_MASKS | key::PEELING,
+            Self::Visibility { target: SampleTarget::Visibility, .. } => key::SAMPLES | key::PASS_MASKS,
+            Self::Visibility { target: SampleTarget::Layer, .. } => {
+                key::SAMPLES | key::PASS_MASKS | key::PEELING | key::BEHIND_SURFACE
+            }
+            Self::VisibilityTile { target: SampleTarget::Visibility, .. } => key::SAMPLES,
+            Self::VisibilityTile { target: SampleTarget::Layer, .. } => key::SAMPLES | key::BEHIND_SURFACE,
+            Self::Composite => SHADED | key::PEELED_HULL,
+            Self::Shade => SHADED | key::PEELING,
             Self::LineLight => SHADED,
-            Self::Ink => key::SURFACE | key::HULL | key::LAYERS | key::SAMPLES,
-            Self::Lines => key::CONTOURS | key::CLIPPED | key::SAMPLES,
+            Self::Coverage => key::SURFACE | key::HULL | key::PEELING | key::SAMPLES,
+            Self::Edge => key::CONTOURS | key::CLIPPED | key::SAMPLES,
             Self::Resolve => key::SURFACE | key::HULL | key::LINES,
         }
     }
 
     /// Values of the kernel's `override` constants.
-    pub fn constants(self, look: u32) -> Vec<(&'static str, f64)> {
-        let look = ("LOOK", f64::from(look));
+    pub fn constants(self, key: u32) -> Vec<(&'static str, f64)> {
+        let key = ("PIPELINE_KEY", f64::from(key));
         match self {
-            Self::Visibility { write: Write::Depth, .. } | Self::VisibilityTile { write: Write::Depth, .. } => {
-                vec![look, ("PHASE", 0.0)]
+            Self::Visibility { write: SampleWrite::Depth, .. }
+            | Self::VisibilityTile { write: SampleWrite::Depth, .. } => {
+                vec![key, ("PHASE", 0.0)]
             }
-            Self::Visibility { write: Write::Id, .. } | Self::VisibilityTile { write: Write::Id, .. } => {
-                vec![look, ("PHASE", 1.0)]
+            Self::Visibility { write: SampleWrite::Id, .. } | Self::VisibilityTile { write: SampleWrite::Id, .. } => {
+                vec![key, ("PHASE", 1.0)]
             }
-            Self::Lines | Self::Ink => vec![look, ("STROKE_WORDS", (STROKES_BYTES / 4) as f64)],
-            _ => vec![look],
+            _ => vec![key],
         }
     }
 }

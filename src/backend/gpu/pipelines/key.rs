@@ -1,60 +1,91 @@
-//! What a plan has: the shaders' `LOOK`, a constant of each pipeline, so that a kernel contains only what its plan needs.
+//! The pipeline key: the features of a plan as bits.
+//!
+//! It is the constant `PIPELINE_KEY` of each pipeline, so that a kernel contains only the code that
+//! its plan needs.
 
 use crate::plan::{DrawPlan, SurfacePass, flags};
 
+/// A shaded surface.
 pub const SURFACE: u32 = 1;
+/// An outline mesh.
 pub const HULL: u32 = 2;
+/// A material lit by face normals.
 pub const FACE_NORMALS: u32 = 8;
+/// A material lit by vertex normals.
 pub const VERTEX_NORMALS: u32 = 16;
+/// A material with barycentric wires.
 pub const WIRES: u32 = 32;
+/// A material index per triangle.
 pub const TRIANGLE_MATERIALS: u32 = 64;
+/// An edge mask per triangle.
 pub const EDGE_MASKS: u32 = 128;
+/// Line passes.
 pub const LINES: u32 = 256;
+/// Triangles may need clipping.
 pub const CLIPPED: u32 = 2048;
+/// 8 samples per pixel.
 pub const EIGHT_SAMPLES: u32 = 512;
+/// 16 samples per pixel.
 pub const SIXTEEN_SAMPLES: u32 = 1024;
+/// 4 samples per pixel; without any of the three it is 1.
 pub const FOUR_SAMPLES: u32 = 4096;
-/// How many samples a pixel has.
+/// Number of samples per pixel.
 pub const SAMPLES: u32 = FOUR_SAMPLES | EIGHT_SAMPLES | SIXTEEN_SAMPLES;
+/// A line pass is lit.
 pub const LIT_LINES: u32 = 8192;
+/// A line pass is a contour.
 pub const CONTOURS: u32 = 16384;
-pub const ROLES: u32 = 0x10_0000;
-pub const HULL_LOOKS: u32 = 0x40_0000;
-pub const LAYERS: u32 = 0x80_0000;
+/// A pass mask per triangle.
+pub const PASS_MASKS: u32 = 0x10_0000;
+/// A material index per triangle of the outline mesh.
+pub const HULL_MATERIALS: u32 = 0x40_0000;
+/// Depth peeling.
+pub const PEELING: u32 = 0x80_0000;
+/// Peeled layers behind the surface show too.
 pub const BEHIND_SURFACE: u32 = 0x100_0000;
+/// Peeled layers show wires alone.
 pub const WIRES_ONLY: u32 = 0x200_0000;
-pub const LAYERED_HULL: u32 = 0x400_0000;
+/// The outline mesh is peeled too.
+pub const PEELED_HULL: u32 = 0x400_0000;
+/// A material lit by derivatives.
 pub const DERIVATIVE_NORMALS: u32 = 1 << 16;
+/// Vertex colours.
 pub const VERTEX_COLORS: u32 = 1 << 17;
+/// Texture coordinates.
 pub const UVS: u32 = 1 << 18;
+/// Textures.
 pub const TEXTURES: u32 = 1 << 19;
+/// Wires by the smallest coordinate.
 pub const WIRE_MINIMUM: u32 = 0x800_0000;
+/// Wires under the light.
 pub const WIRE_LIT: u32 = 0x1000_0000;
+/// A debug view.
 pub const DEBUG: u32 = 0x2000_0000;
+/// Colours vary over a triangle.
 pub const VARYING: u32 = 0x4000_0000;
 
-/// The flags of a plan.
-pub fn look(plan: &DrawPlan<'_>) -> u32 {
+/// The key of a plan.
+pub fn pipeline_key(plan: &DrawPlan<'_>) -> u32 {
     let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
     let count = plan.triangles.len();
-    let mut look = when(plan.projection.clip, CLIPPED) | samples(plan.samples);
+    let mut key = when(plan.projection.clip, CLIPPED) | samples(plan.samples);
     if let Some(surface) = &plan.surface {
         let all = surface.all_flags();
-        look |= when(surface.is_shaded, SURFACE) | when(surface.triangle_materials.len() == count, TRIANGLE_MATERIALS);
-        look |= when(all & flags::FACE_NORMALS != 0, FACE_NORMALS);
-        look |= when(all & flags::VERTEX_NORMALS != 0, VERTEX_NORMALS);
-        look |= varying(surface, all);
-        look |= when(all & flags::WIRES != 0, WIRES) | when(surface.edge_masks.len() == count, EDGE_MASKS);
+        key |= when(surface.is_shaded, SURFACE) | when(surface.triangle_materials.len() == count, TRIANGLE_MATERIALS);
+        key |= when(all & flags::FACE_NORMALS != 0, FACE_NORMALS);
+        key |= when(all & flags::VERTEX_NORMALS != 0, VERTEX_NORMALS);
+        key |= varying(surface, all);
+        key |= when(all & flags::WIRES != 0, WIRES) | when(surface.edge_masks.len() == count, EDGE_MASKS);
     }
     if let Some(hull) = &plan.hull {
-        look |= HULL | when(!hull.triangle_materials.is_empty(), HULL_LOOKS);
-        look |= when(plan.has_peeled_hull(), LAYERED_HULL);
+        key |= HULL | when(!hull.triangle_materials.is_empty(), HULL_MATERIALS);
+        key |= when(plan.has_peeled_hull(), PEELED_HULL);
     }
-    look |= when(plan.pass_masks.len() == count && count > 0, ROLES);
+    key |= when(plan.pass_masks.len() == count && count > 0, PASS_MASKS);
     if let Some(layers) = plan.peeling() {
-        look |= LAYERS | when(layers.behind_surface, BEHIND_SURFACE) | when(layers.wires_only, WIRES_ONLY);
+        key |= PEELING | when(layers.behind_surface, BEHIND_SURFACE) | when(layers.wires_only, WIRES_ONLY);
     }
-    look | when(!plan.lines.is_empty(), LINES)
+    key | when(!plan.lines.is_empty(), LINES)
         | when(plan.lines.iter().any(|lines| lines.contour), CONTOURS)
         | when(plan.lights_lines(), LIT_LINES)
 }
@@ -68,7 +99,7 @@ fn samples(count: u32) -> u32 {
     }
 }
 
-/// What changes over a triangle.
+/// Bits for colours that vary over a triangle.
 fn varying(surface: &SurfacePass<'_>, all: u32) -> u32 {
     let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
     let is_textured = (0..4).any(|slot| surface.samples(slot)) && surface.uvs.is_some();
@@ -82,48 +113,4 @@ fn varying(surface: &SurfacePass<'_>, all: u32) -> u32 {
         | when(all & flags::WIRE_LIT != 0, WIRE_LIT)
         | when(all & flags::DEBUG != 0, DEBUG)
         | when(all & varies != 0 || is_textured, VARYING)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn flags_are_those_of_the_shader() {
-        let shader = include_str!("../../../../shaders/common.wgsl");
-        let all = [
-            ("SURFACE", SURFACE),
-            ("HULL", HULL),
-            ("FACE_NORMALS", FACE_NORMALS),
-            ("VERTEX_NORMALS", VERTEX_NORMALS),
-            ("WIRES", WIRES),
-            ("TRIANGLE_MATERIALS", TRIANGLE_MATERIALS),
-            ("EDGE_MASKS", EDGE_MASKS),
-            ("LINES", LINES),
-            ("CLIPPED", CLIPPED),
-            ("EIGHT_SAMPLES", EIGHT_SAMPLES),
-            ("SIXTEEN_SAMPLES", SIXTEEN_SAMPLES),
-            ("FOUR_SAMPLES", FOUR_SAMPLES),
-            ("LIT_LINES", LIT_LINES),
-            ("CONTOURS", CONTOURS),
-            ("ROLES", ROLES),
-            ("HULL_LOOKS", HULL_LOOKS),
-            ("LAYERS", LAYERS),
-            ("BEHIND_SURFACE", BEHIND_SURFACE),
-            ("WIRES_ONLY", WIRES_ONLY),
-            ("LAYERED_HULL", LAYERED_HULL),
-            ("DERIVATIVE_NORMALS", DERIVATIVE_NORMALS),
-            ("VERTEX_COLORS", VERTEX_COLORS),
-            ("UVS", UVS),
-            ("TEXTURES", TEXTURES),
-            ("WIRE_MINIMUM", WIRE_MINIMUM),
-            ("WIRE_LIT", WIRE_LIT),
-            ("DEBUG", DEBUG),
-            ("VARYING", VARYING),
-        ];
-        for (name, value) in all {
-            let ways = [format!("const {name}: u32 = {value}u;"), format!("const {name}: u32 = {value:#X}u;")];
-            assert!(ways.iter().any(|way| shader.contains(&way.replace("0X", "0x"))), "{name}");
-        }
-    }
 }

@@ -8,42 +8,42 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// A kernel, in one of its variants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Stage {
+pub enum Kernel {
     /// Vertices to the screen.
     Transform,
     /// Triangles to samples: small ones, and a list of the large ones.
     Visibility {
-        /// How samples are written.
-        write: Write,
-        /// Where to.
-        into: Into,
+        /// Phase of writing samples.
+        write: SampleWrite,
+        /// Buffer that is written.
+        target: SampleTarget,
     },
-    /// What is left of triangles behind the eye, to the same list.
+    /// Clipped triangles to the same list.
     Clip,
     /// Large triangles to samples.
     VisibilityTile {
         /// As above.
-        write: Write,
+        write: SampleWrite,
         /// As above.
-        into: Into,
+        target: SampleTarget,
     },
-    /// A layer's samples to colours, under those of the layers before it.
-    Layers,
+    /// Samples of a peeled layer to colours, under the layers in front of it.
+    Composite,
     /// Samples to colours.
     Shade,
     /// Edges to strokes.
-    Lines,
-    /// Unites the strokes of a line pass in each pixel, and lays them over the colours.
-    Ink,
+    Edge,
+    /// Unites the strokes of a line pass in each pixel and composites them over the colours.
+    Coverage,
     /// Samples to the light on a line pass.
     LineLight,
     /// Colours to bytes.
     Resolve,
 }
 
-/// How a visibility kernel writes samples.
+/// Phase of a visibility kernel: with 64-bit atomics one, otherwise two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Write {
+pub enum SampleWrite {
     /// Depth and id in one 64-bit maximum.
     Both,
     /// The maximum of the depths.
@@ -52,12 +52,12 @@ pub enum Write {
     Id,
 }
 
-/// What a visibility kernel's samples are.
+/// Buffer that a visibility kernel writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Into {
+pub enum SampleTarget {
     /// The visibility buffer.
-    Surface,
-    /// A layer.
+    Visibility,
+    /// A peeled layer.
     Layer,
 }
 
@@ -86,18 +86,18 @@ pub enum Slot {
     VertexColors,
     Texels,
     Progress,
-    Roles = 24,
-    HullLooks,
-    Layer,
-    Layered,
-    Rounds,
-    Cells,
+    PassMasks = 24,
+    HullMaterials,
+    PeelLayer,
+    PeelState,
+    PeelRounds,
+    SampleMasks,
 }
 
 /// Number of [`Slot`]s.
 pub const SLOTS: usize = 30;
 
-/// Whether a kernel writes to a buffer.
+/// A kernel's access to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     Read,
@@ -112,26 +112,27 @@ pub struct Pipeline {
 
 /// All pipelines of a device so far.
 #[derive(Default)]
-pub struct Stages {
-    made: Mutex<HashMap<(Stage, u32), Arc<Pipeline>>>,
+pub struct PipelineCache {
+    made: Mutex<HashMap<(Kernel, u32), Arc<Pipeline>>>,
 }
 
-impl Stages {
-    /// The pipeline of a stage for a plan of this look.
-    pub fn get(&self, device: &wgpu::Device, stage: Stage, look: u32) -> Arc<Pipeline> {
-        let look = look & stage.looks();
-        // Held while compiling: two workers that begin together want the same pipelines.
+impl PipelineCache {
+    /// The pipeline of a kernel for a plan with this key.
+    pub fn get(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Arc<Pipeline> {
+        let key = key & kernel.key_bits();
+        // The lock is held while compiling, because workers that start together need the same
+        // pipelines.
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        made.entry((stage, look)).or_insert_with(|| Arc::new(stage.compile(device, look))).clone()
+        made.entry((kernel, key)).or_insert_with(|| Arc::new(kernel.compile(device, key))).clone()
     }
 
-    /// Forgets all pipelines; jobs that use one keep it until they are done.
+    /// Drops all pipelines; jobs that use one keep it until they end.
     pub fn clear(&self) {
         self.made.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
 }
 
-/// The layout of group 0: the plan's numbers, and at a dynamic offset the dispatch's.
+/// The layout of group 0: the plan's uniforms, and the dispatch's at a dynamic offset.
 pub fn uniforms_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let entry = |binding, has_dynamic_offset| {
         layout_entry(
@@ -151,8 +152,8 @@ fn layout_entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEnt
     wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
 }
 
-impl Stage {
-    fn compile(self, device: &wgpu::Device, look: u32) -> Pipeline {
+impl Kernel {
+    fn compile(self, device: &wgpu::Device, key: u32) -> Pipeline {
         let label = Some(self.entry());
         let source = wgpu::ShaderSource::Wgsl(self.source().into());
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
@@ -169,7 +170,7 @@ impl Stage {
             module: &module,
             entry_point: label,
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &self.constants(look),
+                constants: &self.constants(key),
                 // The kernels write their workgroup memory before they read it.
                 zero_initialize_workgroup_memory: false,
             },

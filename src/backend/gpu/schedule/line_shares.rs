@@ -1,21 +1,22 @@
-//! How lines are dealt out to threads: edges to workgroups, and of each window of an edge so many slices; and after how much work a
-//! dispatch ends.
+//! Distribution of lines over threads: edges per workgroup, slices per window of an edge, and work
+//! per dispatch.
 
 use super::sizes::{DeviceTraits, has_visibility};
 use super::step::Step;
 use crate::backend::DrawError;
-use crate::backend::gpu::params::{Batch, FIRST_PASS, line_flags};
-use crate::backend::gpu::pipelines::Stage;
+use crate::backend::gpu::params::{Batch, line_flags};
+use crate::backend::gpu::pipelines::Kernel;
 use crate::backend::gpu::schedule::{Schedule, WORKGROUP};
 use crate::plan::{DrawPlan, LinePass};
 
-/// Edges a dispatch.
+/// Edges per dispatch.
 const EDGE_CHUNK: u32 = 1 << 20;
 
 /// The same where each may cross a large picture.
 const EDGE_CHUNK_LONG: u32 = 1 << 17;
 
-/// Looks at samples that a dispatch may take at most, if it is not known how long its edges are: a second or so of work.
+/// Samples that a dispatch may read at most, if the length of its edges is not known: a second or
+/// so of work.
 const BLIND_LOOKS_MAX: u64 = 1 << 34;
 
 /// Edges that keep all of a GPU busy.
@@ -28,8 +29,8 @@ const BUSY_GROUPS_SOFTWARE: u32 = 16;
 /// Slices of a window, at most.
 const SLICES_MAX: f32 = 64.0;
 
-/// Loop iterations that a thread may run in a dispatch where they are limited: llvmpipe (Mesa 22) leaves all loops of a thread
-/// after 65,535 iterations, silently.
+/// Loop iterations that a thread may run in a dispatch where they are limited: llvmpipe (Mesa 22)
+/// leaves all loops of a thread after 65,535 iterations, silently.
 const ITERATIONS_MAX: u32 = 60_000;
 
 /// The same on a real device, where a dispatch should end in time for the deadline.
@@ -38,30 +39,40 @@ const ITERATIONS_MAX_HARDWARE: u32 = 1 << 24;
 /// Lines from this reach on may take long on a real device too, pixels.
 const WIDE_PX: f32 = 8.0;
 
-/// Threads that run in step on a processor: while one of them is in a loop, the others wait in it, and it counts for all.
+/// Threads that run in step on a processor: while one of them is in a loop, the others wait in it,
+/// and it counts for all.
 const LANES: u32 = 16;
 
 /// Units of work without end.
-const NO_LIMIT: u32 = u32::MAX;
+pub const NO_LIMIT: u32 = u32::MAX;
 
-/// How the kernel that draws lines is run over a pass's edges.
+/// Bytes before what paused threads remember: how many there are.
+pub const PROGRESS_HEAD_BYTES: u64 = 4;
+
+/// Bytes of what a paused thread remembers.
+pub const PAUSED_BYTES: u64 = 16;
+
+/// Parameters of the edge kernel for a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineShares {
-    /// Threads that share a window of an edge, by rows, where the line is so wide that it has many pixels.
+    /// Threads that share a window of an edge, by rows, where the line is so wide that it has many
+    /// pixels.
     pub slices: u32,
     /// Edges that the threads of a workgroup share.
     pub edges_per_group: u32,
-    /// Edges a dispatch, at most.
+    /// Edges per dispatch, at most.
     pub edges: u32,
-    /// Looks along an edge, each with what it has found to draw, and shares without a look, after which a thread pauses until the next round.
+    /// Looks along an edge, each with what it has found to draw, and shares without a look, after
+    /// which a thread pauses until the next round.
     pub units: u32,
 }
 
 impl LineShares {
-    /// Of a pass of the plan.
+    /// The parameters of a pass of the plan.
     pub fn new(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> Self {
         let side = lines.window_px() + 2.0 * lines.reach_px();
-        // Few edges leave most of a GPU idle, so threads may look along them twice; a processor has nothing to spare.
+        // Few edges leave most of a GPU idle, so threads may look along them twice; a processor has
+        // nothing to spare.
         let is_idle = !device.loops_are_limited && lines.edges.len() < BUSY_EDGES;
         let pixels = if is_idle { 64.0 } else { 400.0 };
         let slices = (side * 2.0 * lines.reach_px() / pixels).ceil().clamp(1.0, SLICES_MAX) as u32;
@@ -79,27 +90,28 @@ impl LineShares {
     /// Bytes of what paused threads remember.
     pub fn progress_bytes(&self) -> u64 {
         let threads = self.edges.div_ceil(self.edges_per_group) * WORKGROUP;
-        if self.units == NO_LIMIT { 0 } else { 4 + 16 * u64::from(threads) }
+        if self.units == NO_LIMIT { 0 } else { PROGRESS_HEAD_BYTES + PAUSED_BYTES * u64::from(threads) }
     }
 }
 
 fn edges_a_dispatch(plan: &DrawPlan<'_>, lines: &LinePass) -> u32 {
     // Half a pixel a step, the samples of up to three pixels in each.
     let longest = 2 * u64::from(plan.width_px + plan.height_px) * 3 * u64::from(plan.samples);
-    let looks = longest.saturating_mul(lines.edges.len() as u64);
-    let most = if looks > BLIND_LOOKS_MAX { EDGE_CHUNK_LONG } else { EDGE_CHUNK };
+    let key_bits = longest.saturating_mul(lines.edges.len() as u64);
+    let most = if key_bits > BLIND_LOOKS_MAX { EDGE_CHUNK_LONG } else { EDGE_CHUNK };
     lines.edges.len().min(most as usize) as u32
 }
 
-/// Loop iterations that one unit of work takes at most: a window is begun, looked along, and a part of the edge drawn.
+/// Loop iterations that one unit of work takes at most: a window is begun, looked along, and a part
+/// of the edge drawn.
 fn unit_iterations(samples: u32, lines: &LinePass, slices: u32) -> u32 {
     let length = lines.window_px() + 2.0 * lines.reach_px() + 4.0;
     // Half a pixel a step; its samples when it is begun, then those of three pixels side by side.
     let steps = (2.0 * length) as u32 + 2;
-    let look = steps * (1 + samples) + steps * (1 + 3 * samples);
+    let key = steps * (1 + samples) + steps * (1 + 3 * samples);
     let pixels = ((length as u32).div_ceil(slices) + 1) * (length as u32 + 1);
     // Each is found, while the others wait, and has eight words of its mask filled by halves.
-    look + pixels * (LANES + 1 + 8 * 3) + WORKGROUP
+    key + pixels * (LANES + 1 + 8 * 3) + WORKGROUP
 }
 
 impl Schedule {
@@ -114,7 +126,7 @@ impl Schedule {
         for (pass, (lines, &edges_first)) in (0..).zip(plan.lines.iter().zip(edge_starts)) {
             let shares = LineShares::new(plan, lines, device);
             let is_lit = lines.lit && plan.lights_lines();
-            let first = if pass == 0 { FIRST_PASS } else { 0 };
+            let first = if pass == 0 { line_flags::FIRST_PASS } else { 0 };
             let lined = Batch {
                 edges_per_group: shares.edges_per_group,
                 line_exponent: lines.square_exponent(),
@@ -124,7 +136,7 @@ impl Schedule {
                 line_peak: lines.peak(),
                 line_width: lines.width_px,
                 line_smoothing: lines.smoothing_px,
-                line_flags: line_flags(lines, has_visibility(plan), plan.lights_lines()) | first,
+                line_flags: line_flags::of(lines, has_visibility(plan), plan.lights_lines()) | first,
                 line_pass: pass,
                 ..pixels
             };
@@ -133,7 +145,7 @@ impl Schedule {
                 let count = shares.edges.min(edges - first);
                 let batch = Batch { first: edges_first.saturating_add(first), count, ..lined };
                 let groups = count.div_ceil(shares.edges_per_group);
-                self.dispatch_groups(device, Stage::Lines, groups, batch)?;
+                self.dispatch_groups(device, Kernel::Edge, groups, batch)?;
                 let progress_bytes = shares.progress_bytes();
                 if let (Some(Step::Dispatch { batch, workgroups, .. }), true) =
                     (self.steps.last().copied(), progress_bytes > 0)
@@ -146,9 +158,9 @@ impl Schedule {
                 }
             }
             if is_lit {
-                self.dispatch(device, Stage::LineLight, pixels.count, lined)?;
+                self.dispatch(device, Kernel::LineLight, pixels.count, lined)?;
             }
-            self.dispatch(device, Stage::Ink, pixels.count, lined)?;
+            self.dispatch(device, Kernel::Coverage, pixels.count, lined)?;
         }
         Ok(())
     }

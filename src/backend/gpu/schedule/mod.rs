@@ -1,8 +1,8 @@
-//! What is dispatched for a plan, in order: pure arithmetic, no device.
+//! The dispatches for a plan, in the order of the stages: pure arithmetic, no device.
 //!
-//! The picture is cut into horizontal bands whose sample buffer stays small, triangles into chunks whose work list does.
-//! After each chunk of a large mesh, and each band, the commands go to the device, so that no single submission takes
-//! long and the deadline is looked at in between.
+//! The picture is cut into horizontal bands whose sample buffer stays small, triangles into chunks
+//! whose work list does. After each chunk of a large mesh, and each band, the commands go to the
+//! device, so that no single submission takes long and the deadline is looked at in between.
 
 pub(crate) mod line_shares;
 pub(crate) mod sizes;
@@ -16,22 +16,23 @@ use self::tiles::Tiles;
 use super::params::{Batch, edge_lists, faces_code};
 use crate::backend::DrawError;
 use crate::backend::gpu::pass_mask::Pass;
-use crate::backend::gpu::pipelines::{Into, Stage, Write};
+use crate::backend::gpu::pipelines::{Kernel, SampleTarget, SampleWrite};
 use crate::plan::{DrawPlan, pass_mask};
 
-/// Triangles a dispatch, where none needs clipping; each may leave one item in the work list.
+/// Triangles per dispatch, where none needs clipping; each may leave one item in the work list.
 const CHUNK: u32 = 1 << 20;
 
-/// Triangles a dispatch where all may need clipping, into at most six pieces each.
+/// Triangles per dispatch where all may need clipping, into at most six pieces each.
 const CHUNK_CLIP: u32 = 1 << 17;
-const PIECES_MAX: u32 = 6;
+pub const PIECES_MAX: u32 = 6;
 
-/// Different numbers that dispatches may have, each 256 bytes on the GPU: 128 MiB.
+/// Largest number of batches, 256 bytes each on the GPU: 128 MiB.
 ///
-/// The most that a job within all other limits takes: of 4096 rows at 4 samples, layers make 32 bands of 128 rows. In each, 10
-/// million triangles that may need clipping are 77 chunks, for the surface and 16 layers, filled and hull, in two phases:
-/// 17 * 77 * 2 * 2 = 5236. 64 passes of 30 million edges are 29 chunks each and three more for the ink, 2048. That makes 0.23
-/// million. Rows beyond a band that wide lines look at are no bands of their own: they do not add to it.
+/// The most that a job within all other limits takes: of 4096 rows at 4 samples, layers make 32
+/// bands of 128 rows. In each, 10 million triangles that may need clipping are 77 chunks, for the
+/// surface and 16 layers, filled and hull, in two phases: 17 * 77 * 2 * 2 = 5236. 64 passes of 30
+/// million edges are 29 chunks each and three more for their coverage, 2048. That makes 0.23
+/// million. Margin rows are no bands of their own and do not add to it.
 const BATCHES_MAX: usize = 1 << 19;
 
 /// Threads of a workgroup, in every kernel.
@@ -48,16 +49,16 @@ pub struct Schedule {
     pub work_items: u32,
     /// Layers that are looked for in each band.
     pub layers: u32,
-    /// How the tile kernel is run.
+    /// Runs of the tile kernel.
     pub tiles: Tiles,
-    /// What threads that draw lines remember from round to round.
+    /// Bytes for the state of paused threads of the edge kernel.
     pub progress_bytes: u64,
-    /// What is wanted.
+    /// The result.
     pub goal: Goal,
 }
 
 impl Schedule {
-    /// The commands for what is wanted of `plan`.
+    /// The commands that compute `goal` for `plan`.
     pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Result<Self, DrawError> {
         let banding = Banding::new(plan, device, goal)?;
         let tiles = Tiles::new(plan, device, banding);
@@ -70,7 +71,7 @@ impl Schedule {
             let [beyond, margin] = [banding.beyond, banding.margin].map(|px| px as i32);
             let [row_first, row_end] = [first as i32, end as i32];
             let seen = [row_first - margin, row_end + margin].map(|y| y.clamp(-beyond, plan.height_px as i32 + beyond));
-            // What is done pixel by pixel is done for the band's own rows.
+            // Kernels that run per pixel cover the band's own rows only.
             let band = Batch {
                 row_first,
                 row_end,
@@ -92,7 +93,7 @@ impl Schedule {
                     samples_at: 0,
                     ..band
                 };
-                schedule.triangles(device, all, Into::Surface, Pass::of_surface(plan))?;
+                schedule.triangles(device, all, SampleTarget::Visibility, Pass::of_visibility(plan))?;
                 schedule.layers(plan, device, band, goal)?;
             }
             if goal == Goal::Picture {
@@ -106,12 +107,13 @@ impl Schedule {
     fn transform(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits) -> Result<(), DrawError> {
         let count = plan.positions.len() as u32;
         if has_visibility(plan) || !plan.lines.is_empty() {
-            self.dispatch(device, Stage::Transform, count, Batch { count, ..Batch::default() })?;
+            self.dispatch(device, Kernel::Transform, count, Batch { count, ..Batch::default() })?;
         }
         Ok(())
     }
 
-    /// One round a layer; a round does nothing where the one before has left nothing to find.
+    /// One round per peeled layer; a round does nothing if the previous one has left nothing to
+    /// find.
     fn layers(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, band: Batch, goal: Goal) -> Result<(), DrawError> {
         let Some(pass) = plan.peeling() else { return Ok(()) };
         let rounds = match goal {
@@ -121,14 +123,14 @@ impl Schedule {
         };
         self.layers = rounds;
         let count = plan.width_px * band.row_end.abs_diff(band.row_first);
-        // A layer that is wanted for itself is not shaded: then no sample is done before its last triangle.
-        let role = if goal == Goal::Picture { u32::from(pass_mask::LAYER) } else { 0 };
+        // A layer drawn for a test is not shaded, so no sample is finished early.
+        let pass_bit = if goal == Goal::Picture { u32::from(pass_mask::LAYER) } else { 0 };
         let mut ends = Vec::new();
         for layer in 0..rounds {
             self.steps.push(Step::ClearLayer);
-            self.triangles(device, Batch { layer, ..band }, Into::Layer, Pass::of_layers(plan))?;
-            let batch = Batch { count, role, layer, ..band };
-            self.dispatch(device, Stage::Layers, count, batch)?;
+            self.triangles(device, Batch { layer, ..band }, SampleTarget::Layer, Pass::of_peeling(plan))?;
+            let batch = Batch { count, pass_bit, layer, ..band };
+            self.dispatch(device, Kernel::Composite, count, batch)?;
             self.steps.push(Step::Submit);
             if self.tiles.in_rounds && goal == Goal::Picture {
                 ends.push(self.steps.len());
@@ -148,13 +150,14 @@ impl Schedule {
         &mut self,
         device: &DeviceTraits,
         band: Batch,
-        into: Into,
+        target: SampleTarget,
         passes: [Option<Pass>; 2],
     ) -> Result<(), DrawError> {
-        let writes: &[Write] = if device.int64_atomics { &[Write::Both] } else { &[Write::Depth, Write::Id] };
-        // Every depth must be known before the first id is compared with it.
+        let writes: &[SampleWrite] =
+            if device.int64_atomics { &[SampleWrite::Both] } else { &[SampleWrite::Depth, SampleWrite::Id] };
+        // The depth phase must be complete before the id phase compares with it.
         for &write in writes {
-            for Pass { ids, clip, faces, role } in passes.iter().flatten().cloned() {
+            for Pass { ids, clip, faces, pass_bit } in passes.iter().flatten().cloned() {
                 let (chunk, pieces) = if clip { (CHUNK_CLIP, PIECES_MAX) } else { (CHUNK, 1) };
                 for first in ids.clone().step_by(chunk as usize) {
                     let in_chunk = chunk.min(ids.end - first);
@@ -167,16 +170,16 @@ impl Schedule {
                         capacity,
                         large_end: u32::MAX,
                         huge_end: u32::MAX,
-                        role: u32::from(role),
+                        pass_bit: u32::from(pass_bit),
                         ..band
                     };
                     self.steps.push(Step::ClearWork);
-                    self.dispatch(device, Stage::Visibility { write, into }, in_chunk, batch)?;
+                    self.dispatch(device, Kernel::Visibility { write, target }, in_chunk, batch)?;
                     if clip {
-                        self.dispatch(device, Stage::Clip, in_chunk, batch)?;
+                        self.dispatch(device, Kernel::Clip, in_chunk, batch)?;
                     }
-                    let stage = Stage::VisibilityTile { write, into };
-                    self.steps.push(Step::Tiles { stage, batch: self.batches.len() - 1 });
+                    let kernel = Kernel::VisibilityTile { write, target };
+                    self.steps.push(Step::Tiles { kernel, batch: self.batches.len() - 1 });
                     if ids.len() > chunk as usize {
                         self.steps.push(Step::Submit);
                     }
@@ -186,7 +189,7 @@ impl Schedule {
         Ok(())
     }
 
-    /// What follows visibility, for a band.
+    /// The stages after visibility, for a band.
     fn picture_stages(
         &mut self,
         plan: &DrawPlan<'_>,
@@ -197,33 +200,33 @@ impl Schedule {
         let count = plan.width_px * band.row_end.abs_diff(band.row_first);
         let pixels = Batch { count, ..band };
         if plan.is_shaded() {
-            self.dispatch(device, Stage::Shade, count, pixels)?;
+            self.dispatch(device, Kernel::Shade, count, pixels)?;
         }
         self.lines(plan, device, pixels, edge_starts)?;
-        self.dispatch(device, Stage::Resolve, count, pixels)
+        self.dispatch(device, Kernel::Resolve, count, pixels)
     }
 
     pub(crate) fn dispatch(
         &mut self,
         device: &DeviceTraits,
-        stage: Stage,
+        kernel: Kernel,
         threads: u32,
         batch: Batch,
     ) -> Result<(), DrawError> {
-        self.dispatch_groups(device, stage, threads.div_ceil(WORKGROUP), batch)
+        self.dispatch_groups(device, kernel, threads.div_ceil(WORKGROUP), batch)
     }
 
     pub(crate) fn dispatch_groups(
         &mut self,
         device: &DeviceTraits,
-        stage: Stage,
+        kernel: Kernel,
         workgroups: u32,
         batch: Batch,
     ) -> Result<(), DrawError> {
         if workgroups == 0 {
             return Ok(());
         }
-        // Neighbours may share theirs: triangles are drawn and clipped by the same numbers.
+        // Consecutive dispatches with equal parameters share a batch.
         if self.batches.last() != Some(&batch) {
             if self.batches.len() == BATCHES_MAX {
                 return Err(DrawError::Device(format!("it takes more than {BATCHES_MAX} dispatches")));
@@ -232,7 +235,7 @@ impl Schedule {
         }
         let x = workgroups.min(device.workgroups_max);
         let batch = self.batches.len() - 1;
-        self.steps.push(Step::Dispatch { stage, batch, workgroups: [x, workgroups.div_ceil(x)] });
+        self.steps.push(Step::Dispatch { kernel, batch, workgroups: [x, workgroups.div_ceil(x)] });
         Ok(())
     }
 }

@@ -1,4 +1,4 @@
-//! What a device allows, and how large buffers are: bytes a pixel, a sample, an item, and the rows that this leaves room for.
+//! Limits of a device, sizes of buffers, and the rows per band that follow from them.
 
 use super::step::Goal;
 use crate::backend::DrawError;
@@ -7,32 +7,33 @@ use crate::plan::DrawPlan;
 /// Largest buffer that holds a band of the picture, bytes.
 const BAND_BYTES: u64 = 64 << 20;
 
-/// The same for the visibility buffer, which wide lines look at far beyond their band.
+/// The same for the visibility buffer, which hidden-line removal of wide lines reads far beyond
+/// their band.
 const SEEN_BYTES: u64 = 256 << 20;
 
 /// Bytes of the work list before its items.
-const WORK_HEAD_BYTES: u64 = 16;
+pub const WORK_HEAD_BYTES: u64 = 16;
 
 /// Bytes of one of its items.
-const WORK_ITEM_BYTES: u64 = 48;
+pub const WORK_ITEM_BYTES: u64 = 48;
 
-/// Bytes of what layers make of a sample.
-pub const LAYERED_BYTES: u64 = 32;
+/// Bytes of a sample's state of depth peeling.
+pub const PEEL_STATE_BYTES: u64 = 32;
 
-/// Bytes of a sample of the visibility buffer, or of a layer.
+/// Bytes of a sample of the visibility buffer or of a peeled layer.
 pub const SAMPLE_BYTES: u64 = 8;
 
-/// Bytes of a pixel's strokes: two sums, how often they have gone round, a bit for each of 256 points, and the most that an area
-/// differs from its points'.
+/// Bytes of a pixel's strokes: two sums, how often they have gone round, a bit for each of 256
+/// points, and the most that an area differs from its points'.
 pub const STROKES_BYTES: u64 = 48;
 
-/// Bytes of a pixel of lit lines: whose light falls on them.
+/// Bytes per pixel of lit lines: the face that lights them.
 pub const OWNER_BYTES: u64 = 4;
 
 /// Bytes of a pixel of the picture.
 const RGBA_BYTES: u64 = 4;
 
-/// What a device allows, and which way it goes.
+/// Limits and properties of a device.
 #[derive(Clone, Copy, Debug)]
 pub struct DeviceTraits {
     /// Largest buffer that can be bound, bytes.
@@ -43,25 +44,28 @@ pub struct DeviceTraits {
     pub tile_workgroups: u32,
     /// 64-bit atomics.
     pub int64_atomics: bool,
-    /// Whether a thread's loops are cut off after a while: see [`Tiles`](super::tiles::Tiles).
+    /// True if a thread's loops are cut off after a number of iterations: see
+    /// [`Tiles`](super::tiles::Tiles).
     pub loops_are_limited: bool,
 }
 
-/// How the picture is cut into bands of rows.
+/// Division of the picture into bands of rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Banding {
     /// Rows of each band but the last.
     pub rows: u32,
-    /// Rows beyond a band, above and below, that its lines look at.
+    /// Rows beyond a band, above and below, that hidden-line removal reads.
     pub margin: u32,
-    /// Pixels beyond the picture, on each side, of which the visibility buffer holds those that are in a band's rows and margins.
+    /// Pixels beyond the picture, on each side, of which the visibility buffer holds those that are
+    /// in a band's rows and margins.
     pub beyond: u32,
 }
 
 impl Banding {
-    /// So that no buffer is large or breaks the device's limit. Fails where the device has no room for a row and what its lines
-    /// look at in the picture. Where it has none only for what they look at beyond the picture, they go without: better a border at
-    /// which a line shows that something beyond it hides than no picture.
+    /// Bands in which no buffer is large or exceeds the device's limit. Fails if the device has no
+    /// room for a row and the rows that its lines read in the picture. If only those beyond the
+    /// picture have no room, they are left out: a line at the border that something beyond it hides
+    /// may then show.
     pub fn new(plan: &DrawPlan<'_>, device: &DeviceTraits, goal: Goal) -> Result<Self, DrawError> {
         if goal != Goal::Picture {
             return Self::with_margin(plan, device, [0, 0]);
@@ -83,7 +87,7 @@ impl Banding {
         }
         let room = seen.saturating_sub(2 * u64::from(margin));
         if room == 0 {
-            let why = "the device has no room for what lines so wide look at in a picture so wide";
+            let why = "the device has no room for what lines so wide key at in a picture so wide";
             return Err(DrawError::Device(why.to_owned()));
         }
         Ok(Self { rows: rows.min(room) as u32, margin, beyond })
@@ -107,14 +111,14 @@ impl Banding {
     /// Bytes of all buffers that hold a band.
     pub fn bytes(&self, plan: &DrawPlan<'_>) -> u64 {
         let seen = if has_visibility(plan) { self.seen_samples(plan) * SAMPLE_BYTES } else { 0 };
-        let layers = if plan.peeling().is_some() { LAYERED_BYTES + SAMPLE_BYTES } else { 0 };
+        let layers = if plan.peeling().is_some() { PEEL_STATE_BYTES + SAMPLE_BYTES } else { 0 };
         let (strokes, owners) = if plan.lines.is_empty() { (0, 0) } else { (STROKES_BYTES, OWNER_BYTES) };
         let pixel = u64::from(plan.samples) * layers + color_bytes(plan) + strokes + owners + RGBA_BYTES;
         seen + u64::from(plan.width_px) * u64::from(self.rows) * pixel
     }
 }
 
-/// Bytes of all buffers that hold a band, on a device that allows whatever is asked of it.
+/// Bytes of all buffers that hold a band, on a device without limits.
 pub fn bands_bytes(plan: &DrawPlan<'_>) -> u64 {
     let device = DeviceTraits {
         binding_bytes_max: u64::MAX,
@@ -127,7 +131,7 @@ pub fn bands_bytes(plan: &DrawPlan<'_>) -> u64 {
     Banding::new(plan, &device, Goal::Picture).map_or(0, |banding| banding.bytes(plan) / 4 * 5)
 }
 
-/// Whether a plan needs the sample buffer at all.
+/// True if a plan needs the visibility buffer.
 pub fn has_visibility(plan: &DrawPlan<'_>) -> bool {
     plan.surface.is_some() || plan.hull.is_some()
 }
@@ -137,7 +141,8 @@ pub fn samples(plan: &DrawPlan<'_>, rows: u32) -> u64 {
     u64::from(plan.width_px) * u64::from(rows) * u64::from(plan.samples)
 }
 
-/// Bytes a pixel of colours: the surface's, then everything's, and the light on lines where they are lit.
+/// Bytes per pixel of colours: the surface's, then everything's, and the light on lines where they
+/// are lit.
 pub fn color_bytes(plan: &DrawPlan<'_>) -> u64 {
     if plan.lights_lines() { 32 } else { 16 }
 }
@@ -147,15 +152,15 @@ pub fn work_bytes(items: u32) -> u64 {
     WORK_HEAD_BYTES + u64::from(items) * WORK_ITEM_BYTES
 }
 
-/// Bytes a pixel of the visibility buffer.
+/// Bytes per pixel of the visibility buffer.
 fn seen_bytes(plan: &DrawPlan<'_>) -> u64 {
     u64::from(plan.samples) * SAMPLE_BYTES
 }
 
-/// Bytes a pixel of the largest buffer that holds a band.
+/// Bytes per pixel of the largest buffer that holds a band.
 fn pixel_bytes(plan: &DrawPlan<'_>) -> u64 {
     let strokes = if plan.lines.is_empty() { 0 } else { STROKES_BYTES };
-    let sample = if plan.peeling().is_some() { LAYERED_BYTES } else { SAMPLE_BYTES };
+    let sample = if plan.peeling().is_some() { PEEL_STATE_BYTES } else { SAMPLE_BYTES };
     (u64::from(plan.samples) * sample).max(color_bytes(plan)).max(strokes)
 }
 
@@ -184,7 +189,7 @@ mod tests {
                 assert!(banding.bytes(plan) <= ALL_BYTES_MAX, "{}: {banding:?} {case:?}", banding.bytes(plan));
                 assert!(banding.seen_samples(plan) * SAMPLE_BYTES <= device.binding_bytes_max);
                 assert!(banding.rows >= 1 && banding.rows <= plan.height_px);
-                // What lies beyond a band is there in whole, unless the band is all there is.
+                // The margin is complete unless one band is the whole picture.
                 let is_all = banding.rows == plan.height_px && banding.beyond == 0;
                 assert!(banding.margin == plan.line_margin_rows() || is_all, "{case:?}");
                 if banding.beyond < case.beyond {

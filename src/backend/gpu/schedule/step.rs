@@ -1,45 +1,45 @@
-//! What a [`Schedule`](crate::backend::gpu::schedule::Schedule) is made of, and for.
+//! The commands of a [`Schedule`](super::Schedule), and its goal.
 
-use crate::backend::gpu::pipelines::Stage;
+use crate::backend::gpu::pipelines::Kernel;
 
 /// One command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Fills a band's samples (and ink) with zeros.
+    /// Clears a band's samples and strokes.
     ClearBand,
     /// Empties the work list.
     ClearWork,
-    /// Empties the layer that is looked for.
+    /// Clears the peeled layer.
     ClearLayer,
-    /// Where the device must be waited for anyway, asks whether there is another layer behind this one, and if not, goes on
-    /// at step `end`.
+    /// Reads whether there may be another layer and, if not, continues at step `end`. Only where
+    /// rounds wait for the device anyway.
     EndLayer {
-        /// Which.
+        /// Its index.
         layer: u32,
         /// Index of the step after the last layer.
         end: usize,
     },
     /// Runs a kernel over `threads` threads with the batch at `batch`.
     Dispatch {
-        /// Which.
-        stage: Stage,
-        /// Index of its numbers.
+        /// Its index.
+        kernel: Kernel,
+        /// Index of its batch.
         batch: usize,
-        /// How often.
+        /// Workgroups in x and y.
         workgroups: [u32; 2],
     },
     /// Draws lines, in as many rounds as that takes.
     Lines {
-        /// Index of its numbers.
+        /// Index of its batch.
         batch: usize,
-        /// How often.
+        /// Workgroups in x and y.
         workgroups: [u32; 2],
     },
     /// Draws the large triangles of the batch.
     Tiles {
         /// The kernel.
-        stage: Stage,
-        /// Index of its numbers.
+        kernel: Kernel,
+        /// Index of its batch.
         batch: usize,
     },
     /// Hands what was recorded to the device.
@@ -55,7 +55,7 @@ pub struct Band {
     pub rows: [u32; 2],
 }
 
-/// What is wanted of a plan.
+/// Result that a schedule computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Goal {
     /// The picture.

@@ -14,12 +14,12 @@ pub const DEVICE: DeviceTraits = DeviceTraits {
     loops_are_limited: true,
 };
 
-/// What a plan has.
+/// Properties of a test plan.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     pub size_px: [u32; 2],
     pub samples: u32,
-    pub is_layered: bool,
+    pub is_peeled: bool,
     pub passes: usize,
     pub width_px: f32,
     pub shown: Shown,
@@ -29,7 +29,7 @@ pub struct Case {
 
 /// The largest picture at 4 samples, with thin lines that nothing hides.
 pub const LARGEST: Case =
-    Case { size_px: [4096; 2], samples: 4, is_layered: true, passes: 1, width_px: 1.0, shown: Shown::All, beyond: 0 };
+    Case { size_px: [4096; 2], samples: 4, is_peeled: true, passes: 1, width_px: 1.0, shown: Shown::All, beyond: 0 };
 
 /// Some lines of a width, lit.
 pub fn lines(edges: Arc<[Edge]>, width_px: f32, shown: Shown) -> LinePass {
@@ -60,7 +60,7 @@ pub fn plan<'a>(triangles: &'a [[u32; 3]], case: Case) -> DrawPlan<'a> {
     plan.samples = case.samples;
     plan.margin_px = case.beyond;
     plan.surface = Some(SurfacePass { is_shaded: true, ..SurfacePass::new(Faces::Both, Vec::new()) });
-    if case.is_layered {
+    if case.is_peeled {
         plan.pass_masks = vec![pass_mask::SURFACE | pass_mask::LAYER; triangles.len()].into();
         plan.peeling = Some(PeelingPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 });
     }
@@ -75,8 +75,8 @@ pub fn each_case(mut each: impl FnMut(&DrawPlan<'_>, Case)) {
             for (width_px, shown) in
                 [(1.0, Shown::All), (100.0, Shown::All), (9.0, Shown::Hidden), (100.0, Shown::Visible)]
             {
-                for (is_layered, passes) in [(false, 1), (true, 1), (false, 128), (true, 0)] {
-                    let mut case = Case { size_px, samples, is_layered, passes, width_px, shown, beyond: 0 };
+                for (is_peeled, passes) in [(false, 1), (true, 1), (false, 128), (true, 0)] {
+                    let mut case = Case { size_px, samples, is_peeled, passes, width_px, shown, beyond: 0 };
                     each(&plan(&[[0; 3]], case), case);
                     case.beyond = plan(&[[0; 3]], case).line_margin_rows();
                     if case.beyond > 0 {

@@ -1,22 +1,33 @@
-//! How often the kernel that draws large triangles is run.
+//! Number of runs of the kernel that draws large triangles.
 
 use super::sizes::{Banding, DeviceTraits};
 use crate::plan::DrawPlan;
 
-/// Sample tests that may be handed to the device without looking at how many it really is: a second or so of work.
+/// Sample tests that may be handed to the device without looking at how many it really is: a second
+/// or so of work.
 const BLIND_TESTS_MAX: u64 = 1 << 38;
+
+/// Pixels along a side of a tile, which a workgroup draws together.
+pub const TILE_PX: u32 = 64;
+
+/// Triangles of this many pixels, wide or high, are shared out over all workgroups.
+pub const HUGE_PX: u32 = 128;
+
+/// Tiles of a large triangle, at most: three wide and high, because it need not begin where a tile
+/// does.
+const LARGE_TILES_MAX: u64 = (HUGE_PX as u64 / TILE_PX as u64 + 1).pow(2);
 
 /// Loop iterations a thread of the tile kernel may run in a dispatch of known extent.
 ///
-/// llvmpipe (Mesa 22) leaves all loops of a thread after 65,535 iterations, silently; and on real devices a dispatch
-/// should end in time for the deadline.
+/// llvmpipe (Mesa 22) leaves all loops of a thread after 65,535 iterations, silently; and on real
+/// devices a dispatch should end in time for the deadline.
 const ITERATIONS_MAX: u64 = 40_000;
 
-/// How the tile kernel is run: at once over whatever is in the work list, or, where that might take too long, in rounds
-/// whose number follows from the list's length, which is read back first.
+/// Runs of the tile kernel: one over the whole work list, or, where that might take too long, in
+/// rounds whose number follows from the list's length, which is read back first.
 #[derive(Clone, Copy, Debug)]
 pub struct Tiles {
-    /// Whether to run in rounds.
+    /// True if the kernel runs in rounds.
     pub in_rounds: bool,
     /// Workgroups a dispatch.
     pub workgroups: u32,
@@ -36,14 +47,15 @@ impl Tiles {
             workgroups: device.tile_workgroups.min(device.workgroups_max),
             // 64 blocks, in each the samples; and as much again for the way there.
             tile_iterations: 64 * (u64::from(plan.samples) + 1) + 64,
-            band_tiles: u64::from(seen[0] / 64 + 2) * u64::from(seen[1] / 64 + 2),
+            band_tiles: u64::from(seen[0] / TILE_PX + 2) * u64::from(seen[1] / TILE_PX + 2),
         }
     }
 
     /// The ranges of large and of huge items to draw in each round.
     pub fn rounds(&self, large: u32, huge: u32) -> Vec<[std::ops::Range<u32>; 2]> {
-        // A large triangle is at most 128 pixels, three tiles, wide and high, and one workgroup's.
-        let large_step = (ITERATIONS_MAX / (9 * self.tile_iterations)).max(1) * u64::from(self.workgroups);
+        // A large triangle is drawn by one workgroup.
+        let large_step =
+            (ITERATIONS_MAX / (LARGE_TILES_MAX * self.tile_iterations)).max(1) * u64::from(self.workgroups);
         let huge_iterations = self.band_tiles.div_ceil(u64::from(self.workgroups)) * self.tile_iterations;
         let huge_step = (ITERATIONS_MAX / huge_iterations).max(1);
         let ranges = |count: u32, step: u64| {

@@ -1,0 +1,24 @@
+// The lines stage's buffer of strokes, as edge.wgsl adds to it and coverage.wgsl reads it. No twin:
+// the CPU's is a struct, LineCoverage in src/backend/cpu/lines/coverage.rs.
+
+// Points in a pixel, and the lattice they lie on: point i is in column i and row GENERATOR * i,
+// modulo POINTS.
+const POINTS: u32 = 256u;
+const GENERATOR: u32 = 181u;
+
+// Steps to the pixel of a sum of areas.
+const AREA_UNIT: f32 = 65536.0;
+
+// Words per pixel.
+const STROKE_WORDS: u32 = 12u;
+// The sum of the strokes' areas.
+const AREA_WORD: u32 = 0u;
+// The sum of their counts of points.
+const COUNT_WORD: u32 = 1u;
+// How often either sum has wrapped around: areas in the lower half, counts in the upper.
+const CARRY_WORD: u32 = 2u;
+// The first word of the mask: the points that any stroke covers.
+const MASK_WORD: u32 = 3u;
+const MASK_WORDS: u32 = 8u;
+// The largest difference between a stroke's area and its points.
+const SLACK_WORD: u32 = 11u;

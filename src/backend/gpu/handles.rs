@@ -1,0 +1,8 @@
+//! Device, queue and limits of an opened GPU, in a file of their own because buffers need no more.
+
+/// Device, queue and limits of an opened GPU.
+pub struct Handles {
+    pub device: wgpu::Device,
+    pub queue: wgpu::Queue,
+    pub limits: wgpu::Limits,
+}

@@ -1,0 +1,330 @@
+//! All that the shaders and the code around them must agree on: constants, structs in buffers,
+//! bindings, entry points.
+//!
+//! WGSL has no include and Rust cannot read it, so both sides write these down. Here the shaders
+//! are parsed and each constant, field and binding is compared; one that neither
+//! [`shared_constants`] nor [`SHADER_ONLY`] lists is a failure too.
+
+use std::collections::BTreeMap;
+use std::mem::offset_of;
+
+use wgpu::naga;
+
+use super::cpu::geometry::transform::{GUARD, OUTSIDE, ScreenVertex};
+use super::cpu::geometry::{clip, samples};
+use super::cpu::lines::{coverage, hidden_lines, segment, stroke};
+use super::cpu::surface::texture;
+use super::gpu::params::{Batch, FACES_BACK, FACES_BOTH, FACES_FRONT, Frame, OWN_TRIANGLES, line_flags};
+use super::gpu::pipelines::{Access, Kernel, SampleTarget, SampleWrite, Slot, key};
+use super::gpu::schedule::sizes::{PEEL_STATE_BYTES, STROKES_BYTES, WORK_HEAD_BYTES, WORK_ITEM_BYTES};
+use super::gpu::schedule::{PIECES_MAX, WORKGROUP, line_shares, tiles};
+use super::sample_partition::{GENERATORS, POINTS};
+use crate::plan::{
+    Edge, HullVertex, LinePass, ShadedMaterial, Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
+};
+
+/// Every constant that a shader and Rust both have, as the shader calls it.
+fn shared_constants() -> BTreeMap<&'static str, f64> {
+    let mut all = BTreeMap::new();
+    macro_rules! add {
+        ($($name:literal = $value:expr),* $(,)?) => {
+            $(assert!(all.insert($name, $value as f64).is_none(), "{} twice", $name);)*
+        };
+    }
+    macro_rules! add_same {
+        ($prefix:literal, $module:ident: $($name:ident)*) => {
+            $(assert!(all.insert(concat!($prefix, stringify!($name)), $module::$name as f64).is_none());)*
+        };
+    }
+    // Pipeline key.
+    add_same!("", key: SURFACE HULL FACE_NORMALS VERTEX_NORMALS WIRES TRIANGLE_MATERIALS EDGE_MASKS LINES CLIPPED
+        EIGHT_SAMPLES SIXTEEN_SAMPLES FOUR_SAMPLES LIT_LINES CONTOURS PASS_MASKS HULL_MATERIALS PEELING BEHIND_SURFACE
+        WIRES_ONLY PEELED_HULL DERIVATIVE_NORMALS VERTEX_COLORS UVS TEXTURES WIRE_MINIMUM WIRE_LIT DEBUG VARYING);
+    // Line flags, pass masks, faces.
+    add_same!("", line_flags: SHOWN_VISIBLE SHOWN_HIDDEN SKIP_BACK CONTOUR LIT_PASS FIRST_PASS INSIDE_OUT);
+    add!(
+        "PASS_LAYER" = pass_mask::LAYER,
+        "PASS_FRONT_ONLY" = pass_mask::FRONT_ONLY,
+        "PASS_BACK_ONLY" = pass_mask::BACK_ONLY
+    );
+    add!("FACES_BOTH" = FACES_BOTH, "FACES_FRONT" = FACES_FRONT, "FACES_BACK" = FACES_BACK);
+    // Materials: flags, slots, debug views, samplers.
+    add_same!("MATERIAL_", flags: FILL FACE_NORMALS DERIVATIVE_NORMALS LIT VERTEX_COLORS MASK BLEND WIRE_BARYCENTRIC
+        WIRE_FWIDTH_MIN WIRE_FWIDTH WIRES WIRE_LIT DEBUG_SHIFT OWN_METALLIC OWN_ROUGHNESS);
+    add_same!("SLOT_", slots: BASE METALLIC_ROUGHNESS NORMAL EMISSIVE);
+    add_same!("DEBUG_", debug_views: BARYCENTRIC MIN_BARYCENTRIC EDGE_DISTANCE NORMAL UV FACE_ORIENTATION VERTEX_COLOR);
+    add!("WRAP_BITS" = samplers::WRAP_BITS, "WRAP_DOWN_SHIFT" = samplers::DOWN_SHIFT);
+    add!("WRAP_REPEAT" = samplers::REPEAT, "WRAP_MIRROR" = samplers::MIRROR, "SAMPLER_NEAREST" = samplers::NEAREST);
+    // Values that mean something else than a number.
+    add!(
+        "OUTSIDE" = OUTSIDE,
+        "NOTHING" = samples::NOTHING,
+        "NO_FACE" = Edge::NO_FACE,
+        "NO_LIMIT" = line_shares::NO_LIMIT
+    );
+    add!("OWN_TRIANGLES" = OWN_TRIANGLES);
+    // Sizes and limits.
+    add!("WORKGROUP" = WORKGROUP, "ITEM_VECTORS" = WORK_ITEM_BYTES / 16, "STROKE_WORDS" = STROKES_BYTES / 4);
+    add!("MASK_WORDS" = POINTS / 32, "IMAGE_VECTORS" = size_of::<Texture>() / 8);
+    add!("TILE_PX" = tiles::TILE_PX, "HUGE_PX" = tiles::HUGE_PX, "CORNERS_MAX" = clip::CORNERS_MAX);
+    add!("GUARD" = GUARD, "BOUND" = clip::BOUND, "UV_MAX" = texture::UV_MAX, "MIN_POSITIVE" = f32::MIN_POSITIVE);
+    // Lines.
+    add!("POINTS" = POINTS, "GENERATOR" = GENERATORS[1], "AREA_UNIT" = coverage::AREA_UNIT, "UNIT" = stroke::UNIT);
+    add!(
+        "LIMIT" = LinePass::SCALED_MAX,
+        "BOX_RADIUS" = std::f32::consts::FRAC_1_SQRT_2,
+        "SLACK_PX" = segment::SLACK_PX
+    );
+    add!("STROKES_SIDE_BY_SIDE" = coverage::STROKES_SIDE_BY_SIDE, "ALPHA_MIN" = coverage::ALPHA_MIN);
+    add!("NEARER_RATIO" = hidden_lines::NEARER_RATIO, "SNAP_ERROR" = hidden_lines::SNAP_ERROR);
+    add!("INTERVAL_MIN_PX" = hidden_lines::INTERVAL_MIN_PX, "GAP_MIN_PX" = hidden_lines::GAP_MIN_PX);
+    // Sample offsets, a nibble each.
+    let nibbles = |samples: u32, axis: usize, from: usize| {
+        let offsets = sample_offsets(samples).iter().skip(from).take(8);
+        (0..).zip(offsets).fold(0_u32, |word, (s, offset)| word | (offset[axis] as u32 >> 4) << (4 * s))
+    };
+    assert_eq!(nibbles(1, 0, 0), nibbles(1, 1, 0));
+    add!("ONE_SAMPLE_XY" = nibbles(1, 0, 0), "FOUR_SAMPLES_X" = nibbles(4, 0, 0), "FOUR_SAMPLES_Y" = nibbles(4, 1, 0));
+    add!("EIGHT_SAMPLES_X" = nibbles(8, 0, 0), "EIGHT_SAMPLES_Y" = nibbles(8, 1, 0));
+    add!("SIXTEEN_SAMPLES_X_FIRST" = nibbles(16, 0, 0), "SIXTEEN_SAMPLES_X_LAST" = nibbles(16, 0, 8));
+    add!("SIXTEEN_SAMPLES_Y_FIRST" = nibbles(16, 1, 0), "SIXTEEN_SAMPLES_Y_LAST" = nibbles(16, 1, 8));
+    add!("SIXTEEN_SAMPLES_SHIFT" = sample_offsets(16)[0][0] & 15);
+    all
+}
+
+/// Constants that only shaders have: the states of a search, places in their own buffers, what fits
+/// their 32 bits.
+const SHADER_ONLY: &[&str] = &[
+    "UNSCANNED",
+    "WHOLE",
+    "INTERVALS",
+    "BEYOND",
+    "SMALL",
+    "AREA_WORD",
+    "COUNT_WORD",
+    "CARRY_WORD",
+    "MASK_WORD",
+    "SLACK_WORD",
+];
+
+/// Every kernel in each of its variants.
+fn kernels() -> Vec<Kernel> {
+    let mut all =
+        vec![Kernel::Transform, Kernel::Clip, Kernel::Composite, Kernel::Shade, Kernel::Edge, Kernel::Coverage];
+    all.extend([Kernel::LineLight, Kernel::Resolve]);
+    for write in [SampleWrite::Both, SampleWrite::Depth, SampleWrite::Id] {
+        for target in [SampleTarget::Visibility, SampleTarget::Layer] {
+            all.extend([Kernel::Visibility { write, target }, Kernel::VisibilityTile { write, target }]);
+        }
+    }
+    all
+}
+
+fn parsed() -> Vec<(Kernel, naga::Module)> {
+    let parse = |kernel: Kernel| match naga::front::wgsl::parse_str(&kernel.source()) {
+        Ok(module) => (kernel, module),
+        Err(error) => panic!("{kernel:?}: {}", error.emit_to_string(&kernel.source())),
+    };
+    kernels().into_iter().map(parse).collect()
+}
+
+#[test]
+fn constants_of_shaders_and_rust_are_equal() {
+    let shared = shared_constants();
+    let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+    for (kernel, module) in parsed() {
+        for (_, constant) in module.constants.iter() {
+            let Some(name) = &constant.name else { continue };
+            *seen.entry(name.clone()).or_default() += 1;
+            let naga::Expression::Literal(literal) = module.global_expressions[constant.init] else {
+                panic!("{kernel:?}: {name} is no literal");
+            };
+            match (shared.get(name.as_str()), SHADER_ONLY.contains(&name.as_str())) {
+                (Some(value), false) => assert_eq!(number(literal), *value, "{kernel:?}: {name}"),
+                (None, true) => {}
+                _ => panic!("{kernel:?}: list {name} once, in shared_constants or in SHADER_ONLY"),
+            }
+        }
+    }
+    for name in shared.keys().copied().chain(SHADER_ONLY.iter().copied()) {
+        assert!(seen.contains_key(name), "no shader has {name}");
+    }
+    // A fan of a polygon with so many corners.
+    assert_eq!(PIECES_MAX as usize, clip::CORNERS_MAX - 2);
+}
+
+fn number(literal: naga::Literal) -> f64 {
+    match literal {
+        naga::Literal::F32(v) => f64::from(v),
+        naga::Literal::U32(v) => f64::from(v),
+        naga::Literal::I32(v) => f64::from(v),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A struct's size, and its fields: name, offset, and whether it holds floating-point numbers.
+struct Layout {
+    size: usize,
+    fields: Vec<(&'static str, usize, bool)>,
+}
+
+/// The layout of a struct, all of whose fields must be named.
+macro_rules! layout {
+    ($type:ident { $($field:ident)* }) => {{
+        #[allow(dead_code)]
+        fn names_all_fields($type { $($field: _),* }: &$type) {}
+        fn is_float<T>(_: impl Fn(&$type) -> &T) -> bool {
+            std::any::type_name::<T>().contains("f32")
+        }
+        let fields = vec![$((stringify!($field), offset_of!($type, $field), is_float(|v| &v.$field))),*];
+        Layout { size: size_of::<$type>(), fields }
+    }};
+}
+
+fn layouts() -> Vec<(&'static str, Layout)> {
+    vec![
+        (
+            "Frame",
+            layout!(Frame {
+                x_row y_row z_row w_row screen_up screen_right to_viewer lamps halfways background hull_color near_w
+                ambient lamp_count zero width height triangle_count vertex_count masks_at material_count layer_fade
+                hull_color_count image_count normal_triangles_at uv_triangles_at color_triangles_at
+            }),
+        ),
+        (
+            "Batch",
+            layout!(Batch {
+                first count faces row_first row_end capacity large_first large_end huge_first huge_end edges_per_group
+                line_width line_smoothing line_flags line_exponent line_windows line_slices line_peak line_units
+                line_pass seen_first seen_end samples_at pass_bit layer column_first column_end seen_margin
+            }),
+        ),
+        (
+            "Material",
+            layout!(ShadedMaterial {
+                base_color emissive alpha_cutoff wire_color wire_thickness wire_smoothing metallic roughness
+                normal_scale flags opacity padding textures
+            }),
+        ),
+        ("Vertex", layout!(ScreenVertex { x y z inv_w })),
+        ("Vertex", layout!(HullVertex { x y z inv_w })),
+    ]
+}
+
+#[test]
+fn structs_of_shaders_and_rust_are_equal_field_for_field() {
+    let mut compared: BTreeMap<&str, usize> = BTreeMap::new();
+    for (kernel, module) in parsed() {
+        for (name, layout) in layouts() {
+            let Some((members, span)) = members(&module, name) else { continue };
+            assert_eq!(span as usize, layout.size, "{kernel:?}: size of {name}");
+            let theirs: Vec<_> = members.iter().map(|m| (m.name.as_deref().unwrap(), m.offset as usize)).collect();
+            let ours: Vec<_> = layout.fields.iter().map(|&(field, offset, _)| (field, offset)).collect();
+            assert_eq!(theirs, ours, "{kernel:?}: {name}");
+            for (member, (field, _, is_float)) in members.iter().zip(&layout.fields) {
+                // A texture use is words of both kinds.
+                assert!(*field == "textures" || is_of_floats(&module, member.ty) == *is_float, "{name}.{field}");
+            }
+            *compared.entry(name).or_default() += 1;
+        }
+    }
+    assert_eq!(compared.keys().copied().collect::<Vec<_>>(), ["Batch", "Frame", "Material", "Vertex"]);
+}
+
+#[test]
+fn buffers_of_the_shaders_have_the_sizes_that_are_reserved() {
+    let mut compared = 0;
+    for (kernel, module) in parsed() {
+        if let Some((_, span)) = members(&module, "PeelState") {
+            assert_eq!(u64::from(span), PEEL_STATE_BYTES, "{kernel:?}");
+            compared += 1;
+        }
+        for name in ["Work", "WorkList"] {
+            if let Some((members, _)) = members(&module, name) {
+                assert_eq!(members.last().map(|m| u64::from(m.offset)), Some(WORK_HEAD_BYTES), "{kernel:?}");
+                compared += 1;
+            }
+        }
+        if let Some((members, _)) = members(&module, "Progress") {
+            assert_eq!(members.last().map(|m| u64::from(m.offset)), Some(line_shares::PROGRESS_HEAD_BYTES));
+            compared += 1;
+        }
+        if let Some((_, span)) = members(&module, "Paused") {
+            assert_eq!(u64::from(span), line_shares::PAUSED_BYTES);
+            compared += 1;
+        }
+    }
+    assert!(compared > 15, "{compared}");
+    // An edge is four words in the shaders.
+    assert_eq!(size_of::<Edge>(), 16);
+}
+
+fn members<'a>(module: &'a naga::Module, name: &str) -> Option<(&'a [naga::StructMember], u32)> {
+    module.types.iter().find_map(|(_, ty)| match &ty.inner {
+        naga::TypeInner::Struct { members, span } if ty.name.as_deref() == Some(name) => Some((&members[..], *span)),
+        _ => None,
+    })
+}
+
+fn is_of_floats(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
+    match &module.types[ty].inner {
+        naga::TypeInner::Array { base, .. } => is_of_floats(module, *base),
+        naga::TypeInner::Scalar(scalar) | naga::TypeInner::Vector { scalar, .. } => {
+            scalar.kind == naga::ScalarKind::Float
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+/// What a shader calls a slot, where that is not the slot's own name.
+const OTHER_NAMES: &[(Slot, &str)] = &[(Slot::PeelLayer, "base")];
+
+#[test]
+fn kernels_bind_what_their_shaders_declare() {
+    let mut compared = 0;
+    for (kernel, module) in parsed() {
+        let mut declared = BTreeMap::new();
+        for (_, global) in module.global_variables.iter() {
+            let (Some(at), Some(name)) = (global.binding, global.name.as_deref()) else { continue };
+            if at.group == 1 {
+                let naga::AddressSpace::Storage { access } = global.space else { panic!("{name} is no storage") };
+                let is_written = access.contains(naga::StorageAccess::STORE);
+                declared.insert(at.binding, (name, if is_written { Access::ReadWrite } else { Access::Read }));
+            }
+        }
+        let bound = kernel.buffers().iter().map(|&(slot, access)| (slot as u32, (slot, access)));
+        let bound: BTreeMap<u32, (Slot, Access)> = bound.collect();
+        assert!(declared.keys().eq(bound.keys()), "{kernel:?} declares {declared:?} and binds {bound:?}");
+        for (binding, (name, access)) in declared {
+            let (slot, bound_access) = bound[&binding];
+            let is_named = snake_case(&format!("{slot:?}")) == name || OTHER_NAMES.contains(&(slot, name));
+            assert!(is_named && access == bound_access, "{kernel:?}: {name} is bound as {slot:?}, {bound_access:?}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 80, "{compared}");
+}
+
+fn snake_case(name: &str) -> String {
+    let mut out = String::new();
+    for c in name.chars() {
+        if c.is_uppercase() && !out.is_empty() {
+            out.push('_');
+        }
+        out.extend(c.to_lowercase());
+    }
+    out
+}
+
+#[test]
+fn kernels_have_the_entry_points_and_overrides_that_pipelines_name() {
+    for (kernel, module) in parsed() {
+        let entries: Vec<_> = module.entry_points.iter().map(|e| (e.name.as_str(), e.workgroup_size)).collect();
+        assert_eq!(entries, [(kernel.entry(), [WORKGROUP, 1, 1])], "{kernel:?}");
+        let mut declared: Vec<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
+        let mut given: Vec<_> = kernel.constants(0).into_iter().map(|(name, _)| name).collect();
+        declared.sort_unstable();
+        given.sort_unstable();
+        assert_eq!(declared, given, "{kernel:?}");
+    }
+}
