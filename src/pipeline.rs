@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 use crate::backend::{BackendKind, Backends, DrawError};
 use crate::encode::{self, EncodeError};
 use crate::image::ImageFormat;
-use crate::import::{Bundle, Format, MeshError};
+use crate::import::{Bundle, Format, Imported, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
 use crate::plan::{self, Skip};
@@ -95,10 +95,10 @@ pub fn render(
     let mut budget = Budget::new(limits);
 
     let options = import::Options { format: job.format_in, time_s: job.spec.time_s };
-    let mut mesh = import::import(job.bundle, options, limits, &mut budget, deadline)?;
+    let Imported { mut mesh, report } = import::import(job.bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
 
-    let mut warnings = std::mem::take(&mut mesh.report.warnings);
+    let mut warnings = report.warnings;
     warnings.extend(unknown_materials(&mesh, job.spec));
     let mut chosen = plan::choose(job.spec, mesh.triangles.len(), backends.has_gpu());
     warnings.extend(chosen.iter_mut().flat_map(|chosen| std::mem::take(&mut chosen.warnings)));
@@ -134,9 +134,9 @@ pub fn inspect(
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Report, MeshError> {
     let mut budget = Budget::new(limits);
-    let mesh = import::import(bundle, options, limits, &mut budget, deadline)?;
+    let Imported { mesh, report } = import::import(bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
-    Report::of(&mesh, bundle.bytes_len(), &mut budget, deadline)
+    Report::of(&mesh, &report, bundle.bytes_len(), &mut budget, deadline)
 }
 
 /// A look for a material that the mesh does not have is most likely a misspelt name.

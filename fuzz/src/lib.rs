@@ -4,7 +4,7 @@
 #![allow(clippy::panic, clippy::unwrap_used, clippy::expect_used)] // a broken promise is a find
 
 use meshsnap::backend::{Backends, GpuHost, HardwareHint};
-use meshsnap::import::{Bundle, BundleFile, Format, MeshError, Options, import};
+use meshsnap::import::{Bundle, BundleFile, Format, ImportReport, Imported, MeshError, Options, import};
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use meshsnap::mesh::material::{AlphaMode, FileLens};
@@ -36,7 +36,7 @@ pub fn run(target: &str, bytes: &[u8]) {
 }
 
 /// What a target's importer makes of an input, at no moment of its animations; None for targets that take more than a mesh.
-pub fn imported(target: &str, bytes: &[u8]) -> Option<Result<Mesh, MeshError>> {
+pub fn imported(target: &str, bytes: &[u8]) -> Option<Result<Imported, MeshError>> {
     if matches!(target, "request" | "pipeline") {
         return None;
     }
@@ -90,9 +90,9 @@ fn run_import(bundle: &Bundle, options: Options) {
     let limits = limits();
     let mut budget = Budget::new(&limits);
     match import(bundle, options, &limits, &mut budget, &Deadline::default()) {
-        Ok(mesh) => {
-            check(&mesh);
-            let report = Report::of(&mesh, bundle.bytes_len(), &mut budget, &Deadline::default());
+        Ok(Imported { mesh, report: import }) => {
+            check(&mesh, &import);
+            let report = Report::of(&mesh, &import, bundle.bytes_len(), &mut budget, &Deadline::default());
             let Ok(report) = report else { return };
             assert!(!report.text().is_empty());
             serde_json::to_vec(&report).expect("a report is JSON");
@@ -107,7 +107,7 @@ fn is_short(detail: &str) -> bool {
 }
 
 /// What is true of every mesh, whatever file it comes from.
-fn check(mesh: &Mesh) {
+fn check(mesh: &Mesh, report: &ImportReport) {
     let (positions, triangles) = (mesh.positions.len(), mesh.triangles.len());
     assert!(
         (triangles > 0 || !mesh.lines_and_points.is_empty())
@@ -151,7 +151,7 @@ fn check(mesh: &Mesh) {
         let all_finite = camera.eye.iter().chain(camera.axes.iter().flatten()).all(|c| c.is_finite());
         assert!(all_finite && lens.is_finite() && lens > 0.0 && camera.name.chars().count() <= 200, "{camera:?}");
     }
-    assert!(mesh.report.warnings.iter().all(|warning| is_short(&warning.detail)));
+    assert!(report.warnings.iter().all(|warning| is_short(&warning.detail)));
     assert!(mesh.to_file.scale > 0.0 && mesh.to_file.centre.iter().all(|c| c.is_finite()));
 }
 

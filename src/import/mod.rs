@@ -18,6 +18,7 @@ mod off;
 mod ply;
 mod polygon;
 pub mod raw;
+mod report;
 mod sniff;
 mod stl;
 mod text;
@@ -26,6 +27,7 @@ mod three_mf;
 pub use bundle::{Bundle, BundleFile, Folder};
 pub use error::{MeshError, MeshFault};
 pub use formats::Format;
+pub use report::{FileContent, FileMetadata, ImportReport};
 
 use context::Context;
 use error::DETAIL_CHARS_MAX;
@@ -33,7 +35,7 @@ use normalise::normalise;
 use raw::RawMesh;
 
 use crate::limits::{Budget, Deadline, Limits};
-use crate::mesh::{ImportReport, Mesh};
+use crate::mesh::Mesh;
 use crate::warning::Warning;
 use bundle::{entry, unzip};
 
@@ -52,6 +54,15 @@ impl From<Option<Format>> for Options {
     }
 }
 
+/// A mesh, and what its import reports beside it.
+#[derive(Clone, Debug)]
+pub struct Imported {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// Counts, repairs, warnings and metadata.
+    pub report: ImportReport,
+}
+
 /// Reads the mesh of a bundle.
 pub fn import(
     bundle: &Bundle,
@@ -59,7 +70,7 @@ pub fn import(
     limits: &Limits,
     budget: &mut Budget,
     deadline: &Deadline,
-) -> Result<Mesh, MeshError> {
+) -> Result<Imported, MeshError> {
     open(bundle, options.into(), limits, budget, deadline, normalise)
 }
 

@@ -1,7 +1,8 @@
 //! What an importer fills in, before normalisation.
 
+use crate::import::ImportReport;
 use crate::mesh::material::{FileCamera, ImageSource};
-use crate::mesh::{ImportReport, LineOrPoint, MaterialSlot, UpAxis};
+use crate::mesh::{LineOrPoint, MaterialSlot, UpAxis};
 
 /// A mesh as the file has it: file units, f64, nothing welded, nothing dropped.
 #[derive(Clone, Debug, Default)]

@@ -11,10 +11,11 @@ mod shown;
 
 use super::raw::RawMesh;
 use super::{Format, MeshError, MeshFault, sniff, text};
+use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
 use crate::limits;
-use crate::mesh::{FileMetadata, UpAxis};
+use crate::mesh::UpAxis;
 use crate::warning::Warning;
 use ufbx::{
     AllocatorOpts, CoordinateAxis, Error, ErrorType, FileFormat, LoadOpts, OpenFileCb, ProgressCb, ProgressResult,

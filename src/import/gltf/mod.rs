@@ -25,9 +25,10 @@ use self::scene::transform::Affine;
 use self::scene::{cameras, instancing};
 use super::raw::RawMesh;
 use super::{Format, MeshError};
+use crate::import::FileContent;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
-use crate::mesh::{FileContent, MaterialSlot};
+use crate::mesh::MaterialSlot;
 use crate::warning::Warning;
 use std::rc::Rc;
 

@@ -10,13 +10,13 @@ use self::attributes::Attributes;
 use self::pow2::{Pow2, exponent, is_usable, max_abs};
 use self::weld::PositionSet;
 use super::raw::RawMesh;
-use super::{MeshError, MeshFault};
+use super::{ImportReport, Imported, MeshError, MeshFault};
 use crate::import::context::Context;
-use crate::mesh::{ImportReport, LineOrPoint, MaterialSlot, Mesh, ToFile, primitives};
+use crate::mesh::{LineOrPoint, MaterialSlot, Mesh, ToFile, primitives};
 use crate::pluralise::pluralise;
 
 /// Brings an imported mesh into its final form.
-pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshError> {
+pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, MeshError> {
     cx.check_triangles(raw.triangles.len() as u64 + primitives::triangles(&raw.lines_and_points))?;
     cx.budget.spend("the triangles", raw.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
     cx.budget.spend("lines and points", raw.lines_and_points.len() as u64, BYTES_PER_LOOSE)?;
@@ -52,8 +52,7 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshErr
     }
     (mesh.images, mesh.cameras) = (raw.images, raw.cameras);
     mesh.up = raw.up;
-    mesh.report = raw.report;
-    Ok(mesh)
+    Ok(Imported { mesh, report: raw.report })
 }
 
 /// A face, its normal, and two index triples, next to those of the raw mesh.

@@ -19,9 +19,10 @@ use self::header::Header;
 use self::words::Words;
 use super::raw::RawMesh;
 use super::{Format, MeshError};
+use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
-use crate::mesh::{FileMetadata, MaterialSlot};
+use crate::mesh::MaterialSlot;
 use crate::warning::Warning;
 
 /// How many there are of what, as the file has it.

@@ -28,9 +28,9 @@ use self::text::Text;
 use self::vertices::Vertices;
 use super::raw::RawMesh;
 use super::{Format, MeshError};
+use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
-use crate::mesh::FileMetadata;
 use crate::warning::Warning;
 
 /// Reads a PLY file.

@@ -7,9 +7,10 @@ use self::color::Colors;
 use super::polygon::ALL_EDGES;
 use super::raw::RawMesh;
 use super::{Format, MeshError};
+use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
-use crate::mesh::{FileMetadata, MaterialSlot, UpAxis};
+use crate::mesh::{MaterialSlot, UpAxis};
 use crate::pluralise::pluralise;
 use crate::warning::Warning;
 

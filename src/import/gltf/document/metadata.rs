@@ -1,7 +1,7 @@
 //! What a glTF document says of itself, for reports: read from the JSON alone, so that nothing here depends on what is drawn.
 
+use crate::import::FileMetadata;
 use crate::import::metadata::tidy;
-use crate::mesh::FileMetadata;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
