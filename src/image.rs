@@ -1,5 +1,7 @@
 //! A finished picture.
 
+use crate::srgb::srgb_to_linear;
+
 /// sRGB colours with straight (not premultiplied) alpha, 8 bits a channel, rows from the top.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Image {
@@ -39,11 +41,6 @@ pub enum ImageFormat {
     Webp,
     /// Lossy, opaque.
     Jpeg,
-}
-
-/// The sRGB transfer function, encoded 0..1 to linear 0..1 (IEC 61966-2-1).
-pub fn srgb_to_linear(v: f64) -> f64 {
-    if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
 }
 
 /// `thresholds[k]` is the smallest linear value that is stored as `k + 1` or more: rounding to the nearest of 256 sRGB

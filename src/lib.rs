@@ -35,6 +35,7 @@ pub mod request;
 pub mod scene;
 pub mod service;
 pub mod spec;
+pub mod srgb;
 pub mod telemetry;
 pub(crate) mod texture;
 pub mod warning;

@@ -1,7 +1,9 @@
-//! Bytes to [`Mesh`]: opens a bundle, finds its mesh, sniffs the format from the bytes and calls its importer.
+//! Bytes to [`Mesh`]: opens a bundle, finds its mesh, sniffs the format from the bytes and calls
+//! its importer.
 //!
-//! Reading order: [`bundle`] (what comes in, and what names in it mean), [`formats`] (the table of formats), [`raw`] (what an importer
-//! fills), `obj`, `stl`, `ply`, `off`, `fbx`, `three_mf` and `gltf` (the importers), `normalise` (raw to `Mesh`).
+//! Reading order: [`bundle`] (what comes in, and what names in it mean), [`formats`] (the table of
+//! formats), [`raw`] (what an importer fills), `obj`, `stl`, `ply`, `off`, `fbx`, `three_mf` and
+//! `gltf` (the importers), `normalise` (raw to `Mesh`).
 
 mod affine;
 pub mod bundle;
@@ -26,7 +28,6 @@ mod three_mf;
 
 pub use bundle::{Bundle, BundleFile, Folder};
 pub use error::{MeshError, MeshFault};
-pub use formats::Format;
 pub use report::{FileContent, FileMetadata, ImportReport};
 
 use context::Context;
@@ -39,12 +40,36 @@ use crate::mesh::Mesh;
 use crate::warning::Warning;
 use bundle::{entry, unzip};
 
-/// What is said of a mesh beside its bytes.
+/// The mesh formats that are read. [`formats::FORMATS`] has a row for each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Format {
+    /// Wavefront OBJ.
+    #[default]
+    Obj,
+    /// glTF 2.0 JSON.
+    Gltf,
+    /// glTF 2.0 binary container.
+    Glb,
+    /// Binary STL.
+    StlBinary,
+    /// ASCII STL.
+    StlAscii,
+    /// PLY of any encoding.
+    Ply,
+    /// Geomview's object file format, text or binary.
+    Off,
+    /// Autodesk FBX, binary or ASCII.
+    Fbx,
+    /// 3MF, a zip package of XML.
+    ThreeMf,
+}
+
+/// Options of an import.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Options {
-    /// Overrides sniffing.
+    /// Format of the mesh. None: by sniffing.
     pub format: Option<Format>,
-    /// The moment of the file's first animation that is drawn, seconds; None: the file as its animations find it.
+    /// Moment of the file's first animation, in seconds. None: the rest pose.
     pub time_s: Option<f64>,
 }
 
@@ -57,7 +82,7 @@ impl From<Option<Format>> for Options {
 /// A mesh, and what its import reports beside it.
 #[derive(Clone, Debug)]
 pub struct Imported {
-    /// The mesh.
+    /// The file of the mesh.
     pub mesh: Mesh,
     /// Counts, repairs, warnings and metadata.
     pub report: ImportReport,
@@ -74,7 +99,7 @@ pub fn import(
     open(bundle, options.into(), limits, budget, deadline, normalise)
 }
 
-/// Reads all of a file that [`import`] reads, and reports what is in it, whether there is anything to draw or not.
+/// Reads everything that [`import`] reads, and returns its report even if there is nothing to draw.
 pub fn survey(
     bundle: &Bundle,
     options: impl Into<Options>,
@@ -85,7 +110,7 @@ pub fn survey(
     open(bundle, options.into(), limits, budget, deadline, |raw, _| Ok(raw.report))
 }
 
-/// Finds the mesh of a bundle, reads it, and has it finished.
+/// Finds the mesh of a bundle, reads it and gives it to `finish`.
 fn open<T>(
     bundle: &Bundle,
     options: Options,
@@ -105,20 +130,12 @@ fn open<T>(
     let (folder, format) = entry::choose(files, bundle.entry.as_deref(), options.format, deadline)?;
     let bytes = &folder.entry().bytes;
     let mut cx = Context { limits, budget, deadline, bundle: &folder, time_s: options.time_s };
-    let mut raw = match format {
-        Format::Obj => obj::read(bytes, &mut cx)?,
-        Format::StlBinary | Format::StlAscii => stl::read(bytes, &mut cx)?,
-        Format::Ply => ply::read(bytes, &mut cx)?,
-        Format::Off => off::read(bytes, &mut cx)?,
-        Format::Fbx => fbx::read(bytes, &mut cx)?,
-        Format::ThreeMf => three_mf::read(&mut cx)?,
-        Format::Gltf | Format::Glb => gltf::read(bytes, &mut cx)?,
-    };
-    if options.time_s.is_some() && !matches!(format, Format::Gltf | Format::Glb) {
+    let mut raw = (format.entry().read)(bytes, &mut cx)?;
+    if options.time_s.is_some() && !format.entry().has_animations {
         let detail = format!("scene.time_s is given, and {format} files have no animation");
         raw.report.warnings.push(Warning { code: "animation_missing", detail });
     }
-    // As with errors: what a file repeats here has ended long before.
+    // As with errors: longer details only repeat content of the file.
     for warning in raw.report.warnings.iter_mut().filter(|warning| warning.detail.len() > DETAIL_CHARS_MAX) {
         warning.detail = text::cut(&warning.detail, DETAIL_CHARS_MAX);
     }

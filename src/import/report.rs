@@ -1,4 +1,4 @@
-//! What an import reports beside the mesh: counts, repairs, warnings and the file's metadata.
+//! The report of an import: counts, repairs, warnings and the file's metadata.
 
 use super::Format;
 use crate::warning::Warning;
@@ -10,23 +10,33 @@ pub struct ImportReport {
     pub format: Format,
     /// Vertices in the file, before welding.
     pub file_vertices: u64,
-    /// Totals of the file's meshes, shown or not, each counted once. None for all formats but glTF, the only one whose
-    /// files declare them.
+    /// Totals of the file's meshes, shown or not, each counted once. None for all formats but glTF,
+    /// the only one whose files declare them.
     pub content: Option<FileContent>,
-    /// Polygons in the file: `polygons_by_arity[k]` counts those with `k` corners (12 and more share the last place).
+    /// Polygons in the file: `polygons_by_arity[k]` counts those with `k` corners (12 and more
+    /// share the last place).
     pub polygons_by_arity: [u64; 13],
     /// Faces dropped because a corner is NaN or infinite.
     pub dropped_nonfinite_faces: u64,
-    /// Faces dropped because two corners are equal or all lie on one line, exactly, in the file's own numbers.
+    /// Faces dropped because two corners are equal or all lie on one line, exactly, in the file's
+    /// own numbers.
     pub dropped_degenerate_faces: u64,
-    /// Faces dropped because welding merged two of their corners: they are too small beside the whole mesh for 24 bits.
+    /// Faces dropped because welding merged two of their corners: they are too small beside the
+    /// whole mesh for 24 bits.
     pub dropped_collapsed_faces: u64,
-    /// Line segments and points dropped: those with NaN or infinite ends, and segments without a length.
+    /// Line segments and points dropped: those with NaN or infinite ends, and segments without a
+    /// length.
     pub dropped_lines_and_points: u64,
     /// Notes for the user, each with a stable code.
     pub warnings: Vec<Warning>,
     /// Metadata of the file.
     pub metadata: FileMetadata,
+}
+
+/// A warning for each kind of thing that occurred: its count, its code, and a sentence that the count ends.
+pub fn counted_warnings<const N: usize>(kinds: [(u64, &'static str, &str); N]) -> impl Iterator<Item = Warning> {
+    let occurred = kinds.into_iter().filter(|(count, ..)| *count > 0);
+    occurred.map(|(count, code, what)| Warning { code, detail: format!("{what} {count})") })
 }
 
 /// Totals of a file's meshes, as its own accessors count them, each mesh once.

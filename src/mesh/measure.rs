@@ -1,6 +1,7 @@
 //! How large a mesh is, in file units, for `inspect`.
 
 use super::Mesh;
+use super::vector::{cross, dot, sub};
 
 /// Area and volume; None where the number is beyond what an f64 can hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,7 +18,6 @@ impl Measures {
         let (mut area, mut volume) = (0.0, 0.0);
         for t in mesh.own_triangles() {
             let [a, b, c] = t.map(|v| mesh.positions[v as usize].map(f64::from));
-            let sub = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
             let n = cross(sub(b, a), sub(c, a));
             area += dot(n, n).sqrt() / 2.0;
             volume += dot(a, cross(b, c)) / 6.0;
@@ -31,12 +31,4 @@ impl Measures {
 fn held(value: f64, factors: [f64; 3]) -> Option<f64> {
     let product = factors.into_iter().fold(value, |product, factor| product * factor);
     (product.is_normal() || value == 0.0).then_some(product)
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

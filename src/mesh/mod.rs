@@ -7,6 +7,7 @@ pub mod normals;
 pub mod primitives;
 pub mod topology;
 pub(crate) mod union_find;
+pub(crate) mod vector;
 
 pub use material::MaterialSlot;
 pub use primitives::LineOrPoint;

@@ -1,6 +1,6 @@
 //! Colour: sRGB in documents and files, linear light everywhere between.
 
-use crate::image::srgb_to_linear;
+use crate::srgb::srgb_to_linear;
 
 /// A linear-light colour with straight alpha.
 #[derive(Clone, Copy, Debug, PartialEq)]

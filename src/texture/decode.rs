@@ -5,8 +5,8 @@
 
 use std::io::{BufRead, Cursor, Seek};
 
-use crate::image::srgb_to_linear;
 use crate::plan::PlanError;
+use crate::srgb::srgb_to_linear;
 use crate::texture::basis;
 use crate::texture::basis::{BasisHeader, KTX2_MAGIC};
 use crate::texture::png::Essentials;

@@ -1,23 +1,24 @@
 //! Colours as OFF files store them: whole numbers to 255, or fractions to 1.
 
 use super::Number;
-use crate::import::raw::srgb_to_linear;
+use crate::srgb::srgb_to_linear;
 
-/// Of what has no colour where others have one.
+/// The colour of elements without one, where others have one.
 pub const WHITE: [f32; 4] = [1.0; 4];
 
-/// Colours of one kind of thing, as read. What is above 1 anywhere in the file says what 1 means.
+/// Colours of vertices or of faces, as read. A value above 1 anywhere in the file means a scale of
+/// 0 to 255.
 #[derive(Debug, Default)]
 pub struct Colors {
     /// Components as they are in the file; alpha is negative where it has none.
     stored: Vec<[f32; 4]>,
-    /// Whether all components are written as whole numbers.
+    /// True if all components are written as whole numbers.
     whole: Vec<bool>,
     whole_max: f32,
     fraction_max: f32,
 }
 
-/// What a colour takes.
+/// Bytes per colour.
 pub const COLOR_BYTES: u64 = 16 + 1;
 
 impl Colors {
@@ -27,12 +28,12 @@ impl Colors {
         self.whole.reserve_exact(count);
     }
 
-    /// How many there are.
+    /// Their number.
     pub fn len(&self) -> usize {
         self.stored.len()
     }
 
-    /// Whether two are equal; false for numbers that no colour has.
+    /// True if two are equal; false for numbers that no colour has.
     pub fn are_same(&self, a: u32, b: u32) -> bool {
         let of = |number: u32| self.stored.get(number as usize).zip(self.whole.get(number as usize));
         // White is not a number, and equal to itself.
@@ -40,8 +41,8 @@ impl Colors {
         bits(a).is_some() && bits(a) == bits(b)
     }
 
-    /// Appends a colour of three or four components. Any other number of them is no colour, and white: a single one is an index
-    /// into a table that is not in the file.
+    /// Appends a colour of three or four components. Any other number of them is no colour, and
+    /// white: a single one is an index into a table that is not in the file.
     pub fn push(&mut self, components: &[Number]) {
         let mut color = [0.0, 0.0, 0.0, -1.0];
         if !(3..=4).contains(&components.len()) {

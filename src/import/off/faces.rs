@@ -9,13 +9,13 @@ use crate::import::raw::RawMesh;
 use crate::mesh::LineOrPoint;
 use crate::warning::Warning;
 
-/// What a face's colour and a vertex that only faces of one colour share take at most.
+/// Most bytes of a face's colour and of a vertex that only faces of one colour share.
 const COLORED_BYTES: u64 = COLOR_BYTES + 4 + 16;
 const VERTEX_BYTES: u64 = 2 * (24 + 12 + 8 + 16) + 4 + 4;
 
 const UNSEEN: u32 = u32::MAX;
 
-/// What is known of the faces so far.
+/// The faces read so far.
 pub struct Faces {
     vertices: u32,
     count: u64,
@@ -87,7 +87,8 @@ impl Faces {
         Ok(())
     }
 
-    /// Gives the vertices their faces' colours, and a cloud of points its points. How many faces are nothing.
+    /// Gives the vertices their faces' colours, and a cloud of points its points. How many faces
+    /// are nothing.
     pub fn finish(self, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<u64, MeshError> {
         if self.count == 0 {
             cx.budget.spend("lines and points", u64::from(self.vertices), size_of::<LineOrPoint>() as u64)?;
@@ -151,7 +152,7 @@ impl Split {
     }
 }
 
-/// Appends what a vertex has, if vertices have it.
+/// Appends a copy of a vertex's value, if vertices have the attribute.
 fn copy<T: Copy>(all: &mut Vec<T>, vertex: u32) {
     if let Some(&value) = all.get(vertex as usize) {
         all.push(value);

@@ -10,8 +10,8 @@ use crate::support::mesh_files::{Read, Solid, read, read_limited};
 use crate::support::server::Server;
 use meshsnap::import::{Bundle, Format, MeshFault, import};
 use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::material::{AlphaMode, ImageContent};
 use meshsnap::mesh::UpAxis;
+use meshsnap::mesh::material::{AlphaMode, ImageContent};
 
 type Writer = fn(&[Node]) -> Vec<u8>;
 

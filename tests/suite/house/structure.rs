@@ -6,19 +6,21 @@ use std::path::{Path, PathBuf};
 /// Rooms under `src/`, and what each may name of the others. A file belongs to the room with the longest name that begins its path.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("limits", &[]),
-    ("image", &[]),
+    // One transfer function for everything that reads or writes displayed colours.
+    ("srgb", &[]),
+    ("image", &["srgb"]),
     ("warning", &[]),
     ("pluralise", &[]),
     ("mesh", &["limits", "warning"]),
-    ("import", &["mesh", "limits", "warning", "pluralise"]),
+    ("import", &["mesh", "limits", "srgb", "warning", "pluralise"]),
     ("report", &["import", "mesh", "limits", "warning", "pluralise"]),
-    ("spec", &["mesh", "image", "limits"]),
+    ("spec", &["mesh", "image", "limits", "srgb"]),
     ("request", &["spec", "mesh", "image", "limits"]),
-    ("texture", &["mesh", "limits"]),
+    ("texture", &["mesh", "limits", "srgb"]),
     ("scene", &["spec", "mesh", "limits"]),
     ("plan", &["scene", "spec", "texture", "mesh", "image", "limits", "warning"]),
     // Of spec the choice of a back-end alone.
-    ("backend", &["plan", "spec", "image", "limits"]),
+    ("backend", &["plan", "spec", "image", "limits", "srgb"]),
     ("encode", &["image"]),
     (
         "pipeline",

@@ -83,7 +83,7 @@ fn shown(display: [f32; 3]) -> [f32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::srgb_to_linear;
+    use crate::srgb::srgb_to_linear;
 
     #[test]
     fn display_values_are_decoded() {

@@ -1,4 +1,4 @@
-//! Textures, samplers and images: what a material's use of a texture refers to.
+//! Textures, samplers and images of materials.
 
 use crate::import::MeshError;
 use crate::import::context::Context;
@@ -20,13 +20,15 @@ pub struct Images {
     pub sources: Vec<ImageSource>,
     /// Index into `sources` by the file's image index.
     known: BTreeMap<usize, u32>,
-    /// What was parsed, by the file's indices: materials may share one whose description is long.
+    /// Parsed entries by the file's indices. Materials may share them, and parsing each again could
+    /// be quadratic.
     textures: BTreeMap<usize, model::Texture>,
     samplers: BTreeMap<usize, model::Sampler>,
 }
 
 impl Images {
-    /// What a texture of the file refers to; `what` names the material. None where the texture has no image.
+    /// The image and sampler of a texture. `what` names the material. None if the texture has no
+    /// image.
     pub fn texture(
         &mut self,
         what: &str,
@@ -46,7 +48,7 @@ impl Images {
         cx.deadline.check()?;
         let texture: model::Texture = once(&mut self.textures, "texture", &lists.textures, index, cx)?;
         let in_other = |other: &Option<model::OtherSource>| other.as_ref().and_then(|other| other.source);
-        // Basis Universal last: what else there is has lost less.
+        // Basis Universal last: the other formats have lost less.
         let image = in_other(&texture.extensions.webp).or(texture.source).or(in_other(&texture.extensions.basisu));
         let Some(image) = image else {
             let detail = format!("texture {index} has no image that is read; it is drawn as if it were white");
@@ -97,7 +99,7 @@ impl Images {
     }
 }
 
-/// An entry of a list, parsed when it is first asked for.
+/// An entry of a list, parsed on first use.
 fn once<'a, T: Clone + Deserialize<'a>>(
     known: &mut BTreeMap<usize, T>,
     kind: &str,
@@ -161,8 +163,9 @@ fn wrap(mode: Option<f64>) -> Wrap {
     }
 }
 
-/// Scaled, then turned counter-clockwise as the image is seen (v runs down), then moved. The extension's own example fixes
-/// the direction: a quarter turn and an offset of (0, 1) show the lower left quadrant.
+/// Scales, then rotates counter-clockwise as the image is seen (v runs down), then translates. The
+/// extension's own example fixes the direction: a quarter turn and an offset of (0, 1) show the
+/// lower left quadrant.
 fn transform(json: &Transform) -> [[f32; 3]; 2] {
     // Large enough for any atlas, small enough that no product of two is infinite.
     let tame = |v: f64| v.clamp(-1e6, 1e6);

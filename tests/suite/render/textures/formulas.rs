@@ -164,5 +164,5 @@ fn level(k: u32) -> u8 {
 }
 
 fn linear(byte: u8) -> f32 {
-    meshsnap::image::srgb_to_linear(f64::from(byte) / 255.0) as f32
+    meshsnap::srgb::srgb_to_linear(f64::from(byte) / 255.0) as f32
 }
