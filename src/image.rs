@@ -2,25 +2,25 @@
 
 use crate::srgb::srgb_to_linear;
 
-/// sRGB colours with straight (not premultiplied) alpha, 8 bits a channel, rows from the top.
+/// Pixels in sRGB with straight (not premultiplied) alpha, 8 bits per channel, rows from the top.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Image {
-    /// Pixels in a row.
+    /// Columns.
     pub width_px: u32,
     /// Rows.
     pub height_px: u32,
-    /// `width_px * height_px` times R, G, B, A.
+    /// R, G, B and A of each pixel, `width_px * height_px * 4` bytes.
     pub rgba: Vec<u8>,
 }
 
 impl Image {
-    /// The colour at column `x`, row `y`.
+    /// R, G, B and A at column `x`, row `y`.
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
         let i = (y as usize * self.width_px as usize + x as usize) * 4;
         [self.rgba[i], self.rgba[i + 1], self.rgba[i + 2], self.rgba[i + 3]]
     }
 
-    /// Whether every pixel is fully opaque, so that an encoder may drop the alpha channel.
+    /// Whether every pixel is fully opaque. Then an encoder may drop the alpha channel.
     pub fn is_opaque(&self) -> bool {
         self.rgba.chunks_exact(4).all(|p| p[3] == 255)
     }
@@ -32,19 +32,22 @@ impl std::fmt::Debug for Image {
     }
 }
 
-/// File format of the picture.
+/// The file format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageFormat {
-    /// Lossless, the default.
+    /// PNG: lossless, the default.
     Png,
-    /// Lossless WebP.
+    /// WebP, always lossless here.
     Webp,
-    /// Lossy, opaque.
+    /// JPEG: lossy, without alpha.
     Jpeg,
 }
 
-/// `thresholds[k]` is the smallest linear value that is stored as `k + 1` or more: rounding to the nearest of 256 sRGB
-/// levels, as a table that both back-ends search, so that both store the same byte.
+/// The 255 linear values at which the stored sRGB byte changes: `thresholds[k]` is the smallest
+/// that is stored as `k + 1` or more.
+///
+/// Both back-ends search this table to round to the nearest of 256 levels, so both store the same
+/// byte.
 pub fn srgb8_thresholds() -> [f32; 255] {
     std::array::from_fn(|k| srgb_to_linear((k as f64 + 0.5) / 255.0) as f32)
 }

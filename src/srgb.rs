@@ -1,6 +1,10 @@
-//! The sRGB transfer function, for everything that turns displayed colours into linear light.
+//! The sRGB transfer function. Colours are computed in linear light; files and pictures store them
+//! as sRGB.
 
-/// Encoded to linear (IEC 61966-2-1). It maps 0..1 to 0..1 and continues beyond 1.
+/// The linear value of an sRGB component (IEC 61966-2-1): 0 to 1 becomes 0 to 1, and the same curve
+/// goes on beyond 1.
+///
+/// `libm::pow` has the same bits on every machine, which the platform's own does not promise.
 pub fn srgb_to_linear(v: f64) -> f64 {
     if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
 }

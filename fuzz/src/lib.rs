@@ -201,7 +201,7 @@ fn no_gpu() -> Arc<GpuHost> {
     Arc::new(GpuHost::new(HardwareHint::None { reason: "targets draw on the CPU".into() }))
 }
 
-/// What is before the first zero byte, and what is behind it.
+/// The bytes before the first zero byte, and those after it.
 fn split(bytes: &[u8]) -> (&[u8], &[u8]) {
     let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
     (&bytes[..end], bytes.get(end + 1..).unwrap_or_default())

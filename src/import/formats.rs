@@ -6,7 +6,13 @@ use super::context::Context;
 use super::raw::RawMesh;
 use super::{Format, MeshError, fbx, gltf, obj, off, ply, stl, three_mf};
 
-/// Everything that the program knows of one format beside its importer.
+/// A sniffing test, and the strength of its evidence.
+pub type Test = (Evidence, fn(&[u8]) -> bool);
+
+/// Finds the first file to read among the unpacked files of a package, or None if they are none.
+pub type PackageStart = fn(&[BundleFile]) -> Option<usize>;
+
+/// A row of the table: everything about one format beside its importer.
 pub struct FormatEntry {
     /// The format.
     pub format: Format,
@@ -18,10 +24,10 @@ pub struct FormatEntry {
     pub list_label: &'static str,
     /// File extensions in lower case, without the dot.
     pub extensions: &'static [&'static str],
-    /// Tests for bytes of this format, each with how much it proves.
-    pub tests: &'static [(Evidence, fn(&[u8]) -> bool)],
-    /// For formats that are a zip package: finds the file to begin with among the unpacked ones.
-    pub package_start: Option<fn(&[BundleFile]) -> Option<usize>>,
+    /// Tests that recognise bytes of the format.
+    pub tests: &'static [Test],
+    /// For formats that are a zip package.
+    pub package_start: Option<PackageStart>,
     /// Reads a file of the format, given its bytes.
     pub read: fn(&[u8], &mut Context<'_>) -> Result<RawMesh, MeshError>,
     /// True if a file can have animations, and so a `scene.time_s`.

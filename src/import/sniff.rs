@@ -4,7 +4,7 @@
 //! first; between them stand refusals of what a weaker test would take for a mesh.
 
 use super::bundle::is_zip;
-use super::formats::{Evidence, FORMATS};
+use super::formats::{Evidence, FORMATS, Test};
 use super::text::is_utf16;
 use super::{Format, MeshError, MeshFault, text};
 
@@ -41,9 +41,7 @@ fn find(bytes: &[u8], subject: &str) -> Result<(Format, Evidence), MeshError> {
         if evidence == Evidence::Keyword && text::trim_start(bytes).starts_with(b"{") {
             return Err(unrecognised(&format!("{subject} is JSON but not glTF: there is no \"asset\" property")));
         }
-        let passes = |tests: &[(Evidence, fn(&[u8]) -> bool)]| {
-            tests.iter().any(|(of_test, test)| *of_test == evidence && test(bytes))
-        };
+        let passes = |tests: &[Test]| tests.iter().any(|(of_test, test)| *of_test == evidence && test(bytes));
         if let Some(entry) = FORMATS.iter().find(|entry| passes(entry.tests)) {
             return Ok((entry.format, evidence));
         }

@@ -6,7 +6,6 @@ use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::{Fronts, fronts};
-use crate::mesh::vector::{cross, dot};
 use crate::plan::{Edge, Side};
 use crate::scene::material_groups::{Fill, MaterialGroups};
 use crate::spec::{Cull, Layers};
@@ -97,6 +96,14 @@ impl<'a> Silhouettes<'a> {
 fn least_axis(v: [f64; 3]) -> [f64; 3] {
     let least = (0..3).min_by(|&a, &b| v[a].abs().total_cmp(&v[b].abs()));
     std::array::from_fn(|k| if Some(k) == least { 1.0 } else { 0.0 })
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
 }
 
 /// The side that is seen of no face: inside a closed surface, all of which is drawn from outside and lets nothing through.

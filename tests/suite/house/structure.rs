@@ -6,21 +6,21 @@ use std::path::{Path, PathBuf};
 /// Rooms under `src/`, and what each may name of the others. A file belongs to the room with the longest name that begins its path.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("limits", &[]),
-    // One transfer function for everything that reads or writes displayed colours.
+    // The transfer function that importers, colours of a request, textures and the stored byte share.
     ("srgb", &[]),
     ("image", &["srgb"]),
     ("warning", &[]),
     ("pluralise", &[]),
     ("mesh", &["limits", "warning"]),
-    ("import", &["mesh", "limits", "srgb", "warning", "pluralise"]),
+    ("import", &["mesh", "srgb", "limits", "warning", "pluralise"]),
     ("report", &["import", "mesh", "limits", "warning", "pluralise"]),
-    ("spec", &["mesh", "image", "limits", "srgb"]),
+    ("spec", &["mesh", "image", "srgb", "limits"]),
     ("request", &["spec", "mesh", "image", "limits"]),
-    ("texture", &["mesh", "limits", "srgb"]),
+    ("texture", &["mesh", "srgb", "limits"]),
     ("scene", &["spec", "mesh", "limits"]),
     ("plan", &["scene", "spec", "texture", "mesh", "image", "limits", "warning"]),
     // Of spec the choice of a back-end alone.
-    ("backend", &["plan", "spec", "image", "limits", "srgb"]),
+    ("backend", &["plan", "spec", "image", "srgb", "limits"]),
     ("encode", &["image"]),
     (
         "pipeline",
