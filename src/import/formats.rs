@@ -207,7 +207,7 @@ impl Format {
     }
 
     /// Its row of the table.
-    pub fn entry(self) -> &'static FormatEntry {
+    pub(crate) fn entry(self) -> &'static FormatEntry {
         // A test finds a row for each.
         FORMATS.iter().find(|entry| entry.format == self).unwrap_or(&FORMATS[0])
     }

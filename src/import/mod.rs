@@ -1,9 +1,8 @@
-//! Bytes to [`Mesh`]: opens a bundle, finds its mesh, sniffs the format from the bytes and calls
-//! its importer.
+//! Bytes to [`Mesh`]: unpacks a bundle, finds its mesh, sniffs the format and calls the importer.
 //!
-//! Reading order: [`bundle`] (what comes in, and what names in it mean), [`formats`] (the table of
-//! formats), [`raw`] (what an importer fills), `obj`, `stl`, `ply`, `off`, `fbx`, `three_mf` and
-//! `gltf` (the importers), `normalise` (raw to `Mesh`).
+//! Reading order: [`bundle`] (the upload, and the files that names refer to), `formats` (the table
+//! of formats), `sniff`, [`raw`] (the mesh that an importer fills), the importers `obj`, `stl`,
+//! `ply`, `off`, `fbx`, `three_mf` and `gltf`, and `normalise` (raw mesh to `Mesh`).
 
 mod affine;
 pub mod bundle;
@@ -40,7 +39,7 @@ use crate::mesh::Mesh;
 use crate::warning::Warning;
 use bundle::{entry, unzip};
 
-/// The mesh formats that are read. [`formats::FORMATS`] has a row for each.
+/// The mesh formats that are read. The table in `formats` has a row for each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
     /// Wavefront OBJ.
@@ -79,10 +78,10 @@ impl From<Option<Format>> for Options {
     }
 }
 
-/// A mesh, and what its import reports beside it.
+/// The result of an import.
 #[derive(Clone, Debug)]
 pub struct Imported {
-    /// The file of the mesh.
+    /// The mesh in its normal form.
     pub mesh: Mesh,
     /// Counts, repairs, warnings and metadata.
     pub report: ImportReport,
@@ -121,7 +120,7 @@ fn open<T>(
 ) -> Result<T, MeshError> {
     let files = match bundle.files.as_slice() {
         [archive] if bundle.is_zip => unzip::unzip(&archive.bytes, limits, budget, deadline)?,
-        // Clones of shared bytes.
+        // Cheap: clones share their bytes.
         files => {
             bundle.check_sent()?;
             files.to_vec()

@@ -33,7 +33,8 @@ pub struct ImportReport {
     pub metadata: FileMetadata,
 }
 
-/// A warning for each kind of thing that occurred: its count, its code, and a sentence that the count ends.
+/// A warning for each kind of thing that occurred: its count, its code, and a sentence that the
+/// count ends.
 pub fn counted_warnings<const N: usize>(kinds: [(u64, &'static str, &str); N]) -> impl Iterator<Item = Warning> {
     let occurred = kinds.into_iter().filter(|(count, ..)| *count > 0);
     occurred.map(|(count, code, what)| Warning { code, detail: format!("{what} {count})") })

@@ -41,7 +41,7 @@ impl Folder {
         folder
     }
 
-    /// The file of the mesh.
+    /// The file that holds the mesh.
     pub fn entry(&self) -> &BundleFile {
         &self.files[self.entry]
     }

@@ -144,7 +144,7 @@ impl BundleFile {
     }
 }
 
-/// True if these bytes are a zip archive with at least one entry.
+/// True if the bytes are a zip archive with at least one entry.
 pub fn is_zip(bytes: &[u8]) -> bool {
     bytes.starts_with(b"PK\x03\x04")
 }

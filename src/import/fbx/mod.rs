@@ -1,9 +1,9 @@
 //! Autodesk FBX, binary and ASCII, parsed by `ufbx`. The library gets bytes, a cap on memory and a
 //! deadline callback, and opens no file. Indices that it returns are checked again.
 //!
-//! [`costs`] and [`bombs`] refuse files that would take it too long or too much memory, [`visibility`]
-//! finds hidden nodes, [`geometry`] places meshes and cuts their polygons, [`materials`] makes
-//! slots and images.
+//! [`costs`] and [`bombs`] refuse files that would take it too long or too much memory,
+//! [`visibility`] finds hidden nodes, [`geometry`] places meshes and cuts their polygons,
+//! [`materials`] makes slots and images.
 
 mod bombs;
 mod costs;

@@ -13,8 +13,8 @@ mod primitive;
 mod scene;
 
 use self::document::check;
-use self::document::model::Lists;
-use self::document::tree::Document;
+use self::document::lists::Lists;
+use self::document::schema::Document;
 use self::material::Materials;
 use self::primitive::shape::Shape;
 use self::primitive::{Primitive, triangles};
@@ -43,7 +43,7 @@ pub fn is_gltf(bytes: &[u8]) -> bool {
     text.starts_with(b"{") && text.windows(7).any(|word| word == b"\"asset\"")
 }
 
-/// Reads either kind.
+/// Reads either kind of file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut raw = RawMesh::default();
     let (json, bin) = if is_glb(bytes) {
@@ -99,7 +99,7 @@ struct Meshes<'a> {
 }
 
 impl Meshes<'_> {
-    /// Adds a mesh as one node shows it.
+    /// Adds one instance of a mesh.
     fn show(&mut self, instance: &Instance, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
         cx.deadline.check()?;
         let primitives = self.primitives(instance.mesh, &mut raw.report.warnings, cx)?;

@@ -8,14 +8,14 @@ use crate::import::MeshError;
 use crate::import::context::Context;
 use std::ops::Range;
 
-/// Slots of what a vertex may have.
+/// Slots of a vertex's numbers.
 const POSITION: Range<usize> = 0..3;
 const NORMAL: Range<usize> = 3..6;
 const COLOR: Range<usize> = 6..9;
 const ALPHA: usize = 9;
 const UV: Range<usize> = 10..12;
 
-/// Vertices that are read at once: few enough that their columns stay in the nearest caches.
+/// Vertices per block: few enough that their columns stay in the nearest caches.
 const BLOCK: usize = 512;
 /// Blocks between two deadline checks.
 const BLOCKS_PER_POLL: u64 = 128;
@@ -25,7 +25,7 @@ const BLOCKS_PER_POLL: u64 = 128;
 pub struct Vertices {
     /// One per vertex.
     pub positions: Vec<[f64; 3]>,
-    /// True if those are stored as f32.
+    /// True if positions are stored as f32.
     pub is_f32: bool,
     /// One per vertex, or empty.
     pub normals: Vec<[f32; 3]>,
@@ -106,7 +106,7 @@ fn slot(name: &str) -> Option<Slot> {
 }
 
 impl Vertices {
-    /// Room for all that the layout has. The header's count has been held against the length of the
+    /// Reserves room for all values of the layout. The count was checked against the length of the
     /// file.
     fn reserve(layout: &Layout, count: u64, cx: &mut Context<'_>) -> Result<Self, MeshError> {
         let room = |is_there: bool| if is_there { count as usize } else { 0 };

@@ -19,7 +19,7 @@ const HEADER_BYTES: usize = 84;
 /// Bytes per triangle: a normal, three corners and two attribute bytes.
 const TRIANGLE_BYTES: usize = 50;
 
-/// Reads either kind.
+/// Reads either kind of file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     if !is_exact_binary(bytes) && is_ascii(bytes) {
         read_ascii(text::trim_start(bytes), cx)

@@ -19,7 +19,7 @@ pub struct Parts {
 /// An object of a part.
 pub type Key = (usize, u32);
 
-/// Reads them.
+/// Reads all of them.
 pub fn read(raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Parts, MeshError> {
     let folder = cx.bundle;
     let first = folder.entry();

@@ -5,7 +5,7 @@ use super::attribute::{Component, INDICES, Kind, Rule, decode_unsigned};
 use super::buffers::{Buffers, View};
 use crate::import::MeshError;
 use crate::import::context::Context;
-use crate::import::gltf::document::tree::{Accessor, Document, Sparse};
+use crate::import::gltf::document::schema::{Accessor, Document, Sparse};
 
 /// Elements without data that even the smallest file may declare.
 const ZEROS_MAX: u64 = 1 << 16;

@@ -3,7 +3,7 @@
 
 use super::meshopt;
 use crate::import::context::Context;
-use crate::import::gltf::document::tree::{Buffer, BufferView, Document};
+use crate::import::gltf::document::schema::{Buffer, BufferView, Document};
 use crate::import::{MeshError, MeshFault, text};
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};

@@ -8,7 +8,7 @@
 use super::meshopt_filters as filters;
 use crate::import::MeshError;
 use crate::import::context::Context;
-use crate::import::gltf::document::tree::Meshopt;
+use crate::import::gltf::document::schema::Meshopt;
 
 /// The unpacked bytes of view `index`, which declares `view_bytes` of them.
 pub fn decode(

@@ -1,8 +1,8 @@
 //! Checks the document as a whole before any data is read: references lead somewhere, and related
 //! sizes agree. Data is checked where it is read, and materials where they are used.
 
-use super::model::{Index, Lists};
-use super::tree::{Attributes, Document, Mesh, Node, mode};
+use super::lists::{Index, Lists};
+use super::schema::{Attributes, Document, Mesh, Node, mode};
 use crate::import::MeshError;
 
 /// Fails where a picture of the file would be a guess.
@@ -80,7 +80,7 @@ fn check_mesh(doc: &Document, lists: &Lists<'_>, index: usize, mesh: &Mesh) -> R
         if primitive.mode() > mode::TRIANGLE_FAN {
             return Err(broken(&what(), "has an unknown mode"));
         }
-        let targets = |primitive: &super::tree::Primitive| primitive.targets.len();
+        let targets = |primitive: &super::schema::Primitive| primitive.targets.len();
         if targets(primitive) != targets(&mesh.primitives[0]) {
             return Err(broken(&what(), "has more or fewer morph targets than the mesh's first"));
         }
@@ -143,7 +143,7 @@ fn check_node(doc: &Document, index: usize, node: &Node) -> Result<(), MeshError
     refer("mesh", mesh, doc.meshes.len(), what)?;
     let mesh = &doc.meshes[mesh.0];
     check_weights(&what(), node.weights.as_deref(), mesh)?;
-    let is_rigid = |primitive: &super::tree::Primitive| !primitive.attributes.contains_key("JOINTS_0");
+    let is_rigid = |primitive: &super::schema::Primitive| !primitive.attributes.contains_key("JOINTS_0");
     if node.skin.is_some() && mesh.primitives.iter().any(is_rigid) {
         return Err(broken(&what(), "has a skin, and a mesh of which a part has no JOINTS_0"));
     }

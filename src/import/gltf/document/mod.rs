@@ -1,10 +1,10 @@
 //! The JSON document: measured and paid for before it is parsed.
 
 pub(crate) mod check;
+pub(crate) mod lists;
 pub(crate) mod metadata;
-pub(crate) mod model;
-pub(crate) mod tree;
-use self::tree::Document;
+pub(crate) mod schema;
+use self::schema::Document;
 use crate::import::context::Context;
 use crate::import::{MeshError, MeshFault, text};
 use crate::limits;
@@ -162,14 +162,14 @@ mod tests {
 
     #[test]
     fn the_price_of_an_object_covers_every_type() {
-        use crate::import::gltf::document::tree;
+        use crate::import::gltf::document::schema;
         let sizes = [
-            size_of::<tree::Node>(),
-            size_of::<tree::Accessor>(),
-            size_of::<tree::Primitive>(),
-            size_of::<tree::Mesh>(),
-            size_of::<tree::BufferView>(),
-            size_of::<tree::Skin>(),
+            size_of::<schema::Node>(),
+            size_of::<schema::Accessor>(),
+            size_of::<schema::Primitive>(),
+            size_of::<schema::Mesh>(),
+            size_of::<schema::BufferView>(),
+            size_of::<schema::Skin>(),
         ];
         for size in sizes {
             assert!(size as u64 * 2 <= BYTES_PER_OBJECT, "{size}");

@@ -5,8 +5,8 @@ use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::buffers;
 use crate::import::gltf::data::buffers::Uri;
-use crate::import::gltf::document::model;
-use crate::import::gltf::document::model::{Lists, TextureInfo, Transform, entry};
+use crate::import::gltf::document::lists;
+use crate::import::gltf::document::lists::{Lists, TextureInfo, Transform, entry};
 use crate::mesh::material::{ImageContent, ImageSource, TextureRef, Wrap};
 use crate::warning::Warning;
 use serde::Deserialize;
@@ -22,8 +22,8 @@ pub struct Images {
     known: BTreeMap<usize, u32>,
     /// Parsed entries by the file's indices. Materials may share them, and parsing each again could
     /// be quadratic.
-    textures: BTreeMap<usize, model::Texture>,
-    samplers: BTreeMap<usize, model::Sampler>,
+    textures: BTreeMap<usize, lists::Texture>,
+    samplers: BTreeMap<usize, lists::Sampler>,
 }
 
 impl Images {
@@ -46,8 +46,8 @@ impl Images {
             )));
         }
         cx.deadline.check()?;
-        let texture: model::Texture = once(&mut self.textures, "texture", &lists.textures, index, cx)?;
-        let in_other = |other: &Option<model::OtherSource>| other.as_ref().and_then(|other| other.source);
+        let texture: lists::Texture = once(&mut self.textures, "texture", &lists.textures, index, cx)?;
+        let in_other = |other: &Option<lists::OtherSource>| other.as_ref().and_then(|other| other.source);
         // Basis Universal last: the other formats have lost less.
         let image = in_other(&texture.extensions.webp).or(texture.source).or(in_other(&texture.extensions.basisu));
         let Some(image) = image else {
@@ -58,7 +58,7 @@ impl Images {
         let image = self.image(index, image.0, lists, reader, cx)?;
         let sampler = match texture.sampler {
             Some(sampler) => once(&mut self.samplers, "sampler", &lists.samplers, sampler.0, cx)?,
-            None => model::Sampler::default(),
+            None => lists::Sampler::default(),
         };
         Ok(Some(TextureRef {
             image,
@@ -88,7 +88,7 @@ impl Images {
         cx.deadline.check()?;
         let raw_bytes = lists.images[index].get().len() as u64;
         cx.budget.spend("a glTF image's description", raw_bytes, 1)?;
-        let image: model::Image = entry("image", &lists.images, index)?;
+        let image: lists::Image = entry("image", &lists.images, index)?;
         let name = name(index, &image);
         let content = content(&name, index, &image, reader, cx)?;
         cx.budget.spend("images", 1, size_of::<ImageSource>() as u64 * 2 + 64)?;
@@ -120,7 +120,7 @@ fn once<'a, T: Clone + Deserialize<'a>>(
 fn content(
     name: &str,
     index: usize,
-    image: &model::Image,
+    image: &lists::Image,
     reader: &mut Reader<'_>,
     cx: &mut Context<'_>,
 ) -> Result<ImageContent, MeshError> {
@@ -142,7 +142,7 @@ fn content(
 }
 
 /// `image 3 ("wood.png")`
-fn name(index: usize, image: &model::Image) -> String {
+fn name(index: usize, image: &lists::Image) -> String {
     let file = image.uri.as_deref().filter(|uri| uri.get(..5).is_none_or(|head| !head.eq_ignore_ascii_case("data:")));
     let known = image.name.as_deref().filter(|name| !name.is_empty()).or(file).unwrap_or_default();
     match buffers::printable(known).as_str() {

@@ -4,8 +4,8 @@ pub(crate) mod images;
 use self::images::Images;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
-use crate::import::gltf::document::model;
-use crate::import::gltf::document::model::{EmissiveStrength, Lists, SpecularGlossiness, TextureInfo, entry};
+use crate::import::gltf::document::lists;
+use crate::import::gltf::document::lists::{EmissiveStrength, Lists, SpecularGlossiness, TextureInfo, entry};
 use crate::import::{MeshError, text};
 use crate::mesh::MaterialSlot;
 use crate::mesh::material::{AlphaMode, TextureRef};
@@ -58,7 +58,7 @@ impl<'a> Materials<'a> {
         if let Some(used) = known {
             return Ok(used.uv_set);
         }
-        let json: model::Material<'_> = entry("material", &self.lists.materials, index)?;
+        let json: lists::Material<'_> = entry("material", &self.lists.materials, index)?;
         let what = format!("material {index}");
         warn_of_undrawn(&what, &json, warnings);
         let mut textures = Textures { what: &what, sets: Vec::new(), materials: self, reader, warnings, cx };
@@ -105,7 +105,7 @@ struct Textures<'t, 'a, 'r, 'c> {
 }
 
 impl Textures<'_, '_, '_, '_> {
-    fn slot(&mut self, json: &model::Material<'_>) -> Result<MaterialSlot, MeshError> {
+    fn slot(&mut self, json: &lists::Material<'_>) -> Result<MaterialSlot, MeshError> {
         let name = text::name(json.name.as_deref().unwrap_or_default());
         let mut slot = MaterialSlot { name, ..MaterialSlot::default() };
         match (&json.pbr_metallic_roughness, self.extension::<SpecularGlossiness>(json, SPECULAR_GLOSSINESS)?) {
@@ -118,7 +118,7 @@ impl Textures<'_, '_, '_, '_> {
                 slot.roughness = other.specular_glossiness_texture.is_none().then(|| share(1.0 - gloss));
             }
             (pbr, _) => {
-                let default = model::Pbr::default();
+                let default = lists::Pbr::default();
                 let pbr = pbr.as_ref().unwrap_or(&default);
                 slot.base_color = Some(color(pbr.base_color_factor.unwrap_or([1.0; 4])));
                 slot.base_texture = self.texture(&pbr.base_color_texture)?;
@@ -161,7 +161,7 @@ impl Textures<'_, '_, '_, '_> {
 
     fn extension<'j, T: Deserialize<'j>>(
         &self,
-        json: &model::Material<'j>,
+        json: &lists::Material<'j>,
         name: &str,
     ) -> Result<Option<T>, MeshError> {
         let Some(raw) = json.extensions.get(name) else { return Ok(None) };
@@ -201,7 +201,7 @@ pub fn is_known(extension: &str) -> bool {
     DRAWN.contains(&extension) || UNDRAWN.iter().any(|(name, _)| *name == extension)
 }
 
-fn warn_of_undrawn(what: &str, json: &model::Material<'_>, warnings: &mut Vec<Warning>) {
+fn warn_of_undrawn(what: &str, json: &lists::Material<'_>, warnings: &mut Vec<Warning>) {
     for name in json.extensions.keys() {
         if let Some((name, code)) = UNDRAWN.iter().find(|(known, _)| known == name) {
             super::warn_once(warnings, code, format!("{name} is not drawn ({what} has it)"));

@@ -5,7 +5,7 @@
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::{Reader, Shape};
 use crate::import::gltf::data::attribute::{INDICES, Rule};
-use crate::import::gltf::document::tree::{Draco, Primitive, mode};
+use crate::import::gltf::document::schema::{Draco, Primitive, mode};
 use crate::import::{MeshError, text};
 use draco_core::draco_types::DataType;
 use draco_core::geometry_attribute::PointAttribute;

@@ -13,8 +13,8 @@ use crate::import::affine::Affine;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::attribute;
-use crate::import::gltf::document::tree;
-use crate::import::gltf::document::tree::mode;
+use crate::import::gltf::document::schema;
+use crate::import::gltf::document::schema::mode;
 use crate::import::gltf::material::Materials;
 use crate::import::polygon::ALL_EDGES;
 use crate::import::raw::{RawMesh, extend_attribute};
@@ -61,7 +61,7 @@ pub struct Source<'a> {
     /// Its name in errors.
     pub what: String,
     /// The JSON.
-    pub json: &'a tree::Primitive,
+    pub json: &'a schema::Primitive,
     /// True if the order of its triangles encodes polygons.
     pub has_ngons: bool,
     /// True if the file has skins, so that joints and weights are read.

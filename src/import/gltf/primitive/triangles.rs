@@ -2,7 +2,7 @@
 
 use crate::import::MeshError;
 use crate::import::context::Context;
-use crate::import::gltf::document::tree::mode;
+use crate::import::gltf::document::schema::mode;
 use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
 use crate::pluralise::pluralise;
 

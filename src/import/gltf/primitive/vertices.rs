@@ -6,8 +6,8 @@ use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::attribute::{COLOR, JOINTS, Kind, MORPH_NORMAL, MORPH_POSITION, Rule, WEIGHTS};
-use crate::import::gltf::document::tree;
-use crate::import::gltf::document::tree::mode;
+use crate::import::gltf::document::schema;
+use crate::import::gltf::document::schema::mode;
 use crate::import::gltf::primitive::{Source, Target};
 
 /// Most sets of joints per vertex: more than any exporter writes.
@@ -16,7 +16,7 @@ const INFLUENCE_SETS_MAX: usize = 8;
 /// Reads the attributes of one primitive.
 pub struct Vertices<'s> {
     what: &'s str,
-    json: &'s tree::Primitive,
+    json: &'s schema::Primitive,
     unpacked: Option<draco::Unpacked<'s>>,
     /// The number of vertices, known once positions are read.
     pub count: Option<usize>,
@@ -84,12 +84,12 @@ impl<'s> Vertices<'s> {
 
     /// The morph targets, of the right type and size.
     pub fn targets(&self, reader: &Reader<'_>) -> Result<Vec<Target>, MeshError> {
-        let find = |target: &tree::Attributes, name: &str, rule: &Rule| -> Result<Option<usize>, MeshError> {
+        let find = |target: &schema::Attributes, name: &str, rule: &Rule| -> Result<Option<usize>, MeshError> {
             let Some(accessor) = target.get(name) else { return Ok(None) };
             self.check_count(&format!("{name} of a morph target"), reader.shape(accessor.0, rule)?.count)?;
             Ok(Some(accessor.0))
         };
-        let target = |target: &tree::Attributes| {
+        let target = |target: &schema::Attributes| {
             let positions = find(target, "POSITION", &MORPH_POSITION)?;
             Ok(Target { positions, normals: find(target, "NORMAL", &MORPH_NORMAL)? })
         };

@@ -4,7 +4,7 @@ use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::attribute::{KEY_ROTATIONS, KEY_VECTORS, KEY_WEIGHTS, Rule, TIMES};
-use crate::import::gltf::document::model::Index;
+use crate::import::gltf::document::lists::Index;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 

@@ -2,8 +2,8 @@
 
 use crate::import::affine::Affine;
 use crate::import::context::Context;
-use crate::import::gltf::document::model;
-use crate::import::gltf::document::model::{Lists, entry};
+use crate::import::gltf::document::lists;
+use crate::import::gltf::document::lists::{Lists, entry};
 use crate::import::{MeshError, text};
 use crate::mesh::material::{FileCamera, FileLens};
 use crate::mesh::vector::cross;
@@ -63,7 +63,7 @@ struct Known {
 }
 
 fn parse(index: usize, lists: &Lists<'_>) -> Result<Known, MeshError> {
-    let json: model::Camera = entry("camera", &lists.cameras, index)?;
+    let json: lists::Camera = entry("camera", &lists.cameras, index)?;
     let lens = match (&json.perspective, &json.orthographic) {
         (Some(lens), _) if lens.yfov > 0.0 && lens.yfov < std::f64::consts::PI => {
             FileLens::Perspective { fov_deg: lens.yfov.to_degrees() }

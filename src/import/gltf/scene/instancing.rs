@@ -7,7 +7,7 @@ use crate::import::affine::Affine;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::attribute::{INSTANCE_ROTATIONS, INSTANCE_VECTORS, Rule};
-use crate::import::gltf::document::tree::Instancing;
+use crate::import::gltf::document::schema::Instancing;
 
 /// Transforms of the instances, below that of their node. `triangles` is the count of one instance,
 /// and `before` the count so far: the total is checked before any instance is read.

@@ -10,7 +10,7 @@ use self::cameras::Placed;
 use self::pose::Pose;
 use crate::import::affine::Affine;
 use crate::import::context::Context;
-use crate::import::gltf::document::tree::Document;
+use crate::import::gltf::document::schema::Document;
 use crate::import::{MeshError, text};
 use crate::limits;
 

@@ -6,7 +6,7 @@ use crate::import::affine::Affine;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::attribute::INVERSE_BIND_MATRICES;
-use crate::import::gltf::document::tree::Document;
+use crate::import::gltf::document::schema::Document;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -60,7 +60,7 @@ impl<'a> Skins<'a> {
                 inverse.len()
             )));
         }
-        let joint = |(i, node): (usize, &crate::import::gltf::document::model::Index)| {
+        let joint = |(i, node): (usize, &crate::import::gltf::document::lists::Index)| {
             let inverse = inverse.get(i).map_or(Affine::IDENTITY, |m| Affine::from_columns(*m));
             worlds.get(node.0).copied().unwrap_or(Affine::IDENTITY).after(&inverse)
         };

@@ -1,7 +1,7 @@
 //! Transforms of nodes, as a matrix or as translation, rotation and scale.
 
 use crate::import::affine::Affine;
-use crate::import::gltf::document::tree::Node;
+use crate::import::gltf::document::schema::Node;
 
 /// A translation, a rotation (x, y, z, w) and a scale.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,4 @@
-//! A reader that hands `tobj` one clean line after the other.
+//! A reader that gives `tobj` cleaned lines.
 //!
 //! Only `v`, `vt`, `vn`, `f`, `l`, `p` and material lines pass, in canonical form, checked and paid
 //! for. Harmless content that `tobj` would refuse (bytes that are not UTF-8, empty faces, partial
@@ -76,7 +76,7 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         }
     }
 
-    /// Turns what went wrong, here or in `tobj`, into an error that names the line.
+    /// Turns a failure, here or in `tobj`, into an error that names the line.
     pub fn finish(self, error: Option<LoadError>) -> Result<Summary, MeshError> {
         if let Some(fault) = self.fault {
             return Err(fault);
@@ -121,7 +121,7 @@ impl<'a, 'b> Cleaner<'a, 'b> {
 
     fn clean(&mut self, line: &[u8]) -> Result<(), MeshError> {
         let words = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
-        // A comment may begin in a word, and then that is the last.
+        // A comment may begin within a word, which then is the last.
         let mut is_over = false;
         let mut words = words.map_while(move |word| {
             let kept = before_comment(word);
@@ -173,19 +173,19 @@ impl<'a, 'b> Cleaner<'a, 'b> {
             return Ok(());
         }
         self.triangles += n - 2;
-        // A face that gives an attribute for some corners only has none.
+        // An attribute that only some corners of a face have is dropped.
         let form = (self.corners.iter().all(|c| c.vt.is_some()), self.corners.iter().all(|c| c.vn.is_some()));
         self.begin_form(form);
-        // tobj's own face (its list doubles), then per corner its index and, with attributes, a
-        // vertex and a hash entry of its own; then ours.
+        // tobj's face in a list that doubles; per corner an index and, with attributes, a vertex
+        // and a hash entry; then our own copy.
         let per_corner = if form == (false, false) { 40 } else { 200 };
         self.unpaid_bytes += 208 + n * (per_corner + if n > 4 { 48 } else { 0 });
         write_face(&mut self.out, &self.corners, form);
         Ok(())
     }
 
-    /// A polyline as its segments, or points, in the only form in which tobj reads them: as faces
-    /// with too few corners.
+    /// Writes the segments of a polyline, or points, as faces with too few corners: the only form
+    /// in which tobj reads them.
     fn lines_and_points<'w>(
         &mut self,
         words: impl Iterator<Item = &'w [u8]>,
@@ -213,7 +213,7 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         Ok(())
     }
 
-    /// A new model where the form of faces changes.
+    /// Begins a new model where the attributes of faces change.
     fn begin_form(&mut self, form: (bool, bool)) {
         if self.form.is_some_and(|old| old != form) {
             self.out.extend_from_slice(b"o\n");

@@ -5,9 +5,9 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
 
-use super::model::Index;
+use super::lists::Index;
 
-/// The document, without the lists in [`super::model::Lists`].
+/// The document, without the lists in [`super::lists::Lists`].
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Document {
