@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 use crate::backend::{BackendKind, Backends, DrawError};
 use crate::encode::{self, EncodeError};
 use crate::image::{Image, ImageFormat};
-use crate::import::{Bundle, Format, MeshError};
+use crate::import::{Bundle, Format, Imported, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
 use crate::plan::{self, Skip};
@@ -110,7 +110,7 @@ pub fn render(
     let mut budget = Budget::new(limits);
 
     let options = import::Options { format: job.format_in, time_s: job.spec.time_s };
-    let mesh = import::import(job.bundle, options, limits, &mut budget, deadline)?;
+    let Imported { mesh, report } = import::import(job.bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
 
     let drawn = draw(&mesh, job.spec, backends, &mut budget, deadline, ended)?;
@@ -119,7 +119,7 @@ pub fn render(
     let bytes = encode::encode(&drawn.image, format)?;
     ended(Stage::Encode);
 
-    let warnings = [mesh.report.warnings, drawn.warnings].concat();
+    let warnings = [report.warnings, drawn.warnings].concat();
     let Drawn { backend, skips, choice, .. } = drawn;
     Ok(Output { bytes, format, backend, skips, warnings, choice })
 }
@@ -164,9 +164,9 @@ pub fn inspect(
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Report, MeshError> {
     let mut budget = Budget::new(limits);
-    let mesh = import::import(bundle, options, limits, &mut budget, deadline)?;
+    let Imported { mesh, report } = import::import(bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
-    Report::of(&mesh, bundle.bytes_len(), &mut budget, deadline)
+    Report::of(&mesh, &report, bundle.bytes_len(), &mut budget, deadline)
 }
 
 /// A look for a material that the mesh does not have is most likely a misspelt name.

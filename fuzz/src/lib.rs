@@ -1,10 +1,10 @@
-//! What every fuzz target does with its bytes. The suite includes this file and runs all seeds and all former finds through it,
-//! so it may use meshsnap and `serde_json` alone.
+//! The body of every fuzz target. The suite includes this file and runs all seeds and all former
+//! finds through it, so it may only use meshsnap and `serde_json`.
 
 #![allow(clippy::panic, clippy::unwrap_used, clippy::expect_used)] // a broken promise is a find
 
 use meshsnap::backend::{Backends, GpuHost, HardwareHint};
-use meshsnap::import::{Bundle, BundleFile, Format, MeshError, Options, import};
+use meshsnap::import::{Bundle, BundleFile, Format, ImportReport, Imported, MeshError, Options, import};
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use meshsnap::mesh::material::{AlphaMode, FileLens};
@@ -17,13 +17,15 @@ use meshsnap::spec::BackendChoice;
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// Every target: one for each name that a mesh format has, and what takes more than a mesh.
-pub const TARGETS: [&str; 11] = ["obj", "stl", "ply", "off", "fbx", "3mf", "gltf", "glb", "zip", "request", "pipeline"];
+/// Every target: one per name of a mesh format, and those that take more than a mesh.
+pub fn targets() -> Vec<&'static str> {
+    [Format::names(), vec!["zip", "request", "pipeline"]].concat()
+}
 
 /// Between an OBJ file and the MTL file that it calls `a.mtl`.
 const MTL_MARK: &[u8] = b"\n%mtl\n";
 
-/// Runs one input. It may be refused; it may not panic, take long, or come out as something that no mesh may be.
+/// Runs one input. It may be refused, but must not panic, take long, or become an invalid mesh.
 pub fn run(target: &str, bytes: &[u8]) {
     match target {
         "request" => run_request(bytes),
@@ -35,8 +37,8 @@ pub fn run(target: &str, bytes: &[u8]) {
     }
 }
 
-/// What a target's importer makes of an input, at no moment of its animations; None for targets that take more than a mesh.
-pub fn imported(target: &str, bytes: &[u8]) -> Option<Result<Mesh, MeshError>> {
+/// The result of a target's importer, in the rest pose. None for targets that take more than a mesh.
+pub fn imported(target: &str, bytes: &[u8]) -> Option<Result<Imported, MeshError>> {
     if matches!(target, "request" | "pipeline") {
         return None;
     }
@@ -47,7 +49,7 @@ pub fn imported(target: &str, bytes: &[u8]) -> Option<Result<Mesh, MeshError>> {
 
 fn bundle(target: &str, bytes: &[u8]) -> (Bundle, Option<Format>) {
     match target {
-        // A package is a bundle that says what it is.
+        // A 3MF package is an archive, and is recognised by its contents.
         "zip" | "3mf" => (Bundle::zip(bytes.to_vec()), None),
         "obj" => (obj(bytes), Some(Format::Obj)),
         name => {
@@ -57,13 +59,13 @@ fn bundle(target: &str, bytes: &[u8]) -> (Bundle, Option<Format>) {
     }
 }
 
-/// A moment for two inputs of three, of four seconds: any change of the bytes changes it.
+/// A moment within four seconds for two inputs of three. Any change of the bytes changes it.
 fn time_s(bytes: &[u8]) -> Option<f64> {
     let sum = bytes.iter().fold(0_u32, |sum, byte| sum.wrapping_mul(31).wrapping_add(u32::from(*byte)));
     (!sum.is_multiple_of(3)).then(|| f64::from(sum % 256) / 64.0)
 }
 
-/// Small enough that what breaks a limit does so soon, and large enough for every seed.
+/// Limits that are small, so that inputs break them soon, and large enough for every seed.
 fn limits() -> Limits {
     Limits {
         memory_bytes: 64 << 20,
@@ -90,9 +92,9 @@ fn run_import(bundle: &Bundle, options: Options) {
     let limits = limits();
     let mut budget = Budget::new(&limits);
     match import(bundle, options, &limits, &mut budget, &Deadline::default()) {
-        Ok(mesh) => {
-            check(&mesh);
-            let report = Report::of(&mesh, bundle.bytes_len(), &mut budget, &Deadline::default());
+        Ok(Imported { mesh, report: import }) => {
+            check(&mesh, &import);
+            let report = Report::of(&mesh, &import, bundle.bytes_len(), &mut budget, &Deadline::default());
             let Ok(report) = report else { return };
             assert!(!report.text().is_empty());
             serde_json::to_vec(&report).expect("a report is JSON");
@@ -101,13 +103,13 @@ fn run_import(bundle: &Bundle, options: Options) {
     }
 }
 
-/// Whether a sentence about a file is one, and not a repetition of the file.
+/// True if a sentence about a file is short and does not repeat the file.
 fn is_short(detail: &str) -> bool {
     !detail.is_empty() && detail.chars().count() <= 1000
 }
 
-/// What is true of every mesh, whatever file it comes from.
-fn check(mesh: &Mesh) {
+/// Checks the invariants of every imported mesh.
+fn check(mesh: &Mesh, report: &ImportReport) {
     let (positions, triangles) = (mesh.positions.len(), mesh.triangles.len());
     assert!(
         (triangles > 0 || !mesh.lines_and_points.is_empty())
@@ -115,7 +117,8 @@ fn check(mesh: &Mesh) {
             && mesh.edge_masks.len() == triangles
     );
     assert!(mesh.triangle_materials.len() == triangles && !mesh.materials.is_empty());
-    // Half, but of a mesh as small as f64 is exact where it lies: its centre is one of its corners.
+    // At most a half, except for a mesh as small as the spacing of f64 at its place: its centre is
+    // one of its corners.
     assert!(mesh.positions.iter().flatten().all(|c| c.abs() <= 1.0));
     for [a, b, c] in &mesh.triangles {
         assert!(a != b && b != c && c != a && [a, b, c].iter().all(|v| (**v as usize) < positions));
@@ -151,11 +154,11 @@ fn check(mesh: &Mesh) {
         let all_finite = camera.eye.iter().chain(camera.axes.iter().flatten()).all(|c| c.is_finite());
         assert!(all_finite && lens.is_finite() && lens > 0.0 && camera.name.chars().count() <= 200, "{camera:?}");
     }
-    assert!(mesh.report.warnings.iter().all(|warning| is_short(&warning.detail)));
+    assert!(report.warnings.iter().all(|warning| is_short(&warning.detail)));
     assert!(mesh.to_file.scale > 0.0 && mesh.to_file.centre.iter().all(|c| c.is_finite()));
 }
 
-/// A document, and behind a zero byte dotted keys with their values, one a line.
+/// Reads a document and, after a zero byte, dotted keys with their values, one per line.
 fn run_request(bytes: &[u8]) {
     let (document, keys) = split(bytes);
     let keys = String::from_utf8_lossy(keys);
@@ -172,7 +175,7 @@ fn run_request(bytes: &[u8]) {
     }
 }
 
-/// A document, and behind a zero byte a mesh of any format: drawn small, on the CPU.
+/// Draws, small and on the CPU: a document and, after a zero byte, a mesh of any format.
 fn run_pipeline(bytes: &[u8]) {
     thread_local! {
         static BACKENDS: RefCell<Backends> = RefCell::new(Backends::new(no_gpu(), 1));
@@ -198,7 +201,7 @@ fn no_gpu() -> Arc<GpuHost> {
     Arc::new(GpuHost::new(HardwareHint::None { reason: "targets draw on the CPU".into() }))
 }
 
-/// What is before the first zero byte, and what is behind it.
+/// The bytes before the first zero byte, and those after it.
 fn split(bytes: &[u8]) -> (&[u8], &[u8]) {
     let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
     (&bytes[..end], bytes.get(end + 1..).unwrap_or_default())

@@ -7,7 +7,7 @@ use super::render::{format_in, pairs};
 use super::settings::LimitSettings;
 use super::{bundle, files};
 use crate::cli::error::CliError;
-use crate::import;
+use crate::import::{self, Format};
 use crate::limits::Deadline;
 use crate::pipeline;
 use crate::request::{self, Rules};
@@ -16,15 +16,24 @@ use crate::spec::BackendChoice;
 /// Arguments of `inspect`.
 #[derive(Args)]
 pub struct InspectArgs {
-    /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB; known by its bytes, whatever its name)
-    /// and the files it refers to, or a .zip of them; `-` for standard input
-    #[arg(required = true, value_name = "MESH")]
+    #[arg(
+        required = true,
+        value_name = "MESH",
+        help = format!(
+            "Mesh file ({}; known by its bytes, whatever its name) and the files it refers to, \
+             or a .zip of them; `-` for standard input",
+            Format::list()
+        )
+    )]
     meshes: Vec<String>,
     /// Print JSON
     #[arg(long)]
     json: bool,
-    /// Format of the mesh, where its bytes do not tell: obj, gltf, glb, stl, ply, off, fbx or 3mf
-    #[arg(long, value_name = "FORMAT")]
+    #[arg(
+        long,
+        value_name = "FORMAT",
+        help = format!("Format of the mesh, where its bytes do not tell: {}", Format::list_names())
+    )]
     format_in: Option<String>,
     /// The mesh among several files, where more than one could be
     #[arg(long, value_name = "FILE")]

@@ -24,9 +24,15 @@ use crate::telemetry;
 /// Arguments of `render`.
 #[derive(Args)]
 pub struct RenderArgs {
-    /// Mesh file (OBJ, STL, PLY, OFF, FBX, 3MF, glTF, GLB) and the files it refers to, or a .zip of
-    /// them; `-` for standard input
-    #[arg(required = true, value_name = "MESH")]
+    #[arg(
+        required = true,
+        value_name = "MESH",
+        help = format!(
+            "Mesh file ({}) and the files it refers to, \
+             or a .zip of them; `-` for standard input",
+            Format::list()
+        )
+    )]
     meshes: Vec<String>,
     /// Image file, `-` for standard output; its extension chooses the format unless --format does
     #[arg(short, long, value_name = "OUT")]
@@ -50,8 +56,11 @@ pub struct RenderArgs {
     up: Option<String>,
     #[arg(long, help = format!("Image format: {}", one_of::<ImageFormat>()))]
     format: Option<String>,
-    /// Format of the mesh, where its bytes do not tell: obj, gltf, glb, stl, ply, off, fbx or 3mf
-    #[arg(long, value_name = "FORMAT")]
+    #[arg(
+        long,
+        value_name = "FORMAT",
+        help = format!("Format of the mesh, where its bytes do not tell: {}", Format::list_names())
+    )]
     format_in: Option<String>,
     /// The mesh among several files, where more than one could be
     #[arg(long, value_name = "FILE")]
@@ -176,7 +185,7 @@ fn by_extension(output: &str, of_document: Option<ImageFormat>) -> Result<Option
 /// The mesh format that `--format-in` names.
 pub fn format_in(name: Option<&str>) -> Result<Option<Format>, CliError> {
     let Some(name) = name else { return Ok(None) };
-    let unknown = || CliError::usage(format!("--format-in {name}: allowed is one of {}", Format::NAMES.join(", ")));
+    let unknown = || CliError::usage(format!("--format-in {name}: allowed is one of {}", Format::names().join(", ")));
     Format::from_name(name).map(Some).ok_or_else(unknown)
 }
 

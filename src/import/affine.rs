@@ -1,18 +1,28 @@
-//! Affine maps in f64, for formats whose scenes place parts by matrices.
+//! Affine maps in f64, for formats whose scenes place their parts.
+
+use crate::mesh::vector::{cross, dot};
 
 /// A 3 x 3 matrix by rows, and a translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine {
     /// Rows of the matrix.
     pub linear: [[f64; 3]; 3],
-    /// What is added.
+    /// Added after the matrix.
     pub translation: [f64; 3],
 }
 
 impl Affine {
-    /// No change.
+    /// The identity.
     pub const IDENTITY: Self =
         Self { linear: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
+
+    /// From a 4 x 4 matrix by columns, whose last row is taken to be (0, 0, 0, 1).
+    pub fn from_columns(m: [f64; 16]) -> Self {
+        Self {
+            linear: std::array::from_fn(|row| std::array::from_fn(|column| m[column * 4 + row])),
+            translation: [m[12], m[13], m[14]],
+        }
+    }
 
     /// First `inner`, then `self`.
     pub fn after(&self, inner: &Self) -> Self {
@@ -22,7 +32,26 @@ impl Affine {
         Self { linear, translation: self.point(inner.translation) }
     }
 
-    /// A transformed point. No change is none: numbers stay as the file has them.
+    /// The weighted sum of some maps.
+    pub fn blend(maps: impl Iterator<Item = (Self, f64)>) -> Self {
+        let mut sum = Self { linear: [[0.0; 3]; 3], translation: [0.0; 3] };
+        for (map, weight) in maps {
+            for (sum, c) in sum.linear.iter_mut().flatten().zip(map.linear.iter().flatten()) {
+                *sum += weight * c;
+            }
+            for (sum, c) in sum.translation.iter_mut().zip(map.translation) {
+                *sum += weight * c;
+            }
+        }
+        sum
+    }
+
+    /// Columns of the matrix: the images of the three axes.
+    pub fn columns(&self) -> [[f64; 3]; 3] {
+        std::array::from_fn(|column| std::array::from_fn(|row| self.linear[row][column]))
+    }
+
+    /// A transformed point. The identity returns it unchanged, infinities included.
     pub fn point(&self, p: [f64; 3]) -> [f64; 3] {
         if *self == Self::IDENTITY {
             return p;
@@ -33,23 +62,19 @@ impl Affine {
         })
     }
 
-    /// Whether it turns the inside out, so that windings must be turned round.
+    /// True if it mirrors: windings must then be reversed.
     pub fn is_mirroring(&self) -> bool {
         let [a, b, c] = self.linear;
-        let cross = cross(b, c);
-        a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2] < 0.0
+        dot(a, cross(b, c)) < 0.0
     }
 
-    /// The matrix that keeps normals perpendicular to their surfaces: the inverse transpose, but for its length.
+    /// The inverse transpose up to a positive factor: the matrix for normals, which are made unit
+    /// later.
     pub fn normal_matrix(&self) -> [[f64; 3]; 3] {
         let sign = if self.is_mirroring() { -1.0 } else { 1.0 };
         let [a, b, c] = self.linear;
         [cross(b, c), cross(c, a), cross(a, b)].map(|row| row.map(|v| v * sign))
     }
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]

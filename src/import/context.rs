@@ -1,18 +1,18 @@
-//! What every importer is given beside the bytes of its file.
+//! The context of an import, given to every importer beside the bytes.
 
 use super::bundle::Folder;
 use super::error::MeshError;
 use crate::limits::{Budget, Deadline, Limits};
 
-/// What every importer is given beside the bytes.
+/// The context of an import: limits, budget, deadline and the other files.
 pub struct Context<'a> {
     /// The caps.
     pub limits: &'a Limits,
     /// Bytes that may still be allocated.
     pub budget: &'a mut Budget,
-    /// Looked at inside long loops.
+    /// Polled inside long loops.
     pub deadline: &'a Deadline,
-    /// The files that names in the mesh may mean.
+    /// The files that names in the mesh refer to.
     pub bundle: &'a Folder,
     /// As [`super::Options::time_s`].
     pub time_s: Option<f64>,

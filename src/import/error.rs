@@ -1,37 +1,38 @@
-//! Why bytes could not become a mesh.
+//! Errors of importing.
 
 use super::text;
 use crate::limits::{Exhausted, LimitExceeded, Stopped};
 
-/// Longest detail of an error or a warning, characters. Whatever a file repeats in a sentence about it has ended long before.
+/// Longest detail of an error or a warning, in characters. Longer ones only repeat content of the
+/// file.
 pub const DETAIL_CHARS_MAX: usize = 1000;
 
 /// An import that failed. It is always the input's fault; the detail is safe to show to a client.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{detail}")]
 pub struct MeshError {
-    /// What kind of fault.
+    /// The kind of fault.
     pub fault: MeshFault,
-    /// One sentence that says what is wrong and where in the file.
+    /// One sentence: the fault, and its place in the file.
     pub detail: String,
 }
 
 /// The kinds of fault, each with its own status and stable code at the edge of the program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MeshFault {
-    /// Not a mesh format that we know.
+    /// Not a known mesh format.
     Unrecognised,
     /// Known format, broken content.
     Broken,
-    /// Readable, but nothing in it can be drawn.
+    /// Readable, but without anything to draw.
     Empty,
     /// Refers to a file outside the upload, or to one that the upload lacks.
     OutsideBundle,
-    /// A bundle that cannot be unpacked, or whose files have names that no file may have.
+    /// A bundle that cannot be unpacked, or has files with forbidden names.
     BundleBroken,
-    /// Several files of the bundle are meshes, or the one that was asked for is not there.
+    /// Several files of the bundle are meshes, or the requested one is missing.
     EntryUnclear,
-    /// Uses a feature of the format that is not read, and that the file says is required.
+    /// The file requires a feature of the format that is not read.
     Unsupported,
     /// Breaks a limit.
     Limit(LimitExceeded),
@@ -48,7 +49,7 @@ impl MeshError {
     /// An error of the given kind.
     pub fn new(fault: MeshFault, detail: impl Into<String>) -> Self {
         let detail: String = detail.into();
-        // Most are short, and need no copy.
+        // Most are short and need no copy.
         let detail = if detail.len() > DETAIL_CHARS_MAX { text::cut(detail, DETAIL_CHARS_MAX) } else { detail };
         Self { fault, detail }
     }

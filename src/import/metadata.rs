@@ -1,13 +1,13 @@
-//! Texts that a file says of itself, made safe to print.
+//! Metadata texts of a file, made safe to print.
 
-/// Most characters of a text that a report repeats.
+/// Most characters of a text in a report.
 const TEXT_CHARS_MAX: usize = 200;
-/// Where a text file's first comment is looked for.
+/// Bytes of a text file that are searched for its first comment.
 const HEAD_BYTES: usize = 4096;
 
-/// A text of the file in a form that is safe to print: one line, not too long. None where nothing is left.
+/// A text in a form that is safe to print: one short line. None if nothing is left.
 pub fn tidy(text: &[u8]) -> Option<String> {
-    // A character has at most four bytes, so that this cuts none that would be shown.
+    // A character has at most four bytes, so this cuts none that would be shown.
     let text = String::from_utf8_lossy(&text[..text.len().min(TEXT_CHARS_MAX * 4 + 4)]);
     let text: String =
         text.trim_matches(|c: char| c.is_whitespace() || c == '\0').chars().take(TEXT_CHARS_MAX).collect();
@@ -15,8 +15,8 @@ pub fn tidy(text: &[u8]) -> Option<String> {
     (!text.is_empty()).then_some(text)
 }
 
-/// The first comment among a text file's first lines that has a letter in it: rules of dashes say nothing. `mark` begins comments;
-/// `skip` says which are no more than data.
+/// The first comment with a letter in it, so that rules of dashes do not count. `mark` begins
+/// comments; those that `skip` accepts are passed over.
 pub fn first_comment(bytes: &[u8], mark: &[u8], skip: impl Fn(&[u8]) -> bool) -> Option<String> {
     let head = &bytes[..bytes.len().min(HEAD_BYTES)];
     let head = head.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(head);

@@ -1,7 +1,8 @@
-//! Bytes to [`Mesh`]: opens a bundle, finds its mesh, sniffs the format from the bytes and calls its importer.
+//! Bytes to [`Mesh`]: unpacks a bundle, finds its mesh, sniffs the format and calls the importer.
 //!
-//! Reading order: [`bundle`] (what comes in, and what names in it mean), [`formats`] (the table of formats), [`raw`] (what an importer
-//! fills), `obj`, `stl`, `ply`, `off`, `fbx`, `three_mf` and `gltf` (the importers), `normalise` (raw to `Mesh`).
+//! Reading order: [`bundle`] (the upload, and the files that names refer to), `formats` (the table
+//! of formats), `sniff`, [`raw`] (the mesh that an importer fills), the importers `obj`, `stl`,
+//! `ply`, `off`, `fbx`, `three_mf` and `gltf`, and `normalise` (raw mesh to `Mesh`).
 
 mod affine;
 pub mod bundle;
@@ -18,6 +19,7 @@ mod off;
 mod ply;
 mod polygon;
 pub mod raw;
+mod report;
 mod sniff;
 mod stl;
 mod text;
@@ -25,7 +27,7 @@ mod three_mf;
 
 pub use bundle::{BadPath, Bundle, BundleFile, Folder};
 pub use error::{MeshError, MeshFault};
-pub use formats::Format;
+pub use report::{FileContent, FileMetadata, ImportReport};
 
 use context::Context;
 use error::DETAIL_CHARS_MAX;
@@ -33,16 +35,40 @@ use normalise::normalise;
 use raw::RawMesh;
 
 use crate::limits::{Budget, Deadline, Limits};
-use crate::mesh::{ImportReport, Mesh};
+use crate::mesh::Mesh;
 use crate::warning::Warning;
 use bundle::{entry, unzip};
 
-/// What is said of a mesh beside its bytes.
+/// The mesh formats that are read. The table in `formats` has a row for each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Format {
+    /// Wavefront OBJ.
+    #[default]
+    Obj,
+    /// glTF 2.0 JSON.
+    Gltf,
+    /// glTF 2.0 binary container.
+    Glb,
+    /// Binary STL.
+    StlBinary,
+    /// ASCII STL.
+    StlAscii,
+    /// PLY of any encoding.
+    Ply,
+    /// Geomview's object file format, text or binary.
+    Off,
+    /// Autodesk FBX, binary or ASCII.
+    Fbx,
+    /// 3MF, a zip package of XML.
+    ThreeMf,
+}
+
+/// Options of an import.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Options {
-    /// Overrides sniffing.
+    /// Format of the mesh. None: by sniffing.
     pub format: Option<Format>,
-    /// The moment of the file's first animation that is drawn, seconds; None: the file as its animations find it.
+    /// Moment of the file's first animation, in seconds. None: the rest pose.
     pub time_s: Option<f64>,
 }
 
@@ -52,6 +78,15 @@ impl From<Option<Format>> for Options {
     }
 }
 
+/// The result of an import.
+#[derive(Clone, Debug)]
+pub struct Imported {
+    /// The mesh in its normal form.
+    pub mesh: Mesh,
+    /// Counts, repairs, warnings and metadata.
+    pub report: ImportReport,
+}
+
 /// Reads the mesh of a bundle.
 pub fn import(
     bundle: &Bundle,
@@ -59,11 +94,11 @@ pub fn import(
     limits: &Limits,
     budget: &mut Budget,
     deadline: &Deadline,
-) -> Result<Mesh, MeshError> {
+) -> Result<Imported, MeshError> {
     open(bundle, options.into(), limits, budget, deadline, normalise)
 }
 
-/// Reads all of a file that [`import`] reads, and reports what is in it, whether there is anything to draw or not.
+/// Reads everything that [`import`] reads, and returns its report even if there is nothing to draw.
 pub fn survey(
     bundle: &Bundle,
     options: impl Into<Options>,
@@ -74,7 +109,7 @@ pub fn survey(
     open(bundle, options.into(), limits, budget, deadline, |raw, _| Ok(raw.report))
 }
 
-/// Finds the mesh of a bundle, reads it, and has it finished.
+/// Finds the mesh of a bundle, reads it and gives it to `finish`.
 fn open<T>(
     bundle: &Bundle,
     options: Options,
@@ -85,7 +120,7 @@ fn open<T>(
 ) -> Result<T, MeshError> {
     let files = match bundle.files.as_slice() {
         [archive] if bundle.is_zip => unzip::unzip(&archive.bytes, limits, budget, deadline)?,
-        // Clones of shared bytes.
+        // Cheap: clones share their bytes.
         files => {
             bundle.check_sent()?;
             files.to_vec()
@@ -94,20 +129,12 @@ fn open<T>(
     let (folder, format) = entry::choose(files, bundle.entry.as_deref(), options.format, deadline)?;
     let bytes = &folder.entry().bytes;
     let mut cx = Context { limits, budget, deadline, bundle: &folder, time_s: options.time_s };
-    let mut raw = match format {
-        Format::Obj => obj::read(bytes, &mut cx)?,
-        Format::StlBinary | Format::StlAscii => stl::read(bytes, &mut cx)?,
-        Format::Ply => ply::read(bytes, &mut cx)?,
-        Format::Off => off::read(bytes, &mut cx)?,
-        Format::Fbx => fbx::read(bytes, &mut cx)?,
-        Format::ThreeMf => three_mf::read(&mut cx)?,
-        Format::Gltf | Format::Glb => gltf::read(bytes, &mut cx)?,
-    };
-    if options.time_s.is_some() && !matches!(format, Format::Gltf | Format::Glb) {
+    let mut raw = (format.entry().read)(bytes, &mut cx)?;
+    if options.time_s.is_some() && !format.entry().has_animations {
         let detail = format!("scene.time_s is given, and {format} files have no animation");
         raw.report.warnings.push(Warning { code: "animation_missing", detail });
     }
-    // As with errors: what a file repeats here has ended long before.
+    // As with errors: longer details only repeat content of the file.
     for warning in raw.report.warnings.iter_mut().filter(|warning| warning.detail.len() > DETAIL_CHARS_MAX) {
         warning.detail = text::cut(&warning.detail, DETAIL_CHARS_MAX);
     }

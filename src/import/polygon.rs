@@ -1,16 +1,18 @@
-//! Polygons to triangles. Each triangle remembers which of its edges are edges of the polygon.
+//! Splits polygons into triangles, each with a mask of the edges that belong to the polygon.
 
 use crate::import::normalise::pow2::{Pow2, exponent, is_usable, max_abs};
+use crate::warning::Warning;
 
 /// The mask of a triangle whose three edges are all edges of its polygon.
 pub const ALL_EDGES: u8 = 0b111;
 
-/// Corner tests that ear clipping may do in one file before it falls back to fans: about half a second. Clipping is
-/// quadratic, so a few hostile polygons would otherwise take minutes.
+/// Most corner tests of ear clipping in one file, about half a second. Past that it falls back to
+/// fans: clipping is quadratic, and a few hostile polygons would otherwise take minutes.
 const WORK_MAX: u64 = 100_000_000;
-/// Two squared lengths with less between them count as equal: more than coordinates round in f32, or in f64 far away.
+/// Squared lengths within this ratio count as equal. It is more than the rounding of coordinates in
+/// f32, or of f64 far away.
 const EQUAL_LENGTHS2: f64 = 1.0 + 1e-4;
-/// Corners from which a polygon is fanned at once.
+/// Polygons with more corners are always fanned.
 const CORNERS_MAX: usize = 8192;
 
 /// Triangulates the polygons of one file.
@@ -28,7 +30,7 @@ struct Corner {
     at: [f64; 2],
     prev: u32,
     next: u32,
-    /// Whether the edge to `next` is an edge of the polygon.
+    /// True if the edge to `next` is an edge of the polygon.
     real: bool,
     reflex: bool,
 }
@@ -40,21 +42,25 @@ impl Default for Triangulator {
 }
 
 impl Triangulator {
-    /// Whether a polygon was too large, or the file had too many large ones, to be split with care: concave ones may then
-    /// be wrong.
-    pub fn gave_up(&self) -> bool {
-        self.fanned > 0 || self.work_left == 0
+    /// A warning if a polygon was too large, or the file had too many large ones, for ear clipping.
+    pub fn warning(&self) -> Option<Warning> {
+        (self.fanned > 0 || self.work_left == 0).then(|| Warning {
+            code: "polygons_fanned",
+            detail: "polygons with very many corners were split into fans, which is wrong where they are concave"
+                .into(),
+        })
     }
 
-    /// Splits the polygon `corners` (vertex indices, at least three) and gives each triangle with its edge mask to `emit`.
-    /// The triangles keep the polygon's winding.
+    /// Splits the polygon `corners` (vertex indices, at least three) and gives each triangle with
+    /// its edge mask to `emit`. The triangles keep the polygon's winding.
     pub fn split(&mut self, corners: &[u32], positions: &[[f64; 3]], emit: &mut impl FnMut([u32; 3], u8)) {
         if let [a, b, c] = *corners {
             emit([a, b, c], ALL_EDGES);
             return;
         }
         if let Some(bad) = corners.iter().position(|&v| !is_usable(&positions[v as usize])) {
-            // One triangle with the bad corner stands for the whole face: normalisation drops and counts it.
+            // One triangle with the bad corner stands for the whole face: normalisation drops and
+            // counts it.
             let n = corners.len();
             emit([corners[bad], corners[(bad + 1) % n], corners[(bad + 2) % n]], ALL_EDGES);
             return;
@@ -63,7 +69,7 @@ impl Triangulator {
         let n = self.ring.len();
         let is_flat = n < 3 || !project(&mut self.ring, positions);
         if is_flat && n > 3 && !self.is_on_a_line(positions) {
-            // What crosses itself so that its parts cancel out.
+            // A polygon that crosses itself so that its parts cancel out.
             self.fan(emit);
         } else if is_flat {
             emit([corners[0], corners[1], corners[2]], ALL_EDGES);
@@ -77,7 +83,7 @@ impl Triangulator {
         }
     }
 
-    /// Fills the ring, without corners that lie exactly on the one before.
+    /// Fills the ring, without corners that equal the one before.
     fn load(&mut self, corners: &[u32], positions: &[[f64; 3]]) {
         let at = |v: u32| positions[v as usize];
         self.ring.clear();
@@ -106,8 +112,9 @@ impl Triangulator {
         orient(self.ring[corner.prev as usize].at, corner.at, self.ring[corner.next as usize].at)
     }
 
-    /// Along the shorter diagonal, which gives the better shaped triangles; the first one if they are equal, as in all that is
-    /// symmetric. There rounding must not choose, or the same model elsewhere or at another scale would be cut in other ways.
+    /// Cuts along the shorter diagonal, which gives better shaped triangles. Of equal diagonals, as
+    /// in symmetric models, the first is taken: if rounding chose, the same model elsewhere or at
+    /// another scale would be cut differently.
     fn split_quad(&self, positions: &[[f64; 3]], emit: &mut impl FnMut([u32; 3], u8)) {
         let v: [u32; 4] = std::array::from_fn(|i| self.ring[i].vertex);
         let p = v.map(|v| positions[v as usize]);
@@ -124,7 +131,7 @@ impl Triangulator {
         }
     }
 
-    /// Whether all corners lie on one line, of which there are two different ones at least.
+    /// True if all corners lie on one line. At least two of them differ.
     fn is_on_a_line(&self, positions: &[[f64; 3]]) -> bool {
         let at = |corner: &Corner| positions[corner.vertex as usize];
         let origin = at(&self.ring[0]);
@@ -160,7 +167,8 @@ impl Triangulator {
         let mut misses = 0;
         while left > 3 {
             let (prev, next) = (self.ring[i as usize].prev, self.ring[i as usize].next);
-            // A ring in which a whole round found no ear crosses itself: then any convex corner will do, then any.
+            // A whole round without an ear means that the polygon crosses itself. Then any convex
+            // corner is cut, then any corner.
             self.work_left = self.work_left.saturating_sub(1);
             let ok = match misses / left {
                 _ if self.work_left == 0 => true,
@@ -179,7 +187,7 @@ impl Triangulator {
             for k in [prev, next] {
                 self.ring[k as usize].reflex = self.turn(k) <= 0.0;
             }
-            // Skipping one corner keeps the triangles from all meeting in one point.
+            // Skipping one corner avoids a fan around a single point.
             i = self.ring[next as usize].next;
         }
         let corner = |i: u32| &self.ring[i as usize];
@@ -196,13 +204,13 @@ impl Triangulator {
         let (prev, next) = (corner.prev as usize, corner.next as usize);
         let mask = u8::from(self.ring[prev].real) | u8::from(corner.real) << 1;
         emit([self.ring[prev].vertex, corner.vertex, self.ring[next].vertex], mask);
-        // A flat ear will be dropped, and then the new edge is all that is left of the polygon's own.
+        // A flat ear will be dropped, and then the new edge stands for the polygon's own edges.
         self.ring[prev].real = area == 0.0 && mask != 0;
         self.ring[prev].next = corner.next;
         self.ring[next].prev = corner.prev;
     }
 
-    /// Whether no other corner lies in the triangle at convex corner `i`. Only reflex ones can.
+    /// True if no other corner lies in the triangle at convex corner `i`. Only reflex corners can.
     fn is_empty_ear(&mut self, i: u32) -> bool {
         let corner = self.ring[i as usize];
         let [a, b, c] = [self.ring[corner.prev as usize].at, corner.at, self.ring[corner.next as usize].at];
@@ -232,7 +240,8 @@ fn orient(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Fills in the positions in the plane that the polygon's Newell normal is nearest to. False if it has no area.
+/// Projects the corners to the coordinate plane most perpendicular to the polygon's Newell normal.
+/// False if the polygon has no area.
 fn project(ring: &mut [Corner], positions: &[[f64; 3]]) -> bool {
     let origin = positions[ring[0].vertex as usize];
     let offset = |c: &Corner| {

@@ -1,26 +1,25 @@
-//! Text out of files: in UTF-16 with a byte order mark, in either order, and cut to a length before it is kept or shown.
+//! Text from files: UTF-16 is decoded, and names are cut to a length before they are kept or shown.
 
-use super::MeshError;
-use crate::import::context::Context;
+use crate::limits::{Budget, LimitExceeded};
 use std::borrow::Cow;
 use std::fmt::{Display, Write};
 
-/// Longest name that is kept of what a file names, characters.
+/// Longest name that is kept, in characters.
 const NAME_CHARS_MAX: usize = 200;
-/// Longest that is told of an error of another library: some repeat whole strings of the file.
+/// Longest error text of another library, in characters. Some repeat whole strings of the file.
 const FOREIGN_CHARS_MAX: usize = 200;
 
-/// A name as it is kept.
+/// A name, cut to the length that is kept.
 pub fn name(name: &str) -> String {
     cut(name, NAME_CHARS_MAX)
 }
 
-/// The error of another library as it is shown.
+/// The error of another library, cut to the length that is shown.
 pub fn foreign(error: impl Display) -> String {
     cut(error, FOREIGN_CHARS_MAX)
 }
 
-/// The first characters of a text; the rest is not even written.
+/// The first characters of a text. The rest is never formatted.
 pub fn cut(text: impl Display, chars_max: usize) -> String {
     struct Cut {
         text: String,
@@ -36,20 +35,20 @@ pub fn cut(text: impl Display, chars_max: usize) -> String {
         }
     }
     let mut cut = Cut { text: String::new(), left: chars_max };
-    // An error says that the text is longer, and that is what this is for.
+    // The error only says that the text was cut.
     let _ = write!(cut, "{text}");
     cut.text
 }
 
-/// Whether a word is what C libraries print for what is no number: `1.#IND` (Microsoft's, and its infinity is none of use
-/// either), `-nan(ind)`.
+/// True if a word is a NaN as C libraries print it: `1.#IND` of Microsoft's, also for infinity, or
+/// `-nan(ind)`.
 pub fn is_c_nan(word: &[u8]) -> bool {
     let word = word.strip_prefix(b"-").or(word.strip_prefix(b"+")).unwrap_or(word);
     let is_hashed = word.first().is_some_and(u8::is_ascii_digit) && word[1..].starts_with(b".#");
     is_hashed || word.get(..4).is_some_and(|head| head.eq_ignore_ascii_case(b"nan("))
 }
 
-/// A word up to where a comment begins in it, which is not where a number says that it is none.
+/// A word up to the comment in it. The `#` of a NaN such as `1.#IND` begins no comment.
 pub fn before_comment(word: &[u8]) -> &[u8] {
     match word.iter().position(|b| *b == b'#') {
         Some(at) if !is_c_nan(word) => &word[..at],
@@ -57,23 +56,36 @@ pub fn before_comment(word: &[u8]) -> &[u8] {
     }
 }
 
-/// Whether the bytes begin with a mark of UTF-16.
+/// A name as text: UTF-8, or Latin-1 if it is not valid UTF-8.
+pub fn utf8_or_latin1(name: &[u8]) -> Cow<'_, str> {
+    match std::str::from_utf8(name) {
+        Ok(text) => Cow::Borrowed(text),
+        Err(_) => Cow::Owned(name.iter().map(|&b| char::from(b)).collect()),
+    }
+}
+
+/// The bytes without a UTF-8 byte order mark and leading white space.
+pub fn trim_start(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start()
+}
+
+/// True if the bytes begin with a byte order mark of UTF-16.
 pub fn is_utf16(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF")
 }
 
-/// The same text in UTF-8, without its mark, if it is UTF-16, and the bytes as they are if not. What is no character becomes
-/// a replacement character, as for any reader that goes on.
-pub fn to_utf8<'b>(bytes: &'b [u8], cx: &mut Context<'_>) -> Result<Cow<'b, [u8]>, MeshError> {
+/// UTF-16 is converted to UTF-8 without its mark, other bytes are returned as they are. Invalid
+/// units become replacement characters.
+pub fn to_utf8<'b>(bytes: &'b [u8], budget: &mut Budget) -> Result<Cow<'b, [u8]>, LimitExceeded> {
     if !is_utf16(bytes) {
         return Ok(Cow::Borrowed(bytes));
     }
     // Two bytes become three at most.
-    cx.budget.spend("UTF-16 text", bytes.len() as u64 * 3 / 2, 1)?;
+    budget.spend("UTF-16 text", bytes.len() as u64 * 3 / 2, 1)?;
     Ok(Cow::Owned(decode(bytes).into_bytes()))
 }
 
-/// The beginning of a text, for whoever looks at its first lines: `length` bytes at most.
+/// The first `length` bytes of a text, decoded if they are UTF-16.
 pub fn head(bytes: &[u8], length: usize) -> Cow<'_, [u8]> {
     let head = &bytes[..bytes.len().min(length)];
     if is_utf16(bytes) { Cow::Owned(decode(head).into_bytes()) } else { Cow::Borrowed(head) }

@@ -3,7 +3,7 @@
 use bytes::Bytes;
 
 use super::Error;
-use crate::import::{self, Bundle, BundleFile, Format, MeshError, MeshFault, Options};
+use crate::import::{self, Bundle, BundleFile, Format, Imported, MeshError, MeshFault, Options};
 use crate::limits::{Budget, Deadline, Limits};
 use crate::mesh;
 use crate::warning::Warning;
@@ -129,9 +129,9 @@ impl MeshReader {
     pub fn read(self) -> Result<Mesh, Error> {
         let bundle = bundle(self.files)?.with_entry(self.entry);
         let mut budget = Budget::new(&self.limits);
-        let mut imported = import::import(&bundle, self.options, &self.limits, &mut budget, &self.deadline)?;
-        let warnings = std::mem::take(&mut imported.report.warnings);
-        Ok(Mesh { imported, warnings })
+        let Imported { mesh, report } =
+            import::import(&bundle, self.options, &self.limits, &mut budget, &self.deadline)?;
+        Ok(Mesh { imported: mesh, warnings: report.warnings })
     }
 }
 

@@ -6,7 +6,6 @@
 pub mod edges;
 pub mod material;
 pub mod measure;
-mod metadata;
 pub mod normals;
 pub mod primitives;
 pub mod topology;
@@ -14,13 +13,9 @@ pub(crate) mod union_find;
 pub(crate) mod vector;
 
 pub use material::MaterialSlot;
-pub use metadata::FileMetadata;
 pub use primitives::LineOrPoint;
 
-use crate::import::Format;
-use crate::warning::Warning;
 use material::{FileCamera, ImageSource};
-use serde::Serialize;
 
 /// A triangle mesh in its normal form.
 ///
@@ -73,8 +68,6 @@ pub struct Mesh {
     pub to_file: ToFile,
     /// The axis that points up in the format's convention.
     pub up: UpAxis,
-    /// What the importer saw, dropped and repaired.
-    pub report: ImportReport,
 }
 
 /// How many of a mesh's positions and triangles are the file's own; what follows them draws its lines and points in one view.
@@ -132,47 +125,4 @@ pub enum UpAxis {
     Z,
     /// -Z.
     NegZ,
-}
-
-/// What an importer saw, dropped and repaired. `inspect` prints it.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct ImportReport {
-    /// Format, as sniffed.
-    pub format: Format,
-    /// Vertices in the file, before welding.
-    pub file_vertices: u64,
-    /// What the file's meshes say that they have, whether shown, hidden or shown many times; None where the format counts nothing of
-    /// its own: all but glTF.
-    pub content: Option<FileContent>,
-    /// Polygons in the file: `polygons_by_arity[k]` counts those with `k` corners (12 and more share the last place).
-    pub polygons_by_arity: [u64; 13],
-    /// Faces dropped because a corner is NaN or infinite.
-    pub dropped_nonfinite_faces: u64,
-    /// Faces dropped because two corners are the same point or all lie on a line: exactly, in the file's own numbers.
-    pub dropped_degenerate_faces: u64,
-    /// Faces dropped because welding made two of their corners one: so small beside the whole mesh that 24 bits cannot tell
-    /// them apart.
-    pub dropped_collapsed_faces: u64,
-    /// Line segments and points dropped: with NaN or infinite ends, or segments without a length.
-    pub dropped_lines_and_points: u64,
-    /// Things a user should know; each with a stable code.
-    pub warnings: Vec<Warning>,
-    /// What the file says of itself.
-    pub metadata: FileMetadata,
-}
-
-/// How much the meshes of a file hold by their own account, each counted once.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct FileContent {
-    /// Parts that are drawn with one material each.
-    pub draw_calls: u64,
-    /// Their vertices.
-    pub vertices: u64,
-    /// Their triangles.
-    pub triangles: u64,
-    /// Their line segments.
-    #[serde(rename = "lines")]
-    pub segments: u64,
-    /// Their points.
-    pub points: u64,
 }

@@ -10,13 +10,13 @@ mod topology;
 
 use self::bounds::Bounds;
 use self::topology::TopologyReport;
-use crate::import::MeshError;
+use crate::import::{FileContent, FileMetadata, ImportReport, MeshError};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::edges::EdgeList;
 use crate::mesh::material::{FileLens, ImageContent, ImageSource};
 use crate::mesh::measure::Measures;
 use crate::mesh::topology::Topology;
-use crate::mesh::{FileContent, FileMetadata, Mesh, UpAxis};
+use crate::mesh::{Mesh, UpAxis};
 use serde::Serialize;
 
 /// The contents of a file. Counts are null where the format has no such thing.
@@ -31,7 +31,7 @@ pub struct Report {
     meshes: Option<u64>,
     primitives: Option<u64>,
     /// The totals that other readers of the format give: each mesh of the file once, shown or not.
-    file_content: Option<FileContent>,
+    file_content: Option<ContentReport>,
     file_vertices: u64,
     positions: u64,
     triangles: u64,
@@ -86,6 +86,23 @@ struct TextureReport {
     file_bytes: Option<u64>,
 }
 
+/// [`FileContent`], under the names that clients read.
+#[derive(Clone, Debug, Serialize)]
+struct ContentReport {
+    draw_calls: u64,
+    vertices: u64,
+    triangles: u64,
+    lines: u64,
+    points: u64,
+}
+
+impl From<FileContent> for ContentReport {
+    fn from(content: FileContent) -> Self {
+        let FileContent { draw_calls, vertices, triangles, segments, points } = content;
+        Self { draw_calls, vertices, triangles, lines: segments, points }
+    }
+}
+
 #[derive(Clone, Debug, Serialize)]
 struct CameraReport {
     name: String,
@@ -103,8 +120,14 @@ struct WarningReport {
 }
 
 impl Report {
-    /// On a mesh that was read from `file_bytes` bytes.
-    pub fn of(mesh: &Mesh, file_bytes: u64, budget: &mut Budget, deadline: &Deadline) -> Result<Self, MeshError> {
+    /// On a mesh and its import, which were read from `file_bytes` bytes.
+    pub fn of(
+        mesh: &Mesh,
+        import: &ImportReport,
+        file_bytes: u64,
+        budget: &mut Budget,
+        deadline: &Deadline,
+    ) -> Result<Self, MeshError> {
         deadline.check()?;
         let edges = EdgeList::of(mesh, budget)?;
         deadline.check()?;
@@ -115,7 +138,7 @@ impl Report {
         let cameras = mesh.cameras.iter().map(|camera| camera.name.len() + size_of::<CameraReport>());
         // A name is copied once into the report, and JSON may escape each of its bytes as six.
         budget.spend("the report", names.chain(images).chain(cameras).sum::<usize>() as u64, 1 + 6)?;
-        Ok(Self::new(mesh, file_bytes, topology))
+        Ok(Self::new(mesh, import, file_bytes, topology))
     }
 
     /// The report as JSON, byte for byte as `inspect --json` prints it and HTTP answers.
@@ -128,8 +151,7 @@ impl Report {
         text::text(self)
     }
 
-    fn new(mesh: &Mesh, file_bytes: u64, topology: Topology) -> Self {
-        let import = &mesh.report;
+    fn new(mesh: &Mesh, import: &ImportReport, file_bytes: u64, topology: Topology) -> Self {
         let FileMetadata {
             generator,
             scenes,
@@ -155,7 +177,7 @@ impl Report {
             nodes,
             meshes,
             primitives,
-            file_content: import.content,
+            file_content: import.content.map(ContentReport::from),
             file_vertices: import.file_vertices,
             positions: mesh.own_positions().len() as u64,
             triangles: mesh.own_triangles().len() as u64,

@@ -1,19 +1,23 @@
-//! Which file of a bundle is the mesh.
+//! Chooses the mesh among the files of a bundle.
 
-use crate::import::bundle::{BundleFile, UNNAMED, show, show_all};
-use crate::import::{Folder, Format, MeshError, MeshFault, sniff, three_mf};
+use crate::import::bundle::{BundleFile, UNNAMED, is_zip, show, show_all};
+use crate::import::formats::FORMATS;
+use crate::import::{Folder, Format, MeshError, MeshFault, sniff};
 use crate::limits::Deadline;
 
-/// Finds the mesh among the files: the one that `entry` names, or the only one that is a mesh. `format` overrides sniffing.
+/// Finds the mesh: the file that `entry` names, or the only one that is a mesh. `format` overrides
+/// sniffing.
 pub fn choose(
     files: Vec<BundleFile>,
     entry: Option<&str>,
     format: Option<Format>,
     deadline: &Deadline,
 ) -> Result<(Folder, Format), MeshError> {
-    let is_open = entry.is_none() && format.is_none_or(|format| format == Format::ThreeMf);
-    if let Some(number) = three_mf::start_part(&files).filter(|_| is_open) {
-        return Ok((Folder::new(files, number), Format::ThreeMf));
+    let packages = FORMATS.iter().filter(|row| entry.is_none() && format.is_none_or(|format| format == row.format));
+    for row in packages {
+        if let Some(number) = row.package_start.and_then(|start| start(&files)) {
+            return Ok((Folder::new(files, number), row.format));
+        }
     }
     let folder = Folder::new(files.clone(), 0);
     let number = match entry {
@@ -30,7 +34,7 @@ pub fn choose(
         Some(format) => format,
         None => {
             let file = &files[number];
-            // Who sends a file without a name knows which one is meant.
+            // A single unnamed file needs no name in the error.
             let is_named = files.len() > 1 || file.path != UNNAMED;
             let what = if is_named { format!("\"{}\"", show(&file.path)) } else { "the body".into() };
             sniff::sniff(&file.bytes, &what)?
@@ -58,10 +62,11 @@ fn only_mesh(files: &[BundleFile], format: Option<Format>, deadline: &Deadline) 
     }
 }
 
-/// Whether a file is a mesh beyond doubt: among other files, what only resembles an STL is more likely a texture.
+/// True if a file is certainly a mesh. Among other files, one that only resembles an STL is more
+/// likely a texture.
 fn is_mesh(file: &BundleFile, format: Option<Format>) -> bool {
-    let by_name = Format::from_name(&file.extension());
-    let sniffed = sniff::sniff_among_others(&file.bytes, by_name == Some(Format::StlBinary));
+    let by_name = Format::from_extension(&file.extension());
+    let sniffed = sniff::sniff_among_others(&file.bytes, by_name);
     match format {
         Some(format) => [by_name, sniffed].into_iter().flatten().any(|found| found.name() == format.name()),
         None => sniffed.is_some(),
@@ -70,13 +75,13 @@ fn is_mesh(file: &BundleFile, format: Option<Format>) -> bool {
 
 fn no_mesh(files: &[BundleFile]) -> MeshError {
     if files.is_empty() {
-        let detail = format!("the bundle has no files in it; send a mesh ({}) and what belongs to it", Format::ALL);
+        let detail = format!("the bundle has no files in it; send a mesh ({}) and what belongs to it", Format::list());
         return MeshError::new(MeshFault::Unrecognised, detail);
     }
     let names = show_all(files.iter().map(|file| file.path.as_str()));
-    let detail = format!("no file of the bundle is a mesh in a known format ({}): there is {names}", Format::ALL);
-    // An archive in the place of a mesh may hold another, and that one a third: none is opened but the upload itself.
-    match files.iter().find(|file| sniff::is_zip(&file.bytes)) {
+    let detail = format!("no file of the bundle is a mesh in a known format ({}): there is {names}", Format::list());
+    // Only the upload itself is opened as an archive: nested archives could go on without end.
+    match files.iter().find(|file| is_zip(&file.bytes)) {
         Some(file) => {
             let detail = format!("{detail}; \"{}\" is {}", show(&file.path), sniff::INNER_ZIP);
             MeshError::new(MeshFault::BundleBroken, detail)

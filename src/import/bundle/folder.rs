@@ -1,26 +1,28 @@
-//! The folder that a bundle makes, for whoever follows a name in one of its files.
+//! The folder of a bundle: resolves names in one of its files to other files.
 //!
-//! Everything here is names and bytes. A name that leads out of the folder leads nowhere: no file is opened for it.
+//! Only names and bytes are handled here. No file is ever opened, so a name that leads out of the
+//! folder leads nowhere.
 
 use crate::import::bundle::{BundleFile, base_name, has_drive, show};
 use crate::import::{MeshError, MeshFault};
 use rapidhash::RapidHashMap;
 use std::collections::hash_map::Entry;
 
-/// The files of a bundle, unpacked, and which of them is the mesh.
+/// The unpacked files of a bundle, one of which is the mesh.
 #[derive(Debug)]
 pub struct Folder {
     files: Vec<BundleFile>,
     entry: usize,
     by_path: RapidHashMap<String, usize>,
-    /// Lower-case paths, and base names as they are and in lower case. None where several files have it.
+    /// Files by lower-case path, by base name and by lower-case base name. None if several files
+    /// have it.
     by_lower_path: RapidHashMap<String, Option<usize>>,
     by_base_name: RapidHashMap<String, Option<usize>>,
     by_lower_base_name: RapidHashMap<String, Option<usize>>,
 }
 
 impl Folder {
-    /// Of some files; `entry` is one of them.
+    /// A folder of files, with the index of the mesh.
     pub fn new(files: Vec<BundleFile>, entry: usize) -> Self {
         let mut folder = Self {
             entry,
@@ -39,12 +41,12 @@ impl Folder {
         folder
     }
 
-    /// The mesh.
+    /// The file that holds the mesh.
     pub fn entry(&self) -> &BundleFile {
         &self.files[self.entry]
     }
 
-    /// How much all files are together.
+    /// The size of all files.
     pub fn bytes_len(&self) -> u64 {
         self.files.iter().map(|file| file.bytes.len() as u64).sum()
     }
@@ -60,11 +62,13 @@ impl Folder {
         Self { entry, ..self }
     }
 
-    /// The file that a URI in the entry means, relative to the entry's folder, if the bundle has it.
+    /// The file that a URI in the mesh refers to, relative to the mesh's folder. None if the bundle
+    /// lacks it.
     ///
-    /// Percent escapes are decoded and backslashes are slashes. Where no path fits exactly, one in other letter case does;
-    /// where none does, the only file of that base name, because uploads of single files lose their folders. A URI that
-    /// leads out of the bundle is an error. `data:` URIs are the caller's to decode.
+    /// Percent escapes are decoded, and backslashes count as slashes. If no path fits exactly,
+    /// letter case is ignored; then the only file of that base name is taken, because uploads of
+    /// single files lose their folders. A URI that leads out of the bundle is an error. The caller
+    /// decodes `data:` URIs.
     pub fn resolve(&self, uri: &str) -> Result<Option<&BundleFile>, MeshError> {
         let found = match self.at(self.entry().folder(), uri)? {
             Some(number) => Some(number),
@@ -73,7 +77,7 @@ impl Folder {
         Ok(found.map(|number| self.file(number)))
     }
 
-    /// The file at a relative path from `folder`, in the wrong letter case if need be.
+    /// The file at a relative path from `folder`, in any letter case if there is no exact match.
     pub fn at(&self, folder: &str, uri: &str) -> Result<Option<usize>, MeshError> {
         if has_scheme(uri) {
             return Ok(None);
@@ -113,20 +117,21 @@ fn insert_unique(map: &mut RapidHashMap<String, Option<usize>>, key: String, num
     }
 }
 
-/// `https:` and the like; a single letter is a drive.
+/// True for `https:` and the like. A single letter is a drive.
 fn has_scheme(uri: &str) -> bool {
     uri.split_once(':').is_some_and(|(scheme, _)| {
         scheme.len() > 1 && scheme.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'+' | b'-' | b'.'))
     })
 }
 
-/// A URI with its percent escapes decoded, then as it is: many exporters escape nothing.
+/// Both readings of a URI: with percent escapes decoded, then unchanged, because many exporters do
+/// not escape.
 fn readings(uri: &str) -> impl Iterator<Item = String> {
     let decoded = if uri.contains('%') { percent_decode(uri) } else { None };
     decoded.into_iter().chain(std::iter::once(uri.to_owned()))
 }
 
-/// None where the result is no text.
+/// Decodes percent escapes. None if the result is not UTF-8.
 fn percent_decode(uri: &str) -> Option<String> {
     let digit = |b: Option<&u8>| b.and_then(|&b| char::from(b).to_digit(16));
     let bytes = uri.as_bytes();
@@ -147,7 +152,7 @@ fn percent_decode(uri: &str) -> Option<String> {
     String::from_utf8(out).ok()
 }
 
-/// `folder` and then `path`, without `.` and `..`.
+/// Joins `folder` and `path`, and resolves `.` and `..`.
 fn join(folder: &str, path: &str) -> Result<String, MeshError> {
     let outside = || {
         let detail = format!("the name \"{}\" leads out of the upload, and nothing outside it is read", show(path));

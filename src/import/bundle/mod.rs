@@ -1,4 +1,4 @@
-//! What was uploaded: files that belong together, under names that any folder could give them.
+//! An upload: files that belong together, under relative paths.
 
 pub(crate) mod entry;
 pub(crate) mod folder;
@@ -11,14 +11,14 @@ use bytes::Bytes;
 /// Longest path of a file in a bundle, bytes: what file systems allow, roughly.
 const PATH_BYTES_MAX: usize = 1024;
 
-/// What a file is called that nobody named.
+/// The path of a file that was sent without a name.
 pub const UNNAMED: &str = "mesh";
 
-/// What was uploaded: one file, several, or a zip archive that is still closed.
+/// An upload: one file, several files, or a zip archive that is not yet unpacked.
 #[derive(Clone, Debug, Default)]
 pub struct Bundle {
     pub(crate) files: Vec<BundleFile>,
-    /// The mesh among the files, if the client says which.
+    /// The path of the mesh, if the client named it.
     pub(crate) entry: Option<String>,
     pub(crate) is_zip: bool,
 }
@@ -26,9 +26,9 @@ pub struct Bundle {
 /// One file of a bundle.
 #[derive(Clone, Debug)]
 pub struct BundleFile {
-    /// Where it is in the bundle: components with `/` between them, none of them `.` or `..`.
+    /// Its path in the bundle: components with `/` between them, none of them `.` or `..`.
     pub path: String,
-    /// What is in it; clones share it.
+    /// Its content, shared by clones.
     pub bytes: Bytes,
 }
 
@@ -38,10 +38,10 @@ pub struct BundleFile {
 pub struct BadPath(String);
 
 impl Bundle {
-    /// A bundle of one file without a name, or a zip archive if that is what the bytes are.
+    /// A bundle of one unnamed file, or of a zip archive if the bytes are one.
     pub fn of_one(bytes: impl Into<Bytes>) -> Self {
         let bytes = bytes.into();
-        let is_zip = bytes.starts_with(b"PK\x03\x04");
+        let is_zip = is_zip(&bytes);
         Self { files: vec![BundleFile { path: UNNAMED.into(), bytes }], entry: None, is_zip }
     }
 
@@ -52,38 +52,38 @@ impl Bundle {
 
     /// Several files; a single one may be a zip archive.
     pub fn of_files(files: Vec<BundleFile>) -> Self {
-        let is_zip = files.len() == 1 && files[0].bytes.starts_with(b"PK\x03\x04");
+        let is_zip = files.len() == 1 && is_zip(&files[0].bytes);
         Self { files, entry: None, is_zip }
     }
 
-    /// The same with the mesh named among the files.
+    /// The same bundle with the path of its mesh.
     #[must_use]
     pub fn with_entry(self, entry: Option<String>) -> Self {
         Self { entry, ..self }
     }
 
-    /// Refuses a single file without a byte in it: nobody need open it to know.
+    /// Refuses a single empty file.
     pub fn check_sent(&self) -> Result<(), MeshError> {
         match self.files.as_slice() {
             [single] if single.bytes.is_empty() => Err(MeshError::new(
                 MeshFault::Unrecognised,
-                format!("the body is empty: send the bytes of a mesh file ({})", Format::ALL),
+                format!("the body is empty: send the bytes of a mesh file ({})", Format::list()),
             )),
             _ => Ok(()),
         }
     }
 
-    /// Its files, as they came: an archive is still one.
+    /// Its files, unopened: an archive is one file.
     pub fn files(&self) -> &[BundleFile] {
         &self.files
     }
 
-    /// Whether it is an archive that is still closed.
+    /// True if it is an archive that is not yet unpacked.
     pub fn is_zip(&self) -> bool {
         self.is_zip
     }
 
-    /// Its files, for who makes another bundle of them.
+    /// Its files, without a copy.
     pub fn into_files(self) -> Vec<BundleFile> {
         self.files
     }
@@ -138,10 +138,15 @@ impl BundleFile {
         base_name(&self.path)
     }
 
-    /// What follows the last dot of its name, in lower case; empty without one.
+    /// The text after the last dot of its name, in lower case; empty without a dot.
     pub fn extension(&self) -> String {
         self.base_name().rsplit_once('.').map_or_else(String::new, |(_, e)| e.to_ascii_lowercase())
     }
+}
+
+/// True if the bytes are a zip archive with at least one entry.
+pub fn is_zip(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PK\x03\x04")
 }
 
 /// A short, printable form of a name that a client chose.
@@ -166,7 +171,7 @@ pub fn base_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// Whether a path begins with a drive letter.
+/// True if a path begins with a drive letter.
 pub fn has_drive(path: &str) -> bool {
     matches!(path.as_bytes(), [letter, b':', ..] if letter.is_ascii_alphabetic())
 }

@@ -1,5 +1,6 @@
-//! Unpacks a zip archive into the files of a bundle. Nothing that the archive says of itself is believed: its directory is
-//! walked entry by entry, entries must not share bytes, and what comes out is counted as it does.
+//! Unpacks a zip archive into the files of a bundle. The archive's declarations are not trusted:
+//! its directory is walked entry by entry, entries must not share bytes, and unpacked bytes are
+//! counted.
 
 use crate::import::bundle::{BundleFile, show};
 use crate::import::{MeshError, MeshFault, text};
@@ -13,12 +14,13 @@ use zip::unstable::read::ZipIterable;
 
 /// A local header before its name.
 const LOCAL_HEADER_BYTES: u64 = 30;
-/// Deflate makes at most 258 bytes from two bits: no honest entry is larger than this times its packed form.
+/// Largest ratio that Deflate can reach: at most 258 bytes from two bits.
 const RATIO_MAX: u64 = 1032;
-/// And no meshes and textures of this size together, in bytes, are that much larger: what is was made to fill memory.
+/// An entry of more bytes than this with a larger ratio than the next constant is a bomb: no mesh
+/// or texture compresses that well.
 const BOMB_BYTES: u64 = 16 << 20;
 const BOMB_RATIO: u64 = 200;
-/// Of several of them: pictures of one colour each are honest.
+/// Allowed bytes of several such entries together: small pictures of a single colour are honest.
 const BOMBS_BYTES: u64 = 32 << 20;
 
 /// The files of the archive, without what archivers leave in it.
@@ -39,7 +41,7 @@ pub fn unzip(
     let entries: Vec<_> = directory.files().map_err(unreadable)?.collect::<Result<_, _>>().map_err(unreadable)?;
     check_apart(archive, &entries)?;
 
-    // All of them are looked at before the first is unpacked.
+    // All entries are checked before the first is unpacked.
     let (mut files, mut wanted_entries) = (Vec::new(), Vec::new());
     let mut total = 0_u64;
     for entry in entries {
@@ -60,7 +62,7 @@ pub fn unzip(
     Ok(files)
 }
 
-/// The file that an entry is to become, still empty; None for what is no file.
+/// The still empty file for an entry. None for folders and files that archivers add.
 fn wanted(entry: &ZipFileEntry<'_>) -> Result<Option<BundleFile>, MeshError> {
     if entry.is_dir() {
         return Ok(None);
@@ -92,7 +94,7 @@ fn wanted(entry: &ZipFileEntry<'_>) -> Result<Option<BundleFile>, MeshError> {
     }
 }
 
-/// Entries that hardly anything is left of when packed: one large one, or many.
+/// Refuses decompression bombs: one large entry or many small ones with an extreme ratio.
 fn check_honest(entries: &[ZipFileEntry<'_>], files: &[BundleFile]) -> Result<(), MeshError> {
     let mut total = 0_u64;
     for (entry, file) in entries.iter().zip(files) {
@@ -112,7 +114,7 @@ fn check_honest(entries: &[ZipFileEntry<'_>], files: &[BundleFile]) -> Result<()
     Ok(())
 }
 
-/// Entries that share bytes are how a small archive becomes a large one.
+/// Refuses entries that share bytes, by which a small archive becomes a large one.
 fn check_apart(archive: &[u8], entries: &[ZipFileEntry<'_>]) -> Result<(), MeshError> {
     let directory = entries.iter().map(ZipFileEntry::central_header_start).min().unwrap_or(0);
     let mut ranges = Vec::with_capacity(entries.len());
@@ -143,7 +145,7 @@ fn inflate(archive: &Bytes, entry: ZipFileEntry<'_>, deadline: &Deadline) -> Res
     let size = usize::try_from(entry.size()).map_err(|_| bad("it is too large"))?;
     let mut cursor = Cursor::new(archive.as_ref());
     let mut reader = entry.with_reader(&mut cursor, zip::ZipReadOptions::new()).map_err(|e| bad(&e.to_string()))?;
-    // Paid for by the caller, and within what the packed bytes can give.
+    // The size was paid for by the caller and checked against the packed size.
     let mut out = Vec::with_capacity(size);
     let mut chunk = vec![0; 64 << 10];
     loop {

@@ -1,20 +1,20 @@
-//! What makes `ufbx` work for minutes without a look at the deadline, counted in the bytes before it gets them: two of its loops
-//! are quadratic in what real files have few of.
+//! Refuses files that would keep `ufbx` busy for minutes without a deadline check. Two of its loops
+//! are quadratic in node names that are rare in real files; those are counted in the bytes first.
 //!
-//! Node names are counted as either kind of file writes them, and where that is not certain, once too often.
+//! Node names are counted as both kinds of file write them; a doubtful case counts.
 
 use crate::import::context::Context;
 use crate::import::{MeshError, MeshFault};
 
-/// Textures that are collected for all textures that are made of others, at most: such a texture may be made of every other
-/// one, and collects the files of each. About a second.
+/// Most pairs of a composed texture and a texture that it may be made of: about a second.
 const COLLECTED_MAX: u64 = 32_000_000;
-/// Pairs of an entry of a layer and a set of coordinates that it is looked up among, at most: about a second.
-const LOOKED_UP_MAX: u64 = 2_000_000_000;
-/// Bytes between two looks at the deadline.
-const BYTES_PER_LOOK: usize = 1 << 20;
+/// Most pairs of a layer's entry and a set of coordinates, which it is searched among: about a
+/// second.
+const LOOKUPS_MAX: u64 = 2_000_000_000;
+/// Bytes between two deadline checks.
+const BYTES_PER_POLL: usize = 1 << 20;
 
-/// How often the names occur that those loops depend on.
+/// Occurrences of the names that those loops depend on.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Counts {
     textures: u64,
@@ -25,17 +25,17 @@ struct Counts {
     names_shaders: bool,
     /// Sets of coordinates, tangents and bitangents.
     sets: u64,
-    /// What layers say that they consist of.
+    /// Entries of layers.
     entries: u64,
 }
 
-/// Refuses a file that would take too long.
+/// Refuses a file that would take too long to parse.
 pub fn check(bytes: &[u8], cx: &Context<'_>) -> Result<(), MeshError> {
     let mut counts = Counts::default();
     let is_binary = bytes.starts_with(b"Kaydara FBX Binary");
-    for start in (0..bytes.len()).step_by(BYTES_PER_LOOK) {
+    for start in (0..bytes.len()).step_by(BYTES_PER_POLL) {
         cx.deadline.check()?;
-        for at in start..bytes.len().min(start + BYTES_PER_LOOK) {
+        for at in start..bytes.len().min(start + BYTES_PER_POLL) {
             if matches!(bytes[at], b'T' | b'L' | b'P' | b'3' | b'O') {
                 counts.add(bytes, at, is_binary);
             }
@@ -45,7 +45,7 @@ pub fn check(bytes: &[u8], cx: &Context<'_>) -> Result<(), MeshError> {
 }
 
 impl Counts {
-    /// Counts what begins at `at`.
+    /// Counts the name that begins at `at`.
     fn add(&mut self, bytes: &[u8], at: usize, is_binary: bool) {
         let rest = &bytes[at..];
         let is_node = |name: &[u8]| rest.starts_with(name) && is_name(bytes, at, name.len(), is_binary);
@@ -77,10 +77,10 @@ impl Counts {
             ));
         }
         let (sets, entries) = (self.sets, self.entries);
-        if sets.saturating_mul(entries) > LOOKED_UP_MAX {
+        if sets.saturating_mul(entries) > LOOKUPS_MAX {
             return refused(&format!(
                 "the FBX file has {sets} sets of texture coordinates and tangents (LayerElementUV and its like) and {entries} \
-                 entries of layers (LayerElement): {sets} times {entries} is more than the {LOOKED_UP_MAX} that are read"
+                 entries of layers (LayerElement): {sets} times {entries} is more than the {LOOKUPS_MAX} that are read"
             ));
         }
         Ok(())
@@ -91,13 +91,14 @@ fn refused(detail: &str) -> Result<(), MeshError> {
     Err(MeshError::new(MeshFault::Unsupported, detail))
 }
 
-/// Whether the word at `at` can be the name of a node: after its length in a binary file, and a whole word in a text.
+/// True if the word at `at` can be the name of a node: preceded by its length in a binary file, a
+/// whole word in a text.
 fn is_name(bytes: &[u8], at: usize, length: usize, is_binary: bool) -> bool {
     let before = at.checked_sub(1).and_then(|before| bytes.get(before)).copied().unwrap_or(b' ');
     if is_binary {
         return usize::from(before) == length;
     }
-    // What is in a name begins with a letter, but may follow a number without a space.
+    // A name begins with a letter, but may follow a number without a space.
     if before.is_ascii_alphabetic() || before == b'_' {
         return false;
     }
@@ -105,7 +106,7 @@ fn is_name(bytes: &[u8], at: usize, length: usize, is_binary: bool) -> bool {
     if let Some(quoted) = after.strip_prefix(b"\"") {
         return quoted.starts_with(b":");
     }
-    // A comment may come between. Two colons come in the names of objects, which are strings.
+    // A comment may come before the colon. Two colons occur in names of objects, which are strings.
     let next = after.iter().position(|byte| *byte > b' ').map_or(b' ', |next| after[next]);
     matches!(next, b':' | b';') && !after.starts_with(b"::")
 }

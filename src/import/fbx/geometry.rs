@@ -1,28 +1,29 @@
-//! The meshes of a scene, each as often as nodes show it, where those put it.
+//! Geometry of a scene: every instance of every mesh, placed by its node.
 
-use super::shown::{Fate, Fates};
+use super::visibility::{Visibilities, Visibility};
 use crate::import::MeshError;
 use crate::import::affine::Affine;
 use crate::import::context::Context;
 use crate::import::corners::{CornerSet, Polygons};
-use crate::import::raw::{RawMesh, srgb_to_linear};
+use crate::import::raw::RawMesh;
+use crate::import::report::counted_warnings;
 use crate::mesh::LineOrPoint;
 use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
-use crate::warning::Warning;
+use crate::srgb::srgb_to_linear;
 use rapidhash::RapidHashMap;
 use ufbx::{Matrix, Mesh, Node, Scene};
 
-/// What a vertex takes in a raw mesh.
+/// Bytes per vertex in a raw mesh.
 const VERTEX_BYTES: u64 = 24 + 12 + 8 + 16;
 
-/// Steps of a unit that a rotation's entries are rounded to: finer than positions show, and coarser than the differences
-/// between the sines and cosines of machines. A quarter turn becomes exact, too.
+/// Rotation matrices are rounded to this fraction of a unit: finer than positions show, coarser
+/// than the differences between the sines of different machines. Quarter turns become exact.
 const STEPS: f64 = (1_u64 << 44) as f64;
 
-/// The materials that triangles have, by the numbers of the file.
+/// The materials of triangles, by their ids in the file.
 #[derive(Debug, Default)]
 pub struct Used {
-    /// `typed_id` of each slot's material; none: faces without one.
+    /// `typed_id` of each slot's material. None for faces without a material.
     pub materials: Vec<Option<u32>>,
     slots: RapidHashMap<Option<u32>, u32>,
 }
@@ -38,14 +39,15 @@ impl Used {
     }
 }
 
-/// Fills in the geometry, and gives the materials that it has.
+/// Fills in the geometry and returns its materials.
 pub fn read(scene: &Scene, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Used, MeshError> {
     let mut used = Used::default();
-    let fates = Fates::of(scene, cx)?;
-    let shown = |node: &&Node| node.mesh.is_some() && fates.at(node) == Fate::Shown;
-    let count =
-        |fate: Fate| scene.nodes.into_iter().filter(|node| node.mesh.is_some() && fates.at(node) == fate).count();
-    // Counted as often as they are shown, before any is.
+    let visibilities = Visibilities::of(scene, cx)?;
+    let shown = |node: &&Node| node.mesh.is_some() && visibilities.at(node) == Visibility::Shown;
+    let count = |visibility: Visibility| {
+        scene.nodes.into_iter().filter(|node| node.mesh.is_some() && visibilities.at(node) == visibility).count()
+    };
+    // All instances are counted before the first is added.
     let of_node = |node: &Node| node.mesh.as_ref().map_or(0, |mesh| triangles_of(mesh));
     let triangles = scene.nodes.into_iter().filter(shown).map(of_node).fold(0, u64::saturating_add);
     cx.check_triangles(triangles)?;
@@ -57,18 +59,21 @@ pub fn read(scene: &Scene, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Us
         }
     }
     part.polygons.finish(raw, cx)?;
-    curves(scene, &fates, &mut used, raw, cx)?;
+    curves(scene, &visibilities, &mut used, raw, cx)?;
     let notes = [
-        (count(Fate::Hidden) as u64, "hidden_ignored", "meshes that the file hides are not drawn (meshes in the file:"),
         (
-            count(Fate::OtherLevel) as u64,
+            count(Visibility::Hidden) as u64,
+            "hidden_ignored",
+            "meshes that the file hides are not drawn (meshes in the file:",
+        ),
+        (
+            count(Visibility::OtherDetailLevel) as u64,
             "levels_ignored",
             "of a mesh in several levels of detail the first is drawn (meshes of other levels in the file:",
         ),
         (part.short_faces, "short_faces_ignored", "faces without corners are not drawn (faces in the file:"),
     ];
-    let met = notes.into_iter().filter(|(count, ..)| *count > 0);
-    raw.report.warnings.extend(met.map(|(count, code, what)| Warning { code, detail: format!("{what} {count})") }));
+    raw.report.warnings.extend(counted_warnings(notes));
     Ok(used)
 }
 
@@ -101,7 +106,7 @@ impl Part {
         attributes.begin(raw, cx)?;
         for (number, face) in mesh.faces.iter().enumerate() {
             let (begin, count) = (face.index_begin as usize, face.num_indices as usize);
-            // Points and lines come as faces, too.
+            // The library returns points and lines as faces.
             if count == 0 {
                 self.short_faces += 1;
                 continue;
@@ -134,16 +139,16 @@ impl Part {
     }
 }
 
-/// Lines that are no edges of a mesh, as often as nodes show them.
+/// Line objects, which belong to no mesh, at each node that refers to them.
 fn curves(
     scene: &Scene,
-    fates: &Fates,
+    visibilities: &Visibilities,
     used: &mut Used,
     raw: &mut RawMesh,
     cx: &mut Context<'_>,
 ) -> Result<(), MeshError> {
     for curve in &scene.line_curves {
-        for node in curve.element.instances.into_iter().filter(|node| fates.at(node) == Fate::Shown) {
+        for node in curve.element.instances.into_iter().filter(|node| visibilities.at(node) == Visibility::Shown) {
             cx.deadline.check()?;
             let place = Place::of(&node.geometry_to_world);
             let base = raw.positions.len();
@@ -169,7 +174,7 @@ fn curves(
     Ok(())
 }
 
-/// Gives all vertices the attributes that some have.
+/// Fills up attributes that only some meshes have.
 fn complete(raw: &mut RawMesh) {
     let count = raw.positions.len();
     if !raw.normals.is_empty() {
@@ -183,7 +188,7 @@ fn complete(raw: &mut RawMesh) {
     }
 }
 
-/// A node may give the mesh other materials than its first one does.
+/// Each node may assign other materials to the same mesh.
 fn material(mesh: &Mesh, node: &Node, slot: u32) -> Option<u32> {
     let materials = if node.materials.is_empty() { &mesh.materials } else { &node.materials };
     materials.get(slot as usize).map(|material| material.element.typed_id)
@@ -213,12 +218,12 @@ fn rounded(rows: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     if !(largest.is_normal() && largest < 1e100 && largest > 1e-100) {
         return rows;
     }
-    // A power of two near the largest, so that nothing rounds but what is meant to.
+    // Scaled by a power of two near the largest entry, which itself rounds nothing.
     let unit = f64::from_bits(largest.to_bits() & 0x7FF0_0000_0000_0000);
     rows.map(|row| row.map(|v| (v / unit * STEPS).round_ties_even() / STEPS * unit + 0.0))
 }
 
-/// The attributes of a mesh, all with indices of their own.
+/// The attributes of a mesh, each with its own indices.
 struct Attributes<'a> {
     mesh: &'a Mesh,
     has_normals: bool,
@@ -243,7 +248,7 @@ impl<'a> Attributes<'a> {
         ])
     }
 
-    /// Gives what is there already the attributes that only this mesh has.
+    /// Fills up, for the vertices so far, attributes that only this mesh has.
     fn begin(&self, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
         cx.budget.spend("the vertices of the file", raw.positions.len() as u64, self.missing_bytes(raw))?;
         let count = raw.positions.len();
@@ -273,12 +278,12 @@ impl<'a> Attributes<'a> {
             let n = self.mesh.vertex_normal.values.get(normal as usize)?;
             let n = place.normals.map(|row| row[0] * n.x + row[1] * n.y + row[2] * n.z);
             let largest = n.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
-            // In reach of f32, whatever the scale of the node.
+            // Made unit here, because f32 might not hold it at the node's scale.
             raw.normals.push(n.map(|v| if largest > 0.0 { (v / largest) as f32 } else { 0.0 }));
         }
         if self.has_uvs {
             let uv = self.mesh.vertex_uv.values.get(uv as usize)?;
-            // v runs up in the file, and down in a mesh.
+            // In the file v runs up, in a mesh down.
             raw.uvs.push([uv.x as f32, (1.0 - uv.y) as f32]);
         }
         if self.has_colors {

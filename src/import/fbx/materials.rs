@@ -1,22 +1,24 @@
-//! From the materials of an FBX scene to slots, and from its textures to images: embedded, or found among the files that came
-//! along by the last part of their names, which are other people's paths.
+//! Materials and textures of an FBX scene. Images are embedded, or found in the bundle by the last
+//! part of their names, because paths are those of the author's computer.
 //!
-//! Without them the shape is whole, so what is missing is a warning that says what to add, and never an error.
+//! A missing file is a warning that says what to add, never an error: the shape is complete without
+//! it.
 
 use super::geometry::Used;
 use crate::import::bundle::show_all;
 use crate::import::context::Context;
-use crate::import::raw::{RawMesh, srgb_to_linear};
+use crate::import::raw::RawMesh;
 use crate::import::{MeshError, text};
 use crate::mesh::MaterialSlot;
 use crate::mesh::material::{AlphaMode, ImageContent, ImageSource, TextureRef, Wrap};
+use crate::srgb::srgb_to_linear;
 use crate::warning::Warning;
 use rapidhash::RapidHashMap;
 use ufbx::{Material, MaterialMap, Scene, Texture, WrapMode};
 
-/// Longest file name, bytes; no file of a bundle has a longer path.
+/// Longest file name in bytes. No file of a bundle has a longer path.
 const NAME_BYTES_MAX: usize = 1024;
-/// A step of the entries of texture transforms, whose sines differ from machine to machine.
+/// Entries of texture transforms are rounded to this step, because sines differ between machines.
 const STEPS: f64 = 65_536.0;
 
 /// Gives `raw` its materials and images.
@@ -29,7 +31,7 @@ pub fn read(scene: &Scene, used: &Used, raw: &mut RawMesh, cx: &mut Context<'_>)
         let material = number.and_then(|number| scene.materials.get(number as usize));
         let slot = match material {
             Some(material) => reader.slot(material, cx)?,
-            // Colours of vertices are what to show, not a tint for the grey of files without colours.
+            // Vertex colours are final: white takes the place of the grey of files without colours.
             None => MaterialSlot {
                 base_color: if raw.colors.is_empty() { None } else { Some([1.0; 4]) },
                 ..MaterialSlot::default()
@@ -45,7 +47,7 @@ pub fn read(scene: &Scene, used: &Used, raw: &mut RawMesh, cx: &mut Context<'_>)
 #[derive(Default)]
 struct Reader {
     images: Vec<ImageSource>,
-    /// By the number of the texture in the file.
+    /// Images by the id of their texture in the file.
     known: RapidHashMap<u32, Option<u32>>,
     missing: Vec<String>,
     maps_ignored: u64,
@@ -64,7 +66,7 @@ impl Reader {
         }
         let alpha = self.alpha(material);
         let factor = |map: &MaterialMap| if map.has_value { clamped(map.value_vec4.x) } else { 1.0 };
-        // A texture takes the place of the colour.
+        // A texture replaces the colour.
         let color = match (&base_texture, pbr.base_color.has_value) {
             (Some(_), _) => Some([1.0; 3]),
             (None, true) => Some(rgb(&pbr.base_color)),
@@ -82,10 +84,10 @@ impl Reader {
         };
         let strength = factor(&pbr.emission_factor);
         let exponent = Some(&material.fbx.specular_exponent).filter(|map| !is_pbr && map.has_value);
-        // Clamping would leave a NaN as it is.
-        let said =
+        // `clamp` would keep a NaN.
+        let value_of =
             |map: &MaterialMap| Some(map.value_vec4.x).filter(|value| is_pbr && map.has_value && value.is_finite());
-        let (roughness, metallic) = (said(&pbr.roughness), said(&pbr.metalness));
+        let (roughness, metallic) = (value_of(&pbr.roughness), value_of(&pbr.metalness));
         Ok(MaterialSlot {
             name: text::name(&material.element.name),
             base_color,
@@ -100,8 +102,8 @@ impl Reader {
         })
     }
 
-    /// What is left of 1 by the transparency, or by the opacity of materials that have one. What that makes fully invisible is
-    /// an exporter's slip and no glass.
+    /// Alpha from the transparency, or from the opacity where a material has one. A fully invisible
+    /// material is a mistake of the exporter and is drawn opaque.
     fn alpha(&mut self, material: &Material) -> f64 {
         let (fbx, pbr) = (&material.fbx, &material.pbr);
         let alpha = if material.features.pbr.enabled {
@@ -121,7 +123,7 @@ impl Reader {
 
     fn texture(&mut self, map: &MaterialMap, cx: &mut Context<'_>) -> Result<Option<TextureRef>, MeshError> {
         let Some(texture) = map.texture.as_ref().filter(|_| map.texture_enabled) else { return Ok(None) };
-        // Of layers, the first file stands for all.
+        // Of a layered texture only the first file is used.
         let texture: &Texture = texture.file_textures.first().unwrap_or(texture);
         let id = texture.element.typed_id;
         let image = match self.known.get(&id) {
@@ -135,7 +137,7 @@ impl Reader {
         Ok(image.map(|image| use_of(texture, image)))
     }
 
-    /// The number of the image; none where the texture has no file at all.
+    /// The index of the image. None if the texture has no file.
     fn image(&mut self, texture: &Texture, cx: &mut Context<'_>) -> Result<Option<u32>, MeshError> {
         let names = [&texture.relative_filename, &texture.filename, &texture.absolute_filename];
         let name = names.into_iter().map(|name| &**name).find(|name| !name.is_empty()).unwrap_or_default();
@@ -196,7 +198,7 @@ impl Reader {
     }
 }
 
-/// Coordinates with v up go through the file's matrix, and then are turned to v down.
+/// The file's matrix, which has v up, turned to v down.
 fn use_of(texture: &Texture, image: u32) -> TextureRef {
     let mut out = TextureRef::new(image);
     let wrap = |mode: WrapMode| if mode == WrapMode::Clamp { Wrap::Clamp } else { Wrap::Repeat };
@@ -220,7 +222,8 @@ fn clamped(v: f64) -> f64 {
     if v.is_finite() { v.clamp(0.0, 1e4) } else { 1.0 }
 }
 
-/// As for the highlights of MTL files (Karis, "Specular BRDF Reference", 2013): `n = 2 / alpha^2 - 2`, `alpha = roughness^2`.
+/// As for the highlights of MTL files (Karis, "Specular BRDF Reference", 2013): `n = 2 / alpha^2 -
+/// 2`, `alpha = roughness^2`.
 fn roughness_of(exponent: &MaterialMap) -> f64 {
     (2.0 / (clamped(exponent.value_vec4.x) + 2.0)).sqrt().sqrt()
 }

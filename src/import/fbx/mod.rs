@@ -1,39 +1,43 @@
-//! Autodesk FBX, binary and ASCII, parsed by `ufbx`: it gets bytes, a cap on memory and a look at the deadline, and opens
-//! nothing. What it gives is checked again where it is an index.
+//! Autodesk FBX, binary and ASCII, parsed by `ufbx`. The library gets bytes, a cap on memory and a
+//! deadline callback, and opens no file. Indices that it returns are checked again.
 //!
-//! [`costs`] refuses what would take it too long, [`shown`] says what is hidden, [`geometry`] places the meshes of the scene and cuts their polygons, [`materials`] are their slots and images.
+//! [`costs`] and [`bombs`] refuse files that would take it too long or too much memory,
+//! [`visibility`] finds hidden nodes, [`geometry`] places meshes and cuts their polygons,
+//! [`materials`] makes slots and images.
 
+mod bombs;
 mod costs;
 mod geometry;
 mod materials;
-mod packed;
-mod shown;
+mod visibility;
 
 use super::raw::RawMesh;
-use super::{Format, MeshError, MeshFault, sniff, text};
+use super::{Format, MeshError, MeshFault, text};
+use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
+use crate::import::report::counted_warnings;
 use crate::limits;
-use crate::mesh::{FileMetadata, UpAxis};
+use crate::mesh::UpAxis;
 use crate::warning::Warning;
 use ufbx::{
     AllocatorOpts, CoordinateAxis, Error, ErrorType, FileFormat, LoadOpts, OpenFileCb, ProgressCb, ProgressResult,
     Scene, SceneRoot,
 };
 
-/// How far into a text its first telling word may be.
+/// Bytes of a text that are searched for its keywords.
 const TEXT_SNIFF_BYTES: usize = 4096;
-/// Nodes below nodes. Skeletons of hair and ropes are deep.
+/// Depth of the node tree. Skeletons of hair and ropes are deep.
 const NODE_DEPTH_MAX: u32 = 1024;
-/// Bytes between two looks at the deadline.
-const BYTES_PER_LOOK: u64 = 1 << 16;
+/// Bytes between two deadline checks.
+const BYTES_PER_POLL: u64 = 1 << 16;
 
-/// Whether the bytes begin as an FBX file of either kind.
+/// True if the bytes begin as an FBX file of either kind.
 pub fn is_fbx(bytes: &[u8]) -> bool {
     if bytes.starts_with(b"Kaydara FBX Binary") {
         return true;
     }
-    let text = sniff::trim_start(bytes);
+    let text = text::trim_start(bytes);
     let head = &text[..text.len().min(TEXT_SNIFF_BYTES)];
     let has = |word: &[u8]| head.windows(word.len()).any(|w| w == word);
     head.starts_with(b"; FBX") || (has(b"FBXHeaderExtension:") && has(b"{"))
@@ -42,7 +46,7 @@ pub fn is_fbx(bytes: &[u8]) -> bool {
 /// Reads an FBX file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     costs::check(bytes, cx)?;
-    packed::check(bytes, cx.deadline)?;
+    bombs::check(bytes, cx.deadline)?;
     let scene = load(bytes, cx)?;
     limits::check("the number of scene nodes", scene.nodes.len() as u64, cx.limits.nodes, "--limit-nodes")?;
     let mut raw = RawMesh::default();
@@ -63,10 +67,10 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     Ok(raw)
 }
 
-/// Two pools of memory, each with half of what the job has left.
+/// Loads the scene. Each of the library's two memory pools gets half of the remaining budget.
 fn load(bytes: &[u8], cx: &mut Context<'_>) -> Result<SceneRoot, MeshError> {
     let left = cx.limits.memory_bytes.saturating_sub(cx.budget.spent_bytes());
-    // 0 would mean no limit.
+    // 0 would mean unlimited.
     let pool = || AllocatorOpts { memory_limit: (left / 2).max(1) as usize, ..AllocatorOpts::default() };
     let deadline = cx.deadline;
     deadline.check()?;
@@ -86,16 +90,16 @@ fn load(bytes: &[u8], cx: &mut Context<'_>) -> Result<SceneRoot, MeshError> {
         no_format_from_extension: true,
         node_depth_limit: NODE_DEPTH_MAX,
         progress_cb: ProgressCb::Ref(&progress),
-        progress_interval_hint: BYTES_PER_LOOK,
+        progress_interval_hint: BYTES_PER_POLL,
         ..LoadOpts::default()
     };
-    let scene = ufbx::load_memory(bytes, options).map_err(|error| told(&error, left, cx))?;
+    let scene = ufbx::load_memory(bytes, options).map_err(|error| mesh_error(&error, left, cx))?;
     cx.budget.spend("the FBX scene", scene.metadata.result_memory_used as u64, 1)?;
     Ok(scene)
 }
 
-/// What went wrong, as an error of the file, of a limit or of time.
-fn told(error: &Error, left: u64, cx: &mut Context<'_>) -> MeshError {
+/// Turns an error of the library into one of the file, of a limit or of the deadline.
+fn mesh_error(error: &Error, left: u64, cx: &mut Context<'_>) -> MeshError {
     match error.type_ {
         ErrorType::MemoryLimit | ErrorType::AllocationLimit | ErrorType::OutOfMemory => {
             let refused = cx.budget.spend("the FBX scene", left.saturating_add(1), 1);
@@ -131,17 +135,16 @@ fn up_axis(scene: &Scene) -> UpAxis {
     }
 }
 
-/// What the file has that is not drawn.
+/// Warnings for content that is not drawn.
 fn ignored(scene: &Scene) -> Vec<Warning> {
     let nurbs = scene.nurbs_curves.len() + scene.nurbs_surfaces.len();
     let all = [
-        (nurbs, "curves_ignored", "free-form curves and surfaces are not drawn (in the file:"),
+        (nurbs as u64, "curves_ignored", "free-form curves and surfaces are not drawn (in the file:"),
         (
-            scene.skin_deformers.len() + scene.blend_deformers.len(),
+            (scene.skin_deformers.len() + scene.blend_deformers.len()) as u64,
             "deformers_ignored",
             "skins and blend shapes are drawn as they were modelled, not posed (in the file:",
         ),
     ];
-    let met = all.into_iter().filter(|(count, ..)| *count > 0);
-    met.map(|(count, code, what)| Warning { code, detail: format!("{what} {count})") }).collect()
+    counted_warnings(all).collect()
 }

@@ -1,18 +1,18 @@
-//! The GLB container: a header and chunks. Own code, since the `gltf` crate's underflows on a length below 12 and refuses
-//! chunks of unknown types, which the specification wants ignored.
+//! The GLB container: a header and chunks. Our own code, because the `gltf` crate underflows on a
+//! length below 12 and refuses chunks of unknown types, which the specification wants ignored.
 
 use crate::import::{MeshError, MeshFault};
 use crate::pluralise::pluralise;
 use crate::warning::Warning;
 
-/// What a GLB file holds.
+/// The chunks of a GLB file.
 #[derive(Debug)]
 pub struct Glb<'a> {
     /// The glTF document.
     pub json: &'a [u8],
     /// The data of the first buffer.
     pub bin: Option<&'a [u8]>,
-    /// What is odd about the file.
+    /// Warnings about the container.
     pub warnings: Vec<Warning>,
 }
 
@@ -55,7 +55,8 @@ pub fn split(bytes: &[u8]) -> Result<Glb<'_>, MeshError> {
     if json_type != *b"JSON" {
         return Err(MeshError::broken("the first GLB chunk, at byte 12, is not of type JSON"));
     }
-    // Only the chunk right after the JSON can be the binary buffer; whatever else follows is for others.
+    // Only the chunk right after the JSON can be the binary buffer; whatever else follows is for
+    // others.
     let bin = if next < bytes.len() { Some(chunk(bytes, next)?) } else { None };
     let bin = bin.filter(|(kind, _, _)| kind == b"BIN\0").map(|(_, data, _)| data);
     Ok(Glb { json, bin, warnings })

@@ -1,40 +1,52 @@
 //! glTF 2.0, as JSON or GLB.
 //!
-//! Reading order: [`container`], [`document`], [`tree`] (what is where) and [`check`], [`pose`] (the moment that is drawn), [`scene`]
-//! (which nodes are shown), [`primitive`] and [`vertices`], [`shape`] (morphed and held by joints), [`accessor`], [`buffers`]; for
-//! surfaces [`model`] (the document's other half), [`materials`], [`images`], [`cameras`].
+//! Reading order: [`container`] (the chunks of a GLB), [`document`] (the JSON, parsed and checked),
+//! [`data`] (buffers, accessors, decompression), [`scene`] (nodes, pose, skins, cameras),
+//! [`primitive`] (vertices and triangles, morphed and skinned), [`material`] (materials and
+//! images).
 
 mod container;
-pub(crate) mod data;
+mod data;
 mod document;
-pub(crate) mod material;
+mod material;
 mod primitive;
 mod scene;
 
 use self::document::check;
-use self::document::model::Lists;
-use self::document::tree::Document;
+use self::document::lists::Lists;
+use self::document::schema::Document;
 use self::material::Materials;
-use self::primitive::Primitive;
-use self::primitive::triangles;
+use self::primitive::shape::Shape;
+use self::primitive::{Primitive, triangles};
 use self::scene::Instance;
 use self::scene::pose::Pose;
-use self::scene::shape::Shape;
 use self::scene::skin::Skins;
-use self::scene::transform::Affine;
 use self::scene::{cameras, instancing};
+use super::affine::Affine;
 use super::raw::RawMesh;
-use super::{Format, MeshError};
+use super::{Format, MeshError, text};
+use crate::import::FileContent;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
-use crate::mesh::{FileContent, MaterialSlot};
+use crate::mesh::MaterialSlot;
 use crate::warning::Warning;
 use std::rc::Rc;
 
-/// Reads either kind.
+/// True if the bytes begin as a GLB container.
+pub fn is_glb(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"glTF")
+}
+
+/// True if the bytes are JSON with the property that glTF requires.
+pub fn is_gltf(bytes: &[u8]) -> bool {
+    let text = text::trim_start(bytes);
+    text.starts_with(b"{") && text.windows(7).any(|word| word == b"\"asset\"")
+}
+
+/// Reads either kind of file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut raw = RawMesh::default();
-    let (json, bin) = if bytes.starts_with(b"glTF") {
+    let (json, bin) = if is_glb(bytes) {
         raw.report.format = Format::Glb;
         let glb = container::split(bytes)?;
         raw.report.warnings = glb.warnings;
@@ -75,7 +87,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     Ok(raw)
 }
 
-/// What is shown of the meshes so far.
+/// Adds instances of meshes to a raw mesh, and keeps decoded primitives.
 struct Meshes<'a> {
     doc: &'a Document,
     pose: &'a Pose<'a>,
@@ -87,7 +99,7 @@ struct Meshes<'a> {
 }
 
 impl Meshes<'_> {
-    /// Adds a mesh as one node shows it.
+    /// Adds one instance of a mesh.
     fn show(&mut self, instance: &Instance, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
         cx.deadline.check()?;
         let primitives = self.primitives(instance.mesh, &mut raw.report.warnings, cx)?;
@@ -97,7 +109,7 @@ impl Meshes<'_> {
             Some(skin) => Some(self.skins.joints(skin.0, self.pose, &mut self.reader, cx)?),
             None => None,
         };
-        // What joints hold is where they are: the transform of the node itself means nothing to it.
+        // Skinned vertices follow their joints alone, so the node's own transform is ignored.
         let transform = if joints.is_some() { Affine::IDENTITY } else { instance.transform };
         let placements = match node.and_then(|node| node.extensions.instancing.as_ref()) {
             Some(instancing) => {
@@ -108,7 +120,7 @@ impl Meshes<'_> {
             }
             None => vec![transform],
         };
-        // What is nowhere is neither morphed nor skinned.
+        // Without instances, morphing and skinning would be wasted.
         if placements.is_empty() {
             return Ok(());
         }
@@ -159,7 +171,7 @@ impl Meshes<'_> {
     }
 }
 
-/// What the document's meshes say that they have.
+/// Totals of the document's meshes, by their accessors.
 fn content(doc: &Document) -> FileContent {
     let mut content = FileContent::default();
     let count = |accessor: usize| doc.accessors.get(accessor).map_or(0, |accessor| accessor.count.0);
@@ -170,14 +182,14 @@ fn content(doc: &Document) -> FileContent {
         content.draw_calls += 1;
         content.vertices = content.vertices.saturating_add(vertices);
         content.triangles = content.triangles.saturating_add(triangles::count(primitive.mode(), corners));
-        let [segments, points] = triangles::count_loose(primitive.mode(), corners);
+        let [segments, points] = triangles::count_lines_and_points(primitive.mode(), corners);
         content.segments = content.segments.saturating_add(segments);
         content.points = content.points.saturating_add(points);
     }
     content
 }
 
-/// A file may have 100,000 primitives of a kind that is not drawn.
+/// Adds a warning once per code: a file may have 100,000 primitives of a kind that is not drawn.
 fn warn_once(warnings: &mut Vec<Warning>, code: &'static str, detail: String) {
     if warnings.iter().all(|w| w.code != code) {
         warnings.push(Warning { code, detail });

@@ -1,10 +1,11 @@
-//! Vertex attributes of the file: made finite, normals made unit, or dropped.
+//! Repairs vertex attributes: values become finite, normals become unit, and unusable arrays are
+//! dropped.
 
 use crate::import::raw::RawMesh;
 use crate::mesh::Mesh;
 use crate::warning::Warning;
 
-/// What is left of the attributes: each empty, or one a raw vertex.
+/// The repaired attributes: each empty, or one value per raw vertex.
 #[derive(Debug, Default)]
 pub struct Attributes {
     /// Unit normals.
@@ -15,12 +16,12 @@ pub struct Attributes {
     pub colors: Vec<[f32; 4]>,
 }
 
-/// Takes the attributes out of `raw`, repaired. `mesh` has its triangles already.
+/// Takes the attributes out of `raw` and repairs them. `mesh` has its triangles already.
 pub fn repair(raw: &mut RawMesh, mesh: &Mesh) -> Attributes {
     let count = raw.positions.len();
     let mut colors = std::mem::take(&mut raw.colors);
     for component in colors.iter_mut().flatten() {
-        // White where a component is NaN: no tint.
+        // 1 for a NaN: no tint.
         *component = if component.is_nan() { 1.0 } else { component.clamp(0.0, 1.0) };
     }
     let mut uvs = std::mem::take(&mut raw.uvs);
@@ -46,7 +47,7 @@ pub fn repair(raw: &mut RawMesh, mesh: &Mesh) -> Attributes {
     }
 }
 
-/// Unit normals. One that has no direction becomes the mean of its faces' normals.
+/// Unit normals. A normal without a direction becomes the mean of its faces' normals.
 fn repair_normals(raw: &mut RawMesh, mesh: &Mesh) -> Vec<[f32; 3]> {
     let mut normals = std::mem::take(&mut raw.normals);
     if normals.len() != raw.positions.len() {

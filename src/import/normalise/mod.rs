@@ -1,6 +1,7 @@
-//! [`RawMesh`] to [`Mesh`]: the one place where conversions from f64, the policy on NaN, and welding live.
+//! Turns a [`RawMesh`] into a [`Mesh`]: conversion from f64, the policy on NaN, and welding.
 //!
-//! Everything up to the unit box scales by powers of two alone, so that a file scaled by a power of two gives the same mesh.
+//! Everything up to the unit box scales by powers of two alone, so that a file scaled by a power of
+//! two gives the same mesh.
 
 pub(crate) mod attributes;
 pub(crate) mod pow2;
@@ -10,16 +11,17 @@ use self::attributes::Attributes;
 use self::pow2::{Pow2, exponent, is_usable, max_abs};
 use self::weld::PositionSet;
 use super::raw::RawMesh;
-use super::{MeshError, MeshFault};
+use super::{ImportReport, Imported, MeshError, MeshFault};
 use crate::import::context::Context;
-use crate::mesh::{ImportReport, LineOrPoint, MaterialSlot, Mesh, ToFile, primitives};
+use crate::mesh::vector::{cross, dot, sub};
+use crate::mesh::{LineOrPoint, MaterialSlot, Mesh, ToFile, primitives};
 use crate::pluralise::pluralise;
 
-/// Brings an imported mesh into its final form.
-pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshError> {
+/// Brings an imported mesh into its normal form.
+pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, MeshError> {
     cx.check_triangles(raw.triangles.len() as u64 + primitives::triangles(&raw.lines_and_points))?;
     cx.budget.spend("the triangles", raw.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
-    cx.budget.spend("lines and points", raw.lines_and_points.len() as u64, BYTES_PER_LOOSE)?;
+    cx.budget.spend("lines and points", raw.lines_and_points.len() as u64, BYTES_PER_LINE_OR_POINT)?;
     cx.budget.spend("the welded vertices", raw.positions.len() as u64, BYTES_PER_VERTEX)?;
 
     raw.report.warnings.extend(precision::warning(&raw));
@@ -45,22 +47,21 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Mesh, MeshErr
     }
     (mesh.normals, mesh.uvs, mesh.colors) = (normals, uvs, colors);
     mesh.materials = raw.materials;
-    let loose = mesh.lines_and_points.iter().map(|one| one.material);
-    let slots = mesh.triangle_materials.iter().copied().chain(loose).max().unwrap_or(0) as usize + 1;
+    let of_lines_and_points = mesh.lines_and_points.iter().map(|one| one.material);
+    let slots = mesh.triangle_materials.iter().copied().chain(of_lines_and_points).max().unwrap_or(0) as usize + 1;
     while mesh.materials.len() < slots {
         mesh.materials.push(MaterialSlot::default());
     }
     (mesh.images, mesh.cameras) = (raw.images, raw.cameras);
     mesh.up = raw.up;
-    mesh.report = raw.report;
-    Ok(mesh)
+    Ok(Imported { mesh, report: raw.report })
 }
 
-/// A face, its normal, and two index triples, next to those of the raw mesh.
+/// Memory beside the raw mesh: a face, its normal, two index triples, a mask and a material.
 const BYTES_PER_TRIANGLE: u64 = 20 + 12 + 12 + 12 + 1 + 4;
-/// Its ends among the positions and among the attributes, and its material.
-const BYTES_PER_LOOSE: u64 = 8 + 8 + 4;
-/// A welded position, its place in the raw mesh's map, and its slots in the set while that grows.
+/// Two index pairs and a material.
+const BYTES_PER_LINE_OR_POINT: u64 = 8 + 8 + 4;
+/// A welded position, its place in the raw mesh's map, and its slots in the set as that grows.
 const BYTES_PER_VERTEX: u64 = 12 + 4 + 16;
 
 /// A face that will be drawn: its place in the raw mesh and its unit normal.
@@ -69,8 +70,8 @@ struct Face {
     normal: [f32; 3],
 }
 
-/// Scales all positions so that the largest magnitude used is about 1, and returns the exponent. From here on nothing
-/// over- or underflows that matters.
+/// Scales all positions so that the largest used magnitude is about 1, and returns the exponent.
+/// After this no relevant product over- or underflows.
 fn scale_down(raw: &mut RawMesh) -> i32 {
     let mut largest = 0.0_f64;
     for triangle in &raw.triangles {
@@ -88,7 +89,7 @@ fn scale_down(raw: &mut RawMesh) -> i32 {
     let e = exponent(largest);
     let down = Pow2::new(-e);
     for p in &mut raw.positions {
-        // What cannot be computed with must stay recognisable.
+        // Unusable positions must stay recognisable.
         *p = if is_usable(p) { down.of3(*p) } else { [f64::NAN; 3] };
     }
     e
@@ -118,7 +119,7 @@ fn face_normal([a, b, c]: [[f64; 3]; 3]) -> Option<[f64; 3]> {
     if length2 > 1e-200 {
         return Some(n.map(|x| x / length2.sqrt()));
     }
-    // Tiny edges or a sliver: products may have underflown.
+    // Tiny edges or a sliver: products may have underflowed.
     let (e, f) = (rescale(e)?, rescale(f)?);
     let n = rescale(cross(e, f))?;
     let length = dot(n, n).sqrt();
@@ -128,18 +129,6 @@ fn face_normal([a, b, c]: [[f64; 3]; 3]) -> Option<[f64; 3]> {
 fn rescale(v: [f64; 3]) -> Option<[f64; 3]> {
     let size = max_abs(&v);
     (size > 0.0).then(|| Pow2::new(-exponent(size)).of3(v))
-}
-
-fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// The map from (scaled) file space to the unit box.
@@ -169,7 +158,8 @@ impl UnitBox {
     fn to_unit(&self, p: [f64; 3]) -> [f32; 3] {
         self.down.of3(sub(p, self.centre)).map(|c| {
             let c = c as f32;
-            // No negative zero, so that equal positions have equal bits; nothing subnormal, which some GPUs flush.
+            // No negative zero, so that equal positions have equal bits, and no subnormals, which
+            // some GPUs flush.
             if c.abs() < f32::MIN_POSITIVE { 0.0 } else { c }
         })
     }
@@ -182,7 +172,8 @@ impl UnitBox {
     }
 }
 
-/// Positions numbered in the order of their first use, and the triangles that still have three corners, and segments two ends.
+/// Welds positions, numbered in the order of their first use. Drops triangles and segments whose
+/// corners became equal.
 fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
     const UNSEEN: u32 = u32::MAX;
     let mut mesh = Mesh::default();
@@ -238,13 +229,13 @@ fn reserve(mesh: &mut Mesh, faces: usize) {
     mesh.triangle_materials.reserve_exact(faces);
 }
 
-/// What was dropped may have been the only one to use a position.
+/// Removes positions that only dropped primitives used.
 fn drop_unused(mesh: &mut Mesh) {
     const UNSEEN: u32 = u32::MAX;
     let mut new_of_old = vec![UNSEEN; mesh.positions.len()];
     let mut positions = Vec::with_capacity(mesh.positions.len());
-    let of_loose = mesh.lines_and_points.iter_mut().flat_map(|one| &mut one.ends);
-    for v in mesh.triangles.iter_mut().flatten().chain(of_loose) {
+    let of_lines_and_points = mesh.lines_and_points.iter_mut().flat_map(|one| &mut one.ends);
+    for v in mesh.triangles.iter_mut().flatten().chain(of_lines_and_points) {
         let new = &mut new_of_old[*v as usize];
         if *new == UNSEEN {
             *new = positions.len() as u32;
@@ -283,7 +274,8 @@ fn empty(report: &ImportReport) -> MeshError {
     MeshError::new(MeshFault::Empty, detail)
 }
 
-/// Drops lines and points with an end that cannot be computed with, and segments whose ends are in one place; returns how many.
+/// Drops lines and points with an unusable end, and segments without a length. Returns their
+/// number.
 fn drop_bad(raw: &mut RawMesh) -> u64 {
     let before = raw.lines_and_points.len();
     let positions = &raw.positions;

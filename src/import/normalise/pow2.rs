@@ -1,9 +1,9 @@
 //! Exact scaling by powers of two, for the whole range of f64.
 
-/// Coordinates from here on count as infinite: sums and differences of two smaller ones cannot overflow.
+/// Larger coordinates count as infinite. Sums and differences of two smaller ones cannot overflow.
 pub const TOO_LARGE: f64 = 4.49423283715579e307; // about 2^1022
 
-/// Whether a position can be computed with.
+/// True if a position is finite and small enough to compute with.
 pub fn is_usable(p: &[f64; 3]) -> bool {
     p.iter().all(|c| c.abs() < TOO_LARGE) // false for NaN
 }

@@ -1,15 +1,15 @@
-//! Notices positions whose own format has made them coarse: f32 far from the origin.
+//! Warns of coarse positions: f32 far from the origin.
 
 use super::pow2::{is_usable, max_abs};
 use crate::import::raw::RawMesh;
 use crate::warning::Warning;
 
-/// Where a mesh is at most this many steps across, the steps show: half of one is a quarter of a pixel where the mesh takes
-/// 1024.
+/// A mesh fewer steps across than this shows them: half a step is a quarter of a pixel in a picture
+/// of 1024 pixels.
 const STEPS_MIN: f64 = 2048.0;
 
-/// A warning if the file stores f32, and those are far apart for a mesh of this size. Where a transform has made other numbers of
-/// them, it has most likely moved what is fine near its own origin.
+/// A warning if the file stores f32 that are far apart for the size of the mesh. Not for positions
+/// that a transform changed: they are most likely fine near their own origin.
 pub fn warning(raw: &RawMesh) -> Option<Warning> {
     if !raw.is_f32 {
         return None;
@@ -32,7 +32,7 @@ pub fn warning(raw: &RawMesh) -> Option<Warning> {
     }
     let farthest = max_abs(&low).max(max_abs(&high)) as f32;
     let size = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
-    // No triangle at all leaves the infinities.
+    // Infinite if there is no triangle.
     if !farthest.is_finite() {
         return None;
     }
@@ -84,7 +84,8 @@ mod tests {
         assert!(far.contains("that is 1280 across"), "{far}");
         let near = detail(&f32s(cube(-65_536.5, 2.0))).unwrap();
         assert!(near.starts_with("f32 positions near 65536.5 are 0.0078125 units apart"), "{near}");
-        // Whole numbers in f64, moved f32, a mesh large enough, and one near the origin.
+        // No warning: whole numbers in f64, moved f32, a large enough mesh, and one near the
+        // origin.
         let whole = RawMesh { is_f32: false, ..cube(1e5, 2.0) };
         for fine in [whole, cube(1e9 + 0.5, 2.0), f32s(cube(1e9, 2e5)), f32s(cube(1e3, 2.0)), f32s(cube(0.0, 1e-30))] {
             assert_eq!(warning(&fine), None);

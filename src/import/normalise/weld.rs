@@ -1,9 +1,9 @@
-//! Finding equal positions, by their bits.
+//! Finds equal positions by their bits.
 
 use std::hash::{BuildHasher, RandomState};
 
-/// A set of positions that numbers them in the order in which they were first seen. The hash is keyed at random, so that no
-/// file can be made to collide; the numbers do not depend on it.
+/// A set of positions that numbers them in the order in which they were first seen. The hash is
+/// keyed at random, so that no file can be made to collide; the numbers do not depend on it.
 #[derive(Debug)]
 pub struct PositionSet {
     /// The distinct positions.
@@ -26,7 +26,7 @@ impl PositionSet {
         }
     }
 
-    /// The number of `p`, which must not have a negative zero: those have other bits.
+    /// The number of `p`. It must not have a negative zero, whose bits differ.
     pub fn number(&mut self, p: [f32; 3]) -> u32 {
         let bits = p.map(f32::to_bits);
         let mut at = self.start(bits);
@@ -46,7 +46,7 @@ impl PositionSet {
         number
     }
 
-    /// Where the search for some bits begins: both halves of a 128-bit product, as in wyhash.
+    /// The first slot for some bits, from both halves of a 128-bit product, as in wyhash.
     fn start(&self, [x, y, z]: [u32; 3]) -> usize {
         let a = (u64::from(x) | u64::from(y) << 32) ^ self.keys[0];
         let b = u64::from(z) ^ self.keys[1];

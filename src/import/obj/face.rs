@@ -1,6 +1,6 @@
 //! The corners of an `f` line.
 
-/// Zero-based indices of one corner; `None` where the file gives none.
+/// Zero-based indices of one corner. None where the file has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Corner {
     /// Position.
@@ -11,7 +11,8 @@ pub struct Corner {
     pub vn: Option<u64>,
 }
 
-/// How many vertices, texture coordinates and normals come before the line: relative indices count back from there.
+/// Numbers of vertices, texture coordinates and normals before the line: relative indices count
+/// back from there.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     /// `v` lines.
@@ -22,7 +23,8 @@ pub struct Counts {
     pub vn: u64,
 }
 
-/// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn`; also with empty ends, as in `v//`. The error says what is wrong with the word.
+/// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn`; also with empty ends, as in `v//`. The error says what
+/// is wrong with the word.
 pub fn parse_corner(word: &[u8], counts: Counts) -> Result<Corner, String> {
     let mut parts = word.split(|&b| b == b'/');
     let mut next = |what: &str, count: u64| match parts.next() {
@@ -60,7 +62,7 @@ pub fn show(bytes: &[u8]) -> String {
     head.chars().map(|c| if c.is_control() { '\u{FFFD}' } else { c }).collect()
 }
 
-/// Writes an `f` line; `form` says whether its corners have texture coordinates and normals.
+/// Writes an `f` line, with texture coordinates and normals as the last argument says.
 pub fn write_face(out: &mut Vec<u8>, corners: &[Corner], (vt, vn): (bool, bool)) {
     out.push(b'f');
     for corner in corners {

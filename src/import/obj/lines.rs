@@ -1,16 +1,17 @@
-//! The logical lines of an OBJ file: continued ones are joined, whatever ends them.
+//! The logical lines of an OBJ file: continued lines are joined, for all kinds of line ends.
 
 use std::borrow::Cow;
 
-/// An iterator that knows where it is.
+/// An iterator over lines that knows its line number.
 pub struct Lines<'a> {
     rest: &'a [u8],
     newline: u8,
-    /// Number of the line last returned, from 1; of a continued one, its end.
+    /// Number of the line last returned, from 1. For a continued line, that of its end.
     pub number: u64,
 }
 
-/// A name without the comment after it. Names may have a `#` of their own (`Material #25`): a comment's stands alone.
+/// A name without the comment after it. Names may have a `#` of their own (`Material #25`): a
+/// comment's stands alone.
 pub fn uncommented(name: &[u8]) -> &[u8] {
     let is_space = |at: Option<usize>| at.and_then(|at| name.get(at)).is_none_or(u8::is_ascii_whitespace);
     let mark = |&at: &usize| name[at] == b'#' && is_space(at.checked_sub(1)) && is_space(Some(at + 1));

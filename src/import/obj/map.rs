@@ -2,10 +2,10 @@
 
 use crate::mesh::material::{TextureRef, Wrap};
 
-/// Longest file name that is kept, bytes; no file of a bundle has a longer path.
+/// Longest file name that is kept, in bytes. No file of a bundle has a longer path.
 const NAME_BYTES_MAX: usize = 1024;
 
-/// What a texture statement says.
+/// A parsed texture statement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
     /// The file's name, as it is in the file.
@@ -21,7 +21,7 @@ pub struct Map {
 }
 
 impl Map {
-    /// From what follows the keyword; None where there is no name, or one too long to be a file's.
+    /// Parses the text after the keyword. None without a name, or with one too long for a file.
     pub fn parse(text: &[u8]) -> Option<Self> {
         let mut map = Self { name: Vec::new(), scale: [1.0; 2], offset: [0.0; 2], clamp: false, strength: None };
         let mut rest = text.trim_ascii();
@@ -56,10 +56,11 @@ impl Map {
         Some(map)
     }
 
-    /// The use of image number `image` that it describes.
+    /// The texture reference for image number `image`.
     ///
-    /// Viewers agree on `uv * scale + offset` with v up (the Wavefront text speaks of the size of the pattern, which would
-    /// be the inverse). With v down, `v' = 1 - ((1 - v) * s + o) = s * v + (1 - s - o)`.
+    /// Viewers agree on `uv * scale + offset` with v up (the Wavefront text speaks of the size of
+    /// the pattern, which would be the inverse). With v down, `v' = 1 - ((1 - v) * s + o) = s * v +
+    /// (1 - s - o)`.
     pub fn texture(&self, image: u32) -> TextureRef {
         let ([su, sv], [ou, ov]) = (self.scale, self.offset);
         let mut texture = TextureRef::new(image);
@@ -71,7 +72,7 @@ impl Map {
     }
 }
 
-/// A number that is one.
+/// A finite number of reasonable size.
 pub fn number(word: &[u8]) -> Option<f64> {
     let number: f64 = std::str::from_utf8(word).ok()?.parse().ok()?;
     // Beyond this, nothing that is computed from it in f32 would be finite.
@@ -91,7 +92,8 @@ fn pass_words(mut text: &[u8], count: usize) -> &[u8] {
     text
 }
 
-/// One to three numbers, of which the first two count. The last word of a line is never one of them: it is the name.
+/// One to three numbers, of which the first two count. The last word of a line is never one of
+/// them: it is the name.
 fn numbers<'t>(mut text: &'t [u8], values: &mut [f64; 2]) -> &'t [u8] {
     for i in 0..3 {
         let (word, after) = split_word(text);

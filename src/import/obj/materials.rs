@@ -1,27 +1,29 @@
-//! From the names in an OBJ file to material slots: finds libraries and textures among the files that came along.
+//! Material slots from the names in an OBJ file. Libraries and textures are found in the bundle.
 //!
-//! Without them the shape is whole, so what is missing is a warning that says what to add, and never an error.
+//! A missing file is a warning that says what to add, never an error: the shape is complete without
+//! it.
 
 use super::map::Map;
-use super::mtl::{self, Material, PassedOver};
-use super::srgb_to_linear;
+use super::mtl::{self, Material, SkippedLines};
 use crate::import::bundle::show_all;
 use crate::import::context::Context;
 use crate::import::raw::RawMesh;
+use crate::import::text::utf8_or_latin1;
 use crate::import::{Folder, MeshError, text};
 use crate::mesh::MaterialSlot;
 use crate::mesh::material::{AlphaMode, ImageContent, ImageSource, TextureRef};
+use crate::srgb::srgb_to_linear;
 use crate::warning::Warning;
 use rapidhash::{RapidHashMap, RapidHashSet};
-use std::borrow::Cow;
 
-/// Where a texture counts as there and where not, if it is both drawn and cut out by the same image.
+/// Alpha threshold of a texture that is both drawn and cut out by the same image.
 const MASK_AT: f32 = 0.5;
 
-/// Most libraries that one line can name: a longer line is no list of files.
+/// Most libraries on one line: a longer line is no list of files.
 const LIBRARIES_MAX: usize = 100;
 
-/// A slot for each of `names`, in their order, as the `libraries` describe them. Images go to `raw`, and so do warnings.
+/// A slot for each of `names`, in order, as the `libraries` describe them. Images and warnings go
+/// to `raw`.
 pub fn read(
     names: &[Vec<u8>],
     libraries: &[Vec<u8>],
@@ -34,7 +36,7 @@ pub fn read(
     let numbers: RapidHashMap<&[u8], usize> = names.iter().enumerate().map(|(i, name)| (name.as_slice(), i)).collect();
     let mut found: Vec<Option<(Material, usize)>> = vec![None; names.len()];
     for &file in &files {
-        let library = text::to_utf8(&cx.bundle.file(file).bytes, cx)?;
+        let library = text::to_utf8(&cx.bundle.file(file).bytes, cx.budget)?;
         let passed = mtl::read(&library, &numbers, &mut found, file, cx)?;
         reader.notes.add(passed);
     }
@@ -72,14 +74,14 @@ struct Images {
 }
 
 impl Reader<'_> {
-    /// The files that `mtllib` lines mean, each once. A line is one name with spaces, or several names.
+    /// The files of `mtllib` lines, each once. A line is one name with spaces, or several names.
     fn find_libraries(&mut self, lines: &[Vec<u8>], cx: &Context<'_>) -> Result<Vec<usize>, MeshError> {
-        let mut said = RapidHashSet::default();
+        let mut distinct = RapidHashSet::default();
         let mut seen = RapidHashSet::default();
         let mut files = Vec::new();
-        for line in lines.iter().filter(|line| !line.is_empty() && said.insert(line.as_slice())) {
+        for line in lines.iter().filter(|line| !line.is_empty() && distinct.insert(line.as_slice())) {
             cx.deadline.check()?;
-            let whole = text(line);
+            let whole = utf8_or_latin1(line);
             let folder = self.folder.entry().folder();
             let numbers: Vec<usize> = match self.find(folder, &whole) {
                 Some(number) => vec![number],
@@ -96,8 +98,8 @@ impl Reader<'_> {
         Ok(files)
     }
 
-    /// A file by its path from `folder` or from the mesh, or else by its base name: libraries are full of other people's
-    /// absolute paths.
+    /// A file by its path from `folder` or from the mesh, or else by its base name: libraries are
+    /// full of absolute paths of the author's computer.
     fn find(&self, folder: &str, name: &str) -> Option<usize> {
         let at = |folder: &str| self.folder.at(folder, name).ok().flatten();
         at(folder).or_else(|| at(self.folder.entry().folder())).or_else(|| self.folder.of_base_name(name))
@@ -112,7 +114,7 @@ impl Reader<'_> {
         let is_cut_out = self.is_cut_out(material, library);
         let says_base = material.diffuse.is_some() || alpha < 1.0;
         let [r, g, b] = linear(material.diffuse.unwrap_or([1.0; 3]).map(|c| c.min(1.0)));
-        // Without `Ke` a texture would be multiplied by nothing.
+        // Without `Ke`, `map_Ke` is multiplied by white.
         let emissive = material.emissive.or(emissive_texture.map(|_| [1.0; 3]));
         Ok(MaterialSlot {
             name: String::new(),
@@ -133,11 +135,11 @@ impl Reader<'_> {
         })
     }
 
-    /// Whether `map_d` is the image that `map_Kd` shows. Any other is not drawn.
+    /// True if `map_d` is the same image as `map_Kd`. Any other is not drawn.
     fn is_cut_out(&mut self, material: &Material, library: usize) -> bool {
         let Some(opacity) = &material.opacity_map else { return false };
         let folder = self.folder.file(library).folder();
-        let file = |map: &Map| self.find(folder, &text(&map.name)).ok_or_else(|| map.name.clone());
+        let file = |map: &Map| self.find(folder, &utf8_or_latin1(&map.name)).ok_or_else(|| map.name.clone());
         let same = material.diffuse_map.as_ref().is_some_and(|diffuse| file(diffuse) == file(opacity));
         self.notes.opacity_maps += u64::from(!same);
         same
@@ -150,7 +152,7 @@ impl Reader<'_> {
         cx: &mut Context<'_>,
     ) -> Result<Option<TextureRef>, MeshError> {
         let Some(map) = map else { return Ok(None) };
-        let name = text(&map.name);
+        let name = utf8_or_latin1(&map.name);
         let number = self.find(self.folder.file(library).folder(), &name);
         let images = &mut self.images;
         let known = match number {
@@ -180,7 +182,7 @@ impl Reader<'_> {
     }
 }
 
-/// What a user should hear about, all files taken together.
+/// Collects warnings of all libraries.
 #[derive(Default)]
 struct Notes {
     libraries: Vec<String>,
@@ -188,11 +190,11 @@ struct Notes {
     undefined: Vec<String>,
     opacity_maps: u64,
     reversed: u64,
-    passed: PassedOver,
+    passed: SkippedLines,
 }
 
 impl Notes {
-    fn add(&mut self, more: PassedOver) {
+    fn add(&mut self, more: SkippedLines) {
         self.passed.bumps += more.bumps;
         self.passed.maps += more.maps;
         self.passed.broken += more.broken;
@@ -200,7 +202,7 @@ impl Notes {
 
     fn warnings(&self) -> Vec<Warning> {
         let names = |list: &[String]| show_all(list.iter().map(String::as_str));
-        let PassedOver { bumps, maps, broken } = self.passed;
+        let SkippedLines { bumps, maps, broken } = self.passed;
         let all = [
             (
                 self.libraries.len() as u64,
@@ -247,21 +249,13 @@ impl Notes {
     }
 }
 
-/// What the highlight's exponent says in terms of roughness: `n = 2 / alpha^2 - 2` with `alpha = roughness^2` (Karis,
-/// "Specular BRDF Reference", 2013, for Blinn-Phong).
+/// Roughness from the exponent of the highlight: `n = 2 / alpha^2 - 2` with `alpha = roughness^2`
+/// (Karis, "Specular BRDF Reference", 2013, for Blinn-Phong).
 fn roughness(exponent: f64) -> f64 {
     (2.0 / (exponent + 2.0)).sqrt().sqrt()
 }
 
-/// MTL colours are taken as most viewers take them: as the values to display, that is sRGB.
+/// Linear light of an MTL colour, which is sRGB as most viewers take it.
 fn linear(color: [f64; 3]) -> [f32; 3] {
     color.map(|c| srgb_to_linear(c) as f32)
-}
-
-/// UTF-8, or Latin-1 where it is not.
-fn text(name: &[u8]) -> Cow<'_, str> {
-    match std::str::from_utf8(name) {
-        Ok(text) => Cow::Borrowed(text),
-        Err(_) => Cow::Owned(name.iter().map(|&b| char::from(b)).collect()),
-    }
 }

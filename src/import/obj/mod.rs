@@ -1,32 +1,38 @@
-//! Wavefront OBJ, parsed by `tobj`. What `tobj` refuses, misreads or trusts is seen to line by line before it looks
-//! ([`clean`]), so that every error names its line and no count is trusted. MTL files are read by [`mtl`], not by `tobj`,
-//! which would panic on some; [`materials`] turns what they say into slots and images.
+//! Wavefront OBJ, parsed by `tobj`. Every line is first cleaned by [`clean`], so that `tobj` sees
+//! nothing that it would refuse or misread, every error names its line, and no count is trusted.
+//! MTL files are read by [`mtl`], because `tobj` would panic on some. [`materials`] makes slots and
+//! images from them.
 
 mod clean;
 mod face;
-mod left_out;
 mod lines;
 mod map;
 mod materials;
 mod mtl;
+mod skipped;
+mod sniff;
+
+pub use sniff::is_obj;
 
 use self::clean::Cleaner;
 use super::polygon::Triangulator;
-use super::raw::{RawMesh, extend_attribute, srgb_to_linear};
+use super::raw::{RawMesh, extend_attribute};
 use super::{Format, MeshError, text};
+use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
-use crate::mesh::{FileMetadata, LineOrPoint, MaterialSlot};
-use crate::warning::Warning;
+use crate::mesh::{LineOrPoint, MaterialSlot};
+use crate::srgb::srgb_to_linear;
 use std::path::Path;
 use tobj::{LoadError, LoadOptions};
 
 /// Reads an OBJ file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
-    // tobj would fan polygons, which is wrong for concave ones. With one index for all attributes, models whose faces all
-    // have the same form get arrays of equal length; the cleaner starts a new model where the form changes.
+    // No triangulation by tobj: it would fan polygons, which is wrong for concave ones. With one
+    // index for all attributes, a model whose faces have the same attributes gets arrays of equal
+    // length; the cleaner starts a new model where the attributes change.
     let options = LoadOptions { single_index: true, triangulate: false, ignore_points: false, ignore_lines: false };
-    let text = text::to_utf8(bytes, cx)?;
+    let text = text::to_utf8(bytes, cx.budget)?;
     let mut cleaner = Cleaner::new(&text, cx);
     let loaded = tobj::load_obj_buf(&mut cleaner, &options, material_of_its_own);
     let summary = cleaner.finish(loaded.as_ref().err().copied())?;
@@ -35,25 +41,19 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut raw = RawMesh::default();
     raw.report.format = Format::Obj;
     raw.report.file_vertices = summary.vertices;
-    raw.report.warnings = summary.left_out.warnings();
+    raw.report.warnings = summary.skipped.warnings();
     raw.report.metadata = FileMetadata::by(metadata::first_comment(&text, b"#", |_| false));
     let mut triangulator = Triangulator::default();
     for model in models {
         cx.deadline.check()?;
         append(&mut raw, &model.mesh, &mut triangulator)?;
     }
-    if triangulator.gave_up() {
-        raw.report.warnings.push(Warning {
-            code: "polygons_fanned",
-            detail: "polygons with very many corners were split into fans, which is wrong where they are concave"
-                .into(),
-        });
-    }
+    raw.report.warnings.extend(triangulator.warning());
     linearise(&mut raw.colors);
     let slots = materials::read(&summary.materials, &summary.libraries, &mut raw, cx)?;
-    // Slot 0 is for faces before the first `usemtl`; without such faces it would only be confusing.
-    let loose_unnamed = raw.lines_and_points.iter().any(|one| one.material == 0);
-    let uses_unnamed = raw.triangle_materials.contains(&0) || loose_unnamed || slots.is_empty();
+    // Slot 0 is for faces before the first `usemtl`, and is dropped without such faces.
+    let line_or_point_unnamed = raw.lines_and_points.iter().any(|one| one.material == 0);
+    let uses_unnamed = raw.triangle_materials.contains(&0) || line_or_point_unnamed || slots.is_empty();
     raw.materials = std::iter::once(MaterialSlot::default()).chain(slots).skip(usize::from(!uses_unnamed)).collect();
     if !uses_unnamed {
         raw.triangle_materials.iter_mut().for_each(|m| *m -= 1);
@@ -62,8 +62,8 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     Ok(raw)
 }
 
-/// The cleaner writes `mtllib N` before the first `usemtl N`, and this answers with a material of that name: without one,
-/// tobj would forget which faces use it.
+/// Makes up a material for `mtllib N`, which the cleaner writes before the first `usemtl N`.
+/// Without a material of that name, tobj would not keep which faces use it.
 fn material_of_its_own(path: &Path) -> tobj::MTLLoadResult {
     let name = path.to_str().ok_or(LoadError::MaterialParseError)?.to_owned();
     let material = tobj::Material { name: name.clone(), ..Default::default() };
@@ -81,7 +81,7 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh, triangulator: &mut Triangulator)
     let (before, after) = (base as usize, raw.positions.len());
     let normals = mesh.normals.chunks_exact(3).map(|n| [n[0] as f32, n[1] as f32, n[2] as f32]);
     extend_attribute(&mut raw.normals, before, after, [0.0; 3], normals);
-    // In OBJ v runs up from the image's lower edge, in a RawMesh down from the upper one.
+    // In OBJ v runs up from the image's lower edge, in a raw mesh down from the upper one.
     let uvs = mesh.texcoords.chunks_exact(2).map(|t| [t[0] as f32, (1.0 - t[1]) as f32]);
     extend_attribute(&mut raw.uvs, before, after, [0.0; 2], uvs);
     let colors = mesh.vertex_color.chunks_exact(3).map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0]);
@@ -90,7 +90,7 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh, triangulator: &mut Triangulator)
     let material = mesh.material_id.map_or(0, |id| id as u32 + 1);
     let mut corners = Vec::new();
     let mut at = 0;
-    // No arities means triangles only.
+    // Without arities all faces are triangles.
     let faces = if mesh.face_arities.is_empty() { mesh.indices.len() / 3 } else { mesh.face_arities.len() };
     for face in 0..faces {
         let arity = mesh.face_arities.get(face).map_or(3, |&n| n as usize);
@@ -112,7 +112,8 @@ fn append(raw: &mut RawMesh, mesh: &tobj::Mesh, triangulator: &mut Triangulator)
     Ok(())
 }
 
-/// OBJ colours are sRGB by custom, 0 to 1 or, from some exporters, 0 to 255.
+/// Converts colours, which by convention are sRGB from 0 to 1 or, from some exporters, from 0 to
+/// 255.
 fn linearise(colors: &mut [[f32; 4]]) {
     let scale = if colors.iter().any(|c| c[..3].iter().any(|&v| v > 1.0 && v.is_finite())) { 255.0 } else { 1.0 };
     for component in colors.iter_mut().flat_map(|c| &mut c[..3]) {

@@ -1,5 +1,6 @@
-//! MTL, the material library of OBJ, line by line. Only materials that the mesh uses are kept, so that a library costs no
-//! more than the names that the mesh has paid for; a line that makes no sense is counted and passed over.
+//! MTL, the material library of OBJ, read line by line. Only materials that the mesh uses are kept,
+//! so that a library costs no more than the names that the mesh has paid for. Meaningless lines are
+//! counted and skipped.
 
 use super::lines::{Lines, uncommented};
 use super::map::{Map, number, split_word};
@@ -7,7 +8,7 @@ use crate::import::MeshError;
 use crate::import::context::Context;
 use rapidhash::RapidHashMap;
 
-/// What a library says about one material. None where it does not say.
+/// The statements about one material. None: not stated.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Material {
     /// `Kd`, as displayed.
@@ -34,29 +35,29 @@ pub struct Material {
     pub normal_map: Option<Map>,
 }
 
-/// What was passed over.
+/// Counts of skipped lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PassedOver {
+pub struct SkippedLines {
     /// `bump` and its like.
     pub bumps: u64,
-    /// Textures for what has no texture here: `map_Ks`, `map_Pr` ...
+    /// Textures that are not drawn: `map_Ks`, `map_Pr` ...
     pub maps: u64,
-    /// Lines whose numbers are none.
+    /// Lines with broken numbers.
     pub broken: u64,
 }
 
-/// Reads one library. `numbers` says which names are wanted and where they go in `found`; what is there already stays, since
-/// the first definition of a name counts.
+/// Reads one library. `numbers` maps wanted names to places in `found`. The first definition of a
+/// name counts, so filled places stay.
 pub fn read<T: Copy>(
     bytes: &[u8],
     numbers: &RapidHashMap<&[u8], usize>,
     found: &mut [Option<(Material, T)>],
     library: T,
     cx: &mut Context<'_>,
-) -> Result<PassedOver, MeshError> {
-    // A line that goes on and on is put together in memory.
+) -> Result<SkippedLines, MeshError> {
+    // A continued line is joined in memory.
     cx.budget.spend("a material library", bytes.len() as u64, 1)?;
-    let mut passed = PassedOver::default();
+    let mut passed = SkippedLines::default();
     let mut current = None;
     let mut lines = Lines::new(bytes);
     while let Some(line) = lines.next() {
@@ -77,10 +78,10 @@ pub fn read<T: Copy>(
 }
 
 impl Material {
-    /// How much of what is behind it the surface hides, and whether `Tr` was taken at its opposite.
+    /// The opacity, and true if `Tr` was ignored.
     ///
-    /// `Tr` is 1 - `d` by most accounts, but some exporters (MeshLab for one) write opacity there. A material that `Tr` alone
-    /// makes fully invisible is one of theirs.
+    /// `Tr` is 1 - `d` by most accounts, but some exporters (MeshLab for one) write opacity there.
+    /// A material that `Tr` alone makes fully invisible is one of theirs.
     pub fn alpha(&self) -> (f64, bool) {
         match (self.opacity, self.transparency) {
             (Some(opacity), _) => (opacity, false),
@@ -90,7 +91,7 @@ impl Material {
         }
     }
 
-    fn statement(&mut self, keyword: &[u8], rest: &[u8], passed: &mut PassedOver) {
+    fn statement(&mut self, keyword: &[u8], rest: &[u8], passed: &mut SkippedLines) {
         let mut lower = [0; 12];
         let Some(lower) = lower.get_mut(..keyword.len()) else { return };
         lower.copy_from_slice(keyword);

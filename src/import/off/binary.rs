@@ -1,11 +1,11 @@
-//! A binary body: big-endian integers and floats of 32 bits.
+//! A binary body: big-endian 32-bit integers and floats.
 
 use super::header::Header;
 use super::{Counts, Number, Source};
 use crate::import::MeshError;
 use crate::import::context::Context;
 
-/// Walks through the numbers.
+/// Reads numbers one after the other.
 pub struct Binary<'a> {
     bytes: &'a [u8],
     at: usize,

@@ -1,23 +1,24 @@
-//! Colours as OFF files store them: whole numbers to 255, or fractions to 1.
+//! Colours of OFF files: whole numbers up to 255, or fractions up to 1.
 
 use super::Number;
-use crate::import::raw::srgb_to_linear;
+use crate::srgb::srgb_to_linear;
 
-/// Of what has no colour where others have one.
+/// The colour of elements without one, where others have one.
 pub const WHITE: [f32; 4] = [1.0; 4];
 
-/// Colours of one kind of thing, as read. What is above 1 anywhere in the file says what 1 means.
+/// Colours of vertices or of faces, as read. A value above 1 anywhere in the file means a scale of
+/// 0 to 255.
 #[derive(Debug, Default)]
 pub struct Colors {
-    /// Components as they are in the file; alpha is negative where it has none.
+    /// Components as read. Alpha is negative where the file has none.
     stored: Vec<[f32; 4]>,
-    /// Whether all components are written as whole numbers.
+    /// True if all components are written as whole numbers.
     whole: Vec<bool>,
     whole_max: f32,
     fraction_max: f32,
 }
 
-/// What a colour takes.
+/// Bytes per colour.
 pub const COLOR_BYTES: u64 = 16 + 1;
 
 impl Colors {
@@ -27,21 +28,21 @@ impl Colors {
         self.whole.reserve_exact(count);
     }
 
-    /// How many there are.
+    /// Their number.
     pub fn len(&self) -> usize {
         self.stored.len()
     }
 
-    /// Whether two are equal; false for numbers that no colour has.
+    /// True if two colours are equal; false for indices out of range.
     pub fn are_same(&self, a: u32, b: u32) -> bool {
         let of = |number: u32| self.stored.get(number as usize).zip(self.whole.get(number as usize));
-        // White is not a number, and equal to itself.
+        // White is stored as NaN, and equals itself.
         let bits = |number: u32| of(number).map(|(color, whole)| (color.map(f32::to_bits), whole));
         bits(a).is_some() && bits(a) == bits(b)
     }
 
-    /// Appends a colour of three or four components. Any other number of them is no colour, and white: a single one is an index
-    /// into a table that is not in the file.
+    /// Appends a colour of three or four components. Any other number gives white: a single one
+    /// would be an index into a table outside the file.
     pub fn push(&mut self, components: &[Number]) {
         let mut color = [0.0, 0.0, 0.0, -1.0];
         if !(3..=4).contains(&components.len()) {
@@ -58,13 +59,13 @@ impl Colors {
         self.whole.push(is_whole);
     }
 
-    /// Appends what has no colour.
+    /// Appends white for an element without a colour.
     pub fn push_white(&mut self) {
         self.stored.push([f32::NAN, 1.0, 1.0, -1.0]);
         self.whole.push(false);
     }
 
-    /// Linear RGBA of each, 0 to 1.
+    /// Linear RGBA of each colour, 0 to 1.
     pub fn linear(self) -> impl ExactSizeIterator<Item = [f32; 4]> {
         let scale = |max: f32| if max > 1.0 { 255.0 } else { 1.0 };
         let scales = [scale(self.fraction_max), scale(self.whole_max)];

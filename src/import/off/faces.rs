@@ -1,4 +1,4 @@
-//! The faces, of any number of corners, and their colours.
+//! The faces and their colours.
 
 use super::colors::{COLOR_BYTES, Colors, WHITE};
 use super::{Counts, Source};
@@ -9,13 +9,13 @@ use crate::import::raw::RawMesh;
 use crate::mesh::LineOrPoint;
 use crate::warning::Warning;
 
-/// What a face's colour and a vertex that only faces of one colour share take at most.
+/// Most bytes of a face's colour and of a vertex that only faces of one colour share.
 const COLORED_BYTES: u64 = COLOR_BYTES + 4 + 16;
 const VERTEX_BYTES: u64 = 2 * (24 + 12 + 8 + 16) + 4 + 4;
 
 const UNSEEN: u32 = u32::MAX;
 
-/// What is known of the faces so far.
+/// The faces read so far.
 pub struct Faces {
     vertices: u32,
     count: u64,
@@ -24,10 +24,10 @@ pub struct Faces {
     colors: Option<Split>,
 }
 
-/// Vertices that faces of different colours share become several.
+/// Vertices shared by faces of different colours are duplicated.
 struct Split {
     colors: Colors,
-    /// The number of the colour that each vertex has.
+    /// The colour index of each vertex.
     color_of: Vec<u32>,
     /// The vertex last made for each vertex of the file.
     last: Vec<u32>,
@@ -41,7 +41,7 @@ impl Faces {
         Self { vertices, count: counts.faces, polygons: Polygons::default(), short_faces: 0, colors: None }
     }
 
-    /// Reads them.
+    /// Reads all of them.
     pub fn read(&mut self, source: &mut impl Source, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
         let (mut numbers, mut color, mut corners) = (Vec::new(), Vec::new(), Vec::new());
         let has_vertex_colors = !raw.colors.is_empty();
@@ -87,7 +87,8 @@ impl Faces {
         Ok(())
     }
 
-    /// Gives the vertices their faces' colours, and a cloud of points its points. How many faces are nothing.
+    /// Gives vertices the colours of their faces, and a file without faces its points. Returns the
+    /// number of degenerate faces.
     pub fn finish(self, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<u64, MeshError> {
         if self.count == 0 {
             cx.budget.spend("lines and points", u64::from(self.vertices), size_of::<LineOrPoint>() as u64)?;
@@ -113,7 +114,7 @@ impl Faces {
 }
 
 impl Split {
-    /// After faces without a colour, whose vertices stay without one.
+    /// Fills up colours for earlier faces without one.
     fn new(vertices: u32, raw: &RawMesh, cx: &mut Context<'_>) -> Result<Self, MeshError> {
         cx.budget.spend("the colours of OFF faces", u64::from(vertices), 4 + 4 + 16)?;
         let count = vertices as usize;
@@ -151,7 +152,7 @@ impl Split {
     }
 }
 
-/// Appends what a vertex has, if vertices have it.
+/// Appends a copy of a vertex's value, if vertices have the attribute.
 fn copy<T: Copy>(all: &mut Vec<T>, vertex: u32) {
     if let Some(&value) = all.get(vertex as usize) {
         all.push(value);

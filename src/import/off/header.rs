@@ -1,9 +1,9 @@
-//! The keyword: what vertices have, and where the counts begin.
+//! The keyword: the attributes of vertices and the encoding.
 
 use super::words::Words;
-use crate::import::{MeshError, MeshFault, sniff};
+use crate::import::{MeshError, MeshFault, text};
 
-/// What the keyword says.
+/// The parsed keyword.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Header {
     /// `N`
@@ -14,9 +14,9 @@ pub struct Header {
     pub has_uvs: bool,
     /// MeshLab's order: with `N` before `C`, colours come before normals.
     pub colors_first: bool,
-    /// Followed by the word `BINARY`.
+    /// True if the word `BINARY` follows.
     pub is_binary: bool,
-    /// Where the counts begin.
+    /// Offset of the counts.
     pub body_at: usize,
 }
 
@@ -32,24 +32,25 @@ impl Header {
         normal + if self.has_uvs { 2 } else { 0 }
     }
 
-    /// Numbers of a vertex, of whose colour it may have one more.
+    /// The fewest numbers of a vertex. A colour may have one more.
     pub fn numbers_min(&self) -> usize {
         self.before_color() + if self.has_colors { 3 } else { 0 } + self.after_color()
     }
 }
 
-/// Whether the bytes begin with a keyword of OFF, and go on with what follows one.
+/// True if the bytes begin with a keyword of OFF that is followed by a count or `BINARY`.
 pub fn is_off(bytes: &[u8]) -> bool {
-    let mut words = Words::new(bytes, bytes.len() - sniff::trim_start(bytes).len());
+    let mut words = Words::new(bytes, bytes.len() - text::trim_start(bytes).len());
     let Some(first) = words.next_word() else { return false };
     let Some((_, rest)) = keyword(first) else { return false };
     let next = if rest.is_empty() { words.next_word() } else { Some(rest) };
     next.is_none_or(|word| word == b"BINARY" || word.iter().all(u8::is_ascii_digit))
 }
 
-/// Reads the keyword. By the format's own rules it may be missing, if it is known what the file is.
+/// Reads the keyword. The format allows it to be missing, so a file that is said to be OFF may
+/// begin with its counts.
 pub fn parse(bytes: &[u8]) -> Result<Header, MeshError> {
-    let begin = bytes.len() - sniff::trim_start(bytes).len();
+    let begin = bytes.len() - text::trim_start(bytes).len();
     let mut words = Words::new(bytes, begin);
     let first = words.next_word().ok_or_else(|| MeshError::broken("the OFF file is empty"))?;
     let Some((prefix, rest)) = keyword(first) else {
@@ -84,8 +85,8 @@ fn unsupported(letter: &str, what: &str) -> MeshError {
     MeshError::new(MeshFault::Unsupported, detail)
 }
 
-/// The prefix of a keyword, and what is joined to its end: some files have the first count there. Geomview's prefix is
-/// `[ST][C][N][4][n]`; vcglib, and so MeshLab, write `[N][C][ST]`.
+/// The prefix of a keyword, and the digits joined to its end: some files have the first count
+/// there. Geomview's prefix is `[ST][C][N][4][n]`; vcglib, and so MeshLab, writes `[N][C][ST]`.
 fn keyword(word: &[u8]) -> Option<(&[u8], &[u8])> {
     let mut at = 0;
     let mut left = vec![&b"ST"[..], b"C", b"N", b"4", b"n"];

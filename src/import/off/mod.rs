@@ -1,13 +1,14 @@
-//! OFF, the object file format of Geomview (its manual, "OFF: Object File Format"): text or binary, with the prefixes for
-//! normals, colours and texture coordinates, and with colours a face.
+//! OFF, the object file format of Geomview (its manual, "OFF: Object File Format"): text or binary,
+//! with prefixes for normals, colours and texture coordinates, and with colours per face.
 //!
-//! [`header`] is what the first line says, [`words`] and [`binary`] are the two ways to the numbers, [`vertices`] and
-//! [`faces`] keep them, and [`colors`] is how colours are stored.
+//! [`header`] reads the keyword, [`text`] (by [`words`]) and [`binary`] are the two encodings of
+//! the numbers, [`vertices`] and [`faces`] keep them, and [`colors`] decodes colours.
 
 mod binary;
 mod colors;
 mod faces;
 mod header;
+mod text;
 mod vertices;
 mod words;
 
@@ -16,15 +17,16 @@ pub use header::is_off;
 use self::binary::Binary;
 use self::faces::Faces;
 use self::header::Header;
-use self::words::Words;
+use self::text::Text;
 use super::raw::RawMesh;
 use super::{Format, MeshError};
+use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
-use crate::mesh::{FileMetadata, MaterialSlot};
-use crate::warning::Warning;
+use crate::import::report::counted_warnings;
+use crate::mesh::MaterialSlot;
 
-/// How many there are of what, as the file has it.
+/// Declared numbers of vertices and faces.
 #[derive(Clone, Copy, Debug)]
 struct Counts {
     vertices: u32,
@@ -35,25 +37,25 @@ struct Counts {
 #[derive(Clone, Copy, Debug)]
 struct Number {
     value: f64,
-    /// Whether it is written as a whole number, which decides what it means in a colour.
+    /// True if it is written as a whole number. In a colour that means 0 to 255 instead of 0 to 1.
     is_whole: bool,
 }
 
-/// Where the numbers come from.
+/// A body in either encoding.
 trait Source {
     /// The number of vertices and faces.
     fn counts(&mut self) -> Result<Counts, MeshError>;
-    /// The least bytes that a vertex of `numbers` numbers and a face take.
+    /// The fewest bytes of a vertex of `numbers` numbers, and of a face.
     fn bytes_min(&self, numbers: u64) -> [u64; 2];
     /// Bytes that are left.
     fn left(&self) -> u64;
-    /// Appends a vertex's numbers: those that the header says, and what more there is on the line.
+    /// Appends a vertex's numbers: those that the header declares, and the rest of the line.
     fn vertex(&mut self, header: &Header, out: &mut Vec<Number>) -> Result<(), MeshError>;
     /// Appends a face's vertices, and its colour's components.
     fn face(&mut self, corners: &mut Vec<f64>, color: &mut Vec<Number>, cx: &mut Context<'_>) -> Result<(), MeshError>;
     /// An error about the record last read.
     fn broken(&self, what: &str) -> MeshError;
-    /// Bytes after the last record that are no white space.
+    /// Bytes after the last record, without white space.
     fn trailing_bytes(&mut self) -> usize;
 }
 
@@ -63,7 +65,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     if header.is_binary {
         return read_from(&mut Binary::new(bytes, header.body_at), &header, cx);
     }
-    let mut raw = read_from(&mut Words::new(bytes, header.body_at), &header, cx)?;
+    let mut raw = read_from(&mut Text::new(bytes, header.body_at), &header, cx)?;
     raw.report.metadata = FileMetadata::by(metadata::first_comment(bytes, b"#", |_| false));
     Ok(raw)
 }
@@ -86,8 +88,7 @@ fn read_from(source: &mut impl Source, header: &Header, cx: &mut Context<'_>) ->
         ),
         (source.trailing_bytes() as u64, "trailing_bytes", "what comes after the last OFF face is ignored (bytes:"),
     ];
-    let met = notes.into_iter().filter(|(count, ..)| *count > 0);
-    raw.report.warnings.extend(met.map(|(count, code, what)| Warning { code, detail: format!("{what} {count})") }));
+    raw.report.warnings.extend(counted_warnings(notes));
     // Colours in the file are what to show, not a tint for the grey of files without colours.
     let base_color = if raw.colors.is_empty() { None } else { Some([1.0; 4]) };
     raw.materials = vec![MaterialSlot { base_color, ..MaterialSlot::default() }];

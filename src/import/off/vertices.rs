@@ -1,4 +1,4 @@
-//! The vertices.
+//! Reads vertices.
 
 use super::colors::{COLOR_BYTES, Colors};
 use super::header::Header;
@@ -7,10 +7,10 @@ use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::raw::RawMesh;
 
-/// Vertices between two looks at the deadline.
-const VERTICES_PER_LOOK: u32 = 65_536;
+/// Vertices between two deadline checks.
+const VERTICES_PER_POLL: u32 = 65_536;
 
-/// Reads the vertices into `raw`. The header's count has been held against the length of the file.
+/// Reads the vertices into `raw`. Their count was checked against the length of the file.
 pub fn read(
     source: &mut impl Source,
     header: &Header,
@@ -29,7 +29,7 @@ pub fn read(
     let mut colors = None;
     let mut numbers = Vec::new();
     for i in 0..counts.vertices {
-        if i % VERTICES_PER_LOOK == 0 {
+        if i % VERTICES_PER_POLL == 0 {
             cx.deadline.check()?;
         }
         numbers.clear();
@@ -42,11 +42,11 @@ pub fn read(
             raw.normals.push([value(at) as f32, value(at + 1) as f32, value(at + 2) as f32]);
         }
         if header.has_uvs {
-            // v runs up in the file, and down in a mesh.
+            // In the file v runs up, in a mesh down.
             let [u, v] = [2, 1].map(|from_end| value(numbers.len() - from_end));
             raw.uvs.push([u as f32, (1.0 - v) as f32]);
         }
-        // Some files have colours on a few lines, and no C.
+        // Some files have colours on a few lines only, without C in the keyword.
         if !color.is_empty() && colors.is_none() {
             cx.budget.spend("the colours of OFF vertices", count as u64, 16 + COLOR_BYTES)?;
             let all = colors.insert(Colors::default());
@@ -61,7 +61,8 @@ pub fn read(
     Ok(())
 }
 
-/// The numbers of a vertex that are its colour: as many as the header says, or three or four more than it says.
+/// The numbers of a vertex's colour: as many as the header declares, or three or four undeclared
+/// ones.
 fn color<'n>(header: &Header, numbers: &'n [Number]) -> Result<&'n [Number], String> {
     let color = &numbers[header.before_color()..numbers.len() - header.after_color()];
     let is_one = match color.len() {

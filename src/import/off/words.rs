@@ -1,28 +1,18 @@
-//! A text body: words, lines and comments.
+//! Words, lines and comments of a text.
 
-use super::header::Header;
-use super::{Counts, Number, Source};
-use crate::import::context::Context;
-use crate::import::{MeshError, text};
+use crate::import::text;
 
-/// Corners of one face between two payments.
-const CORNERS_PER_LOOK: usize = 65_536;
-/// Most numbers that a line can have beside a face's vertices.
-const NUMBERS_MAX: usize = 16;
-
-/// Walks through the words.
+/// Walks through the words of a text.
 pub struct Words<'a> {
     bytes: &'a [u8],
-    /// After the word last read.
+    /// The end of the word last read.
     pub at: usize,
-    /// Where the record last read begins.
-    record: usize,
 }
 
 impl<'a> Words<'a> {
     /// The words from `at` on.
     pub fn new(bytes: &'a [u8], at: usize) -> Self {
-        Self { bytes, at, record: at }
+        Self { bytes, at }
     }
 
     /// The next word of this line.
@@ -34,7 +24,7 @@ impl<'a> Words<'a> {
             return None;
         }
         let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
-        // Where a comment begins in a word, it is what comes next.
+        // A comment that begins within the word is left for the next call.
         let word = text::before_comment(&rest[..end]);
         self.at += begin + word.len();
         Some(word)
@@ -51,112 +41,13 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// Where the next line begins.
+    /// Offset of the next line.
     pub fn after_line(&self) -> usize {
         let rest = &self.bytes[self.at..];
         self.at + rest.iter().position(|&b| b == b'\n').map_or(rest.len(), |end| end + 1)
-    }
-
-    /// Goes to the next word, where a record begins.
-    fn begin(&mut self) {
-        if let Some(word) = self.next_word() {
-            self.at -= word.len();
-        }
-        self.record = self.at;
-    }
-
-    fn number(&mut self) -> Result<Number, MeshError> {
-        let word = self.next_word().ok_or_else(|| self.broken("the file ends here"))?;
-        parse(word).ok_or_else(|| self.not_a_number(word))
-    }
-
-    /// The numbers that are left on the line.
-    fn rest_of_line(&mut self, out: &mut Vec<Number>) -> Result<(), MeshError> {
-        while let Some(word) = self.next_on_line() {
-            out.push(parse(word).ok_or_else(|| self.not_a_number(word))?);
-            if out.len() > NUMBERS_MAX {
-                return Err(self.broken("there are too many numbers on the line"));
-            }
-        }
-        Ok(())
-    }
-
-    fn not_a_number(&self, word: &[u8]) -> MeshError {
-        let shown = String::from_utf8_lossy(&word[..word.len().min(40)]);
-        let shown: String = shown.chars().map(|c| if c.is_control() { '\u{FFFD}' } else { c }).collect();
-        self.broken(&format!("\"{shown}\" is no number"))
-    }
-
-    fn count(&mut self) -> Result<u64, MeshError> {
-        let word = self.next_word().ok_or_else(|| self.broken("the numbers of vertices and faces are missing"))?;
-        let count = std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
-        count.ok_or_else(|| self.not_a_number(word))
-    }
-}
-
-impl Source for Words<'_> {
-    fn counts(&mut self) -> Result<Counts, MeshError> {
-        self.begin();
-        let (vertices, faces) = (self.count()?, self.count()?);
-        // The number of edges is as often wrong as not there.
-        self.rest_of_line(&mut Vec::new())?;
-        let vertices = u32::try_from(vertices).ok().filter(|&count| count < u32::MAX);
-        let vertices = vertices.ok_or_else(|| self.broken("there are more than 4 billion vertices"))?;
-        Ok(Counts { vertices, faces })
-    }
-
-    fn bytes_min(&self, numbers: u64) -> [u64; 2] {
-        [2 * numbers, 2]
-    }
-
-    fn left(&self) -> u64 {
-        // Nothing needs to follow the last number.
-        (self.bytes.len() - self.at) as u64 + 1
-    }
-
-    fn vertex(&mut self, header: &Header, out: &mut Vec<Number>) -> Result<(), MeshError> {
-        self.begin();
-        for _ in 0..header.numbers_min() {
-            out.push(self.number()?);
-        }
-        self.rest_of_line(out)
-    }
-
-    fn face(&mut self, corners: &mut Vec<f64>, color: &mut Vec<Number>, cx: &mut Context<'_>) -> Result<(), MeshError> {
-        self.begin();
-        let count = self.count()?;
-        if count > self.left() / 2 {
-            return Err(self.broken(&format!("a face of {count} corners is more than the file has left")));
-        }
-        for i in 0..count as usize {
-            if i.is_multiple_of(CORNERS_PER_LOOK) && i > 0 {
-                cx.deadline.check()?;
-                cx.budget.spend("a face of very many corners", CORNERS_PER_LOOK as u64, 16)?;
-            }
-            corners.push(self.number()?.value);
-        }
-        self.rest_of_line(color)
-    }
-
-    fn broken(&self, what: &str) -> MeshError {
-        let before = &self.bytes[..self.record];
-        let newline = if before.contains(&b'\n') { b'\n' } else { b'\r' };
-        let line = before.iter().filter(|&&b| b == newline).count() + 1;
-        MeshError::broken(format!("line {line} of the OFF file: {what}"))
-    }
-
-    fn trailing_bytes(&mut self) -> usize {
-        self.begin();
-        if self.next_word().is_none() { 0 } else { self.bytes[self.record..].trim_ascii().len() }
     }
 }
 
 fn is_end(byte: u8) -> bool {
     matches!(byte, b'\n' | b'\r')
-}
-
-/// A number as C prints it, NaN of any kind included.
-fn parse(word: &[u8]) -> Option<Number> {
-    let value = if text::is_c_nan(word) { f64::NAN } else { std::str::from_utf8(word).ok()?.parse().ok()? };
-    Some(Number { value, is_whole: word.iter().all(u8::is_ascii_digit) })
 }

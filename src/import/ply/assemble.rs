@@ -1,8 +1,8 @@
-//! Vertices and faces, all read, to a raw mesh: polygons are split, and what corners have of their own is given to
-//! vertices of their own.
+//! Assembles vertices and faces to a raw mesh. Polygons are split, and corners with attributes of
+//! their own get their own vertices.
 
+use super::conversion::WHITE;
 use super::faces::{Faces, NO_TEXTURE};
-use super::stored::WHITE;
 use super::vertices::Vertices;
 use crate::import::MeshError;
 use crate::import::context::Context;
@@ -10,12 +10,13 @@ use crate::import::polygon::Triangulator;
 use crate::import::raw::RawMesh;
 use crate::warning::Warning;
 
-/// Corners between two looks at the deadline.
-const CORNERS_PER_LOOK: usize = 65_536;
-/// A vertex that corners need beyond those of the file, with the room that lists have once they doubled.
+/// Corners between two deadline checks.
+const CORNERS_PER_POLL: usize = 65_536;
+/// Bytes of an added vertex, in lists that double as they grow.
 const VERTEX_BYTES: u64 = 2 * (24 + 12 + 8 + 16);
 
-/// Fills in vertices, triangles and counts. Gives the number of a texture a triangle, or none where no face says.
+/// Fills in vertices, triangles and counts. Returns the index of a texture per triangle, or nothing
+/// if no face has one.
 pub fn assemble(
     vertices: Vertices,
     faces: &Faces,
@@ -27,7 +28,7 @@ pub fn assemble(
     raw.is_f32 = is_f32;
     (raw.positions, raw.normals, raw.uvs, raw.colors) = (positions, normals, uvs, colors);
     let mut splitter = Splitter::new(faces, raw, cx)?;
-    // Triangles at most: every polygon has two fewer than corners.
+    // An upper bound: every polygon has two triangles fewer than corners.
     let triangles = faces.corners.len() - 2 * faces.arities.len();
     cx.check_triangles(triangles as u64)?;
     cx.budget.spend("the PLY triangles", triangles as u64, 12 + 1 + 4 + 4)?;
@@ -36,13 +37,13 @@ pub fn assemble(
     let mut textures = Vec::with_capacity(if faces.textures.is_empty() { 0 } else { triangles });
     let mut triangulator = Triangulator::default();
     let mut own = Vec::new();
-    let (mut at, mut looked) = (0, 0);
+    let (mut at, mut polled) = (0, 0);
     for (face, &arity) in faces.arities.iter().enumerate() {
         let corners = &faces.corners[at..at + arity as usize];
-        if at - looked >= CORNERS_PER_LOOK {
+        if at - polled >= CORNERS_PER_POLL {
             cx.deadline.check()?;
             splitter.pay(raw, cx)?;
-            looked = at;
+            polled = at;
         }
         splitter.pay_ahead(corners.len(), cx)?;
         let corners = if splitter.is_needed() {
@@ -64,18 +65,13 @@ pub fn assemble(
     }
     splitter.pay(raw, cx)?;
     raw.triangle_materials = vec![0; raw.triangles.len()];
-    if triangulator.gave_up() {
-        raw.report.warnings.push(Warning {
-            code: "polygons_fanned",
-            detail: "polygons with very many corners were split into fans, which is wrong where they are concave"
-                .into(),
-        });
-    }
+    raw.report.warnings.extend(triangulator.warning());
     Ok(textures)
 }
 
-/// Gives corners that have texture coordinates or colours of their own vertices of their own, as few as a quick look allows:
-/// a corner shares the vertex that was last made for the same vertex of the file, if it has the same.
+/// Gives vertices of their own to corners that have their own texture coordinates or colours. A
+/// corner shares the vertex last made for the same vertex of the file, if the values are equal; a
+/// full search would find more but cost a table.
 struct Splitter<'a> {
     faces: &'a Faces,
     has_uvs: bool,
@@ -91,7 +87,7 @@ const UNSEEN: u32 = u32::MAX;
 impl<'a> Splitter<'a> {
     fn new(faces: &'a Faces, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Self, MeshError> {
         let count = raw.positions.len();
-        // What is finer wins. MeshLab writes both where it has both.
+        // Texture coordinates of corners win over those of vertices; MeshLab writes both.
         let has_uvs = !faces.uvs.is_empty();
         let has_colors = !faces.colors.is_empty() && raw.colors.is_empty();
         if !faces.colors.is_empty() && !has_colors {
@@ -149,7 +145,7 @@ impl<'a> Splitter<'a> {
 
     /// Pays for the corners of a polygon that is too large to pay for afterwards.
     fn pay_ahead(&mut self, corners: usize, cx: &mut Context<'_>) -> Result<(), MeshError> {
-        if self.is_needed() && corners > CORNERS_PER_LOOK {
+        if self.is_needed() && corners > CORNERS_PER_POLL {
             cx.budget.spend("PLY corners with attributes of their own", corners as u64, VERTEX_BYTES)?;
             self.paid += corners;
         }
@@ -168,7 +164,7 @@ impl<'a> Splitter<'a> {
     }
 }
 
-/// Appends what a vertex has, if vertices have it.
+/// Appends a copy of a vertex's value, if vertices have the attribute.
 fn copy<T: Copy>(all: &mut Vec<T>, vertex: u32) {
     if let Some(&value) = all.get(vertex as usize) {
         all.push(value);

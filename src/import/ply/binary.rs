@@ -4,14 +4,14 @@ use super::header::Kind;
 use super::layout::{Layout, Step};
 use super::source::{Columns, Source};
 
-/// Reads numbers; `BIG`: most significant byte first.
+/// Reads numbers. `BIG`: most significant byte first.
 pub struct Binary<'a, const BIG: bool> {
     bytes: &'a [u8],
     at: usize,
 }
 
-/// Evaluates an expression with `$type` standing for the Rust type of a kind, so that loops inside of it are compiled for
-/// each type and do not ask for every number.
+/// Evaluates an expression with `$type` as the Rust type of a kind. Loops inside are then compiled
+/// per type instead of matching per number.
 macro_rules! by_kind {
     ($kind:expr, $type:ident => $body:expr) => {
         match $kind {
@@ -31,7 +31,7 @@ macro_rules! by_kind {
     }};
 }
 
-/// A number in a file. `bytes` is exactly as long as it needs.
+/// A number type in a file. `bytes` has exactly its length.
 trait Number {
     fn read<const BIG: bool>(bytes: &[u8]) -> f64;
 }

@@ -1,4 +1,4 @@
-//! The element `edge`, and points: what is drawn of a file without faces.
+//! The element `edge`, and points: the content of files without faces.
 
 use super::faces::vertex;
 use super::header::Element;
@@ -21,7 +21,7 @@ pub struct Edges {
 }
 
 impl Edges {
-    /// Reads the element; there are so many `vertices`.
+    /// Reads the element. Indices must be below `vertices`.
     pub fn read<S: Source>(
         &mut self,
         source: &mut S,
@@ -43,7 +43,7 @@ impl Edges {
         })
     }
 
-    /// Gives a mesh without faces its edges, or where there is none, its vertices as points.
+    /// Gives a mesh without faces its edges, or, without edges, its vertices as points.
     pub fn apply(&self, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
         let count = if self.ends.is_empty() { raw.positions.len() } else { self.ends.len() };
         cx.budget.spend("lines and points", count as u64, size_of::<LineOrPoint>() as u64)?;

@@ -1,22 +1,22 @@
 //! The elements `face` and `tristrips`.
 
+use super::conversion::{WHITE, linearise, upright};
 use super::header::Element;
 use super::layout::{Layout, Slot};
 use super::source::{Cost, Meter, Source, each_record};
-use super::stored::{WHITE, linearise, upright};
 use crate::import::MeshError;
 use crate::import::context::Context;
 use std::ops::Range;
 
-/// Slots of what a face may have.
+/// Slots of a face's numbers.
 const COLOR: Range<usize> = 0..3;
 const ALPHA: usize = 3;
 const TEXTURE: usize = 4;
-/// And of its lists.
+/// Slots of a face's lists.
 const CORNERS: usize = 0;
 const UVS: usize = 1;
 
-/// The texture of faces that say they have none.
+/// The texture of faces that declare none.
 pub const NO_TEXTURE: u32 = u32::MAX;
 
 /// The faces so far, of both elements.
@@ -24,22 +24,22 @@ pub const NO_TEXTURE: u32 = u32::MAX;
 pub struct Faces {
     /// Vertex indices, face by face, all in range.
     pub corners: Vec<u32>,
-    /// How many corners each face has: three at least.
+    /// Corners of each face: at least three.
     pub arities: Vec<u32>,
-    /// Texture coordinates a corner, as far as the last face that has any; or empty.
+    /// Texture coordinates per corner, up to the last face that has any; or empty.
     pub uvs: Vec<[f32; 2]>,
-    /// Linear RGBA a face, as far as the last one that has any; or empty.
+    /// Linear RGBA per face, up to the last one that has any; or empty.
     pub colors: Vec<[f32; 4]>,
-    /// Number of a texture a face, as far as the last one that has any; or empty.
+    /// Index of a texture per face, up to the last one that has any; or empty.
     pub textures: Vec<u32>,
-    /// Faces that were passed over, having fewer than three corners.
+    /// Skipped faces with fewer than three corners.
     pub short_faces: u64,
-    /// Faces whose list of texture coordinates is not two numbers a corner.
+    /// Faces whose list of texture coordinates is not two numbers per corner.
     pub odd_uvs: u64,
 }
 
 impl Faces {
-    /// Reads the element `face`; there are so many `vertices`.
+    /// Reads the element `face`. Indices must be below `vertices`.
     pub fn read<S: Source>(
         &mut self,
         source: &mut S,
@@ -54,7 +54,7 @@ impl Faces {
         }
         let (has_colors, has_texture) = (layout.has(COLOR), layout.kinds[TEXTURE].is_some());
         if has_colors {
-            // There may be strips already.
+            // Strips may have been read before.
             self.colors.resize(self.arities.len(), WHITE);
         }
         if has_texture {
@@ -92,8 +92,8 @@ impl Faces {
         Ok(())
     }
 
-    /// Reads the element `tristrips`: lists in which every corner from the third on makes a triangle with the two before
-    /// it, and -1 begins a new strip.
+    /// Reads the element `tristrips`: lists in which every corner from the third on makes a
+    /// triangle with the two before it, and -1 begins a new strip.
     pub fn read_strips<S: Source>(
         &mut self,
         source: &mut S,
@@ -117,7 +117,7 @@ impl Faces {
                 }
                 let c = vertex(item, vertices)?;
                 length += 1;
-                // Strips are sewn together with triangles that have no area: those are no loss.
+                // Strips are joined by triangles without area, which are skipped.
                 if length > 2 && a != b && b != c && c != a {
                     let corners = if length % 2 == 1 { [a, b, c] } else { [b, a, c] };
                     self.corners.extend(corners);

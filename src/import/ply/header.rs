@@ -1,4 +1,4 @@
-//! The header of a PLY file: which elements follow, and what each of them is made of.
+//! The header of a PLY file: its elements and their properties.
 
 use crate::import::MeshError;
 use crate::import::bundle::show;
@@ -7,12 +7,12 @@ use crate::import::bundle::show;
 const HEADER_BYTES_MAX: usize = 1 << 20;
 /// Longest line of a header.
 const LINE_BYTES_MAX: usize = 16 << 10;
-/// Most elements of a header, properties of all its elements, and textures that it names.
+/// Most elements, properties (of all elements together) and textures of a header.
 const ELEMENTS_MAX: usize = 256;
 const PROPERTIES_MAX: usize = 4096;
 const TEXTURES_MAX: usize = 1000;
 
-/// How the body is written.
+/// The encoding of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
     /// Words.
@@ -44,16 +44,16 @@ pub enum Kind {
     F64,
 }
 
-/// What a property holds.
+/// The content of a property.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     /// One number.
     One(Kind),
-    /// A count, and so many items.
+    /// A count, then that many items.
     List {
-        /// Of the count.
+        /// Type of the count.
         count: Kind,
-        /// Of the items.
+        /// Type of the items.
         item: Kind,
     },
 }
@@ -61,35 +61,35 @@ pub enum Shape {
 /// A property of an element.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Property {
-    /// As in the file.
+    /// Its name in the file.
     pub name: String,
-    /// What it holds.
+    /// Its content.
     pub shape: Shape,
 }
 
-/// A kind of record, and how many there are.
+/// A declared kind of record, with its count.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Element {
-    /// As in the file.
+    /// Its name in the file.
     pub name: String,
     /// Records in the body, if the header is honest.
     pub count: u64,
-    /// What a record is made of, in order.
+    /// Properties of a record, in order.
     pub properties: Vec<Property>,
 }
 
-/// A header, understood.
+/// A parsed header.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// How the body is written.
+    /// The encoding of the body.
     pub encoding: Encoding,
-    /// What it holds, in order.
+    /// Elements of the body, in order.
     pub elements: Vec<Element>,
-    /// What `comment TextureFile` lines name (MeshLab's custom).
+    /// Names in `comment TextureFile` lines, MeshLab's convention.
     pub textures: Vec<Vec<u8>>,
-    /// Where the body begins.
+    /// Offset of the body.
     pub body_at: usize,
-    /// What ends a line.
+    /// The line end.
     pub newline: u8,
 }
 
@@ -120,7 +120,8 @@ impl Kind {
 }
 
 impl Element {
-    /// The fewest bytes that a record takes. In a text every number is at least a digit and a space.
+    /// The fewest bytes that a record takes. In a text every number is at least a digit and a
+    /// space.
     pub fn record_bytes_min(&self, encoding: Encoding) -> u64 {
         let bytes = |property: &Property| match (encoding, property.shape) {
             (Encoding::Text, _) => 2,
@@ -130,7 +131,7 @@ impl Element {
     }
 }
 
-/// Whether the bytes begin as every PLY file does: with a line that says `ply`.
+/// True if the first line is `ply`, as in every PLY file.
 pub fn is_ply(bytes: &[u8]) -> bool {
     let rest = bytes.strip_prefix(b"ply").unwrap_or_default();
     rest.iter().find(|b| !matches!(b, b' ' | b'\t')).is_some_and(|b| matches!(b, b'\n' | b'\r'))
@@ -173,7 +174,7 @@ struct Draft<'a> {
     lines: Lines<'a>,
     encoding: Option<Encoding>,
     elements: Vec<Element>,
-    /// Of all elements.
+    /// Number of properties of all elements.
     properties: usize,
 }
 
@@ -244,7 +245,7 @@ impl Draft<'_> {
     }
 }
 
-/// The lines of a header; they end where the first one does.
+/// The lines of a header, all with the line end of the first.
 struct Lines<'a> {
     bytes: &'a [u8],
     at: usize,

@@ -1,14 +1,14 @@
-//! An element's properties, compiled: what of each record is kept, where it lies, and what is passed over. Names are looked
-//! at here, once, and not again for any record.
+//! The layout of an element: its properties, compiled to the steps through a record. Names are
+//! compared here once, not per record.
 
 use super::header::{Element, Kind, Property, Shape};
 
-/// Numbers of one record that can be kept.
+/// Most numbers kept per record.
 pub const VALUES_MAX: usize = 12;
-/// Lists of one record that can be kept.
+/// Most lists kept per record.
 pub const LISTS_MAX: usize = 2;
 
-/// Where a property goes.
+/// The destination of a property.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slot {
     /// Into [`Row::values`].
@@ -22,18 +22,18 @@ pub enum Slot {
 pub enum Step {
     /// Passes over numbers.
     Skip {
-        /// How many.
+        /// Their number.
         numbers: usize,
-        /// What they take in a binary body.
+        /// Their size in a binary body.
         bytes: usize,
     },
     /// Reads a number.
     Value {
         /// Its type.
         kind: Kind,
-        /// Where it goes.
+        /// Its slot.
         slot: usize,
-        /// Where it lies in the record, as long as no list came before.
+        /// Its offset in the record, valid if no list came before.
         offset: usize,
     },
     /// Reads a list, or passes over it.
@@ -42,7 +42,7 @@ pub enum Step {
         count: Kind,
         /// Type of its items.
         item: Kind,
-        /// Where it goes.
+        /// Its slot.
         slot: Option<usize>,
     },
 }
@@ -52,15 +52,15 @@ pub enum Step {
 pub struct Layout {
     /// In order.
     pub steps: Vec<Step>,
-    /// Bytes of a binary record; None where lists make them differ.
+    /// Bytes of a binary record. None if lists make it variable.
     pub stride: Option<usize>,
     /// The type of each value that is kept.
     pub kinds: [Option<Kind>; VALUES_MAX],
-    /// Which lists are kept.
+    /// True for lists that are kept.
     pub lists: [bool; LISTS_MAX],
 }
 
-/// A record, read.
+/// The kept values of one record.
 #[derive(Clone, Debug, Default)]
 pub struct Row {
     /// By slot. f64 holds every number of every type exactly.
@@ -70,7 +70,8 @@ pub struct Row {
 }
 
 impl Layout {
-    /// Of an element; `slot` says what is wanted. Of two properties for one slot the first counts.
+    /// Compiles an element. `slot` names the destinations of wanted properties. Of two properties
+    /// for one slot the first counts.
     pub fn new(element: &Element, slot: impl Fn(&str) -> Option<Slot>) -> Self {
         let mut layout = Self { stride: Some(0), ..Self::default() };
         for property in &element.properties {
@@ -80,7 +81,7 @@ impl Layout {
         layout
     }
 
-    /// Whether all of some values are there.
+    /// True if the element has all of some values.
     pub fn has(&self, slots: std::ops::Range<usize>) -> bool {
         self.kinds[slots].iter().all(Option::is_some)
     }

@@ -1,18 +1,20 @@
-//! PLY, the polygon file format (Greg Turk, "The PLY Polygon File Format", 1994), in all three encodings, with what MeshLab
-//! and Blender added by custom: texture coordinates a corner (`texcoord`), textures (`comment TextureFile`, `texnumber`), strips.
+//! PLY, the polygon file format (Greg Turk, "The PLY Polygon File Format", 1994), in all three
+//! encodings, with the additions of MeshLab and Blender: texture coordinates per corner
+//! (`texcoord`), textures (`comment TextureFile`, `texnumber`), triangle strips.
 //!
-//! The header may declare any properties of any types in any order, so it is compiled first: [`header`] is what it says,
-//! [`layout`] the steps through a record. [`source`] walks through the records of a [`text`] or [`binary`] body; [`vertices`],
-//! [`faces`] and [`edges`] keep what they know, and [`assemble`] makes a mesh of it, with the materials of [`textures`]; [`stored`] is how colours are.
+//! The [`header`] may declare any properties of any types in any order, so it is compiled to a
+//! [`layout`], the steps through a record. [`source`] walks the records of a [`text`] or [`binary`]
+//! body. [`vertices`], [`faces`] and [`edges`] keep what they need, [`assemble`] makes a mesh of
+//! it, [`textures`] its materials, and [`conversion`] decodes colours.
 
 mod assemble;
 mod binary;
+mod conversion;
 mod edges;
 mod faces;
 mod header;
 mod layout;
 mod source;
-mod stored;
 mod text;
 mod textures;
 mod vertices;
@@ -28,9 +30,10 @@ use self::text::Text;
 use self::vertices::Vertices;
 use super::raw::RawMesh;
 use super::{Format, MeshError};
+use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
-use crate::mesh::FileMetadata;
+use crate::import::report::counted_warnings;
 use crate::warning::Warning;
 
 /// Reads a PLY file.
@@ -57,7 +60,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     Ok(raw)
 }
 
-/// Everything that the body has.
+/// Everything read from the body.
 #[derive(Debug, Default)]
 struct Body {
     vertices: Vertices,
@@ -66,7 +69,7 @@ struct Body {
     trailing_bytes: usize,
 }
 
-/// Refuses counts of records that the file is too short for, before anything is made of them.
+/// Refuses counts of records that the file is too short for, before anything is allocated.
 fn check_counts(header: &Header, file_bytes: usize) -> Result<(), MeshError> {
     let mut left = (file_bytes - header.body_at) as u64;
     if header.encoding == Encoding::Text {
@@ -89,7 +92,7 @@ fn check_counts(header: &Header, file_bytes: usize) -> Result<(), MeshError> {
 }
 
 fn read_body<S: Source>(source: &mut S, header: &Header, cx: &mut Context<'_>) -> Result<Body, MeshError> {
-    // Faces may come first, so how many vertices there are is known from the header.
+    // Faces may come first, so the number of vertices is taken from the header.
     let of_vertices = header.elements.iter().find(|element| element.name == "vertex");
     let count = of_vertices.map_or(0, |element| element.count);
     let count = u32::try_from(count).ok().filter(|&count| count < u32::MAX);
@@ -111,9 +114,9 @@ fn read_body<S: Source>(source: &mut S, header: &Header, cx: &mut Context<'_>) -
 }
 
 impl Body {
-    /// One for each kind of thing that is not drawn.
+    /// One warning for each kind of content that is not drawn.
     fn warnings(&self) -> Vec<Warning> {
-        // Beside faces they are most often edges of these, and would be drawn over them.
+        // Beside faces, edges mostly repeat edges of the faces and would be drawn over them.
         let edges = if self.faces.arities.is_empty() { 0 } else { self.edges.ends.len() as u64 };
         let all = [
             (edges, "lines_ignored", "edges are drawn where there are no faces (edges in the file:"),
@@ -129,7 +132,6 @@ impl Body {
             ),
             (self.trailing_bytes as u64, "trailing_bytes", "what comes after the last PLY element is ignored (bytes:"),
         ];
-        let met = all.into_iter().filter(|(count, ..)| *count > 0);
-        met.map(|(count, code, what)| Warning { code, detail: format!("{what} {count})") }).collect()
+        counted_warnings(all).collect()
     }
 }

@@ -1,43 +1,46 @@
-//! A body, record by record, whatever its encoding: the one place that believes no count, keeps time and pays.
+//! Walks the records of a body in any encoding. Counts are checked, the deadline polled and memory
+//! paid for here only.
 
 use super::header::{Element, Kind};
 use super::layout::{Layout, Row, Step, VALUES_MAX};
 use crate::import::MeshError;
 use crate::import::context::Context;
 
-/// Records, or items of one list, between two looks at the deadline.
-const RECORDS_PER_LOOK: u64 = 65_536;
-/// Bytes that are paid for together.
+/// Records, or items of one list, between two deadline checks.
+const RECORDS_PER_POLL: u64 = 65_536;
+/// Bytes per payment.
 const PAY_BYTES: u64 = 1 << 20;
 
-/// The values of some records by slot, each in a row of its own.
+/// Values of some records, one column per slot.
 pub type Columns = [Vec<f64>; VALUES_MAX];
 
-/// The numbers of a body, one after the other. What gives None leaves the place as it is, for [`Source::why`] to look at.
+/// The numbers of a body, in order. A method that returns None keeps the position, so that
+/// [`Source::why`] can explain it.
 pub trait Source {
     /// The next number.
     fn value(&mut self, kind: Kind) -> Option<f64>;
     /// Appends the next `count` numbers to `items`.
     fn values(&mut self, kind: Kind, count: usize, items: &mut Vec<f64>) -> Option<()>;
-    /// Passes over so many numbers, which take so many bytes in a binary body.
+    /// Skips some numbers, which take `bytes` in a binary body.
     fn skip(&mut self, numbers: usize, bytes: usize) -> Option<()>;
-    /// Reads records of a fixed size at once, in place of what `columns` holds.
+    /// Replaces `columns` with the values of some records of a fixed size.
     fn columns(&mut self, layout: &Layout, rows: usize, columns: &mut Columns) -> Option<()>;
-    /// Whether [`Source::columns`] works.
+    /// True if [`Source::columns`] works.
     fn is_in_columns(&self) -> bool;
-    /// How many more numbers there can be at most.
+    /// An upper bound for the numbers left.
     fn numbers_left(&self, kind: Kind) -> u64;
     /// Bytes read so far.
     fn at(&self) -> usize;
-    /// A place in words.
+    /// A position in words.
     fn place(&self, at: usize) -> String;
-    /// Why there was no next number; the record's name follows.
+    /// The reason why there was no next number, as the beginning of a sentence that ends with the
+    /// record's name.
     fn why(&self) -> String;
-    /// Bytes after the place where the reading stands that mean something.
+    /// Meaningful bytes after the current position.
     fn trailing_bytes(&self) -> usize;
 }
 
-/// What has been read and not been paid for yet.
+/// Counts what has been read and not yet paid for.
 #[derive(Debug, Default)]
 pub struct Meter {
     unpaid_bytes: u64,
@@ -45,16 +48,17 @@ pub struct Meter {
     triangles: u64,
 }
 
-/// What memory the records of an element take once read, bytes.
+/// Memory of an element's records once read, in bytes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
     /// Each.
     pub record: u64,
-    /// And for each item of its lists.
+    /// Per item of its lists.
     pub item: u64,
 }
 
-/// Reads all records of an element. `keep` is given each, and says how many triangles it has or what is wrong with it.
+/// Reads all records of an element. `keep` gets each, and returns its number of triangles or a
+/// fault.
 pub fn each_record<S: Source>(
     source: &mut S,
     element: &Element,
@@ -68,7 +72,7 @@ pub fn each_record<S: Source>(
     }
     let mut row = Row::default();
     for number in 0..element.count {
-        if number % RECORDS_PER_LOOK == 0 {
+        if number % RECORDS_PER_POLL == 0 {
             cx.deadline.check()?;
         }
         let begin = source.at();
@@ -83,7 +87,7 @@ pub fn each_record<S: Source>(
             }
             Fault::Is(error) => *error,
         })?;
-        // Before anything is kept: one list may be the whole file.
+        // Paid before anything is kept, because one list may be the whole file.
         let items = row.lists.iter().map(|list| list.len() as u64).sum::<u64>();
         meter.unpaid_bytes += cost.record + cost.item * items;
         if meter.unpaid_bytes > PAY_BYTES {
@@ -97,7 +101,7 @@ pub fn each_record<S: Source>(
     meter.pay(cx)
 }
 
-/// Passes over an element.
+/// Skips an element.
 pub fn pass_over<S: Source>(
     source: &mut S,
     element: &Element,
@@ -105,7 +109,7 @@ pub fn pass_over<S: Source>(
     cx: &mut Context<'_>,
 ) -> Result<(), MeshError> {
     let layout = Layout::new(element, |_| None);
-    // A binary element without lists is one step, or none.
+    // A binary element without lists is one step.
     if let (Some(stride), true) = (layout.stride, source.is_in_columns()) {
         let bytes = element.count.checked_mul(stride as u64).and_then(|bytes| usize::try_from(bytes).ok());
         return bytes.and_then(|bytes| source.skip(0, bytes)).ok_or_else(|| ends_within(source, element, stride, 0));
@@ -113,7 +117,8 @@ pub fn pass_over<S: Source>(
     each_record(source, element, &layout, (Cost::default(), meter), cx, |_| Ok(0))
 }
 
-/// The error for records of a fixed size, the next of which is number `next`, where the file ends too soon.
+/// The error for a file that ends within records of a fixed size. `next` is the index of the next
+/// record.
 pub fn ends_within<S: Source>(source: &S, element: &Element, stride: usize, next: u64) -> MeshError {
     let whole = source.trailing_bytes() / stride.max(1);
     let place = source.place(source.at() + whole * stride);
@@ -127,11 +132,11 @@ fn name(element: &Element, number: u64) -> String {
 
 /// Why a record could not be read. Small: it goes through hot loops.
 enum Fault {
-    /// The source knows.
+    /// No next number; the source knows why.
     NoValue,
-    /// What follows the record's name.
+    /// A fault, as the sentence after the record's name.
     Says(Box<str>),
-    /// Something else entirely.
+    /// Any other error.
     Is(Box<MeshError>),
 }
 
@@ -153,7 +158,7 @@ fn read_record<S: Source>(source: &mut S, layout: &Layout, row: &mut Row, cx: &m
     Ok(())
 }
 
-/// A count that the rest of the file can keep.
+/// A count of items, checked against the rest of the file.
 fn list_length<S: Source>(source: &S, given: f64, item: Kind) -> Result<usize, Fault> {
     let count = given as u32;
     if f64::from(count) != given {
@@ -186,11 +191,11 @@ fn skip_list<S: Source>(source: &mut S, item: Kind, count: usize, cx: &Context<'
     in_pieces(count, cx, |piece| source.skip(piece, piece * item.bytes()))
 }
 
-/// Calls `read` with at most so many items at a time as may go by between two looks at the deadline.
+/// Calls `read` in pieces, with a deadline check between them.
 fn in_pieces(count: usize, cx: &Context<'_>, mut read: impl FnMut(usize) -> Option<()>) -> Result<(), Fault> {
     let mut left = count;
     loop {
-        let piece = left.min(RECORDS_PER_LOOK as usize);
+        let piece = left.min(RECORDS_PER_POLL as usize);
         read(piece).ok_or(Fault::NoValue)?;
         left -= piece;
         if left == 0 {

@@ -1,4 +1,4 @@
-//! An ASCII body, read by its words alone: exporters disagree on lines.
+//! An ASCII body, read word by word, because exporters disagree on lines.
 
 use super::header::{Kind, word};
 use super::layout::Layout;
@@ -18,7 +18,7 @@ impl<'a> Text<'a> {
         Self { bytes, at, newline }
     }
 
-    /// Where the next word begins and ends; empty at the end of the file.
+    /// The offset and bytes of the next word, which is empty at the end of the file.
     fn next_word(&self) -> (usize, &'a [u8]) {
         let rest = &self.bytes[self.at..];
         let begin = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
@@ -43,7 +43,7 @@ impl Source for Text<'_> {
         Some(())
     }
 
-    /// What is passed over need not be a number.
+    /// Skipped words need not be numbers.
     fn skip(&mut self, numbers: usize, _bytes: usize) -> Option<()> {
         for _ in 0..numbers {
             let (begin, word) = self.next_word();
@@ -73,7 +73,7 @@ impl Source for Text<'_> {
     }
 
     fn place(&self, at: usize) -> String {
-        // Of a record that begins with white space, the line of its first word.
+        // For a record that begins with white space, the line of its first word.
         let begin = self.bytes[at..].iter().position(|b| !b.is_ascii_whitespace()).map_or(at, |ahead| at + ahead);
         let line = self.bytes[..begin].iter().filter(|&&b| b == self.newline).count() + 1;
         format!("line {line} of the PLY file")
@@ -93,7 +93,7 @@ impl Source for Text<'_> {
 
 /// A number as C prints it, NaN of any kind included. There are no comments in a body.
 fn parse(word: &[u8]) -> Option<f64> {
-    // Most words are indices.
+    // Fast path: most words are indices.
     if (1..10).contains(&word.len()) && word.iter().all(u8::is_ascii_digit) {
         return Some(f64::from(word.iter().fold(0, |value: u32, digit| value * 10 + u32::from(digit - b'0'))));
     }

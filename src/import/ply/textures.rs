@@ -1,24 +1,26 @@
-//! Material slots for the textures that a header names, found among the files that came along.
+//! Material slots for the textures that a header names, found in the bundle.
 //!
-//! Without them the shape is whole, so what is missing is a warning that says what to add, and never an error.
+//! A missing file is a warning that says what to add, never an error: the shape is complete without
+//! it.
 
 use super::faces::NO_TEXTURE;
 use crate::import::MeshError;
 use crate::import::bundle::show_all;
 use crate::import::context::Context;
 use crate::import::raw::RawMesh;
+use crate::import::text::utf8_or_latin1;
 use crate::mesh::MaterialSlot;
 use crate::mesh::material::{ImageContent, ImageSource, TextureRef};
 use crate::warning::Warning;
 use rapidhash::RapidHashMap;
 
-/// Longest file name, bytes; no file of a bundle has a longer path.
+/// Longest file name in bytes. No file of a bundle has a longer path.
 const NAME_BYTES_MAX: usize = 1024;
 
-/// Gives `raw` its materials: one for each texture, and one without. `numbers` are the textures of its triangles, or empty
-/// where all have the first.
+/// Gives `raw` its materials: one per texture, and one without a texture. `numbers` are the
+/// textures of the triangles; empty if all use the first.
 pub fn apply(names: &[Vec<u8>], numbers: &[u32], raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
-    // Colours of vertices are what to show, not a tint for the grey of files without colours.
+    // Vertex colours are final: white takes the place of the grey of files without colours.
     let color = if raw.colors.is_empty() { None } else { Some([1.0; 4]) };
     let plain = MaterialSlot { base_color: color, ..MaterialSlot::default() };
     if !names.is_empty() && raw.uvs.is_empty() {
@@ -69,11 +71,12 @@ struct Images {
 }
 
 impl Images {
-    /// The number of the image that a name means, and whether it is there.
+    /// The index of the image with a name, and true if the bundle has it.
     fn find(&mut self, name: &[u8], cx: &mut Context<'_>) -> Result<(u32, bool), MeshError> {
-        let name = text(&name[..name.len().min(NAME_BYTES_MAX)]);
+        let name = utf8_or_latin1(&name[..name.len().min(NAME_BYTES_MAX)]).into_owned();
         let folder = cx.bundle;
-        // By its path from the mesh, or else by its base name: other people's absolute paths are of no use here.
+        // By its path from the mesh, or else by its base name: absolute paths are those of the
+        // author's computer.
         let at = folder.at(folder.entry().folder(), &name).ok().flatten();
         let number = at.or_else(|| folder.of_base_name(&name));
         if let Some(&image) = number.and_then(|number| self.of_file.get(&number)) {
@@ -95,13 +98,5 @@ impl Images {
         };
         self.all.push(ImageSource { name: format!("texture {}", show_all(std::iter::once(name.as_str()))), content });
         Ok((image, number.is_some()))
-    }
-}
-
-/// UTF-8, or Latin-1 where it is not.
-fn text(name: &[u8]) -> String {
-    match std::str::from_utf8(name) {
-        Ok(text) => text.to_owned(),
-        Err(_) => name.iter().map(|&b| char::from(b)).collect(),
     }
 }

@@ -1,37 +1,37 @@
 //! The element `vertex`.
 
+use super::conversion::{linearise, upright};
 use super::header::{Element, Kind};
 use super::layout::{Layout, Slot};
 use super::source::{Columns, Cost, Meter, Source, each_record, ends_within};
-use super::stored::{linearise, upright};
 use crate::import::MeshError;
 use crate::import::context::Context;
 use std::ops::Range;
 
-/// Slots of what a vertex may have.
+/// Slots of a vertex's numbers.
 const POSITION: Range<usize> = 0..3;
 const NORMAL: Range<usize> = 3..6;
 const COLOR: Range<usize> = 6..9;
 const ALPHA: usize = 9;
 const UV: Range<usize> = 10..12;
 
-/// Vertices that are read at once: few enough that their columns stay in the nearest caches.
+/// Vertices per block: few enough that their columns stay in the nearest caches.
 const BLOCK: usize = 512;
-/// Blocks between two looks at the deadline.
-const BLOCKS_PER_LOOK: u64 = 128;
+/// Blocks between two deadline checks.
+const BLOCKS_PER_POLL: u64 = 128;
 
-/// What was read: each as in [`crate::import::raw::RawMesh`].
+/// The vertices read so far, each list as in [`crate::import::raw::RawMesh`].
 #[derive(Debug, Default)]
 pub struct Vertices {
-    /// One a vertex.
+    /// One per vertex.
     pub positions: Vec<[f64; 3]>,
-    /// Whether those are stored as f32.
+    /// True if positions are stored as f32.
     pub is_f32: bool,
-    /// One a vertex, or empty.
+    /// One per vertex, or empty.
     pub normals: Vec<[f32; 3]>,
-    /// One a vertex, or empty.
+    /// One per vertex, or empty.
     pub uvs: Vec<[f32; 2]>,
-    /// One a vertex, or empty.
+    /// One per vertex, or empty.
     pub colors: Vec<[f32; 4]>,
 }
 
@@ -54,7 +54,7 @@ pub fn read<S: Source>(
     if let (Some(stride), true) = (layout.stride, source.is_in_columns()) {
         let mut left = element.count;
         for block in 0.. {
-            if block % BLOCKS_PER_LOOK == 0 {
+            if block % BLOCKS_PER_POLL == 0 {
                 cx.deadline.check()?;
             }
             let rows = left.min(BLOCK as u64);
@@ -106,7 +106,8 @@ fn slot(name: &str) -> Option<Slot> {
 }
 
 impl Vertices {
-    /// Room for all that the layout has. The header's count has been held against the length of the file.
+    /// Reserves room for all values of the layout. The count was checked against the length of the
+    /// file.
     fn reserve(layout: &Layout, count: u64, cx: &mut Context<'_>) -> Result<Self, MeshError> {
         let room = |is_there: bool| if is_there { count as usize } else { 0 };
         let rooms = [room(layout.has(NORMAL)), room(layout.has(UV)), room(layout.has(COLOR))];

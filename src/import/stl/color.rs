@@ -1,29 +1,31 @@
-//! Colours in the two attribute bytes of binary STL: 5 bits a channel, in the two ways that programs agree on, and what they
-//! mean for the whole file.
+//! Colours in the two attribute bytes of binary STL: 5 bits per channel, in the two conventions in
+//! use.
 
-use crate::import::raw::srgb_to_linear;
+use crate::srgb::srgb_to_linear;
 
-/// The header of Materialise Magics, and what follows it: RGBA, a byte each, of what has no colour of its own.
+/// Keyword in the header of Materialise Magics. RGBA bytes follow: the colour of triangles without
+/// their own.
 const MAGICS: &[u8] = b"COLOR=";
-/// Bit 15.
+/// Bit 15, which tells whether a triangle has a colour.
 const FLAG: u16 = 0x8000;
-/// Of what has no colour where others have one.
+/// The colour of elements without one, where others have one.
 const WHITE: [f32; 4] = [1.0; 4];
 
-/// How a file stores its colours.
+/// The convention for colours in a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Colors {
     /// VisCAM and SolidView: blue in the lowest bits; a triangle has a colour if bit 15 is set.
     VisCam,
     /// Materialise Magics: red in the lowest bits; a triangle has a colour if bit 15 is clear.
     Magics {
-        /// Of the other triangles, linear RGBA.
+        /// Colour of the other triangles, linear RGBA.
         object: [f32; 4],
     },
 }
 
 impl Colors {
-    /// What the header and the triangles' attribute bytes say. None where no triangle has a colour.
+    /// Detects the convention from the header and the attribute bytes. None if no triangle has a
+    /// colour.
     pub fn of(header: &[u8], mut attributes: impl Iterator<Item = u16>) -> Option<Self> {
         let at = header.windows(MAGICS.len()).position(|word| word == MAGICS);
         if let Some(bytes) = at.and_then(|at| header.get(at + MAGICS.len()..at + MAGICS.len() + 3)) {
@@ -33,7 +35,8 @@ impl Colors {
         attributes.any(|attribute| attribute & FLAG != 0).then_some(Self::VisCam)
     }
 
-    /// Linear RGBA of a triangle. Programs that know Magics' header and not its colours leave 0, which would be black.
+    /// Linear RGBA of a triangle. In the Magics convention 0 means no colour, because programs that
+    /// copy the header but write no colours leave 0.
     pub fn color(self, attribute: u16) -> [f32; 4] {
         let channel = |shift: u16| linear(f64::from(attribute >> shift & 31) / 31.0);
         match self {

@@ -1,37 +1,42 @@
-//! STL, binary and ASCII, with the two kinds of colours that binary files have ([`color`]). The stored normals are ignored:
-//! they repeat what the corners say, or lie.
+//! STL, binary and ASCII, with the two conventions for colours in binary files ([`color`]). The
+//! stored normals are ignored: they repeat the corners, or are wrong.
 
 mod color;
 
 use self::color::Colors;
 use super::polygon::ALL_EDGES;
 use super::raw::RawMesh;
-use super::{Format, MeshError};
+use super::{Format, MeshError, text};
+use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
-use crate::mesh::{FileMetadata, MaterialSlot, UpAxis};
+use crate::mesh::{MaterialSlot, UpAxis};
 use crate::pluralise::pluralise;
 use crate::warning::Warning;
 
-/// An 80-byte header and a count come before the triangles.
+/// Bytes before the triangles: an 80-byte header and a count.
 const HEADER_BYTES: usize = 84;
-/// A normal, three corners and two attribute bytes.
+/// Bytes per triangle: a normal, three corners and two attribute bytes.
 const TRIANGLE_BYTES: usize = 50;
 
-/// Reads either kind.
+/// Reads either kind of file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
-    let text = super::sniff::trim_start(bytes);
-    if !is_exact_binary(bytes) && is_ascii(text) { read_ascii(text, cx) } else { read_binary(bytes, cx) }
+    if !is_exact_binary(bytes) && is_ascii(bytes) {
+        read_ascii(text::trim_start(bytes), cx)
+    } else {
+        read_binary(bytes, cx)
+    }
 }
 
-/// Whether the length is exactly what the count in the header asks for. Noise never is.
+/// True if the length is exactly what the count in the header requires. Other data practically
+/// never fits.
 pub fn is_exact_binary(bytes: &[u8]) -> bool {
     declared_bytes(bytes) == Some(bytes.len() as u64)
 }
 
-/// Whether the bytes look like a binary STL that was cut off or has something after its end: the count fits the length
-/// roughly.
-pub fn is_loose_binary(bytes: &[u8]) -> bool {
+/// True if the bytes look like a binary STL that was cut off or has trailing bytes: the count
+/// roughly fits the length.
+pub fn is_plausible_binary(bytes: &[u8]) -> bool {
     let len = bytes.len() as u64;
     if uncounted(bytes).is_some() {
         return true;
@@ -48,8 +53,8 @@ pub fn is_loose_binary(bytes: &[u8]) -> bool {
     }
 }
 
-/// The triangles of a file whose count was never filled in, as programs leave it that write as they go: 0 or all ones, with
-/// whole triangles behind it, the first of which is one.
+/// The number of triangles in a file whose count was never filled in, as streaming writers leave
+/// it: the count is 0 or all ones, whole triangles follow, and the first is plausible.
 fn uncounted(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(80..HEADER_BYTES)?;
     let body = bytes.get(HEADER_BYTES..).filter(|body| body.len().is_multiple_of(TRIANGLE_BYTES))?;
@@ -60,8 +65,9 @@ fn uncounted(bytes: &[u8]) -> Option<u64> {
     (is_unset && is_plausible && first.iter().any(|v| *v != 0.0)).then_some((body.len() / TRIANGLE_BYTES) as u64)
 }
 
-/// Whether the text begins as an ASCII STL and goes on as one.
-pub fn is_ascii(text: &[u8]) -> bool {
+/// True if the bytes begin as an ASCII STL and go on as one.
+pub fn is_ascii(bytes: &[u8]) -> bool {
+    let text = text::trim_start(bytes);
     let begins = text.len() >= 5 && text[..5].eq_ignore_ascii_case(b"solid");
     if !begins || text.get(5).is_some_and(|b| !b.is_ascii_whitespace()) {
         return false;
@@ -130,7 +136,7 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
     finish(raw)
 }
 
-/// Gives each triangle's vertices, which are its own, the colour in its attribute bytes.
+/// Gives each triangle's three vertices the colour in its attribute bytes.
 fn paint(raw: &mut RawMesh, header: &[u8], body: &[u8], cx: &mut Context<'_>) -> Result<(), MeshError> {
     let attributes =
         || body.chunks_exact(TRIANGLE_BYTES).map(|triangle| u16::from_le_bytes([triangle[48], triangle[49]]));
@@ -139,18 +145,19 @@ fn paint(raw: &mut RawMesh, header: &[u8], body: &[u8], cx: &mut Context<'_>) ->
     cx.budget.spend("the colours of STL triangles", raw.positions.len() as u64, 16)?;
     raw.colors.reserve_exact(raw.positions.len());
     raw.colors.extend(attributes().flat_map(|attribute| [colors.color(attribute); 3]));
-    // These are what to show, not a tint for the grey of files without colours.
+    // Vertex colours are final: white takes the place of the grey of files without colours.
     raw.materials = vec![MaterialSlot { base_color: Some([1.0; 4]), ..MaterialSlot::default() }];
     Ok(())
 }
 
-/// ASCII is read by its words alone: exporters disagree on lines and indentation, but every corner is `vertex x y z`.
+/// Reads ASCII word by word: exporters disagree on lines and indentation, but every corner is
+/// `vertex x y z`.
 fn read_ascii(text: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut raw = new_mesh(Format::StlAscii);
-    // Line ends of old Macs, where there are no others.
+    // Files without line feeds have the line ends of old Macs.
     let newline = if text.contains(&b'\n') { b'\n' } else { b'\r' };
     raw.report.metadata = FileMetadata::by(metadata::tidy(name(text, newline)));
-    // The shortest triangle that a text can hold says how many it can have at most.
+    // An upper bound from the shortest possible text of a triangle.
     let count_max = text.len() as u64 / 30 + 1;
     cx.budget.spend("the STL triangles", count_max, 3 * 24 + 12 + 1 + 4)?;
     let mut corners = 0_usize;
@@ -158,7 +165,8 @@ fn read_ascii(text: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let mut met = 0_u64;
     for (number, line) in text.split(|&b| b == newline).enumerate() {
         let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|w| !w.is_empty());
-        // Behind "solid" and "endsolid" is a name, which may be any words. It ends with the line, or where facets begin.
+        // After "solid" and "endsolid" comes a name of any words. It ends with the line, or where
+        // facets begin.
         let mut is_name = false;
         while let Some(word) = words.next() {
             if met.is_multiple_of(65_536) {
@@ -195,7 +203,7 @@ fn read_ascii(text: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     finish(raw)
 }
 
-/// What follows the first word: up to the end of the line, or of what is before the first facet where that is on the same.
+/// The name after the first word, up to the end of the line or to a facet on the same line.
 fn name(text: &[u8], newline: u8) -> &[u8] {
     let line = text.split(|&b| b == newline).next().and_then(|line| line.get(5..)).unwrap_or_default();
     let head = &line[..line.len().min(4096)];

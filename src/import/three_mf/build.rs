@@ -1,5 +1,5 @@
-//! Places the objects that are built, with all that is in them. Counted before it is done: components of components double with
-//! every level.
+//! Places the build items with all their components. They are counted first, because components of
+//! components double with every level.
 
 use super::model::{Group, NONE, Object, Triangle};
 use super::parts::{Key, Parts};
@@ -14,13 +14,13 @@ use crate::mesh::MaterialSlot;
 use crate::mesh::material::AlphaMode;
 use rapidhash::RapidHashMap;
 
-/// Objects within objects. Writers use two levels.
+/// Depth of components. Writers use two levels.
 const DEPTH_MAX: usize = 64;
 const VERTEX_BYTES: u64 = 24 + 16;
 const TRIANGLE_BYTES: u64 = 12 + 1 + 4;
 const WHITE: [f32; 4] = [1.0; 4];
 
-/// Fills in everything that is built.
+/// Fills `raw` with all build items.
 pub fn assemble(parts: &Parts, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
     let roots = parts.roots();
     let mut counter = Counter { parts, known: RapidHashMap::default() };
@@ -46,7 +46,7 @@ pub fn assemble(parts: &Parts, raw: &mut RawMesh, cx: &mut Context<'_>) -> Resul
     Ok(())
 }
 
-/// What an object comes to with all that is in it.
+/// Totals of an object with all its components.
 #[derive(Clone, Copy, Debug, Default)]
 struct Count {
     objects: u64,
@@ -57,7 +57,7 @@ struct Count {
 }
 
 impl Count {
-    /// Adds what is beside it.
+    /// Adds the totals of a sibling.
     fn add(&mut self, other: Self) {
         self.objects = self.objects.saturating_add(other.objects);
         self.triangles = self.triangles.saturating_add(other.triangles);
@@ -77,7 +77,7 @@ impl Counter<'_> {
         if let Some(None) = known {
             return Err(MeshError::broken(format!("object {} of the 3MF file is in itself", key.1)));
         }
-        // What is known already may be deep itself.
+        // A known object may be deep itself.
         if depth + known.flatten().map_or(0, |count| count.height) > DEPTH_MAX {
             return Err(MeshError::broken(format!("objects of the 3MF file are more than {DEPTH_MAX} deep")));
         }
@@ -106,7 +106,7 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// Adds an object; its depth and number were counted.
+    /// Adds an object. Depth and size were checked before.
     fn add(
         &mut self,
         part: usize,
@@ -170,7 +170,7 @@ impl Builder<'_> {
     }
 }
 
-/// What tells a corner from others at its vertex, and its colour if it has one of its own.
+/// The key that distinguishes corners at one vertex, and the corner's own colour.
 fn corner_color(triangle: &Triangle, corner: usize, group: Option<&Group>) -> ([u32; 4], Option<[f32; 4]>) {
     let vertex = triangle.corners[corner];
     let index = triangle.indices[corner];
@@ -188,7 +188,7 @@ type Base = (usize, u32, u32);
 #[derive(Default)]
 struct Slots {
     all: Vec<MaterialSlot>,
-    /// None: what has no base material.
+    /// Slots by base material. None: triangles without one.
     known: RapidHashMap<Option<Base>, u32>,
     has_plain: Option<usize>,
 }
@@ -221,7 +221,7 @@ impl Slots {
     }
 
     fn finish(mut self, raw: &mut RawMesh) {
-        // Colours of vertices are what to show, not a tint for the grey of files without colours.
+        // Vertex colours are final: white takes the place of the grey of files without colours.
         if let Some(plain) = self.has_plain.filter(|_| !raw.colors.is_empty()) {
             self.all[plain].base_color = Some(WHITE);
         }

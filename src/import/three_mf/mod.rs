@@ -1,14 +1,16 @@
-//! 3MF, the format of 3D printing (3MF Consortium, "3D Manufacturing Format Core Specification" 1.3, "Production Extension" 1.1,
-//! and of "Materials and Properties Extension" 1.2 the colour groups): a zip package whose model parts are XML.
+//! 3MF, the format of 3D printing: a zip package whose model parts are XML. Read are the 3MF
+//! Consortium's "Core Specification" 1.3, "Production Extension" 1.1 and the colour groups of
+//! "Materials and Properties Extension" 1.2.
 //!
-//! [`package`] finds the part to begin with, [`xml`] is how elements and attributes are read, [`spaces`] whose they are, [`model`] keeps one part,
-//! [`parts`] all that it refers to, and [`build`] places them.
+//! [`package`] finds the first part, [`xml`] reads elements and attributes, [`namespaces`] resolves
+//! their namespaces, [`model`] keeps one part, [`parts`] all parts that it refers to, and [`build`]
+//! places their objects.
 
 mod build;
 mod model;
+mod namespaces;
 mod package;
 mod parts;
-mod spaces;
 mod values;
 mod xml;
 

@@ -1,6 +1,6 @@
-//! One model part: its objects, what it builds, and the colours of its property groups.
+//! One model part: its objects, build items and colours of property groups.
 
-use super::spaces::Space;
+use super::namespaces::Space;
 use super::values::{color, transform};
 use super::xml::{Element, Visitor};
 use crate::import::affine::Affine;
@@ -12,7 +12,7 @@ use rapidhash::RapidHashMap;
 
 /// No property.
 pub const NONE: u32 = u32::MAX;
-/// Vertices or triangles that are paid for at once.
+/// Vertices or triangles per payment.
 const PAID_AT_ONCE: usize = 1024;
 
 /// A part, as the file has it.
@@ -22,7 +22,7 @@ pub struct Model {
     pub objects: RapidHashMap<u32, Object>,
     /// Numbers of the objects, in the file's order.
     pub order: Vec<u32>,
-    /// What is built.
+    /// The build items.
     pub items: Vec<Placed>,
     /// Colours by the numbers of their groups.
     pub groups: RapidHashMap<u32, Group>,
@@ -33,7 +33,7 @@ pub struct Model {
     open: Open,
 }
 
-/// An object: a mesh or components, or, where a file does not keep to the rules, both.
+/// An object: a mesh or components. Files that break the rules have both.
 #[derive(Debug, Default)]
 pub struct Object {
     /// Its vertices.
@@ -56,14 +56,14 @@ pub struct Triangle {
     pub indices: [u32; 3],
 }
 
-/// An object somewhere.
+/// A reference to an object, with its transform.
 #[derive(Clone, Debug)]
 pub struct Placed {
-    /// Its number in its part.
+    /// Its id in its part.
     pub object: u32,
     /// Path of another part (production extension), or empty.
     pub path: String,
-    /// Where it goes.
+    /// Its transform.
     pub transform: Affine,
 }
 
@@ -76,7 +76,7 @@ pub struct Group {
     pub names: Option<Vec<String>>,
 }
 
-/// Where the visitor is.
+/// The visitor's place in the document.
 #[derive(Debug, Default)]
 struct Open {
     object: Option<u32>,
@@ -101,7 +101,7 @@ impl Visitor for Model {
                 self.unread_groups += 1;
                 Ok(())
             }
-            // Slices and the like have vertices and names of their own.
+            // Slices and other extensions have vertices and names of their own.
             _ if !space.is_core() => Ok(()),
             "object" => self.object(element, cx),
             "vertex" => self.vertex(element, cx),
@@ -141,7 +141,7 @@ impl Visitor for Model {
     }
 }
 
-/// The root, and what it says that a reader has to know.
+/// Reads the root element, with the extensions that it requires.
 fn root(element: &Element<'_>, space: Space) -> Result<(), MeshError> {
     if element.name() != "model" || !space.is_core() {
         return Err(element.broken("a part begins with <model>"));

@@ -1,31 +1,33 @@
-//! Which of the files is the model that a package begins with.
+//! Finds the first model part of a package.
 
 use crate::import::bundle::BundleFile;
 
 /// The relationship of a package to its first model.
 const MODEL_TYPE: &str = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel";
-/// Where writers put it.
+/// The usual path of that part.
 const MODEL_PATH: &str = "3d/3dmodel.model";
-/// Relationships are a few lines.
+/// Most bytes of the relationships that are read. Real ones are a few lines.
 const RELATIONSHIPS_BYTES_MAX: usize = 1 << 16;
 
-/// The number of the first model part, if the files are a 3MF package: what an archive of that format unpacks to.
+/// The index of the first model part, if the files are an unpacked 3MF package.
 pub fn start_part(files: &[BundleFile]) -> Option<usize> {
     let has = |name: &str| files.iter().position(|file| file.path.eq_ignore_ascii_case(name));
     let relationships = has("_rels/.rels");
     if has("[Content_Types].xml").is_none() && relationships.is_none() {
         return None;
     }
-    let said = relationships.and_then(|number| target(&files[number].bytes));
-    let said = said.and_then(|path| has(path.trim_start_matches('/')).filter(|&number| is_model(&files[number])));
-    said.or_else(|| has(MODEL_PATH)).or_else(|| files.iter().position(is_model))
+    let declared = relationships.and_then(|number| target(&files[number].bytes));
+    let declared =
+        declared.and_then(|path| has(path.trim_start_matches('/')).filter(|&number| is_model(&files[number])));
+    declared.or_else(|| has(MODEL_PATH)).or_else(|| files.iter().position(is_model))
 }
 
 fn is_model(file: &BundleFile) -> bool {
     file.extension() == "model"
 }
 
-/// The target of the relationship. Read without a parser: it only chooses among the files, and there is a second guess.
+/// The target of the relationship. Read without a parser, because it only selects among the files,
+/// and there is a fallback.
 fn target(bytes: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(RELATIONSHIPS_BYTES_MAX)]);
     let element = text.split('<').find(|element| element.contains(MODEL_TYPE))?;
@@ -46,9 +48,9 @@ mod tests {
             list.iter().map(|(name, text)| BundleFile::new(name, text.as_bytes().to_vec()).unwrap()).collect()
         };
         let types = ("[Content_Types].xml", "");
-        let said = rels("/3D/b.model");
+        let declared = rels("/3D/b.model");
         let cases = [
-            (files(&[types, ("3D/a.model", ""), ("3D/b.model", ""), ("_rels/.rels", &said)]), Some(2)),
+            (files(&[types, ("3D/a.model", ""), ("3D/b.model", ""), ("_rels/.rels", &declared)]), Some(2)),
             (files(&[types, ("3D/a.model", ""), ("3D/3dmodel.model", ""), ("_rels/.rels", "<Rel")]), Some(2)),
             (files(&[types, ("x.txt", ""), ("Metadata/a.MODEL", "")]), Some(2)),
             (files(&[types, ("word/document.xml", ""), ("_rels/.rels", "")]), None),

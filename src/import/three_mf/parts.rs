@@ -5,21 +5,21 @@ use super::xml;
 use crate::import::bundle::show;
 use crate::import::context::Context;
 use crate::import::raw::RawMesh;
+use crate::import::report::counted_warnings;
 use crate::import::{MeshError, MeshFault};
-use crate::warning::Warning;
 use rapidhash::RapidHashMap;
 
-/// The parts, the first one first.
+/// All parts, the first one first.
 pub struct Parts {
     models: Vec<Model>,
-    /// Numbers of models by the paths that name them.
+    /// Indices of models by path.
     by_path: RapidHashMap<String, usize>,
 }
 
 /// An object of a part.
 pub type Key = (usize, u32);
 
-/// Reads them.
+/// Reads all of them.
 pub fn read(raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Parts, MeshError> {
     let folder = cx.bundle;
     let first = folder.entry();
@@ -63,8 +63,7 @@ pub fn read(raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Parts, MeshError>
         ),
         (sum(|model| model.beam_lattices), "beams_ignored", "beam lattices are not drawn (meshes in the file:"),
     ];
-    let met = notes.into_iter().filter(|(count, ..)| *count > 0);
-    raw.report.warnings.extend(met.map(|(count, code, what)| Warning { code, detail: format!("{what} {count})") }));
+    raw.report.warnings.extend(counted_warnings(notes));
     Ok(parts)
 }
 
@@ -80,7 +79,7 @@ impl Parts {
         &self.models[number]
     }
 
-    /// The object that something in a part refers to.
+    /// Resolves a reference from within a part to an object.
     pub fn find(&self, part: usize, placed: &Placed) -> Result<(Key, &Object), MeshError> {
         let part = if placed.path.is_empty() { Some(part) } else { self.by_path.get(&placed.path).copied() };
         let found = part.and_then(|part| Some(((part, placed.object), self.models[part].objects.get(&placed.object)?)));
@@ -89,7 +88,7 @@ impl Parts {
         })
     }
 
-    /// What is built: the items, or where there is none every object that is no part of another.
+    /// The items that are built. Without any, every object that is no component of another.
     pub fn roots(&self) -> Vec<Placed> {
         let first = &self.models[0];
         if !first.items.is_empty() {

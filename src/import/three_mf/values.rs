@@ -1,9 +1,9 @@
 //! Attribute values of several parts: transforms and colours.
 
 use crate::import::affine::Affine;
-use crate::import::raw::srgb_to_linear;
+use crate::srgb::srgb_to_linear;
 
-/// Twelve numbers: where the three axes go, and the translation.
+/// Parses twelve numbers: the images of the three axes, and the translation.
 pub fn transform(text: &str) -> Option<Affine> {
     let mut numbers = [0.0; 12];
     let mut words = text.split_ascii_whitespace();
@@ -14,7 +14,7 @@ pub fn transform(text: &str) -> Option<Affine> {
     words.next().is_none().then_some(Affine { linear, translation: [numbers[9], numbers[10], numbers[11]] })
 }
 
-/// sRGB and, where there are eight digits, alpha.
+/// Parses sRGB with six hex digits, or with alpha and eight.
 pub fn color(text: &str) -> Option<[f32; 4]> {
     let digits = text.trim_ascii().strip_prefix('#').filter(|digits| matches!(digits.len(), 6 | 8))?;
     let byte = |at: usize| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok();

@@ -1,6 +1,7 @@
-//! Elements and attributes of an XML part, by their names without prefixes, and what namespace an element's prefix means. Nothing is expanded: a part with a DTD is refused.
+//! Reads elements and attributes of an XML part by their names without prefixes, with the
+//! namespaces of elements. Entities are not expanded: a part with a DTD is refused.
 
-use super::spaces::{Space, Spaces};
+use super::namespaces::{Space, Spaces};
 use crate::import::bundle::show;
 use crate::import::context::Context;
 use crate::import::{MeshError, text};
@@ -8,12 +9,12 @@ use quick_xml::events::{BytesStart, Event};
 use quick_xml::name::{Prefix, QName};
 use quick_xml::{Reader, XmlVersion};
 
-/// Elements within elements. The format needs seven.
+/// Depth of elements. The format needs seven.
 const DEPTH_MAX: usize = 64;
 /// Bytes of one element's attributes.
 const ATTRIBUTES_BYTES_MAX: usize = 1 << 20;
-/// Elements between two looks at the deadline.
-const ELEMENTS_PER_LOOK: u64 = 1 << 16;
+/// Elements between two deadline checks.
+const ELEMENTS_PER_POLL: u64 = 1 << 16;
 
 /// An element that begins.
 pub struct Element<'e> {
@@ -23,17 +24,17 @@ pub struct Element<'e> {
     spaces: &'e Spaces,
 }
 
-/// What becomes of a part's elements.
+/// Receives a part's elements.
 pub trait Visitor {
     /// An element begins; `depth` is 0 for the root.
     fn begin(&mut self, element: &Element<'_>, depth: usize, cx: &mut Context<'_>) -> Result<(), MeshError>;
-    /// And ends.
+    /// An element ends.
     fn end(&mut self, name: &str, space: Space, cx: &mut Context<'_>) -> Result<(), MeshError>;
 }
 
 /// Walks through the part of this name.
 pub fn walk(part: &str, bytes: &[u8], visitor: &mut impl Visitor, cx: &mut Context<'_>) -> Result<(), MeshError> {
-    let bytes = text::to_utf8(bytes, cx)?;
+    let bytes = text::to_utf8(bytes, cx.budget)?;
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
     let broken =
         |at: u64, what: &str| MeshError::broken(format!("byte {at} of the 3MF part \"{}\": {what}", show(part)));
@@ -44,7 +45,7 @@ pub fn walk(part: &str, bytes: &[u8], visitor: &mut impl Visitor, cx: &mut Conte
     let (mut depth, mut met, mut has_root) = (0, 0_u64, false);
     loop {
         met += 1;
-        if met.is_multiple_of(ELEMENTS_PER_LOOK) {
+        if met.is_multiple_of(ELEMENTS_PER_POLL) {
             cx.deadline.check()?;
         }
         let at = reader.buffer_position();
@@ -107,12 +108,12 @@ impl Element<'_> {
         self.event.local_name().into_inner()
     }
 
-    /// Whose it is.
+    /// The namespace of the element.
     pub fn space(&self) -> Space {
         space(self.spaces, self.event.name())
     }
 
-    /// The namespaces of a list of prefixes that a file may not require.
+    /// Namespaces of a list of required prefixes that are not read.
     pub fn unread(&self, prefixes: &str) -> Vec<String> {
         self.spaces.unread(prefixes)
     }
@@ -128,7 +129,7 @@ impl Element<'_> {
         Ok(())
     }
 
-    /// The value of an attribute, its escapes undone; None where there is none.
+    /// The unescaped value of an attribute. None without the attribute.
     pub fn text(&self, name: &str) -> Result<Option<String>, MeshError> {
         let mut attributes = self.event.attributes();
         for attribute in attributes.with_checks(false) {
@@ -141,7 +142,7 @@ impl Element<'_> {
         Ok(None)
     }
 
-    /// A number that the element has to have or may have.
+    /// An attribute that is a number, required or not.
     pub fn number<T: std::str::FromStr>(&self, name: &str) -> Result<Option<T>, MeshError> {
         match self.text(name)? {
             Some(value) => self.parse(name, &value).map(Some),
@@ -149,12 +150,12 @@ impl Element<'_> {
         }
     }
 
-    /// A number that it has to have.
+    /// A required attribute that is a number.
     pub fn needed<T: std::str::FromStr>(&self, name: &str) -> Result<T, MeshError> {
         self.number(name)?.ok_or_else(|| self.broken(&format!("the attribute \"{name}\" is missing")))
     }
 
-    /// A value that has to be a number.
+    /// Parses a value that must be a number.
     pub fn parse<T: std::str::FromStr>(&self, name: &str, value: &str) -> Result<T, MeshError> {
         let parsed = value.trim_ascii().parse();
         parsed.map_err(|_| {

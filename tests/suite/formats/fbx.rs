@@ -6,12 +6,12 @@ use crate::support::damage::{cut_everywhere, mutate};
 use crate::support::fbx_files::{
     Node, Value, ascii, binary, face_materials, file, geometry, layer, material, model, node, property, text,
 };
-use crate::support::mesh_files::{Solid, read, read_limited};
+use crate::support::mesh_files::{Read, Solid, read, read_limited};
 use crate::support::server::Server;
 use meshsnap::import::{Bundle, Format, MeshFault, import};
 use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap::mesh::UpAxis;
 use meshsnap::mesh::material::{AlphaMode, ImageContent};
-use meshsnap::mesh::{Mesh, UpAxis};
 
 type Writer = fn(&[Node]) -> Vec<u8>;
 
@@ -31,7 +31,7 @@ fn moved(solid: &Solid, map: impl Fn([f64; 3]) -> [f64; 3]) -> Solid {
     Solid { positions: solid.positions.iter().map(|p| map(*p)).collect(), polygons: solid.polygons.clone() }
 }
 
-fn codes(mesh: &Mesh) -> Vec<&'static str> {
+fn codes(mesh: &Read) -> Vec<&'static str> {
     mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 

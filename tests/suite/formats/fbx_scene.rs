@@ -1,8 +1,7 @@
 //! Which parts of an FBX scene are drawn, and numbers in it that are none.
 
 use crate::support::fbx_files::{Node, Value, ascii, binary, file, geometry, model, node, properties, property, text};
-use crate::support::mesh_files::{Solid, read};
-use meshsnap::mesh::Mesh;
+use crate::support::mesh_files::{Read, Solid, read};
 
 type Links = Vec<(i64, i64, &'static str)>;
 /// A name, a file, how many boxes it shows, and its warnings.
@@ -12,7 +11,7 @@ fn flag(name: &str, value: f64) -> Node {
     property(name, if name == "Visibility" { "Visibility" } else { "bool" }, &[value])
 }
 
-fn codes(mesh: &Mesh) -> Vec<&'static str> {
+fn codes(mesh: &Read) -> Vec<&'static str> {
     mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 

@@ -2,7 +2,7 @@
 
 use crate::support::damage::{cut_everywhere, mutate};
 use crate::support::fbx_files::{Value, ascii, binary, file, geometry, model, node, property};
-use crate::support::mesh_files::{Solid, read, read_limited};
+use crate::support::mesh_files::{Read, Solid, read, read_limited};
 use crate::support::ply_files::{ENCODINGS, Ply, XYZ};
 use crate::support::shared::folder;
 use meshsnap::import::{Format, MeshFault};
@@ -20,7 +20,7 @@ fn loose(mesh: &Mesh) -> Vec<End> {
     mesh.lines_and_points.iter().map(|one| (one.ends.map(to_file), one.material)).collect()
 }
 
-fn codes(mesh: &Mesh) -> Vec<&'static str> {
+fn codes(mesh: &Read) -> Vec<&'static str> {
     mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 

@@ -1,18 +1,17 @@
 //! MTL: what each statement becomes, and libraries that are broken or hostile.
 
 use meshsnap::import::{Bundle, MeshError, MeshFault};
-use meshsnap::mesh::Mesh;
 use meshsnap::mesh::material::{AlphaMode, ImageContent, MaterialSlot, Wrap};
 use std::time::{Duration, Instant};
 
 use crate::formats::bundles::names::{files, read_bundle};
-use crate::support::mesh_files::Noise;
+use crate::support::mesh_files::{Noise, Read};
 
 /// A triangle in each of three materials.
 const OBJ: &[u8] =
     b"mtllib lib.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl A\nf 1 2 3\nusemtl B\nf 1 3 2\nusemtl C\nf 3 2 1\n";
 
-fn read_mtl(mtl: &[u8]) -> Result<Mesh, MeshError> {
+fn read_mtl(mtl: &[u8]) -> Result<Read, MeshError> {
     read_bundle(&Bundle::of_files(files(&[
         ("m.obj", OBJ),
         ("lib.mtl", mtl),
@@ -23,12 +22,12 @@ fn read_mtl(mtl: &[u8]) -> Result<Mesh, MeshError> {
 }
 
 /// The first material, from statements.
-fn slot(statements: &str) -> (MaterialSlot, Mesh) {
+fn slot(statements: &str) -> (MaterialSlot, Read) {
     let mesh = read_mtl(format!("newmtl A\n{statements}\nnewmtl B\nnewmtl C\n").as_bytes()).unwrap();
     (mesh.materials[0].clone(), mesh)
 }
 
-fn codes(mesh: &Mesh) -> Vec<&'static str> {
+fn codes(mesh: &Read) -> Vec<&'static str> {
     mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 

@@ -3,11 +3,10 @@
 use crate::formats::bundles::names::{files, read_bundle};
 use crate::formats::same_shape::assert_same_shape;
 use crate::support::damage::{cut_everywhere, mutate};
-use crate::support::mesh_files::{Solid, read, read_as};
+use crate::support::mesh_files::{Read, Solid, read, read_as};
 use meshsnap::import::{Bundle, Format};
-use meshsnap::mesh::Mesh;
 
-fn codes(mesh: &Mesh) -> Vec<&'static str> {
+fn codes(mesh: &Read) -> Vec<&'static str> {
     mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 

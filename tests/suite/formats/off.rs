@@ -2,12 +2,11 @@
 
 use crate::formats::same_shape::assert_same_shape;
 use crate::support::damage::{cut_everywhere, mutate};
-use crate::support::mesh_files::{Solid, read, read_as, read_limited};
+use crate::support::mesh_files::{Read, Solid, read, read_as, read_limited};
 use crate::support::server::Server;
 use crate::support::shared::folder;
 use meshsnap::import::{Format, MeshFault};
 use meshsnap::limits::Limits;
-use meshsnap::mesh::Mesh;
 
 /// A box with `extra` words after the position of each vertex, and `color` after each face.
 fn off(head: &str, extra: &str, color: &str) -> String {
@@ -44,7 +43,7 @@ fn binary(with_color: bool) -> Vec<u8> {
     out
 }
 
-fn codes(mesh: &Mesh) -> Vec<&'static str> {
+fn codes(mesh: &Read) -> Vec<&'static str> {
     mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 

@@ -1,9 +1,10 @@
 //! The report: facts of each format, measures against closed forms, hostile meshes.
 
-use crate::support::mesh_files::{Gltf, Solid, read};
+use crate::support::mesh_files::{Gltf, Read, Solid, read};
 use crate::support::ply_files::Encoding;
 use crate::support::server::meshsnap;
 use crate::support::shapes::{Obj, cube, torus};
+use meshsnap::import::ImportReport;
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::edges::EdgeList;
 use meshsnap::mesh::topology::Topology;
@@ -14,12 +15,13 @@ use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
 
 fn report(bytes: &[u8]) -> (Value, String) {
-    let report = of(&read(bytes).unwrap(), bytes.len() as u64);
+    let Read { mesh, report } = read(bytes).unwrap();
+    let report = of(&mesh, &report, bytes.len() as u64);
     (serde_json::to_value(&report).unwrap(), report.text())
 }
 
-fn of(mesh: &Mesh, bytes: u64) -> Report {
-    Report::of(mesh, bytes, &mut Budget::new(&Limits::default()), &Deadline::default()).unwrap()
+fn of(mesh: &Mesh, import: &ImportReport, bytes: u64) -> Report {
+    Report::of(mesh, import, bytes, &mut Budget::new(&Limits::default()), &Deadline::default()).unwrap()
 }
 
 /// Area and volume.
@@ -228,7 +230,7 @@ fn a_million_hostile_triangles_are_counted_in_time() {
     for (name, triangles) in meshes {
         let mesh = mesh_of(triangles);
         let start = Instant::now();
-        let given = serde_json::to_value(of(&mesh, 0)).unwrap();
+        let given = serde_json::to_value(of(&mesh, &ImportReport::default(), 0)).unwrap();
         let took = start.elapsed();
         println!("{name}: {took:?}");
         // About a second on a busy machine, and three for noise, which is at home in no cache.
@@ -266,10 +268,10 @@ fn a_poor_budget_and_a_raised_flag_stop_the_report() {
     let stopped = Deadline::default();
     stopped.stop();
     assert!(Topology::of(&mesh, &edges, &mut Budget::new(&Limits::default()), &stopped).is_err());
-    assert!(Report::of(&mesh, 0, &mut Budget::new(&Limits::default()), &stopped).is_err());
+    assert!(Report::of(&mesh, &mesh.report, 0, &mut Budget::new(&Limits::default()), &stopped).is_err());
     let needed = (0..10_000).find(|&memory_bytes| {
         let limits = Limits { memory_bytes, ..Limits::default() };
-        Report::of(&mesh, 0, &mut Budget::new(&limits), &Deadline::default()).is_ok()
+        Report::of(&mesh, &mesh.report, 0, &mut Budget::new(&limits), &Deadline::default()).is_ok()
     });
     assert!(needed.is_some_and(|bytes| bytes > 500), "{needed:?}");
 }

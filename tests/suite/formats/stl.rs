@@ -2,7 +2,7 @@
 
 use crate::formats::same_shape::assert_same_shape;
 use crate::support::damage::{cut_everywhere, mutate};
-use crate::support::mesh_files::{Solid, read, read_limited};
+use crate::support::mesh_files::{Read, Solid, read, read_limited};
 use meshsnap::import::{Format, MeshFault};
 use meshsnap::limits::Limits;
 use meshsnap::mesh::Mesh;
@@ -25,7 +25,7 @@ fn colors(mesh: &Mesh) -> Vec<[[f32; 4]; 3]> {
     mesh.attribute_triangles.iter().map(|t| t.map(|v| mesh.colors[v as usize])).collect()
 }
 
-fn codes(mesh: &Mesh) -> Vec<&'static str> {
+fn codes(mesh: &Read) -> Vec<&'static str> {
     mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 

@@ -3,12 +3,12 @@
 use crate::formats::bundles::names::{files, read_bundle, zipped};
 use crate::formats::same_shape::assert_same_shape;
 use crate::support::damage::{cut_everywhere, mutate};
-use crate::support::mesh_files::{Solid, read, read_as, read_limited};
+use crate::support::mesh_files::{Read, Solid, read, read_as, read_limited};
 use crate::support::server::Server;
 use meshsnap::import::{Bundle, Format, MeshError, MeshFault, import};
 use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap::mesh::UpAxis;
 use meshsnap::mesh::material::AlphaMode;
-use meshsnap::mesh::{Mesh, UpAxis};
 use std::time::{Duration, Instant};
 
 const TYPES: &str = r#"<?xml version="1.0"?><Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
@@ -54,11 +54,11 @@ fn package(model: &[u8]) -> Vec<u8> {
     zipped(&[("[Content_Types].xml", TYPES.as_bytes()), ("_rels/.rels", RELS.as_bytes()), ("3D/3dmodel.model", model)])
 }
 
-fn read_model(model: &str) -> Result<Mesh, MeshError> {
+fn read_model(model: &str) -> Result<Read, MeshError> {
     read(&package(model.as_bytes()))
 }
 
-fn codes(mesh: &Mesh) -> Vec<&'static str> {
+fn codes(mesh: &Read) -> Vec<&'static str> {
     mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 

@@ -22,7 +22,7 @@ fn cut_and_changed_files_are_answered_in_time_and_memory() {
     let changes = asked.as_ref().map_or(CHANGES, |text| text.parse().expect("MESHSNAP_HOSTILE is a number"));
     println!("target       cuts  changes   seconds   slowest       of                resident MB, before and after");
     let (began, mut done, mut executions) = (Instant::now(), 0, 0);
-    for target in targets::TARGETS {
+    for target in targets::targets() {
         let seeds = files(&root().join("fuzz/seeds").join(target));
         let changes = if target == "pipeline" { changes.div_ceil(SLOWER_PIPELINE) } else { changes };
         let mut watch = Watch { target, slowest: (Duration::ZERO, String::new()), runs: 0 };
@@ -50,7 +50,7 @@ fn cut_and_changed_files_are_answered_in_time_and_memory() {
         (done, executions) = (done + 1, executions + watch.runs);
     }
     println!("{executions} executions of {done} targets in {:.0?}; none panicked", began.elapsed());
-    assert_eq!(done, targets::TARGETS.len());
+    assert_eq!(done, targets::targets().len());
 }
 
 /// Runs inputs and remembers the slowest.

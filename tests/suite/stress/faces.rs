@@ -84,7 +84,7 @@ fn faces_without_area_are_counted_and_never_seen() {
         for (i, face) in bad.iter().enumerate() {
             dirty.polygons.insert(i * 2, face.clone());
         }
-        let (clean, dirty) = (scenes::mesh(&clean.text()), scenes::mesh(&dirty.text()));
+        let (clean, dirty) = (read(clean.text().as_bytes()).unwrap(), read(dirty.text().as_bytes()).unwrap());
         assert_eq!((clean.report.dropped_degenerate_faces, dirty.report.dropped_degenerate_faces), (0, 5), "{name}");
         assert_eq!(clean.triangles.len(), dirty.triangles.len(), "{name}");
         for (look, keys) in LOOKS {
@@ -106,7 +106,7 @@ fn the_tiny_beside_the_huge_is_counted_and_the_huge_is_drawn() {
             let corners = [[0.0; 3], [size, 0.0, 0.0], [0.0, size, size]].map(|p| both.vertex(p));
             both.polygons.push(corners.to_vec());
         }
-        let (huge, both) = (scenes::mesh(&huge.text()), scenes::mesh(&both.text()));
+        let (huge, both) = (read(huge.text().as_bytes()).unwrap(), read(both.text().as_bytes()).unwrap());
         assert_eq!(both.report.dropped_degenerate_faces, 0, "{name}");
         assert_eq!((huge.report.dropped_collapsed_faces, both.report.dropped_collapsed_faces), (0, 3), "{name}");
         for (look, keys) in LOOKS {
@@ -150,7 +150,7 @@ fn vertices_that_are_no_numbers_are_dropped_and_counted_or_nothing_is_left() {
             let words: Vec<&str> = first.split(' ').collect();
             let broken = format!("v {} {bad} {}\n{rest}", words[1], words[3]);
             let users = whole.polygons.iter().filter(|p| p.contains(&0)).count();
-            let mesh = scenes::mesh(&broken);
+            let mesh = read(broken.as_bytes()).unwrap();
             assert_eq!(mesh.report.dropped_nonfinite_faces, users as u64, "{name}, {bad}");
             assert_eq!(mesh.triangles.len(), whole.polygons.len() - users, "{name}, {bad}");
             for (look, keys) in LOOKS {

@@ -1,30 +1,60 @@
 //! Small mesh files of every format, made from one description, so that tests can compare what comes out.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
-use meshsnap::import::{Bundle, Format, MeshError, Options, import};
+use meshsnap::import::{Bundle, Format, ImportReport, Imported, MeshError, Options, import};
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use serde_json::{Value, json};
+use std::ops::{Deref, DerefMut};
+
+/// A mesh with the report of its import: as a mesh to whatever takes one.
+#[derive(Clone, Debug)]
+pub struct Read {
+    pub mesh: Mesh,
+    pub report: ImportReport,
+}
+
+impl From<Imported> for Read {
+    fn from(Imported { mesh, report }: Imported) -> Self {
+        Self { mesh, report }
+    }
+}
+
+impl Deref for Read {
+    type Target = Mesh;
+
+    fn deref(&self) -> &Mesh {
+        &self.mesh
+    }
+}
+
+impl DerefMut for Read {
+    fn deref_mut(&mut self) -> &mut Mesh {
+        &mut self.mesh
+    }
+}
 
 /// Imports with default limits.
-pub fn read(bytes: &[u8]) -> Result<Mesh, MeshError> {
+pub fn read(bytes: &[u8]) -> Result<Read, MeshError> {
     read_as(bytes, None)
 }
 
 /// Imports as a given format.
-pub fn read_as(bytes: &[u8], format: Option<Format>) -> Result<Mesh, MeshError> {
+pub fn read_as(bytes: &[u8], format: Option<Format>) -> Result<Read, MeshError> {
     read_limited(bytes, format, &Limits::default())
 }
 
 /// Imports with limits.
-pub fn read_limited(bytes: &[u8], format: Option<Format>, limits: &Limits) -> Result<Mesh, MeshError> {
+pub fn read_limited(bytes: &[u8], format: Option<Format>, limits: &Limits) -> Result<Read, MeshError> {
     import(&Bundle::of_one(bytes.to_vec()), format, limits, &mut Budget::new(limits), &Deadline::default())
+        .map(Read::from)
 }
 
 /// Imports at a moment of the file's first animation.
-pub fn read_at(bytes: &[u8], time_s: f64) -> Result<Mesh, MeshError> {
+pub fn read_at(bytes: &[u8], time_s: f64) -> Result<Read, MeshError> {
     let (limits, options) = (Limits::default(), Options { format: None, time_s: Some(time_s) });
     import(&Bundle::of_one(bytes.to_vec()), options, &limits, &mut Budget::new(&limits), &Deadline::default())
+        .map(Read::from)
 }
 
 /// The corners of all triangles in file space.

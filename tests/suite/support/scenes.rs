@@ -203,6 +203,7 @@ pub fn mesh_of(bytes: &[u8]) -> Result<Mesh, meshsnap::import::MeshError> {
         &mut Budget::new(&limits),
         &Deadline::default(),
     )
+    .map(|imported| imported.mesh)
 }
 
 /// Reads dotted keys that must be good.

@@ -1,12 +1,13 @@
-//! Reading accessors: every offset and count is checked, in 64 bits, and paid for, before any data is touched.
+//! Reads accessors. Every offset and count is checked in 64 bits, and paid for, before any data is
+//! touched.
 
 use super::attribute::{Component, INDICES, Kind, Rule, decode_unsigned};
 use super::buffers::{Buffers, View};
 use crate::import::MeshError;
 use crate::import::context::Context;
-use crate::import::gltf::document::tree::{Accessor, Document, Sparse};
+use crate::import::gltf::document::schema::{Accessor, Document, Sparse};
 
-/// Elements without data that a file may have however small it is.
+/// Elements without data that even the smallest file may declare.
 const ZEROS_MAX: u64 = 1 << 16;
 
 /// Reads accessors of one file.
@@ -16,16 +17,16 @@ pub struct Reader<'a> {
     is_quantised: bool,
 }
 
-/// What an accessor says of its elements.
+/// The declared type and count of an accessor's elements.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
     /// Their type.
     pub kind: Kind,
     /// The type of their components.
     pub component: Component,
-    /// Whether integers stand for -1 to 1, or 0 to 1.
+    /// True if integers stand for -1 to 1, or 0 to 1.
     pub normalised: bool,
-    /// How many there are.
+    /// Their number.
     pub count: u64,
 }
 
@@ -40,7 +41,7 @@ impl<'a> Reader<'a> {
         self.buffers.view(index, cx)
     }
 
-    /// What an accessor says of itself, if that is what its use allows.
+    /// The declaration of an accessor, if its use allows it.
     pub fn shape(&self, index: usize, rule: &Rule) -> Result<Shape, MeshError> {
         let accessor = self.accessor(index)?;
         let what = format!("accessor {index}");
@@ -51,12 +52,13 @@ impl<'a> Reader<'a> {
         Ok(Shape { kind, component, normalised: accessor.normalized, count: accessor.count.0 })
     }
 
-    /// How many elements an accessor has, whatever they are.
+    /// The number of an accessor's elements, of any type.
     pub fn count(&self, index: usize) -> Result<u64, MeshError> {
         Ok(self.accessor(index)?.count.0)
     }
 
-    /// Vectors with `N` components. A rule that allows several types fails here where the accessor's has not `N` components.
+    /// Vectors with `N` components. Where a rule allows several types, an accessor of another size
+    /// fails here.
     pub fn vectors<const N: usize>(
         &mut self,
         index: usize,
@@ -100,7 +102,8 @@ impl<'a> Reader<'a> {
             .ok_or_else(|| MeshError::broken(format!("there is no accessor {index} in the glTF file")))
     }
 
-    /// An accessor without data stands for zeros, and may stand for as many as the upload has bytes: no mesh has more vertices.
+    /// Limits accessors without data, which stand for zeros, to as many elements as the upload has
+    /// bytes: no mesh has more vertices.
     fn check_zeros(&self, index: usize, cx: &Context<'_>) -> Result<(), MeshError> {
         let accessor = self.accessor(index)?;
         let count = accessor.count.0;
@@ -114,7 +117,8 @@ impl<'a> Reader<'a> {
         Err(broken(index, &format!("has {count} elements and no data, in an upload that has room for {most}")))
     }
 
-    /// Hands every element's bytes to `take`: those of the buffer view, then those that the sparse part replaces.
+    /// Gives every element's bytes to `take`: those of the buffer view, then the sparse
+    /// replacements.
     fn each(
         &mut self,
         index: usize,
@@ -142,7 +146,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The sparse part: indices that rise, and the elements that go there.
+    /// The sparse part: ascending indices, and the elements that replace those.
     fn replace(
         &mut self,
         index: usize,
@@ -185,7 +189,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Where elements lie in a view. All in bytes but the count.
+/// The layout of elements in a view. All in bytes but the count.
 #[derive(Clone, Copy)]
 struct Span {
     offset: u64,
@@ -196,7 +200,7 @@ struct Span {
 }
 
 impl Span {
-    /// The bytes of each element, after checking that all of them lie in the view, aligned.
+    /// The bytes of each element, after a check that all lie in the view and are aligned.
     fn elements<'v>(
         self,
         what: &str,

@@ -1,5 +1,6 @@
-//! Which accessors may be what: element types, component types, and whether integers are normalised.
-//! glTF 2.0, 3.7.2.1 (attributes), 3.7.3.1 (skins), 3.11 (animations); KHR_mesh_quantization adds small integers.
+//! Rules for accessors by their use: element types, component types, normalisation. glTF 2.0,
+//! 3.7.2.1 (attributes), 3.7.3.1 (skins), 3.11 (animations); KHR_mesh_quantization adds small
+//! integers.
 
 use crate::import::MeshError;
 
@@ -19,7 +20,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// By its name in the document; small matrices are nothing that is read.
+    /// From its name in the document. Matrices of 2 x 2 and 3 x 3 are not read.
     pub fn of(name: &str) -> Option<Self> {
         Some(match name {
             "SCALAR" => Self::Scalar,
@@ -31,7 +32,7 @@ impl Kind {
         })
     }
 
-    /// How many numbers an element has.
+    /// Numbers per element.
     pub fn components(self) -> usize {
         match self {
             Self::Scalar => 1,
@@ -61,7 +62,7 @@ pub enum Component {
 }
 
 impl Component {
-    /// By its number in the document.
+    /// From its number in the document.
     pub fn of(number: usize) -> Option<Self> {
         Some(match number {
             5120 => Self::I8,
@@ -83,7 +84,8 @@ impl Component {
         }
     }
 
-    /// The number in its bytes. A normalised integer is divided by its type's largest value; what would lie below -1 is -1.
+    /// The number in its bytes. A normalised integer is divided by the largest value of its type
+    /// and clamped to at least -1.
     pub fn decode(self, b: &[u8], normalised: bool) -> f64 {
         let (value, largest) = match (self, b) {
             (Self::F32, &[a, b, c, d]) => return f64::from(f32::from_le_bytes([a, b, c, d])),
@@ -107,20 +109,20 @@ pub fn decode_unsigned(b: &[u8]) -> u32 {
     }
 }
 
-/// What an accessor must be for one use.
+/// The allowed types of an accessor for one use.
 #[derive(Clone, Copy, Debug)]
 pub struct Rule {
-    /// How errors speak of the use.
+    /// The name of the use in errors.
     pub name: &'static str,
     kinds: &'static [Kind],
-    /// Component types, and whether normalised.
+    /// Allowed component types, each with its normalisation.
     plain: &'static [(Component, bool)],
-    /// Those that KHR_mesh_quantization adds.
+    /// Types that KHR_mesh_quantization adds.
     quantised: &'static [(Component, bool)],
 }
 
 impl Rule {
-    /// Fails where an accessor is something else; `what` names it.
+    /// Fails if an accessor breaks the rule. `what` names the accessor.
     pub fn check(&self, what: &str, kind: Kind, form: (Component, bool), is_quantised: bool) -> Result<(), MeshError> {
         let fails = |is: String| {
             Err(MeshError::broken(format!("{what} of the glTF file is {is}, which {} cannot be", self.name)))

@@ -1,9 +1,9 @@
-//! The bytes of buffers and buffer views. Buffers are decoded and views decompressed when first asked for, so that what nothing drawn
-//! needs (a texture's buffer, or a file outside the upload) costs nothing.
+//! Bytes of buffers and buffer views. Buffers are decoded and views decompressed on first use, so
+//! that unused ones (a texture's buffer, a file outside the upload) cost nothing.
 
 use super::meshopt;
 use crate::import::context::Context;
-use crate::import::gltf::document::tree::{Buffer, BufferView, Document};
+use crate::import::gltf::document::schema::{Buffer, BufferView, Document};
 use crate::import::{MeshError, MeshFault, text};
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -25,9 +25,9 @@ pub struct View<'a> {
     buffer: Rc<Cow<'a, [u8]>>,
     start: usize,
     length: usize,
-    /// Where it begins in what elements are aligned to.
+    /// Its offset in the buffer, for alignment checks.
     pub offset_bytes: u64,
-    /// Bytes from one element to the next, where the view says so.
+    /// Bytes from one element to the next, if the view declares a stride.
     pub stride_bytes: Option<u64>,
 }
 
@@ -126,17 +126,17 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// What a URI leads to.
+/// The content behind a URI.
 #[derive(Debug)]
 pub enum Uri {
-    /// These bytes, paid for.
+    /// Its bytes, paid for.
     Bytes(Vec<u8>),
-    /// Something that is not in the upload; the sentence says what to do about it.
+    /// Content that the upload lacks, with a sentence that says what to add.
     Outside(String),
 }
 
-/// Resolves the URI of `what` ("buffer 0", "image 3"): decodes a `data:` URI, or takes the file of the bundle that the URI
-/// means. Nothing else is ever opened.
+/// Resolves the URI of `what` ("buffer 0", "image 3"): decodes a `data:` URI, or finds a file of
+/// the bundle. Nothing else is ever opened.
 pub fn from_uri(uri: &str, what: &str, cx: &mut Context<'_>) -> Result<Uri, MeshError> {
     let Some(data) = strip_prefix_ignore_case(uri, "data:") else {
         return match cx.bundle.resolve(uri) {
@@ -167,7 +167,7 @@ pub fn from_uri(uri: &str, what: &str, cx: &mut Context<'_>) -> Result<Uri, Mesh
     )
 }
 
-/// The beginning of a name from the file, fit for a sentence.
+/// The beginning of a name, short enough for a sentence.
 pub fn printable(name: &str) -> String {
     name.chars().filter(|c| !c.is_control()).take(80).collect()
 }

@@ -1,15 +1,16 @@
-//! EXT_meshopt_compression and KHR_meshopt_compression: a view's bytes, packed by the meshoptimizer codec.
+//! EXT_meshopt_compression and KHR_meshopt_compression: a view's bytes, packed by the meshoptimizer
+//! codec.
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_meshopt_compression>
 //!
-//! The `meshopt` crate unpacks, which is exact; the filters that follow are ours, because its own take a square root that is
-//! different on every kind of processor.
+//! The `meshopt` crate unpacks, which is exact. The filters that follow are our own, because those
+//! of the crate use a square root that differs between processors.
 
 use super::meshopt_filters as filters;
 use crate::import::MeshError;
 use crate::import::context::Context;
-use crate::import::gltf::document::tree::Meshopt;
+use crate::import::gltf::document::schema::Meshopt;
 
-/// The unpacked bytes of view `index`, which says that they are `view_bytes`.
+/// The unpacked bytes of view `index`, which declares `view_bytes` of them.
 pub fn decode(
     index: usize,
     packed: &Meshopt,
@@ -38,7 +39,7 @@ pub fn decode(
     if filter != "NONE" && !is_attributes {
         return Err(broken("has a filter, which goes with attributes alone"));
     }
-    // Unpacked twice: as the codec gives it, and as bytes.
+    // Paid for twice: as the codec returns it, and as bytes.
     cx.budget.spend("compressed glTF data", size, 2)?;
     cx.deadline.check()?;
     let count = count as usize;
@@ -66,7 +67,7 @@ pub fn decode(
     Ok(bytes)
 }
 
-/// An element as the codec wants it: a type of its size.
+/// An element type for the codec, which is generic over types of the element's size.
 #[derive(Clone, Copy)]
 struct Row<const WORDS: usize>([u32; WORDS]);
 

@@ -1,8 +1,9 @@
-//! The filters of meshopt compression, in the extension's own formulas: elements of 4 components, little-endian, in place.
+//! The filters of meshopt compression, in the extension's own formulas: elements of 4 components,
+//! little-endian, in place.
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_meshopt_compression#filters>
 
-/// Unit vectors from the octahedron: x and y on it, and in the third place what stands for 1. The fourth component stays.
-/// `size` is that of a component: 1 or 2 bytes.
+/// Decodes octahedral unit vectors: x, y and the value that stands for 1. The fourth component
+/// stays. A component has `size` bytes, 1 or 2.
 pub fn octahedral(bytes: &mut [u8], size: usize) {
     let largest = if size == 1 { 127.0 } else { 32767.0 };
     for element in bytes.chunks_exact_mut(size * 4) {
@@ -22,7 +23,8 @@ pub fn octahedral(bytes: &mut [u8], size: usize) {
     }
 }
 
-/// Unit quaternions of 16-bit components from three of them, and in the last place a scale and which one is left out.
+/// Decodes unit quaternions of 16 bits: three components, then a scale with the index of the
+/// omitted one.
 pub fn quaternion(bytes: &mut [u8]) {
     for element in bytes.chunks_exact_mut(8) {
         let [x, y, z, last] = [0, 1, 2, 3].map(|k| signed(element, 2, k));
@@ -37,7 +39,7 @@ pub fn quaternion(bytes: &mut [u8]) {
     }
 }
 
-/// Floats from 8 bits of exponent over 24 of mantissa, both signed.
+/// Decodes floats with 8 bits of exponent over 24 of mantissa, both signed.
 pub fn exponential(bytes: &mut [u8]) {
     for element in bytes.chunks_exact_mut(4) {
         let word = i32::from_le_bytes([element[0], element[1], element[2], element[3]]);
@@ -48,7 +50,7 @@ pub fn exponential(bytes: &mut [u8]) {
     }
 }
 
-/// RGBA from Y, Co, Cg and alpha; the highest bit of alpha tells how many bits they have.
+/// Decodes RGBA from Y, Co, Cg and alpha. The highest set bit of alpha tells their bit depth.
 pub fn color(bytes: &mut [u8], size: usize) {
     let largest = if size == 1 { 255.0 } else { 65535.0 };
     for element in bytes.chunks_exact_mut(size * 4) {
@@ -68,7 +70,7 @@ pub fn color(bytes: &mut [u8], size: usize) {
     }
 }
 
-/// To nearest, halves away from zero, as the extension rounds.
+/// Rounds to nearest, halves away from zero, as the extension does.
 fn round(v: f64) -> i64 {
     (v + 0.5_f64.copysign(v)) as i64
 }

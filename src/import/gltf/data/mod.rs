@@ -1,4 +1,4 @@
-//! TODO room.
+//! Binary data: buffers and their views, decompression, accessors and the rules for attributes.
 
 pub(crate) mod accessor;
 pub(crate) mod attribute;

@@ -1,8 +1,8 @@
-//! What the document says of itself, checked as a whole before anything is read: whatever one part of it refers to is there,
-//! and what belongs together fits. Data is checked where it is read; what is only a surface's, where something drawn uses it.
+//! Checks the document as a whole before any data is read: references lead somewhere, and related
+//! sizes agree. Data is checked where it is read, and materials where they are used.
 
-use super::model::{Index, Lists};
-use super::tree::{Attributes, Document, Mesh, Node, mode};
+use super::lists::{Index, Lists};
+use super::schema::{Attributes, Document, Mesh, Node, mode};
 use crate::import::MeshError;
 
 /// Fails where a picture of the file would be a guess.
@@ -43,7 +43,7 @@ pub fn check(doc: &Document, lists: &Lists<'_>) -> Result<(), MeshError> {
     check_no_loops(doc)
 }
 
-/// The view's bytes lie in what its buffer says it has.
+/// The view lies within the declared length of its buffer.
 fn check_view(doc: &Document, index: usize, buffer: Index, offset: u64, length: u64) -> Result<(), MeshError> {
     refer("buffer", buffer, doc.buffers.len(), || format!("buffer view {index}"))?;
     let has = doc.buffers[buffer.0].byte_length.0;
@@ -54,7 +54,7 @@ fn check_view(doc: &Document, index: usize, buffer: Index, offset: u64, length: 
     Ok(())
 }
 
-/// 0 is what some exporters write for none.
+/// Some exporters write 0 for none.
 fn check_stride(doc: &Document, index: usize) -> Result<(), MeshError> {
     let view = &doc.buffer_views[index];
     match view.byte_stride.map_or(0, |stride| stride.0) {
@@ -80,7 +80,7 @@ fn check_mesh(doc: &Document, lists: &Lists<'_>, index: usize, mesh: &Mesh) -> R
         if primitive.mode() > mode::TRIANGLE_FAN {
             return Err(broken(&what(), "has an unknown mode"));
         }
-        let targets = |primitive: &super::tree::Primitive| primitive.targets.len();
+        let targets = |primitive: &super::schema::Primitive| primitive.targets.len();
         if targets(primitive) != targets(&mesh.primitives[0]) {
             return Err(broken(&what(), "has more or fewer morph targets than the mesh's first"));
         }
@@ -97,7 +97,7 @@ fn check_mesh(doc: &Document, lists: &Lists<'_>, index: usize, mesh: &Mesh) -> R
     check_weights(&format!("mesh {index}"), mesh.weights.as_deref(), mesh)
 }
 
-/// What morph targets are read for.
+/// Attributes of morph targets that are read.
 pub fn is_morphed(attribute: &str) -> bool {
     ["POSITION", "NORMAL"].contains(&attribute)
 }
@@ -143,14 +143,15 @@ fn check_node(doc: &Document, index: usize, node: &Node) -> Result<(), MeshError
     refer("mesh", mesh, doc.meshes.len(), what)?;
     let mesh = &doc.meshes[mesh.0];
     check_weights(&what(), node.weights.as_deref(), mesh)?;
-    let is_rigid = |primitive: &super::tree::Primitive| !primitive.attributes.contains_key("JOINTS_0");
+    let is_rigid = |primitive: &super::schema::Primitive| !primitive.attributes.contains_key("JOINTS_0");
     if node.skin.is_some() && mesh.primitives.iter().any(is_rigid) {
         return Err(broken(&what(), "has a skin, and a mesh of which a part has no JOINTS_0"));
     }
     Ok(())
 }
 
-/// No node is its own ancestor, in any scene or none. Its own stack, since a file may be 100,000 nodes deep.
+/// No node is its own ancestor, in any scene or none. Its own stack, since a file may be 100,000
+/// nodes deep.
 fn check_no_loops(doc: &Document) -> Result<(), MeshError> {
     #[derive(Clone, Copy, PartialEq)]
     enum State {
@@ -160,7 +161,7 @@ fn check_no_loops(doc: &Document) -> Result<(), MeshError> {
     }
     let mut states = vec![State::New; doc.nodes.len()];
     for root in 0..doc.nodes.len() {
-        // A node, and which of its children comes next.
+        // Each entry: a node, and the index of its next child.
         let mut path = vec![(root, 0)];
         while let Some((node, next)) = path.last_mut() {
             let node = *node;

@@ -1,14 +1,15 @@
-//! What a glTF document says of itself, for reports: read from the JSON alone, so that nothing here depends on what is drawn.
+//! Metadata of a glTF document, for reports. Read from the JSON alone, independently of what is
+//! drawn.
 
 use crate::import::metadata::tidy;
-use crate::mesh::FileMetadata;
+use crate::import::{FileMetadata, text};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 /// Most names of extensions that are kept.
 const EXTENSIONS_MAX: usize = 100;
 
-/// The few fields that are counted. Numbers are f64, because `1.0` is a good integer in JSON.
+/// The few fields that are counted. Entries themselves are ignored.
 #[derive(Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 struct Document {
@@ -35,10 +36,10 @@ struct Mesh {
     primitives: Vec<IgnoredAny>,
 }
 
-/// The facts of a document that was measured and paid for before. A list of an odd type leaves the report without them, and
-/// fails nothing.
+/// Metadata of a document whose parsing was paid for before. A list of an unexpected type leaves
+/// the metadata empty and is no error.
 pub fn metadata(json: &[u8]) -> FileMetadata {
-    let json = crate::import::sniff::trim_start(json);
+    let json = text::trim_start(json);
     let Ok(document) = serde_json::from_slice::<Document>(json) else { return FileMetadata::default() };
     let primitives = || document.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let names = |names: &[String]| names.iter().take(EXTENSIONS_MAX).filter_map(|name| tidy(name.as_bytes())).collect();
@@ -67,16 +68,16 @@ mod tests {
                       {"primitives":[{"mode":1,"indices":1},{"mode":2,"indices":1},{"mode":3,"indices":1},{"mode":0,"indices":9}]}],
             "accessors":[{"count":7},{"count":10.0,"min":[1]}],"animations":[{}],"skins":[{"joints":[0]}],"cameras":[{},{},{},{}],
             "extensionsUsed":["A","B"],"extensionsRequired":["A"]}"#;
-        let facts = metadata(json);
-        assert_eq!(facts.generator.as_deref(), Some("by\u{FFFD}hand"));
+        let found = metadata(json);
+        assert_eq!(found.generator.as_deref(), Some("by\u{FFFD}hand"));
         let counts =
-            [facts.scenes, facts.nodes, facts.meshes, facts.primitives, facts.animations, facts.skins, facts.cameras];
+            [found.scenes, found.nodes, found.meshes, found.primitives, found.animations, found.skins, found.cameras];
         assert_eq!(counts.map(Option::unwrap), [2, 3, 2, 6, 1, 1, 4]);
-        assert_eq!((facts.extensions_used.len(), facts.extensions_required), (2, vec!["A".to_owned()]));
+        assert_eq!((found.extensions_used.len(), found.extensions_required), (2, vec!["A".to_owned()]));
     }
 
     #[test]
-    fn odd_documents_have_no_facts() {
+    fn odd_documents_have_no_metadata() {
         assert_eq!(metadata(b"[1]"), FileMetadata::default());
         assert_eq!(metadata(br#"{"nodes":3}"#), FileMetadata::default());
     }

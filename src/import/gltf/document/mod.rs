@@ -1,35 +1,36 @@
 //! The JSON document: measured and paid for before it is parsed.
 
 pub(crate) mod check;
+pub(crate) mod lists;
 pub(crate) mod metadata;
-pub(crate) mod model;
-pub(crate) mod tree;
-use self::tree::Document;
+pub(crate) mod schema;
+use self::schema::Document;
 use crate::import::context::Context;
 use crate::import::{MeshError, MeshFault, text};
 use crate::limits;
 
-/// Memory that an object of the document may take once parsed: the largest of the types, in a list that doubles.
+/// Memory per parsed object: the largest type, in a list that doubles as it grows.
 const BYTES_PER_OBJECT: u64 = 1024;
-/// The same for an entry in a list or a map.
+/// Memory per entry of a list or a map.
 const BYTES_PER_VALUE: u64 = 64;
 
-/// Parses the document and checks what the file demands of its reader.
+/// Parses the document and refuses required extensions that are not read.
 pub fn parse(json: &[u8], cx: &mut Context<'_>) -> Result<Document, MeshError> {
     let all_bytes = json.len();
-    let json = crate::import::sniff::trim_start(json);
+    let json = text::trim_start(json);
     let size = measure(json);
     limits::check("the nesting depth of the JSON", size.depth, cx.limits.json_depth, "--limit-json-depth")?;
     cx.budget.spend("the glTF JSON", json.len() as u64, 1)?;
     cx.budget.spend("the glTF JSON", size.objects, BYTES_PER_OBJECT)?;
     cx.budget.spend("the glTF JSON", size.commas, BYTES_PER_VALUE)?;
     cx.deadline.check()?;
-    // What nothing reads is passed over without a look at its characters, by some readers of the document and not by others.
+    // Checked here once, because only some of the readers look at the characters of fields that
+    // they skip.
     if let Err(error) = std::str::from_utf8(json) {
         let at = all_bytes - json.len() + error.valid_up_to();
         return Err(MeshError::broken(format!("byte {at} of the glTF JSON is not UTF-8")));
     }
-    // Few documents have so many objects at all, and only they are counted: a node that nobody shows takes memory too.
+    // Only documents with very many objects are counted exactly. Unused nodes take memory too.
     if size.objects > cx.limits.nodes {
         limits::check("the number of nodes in the glTF file", nodes(json), cx.limits.nodes, "--limit-nodes")?;
     }
@@ -38,7 +39,7 @@ pub fn parse(json: &[u8], cx: &mut Context<'_>) -> Result<Document, MeshError> {
     Ok(doc)
 }
 
-/// What is said of a document that is no JSON, or has other types than glTF.
+/// The error for a document that is not JSON, or whose types are not those of glTF.
 pub fn unread(error: serde_json::Error) -> MeshError {
     MeshError::broken(format!("the glTF JSON cannot be read: {}", text::foreign(error)))
 }
@@ -50,7 +51,8 @@ struct Size {
     commas: u64,
 }
 
-/// What parsing will cost, from the bytes alone. A document that is not JSON gives numbers that mean nothing, and fails later.
+/// The memory that parsing takes, estimated from the bytes alone. For a document that is not JSON
+/// the number is meaningless, and parsing fails later.
 fn measure(json: &[u8]) -> Size {
     let mut size = Size::default();
     let mut depth = 0_u64;
@@ -79,12 +81,12 @@ fn measure(json: &[u8]) -> Size {
     size
 }
 
-/// How many there are; 0 in what is no glTF, and fails later.
+/// The length of a list; 0 where the value is no list, which fails later.
 fn nodes(json: &[u8]) -> u64 {
     #[derive(Default, serde::Deserialize)]
     #[serde(default)]
     struct Nodes {
-        // Takes no memory.
+        // Costs no memory.
         nodes: Vec<serde::de::IgnoredAny>,
     }
     serde_json::from_slice::<Nodes>(json).map_or(0, |counted| counted.nodes.len() as u64)
@@ -104,7 +106,7 @@ fn check_demands(root: &Document) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// Whether a required extension is read, or changes nothing that is drawn but what a warning tells.
+/// True if a required extension is read, or if ignoring it changes at most what a warning reports.
 fn is_fine(extension: &str) -> bool {
     READ.contains(&extension) || UNSEEN.contains(&extension) || crate::import::gltf::material::is_known(extension)
 }
@@ -123,7 +125,8 @@ const READ: &[&str] = &[
     "KHR_texture_transform",
 ];
 
-/// Extensions that are not read, and leave shapes and surfaces as they are: light that a request sets, and data about data.
+/// Extensions that are not read and do not change shapes or surfaces: lights (the request sets
+/// those) and metadata.
 const UNSEEN: &[&str] = &[
     "EXT_instance_features",
     "EXT_lights_ies",
@@ -159,14 +162,14 @@ mod tests {
 
     #[test]
     fn the_price_of_an_object_covers_every_type() {
-        use crate::import::gltf::document::tree;
+        use crate::import::gltf::document::schema;
         let sizes = [
-            size_of::<tree::Node>(),
-            size_of::<tree::Accessor>(),
-            size_of::<tree::Primitive>(),
-            size_of::<tree::Mesh>(),
-            size_of::<tree::BufferView>(),
-            size_of::<tree::Skin>(),
+            size_of::<schema::Node>(),
+            size_of::<schema::Accessor>(),
+            size_of::<schema::Primitive>(),
+            size_of::<schema::Mesh>(),
+            size_of::<schema::BufferView>(),
+            size_of::<schema::Skin>(),
         ];
         for size in sizes {
             assert!(size as u64 * 2 <= BYTES_PER_OBJECT, "{size}");

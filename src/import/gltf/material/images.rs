@@ -1,12 +1,12 @@
-//! Textures, samplers and images: what a material's use of a texture refers to.
+//! Textures, samplers and images of materials.
 
 use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::buffers;
 use crate::import::gltf::data::buffers::Uri;
-use crate::import::gltf::document::model;
-use crate::import::gltf::document::model::{Lists, TextureInfo, Transform, entry};
+use crate::import::gltf::document::lists;
+use crate::import::gltf::document::lists::{Lists, TextureInfo, Transform, entry};
 use crate::mesh::material::{ImageContent, ImageSource, TextureRef, Wrap};
 use crate::warning::Warning;
 use serde::Deserialize;
@@ -20,13 +20,15 @@ pub struct Images {
     pub sources: Vec<ImageSource>,
     /// Index into `sources` by the file's image index.
     known: BTreeMap<usize, u32>,
-    /// What was parsed, by the file's indices: materials may share one whose description is long.
-    textures: BTreeMap<usize, model::Texture>,
-    samplers: BTreeMap<usize, model::Sampler>,
+    /// Parsed entries by the file's indices. Materials may share them, and parsing each again could
+    /// be quadratic.
+    textures: BTreeMap<usize, lists::Texture>,
+    samplers: BTreeMap<usize, lists::Sampler>,
 }
 
 impl Images {
-    /// What a texture of the file refers to; `what` names the material. None where the texture has no image.
+    /// The image and sampler of a texture. `what` names the material. None if the texture has no
+    /// image.
     pub fn texture(
         &mut self,
         what: &str,
@@ -44,9 +46,9 @@ impl Images {
             )));
         }
         cx.deadline.check()?;
-        let texture: model::Texture = once(&mut self.textures, "texture", &lists.textures, index, cx)?;
-        let in_other = |other: &Option<model::OtherSource>| other.as_ref().and_then(|other| other.source);
-        // Basis Universal last: what else there is has lost less.
+        let texture: lists::Texture = once(&mut self.textures, "texture", &lists.textures, index, cx)?;
+        let in_other = |other: &Option<lists::OtherSource>| other.as_ref().and_then(|other| other.source);
+        // Basis Universal last: the other formats have lost less.
         let image = in_other(&texture.extensions.webp).or(texture.source).or(in_other(&texture.extensions.basisu));
         let Some(image) = image else {
             let detail = format!("texture {index} has no image that is read; it is drawn as if it were white");
@@ -56,7 +58,7 @@ impl Images {
         let image = self.image(index, image.0, lists, reader, cx)?;
         let sampler = match texture.sampler {
             Some(sampler) => once(&mut self.samplers, "sampler", &lists.samplers, sampler.0, cx)?,
-            None => model::Sampler::default(),
+            None => lists::Sampler::default(),
         };
         Ok(Some(TextureRef {
             image,
@@ -86,7 +88,7 @@ impl Images {
         cx.deadline.check()?;
         let raw_bytes = lists.images[index].get().len() as u64;
         cx.budget.spend("a glTF image's description", raw_bytes, 1)?;
-        let image: model::Image = entry("image", &lists.images, index)?;
+        let image: lists::Image = entry("image", &lists.images, index)?;
         let name = name(index, &image);
         let content = content(&name, index, &image, reader, cx)?;
         cx.budget.spend("images", 1, size_of::<ImageSource>() as u64 * 2 + 64)?;
@@ -97,7 +99,7 @@ impl Images {
     }
 }
 
-/// An entry of a list, parsed when it is first asked for.
+/// An entry of a list, parsed on first use.
 fn once<'a, T: Clone + Deserialize<'a>>(
     known: &mut BTreeMap<usize, T>,
     kind: &str,
@@ -118,7 +120,7 @@ fn once<'a, T: Clone + Deserialize<'a>>(
 fn content(
     name: &str,
     index: usize,
-    image: &model::Image,
+    image: &lists::Image,
     reader: &mut Reader<'_>,
     cx: &mut Context<'_>,
 ) -> Result<ImageContent, MeshError> {
@@ -140,7 +142,7 @@ fn content(
 }
 
 /// `image 3 ("wood.png")`
-fn name(index: usize, image: &model::Image) -> String {
+fn name(index: usize, image: &lists::Image) -> String {
     let file = image.uri.as_deref().filter(|uri| uri.get(..5).is_none_or(|head| !head.eq_ignore_ascii_case("data:")));
     let known = image.name.as_deref().filter(|name| !name.is_empty()).or(file).unwrap_or_default();
     match buffers::printable(known).as_str() {
@@ -161,8 +163,9 @@ fn wrap(mode: Option<f64>) -> Wrap {
     }
 }
 
-/// Scaled, then turned counter-clockwise as the image is seen (v runs down), then moved. The extension's own example fixes
-/// the direction: a quarter turn and an offset of (0, 1) show the lower left quadrant.
+/// Scales, then rotates counter-clockwise as the image is seen (v runs down), then translates. The
+/// extension's own example fixes the direction: a quarter turn and an offset of (0, 1) show the
+/// lower left quadrant.
 fn transform(json: &Transform) -> [[f32; 3]; 2] {
     // Large enough for any atlas, small enough that no product of two is infinite.
     let tame = |v: f64| v.clamp(-1e6, 1e6);

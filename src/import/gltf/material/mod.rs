@@ -1,11 +1,11 @@
-//! Materials, read when something drawn uses them: a broken one that nothing uses is nobody's problem.
+//! Materials, parsed on first use: an unused broken material is no error.
 
 pub(crate) mod images;
 use self::images::Images;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
-use crate::import::gltf::document::model;
-use crate::import::gltf::document::model::{EmissiveStrength, Lists, SpecularGlossiness, TextureInfo, entry};
+use crate::import::gltf::document::lists;
+use crate::import::gltf::document::lists::{EmissiveStrength, Lists, SpecularGlossiness, TextureInfo, entry};
 use crate::import::{MeshError, text};
 use crate::mesh::MaterialSlot;
 use crate::mesh::material::{AlphaMode, TextureRef};
@@ -17,7 +17,7 @@ use serde::Deserialize;
 pub struct Materials<'a> {
     lists: &'a Lists<'a>,
     used: Vec<Option<Used>>,
-    /// The images of those that are used.
+    /// Images of the used materials.
     pub images: Images,
 }
 
@@ -28,19 +28,20 @@ struct Used {
 }
 
 impl<'a> Materials<'a> {
-    /// None is read yet.
+    /// An empty collection for the file's list.
     pub fn new(lists: &'a Lists<'a>, cx: &mut Context<'_>) -> Result<Self, MeshError> {
         let count = lists.materials.len();
         cx.budget.spend("materials", count as u64, 2 * size_of::<Option<Used>>() as u64)?;
         Ok(Self { lists, used: vec![None; count], images: Images::default() })
     }
 
-    /// How many the file has.
+    /// The number of materials in the file.
     pub fn count(&self) -> usize {
         self.used.len()
     }
 
-    /// Reads a material that `what` uses, and says which texture coordinates it wants; none if it has no texture.
+    /// Reads a material that `what` uses. Returns the set of texture coordinates that it needs, or
+    /// None without a texture.
     pub fn uv_set(
         &mut self,
         what: &str,
@@ -57,7 +58,7 @@ impl<'a> Materials<'a> {
         if let Some(used) = known {
             return Ok(used.uv_set);
         }
-        let json: model::Material<'_> = entry("material", &self.lists.materials, index)?;
+        let json: lists::Material<'_> = entry("material", &self.lists.materials, index)?;
         let what = format!("material {index}");
         warn_of_undrawn(&what, &json, warnings);
         let mut textures = Textures { what: &what, sets: Vec::new(), materials: self, reader, warnings, cx };
@@ -74,7 +75,7 @@ impl<'a> Materials<'a> {
         Ok(uv_set)
     }
 
-    /// All of them, with nothing but their names where nothing uses them.
+    /// A slot for every material. Unused ones have only a name.
     pub fn into_slots(self) -> (Vec<MaterialSlot>, Images) {
         let unused = |index: usize| {
             let json = entry::<Named>("material", &self.lists.materials, index).unwrap_or_default();
@@ -92,10 +93,10 @@ struct Named {
     name: Option<String>,
 }
 
-/// What reading one material's textures takes.
+/// The state for reading one material's textures.
 struct Textures<'t, 'a, 'r, 'c> {
     what: &'t str,
-    /// The texture coordinates that each texture wants, the most important first.
+    /// Sets of texture coordinates that the textures need, the most important first.
     sets: Vec<u32>,
     materials: &'t mut Materials<'a>,
     reader: &'t mut Reader<'r>,
@@ -104,7 +105,7 @@ struct Textures<'t, 'a, 'r, 'c> {
 }
 
 impl Textures<'_, '_, '_, '_> {
-    fn slot(&mut self, json: &model::Material<'_>) -> Result<MaterialSlot, MeshError> {
+    fn slot(&mut self, json: &lists::Material<'_>) -> Result<MaterialSlot, MeshError> {
         let name = text::name(json.name.as_deref().unwrap_or_default());
         let mut slot = MaterialSlot { name, ..MaterialSlot::default() };
         match (&json.pbr_metallic_roughness, self.extension::<SpecularGlossiness>(json, SPECULAR_GLOSSINESS)?) {
@@ -112,12 +113,12 @@ impl Textures<'_, '_, '_, '_> {
                 slot.base_color = Some(color(other.diffuse_factor.unwrap_or([1.0; 4])));
                 slot.base_texture = self.texture(&other.diffuse_texture)?;
                 slot.metallic = Some(0.0);
-                // With a texture, its alpha would say how smooth each place is.
+                // With a texture, roughness would come from its alpha channel, which is not read.
                 let gloss = other.glossiness_factor.unwrap_or(1.0);
                 slot.roughness = other.specular_glossiness_texture.is_none().then(|| share(1.0 - gloss));
             }
             (pbr, _) => {
-                let default = model::Pbr::default();
+                let default = lists::Pbr::default();
                 let pbr = pbr.as_ref().unwrap_or(&default);
                 slot.base_color = Some(color(pbr.base_color_factor.unwrap_or([1.0; 4])));
                 slot.base_texture = self.texture(&pbr.base_color_texture)?;
@@ -160,7 +161,7 @@ impl Textures<'_, '_, '_, '_> {
 
     fn extension<'j, T: Deserialize<'j>>(
         &self,
-        json: &model::Material<'j>,
+        json: &lists::Material<'j>,
         name: &str,
     ) -> Result<Option<T>, MeshError> {
         let Some(raw) = json.extensions.get(name) else { return Ok(None) };
@@ -171,12 +172,13 @@ impl Textures<'_, '_, '_, '_> {
     }
 }
 
-/// The largest finite half float: what textures can hold is bright enough for factors.
+/// The largest finite half float: a factor need not be brighter than a texture can be.
 const BRIGHTEST: f64 = 65504.0;
 
 const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 
-/// Extensions of materials that change the look and are not drawn, and the code of the warning.
+/// Extensions of materials that are not drawn though they change the look, each with the code of
+/// its warning.
 const UNDRAWN: &[(&str, &str)] = &[
     ("KHR_materials_anisotropy", "anisotropy_ignored"),
     ("KHR_materials_clearcoat", "clearcoat_ignored"),
@@ -194,12 +196,12 @@ const UNDRAWN: &[(&str, &str)] = &[
 /// Extensions of materials that are drawn.
 const DRAWN: &[&str] = &["KHR_materials_emissive_strength", "KHR_materials_unlit", SPECULAR_GLOSSINESS];
 
-/// Whether an extension of materials is drawn, or known and told of in a warning.
+/// True if an extension of materials is drawn, or known and reported in a warning.
 pub fn is_known(extension: &str) -> bool {
     DRAWN.contains(&extension) || UNDRAWN.iter().any(|(name, _)| *name == extension)
 }
 
-fn warn_of_undrawn(what: &str, json: &model::Material<'_>, warnings: &mut Vec<Warning>) {
+fn warn_of_undrawn(what: &str, json: &lists::Material<'_>, warnings: &mut Vec<Warning>) {
     for name in json.extensions.keys() {
         if let Some((name, code)) = UNDRAWN.iter().find(|(known, _)| known == name) {
             super::warn_once(warnings, code, format!("{name} is not drawn ({what} has it)"));

@@ -1,10 +1,11 @@
-//! KHR_draco_mesh_compression: a primitive's triangles and attributes, decoded by the `draco-core` crate.
+//! KHR_draco_mesh_compression: a primitive's triangles and attributes, decoded by the `draco-core`
+//! crate.
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_draco_mesh_compression>
 
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::{Reader, Shape};
 use crate::import::gltf::data::attribute::{INDICES, Rule};
-use crate::import::gltf::document::tree::{Draco, Primitive, mode};
+use crate::import::gltf::document::schema::{Draco, Primitive, mode};
 use crate::import::{MeshError, text};
 use draco_core::draco_types::DataType;
 use draco_core::geometry_attribute::PointAttribute;
@@ -18,14 +19,15 @@ pub struct Unpacked<'a> {
     mesh: draco_core::Mesh,
 }
 
-/// What the decoder keeps of a face while it works, corner tables included; and of a point.
+/// Bytes that the decoder needs per face, corner tables included, and per point.
 const FACE_BYTES: u64 = 256;
 const POINT_BYTES: u64 = 512;
-/// Values that any attribute has, of all points: eight attributes of four floats.
+/// Bytes of attributes per point: eight attributes of four floats.
 const POINT_VALUE_BYTES: u64 = 128;
 
 impl<'a> Unpacked<'a> {
-    /// Decodes what the extension says of a primitive; `what` names it. The accessors tell the size, and no more is decoded.
+    /// Decodes the compressed data of primitive `what`. The accessors declare the size, and no more
+    /// than that is decoded.
     pub fn decode(
         what: &str,
         primitive: &Primitive,
@@ -56,7 +58,8 @@ impl<'a> Unpacked<'a> {
             .map_err(|error| broken(&what, &format!("cannot be decompressed: {}", text::foreign(error))))?;
         cx.deadline.check()?;
         let has = [mesh.num_faces() as u64, mesh.num_points() as u64];
-        // A strip repeats corners where it jumps; what that leaves has no area and is not compressed.
+        // A strip repeats corners where it jumps. Those triangles have no area and are missing in
+        // the compressed data.
         let is_strip = primitive.mode() == mode::TRIANGLE_STRIP;
         if has[1] != points || if is_strip { has[0] > faces } else { has[0] != faces } {
             let detail =
@@ -66,18 +69,18 @@ impl<'a> Unpacked<'a> {
         Ok(Self { what, json, mesh })
     }
 
-    /// Vertex indices; as checked as those of an accessor, so not at all.
+    /// Vertex indices, unchecked like those of an accessor.
     pub fn indices(&self, cx: &mut Context<'_>) -> Result<Vec<u32>, MeshError> {
         cx.budget.spend("glTF indices", self.mesh.num_faces() as u64, 12)?;
         Ok(self.mesh.faces().iter().flatten().map(|point| point.0).collect())
     }
 
-    /// Whether an attribute is among what is compressed.
+    /// True if an attribute is compressed.
     pub fn has(&self, name: &str) -> bool {
         self.json.attributes.contains_key(name)
     }
 
-    /// The values of an attribute, as its accessor says that they are meant.
+    /// The values of an attribute, converted by the type of its accessor.
     pub fn vectors<const N: usize>(
         &self,
         name: &str,

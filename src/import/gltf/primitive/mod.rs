@@ -1,20 +1,21 @@
-//! A primitive: its triangles and vertices, decoded once however many nodes show it.
+//! A primitive: its triangles and vertices, decoded once for all its instances.
 
 pub(crate) mod draco;
 pub(crate) mod ngons;
+pub(crate) mod shape;
 pub(crate) mod triangles;
 pub(crate) mod vertices;
+use self::shape::{Influences, Shape};
 use self::vertices::Vertices;
 use super::warn_once;
 use crate::import::MeshError;
+use crate::import::affine::Affine;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::attribute;
-use crate::import::gltf::document::tree;
-use crate::import::gltf::document::tree::mode;
+use crate::import::gltf::document::schema;
+use crate::import::gltf::document::schema::mode;
 use crate::import::gltf::material::Materials;
-use crate::import::gltf::scene::shape::{Influences, Shape};
-use crate::import::gltf::scene::transform::Affine;
 use crate::import::polygon::ALL_EDGES;
 use crate::import::raw::{RawMesh, extend_attribute};
 use crate::mesh::LineOrPoint;
@@ -24,20 +25,20 @@ use crate::warning::Warning;
 /// Decoded data of one primitive.
 #[derive(Debug, Default)]
 pub struct Primitive {
-    /// How errors speak of it.
+    /// Its name in errors.
     pub what: String,
-    /// One a vertex.
+    /// One per vertex.
     pub positions: Vec<[f64; 3]>,
-    /// One a vertex, or empty.
+    /// One per vertex, or empty.
     pub normals: Vec<[f64; 3]>,
     uvs: Vec<[f64; 2]>,
     colors: Vec<[f64; 4]>,
     triangles: Vec<[u32; 3]>,
-    /// Ends of line segments; of points, the vertex twice.
+    /// Ends of line segments. A point has its vertex twice.
     lines_and_points: Vec<[u32; 2]>,
-    /// As [`RawMesh::edge_masks`]; empty where every edge is a polygon's.
+    /// As [`RawMesh::edge_masks`]; empty if every edge belongs to a polygon.
     edge_masks: Vec<u8>,
-    /// As [`crate::mesh::ImportReport::polygons_by_arity`].
+    /// As [`crate::import::ImportReport::polygons_by_arity`].
     polygons_by_arity: [u64; 13],
     material: Option<usize>,
     /// Accessors of the morph targets.
@@ -49,26 +50,26 @@ pub struct Primitive {
 /// The accessors of one morph target.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
-    /// What to add to positions.
+    /// Displacements of positions.
     pub positions: Option<usize>,
-    /// What to add to normals.
+    /// Displacements of normals.
     pub normals: Option<usize>,
 }
 
-/// Where a primitive comes from.
+/// The document's part of a primitive.
 pub struct Source<'a> {
-    /// How errors speak of it.
+    /// Its name in errors.
     pub what: String,
-    /// The document's part.
-    pub json: &'a tree::Primitive,
-    /// Whether the order of its triangles tells its polygons.
+    /// The JSON.
+    pub json: &'a schema::Primitive,
+    /// True if the order of its triangles encodes polygons.
     pub has_ngons: bool,
-    /// Whether the file has skins that may hold it.
+    /// True if the file has skins, so that joints and weights are read.
     pub has_skins: bool,
 }
 
 impl Primitive {
-    /// Decodes a primitive. None if it has nothing that is drawn.
+    /// Decodes a primitive. None if it has no positions.
     pub fn read(
         source: &Source<'_>,
         reader: &mut Reader<'_>,
@@ -116,7 +117,7 @@ impl Primitive {
         Ok(Some(out))
     }
 
-    /// Adds an instance of the primitive, in a shape of its own, moved by `transform`.
+    /// Adds an instance of the primitive with the given shape and transform.
     pub fn append(
         &self,
         shape: &Shape<'_>,
@@ -173,14 +174,15 @@ impl Primitive {
         self.material
     }
 
-    /// How many triangles it has, with those that its lines and points become.
+    /// The number of its triangles, including those that lines and points become.
     pub fn triangle_count(&self) -> u64 {
         let of = |ends: &[u32; 2]| if ends[0] == ends[1] { POINT_TRIANGLES } else { SEGMENT_TRIANGLES };
         self.triangles.len() as u64 + self.lines_and_points.iter().map(of).sum::<u64>()
     }
 }
 
-/// A turned unit normal, or zero if it has no direction. Unit already here: after a scale of 1e-30, f32 could not hold it.
+/// A transformed normal of unit length, or zero if it has no direction. Made unit in f64, because
+/// after a scale of 1e-30 f32 could not hold it.
 fn turn(m: &[[f64; 3]; 3], n: &[f64; 3]) -> [f32; 3] {
     let v: [f64; 3] = std::array::from_fn(|r| m[r][0] * n[0] + m[r][1] * n[1] + m[r][2] * n[2]);
     let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();

@@ -1,12 +1,13 @@
-//! FB_ngon_encoding: the order of triangles tells which of them were one polygon.
+//! FB_ngon_encoding: the order of triangles encodes polygons.
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Vendor/FB_ngon_encoding>
 
 use crate::import::polygon::ALL_EDGES;
 
-/// The edge masks of triangles whose consecutive fans are polygons, and how many polygons have each number of corners.
+/// Edge masks of triangles whose consecutive fans are polygons, and the polygons counted by their
+/// number of corners.
 ///
-/// A polygon's triangles share their first vertex. A triangle that shares it without going on where the last one ended
-/// begins a polygon of its own, since no diagonal lies between them.
+/// A polygon's triangles share their first vertex. A triangle that shares it without going on where
+/// the last one ended begins a polygon of its own, since no diagonal lies between them.
 pub fn edge_masks(triangles: &[[u32; 3]]) -> (Vec<u8>, [u64; 13]) {
     let mut masks = vec![ALL_EDGES; triangles.len()];
     let mut by_arity = [0; 13];
@@ -26,9 +27,9 @@ pub fn edge_masks(triangles: &[[u32; 3]]) -> (Vec<u8>, [u64; 13]) {
     (masks, by_arity)
 }
 
-/// From corner 0 to 1, which the triangle before ended with.
+/// The edge from corner 0 to 1, shared with the triangle before.
 const FIRST_EDGE: u8 = 0b001;
-/// From corner 2 to 0.
+/// The edge from corner 2 to 0.
 const LAST_EDGE: u8 = 0b100;
 
 fn count(by_arity: &mut [u64; 13], corners: usize) {
@@ -37,7 +38,7 @@ fn count(by_arity: &mut [u64; 13], corners: usize) {
     }
 }
 
-/// The mask of a triangle whose second and third corner changed places.
+/// The mask of a triangle after its second and third corner are swapped.
 pub fn mirrored(mask: u8) -> u8 {
     (mask & 0b010) | (mask & FIRST_EDGE) << 2 | (mask & LAST_EDGE) >> 2
 }

@@ -2,11 +2,11 @@
 
 use crate::import::MeshError;
 use crate::import::context::Context;
-use crate::import::gltf::document::tree::mode;
+use crate::import::gltf::document::schema::mode;
 use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
 use crate::pluralise::pluralise;
 
-/// How many triangles so many corners make up. Corners that do not make up a whole triangle are left over.
+/// The number of triangles from a number of corners. Corners of an incomplete triangle are ignored.
 pub fn count(mode: usize, corners: u64) -> u64 {
     match mode {
         mode::TRIANGLES => corners / 3,
@@ -15,8 +15,8 @@ pub fn count(mode: usize, corners: u64) -> u64 {
     }
 }
 
-/// How many line segments and how many points so many corners make up.
-pub fn count_loose(mode: usize, corners: u64) -> [u64; 2] {
+/// The numbers of line segments and of points from a number of corners.
+pub fn count_lines_and_points(mode: usize, corners: u64) -> [u64; 2] {
     match mode {
         mode::POINTS => [0, corners],
         mode::LINES => [corners / 2, 0],
@@ -26,7 +26,8 @@ pub fn count_loose(mode: usize, corners: u64) -> [u64; 2] {
     }
 }
 
-/// The ends of line segments and points among so many corners, given or all vertices in turn; points have one vertex at both.
+/// The ends of line segments and points. Without indices all vertices are taken in turn. A point
+/// has its vertex at both ends.
 pub fn lines_and_points(
     mode: usize,
     indices: Option<&[u32]>,
@@ -34,7 +35,7 @@ pub fn lines_and_points(
     cx: &mut Context<'_>,
 ) -> Result<Vec<[u32; 2]>, MeshError> {
     let corners = indices.map_or(vertices, <[u32]>::len);
-    let [segments, points] = count_loose(mode, corners as u64);
+    let [segments, points] = count_lines_and_points(mode, corners as u64);
     cx.check_triangles(SEGMENT_TRIANGLES * segments + POINT_TRIANGLES * points)?;
     cx.budget.spend("glTF lines and points", segments + points, 8)?;
     let at = |i: usize| indices.map_or(i as u32, |list| list[i]);
@@ -44,12 +45,12 @@ pub fn lines_and_points(
             mode::LINES => [at(2 * i), at(2 * i + 1)],
             _ => [at(i), at((i + 1) % corners)],
         })
-        // Of a segment that ends where it begins nothing is seen.
+        // A segment between a vertex and itself is invisible.
         .filter(|ends| mode == mode::POINTS || ends[0] != ends[1])
         .collect())
 }
 
-/// The triangles of `what`, whose vertices are as many as `vertices` says.
+/// The triangles of primitive `what`, which has this many `vertices`.
 pub fn of(
     what: &str,
     mode: usize,

@@ -1,33 +1,33 @@
-//! The attributes of a primitive's vertices: from accessors, or from compressed data where that has them.
+//! Vertex attributes of a primitive, from accessors or from Draco data.
 
 use super::draco;
+use super::shape::Influences;
 use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::attribute::{COLOR, JOINTS, Kind, MORPH_NORMAL, MORPH_POSITION, Rule, WEIGHTS};
-use crate::import::gltf::document::tree;
-use crate::import::gltf::document::tree::mode;
+use crate::import::gltf::document::schema;
+use crate::import::gltf::document::schema::mode;
 use crate::import::gltf::primitive::{Source, Target};
-use crate::import::gltf::scene::shape::Influences;
 
-/// Sets of joints of one vertex; more than any exporter writes.
+/// Most sets of joints per vertex: more than any exporter writes.
 const INFLUENCE_SETS_MAX: usize = 8;
 
 /// Reads the attributes of one primitive.
 pub struct Vertices<'s> {
     what: &'s str,
-    json: &'s tree::Primitive,
+    json: &'s schema::Primitive,
     unpacked: Option<draco::Unpacked<'s>>,
-    /// How many vertices there are, once the positions tell.
+    /// The number of vertices, known once positions are read.
     pub count: Option<usize>,
 }
 
 impl<'s> Vertices<'s> {
-    /// Decompresses what is compressed as a whole.
+    /// Decompresses the primitive if it is Draco-compressed.
     pub fn new(source: &'s Source<'_>, reader: &mut Reader<'_>, cx: &mut Context<'_>) -> Result<Self, MeshError> {
         let (what, json) = (source.what.as_str(), source.json);
         let unpacked = match &json.extensions.draco {
-            // A strip is compressed as the triangles that it is made of.
+            // A strip is compressed as a list of its triangles.
             Some(draco) if matches!(json.mode(), mode::TRIANGLES | mode::TRIANGLE_STRIP) => {
                 Some(draco::Unpacked::decode(what, json, draco, reader, cx)?)
             }
@@ -40,7 +40,7 @@ impl<'s> Vertices<'s> {
         Ok(Self { what, json, unpacked, count: None })
     }
 
-    /// The values of an attribute, if the primitive has it: as many as there are positions.
+    /// The values of an attribute, one per position; None without the attribute.
     pub fn attribute<const N: usize>(
         &self,
         name: &str,
@@ -58,7 +58,7 @@ impl<'s> Vertices<'s> {
         Ok(Some(values))
     }
 
-    /// COLOR_0 as RGBA, or nothing.
+    /// COLOR_0 as RGBA; empty without it.
     pub fn colors(&self, reader: &mut Reader<'_>, cx: &mut Context<'_>) -> Result<Vec<[f64; 4]>, MeshError> {
         let Some(accessor) = self.json.attributes.get("COLOR_0") else { return Ok(Vec::new()) };
         if reader.shape(accessor.0, &COLOR)?.kind == Kind::Vec4 {
@@ -84,12 +84,12 @@ impl<'s> Vertices<'s> {
 
     /// The morph targets, of the right type and size.
     pub fn targets(&self, reader: &Reader<'_>) -> Result<Vec<Target>, MeshError> {
-        let find = |target: &tree::Attributes, name: &str, rule: &Rule| -> Result<Option<usize>, MeshError> {
+        let find = |target: &schema::Attributes, name: &str, rule: &Rule| -> Result<Option<usize>, MeshError> {
             let Some(accessor) = target.get(name) else { return Ok(None) };
             self.check_count(&format!("{name} of a morph target"), reader.shape(accessor.0, rule)?.count)?;
             Ok(Some(accessor.0))
         };
-        let target = |target: &tree::Attributes| {
+        let target = |target: &schema::Attributes| {
             let positions = find(target, "POSITION", &MORPH_POSITION)?;
             Ok(Target { positions, normals: find(target, "NORMAL", &MORPH_NORMAL)? })
         };
@@ -105,7 +105,7 @@ impl<'s> Vertices<'s> {
         }
     }
 
-    /// How its indices make up triangles: what was compressed is a list, whatever it was before.
+    /// The topology of its indices. Decompressed ones are always a list.
     pub fn mode(&self) -> usize {
         if self.unpacked.is_some() { mode::TRIANGLES } else { self.json.mode() }
     }

@@ -1,10 +1,10 @@
-//! What an animation's channels say at one moment. glTF 2.0, 3.11 and appendix C.
+//! Animation channels, sampled at one moment. glTF 2.0, 3.11 and appendix C.
 
 use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::attribute::{KEY_ROTATIONS, KEY_VECTORS, KEY_WEIGHTS, Rule, TIMES};
-use crate::import::gltf::document::model::Index;
+use crate::import::gltf::document::lists::Index;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -37,9 +37,9 @@ pub struct Sampler {
     pub interpolation: Option<String>,
 }
 
-/// Which sampler, and for whom.
+/// One channel of the animation, and its sampler.
 pub struct Channel<'a> {
-    /// How errors speak of it.
+    /// Its name in errors.
     pub what: &'a str,
     /// Its index.
     pub sampler: Index,
@@ -49,19 +49,19 @@ pub struct Channel<'a> {
 pub struct Sampling<'a> {
     animation: &'a Animation,
     time_s: f64,
-    /// Channels share key times more often than not.
+    /// Key times by accessor: channels often share them.
     moments: BTreeMap<usize, Moment>,
 }
 
-/// A time between two keys; both are the same before the first and after the last.
+/// A time between two keys, which are the same before the first and after the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Moment {
     keys: usize,
     before: usize,
     after: usize,
-    /// From 0 at the key before to 1 at the one after.
+    /// 0 at the key before, 1 at the key after.
     share: f64,
-    /// Seconds from one to the other.
+    /// Seconds between the keys.
     span_s: f64,
 }
 
@@ -72,11 +72,11 @@ enum Interpolation {
     Cubic,
 }
 
-/// The keys of a channel, and where among them.
+/// The keys of a channel, and the place of the moment among them.
 type Keys<const N: usize> = (Moment, Interpolation, Vec<[f64; N]>);
 
 impl<'a> Sampling<'a> {
-    /// Nothing is read yet.
+    /// A reader that has read nothing yet.
     pub fn new(animation: &'a Animation, time_s: f64) -> Self {
         Self { animation, time_s, moments: BTreeMap::new() }
     }
@@ -103,7 +103,7 @@ impl<'a> Sampling<'a> {
         if interpolation == Interpolation::Linear {
             return Ok(slerp(values[moment.before], values[moment.after], moment.share));
         }
-        // Turns into a matrix as if it had length 1, as the specification wants of a spline.
+        // The matrix normalises it, as the specification requires for a spline.
         Ok(interpolate(&moment, interpolation, |i| values[i]))
     }
 
@@ -121,7 +121,7 @@ impl<'a> Sampling<'a> {
         Ok((0..targets).map(weight).collect())
     }
 
-    /// The keys of a channel, each of which has `per_key` values; of a spline three times as many.
+    /// The keys of a channel with `per_key` values per key, and three times as many for a spline.
     fn values<const N: usize>(
         &mut self,
         channel: &Channel<'_>,
@@ -173,7 +173,8 @@ fn locate(times: &[[f64; 1]], time_s: f64) -> Option<Moment> {
     Some(Moment { keys: times.len(), before, after, share, span_s })
 }
 
-/// The value at a moment, of what `value` has by index: keys, or for a spline each key's in-tangent, value and out-tangent.
+/// The interpolated value. `value` gives keys by index; for a spline it gives each key's
+/// in-tangent, value and out-tangent.
 fn interpolate<const N: usize>(
     moment: &Moment,
     interpolation: Interpolation,
@@ -200,7 +201,7 @@ fn interpolate<const N: usize>(
     }
 }
 
-/// Along the shorter arc, at an even speed.
+/// Spherical interpolation along the shorter arc.
 fn slerp(a: [f64; 4], b: [f64; 4], t: f64) -> [f64; 4] {
     let unit = |q: [f64; 4]| {
         let length = q.iter().map(|c| c * c).sum::<f64>().sqrt();
@@ -210,7 +211,7 @@ fn slerp(a: [f64; 4], b: [f64; 4], t: f64) -> [f64; 4] {
     let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
     let angle = libm::acos(dot.abs().min(1.0));
     let sine = libm::sin(angle);
-    // Close together, an arc is a straight line.
+    // For a small angle the sine in the denominator vanishes; linear interpolation is exact enough.
     let (of_a, of_b) =
         if sine < 1e-9 { (1.0 - t, t) } else { (libm::sin(angle * (1.0 - t)) / sine, libm::sin(angle * t) / sine) };
     let of_b = of_b.copysign(of_b * dot);

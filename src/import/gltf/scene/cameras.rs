@@ -1,11 +1,12 @@
 //! Cameras of the scene.
 
-use super::transform::Affine;
+use crate::import::affine::Affine;
 use crate::import::context::Context;
-use crate::import::gltf::document::model;
-use crate::import::gltf::document::model::{Lists, entry};
+use crate::import::gltf::document::lists;
+use crate::import::gltf::document::lists::{Lists, entry};
 use crate::import::{MeshError, text};
 use crate::mesh::material::{FileCamera, FileLens};
+use crate::mesh::vector::cross;
 use crate::warning::Warning;
 use std::collections::BTreeMap;
 
@@ -16,13 +17,14 @@ pub struct Placed {
     pub camera: usize,
     /// The node's name.
     pub name: Option<String>,
-    /// From node to scene space.
+    /// Transform from node to scene space.
     pub transform: Affine,
 }
 
-/// Reads the cameras of the default scene. A broken one is left out: most pictures are taken through none of them.
+/// Reads the cameras of the default scene. A broken one is left out with a warning, because most
+/// pictures use none of them.
 ///
-/// Each is parsed once, however many nodes show it, and its places were paid for with names of their full length.
+/// Each is parsed once, even where many nodes refer to it.
 pub fn cameras(
     placed: &[Placed],
     lists: &Lists<'_>,
@@ -54,14 +56,14 @@ pub fn cameras(
     Ok(cameras)
 }
 
-/// What does not depend on where it is shown.
+/// The part of a camera that does not depend on its node.
 struct Known {
     name: String,
     lens: FileLens,
 }
 
 fn parse(index: usize, lists: &Lists<'_>) -> Result<Known, MeshError> {
-    let json: model::Camera = entry("camera", &lists.cameras, index)?;
+    let json: lists::Camera = entry("camera", &lists.cameras, index)?;
     let lens = match (&json.perspective, &json.orthographic) {
         (Some(lens), _) if lens.yfov > 0.0 && lens.yfov < std::f64::consts::PI => {
             FileLens::Perspective { fov_deg: lens.yfov.to_degrees() }
@@ -97,10 +99,6 @@ fn axes(transform: &Affine) -> Option<[[f64; 3]; 3]> {
     let back = unit(back)?;
     let right = unit(cross(unit(up)?, back))?;
     Some([right, cross(back, right), back])
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn unit(v: [f64; 3]) -> Option<[f64; 3]> {

@@ -1,15 +1,16 @@
 //! EXT_mesh_gpu_instancing: one node that shows its mesh many times.
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Vendor/EXT_mesh_gpu_instancing>
 
-use super::transform::{Affine, Trs};
+use super::transform::Trs;
 use crate::import::MeshError;
+use crate::import::affine::Affine;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::attribute::{INSTANCE_ROTATIONS, INSTANCE_VECTORS, Rule};
-use crate::import::gltf::document::tree::Instancing;
+use crate::import::gltf::document::schema::Instancing;
 
-/// Where instances are below the transform of their node. `triangles` is what each has, and `before` what there is already:
-/// all are counted before any is read.
+/// Transforms of the instances, below that of their node. `triangles` is the count of one instance,
+/// and `before` the count so far: the total is checked before any instance is read.
 pub fn placements(
     node: usize,
     instancing: &Instancing,
@@ -26,7 +27,7 @@ pub fn placements(
             return Err(MeshError::broken(format!("node {node} of the glTF file {detail}")));
         }
     }
-    // Without any attribute there is nothing that would say how many.
+    // Without attributes the number of instances is unknown.
     let Some(count) = count else { return Ok(vec![*transform]) };
     cx.check_triangles(count.saturating_mul(triangles).saturating_add(before))?;
     cx.budget.spend("instances", count, size_of::<Affine>() as u64)?;

@@ -1,32 +1,31 @@
-//! Which meshes the default scene shows, and where.
+//! The default scene: its meshes and cameras, each with its transform.
 
 pub(crate) mod animation;
 pub(crate) mod cameras;
 pub(crate) mod instancing;
 pub(crate) mod pose;
-pub(crate) mod shape;
 pub(crate) mod skin;
 pub(crate) mod transform;
 use self::cameras::Placed;
 use self::pose::Pose;
-use self::transform::Affine;
+use crate::import::affine::Affine;
 use crate::import::context::Context;
-use crate::import::gltf::document::tree::Document;
+use crate::import::gltf::document::schema::Document;
 use crate::import::{MeshError, text};
 use crate::limits;
 
-/// One showing of a mesh.
+/// One instance of a mesh.
 #[derive(Debug)]
 pub struct Instance {
     /// Index of the mesh.
     pub mesh: usize,
     /// Index of the node, if the file has any.
     pub node: Option<usize>,
-    /// From mesh to scene space.
+    /// Transform from mesh to scene space.
     pub transform: Affine,
 }
 
-/// What the default scene shows, in the order of the node tree.
+/// Meshes and cameras of the default scene, in the order of the node tree.
 #[derive(Debug, Default)]
 pub struct Scene {
     /// Its meshes.
@@ -46,7 +45,8 @@ pub fn scene(doc: &Document, pose: &Pose<'_>, cx: &mut Context<'_>) -> Result<Sc
     Walk { doc, pose, on_path: vec![false; doc.nodes.len()], met: 0, found: Scene::default() }.run(roots, cx)
 }
 
-/// The root nodes of the default scene: the named one, or the first, or all nodes that are no node's child.
+/// The root nodes of the default scene. Without a default it is the first scene; without scenes,
+/// all nodes without a parent.
 fn roots(doc: &Document) -> Result<Vec<usize>, MeshError> {
     let index = doc.scene.map_or(0, |scene| scene.0);
     match doc.scenes.get(index) {
@@ -112,7 +112,8 @@ impl Walk<'_> {
         if std::mem::replace(&mut self.on_path[index], true) {
             return Err(MeshError::broken(format!("node {index} of the glTF file is its own ancestor")));
         }
-        // What a hidden node has below it is hidden too; joints there still hold what is shown.
+        // Children of a hidden node are hidden too, but joints among them still move visible
+        // meshes.
         if node.extensions.visibility.as_ref().is_some_and(|v| v.visible == Some(false)) {
             self.on_path[index] = false;
             return Ok(());
@@ -122,7 +123,7 @@ impl Walk<'_> {
             self.found.instances.push(Instance { mesh: mesh.0, node: Some(index), transform });
         }
         if let Some(camera) = node.camera {
-            // Here and in the mesh, each with a name.
+            // Paid for twice, with their names: here and in the mesh.
             cx.budget.spend("cameras", 1, 2 * 1024)?;
             let name = node.name.as_deref().map(text::name);
             self.found.cameras.push(Placed { camera: camera.0, name, transform });

@@ -1,34 +1,36 @@
-//! Where nodes are and how far meshes are morphed: as the file's nodes say, or at a moment of its first animation.
+//! The pose that is drawn: node transforms and morph weights, either the rest pose or a moment of
+//! the file's first animation.
 
 use super::animation::{self, Channel};
-use super::transform::{Affine, Trs};
+use super::transform::{self, Trs};
 use crate::import::MeshError;
+use crate::import::affine::Affine;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
-use crate::import::gltf::document::model::{Lists, entry};
-use crate::import::gltf::document::tree::Document;
+use crate::import::gltf::document::lists::{Lists, entry};
+use crate::import::gltf::document::schema::Document;
 use crate::import::gltf::warn_once;
 use crate::warning::Warning;
 use std::collections::BTreeMap;
 
-/// The moment that is drawn.
+/// A pose of the file's nodes.
 pub struct Pose<'a> {
     doc: &'a Document,
-    /// What an animation changes, by node.
+    /// Animated nodes, by index.
     animated: BTreeMap<usize, Animated>,
 }
 
-/// A node as an animation has it.
+/// The animated values of one node.
 #[derive(Clone, Debug)]
 struct Animated {
     trs: Trs,
-    /// Whether `trs` says more than the node itself.
+    /// True if the animation moves the node, so that `trs` replaces its own transform.
     is_moved: bool,
     weights: Option<Vec<f64>>,
 }
 
 impl<'a> Pose<'a> {
-    /// The file's first animation at the time that the job asks for, or the nodes as they are.
+    /// The first animation at the job's time, or the rest pose without one.
     pub fn new(
         doc: &'a Document,
         lists: &Lists<'_>,
@@ -104,15 +106,15 @@ impl<'a> Pose<'a> {
         Ok(())
     }
 
-    /// A node's own transform.
+    /// The transform of a node relative to its parent.
     pub fn local(&self, node: usize) -> Affine {
         match self.animated.get(&node).filter(|animated| animated.is_moved) {
             Some(animated) => animated.trs.into(),
-            None => self.doc.nodes.get(node).map_or(Affine::IDENTITY, Affine::of),
+            None => self.doc.nodes.get(node).map_or(Affine::IDENTITY, transform::of_node),
         }
     }
 
-    /// How much of each morph target a mesh shows at a node, if any says so: the animation, then the node, then the mesh.
+    /// Morph weights of a mesh at a node: the animation's, else the node's, else the mesh's.
     pub fn weights(&self, mesh: usize, node: Option<usize>) -> &[f64] {
         let animated = node.and_then(|node| self.animated.get(&node)?.weights.as_deref());
         let of_node = || node.and_then(|node| self.doc.nodes.get(node)?.weights.as_deref());

@@ -1,28 +1,28 @@
-//! Skins: where joints have moved the vertices that they hold. glTF 2.0, 3.7.3.
+//! Skins: the transforms of joints in the drawn pose. glTF 2.0, 3.7.3.
 
 use super::pose::Pose;
-use super::transform::Affine;
 use crate::import::MeshError;
+use crate::import::affine::Affine;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::attribute::INVERSE_BIND_MATRICES;
-use crate::import::gltf::document::tree::Document;
+use crate::import::gltf::document::schema::Document;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// From mesh to scene space, a map for each joint of a skin.
+/// Transforms from mesh to scene space, one per joint of a skin.
 pub type Joints = Rc<Vec<Affine>>;
 
 /// The skins of a file, in one pose.
 pub struct Skins<'a> {
     doc: &'a Document,
-    /// From node to scene space, once a skin was asked for.
+    /// Transforms from node to scene space, computed for the first skin.
     worlds: Option<Vec<Affine>>,
     known: BTreeMap<usize, Joints>,
 }
 
 impl<'a> Skins<'a> {
-    /// None is read yet.
+    /// An empty collection for the file's list.
     pub fn new(doc: &'a Document) -> Self {
         Self { doc, worlds: None, known: BTreeMap::new() }
     }
@@ -52,7 +52,7 @@ impl<'a> Skins<'a> {
             Some(accessor) => reader.vectors(accessor.0, &INVERSE_BIND_MATRICES, cx)?,
             None => Vec::new(),
         };
-        // More are allowed, and mean nothing.
+        // More matrices than joints are allowed; the rest has no meaning.
         if skin.inverse_bind_matrices.is_some() && inverse.len() < skin.joints.len() {
             return Err(MeshError::broken(format!(
                 "skin {index} of the glTF file has {} joints and {} inverse bind matrices",
@@ -60,8 +60,8 @@ impl<'a> Skins<'a> {
                 inverse.len()
             )));
         }
-        let joint = |(i, node): (usize, &crate::import::gltf::document::model::Index)| {
-            let inverse = inverse.get(i).map_or(Affine::IDENTITY, |m| Affine::of_columns(*m));
+        let joint = |(i, node): (usize, &crate::import::gltf::document::lists::Index)| {
+            let inverse = inverse.get(i).map_or(Affine::IDENTITY, |m| Affine::from_columns(*m));
             worlds.get(node.0).copied().unwrap_or(Affine::IDENTITY).after(&inverse)
         };
         let joints: Joints = Rc::new(skin.joints.iter().enumerate().map(joint).collect());
@@ -70,7 +70,8 @@ impl<'a> Skins<'a> {
     }
 }
 
-/// Every node's transform into scene space. Of several parents, which the specification forbids, the first counts.
+/// Transforms of all nodes to scene space. Several parents are forbidden by the specification; the
+/// first one counts.
 fn worlds(doc: &Document, pose: &Pose<'_>, cx: &mut Context<'_>) -> Result<Vec<Affine>, MeshError> {
     let count = doc.nodes.len();
     cx.budget.spend("node transforms", count as u64, size_of::<Affine>() as u64 + 32)?;
@@ -85,7 +86,7 @@ fn worlds(doc: &Document, pose: &Pose<'_>, cx: &mut Context<'_>) -> Result<Vec<A
     let mut is_done = vec![false; count];
     let mut path = Vec::new();
     for start in 0..count {
-        // Up to what is done or has no parent, then down again. No node is its own ancestor: that is checked before.
+        // Walks up to a finished node or a root, then down again. Cycles were refused before.
         let mut at = Some(start);
         while let Some(node) = at.filter(|&node| !is_done[node]) {
             path.push(node);

@@ -1,13 +1,14 @@
-//! A reader that hands `tobj` one clean line after the other.
+//! A reader that gives `tobj` cleaned lines.
 //!
-//! Only `v`, `vt`, `vn`, `f`, `l`, `p` and material lines get through, in canonical form, checked and paid for. What `tobj` would
-//! refuse but is harmless (bytes that are not UTF-8, empty faces, partial colours) is dropped or completed on the way.
+//! Only `v`, `vt`, `vn`, `f`, `l`, `p` and material lines pass, in canonical form, checked and paid
+//! for. Harmless content that `tobj` would refuse (bytes that are not UTF-8, empty faces, partial
+//! colours) is dropped or completed.
 
 mod numbers;
 
 use super::face::{Corner, Counts, parse_corner, write_face};
-use super::left_out::LeftOut;
 use super::lines::{Lines, uncommented};
+use super::skipped::Skipped;
 use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::text::before_comment;
@@ -17,16 +18,16 @@ use rapidhash::RapidHashMap;
 use std::io::{BufRead, Read};
 use tobj::LoadError;
 
-/// What is known of the file once all of it was read.
+/// Summary of a cleaned file.
 pub struct Summary {
     /// `v` lines.
     pub vertices: u64,
     /// `usemtl` names, in order of first use.
     pub materials: Vec<Vec<u8>>,
-    /// What `mtllib` lines say.
+    /// Arguments of `mtllib` lines.
     pub libraries: Vec<Vec<u8>>,
-    /// What was left out.
-    pub left_out: LeftOut,
+    /// Counts of skipped lines.
+    pub skipped: Skipped,
 }
 
 /// Implements [`BufRead`] for `tobj`.
@@ -39,9 +40,9 @@ pub struct Cleaner<'a, 'b> {
     fault: Option<MeshError>,
     counts: Counts,
     triangles: u64,
-    /// Which attributes the faces of the current model have.
+    /// Attributes of faces in the current model: texture coordinates, normals.
     form: Option<(bool, bool)>,
-    /// Whether the first vertex had a colour. Then all get one.
+    /// True if the first vertex had a colour. Then all get one.
     colored: Option<bool>,
     /// The largest index of each kind and its line: tobj does not say which one was out of range.
     largest: [(u64, u64); 3],
@@ -49,7 +50,7 @@ pub struct Cleaner<'a, 'b> {
     material_numbers: RapidHashMap<Vec<u8>, usize>,
     libraries: Vec<Vec<u8>>,
     corners: Vec<Corner>,
-    left_out: LeftOut,
+    skipped: Skipped,
 }
 
 impl<'a, 'b> Cleaner<'a, 'b> {
@@ -71,11 +72,11 @@ impl<'a, 'b> Cleaner<'a, 'b> {
             material_numbers: RapidHashMap::default(),
             libraries: Vec::new(),
             corners: Vec::new(),
-            left_out: LeftOut::default(),
+            skipped: Skipped::default(),
         }
     }
 
-    /// Turns what went wrong, here or in `tobj`, into an error that names the line.
+    /// Turns a failure, here or in `tobj`, into an error that names the line.
     pub fn finish(self, error: Option<LoadError>) -> Result<Summary, MeshError> {
         if let Some(fault) = self.fault {
             return Err(fault);
@@ -87,8 +88,8 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         let here = |what: &str| format!("line {} of the OBJ file: {what}", self.lines.number);
         let detail = match error {
             None => {
-                let Self { counts, materials, libraries, left_out, .. } = self;
-                return Ok(Summary { vertices: counts.v, materials, libraries, left_out });
+                let Self { counts, materials, libraries, skipped, .. } = self;
+                return Ok(Summary { vertices: counts.v, materials, libraries, skipped });
             }
             Some(LoadError::PositionParseError) => here("a vertex needs three numbers"),
             Some(LoadError::NormalParseError) => here("a normal needs three numbers"),
@@ -120,7 +121,7 @@ impl<'a, 'b> Cleaner<'a, 'b> {
 
     fn clean(&mut self, line: &[u8]) -> Result<(), MeshError> {
         let words = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
-        // A comment may begin in a word, and then that is the last.
+        // A comment may begin within a word, which then is the last.
         let mut is_over = false;
         let mut words = words.map_while(move |word| {
             let kept = before_comment(word);
@@ -148,7 +149,7 @@ impl<'a, 'b> Cleaner<'a, 'b> {
             b"f" | b"fo" => self.face(words)?,
             b"l" => self.lines_and_points(words, true)?,
             b"p" => self.lines_and_points(words, false)?,
-            b"curv" | b"curv2" | b"surf" => self.left_out.curves += 1,
+            b"curv" | b"curv2" | b"surf" => self.skipped.curves += 1,
             b"mtllib" => self.library(name(line)),
             b"usemtl" => self.material(name(line)),
             _ => {}
@@ -168,22 +169,23 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         }
         let n = self.corners.len() as u64;
         if n < 3 {
-            self.left_out.short_faces += 1;
+            self.skipped.short_faces += 1;
             return Ok(());
         }
         self.triangles += n - 2;
-        // A face that gives an attribute for some corners only has none.
+        // An attribute that only some corners of a face have is dropped.
         let form = (self.corners.iter().all(|c| c.vt.is_some()), self.corners.iter().all(|c| c.vn.is_some()));
         self.begin_form(form);
-        // tobj's own face (its list doubles), then per corner its index and, with attributes, a vertex and a hash entry of
-        // its own; then ours.
+        // tobj's face in a list that doubles; per corner an index and, with attributes, a vertex
+        // and a hash entry; then our own copy.
         let per_corner = if form == (false, false) { 40 } else { 200 };
         self.unpaid_bytes += 208 + n * (per_corner + if n > 4 { 48 } else { 0 });
         write_face(&mut self.out, &self.corners, form);
         Ok(())
     }
 
-    /// A polyline as its segments, or points, in the only form in which tobj reads them: as faces with too few corners.
+    /// Writes the segments of a polyline, or points, as faces with too few corners: the only form
+    /// in which tobj reads them.
     fn lines_and_points<'w>(
         &mut self,
         words: impl Iterator<Item = &'w [u8]>,
@@ -211,7 +213,7 @@ impl<'a, 'b> Cleaner<'a, 'b> {
         Ok(())
     }
 
-    /// A new model where the form of faces changes.
+    /// Begins a new model where the attributes of faces change.
     fn begin_form(&mut self, form: (bool, bool)) {
         if self.form.is_some_and(|old| old != form) {
             self.out.extend_from_slice(b"o\n");
@@ -285,7 +287,7 @@ impl Read for Cleaner<'_, '_> {
     }
 }
 
-/// What follows the keyword of a line, six letters long: one name, spaces and all.
+/// The name after a keyword of six letters, including its spaces.
 fn name(line: &[u8]) -> &[u8] {
     uncommented(line.trim_ascii_start().get(6..).unwrap_or_default().trim_ascii())
 }

@@ -16,8 +16,8 @@ impl Cleaner<'_, '_> {
         self.numbers(b"v", all[..count].iter().copied(), 3)?;
         let color = Some(&all[3..6]).filter(|c| count >= 6 && c.iter().all(|w| number(w).is_some()));
         let colored = *self.colored.get_or_insert(color.is_some());
-        self.left_out.colors += u64::from(colored != color.is_some());
-        // Six or seven numbers are a position and a colour; four are x y z w, and tobj divides by w.
+        self.skipped.colors += u64::from(colored != color.is_some());
+        // Six or seven numbers are a position and a colour. Four are x y z w; tobj divides by w.
         let more: &[&[u8]] = match color {
             Some(color) if colored => color,
             None if colored => &[b"1", b"1", b"1"],

@@ -20,7 +20,7 @@ fn triangles(count: usize) -> Mesh {
     }
     let limits = Limits::default();
     let bundle = Bundle::of_one(obj.into_bytes());
-    import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap()
+    import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().mesh
 }
 
 fn spec() -> Spec {

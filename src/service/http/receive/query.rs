@@ -24,7 +24,7 @@ impl Query {
         let format_in = take(&mut pairs, "format_in")?;
         let format_in = format_in.map(|name| {
             Format::from_name(&name).ok_or_else(|| {
-                let allowed = Format::NAMES.join(", ");
+                let allowed = Format::names().join(", ");
                 bad("out_of_range", format!("`format_in` is {}, and allowed is one of {allowed}", short(&name)))
             })
         });

@@ -18,7 +18,7 @@ use crate::spec::BackendChoice;
 #[derive(Serialize)]
 pub struct CapabilitiesDto {
     version: &'static str,
-    mesh_formats: [&'static str; Format::NAMES.len()],
+    mesh_formats: Vec<&'static str>,
     image_formats: [&'static str; 3],
     styles: Vec<&'static str>,
     schema: &'static str,
@@ -103,7 +103,7 @@ impl CapabilitiesDto {
         let Limits { texture_px, texture_total_px, .. } = *limits;
         Self {
             version: env!("CARGO_PKG_VERSION"),
-            mesh_formats: Format::NAMES,
+            mesh_formats: Format::names(),
             image_formats: ["png", "webp", "jpeg"],
             styles: words_of::<Style>(),
             schema: schema::PATH,

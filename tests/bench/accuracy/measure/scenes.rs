@@ -101,6 +101,7 @@ impl Scene {
         let bundle = Bundle::of_one(self.bytes(size_px));
         meshsnap::import::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default())
             .unwrap_or_else(|e| panic!("{}: {e}", self.name))
+            .mesh
     }
 
     fn bytes(&self, size_px: u32) -> Vec<u8> {

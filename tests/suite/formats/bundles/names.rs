@@ -1,9 +1,9 @@
 //! Bundles: names, what they mean from inside one, and which file is the mesh.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
+use crate::support::mesh_files::Read;
 use meshsnap::import::{Bundle, BundleFile, Folder, Format, MeshError, MeshFault, import};
 use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::Mesh;
 use meshsnap::mesh::material::ImageContent;
 use std::io::{Cursor, Write as _};
 
@@ -17,9 +17,9 @@ pub fn files(files: &[(&str, &[u8])]) -> Vec<BundleFile> {
 }
 
 /// Imports a bundle with default limits.
-pub fn read_bundle(bundle: &Bundle) -> Result<Mesh, MeshError> {
+pub fn read_bundle(bundle: &Bundle) -> Result<Read, MeshError> {
     let limits = Limits::default();
-    import(bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default())
+    import(bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).map(Read::from)
 }
 
 /// An honest archive.
@@ -158,7 +158,7 @@ fn the_mesh_among_the_files_is_found_or_asked_for() {
     let limits = Limits::default();
     let of = |format| {
         let bundle = Bundle::of_files(named("x.stl"));
-        import(&bundle, Some(format), &limits, &mut Budget::new(&limits), &Deadline::default())
+        import(&bundle, Some(format), &limits, &mut Budget::new(&limits), &Deadline::default()).map(Read::from)
     };
     assert_eq!(of(Format::Obj).unwrap().triangles.len(), 12);
     assert_eq!(of(Format::Gltf).unwrap_err().fault, MeshFault::Unrecognised);

@@ -65,7 +65,7 @@ fn required_extensions_are_known_or_named() {
 fn glb_containers_may_have_more_chunks_and_no_binary_one() {
     let gltf = Solid::cuboid().triangulated(&[[0, 1, 2], [0, 1, 4]]).gltf();
     let mut bytes = gltf.glb();
-    let expected = read(&bytes).unwrap().positions;
+    let expected = read(&bytes).unwrap().mesh.positions;
     bytes.extend([4, 0, 0, 0, b'A', b'B', b'C', b'D', 1, 2, 3, 4]);
     let length = (bytes.len() as u32).to_le_bytes();
     bytes[8..12].copy_from_slice(&length);
@@ -85,7 +85,7 @@ fn glb_containers_may_have_more_chunks_and_no_binary_one() {
 #[test]
 fn scenes_may_be_left_out() {
     let mut gltf = Solid::cuboid().triangulated(&[[0, 1, 2], [0, 1, 4]]).gltf();
-    let expected = read(&gltf.glb()).unwrap().positions;
+    let expected = read(&gltf.glb()).unwrap().mesh.positions;
     let root = gltf.json.as_object_mut().unwrap();
     root.remove("scene");
     assert_eq!(read(&gltf.glb()).unwrap().positions, expected);

@@ -1,7 +1,7 @@
 //! glTF: one shape in several encodings, compressed and not.
 
 use crate::formats::bundles::names::read_bundle;
-use crate::support::mesh_files::{Gltf, Solid, assert_close, corners, read};
+use crate::support::mesh_files::{Gltf, Read, Solid, assert_close, corners, read};
 use crate::support::scenes;
 use crate::support::shared::folder;
 use meshsnap::backend::Renderer;
@@ -165,7 +165,7 @@ fn normals_close(a: &Mesh, b: &Mesh, tolerance: f32) {
 
 /// Triangles in the order of their corners, each from its smallest on, since encoders turn and reorder them. The sheet's corners lie
 /// on multiples of 1/8.
-fn in_order(mut mesh: Mesh) -> Mesh {
+fn in_order(mut mesh: Read) -> Read {
     let all = corners(&mesh);
     let key = |t: &[[f64; 3]; 3]| {
         let mut key: Vec<[i64; 3]> = t.iter().map(|p| p.map(|c| (c * 8.0).round() as i64)).collect();

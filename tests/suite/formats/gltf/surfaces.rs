@@ -1,7 +1,7 @@
 //! glTF: what a file says about its surfaces.
 
 use crate::formats::bundles::names::read_bundle;
-use crate::support::mesh_files::{Gltf, read};
+use crate::support::mesh_files::{Gltf, Read, read};
 use crate::support::shared::folder;
 use meshsnap::import::{Bundle, BundleFile, MeshError, MeshFault};
 use meshsnap::mesh::material::{AlphaMode, ImageContent, TextureRef, Wrap};
@@ -33,7 +33,7 @@ fn slot(material: Value) -> MaterialSlot {
     read(&surface(material).glb()).unwrap().materials.remove(0)
 }
 
-pub fn codes(mesh: &Mesh) -> Vec<&str> {
+pub fn codes(mesh: &Read) -> Vec<&str> {
     mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 

@@ -1,7 +1,7 @@
 //! PLY in every encoding: what each property becomes.
 
 use crate::formats::same_shape::assert_same_shape;
-use crate::support::mesh_files::{Solid, read};
+use crate::support::mesh_files::{Read, Solid, read};
 use crate::support::ply_files::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
 use crate::support::scenes;
 use crate::support::server::Server;
@@ -25,7 +25,7 @@ fn polygons() -> Solid {
 }
 
 /// The codes of its warnings.
-pub fn codes(mesh: &Mesh) -> Vec<&'static str> {
+pub fn codes(mesh: &Read) -> Vec<&'static str> {
     mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 

@@ -24,7 +24,7 @@ pub fn model(corners: &[[[f32; 3]; 3]], uvs: &[[[f32; 2]; 3]], image: &[u8], mat
     gltf.json["images"] = json!([{ "bufferView": view, "mimeType": "image/vnd.radiance" }]);
     gltf.json["textures"] = json!([{ "source": 0 }]);
     gltf.json["materials"] = json!([material]);
-    read(&gltf.glb()).unwrap()
+    read(&gltf.glb()).unwrap().mesh
 }
 
 pub fn base() -> Value {

@@ -1,13 +1,13 @@
-//! The parts of the document that say what is where: nodes, meshes, accessors, in types of our own, parsed as a whole. What they
-//! refer to is checked in [`super::check`].
+//! The eagerly parsed parts of the document: nodes, meshes, accessors, buffers. References among
+//! them are checked in [`super::check`].
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
 
-use super::model::Index;
+use super::lists::Index;
 
-/// The document, but for what [`super::model::Lists`] holds.
+/// The document, without the lists in [`super::lists::Lists`].
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Document {
@@ -34,7 +34,7 @@ pub struct Document {
 }
 
 impl Document {
-    /// Whether the file says that it uses an extension.
+    /// True if the file declares an extension as used.
     pub fn uses(&self, extension: &str) -> bool {
         self.extensions_used.iter().chain(&self.extensions_required).any(|name| name == extension)
     }
@@ -120,7 +120,7 @@ pub struct Primitive {
 }
 
 impl Primitive {
-    /// How vertices make up shapes; the number of an unknown mode is an error elsewhere.
+    /// The topology of the primitive. Unknown modes are refused elsewhere.
     pub fn mode(&self) -> usize {
         self.mode.map_or(mode::TRIANGLES, |mode| mode.0)
     }
@@ -252,7 +252,7 @@ pub struct Buffer {
     pub byte_length: Whole,
 }
 
-/// A count or an offset; `1.0` is a good integer in JSON.
+/// A count or an offset. `1.0` is a valid integer in JSON.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
 #[serde(try_from = "f64")]
 pub struct Whole(pub u64);
@@ -261,7 +261,7 @@ impl TryFrom<f64> for Whole {
     type Error = &'static str;
 
     fn try_from(v: f64) -> Result<Self, Self::Error> {
-        // Up to there every whole number has an f64 of its own.
+        // Up to 2^53 every whole number is an exact f64.
         let whole = v as u64;
         if whole as f64 == v && v < 9007199254740992.0 { Ok(Self(whole)) } else { Err("it must be a whole number") }
     }

@@ -1,4 +1,4 @@
-//! XML namespaces, as far as it matters here: whose an element is, and what the prefixes stand for that a part requires.
+//! XML namespaces: the owner of each element, and the extensions that a part requires.
 
 use crate::import::text;
 use quick_xml::events::BytesStart;
@@ -11,19 +11,19 @@ const CORE: [&str; 2] =
 const MATERIALS: &str = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02";
 /// Beam lattices begin with this, whatever their year.
 const BEAMS: &str = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/";
-/// What may be required: it is read, or says nothing of the shape.
+/// Extensions that may be required: they are read, or do not change the shape.
 const READ: [&str; 3] = [
     MATERIALS,
     "http://schemas.microsoft.com/3dmanufacturing/production/2015/06",
     "http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07",
 ];
 
-/// Declarations that may hold at one place. Every element is held against them.
+/// Most declarations in scope. Every element is compared with all of them.
 const DECLARED_MAX: usize = 64;
 /// Characters that are kept of a namespace.
 const URI_CHARS_MAX: usize = 200;
 
-/// Whose an element is.
+/// The namespace of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
     /// The format's own.
@@ -32,19 +32,19 @@ pub enum Space {
     Materials,
     /// Beam lattices.
     Beams,
-    /// Of an extension that is not read.
+    /// An extension that is not read.
     Other,
-    /// Nothing says: some writers declare no namespaces at all.
+    /// No declaration: some writers declare no namespaces at all.
     Unsaid,
 }
 
 impl Space {
-    /// Whether the format's own names mean something here.
+    /// True if the core specification's names apply to the element.
     pub fn is_core(self) -> bool {
         matches!(self, Self::Core | Self::Unsaid)
     }
 
-    /// The same of the names of the materials extension.
+    /// True if the materials extension's names apply to the element.
     pub fn is_materials(self) -> bool {
         matches!(self, Self::Materials | Self::Unsaid)
     }
@@ -59,20 +59,20 @@ impl Space {
     }
 }
 
-/// The declarations that hold where the reader is.
+/// The declarations in scope.
 #[derive(Debug, Default)]
 pub struct Spaces {
-    /// Depth, prefix and namespace; the last one counts.
+    /// Depth, prefix and namespace. The last one counts.
     declared: Vec<(usize, String, String)>,
 }
 
 impl Spaces {
-    /// Takes in what an element at this depth declares; whether that is few enough.
+    /// Adds the declarations of an element at this depth. False if there are too many.
     pub fn begin(&mut self, event: &BytesStart<'_>, depth: usize) -> bool {
         if !event.attributes_raw().contains("xmlns") {
             return true;
         }
-        // What is broken here is told by whoever reads the attributes.
+        // Broken attributes are reported where they are read.
         for attribute in event.attributes().with_checks(false).flatten() {
             let prefix = match attribute.key.as_namespace_binding() {
                 Some(PrefixDeclaration::Default) => "",
@@ -88,19 +88,19 @@ impl Spaces {
         true
     }
 
-    /// Forgets what an element at this depth has declared.
+    /// Removes the declarations of an element at this depth.
     pub fn end(&mut self, depth: usize) {
         while self.declared.last().is_some_and(|declared| declared.0 >= depth) {
             self.declared.pop();
         }
     }
 
-    /// What a prefix stands for; "" is none.
+    /// The namespace of a prefix. "" is the default one.
     pub fn of(&self, prefix: &str) -> Space {
         self.uri(prefix).map_or(Space::Unsaid, Space::of)
     }
 
-    /// The namespaces of a list of prefixes that a file may not require.
+    /// Namespaces of a list of required prefixes that are not read.
     pub fn unread(&self, prefixes: &str) -> Vec<String> {
         let uri = |prefix| self.uri(prefix).unwrap_or(prefix);
         let unread = prefixes

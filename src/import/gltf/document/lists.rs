@@ -1,5 +1,6 @@
-//! The parts of the document that say what surfaces look like, cameras and animations: one odd value in a material that nothing uses
-//! is no reason to refuse a file, so an entry is parsed when something drawn asks for it.
+//! Lazily parsed parts of the document: materials, textures, images, cameras and animations. An
+//! entry is parsed on first use, so that an odd value in an unused material does not refuse the
+//! file.
 
 use crate::import::{MeshError, text};
 use serde::Deserialize;
@@ -7,7 +8,7 @@ use serde::de::IgnoredAny;
 use serde_json::value::RawValue;
 use std::collections::BTreeMap;
 
-/// The lists of a document, entries not yet parsed.
+/// The document's lists, with unparsed entries.
 #[derive(Debug, Default)]
 pub struct Lists<'a> {
     /// `materials`
@@ -25,7 +26,8 @@ pub struct Lists<'a> {
 }
 
 impl<'a> Lists<'a> {
-    /// Of a document that was measured and parsed before. What is no list is an empty one: only its use is an error.
+    /// Splits a document whose parsing was paid for before. A value that is no list counts as an
+    /// empty list, so that only its use is an error.
     pub fn of(json: &'a [u8]) -> Result<Self, MeshError> {
         #[derive(Default, Deserialize)]
         #[serde(default)]
@@ -43,8 +45,8 @@ impl<'a> Lists<'a> {
             #[serde(borrow)]
             animations: Option<&'a RawValue>,
         }
-        let raw: Raw<'a> = serde_json::from_slice(crate::import::sniff::trim_start(json))
-            .map_err(crate::import::gltf::document::unread)?;
+        let raw: Raw<'a> =
+            serde_json::from_slice(text::trim_start(json)).map_err(crate::import::gltf::document::unread)?;
         let list = |raw: Option<&'a RawValue>| -> Vec<&'a RawValue> {
             raw.and_then(|raw| serde_json::from_str(raw.get()).ok()).unwrap_or_default()
         };
@@ -68,7 +70,7 @@ pub fn entry<'a, T: Deserialize<'a>>(kind: &str, list: &[&'a RawValue], index: u
     })
 }
 
-/// An index; `1.0` is a good integer in JSON.
+/// An index. `1.0` is a valid integer in JSON.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(try_from = "f64")]
 pub struct Index(pub usize);
@@ -112,7 +114,7 @@ pub struct Pbr {
     pub metallic_roughness_texture: Option<TextureInfo>,
 }
 
-/// `KHR_materials_pbrSpecularGlossiness`, as far as it stands in for [`Pbr`].
+/// `KHR_materials_pbrSpecularGlossiness`: the fields that can stand in for [`Pbr`].
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 pub struct SpecularGlossiness {

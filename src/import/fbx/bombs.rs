@@ -1,26 +1,29 @@
-//! Arrays of a binary FBX file are deflated one by one, and `ufbx` believes what they say of their size as far as memory goes. What was made
-//! to fill it is refused before.
+//! Refuses decompression bombs in binary FBX files. Their arrays are deflated one by one, and
+//! `ufbx` trusts the declared sizes as far as memory allows.
 //!
-//! The records as the Blender Foundation describes them ("FBX binary file format specification", 2013): where a node ends, how many
-//! properties it has, how long they are, its name, the properties, and then the nodes inside of it, up to an empty one.
+//! The records follow the Blender Foundation's description ("FBX binary file format specification",
+//! 2013): the end of the node, the number and length of its properties, its name, the properties,
+//! and the child nodes up to an empty one.
 
 use crate::import::MeshError;
 use crate::limits::Deadline;
 
-/// No array of a mesh is this many times as large as its packed form, except for those that say the same of every face.
+/// Ratio from which an array is suspicious. Honest arrays reach it only if they repeat one value
+/// for every face.
 const RATIO: u64 = 200;
-/// Such arrays are together at most this large, or this many times as large as the file.
+/// Most bytes of suspicious arrays together, absolute and as a multiple of the file.
 const BYTES_MAX: u64 = 16 << 20;
 const FILES_MAX: u64 = 16;
 
-/// After the magic words and the byte that says in which order bytes are; then comes the first record.
+/// Offset of the first record, after the signature and the byte order.
 const VERSION_AT: usize = 23;
-/// From this version on places have 64 bits.
+/// From this version on offsets have 64 bits.
 const WIDE_VERSION: u64 = 7500;
-/// Of whatever kind numbers are in the file: what the parser may make of them.
+/// Bytes per number once parsed, whatever its type in the file.
 const NUMBER_BYTES: u64 = 8;
 
-/// Refuses a binary file whose arrays are bombs. What cannot be followed is left to the parser, which says what is wrong with it.
+/// Refuses a binary file whose arrays are bombs. A broken record ends the walk: the parser then
+/// reports it.
 pub fn check(bytes: &[u8], deadline: &Deadline) -> Result<(), MeshError> {
     let mut cursor =
         Cursor { bytes, at: VERSION_AT, is_big_endian: bytes.get(VERSION_AT - 1).is_some_and(|&b| b != 0) };
@@ -50,7 +53,8 @@ struct Cursor<'b> {
 }
 
 impl Cursor<'_> {
-    /// Passes a node's own part; what it contains comes next. Gives the bytes that its suspicious arrays unpack to; None at the end.
+    /// Steps over a node's header and properties, to its first child. Returns the unpacked bytes of
+    /// its suspicious arrays, or None at the end.
     fn record(&mut self, is_wide: bool) -> Option<u64> {
         let end = self.word(is_wide)?;
         let count = self.word(is_wide)?;
@@ -62,7 +66,7 @@ impl Cursor<'_> {
         if end == 0 && name == 0 {
             return Some(0);
         }
-        // Their length decides where they end, whatever they say of themselves.
+        // The declared length of the properties decides where they end, whatever their contents.
         let begin = self.at;
         self.skip(properties)?;
         let end = std::mem::replace(&mut self.at, begin);
@@ -181,7 +185,7 @@ mod tests {
         while bytes.len() < 20_000_000 {
             bytes.extend(record(false, [9, u32::MAX], b"", b"C"));
         }
-        // Anything else than a few looks would take hours.
+        // More than a few visits per byte would take hours here.
         check(&bytes, &Deadline::default()).unwrap();
     }
 }

@@ -1,15 +1,15 @@
 //! Colours and texture coordinates as PLY files store them.
 
 use super::header::Kind;
-use crate::import::raw::srgb_to_linear;
+use crate::srgb::srgb_to_linear;
 
-/// Of what has no colour where others have one.
+/// The colour of elements without one, where others have one.
 pub const WHITE: [f32; 4] = [1.0; 4];
 
-/// Brings colours of vertices or of faces, as read, to linear light from 0 to 1. `kinds` are the types of red, green, blue
-/// and alpha; an alpha that the file does not have must be 1.
+/// Converts colours of vertices or faces, as read, to linear light from 0 to 1. `kinds` are the
+/// types of red, green, blue and alpha. A missing alpha must be given as 1.
 ///
-/// Scanners, MeshLab and Blender store what is displayed, that is sRGB, in bytes. Bytes may be declared as wider types; floats
+/// Scanners, MeshLab and Blender store sRGB in bytes, which may be declared as wider types. Floats
 /// are 0 to 1 or, from some exporters, 0 to 255, as in OBJ.
 pub fn linearise(colors: &mut [[f32; 4]], kinds: &[Option<Kind>]) {
     if colors.is_empty() {
@@ -39,7 +39,8 @@ pub fn linearise(colors: &mut [[f32; 4]], kinds: &[Option<Kind>]) {
     }
 }
 
-/// In PLY as in OBJ, v runs up from the image's lower edge, in a mesh down from the upper one.
+/// Turns v around: in PLY as in OBJ it runs up from the image's lower edge, in a mesh down from the
+/// upper one.
 pub fn upright([u, v]: [f64; 2]) -> [f32; 2] {
     [u as f32, (1.0 - v) as f32]
 }

@@ -1,40 +1,40 @@
-//! The shape of a primitive at one node: morphed, then held by joints.
+//! The shape of a primitive at one node: morphed, then skinned.
 
-use super::transform::Affine;
+use super::Primitive;
 use crate::import::MeshError;
+use crate::import::affine::Affine;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::attribute::{MORPH_NORMAL, MORPH_POSITION, Rule};
-use crate::import::gltf::primitive::Primitive;
 use std::borrow::Cow;
 
-/// Positions and normals in the space of the node, or of the scene where joints hold them.
+/// Positions and normals in the space of the node, or of the scene if skinned.
 pub struct Shape<'a> {
-    /// One a vertex.
+    /// One per vertex.
     pub positions: Cow<'a, [[f64; 3]]>,
-    /// One a vertex, of any length; or empty.
+    /// One per vertex, of any length; or empty.
     pub normals: Cow<'a, [[f64; 3]]>,
-    /// Vertices whose surroundings joints have turned inside out; or empty.
+    /// Vertices whose skinning transform mirrors; or empty.
     pub mirrored: Vec<bool>,
 }
 
-/// Joints and weights of the vertices: one of several sets of four.
+/// One set of four joints and weights per vertex.
 #[derive(Debug)]
 pub struct Influences {
     /// Indices of joints.
     pub joints: Vec<[u16; 4]>,
-    /// How much each holds.
+    /// Their weights.
     pub weights: Vec<[f64; 4]>,
 }
 
 impl<'a> Shape<'a> {
-    /// A primitive as it is.
+    /// The undeformed shape of a primitive.
     pub fn of(primitive: &'a Primitive) -> Self {
         let (positions, normals) = (Cow::Borrowed(&primitive.positions[..]), Cow::Borrowed(&primitive.normals[..]));
         Self { positions, normals, mirrored: Vec::new() }
     }
 
-    /// Adds morph targets, each as much as its weight says.
+    /// Adds morph targets, each times its weight.
     pub fn morph(
         &mut self,
         primitive: &Primitive,
@@ -60,7 +60,7 @@ impl<'a> Shape<'a> {
         Ok(())
     }
 
-    /// Moves every vertex with the joints that hold it.
+    /// Skins every vertex.
     pub fn skin(
         &mut self,
         what: &str,
@@ -92,7 +92,8 @@ impl<'a> Shape<'a> {
     }
 }
 
-/// The map of one vertex. Weights are shares of their sum: quantised ones rarely add up. Without any the first joint holds it.
+/// The transform of one vertex. Weights are divided by their sum, because quantised ones rarely add
+/// up to 1. Without weights the first joint counts.
 fn blend(sets: &[Influences], vertex: usize, joints: &[Affine]) -> Option<Affine> {
     let pairs =
         || sets.iter().flat_map(move |set| (0..4).map(move |k| (set.joints[vertex][k], set.weights[vertex][k])));

@@ -1,0 +1,74 @@
+//! Visibility of nodes. Hidden nodes and their children are not drawn, and only one level of detail
+//! is.
+
+use crate::import::MeshError;
+use crate::import::context::Context;
+use ufbx::{ElementData, LodDisplay, Node, Scene};
+
+/// The visibility of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Visibility {
+    /// It is drawn.
+    Shown,
+    /// The file hides it or a parent.
+    Hidden,
+    /// It belongs to a level of detail that is not drawn.
+    OtherDetailLevel,
+}
+
+/// The visibility of all nodes of a scene.
+pub struct Visibilities(Vec<Visibility>);
+
+impl Visibilities {
+    /// Finds it. Parents come before their children in a scene.
+    pub fn of(scene: &Scene, cx: &mut Context<'_>) -> Result<Self, MeshError> {
+        cx.budget.spend("the nodes of the FBX file", scene.nodes.len() as u64, size_of::<Visibility>() as u64)?;
+        let mut visibilities = vec![Visibility::Shown; scene.nodes.len()];
+        for (i, node) in (&scene.nodes).into_iter().enumerate() {
+            if i.is_multiple_of(4096) {
+                cx.deadline.check()?;
+            }
+            let above =
+                node.parent.as_ref().and_then(|parent| visibilities.get(parent.element.typed_id as usize)).copied();
+            let own = match above {
+                _ if !node.visible => Visibility::Hidden,
+                Some(Visibility::Hidden) if inherits(node) => Visibility::Hidden,
+                Some(Visibility::OtherDetailLevel) => Visibility::OtherDetailLevel,
+                // Already set by its group.
+                _ => visibilities[i],
+            };
+            visibilities[i] = own;
+            if own == Visibility::Shown {
+                for (level, child) in (&node.children).into_iter().enumerate() {
+                    if let Some(visibility) =
+                        visibilities.get_mut(child.element.typed_id as usize).filter(|_| !is_drawn(node, level))
+                    {
+                        *visibility = Visibility::OtherDetailLevel;
+                    }
+                }
+            }
+        }
+        Ok(Self(visibilities))
+    }
+
+    /// The visibility of a node.
+    pub fn at(&self, node: &Node) -> Visibility {
+        self.0.get(node.element.typed_id as usize).copied().unwrap_or(Visibility::Shown)
+    }
+}
+
+/// True if a hidden parent hides the node.
+fn inherits(node: &Node) -> bool {
+    node.element.props.find_prop("Visibility Inheritance").is_none_or(|prop| prop.value_int != 0)
+}
+
+/// True if a child of a node is the drawn level of detail: the first, which is the finest, unless
+/// the group selects another.
+fn is_drawn(node: &Node, level: usize) -> bool {
+    let Some(ElementData::LodGroup(group)) = node.attrib.as_ref().map(|element| element.as_data()) else { return true };
+    match group.lod_levels.get(level).map(|level| level.display) {
+        Some(LodDisplay::Show) => true,
+        Some(LodDisplay::Hide) => false,
+        Some(LodDisplay::UseLod) | None => level == 0,
+    }
+}
