@@ -15,7 +15,7 @@ impl Measures {
     /// Sums over all triangles, in f64, in the unit box: nothing overflows or cancels there, wherever in the file the mesh lies.
     pub fn of(mesh: &Mesh) -> Self {
         let (mut area, mut volume) = (0.0, 0.0);
-        for t in mesh.own_triangles() {
+        for t in &mesh.triangles {
             let [a, b, c] = t.map(|v| mesh.positions[v as usize].map(f64::from));
             let sub = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
             let n = cross(sub(b, a), sub(c, a));

@@ -87,7 +87,7 @@ impl Draft {
         open.wire = look.has_open_wire();
         open.material_wires = materials.iter().map(|(_, look)| look.has_open_wire()).collect();
         let is_asked = max_error.is_some() || max_time_ms.is_some();
-        let ask = is_asked.then_some(QualityTarget { max_error, max_time_ms, open });
+        let quality_target = is_asked.then_some(QualityTarget { max_error, max_time_ms, open });
         let layers = look.finish("")?;
         let materials = materials.into_iter().map(|(name, look)| {
             let layers = look.finish(&format!("materials.{name}."))?;
@@ -98,7 +98,7 @@ impl Draft {
         check_camera(&camera)?;
         let has_lamps = light.preset != LightPreset::None;
         light.ambient = ambient.unwrap_or(if has_lamps { 0.3 } else { 1.0 });
-        Ok(Spec { layers, materials, topology, time_s, camera, light, image, backend, ask })
+        Ok(Spec { layers, materials, topology, time_s, camera, light, image, backend, quality_target })
     }
 }
 

@@ -107,7 +107,7 @@ impl Camera {
         f64::from(size_px[1]) * 0.5 / (self.half_size.y * w)
     }
 
-    /// The four rows of [`crate::plan::Projection`]: x, y (in 1/256 px from the centre), reversed depth, W.
+    /// The four rows of the projection: x, y (in 1/256 px from the centre), reversed depth, W.
     pub fn rows(&self, size_px: [u32; 2]) -> [[f32; 4]; 4] {
         let [right, up, back] = self.axes;
         let perspective = self.kind == Kind::Perspective;
@@ -153,7 +153,7 @@ impl Extents {
 }
 
 fn positions(mesh: &Mesh, axes: [DVec3; 3]) -> impl Iterator<Item = DVec3> {
-    mesh.own_positions().iter().map(move |p| {
+    mesh.positions.iter().map(move |p| {
         let p = DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
         DVec3::new(axes[0].dot(p), axes[1].dot(p), axes[2].dot(p))
     })

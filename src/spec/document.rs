@@ -27,7 +27,7 @@ pub struct Spec {
     /// Which back-end draws.
     pub backend: BackendChoice,
     /// An error or a time that is asked for in place of what `QualityTarget::open` names; None: nothing is chosen.
-    pub ask: Option<QualityTarget>,
+    pub quality_target: Option<QualityTarget>,
 }
 
 /// Named directions to look from.

@@ -15,7 +15,7 @@ pub struct Fans<'a> {
 impl<'a> Fans<'a> {
     /// Of a mesh and its edges.
     pub fn of(mesh: &'a Mesh, edges: &EdgeList) -> Self {
-        let (triangles, vertices) = (mesh.own_triangles(), mesh.positions.len());
+        let (triangles, vertices) = (&mesh.triangles, mesh.positions.len());
         let mut fans = Self { triangles, vertices, corners: Sets::new(triangles.len() * 3) };
         for edge in edges.edges.iter().filter(|edge| edge.faces[1] != NO_FACE) {
             fans.unite(edge, edge.faces[1]);

@@ -57,7 +57,7 @@ const BYTES_PER_VERTEX: u64 = 4 + 1;
 impl Topology {
     /// Counts.
     pub fn of(mesh: &Mesh, edges: &EdgeList, budget: &mut Budget, deadline: &Deadline) -> Result<Self, MeshError> {
-        budget.spend("the topology", mesh.own_triangles().len() as u64, BYTES_PER_TRIANGLE)?;
+        budget.spend("the topology", mesh.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
         budget.spend("the topology", mesh.positions.len() as u64, BYTES_PER_VERTEX)?;
         let (_, components, vertices) = components(mesh);
         deadline.check()?;
@@ -80,7 +80,7 @@ impl Topology {
             nonmanifold_vertices,
             duplicate_faces,
             inconsistent_edges: count(|faces, alike| faces == 2 && alike),
-            euler_characteristic: vertices as i64 - edges.edges.len() as i64 + mesh.own_triangles().len() as i64,
+            euler_characteristic: vertices as i64 - edges.edges.len() as i64 + mesh.triangles.len() as i64,
             is_watertight: !edges.edges.is_empty() && edges.is_closed(),
             is_orientable: surfaces.is_orientable,
             genus: surfaces.genus().filter(|_| nonmanifold_vertices == 0 && !edges.edges.is_empty()),
@@ -104,7 +104,7 @@ pub enum Fronts {
 pub fn fronts(mesh: &Mesh) -> Fronts {
     let mut sets = components(mesh).0;
     let mut volumes = vec![0.0_f64; mesh.positions.len()];
-    for t in mesh.own_triangles() {
+    for t in &mesh.triangles {
         let [a, b, c] = t.map(|v| mesh.positions[v as usize].map(f64::from));
         let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
         volumes[sets.find(t[0]) as usize] += (a[0] * cross[0] + a[1] * cross[1]) + a[2] * cross[2];
@@ -123,7 +123,7 @@ fn components(mesh: &Mesh) -> (Sets, u64, u64) {
     let mut sets = Sets::new(mesh.positions.len());
     let mut is_met = vec![false; mesh.positions.len()];
     let (mut united, mut vertices) = (0, 0);
-    for t in mesh.own_triangles() {
+    for t in &mesh.triangles {
         united += u64::from(sets.unite(t[0], t[1])) + u64::from(sets.unite(t[0], t[2]));
         for v in *t {
             vertices += u64::from(!std::mem::replace(&mut is_met[v as usize], true));
@@ -133,7 +133,7 @@ fn components(mesh: &Mesh) -> (Sets, u64, u64) {
 }
 
 fn duplicates(mesh: &Mesh) -> u64 {
-    let mut faces = mesh.own_triangles().to_vec();
+    let mut faces = mesh.triangles.clone();
     faces.iter_mut().for_each(|face| face.sort_unstable());
     faces.sort_unstable();
     faces.windows(2).filter(|pair| pair[0] == pair[1]).count() as u64

@@ -15,18 +15,18 @@ use crate::warning::Warning;
 
 /// A request with what it left open filled in.
 #[derive(Clone, Debug)]
-pub struct Chosen {
+pub struct Selected {
     /// What is drawn.
     pub spec: Spec,
     /// What there is to say about it.
-    pub choice: Choice,
+    pub selection: Selection,
     /// Where what was asked for is out of reach.
     pub warnings: Vec<Warning>,
 }
 
 /// What was chosen, and what is expected of it. Results keep it, so it is small.
 #[derive(Clone, Debug)]
-pub struct Choice {
+pub struct Selection {
     /// `image.samples`.
     pub samples: u32,
     /// How wires are drawn, each method once.
@@ -40,11 +40,11 @@ pub struct Choice {
 }
 
 /// Chooses for a mesh of so many triangles; None where nothing is asked for. `has_gpu`: whether `auto` may mean a GPU here.
-pub fn choose(spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Chosen> {
-    choose_from(ErrorTable::shipped(), spec, triangles, has_gpu)
+pub fn select(spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Selected> {
+    select_from(ErrorTable::shipped(), spec, triangles, has_gpu)
 }
 
-impl fmt::Display for Choice {
+impl fmt::Display for Selection {
     /// In the request's own keys.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "image.samples={}", self.samples)?;
@@ -56,31 +56,31 @@ impl fmt::Display for Choice {
 /// The methods whose width can be given in pixels. The others' depends on each triangle's size.
 const METHODS: [WireMethod; 3] = [WireMethod::Exact, WireMethod::Fwidth, WireMethod::FwidthMin];
 
-fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Chosen> {
-    let ask = spec.ask.as_ref()?;
-    let all = candidates(table, spec, ask, triangles, has_gpu);
+fn select_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Selected> {
+    let target = spec.quality_target.as_ref()?;
+    let all = candidates(table, spec, target, triangles, has_gpu);
     let time = |(_, [_, time_ms]): &Candidate| *time_ms;
     let error = |(_, [error, _]): &Candidate| *error;
-    let is_in_time = |c: &&Candidate| ask.max_time_ms.is_none_or(|max| time(c) <= max);
-    let is_exact = |c: &&Candidate| ask.max_error.is_none_or(|max| error(c) <= max);
+    let is_in_time = |c: &&Candidate| target.max_time_ms.is_none_or(|max| time(c) <= max);
+    let is_exact = |c: &&Candidate| target.max_error.is_none_or(|max| error(c) <= max);
     let cheapest = |a: &&Candidate, b: &&Candidate| time(a).total_cmp(&time(b)).then(error(a).total_cmp(&error(b)));
     let best = |a: &&Candidate, b: &&Candidate| error(a).total_cmp(&error(b)).then(time(a).total_cmp(&time(b)));
     let in_time = || all.iter().filter(is_in_time);
-    let wanted = match ask.max_error {
+    let wanted = match target.max_error {
         Some(_) => in_time().filter(is_exact).min_by(cheapest),
         None => None,
     };
     let chosen = wanted.or_else(|| in_time().min_by(best)).or_else(|| all.iter().min_by(cheapest))?;
 
     let mut warnings = Vec::new();
-    if let Some(max) = ask.max_error.filter(|_| !is_exact(&chosen)) {
+    if let Some(max) = target.max_error.filter(|_| !is_exact(&chosen)) {
         let detail = format!(
             "an error of at most {max}/255 is asked for, and the best of what may be chosen is expected to have {}/255",
             error(chosen)
         );
         warnings.push(Warning { code: "max_error_unmet", detail });
     }
-    if let Some(max) = ask.max_time_ms.filter(|_| !is_in_time(&chosen)) {
+    if let Some(max) = target.max_time_ms.filter(|_| !is_in_time(&chosen)) {
         let detail = format!(
             "at most {max} ms are asked for, and the fastest of what may be chosen is expected to take {} ms",
             time(chosen)
@@ -92,19 +92,25 @@ fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool)
     wire_methods.sort_unstable();
     wire_methods.dedup();
     let (samples, backend) = (spec.image.samples, spec.backend);
-    let choice = Choice { samples, wire_methods, backend, expected_error, expected_time_ms };
-    Some(Chosen { spec, choice, warnings })
+    let selection = Selection { samples, wire_methods, backend, expected_error, expected_time_ms };
+    Some(Selected { spec, selection, warnings })
 }
 
 /// A spec, its expected error and its expected time.
 type Candidate = (Spec, [f64; 2]);
 
 /// Every way to fill in what is open, with what is expected of it.
-fn candidates(table: &ErrorTable, spec: &Spec, ask: &QualityTarget, triangles: usize, has_gpu: bool) -> Vec<Candidate> {
-    let samples = if ask.open.samples { vec![1, 4, 8, 16] } else { vec![spec.image.samples] };
-    let has_open_wire = ask.open.wire || ask.open.material_wires.contains(&true);
+fn candidates(
+    table: &ErrorTable,
+    spec: &Spec,
+    target: &QualityTarget,
+    triangles: usize,
+    has_gpu: bool,
+) -> Vec<Candidate> {
+    let samples = if target.open.samples { vec![1, 4, 8, 16] } else { vec![spec.image.samples] };
+    let has_open_wire = target.open.wire || target.open.material_wires.contains(&true);
     let methods = if has_open_wire { METHODS.map(Some).to_vec() } else { vec![None] };
-    let backends = match (ask.open.backend, has_gpu && table.knows_gpu()) {
+    let backends = match (target.open.backend, has_gpu && table.knows_gpu()) {
         (false, _) => vec![spec.backend],
         (true, false) => vec![BackendChoice::Cpu],
         (true, true) => vec![BackendChoice::Cpu, BackendChoice::Auto],
@@ -117,7 +123,7 @@ fn candidates(table: &ErrorTable, spec: &Spec, ask: &QualityTarget, triangles: u
                 let mut spec = spec.clone();
                 spec.image.samples = samples;
                 spec.backend = backend;
-                if method.is_none_or(|method| set_method(&mut spec, ask, method)) {
+                if method.is_none_or(|method| set_method(&mut spec, target, method)) {
                     let known = expect(table, &spec, if is_gpu { "gpu" } else { "cpu" }, triangles);
                     all.extend(known.map(|expected| (spec, expected)));
                 }
@@ -128,9 +134,9 @@ fn candidates(table: &ErrorTable, spec: &Spec, ask: &QualityTarget, triangles: u
 }
 
 /// Draws the open wires so; false where that would not be the same lines.
-fn set_method(spec: &mut Spec, ask: &QualityTarget, method: WireMethod) -> bool {
-    let material_wires = spec.materials.iter_mut().map(|(_, layers)| layers).zip(&ask.open.material_wires);
-    let open = std::iter::once((&mut spec.layers, &ask.open.wire)).chain(material_wires);
+fn set_method(spec: &mut Spec, target: &QualityTarget, method: WireMethod) -> bool {
+    let material_wires = spec.materials.iter_mut().map(|(_, layers)| layers).zip(&target.open.material_wires);
+    let open = std::iter::once((&mut spec.layers, &target.open.wire)).chain(material_wires);
     for wire in open.filter(|(_, is_open)| **is_open).filter_map(|(layers, _)| layers.wire.as_mut()) {
         match as_wide(wire, method) {
             Some(same) => *wire = same,

@@ -1,4 +1,5 @@
-//! Images to textures: decoded only if sampled, each once for each way it is read, and only as large as the picture can show.
+//! Images to textures: decoded only if sampled, once per way of reading them, and only as large as
+//! the picture can show.
 //!
 //! All textures of a picture together have at most [`TEXELS_MAX`] texels: while they have more, the largest one loses its
 //! finest level.
@@ -9,19 +10,21 @@ use std::collections::{BTreeMap, BinaryHeap};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
 use crate::mesh::material::{ImageContent, TextureRef, Wrap};
-use crate::plan::context::PlanContext;
+use crate::plan::geometry::Geometry;
+use crate::plan::projection::Projection;
 use crate::plan::skips::{SkipKind, Skips};
 use crate::plan::surface::closeup;
 use crate::plan::surface::closeup::Use;
-use crate::plan::{PlanError, Projection, Texture, TextureUse, Textures};
+use crate::plan::{PlanError, Texture, TextureUse, Textures};
 use crate::texture::decode;
 use crate::texture::decode::Header;
 use crate::texture::mips;
 
-/// 96 MiB of half floats: bindings of 128 MiB are the most that every GPU has.
+/// Texels of all textures of a picture: 96 MiB of half floats, because bindings of 128 MiB are the
+/// most that every GPU has.
 pub const TEXELS_MAX: u64 = (96 << 20) / 8;
 
-/// Collects what materials ask for, and decodes it at the end.
+/// Collects the textures that materials sample, and decodes them at the end.
 pub struct TextureLoader<'a> {
     mesh: &'a Mesh,
     budget: &'a mut Budget,
@@ -33,7 +36,7 @@ pub struct TextureLoader<'a> {
     uses: Vec<Use>,
 }
 
-/// An image that is read in one way.
+/// An image that is read in one way: as colours or as numbers.
 struct Wanted {
     image: u32,
     is_color: bool,
@@ -41,12 +44,12 @@ struct Wanted {
 }
 
 impl<'a> TextureLoader<'a> {
-    /// Nothing so far.
-    pub fn new(mesh: &'a Mesh, cx: &'a mut PlanContext<'_>) -> Self {
+    /// A loader without textures.
+    pub fn new(mesh: &'a Mesh, budget: &'a mut Budget, deadline: &'a Deadline) -> Self {
         Self {
             mesh,
-            budget: cx.budget,
-            deadline: cx.deadline,
+            budget,
+            deadline,
             material: 0,
             is_used: true,
             wanted: Vec::new(),
@@ -55,7 +58,8 @@ impl<'a> TextureLoader<'a> {
         }
     }
 
-    /// Says whose textures are loaded next. One that no triangle uses (`is_used`) gets none.
+    /// Sets the material whose textures are loaded next. One without triangles (not `is_used`) gets
+    /// none.
     pub fn for_material(&mut self, material: usize, is_used: bool) {
         self.material = material as u32;
         self.is_used = is_used;
@@ -63,7 +67,7 @@ impl<'a> TextureLoader<'a> {
 
     /// A texture for a material; `is_color` says that texels are sRGB.
     pub fn load(&mut self, texture: &TextureRef, is_color: bool) -> Result<TextureUse, PlanError> {
-        // Without coordinates nothing says where it goes.
+        // Without texture coordinates a texture has no place on the mesh.
         let Some(image) =
             self.mesh.images.get(texture.image as usize).filter(|_| self.is_used && !self.mesh.uvs.is_empty())
         else {
@@ -92,14 +96,19 @@ impl<'a> TextureLoader<'a> {
         Ok(TextureUse { transform: texture.transform, texture: index as u32, sampler: sampler(texture) })
     }
 
-    /// Decodes all that was asked for.
-    pub fn finish(self, projection: &Projection, skips: &mut Skips<'_>) -> Result<Textures, PlanError> {
+    /// Decodes all textures that were loaded.
+    pub fn finish(
+        self,
+        geometry: &Geometry<'_>,
+        projection: &Projection,
+        skips: &mut Skips<'_>,
+    ) -> Result<Textures, PlanError> {
         if self.wanted.is_empty() {
             return Ok(Textures::default());
         }
         let Self { mesh, budget, deadline, wanted, uses, .. } = self;
         let sizes: Vec<[u32; 2]> = wanted.iter().map(|w| [w.header.width, w.header.height]).collect();
-        let mut finest = closeup::finest_levels(mesh, projection, &uses, wanted.len(), deadline)?;
+        let mut finest = closeup::finest_levels(mesh, geometry, projection, &uses, wanted.len(), deadline)?;
         for (level, size) in finest.iter_mut().zip(&sizes) {
             *level = (*level).min(mips::count(size[0], size[1]) - 1);
         }
@@ -114,7 +123,7 @@ impl<'a> TextureLoader<'a> {
         let mut most = 0;
         for (want, &first_level) in wanted.iter().zip(&first_levels) {
             let Header { width, height, decoding_bytes, .. } = want.header;
-            // One is decoded after the other, in the memory of the one before.
+            // Images are decoded one after the other, in the memory of the one before.
             let bytes = decoding_bytes.saturating_add(mips::working_bytes(width, height));
             budget.spend("decoding textures", bytes.saturating_sub(most), 1)?;
             most = most.max(bytes);
@@ -141,8 +150,10 @@ fn sampler(texture: &TextureRef) -> u32 {
     wrap(texture.wrap[0]) | wrap(texture.wrap[1]) << 2 | u32::from(texture.nearest) << 4
 }
 
-/// The level from which each texture is kept, given the finest that the picture can show. With or without finer levels
-/// (`skip`), the picture is the same: what the cap takes from the picture does not depend on it.
+/// The finest level that is kept of each texture, given the finest that the picture can show.
+///
+/// The picture is the same with or without finer levels (`skip`): the cap takes the same levels from
+/// it either way.
 fn first_levels(sizes: &[[u32; 2]], finest: &[u32], skip: bool) -> Vec<u32> {
     let mut shown = finest.to_vec();
     halve(sizes, &mut shown, |_| u32::MAX);
@@ -154,7 +165,8 @@ fn first_levels(sizes: &[[u32; 2]], finest: &[u32], skip: bool) -> Vec<u32> {
     kept
 }
 
-/// Takes the finest level from the largest texture (of equal ones the first) until all fit; none beyond `last`.
+/// Takes the finest level from the largest texture (of equal ones the first) until all fit, and no
+/// level beyond `last`.
 fn halve(sizes: &[[u32; 2]], first: &mut [u32], last: impl Fn(usize) -> u32) {
     let texels = |i: usize, first: u32| mips::texels(sizes[i][0], sizes[i][1], first);
     let mut total: u64 = (0..sizes.len()).map(|i| texels(i, first[i])).sum();
@@ -181,7 +193,7 @@ mod tests {
         // With their smaller levels 22.4 + 5.6 + 22.4 million texels; 12.6 are allowed.
         assert_eq!(first_levels(&sizes, &[0; 4], true), [2, 1, 0, 1]);
         assert_eq!(first_levels(&sizes, &[0; 4], false), [2, 1, 0, 1]);
-        // What is not shown does not count, and what is kept beyond that takes nothing from what is.
+        // Levels that are not shown do not count, and keeping them takes nothing from those that are.
         assert_eq!(first_levels(&sizes, &[2, 0, 3, 2], true), [2, 0, 3, 2]);
         let kept = first_levels(&sizes, &[2, 0, 3, 2], false);
         assert_eq!(kept, [2, 0, 0, 2]);

@@ -61,13 +61,20 @@ fn spec() -> Spec {
         light,
         image,
         backend: BackendChoice::Cpu,
-        ask: None,
+        quality_target: None,
     }
 }
 
 fn output(bytes: usize) -> Output {
     let (skips, warnings) = (Vec::new(), Vec::new());
-    Output { bytes: vec![7; bytes], format: ImageFormat::Png, backend: BackendKind::Cpu, skips, warnings, choice: None }
+    Output {
+        bytes: vec![7; bytes],
+        format: ImageFormat::Png,
+        backend: BackendKind::Cpu,
+        skips,
+        warnings,
+        selection: None,
+    }
 }
 
 /// What the mesh bytes make the fake renderer do.
