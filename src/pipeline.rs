@@ -1,8 +1,8 @@
 //! The whole program in one function: bytes -> Mesh -> Scene -> DrawPlan -> back-end -> Image ->
 //! encoded bytes.
 //!
-//! The command line, the synchronous HTTP handler and the job workers all call [`render`]. Those who
-//! want to know what is in a file, and no picture, call [`inspect`].
+//! The command line, the synchronous HTTP handler and the job workers all call [`render`].
+//! [`inspect`] reports what is in a file and draws nothing.
 //!
 //! Invariant: nothing from here down reads a clock, a file or the environment, or knows an async
 //! runtime.

@@ -2,8 +2,8 @@
 //! numbers, never a mesh or a scene.
 //!
 //! [`build()`] makes the plan in stages: `primitives` (lines and points), `lines`, `surface`,
-//! `outline` (hulls) and `peeling` (transparent layers). `quality` runs before it and fills in what a
-//! request leaves open.
+//! `outline` (hulls) and `peeling` (transparent layers). `quality` runs before it and fills in what
+//! a request leaves open.
 //!
 //! Invariant: everything that a scene does not need is left out here, and each omission is written
 //! down in [`DrawPlan::skips`].
@@ -44,23 +44,23 @@ use std::borrow::Cow;
 
 /// Everything a back-end needs for one picture.
 ///
-/// Screen space: x right, y down, in units of 1/256 pixel from the picture's centre. Depth is reversed: larger is nearer,
-/// 0 is infinitely far or nothing.
+/// Screen space: x right, y down, in units of 1/256 pixel from the picture's centre. Depth is
+/// reversed: larger is nearer, 0 is infinitely far or nothing.
 #[derive(Debug)]
 pub struct DrawPlan<'a> {
     /// Columns, at most 4096.
     pub width_px: u32,
     /// Rows, at most 4096.
     pub height_px: u32,
-    /// Pixels beyond the picture, on each side, that have visibility samples too. What is there hides
-    /// the middle of lines whose flanks are in the picture. Nothing else is drawn there.
+    /// Pixels beyond the picture, on each side, that have visibility samples too. What is there
+    /// hides the middle of lines whose flanks are in the picture. Nothing else is drawn there.
     pub margin_px: u32,
     /// Visibility samples per pixel: 1, 4, 8 or 16.
     pub samples: u32,
     /// Positions in the unit box.
     pub positions: SharedSlice<'a, [f32; 3]>,
-    /// Triangles over `positions`. An id in the visibility buffer is an index here, or past them one
-    /// into the hull's triangles.
+    /// Triangles over `positions`. An id in the visibility buffer is an index here, or past them
+    /// one into the hull's triangles.
     pub triangles: SharedSlice<'a, [u32; 3]>,
     /// The passes that draw each triangle: bits of [`pass_mask`]. Empty where all are
     /// [`pass_mask::SURFACE`].
@@ -141,11 +141,11 @@ impl<'a> DrawPlan<'a> {
     }
 }
 
-/// Sample positions inside a pixel, in 1/256 pixel from its upper left corner: the standard patterns
-/// of Direct3D 11 and Vulkan.
+/// Sample positions inside a pixel, in 1/256 pixel from its upper left corner: the standard
+/// patterns of Direct3D 11 and Vulkan.
 ///
-/// No two samples share a row or a column. Their mean is the pixel's centre. All coordinates have the
-/// same remainder modulo 16. With 16 samples it is 8, because as many rows and columns have no
+/// No two samples share a row or a column. Their mean is the pixel's centre. All coordinates have
+/// the same remainder modulo 16. With 16 samples it is 8, because as many rows and columns have no
 /// symmetric places in sixteenths otherwise.
 pub fn sample_offsets(samples: u32) -> &'static [[i32; 2]] {
     const fn scaled<const N: usize>(mut sixteenths: [[i32; 2]; N], shift: i32) -> [[i32; 2]; N] {

@@ -16,9 +16,10 @@ pub const FADE: f32 = 0.25;
 /// Transparent surfaces, peeled off sample by sample.
 ///
 /// Layer 0 of a sample is the nearest triangle with [`pass_mask::LAYER`] (or hull triangle, see
-/// below). Layer k is the nearest behind layer k - 1 by (depth, lowest id first). All of them lie in
-/// front of the visibility buffer's surface unless `behind_surface`. Each is shaded as the surface
-/// is, and they lie over each other and over what the visibility buffer shows, nearest on top.
+/// below). Layer k is the nearest behind layer k - 1 by (depth, lowest id first). All of them lie
+/// in front of the visibility buffer's surface unless `behind_surface`. Each is shaded as the
+/// surface is, and they lie over each other and over what the visibility buffer shows, nearest on
+/// top.
 ///
 /// Where layers stop at the surface, hull triangles are drawn into the layers and not into the
 /// visibility buffer. Such a triangle adds nothing (but counts as a layer) where a nearer layer of

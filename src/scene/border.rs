@@ -18,7 +18,8 @@ pub const POINT_WIDTH: f32 = (POINT_PX / LINE_PX) as f32;
 /// Default width of an outline in pixels.
 const OUTLINE_PX: f32 = 3.0;
 
-/// Default thickness of an outline as a share of the mesh's longest side: 0.03 for a model of side 2.
+/// Default thickness of an outline as a share of the mesh's longest side: 0.03 for a model of side
+/// 2.
 const OUTLINE_OBJECT_SHARE: f32 = 0.015;
 
 /// Largest thickness in units of the box. An outline thicker than the guard band is wide shows

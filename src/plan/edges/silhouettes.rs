@@ -62,8 +62,8 @@ impl Silhouettes {
 
 /// Of more than two faces around an edge, the two beside the widest gap.
 ///
-/// If the gap is wider than half a turn, all faces lie on one side on screen exactly where these two
-/// do. If it is not, there are faces on both sides in every view, and the result is None.
+/// If the gap is wider than half a turn, all faces lie on one side on screen exactly where these
+/// two do. If it is not, there are faces on both sides in every view, and the result is None.
 fn outermost(mesh: &Mesh, ends: [u32; 2], faces: &[u32]) -> Option<[u32; 2]> {
     let at = |v: u32| mesh.positions[v as usize].map(f64::from);
     let minus = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];

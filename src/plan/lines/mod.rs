@@ -27,18 +27,18 @@ pub struct LinePass {
     /// Whether only silhouette edges of this view are drawn: those whose faces all lie on one side
     /// of them on screen.
     pub contour: bool,
-    /// Whether the surface's light falls on the line. Without a surface that is seen the colour stays
-    /// as it is.
+    /// Whether the surface's light falls on the line. Without a surface that is seen the colour
+    /// stays as it is.
     pub lit: bool,
 }
 
 impl LinePass {
-    /// Largest number that areas around a line's end are scaled to. They fit 16 bits, and so does the
-    /// difference of two.
+    /// Largest number that areas around a line's end are scaled to. They fit 16 bits, and so does
+    /// the difference of two.
     pub const SCALED_MAX: f32 = 16_000.0;
 
-    /// Distance from the middle of a line to the farthest pixel centre that it touches, pixels: half
-    /// its width, half its ramp, and half a pixel's diagonal.
+    /// Distance from the middle of a line to the farthest pixel centre that it touches, pixels:
+    /// half its width, half its ramp, and half a pixel's diagonal.
     pub fn reach_px(&self) -> f32 {
         0.5 * self.width_px + 0.5 * self.smoothing_px + std::f32::consts::FRAC_1_SQRT_2
     }
@@ -56,7 +56,8 @@ impl LinePass {
         (0.5 * self.reach_px()).clamp(8.0, 24.0)
     }
 
-    /// The largest power of two that scales areas around the line's end to at most [`LinePass::SCALED_MAX`].
+    /// The exponent of the largest power of two that scales areas around the line's end to at most
+    /// [`LinePass::SCALED_MAX`].
     pub fn square_exponent(&self) -> u32 {
         let outer = 0.5 * self.width_px + 0.5 * self.smoothing_px;
         (1..=13).rev().find(|&e| (outer + 1.5) * (1 << e) as f32 <= Self::SCALED_MAX).unwrap_or(1)
@@ -115,8 +116,8 @@ impl Edge {
     /// No triangle.
     pub const NO_FACE: u32 = u32::MAX;
 
-    /// An edge that runs from the smaller position to the larger, so that a line's bytes do not depend
-    /// on the order, the numbers and the winding of the faces that have the edge.
+    /// An edge that runs from the smaller position to the larger, so that a line's bytes do not
+    /// depend on the order, the numbers and the winding of the faces that have the edge.
     pub fn new(positions: &[[f32; 3]], [a, b]: [u32; 2], faces: [u32; 2]) -> Self {
         let is_in_order = positions[a as usize] <= positions[b as usize];
         Self { vertices: if is_in_order { [a, b] } else { [b, a] }, faces }

@@ -1,9 +1,9 @@
 //! The hull: an outline around surfaces, as a mesh of triangles that are on screen already.
 //!
 //! Users know inverted hulls, copies of a mesh pushed out along its normals. This outline mesh
-//! differs: a plan knows its camera, so it draws the border itself, as wide as it should be and with
-//! round corners. Beside each [silhouette edge](silhouette_edges) lies an [offset quad](build), and
-//! around the vertices between two of them a [round join](round_join).
+//! differs: a plan knows its camera, so it draws the border itself, as wide as it should be and
+//! with round corners. Beside each [silhouette edge](silhouette_edges) lies an [offset
+//! quad](build), and around the vertices between two of them a [round join](round_join).
 
 pub(crate) mod build;
 pub(crate) mod round_join;
@@ -15,20 +15,20 @@ pub use build::hull_pass;
 
 use super::shared_slice::SharedSlice;
 
-/// Triangles beside the edges where a surface ends in this view. They are drawn from both sides, and
-/// surfaces before them hide them.
+/// Triangles beside the edges where a surface ends in this view. They are drawn from both sides,
+/// and surfaces before them hide them.
 #[derive(Clone, Debug, Default)]
 pub struct HullPass<'a> {
     /// Premultiplied linear RGBA, by material index; one where all are the same.
     pub colors: Vec<[f32; 4]>,
     /// Corners that are not the mesh's.
     pub vertices: Vec<HullVertex>,
-    /// Indices into the plan's positions, followed by `vertices`. Those into the positions lie before
-    /// the near plane and not far outside the picture, so nothing needs clipping.
+    /// Indices into the plan's positions, followed by `vertices`. Those into the positions lie
+    /// before the near plane and not far outside the picture, so nothing needs clipping.
     pub triangles: Vec<[u32; 3]>,
-    /// A material index per triangle of the plan; empty where all are the same. Unlike the surface's
-    /// materials, equal ones are not merged: the index also says what hides which hull, see
-    /// [`PeelingPass`](super::PeelingPass).
+    /// A material index per triangle of the plan; empty where all are the same. Unlike the
+    /// surface's materials, equal ones are not merged: the index also says what hides which hull,
+    /// see [`PeelingPass`](super::PeelingPass).
     pub surface_materials: SharedSlice<'a, u32>,
     /// A material index per triangle of the hull; empty where all are the same.
     pub triangle_materials: Vec<u32>,

@@ -18,7 +18,8 @@ pub struct SilhouetteEdge {
     pub vertices: [u32; 2],
     /// Its faces that are drawn.
     pub faces: [u32; 2],
-    /// The side that is free, as the sign of `(end - start) x (point - end)` on screen, where y points down.
+    /// The side that is free, as the sign of `(end - start) x (point - end)` on screen, where y
+    /// points down.
     pub free: i8,
     /// The material whose outline it is.
     pub material: u32,
@@ -117,7 +118,8 @@ impl<'a> ScreenMesh<'a> {
         faces.iter().filter_map(of).filter(|&m| outlines.get(m as usize).is_some_and(Option::is_some)).min()
     }
 
-    /// The sides of an edge on which its surface ends. An only face that is seen edge on ends on both.
+    /// The sides of an edge on which its surface ends. An only face that is seen edge on ends on
+    /// both.
     fn free_sides(&self, vertices: [u32; 2], faces: [u32; 2]) -> &'static [i8] {
         let [a, b] = faces.map(|face| self.side_of(vertices, face));
         match (a < 0 || b < 0, a > 0 || b > 0) {
@@ -145,8 +147,8 @@ fn cull(groups: &MaterialGroups<'_>, material: usize) -> Cull {
     }
 }
 
-/// The side that a triangle shows: the sign of the volume that it spans with the eye. It is right for
-/// corners behind the eye too.
+/// The side that a triangle shows: the sign of the volume that it spans with the eye. It is right
+/// for corners behind the eye too.
 fn facing(mesh: &Mesh, places: &[[f64; 3]], triangle: [u32; 3]) -> i8 {
     // Corners are sorted, so that rounding does not depend on which comes first or on the winding.
     let mut sorted = triangle;

@@ -14,7 +14,8 @@ use crate::scene::camera::Camera;
 use crate::scene::{LINE_PX, POINT_PX, Scene};
 use crate::spec::ProjectionKind;
 
-/// Radius of a circle over the circumradius of the hexagon that has its area: sqrt(3 sqrt(3) / (2 pi)).
+/// Radius of a circle over the circumradius of the hexagon that has its area: sqrt(3 sqrt(3) / (2
+/// pi)).
 const HEXAGON: f64 = 0.909_388_9;
 
 /// Distance by which the triangles are moved towards the viewer, pixels, so that a line on a

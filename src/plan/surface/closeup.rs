@@ -1,21 +1,24 @@
 //! How close a picture comes to a texture: the finest level that any pixel can reach. Finer levels
 //! need not be kept.
 //!
-//! The sampler takes the level log2(max(|a|, |b|)), a and b being the derivatives of the texel coordinates across and down a
-//! pixel. max(|a|, |b|)^2 >= |a x b|, the texels that a pixel covers. Over a triangle with screen corners s_i, texel corners
-//! t_i and distances W_i, perspective interpolation gives
+//! The sampler takes the level log2(max(|a|, |b|)), a and b being the derivatives of the texel
+//! coordinates across and down a pixel. max(|a|, |b|)^2 >= |a x b|, the texels that a pixel covers.
+//! Over a triangle with screen corners s_i, texel corners t_i and distances W_i, perspective
+//! interpolation gives
 //!
 //! ```text
 //! |a x b| (p) = area(t) / area(s) * W(p)^3 / (W_0 W_1 W_2)
 //! ```
 //!
-//! (u and v are ratios of functions that are linear on screen, with the denominator 1 / W; the Jacobian of such a ratio is a
-//! determinant of the planes over the denominator's cube.) A pixel is shaded at the mean of its samples, which lie inside the
-//! triangle, where W is at least the smallest W_i. So the least of this over all triangles bounds the level from below.
+//! (u and v are ratios of functions that are linear on screen, with the denominator 1 / W; the
+//! Jacobian of such a ratio is a determinant of the planes over the denominator's cube.) A pixel is
+//! shaded at the mean of its samples, which lie inside the triangle, where W is at least the
+//! smallest W_i. So the least of this over all triangles bounds the level from below.
 //!
-//! Rounding: corners are snapped to whole units of 1/256 px, so area(s) may be larger than the true one, by at most
-//! e perimeter + 3 e^2 for corners that move by e; and f32 coordinates make area(t) uncertain in the same way. Both
-//! are taken at their worst. A corner that is snapped nowhere, behind the eye or far outside, keeps every level.
+//! Rounding: corners are snapped to whole units of 1/256 px, so area(s) may be larger than the true
+//! one, by at most e perimeter + 3 e^2 for corners that move by e; and f32 coordinates make area(t)
+//! uncertain in the same way. Both are taken at their worst. A corner that is snapped nowhere,
+//! behind the eye or far outside, keeps every level.
 
 use crate::limits::{Deadline, Stopped};
 use crate::mesh::Mesh;
@@ -35,8 +38,8 @@ pub struct Use {
     pub texels: f64,
 }
 
-/// For each of `count` textures, a level that is reached or exceeded by every pixel that samples the
-/// texture.
+/// For each of `count` textures, a level that is reached or exceeded by every pixel that samples
+/// the texture.
 pub fn finest_levels(
     mesh: &Mesh,
     geometry: &Geometry<'_>,
@@ -81,8 +84,8 @@ pub fn finest_levels(
     Ok(levels)
 }
 
-/// The level at which a pixel covers `density` texels of level 0, rounded down, with a margin for the sampler's own
-/// rounding.
+/// The level at which a pixel covers `density` texels of level 0, rounded down, with a margin for
+/// the sampler's own rounding.
 fn level(density: f64) -> u32 {
     let (mut level, mut texels) = (0, 4.0 * 1.08);
     while level < 31 && texels <= density {
@@ -92,8 +95,8 @@ fn level(density: f64) -> u32 {
     level
 }
 
-/// The factor of the texel area: `W^3 / (W_0 W_1 W_2) / area(s)` at the nearest corner, in 1 / px^2.
-/// None where a corner is outside.
+/// The factor of the texel area: `W^3 / (W_0 W_1 W_2) / area(s)` at the nearest corner, in 1 /
+/// px^2. None where a corner is outside.
 fn on_screen(corners: [[f32; 3]; 3], projection: &Projection) -> Option<f64> {
     /// 4096 px, in 1/256 px.
     const GUARD: f64 = 1_048_576.0;

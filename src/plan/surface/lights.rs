@@ -7,10 +7,12 @@ use crate::plan::{Lamp, Lights};
 use crate::scene::camera::Camera;
 use crate::spec::{Light, LightPreset};
 
-/// A lamp's place in the camera's axes (right, up, towards the viewer) and its share of the intensity.
+/// A lamp's place in the camera's axes (right, up, towards the viewer) and its share of the
+/// intensity.
 type Place = ([f64; 3], f32);
 
-/// A lamp over the viewer's left shoulder. One straight ahead would leave shapes without a lit side.
+/// A lamp over the viewer's left shoulder. One straight ahead would leave shapes without a lit
+/// side.
 const HEADLIGHT: &[Place] = &[([-0.5, 0.7, 1.0], 1.0)];
 
 /// A key light from the left and above, a weak fill light from the right that keeps the shadow side

@@ -90,7 +90,8 @@ pub struct TextureUse {
     pub transform: [[f32; 3]; 2],
     /// Index into [`Textures::images`], or [`TEXTURE_NONE`].
     pub texture: u32,
-    /// Bits 0 to 1: wrap across (0 repeat, 1 mirror, 2 clamp); bits 2 to 3: wrap down; bit 4: nearest texel.
+    /// Bits 0 to 1: wrap across (0 repeat, 1 mirror, 2 clamp); bits 2 to 3: wrap down; bit 4:
+    /// nearest texel.
     pub sampler: u32,
 }
 
@@ -160,7 +161,8 @@ pub struct Textures {
     pub images: Vec<Texture>,
 }
 
-/// An image in [`Textures::texels`]. Level k is `max(1, width >> k)` by `max(1, height >> k)` texels.
+/// An image in [`Textures::texels`]. Level k is `max(1, width >> k)` by `max(1, height >> k)`
+/// texels.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Texture {
@@ -183,7 +185,8 @@ pub struct Texture {
 pub struct Lights {
     /// The lamps, at most [`Lights::LAMPS_MAX`].
     pub lamps: Vec<Lamp>,
-    /// Share of light that comes from everywhere, 0 to 1. It is brighter from above than from below.
+    /// Share of light that comes from everywhere, 0 to 1. It is brighter from above than from
+    /// below.
     pub ambient: f32,
 }
 

@@ -1,8 +1,8 @@
 //! Images to textures: decoded only if sampled, once per way of reading them, and only as large as
 //! the picture can show.
 //!
-//! All textures of a picture together have at most [`TEXELS_MAX`] texels: while they have more, the largest one loses its
-//! finest level.
+//! All textures of a picture together have at most [`TEXELS_MAX`] texels: while they have more, the
+//! largest one loses its finest level.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -152,8 +152,8 @@ fn sampler(texture: &TextureRef) -> u32 {
 
 /// The finest level that is kept of each texture, given the finest that the picture can show.
 ///
-/// The picture is the same with or without finer levels (`skip`): the cap takes the same levels from
-/// it either way.
+/// The picture is the same with or without finer levels (`skip`): the cap takes the same levels
+/// from it either way.
 fn first_levels(sizes: &[[u32; 2]], finest: &[u32], skip: bool) -> Vec<u32> {
     let mut shown = finest.to_vec();
     halve(sizes, &mut shown, |_| u32::MAX);
@@ -193,7 +193,8 @@ mod tests {
         // With their smaller levels 22.4 + 5.6 + 22.4 million texels; 12.6 are allowed.
         assert_eq!(first_levels(&sizes, &[0; 4], true), [2, 1, 0, 1]);
         assert_eq!(first_levels(&sizes, &[0; 4], false), [2, 1, 0, 1]);
-        // Levels that are not shown do not count, and keeping them takes nothing from those that are.
+        // Levels that are not shown do not count, and keeping them takes nothing from those that
+        // are.
         assert_eq!(first_levels(&sizes, &[2, 0, 3, 2], true), [2, 0, 3, 2]);
         let kept = first_levels(&sizes, &[2, 0, 3, 2], false);
         assert_eq!(kept, [2, 0, 0, 2]);

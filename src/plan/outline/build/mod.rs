@@ -19,11 +19,12 @@ use crate::spec::OutlineMethod;
 /// 1/256 px in a pixel.
 const PX: f64 = 256.0;
 
-/// The widest outline, pixels: one around something beside the picture still lies in the guard band.
+/// The widest outline, pixels: one around something beside the picture still lies in the guard
+/// band.
 const THICKNESS_MAX_PX: f64 = 1000.0;
 
-/// Slope at which an outline recedes from its edge: length in depth per length across. Surfaces next
-/// to the edge hide the outline, and what is farther behind does not.
+/// Slope at which an outline recedes from its edge: length in depth per length across. Surfaces
+/// next to the edge hide the outline, and what is farther behind does not.
 const RECEDES: f64 = 0.5;
 
 /// Largest slope of an outline that follows a face beyond its edge, so that it lies behind what
@@ -106,8 +107,8 @@ impl<'a> OutlineMesh<'a> {
         let along = |row: &[f32; 4]| (0..3).map(|k| f64::from(row[k]) * f64::from(p.to_viewer[k])).sum::<f64>();
         let scale = (0..3).map(|k| f64::from(p.x[k]) * f64::from(p.x[k])).sum::<f64>().sqrt();
         let half = size_px.map(|size| 0.5 * PX * f64::from(size + 2 * margin_px));
-        // An offset quad has at most four corners of its own, and two triangles with a material. Joins
-        // keep both ends.
+        // An offset quad has at most four corners of its own, and two triangles with a material.
+        // Joins keep both ends.
         let bytes = 4 * size_of::<HullVertex>() + 2 * (size_of::<[u32; 3]>() + 4) + 2 * size_of::<EdgeEnd>();
         cx.budget.spend("an outline's strips", edges.len() as u64, bytes as u64)?;
         let hull = HullPass {
@@ -141,9 +142,9 @@ impl<'a> OutlineMesh<'a> {
         }
         let along = way.map(|v| v / length);
         let out = f64::from(edge.free);
-        // The outer side touches the circles around both ends, of which one may be nearer and larger.
-        // Where that circle surrounds the other one, the quad is empty and the nearer end's join
-        // reaches around.
+        // The outer side touches the circles around both ends, of which one may be nearer and
+        // larger. Where that circle surrounds the other one, the quad is empty and the nearer end's
+        // join reaches around.
         let sine = ((reach[0] - reach[1]) / length).clamp(-1.0, 1.0);
         let cosine = (1.0 - sine * sine).sqrt();
         let normal = [sine * along[0] - cosine * out * along[1], sine * along[1] + cosine * out * along[0]];
@@ -190,8 +191,8 @@ impl<'a> OutlineMesh<'a> {
         reach.min(PX * THICKNESS_MAX_PX)
     }
 
-    /// The part of an edge before the near plane whose outline may be in the picture, and which of its
-    /// two ends are the edge's own.
+    /// The part of an edge before the near plane whose outline may be in the picture, and which of
+    /// its two ends are the edge's own.
     fn on_screen(&self, edge: &SilhouetteEdge) -> Option<([ScreenPoint; 2], [bool; 2])> {
         let near = f64::from(self.view.projection.near_w) * (1.0 + 1e-5);
         let [a, b] = edge.vertices.map(|v| self.homogeneous(v));

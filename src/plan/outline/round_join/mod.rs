@@ -1,6 +1,6 @@
-//! Round joins of outlines: around a vertex, the triangles between the offset quads of two silhouette
-//! edges that meet there. Where the vertex's own faces hide one of the two edges, the join is left
-//! out where these faces cover it.
+//! Round joins of outlines: around a vertex, the triangles between the offset quads of two
+//! silhouette edges that meet there. Where the vertex's own faces hide one of the two edges, the
+//! join is left out where these faces cover it.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
@@ -24,8 +24,8 @@ const TRIANGLES_MAX_PER_PX: f64 = 16.0;
 /// Largest angle of a chord. Of half a turn, 3.14, no triangle would be left.
 const CHORD_MAX: f64 = 2.8;
 
-/// Gaps between two edges up to which they are the tip of a needle, narrowed by rounding. The outline
-/// goes all around such a tip.
+/// Gaps between two edges up to which they are the tip of a needle, narrowed by rounding. The
+/// outline goes all around such a tip.
 const GAP_MIN: f64 = 1e-9;
 
 /// The narrowest piece of a join, as an angle.
@@ -77,8 +77,8 @@ impl RoundJoins {
 
     /// Puts the ends in order, by vertex and angle.
     fn sort(&mut self, deadline: &Deadline) -> Result<(), Stopped> {
-        // Of two ends in one direction, the one whose edge is free below comes first: the gap from the
-        // other to it is a whole turn.
+        // Of two ends in one direction, the one whose edge is free below comes first: the gap from
+        // the other to it is a whole turn.
         let order = |a: &EdgeEnd, b: &EdgeEnd| {
             (a.vertex.cmp(&b.vertex)).then(a.angle.total_cmp(&b.angle)).then(a.free.cmp(&b.free))
         };

@@ -53,7 +53,8 @@ fn swept(ends: Vec<EdgeEnd>) -> f64 {
 #[test]
 fn joins_fill_what_offset_quads_leave() {
     let near = |got: f64, want: f64| assert!((got - want).abs() < 1e-6, "{got}, not {want}");
-    // A corner of a square, where three quarters of a turn are free; one that turns inwards; a needle, and one that is rounded flat.
+    // A corner of a square, where three quarters of a turn are free; one that turns inwards; a
+    // needle, and one that is rounded flat.
     near(swept(corner(0, [0.0, 1.5 * PI], 4.0).into()), FRAC_PI_2);
     near(swept(corner(0, [3.0, 3.0 + 1.5 * PI - TAU], 4.0).into()), FRAC_PI_2);
     near(swept(corner(0, [0.0, FRAC_PI_2], 4.0).into()), 0.0);
@@ -67,8 +68,8 @@ fn joins_fill_what_offset_quads_leave() {
     near(swept(two), 0.0);
 }
 
-/// A face that covers most of a join of a quarter of a turn leaves its two borders, if one of the two
-/// edges is hidden.
+/// A face that covers most of a join of a quarter of a turn leaves its two borders, if one of the
+/// two edges is hidden.
 #[test]
 fn faces_cut_joins_beside_edges_that_they_hide() {
     let occlusion = VertexOcclusion::of_one(0, [FRAC_PI_2 + 0.2, PI - 0.3]);

@@ -76,8 +76,8 @@ impl VertexOcclusion {
         Self { arcs: vec![Arc { vertex, from, to, slope: [0.0; 2] }] }
     }
 
-    /// Calls `each` with the parts of a range of angles around a vertex that no face covers. The range
-    /// begins between 0 and a whole turn, and is at most a whole turn long.
+    /// Calls `each` with the parts of a range of angles around a vertex that no face covers. The
+    /// range begins between 0 and a whole turn, and is at most a whole turn long.
     pub fn gaps(&self, vertex: u32, [from, to]: [f64; 2], mut each: impl FnMut([f64; 2])) {
         let first = self.arcs.partition_point(|arc| arc.vertex < vertex);
         let mut free_from = from;
@@ -98,14 +98,14 @@ impl VertexOcclusion {
 }
 
 impl Arc {
-    /// Whether the face hides an edge that leaves its corner: it covers the edge's direction, and is
-    /// nearer there.
+    /// Whether the face hides an edge that leaves its corner: it covers the edge's direction, and
+    /// is nearer there.
     fn hides(&self, end: &EdgeEnd) -> bool {
         let angle = wrapped(end.angle);
         let slope = self.slope[0] * libm::cos(angle) + self.slope[1] * libm::sin(angle);
         let rounded = EQUAL * (self.slope[0].abs() + self.slope[1].abs() + end.slope.abs());
-        // An arc past a whole turn is stored as two, and the direction to the right is at both ends of
-        // the turn.
+        // An arc past a whole turn is stored as two, and the direction to the right is at both ends
+        // of the turn.
         let is_within = |angle: f64| angle >= self.from - EQUAL && angle <= self.to + EQUAL;
         [angle, angle + TAU, angle - TAU].into_iter().any(is_within) && slope > end.slope + rounded
     }
@@ -144,15 +144,16 @@ fn arcs(ends: &[EdgeEnd], view: &ScreenMesh<'_>, cx: &mut PlanContext<'_>) -> Re
 /// of a face that is not drawn or seen edge on.
 fn face_arcs(view: &ScreenMesh<'_>, face: u32, [at, next, last]: [u32; 3]) -> [Option<Arc>; 2] {
     let shown = view.shown(face).unwrap_or(0);
-    // The direction in which a side leaves: the derivative of its place on screen, which is right even
-    // where the other end lies behind the eye.
+    // The direction in which a side leaves: the derivative of its place on screen, which is right
+    // even where the other end lies behind the eye.
     let here = view.places[at as usize];
     let angle = |there: u32| {
         let there = view.places[there as usize];
         let [x, y] = [0, 1].map(|axis| there[axis] * here[2] - here[axis] * there[2]);
         libm::atan2(y, x)
     };
-    // Y points down, so angles grow from the first to the last corner of a face that shows its back.
+    // Y points down, so angles grow from the first to the last corner of a face that shows its
+    // back.
     let (from, to) = match shown {
         0 => return [None; 2],
         1 => (angle(next), angle(last)),
@@ -169,7 +170,8 @@ fn face_arcs(view: &ScreenMesh<'_>, face: u32, [at, next, last]: [u32; 3]) -> [O
     [arc(from, (from + width).min(TAU)), arc(0.0, from + width - TAU)]
 }
 
-/// Change of a face's depth right and down: `Z = (gx x + gy y + c) W` for all corners, by Cramer's rule.
+/// Change of a face's depth right and down: `Z = (gx x + gy y + c) W` for all corners, by Cramer's
+/// rule.
 fn slope(view: &ScreenMesh<'_>, corners: [u32; 3]) -> [f64; 2] {
     let [p, q, r] = corners.map(|v| {
         let [x, y, w] = view.places[v as usize];
