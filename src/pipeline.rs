@@ -13,7 +13,7 @@ use crate::image::ImageFormat;
 use crate::import::{self, Bundle, Format, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::plan::{self, Skip};
-pub use crate::plan::{PlanError, Selection};
+pub use crate::plan::{PlanError, QualitySelection};
 use crate::report::Report;
 use crate::scene::{Scene, SceneError};
 use crate::spec::Spec;
@@ -37,7 +37,7 @@ pub fn render(
     ended(Stage::Parse);
 
     // Mesh -> Scene -> DrawPlan
-    let selected = plan::select(job.spec, mesh.triangles.len(), backends.has_gpu());
+    let selected = plan::select_quality(job.spec, mesh.triangles.len(), backends.has_gpu());
     let spec = selected.as_ref().map_or(job.spec, |selected| &selected.spec);
     let scene = Scene::new(&mesh, spec, &mut budget)?;
     let plan = plan::build(&scene, &mut budget, deadline)?;
@@ -97,12 +97,12 @@ pub struct Output {
     pub format: ImageFormat,
     /// The back-end that drew it.
     pub backend: BackendKind,
-    /// What the plan leaves out, and why.
+    /// The parts of drawing that the plan leaves out, with reasons.
     pub skips: Vec<Skip>,
     /// Faults that the importer noticed, and parts of the request that do not go with the mesh.
     pub warnings: Vec<Warning>,
-    /// What was selected for a request with a quality target; None for others.
-    pub selection: Option<Selection>,
+    /// The values selected for a request with a quality target; None for other requests.
+    pub selection: Option<QualitySelection>,
 }
 
 /// The stages whose durations a response reports. Each is announced when it ends.

@@ -1,4 +1,4 @@
-//! What every stage of planning spends, shares and writes down.
+//! The state that the stages of one plan share: budget, deadline, skips, and the mesh's edges.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ pub struct PlanContext<'c> {
     pub budget: &'c mut Budget,
     /// The time limit.
     pub deadline: &'c Deadline,
-    /// What was left out so far.
+    /// The skips so far.
     pub skips: Skips<'c>,
     edges: Option<Arc<EdgeList>>,
     silhouettes: Option<Arc<Silhouettes>>,

@@ -4,7 +4,7 @@
 use super::shared_slice::SharedSlice;
 use crate::mesh::Mesh;
 
-/// What a plan draws as triangles.
+/// Everything that a plan draws as triangles of the mesh's kind.
 ///
 /// The mesh's own positions and triangles come first and keep their numbers. Nothing is written
 /// back into the mesh: triangles that face the camera of one picture are part of its plan.
@@ -22,7 +22,7 @@ pub struct Geometry<'m> {
     pub attribute_triangles: SharedSlice<'m, [u32; 3]>,
     /// Vertex normals of the file, among the attributes; empty where it has none.
     pub normals: SharedSlice<'m, [f32; 3]>,
-    /// How many of the triangles are the mesh's own. Only these have edges.
+    /// Number of triangles that are the mesh's own. Only these have edges.
     pub mesh_triangle_count: usize,
 }
 

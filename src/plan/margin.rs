@@ -1,4 +1,4 @@
-//! How far beyond the picture samples are taken.
+//! The margin: how far beyond the picture samples are taken.
 //!
 //! A line is as wide as half a window around its edge, so a pixel at the picture's border may
 //! belong to a line whose middle lies beyond it. What hides that middle is only known where there

@@ -32,7 +32,7 @@ pub use lines::{Edge, LinePass, Shown, Side};
 pub use outline::{HullPass, HullVertex};
 pub use peeling::{PeelingPass, pass_mask};
 pub use projection::Projection;
-pub use quality::{Selected, Selection, select};
+pub use quality::{QualitySelection, SelectedSpec, select_quality};
 pub use shared_slice::SharedSlice;
 pub use skips::{Skip, SkipKind};
 pub use surface::{
@@ -77,7 +77,7 @@ pub struct DrawPlan<'a> {
     pub lines: Vec<LinePass>,
     /// Premultiplied linear RGBA behind everything.
     pub background: [f32; 4],
-    /// What the plan leaves out, and why.
+    /// Work that the plan leaves out, and why.
     pub skips: Vec<Skip>,
 }
 

@@ -95,7 +95,7 @@ pub fn pass_masks(
     has_surface: bool,
     pass: Option<&PeelingPass>,
 ) -> Cow<'static, [u8]> {
-    let by_material: Vec<u8> = (0..groups.len()).map(|m| material_mask(groups, m, pass)).collect();
+    let by_material: Vec<u8> = (0..groups.material_count()).map(|m| material_mask(groups, m, pass)).collect();
     let is_default = |mask: u8| {
         (mask & pass_mask::SURFACE != 0 || !has_surface) && mask & (pass_mask::FRONT_ONLY | pass_mask::BACK_ONLY) == 0
     };
@@ -125,7 +125,7 @@ fn material_mask(groups: &MaterialGroups<'_>, material: usize, pass: Option<&Pee
     if pass.is_some_and(|pass| pass.wires_only) && wire.is_some_and(|hidden| hidden != Hidden::Hide) {
         mask |= pass_mask::LAYER;
     }
-    // What all materials cull, the surface pass does not draw anyway.
+    // A side that all materials cull is left out by the surface pass already.
     match layers.surface.map_or(Cull::None, |s| s.cull) {
         cull if cull == groups.common_cull() => {}
         Cull::None => {}

@@ -1,18 +1,18 @@
-//! What a scene does not need. A skip changes no byte of the picture, and can be turned off to show
-//! that.
+//! Skips: work that a plan leaves out because its scene does not need it. A skip changes no byte of
+//! the picture, and can be turned off to show that.
 
 use std::fmt;
 
 /// Something that a plan leaves out, and why its scene does not need it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Skip {
-    /// What is left out.
+    /// The kind of work.
     pub kind: SkipKind,
     /// The reason: "flat shading reads face normals".
     pub why: &'static str,
 }
 
-/// What a plan can leave out.
+/// Kinds of work that a plan can leave out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SkipKind {
     /// Filling and shading a surface.

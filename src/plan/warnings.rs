@@ -1,4 +1,4 @@
-//! What a user should know about a request that does not go with its mesh.
+//! Warnings about a request that does not go with its mesh.
 
 use std::collections::BTreeSet;
 
@@ -41,7 +41,7 @@ pub fn out_of_view(plan: &DrawPlan<'_>) -> Option<Warning> {
 /// Whether each triangle lies behind the eye or wholly beyond one side of the picture: an explicit
 /// camera may look past the mesh.
 ///
-/// Where this is so the picture is blank; a mesh that is missed by a hair may go unnoticed.
+/// If so, the picture is blank. A mesh that is missed narrowly may go unnoticed.
 pub fn is_out_of_view(plan: &DrawPlan<'_>) -> bool {
     // A hull holds only triangles that may be in the picture.
     let has_hull = plan.hull.as_ref().is_some_and(|hull| !hull.triangles.is_empty());

@@ -1,5 +1,4 @@
-//! How much wider than its mesh a picture is: the room that outlines, lines and points need when
-//! the camera is fitted.
+//! The room around a mesh that its outlines, lines and points need when the camera is fitted.
 
 use super::camera::Border;
 use super::material_groups::MaterialGroups;
@@ -26,7 +25,7 @@ const OUTLINE_OBJECT_SHARE: f32 = 0.015;
 /// nothing but itself.
 const OUTLINE_OBJECT_MAX: f32 = 16.0;
 
-/// How far an outline reaches from its silhouette edge.
+/// The distance that an outline reaches from its silhouette edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Thickness {
     /// In units of the box, as seen at each point's depth.

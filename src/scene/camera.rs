@@ -196,7 +196,7 @@ fn explicit_axes(mesh: &Mesh, up: UpAxis, eye: [f64; 3], target: [f64; 3]) -> ([
     ([side, back.cross(side), back], Some((target, (eye - target).length())))
 }
 
-/// The wish with the lens of the file's camera.
+/// The requested camera with the lens of the file's camera.
 fn through(spec: &CameraSpec, camera: &FileCamera) -> CameraSpec {
     match camera.lens {
         FileLens::Perspective { fov_deg } => {

@@ -24,14 +24,14 @@ pub struct MaterialGroups<'s> {
     needs_occluder: bool,
 }
 
-/// How the surface of a material group is filled.
+/// The fill of a material group's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fill {
     /// No fill.
     None,
     /// Nothing shines through.
     Opaque,
-    /// What is behind may shine through.
+    /// Surfaces behind may shine through.
     Transparent,
 }
 
@@ -60,7 +60,7 @@ impl<'s> MaterialGroups<'s> {
     }
 
     /// Number of materials.
-    pub fn len(&self) -> usize {
+    pub fn material_count(&self) -> usize {
         self.by_material.len()
     }
 
@@ -117,7 +117,7 @@ impl<'s> MaterialGroups<'s> {
     }
 }
 
-/// How a style treats the hidden edges of its barycentric wire, if it has one.
+/// The treatment of hidden edges in a style's barycentric wire, if the style has one.
 pub fn barycentric_wire(layers: &Layers) -> Option<Hidden> {
     layers.wire.filter(|wire| wire.method != WireMethod::Exact).map(|wire| wire.hidden)
 }

@@ -19,7 +19,7 @@ use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::spec::{Outline, Spec};
 
-/// What one picture shows, and from where.
+/// The content of one picture and the camera that sees it.
 ///
 /// The mesh and the request have lifetimes of their own, because a plan borrows from the mesh but
 /// outlives the request.
@@ -63,7 +63,7 @@ impl<'m, 's> Scene<'m, 's> {
         [self.spec.image.width_px, self.spec.image.height_px]
     }
 
-    /// How far an outline reaches from its silhouette edge.
+    /// The distance that an outline reaches from its silhouette edge.
     pub fn outline_thickness(&self, outline: &Outline) -> Thickness {
         outline_thickness(self.mesh, outline)
     }

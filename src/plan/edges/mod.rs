@@ -1,6 +1,7 @@
-//! What planning asks of a mesh's edges: which may be silhouette edges, and of which class each is.
+//! Questions about a mesh's edges: which may be silhouette edges, and of which class each is.
 //!
-//! Stages get both through [`PlanContext`](super::context::PlanContext), which finds them once.
+//! Stages get the edges through [`PlanContext`](super::context::PlanContext), which finds them
+//! once.
 
 pub(crate) mod edge_class;
 pub(crate) mod silhouettes;

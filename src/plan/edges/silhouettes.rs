@@ -24,10 +24,10 @@ impl Silhouettes {
     pub fn new(groups: &MaterialGroups<'_>, list: &EdgeList, budget: &mut Budget) -> Result<Self, LimitExceeded> {
         // A list per edge, and a place in the map.
         budget.spend("edges of many faces", list.further_faces.len() as u64, 100)?;
-        budget.spend("materials", groups.len() as u64, 1)?;
+        budget.spend("materials", groups.material_count() as u64, 1)?;
         let has_fill = groups.has_fill();
         let is_absent = |m: usize| has_fill && groups.fill(m) == Fill::None && !groups.is_outlined(m);
-        let is_absent = (0..groups.len()).map(is_absent).collect();
+        let is_absent = (0..groups.material_count()).map(is_absent).collect();
         let mut crowded: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for &[edge, face] in &list.further_faces {
             let first_two = list.edges[edge as usize].faces;
@@ -107,7 +107,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// The side that no face shows: the inside of a closed, opaque surface that is seen from outside.
 pub fn unseen_side(mesh: &Mesh, groups: &MaterialGroups<'_>, list: &EdgeList) -> Option<Side> {
     let covers = if groups.has_fill() { Fill::Opaque } else { Fill::None };
-    if (0..groups.len()).any(|m| groups.fill(m) != covers) || !list.is_closed() {
+    if (0..groups.material_count()).any(|m| groups.fill(m) != covers) || !list.is_closed() {
         return None;
     }
     let (unseen, culled) = match fronts(mesh) {

@@ -45,7 +45,7 @@ pub fn passes(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<Lin
     Ok(passes)
 }
 
-/// Where edges that are drawn come from.
+/// The edges of a scene, from which each style takes its own.
 struct Source<'s> {
     scene: &'s Scene<'s, 's>,
     list: &'s EdgeList,

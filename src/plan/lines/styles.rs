@@ -22,7 +22,7 @@ pub struct LineStyle {
     pub smoothing_px: f32,
     /// As [`LinePass::color`].
     pub color: [f32; 4],
-    /// How the hidden parts of edges are drawn.
+    /// Treatment of the hidden parts of edges.
     pub hidden: Hidden,
     lit: bool,
     /// As [`LinePass::contour`].

@@ -47,7 +47,7 @@ impl<'a> ScreenMesh<'a> {
         let PlanContext { budget, deadline, .. } = cx;
         budget.spend("an outline", mesh.positions.len() as u64, size_of::<[f64; 3]>() as u64)?;
         budget.spend("an outline", mesh.triangles.len() as u64, 1)?;
-        budget.spend("materials", groups.len() as u64, 1)?;
+        budget.spend("materials", groups.material_count() as u64, 1)?;
         let mut places = Vec::with_capacity(mesh.positions.len());
         for positions in mesh.positions.chunks(CHECK_EVERY) {
             deadline.check()?;
@@ -59,7 +59,7 @@ impl<'a> ScreenMesh<'a> {
             deadline.check()?;
             facings.extend(triangles.iter().map(|triangle| facing(mesh, &places, *triangle)));
         }
-        let culls = (0..groups.len()).map(|m| cull(groups, m)).collect();
+        let culls = (0..groups.material_count()).map(|m| cull(groups, m)).collect();
         Ok(Self { mesh, projection, places, facing: facings, culls })
     }
 

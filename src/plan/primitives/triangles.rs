@@ -27,7 +27,7 @@ const TRIANGLE_BYTES: u64 = 12 + 12 + 4 + 12 + 1 + 24;
 
 /// The mesh's triangles, and after them those of its filled lines and points.
 ///
-/// Where there are none of these, the geometry borrows everything from the mesh.
+/// A mesh without filled lines and points is borrowed whole.
 pub fn geometry<'m>(scene: &Scene<'m, '_>, cx: &mut PlanContext<'_>) -> Result<Geometry<'m>, PlanError> {
     let Scene { mesh, groups, camera, .. } = scene;
     let filled = || mesh.lines_and_points.iter().enumerate().filter(|(_, one)| is_filled(groups, one));

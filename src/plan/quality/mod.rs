@@ -19,18 +19,18 @@ use crate::warning::Warning;
 
 /// A request in which everything that it left open is filled in.
 #[derive(Clone, Debug)]
-pub struct Selected {
+pub struct SelectedSpec {
     /// The request that is drawn.
     pub spec: Spec,
     /// The selected values, for the response.
-    pub selection: Selection,
+    pub selection: QualitySelection,
     /// Targets that are out of reach.
     pub warnings: Vec<Warning>,
 }
 
 /// The selected values, and the error and time to expect. Results keep it, so it is small.
 #[derive(Clone, Debug)]
-pub struct Selection {
+pub struct QualitySelection {
     /// The value of `image.samples`.
     pub samples: u32,
     /// The methods by which wires are drawn, each once.
@@ -45,11 +45,11 @@ pub struct Selection {
 
 /// Selects what a request leaves open, for a mesh of so many triangles; None where the request has
 /// no quality target. `has_gpu` says whether `auto` may mean a GPU here.
-pub fn select(spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Selected> {
+pub fn select_quality(spec: &Spec, triangles: usize, has_gpu: bool) -> Option<SelectedSpec> {
     select_from(ErrorTable::shipped(), spec, triangles, has_gpu)
 }
 
-impl fmt::Display for Selection {
+impl fmt::Display for QualitySelection {
     /// Writes the selected values in the request's own keys.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "image.samples={}", self.samples)?;
@@ -62,7 +62,7 @@ impl fmt::Display for Selection {
 /// triangle's size.
 const METHODS: [WireMethod; 3] = [WireMethod::Exact, WireMethod::Fwidth, WireMethod::FwidthMin];
 
-fn select_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Selected> {
+fn select_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool) -> Option<SelectedSpec> {
     let target = spec.quality_target.as_ref()?;
     let all = candidates(table, spec, target, triangles, has_gpu);
     let time = |(_, [_, time_ms]): &Candidate| *time_ms;
@@ -98,8 +98,8 @@ fn select_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool)
     wire_methods.sort_unstable();
     wire_methods.dedup();
     let (samples, backend) = (spec.image.samples, spec.backend);
-    let selection = Selection { samples, wire_methods, backend, expected_error, expected_time_ms };
-    Some(Selected { spec, selection, warnings })
+    let selection = QualitySelection { samples, wire_methods, backend, expected_error, expected_time_ms };
+    Some(SelectedSpec { spec, selection, warnings })
 }
 
 /// A spec, its expected error and its expected time.

@@ -83,7 +83,7 @@ fn the_cheapest_that_is_good_enough_is_chosen_of_what_is_open() {
     for (keys, triangles, what, expected, warnings) in &cases {
         let chosen = select_from(&table(true), &spec(&[LINES, keys].concat()), *triangles, false).unwrap();
         assert_eq!(chosen.selection.to_string(), *what, "{keys:?}");
-        let Selection { expected_error, expected_time_ms, .. } = chosen.selection;
+        let QualitySelection { expected_error, expected_time_ms, .. } = chosen.selection;
         assert_eq!([expected_error, expected_time_ms], *expected, "{keys:?}");
         let codes: Vec<&str> = chosen.warnings.iter().map(|warning| warning.code).collect();
         assert_eq!(codes, *warnings, "{keys:?}");

@@ -1,5 +1,4 @@
-//! How close a picture comes to a texture: the finest level that any pixel can reach. Finer levels
-//! need not be kept.
+//! Texture levels that a picture can reach: finer ones need not be kept.
 //!
 //! The sampler takes the level log2(max(|a|, |b|)), a and b being the derivatives of the texel
 //! coordinates across and down a pixel. max(|a|, |b|)^2 >= |a x b|, the texels that a pixel covers.

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::error::ApiError;
 use crate::image::ImageFormat;
 use crate::import::Bundle;
-use crate::pipeline::Selection;
+use crate::pipeline::QualitySelection;
 use crate::service::jobs::{Job, State, Timings};
 use crate::service::store::Digest;
 
@@ -72,7 +72,7 @@ pub struct ChoiceDto {
 }
 
 impl ChoiceDto {
-    fn new(selection: &Selection) -> Self {
+    fn new(selection: &QualitySelection) -> Self {
         Self {
             samples: selection.samples,
             wire_methods: selection.wire_methods.clone(),

@@ -13,7 +13,7 @@ use crate::backend::BackendKind;
 use crate::image::ImageFormat;
 use crate::import::{Bundle, Format};
 use crate::limits::Deadline;
-use crate::pipeline::{Output, RenderError, Selection, Stage};
+use crate::pipeline::{Output, QualitySelection, RenderError, Stage};
 use crate::spec::Spec;
 use crate::warning::Warning;
 
@@ -101,7 +101,7 @@ pub struct Finished {
     /// What the importer noticed.
     pub warnings: Vec<Warning>,
     /// What was chosen for a request that asks for an error or a time.
-    pub selection: Option<Selection>,
+    pub selection: Option<QualitySelection>,
     /// How long each part took.
     pub timings: Timings,
 }

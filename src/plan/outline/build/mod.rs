@@ -47,15 +47,15 @@ pub fn hull_pass<'m>(
     let groups = &scene.groups;
     let outline = |m: usize| groups.by_material[m].outline.filter(|o| o.method == OutlineMethod::Hull);
     let thicknesses: Vec<Option<Thickness>> =
-        (0..groups.len()).map(|m| outline(m).map(|o| scene.outline_thickness(&o))).collect();
+        (0..groups.material_count()).map(|m| outline(m).map(|o| scene.outline_thickness(&o))).collect();
     let mut colors: Vec<[f32; 4]> =
-        (0..groups.len()).map(|m| outline(m).map_or([0.0; 4], |o| o.color.premultiplied())).collect();
+        (0..groups.material_count()).map(|m| outline(m).map_or([0.0; 4], |o| o.color.premultiplied())).collect();
     let used: Vec<[f32; 4]> = (0..colors.len()).filter(|&m| thicknesses[m].is_some()).map(|m| colors[m]).collect();
     let color = used.first().copied().unwrap_or_default();
     if used.iter().all(|c| *c == color) {
         colors = vec![color];
     }
-    let needs_materials = colors.len() > 1 || (needed_pass(groups).is_some() && groups.len() > 1);
+    let needs_materials = colors.len() > 1 || (needed_pass(groups).is_some() && groups.material_count() > 1);
     let (list, silhouettes) = cx.silhouettes(scene)?;
     let view = ScreenMesh::new(scene, cx)?;
     let edges = view.silhouette_edges(&thicknesses, &list, &silhouettes, cx)?;
@@ -69,7 +69,7 @@ pub fn hull_pass<'m>(
     Ok(HullPass { colors, surface_materials, ..hull })
 }
 
-/// What an outline mesh is drawn into.
+/// The picture that an outline mesh is drawn for.
 #[derive(Clone, Copy)]
 struct Canvas {
     size_px: [u32; 2],
