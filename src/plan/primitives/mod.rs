@@ -22,3 +22,6 @@ pub fn is_line(groups: &MaterialGroups<'_>, primitive: &LineOrPoint) -> bool {
     let layers = groups.by_material.get(primitive.material as usize);
     layers.is_some_and(|layers| layers.wire.is_some() || layers.outline.is_some()) && !is_filled(groups, primitive)
 }
+
+#[cfg(test)]
+mod tests;
