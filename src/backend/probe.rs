@@ -147,7 +147,7 @@ fn plan(samples: u32) -> DrawPlan<'static> {
         screen_right: [1.0, 0.0, 0.0],
     };
     let materials = COLORS.iter().map(|&color| ShadedMaterial::unlit(color)).collect();
-    let surface = SurfacePass { triangle_materials: &MATERIALS, ..SurfacePass::new(Faces::Front, materials) };
+    let surface = SurfacePass { triangle_materials: (&MATERIALS).into(), ..SurfacePass::new(Faces::Front, materials) };
     DrawPlan {
         samples,
         surface: Some(surface),

@@ -202,9 +202,9 @@ fn after(stage: Stage) -> &'static str {
 /// Prints what `--explain` asks for.
 fn explain(output: &Output, gpu: &GpuStatus, times: &[(Stage, Duration)], total: Duration) {
     eprintln!("drawn by {}", output.backend.name());
-    if let Some(choice) = &output.choice {
-        let (error, time_ms) = (choice.expected_error, choice.expected_time_ms);
-        eprintln!("chosen: {choice}; expected error {error}/255, expected time {time_ms} ms");
+    if let Some(selection) = &output.selection {
+        let (error, time_ms) = (selection.expected_error, selection.expected_time_ms);
+        eprintln!("chosen: {selection}; expected error {error}/255, expected time {time_ms} ms");
     }
     let device = gpu.info.as_ref().map(|info| {
         let features = if info.features.is_empty() { "no optional features".into() } else { info.features.join(", ") };

@@ -36,7 +36,7 @@ pub struct EdgeList {
 impl EdgeList {
     /// Collects the edges of `mesh`.
     pub fn of(mesh: &Mesh, budget: &mut Budget) -> Result<Self, LimitExceeded> {
-        let half_edges = mesh.own_triangles().len() as u64 * 3;
+        let half_edges = mesh.triangles.len() as u64 * 3;
         budget.spend("the edges", half_edges, 8 + 4 + size_of::<MeshEdge>() as u64)?;
         budget.spend("the edges", mesh.positions.len() as u64 + 1, 4)?;
         let buckets = Buckets::of(mesh);
@@ -63,7 +63,7 @@ struct Buckets {
 impl Buckets {
     fn of(mesh: &Mesh) -> Self {
         let mut ends = vec![0_u32; mesh.positions.len() + 1];
-        for t in mesh.own_triangles() {
+        for t in &mesh.triangles {
             for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
                 ends[a.min(b) as usize + 1] += 1;
             }
@@ -71,10 +71,10 @@ impl Buckets {
         for v in 1..ends.len() {
             ends[v] += ends[v - 1];
         }
-        let mut half_edges = vec![(0, 0); mesh.own_triangles().len() * 3];
+        let mut half_edges = vec![(0, 0); mesh.triangles.len() * 3];
         let mut number = 0;
         // Filling a bucket moves `ends[v]` from the bucket's start to its end.
-        for t in mesh.own_triangles() {
+        for t in &mesh.triangles {
             for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
                 let slot = &mut ends[a.min(b) as usize];
                 half_edges[*slot as usize] = (a.max(b), number);

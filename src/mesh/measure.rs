@@ -21,7 +21,7 @@ impl Measures {
     /// origin loses no digits.
     pub fn of(mesh: &Mesh) -> Self {
         let (mut area, mut volume) = (0.0, 0.0);
-        for t in mesh.own_triangles() {
+        for t in &mesh.triangles {
             let [a, b, c] = t.map(|v| mesh.positions[v as usize].map(f64::from));
             let n = cross(sub(b, a), sub(c, a));
             area += dot(n, n).sqrt() / 2.0;

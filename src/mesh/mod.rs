@@ -53,8 +53,6 @@ pub struct Mesh {
     /// Two indices into the attribute arrays per line or point. Empty where the mesh has no
     /// attributes.
     pub line_point_attributes: Vec<[u32; 2]>,
-    /// Set once `loose` has been given an area for one view: where what the file has ends in the arrays.
-    pub thickened: Option<Thickened>,
     /// Unit vertex normals of the file; empty where it has none.
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates, (0, 0) the upper left corner of the image and v down; empty where the
@@ -68,29 +66,6 @@ pub struct Mesh {
     pub to_file: ToFile,
     /// The axis that points up in the format's convention.
     pub up: UpAxis,
-}
-
-/// How many of a mesh's positions and triangles are the file's own; what follows them draws its lines and points in one view.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Thickened {
-    /// Positions of the file.
-    pub positions: usize,
-    /// Triangles of the file.
-    pub triangles: usize,
-}
-
-impl Mesh {
-    /// The file's own positions.
-    pub fn own_positions(&self) -> &[[f32; 3]] {
-        let end = self.thickened.map_or(self.positions.len(), |own| own.positions);
-        self.positions.get(..end).unwrap_or(&self.positions)
-    }
-
-    /// The file's own triangles: these have edges, outlines and a topology.
-    pub fn own_triangles(&self) -> &[[u32; 3]] {
-        let end = self.thickened.map_or(self.triangles.len(), |own| own.triangles);
-        self.triangles.get(..end).unwrap_or(&self.triangles)
-    }
 }
 
 /// The way from the unit box to the file's space: `file = centre + scale * unit`. The scale is a

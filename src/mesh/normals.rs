@@ -1,26 +1,14 @@
 //! Vertex normals, for meshes that bring none.
 
-use super::Mesh;
 use super::vector::{dot, sub};
-use std::borrow::Cow;
 
-/// Normals to shade smoothly with, and the index that goes with them: the file's own, or
-/// angle-weighted ones.
-pub fn smooth(mesh: &Mesh) -> (Cow<'_, [[f32; 3]]>, &[[u32; 3]]) {
-    if mesh.normals.is_empty() {
-        (Cow::Owned(angle_weighted(mesh)), &mesh.triangles)
-    } else {
-        (Cow::Borrowed(&mesh.normals), &mesh.attribute_triangles)
-    }
-}
-
-/// A unit normal a welded position: the mean of its faces' normals, each weighted by the angle of
-/// the corner there, so that it does not depend on how a flat region was cut into triangles.
-pub fn angle_weighted(mesh: &Mesh) -> Vec<[f32; 3]> {
-    let mut sums = vec![[0.0_f64; 3]; mesh.positions.len()];
-    for (triangle, normal) in mesh.triangles.iter().zip(&mesh.face_normals) {
+/// A unit normal per position: the mean of its faces' normals, each weighted by the angle of the
+/// face's corner there. So the normals do not depend on how a flat region was cut into triangles.
+pub fn angle_weighted(positions: &[[f32; 3]], triangles: &[[u32; 3]], face_normals: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let mut sums = vec![[0.0_f64; 3]; positions.len()];
+    for (triangle, normal) in triangles.iter().zip(face_normals) {
         let normal = normal.map(f64::from);
-        let angles = corner_angles(triangle.map(|v| mesh.positions[v as usize].map(f64::from)));
+        let angles = corner_angles(triangle.map(|v| positions[v as usize].map(f64::from)));
         for (&v, angle) in triangle.iter().zip(angles) {
             let sum = &mut sums[v as usize];
             for k in 0..3 {
@@ -31,7 +19,7 @@ pub fn angle_weighted(mesh: &Mesh) -> Vec<[f32; 3]> {
     let mut normals: Vec<[f32; 3]> = sums.iter().map(|s| unit(*s).unwrap_or_default()).collect();
     // Where faces cancel each other, as on the two sides of a sheet, the first face's normal is
     // taken.
-    for (triangle, face_normal) in mesh.triangles.iter().zip(&mesh.face_normals) {
+    for (triangle, face_normal) in triangles.iter().zip(face_normals) {
         for &v in triangle {
             if normals[v as usize] == [0.0; 3] {
                 normals[v as usize] = *face_normal;
@@ -82,6 +70,7 @@ fn acos(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::Mesh;
 
     #[test]
     fn the_fast_arc_cosine_is_close() {
@@ -111,7 +100,7 @@ mod tests {
                 mesh.triangles.extend([[r[0], r[1], r[2]], [r[0], r[2], r[3]]]);
                 mesh.face_normals.extend([normal; 2]);
             }
-            for (n, p) in angle_weighted(&mesh).iter().zip(&positions) {
+            for (n, p) in angle_weighted(&mesh.positions, &mesh.triangles, &mesh.face_normals).iter().zip(&positions) {
                 for k in 0..3 {
                     assert!((n[k] - p[k] * 2.0 / 3.0_f32.sqrt()).abs() < 1e-6);
                 }
@@ -129,6 +118,6 @@ mod tests {
             face_normals: vec![[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]],
             ..Mesh::default()
         };
-        assert_eq!(angle_weighted(&mesh), vec![[0.0, 0.0, 1.0]; 3]);
+        assert_eq!(angle_weighted(&mesh.positions, &mesh.triangles, &mesh.face_normals), vec![[0.0, 0.0, 1.0]; 3]);
     }
 }

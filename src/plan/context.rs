@@ -1,14 +1,56 @@
-//! What every part of a plan is made with.
+//! The state that the stages of one plan share: budget, deadline, skips, and the mesh's edges.
 
+use std::sync::Arc;
+
+use super::PlanError;
+use super::edges::silhouettes::Silhouettes;
+use super::skips::{SkipKind, Skips};
 use crate::limits::{Budget, Deadline};
+use crate::mesh::Mesh;
+use crate::mesh::edges::EdgeList;
+use crate::scene::Scene;
 
-/// Items of a list that are worked through between two looks at the deadline.
+/// Items that are worked through between two checks of the deadline.
 pub const CHECK_EVERY: usize = 1 << 16;
 
-/// What planning may spend.
-pub struct PlanContext<'m> {
-    /// Bytes.
-    pub budget: &'m mut Budget,
-    /// Time.
-    pub deadline: &'m Deadline,
+/// The state that the stages of one plan share.
+pub struct PlanContext<'c> {
+    /// Bytes that may still be allocated.
+    pub budget: &'c mut Budget,
+    /// The time limit.
+    pub deadline: &'c Deadline,
+    /// The skips so far.
+    pub skips: Skips<'c>,
+    edges: Option<Arc<EdgeList>>,
+    silhouettes: Option<Arc<Silhouettes>>,
+}
+
+impl<'c> PlanContext<'c> {
+    /// A context in which nothing in `keep` is ever skipped.
+    pub fn new(budget: &'c mut Budget, deadline: &'c Deadline, keep: &'c [SkipKind]) -> Self {
+        Self { budget, deadline, skips: Skips::new(keep), edges: None, silhouettes: None }
+    }
+
+    /// The edges of the mesh, found when a stage first needs them.
+    pub fn edges(&mut self, mesh: &Mesh) -> Result<Arc<EdgeList>, PlanError> {
+        if let Some(edges) = &self.edges {
+            return Ok(Arc::clone(edges));
+        }
+        self.deadline.check()?;
+        let edges = Arc::new(EdgeList::of(mesh, self.budget)?);
+        self.edges = Some(Arc::clone(&edges));
+        Ok(edges)
+    }
+
+    /// The edges of the mesh, and which of them may be silhouette edges. Contours and hulls share
+    /// them.
+    pub fn silhouettes(&mut self, scene: &Scene<'_, '_>) -> Result<(Arc<EdgeList>, Arc<Silhouettes>), PlanError> {
+        let edges = self.edges(scene.mesh)?;
+        if let Some(silhouettes) = &self.silhouettes {
+            return Ok((edges, Arc::clone(silhouettes)));
+        }
+        let silhouettes = Arc::new(Silhouettes::new(&scene.groups, &edges, self.budget)?);
+        self.silhouettes = Some(Arc::clone(&silhouettes));
+        Ok((edges, silhouettes))
+    }
 }

@@ -1,12 +1,13 @@
-//! Why there is no plan. It is always the input's fault.
+//! Why there is no plan. The input is always at fault.
 
 use crate::limits::{LimitExceeded, Stopped};
+use crate::scene::SceneError;
 use crate::texture::TextureError;
 
-/// A mesh and a request that do not make a picture; the text is safe to show.
+/// A mesh and a request that do not make a picture. The text is safe to show to clients.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlanError {
-    /// More than is allowed.
+    /// The picture takes more than is allowed.
     #[error(transparent)]
     Limit(#[from] LimitExceeded),
     /// A texture that the picture needs cannot be read. The mesh is at fault.
@@ -15,7 +16,16 @@ pub enum PlanError {
     /// The request asks for the file's camera, and there is none.
     #[error("`camera.from_file` is true, and the file has no camera")]
     NoCamera,
-    /// The job's time was up.
+    /// The job's time was up, or it was cancelled.
     #[error(transparent)]
     Stopped(#[from] Stopped),
+}
+
+impl From<SceneError> for PlanError {
+    fn from(error: SceneError) -> Self {
+        match error {
+            SceneError::Limit(limit) => Self::Limit(limit),
+            SceneError::NoCamera => Self::NoCamera,
+        }
+    }
 }

@@ -1,17 +1,18 @@
-//! What a scene does not need. Each skip changes no byte of the picture, and can be turned off to show that.
+//! Skips: work that a plan leaves out because its scene does not need it. A skip changes no byte of
+//! the picture, and can be turned off to show that.
 
 use std::fmt;
 
-/// Something that was left out, and why this scene does not need it.
+/// Something that a plan leaves out, and why its scene does not need it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Skip {
-    /// What.
+    /// The kind of work.
     pub kind: SkipKind,
-    /// Why: "flat shading reads face normals".
+    /// The reason: "flat shading reads face normals".
     pub why: &'static str,
 }
 
-/// What can be left out.
+/// Kinds of work that a plan can leave out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SkipKind {
     /// Filling and shading a surface.
@@ -21,10 +22,10 @@ pub enum SkipKind {
     /// Outlines around surfaces.
     Hull,
     /// Transparent layers and their blending.
-    Layers,
-    /// A normal a triangle.
+    Peeling,
+    /// A normal per triangle.
     FaceNormals,
-    /// A normal a vertex.
+    /// A normal per vertex.
     VertexNormals,
     /// Texture coordinates.
     Uvs,
@@ -34,9 +35,9 @@ pub enum SkipKind {
     Textures,
     /// Levels of textures finer than the picture can show.
     FineTextureLevels,
-    /// A material index a triangle.
+    /// A material index per triangle.
     MaterialIndices,
-    /// Which triangles are neighbours.
+    /// The edges, and which triangles are neighbours.
     Adjacency,
     /// Clipping at the near plane and the guard band.
     Clipping,
@@ -45,12 +46,12 @@ pub enum SkipKind {
 }
 
 impl SkipKind {
-    /// All of them.
+    /// All kinds, in the order in which they are listed.
     pub const ALL: &'static [Self] = &[
         Self::Surface,
         Self::Shading,
         Self::Hull,
-        Self::Layers,
+        Self::Peeling,
         Self::FaceNormals,
         Self::VertexNormals,
         Self::Uvs,
@@ -70,7 +71,7 @@ impl fmt::Display for SkipKind {
             Self::Surface => "surface",
             Self::Shading => "shading",
             Self::Hull => "hull",
-            Self::Layers => "transparent layers",
+            Self::Peeling => "transparent layers",
             Self::FaceNormals => "face normals",
             Self::VertexNormals => "vertex normals",
             Self::Uvs => "texture coordinates",
@@ -85,21 +86,22 @@ impl fmt::Display for SkipKind {
     }
 }
 
-/// The skips of one plan: what was left out so far, and what must not be.
+/// The skips of one plan so far, and the kinds that must not be skipped.
 #[derive(Debug)]
 pub struct Skips<'k> {
-    /// What was left out.
+    /// The skips so far.
     pub done: Vec<Skip>,
     keep: &'k [SkipKind],
 }
 
 impl<'k> Skips<'k> {
-    /// None so far; those in `keep` never.
+    /// No skips yet. Kinds in `keep` are never skipped.
     pub fn new(keep: &'k [SkipKind]) -> Self {
         Self { done: Vec::new(), keep }
     }
 
-    /// Whether `kind` can be left out, where the scene does not need it; noted if so.
+    /// Whether `kind` is left out: the scene does not need it, and it need not be kept. If so, the
+    /// skip is noted.
     pub fn skip(&mut self, kind: SkipKind, is_unneeded: bool, why: &'static str) -> bool {
         let skips = is_unneeded && !self.keep.contains(&kind);
         if skips {

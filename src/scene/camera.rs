@@ -1,8 +1,9 @@
-//! A camera wish and a mesh to screen rows, in f64.
+//! The requested camera, placed for a mesh, in f64.
 //!
-//! Fitting is exact: the frame touches the projected mesh itself, not its bounding sphere. For a plane of the view pyramid
-//! with slope t, a vertex (x, y, z) in camera axes (z towards the viewer) asks for `x + t z <= t d + cx`; the largest
-//! left-hand side on each of the four planes gives distance and centre in closed form.
+//! Fitting is exact: the frame touches the projected mesh itself, not its bounding sphere. Let t be
+//! the slope of a plane of the view pyramid. A vertex (x, y, z) in camera axes (z towards the
+//! viewer) is inside where `x + t z <= t d + cx`. The largest left-hand side on each of the four
+//! planes gives distance d and centre cx in closed form.
 
 use glam::{DVec2, DVec3};
 
@@ -10,16 +11,17 @@ use crate::mesh::material::{FileCamera, FileLens};
 use crate::mesh::{Mesh, UpAxis};
 use crate::spec::{CameraSpec, NamedView, ProjectionKind as Kind};
 
-/// A placed camera. Lengths in units of the mesh's box.
+/// A placed camera. Lengths are in units of the mesh's box.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
-    /// Picture right, picture up, towards the viewer: unit vectors, right-handed.
+    /// Unit vectors to the picture's right, to its top, and towards the viewer: right-handed.
     pub axes: [DVec3; 3],
-    /// Where the view's axis crosses the plane z = 0 of the camera's axes.
+    /// The point where the view's axis crosses the plane z = 0 of the camera's axes.
     pub center: DVec2,
     /// Distance of the eye from that plane, along the view's axis.
     pub distance: f64,
-    /// Half the picture's width and height: at distance 1 in perspective, everywhere in an orthographic view.
+    /// Half the picture's width and height: at distance 1 in perspective, at every distance in an
+    /// orthographic view.
     pub half_size: DVec2,
     /// Perspective or orthographic.
     pub kind: Kind,
@@ -31,12 +33,12 @@ pub struct Camera {
     pub contains_mesh: bool,
 }
 
-/// What a picture adds around the mesh.
+/// Room that a picture needs around the mesh.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Border {
-    /// Growth of the mesh itself, units of the box.
+    /// Distance by which the mesh itself grows on each side, units of the box.
     pub grow: f64,
-    /// Pixels on each side.
+    /// Room on each side, pixels.
     pub px: f64,
 }
 
@@ -89,33 +91,35 @@ impl Camera {
     fn set_range(&mut self, extents: &Extents, grow: f64, size_px: DVec2) {
         let nearest = self.distance - extents.high.z - grow;
         let farthest = self.distance - extents.low.z + grow;
-        // Behind or around the eye: a millionth of what is in front is close enough.
+        // Where the mesh lies behind or around the eye, the near plane is at a millionth of the
+        // distance to its far side.
         self.near = if nearest > 0.0 { 0.5 * nearest } else { 1e-6 * farthest.max(1e-6) };
-        // f32 rounds depths by the size of the box, however close the eye is to its far side: that must not end up behind the far
-        // plane.
+        // f32 rounds depths by the size of the box, however close the eye is to the box's far side,
+        // and rounding must not move that behind the far plane.
         self.far = (farthest.max(2.0 * self.near) * (1.0 + 1e-6)).max(farthest + 1e-6);
         let reach = (extents.high - self.center.extend(0.0)).abs().max((extents.low - self.center.extend(0.0)).abs());
         let w = if self.kind == Kind::Perspective { nearest } else { 1.0 };
         let px = (DVec2::new(reach.x, reach.y) + grow) / (self.half_size * w) * size_px * 0.5;
-        // Half of the guard band, which f32 cannot round out of it. Hulls ask for no room: the plan cuts them to what may be in the picture.
+        // Half of the guard band, so that f32 cannot round anything out of it. Hulls need no room:
+        // the plan cuts them to what may be in the picture.
         self.contains_mesh = nearest > 0.0 && px.max_element() < 2048.0;
     }
 
-    /// Pixels that a unit of the box takes at the box's centre.
+    /// Pixels per unit of the box, at the box's centre.
     pub fn px_per_unit(&self, size_px: [u32; 2]) -> f64 {
         let w = if self.kind == Kind::Perspective { self.distance.max(self.near) } else { 1.0 };
         f64::from(size_px[1]) * 0.5 / (self.half_size.y * w)
     }
 
-    /// The four rows of [`crate::plan::Projection`]: x, y (in 1/256 px from the centre), reversed depth, W.
+    /// The four rows of the projection: x, y (in 1/256 px from the centre), reversed depth, W.
     pub fn rows(&self, size_px: [u32; 2]) -> [[f32; 4]; 4] {
         let [right, up, back] = self.axes;
         let perspective = self.kind == Kind::Perspective;
         let unit = DVec2::new(f64::from(size_px[0]), f64::from(size_px[1])) * 128.0 / self.half_size;
         let row = |axis: DVec3, offset: f64| [axis.x as f32, axis.y as f32, axis.z as f32, offset as f32];
         let w = if perspective { row(-back, self.distance) } else { [0.0, 0.0, 0.0, 1.0] };
-        // z = near (far - W) / (W (far - near)): 1 at the near plane, 0 at the far one. Written with far - W as one row,
-        // which does not cancel however narrow the field of view is.
+        // z = near (far - W) / (W (far - near)): 1 at the near plane, 0 at the far one. With far -
+        // W as one row nothing cancels, however narrow the field of view is.
         let range = self.far - self.near;
         let scale = if perspective { self.near / range } else { 1.0 / range };
         [
@@ -153,7 +157,7 @@ impl Extents {
 }
 
 fn positions(mesh: &Mesh, axes: [DVec3; 3]) -> impl Iterator<Item = DVec3> {
-    mesh.own_positions().iter().map(move |p| {
+    mesh.positions.iter().map(move |p| {
         let p = DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
         DVec3::new(axes[0].dot(p), axes[1].dot(p), axes[2].dot(p))
     })
@@ -173,13 +177,15 @@ fn fit_perspective(mesh: &Mesh, axes: [DVec3; 3], slopes: DVec2, grow: f64) -> (
     }
     let lean = DVec2::new((1.0 + slopes.x * slopes.x).sqrt(), (1.0 + slopes.y * slopes.y).sqrt()) * grow;
     let distance = ((plus + minus + 2.0 * lean) / (2.0 * slopes)).max_element();
-    // A mesh seen as a point or a line asks for no distance at all, and a very wide view for hardly any.
+    // A mesh seen as a point or a line would give no distance at all, and a very wide view hardly
+    // any.
     ((plus - minus) * 0.5, distance.max(nearest + grow + 1e-3))
 }
 
 type Explicit = Option<(DVec3, f64)>;
 
-/// Axes for an explicit eye and target (file space); the target in box units and its distance from the eye.
+/// Axes for an explicit eye and target (file space), with the target in box units and its distance
+/// from the eye.
 fn explicit_axes(mesh: &Mesh, up: UpAxis, eye: [f64; 3], target: [f64; 3]) -> ([DVec3; 3], Explicit) {
     let local = |p: [f64; 3]| (DVec3::from(p) - DVec3::from(mesh.to_file.centre)) / mesh.to_file.scale;
     let (eye, target) = (local(eye), local(target));
@@ -190,7 +196,7 @@ fn explicit_axes(mesh: &Mesh, up: UpAxis, eye: [f64; 3], target: [f64; 3]) -> ([
     ([side, back.cross(side), back], Some((target, (eye - target).length())))
 }
 
-/// The wish with the lens of the file's camera.
+/// The requested camera with the lens of the file's camera.
 fn through(spec: &CameraSpec, camera: &FileCamera) -> CameraSpec {
     match camera.lens {
         FileLens::Perspective { fov_deg } => {
@@ -202,7 +208,7 @@ fn through(spec: &CameraSpec, camera: &FileCamera) -> CameraSpec {
     }
 }
 
-/// The file camera's axes; a point in front of it, and how far that is.
+/// The file camera's axes, with a point in front of it and its distance.
 fn file_axes(mesh: &Mesh, camera: &FileCamera) -> ([DVec3; 3], Explicit) {
     let axes = camera.axes.map(DVec3::from);
     let eye = (DVec3::from(camera.eye) - DVec3::from(mesh.to_file.centre)) / mesh.to_file.scale;
@@ -227,8 +233,8 @@ fn named_axes(spec: &CameraSpec, up: UpAxis) -> [DVec3; 3] {
     [side, back.cross(side), back]
 }
 
-/// Model right, up and front for an up axis: right-handed, and as the formats' conventions have it (glTF: +Y up, +Z
-/// front; STL: +Z up, -Y front).
+/// Model right, up and front for an up axis: right-handed, and as the formats' conventions have it
+/// (glTF: +Y up, +Z front; STL: +Z up, -Y front).
 fn frame(up: UpAxis) -> [DVec3; 3] {
     let (right, up) = match up {
         UpAxis::Y => (DVec3::X, DVec3::Y),

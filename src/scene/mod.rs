@@ -1,4 +1,80 @@
-//! TODO room.
+//! A mesh and a request brought together: the placed camera and the material groups, worked out
+//! once per render.
+//!
+//! Invariant: a scene knows nothing of the plan. It reads the mesh and the spec, and changes
+//! neither.
 
+mod border;
 pub mod camera;
-pub(crate) mod material_groups;
+mod material_groups;
+
+pub use border::{LINE_PX, POINT_PX, POINT_WIDTH, Thickness};
+pub use material_groups::{Fill, MaterialGroups, barycentric_wire};
+
+use border::{border, outline_thickness};
+use camera::Camera;
+use material_groups::GROUP_BYTES;
+
+use crate::limits::{Budget, LimitExceeded};
+use crate::mesh::Mesh;
+use crate::spec::{Outline, Spec};
+
+/// The content of one picture and the camera that sees it.
+///
+/// The mesh and the request have lifetimes of their own, because a plan borrows from the mesh but
+/// outlives the request.
+pub struct Scene<'m, 's> {
+    /// The imported mesh.
+    pub mesh: &'m Mesh,
+    /// The request.
+    pub spec: &'s Spec,
+    /// The style of each material.
+    pub groups: MaterialGroups<'s>,
+    /// The camera, placed so that the mesh, its outlines and its lines fit the picture.
+    pub camera: Camera,
+}
+
+/// Why a mesh and a request make no scene.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SceneError {
+    /// The materials take more memory than is allowed.
+    #[error(transparent)]
+    Limit(#[from] LimitExceeded),
+    /// The request asks for the file's camera, and there is none.
+    #[error("`camera.from_file` is true, and the file has no camera")]
+    NoCamera,
+}
+
+impl<'m, 's> Scene<'m, 's> {
+    /// Groups the mesh's materials by style and places the camera.
+    pub fn new(mesh: &'m Mesh, spec: &'s Spec, budget: &mut Budget) -> Result<Self, SceneError> {
+        if spec.camera.from_file && mesh.cameras.is_empty() {
+            return Err(SceneError::NoCamera);
+        }
+        budget.spend("materials", mesh.materials.len() as u64, GROUP_BYTES)?;
+        let groups = MaterialGroups::new(mesh, spec);
+        let size_px = [spec.image.width_px, spec.image.height_px];
+        let camera = Camera::place(&spec.camera, mesh, size_px, border(mesh, &groups, spec));
+        Ok(Self { mesh, spec, groups, camera })
+    }
+
+    /// Columns and rows of the picture.
+    pub fn size_px(&self) -> [u32; 2] {
+        [self.spec.image.width_px, self.spec.image.height_px]
+    }
+
+    /// The distance that an outline reaches from its silhouette edge.
+    pub fn outline_thickness(&self, outline: &Outline) -> Thickness {
+        outline_thickness(self.mesh, outline)
+    }
+
+    /// Full width of a contour in pixels. A width in object units is taken at the mesh's centre.
+    pub fn contour_width_px(&self, outline: &Outline) -> f32 {
+        const WIDTH_MAX_PX: f32 = 100.0;
+        let width_px = match self.outline_thickness(outline) {
+            Thickness::Px(px) => px,
+            Thickness::Object(units) => (f64::from(units) * self.camera.px_per_unit(self.size_px())) as f32,
+        };
+        width_px.min(WIDTH_MAX_PX)
+    }
+}

@@ -167,9 +167,9 @@ fn upload_geometry(
     plan: &DrawPlan<'_>,
     schedule: &Schedule,
 ) -> Result<(), DrawError> {
-    buffers.upload(gpu, Slot::Positions, bytemuck::cast_slice(plan.positions))?;
+    buffers.upload(gpu, Slot::Positions, bytemuck::cast_slice(&plan.positions))?;
     let (corners, own) = plan.hull.as_ref().map_or((&[][..], &[][..]), |hull| (&hull.triangles, &hull.vertices));
-    let triangles = [bytemuck::cast_slice(plan.triangles), bytemuck::cast_slice(corners)];
+    let triangles = [bytemuck::cast_slice(&plan.triangles), bytemuck::cast_slice(corners)];
     buffers.upload_slices(gpu, Slot::Triangles, &triangles)?;
     let transformed = plan.positions.len() as u64 * size_of::<HullVertex>() as u64;
     buffers.upload_at(gpu, Slot::Vertices, transformed, bytemuck::cast_slice(own))?;
@@ -205,7 +205,7 @@ fn upload_shading(
     if let Some(surface) = &plan.surface {
         buffers.upload(gpu, Slot::Attributes, &attributes(surface))?;
         buffers.upload(gpu, Slot::Materials, bytemuck::cast_slice(&surface.materials))?;
-        buffers.upload(gpu, Slot::FaceNormals, bytemuck::cast_slice(surface.face_normals))?;
+        buffers.upload(gpu, Slot::FaceNormals, bytemuck::cast_slice(&surface.face_normals))?;
         if let Some(normals) = &surface.vertex_normals {
             buffers.upload(gpu, Slot::Normals, bytemuck::cast_slice(&normals.values))?;
         }
@@ -215,7 +215,7 @@ fn upload_shading(
         if let Some(colors) = &surface.colors {
             buffers.upload(gpu, Slot::VertexColors, bytemuck::cast_slice(&colors.values))?;
         }
-        let triangles = corner_triangles(surface, plan.triangles).0;
+        let triangles = corner_triangles(surface, &plan.triangles).0;
         let triangles: Vec<&[u8]> = triangles.into_iter().map(bytemuck::cast_slice).collect();
         buffers.upload_slices(gpu, Slot::CornerTriangles, &triangles)?;
         let (images, texels) = (&surface.textures.images, &surface.textures.texels);

@@ -134,7 +134,7 @@ impl Frame {
             ..Self::default()
         };
         if let Some(surface) = &plan.surface {
-            frame.surface(surface, plan.triangles);
+            frame.surface(surface, &plan.triangles);
         }
         if let Some(hull) = &plan.hull {
             frame.hull_color = hull.color(0);
@@ -163,13 +163,13 @@ impl Frame {
 /// The hull's colours, then the materials of the mesh's triangles and of its own: what
 /// [`Frame::hull_color_count`] points into.
 pub fn hull_materials(hull: &HullPass<'_>) -> Vec<u8> {
-    let materials = [hull.surface_materials, &hull.triangle_materials].map(bytemuck::cast_slice::<u32, u8>);
+    let materials = [&hull.surface_materials[..], &hull.triangle_materials].map(bytemuck::cast_slice::<u32, u8>);
     [bytemuck::cast_slice(&hull.colors), materials[0], materials[1]].concat()
 }
 
 /// Triangles' materials, then edge masks four to a word: what [`Frame::masks_at`] points into.
 pub fn attributes(surface: &SurfacePass<'_>) -> Vec<u8> {
-    [bytemuck::cast_slice(surface.triangle_materials), &surface.edge_masks[..]].concat()
+    [bytemuck::cast_slice(&surface.triangle_materials), &surface.edge_masks[..]].concat()
 }
 
 /// Value of `normal_triangles_at` for normals indexed by the plan's own triangles, which are on the
@@ -181,13 +181,13 @@ pub const OWN_TRIANGLES: u32 = u32::MAX;
 ///
 /// A mesh's normals go by position (`own`, the plan's triangles) or by what the other two go by:
 /// one array is all there is.
-pub fn corner_triangles<'a>(surface: &SurfacePass<'a>, own: &[[u32; 3]]) -> (Vec<&'a [[u32; 3]]>, [u32; 3]) {
-    let normals = surface.vertex_normals.as_ref().map(|v| v.triangles);
+pub fn corner_triangles<'a>(surface: &'a SurfacePass<'_>, own: &[[u32; 3]]) -> (Vec<&'a [[u32; 3]]>, [u32; 3]) {
+    let normals = surface.vertex_normals.as_ref().map(|v| &v.triangles[..]);
     let has_own = normals.is_some_and(|triangles| std::ptr::eq(triangles, own));
     let of = [
         normals.filter(|_| !has_own),
-        surface.uvs.as_ref().map(|v| v.triangles),
-        surface.colors.as_ref().map(|v| v.triangles),
+        surface.uvs.as_ref().map(|v| &v.triangles[..]),
+        surface.colors.as_ref().map(|v| &v.triangles[..]),
     ];
     let mut parts: Vec<&[[u32; 3]]> = Vec::new();
     let [normals, uvs, colors] = of.map(|triangles| {
@@ -262,8 +262,6 @@ pub fn pack(batches: &[Batch]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use std::borrow::Cow;
-
     use super::*;
     use crate::backend::gpu::schedule::test_plans::{edges, lines};
     use crate::plan::{CornerValues, Shown};
@@ -293,15 +291,17 @@ mod tests {
     #[test]
     fn an_index_of_corners_is_uploaded_once_and_the_plans_own_never() {
         let (own, other) = (vec![[0, 1, 2]; 4], vec![[0, 1, 2]; 4]);
-        let values = |triangles| CornerValues { values: Cow::Owned(vec![[0.0; 3]; 3]), triangles };
+        fn values(triangles: &[[u32; 3]]) -> CornerValues<'_, [f32; 3]> {
+            CornerValues { values: vec![[0.0; 3]; 3].into(), triangles: triangles.into() }
+        }
         let mut surface = SurfacePass::new(Faces::Both, Vec::new());
-        surface.uvs = Some(CornerValues { values: Cow::Owned(vec![[0.0; 2]; 3]), triangles: &other });
+        surface.uvs = Some(CornerValues { values: vec![[0.0; 2]; 3].into(), triangles: (&other).into() });
         surface.vertex_normals = Some(values(&own));
         assert_eq!(corner_triangles(&surface, &own), (vec![&other[..]], [OWN_TRIANGLES, 0, 0]));
         surface.vertex_normals = Some(values(&other));
         assert_eq!(corner_triangles(&surface, &own), (vec![&other[..]], [0, 0, 0]));
         surface.uvs = None;
-        surface.colors = Some(CornerValues { values: Cow::Owned(vec![[0.0; 4]; 3]), triangles: &own });
+        surface.colors = Some(CornerValues { values: vec![[0.0; 4]; 3].into(), triangles: (&own).into() });
         assert_eq!(corner_triangles(&surface, &own), (vec![&other[..], &own[..]], [0, 0, 12]));
     }
 }

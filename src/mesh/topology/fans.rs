@@ -18,7 +18,7 @@ pub struct Fans<'a> {
 impl<'a> Fans<'a> {
     /// The fans of `mesh`, whose edges are `edges`.
     pub fn of(mesh: &'a Mesh, edges: &EdgeList) -> Self {
-        let (triangles, vertices) = (mesh.own_triangles(), mesh.positions.len());
+        let (triangles, vertices) = (&mesh.triangles, mesh.positions.len());
         let mut fans = Self { triangles, vertices, corners: UnionFind::new(triangles.len() * 3) };
         for edge in edges.edges.iter().filter(|edge| edge.faces[1] != NO_FACE) {
             fans.unite(edge, edge.faces[1]);

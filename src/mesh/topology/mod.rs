@@ -62,7 +62,7 @@ const BYTES_PER_VERTEX: u64 = 4 + 1;
 impl Topology {
     /// Finds the topology of `mesh`, whose edges are `edges`.
     pub fn of(mesh: &Mesh, edges: &EdgeList, budget: &mut Budget, deadline: &Deadline) -> Result<Self, Exhausted> {
-        budget.spend("the topology", mesh.own_triangles().len() as u64, BYTES_PER_TRIANGLE)?;
+        budget.spend("the topology", mesh.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
         budget.spend("the topology", mesh.positions.len() as u64, BYTES_PER_VERTEX)?;
         let (_, components, vertices) = components(mesh);
         deadline.check()?;
@@ -85,7 +85,7 @@ impl Topology {
             nonmanifold_vertices,
             duplicate_faces,
             inconsistent_edges: count(|faces, is_inconsistent| faces == 2 && is_inconsistent),
-            euler_characteristic: vertices as i64 - edges.edges.len() as i64 + mesh.own_triangles().len() as i64,
+            euler_characteristic: vertices as i64 - edges.edges.len() as i64 + mesh.triangles.len() as i64,
             is_watertight: !edges.edges.is_empty() && edges.is_closed(),
             is_orientable: surfaces.is_orientable,
             genus: surfaces.genus().filter(|_| nonmanifold_vertices == 0 && !edges.edges.is_empty()),
@@ -110,7 +110,7 @@ pub enum Orientation {
 pub fn orientation(mesh: &Mesh) -> Orientation {
     let mut sets = components(mesh).0;
     let mut volumes = vec![0.0_f64; mesh.positions.len()];
-    for t in mesh.own_triangles() {
+    for t in &mesh.triangles {
         let [a, b, c] = t.map(|v| mesh.positions[v as usize].map(f64::from));
         volumes[sets.find(t[0]) as usize] += dot(a, cross(b, c));
     }
@@ -129,7 +129,7 @@ fn components(mesh: &Mesh) -> (UnionFind, u64, u64) {
     let mut sets = UnionFind::new(mesh.positions.len());
     let mut is_met = vec![false; mesh.positions.len()];
     let (mut united, mut vertices) = (0, 0);
-    for t in mesh.own_triangles() {
+    for t in &mesh.triangles {
         united += u64::from(sets.unite(t[0], t[1])) + u64::from(sets.unite(t[0], t[2]));
         for v in *t {
             vertices += u64::from(!std::mem::replace(&mut is_met[v as usize], true));
@@ -140,7 +140,7 @@ fn components(mesh: &Mesh) -> (UnionFind, u64, u64) {
 
 /// The number of faces with the vertices of an earlier face.
 fn duplicates(mesh: &Mesh) -> u64 {
-    let mut faces = mesh.own_triangles().to_vec();
+    let mut faces = mesh.triangles.clone();
     faces.iter_mut().for_each(|face| face.sort_unstable());
     faces.sort_unstable();
     faces.windows(2).filter(|pair| pair[0] == pair[1]).count() as u64

@@ -25,7 +25,7 @@ const IS_ONE_SIDED: u8 = 2;
 impl Surfaces {
     /// Finds the surfaces of `mesh`, whose edges and fans are given.
     pub fn of(mesh: &Mesh, edges: &EdgeList, fans: &mut Fans<'_>) -> Self {
-        let count = mesh.own_triangles().len();
+        let count = mesh.triangles.len();
         let mut faces = ParityUnionFind::new(count);
         for edge in edges.edges.iter().filter(|edge| edge.face_count == 2) {
             faces.unite(edge.faces[0], edge.faces[1], edge.has_inconsistent_winding);

@@ -1,4 +1,4 @@
-//! Edges that may be part of a silhouette, and the two faces that decide.
+//! Edges that may be silhouette edges, and the two faces that decide.
 
 use std::collections::BTreeMap;
 
@@ -8,89 +8,87 @@ use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::{Orientation, orientation};
 use crate::mesh::vector::{cross, dot};
 use crate::plan::{Edge, Side};
-use crate::scene::material_groups::{Fill, MaterialGroups};
+use crate::scene::{Fill, MaterialGroups};
 use crate::spec::{Cull, Layers};
 
-/// Contours' edges. Of an edge's faces only those count that are drawn.
-pub struct Silhouettes<'a> {
-    mesh: &'a Mesh,
-    /// MaterialGroups that are not drawn while others are, and have no hull either.
-    absent: Vec<bool>,
+/// Finds the faces that decide whether an edge is a silhouette edge. Of an edge's faces only those
+/// count that are drawn.
+pub struct Silhouettes {
+    /// By material: not drawn while others are, and without a hull.
+    is_absent: Vec<bool>,
     /// All faces of the edges that have more than two.
     crowded: BTreeMap<u32, Vec<u32>>,
 }
 
-impl<'a> Silhouettes<'a> {
-    /// Those of a mesh.
-    pub fn new(
-        mesh: &'a Mesh,
-        groups: &MaterialGroups<'_>,
-        list: &EdgeList,
-        budget: &mut Budget,
-    ) -> Result<Self, LimitExceeded> {
-        // A list for each edge, and a place in the map.
+impl Silhouettes {
+    /// Those of a mesh with these edges.
+    pub fn new(groups: &MaterialGroups<'_>, list: &EdgeList, budget: &mut Budget) -> Result<Self, LimitExceeded> {
+        // A list per edge, and a place in the map.
         budget.spend("edges of many faces", list.further_faces.len() as u64, 100)?;
-        budget.spend("materials", groups.layers.len() as u64, 1)?;
+        budget.spend("materials", groups.material_count() as u64, 1)?;
         let has_fill = groups.has_fill();
         let is_absent = |m: usize| has_fill && groups.fill(m) == Fill::None && !groups.is_outlined(m);
-        let absent = (0..groups.layers.len()).map(is_absent).collect();
+        let is_absent = (0..groups.material_count()).map(is_absent).collect();
         let mut crowded: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for &[edge, face] in &list.further_faces {
             let first_two = list.edges[edge as usize].faces;
             crowded.entry(edge).or_insert_with(|| first_two.to_vec()).push(face);
         }
-        Ok(Self { mesh, absent, crowded })
+        Ok(Self { is_absent, crowded })
     }
 
-    /// The edge numbered `index` with the faces that decide whether it is a silhouette; None where no view makes it one.
-    pub fn edge(&self, index: u32, edge: Edge) -> Option<Edge> {
-        let drawn = |face: &u32| *face != Edge::NO_FACE && !self.is_absent(*face);
+    /// The edge numbered `index` with the faces that decide whether it is a silhouette edge; None
+    /// where no view makes it one.
+    pub fn edge(&self, mesh: &Mesh, index: u32, edge: Edge) -> Option<Edge> {
+        let is_drawn = |face: &u32| *face != Edge::NO_FACE && !self.is_absent(mesh, *face);
         let faces = if let Some(all) = self.crowded.get(&index) {
-            let faces: Vec<u32> = all.iter().copied().filter(drawn).collect();
+            let faces: Vec<u32> = all.iter().copied().filter(is_drawn).collect();
             match faces[..] {
                 [] => [Edge::NO_FACE; 2],
                 [a] => [a, Edge::NO_FACE],
                 [a, b] => [a, b],
-                _ => self.outermost(edge.vertices, &faces)?,
+                _ => outermost(mesh, edge.vertices, &faces)?,
             }
         } else {
-            let [a, b] = edge.faces.map(|face| if drawn(&face) { face } else { Edge::NO_FACE });
+            let [a, b] = edge.faces.map(|face| if is_drawn(&face) { face } else { Edge::NO_FACE });
             if a == Edge::NO_FACE { [b, a] } else { [a, b] }
         };
         (faces[0] != Edge::NO_FACE).then_some(Edge { faces, ..edge })
     }
 
-    fn is_absent(&self, face: u32) -> bool {
-        self.absent.get(self.mesh.triangle_materials[face as usize] as usize) == Some(&true)
+    fn is_absent(&self, mesh: &Mesh, face: u32) -> bool {
+        self.is_absent.get(mesh.triangle_materials[face as usize] as usize) == Some(&true)
     }
+}
 
-    /// Of more than two faces around an edge, those beside the widest gap: if that is wider than half a turn, all lie on one side
-    /// on screen exactly where these two do. If it is not, there are faces on both sides in every view.
-    fn outermost(&self, ends: [u32; 2], faces: &[u32]) -> Option<[u32; 2]> {
-        let at = |v: u32| self.mesh.positions[v as usize].map(f64::from);
-        let minus = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-        let origin = at(ends[0]);
-        let axis = minus(at(ends[1]), origin);
-        // Two directions across the axis.
-        let across = cross(axis, least_axis(axis));
-        let up = cross(axis, across);
-        let length = dot(axis, axis).sqrt();
-        let angle = |face: u32| {
-            let corners = self.mesh.triangles[face as usize];
-            let corner = corners.into_iter().find(|v| !ends.contains(v)).unwrap_or(corners[2]);
-            let way = minus(at(corner), origin);
-            libm::atan2(dot(way, up), dot(way, across) * length)
-        };
-        let mut angles: Vec<(f64, u32)> = faces.iter().map(|&face| (angle(face), face)).collect();
-        angles.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let count = angles.len();
-        let gap = |i: usize| {
-            let turned = angles[i].0 - angles[(i + count - 1) % count].0;
-            if i == 0 { turned + std::f64::consts::TAU } else { turned }
-        };
-        let widest = (0..count).max_by(|&a, &b| gap(a).total_cmp(&gap(b)))?;
-        (gap(widest) > std::f64::consts::PI).then(|| [angles[(widest + count - 1) % count].1, angles[widest].1])
-    }
+/// Of more than two faces around an edge, the two beside the widest gap.
+///
+/// If the gap is wider than half a turn, all faces lie on one side on screen exactly where these
+/// two do. If it is not, there are faces on both sides in every view, and the result is None.
+fn outermost(mesh: &Mesh, ends: [u32; 2], faces: &[u32]) -> Option<[u32; 2]> {
+    let at = |v: u32| mesh.positions[v as usize].map(f64::from);
+    let minus = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    let origin = at(ends[0]);
+    let axis = minus(at(ends[1]), origin);
+    // Two directions across the axis.
+    let across = cross(axis, least_axis(axis));
+    let up = cross(axis, across);
+    let length = dot(axis, axis).sqrt();
+    let angle = |face: u32| {
+        let corners = mesh.triangles[face as usize];
+        let corner = corners.into_iter().find(|v| !ends.contains(v)).unwrap_or(corners[2]);
+        let way = minus(at(corner), origin);
+        libm::atan2(dot(way, up), dot(way, across) * length)
+    };
+    let mut angles: Vec<(f64, u32)> = faces.iter().map(|&face| (angle(face), face)).collect();
+    angles.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let count = angles.len();
+    let gap = |i: usize| {
+        let turned = angles[i].0 - angles[(i + count - 1) % count].0;
+        if i == 0 { turned + std::f64::consts::TAU } else { turned }
+    };
+    let widest = (0..count).max_by(|&a, &b| gap(a).total_cmp(&gap(b)))?;
+    (gap(widest) > std::f64::consts::PI).then(|| [angles[(widest + count - 1) % count].1, angles[widest].1])
 }
 
 /// The coordinate axis that is farthest from a direction.
@@ -99,10 +97,10 @@ fn least_axis(v: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|k| if Some(k) == least { 1.0 } else { 0.0 })
 }
 
-/// The side that is seen of no face: inside a closed surface, all of which is drawn from outside and lets nothing through.
+/// The side that no face shows: the inside of a closed, opaque surface that is seen from outside.
 pub fn unseen_side(mesh: &Mesh, groups: &MaterialGroups<'_>, list: &EdgeList) -> Option<Side> {
     let covers = if groups.has_fill() { Fill::Opaque } else { Fill::None };
-    if (0..groups.layers.len()).any(|m| groups.fill(m) != covers) || !list.is_closed() {
+    if (0..groups.material_count()).any(|m| groups.fill(m) != covers) || !list.is_closed() {
         return None;
     }
     let (unseen, culled) = match orientation(mesh) {
@@ -111,5 +109,5 @@ pub fn unseen_side(mesh: &Mesh, groups: &MaterialGroups<'_>, list: &EdgeList) ->
         Orientation::Mixed => return None,
     };
     let is_drawn = |layers: &&Layers| layers.surface.is_none_or(|s| s.cull != culled);
-    groups.layers.iter().all(is_drawn).then_some(unseen)
+    groups.by_material.iter().all(is_drawn).then_some(unseen)
 }

@@ -1,11 +1,10 @@
-//! Lines of exact width.
+//! Lines of exact width: wires, topology and contours.
 
 pub(crate) mod build;
-pub(crate) mod edge_class;
-pub mod primitives;
 pub(crate) mod styles;
 
 pub use build::passes;
+
 use std::sync::Arc;
 
 use super::DrawPlan;
@@ -17,61 +16,67 @@ pub struct LinePass {
     pub edges: Arc<[Edge]>,
     /// Full width, pixels.
     pub width_px: f32,
-    /// Extra ramp, pixels.
+    /// Width of the soft ramp, both sides together, pixels.
     pub smoothing_px: f32,
     /// Premultiplied linear RGBA, opacity included.
     pub color: [f32; 4],
-    /// Which parts of the edges, as the visibility buffer has it.
+    /// The parts of the edges that are drawn, as the visibility buffer has it.
     pub shown: Shown,
-    /// The side of its faces that a closed surface shows no one: an edge whose faces all show the viewer that one is left out.
+    /// The inside of a closed surface: an edge whose faces all turn it to the viewer is left out.
     pub unseen_side: Option<Side>,
-    /// Whether only edges of this view's silhouette are drawn: those whose faces all lie on one side of them on screen.
+    /// Whether only silhouette edges of this view are drawn: those whose faces all lie on one side
+    /// of them on screen.
     pub contour: bool,
-    /// Whether the surface's light falls on the line; without a surface that is seen there is none, and the colour stays.
+    /// Whether the surface's light falls on the line. Without a surface that is seen the colour
+    /// stays as it is.
     pub lit: bool,
 }
 
 impl LinePass {
-    /// Largest number that areas around a line's end are scaled to: they fit 16 bits, and so does the difference of two.
+    /// Largest number that areas around a line's end are scaled to. They fit 16 bits, and so does
+    /// the difference of two.
     pub const SCALED_MAX: f32 = 16_000.0;
 
-    /// From the middle of a line to the farthest pixel's centre that it touches, pixels: half its width, half its ramp, and the
-    /// corner of a pixel.
+    /// Distance from the middle of a line to the farthest pixel centre that it touches, pixels:
+    /// half its width, half its ramp, and half a pixel's diagonal.
     pub fn reach_px(&self) -> f32 {
         0.5 * self.width_px + 0.5 * self.smoothing_px + std::f32::consts::FRAC_1_SQRT_2
     }
 
-    /// Coverage in the middle of a line, 0 to 1, by its ramp alone.
+    /// Coverage in the middle of a line by its ramp alone, 0 to 1.
     pub fn peak(&self) -> f32 {
         if self.smoothing_px > self.width_px { self.width_px / self.smoothing_px } else { 1.0 }
     }
 
-    /// Length of the windows in which an edge's visible parts are looked for, pixels. Longer for wide lines, or most of the
-    /// pixels around a window would be its neighbours'; but not much, because a window looks along all of itself for each part.
+    /// Length of the windows in which an edge's visible parts are looked for, pixels.
+    ///
+    /// Windows are longer for wide lines, or most pixels around a window would be its neighbours'.
+    /// They are not much longer, because each visible part is searched along the whole window.
     pub fn window_px(&self) -> f32 {
         (0.5 * self.reach_px()).clamp(8.0, 24.0)
     }
 
-    /// The largest power of two that scales areas around the line's end to at most [`LinePass::SCALED_MAX`].
+    /// The exponent of the largest power of two that scales areas around the line's end to at most
+    /// [`LinePass::SCALED_MAX`].
     pub fn square_exponent(&self) -> u32 {
         let outer = 0.5 * self.width_px + 0.5 * self.smoothing_px;
         (1..=13).rev().find(|&e| (outer + 1.5) * (1 << e) as f32 <= Self::SCALED_MAX).unwrap_or(1)
     }
 
-    /// Rows beyond a band of the picture that its lines look at, to see what hides them.
+    /// Rows beyond a band of the picture that are searched for what hides its lines.
     pub fn margin_rows(&self) -> u32 {
         if self.shown == Shown::All { 0 } else { (self.window_px() + 2.0 * self.reach_px() + 4.0) as u32 }
     }
 }
 
 impl DrawPlan<'_> {
-    /// Rows beyond a band of the picture that lines look at: none where there is nothing that hides.
+    /// Rows beyond a band of the picture that lines look at: none where nothing hides lines.
     pub fn line_margin_rows(&self) -> u32 {
         let something_hides = self.surface.is_some() || self.hull.is_some();
         self.lines.iter().map(LinePass::margin_rows).filter(|_| something_hides).max().unwrap_or(0)
     }
 
-    /// Whether light has to be found for any line: one wants it, and there is a surface that has it.
+    /// Whether any line is lit, and there is a surface whose light it can take.
     pub fn lights_lines(&self) -> bool {
         self.surface.as_ref().is_some_and(|surface| surface.is_shaded) && self.lines.iter().any(|lines| lines.lit)
     }
@@ -80,20 +85,20 @@ impl DrawPlan<'_> {
 /// A side of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// Where its corners run counter-clockwise.
+    /// The side from which its corners run counter-clockwise.
     Front,
-    /// Where they run clockwise.
+    /// The side from which its corners run clockwise.
     Back,
 }
 
-/// Which parts of an edge are drawn.
+/// The parts of an edge that are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
     /// All of it; the visibility buffer is not read.
     All,
-    /// What no surface hides.
+    /// The parts that no surface hides.
     Visible,
-    /// What a surface hides.
+    /// The parts that a surface hides.
     Hidden,
 }
 
@@ -101,7 +106,7 @@ pub enum Shown {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Edge {
-    /// Indices into the positions.
+    /// Indices into the plan's positions.
     pub vertices: [u32; 2],
     /// Triangle indices; [`Edge::NO_FACE`] where there is no second face.
     pub faces: [u32; 2],
@@ -111,8 +116,8 @@ impl Edge {
     /// No triangle.
     pub const NO_FACE: u32 = u32::MAX;
 
-    /// An edge that runs from the smaller position to the larger, so that lines have the same bytes whatever the order, the
-    /// numbers and the winding of the faces that they are found in.
+    /// An edge that runs from the smaller position to the larger, so that a line's bytes do not
+    /// depend on the order, the numbers and the winding of the faces that have the edge.
     pub fn new(positions: &[[f32; 3]], [a, b]: [u32; 2], faces: [u32; 2]) -> Self {
         let is_in_order = positions[a as usize] <= positions[b as usize];
         Self { vertices: if is_in_order { [a, b] } else { [b, a] }, faces }

@@ -1,56 +1,58 @@
-//! The styles of lines that a scene asks for, and the edges that have each.
+//! The line styles of a scene, and the edges that have each.
 
 use std::sync::Arc;
 
 use crate::mesh::Mesh;
 use crate::mesh::edges::{MeshEdge, NO_FACE};
-use crate::plan::lines::edge_class::{Class, class_of, cos_deg, is_of};
+use crate::plan::edges::edge_class::{Class, belongs_to, class_of, cos_deg};
+use crate::plan::peeling::FADE;
 use crate::plan::{Edge, LinePass, Shown, Side};
-use crate::scene::material_groups::{FADE, MaterialGroups};
+use crate::scene::{MaterialGroups, Scene};
 use crate::spec::color::Rgba;
-use crate::spec::{Hidden, Outline, OutlineMethod, Topology, Wire, WireMethod};
+use crate::spec::{Hidden, OutlineMethod, Topology, Wire, WireMethod};
 
-/// How much wider than the polygons' edges those that tell of a fault are.
+/// Width of edges that tell of a fault, in multiples of a polygon edge's.
 const FAULT_WIDTH: f32 = 2.5;
 
-/// Lines of one style, and the edges that have it.
-pub struct Want {
+/// A style of lines, and the edges that have it.
+pub struct LineStyle {
     /// As [`LinePass::width_px`].
     pub width_px: f32,
     /// As [`LinePass::smoothing_px`].
     pub smoothing_px: f32,
     /// As [`LinePass::color`].
     pub color: [f32; 4],
-    /// What becomes of what is hidden.
+    /// Treatment of the hidden parts of edges.
     pub hidden: Hidden,
     lit: bool,
     /// As [`LinePass::contour`].
     pub contour: bool,
     class: Class,
-    /// Edges of which of [`MaterialGroups::looks`]; empty: all.
-    looks: Vec<bool>,
+    /// By index into [`MaterialGroups::styles`], which materials' edges; empty: all.
+    styles: Vec<bool>,
 }
 
-impl Want {
-    /// Lines of a style, not lit, along all edges that they are given.
+impl LineStyle {
+    /// Unlit lines along all edges that they are given.
     pub fn everywhere(width_px: f32, smoothing_px: f32, color: [f32; 4], hidden: Hidden) -> Self {
-        let (lit, contour, class, looks) = (false, false, Class::All, Vec::new());
-        Self { width_px, smoothing_px, color, hidden, lit, contour, class, looks }
+        let (lit, contour, class, styles) = (false, false, Class::All, Vec::new());
+        Self { width_px, smoothing_px, color, hidden, lit, contour, class, styles }
     }
 
-    /// Whether they leave a trace.
+    /// Whether the lines leave a trace.
     pub fn is_seen(&self) -> bool {
         self.width_px + self.smoothing_px > 0.0 && self.color[3] > 0.0
     }
 
-    /// Whether an edge is one of them.
+    /// Whether an edge has this style.
     pub fn draws(&self, mesh: &Mesh, groups: &MaterialGroups<'_>, edge: &MeshEdge) -> bool {
         let mut faces = edge.faces.into_iter().filter(|&face| face != NO_FACE);
-        let look = |face: u32| groups.look_of[mesh.triangle_materials[face as usize] as usize] as usize;
-        (self.looks.is_empty() || faces.any(|face| self.looks[look(face)])) && is_of(self.class, mesh, edge)
+        let style = |face: u32| groups.style_of[mesh.triangle_materials[face as usize] as usize] as usize;
+        let has_material = self.styles.is_empty() || faces.any(|face| self.styles[style(face)]);
+        has_material && belongs_to(self.class, mesh, edge)
     }
 
-    /// What draws these edges, the hidden ones first.
+    /// The passes that draw these edges, those of hidden parts first.
     pub fn passes(&self, edges: &Arc<[Edge]>, hides: bool, unseen_side: Option<Side>) -> Vec<LinePass> {
         let pass = |shown, color| LinePass {
             edges: edges.clone(),
@@ -73,34 +75,48 @@ impl Want {
     }
 }
 
-/// Lines of exact width along the edges of surfaces, each style once.
-pub fn wire_wants(groups: &MaterialGroups<'_>) -> Vec<Want> {
+/// The line styles of a scene, in the order in which they are drawn.
+pub fn line_styles(scene: &Scene<'_, '_>) -> Vec<LineStyle> {
+    let mut styles = wire_styles(&scene.groups);
+    styles.extend(scene.spec.topology.iter().flat_map(topology_styles));
+    styles.extend(contour_styles(scene));
+    styles.retain(LineStyle::is_seen);
+    styles
+}
+
+/// A wire's colour: premultiplied, opacity included.
+pub fn wire_color(wire: &Wire) -> [f32; 4] {
+    wire.color.premultiplied().map(|v| v * wire.opacity)
+}
+
+/// Wires of exact width, each style once.
+fn wire_styles(groups: &MaterialGroups<'_>) -> Vec<LineStyle> {
     let mut kinds: Vec<(Wire, Vec<bool>)> = Vec::new();
-    for (look, layers) in groups.looks.iter().enumerate() {
+    for (index, layers) in groups.styles.iter().enumerate() {
         let Some(wire) = layers.wire.filter(|wire| wire.method == WireMethod::Exact) else { continue };
         let at = kinds.iter().position(|(kind, _)| *kind == wire).unwrap_or_else(|| {
-            kinds.push((wire, vec![false; groups.looks.len()]));
+            kinds.push((wire, vec![false; groups.styles.len()]));
             kinds.len() - 1
         });
-        kinds[at].1[look] = true;
+        kinds[at].1[index] = true;
     }
-    let want = |(wire, looks): (Wire, Vec<bool>)| Want {
+    let style = |(wire, styles): (Wire, Vec<bool>)| LineStyle {
         width_px: wire.thickness,
         smoothing_px: wire.smoothing,
-        color: crate::plan::lines::build::color(&wire),
+        color: wire_color(&wire),
         hidden: wire.hidden,
         lit: wire.lit,
         contour: false,
         class: class_of(&wire),
-        looks: if looks.iter().all(|&drawn| drawn) { Vec::new() } else { looks },
+        styles: if styles.iter().all(|&has| has) { Vec::new() } else { styles },
     };
-    kinds.into_iter().map(want).collect()
+    kinds.into_iter().map(style).collect()
 }
 
-/// Faults last, so that they lie on top.
-pub fn topology_wants(topology: &Topology) -> Vec<Want> {
-    let want = |color: Option<Rgba>, class, share: f32, hidden| {
-        color.map(|color| Want {
+/// The styles that show a mesh's topology. Faults come last, so that they lie on top.
+fn topology_styles(topology: &Topology) -> Vec<LineStyle> {
+    let style = |color: Option<Rgba>, class, share: f32, hidden| {
+        color.map(|color| LineStyle {
             width_px: topology.thickness * share,
             smoothing_px: 0.0,
             color: color.premultiplied(),
@@ -108,42 +124,33 @@ pub fn topology_wants(topology: &Topology) -> Vec<Want> {
             lit: false,
             contour: false,
             class,
-            looks: Vec::new(),
+            styles: Vec::new(),
         })
     };
     let crease = Class::Crease(cos_deg(topology.crease_angle_deg));
     let kinds = [
-        want(topology.polygon, Class::Polygon, 1.0, Hidden::Hide),
-        want(topology.crease, crease, FAULT_WIDTH, Hidden::Hide),
-        // A fault on the far side is one too.
-        want(topology.open, Class::Boundary, FAULT_WIDTH, Hidden::Fade),
-        want(topology.nonmanifold, Class::Nonmanifold, FAULT_WIDTH, Hidden::Fade),
+        style(topology.polygon, Class::Polygon, 1.0, Hidden::Hide),
+        style(topology.crease, crease, FAULT_WIDTH, Hidden::Hide),
+        // A fault on the far side is a fault too, so hidden ones are shown.
+        style(topology.open, Class::Boundary, FAULT_WIDTH, Hidden::Fade),
+        style(topology.nonmanifold, Class::Nonmanifold, FAULT_WIDTH, Hidden::Fade),
     ];
     kinds.into_iter().flatten().collect()
 }
 
 /// Contours, each style once.
-pub fn contour_wants(groups: &MaterialGroups<'_>, contour_px: impl Fn(&Outline) -> f32) -> Vec<Want> {
-    let mut wants: Vec<Want> = Vec::new();
-    for (look, layers) in groups.looks.iter().enumerate() {
+fn contour_styles(scene: &Scene<'_, '_>) -> Vec<LineStyle> {
+    let mut styles: Vec<LineStyle> = Vec::new();
+    let count = scene.groups.styles.len();
+    for (index, layers) in scene.groups.styles.iter().enumerate() {
         let Some(outline) = layers.outline.filter(|o| o.method == OutlineMethod::Contour) else { continue };
-        let (width_px, color) = (contour_px(&outline), outline.color.premultiplied());
-        let at = wants.iter().position(|w| w.width_px == width_px && w.color == color).unwrap_or_else(|| {
-            let looks = vec![false; groups.looks.len()];
-            let class = Class::All;
-            wants.push(Want {
-                width_px,
-                smoothing_px: 0.0,
-                color,
-                hidden: Hidden::Hide,
-                lit: false,
-                contour: true,
-                class,
-                looks,
-            });
-            wants.len() - 1
+        let (width_px, color) = (scene.contour_width_px(&outline), outline.color.premultiplied());
+        let at = styles.iter().position(|s| s.width_px == width_px && s.color == color).unwrap_or_else(|| {
+            let contour = LineStyle::everywhere(width_px, 0.0, color, Hidden::Hide);
+            styles.push(LineStyle { contour: true, styles: vec![false; count], ..contour });
+            styles.len() - 1
         });
-        wants[at].looks[look] = true;
+        styles[at].styles[index] = true;
     }
-    wants
+    styles
 }

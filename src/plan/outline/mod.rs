@@ -1,28 +1,36 @@
-//! The hull: the outline around a surface, as triangles that are on screen already.
+//! The hull: an outline around surfaces, as a mesh of triangles that are on screen already.
+//!
+//! Users know inverted hulls, copies of a mesh pushed out along its normals. This outline mesh
+//! differs: a plan knows its camera, so it draws the border itself, as wide as it should be and
+//! with round corners. Beside each [silhouette edge](silhouette_edges) lies an [offset
+//! quad](build), and around the vertices between two of them a [round join](round_join).
 
 pub(crate) mod build;
 pub(crate) mod round_join;
 pub(crate) mod silhouette_edges;
+mod sort;
 pub(crate) mod vertex_occlusion;
 
 pub use build::hull_pass;
-/// Triangles beside the edges where a surface ends in this view. They are drawn from both sides, and what lies before them hides them.
-///
-/// A plan knows its camera, so it need not push a copy of the mesh out and let the depth test find what sticks out on all sides: it
-/// draws that border itself, as wide as it should be, with round corners.
+
+use super::shared_slice::SharedSlice;
+
+/// Triangles beside the edges where a surface ends in this view. They are drawn from both sides,
+/// and surfaces before them hide them.
 #[derive(Clone, Debug, Default)]
 pub struct HullPass<'a> {
     /// Premultiplied linear RGBA, by material index; one where all are the same.
     pub colors: Vec<[f32; 4]>,
     /// Corners that are not the mesh's.
     pub vertices: Vec<HullVertex>,
-    /// Indices into the plan's positions, followed by `vertices`. Those into the positions lie before the near plane and not far
-    /// outside the picture: nothing needs clipping.
+    /// Indices into the plan's positions, followed by `vertices`. Those into the positions lie
+    /// before the near plane and not far outside the picture, so nothing needs clipping.
     pub triangles: Vec<[u32; 3]>,
-    /// Material index a triangle of the mesh; empty where all are the same. Unlike the surface's, never merged because they look alike:
-    /// it also says what hides which hull, see [`PeelingPass`](super::PeelingPass).
-    pub surface_materials: &'a [u32],
-    /// The same of `triangles`.
+    /// A material index per triangle of the plan; empty where all are the same. Unlike the
+    /// surface's materials, equal ones are not merged: the index also says what hides which hull,
+    /// see [`PeelingPass`](super::PeelingPass).
+    pub surface_materials: SharedSlice<'a, u32>,
+    /// A material index per triangle of the hull; empty where all are the same.
     pub triangle_materials: Vec<u32>,
 }
 
@@ -41,7 +49,7 @@ pub struct HullVertex {
 }
 
 impl HullPass<'_> {
-    /// The material of an id in the visibility buffer, the hull's or not.
+    /// The material of an id in the visibility buffer, whether the plan's or the hull's triangle.
     #[inline(always)]
     pub fn material(&self, id: usize) -> u32 {
         let own = || self.triangle_materials.get(id - self.surface_materials.len());
@@ -56,11 +64,44 @@ impl HullPass<'_> {
     }
 }
 
-/// How far an outline reaches.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Thickness {
-    /// In units of the box, as they are at each point's depth.
-    Object(f32),
-    /// On screen, in pixels.
-    Px(f32),
+/// A point on screen: x and y in 1/256 px, reversed depth, 1 / W. All of these are affine along an
+/// edge and across a face.
+type ScreenPoint = [f64; 4];
+
+impl HullVertex {
+    /// The vertex at a point, which lies in the guard band.
+    fn snapped([x, y, z, inv_w]: ScreenPoint) -> Self {
+        // The clamp is never reached, but NaN must become a number here.
+        let round = |v: f64| libm::rint(v).clamp(-1_048_576.0, 1_048_576.0) as i32;
+        Self { x: round(x), y: round(y), z: z as f32, inv_w: inv_w as f32 }
+    }
+}
+
+/// The end of a silhouette edge beside which an offset quad lies.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct EdgeEnd {
+    /// The vertex where the edge ends.
+    vertex: u32,
+    /// The quad's outer corner there.
+    outer: u32,
+    /// The material whose outline it is.
+    material: u32,
+    /// The free side of the edge, seen from this end: 1 where angles grow, else -1.
+    free: i8,
+    /// Direction in which the edge leaves, radians.
+    angle: f64,
+    /// Angle from there to the outer corner's direction, positive.
+    turn: f64,
+    /// The end on screen, 1/256 px.
+    middle: [f64; 2],
+    /// Distance from the middle to the outer corner, 1/256 px.
+    reach: f64,
+    /// Depth of the outer corner.
+    depth: f64,
+    /// 1 / W
+    inv_w: f64,
+    /// Change of depth along the edge, away from here, per 1/256 px.
+    slope: f64,
+    /// Whether a face of the vertex hides the edge.
+    is_hidden: bool,
 }

@@ -1,101 +1,101 @@
-//! Where surfaces end in a view: the edges along which outlines run, and on which side of each nothing is.
+//! The silhouette edges of a view: where surfaces end on screen, and on which side of each edge
+//! nothing is.
 
 use crate::limits::Stopped;
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
-use crate::plan::PlanError;
-use crate::plan::context::CHECK_EVERY;
-use crate::plan::context::PlanContext;
+use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::edges::silhouettes::Silhouettes;
-use crate::plan::{Edge, Projection, Thickness};
-use crate::scene::material_groups::{Fill, MaterialGroups};
+use crate::plan::projection::row_dot;
+use crate::plan::{Edge, PlanError, Projection};
+use crate::scene::{Fill, MaterialGroups, Scene, Thickness};
 use crate::spec::Cull;
 
 /// An edge beside which an outline is drawn.
 #[derive(Clone, Copy, Debug)]
-pub struct Rim {
+pub struct SilhouetteEdge {
     /// Its ends.
     pub vertices: [u32; 2],
     /// Its faces that are drawn.
     pub faces: [u32; 2],
-    /// The side that is free, as the sign of `(end - start) x (point - end)` on screen, where y points down.
+    /// The side that is free, as the sign of `(end - start) x (point - end)` on screen, where y
+    /// points down.
     pub free: i8,
-    /// Whose outline it is.
+    /// The material whose outline it is.
     pub material: u32,
 }
 
-/// A mesh on screen.
-pub struct View<'a> {
-    /// What is seen.
+/// A mesh as one view shows it.
+pub struct ScreenMesh<'a> {
+    /// The mesh.
     pub mesh: &'a Mesh,
-    /// How it is seen.
-    pub projection: &'a Projection,
+    /// The view.
+    pub projection: Projection,
     /// X, Y and W of each position.
     pub places: Vec<[f64; 3]>,
-    /// Of each face: -1 front, 1 back, 0 edge on.
+    /// By face: -1 front, 1 back, 0 edge on.
     facing: Vec<i8>,
-    /// By material: the side that is left out.
+    /// By material: the side that is culled.
     culls: Vec<Cull>,
 }
 
-impl<'a> View<'a> {
-    /// Looks at a mesh.
-    pub fn new(
-        mesh: &'a Mesh,
-        groups: &MaterialGroups<'_>,
-        projection: &'a Projection,
-        cx: &mut PlanContext<'_>,
-    ) -> Result<Self, PlanError> {
-        let PlanContext { budget, deadline } = cx;
+impl<'a> ScreenMesh<'a> {
+    /// Projects the mesh of a scene.
+    pub fn new(scene: &Scene<'a, '_>, cx: &mut PlanContext<'_>) -> Result<Self, PlanError> {
+        let (mesh, groups) = (scene.mesh, &scene.groups);
+        let projection = Projection::new(&scene.camera, scene.size_px(), true);
+        let PlanContext { budget, deadline, .. } = cx;
         budget.spend("an outline", mesh.positions.len() as u64, size_of::<[f64; 3]>() as u64)?;
         budget.spend("an outline", mesh.triangles.len() as u64, 1)?;
-        budget.spend("materials", groups.layers.len() as u64, 1)?;
+        budget.spend("materials", groups.material_count() as u64, 1)?;
         let mut places = Vec::with_capacity(mesh.positions.len());
         for positions in mesh.positions.chunks(CHECK_EVERY) {
             deadline.check()?;
             let rows = [&projection.x, &projection.y, &projection.w];
             places.extend(positions.iter().map(|p| rows.map(|row| row_dot(row, *p))));
         }
-        let mut sides = Vec::with_capacity(mesh.triangles.len());
+        let mut facings = Vec::with_capacity(mesh.triangles.len());
         for triangles in mesh.triangles.chunks(CHECK_EVERY) {
             deadline.check()?;
-            sides.extend(triangles.iter().map(|triangle| facing(mesh, &places, *triangle)));
+            facings.extend(triangles.iter().map(|triangle| facing(mesh, &places, *triangle)));
         }
-        let culls = (0..groups.layers.len()).map(|m| cull(groups, m)).collect();
-        Ok(Self { mesh, projection, places, facing: sides, culls })
+        let culls = (0..groups.material_count()).map(|m| cull(groups, m)).collect();
+        Ok(Self { mesh, projection, places, facing: facings, culls })
     }
 
-    /// The rims of the parts that have an outline, by material.
-    pub fn rims(
+    /// The silhouette edges of the materials that have an outline (`outlines`, by material).
+    pub fn silhouette_edges(
         &self,
         outlines: &[Option<Thickness>],
-        (list, silhouettes): (&EdgeList, &Silhouettes<'_>),
+        list: &EdgeList,
+        silhouettes: &Silhouettes,
         cx: &mut PlanContext<'_>,
-    ) -> Result<Vec<Rim>, PlanError> {
-        let each = |each: &mut dyn FnMut(Rim)| {
+    ) -> Result<Vec<SilhouetteEdge>, PlanError> {
+        let each = |each: &mut dyn FnMut(SilhouetteEdge)| {
             for (i, edge) in list.edges.iter().enumerate() {
                 if i % CHECK_EVERY == 0 {
                     cx.deadline.check()?;
                 }
                 let edge = Edge::new(&self.mesh.positions, edge.vertices, edge.faces);
-                let Some(edge) = silhouettes.edge(i as u32, edge) else { continue };
+                let Some(edge) = silhouettes.edge(self.mesh, i as u32, edge) else { continue };
                 let faces = self.drawn(edge.faces);
                 let Some(material) = self.material(faces, outlines) else { continue };
                 for &free in self.free_sides(edge.vertices, faces) {
-                    each(Rim { vertices: edge.vertices, faces, free, material });
+                    each(SilhouetteEdge { vertices: edge.vertices, faces, free, material });
                 }
             }
             Ok::<(), Stopped>(())
         };
         let mut count = 0;
         each(&mut |_| count += 1)?;
-        cx.budget.spend("an outline's edges", count, size_of::<Rim>() as u64)?;
-        let mut rims = Vec::with_capacity(count as usize);
-        each(&mut |rim| rims.push(rim))?;
-        Ok(rims)
+        cx.budget.spend("an outline's edges", count, size_of::<SilhouetteEdge>() as u64)?;
+        let mut found = Vec::with_capacity(count as usize);
+        each(&mut |edge| found.push(edge))?;
+        Ok(found)
     }
 
-    /// Which side a face shows: -1 its front, 1 its back, 0 neither; None of one that is left out because of that side, or of no face.
+    /// The side that a face shows: -1 its front, 1 its back, 0 neither. None where that side is
+    /// culled, or where there is no such face.
     pub fn shown(&self, face: u32) -> Option<i8> {
         let facing = *self.facing.get(face as usize)?;
         let material = self.mesh.triangle_materials[face as usize] as usize;
@@ -106,19 +106,20 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Those of two faces that are drawn, the first of them first.
+    /// Those of two faces that are drawn, in order.
     fn drawn(&self, faces: [u32; 2]) -> [u32; 2] {
         let [a, b] = faces.map(|face| self.shown(face).map_or(Edge::NO_FACE, |_| face));
         if a == Edge::NO_FACE { [b, a] } else { [a, b] }
     }
 
-    /// The material with the lowest index that has an outline, of two faces.
+    /// Of two faces' materials, the lowest that has an outline.
     fn material(&self, faces: [u32; 2], outlines: &[Option<Thickness>]) -> Option<u32> {
         let of = |face: &u32| self.mesh.triangle_materials.get(*face as usize).copied();
         faces.iter().filter_map(of).filter(|&m| outlines.get(m as usize).is_some_and(Option::is_some)).min()
     }
 
-    /// The sides of an edge on which its surface ends: both of an only face that is seen edge on.
+    /// The sides of an edge on which its surface ends. An only face that is seen edge on ends on
+    /// both.
     fn free_sides(&self, vertices: [u32; 2], faces: [u32; 2]) -> &'static [i8] {
         let [a, b] = faces.map(|face| self.side_of(vertices, face));
         match (a < 0 || b < 0, a > 0 || b > 0) {
@@ -129,7 +130,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// On which side of an edge a face lies.
+    /// The side of an edge on which a face lies.
     fn side_of(&self, [from, to]: [u32; 2], face: u32) -> i8 {
         let Some(&facing) = self.facing.get(face as usize) else { return 0 };
         let corners = self.mesh.triangles[face as usize];
@@ -138,23 +139,18 @@ impl<'a> View<'a> {
     }
 }
 
-/// `row . (p, 1)`, in f64.
-pub fn row_dot(row: &[f32; 4], p: [f32; 3]) -> f64 {
-    let (row, p) = (row.map(f64::from), p.map(f64::from));
-    ((row[0] * p[0] + row[1] * p[1]) + row[2] * p[2]) + row[3]
-}
-
-/// Which side of a part is left out, if it is filled.
+/// The side of a material that is culled, if the material is filled.
 fn cull(groups: &MaterialGroups<'_>, material: usize) -> Cull {
     match groups.fill(material) {
         Fill::None => Cull::None,
-        _ => groups.layers[material].surface.map_or(Cull::None, |surface| surface.cull),
+        _ => groups.by_material[material].surface.map_or(Cull::None, |surface| surface.cull),
     }
 }
 
-/// Which side a triangle shows: the sign of the volume that it spans with the eye, which is right for corners behind the eye too.
+/// The side that a triangle shows: the sign of the volume that it spans with the eye. It is right
+/// for corners behind the eye too.
 fn facing(mesh: &Mesh, places: &[[f64; 3]], triangle: [u32; 3]) -> i8 {
-    // In an order of its own, so that it is rounded alike whichever corner comes first and whichever way it is wound.
+    // Corners are sorted, so that rounding does not depend on which comes first or on the winding.
     let mut sorted = triangle;
     let mut is_even = true;
     for (i, j) in [(0, 1), (1, 2), (0, 1)] {

@@ -1,5 +1,5 @@
-//! How far each technique is from the truth and how long it takes, as measured: `error_table.json`, which the benchmark
-//! writes (`cargo bench --bench accuracy -- --write`) and which says of itself what its numbers mean.
+//! The measured error and time of each technique: `error_table.json`. The benchmark writes it
+//! (`cargo bench --bench accuracy -- --write`), and the file explains its numbers.
 
 use std::sync::LazyLock;
 
@@ -8,9 +8,10 @@ use serde::Deserialize;
 /// Everything that was measured.
 #[derive(Clone, Debug, Default, Deserialize)]
 pub struct ErrorTable {
-    /// Whether the GPU that was measured is software. It is then no stand-in for one that `auto` would draw on.
+    /// Whether the measured GPU is software. It then says nothing about one that `auto` would draw
+    /// on.
     pub gpu_is_software: bool,
-    /// Columns and rows of the pictures that were measured.
+    /// Columns and rows of the measured pictures.
     size_px: f64,
     rows: Vec<Row>,
 }
@@ -28,14 +29,16 @@ pub struct Row {
 }
 
 impl ErrorTable {
-    /// The table that this program was built with; empty if it could not be read, which a test rules out.
+    /// The table that this program was built with; empty if it cannot be read, which a test rules
+    /// out.
     pub fn shipped() -> &'static Self {
         static SHIPPED: LazyLock<ErrorTable> =
             LazyLock::new(|| serde_json::from_str(include_str!("error_table.json")).unwrap_or_default());
         &SHIPPED
     }
 
-    /// A technique on the back-end of this name; on the CPU where the table knows no GPU, since their pictures agree.
+    /// The row of a technique on the back-end of this name; the CPU's row where the table has no
+    /// GPU, since their pictures agree.
     pub fn row(&self, technique: &str, backend: &str, samples: u32) -> Option<&Row> {
         let find = |backend: &str| {
             let is_it = |row: &&Row| row.technique == technique && row.backend == backend && row.samples == samples;
@@ -44,24 +47,26 @@ impl ErrorTable {
         find(backend).or_else(|| find("cpu"))
     }
 
-    /// How far a picture of so many pixels is expected to be from the truth, RMSE in /255.
+    /// The expected error of a picture of so many pixels, RMSE in /255.
     ///
-    /// Errors of filled pictures are at the edges of what is seen: those grow with a picture's side and its area with the square of
-    /// it, so the mean square goes with 1 / side. Lines of one mesh meet in more and more of the pixels as these get fewer, with about
-    /// the same effect. Larger pictures than were measured are promised no less error, since finer meshes go with them.
+    /// Errors of filled pictures are at edges. Their number grows with the picture's side and its
+    /// area with the square of the side, so the mean square goes with 1 / side. Lines of one mesh
+    /// meet in a larger share of the pixels as these get fewer, with about the same effect.
+    /// Pictures larger than the measured ones get no smaller error, since finer meshes go with
+    /// them.
     pub fn error(&self, row: &Row, pixels: f64) -> f64 {
         let smaller = (self.size_px / pixels.sqrt()).max(1.0);
         (row.error * smaller.sqrt()).min(255.0)
     }
 
-    /// Whether a GPU was measured that is one.
+    /// Whether a GPU was measured that is not software.
     pub fn knows_gpu(&self) -> bool {
         !self.gpu_is_software && self.rows.iter().any(|row| row.backend == "gpu")
     }
 }
 
 impl Row {
-    /// What it is expected to take, milliseconds.
+    /// The expected time, milliseconds.
     pub fn time_ms(&self, pixels: f64, triangles: f64) -> f64 {
         self.ms_per_megapixel * pixels / 1e6 + self.ms_per_kilotriangle * triangles / 1e3
     }

@@ -1,54 +1,58 @@
-//! An error or a time in place of techniques: the samples, wire method and back-end that a request leaves open are chosen from the
-//! measured table.
+//! Quality targets: a request may give an error or a time in place of techniques. The samples, wire
+//! method and back-end that it leaves open are then selected from the measured table.
 //!
-//! The expected error of a look is the largest of its techniques': of faces' edges, of lines along edges and around shapes. It
-//! covers no texture filtering, no smooth normals between vertices and no order of layers. The expected time is the sum of its
-//! techniques', on the machine of the table and one thread: a hint for others.
+//! The expected error of a picture is the largest of its techniques' errors: at the edges of faces,
+//! and at lines along edges and around shapes. It does not cover texture filtering, smooth normals
+//! between vertices, or the order of layers. The expected time is the sum of its techniques' times,
+//! on one thread of the machine of the table: a hint for other machines.
 
 pub(crate) mod error_table;
+
 use std::fmt;
 
-use self::error_table::ErrorTable;
-use crate::spec::BackendChoice;
+use error_table::ErrorTable;
+
 use crate::spec::words::word_for;
 use crate::spec::{
-    FlatNormals, Hidden, Layers, OutlineMethod, QualityTarget, Shading, Spec, WIRE_METHODS, Wire, WireMethod,
+    BackendChoice, FlatNormals, Hidden, Layers, OutlineMethod, QualityTarget, Shading, Spec, WIRE_METHODS, Wire,
+    WireMethod,
 };
 use crate::warning::Warning;
 
-/// A request with what it left open filled in.
+/// A request in which everything that it left open is filled in.
 #[derive(Clone, Debug)]
-pub struct Chosen {
-    /// What is drawn.
+pub struct SelectedSpec {
+    /// The request that is drawn.
     pub spec: Spec,
-    /// What there is to say about it.
-    pub choice: Choice,
-    /// Where what was asked for is out of reach.
+    /// The selected values, for the response.
+    pub selection: QualitySelection,
+    /// Targets that are out of reach.
     pub warnings: Vec<Warning>,
 }
 
-/// What was chosen, and what is expected of it. Results keep it, so it is small.
+/// The selected values, and the error and time to expect. Results keep it, so it is small.
 #[derive(Clone, Debug)]
-pub struct Choice {
-    /// `image.samples`.
+pub struct QualitySelection {
+    /// The value of `image.samples`.
     pub samples: u32,
-    /// How wires are drawn, each method once.
+    /// The methods by which wires are drawn, each once.
     pub wire_methods: Vec<&'static str>,
-    /// `backend`.
+    /// The value of `backend`.
     pub backend: BackendChoice,
-    /// RMSE, /255.
+    /// Expected error, RMSE in /255.
     pub expected_error: f64,
-    /// Of drawing alone, milliseconds.
+    /// Expected time of drawing alone, milliseconds.
     pub expected_time_ms: f64,
 }
 
-/// Chooses for a mesh of so many triangles; None where nothing is asked for. `has_gpu`: whether `auto` may mean a GPU here.
-pub fn choose(spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Chosen> {
-    choose_from(ErrorTable::shipped(), spec, triangles, has_gpu)
+/// Selects what a request leaves open, for a mesh of so many triangles; None where the request has
+/// no quality target. `has_gpu` says whether `auto` may mean a GPU here.
+pub fn select_quality(spec: &Spec, triangles: usize, has_gpu: bool) -> Option<SelectedSpec> {
+    select_from(ErrorTable::shipped(), spec, triangles, has_gpu)
 }
 
-impl fmt::Display for Choice {
-    /// In the request's own keys.
+impl fmt::Display for QualitySelection {
+    /// Writes the selected values in the request's own keys.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "image.samples={}", self.samples)?;
         self.wire_methods.iter().try_for_each(|name| write!(f, ", wire.method={name}"))?;
@@ -56,7 +60,7 @@ impl fmt::Display for Choice {
     }
 }
 
-fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool) -> Option<Chosen> {
+fn select_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool) -> Option<SelectedSpec> {
     let target = spec.quality_target.as_ref()?;
     let all = candidates(table, spec, target, triangles, has_gpu);
     let time = |(_, [_, time_ms]): &Candidate| *time_ms;
@@ -70,36 +74,36 @@ fn choose_from(table: &ErrorTable, spec: &Spec, triangles: usize, has_gpu: bool)
         Some(_) => in_time().filter(is_exact).min_by(cheapest),
         None => None,
     };
-    let chosen = wanted.or_else(|| in_time().min_by(best)).or_else(|| all.iter().min_by(cheapest))?;
+    let selected = wanted.or_else(|| in_time().min_by(best)).or_else(|| all.iter().min_by(cheapest))?;
 
     let mut warnings = Vec::new();
-    if let Some(max) = target.max_error.filter(|_| !is_exact(&chosen)) {
+    if let Some(max) = target.max_error.filter(|_| !is_exact(&selected)) {
         let detail = format!(
             "an error of at most {max}/255 is asked for, and the best of what may be chosen is expected to have {}/255",
-            error(chosen)
+            error(selected)
         );
         warnings.push(Warning { code: "max_error_unmet", detail });
     }
-    if let Some(max) = target.max_time_ms.filter(|_| !is_in_time(&chosen)) {
+    if let Some(max) = target.max_time_ms.filter(|_| !is_in_time(&selected)) {
         let detail = format!(
             "at most {max} ms are asked for, and the fastest of what may be chosen is expected to take {} ms",
-            time(chosen)
+            time(selected)
         );
         warnings.push(Warning { code: "max_time_ms_unmet", detail });
     }
-    let (spec, [expected_error, expected_time_ms]) = chosen.clone();
+    let (spec, [expected_error, expected_time_ms]) = selected.clone();
     let mut wire_methods: Vec<&str> = wires(&spec).map(|wire| word_for(wire.method)).collect();
     wire_methods.sort_unstable();
     wire_methods.dedup();
     let (samples, backend) = (spec.image.samples, spec.backend);
-    let choice = Choice { samples, wire_methods, backend, expected_error, expected_time_ms };
-    Some(Chosen { spec, choice, warnings })
+    let selection = QualitySelection { samples, wire_methods, backend, expected_error, expected_time_ms };
+    Some(SelectedSpec { spec, selection, warnings })
 }
 
 /// A spec, its expected error and its expected time.
 type Candidate = (Spec, [f64; 2]);
 
-/// Every way to fill in what is open, with what is expected of it.
+/// Every way to fill in what is open, with its expected error and time.
 fn candidates(
     table: &ErrorTable,
     spec: &Spec,
@@ -135,7 +139,7 @@ fn candidates(
     all
 }
 
-/// Draws the open wires so; false where that would not be the same lines.
+/// Sets the method of the open wires; false where that would not draw the same lines.
 fn set_method(spec: &mut Spec, target: &QualityTarget, method: WireMethod) -> bool {
     let material_wires = spec.materials.iter_mut().map(|(_, layers)| layers).zip(&target.open.material_wires);
     let open = std::iter::once((&mut spec.layers, &target.open.wire)).chain(material_wires);
@@ -145,25 +149,25 @@ fn set_method(spec: &mut Spec, target: &QualityTarget, method: WireMethod) -> bo
             None => return false,
         }
     }
-    // All wires by barycentrics of one picture do the same with hidden ones, and only `hide` was measured.
+    // All barycentric wires of one picture treat hidden lines alike, and only `hide` was measured.
     method == WireMethod::Exact || wires(spec).all(|w| w.method == WireMethod::Exact || w.hidden == Hidden::Hide)
 }
 
-/// An exact wire by another method, as wide where that method's own measure is right: full up to t and gone at t + s on either
-/// side of an edge.
+/// An exact wire by another method, with the same width where that method measures pixels rightly:
+/// full up to t and gone at t + s on either side of an edge.
 fn as_wide(wire: &Wire, method: WireMethod) -> Option<Wire> {
     if method == WireMethod::Exact {
         return Some(*wire);
     }
     let smoothing = wire.thickness.min(1.0);
     let thickness = 0.5 * (wire.thickness - smoothing);
-    // What a request may say itself.
+    // Within what a request may give itself.
     (smoothing > 0.0 && thickness <= 10.0).then_some(Wire { method, thickness, smoothing, ..*wire })
 }
 
-/// The error and the time of a look; None where the table does not know one of its techniques.
+/// The error and the time of a picture; None where the table does not have one of its techniques.
 fn expect(table: &ErrorTable, spec: &Spec, backend: &str, triangles: usize) -> Option<[f64; 2]> {
-    let mut techniques: Vec<&str> = looks(spec).flat_map(techniques).collect();
+    let mut techniques: Vec<&str> = styles(spec).flat_map(techniques).collect();
     techniques.extend(spec.topology.map(|_| word_for(WireMethod::Exact)));
     techniques.sort_unstable();
     techniques.dedup();
@@ -174,7 +178,7 @@ fn expect(table: &ErrorTable, spec: &Spec, backend: &str, triangles: usize) -> O
         error = error.max(table.error(row, pixels));
         time_ms += row.time_ms(pixels, triangles as f64);
     }
-    // More digits would only pretend.
+    // More digits would suggest a precision that the table does not have.
     Some([error, time_ms].map(|v: f64| (v * 1e4).round() / 1e4))
 }
 
@@ -191,12 +195,12 @@ fn techniques(layers: &Layers) -> Vec<&'static str> {
     [surface, wire, outline].into_iter().flatten().collect()
 }
 
-fn looks(spec: &Spec) -> impl Iterator<Item = &Layers> {
+fn styles(spec: &Spec) -> impl Iterator<Item = &Layers> {
     std::iter::once(&spec.layers).chain(spec.materials.iter().map(|(_, layers)| layers))
 }
 
 fn wires(spec: &Spec) -> impl Iterator<Item = &Wire> {
-    looks(spec).filter_map(|layers| layers.wire.as_ref())
+    styles(spec).filter_map(|layers| layers.wire.as_ref())
 }
 
 #[cfg(test)]

@@ -81,9 +81,9 @@ fn the_cheapest_that_is_good_enough_is_chosen_of_what_is_open() {
         ),
     ];
     for (keys, triangles, what, expected, warnings) in &cases {
-        let chosen = choose_from(&table(true), &spec(&[LINES, keys].concat()), *triangles, false).unwrap();
-        assert_eq!(chosen.choice.to_string(), *what, "{keys:?}");
-        let Choice { expected_error, expected_time_ms, .. } = chosen.choice;
+        let chosen = select_from(&table(true), &spec(&[LINES, keys].concat()), *triangles, false).unwrap();
+        assert_eq!(chosen.selection.to_string(), *what, "{keys:?}");
+        let QualitySelection { expected_error, expected_time_ms, .. } = chosen.selection;
         assert_eq!([expected_error, expected_time_ms], *expected, "{keys:?}");
         let codes: Vec<&str> = chosen.warnings.iter().map(|warning| warning.code).collect();
         assert_eq!(codes, *warnings, "{keys:?}");
@@ -93,21 +93,21 @@ fn the_cheapest_that_is_good_enough_is_chosen_of_what_is_open() {
 #[test]
 fn a_gpu_is_chosen_where_there_is_one_and_the_table_knows_it() {
     let asked = spec(&[LINES, &[("max_error", "2")]].concat());
-    let chosen = choose_from(&table(false), &asked, 1000, true).unwrap();
-    assert_eq!((chosen.spec.backend, chosen.choice.expected_time_ms), (BackendChoice::Auto, 2.01));
-    let without = choose_from(&table(false), &asked, 1000, false).unwrap();
-    assert_eq!((without.spec.backend, without.choice.expected_time_ms), (BackendChoice::Cpu, 11.0));
+    let chosen = select_from(&table(false), &asked, 1000, true).unwrap();
+    assert_eq!((chosen.spec.backend, chosen.selection.expected_time_ms), (BackendChoice::Auto, 2.01));
+    let without = select_from(&table(false), &asked, 1000, false).unwrap();
+    assert_eq!((without.spec.backend, without.selection.expected_time_ms), (BackendChoice::Cpu, 11.0));
     let given = spec(&[LINES, &[("max_error", "2"), ("backend", "cpu")]].concat());
-    assert_eq!(choose_from(&table(false), &given, 1000, true).unwrap().spec.backend, BackendChoice::Cpu);
+    assert_eq!(select_from(&table(false), &given, 1000, true).unwrap().spec.backend, BackendChoice::Cpu);
     let rules = Rules { limits: Limits::default(), backend: BackendChoice::Gpu };
     let of_server = request::read(None, &[("max_error".to_owned(), "2".to_owned())], &rules).unwrap();
-    assert_eq!(choose_from(&table(true), &of_server, 1000, false).unwrap().spec.backend, BackendChoice::Gpu);
+    assert_eq!(select_from(&table(true), &of_server, 1000, false).unwrap().spec.backend, BackendChoice::Gpu);
 }
 
 #[test]
 fn another_method_draws_as_wide() {
     let asked = spec(&[LINES, &[("max_error", "99")]].concat());
-    let wire = choose_from(&table(true), &asked, 100_000, false).unwrap().spec.layers.wire.unwrap();
+    let wire = select_from(&table(true), &asked, 100_000, false).unwrap().spec.layers.wire.unwrap();
     assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Fwidth, 1.0, 1.0));
     let exact = asked.layers.wire.unwrap();
     let wide = |thickness| as_wide(&Wire { thickness, ..exact }, WireMethod::Fwidth);
@@ -119,12 +119,12 @@ fn another_method_draws_as_wide() {
 #[test]
 fn the_worst_technique_of_all_materials_counts() {
     let keys = [("size", "1000"), ("max_error", "3"), ("materials.A.wire.method", "fwidth")];
-    let chosen = choose_from(&table(true), &spec(&keys), 0, false).unwrap();
-    assert_eq!((chosen.choice.expected_error, chosen.choice.expected_time_ms), (50.0, 80.0));
-    assert_eq!(chosen.choice.wire_methods, ["fwidth"]);
+    let chosen = select_from(&table(true), &spec(&keys), 0, false).unwrap();
+    assert_eq!((chosen.selection.expected_error, chosen.selection.expected_time_ms), (50.0, 80.0));
+    assert_eq!(chosen.selection.wire_methods, ["fwidth"]);
     // A material's open wire is chosen too.
     let keys = [("size", "1000"), ("max_error", "99"), ("materials.A.wire", "{}")];
-    let chosen = choose_from(&table(true), &spec(&keys), 100_000, false).unwrap();
+    let chosen = select_from(&table(true), &spec(&keys), 100_000, false).unwrap();
     assert_eq!(chosen.spec.materials[0].1.wire.unwrap().method, WireMethod::Fwidth);
     assert!(chosen.spec.layers.wire.is_none());
 }
@@ -132,8 +132,8 @@ fn the_worst_technique_of_all_materials_counts() {
 #[test]
 fn nothing_is_chosen_where_nothing_is_asked_for() {
     for keys in [&[("samples", "1")][..], &[("max_error", "null")], &[("image.max_time_ms", "null")]] {
-        assert!(choose_from(&table(true), &spec(keys), 7, false).is_none(), "{keys:?}");
+        assert!(select_from(&table(true), &spec(keys), 7, false).is_none(), "{keys:?}");
     }
     // Without a table nothing can be promised.
-    assert!(choose_from(&ErrorTable::default(), &spec(&[("max_error", "1")]), 7, true).is_none());
+    assert!(select_from(&ErrorTable::default(), &spec(&[("max_error", "1")]), 7, true).is_none());
 }

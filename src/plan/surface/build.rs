@@ -2,61 +2,44 @@
 
 use std::borrow::Cow;
 
+use super::edge_masks::edge_masks;
 use super::textures::TextureLoader;
 use super::{lights, materials};
-use crate::mesh::{Mesh, normals};
-use crate::plan::build::projection;
+use crate::mesh::normals;
 use crate::plan::context::PlanContext;
-use crate::plan::edges::Edges;
-use crate::plan::lines::build;
+use crate::plan::geometry::Geometry;
+use crate::plan::projection::Projection;
+use crate::plan::shared_slice::SharedSlice;
 use crate::plan::skips::{SkipKind, Skips};
-use crate::plan::{CornerValues, Faces, PlanError, SurfacePass, flags};
-use crate::scene::camera::Camera;
-use crate::scene::material_groups::MaterialGroups;
-use crate::spec::{Cull, Spec};
+use crate::plan::{CornerValues, Faces, PlanError, ShadedMaterial, SurfacePass, Textures, flags};
+use crate::scene::Scene;
+use crate::spec::Cull;
 
-/// What is filled, or only hides lines; None where the look has neither.
-pub fn surface_pass<'a>(
-    mesh: &'a Mesh,
-    spec: &Spec,
-    groups: &MaterialGroups<'_>,
-    camera: &Camera,
-    edges: &mut Edges<'_>,
-    skips: &mut Skips<'_>,
+/// The pass that is filled, or only hides lines; None where the request needs neither.
+pub fn surface_pass<'m>(
+    scene: &Scene<'m, '_>,
+    geometry: &Geometry<'m>,
     cx: &mut PlanContext<'_>,
-) -> Result<Option<SurfacePass<'a>>, PlanError> {
+) -> Result<Option<SurfacePass<'m>>, PlanError> {
+    let groups = &scene.groups;
     let is_seen = groups.has_fill() || groups.has_barycentric_wire();
     let is_needless = !is_seen && !groups.needs_occluder();
     let why = "the look has no filled surface, and no line that one could hide";
-    if skips.skip(SkipKind::Surface, is_needless, why) {
+    if cx.skips.skip(SkipKind::Surface, is_needless, why) {
         return Ok(None);
     }
-    let is_shaded = !skips.skip(SkipKind::Shading, !is_seen, "the surface is not seen: it only hides lines");
+    let why = "the surface is not seen: it only hides lines";
+    let is_shaded = !cx.skips.skip(SkipKind::Shading, !is_seen, why);
     let edge_masks = if groups.has_barycentric_wire() || groups.shows_edge_distance() {
-        build::edge_masks(mesh, groups, edges, cx)?
+        edge_masks(scene, geometry, cx)?
     } else {
         Vec::new()
     };
-    let mut loader = TextureLoader::new(mesh, cx);
-    let mut looks = Vec::with_capacity(mesh.materials.len());
-    let used = used_materials(mesh);
-    for (index, (slot, layers)) in mesh.materials.iter().zip(&groups.layers).enumerate() {
-        loader.for_material(index, used[index]);
-        looks.push(materials::look(mesh, slot, layers, &mut loader)?);
-    }
-    let samples = looks.iter().any(materials::samples);
-    if !skips.skip(SkipKind::Textures, !samples, "nothing samples one") && !samples {
-        for (index, slot) in mesh.materials.iter().enumerate() {
-            loader.for_material(index, used[index]);
-            materials::load_all(slot, &mut loader)?;
-        }
-    }
-    let size_px = [spec.image.width_px, spec.image.height_px];
-    let textures = loader.finish(&projection(camera, size_px, true), skips)?;
-    let is_one = looks.iter().all(|look| *look == looks[0]);
-    let one_material = skips.skip(SkipKind::MaterialIndices, is_one, "every triangle has the same material");
-    if one_material {
-        looks.truncate(1);
+    let (mut materials, textures) = materials_and_textures(scene, geometry, cx)?;
+    let is_one = materials.iter().all(|material| *material == materials[0]);
+    let is_one = cx.skips.skip(SkipKind::MaterialIndices, is_one, "every triangle has the same material");
+    if is_one {
+        materials.truncate(1);
     }
     let mut pass = SurfacePass {
         faces: match groups.common_cull() {
@@ -65,53 +48,93 @@ pub fn surface_pass<'a>(
             Cull::Front => Faces::Back,
         },
         is_shaded,
-        materials: looks,
-        triangle_materials: if one_material { &[] } else { &mesh.triangle_materials },
-        face_normals: &[],
+        materials,
+        triangle_materials: if is_one { SharedSlice::default() } else { geometry.triangle_materials.clone() },
+        face_normals: SharedSlice::default(),
         vertex_normals: None,
         uvs: None,
         colors: None,
         edge_masks: Cow::Owned(edge_masks),
         textures,
-        lights: lights::lights(&spec.light, camera),
+        lights: lights::lights(&scene.spec.light, &scene.camera),
     };
-    attributes(mesh, &mut pass, skips);
+    add_attributes(scene, geometry, &mut pass, &mut cx.skips);
     Ok(Some(pass))
 }
 
-/// Whether any triangle has a material.
-fn used_materials(mesh: &Mesh) -> Vec<bool> {
-    let mut used = vec![false; mesh.materials.len()];
-    for &material in &mesh.triangle_materials {
-        if let Some(used) = used.get_mut(material as usize) {
-            *used = true;
+/// The materials as the shaders read them, and the textures that they sample.
+fn materials_and_textures(
+    scene: &Scene<'_, '_>,
+    geometry: &Geometry<'_>,
+    cx: &mut PlanContext<'_>,
+) -> Result<(Vec<ShadedMaterial>, Textures), PlanError> {
+    let mesh = scene.mesh;
+    let mut loader = TextureLoader::new(mesh, cx.budget, cx.deadline);
+    let mut materials = Vec::with_capacity(mesh.materials.len());
+    let is_used = used_materials(mesh.materials.len(), geometry);
+    for (index, (slot, layers)) in mesh.materials.iter().zip(&scene.groups.by_material).enumerate() {
+        loader.for_material(index, is_used[index]);
+        materials.push(materials::shaded_material(mesh, slot, layers, &mut loader)?);
+    }
+    let samples = materials.iter().any(materials::samples);
+    if !cx.skips.skip(SkipKind::Textures, !samples, "nothing samples one") && !samples {
+        for (index, slot) in mesh.materials.iter().enumerate() {
+            loader.for_material(index, is_used[index]);
+            materials::load_all(slot, &mut loader)?;
         }
     }
-    used
+    let projection = Projection::new(&scene.camera, scene.size_px(), true);
+    let textures = loader.finish(geometry, &projection, &mut cx.skips)?;
+    Ok((materials, textures))
+}
+
+/// By material, whether any triangle has it.
+fn used_materials(count: usize, geometry: &Geometry<'_>) -> Vec<bool> {
+    let mut is_used = vec![false; count];
+    for &material in geometry.triangle_materials.iter() {
+        if let Some(is_used) = is_used.get_mut(material as usize) {
+            *is_used = true;
+        }
+    }
+    is_used
 }
 
 /// Gives the pass the arrays that its materials read.
-fn attributes<'a>(mesh: &'a Mesh, pass: &mut SurfacePass<'a>, skips: &mut Skips<'_>) {
+fn add_attributes<'m>(
+    scene: &Scene<'m, '_>,
+    geometry: &Geometry<'m>,
+    pass: &mut SurfacePass<'m>,
+    skips: &mut Skips<'_>,
+) {
+    let mesh = scene.mesh;
     let all = pass.all_flags();
     let reads = |flag: u32| pass.is_shaded && all & flag != 0;
-    let faceless = !reads(flags::FACE_NORMALS);
-    if !skips.skip(SkipKind::FaceNormals, faceless, "no material is lit by them") {
-        pass.face_normals = &mesh.face_normals;
+    let is_unlit = !reads(flags::FACE_NORMALS);
+    if !skips.skip(SkipKind::FaceNormals, is_unlit, "no material is lit by them") {
+        pass.face_normals = geometry.face_normals.clone();
     }
     if !skips.skip(SkipKind::VertexNormals, !reads(flags::VERTEX_NORMALS), "no material is shaded smoothly") {
-        let (values, triangles) = normals::smooth(mesh);
-        pass.vertex_normals = Some(CornerValues { values, triangles });
+        pass.vertex_normals = Some(vertex_normals(geometry));
     }
     let samples = pass.is_shaded && pass.materials.iter().any(materials::samples);
     let shows_uvs =
         pass.materials.iter().any(|m| m.flags & flags::DEBUG == super::debug_views::UV << flags::DEBUG_SHIFT);
     if !mesh.uvs.is_empty() && !skips.skip(SkipKind::Uvs, !samples && !shows_uvs, "nothing samples a texture") {
-        let values = Cow::Borrowed(mesh.uvs.as_slice());
-        pass.uvs = Some(CornerValues { values, triangles: &mesh.attribute_triangles });
+        let triangles = geometry.attribute_triangles.clone();
+        pass.uvs = Some(CornerValues { values: (&mesh.uvs).into(), triangles });
     }
-    let colorless = !reads(flags::VERTEX_COLORS);
-    if !mesh.colors.is_empty() && !skips.skip(SkipKind::VertexColors, colorless, "no material shows them") {
-        let values = Cow::Borrowed(mesh.colors.as_slice());
-        pass.colors = Some(CornerValues { values, triangles: &mesh.attribute_triangles });
+    let is_colorless = !reads(flags::VERTEX_COLORS);
+    if !mesh.colors.is_empty() && !skips.skip(SkipKind::VertexColors, is_colorless, "no material shows them") {
+        let triangles = geometry.attribute_triangles.clone();
+        pass.colors = Some(CornerValues { values: (&mesh.colors).into(), triangles });
     }
+}
+
+/// The file's own vertex normals; angle-weighted ones where it has none.
+fn vertex_normals<'m>(geometry: &Geometry<'m>) -> CornerValues<'m, [f32; 3]> {
+    if geometry.normals.is_empty() {
+        let values = normals::angle_weighted(&geometry.positions, &geometry.triangles, &geometry.face_normals);
+        return CornerValues { values: values.into(), triangles: geometry.triangles.clone() };
+    }
+    CornerValues { values: geometry.normals.clone(), triangles: geometry.attribute_triangles.clone() }
 }

@@ -1,24 +1,28 @@
-//! How close the picture comes to a texture: a level that no pixel can reach, so that finer ones need not be kept.
+//! Texture levels that a picture can reach: finer ones need not be kept.
 //!
-//! The sampler takes the level log2(max(|a|, |b|)), a and b being the derivatives of the texel coordinates across and down a
-//! pixel. max(|a|, |b|)^2 >= |a x b|, the texels that a pixel covers. Over a triangle with screen corners s_i, texel corners
-//! t_i and distances W_i, perspective interpolation gives
+//! The sampler takes the level log2(max(|a|, |b|)), a and b being the derivatives of the texel
+//! coordinates across and down a pixel. max(|a|, |b|)^2 >= |a x b|, the texels that a pixel covers.
+//! Over a triangle with screen corners s_i, texel corners t_i and distances W_i, perspective
+//! interpolation gives
 //!
 //! ```text
 //! |a x b| (p) = area(t) / area(s) * W(p)^3 / (W_0 W_1 W_2)
 //! ```
 //!
-//! (u and v are ratios of functions that are linear on screen, with the denominator 1 / W; the Jacobian of such a ratio is a
-//! determinant of the planes over the denominator's cube.) A pixel is shaded at the mean of its samples, which lie inside the
-//! triangle, where W is at least the smallest W_i. So the least of this over all triangles bounds the level from below.
+//! (u and v are ratios of functions that are linear on screen, with the denominator 1 / W; the
+//! Jacobian of such a ratio is a determinant of the planes over the denominator's cube.) A pixel is
+//! shaded at the mean of its samples, which lie inside the triangle, where W is at least the
+//! smallest W_i. So the least of this over all triangles bounds the level from below.
 //!
-//! Rounding: corners are snapped to whole units of 1/256 px, so area(s) may be larger than the true one, by at most
-//! e perimeter + 3 e^2 for corners that move by e; and f32 coordinates make area(t) uncertain in the same way. Both
-//! are taken at their worst. A corner that is snapped nowhere, behind the eye or far outside, keeps every level.
+//! Rounding: corners are snapped to whole units of 1/256 px, so area(s) may be larger than the true
+//! one, by at most e perimeter + 3 e^2 for corners that move by e; and f32 coordinates make area(t)
+//! uncertain in the same way. Both are taken at their worst. A corner that is snapped nowhere,
+//! behind the eye or far outside, keeps every level.
 
 use crate::limits::{Deadline, Stopped};
 use crate::mesh::Mesh;
-use crate::plan::Projection;
+use crate::plan::geometry::Geometry;
+use crate::plan::projection::Projection;
 
 /// A material's use of a texture.
 #[derive(Clone, Copy, Debug)]
@@ -27,15 +31,17 @@ pub struct Use {
     pub material: u32,
     /// The texture's place in the result.
     pub texture: usize,
-    /// Of the texture coordinates.
+    /// The transform of the texture coordinates.
     pub transform: [[f32; 3]; 2],
     /// Texels of level 0.
     pub texels: f64,
 }
 
-/// For each of `count` textures, a level that every pixel that samples it reaches or exceeds.
+/// For each of `count` textures, a level that is reached or exceeded by every pixel that samples
+/// the texture.
 pub fn finest_levels(
     mesh: &Mesh,
+    geometry: &Geometry<'_>,
     projection: &Projection,
     uses: &[Use],
     count: usize,
@@ -48,20 +54,20 @@ pub fn finest_levels(
         }
     }
     let mut least = vec![f64::INFINITY; uses.len()];
-    // Those that may still be spared a level.
+    // Uses that may still be spared a level.
     let mut open: usize = of_material.iter().map(Vec::len).sum();
-    for (t, &material) in mesh.triangle_materials.iter().enumerate() {
+    for (t, &material) in geometry.triangle_materials.iter().enumerate() {
         if t.is_multiple_of(4096) {
             deadline.check()?;
         }
         let Some(list) = of_material.get_mut(material as usize).filter(|list| !list.is_empty()) else { continue };
-        let screen = on_screen(mesh.triangles[t].map(|v| mesh.positions[v as usize]), projection);
-        let uvs = mesh.attribute_triangles[t].map(|v| mesh.uvs[v as usize]);
+        let screen = on_screen(geometry.triangles[t].map(|v| geometry.positions[v as usize]), projection);
+        let uvs = geometry.attribute_triangles[t].map(|v| mesh.uvs[v as usize]);
         let before = list.len();
         list.retain(|&index| {
             let one = &uses[index];
             let density = screen.map_or(0.0, |screen| screen * area_of_uvs(&uvs, &one.transform) * one.texels);
-            // Written so that NaN counts as nothing.
+            // Written so that NaN counts as 0.
             least[index] = if density > 0.0 { least[index].min(density) } else { 0.0 };
             level(least[index]) > 0
         });
@@ -77,8 +83,8 @@ pub fn finest_levels(
     Ok(levels)
 }
 
-/// The level at which a pixel covers `density` texels of level 0, rounded down, with a margin for the sampler's own
-/// rounding.
+/// The level at which a pixel covers `density` texels of level 0, rounded down, with a margin for
+/// the sampler's own rounding.
 fn level(density: f64) -> u32 {
     let (mut level, mut texels) = (0, 4.0 * 1.08);
     while level < 31 && texels <= density {
@@ -88,8 +94,8 @@ fn level(density: f64) -> u32 {
     level
 }
 
-/// What the texel area is to be multiplied with: `W^3 / (W_0 W_1 W_2) / area(s)` at the nearest corner, in 1 / px^2. None
-/// where a corner is outside.
+/// The factor of the texel area: `W^3 / (W_0 W_1 W_2) / area(s)` at the nearest corner, in 1 /
+/// px^2. None where a corner is outside.
 fn on_screen(corners: [[f32; 3]; 3], projection: &Projection) -> Option<f64> {
     /// 4096 px, in 1/256 px.
     const GUARD: f64 = 1_048_576.0;
@@ -117,7 +123,7 @@ fn on_screen(corners: [[f32; 3]; 3], projection: &Projection) -> Option<f64> {
     Some((nearest / depths[0]) * (nearest / depths[1]) * (nearest / depths[2]) / area_px)
 }
 
-/// Twice the area of a triangle in transformed texture coordinates; the least that f32 can make of it.
+/// Twice the area of a triangle in transformed texture coordinates, less what f32 may be off.
 fn area_of_uvs(uvs: &[[f32; 2]; 3], transform: &[[f32; 3]; 2]) -> f64 {
     let mut largest = 0.0_f64;
     let points = uvs.map(|uv| {

@@ -1,4 +1,5 @@
-//! Lamps for a preset. They hang around the viewer, so that every view of a model is lit as well as any other.
+//! The lamps of a preset. They are placed around the viewer, so that every view of a model is lit
+//! equally well.
 
 use glam::DVec3;
 
@@ -6,14 +7,16 @@ use crate::plan::{Lamp, Lights};
 use crate::scene::camera::Camera;
 use crate::spec::{Light, LightPreset};
 
-/// A lamp's place in the camera's axes (right, up, towards the viewer) and its share of the intensity.
+/// A lamp's place in the camera's axes (right, up, towards the viewer) and its share of the
+/// intensity.
 type Place = ([f64; 3], f32);
 
-/// Over the viewer's left shoulder: straight ahead would leave every shape without a lit side.
+/// A lamp over the viewer's left shoulder. One straight ahead would leave shapes without a lit
+/// side.
 const HEADLIGHT: &[Place] = &[([-0.5, 0.7, 1.0], 1.0)];
 
-/// Key from the left and above, a weak fill from the right that keeps the shadow side readable, a rim from behind that
-/// lifts the shape off the background.
+/// A key light from the left and above, a weak fill light from the right that keeps the shadow side
+/// readable, and a rim light from behind that lifts the shape off the background.
 const THREE_POINT: &[Place] = &[([-0.8, 0.9, 0.9], 0.85), ([1.0, 0.15, 0.7], 0.35), ([0.5, 0.9, -0.8], 0.55)];
 
 /// The lamps of a scene.

@@ -1,39 +1,39 @@
-//! A material of the file and a part's layers to what the shaders read.
+//! A material of the file and its style to the material that the shaders read.
 
 use super::textures::TextureLoader;
 use crate::mesh::material::{AlphaMode, TextureRef};
 use crate::mesh::{MaterialSlot, Mesh};
-use crate::plan::lines::build;
+use crate::plan::lines::styles::wire_color;
 use crate::plan::{PlanError, ShadedMaterial, TEXTURE_NONE, flags, slots};
 use crate::spec::color::Rgba;
 use crate::spec::{DebugView, FlatNormals, Layers, Shading, Surface, Wire, WireMethod};
 
-/// Surfaces for which neither the request nor the file names a colour: `#c8ccd2`, a calm light grey.
+/// The colour where neither the request nor the file names one: `#c8ccd2`, a calm light grey.
 const DEFAULT_COLOR: [u8; 4] = [0xc8, 0xcc, 0xd2, 0xff];
 
-/// Neither a mirror nor chalk.
+/// The roughness where neither the request nor the file names one: neither a mirror nor chalk.
 const DEFAULT_ROUGHNESS: f32 = 0.6;
 
-/// What a part looks like.
-pub fn look(
+/// A material in its style.
+pub fn shaded_material(
     mesh: &Mesh,
     slot: &MaterialSlot,
     layers: &Layers,
     textures: &mut TextureLoader<'_>,
 ) -> Result<ShadedMaterial, PlanError> {
-    let mut look = ShadedMaterial::unlit([0.0; 4]);
-    look.flags = 0;
+    let mut material = ShadedMaterial::unlit([0.0; 4]);
+    material.flags = 0;
     if let Some(surface) = &layers.surface {
-        look.flags = flags::FILL | shading_flags(slot, surface);
-        fill(&mut look, mesh, slot, surface);
+        material.flags = flags::FILL | shading_flags(slot, surface);
+        fill(&mut material, mesh, slot, surface);
         if surface.textures && surface.debug == DebugView::None {
-            sample(&mut look, slot, surface, textures)?;
+            sample(&mut material, slot, surface, textures)?;
         }
     }
     if let Some(wire) = layers.wire.as_ref().filter(|wire| wire.method != WireMethod::Exact) {
-        wire_of(&mut look, wire);
+        wire_of(&mut material, wire);
     }
-    Ok(look)
+    Ok(material)
 }
 
 /// Loads all textures of a material that samples none.
@@ -52,42 +52,42 @@ pub fn load_all(slot: &MaterialSlot, textures: &mut TextureLoader<'_>) -> Result
     Ok(())
 }
 
-fn fill(look: &mut ShadedMaterial, mesh: &Mesh, slot: &MaterialSlot, surface: &Surface) {
-    // A picture or the vertices' colours say it all: grey would only darken them.
+fn fill(material: &mut ShadedMaterial, mesh: &Mesh, slot: &MaterialSlot, surface: &Surface) {
+    // Grey would darken a base texture or vertex colours.
     let is_painted = slot.base_texture.is_some() || !mesh.colors.is_empty();
     let none = if is_painted { [1.0; 4] } else { Rgba::from_srgb8(DEFAULT_COLOR).0 };
     let file = slot.base_color.unwrap_or(none);
-    look.base_color = surface.color.map_or(file, |color| color.0);
-    look.opacity = if surface.debug == DebugView::None { surface.opacity } else { 1.0 };
-    look.metallic = surface.metallic.or(slot.metallic).unwrap_or(0.0);
-    look.roughness = surface.roughness.or(slot.roughness).unwrap_or(DEFAULT_ROUGHNESS);
-    look.normal_scale = slot.normal_scale.unwrap_or(1.0);
-    look.emissive = match surface.emissive {
+    material.base_color = surface.color.map_or(file, |color| color.0);
+    material.opacity = if surface.debug == DebugView::None { surface.opacity } else { 1.0 };
+    material.metallic = surface.metallic.or(slot.metallic).unwrap_or(0.0);
+    material.roughness = surface.roughness.or(slot.roughness).unwrap_or(DEFAULT_ROUGHNESS);
+    material.normal_scale = slot.normal_scale.unwrap_or(1.0);
+    material.emissive = match surface.emissive {
         Some(Rgba([r, g, b, a])) => [r, g, b].map(|v| v * a),
         None => slot.emissive.unwrap_or_default(),
     };
-    // A request's own colour takes the place of all that the file says about colour.
+    // A colour in the request replaces all colours of the file.
     if surface.color.is_none() && !mesh.colors.is_empty() {
-        look.flags |= flags::VERTEX_COLORS;
+        material.flags |= flags::VERTEX_COLORS;
     }
     let alpha = if surface.color.is_some() { AlphaMode::Blend } else { slot.alpha };
-    look.flags |= match alpha {
+    material.flags |= match alpha {
         _ if surface.debug != DebugView::None => 0,
         AlphaMode::Mask(cutoff) => {
-            look.alpha_cutoff = cutoff;
+            material.alpha_cutoff = cutoff;
             flags::MASK
         }
         AlphaMode::Blend => flags::BLEND,
         AlphaMode::Opaque => 0,
     };
     if surface.metallic.is_some() {
-        look.flags |= flags::OWN_METALLIC;
+        material.flags |= flags::OWN_METALLIC;
     }
     if surface.roughness.is_some() {
-        look.flags |= flags::OWN_ROUGHNESS;
+        material.flags |= flags::OWN_ROUGHNESS;
     }
     if surface.debug == DebugView::VertexColor && !mesh.colors.is_empty() {
-        look.flags |= flags::VERTEX_COLORS;
+        material.flags |= flags::VERTEX_COLORS;
     }
 }
 
@@ -106,7 +106,7 @@ fn shading_flags(slot: &MaterialSlot, surface: &Surface) -> u32 {
         (_, FlatNormals::Face) if surface.debug == DebugView::FaceOrientation => flags::FACE_NORMALS,
         (Shading::Flat, FlatNormals::Face) => flags::FACE_NORMALS,
         (Shading::Flat, FlatNormals::Derivative) => flags::DERIVATIVE_NORMALS,
-        // Light is painted into such a material's colours; smooth shading shows the asset as its author means it.
+        // An unlit material has its light painted into its colours, as its author means it.
         (Shading::Smooth, _) if slot.unlit && surface.debug == DebugView::None => 0,
         (Shading::Smooth, _) => flags::VERTEX_NORMALS,
         (Shading::Unlit, _) if surface.debug == DebugView::Normal => flags::FACE_NORMALS,
@@ -116,33 +116,33 @@ fn shading_flags(slot: &MaterialSlot, surface: &Surface) -> u32 {
 }
 
 fn sample(
-    look: &mut ShadedMaterial,
+    material: &mut ShadedMaterial,
     slot: &MaterialSlot,
     surface: &Surface,
     textures: &mut TextureLoader<'_>,
 ) -> Result<(), PlanError> {
-    let is_lit = look.flags & (flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_NORMALS) != 0;
-    let asks_gloss = surface.metallic.is_none() || surface.roughness.is_none();
+    let is_lit = material.flags & (flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_NORMALS) != 0;
+    let reads_texture = surface.metallic.is_none() || surface.roughness.is_none();
     let wanted: [(usize, bool, &Option<TextureRef>, bool); 4] = [
         (slots::BASE, surface.color.is_none(), &slot.base_texture, true),
-        (slots::METALLIC_ROUGHNESS, is_lit && asks_gloss, &slot.metallic_roughness_texture, false),
-        // The other kinds of normals are there to show the faces as they are.
-        (slots::NORMAL, look.flags & flags::VERTEX_NORMALS != 0, &slot.normal_texture, false),
-        (slots::EMISSIVE, surface.emissive.is_none() && look.emissive != [0.0; 3], &slot.emissive_texture, true),
+        (slots::METALLIC_ROUGHNESS, is_lit && reads_texture, &slot.metallic_roughness_texture, false),
+        // The other kinds of normals show the faces as they are.
+        (slots::NORMAL, material.flags & flags::VERTEX_NORMALS != 0, &slot.normal_texture, false),
+        (slots::EMISSIVE, surface.emissive.is_none() && material.emissive != [0.0; 3], &slot.emissive_texture, true),
     ];
     for (place, is_needed, texture, is_color) in wanted {
         if let Some(texture) = texture.as_ref().filter(|_| is_needed) {
-            look.textures[place] = textures.load(texture, is_color)?;
+            material.textures[place] = textures.load(texture, is_color)?;
         }
     }
     Ok(())
 }
 
-fn wire_of(look: &mut ShadedMaterial, wire: &Wire) {
-    look.wire_color = build::color(wire);
-    look.wire_thickness = wire.thickness;
-    look.wire_smoothing = wire.smoothing;
-    look.flags |= match wire.method {
+fn wire_of(material: &mut ShadedMaterial, wire: &Wire) {
+    material.wire_color = wire_color(wire);
+    material.wire_thickness = wire.thickness;
+    material.wire_smoothing = wire.smoothing;
+    material.flags |= match wire.method {
         WireMethod::Exact => 0,
         WireMethod::Fwidth => flags::WIRE_FWIDTH,
         WireMethod::FwidthMin => flags::WIRE_FWIDTH_MIN,
@@ -150,11 +150,11 @@ fn wire_of(look: &mut ShadedMaterial, wire: &Wire) {
         WireMethod::Threshold => flags::WIRE_THRESHOLD,
     };
     if wire.lit {
-        look.flags |= flags::WIRE_LIT;
+        material.flags |= flags::WIRE_LIT;
     }
 }
 
-/// Whether a material samples anything at all.
-pub fn samples(look: &ShadedMaterial) -> bool {
-    look.textures.iter().any(|texture| texture.texture != TEXTURE_NONE)
+/// Whether a material samples any texture.
+pub fn samples(material: &ShadedMaterial) -> bool {
+    material.textures.iter().any(|texture| texture.texture != TEXTURE_NONE)
 }

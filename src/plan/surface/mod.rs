@@ -1,7 +1,8 @@
-//! The filled surface: what a visible sample needs to know to become a colour.
+//! The surface: what turns a visible sample into a colour.
 
 pub(crate) mod build;
 pub(crate) mod closeup;
+pub(crate) mod edge_masks;
 pub(crate) mod lights;
 pub(crate) mod materials;
 pub(crate) mod textures;
@@ -10,42 +11,44 @@ pub use build::surface_pass;
 use std::borrow::Cow;
 
 use super::Faces;
+use super::shared_slice::SharedSlice;
 use crate::texture::Textures;
 
 /// The filled surface. Arrays that no material reads are empty.
 #[derive(Debug)]
 pub struct SurfacePass<'a> {
-    /// Which faces are drawn.
+    /// The faces that are drawn.
     pub faces: Faces,
-    /// Whether it is seen. Where not, it only hides lines.
+    /// Whether the surface is seen. Where it is not, it only hides lines.
     pub is_shaded: bool,
-    /// What parts look like; at least one.
+    /// The materials; at least one.
     pub materials: Vec<ShadedMaterial>,
-    /// Index into `materials` a triangle; empty where there is one material.
-    pub triangle_materials: &'a [u32],
-    /// A unit normal a triangle.
-    pub face_normals: &'a [[f32; 3]],
+    /// An index into `materials` per triangle; empty where there is one material.
+    pub triangle_materials: SharedSlice<'a, u32>,
+    /// A unit normal per triangle.
+    pub face_normals: SharedSlice<'a, [f32; 3]>,
     /// Unit normals, interpolated between corners.
     pub vertex_normals: Option<CornerValues<'a, [f32; 3]>>,
     /// Texture coordinates.
     pub uvs: Option<CornerValues<'a, [f32; 2]>>,
     /// Linear RGBA vertex colours, straight alpha.
     pub colors: Option<CornerValues<'a, [f32; 4]>>,
-    /// Which edges of each triangle barycentric wires follow (bit i: corner i to i + 1); empty where all.
+    /// The edges of each triangle that barycentric wires follow (bit i: corner i to i + 1); empty
+    /// where wires follow all edges.
     pub edge_masks: Cow<'a, [u8]>,
-    /// What materials sample.
+    /// The textures that materials sample.
     pub textures: Textures,
-    /// What shines.
+    /// The lamps and the ambient light.
     pub lights: Lights,
 }
 
 /// Values of triangle corners, with their own index.
 #[derive(Clone, Debug)]
-pub struct CornerValues<'a, T: Clone> {
+pub struct CornerValues<'a, T> {
     /// The values.
-    pub values: Cow<'a, [T]>,
-    /// Three indices into `values` a triangle.
-    pub triangles: &'a [[u32; 3]],
+    pub values: SharedSlice<'a, T>,
+    /// Three indices into `values` per triangle.
+    pub triangles: SharedSlice<'a, [u32; 3]>,
 }
 
 /// A material as the shaders read it, field for field.
@@ -54,29 +57,29 @@ pub struct CornerValues<'a, T: Clone> {
 pub struct ShadedMaterial {
     /// Linear RGBA, straight alpha.
     pub base_color: [f32; 4],
-    /// Linear RGB that it gives off.
+    /// Emitted light, linear RGB.
     pub emissive: [f32; 3],
-    /// For [`flags::MASK`]: the smallest alpha that is there.
+    /// For [`flags::MASK`]: the smallest alpha that is drawn.
     pub alpha_cutoff: f32,
-    /// Of a barycentric wire: premultiplied linear RGBA, opacity included.
+    /// Colour of a barycentric wire: premultiplied linear RGBA, opacity included.
     pub wire_color: [f32; 4],
-    /// t
+    /// Thickness of a barycentric wire: t in the formulas.
     pub wire_thickness: f32,
-    /// s
+    /// Smoothing of a barycentric wire: s in the formulas.
     pub wire_smoothing: f32,
-    /// 0 to 1.
+    /// Metallic share, 0 to 1.
     pub metallic: f32,
-    /// 0 to 1.
+    /// Roughness, 0 to 1.
     pub roughness: f32,
-    /// Multiplies the normal texture's x and y.
+    /// Factor of the normal texture's x and y.
     pub normal_scale: f32,
     /// Bits of [`flags`].
     pub flags: u32,
-    /// Multiplies whatever alpha comes to, 0 to 1.
+    /// Factor of the final alpha, 0 to 1.
     pub opacity: f32,
-    /// 0
+    /// Always 0.
     pub padding: u32,
-    /// By [`slots`].
+    /// Uses of textures, by [`slots`].
     pub textures: [TextureUse; 4],
 }
 
@@ -84,7 +87,7 @@ pub struct ShadedMaterial {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct TextureUse {
-    /// `[u', v'] = [[a, b, c], [d, e, f]] (u, v, 1)`.
+    /// The texture transform: `[u', v'] = [[a, b, c], [d, e, f]] (u, v, 1)`.
     pub transform: [[f32; 3]; 2],
     /// Index into [`Textures::images`], or [`TEXTURE_NONE`].
     pub texture: u32,
@@ -92,7 +95,7 @@ pub struct TextureUse {
     pub sampler: u32,
 }
 
-/// No texture.
+/// The index of no texture.
 pub const TEXTURE_NONE: u32 = u32::MAX;
 
 /// Places in [`ShadedMaterial::textures`].
@@ -103,7 +106,7 @@ pub mod slots {
     pub const METALLIC_ROUGHNESS: usize = 1;
     /// Tangent-space normal.
     pub const NORMAL: usize = 2;
-    /// Light given off.
+    /// Emitted light.
     pub const EMISSIVE: usize = 3;
 }
 
@@ -143,21 +146,21 @@ pub mod debug_views {
 
 /// Bits of [`ShadedMaterial::flags`].
 pub mod flags {
-    /// There is a fill. Without it only wires show.
+    /// Filled. Without this bit only wires show.
     pub const FILL: u32 = 1;
-    /// Lit by a normal a triangle. None of this and the next two: unlit.
+    /// Lit by a normal per triangle. Without this and the next two bits: unlit.
     pub const FACE_NORMALS: u32 = 2;
     /// Lit by the cross product of screen-space derivatives of the position.
     pub const DERIVATIVE_NORMALS: u32 = 4;
     /// Lit by interpolated vertex normals.
     pub const VERTEX_NORMALS: u32 = 8;
-    /// Any normal.
+    /// All kinds of normals: lit.
     pub const LIT: u32 = FACE_NORMALS | DERIVATIVE_NORMALS | VERTEX_NORMALS;
     /// Vertex colours multiply the base colour.
     pub const VERTEX_COLORS: u32 = 16;
     /// Alpha is 0 below the cutoff and 1 from it on.
     pub const MASK: u32 = 32;
-    /// Alpha is what it is. Without this and `MASK`: 1; the opacity multiplies it.
+    /// Alpha is used as it is. Without this and `MASK` it is 1. The opacity multiplies either.
     pub const BLEND: u32 = 64;
     /// A wire where any `b < 0.02 t`.
     pub const WIRE_THRESHOLD: u32 = 128;
@@ -169,24 +172,25 @@ pub mod flags {
     pub const WIRE_FWIDTH: u32 = 1024;
     /// The wire is mixed into the base colour before lighting.
     pub const WIRE_LIT: u32 = 2048;
-    /// All four wires.
+    /// All four kinds of wire.
     pub const WIRES: u32 = WIRE_THRESHOLD | WIRE_BARYCENTRIC | WIRE_FWIDTH_MIN | WIRE_FWIDTH;
     /// The debug view, one of [`debug_views`](super::debug_views), is in three bits from here on.
     pub const DEBUG_SHIFT: u32 = 12;
-    /// Those three bits.
+    /// All bits of the debug view.
     pub const DEBUG: u32 = 7 << DEBUG_SHIFT;
-    /// The request gives the metallic share: the texture has no say in it.
+    /// The request gives the metallic share, and the texture's is ignored.
     pub const OWN_METALLIC: u32 = 1 << 15;
-    /// The request gives the roughness, likewise.
+    /// The request gives the roughness, and the texture's is ignored.
     pub const OWN_ROUGHNESS: u32 = 1 << 16;
 }
 
 /// Lamps infinitely far away, and light from everywhere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lights {
-    /// At most [`Lights::LAMPS_MAX`].
+    /// The lamps, at most [`Lights::LAMPS_MAX`].
     pub lamps: Vec<Lamp>,
-    /// Share of light that comes from everywhere, 0 to 1: brighter from above than from below.
+    /// Share of light that comes from everywhere, 0 to 1. It is brighter from above than from
+    /// below.
     pub ambient: f32,
 }
 
@@ -198,11 +202,11 @@ impl Lights {
 /// A lamp. Unit vectors in unit-box axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
-    /// Towards it.
+    /// Direction towards the lamp.
     pub to_light: [f32; 3],
-    /// Halfway between it and the viewer: the normal that shines most.
+    /// Direction halfway between the lamp and the viewer: the normal with the strongest highlight.
     pub halfway: [f32; 3],
-    /// Brightness, the share that is not ambient included.
+    /// Brightness, multiplied by the share of light that is not ambient.
     pub strength: f32,
 }
 
@@ -212,7 +216,7 @@ impl TextureUse {
 }
 
 impl ShadedMaterial {
-    /// An unlit fill of one colour, to begin with.
+    /// An unlit fill of one colour.
     pub fn unlit(base_color: [f32; 4]) -> Self {
         Self {
             base_color,
@@ -239,8 +243,8 @@ impl<'a> SurfacePass<'a> {
             faces,
             is_shaded: true,
             materials,
-            triangle_materials: &[],
-            face_normals: &[],
+            triangle_materials: SharedSlice::default(),
+            face_normals: SharedSlice::default(),
             vertex_normals: None,
             uvs: None,
             colors: None,
@@ -257,7 +261,7 @@ impl<'a> SurfacePass<'a> {
         &self.materials[index.min(self.materials.len() - 1)]
     }
 
-    /// The flags of all materials together: what shading has to be able to do.
+    /// The flags of all materials together: the union of what shading needs.
     pub fn all_flags(&self) -> u32 {
         self.materials.iter().fold(0, |all, material| all | material.flags)
     }

@@ -1,19 +1,21 @@
-//! Images to textures: decoded only if sampled, each once for each way it is read, and only as large as the picture can show.
+//! Images to textures: decoded only if sampled, once per way of reading them, and only as large as
+//! the picture can show.
 
 use std::collections::BTreeMap;
 
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
 use crate::mesh::material::{ImageContent, TextureRef, Wrap};
-use crate::plan::context::PlanContext;
+use crate::plan::geometry::Geometry;
+use crate::plan::projection::Projection;
 use crate::plan::skips::{SkipKind, Skips};
 use crate::plan::surface::closeup;
 use crate::plan::surface::closeup::Use;
-use crate::plan::{PlanError, Projection, TextureUse};
+use crate::plan::{PlanError, TextureUse};
 use crate::texture::decode::{self, Header};
 use crate::texture::{Texture, TextureError, Textures, fit, mips};
 
-/// Collects what materials ask for, and decodes it at the end.
+/// Collects the textures that materials sample, and decodes them at the end.
 pub struct TextureLoader<'a> {
     mesh: &'a Mesh,
     budget: &'a mut Budget,
@@ -25,7 +27,7 @@ pub struct TextureLoader<'a> {
     uses: Vec<Use>,
 }
 
-/// An image that is read in one way.
+/// An image that is read in one way: as colours or as numbers.
 struct Wanted {
     image: u32,
     is_color: bool,
@@ -33,12 +35,12 @@ struct Wanted {
 }
 
 impl<'a> TextureLoader<'a> {
-    /// Nothing so far.
-    pub fn new(mesh: &'a Mesh, cx: &'a mut PlanContext<'_>) -> Self {
+    /// A loader without textures.
+    pub fn new(mesh: &'a Mesh, budget: &'a mut Budget, deadline: &'a Deadline) -> Self {
         Self {
             mesh,
-            budget: cx.budget,
-            deadline: cx.deadline,
+            budget,
+            deadline,
             material: 0,
             is_used: true,
             wanted: Vec::new(),
@@ -47,7 +49,8 @@ impl<'a> TextureLoader<'a> {
         }
     }
 
-    /// Says whose textures are loaded next. One that no triangle uses (`is_used`) gets none.
+    /// Sets the material whose textures are loaded next. One without triangles (not `is_used`) gets
+    /// none.
     pub fn for_material(&mut self, material: usize, is_used: bool) {
         self.material = material as u32;
         self.is_used = is_used;
@@ -55,7 +58,7 @@ impl<'a> TextureLoader<'a> {
 
     /// A texture for a material; `is_color` says that texels are sRGB.
     pub fn load(&mut self, texture: &TextureRef, is_color: bool) -> Result<TextureUse, PlanError> {
-        // Without coordinates nothing says where it goes.
+        // Without texture coordinates a texture has no place on the mesh.
         let Some(image) =
             self.mesh.images.get(texture.image as usize).filter(|_| self.is_used && !self.mesh.uvs.is_empty())
         else {
@@ -84,14 +87,19 @@ impl<'a> TextureLoader<'a> {
         Ok(TextureUse { transform: texture.transform, texture: index as u32, sampler: sampler(texture) })
     }
 
-    /// Decodes all that was asked for.
-    pub fn finish(self, projection: &Projection, skips: &mut Skips<'_>) -> Result<Textures, PlanError> {
+    /// Decodes all textures that were loaded.
+    pub fn finish(
+        self,
+        geometry: &Geometry<'_>,
+        projection: &Projection,
+        skips: &mut Skips<'_>,
+    ) -> Result<Textures, PlanError> {
         if self.wanted.is_empty() {
             return Ok(Textures::default());
         }
         let Self { mesh, budget, deadline, wanted, uses, .. } = self;
         let sizes: Vec<[u32; 2]> = wanted.iter().map(|w| [w.header.width, w.header.height]).collect();
-        let mut finest = closeup::finest_levels(mesh, projection, &uses, wanted.len(), deadline)?;
+        let mut finest = closeup::finest_levels(mesh, geometry, projection, &uses, wanted.len(), deadline)?;
         for (level, size) in finest.iter_mut().zip(&sizes) {
             *level = (*level).min(mips::count(size[0], size[1]) - 1);
         }
@@ -106,7 +114,7 @@ impl<'a> TextureLoader<'a> {
         let mut most = 0;
         for (want, &first_level) in wanted.iter().zip(&first_levels) {
             let Header { width, height, decoding_bytes, .. } = want.header;
-            // One is decoded after the other, in the memory of the one before.
+            // Images are decoded one after the other, in the memory of the one before.
             let bytes = decoding_bytes.saturating_add(mips::working_bytes(width, height));
             budget.spend("decoding textures", bytes.saturating_sub(most), 1)?;
             most = most.max(bytes);

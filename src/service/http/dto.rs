@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::error::ApiError;
 use crate::image::ImageFormat;
 use crate::import::Bundle;
-use crate::pipeline::Choice;
+use crate::pipeline::QualitySelection;
 use crate::service::jobs::{Job, State, Timings};
 use crate::service::store::Digest;
 
@@ -72,12 +72,12 @@ pub struct ChoiceDto {
 }
 
 impl ChoiceDto {
-    fn new(choice: &Choice) -> Self {
+    fn new(selection: &QualitySelection) -> Self {
         Self {
-            samples: choice.samples,
-            wire_methods: choice.wire_methods.clone(),
-            expected_error: choice.expected_error,
-            expected_time_ms: choice.expected_time_ms,
+            samples: selection.samples,
+            wire_methods: selection.wire_methods.clone(),
+            expected_error: selection.expected_error,
+            expected_time_ms: selection.expected_time_ms,
         }
     }
 }
@@ -123,7 +123,7 @@ impl JobDto {
                     backend: finished.backend.name(),
                     timings_ms: TimingsDto::new(&finished.timings),
                     warnings: warnings.map(|w| WarningDto { code: w.code, detail: w.detail.clone() }).collect(),
-                    chosen: finished.choice.as_ref().map(ChoiceDto::new),
+                    chosen: finished.selection.as_ref().map(ChoiceDto::new),
                 };
                 (Some(result), None)
             }

@@ -13,7 +13,7 @@ use crate::backend::BackendKind;
 use crate::image::ImageFormat;
 use crate::import::{Bundle, Format};
 use crate::limits::Deadline;
-use crate::pipeline::{Choice, Output, RenderError, Stage};
+use crate::pipeline::{Output, QualitySelection, RenderError, Stage};
 use crate::spec::Spec;
 use crate::warning::Warning;
 
@@ -101,7 +101,7 @@ pub struct Finished {
     /// What the importer noticed.
     pub warnings: Vec<Warning>,
     /// What was chosen for a request that asks for an error or a time.
-    pub choice: Option<Choice>,
+    pub selection: Option<QualitySelection>,
     /// How long each part took.
     pub timings: Timings,
 }
@@ -109,8 +109,8 @@ pub struct Finished {
 impl Finished {
     /// From what the pipeline gave.
     pub fn new(output: Output, timings: Timings) -> Self {
-        let Output { bytes, format, backend, warnings, choice, .. } = output;
-        Self { picture: bytes.into(), format, backend, warnings, choice, timings }
+        let Output { bytes, format, backend, warnings, selection, .. } = output;
+        Self { picture: bytes.into(), format, backend, warnings, selection, timings }
     }
 }
 

@@ -67,7 +67,14 @@ fn spec() -> Spec {
 
 fn output(bytes: usize) -> Output {
     let (skips, warnings) = (Vec::new(), Vec::new());
-    Output { bytes: vec![7; bytes], format: ImageFormat::Png, backend: BackendKind::Cpu, skips, warnings, choice: None }
+    Output {
+        bytes: vec![7; bytes],
+        format: ImageFormat::Png,
+        backend: BackendKind::Cpu,
+        skips,
+        warnings,
+        selection: None,
+    }
 }
 
 /// What the mesh bytes make the fake renderer do.

@@ -63,9 +63,9 @@ fn expected(technique: Technique, samples: u32, size_px: u32) -> f64 {
     let keys: Vec<(String, String)> = keys.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
     let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
     let spec = request::read(None, &keys, &rules).unwrap();
-    let choice = plan::choose(&spec, 1000, false).unwrap().choice;
-    assert_eq!((choice.samples, choice.backend), (samples, BackendChoice::Cpu));
-    choice.expected_error
+    let selection = plan::select_quality(&spec, 1000, false).unwrap().selection;
+    assert_eq!((selection.samples, selection.backend), (samples, BackendChoice::Cpu));
+    selection.expected_error
 }
 
 #[test]

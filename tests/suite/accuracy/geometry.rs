@@ -41,7 +41,7 @@ impl Ownership {
         let forth = renderer.draw_visibility(plan, &Deadline::default()).unwrap();
         let triangles: Vec<[u32; 3]> = plan.triangles.iter().rev().copied().collect();
         let reversed =
-            scenes::screen_plan([plan.width_px, plan.height_px], plan.samples, 1.0, plan.positions, &triangles);
+            scenes::screen_plan([plan.width_px, plan.height_px], plan.samples, 1.0, &plan.positions, &triangles);
         let reversed = DrawPlan { projection: plan.projection, ..reversed };
         let back = renderer.draw_visibility(&reversed, &Deadline::default()).unwrap();
         let last = triangles.len() as u32 - 1;

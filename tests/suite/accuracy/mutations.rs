@@ -88,7 +88,7 @@ fn f32_face_normals_are_found() {
     let mesh = scenes::mesh(&shape.text());
     let spec = scenes::spec(&[("style", "flat"), ("size", "64x64")]);
     let plan = scenes::plan(&mesh, &spec);
-    let right = plan.surface.as_ref().unwrap().face_normals;
+    let right = &plan.surface.as_ref().unwrap().face_normals;
     let wrong: Vec<[f32; 3]> =
         shape.polygons.iter().map(|p| f32_normal([0, 1, 2].map(|k| shape.vertices[p[k]]))).collect();
     assert!(normal_error(&shape, right) <= NORMAL_GOAL_RAD);
@@ -126,7 +126,7 @@ fn f32_face_normals_are_seen_in_the_picture() {
         errors.max
     };
     assert!(measure(&plan) <= FLAT_NOW);
-    plan.surface.as_mut().unwrap().face_normals = &wrong;
+    plan.surface.as_mut().unwrap().face_normals = (&wrong).into();
     assert!(measure(&plan) > COLOR_GOAL);
 }
 

@@ -157,7 +157,7 @@ fn normals_of_slivers_are_exact() {
                 let plan = scenes::plan(&mesh, &plan_spec);
                 let surface = plan.surface.as_ref().unwrap();
                 assert!(surface.all_flags() & flags::FACE_NORMALS != 0);
-                worst = worst.max(normal_error(&shape, surface.face_normals));
+                worst = worst.max(normal_error(&shape, &surface.face_normals));
             }
             let what = format!("- slivers of aspect {aspect:e}, {offset:e} away");
             println!("{what:<44} normal off by {worst:.2e} rad (gate {NORMAL_GOAL_RAD:e})");

@@ -6,9 +6,8 @@ use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::image::Image;
-use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap::limits::{Deadline, Limits};
 use meshsnap::mesh::Mesh;
-use meshsnap::plan;
 
 use crate::render::twins::pictures::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
@@ -64,7 +63,7 @@ fn stop_all_over<T>(moments: u32, mut job: impl FnMut(&Deadline) -> Option<T>) -
 fn hulls_of_many_edges_end_soon_after_their_job() {
     let mesh = disjoint(200_000, 0.02);
     let spec = scenes::spec(&[("style", "outline"), ("outline.method", "hull"), ("size", "128")]);
-    let build = |deadline: &Deadline| plan::build(&mesh, &spec, &mut Budget::new(&Limits::default()), deadline).ok();
+    let build = |deadline: &Deadline| scenes::try_plan(&mesh, &spec, &Limits::default(), deadline, &[]).ok();
     // One that is raised late in a time that varies may come after the end.
     assert!(stop_all_over(8, build) >= 4);
     let plan = scenes::plan(&mesh, &spec);

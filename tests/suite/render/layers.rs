@@ -69,11 +69,11 @@ impl Layered {
         plan.peeling = Some(pass);
         if let Some(surface) = &mut plan.surface {
             *surface = SurfacePass::new(surface.faces, materials());
-            surface.triangle_materials = &self.materials;
+            surface.triangle_materials = (&self.materials).into();
         }
         if let Some(hull) = &mut plan.hull {
             hull.colors = (0..5).map(|m| [0.0, 0.02 * m as f32, 0.1, 1.0]).collect();
-            hull.surface_materials = &self.materials;
+            hull.surface_materials = (&self.materials).into();
             hull.triangle_materials = self.materials.iter().flat_map(|&m| [m; 2]).collect();
         }
         plan
@@ -227,7 +227,7 @@ fn sorted(plan: &DrawPlan<'_>) -> (Image, usize) {
             _ => Faces::Both,
         };
         let alone = [*triangle];
-        let mut single = DrawPlan::new([plan.width_px, plan.height_px], plan.positions, &alone, plan.projection);
+        let mut single = DrawPlan::new([plan.width_px, plan.height_px], &plan.positions, &alone, plan.projection);
         single.samples = plan.samples;
         single.surface = Some(SurfacePass::new(faces, vec![ShadedMaterial::unlit([1.0; 4])]));
         let words = CpuRenderer::new(1).draw_visibility(&single, &Deadline::default()).unwrap();

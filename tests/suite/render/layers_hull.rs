@@ -85,7 +85,7 @@ fn glass_shows_the_outlines_of_others_behind_it() {
     let shown = draw(&plan, "another's outline behind glass");
     let mut merged = scenes::plan(&mesh, &spec);
     if let Some(hull) = &mut merged.hull {
-        hull.surface_materials = &[];
+        hull.surface_materials = Default::default();
         hull.triangle_materials = Vec::new();
     }
     let hidden = draw(&merged, "its own outline behind glass");

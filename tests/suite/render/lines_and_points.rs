@@ -10,6 +10,7 @@ use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::{LineOrPoint, Mesh};
 use meshsnap::plan;
 use meshsnap::plan::DrawPlan;
+use meshsnap::scene::Scene;
 use meshsnap::spec::Spec;
 use meshsnap::warning::Warning;
 
@@ -42,9 +43,9 @@ fn segment(a: u32, b: u32) -> LineOrPoint {
     LineOrPoint { ends: [a, b], material: 0 }
 }
 
-fn thicken(mesh: &mut Mesh, spec: &Spec) -> Option<Warning> {
-    let limits = Limits::default();
-    plan::thicken(mesh, spec, &mut Budget::new(&limits), &Deadline::default()).unwrap()
+fn warning(mesh: &Mesh, spec: &Spec) -> Option<Warning> {
+    let scene = Scene::new(mesh, spec, &mut Budget::new(&Limits::default())).unwrap();
+    plan::undrawn_primitives(&scene)
 }
 
 fn draw(plan: &DrawPlan<'_>) -> Image {
@@ -76,9 +77,9 @@ fn widths_are_in_pixels_however_far_away() {
     for (a, b) in [(0, 1), (1, 2), (2, 3), (0, 0), (1, 1), (2, 2), (3, 3)] {
         for projection in ["perspective", "orthographic"] {
             // The other positions keep the camera where it is.
-            let mut mesh = alone(&positions, &[LineOrPoint { ends: [a, b], material: 0 }]);
+            let mesh = alone(&positions, &[LineOrPoint { ends: [a, b], material: 0 }]);
             let spec = scenes::spec(&[BLACK, &[("camera.projection", projection)]].concat());
-            assert_eq!(thicken(&mut mesh, &spec), None);
+            assert_eq!(warning(&mesh, &spec), None);
             let plan = scenes::plan(&mesh, &spec);
             let [from, to] = [a, b].map(|v| on_screen(&plan, v as usize));
             let length = (from[0] - to[0]).hypot(from[1] - to[1]);
@@ -98,11 +99,11 @@ fn what_is_behind_the_eye_is_cut_away() {
     let positions = [[0.0, 0.0, 0.5], [0.05, 0.02, -0.5], [0.3, 0.2, 0.5]];
     let camera = [("camera.eye", "[0,0,0]"), ("camera.target", "[0,0,-1]")];
     let ink = |loose: &[LineOrPoint]| {
-        let mut mesh = alone(&positions, loose);
+        let mesh = alone(&positions, loose);
         let spec = scenes::spec(&[BLACK, &camera].concat());
-        thicken(&mut mesh, &spec);
-        assert!(mesh.positions.iter().flatten().all(|v| v.is_finite()));
-        ink_px2(&draw(&scenes::plan(&mesh, &spec)))
+        let plan = scenes::plan(&mesh, &spec);
+        assert!(plan.positions.iter().flatten().all(|v| v.is_finite()));
+        ink_px2(&draw(&plan))
     };
     assert!(ink(&[segment(0, 1)]) > 20.0);
     assert!(ink(&[segment(1, 2)]) > 20.0);
@@ -122,9 +123,8 @@ fn they_have_neither_edges_nor_outlines() {
     ] {
         let spec = scenes::spec(&[keys, &[("size", "160x120")]].concat());
         // Seen by the same camera.
-        let (mut bare, mut mesh) = (cube(), cube());
+        let (mut bare, mesh) = (cube(), cube());
         bare.lines_and_points.clear();
-        thicken(&mut mesh, &spec);
         let (without, with) = (scenes::plan(&bare, &spec), scenes::plan(&mesh, &spec));
         assert_eq!(with.triangles.len(), without.triangles.len() + 2 * 2 + 8 * 4);
         assert!(without.lines.iter().zip(&with.lines).all(|(a, b)| a.edges.len() == b.edges.len()));
@@ -148,8 +148,7 @@ fn both_back_ends_draw_them_alike() {
     for style in ["flat", "smooth", "wire", "outline", "hidden-line", "topology"] {
         for opacity in ["1", "0.5"] {
             let spec = scenes::spec(&[("style", style), ("size", "160x120"), ("surface.opacity", opacity)]);
-            let mut mesh = cube();
-            thicken(&mut mesh, &spec);
+            let mesh = cube();
             let plan = scenes::plan(&mesh, &spec);
             let picture = gpu.draw(&plan, &Deadline::default()).unwrap();
             Likeness::of(&draw(&plan), &picture).assert(Tolerance::TWINS, &format!("{style} {opacity}"));
@@ -176,12 +175,13 @@ fn looks_without_a_surface_draw_them_as_lines() {
     let mut cases = 0;
     for (look, width) in BARE {
         for (a, b) in [(0, 1), (2, 3), (0, 0), (3, 3)] {
-            let mut mesh = alone(&positions, &[segment(a, b)]);
+            let mesh = alone(&positions, &[segment(a, b)]);
             let size: &[(&str, &str)] = &[("size", "200x160"), ("wire.opacity", "1")];
             let size = if look.iter().any(|(key, _)| key.starts_with("outline")) { &size[..1] } else { size };
             let spec = scenes::spec(&[look, size].concat());
-            assert_eq!((thicken(&mut mesh, &spec), mesh.thickened), (None, None));
+            assert_eq!(warning(&mesh, &spec), None);
             let plan = scenes::plan(&mesh, &spec);
+            assert_eq!((plan.positions.len(), plan.triangles.len()), (4, 0));
             let [from, to] = [a, b].map(|v| on_screen(&plan, v as usize));
             let length = (from[0] - to[0]).hypot(from[1] - to[1]);
             // With round ends; a point is twice as wide as a line.
@@ -209,7 +209,7 @@ fn both_back_ends_draw_them_alike_without_a_surface() {
                 if is_alone {
                     mesh = alone(&mesh.positions, &mesh.lines_and_points);
                 }
-                assert_eq!(thicken(&mut mesh, &spec), None);
+                assert_eq!(warning(&mesh, &spec), None);
                 let plan = scenes::plan(&mesh, &spec);
                 let (picture, other) = (draw(&plan), gpu.draw(&plan, &Deadline::default()).unwrap());
                 assert!(ink_px2(&picture) > 20.0, "{look:?} {is_alone}");
@@ -231,7 +231,7 @@ fn parts_with_and_without_a_fill_draw_their_own() {
     let mut spec =
         scenes::spec(&[("style", "wireframe"), ("wire.hidden", "show"), ("view", "front"), ("size", "200x160")]);
     spec.materials = vec![("filled".into(), scenes::spec(BLACK).layers)];
-    assert_eq!(thicken(&mut mesh, &spec), None);
+    assert_eq!(warning(&mesh, &spec), None);
     let plan = scenes::plan(&mesh, &spec);
     assert_eq!((plan.triangles.len(), plan.lines.len(), plan.lines[0].edges.len()), (2, 1, 1));
     assert_eq!(plan.lines[0].edges[0].vertices, [2, 3]);
@@ -245,10 +245,10 @@ fn parts_with_and_without_a_fill_draw_their_own() {
 fn a_look_of_nothing_says_that_it_leaves_them_out() {
     let mut nothing = scenes::spec(&[("style", "wireframe")]);
     nothing.layers.wire = None;
-    let mut mesh = cube();
-    let warning = thicken(&mut mesh, &nothing).unwrap();
-    assert_eq!((warning.code, mesh.thickened), ("lines_not_drawn", None));
-    assert!(scenes::plan(&mesh, &nothing).lines.is_empty());
-    let mut plain = scenes::mesh(&shapes::cube());
-    assert_eq!(thicken(&mut plain, &nothing), None);
+    let mesh = cube();
+    assert_eq!(warning(&mesh, &nothing).unwrap().code, "lines_not_drawn");
+    let plan = scenes::plan(&mesh, &nothing);
+    assert_eq!((plan.triangles.len(), plan.lines.len()), (mesh.triangles.len(), 0));
+    let plain = scenes::mesh(&shapes::cube());
+    assert_eq!(warning(&plain, &nothing), None);
 }

@@ -88,7 +88,7 @@ fn owners(plan: &DrawPlan<'_>, sample: usize) -> Vec<u32> {
                 value > 0 || (value == 0 && (dy < 0 || (dy == 0 && dx > 0)))
             })
     };
-    (0..).zip(plan.triangles).filter(|(_, t)| covers(t)).map(|(id, _)| id).collect()
+    (0..).zip(plan.triangles.iter()).filter(|(_, t)| covers(t)).map(|(id, _)| id).collect()
 }
 
 fn cross(a: [i64; 2], b: [i64; 2], p: [i64; 2]) -> i64 {

@@ -4,9 +4,8 @@ use image::ImageFormat;
 use meshsnap::backend::Renderer as _;
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::GpuRenderer;
-use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap::limits::{Deadline, Limits};
 use meshsnap::mesh::Mesh;
-use meshsnap::plan;
 use meshsnap::plan::{DrawPlan, SkipKind};
 use meshsnap::spec::Spec;
 
@@ -110,5 +109,5 @@ fn textured() -> Mesh {
 }
 
 fn keeping<'a>(mesh: &'a Mesh, spec: &Spec, keep: &[SkipKind]) -> DrawPlan<'a> {
-    plan::build_keeping(mesh, spec, &mut Budget::new(&Limits::default()), &Deadline::default(), keep).unwrap()
+    scenes::try_plan(mesh, spec, &Limits::default(), &Deadline::default(), keep).unwrap()
 }

@@ -4,7 +4,7 @@ use meshsnap::import::Bundle;
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use meshsnap::plan;
-use meshsnap::plan::{DrawPlan, Faces, Projection, ShadedMaterial, SurfacePass};
+use meshsnap::plan::{DrawPlan, Faces, PlanError, Projection, ShadedMaterial, SkipKind, SurfacePass};
 use meshsnap::request;
 use meshsnap::request::Rules;
 use meshsnap::spec::BackendChoice;
@@ -215,7 +215,20 @@ pub fn spec(keys: &[(&str, &str)]) -> Spec {
 
 /// Plans with default limits.
 pub fn plan<'a>(mesh: &'a Mesh, spec: &Spec) -> DrawPlan<'a> {
-    plan::build(mesh, spec, &mut Budget::new(&Limits::default()), &Deadline::default()).unwrap()
+    try_plan(mesh, spec, &Limits::default(), &Deadline::default(), &[]).unwrap()
+}
+
+/// Plans within these limits; nothing in `keep` is skipped.
+pub fn try_plan<'a>(
+    mesh: &'a Mesh,
+    spec: &Spec,
+    limits: &Limits,
+    deadline: &Deadline,
+    keep: &[SkipKind],
+) -> Result<DrawPlan<'a>, PlanError> {
+    let mut budget = Budget::new(limits);
+    let scene = meshsnap::scene::Scene::new(mesh, spec, &mut budget)?;
+    plan::build_keeping(&scene, &mut budget, deadline, keep)
 }
 
 /// A plan made by hand: positions are pixels from the picture's centre over `scale`, y down, and a depth; unlit white on black.

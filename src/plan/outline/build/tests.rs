@@ -2,10 +2,9 @@
 
 use super::*;
 use crate::import::{Bundle, import};
-use crate::limits::{Deadline, Limits, Stopped};
-use crate::plan::build::projection;
+use crate::limits::{Budget, Deadline, Limits, Stopped};
+use crate::mesh::Mesh;
 use crate::request::{self, Rules};
-use crate::scene::camera::{Border, Camera};
 use crate::spec::BackendChoice;
 use crate::spec::Spec;
 
@@ -23,6 +22,10 @@ fn triangles(count: usize) -> Mesh {
     import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().mesh
 }
 
+fn canvas(scene: &Scene<'_, '_>) -> Canvas {
+    Canvas { size_px: scene.size_px(), margin_px: 0, first_vertex: scene.mesh.positions.len() as u32 }
+}
+
 fn spec() -> Spec {
     let keys = [("style", "outline"), ("outline.method", "hull"), ("size", "200x160")];
     let keys: Vec<(String, String)> = keys.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
@@ -35,21 +38,18 @@ fn a_hull_takes_no_more_than_it_spends() {
     for count in [1, 10, 20_000] {
         let (mesh, spec) = (triangles(count), spec());
         let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
-        let groups = MaterialGroups::new(&mesh, &spec);
-        let size_px = [200, 160];
-        let rows = projection(&Camera::place(&spec.camera, &mesh, size_px, Border::default()), size_px, true);
-        let mut cx = PlanContext { budget: &mut budget, deadline: &deadline };
-        let mut edges = Edges::default();
-        let found = edges.with_silhouettes(&mesh, &groups, &mut cx).unwrap();
+        let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
+        let mut cx = PlanContext::new(&mut budget, &deadline, &[]);
+        let (list, silhouettes) = cx.silhouettes(&scene).unwrap();
         let before = cx.budget.spent_bytes();
-        let view = View::new(&mesh, &groups, &rows, &mut cx).unwrap();
+        let view = ScreenMesh::new(&scene, &mut cx).unwrap();
         let thicknesses = [Some(Thickness::Px(3.0))];
-        let rims = view.rims(&thicknesses, found, &mut cx).unwrap();
-        let hull = Outlines::draw(&view, &thicknesses, (size_px, 0), &rims, &mut cx).unwrap();
-        assert_eq!((rims.len(), rims.capacity()), (3 * count, 3 * count));
+        let edges = view.silhouette_edges(&thicknesses, &list, &silhouettes, &mut cx).unwrap();
+        let hull = OutlineMesh::draw(&view, &thicknesses, canvas(&scene), &edges, &mut cx).unwrap();
+        assert_eq!((edges.len(), edges.capacity()), (3 * count, 3 * count));
         assert!(hull.triangles.len() >= 9 * count, "{} triangles", hull.triangles.len());
-        let taken = size_of::<Rim>() * rims.capacity()
-            + 2 * size_of::<End>() * rims.len()
+        let taken = size_of::<SilhouetteEdge>() * edges.capacity()
+            + 2 * size_of::<EdgeEnd>() * edges.len()
             + size_of::<[f64; 3]>() * view.places.capacity()
             + mesh.triangles.len()
             + size_of::<HullVertex>() * hull.vertices.capacity()
@@ -65,8 +65,10 @@ fn a_budget_that_is_too_small_is_refused_at_every_step() {
     let (mesh, spec) = (triangles(500), spec());
     let plan = |memory_bytes| {
         let mut budget = Budget::new(&Limits { memory_bytes, ..Limits::default() });
-        let result = crate::plan::build(&mesh, &spec, &mut budget, &Deadline::default());
-        result.map(|_| budget.spent_bytes()).map_err(|error| error.to_string())
+        let result = Scene::new(&mesh, &spec, &mut budget)
+            .map_err(PlanError::from)
+            .and_then(|scene| crate::plan::build(&scene, &mut budget, &Deadline::default()).map(|_| ()));
+        result.map(|()| budget.spent_bytes()).map_err(|error| error.to_string())
     };
     let enough = plan(1 << 30).unwrap();
     assert_eq!(plan(enough), Ok(enough));
@@ -81,21 +83,19 @@ fn a_budget_that_is_too_small_is_refused_at_every_step() {
 fn every_step_ends_when_the_job_does() {
     let (mesh, spec) = (triangles(100), spec());
     let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
-    let groups = MaterialGroups::new(&mesh, &spec);
-    let size_px = [200, 160];
-    let rows = projection(&Camera::place(&spec.camera, &mesh, size_px, Border::default()), size_px, true);
-    let (mut edges, stopped) = (Edges::default(), Deadline::default());
+    let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
+    let stopped = Deadline::default();
     stopped.stop();
-    let mut cx = PlanContext { budget: &mut budget, deadline: &deadline };
-    let found = edges.with_silhouettes(&mesh, &groups, &mut cx).unwrap();
-    let view = View::new(&mesh, &groups, &rows, &mut cx).unwrap();
+    let mut cx = PlanContext::new(&mut budget, &deadline, &[]);
+    let (list, silhouettes) = cx.silhouettes(&scene).unwrap();
+    let view = ScreenMesh::new(&scene, &mut cx).unwrap();
     let thicknesses = [Some(Thickness::Px(3.0))];
-    let rims = view.rims(&thicknesses, found, &mut cx).unwrap();
-    let mut late = PlanContext { budget: cx.budget, deadline: &stopped };
+    let edges = view.silhouette_edges(&thicknesses, &list, &silhouettes, &mut cx).unwrap();
+    let mut late = PlanContext::new(&mut budget, &stopped, &[]);
     let results = [
-        View::new(&mesh, &groups, &rows, &mut late).err(),
-        view.rims(&thicknesses, found, &mut late).err(),
-        Outlines::draw(&view, &thicknesses, (size_px, 0), &rims, &mut late).err(),
+        ScreenMesh::new(&scene, &mut late).err(),
+        view.silhouette_edges(&thicknesses, &list, &silhouettes, &mut late).err(),
+        OutlineMesh::draw(&view, &thicknesses, canvas(&scene), &edges, &mut late).err(),
     ];
     assert_eq!(results, [const { Some(PlanError::Stopped(Stopped)) }; 3]);
 }

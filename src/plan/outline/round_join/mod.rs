@@ -1,81 +1,56 @@
-//! Round corners of outlines: the fan around a vertex between the strips of two rims that meet there. Where the vertex's own faces hide one
-//! of the two, only where none of its faces is.
+//! Round joins of outlines: around a vertex, the triangles between the offset quads of two
+//! silhouette edges that meet there. Where the vertex's own faces hide one of the two edges, the
+//! join is left out where these faces cover it.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use crate::limits::{Budget, Deadline, Stopped};
-use crate::plan::HullPass;
 use crate::plan::PlanError;
-use crate::plan::context::CHECK_EVERY;
-use crate::plan::context::PlanContext;
-use crate::plan::outline::build::snapped;
-use crate::plan::outline::silhouette_edges::View;
-use crate::plan::outline::vertex_occlusion::{Sectors, turn as turned};
-use crate::plan::sort::sort;
+use crate::plan::context::{CHECK_EVERY, PlanContext};
+use crate::plan::outline::silhouette_edges::ScreenMesh;
+use crate::plan::outline::sort::sort;
+use crate::plan::outline::vertex_occlusion::{VertexOcclusion, wrapped};
+use crate::plan::outline::{EdgeEnd, HullPass, HullVertex};
 
-/// How far an arc may lie from its chords, 1/256 px: 1/64 px.
+/// Largest distance of an arc from its chords, 1/256 px: 1/64 px.
 const SAGITTA: f64 = 4.0;
 
-/// Triangles of all fans up to which arcs are as round as they should be, and how many for each pixel of the picture. With more of them
-/// they have fewer corners, as many in all and up to three for each arc.
+/// Triangles of all joins up to which arcs are as round as `SAGITTA` says. Beyond it, or beyond the
+/// limit per pixel of the picture, arcs get fewer corners: as many in all, and up to three per arc.
 const TRIANGLES_MAX: f64 = (1 << 20) as f64;
+/// The same limit per pixel of the picture.
 const TRIANGLES_MAX_PER_PX: f64 = 16.0;
 
-/// Angle of a chord, at most: of half a turn, 3.14, no triangle would be left.
+/// Largest angle of a chord. Of half a turn, 3.14, no triangle would be left.
 const CHORD_MAX: f64 = 2.8;
 
-/// Gaps between two rims that are this narrow are what rounding makes of a needle's tip, around which its outline goes.
+/// Gaps between two edges up to which they are the tip of a needle, narrowed by rounding. The
+/// outline goes all around such a tip.
 const GAP_MIN: f64 = 1e-9;
 
-/// The narrowest piece of a fan, as an angle.
+/// The narrowest piece of a join, as an angle.
 const PIECE_MIN: f64 = 1e-9;
 
-/// An end of a rim that has a strip.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct End {
-    /// Where it ends.
-    pub vertex: u32,
-    /// The strip's outer corner there.
-    pub outer: u32,
-    /// Whose outline it is.
-    pub material: u32,
-    /// To which side of the rim, seen from here, nothing is: 1 where angles grow, else -1.
-    pub free: i8,
-    /// In which direction the rim leaves.
-    pub angle: f64,
-    /// From there to the outer corner's direction, positive.
-    pub turn: f64,
-    /// On screen, 1/256 px.
-    pub middle: [f64; 2],
-    /// From the middle to the outer corner, 1/256 px.
-    pub reach: f64,
-    /// The outer corner's.
-    pub depth: f64,
-    /// 1 / W
-    pub inv_w: f64,
-    /// How depth changes along the rim, away from here, each 1/256 px.
-    pub slope: f64,
-    /// Whether a face of the vertex hides the rim.
-    pub is_hidden: bool,
-}
-
-/// Ends of rims, and what is between them.
-pub struct Fans {
-    ends: Vec<End>,
+/// Ends of silhouette edges, and the joins between them.
+pub struct RoundJoins {
+    ends: Vec<EdgeEnd>,
     triangles_max: f64,
 }
 
-/// A fan: from an end's outer corner on, by an angle; to another end's, if there is one. Of it, what lies between two of its angles is
-/// drawn.
-struct Fan {
+/// A piece of a join around a vertex.
+struct Join {
+    /// The end from whose outer corner the join starts.
     from: usize,
+    /// Angle of the whole join.
     sweep: f64,
+    /// The end at whose outer corner the join stops, if there is one.
     to: Option<usize>,
+    /// The angles between which the join is drawn, from 0 to `sweep`.
     piece: [f64; 2],
 }
 
-impl Fans {
-    /// Of so many ends at most, around what is seen in a picture of this size.
+impl RoundJoins {
+    /// Joins of at most so many ends, in a picture of this size.
     pub fn with_capacity(ends: usize, size_px: [u32; 2]) -> Self {
         let pixels = size_px.map(f64::from);
         let triangles_max = TRIANGLES_MAX.min(TRIANGLES_MAX_PER_PX * pixels[0] * pixels[1]);
@@ -83,57 +58,60 @@ impl Fans {
     }
 
     /// Adds an end.
-    pub fn push(&mut self, end: End) {
+    pub fn push(&mut self, end: EdgeEnd) {
         self.ends.push(end);
     }
 
-    /// Adds the fans of all vertices to the hull.
+    /// Adds the joins of all vertices to the hull, whose own vertices are numbered from `first` on.
     pub fn finish(
         &mut self,
-        view: &View<'_>,
+        view: &ScreenMesh<'_>,
+        first: u32,
         hull: &mut HullPass<'_>,
         cx: &mut PlanContext<'_>,
     ) -> Result<(), PlanError> {
         self.sort(cx.deadline)?;
-        let sectors = Sectors::around(&mut self.ends, view, cx)?;
-        self.draw(&sectors, view.mesh.positions.len() as u32, hull, cx)
+        let occlusion = VertexOcclusion::around(&mut self.ends, view, cx)?;
+        self.draw(&occlusion, first, hull, cx)
     }
 
     /// Puts the ends in order, by vertex and angle.
     fn sort(&mut self, deadline: &Deadline) -> Result<(), Stopped> {
-        // Of two ends in one direction the one whose rim is free below comes first: the gap from the other to it is a whole turn.
-        let order =
-            |a: &End, b: &End| (a.vertex.cmp(&b.vertex)).then(a.angle.total_cmp(&b.angle)).then(a.free.cmp(&b.free));
+        // Of two ends in one direction, the one whose edge is free below comes first: the gap from
+        // the other to it is a whole turn.
+        let order = |a: &EdgeEnd, b: &EdgeEnd| {
+            (a.vertex.cmp(&b.vertex)).then(a.angle.total_cmp(&b.angle)).then(a.free.cmp(&b.free))
+        };
         sort(&mut self.ends, &order, deadline)
     }
 
-    /// Adds the fans; the hull's own vertices are numbered from `first` on.
+    /// Adds the joins; the hull's own vertices are numbered from `first` on.
     fn draw(
         &self,
-        sectors: &Sectors,
+        occlusion: &VertexOcclusion,
         first: u32,
         hull: &mut HullPass<'_>,
         cx: &mut PlanContext<'_>,
     ) -> Result<(), PlanError> {
         let (ends, deadline) = (&self.ends, cx.deadline);
         let mut steps = 0.0;
-        each_fan(ends, sectors, deadline, |fan| steps += fan.angle() / step(ends, &fan))?;
+        each_join(ends, occlusion, deadline, |join| steps += join.angle() / step(ends, &join))?;
         let coarser = (steps / self.triangles_max).max(1.0);
         let (mut vertices, mut triangles) = (0, 0);
-        each_fan(ends, sectors, deadline, |fan| {
-            let count = chords(ends, &fan, coarser) as usize;
+        each_join(ends, occlusion, deadline, |join| {
+            let count = chords(ends, &join, coarser) as usize;
             triangles += count;
-            vertices += count + 1 - usize::from(fan.begins()) - usize::from(fan.meets().is_some());
+            vertices += count + 1 - usize::from(join.begins()) - usize::from(join.meets().is_some());
         })?;
         grow("an outline's corners", &mut hull.vertices, vertices, cx.budget)?;
         grow("an outline's corners", &mut hull.triangles, triangles, cx.budget)?;
         grow("an outline's corners", &mut hull.triangle_materials, triangles, cx.budget)?;
-        each_fan(ends, sectors, deadline, |fan| draw(ends, &fan, coarser, first, hull))?;
+        each_join(ends, occlusion, deadline, |join| draw(ends, &join, coarser, first, hull))?;
         Ok(())
     }
 }
 
-/// Makes room for so many more, and no others. While a list moves to where there is room, it is there twice.
+/// Makes room for exactly so many more items. While a list moves, it takes its memory twice.
 fn grow<T>(what: &str, list: &mut Vec<T>, more: usize, budget: &mut Budget) -> Result<(), PlanError> {
     if list.capacity() - list.len() < more {
         budget.spend(what, (list.len() + more) as u64, size_of::<T>() as u64)?;
@@ -142,38 +120,43 @@ fn grow<T>(what: &str, list: &mut Vec<T>, more: usize, budget: &mut Budget) -> R
     Ok(())
 }
 
-impl Fan {
-    /// How wide the piece is that is drawn.
+impl Join {
+    /// Angle of the piece.
     fn angle(&self) -> f64 {
         self.piece[1] - self.piece[0]
     }
 
-    /// Whether it is drawn from the end's outer corner on.
+    /// Whether the piece starts at the outer corner of the end `from`.
     fn begins(&self) -> bool {
         self.piece[0] <= 0.0
     }
 
-    /// The other end, if it is drawn up to there.
+    /// The end at whose outer corner the piece stops, if it does.
     fn meets(&self) -> Option<usize> {
         self.to.filter(|_| self.piece[1] >= self.sweep)
     }
 }
 
-/// Calls `each` with every piece of a fan, vertex by vertex.
-fn each_fan(ends: &[End], sectors: &Sectors, deadline: &Deadline, mut each: impl FnMut(Fan)) -> Result<(), Stopped> {
+/// Calls `each` with every piece of a join, vertex by vertex.
+fn each_join(
+    ends: &[EdgeEnd],
+    occlusion: &VertexOcclusion,
+    deadline: &Deadline,
+    mut each: impl FnMut(Join),
+) -> Result<(), Stopped> {
     let mut each_piece = |from: usize, sweep: f64, next: usize, to: Option<usize>| {
         if !ends[from].is_hidden && !ends[next].is_hidden {
-            return each(Fan { from, sweep, to, piece: [0.0, sweep] });
+            return each(Join { from, sweep, to, piece: [0.0, sweep] });
         }
-        let End { vertex, free, angle, turn, .. } = ends[from];
+        let EdgeEnd { vertex, free, angle, turn, .. } = ends[from];
         let (start, free) = (angle + f64::from(free) * turn, f64::from(free));
-        let low = turned(if free > 0.0 { start } else { start - sweep });
-        sectors.gaps(vertex, [low, low + sweep], |[a, b]| {
+        let low = wrapped(if free > 0.0 { start } else { start - sweep });
+        occlusion.gaps(vertex, [low, low + sweep], |[a, b]| {
             let [a, b] = if free > 0.0 { [a - low, b - low] } else { [low + sweep - b, low + sweep - a] };
-            // What rounding leaves of a fan whose corner lies where a face ends is none.
+            // Slivers that rounding leaves beside a face are not drawn.
             let piece = [if a < PIECE_MIN { 0.0 } else { a }, if b > sweep - PIECE_MIN { sweep } else { b }];
             if piece[1] - piece[0] > PIECE_MIN {
-                each(Fan { from, sweep, to, piece });
+                each(Join { from, sweep, to, piece });
             }
         });
     };
@@ -186,7 +169,7 @@ fn each_fan(ends: &[End], sectors: &Sectors, deadline: &Deadline, mut each: impl
             deadline.check()?;
         }
         for (i, end) in group.iter().enumerate() {
-            // The next one on the free side, and how far it is.
+            // The next end on the free side, and how far it is.
             let next = if end.free > 0 { (i + 1) % count } else { (i + count - 1) % count };
             let mut gap = f64::from(end.free) * (group[next].angle - end.angle);
             if gap < 0.0 || next == i || (next > i) != (end.free > 0) {
@@ -196,7 +179,7 @@ fn each_fan(ends: &[End], sectors: &Sectors, deadline: &Deadline, mut each: impl
                 gap += TAU;
             }
             let meets = group[next].free != end.free;
-            // Of two that meet, the one that is free above draws the fan between them.
+            // Of two ends that meet, the one that is free above draws the join between them.
             if meets && end.free > 0 {
                 let sweep = gap - end.turn - group[next].turn;
                 if sweep > 0.0 {
@@ -213,8 +196,8 @@ fn each_fan(ends: &[End], sectors: &Sectors, deadline: &Deadline, mut each: impl
     Ok(())
 }
 
-/// The ends at each vertex, and where they begin.
-fn groups(ends: &[End]) -> impl Iterator<Item = (usize, &[End])> {
+/// The ends at each vertex, with the index of the first.
+fn groups(ends: &[EdgeEnd]) -> impl Iterator<Item = (usize, &[EdgeEnd])> {
     let mut first = 0;
     ends.chunk_by(|a, b| a.vertex == b.vertex).map(move |group| {
         first += group.len();
@@ -222,38 +205,39 @@ fn groups(ends: &[End]) -> impl Iterator<Item = (usize, &[End])> {
     })
 }
 
-/// The angle between the corners of an arc: its chords are `SAGITTA` away from it, `r (1 - cos(a / 2))`.
-fn step(ends: &[End], fan: &Fan) -> f64 {
-    let from = &ends[fan.from];
-    let reach = fan.to.map_or(from.reach, |to| ends[to].reach.max(from.reach));
+/// The angle between the corners of an arc whose chords are `SAGITTA` away from it,
+/// `r (1 - cos(a / 2))`.
+fn step(ends: &[EdgeEnd], join: &Join) -> f64 {
+    let from = &ends[join.from];
+    let reach = join.to.map_or(from.reach, |to| ends[to].reach.max(from.reach));
     (8.0 * SAGITTA / reach.max(1.0)).sqrt().min(FRAC_PI_4)
 }
 
-/// Into how many triangles a fan is cut.
-fn chords(ends: &[End], fan: &Fan, coarser: f64) -> u32 {
-    let chord = (step(ends, fan) * coarser).min(CHORD_MAX);
-    (fan.angle() / chord).max(0.0) as u32 + 1
+/// The number of triangles of a piece.
+fn chords(ends: &[EdgeEnd], join: &Join, coarser: f64) -> u32 {
+    let chord = (step(ends, join) * coarser).min(CHORD_MAX);
+    (join.angle() / chord).max(0.0) as u32 + 1
 }
 
-fn draw(ends: &[End], fan: &Fan, coarser: f64, first: u32, hull: &mut HullPass<'_>) {
-    let from = &ends[fan.from];
-    let (reach, depth) = fan.to.map_or((from.reach, from.depth), |to| (ends[to].reach, ends[to].depth));
+fn draw(ends: &[EdgeEnd], join: &Join, coarser: f64, first: u32, hull: &mut HullPass<'_>) {
+    let from = &ends[join.from];
+    let (reach, depth) = join.to.map_or((from.reach, from.depth), |to| (ends[to].reach, ends[to].depth));
     let free = f64::from(from.free);
     let start = from.angle + free * from.turn;
     let mut corner = |swept: f64| {
-        let (angle, share) = (start + free * swept, swept / fan.sweep);
+        let (angle, share) = (start + free * swept, swept / join.sweep);
         let reach = from.reach + share * (reach - from.reach);
         let at = [libm::cos(angle), libm::sin(angle)];
         let [x, y] = [0, 1].map(|k| from.middle[k] + reach * at[k]);
-        hull.vertices.push(snapped([x, y, from.depth + share * (depth - from.depth), from.inv_w]));
+        hull.vertices.push(HullVertex::snapped([x, y, from.depth + share * (depth - from.depth), from.inv_w]));
         first + hull.vertices.len() as u32 - 1
     };
-    let count = chords(ends, fan, coarser);
-    let mut last = if fan.begins() { from.outer } else { corner(fan.piece[0]) };
+    let count = chords(ends, join, coarser);
+    let mut last = if join.begins() { from.outer } else { corner(join.piece[0]) };
     for i in 1..=count {
-        let next = match fan.meets() {
+        let next = match join.meets() {
             Some(to) if i == count => ends[to].outer,
-            _ => corner(fan.piece[0] + fan.angle() * (f64::from(i) / f64::from(count))),
+            _ => corner(join.piece[0] + join.angle() * (f64::from(i) / f64::from(count))),
         };
         hull.triangles.push([from.vertex, last, next]);
         hull.triangle_materials.push(from.material);

@@ -1,28 +1,30 @@
-//! Which directions around a vertex its own faces take up on screen, and which edges there they hide.
+//! Vertex occlusion: the directions around a vertex that its own faces cover on screen, and the
+//! silhouette edges there that these faces hide.
 //!
-//! A contour that ends inside a shape, where the surface folds, ends at a vertex around which the surface goes on, and where the fold's
-//! other edge leaves that this surface hides: between the two nothing is free, and no outline belongs. Between two edges that are seen
-//! nothing of the vertex is in the way, unless it lies behind.
+//! At a cusp, where the surface folds, a contour ends inside the shape. The fold's other silhouette
+//! edge leaves from the same vertex, and the surface hides it. The round join is left out where the
+//! vertex's own faces cover it. Between two edges that are both visible, no face of the vertex lies
+//! in front of the join.
 
 use std::f64::consts::TAU;
 
 use crate::limits::Stopped;
 use crate::plan::PlanError;
-use crate::plan::context::CHECK_EVERY;
-use crate::plan::context::PlanContext;
-use crate::plan::outline::round_join::End;
-use crate::plan::outline::silhouette_edges::{View, row_dot};
-use crate::plan::sort::sort;
+use crate::plan::context::{CHECK_EVERY, PlanContext};
+use crate::plan::outline::EdgeEnd;
+use crate::plan::outline::silhouette_edges::ScreenMesh;
+use crate::plan::outline::sort::sort;
+use crate::plan::projection::row_dot;
 
-/// Ends times faces at a vertex up to which each is compared with each. Around a vertex of more, all ends count as seen.
+/// Limit of ends times faces at a vertex. Around a vertex with more, all ends count as visible.
 const PAIRS_MAX: usize = 1 << 12;
 
-/// What rounding makes of two angles that are equal, and of two slopes, as a share of them.
+/// Relative difference up to which two angles or two slopes count as equal.
 const EQUAL: f64 = 1e-9;
 
-/// The directions that a vertex's own faces take up, by vertex and angle: arcs that do not touch.
+/// The directions that vertices' own faces cover: arcs that do not touch, by vertex and angle.
 #[derive(Debug, Default)]
-pub struct Sectors {
+pub struct VertexOcclusion {
     arcs: Vec<Arc>,
 }
 
@@ -32,13 +34,14 @@ struct Arc {
     vertex: u32,
     from: f64,
     to: f64,
-    /// How depth changes across the face, each 1/256 px right and down.
+    /// Change of depth across the face, per 1/256 px right and down.
     slope: [f64; 2],
 }
 
-impl Sectors {
-    /// Around the vertices of ends, which are in the order of these. Says of each end whether a face of its vertex hides it.
-    pub fn around(ends: &mut [End], view: &View<'_>, cx: &mut PlanContext<'_>) -> Result<Self, PlanError> {
+impl VertexOcclusion {
+    /// The occlusion around the vertices of `ends`, which are sorted by vertex. Sets
+    /// [`EdgeEnd::is_hidden`] of each end.
+    pub fn around(ends: &mut [EdgeEnd], view: &ScreenMesh<'_>, cx: &mut PlanContext<'_>) -> Result<Self, PlanError> {
         if ends.is_empty() {
             return Ok(Self::default());
         }
@@ -67,14 +70,14 @@ impl Sectors {
         Ok(Self { arcs })
     }
 
-    /// That of one face.
+    /// The occlusion of one face, for tests.
     #[cfg(test)]
     pub fn of_one(vertex: u32, [from, to]: [f64; 2]) -> Self {
         Self { arcs: vec![Arc { vertex, from, to, slope: [0.0; 2] }] }
     }
 
-    /// Calls `each` with the parts of a range of angles around a vertex that no face takes up. It begins between 0 and a whole turn,
-    /// and is at most one long.
+    /// Calls `each` with the parts of a range of angles around a vertex that no face covers. The
+    /// range begins between 0 and a whole turn, and is at most a whole turn long.
     pub fn gaps(&self, vertex: u32, [from, to]: [f64; 2], mut each: impl FnMut([f64; 2])) {
         let first = self.arcs.partition_point(|arc| arc.vertex < vertex);
         let mut free_from = from;
@@ -95,34 +98,36 @@ impl Sectors {
 }
 
 impl Arc {
-    /// Whether the face goes on under an edge that leaves its corner, nearer than the edge.
-    fn hides(&self, end: &End) -> bool {
-        let angle = turn(end.angle);
+    /// Whether the face hides an edge that leaves its corner: it covers the edge's direction, and
+    /// is nearer there.
+    fn hides(&self, end: &EdgeEnd) -> bool {
+        let angle = wrapped(end.angle);
         let slope = self.slope[0] * libm::cos(angle) + self.slope[1] * libm::sin(angle);
         let rounded = EQUAL * (self.slope[0].abs() + self.slope[1].abs() + end.slope.abs());
-        // One that goes past a whole turn is two arcs, and to the right is both ends of the turn.
+        // An arc past a whole turn is stored as two, and the direction to the right is at both ends
+        // of the turn.
         let is_within = |angle: f64| angle >= self.from - EQUAL && angle <= self.to + EQUAL;
         [angle, angle + TAU, angle - TAU].into_iter().any(is_within) && slope > end.slope + rounded
     }
 }
 
 /// The arcs of all faces around the vertices of ends.
-fn arcs(ends: &[End], view: &View<'_>, cx: &mut PlanContext<'_>) -> Result<Vec<Arc>, PlanError> {
+fn arcs(ends: &[EdgeEnd], view: &ScreenMesh<'_>, cx: &mut PlanContext<'_>) -> Result<Vec<Arc>, PlanError> {
     let words = view.mesh.positions.len().div_ceil(64);
     cx.budget.spend("an outline's corners", words as u64, 8)?;
-    let mut is_asked = vec![0_u64; words];
+    let mut has_end = vec![0_u64; words];
     for end in ends {
-        is_asked[end.vertex as usize / 64] |= 1 << (end.vertex % 64);
+        has_end[end.vertex as usize / 64] |= 1 << (end.vertex % 64);
     }
     let each = |each: &mut dyn FnMut(Arc)| {
         for (i, triangle) in view.mesh.triangles.iter().enumerate() {
             if i % CHECK_EVERY == 0 {
                 cx.deadline.check()?;
             }
-            let asked = |v: u32| is_asked[v as usize / 64] >> (v % 64) & 1 == 1;
-            for k in (0..3).filter(|&k| asked(triangle[k])) {
+            let is_listed = |v: u32| has_end[v as usize / 64] >> (v % 64) & 1 == 1;
+            for k in (0..3).filter(|&k| is_listed(triangle[k])) {
                 let corners = [0, 1, 2].map(|j| triangle[(k + j) % 3]);
-                sector(view, i as u32, corners).into_iter().flatten().for_each(&mut *each);
+                face_arcs(view, i as u32, corners).into_iter().flatten().for_each(&mut *each);
             }
         }
         Ok::<(), Stopped>(())
@@ -135,36 +140,39 @@ fn arcs(ends: &[End], view: &View<'_>, cx: &mut PlanContext<'_>) -> Result<Vec<A
     Ok(arcs)
 }
 
-/// The arc that a face takes up around its first corner, in two where it goes past a whole turn; nothing of a face that is not drawn or
-/// seen edge on.
-fn sector(view: &View<'_>, face: u32, [at, next, last]: [u32; 3]) -> [Option<Arc>; 2] {
+/// The arc that a face covers around its first corner, in two where it goes past a whole turn. None
+/// of a face that is not drawn or seen edge on.
+fn face_arcs(view: &ScreenMesh<'_>, face: u32, [at, next, last]: [u32; 3]) -> [Option<Arc>; 2] {
     let shown = view.shown(face).unwrap_or(0);
-    // The way in which a line leaves, which does not depend on whether its other end lies behind the eye: the derivative of its place.
+    // The direction in which a side leaves: the derivative of its place on screen, which is right
+    // even where the other end lies behind the eye.
     let here = view.places[at as usize];
     let angle = |there: u32| {
         let there = view.places[there as usize];
         let [x, y] = [0, 1].map(|axis| there[axis] * here[2] - here[axis] * there[2]);
         libm::atan2(y, x)
     };
-    // Y points down: angles grow from the first to the last corner of what shows its back.
+    // Y points down, so angles grow from the first to the last corner of a face that shows its
+    // back.
     let (from, to) = match shown {
         0 => return [None; 2],
         1 => (angle(next), angle(last)),
         _ => (angle(last), angle(next)),
     };
-    let width = turn(to - from);
-    // Rounding made it more than half a turn: it is seen edge on.
+    let width = wrapped(to - from);
+    // More than half a turn is a rounding error of a face that is seen edge on.
     if here[2] <= 0.0 || width.is_nan() || width > 0.5 * TAU {
         return [None; 2];
     }
-    let from = turn(from);
+    let from = wrapped(from);
     let slope = slope(view, [at, next, last]);
     let arc = |from: f64, to: f64| (from < to).then_some(Arc { vertex: at, from, to, slope });
     [arc(from, (from + width).min(TAU)), arc(0.0, from + width - TAU)]
 }
 
-/// How a face's depth changes right and down: `Z = (gx x + gy y + c) W` for all corners, by Cramer's rule.
-fn slope(view: &View<'_>, corners: [u32; 3]) -> [f64; 2] {
+/// Change of a face's depth right and down: `Z = (gx x + gy y + c) W` for all corners, by Cramer's
+/// rule.
+fn slope(view: &ScreenMesh<'_>, corners: [u32; 3]) -> [f64; 2] {
     let [p, q, r] = corners.map(|v| {
         let [x, y, w] = view.places[v as usize];
         [x, y, row_dot(&view.projection.z, view.mesh.positions[v as usize]), w]
@@ -178,7 +186,7 @@ fn slope(view: &View<'_>, corners: [u32; 3]) -> [f64; 2] {
 }
 
 /// The same angle, from 0 to a whole turn.
-pub fn turn(angle: f64) -> f64 {
+pub fn wrapped(angle: f64) -> f64 {
     angle.rem_euclid(TAU)
 }
 

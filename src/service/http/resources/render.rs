@@ -88,10 +88,10 @@ pub fn picture(finished: &Finished) -> Response {
         }
     }
     let warnings = (!codes.is_empty()).then(|| (HeaderName::from_static("x-warnings"), text(&codes.join(", "))));
-    let chosen = finished.choice.as_ref().map(|choice| {
+    let chosen = finished.selection.as_ref().map(|selection| {
         [
-            (HeaderName::from_static("x-expected-error"), text(&choice.expected_error.to_string())),
-            (HeaderName::from_static("x-chosen"), text(&choice.to_string())),
+            (HeaderName::from_static("x-expected-error"), text(&selection.expected_error.to_string())),
+            (HeaderName::from_static("x-chosen"), text(&selection.to_string())),
         ]
     });
     let mut response = (StatusCode::OK, headers, finished.picture.clone()).into_response();

@@ -140,7 +140,9 @@ impl Scene {
 
 /// Plans with default limits.
 pub fn plan<'a>(mesh: &'a Mesh, spec: &Spec) -> DrawPlan<'a> {
-    plan::build(mesh, spec, &mut Budget::new(&Limits::default()), &Deadline::default()).expect("a plan")
+    let mut budget = Budget::new(&Limits::default());
+    let scene = meshsnap::scene::Scene::new(mesh, spec, &mut budget).expect("a scene");
+    plan::build(&scene, &mut budget, &Deadline::default()).expect("a plan")
 }
 
 fn models() -> PathBuf {

@@ -3,8 +3,7 @@
 use crate::render::textures::levels::{error, model_of, textures, value};
 use crate::support::mesh_files::Noise;
 use crate::support::shared::folder;
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::plan;
+use meshsnap::limits::{Deadline, Limits};
 use meshsnap::plan::PlanError;
 use std::time::{Duration, Instant};
 
@@ -90,7 +89,7 @@ fn other_ktx2_files_are_named() {
         let mesh = model_of(&bytes);
         let limits = Limits { texture_total_px: 8192 * 8191, ..Limits::default() };
         let spec = crate::support::scenes::spec(&[("style", "smooth"), ("size", "64")]);
-        let error = plan::build(&mesh, &spec, &mut Budget::new(&limits), &Deadline::default()).unwrap_err();
+        let error = crate::support::scenes::try_plan(&mesh, &spec, &limits, &Deadline::default(), &[]).unwrap_err();
         assert!(matches!(&error, PlanError::Limit(over) if over.flag == limit), "{error}");
     }
 }
@@ -110,7 +109,7 @@ fn damaged_textures_are_refused_or_drawn_in_time() {
             let mesh = model_of(&bytes);
             let limits = Limits::default();
             let spec = crate::support::scenes::spec(&[("style", "smooth"), ("size", "16")]);
-            _ = plan::build(&mesh, &spec, &mut Budget::new(&limits), &Deadline::default());
+            _ = crate::support::scenes::try_plan(&mesh, &spec, &limits, &Deadline::default(), &[]);
             cases += 1;
         }
     }

@@ -4,8 +4,7 @@ use crate::render::textures::levels::{base, encode, model, model_of};
 use crate::support::mesh_files::Noise;
 use crate::support::scenes;
 use image::ImageFormat;
-use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::plan;
+use meshsnap::limits::{Deadline, Limits};
 use meshsnap::plan::{Projection, SkipKind, Texture};
 
 /// Triangles of all shapes, from anywhere: no pixel samples a level that was left out.
@@ -116,8 +115,7 @@ fn fine_levels_are_kept_where_they_may_be_seen() {
     let mesh = model_of(&picture);
     let image = |keys: &[(&str, &str)], keep: &[SkipKind]| {
         let spec = scenes::spec(&[&[("style", "smooth"), ("camera.view", "front")], keys].concat());
-        let plan = plan::build_keeping(&mesh, &spec, &mut Budget::new(&Limits::default()), &Deadline::default(), keep)
-            .unwrap();
+        let plan = scenes::try_plan(&mesh, &spec, &Limits::default(), &Deadline::default(), keep).unwrap();
         let skipped = plan.skips.iter().any(|s| s.kind == SkipKind::FineTextureLevels);
         let textures = plan.surface.unwrap().textures;
         assert_eq!(textures.texels.len() as u64, texels(&textures.images[0]));

@@ -1,7 +1,5 @@
 //! Textures on a square that faces the viewer: what is where, which way up, and which way bumps go.
 
-use std::borrow::Cow;
-
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::image::Image;
@@ -116,7 +114,7 @@ fn lit(uvs: &[[f32; 2]], look: ShadedMaterial, textures: Textures, to_light: [f3
     let mut plan = plan(uvs, look, textures);
     let surface = plan.surface.as_mut().unwrap();
     surface.lights = Lights { lamps: vec![lamp], ambient: 0.1 };
-    surface.face_normals = &normals;
+    surface.face_normals = (&normals).into();
     CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap().pixel(7, 7)[0]
 }
 
@@ -128,7 +126,7 @@ fn plan<'a>(uvs: &'a [[f32; 2]], look: ShadedMaterial, textures: Textures) -> Dr
     let mut plan = scenes::screen_plan([SIDE; 2], 1, 1.0, &POSITIONS, &TRIANGLES);
     let surface = plan.surface.as_mut().unwrap();
     surface.materials = vec![look];
-    surface.uvs = Some(CornerValues { values: Cow::Borrowed(uvs), triangles: &TRIANGLES });
+    surface.uvs = Some(CornerValues { values: uvs.into(), triangles: (&TRIANGLES).into() });
     surface.textures = textures;
     plan
 }

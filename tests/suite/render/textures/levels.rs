@@ -6,9 +6,8 @@ use crate::render::textures::bad::{header, png, zlib};
 use crate::support::mesh_files::{Gltf, Noise, read};
 use crate::support::scenes;
 use image::{DynamicImage, ImageFormat};
-use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap::limits::{Deadline, Limits};
 use meshsnap::mesh::Mesh;
-use meshsnap::plan;
 use meshsnap::plan::{DrawPlan, PlanError, SkipKind, TEXTURE_NONE, Texture, TextureError, Textures, slots};
 use serde_json::{Value, json};
 
@@ -45,13 +44,7 @@ pub fn encode(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
 }
 
 pub fn plan_of<'a>(mesh: &'a Mesh, keep: &[SkipKind], limits: &Limits) -> Result<DrawPlan<'a>, PlanError> {
-    plan::build_keeping(
-        mesh,
-        &scenes::spec(&[("style", "smooth"), ("size", "64")]),
-        &mut Budget::new(limits),
-        &Deadline::default(),
-        keep,
-    )
+    scenes::try_plan(mesh, &scenes::spec(&[("style", "smooth"), ("size", "64")]), limits, &Deadline::default(), keep)
 }
 
 /// All levels of the textures.
@@ -251,7 +244,7 @@ fn a_stopped_job_decodes_nothing_more() {
     let (mesh, deadline) = (model_of(&picture), Deadline::default());
     deadline.stop();
     let spec = scenes::spec(&[("style", "smooth"), ("size", "64")]);
-    let plan = plan::build(&mesh, &spec, &mut Budget::new(&Limits::default()), &deadline);
+    let plan = scenes::try_plan(&mesh, &spec, &Limits::default(), &deadline, &[]);
     assert!(matches!(plan, Err(PlanError::Stopped(_))));
 }
 

@@ -80,8 +80,8 @@ fn faces_of_many_normals_have_the_same_bytes() {
                 plan.background = [0.2, 0.3, 0.1, 0.5];
                 let surface = plan.surface.as_mut().unwrap();
                 surface.lights = lit.surface.as_ref().unwrap().lights.clone();
-                surface.face_normals = &normals;
-                surface.triangle_materials = &materials;
+                surface.face_normals = (&normals).into();
+                surface.triangle_materials = (&materials).into();
                 surface.materials = (0..MATERIALS).map(|_| look(&mut random)).collect();
                 let picture = cpu.draw(&plan, &Deadline::default()).unwrap();
                 let colors: HashSet<_> = picture.rgba.chunks(4).collect();

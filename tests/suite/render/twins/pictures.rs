@@ -159,7 +159,7 @@ fn materials_masks_and_normals_agree() {
                 let colors = [[0.8, 0.1, 0.1, 1.0], [0.1, 0.7, 0.2, 1.0], [0.2, 0.2, 0.9, 0.5]];
                 let first = surface.materials[0];
                 surface.materials = colors.map(|base_color| ShadedMaterial { base_color, ..first }).to_vec();
-                surface.triangle_materials = &materials;
+                surface.triangle_materials = (&materials).into();
                 plan.background = [0.0; 4];
                 let cpu = CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap();
                 let is_mostly = |channel: usize| cpu.rgba.chunks(4).any(|p| p[channel] > 128 && p[2 - channel] < 100);

@@ -126,7 +126,7 @@ fn parts_of_different_looks_agree() {
         let surface = plan.surface.as_mut().unwrap();
         surface.materials = LOOKS.iter().map(|(_, look)| with(base_look(), *look)).collect();
         let count = surface.face_normals.len();
-        surface.triangle_materials = &materials[..count];
+        surface.triangle_materials = materials[..count].into();
         let masks: Vec<u8> = (0..count).map(|t| [7, 5, 0, 2][t % 4]).collect();
         surface.edge_masks = Cow::Owned(masks);
         let picture = cpu.draw(plan, &Deadline::default()).unwrap();
@@ -146,7 +146,7 @@ fn hostile_coordinates_and_textures_agree() {
             .map(|i| [[1e30, -1e30], [f32::MAX, 0.0], [0.5, f32::MIN_POSITIVE], [-0.0, 3e7]][i % 4])
             .collect();
         let surface = plan.surface.as_mut().unwrap();
-        surface.uvs = Some(CornerValues { values: Cow::Owned(bad), triangles: plan.triangles });
+        surface.uvs = Some(CornerValues { values: bad.into(), triangles: plan.triangles.clone() });
         let uses = [used(CHECKER, 0), turned(CHECKER, f32::MAX), used(COARSE, 5), used(77, 0)];
         let look = ShadedMaterial { textures: uses, flags: SMOOTH | flags::MASK, alpha_cutoff: 0.1, ..base_look() };
         surface.materials = vec![ShadedMaterial { emissive: [1e30, 2.0, 0.0], ..look }];
@@ -178,7 +178,7 @@ fn alpha_that_rounds_below_nothing_agrees() {
             let mut plan = scenes::screen_plan([160, 100], samples, 1.0, &positions, &triangles);
             plan.background = [0.0; 4];
             let surface = plan.surface.as_mut().unwrap();
-            surface.colors = Some(CornerValues { values: Cow::Borrowed(&values), triangles: &triangles });
+            surface.colors = Some(CornerValues { values: (&values).into(), triangles: (&triangles).into() });
             let flags = flags::FILL | flags::VERTEX_COLORS | bits;
             surface.materials = vec![ShadedMaterial { flags, wire_thickness: 1.0, ..base_look() }];
             let picture = CpuRenderer::new(1).draw(&plan, &Deadline::default()).unwrap();
@@ -199,16 +199,16 @@ fn normals_and_colours_that_go_by_different_indices_agree() {
     let corners: &'static [[u32; 3]] = (0..10_000).map(|t| [3 * t + 2, 3 * t, 3 * t + 1]).collect::<Vec<_>>().leak();
     let mut cases = 0;
     each_view(|view, plan| {
-        let (own, count) = (plan.triangles, plan.triangles.len());
+        let (own, count) = (plan.triangles.clone(), plan.triangles.len());
         let surface = plan.surface.as_mut().unwrap();
         surface.materials = vec![ShadedMaterial { flags: SMOOTH | flags::VERTEX_COLORS, ..base_look() }];
         let by_position = surface.vertex_normals.clone().unwrap();
-        assert!(std::ptr::eq(by_position.triangles, own), "{view}: the normals have an index of their own");
+        assert!(std::ptr::eq(&by_position.triangles[..], &own[..]), "{view}: the normals have an index of their own");
         let all: Vec<[f32; 3]> = own.iter().flatten().map(|&v| by_position.values[v as usize]).collect();
-        let turned = (0..count).flat_map(|t| [all[3 * t + 1], all[3 * t + 2], all[3 * t]]).collect();
-        let by_corner = CornerValues { values: Cow::Owned(turned), triangles: &corners[..count] };
-        let paint = (0..3 * count).map(|c| [(c % 3) as f32 / 2.0, (c % 7) as f32 / 6.0, 0.5, 1.0]).collect();
-        let paint = CornerValues { values: Cow::Owned(paint), triangles: &corners[..count] };
+        let turned: Vec<_> = (0..count).flat_map(|t| [all[3 * t + 1], all[3 * t + 2], all[3 * t]]).collect();
+        let by_corner = CornerValues { values: turned.into(), triangles: corners[..count].into() };
+        let paint: Vec<_> = (0..3 * count).map(|c| [(c % 3) as f32 / 2.0, (c % 7) as f32 / 6.0, 0.5, 1.0]).collect();
+        let paint = CornerValues { values: paint.into(), triangles: corners[..count].into() };
         let mut pictures = Vec::new();
         for normals in [by_position, by_corner] {
             let surface = plan.surface.as_mut().unwrap();
@@ -244,12 +244,12 @@ fn dress<'a>(mesh: &'a Mesh, plan: &mut DrawPlan<'a>) {
     plan.background = [0.0; 4];
     let mut random = Random(7);
     let mut value = |from: f64| random.range(from, 1.0) as f32;
-    let colors = mesh.positions.iter().map(|_| [value(0.0), value(0.0), value(0.0), value(0.2)]).collect();
-    let uvs = mesh.positions.iter().map(|p| [2.5 * p[0] + 0.3 * p[1], 2.0 * p[2] - 1.7 * p[1]]).collect();
+    let colors: Vec<_> = mesh.positions.iter().map(|_| [value(0.0), value(0.0), value(0.0), value(0.2)]).collect();
+    let uvs: Vec<_> = mesh.positions.iter().map(|p| [2.5 * p[0] + 0.3 * p[1], 2.0 * p[2] - 1.7 * p[1]]).collect();
     let surface = plan.surface.as_mut().unwrap();
-    surface.face_normals = &mesh.face_normals;
-    surface.colors = Some(CornerValues { values: Cow::Owned(colors), triangles: &mesh.triangles });
-    surface.uvs = Some(CornerValues { values: Cow::Owned(uvs), triangles: &mesh.triangles });
+    surface.face_normals = (&mesh.face_normals).into();
+    surface.colors = Some(CornerValues { values: colors.into(), triangles: (&mesh.triangles).into() });
+    surface.uvs = Some(CornerValues { values: uvs.into(), triangles: (&mesh.triangles).into() });
     surface.textures = textures();
 }
 

@@ -1,27 +1,28 @@
-//! Kinds of edges.
+//! Classes of edges: which edges of a mesh a line style follows.
 
 use crate::mesh::Mesh;
 use crate::mesh::edges::MeshEdge;
 use crate::spec::{Wire, WireEdges};
 
-/// A kind of edge.
+/// A class of edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Class {
-    /// Each.
+    /// All edges.
     All,
-    /// Of the file's polygons.
+    /// Edges of the file's polygons, without the diagonals of triangulation.
     Polygon,
-    /// Faces meet at an angle whose cosine is below this, or there are not two.
+    /// Edges whose faces meet at an angle with a cosine below this, and edges without exactly two
+    /// faces.
     Feature(f64),
-    /// Two faces that meet so.
+    /// Edges of exactly two faces that meet at an angle with a cosine below this.
     Crease(f64),
-    /// With one face.
+    /// Edges with one face.
     Boundary,
-    /// With more than two faces, or with two that disagree which side is out.
+    /// Edges with more than two faces, or with two that disagree which side is out.
     Nonmanifold,
 }
 
-/// The kind that a wire follows.
+/// The class that a wire follows.
 pub fn class_of(wire: &Wire) -> Class {
     match wire.edges {
         WireEdges::Triangles => Class::All,
@@ -31,8 +32,8 @@ pub fn class_of(wire: &Wire) -> Class {
     }
 }
 
-/// Whether an edge is of a kind.
-pub fn is_of(class: Class, mesh: &Mesh, edge: &MeshEdge) -> bool {
+/// Whether an edge belongs to a class.
+pub fn belongs_to(class: Class, mesh: &Mesh, edge: &MeshEdge) -> bool {
     let bends = |limit: f64| {
         let [a, b] = edge.faces.map(|face| mesh.face_normals[face as usize].map(f64::from));
         let cos = (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
@@ -53,7 +54,7 @@ pub fn is_of(class: Class, mesh: &Mesh, edge: &MeshEdge) -> bool {
     }
 }
 
-/// The cosine of degrees.
+/// The cosine of an angle in degrees.
 pub fn cos_deg(degrees: f64) -> f64 {
     libm::cos(degrees.to_radians())
 }

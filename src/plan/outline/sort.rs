@@ -1,11 +1,11 @@
-//! Putting long lists in order.
+//! Sorting of long lists.
 
 use std::cmp::Ordering;
 
 use crate::limits::{Deadline, Stopped};
 use crate::plan::context::CHECK_EVERY;
 
-/// Sorts. In groups, which are put in order one by one, so that the deadline can be looked at in between.
+/// Sorts a list by halves, so that the deadline can be checked in between.
 pub fn sort<T>(items: &mut [T], order: &impl Fn(&T, &T) -> Ordering, deadline: &Deadline) -> Result<(), Stopped> {
     deadline.check()?;
     if items.len() <= CHECK_EVERY {

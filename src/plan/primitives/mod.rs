@@ -1,0 +1,27 @@
+//! Line and point primitives: what a file draws without area.
+//!
+//! Where their material has a fill, they are triangles that face the camera and are shaded with the
+//! surface ([`geometry`]). Where it has none, they are lines of exact width ([`line_passes`]).
+
+mod lines;
+mod triangles;
+
+pub use lines::line_passes;
+pub use triangles::geometry;
+
+use crate::mesh::LineOrPoint;
+use crate::scene::{Fill, MaterialGroups};
+
+/// Whether a primitive is drawn as triangles.
+pub fn is_filled(groups: &MaterialGroups<'_>, primitive: &LineOrPoint) -> bool {
+    groups.fill(primitive.material as usize) != Fill::None
+}
+
+/// Whether a primitive is drawn as a line.
+pub fn is_line(groups: &MaterialGroups<'_>, primitive: &LineOrPoint) -> bool {
+    let layers = groups.by_material.get(primitive.material as usize);
+    layers.is_some_and(|layers| layers.wire.is_some() || layers.outline.is_some()) && !is_filled(groups, primitive)
+}
+
+#[cfg(test)]
+mod tests;
