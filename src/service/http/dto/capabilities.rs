@@ -1,20 +1,18 @@
-//! `/v1/capabilities` as JSON.
+//! The answer of `/v1/capabilities` as JSON.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::schema;
 use crate::backend::GpuStatus;
 use crate::import::Format;
 use crate::limits::Limits;
 use crate::request::{self, Style, word_for, words_of};
-use crate::service::http::app;
-use crate::service::jobs::Load;
+use crate::service::jobs::JobLoad;
 use crate::service::store::{Store, StoreLoad};
 use crate::spec::BackendChoice;
 
-/// `/v1/capabilities`.
+/// The capabilities of this process, its limits and its load.
 #[derive(Serialize)]
 pub struct CapabilitiesDto {
     version: &'static str,
@@ -31,7 +29,7 @@ pub struct CapabilitiesDto {
     limits: LimitsDto,
 }
 
-/// Who draws.
+/// The back-ends that can draw.
 #[derive(Serialize)]
 pub struct BackendDto {
     default: &'static str,
@@ -50,7 +48,7 @@ struct GpuDto {
 }
 
 impl BackendDto {
-    /// The back-end of a request that names none, and how it stands with the GPU.
+    /// The back-end of requests that name none, and the state of the GPU.
     pub fn new(default: BackendChoice, gpu: GpuStatus) -> Self {
         let GpuStatus { state, info, reason } = gpu;
         let (name, driver, device_type, features) = match info {
@@ -94,8 +92,17 @@ struct LimitsDto {
 }
 
 impl CapabilitiesDto {
-    /// What this process can do.
-    pub fn new(limits: &Limits, backend: BackendDto, workers: u64, load: Load, meshes: &Store) -> Self {
+    /// The answer. `schema` is the path of the schema, `paths` are those that need an API key where
+    /// keys are configured.
+    pub fn new(
+        limits: &Limits,
+        backend: BackendDto,
+        workers: u64,
+        load: JobLoad,
+        meshes: &Store,
+        schema: &'static str,
+        paths: Vec<String>,
+    ) -> Self {
         let (mesh_bytes, mesh_count) = meshes.limits();
         let StoreLoad { count: stored_meshes, bytes: stored_mesh_bytes } = meshes.load();
         let Limits { body_bytes, memory_bytes, triangles, nodes, json_depth, image_px, .. } = *limits;
@@ -106,10 +113,10 @@ impl CapabilitiesDto {
             mesh_formats: Format::NAMES,
             image_formats: ["png", "webp", "jpeg"],
             styles: words_of::<Style>(),
-            schema: schema::PATH,
+            schema,
             request_keys: request::keys(),
             request_words: request::vocabulary(),
-            paths: app::paths(),
+            paths,
             backend,
             workers,
             load: LoadDto {
