@@ -1,6 +1,6 @@
 //! The only map from errors to HTTP statuses.
 //!
-//! Handlers say who is at fault ([`Fault`]), never a status. An [`ApiError`] becomes an answer in
+//! Handlers name who is at fault ([`Fault`]), never a status. An [`ApiError`] becomes an answer in
 //! two steps: status and headers here, the body in [`super::middleware::observe`], because the
 //! request's id is only known there.
 

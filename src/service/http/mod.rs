@@ -6,7 +6,7 @@
 //! 2. [`router`] finds the handler of a path. [`middleware`] wraps it: request id, log, API key.
 //! 3. [`resources`] holds the handlers, one file per resource. They share [`state`].
 //! 4. [`receive`] reads the query and the body within their limits.
-//! 5. [`dto`] says what JSON answers look like, and [`error`] which status an error has.
+//! 5. [`dto`] defines the JSON of answers, and [`error`] maps errors to statuses.
 //!
 //! [`negotiate`] and [`conditional`] read and write single headers. [`stored_mesh`] and [`address`]
 //! serve the resources of stored meshes. [`static_document`] answers with a constant document.

@@ -11,7 +11,7 @@ use crate::image::ImageFormat;
 /// The formats, best first: of those that a client accepts equally, the first is taken.
 const FORMATS: [ImageFormat; 3] = [ImageFormat::Png, ImageFormat::Webp, ImageFormat::Jpeg];
 
-/// Longest wait that a client can ask for: proxies often end a request after a minute.
+/// Longest wait that a client can set: proxies often end a request after a minute.
 const WAIT_S_MAX: u64 = 60;
 
 /// The picture's format: the one in the document, else the best acceptable one, else PNG.

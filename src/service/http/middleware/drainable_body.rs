@@ -28,7 +28,7 @@ struct Inner {
     body: BodyDataStream,
     /// The end or an error was seen. Neither leaves anything to read.
     ended: bool,
-    /// A byte was asked for, and so the client was told to go on sending.
+    /// Reading has begun, so that a client that waits for `100 Continue` has got it.
     begun: bool,
 }
 

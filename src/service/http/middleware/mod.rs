@@ -1,4 +1,4 @@
-//! What happens around every request, whichever handler it has.
+//! Steps around every request, whatever its handler is.
 
 pub mod auth;
 mod drainable_body;

@@ -81,7 +81,7 @@ pub fn is_multipart(headers: &HeaderMap) -> bool {
     has_media_type(headers, "multipart/form-data")
 }
 
-/// The error for a body that is not a form, or a form with other parts than are wanted.
+/// The error for a malformed form, or one with missing or unexpected parts.
 pub fn bad_form(detail: impl Into<String>) -> ApiError {
     ApiError::new(Fault::BadRequest, "bad_form", detail)
 }
@@ -183,7 +183,7 @@ struct Meter {
 
 struct MeterState {
     bytes: u64,
-    /// Bytes since the end of the last part, while the next part of a form is looked for.
+    /// Bytes since the last part of a form, while the parser searches the next one.
     bytes_between_parts: Option<u64>,
     reservation: Reservation,
     error: Option<ApiError>,
@@ -217,7 +217,7 @@ impl Meter {
         })
     }
 
-    /// Says whether the next part of a form is looked for, or a part is read.
+    /// Starts or ends the count of bytes between two parts of a form.
     fn set_between_parts(&self, is_between: bool) {
         self.lock().bytes_between_parts = is_between.then_some(0);
     }
