@@ -5,7 +5,8 @@
 //! dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
 //!
 //! Reading order: [`job`] (one job and its states), [`registry`] (all jobs, behind one lock),
-//! [`worker`] (does the jobs), [`clock`] (ends overdue jobs), [`upload_budget`] (memory of uploads).
+//! [`worker`] (does the jobs), [`clock`] (ends overdue jobs), [`upload_budget`] (memory of
+//! uploads).
 
 mod clock;
 mod job;
@@ -94,8 +95,8 @@ impl Jobs {
         Ok(Self { registry, workers: Arc::new(Mutex::new(threads)) })
     }
 
-    /// Queues work. A kept job can be found by its id until its result expires. Any other job lives as
-    /// long as its handle.
+    /// Queues work. A kept job can be found by its id until its result expires. Any other job lives
+    /// as long as its handle.
     pub fn submit(&self, work: Work, is_kept: bool) -> Result<Arc<Job>, Refusal> {
         self.registry.submit(work, is_kept)
     }
@@ -132,9 +133,9 @@ impl Jobs {
         let _ = outstanding.wait_for(|&count| count == 0).await;
     }
 
-    /// Waits, after [`Jobs::drain`], until the workers have dropped their renderers. A GPU driver that
-    /// is unloaded while a thread still owns a device crashes. A worker may be stuck, so the wait is
-    /// no longer than `time_max`.
+    /// Waits, after [`Jobs::drain`], until the workers have dropped their renderers. A GPU driver
+    /// that is unloaded while a thread still owns a device crashes. A worker may be stuck, so the
+    /// wait is no longer than `time_max`.
     pub fn join(&self, time_max: Duration) {
         let until = Instant::now() + time_max;
         let mut workers = self.workers.lock().unwrap_or_else(PoisonError::into_inner);

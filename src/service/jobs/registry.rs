@@ -165,8 +165,8 @@ impl JobRegistry {
         self.outstanding.subscribe()
     }
 
-    /// Waits until jobs are overdue, and returns them. None once there will be no more. Drops expired
-    /// results meanwhile.
+    /// Waits until jobs are overdue, and returns them. None once there will be no more. Drops
+    /// expired results meanwhile.
     pub fn wait_for_overdue(&self) -> Option<Vec<Arc<Job>>> {
         let mut inner = self.lock();
         loop {

@@ -70,7 +70,7 @@ fn output(bytes: usize) -> Output {
 }
 
 /// The fake renderer, whose behaviour the mesh's bytes name.
-fn act(work: &Work, deadline: &Deadline, gate: &Mutex<Receiver<()>>) -> Result<Output, RenderError> {
+fn fake_render(work: &Work, deadline: &Deadline, gate: &Mutex<Receiver<()>>) -> Result<Output, RenderError> {
     match &work.bundle.files()[0].bytes[..] {
         b"panic" => panic!("asked to"),
         b"wait" => {
@@ -80,7 +80,7 @@ fn act(work: &Work, deadline: &Deadline, gate: &Mutex<Receiver<()>>) -> Result<O
             deadline.check()?;
             std::thread::sleep(Duration::from_millis(1));
         },
-        b"deaf" => {
+        b"uninterruptible" => {
             std::thread::sleep(Duration::from_millis(400));
             Ok(output(1))
         }
@@ -105,7 +105,7 @@ fn fixture(settings: JobSettings) -> Fixture {
         let gate = gate.clone();
         Box::new(move |work, deadline, ended| {
             ended(Stage::Parse);
-            let output = act(work, deadline, &gate)?;
+            let output = fake_render(work, deadline, &gate)?;
             ended(Stage::Encode);
             Ok(Product::Picture(output))
         })
@@ -202,9 +202,9 @@ fn a_job_out_of_time_stops_wherever_it_is() {
 }
 
 #[test]
-fn a_late_answer_comes_in_time_even_if_the_renderer_does_not_listen() {
+fn an_overdue_job_ends_in_time_even_if_its_renderer_goes_on() {
     let fixture = fixture(JobSettings { job_time: Duration::from_millis(50), ..settings() });
-    let job = fixture.submit(b"deaf", true).unwrap();
+    let job = fixture.submit(b"uninterruptible", true).unwrap();
     assert!(matches!(wait(&job), JobState::Failed(_)));
     assert!(job.accepted.elapsed() < Duration::from_millis(350), "{:?}", job.accepted.elapsed());
     std::thread::sleep(Duration::from_millis(450));
@@ -242,15 +242,15 @@ fn results_are_kept_for_a_while_and_within_their_memory() {
     assert!(fixture.jobs.find(second.id).is_some());
     assert_eq!(fixture.jobs.load().kept_bytes, 600);
 
-    let brief = self::fixture(JobSettings { result_ttl: Duration::from_millis(30), ..settings() });
-    let job = brief.submit(b"1", true).unwrap();
+    let short_lived = self::fixture(JobSettings { result_ttl: Duration::from_millis(30), ..settings() });
+    let job = short_lived.submit(b"1", true).unwrap();
     wait(&job);
     let began = Instant::now();
-    while brief.jobs.find(job.id).is_some() {
+    while short_lived.jobs.find(job.id).is_some() {
         assert!(began.elapsed() < SOON, "the result did not expire");
         std::thread::sleep(Duration::from_millis(5));
     }
-    assert_eq!(brief.jobs.load(), JobLoad::default());
+    assert_eq!(short_lived.jobs.load(), JobLoad::default());
 }
 
 #[test]

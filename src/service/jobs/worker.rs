@@ -57,8 +57,8 @@ pub fn run(registry: &JobRegistry, renderers: &RendererFactory) {
             let _ = catch_unwind(AssertUnwindSafe(|| drop(broken)));
             JobState::Failed(Arc::new(Failure::Panicked))
         });
-        // The memory is freed before the end is announced, so that a client that waits for the end can
-        // send the next mesh of the same size.
+        // The memory is freed before the end is announced, so that a client that waits for the end
+        // can send the next mesh of the same size.
         drop(work);
         registry.finish(&job, state, started.elapsed());
     }

@@ -19,8 +19,8 @@ impl Digest {
         Self(Sha256::digest(bytes).into())
     }
 
-    /// The digest of named files in any order. It is the digest of a list with a line `digest  name`
-    /// per file, sorted by name, as `sha256sum FILE... | LC_ALL=C sort -k 2` writes it.
+    /// The digest of named files in any order. It is the digest of a list with a line `digest
+    /// name` per file, sorted by name, as `sha256sum FILE... | LC_ALL=C sort -k 2` writes it.
     ///
     /// No mesh file has the bytes of such a list, so a form and a file never share a name. No text
     /// format has statements that begin with 64 digits. Names have no control characters, so as a

@@ -46,8 +46,8 @@ pub struct NewMesh {
 pub struct StoredMesh {
     /// The mesh itself.
     pub mesh: NewMesh,
-    /// The memory of its bytes. Every holder of the bytes holds a clone, and the memory counts until
-    /// the last clone is dropped.
+    /// The memory of its bytes. Every holder of the bytes holds a clone, and the memory counts
+    /// until the last clone is dropped.
     pub memory: Arc<Reservation>,
 }
 
@@ -188,8 +188,8 @@ impl Inner {
         self.meshes.insert(stored.mesh.digest, Entry { stored: Arc::new(stored), used: self.serial });
     }
 
-    /// Removes the least recently used mesh that is not held elsewhere. Removing a held one would free
-    /// no memory. None if all are held.
+    /// Removes the least recently used mesh that is not held elsewhere. Removing a held one would
+    /// free no memory. None if all are held.
     fn evict(&mut self) -> Option<()> {
         // These counts cannot grow from 1 meanwhile: new holders need this lock.
         let is_held =

@@ -134,8 +134,8 @@ async fn refuse(stream: TcpStream) {
     let _ = tokio::time::timeout(Duration::from_secs(1), answering).await;
 }
 
-/// Waits after a failed accept. Its cause, such as a lack of file descriptors, lasts for a while, and
-/// trying again at once would only use up processor time.
+/// Waits after a failed accept. Its cause, such as a lack of file descriptors, lasts for a while,
+/// and trying again at once would only use up processor time.
 async fn pause_after(error: &io::Error) {
     tracing::warn!(error = %error, "a connection could not be accepted");
     tokio::time::sleep(Duration::from_millis(50)).await;

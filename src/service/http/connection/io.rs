@@ -102,8 +102,8 @@ impl AsyncWrite for ClientStream {
             self.start_timer(Phase::Lingering { has_received: false }, LINGER_QUIET);
         }
         let mut scratch = [0; 16 * 1024];
-        // A client that sends without pause must not occupy the thread: a few reads, then a turn for
-        // other connections.
+        // A client that sends without pause must not occupy the thread: a few reads, then a turn
+        // for other connections.
         for _ in 0..16 {
             if self.timer.as_mut().poll(cx).is_ready() {
                 return Poll::Ready(Ok(()));

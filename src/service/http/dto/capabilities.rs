@@ -8,8 +8,9 @@ use crate::backend::GpuStatus;
 use crate::import::Format;
 use crate::limits::Limits;
 use crate::request::{self, Style, word_for, words_of};
+use crate::service::http::state::AppState;
 use crate::service::jobs::JobLoad;
-use crate::service::store::{Store, StoreLoad};
+use crate::service::store::StoreLoad;
 use crate::spec::BackendChoice;
 
 /// The capabilities of this process, its limits and its load.
@@ -31,7 +32,7 @@ pub struct CapabilitiesDto {
 
 /// The back-ends that can draw.
 #[derive(Serialize)]
-pub struct BackendDto {
+struct BackendDto {
     default: &'static str,
     choices: Vec<&'static str>,
     gpu: GpuDto,
@@ -45,22 +46,6 @@ struct GpuDto {
     device_type: Option<&'static str>,
     features: Vec<&'static str>,
     reason: Option<String>,
-}
-
-impl BackendDto {
-    /// The back-end of requests that name none, and the state of the GPU.
-    pub fn new(default: BackendChoice, gpu: GpuStatus) -> Self {
-        let GpuStatus { state, info, reason } = gpu;
-        let (name, driver, device_type, features) = match info {
-            Some(info) => (Some(info.name), Some(info.driver), Some(info.device_type), info.features),
-            None => (None, None, None, Vec::new()),
-        };
-        Self {
-            default: word_for(default),
-            choices: words_of::<BackendChoice>(),
-            gpu: GpuDto { state: state.name(), name, driver, device_type, features, reason },
-        }
-    }
 }
 
 #[derive(Serialize)]
@@ -94,20 +79,7 @@ struct LimitsDto {
 impl CapabilitiesDto {
     /// The answer. `schema` is the path of the schema, `paths` are those that need an API key where
     /// keys are configured.
-    pub fn new(
-        limits: &Limits,
-        backend: BackendDto,
-        workers: u64,
-        load: JobLoad,
-        meshes: &Store,
-        schema: &'static str,
-        paths: Vec<String>,
-    ) -> Self {
-        let (mesh_bytes, mesh_count) = meshes.limits();
-        let StoreLoad { count: stored_meshes, bytes: stored_mesh_bytes } = meshes.load();
-        let Limits { body_bytes, memory_bytes, triangles, nodes, json_depth, image_px, .. } = *limits;
-        let Limits { bundle_bytes, bundle_entries, job_ms, queue_per_worker, .. } = *limits;
-        let Limits { texture_px, texture_total_px, .. } = *limits;
+    pub fn new(state: &AppState, schema: &'static str, paths: Vec<String>) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             mesh_formats: Format::NAMES,
@@ -117,32 +89,60 @@ impl CapabilitiesDto {
             request_keys: request::keys(),
             request_words: request::vocabulary(),
             paths,
-            backend,
-            workers,
-            load: LoadDto {
-                queued: load.queued,
-                running: load.running,
-                kept_results: load.kept,
-                kept_result_bytes: load.kept_bytes,
-                stored_meshes,
-                stored_mesh_bytes,
-            },
-            limits: LimitsDto {
-                body_bytes,
-                memory_bytes,
-                triangles,
-                nodes,
-                json_depth,
-                image_px,
-                texture_px,
-                texture_total_px,
-                bundle_bytes,
-                bundle_entries,
-                job_ms,
-                queue_per_worker,
-                mesh_bytes,
-                mesh_count,
-            },
+            backend: BackendDto::new(state.rules.backend, state.gpu.status()),
+            workers: state.workers,
+            load: LoadDto::new(state.jobs.load(), state.meshes.load()),
+            limits: LimitsDto::new(&state.rules.limits, state.meshes.limits()),
+        }
+    }
+}
+
+impl BackendDto {
+    /// The back-end of requests that name none, and the state of the GPU.
+    fn new(default: BackendChoice, gpu: GpuStatus) -> Self {
+        let GpuStatus { state, info, reason } = gpu;
+        let (name, driver, device_type, features) = match info {
+            Some(info) => (Some(info.name), Some(info.driver), Some(info.device_type), info.features),
+            None => (None, None, None, Vec::new()),
+        };
+        Self {
+            default: word_for(default),
+            choices: words_of::<BackendChoice>(),
+            gpu: GpuDto { state: state.name(), name, driver, device_type, features, reason },
+        }
+    }
+}
+
+impl LoadDto {
+    fn new(jobs: JobLoad, meshes: StoreLoad) -> Self {
+        Self {
+            queued: jobs.queued,
+            running: jobs.running,
+            kept_results: jobs.kept,
+            kept_result_bytes: jobs.kept_bytes,
+            stored_meshes: meshes.count,
+            stored_mesh_bytes: meshes.bytes,
+        }
+    }
+}
+
+impl LimitsDto {
+    fn new(limits: &Limits, (mesh_bytes, mesh_count): (u64, usize)) -> Self {
+        Self {
+            body_bytes: limits.body_bytes,
+            memory_bytes: limits.memory_bytes,
+            triangles: limits.triangles,
+            nodes: limits.nodes,
+            json_depth: limits.json_depth,
+            image_px: limits.image_px,
+            texture_px: limits.texture_px,
+            texture_total_px: limits.texture_total_px,
+            bundle_bytes: limits.bundle_bytes,
+            bundle_entries: limits.bundle_entries,
+            job_ms: limits.job_ms,
+            queue_per_worker: limits.queue_per_worker,
+            mesh_bytes,
+            mesh_count,
         }
     }
 }

@@ -4,7 +4,7 @@
 mod capabilities;
 mod job;
 
-pub use capabilities::{BackendDto, CapabilitiesDto};
+pub use capabilities::CapabilitiesDto;
 pub use job::JobDto;
 
 use serde::Serialize;

@@ -7,7 +7,7 @@ use axum::extract::State;
 use axum::response::Response;
 
 use super::{responses, schema};
-use crate::service::http::dto::{BackendDto, CapabilitiesDto, StatusDto, VersionDto};
+use crate::service::http::dto::{CapabilitiesDto, StatusDto, VersionDto};
 use crate::service::http::error::ApiError;
 use crate::service::http::state::AppState;
 
@@ -31,8 +31,5 @@ pub async fn version() -> Response {
 
 /// Formats, styles, keys, limits and load, beside the given paths.
 pub fn capabilities(state: &AppState, paths: Vec<String>) -> Response {
-    let AppState { rules, workers, jobs, gpu, meshes, .. } = state;
-    let backend = BackendDto::new(rules.backend, gpu.status());
-    let limits = &rules.limits;
-    responses::uncached(CapabilitiesDto::new(limits, backend, *workers, jobs.load(), meshes, schema::PATH, paths))
+    responses::uncached(CapabilitiesDto::new(state, schema::PATH, paths))
 }
