@@ -1,8 +1,9 @@
 //! `ETag`, `If-None-Match` and `Cache-Control`.
 
-use axum::http::{HeaderMap, HeaderValue, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 
-/// Whether the client has the representation of this tag. Weak comparison, as RFC 9110 (13.1.2) wants it for `If-None-Match`.
+/// True if the client has the representation with this tag. The comparison is weak, as RFC 9110
+/// (13.1.2) demands for `If-None-Match`.
 pub fn is_known(headers: &HeaderMap, tag: &str) -> bool {
     let opaque = |tag: &str| tag.trim().trim_start_matches("W/").to_owned();
     let wanted = opaque(tag);
@@ -10,14 +11,21 @@ pub fn is_known(headers: &HeaderMap, tag: &str) -> bool {
     lines.flat_map(|line| line.split(',')).any(|given| given.trim() == "*" || opaque(given) == wanted)
 }
 
-/// A tag as a header.
-pub fn etag(tag: &str) -> (header::HeaderName, HeaderValue) {
+/// The `ETag` header with this tag.
+pub fn etag(tag: &str) -> (HeaderName, HeaderValue) {
     (header::ETAG, HeaderValue::from_str(tag).unwrap_or_else(|_| HeaderValue::from_static("\"\"")))
 }
 
-/// For what follows from a stored mesh, a query and this version of the program: good for a day, after which the tag tells
-/// whether a newer version sees it otherwise. Where keys are asked for, a shared cache must not give it away.
-pub fn day(has_keys: bool) -> (header::HeaderName, HeaderValue) {
+/// A strong tag made of 128 hash bits of the body. Different bodies share one only by chance.
+pub fn content_tag(body: &[u8]) -> String {
+    let half = |seed| rapidhash::v3::rapidhash_v3_seeded(body, &rapidhash::v3::RapidSecrets::seed(seed));
+    format!("\"{:032x}\"", u128::from(half(1)) << 64 | u128::from(half(2)))
+}
+
+/// `Cache-Control` for what follows from a stored mesh, a query and this version of the program.
+/// After a day, caches revalidate, because a newer version of the program may change the answer.
+/// Where API keys are configured, a shared cache must not keep it.
+pub fn cache_for_a_day(has_keys: bool) -> (HeaderName, HeaderValue) {
     let value = if has_keys { "private, max-age=86400, immutable" } else { "public, max-age=86400, immutable" };
     (header::CACHE_CONTROL, HeaderValue::from_static(value))
 }

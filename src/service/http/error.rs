@@ -1,7 +1,8 @@
-//! The only map from what went wrong to an HTTP status.
+//! The only map from errors to HTTP statuses.
 //!
-//! An [`ApiError`] becomes an answer in two steps: here its status and headers, in [`super::observe`] the body, because
-//! only there the request's id is known.
+//! Handlers name who is at fault ([`Fault`]), never a status. An [`ApiError`] becomes an answer in
+//! two steps: status and headers here, the body in [`super::middleware::observe`], because the
+//! request's id is only known there.
 
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -9,72 +10,158 @@ use axum::response::{IntoResponse, Response};
 use crate::backend::DrawError;
 use crate::import::{MeshError, MeshFault};
 use crate::limits::LimitExceeded;
-use crate::pipeline::PlanError;
-use crate::pipeline::RenderError;
+use crate::pipeline::{PlanError, RenderError};
 use crate::request::RequestError;
 use crate::service::jobs::{Failure, Refusal, UploadBudgetFull};
 use crate::service::store::StoreError;
 
-/// An answer that is not what the client wanted.
+/// Kinds of errors, by who is at fault. Each has one status.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The request is malformed: query, document, form or header.
+    BadRequest,
+    /// The request has no valid API key.
+    Unauthorized,
+    /// The path names nothing.
+    NotFound,
+    /// The path does not accept this method.
+    MethodNotAllowed,
+    /// The client accepts none of the available formats.
+    NotAcceptable,
+    /// The client sent its body too slowly.
+    TooSlow,
+    /// The resource is in a state that does not permit the request.
+    Conflict,
+    /// The body is too large.
+    TooLarge,
+    /// The body is not in a known format.
+    UnknownFormat,
+    /// The content is at fault: a broken mesh, a bad reference, or too much of something.
+    Content,
+    /// The server has no room now. The same request may succeed later.
+    Busy,
+    /// The server cannot serve this now: it shuts down, or lost its GPU.
+    Unavailable,
+    /// The job took longer than a job may take.
+    Deadline,
+    /// The server has a bug.
+    Internal,
+    /// The framework refused the request by itself, with this status.
+    Framework(StatusCode),
+}
+
+impl Fault {
+    /// The HTTP status.
+    pub fn status(self) -> StatusCode {
+        match self {
+            Self::BadRequest => StatusCode::BAD_REQUEST,
+            Self::Unauthorized => StatusCode::UNAUTHORIZED,
+            Self::NotFound => StatusCode::NOT_FOUND,
+            Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
+            Self::NotAcceptable => StatusCode::NOT_ACCEPTABLE,
+            Self::TooSlow => StatusCode::REQUEST_TIMEOUT,
+            Self::Conflict => StatusCode::CONFLICT,
+            Self::TooLarge => StatusCode::PAYLOAD_TOO_LARGE,
+            Self::UnknownFormat => StatusCode::UNSUPPORTED_MEDIA_TYPE,
+            Self::Content => StatusCode::UNPROCESSABLE_ENTITY,
+            Self::Busy => StatusCode::TOO_MANY_REQUESTS,
+            Self::Unavailable => StatusCode::SERVICE_UNAVAILABLE,
+            Self::Deadline => StatusCode::GATEWAY_TIMEOUT,
+            Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
+            Self::Framework(status) => status,
+        }
+    }
+}
+
+/// An error as a client sees it.
 #[derive(Clone, Debug)]
 pub struct ApiError {
-    /// The HTTP status.
-    pub status: StatusCode,
-    /// Stable, snake case.
+    /// Who is at fault, from which the status follows.
+    pub fault: Fault,
+    /// The error's stable name, in snake case.
     pub code: &'static str,
-    /// One sentence: what is wrong, where, what to do. Never says anything about our insides.
+    /// One sentence: what is wrong, where, what to do. It never tells the server's internals.
     pub detail: String,
-    /// The flag of `serve` that raises the limit, if one was hit.
+    /// The flag of `serve` that raises the limit, if a limit was hit.
     pub flag: Option<&'static str>,
     /// Headers of this answer beside the usual ones.
     pub headers: Vec<(HeaderName, HeaderValue)>,
 }
 
 impl ApiError {
-    /// An answer without extras.
-    pub fn new(status: StatusCode, code: &'static str, detail: impl Into<String>) -> Self {
-        Self { status, code, detail: detail.into(), flag: None, headers: Vec::new() }
+    /// An error without a flag and without headers of its own.
+    pub fn new(fault: Fault, code: &'static str, detail: impl Into<String>) -> Self {
+        Self { fault, code, detail: detail.into(), flag: None, headers: Vec::new() }
     }
 
-    /// The same with `Retry-After`.
+    /// Adds `Retry-After`.
     pub fn retry_after(mut self, seconds: u64) -> Self {
         self.headers.push((header::RETRY_AFTER, HeaderValue::from(seconds)));
         self
     }
 
-    /// The same with another header.
+    /// Adds a header.
     pub fn header(mut self, name: HeaderName, value: &'static str) -> Self {
         self.headers.push((name, HeaderValue::from_static(value)));
         self
     }
 
-    /// The same with the flag that raises a limit.
-    pub fn flag(mut self, flag: Option<&'static str>) -> Self {
-        self.flag = flag;
+    /// Sets the flag that raises the limit.
+    pub fn flag(mut self, flag: impl Into<Option<&'static str>>) -> Self {
+        self.flag = flag.into();
         self
     }
 
-    /// A bug of ours. What happened is in the log and not in the answer.
+    /// A bug of the server. The cause is in the log and not in the answer.
     pub fn internal() -> Self {
         let detail = "something failed here that was not the request's fault; the log has more under this request id";
-        Self::new(StatusCode::INTERNAL_SERVER_ERROR, "internal", detail)
+        Self::new(Fault::Internal, "internal", detail)
     }
 
     /// The body is larger than is accepted.
     pub fn body_too_large(limit: u64) -> Self {
         let detail = format!("the request body is larger than {limit} bytes (raise the limit with --limit-body-bytes)");
-        Self::new(StatusCode::PAYLOAD_TOO_LARGE, "body_too_large", detail).flag(Some("--limit-body-bytes"))
+        Self::new(Fault::TooLarge, "body_too_large", detail).flag("--limit-body-bytes")
     }
 
-    /// No such path.
+    /// The server shuts down and takes no new work.
+    pub fn draining(detail: impl Into<String>) -> Self {
+        Self::new(Fault::Unavailable, "draining", detail).retry_after(5)
+    }
+
+    /// The path names nothing.
     pub fn not_found(detail: impl Into<String>) -> Self {
-        Self::new(StatusCode::NOT_FOUND, "not_found", detail)
+        Self::new(Fault::NotFound, "not_found", detail)
+    }
+
+    /// An error that the framework answered by itself.
+    pub fn of_framework(status: StatusCode) -> Self {
+        match status {
+            StatusCode::METHOD_NOT_ALLOWED => {
+                let detail = "this path does not answer to this method; the Allow header says to which it does";
+                Self::new(Fault::MethodNotAllowed, "method_not_allowed", detail)
+            }
+            StatusCode::INTERNAL_SERVER_ERROR => Self::internal(),
+            _ => {
+                let detail = status.canonical_reason().unwrap_or("the request failed");
+                Self::new(Fault::Framework(status), "bad_request", detail)
+            }
+        }
+    }
+
+    /// The HTTP status.
+    pub fn status(&self) -> StatusCode {
+        self.fault.status()
+    }
+
+    fn deadline(detail: String) -> Self {
+        Self::new(Fault::Deadline, "deadline", detail).flag("--limit-job-ms")
     }
 }
 
 impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
-        let mut response = self.status.into_response();
+        let mut response = self.status().into_response();
         response.headers_mut().extend(self.headers.iter().cloned());
         response.extensions_mut().insert(self);
         response
@@ -83,7 +170,7 @@ impl IntoResponse for ApiError {
 
 impl From<RequestError> for ApiError {
     fn from(error: RequestError) -> Self {
-        Self::new(StatusCode::BAD_REQUEST, error.fault.code(), error.to_string()).flag(error.flag)
+        Self::new(Fault::BadRequest, error.fault.code(), error.to_string()).flag(error.flag)
     }
 }
 
@@ -92,18 +179,18 @@ impl From<Refusal> for ApiError {
         let detail = refusal.to_string();
         match refusal {
             Refusal::QueueFull { retry_after_s, .. } => {
-                let error = Self::new(StatusCode::TOO_MANY_REQUESTS, "queue_full", detail);
-                error.flag(Some("--queue")).retry_after(retry_after_s)
+                let error = Self::new(Fault::Busy, "queue_full", detail);
+                error.flag("--queue").retry_after(retry_after_s)
             }
-            Refusal::Draining => Self::new(StatusCode::SERVICE_UNAVAILABLE, "draining", detail).retry_after(5),
+            Refusal::Draining => Self::draining(detail),
         }
     }
 }
 
 impl From<UploadBudgetFull> for ApiError {
     fn from(full: UploadBudgetFull) -> Self {
-        let error = Self::new(StatusCode::TOO_MANY_REQUESTS, "uploads_full", full.to_string());
-        error.flag(Some("--uploads-bytes")).retry_after(1)
+        let error = Self::new(Fault::Busy, "uploads_full", full.to_string());
+        error.flag("--uploads-bytes").retry_after(1)
     }
 }
 
@@ -111,12 +198,8 @@ impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
         let detail = error.to_string();
         match error {
-            StoreError::TooLarge { .. } => {
-                Self::new(StatusCode::PAYLOAD_TOO_LARGE, "mesh_too_large", detail).flag(Some("--mesh-bytes"))
-            }
-            StoreError::Busy { flag } => {
-                Self::new(StatusCode::TOO_MANY_REQUESTS, "meshes_full", detail).flag(Some(flag)).retry_after(1)
-            }
+            StoreError::TooLarge { .. } => Self::new(Fault::TooLarge, "mesh_too_large", detail).flag("--mesh-bytes"),
+            StoreError::Busy { flag } => Self::new(Fault::Busy, "meshes_full", detail).flag(flag).retry_after(1),
         }
     }
 }
@@ -125,7 +208,7 @@ impl From<&Failure> for ApiError {
     fn from(failure: &Failure) -> Self {
         match failure {
             Failure::Render(error) => error.into(),
-            Failure::TimeUp { .. } => deadline(failure.to_string()),
+            Failure::TimeUp { .. } => Self::deadline(failure.to_string()),
             Failure::Panicked => Self::internal(),
         }
     }
@@ -136,21 +219,21 @@ impl From<&RenderError> for ApiError {
         match error {
             RenderError::Mesh(error) => error.into(),
             RenderError::Plan(error) => error.into(),
-            RenderError::Stopped(stopped) => deadline(stopped.to_string()),
-            RenderError::Draw(DrawError::Stopped(stopped)) => deadline(stopped.to_string()),
+            RenderError::Stopped(stopped) => Self::deadline(stopped.to_string()),
+            RenderError::Draw(DrawError::Stopped(stopped)) => Self::deadline(stopped.to_string()),
             RenderError::Draw(DrawError::DeviceLost(_)) => {
                 let detail = "the GPU of this server was lost while drawing; try again, or ask for backend=cpu";
-                Self::new(StatusCode::SERVICE_UNAVAILABLE, "device_lost", detail).retry_after(1)
+                Self::new(Fault::Unavailable, "device_lost", detail).retry_after(1)
             }
-            // Only reachable by asking for the GPU by name: `auto` goes on with the CPU.
+            // Only with `backend=gpu`: `auto` goes on with the CPU.
             RenderError::Draw(DrawError::NoGpu(_)) => {
                 let detail = "this server has no GPU that can be used; ask for backend=auto or backend=cpu \
                               (backend.gpu at /v1/capabilities says why)";
-                Self::new(StatusCode::UNPROCESSABLE_ENTITY, "backend_unavailable", detail)
+                Self::new(Fault::Content, "backend_unavailable", detail)
             }
             RenderError::Draw(_) => {
                 let detail = "the GPU of this server cannot draw this; ask for backend=auto or backend=cpu";
-                Self::new(StatusCode::UNPROCESSABLE_ENTITY, "backend_unavailable", detail)
+                Self::new(Fault::Content, "backend_unavailable", detail)
             }
             RenderError::Encode(_) | RenderError::Report(_) => Self::internal(),
         }
@@ -161,37 +244,33 @@ impl From<&PlanError> for ApiError {
     fn from(error: &PlanError) -> Self {
         let code = match error {
             PlanError::Limit(limit) => return limit.into(),
-            PlanError::Stopped(stopped) => return deadline(stopped.to_string()),
+            PlanError::Stopped(stopped) => return Self::deadline(stopped.to_string()),
             PlanError::Texture(_) => "texture_broken",
             PlanError::NoCamera => "no_camera",
         };
-        Self::new(StatusCode::UNPROCESSABLE_ENTITY, code, error.to_string())
+        Self::new(Fault::Content, code, error.to_string())
     }
 }
 
 impl From<&MeshError> for ApiError {
     fn from(error: &MeshError) -> Self {
-        let (status, code) = match &error.fault {
-            MeshFault::Unrecognised => (StatusCode::UNSUPPORTED_MEDIA_TYPE, "mesh_unrecognised"),
-            MeshFault::Broken => (StatusCode::UNPROCESSABLE_ENTITY, "mesh_broken"),
-            MeshFault::Empty => (StatusCode::UNPROCESSABLE_ENTITY, "mesh_empty"),
-            MeshFault::OutsideBundle => (StatusCode::UNPROCESSABLE_ENTITY, "mesh_outside_bundle"),
-            MeshFault::BundleBroken => (StatusCode::UNPROCESSABLE_ENTITY, "bundle_broken"),
-            MeshFault::EntryUnclear => (StatusCode::UNPROCESSABLE_ENTITY, "entry_unclear"),
-            MeshFault::Unsupported => (StatusCode::UNPROCESSABLE_ENTITY, "mesh_unsupported"),
+        let (fault, code) = match &error.fault {
+            MeshFault::Unrecognised => (Fault::UnknownFormat, "mesh_unrecognised"),
+            MeshFault::Broken => (Fault::Content, "mesh_broken"),
+            MeshFault::Empty => (Fault::Content, "mesh_empty"),
+            MeshFault::OutsideBundle => (Fault::Content, "mesh_outside_bundle"),
+            MeshFault::BundleBroken => (Fault::Content, "bundle_broken"),
+            MeshFault::EntryUnclear => (Fault::Content, "entry_unclear"),
+            MeshFault::Unsupported => (Fault::Content, "mesh_unsupported"),
             MeshFault::Limit(limit) => return limit.into(),
-            MeshFault::Stopped => return deadline(error.detail.clone()),
+            MeshFault::Stopped => return Self::deadline(error.detail.clone()),
         };
-        Self::new(status, code, error.detail.clone())
+        Self::new(fault, code, error.detail.clone())
     }
 }
 
 impl From<&LimitExceeded> for ApiError {
     fn from(limit: &LimitExceeded) -> Self {
-        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "limit_exceeded", limit.to_string()).flag(Some(limit.flag))
+        Self::new(Fault::Content, "limit_exceeded", limit.to_string()).flag(limit.flag)
     }
-}
-
-fn deadline(detail: String) -> ApiError {
-    ApiError::new(StatusCode::GATEWAY_TIMEOUT, "deadline", detail).flag(Some("--limit-job-ms"))
 }

@@ -1,22 +1,31 @@
-//! The daemon: HTTP in front of [`crate::service::jobs`].
+//! The daemon: HTTP in front of [`crate::service::jobs`] and [`crate::service::store`].
 //!
-//! Reading order: [`app`] (what handlers share, and every path), [`render`], [`meshes`], [`pictures`], [`jobs`] and [`schema`] (the
-//! resources), [`receive`] (a request to work, in the order of refusals), [`query`], [`body`], [`upload`] (a body to what is
-//! stored), [`negotiate`], [`conditional`], [`error`] (the only status map), [`observe`] and
-//! [`lent`] (around every request), [`accept`] and [`io`] (connections).
+//! A request passes these modules in this order:
+//!
+//! 1. [`connection`] accepts the socket and limits how long a client may be silent.
+//! 2. [`router`] finds the handler of a path. [`middleware`] wraps it: request id, log, API key.
+//! 3. [`resources`] holds the handlers, one file per resource. They share [`state`].
+//! 4. [`receive`] reads the query and the body within their limits.
+//! 5. [`dto`] defines the JSON of answers, and [`error`] maps errors to statuses.
+//!
+//! [`negotiate`] and [`conditional`] read and write single headers. [`stored_mesh`] and [`address`]
+//! serve the resources of stored meshes. [`static_document`] answers with a constant document.
 //!
 //! Architecture invariant: axum and hyper are used nowhere else.
 
-mod app;
-mod auth;
+mod address;
 mod conditional;
-pub(crate) mod connection;
+mod connection;
 mod dto;
 mod error;
+mod middleware;
 mod negotiate;
-mod observe;
 mod receive;
-pub(crate) mod resources;
+mod resources;
+mod router;
+mod state;
+mod static_document;
+mod stored_mesh;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -26,39 +35,40 @@ use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 
 use crate::config::{Config, cores};
-use app::App;
+use state::AppState;
 
-/// What jobs may take beyond their deadline before the process ends without them.
+/// Time beyond a job's deadline after which the process ends without the jobs that still run.
 const DRAIN_GRACE: Duration = Duration::from_secs(5);
 
-/// How long workers without work may take to put their renderers down.
+/// Time that idle workers have to drop their renderers.
 const WORKERS_GRACE: Duration = Duration::from_secs(2);
 
-/// Why the daemon did not start.
+/// Reasons why the daemon did not start.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// Everybody could use it, and nobody said that they may.
+    /// The address is open to other machines, and neither API keys nor `--no-auth` are given.
     #[error(
         "{0} can be reached from other machines, and no API keys are configured: set MESHSNAP_API_KEYS, or say --no-auth"
     )]
     Unprotected(SocketAddr),
-    /// The address is no address.
+    /// The address cannot be resolved or bound.
     #[error("cannot listen on `{listen}`: {error}")]
     Listen {
-        /// As configured.
+        /// The address as configured.
         listen: String,
-        /// Why.
+        /// The cause.
         error: std::io::Error,
     },
-    /// Threads or signals.
+    /// Threads or signal handlers could not be set up.
     #[error("the server could not start: {0}")]
     Start(#[from] std::io::Error),
 }
 
-/// Serves until SIGTERM or SIGINT, then finishes what was accepted. `ready` hears the address once clients can connect.
+/// Serves until SIGTERM or SIGINT, then finishes the accepted jobs. `ready` is called with the
+/// address once clients can connect.
 pub fn serve(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), ServeError> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
-        // Handlers only pass bytes on; what computes is the workers.
+        // Handlers only pass bytes on: a few threads are enough, and the workers need the cores.
         .worker_threads(cores().clamp(1, 4) as usize)
         .thread_name("http")
         .enable_all()
@@ -79,8 +89,8 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     let address = listener.local_addr()?;
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
 
-    let app = App::start(config)?;
-    let router = app::router(&app);
+    let state = AppState::start(config)?;
+    let router = router::router(&state);
     tracing::info!(%address, workers = config.workers, "ready");
     ready(address);
 
@@ -90,24 +100,25 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
             _ = interrupt.recv() => {}
         }
         tokio::select! {
-            () = drain(&app, Duration::from_millis(config.limits.job_ms) + DRAIN_GRACE) => {}
+            () = drain(&state, Duration::from_millis(config.limits.job_ms) + DRAIN_GRACE) => {}
             _ = terminate.recv() => tracing::warn!("told twice to end: jobs are abandoned"),
             _ = interrupt.recv() => tracing::warn!("told twice to end: jobs are abandoned"),
         }
     };
     let header_timeout = Duration::from_millis(config.header_timeout_ms);
     connection::accept::run(listener, router, config.connections as usize, header_timeout, stop).await;
-    app.jobs.join(WORKERS_GRACE);
+    state.jobs.join(WORKERS_GRACE);
     tracing::info!("ended");
     Ok(())
 }
 
-/// While this runs, clients can still connect: to hear 503, to see how their jobs are, to fetch results.
-async fn drain(app: &Arc<App>, patience: Duration) {
-    let load = app.jobs.load();
+/// Refuses new work and waits until the accepted jobs have ended, no longer than `time_max`.
+/// Meanwhile clients can still connect, to read job states and fetch results.
+async fn drain(state: &Arc<AppState>, time_max: Duration) {
+    let load = state.jobs.load();
     tracing::info!(queued = load.queued, running = load.running, "draining");
-    app.drain();
-    if tokio::time::timeout(patience, app.jobs.idle()).await.is_err() {
+    state.drain();
+    if tokio::time::timeout(time_max, state.jobs.idle()).await.is_err() {
         tracing::error!("some jobs did not end in time");
     }
 }

@@ -1,22 +1,22 @@
-//! What a client would like: `Accept` and `Prefer`.
+//! The preferences of a client: `Accept` and `Prefer`.
 
 use std::time::Duration;
 
 use axum::http::{HeaderMap, header};
 
 use super::dto::media_type;
-use super::error::ApiError;
+use super::error::{ApiError, Fault};
 use crate::image::ImageFormat;
 
-/// In order of our own preference.
+/// The formats, best first: of those that a client accepts equally, the first is taken.
 const FORMATS: [ImageFormat; 3] = [ImageFormat::Png, ImageFormat::Webp, ImageFormat::Jpeg];
 
-/// Longest wait that a client can ask for: proxies give up after a minute or so.
+/// Longest wait that a client can set: proxies often end a request after a minute.
 const WAIT_S_MAX: u64 = 60;
 
-/// The picture's format: the document's, else the best acceptable one, else PNG.
-pub fn image_format(asked: Option<ImageFormat>, headers: &HeaderMap) -> Result<ImageFormat, ApiError> {
-    if let Some(format) = asked {
+/// The picture's format: the one in the document, else the best acceptable one, else PNG.
+pub fn image_format(requested: Option<ImageFormat>, headers: &HeaderMap) -> Result<ImageFormat, ApiError> {
+    if let Some(format) = requested {
         return Ok(format);
     }
     let accept: Vec<&str> = headers.get_all(header::ACCEPT).iter().filter_map(|v| v.to_str().ok()).collect();
@@ -33,11 +33,11 @@ pub fn image_format(asked: Option<ImageFormat>, headers: &HeaderMap) -> Result<I
     }
     best.map(|(format, _)| format).ok_or_else(|| {
         let detail = "the Accept header allows none of image/png, image/webp and image/jpeg";
-        ApiError::new(axum::http::StatusCode::NOT_ACCEPTABLE, "not_acceptable", detail)
+        ApiError::new(Fault::NotAcceptable, "not_acceptable", detail)
     })
 }
 
-/// A media range and its quality; None where it is nonsense.
+/// A media range and its quality. None if it is malformed.
 fn range(text: &str) -> Option<(&str, f32)> {
     let mut parts = text.split(';').map(str::trim);
     let name = parts.next().filter(|name| name.contains('/'))?;
@@ -46,7 +46,7 @@ fn range(text: &str) -> Option<(&str, f32)> {
     (0.0..=1.0).contains(&q).then_some((name, q))
 }
 
-/// The quality that the most specific matching range gives.
+/// The quality of a media type: that of the most specific range that matches it.
 fn quality(media_type: &str, ranges: &[(&str, f32)]) -> f32 {
     let specificity = |name: &str| match name {
         _ if name.eq_ignore_ascii_case(media_type) => Some(2),
@@ -58,16 +58,16 @@ fn quality(media_type: &str, ranges: &[(&str, f32)]) -> f32 {
     matching.max_by_key(|&(s, _)| s).map_or(0.0, |(_, q)| q)
 }
 
-/// What `Prefer` asks for.
+/// The preferences in `Prefer`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Prefer {
-    /// 202 at once instead of waiting for the picture.
+    /// An answer of 202 at once, instead of the picture later.
     pub respond_async: bool,
-    /// How long to wait for a change.
+    /// Longest time to wait for the end of a job.
     pub wait: Option<Duration>,
 }
 
-/// Reads every `Prefer` header; what is not understood is ignored, as RFC 7240 wants.
+/// Reads every `Prefer` header. Unknown preferences are ignored, as RFC 7240 demands.
 pub fn prefer(headers: &HeaderMap) -> Prefer {
     let mut prefer = Prefer::default();
     let lines = headers.get_all("prefer").iter().filter_map(|v| v.to_str().ok());

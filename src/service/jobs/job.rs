@@ -1,4 +1,4 @@
-//! One job: what is to be done, and how far it is.
+//! One job: its work, its state and its result.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,7 +8,7 @@ use bytes::Bytes;
 use tokio::sync::watch;
 use uuid::Uuid;
 
-use super::Reservation;
+use super::upload_budget::Reservation;
 use crate::backend::BackendKind;
 use crate::image::ImageFormat;
 use crate::import::{Bundle, Format};
@@ -17,7 +17,7 @@ use crate::pipeline::{Output, QualitySelection, RenderError, Stage};
 use crate::spec::Spec;
 use crate::warning::Warning;
 
-/// Names a job; ids made later sort later.
+/// The name of a job. Later ids sort after earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct JobId(Uuid);
 
@@ -26,7 +26,7 @@ impl JobId {
         Self(Uuid::now_v7())
     }
 
-    /// From its usual text; None for anything else.
+    /// Reads the usual text of a UUID. None for anything else.
     pub fn parse(text: &str) -> Option<Self> {
         Uuid::try_parse(text).ok().map(Self)
     }
@@ -38,106 +38,106 @@ impl fmt::Display for JobId {
     }
 }
 
-/// What is to be done.
+/// The work of one job.
 #[derive(Debug)]
 pub struct Work {
-    /// The mesh and what came along with it.
+    /// The mesh and the files beside it.
     pub bundle: Bundle,
-    /// Overrides sniffing.
+    /// The mesh's format. None: found from the bytes.
     pub format_in: Option<Format>,
-    /// What to do with it.
+    /// The task on the mesh.
     pub task: Task,
-    /// The memory that `bundle` was granted. Shared where others hold the same bytes.
+    /// The memory of `bundle`, shared with all other holders of the same bytes.
     pub memory: Arc<Reservation>,
 }
 
-/// What is wanted of a mesh.
+/// Tasks on a mesh.
 #[derive(Clone, Debug)]
 pub enum Task {
-    /// A picture.
+    /// Draw a picture.
     Draw(Box<Spec>),
-    /// A report on what is in it.
+    /// Write a report on its content.
     Inspect {
-        /// As [`Spec::time_s`].
+        /// The time within its animation, as in [`Spec::time_s`].
         time_s: Option<f64>,
     },
 }
 
-/// What a worker made.
+/// The outcome of a task.
 #[derive(Debug)]
 pub enum Product {
-    /// For [`Task::Draw`].
+    /// The outcome of [`Task::Draw`].
     Picture(Output),
-    /// For [`Task::Inspect`]: JSON.
+    /// The outcome of [`Task::Inspect`], as JSON.
     Report(String),
 }
 
-/// How far a job is. All but the first two are final.
+/// The states of a job. All but the first two are final.
 #[derive(Clone, Debug)]
-pub enum State {
-    /// Waits for a worker.
+pub enum JobState {
+    /// The job waits for a worker.
     Queued,
-    /// A worker is at it.
+    /// A worker does it.
     Running,
-    /// There is a picture.
+    /// It ended with a picture.
     Done(Arc<Finished>),
-    /// There is a report: JSON; clones share it.
+    /// It ended with a report, as JSON. Clones share the bytes.
     Inspected(Bytes),
-    /// There is none, and never will be.
+    /// It ended with an error.
     Failed(Arc<Failure>),
-    /// Whoever asked no longer wants it.
+    /// The client cancelled it, or hung up.
     Cancelled,
 }
 
-/// A picture and what is known about it.
+/// A picture and the metadata of its making.
 #[derive(Debug)]
 pub struct Finished {
-    /// The encoded picture; clones share it.
+    /// The encoded picture. Clones share the bytes.
     pub picture: Bytes,
-    /// Its format.
+    /// The picture's format.
     pub format: ImageFormat,
-    /// Who drew it.
+    /// The back-end that drew it.
     pub backend: BackendKind,
-    /// What the importer noticed.
+    /// Faults of the file in spite of which it was drawn.
     pub warnings: Vec<Warning>,
-    /// What was chosen for a request that asks for an error or a time.
+    /// The techniques chosen for a request with a quality target.
     pub selection: Option<QualitySelection>,
-    /// How long each part took.
+    /// The duration of each stage.
     pub timings: Timings,
 }
 
 impl Finished {
-    /// From what the pipeline gave.
+    /// Takes over the pipeline's output.
     pub fn new(output: Output, timings: Timings) -> Self {
         let Output { bytes, format, backend, warnings, selection, .. } = output;
         Self { picture: bytes.into(), format, backend, warnings, selection, timings }
     }
 }
 
-/// Why a job has no picture.
+/// Reasons why a job failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
-    /// The pipeline says why.
+    /// The pipeline failed.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// It took too long, waiting included.
+    /// The job took too long, waiting included.
     #[error("the job did not finish within {limit_ms} ms of being accepted")]
     TimeUp {
-        /// How long it could have taken.
+        /// The longest time allowed.
         limit_ms: u64,
     },
-    /// A bug of ours.
+    /// The renderer has a bug.
     #[error("the renderer failed unexpectedly")]
     Panicked,
 }
 
-impl State {
-    /// Whether nothing will change any more.
+impl JobState {
+    /// True if the state will not change any more.
     pub fn is_final(&self) -> bool {
         !matches!(self, Self::Queued | Self::Running)
     }
 
-    /// `queued`, `running`, `done`, `failed` or `cancelled`.
+    /// The state's name: `queued`, `running`, `done`, `failed` or `cancelled`.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Queued => "queued",
@@ -149,7 +149,7 @@ impl State {
     }
 }
 
-/// How long each part of a job took.
+/// The durations of a job's stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timings {
     /// Waiting for a worker.
@@ -165,8 +165,8 @@ pub struct Timings {
 }
 
 impl Timings {
-    /// Notes what a stage took.
-    pub fn note(&mut self, stage: Stage, took: Duration) {
+    /// Records the duration of a stage.
+    pub fn record(&mut self, stage: Stage, took: Duration) {
         *match stage {
             Stage::Parse => &mut self.parse,
             Stage::Plan => &mut self.plan,
@@ -175,7 +175,7 @@ impl Timings {
         } = took;
     }
 
-    /// Name and duration of every part, in order.
+    /// Name and duration of every stage, in order.
     pub fn parts(&self) -> [(&'static str, Duration); 5] {
         [
             ("queue", self.queue),
@@ -190,53 +190,53 @@ impl Timings {
 /// A job that was accepted.
 #[derive(Debug)]
 pub struct Job {
-    /// Its name.
+    /// The job's name.
     pub id: JobId,
-    /// Whether it can be found by its id.
-    pub keep: bool,
-    /// When it was accepted.
+    /// The job can be found by its id, also after its end.
+    pub is_kept: bool,
+    /// Time of acceptance.
     pub accepted: Instant,
-    /// The same for people, milliseconds since 1970.
+    /// Time of acceptance in milliseconds since 1970, for clients.
     pub accepted_unix_ms: u64,
-    /// Order of acceptance.
-    pub(crate) serial: u64,
-    pub(crate) deadline: Deadline,
-    pub(crate) state: watch::Sender<State>,
+    /// Number in the order of acceptance.
+    pub(super) serial: u64,
+    pub(super) deadline: Deadline,
+    pub(super) state: watch::Sender<JobState>,
     work: Mutex<Option<Work>>,
 }
 
 impl Job {
-    pub(crate) fn new(work: Work, keep: bool, serial: u64) -> Self {
+    pub(super) fn new(work: Work, is_kept: bool, serial: u64) -> Self {
         let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Self {
             id: JobId::new(),
-            keep,
+            is_kept,
             accepted: Instant::now(),
             accepted_unix_ms: u64::try_from(since_1970.as_millis()).unwrap_or(u64::MAX),
             serial,
             deadline: Deadline::default(),
-            state: watch::Sender::new(State::Queued),
+            state: watch::Sender::new(JobState::Queued),
             work: Mutex::new(Some(work)),
         }
     }
 
-    /// How far it is.
-    pub fn state(&self) -> State {
+    /// The state at this moment.
+    pub fn state(&self) -> JobState {
         self.state.borrow().clone()
     }
 
-    /// Waits for its end.
-    pub async fn ended(&self) -> State {
+    /// Waits for the job's end.
+    pub async fn ended(&self) -> JobState {
         let mut states = self.state.subscribe();
-        match states.wait_for(State::is_final).await {
+        match states.wait_for(JobState::is_final).await {
             Ok(state) => state.clone(),
-            // The sender is ours, so this cannot happen; saying what is known is better than a panic.
+            // Unreachable, because this job owns the sender. A stale state is better than a panic.
             Err(_) => self.state(),
         }
     }
 
-    /// The work, once; its memory is the taker's.
-    pub(crate) fn take_work(&self) -> Option<Work> {
+    /// Takes the work out of the job. None if it was taken before.
+    pub(super) fn take_work(&self) -> Option<Work> {
         self.work.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }

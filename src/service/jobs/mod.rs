@@ -1,144 +1,148 @@
-//! Rendering, and the inspection of what is to be stored, as jobs: a bounded queue, worker threads that each own their renderers, and what became of every job.
+//! Jobs: a bounded queue, worker threads that each own a renderer, and the results. A job draws a
+//! picture, or writes the report on a mesh that is to be stored.
 //!
-//! Architecture invariants: a full queue is a typed refusal at once, never a wait. A job that was accepted is never
-//! dropped before it ended. A panic costs its job alone. Nothing here knows HTTP.
+//! Architecture invariants: a full queue refuses at once and never waits. An accepted job is never
+//! dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
 //!
-//! Reading order: [`job`] (one job and its states), [`board`] (all of them, behind one lock), [`worker`], [`clock`]
-//! (raises deadlines), [`bodies`] (bytes of waiting uploads).
+//! Reading order: [`job`] (one job and its states), [`registry`] (all jobs, behind one lock),
+//! [`worker`] (does the jobs), [`clock`] (ends overdue jobs), [`upload_budget`] (memory of
+//! uploads).
 
 mod clock;
 mod job;
-pub(crate) mod registry;
+mod registry;
 #[cfg(test)]
 mod tests;
-pub(crate) mod upload_budget;
+mod upload_budget;
 mod worker;
 
-pub use job::{Failure, Finished, Job, JobId, Product, State, Task, Timings, Work};
+pub use job::{Failure, Finished, Job, JobId, JobState, Product, Task, Timings, Work};
 pub use upload_budget::{Reservation, UploadBudget, UploadBudgetFull};
-pub use worker::{Engine, Renderer, pipeline_engine};
+pub use worker::{Renderer, RendererFactory, pipeline_renderers};
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use registry::Registry;
+use registry::JobRegistry;
 
-/// How many, how long, how much.
+/// The limits of the job service.
 #[derive(Clone, Debug)]
-pub struct Settings {
-    /// Worker threads.
+pub struct JobSettings {
+    /// Number of worker threads.
     pub workers: usize,
-    /// Jobs that may wait, in all.
+    /// Most jobs that wait, over all workers.
     pub queue: usize,
-    /// From acceptance to the encoded picture.
+    /// Longest time from acceptance to the encoded picture.
     pub job_time: Duration,
-    /// How long the result of a kept job can be fetched.
+    /// Time for which the result of a kept job can be fetched.
     pub result_ttl: Duration,
-    /// Encoded bytes of kept results; the oldest go first.
+    /// Most encoded bytes of kept results. The oldest are dropped first.
     pub result_bytes: u64,
-    /// Kept results; the oldest go first.
+    /// Most kept results. The oldest are dropped first.
     pub result_count: usize,
 }
 
-/// Why a job was not accepted.
+/// Reasons why a job was not accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
-    /// As many jobs wait as may wait.
+    /// The queue is full.
     #[error("the queue is full ({queue} waiting); try again in {retry_after_s} s")]
     QueueFull {
-        /// How many may wait.
+        /// Most jobs that wait.
         queue: usize,
-        /// When a place should be free.
+        /// Seconds until a place should be free.
         retry_after_s: u64,
     },
-    /// The process is about to end.
+    /// The process shuts down.
     #[error("the server is shutting down and takes no new work")]
     Draining,
 }
 
-/// What the queue looks like at this moment.
+/// The load at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Load {
-    /// Jobs that wait.
+pub struct JobLoad {
+    /// Number of jobs that wait.
     pub queued: usize,
-    /// Jobs that workers are busy with.
+    /// Number of busy workers.
     pub running: usize,
-    /// Finished jobs whose results can be fetched.
+    /// Number of ended jobs that can be found by their ids.
     pub kept: usize,
-    /// Encoded bytes of those.
+    /// Encoded bytes of their results.
     pub kept_bytes: u64,
 }
 
-/// The job service. Clones are handles to the same one; its threads end after [`Jobs::drain`].
+/// A handle to the job service. Clones share the service. Its threads end after [`Jobs::drain`].
 #[derive(Clone)]
 pub struct Jobs {
-    board: Arc<Registry>,
+    registry: Arc<JobRegistry>,
     workers: Arc<Mutex<Vec<JoinHandle<()>>>>,
 }
 
 impl Jobs {
     /// Starts the workers and the clock.
-    pub fn start(settings: Settings, engine: Engine) -> std::io::Result<Self> {
+    pub fn start(settings: JobSettings, renderers: RendererFactory) -> std::io::Result<Self> {
         let workers = settings.workers.max(1);
-        let board = Arc::new(Registry::new(settings));
+        let registry = Arc::new(JobRegistry::new(settings));
         let mut threads = Vec::new();
         for index in 0..workers {
-            let (board, engine) = (board.clone(), engine.clone());
+            let (registry, renderers) = (registry.clone(), renderers.clone());
             let name = format!("render-{index}");
-            threads.push(std::thread::Builder::new().name(name).spawn(move || worker::run(&board, &engine))?);
+            threads.push(std::thread::Builder::new().name(name).spawn(move || worker::run(&registry, &renderers))?);
         }
-        let ticking = board.clone();
-        std::thread::Builder::new().name("job-clock".into()).spawn(move || clock::run(&ticking))?;
-        Ok(Self { board, workers: Arc::new(Mutex::new(threads)) })
+        let clocked = registry.clone();
+        std::thread::Builder::new().name("job-clock".into()).spawn(move || clock::run(&clocked))?;
+        Ok(Self { registry, workers: Arc::new(Mutex::new(threads)) })
     }
 
-    /// Queues work. A kept job can be found again by its id until its result expires; another lives as long as its handle.
-    pub fn submit(&self, work: Work, keep: bool) -> Result<Arc<Job>, Refusal> {
-        self.board.submit(work, keep)
+    /// Queues work. A kept job can be found by its id until its result expires. Any other job lives
+    /// as long as its handle.
+    pub fn submit(&self, work: Work, is_kept: bool) -> Result<Arc<Job>, Refusal> {
+        self.registry.submit(work, is_kept)
     }
 
-    /// Whether a job would be accepted now, so that a refusal can come before an upload.
+    /// Checks that a job would be accepted now, so that a refusal can come before an upload.
     pub fn would_accept(&self) -> Result<(), Refusal> {
-        self.board.would_accept()
+        self.registry.would_accept()
     }
 
     /// A kept job.
     pub fn find(&self, id: JobId) -> Option<Arc<Job>> {
-        self.board.find(id)
+        self.registry.find(id)
     }
 
-    /// Stops a job that has not ended; one that has stays as it is.
+    /// Cancels a job. One that has ended stays as it is.
     pub fn cancel(&self, job: &Job) {
-        self.board.end(job, State::Cancelled);
+        self.registry.end(job, JobState::Cancelled);
     }
 
-    /// What the queue looks like.
-    pub fn load(&self) -> Load {
-        self.board.load()
+    /// The load at this moment.
+    pub fn load(&self) -> JobLoad {
+        self.registry.load()
     }
 
-    /// Takes no more work.
+    /// Refuses new work from now on. Accepted jobs go on.
     pub fn drain(&self) {
-        self.board.drain();
+        self.registry.drain();
     }
 
-    /// Returns once nothing waits and no worker is busy.
+    /// Waits until no job waits and no worker is busy.
     pub async fn idle(&self) {
-        let mut outstanding = self.board.outstanding();
-        // The sender lives in the board, so waiting cannot fail while self is there.
+        let mut outstanding = self.registry.outstanding();
+        // This cannot fail: `self` keeps the registry alive, which owns the sender.
         let _ = outstanding.wait_for(|&count| count == 0).await;
     }
 
-    /// Waits, after [`Jobs::drain`], until the workers have ended and dropped their renderers; no longer than `patience`,
-    /// since a worker may be stuck. A GPU driver that is unloaded under a thread that still owns its device crashes.
-    pub fn join(&self, patience: Duration) {
-        let until = Instant::now() + patience;
+    /// Waits, after [`Jobs::drain`], until the workers have dropped their renderers. A GPU driver
+    /// that is unloaded while a thread still owns a device crashes. A worker may be stuck, so the
+    /// wait is no longer than `time_max`.
+    pub fn join(&self, time_max: Duration) {
+        let until = Instant::now() + time_max;
         let mut workers = self.workers.lock().unwrap_or_else(PoisonError::into_inner);
         while workers.iter().any(|worker| !worker.is_finished()) && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(2));
         }
-        // Finished or not, there is nothing more to do about them: the process is about to end.
+        // Threads that still run are detached, because the process is about to end.
         workers.clear();
     }
 }

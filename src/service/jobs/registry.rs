@@ -1,8 +1,10 @@
-//! Every job there is, behind one lock: who waits, who runs, whose result can still be fetched.
+//! The registry of all jobs: waiting, running, and ended with a result that can be fetched.
 //!
-//! One lock, because the transitions must agree (a job that is cancelled while a worker reaches for it), and because it
-//! is held for microseconds beside renders of milliseconds. The queue is our own and not a channel's, because a job that
-//! is cancelled or out of time has to leave it at once and free its place and its memory.
+//! One lock guards them all, because a job may be cancelled at the moment in which a worker takes
+//! it. The lock is held for microseconds, and a render takes milliseconds.
+//!
+//! The queue is not a channel, because a cancelled or overdue job must leave it at once and free
+//! its place and its memory.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -10,58 +12,70 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use super::job::{Job, JobId, State, Work};
-use super::{Load, Refusal, Settings};
+use super::job::{Job, JobId, JobState, Work};
+use super::{JobLoad, JobSettings, Refusal};
 
-/// The jobs and what their threads wait for.
-pub struct Registry {
-    pub(crate) settings: Settings,
+/// All jobs, and the conditions that threads wait for.
+pub struct JobRegistry {
+    pub(super) settings: JobSettings,
     inner: Mutex<Inner>,
-    /// Something was queued, or draining began.
+    /// Wakes workers: a job was queued, or draining began.
     work: Condvar,
-    /// The clock has something new to look at.
+    /// Wakes the clock: there is a new deadline or a new result, or draining began.
     clock: Condvar,
+    /// Number of jobs that wait or occupy a worker.
     outstanding: watch::Sender<usize>,
 }
 
 #[derive(Default)]
 struct Inner {
     queue: VecDeque<Arc<Job>>,
-    /// Queued or running and not ended, by order of acceptance, which is also the order of their deadlines.
+    /// Queued and running jobs in the order of acceptance, which is the order of their deadlines.
     active: BTreeMap<u64, Arc<Job>>,
-    /// Workers that are busy; a job that has ended early may still occupy its worker for a moment.
+    /// Number of busy workers. A cancelled job may occupy its worker for a moment longer.
     busy: usize,
     kept: HashMap<JobId, Arc<Job>>,
-    /// Ended kept jobs, oldest first: when they ended, and how many bytes they hold.
-    ended: VecDeque<(Instant, JobId, u64)>,
+    /// Kept jobs that have ended, oldest first.
+    ended: VecDeque<EndedJob>,
+    /// Bytes of their results together.
     ended_bytes: u64,
     draining: bool,
     serial: u64,
-    /// Running mean of how long a worker takes for a job.
+    /// Running mean of the time that a job occupies a worker.
     mean: Duration,
 }
 
-impl Registry {
-    pub fn new(settings: Settings) -> Self {
+/// A kept job that has ended.
+struct EndedJob {
+    at: Instant,
+    id: JobId,
+    bytes: u64,
+}
+
+impl JobRegistry {
+    /// An empty registry.
+    pub fn new(settings: JobSettings) -> Self {
         let outstanding = watch::Sender::new(0);
         Self { settings, inner: Mutex::default(), work: Condvar::new(), clock: Condvar::new(), outstanding }
     }
 
+    /// Checks that a job would be accepted now.
     pub fn would_accept(&self) -> Result<(), Refusal> {
         self.check(&self.lock())
     }
 
-    pub fn submit(&self, work: Work, keep: bool) -> Result<Arc<Job>, Refusal> {
+    /// Queues work. A kept job can be found by its id until its result expires.
+    pub fn submit(&self, work: Work, is_kept: bool) -> Result<Arc<Job>, Refusal> {
         let mut inner = self.lock();
         self.check(&inner)?;
         inner.serial += 1;
-        let job = Arc::new(Job::new(work, keep, inner.serial));
+        let job = Arc::new(Job::new(work, is_kept, inner.serial));
         inner.queue.push_back(job.clone());
         if inner.active.is_empty() {
             self.clock.notify_one();
         }
         inner.active.insert(job.serial, job.clone());
-        if keep {
+        if is_kept {
             inner.kept.insert(job.id, job.clone());
         }
         self.publish(&inner);
@@ -69,14 +83,14 @@ impl Registry {
         Ok(job)
     }
 
-    /// The next job for a worker, which is busy from now on; None when there will be no more.
+    /// Waits for the next job, and counts the worker as busy. None once there will be no more.
     pub fn take(&self) -> Option<(Arc<Job>, Work)> {
         let mut inner = self.lock();
         loop {
             if let Some(job) = inner.queue.pop_front() {
                 if let Some(work) = job.take_work() {
                     inner.busy += 1;
-                    job.state.send_replace(State::Running);
+                    job.state.send_replace(JobState::Running);
                     self.publish(&inner);
                     return Some((job, work));
                 }
@@ -88,8 +102,8 @@ impl Registry {
         }
     }
 
-    /// A worker's news of its job: it ended like this, and the worker is free again after `took`.
-    pub fn finish(&self, job: &Job, state: State, took: Duration) {
+    /// Ends the job of a worker, which is free again after `took`.
+    pub fn finish(&self, job: &Job, state: JobState, took: Duration) {
         let mut inner = self.lock();
         inner.busy = inner.busy.saturating_sub(1);
         inner.mean = if inner.mean.is_zero() { took } else { (inner.mean * 7 + took) / 8 };
@@ -97,15 +111,15 @@ impl Registry {
         self.publish(&inner);
     }
 
-    /// A job's end that comes from elsewhere: cancelled, or out of time.
-    pub fn end(&self, job: &Job, state: State) {
+    /// Ends a job from outside its worker: cancelled, or out of time.
+    pub fn end(&self, job: &Job, state: JobState) {
         let mut inner = self.lock();
         self.end_locked(&mut inner, job, state);
         self.publish(&inner);
     }
 
-    /// The first end counts; later ones change nothing.
-    fn end_locked(&self, inner: &mut Inner, job: &Job, state: State) {
+    /// Ends a job. Only the first end of a job has an effect.
+    fn end_locked(&self, inner: &mut Inner, job: &Job, state: JobState) {
         if inner.active.remove(&job.serial).is_none() {
             return;
         }
@@ -113,9 +127,9 @@ impl Registry {
         if job.take_work().is_some() {
             inner.queue.retain(|queued| queued.serial != job.serial);
         }
-        if job.keep {
-            let bytes = if let State::Done(finished) = &state { finished.picture.len() as u64 } else { 0 };
-            inner.ended.push_back((Instant::now(), job.id, bytes));
+        if job.is_kept {
+            let bytes = if let JobState::Done(finished) = &state { finished.picture.len() as u64 } else { 0 };
+            inner.ended.push_back(EndedJob { at: Instant::now(), id: job.id, bytes });
             inner.ended_bytes += bytes;
             self.evict(inner);
             self.clock.notify_one();
@@ -123,27 +137,37 @@ impl Registry {
         job.state.send_replace(state);
     }
 
+    /// A kept job.
     pub fn find(&self, id: JobId) -> Option<Arc<Job>> {
         self.lock().kept.get(&id).cloned()
     }
 
-    pub fn load(&self) -> Load {
+    /// The load at this moment.
+    pub fn load(&self) -> JobLoad {
         let inner = self.lock();
-        Load { queued: inner.queue.len(), running: inner.busy, kept: inner.ended.len(), kept_bytes: inner.ended_bytes }
+        JobLoad {
+            queued: inner.queue.len(),
+            running: inner.busy,
+            kept: inner.ended.len(),
+            kept_bytes: inner.ended_bytes,
+        }
     }
 
+    /// Refuses new jobs from now on.
     pub fn drain(&self) {
         self.lock().draining = true;
         self.work.notify_all();
         self.clock.notify_all();
     }
 
+    /// Follows the number of jobs that wait or occupy a worker.
     pub fn outstanding(&self) -> watch::Receiver<usize> {
         self.outstanding.subscribe()
     }
 
-    /// Jobs whose time is up at this moment. Waits until there can be some; None when there never will be.
-    pub fn overdue(&self) -> Option<Vec<Arc<Job>>> {
+    /// Waits until jobs are overdue, and returns them. None once there will be no more. Drops
+    /// expired results meanwhile.
+    pub fn wait_for_overdue(&self) -> Option<Vec<Arc<Job>>> {
         let mut inner = self.lock();
         loop {
             self.evict(&mut inner);
@@ -158,7 +182,7 @@ impl Registry {
             }
             let next_deadline =
                 inner.active.values().next().and_then(|job| job.accepted.checked_add(self.settings.job_time));
-            let next_expiry = inner.ended.front().and_then(|&(at, ..)| at.checked_add(self.settings.result_ttl));
+            let next_expiry = inner.ended.front().and_then(|ended| ended.at.checked_add(self.settings.result_ttl));
             inner = match next_deadline.into_iter().chain(next_expiry).min() {
                 Some(at) => {
                     let wait = at.saturating_duration_since(now);
@@ -174,7 +198,7 @@ impl Registry {
             return Err(Refusal::Draining);
         }
         let queue = self.settings.queue;
-        // An idle worker's place counts: with a queue of 0, a job is accepted when somebody can start it.
+        // Idle workers count as places, so that a queue of 0 accepts a job that can start at once.
         let idle = self.settings.workers.saturating_sub(inner.busy);
         if inner.queue.len() >= queue + idle {
             return Err(Refusal::QueueFull { queue, retry_after_s: self.retry_after_s(inner) });
@@ -182,16 +206,16 @@ impl Registry {
         Ok(())
     }
 
-    /// How long the jobs that wait now should take, between 1 and 30 seconds.
+    /// Expected time in seconds until the waiting jobs are done, between 1 and 30.
     fn retry_after_s(&self, inner: &Inner) -> u64 {
         let waiting = inner.mean.as_secs_f64() * inner.queue.len() as f64 / self.settings.workers.max(1) as f64;
         waiting.ceil().clamp(1.0, 30.0) as u64
     }
 
-    /// Forgets results that are too old or too many. The newest stays, however large.
+    /// Drops results that are too old or too many. The newest stays, however large.
     fn evict(&self, inner: &mut Inner) {
         let now = Instant::now();
-        while let Some(&(at, id, bytes)) = inner.ended.front() {
+        while let Some(&EndedJob { at, id, bytes }) = inner.ended.front() {
             let too_old = now.duration_since(at) >= self.settings.result_ttl;
             let too_many = inner.ended.len() > 1
                 && (inner.ended_bytes > self.settings.result_bytes || inner.ended.len() > self.settings.result_count);

@@ -1,53 +1,55 @@
-//! Bytes of uploads that are being read, wait or are being drawn, over all requests together.
+//! A cap on bytes held by several owners together: one for the uploads of all requests, from
+//! reading to drawing, and one for all stored meshes.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The cap on uploads in memory at once.
+/// A shared cap on bytes in memory.
 #[derive(Debug)]
 pub struct UploadBudget {
     used: AtomicU64,
     limit: u64,
 }
 
-/// Other uploads have taken all the memory there is for uploads.
+/// The error when other uploads hold all the memory for uploads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("uploads in progress hold {limit} bytes of memory, which is all there is for them; try again shortly")]
 pub struct UploadBudgetFull {
-    /// How many bytes there are.
+    /// The cap in bytes.
     pub limit: u64,
 }
 
-/// A share of [`UploadBudget`], given back when dropped. Travels with the bytes that it stands for.
+/// A share of an [`UploadBudget`], given back when dropped. It is kept beside the bytes that it
+/// accounts for.
 #[derive(Debug)]
 pub struct Reservation {
-    bodies: Arc<UploadBudget>,
+    budget: Arc<UploadBudget>,
     bytes: u64,
 }
 
 impl UploadBudget {
-    /// Room for `limit` bytes.
+    /// A budget of `limit` bytes.
     pub fn new(limit: u64) -> Arc<Self> {
         Arc::new(Self { used: AtomicU64::new(0), limit })
     }
 
-    /// A share of nothing, to grow as bytes arrive.
+    /// An empty share, which grows as bytes arrive.
     pub fn reserve(self: &Arc<Self>) -> Reservation {
-        Reservation { bodies: self.clone(), bytes: 0 }
+        Reservation { budget: self.clone(), bytes: 0 }
     }
 
-    /// Bytes held now.
+    /// Bytes reserved at this moment.
     pub fn used_bytes(&self) -> u64 {
         self.used.load(Ordering::Relaxed)
     }
 }
 
 impl Reservation {
-    /// Takes `bytes` more, or nothing.
+    /// Takes `bytes` more. If there are fewer left, takes nothing.
     pub fn grow(&mut self, bytes: u64) -> Result<(), UploadBudgetFull> {
-        let limit = self.bodies.limit;
+        let limit = self.budget.limit;
         let grown = |used: u64| used.checked_add(bytes).filter(|&sum| sum <= limit);
-        self.bodies
+        self.budget
             .used
             .fetch_update(Ordering::Relaxed, Ordering::Relaxed, grown)
             .map_err(|_| UploadBudgetFull { limit })?;
@@ -58,7 +60,7 @@ impl Reservation {
 
 impl Drop for Reservation {
     fn drop(&mut self) {
-        self.bodies.used.fetch_sub(self.bytes, Ordering::Relaxed);
+        self.budget.used.fetch_sub(self.bytes, Ordering::Relaxed);
     }
 }
 
@@ -68,17 +70,17 @@ mod tests {
 
     #[test]
     fn what_is_taken_comes_back() {
-        let bodies = UploadBudget::new(100);
-        let mut first = bodies.reserve();
+        let budget = UploadBudget::new(100);
+        let mut first = budget.reserve();
         first.grow(60).unwrap();
-        let mut second = bodies.reserve();
+        let mut second = budget.reserve();
         assert_eq!(second.grow(41), Err(UploadBudgetFull { limit: 100 }));
         second.grow(40).unwrap();
         assert_eq!(second.grow(u64::MAX), Err(UploadBudgetFull { limit: 100 }));
-        assert_eq!(bodies.used_bytes(), 100);
+        assert_eq!(budget.used_bytes(), 100);
         drop(first);
-        assert_eq!(bodies.used_bytes(), 40);
+        assert_eq!(budget.used_bytes(), 40);
         drop(second);
-        assert_eq!(bodies.used_bytes(), 0);
+        assert_eq!(budget.used_bytes(), 0);
     }
 }

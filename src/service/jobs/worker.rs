@@ -1,24 +1,25 @@
-//! A worker thread: takes jobs, draws them, survives them.
+//! The worker threads. Each takes jobs from the queue and does them with its own renderer.
 
-use crate::import;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::job::{Failure, Finished, Job, Product, State, Task, Timings, Work};
+use super::job::{Failure, Finished, Job, JobState, Product, Task, Timings, Work};
+use super::registry::JobRegistry;
 use crate::backend::{Backends, GpuHost};
+use crate::import;
 use crate::limits::{Deadline, Limits};
 use crate::pipeline::{self, RenderError, Stage};
-use crate::service::jobs::registry::Registry;
 
-/// What does one job after the other on one thread.
+/// A worker's renderer, which does one job after the other.
 pub type Renderer = Box<dyn FnMut(&Work, &Deadline, &mut dyn FnMut(Stage)) -> Result<Product, RenderError>>;
 
-/// Makes a worker's renderer, on the worker's own thread: devices do not move between threads.
-pub type Engine = Arc<dyn Fn() -> Renderer + Send + Sync>;
+/// Makes the renderer of a worker, on the worker's own thread, because devices do not move between
+/// threads.
+pub type RendererFactory = Arc<dyn Fn() -> Renderer + Send + Sync>;
 
-/// The real engine. Each worker's CPU path uses up to `threads` threads.
-pub fn pipeline_engine(gpu: Arc<GpuHost>, threads: usize, limits: Limits) -> Engine {
+/// Renderers that run [`crate::pipeline`]. The CPU back-end of each uses up to `threads` threads.
+pub fn pipeline_renderers(gpu: Arc<GpuHost>, threads: usize, limits: Limits) -> RendererFactory {
     Arc::new(move || {
         let mut backends = Backends::new(gpu.clone(), threads);
         let limits = limits.clone();
@@ -39,40 +40,41 @@ pub fn pipeline_engine(gpu: Arc<GpuHost>, threads: usize, limits: Limits) -> Eng
     })
 }
 
-/// Works until the board is drained.
-pub fn run(board: &Registry, engine: &Engine) {
-    // Made with the first job: an idle process holds no renderer.
+/// Does jobs until the registry is drained.
+pub fn run(registry: &JobRegistry, renderers: &RendererFactory) {
+    // It is made with the first job, so that an idle process holds no renderer.
     let mut renderer: Option<Renderer> = None;
-    while let Some((job, work)) = board.take() {
+    while let Some((job, work)) = registry.take() {
         let started = Instant::now();
         let attempt = catch_unwind(AssertUnwindSafe(|| {
-            let renderer = renderer.get_or_insert_with(|| engine());
-            draw(renderer, &job, &work, started)
+            let renderer = renderer.get_or_insert_with(|| renderers());
+            run_job(renderer, &job, &work, started)
         }));
         let state = attempt.unwrap_or_else(|_| {
             tracing::error!(job = %job.id, "a job panicked; its worker goes on with a fresh renderer");
-            // What it left behind may be half done. Dropping it may panic as well.
+            // The renderer may be in an undefined state, and dropping it may panic as well.
             let broken = renderer.take();
             let _ = catch_unwind(AssertUnwindSafe(|| drop(broken)));
-            State::Failed(Arc::new(Failure::Panicked))
+            JobState::Failed(Arc::new(Failure::Panicked))
         });
-        // Memory first, then the news: whoever hears of the end can send the next mesh of the same size.
+        // The memory is freed before the end is announced, so that a client that waits for the end
+        // can send the next mesh of the same size.
         drop(work);
-        board.finish(&job, state, started.elapsed());
+        registry.finish(&job, state, started.elapsed());
     }
 }
 
-fn draw(renderer: &mut Renderer, job: &Job, work: &Work, started: Instant) -> State {
+fn run_job(renderer: &mut Renderer, job: &Job, work: &Work, started: Instant) -> JobState {
     let mut timings = Timings { queue: started.duration_since(job.accepted), ..Timings::default() };
     let mut stage_began = started;
     let result = renderer(work, &job.deadline, &mut |stage| {
         let now = Instant::now();
-        timings.note(stage, now.duration_since(stage_began));
+        timings.record(stage, now.duration_since(stage_began));
         stage_began = now;
     });
     match result {
-        Ok(Product::Picture(output)) => State::Done(Arc::new(Finished::new(output, timings))),
-        Ok(Product::Report(json)) => State::Inspected(json.into()),
-        Err(error) => State::Failed(Arc::new(Failure::Render(error))),
+        Ok(Product::Picture(output)) => JobState::Done(Arc::new(Finished::new(output, timings))),
+        Ok(Product::Report(json)) => JobState::Inspected(json.into()),
+        Err(error) => JobState::Failed(Arc::new(Failure::Render(error))),
     }
 }

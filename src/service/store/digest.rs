@@ -1,4 +1,4 @@
-//! SHA-256 digests, as names of meshes.
+//! SHA-256 digests, the names of meshes.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::import::BundleFile;
 
-/// How many hexadecimal digits name a mesh.
+/// Number of hexadecimal digits in a digest.
 const DIGITS: usize = 64;
 
 /// A SHA-256 digest. Its text is 64 lower-case hexadecimal digits.
@@ -14,17 +14,17 @@ const DIGITS: usize = 64;
 pub struct Digest([u8; 32]);
 
 impl Digest {
-    /// Of bytes as they are: what `sha256sum` prints.
+    /// The digest of bytes, as `sha256sum` prints it.
     pub fn of(bytes: &[u8]) -> Self {
         Self(Sha256::digest(bytes).into())
     }
 
-    /// Of files under names, in whatever order: that of the list of their own digests, sorted by name, a line
-    /// `digest  name` each, as `sha256sum FILE... | LC_ALL=C sort -k 2` writes it.
+    /// The digest of named files in any order. It is the digest of a list with a line `digest
+    /// name` per file, sorted by name, as `sha256sum FILE... | LC_ALL=C sort -k 2` writes it.
     ///
-    /// No mesh has the bytes of such a list, so nothing that is stored as it came has the name of something else: each line
-    /// begins with 64 digits, and no format's statements do; and names have no control characters, so that a binary STL's
-    /// count of triangles, if the list were taken for one, would be far more than a body can hold.
+    /// No mesh file has the bytes of such a list, so a form and a file never share a name. No text
+    /// format has statements that begin with 64 digits. Names have no control characters, so as a
+    /// binary STL the list would have more triangles than a body can hold.
     pub fn of_files(files: &[BundleFile]) -> Self {
         let mut lines: Vec<(&str, Self)> = files.iter().map(|f| (f.path.as_str(), Self::of(&f.bytes))).collect();
         lines.sort_unstable();
@@ -32,7 +32,8 @@ impl Digest {
         Self::of(list.as_bytes())
     }
 
-    /// From its text; None for anything else, upper case included: a mesh has one name.
+    /// Reads a digest's text. None for anything else, upper case included, so that a mesh has one
+    /// name.
     pub fn parse(text: &str) -> Option<Self> {
         let value = |digit: u8| match digit {
             b'0'..=b'9' => Some(digit - b'0'),

@@ -1,9 +1,9 @@
-//! Meshes that stay: named by what is in them, so that clients send each once and draw it often.
+//! The store of meshes. A mesh is named by the digest of its content, so that clients send it once
+//! and draw it often. The store is in memory only.
 //!
-//! Architecture invariants: what is stored never changes, only comes and goes. The bytes of everything that is stored, and of
-//! what was but is still being drawn, are within one cap. Nothing here knows HTTP, waits, or parses.
-//!
-//! In memory alone; the rest of the program sees [`Store`], whose methods would be the same over a folder.
+//! Architecture invariants: a stored mesh never changes. One cap holds for the bytes of all stored
+//! meshes together with those that were removed and are still being drawn. Nothing here knows HTTP,
+//! waits, or parses.
 
 mod digest;
 #[cfg(test)]
@@ -19,68 +19,70 @@ use bytes::Bytes;
 use crate::import::{Bundle, Format};
 use crate::service::jobs::{Reservation, UploadBudget};
 
-/// How a bundle is read: what is said of it beside its bytes.
+/// The way in which a bundle is read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reading {
-    /// Overrides sniffing.
+    /// The mesh's format. None: found from the bytes.
     pub format_in: Option<Format>,
-    /// Which file is the mesh.
+    /// The file that is the mesh. None: found from the files.
     pub entry: Option<String>,
 }
 
 /// A mesh to be stored.
 #[derive(Clone, Debug)]
 pub struct NewMesh {
-    /// Its name.
+    /// The mesh's name.
     pub digest: Digest,
-    /// Its files.
+    /// The mesh's files.
     pub bundle: Bundle,
-    /// How it was read for the report.
+    /// The way in which it was read for the report.
     pub reading: Reading,
-    /// What is in it: JSON.
+    /// The report on its content, as JSON.
     pub report: Bytes,
 }
 
-/// A mesh that is stored, or was when it was found.
+/// A mesh that is stored, or was stored when it was found.
 #[derive(Debug)]
 pub struct StoredMesh {
-    /// What was stored.
+    /// The mesh itself.
     pub mesh: NewMesh,
-    /// The memory that its bytes take. Whoever holds the bytes holds a clone: while there is one, the memory counts.
+    /// The memory of its bytes. Every holder of the bytes holds a clone, and the memory counts
+    /// until the last clone is dropped.
     pub memory: Arc<Reservation>,
 }
 
-/// Why a mesh was not stored.
+/// Reasons why a mesh was not stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StoreError {
-    /// It would not fit into an empty store.
+    /// The mesh would not fit into an empty store.
     #[error(
         "the mesh takes {bytes} bytes with its report, and all stored meshes may take {limit} (raise the limit with --mesh-bytes)"
     )]
     TooLarge {
-        /// What it takes.
+        /// Bytes of the mesh and its report.
         bytes: u64,
-        /// What there is.
+        /// The cap in bytes.
         limit: u64,
     },
-    /// What is being drawn takes the room.
+    /// Meshes that are being drawn take all the room.
     #[error("meshes that are being drawn take all the room for stored meshes; try again shortly")]
     Busy {
-        /// The flag that gives more.
+        /// The flag that raises the cap.
         flag: &'static str,
     },
 }
 
-/// What the store holds at this moment.
+/// The content of the store at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StoreLoad {
-    /// Meshes that can be found.
+    /// Number of meshes that can be found.
     pub count: usize,
-    /// Their bytes, and those of meshes that are gone but still being drawn.
+    /// Their bytes, and those of removed meshes that are still being drawn.
     pub bytes: u64,
 }
 
-/// The meshes. When there is no room for another, the least recently used that nobody holds goes.
+/// The stored meshes. To make room for a new one, the store removes the least recently used mesh
+/// that is not being drawn.
 #[derive(Debug)]
 pub struct Store {
     memory: Arc<UploadBudget>,
@@ -92,7 +94,7 @@ pub struct Store {
 #[derive(Debug, Default)]
 struct Inner {
     meshes: HashMap<Digest, Entry>,
-    /// Their names by last use.
+    /// The names of the meshes, ordered by last use.
     by_use: BTreeMap<u64, Digest>,
     serial: u64,
 }
@@ -104,17 +106,17 @@ struct Entry {
 }
 
 impl Store {
-    /// Room for `count` meshes that take `bytes` together.
+    /// A store for at most `count` meshes with `bytes` together.
     pub fn new(bytes: u64, count: usize) -> Self {
         Self { memory: UploadBudget::new(bytes), bytes, count: count.max(1), inner: Mutex::default() }
     }
 
-    /// The mesh of this name, used now.
+    /// Finds a mesh, which counts as a use of it.
     pub fn find(&self, digest: Digest) -> Option<Arc<StoredMesh>> {
         self.lock().touch(digest)
     }
 
-    /// Stores a mesh. Whether it is new; if not, what is stored stays as it is.
+    /// Stores a mesh. False if one of its name is stored already, which then stays as it is.
     pub fn insert(&self, mesh: NewMesh) -> Result<bool, StoreError> {
         let bytes = mesh.size_bytes();
         self.check_size(bytes)?;
@@ -133,7 +135,7 @@ impl Store {
         Ok(true)
     }
 
-    /// Forgets a mesh; whether it was there. Who draws it can go on.
+    /// Removes a mesh. False if it was not there. Jobs that already draw it go on.
     pub fn remove(&self, digest: Digest) -> bool {
         let mut inner = self.lock();
         let Some(entry) = inner.meshes.remove(&digest) else { return false };
@@ -141,17 +143,17 @@ impl Store {
         true
     }
 
-    /// Refuses what would not fit into an empty store.
+    /// Refuses a mesh that would not fit into an empty store.
     pub fn check_size(&self, bytes: u64) -> Result<(), StoreError> {
         if bytes > self.bytes { Err(StoreError::TooLarge { bytes, limit: self.bytes }) } else { Ok(()) }
     }
 
-    /// What there is.
+    /// The content of the store at this moment.
     pub fn load(&self) -> StoreLoad {
         StoreLoad { count: self.lock().meshes.len(), bytes: self.memory.used_bytes() }
     }
 
-    /// Bytes and meshes that there is room for.
+    /// Most bytes and most meshes.
     pub fn limits(&self) -> (u64, usize) {
         (self.bytes, self.count)
     }
@@ -162,7 +164,7 @@ impl Store {
 }
 
 impl NewMesh {
-    /// The memory that it takes: its files, their names and its report, and a name that the client chose.
+    /// The memory of its files, their names, its report, and the entry's name.
     fn size_bytes(&self) -> u64 {
         let names = self.bundle.files().iter().map(|file| file.path.len());
         let entry = self.reading.entry.as_ref().map_or(0, String::len);
@@ -186,9 +188,10 @@ impl Inner {
         self.meshes.insert(stored.mesh.digest, Entry { stored: Arc::new(stored), used: self.serial });
     }
 
-    /// Forgets the least recently used mesh that nobody holds: another one's memory would not come back. None if there is none.
+    /// Removes the least recently used mesh that is not held elsewhere. Removing a held one would
+    /// free no memory. None if all are held.
     fn evict(&mut self) -> Option<()> {
-        // Who holds neither now can come to hold one only through this lock.
+        // These counts cannot grow from 1 meanwhile: new holders need this lock.
         let is_held =
             |entry: &Entry| Arc::strong_count(&entry.stored) > 1 || Arc::strong_count(&entry.stored.memory) > 1;
         let is_free = |digest: &Digest| self.meshes.get(digest).is_none_or(|entry| !is_held(entry));

@@ -1,12 +1,11 @@
-//! The accept loop: hyper's own, because `axum::serve` installs no timer, and without one a slow client can hold a
-//! connection for ever.
+//! The accept loop. It is built on hyper, because `axum::serve` installs no timer, and without one
+//! a slow client can hold a connection for ever.
 
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
-use axum::http::StatusCode;
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
 use hyper_util::server::conn::auto;
 use hyper_util::server::graceful::{GracefulShutdown, Watcher};
@@ -17,15 +16,15 @@ use tokio::sync::Semaphore;
 
 use super::io::ClientStream;
 use crate::service::http::dto::ProblemDto;
-use crate::service::http::error::ApiError;
+use crate::service::http::error::{ApiError, Fault};
 
-/// How long open connections get to read their answers once the last job is done.
+/// Time that clients have to read their answers once the last job has ended.
 const CLOSING_TIME: Duration = Duration::from_secs(5);
 
-/// What every HTTP/2 connection begins with.
+/// The first bytes of every HTTP/2 connection.
 const HTTP2_PREFACE: &[u8; 24] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
-/// Accepts connections until `stop` is there, then closes them gently.
+/// Accepts connections until `stop` is ready, then lets the open ones finish their answers.
 pub async fn run(
     listener: TcpListener,
     router: Router,
@@ -50,7 +49,7 @@ pub async fn run(
                 continue;
             }
         };
-        // Small answers must not wait for the client's acknowledgement of the header.
+        // Without this, a small body waits for the client's acknowledgement of the header.
         let _ = stream.set_nodelay(true);
         let Ok(place) = places.clone().try_acquire_owned() else {
             tokio::spawn(refuse(stream));
@@ -58,7 +57,7 @@ pub async fn run(
         };
         let (server, service, watcher) = (server.clone(), service.clone(), graceful.watcher());
         tokio::spawn(async move {
-            converse(&server, stream, service, watcher, header_timeout).await;
+            serve_connection(&server, stream, service, watcher, header_timeout).await;
             drop(place);
         });
     }
@@ -82,26 +81,26 @@ fn server(header_timeout: Duration) -> auto::Builder<TokioExecutor> {
     server
 }
 
-async fn converse(
+async fn serve_connection(
     server: &auto::Builder<TokioExecutor>,
     stream: TcpStream,
     service: TowerToHyperService<Router>,
     watcher: Watcher,
     header_timeout: Duration,
 ) {
-    if !speaks_in_time(&stream, header_timeout).await {
+    if !sends_preface_in_time(&stream, header_timeout).await {
         return;
     }
     let io = TokioIo::new(ClientStream::new(stream));
-    // Errors here are the client's: it hung up, was too slow or spoke no HTTP.
+    // These errors are the client's: it hung up, was too slow or sent no HTTP.
     if let Err(error) = watcher.watch(server.serve_connection(io, service)).await {
         tracing::debug!(error = %error, "a connection ended early");
     }
 }
 
-/// Whether the client says enough within `limit` to tell HTTP/1 from HTTP/2: the library that tells them apart has no
-/// timer of its own.
-async fn speaks_in_time(stream: &TcpStream, limit: Duration) -> bool {
+/// Waits until the client has sent enough to tell HTTP/1 from HTTP/2. False if that takes longer
+/// than `limit`: hyper-util, which tells them apart, has no timer for it.
+async fn sends_preface_in_time(stream: &TcpStream, limit: Duration) -> bool {
     let first_bytes = async {
         let mut seen = [0; HTTP2_PREFACE.len()];
         loop {
@@ -109,17 +108,17 @@ async fn speaks_in_time(stream: &TcpStream, limit: Duration) -> bool {
             if length == 0 || length == seen.len() || !HTTP2_PREFACE.starts_with(&seen[..length]) {
                 return length > 0;
             }
-            // There is no way to be told of the next byte while earlier ones are still unread.
+            // While earlier bytes are unread, the socket does not announce new ones: poll for them.
             tokio::time::sleep(Duration::from_millis(10)).await;
         }
     };
     tokio::time::timeout(limit, first_bytes).await.unwrap_or(false)
 }
 
-/// One connection too many: says so, without reading what it wants, and hangs up.
+/// Answers one connection too many with 503, without reading its request, and closes it.
 async fn refuse(stream: TcpStream) {
     let detail = "as many connections are open as may be; try again shortly";
-    let error = ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "connections_full", detail).flag(Some("--connections"));
+    let error = ApiError::new(Fault::Unavailable, "connections_full", detail).flag("--connections");
     let request_id = uuid::Uuid::now_v7().to_string();
     let body = serde_json::to_string(&ProblemDto::new(&error, &request_id)).unwrap_or_default();
     let answer = format!(
@@ -135,7 +134,8 @@ async fn refuse(stream: TcpStream) {
     let _ = tokio::time::timeout(Duration::from_secs(1), answering).await;
 }
 
-/// Out of file descriptors and the like: trying again at once would only burn the processor.
+/// Waits after a failed accept. Its cause, such as a lack of file descriptors, lasts for a while,
+/// and trying again at once would only use up processor time.
 async fn pause_after(error: &io::Error) {
     tracing::warn!(error = %error, "a connection could not be accepted");
     tokio::time::sleep(Duration::from_millis(50)).await;

@@ -1,8 +1,9 @@
-//! A client's socket, with the two patience limits that HTTP libraries leave out.
+//! A client's socket, with two timeouts that the HTTP libraries lack.
 //!
-//! A client that stops reading its answer is let go after a while. And after an answer that came before the upload ended
-//! (413), the rest of the upload is read and thrown away for a moment: closing at once would reset the connection, and
-//! the client would never see the answer.
+//! 1. A client that stops reading its answer is disconnected after a while.
+//! 2. After an answer that came before the upload ended (413), the rest of the upload is read and
+//!    thrown away for a moment. Closing at once would reset the connection, and the client would
+//!    never see the answer.
 
 use std::future::Future as _;
 use std::io;
@@ -14,13 +15,16 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 use tokio::time::{Instant, Sleep, sleep};
 
-/// For how long a client may read nothing of its answer.
+/// Longest time for which a client may read nothing of its answer.
 const WRITE_STALL: Duration = Duration::from_secs(30);
-/// For how long a closing connection waits for the first stray byte, and how long it reads them after that.
+
+/// Time that a closing connection waits for the first byte of a rest.
 const LINGER_QUIET: Duration = Duration::from_millis(100);
+
+/// Time that a closing connection reads a rest once it has begun.
 const LINGER_BUSY: Duration = Duration::from_secs(2);
 
-/// The socket.
+/// A client's socket with timeouts.
 pub struct ClientStream {
     inner: TcpStream,
     timer: Pin<Box<Sleep>>,
@@ -30,16 +34,16 @@ pub struct ClientStream {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Phase {
     Open,
-    /// A write waits; the timer runs.
+    /// A write waits, and the timer runs.
     Stalled,
-    /// Our side is closed; the timer runs.
+    /// The server's side is closed, and the timer runs.
     Lingering {
-        heard: bool,
+        has_received: bool,
     },
 }
 
 impl ClientStream {
-    /// Takes a socket.
+    /// Wraps a socket.
     pub fn new(inner: TcpStream) -> Self {
         Self { inner, timer: Box::pin(sleep(WRITE_STALL)), phase: Phase::Open }
     }
@@ -49,8 +53,8 @@ impl ClientStream {
         self.timer.as_mut().reset(Instant::now() + wait);
     }
 
-    /// Passes a write's outcome on, and watches how long it waits.
-    fn patient<T>(&mut self, cx: &mut Context<'_>, written: Poll<io::Result<T>>) -> Poll<io::Result<T>> {
+    /// Passes a write's outcome on, and fails when the client has read nothing for too long.
+    fn with_stall_timeout<T>(&mut self, cx: &mut Context<'_>, written: Poll<io::Result<T>>) -> Poll<io::Result<T>> {
         if written.is_ready() {
             self.phase = Phase::Open;
             return written;
@@ -72,7 +76,7 @@ impl AsyncRead for ClientStream {
 impl AsyncWrite for ClientStream {
     fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buf: &[u8]) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.inner).poll_write(cx, buf);
-        self.patient(cx, written)
+        self.with_stall_timeout(cx, written)
     }
 
     fn poll_write_vectored(
@@ -81,7 +85,7 @@ impl AsyncWrite for ClientStream {
         bufs: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.inner).poll_write_vectored(cx, bufs);
-        self.patient(cx, written)
+        self.with_stall_timeout(cx, written)
     }
 
     fn is_write_vectored(&self) -> bool {
@@ -95,10 +99,11 @@ impl AsyncWrite for ClientStream {
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         if !matches!(self.phase, Phase::Lingering { .. }) {
             ready!(Pin::new(&mut self.inner).poll_shutdown(cx))?;
-            self.start_timer(Phase::Lingering { heard: false }, LINGER_QUIET);
+            self.start_timer(Phase::Lingering { has_received: false }, LINGER_QUIET);
         }
         let mut scratch = [0; 16 * 1024];
-        // A client that sends without pause must not keep the thread from others: a few reads, then again later.
+        // A client that sends without pause must not occupy the thread: a few reads, then a turn
+        // for other connections.
         for _ in 0..16 {
             if self.timer.as_mut().poll(cx).is_ready() {
                 return Poll::Ready(Ok(()));
@@ -106,8 +111,8 @@ impl AsyncWrite for ClientStream {
             let mut buf = ReadBuf::new(&mut scratch);
             match ready!(Pin::new(&mut self.inner).poll_read(cx, &mut buf)) {
                 Ok(()) if !buf.filled().is_empty() => {
-                    if self.phase == (Phase::Lingering { heard: false }) {
-                        self.start_timer(Phase::Lingering { heard: true }, LINGER_BUSY);
+                    if self.phase == (Phase::Lingering { has_received: false }) {
+                        self.start_timer(Phase::Lingering { has_received: true }, LINGER_BUSY);
                     }
                 }
                 _ => return Poll::Ready(Ok(())),

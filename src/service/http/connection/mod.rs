@@ -1,4 +1,4 @@
-//! TODO room.
+//! Connections: the accept loop and the client's socket, both with limits on a client's silence.
 
-pub(crate) mod accept;
-pub(crate) mod io;
+pub mod accept;
+mod io;

@@ -1,140 +1,146 @@
-//! Reads a request's body within its limits: size, memory shared with other uploads, and time.
+//! Reads a request's body within its limits: size, shared memory, and time.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use axum::body::{Body, Bytes};
 use axum::extract::{FromRequest as _, Multipart, Request};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, header};
 use futures_util::{Stream, StreamExt as _};
 
 use crate::import::{Bundle, BundleFile};
 use crate::limits;
-use crate::service::http::error::ApiError;
+use crate::service::http::error::{ApiError, Fault};
 use crate::service::jobs::{Reservation, UploadBudget};
 
-/// What a body holds.
+/// Most bytes between two parts of a form: boundary and headers. The parser searches them from the
+/// start with every chunk that arrives, so that their cost grows with the square.
+const BETWEEN_PARTS_BYTES_MAX: u64 = 256 << 10;
+
+/// The content of a body.
 #[derive(Debug)]
 pub struct Upload {
-    /// The mesh and what came along with it.
+    /// The mesh and the files beside it.
     pub bundle: Bundle,
-    /// How it came.
+    /// The kind of body that it came in.
     pub kind: BodyKind,
     /// The request document, if the body is a multipart form that has one.
     pub document: Option<Bytes>,
-    /// The memory that the two take.
+    /// The memory that bundle and document take.
     pub reservation: Reservation,
 }
 
-/// What a body is, as its `Content-Type` has it.
+/// Kinds of bodies, by `Content-Type`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BodyKind {
     /// The bytes of a file.
     Raw,
-    /// Those of a zip archive.
+    /// The bytes of a zip archive.
     Archive,
     /// A form with files.
     Form,
 }
 
-/// Within which a body is read.
+/// The limits within which a body is read.
 pub struct BodyLimits<'a> {
-    /// Largest body.
+    /// Most bytes of the body.
     pub bytes: u64,
-    /// Most files of a form.
+    /// Most files in a form.
     pub files: u64,
-    /// For all of it.
+    /// Longest time for the whole body.
     pub time: Duration,
-    /// Memory shared with other uploads.
-    pub bodies: &'a Arc<UploadBudget>,
+    /// The memory that all uploads share.
+    pub upload_budget: &'a Arc<UploadBudget>,
 }
 
-/// Refuses what can be refused from the header alone, before a byte is read and before `100 Continue` is sent.
+/// Refuses what can be refused from the header alone. This comes before a byte is read, and so
+/// before `100 Continue` is sent.
 pub fn check_header(headers: &HeaderMap, bytes_max: u64) -> Result<(), ApiError> {
-    if length(headers).is_some_and(|length| length > bytes_max) {
+    if announced_length(headers).is_some_and(|length| length > bytes_max) {
         return Err(ApiError::body_too_large(bytes_max));
     }
     if headers.get(header::CONTENT_ENCODING).is_some_and(|v| !v.as_bytes().eq_ignore_ascii_case(b"identity")) {
         let detail = "a Content-Encoding is not understood; send the body as it is";
-        return Err(ApiError::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "content_encoding", detail));
+        return Err(ApiError::new(Fault::UnknownFormat, "content_encoding", detail));
     }
     Ok(())
 }
 
-/// The length that is announced, if one is.
-pub fn length(headers: &HeaderMap) -> Option<u64> {
+/// The announced length of the body, if there is one.
+pub fn announced_length(headers: &HeaderMap) -> Option<u64> {
     headers.get(header::CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
 }
 
-/// Whether the body is said to be JSON.
+/// True if the `Content-Type` is JSON.
 pub fn is_json(headers: &HeaderMap) -> bool {
-    media_type(headers).is_some_and(|t| t.eq_ignore_ascii_case("application/json"))
+    has_media_type(headers, "application/json")
 }
 
-/// Whether the body is a form.
+/// True if the `Content-Type` is a multipart form.
 pub fn is_multipart(headers: &HeaderMap) -> bool {
-    media_type(headers).is_some_and(|t| t.eq_ignore_ascii_case("multipart/form-data"))
+    has_media_type(headers, "multipart/form-data")
 }
 
-/// Reads the body: the bytes of a mesh file or of a zip archive, or a form with files.
+/// The error for a malformed form, or one with missing or unexpected parts.
+pub fn bad_form(detail: impl Into<String>) -> ApiError {
+    ApiError::new(Fault::BadRequest, "bad_form", detail)
+}
+
+/// Reads the body: a mesh file, a zip archive, or a form with files.
 pub async fn read(request: Request, limits: BodyLimits<'_>) -> Result<Upload, ApiError> {
     let reading = async {
-        let multipart = is_multipart(request.headers());
-        let is_zip = media_type(request.headers()).is_some_and(|t| t.eq_ignore_ascii_case("application/zip"));
         let (parts, body) = request.into_parts();
-        let meter = Meter::new(limits.bytes, limits.bodies);
-        if multipart {
-            let body = Body::from_stream(metered(body, meter.clone()));
-            form(Request::from_parts(parts, body), &meter, limits.files).await
+        let meter = Meter::new(limits.bytes, limits.upload_budget);
+        let chunks = metered(body, meter.clone());
+        if is_multipart(&parts.headers) {
+            read_form(Request::from_parts(parts, Body::from_stream(chunks)), &meter, limits.files).await
         } else {
-            let bytes = whole(metered(body, meter.clone()), &meter).await?;
-            // An archive stays closed until a worker opens it: unpacking is work.
+            let is_zip = has_media_type(&parts.headers, "application/zip");
+            let bytes = read_whole(chunks, &meter).await?;
+            // A worker opens the archive later, because unpacking takes long.
             let (bundle, kind) = match is_zip {
                 true => (Bundle::zip(bytes), BodyKind::Archive),
                 false => (Bundle::of_one(bytes), BodyKind::Raw),
             };
-            Ok(Upload { bundle, kind, document: None, reservation: meter.reservation() })
+            Ok(Upload { bundle, kind, document: None, reservation: meter.take_reservation() })
         }
     };
     tokio::time::timeout(limits.time, reading).await.unwrap_or_else(|_| Err(too_slow(limits.time)))
 }
 
-async fn whole(chunks: impl Stream<Item = Result<Bytes, Broken>>, meter: &Meter) -> Result<Bytes, ApiError> {
+async fn read_whole(chunks: impl Stream<Item = Result<Bytes, Interrupted>>, meter: &Meter) -> Result<Bytes, ApiError> {
     let mut chunks = std::pin::pin!(chunks);
     let mut bytes = Vec::new();
     while let Some(chunk) = chunks.next().await {
-        // Grown as bytes arrive: a length that is only claimed gets no memory.
-        bytes.extend_from_slice(&chunk.map_err(|broken| meter.fault(broken))?);
+        // The vector grows as bytes arrive: a length that is only announced gets no memory.
+        bytes.extend_from_slice(&chunk.map_err(|interrupted| meter.error(interrupted))?);
     }
     Ok(bytes.into())
 }
 
-/// What a form may have before a part's content: its boundary and headers. They are looked for from the start with every chunk that comes.
-const BETWEEN_PARTS_MAX: u64 = 256 << 10;
-
-async fn form(request: Request, meter: &Meter, files_max: u64) -> Result<Upload, ApiError> {
+async fn read_form(request: Request, meter: &Meter, files_max: u64) -> Result<Upload, ApiError> {
     let broken = |error: axum::extract::multipart::MultipartError| {
-        meter.fault_or(|| bad_form(format!("the form cannot be read: {}", error.body_text())))
+        meter.error_or(|| bad_form(format!("the form cannot be read: {}", error.body_text())))
     };
     let mut form = Multipart::from_request(request, &()).await.map_err(|e| bad_form(e.body_text()))?;
     let (mut files, mut document): (Vec<BundleFile>, _) = (Vec::new(), None);
     loop {
-        meter.is_between_parts(true);
+        meter.set_between_parts(true);
         let Some(field) = form.next_field().await.map_err(broken)? else { break };
-        meter.is_between_parts(false);
+        meter.set_between_parts(false);
         match field.name().unwrap_or_default() {
             "file" => {
                 let count = files.len() as u64 + 1;
                 limits::check("the number of files in the form", count, files_max, "--limit-bundle-entries")
                     .map_err(|limit| ApiError::from(&limit))?;
-                // Before its bytes are read, so that a bad name costs nothing.
-                let mut file = named(field.file_name(), files.len())?;
+                // The name is checked before the bytes are read, so that a bad one costs nothing.
+                let mut file = empty_file(field.file_name(), files.len())?;
                 file.check_new(&files).map_err(|e| bad_form(format!("{e}; each `file` part needs its own")))?;
                 file.bytes = field.bytes().await.map_err(broken)?;
                 files.push(file);
             }
             "request" if document.is_some() => {
-                return Err(bad_form("the form has several `request` parts; send at most one".into()));
+                return Err(bad_form("the form has several `request` parts; send at most one"));
             }
             "request" => document = Some(field.bytes().await.map_err(broken)?),
             other => {
@@ -144,111 +150,113 @@ async fn form(request: Request, meter: &Meter, files_max: u64) -> Result<Upload,
         }
     }
     if files.is_empty() {
-        return Err(bad_form("the form has no `file` part; send the mesh as one".into()));
+        return Err(bad_form("the form has no `file` part; send the mesh as one"));
     }
     let bundle = Bundle::of_files(files);
-    Ok(Upload { bundle, kind: BodyKind::Form, document, reservation: meter.reservation() })
+    Ok(Upload { bundle, kind: BodyKind::Form, document, reservation: meter.take_reservation() })
 }
 
-/// An empty file by the name that its part gives. One part needs no name.
-fn named(name: Option<&str>, before: usize) -> Result<BundleFile, ApiError> {
+/// A file without bytes, under the name that its part gives. The first part needs no name.
+fn empty_file(name: Option<&str>, files_before: usize) -> Result<BundleFile, ApiError> {
     let name = match name {
-        None | Some("") if before == 0 => "mesh",
-        None | Some("") => return Err(bad_form(format!("`file` part {} of the form has no filename", before + 1))),
+        None | Some("") if files_before == 0 => "mesh",
+        None | Some("") => {
+            return Err(bad_form(format!("`file` part {} of the form has no filename", files_before + 1)));
+        }
         Some(name) => name,
     };
     BundleFile::new(name, Bytes::new()).map_err(|error| bad_form(error.to_string()))
 }
 
-/// A form that is none, or not what is wanted here.
-pub fn bad_form(detail: String) -> ApiError {
-    ApiError::new(StatusCode::BAD_REQUEST, "bad_form", detail)
-}
-
-/// A body that ended before its end. Why is in the [`Meter`], if it was us.
+/// The error of a body that ended early. The [`Meter`] holds the cause if a limit was hit.
 #[derive(Debug, thiserror::Error)]
 #[error("the body broke off")]
-struct Broken;
+struct Interrupted;
 
-/// Counts bytes as they arrive, takes their memory, and remembers why it stopped.
+/// Counts bytes as they arrive, reserves their memory, and keeps the error that stopped it.
 #[derive(Clone)]
 struct Meter {
-    limit: u64,
-    inner: Arc<Mutex<MeterState>>,
-    bodies: Arc<UploadBudget>,
+    bytes_max: u64,
+    upload_budget: Arc<UploadBudget>,
+    state: Arc<Mutex<MeterState>>,
 }
 
 struct MeterState {
-    seen: u64,
-    /// What came while the next part of a form was looked for.
-    seen_between_parts: Option<u64>,
+    bytes: u64,
+    /// Bytes since the last part of a form, while the parser searches the next one.
+    bytes_between_parts: Option<u64>,
     reservation: Reservation,
-    fault: Option<ApiError>,
+    error: Option<ApiError>,
 }
 
 impl Meter {
-    fn new(limit: u64, bodies: &Arc<UploadBudget>) -> Self {
-        let state = MeterState { seen: 0, seen_between_parts: None, reservation: bodies.reserve(), fault: None };
-        Self { limit, inner: Arc::new(Mutex::new(state)), bodies: bodies.clone() }
+    fn new(bytes_max: u64, upload_budget: &Arc<UploadBudget>) -> Self {
+        let reservation = upload_budget.reserve();
+        let state = MeterState { bytes: 0, bytes_between_parts: None, reservation, error: None };
+        Self { bytes_max, upload_budget: upload_budget.clone(), state: Arc::new(Mutex::new(state)) }
     }
 
-    fn count(&self, bytes: u64) -> Result<(), Broken> {
-        let mut state = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-        state.seen += bytes;
-        let before = state.seen_between_parts;
-        state.seen_between_parts = before.map(|seen| seen + bytes);
-        let counted = if state.seen > self.limit {
-            Err(ApiError::body_too_large(self.limit))
-        } else if before.is_some_and(|seen| seen > BETWEEN_PARTS_MAX) {
-            let detail =
-                format!("the form has no part within {BETWEEN_PARTS_MAX} bytes; is its boundary the announced one?");
-            Err(bad_form(detail))
+    fn count(&self, bytes: u64) -> Result<(), Interrupted> {
+        let mut state = self.lock();
+        state.bytes += bytes;
+        let before = state.bytes_between_parts;
+        state.bytes_between_parts = before.map(|seen| seen + bytes);
+        let counted = if state.bytes > self.bytes_max {
+            Err(ApiError::body_too_large(self.bytes_max))
+        // The chunk that ends the search may hold much of the part's content, so it does not count.
+        } else if before.is_some_and(|seen| seen > BETWEEN_PARTS_BYTES_MAX) {
+            Err(bad_form(format!(
+                "the form has no part within {BETWEEN_PARTS_BYTES_MAX} bytes; is its boundary the announced one?"
+            )))
         } else {
             state.reservation.grow(bytes).map_err(ApiError::from)
         };
-        counted.map_err(|fault| {
-            state.fault = Some(fault);
-            Broken
+        counted.map_err(|error| {
+            state.error = Some(error);
+            Interrupted
         })
     }
 
-    /// Whether the next part of a form is looked for, or one is read.
-    fn is_between_parts(&self, is_between: bool) {
-        let mut state = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-        state.seen_between_parts = is_between.then_some(0);
+    /// Starts or ends the count of bytes between two parts of a form.
+    fn set_between_parts(&self, is_between: bool) {
+        self.lock().bytes_between_parts = is_between.then_some(0);
     }
 
-    fn fault_or(&self, otherwise: impl FnOnce() -> ApiError) -> ApiError {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner).fault.take().unwrap_or_else(otherwise)
+    /// The error that stopped the meter, or another one if nothing did.
+    fn error_or(&self, otherwise: impl FnOnce() -> ApiError) -> ApiError {
+        self.lock().error.take().unwrap_or_else(otherwise)
     }
 
-    fn fault(&self, _: Broken) -> ApiError {
-        self.fault_or(|| {
+    fn error(&self, _: Interrupted) -> ApiError {
+        self.error_or(|| {
             let detail = "the request body ended before its announced end";
-            ApiError::new(StatusCode::BAD_REQUEST, "body_incomplete", detail)
+            ApiError::new(Fault::BadRequest, "body_incomplete", detail)
         })
     }
 
-    /// The memory taken so far; it is the caller's to give back.
-    fn reservation(&self) -> Reservation {
-        let mut state = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-        std::mem::replace(&mut state.reservation, self.bodies.reserve())
+    /// Hands over the memory that was reserved so far.
+    fn take_reservation(&self) -> Reservation {
+        std::mem::replace(&mut self.lock().reservation, self.upload_budget.reserve())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, MeterState> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-fn metered(body: Body, meter: Meter) -> impl Stream<Item = Result<Bytes, Broken>> + Send {
+fn metered(body: Body, meter: Meter) -> impl Stream<Item = Result<Bytes, Interrupted>> + Send {
     body.into_data_stream().map(move |chunk| {
-        let chunk = chunk.map_err(|_| Broken)?;
+        let chunk = chunk.map_err(|_| Interrupted)?;
         meter.count(chunk.len() as u64).map(|()| chunk)
     })
 }
 
-fn media_type(headers: &HeaderMap) -> Option<&str> {
-    let value = headers.get(header::CONTENT_TYPE)?.to_str().ok()?;
-    value.split(';').next().map(str::trim)
+fn has_media_type(headers: &HeaderMap, wanted: &str) -> bool {
+    let value = headers.get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok());
+    value.and_then(|value| value.split(';').next()).is_some_and(|t| t.trim().eq_ignore_ascii_case(wanted))
 }
 
 fn too_slow(limit: Duration) -> ApiError {
     let detail = format!("the request body did not arrive within {} ms", limit.as_millis());
-    ApiError::new(StatusCode::REQUEST_TIMEOUT, "body_timeout", detail).flag(Some("--body-timeout-ms"))
+    ApiError::new(Fault::TooSlow, "body_timeout", detail).flag("--body-timeout-ms")
 }

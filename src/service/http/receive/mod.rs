@@ -1,9 +1,12 @@
-//! From a request to accepted work, in the order in which refusals are cheapest.
+//! From a request to work for a worker. The cheapest refusals come first.
+//!
+//! [`query`] reads the query, [`body`] the body within its limits. [`upload`] names what is to be
+//! stored.
 
-pub(crate) mod body;
-pub(crate) mod drainable_body;
-pub(crate) mod query;
-pub(crate) mod upload;
+pub mod body;
+pub mod query;
+pub mod upload;
+
 use std::sync::Arc;
 
 use axum::extract::Request;
@@ -11,61 +14,60 @@ use axum::http::HeaderMap;
 
 use self::body::{BodyKind, BodyLimits, Upload};
 use self::query::Query;
-use super::app::App;
+use super::address::Address;
 use super::error::ApiError;
-use super::negotiate;
+use super::state::AppState;
+use super::{negotiate, stored_mesh};
 use crate::limits::Limits;
 use crate::request;
-use crate::service::http::resources::meshes;
-use crate::service::http::resources::pictures;
-use crate::service::http::resources::pictures::Address;
 use crate::service::jobs::{Task, Work};
 use crate::service::store::{Digest, Reading};
 use crate::spec::Spec;
 
-/// What is to be done.
+/// A request for a picture that was found valid.
 pub struct Received {
-    /// For a worker.
+    /// The work for a worker.
     pub work: Work,
-    /// Where the picture of a stored mesh can be had again.
+    /// The address of the picture, if the mesh is stored.
     pub address: Option<Address>,
 }
 
-/// Reads a request for a picture, and says everything that can be wrong with it before it costs a worker's time.
-pub async fn receive(app: &Arc<App>, request: Request) -> Result<Received, ApiError> {
-    body::check_header(request.headers(), app.rules.limits.body_bytes)?;
-    let Query { reading, overrides } = Query::read(request.uri(), &app.rules)?;
-    // A form brings its document with it, and JSON may be one; without one, the query is all there is and can be judged
-    // before the upload.
+/// Reads a request for a picture. Every fault that shows without reading the mesh is found here,
+/// before it takes a worker's time.
+pub async fn receive(state: &AppState, request: Request) -> Result<Received, ApiError> {
+    body::check_header(request.headers(), state.rules.limits.body_bytes)?;
+    let Query { reading, overrides } = Query::read(request.uri(), &state.rules)?;
+    // Forms and JSON may bring a document. Of every other request, the query is the whole document
+    // and is checked before the upload.
     if !body::is_multipart(request.headers()) && !body::is_json(request.headers()) {
-        request::read(None, &overrides, &app.rules).map_err(query::told)?;
+        request::read(None, &overrides, &state.rules).map_err(query::query_error)?;
     }
-    app.jobs.would_accept()?;
+    state.jobs.would_accept()?;
 
     let headers = request.headers().clone();
-    let upload = body(app, request).await?;
-    let finish = |mut spec: Spec| {
+    let upload = read_upload(state, request).await?;
+    let with_format = |mut spec: Spec| {
         let format = negotiate::image_format(spec.image.format, &headers)?;
         request::set_format(&mut spec, format);
         Ok::<_, ApiError>(Box::new(spec))
     };
     if let Some(document) = document_of(&upload, &reading, &headers) {
-        let (name, spec) = request::read_with_mesh(document, &overrides, &app.rules)?;
+        let (name, spec) = request::read_with_mesh(document, &overrides, &state.rules)?;
         let digest = Digest::parse(&name).ok_or_else(|| request::bad_mesh_name(&name))?;
-        let spec = finish(spec)?;
-        let stored = meshes::find(app, Some(&name))?;
-        let keys = request::all_dotted(document, &overrides, &spec, &app.rules);
-        let address = keys.and_then(|keys| pictures::address(app, digest, &reading, &spec, &keys));
-        return Ok(Received { work: meshes::work(&stored, reading, Task::Draw(spec)), address });
+        let spec = with_format(spec)?;
+        let stored = stored_mesh::find(state, Some(&name))?;
+        let keys = request::all_dotted(document, &overrides, &spec, &state.rules);
+        let address = keys.and_then(|keys| Address::new(state, digest, &reading, &spec, &keys));
+        return Ok(Received { work: stored_mesh::work_on(&stored, reading, Task::Draw(spec)), address });
     }
     upload.bundle.check_sent().map_err(|error| ApiError::from(&error))?;
-    let spec = finish(request::read(upload.document.as_deref(), &overrides, &app.rules)?)?;
-    let Reading { format_in, entry } = reading;
-    let (bundle, task, memory) = (upload.bundle.with_entry(entry), Task::Draw(spec), Arc::new(upload.reservation));
-    Ok(Received { work: Work { bundle, format_in, task, memory }, address: None })
+    let spec = with_format(request::read(upload.document.as_deref(), &overrides, &state.rules)?)?;
+    let memory = Arc::new(upload.reservation);
+    Ok(Received { work: stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory), address: None })
 }
 
-/// The body, if it is a request document in place of a mesh. Who says how the mesh in it is to be read sent one.
+/// The body, if it is a request document that names a stored mesh. A request with `format_in` has a
+/// mesh as its body, so that faulty JSON is then no document.
 fn document_of<'u>(upload: &'u Upload, reading: &Reading, headers: &HeaderMap) -> Option<&'u [u8]> {
     let body = upload.bundle.files().first().filter(|_| upload.kind == BodyKind::Raw)?.bytes.as_ref();
     let is_faulty = || reading.format_in.is_none() && request::is_faulty_document(body, body::is_json(headers));
@@ -73,7 +75,8 @@ fn document_of<'u>(upload: &'u Upload, reading: &Reading, headers: &HeaderMap) -
 }
 
 /// Reads a body within this server's limits.
-pub async fn body(app: &App, request: Request) -> Result<Upload, ApiError> {
-    let Limits { body_bytes: bytes, bundle_entries: files, .. } = app.rules.limits;
-    body::read(request, BodyLimits { bytes, files, time: app.body_timeout, bodies: &app.bodies }).await
+pub async fn read_upload(state: &AppState, request: Request) -> Result<Upload, ApiError> {
+    let Limits { body_bytes: bytes, bundle_entries: files, .. } = state.rules.limits;
+    let limits = BodyLimits { bytes, files, time: state.body_timeout, upload_budget: &state.upload_budget };
+    body::read(request, limits).await
 }

@@ -1,23 +1,23 @@
-//! What a query says: how the mesh is read, and the dotted keys of the request document.
+//! The query of a request: how the mesh is read, and the dotted keys of the request document.
 
 use axum::extract;
-use axum::http::{StatusCode, Uri};
+use axum::http::Uri;
 
 use crate::import::Format;
 use crate::request::{self, Overrides, RequestError, RequestFault, Rules};
-use crate::service::http::error::ApiError;
+use crate::service::http::error::{ApiError, Fault};
 use crate::service::store::Reading;
 
 /// A query.
 pub struct Query {
-    /// `format_in` and `entry`.
+    /// How the mesh is read: `format_in` and `entry`.
     pub reading: Reading,
     /// The dotted keys of the request document.
     pub overrides: Box<Overrides>,
 }
 
 impl Query {
-    /// Reads a query, which says everything once. The dotted keys are still as they were given.
+    /// Reads a query and refuses keys that are given twice. The values of dotted keys stay text.
     pub fn read(uri: &Uri, rules: &Rules) -> Result<Self, ApiError> {
         let extract::Query(mut pairs) = extract::Query::<Vec<(String, String)>>::try_from_uri(uri)
             .map_err(|e| bad("bad_query", format!("the query cannot be read: {}", e.body_text())))?;
@@ -25,7 +25,7 @@ impl Query {
         let format_in = format_in.map(|name| {
             Format::from_name(&name).ok_or_else(|| {
                 let allowed = Format::names().join(", ");
-                bad("out_of_range", format!("`format_in` is {}, and allowed is one of {allowed}", short(&name)))
+                bad("out_of_range", format!("`format_in` is {}, and allowed is one of {allowed}", quote(&name)))
             })
         });
         let reading = Reading { format_in: format_in.transpose()?, entry: take(&mut pairs, "entry")? };
@@ -33,43 +33,39 @@ impl Query {
         Ok(Self { reading, overrides: pairs.into() })
     }
 
-    /// Reads a query that asks what is in a mesh: how it is read, and at which moment of its animation.
-    pub fn moment(uri: &Uri, rules: &Rules) -> Result<(Reading, Option<f64>), ApiError> {
+    /// Reads the query of a report on a mesh: how the mesh is read, and the time in seconds within
+    /// its animation.
+    pub fn read_for_report(uri: &Uri, rules: &Rules) -> Result<(Reading, Option<f64>), ApiError> {
         let Self { reading, overrides } = Self::read(uri, rules)?;
-        Ok((reading, request::read_moment(&overrides, rules).map_err(told)?))
+        Ok((reading, request::read_moment(&overrides, rules).map_err(query_error)?))
     }
 
-    /// Reads a query where nothing is drawn.
-    pub fn reading(uri: &Uri, rules: &Rules) -> Result<Reading, ApiError> {
+    /// Reads the query of an upload, where nothing is drawn.
+    pub fn read_for_upload(uri: &Uri, rules: &Rules) -> Result<Reading, ApiError> {
         let Self { reading, overrides } = Self::read(uri, rules)?;
         match overrides.first() {
             None => Ok(reading),
             Some((key, _)) => {
                 let detail = format!(
                     "nothing is drawn here, so there is no key {}; allowed are `format_in` and `entry`",
-                    short(key)
+                    quote(key)
                 );
-                Err(ApiError::new(StatusCode::BAD_REQUEST, "unknown_key", detail))
+                Err(bad("unknown_key", detail))
             }
         }
     }
 }
 
-/// A part of a query, with what means something there percent-encoded (RFC 3986, 3.4).
-pub fn escape(text: &str) -> String {
-    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~,:/".contains(&byte);
-    text.bytes().map(|byte| if plain(byte) { char::from(byte).into() } else { format!("%{byte:02X}") }).collect()
-}
-
-/// What a query is told about a key that there is not: the request module knows of the document's keys alone.
-pub fn told(mut error: RequestError) -> ApiError {
+/// The error of a dotted key. For an unknown key it adds the keys that only a query has, because
+/// the request module does not know them.
+pub fn query_error(mut error: RequestError) -> ApiError {
     if error.fault == RequestFault::UnknownKey && !error.key.contains('.') {
         error.allowed.push_str("; of the mesh, a query says `format_in` and `entry`");
     }
     error.into()
 }
 
-/// The value of a key that is about the mesh and not about the picture.
+/// Removes a key that concerns the mesh and not the picture, and returns its value.
 fn take(pairs: &mut Vec<(String, String)>, key: &str) -> Result<Option<String>, ApiError> {
     let mut values: Vec<String> = pairs.extract_if(.., |(name, _)| name == key).map(|(_, value)| value).collect();
     if values.len() > 1 {
@@ -79,9 +75,10 @@ fn take(pairs: &mut Vec<(String, String)>, key: &str) -> Result<Option<String>, 
 }
 
 fn bad(code: &'static str, detail: String) -> ApiError {
-    ApiError::new(StatusCode::BAD_REQUEST, code, detail)
+    ApiError::new(Fault::BadRequest, code, detail)
 }
 
-fn short(text: &str) -> String {
+/// The beginning of a client's text, in quotes.
+fn quote(text: &str) -> String {
     format!("{:?}", text.chars().take(40).collect::<String>())
 }

@@ -1,45 +1,35 @@
-//! Answers about the process itself. None of them waits for a lock that is held while drawing, nor for a worker.
+//! Answers about the process itself. None of them waits for a worker, nor for a lock that is held
+//! while drawing.
 
 use std::sync::Arc;
 
-use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderValue, StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 
-use super::capabilities::{BackendDto, CapabilitiesDto};
-use crate::service::http::app::App;
-use crate::service::http::dto::{StatusDto, VersionDto};
+use super::{responses, schema};
+use crate::service::http::dto::{CapabilitiesDto, StatusDto, VersionDto};
 use crate::service::http::error::ApiError;
+use crate::service::http::state::AppState;
 
-/// The process is alive.
+/// 200 while the process is alive.
 pub async fn healthz() -> Response {
-    fresh(Json(StatusDto { status: "ok" }))
+    responses::uncached(StatusDto { status: "ok" })
 }
 
-/// The process takes work.
-pub async fn readyz(State(app): State<Arc<App>>) -> Result<Response, ApiError> {
-    if app.is_draining() {
-        let detail = "the server is shutting down";
-        return Err(ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "draining", detail).retry_after(5));
+/// 200 while the process takes work.
+pub async fn readyz(State(state): State<Arc<AppState>>) -> Result<Response, ApiError> {
+    if state.is_draining() {
+        return Err(ApiError::draining("the server is shutting down"));
     }
-    Ok(fresh(Json(StatusDto { status: "ready" })))
+    Ok(responses::uncached(StatusDto { status: "ready" }))
 }
 
-/// Name and version.
+/// Name and version of the program.
 pub async fn version() -> Response {
-    fresh(Json(VersionDto::new()))
+    responses::uncached(VersionDto::new())
 }
 
-/// Formats, styles, keys, paths, limits and load.
-pub async fn capabilities(State(app): State<Arc<App>>) -> Response {
-    let rules = &app.rules;
-    let backend = BackendDto::new(rules.backend, app.gpu.status());
-    fresh(Json(CapabilitiesDto::new(&rules.limits, backend, app.workers, app.jobs.load(), &app.meshes)))
-}
-
-fn fresh(body: impl IntoResponse) -> Response {
-    let mut response = body.into_response();
-    response.headers_mut().insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-    response
+/// Formats, styles, keys, limits and load, beside the given paths.
+pub fn capabilities(state: &AppState, paths: Vec<String>) -> Response {
+    responses::uncached(CapabilitiesDto::new(state, schema::PATH, paths))
 }

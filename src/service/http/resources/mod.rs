@@ -1,9 +1,24 @@
-//! TODO room.
+//! The handlers, one file per resource, and what several of them share: [`run`] waits for a worker,
+//! [`responses`] writes answers that more than one resource gives.
+//!
+//! Handlers are named after their method. None of them computes: work goes to the job queue.
 
-pub(crate) mod capabilities;
-pub(crate) mod health;
-pub(crate) mod jobs;
-pub(crate) mod meshes;
-pub(crate) mod pictures;
-pub(crate) mod render;
-pub(crate) mod schema;
+pub mod health;
+pub mod jobs;
+pub mod meshes;
+pub mod pictures;
+pub mod render;
+mod responses;
+mod run;
+pub mod schema;
+
+use axum::extract::Path;
+use axum::extract::rejection::PathRejection;
+
+/// The one variable segment of a path. It is a rejection if the segment is not UTF-8.
+type PathName = Result<Path<String>, PathRejection>;
+
+/// The segment's text. None if it is not UTF-8.
+fn text_of(name: PathName) -> Option<String> {
+    name.ok().map(|Path(text)| text)
+}

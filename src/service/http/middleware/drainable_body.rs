@@ -1,8 +1,9 @@
-//! A request's body, lent to its handler and taken back afterwards.
+//! A request body that can be read on after its handler has stopped reading.
 //!
-//! A handler that refuses early (a full queue, a bad key) leaves the body unread. What a client has sent must then be
-//! read and thrown away before the connection can carry its next request; and where that is too much, the client must be
-//! told that the connection closes, or its next request would fail for no fault of its own.
+//! A handler that refuses early (a full queue, a bad key) leaves the body unread. The rest must be
+//! read and thrown away before the connection can carry its next request. Where the rest is too
+//! long for that, the answer must announce that the connection closes: otherwise the client's next
+//! request would fail.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,32 +14,35 @@ use axum::body::{Body, BodyDataStream, Bytes};
 use axum::http::{HeaderMap, header};
 use futures_util::{Stream, StreamExt as _};
 
-/// What is read and thrown away for the sake of keeping a connection: as much as fits the sockets' buffers or so.
+/// Most bytes that are thrown away to keep a connection: about what the sockets' buffers hold.
 const DISCARD_BYTES_MAX: usize = 1 << 20;
+
+/// Longest time for the same.
 const DISCARD_TIME_MAX: Duration = Duration::from_millis(250);
 
-/// A handle to a body that others hold too.
+/// A shared handle to a request body.
 #[derive(Clone)]
-pub struct Lent(Arc<Mutex<Inner>>);
+pub struct DrainableBody(Arc<Mutex<Inner>>);
 
 struct Inner {
     body: BodyDataStream,
-    /// Whether the end was seen, or an error, after which there is nothing to read either.
+    /// The end or an error was seen. Neither leaves anything to read.
     ended: bool,
-    /// Whether a byte was asked for; from then on the client has been told to go on sending.
+    /// Reading has begun, so that a client that waits for `100 Continue` has got it.
     begun: bool,
 }
 
-impl Lent {
-    /// Takes a body, and makes one that reads from it.
+impl DrainableBody {
+    /// Wraps a body. The second value is the body that the handler reads.
     pub fn new(body: Body) -> (Self, Body) {
         let inner = Inner { body: body.into_data_stream(), ended: false, begun: false };
-        let lent = Self(Arc::new(Mutex::new(inner)));
-        (lent.clone(), Body::from_stream(lent))
+        let drainable = Self(Arc::new(Mutex::new(inner)));
+        (drainable.clone(), Body::from_stream(drainable))
     }
 
-    /// Reads and drops what is left, if that is little. Whether the connection can carry another request.
-    pub async fn discard(mut self, headers: &HeaderMap) -> bool {
+    /// Reads the rest and throws it away, if it is short. True if the connection can carry another
+    /// request.
+    pub async fn drain(mut self, headers: &HeaderMap) -> bool {
         let (ended, begun) = {
             let inner = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             (inner.ended, inner.begun)
@@ -46,7 +50,7 @@ impl Lent {
         if ended {
             return true;
         }
-        // This client waits for a word before it sends: reading would be the word.
+        // The client waits for `100 Continue`, and reading would send it.
         if headers.contains_key(header::EXPECT) && !begun {
             return false;
         }
@@ -65,7 +69,7 @@ impl Lent {
     }
 }
 
-impl Stream for Lent {
+impl Stream for DrainableBody {
     type Item = Result<Bytes, axum::Error>;
 
     fn poll_next(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Self::Item>> {

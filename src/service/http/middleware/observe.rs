@@ -1,24 +1,25 @@
-//! Around every request: its id, its span in the log, and the body of its error.
+//! The id of each request, its span in the log, and the body of its error.
 
 use std::time::Instant;
 
 use axum::body::Body;
 use axum::extract::Request;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Version, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Version, header};
 use axum::middleware::Next;
 use axum::response::Response;
 use tracing::Instrument as _;
 
-use super::dto::ProblemDto;
-use super::error::ApiError;
-use crate::service::http::receive::drainable_body::Lent;
+use super::drainable_body::DrainableBody;
+use crate::service::http::dto::ProblemDto;
+use crate::service::http::error::ApiError;
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-/// A path can be as long as a header may be; a log line should not.
+/// Longest path in a log line. A request's path can be as long as a header may be.
 const LOGGED_PATH_CHARS_MAX: usize = 256;
 
-/// Gives the request an id and a span, logs how it ended, and turns errors into `application/problem+json`.
+/// Gives the request an id and a span, logs how it ended, and turns errors into
+/// `application/problem+json`.
 pub async fn observe(request: Request, next: Next) -> Response {
     let began = Instant::now();
     let id = request_id(request.headers());
@@ -26,11 +27,11 @@ pub async fn observe(request: Request, next: Next) -> Response {
     let span = tracing::info_span!("request", request_id = %id, method = %request.method(), path);
     let (headers, version) = (request.headers().clone(), request.version());
     let (parts, body) = request.into_parts();
-    let (lent, body) = Lent::new(body);
+    let (drainable, body) = DrainableBody::new(body);
     let mut response = next.run(Request::from_parts(parts, body)).instrument(span.clone()).await;
-    complete(&mut response, &id);
+    add_id_and_problem(&mut response, &id);
     // HTTP/2 ends a stream without ending the connection.
-    if version < Version::HTTP_2 && !lent.discard(&headers).await {
+    if version < Version::HTTP_2 && !drainable.drain(&headers).await {
         response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
     }
 
@@ -44,19 +45,20 @@ pub async fn observe(request: Request, next: Next) -> Response {
     response
 }
 
-/// The client's own id, if it is fit for a log line and a header; a new one otherwise.
+/// The client's own id, if it is safe in a log line and a header. A new one otherwise.
 fn request_id(headers: &HeaderMap) -> String {
-    let sane = |id: &&str| {
+    let is_safe = |id: &&str| {
         (1..=128).contains(&id.len()) && id.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
     };
-    let given = headers.get(REQUEST_ID).and_then(|v| v.to_str().ok()).filter(sane);
+    let given = headers.get(REQUEST_ID).and_then(|v| v.to_str().ok()).filter(is_safe);
     given.map_or_else(|| uuid::Uuid::now_v7().to_string(), str::to_owned)
 }
 
-fn complete(response: &mut Response, id: &str) {
+/// Adds the request's id, and to an error its problem document.
+fn add_id_and_problem(response: &mut Response, id: &str) {
     let status = response.status();
     if status.is_client_error() || status.is_server_error() {
-        let error = response.extensions_mut().get_or_insert_with(|| foreign(status)).clone();
+        let error = response.extensions_mut().get_or_insert_with(|| ApiError::of_framework(status)).clone();
         let body = serde_json::to_vec(&ProblemDto::new(&error, id)).unwrap_or_default();
         let headers = response.headers_mut();
         headers.remove(header::CONTENT_LENGTH);
@@ -66,17 +68,5 @@ fn complete(response: &mut Response, id: &str) {
     }
     if let Ok(value) = HeaderValue::from_str(id) {
         response.headers_mut().insert(REQUEST_ID, value);
-    }
-}
-
-/// An error that the framework answered by itself.
-fn foreign(status: StatusCode) -> ApiError {
-    match status {
-        StatusCode::METHOD_NOT_ALLOWED => {
-            let detail = "this path does not answer to this method; the Allow header says to which it does";
-            ApiError::new(status, "method_not_allowed", detail)
-        }
-        StatusCode::INTERNAL_SERVER_ERROR => ApiError::internal(),
-        _ => ApiError::new(status, "bad_request", status.canonical_reason().unwrap_or("the request failed")),
     }
 }

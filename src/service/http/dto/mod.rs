@@ -1,0 +1,101 @@
+//! The JSON of every answer. Domain types do not serialise themselves, so that a change of theirs
+//! cannot change the interface.
+
+mod capabilities;
+mod job;
+
+pub use capabilities::CapabilitiesDto;
+pub use job::JobDto;
+
+use serde::Serialize;
+
+use super::error::ApiError;
+use crate::image::ImageFormat;
+use crate::import::Bundle;
+use crate::service::store::Digest;
+
+/// An error: a problem document (RFC 9457).
+#[derive(Serialize)]
+pub struct ProblemDto<'a> {
+    r#type: String,
+    title: &'a str,
+    status: u16,
+    detail: &'a str,
+    code: &'a str,
+    request_id: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    flag: Option<&'a str>,
+}
+
+impl<'a> ProblemDto<'a> {
+    /// The problem document of an error.
+    pub fn new(error: &'a ApiError, request_id: &'a str) -> Self {
+        let status = error.status();
+        Self {
+            r#type: format!("urn:meshsnap:error:{}", error.code),
+            title: status.canonical_reason().unwrap_or("Error"),
+            status: status.as_u16(),
+            detail: &error.detail,
+            code: error.code,
+            request_id,
+            flag: error.flag,
+        }
+    }
+}
+
+/// The answer of `/healthz` and `/readyz`.
+#[derive(Serialize)]
+pub struct StatusDto {
+    /// `ok` or `ready`.
+    pub status: &'static str,
+}
+
+/// The answer of `/version`.
+#[derive(Serialize)]
+pub struct VersionDto {
+    name: &'static str,
+    version: &'static str,
+}
+
+impl VersionDto {
+    /// Name and version of this program.
+    pub fn new() -> Self {
+        Self { name: env!("CARGO_PKG_NAME"), version: env!("CARGO_PKG_VERSION") }
+    }
+}
+
+/// A stored mesh.
+#[derive(Serialize)]
+pub struct MeshDto {
+    sha256: String,
+    /// Bytes of its files, as they were sent.
+    size_bytes: u64,
+    files: usize,
+    /// The address of its report.
+    pub url: String,
+    render_url: String,
+}
+
+impl MeshDto {
+    /// The stored mesh with this name.
+    pub fn new(digest: Digest, bundle: &Bundle) -> Self {
+        let url = format!("/v1/meshes/{digest}");
+        let render_url = format!("{url}/render.png");
+        Self {
+            sha256: digest.to_string(),
+            size_bytes: bundle.bytes_len(),
+            files: bundle.files().len(),
+            url,
+            render_url,
+        }
+    }
+}
+
+/// The media type of a picture.
+pub fn media_type(format: ImageFormat) -> &'static str {
+    match format {
+        ImageFormat::Png => "image/png",
+        ImageFormat::Webp => "image/webp",
+        ImageFormat::Jpeg => "image/jpeg",
+    }
+}

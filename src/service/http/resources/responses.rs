@@ -1,0 +1,72 @@
+//! Answers that several resources give.
+
+use axum::Json;
+use axum::body::Body;
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
+use serde::Serialize;
+
+use crate::service::http::conditional;
+use crate::service::http::dto::{JobDto, media_type};
+use crate::service::jobs::{Finished, Job};
+
+/// A picture, with its back-end, timings and warnings as headers.
+pub fn picture(finished: &Finished) -> Response {
+    let timings = finished.timings.parts().map(|(name, took)| format!("{name};dur={:.3}", took.as_secs_f64() * 1e3));
+    let headers = [
+        (header::CONTENT_TYPE, HeaderValue::from_static(media_type(finished.format))),
+        conditional::etag(&conditional::content_tag(&finished.picture)),
+        (HeaderName::from_static("x-render-backend"), HeaderValue::from_static(finished.backend.name())),
+        (HeaderName::from_static("server-timing"), header_text(&timings.join(", "))),
+    ];
+    // Codes only: the sentences are in the job's state.
+    let mut codes: Vec<&str> = Vec::new();
+    for warning in &finished.warnings {
+        if !codes.contains(&warning.code) {
+            codes.push(warning.code);
+        }
+    }
+    let warnings = (!codes.is_empty()).then(|| (HeaderName::from_static("x-warnings"), header_text(&codes.join(", "))));
+    let choice = finished.selection.as_ref().map(|choice| {
+        [
+            (HeaderName::from_static("x-expected-error"), header_text(&choice.expected_error.to_string())),
+            (HeaderName::from_static("x-chosen"), header_text(&choice.to_string())),
+        ]
+    });
+    let mut response = (StatusCode::OK, headers, finished.picture.clone()).into_response();
+    response.headers_mut().extend(choice.into_iter().flatten().chain(warnings));
+    response
+}
+
+/// 202 with the state and the location of an accepted job.
+pub fn accepted(job: &Job) -> Response {
+    let mut response = (StatusCode::ACCEPTED, job_state(job)).into_response();
+    response.headers_mut().insert(header::LOCATION, header_text(&format!("/v1/jobs/{}", job.id)));
+    response
+}
+
+/// The state of a job.
+pub fn job_state(job: &Job) -> Response {
+    uncached(JobDto::new(job))
+}
+
+/// JSON that caches must not keep, because it changes.
+pub fn uncached(body: impl Serialize) -> Response {
+    ([(header::CACHE_CONTROL, "no-store")], Json(body)).into_response()
+}
+
+/// The body of an answer to HEAD whose content was not made: its length is unknown.
+pub fn body_of_unknown_length() -> Body {
+    Body::from_stream(futures_util::stream::empty::<Result<Bytes, std::convert::Infallible>>())
+}
+
+/// Sets `Preference-Applied`.
+pub fn set_preference_applied(response: &mut Response, preference: &str) {
+    response.headers_mut().insert("preference-applied", header_text(preference));
+}
+
+/// A header's value; empty if the text cannot stand in a header.
+pub fn header_text(text: &str) -> HeaderValue {
+    HeaderValue::from_str(text).unwrap_or_else(|_| HeaderValue::from_static(""))
+}

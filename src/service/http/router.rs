@@ -1,0 +1,61 @@
+//! The routes: each path, its handlers, and the middleware around them.
+
+use std::sync::Arc;
+
+use axum::Router;
+use axum::extract::{DefaultBodyLimit, State};
+use axum::middleware::{from_fn, from_fn_with_state};
+use axum::response::Response;
+use axum::routing::{MethodRouter, get, post};
+
+use super::error::ApiError;
+use super::middleware::{auth, observe};
+use super::resources::{health, jobs, meshes, pictures, render, schema};
+use super::state::AppState;
+
+/// The router of the whole interface.
+pub fn router(state: &Arc<AppState>) -> Router {
+    let api = protected_routes()
+        .into_iter()
+        .fold(Router::new(), |router, (path, methods)| router.route(path, methods))
+        .route_layer(from_fn_with_state(state.clone(), auth::check));
+    Router::new()
+        .route("/healthz", get(health::healthz))
+        .route("/readyz", get(health::readyz))
+        .route("/version", get(health::version))
+        .route(schema::OPENAPI_PATH, get(schema::openapi))
+        .merge(api)
+        .fallback(|| async {
+            ApiError::not_found(
+                "there is nothing at this path; the work is done at POST /v1/render, and /openapi.json lists the paths",
+            )
+        })
+        // Bodies, forms included, are metered as they are read. The limit of axum, 2 MB, would come
+        // before `--limit-body-bytes`.
+        .layer(DefaultBodyLimit::disable())
+        .layer(from_fn(observe::observe))
+        .with_state(state.clone())
+}
+
+/// The routes that need an API key where keys are configured.
+fn protected_routes() -> [(&'static str, MethodRouter<Arc<AppState>>); 9] {
+    [
+        ("/v1/render", post(render::post)),
+        ("/v1/meshes", post(meshes::post)),
+        ("/v1/meshes/{sha256}", get(meshes::get).put(meshes::put).delete(meshes::delete)),
+        // The last segment is `render.png` and so on: the router matches whole segments only.
+        ("/v1/meshes/{sha256}/{picture}", get(pictures::get)),
+        ("/v1/jobs", post(jobs::post)),
+        ("/v1/jobs/{id}", get(jobs::get).delete(jobs::delete)),
+        ("/v1/jobs/{id}/result", get(jobs::result)),
+        (schema::PATH, get(schema::get)),
+        ("/v1/capabilities", get(capabilities)),
+    ]
+}
+
+/// This handler stands here because it lists the routes.
+async fn capabilities(State(state): State<Arc<AppState>>) -> Response {
+    let routes = protected_routes().into_iter();
+    let paths = routes.map(|(path, _)| path.replace("{picture}", "render.{png|webp|jpg}")).collect();
+    health::capabilities(&state, paths)
+}

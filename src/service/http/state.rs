@@ -1,0 +1,86 @@
+//! The state that all handlers share.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use super::static_document::StaticDocument;
+use crate::backend::{GpuHost, HardwareHint};
+use crate::config::{Config, cores, why_no_gpu};
+use crate::limits::Limits;
+use crate::request::{self, Rules};
+use crate::service::jobs::{JobSettings, Jobs, UploadBudget, pipeline_renderers};
+use crate::service::store::Store;
+
+/// The state that all handlers share.
+pub struct AppState {
+    /// The limits and defaults by which request documents are read.
+    pub rules: Rules,
+    /// The JSON Schema of request documents under these rules.
+    pub schema: StaticDocument,
+    /// The job queue and its workers.
+    pub jobs: Jobs,
+    /// The process's GPU, opened on first need.
+    pub gpu: Arc<GpuHost>,
+    /// The memory that uploads share.
+    pub upload_budget: Arc<UploadBudget>,
+    /// The stored meshes.
+    pub meshes: Store,
+    /// Time limit for reading one request body.
+    pub body_timeout: Duration,
+    /// Number of worker threads.
+    pub workers: u64,
+    /// Accepted bearer tokens. If there are none, no request needs one.
+    pub api_keys: Vec<String>,
+    draining: AtomicBool,
+}
+
+impl AppState {
+    /// Builds the state and starts the workers.
+    pub fn start(config: &Config) -> std::io::Result<Arc<Self>> {
+        let threads = match config.worker_threads {
+            0 => (cores() / config.workers.max(1)).max(1),
+            given => given,
+        };
+        let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));
+        let renderers = pipeline_renderers(gpu.clone(), threads as usize, config.limits.clone());
+        let Limits { queue_per_worker, job_ms, .. } = config.limits;
+        let settings = JobSettings {
+            workers: to_usize(config.workers),
+            queue: to_usize(queue_per_worker.saturating_mul(config.workers)),
+            job_time: Duration::from_millis(job_ms),
+            result_ttl: Duration::from_millis(config.result_ttl_ms),
+            result_bytes: config.result_bytes,
+            result_count: to_usize(config.result_count),
+        };
+        let rules = Rules { limits: config.limits.clone(), backend: config.backend };
+        let schema = format!("{:#}\n", request::schema(&rules));
+        Ok(Arc::new(Self {
+            schema: StaticDocument::new(schema, "application/schema+json"),
+            rules,
+            jobs: Jobs::start(settings, renderers)?,
+            gpu,
+            upload_budget: UploadBudget::new(config.uploads_bytes),
+            meshes: Store::new(config.mesh_bytes, to_usize(config.mesh_count)),
+            body_timeout: Duration::from_millis(config.body_timeout_ms),
+            workers: config.workers,
+            api_keys: config.api_keys.clone(),
+            draining: AtomicBool::new(false),
+        }))
+    }
+
+    /// Refuses new work from now on. Accepted jobs go on.
+    pub fn drain(&self) {
+        self.draining.store(true, Ordering::Relaxed);
+        self.jobs.drain();
+    }
+
+    /// True once [`AppState::drain`] was called.
+    pub fn is_draining(&self) -> bool {
+        self.draining.load(Ordering::Relaxed)
+    }
+}
+
+fn to_usize(number: u64) -> usize {
+    usize::try_from(number).unwrap_or(usize::MAX)
+}
