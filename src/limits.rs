@@ -4,7 +4,7 @@
 //! the input first spends that many bytes from the job's [`Budget`].
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// What a job or a request may use. Defaults are those of the public contract; every one can be configured.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -129,18 +129,49 @@ impl Budget {
 #[error("the job was stopped before it finished")]
 pub struct Stopped;
 
-/// A flag that whoever keeps the clock raises; the pipeline only looks at it, between stages and inside long loops.
+/// A flag that the owner of the clock raises. The pipeline polls it between stages and inside long loops.
 #[derive(Clone, Debug, Default)]
-pub struct Deadline(Arc<AtomicBool>);
+pub struct Deadline(Arc<DeadlineState>);
+
+#[derive(Debug, Default)]
+struct DeadlineState {
+    is_stopped: AtomicBool,
+    /// Tests count polls, because times depend on the machine.
+    counter: Option<PollCounter>,
+}
+
+#[derive(Debug)]
+struct PollCounter {
+    polls: AtomicU64,
+    stop_at: u64,
+}
 
 impl Deadline {
-    /// Tells the job to stop at its next check.
+    /// A deadline that counts its polls and stops at the poll numbered `stop_at`, from 1.
+    #[doc(hidden)]
+    pub fn after_polls(stop_at: u64) -> Self {
+        let counter = Some(PollCounter { polls: AtomicU64::new(0), stop_at });
+        Self(Arc::new(DeadlineState { is_stopped: AtomicBool::new(false), counter }))
+    }
+
+    /// Polls so far, of a deadline that counts them.
+    #[doc(hidden)]
+    pub fn polls(&self) -> u64 {
+        self.0.counter.as_ref().map_or(0, |counter| counter.polls.load(Ordering::Relaxed))
+    }
+
+    /// Tells the job to stop at its next poll.
     pub fn stop(&self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.0.is_stopped.store(true, Ordering::Relaxed);
     }
 
     /// Fails once [`Deadline::stop`] was called.
     pub fn check(&self) -> Result<(), Stopped> {
-        if self.0.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
+        if let Some(counter) = &self.0.counter
+            && counter.polls.fetch_add(1, Ordering::Relaxed) + 1 >= counter.stop_at
+        {
+            self.stop();
+        }
+        if self.0.is_stopped.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
     }
 }

@@ -1,6 +1,5 @@
-//! Hulls of very many edges: what they are made of is bounded, and they end soon when their job does.
-
-use std::time::{Duration, Instant};
+//! Hulls of very many edges: what they are made of is bounded, and they end soon when their job
+//! does.
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
@@ -10,14 +9,12 @@ use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use meshsnap::plan;
 
-use crate::render::twins::pictures::gpus;
+use crate::support::families::outlines::SHAPES;
+use crate::support::families::soups::Random;
+use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
-use crate::support::outline_shapes::SHAPES;
-use crate::support::soups::Random;
+use crate::support::work::assert_stops_at_any_poll;
 use crate::support::{scenes, shapes};
-
-/// As much as a job may go on after its deadline: far longer than what lies between two looks at it, on a machine that does other work.
-const SOON: Duration = Duration::from_millis(1000);
 
 /// A mesh of so many triangles in the unit box, up to `size` long, that share no edge: STL.
 fn disjoint(count: u32, size: f32) -> Mesh {
@@ -36,41 +33,23 @@ fn disjoint(count: u32, size: f32) -> Mesh {
     scenes::mesh_of(&stl).unwrap()
 }
 
-/// Runs `job` to its end, then again with a deadline that is raised at moments all over the time that it took: how often it was stopped.
-fn stop_all_over<T>(moments: u32, mut job: impl FnMut(&Deadline) -> Option<T>) -> u32 {
-    let begun = Instant::now();
-    assert!(job(&Deadline::default()).is_some());
-    let whole = begun.elapsed();
-    let mut stopped = 0;
-    for moment in 0..moments {
-        let deadline = Deadline::default();
-        std::thread::scope(|scope| {
-            let raised = scope.spawn(|| {
-                std::thread::sleep(whole * moment / moments);
-                deadline.stop();
-                Instant::now()
-            });
-            let is_stopped = job(&deadline).is_none();
-            let ended = Instant::now();
-            let late = ended.saturating_duration_since(raised.join().unwrap());
-            assert!(late < SOON, "{late:?} after its end, {moment} of {moments} parts of {whole:?}");
-            stopped += u32::from(is_stopped);
-        });
-    }
-    stopped
-}
-
 #[test]
 fn hulls_of_many_edges_end_soon_after_their_job() {
-    let mesh = disjoint(200_000, 0.02);
+    const TRIANGLES: u32 = 100_000;
+    let mesh = disjoint(TRIANGLES, 0.02);
     let spec = scenes::spec(&[("style", "outline"), ("outline.method", "hull"), ("size", "128")]);
     let build = |deadline: &Deadline| plan::build(&mesh, &spec, &mut Budget::new(&Limits::default()), deadline).ok();
-    // One that is raised late in a time that varies may come after the end.
-    assert!(stop_all_over(8, build) >= 4);
+    let polls = assert_stops_at_any_poll(8, 4, build);
+    assert!(polls >= u64::from(TRIANGLES / TRIANGLES_PER_POLL), "{polls} polls while planning");
     let plan = scenes::plan(&mesh, &spec);
-    let mut renderer = CpuRenderer::new(2);
-    assert!(stop_all_over(4, |deadline| renderer.draw(&plan, deadline).ok()) >= 2);
+    let threads = 2;
+    let mut renderer = CpuRenderer::new(threads);
+    let polls = assert_stops_at_any_poll(4, 2 * threads as u64, |deadline| renderer.draw(&plan, deadline).ok());
+    assert!(polls >= u64::from(TRIANGLES / TRIANGLES_PER_POLL), "{polls} polls while drawing");
 }
+
+/// Triangles of a hull that may lie between two polls of the deadline.
+const TRIANGLES_PER_POLL: u32 = 1 << 15;
 
 #[test]
 fn hulls_of_many_edges_have_few_triangles_where_there_are_few_pixels() {
@@ -122,7 +101,7 @@ fn hulls_are_the_same_on_both_back_ends_with_any_samples() {
     assert_eq!(cases, 3 * 4 * 3 * gpus.len());
 }
 
-/// How many pieces the dark pixels of a picture are of, where those that touch at a corner are one.
+/// Counts the connected pieces of a picture's dark pixels; a common corner connects.
 fn dark_pieces(picture: &Image) -> usize {
     let [width, height] = [picture.width_px as usize, picture.height_px as usize];
     let mut is_left: Vec<bool> = picture.rgba.chunks(4).map(|pixel| pixel[0] < 128).collect();

@@ -1,4 +1,5 @@
-//! Transparent layers: the same on both back-ends sample for sample, and what sorting every sample by hand gives.
+//! Transparent layers: the same on both back-ends sample for sample, and what sorting every sample
+//! by hand gives.
 
 use std::borrow::Cow;
 
@@ -9,9 +10,9 @@ use meshsnap::image::{Image, srgb8_thresholds};
 use meshsnap::limits::Deadline;
 use meshsnap::plan::{DrawPlan, Faces, PeelingPass, ShadedMaterial, SurfacePass, flags, pass_mask};
 
-use crate::render::twins::pictures::gpus;
+use crate::support::families::soups::{KINDS, Kind, Random, Soup, View};
+use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
-use crate::support::soups::{KINDS, Kind, Random, Soup, View};
 
 const PASS: PeelingPass = PeelingPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
 
@@ -80,7 +81,8 @@ impl Layered {
     }
 }
 
-/// How many samples of all layers the plan has. Compares them and the visibility buffer on the CPU's ways and the GPU's.
+/// Counts the samples of all layers, and compares them and the visibility buffer on every CPU
+/// set-up and the GPU.
 fn compare(plan: &DrawPlan<'_>, what: &str) -> usize {
     let deadline = Deadline::default();
     let mut cpu = CpuRenderer::new(1);
@@ -214,7 +216,8 @@ fn layers_are_what_sorting_each_sample_gives() {
     assert!(deepest >= 12, "no sample has more than {deepest} layers");
 }
 
-/// Every triangle drawn alone, then each sample's triangles sorted and blended in f64; and how many layers the deepest has.
+/// Every triangle drawn alone, then each sample's triangles sorted and blended in f64; and how many
+/// layers the deepest has.
 fn sorted(plan: &DrawPlan<'_>) -> (Image, usize) {
     let surface = plan.surface.as_ref().unwrap();
     let len = (plan.width_px * plan.height_px * plan.samples) as usize;

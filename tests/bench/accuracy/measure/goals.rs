@@ -15,11 +15,12 @@ struct Goal {
     by: By,
 }
 
-/// Who measures a goal.
+/// The program that measures a goal.
 enum By {
     /// This benchmark, from its rows.
     Bench(fn(&[Row]) -> String),
-    /// Tests of the suite. What stands in the page is kept, and marked as missing where nothing does.
+    /// Tests of the suite. What stands in the page is kept, and marked as missing where nothing
+    /// does.
     Suite(&'static str),
 }
 
@@ -109,7 +110,7 @@ pub fn page(rows: &[Row], machine: &Machine, effort: Effort, before: &str) -> St
     text
 }
 
-/// What the page says was measured for a goal.
+/// The measurement that the page states for a goal.
 fn kept(before: &str, number: u32) -> Option<String> {
     let line = before.lines().find(|line| line.starts_with(&format!("| {number} |")))?;
     let cell = line.trim_end().trim_end_matches('|').rsplit('|').next()?.trim();
