@@ -13,6 +13,7 @@ use crate::support::families::outlines::SHAPES;
 use crate::support::families::soups::Random;
 use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
+use crate::support::truth::cases;
 use crate::support::work::assert_stops_at_any_poll;
 use crate::support::{scenes, shapes};
 
@@ -68,10 +69,13 @@ fn hulls_of_many_edges_have_few_triangles_where_there_are_few_pixels() {
 #[test]
 fn hulls_are_the_same_on_both_back_ends_with_any_samples() {
     let Some(gpus) = gpus() else { return };
-    let mut cases = 0;
+    let mut cpu = CpuRenderer::new(2);
+    let mut renderers = gpus.each_ref().map(|gpu| GpuRenderer::new(gpu.clone()));
+    let samples: &[&str] = cases(&["1", "8"], &["1", "4", "8", "16"]);
+    let mut compared = 0;
     for (name, obj) in [("gear", shapes::gear(9)), ("sheet", shapes::sheet(6)), ("balls", shapes::two_balls())] {
         let mesh = scenes::mesh(&obj);
-        for samples in ["1", "4", "8", "16"] {
+        for samples in samples.iter().copied() {
             for (unit, thickness, opacity) in [("px", "5", "1"), ("object", "0.07", "1"), ("px", "2.5", "0.4")] {
                 let spec = scenes::spec(&[
                     ("style", "outline"),
@@ -86,19 +90,19 @@ fn hulls_are_the_same_on_both_back_ends_with_any_samples() {
                 ]);
                 let plan = scenes::plan(&mesh, &spec);
                 let what = format!("{name}, {samples} samples, {thickness} {unit}, opacity {opacity}");
-                let cpu = CpuRenderer::new(2).draw(&plan, &Deadline::default()).unwrap();
+                let cpu = cpu.draw(&plan, &Deadline::default()).unwrap();
                 let is_red = |p: &&[u8]| p[3] > 0 && p[0] > 150 && p[1] < 80;
                 let red = cpu.rgba.chunks(4).filter(is_red).count();
                 assert!(red > 300, "{what}: {red} pixels of an outline");
-                for gpu in gpus {
-                    let gpu = GpuRenderer::new(gpu.clone()).draw(&plan, &Deadline::default()).unwrap();
+                for gpu in &mut renderers {
+                    let gpu = gpu.draw(&plan, &Deadline::default()).unwrap();
                     Likeness::of(&cpu, &gpu).assert(Tolerance::TWINS, &what);
-                    cases += 1;
+                    compared += 1;
                 }
             }
         }
     }
-    assert_eq!(cases, 3 * 4 * 3 * gpus.len());
+    assert_eq!(compared, 3 * samples.len() * 3 * gpus.len());
 }
 
 /// Counts the connected pieces of a picture's dark pixels; a common corner connects.

@@ -29,7 +29,7 @@ const GOALS: [Goal; 10] = [
         number: 1,
         measure: "isolated exact lines, 0.25 to 16 px wide, all angles, 64 places within a pixel",
         goal: "RMSE <= 0.35/255, largest <= 1/255, width +-0.005 px",
-        by: By::Suite("accuracy_wires::isolated_lines"),
+        by: By::Suite("accuracy::wires::isolated_lines"),
     },
     Goal {
         number: 2,
@@ -42,19 +42,19 @@ const GOALS: [Goal; 10] = [
         number: 4,
         measure: "triangles and lines with ends behind the eye",
         goal: "0.01 px, no false fill, no NaN",
-        by: By::Suite("accuracy_behind_eye"),
+        by: By::Suite("accuracy::behind_eye"),
     },
     Goal {
         number: 5,
         measure: "outlines of 1 to 32 px against the exact dilated contour",
         goal: "mean +-0.05 px, 99th percentile <= 0.25 px, no gaps",
-        by: By::Suite("accuracy_outlines"),
+        by: By::Suite("accuracy::outlines"),
     },
     Goal {
         number: 6,
         measure: "watertightness: 10^6 shared edges, fans, shells around the eye",
         goal: "0 missing, 0 double",
-        by: By::Suite("accuracy_geometry"),
+        by: By::Suite("accuracy::geometry"),
     },
     Goal {
         number: 7,

@@ -112,12 +112,20 @@ impl Scene {
         }
     }
 
+    /// The scene's model where it is not at hand, so that a made mesh takes its place.
+    pub fn missing_model(&self) -> Option<&'static str> {
+        match self.source {
+            Source::Model(file, _) if !models().join(file).is_file() => Some(file),
+            _ => None,
+        }
+    }
+
     /// A description for readers of the report.
     pub fn about(&self) -> String {
         let what = match self.source {
             Source::Made(_) => "made by the benchmark".to_owned(),
-            Source::Model(file, _) if models().join(file).is_file() => file.to_owned(),
-            Source::Model(file, _) => format!("a torus in place of {file}, which is not there"),
+            Source::Model(file, _) if self.missing_model().is_none() => file.to_owned(),
+            Source::Model(file, _) => format!("a made mesh in place of {file}, which is not there"),
         };
         if self.width_px > 0.0 { format!("{what}, lines {} px wide", self.width_px) } else { what }
     }

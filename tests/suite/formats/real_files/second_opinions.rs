@@ -224,7 +224,7 @@ impl Triangles<'_> {
         let triangles: Vec<[usize; 3]> = match primitive.mode() {
             Mode::Triangles => (0..count / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
             Mode::TriangleStrip => {
-                let turned = |i: usize| if i % 2 == 0 { [i, i + 1, i + 2] } else { [i + 1, i, i + 2] };
+                let turned = |i: usize| if i.is_multiple_of(2) { [i, i + 1, i + 2] } else { [i + 1, i, i + 2] };
                 (0..count.saturating_sub(2)).map(turned).collect()
             }
             Mode::TriangleFan => (1..count.saturating_sub(1)).map(|i| [i, i + 1, 0]).collect(),

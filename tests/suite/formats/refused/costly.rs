@@ -3,6 +3,7 @@
 
 use crate::support::files::fbx::{Node, Value, ascii, binary, file, geometry, model, node, text};
 use crate::support::files::mesh::{Gltf, Noise, Solid, read, read_limited};
+use crate::support::truth::{cases, is_long};
 use crate::support::work::within_bytes;
 use meshsnap::import::{MeshError, MeshFault};
 use meshsnap::limits::Limits;
@@ -147,7 +148,7 @@ fn layers(sets: usize, entries: usize) -> Vec<Node> {
 
 #[test]
 fn fbx_files_that_take_the_square_of_their_size_are_refused() {
-    let writers: [Writer; 2] = [ascii, binary];
+    let writers: [Writer; 2] = [binary, ascii];
     let mut ran = 0;
     for write in writers {
         for (nodes, what) in [(collected(300, 1500), "LayeredTexture"), (layers(50_000, 50_000), "LayerElementUV")] {
@@ -158,14 +159,17 @@ fn fbx_files_that_take_the_square_of_their_size_are_refused() {
             );
             ran += 1;
         }
-        // Files just below the caps are read.
+        // Files just below the caps are read; as text, only in the long run.
+        if ran > 2 && !is_long() {
+            continue;
+        }
         for (nodes, what) in [(collected(140, 1490), "textures"), (layers(44_000, 44_000), "layers")] {
             let bytes = write(&nodes);
             read(&bytes).unwrap_or_else(|error| panic!("{what}: {error}"));
             ran += 1;
         }
     }
-    assert_eq!(ran, 8);
+    assert_eq!(ran, cases(6, 8));
 }
 
 #[test]
