@@ -28,12 +28,12 @@ fn every_model_is_drawn_in_every_style_alike_on_both_back_ends() {
 fn every_large_model_is_drawn_in_every_style_alike_on_both_back_ends() {
     let Some(folder) = data::large_folder("models") else { return };
     let meshes = readable(&folder);
-    assert_eq!(meshes.len(), 36, "models that this version reads");
+    assert!(meshes.len() >= 36, "only {} models are read", meshes.len());
     all_are_drawn_alike(&meshes);
 }
 
 /// Models of `tests/data` with triangles.
-const MODELS: usize = 14;
+const MODELS: usize = 16;
 
 fn all_are_drawn_alike(meshes: &[(String, Mesh)]) {
     let mut cpu = CpuRenderer::new(2);

@@ -29,7 +29,7 @@ const BESIDE: [&str; 7] = ["mtl", "bin", "png", "jpg", "webp", "ktx2", "json"];
 fn the_validator_and_meshsnap_agree_or_it_is_said_why_not() {
     let rows = rows_of(&[data::folder("models"), data::folder("corpus")]);
     let counts = [rows.len(), drawn(&rows), rows.iter().filter(|row| row.is_counted()).count()];
-    assert_eq!(counts, [187, 76, 62], "files, drawn, compared with the validator's totals");
+    assert_eq!(counts, [181, 68, 62], "files, drawn, compared with the validator's totals");
     assert_eq!(rows.iter().filter(|row| row.validator.is_some()).count(), 97);
     for (name, _) in EXPLAINED.iter().chain(UNLIKE) {
         assert!(rows.iter().any(|row| row.name == *name), "{name} is explained, and is not there");
@@ -40,7 +40,9 @@ fn the_validator_and_meshsnap_agree_or_it_is_said_why_not() {
 fn large_models_are_drawn_alike_on_both_back_ends() {
     let Some(models) = data::large_folder("models") else { return };
     let rows = rows_of(&[models]);
-    assert_eq!([rows.len(), drawn(&rows)], [44, 44]);
+    // The folder may grow.
+    assert!(rows.len() >= 44, "only {} files", rows.len());
+    assert_eq!(drawn(&rows), rows.len());
 }
 
 fn drawn(rows: &[Row]) -> usize {

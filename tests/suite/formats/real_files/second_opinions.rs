@@ -22,7 +22,7 @@ const APART_MAX: f64 = 2e-6;
 #[test]
 fn tobj_reads_the_same_from_every_obj() {
     let [models, corpus, examples] = own_folders();
-    assert_eq!(compare_all(&[models, corpus, examples], "obj", compare_obj), OBJ_FILES);
+    assert!(compare_all(&[models, corpus, examples], "obj", compare_obj) >= OBJ_FILES_MIN);
 }
 
 #[test]
@@ -30,7 +30,7 @@ fn the_gltf_crate_reads_the_same_from_every_gltf() {
     let [models, corpus, examples] = own_folders();
     let all = [models, corpus, examples];
     let compared = compare_all(&all, "gltf", compare_gltf) + compare_all(&all, "glb", compare_gltf);
-    assert_eq!(compared, GLTF_FILES);
+    assert!(compared >= GLTF_FILES_MIN);
 }
 
 #[test]
@@ -38,14 +38,15 @@ fn other_readers_read_the_same_from_every_large_model() {
     let Some(models) = data::large_folder("models") else { return };
     let folders = [models];
     let gltf = compare_all(&folders, "gltf", compare_gltf) + compare_all(&folders, "glb", compare_gltf);
-    assert_eq!([compare_all(&folders, "obj", compare_obj), gltf], LARGE_FILES);
+    let obj = compare_all(&folders, "obj", compare_obj);
+    assert!(obj >= LARGE_FILES_MIN[0] && gltf >= LARGE_FILES_MIN[1], "{obj} OBJ and {gltf} glTF files");
 }
 
-/// Files of the repository that are compared.
-const OBJ_FILES: usize = 0;
-const GLTF_FILES: usize = 0;
-/// OBJ and glTF files of the large data that are compared.
-const LARGE_FILES: [usize; 2] = [0, 0];
+/// Files of the repository that are compared, at least.
+const OBJ_FILES_MIN: usize = 20;
+const GLTF_FILES_MIN: usize = 10;
+/// OBJ and glTF files of the large data that are compared, at least. That folder may grow.
+const LARGE_FILES_MIN: [usize; 2] = [10, 8];
 
 fn own_folders() -> [PathBuf; 3] {
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("api/examples");
