@@ -189,13 +189,14 @@ fn huge_triangles_by_the_thousand_stop_when_told() {
     let positions: Vec<[f32; 3]> = (0..3).map(|i| [[-2.0, -2.0, 0.5], [6.0, -2.0, 0.5], [-2.0, 6.0, 0.5]][i]).collect();
     let triangles = vec![[0, 1, 2]; COUNT];
     let plan = plan(&positions, &triangles, 4);
-    let threads = 2;
-    let mut renderer = CpuRenderer::new(threads);
-    // After a stop, each thread may be on its way to one more poll.
-    let polls = assert_stops_at_any_poll(8, 2 * threads as u64, |deadline| renderer.draw(&plan, deadline).ok());
-    // Each covers the whole picture, so that few triangles lie between two polls.
-    assert!(polls as usize >= COUNT / TRIANGLES_PER_POLL, "{polls} polls");
+    let mut renderer = CpuRenderer::new(2);
+    let polls = assert_stops_at_any_poll(8, MORE_POLLS_MAX, |deadline| renderer.draw(&plan, deadline).ok());
+    // Each triangle covers the whole picture.
+    let samples = u64::from(WIDTH * HEIGHT * 4) * COUNT as u64;
+    assert!(polls >= samples / SAMPLES_PER_POLL, "{polls} polls");
 }
 
-/// Huge triangles that may lie between two polls of the deadline.
-const TRIANGLES_PER_POLL: usize = 128;
+/// Covered samples that may lie between two polls of the deadline.
+const SAMPLES_PER_POLL: u64 = 1 << 23;
+/// Polls after a stop: each band that is left polls once and does nothing.
+const MORE_POLLS_MAX: u64 = 64;
