@@ -5,7 +5,7 @@
 //! [`Budget`]. A count in a client's file is never trusted.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// What a job or a request may use. The defaults are those of the public contract, and each can be
 /// configured.
@@ -148,16 +148,47 @@ pub enum Exhausted {
 /// A flag that says "stop", raised by the job's owner. The pipeline has no clock: it polls the flag
 /// between stages and inside long loops.
 #[derive(Clone, Debug, Default)]
-pub struct Deadline(Arc<AtomicBool>);
+pub struct Deadline(Arc<DeadlineState>);
+
+#[derive(Debug, Default)]
+struct DeadlineState {
+    is_stopped: AtomicBool,
+    /// Tests count polls, because times depend on the machine.
+    counter: Option<PollCounter>,
+}
+
+#[derive(Debug)]
+struct PollCounter {
+    polls: AtomicU64,
+    stop_at: u64,
+}
 
 impl Deadline {
-    /// Tells the job to stop at its next check.
+    /// A deadline that counts its polls and stops at the poll numbered `stop_at`, from 1.
+    #[doc(hidden)]
+    pub fn after_polls(stop_at: u64) -> Self {
+        let counter = Some(PollCounter { polls: AtomicU64::new(0), stop_at });
+        Self(Arc::new(DeadlineState { is_stopped: AtomicBool::new(false), counter }))
+    }
+
+    /// Polls so far, of a deadline that counts them.
+    #[doc(hidden)]
+    pub fn polls(&self) -> u64 {
+        self.0.counter.as_ref().map_or(0, |counter| counter.polls.load(Ordering::Relaxed))
+    }
+
+    /// Tells the job to stop at its next poll.
     pub fn stop(&self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.0.is_stopped.store(true, Ordering::Relaxed);
     }
 
     /// Fails once [`Deadline::stop`] was called.
     pub fn check(&self) -> Result<(), Stopped> {
-        if self.0.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
+        if let Some(counter) = &self.0.counter
+            && counter.polls.fetch_add(1, Ordering::Relaxed) + 1 >= counter.stop_at
+        {
+            self.stop();
+        }
+        if self.0.is_stopped.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
     }
 }

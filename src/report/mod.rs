@@ -65,7 +65,7 @@ pub struct Report {
     dropped_nonfinite_faces: u64,
     dropped_degenerate_faces: u64,
     dropped_collapsed_faces: u64,
-    dropped_lines_and_points: u64,
+    dropped_loose: u64,
     warnings: Vec<WarningReport>,
 }
 
@@ -203,7 +203,7 @@ impl Report {
             dropped_nonfinite_faces: import.dropped_nonfinite_faces,
             dropped_degenerate_faces: import.dropped_degenerate_faces,
             dropped_collapsed_faces: import.dropped_collapsed_faces,
-            dropped_lines_and_points: import.dropped_lines_and_points,
+            dropped_loose: import.dropped_lines_and_points,
             warnings: warnings.map(|w| WarningReport { code: w.code, detail: w.detail.clone() }).collect(),
         }
     }

@@ -118,7 +118,7 @@ fn dropped(report: &Report) -> Option<String> {
     ];
     let met = reasons.into_iter().filter(|(count, _)| *count > 0);
     let faces = met.map(|(count, why)| format!("{} {why}", pluralise(count, "face", "faces")));
-    let primitives = Some(report.dropped_lines_and_points).filter(|count| *count > 0);
+    let primitives = Some(report.dropped_loose).filter(|count| *count > 0);
     joined(faces.chain(primitives.map(|count| pluralise(count, "line or point", "lines and points"))))
 }
 

@@ -1,11 +1,12 @@
-//! Load: many connections post a mesh for a while; prints what came back, how fast, and whether memory stays flat.
+//! Load: many connections post a mesh for a while; prints what came back, how fast, and whether
+//! memory stays flat.
 //!
 //!     cargo bench --bench load                                # 64 connections, 30 s, api/examples/knot.obj
 //!     cargo bench --bench load -- --mesh suzanne.obj --seconds 10 --query 'style=wire&size=256'
 //!     cargo bench --bench load -- --url 127.0.0.1:8080        # a server that runs already (no memory is sampled)
 //!
-//! Starts a server of its own unless told where one is. Ends with a failure if anything but 200 and 429 came back, or if
-//! memory grew after the first third.
+//! Starts a server of its own unless told where one is. Ends with a failure if anything but 200 and
+//! 429 came back, or if memory grew after the first third.
 
 // A tool for developers: giving up loudly is fine.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -17,7 +18,8 @@ use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Memory may still grow by this much after warm-up: allocators keep what their busiest moment needed.
+/// Memory may still grow by this much after warm-up: allocators keep what their busiest moment
+/// needed.
 const GROWTH_MAX: f64 = 1.15;
 
 struct Options {
@@ -130,7 +132,8 @@ fn client(address: &str, request: &[u8], stop: &AtomicBool) -> Seen {
                 if status == 200 {
                     seen.drawn.push(began.elapsed());
                 } else if status == 429 {
-                    // A polite client would wait as long as Retry-After says; this one only avoids spinning.
+                    // A polite client would wait as long as Retry-After says; this one only avoids
+                    // spinning.
                     std::thread::sleep(Duration::from_millis(20));
                 }
             }

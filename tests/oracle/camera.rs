@@ -2,8 +2,8 @@
 
 use super::vector::V3;
 
-/// Rows that give pixels right of and below the picture's centre (times W), reversed depth (times W: larger is nearer) and
-/// W, the distance in front of the eye or 1.
+/// Rows that give pixels right of and below the picture's centre (times W), reversed depth (times
+/// W: larger is nearer) and W, the distance in front of the eye or 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     pub size_px: [u32; 2],
@@ -11,7 +11,7 @@ pub struct Camera {
     pub y: [f64; 4],
     pub z: [f64; 4],
     pub w: [f64; 4],
-    /// What has less W is not drawn.
+    /// Points with less W are not drawn.
     pub near_w: f64,
 }
 
@@ -39,7 +39,8 @@ impl Camera {
         [row(&self.x) + half[0] * w, row(&self.y) + half[1] * w, row(&self.z), w]
     }
 
-    /// The part of a closed chain of corners in front of the near plane; with two corners, of a segment.
+    /// The part of a closed chain of corners in front of the near plane; with two corners, of a
+    /// segment.
     pub fn in_front(&self, corners: &[Homogeneous]) -> Vec<Homogeneous> {
         let mut kept = Vec::new();
         for (i, &from) in corners.iter().enumerate() {

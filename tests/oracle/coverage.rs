@@ -1,11 +1,12 @@
-//! Part 1: which pixels a triangle covers. Corners are snapped to 1/256 pixel, so that every sign is exact in integers.
+//! Part 1: which pixels a triangle covers. Corners are snapped to 1/256 pixel, so that every sign
+//! is exact in integers.
 
 use super::polygon::{UNIT_BOX, area, clip_by};
 
 /// In 1/256 px from the picture's upper left corner.
 pub type Snapped = [i64; 2];
 
-/// How much of a pixel a triangle covers.
+/// A triangle's coverage of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coverage {
     None,
@@ -33,8 +34,9 @@ pub fn clockwise(t: [Snapped; 3]) -> Option<[Snapped; 3]> {
     }
 }
 
-/// Exact. Full: all corners of the pixel lie in the closed triangle. None: their insides do not meet, which for two convex
-/// shapes is so exactly if a side of one of them has the other on its far side.
+/// Exact. Full: all corners of the pixel lie in the closed triangle. None: their insides do not
+/// meet, which for two convex shapes is so exactly if a side of one of them has the other on its
+/// far side.
 pub fn classify(triangle: [Snapped; 3], pixel: [i64; 2]) -> Coverage {
     let Some(t) = clockwise(triangle) else { return Coverage::None };
     let low = pixel.map(|v| v * 256);

@@ -1,9 +1,11 @@
-//! Part 5: how different two pictures look to someone who flips between them on a screen: LDR-FLIP (Andersson, Nilsson,
-//! Akenine-Möller, Oskarsson, Åström and Fairchild 2020, "FLIP: A Difference Evaluator for Alternating Images"), written from
-//! the paper with its constants. 0: no difference that could be seen; 1: as large as there is.
+//! Part 5: how different two pictures look to someone who flips between them on a screen: LDR-FLIP
+//! (Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild 2020, "FLIP: A Difference
+//! Evaluator for Alternating Images"), written from the paper with its constants. 0: no difference
+//! that could be seen; 1: as large as there is.
 //!
-//! What the eye blurs is blurred first (contrast sensitivity, in a space of one achromatic and two chromatic channels), then
-//! colours are compared by a metric for large differences, and where edges or points differ too, the difference is amplified.
+//! The eye's own blur comes first (contrast sensitivity, in a space of one achromatic and two
+//! chromatic channels), then colours are compared by a metric for large differences, and where
+//! edges or points differ too, the difference is amplified.
 
 use std::f64::consts::PI;
 
@@ -12,7 +14,8 @@ use super::vector::{V3, length};
 /// A screen 0.7 m wide with 3840 columns, seen from 0.7 m away.
 pub const PIXELS_PER_DEGREE: f64 = 67.0;
 
-/// The contrast sensitivity of each channel as a sum of Gaussians, (a, b) each (the paper's table 1).
+/// The contrast sensitivity of each channel as a sum of Gaussians, (a, b) each (the paper's table
+/// 1).
 const ACHROMATIC: &[[f64; 2]] = &[[1.0, 0.0047]];
 const RED_GREEN: &[[f64; 2]] = &[[1.0, 0.0053]];
 const BLUE_YELLOW: &[[f64; 2]] = &[[34.1, 0.04], [13.5, 0.025]];
@@ -34,7 +37,7 @@ const FEATURE_POWER: f64 = 0.5;
 pub struct Seen {
     /// Blurred, in L*a*b* with chroma that fades with darkness (Hunt's effect).
     colors: Vec<V3>,
-    /// How much of an edge and of a point each pixel is.
+    /// Strength of the edge and of the point at each pixel.
     features: Vec<[f64; 2]>,
 }
 
@@ -82,7 +85,7 @@ fn colors(width: usize, xyz: &[V3]) -> Vec<V3> {
     let from_xyz = inverse(TO_XYZ.map(|row| row.map(|v| v / row.iter().sum::<f64>())));
     let pixel = |i: usize| {
         let blurred = [luma[i] + red_green[i], luma[i], luma[i] - blue_yellow[i]];
-        // What is outside of the screen's gamut cannot be shown.
+        // Colours outside of the screen's gamut cannot be shown.
         let rgb = from_xyz.map(|row| (0..3).map(|k| row[k] * blurred[k]).sum::<f64>().clamp(0.0, 1.0));
         hunt_lab(xyz_over_white(rgb))
     };
@@ -104,7 +107,8 @@ fn blurred(width: usize, plane: Vec<f64>, gaussians: &[[f64; 2]]) -> Vec<f64> {
     sum
 }
 
-/// Edges by first and points by second derivatives of a Gaussian, of the luminance that is not blurred.
+/// Edges by first and points by second derivatives of a Gaussian, of the luminance that is not
+/// blurred.
 fn features(width: usize, xyz: &[V3]) -> Vec<[f64; 2]> {
     let deviation = 0.5 * FEATURE_DEGREES * PIXELS_PER_DEGREE;
     let radius = (3.0 * deviation).ceil();

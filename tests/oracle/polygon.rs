@@ -1,8 +1,10 @@
-//! Convex polygons: clipping by a half plane, and area. About 1e-14 of the square of the coordinates' size: shift them first.
+//! Convex polygons: clipping by a half plane, and area. About 1e-14 of the square of the
+//! coordinates' size: shift them first.
 
 use super::vector::{V2, cross2, mix, sub};
 
-/// What of a polygon has `inside(p) >= 0`, `inside` being affine (Sutherland and Hodgman's algorithm).
+/// The part of a polygon with `inside(p) >= 0`, `inside` being affine (Sutherland and Hodgman's
+/// algorithm).
 pub fn clip(polygon: &[V2], inside: impl Fn(V2) -> f64) -> Vec<V2> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (i, &from) in polygon.iter().enumerate() {
@@ -18,7 +20,7 @@ pub fn clip(polygon: &[V2], inside: impl Fn(V2) -> f64) -> Vec<V2> {
     kept
 }
 
-/// What of a polygon lies in a convex one whose corners run clockwise on screen.
+/// The part of a polygon in a convex one whose corners run clockwise on screen.
 pub fn clip_by(polygon: &[V2], by: &[V2]) -> Vec<V2> {
     let mut rest = polygon.to_vec();
     for (i, &a) in by.iter().enumerate() {

@@ -3,7 +3,7 @@
 use super::camera::{Camera, project};
 use super::vector::{V2, V3, cross2, sub};
 
-/// What is looked at.
+/// A scene in homogeneous coordinates.
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub camera: Camera,
@@ -15,7 +15,7 @@ pub struct Scene {
     pub edges: Vec<[u32; 2]>,
 }
 
-/// Which sides of triangles are there.
+/// The sides of triangles that are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sides {
     Both,
@@ -28,7 +28,7 @@ pub enum Sides {
 /// A triangle on screen, or what of one lies in front of the near plane.
 #[derive(Clone, Copy, Debug)]
 pub struct Piece {
-    /// Which triangle.
+    /// The triangle's index.
     pub triangle: u32,
     /// Its vertices.
     pub vertices: [u32; 3],
@@ -70,8 +70,8 @@ impl Screen {
         found.into_iter().map(|i| &self.pieces[i as usize]).collect()
     }
 
-    /// Tiles that touch the box around some points. What lies beside the picture counts to its border's tiles, so that two
-    /// things that meet always share a tile.
+    /// Tiles that touch the box around some points. What lies beside the picture counts to its
+    /// border's tiles, so that two things that meet always share a tile.
     fn tiles_of(&self, points: &[V2]) -> Vec<usize> {
         let range = |k: usize| {
             let tile = |v: f64| (v / TILE_PX).floor().clamp(0.0, self.counts[k] as f64 - 1.0) as usize;
@@ -85,14 +85,15 @@ impl Screen {
 }
 
 impl Piece {
-    /// Twice the area of the part of the piece that lies opposite corner `k` from `p`; negative outside of that side.
+    /// Twice the area of the part of the piece that lies opposite corner `k` from `p`; negative
+    /// outside of that side.
     pub fn side(&self, k: usize, p: V2) -> f64 {
         let at = |i: usize| [self.corners[i % 3][0], self.corners[i % 3][1]];
         cross2(sub(at(k + 2), at(k + 1)), sub(p, at(k + 1)))
     }
 
-    /// Depth where a point lies inside, by the weights of the corners, which are between 0 and 1 there: that holds for the
-    /// thinnest of triangles too.
+    /// Depth where a point lies inside, by the weights of the corners, which are between 0 and 1
+    /// there: that holds for the thinnest of triangles too.
     pub fn depth_inside(&self, p: V2) -> f64 {
         let sides = [0, 1, 2].map(|k| self.side(k, p).max(0.0));
         let total: f64 = sides.iter().sum();
@@ -105,8 +106,8 @@ impl Piece {
     }
 }
 
-/// Whether a triangle shows its front: by the sign of the volume that its homogeneous corners span with the eye, which is
-/// right for corners behind the eye too. None where it is seen edge on.
+/// True if a triangle shows its front: by the sign of the volume that its homogeneous corners span
+/// with the eye, which is right for corners behind the eye too. None where it is seen edge on.
 pub fn is_front(camera: &Camera, corners: [V3; 3]) -> Option<bool> {
     let [a, b, c] = corners.map(|p| camera.homogeneous(p)).map(|h| [h[0], h[1], h[3]]);
     let volume = super::vector::dot(a, super::vector::cross(b, c));

@@ -25,7 +25,8 @@ pub fn unit<const N: usize>(a: [f64; N]) -> [f64; N] {
     a.map(|v| v / length)
 }
 
-/// The z of the vector product: positive where `b` lies clockwise of `a` on screen, where y points down.
+/// The z of the vector product: positive where `b` lies clockwise of `a` on screen, where y points
+/// down.
 pub fn cross2(a: V2, b: V2) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }

@@ -1,4 +1,5 @@
-//! Run time against error: every technique on every back-end with every number of samples, each compared with the oracle.
+//! Run time against error: every technique on every back-end with every number of samples, each
+//! compared with the oracle.
 //!
 //!     cargo bench --bench accuracy                            # all scenes; some minutes
 //!     cargo bench --bench accuracy -- --quick                 # few and small scenes, few rounds; under a minute
@@ -7,9 +8,10 @@
 //!                                                             # and src/plan/quality/error_table.json
 //!     cargo bench --bench accuracy -- --table-only            # the last of these, from docs/accuracy.json as it is
 //!
-//! What is true and how errors are counted: `measure/truths.rs`. What each technique is asked for: `measure/techniques.rs`.
-//! Times: medians of interleaved rounds of `Renderer::draw` alone, after one that warms up, as ratios to a baseline in the same
-//! rounds, since machines differ. A model that is not there is replaced (see `measure/scenes.rs`), and the report says so.
+//! Truth and the count of errors: `measure/truths.rs`. The request of each technique:
+//! `measure/techniques.rs`. Times: medians of interleaved rounds of `Renderer::draw` alone, after
+//! one that warms up, as ratios to a baseline in the same rounds, since machines differ. A model
+//! that is not there is replaced (see `measure/scenes.rs`), and the report says so.
 
 // A tool for developers: giving up loudly is fine.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

@@ -11,10 +11,12 @@ use crate::support::truth::{Errors, Gate, cases, drawn_ink, goal, renderers, sce
 
 /// Goal 4, pixels, for ten thousand triangles.
 const BEHIND_EYE_GOAL_PX: f64 = 0.01;
-/// Of a hundred thousand triangles, how many samples may be farther off, and how far: f32 rounds a corner that is 100 units behind an eye
-/// whose near plane is 0.001 units away, and what is seen of its edges is a hundred thousand times nearer.
+/// Of a hundred thousand triangles, how many samples may be farther off, and how far: f32 rounds a
+/// corner that is 100 units behind an eye whose near plane is 0.001 units away, and what is seen of
+/// its edges is a hundred thousand times nearer.
 const FARTHER: (usize, f64) = (5, 0.03);
-/// Lines, measured now: their ends in the picture are what is wrong. 0.01 px are 2.55/255 on a line's border.
+/// Lines, measured now: their ends in the picture are what is wrong. 0.01 px are 2.55/255 on a
+/// line's border.
 const LINES_NOW: Gate = Gate { rmse: 0.71, max: 51.0, ink: 0.005 };
 
 /// From the origin along +z, 40 px at distance 1 across.
@@ -73,9 +75,10 @@ fn sample_position(plan: &DrawPlan<'_>, sample: usize) -> V2 {
     [0, 1].map(|k| corner[k] as f64 + f64::from(offset[k]) / 256.0)
 }
 
-/// Where a triangle is seen: where four affine functions of the screen, each a signed distance in pixels, are positive. A point
-/// p of the screen is a sum of the corners' homogeneous (x, y, w) with weights `l`, which have to be positive; and as those add up
-/// to 1 / W, there is a line where W is the near plane's. This stays right for corners behind the eye (Olano and Greer 1997).
+/// Where a triangle is seen: where four affine functions of the screen, each a signed distance in
+/// pixels, are positive. A point p of the screen is a sum of the corners' homogeneous (x, y, w)
+/// with weights `l`, which have to be positive; and as those add up to 1 / W, there is a line where
+/// W is the near plane's. This stays right for corners behind the eye (Olano and Greer 1997).
 struct Region([V3; 4]);
 
 impl Region {
@@ -95,7 +98,7 @@ impl Region {
         distances.iter().flatten().all(|c| c.is_finite()).then_some(Self(distances))
     }
 
-    /// How far a sample lies on the wrong side.
+    /// The distance of a sample on the wrong side, pixels.
     fn error_px(&self, p: V2, is_drawn: bool) -> f64 {
         let inside = self.0.iter().map(|n| n[0] * p[0] + n[1] * p[1] + n[2]).fold(f64::INFINITY, f64::min);
         if is_drawn { (-inside).max(0.0) } else { inside.max(0.0) }
@@ -110,6 +113,7 @@ fn lines_that_come_from_behind_the_eye_have_their_exact_coverage() {
     let (mut drawn, count) = (0, cases(300, 10_000));
     for mut renderer in renderers() {
         let mut errors = Errors::default();
+        let count = if renderer.kind().name() == "cpu" { count } else { count / 5 };
         for i in 0..count {
             let near = [0.001, 0.05, 0.3][i % 3];
             let mut end = |z: [f64; 2]| {
@@ -128,6 +132,6 @@ fn lines_that_come_from_behind_the_eye_have_their_exact_coverage() {
         rmse = rmse.max(errors.rmse());
     }
     goal(4, &format!("{drawn} lines: RMSE {rmse:.2}/255"));
-    assert_eq!(drawn, count * renderers().len());
+    assert_eq!(drawn, count + count / 5 * (renderers().len() - 1));
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }

@@ -8,10 +8,10 @@ use crate::measure::scenes::{SCENES, SMALL, Scene};
 use crate::measure::table::{Machine, table};
 use crate::measure::techniques::{Family, Technique};
 use crate::measure::{Effort, Row, SAMPLES, back_ends, goals, json, plot, rounds};
-use crate::render::twins::pictures::gpus;
+use crate::support::gpus::gpus;
 
 /// Small enough for every run of the suite.
-const EFFORT: Effort = Effort { size_px: 128, runs: 1, points_per_side: 16 };
+const EFFORT: Effort = Effort { size_px: 96, runs: 1, points_per_side: 16 };
 
 fn small() -> Vec<Scene> {
     let small: Vec<Scene> = SCENES.iter().filter(|scene| SMALL.contains(&scene.name)).copied().collect();
@@ -72,9 +72,10 @@ fn outlines_and_faces_are_measured_too() {
         match scene.family {
             Family::Outlines => {
                 let (contour, hull) = (rmse(Technique::Contour), rmse(Technique::Hull));
-                // A contour's border is exact and a hull's as its samples have it, which known straight edges show to cost 26/255 with 4
-                // and 12/255 with 16. What is left beside are pixels at the roots of teeth, where edges that the gear itself hides
-                // nearly meet those that are seen.
+                // A contour's border is exact and a hull's as its samples have it, which known
+                // straight edges show to cost 26/255 with 4 and 12/255 with 16. What is left beside
+                // are pixels at the roots of teeth, where edges that the gear itself hides nearly
+                // meet those that are seen.
                 assert!(contour < 1.0 && contour < hull && hull < 22.0, "{contour}, {hull}");
                 let most = errors(Technique::Hull, 16).rmse;
                 assert!(most < 14.5, "{most}");
@@ -141,7 +142,8 @@ fn the_page_keeps_what_the_suite_measured() {
     assert_eq!(second.matches("measured by: `cargo test --test suite ").count(), missing - 1);
 }
 
-/// The number of elements of a document of elements, attributes and text alone; or what is wrong with it.
+/// The number of elements of a document of elements, attributes and text alone; or what is wrong
+/// with it.
 fn check_xml(text: &str) -> Result<usize, String> {
     let (mut open, mut tags, mut rest) = (Vec::new(), 0, text.trim());
     while !rest.is_empty() {

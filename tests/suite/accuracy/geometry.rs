@@ -1,4 +1,5 @@
-//! Which samples triangles own: every one exactly once, right up to and behind the eye, on every machine alike.
+//! The samples that triangles own: each exactly once, up to and behind the eye, on every machine
+//! alike.
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::{CpuRenderer, Isa};
@@ -8,8 +9,8 @@ use meshsnap::plan::DrawPlan;
 use crate::accuracy::behind_eye::eye_plan;
 use crate::oracle::coverage::{Coverage, classify, snap};
 use crate::oracle::vector::V3;
+use crate::support::families::lines::{CONTOURS, MESHES, plan_keys};
 use crate::support::likeness::{Likeness, Tolerance};
-use crate::support::lines_scenes::{CONTOURS, MESHES, plan_keys};
 use crate::support::scenes;
 use crate::support::shapes::Random;
 use crate::support::truth::{cases, goal, renderers};
@@ -35,8 +36,8 @@ impl Ownership {
         self.samples += other.samples;
     }
 
-    /// Of triangles that fill the picture at one depth. Of equal depths the lowest id wins, so a sample that two triangles own
-    /// goes to another one when they are drawn in reverse.
+    /// Of triangles that fill the picture at one depth. Of equal depths the lowest id wins, so a
+    /// sample that two triangles own goes to another one when they are drawn in reverse.
     pub fn of(plan: &DrawPlan<'_>, renderer: &mut dyn Renderer) -> Self {
         let forth = renderer.draw_visibility(plan, &Deadline::default()).unwrap();
         let triangles: Vec<[u32; 3]> = plan.triangles.iter().rev().copied().collect();
@@ -54,8 +55,9 @@ impl Ownership {
     }
 }
 
-/// A net of triangles that covers a picture and more, pixels from its centre, moved about; one third of the vertices on
-/// multiples of 1/8 px, where samples lie. By less than a quarter of a cell in all, so that nothing folds over.
+/// A net of triangles that covers a picture and more, pixels from its centre, moved about; one
+/// third of the vertices on multiples of 1/8 px, where samples lie. By less than a quarter of a
+/// cell in all, so that nothing folds over.
 pub fn jittered_net(n: u32, size_px: [u32; 2], random: &mut Random) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let cell = size_px.map(|s| 1.25 * f64::from(s) / f64::from(n));
     let mut positions = Vec::new();

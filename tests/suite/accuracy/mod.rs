@@ -1,4 +1,4 @@
-//! How far pictures are from the truth, and whether the gates that say so can fail.
+//! The distance of pictures from the truth, and tests that the gates can fail.
 
 pub mod behind_eye;
 pub mod bench;

@@ -1,5 +1,5 @@
-//! The gates can fail: wrong pictures, each made wrong in the way of a known technique, do not get through. The right ones,
-//! made by the same means, do.
+//! The gates can fail: wrong pictures, each made wrong in the way of a known technique, do not get
+//! through. The right ones, made by the same means, do.
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
@@ -10,11 +10,11 @@ use crate::accuracy::behind_eye::eye_plan;
 use crate::accuracy::geometry::{Ownership, jittered_net};
 use crate::accuracy::shading::{COLOR_GOAL, FLAT_NOW, NORMAL_GOAL_RAD, color_errors, normal_error, slivers};
 use crate::oracle::camera::{Homogeneous, project};
-use crate::oracle::light::{face_normal, weights};
 use crate::oracle::screen::Screen;
+use crate::oracle::surface::light::{face_normal, weights};
 use crate::oracle::vector::{V2, V3, cross2, distance_to_segment, length, sub};
-use crate::oracle::{srgb, strip};
-use crate::support::lines_scenes::{MESHES, MESHES_GOAL, plan_keys};
+use crate::oracle::{lines::strip, surface::srgb};
+use crate::support::families::lines::{MESHES, MESHES_GOAL, plan_keys};
 use crate::support::scenes;
 use crate::support::shapes::Random;
 use crate::support::truth::{Errors, scene, true_ink};
@@ -35,8 +35,8 @@ fn apart(positions: &[[f32; 3]], triangles: &[[u32; 3]], grow: f32) -> (Vec<[f32
     (own, triangles)
 }
 
-/// Without the rule that gives a shared edge's samples to one side, both sides take them, or neither does: as if each
-/// triangle were a hair larger or smaller.
+/// Without the rule that gives a shared edge's samples to one side, both sides take them, or
+/// neither does: as if each triangle were a hair larger or smaller.
 #[test]
 fn a_missing_fill_rule_is_found() {
     let (positions, triangles) = jittered_net(100, [256; 2], &mut Random(41));
@@ -74,7 +74,8 @@ fn fwidth_in_place_of_exact_distances_is_found() {
             Errors::of(&ink_on_surface(i, method, thickness), &truth).check(&what, mesh_scene.now)
         };
         check("exact", "1").unwrap();
-        // Half a pixel on each side, and a pixel's ramp: what fwidth has to offer for a line of one pixel.
+        // Half a pixel on each side, and a pixel's ramp: what fwidth has to offer for a line of one
+        // pixel.
         assert!(check("fwidth", "0.5").is_err() && check("fwidth", "0").is_err());
         found += 1;
     }
@@ -130,8 +131,9 @@ fn f32_face_normals_are_seen_in_the_picture() {
     assert!(measure(&plan) > COLOR_GOAL);
 }
 
-/// Distances to a triangle's sides as its corners have them, interpolated: affinely on screen, which is right, or along the
-/// surface, as attributes of a vertex are. Compared deep inside of each side's line, where no other is near.
+/// Distances to a triangle's sides as its corners have them, interpolated: affinely on screen,
+/// which is right, or along the surface, as attributes of a vertex are. Compared deep inside of
+/// each side's line, where no other is near.
 #[test]
 fn perspective_interpolated_edge_distances_are_found() {
     let positions = [[-0.9, 0.5, 1.0], [0.8, 0.6, 1.2], [0.1, -2.5, 6.0]];

@@ -2,9 +2,9 @@
 
 use crate::oracle::camera::Camera;
 use crate::oracle::flip::Seen;
-use crate::oracle::rim::{ink, rims};
+use crate::oracle::lines::silhouette::{ink, rims};
 use crate::oracle::screen::{Scene, Screen, Sides};
-use crate::oracle::srgb;
+use crate::oracle::surface::srgb;
 use crate::oracle::vector::V3;
 
 const WIDTH: i32 = 48;
@@ -47,7 +47,8 @@ fn seen(pattern: impl Fn(i32, i32, i32) -> i32) -> Seen {
     Seen::new(WIDTH as usize, &(0..WIDTH * HEIGHT).map(pixel).collect::<Vec<_>>())
 }
 
-/// What version 1.7 of the authors' own program, `flip-evaluator`, says at 67 pixels a degree; it computes in f32.
+/// Results of version 1.7 of the authors' own program, `flip-evaluator`, at 67 pixels per degree;
+/// it computes in f32.
 #[test]
 fn flip_is_what_its_authors_program_says() {
     let known: [(&str, Pattern, Pattern, f64); 8] = [
@@ -88,8 +89,8 @@ fn flip_grows_with_contrast() {
     assert!(last > 0.5 && last <= 1.0, "{last}");
 }
 
-/// The rim of a square is what Steiner's formula says of a strip around a convex shape, and nothing where another surface is; before
-/// what is near it is as narrow as it recedes.
+/// The rim of a square is what Steiner's formula says of a strip around a convex shape, and nothing
+/// where another surface is; before what is near it is as narrow as it recedes.
 #[test]
 fn rims_lie_beyond_the_silhouette_and_recede_behind_what_is_near() {
     let square = |at: [f64; 2], side: f64, z: f64| {
@@ -111,12 +112,14 @@ fn rims_lie_beyond_the_silhouette_and_recede_behind_what_is_near() {
     let alone = square([20.3, 18.6], 20.0, 0.0);
     let around = |width: f64| 4.0 * 20.0 * width + std::f64::consts::PI * width * width;
     assert_near(total(&scene(&[alone])), around(4.0));
-    // Before a large one, whose own rim is out of sight: all of it, or as much as is not yet behind it. Behind a large one: nothing.
+    // Before a large one, whose own rim is out of sight: all of it, or as much as is not yet behind
+    // it. Behind a large one: nothing.
     let wall = |z: f64| square([-40.0, -40.0], 200.0, z);
     assert_near(total(&scene(&[alone, wall(-30.0)])), around(4.0));
     assert_near(total(&scene(&[alone, wall(-1.0)])), around(2.0));
     assert_eq!(total(&scene(&[alone, wall(30.0)])), 0.0);
-    // One that rises to the right is followed beyond its left side, down to 4.2 units behind: half of that strip is behind the wall.
+    // One that rises to the right is followed beyond its left side, down to 4.2 units behind: half
+    // of that strip is behind the wall.
     let rises = alone.map(|[x, y, _]| [x, y, x - 20.3]);
     assert_near(total(&scene(&[rises, wall(-30.0)])), around(4.0));
     assert_near(total(&scene(&[rises, wall(-2.1)])), around(4.0) - 20.0 * 2.0);

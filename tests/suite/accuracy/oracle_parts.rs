@@ -1,5 +1,5 @@
-//! The oracle's closed forms against each other, against many points and against what is known otherwise: nothing here looks
-//! at a renderer.
+//! The oracle's closed forms against each other, against many points and against what is known
+//! otherwise: nothing here looks at a renderer.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,10 +7,14 @@ use robust::{Coord, orient2d};
 
 use crate::oracle::camera::Camera;
 use crate::oracle::coverage::{Coverage, classify, orient, share};
-use crate::oracle::ink::ink;
+use crate::oracle::lines::coverage::ink;
 use crate::oracle::screen::{Scene, Screen, Sides};
 use crate::oracle::vector::{length, sub};
-use crate::oracle::{capsule, rays, strip};
+use crate::oracle::{
+    lines::{capsule, strip},
+    surface::rays,
+};
+use crate::support::data;
 use crate::support::shapes::Random;
 use crate::support::truth::points_per_side;
 
@@ -140,8 +144,7 @@ fn capsules_are_what_their_points_say() {
 fn the_oracle_stands_alone() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracle");
     let mut files = 0;
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
+    for path in data::files(&folder) {
         let text = std::fs::read_to_string(&path).unwrap();
         for foreign in ["meshsnap::", "crate::", "glam::", "libm::"] {
             assert!(!text.contains(foreign), "{} uses {foreign}", path.display());

@@ -1,15 +1,16 @@
-//! The oracle's scenes and light: what it finds visible against what its rays see, and what is known otherwise.
+//! The oracle's scenes and light: what it finds visible against what its rays see, and what is
+//! known otherwise.
 
 use std::f64::consts::{PI, TAU};
 
 use crate::oracle::camera::{Camera, project};
-use crate::oracle::ink::ink;
-use crate::oracle::light::{Lamp, Lights, Material, face_normal, lit, smooth_normals, weights};
+use crate::oracle::lines::coverage::ink;
 use crate::oracle::obj::Shape;
 use crate::oracle::screen::{Scene, Screen, Sides};
+use crate::oracle::surface::light::{Lamp, Lights, Material, face_normal, lit, smooth_normals, weights};
+use crate::oracle::surface::visible::{contour, on_screen, visible, visible_parts};
+use crate::oracle::surface::{rays, srgb};
 use crate::oracle::vector::{dot, length, mix, sub, unit};
-use crate::oracle::visible::{contour, on_screen, visible, visible_parts};
-use crate::oracle::{rays, srgb};
 use crate::support::shapes::Random;
 
 #[test]
@@ -137,7 +138,8 @@ fn normals_weights_and_light_are_what_is_known() {
     }
     assert_eq!(cases, 1000);
 
-    // Lambert: a lamp at 60 degrees gives half; at roughness 1 the highlight is 0.04 / 6 of that at l.h = 1.
+    // Lambert: a lamp at 60 degrees gives half; at roughness 1 the highlight is 0.04 / 6 of that at
+    // l.h = 1.
     let lamp = Lamp { to_light: [0.0, 0.0, 1.0], halfway: [0.0, 0.0, 1.0], strength: 1.0 };
     let lights = Lights { lamps: vec![lamp], ambient: 0.0, up: [0.0, 1.0, 0.0] };
     let tilted = [0.0, (3.0_f64).sqrt() / 2.0, 0.5];

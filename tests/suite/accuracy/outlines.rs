@@ -1,6 +1,7 @@
-//! How far the outer borders of outlines are from where they should be: goal 5. What is true is the contour, widened: all points within
-//! the outline's width of it, of a contour's own line within half. An outline in units of the model is as wide as these are at the depth
-//! of the point of the contour that it surrounds.
+//! The distance of outlines' outer borders from their true place: goal 5. The truth is the widened
+//! contour: all points within the outline's width of it, of a contour's own line within half. An
+//! outline in units of the model is as wide as these are at the depth of the point of the contour
+//! that it surrounds.
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
@@ -8,14 +9,14 @@ use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
 use meshsnap::plan::Projection;
 
-use crate::support::outline_shapes::{SHAPES, Shape};
+use crate::support::families::outlines::{SHAPES, Shape};
 use crate::support::scenes;
 use crate::support::shadow::{Around, Shadow, Width};
 use crate::support::truth::{alpha, cases, goal, scene};
 
 const WIDTHS_PX: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
 
-/// What is let pass.
+/// The gate.
 #[derive(Clone, Copy, Debug)]
 struct Gate {
     /// Of all distances from where the border should be.
@@ -29,10 +30,11 @@ struct Gate {
 /// Goal 5.
 const GOAL: Gate = Gate { mean_px: 0.05, p99_px: 0.25, gaps: 0 };
 
-/// Four samples a pixel lie 1/4 px apart in each direction, which is as far as a border may move before one of them sees it.
+/// Four samples a pixel lie 1/4 px apart in each direction, which is as far as a border may move
+/// before one of them sees it.
 const FOUR_SAMPLES: Gate = Gate { p99_px: 0.27, ..GOAL };
 
-/// How far a drawn outline's border is from where it should be.
+/// The distance of a drawn outline's border from its true place.
 struct Border {
     /// Positive: too far out.
     errors_px: Vec<f64>,
@@ -40,7 +42,8 @@ struct Border {
 }
 
 impl Border {
-    /// In a pixel that is covered by a share c, the border lies where a share c of the pixel is nearer to the shape.
+    /// In a pixel that is covered by a share c, the border lies where a share c of the pixel is
+    /// nearer to the shape.
     fn of(covered: &[f64], shadow: &mut Shadow, outside_px: f64) -> Self {
         let mut border = Self { errors_px: Vec::new(), gaps: 0 };
         for (pixel, &covered) in covered.iter().enumerate() {
@@ -96,7 +99,7 @@ struct Asked {
     method: &'static str,
     unit: &'static str,
     samples: u32,
-    /// What of its width lies outside of the shape.
+    /// The share of its width outside of the shape.
     outside: f64,
     around: Around,
 }
@@ -150,7 +153,8 @@ fn measure(asked: Asked, widths: &[f64], gate: impl Fn(f64) -> Gate) {
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
-/// The thickness in units of the model that is as wide as so many pixels in the middle of a picture.
+/// The thickness in units of the model that is as wide as so many pixels in the middle of a
+/// picture.
 fn units(mesh: &Mesh, projection: &Projection, px: f64) -> f64 {
     let scale = (0..3).map(|k| f64::from(projection.x[k]).powi(2)).sum::<f64>().sqrt() / 256.0;
     px * f64::from(projection.w[3]) / scale * mesh.to_file.scale
@@ -180,8 +184,9 @@ fn hulls_in_units_of_the_model_are_as_wide_as_they_should_be() {
     measure(Asked { unit: "object", ..HULL }, widths, |_| GOAL);
 }
 
-/// Measured against all points of the surface, which is more than goal 5 asks for: beside a contour a face that is seen nearly edge on soon
-/// comes nearer, and circles around what is nearer reach a little farther, on these meshes by a thirtieth of the width.
+/// Measured against all points of the surface, which is more than goal 5 asks for: beside a contour
+/// a face that is seen nearly edge on soon comes nearer, and circles around what is nearer reach a
+/// little farther, on these meshes by a thirtieth of the width.
 #[test]
 fn hulls_in_units_of_the_model_are_hardly_less_than_what_surrounds_every_point_of_the_surface() {
     let nearly = |gate: Gate, px: f64| Gate {

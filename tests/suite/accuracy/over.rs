@@ -1,24 +1,27 @@
-//! How exact colours are where lines lie over a surface and its border: against the oracle's points, in bytes' steps, of pixels that
-//! see both the line and what is beside it.
+//! The accuracy of colours where lines lie over a surface and its border: against the oracle's
+//! points, in bytes' steps, of pixels that see both the line and what is beside it.
 
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::plan::DrawPlan;
 use meshsnap::spec::Spec;
 
-use crate::oracle::ink::ink;
-use crate::oracle::rays::{Pen, picture};
+use crate::oracle::lines::coverage::ink;
 use crate::oracle::screen::Screen;
-use crate::oracle::srgb;
+use crate::oracle::surface::rays::{Pen, picture};
+use crate::oracle::surface::srgb;
 use crate::oracle::vector::V3;
 use crate::support::likeness::{Likeness, Tolerance};
-use crate::support::truth::{Errors, Gate, points_per_side, renderers, scene, segments};
+use crate::support::truth::{Errors, Gate, cases, points_per_side, renderers, scene, segments};
 use crate::support::{scenes, shapes};
 
 const SIZE_PX: [u32; 2] = [160, 130];
-const WIDTHS_PX: [f64; 3] = [0.5, 1.0, 2.5];
+/// Lines' widths and numbers of samples: few, or all in the long run.
+fn widths_and_samples() -> (&'static [f64], &'static [u32]) {
+    cases((&[0.5, 2.5], &[1, 4]), (&[0.5, 1.0, 2.5], &[1, 4, 8, 16]))
+}
 
-/// What is drawn over a surface of one colour.
+/// Lines drawn over a surface of one colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Lines {
     /// Along its border.
@@ -54,8 +57,8 @@ fn spec(lines: Lines, width_px: f64, samples: u32, opacity: f64) -> Spec {
     spec
 }
 
-/// Colours of the pixels that lines cover in part, as they should be: where they are, and red, green and blue. A surface of this
-/// opacity lies nowhere over itself.
+/// Colours of the pixels that lines cover in part, as they should be: where they are, and red,
+/// green and blue. A surface of this opacity lies nowhere over itself.
 fn truth(plan: &DrawPlan<'_>, opacity: f64) -> Vec<(usize, V3)> {
     let [pass] = &plan.lines[..] else { panic!("{} passes", plan.lines.len()) };
     let look = plan.surface.as_ref().unwrap().materials[0];
@@ -76,7 +79,7 @@ fn errors(image: &Image, truth: &[(usize, V3)]) -> Errors {
     Errors::of(&drawn.collect::<Vec<_>>(), &truth.iter().flat_map(|(_, color)| *color).collect::<Vec<_>>())
 }
 
-/// What is let pass. A line as wide as samples are apart leaves no doubt on which side of it a point is.
+/// The gate. A line as wide as samples are apart leaves no doubt on which side of it a point is.
 fn now(width_px: f64, samples: u32) -> Gate {
     let rmse = match samples {
         1 if width_px < 1.0 => 21.0,
@@ -94,10 +97,12 @@ fn measure(name: &str, obj: &str, opacity: f64) {
     let (mut missed, mut drawn) = (Vec::new(), 0);
     let mut renderers = renderers();
     let mesh = scenes::mesh(obj);
-    for (lines, width_px) in [Lines::Contour, Lines::Wires].into_iter().flat_map(|l| WIDTHS_PX.map(|w| (l, w))) {
+    let (widths_px, samples) = widths_and_samples();
+    let all_lines = [Lines::Contour, Lines::Wires].into_iter();
+    for (lines, width_px) in all_lines.flat_map(|l| widths_px.iter().map(move |&w| (l, w))) {
         let truth = truth(&scenes::plan(&mesh, &spec(lines, width_px, 1, 1.0)), opacity);
         assert!(truth.len() > 300, "{name}: {} pixels", truth.len());
-        for samples in [1, 4, 8, 16] {
+        for &samples in samples {
             let spec = spec(lines, width_px, samples, opacity);
             let plan = scenes::plan(&mesh, &spec);
             assert_eq!(plan.peeling().is_some(), opacity < 1.0);
@@ -115,7 +120,7 @@ fn measure(name: &str, obj: &str, opacity: f64) {
             }
         }
     }
-    assert_eq!(drawn, 2 * WIDTHS_PX.len() * 4 * renderers.len());
+    assert_eq!(drawn, 2 * widths_px.len() * samples.len() * renderers.len());
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 

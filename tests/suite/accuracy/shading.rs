@@ -4,10 +4,10 @@ use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::plan::{DrawPlan, flags};
 
-use crate::oracle::light::{face_normal, lit, smooth_normals, weights};
 use crate::oracle::obj::Shape;
 use crate::oracle::screen::{Scene, Screen};
-use crate::oracle::srgb;
+use crate::oracle::surface::light::{face_normal, lit, smooth_normals, weights};
+use crate::oracle::surface::srgb;
 use crate::oracle::vector::{V3, cross, dot, length, unit};
 use crate::support::scenes;
 use crate::support::seen::{lights, material, only_triangle};
@@ -16,20 +16,23 @@ use crate::support::truth::{cases, renderers, scene};
 
 /// A face's normal may be this far from the exact one, radians.
 pub const NORMAL_GOAL_RAD: f64 = 1e-6;
-/// A byte may be this far from the exact value, which no picture of bytes can be nearer to than half a step.
+/// A byte may be this far from the exact value, which no picture of bytes can be nearer to than
+/// half a step.
 pub const COLOR_GOAL: f64 = 1.0;
 /// Measured now, one normal a face: f32 alone.
 pub const FLAT_NOW: f64 = 0.51;
 /// Measured now, normals between corners that are snapped to 1/256 px.
 pub const SMOOTH_NOW: f64 = 0.65;
 
-/// A colour by triangle and by the place in the picture, with the number of pixels that could be compared.
+/// A colour by triangle and by the place in the picture, with the number of pixels that could be
+/// compared.
 pub struct ColorErrors {
     pub pixels: usize,
     pub max: f64,
 }
 
-/// Compares the pixels that lie wholly in one triangle, which is the only one that is seen there; `normals` are by triangle corner.
+/// Compares the pixels that lie wholly in one triangle, which is the only one that is seen there;
+/// `normals` are by triangle corner.
 pub fn color_errors(plan: &DrawPlan<'_>, image: &Image, normals: &[[V3; 3]]) -> ColorErrors {
     let scene = scene(plan);
     let screen = Screen::new(&scene);

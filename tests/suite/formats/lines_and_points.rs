@@ -1,10 +1,10 @@
 //! Lines and points, from every format that has them.
 
-use crate::support::damage::{cut_everywhere, mutate};
-use crate::support::fbx_files::{Value, ascii, binary, file, geometry, model, node, property};
-use crate::support::mesh_files::{Read, Solid, read, read_limited};
-use crate::support::ply_files::{ENCODINGS, Ply, XYZ};
-use crate::support::shared::folder;
+use crate::support::data;
+use crate::support::files::damage::{cut_everywhere, mutate};
+use crate::support::files::fbx::{Value, ascii, binary, file, geometry, model, node, property};
+use crate::support::files::mesh::{Solid, codes, read, read_limited};
+use crate::support::files::ply::{ENCODINGS, Ply, XYZ};
 use meshsnap::import::{Format, MeshFault};
 use meshsnap::limits::Limits;
 use meshsnap::mesh::Mesh;
@@ -18,10 +18,6 @@ fn loose(mesh: &Mesh) -> Vec<End> {
         std::array::from_fn(|k| mesh.to_file.centre[k] + mesh.to_file.scale * f64::from(p[k]))
     };
     mesh.lines_and_points.iter().map(|one| (one.ends.map(to_file), one.material)).collect()
-}
-
-fn codes(mesh: &Read) -> Vec<&'static str> {
-    mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 
 const A: [f64; 3] = [0.0, 0.0, 0.0];
@@ -93,9 +89,8 @@ fn ply_clouds_and_edges() {
     let few = Limits { triangles: 11, ..Limits::default() };
     let cloud = Ply::new(ENCODINGS[1]).element("vertex", &XYZ, &points).bytes();
     assert!(read_limited(&cloud, None, &few).unwrap_err().detail.contains("--limit-triangles"));
-    let Some(models) = folder("models") else { return };
-    for name in ["points_ascii.ply", "points_bin.ply"] {
-        let mesh = read(&std::fs::read(models.join(name)).unwrap()).unwrap();
+    for name in ["ply_points_ascii.ply", "ply_points_bin.ply"] {
+        let mesh = read(&data::bytes(&format!("corpus/emptyIO/{name}"))).unwrap();
         assert_eq!(mesh.lines_and_points.len() as u64, mesh.report.file_vertices, "{name}");
         assert!(mesh.lines_and_points.len() > 3 && mesh.lines_and_points.iter().all(|one| one.is_point()), "{name}");
     }

@@ -1,10 +1,10 @@
 //! OFF files: every prefix, colours of all kinds, comments, binary ones, and broken ones.
 
-use crate::formats::same_shape::assert_same_shape;
-use crate::support::damage::{cut_everywhere, mutate};
-use crate::support::mesh_files::{Read, Solid, read, read_as, read_limited};
+use crate::support::data::large_folder;
+use crate::support::files::damage::{cut_everywhere, mutate};
+use crate::support::files::mesh::{Solid, codes, read, read_as, read_limited};
+use crate::support::files::same::assert_same_shape;
 use crate::support::server::Server;
-use crate::support::shared::folder;
 use meshsnap::import::{Format, MeshFault};
 use meshsnap::limits::Limits;
 
@@ -41,10 +41,6 @@ fn binary(with_color: bool) -> Vec<u8> {
         }
     }
     out
-}
-
-fn codes(mesh: &Read) -> Vec<&'static str> {
-    mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 
 #[test]
@@ -208,7 +204,11 @@ fn real_files_and_the_service_read_it() {
     assert_eq!(server.post("/v1/render?size=32&format_in=off", plain().as_bytes()).body, sniffed.body);
     let formats = server.get("/v1/capabilities").json()["mesh_formats"].clone();
     assert!(formats.as_array().unwrap().contains(&"off".into()), "{formats}");
-    let Some(models) = folder("models") else { return };
+}
+
+#[test]
+fn large_files_have_their_known_sizes() {
+    let Some(models) = large_folder("models") else { return };
     let sizes = [("3holes.off", 3596, 7200), ("ballA.off", 1900, 3796), ("comments.off", 8, 12)];
     for (name, vertices, triangles) in sizes {
         let mesh = read(&std::fs::read(models.join(name)).unwrap()).unwrap();

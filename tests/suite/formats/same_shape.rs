@@ -1,29 +1,15 @@
-//! Every format that is read gives the same mesh for the same shape, and the shape keeps what matters.
+//! Every format that is read gives the same mesh for the same shape, and the shape keeps what
+//! matters.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
-use crate::support::mesh_files::{Gltf, Solid, read, read_as};
-use crate::support::ply_files::Encoding;
+use crate::support::files::mesh::{Gltf, Solid, read, read_as};
+use crate::support::files::ply::Encoding;
+use crate::support::files::same::{assert_same_shape, edges};
 use meshsnap::import::Format;
 use meshsnap::limits::{Budget, Deadline, Limits};
-use meshsnap::mesh::edges::EdgeList;
+use meshsnap::mesh::UpAxis;
 use meshsnap::mesh::topology::Topology;
-use meshsnap::mesh::{Mesh, UpAxis};
 use serde_json::json;
-
-/// The edge list, with default limits.
-pub fn edges(mesh: &Mesh) -> EdgeList {
-    let limits = Limits::default();
-    EdgeList::of(mesh, &mut Budget::new(&limits)).unwrap()
-}
-
-/// What must not depend on the format.
-pub fn assert_same_shape(a: &Mesh, b: &Mesh, what: &str) {
-    assert_eq!(a.positions, b.positions, "{what}");
-    assert_eq!(a.triangles, b.triangles, "{what}");
-    assert_eq!(a.face_normals, b.face_normals, "{what}");
-    assert_eq!(a.bounds, b.bounds, "{what}");
-    assert_eq!(a.to_file, b.to_file, "{what}");
-}
 
 #[test]
 fn one_shape_in_every_format_is_one_mesh() {
@@ -133,7 +119,8 @@ fn slivers_and_tiny_faces_have_normals() {
     // A face of 1e-160 beside one of 1, and a needle: products of their edges underflow or cancel.
     let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1e-160 0 0\nv 0 1e-160 0\nv 1 1e-170 0\nf 1 2 3\nf 1 4 5\nf 1 2 6\n";
     let mesh = read(obj.as_bytes()).unwrap();
-    // In f32 the tiny ones have no area left, and are counted; but they were not taken for faces along a line.
+    // In f32 the tiny ones have no area left, and are counted; but they were not taken for faces
+    // along a line.
     let report = &mesh.report;
     assert_eq!((mesh.triangles.len(), report.dropped_degenerate_faces, report.dropped_collapsed_faces), (1, 0, 2));
     let tiny = "v 0 0 0\nv 1e-160 0 0\nv 0 1e-160 0\nf 1 2 3\n";

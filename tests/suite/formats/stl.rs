@@ -1,8 +1,8 @@
 //! STL files as programs write them: colours, headers that lie, counts that were never filled in.
 
-use crate::formats::same_shape::assert_same_shape;
-use crate::support::damage::{cut_everywhere, mutate};
-use crate::support::mesh_files::{Read, Solid, read, read_limited};
+use crate::support::files::damage::{cut_everywhere, mutate};
+use crate::support::files::mesh::{Solid, codes, read, read_limited};
+use crate::support::files::same::assert_same_shape;
 use meshsnap::import::{Format, MeshFault};
 use meshsnap::limits::Limits;
 use meshsnap::mesh::Mesh;
@@ -23,10 +23,6 @@ fn stl(header: &[u8], attributes: [u16; 3]) -> Vec<u8> {
 
 fn colors(mesh: &Mesh) -> Vec<[[f32; 4]; 3]> {
     mesh.attribute_triangles.iter().map(|t| t.map(|v| mesh.colors[v as usize])).collect()
-}
-
-fn codes(mesh: &Read) -> Vec<&'static str> {
-    mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 
 #[test]

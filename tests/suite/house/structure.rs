@@ -1,9 +1,11 @@
-//! Who may import whom. ARCHITECTURE.md draws the picture; this holds it.
+//! The rules of the source tree: imports between rooms, circles between files, crowded folders.
+//! ARCHITECTURE.md draws the picture; these tests hold it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Rooms under `src/`, and what each may name of the others. A file belongs to the room with the longest name that begins its path.
+/// Rooms under `src/`, and what each may name of the others. A file belongs to the room with the
+/// longest name that begins its path.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("limits", &[]),
     // The transfer function that importers, colours of a request, textures and the stored byte share.
@@ -80,10 +82,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
 /// Lines of a source file; past that it holds more than one idea.
 const LINES_MAX: usize = 600;
 
-/// Files directly in a folder, `mod.rs` included; past that it needs sub-folders that say what belongs together.
+/// Files directly in a folder, `mod.rs` included; past that it needs sub-folders that say what
+/// belongs together.
 const DIRECT_FILES_MAX: usize = 14;
 
-/// Crates and what of std may be named where: a word, and the path prefixes under `src/` that may hold it.
+/// Crates and what of std may be named where: a word, and the path prefixes under `src/` that may
+/// hold it.
 const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("wgpu::", &["backend/gpu/"]),
     ("axum::", &["service/http/"]),
@@ -120,7 +124,8 @@ fn imports_go_one_way() {
     assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
 }
 
-/// A child may use its parents' types, and a parent calls its children. Between other files, imports make no circle.
+/// A child may use its parents' types, and a parent calls its children. Between other files,
+/// imports make no circle.
 #[test]
 fn no_files_import_each_other_in_a_circle() {
     let files: Vec<(String, String)> = sources().into_iter().filter(|(file, _)| !file.ends_with("tests.rs")).collect();
@@ -284,7 +289,8 @@ fn code(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.lines().enumerate().map(|(i, line)| (i + 1, line)).filter(|(_, line)| !line.trim_start().starts_with("//"))
 }
 
-/// The longest room in [`ALLOWED`] that a file or a path is in; the first word of the path where there is none.
+/// The longest room in [`ALLOWED`] that a file or a path is in; the first word of the path where
+/// there is none.
 fn room_of(path: &str) -> &str {
     let path = path.strip_suffix(".rs").unwrap_or(path);
     let is_in = |room: &str| path == room || path.strip_prefix(room).is_some_and(|rest| rest.starts_with('/'));
@@ -298,13 +304,13 @@ fn module(file: &str) -> String {
     path.strip_suffix("/mod").unwrap_or(path).replace('/', "::")
 }
 
-/// What `crate::` and `meshsnap::` paths name, without that first word.
+/// The names in `crate::` and `meshsnap::` paths, without that first word.
 fn crate_paths(text: &str) -> Vec<(usize, Vec<String>)> {
     paths(text, "").into_iter().filter(|(_, path)| !path.is_empty()).collect()
 }
 
-/// Paths in a file's code, from the crate's root, as far as they begin with `crate`, `meshsnap`, `self` or `super`. Of a list in braces
-/// each item is a path.
+/// Paths in a file's code, from the crate's root, as far as they begin with `crate`, `meshsnap`,
+/// `self` or `super`. Of a list in braces each item is a path.
 fn paths(text: &str, own: &str) -> Vec<(usize, Vec<String>)> {
     let mut out = Vec::new();
     let lines: Vec<(usize, &str)> = code(text).collect();

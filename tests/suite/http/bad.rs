@@ -1,6 +1,7 @@
-//! The daemon over HTTP: bad input and bad manners. Each is refused precisely, and the next request is fine.
+//! The daemon over HTTP: bad input and bad manners. Each is refused precisely, and the next request
+//! is fine.
 
-use std::io::{Read as _, Write as _};
+use std::io::{ErrorKind, Read as _, Write as _};
 use std::time::{Duration, Instant};
 
 use crate::http::answers::{FORM, form};
@@ -107,11 +108,10 @@ fn a_huge_announced_body_is_refused_at_once_and_unread() {
     let server = Server::start(&[]);
     for expect in ["", "Expect: 100-continue\r\n"] {
         let head = format!("POST /v1/render HTTP/1.1\r\nHost: x\r\nContent-Length: 10000000000\r\n{expect}\r\n");
-        let began = Instant::now();
+        // An answer at all is the proof: the announced bytes are never sent.
         let answer = server.send(&head, b"");
         let detail = answer.problem(413, "body_too_large");
         assert!(detail.contains("67108864") && answer.json()["flag"] == "--limit-body-bytes", "{detail}");
-        assert!(began.elapsed() < Duration::from_secs(1), "{:?}", began.elapsed());
     }
     // A length beyond u64 is HTTP that cannot be read.
     let head = "POST /v1/render HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999999999999999999\r\n\r\n";
@@ -162,11 +162,12 @@ fn slow_clients_are_let_go() {
     for beginning in beginnings {
         let mut stream = server.connect();
         stream.write_all(beginning).unwrap();
-        let began = Instant::now();
         let mut rest = Vec::new();
-        let _ = stream.read_to_end(&mut rest);
-        let took = began.elapsed();
-        assert!(took < Duration::from_secs(5), "{:?} held for {took:?}", String::from_utf8_lossy(beginning));
+        // The server closes or resets the connection, before the client's own guard ends the read.
+        if let Err(error) = stream.read_to_end(&mut rest) {
+            let is_guard = [ErrorKind::WouldBlock, ErrorKind::TimedOut].contains(&error.kind());
+            assert!(!is_guard, "{:?} is held", String::from_utf8_lossy(beginning));
+        }
     }
     let head = "POST /v1/render HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\nv 1 2 3\n";
     server.send(head, b"").problem(408, "body_timeout");
@@ -183,7 +184,8 @@ fn a_body_that_ends_early_costs_nothing() {
     server.wait_for_load(|load| load["queued"] == 0 && load["running"] == 0);
 }
 
-/// A refusal that comes before the body is read must not break the connection for the next request, or say that it does.
+/// A refusal that comes before the body is read must not break the connection for the next request,
+/// or say that it does.
 #[test]
 fn early_refusals_leave_the_connection_in_order() {
     let server = Server::start(&["--limit-body-bytes", "3000000"]);

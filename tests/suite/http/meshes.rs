@@ -1,12 +1,13 @@
-//! `/v1/meshes` of the real server: stored once, reported as `inspect --json` does, known by digest.
+//! `/v1/meshes` of the real server: stored once, reported as `inspect --json` does, known by
+//! digest.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use std::io::Read as _;
 use std::io::Write as _;
 
-use crate::formats::bundles::names::zipped;
 use crate::http::answers::FORM;
-use crate::support::mesh_files::Solid;
+use crate::support::files::bundle::zipped;
+use crate::support::files::mesh::Solid;
 use crate::support::server::{Answer, CUBE_OBJ, Server, meshsnap};
 use meshsnap::service::store::Digest;
 
@@ -42,7 +43,7 @@ pub fn head(server: &Server, path: &str, headers: &[&str]) -> Answer {
     Answer { status, headers: text.lines().skip(1).filter_map(pair).collect(), body: Vec::new() }
 }
 
-/// What the program prints of these files.
+/// The program's output for these files.
 fn inspected(files: &[(&str, &[u8])], arguments: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
     for (name, bytes) in files {
@@ -137,7 +138,8 @@ fn the_report_is_what_inspect_prints() {
     }
     assert_eq!(reports, 18);
 
-    // The archive's two readings are two reports, with a tag each; without `entry` it is as unclear as it was.
+    // The archive's two readings are two reports, with a tag each; without `entry` it is as unclear
+    // as it was.
     let tags =
         ["a", "b"].map(|e| server.get(&format!("{}?entry={e}.obj", url(&two))).header("etag").unwrap().to_owned());
     assert_ne!(tags[0], tags[1]);
@@ -216,7 +218,8 @@ fn put_stores_under_the_name_that_it_says() {
     let detail = server.request("PUT", &url, &[], &other).problem(422, "digest_mismatch");
     assert!(detail.contains(&Digest::of(&other).to_string()), "{detail}");
     server.get(&self::url(&other)).problem(404, "mesh_unknown");
-    // A digest costs no worker's time; a mesh that is none is refused as such only under its own name.
+    // A digest costs no worker's time; a mesh that is none is refused as such only under its own
+    // name.
     server.request("PUT", &url, &[], b"no mesh").problem(422, "digest_mismatch");
     server.request("PUT", &self::url(b"no mesh"), &[], b"no mesh").problem(415, "mesh_unrecognised");
     // Any spelling of a path is the path.

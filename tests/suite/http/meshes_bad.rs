@@ -51,7 +51,7 @@ fn names_that_are_no_digest() {
     assert_eq!(server.get(&url(CUBE_OBJ)).status, 200, "nothing happened to what is there");
 }
 
-/// What it is, its headers, its query, its bytes, and the status.
+/// A name, headers, a query, bytes, and the status.
 type Case<'a> = (&'a str, &'a [&'a str], &'a str, &'a [u8], u16);
 
 #[test]

@@ -1,9 +1,9 @@
 //! Pictures of stored meshes, by address and by request document.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
-use crate::formats::bundles::names::zipped;
 use crate::http::meshes::{head, url};
-use crate::support::mesh_files::Solid;
+use crate::support::files::bundle::zipped;
+use crate::support::files::mesh::Solid;
 use crate::support::server::{CUBE_OBJ, Server};
 use meshsnap::service::store::Digest;
 

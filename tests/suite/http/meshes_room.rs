@@ -119,7 +119,8 @@ fn what_is_drawn_keeps_its_room_until_it_is_done() {
     let server = Server::start(&["--workers", "2", "--mesh-bytes", "30000", "--limit-job-ms", "60000"]);
     let (first, second) = (cube(1, 20_000), cube(2, 20_000));
     assert_eq!(server.post("/v1/meshes", &first).status, 201);
-    // Two jobs occupy both workers; when they end, one takes the third and the other looks at what was sent meanwhile.
+    // Two jobs occupy both workers; when they end, one takes the third and the other looks at what
+    // was sent meanwhile.
     let document =
         format!(r#"{{"mesh":"{}","style":"topology","image":{{"width":4096,"height":4096}}}}"#, &url(&first)[11..]);
     let jobs =

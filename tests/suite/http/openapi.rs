@@ -19,7 +19,7 @@ fn methods(item: &Value) -> BTreeSet<String> {
     item.as_object().unwrap().keys().map(|key| key.to_uppercase()).filter(|m| METHODS.contains(&m.as_str())).collect()
 }
 
-/// What a reference within the document leads to; anything else as it is.
+/// The target of a reference within the document; anything else as it is.
 fn follow<'d>(document: &'d Value, at: &'d Value) -> &'d Value {
     match at["$ref"].as_str().and_then(|place| place.strip_prefix('#')) {
         Some(place) => document.pointer(place).unwrap_or_else(|| panic!("{place} leads nowhere")),

@@ -2,7 +2,7 @@
 
 use crate::support::server::{Answer, CUBE_OBJ, Server, meshsnap};
 
-/// What an answer says of the choice.
+/// The choice, as an answer states it.
 fn said(answer: &Answer) -> (f64, String) {
     let error = answer.header("x-expected-error").expect("X-Expected-Error").parse().unwrap();
     (error, answer.header("x-chosen").expect("X-Chosen").to_owned())

@@ -14,7 +14,8 @@ fn rules() -> Rules {
     Rules { limits: Limits::default(), backend: BackendChoice::Auto }
 }
 
-/// `MESHSNAP_GOLDEN=write` stores the schema anew, and fails: a run that wrote its own truth has tested nothing.
+/// `MESHSNAP_GOLDEN=write` stores the schema anew, and fails: a run that wrote its own truth has
+/// tested nothing.
 #[test]
 fn the_stored_schema_is_the_generated_one() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("api/material.schema.json");
@@ -177,7 +178,8 @@ fn the_schema_and_the_reader_are_of_one_mind() {
     assert_eq!((GOOD.len(), BAD.len()), (46, 57));
 }
 
-/// Documents made at random from pieces of both kinds: as many as both refuse or take; none where they differ.
+/// Documents made at random from pieces of both kinds: as many as both refuse or take; none where
+/// they differ.
 #[test]
 fn the_schema_and_the_reader_agree_on_documents_made_at_random() {
     let validator = jsonschema::draft202012::new(&request::schema(&rules())).unwrap();

@@ -13,10 +13,11 @@ use meshsnap::request;
 use meshsnap::request::Rules;
 use meshsnap::spec::BackendChoice;
 
-use crate::render::twins::pictures as twins;
+use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::scenes;
 use crate::support::server::{Server, meshsnap};
+use crate::support::skip::{Need, skip};
 
 /// Requests under api/examples.
 const EXAMPLES: usize = 32;
@@ -38,7 +39,8 @@ fn knot() -> String {
         let (s2, c2, s3, c3) = (libm::sin(2.0 * t), libm::cos(2.0 * t), libm::sin(3.0 * t), libm::cos(3.0 * t));
         let centre = [(2.0 + c3) * c2, (2.0 + c3) * s2, s3];
         let tangent = [-3.0 * s3 * c2 - 2.0 * (2.0 + c3) * s2, -3.0 * s3 * s2 + 2.0 * (2.0 + c3) * c2, 3.0 * c3];
-        // The torus's own normal is across the knot everywhere, so the frame closes without a twist.
+        // The torus's own normal is across the knot everywhere, so the frame closes without a
+        // twist.
         let normal = [c3 * c2, c3 * s2, s3];
         let length = tangent.iter().map(|v| v * v).sum::<f64>().sqrt();
         let [tx, ty, tz] = tangent.map(|v| v / length);
@@ -65,7 +67,7 @@ fn the_knot_is_what_its_generator_makes() {
     check_written("knot.obj", &knot(), 60_000..120_000);
 }
 
-/// With MESHSNAP_WRITE_EXAMPLES set, writes the file anew, and fails so that nobody takes writing for checking.
+/// With MESHSNAP_WRITE_EXAMPLES set, writes the file anew, and fails: writing is not checking.
 fn check_written(file: &str, made: &str, sizes: std::ops::Range<usize>) {
     let path = examples().join(file);
     if std::env::var_os("MESHSNAP_WRITE_EXAMPLES").is_some() {
@@ -77,7 +79,8 @@ fn check_written(file: &str, made: &str, sizes: std::ops::Range<usize>) {
     assert!(sizes.contains(&made.len()), "{} bytes", made.len());
 }
 
-/// Six times the volume that the quads enclose: positive if they face outwards, and 6 pi 0.42^2 times the length.
+/// Six times the volume that the quads enclose: positive if they face outwards, and 6 pi 0.42^2
+/// times the length.
 #[test]
 fn the_knot_faces_outwards() {
     let text = knot();
@@ -94,8 +97,9 @@ fn the_knot_faces_outwards() {
     assert!((100.0..105.0).contains(&volume), "{volume}");
 }
 
-/// A lamp with everything that a look can be about: parts of several materials (Base, Glass, Shade), a shade with two open
-/// rims and colours of its own, a fin that makes an edge of three faces, sharp rims, and texture coordinates.
+/// A lamp with everything that a look can be about: parts of several materials (Base, Glass,
+/// Shade), a shade with two open rims and colours of its own, a fin that makes an edge of three
+/// faces, sharp rims, and texture coordinates.
 fn lamp() -> String {
     let mut lamp = Lamp::default();
     let (base, gold, glass) = ([0.42, 0.46, 0.5], [0.9, 0.75, 0.45], [0.8, 0.9, 0.95]);
@@ -133,8 +137,8 @@ impl Lamp {
         self.count
     }
 
-    /// A profile, turned around the y axis; the number of its first point. The seam's points are there twice, for the
-    /// texture coordinates' sake.
+    /// A profile, turned around the y axis; the number of its first point. The seam's points are
+    /// there twice, for the texture coordinates' sake.
     fn turn(&mut self, material: &str, profile: &[(f64, f64)], color: [f64; 3]) -> usize {
         let first = self.count + 1;
         for (i, &(radius, height)) in profile.iter().enumerate() {
@@ -214,7 +218,7 @@ fn every_example_is_drawn_alike_on_both_back_ends() {
     let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
     let size = [("size".to_owned(), SIZE_PX.to_string())];
     let mut cpu = CpuRenderer::new(2);
-    let mut gpu = twins::gpus().map(|gpus| GpuRenderer::new(gpus[0].clone()));
+    let mut gpu = gpus().map(|gpus| GpuRenderer::new(gpus[0].clone()));
     let (mut drawn, mut compared, mut of_the_lamp) = (0, 0, 0);
     let mut faults = Vec::new();
     for (name, document) in requests() {
@@ -244,7 +248,7 @@ fn every_example_is_drawn_alike_on_both_back_ends() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// For whoever wants to look: `MESHSNAP_EXAMPLES_OUT=FOLDER` keeps the pictures.
+/// `MESHSNAP_EXAMPLES_OUT=FOLDER` keeps the pictures, to be looked at.
 fn keep(name: &str, picture: &Image) {
     if let Some(folder) = std::env::var_os("MESHSNAP_EXAMPLES_OUT") {
         let path = Path::new(&folder).join(format!("{name}.png"));
@@ -269,7 +273,7 @@ fn the_examples_show_every_look() {
         ("light.preset", "/light/preset"),
     ] {
         for word in &vocabulary[key] {
-            // What needs no word because it is the default.
+            // A default needs no word.
             let is_default = ["none", "face", "exact", "triangles"].contains(word);
             let is_shown = all.iter().any(|document| document.pointer(at).is_some_and(|v| v == word));
             assert!(is_shown || is_default, "no example has {key}={word}");
@@ -283,8 +287,7 @@ fn the_examples_show_every_look() {
 #[test]
 fn the_printed_curl_line_works_as_printed() {
     if Command::new("curl").arg("--version").output().is_err() {
-        assert_ne!(std::env::var("MESHSNAP_TEST_REQUIRE").as_deref(), Ok("all"), "curl is missing");
-        println!("curl is missing: not checked");
+        skip(Need::Curl, "curl");
         return;
     }
     let server = Server::start(&[]);

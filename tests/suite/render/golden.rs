@@ -1,9 +1,12 @@
-//! Every scene on every back-end: the CPU's picture equals the stored one to the byte, whatever the profile, the number
-//! of threads or the instruction set; the GPU's is as close as its named tolerance says.
+//! The golden scenes, one test each. The CPU's picture equals the stored one to the byte, for every
+//! number of threads and every instruction set. `twins/pictures.rs` holds the GPU to the CPU.
 //!
-//! `MESHSNAP_GOLDEN=write` stores new pictures, and then fails: a run that wrote its own truth has tested nothing.
+//! A failure writes the actual, the expected and the difference picture under
+//! `target/golden-failures/NAME/`. `MESHSNAP_GOLDEN=write` stores new pictures, and then fails: a
+//! run that wrote its own truth has tested nothing.
 
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::{CpuRenderer, Isa};
@@ -14,27 +17,78 @@ use crate::support::scenes::{self, SCENES, Scene};
 use crate::support::truth::goal;
 
 const THREADS: [usize; 4] = [1, 2, 3, 8];
+/// Pictures per set-up. The second comes from buffers that the first has used.
+const RUNS: usize = 2;
+
+/// A test per scene, named after it with `_` for `-`.
+macro_rules! golden_tests {
+    ($($name:ident,)*) => {
+        const TESTED: &[&str] = &[$(stringify!($name)),*];
+        $(
+            #[test]
+            fn $name() {
+                picture_equals_the_stored_one(&stringify!($name).replace('_', "-"));
+            }
+        )*
+    };
+}
+
+golden_tests! {
+    torus_flat,
+    torus_smooth,
+    torus_unlit,
+    torus_wire,
+    torus_wire_wide,
+    torus_fwidth,
+    torus_wireframe,
+    gear_outline_px,
+    gear_outline_object,
+    gear_hidden_line,
+    cube_flat_one_sample,
+    cube_wire_polygons,
+    sheet_wire_red,
+    sheet_back_faces,
+    sheet_orthographic,
+    sheet_from_inside,
+    sheet_wire_from_inside,
+    torus_glass,
+    gear_glass_outline,
+    torus_wireframe_fwidth_show,
+    torus_wireframe_fwidth_fade,
+    torus_wire_fwidth_fade,
+    two_one_outlined,
+    two_one_glass,
+    torus_derivative,
+    gear_metal,
+    torus_metal,
+    sheet_threshold,
+    gear_fwidth_min,
+    gear_barycentric_lit,
+    torus_debug_normal,
+    gear_debug_edge_distance,
+    sheet_debug_barycentric,
+    sheet_debug_face_orientation,
+    torus_contour,
+    gear_contour,
+    gear_feature_fade,
+    fin_topology,
+    torus_wire_lit,
+    spring_wireframe,
+    sheet_boundary,
+}
 
 #[test]
-fn cpu_pictures_equal_the_stored_ones_to_the_byte() {
-    let isas = Isa::available();
-    let of = |threads: usize, isa: Isa| (format!("{threads} threads, {isa:?}"), CpuRenderer::with_isa(threads, isa));
-    let mut renderers: Vec<_> = isas.iter().flat_map(|&isa| THREADS.map(|threads| of(threads, isa))).collect();
-    let mut compared = 0;
-    for scene in SCENES {
-        let stored = stored(scene, &mut renderers[0].1);
-        for (name, renderer) in &mut renderers {
-            // Twice: the second picture comes from buffers that the first has used.
-            for run in 0..2 {
-                let picture = draw(scene, renderer);
-                assert_same(scene, name, run, &picture, &stored);
-                compared += 1;
-            }
-        }
-    }
-    goal(7, &format!("identical: {compared} pictures with {isas:?} instructions on {THREADS:?} threads"));
-    assert_eq!(compared, SCENES.len() * 2 * THREADS.len() * isas.len());
+fn every_scene_has_a_test_and_every_picture_a_scene() {
+    let scenes: BTreeSet<String> = SCENES.iter().map(|scene| scene.name.to_owned()).collect();
+    let tested: BTreeSet<String> = TESTED.iter().map(|name| name.replace('_', "-")).collect();
+    assert_eq!(scenes, tested);
+    let entries = std::fs::read_dir(folder()).unwrap();
+    let stored: BTreeSet<String> =
+        entries.map(|entry| entry.unwrap().path().file_stem().unwrap().to_str().unwrap().to_owned()).collect();
+    assert_eq!(scenes, stored, "tests/golden");
     assert_eq!(SCENES.len(), 41);
+    let compared = SCENES.len() * 2 * THREADS.len() * RUNS;
+    goal(7, &format!("identical: {compared} pictures with {:?} instructions on {THREADS:?} threads", isas()));
 }
 
 /// Draws a scene.
@@ -44,25 +98,82 @@ pub fn draw(scene: &Scene, renderer: &mut dyn Renderer) -> Image {
     renderer.draw(&scenes::plan(&mesh, &spec), &Deadline::default()).unwrap()
 }
 
-fn stored(scene: &Scene, renderer: &mut CpuRenderer) -> Image {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{}.png", scene.name));
-    if std::env::var_os("MESHSNAP_GOLDEN").is_some_and(|v| v == "write") {
-        let picture = draw(scene, renderer);
-        image::save_buffer(&path, &picture.rgba, picture.width_px, picture.height_px, image::ColorType::Rgba8).unwrap();
+fn isas() -> Vec<Isa> {
+    Isa::available()
+}
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden")
+}
+
+fn picture_equals_the_stored_one(name: &str) {
+    let scene = SCENES.iter().find(|scene| scene.name == name).expect("a scene of this name");
+    let path = folder().join(format!("{name}.png"));
+    if std::env::var_os("MESHSNAP_GOLDEN").is_some_and(|value| value == "write") {
+        save(&path, &draw(scene, &mut CpuRenderer::new(1)));
+        panic!("{} was written: look at it, then run without MESHSNAP_GOLDEN", path.display());
     }
-    let file =
-        image::open(&path).unwrap_or_else(|e| panic!("{}: {e}; MESHSNAP_GOLDEN=write stores it", path.display()));
-    let file = file.into_rgba8();
-    Image { width_px: file.width(), height_px: file.height(), rgba: file.into_raw() }
+    let stored = image::open(&path)
+        .unwrap_or_else(|error| panic!("{}: {error}; MESHSNAP_GOLDEN=write stores it", path.display()))
+        .into_rgba8();
+    let stored = Image { width_px: stored.width(), height_px: stored.height(), rgba: stored.into_raw() };
+    for isa in isas() {
+        for threads in THREADS {
+            let mut renderer = CpuRenderer::with_isa(threads, isa);
+            for run in 0..RUNS {
+                let setup = format!("{threads} threads, {isa:?}, run {run}");
+                assert_same(name, &setup, &draw(scene, &mut renderer), &stored);
+            }
+        }
+    }
+}
+
+fn assert_same(name: &str, setup: &str, actual: &Image, expected: &Image) {
+    let sizes = [actual, expected].map(|image| [image.width_px, image.height_px]);
+    let pixels = actual.rgba.chunks(4).zip(expected.rgba.chunks(4));
+    let differing = pixels.filter(|(a, b)| a != b).count();
+    if sizes[0] == sizes[1] && differing == 0 {
+        return;
+    }
+    let folder = failure_folder(name);
+    save(&folder.join("actual.png"), actual);
+    save(&folder.join("expected.png"), expected);
+    if sizes[0] == sizes[1] {
+        save(&folder.join("difference.png"), &difference(actual, expected));
+    }
+    panic!("{name}, {setup}: {differing} pixels of {sizes:?} differ; see {}", folder.display());
+}
+
+/// Every differing pixel in white, on black: a difference of 1/255 is as easy to see as a large
+/// one.
+fn difference(actual: &Image, expected: &Image) -> Image {
+    let pixels = actual.rgba.chunks(4).zip(expected.rgba.chunks(4));
+    let rgba = pixels.flat_map(|(a, b)| if a == b { [0, 0, 0, 255] } else { [255; 4] }).collect();
+    Image { rgba, ..*actual }
+}
+
+/// Made anew in `target/golden-failures/`.
+fn failure_folder(name: &str) -> PathBuf {
+    // Cargo's folder for tests lies directly in the target folder.
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("a target folder");
+    let folder = target.join("golden-failures").join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn save(path: &Path, picture: &Image) {
+    image::save_buffer(path, &picture.rgba, picture.width_px, picture.height_px, image::ColorType::Rgba8).unwrap();
 }
 
 #[test]
-fn a_run_that_writes_goldens_fails() {
-    assert!(std::env::var_os("MESHSNAP_GOLDEN").is_none(), "goldens were written: look at them, then run without");
-}
-
-fn assert_same(scene: &Scene, renderer: &str, run: i32, picture: &Image, stored: &Image) {
-    assert_eq!((picture.width_px, picture.height_px), (stored.width_px, stored.height_px), "{}", scene.name);
-    let differing = picture.rgba.chunks(4).zip(stored.rgba.chunks(4)).filter(|(a, b)| a != b).count();
-    assert_eq!(differing, 0, "{}: {renderer}, run {run}: pixels differ from tests/golden", scene.name);
+fn a_differing_picture_leaves_three_files() {
+    let image = |byte: u8| Image { width_px: 2, height_px: 1, rgba: vec![byte, 0, 0, 255, 9, 9, 9, 255] };
+    let failed = std::panic::catch_unwind(|| assert_same("self-test", "none", &image(1), &image(2)));
+    let message = failed.unwrap_err();
+    assert!(message.downcast_ref::<String>().unwrap().contains("1 pixels"));
+    let folder = failure_folder("self-test");
+    for file in ["actual.png", "expected.png", "difference.png"] {
+        assert_eq!(image::open(folder.join(file)).unwrap().to_rgba8().dimensions(), (2, 1), "{file}");
+    }
+    std::fs::remove_dir_all(folder).unwrap();
 }

@@ -1,6 +1,5 @@
-//! Hulls of very many edges: what they are made of is bounded, and they end soon when their job does.
-
-use std::time::{Duration, Instant};
+//! Hulls of very many edges: what they are made of is bounded, and they end soon when their job
+//! does.
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
@@ -9,14 +8,13 @@ use meshsnap::image::Image;
 use meshsnap::limits::{Deadline, Limits};
 use meshsnap::mesh::Mesh;
 
-use crate::render::twins::pictures::gpus;
+use crate::support::families::outlines::SHAPES;
+use crate::support::families::soups::Random;
+use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
-use crate::support::outline_shapes::SHAPES;
-use crate::support::soups::Random;
+use crate::support::truth::cases;
+use crate::support::work::assert_stops_at_any_poll;
 use crate::support::{scenes, shapes};
-
-/// As much as a job may go on after its deadline: far longer than what lies between two looks at it, on a machine that does other work.
-const SOON: Duration = Duration::from_millis(1000);
 
 /// A mesh of so many triangles in the unit box, up to `size` long, that share no edge: STL.
 fn disjoint(count: u32, size: f32) -> Mesh {
@@ -35,41 +33,23 @@ fn disjoint(count: u32, size: f32) -> Mesh {
     scenes::mesh_of(&stl).unwrap()
 }
 
-/// Runs `job` to its end, then again with a deadline that is raised at moments all over the time that it took: how often it was stopped.
-fn stop_all_over<T>(moments: u32, mut job: impl FnMut(&Deadline) -> Option<T>) -> u32 {
-    let begun = Instant::now();
-    assert!(job(&Deadline::default()).is_some());
-    let whole = begun.elapsed();
-    let mut stopped = 0;
-    for moment in 0..moments {
-        let deadline = Deadline::default();
-        std::thread::scope(|scope| {
-            let raised = scope.spawn(|| {
-                std::thread::sleep(whole * moment / moments);
-                deadline.stop();
-                Instant::now()
-            });
-            let is_stopped = job(&deadline).is_none();
-            let ended = Instant::now();
-            let late = ended.saturating_duration_since(raised.join().unwrap());
-            assert!(late < SOON, "{late:?} after its end, {moment} of {moments} parts of {whole:?}");
-            stopped += u32::from(is_stopped);
-        });
-    }
-    stopped
-}
-
 #[test]
 fn hulls_of_many_edges_end_soon_after_their_job() {
-    let mesh = disjoint(200_000, 0.02);
+    const TRIANGLES: u32 = 100_000;
+    let mesh = disjoint(TRIANGLES, 0.02);
     let spec = scenes::spec(&[("style", "outline"), ("outline.method", "hull"), ("size", "128")]);
     let build = |deadline: &Deadline| scenes::try_plan(&mesh, &spec, &Limits::default(), deadline, &[]).ok();
-    // One that is raised late in a time that varies may come after the end.
-    assert!(stop_all_over(8, build) >= 4);
+    let polls = assert_stops_at_any_poll(8, 8, build);
+    assert!(polls >= u64::from(TRIANGLES / TRIANGLES_PER_POLL), "{polls} polls while planning");
     let plan = scenes::plan(&mesh, &spec);
     let mut renderer = CpuRenderer::new(2);
-    assert!(stop_all_over(4, |deadline| renderer.draw(&plan, deadline).ok()) >= 2);
+    // After a stop, each band that is left polls once and does nothing.
+    let polls = assert_stops_at_any_poll(4, 64, |deadline| renderer.draw(&plan, deadline).ok());
+    assert!(polls >= u64::from(TRIANGLES / TRIANGLES_PER_POLL), "{polls} polls while drawing");
 }
+
+/// Triangles of a hull that may lie between two polls of the deadline.
+const TRIANGLES_PER_POLL: u32 = 1 << 15;
 
 #[test]
 fn hulls_of_many_edges_have_few_triangles_where_there_are_few_pixels() {
@@ -88,10 +68,13 @@ fn hulls_of_many_edges_have_few_triangles_where_there_are_few_pixels() {
 #[test]
 fn hulls_are_the_same_on_both_back_ends_with_any_samples() {
     let Some(gpus) = gpus() else { return };
-    let mut cases = 0;
+    let mut cpu = CpuRenderer::new(2);
+    let mut renderers = gpus.each_ref().map(|gpu| GpuRenderer::new(gpu.clone()));
+    let samples: &[&str] = cases(&["1", "8"], &["1", "4", "8", "16"]);
+    let mut compared = 0;
     for (name, obj) in [("gear", shapes::gear(9)), ("sheet", shapes::sheet(6)), ("balls", shapes::two_balls())] {
         let mesh = scenes::mesh(&obj);
-        for samples in ["1", "4", "8", "16"] {
+        for samples in samples.iter().copied() {
             for (unit, thickness, opacity) in [("px", "5", "1"), ("object", "0.07", "1"), ("px", "2.5", "0.4")] {
                 let spec = scenes::spec(&[
                     ("style", "outline"),
@@ -106,22 +89,22 @@ fn hulls_are_the_same_on_both_back_ends_with_any_samples() {
                 ]);
                 let plan = scenes::plan(&mesh, &spec);
                 let what = format!("{name}, {samples} samples, {thickness} {unit}, opacity {opacity}");
-                let cpu = CpuRenderer::new(2).draw(&plan, &Deadline::default()).unwrap();
+                let cpu = cpu.draw(&plan, &Deadline::default()).unwrap();
                 let is_red = |p: &&[u8]| p[3] > 0 && p[0] > 150 && p[1] < 80;
                 let red = cpu.rgba.chunks(4).filter(is_red).count();
                 assert!(red > 300, "{what}: {red} pixels of an outline");
-                for gpu in gpus {
-                    let gpu = GpuRenderer::new(gpu.clone()).draw(&plan, &Deadline::default()).unwrap();
+                for gpu in &mut renderers {
+                    let gpu = gpu.draw(&plan, &Deadline::default()).unwrap();
                     Likeness::of(&cpu, &gpu).assert(Tolerance::TWINS, &what);
-                    cases += 1;
+                    compared += 1;
                 }
             }
         }
     }
-    assert_eq!(cases, 3 * 4 * 3 * gpus.len());
+    assert_eq!(compared, 3 * samples.len() * 3 * gpus.len());
 }
 
-/// How many pieces the dark pixels of a picture are of, where those that touch at a corner are one.
+/// Counts the connected pieces of a picture's dark pixels; a common corner connects.
 fn dark_pieces(picture: &Image) -> usize {
     let [width, height] = [picture.width_px as usize, picture.height_px as usize];
     let mut is_left: Vec<bool> = picture.rgba.chunks(4).map(|pixel| pixel[0] < 128).collect();

@@ -9,7 +9,7 @@ use meshsnap::mesh::Mesh;
 use meshsnap::plan::DrawPlan;
 use meshsnap::spec::{Hidden, Layers, Spec};
 
-use crate::render::twins::pictures::gpus;
+use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::scenes;
 use crate::support::shapes::{self, Obj};

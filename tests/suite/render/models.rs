@@ -10,21 +10,37 @@ use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
 
-use crate::render::twins::pictures as twins;
+use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
-use crate::support::{scenes, shared};
+use crate::support::{data, scenes};
 
 const STYLES: [&str; 5] = ["flat", "smooth", "wire", "wireframe", "outline"];
 const SIZE_PX: u32 = 256;
 
 #[test]
 fn every_model_is_drawn_in_every_style_alike_on_both_back_ends() {
-    let Some(meshes) = shared::folder("models").map(|folder| readable(&folder)) else { return };
+    let meshes = readable(&data::folder("models"));
+    assert_eq!(meshes.len(), MODELS, "models that this version reads");
+    all_are_drawn_alike(&meshes);
+}
+
+#[test]
+fn every_large_model_is_drawn_in_every_style_alike_on_both_back_ends() {
+    let Some(folder) = data::large_folder("models") else { return };
+    let meshes = readable(&folder);
+    assert!(meshes.len() >= 36, "only {} models are read", meshes.len());
+    all_are_drawn_alike(&meshes);
+}
+
+/// Models of `tests/data` with triangles.
+const MODELS: usize = 16;
+
+fn all_are_drawn_alike(meshes: &[(String, Mesh)]) {
     let mut cpu = CpuRenderer::new(2);
-    let mut gpu = twins::gpus().map(|gpus| GpuRenderer::new(gpus[0].clone()));
+    let mut gpu = gpus().map(|gpus| GpuRenderer::new(gpus[0].clone()));
     let (mut drawn, mut compared) = (0, 0);
     let mut sheet = Sheet::default();
-    for (name, mesh) in &meshes {
+    for (name, mesh) in meshes {
         for style in STYLES {
             let spec = scenes::spec(&[("style", style), ("size", &SIZE_PX.to_string())]);
             let plan = scenes::plan(mesh, &spec);
@@ -41,17 +57,17 @@ fn every_model_is_drawn_in_every_style_alike_on_both_back_ends() {
     }
     println!("{drawn} pictures drawn, {compared} compared");
     assert_eq!(drawn, meshes.len() * STYLES.len());
-    assert_eq!(meshes.len(), 36, "models that this version reads");
     sheet.store();
 }
 
-/// The models that this version reads: OBJ, STL, PLY, OFF, GLB and single-file glTF without compression, and not of points alone.
+/// The models that this version reads: OBJ, STL, PLY, OFF, GLB and single-file glTF without
+/// compression, and not of points alone.
 fn readable(folder: &std::path::Path) -> Vec<(String, Mesh)> {
     let kinds = ["obj", "stl", "ply", "off", "glb", "gltf"];
     let is_mesh = |path: &std::path::PathBuf| {
         path.extension().is_some_and(|e| kinds.contains(&e.to_string_lossy().to_lowercase().as_str()))
     };
-    shared::files(folder)
+    data::files(folder)
         .into_iter()
         .filter(is_mesh)
         .filter_map(|path| {
@@ -66,7 +82,8 @@ fn assert_drawn(name: &str, style: &str, picture: &Image) {
     assert_eq!((picture.width_px, picture.height_px), (SIZE_PX, SIZE_PX), "{name}, {style}");
     let inked = picture.rgba.chunks(4).filter(|p| *p != [255; 4]).count();
     assert!(inked > 300, "{name}, {style}: only {inked} pixels are not background");
-    // Fitted: something within 12 % of the border on two opposite sides, nothing on the border itself.
+    // Fitted: something within 12 % of the border on two opposite sides, nothing on the border
+    // itself.
     let at = |x: u32, y: u32| picture.pixel(x, y) != [255; 4];
     let last = SIZE_PX - 1;
     let edge = (0..SIZE_PX).any(|i| at(i, 0) || at(i, last) || at(0, i) || at(last, i));

@@ -1,4 +1,4 @@
-//! What a plan leaves out changes no byte: every scene, with each skip turned off in turn, and all at once.
+//! Skips change no byte: every scene, with each skip turned off in turn, and all at once.
 
 use image::ImageFormat;
 use meshsnap::backend::Renderer as _;
@@ -10,12 +10,13 @@ use meshsnap::plan::{DrawPlan, SkipKind};
 use meshsnap::spec::Spec;
 
 use crate::render::textures::levels as textures;
-use crate::render::twins::pictures::gpus;
-use crate::support::mesh_files::Noise;
+use crate::support::files::mesh::Noise;
+use crate::support::gpus::gpus;
 use crate::support::scenes::{self, SCENES};
 use crate::support::truth::goal;
 
-/// Views of [`textured`]: its texture from afar, close up, not at all; and its vertex colours instead.
+/// Views of [`textured`]: its texture from afar, close up, not at all; and its vertex colours
+/// instead.
 const TEXTURED: &[(&str, &[(&str, &str)])] = &[
     ("texture-small", &[("style", "smooth"), ("size", "48")]),
     (
@@ -27,7 +28,7 @@ const TEXTURED: &[(&str, &[(&str, &str)])] = &[
     ("texture-wire-show", &[("style", "wireframe"), ("size", "48"), ("wire.hidden", "show")]),
 ];
 
-/// What was left out, how often, and what of it was tried the other way.
+/// The skips that were taken, how often, and those that were tried the other way.
 struct Tally {
     cpu: CpuRenderer,
     gpu: Option<GpuRenderer>,

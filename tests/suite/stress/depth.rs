@@ -1,4 +1,5 @@
-//! Of two surfaces a millionth of their distance apart the nearer one is seen, from a millimetre to a million kilometres.
+//! Of two surfaces a millionth of their distance apart the nearer one is seen, from a millimetre to
+//! a million kilometres.
 
 use glam::{DVec2, DVec3};
 use meshsnap::limits::Deadline;
@@ -18,7 +19,8 @@ const FARTHEST: f64 = 1e9;
 
 const SIZE_PX: u32 = 100;
 
-/// Eye at the origin, looking along -z, the half picture 1.25 wide at distance 1; all distances in one range.
+/// Eye at the origin, looking along -z, the half picture 1.25 wide at distance 1; all distances in
+/// one range.
 fn projection() -> Projection {
     let axes = [DVec3::X, DVec3::Y, DVec3::Z];
     let camera = Camera {
@@ -105,7 +107,8 @@ fn the_nearer_of_a_million_pairs_is_seen() {
     assert_eq!(seen, wanted);
 }
 
-/// The whole way from a file: two sheets as large as the picture, their distance a millionth of the eye's.
+/// The whole way from a file: two sheets as large as the picture, their distance a millionth of the
+/// eye's.
 #[test]
 fn the_nearer_of_two_sheets_is_seen_in_every_sample() {
     let mut random = Random(52);

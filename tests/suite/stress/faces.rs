@@ -5,8 +5,8 @@ use meshsnap::import::MeshFault;
 
 use crate::oracle::obj::Shape;
 use crate::oracle::vector::{V3, cross, dot, length, unit};
-use crate::support::mesh_files::read;
-use crate::support::moved_meshes::{LOOKS, MESHES, draw, is_blank, shape};
+use crate::support::families::moved::{LOOKS, MESHES, draw, is_blank, shape};
+use crate::support::files::mesh::read;
 use crate::support::scenes;
 use crate::support::shapes::Random;
 use crate::support::truth::cases;
@@ -76,7 +76,8 @@ fn faces_without_area_are_counted_and_never_seen() {
     for (name, obj) in MESHES {
         let clean = shape(&obj());
         let mut dirty = clean.clone();
-        // Twice the same corner, the same position under another number, and three points in a row, inside and in front.
+        // Twice the same corner, the same position under another number, and three points in a row,
+        // inside and in front.
         let again = dirty.vertex(clean.vertices[0]);
         let row = [0.125, 0.25, 0.5].map(|t| dirty.vertex([t; 3]));
         let upright = [-0.25, 0.0, 0.5].map(|t| dirty.vertex([0.75, t, 0.5]));
@@ -118,7 +119,8 @@ fn the_tiny_beside_the_huge_is_counted_and_the_huge_is_drawn() {
     assert_eq!(compared, MESHES.len() * LOOKS.len());
 }
 
-/// A mesh of whole multiples of the smallest number there is, and one whose small coordinates are as small as that.
+/// A mesh of whole multiples of the smallest number there is, and one whose small coordinates are
+/// as small as that.
 #[test]
 fn denormal_coordinates_are_numbers_like_others() {
     let mut compared = 0;

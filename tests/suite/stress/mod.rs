@@ -1,4 +1,4 @@
-//! What extreme numbers may do to a picture, and what they may not.
+//! Extreme numbers: the changes to a picture that they may cause, and those that they may not.
 
 pub mod depth;
 pub mod faces;

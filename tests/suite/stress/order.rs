@@ -1,7 +1,8 @@
-//! The picture is the mesh's, not the file's: the order of faces and vertices and their winding leave no trace.
+//! The picture is the mesh's, not the file's: the order of faces and vertices and their winding
+//! leave no trace.
 
 use crate::oracle::obj::Shape;
-use crate::support::moved_meshes::{LOOKS, MESHES, differing, draw, is_blank, shape};
+use crate::support::families::moved::{LOOKS, MESHES, differing, draw, is_blank, shape};
 use crate::support::scenes;
 use crate::support::shapes::Random;
 use crate::support::truth::{cases, renderers};

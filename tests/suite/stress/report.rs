@@ -3,11 +3,11 @@
 use std::io::Write as _;
 use std::process::Stdio;
 
-use crate::support::ply_files::{Encoding, INDICES, Ply, XYZ, list};
+use crate::support::files::ply::{Encoding, INDICES, Ply, XYZ, list};
 use crate::support::server::{Server, meshsnap};
 
-/// Seven good and bad triangles: two good ones, one with NaN, two without area, one too small, and one good one again at
-/// positions that the others have too.
+/// Seven good and bad triangles: two good ones, one with NaN, two without area, one too small, and
+/// one good one again at positions that the others have too.
 const MIXED: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv nan 0 0\nv 2 0 0\nv 0 1e-30 0\nv 1e-30 0 0\nv 1 0 0\nv -0 0 1\n\
                      f 1 2 3\nf 1 2 4\nf 1 2 5\nf 1 2 6\nf 2 2 3\nf 1 7 8\nf 1 9 10\n";
 

@@ -3,14 +3,14 @@
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::mesh::Mesh;
 
-use crate::support::moved_meshes::{LOOKS, MESHES, differing, draw, is_blank, shape};
+use crate::support::families::moved::{LOOKS, MESHES, differing, draw, is_blank, shape};
 use crate::support::scenes;
 use crate::support::truth::{cases, renderers};
 
 /// Share of pixels, where the scale is no power of two.
 const DIFFERING_MAX: f64 = 1e-4;
-/// The same of one picture: a vertex that lies between two multiples of 1/256 px may be snapped to the other one, and then
-/// every line that it ends moves by that, which is one step of a byte.
+/// The same of one picture: a vertex that lies between two multiples of 1/256 px may be snapped to
+/// the other one, and then every line that it ends moves by that, which is one step of a byte.
 const DIFFERING_IN_ONE_MAX: f64 = 1e-3;
 
 fn scaled(obj: &str, factor: f64) -> Mesh {

@@ -1,4 +1,5 @@
-//! A model far from the origin is the same model as long as its file says so; where the file cannot, that is said.
+//! A model far from the origin is the same model as long as its file says so; where the file
+//! cannot, that is said.
 
 use meshsnap::import::MeshFault;
 use meshsnap::mesh::Mesh;
@@ -7,9 +8,9 @@ use meshsnap::plan::DrawPlan;
 use crate::oracle::camera::project;
 use crate::oracle::obj::Shape;
 use crate::oracle::vector::{V2, V3};
-use crate::support::mesh_files::{Solid, read};
-use crate::support::moved_meshes::{MESHES, shape};
-use crate::support::ply_files::{ENCODINGS, Encoding, INDICES, Ply};
+use crate::support::families::moved::{MESHES, shape};
+use crate::support::files::mesh::{Solid, read};
+use crate::support::files::ply::{ENCODINGS, Encoding, INDICES, Ply};
 use crate::support::scenes;
 use crate::support::truth::scene;
 

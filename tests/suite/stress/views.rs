@@ -1,4 +1,5 @@
-//! Awkward views: through a keyhole and all around, pictures of one pixel and of millions, from inside, edge on.
+//! Awkward views: through a keyhole and all around, pictures of one pixel and of millions, from
+//! inside, edge on.
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
@@ -7,8 +8,8 @@ use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
 use meshsnap::plan::DrawPlan;
 
-use crate::support::mesh_files::read;
-use crate::support::moved_meshes::{LOOKS, MESHES, draw, is_blank};
+use crate::support::families::moved::{LOOKS, MESHES, draw, is_blank};
+use crate::support::files::mesh::read;
 use crate::support::scenes;
 use crate::support::truth::renderers;
 
@@ -16,7 +17,7 @@ fn plan<'a>(mesh: &'a Mesh, keys: &[(&str, &str)]) -> DrawPlan<'a> {
     scenes::plan(mesh, &scenes::spec(keys))
 }
 
-/// What every back-end sees, which must be the same in every sample; depths are finite.
+/// The visibility buffer, which must be the same on every back-end; depths are finite.
 fn visibility(plan: &DrawPlan<'_>, renderers: &mut [Box<dyn Renderer>], what: &str) -> Vec<u64> {
     let mut all = renderers.iter_mut().map(|r| r.draw_visibility(plan, &Deadline::default()).unwrap());
     let words = all.next().unwrap();
@@ -186,7 +187,8 @@ fn faces_that_are_a_point_or_a_line_are_refused() {
     assert_eq!(files.len(), 7);
 }
 
-/// A sheet is a full square from the front, and from above a line, which only what draws edges shows.
+/// A sheet is a full square from the front, and from above a line, which only what draws edges
+/// shows.
 #[test]
 fn flat_meshes_are_seen_from_the_front_and_edge_on() {
     let mut drawn = 0;

@@ -12,7 +12,7 @@ use meshsnap::plan::DrawPlan;
 
 use crate::support::scenes;
 
-/// What an attempt to open finds.
+/// The result of an attempt to open a device.
 #[derive(Clone, Copy, Debug)]
 pub enum Open {
     Hardware,
@@ -25,7 +25,7 @@ pub enum Open {
     Panics,
 }
 
-/// What happens to a job on a device. Where nothing is said it is drawn.
+/// A device's reaction to a job; by default the job is drawn.
 #[derive(Clone, Copy, Debug)]
 pub enum Act {
     Draws,

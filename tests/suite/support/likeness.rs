@@ -1,4 +1,4 @@
-//! How far two pictures differ, and how far they may.
+//! The difference of two pictures, and named tolerances for it.
 
 use std::fmt;
 
@@ -27,8 +27,8 @@ pub struct Likeness {
 }
 
 impl Likeness {
-    /// Compares two pictures of the same size. Colours count as much as they show: of a pixel that is all but transparent, the
-    /// stored colour is that of nothing, or of its last step of alpha.
+    /// Compares two pictures of the same size. Colours count as much as they show: of a pixel that
+    /// is all but transparent, the stored colour is that of nothing, or of its last step of alpha.
     pub fn of(a: &Image, b: &Image) -> Self {
         assert_eq!((a.width_px, a.height_px), (b.width_px, b.height_px));
         let mut like = Self { pixels: a.rgba.len() / 4, ..Self::default() };
@@ -41,7 +41,7 @@ impl Likeness {
         like
     }
 
-    /// Whether the tolerance holds.
+    /// True if the tolerance holds.
     pub fn is_within(&self, tolerance: Tolerance) -> bool {
         self.max <= tolerance.max && self.differing as f64 / self.pixels as f64 <= tolerance.share
     }

@@ -18,12 +18,12 @@ pub struct Scene {
     pub name: &'static str,
     pub obj: fn() -> String,
     pub keys: &'static [(&'static str, &'static str)],
-    /// What the keys do not say.
+    /// Changes that the keys cannot express.
     pub edit: fn(&mut Spec),
 }
 
 impl Scene {
-    /// The keys, understood, and what they do not say.
+    /// The spec of the keys, with the scene's edit.
     pub fn spec(&self) -> Spec {
         let mut spec = spec(self.keys);
         (self.edit)(&mut spec);
@@ -33,7 +33,8 @@ impl Scene {
 
 const SIZE: (&str, &str) = ("size", "200x160");
 
-/// Every style, both wire techniques, polygons, both outline units, the views, and the awkward cameras.
+/// Every style, both wire techniques, polygons, both outline units, the views, and the awkward
+/// cameras.
 pub const SCENES: &[Scene] = &[
     scene("torus-flat", torus, &[SIZE, ("style", "flat")]),
     scene("torus-smooth", torus, &[SIZE, ("style", "smooth")]),
@@ -231,7 +232,8 @@ pub fn try_plan<'a>(
     plan::build_keeping(&scene, &mut budget, deadline, keep)
 }
 
-/// A plan made by hand: positions are pixels from the picture's centre over `scale`, y down, and a depth; unlit white on black.
+/// A plan made by hand: positions are pixels from the picture's centre over `scale`, y down, and a
+/// depth; unlit white on black.
 pub fn screen_plan<'a>(
     size_px: [u32; 2],
     samples: u32,

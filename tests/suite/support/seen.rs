@@ -4,10 +4,10 @@ use meshsnap::plan::{DrawPlan, Faces, Shown, SurfacePass};
 
 use crate::oracle::camera::{Camera, project};
 use crate::oracle::coverage::{Coverage, classify, snap};
-use crate::oracle::light::{Lamp, Lights, Material};
-use crate::oracle::rays::nearest;
 use crate::oracle::screen::{Scene, Screen, Sides};
-use crate::oracle::visible::{self, Segment};
+use crate::oracle::surface::light::{Lamp, Lights, Material};
+use crate::oracle::surface::rays::nearest;
+use crate::oracle::surface::visible::{self, Segment};
 
 /// The plan's numbers and nothing else: its geometry, and the edges of its first line pass.
 pub fn scene(plan: &DrawPlan<'_>) -> Scene {
@@ -38,13 +38,14 @@ pub fn scene(plan: &DrawPlan<'_>) -> Scene {
     }
 }
 
-/// What of the edges of the plan's only line pass is drawn.
+/// The visible segments of the plan's only line pass.
 pub fn segments(plan: &DrawPlan<'_>) -> Vec<Segment> {
     segments_of(plan, scene(plan))
 }
 
-/// The same of vertices on the lattice of 1/256 px on which triangles are drawn; all must be in front of the eye. Depth is affine on
-/// screen, so that what hides what stays the same but for what is seen nearly edge on.
+/// The same of vertices on the lattice of 1/256 px on which triangles are drawn; all must be in
+/// front of the eye. Depth is affine on screen, so that what hides what stays the same but for what
+/// is seen nearly edge on.
 pub fn snapped_segments(plan: &DrawPlan<'_>) -> Vec<Segment> {
     let mut scene = scene(plan);
     for position in &mut scene.positions {
@@ -87,7 +88,7 @@ pub fn material(surface: &SurfacePass<'_>) -> Material {
     Material { base: [r, g, b], roughness: f64::from(look.roughness) }
 }
 
-/// What shines on a plan's surface.
+/// The lights on a plan's surface.
 pub fn lights(plan: &DrawPlan<'_>) -> Lights {
     let lights = &plan.surface.as_ref().unwrap().lights;
     let wide = |v: [f32; 3]| v.map(f64::from);

@@ -1,12 +1,12 @@
-//! Starts the real binary and talks HTTP to it over a plain socket, so that tests can also say what no client library
-//! would.
+//! Starts the real binary and talks HTTP to it over a plain socket, so that tests can also say what
+//! no client library would.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// Nothing that a test waits for takes longer, even on a busy machine.
+/// A guard against hanging: nothing that a test waits for takes longer, even on a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A cube of quads.
@@ -16,7 +16,7 @@ pub const CUBE_OBJ: &[u8] = b"v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -
 /// The binary under test.
 pub fn meshsnap() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_meshsnap"));
-    // What the developer has set must not decide what a test sees.
+    // The developer's own settings must not reach a test.
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("MESHSNAP_")) {
         command.env_remove(name);
     }
@@ -28,8 +28,6 @@ pub struct Server {
     child: Child,
     /// Where it listens.
     pub address: SocketAddr,
-    /// From the start of the process to the line that says where it listens.
-    pub start_took: Duration,
     /// The curl line that it printed.
     pub curl_line: String,
 }
@@ -42,14 +40,12 @@ impl Server {
 
     /// Starts a prepared command.
     pub fn start_with(command: &mut Command) -> Self {
-        let began = Instant::now();
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
         let line = lines.next().expect("the server says where it listens").unwrap();
-        let start_took = began.elapsed();
         let address = line.strip_prefix("listening on http://").expect(&line).parse().unwrap();
         let curl_line = lines.next().expect("the server shows a curl line").unwrap();
-        Self { child, address, start_took, curl_line }
+        Self { child, address, curl_line }
     }
 
     /// Sends a request and reads the whole answer.

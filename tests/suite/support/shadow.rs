@@ -1,4 +1,4 @@
-//! How far points are from a shape on screen, as outlines count.
+//! The distance of points from a shape on screen, as outlines measure it.
 
 use std::collections::BTreeMap;
 
@@ -6,14 +6,15 @@ use meshsnap::plan::Projection;
 
 use crate::oracle::lattice;
 use crate::oracle::screen::{Piece, Scene, Screen};
+use crate::oracle::surface::visible::{contour, on_screen};
 use crate::oracle::vector::{V2, V3, distance_to_segment, dot};
-use crate::oracle::visible::{contour, on_screen};
 
-/// How wide an outline is, in pixels.
+/// The width of an outline, pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct Width {
     pub px: f64,
-    /// What that is in units of the box, and how to get 1 / W from depth; None where it is the same everywhere.
+    /// The width in units of the box, and how to get 1 / W from depth; None where the width is the
+    /// same everywhere.
     pub in_units: Option<[f64; 3]>,
 }
 
@@ -38,15 +39,16 @@ impl Width {
 pub enum Around {
     /// Every point of the contour, as large as the outline is at that point's depth.
     Contour,
-    /// Every point of the surface, as large as at its own depth. What comes nearer inside of the contour may reach beyond what the
-    /// contour's own points reach.
+    /// Every point of the surface, as large as at its own depth. What comes nearer inside of the
+    /// contour may reach beyond what the contour's own points reach.
     Surface,
 }
 
-/// The shape on screen, and how far points are from it, as its outline counts: this wide on its border.
+/// The shape on screen, and how far points are from it, as its outline counts: this wide on its
+/// border.
 pub struct Shadow {
     pieces: Vec<Piece>,
-    /// What is widened: ends with their depth.
+    /// The widened segments: ends with their depth.
     sides: Vec<[V3; 2]>,
     width: Width,
     size_px: [u32; 2],
@@ -104,7 +106,8 @@ impl Shadow {
         let Self { pieces, sides, width, size_px, distances, points, sorted } = self;
         sorted.entry(pixel).or_insert_with(|| {
             let [x, y] = middle(*size_px, pixel);
-            // A point's nearest side is not farther from the pixel's middle than its own nearest, twice half a diagonal later.
+            // A point's nearest side is not farther from the pixel's middle than its own nearest,
+            // twice half a diagonal later.
             let reach = distances[pixel] + 1.5;
             let near: Vec<[V3; 2]> =
                 sides.iter().copied().filter(|side| distance_to_side(width, [x, y], *side) <= reach).collect();
@@ -118,7 +121,7 @@ impl Shadow {
     }
 }
 
-/// How far inside of the line through its side `k` a point lies, pixels.
+/// The distance of a point inside of the line through side `k`, pixels.
 fn piece_distance(piece: &Piece, k: usize, p: V2) -> f64 {
     let [a, b] = [1, 2].map(|i| piece.corners[(k + i) % 3]);
     piece.side(k, p) / (b[0] - a[0]).hypot(b[1] - a[1]).max(1e-300)

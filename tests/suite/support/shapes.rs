@@ -132,7 +132,8 @@ pub fn torus(n: usize) -> String {
     obj.finish()
 }
 
-/// Two balls side by side, of the materials "left" and "right"; seen from the left, one before the other.
+/// Two balls side by side, of the materials "left" and "right"; seen from the left, one before the
+/// other.
 pub fn two_balls() -> String {
     let mut obj = Obj::default();
     for (name, x, radius) in [("left", -1.1, 0.9), ("right", 1.1, 1.0)] {

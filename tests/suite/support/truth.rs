@@ -7,13 +7,13 @@ use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::plan::DrawPlan;
 
-use crate::oracle::ink::ink;
-use crate::oracle::visible::Segment;
-use crate::render::twins::pictures::gpus;
+use crate::oracle::lines::coverage::ink;
+use crate::oracle::surface::visible::Segment;
+use crate::support::gpus::gpus;
 use crate::support::seen::snapped_segments;
 pub use crate::support::seen::{scene, segments};
 
-/// Whether to take minutes' worth of cases instead of seconds'.
+/// True if the long cases run, which take minutes: `MESHSNAP_ORACLE=long`.
 pub fn is_long() -> bool {
     std::env::var("MESHSNAP_ORACLE").is_ok_and(|v| v == "long")
 }
@@ -56,7 +56,8 @@ fn ink_of(plan: &DrawPlan<'_>, segments: &[Segment]) -> Vec<f64> {
     ink([plan.width_px, plan.height_px], segments, f64::from(plan.lines[0].width_px), points_per_side())
 }
 
-/// The coverage that a back-end draws. The plan's lines are opaque white on nothing, so that alpha is their coverage.
+/// The coverage that a back-end draws. The plan's lines are opaque white on nothing, so that alpha
+/// is their coverage.
 pub fn drawn_ink(plan: &DrawPlan<'_>, renderer: &mut dyn Renderer) -> Vec<f64> {
     assert_eq!((plan.background, plan.lines[0].color), ([0.0; 4], [1.0; 4]), "alpha is not coverage");
     alpha(&renderer.draw(plan, &Deadline::default()).unwrap())
@@ -67,7 +68,7 @@ pub fn alpha(image: &Image) -> Vec<f64> {
     image.rgba.chunks(4).map(|p| f64::from(p[3]) / 255.0).collect()
 }
 
-/// How far pictures are from the truth. Pixels that neither has touched do not count.
+/// The distance of pictures from the truth. Pixels that neither has touched do not count.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Errors {
     pixels: usize,
@@ -113,7 +114,7 @@ impl Errors {
         self.max
     }
 
-    /// What is drawn, as a share of what should be.
+    /// Drawn ink, as a share of true ink.
     pub fn ink(&self) -> f64 {
         self.drawn / self.truth
     }
@@ -130,19 +131,19 @@ impl Errors {
         if self.is_within(gate) { Ok(()) } else { Err(format!("{measured}, but {gate:?}")) }
     }
 
-    /// Whether a gate lets them pass.
+    /// True if a gate lets them pass.
     pub fn is_within(&self, gate: Gate) -> bool {
         self.pixels > 0 && self.rmse() <= gate.rmse && self.max <= gate.max && (self.ink() - 1.0).abs() <= gate.ink
     }
 }
 
-/// What errors a gate lets pass.
+/// The errors that a gate lets pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Gate {
     /// Of all touched pixels, /255.
     pub rmse: f64,
     /// Of the worst pixel, /255.
     pub max: f64,
-    /// How far the share of ink may be from 1.
+    /// The largest distance of the share of ink from 1.
     pub ink: f64,
 }

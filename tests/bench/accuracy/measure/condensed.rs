@@ -1,5 +1,6 @@
-//! `src/plan/error_table.json`: what was measured, a row for each technique on each kind of back-end with each number of samples.
-//! The program chooses by it where a request asks for an error or a time.
+//! `src/plan/error_table.json`: what was measured, a row for each technique on each kind of
+//! back-end with each number of samples. The program chooses by it where a request asks for an
+//! error or a time.
 
 use std::fmt::Write;
 
@@ -67,7 +68,8 @@ fn about() -> String {
     )
 }
 
-/// The a, b >= 0 that make a p + b t nearest to ms, for points [p, t, ms], in squares of relative errors.
+/// The a, b >= 0 that make a p + b t nearest to ms, for points [p, t, ms], in squares of relative
+/// errors.
 pub fn fit(points: &[[f64; 3]]) -> [f64; 2] {
     let sum = |f: fn(f64, f64) -> f64| points.iter().map(|[p, t, ms]| f(p / ms, t / ms)).sum::<f64>();
     let (pp, pt, tt, p, t) = (sum(|p, _| p * p), sum(|p, t| p * t), sum(|_, t| t * t), sum(|p, _| p), sum(|_, t| t));

@@ -17,11 +17,12 @@ struct Goal {
     by: By,
 }
 
-/// Who measures a goal.
+/// The program that measures a goal.
 enum By {
     /// This benchmark, from its rows.
     Bench(fn(&[Row]) -> String),
-    /// Tests of the suite. What stands in the page is kept, and marked as missing where nothing does.
+    /// Tests of the suite. What stands in the page is kept, and marked as missing where nothing
+    /// does.
     Suite(&'static str),
 }
 
@@ -30,7 +31,7 @@ const GOALS: [Goal; 10] = [
         number: 1,
         measure: "isolated exact lines, 0.25 to 16 px wide, all angles, 64 places within a pixel",
         goal: "RMSE <= 0.35/255, largest <= 1/255, width +-0.005 px",
-        by: By::Suite("accuracy_wires::isolated_lines"),
+        by: By::Suite("accuracy::wires::isolated_lines"),
     },
     Goal {
         number: 2,
@@ -43,19 +44,19 @@ const GOALS: [Goal; 10] = [
         number: 4,
         measure: "triangles and lines with ends behind the eye",
         goal: "0.01 px, no false fill, no NaN",
-        by: By::Suite("accuracy_behind_eye"),
+        by: By::Suite("accuracy::behind_eye"),
     },
     Goal {
         number: 5,
         measure: "outlines of 1 to 32 px against the exact dilated contour",
         goal: "mean +-0.05 px, 99th percentile <= 0.25 px, no gaps",
-        by: By::Suite("accuracy_outlines"),
+        by: By::Suite("accuracy::outlines"),
     },
     Goal {
         number: 6,
         measure: "watertightness: 10^6 shared edges, fans, shells around the eye",
         goal: "0 missing, 0 double",
-        by: By::Suite("accuracy_geometry"),
+        by: By::Suite("accuracy::geometry"),
     },
     Goal {
         number: 7,
@@ -111,7 +112,7 @@ pub fn page(rows: &[Row], machine: &Machine, effort: Effort, before: &str) -> St
     text
 }
 
-/// What the page says was measured for a goal.
+/// The measurement that the page states for a goal.
 fn kept(before: &str, number: u32) -> Option<String> {
     let line = before.lines().find(|line| line.starts_with(&format!("| {number} |")))?;
     let cell = line.trim_end().trim_end_matches('|').rsplit('|').next()?.trim();

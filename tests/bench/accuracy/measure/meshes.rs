@@ -1,4 +1,5 @@
-//! Meshes that the benchmark makes itself, as OBJ text. Flat ones lie in the x-y plane, a unit a pixel.
+//! Meshes that the benchmark makes itself, as OBJ text. Flat ones lie in the x-y plane, a unit a
+//! pixel.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -7,7 +8,8 @@ use crate::oracle::obj::Shape;
 use crate::oracle::vector::{V3, unit};
 use crate::support::shapes::Random;
 
-/// Straight lines across the whole picture, no two of which are near each other in it: a zigzag whose corners lie outside.
+/// Straight lines across the whole picture, no two of which are near each other in it: a zigzag
+/// whose corners lie outside.
 pub fn lines(size_px: u32) -> String {
     let reach = f64::from(size_px);
     let mut random = Random(3);
@@ -44,7 +46,8 @@ pub fn fan(size_px: u32) -> String {
     shape.text()
 }
 
-/// Lines of quads as large as the strokes of small print: upright lines along the pixels, others turned.
+/// Lines of quads as large as the strokes of small print: upright lines along the pixels, others
+/// turned.
 pub fn print(size_px: u32) -> String {
     let mut random = Random(8);
     let mut shape = Shape::default();
@@ -68,7 +71,8 @@ pub fn print(size_px: u32) -> String {
     shape.text()
 }
 
-/// A ball of 20 * 4^cuts triangles: an icosahedron whose triangles are cut in four, again and again.
+/// A ball of 20 * 4^cuts triangles: an icosahedron whose triangles are cut in four, again and
+/// again.
 pub fn icosphere(cuts: u32) -> String {
     let golden = (1.0 + 5.0_f64.sqrt()) / 2.0;
     let mut shape = Shape::default();

@@ -1,7 +1,8 @@
-//! The benchmark of run time against error, in parts that the test suite runs too: scenes, techniques, what is true of each,
-//! and rounds that time them.
+//! The benchmark of run time against error, in parts that the test suite runs too: scenes,
+//! techniques, what is true of each, and rounds that time them.
 
-// Each binary that includes this module uses its own part of it. A tool for developers: giving up loudly is fine.
+// Each binary that includes this module uses its own part of it. A tool for developers: giving up
+// loudly is fine.
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 pub mod condensed;
@@ -28,7 +29,7 @@ pub const SAMPLES: &[u32] = &[1, 4, 8, 16];
 /// Threads of the CPU's renderers; the first is the baseline's.
 const THREADS: [usize; 2] = [1, 2];
 
-/// What all times are given as ratios to: on the same scene's mesh, in the same rounds.
+/// The baseline of all times: on the same scene's mesh, in the same rounds.
 pub const BASELINE: &str = "cpu-1, exact wires, 4 samples";
 /// The baseline's samples.
 pub const BASELINE_SAMPLES: u32 = 4;
@@ -48,10 +49,10 @@ pub fn back_ends(gpu: Option<Arc<Gpu>>) -> Vec<BackEnd> {
     all
 }
 
-/// How much work to do.
+/// The amount of work to do.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
-    /// Pictures are squares of this many pixels a side.
+    /// Pictures are squares of this many pixels per side.
     pub size_px: u32,
     /// Timed rounds.
     pub runs: usize,
@@ -60,7 +61,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// What is published.
+    /// The effort of the published figures.
     pub const FULL: Self = Self { size_px: 512, runs: 9, points_per_side: 32 };
     /// To look at while working.
     pub const QUICK: Self = Self { size_px: 256, runs: 3, points_per_side: 16 };
@@ -75,7 +76,7 @@ pub struct Row {
     pub technique: techniques::Technique,
     pub back_end: &'static str,
     pub samples: u32,
-    /// What the request asked for: `wire.thickness` or `outline.thickness`; 0 for faces.
+    /// The requested `wire.thickness` or `outline.thickness`; 0 for faces.
     pub thickness: f64,
     pub median_ms: f64,
     /// To the baseline's median.

@@ -1,4 +1,5 @@
-//! The work-precision plot as SVG: time across, error up, both logarithmic; down and to the left is better.
+//! The work-precision plot as SVG: time across, error up, both logarithmic; down and to the left is
+//! better.
 
 use std::fmt::Write;
 

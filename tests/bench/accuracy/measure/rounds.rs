@@ -1,4 +1,5 @@
-//! Draws a scene's cases in rounds, so that whatever slows the machine slows all of them, and measures their pictures.
+//! Draws a scene's cases in rounds, so that whatever slows the machine slows all of them, and
+//! measures their pictures.
 
 use std::rc::Rc;
 use std::time::Instant;
@@ -24,7 +25,7 @@ struct Case<'a> {
     plan: DrawPlan<'a>,
 }
 
-/// What a case's draws on one back-end came to.
+/// The results of a case's draws on one back-end.
 struct Drawn {
     /// Of the round that warms up, which is not timed.
     picture: Image,
@@ -72,7 +73,8 @@ pub fn measure(scene: &Scene, effort: Effort, back_ends: &mut [BackEnd]) -> Vec<
     rows
 }
 
-/// Each case on each back-end, once to warm up and then in turn; and the baseline's median on the first of them.
+/// Each case on each back-end, once to warm up and then in turn; and the baseline's median on the
+/// first of them.
 fn rounds(cases: &[Case<'_>], baseline: &Case<'_>, runs: usize, back_ends: &mut [BackEnd]) -> (Vec<Vec<Drawn>>, f64) {
     let count = back_ends.len();
     let mut draw = |back_end: usize, plan: &DrawPlan<'_>| {

@@ -1,4 +1,4 @@
-//! What is drawn: meshes, from where, and how wide lines should be.
+//! The scenes: meshes, views, and the true widths of lines.
 
 use std::path::PathBuf;
 
@@ -22,19 +22,19 @@ pub struct Scene {
     pub name: &'static str,
     pub family: Family,
     source: Source,
-    /// Whether a unit of the mesh is a pixel.
+    /// True if a unit of the mesh is a pixel.
     is_flat: bool,
     keys: &'static [(&'static str, &'static str)],
-    /// How wide lines should be; of a hull, the strip that shows.
+    /// The true width of lines; of a hull, of the strip that shows.
     pub width_px: f64,
-    /// Whether `--quick` draws it.
+    /// True if `--quick` draws it.
     pub is_quick: bool,
 }
 
 /// Where a mesh is from.
 #[derive(Clone, Copy, Debug)]
 enum Source {
-    /// Made for pictures of so many pixels a side.
+    /// Made for pictures of so many pixels per side.
     Made(fn(u32) -> String),
     /// A file of the shared models, and what takes its place where it is not there.
     Model(&'static str, fn(u32) -> String),
@@ -113,12 +113,20 @@ impl Scene {
         }
     }
 
-    /// What is drawn, for readers of the report.
+    /// The scene's model where it is not at hand, so that a made mesh takes its place.
+    pub fn missing_model(&self) -> Option<&'static str> {
+        match self.source {
+            Source::Model(file, _) if !models().join(file).is_file() => Some(file),
+            _ => None,
+        }
+    }
+
+    /// A description for readers of the report.
     pub fn about(&self) -> String {
         let what = match self.source {
             Source::Made(_) => "made by the benchmark".to_owned(),
-            Source::Model(file, _) if models().join(file).is_file() => file.to_owned(),
-            Source::Model(file, _) => format!("a torus in place of {file}, which is not there"),
+            Source::Model(file, _) if self.missing_model().is_none() => file.to_owned(),
+            Source::Model(file, _) => format!("a made mesh in place of {file}, which is not there"),
         };
         if self.width_px > 0.0 { format!("{what}, lines {} px wide", self.width_px) } else { what }
     }

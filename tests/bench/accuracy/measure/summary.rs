@@ -26,7 +26,8 @@ pub struct Series {
     pub points: Vec<Point>,
 }
 
-/// Errors below this (/255) are drawn and averaged as this: nothing that is stored in 8 bits is nearer to the truth in the mean.
+/// Errors below this (/255) are drawn and averaged as this: nothing that is stored in 8 bits is
+/// nearer to the truth in the mean.
 const ERROR_MIN: f64 = 0.05;
 
 /// Every technique of a family on every back-end.
@@ -77,7 +78,8 @@ pub fn lead(rows: &[Row], back_end: &str) -> Option<Lead> {
     Some(Lead { other, error_factor: best.error / exact.error, time_factor: exact.time / best.time })
 }
 
-/// The smallest and the largest of something over the rows of a technique on a back-end; None where there are none.
+/// The smallest and the largest of something over the rows of a technique on a back-end; None where
+/// there are none.
 pub fn range(rows: &[Row], technique: Technique, back_end: &str, of: impl Fn(&Row) -> Option<f64>) -> Option<[f64; 2]> {
     let values = rows.iter().filter(|row| row.technique == technique && row.back_end == back_end).filter_map(of);
     values.fold(None, |range: Option<[f64; 2]>, v| Some(range.map_or([v, v], |[low, high]| [low.min(v), high.max(v)])))

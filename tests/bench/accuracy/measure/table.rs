@@ -6,14 +6,14 @@ use meshsnap::backend::gpu::GpuInfo;
 
 use super::{BASELINE, Effort, Row};
 
-/// What was measured on: models, and nothing that names a machine.
+/// The hardware of a measurement: models, and nothing that names a machine.
 #[derive(Clone, Debug)]
 pub struct Machine {
     pub cpu: String,
     /// That this process may use.
     pub cores: usize,
     pub gpu: Option<String>,
-    /// What else ran: the load average over a minute before the first round, where the system tells.
+    /// Other load: the average over a minute before the first round, where the system tells.
     pub load: Option<f64>,
 }
 
@@ -29,7 +29,7 @@ impl Machine {
         }
     }
 
-    /// Whether what stands for the GPU is software, and shares the CPU's cores.
+    /// True if the GPU is software, and shares the CPU's cores.
     pub fn has_software_gpu(&self) -> bool {
         self.gpu.as_ref().is_some_and(|gpu| gpu.contains("(software,"))
     }
@@ -51,7 +51,7 @@ impl Machine {
     }
 }
 
-/// How times were taken.
+/// The method by which times were taken.
 pub fn method(effort: Effort) -> String {
     format!(
         "Pictures of {0} x {0} pixels. Times: medians of {1} interleaved rounds of `Renderer::draw` alone (no import, plan or \

@@ -1,12 +1,15 @@
 //! The techniques that are compared, and the requests that ask each of them for the same picture.
 //!
-//! Lines are w pixels wide in truth. The approximating wire methods have no such number; each gets the parameters with which it
-//! is w wide where its own measure is right:
-//! - `fwidth`, `fwidth-min`: a wire is full up to t and gone at t + s, in multiples of |db/dx| + |db/dy|, which is a pixel for an
-//!   edge along the axes; both triangles of an edge draw it, so it is 2t + s wide (half of each ramp counted). s = min(w, 1),
-//!   t = (w - s) / 2. On diagonals that is 1.41 w, a property of the method.
-//! - `barycentric`: half gone at b = 0.05 t, so that with h the height of a triangle on screen it is 0.1 t h wide.
-//! - `threshold`: gone at b = 0.02 t, so 0.04 t h wide. For both h is the scene's median, and t at most 10.
+//! Lines are w pixels wide in truth. The approximating wire methods have no such number; each gets
+//! the parameters with which it is w wide where its own measure is right:
+//! - `fwidth`, `fwidth-min`: a wire is full up to t and gone at t + s, in multiples of |db/dx| +
+//!   |db/dy|, which is a pixel for an edge along the axes; both triangles of an edge draw it, so it
+//!   is 2t + s wide (half of each ramp counted). s = min(w, 1), t = (w - s) / 2. On diagonals that
+//!   is 1.41 w, a property of the method.
+//! - `barycentric`: half gone at b = 0.05 t, so that with h the height of a triangle on screen it
+//!   is 0.1 t h wide.
+//! - `threshold`: gone at b = 0.02 t, so 0.04 t h wide. For both h is the scene's median, and t at
+//!   most 10.
 //! - `hull`: a strip of w pixels beyond the silhouette; `contour`: w pixels, half of them inside.
 
 use std::sync::LazyLock;
@@ -73,7 +76,8 @@ impl Technique {
         }
     }
 
-    /// The thickness to ask for; `height_px` is the median height of the scene's triangles on screen.
+    /// The thickness to ask for; `height_px` is the median height of the scene's triangles on
+    /// screen.
     pub fn thickness(self, width_px: f64, height_px: f64) -> f64 {
         let unit = if let Wire(method) = self { method.info().unit } else { ThicknessUnit::Pixels };
         match (self, unit) {
@@ -85,8 +89,8 @@ impl Technique {
         }
     }
 
-    /// What a request says. Lines are opaque white on nothing, so that alpha is coverage. A hull needs a surface before it, so it is
-    /// white on a black one.
+    /// A request's keys. Lines are opaque white on nothing, so that alpha is coverage. A hull needs
+    /// a surface before it, so it is white on a black one.
     pub fn keys(self, scene: &Scene, samples: u32, thickness: f64) -> Vec<(&'static str, String)> {
         let mut keys: Vec<(&str, &str)> = match self {
             Wire(_) => vec![

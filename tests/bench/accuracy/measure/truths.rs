@@ -1,16 +1,16 @@
-//! What is true of a scene, and how far a picture is from it.
+//! The truth of a scene, and a picture's distance from it.
 
 use meshsnap::image::Image;
 use meshsnap::plan::DrawPlan;
 
 use super::techniques::{Family, Technique};
 use crate::oracle::flip::Seen;
-use crate::oracle::ink::ink;
-use crate::oracle::light::{face_normal, lit};
-use crate::oracle::rays::{Pen, picture};
+use crate::oracle::lines::coverage::ink;
 use crate::oracle::screen::{Screen, is_front};
+use crate::oracle::surface::light::{face_normal, lit};
+use crate::oracle::surface::rays::{Pen, picture};
 use crate::oracle::vector::{V3, sub};
-use crate::oracle::{rim, srgb};
+use crate::oracle::{lines::silhouette, surface::srgb};
 use crate::support::seen::{lights, material, only_triangle, scene, segments};
 
 /// A picture as it should be.
@@ -18,13 +18,13 @@ pub struct Truth {
     width: usize,
     /// A pixel's values, 0 to 1: the coverage by lines, or encoded red, green and blue.
     pixels: Vec<Vec<f64>>,
-    /// Whether a pixel is compared.
+    /// For each pixel, true if it is compared.
     counts: Vec<bool>,
     kind: Kind,
     seen: Seen,
 }
 
-/// What a drawn picture says of coverage or colour.
+/// A drawn picture's coverage or colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     /// Alpha is coverage.
@@ -34,7 +34,7 @@ enum Kind {
     Color,
 }
 
-/// How far a picture is from the truth.
+/// The distance of a picture from the truth.
 #[derive(Clone, Copy, Debug)]
 pub struct Errors {
     /// Root of the mean square over the pixels that either touches, /255.
@@ -49,19 +49,20 @@ pub struct Errors {
     pub pixels: usize,
 }
 
-/// How far two back-ends' pictures are from each other.
+/// The distance of two back-ends' pictures from each other.
 #[derive(Clone, Copy, Debug)]
 pub struct Apart {
     /// Share of pixels that differ at all.
     pub share: f64,
-    /// The largest difference, /255, of colours times their alpha: of what is hardly there the colour says nothing.
+    /// The largest difference, /255, of colours times their alpha: of what is hardly there the
+    /// colour says nothing.
     pub max: u8,
     pub flip: f64,
 }
 
 impl Truth {
-    /// Of a technique's scene. `lines` is a plan whose line pass has the wanted width: of exact wires, or of a contour; for faces,
-    /// the technique's own plan.
+    /// Of a technique's scene. `lines` is a plan whose line pass has the wanted width: of exact
+    /// wires, or of a contour; for faces, the technique's own plan.
     pub fn new(family: Family, technique: Technique, lines: &DrawPlan<'_>, width_px: f64, points: u32) -> Self {
         let size = [lines.width_px, lines.height_px];
         let (kind, pixels, counts) = match (family, technique) {
@@ -73,7 +74,7 @@ impl Truth {
             (_, Technique::Hull) => {
                 let scene = scene(lines);
                 let screen = Screen::new(&scene);
-                let ink = rim::ink(&screen, &rim::rims(&scene, width_px), width_px, points);
+                let ink = silhouette::ink(&screen, &silhouette::rims(&scene, width_px), width_px, points);
                 (Kind::WhiteOnBlack, gray(ink), None)
             }
             _ => (Kind::Alpha, gray(ink(size, &segments(lines), width_px, points)), None),
@@ -149,8 +150,8 @@ fn seen(width: usize, kind: Kind, pixels: &[Vec<f64>]) -> Seen {
     Seen::new(width, &pixels.iter().map(linear).collect::<Vec<V3>>())
 }
 
-/// Encoded colours of the pixels that lie wholly in one face, which is the only one that is seen there; others are white and do
-/// not count.
+/// Encoded colours of the pixels that lie wholly in one face, which is the only one that is seen
+/// there; others are white and do not count.
 fn whole_pixels(plan: &DrawPlan<'_>) -> (Vec<Vec<f64>>, Option<Vec<bool>>) {
     let scene = scene(plan);
     let screen = Screen::new(&scene);

@@ -1,65 +1,16 @@
 //! Bundles: names, what they mean from inside one, and which file is the mesh.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
-use crate::support::mesh_files::Read;
-use meshsnap::import::{Bundle, BundleFile, Folder, Format, MeshError, MeshFault, import};
+use crate::support::files::mesh::Read;
+use meshsnap::import::{Bundle, BundleFile, Folder, Format, MeshFault, import};
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::material::ImageContent;
-use std::io::{Cursor, Write as _};
+use std::path::Path;
 
-use crate::formats::bundles::zip::{Raw, archive};
+use crate::support::data;
+use crate::support::files::archive::{Raw, archive};
+use crate::support::files::bundle::{Model, files, read_bundle, zipped};
 use crate::support::server::CUBE_OBJ;
-use crate::support::shared::folder;
-
-/// Files under names that must be good.
-pub fn files(files: &[(&str, &[u8])]) -> Vec<BundleFile> {
-    files.iter().map(|(name, bytes)| BundleFile::new(name, bytes.to_vec()).unwrap()).collect()
-}
-
-/// Imports a bundle with default limits.
-pub fn read_bundle(bundle: &Bundle) -> Result<Read, MeshError> {
-    let limits = Limits::default();
-    import(bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).map(Read::from)
-}
-
-/// An honest archive.
-pub fn zipped(files: &[(&str, &[u8])]) -> Vec<u8> {
-    let mut writer = zip::ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, bytes) in files {
-        let options = zip::write::SimpleFileOptions::default();
-        if name.ends_with('/') {
-            writer.add_directory(*name, options).unwrap();
-        } else {
-            writer.start_file(*name, options).unwrap();
-            writer.write_all(bytes).unwrap();
-        }
-    }
-    writer.finish().unwrap().into_inner()
-}
-
-/// A model of the shared data with all its files.
-pub struct Model {
-    pub files: Vec<(String, Vec<u8>)>,
-    pub material: &'static str,
-}
-
-impl Model {
-    pub fn all() -> Option<Vec<Self>> {
-        let folder = folder("models")?;
-        let model = |names: &[&str], material| {
-            let read = |name: &&str| (name.to_string(), std::fs::read(folder.join(name)).unwrap());
-            Self { files: names.iter().map(read).collect(), material }
-        };
-        Some(vec![
-            model(&["capsule.obj", "capsule.mtl", "capsule0.jpg"], "material0"),
-            model(&["fuze.obj", "fuze.obj.mtl", "fuze uv.jpg"], "a-super-duper-material"),
-        ])
-    }
-
-    pub fn files(&self) -> Vec<(&str, &[u8])> {
-        self.files.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice())).collect()
-    }
-}
 
 #[test]
 fn names_that_no_file_may_have() {
@@ -149,7 +100,7 @@ fn the_mesh_among_the_files_is_found_or_asked_for() {
     let many: Vec<(&str, &[u8])> = many.iter().map(|(name, bytes)| (name.as_str(), *bytes)).collect();
     let error = read_bundle(&Bundle::of_files(files(&many))).unwrap_err();
     assert!(error.detail.ends_with("\"00.txt\", \"01.txt\", \"02.txt\", \"03.txt\", \"04.txt\", \"05.txt\", \"06.txt\", \"07.txt\", \"08.txt\", \"09.txt\" and 3 more"), "{error}");
-    // What only resembles an STL is one if it says so, not if it is called a texture.
+    // A file that only resembles an STL is one by the name of an STL, and not by that of a texture.
     let mut loose = vec![0; 84 + 50 * 2 + 3];
     loose[80] = 2;
     let named = |name| files(&[("cube.obj", cube), (name, &loose)]);
@@ -166,7 +117,7 @@ fn the_mesh_among_the_files_is_found_or_asked_for() {
 
 #[test]
 fn real_models_come_with_their_materials_however_they_are_packed() {
-    let Some(models) = Model::all() else { return };
+    let models = Model::all();
     for model in &models {
         let files_of = model.files();
         let in_folder = |prefix: &str| -> Vec<(String, &[u8])> {
@@ -208,20 +159,8 @@ fn real_models_come_with_their_materials_however_they_are_packed() {
 
 #[test]
 fn gltf_finds_its_buffers() {
-    let Some(folder) = folder("models") else { return };
-    let read = |name: &str| std::fs::read(folder.join("PalmTree").join(name)).unwrap();
-    let names: Vec<String> = std::fs::read_dir(folder.join("PalmTree"))
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    let all: Vec<(&str, Vec<u8>)> = names.iter().map(|name| (name.as_str(), read(name))).collect();
-    let all: Vec<(&str, &[u8])> = all.iter().map(|(name, bytes)| (*name, bytes.as_slice())).collect();
-    for bundle in [Bundle::of_files(files(&all)), Bundle::of_one(zipped(&all))] {
-        assert!(read_bundle(&bundle).unwrap().triangles.len() > 100);
-    }
-    let error = read_bundle(&Bundle::of_one(read("PalmTree.gltf"))).unwrap_err();
-    assert_eq!(error.fault, MeshFault::OutsideBundle);
-    assert!(error.detail.contains(".bin") && error.detail.contains("add it"), "{error}");
+    let cube = data::folder("corpus/gltf/CubeImageUriSpaces");
+    finds_its_buffers(&cube, "CubeImageUriSpaces.gltf", &["CubeImageUriMultipleSpaces.gltf"], 12);
     let out = r#"{"asset":{"version":"2.0"},"buffers":[{"uri":"../x.bin","byteLength":36}],"bufferViews":[{"buffer":0,"byteLength":36}],
         "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}]}"#;
@@ -230,10 +169,30 @@ fn gltf_finds_its_buffers() {
     assert_eq!(read_bundle(&bundle("m/x.gltf", "x.bin")).unwrap_err().fault, MeshFault::Empty, "three equal points");
 }
 
+#[test]
+fn a_large_gltf_finds_its_buffers() {
+    let Some(folder) = data::large_folder("models") else { return };
+    finds_its_buffers(&folder.join("PalmTree"), "PalmTree.gltf", &[], 101);
+}
+
+/// Reads the folder's files as a bundle, without those of `others`, and then its entry alone.
+fn finds_its_buffers(folder: &Path, entry: &str, others: &[&str], triangles_min: usize) {
+    let name = |path: &Path| path.file_name().unwrap().to_str().unwrap().to_owned();
+    let paths = data::files(folder).into_iter().filter(|path| !others.contains(&name(path).as_str()));
+    let all: Vec<(String, Vec<u8>)> = paths.map(|path| (name(&path), std::fs::read(&path).unwrap())).collect();
+    let all: Vec<(&str, &[u8])> = all.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice())).collect();
+    for bundle in [Bundle::of_files(files(&all)), Bundle::of_one(zipped(&all))] {
+        assert!(read_bundle(&bundle).unwrap().triangles.len() >= triangles_min);
+    }
+    let error = read_bundle(&Bundle::of_one(std::fs::read(folder.join(entry)).unwrap())).unwrap_err();
+    assert_eq!(error.fault, MeshFault::OutsideBundle);
+    assert!(error.detail.contains(".bin") && error.detail.contains("add it"), "{error}");
+}
+
 /// The files of an archive, and parts of what is said of it.
 type Case<'a> = (Vec<(&'a str, &'a [u8])>, &'a [&'a str]);
 
-/// What an archive stores without packing it is there to be read, but nobody asked for it.
+/// An archive's stored, unpacked entry can be read, but is not if nothing names it.
 #[test]
 fn archives_in_archives_and_archives_without_a_mesh_are_said_to_be_that() {
     let inner = archive(&[Raw::stored("cube.obj", CUBE_OBJ)], 1);

@@ -1,10 +1,11 @@
-//! Bundles through the real program: forms, archives and command lines give the same pictures and the same warnings.
+//! Bundles through the real program: forms, archives and command lines give the same pictures and
+//! the same warnings.
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
 use std::process::Output;
 
-use crate::formats::bundles::names::{Model, files, read_bundle, zipped};
 use crate::http::answers::FORM;
+use crate::support::files::bundle::{Model, files, read_bundle, zipped};
 use crate::support::server::{Answer, CUBE_OBJ, Server, meshsnap};
 use meshsnap::import::Bundle;
 
@@ -43,7 +44,7 @@ fn warnings_of_job(server: &Server, content_type: &str, body: &[u8]) -> Vec<Stri
 
 #[test]
 fn a_form_an_archive_and_a_command_line_are_the_same_bundle() {
-    let Some(models) = Model::all() else { return };
+    let models = Model::all();
     let server = Server::start(&[]);
     let directory = tempfile::tempdir().unwrap();
     for model in &models {
@@ -80,7 +81,8 @@ fn a_form_an_archive_and_a_command_line_are_the_same_bundle() {
             report["warnings"].as_array().unwrap().iter().map(|w| w["code"].as_str().unwrap()).collect();
         assert_eq!((codes, &report["materials"][0]), (expected, &model.material.into()));
 
-        // Its neighbours on disk are not read unless they are named, but the warning says which to name.
+        // Its neighbours on disk are not read unless they are named, but the warning says which to
+        // name.
         let output = run(&[&["render"], &paths[..1], &rest].concat());
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert!(stderr.contains("the upload lacks the material library") && stderr.contains(parts[1].0), "{stderr}");
@@ -165,7 +167,7 @@ fn forms_are_limited_as_all_uploads_are() {
     assert_eq!(form(&large).body, form(CUBE_OBJ).body);
     large.resize(7_000_000, b'\n');
     form(&large).problem(413, "body_too_large");
-    // What is looked through for a part's beginning is little.
+    // The search for a part's beginning ends soon.
     for beginning in ["-", "--XX\r\nX: "] {
         let endless = [beginning.as_bytes(), &vec![b'-'; 5_000_000]].concat();
         let detail = server.request("POST", "/v1/render", &[FORM], &endless).problem(400, "bad_form");
@@ -201,7 +203,7 @@ fn hostile_forms_are_refused_precisely() {
     send(&[("file", None, CUBE_OBJ)]).picture(16, 16);
     send(&[a, ("file", Some("b.mtl"), b"newmtl A\nKd 0.5\n"), ("request", None, b"{\"style\":\"wire\"}")])
         .picture(16, 16);
-    // An archive in a form is the same archive; beside other files nobody opens it.
+    // An archive in a form is the same archive; beside other files it stays closed.
     let zip = zipped(&[("cube.obj", CUBE_OBJ)]);
     send(&[("file", Some("x.zip"), &zip)]).picture(16, 16);
     send(&[("file", Some("x.zip"), &zip), ("file", Some("b.txt"), b"b")]).problem(422, "bundle_broken");

@@ -1,6 +1,6 @@
 //! glTF: primitive modes, accessor encodings, the node tree, buffers, extensions.
 
-use crate::support::mesh_files::{Gltf, Read, corners, read};
+use crate::support::files::mesh::{Gltf, Read, corners, read};
 use meshsnap::import::MeshFault;
 use serde_json::{Value, json};
 
@@ -86,7 +86,7 @@ fn every_component_type_and_normalisation() {
             cases += 1;
         }
     }
-    // What no extension allows.
+    // Forms that no extension allows.
     for (component, normalised) in [(5125, false), (5125, true), (5126, true), (5124, false)] {
         let mut gltf = build(component, 4, 1, normalised);
         gltf.json["extensionsUsed"] = json!(["KHR_mesh_quantization"]);

@@ -1,6 +1,6 @@
 //! glTF: the document and its container, buffers and extensions.
 
-use crate::support::mesh_files::{Solid, glb, read};
+use crate::support::files::mesh::{Solid, glb, read};
 use meshsnap::import::MeshFault;
 use serde_json::{Value, json};
 
@@ -102,7 +102,8 @@ fn scenes_may_be_left_out() {
     assert_eq!(read(&gltf.glb()).unwrap_err().fault, MeshFault::Empty);
 }
 
-/// Some readers pass over a text without a look at it, and others do not: then lists were empty that are not.
+/// Some readers pass over a text without a look at it, and others do not: then lists were empty
+/// that are not.
 #[test]
 fn bytes_that_are_no_text_are_named_wherever_they_are() {
     let mut gltf = Solid::cuboid().triangulated(&[[0, 2, 3]]).gltf();

@@ -1,6 +1,6 @@
 //! glTF: instances, and nodes that are hidden.
 
-use crate::support::mesh_files::{Gltf, Solid, corners, read, read_limited};
+use crate::support::files::mesh::{Gltf, Solid, corners, read, read_limited};
 use meshsnap::import::{MeshError, MeshFault};
 use meshsnap::limits::Limits;
 use serde_json::{Value, json};

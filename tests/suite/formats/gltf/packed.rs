@@ -1,9 +1,9 @@
 //! glTF: one shape in several encodings, compressed and not.
 
-use crate::formats::bundles::names::read_bundle;
-use crate::support::mesh_files::{Gltf, Read, Solid, assert_close, corners, read};
+use crate::support::data;
+use crate::support::files::bundle::read_bundle;
+use crate::support::files::mesh::{Gltf, Read, Solid, assert_close, corners, read};
 use crate::support::scenes;
-use crate::support::shared::folder;
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::image::Image;
@@ -11,6 +11,7 @@ use meshsnap::import::{Bundle, BundleFile};
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
 use serde_json::json;
+use std::path::Path;
 
 /// A wavy sheet with normals, and its triangles.
 pub struct Sheet {
@@ -48,7 +49,8 @@ impl Sheet {
         gltf
     }
 
-    /// Positions as shorts of 1/1000, normals as normalised bytes, both padded to four bytes, or padded to four components.
+    /// Positions as shorts of 1/1000, normals as normalised bytes, both padded to four bytes, or
+    /// padded to four components.
     fn small(&self) -> (Vec<[i16; 4]>, Vec<[i8; 4]>) {
         let position = |p: &[f32; 3]| [0, 1, 2, 3].map(|k| p.get(k).map_or(0, |c| (c * 1000.0).round() as i16));
         let normal = |n: &[f32; 3]| [0, 1, 2, 3].map(|k| n.get(k).map_or(0, |c| (c * 127.0).round() as i8));
@@ -163,8 +165,8 @@ fn normals_close(a: &Mesh, b: &Mesh, tolerance: f32) {
     assert_eq!(far, 0, "{far} normals of {}", a.len());
 }
 
-/// Triangles in the order of their corners, each from its smallest on, since encoders turn and reorder them. The sheet's corners lie
-/// on multiples of 1/8.
+/// Triangles in the order of their corners, each from its smallest on, since encoders turn and
+/// reorder them. The sheet's corners lie on multiples of 1/8.
 fn in_order(mut mesh: Read) -> Read {
     let all = corners(&mesh);
     let key = |t: &[[f64; 3]; 3]| {
@@ -188,7 +190,8 @@ fn every_encoding_holds_the_same_shape() {
     let sheet = Sheet::new();
     let plain = read(&sheet.plain().glb()).unwrap();
     let mut cases = 0;
-    // Positions within half a step; normals within what eight bits a side of an octahedron tell, about a degree.
+    // Positions within half a step; normals within what eight bits a side of an octahedron tell,
+    // about a degree.
     for gltf in [sheet.quantised(), sheet.meshopt("EXT_meshopt_compression"), sheet.meshopt("KHR_meshopt_compression")]
     {
         let mesh = read(&gltf.glb()).unwrap();
@@ -205,25 +208,33 @@ fn every_encoding_holds_the_same_shape() {
 
 #[test]
 fn known_compressed_models_are_read() {
-    let Some(folder) = folder("models") else { return };
-    let bundle = |place: &str, names: &[&str]| {
-        let file = |name: &&str| BundleFile::new(name, std::fs::read(folder.join(place).join(name)).unwrap()).unwrap();
-        read_bundle(&Bundle::of_files(names.iter().map(file).collect()))
-    };
-    let of_one = |name: &str| read(&std::fs::read(folder.join(name)).unwrap()).unwrap();
-    let boxes = [bundle("BoxDraco", &["BoxDraco.gltf", "0.bin"]).unwrap(), of_one("BoxMeshopt.glb")];
+    let folder = data::folder("models");
+    let draco = read_files(&folder.join("BoxDraco"), &["BoxDraco.gltf", "0.bin"]);
+    let boxes = [draco, read(&data::bytes("models/BoxMeshopt.glb")).unwrap()];
     for mesh in boxes {
         assert_eq!(mesh.triangles.len(), 12);
         let [low, high] = mesh.bounds;
         assert!((0..3).all(|k| (high[k] - low[k] - (high[0] - low[0])).abs() < 1e-3), "{:?}", mesh.bounds);
     }
-    // The fallback's file may be missing: what is compressed is all there.
-    let with = bundle("meshopt-fallback", &["meshopt-fallback.gltf", "meshopt-fallback.bin"]).unwrap();
-    let without = bundle("meshopt-no-fallback", &["meshopt-no-fallback.gltf", "meshopt-no-fallback.bin"]).unwrap();
+}
+
+fn read_files(folder: &Path, names: &[&str]) -> Read {
+    let file = |name: &&str| BundleFile::new(name, std::fs::read(folder.join(name)).unwrap()).unwrap();
+    read_bundle(&Bundle::of_files(names.iter().map(file).collect())).unwrap()
+}
+
+#[test]
+fn large_compressed_models_are_read() {
+    let Some(folder) = data::large_folder("models") else { return };
+    let of = |name: &str| {
+        read_files(&folder.join(name), &[format!("{name}.gltf"), format!("{name}.bin")].each_ref().map(String::as_str))
+    };
+    // The fallback's file is left out: the compressed data holds everything.
+    let (with, without) = (of("meshopt-fallback"), of("meshopt-no-fallback"));
     assert!(with.triangles.len() > 10);
     assert_close(&with, &without, 1e-6);
-    // Quantised twins of nothing: a sphere is round.
-    let sphere = of_one("DenseSphere.glb");
+    // Quantised: a sphere stays round.
+    let sphere = read(&std::fs::read(folder.join("DenseSphere.glb")).unwrap()).unwrap();
     let radius = |p: &[f32; 3]| p.iter().map(|c| c * c).sum::<f32>().sqrt();
     let (small, large) = sphere.positions.iter().map(radius).fold((9.0_f32, 0.0_f32), |(a, b), r| (a.min(r), b.max(r)));
     assert!(large / small < 1.02, "{small} to {large}");

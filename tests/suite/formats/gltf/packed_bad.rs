@@ -1,10 +1,10 @@
 //! glTF: compressed data that lies or is damaged.
 
 use crate::formats::gltf::packed::Sheet;
-use crate::support::mesh_files::{Noise, read, set};
+use crate::support::files::mesh::{Noise, read, set};
+use crate::support::work::within_bytes;
 use meshsnap::import::MeshFault;
 use serde_json::{Value, json};
-use std::time::{Duration, Instant};
 
 #[test]
 fn compressed_views_that_lie_are_refused() {
@@ -82,10 +82,13 @@ fn draco_data_must_be_what_accessors_say() {
     assert_eq!(cases, 10);
 }
 
-/// Every byte of the compressed data matters to somebody; none may bring the decoder down.
+/// Bytes that damaged data may allocate.
+const COST_MAX: u64 = 256 << 20;
+
+/// No changed byte of the compressed data may bring the decoder down, or make it take much memory.
 #[test]
-fn damaged_compressed_data_is_refused_or_read_in_time() {
-    let (mut noise, start, mut cases) = (Noise(7), Instant::now(), 0);
+fn damaged_compressed_data_is_refused_or_read() {
+    let (mut noise, mut cases) = (Noise(7), 0);
     let sheet = Sheet::new();
     for gltf in [sheet.draco(), sheet.meshopt("EXT_meshopt_compression")] {
         let whole = gltf.glb();
@@ -96,7 +99,7 @@ fn damaged_compressed_data_is_refused_or_read_in_time() {
                 let at = from + (noise.next() as usize) % gltf.bin.len();
                 bytes[at] ^= 1 << (noise.next() % 8);
             }
-            _ = read(&bytes);
+            _ = within_bytes(COST_MAX, "damaged data", || read(&bytes));
             cases += 1;
         }
         // Cut off: the header says less.
@@ -105,10 +108,10 @@ fn damaged_compressed_data_is_refused_or_read_in_time() {
             let mut gltf = gltf.clone();
             let length = gltf.json["bufferViews"][view]["byteLength"].as_u64().unwrap();
             gltf.json["bufferViews"][view]["byteLength"] = (length * cut / 60).into();
-            _ = read(&gltf.glb());
+            let glb = gltf.glb();
+            _ = within_bytes(COST_MAX, "data cut off", || read(&glb));
             cases += 1;
         }
     }
     assert_eq!(cases, 2 * (400 + 59));
-    assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
 }

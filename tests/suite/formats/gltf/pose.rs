@@ -1,9 +1,9 @@
 //! glTF: skins, morph targets, and animations at a moment.
 
-use crate::formats::gltf::surfaces::codes;
-use crate::support::mesh_files::{Gltf, assert_close, corners, read, read_at, set};
+use crate::support::data;
+use crate::support::files::mesh::codes;
+use crate::support::files::mesh::{Gltf, assert_close, corners, read, read_at, set};
 use crate::support::server::{Server, meshsnap};
-use crate::support::shared::folder;
 use meshsnap::import::MeshFault;
 use serde_json::{Value, json};
 
@@ -44,7 +44,8 @@ fn close(a: &[[[f64; 3]; 3]], b: &[[[f64; 3]; 3]]) {
 #[test]
 fn joints_hold_vertices_wherever_their_mesh_is() {
     let mesh = read(&skinned().glb()).unwrap();
-    // (0, 1, 0): a quarter stays, and three turn a quarter about (1, 0, 0), to (0, -1, 0). Weights are shares of their sum.
+    // (0, 1, 0): a quarter stays, and three turn a quarter about (1, 0, 0), to (0, -1, 0). Weights
+    // are shares of their sum.
     close(&corners(&mesh), &[[[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, -0.5, 5.0]]]);
     assert!(mesh.normals.iter().all(|n| *n == [0.0, 0.0, 1.0]), "{:?}", mesh.normals);
     // Two sets hold together as one would.
@@ -63,7 +64,8 @@ fn joints_hold_vertices_wherever_their_mesh_is() {
     // Without inverse bind matrices joints stand where the mesh was made.
     let mut gltf = skinned();
     gltf.json["skins"][0].as_object_mut().unwrap().remove("inverseBindMatrices");
-    // The second turns what is at its own place in the mesh: (1, 0) goes to (1, 1), and of (0, 1) three parts to (0, 0).
+    // The second turns what is at its own place in the mesh: (1, 0) goes to (1, 1), and of (0, 1)
+    // three parts to (0, 0).
     close(&corners(&read(&gltf.glb()).unwrap()), &[[[0.0, 0.0, 5.0], [1.0, 1.0, 5.0], [0.0, 0.25, 5.0]]]);
 }
 
@@ -228,8 +230,7 @@ fn broken_animations_are_refused_when_they_are_asked_for() {
 
 #[test]
 fn known_models_move() {
-    let Some(folder) = folder("models") else { return };
-    let fox = std::fs::read(folder.join("Fox.glb")).unwrap();
+    let fox = data::bytes("models/Fox.glb");
     let still = read(&fox).unwrap();
     let moments = [0.0, 0.5, 1.0].map(|time_s| read_at(&fox, time_s).unwrap());
     assert_eq!(codes(&still), ["animations_ignored"]);
@@ -241,7 +242,7 @@ fn known_models_move() {
     }
     assert_ne!(moments[0].positions, moments[1].positions);
     assert_close(&moments[2], &read_at(&fox, 1.0).unwrap(), 0.0);
-    let stress = std::fs::read(folder.join("MorphStressTest.gltf")).unwrap();
+    let stress = data::bytes("models/MorphStressTest.gltf");
     let [a, b] = [0.1, 0.6].map(|time_s| read_at(&stress, time_s).unwrap());
     assert_ne!(a.positions, b.positions);
 }

@@ -1,7 +1,8 @@
 //! glTF: cameras of the scene; polygons in the order of triangles.
 
-use crate::formats::gltf::surfaces::{codes, surface};
-use crate::support::mesh_files::{Gltf, read};
+use crate::formats::gltf::surfaces::surface;
+use crate::support::files::mesh::codes;
+use crate::support::files::mesh::{Gltf, read};
 use meshsnap::mesh::material::FileLens;
 use serde_json::json;
 
@@ -43,7 +44,8 @@ fn cameras_of_the_scene_in_its_order() {
 
 #[test]
 fn fans_are_polygons_where_the_file_says_so() {
-    // A pentagon, a quad, a triangle that happens to begin with the quad's first corner, and a triangle.
+    // A pentagon, a quad, a triangle that happens to begin with the quad's first corner, and a
+    // triangle.
     let indices = [0, 1, 2, 0, 2, 3, 0, 3, 4, 5, 6, 7, 5, 7, 8, 5, 1, 2, 4, 3, 2];
     let build = |extension: bool, used: bool, mode: u32, scale: f64| {
         let mut gltf = Gltf::default();

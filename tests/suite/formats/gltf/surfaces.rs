@@ -1,12 +1,13 @@
 //! glTF: what a file says about its surfaces.
 
-use crate::formats::bundles::names::read_bundle;
-use crate::support::mesh_files::{Gltf, Read, read};
-use crate::support::shared::folder;
+use crate::support::data;
+use crate::support::files::bundle::read_bundle;
+use crate::support::files::mesh::{Gltf, codes, read};
 use meshsnap::import::{Bundle, BundleFile, MeshError, MeshFault};
 use meshsnap::mesh::material::{AlphaMode, ImageContent, TextureRef, Wrap};
 use meshsnap::mesh::{MaterialSlot, Mesh};
 use serde_json::{Value, json};
+use std::path::Path;
 
 /// A triangle with two sets of texture coordinates and a material that uses what is in the lists.
 pub fn surface(material: Value) -> Gltf {
@@ -31,10 +32,6 @@ pub fn surface(material: Value) -> Gltf {
 
 fn slot(material: Value) -> MaterialSlot {
     read(&surface(material).glb()).unwrap().materials.remove(0)
-}
-
-pub fn codes(mesh: &Read) -> Vec<&str> {
-    mesh.report.warnings.iter().map(|w| w.code).collect()
 }
 
 #[test]
@@ -209,10 +206,13 @@ fn broken_materials_matter_only_where_they_are_used() {
 
 #[test]
 fn known_models_have_their_known_materials() {
-    let Some(folder) = folder("models") else { return };
-    let cases =
-        [("BoxTextured.glb", "Texture", 1.0), ("Duck.glb", "blinn3-fx", 1.0), ("Fox.glb", "fox_material", 0.58)];
-    for (file, name, roughness) in cases {
+    let folder = data::folder("models");
+    have_materials(&folder, &[("BoxTextured.glb", "Texture", 1.0), ("Fox.glb", "fox_material", 0.58)]);
+}
+
+/// Each file's one material, by its name and roughness, and its picture.
+fn have_materials(folder: &Path, cases: &[(&str, &str, f32)]) {
+    for &(file, name, roughness) in cases {
         let mesh = read(&std::fs::read(folder.join(file)).unwrap()).unwrap();
         let slot = &mesh.materials[0];
         assert_eq!((slot.name.as_str(), slot.metallic, slot.roughness), (name, Some(0.0), Some(roughness)), "{file}");
@@ -222,6 +222,12 @@ fn known_models_have_their_known_materials() {
         assert!(bytes.starts_with(b"\x89PNG"), "{file}");
         assert_eq!(mesh.cameras.len(), usize::from(file == "Duck.glb"));
     }
+}
+
+#[test]
+fn large_models_have_their_known_materials() {
+    let Some(folder) = data::large_folder("models") else { return };
+    have_materials(&folder, &[("Duck.glb", "blinn3-fx", 1.0)]);
     // In several files; with the geometry embedded, the picture is still outside.
     let palm = folder.join("PalmTree");
     let mut json: Value = serde_json::from_slice(&std::fs::read(palm.join("PalmTree.gltf")).unwrap()).unwrap();

@@ -1,10 +1,13 @@
 //! PLY files made to cost a lot, cut off anywhere, or changed at random.
 
-use crate::support::mesh_files::{Noise, Solid, read, read_as, read_limited};
-use crate::support::ply_files::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
+use crate::support::files::mesh::{Noise, Solid, read, read_as, read_limited};
+use crate::support::files::ply::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
+use crate::support::work::within_bytes;
 use meshsnap::import::{Format, MeshFault};
 use meshsnap::limits::Limits;
-use std::time::{Duration, Instant};
+
+/// Bytes that a changed file of a kilobyte may allocate.
+const COST_MAX: u64 = 16 << 20;
 
 #[test]
 fn memory_and_triangles_are_limited() {
@@ -17,17 +20,17 @@ fn memory_and_triangles_are_limited() {
     let corners = 20_000_000_u32;
     let list = |count: u32| [&count.to_le_bytes()[..], &vec![0; count as usize]].concat();
     let property = "property list uint uchar vertex_indices\n";
-    let start = Instant::now();
     let many = bytes(property, &list(corners));
     let one = format!("{property}property list uint uchar texcoord\n");
     let with_uvs = bytes(&one, &[list(9_000_000), list(18_000_000)].concat());
     let small = Limits { memory_bytes: 64 << 20, ..Limits::default() };
     for (file, limits) in [(&many, &Limits::default()), (&many, &small), (&with_uvs, &small)] {
-        let error = read_limited(file, None, limits).unwrap_err();
+        // The importer holds its bytes once; what a limit refuses is not allocated.
+        let most = limits.memory_bytes.min(1 << 30) + 2 * file.len() as u64;
+        let error = within_bytes(most, "a face of many corners", || read_limited(file, None, limits).unwrap_err());
         assert!(matches!(error.fault, MeshFault::Limit(_)), "{error}");
     }
     assert!(read(&with_uvs).is_err());
-    assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
 }
 
 /// A file with everything in it.
@@ -65,7 +68,6 @@ fn small(encoding: Encoding) -> Vec<u8> {
 
 #[test]
 fn a_file_cut_off_anywhere_is_told() {
-    let start = Instant::now();
     let mut cases = 0;
     for encoding in ENCODINGS {
         let bytes = small(encoding);
@@ -86,13 +88,12 @@ fn a_file_cut_off_anywhere_is_told() {
         }
     }
     assert!(cases > 6000, "{cases}");
-    assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
 }
 
 #[test]
-fn mutated_files_never_panic_and_are_never_slow() {
+fn mutated_files_never_panic_and_never_cost_much() {
     let mut noise = Noise(0x5EED_0F01);
-    let (mut cases, mut drawn, start) = (0, 0, Instant::now());
+    let (mut cases, mut drawn) = (0, 0);
     for encoding in ENCODINGS {
         let good = small(encoding);
         for _ in 0..20_000 {
@@ -107,11 +108,10 @@ fn mutated_files_never_panic_and_are_never_slow() {
                     _ => bytes.insert(at, b"0123456789-.e \nnaif"[(noise.next() % 19) as usize]),
                 }
             }
-            drawn += u32::from(read_as(&bytes, Some(Format::Ply)).is_ok());
+            drawn += u32::from(within_bytes(COST_MAX, "a changed file", || read_as(&bytes, Some(Format::Ply)).is_ok()));
             cases += 1;
         }
     }
     assert_eq!(cases, 60_000);
     assert!(drawn > 3_000 && drawn < 55_000, "{drawn}");
-    assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
 }

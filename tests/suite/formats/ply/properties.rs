@@ -1,8 +1,8 @@
 //! PLY in every encoding: what each property becomes.
 
-use crate::formats::same_shape::assert_same_shape;
-use crate::support::mesh_files::{Read, Solid, read};
-use crate::support::ply_files::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
+use crate::support::files::mesh::{Solid, codes, read};
+use crate::support::files::ply::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
+use crate::support::files::same::assert_same_shape;
 use crate::support::scenes;
 use crate::support::server::Server;
 use meshsnap::backend::Renderer;
@@ -25,9 +25,6 @@ fn polygons() -> Solid {
 }
 
 /// The codes of its warnings.
-pub fn codes(mesh: &Read) -> Vec<&'static str> {
-    mesh.report.warnings.iter().map(|w| w.code).collect()
-}
 
 #[test]
 fn every_encoding_draws_what_obj_draws() {

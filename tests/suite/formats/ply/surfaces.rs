@@ -1,9 +1,9 @@
-//! What PLY files say of their surfaces: normals, texture coordinates, colours and textures.
+//! Surfaces in PLY files: normals, texture coordinates, colours and textures.
 
-use crate::formats::bundles::names::{files, read_bundle};
-use crate::formats::ply::properties::codes;
-use crate::support::mesh_files::read;
-use crate::support::ply_files::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
+use crate::support::files::bundle::{files, read_bundle};
+use crate::support::files::mesh::codes;
+use crate::support::files::mesh::read;
+use crate::support::files::ply::{ENCODINGS, Encoding, INDICES, Ply, XYZ, list};
 use crate::support::scenes;
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
@@ -154,7 +154,8 @@ fn textures_come_from_the_bundle() {
     assert_eq!((mesh.materials.len(), mesh.materials[0].base_texture, codes(&mesh)), (1, None, vec!["uvs_missing"]));
 }
 
-/// A sheet of two quads with a texture and colours: as OBJ, and as PLY with texture coordinates a vertex and a corner.
+/// A sheet of two quads with a texture and colours: as OBJ, and as PLY with texture coordinates a
+/// vertex and a corner.
 #[test]
 fn textured_and_coloured_files_draw_what_obj_draws() {
     let mut png = Vec::new();

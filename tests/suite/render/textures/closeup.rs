@@ -1,7 +1,7 @@
 //! Levels of textures that are left out: none that a pixel could reach, and as many as can be.
 
 use crate::render::textures::levels::{base, encode, model, model_of};
-use crate::support::mesh_files::Noise;
+use crate::support::files::mesh::Noise;
 use crate::support::scenes;
 use image::ImageFormat;
 use meshsnap::limits::{Deadline, Limits};

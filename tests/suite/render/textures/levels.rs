@@ -3,7 +3,7 @@
 use std::io::Cursor;
 
 use crate::render::textures::bad::{header, png, zlib};
-use crate::support::mesh_files::{Gltf, Noise, read};
+use crate::support::files::mesh::{Gltf, Noise, read};
 use crate::support::scenes;
 use image::{DynamicImage, ImageFormat};
 use meshsnap::limits::{Deadline, Limits};

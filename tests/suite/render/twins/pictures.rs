@@ -1,39 +1,16 @@
 //! GPU against CPU: pictures that agree, within named tolerances, and workers that share a device.
 
-use std::sync::{Arc, OnceLock};
-
 use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
+use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::backend::{DrawError, Renderer};
 use meshsnap::limits::Deadline;
 use meshsnap::plan::ShadedMaterial;
 
 use crate::render::golden;
+use crate::support::gpus::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::scenes::{self, SCENES};
 use crate::support::shapes;
-
-/// The GPU with 64-bit atomics (where it has them) and without; None where there is no Vulkan.
-pub fn gpus() -> Option<&'static [Arc<Gpu>; 2]> {
-    static GPUS: OnceLock<Option<[Arc<Gpu>; 2]>> = OnceLock::new();
-    let opened = GPUS.get_or_init(|| {
-        let open = |atomics| Gpu::open(GpuKind::Any, atomics).map(Arc::new);
-        match (open(AtomicsChoice::Best), open(AtomicsChoice::Force32)) {
-            (Ok(best), Ok(force32)) => {
-                println!("GPU: {:?}", best.info());
-                Some([best, force32])
-            }
-            (Err(DrawError::NoGpu(reason)), _) => {
-                println!("no Vulkan here: {reason}");
-                None
-            }
-            (a, b) => panic!("{:?} {:?}", a.err(), b.err()),
-        }
-    });
-    let required = std::env::var("MESHSNAP_TEST_REQUIRE").is_ok_and(|v| v == "all");
-    assert!(opened.is_some() || !required, "MESHSNAP_TEST_REQUIRE=all, and there is no Vulkan");
-    opened.as_ref()
-}
 
 #[test]
 fn pictures_of_the_scenes_agree() {

@@ -10,7 +10,7 @@ use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
 use meshsnap::plan::{CornerValues, DrawPlan, ShadedMaterial, Texture, TextureUse, Textures, flags, slots};
 
-use crate::render::twins::pictures as twins;
+use crate::support::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
 use crate::support::scenes;
 use crate::support::shapes::{self, Random};
@@ -87,12 +87,13 @@ const INSIDE: &[(&str, &str)] =
 
 #[test]
 fn every_look_agrees() {
-    let Some(gpus) = twins::gpus() else { return };
+    let Some(gpus) = gpus::gpus() else { return };
     let mut gpu = GpuRenderer::new(gpus[0].clone());
     let mut cpu = CpuRenderer::new(1);
     let mut cases = 0;
     each_view(|view, plan| {
-        // The parts test has this view too, and every kernel that a software device compiles takes its time.
+        // The parts test has this view too, and every kernel that a software device compiles takes
+        // its time.
         if view == "inside a sheet, 1 samples" {
             return;
         }
@@ -116,7 +117,7 @@ fn every_look_agrees() {
 
 #[test]
 fn parts_of_different_looks_agree() {
-    let Some(gpus) = twins::gpus() else { return };
+    let Some(gpus) = gpus::gpus() else { return };
     let mut gpu = GpuRenderer::new(gpus[0].clone());
     let mut cpu = CpuRenderer::new(1);
     // Plans of any lifetime may borrow it.
@@ -139,7 +140,7 @@ fn parts_of_different_looks_agree() {
 
 #[test]
 fn hostile_coordinates_and_textures_agree() {
-    let Some(gpus) = twins::gpus() else { return };
+    let Some(gpus) = gpus::gpus() else { return };
     let mut cases = 0;
     each_view(|view, plan| {
         let bad: Vec<[f32; 2]> = (0..plan.positions.len())
@@ -161,9 +162,10 @@ fn hostile_coordinates_and_textures_agree() {
 
 #[test]
 fn alpha_that_rounds_below_nothing_agrees() {
-    let Some(gpus) = twins::gpus() else { return };
+    let Some(gpus) = gpus::gpus() else { return };
     let mut gpu = GpuRenderer::new(gpus[0].clone());
-    // Alpha is 0 along the upper edge, which runs through pixels' centres: there the third barycentric rounds to either side of 0.
+    // Alpha is 0 along the upper edge, which runs through pixels' centres: there the third
+    // barycentric rounds to either side of 0.
     let corners = |i: u32| {
         let (left, top) = (-60.0 + 2.0 * i as f32, 9.5 * i as f32 - 47.0);
         [[left, top, 0.5], [left + 71.0 + 3.0 * i as f32, top, 0.5], [left + 23.0, top + 9.0, 0.5]]
@@ -193,7 +195,7 @@ fn alpha_that_rounds_below_nothing_agrees() {
 
 #[test]
 fn normals_and_colours_that_go_by_different_indices_agree() {
-    let Some(gpus) = twins::gpus() else { return };
+    let Some(gpus) = gpus::gpus() else { return };
     let (mut gpu, mut cpu) = (GpuRenderer::new(gpus[0].clone()), CpuRenderer::new(1));
     // An index of its own for every corner. Plans of any lifetime may borrow it.
     let corners: &'static [[u32; 3]] = (0..10_000).map(|t| [3 * t + 2, 3 * t, 3 * t + 1]).collect::<Vec<_>>().leak();
@@ -224,7 +226,8 @@ fn normals_and_colours_that_go_by_different_indices_agree() {
     assert_eq!(cases, 8);
 }
 
-/// Two meshes, the second from inside (where triangles are clipped), with one sample a pixel and with four.
+/// Two meshes, the second from inside (where triangles are clipped), with one sample a pixel and
+/// with four.
 fn each_view(mut each: impl FnMut(&str, &mut DrawPlan<'_>)) {
     for (name, obj, camera) in [("torus", shapes::torus(16), &[][..]), ("inside a sheet", shapes::sheet(12), INSIDE)] {
         let mesh = scenes::mesh(&obj);

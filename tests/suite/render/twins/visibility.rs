@@ -1,4 +1,5 @@
-//! GPU against CPU: the same visibility buffer, word for word, on random triangle soups; and a brute-force third opinion.
+//! GPU against CPU: the same visibility buffer, word for word, on random triangle soups; and a
+//! brute-force third opinion.
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
@@ -6,10 +7,11 @@ use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::limits::Deadline;
 use meshsnap::plan::{DrawPlan, Faces, sample_offsets};
 
-use crate::render::twins::pictures::gpus;
-use crate::support::soups::{KINDS, Kind, Random, Soup, View};
+use crate::support::families::soups::{KINDS, Kind, Random, Soup, View};
+use crate::support::gpus::gpus;
 
-/// Draws the plan on the CPU and on both GPU paths and compares; returns how many samples saw something.
+/// Draws the plan on the CPU and on both GPU paths and compares; returns how many samples saw
+/// something.
 fn compare(plan: &DrawPlan<'_>, what: &str) -> usize {
     let deadline = Deadline::default();
     let cpu = CpuRenderer::new(2).draw_visibility(plan, &deadline).unwrap();
@@ -187,7 +189,7 @@ fn visibility_is_what_brute_force_finds() {
     assert_eq!(cases, 24);
 }
 
-/// What a sample should see, by i128 coverage and f64 depth: whoever owns it, nearest first.
+/// The true content of a sample, by i128 coverage and f64 depth: its owner, nearest first.
 #[derive(Debug)]
 struct Truth(Vec<(f64, u32)>);
 
@@ -206,7 +208,8 @@ fn brute_force(plan: &DrawPlan<'_>) -> Vec<Truth> {
     let dot = |row: &[f32; 4], v: [f32; 3]| {
         (0..3).map(|k| f64::from(row[k]) * f64::from(v[k])).sum::<f64>() + f64::from(row[3])
     };
-    // The grid that vertices snap to is 1/256 px, so f64 snaps as f32 does but for ties: those are nudged away.
+    // The grid that vertices snap to is 1/256 px, so f64 snaps as f32 does but for ties: those are
+    // nudged away.
     let snapped: Vec<_> = CpuSnap::all(plan);
     let mut truth: Vec<Truth> = Vec::new();
     let half = [i64::from(plan.width_px) * 128, i64::from(plan.height_px) * 128];
@@ -231,7 +234,8 @@ fn brute_force(plan: &DrawPlan<'_>) -> Vec<Truth> {
     truth
 }
 
-/// Snapping is part of the contract, bit for bit, so the brute force takes it from the CPU's rules, written again.
+/// Snapping is part of the contract, bit for bit, so the brute force takes it from the CPU's rules,
+/// written again.
 struct CpuSnap;
 
 impl CpuSnap {

@@ -1,0 +1,6 @@
+//! Surfaces: what is seen of them, and its colour.
+
+pub mod light;
+pub mod rays;
+pub mod srgb;
+pub mod visible;

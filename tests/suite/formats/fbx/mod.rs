@@ -1,0 +1,4 @@
+//! FBX, ASCII and binary.
+
+pub mod basics;
+pub mod scene;

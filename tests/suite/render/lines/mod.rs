@@ -1,0 +1,7 @@
+//! Lines: their formulas, looks, borders and limits, and line and point primitives.
+
+pub mod borders;
+pub mod formulas;
+pub mod limits;
+pub mod looks;
+pub mod primitives;
