@@ -46,6 +46,13 @@ impl MeshError {
         Self::new(MeshFault::Broken, detail)
     }
 
+    /// The file needs an optional part of this crate that the build left out. `what` is a sentence's
+    /// beginning: "the file is FBX".
+    #[cfg(not(all(feature = "fbx", feature = "draco", feature = "meshopt")))]
+    pub(crate) fn missing_feature(what: &str, feature: &str) -> Self {
+        Self::new(MeshFault::Unsupported, format!("{what}, and this build lacks the feature `{feature}`"))
+    }
+
     /// An error of the given kind.
     pub fn new(fault: MeshFault, detail: impl Into<String>) -> Self {
         let detail: String = detail.into();

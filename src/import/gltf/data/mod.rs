@@ -3,7 +3,7 @@
 pub(crate) mod accessor;
 pub(crate) mod attribute;
 pub(crate) mod buffers;
-#[cfg(feature = "meshopt")]
+#[cfg_attr(not(feature = "meshopt"), path = "meshopt_absent.rs")]
 pub(crate) mod meshopt;
 #[cfg(feature = "meshopt")]
 pub(crate) mod meshopt_filters;

@@ -148,6 +148,7 @@ pub struct PrimitiveExtensions {
 }
 
 /// `KHR_draco_mesh_compression`
+#[cfg_attr(not(feature = "draco"), allow(dead_code))] // Only its decoder reads all of it.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Draco {
@@ -231,6 +232,7 @@ pub struct BufferViewExtensions {
 }
 
 /// `EXT_meshopt_compression`, `KHR_meshopt_compression`
+#[cfg_attr(not(feature = "meshopt"), allow(dead_code))] // Only its decoder reads all of it.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Meshopt {

@@ -1,5 +1,6 @@
 //! A primitive: its triangles and vertices, decoded once for all its instances.
 
+#[cfg_attr(not(feature = "draco"), path = "draco_absent.rs")]
 pub(crate) mod draco;
 pub(crate) mod ngons;
 pub(crate) mod shape;

@@ -1,0 +1,10 @@
+//! In place of `scene.rs` in a build without the feature `fbx`.
+
+use crate::import::MeshError;
+use crate::import::context::Context;
+use crate::import::raw::RawMesh;
+
+/// Refuses: this build has no parser.
+pub fn read(_: &[u8], _: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    Err(MeshError::missing_feature("the file is FBX", "fbx"))
+}

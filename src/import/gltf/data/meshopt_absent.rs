@@ -1,0 +1,11 @@
+//! In place of `meshopt.rs` in a build without the feature `meshopt`.
+
+use crate::import::MeshError;
+use crate::import::context::Context;
+use crate::import::gltf::document::schema::Meshopt;
+
+/// Refuses: this build has no decoder.
+pub fn decode(index: usize, _: &Meshopt, _: bool, _: &[u8], _: u64, _: &mut Context<'_>) -> Result<Vec<u8>, MeshError> {
+    let what = format!("buffer view {index} is compressed by meshoptimizer");
+    Err(MeshError::missing_feature(&what, "meshopt"))
+}
