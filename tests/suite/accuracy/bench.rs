@@ -11,7 +11,7 @@ use crate::measure::{Effort, Row, SAMPLES, back_ends, goals, json, plot, rounds}
 use crate::support::gpus::gpus;
 
 /// Small enough for every run of the suite.
-const EFFORT: Effort = Effort { size_px: 96, runs: 1, points_per_side: 16 };
+const EFFORT: Effort = Effort { size_px: 128, runs: 1, points_per_side: 16 };
 
 fn small() -> Vec<Scene> {
     let small: Vec<Scene> = SCENES.iter().filter(|scene| SMALL.contains(&scene.name)).copied().collect();
