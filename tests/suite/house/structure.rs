@@ -75,6 +75,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("config", &["request", "spec", "limits"]),
     ("telemetry", &["config"]),
+    // The crate's public face is made of what the rooms have.
+    (
+        "library",
+        &["pipeline", "request", "encode", "backend", "plan", "spec", "import", "mesh", "image", "limits", "warning"],
+    ),
     ("lib", &["*"]),
     ("main", &["cli"]),
 ];

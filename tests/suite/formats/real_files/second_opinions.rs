@@ -43,10 +43,20 @@ fn other_readers_read_the_same_from_every_large_model() {
 }
 
 /// Files of the repository that are compared, at least.
-const OBJ_FILES_MIN: usize = 20;
-const GLTF_FILES_MIN: usize = 10;
+const OBJ_FILES_MIN: usize = 46;
+const GLTF_FILES_MIN: usize = 9;
 /// OBJ and glTF files of the large data that are compared, at least. That folder may grow.
 const LARGE_FILES_MIN: [usize; 2] = [10, 8];
+
+/// Files on which the readers disagree, and the reason. Each must go on to disagree.
+const EXPLAINED: [(&str, &str); 3] = [
+    (
+        "issue-319-002.obj",
+        "a corner lies between its neighbours: we cut a polygon into one triangle fewer than tobj counts",
+    ),
+    ("line-prim.obj", "tobj takes a polyline for a polygon"),
+    ("points-prim.obj", "tobj drops points"),
+];
 
 fn own_folders() -> [PathBuf; 3] {
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("api/examples");
@@ -61,9 +71,12 @@ fn compare_all(folders: &[PathBuf], extension: &str, compare: fn(&Path, &Read) -
             continue;
         }
         let Ok(mesh) = read_bundle(&bundle(&path)) else { continue };
-        match compare(&path, &mesh) {
-            Ok(is_comparable) => compared += usize::from(is_comparable),
-            Err(fault) => faults.push(format!("{}: {fault}", path.display())),
+        let why = EXPLAINED.iter().find(|(name, _)| path.ends_with(name)).map(|(_, why)| why);
+        match (compare(&path, &mesh), why) {
+            (Ok(is_comparable), None) => compared += usize::from(is_comparable),
+            (Ok(_), Some(why)) => faults.push(format!("{}: explained by \"{why}\", and the same", path.display())),
+            (Err(_), Some(_)) => compared += 1,
+            (Err(fault), None) => faults.push(format!("{}: {fault}", path.display())),
         }
     }
     println!("{compared} {extension} files compared");
