@@ -1,8 +1,8 @@
 //! The whole program in one function: bytes -> Mesh -> Scene -> DrawPlan -> back-end -> Image ->
 //! encoded bytes.
 //!
-//! The command line and the job workers call [`render`]; the workers do so for synchronous HTTP too.
-//! The library calls [`draw`], the second half of it: a mesh that is read already, to a picture.
+//! The command line and the job workers call [`render`]; the workers do so for synchronous HTTP
+//! too. The library calls [`draw`], which turns a mesh that is read already into a picture.
 //! [`inspect`] reports what is in a file and draws nothing.
 //!
 //! Invariant: nothing from here down reads a clock, a file or the environment, or knows an async

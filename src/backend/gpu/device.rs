@@ -80,8 +80,8 @@ impl Gpu {
             // Dropping the device reports "destroyed" here too; the slot is not read any more then.
             let _ = slot.set(format!("{reason:?}: {message}"));
         });
-        // Without a handler wgpu panics. Errors that a job causes go to that job's error scope; only
-        // the others come here.
+        // Without a handler wgpu panics. Errors that a job causes go to that job's error scope; the
+        // others come here.
         device
             .on_uncaptured_error(Arc::new(|error| tracing::error!(%error, "the GPU reported an error outside a job")));
 

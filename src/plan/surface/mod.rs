@@ -110,8 +110,8 @@ pub mod slots {
     pub const EMISSIVE: usize = 3;
 }
 
-/// Bits of [`TextureUse::sampler`]: the wrap mode across in the lowest bits, the wrap mode down from
-/// bit [`samplers::DOWN_SHIFT`] on.
+/// Bits of [`TextureUse::sampler`]: the wrap mode across in the lowest bits, the wrap mode down
+/// from bit [`samplers::DOWN_SHIFT`] on.
 pub mod samplers {
     /// Bits of a wrap mode.
     pub const WRAP_BITS: u32 = 3;
