@@ -1,5 +1,5 @@
 // Every stage: the uniforms, shared constants, and arithmetic that gives the CPU's bits
-// (ARCHITECTURE.md, "Rounded operations"). Prepended to each stage by
+// (docs/rasterizer.md, "Rounded operations"). Prepended to each stage by
 // src/backend/gpu/pipelines/mod.rs.
 
 struct Frame {

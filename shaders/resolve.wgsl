@@ -1,7 +1,8 @@
-// Stage resolve, per pixel: surface over background, where no line has composited both, to sRGB
-// bytes. Twin of src/backend/cpu/resolve.rs.
+// Stage resolve, per pixel: blends the background into the colour, unless lines have done so, and
+// converts it to sRGB bytes. Twin of src/backend/cpu/resolve.rs.
 
-// Per pixel, the surface over nothing or the finished colour; over.wgsl tells them apart.
+// Per pixel. A negative alpha means that lines have already blended the background into this
+// colour; otherwise it is premultiplied, without background.
 @group(1) @binding(9) var<storage, read> colors: array<vec4<f32>>;
 // thresholds[k] is the smallest linear value that is stored as k + 1 or more.
 @group(1) @binding(13) var<storage, read> thresholds: array<f32>;

@@ -20,7 +20,7 @@ impl Image {
         [self.rgba[i], self.rgba[i + 1], self.rgba[i + 2], self.rgba[i + 3]]
     }
 
-    /// Whether every pixel is fully opaque. Then an encoder may drop the alpha channel.
+    /// True if every pixel is fully opaque. Then an encoder may drop the alpha channel.
     pub fn is_opaque(&self) -> bool {
         self.rgba.chunks_exact(4).all(|p| p[3] == 255)
     }

@@ -1,4 +1,4 @@
-//! Every cap in one place, and the two things that a job spends: bytes ([`Budget`]) and time
+//! The caps of one job, and the two things that a job spends: bytes ([`Budget`]) and time
 //! ([`Deadline`]).
 //!
 //! **Invariant**: an allocation whose size follows from the input is first spent from the job's
@@ -7,8 +7,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// What a job or a request may use. The defaults are those of the public contract, and each can be
-/// configured.
+/// The most that a job or a request may use. The defaults are those of the public contract, and
+/// each can be configured.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// The largest request body that is accepted, bytes.

@@ -1,7 +1,8 @@
 //! The whole program in one function: bytes -> Mesh -> Scene -> DrawPlan -> back-end -> Image ->
 //! encoded bytes.
 //!
-//! The command line, the synchronous HTTP handler and the job workers all call [`render`].
+//! The command line and the job workers call [`render`]; the workers do so for synchronous HTTP
+//! too. The library calls [`draw`], which turns a mesh that is read already into a picture.
 //! [`inspect`] reports what is in a file and draws nothing.
 //!
 //! Invariant: nothing from here down reads a clock, a file or the environment, or knows an async
@@ -150,7 +151,7 @@ pub enum Stage {
     Encode,
 }
 
-/// Why there is no picture, by who is at fault.
+/// Errors of [`render`] and [`draw`], by who is at fault.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
     /// The mesh is at fault.

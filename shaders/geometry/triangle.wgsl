@@ -70,7 +70,8 @@ fn pixel_bounds(x: vec3<i32>, y: vec3<i32>) -> vec4<i32> {
 struct Edges {
     dx: vec3<i32>,
     dy: vec3<i32>,
-    // 0 where a sample on the edge is inside (top and left edges), -1 elsewhere.
+    // The top-left rule: 0 for top and left edges, where a sample on the edge is inside; -1 for
+    // the others.
     bias: vec3<i32>,
 };
 

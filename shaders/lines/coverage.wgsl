@@ -15,8 +15,8 @@
 // Per sample, the points assigned to it, as stroke.wgsl numbers them.
 @group(1) @binding(29) var<storage, read> sample_masks: array<u32>;
 
-// Strokes in a pixel that may all differ from their points by the largest difference. Of more
-// strokes, some overlap.
+// A union of strokes is taken to differ from its points by at most this many times the largest
+// difference between a stroke and its points. Of more strokes in one pixel, some overlap.
 const STROKES_SIDE_BY_SIDE: f32 = 4.0;
 
 // Alpha below which a surface is ignored: a tenth of a byte's last step in the most transparent

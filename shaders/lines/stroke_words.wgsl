@@ -15,7 +15,7 @@ const STROKE_WORDS: u32 = 12u;
 const AREA_WORD: u32 = 0u;
 // The sum of their counts of points.
 const COUNT_WORD: u32 = 1u;
-// How often either sum has wrapped around: areas in the lower half, counts in the upper.
+// Number of times that each sum has wrapped around: areas in the lower half, counts in the upper.
 const CARRY_WORD: u32 = 2u;
 // The first word of the mask: the points that any stroke covers.
 const MASK_WORD: u32 = 3u;

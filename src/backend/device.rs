@@ -73,7 +73,7 @@ pub struct GpuStatus {
     pub state: GpuState,
     /// The device opened last.
     pub info: Option<GpuInfo>,
-    /// Why there is no GPU, or why `auto` means the CPU in spite of it.
+    /// The reason why there is no GPU, or why `auto` means the CPU although there is one.
     pub reason: Option<String>,
 }
 

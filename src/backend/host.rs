@@ -15,7 +15,7 @@ const LOSSES_MAX: u32 = 3;
 /// The process's one GPU, shared by all workers.
 pub struct GpuHost {
     open: Box<Opener>,
-    /// Why `auto` means the CPU, once that is decided. It stays decided.
+    /// The reason why `auto` means the CPU. Set at most once, and never cleared.
     without: OnceLock<String>,
     /// Held while a device is opened.
     device: Mutex<Slot>,
@@ -28,7 +28,7 @@ pub struct GpuHost {
 #[derive(Default)]
 struct Slot {
     current: Option<Arc<dyn GpuDevice>>,
-    /// Why the first opening failed; it is not tried again.
+    /// The reason for which the first opening failed. There is no second attempt then.
     failed: Option<String>,
     /// True once an opening has succeeded. From then on a failure counts as a loss.
     opened_before: bool,

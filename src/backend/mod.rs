@@ -61,7 +61,7 @@ impl BackendKind {
     }
 }
 
-/// Why a picture could not be filled. Never the client's fault, except for an exceeded deadline.
+/// Errors of drawing a plan. Never the client's fault, except for an exceeded deadline.
 #[derive(Debug, thiserror::Error)]
 pub enum DrawError {
     /// The deadline has passed.

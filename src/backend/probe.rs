@@ -36,7 +36,7 @@ const FAR: f32 = 0.25;
 const COLORS: [[f32; 4]; 3] = [[1.0, 0.25, 0.0, 1.0], [0.0, 0.25, 1.0, 1.0], [0.0, 1.0, 0.0, 1.0]];
 const BACKGROUND: [f32; 4] = [1.0, 1.0, 1.0, 1.0];
 
-/// Why a renderer cannot be trusted.
+/// The fault that makes a renderer unfit for use.
 #[derive(Debug, thiserror::Error)]
 pub enum ProbeError {
     /// It would not draw.

@@ -276,7 +276,7 @@ fn is_of_floats(module: &naga::Module, ty: naga::Handle<naga::Type>) -> bool {
     }
 }
 
-/// What a shader calls a slot, where that is not the slot's own name.
+/// Names of slots in the shaders, where these differ from the slots' own names.
 const OTHER_NAMES: &[(Slot, &str)] = &[(Slot::PeelLayer, "base")];
 
 #[test]

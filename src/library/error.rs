@@ -8,7 +8,8 @@ use crate::pipeline::RenderError;
 use crate::plan::PlanError;
 use crate::request::RequestError;
 
-/// Why there is no mesh, no spec or no picture. [`Error::fault`] says who can mend it.
+/// Errors of reading a mesh, making a spec, drawing or encoding. [`Error::fault`] says who can mend
+/// it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

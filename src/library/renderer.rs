@@ -43,9 +43,10 @@ pub struct Picture {
     pub image: Image,
     /// The back-end that drew it.
     pub backend: BackendKind,
-    /// What the plan left out, with its reasons. No skip changes a byte of the picture.
+    /// The parts of drawing that the plan left out, with reasons. No skip changes a byte of the
+    /// picture.
     pub skips: Vec<Skip>,
-    /// What of the spec does not go with the mesh.
+    /// Parts of the spec that do not go with the mesh.
     pub warnings: Vec<Warning>,
 }
 

@@ -1,11 +1,11 @@
-//! What a picture should look like: the request document, built by hand.
+//! The request as a Rust value: a style and the keys of the request document.
 
 use super::Error;
 use crate::limits::Limits;
 use crate::request::{self, Rules};
 use crate::spec::{self, BackendChoice};
 
-/// What to draw: a style, then the keys of the request document that override it.
+/// A request: a style, and the keys of the request document that override it.
 ///
 /// Styles and keys are those of the HTTP interface and of `meshsnap render`.
 ///

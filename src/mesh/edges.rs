@@ -15,9 +15,9 @@ pub struct MeshEdge {
     pub faces: [u32; 2],
     /// The number of faces: 1 for an open edge, 2 for a manifold one, more for a non-manifold one.
     pub face_count: u32,
-    /// Whether the file's polygon has this edge; false for a diagonal that triangulation added.
+    /// True if the file's polygon has this edge; false for a diagonal that triangulation added.
     pub is_polygon_edge: bool,
-    /// Whether a further face runs along the edge in the first one's direction, so that one of the
+    /// True if a further face runs along the edge in the first one's direction, so that one of the
     /// two is inside out.
     pub has_inconsistent_winding: bool,
 }
@@ -44,7 +44,7 @@ impl EdgeList {
         Ok(collect(mesh, &first_half_edges))
     }
 
-    /// Whether every edge has exactly two faces, which run along it in opposite directions: then
+    /// True if every edge has exactly two faces, which run along it in opposite directions: then
     /// the mesh bounds a solid.
     pub fn is_closed(&self) -> bool {
         self.edges.iter().all(|e| e.face_count == 2 && !e.has_inconsistent_winding)

@@ -20,7 +20,7 @@ pub struct MaterialSlot {
     pub emissive: Option<[f32; 3]>,
     /// The meaning of the base colour's alpha.
     pub alpha: AlphaMode,
-    /// Whether the material is shown without light (KHR_materials_unlit).
+    /// True if the material is shown without light (KHR_materials_unlit).
     pub unlit: bool,
     /// sRGB colour and alpha, times `base_color`.
     pub base_texture: Option<TextureRef>,
@@ -54,9 +54,9 @@ pub struct TextureRef {
     /// KHR_texture_transform, or the identity: `[u', v'] = [[a, b, c], [d, e, f]] (u, v, 1)`. (0,
     /// 0) is the upper left corner of the image, and v runs down.
     pub transform: [[f32; 3]; 2],
-    /// How the image continues beyond 0 and 1, across and down.
+    /// Continuation of the image beyond 0 and 1, across and down.
     pub wrap: [Wrap; 2],
-    /// Whether the nearest texel is sampled, instead of a blend of neighbours.
+    /// True if the nearest texel is sampled, false for a blend of neighbours.
     pub nearest: bool,
 }
 
@@ -70,7 +70,7 @@ impl TextureRef {
     }
 }
 
-/// How a texture continues beyond its edge.
+/// Continuation of a texture beyond its edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
     /// It starts again.

@@ -24,7 +24,7 @@ impl LineOrPoint {
         Self { ends: [vertex; 2], material }
     }
 
-    /// Whether this is a point.
+    /// True if this is a point.
     pub fn is_point(&self) -> bool {
         self.ends[0] == self.ends[1]
     }

@@ -1,4 +1,4 @@
-//! Why there is no plan. The input is always at fault.
+//! Errors of making a plan. The input is always at fault.
 
 use crate::limits::{LimitExceeded, Stopped};
 use crate::scene::SceneError;

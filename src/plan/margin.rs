@@ -40,7 +40,7 @@ pub fn margin_px(
     Ok(if is_skipped { 0 } else { needed_px.max(KEPT_PX) })
 }
 
-/// Whether all positions are before the eye and inside the picture.
+/// True if all positions are before the eye and inside the picture.
 fn is_inside(scene: &Scene<'_, '_>, geometry: &Geometry<'_>, deadline: &Deadline) -> Result<bool, Stopped> {
     let size_px = scene.size_px();
     let projection = Projection::new(&scene.camera, size_px, true);

@@ -126,7 +126,7 @@ impl<'a> DrawPlan<'a> {
         self.peeling.as_ref().filter(|layers| layers.count_max > 0 && has_triangles)
     }
 
-    /// Whether the hull is drawn into the layers and not into the visibility buffer.
+    /// True if the hull is drawn into the layers and not into the visibility buffer.
     pub fn has_peeled_hull(&self) -> bool {
         self.hull.is_some() && self.peeling().is_some_and(|layers| !layers.behind_surface)
     }
@@ -137,7 +137,7 @@ impl<'a> DrawPlan<'a> {
         self.pass_masks.get(triangle).copied().unwrap_or(pass_mask::SURFACE)
     }
 
-    /// Whether any sample gets a colour.
+    /// True if any sample gets a colour.
     pub fn is_shaded(&self) -> bool {
         self.surface.as_ref().is_some_and(|surface| surface.is_shaded) || self.hull.is_some()
     }

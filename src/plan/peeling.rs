@@ -30,9 +30,9 @@ pub const FADE: f32 = 0.25;
 pub struct PeelingPass {
     /// Layers that are looked for; what lies behind the last of them is not drawn.
     pub count_max: u32,
-    /// Whether layers go on behind the surface: for wires that show through it.
+    /// True if layers go on behind the surface: for wires that show through it.
     pub behind_surface: bool,
-    /// Whether layers show wires alone, and the visibility buffer shows triangles with
+    /// True if layers show wires alone, and the visibility buffer shows triangles with
     /// [`pass_mask::LAYER`] without their wires.
     pub wires_only: bool,
     /// The share of its colour that a wire keeps from the second layer on, 0 to 1.

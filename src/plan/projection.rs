@@ -18,7 +18,7 @@ pub struct Projection {
     pub w: [f32; 4],
     /// Smallest W that is drawn.
     pub near_w: f32,
-    /// Whether triangles may reach behind the near plane or far outside the picture. Where the
+    /// True if triangles may reach behind the near plane or far outside the picture. Where the
     /// mesh's box is known to lie inside, no triangle is tested for clipping.
     pub clip: bool,
     /// Unit vector from the mesh towards the viewer, unit-box axes.

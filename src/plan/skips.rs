@@ -100,7 +100,7 @@ impl<'k> Skips<'k> {
         Self { done: Vec::new(), keep }
     }
 
-    /// Whether `kind` is left out: the scene does not need it, and it need not be kept. If so, the
+    /// True if `kind` is left out: the scene does not need it, and it need not be kept. If so, the
     /// skip is noted.
     pub fn skip(&mut self, kind: SkipKind, is_unneeded: bool, why: &'static str) -> bool {
         let skips = is_unneeded && !self.keep.contains(&kind);

@@ -38,7 +38,7 @@ pub fn out_of_view(plan: &DrawPlan<'_>) -> Option<Warning> {
     is_out_of_view(plan).then(|| Warning { code: "mesh_out_of_view", detail: detail.to_owned() })
 }
 
-/// Whether each triangle lies behind the eye or wholly beyond one side of the picture: an explicit
+/// True if each triangle lies behind the eye or wholly beyond one side of the picture: an explicit
 /// camera may look past the mesh.
 ///
 /// If so, the picture is blank. A mesh that is missed narrowly may go unnoticed.

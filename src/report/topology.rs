@@ -32,9 +32,9 @@ pub struct TopologyReport {
     pub genus: Option<u64>,
     /// The closed, orientable surfaces in the mesh, by genus.
     pub closed_surfaces: Vec<ClosedSurfaces>,
-    /// Whether faces can be turned over so that all neighbours agree.
+    /// True if faces can be turned over so that all neighbours agree.
     pub is_orientable: bool,
-    /// Whether every edge has exactly two faces, which run along it in opposite directions.
+    /// True if every edge has exactly two faces, which run along it in opposite directions.
     pub is_watertight: bool,
 }
 

@@ -10,11 +10,11 @@ use crate::spec::{
     Spec, Surface, Topology, Wire, WireMethod,
 };
 
-/// Different exact wires and contours in one picture.
+/// Most different styles of exact wires and contours in one picture.
 const LINE_STYLES_MAX: usize = 64;
 
-/// A spec whose dependent defaults are still open. A material is one too, of which only the layers
-/// count.
+/// A spec whose dependent defaults are still open. A material's document is also read into a draft;
+/// only its layers are used.
 #[derive(Clone, Debug)]
 pub struct Draft {
     /// The document's own layers; each of its materials begins from them.

@@ -29,7 +29,7 @@ pub struct Camera {
     pub near: f64,
     /// Distance from the eye of the farthest point of the mesh.
     pub far: f64,
-    /// Whether all of the mesh lies safely between `near` and the guard band.
+    /// True if all of the mesh lies safely between `near` and the guard band.
     pub contains_mesh: bool,
 }
 

@@ -74,37 +74,37 @@ impl<'s> MaterialGroups<'s> {
         &self.fills
     }
 
-    /// Whether any material has a fill.
+    /// True if any material has a fill.
     pub fn has_fill(&self) -> bool {
         self.has_fill
     }
 
-    /// Whether a material has a hull.
+    /// True if a material has a hull.
     pub fn is_outlined(&self, material: usize) -> bool {
         self.by_material.get(material).is_some_and(|layers| has_hull(layers))
     }
 
-    /// Whether any material has a hull.
+    /// True if any material has a hull.
     pub fn has_hull(&self) -> bool {
         self.styles.iter().any(|layers| has_hull(layers))
     }
 
-    /// Whether any material has a wire that is shaded with the surface.
+    /// True if any material has a wire that is shaded with the surface.
     pub fn has_barycentric_wire(&self) -> bool {
         self.styles.iter().any(|layers| barycentric_wire(layers).is_some())
     }
 
-    /// Whether any material shows the distance to its edges, a debug view.
+    /// True if any material has the debug view of the distance to edges.
     pub fn shows_edge_distance(&self) -> bool {
         self.styles.iter().any(|layers| layers.surface.is_some_and(|s| s.debug == DebugView::EdgeDistance))
     }
 
-    /// Whether lines need a surface that is not seen, only to hide them.
+    /// True if lines need an invisible surface that only hides them.
     pub fn needs_occluder(&self) -> bool {
         self.needs_occluder
     }
 
-    /// Whether there is a surface that hides lines, seen or not.
+    /// True if there is a surface that hides lines, visible or not.
     pub fn hides_lines(&self) -> bool {
         self.has_fill || self.needs_occluder
     }
@@ -122,7 +122,7 @@ pub fn barycentric_wire(layers: &Layers) -> Option<Hidden> {
     layers.wire.filter(|wire| wire.method != WireMethod::Exact).map(|wire| wire.hidden)
 }
 
-/// Whether a style has lines of exact width that a surface would hide.
+/// True if a style has lines of exact width that a surface would hide.
 fn has_hideable_lines(layers: &Layers) -> bool {
     let is_hideable = |wire: Wire| wire.method == WireMethod::Exact && wire.hidden != Hidden::Show;
     layers.wire.is_some_and(is_hideable) || layers.outline.is_some_and(|o| o.method == OutlineMethod::Contour)

@@ -34,7 +34,7 @@ pub struct Scene<'m, 's> {
     pub camera: Camera,
 }
 
-/// Why a mesh and a request make no scene.
+/// Errors of making a scene from a mesh and a request.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SceneError {
     /// The materials take more memory than is allowed.

@@ -41,8 +41,8 @@ pub enum ThicknessUnit {
     /// the surface is shaded: `plan/surface/materials.rs`, `wire.rs` and `wire.wgsl` under
     /// `surface`.
     Derivatives,
-    /// This share of the triangle's height, where the wire is half gone. Drawn while the surface is
-    /// shaded.
+    /// Share of the triangle's height. At the given share, the wire's coverage is one half. Drawn
+    /// while the surface is shaded.
     TriangleHeight(f64),
 }
 

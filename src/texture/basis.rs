@@ -6,7 +6,7 @@
 
 use crate::texture::TextureError;
 
-/// What a KTX2 file's header says.
+/// The header of a KTX2 file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BasisHeader {
     /// Columns, texels.

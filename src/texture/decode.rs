@@ -42,7 +42,7 @@ pub struct Pixels {
     pub height: u32,
     /// 1: grey, 2: grey and alpha, 3: RGB, 4: RGB and alpha.
     pub channels: usize,
-    /// Whether a channel has 16 bits, in the machine's byte order, instead of 8.
+    /// True if a channel has 16 bits, in the machine's byte order; false if it has 8.
     pub is_wide: bool,
     bytes: Vec<u8>,
 }
@@ -151,7 +151,7 @@ impl Pixels {
         }
     }
 
-    /// Whether the file has an alpha channel.
+    /// True if the file has an alpha channel.
     pub fn has_alpha(&self) -> bool {
         self.channels.is_multiple_of(2)
     }

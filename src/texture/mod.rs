@@ -29,7 +29,7 @@ pub struct Textures {
     /// Linear RGBA with straight alpha, as IEEE 754 half floats: row by row, then level by level
     /// (finest first), then image by image.
     pub texels: Vec<[u16; 4]>,
-    /// Where each image lies in `texels`.
+    /// The place of each image in `texels`.
     pub images: Vec<Texture>,
 }
 

@@ -34,8 +34,8 @@ impl SrgbEncoder {
     }
 }
 
-/// True if the background is part of a pixel's colour already: then the sign of its alpha is set.
-/// Otherwise the colour is the surface's over nothing.
+/// True if alpha is negative: lines have already blended the background into this colour. Otherwise
+/// the colour is premultiplied and without background.
 #[inline(always)]
 pub fn is_composited(color: &[f32; 4]) -> bool {
     color[3].is_sign_negative()

@@ -80,8 +80,8 @@ impl Gpu {
             // Dropping the device reports "destroyed" here too; the slot is not read any more then.
             let _ = slot.set(format!("{reason:?}: {message}"));
         });
-        // Without a handler wgpu panics. What a job causes is caught by that job's error scope;
-        // this is the rest.
+        // Without a handler wgpu panics. Errors that a job causes go to that job's error scope; the
+        // others come here.
         device
             .on_uncaptured_error(Arc::new(|error| tracing::error!(%error, "the GPU reported an error outside a job")));
 
@@ -145,10 +145,10 @@ impl Gpu {
 
     /// Waits until a callback of the device has sent a value, and polls the deadline meanwhile.
     ///
-    /// Only ever polls without blocking. In wgpu-core 30.0.1 a wait with a timeout panics if it
-    /// runs out just when another thread's poll or submit finds the queue empty
-    /// (device/resource.rs:948), and takes other jobs' callbacks down with it; a wait without one
-    /// could hang for ever.
+    /// It never blocks in a poll. In wgpu-core 30.0.1 a wait with a timeout panics if the timeout
+    /// ends at the moment at which another thread's poll or submit finds the queue empty
+    /// (device/resource.rs:948). The callbacks of other jobs are then lost too. A wait without a
+    /// timeout could hang for ever.
     pub(super) fn wait<T>(&self, news: &mpsc::Receiver<T>, deadline: &Deadline) -> Result<T, DrawError> {
         let (mut polls, mut waited) = (0_u32, Duration::ZERO);
         while waited < HUNG_AFTER {

@@ -130,7 +130,7 @@ fn name(element: &Element, number: u64) -> String {
     format!("{} {} of {}", super::header::word(element.name.as_bytes()), number + 1, element.count)
 }
 
-/// Why a record could not be read. Small: it goes through hot loops.
+/// Errors of reading a record. Small, because it goes through hot loops.
 enum Fault {
     /// No next number; the source knows why.
     NoValue,

@@ -29,7 +29,7 @@ impl<'a> Fans<'a> {
         fans
     }
 
-    /// Whether a corner is the representative of its fan. Each fan has exactly one.
+    /// True if a corner is the representative of its fan. Each fan has exactly one.
     pub fn is_representative(&mut self, corner: u32) -> bool {
         self.corners.find(corner) == corner
     }

@@ -22,13 +22,14 @@ pub struct LinePass {
     pub color: [f32; 4],
     /// The parts of the edges that are drawn, as the visibility buffer has it.
     pub shown: Shown,
-    /// The inside of a closed surface: an edge whose faces all turn it to the viewer is left out.
+    /// The side of all faces that lies inside a closed surface. An edge is left out if all its
+    /// faces show this side to the viewer. None: no edge is left out for this reason.
     pub unseen_side: Option<Side>,
-    /// Whether only silhouette edges of this view are drawn: those whose faces all lie on one side
+    /// True if only this view's silhouette edges are drawn: edges whose faces all lie on one side
     /// of them on screen.
     pub contour: bool,
-    /// Whether the surface's light falls on the line. Without a surface that is seen the colour
-    /// stays as it is.
+    /// True if the surface's light changes the line's colour. It does not where no surface is
+    /// visible.
     pub lit: bool,
 }
 
@@ -50,8 +51,9 @@ impl LinePass {
 
     /// Length of the windows in which an edge's visible parts are looked for, pixels.
     ///
-    /// Windows are longer for wide lines, or most pixels around a window would be its neighbours'.
-    /// They are not much longer, because each visible part is searched along the whole window.
+    /// Windows are longer for wide lines; otherwise most pixels around a window would belong to its
+    /// neighbours. They are at most 24 px long, because the search for each visible part takes
+    /// the whole window.
     pub fn window_px(&self) -> f32 {
         (0.5 * self.reach_px()).clamp(8.0, 24.0)
     }
@@ -63,20 +65,20 @@ impl LinePass {
         (1..=13).rev().find(|&e| (outer + 1.5) * (1 << e) as f32 <= Self::SCALED_MAX).unwrap_or(1)
     }
 
-    /// Rows beyond a band of the picture that are searched for what hides its lines.
+    /// Rows above and below a band that are searched for triangles that hide the band's lines.
     pub fn margin_rows(&self) -> u32 {
         if self.shown == Shown::All { 0 } else { (self.window_px() + 2.0 * self.reach_px() + 4.0) as u32 }
     }
 }
 
 impl DrawPlan<'_> {
-    /// Rows beyond a band of the picture that lines look at: none where nothing hides lines.
+    /// Rows above and below a band that its lines need: 0 if no surface can hide lines.
     pub fn line_margin_rows(&self) -> u32 {
         let something_hides = self.surface.is_some() || self.hull.is_some();
         self.lines.iter().map(LinePass::margin_rows).filter(|_| something_hides).max().unwrap_or(0)
     }
 
-    /// Whether any line is lit, and there is a surface whose light it can take.
+    /// True if any line is lit and there is a visible surface to take the light from.
     pub fn lights_lines(&self) -> bool {
         self.surface.as_ref().is_some_and(|surface| surface.is_shaded) && self.lines.iter().any(|lines| lines.lit)
     }

@@ -39,12 +39,12 @@ impl LineStyle {
         Self { width_px, smoothing_px, color, hidden, lit, contour, class, styles }
     }
 
-    /// Whether the lines leave a trace.
+    /// True if the lines are visible at all.
     pub fn is_seen(&self) -> bool {
         self.width_px + self.smoothing_px > 0.0 && self.color[3] > 0.0
     }
 
-    /// Whether an edge has this style.
+    /// True if an edge has this style.
     pub fn draws(&self, mesh: &Mesh, groups: &MaterialGroups<'_>, edge: &MeshEdge) -> bool {
         let mut faces = edge.faces.into_iter().filter(|&face| face != NO_FACE);
         let style = |face: u32| groups.style_of[mesh.triangle_materials[face as usize] as usize] as usize;

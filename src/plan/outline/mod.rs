@@ -102,6 +102,6 @@ pub struct EdgeEnd {
     inv_w: f64,
     /// Change of depth along the edge, away from here, per 1/256 px.
     slope: f64,
-    /// Whether a face of the vertex hides the edge.
+    /// True if a face of the vertex hides the edge.
     is_hidden: bool,
 }

@@ -12,12 +12,12 @@ pub use triangles::geometry;
 use crate::mesh::LineOrPoint;
 use crate::scene::{Fill, MaterialGroups};
 
-/// Whether a primitive is drawn as triangles.
+/// True if a primitive is drawn as triangles.
 pub fn is_filled(groups: &MaterialGroups<'_>, primitive: &LineOrPoint) -> bool {
     groups.fill(primitive.material as usize) != Fill::None
 }
 
-/// Whether a primitive is drawn as a line.
+/// True if a primitive is drawn as a line.
 pub fn is_line(groups: &MaterialGroups<'_>, primitive: &LineOrPoint) -> bool {
     let layers = groups.by_material.get(primitive.material as usize);
     layers.is_some_and(|layers| layers.wire.is_some() || layers.outline.is_some()) && !is_filled(groups, primitive)

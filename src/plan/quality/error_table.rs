@@ -8,7 +8,7 @@ use serde::Deserialize;
 /// Everything that was measured.
 #[derive(Clone, Debug, Default, Deserialize)]
 pub struct ErrorTable {
-    /// Whether the measured GPU is software. It then says nothing about one that `auto` would draw
+    /// True if the measured GPU is software. It then says nothing about one that `auto` would draw
     /// on.
     pub gpu_is_software: bool,
     /// Columns and rows of the measured pictures.
@@ -59,7 +59,7 @@ impl ErrorTable {
         (row.error * smaller.sqrt()).min(255.0)
     }
 
-    /// Whether a GPU was measured that is not software.
+    /// True if a GPU was measured that is not software.
     pub fn knows_gpu(&self) -> bool {
         !self.gpu_is_software && self.rows.iter().any(|row| row.backend == "gpu")
     }

@@ -154,7 +154,7 @@ fn wire_of(material: &mut ShadedMaterial, wire: &Wire) {
     }
 }
 
-/// Whether a material samples any texture.
+/// True if a material samples any texture.
 pub fn samples(material: &ShadedMaterial) -> bool {
     material.textures.iter().any(|texture| texture.texture != TEXTURE_NONE)
 }

@@ -19,7 +19,7 @@ use crate::texture::Textures;
 pub struct SurfacePass<'a> {
     /// The faces that are drawn.
     pub faces: Faces,
-    /// Whether the surface is seen. Where it is not, it only hides lines.
+    /// True if the surface is visible. An invisible one only hides lines.
     pub is_shaded: bool,
     /// The materials; at least one.
     pub materials: Vec<ShadedMaterial>,
@@ -110,11 +110,12 @@ pub mod slots {
     pub const EMISSIVE: usize = 3;
 }
 
-/// Bits of [`TextureUse::sampler`]: a wrap mode across in the lowest, one down from [`samplers::DOWN_SHIFT`] on.
+/// Bits of [`TextureUse::sampler`]: the wrap mode across in the lowest bits, the wrap mode down
+/// from bit [`samplers::DOWN_SHIFT`] on.
 pub mod samplers {
     /// Bits of a wrap mode.
     pub const WRAP_BITS: u32 = 3;
-    /// Where the wrap mode down begins.
+    /// Lowest bit of the wrap mode down.
     pub const DOWN_SHIFT: u32 = 2;
     /// Wrap mode: the image repeats.
     pub const REPEAT: u32 = 0;
@@ -266,7 +267,7 @@ impl<'a> SurfacePass<'a> {
         self.materials.iter().fold(0, |all, material| all | material.flags)
     }
 
-    /// Whether any material samples the texture in this slot.
+    /// True if any material samples the texture in this slot.
     pub fn samples(&self, slot: usize) -> bool {
         self.materials.iter().any(|material| material.textures[slot].texture != TEXTURE_NONE)
     }

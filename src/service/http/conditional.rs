@@ -24,7 +24,7 @@ pub fn content_tag(body: &[u8]) -> String {
 
 /// `Cache-Control` for what follows from a stored mesh, a query and this version of the program.
 /// After a day, caches revalidate, because a newer version of the program may change the answer.
-/// Where API keys are configured, a shared cache must not keep it.
+/// With API keys the answer is `private`, so that shared caches do not keep it.
 pub fn cache_for_a_day(has_keys: bool) -> (HeaderName, HeaderValue) {
     let value = if has_keys { "private, max-age=86400, immutable" } else { "public, max-age=86400, immutable" };
     (header::CACHE_CONTROL, HeaderValue::from_static(value))

@@ -76,7 +76,7 @@ impl Fault {
 /// An error as a client sees it.
 #[derive(Clone, Debug)]
 pub struct ApiError {
-    /// Who is at fault, from which the status follows.
+    /// The party at fault; the status follows from it.
     pub fault: Fault,
     /// The error's stable name, in snake case.
     pub code: &'static str,

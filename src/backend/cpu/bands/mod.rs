@@ -58,7 +58,8 @@ pub fn draw_visibility(
     for_each_sample(samples, words, |at| samples.word(at));
 }
 
-/// Draws band number `band` of a layer alone, likewise.
+/// Draws band number `band` of peeled layer number `layer` alone, in the words of
+/// [`draw_visibility`].
 pub fn draw_layer(
     context: &RasterContext<'_>,
     scratch: &mut BandScratch,

@@ -2,7 +2,7 @@
 //! `shaders/geometry/transform.wgsl`.
 //!
 //! Bit-exact on every machine and on both back-ends: only `+ - *`, each rounded by itself
-//! (ARCHITECTURE.md, "Rounded operations").
+//! (docs/rasterizer.md, "Rounded operations").
 
 use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::plan::{HullVertex, Projection};

@@ -19,8 +19,8 @@ use crate::plan::{DrawPlan, LinePass};
 /// Steps to the pixel of a sum of areas.
 pub const AREA_UNIT: f32 = 65_536.0;
 
-/// Strokes in a pixel that may all differ from their points by the largest difference. Of more
-/// strokes, some overlap.
+/// A union of strokes is taken to differ from its points by at most this many times the largest
+/// difference between a stroke and its points. Of more strokes in one pixel, some overlap.
 pub const STROKES_SIDE_BY_SIDE: f32 = 4.0;
 
 /// The strokes of a pixel.

@@ -1,5 +1,5 @@
 //! Stage lines, per piece of an edge: hidden-line removal, which finds the intervals that no
-//! triangle hides. Twin of `shaders/lines/hidden_edge.wgsl`.
+//! triangle hides. Twin of `shaders/lines/hidden_lines.wgsl`.
 //!
 //! On screen an edge and a triangle are straight and their depths are affine, so what a triangle
 //! hides of an edge is an interval. Candidates are the triangles that the visibility buffer shows

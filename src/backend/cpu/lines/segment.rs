@@ -15,13 +15,13 @@ pub struct Segment {
     /// Ends, in 1/256 px from the picture's centre.
     ends: [[f32; 2]; 2],
     depths: [f32; 2],
-    /// First end, pixels from the picture's upper left corner.
+    /// The first end, pixels from the picture's upper left corner.
     pub start: [f32; 2],
-    /// The way from there to the other, pixels.
+    /// Vector from `start` to the second end, pixels.
     pub along: [f32; 2],
-    /// Pixels.
+    /// Length of `along`, pixels.
     pub length: f32,
-    /// One over it; 0 where it is a point.
+    /// `1 / length`; 0 if the length is 0.
     pub inverse_length: f32,
 }
 

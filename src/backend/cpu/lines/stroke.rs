@@ -83,10 +83,12 @@ impl Pen {
     }
 }
 
-/// The line's coverage across it is a box of its width under another of its ramp's: a trapezoid.
-/// Where it is at least as high as a level, within this distance of the middle, the points of that
-/// level are covered: so the denser of two lines that cross is what remains of both. Levels are
-/// shares of the line's peak, which is less than 1 where the ramp is wider.
+/// Distance from the middle of a line within which the points of a level are covered.
+///
+/// Across a line, its coverage is a trapezoid: a box as wide as the line, filtered by a box as wide
+/// as its ramp. A level's points are covered where the trapezoid is at least as high as the level.
+/// So where two lines cross, the larger coverage remains. Levels are shares of the line's peak,
+/// which is less than 1 where the ramp is wider than the line.
 fn radius(half_width: f32, half_ramp: f32, peak: f32, level: usize) -> f32 {
     // Neighbouring words far apart in level.
     let level = ((((level * 7) % WORDS) as f32 + 0.5) * (1.0 / WORDS as f32)) * peak;

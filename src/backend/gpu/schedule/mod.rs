@@ -43,7 +43,7 @@ pub const WORKGROUP: u32 = 64;
 pub struct Schedule {
     pub steps: Vec<Step>,
     pub batches: Vec<Batch>,
-    /// Rows of the largest band, and beyond it.
+    /// Number of rows in the largest band, and above and below it.
     pub banding: Banding,
     /// Items that the work list must hold.
     pub work_items: u32,

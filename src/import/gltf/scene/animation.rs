@@ -53,7 +53,7 @@ pub struct Sampling<'a> {
     moments: BTreeMap<usize, Moment>,
 }
 
-/// A time between two keys, which are the same before the first and after the last.
+/// A time and the two keys around it. Before the first key and after the last, both are that key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Moment {
     keys: usize,
@@ -72,7 +72,7 @@ enum Interpolation {
     Cubic,
 }
 
-/// The keys of a channel, and the place of the moment among them.
+/// The moment, the interpolation and the key values of a channel.
 type Keys<const N: usize> = (Moment, Interpolation, Vec<[f64; N]>);
 
 impl<'a> Sampling<'a> {

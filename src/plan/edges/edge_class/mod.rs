@@ -32,7 +32,7 @@ pub fn class_of(wire: &Wire) -> Class {
     }
 }
 
-/// Whether an edge belongs to a class.
+/// True if an edge belongs to a class.
 pub fn belongs_to(class: Class, mesh: &Mesh, edge: &MeshEdge) -> bool {
     let bends = |limit: f64| {
         let [a, b] = edge.faces.map(|face| mesh.face_normals[face as usize].map(f64::from));

@@ -5,7 +5,7 @@ use crate::limits::Budget;
 use crate::limits::{Deadline, Limits};
 use crate::mesh::edges::EdgeList;
 
-/// How many edges are feature, crease (both at 30 degrees), boundary and non-manifold.
+/// Numbers of edges that are feature, crease (both at 30 degrees), boundary and non-manifold.
 fn counts(obj: &str) -> [usize; 4] {
     let limits = Limits::default();
     let mut budget = Budget::new(&limits);

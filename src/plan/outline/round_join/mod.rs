@@ -126,7 +126,7 @@ impl Join {
         self.piece[1] - self.piece[0]
     }
 
-    /// Whether the piece starts at the outer corner of the end `from`.
+    /// True if the piece starts at the outer corner of the end `from`.
     fn begins(&self) -> bool {
         self.piece[0] <= 0.0
     }

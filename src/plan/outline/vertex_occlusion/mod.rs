@@ -98,7 +98,7 @@ impl VertexOcclusion {
 }
 
 impl Arc {
-    /// Whether the face hides an edge that leaves its corner: it covers the edge's direction, and
+    /// True if the face hides an edge that leaves its corner: it covers the edge's direction, and
     /// is nearer there.
     fn hides(&self, end: &EdgeEnd) -> bool {
         let angle = wrapped(end.angle);

@@ -10,7 +10,7 @@ use crate::service::store::Reading;
 
 /// A query.
 pub struct Query {
-    /// How the mesh is read: `format_in` and `entry`.
+    /// The keys about reading the mesh: `format_in` and `entry`.
     pub reading: Reading,
     /// The dotted keys of the request document.
     pub overrides: Box<Overrides>,
