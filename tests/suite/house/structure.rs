@@ -116,7 +116,7 @@ fn imports_go_one_way() {
     {
         let room = room_of(&file);
         let may = allowed.get(room).unwrap_or_else(|| panic!("src/{file}: say in ALLOWED what its room may import"));
-        for (line, path) in crate_paths(&text) {
+        for (line, path) in paths(&text, &module(&file)) {
             seen += 1;
             let path = path.join("/");
             let used = room_of(&path);
@@ -307,11 +307,6 @@ fn room_of(path: &str) -> &str {
 fn module(file: &str) -> String {
     let path = file.strip_suffix(".rs").unwrap_or(file);
     path.strip_suffix("/mod").unwrap_or(path).replace('/', "::")
-}
-
-/// The names in `crate::` and `meshsnap::` paths, without that first word.
-fn crate_paths(text: &str) -> Vec<(usize, Vec<String>)> {
-    paths(text, "").into_iter().filter(|(_, path)| !path.is_empty()).collect()
 }
 
 /// Paths in a file's code, from the crate's root, as far as they begin with `crate`, `meshsnap`,

@@ -41,7 +41,7 @@ fn wide_lines(count: usize) -> String {
 #[test]
 fn the_widest_lines_on_the_largest_picture_take_bounded_memory() {
     const PARTS: usize = 20;
-    let few = ["--workers", "1", "--worker-threads", "8", "--limit-job-ms", "50000"];
+    let few = ["--workers", "1", "--worker-threads", "8", "--limit-job-ms", "600000"];
     let server = Server::start(&few);
     let body = form(&[("request", wide_lines(PARTS).as_bytes()), ("file", parts(PARTS).as_bytes())]);
     server.post("/v1/render?size=16", parts(1).as_bytes()).picture(16, 16);
