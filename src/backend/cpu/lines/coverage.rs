@@ -5,7 +5,7 @@
 //! areas, the sum of point counts, the mask of points that any stroke covers, and the largest
 //! difference between an area and its points. Where they do not overlap the sum of the areas is the
 //! answer; where they do, the share of the points that are left of the sum says how much of it is
-//! ([LineCoverage::coverage]).
+//! ([`LineCoverage::covered_share`]).
 
 use super::stroke::{Mask, POINTS, WORDS, count};
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
