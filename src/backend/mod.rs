@@ -78,5 +78,6 @@ pub enum DrawError {
     Device(String),
 }
 
-#[cfg(test)]
+// They compare with the shaders.
+#[cfg(all(test, feature = "gpu"))]
 mod tests;
