@@ -79,5 +79,6 @@ pub enum DrawError {
 }
 
 // They compare with the shaders.
-#[cfg(all(test, feature = "gpu"))]
+#[cfg(test)]
+#[cfg(feature = "gpu")]
 mod tests;

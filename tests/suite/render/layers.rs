@@ -87,6 +87,12 @@ fn samples() -> &'static [u32] {
     truth::cases(&[1, 8], &[1, 4, 8, 16])
 }
 
+/// One of three distances in turn; all of them in a long run.
+fn distances(case: usize) -> Vec<f32> {
+    let all = [0.0, 3.0, 0.4];
+    truth::cases(vec![all[case % 3]], all.to_vec())
+}
+
 /// Counts the samples of all layers, and compares them and the visibility buffer on every CPU
 /// set-up and the GPU.
 fn compare(plan: &DrawPlan<'_>, what: &str) -> usize {
@@ -129,7 +135,7 @@ fn layers_of_soups_are_the_same() {
     for kind in KINDS {
         for &samples in all_samples {
             // From the side, from afar, and from within, where triangles reach behind the eye.
-            for distance in [0.0, 3.0, 0.4] {
+            for distance in distances(cases) {
                 let count = if kind == Kind::Tiny { 400 } else { 30 };
                 let soup = Layered::new(Soup::new(kind, count, 0.7, &mut random), &mut random);
                 let view = View::new([90, 70], samples, distance, &mut random);
@@ -140,8 +146,8 @@ fn layers_of_soups_are_the_same() {
             }
         }
     }
-    assert_eq!(cases, KINDS.len() * all_samples.len() * 3);
-    assert!(seen > truth::cases(20_000, 100_000), "{seen} samples saw something");
+    assert_eq!(cases, KINDS.len() * all_samples.len() * truth::cases(1, 3));
+    assert!(seen > truth::cases(6_000, 100_000), "{seen} samples saw something");
 }
 
 #[test]
@@ -180,7 +186,8 @@ fn pictures_with_layers_agree() {
                 for mut other in [CpuRenderer::new(7), CpuRenderer::with_isa(2, Isa::baseline())] {
                     assert!(cpu.rgba == other.draw(&plan, &Deadline::default()).unwrap().rgba, "{what}");
                 }
-                for gpu in gpus().into_iter().flatten() {
+                // One of the devices in turn; all of them in a long run.
+                for gpu in gpus().into_iter().flatten().skip(truth::cases(cases % 2, 0)).take(truth::cases(1, 2)) {
                     let mut renderer = GpuRenderer::new(gpu.clone());
                     // Twice: the second picture comes from buffers that the first has used.
                     for _ in 0..2 {

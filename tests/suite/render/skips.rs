@@ -13,7 +13,7 @@ use crate::render::textures::levels as textures;
 use crate::support::files::mesh::Noise;
 use crate::support::gpus::gpus;
 use crate::support::scenes::{self, SCENES};
-use crate::support::truth::goal;
+use crate::support::truth::{goal, is_long};
 
 /// Views of [`textured`]: its texture from afar, close up, not at all; and its vertex colours
 /// instead.
@@ -33,13 +33,14 @@ struct Tally {
     cpu: CpuRenderer,
     gpu: Option<GpuRenderer>,
     cases: usize,
+    scenes: usize,
     skipped: Vec<usize>,
 }
 
 #[test]
 fn turning_a_skip_off_changes_no_byte() {
     let gpu = gpus().map(|gpus| GpuRenderer::new(gpus[0].clone()));
-    let mut tally = Tally { cpu: CpuRenderer::new(1), gpu, cases: 0, skipped: vec![0; SkipKind::ALL.len()] };
+    let mut tally = Tally { cpu: CpuRenderer::new(1), gpu, cases: 0, scenes: 0, skipped: vec![0; SkipKind::ALL.len()] };
     for scene in SCENES {
         tally.compare(scene.name, &scenes::mesh(&(scene.obj)()), &scene.spec());
     }
@@ -87,7 +88,10 @@ impl Tally {
         }
         let all = keeping(mesh, spec, SkipKind::ALL);
         assert!(self.cpu.draw(&all, &deadline).unwrap() == want, "{name}: with everything");
-        if let Some(gpu) = &mut self.gpu {
+        // The GPU draws every third scene; all scenes in a long run.
+        self.scenes += 1;
+        let is_taken = is_long() || self.scenes % 3 == 1;
+        if let Some(gpu) = self.gpu.as_mut().filter(|_| is_taken) {
             let want = gpu.draw(&usual, &deadline).unwrap();
             assert!(gpu.draw(&all, &deadline).unwrap() == want, "{name}: with everything, GPU");
             if usual.skips.iter().any(|skip| skip.kind == SkipKind::FineTextureLevels) {
