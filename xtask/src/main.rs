@@ -16,7 +16,7 @@ cargo xtask COMMAND
   test FILTER...             tests of the suite whose names contain a filter
   bless pictures|schema|tables|examples
                              store what tests compare with anew, then test against it
-  bench [accuracy|load] [OPTIONS]
+  bench [accuracy|load|stages] [OPTIONS]
                              measure error and time (accuracy), or a server under load
   goals                      measure the goals of docs/accuracy.md that tests hold
   gallery [cpu|gpu]          draw docs/gallery anew
