@@ -43,7 +43,7 @@ pub fn render(
 
     // Image -> bytes
     let format = job.spec.image.format.unwrap_or(ImageFormat::Png);
-    let bytes = encode::encode(&drawn.image, format)?;
+    let bytes = encode::encode(&drawn.image, format, job.spec.image.effort, deadline)?;
     ended(Stage::Encode);
 
     let warnings = [report.warnings, drawn.warnings].concat();
@@ -168,7 +168,7 @@ pub enum RenderError {
     Draw(DrawError),
     /// The encoder failed.
     #[error(transparent)]
-    Encode(#[from] EncodeError),
+    Encode(EncodeError),
     /// The report could not be written.
     #[error("the report could not be written: {0}")]
     Report(#[from] serde_json::Error),
@@ -188,6 +188,15 @@ impl From<DrawError> for RenderError {
         match error {
             DrawError::Stopped(stopped) => Self::Stopped(stopped),
             other => Self::Draw(other),
+        }
+    }
+}
+
+impl From<EncodeError> for RenderError {
+    fn from(error: EncodeError) -> Self {
+        match error {
+            EncodeError::Stopped(stopped) => Self::Stopped(stopped),
+            other => Self::Encode(other),
         }
     }
 }

@@ -33,7 +33,12 @@ pub struct Chosen {
 impl Backends {
     /// Renderers for one worker. The CPU path uses up to `threads` threads; no GPU is touched yet.
     pub fn new(host: Arc<GpuHost>, threads: usize) -> Self {
-        Self { cpu: cpu::CpuRenderer::new(threads), host, gpu: None }
+        Self::sharing(host, Arc::new(cpu::DrawingThreads::new(threads)))
+    }
+
+    /// The same for one of several workers, whose CPU paths share threads.
+    pub fn sharing(host: Arc<GpuHost>, threads: Arc<cpu::DrawingThreads>) -> Self {
+        Self { cpu: cpu::CpuRenderer::on(threads), host, gpu: None }
     }
 
     /// True as long as `auto` may choose a GPU here. Opens none, so there may turn out to be none.

@@ -109,6 +109,10 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
         stage_began = Instant::now();
     };
     let threads = arguments.threads.unwrap_or(cores() as usize);
+    if arguments.threads.is_some() {
+        // Those that decode textures, too. It only fails where they run already.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    }
     let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));
     let mut backends = Backends::new(gpu.clone(), threads);
     let job = Job { bundle: &bundle, format_in, spec: &spec };

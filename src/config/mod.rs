@@ -8,6 +8,7 @@ mod hardware;
 mod settings;
 
 use std::path::PathBuf;
+use std::sync::LazyLock;
 
 pub use hardware::why_no_gpu;
 
@@ -24,7 +25,8 @@ pub struct Config {
     pub data_dir: Option<PathBuf>,
     /// Number of threads that draw.
     pub workers: u64,
-    /// Threads within one CPU render; 0 means the cores divided by the workers.
+    /// Threads within one CPU render; 0 means that the workers share the cores: a picture that is
+    /// drawn alone has all of them.
     pub worker_threads: u64,
     /// The back-end of a request that names none.
     pub backend: BackendChoice,
@@ -87,7 +89,9 @@ impl Default for Config {
 
 /// Number of processors that this process may use.
 pub fn cores() -> u64 {
-    std::thread::available_parallelism().map_or(1, |n| n.get() as u64)
+    // Linux finds it out by reading files.
+    static CORES: LazyLock<u64> = LazyLock::new(|| std::thread::available_parallelism().map_or(1, |n| n.get() as u64));
+    *CORES
 }
 
 /// A setting that is refused.

@@ -45,7 +45,9 @@ pub const SETTINGS: &[Setting] = &[
         data_dir,
     ),
     number("workers", "Number of threads that draw", 1, 1024, |c| &mut c.workers),
-    number("worker-threads", "Threads within one CPU render; 0: cores / workers", 0, 1024, |c| &mut c.worker_threads),
+    number("worker-threads", "Threads within one CPU render; 0: the workers share the cores", 0, 1024, |c| {
+        &mut c.worker_threads
+    }),
     number("queue", "Most jobs that wait for each worker", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
     text("backend", "Back-end of requests that name none: auto, gpu or cpu", set_backend, |c| {
         word_for(c.backend).into()

@@ -1,50 +1,64 @@
 //! Encoders: a finished [`Image`] to the bytes of a file. The same picture always gives the same
 //! bytes.
 
+mod png;
+
 use image::ImageEncoder as _;
 use image::codecs::jpeg::JpegEncoder;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageError};
 
 use crate::image::{Image, ImageFormat};
+use crate::limits::{Deadline, Stopped};
 
 /// The lowest quality at which artefacts around thin dark lines are invisible at normal viewing
 /// distance.
 const JPEG_QUALITY: u8 = 85;
 
-/// The encoder failed, which is never the client's fault.
+/// Encoding failed, which is never the client's fault, or was stopped.
 #[derive(Debug, thiserror::Error)]
-#[error("the picture could not be encoded: {0}")]
-pub struct EncodeError(String);
+#[non_exhaustive]
+pub enum EncodeError {
+    /// The encoder failed.
+    #[error("the picture could not be encoded: {0}")]
+    Failed(String),
+    /// The deadline was raised.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
 
-/// Encodes a picture.
+/// Encodes a picture. `effort` is that of `image.effort`.
 ///
 /// PNG and WebP are lossless, and an opaque picture is stored without alpha. JPEG has no alpha, so
 /// transparent pixels are laid over white.
-pub fn encode(image: &Image, format: ImageFormat) -> Result<Vec<u8>, EncodeError> {
+pub fn encode(image: &Image, format: ImageFormat, effort: u32, deadline: &Deadline) -> Result<Vec<u8>, EncodeError> {
     let (width, height) = (image.width_px, image.height_px);
-    let rgb;
-    let (pixels, color) = match (format, image.is_opaque()) {
-        (ImageFormat::Png | ImageFormat::Webp, false) => (&image.rgba, ExtendedColorType::Rgba8),
-        (ImageFormat::Png | ImageFormat::Webp, true) | (ImageFormat::Jpeg, _) => {
-            rgb = over_white(image);
-            (&rgb, ExtendedColorType::Rgb8)
-        }
-    };
     let mut bytes = Vec::new();
-    match format {
-        // Fast takes a sixth of Balanced's time for twice its size. Pictures are rendered more
-        // often than stored.
-        ImageFormat::Png => PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
-            .write_image(pixels, width, height, color),
-        ImageFormat::Webp => WebPEncoder::new_lossless(&mut bytes).encode(pixels, width, height, color),
-        ImageFormat::Jpeg => {
-            JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY).write_image(pixels, width, height, color)
+    match (format, image.is_opaque()) {
+        (ImageFormat::Png, _) => return png::encode(image, effort, deadline),
+        (ImageFormat::Webp, true) => {
+            let rgb = drop_alpha(&image.rgba);
+            WebPEncoder::new_lossless(&mut bytes).encode(&rgb, width, height, ExtendedColorType::Rgb8)?;
+        }
+        (ImageFormat::Webp, false) => {
+            WebPEncoder::new_lossless(&mut bytes).encode(&image.rgba, width, height, ExtendedColorType::Rgba8)?;
+        }
+        (ImageFormat::Jpeg, is_opaque) => {
+            let rgb = if is_opaque { drop_alpha(&image.rgba) } else { over_white(image) };
+            let encoder = JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
+            encoder.write_image(&rgb, width, height, ExtendedColorType::Rgb8)?;
         }
     }
-    .map_err(|error: ImageError| EncodeError(error.to_string()))?;
     Ok(bytes)
+}
+
+/// RGB of RGBA.
+fn drop_alpha(rgba: &[u8]) -> Vec<u8> {
+    let mut rgb = vec![0; rgba.len() / 4 * 3];
+    for (rgb, rgba) in rgb.as_chunks_mut::<3>().0.iter_mut().zip(rgba.as_chunks::<4>().0) {
+        *rgb = [rgba[0], rgba[1], rgba[2]];
+    }
+    rgb
 }
 
 /// The picture as RGB over white, rows from the top. Opaque pixels keep their bytes.
@@ -60,6 +74,24 @@ fn over_white(image: &Image) -> Vec<u8> {
     image.rgba.chunks_exact(4).flat_map(|p| [over(p[0], p[3]), over(p[1], p[3]), over(p[2], p[3])]).collect()
 }
 
+impl From<ImageError> for EncodeError {
+    fn from(error: ImageError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+impl From<::png::EncodingError> for EncodeError {
+    fn from(error: ::png::EncodingError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+impl From<std::io::Error> for EncodeError {
+    fn from(error: std::io::Error) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -72,6 +104,10 @@ mod tests {
         Image { width_px, height_px, rgba }
     }
 
+    fn encode(image: &Image, format: ImageFormat) -> Result<Vec<u8>, EncodeError> {
+        super::encode(image, format, 3, &Deadline::default())
+    }
+
     fn guess(bytes: &[u8]) -> image::DynamicImage {
         image::load_from_memory(bytes).expect("our own bytes decode")
     }
@@ -79,11 +115,12 @@ mod tests {
     #[test]
     fn lossless_formats_come_back_exactly() {
         for format in [ImageFormat::Png, ImageFormat::Webp] {
-            for alpha in [255, 77, 0] {
+            for (alpha, effort) in [255, 77, 0].into_iter().flat_map(|alpha| [0, 3, 4, 9].map(|effort| (alpha, effort)))
+            {
                 let image = gradient(alpha);
-                let decoded = guess(&encode(&image, format).unwrap());
-                assert_eq!(decoded.color().has_alpha(), alpha != 255, "{format:?} {alpha}");
-                assert_eq!(decoded.to_rgba8().into_raw(), image.rgba, "{format:?} {alpha}");
+                let decoded = guess(&super::encode(&image, format, effort, &Deadline::default()).unwrap());
+                assert_eq!(decoded.color().has_alpha(), alpha != 255, "{format:?} {alpha} {effort}");
+                assert_eq!(decoded.to_rgba8().into_raw(), image.rgba, "{format:?} {alpha} {effort}");
             }
         }
     }

@@ -12,6 +12,8 @@ pub use spec::Spec;
 
 use crate::encode;
 use crate::image::{Image, ImageFormat};
+use crate::limits::Deadline;
+use crate::spec::DEFAULT_EFFORT;
 
 /// Encoding. The same picture always gives the same bytes.
 impl Image {
@@ -23,6 +25,12 @@ impl Image {
     /// The bytes of a file in the given format. JPEG has no alpha: what is transparent is laid over
     /// white.
     pub fn encode(&self, format: ImageFormat) -> Result<Vec<u8>, Error> {
-        Ok(encode::encode(self, format)?)
+        self.encode_with_effort(format, DEFAULT_EFFORT)
+    }
+
+    /// As [`Image::encode`]. An effort from 4 to 9 makes smaller PNG files, in 5 to 100 times the
+    /// time.
+    pub fn encode_with_effort(&self, format: ImageFormat, effort: u32) -> Result<Vec<u8>, Error> {
+        Ok(encode::encode(self, format, effort, &Deadline::default())?)
     }
 }

@@ -16,10 +16,23 @@ pub struct ImageSpec {
     pub samples: u32,
     /// The colour behind the mesh; alpha 0 is transparent.
     pub background: Rgba,
+    /// From 0, which encodes quickly, to 9, which makes small files. Formats that are encoded in
+    /// one way only take no notice of it.
+    pub effort: u32,
 }
+
+/// The default of [`ImageSpec::effort`]: quick, because pictures are drawn more often than stored.
+pub const DEFAULT_EFFORT: u32 = 3;
 
 impl Default for ImageSpec {
     fn default() -> Self {
-        Self { width_px: 512, height_px: 512, format: None, samples: 4, background: Rgba::WHITE }
+        Self {
+            width_px: 512,
+            height_px: 512,
+            format: None,
+            samples: 4,
+            background: Rgba::WHITE,
+            effort: DEFAULT_EFFORT,
+        }
     }
 }

@@ -123,31 +123,16 @@ impl Pixels {
     pub fn row<T: Copy>(&self, y: u32, table: &LookupTable<T>, out: &mut [[T; 4]]) {
         let stride = self.width as usize * self.channels * if self.is_wide { 2 } else { 1 };
         let row = &self.bytes[y as usize * stride..][..stride];
-        if self.is_wide {
-            self.texels(row, out, table, |b| u16::from_ne_bytes([b[0], b[1]]) as usize, 2);
-        } else {
-            self.texels(row, out, table, |b| b[0] as usize, 1);
-        }
-    }
-
-    fn texels<T: Copy>(
-        &self,
-        row: &[u8],
-        out: &mut [[T; 4]],
-        table: &LookupTable<T>,
-        number: impl Fn(&[u8]) -> usize,
-        size: usize,
-    ) {
-        let opaque = table.alpha[table.alpha.len() - 1];
-        let at = |pixel: &[u8], channel: usize| number(&pixel[channel * size..]);
-        for (pixel, out) in row.chunks_exact(self.channels * size).zip(out) {
-            let color = |channel: usize| table.color[at(pixel, channel)];
-            *out = match self.channels {
-                1 => [color(0), color(0), color(0), opaque],
-                2 => [color(0), color(0), color(0), table.alpha[at(pixel, 1)]],
-                3 => [color(0), color(1), color(2), opaque],
-                _ => [color(0), color(1), color(2), table.alpha[at(pixel, 3)]],
-            };
+        // A loop for each kind of pixel, in which nothing is decided any more.
+        match (self.channels, self.is_wide) {
+            (1, false) => narrow::<T, 1>(row, table, out),
+            (2, false) => narrow::<T, 2>(row, table, out),
+            (3, false) => narrow::<T, 3>(row, table, out),
+            (_, false) => narrow::<T, 4>(row, table, out),
+            (1, true) => wide::<T, 1>(row, table, out),
+            (2, true) => wide::<T, 2>(row, table, out),
+            (3, true) => wide::<T, 3>(row, table, out),
+            (_, true) => wide::<T, 4>(row, table, out),
         }
     }
 
@@ -165,6 +150,35 @@ impl Pixels {
         LookupTable {
             color: (0..=largest).map(|v| of(color(v) as f32)).collect(),
             alpha: (0..=largest).map(|v| of(alpha(v) as f32)).collect(),
+        }
+    }
+}
+
+/// A row of 8 bits per channel.
+fn narrow<T: Copy, const CHANNELS: usize>(row: &[u8], table: &LookupTable<T>, out: &mut [[T; 4]]) {
+    for (pixel, out) in row.as_chunks::<CHANNELS>().0.iter().zip(out) {
+        *out = table.texel(pixel.map(usize::from));
+    }
+}
+
+/// A row of 16 bits per channel.
+fn wide<T: Copy, const CHANNELS: usize>(row: &[u8], table: &LookupTable<T>, out: &mut [[T; 4]]) {
+    for (pixel, out) in row.as_chunks::<2>().0.as_chunks::<CHANNELS>().0.iter().zip(out) {
+        *out = table.texel(pixel.map(|number| u16::from_ne_bytes(number).into()));
+    }
+}
+
+impl<T: Copy> LookupTable<T> {
+    /// The texel of a pixel: grey, grey and alpha, RGB, or RGB and alpha.
+    #[inline]
+    fn texel<const CHANNELS: usize>(&self, pixel: [usize; CHANNELS]) -> [T; 4] {
+        let color = |channel: usize| self.color[pixel[channel]];
+        let opaque = self.alpha[self.alpha.len() - 1];
+        match CHANNELS {
+            1 => [color(0), color(0), color(0), opaque],
+            2 => [color(0), color(0), color(0), self.alpha[pixel[1]]],
+            3 => [color(0), color(1), color(2), opaque],
+            _ => [color(0), color(1), color(2), self.alpha[pixel[3]]],
         }
     }
 }

@@ -6,6 +6,10 @@
 use crate::limits::{Deadline, Stopped};
 use crate::texture::decode::{LookupTable, Pixels};
 use half::f16;
+use rayon::prelude::*;
+
+/// Rows that a thread does at least, so that small levels are not shared.
+const ROWS_MIN: usize = 32;
 
 /// The number of levels of an image, down to a single texel.
 pub fn count(width: u32, height: u32) -> u32 {
@@ -22,30 +26,32 @@ pub fn side(texels: u32, level: u32) -> u32 {
     (texels >> level).max(1)
 }
 
-/// Memory that [`append`] takes beside its result, bytes: levels 1 and 2 as f32, a row, and the
-/// lookup tables.
+/// Memory that [`fill`] takes beside its result, bytes: levels 1 and 2 as f32, the rows of
+/// all pieces, and the lookup tables.
 pub fn working_bytes(width: u32, height: u32) -> u64 {
     let texels = |level| u64::from(side(width, level)) * u64::from(side(height, level));
-    (texels(1) + texels(2)).saturating_mul(16).saturating_add(64 * u64::from(width) + (4 << 16))
+    let pieces = u64::from(side(height, 1)).div_ceil(ROWS_MIN as u64);
+    (texels(1) + texels(2)).saturating_mul(16).saturating_add(64 * pieces * u64::from(width) + (4 << 16))
 }
 
-/// Appends the levels from `first` on to `out`, as half floats.
-pub fn append(
+/// Writes the levels from `first` on to `out`, as half floats.
+pub fn fill(
     pixels: &Pixels,
     is_color: bool,
     first: u32,
-    out: &mut Vec<[u16; 4]>,
+    mut out: &mut [[u16; 4]],
     deadline: &Deadline,
 ) -> Result<(), Stopped> {
     let (width, height) = (pixels.width, pixels.height);
     if first == 0 {
         let table = pixels.lookup_table(is_color, half);
-        let start = out.len();
-        out.resize(start + width as usize * height as usize, [0; 4]);
-        for (y, row) in (0..height).zip(out[start..].chunks_exact_mut(width as usize)) {
+        let level = take(&mut out, [width, height]);
+        let rows = level.par_chunks_exact_mut(width as usize).enumerate().with_min_len(ROWS_MIN);
+        rows.try_for_each(|(y, row)| {
             deadline.check()?;
-            pixels.row(y, &table, row);
-        }
+            pixels.row(y as u32, &table, row);
+            Ok(())
+        })?;
     }
     if count(width, height) == 1 {
         return Ok(());
@@ -55,13 +61,14 @@ pub fn append(
     let table: LookupTable<f32> = pixels.lookup_table(is_color, |v| v);
     let mut level = shrink([width, height], by_alpha, deadline, |y, row| pixels.row(y, &table, row))?;
     for k in 1.. {
+        let size = [side(width, k), side(height, k)];
         if k >= first {
-            out.extend(level.iter().map(|texel| texel.map(half)));
+            let out = take(&mut out, size).par_iter_mut().with_min_len(ROWS_MIN << 10);
+            out.zip(&level).for_each(|(out, texel)| *out = texel.map(half));
         }
         if k + 1 == count(width, height) {
             break;
         }
-        let size = [side(width, k), side(height, k)];
         let stride = size[0] as usize;
         level =
             shrink(size, by_alpha, deadline, |y, row| row.copy_from_slice(&level[y as usize * stride..][..stride]))?;
@@ -69,33 +76,61 @@ pub fn append(
     Ok(())
 }
 
+/// Cuts a level off the front of `out`.
+fn take<'a>(out: &mut &'a mut [[u16; 4]], size: [u32; 2]) -> &'a mut [[u16; 4]] {
+    let (level, rest) = std::mem::take(out).split_at_mut(size[0] as usize * size[1] as usize);
+    *out = rest;
+    level
+}
+
 /// The level after one of `size` texels, whose rows `read` writes.
 fn shrink(
     size: [u32; 2],
     by_alpha: bool,
     deadline: &Deadline,
-    mut read: impl FnMut(u32, &mut [[f32; 4]]),
+    read: impl Fn(u32, &mut [[f32; 4]]) + Sync,
 ) -> Result<Vec<[f32; 4]>, Stopped> {
     let to = size.map(|s| side(s, 1));
     let columns: Vec<Taps> = (0..to[0]).map(|x| Taps::of(size[0], x)).collect();
-    let mut line = vec![[0.0; 4]; size[0] as usize];
-    let mut sums = vec![Sum::default(); to[0] as usize];
-    let mut out = Vec::with_capacity(to[0] as usize * to[1] as usize);
-    for y in 0..to[1] {
+    let is_plain = !by_alpha && size.iter().all(|s| s.is_multiple_of(2));
+    let mut out = vec![[0.0; 4]; to[0] as usize * to[1] as usize];
+    let rows = out.par_chunks_exact_mut(to[0] as usize).enumerate().with_min_len(ROWS_MIN);
+    let buffer = || (vec![[0.0; 4]; 2 * size[0] as usize], vec![Sum::default(); to[0] as usize]);
+    rows.try_for_each_init(buffer, |(lines, sums), (y, out)| {
         deadline.check()?;
+        if is_plain {
+            let (upper, lower) = lines.split_at_mut(size[0] as usize);
+            read(2 * y as u32, upper);
+            read(2 * y as u32 + 1, lower);
+            mean_of_squares(upper, lower, out);
+            return Ok(());
+        }
+        let line = &mut lines[..size[0] as usize];
         sums.fill(Sum::default());
-        let rows = Taps::of(size[1], y);
+        let rows = Taps::of(size[1], y as u32);
         for (row, down) in (rows.first..).zip(rows.weights()) {
-            read(row, &mut line);
+            read(row, line);
             for (sum, taps) in sums.iter_mut().zip(&columns) {
                 for (texel, across) in line[taps.first as usize..].iter().zip(taps.weights()) {
                     sum.add(texel, down * across, by_alpha);
                 }
             }
         }
-        out.extend(sums.iter().map(|sum| sum.mean(by_alpha)));
-    }
+        for (out, sum) in out.iter_mut().zip(sums) {
+            *out = sum.mean(by_alpha);
+        }
+        Ok(())
+    })?;
     Ok(out)
+}
+
+/// What [`Sum`] makes of sides that are even and of alpha that does not count, in the same order
+/// of additions, which is nearly every texture.
+fn mean_of_squares(upper: &[[f32; 4]], lower: &[[f32; 4]], out: &mut [[f32; 4]]) {
+    let squares = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
+    for (out, ([a, b], [c, d])) in out.iter_mut().zip(squares) {
+        *out = std::array::from_fn(|k| 0.25 * a[k] + 0.25 * b[k] + 0.25 * c[k] + 0.25 * d[k]);
+    }
 }
 
 /// Filter taps in one direction: the texels that a texel of the next level covers, with weights
@@ -159,15 +194,43 @@ impl Sum {
 
 /// The nearest IEEE 754 half float, ties to even. Too large values become infinite.
 ///
-/// The `const` conversion never uses a processor's own instruction, so it has the same bits
-/// everywhere.
+/// Neither way uses a processor's own instruction, so it has the same bits everywhere.
+#[inline]
 fn half(v: f32) -> u16 {
-    f16::from_f32_const(v).to_bits()
+    let bits = v.to_bits();
+    // Positive, and neither subnormal nor too large as a half: all but the smallest texels.
+    if (SMALLEST_NORMAL..LARGEST).contains(&bits) {
+        let rounded = bits + 0xfff + (bits >> 13 & 1);
+        ((rounded - EXPONENT_SHIFT) >> 13) as u16
+    } else {
+        f16::from_f32_const(v).to_bits()
+    }
 }
+
+/// The bits of 2^-14 and of 65504 as f32, and the difference between the two formats' exponents.
+const SMALLEST_NORMAL: u32 = 113 << 23;
+const LARGEST: u32 = 0x477f_e000;
+const EXPONENT_SHIFT: u32 = 112 << 23;
 
 #[cfg(test)]
 mod tests {
-    use super::half;
+    use super::{Sum, half, mean_of_squares};
+
+    #[test]
+    fn the_mean_of_squares_has_the_bits_of_the_general_way() {
+        // Thirds of many sizes, so that each addition rounds.
+        let texel = |i: u32| [0, 1, 2, 3].map(|k| ((i * 7 + k * 13) % 256) as f32 / (3 << (i % 5)) as f32);
+        let [upper, lower] = [0, 1000].map(|from| (from..from + 512).map(texel).collect::<Vec<_>>());
+        let mut means = vec![[0.0; 4]; 256];
+        mean_of_squares(&upper, &lower, &mut means);
+        for (x, mean) in means.iter().enumerate() {
+            let mut sum = Sum::default();
+            for texel in [upper[2 * x], upper[2 * x + 1], lower[2 * x], lower[2 * x + 1]] {
+                sum.add(&texel, 0.5 * 0.5, false);
+            }
+            assert_eq!(mean.map(f32::to_bits), sum.mean(false).map(f32::to_bits), "{x}");
+        }
+    }
 
     /// The value of a half float, by the definition of the format.
     fn value(half: u16) -> f64 {

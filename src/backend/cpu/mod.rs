@@ -18,11 +18,13 @@ pub(super) mod lines;
 mod peeling;
 mod resolve;
 pub(super) mod surface;
+mod threads;
 mod vector;
 
 pub use isa::Isa;
+pub use threads::DrawingThreads;
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -41,7 +43,7 @@ const CHUNK: usize = 8192;
 /// Draws on the CPU. Keeps its buffers from picture to picture.
 pub struct CpuRenderer {
     isa: Isa,
-    pool: Option<rayon::ThreadPool>,
+    threads: Arc<DrawingThreads>,
     vertices: Vec<ScreenVertex>,
     scratch: ScratchPool,
     srgb: SrgbEncoder,
@@ -65,16 +67,18 @@ impl CpuRenderer {
 
     /// As [`CpuRenderer::new`] on a given instruction set, for tests that compare them.
     pub fn with_isa(threads: usize, isa: Isa) -> Self {
-        // One thread needs no pool; and if the system gives no threads, one is what there is.
-        let build = || rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("raster-{i}"));
-        let pool = if threads > 1 { build().build().ok() } else { None };
-        Self { isa, pool, vertices: Vec::new(), scratch: ScratchPool::default(), srgb: SrgbEncoder::new() }
+        Self { isa, ..Self::on(Arc::new(DrawingThreads::new(threads))) }
+    }
+
+    /// A renderer that shares threads with others.
+    pub fn on(threads: Arc<DrawingThreads>) -> Self {
+        let (vertices, scratch) = (Vec::new(), ScratchPool::default());
+        Self { isa: Isa::detect(), threads, vertices, scratch, srgb: SrgbEncoder::new() }
     }
 
     /// Transforms the plan's vertices; afterwards [`RasterContext`] can be made.
-    fn transform(&mut self, plan: &DrawPlan<'_>) {
+    fn transform(&mut self, plan: &DrawPlan<'_>, pool: Option<&rayon::ThreadPool>) {
         let isa = self.isa;
-        let pool = self.pool.as_ref();
         let own = plan.hull.as_ref().map_or(&[][..], |hull| &hull.vertices);
         // Room for just what there is: a list that grows by itself would double.
         self.vertices.clear();
@@ -99,13 +103,18 @@ impl CpuRenderer {
         each: impl Fn(&RasterContext<'_>, &mut BandScratch, &Bins, usize, &mut [T]) + Sync + Send,
     ) -> Result<(), DrawError> {
         deadline.check()?;
-        self.transform(plan);
+        let threads = self.threads.clone();
+        let share = threads.share();
+        let pool = share.pool();
+        self.transform(plan, pool);
         let context = self.context(plan, deadline);
-        let banding = Banding::new(plan, self.threads());
-        let drawn = bands::bins::bin(&context, self.pool.as_ref(), [banding.rows, banding.margin]).map(|bins| {
+        // As many bands at once as were paid for, or fewer.
+        let mut banding = Banding::new(plan, threads.count());
+        banding.at_once = banding.at_once.min(share.count);
+        let drawn = bands::bins::bin(&context, pool, [banding.rows, banding.margin]).map(|bins| {
             let row_len = out.len() / plan.height_px as usize;
             let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
-            run_few(self.pool.as_ref(), banding.at_once, items, |(band, out)| {
+            run_few(pool, banding.at_once, items, |(band, out)| {
                 if deadline.check().is_ok() {
                     self.scratch.with(plan, banding, |scratch| each(&context, scratch, &bins, band, out));
                 }
@@ -124,13 +133,10 @@ impl CpuRenderer {
         }
     }
 
-    fn threads(&self) -> usize {
-        self.pool.as_ref().map_or(1, rayon::ThreadPool::current_num_threads)
-    }
-
-    /// Memory that drawing the plan takes beside what grows with its mesh, bytes.
+    /// Memory that drawing the plan takes beside what grows with its mesh, bytes. On all threads,
+    /// so that no refusal depends on what else is drawn.
     pub fn bands_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
-        Banding::new(plan, self.threads()).bytes(plan) as u64
+        Banding::new(plan, self.threads.count()).bytes(plan) as u64
     }
 }
 

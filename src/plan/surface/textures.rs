@@ -3,9 +3,11 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
-use crate::mesh::material::{ImageContent, TextureRef, Wrap};
+use crate::mesh::material::{ImageContent, ImageSource, TextureRef, Wrap};
 use crate::plan::geometry::Geometry;
 use crate::plan::projection::Projection;
 use crate::plan::skips::{SkipKind, Skips};
@@ -14,6 +16,9 @@ use crate::plan::surface::closeup::Use;
 use crate::plan::{PlanError, TextureUse};
 use crate::texture::decode::{self, Header};
 use crate::texture::{Texture, TextureError, Textures, fit, mips};
+
+/// Memory of images that are decoded at once, bytes: three of 2048 x 2048 texels in JPEG.
+const TOGETHER_BYTES_MAX: u64 = 256 << 20;
 
 /// Collects the textures that materials sample, and decodes them at the end.
 pub struct TextureLoader<'a> {
@@ -110,25 +115,74 @@ impl<'a> TextureLoader<'a> {
         let texels = |w: &Wanted, first: u32| mips::texels(w.header.width, w.header.height, first);
         let total: u64 = wanted.iter().zip(&first_levels).map(|(w, &first)| texels(w, first)).sum();
         budget.spend("textures", total, 8)?;
-        let mut textures = Textures { texels: Vec::with_capacity(total as usize), images: Vec::new() };
-        let mut most = 0;
+        let mut textures = Textures { texels: vec![[0; 4]; total as usize], images: Vec::new() };
+        let mut images = Vec::new();
+        let mut rest = &mut textures.texels[..];
+        let mut first_texel = 0;
         for (want, &first_level) in wanted.iter().zip(&first_levels) {
-            let Header { width, height, decoding_bytes, .. } = want.header;
-            // Images are decoded one after the other, in the memory of the one before.
-            let bytes = decoding_bytes.saturating_add(mips::working_bytes(width, height));
-            budget.spend("decoding textures", bytes.saturating_sub(most), 1)?;
-            most = most.max(bytes);
-            deadline.check()?;
-            let image = &mesh.images[want.image as usize];
-            let ImageContent::Encoded(encoded) = &image.content else { continue };
-            let pixels = decode::decode(&image.name, encoded, &want.header)?;
-            let first_texel = textures.texels.len() as u32;
-            mips::append(&pixels, want.is_color, first_level, &mut textures.texels, deadline)?;
+            let Header { width, height, .. } = want.header;
+            let (out, others) = rest.split_at_mut(texels(want, first_level) as usize);
             let levels = mips::count(width, height);
             textures.images.push(Texture { width, height, first_level, levels, first_texel, padding: [0; 3] });
+            first_texel += out.len() as u32;
+            images.push(Decoding { image: &mesh.images[want.image as usize], want, first_level, out });
+            rest = others;
         }
+        decode_all(images, budget, deadline)?;
         Ok(textures)
     }
+}
+
+/// An image that is to be decoded, and the place of its levels.
+struct Decoding<'a> {
+    image: &'a ImageSource,
+    want: &'a Wanted,
+    first_level: u32,
+    out: &'a mut [[u16; 4]],
+}
+
+impl Decoding<'_> {
+    /// Memory that decoding takes beside the levels.
+    fn bytes(&self) -> u64 {
+        let Header { width, height, decoding_bytes, .. } = self.want.header;
+        decoding_bytes.saturating_add(mips::working_bytes(width, height))
+    }
+
+    fn run(self, deadline: &Deadline) -> Result<(), PlanError> {
+        deadline.check()?;
+        let ImageContent::Encoded(encoded) = &self.image.content else { return Ok(()) };
+        let pixels = decode::decode(&self.image.name, encoded, &self.want.header)?;
+        mips::fill(&pixels, self.want.is_color, self.first_level, self.out, deadline)?;
+        Ok(())
+    }
+}
+
+/// Decodes images, a few at once, each few in the memory of those before. Which are decoded
+/// together follows from their sizes and the budget alone, so that threads change no refusal.
+fn decode_all(mut images: Vec<Decoding<'_>>, budget: &mut Budget, deadline: &Deadline) -> Result<(), PlanError> {
+    let mut most = 0;
+    while !images.is_empty() {
+        let mut bytes = 0_u64;
+        let fits = |image: &&Decoding<'_>| {
+            bytes = bytes.saturating_add(image.bytes());
+            bytes <= TOGETHER_BYTES_MAX
+        };
+        let mut count = images.iter().take_while(fits).count().max(1);
+        let mut together: u64 = images[..count].iter().map(Decoding::bytes).sum();
+        if count > 1 && budget.spend("decoding textures", together.saturating_sub(most), 1).is_err() {
+            (count, together) = (1, images[0].bytes());
+        }
+        if count == 1 {
+            budget.spend("decoding textures", together.saturating_sub(most), 1)?;
+        }
+        most = most.max(together);
+        let others = images.split_off(count);
+        // Of several errors, the first image's.
+        let results: Vec<_> = images.into_par_iter().map(|image| image.run(deadline)).collect();
+        results.into_iter().collect::<Result<(), _>>()?;
+        images = others;
+    }
+    Ok(())
 }
 
 /// Bits as in [`TextureUse::sampler`].

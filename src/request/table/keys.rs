@@ -6,6 +6,7 @@ use serde_json::Value::Null;
 use super::field::{Field, fields};
 use super::value::Kind;
 use crate::limits::JOB_MS_MAX;
+use crate::spec::DEFAULT_EFFORT;
 use crate::spec::{WIRE_METHODS, WireMethod};
 
 /// A share, such as an opacity.
@@ -173,6 +174,8 @@ fn image() -> Vec<Field> {
             "Longest expected time to draw, as measured on one machine: the most accurate choice within it is taken.";
         "image.background" |d| d.image.background, short "background", default "#fff";
             "Colour behind the mesh.";
+        "image.effort" |d| d.image.effort, in Kind::OneOf(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]), default DEFAULT_EFFORT;
+            "PNG: 0 to 3 encode quickly; 4 to 9 make smaller files in 5 to 100 times the time, for pictures that are stored.";
         "backend" |d| d.backend;
             "Back-end that draws; by default the server's choice.";
     ]

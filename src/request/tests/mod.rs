@@ -114,7 +114,7 @@ fn every_key_reaches_its_field() {
         "camera": {"view":"top","azimuth_deg":10,"elevation_deg":-20,"projection":"orthographic","fov_deg":50,
                    "height":2.5,"up":"-z","margin":0.1,"eye":[1,2,3],"target":[0,0,0.5]},
         "light": {"preset":"three-point","direction":[0,-1,0.5],"intensity":2,"ambient":0.1},
-        "image": {"width":640,"height":480,"format":"webp","samples":1,"background":"transparent"},
+        "image": {"width":640,"height":480,"format":"webp","samples":1,"background":"transparent","effort":9},
         "backend": "cpu"
     }"##;
     let spec = json(document).unwrap();
@@ -148,6 +148,7 @@ fn every_key_reaches_its_field() {
     assert_eq!((spec.light.intensity, spec.light.ambient), (2.0, 0.1));
     assert_eq!((spec.image.width_px, spec.image.height_px, spec.image.samples), (640, 480, 1));
     assert_eq!((spec.image.format, spec.image.background), (Some(ImageFormat::Webp), Rgba::TRANSPARENT));
+    assert_eq!(spec.image.effort, 9);
     assert_eq!(spec.backend, BackendChoice::Cpu);
 }
 
@@ -204,7 +205,7 @@ fn null_is_the_default_or_as_if_the_key_were_not_there() {
         }
         query(&[(key, "null")]).unwrap_or_else(|error| panic!("{error}"));
     }
-    assert_eq!(keys.len(), 60);
+    assert_eq!(keys.len(), 61);
     for document in [r#"{"style":null}"#, r#"{"camera":null,"light":null,"image":null}"#, r#"{"materials":null}"#] {
         assert_eq!(json(document).unwrap(), json("{}").unwrap(), "{document}");
     }
@@ -292,7 +293,7 @@ fn stated_defaults_are_the_defaults() {
         assert_eq!(json(&with.to_string()).unwrap(), json(&without.to_string()).unwrap(), "{}", field.key);
         checked += 1;
     }
-    assert_eq!(checked, 45);
+    assert_eq!(checked, 46);
 }
 
 #[test]

@@ -5,11 +5,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::static_document::StaticDocument;
+use crate::backend::cpu::DrawingThreads;
 use crate::backend::{GpuHost, HardwareHint};
 use crate::config::{Config, cores, why_no_gpu};
 use crate::limits::Limits;
 use crate::request::{self, Rules};
-use crate::service::jobs::{JobSettings, Jobs, UploadBudget, pipeline_renderers};
+use crate::service::jobs::{CpuThreads, JobSettings, Jobs, UploadBudget, pipeline_renderers};
 use crate::service::store::Store;
 
 /// The state that all handlers share.
@@ -39,11 +40,11 @@ impl AppState {
     /// Builds the state and starts the workers.
     pub fn start(config: &Config) -> std::io::Result<Arc<Self>> {
         let threads = match config.worker_threads {
-            0 => (cores() / config.workers.max(1)).max(1),
-            given => given,
+            0 => CpuThreads::Shared(Arc::new(DrawingThreads::new(to_usize(cores())))),
+            given => CpuThreads::Each(to_usize(given)),
         };
         let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));
-        let renderers = pipeline_renderers(gpu.clone(), threads as usize, config.limits.clone());
+        let renderers = pipeline_renderers(gpu.clone(), threads, config.limits.clone());
         let Limits { queue_per_worker, job_ms, .. } = config.limits;
         let settings = JobSettings {
             workers: to_usize(config.workers),

@@ -18,7 +18,7 @@ mod worker;
 
 pub use job::{Failure, Finished, Job, JobId, JobState, Product, Task, Timings, Work};
 pub use upload_budget::{Reservation, UploadBudget, UploadBudgetFull};
-pub use worker::{Renderer, RendererFactory, pipeline_renderers};
+pub use worker::{CpuThreads, Renderer, RendererFactory, pipeline_renderers};
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;

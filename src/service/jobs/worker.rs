@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use super::job::{Failure, Finished, Job, JobState, Product, Task, Timings, Work};
 use super::registry::JobRegistry;
+use crate::backend::cpu::DrawingThreads;
 use crate::backend::{Backends, GpuHost};
 use crate::import;
 use crate::limits::{Deadline, Limits};
@@ -18,10 +19,22 @@ pub type Renderer = Box<dyn FnMut(&Work, &Deadline, &mut dyn FnMut(Stage)) -> Re
 /// threads.
 pub type RendererFactory = Arc<dyn Fn() -> Renderer + Send + Sync>;
 
-/// Renderers that run [`crate::pipeline`]. The CPU back-end of each uses up to `threads` threads.
-pub fn pipeline_renderers(gpu: Arc<GpuHost>, threads: usize, limits: Limits) -> RendererFactory {
+/// The threads that draw on the CPU.
+#[derive(Clone)]
+pub enum CpuThreads {
+    /// So many for each worker.
+    Each(usize),
+    /// The same ones for all workers.
+    Shared(Arc<DrawingThreads>),
+}
+
+/// Renderers that run [`crate::pipeline`].
+pub fn pipeline_renderers(gpu: Arc<GpuHost>, threads: CpuThreads, limits: Limits) -> RendererFactory {
     Arc::new(move || {
-        let mut backends = Backends::new(gpu.clone(), threads);
+        let mut backends = match &threads {
+            CpuThreads::Each(count) => Backends::new(gpu.clone(), *count),
+            CpuThreads::Shared(threads) => Backends::sharing(gpu.clone(), threads.clone()),
+        };
         let limits = limits.clone();
         Box::new(move |work, deadline, ended| {
             let Work { bundle, format_in, task, .. } = work;

@@ -23,7 +23,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("plan", &["scene", "spec", "texture", "mesh", "image", "limits", "warning"]),
     // Of spec the choice of a back-end alone.
     ("backend", &["plan", "spec", "image", "srgb", "limits"]),
-    ("encode", &["image"]),
+    ("encode", &["image", "limits"]),
     (
         "pipeline",
         &["report", "import", "encode", "backend", "plan", "scene", "spec", "mesh", "image", "limits", "warning"],

@@ -7,9 +7,10 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::{CpuRenderer, Isa};
+use meshsnap::backend::cpu::{CpuRenderer, DrawingThreads, Isa};
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 
@@ -89,6 +90,29 @@ fn every_scene_has_a_test_and_every_picture_a_scene() {
     assert_eq!(SCENES.len(), 41);
     let compared = SCENES.len() * 2 * THREADS.len() * RUNS;
     goal(7, &format!("identical: {compared} pictures with {:?} instructions on {THREADS:?} threads", isas()));
+}
+
+/// Renderers that draw at the same time on the same threads do not disturb one another.
+#[test]
+fn golden_on_shared_threads() {
+    let threads = Arc::new(DrawingThreads::new(3));
+    let drawn: usize = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..4)
+            .map(|worker| {
+                let mut renderer = CpuRenderer::on(threads.clone());
+                scope.spawn(move || {
+                    let scenes = SCENES.iter().skip(worker).step_by(5);
+                    let same = |scene: &Scene| {
+                        let alone = draw(scene, &mut CpuRenderer::new(1));
+                        assert_same(scene.name, "shared threads", &draw(scene, &mut renderer), &alone);
+                    };
+                    scenes.map(same).count()
+                })
+            })
+            .collect();
+        workers.into_iter().map(|worker| worker.join().unwrap()).sum()
+    });
+    assert_eq!(drawn, 33);
 }
 
 /// Draws a scene.

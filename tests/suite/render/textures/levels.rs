@@ -248,6 +248,36 @@ fn a_stopped_job_decodes_nothing_more() {
     assert!(matches!(plan, Err(PlanError::Stopped(_))));
 }
 
+/// Images are decoded together where the budget has room for it, and else one after the other, in
+/// the same memory and with the same texels.
+#[test]
+fn a_small_budget_decodes_one_after_the_other() {
+    let side = 256;
+    let picture = image::RgbImage::from_raw(side, side, noise(side, side, 3, 8)).unwrap();
+    let picture = encode(&picture.into(), ImageFormat::Png);
+    let alone = json!({ "emissiveFactor": [1, 1, 1], "emissiveTexture": { "index": 0 } });
+    let mut both = alone.clone();
+    both["normalTexture"] = json!({ "index": 0 });
+    let least = |material: &Value| {
+        let mesh = model(&[TRIANGLE], &[UVS], &picture, material.clone());
+        let keep = [SkipKind::FineTextureLevels];
+        let plan = |memory_bytes| plan_of(&mesh, &keep, &Limits { memory_bytes, ..Limits::default() });
+        let (mut low, mut high) = (0, 1 << 30);
+        while low + 1 < high {
+            let middle = (low + high) / 2;
+            if plan(middle).is_ok() { high = middle } else { low = middle }
+        }
+        let texels = |memory_bytes| plan(memory_bytes).unwrap().surface.unwrap().textures.texels;
+        assert_eq!(texels(high), texels(1 << 30));
+        (high, texels(high).len())
+    };
+    let ((one_bytes, one_texels), (two_bytes, two_texels)) = (least(&alone), least(&both));
+    assert_eq!(two_texels, 2 * one_texels);
+    // Decoding takes more than this beside the texels.
+    let decoding_bytes = u64::from(side * side) * 3;
+    assert!(two_bytes - one_bytes < 8 * one_texels as u64 + decoding_bytes / 2, "{one_bytes} {two_bytes}");
+}
+
 #[test]
 fn uses_are_written_as_the_shaders_read_them() {
     let picture = encode(&image::RgbImage::new(4, 4).into(), ImageFormat::Png);
