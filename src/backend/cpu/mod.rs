@@ -29,6 +29,7 @@ use rayon::prelude::*;
 use self::bands::bins::Bins;
 use self::bands::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, ScratchPool};
 use self::resolve::SrgbEncoder;
+use self::surface::flat::FlatColors;
 use super::{BackendKind, DrawError, Renderer};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::image::Image;
@@ -45,6 +46,7 @@ pub struct CpuRenderer {
     vertices: Vec<ScreenVertex>,
     scratch: ScratchPool,
     srgb: SrgbEncoder,
+    flat: FlatColors,
 }
 
 /// Input of every stage: the plan and the vertices on screen.
@@ -55,6 +57,8 @@ pub struct RasterContext<'a> {
     vertices: &'a [ScreenVertex],
     isa: Isa,
     srgb: &'a SrgbEncoder,
+    /// The colours of triangles, where these are all that there is to know.
+    flat: Option<&'a FlatColors>,
 }
 
 impl CpuRenderer {
@@ -68,7 +72,8 @@ impl CpuRenderer {
         // One thread needs no pool; and if the system gives no threads, one is what there is.
         let build = || rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("raster-{i}"));
         let pool = if threads > 1 { build().build().ok() } else { None };
-        Self { isa, pool, vertices: Vec::new(), scratch: ScratchPool::default(), srgb: SrgbEncoder::new() }
+        let (vertices, scratch, flat) = (Vec::new(), ScratchPool::default(), FlatColors::default());
+        Self { isa, pool, vertices, scratch, srgb: SrgbEncoder::new(), flat }
     }
 
     /// Transforms the plan's vertices; afterwards [`RasterContext`] can be made.
@@ -86,7 +91,7 @@ impl CpuRenderer {
     }
 
     fn context<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> RasterContext<'a> {
-        RasterContext { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb }
+        RasterContext { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb, flat: None }
     }
 
     /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside
@@ -100,9 +105,14 @@ impl CpuRenderer {
     ) -> Result<(), DrawError> {
         deadline.check()?;
         self.transform(plan);
-        let context = self.context(plan, deadline);
+        let mut flat = std::mem::take(&mut self.flat);
+        let mut context = self.context(plan, deadline);
         let banding = Banding::new(plan, self.threads());
         let drawn = bands::bins::bin(&context, self.pool.as_ref(), [banding.rows, banding.margin]).map(|bins| {
+            if FlatColors::suffice(plan) {
+                flat.find(&context, self.pool.as_ref(), &bins.triangles);
+                context.flat = Some(&flat);
+            }
             let row_len = out.len() / plan.height_px as usize;
             let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
             run_few(self.pool.as_ref(), banding.at_once, items, |(band, out)| {
@@ -111,6 +121,7 @@ impl CpuRenderer {
                 }
             });
         });
+        self.flat = flat;
         self.trim();
         drawn?;
         Ok(deadline.check()?)
@@ -121,6 +132,9 @@ impl CpuRenderer {
         self.scratch.trim();
         if self.vertices.capacity() * size_of::<ScreenVertex>() > KEPT_BYTES_MAX {
             self.vertices = Vec::new();
+        }
+        if self.flat.bytes() > KEPT_BYTES_MAX {
+            self.flat = FlatColors::default();
         }
     }
 

@@ -260,7 +260,7 @@ impl Setup {
 
 /// `min` and `max` in the order that maps to two machine instructions; no input is NaN.
 #[inline(always)]
-fn clamp(v: f32, range: [f32; 2]) -> f32 {
+pub fn clamp(v: f32, range: [f32; 2]) -> f32 {
     let v = if v > range[0] { v } else { range[0] };
     if v < range[1] { v } else { range[1] }
 }
