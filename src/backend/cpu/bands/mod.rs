@@ -193,7 +193,7 @@ fn draw_batches<'a, const S: usize>(
     let mut batch = Batch::default();
     for list in lists {
         for id in list.items_in(band) {
-            if batch.push(id) {
+            if batch.push(context, id) {
                 let tested = batch.draw::<S>(context, samples, tiles);
                 if poll.is_expired_after(LANES as u64, tested) {
                     return ControlFlow::Break(());
@@ -201,6 +201,8 @@ fn draw_batches<'a, const S: usize>(
             }
         }
     }
+    // What waits, and what was collected after it.
+    batch.draw::<S>(context, samples, tiles);
     batch.draw::<S>(context, samples, tiles);
     ControlFlow::Continue(())
 }

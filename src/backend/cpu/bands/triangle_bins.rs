@@ -49,7 +49,8 @@ pub struct BandLists {
     items: Vec<u32>,
     /// Items that touch many bands.
     tall: Vec<Spanned>,
-    tall_items: Vec<u32>,
+    /// Every item once, in ascending order.
+    pub all: Vec<u32>,
 }
 
 /// An item, and the first and last band that it touches.
@@ -80,13 +81,8 @@ impl BandLists {
                 starts[band + 1] += 1;
             }
         }
-        let tall: Vec<Spanned> = spanned.iter().filter(is_tall).copied().collect();
-        Self { starts, items, tall_items: tall.iter().map(|s| s.item).collect(), tall }
-    }
-
-    /// All items, once where they are in one band: those of few bands, and those of many.
-    pub fn lists(&self) -> [&[u32]; 2] {
-        [&self.items, &self.tall_items]
+        let tall = spanned.iter().filter(is_tall).copied().collect();
+        Self { starts, items, tall, all: spanned.iter().map(|s| s.item).collect() }
     }
 
     /// The band's items.

@@ -8,36 +8,41 @@ use super::samples::{SampleBand, SampleGrid};
 use super::tiles::Tiles;
 use super::transform::recip;
 use super::visibility;
-use super::visibility::Setup;
+use super::visibility::{Part, Setup};
 use crate::backend::cpu::RasterContext;
-use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::isa::{Isa, LANES};
 use crate::plan::sample_offsets;
 
 /// Largest width and height of a triangle that is set up in lanes, 1/256 px. Twice its square, and
 /// some, is below 2^31.
-const EXTENT_MAX: i32 = 64 * 256;
+pub const EXTENT_MAX: i32 = 64 * 256;
 
 /// Largest width and height of what is drawn without looking which blocks are empty, pixels.
-const SHORT_MAX: i32 = 16;
+pub const SHORT_MAX: i32 = 16;
 
-/// Up to eight triangles that need no clipping.
+/// Draws triangles that need no clipping. Eight are collected while the eight before them wait with
+/// their corners loaded, so that the memory is read ahead of what needs it.
 #[derive(Default)]
 pub struct Batch {
+    /// Triangles of which only the indices are known.
     ids: [u32; LANES],
+    vertices: [[u32; 3]; LANES],
     len: usize,
+    waiting: Corners,
 }
 
 impl Batch {
     /// Adds a triangle. True if the batch is full, and to be drawn now.
     #[inline(always)]
-    pub fn push(&mut self, id: u32) -> bool {
+    pub fn push(&mut self, context: &RasterContext<'_>, id: u32) -> bool {
         self.ids[self.len % LANES] = id;
+        self.vertices[self.len % LANES] = context.triangle(id);
         self.len += 1;
         self.len == LANES
     }
 
-    /// Draws the triangles, except those that `tiles` hides, and empties the batch. Returns the
-    /// number of samples tested.
+    /// Loads the new triangles' corners and draws those that wait, except where `tiles` hides them.
+    /// Returns the number of samples tested.
     #[inline(always)]
     pub fn draw<const S: usize>(
         &mut self,
@@ -45,9 +50,12 @@ impl Batch {
         band: &mut SampleBand,
         tiles: Option<&Tiles>,
     ) -> u64 {
-        let setups = Setups::new::<S>(&Corners::load(context, &self.ids, self.len), band);
+        let next = Corners::load(context, self);
+        let corners = std::mem::replace(&mut self.waiting, next);
+        self.len = 0;
+        let setups = set_up::<S>(context.isa, &corners, band);
         let mut tested = 0;
-        for l in 0..self.len {
+        for l in 0..corners.len {
             let [[left, right], [top, bottom]] = setups.bounds_of(l);
             if left > right || top > bottom {
                 continue;
@@ -56,34 +64,36 @@ impl Batch {
             if tiles.is_some_and(|tiles| tiles.hide([left, right], [top, bottom], depth_max)) {
                 continue;
             }
-            let id = self.ids[l];
+            let id = corners.ids[l];
             if setups.is_short[l] {
-                setups.draw::<S>(l, id, band);
+                draw_short::<S>(context.isa, &setups.short(l), id, band);
                 tested += ((right - left + 1) * (bottom - top + 1)) as u64 * S as u64;
             } else if let Some(setup) = Setup::new(&context.screen_triangle(id)) {
-                tested += visibility::draw(&setup, id, &mut Nearest(band));
+                tested += draw_long::<S>(context.isa, &setup, id, band);
             }
         }
-        self.len = 0;
         tested
     }
 }
 
-/// Corners of eight triangles.
-struct Corners {
-    x: [[i32; LANES]; 3],
-    y: [[i32; LANES]; 3],
-    z: [[f32; LANES]; 3],
+/// Corners of up to eight triangles.
+#[derive(Default)]
+pub struct Corners {
+    ids: [u32; LANES],
+    len: usize,
+    pub x: [[i32; LANES]; 3],
+    pub y: [[i32; LANES]; 3],
+    pub z: [[f32; LANES]; 3],
 }
 
 impl Corners {
     #[inline(always)]
-    fn load(context: &RasterContext<'_>, ids: &[u32; LANES], len: usize) -> Self {
-        let mut corners = Self { x: [[0; LANES]; 3], y: [[0; LANES]; 3], z: [[0.0; LANES]; 3] };
-        for l in 0..LANES.min(len) {
-            let v = context.screen_triangle(ids[l]);
+    fn load(context: &RasterContext<'_>, batch: &Batch) -> Self {
+        let mut corners = Self { ids: batch.ids, len: batch.len.min(LANES), ..Self::default() };
+        for l in 0..corners.len {
             for k in 0..3 {
-                (corners.x[k][l], corners.y[k][l], corners.z[k][l]) = (v[k].x, v[k].y, v[k].z);
+                let v = &context.vertices[batch.vertices[l][k] as usize];
+                (corners.x[k][l], corners.y[k][l], corners.z[k][l]) = (v.x, v.y, v.z);
             }
         }
         corners
@@ -92,35 +102,27 @@ impl Corners {
 
 /// Eight triangles, ready to be drawn. Lanes that are not short have their bounds and their depth
 /// range alone.
-struct Setups {
+#[derive(Default)]
+pub struct Setups {
     /// First and last column, and row; the first beyond the last where there are no samples.
-    bounds: [[[i32; LANES]; 2]; 2],
-    is_short: [bool; LANES],
+    pub bounds: [[[i32; LANES]; 2]; 2],
+    pub is_short: [bool; LANES],
     /// Change of the edge functions.
-    dx: [[i32; LANES]; 3],
-    dy: [[i32; LANES]; 3],
+    pub dx: [[i32; LANES]; 3],
+    pub dy: [[i32; LANES]; 3],
     /// Edge functions in sixteenths at the first pixel's corner.
-    edges: [[i32; LANES]; 3],
+    pub edges: [[i32; LANES]; 3],
     /// That corner from the triangle's first, 1/256 px.
-    from: [[i32; LANES]; 2],
+    pub from: [[i32; LANES]; 2],
     /// Depth at the triangle's first corner, and its change per 1/256 px.
-    depth: [[f32; LANES]; 3],
-    depth_range: [[f32; LANES]; 2],
+    pub depth: [[f32; LANES]; 3],
+    pub depth_range: [[f32; LANES]; 2],
 }
 
 impl Setups {
     #[inline(always)]
     fn new<const S: usize>(corners: &Corners, band: &SampleBand) -> Self {
-        let mut s = Self {
-            bounds: [[[0; LANES]; 2]; 2],
-            is_short: [false; LANES],
-            dx: [[0; LANES]; 3],
-            dy: [[0; LANES]; 3],
-            edges: [[0; LANES]; 3],
-            from: [[0; LANES]; 2],
-            depth: [[0.0; LANES]; 3],
-            depth_range: [[0.0; LANES]; 2],
-        };
+        let mut s = Self::default();
         let grid = SampleGrid::new(S as u32);
         let half = band.size_px.map(|size| size as i32 * 128);
         let ranges = band.range();
@@ -138,7 +140,8 @@ impl Setups {
             s.is_short[l] = (high[0] - low[0] <= EXTENT_MAX)
                 & (high[1] - low[1] <= EXTENT_MAX)
                 & (columns[1].wrapping_sub(columns[0]) < SHORT_MAX)
-                & (rows[1].wrapping_sub(rows[0]) < SHORT_MAX);
+                & (rows[1].wrapping_sub(rows[0]) < SHORT_MAX)
+                & (z[0].min(z[1]).min(z[2]) > 0.0);
             s.depth_range[0][l] = z[0].min(z[1]).min(z[2]);
             s.depth_range[1][l] = z[0].max(z[1]).max(z[2]);
             // What follows means nothing where it wraps: those lanes are not short.
@@ -185,47 +188,96 @@ impl Setups {
         [[left[l], right[l]], [top[l], bottom[l]]]
     }
 
-    /// Draws the short triangle of lane `l`.
+    /// The short triangle of lane `l`.
     #[inline(always)]
-    fn draw<const S: usize>(&self, l: usize, id: u32, band: &mut SampleBand) {
-        let [[left, right], [top, bottom]] = self.bounds_of(l);
-        let (dx, dy, edges) = (lane(&self.dx, l), lane(&self.dy, l), lane(&self.edges, l));
-        let (depth, range) = (lane(&self.depth, l), [self.depth_range[0][l], self.depth_range[1][l]]);
-        let pixels = (LANES / S).max(1);
-        for part in 0..S.div_ceil(LANES) {
-            let [offset_x, offset_y] = lane_offsets::<S>(part);
-            let (mut steps, mut x) = ([[0; LANES]; 3], [0; LANES]);
-            for i in 0..LANES {
-                for k in 0..3 {
-                    steps[k][i] = edges[k] + (dx[k] * offset_y[i] - dy[k] * offset_x[i]);
-                }
-                x[i] = self.from[0][l] + 16 * offset_x[i];
+    fn short(&self, l: usize) -> Part {
+        Part {
+            bounds: self.bounds_of(l),
+            dx: lane(&self.dx, l),
+            dy: lane(&self.dy, l),
+            edges: lane(&self.edges, l),
+            from: [self.from[0][l], self.from[1][l]],
+            depth: lane(&self.depth, l),
+            depth_range: [self.depth_range[0][l], self.depth_range[1][l]],
+        }
+    }
+}
+
+#[inline(always)]
+#[allow(unsafe_code)]
+fn set_up<const S: usize>(isa: Isa, corners: &Corners, band: &SampleBand) -> Setups {
+    #[cfg(target_arch = "x86_64")]
+    if isa.has_avx2() {
+        // SAFETY: the processor has AVX2, as `isa` says.
+        return unsafe { super::batch_avx2::set_up::<S>(corners, band) };
+    }
+    let _ = isa;
+    Setups::new::<S>(corners, band)
+}
+
+/// Draws a triangle block by block. Returns the number of samples tested.
+#[inline(always)]
+fn draw_long<const S: usize>(isa: Isa, setup: &Setup, id: u32, band: &mut SampleBand) -> u64 {
+    if !isa.has_own_batch() || setup.depth_range[0] <= 0.0 {
+        return visibility::draw(setup, id, &mut Nearest(band));
+    }
+    let mut parts = 0;
+    let (size_px, range) = (band.size_px, band.range());
+    visibility::for_each_part::<S>(setup, size_px, range, |part| {
+        draw_short::<S>(isa, part, id, band);
+        parts += 1;
+    });
+    parts * (64 * S as u64)
+}
+
+/// Draws part of a triangle whose depths are above 0.
+#[inline(always)]
+#[allow(unsafe_code)]
+fn draw_short<const S: usize>(isa: Isa, part: &Part, id: u32, band: &mut SampleBand) {
+    #[cfg(target_arch = "x86_64")]
+    if isa.has_avx2() {
+        // SAFETY: the processor has AVX2, as `isa` says.
+        return unsafe { super::batch_avx2::draw_short::<S>(part, id, band) };
+    }
+    let _ = isa;
+    draw_part::<S>(part, id, band);
+}
+
+#[inline(always)]
+fn draw_part<const S: usize>(part: &Part, id: u32, band: &mut SampleBand) {
+    let Part { bounds: [[left, right], [top, bottom]], dx, dy, edges, from, depth, depth_range } = *part;
+    let pixels = (LANES / S).max(1);
+    for part in 0..S.div_ceil(LANES) {
+        let [offset_x, offset_y] = lane_offsets::<S>(part);
+        let (mut steps, mut x) = ([[0; LANES]; 3], [0; LANES]);
+        for i in 0..LANES {
+            for k in 0..3 {
+                steps[k][i] = edges[k] + (dx[k] * offset_y[i] - dy[k] * offset_x[i]);
             }
-            for row in 0..=bottom - top {
-                let mut depth_y = [0.0; LANES];
-                for i in 0..LANES {
-                    depth_y[i] = depth[2] * (self.from[1][l] + 256 * row + 16 * offset_y[i]) as f32;
-                }
-                let mut at = band.index(left, top + row, 0) + LANES * part;
-                for column in (0..=right - left).step_by(pixels) {
-                    let (mut outside, mut z) = ([0; LANES], [0.0; LANES]);
-                    for k in 0..3 {
-                        let base = 16 * (dx[k] * row - dy[k] * column);
-                        for i in 0..LANES {
-                            outside[i] |= base + steps[k][i];
-                        }
-                    }
+            x[i] = from[0] + 16 * offset_x[i];
+        }
+        for row in 0..=bottom - top {
+            let mut depth_y = [0.0; LANES];
+            for i in 0..LANES {
+                depth_y[i] = depth[2] * (from[1] + 256 * row + 16 * offset_y[i]) as f32;
+            }
+            let mut at = band.index(left, top + row, 0) + LANES * part;
+            for column in (0..=right - left).step_by(pixels) {
+                let (mut outside, mut z) = ([0; LANES], [0.0; LANES]);
+                for k in 0..3 {
+                    let base = 16 * (dx[k] * row - dy[k] * column);
                     for i in 0..LANES {
-                        let across = depth[0] + depth[1] * (x[i] + 256 * column) as f32;
-                        z[i] = visibility::clamp(across + depth_y[i], range);
+                        outside[i] |= base + steps[k][i];
                     }
-                    let depths = band.depth.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
-                    let ids = band.ids.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
-                    if let (Some(depths), Some(ids)) = (depths, ids) {
-                        update(&outside, &z, id, depths, ids);
-                    }
-                    at += pixels * S;
                 }
+                for i in 0..LANES {
+                    let across = depth[0] + depth[1] * (x[i] + 256 * column) as f32;
+                    z[i] = visibility::clamp(across + depth_y[i], depth_range);
+                }
+                if let Some((depths, ids)) = band.lanes_mut(at) {
+                    update(&outside, &z, id, depths, ids);
+                }
+                at += pixels * S;
             }
         }
     }
@@ -240,7 +292,7 @@ fn lane<T: Copy>(v: &[[T; LANES]; 3], l: usize) -> [T; 3] {
 /// Each lane's sample from the pixel's corner (moved by what the samples leave modulo 16), in 1/16
 /// px: across, down.
 #[inline(always)]
-fn lane_offsets<const S: usize>(part: usize) -> [[i32; LANES]; 2] {
+pub fn lane_offsets<const S: usize>(part: usize) -> [[i32; LANES]; 2] {
     let offsets = sample_offsets(S as u32);
     let (mut x, mut y) = ([0; LANES], [0; LANES]);
     for i in 0..LANES {

@@ -7,6 +7,8 @@
 //! both back-ends agree on every sample. Twins are in `shaders/geometry/`.
 
 pub(crate) mod batch;
+#[cfg(target_arch = "x86_64")]
+mod batch_avx2;
 pub(crate) mod clip;
 pub(crate) mod nearest;
 pub(crate) mod samples;

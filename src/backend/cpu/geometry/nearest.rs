@@ -15,18 +15,14 @@ impl Target for Nearest<'_> {
 
     #[inline(always)]
     fn offer(&mut self, at: usize, outside: &[i32; LANES], z: &[f32; LANES], id: u32) {
-        let depths = self.0.depth.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
-        let ids = self.0.ids.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
-        if let (Some(depths), Some(ids)) = (depths, ids) {
+        if let Some((depths, ids)) = self.0.lanes_mut(at) {
             update(outside, z, id, depths, ids);
         }
     }
 }
 
 /// Keeps, lane by lane, the nearer of what is there and triangle `id`. Written as whole-array steps
-/// without branches, which is the form that compilers turn into vector instructions. (Without the
-/// test for ties it would become masked stores, which take several times as long on some
-/// processors.)
+/// without branches, which is the form that compilers turn into vector instructions.
 #[inline(always)]
 pub fn update(outside: &[i32; LANES], z: &[f32; LANES], id: u32, depths: &mut [f32; LANES], ids: &mut [u32; LANES]) {
     let (old_depths, old_ids) = (*depths, *ids);

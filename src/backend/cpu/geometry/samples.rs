@@ -23,9 +23,9 @@ pub const NOTHING: u32 = u32::MAX;
 #[derive(Clone, Copy)]
 pub struct SampleGrid {
     /// Binary logarithm of the number in a pixel.
-    shift: i32,
+    pub shift: i32,
     /// Distance from the pixel's border to the first, 1/256 px.
-    border: i32,
+    pub border: i32,
 }
 
 impl SampleGrid {
@@ -98,6 +98,14 @@ impl SampleBand {
     pub fn index(&self, x: i32, y: i32, s: u32) -> usize {
         let column = (x + self.margin as i32) as u32;
         (y - self.first_row) as usize * self.stride + (column * self.samples + s) as usize
+    }
+
+    /// Depths and ids of the samples from `at` on.
+    #[inline(always)]
+    pub fn lanes_mut(&mut self, at: usize) -> Option<(&mut [f32; LANES], &mut [u32; LANES])> {
+        let depths = self.depth.get_mut(at..)?.first_chunk_mut::<LANES>()?;
+        let ids = self.ids.get_mut(at..)?.first_chunk_mut::<LANES>()?;
+        Some((depths, ids))
     }
 
     /// Depth and id of a sample in one number: nearer is larger; of equal depths the lower id is.

@@ -77,10 +77,7 @@ fn find_kernel(context: &RasterContext<'_>, bin: &TriangleBin, colors: &mut [[f3
         colors[id as usize - bin.ids.start] = UNKNOWN;
     }
     for (list, is_front) in [(&bin.fronts, true), (&bin.backs, false)] {
-        // No closures here: they are functions of their own, compiled for the baseline.
-        for ids in list.lists() {
-            find_in_list(context, ids, is_front, (bin.ids.start, &mut *colors));
-        }
+        find_in_list(context, &list.all, is_front, (bin.ids.start, &mut *colors));
     }
 }
 
@@ -161,52 +158,71 @@ fn shade_sampled<const S: usize>(
     band: &SampleBand,
     colors: &mut [[f32; 4]],
 ) {
-    let width = band.size_px[0];
-    let mut shader = Shader::new(context);
-    for (y, line) in (band.shown[0]..band.shown[1]).zip(colors.chunks_exact_mut(width as usize)) {
+    let width = band.size_px[0] as usize;
+    for (y, line) in (band.shown[0]..band.shown[1]).zip(colors.chunks_exact_mut(width)) {
         let first = band.index(0, y as i32, 0);
-        let (ids, _) = band.ids[first..first + width as usize * S].as_chunks::<S>();
-        let groups = ids.chunks(LANES).zip(line.chunks_mut(LANES));
-        for (x, (ids, out)) in (0..).step_by(LANES).zip(groups) {
-            let same = ids[0][0];
-            if ids.iter().all(|ids| ids.iter().fold(0, |other, id| other | (id ^ same)) == 0) {
-                let color = flat.of(same);
-                if !color[3].is_nan() {
-                    out.fill(color);
-                    continue;
-                }
+        let row = &band.ids[first..first + width * S];
+        let groups = row.chunks(LANES * S).zip(line.chunks_mut(LANES));
+        for (x, (group, out)) in (0..).step_by(LANES).zip(groups) {
+            // Without a way out in between, this is a few vector instructions.
+            let difference = group.iter().fold(0, |other, id| other | (id ^ group[0]));
+            let color = flat.of(group[0]);
+            if difference == 0 && !color[3].is_nan() {
+                out.fill(color);
+                continue;
             }
-            for (x, (ids, out)) in (x..).zip(ids.iter().zip(out)) {
+            let (pixels, _) = group.as_chunks::<S>();
+            for (x, (ids, out)) in (x..).zip(pixels.iter().zip(out)) {
                 *out = mean(flat, ids);
                 if out[3].is_nan() {
-                    *out = shader.pixel::<S>(band, x, y);
+                    *out = pixel_by_point::<S>(context, band, [x, y]);
                 }
             }
         }
     }
 }
 
+/// A pixel with a colour that is not known.
+#[cold]
+#[inline(never)]
+fn pixel_by_point<const S: usize>(context: &RasterContext<'_>, band: &SampleBand, [x, y]: [u32; 2]) -> [f32; 4] {
+    Shader::new(context).pixel::<S>(band, x, y)
+}
+
 /// The mean of the samples' colours. Each triangle's share is added at once, at its first sample,
 /// as [`Shader`] does.
 #[inline(always)]
 fn mean<const S: usize>(flat: &FlatColors, ids: &[u32; S]) -> [f32; 4] {
-    let (mut counts, mut is_later) = ([0_i32; S], [0_i32; S]);
-    for s in 0..S {
-        for t in 0..S {
-            let same = -i32::from(ids[s] == ids[t]);
-            counts[t] -= same;
-            if t > s {
-                is_later[t] |= same;
-            }
-        }
-    }
+    let weights = weights(ids);
     let mut sum = [0.0; 4];
     for s in 0..S {
-        let weight = (counts[s] & !is_later[s]) as f32 * (1.0 / S as f32);
         let color = flat.of(ids[s]);
         for k in 0..4 {
-            sum[k] += weight * color[k];
+            sum[k] += weights[s] * color[k];
         }
     }
     sum
+}
+
+/// Each triangle's share of the samples at its first sample, 0 at the others.
+#[inline(always)]
+fn weights<const S: usize>(ids: &[u32; S]) -> [f32; S] {
+    let (mut counts, mut is_later) = ([0_i32; S], [0_i32; S]);
+    for s in 0..S {
+        let mut same = [0_i32; S];
+        for t in 0..S {
+            same[t] = -i32::from(ids[s] == ids[t]);
+        }
+        for t in 0..S {
+            counts[t] -= same[t];
+        }
+        for t in s + 1..S {
+            is_later[t] |= same[t];
+        }
+    }
+    let mut weights = [0.0; S];
+    for s in 0..S {
+        weights[s] = (counts[s] & !is_later[s]) as f32 * (1.0 / S as f32);
+    }
+    weights
 }
