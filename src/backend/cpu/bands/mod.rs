@@ -192,8 +192,8 @@ fn draw_batches<'a, const S: usize>(
 ) -> ControlFlow<()> {
     let mut batch = Batch::default();
     for list in lists {
-        for id in list.items_in(band) {
-            if batch.push(context, id) {
+        for triangle in list.items_in(band) {
+            if batch.push(triangle.id, triangle.vertices) {
                 let tested = batch.draw::<S>(context, samples, tiles);
                 if poll.is_expired_after(LANES as u64, tested) {
                     return ControlFlow::Break(());

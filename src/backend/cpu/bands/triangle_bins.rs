@@ -14,7 +14,7 @@ use crate::plan::{DrawPlan, Faces, pass_mask};
 
 /// Triangles that touch this many bands are listed once for all of them. Otherwise large ones on a
 /// tall picture would take gigabytes of lists.
-const TALL_BANDS: usize = 8;
+const TALL_BANDS: usize = 4;
 
 /// Triangles of one pass.
 pub struct TrianglePass {
@@ -41,27 +41,36 @@ pub struct TriangleBin {
     piece_bands: Bin,
 }
 
-/// Items by band, in one list.
+/// Triangles by band, in one list.
 #[derive(Default)]
 pub struct BandLists {
     /// Where each band's items start in `items`, and the last ones' end.
     starts: Vec<u32>,
-    items: Vec<u32>,
-    /// Items that touch many bands.
-    tall: Vec<Spanned>,
-    /// Every item once, in ascending order.
+    items: Vec<ListedTriangle>,
+    /// Triangles that touch many bands, with the first and last.
+    tall: Vec<(ListedTriangle, [u16; 2])>,
+    /// Every triangle's id once, in ascending order.
     pub all: Vec<u32>,
 }
 
-/// An item, and the first and last band that it touches.
+/// A triangle in a list, with what would else be looked up all over memory.
+#[derive(Clone, Copy, Default)]
+pub struct ListedTriangle {
+    /// Its id.
+    pub id: u32,
+    /// Indices of its vertices.
+    pub vertices: [u32; 3],
+}
+
+/// A triangle's id, and the first and last band that it touches.
 #[derive(Clone, Copy, Default)]
 struct Spanned {
-    item: u32,
+    id: u32,
     bands: [u16; 2],
 }
 
 impl BandLists {
-    fn new(spanned: &[Spanned], bands: usize) -> Self {
+    fn new(spanned: &[Spanned], bands: usize, vertices_of: impl Fn(u32) -> [u32; 3]) -> Self {
         let span = |s: &Spanned| s.bands[0] as usize..s.bands[1] as usize + 1;
         let is_tall = |s: &&Spanned| span(s).len() > TALL_BANDS;
         // Counts, shifted by one band, become starts, which the second pass moves to the ends.
@@ -74,22 +83,24 @@ impl BandLists {
         for band in 2..starts.len() {
             starts[band] += starts[band - 1];
         }
-        let mut items = vec![0; starts[bands + 1] as usize];
+        let listed = |id: u32| ListedTriangle { id, vertices: vertices_of(id) };
+        let mut items = vec![ListedTriangle::default(); starts[bands + 1] as usize];
         for s in spanned.iter().filter(|s| !is_tall(s)) {
+            let triangle = listed(s.id);
             for band in span(s) {
-                items[starts[band + 1] as usize] = s.item;
+                items[starts[band + 1] as usize] = triangle;
                 starts[band + 1] += 1;
             }
         }
-        let tall = spanned.iter().filter(is_tall).copied().collect();
-        Self { starts, items, tall, all: spanned.iter().map(|s| s.item).collect() }
+        let tall = spanned.iter().filter(is_tall).map(|s| (listed(s.id), s.bands)).collect();
+        Self { starts, items, tall, all: spanned.iter().map(|s| s.id).collect() }
     }
 
-    /// The band's items.
-    pub fn items_in(&self, band: usize) -> impl Iterator<Item = u32> {
+    /// The band's triangles.
+    pub fn items_in(&self, band: usize) -> impl Iterator<Item = ListedTriangle> {
         let at = |i: usize| self.starts.get(i).map_or(0, |&start| start as usize);
-        let is_here = move |s: &&Spanned| (s.bands[0] as usize..=s.bands[1] as usize).contains(&band);
-        let tall = self.tall.iter().filter(is_here).map(|s| s.item);
+        let is_here = move |[first, last]: [u16; 2]| (first as usize..=last as usize).contains(&band);
+        let tall = self.tall.iter().filter(move |(_, bands)| is_here(*bands)).map(|(triangle, _)| *triangle);
         self.items[at(band)..at(band + 1)].iter().copied().chain(tall)
     }
 }
@@ -113,8 +124,8 @@ impl TriangleBin {
         keep(context.isa, context, &bounds, pass, &mut kept);
         let mut bin = Self {
             ids: pass.ids.clone(),
-            fronts: BandLists::new(&kept.fronts[..kept.counts[0]], bands),
-            backs: BandLists::new(&kept.backs[..kept.counts[1]], bands),
+            fronts: BandLists::new(&kept.fronts[..kept.counts[0]], bands, |id| context.triangle(id)),
+            backs: BandLists::new(&kept.backs[..kept.counts[1]], bands, |id| context.triangle(id)),
             pieces: Vec::new(),
             piece_bands: Bin::new(bands, TALL_BANDS),
         };
@@ -152,7 +163,7 @@ impl TriangleBin {
 
     /// The band's triangles that need no clipping.
     pub fn whole_in(&self, band: usize) -> impl Iterator<Item = u32> {
-        self.fronts.items_in(band).chain(self.backs.items_in(band))
+        self.fronts.items_in(band).chain(self.backs.items_in(band)).map(|triangle| triangle.id)
     }
 
     /// The band's clipped pieces with their ids.
@@ -245,7 +256,7 @@ fn keep_kernel(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass
         for l in 0..LANES {
             let area = group.area[l];
             let bands = [0, 1].map(|k| ((seen.rows[k][l] as f32 + 0.5) * per_row) as u16);
-            let spanned = Spanned { item: (first + l) as u32, bands };
+            let spanned = Spanned { id: (first + l) as u32, bands };
             // Written in any case, kept by the count.
             kept.fronts[kept.counts[0]] = spanned;
             kept.backs[kept.counts[1]] = spanned;
@@ -340,10 +351,10 @@ mod tests {
 
     #[test]
     fn each_band_lists_the_items_that_touch_it() {
-        let spanned: Vec<Spanned> = (100..).zip(SPANS).map(|(item, bands)| Spanned { item, bands }).collect();
-        let lists = BandLists::new(&spanned, 20);
+        let spanned: Vec<Spanned> = (100..).zip(SPANS).map(|(id, bands)| Spanned { id, bands }).collect();
+        let lists = BandLists::new(&spanned, 20, |id| [id, 0, 1]);
         for band in 0..20 {
-            let mut found: Vec<u32> = lists.items_in(band as usize).collect();
+            let mut found: Vec<u32> = lists.items_in(band as usize).map(|triangle| triangle.id).collect();
             found.sort_unstable();
             assert_eq!(found, items_of(band), "band {band}");
         }

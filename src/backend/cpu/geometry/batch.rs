@@ -34,9 +34,9 @@ pub struct Batch {
 impl Batch {
     /// Adds a triangle. True if the batch is full, and to be drawn now.
     #[inline(always)]
-    pub fn push(&mut self, context: &RasterContext<'_>, id: u32) -> bool {
+    pub fn push(&mut self, id: u32, vertices: [u32; 3]) -> bool {
         self.ids[self.len % LANES] = id;
-        self.vertices[self.len % LANES] = context.triangle(id);
+        self.vertices[self.len % LANES] = vertices;
         self.len += 1;
         self.len == LANES
     }
