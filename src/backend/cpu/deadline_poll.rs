@@ -24,7 +24,13 @@ impl<'a> DeadlinePoll<'a> {
     /// tested, and not again once it is true.
     #[inline(always)]
     pub fn is_expired(&mut self, samples: u64) -> bool {
-        let work = samples + WORK_PER_TRIANGLE;
+        self.is_expired_after(1, samples)
+    }
+
+    /// The same after several triangles.
+    #[inline(always)]
+    pub fn is_expired_after(&mut self, triangles: u64, samples: u64) -> bool {
+        let work = samples + triangles * WORK_PER_TRIANGLE;
         if work <= self.left {
             self.left -= work;
             return false;

@@ -82,6 +82,12 @@ impl Isa {
         self.0 == Level::Avx2
     }
 
+    /// True if the steps of `geometry::batch` are written in this level's own instructions.
+    #[inline(always)]
+    pub(in crate::backend::cpu) fn has_own_batch(self) -> bool {
+        self.0 != Level::Baseline
+    }
+
     #[cfg(target_arch = "x86_64")]
     fn avx2() -> Option<Self> {
         for_avx2_features!(are_detected! {}).then_some(Self(Level::Avx2))

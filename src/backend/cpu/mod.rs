@@ -31,6 +31,7 @@ use rayon::prelude::*;
 use self::bands::bins::Bins;
 use self::bands::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, ScratchPool};
 use self::resolve::SrgbEncoder;
+use self::surface::flat::FlatColors;
 use super::{BackendKind, DrawError, Renderer};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::image::Image;
@@ -47,6 +48,7 @@ pub struct CpuRenderer {
     vertices: Vec<ScreenVertex>,
     scratch: ScratchPool,
     srgb: SrgbEncoder,
+    flat: FlatColors,
 }
 
 /// Input of every stage: the plan and the vertices on screen.
@@ -57,6 +59,8 @@ pub struct RasterContext<'a> {
     vertices: &'a [ScreenVertex],
     isa: Isa,
     srgb: &'a SrgbEncoder,
+    /// The colours of triangles, where these are all that there is to know.
+    flat: Option<&'a FlatColors>,
 }
 
 impl CpuRenderer {
@@ -72,8 +76,8 @@ impl CpuRenderer {
 
     /// A renderer that shares threads with others.
     pub fn on(threads: Arc<DrawingThreads>) -> Self {
-        let (vertices, scratch) = (Vec::new(), ScratchPool::default());
-        Self { isa: Isa::detect(), threads, vertices, scratch, srgb: SrgbEncoder::new() }
+        let (vertices, scratch, flat) = (Vec::new(), ScratchPool::default(), FlatColors::default());
+        Self { isa: Isa::detect(), threads, vertices, scratch, srgb: SrgbEncoder::new(), flat }
     }
 
     /// Transforms the plan's vertices; afterwards [`RasterContext`] can be made.
@@ -90,7 +94,7 @@ impl CpuRenderer {
     }
 
     fn context<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> RasterContext<'a> {
-        RasterContext { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb }
+        RasterContext { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb, flat: None }
     }
 
     /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside
@@ -107,11 +111,16 @@ impl CpuRenderer {
         let share = threads.share();
         let pool = share.pool();
         self.transform(plan, pool);
-        let context = self.context(plan, deadline);
+        let mut flat = std::mem::take(&mut self.flat);
+        let mut context = self.context(plan, deadline);
         // As many bands at once as were paid for, or fewer.
         let mut banding = Banding::new(plan, threads.count());
         banding.at_once = banding.at_once.min(share.count);
         let drawn = bands::bins::bin(&context, pool, [banding.rows, banding.margin]).map(|bins| {
+            if FlatColors::suffice(plan) {
+                flat.find(&context, pool, &bins.triangles);
+                context.flat = Some(&flat);
+            }
             let row_len = out.len() / plan.height_px as usize;
             let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
             run_few(pool, banding.at_once, items, |(band, out)| {
@@ -120,6 +129,7 @@ impl CpuRenderer {
                 }
             });
         });
+        self.flat = flat;
         self.trim();
         drawn?;
         Ok(deadline.check()?)
@@ -130,6 +140,9 @@ impl CpuRenderer {
         self.scratch.trim();
         if self.vertices.capacity() * size_of::<ScreenVertex>() > KEPT_BYTES_MAX {
             self.vertices = Vec::new();
+        }
+        if self.flat.bytes() > KEPT_BYTES_MAX {
+            self.flat = FlatColors::default();
         }
     }
 

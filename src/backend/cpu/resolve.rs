@@ -2,35 +2,47 @@
 //! bytes. Twin of `shaders/resolve.wgsl`.
 
 use crate::backend::cpu::geometry::transform::recip;
+use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::image::srgb8_thresholds;
 use crate::plan::DrawPlan;
 
-/// Linear light to sRGB bytes by the 255 thresholds, with a first guess from a small table.
+/// Cells of the table of bytes: so many that none holds two thresholds.
+const CELLS: usize = 4096;
+
+/// Linear light to sRGB bytes by the 255 thresholds: the cell that a value lies in leaves two bytes
+/// to choose from, and one comparison decides.
 pub struct SrgbEncoder {
-    thresholds: [f32; 256],
-    /// Largest byte whose threshold is not above `i / 4096`.
-    guess: Vec<u8>,
+    cells: Box<[Cell; CELLS]>,
+}
+
+/// The values from `i / CELLS` to the next cell.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    /// The next threshold.
+    threshold: f32,
+    /// The byte below it.
+    byte: u32,
 }
 
 impl SrgbEncoder {
-    /// Builds the tables.
+    /// Builds the table.
     pub fn new() -> Self {
-        let mut thresholds = [f32::INFINITY; 256];
-        thresholds[..255].copy_from_slice(&srgb8_thresholds());
-        let below = |v: f32| thresholds.partition_point(|&t| t <= v) as u8;
-        let guess = (0..4096).map(|i| below(i as f32 / 4096.0)).collect();
-        Self { thresholds, guess }
+        let thresholds = srgb8_thresholds();
+        let mut cells = Box::new([Cell::default(); CELLS]);
+        for (i, cell) in cells.iter_mut().enumerate() {
+            let byte = thresholds.partition_point(|&t| t <= i as f32 / CELLS as f32);
+            *cell = Cell { threshold: thresholds.get(byte).copied().unwrap_or(f32::INFINITY), byte: byte as u32 };
+        }
+        Self { cells }
     }
 
     /// The byte for a linear value; out of range is clamped, NaN is 0.
     #[inline(always)]
     pub fn encode(&self, v: f32) -> u8 {
-        let v = if v > 0.0 { v.min(1.0) } else { 0.0 };
-        let mut byte = self.guess[((v * 4096.0) as usize).min(4095)];
-        while byte < 255 && self.thresholds[byte as usize] <= v {
-            byte += 1;
-        }
-        byte
+        let v = if v > 0.0 { v } else { 0.0 };
+        let v = if v < 1.0 { v } else { 1.0 };
+        let Cell { threshold, byte } = self.cells[((v * CELLS as f32) as i32 as usize).min(CELLS - 1)];
+        (byte + u32::from(threshold <= v)) as u8
     }
 }
 
@@ -47,27 +59,62 @@ pub fn over_background(surface: [f32; 4], background: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|k| surface[k] + background[k] * (1.0 - surface[3]))
 }
 
-/// Composites the surface over the background wherever no line has done so.
-pub fn composite_background(plan: &DrawPlan<'_>, colors: &mut [[f32; 4]]) {
-    for color in colors {
-        if is_composited(color) {
-            color[3] = -color[3];
-        } else {
-            *color = over_background(*color, plan.background);
+dispatch! {
+    /// Writes a band's colours as sRGB bytes, over the background wherever no line has composited
+    /// both.
+    pub fn resolve(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], rgba: &mut [u8]) = resolve_kernel
+}
+
+#[inline(always)]
+fn resolve_kernel(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], rgba: &mut [u8]) {
+    let mut last = Last::of([0.0; 4], plan, srgb);
+    let (groups, rest) = colors.as_chunks::<LANES>();
+    let (pixels, _) = rgba.as_chunks_mut::<4>();
+    let (outs, rest_out) = pixels.split_at_mut(groups.len() * LANES);
+    for (group, out) in groups.iter().zip(outs.chunks_exact_mut(LANES)) {
+        // Neighbours are often the same colour to the bit: large flat faces, the background.
+        if last.is_all(group) {
+            out.fill(last.pixel);
+            continue;
         }
+        for (&c, out) in group.iter().zip(&mut *out) {
+            *out = resolve_pixel(plan, srgb, c);
+        }
+        last = Last { bits: group[LANES - 1].map(f32::to_bits), pixel: out[LANES - 1] };
+    }
+    for (&c, out) in rest.iter().zip(rest_out) {
+        *out = resolve_pixel(plan, srgb, c);
     }
 }
 
-/// Writes a band's colours as sRGB bytes.
-pub fn encode(srgb: &SrgbEncoder, colors: &[[f32; 4]], rgba: &mut [u8]) {
-    let mut last = ([f32::NAN; 4], [0; 4]);
-    for (&c, out) in colors.iter().zip(rgba.chunks_exact_mut(4)) {
-        // Neighbours are often the same colour to the bit: flat faces, background.
-        if c != last.0 {
-            last = (c, encode_pixel(srgb, c));
-        }
-        out.copy_from_slice(&last.1);
+/// A colour, by its bits because a zero's sign matters, and its pixel.
+struct Last {
+    bits: [u32; 4],
+    pixel: [u8; 4],
+}
+
+impl Last {
+    fn of(c: [f32; 4], plan: &DrawPlan<'_>, srgb: &SrgbEncoder) -> Self {
+        Self { bits: c.map(f32::to_bits), pixel: resolve_pixel(plan, srgb, c) }
     }
+
+    /// True if a group has no other colour.
+    #[inline(always)]
+    fn is_all(&self, group: &[[f32; 4]; LANES]) -> bool {
+        let mut difference = [0; 4];
+        for c in group {
+            for k in 0..4 {
+                difference[k] |= c[k].to_bits() ^ self.bits[k];
+            }
+        }
+        difference == [0; 4]
+    }
+}
+
+#[inline(always)]
+fn resolve_pixel(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, c: [f32; 4]) -> [u8; 4] {
+    let c = if is_composited(&c) { [c[0], c[1], c[2], -c[3]] } else { over_background(c, plan.background) };
+    encode_pixel(srgb, c)
 }
 
 #[inline(always)]
@@ -83,4 +130,24 @@ fn encode_pixel(srgb: &SrgbEncoder, c: [f32; 4]) -> [u8; 4] {
     let inverse = recip(alpha.max(1e-30));
     let a = (alpha * 255.0 + 0.5) as u8;
     [srgb.encode(c[0] * inverse), srgb.encode(c[1] * inverse), srgb.encode(c[2] * inverse), a]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_the_thresholds_in_every_cell() {
+        let (encoder, thresholds) = (SrgbEncoder::new(), srgb8_thresholds());
+        for (k, &threshold) in thresholds.iter().enumerate() {
+            let below = f32::from_bits(threshold.to_bits() - 1);
+            assert_eq!([encoder.encode(below), encoder.encode(threshold)], [k as u8, k as u8 + 1]);
+        }
+        for i in 0..=8 * CELLS {
+            let v = i as f32 / (8 * CELLS) as f32;
+            assert_eq!(encoder.encode(v), thresholds.partition_point(|&t| t <= v) as u8, "{v}");
+        }
+        let odd = [-1.0, -0.0, f32::NAN, f32::NEG_INFINITY, 1.0, 7.0, f32::INFINITY];
+        assert_eq!(odd.map(|v| encoder.encode(v)), [0, 0, 0, 0, 255, 255, 255]);
+    }
 }

@@ -1,16 +1,19 @@
 //! Vectors of three, for the stages shade and lines.
 
 /// Scalar product.
+#[inline(always)]
 pub fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
 }
 
 /// `a - b`
+#[inline(always)]
 pub fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// Vector product.
+#[inline(always)]
 pub fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
@@ -31,11 +34,13 @@ pub fn unit_or(v: [f32; 3], otherwise: [f32; 3]) -> [f32; 3] {
 
 /// A face's unit normal on the viewer's side. It is not normalised again, so that it keeps its
 /// bits.
+#[inline(always)]
 pub fn turned_to_viewer(n: [f32; 3], front: bool) -> [f32; 3] {
     if front { n } else { n.map(|v| -v) }
 }
 
 /// The unit normal on the viewer's side of interpolated corner normals.
+#[inline(always)]
 pub fn facing(n: [f32; 3], front: bool) -> [f32; 3] {
     let length_squared = dot(n, n);
     let scale = if length_squared > 1e-20 { 1.0 / length_squared.sqrt() } else { 0.0 };

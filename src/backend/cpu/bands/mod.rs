@@ -5,13 +5,20 @@
 
 pub(crate) mod bins;
 pub(crate) mod scratch;
+pub(crate) mod triangle_bins;
+
+use std::ops::ControlFlow;
+
 use self::bins::{Bin, Bins};
 use self::scratch::BandScratch;
-use super::isa::dispatch;
+use self::triangle_bins::BandLists;
+use super::isa::{LANES, dispatch};
 use super::{RasterContext, resolve};
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
+use crate::backend::cpu::geometry::batch::Batch;
 use crate::backend::cpu::geometry::nearest::Nearest;
-use crate::backend::cpu::geometry::samples::SampleBand;
+use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
+use crate::backend::cpu::geometry::tiles::Tiles;
 use crate::backend::cpu::geometry::visibility;
 use crate::backend::cpu::geometry::visibility::Setup;
 use crate::backend::cpu::lines::coverage::{LineCompositor, LineCoverage};
@@ -19,6 +26,7 @@ use crate::backend::cpu::lines::edge::{LineDrawer, LineTarget};
 use crate::backend::cpu::lines::line_light;
 use crate::backend::cpu::peeling::composite;
 use crate::backend::cpu::peeling::state::PeelBand;
+use crate::backend::cpu::surface::flat::shade_flat;
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::cpu::surface::shade;
 use crate::plan::LinePass;
@@ -36,12 +44,13 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
     if let Some(pass) = plan.peeling() {
         let peel = scratch.peel.get_or_insert_with(|| PeelBand::new(&scratch.samples, scratch.rows));
         composite::draw(context, pass, (&bins.peel, band), &scratch.samples, peel, &mut scratch.colors);
+    } else if let Some(flat) = context.flat {
+        shade_flat(isa, context, flat, &scratch.samples, &mut scratch.colors);
     } else if plan.is_shaded() {
         shade_band(isa, context, &scratch.samples, &mut scratch.colors);
     }
     draw_lines(context, scratch, bins, band);
-    resolve::composite_background(plan, &mut scratch.colors);
-    resolve::encode(context.srgb, &scratch.colors, rgba);
+    resolve::resolve(isa, plan, context.srgb, &scratch.colors, rgba);
 }
 
 /// Draws band number `band` of the visibility buffer alone, as
@@ -149,28 +158,53 @@ dispatch! {
 
 #[inline(always)]
 fn triangles_kernel(context: &RasterContext<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) {
+    for_samples!(samples.samples, triangles_sampled(context, bins, band, samples));
+}
+
+/// Clipped pieces and faces towards the viewer first. Most of those that face away lie behind them,
+/// which is quickly seen.
+#[inline(always)]
+fn triangles_sampled<const S: usize>(context: &RasterContext<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) {
     let mut poll = DeadlinePoll::new(context.deadline);
-    for chunk in &bins.triangles {
-        // Only ascending ids need no test for ties.
-        let ordered = chunk.whole.is_ordered() && !context.plan.projection.clip;
-        for (id, piece) in chunk.pieces_in(band) {
-            let setup = Setup::new(piece);
-            if poll.is_expired(setup.map_or(0, |setup| visibility::draw(&setup, id, &mut Nearest::<true>(samples)))) {
-                return;
-            }
+    for (id, piece) in bins.triangles.iter().flat_map(|chunk| chunk.pieces_in(band)) {
+        let setup = Setup::new(piece);
+        if poll.is_expired(setup.map_or(0, |setup| visibility::draw(&setup, id, &mut Nearest(samples)))) {
+            return;
         }
-        for id in chunk.whole.items_in(band) {
-            let setup = Setup::new(&context.screen_triangle(id));
-            let looked_at = match setup {
-                Some(setup) if ordered => visibility::draw(&setup, id, &mut Nearest::<false>(samples)),
-                Some(setup) => visibility::draw(&setup, id, &mut Nearest::<true>(samples)),
-                None => 0,
-            };
-            if poll.is_expired(looked_at) {
-                return;
+    }
+    let fronts = bins.triangles.iter().map(|chunk| &chunk.fronts);
+    let drawn = draw_batches::<S>(context, (fronts, band), samples, None, &mut poll);
+    let backs = bins.triangles.iter().map(|chunk| &chunk.backs);
+    if drawn.is_continue() && backs.clone().any(|list| list.items_in(band).next().is_some()) {
+        let tiles = Tiles::new(samples);
+        let _ = draw_batches::<S>(context, (backs, band), samples, Some(&tiles), &mut poll);
+    }
+}
+
+/// Draws a band's triangles of several lists; breaks off when the deadline has passed.
+#[inline(always)]
+fn draw_batches<'a, const S: usize>(
+    context: &RasterContext<'_>,
+    (lists, band): (impl Iterator<Item = &'a BandLists>, usize),
+    samples: &mut SampleBand,
+    tiles: Option<&Tiles>,
+    poll: &mut DeadlinePoll<'_>,
+) -> ControlFlow<()> {
+    let mut batch = Batch::default();
+    for list in lists {
+        for triangle in list.items_in(band) {
+            if batch.push(triangle.id, triangle.vertices) {
+                let tested = batch.draw::<S>(context, samples, tiles);
+                if poll.is_expired_after(LANES as u64, tested) {
+                    return ControlFlow::Break(());
+                }
             }
         }
     }
+    // What waits, and what was collected after it.
+    batch.draw::<S>(context, samples, tiles);
+    batch.draw::<S>(context, samples, tiles);
+    ControlFlow::Continue(())
 }
 
 #[inline(always)]

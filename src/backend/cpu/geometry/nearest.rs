@@ -4,11 +4,10 @@ use super::samples::SampleBand;
 use super::visibility::Target;
 use crate::backend::cpu::isa::LANES;
 
-/// Keeps the nearest. With `TIES`, of equal depths the lowest id wins whatever the order of
-/// drawing; without, the caller promises ascending ids.
-pub struct Nearest<'a, const TIES: bool>(pub &'a mut SampleBand);
+/// Keeps the nearest; of equal depths the lowest id, whatever the order of drawing.
+pub struct Nearest<'a>(pub &'a mut SampleBand);
 
-impl<const TIES: bool> Target for Nearest<'_, TIES> {
+impl Target for Nearest<'_> {
     #[inline(always)]
     fn band(&self) -> &SampleBand {
         self.0
@@ -16,10 +15,8 @@ impl<const TIES: bool> Target for Nearest<'_, TIES> {
 
     #[inline(always)]
     fn offer(&mut self, at: usize, outside: &[i32; LANES], z: &[f32; LANES], id: u32) {
-        let depths = self.0.depth.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
-        let ids = self.0.ids.get_mut(at..).and_then(|d| d.first_chunk_mut::<LANES>());
-        if let (Some(depths), Some(ids)) = (depths, ids) {
-            update::<TIES>(outside, z, id, depths, ids);
+        if let Some((depths, ids)) = self.0.lanes_mut(at) {
+            update(outside, z, id, depths, ids);
         }
     }
 }
@@ -27,18 +24,12 @@ impl<const TIES: bool> Target for Nearest<'_, TIES> {
 /// Keeps, lane by lane, the nearer of what is there and triangle `id`. Written as whole-array steps
 /// without branches, which is the form that compilers turn into vector instructions.
 #[inline(always)]
-fn update<const TIES: bool>(
-    outside: &[i32; LANES],
-    z: &[f32; LANES],
-    id: u32,
-    depths: &mut [f32; LANES],
-    ids: &mut [u32; LANES],
-) {
+pub fn update(outside: &[i32; LANES], z: &[f32; LANES], id: u32, depths: &mut [f32; LANES], ids: &mut [u32; LANES]) {
     let (old_depths, old_ids) = (*depths, *ids);
     let mut keep = [0_u32; LANES];
     for l in 0..LANES {
         let nearer = z[l] > old_depths[l];
-        let tied = TIES & (z[l] == old_depths[l]) & (z[l] > 0.0) & (id < old_ids[l]);
+        let tied = (z[l] == old_depths[l]) & (z[l] > 0.0) & (id < old_ids[l]);
         // All ones where the old sample stays.
         keep[l] = ((outside[l] >> 31) as u32) | u32::from(nearer | tied).wrapping_sub(1);
     }

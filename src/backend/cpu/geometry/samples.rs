@@ -18,6 +18,36 @@ pub(crate) use for_samples;
 /// No triangle.
 pub const NOTHING: u32 = u32::MAX;
 
+/// Columns, and rows, in which samples lie: as many in a pixel as it has samples, at equal
+/// distances.
+#[derive(Clone, Copy)]
+pub struct SampleGrid {
+    /// Binary logarithm of the number in a pixel.
+    pub shift: i32,
+    /// Distance from the pixel's border to the first, 1/256 px.
+    pub border: i32,
+}
+
+impl SampleGrid {
+    /// The grid of pixels with 1, 4, 8 or 16 samples.
+    #[inline(always)]
+    pub fn new(samples: u32) -> Self {
+        Self { shift: samples.trailing_zeros() as i32, border: 128 / samples as i32 }
+    }
+
+    /// First and last pixel from `from` to before `to` whose samples may lie between two
+    /// coordinates, in 1/256 px from the picture's corner; the first is beyond the last if there
+    /// are none.
+    #[inline(always)]
+    pub fn pixels(&self, [low, high]: [i32; 2], [from, to]: [i32; 2]) -> [i32; 2] {
+        let first = (low.wrapping_add(self.border - 1)) >> (8 - self.shift);
+        let last = (high.wrapping_sub(self.border)) >> (8 - self.shift);
+        // Between two columns of samples the first is the last's successor, perhaps of one pixel.
+        let last = if first <= last { last >> self.shift } else { i32::MIN };
+        [(first >> self.shift).max(from), last.min(to - 1)]
+    }
+}
+
 /// Rows of samples of one horizontal band of the picture.
 pub struct SampleBand {
     /// Picture size, pixels.
@@ -68,6 +98,14 @@ impl SampleBand {
     pub fn index(&self, x: i32, y: i32, s: u32) -> usize {
         let column = (x + self.margin as i32) as u32;
         (y - self.first_row) as usize * self.stride + (column * self.samples + s) as usize
+    }
+
+    /// Depths and ids of the samples from `at` on.
+    #[inline(always)]
+    pub fn lanes_mut(&mut self, at: usize) -> Option<(&mut [f32; LANES], &mut [u32; LANES])> {
+        let depths = self.depth.get_mut(at..)?.first_chunk_mut::<LANES>()?;
+        let ids = self.ids.get_mut(at..)?.first_chunk_mut::<LANES>()?;
+        Some((depths, ids))
     }
 
     /// Depth and id of a sample in one number: nearer is larger; of equal depths the lower id is.

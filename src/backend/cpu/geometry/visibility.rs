@@ -64,9 +64,8 @@ impl Setup {
     /// First and last pixel column and row that the triangle may touch, inside the band; None if
     /// none.
     #[inline(always)]
-    fn bounds(&self, band: &SampleBand) -> Option<[[i32; 2]; 2]> {
-        let [columns, rows] = band.range();
-        Some([axis_bounds(&self.x, band.size_px[0], columns)?, axis_bounds(&self.y, band.size_px[1], rows)?])
+    fn bounds(&self, size_px: [u32; 2], [columns, rows]: [[i32; 2]; 2]) -> Option<[[i32; 2]; 2]> {
+        Some([axis_bounds(&self.x, size_px[0], columns)?, axis_bounds(&self.y, size_px[1], rows)?])
     }
 }
 
@@ -104,13 +103,67 @@ pub fn draw(setup: &Setup, id: u32, target: &mut impl Target) -> u64 {
 
 #[inline(always)]
 fn draw_sampled<const S: usize>(setup: &Setup, id: u32, target: &mut impl Target) -> u64 {
-    let band = target.band();
-    let Some([columns, rows]) = setup.bounds(band) else { return 0 };
     let edges = Edges::new(setup);
     let lanes = [Lanes::new::<S>(&edges, 0), Lanes::new::<S>(&edges, LANES)];
+    let size_px = target.band().size_px;
+    let Some(bounds) = setup.bounds(size_px, target.band().range()) else { return 0 };
+    for_each_block::<S>(&edges, bounds, size_px, |block| block.draw::<S>(setup, &edges, &lanes, id, target));
+    let [columns, rows] = bounds;
+    (columns[1] - columns[0] + 1) as u64 * (rows[1] - rows[0] + 1) as u64 * S as u64
+}
+
+/// Calls `each` with the parts of a triangle in blocks of 8 x 8 pixels that may hold some of it.
+#[inline(always)]
+pub fn for_each_part<const S: usize>(
+    setup: &Setup,
+    size_px: [u32; 2],
+    range: [[i32; 2]; 2],
+    mut each: impl FnMut(&Part),
+) {
+    let edges = Edges::new(setup);
+    let Some(bounds) = setup.bounds(size_px, range) else { return };
+    for_each_block::<S>(&edges, bounds, size_px, |block| {
+        each(&Part {
+            bounds: [[block.column, block.column + block.size[0] - 1], [block.row, block.row + block.size[1] - 1]],
+            dx: edges.dx,
+            dy: edges.dy,
+            edges: block.values,
+            from: [block.corner[0] - setup.x[0], block.corner[1] - setup.y[0]],
+            depth: setup.depth,
+            depth_range: setup.depth_range,
+        });
+    });
+}
+
+/// A rectangle of pixels, and what a triangle is there.
+pub struct Part {
+    /// First and last column, and row.
+    pub bounds: [[i32; 2]; 2],
+    /// Change of the edge functions.
+    pub dx: [i32; 3],
+    /// As `dx`.
+    pub dy: [i32; 3],
+    /// Edge functions in sixteenths at the first pixel's corner (moved by what the samples leave
+    /// modulo 16).
+    pub edges: [i32; 3],
+    /// That corner from the triangle's first, 1/256 px.
+    pub from: [i32; 2],
+    /// As [`Setup::depth`].
+    pub depth: [f32; 3],
+    /// As [`Setup::depth_range`].
+    pub depth_range: [f32; 2],
+}
+
+#[inline(always)]
+fn for_each_block<const S: usize>(
+    edges: &Edges,
+    [columns, rows]: [[i32; 2]; 2],
+    size_px: [u32; 2],
+    mut each: impl FnMut(&Block),
+) {
     // All samples lie multiples of 1/16 px from here.
     let shift = sample_offsets(S as u32)[0][0] & 15;
-    let origin = [band.size_px[0] as i32 * 128 - shift, band.size_px[1] as i32 * 128 - shift];
+    let origin = [size_px[0] as i32 * 128 - shift, size_px[1] as i32 * 128 - shift];
     let mut row = rows[0];
     while row <= rows[1] {
         let mut column = columns[0];
@@ -118,14 +171,12 @@ fn draw_sampled<const S: usize>(setup: &Setup, id: u32, target: &mut impl Target
             let corner = [column * 256 - origin[0], row * 256 - origin[1]];
             if let Some(values) = edges.at(corner) {
                 let size = [(columns[1] - column + 1).min(BLOCK), (rows[1] - row + 1).min(BLOCK)];
-                let block = Block { column, row, size, corner, values };
-                block.draw::<S>(setup, &edges, &lanes, id, target);
+                each(&Block { column, row, size, corner, values });
             }
             column += BLOCK;
         }
         row += BLOCK;
     }
-    (columns[1] - columns[0] + 1) as u64 * (rows[1] - rows[0] + 1) as u64 * S as u64
 }
 
 /// Pixels along a side of a block, in which edge functions fit 32 bits.
@@ -260,7 +311,7 @@ impl Setup {
 
 /// `min` and `max` in the order that maps to two machine instructions; no input is NaN.
 #[inline(always)]
-fn clamp(v: f32, range: [f32; 2]) -> f32 {
+pub fn clamp(v: f32, range: [f32; 2]) -> f32 {
     let v = if v > range[0] { v } else { range[0] };
     if v < range[1] { v } else { range[1] }
 }

@@ -6,7 +6,7 @@
 //! above the visibility buffer's.
 
 use crate::backend::cpu::RasterContext;
-use crate::backend::cpu::bands::bins::TriangleBin;
+use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
 use crate::backend::cpu::isa::dispatch;
 use crate::backend::cpu::peeling::emit_layer::peel_layer;

@@ -2,7 +2,7 @@
 //! layer. Twin of `shaders/peeling/emit_layer.wgsl`.
 
 use crate::backend::cpu::RasterContext;
-use crate::backend::cpu::bands::bins::TriangleBin;
+use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
@@ -68,7 +68,7 @@ fn peel_layer_kernel(context: &RasterContext<'_>, (bins, band): (&[TriangleBin],
             }
             item += 1;
         }
-        for id in chunk.whole.items_in(band) {
+        for id in chunk.whole_in(band) {
             if poll.is_expired(offer(item, id, || context.screen_triangle(id), found, previous, pending)) {
                 return;
             }

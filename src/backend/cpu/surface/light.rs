@@ -34,6 +34,7 @@ impl Light {
 }
 
 /// A colour with straight alpha under light, clamped to 1.
+#[inline(always)]
 pub fn lit(base: [f32; 4], light: Light) -> [f32; 4] {
     let [r, g, b] = [0, 1, 2].map(|k| (base[k] * light.gain + light.gloss).clamp(0.0, 1.0));
     [r, g, b, base[3]]
@@ -42,59 +43,90 @@ pub fn lit(base: [f32; 4], light: Light) -> [f32; 4] {
 /// Light on a surface with unit normal `n`: the bits of the other back-end.
 #[inline(always)]
 pub fn light(lights: &Lights, projection: &Projection, metallic: f32, roughness: f32, n: [f32; 3]) -> Light {
+    let [gain, gloss] = light_lanes(lights, projection, metallic, roughness, &n.map(|v| [v]));
+    Light { gain: gain[0], gloss: gloss[0] }
+}
+
+/// As [`light`], for several normals: gains, glosses.
+#[inline(always)]
+pub fn light_lanes<const N: usize>(
+    lights: &Lights,
+    projection: &Projection,
+    metallic: f32,
+    roughness: f32,
+    n: &[[f32; N]; 3],
+) -> [[f32; N]; 2] {
     light_by(quick_recip, lights, projection, metallic, roughness, n)
 }
 
-/// As [`light`], with the processor's own division: quicker where the normal's bits differ anyway.
+/// As [`light_lanes`], with the processor's own division: quicker where the normal's bits differ
+/// anyway.
 #[inline(always)]
-pub fn light_on_blend(lights: &Lights, projection: &Projection, metallic: f32, roughness: f32, n: [f32; 3]) -> Light {
+pub fn light_on_blend<const N: usize>(
+    lights: &Lights,
+    projection: &Projection,
+    metallic: f32,
+    roughness: f32,
+    n: &[[f32; N]; 3],
+) -> [[f32; N]; 2] {
     light_by(|w| 1.0 / w, lights, projection, metallic, roughness, n)
 }
 
 #[inline(always)]
-fn light_by(
+fn light_by<const N: usize>(
     inverse_of: impl Fn(f32) -> f32,
     lights: &Lights,
     projection: &Projection,
     metallic: f32,
     roughness: f32,
-    n: [f32; 3],
-) -> Light {
+    n: &[[f32; N]; 3],
+) -> [[f32; N]; 2] {
     let alpha = (roughness * roughness).max(0.0025);
     let alpha_squared = alpha * alpha;
-    let n_up = dot(n, projection.screen_up);
-    let ambient = lights.ambient * (0.7 + 0.3 * n_up);
-    let (mut diffuse, mut shine, mut strength) = (0.0, 0.0, 0.0);
+    let (mut diffuse, mut shine, mut strength) = ([0.0; N], [0.0; N], 0.0);
     for lamp in &lights.lamps {
-        let n_light = dot(n, lamp.to_light).max(0.0);
-        let n_half = dot(n, lamp.halfway).max(0.0);
         let light_half = dot(lamp.to_light, lamp.halfway);
-        let lobe = n_half * n_half * (alpha_squared - 1.0) + 1.0;
-        let spread = lobe * lobe * (light_half * light_half).max(0.1);
-        let gloss = alpha_squared * inverse_of(spread * (4.0 * roughness + 2.0));
-        let direct = lamp.strength * n_light;
-        diffuse += direct;
-        shine += direct * gloss;
+        for l in 0..N {
+            let n = [n[0][l], n[1][l], n[2][l]];
+            let n_light = dot(n, lamp.to_light).max(0.0);
+            let n_half = dot(n, lamp.halfway).max(0.0);
+            let lobe = n_half * n_half * (alpha_squared - 1.0) + 1.0;
+            let spread = lobe * lobe * (light_half * light_half).max(0.1);
+            let gloss = alpha_squared * inverse_of(spread * (4.0 * roughness + 2.0));
+            let direct = lamp.strength * n_light;
+            diffuse[l] += direct;
+            shine[l] += direct * gloss;
+        }
         strength += lamp.strength;
     }
     // F0 = 0.04 (1 - metallic) + metallic base.
     let matte = 1.0 - metallic;
-    let mut light = Light { gain: matte * (ambient + diffuse) + metallic * shine, gloss: 0.04 * matte * shine };
-    if metallic > 0.0 {
-        let n_view = dot(n, projection.to_viewer);
-        // Schlick's rise towards grazing angles, less of it where the surface is rough.
-        let grazing = 1.0 - n_view.clamp(0.0, 1.0);
-        let square = grazing * grazing;
-        let rise = square * square * grazing * (1.0 - roughness);
-        let mirrored = 2.0 * (n_view * n_up) - dot(projection.to_viewer, projection.screen_up);
-        let seen = metallic * (lights.ambient + 0.5 * strength) * studio(inverse_of, mirrored, roughness);
-        light.gain += seen * (1.0 - rise);
-        light.gloss += seen * rise;
+    let (mut gain, mut gloss) = ([0.0; N], [0.0; N]);
+    for l in 0..N {
+        let n_up = dot([n[0][l], n[1][l], n[2][l]], projection.screen_up);
+        let ambient = lights.ambient * (0.7 + 0.3 * n_up);
+        gain[l] = matte * (ambient + diffuse[l]) + metallic * shine[l];
+        gloss[l] = 0.04 * matte * shine[l];
     }
-    light
+    if metallic > 0.0 {
+        for l in 0..N {
+            let n = [n[0][l], n[1][l], n[2][l]];
+            let (n_view, n_up) = (dot(n, projection.to_viewer), dot(n, projection.screen_up));
+            // Schlick's rise towards grazing angles, less of it where the surface is rough.
+            let grazing = 1.0 - n_view.clamp(0.0, 1.0);
+            let square = grazing * grazing;
+            let rise = square * square * grazing * (1.0 - roughness);
+            let mirrored = 2.0 * (n_view * n_up) - dot(projection.to_viewer, projection.screen_up);
+            let seen = metallic * (lights.ambient + 0.5 * strength) * studio(&inverse_of, mirrored, roughness);
+            gain[l] += seen * (1.0 - rise);
+            gloss[l] += seen * rise;
+        }
+    }
+    [gain, gloss]
 }
 
 /// Brightness of the studio in a direction that rises by `up` (the sine of its elevation).
+#[inline(always)]
 fn studio(inverse_of: impl Fn(f32) -> f32, up: f32, roughness: f32) -> f32 {
     const GROUND: f32 = 0.36;
     const SKY_ABOVE_GROUND: f32 = 0.79;

@@ -6,6 +6,7 @@
 
 pub(crate) mod barycentric;
 pub(crate) mod debug;
+pub(crate) mod flat;
 pub(crate) mod light;
 pub(crate) mod normal;
 pub(crate) mod point;

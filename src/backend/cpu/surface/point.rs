@@ -3,7 +3,7 @@
 
 use super::barycentric::{Barycentrics, corners};
 use super::debug;
-use super::light::{Light, light, light_on_blend, lit};
+use super::light::{Light, light, light_lanes, light_on_blend, lit};
 use super::normal::{normal, normal_mapped};
 use super::texture::{Uv, blend, sample};
 use super::wire::{Place, edge_mask, fwidth_cover, wire_cover};
@@ -11,7 +11,7 @@ use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::area;
 use crate::backend::cpu::vector::{facing, turned_to_viewer};
-use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, slots};
+use crate::plan::{Projection, ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, slots};
 
 /// Flags that the common materials do not have, textures aside.
 const GENERAL: u32 = flags::DERIVATIVE_NORMALS
@@ -67,21 +67,20 @@ impl<'a> PointShader<'a> {
     /// picture's centre.
     pub fn color(&mut self, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> [f32; 4] {
         let material = surface.material(id as usize);
-        let is_textured =
-            !surface.textures.images.is_empty() && material.textures.iter().any(|used| used.texture != TEXTURE_NONE);
+        let is_textured = is_textured(surface, material);
         if material.flags & GENERAL != 0 || is_textured {
             return self.general(surface, material, id, at, is_textured);
         }
         if material.flags & VARYING != 0 {
             return self.common(surface, material, id, at);
         }
-        let base = self.with_alpha(material, material.base_color);
-        let mut light = Light::NONE;
+        let mut normal = [[0.0]; 3];
         if material.flags & flags::FACE_NORMALS != 0 {
-            let normal = turned_to_viewer(surface.face_normals[id as usize], self.is_front(id, at));
-            light = self.light(surface, material.metallic, material.roughness, normal);
+            let is_front = self.is_front(id, at);
+            normal = turned_to_viewer(surface.face_normals[id as usize], is_front).map(|v| [v]);
         }
-        let color = premultiplied(lit(base, light), material.emissive);
+        let [r, g, b, a] = flat_colors(surface, material, &self.context.plan.projection, self.show, &normal);
+        let color = [r[0], g[0], b[0], a[0]];
         self.flat = Some((id, color));
         color
     }
@@ -89,7 +88,7 @@ impl<'a> PointShader<'a> {
     /// One base colour, smooth or with a wire by fwidth.
     fn common(&self, surface: &SurfacePass<'_>, material: &ShadedMaterial, id: u32, at: [f32; 2]) -> [f32; 4] {
         let b = Barycentrics::new(&corners(self.context, id, at));
-        let base = self.with_alpha(material, material.base_color);
+        let base = with_alpha(material, material.base_color, self.show);
         let mut light = Light::NONE;
         if material.flags & flags::LIT != 0 {
             let projection = &self.context.plan.projection;
@@ -97,7 +96,10 @@ impl<'a> PointShader<'a> {
                 (Some(normals), _) if material.flags & flags::VERTEX_NORMALS != 0 => {
                     let corners = normals.triangles[id as usize].map(|i| normals.values[i as usize]);
                     let normal = facing(blend(corners, b.value), b.front);
-                    light_on_blend(&surface.lights, projection, material.metallic, material.roughness, normal)
+                    let normal = normal.map(|v| [v]);
+                    let (metallic, roughness) = (material.metallic, material.roughness);
+                    let [gain, gloss] = light_on_blend(&surface.lights, projection, metallic, roughness, &normal);
+                    Light { gain: gain[0], gloss: gloss[0] }
                 }
                 (_, face) => {
                     let normal = face.map_or(projection.to_viewer, |normal| turned_to_viewer(*normal, b.front));
@@ -141,7 +143,7 @@ impl<'a> PointShader<'a> {
             }
             _ => [1.0; 4],
         };
-        let base = self.with_alpha(material, base_color(surface, material, &place, texture(slots::BASE)));
+        let base = with_alpha(material, base_color(surface, material, &place, texture(slots::BASE)), self.show);
         if base[3] == 0.0 && cover == 0.0 {
             return [0.0; 4];
         }
@@ -165,21 +167,6 @@ impl<'a> PointShader<'a> {
         over(cover, material.wire_color, premultiplied(lit(base, light), emissive))
     }
 
-    /// The base colour with the material's cutoff, blending and opacity applied to alpha.
-    fn with_alpha(&self, material: &ShadedMaterial, mut base: [f32; 4]) -> [f32; 4] {
-        // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.
-        base[3] = if base[3] > 0.0 { base[3].min(1.0) } else { 0.0 };
-        let is_cut = material.flags & flags::MASK != 0 && base[3] < material.alpha_cutoff;
-        if is_cut || !self.show.fill || material.flags & flags::FILL == 0 {
-            return [0.0; 4];
-        }
-        if material.flags & flags::BLEND == 0 {
-            base[3] = 1.0;
-        }
-        base[3] *= material.opacity;
-        base
-    }
-
     /// Light at a point with this normal.
     #[inline(always)]
     pub fn light(&self, surface: &SurfacePass<'_>, metallic: f32, roughness: f32, normal: [f32; 3]) -> Light {
@@ -195,6 +182,56 @@ impl<'a> PointShader<'a> {
     }
 }
 
+fn is_textured(surface: &SurfacePass<'_>, material: &ShadedMaterial) -> bool {
+    !surface.textures.images.is_empty() && material.textures.iter().any(|used| used.texture != TEXTURE_NONE)
+}
+
+/// True if a material's colour is the same all over a triangle.
+pub fn is_flat(surface: &SurfacePass<'_>, material: &ShadedMaterial) -> bool {
+    material.flags & (GENERAL | VARYING) == 0 && !is_textured(surface, material)
+}
+
+/// Premultiplied linear RGBA of triangles of one material ([`is_flat`]), by their normals on the
+/// viewer's side.
+#[inline(always)]
+pub fn flat_colors<const N: usize>(
+    surface: &SurfacePass<'_>,
+    material: &ShadedMaterial,
+    projection: &Projection,
+    show: Show,
+    normals: &[[f32; N]; 3],
+) -> [[f32; N]; 4] {
+    let base = with_alpha(material, material.base_color, show);
+    let mut light = [[Light::NONE.gain; N], [Light::NONE.gloss; N]];
+    if material.flags & flags::FACE_NORMALS != 0 {
+        light = light_lanes(&surface.lights, projection, material.metallic, material.roughness, normals);
+    }
+    let mut colors = [[0.0; N]; 4];
+    for l in 0..N {
+        let color = lit(base, Light { gain: light[0][l], gloss: light[1][l] });
+        let color = premultiplied(color, material.emissive);
+        for k in 0..4 {
+            colors[k][l] = color[k];
+        }
+    }
+    colors
+}
+
+/// The base colour with the material's cutoff, blending and opacity applied to alpha.
+fn with_alpha(material: &ShadedMaterial, mut base: [f32; 4], show: Show) -> [f32; 4] {
+    // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.
+    base[3] = if base[3] > 0.0 { base[3].min(1.0) } else { 0.0 };
+    let is_cut = material.flags & flags::MASK != 0 && base[3] < material.alpha_cutoff;
+    if is_cut || !show.fill || material.flags & flags::FILL == 0 {
+        return [0.0; 4];
+    }
+    if material.flags & flags::BLEND == 0 {
+        base[3] = 1.0;
+    }
+    base[3] *= material.opacity;
+    base
+}
+
 /// Base colour with straight alpha.
 fn base_color(surface: &SurfacePass<'_>, material: &ShadedMaterial, place: &Place<'_>, texel: [f32; 4]) -> [f32; 4] {
     let tint = match &surface.colors {
@@ -206,6 +243,7 @@ fn base_color(surface: &SurfacePass<'_>, material: &ShadedMaterial, place: &Plac
     std::array::from_fn(|k| material.base_color[k] * tint[k] * texel[k])
 }
 
+#[inline(always)]
 fn premultiplied(straight: [f32; 4], emissive: [f32; 3]) -> [f32; 4] {
     let alpha = straight[3];
     let [r, g, b] = [0, 1, 2].map(|k| (straight[k] + emissive[k]) * alpha);

@@ -43,8 +43,9 @@ impl<'a> Shader<'a> {
         Self { context, points: PointShader::new(context) }
     }
 
+    /// The colour of a pixel of the picture.
     #[inline(always)]
-    fn pixel<const S: usize>(&mut self, band: &SampleBand, x: u32, y: u32) -> [f32; 4] {
+    pub fn pixel<const S: usize>(&mut self, band: &SampleBand, x: u32, y: u32) -> [f32; 4] {
         let at = band.index(x as i32, y as i32, 0);
         let mut ids = [band.ids[at]; S];
         let mut is_mixed = false;

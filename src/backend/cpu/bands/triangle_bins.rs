@@ -1,0 +1,378 @@
+//! Sorting of triangles into bands of rows, before the stage visibility. Triangles that no sample
+//! can show are dropped here, eight at a time.
+
+use std::ops::Range;
+
+use super::bins::Bin;
+use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::geometry::clip::clip_triangle;
+use crate::backend::cpu::geometry::samples::SampleGrid;
+use crate::backend::cpu::geometry::transform::{OUTSIDE, ScreenVertex, homogeneous};
+use crate::backend::cpu::geometry::visibility::{area, passes_culling};
+use crate::backend::cpu::isa::{LANES, dispatch};
+use crate::plan::{DrawPlan, Faces, pass_mask};
+
+/// Triangles that touch this many bands are listed once for all of them. Otherwise large ones on a
+/// tall picture would take gigabytes of lists.
+const TALL_BANDS: usize = 4;
+
+/// Triangles of one pass.
+pub struct TrianglePass {
+    /// Their ids.
+    pub ids: Range<usize>,
+    /// Bit that a triangle's pass mask must have; 0 for the outline mesh, which has no masks.
+    pub pass_bit: u8,
+    /// The faces that are drawn, where a triangle's pass mask does not say.
+    pub faces: Faces,
+}
+
+/// A chunk's triangles by band.
+#[derive(Default)]
+pub struct TriangleBin {
+    /// The chunk's ids.
+    pub ids: Range<usize>,
+    /// Ids of triangles that face the viewer and need no clipping.
+    pub fronts: BandLists,
+    /// Ids of those that face away.
+    pub backs: BandLists,
+    /// Id and pieces of clipped triangles.
+    pieces: Vec<(u32, [ScreenVertex; 3])>,
+    /// Indices into `pieces`.
+    piece_bands: Bin,
+}
+
+/// Triangles by band, in one list.
+#[derive(Default)]
+pub struct BandLists {
+    /// Where each band's items start in `items`, and the last ones' end.
+    starts: Vec<u32>,
+    items: Vec<ListedTriangle>,
+    /// Triangles that touch many bands, with the first and last.
+    tall: Vec<(ListedTriangle, [u16; 2])>,
+    /// Every triangle's id once, in ascending order.
+    pub all: Vec<u32>,
+}
+
+/// A triangle in a list, with what would else be looked up all over memory.
+#[derive(Clone, Copy, Default)]
+pub struct ListedTriangle {
+    /// Its id.
+    pub id: u32,
+    /// Indices of its vertices.
+    pub vertices: [u32; 3],
+}
+
+/// A triangle's id, and the first and last band that it touches.
+#[derive(Clone, Copy, Default)]
+struct Spanned {
+    id: u32,
+    bands: [u16; 2],
+}
+
+impl BandLists {
+    fn new(spanned: &[Spanned], bands: usize, vertices_of: impl Fn(u32) -> [u32; 3]) -> Self {
+        let span = |s: &Spanned| s.bands[0] as usize..s.bands[1] as usize + 1;
+        let is_tall = |s: &&Spanned| span(s).len() > TALL_BANDS;
+        // Counts, shifted by one band, become starts, which the second pass moves to the ends.
+        let mut starts = vec![0_u32; bands + 2];
+        for s in spanned.iter().filter(|s| !is_tall(s)) {
+            for band in span(s) {
+                starts[band + 2] += 1;
+            }
+        }
+        for band in 2..starts.len() {
+            starts[band] += starts[band - 1];
+        }
+        let listed = |id: u32| ListedTriangle { id, vertices: vertices_of(id) };
+        let mut items = vec![ListedTriangle::default(); starts[bands + 1] as usize];
+        for s in spanned.iter().filter(|s| !is_tall(s)) {
+            let triangle = listed(s.id);
+            for band in span(s) {
+                items[starts[band + 1] as usize] = triangle;
+                starts[band + 1] += 1;
+            }
+        }
+        let tall = spanned.iter().filter(is_tall).map(|s| (listed(s.id), s.bands)).collect();
+        Self { starts, items, tall, all: spanned.iter().map(|s| s.id).collect() }
+    }
+
+    /// The band's triangles.
+    pub fn items_in(&self, band: usize) -> impl Iterator<Item = ListedTriangle> {
+        let at = |i: usize| self.starts.get(i).map_or(0, |&start| start as usize);
+        let is_here = move |[first, last]: [u16; 2]| (first as usize..=last as usize).contains(&band);
+        let tall = self.tall.iter().filter(move |(_, bands)| is_here(*bands)).map(|(triangle, _)| *triangle);
+        self.items[at(band)..at(band + 1)].iter().copied().chain(tall)
+    }
+}
+
+impl TriangleBin {
+    /// Sorts a pass's triangles into bands of `rows`, and into those to which they are as close as
+    /// `margin` rows.
+    pub fn new(context: &RasterContext<'_>, [rows, margin]: [u32; 2], pass: &TrianglePass) -> Self {
+        let plan = context.plan;
+        let bands = plan.height_px.div_ceil(rows) as usize;
+        let range = |size: u32| plan.seen_range(size);
+        let bounds = Bounds {
+            grid: SampleGrid::new(plan.samples),
+            half: [plan.width_px, plan.height_px].map(|size| size as i32 * 128),
+            ranges: [range(plan.width_px), range(plan.height_px)],
+            rows: rows as i32,
+            margin: margin as i32,
+            row_last: plan.height_px as i32 - 1,
+        };
+        let mut kept = Kept::with_room_for(pass.ids.len());
+        keep(context.isa, context, &bounds, pass, &mut kept);
+        let mut bin = Self {
+            ids: pass.ids.clone(),
+            fronts: BandLists::new(&kept.fronts[..kept.counts[0]], bands, |id| context.triangle(id)),
+            backs: BandLists::new(&kept.backs[..kept.counts[1]], bands, |id| context.triangle(id)),
+            pieces: Vec::new(),
+            piece_bands: Bin::new(bands, TALL_BANDS),
+        };
+        for &id in &kept.outside {
+            let Some(faces) = pass.faces_of(plan, id as usize) else { continue };
+            bin.push_clipped(context, &bounds, id, faces);
+        }
+        bin
+    }
+
+    fn push_clipped(&mut self, context: &RasterContext<'_>, bounds: &Bounds, id: u32, faces: Faces) {
+        let plan = context.plan;
+        if !plan.projection.clip || context.is_hull(id) {
+            return;
+        }
+        let corners = context.positions_of(id).map(|(position, _)| homogeneous(&plan.projection, position));
+        clip_triangle(&plan.projection, corners, |piece| {
+            if passes_culling(faces, area(&piece))
+                && let Some(bands) = bounds.bands_of(&piece)
+            {
+                self.push_piece(id, piece, bands);
+            }
+        });
+    }
+
+    fn push_piece(&mut self, id: u32, piece: [ScreenVertex; 3], bands: [usize; 2]) {
+        self.piece_bands.push(self.pieces.len() as u32, bands);
+        self.pieces.push((id, piece));
+    }
+
+    /// Ids of the clipped triangles, once for each piece.
+    pub fn clipped_ids(&self) -> impl Iterator<Item = u32> {
+        self.pieces.iter().map(|(id, _)| *id)
+    }
+
+    /// The band's triangles that need no clipping.
+    pub fn whole_in(&self, band: usize) -> impl Iterator<Item = u32> {
+        self.fronts.items_in(band).chain(self.backs.items_in(band)).map(|triangle| triangle.id)
+    }
+
+    /// The band's clipped pieces with their ids.
+    pub fn pieces_in(&self, band: usize) -> impl Iterator<Item = (u32, &[ScreenVertex; 3])> {
+        self.piece_bands.items_in(band).map(|i| &self.pieces[i as usize]).map(|(id, piece)| (*id, piece))
+    }
+}
+
+impl TrianglePass {
+    /// Drawn faces of a triangle; None if the pass does not draw it.
+    #[inline(always)]
+    fn faces_of(&self, plan: &DrawPlan<'_>, id: usize) -> Option<Faces> {
+        if self.pass_bit == 0 {
+            return Some(self.faces);
+        }
+        match plan.pass_masks.get(id) {
+            None => Some(self.faces),
+            Some(mask) if mask & self.pass_bit == 0 => None,
+            Some(mask) if mask & pass_mask::FRONT_ONLY != 0 => Some(Faces::Front),
+            Some(mask) if mask & pass_mask::BACK_ONLY != 0 => Some(Faces::Back),
+            _ => Some(self.faces),
+        }
+    }
+}
+
+/// Where there are samples, and bands.
+pub struct Bounds {
+    grid: SampleGrid,
+    /// The picture's centre, 1/256 px from its corner.
+    half: [i32; 2],
+    /// Columns, and rows, that have samples.
+    ranges: [[i32; 2]; 2],
+    /// Rows of a band, and rows beyond it that it sees.
+    rows: i32,
+    margin: i32,
+    row_last: i32,
+}
+
+impl Bounds {
+    /// First and last band that a triangle on screen touches, or comes as close to as `margin`
+    /// rows; None if it touches no column or row of samples.
+    #[inline(always)]
+    fn bands_of(&self, v: &[ScreenVertex; 3]) -> Option<[usize; 2]> {
+        let axis = |k: usize, v: [i32; 3]| {
+            let (low, high) = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
+            self.grid.pixels([low + self.half[k], high + self.half[k]], self.ranges[k])
+        };
+        let [left, right] = axis(0, v.map(|v| v.x));
+        let [top, bottom] = axis(1, v.map(|v| v.y));
+        let (top, bottom) = ((top - self.margin).max(0), (bottom + self.margin).min(self.row_last));
+        (left <= right && top <= bottom).then(|| [top, bottom].map(|row| (row / self.rows) as usize))
+    }
+}
+
+/// What is left of a chunk after culling.
+pub struct Kept {
+    /// Triangles that face the viewer, and that face away; the first `counts` of them count.
+    fronts: Vec<Spanned>,
+    backs: Vec<Spanned>,
+    counts: [usize; 2],
+    /// Triangles with a corner behind the eye or far outside the picture.
+    outside: Vec<u32>,
+}
+
+impl Kept {
+    fn with_room_for(triangles: usize) -> Self {
+        let room = || vec![Spanned::default(); triangles + LANES];
+        Self { fronts: room(), backs: room(), counts: [0; 2], outside: Vec::new() }
+    }
+}
+
+dispatch! {
+    /// Culls the triangles of a pass.
+    pub fn keep(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass, kept: &mut Kept) = keep_kernel
+}
+
+#[inline(always)]
+fn keep_kernel(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass, kept: &mut Kept) {
+    let plan = context.plan;
+    let has_masks = pass.pass_bit != 0 && !plan.pass_masks.is_empty();
+    // f32 divides exactly enough: rows are below 2^13.
+    let per_row = 1.0 / bounds.rows as f32;
+    for first in pass.ids.clone().step_by(LANES) {
+        let group = Group::load(context, first, pass.ids.end);
+        let [drawn_front, drawn_back] = match has_masks {
+            true => group.drawn(|id| pass.faces_of(plan, id)),
+            false => group.drawn(|_| Some(pass.faces)),
+        };
+        let seen = group.seen(bounds);
+        for l in 0..LANES {
+            let area = group.area[l];
+            let bands = [0, 1].map(|k| ((seen.rows[k][l] as f32 + 0.5) * per_row) as u16);
+            let spanned = Spanned { id: (first + l) as u32, bands };
+            // Written in any case, kept by the count.
+            kept.fronts[kept.counts[0]] = spanned;
+            kept.backs[kept.counts[1]] = spanned;
+            kept.counts[0] += usize::from(drawn_front[l] & seen.any[l] & (area < 0));
+            kept.counts[1] += usize::from(drawn_back[l] & seen.any[l] & (area > 0));
+        }
+        if group.is_outside != [false; LANES] {
+            let outside = (0..LANES).filter(|&l| group.is_outside[l] && (drawn_front[l] || drawn_back[l]));
+            kept.outside.extend(outside.map(|l| (first + l) as u32));
+        }
+    }
+}
+
+/// Eight triangles on screen.
+struct Group {
+    first: usize,
+    /// Lanes that hold a triangle.
+    len: usize,
+    x: [[i32; LANES]; 3],
+    y: [[i32; LANES]; 3],
+    area: [i64; LANES],
+    is_outside: [bool; LANES],
+}
+
+/// Lanes of triangles that samples may show, and their first and last row.
+struct Seen {
+    any: [bool; LANES],
+    rows: [[i32; LANES]; 2],
+}
+
+impl Group {
+    #[inline(always)]
+    fn load(context: &RasterContext<'_>, first: usize, end: usize) -> Self {
+        let (mut x, mut y) = ([[0; LANES]; 3], [[0; LANES]; 3]);
+        let len = (end - first).min(LANES);
+        for l in 0..len {
+            let corners = context.screen_triangle((first + l) as u32);
+            for k in 0..3 {
+                (x[k][l], y[k][l]) = (corners[k].x, corners[k].y);
+            }
+        }
+        let (mut area, mut is_outside) = ([0; LANES], [false; LANES]);
+        for l in 0..LANES {
+            let d = |a: i32, b: i32| i64::from(a) - i64::from(b);
+            area[l] = d(x[1][l], x[0][l]) * d(y[2][l], y[0][l]) - d(x[2][l], x[0][l]) * d(y[1][l], y[0][l]);
+            is_outside[l] = (x[0][l] == OUTSIDE) | (x[1][l] == OUTSIDE) | (x[2][l] == OUTSIDE);
+        }
+        Self { first, len, x, y, area, is_outside }
+    }
+
+    /// Lanes whose fronts, and whose backs, are drawn.
+    #[inline(always)]
+    fn drawn(&self, faces_of: impl Fn(usize) -> Option<Faces>) -> [[bool; LANES]; 2] {
+        let mut drawn = [[false; LANES]; 2];
+        for l in 0..self.len {
+            let faces = faces_of(self.first + l);
+            drawn[0][l] = matches!(faces, Some(Faces::Both | Faces::Front));
+            drawn[1][l] = matches!(faces, Some(Faces::Both | Faces::Back));
+        }
+        drawn
+    }
+
+    #[inline(always)]
+    fn seen(&self, bounds: &Bounds) -> Seen {
+        let mut seen = Seen { any: [false; LANES], rows: [[0; LANES]; 2] };
+        for l in 0..LANES {
+            let axis = |k: usize, v: &[[i32; LANES]; 3]| {
+                let (low, high) = (v[0][l].min(v[1][l]).min(v[2][l]), v[0][l].max(v[1][l]).max(v[2][l]));
+                let half = bounds.half[k];
+                bounds.grid.pixels([low.wrapping_add(half), high.wrapping_add(half)], bounds.ranges[k])
+            };
+            let ([left, right], [top, bottom]) = (axis(0, &self.x), axis(1, &self.y));
+            let (top, bottom) = ((top - bounds.margin).max(0), (bottom + bounds.margin).min(bounds.row_last));
+            seen.any[l] = (left <= right) & (top <= bottom) & !self.is_outside[l];
+            seen.rows[0][l] = top;
+            seen.rows[1][l] = bottom;
+        }
+        seen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPANS: [[u16; 2]; 5] = [[0, 0], [2, 4], [0, 19], [3, 3], [5, 15]];
+
+    fn items_of(band: u16) -> Vec<u32> {
+        let want = (100..).zip(SPANS).filter(|(_, [first, last])| (*first..=*last).contains(&band));
+        want.map(|(id, _)| id).collect()
+    }
+
+    #[test]
+    fn each_band_lists_the_items_that_touch_it() {
+        let spanned: Vec<Spanned> = (100..).zip(SPANS).map(|(id, bands)| Spanned { id, bands }).collect();
+        let lists = BandLists::new(&spanned, 20, |id| [id, 0, 1]);
+        for band in 0..20 {
+            let mut found: Vec<u32> = lists.items_in(band as usize).map(|triangle| triangle.id).collect();
+            found.sort_unstable();
+            assert_eq!(found, items_of(band), "band {band}");
+        }
+        // Items that touch few bands are not visited in the others.
+        assert_eq!(lists.tall.len(), 2);
+        assert_eq!(BandLists::default().items_in(3).count(), 0);
+    }
+
+    #[test]
+    fn each_band_lists_the_pieces_that_touch_it() {
+        let mut bin = TriangleBin { piece_bands: Bin::new(20, TALL_BANDS), ..TriangleBin::default() };
+        for (id, span) in (100..).zip(SPANS) {
+            bin.push_piece(id, [ScreenVertex::default(); 3], span.map(usize::from));
+        }
+        for band in 0..20 {
+            let mut found: Vec<u32> = bin.pieces_in(band as usize).map(|(id, _)| id).collect();
+            found.sort_unstable();
+            assert_eq!(found, items_of(band), "band {band}");
+        }
+    }
+}

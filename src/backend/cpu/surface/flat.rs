@@ -1,0 +1,228 @@
+//! Stage shade, per triangle: colours that are the same all over a triangle. Each is found once,
+//! eight at a time, and pixels look them up.
+
+use rayon::prelude::*;
+
+use super::point::{Show, flat_colors, is_flat};
+use super::shade::Shader;
+use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::bands::triangle_bins::TriangleBin;
+use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
+use crate::backend::cpu::isa::{LANES, dispatch};
+use crate::backend::cpu::vector::turned_to_viewer;
+use crate::plan::{DrawPlan, SurfacePass, flags};
+
+/// A colour that is not known: of a clipped triangle, or none that a weight of 0 makes 0.
+const UNKNOWN: [f32; 4] = [f32::NAN; 4];
+
+/// Colours by triangle id. Only those of triangles in the bins are there.
+#[derive(Default)]
+pub struct FlatColors {
+    /// Premultiplied linear RGBA; after the last triangle's, that of no triangle.
+    colors: Vec<[f32; 4]>,
+}
+
+impl FlatColors {
+    /// True if all colours of a plan's visible samples are the same all over a triangle.
+    pub fn suffice(plan: &DrawPlan<'_>) -> bool {
+        let is_flat = |s: &SurfacePass<'_>| !s.is_shaded || s.materials.iter().all(|m| is_flat(s, m));
+        plan.peeling().is_none() && plan.is_shaded() && plan.surface.as_ref().is_none_or(is_flat)
+    }
+
+    /// Finds the colours of all triangles in the bins, which have each triangle once.
+    pub fn find(&mut self, context: &RasterContext<'_>, pool: Option<&rayon::ThreadPool>, bins: &[TriangleBin]) {
+        let triangles = context.plan.triangles.len() + context.plan.hull.as_ref().map_or(0, |h| h.triangles.len());
+        if self.colors.len() != triangles + 1 {
+            // Not filled: the system gives zeros, and pages that nothing touches cost nothing.
+            self.colors = Vec::new();
+            self.colors = vec![[0.0; 4]; triangles + 1];
+        }
+        self.colors[triangles] = [0.0; 4];
+        let mut rest = &mut self.colors[..];
+        let mut next = 0;
+        let mut jobs = Vec::with_capacity(bins.len());
+        for bin in bins {
+            let (_, from_here) = rest.split_at_mut(bin.ids.start.saturating_sub(next).min(rest.len()));
+            let (own, after) = from_here.split_at_mut(bin.ids.len().min(from_here.len()));
+            (rest, next) = (after, bin.ids.end);
+            jobs.push((bin, own));
+        }
+        let each = |(bin, own): (&TriangleBin, &mut [[f32; 4]])| find_colors(context.isa, context, bin, own);
+        match pool {
+            Some(pool) => pool.install(|| jobs.into_par_iter().for_each(each)),
+            None => jobs.into_iter().for_each(each),
+        }
+    }
+
+    /// Allocated memory, bytes.
+    pub fn bytes(&self) -> usize {
+        self.colors.capacity() * size_of::<[f32; 4]>()
+    }
+
+    #[inline(always)]
+    fn of(&self, id: u32) -> [f32; 4] {
+        let last = self.colors.len().wrapping_sub(1);
+        self.colors.get((id as usize).min(last)).copied().unwrap_or_default()
+    }
+}
+
+dispatch! {
+    /// Finds the colours of a chunk's triangles.
+    pub fn find_colors(context: &RasterContext<'_>, bin: &TriangleBin, colors: &mut [[f32; 4]]) = find_kernel
+}
+
+#[inline(always)]
+fn find_kernel(context: &RasterContext<'_>, bin: &TriangleBin, colors: &mut [[f32; 4]]) {
+    for id in bin.clipped_ids() {
+        colors[id as usize - bin.ids.start] = UNKNOWN;
+    }
+    for (list, is_front) in [(&bin.fronts, true), (&bin.backs, false)] {
+        find_in_list(context, &list.all, is_front, (bin.ids.start, &mut *colors));
+    }
+}
+
+#[inline(always)]
+fn find_in_list(context: &RasterContext<'_>, ids: &[u32], is_front: bool, (first, colors): (usize, &mut [[f32; 4]])) {
+    let surface = context.plan.surface.as_ref().filter(|surface| surface.is_shaded);
+    let hull = context.plan.hull.as_ref().filter(|_| context.is_hull(first as u32));
+    let (Some(surface), None) = (surface, hull) else {
+        for &id in ids {
+            colors[id as usize - first] = hull.map_or([0.0; 4], |hull| hull.color(id as usize));
+        }
+        return;
+    };
+    let mut group = Group { ids: [0; LANES], len: 0, material: 0 };
+    for &id in ids {
+        let material = surface.triangle_materials.get(id as usize).map_or(0, |&m| m);
+        if group.len == LANES || (group.material != material && group.len > 0) {
+            group.color(context, surface, is_front, (first, &mut *colors));
+            group.len = 0;
+        }
+        group.material = material;
+        group.ids[group.len] = id;
+        group.len += 1;
+    }
+    if group.len > 0 {
+        group.color(context, surface, is_front, (first, colors));
+    }
+}
+
+/// Up to eight triangles of a material.
+struct Group {
+    ids: [u32; LANES],
+    len: usize,
+    material: u32,
+}
+
+impl Group {
+    #[inline(always)]
+    fn color(
+        &self,
+        context: &RasterContext<'_>,
+        surface: &SurfacePass<'_>,
+        is_front: bool,
+        (first, out): (usize, &mut [[f32; 4]]),
+    ) {
+        let material = surface.material(self.ids[0] as usize);
+        let mut normals = [[0.0; LANES]; 3];
+        if material.flags & flags::FACE_NORMALS != 0 {
+            for l in 0..self.len {
+                let normal = turned_to_viewer(surface.face_normals[self.ids[l] as usize], is_front);
+                for k in 0..3 {
+                    normals[k][l] = normal[k];
+                }
+            }
+        }
+        let colors = flat_colors(surface, material, &context.plan.projection, Show::ALL, &normals);
+        for l in 0..self.len {
+            let color = [colors[0][l], colors[1][l], colors[2][l], colors[3][l]];
+            out[self.ids[l] as usize - first] = if color.iter().all(|v| v.is_finite()) { color } else { UNKNOWN };
+        }
+    }
+}
+
+dispatch! {
+    /// Shades every pixel of the band into `colors`, as [`shade`](super::shade::shade) does.
+    pub fn shade_flat(context: &RasterContext<'_>, flat: &FlatColors, band: &SampleBand, colors: &mut [[f32; 4]]) = shade
+}
+
+#[inline(always)]
+fn shade(context: &RasterContext<'_>, flat: &FlatColors, band: &SampleBand, colors: &mut [[f32; 4]]) {
+    for_samples!(band.samples, shade_sampled(context, flat, band, colors));
+}
+
+#[inline(always)]
+fn shade_sampled<const S: usize>(
+    context: &RasterContext<'_>,
+    flat: &FlatColors,
+    band: &SampleBand,
+    colors: &mut [[f32; 4]],
+) {
+    let width = band.size_px[0] as usize;
+    for (y, line) in (band.shown[0]..band.shown[1]).zip(colors.chunks_exact_mut(width)) {
+        let first = band.index(0, y as i32, 0);
+        let row = &band.ids[first..first + width * S];
+        let groups = row.chunks(LANES * S).zip(line.chunks_mut(LANES));
+        for (x, (group, out)) in (0..).step_by(LANES).zip(groups) {
+            // Without a way out in between, this is a few vector instructions.
+            let difference = group.iter().fold(0, |other, id| other | (id ^ group[0]));
+            let color = flat.of(group[0]);
+            if difference == 0 && !color[3].is_nan() {
+                out.fill(color);
+                continue;
+            }
+            let (pixels, _) = group.as_chunks::<S>();
+            for (x, (ids, out)) in (x..).zip(pixels.iter().zip(out)) {
+                *out = mean(flat, ids);
+                if out[3].is_nan() {
+                    *out = pixel_by_point::<S>(context, band, [x, y]);
+                }
+            }
+        }
+    }
+}
+
+/// A pixel with a colour that is not known.
+#[cold]
+#[inline(never)]
+fn pixel_by_point<const S: usize>(context: &RasterContext<'_>, band: &SampleBand, [x, y]: [u32; 2]) -> [f32; 4] {
+    Shader::new(context).pixel::<S>(band, x, y)
+}
+
+/// The mean of the samples' colours. Each triangle's share is added at once, at its first sample,
+/// as [`Shader`] does.
+#[inline(always)]
+fn mean<const S: usize>(flat: &FlatColors, ids: &[u32; S]) -> [f32; 4] {
+    let weights = weights(ids);
+    let mut sum = [0.0; 4];
+    for s in 0..S {
+        let color = flat.of(ids[s]);
+        for k in 0..4 {
+            sum[k] += weights[s] * color[k];
+        }
+    }
+    sum
+}
+
+/// Each triangle's share of the samples at its first sample, 0 at the others.
+#[inline(always)]
+fn weights<const S: usize>(ids: &[u32; S]) -> [f32; S] {
+    let (mut counts, mut is_later) = ([0_i32; S], [0_i32; S]);
+    for s in 0..S {
+        let mut same = [0_i32; S];
+        for t in 0..S {
+            same[t] = -i32::from(ids[s] == ids[t]);
+        }
+        for t in 0..S {
+            counts[t] -= same[t];
+        }
+        for t in s + 1..S {
+            is_later[t] |= same[t];
+        }
+    }
+    let mut weights = [0.0; S];
+    for s in 0..S {
+        weights[s] = (counts[s] & !is_later[s]) as f32 * (1.0 / S as f32);
+    }
+    weights
+}
