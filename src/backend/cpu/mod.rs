@@ -44,6 +44,7 @@ pub struct CpuRenderer {
     pool: Option<rayon::ThreadPool>,
     vertices: Vec<ScreenVertex>,
     scratch: ScratchPool,
+    has_plain_lines: bool,
     srgb: SrgbEncoder,
 }
 
@@ -54,6 +55,8 @@ pub struct RasterContext<'a> {
     /// The positions', then the hull's own.
     vertices: &'a [ScreenVertex],
     isa: Isa,
+    /// True if lines take no shortcut.
+    has_plain_lines: bool,
     srgb: &'a SrgbEncoder,
 }
 
@@ -68,7 +71,13 @@ impl CpuRenderer {
         // One thread needs no pool; and if the system gives no threads, one is what there is.
         let build = || rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("raster-{i}"));
         let pool = if threads > 1 { build().build().ok() } else { None };
-        Self { isa, pool, vertices: Vec::new(), scratch: ScratchPool::default(), srgb: SrgbEncoder::new() }
+        let (vertices, scratch) = (Vec::new(), ScratchPool::default());
+        Self { isa, pool, vertices, scratch, has_plain_lines: false, srgb: SrgbEncoder::new() }
+    }
+
+    /// A renderer whose lines take no shortcut, slowly, for tests that compare pictures.
+    pub fn with_plain_lines(threads: usize) -> Self {
+        Self { has_plain_lines: true, ..Self::new(threads) }
     }
 
     /// Transforms the plan's vertices; afterwards [`RasterContext`] can be made.
@@ -86,7 +95,8 @@ impl CpuRenderer {
     }
 
     fn context<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> RasterContext<'a> {
-        RasterContext { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb }
+        let (vertices, has_plain_lines) = (self.vertices.as_slice(), self.has_plain_lines);
+        RasterContext { plan, deadline, vertices, isa: self.isa, has_plain_lines, srgb: &self.srgb }
     }
 
     /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside
