@@ -124,6 +124,7 @@ macro_rules! dispatch_to {
         pub fn $name(isa: $crate::backend::cpu::isa::Isa, $($arg: $ty),*) {
             #[cfg(target_arch = "x86_64")]
             {
+                #[inline(never)]
                 $(#[target_feature(enable = $feature)])+
                 fn avx2($($arg: $ty),*) {
                     $kernel($($arg),*)

@@ -47,6 +47,7 @@ pub struct CpuRenderer {
     threads: Arc<DrawingThreads>,
     vertices: Vec<ScreenVertex>,
     scratch: ScratchPool,
+    has_plain_lines: bool,
     srgb: SrgbEncoder,
     flat: FlatColors,
 }
@@ -58,6 +59,8 @@ pub struct RasterContext<'a> {
     /// The positions', then the hull's own.
     vertices: &'a [ScreenVertex],
     isa: Isa,
+    /// True if lines take no shortcut.
+    has_plain_lines: bool,
     srgb: &'a SrgbEncoder,
     /// The colours of triangles, where these are all that there is to know.
     flat: Option<&'a FlatColors>,
@@ -74,10 +77,22 @@ impl CpuRenderer {
         Self { isa, ..Self::on(Arc::new(DrawingThreads::new(threads))) }
     }
 
+    /// A renderer whose lines take no shortcut, slowly, for tests that compare pictures.
+    pub fn with_plain_lines(threads: usize) -> Self {
+        Self { has_plain_lines: true, ..Self::new(threads) }
+    }
+
     /// A renderer that shares threads with others.
     pub fn on(threads: Arc<DrawingThreads>) -> Self {
-        let (vertices, scratch, flat) = (Vec::new(), ScratchPool::default(), FlatColors::default());
-        Self { isa: Isa::detect(), threads, vertices, scratch, srgb: SrgbEncoder::new(), flat }
+        Self {
+            isa: Isa::detect(),
+            threads,
+            vertices: Vec::new(),
+            scratch: ScratchPool::default(),
+            has_plain_lines: false,
+            srgb: SrgbEncoder::new(),
+            flat: FlatColors::default(),
+        }
     }
 
     /// Transforms the plan's vertices; afterwards [`RasterContext`] can be made.
@@ -94,7 +109,8 @@ impl CpuRenderer {
     }
 
     fn context<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> RasterContext<'a> {
-        RasterContext { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb, flat: None }
+        let (vertices, has_plain_lines) = (self.vertices.as_slice(), self.has_plain_lines);
+        RasterContext { plan, deadline, vertices, isa: self.isa, has_plain_lines, srgb: &self.srgb, flat: None }
     }
 
     /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside

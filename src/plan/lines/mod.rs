@@ -78,6 +78,12 @@ impl DrawPlan<'_> {
         self.lines.iter().map(LinePass::margin_rows).filter(|_| something_hides).max().unwrap_or(0)
     }
 
+    /// True if a surface may hide some line.
+    pub fn hides_lines(&self) -> bool {
+        let something_hides = self.surface.is_some() || self.hull.is_some();
+        something_hides && self.lines.iter().any(|lines| lines.shown != Shown::All)
+    }
+
     /// True if any line is lit and there is a visible surface to take the light from.
     pub fn lights_lines(&self) -> bool {
         self.surface.as_ref().is_some_and(|surface| surface.is_shaded) && self.lines.iter().any(|lines| lines.lit)

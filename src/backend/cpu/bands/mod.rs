@@ -23,6 +23,7 @@ use crate::backend::cpu::geometry::visibility;
 use crate::backend::cpu::geometry::visibility::Setup;
 use crate::backend::cpu::lines::coverage::{LineCompositor, LineCoverage};
 use crate::backend::cpu::lines::edge::{LineDrawer, LineTarget};
+use crate::backend::cpu::lines::farthest::Farthest;
 use crate::backend::cpu::lines::line_light;
 use crate::backend::cpu::peeling::composite;
 use crate::backend::cpu::peeling::state::PeelBand;
@@ -90,6 +91,9 @@ pub fn draw_layer(
 fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
     let plan = context.plan;
     let pixels = scratch.colors.len();
+    if plan.hides_lines() {
+        scratch.farthest.clear(&scratch.samples);
+    }
     let compositor = LineCompositor::new(plan, &scratch.samples, scratch.peel.as_ref());
     for (pass, bins) in plan.lines.iter().zip(&bins.edges) {
         if bins.iter().all(|chunk| chunk.items_in(band).next().is_none()) {
@@ -101,7 +105,7 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
         scratch.owners.clear();
         scratch.owners.resize(lit_pixels, 0);
         let target = &mut LineTarget { coverage: &mut scratch.coverage, owners: &mut scratch.owners };
-        draw_edges(context.isa, context, pass, bins, band, &scratch.samples, target);
+        draw_edges(context.isa, context, pass, bins, band, (&scratch.samples, &mut scratch.farthest), target);
         scratch.light.clear();
         scratch.light.resize(lit_pixels, Light::NONE);
         line_light::light_lines(context, &scratch.samples, &scratch.owners, &mut scratch.light);
@@ -151,7 +155,7 @@ dispatch! {
         pass: &LinePass,
         bins: &[Bin],
         band: usize,
-        samples: &SampleBand,
+        seen: (&SampleBand, &mut Farthest),
         target: &mut LineTarget<'_>,
     ) = edges_kernel
 }
@@ -213,10 +217,10 @@ fn edges_kernel(
     pass: &LinePass,
     bins: &[Bin],
     band: usize,
-    samples: &SampleBand,
+    seen: (&SampleBand, &mut Farthest),
     target: &mut LineTarget<'_>,
 ) {
-    let mut drawer = LineDrawer::new(context, pass, samples, samples.shown);
+    let mut drawer = LineDrawer::new(context, pass, seen);
     for chunk in bins {
         for (i, edge) in chunk.items_in(band).enumerate() {
             // An edge of a wide line is as much work as hundreds of others.

@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::isa::LANES;
 use crate::backend::cpu::lines::coverage::LineCoverage;
+use crate::backend::cpu::lines::farthest::Farthest;
 use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::light::Light;
 use crate::plan::DrawPlan;
@@ -18,6 +19,9 @@ const ROWS_MIN: u32 = 4;
 
 /// Memory of all bands that are drawn at once, bytes, whatever is drawn on however many threads.
 pub const BANDS_BYTES_MAX: usize = 256 << 20;
+
+/// Memory of a band whose height is a multiple of its margin, bytes.
+const TALL_BYTES: usize = 8 << 20;
 
 /// Memory kept from picture to picture, bytes: of a band's scratch, and of vertices.
 pub const KEPT_BYTES_MAX: usize = 8 << 20;
@@ -59,7 +63,29 @@ impl Banding {
                 best = other;
             }
         }
-        best
+        // Past the cache, what a band draws for its neighbours costs more than fetching its own
+        // samples.
+        for times in [4, 8] {
+            let other = banding(times * margin);
+            if other.bytes(plan) <= other.at_once * TALL_BYTES && yields(&other) > yields(&best) {
+                best = other;
+            }
+        }
+        best.evened(plan)
+    }
+
+    /// With as many bands as all threads take equally many of, if that makes them no taller than by
+    /// a fifth.
+    fn evened(self, plan: &DrawPlan<'_>) -> Self {
+        if self.margin == 0 {
+            return self;
+        }
+        let bands = plan.height_px.div_ceil(self.rows) as usize;
+        let rounds = (bands / self.at_once).max(1);
+        let rows = plan.height_px.div_ceil((rounds * self.at_once) as u32);
+        let evened = Self { rows: rows.max(1), ..self };
+        let is_taller = evened.rows > self.rows + self.rows / 5;
+        if is_taller || evened.bytes(plan) > BANDS_BYTES_MAX { self } else { evened }
     }
 
     /// Memory of the bands that are drawn at once.
@@ -73,7 +99,9 @@ impl Banding {
 fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
     let samples = |columns: u32| columns as usize * plan.samples as usize + LANES;
     if part == 0 {
-        return samples(plan.width_px + 2 * plan.margin_px) * SAMPLE_BYTES;
+        let columns = plan.width_px + 2 * plan.margin_px;
+        let farthest = if plan.hides_lines() { columns as usize * size_of::<f32>() } else { 0 };
+        return samples(columns) * SAMPLE_BYTES + farthest;
     }
     let light = if plan.lights_lines() { size_of::<Light>() + size_of::<u32>() } else { 0 };
     let coverage = if plan.lines.is_empty() { 0 } else { size_of::<LineCoverage>() };
@@ -91,6 +119,8 @@ pub struct BandScratch {
     pub margin: u32,
     /// Depth peeling, where the plan has it.
     pub peel: Option<PeelBand>,
+    /// How far away the samples' triangles reach, where they hide lines.
+    pub farthest: Farthest,
     /// Per pixel, premultiplied linear RGBA.
     pub colors: Vec<[f32; 4]>,
     /// Line coverage of the current line pass.
@@ -108,6 +138,7 @@ impl BandScratch {
             rows,
             margin,
             peel: None,
+            farthest: Farthest::default(),
             colors: Vec::new(),
             coverage: Vec::new(),
             owners: Vec::new(),
@@ -119,6 +150,7 @@ impl BandScratch {
     fn bytes(&self) -> usize {
         self.samples.depth.len() * SAMPLE_BYTES
             + self.peel.as_ref().map_or(0, PeelBand::bytes)
+            + self.farthest.bytes()
             + self.colors.capacity() * size_of::<[f32; 4]>()
             + self.coverage.capacity() * size_of::<LineCoverage>()
             + self.owners.capacity() * size_of::<u32>()

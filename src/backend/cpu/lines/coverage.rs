@@ -7,7 +7,7 @@
 //! answer; where they do, the share of the points that are left of the sum says how much of it is
 //! ([`LineCoverage::covered_share`]).
 
-use super::stroke::{Mask, POINTS, WORDS, count};
+use super::stroke::{Amount, Mask, POINTS, WORDS, count};
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::peeling::state::PeelBand;
@@ -46,11 +46,11 @@ impl LineCoverage {
 
     /// Adds a stroke of a line with this peak.
     #[inline(always)]
-    pub fn add(&mut self, area: f32, mask: &Mask, peak: f32) {
+    pub fn add(&mut self, amount: Amount, mask: &Mask, peak: f32) {
         for l in 0..WORDS {
             self.mask[l] |= mask[l];
         }
-        let (area, count) = ((area * AREA_UNIT + 0.5) as u32, count(mask));
+        let (area, count) = ((amount.area * AREA_UNIT + 0.5) as u32, amount.points);
         self.area += u64::from(area);
         self.count = self.count.saturating_add(count);
         self.slack = self.slack.max(area.abs_diff((count as f32 * (peak * (AREA_UNIT / POINTS as f32)) + 0.5) as u32));
@@ -252,9 +252,10 @@ mod tests {
             let area = count(&beside) as f32 * peak / POINTS as f32;
             let mut last = 0.0;
             for copies in [0, 1, 4, 5, 100, 1_000_000] {
-                let mut coverage = LineCoverage::default();
-                coverage.add(area, &beside, peak);
-                (0..copies).for_each(|_| coverage.add(0.003, &Mask::default(), peak));
+                let (mut coverage, none) = (LineCoverage::default(), Mask::default());
+                let amount = |area, mask: &Mask| Amount { area, points: count(mask) };
+                coverage.add(amount(area, &beside), &beside, peak);
+                (0..copies).for_each(|_| coverage.add(amount(0.003, &none), &none, peak));
                 let expected = area + 0.003 * copies.min(4) as f32;
                 assert!(
                     (coverage.covered_share(peak) - expected).abs() < 1e-3,

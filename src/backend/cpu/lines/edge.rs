@@ -5,11 +5,13 @@
 //! their union ([`coverage`](super::coverage)). Long edges are processed in windows, so that a
 //! pixel's lines depend only on what is near it.
 
+use super::farthest::Farthest;
 use super::segment::{SLACK_PX, Segment, rows};
-use super::stroke::{self, Direction, Pen};
+use super::stroke::{self, Direction, Mask, Pen, Places};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;
+use crate::backend::cpu::isa::LANES;
 use crate::backend::cpu::lines::coverage::LineCoverage;
 use crate::backend::cpu::lines::hidden_lines::HiddenIntervals;
 use crate::plan::{Edge, LinePass, Shown};
@@ -26,10 +28,13 @@ pub struct LineTarget<'a> {
 pub struct LineDrawer<'a> {
     context: &'a RasterContext<'a>,
     lines: &'a LinePass,
-    band: &'a SampleBand,
+    pub(super) band: &'a SampleBand,
+    farthest: &'a mut Farthest,
     /// Rows of the picture that are drawn.
-    rows: [i32; 2],
-    pen: Pen,
+    pub(super) rows: [i32; 2],
+    pub(super) pen: Pen,
+    /// The edge's.
+    pub(super) direction: Direction,
     /// Windows per pixel of an edge's length.
     windows: f32,
     /// True if a surface may hide a line.
@@ -42,16 +47,22 @@ pub struct LineDrawer<'a> {
 }
 
 impl<'a> LineDrawer<'a> {
-    /// A drawer for a pass and the picture rows from `rows[0]` to before `rows[1]`.
-    pub fn new(context: &'a RasterContext<'a>, lines: &'a LinePass, band: &'a SampleBand, rows: [u32; 2]) -> Self {
+    /// A drawer for a pass and the rows of a band that are shown.
+    pub fn new(
+        context: &'a RasterContext<'a>,
+        lines: &'a LinePass,
+        (band, farthest): (&'a SampleBand, &'a mut Farthest),
+    ) -> Self {
         // Without a surface nothing hides a line, and there is no visibility buffer to read.
         let something_hides = context.plan.surface.is_some() || context.plan.hull.is_some();
         Self {
             context,
             lines,
             band,
-            rows: rows.map(|row| row as i32),
-            pen: Pen::new(lines),
+            farthest,
+            rows: band.shown.map(|row| row as i32),
+            pen: Pen::new(context.isa, lines),
+            direction: Direction::new(),
             windows: 1.0 / lines.window_px(),
             is_hidden: something_hides && lines.shown != Shown::All,
             hidden: HiddenIntervals::default(),
@@ -72,10 +83,11 @@ impl<'a> LineDrawer<'a> {
 
     /// Draws one edge.
     #[inline(always)]
-    pub fn draw(&mut self, edge: &Edge, LineTarget { coverage, owners }: &mut LineTarget<'_>) {
+    pub fn draw(&mut self, edge: &Edge, target: &mut LineTarget<'_>) {
         let Some(segment) = Segment::new(self.context, edge) else { return };
-        let mut direction = None;
-        let owner = if self.lines.lit && !owners.is_empty() { self.context.lighting_face(self.lines, edge) } else { 0 };
+        let mut has_direction = false;
+        let owner =
+            if self.lines.lit && !target.owners.is_empty() { self.context.lighting_face(self.lines, edge) } else { 0 };
         let windows = if self.is_hidden { (segment.length * self.windows) as u32 + 1 } else { 1 };
         let step = recip(windows as f32);
         for window in 0..windows {
@@ -85,43 +97,56 @@ impl<'a> LineDrawer<'a> {
             if first > last || !self.collect_intervals(edge, &segment, range) {
                 continue;
             }
-            if direction.is_none() {
-                direction = Some(Direction::new(&self.pen, segment.along));
+            if !has_direction {
+                self.direction.set(&self.pen, segment.along);
+                has_direction = true;
             }
-            let Some(direction) = &direction else { return };
-            let windowed = Window { segment: &segment, ends: [a, b], number: window, count: windows };
-            for y in first..=last {
-                let row = (y - self.rows[0]) as usize * self.band.size_px[0] as usize;
-                let [from, to] = windowed.columns(y, self.pen.reach, self.band.size_px[0]);
-                self.pixels_since_poll += (to - from).max(0);
-                for x in from..=to {
-                    let at = row + x as usize;
-                    let center = [x as f32 + 0.5, y as f32 + 0.5];
+            let window = Window { segment: &segment, ends: [a, b], number: window, count: windows };
+            for i in 0..self.intervals.len() {
+                let piece = self.intervals[i].map(|t| segment.point(t));
+                if self.context.has_plain_lines {
+                    self.draw_piece_plainly(&window, piece, owner, target);
+                } else {
+                    self.draw_piece(&window, piece, owner, target);
+                }
+            }
+        }
+    }
+
+    /// Draws a piece of an edge into the pixels that the window owns.
+    #[inline(always)]
+    fn draw_piece(&mut self, window: &Window<'_>, [a, b]: [[f32; 2]; 2], owner: u32, target: &mut LineTarget<'_>) {
+        let width_px = self.band.size_px[0];
+        let area = Footprint::new(window, [a, b], self.pen.reach);
+        let [first, last] = area.rows(self.rows);
+        for y in first..=last {
+            let row = (y - self.rows[0]) as usize * width_px as usize;
+            let [from, to] = area.columns(y, width_px);
+            self.pixels_since_poll += (to - from).max(0);
+            let mut x = from;
+            while x <= to {
+                let centers = [x as f32 + 0.5, y as f32 + 0.5];
+                let places = Places::new(&self.pen, &self.direction, [a, b], centers);
+                let mut touched = places.touched & lanes_up_to(to - x);
+                while touched != 0 {
+                    let l = touched.trailing_zeros() as usize % LANES;
+                    touched &= touched - 1;
+                    let (at, center) = (row + x as usize + l, [centers[0] + l as f32, centers[1]]);
                     // A full pixel stays full. Only a lit line goes on, to find the face that
                     // lights it.
-                    if (owner == 0 && coverage[at].is_full()) || !windowed.owns(center) {
+                    if (owner == 0 && target.coverage[at].is_full()) || !window.owns(center) {
                         continue;
                     }
-                    let [low, high] = windowed.reached(center, self.pen.reach);
-                    for &[from, to] in &self.intervals {
-                        if to < low {
-                            continue;
-                        }
-                        if from > high {
-                            break;
-                        }
-                        let (a, b) = (segment.point(from), segment.point(to));
-                        let ends = [[a[0] - center[0], a[1] - center[1]], [b[0] - center[0], b[1] - center[1]]];
-                        if let Some((area, mask)) = stroke::cover(&self.pen, direction, ends) {
-                            coverage[at].add(area, &mask, self.pen.peak);
-                            if owner > 0 {
-                                owners[at] = owners[at].max(owner);
-                            } else if coverage[at].is_full() {
-                                break;
-                            }
+                    let ends = [[a[0] - center[0], a[1] - center[1]], [b[0] - center[0], b[1] - center[1]]];
+                    let mut mask = Mask::default();
+                    if let Some(amount) = stroke::cover(&self.pen, &self.direction, ends, &places.of(l), &mut mask) {
+                        target.coverage[at].add(amount, &mask, self.pen.peak);
+                        if owner > 0 {
+                            target.owners[at] = target.owners[at].max(owner);
                         }
                     }
                 }
+                x += LANES as i32;
             }
         }
     }
@@ -137,7 +162,11 @@ impl<'a> LineDrawer<'a> {
         }
         let beyond = (self.pen.reach + 1.0) * segment.inverse_length;
         let range = [(range[0] - beyond).max(0.0), (range[1] + beyond).min(1.0)];
-        self.hidden.find((self.context, self.band), edge, segment, range);
+        if self.context.has_plain_lines {
+            self.hidden.find_plainly((self.context, self.band), (edge, segment), range);
+        } else {
+            self.hidden.find((self.context, self.band, &mut *self.farthest), edge, segment, range);
+        }
         if self.lines.shown == Shown::Visible {
             self.hidden.visible(range, segment.inverse_length, &mut self.intervals);
         } else {
@@ -148,7 +177,7 @@ impl<'a> LineDrawer<'a> {
 }
 
 /// A piece of an edge, and the pixels whose centres are nearest to it.
-struct Window<'a> {
+pub(super) struct Window<'a> {
     segment: &'a Segment,
     ends: [[f32; 2]; 2],
     number: u32,
@@ -156,36 +185,9 @@ struct Window<'a> {
 }
 
 impl Window<'_> {
-    /// First and last column whose pixel centre may lie within reach in pixel row `y`.
-    #[inline(always)]
-    fn columns(&self, y: i32, reach: f32, width_px: u32) -> [i32; 2] {
-        let reach = reach + SLACK_PX;
-        let [a, b] = self.ends;
-        let (mut low, mut high) = (a[0].min(b[0]) - reach, a[0].max(b[0]) + reach);
-        // A steep or slanted line touches only a short piece of each row.
-        let along = self.segment.along;
-        if along[1] * along[1] > 1e-6 {
-            let slope = along[0] / along[1];
-            let center = a[0] + (y as f32 + 0.5 - a[1]) * slope;
-            let spread = reach * (1.0 + slope * slope).sqrt();
-            low = low.max(center - spread);
-            high = high.min(center + spread);
-        }
-        [(low as i32).max(0), (high as i32).min(width_px as i32 - 1)]
-    }
-
-    /// Range of the edge that may reach a pixel, with a margin: intervals beyond it are skipped.
-    #[inline(always)]
-    fn reached(&self, center: [f32; 2], reach: f32) -> [f32; 2] {
-        let s = self.segment;
-        let from_start = [center[0] - s.start[0], center[1] - s.start[1]];
-        let way = (from_start[0] * s.along[0] + from_start[1] * s.along[1]) * s.inverse_length;
-        [(way - reach - 1.0) * s.inverse_length, (way + reach + 1.0) * s.inverse_length]
-    }
-
     /// True if the pixel belongs to this window of the edge.
     #[inline(always)]
-    fn owns(&self, center: [f32; 2]) -> bool {
+    pub(super) fn owns(&self, center: [f32; 2]) -> bool {
         if self.count == 1 {
             return true;
         }
@@ -195,5 +197,55 @@ impl Window<'_> {
         let at = (way * s.inverse_length) * self.count as f32;
         // Rounds towards zero, and what is below zero to it.
         (at as u32).min(self.count - 1) == self.number
+    }
+}
+
+/// Bits of the lanes from the first to one.
+#[inline(always)]
+fn lanes_up_to(lane: i32) -> u32 {
+    if lane < LANES as i32 - 1 { (2 << lane) - 1 } else { u32::MAX }
+}
+
+/// The pixels that a piece of an edge may touch.
+struct Footprint {
+    low: [f32; 2],
+    high: [f32; 2],
+    /// A point of the line, the change of x per row, and how far a row's pixels lie from the line;
+    /// infinitely far if the line is level.
+    point: [f32; 2],
+    slope: f32,
+    spread: f32,
+}
+
+impl Footprint {
+    #[inline(always)]
+    fn new(window: &Window<'_>, [a, b]: [[f32; 2]; 2], reach: f32) -> Self {
+        let reach = reach + SLACK_PX;
+        let [c, d] = window.ends;
+        let along = window.segment.along;
+        // A steep or slanted line touches only a short piece of each row.
+        let is_level = along[1] * along[1] <= 1e-6;
+        let slope = if is_level { 0.0 } else { along[0] / along[1] };
+        Self {
+            low: std::array::from_fn(|k| a[k].min(b[k]).max(c[k].min(d[k])) - reach),
+            high: std::array::from_fn(|k| a[k].max(b[k]).min(c[k].max(d[k])) + reach),
+            point: a,
+            slope,
+            spread: if is_level { f32::INFINITY } else { reach * (1.0 + slope * slope).sqrt() },
+        }
+    }
+
+    /// First and last row, of these; empty if first > last.
+    #[inline(always)]
+    fn rows(&self, [first, end]: [i32; 2]) -> [i32; 2] {
+        [(self.low[1] as i32).max(first), (self.high[1] as i32).min(end - 1)]
+    }
+
+    /// First and last column in a row; empty if first > last.
+    #[inline(always)]
+    fn columns(&self, y: i32, width_px: u32) -> [i32; 2] {
+        let center = self.point[0] + (y as f32 + 0.5 - self.point[1]) * self.slope;
+        let (low, high) = (self.low[0].max(center - self.spread), self.high[0].min(center + self.spread));
+        [(low as i32).max(0), (high as i32).min(width_px as i32 - 1)]
     }
 }

@@ -5,11 +5,13 @@
 //! hides of an edge is an interval. Candidates are the triangles that the visibility buffer shows
 //! along the edge.
 
+use super::candidates::Candidates;
 use super::contour::volume;
+use super::farthest::Farthest;
 use super::segment::Segment;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::is_moderate;
-use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
+use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
 use crate::backend::cpu::geometry::visibility::area;
 use crate::plan::Edge;
@@ -34,13 +36,12 @@ pub const INTERVAL_MIN_PX: f32 = 1.0 / 16.0;
 /// sample.
 pub const GAP_MIN_PX: f32 = 1.0 / 4.0;
 
-/// Number of recent triangles that are not tested again.
-const RECENT: usize = 8;
-
 /// Intervals along an edge in which something hides it, kept from edge to edge.
 #[derive(Default)]
 pub struct HiddenIntervals {
-    hidden: Vec<[f32; 2]>,
+    pub(super) hidden: Vec<[f32; 2]>,
+    /// Pixels along the edge.
+    pixels: Vec<[i32; 2]>,
 }
 
 impl HiddenIntervals {
@@ -48,13 +49,14 @@ impl HiddenIntervals {
     #[inline(always)]
     pub fn find(
         &mut self,
-        (context, band): (&RasterContext<'_>, &SampleBand),
+        (context, band, farthest): (&RasterContext<'_>, &SampleBand, &mut Farthest),
         edge: &Edge,
         segment: &Segment,
         range: [f32; 2],
     ) {
         self.hidden.clear();
-        if is_fully_hidden((context, band), segment, range) {
+        segment.pixels(range, &mut self.pixels);
+        if self.is_fully_hidden((context, band, farthest), segment) {
             self.hidden.push(range);
             return;
         }
@@ -62,11 +64,34 @@ impl HiddenIntervals {
         if !self.hidden.is_empty() && self.hidden[0] != range {
             // Where an edge passes under another surface, a sliver of that may have its samples
             // only beside the edge.
+            let beyond = segment.inverse_length;
+            segment.pixels([range[0] - beyond, range[1] + beyond], &mut self.pixels);
             self.collect_around(context, band, (edge, segment), range, 1);
         }
         if self.hidden.len() > 1 {
             self.hidden.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
         }
+    }
+
+    /// True if every triangle visible along the edge is nearer than all of it: then intervals need
+    /// not be computed.
+    #[inline(always)]
+    fn is_fully_hidden(
+        &self,
+        (context, band, farthest): (&RasterContext<'_>, &SampleBand, &mut Farthest),
+        segment: &Segment,
+    ) -> bool {
+        let nearest = segment.nearest() * NEARER_RATIO;
+        let mut any = false;
+        for &[x, y] in &self.pixels {
+            if band.has(x, y) {
+                any = true;
+                if farthest.at((context, band), [x, y]) <= nearest {
+                    return false;
+                }
+            }
+        }
+        any
     }
 
     /// Collects the hidden intervals of each triangle that is visible along the edge or within
@@ -80,35 +105,48 @@ impl HiddenIntervals {
         range: [f32; 2],
         radius: i32,
     ) {
-        let mut recent = [NOTHING; RECENT];
+        let mut candidates = Candidates::new();
         let across = segment.across();
-        let beyond = radius as f32 * segment.inverse_length;
-        for [x, y] in segment.walk([range[0] - beyond, range[1] + beyond]) {
-            for y in y - radius * across[1]..=y + radius * across[1] {
-                for x in x - radius * across[0]..=x + radius * across[0] {
-                    if !band.has(x, y) {
-                        continue;
-                    }
-                    for &id in band.pixel(x, y).0 {
-                        if id == NOTHING || recent.contains(&id) {
-                            continue;
-                        }
-                        recent.copy_within(..RECENT - 1, 1);
-                        recent[0] = id;
-                        let Some([start, end]) = hidden_by(context, edge, segment, id) else { continue };
-                        let (start, end) = (start.max(range[0]), end.min(range[1]));
-                        if [start, end] == range {
-                            self.hidden.clear();
-                            self.hidden.push(range);
-                            return;
-                        }
-                        if start < end {
-                            self.hidden.push([start, end]);
-                        }
+        for i in 0..self.pixels.len() {
+            let [x, y] = self.pixels[i];
+            for away in -radius..=radius {
+                let [x, y] = [x + away * across[0], y + away * across[1]];
+                if !band.has(x, y) {
+                    continue;
+                }
+                for &id in band.pixel(x, y).0 {
+                    if candidates.push(id)
+                        && self.examine((context, edge, segment), candidates.take(context, edge, segment), range)
+                    {
+                        return;
                     }
                 }
             }
         }
+        self.examine((context, edge, segment), candidates.take(context, edge, segment), range);
+    }
+
+    /// Collects the intervals that triangles hide; true if one of them hides all of the range.
+    #[inline(always)]
+    fn examine(
+        &mut self,
+        (context, edge, segment): (&RasterContext<'_>, &Edge, &Segment),
+        triangles: impl Iterator<Item = u32>,
+        range: [f32; 2],
+    ) -> bool {
+        for id in triangles {
+            let Some([start, end]) = hidden_by(context, edge, segment, id) else { continue };
+            let (start, end) = (start.max(range[0]), end.min(range[1]));
+            if [start, end] == range {
+                self.hidden.clear();
+                self.hidden.push(range);
+                return true;
+            }
+            if start < end {
+                self.hidden.push([start, end]);
+            }
+        }
+        false
     }
 
     /// Appends the visible intervals of the range to `intervals`, in order, without those below the
@@ -142,39 +180,12 @@ impl HiddenIntervals {
     }
 }
 
-/// True if every triangle visible along the edge is nearer than all of it: then intervals need not
-/// be computed.
-#[inline(always)]
-fn is_fully_hidden((context, band): (&RasterContext<'_>, &SampleBand), segment: &Segment, range: [f32; 2]) -> bool {
-    let nearest = segment.depth(0.0).max(segment.depth(1.0)) * NEARER_RATIO;
-    let mut last = NOTHING;
-    for [x, y] in segment.walk(range) {
-        if !band.has(x, y) {
-            continue;
-        }
-        let (ids, depths) = band.pixel(x, y);
-        for (&id, &depth) in ids.iter().zip(depths) {
-            if id == NOTHING || depth <= nearest {
-                return false;
-            }
-            if id != last {
-                last = id;
-                let [a, b, c] = &context.screen_triangle(id);
-                if a.is_outside() | b.is_outside() | c.is_outside() | (a.z.min(b.z).min(c.z) <= nearest) {
-                    return false;
-                }
-            }
-        }
-    }
-    last != NOTHING
-}
-
 /// A corner on screen, times its W: X, Y, Z, W.
 type Corner = [f32; 4];
 
 /// Interval of the edge that the triangle hides.
 #[inline(always)]
-fn hidden_by(context: &RasterContext<'_>, edge: &Edge, segment: &Segment, id: u32) -> Option<[f32; 2]> {
+pub(super) fn hidden_by(context: &RasterContext<'_>, edge: &Edge, segment: &Segment, id: u32) -> Option<[f32; 2]> {
     let vertices = context.triangle(id);
     if edge.vertices.iter().all(|v| vertices.contains(v)) {
         return None;

@@ -6,11 +6,14 @@
 //! and composites them over the colours, under the light of [`line_light`]. Twins are in
 //! `shaders/lines/`.
 
+pub(crate) mod candidates;
 pub(crate) mod contour;
 pub(crate) mod coverage;
 pub(crate) mod edge;
+pub(crate) mod farthest;
 pub(crate) mod hidden_lines;
 pub(crate) mod line_light;
+mod plain;
 pub(crate) mod profile;
 pub(crate) mod segment;
 pub(crate) mod stroke;

@@ -3,7 +3,8 @@
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::clip_segment;
-use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, rsqrt};
+use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, round_to_i32, rsqrt};
+use crate::backend::cpu::isa::LANES;
 use crate::plan::Edge;
 
 /// Slack for roundings where only too much is harmless, pixels.
@@ -55,6 +56,18 @@ impl Segment {
         self.ends
     }
 
+    /// The smaller depth of its ends.
+    #[inline(always)]
+    pub fn farthest(&self) -> f32 {
+        self.depths[0].min(self.depths[1])
+    }
+
+    /// The larger depth of its ends.
+    #[inline(always)]
+    pub fn nearest(&self) -> f32 {
+        self.depths[0].max(self.depths[1])
+    }
+
     /// False if the triangle is farther away than all of the edge, or beside its box.
     #[inline(always)]
     pub fn may_be_hidden_by(&self, [a, b, c]: &[ScreenVertex; 3]) -> bool {
@@ -63,9 +76,7 @@ impl Segment {
             let (low, high) = (a.min(b).min(c) as f32, a.max(b).max(c) as f32);
             (low <= start[k].max(end[k])) & (high >= start[k].min(end[k]))
         };
-        (a.z.max(b.z).max(c.z) > self.depths[0].min(self.depths[1]))
-            & overlaps(0, a.x, b.x, c.x)
-            & overlaps(1, a.y, b.y, c.y)
+        (a.z.max(b.z).max(c.z) > self.farthest()) & overlaps(0, a.x, b.x, c.x) & overlaps(1, a.y, b.y, c.y)
     }
 
     /// Depth at `t` of the way.
@@ -84,6 +95,31 @@ impl Segment {
     #[inline(always)]
     pub fn across(&self) -> [i32; 2] {
         if self.along[0].abs() >= self.along[1].abs() { [0, 1] } else { [1, 0] }
+    }
+
+    /// Replaces `pixels` by those of [`Segment::walk`].
+    #[inline(always)]
+    pub fn pixels(&self, [from, to]: [f32; 2], pixels: &mut Vec<[i32; 2]>) {
+        pixels.clear();
+        let steps = (self.length * (to - from) * 2.0) as u32 + 1;
+        let step = 0.5 * self.inverse_length;
+        let mut last = [i32::MIN; 2];
+        let mut first = 0;
+        while first <= steps {
+            let (mut x, mut y) = ([0; LANES], [0; LANES]);
+            for l in 0..LANES {
+                let at = self.point((from + (first + l as u32) as f32 * step).min(to));
+                (x[l], y[l]) = (floor(at[0]), floor(at[1]));
+            }
+            for l in 0..LANES.min((steps - first) as usize + 1) {
+                let pixel = [x[l], y[l]];
+                if pixel != last {
+                    pixels.push(pixel);
+                    last = pixel;
+                }
+            }
+            first += LANES as u32;
+        }
     }
 
     /// The pixels that the edge passes in a range of it, some twice.
@@ -124,10 +160,11 @@ impl Iterator for Walk {
 }
 
 /// The largest integer that is not greater: left of and above the picture there are pixels too.
+/// Nothing on screen is as far away as 2^22.
 #[inline(always)]
 fn floor(v: f32) -> i32 {
-    let towards_zero = v as i32;
-    towards_zero - i32::from(towards_zero as f32 > v)
+    let nearest = round_to_i32(v);
+    nearest - i32::from(nearest as f32 > v)
 }
 
 /// First and last row, from `first` to before `end`, that a line between these heights may touch;

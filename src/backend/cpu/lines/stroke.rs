@@ -8,6 +8,7 @@
 
 use super::profile::Profile;
 use crate::backend::cpu::geometry::transform::{round_to_i32, rsqrt};
+use crate::backend::cpu::isa::{Isa, LANES, dispatch};
 use crate::backend::sample_partition;
 use crate::backend::sample_partition::GENERATORS;
 use crate::plan::LinePass;
@@ -23,7 +24,7 @@ pub const POINTS: u32 = sample_partition::POINTS as u32;
 pub type Mask = [u16; WORDS];
 
 /// A number for each point: of bit j of word l, at `[j][l]`.
-type PerPoint = [[i16; WORDS]; BITS];
+pub type PerPoint = [[i16; WORDS]; BITS];
 
 /// Positions of the points, in 1/65536 px right of and below the pixel's middle.
 static LATTICE: [PerPoint; 2] = [lattice(GENERATORS[0]), lattice(GENERATORS[1])];
@@ -46,6 +47,7 @@ const fn lattice(generator: usize) -> PerPoint {
 
 /// Parameters of all strokes of a line pass.
 pub struct Pen {
+    isa: Isa,
     /// Half the width, pixels.
     half_width: f32,
     /// Half of the extra ramp, pixels.
@@ -64,7 +66,7 @@ pub struct Pen {
 
 impl Pen {
     /// A pass's.
-    pub fn new(lines: &LinePass) -> Self {
+    pub fn new(isa: Isa, lines: &LinePass) -> Self {
         let (half_width, half_ramp) = (0.5 * lines.width_px, 0.5 * lines.smoothing_px);
         let exponent = lines.square_exponent();
         let half_square = |j: usize, l: usize| {
@@ -72,6 +74,7 @@ impl Pen {
             ((square(LATTICE[0][j][l]) + square(LATTICE[1][j][l])) >> (17 - exponent)) as i16
         };
         Self {
+            isa,
             half_width,
             half_ramp,
             reach: lines.reach_px(),
@@ -108,34 +111,54 @@ pub struct Direction {
 }
 
 impl Direction {
-    /// That of a vector, pixels.
+    /// None yet.
+    pub fn new() -> Self {
+        let nothing = [[0; WORDS]; BITS];
+        let profile = Profile::new(0.0, 0.0, [1.0, 0.0]);
+        Self { along: [0.0; 2], across_at: nothing, along_at: nothing, profile, box_along: 0.0 }
+    }
+
+    /// Becomes that of a vector, pixels.
     #[inline(always)]
-    pub fn new(pen: &Pen, vector: [f32; 2]) -> Self {
+    pub fn set(&mut self, pen: &Pen, vector: [f32; 2]) {
         let squared = vector[0] * vector[0] + vector[1] * vector[1];
         let inverse = if squared > 0.0 { rsqrt(squared) } else { 0.0 };
         let along = [vector[0] * inverse, vector[1] * inverse];
         let across = [-along[1], along[0]];
-        Self {
-            along,
-            across_at: places(across),
-            along_at: places(along),
-            profile: Profile::new(pen.half_width, pen.half_ramp, across),
-            box_along: if squared > 0.0 { 0.5 * (along[0].abs() + along[1].abs()) } else { f32::MIN_POSITIVE },
-        }
+        self.along = along;
+        find_places(pen.isa, units_of(across), &mut self.across_at);
+        find_places(pen.isa, units_of(along), &mut self.along_at);
+        self.profile = Profile::new(pen.half_width, pen.half_ramp, across);
+        self.box_along = if squared > 0.0 { 0.5 * (along[0].abs() + along[1].abs()) } else { f32::MIN_POSITIVE };
+    }
+
+    /// Where a pixel lies to a piece with this direction, whose ends are given from the pixel's
+    /// centre.
+    #[inline(always)]
+    pub fn place(&self, [start, end]: [[f32; 2]; 2]) -> Place {
+        let past = |p: [f32; 2]| -(self.along[0] * p[0] + self.along[1] * p[1]);
+        let across = self.along[1] * start[0] - self.along[0] * start[1];
+        Place { across, past: [past(start), past(end)] }
     }
 }
 
 #[inline(always)]
-fn places(direction: [f32; 2]) -> PerPoint {
-    let (x, y) = (round_to_i32(direction[0] * UNIT) as i16, round_to_i32(direction[1] * UNIT) as i16);
-    let mut places = [[0; WORDS]; BITS];
-    for j in 0..BITS {
-        let (right, down, place) = (&LATTICE[0][j], &LATTICE[1][j], &mut places[j]);
+fn units_of(direction: [f32; 2]) -> [i16; 2] {
+    direction.map(|v| round_to_i32(v * UNIT) as i16)
+}
+
+dispatch! {
+    /// Every point's place in a direction.
+    pub fn find_places(direction: [i16; 2], places: &mut PerPoint) = places_kernel
+}
+
+#[inline(always)]
+fn places_kernel([x, y]: [i16; 2], places: &mut PerPoint) {
+    for ((right, down), place) in LATTICE[0].iter().zip(&LATTICE[1]).zip(places) {
         for l in 0..WORDS {
             place[l] = high(x, right[l]) + high(y, down[l]);
         }
     }
-    places
 }
 
 /// The upper half of a product.
@@ -144,50 +167,103 @@ fn high(a: i16, b: i16) -> i16 {
     ((i32::from(a) * i32::from(b)) >> 16) as i16
 }
 
-/// Area (0 to 1) and mask of a piece of an edge in a pixel. `ends` are the piece's, in pixels from
-/// the pixel's centre.
-#[inline(always)]
-pub fn cover(pen: &Pen, direction: &Direction, ends: [[f32; 2]; 2]) -> Option<(f32, Mask)> {
-    let [start, end] = ends;
-    // Distances of the pixel's centre: from the line, past the start and past the end.
-    let across = direction.along[1] * start[0] - direction.along[0] * start[1];
-    let past = |p: [f32; 2]| -(direction.along[0] * p[0] + direction.along[1] * p[1]);
-    let (past_start, past_end) = (past(start), past(end));
-    let beyond = (-past_start).max(past_end).max(0.0);
-    if across * across + beyond * beyond > pen.reach * pen.reach {
-        return None;
+/// How much of a pixel a stroke covers.
+#[derive(Clone, Copy)]
+pub struct Amount {
+    /// The area, 0 to 1.
+    pub area: f32,
+    /// The number of points.
+    pub points: u32,
+}
+
+/// Where eight pixels of a row lie to a piece of an edge, in pixels.
+pub struct Places {
+    /// Distances of the pixels' centres from the line, past the piece's start, and past its end.
+    across: [f32; LANES],
+    past: [[f32; LANES]; 2],
+    /// Bit l: the stroke may touch pixel l.
+    pub touched: u32,
+}
+
+impl Places {
+    /// For a piece with these ends, and pixels whose first centre this is.
+    #[inline(always)]
+    pub fn new(pen: &Pen, direction: &Direction, [start, end]: [[f32; 2]; 2], first: [f32; 2]) -> Self {
+        let (mut across, mut past) = ([0.0; LANES], [[0.0; LANES]; 2]);
+        let mut is_touched = [0_u32; LANES];
+        for l in 0..LANES {
+            let x = first[0] + l as f32;
+            let from = |p: [f32; 2]| [p[0] - x, p[1] - first[1]];
+            let place = direction.place([from(start), from(end)]);
+            (across[l], past[0][l], past[1][l]) = (place.across, place.past[0], place.past[1]);
+            is_touched[l] = u32::from(place.is_within(pen.reach)) << l;
+        }
+        Self { across, past, touched: is_touched.iter().fold(0, |all, bit| all | bit) }
     }
+
+    /// Pixel l's.
+    #[inline(always)]
+    pub fn of(&self, l: usize) -> Place {
+        Place { across: self.across[l], past: [self.past[0][l], self.past[1][l]] }
+    }
+}
+
+/// Distances of a pixel's centre: from the line, past the piece's start and past its end.
+#[derive(Clone, Copy)]
+pub struct Place {
+    across: f32,
+    past: [f32; 2],
+}
+
+impl Place {
+    /// Distance past the nearer end.
+    #[inline(always)]
+    fn beyond(&self) -> f32 {
+        (-self.past[0]).max(self.past[1]).max(0.0)
+    }
+
+    /// False if the pixel is farther from the piece than a line reaches.
+    #[inline(always)]
+    pub fn is_within(&self, reach: f32) -> bool {
+        let beyond = self.beyond();
+        self.across * self.across + beyond * beyond <= reach * reach
+    }
+}
+
+/// What a piece of an edge covers of a pixel within its reach; `mask`, which is empty, gets the
+/// points. `ends` are the piece's, in pixels from the pixel's centre.
+#[inline(always)]
+pub fn cover(pen: &Pen, direction: &Direction, ends: [[f32; 2]; 2], place: &Place, mask: &mut Mask) -> Option<Amount> {
     // Does the pixel reach past the start, and past the end?
-    let reaches = [past_start < direction.box_along, past_end > -direction.box_along];
-    let mut mask = [0; WORDS];
+    let reaches = [place.past[0] < direction.box_along, place.past[1] > -direction.box_along];
     if reaches == [false; 2] {
-        let area = direction.profile.coverage(across.abs());
+        let area = direction.profile.coverage(place.across.abs());
         if area == 0.0 {
             return None;
         }
-        strip(pen, direction, across, [past_start, past_end], true, &mut mask);
-        return Some((area, mask));
+        strip(pen, direction, place.across, place.past, true, mask);
+        return Some(Amount { area, points: count(mask) });
     }
     // An edge that is a point has no sides, only the disc around it.
-    if direction.along != [0.0; 2] && beyond < direction.box_along {
-        strip(pen, direction, across, [past_start, past_end], false, &mut mask);
+    if direction.along != [0.0; 2] && place.beyond() < direction.box_along {
+        strip(pen, direction, place.across, place.past, false, mask);
     }
     if reaches[0] {
-        disc(pen, start, &mut mask);
+        disc(pen, ends[0], mask);
     }
     if reaches[1] {
-        disc(pen, end, &mut mask);
+        disc(pen, ends[1], mask);
     }
-    let count = count(&mask);
-    (count > 0).then_some((count as f32 * (pen.peak * (1.0 / POINTS as f32)), mask))
+    let points = count(mask);
+    (points > 0).then_some(Amount { area: points as f32 * (pen.peak * (1.0 / POINTS as f32)), points })
 }
 
 /// Points of a mask.
 #[inline(always)]
 pub fn count(mask: &Mask) -> u32 {
     // Four words at a time: the compiler counts no shorter ones faster.
-    let four = |k: usize| (0..4).fold(0_u64, |all, i| all << 16 | u64::from(mask[4 * k + i]));
-    (four(0).count_ones() + four(1).count_ones()) + (four(2).count_ones() + four(3).count_ones())
+    let four: [u64; WORDS / 4] = bytemuck::cast(*mask);
+    (four[0].count_ones() + four[1].count_ones()) + (four[2].count_ones() + four[3].count_ones())
 }
 
 #[inline(always)]
@@ -202,23 +278,39 @@ fn strip(pen: &Pen, direction: &Direction, across: f32, past: [f32; 2], is_endle
             (low[l], high[l]) = (units(-r - across), units(r - across));
         }
     }
-    let mut outside = [0; WORDS];
+    let across = Range::new(&low, &high);
     if is_endless {
-        for places in &direction.across_at {
-            let mut sign = [0; WORDS];
-            for l in 0..WORDS {
-                sign[l] = (places[l] - low[l]) | (high[l] - places[l]);
-            }
-            push_signs(&mut outside, &sign);
-        }
-    } else {
-        let (first, last) = (units(-past[0]), units(-past[1]));
-        for (places, ways) in direction.across_at.iter().zip(&direction.along_at) {
-            let mut sign = [0; WORDS];
-            for l in 0..WORDS {
-                sign[l] = (places[l] - low[l]) | (high[l] - places[l]) | (ways[l] - first) | (last - ways[l]);
-            }
-            push_signs(&mut outside, &sign);
+        add_strip(pen.isa, &direction.across_at, &across, mask);
+        return;
+    }
+    let (first, last) = (units(-past[0]), units(-past[1]));
+    if first <= last {
+        let along = Range::new(&[first; WORDS], &[last; WORDS]);
+        add_rectangle(pen.isa, [&direction.across_at, &direction.along_at], [&across, &along], mask);
+    }
+}
+
+dispatch! {
+    /// Adds the points whose places lie in a range.
+    pub fn add_strip(places: &PerPoint, range: &Range, mask: &mut Mask) = strip_kernel
+}
+
+dispatch! {
+    /// Adds the points whose places of both kinds lie in their ranges.
+    pub fn add_rectangle(places: [&PerPoint; 2], ranges: [&Range; 2], mask: &mut Mask) = rectangle_kernel
+}
+
+dispatch! {
+    /// Adds the points of a disc.
+    pub fn add_disc(half_square: &PerPoint, disc: &Disc, mask: &mut Mask) = disc_kernel
+}
+
+#[inline(always)]
+fn strip_kernel(places: &PerPoint, range: &Range, mask: &mut Mask) {
+    let mut outside = [0; WORDS];
+    for places in places {
+        for l in 0..WORDS {
+            push(&mut outside[l], range.excludes(l, places[l]));
         }
     }
     for l in 0..WORDS {
@@ -226,13 +318,80 @@ fn strip(pen: &Pen, direction: &Direction, across: f32, past: [f32; 2], is_endle
     }
 }
 
-/// Moves words up by a bit, and puts the signs of `of` below. A loop of nothing else is what
-/// compilers make vectors of.
 #[inline(always)]
-fn push_signs(words: &mut [u16; WORDS], of: &[i16; WORDS]) {
-    for l in 0..WORDS {
-        words[l] = words[l] << 1 | (of[l] as u16) >> 15;
+fn rectangle_kernel([across, along]: [&PerPoint; 2], ranges: [&Range; 2], mask: &mut Mask) {
+    let mut outside = [0; WORDS];
+    for (across, along) in across.iter().zip(along) {
+        for l in 0..WORDS {
+            push(&mut outside[l], ranges[0].excludes(l, across[l]) | ranges[1].excludes(l, along[l]));
+        }
     }
+    for l in 0..WORDS {
+        mask[l] |= !outside[l];
+    }
+}
+
+#[inline(always)]
+fn disc_kernel(half_square: &PerPoint, disc: &Disc, mask: &mut Mask) {
+    // In steps of four, which compilers unroll.
+    const STEP: usize = 4;
+    let mut outside = [0; WORDS];
+    for first in 0..BITS / STEP {
+        for j in STEP * first..STEP * first + STEP {
+            let (right, down) = (&LATTICE[0][j], &LATTICE[1][j]);
+            let mut at = [0_i16; WORDS];
+            for l in 0..WORDS {
+                at[l] = high(disc.x, right[l]) + high(disc.y, down[l]) + half_square[j][l];
+            }
+            for l in 0..WORDS {
+                push(&mut outside[l], at[l] > disc.limits[l]);
+            }
+        }
+    }
+    for l in 0..WORDS {
+        mask[l] |= !outside[l];
+    }
+}
+
+/// A disc around the end of a piece.
+pub struct Disc {
+    /// From the end to the pixel's centre, scaled.
+    x: i16,
+    y: i16,
+    /// For each word, the largest `|p|^2 / 2 - p . end` of a point p inside.
+    limits: [i16; WORDS],
+}
+
+/// A range of places for each word, from a first to a last that is not less.
+pub struct Range {
+    /// What moves the first place to the least number, and the last place moved likewise. Then one
+    /// comparison finds what is outside, because places below the first wrap around.
+    shift: [i16; WORDS],
+    last: [i16; WORDS],
+}
+
+impl Range {
+    #[inline(always)]
+    fn new(first: &[i16; WORDS], last: &[i16; WORDS]) -> Self {
+        let (mut shift, mut moved) = ([0; WORDS], [0; WORDS]);
+        for l in 0..WORDS {
+            shift[l] = i16::MIN.wrapping_sub(first[l]);
+            moved[l] = last[l].wrapping_add(shift[l]);
+        }
+        Self { shift, last: moved }
+    }
+
+    #[inline(always)]
+    fn excludes(&self, word: usize, place: i16) -> bool {
+        place.wrapping_add(self.shift[word]) > self.last[word]
+    }
+}
+
+/// Moves a word up by a bit, and puts a bit below. In a loop over words, compilers make vectors of
+/// this.
+#[inline(always)]
+fn push(word: &mut u16, bit: bool) {
+    *word = (word.wrapping_add(*word)).wrapping_add(u16::from(bit));
 }
 
 /// Adds the points around the end of a piece, which lies at `end` from the pixel's centre.
@@ -251,16 +410,5 @@ fn disc(pen: &Pen, end: [f32; 2], mask: &mut Mask) {
         }
     }
     let (x, y) = (round_to_i32(-end[0] * pen.square_unit) as i16, round_to_i32(-end[1] * pen.square_unit) as i16);
-    let mut outside = [0; WORDS];
-    for j in 0..BITS {
-        let (right, down, half_square) = (&LATTICE[0][j], &LATTICE[1][j], &pen.half_square[j]);
-        let mut sign = [0; WORDS];
-        for l in 0..WORDS {
-            sign[l] = limits[l] - half_square[l] - high(x, right[l]) - high(y, down[l]);
-        }
-        push_signs(&mut outside, &sign);
-    }
-    for l in 0..WORDS {
-        mask[l] |= !outside[l];
-    }
+    add_disc(pen.isa, &pen.half_square, &Disc { x, y, limits }, mask);
 }

@@ -5,3 +5,4 @@ pub mod formulas;
 pub mod limits;
 pub mod looks;
 pub mod primitives;
+pub mod shortcuts;

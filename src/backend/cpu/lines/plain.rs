@@ -1,0 +1,105 @@
+//! Lines without any shortcut, for tests that compare pictures: hidden-line removal examines every
+//! triangle that is visible along an edge, one by one, and strokes look at every pixel around them.
+
+use super::edge::{LineDrawer, LineTarget, Window};
+use super::hidden_lines::{HiddenIntervals, NEARER_RATIO, hidden_by};
+use super::segment::Segment;
+use super::stroke::{self, Mask};
+use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
+use crate::plan::Edge;
+
+impl HiddenIntervals {
+    /// As [`HiddenIntervals::find`].
+    pub fn find_plainly(
+        &mut self,
+        (context, band): (&RasterContext<'_>, &SampleBand),
+        (edge, segment): (&Edge, &Segment),
+        range: [f32; 2],
+    ) {
+        self.hidden.clear();
+        if is_behind_all((context, band), segment, range) {
+            self.hidden.push(range);
+            return;
+        }
+        self.collect_plainly((context, band), (edge, segment), range, 0);
+        if !self.hidden.is_empty() && !self.hidden.contains(&range) {
+            self.collect_plainly((context, band), (edge, segment), range, 1);
+        }
+        if self.hidden.contains(&range) {
+            self.hidden = vec![range];
+        }
+        self.hidden.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    }
+
+    fn collect_plainly(
+        &mut self,
+        (context, band): (&RasterContext<'_>, &SampleBand),
+        (edge, segment): (&Edge, &Segment),
+        range: [f32; 2],
+        radius: i32,
+    ) {
+        let across = segment.across();
+        let beyond = radius as f32 * segment.inverse_length;
+        let mut ids = Vec::new();
+        for [x, y] in segment.walk([range[0] - beyond, range[1] + beyond]) {
+            for away in -radius..=radius {
+                let [x, y] = [x + away * across[0], y + away * across[1]];
+                if band.has(x, y) {
+                    ids.extend(band.pixel(x, y).0.iter().filter(|&&id| id != NOTHING));
+                }
+            }
+        }
+        ids.sort_unstable();
+        ids.dedup();
+        for [start, end] in ids.into_iter().filter_map(|id| hidden_by(context, edge, segment, id)) {
+            let (start, end) = (start.max(range[0]), end.min(range[1]));
+            if start < end {
+                self.hidden.push([start, end]);
+            }
+        }
+    }
+}
+
+/// True if every triangle visible along the edge is nearer than all of it.
+fn is_behind_all((context, band): (&RasterContext<'_>, &SampleBand), segment: &Segment, range: [f32; 2]) -> bool {
+    let nearest = segment.nearest() * NEARER_RATIO;
+    let is_nearer = |id: u32| {
+        id != NOTHING && context.screen_triangle(id).iter().all(|corner| !corner.is_outside() && corner.z > nearest)
+    };
+    let mut pixels = segment.walk(range).filter(|&[x, y]| band.has(x, y)).peekable();
+    pixels.peek().is_some() && pixels.all(|[x, y]| band.pixel(x, y).0.iter().all(|&id| is_nearer(id)))
+}
+
+impl LineDrawer<'_> {
+    /// As [`LineDrawer::draw_piece`].
+    pub(super) fn draw_piece_plainly(
+        &mut self,
+        window: &Window<'_>,
+        [a, b]: [[f32; 2]; 2],
+        owner: u32,
+        target: &mut LineTarget<'_>,
+    ) {
+        let width_px = self.band.size_px[0];
+        let reach = self.pen.reach + 1.0;
+        let columns = [a[0].min(b[0]) - reach, a[0].max(b[0]) + reach];
+        for y in self.rows[0]..self.rows[1] {
+            for x in (columns[0] as i32).max(0)..(columns[1] as i32 + 1).min(width_px as i32) {
+                let center = [x as f32 + 0.5, y as f32 + 0.5];
+                let ends = [a, b].map(|p| [p[0] - center[0], p[1] - center[1]]);
+                let place = self.direction.place(ends);
+                if !place.is_within(self.pen.reach) || !window.owns(center) {
+                    continue;
+                }
+                let mut mask = Mask::default();
+                if let Some(amount) = stroke::cover(&self.pen, &self.direction, ends, &place, &mut mask) {
+                    let at = (y - self.rows[0]) as usize * width_px as usize + x as usize;
+                    target.coverage[at].add(amount, &mask, self.pen.peak);
+                    if owner > 0 {
+                        target.owners[at] = target.owners[at].max(owner);
+                    }
+                }
+            }
+        }
+    }
+}
