@@ -125,7 +125,7 @@ mod tests {
         for word in words.split(' ') {
             check(word, &mut count);
         }
-        assert_eq!(count, 59);
+        assert_eq!(count, words.split(' ').count() as u64);
         assert_eq!(parse(b""), None);
         assert_eq!(leading(b"1.5 2", 4), Some((2.0, 5)));
         assert_eq!(

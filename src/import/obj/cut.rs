@@ -1,14 +1,14 @@
 //! Cuts a text into parts that can be read on their own, at ends of logical lines.
 
 /// Bytes of a part, about: a part and what is read from it fit the second cache of a core.
-const PART_BYTES: usize = 256 << 10;
+pub const PART_BYTES: usize = 256 << 10;
 
-/// Cuts `text` into parts. A line that a backslash continues stays whole.
-pub fn cut(text: &[u8], newline: u8) -> Vec<&[u8]> {
-    let mut parts = Vec::with_capacity(text.len() / PART_BYTES + 1);
+/// Cuts `text` into parts of about `part_bytes`. A line that a backslash continues stays whole.
+pub fn cut(text: &[u8], newline: u8, part_bytes: usize) -> Vec<&[u8]> {
+    let mut parts = Vec::with_capacity(text.len() / part_bytes + 1);
     let mut rest = text;
-    while rest.len() > PART_BYTES {
-        let Some(end) = end_of_line(rest, PART_BYTES, newline) else { break };
+    while rest.len() > part_bytes {
+        let Some(end) = end_of_line(rest, part_bytes, newline) else { break };
         let (part, after) = rest.split_at(end);
         parts.push(part);
         rest = after;
@@ -48,15 +48,15 @@ mod tests {
     fn parts_end_with_whole_lines() {
         let line = "v 1 2 3 \\ \r\n 4\nf 1 2\\\n\\\n3\n# c \\\n";
         let text = line.repeat(40_000);
-        let parts = cut(text.as_bytes(), b'\n');
+        let parts = cut(text.as_bytes(), b'\n', PART_BYTES);
         assert!(parts.len() >= 4, "{}", parts.len());
         assert_eq!(parts.concat(), text.as_bytes());
         for part in &parts[..parts.len() - 1] {
             assert!(part.ends_with(b" 4\n") || part.ends_with(b"3\n"), "{:?}", &part[part.len() - 20..]);
         }
-        assert!(cut(b"", b'\n').is_empty());
-        assert_eq!(cut("x".repeat(PART_BYTES * 3).as_bytes(), b'\n').len(), 1, "one line is one part");
-        assert_eq!(cut("v 1\r".repeat(PART_BYTES).as_bytes(), b'\r').len(), 4);
+        assert!(cut(b"", b'\n', 1).is_empty());
+        assert_eq!(cut("x".repeat(300).as_bytes(), b'\n', 100).len(), 1, "one line is one part");
+        assert_eq!(cut("v 1\r".repeat(100).as_bytes(), b'\r', 99).len(), 4);
     }
 
     #[test]

@@ -12,10 +12,13 @@ mod mtl;
 mod parse;
 mod skipped;
 mod sniff;
+#[cfg(test)]
+mod tests;
 
 pub use sniff::is_obj;
 
 use self::assemble::assemble;
+use self::cut::PART_BYTES;
 use self::face::Counts;
 use self::parse::{Fault, Part, Rules, parse};
 use super::raw::RawMesh;
@@ -33,7 +36,7 @@ const BYTES_PER_WORD: u64 = 24;
 /// Reads an OBJ file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let text = text::to_utf8(bytes, cx.budget)?;
-    let parts = read_parts(&text, cx)?;
+    let parts = read_parts(&text, PART_BYTES, true, cx)?;
     let mut raw = RawMesh::default();
     raw.report.format = Format::Obj;
     raw.report.metadata = FileMetadata::by(metadata::first_comment(&text, b"#", |_| false));
@@ -54,16 +57,21 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
 }
 
 /// The parts of a text, in its order.
-fn read_parts<'t>(text: &'t [u8], cx: &mut Context<'_>) -> Result<Vec<Part<'t>>, MeshError> {
+fn read_parts<'t>(
+    text: &'t [u8],
+    part_bytes: usize,
+    has_plain_lines: bool,
+    cx: &mut Context<'_>,
+) -> Result<Vec<Part<'t>>, MeshError> {
     let newline = lines::newline(text);
     let text = lines::without_mark(text);
-    let pieces = cut::cut(text, newline);
+    let pieces = cut::cut(text, newline, part_bytes);
     let words = parallel::map(pieces.clone(), cut::words_max);
     cx.budget.spend("the OBJ file", words.iter().sum(), BYTES_PER_WORD)?;
     let deadline = cx.deadline;
     deadline.check()?;
     let is_colored = parse::has_colored_vertex(text, newline, || deadline.check().is_ok()).unwrap_or(false);
-    let rules = Rules { newline, is_colored, before: None, deadline };
+    let rules = Rules { newline, is_colored, before: None, has_plain_lines, deadline };
     let mut parts = parallel::map(pieces.iter().copied().enumerate().collect(), |(i, piece)| {
         parse(piece, Rules { before: (i == 0).then(Counts::default), ..rules })
     });

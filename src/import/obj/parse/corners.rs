@@ -6,6 +6,9 @@ use crate::import::obj::face::MISSING;
 /// Digits of an index that cannot overflow.
 const DIGITS_MAX: usize = 9;
 
+/// Where a face's line ends, and whether its corners have texture coordinates and normals.
+type FaceEnd = (usize, (bool, bool));
+
 impl Parser<'_, '_> {
     /// A face of three or more corners, all `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     #[inline]
@@ -29,7 +32,7 @@ impl Parser<'_, '_> {
     }
 
     #[inline]
-    fn plain_corners(&mut self, mut at: usize, before: usize) -> Result<Option<(usize, (bool, bool))>, Fault> {
+    fn plain_corners(&mut self, mut at: usize, before: usize) -> Result<Option<FaceEnd>, Fault> {
         let mut form = None;
         loop {
             while let Some(b' ' | b'\t' | b'\r') = self.bytes.get(at) {
