@@ -14,7 +14,14 @@ pub fn read(name: &str, bytes_max: u64) -> Result<Vec<u8>, CliError> {
     if name == "-" {
         limited(&mut io::stdin().lock(), &mut bytes).map_err(failed)?;
     } else {
-        limited(&mut File::open(name).map_err(failed)?, &mut bytes).map_err(failed)?;
+        let mut file = File::open(name).map_err(failed)?;
+        // One read into a buffer of the right size. The length is a hint: files may grow, and some
+        // have none.
+        let length = file.metadata().map_or(0, |metadata| metadata.len()).min(bytes_max);
+        bytes
+            .try_reserve_exact(usize::try_from(length).unwrap_or(0).saturating_add(1))
+            .map_err(|_| CliError::input(format!("{name}: there is no memory for its {length} bytes")))?;
+        limited(&mut file, &mut bytes).map_err(failed)?;
     }
     if bytes.len() as u64 > bytes_max {
         let sentence = format!("{name}: is larger than {bytes_max} bytes (raise it with --limit-memory-bytes)");

@@ -8,7 +8,7 @@ pub const ALL_EDGES: u8 = 0b111;
 
 /// Most corner tests of ear clipping in one file, about half a second. Past that it falls back to
 /// fans: clipping is quadratic, and a few hostile polygons would otherwise take minutes.
-const WORK_MAX: u64 = 100_000_000;
+pub const WORK_MAX: u64 = 100_000_000;
 /// Squared lengths within this ratio count as equal. It is more than the rounding of coordinates in
 /// f32, or of f64 far away.
 const EQUAL_LENGTHS2: f64 = 1.0 + 1e-4;
@@ -42,6 +42,17 @@ impl Default for Triangulator {
 }
 
 impl Triangulator {
+    /// Corner tests so far.
+    pub fn work(&self) -> u64 {
+        WORK_MAX - self.work_left
+    }
+
+    /// Counts the work of another triangulator as this one's.
+    pub fn add_work_of(&mut self, other: &Self) {
+        self.work_left = self.work_left.saturating_sub(other.work());
+        self.fanned += other.fanned;
+    }
+
     /// A warning if a polygon was too large, or the file had too many large ones, for ear clipping.
     pub fn warning(&self) -> Option<Warning> {
         (self.fanned > 0 || self.work_left == 0).then(|| Warning {

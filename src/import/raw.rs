@@ -3,6 +3,7 @@
 use crate::import::ImportReport;
 use crate::mesh::material::{FileCamera, ImageSource};
 use crate::mesh::{LineOrPoint, MaterialSlot, UpAxis};
+use bytes::Bytes;
 
 /// A mesh as the file has it: file units, f64, nothing welded, nothing dropped.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +22,8 @@ pub struct RawMesh {
     pub colors: Vec<[f32; 4]>,
     /// Vertex indices; every one is below `positions.len()`: the importer has checked.
     pub triangles: Vec<[u32; 3]>,
+    /// Triangles that share no vertices, in place of `positions` and `triangles`.
+    pub soup: Option<Soup>,
     /// As [`crate::mesh::Mesh::edge_masks`], one per triangle.
     pub edge_masks: Vec<u8>,
     /// Index into `materials`, one per triangle.
@@ -37,6 +40,36 @@ pub struct RawMesh {
     pub up: UpAxis,
     /// Format, counts and warnings so far.
     pub report: ImportReport,
+}
+
+/// Triangles that share no vertices, left where they lie in the file: records with nine f32,
+/// little-endian. Vertex `3 t + k` is corner `k` of triangle `t`.
+#[derive(Clone, Debug)]
+pub struct Soup {
+    records: Bytes,
+    record_bytes: usize,
+    offset: usize,
+}
+
+impl Soup {
+    /// Triangles in whole records of `record_bytes`, whose corners begin at `offset` in each.
+    pub fn new(records: Bytes, record_bytes: usize, offset: usize) -> Self {
+        Self { records, record_bytes, offset }
+    }
+
+    /// Number of triangles.
+    pub fn triangles(&self) -> usize {
+        self.records.len() / self.record_bytes
+    }
+
+    /// The position of a corner.
+    #[inline(always)]
+    pub fn corner(&self, triangle: usize, corner: usize) -> [f64; 3] {
+        let begin = triangle * self.record_bytes + self.offset + 12 * corner;
+        let bytes = &self.records[begin..begin + 12];
+        let float = |at: usize| f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+        [f64::from(float(0)), f64::from(float(4)), f64::from(float(8))]
+    }
 }
 
 /// Appends the values of an attribute for the vertices from `before` to `after`. If `new` is empty

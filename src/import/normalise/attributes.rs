@@ -16,9 +16,9 @@ pub struct Attributes {
     pub colors: Vec<[f32; 4]>,
 }
 
-/// Takes the attributes out of `raw` and repairs them. `mesh` has its triangles already.
-pub fn repair(raw: &mut RawMesh, mesh: &Mesh) -> Attributes {
-    let count = raw.positions.len();
+/// Takes the attributes of `count` vertices out of `raw` and repairs them. `mesh` has its triangles
+/// already.
+pub fn repair(raw: &mut RawMesh, count: usize, mesh: &Mesh) -> Attributes {
     let mut colors = std::mem::take(&mut raw.colors);
     for component in colors.iter_mut().flatten() {
         // 1 for a NaN: no tint.
@@ -38,7 +38,7 @@ pub fn repair(raw: &mut RawMesh, mesh: &Mesh) -> Attributes {
             detail: format!("{bad_uvs} texture coordinates are NaN or infinite and were set to 0"),
         });
     }
-    let normals = repair_normals(raw, mesh);
+    let normals = repair_normals(raw, count, mesh);
     let whole = |len: usize| len == count;
     Attributes {
         normals: if whole(normals.len()) { normals } else { Vec::new() },
@@ -48,9 +48,9 @@ pub fn repair(raw: &mut RawMesh, mesh: &Mesh) -> Attributes {
 }
 
 /// Unit normals. A normal without a direction becomes the mean of its faces' normals.
-fn repair_normals(raw: &mut RawMesh, mesh: &Mesh) -> Vec<[f32; 3]> {
+fn repair_normals(raw: &mut RawMesh, count: usize, mesh: &Mesh) -> Vec<[f32; 3]> {
     let mut normals = std::mem::take(&mut raw.normals);
-    if normals.len() != raw.positions.len() {
+    if normals.len() != count {
         return Vec::new();
     }
     let mut is_bad = vec![false; normals.len()];

@@ -4,44 +4,62 @@
 //! two gives the same mesh.
 
 pub(crate) mod attributes;
+mod faces;
+mod geometry;
+mod number;
 pub(crate) mod pow2;
 pub(crate) mod precision;
+#[cfg(test)]
+mod tests;
 pub(crate) mod weld;
 use self::attributes::Attributes;
+use self::faces::{Bounds, Faces};
+use self::geometry::{Geometry, Indexed};
+use self::number::Numbered;
 use self::pow2::{Pow2, exponent, is_usable, max_abs};
-use self::weld::PositionSet;
 use super::raw::RawMesh;
 use super::{ImportReport, Imported, MeshError, MeshFault};
 use crate::import::context::Context;
-use crate::mesh::vector::{cross, dot, sub};
+use crate::limits::Stopped;
+use crate::mesh::vector::sub;
 use crate::mesh::{LineOrPoint, MaterialSlot, Mesh, ToFile, primitives};
 use crate::pluralise::pluralise;
 
 /// Brings an imported mesh into its normal form.
 pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, MeshError> {
-    cx.check_triangles(raw.triangles.len() as u64 + primitives::triangles(&raw.lines_and_points))?;
-    cx.budget.spend("the triangles", raw.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
+    let soup = raw.soup.take();
+    let (positions, triangles) = (std::mem::take(&mut raw.positions), std::mem::take(&mut raw.triangles));
+    let indexed = Indexed { positions: &positions, triangles: &triangles };
+    let [triangle_count, vertex_count] = match &soup {
+        Some(soup) => [soup.triangles(), soup.vertices()],
+        None => [triangles.len(), positions.len()],
+    };
+    cx.check_triangles(triangle_count as u64 + primitives::triangles(&raw.lines_and_points))?;
+    cx.budget.spend("the triangles", triangle_count as u64, BYTES_PER_TRIANGLE)?;
     cx.budget.spend("lines and points", raw.lines_and_points.len() as u64, BYTES_PER_LINE_OR_POINT)?;
-    cx.budget.spend("the welded vertices", raw.positions.len() as u64, BYTES_PER_VERTEX)?;
+    if vertex_count > VERTICES_MAX {
+        return Err(MeshError::new(MeshFault::Unsupported, "the mesh has more than a billion corners or vertices"));
+    }
+    cx.budget.spend("the welded vertices", vertex_count as u64, BYTES_PER_VERTEX)?;
 
-    raw.report.warnings.extend(precision::warning(&raw));
-    cx.deadline.check()?;
-    raw.report.dropped_lines_and_points = drop_bad(&mut raw);
-    let file_exponent = scale_down(&mut raw);
-    let faces = pick_faces(&mut raw);
-    cx.deadline.check()?;
-    if faces.is_empty() && raw.lines_and_points.is_empty() {
-        return Err(empty(&raw.report));
+    let (mut mesh, kept) = match &soup {
+        Some(soup) => shape(soup, true, &mut raw, cx)?,
+        None => shape(&indexed, false, &mut raw, cx)?,
+    };
+    drop(positions);
+    let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
+    if has_attributes {
+        mesh.attribute_triangles = match (&soup, &kept) {
+            (None, None) => triangles,
+            (None, Some(kept)) => kept.iter().map(|&triangle| triangles[triangle as usize]).collect(),
+            (Some(soup), None) => (0..soup.triangles()).map(|triangle| soup.triangle(triangle)).collect(),
+            (Some(soup), Some(kept)) => kept.iter().map(|&triangle| soup.triangle(triangle as usize)).collect(),
+        };
     }
-    let unit_box = UnitBox::around(&raw, &faces);
-    let mut mesh = weld(&mut raw, &faces, &unit_box);
+    mesh.edge_masks = pick(std::mem::take(&mut raw.edge_masks), kept.as_deref());
+    mesh.triangle_materials = pick(std::mem::take(&mut raw.triangle_materials), kept.as_deref());
     cx.deadline.check()?;
-    if mesh.triangles.is_empty() && mesh.lines_and_points.is_empty() {
-        return Err(empty(&raw.report));
-    }
-    mesh.bounds = bounds(&mesh.positions);
-    mesh.to_file = unit_box.to_file(file_exponent);
-    let Attributes { normals, uvs, colors } = attributes::repair(&mut raw, &mesh);
+    let Attributes { normals, uvs, colors } = attributes::repair(&mut raw, vertex_count, &mesh);
     if normals.is_empty() && uvs.is_empty() && colors.is_empty() {
         (mesh.attribute_triangles, mesh.line_point_attributes) = (Vec::new(), Vec::new());
     }
@@ -57,79 +75,59 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     Ok(Imported { mesh, report: raw.report })
 }
 
+/// Positions, triangles, normals, lines and bounds of the mesh, and the triangle of each face
+/// unless all triangles are faces.
+fn shape<G: Geometry>(
+    geometry: &G,
+    is_soup: bool,
+    raw: &mut RawMesh,
+    cx: &Context<'_>,
+) -> Result<(Mesh, Option<Vec<u32>>), MeshError> {
+    let (around_usable, has_only_f32) = faces::survey(geometry, cx.deadline)?;
+    if raw.is_f32 && has_only_f32 {
+        raw.report.warnings.extend(precision::warning(&around_usable));
+    }
+    raw.report.dropped_lines_and_points = drop_bad(geometry, &mut raw.lines_and_points);
+    let of_lines = raw.lines_and_points.iter().flat_map(|one| one.ends).map(|v| geometry.position(v));
+    let around_lines = of_lines.fold(Bounds::EMPTY, Bounds::with);
+    // The largest magnitude becomes about 1. After that no relevant product over- or underflows.
+    let largest = around_usable.union(around_lines).largest();
+    let file_exponent = if largest > 0.0 && largest.is_finite() { exponent(largest) } else { 0 };
+    let down = Pow2::new(-file_exponent);
+
+    let faces = faces::pick(geometry, down, cx.deadline)?;
+    raw.report.dropped_nonfinite_faces = faces.nonfinite;
+    raw.report.dropped_degenerate_faces = faces.degenerate;
+    if faces.normals.is_empty() && raw.lines_and_points.is_empty() {
+        return Err(empty(&raw.report));
+    }
+    let of_lines = raw.lines_and_points.iter().flat_map(|one| one.ends).map(|v| down.of3(geometry.position(v)));
+    let unit_box = UnitBox::around(of_lines.fold(faces.bounds, Bounds::with));
+    let (mut mesh, kept) = weld(geometry, is_soup, faces, (down, &unit_box), raw, cx)?;
+    if mesh.triangles.is_empty() && mesh.lines_and_points.is_empty() {
+        return Err(empty(&raw.report));
+    }
+    mesh.bounds = bounds(&mesh.positions);
+    mesh.to_file = unit_box.to_file(file_exponent);
+    Ok((mesh, kept))
+}
+
+/// The items of the kept triangles.
+fn pick<T: Copy>(all: Vec<T>, kept: Option<&[u32]>) -> Vec<T> {
+    match kept {
+        None => all,
+        Some(kept) => kept.iter().map(|&triangle| all[triangle as usize]).collect(),
+    }
+}
+
+/// Most vertices, or corners of triangles that share none. Welding marks numbers with a bit.
+const VERTICES_MAX: usize = 1 << 30;
 /// Memory beside the raw mesh: a face, its normal, two index triples, a mask and a material.
 const BYTES_PER_TRIANGLE: u64 = 20 + 12 + 12 + 12 + 1 + 4;
 /// Two index pairs and a material.
 const BYTES_PER_LINE_OR_POINT: u64 = 8 + 8 + 4;
-/// A welded position, its place in the raw mesh's map, and its slots in the set as that grows.
-const BYTES_PER_VERTEX: u64 = 12 + 4 + 16;
-
-/// A face that will be drawn: its place in the raw mesh and its unit normal.
-struct Face {
-    triangle: u32,
-    normal: [f32; 3],
-}
-
-/// Scales all positions so that the largest used magnitude is about 1, and returns the exponent.
-/// After this no relevant product over- or underflows.
-fn scale_down(raw: &mut RawMesh) -> i32 {
-    let mut largest = 0.0_f64;
-    for triangle in &raw.triangles {
-        let corners = triangle.map(|v| &raw.positions[v as usize]);
-        if corners.iter().all(|p| is_usable(p)) {
-            largest = corners.iter().fold(largest, |m, p| m.max(max_abs(p)));
-        }
-    }
-    for v in raw.lines_and_points.iter().flat_map(|one| one.ends) {
-        largest = largest.max(max_abs(&raw.positions[v as usize]));
-    }
-    if largest == 0.0 {
-        return 0;
-    }
-    let e = exponent(largest);
-    let down = Pow2::new(-e);
-    for p in &mut raw.positions {
-        // Unusable positions must stay recognisable.
-        *p = if is_usable(p) { down.of3(*p) } else { [f64::NAN; 3] };
-    }
-    e
-}
-
-/// The faces that have an area. Counts the others.
-fn pick_faces(raw: &mut RawMesh) -> Vec<Face> {
-    let mut faces = Vec::with_capacity(raw.triangles.len());
-    for (i, triangle) in (0..).zip(&raw.triangles) {
-        let corners = triangle.map(|v| raw.positions[v as usize]);
-        if !corners.iter().all(is_usable) {
-            raw.report.dropped_nonfinite_faces += 1;
-        } else if let Some(normal) = face_normal(corners) {
-            faces.push(Face { triangle: i, normal: normal.map(|c| c as f32) });
-        } else {
-            raw.report.dropped_degenerate_faces += 1;
-        }
-    }
-    faces
-}
-
-/// The unit normal, or none if the area is exactly zero. Good for edges of any length.
-fn face_normal([a, b, c]: [[f64; 3]; 3]) -> Option<[f64; 3]> {
-    let (e, f) = (sub(b, a), sub(c, a));
-    let n = cross(e, f);
-    let length2 = dot(n, n);
-    if length2 > 1e-200 {
-        return Some(n.map(|x| x / length2.sqrt()));
-    }
-    // Tiny edges or a sliver: products may have underflowed.
-    let (e, f) = (rescale(e)?, rescale(f)?);
-    let n = rescale(cross(e, f))?;
-    let length = dot(n, n).sqrt();
-    Some(n.map(|x| x / length))
-}
-
-fn rescale(v: [f64; 3]) -> Option<[f64; 3]> {
-    let size = max_abs(&v);
-    (size > 0.0).then(|| Pow2::new(-exponent(size)).of3(v))
-}
+/// Welding, and a number in the order of first use with its position.
+const BYTES_PER_VERTEX: u64 = weld::BYTES_PER_POSITION + 4 + 12;
 
 /// The map from (scaled) file space to the unit box.
 struct UnitBox {
@@ -139,29 +137,20 @@ struct UnitBox {
 }
 
 impl UnitBox {
-    fn around(raw: &RawMesh, faces: &[Face]) -> Self {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        let of_faces = faces.iter().flat_map(|face| raw.triangles[face.triangle as usize]);
-        for v in of_faces.chain(raw.lines_and_points.iter().flat_map(|one| one.ends)) {
-            let p = raw.positions[v as usize];
-            for k in 0..3 {
-                low[k] = low[k].min(p[k]);
-                high[k] = high[k].max(p[k]);
-            }
-        }
+    fn around(Bounds { low, high }: Bounds) -> Self {
         let size = max_abs(&sub(high, low));
         // A single point has no size.
         let exponent = if size > 0.0 { exponent(size) } else { 0 };
         Self { centre: std::array::from_fn(|k| low[k] * 0.5 + high[k] * 0.5), exponent, down: Pow2::new(-exponent) }
     }
 
+    #[inline(always)]
     fn to_unit(&self, p: [f64; 3]) -> [f32; 3] {
-        self.down.of3(sub(p, self.centre)).map(|c| {
-            let c = c as f32;
-            // No negative zero, so that equal positions have equal bits, and no subnormals, which
-            // some GPUs flush.
-            if c.abs() < f32::MIN_POSITIVE { 0.0 } else { c }
-        })
+        let [x, y, z] = self.down.of3(sub(p, self.centre));
+        // No negative zero, so that equal positions have equal bits, and no subnormals, which some
+        // GPUs flush.
+        let tidy = |c: f32| if c.abs() < f32::MIN_POSITIVE { 0.0 } else { c };
+        [tidy(x as f32), tidy(y as f32), tidy(z as f32)]
     }
 
     fn to_file(&self, file_exponent: i32) -> ToFile {
@@ -174,38 +163,32 @@ impl UnitBox {
 
 /// Welds positions, numbered in the order of their first use. Drops triangles and segments whose
 /// corners became equal.
-fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
-    const UNSEEN: u32 = u32::MAX;
-    let mut mesh = Mesh::default();
-    let mut welded_of_raw = vec![UNSEEN; raw.positions.len()];
-    // A closed mesh has half as many vertices as triangles.
-    let mut set = PositionSet::with_capacity(raw.positions.len().min(faces.len() / 2 + 2));
-    reserve(&mut mesh, faces.len());
-    let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
-    let mut welded = |v: u32| {
-        let known = &mut welded_of_raw[v as usize];
-        if *known == UNSEEN {
-            *known = set.number(unit_box.to_unit(raw.positions[v as usize]));
-        }
-        *known
+fn weld<G: Geometry>(
+    geometry: &G,
+    is_soup: bool,
+    mut faces: Faces,
+    (down, unit_box): (Pow2, &UnitBox),
+    raw: &mut RawMesh,
+    cx: &Context<'_>,
+) -> Result<(Mesh, Option<Vec<u32>>), Stopped> {
+    let position = |v: u32| unit_box.to_unit(down.of3(geometry.position(v)));
+    let Numbered { positions, mut triangles, ends } = if is_soup {
+        number::corners(geometry, &faces, position, cx.deadline)?
+    } else {
+        number::vertices(geometry, &faces, raw.lines_and_points.iter().map(|one| one.ends), position, cx.deadline)?
     };
-    for face in faces {
-        let i = face.triangle as usize;
-        let corners = raw.triangles[i].map(&mut welded);
-        if corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0] {
-            raw.report.dropped_collapsed_faces += 1;
-            continue;
-        }
-        mesh.triangles.push(corners);
-        mesh.face_normals.push(face.normal);
-        mesh.edge_masks.push(raw.edge_masks[i]);
-        mesh.triangle_materials.push(raw.triangle_materials[i]);
-        if has_attributes {
-            mesh.attribute_triangles.push(raw.triangles[i]);
-        }
+    let is_collapsed = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+    let collapsed = triangles.iter().filter(|triangle| is_collapsed(triangle)).count();
+    raw.report.dropped_collapsed_faces = collapsed as u64;
+    if collapsed > 0 {
+        let left: Vec<usize> = (0..triangles.len()).filter(|&face| !is_collapsed(&triangles[face])).collect();
+        faces.kept = Some(left.iter().map(|&face| faces.triangle(face) as u32).collect());
+        faces.normals = left.iter().map(|&face| faces.normals[face]).collect();
+        triangles.retain(|triangle| !is_collapsed(triangle));
     }
-    for one in &raw.lines_and_points {
-        let ends = one.ends.map(&mut welded);
+    let mut mesh = Mesh { positions, triangles, face_normals: faces.normals, ..Mesh::default() };
+    let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
+    for (one, ends) in raw.lines_and_points.iter().zip(ends) {
         if ends[0] == ends[1] && !one.is_point() {
             raw.report.dropped_lines_and_points += 1;
             continue;
@@ -215,18 +198,10 @@ fn weld(raw: &mut RawMesh, faces: &[Face], unit_box: &UnitBox) -> Mesh {
             mesh.line_point_attributes.push(one.ends);
         }
     }
-    mesh.positions = set.positions;
     if raw.report.dropped_collapsed_faces + raw.report.dropped_lines_and_points > 0 {
         drop_unused(&mut mesh);
     }
-    mesh
-}
-
-fn reserve(mesh: &mut Mesh, faces: usize) {
-    mesh.triangles.reserve_exact(faces);
-    mesh.face_normals.reserve_exact(faces);
-    mesh.edge_masks.reserve_exact(faces);
-    mesh.triangle_materials.reserve_exact(faces);
+    Ok((mesh, faces.kept))
 }
 
 /// Removes positions that only dropped primitives used.
@@ -276,12 +251,11 @@ fn empty(report: &ImportReport) -> MeshError {
 
 /// Drops lines and points with an unusable end, and segments without a length. Returns their
 /// number.
-fn drop_bad(raw: &mut RawMesh) -> u64 {
-    let before = raw.lines_and_points.len();
-    let positions = &raw.positions;
-    raw.lines_and_points.retain(|one| {
-        let [a, b] = one.ends.map(|v| &positions[v as usize]);
-        is_usable(a) && is_usable(b) && (one.is_point() || a != b)
+fn drop_bad<G: Geometry>(geometry: &G, lines_and_points: &mut Vec<LineOrPoint>) -> u64 {
+    let before = lines_and_points.len();
+    lines_and_points.retain(|one| {
+        let [a, b] = one.ends.map(|v| geometry.position(v));
+        is_usable(&a) && is_usable(&b) && (one.is_point() || a != b)
     });
-    (before - raw.lines_and_points.len()) as u64
+    (before - lines_and_points.len()) as u64
 }

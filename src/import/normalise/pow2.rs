@@ -4,8 +4,10 @@
 pub const TOO_LARGE: f64 = 4.49423283715579e307; // about 2^1022
 
 /// True if a position is finite and small enough to compute with.
+#[inline(always)]
 pub fn is_usable(p: &[f64; 3]) -> bool {
-    p.iter().all(|c| c.abs() < TOO_LARGE) // false for NaN
+    // False for NaN.
+    (p[0].abs() < TOO_LARGE) & (p[1].abs() < TOO_LARGE) & (p[2].abs() < TOO_LARGE)
 }
 
 /// Multiplies by a power of two that need not itself be an f64.
@@ -20,13 +22,15 @@ impl Pow2 {
     }
 
     /// `v * 2^exponent`, exact unless it under- or overflows.
+    #[inline(always)]
     pub fn of(self, v: f64) -> f64 {
         v * self.0[0] * self.0[1]
     }
 
     /// The same for a vector.
+    #[inline(always)]
     pub fn of3(self, v: [f64; 3]) -> [f64; 3] {
-        v.map(|c| self.of(c))
+        [self.of(v[0]), self.of(v[1]), self.of(v[2])]
     }
 }
 

@@ -10,6 +10,16 @@ pub struct Lines<'a> {
     pub number: u64,
 }
 
+/// The byte that ends lines. Only very old files end them with a carriage return alone.
+pub fn newline(bytes: &[u8]) -> u8 {
+    if bytes.contains(&b'\n') { b'\n' } else { b'\r' }
+}
+
+/// A text without the byte order mark of UTF-8.
+pub fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
+}
+
 /// A name without the comment after it. Names may have a `#` of their own (`Material #25`): a
 /// comment's stands alone.
 pub fn uncommented(name: &[u8]) -> &[u8] {
@@ -22,12 +32,17 @@ pub fn uncommented(name: &[u8]) -> &[u8] {
 impl<'a> Lines<'a> {
     /// The lines of a file.
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self {
-            rest: bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes),
-            // Only very old files end their lines with a carriage return alone.
-            newline: if bytes.contains(&b'\n') { b'\n' } else { b'\r' },
-            number: 0,
-        }
+        Self { rest: without_mark(bytes), newline: newline(bytes), number: 0 }
+    }
+
+    /// The lines of a part of a text whose lines end with `newline`.
+    pub fn of_part(bytes: &'a [u8], newline: u8) -> Self {
+        Self { rest: bytes, newline, number: 0 }
+    }
+
+    /// Bytes after the line last returned.
+    pub fn rest_bytes(&self) -> usize {
+        self.rest.len()
     }
 
     fn physical(&mut self) -> &'a [u8] {

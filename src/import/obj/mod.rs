@@ -1,54 +1,48 @@
-//! Wavefront OBJ, parsed by `tobj`. Every line is first cleaned by [`clean`], so that `tobj` sees
-//! nothing that it would refuse or misread, every error names its line, and no count is trusted.
-//! MTL files are read by [`mtl`], because `tobj` would panic on some. [`materials`] makes slots and
-//! images from them.
+//! Wavefront OBJ. The text is cut into parts ([`cut`]), which are parsed at the same time
+//! ([`parse`]) and then put together ([`assemble`]). Every error names its line, and no count is
+//! trusted. MTL files are read by [`mtl`]; [`materials`] makes slots and images from them.
 
-mod clean;
+mod assemble;
+mod cut;
 mod face;
 mod lines;
 mod map;
 mod materials;
 mod mtl;
+mod parse;
 mod skipped;
 mod sniff;
+#[cfg(test)]
+mod tests;
 
 pub use sniff::is_obj;
 
-use self::clean::Cleaner;
-use super::polygon::Triangulator;
-use super::raw::{RawMesh, extend_attribute};
-use super::{Format, MeshError, text};
+use self::assemble::assemble;
+use self::cut::PART_BYTES;
+use self::face::Counts;
+use self::parse::{Fault, Part, Rules, parse};
+use super::raw::RawMesh;
+use super::{Format, MeshError, parallel, text};
 use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
-use crate::mesh::{LineOrPoint, MaterialSlot};
+use crate::mesh::MaterialSlot;
 use crate::srgb::srgb_to_linear;
-use std::path::Path;
-use tobj::{LoadError, LoadOptions};
+
+/// Bytes that a number or a keyword becomes, at most: three coordinates in lists that double as they
+/// grow, or a corner in the lists of a part and of the whole, and its share of a triangle.
+const BYTES_PER_WORD: u64 = 24;
 
 /// Reads an OBJ file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
-    // No triangulation by tobj: it would fan polygons, which is wrong for concave ones. With one
-    // index for all attributes, a model whose faces have the same attributes gets arrays of equal
-    // length; the cleaner starts a new model where the attributes change.
-    let options = LoadOptions { single_index: true, triangulate: false, ignore_points: false, ignore_lines: false };
     let text = text::to_utf8(bytes, cx.budget)?;
-    let mut cleaner = Cleaner::new(&text, cx);
-    let loaded = tobj::load_obj_buf(&mut cleaner, &options, material_of_its_own);
-    let summary = cleaner.finish(loaded.as_ref().err().copied())?;
-    let (models, _) = loaded.map_err(|e| MeshError::broken(format!("the OBJ file cannot be read: {e}")))?;
-
+    let parts = read_parts(&text, PART_BYTES, true, cx)?;
     let mut raw = RawMesh::default();
     raw.report.format = Format::Obj;
-    raw.report.file_vertices = summary.vertices;
-    raw.report.warnings = summary.skipped.warnings();
     raw.report.metadata = FileMetadata::by(metadata::first_comment(&text, b"#", |_| false));
-    let mut triangulator = Triangulator::default();
-    for model in models {
-        cx.deadline.check()?;
-        append(&mut raw, &model.mesh, &mut triangulator)?;
-    }
-    raw.report.warnings.extend(triangulator.warning());
+    let summary = assemble(parts, &mut raw, cx)?;
+    // What is said of skipped lines comes first.
+    raw.report.warnings.splice(0..0, summary.skipped.warnings());
     linearise(&mut raw.colors);
     let slots = materials::read(&summary.materials, &summary.libraries, &mut raw, cx)?;
     // Slot 0 is for faces before the first `usemtl`, and is dropped without such faces.
@@ -62,54 +56,58 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     Ok(raw)
 }
 
-/// Makes up a material for `mtllib N`, which the cleaner writes before the first `usemtl N`.
-/// Without a material of that name, tobj would not keep which faces use it.
-fn material_of_its_own(path: &Path) -> tobj::MTLLoadResult {
-    let name = path.to_str().ok_or(LoadError::MaterialParseError)?.to_owned();
-    let material = tobj::Material { name: name.clone(), ..Default::default() };
-    Ok((vec![material], std::iter::once((name, 0)).collect()))
+/// The parts of a text, in its order.
+fn read_parts<'t>(
+    text: &'t [u8],
+    part_bytes: usize,
+    has_plain_lines: bool,
+    cx: &mut Context<'_>,
+) -> Result<Vec<Part<'t>>, MeshError> {
+    let newline = lines::newline(text);
+    let text = lines::without_mark(text);
+    let pieces = cut::cut(text, newline, part_bytes);
+    let words = parallel::map(pieces.clone(), cut::words_max);
+    cx.budget.spend("the OBJ file", words.iter().sum(), BYTES_PER_WORD)?;
+    let deadline = cx.deadline;
+    deadline.check()?;
+    let is_colored = parse::has_colored_vertex(text, newline, || deadline.check().is_ok()).unwrap_or(false);
+    let rules = Rules { newline, is_colored, before: None, has_plain_lines, deadline };
+    let mut parts = parallel::map(pieces.iter().copied().enumerate().collect(), |(i, piece)| {
+        parse(piece, Rules { before: (i == 0).then(Counts::default), ..rules })
+    });
+    if parts.iter().any(|part| matches!(part, Err(Fault::NeedsCounts))) {
+        parts = with_counts(&pieces, parts, rules);
+    }
+    let mut lines_before = 0;
+    let mut all = Vec::with_capacity(parts.len());
+    for part in parts {
+        let part = part.map_err(|fault| fault.error(lines_before))?;
+        lines_before += part.lines;
+        all.push(part);
+    }
+    Ok(all)
 }
 
-/// Adds one of tobj's models: the faces between two changes of material or form.
-fn append(raw: &mut RawMesh, mesh: &tobj::Mesh, triangulator: &mut Triangulator) -> Result<(), MeshError> {
-    let base = u32::try_from(raw.positions.len()).ok().filter(|base| {
-        let end = u64::from(*base) + mesh.positions.len() as u64 / 3;
-        end < u64::from(u32::MAX)
+/// Parses the parts again that need the counts of those before them.
+fn with_counts<'t>(
+    pieces: &[&'t [u8]],
+    parts: Vec<Result<Part<'t>, Fault>>,
+    rules: Rules<'_>,
+) -> Vec<Result<Part<'t>, Fault>> {
+    let counts = parallel::map(parts.iter().zip(pieces).collect(), |(part, piece)| match part {
+        Ok(part) => part.counts(),
+        Err(_) => parse::count(piece, rules.newline, || rules.deadline.check().is_ok()),
     });
-    let base = base.ok_or_else(|| MeshError::broken("the OBJ file has more than 4 billion vertices"))?;
-    raw.positions.extend(mesh.positions.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
-    let (before, after) = (base as usize, raw.positions.len());
-    let normals = mesh.normals.chunks_exact(3).map(|n| [n[0] as f32, n[1] as f32, n[2] as f32]);
-    extend_attribute(&mut raw.normals, before, after, [0.0; 3], normals);
-    // In OBJ v runs up from the image's lower edge, in a raw mesh down from the upper one.
-    let uvs = mesh.texcoords.chunks_exact(2).map(|t| [t[0] as f32, (1.0 - t[1]) as f32]);
-    extend_attribute(&mut raw.uvs, before, after, [0.0; 2], uvs);
-    let colors = mesh.vertex_color.chunks_exact(3).map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0]);
-    extend_attribute(&mut raw.colors, before, after, [1.0; 4], colors);
-
-    let material = mesh.material_id.map_or(0, |id| id as u32 + 1);
-    let mut corners = Vec::new();
-    let mut at = 0;
-    // Without arities all faces are triangles.
-    let faces = if mesh.face_arities.is_empty() { mesh.indices.len() / 3 } else { mesh.face_arities.len() };
-    for face in 0..faces {
-        let arity = mesh.face_arities.get(face).map_or(3, |&n| n as usize);
-        let Some(indices) = mesh.indices.get(at..at + arity) else { break };
-        at += arity;
-        corners.clear();
-        corners.extend(indices.iter().map(|i| base + i));
-        if let [a] | [a, _] = corners[..] {
-            raw.lines_and_points.push(LineOrPoint { ends: [a, corners[arity - 1]], material });
-            continue;
-        }
-        raw.report.polygons_by_arity[arity.min(12)] += 1;
-        triangulator.split(&corners, &raw.positions, &mut |triangle, mask| {
-            raw.triangles.push(triangle);
-            raw.edge_masks.push(mask);
-            raw.triangle_materials.push(material);
-        });
+    let mut sum = Counts::default();
+    let mut befores = Vec::with_capacity(counts.len());
+    for own in counts {
+        befores.push(sum);
+        sum = sum + own;
     }
-    Ok(())
+    parallel::map(parts.into_iter().zip(pieces).zip(befores).collect(), |((part, piece), before)| match part {
+        Err(Fault::NeedsCounts) => parse(piece, Rules { before: Some(before), ..rules }),
+        other => other,
+    })
 }
 
 /// Converts colours, which by convention are sRGB from 0 to 1 or, from some exporters, from 0 to

@@ -15,6 +15,13 @@ pub struct Skipped {
 }
 
 impl Skipped {
+    /// Adds the counts of another part.
+    pub fn add(&mut self, more: &Self) {
+        self.short_faces += more.short_faces;
+        self.curves += more.curves;
+        self.colors += more.colors;
+    }
+
     /// One warning for each kind that occurred.
     pub fn warnings(&self) -> Vec<Warning> {
         let kinds = [

@@ -6,7 +6,7 @@ use super::faces::{Faces, NO_TEXTURE};
 use super::vertices::Vertices;
 use crate::import::MeshError;
 use crate::import::context::Context;
-use crate::import::polygon::Triangulator;
+use crate::import::polygon::{ALL_EDGES, Triangulator};
 use crate::import::raw::RawMesh;
 use crate::warning::Warning;
 
@@ -34,6 +34,14 @@ pub fn assemble(
     cx.budget.spend("the PLY triangles", triangles as u64, 12 + 1 + 4 + 4)?;
     raw.triangles.reserve_exact(triangles);
     raw.edge_masks.reserve_exact(triangles);
+    if !splitter.is_needed() && faces.textures.is_empty() && faces.arities.iter().all(|arity| *arity == 3) {
+        cx.deadline.check()?;
+        raw.triangles.extend(faces.corners.chunks_exact(3).map(|face| [face[0], face[1], face[2]]));
+        raw.edge_masks.resize(triangles, ALL_EDGES);
+        raw.triangle_materials = vec![0; triangles];
+        raw.report.polygons_by_arity[3] += triangles as u64;
+        return Ok(Vec::new());
+    }
     let mut textures = Vec::with_capacity(if faces.textures.is_empty() { 0 } else { triangles });
     let mut triangulator = Triangulator::default();
     let mut own = Vec::new();

@@ -3,6 +3,7 @@
 use super::header::Kind;
 use super::layout::{Layout, Step};
 use super::source::{Columns, Source};
+use crate::import::parallel::map;
 
 /// Reads numbers. `BIG`: most significant byte first.
 pub struct Binary<'a, const BIG: bool> {
@@ -66,7 +67,66 @@ impl<'a, const BIG: bool> Binary<'a, BIG> {
     }
 }
 
+/// Bytes of a record that is a triangle: a count and three indices.
+const TRIANGLE_BYTES: usize = 1 + 3 * 4;
+/// Triangles handed to a thread at a time.
+const TRIANGLES_PER_PIECE: usize = 16_384;
+
+/// True if records are one list of 32-bit indices after a count of 8 bits.
+fn is_triangles(layout: &Layout) -> bool {
+    let (Kind::I8 | Kind::U8, Kind::I32 | Kind::U32) = (match layout.steps[..] {
+        [Step::List { count, item, slot: Some(0) }] => (count, item),
+        _ => return false,
+    }) else {
+        return false;
+    };
+    true
+}
+
+/// The triangle of a record, if it is one and its indices are below `vertices`.
+fn triangle<const BIG: bool>(record: &[u8], vertices: u32) -> Option<[u32; 3]> {
+    let index = |at: usize| {
+        let own = [record[at], record[at + 1], record[at + 2], record[at + 3]];
+        if BIG { u32::from_be_bytes(own) } else { u32::from_le_bytes(own) }
+    };
+    let triangle = [index(1), index(5), index(9)];
+    // A negative index is too large, too.
+    let below = vertices.min(i32::MAX as u32);
+    (record[0] == 3 && triangle[0] < below && triangle[1] < below && triangle[2] < below).then_some(triangle)
+}
+
 impl<const BIG: bool> Source for Binary<'_, BIG> {
+    fn triangles_max(&self, layout: &Layout, records: u64) -> u64 {
+        if !is_triangles(layout) {
+            return 0;
+        }
+        let run = self.bytes[self.at..].chunks_exact(TRIANGLE_BYTES).take_while(|record| record[0] == 3).count();
+        records.min(run as u64)
+    }
+
+    fn triangles(&mut self, records: u64, vertices: u32, corners: &mut Vec<u32>) {
+        let count = records as usize;
+        let before = corners.len();
+        corners.resize(before + 3 * count, 0);
+        let records =
+            self.bytes[self.at..self.at + count * TRIANGLE_BYTES].chunks(TRIANGLES_PER_PIECE * TRIANGLE_BYTES);
+        let pieces = records.zip(corners[before..].chunks_mut(3 * TRIANGLES_PER_PIECE)).collect();
+        let runs = map(pieces, |(records, corners): (&[u8], &mut [u32])| {
+            let mut run = 0;
+            for (record, corners) in records.chunks_exact(TRIANGLE_BYTES).zip(corners.chunks_exact_mut(3)) {
+                let Some(triangle) = triangle::<BIG>(record, vertices) else { break };
+                corners.copy_from_slice(&triangle);
+                run += 1;
+            }
+            (run, records.len() / TRIANGLE_BYTES)
+        });
+        // Up to the first record that is something else.
+        let whole = runs.iter().take_while(|(run, all)| run == all).count();
+        let run: usize = runs.iter().take(whole + 1).map(|(run, _)| run).sum();
+        corners.truncate(before + 3 * run);
+        self.at += run * TRIANGLE_BYTES;
+    }
+
     fn value(&mut self, kind: Kind) -> Option<f64> {
         let bytes = self.take(kind.bytes())?;
         Some(by_kind!(kind, T => T::read::<BIG>(bytes)))

@@ -3,7 +3,7 @@
 use super::conversion::{WHITE, linearise, upright};
 use super::header::Element;
 use super::layout::{Layout, Slot};
-use super::source::{Cost, Meter, Source, each_record};
+use super::source::{Cost, Meter, Source, each_record, each_record_from, leading_triangles};
 use crate::import::MeshError;
 use crate::import::context::Context;
 use std::ops::Range;
@@ -63,7 +63,9 @@ impl Faces {
         let first = self.colors.len();
         // Lists double when they grow.
         let cost = Cost { record: 2 * (4 + 16 + 4), item: 2 * (4 + 8) };
-        each_record(source, element, &layout, (cost, meter), cx, |row| {
+        let run = leading_triangles(source, element, &layout, vertices, (cost, meter), &mut self.corners, cx)?;
+        self.arities.resize(self.arities.len() + run as usize, 3);
+        each_record_from(run, source, element, &layout, (cost, meter), cx, |row| {
             let corners = &row.lists[CORNERS];
             let before = self.corners.len();
             for &item in corners {

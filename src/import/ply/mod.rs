@@ -15,6 +15,8 @@ mod faces;
 mod header;
 mod layout;
 mod source;
+#[cfg(test)]
+mod tests;
 mod text;
 mod textures;
 mod vertices;

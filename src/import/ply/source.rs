@@ -25,6 +25,13 @@ pub trait Source {
     fn skip(&mut self, numbers: usize, bytes: usize) -> Option<()>;
     /// Replaces `columns` with the values of some records of a fixed size.
     fn columns(&mut self, layout: &Layout, rows: usize, columns: &mut Columns) -> Option<()>;
+    /// How many of the next records are nothing but lists of three indices, at most `records`. 0 where
+    /// [`Source::triangles`] would be no faster than record by record.
+    fn triangles_max(&self, _layout: &Layout, _records: u64) -> u64 {
+        0
+    }
+    /// Reads up to `records` of them, as long as indices are below `vertices`. Appends the indices.
+    fn triangles(&mut self, _records: u64, _vertices: u32, _corners: &mut Vec<u32>) {}
     /// True if [`Source::columns`] works.
     fn is_in_columns(&self) -> bool;
     /// An upper bound for the numbers left.
@@ -63,6 +70,41 @@ pub fn each_record<S: Source>(
     source: &mut S,
     element: &Element,
     layout: &Layout,
+    paying: (Cost, &mut Meter),
+    cx: &mut Context<'_>,
+    keep: impl FnMut(&Row) -> Result<u64, String>,
+) -> Result<(), MeshError> {
+    each_record_from(0, source, element, layout, paying, cx, keep)
+}
+
+/// The triangles at the begin of an element that is nothing but triangles for a while. Returns how
+/// many were read.
+pub fn leading_triangles<S: Source>(
+    source: &mut S,
+    element: &Element,
+    layout: &Layout,
+    vertices: u32,
+    (cost, meter): (Cost, &mut Meter),
+    corners: &mut Vec<u32>,
+    cx: &mut Context<'_>,
+) -> Result<u64, MeshError> {
+    cx.deadline.check()?;
+    let most = source.triangles_max(layout, element.count);
+    cx.budget.spend("the PLY file", most, cost.record + 3 * cost.item)?;
+    let before = corners.len();
+    source.triangles(most, vertices, corners);
+    let read = (corners.len() - before) as u64 / 3;
+    meter.triangles += read;
+    meter.pay(cx)?;
+    Ok(read)
+}
+
+/// As [`each_record`], from the record numbered `first`.
+pub fn each_record_from<S: Source>(
+    first: u64,
+    source: &mut S,
+    element: &Element,
+    layout: &Layout,
     (cost, meter): (Cost, &mut Meter),
     cx: &mut Context<'_>,
     mut keep: impl FnMut(&Row) -> Result<u64, String>,
@@ -71,7 +113,7 @@ pub fn each_record<S: Source>(
         return Ok(()); // however many there are
     }
     let mut row = Row::default();
-    for number in 0..element.count {
+    for number in first..element.count {
         if number % RECORDS_PER_POLL == 0 {
             cx.deadline.check()?;
         }

@@ -5,7 +5,7 @@ mod color;
 
 use self::color::Colors;
 use super::polygon::ALL_EDGES;
-use super::raw::RawMesh;
+use super::raw::{RawMesh, Soup};
 use super::{Format, MeshError, text};
 use crate::import::FileMetadata;
 use crate::import::context::Context;
@@ -120,30 +120,27 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
         });
     }
     raw.is_f32 = true;
-    reserve(&mut raw, count, cx)?;
-    let body = &bytes[HEADER_BYTES..declared as usize];
-    for (i, triangle) in body.chunks_exact(TRIANGLE_BYTES).enumerate() {
-        if i % 65536 == 0 {
-            cx.deadline.check()?;
-        }
-        for corner in triangle[12..48].chunks_exact(12) {
-            let c = |k: usize| f64::from(f32::from_le_bytes([corner[k], corner[k + 1], corner[k + 2], corner[k + 3]]));
-            raw.positions.push([c(0), c(4), c(8)]);
-        }
-        push_triangle(&mut raw);
+    cx.check_triangles(count)?;
+    if count > u64::from(u32::MAX / 3) {
+        return Err(MeshError::broken("the STL file has more than 4 billion corners"));
     }
-    paint(&mut raw, &bytes[..80], body, cx)?;
-    finish(raw)
+    cx.budget.spend("the STL triangles", count, 1 + 4)?;
+    // The triangles stay where they are.
+    let body = cx.bundle.entry().bytes.slice(HEADER_BYTES..declared as usize);
+    raw.soup = Some(Soup::new(body.clone(), TRIANGLE_BYTES, 12));
+    cx.deadline.check()?;
+    paint(&mut raw, &bytes[..80], (&body, count), cx)?;
+    finish(raw, count as usize)
 }
 
 /// Gives each triangle's three vertices the colour in its attribute bytes.
-fn paint(raw: &mut RawMesh, header: &[u8], body: &[u8], cx: &mut Context<'_>) -> Result<(), MeshError> {
+fn paint(raw: &mut RawMesh, header: &[u8], (body, count): (&[u8], u64), cx: &mut Context<'_>) -> Result<(), MeshError> {
     let attributes =
         || body.chunks_exact(TRIANGLE_BYTES).map(|triangle| u16::from_le_bytes([triangle[48], triangle[49]]));
     let Some(colors) = Colors::of(header, attributes()) else { return Ok(()) };
     cx.deadline.check()?;
-    cx.budget.spend("the colours of STL triangles", raw.positions.len() as u64, 16)?;
-    raw.colors.reserve_exact(raw.positions.len());
+    cx.budget.spend("the colours of STL triangles", 3 * count, 16)?;
+    raw.colors.reserve_exact(3 * count as usize);
     raw.colors.extend(attributes().flat_map(|attribute| [colors.color(attribute); 3]));
     // Vertex colours are final: white takes the place of the grey of files without colours.
     raw.materials = vec![MaterialSlot { base_color: Some([1.0; 4]), ..MaterialSlot::default() }];
@@ -199,8 +196,9 @@ fn read_ascii(text: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     if corners != 0 || !ended {
         return Err(MeshError::broken("the STL text has no \"endsolid\" at its end: it seems to be cut off"));
     }
-    cx.check_triangles(raw.triangles.len() as u64)?;
-    finish(raw)
+    let count = raw.triangles.len();
+    cx.check_triangles(count as u64)?;
+    finish(raw, count)
 }
 
 /// The name after the first word, up to the end of the line or to a facet on the same line.
@@ -225,23 +223,15 @@ fn new_mesh(format: Format) -> RawMesh {
     raw
 }
 
-fn reserve(raw: &mut RawMesh, count: u64, cx: &mut Context<'_>) -> Result<(), MeshError> {
-    cx.check_triangles(count)?;
-    cx.budget.spend("the STL triangles", count, 3 * 24 + 12 + 1 + 4)?;
-    raw.positions.reserve_exact(count as usize * 3);
-    raw.triangles.reserve_exact(count as usize);
-    Ok(())
-}
-
 fn push_triangle(raw: &mut RawMesh) {
     let end = raw.positions.len() as u32;
     raw.triangles.push([end - 3, end - 2, end - 1]);
 }
 
-fn finish(mut raw: RawMesh) -> Result<RawMesh, MeshError> {
-    raw.edge_masks = vec![ALL_EDGES; raw.triangles.len()];
-    raw.triangle_materials = vec![0; raw.triangles.len()];
-    raw.report.file_vertices = raw.positions.len() as u64;
-    raw.report.polygons_by_arity[3] = raw.triangles.len() as u64;
+fn finish(mut raw: RawMesh, count: usize) -> Result<RawMesh, MeshError> {
+    raw.edge_masks = vec![ALL_EDGES; count];
+    raw.triangle_materials = vec![0; count];
+    raw.report.file_vertices = 3 * count as u64;
+    raw.report.polygons_by_arity[3] = count as u64;
     Ok(raw)
 }

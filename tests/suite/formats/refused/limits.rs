@@ -106,13 +106,17 @@ fn obj_text_that_explodes_is_refused() {
     let cases = [
         format!("{head}{}", "f 1 2 3\n".repeat(10_000_001)),
         format!("{head}{}", "f 1 2 3\nf 1/1 2/1 3/1\n".repeat(3_000_000)),
-        format!("{head}{}", "usemtl a\nf 1 2 3\nusemtl b\n".repeat(2_000_000)),
         format!("{head}f{}", " 1".repeat(20_000_000)),
     ];
     for text in &cases {
         let error = read(text.as_bytes()).unwrap_err();
         assert!(matches!(error.fault, MeshFault::Limit(_)), "{error}");
     }
+    // Materials that change with every face cost no more than other lines.
+    let changes = format!("{head}{}", "usemtl a\nf 1 2 3\nusemtl b\n".repeat(200_000));
+    let mesh = read_limited(changes.as_bytes(), None, &Limits { memory_bytes: 64 << 20, ..Limits::default() }).unwrap();
+    assert_eq!(mesh.triangles.len(), 200_000);
+    assert_eq!(mesh.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["a", "b"]);
 }
 
 #[test]

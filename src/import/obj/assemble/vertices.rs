@@ -1,0 +1,161 @@
+//! The vertices of a raw mesh: the file's positions, or one for each combination of a position
+//! with a texture coordinate and a normal.
+
+use super::{Lists, Names};
+use crate::import::MeshError;
+use crate::import::context::Context;
+use crate::import::obj::face::MISSING;
+use crate::import::obj::parse::Part;
+use crate::import::raw::RawMesh;
+use rapidhash::RapidHashMap;
+
+/// Combinations of one position that are compared one by one. More are looked up by their hash:
+/// a file may have any number of them.
+const CHAIN_MAX: usize = 16;
+/// Corners between two payments.
+const CORNERS_PER_PAYMENT: u64 = 65_536;
+/// Bytes of a combination and its vertex, in lists that double as they grow, and its place in a hash
+/// table.
+const VERTEX_BYTES: u64 = 2 * (16 + 24 + 8 + 12 + 16) + 2 * (12 + 4 + 1);
+
+/// Fills in positions and attributes, and makes the corners of `parts` refer to them.
+pub fn fill(
+    parts: &mut [Part<'_>],
+    names: &Names,
+    lists: Lists,
+    raw: &mut RawMesh,
+    cx: &mut Context<'_>,
+) -> Result<(), MeshError> {
+    let mut forms = parts.iter().flat_map(|part| &part.groups).map(|group| group.form);
+    let (has_uvs, has_normals) = (!lists.uvs.is_empty(), !lists.normals.is_empty());
+    if !forms.any(|(vt, vn)| vt && has_uvs || vn && has_normals) {
+        (raw.positions, raw.colors) = (lists.positions, lists.colors);
+        return Ok(());
+    }
+    cx.budget.spend("the vertices of the OBJ file", lists.positions.len() as u64, 4)?;
+    let mut combinations = Combinations::new(lists.positions.len());
+    let mut uses = [false; 2];
+    let mut last = None;
+    let mut unpaid = 0;
+    for (number, part) in parts.iter_mut().enumerate() {
+        let mut at = 0;
+        for group in &part.groups {
+            // Vertices are shared by faces of one kind that follow each other.
+            let run = (group.form, names.material(number, group));
+            if last.replace(run) != Some(run) {
+                combinations.begin_run();
+            }
+            let form = (group.form.0 && has_uvs, group.form.1 && has_normals);
+            uses = [uses[0] | form.0, uses[1] | form.1];
+            for _ in 0..u64::from(group.faces) * u64::from(group.arity) {
+                if unpaid == 0 {
+                    cx.deadline.check()?;
+                    cx.budget.spend("the vertices of the OBJ file", CORNERS_PER_PAYMENT, VERTEX_BYTES)?;
+                    unpaid = CORNERS_PER_PAYMENT;
+                }
+                unpaid -= 1;
+                let vt = if form.0 { part.corners.vt[at] } else { MISSING };
+                let vn = if form.1 { part.corners.vn[at] } else { MISSING };
+                let v = &mut part.corners.v[at];
+                *v = combinations.number([*v, vt, vn]);
+                at += 1;
+            }
+        }
+        (part.corners.vt, part.corners.vn) = (Vec::new(), Vec::new());
+    }
+    let all = &combinations.all;
+    if all.len() >= u32::MAX as usize {
+        return Err(MeshError::broken("the OBJ file has more than 4 billion vertices"));
+    }
+    raw.positions = all.iter().map(|one| lists.positions[one.key[0] as usize]).collect();
+    if uses[0] {
+        raw.uvs = all.iter().map(|one| lists.uvs.get(one.key[1] as usize).copied().unwrap_or_default()).collect();
+    }
+    if uses[1] {
+        raw.normals =
+            all.iter().map(|one| lists.normals.get(one.key[2] as usize).copied().unwrap_or_default()).collect();
+    }
+    if !lists.colors.is_empty() {
+        raw.colors = all.iter().map(|one| lists.colors[one.key[0] as usize]).collect();
+    }
+    Ok(())
+}
+
+/// Numbers the distinct combinations of indices, separately for each run of faces.
+struct Combinations {
+    all: Vec<Combination>,
+    /// The newest combination of each position, which begins a chain.
+    newest: Vec<u32>,
+    run_begin: usize,
+    /// Those of the run whose chains are full.
+    far: RapidHashMap<[u32; 3], u32>,
+}
+
+struct Combination {
+    key: [u32; 3],
+    /// The next older one of the same position.
+    older: u32,
+}
+
+impl Combinations {
+    fn new(positions: usize) -> Self {
+        Self { all: Vec::new(), newest: vec![MISSING; positions], run_begin: 0, far: RapidHashMap::default() }
+    }
+
+    fn begin_run(&mut self) {
+        self.run_begin = self.all.len();
+        if !self.far.is_empty() {
+            self.far = RapidHashMap::default();
+        }
+    }
+
+    fn number(&mut self, key: [u32; 3]) -> u32 {
+        let newest = &mut self.newest[key[0] as usize];
+        let mut at = *newest;
+        let mut steps = 0;
+        while let Some(one) = self.all.get(at as usize).filter(|_| at as usize >= self.run_begin) {
+            if one.key == key {
+                return at;
+            }
+            steps += 1;
+            if steps == CHAIN_MAX {
+                break;
+            }
+            at = one.older;
+        }
+        let number = self.all.len() as u32;
+        if steps < CHAIN_MAX {
+            self.all.push(Combination { key, older: *newest });
+            *newest = number;
+            return number;
+        }
+        let known = *self.far.entry(key).or_insert(number);
+        if known == number {
+            self.all.push(Combination { key, older: MISSING });
+        }
+        known
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn combinations_are_numbered_once_a_run_however_many() {
+        let mut combinations = Combinations::new(3);
+        let key = |i: u32| [i % 3, i % 300, i % 7];
+        let mut expected: RapidHashMap<[u32; 3], u32> = RapidHashMap::default();
+        for run in 0..3 {
+            let before = combinations.all.len() as u32;
+            for i in (0..5000).chain(0..5000) {
+                let next = before + expected.len() as u32;
+                let number = *expected.entry(key(i)).or_insert(next);
+                assert_eq!(combinations.number(key(i)), number, "{run} {i}");
+            }
+            assert_eq!(combinations.all.len() as u32 - before, 2100);
+            combinations.begin_run();
+            expected.clear();
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! Parses one part of an OBJ text, byte by byte in one pass. What is not in its plainest form
+//! goes to [`statement`], line by line.
+
+mod corners;
+mod numbers;
+mod statement;
+
+pub use statement::{count, has_colored_vertex};
+
+use super::face::{Counts, MISSING};
+use super::skipped::Skipped;
+use crate::import::MeshError;
+use crate::limits::{Deadline, Stopped};
+use std::borrow::Cow;
+
+/// Corners between two deadline checks: one line may be the whole file.
+const CORNERS_PER_POLL: usize = 65_536;
+
+/// What is known before a part is parsed.
+#[derive(Clone, Copy, Debug)]
+pub struct Rules<'a> {
+    /// The byte that ends lines.
+    pub newline: u8,
+    /// True if the file's first vertex has a colour. Then all get one.
+    pub is_colored: bool,
+    /// The counts before the part; None if they are not known yet.
+    pub before: Option<Counts>,
+    /// False: every line goes word by word. Tests compare both ways.
+    pub has_plain_lines: bool,
+    /// Polled inside long lines.
+    pub deadline: &'a Deadline,
+}
+
+/// The content of one part.
+#[derive(Debug, Default)]
+pub struct Part<'t> {
+    /// `v` lines.
+    pub positions: Vec<[f64; 3]>,
+    /// Colours of the vertices as in the file, if they have any.
+    pub colors: Vec<[f32; 4]>,
+    /// `vt` lines, v down.
+    pub uvs: Vec<[f32; 2]>,
+    /// `vn` lines.
+    pub normals: Vec<[f32; 3]>,
+    /// Faces, segments and points, run-length coded.
+    pub groups: Vec<Group>,
+    /// Their corners.
+    pub corners: Corners,
+    /// The name of each `usemtl` line.
+    pub materials: Vec<Cow<'t, [u8]>>,
+    /// Arguments of `mtllib` lines.
+    pub libraries: Vec<Vec<u8>>,
+    /// Triangles that faces, segments and points become, at most.
+    pub triangles: u64,
+    /// Counts of skipped lines.
+    pub skipped: Skipped,
+    /// The largest index of each kind, from 1, and its line in the part.
+    pub largest: [(u64, u64); 3],
+    /// Lines.
+    pub lines: u64,
+}
+
+/// Zero-based indices of corners.
+#[derive(Debug, Default)]
+pub struct Corners {
+    /// Positions.
+    pub v: Vec<u32>,
+    /// Texture coordinates, [`MISSING`] where a corner has none. Empty if no corner has one.
+    pub vt: Vec<u32>,
+    /// Normals, in the same way.
+    pub vn: Vec<u32>,
+}
+
+/// Consecutive faces with the same number of corners, attributes and material.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Corners of each; 2 for a segment, 1 for a point.
+    pub arity: u32,
+    /// Number of faces.
+    pub faces: u32,
+    /// True if their corners have texture coordinates, normals.
+    pub form: (bool, bool),
+    /// Index into the part's `materials`. None: as before the part.
+    pub material: Option<u32>,
+}
+
+/// The end of a part that cannot be parsed.
+#[derive(Debug)]
+pub enum Fault {
+    /// A relative index, and the counts before the part are not known.
+    NeedsCounts,
+    /// Broken content: the line in the part, and what is wrong.
+    Line(u64, String),
+    /// The deadline.
+    Stopped,
+}
+
+impl Part<'_> {
+    /// The counts of the part.
+    pub fn counts(&self) -> Counts {
+        let [v, vt, vn] = [self.positions.len(), self.uvs.len(), self.normals.len()].map(|count| count as u64);
+        Counts { v, vt, vn }
+    }
+}
+
+impl From<Stopped> for Fault {
+    fn from(_: Stopped) -> Self {
+        Self::Stopped
+    }
+}
+
+impl Fault {
+    /// The error, if `lines` come before the part.
+    pub fn error(self, lines: u64) -> MeshError {
+        match self {
+            Self::Stopped => Stopped.into(),
+            Self::NeedsCounts => MeshError::broken("a relative index of the OBJ file has nothing before it"),
+            Self::Line(line, what) => MeshError::broken(format!("line {} of the OBJ file: {what}", lines + line)),
+        }
+    }
+}
+
+/// Parses one part.
+pub fn parse<'t>(bytes: &'t [u8], rules: Rules<'_>) -> Result<Part<'t>, Fault> {
+    rules.deadline.check()?;
+    let mut parser = Parser { bytes, rules, part: Part::default(), line: Vec::new() };
+    let mut at = 0;
+    while at < bytes.len() {
+        let plain = if rules.has_plain_lines { parser.plain_line(at)? } else { None };
+        at = match plain {
+            Some(end) => {
+                parser.part.lines += 1;
+                end
+            }
+            None => parser.any_line(at)?,
+        };
+    }
+    Ok(parser.part)
+}
+
+struct Parser<'t, 'a> {
+    bytes: &'t [u8],
+    rules: Rules<'a>,
+    part: Part<'t>,
+    /// The corners of a face in its general form.
+    line: Vec<[u32; 3]>,
+}
+
+impl Parser<'_, '_> {
+    /// Parses the line at `at` if it is in the plainest form, and gives the begin of the next.
+    #[inline]
+    fn plain_line(&mut self, at: usize) -> Result<Option<usize>, Fault> {
+        let (first, second) = (self.bytes[at], self.bytes.get(at + 1).copied().unwrap_or(self.rules.newline));
+        Ok(match (first, second) {
+            (b'v', b' ') => self.plain_vertex(at + 2),
+            (b'f', b' ') => self.plain_face(at + 2)?,
+            (b'v', b'n') => self.plain_normal(at + 2),
+            (b'v', b't') => self.plain_uv(at + 2),
+            (newline, _) if newline == self.rules.newline => Some(at + 1),
+            _ => None,
+        })
+    }
+
+    /// The begin of the next line, if only white space is left on this one.
+    #[inline]
+    fn end_of_line(&self, mut at: usize) -> Option<usize> {
+        loop {
+            match self.bytes.get(at) {
+                None => return Some(at),
+                Some(&b) if b == self.rules.newline => return Some(at + 1),
+                Some(b' ' | b'\t' | b'\r') => at += 1,
+                Some(_) => return None,
+            }
+        }
+    }
+
+    /// Counts a face whose corners were added.
+    #[inline]
+    fn count_face(&mut self, arity: usize, form: (bool, bool)) {
+        let part = &mut self.part;
+        let material = part.materials.len().checked_sub(1).map(|last| last as u32);
+        let arity = arity as u32;
+        match part.groups.last_mut() {
+            Some(Group { faces, .. }) if *faces == u32::MAX => {}
+            Some(last) if (last.arity, last.form, last.material) == (arity, form, material) => {
+                last.faces += 1;
+                return;
+            }
+            _ => {}
+        }
+        part.groups.push(Group { arity, faces: 1, form, material });
+    }
+}
+
+impl Corners {
+    /// Adds a corner, with [`MISSING`] for what it lacks.
+    #[inline]
+    fn push(&mut self, [v, vt, vn]: [u32; 3]) {
+        add(&mut self.vt, vt, self.v.len());
+        add(&mut self.vn, vn, self.v.len());
+        self.v.push(v);
+    }
+
+    /// Takes back the last corners, so that `len` are left.
+    fn truncate(&mut self, len: usize) {
+        self.v.truncate(len);
+        self.vt.truncate(len);
+        self.vn.truncate(len);
+    }
+}
+
+/// Adds the attribute of a corner; `before` corners come before it.
+#[inline]
+fn add(list: &mut Vec<u32>, index: u32, before: usize) {
+    if list.is_empty() {
+        if index == MISSING {
+            return;
+        }
+        list.resize(before, MISSING);
+    }
+    list.push(index);
+}
