@@ -74,8 +74,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "COLOR")]
     background: Option<String>,
     /// Threads of the CPU renderer [default: one for each processor]
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
     /// Print the work that was skipped, and the time of each stage
     #[arg(long)]
     explain: bool,
@@ -108,7 +108,7 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
         times.push((stage, stage_began.elapsed()));
         stage_began = Instant::now();
     };
-    let threads = arguments.threads.unwrap_or(cores() as usize);
+    let threads = arguments.threads.map_or(cores() as usize, usize::from);
     if arguments.threads.is_some() {
         // Those that decode textures, too. It only fails where they run already.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();

@@ -167,6 +167,14 @@ fn failures_are_one_sentence_with_the_right_exit_code() {
 }
 
 #[test]
+fn the_number_of_threads_has_bounds() {
+    for (threads, code) in [("0", 2), ("1", 0), ("3", 0), ("1025", 2), ("-1", 2)] {
+        let output = run(&["render", "-", "-o", "-", "--size", "8", "--threads", threads], CUBE_OBJ);
+        assert_eq!(output.status.code(), Some(code), "{threads}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+#[test]
 fn inspect_says_what_is_in_the_file() {
     let output = run(&["inspect", "-", "--json"], CUBE_OBJ);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
