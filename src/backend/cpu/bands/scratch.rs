@@ -296,6 +296,9 @@ mod tests {
             }
             ScratchPool::default().with(plan, banding, |scratch| {
                 let pixels = (plan.width_px * banding.rows) as usize;
+                if plan.hides_lines() {
+                    scratch.farthest.clear(&scratch.samples);
+                }
                 scratch.colors = Vec::with_capacity(pixels);
                 scratch.coverage = Vec::with_capacity(pixels);
                 scratch.owners = Vec::with_capacity(pixels);
