@@ -47,6 +47,8 @@ pub struct CpuRenderer {
     scratch: ScratchPool,
     srgb: SrgbEncoder,
     flat: FlatColors,
+    /// True if no shortcuts are taken.
+    is_plain: bool,
 }
 
 /// Input of every stage: the plan and the vertices on screen.
@@ -59,6 +61,8 @@ pub struct RasterContext<'a> {
     srgb: &'a SrgbEncoder,
     /// The colours of triangles, where these are all that there is to know.
     flat: Option<&'a FlatColors>,
+    /// As [`CpuRenderer::plain`].
+    is_plain: bool,
 }
 
 impl CpuRenderer {
@@ -73,7 +77,13 @@ impl CpuRenderer {
         let build = || rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("raster-{i}"));
         let pool = if threads > 1 { build().build().ok() } else { None };
         let (vertices, scratch, flat) = (Vec::new(), ScratchPool::default(), FlatColors::default());
-        Self { isa, pool, vertices, scratch, srgb: SrgbEncoder::new(), flat }
+        Self { isa, pool, vertices, scratch, srgb: SrgbEncoder::new(), flat, is_plain: false }
+    }
+
+    /// One that takes no shortcuts: each triangle is set up by itself and drawn in blocks, whatever
+    /// is before it, and each point is shaded by itself. For tests that compare pictures with its.
+    pub fn plain(threads: usize) -> Self {
+        Self { is_plain: true, ..Self::new(threads) }
     }
 
     /// Transforms the plan's vertices; afterwards [`RasterContext`] can be made.
@@ -91,7 +101,15 @@ impl CpuRenderer {
     }
 
     fn context<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> RasterContext<'a> {
-        RasterContext { plan, deadline, vertices: &self.vertices, isa: self.isa, srgb: &self.srgb, flat: None }
+        RasterContext {
+            plan,
+            deadline,
+            vertices: &self.vertices,
+            isa: self.isa,
+            srgb: &self.srgb,
+            flat: None,
+            is_plain: self.is_plain,
+        }
     }
 
     /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside
@@ -109,7 +127,7 @@ impl CpuRenderer {
         let mut context = self.context(plan, deadline);
         let banding = Banding::new(plan, self.threads());
         let drawn = bands::bins::bin(&context, self.pool.as_ref(), [banding.rows, banding.margin]).map(|bins| {
-            if FlatColors::suffice(plan) {
+            if FlatColors::suffice(plan) && !context.is_plain {
                 flat.find(&context, self.pool.as_ref(), &bins.triangles);
                 context.flat = Some(&flat);
             }

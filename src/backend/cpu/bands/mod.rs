@@ -176,8 +176,8 @@ fn triangles_sampled<const S: usize>(context: &RasterContext<'_>, bins: &Bins, b
     let drawn = draw_batches::<S>(context, (fronts, band), samples, None, &mut poll);
     let backs = bins.triangles.iter().map(|chunk| &chunk.backs);
     if drawn.is_continue() && backs.clone().any(|list| list.items_in(band).next().is_some()) {
-        let tiles = Tiles::new(samples);
-        let _ = draw_batches::<S>(context, (backs, band), samples, Some(&tiles), &mut poll);
+        let tiles = (!context.is_plain).then(|| Tiles::new(samples));
+        let _ = draw_batches::<S>(context, (backs, band), samples, tiles.as_ref(), &mut poll);
     }
 }
 

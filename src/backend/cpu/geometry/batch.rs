@@ -65,11 +65,14 @@ impl Batch {
                 continue;
             }
             let id = corners.ids[l];
-            if setups.is_short[l] {
+            if setups.is_short[l] && !context.is_plain {
                 draw_short::<S>(context.isa, &setups.short(l), id, band);
                 tested += ((right - left + 1) * (bottom - top + 1)) as u64 * S as u64;
             } else if let Some(setup) = Setup::new(&context.screen_triangle(id)) {
-                tested += draw_long::<S>(context.isa, &setup, id, band);
+                tested += match context.is_plain {
+                    true => visibility::draw(&setup, id, &mut Nearest(band)),
+                    false => draw_long::<S>(context.isa, &setup, id, band),
+                };
             }
         }
         tested
