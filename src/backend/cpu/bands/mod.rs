@@ -3,13 +3,15 @@
 //! A band fits a core's cache and depends on no other band. [`bins`] sorts triangles and edges into
 //! bands, [`scratch`] holds a band's buffers.
 
+mod bin;
 pub(crate) mod bins;
 pub(crate) mod scratch;
 pub(crate) mod triangle_bins;
 
 use std::ops::ControlFlow;
 
-use self::bins::{Bin, Bins};
+use self::bin::Bin;
+use self::bins::Bins;
 use self::scratch::BandScratch;
 use self::triangle_bins::BandLists;
 use super::isa::{LANES, dispatch};
