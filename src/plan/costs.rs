@@ -13,13 +13,14 @@ const MATERIAL_BYTES: u64 = 259;
 /// Bytes that a back-end takes per vertex on screen.
 const VERTEX_BYTES: u64 = 32;
 
-/// Bytes per triangle: up to four entries in the lists of the picture's bands, with the indices of
-/// its vertices, one more index, and its colour. The GPU's lists take less.
-const LISTED_BYTES: u64 = 4 * 16 + 4 + 16;
+/// Bytes per triangle: up to four entries in the lists of the picture's bands, each with an id and
+/// vertex indices (or eight ids in lists of tiles), two ids in lists that are not by band, and a
+/// colour.
+const LISTED_BYTES: u64 = 4 * 16 + 2 * 4 + 16;
 
 /// Bytes more per triangle where a plan has layers: it may be in the lists of the visibility buffer
 /// and in those of the layers, and each thread notes which triangles are done.
-const LAYERED_BYTES: u64 = 4 * 16 + 4 + 8;
+const LAYERED_BYTES: u64 = 4 * 16 + 2 * 4 + 8;
 
 /// Bytes per position for computed vertex normals: a sum in f64, then the unit normal in f32.
 const NORMAL_BYTES: u64 = 36;

@@ -47,9 +47,10 @@ pub struct CpuRenderer {
     threads: Arc<DrawingThreads>,
     vertices: Vec<ScreenVertex>,
     scratch: ScratchPool,
-    has_plain_lines: bool,
     srgb: SrgbEncoder,
     flat: FlatColors,
+    /// True if no shortcuts are taken.
+    is_plain: bool,
 }
 
 /// Input of every stage: the plan and the vertices on screen.
@@ -59,11 +60,11 @@ pub struct RasterContext<'a> {
     /// The positions', then the hull's own.
     vertices: &'a [ScreenVertex],
     isa: Isa,
-    /// True if lines take no shortcut.
-    has_plain_lines: bool,
     srgb: &'a SrgbEncoder,
     /// The colours of triangles, where these are all that there is to know.
     flat: Option<&'a FlatColors>,
+    /// As [`CpuRenderer::plain`].
+    is_plain: bool,
 }
 
 impl CpuRenderer {
@@ -77,9 +78,11 @@ impl CpuRenderer {
         Self { isa, ..Self::on(Arc::new(DrawingThreads::new(threads))) }
     }
 
-    /// A renderer whose lines take no shortcut, slowly, for tests that compare pictures.
-    pub fn with_plain_lines(threads: usize) -> Self {
-        Self { has_plain_lines: true, ..Self::new(threads) }
+    /// One that takes no shortcuts: each triangle is set up by itself and drawn in blocks, whatever
+    /// is before it, each point is shaded by itself, and each edge is searched. For tests that
+    /// compare pictures with its.
+    pub fn plain(threads: usize) -> Self {
+        Self { is_plain: true, ..Self::new(threads) }
     }
 
     /// A renderer that shares threads with others.
@@ -89,9 +92,9 @@ impl CpuRenderer {
             threads,
             vertices: Vec::new(),
             scratch: ScratchPool::default(),
-            has_plain_lines: false,
             srgb: SrgbEncoder::new(),
             flat: FlatColors::default(),
+            is_plain: false,
         }
     }
 
@@ -109,8 +112,15 @@ impl CpuRenderer {
     }
 
     fn context<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> RasterContext<'a> {
-        let (vertices, has_plain_lines) = (self.vertices.as_slice(), self.has_plain_lines);
-        RasterContext { plan, deadline, vertices, isa: self.isa, has_plain_lines, srgb: &self.srgb, flat: None }
+        RasterContext {
+            plan,
+            deadline,
+            vertices: &self.vertices,
+            isa: self.isa,
+            srgb: &self.srgb,
+            flat: None,
+            is_plain: self.is_plain,
+        }
     }
 
     /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside
@@ -133,7 +143,7 @@ impl CpuRenderer {
         let mut banding = Banding::new(plan, threads.count());
         banding.at_once = banding.at_once.min(share.count);
         let drawn = bands::bins::bin(&context, pool, [banding.rows, banding.margin]).map(|bins| {
-            if FlatColors::suffice(plan) {
+            if FlatColors::suffice(plan) && !context.is_plain {
                 flat.find(&context, pool, &bins.triangles);
                 context.flat = Some(&flat);
             }

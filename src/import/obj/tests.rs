@@ -8,15 +8,15 @@ use crate::import::raw::RawMesh;
 use crate::limits::{Budget, Deadline, Limits};
 
 /// Everything that a text becomes, or its error.
-fn read(text: &str, part_bytes: usize, has_plain_lines: bool) -> String {
+fn read(text: &str, part_bytes: usize, is_plain: bool) -> String {
     let limits = Limits::default();
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let files = Bundle::of_one(text.as_bytes().to_vec()).into_files();
     let (folder, _) = entry::choose(files, None, Some(Format::Obj), &deadline).unwrap();
     let mut cx = Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
     let mut raw = RawMesh::default();
-    let summary = read_parts(text.as_bytes(), part_bytes, has_plain_lines, &mut cx)
-        .and_then(|parts| assemble(parts, &mut raw, &mut cx));
+    let summary =
+        read_parts(text.as_bytes(), part_bytes, is_plain, &mut cx).and_then(|parts| assemble(parts, &mut raw, &mut cx));
     match summary {
         Ok(summary) => format!("{summary:?} {raw:?}"),
         Err(error) => format!("{error:?}"),
@@ -129,9 +129,9 @@ fn parts_threads_and_both_ways_agree() {
         for threads in [1, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             for part_bytes in [1, 50, 2000, usize::MAX] {
-                for has_plain_lines in [false, true] {
-                    let given = pool.install(|| read(&text, part_bytes, has_plain_lines));
-                    assert!(given == expected, "{threads} threads, parts of {part_bytes}, {has_plain_lines}: {text}");
+                for is_plain in [false, true] {
+                    let given = pool.install(|| read(&text, part_bytes, is_plain));
+                    assert!(given == expected, "{threads} threads, parts of {part_bytes}, {is_plain}: {text}");
                 }
             }
         }

@@ -9,6 +9,7 @@ pub mod lines;
 pub mod models;
 pub mod raster;
 pub mod select;
+pub mod shortcuts;
 pub mod skips;
 pub mod textures;
 pub mod twins;

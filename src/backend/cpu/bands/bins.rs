@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::bin::Bin;
 use super::triangle_bins::{TriangleBin, TrianglePass};
 use crate::backend::cpu::lines::contour;
 use crate::backend::cpu::lines::segment::Segment;
@@ -22,41 +23,6 @@ pub struct Bins {
     pub peel: Vec<TriangleBin>,
     /// By line pass.
     pub edges: Vec<Vec<Bin>>,
-}
-
-/// A chunk's items by band.
-#[derive(Default)]
-pub struct Bin {
-    by_band: Vec<Vec<u32>>,
-    /// Items that touch many bands, with the first and last.
-    tall: Vec<(u32, [u32; 2])>,
-    /// Number of bands from which an item is tall.
-    tall_bands: usize,
-}
-
-impl Bin {
-    /// Empty lists; what touches `tall_bands` bands is listed once for all of them.
-    pub fn new(bands: usize, tall_bands: usize) -> Self {
-        Self { by_band: vec![Vec::new(); bands], tall: Vec::new(), tall_bands }
-    }
-
-    /// Adds an item that touches the bands from `first` to `last`.
-    pub fn push(&mut self, item: u32, [first, last]: [usize; 2]) {
-        if last - first >= self.tall_bands {
-            self.tall.push((item, [first as u32, last as u32]));
-            return;
-        }
-        for band in &mut self.by_band[first..=last] {
-            band.push(item);
-        }
-    }
-
-    /// The band's items.
-    pub fn items_in(&self, band: usize) -> impl Iterator<Item = u32> {
-        let is_here = move |[first, last]: [u32; 2]| (first as usize..=last as usize).contains(&band);
-        let tall = self.tall.iter().filter(move |(_, bands)| is_here(*bands)).map(|&(item, _)| item);
-        self.by_band.get(band).into_iter().flatten().copied().chain(tall)
-    }
 }
 
 /// Sorts the plan's triangles and edges into bands of `rows`; triangles of the visibility buffer

@@ -3,13 +3,15 @@
 //! A band fits a core's cache and depends on no other band. [`bins`] sorts triangles and edges into
 //! bands, [`scratch`] holds a band's buffers.
 
+mod bin;
 pub(crate) mod bins;
 pub(crate) mod scratch;
 pub(crate) mod triangle_bins;
 
 use std::ops::ControlFlow;
 
-use self::bins::{Bin, Bins};
+use self::bin::Bin;
+use self::bins::Bins;
 use self::scratch::BandScratch;
 use self::triangle_bins::BandLists;
 use super::isa::{LANES, dispatch};
@@ -180,8 +182,8 @@ fn triangles_sampled<const S: usize>(context: &RasterContext<'_>, bins: &Bins, b
     let drawn = draw_batches::<S>(context, (fronts, band), samples, None, &mut poll);
     let backs = bins.triangles.iter().map(|chunk| &chunk.backs);
     if drawn.is_continue() && backs.clone().any(|list| list.items_in(band).next().is_some()) {
-        let tiles = Tiles::new(samples);
-        let _ = draw_batches::<S>(context, (backs, band), samples, Some(&tiles), &mut poll);
+        let tiles = (!context.is_plain).then(|| Tiles::new(samples));
+        let _ = draw_batches::<S>(context, (backs, band), samples, tiles.as_ref(), &mut poll);
     }
 }
 

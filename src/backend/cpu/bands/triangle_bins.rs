@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::bins::Bin;
+use super::bin::Bin;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::clip_triangle;
 use crate::backend::cpu::geometry::samples::SampleGrid;

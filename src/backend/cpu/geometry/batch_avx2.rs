@@ -1,4 +1,4 @@
-//! Stage visibility: the steps of [`batch`](super::batch) in AVX2 instructions, lane for lane the
+//! Stage visibility: the steps of `batch` and `setups` in AVX2 instructions, lane for lane the
 //! same. Compilers make worse of the loops there: parts of vectors, and masked stores, which take
 //! several times as long on some processors.
 
@@ -7,8 +7,8 @@
 use std::arch::asm;
 use std::arch::x86_64::*;
 
-use super::batch::{Corners, EXTENT_MAX, SHORT_MAX, Setups, lane_offsets};
 use super::samples::{SampleBand, SampleGrid};
+use super::setups::{Corners, EXTENT_MAX, SHORT_MAX, Setups, lane_offsets};
 use super::visibility::Part;
 use crate::backend::cpu::isa::LANES;
 use crate::plan::sample_offsets;

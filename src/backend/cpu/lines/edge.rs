@@ -104,7 +104,7 @@ impl<'a> LineDrawer<'a> {
             let window = Window { segment: &segment, ends: [a, b], number: window, count: windows };
             for i in 0..self.intervals.len() {
                 let piece = self.intervals[i].map(|t| segment.point(t));
-                if self.context.has_plain_lines {
+                if self.context.is_plain {
                     self.draw_piece_plainly(&window, piece, owner, target);
                 } else {
                     self.draw_piece(&window, piece, owner, target);
@@ -162,7 +162,7 @@ impl<'a> LineDrawer<'a> {
         }
         let beyond = (self.pen.reach + 1.0) * segment.inverse_length;
         let range = [(range[0] - beyond).max(0.0), (range[1] + beyond).min(1.0)];
-        if self.context.has_plain_lines {
+        if self.context.is_plain {
             self.hidden.find_plainly((self.context, self.band), (edge, segment), range);
         } else {
             self.hidden.find((self.context, self.band, &mut *self.farthest), edge, segment, range);

@@ -53,7 +53,7 @@ const LOOKS: &[Keys<'_>] = &[
 #[test]
 fn the_shortcuts_of_lines_change_no_byte() {
     let deadline = Deadline::default();
-    let mut plain = CpuRenderer::with_plain_lines(2);
+    let mut plain = CpuRenderer::plain(2);
     let mut renderers = [CpuRenderer::new(1), CpuRenderer::new(3), CpuRenderer::with_isa(2, Isa::baseline())];
     let (mut cases, mut with_lines) = (0, 0);
     let mut compare = |name: &str, mesh: &Mesh, spec: &meshsnap::spec::Spec| {
