@@ -59,8 +59,14 @@ pub fn fill(
     // The alpha channel of a normal map or a metallic map has no meaning.
     let by_alpha = is_color && pixels.has_alpha();
     let table: LookupTable<f32> = pixels.lookup_table(is_color, |v| v);
-    let mut level = shrink([width, height], by_alpha, deadline, |y, row| pixels.row(y, &table, row))?;
-    for k in 1.. {
+    let read = |y, row: &mut [[f32; 4]]| pixels.row(y, &table, row);
+    let steps = if by_alpha { 0 } else { square_steps([width, height]).min(first) };
+    let (mut level, reached) = if steps > 1 {
+        (shrink_often([width, height], steps, deadline, read)?, steps)
+    } else {
+        (shrink([width, height], by_alpha, deadline, read)?, 1)
+    };
+    for k in reached.. {
         let size = [side(width, k), side(height, k)];
         if k >= first {
             let out = take(&mut out, size).par_iter_mut().with_min_len(ROWS_MIN << 10);
@@ -122,6 +128,41 @@ fn shrink(
         Ok(())
     })?;
     Ok(out)
+}
+
+/// The number of levels in a row that are means of squares of 2 x 2 texels.
+fn square_steps(size: [u32; 2]) -> u32 {
+    size[0].trailing_zeros().min(size[1].trailing_zeros())
+}
+
+/// The level `steps` after one of `size` texels, all of whose steps are [`square_steps`]. No level in
+/// between is kept: memory that is touched for the first time costs more than the means.
+fn shrink_often(
+    size: [u32; 2],
+    steps: u32,
+    deadline: &Deadline,
+    read: impl Fn(u32, &mut [[f32; 4]]) + Sync,
+) -> Result<Vec<[f32; 4]>, Stopped> {
+    let to = size.map(|s| side(s, steps));
+    let mut out = vec![[0.0; 4]; to[0] as usize * to[1] as usize];
+    let rows = out.par_chunks_exact_mut(to[0] as usize).enumerate().with_min_len((2 * ROWS_MIN) >> steps.min(6));
+    // Two rows of each finer level.
+    let lines = || (0..steps).map(|k| vec![[0.0; 4]; 2 * side(size[0], k) as usize]).collect::<Vec<_>>();
+    rows.try_for_each_init(lines, |lines, (y, out)| {
+        deadline.check()?;
+        mean_row(y as u32, lines, &read, out);
+        Ok(())
+    })?;
+    Ok(out)
+}
+
+/// Row `y` of the level after the last one in `lines`.
+fn mean_row(y: u32, lines: &mut [Vec<[f32; 4]>], read: &impl Fn(u32, &mut [[f32; 4]]), out: &mut [[f32; 4]]) {
+    let Some((last, finer)) = lines.split_last_mut() else { return read(y, out) };
+    let (upper, lower) = last.split_at_mut(2 * out.len());
+    mean_row(2 * y, finer, read, upper);
+    mean_row(2 * y + 1, finer, read, lower);
+    mean_of_squares(upper, lower, out);
 }
 
 /// What [`Sum`] makes of sides that are even and of alpha that does not count, in the same order
@@ -214,7 +255,27 @@ const EXPONENT_SHIFT: u32 = 112 << 23;
 
 #[cfg(test)]
 mod tests {
-    use super::{Sum, half, mean_of_squares};
+    use super::{Sum, half, mean_of_squares, shrink, shrink_often, side, square_steps};
+    use crate::limits::Deadline;
+
+    #[test]
+    fn several_steps_at_once_have_the_bits_of_one_after_the_other() {
+        let (size, deadline) = ([192, 64], Deadline::default());
+        let read = |y: u32, row: &mut [[f32; 4]]| {
+            for (x, texel) in row.iter_mut().enumerate() {
+                *texel = [1, 3, 5, 7].map(|k| ((y * 31 + x as u32 * k) % 251) as f32 / 253.0);
+            }
+        };
+        assert_eq!((square_steps(size), square_steps([3, 4]), square_steps([4, 6])), (6, 0, 1));
+        let mut level = shrink(size, false, &deadline, read).unwrap();
+        for steps in 2..=6 {
+            let from = size.map(|s| side(s, steps - 1));
+            let finer =
+                |y: u32, row: &mut [[f32; 4]]| row.copy_from_slice(&level[(y * from[0]) as usize..][..row.len()]);
+            level = shrink(from, false, &deadline, finer).unwrap();
+            assert_eq!(shrink_often(size, steps, &deadline, read).unwrap(), level, "{steps}");
+        }
+    }
 
     #[test]
     fn the_mean_of_squares_has_the_bits_of_the_general_way() {
