@@ -13,7 +13,7 @@ use meshsnap::mesh::Mesh;
 use meshsnap::plan::{self, DrawPlan};
 use meshsnap::request::{self, Rules};
 use meshsnap::scene::Scene;
-use meshsnap::spec::{BackendChoice, Spec};
+use meshsnap::spec::{BackendChoice, DEFAULT_EFFORT, Spec};
 
 use crate::meshes::MeshFile;
 use crate::reference::Reference;
@@ -60,14 +60,14 @@ pub fn measure(file: &MeshFile, threads: usize, rounds: usize) -> Vec<Row> {
         for ((look, _), (spec, image)) in LOOKS.iter().zip(specs.iter().zip(&images)) {
             let plan = least.time(&format!("plan {look}"), || plan(&mesh, spec));
             least.time(&format!("render {look}"), || draw(&mut cpu, &plan).unwrap());
-            least.time(&format!("encode {look}"), || encode::encode(image, ImageFormat::Png).unwrap());
+            least.time(&format!("encode {look}"), || png(image));
         }
     }
     let note = |stage: &str| match stage.split_once(' ') {
         None => format!("{:.0} MB/s", file.bytes.len() as f64 / 1e3 / least.of(stage)),
         Some(("encode", look)) => {
             let image = &images[LOOKS.iter().position(|(name, _)| *name == look).unwrap()];
-            format!("{} bytes", encode::encode(image, ImageFormat::Png).unwrap().len())
+            format!("{} bytes", png(image).len())
         }
         Some(_) => String::new(),
     };
@@ -123,6 +123,10 @@ pub fn plan<'m>(mesh: &'m Mesh, spec: &Spec) -> DrawPlan<'m> {
     let mut budget = Budget::new(&Limits::default());
     let scene = Scene::new(mesh, spec, &mut budget).unwrap();
     plan::build(&scene, &mut budget, &Deadline::default()).unwrap()
+}
+
+fn png(image: &Image) -> Vec<u8> {
+    encode::encode(image, ImageFormat::Png, DEFAULT_EFFORT, &Deadline::default()).unwrap()
 }
 
 /// The picture.

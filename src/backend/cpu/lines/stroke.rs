@@ -156,12 +156,13 @@ dispatch! {
 fn places_kernel([x, y]: [i16; 2], places: &mut PerPoint) {
     for ((right, down), place) in LATTICE[0].iter().zip(&LATTICE[1]).zip(places) {
         for l in 0..WORDS {
-            place[l] = high(x, right[l]) + high(y, down[l]);
+            place[l] = high(x, right[l]).wrapping_add(high(y, down[l]));
         }
     }
 }
 
-/// The upper half of a product.
+/// The upper half of a product. Sums of these do not overflow; they are written as wrapping ones,
+/// because the checks of debug builds would keep the loops from being vectors.
 #[inline(always)]
 fn high(a: i16, b: i16) -> i16 {
     ((i32::from(a) * i32::from(b)) >> 16) as i16
@@ -341,7 +342,7 @@ fn disc_kernel(half_square: &PerPoint, disc: &Disc, mask: &mut Mask) {
             let (right, down) = (&LATTICE[0][j], &LATTICE[1][j]);
             let mut at = [0_i16; WORDS];
             for l in 0..WORDS {
-                at[l] = high(disc.x, right[l]) + high(disc.y, down[l]) + half_square[j][l];
+                at[l] = high(disc.x, right[l]).wrapping_add(high(disc.y, down[l])).wrapping_add(half_square[j][l]);
             }
             for l in 0..WORDS {
                 push(&mut outside[l], at[l] > disc.limits[l]);
