@@ -1,5 +1,5 @@
-//! Wavefront OBJ. The text is cut into parts ([`cut`]), which are parsed at the same time
-//! ([`parse`]) and then put together ([`assemble`]). Every error names its line, and no count is
+//! Wavefront OBJ. The text is cut into parts (`cut`), which are parsed at the same time
+//! (`parse`) and then put together (`assemble`). Every error names its line, and no count is
 //! trusted. MTL files are read by [`mtl`]; [`materials`] makes slots and images from them.
 
 mod assemble;
