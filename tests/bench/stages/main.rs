@@ -97,7 +97,11 @@ fn write(rows: &[Row]) {
 
 /// Fails where a stage has become slower, and where nothing was compared.
 fn gate(rows: &[Row]) -> ExitCode {
-    let stored: BTreeMap<String, f64> = serde_json::from_slice(&std::fs::read(path()).unwrap()).unwrap();
+    let Ok(bytes) = std::fs::read(path()) else {
+        println!("nothing to compare with: --write keeps the ratios of a run");
+        return ExitCode::FAILURE;
+    };
+    let stored: BTreeMap<String, f64> = serde_json::from_slice(&bytes).unwrap();
     let compared: Vec<(&Row, f64)> =
         rows.iter().filter_map(|row| stored.get(&row.name()).map(|ratio| (row, *ratio))).collect();
     let slower: Vec<_> = compared.iter().filter(|(row, ratio)| row.ratio > GATE * ratio).collect();
