@@ -13,7 +13,7 @@ use std::ops::ControlFlow;
 use self::bin::Bin;
 use self::bins::Bins;
 use self::scratch::BandScratch;
-use self::triangle_bins::BandLists;
+use self::triangle_bins::{BandLists, TriangleBin};
 use super::isa::{LANES, dispatch};
 use super::{RasterContext, resolve};
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
@@ -173,17 +173,21 @@ fn triangles_kernel(context: &RasterContext<'_>, bins: &Bins, band: usize, sampl
 fn triangles_sampled<const S: usize>(context: &RasterContext<'_>, bins: &Bins, band: usize, samples: &mut SampleBand) {
     let mut poll = DeadlinePoll::new(context.deadline);
     for (id, piece) in bins.triangles.iter().flat_map(|chunk| chunk.pieces_in(band)) {
-        let setup = Setup::new(piece);
-        if poll.is_expired(setup.map_or(0, |setup| visibility::draw(&setup, id, &mut Nearest(samples)))) {
+        let tested = Setup::new(piece).map_or(0, |setup| visibility::draw::<S>(&setup, id, &mut Nearest(samples)));
+        if poll.is_expired(tested) {
             return;
         }
     }
-    let fronts = bins.triangles.iter().map(|chunk| &chunk.fronts);
-    let drawn = draw_batches::<S>(context, (fronts, band), samples, None, &mut poll);
-    let backs = bins.triangles.iter().map(|chunk| &chunk.backs);
-    if drawn.is_continue() && backs.clone().any(|list| list.items_in(band).next().is_some()) {
-        let tiles = (!context.is_plain).then(|| Tiles::new(samples));
-        let _ = draw_batches::<S>(context, (backs, band), samples, tiles.as_ref(), &mut poll);
+    let lists_of: [fn(&TriangleBin) -> &BandLists; 2] = [|chunk| &chunk.fronts, |chunk| &chunk.backs];
+    for (i, list_of) in lists_of.into_iter().enumerate() {
+        let lists = || bins.triangles.iter().map(list_of);
+        if lists().all(|list| list.items_in(band).next().is_none()) {
+            continue;
+        }
+        let tiles = (i == 1 && !context.is_plain).then(|| Tiles::new(samples));
+        if draw_batches::<S>(context, (lists(), band), samples, tiles.as_ref(), &mut poll).is_break() {
+            return;
+        }
     }
 }
 
@@ -197,19 +201,16 @@ fn draw_batches<'a, const S: usize>(
     poll: &mut DeadlinePoll<'_>,
 ) -> ControlFlow<()> {
     let mut batch = Batch::default();
-    for list in lists {
-        for triangle in list.items_in(band) {
-            if batch.push(triangle.id, triangle.vertices) {
-                let tested = batch.draw::<S>(context, samples, tiles);
-                if poll.is_expired_after(LANES as u64, tested) {
-                    return ControlFlow::Break(());
-                }
+    // The two ends of the list draw the batch that waits, and the one that was not filled.
+    for triangle in lists.flat_map(|list| list.items_in(band)).map(Some).chain([None, None]) {
+        let is_due = triangle.is_none_or(|triangle| batch.push(triangle.id, triangle.vertices));
+        if is_due {
+            let tested = batch.draw::<S>(context, samples, tiles);
+            if poll.is_expired_after(LANES as u64, tested) {
+                return ControlFlow::Break(());
             }
         }
     }
-    // What waits, and what was collected after it.
-    batch.draw::<S>(context, samples, tiles);
-    batch.draw::<S>(context, samples, tiles);
     ControlFlow::Continue(())
 }
 

@@ -60,10 +60,7 @@ impl Batch {
                 draw_short::<S>(context.isa, &setups.short(l), id, band);
                 tested += ((right - left + 1) * (bottom - top + 1)) as u64 * S as u64;
             } else if let Some(setup) = Setup::new(&context.screen_triangle(id)) {
-                tested += match context.is_plain {
-                    true => visibility::draw(&setup, id, &mut Nearest(band)),
-                    false => draw_long::<S>(context.isa, &setup, id, band),
-                };
+                tested += draw_long::<S>(context, &setup, id, band);
             }
         }
         tested
@@ -84,14 +81,14 @@ fn set_up<const S: usize>(isa: Isa, corners: &Corners, band: &SampleBand) -> Set
 
 /// Draws a triangle block by block. Returns the number of samples tested.
 #[inline(always)]
-fn draw_long<const S: usize>(isa: Isa, setup: &Setup, id: u32, band: &mut SampleBand) -> u64 {
-    if !isa.has_own_batch() || setup.depth_range[0] <= 0.0 {
-        return visibility::draw(setup, id, &mut Nearest(band));
+fn draw_long<const S: usize>(context: &RasterContext<'_>, setup: &Setup, id: u32, band: &mut SampleBand) -> u64 {
+    if context.is_plain || !context.isa.has_own_batch() || setup.depth_range[0] <= 0.0 {
+        return visibility::draw::<S>(setup, id, &mut Nearest(band));
     }
     let mut parts = 0;
     let (size_px, range) = (band.size_px, band.range());
     visibility::for_each_part::<S>(setup, size_px, range, |part| {
-        draw_short::<S>(isa, part, id, band);
+        draw_short::<S>(context.isa, part, id, band);
         parts += 1;
     });
     parts * (64 * S as u64)

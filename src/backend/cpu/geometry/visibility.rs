@@ -5,7 +5,7 @@
 //! triangles that share an edge, every sample belongs to exactly one. Depth is evaluated from
 //! integer offsets, never incrementally, so it does not depend on where a traversal began.
 
-use super::samples::{SampleBand, for_samples};
+use super::samples::SampleBand;
 use super::transform::{ScreenVertex, recip};
 use crate::backend::cpu::isa::LANES;
 use crate::plan::{Faces, sample_offsets};
@@ -95,14 +95,9 @@ pub trait Target {
     fn offer(&mut self, at: usize, outside: &[i32; LANES], z: &[f32; LANES], id: u32);
 }
 
-/// Draws a triangle into the target. Returns the number of samples tested.
+/// Draws a triangle into a target of `S` samples per pixel. Returns the number of samples tested.
 #[inline(always)]
-pub fn draw(setup: &Setup, id: u32, target: &mut impl Target) -> u64 {
-    for_samples!(target.band().samples, draw_sampled(setup, id, target))
-}
-
-#[inline(always)]
-fn draw_sampled<const S: usize>(setup: &Setup, id: u32, target: &mut impl Target) -> u64 {
+pub fn draw<const S: usize>(setup: &Setup, id: u32, target: &mut impl Target) -> u64 {
     let edges = Edges::new(setup);
     let lanes = [Lanes::new::<S>(&edges, 0), Lanes::new::<S>(&edges, LANES)];
     let size_px = target.band().size_px;

@@ -4,7 +4,7 @@
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
-use crate::backend::cpu::geometry::samples::SampleBand;
+use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility;
 use crate::backend::cpu::geometry::visibility::{Setup, Target};
@@ -57,22 +57,26 @@ impl Target for Behind<'_> {
 }
 
 #[inline(always)]
-fn peel_layer_kernel(context: &RasterContext<'_>, (bins, band): (&[TriangleBin], usize), peel: &mut PeelBand) {
+fn peel_layer_kernel(context: &RasterContext<'_>, bins: (&[TriangleBin], usize), peel: &mut PeelBand) {
+    for_samples!(peel.found.samples, peel_sampled(context, bins, peel));
+}
+
+#[inline(always)]
+fn peel_sampled<const S: usize>(
+    context: &RasterContext<'_>,
+    (bins, band): (&[TriangleBin], usize),
+    peel: &mut PeelBand,
+) {
     let PeelBand { found, previous, pending, .. } = peel;
     let mut poll = DeadlinePoll::new(context.deadline);
-    let mut item = 0;
-    for chunk in bins {
-        for (id, piece) in chunk.pieces_in(band) {
-            if poll.is_expired(offer(item, id, || *piece, found, previous, pending)) {
-                return;
-            }
-            item += 1;
-        }
-        for id in chunk.whole_in(band) {
-            if poll.is_expired(offer(item, id, || context.screen_triangle(id), found, previous, pending)) {
-                return;
-            }
-            item += 1;
+    let items = bins.iter().flat_map(|chunk| {
+        let pieces = chunk.pieces_in(band).map(|(id, piece)| (id, Some(piece)));
+        pieces.chain(chunk.whole_in(band).map(|id| (id, None)))
+    });
+    for (item, (id, piece)) in items.enumerate() {
+        let corners = || piece.copied().unwrap_or_else(|| context.screen_triangle(id));
+        if poll.is_expired(offer::<S>(item, id, corners, found, previous, pending)) {
+            return;
         }
     }
 }
@@ -80,7 +84,7 @@ fn peel_layer_kernel(context: &RasterContext<'_>, (bins, band): (&[TriangleBin],
 /// Draws the band's triangle number `item`, unless an earlier round has found all of its samples.
 /// Returns the number of samples tested.
 #[inline(always)]
-fn offer(
+fn offer<const S: usize>(
     item: usize,
     id: u32,
     corners: impl Fn() -> [ScreenVertex; 3],
@@ -92,7 +96,7 @@ fn offer(
         return 0;
     }
     let mut target = Behind { found, previous, pending: [0; LANES] };
-    let looked_at = Setup::new(&corners()).map_or(0, |setup| visibility::draw(&setup, id, &mut target));
+    let looked_at = Setup::new(&corners()).map_or(0, |setup| visibility::draw::<S>(&setup, id, &mut target));
     let is_pending = target.pending != [0; LANES];
     match pending.get_mut(item) {
         Some(kept) => *kept = is_pending,
