@@ -3,7 +3,8 @@
 //!
 //! Quickly means one filter for the whole picture, Paeth, and Huffman codes that are not fitted to
 //! it. What Paeth leaves of a rendering is mostly runs of zeros, so trying more filters pays little.
-//! Where a row equals the one above it, as in background and flat faces, nothing is computed.
+//! A row that equals the one above it, as in background and flat faces, is written as zeros without
+//! computing anything.
 
 use fdeflate::Compressor;
 use png::{BitDepth, ColorType, DeflateCompression, Encoder, Filter, chunk};

@@ -89,6 +89,7 @@ fn exponent_at(bytes: &[u8], begin: usize) -> Option<(i64, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::import::noise::Noise;
 
     /// Compares a text with std, and counts it.
     fn check(text: &str, count: &mut u64) {
@@ -101,17 +102,6 @@ mod tests {
             }
         }
         *count += 1;
-    }
-
-    struct Noise(u64);
-
-    impl Noise {
-        fn below(&mut self, n: u64) -> u64 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            (self.0 >> 11) % n
-        }
     }
 
     #[test]

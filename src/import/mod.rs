@@ -14,6 +14,8 @@ mod fbx;
 mod formats;
 mod gltf;
 mod metadata;
+#[cfg(test)]
+mod noise;
 mod normalise;
 mod obj;
 mod off;

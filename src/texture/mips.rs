@@ -165,8 +165,8 @@ fn mean_row(y: u32, lines: &mut [Vec<[f32; 4]>], read: &impl Fn(u32, &mut [[f32;
     mean_of_squares(upper, lower, out);
 }
 
-/// What [`Sum`] makes of sides that are even and of alpha that does not count, in the same order
-/// of additions, which is nearly every texture.
+/// The result of [`Sum`], by the same order of additions, for the usual texture: even sides, and
+/// alpha that does not count.
 fn mean_of_squares(upper: &[[f32; 4]], lower: &[[f32; 4]], out: &mut [[f32; 4]]) {
     let squares = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
     for (out, ([a, b], [c, d])) in out.iter_mut().zip(squares) {

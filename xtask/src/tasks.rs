@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// What went wrong, for standard error.
+/// A failure's text, for standard error.
 type Result = std::result::Result<(), String>;
 
 /// Something that tests compare with, and that they can store anew.
@@ -14,7 +14,7 @@ struct Stored {
     filter: &'static str,
     /// The environment variable and value that make these tests write.
     write: (&'static str, &'static str),
-    /// Where it lies.
+    /// Its folder or file.
     path: &'static str,
 }
 

@@ -21,12 +21,12 @@ pub struct DrawingThreads {
 /// The part of the threads that one picture has. It ends when this is dropped.
 pub struct Share<'a> {
     threads: &'a DrawingThreads,
-    /// How many they are, at least 1.
+    /// Their number, at least 1.
     pub count: usize,
 }
 
 impl DrawingThreads {
-    /// So many threads, if the system gives them, and else one.
+    /// A pool of `count` threads, or of one if the system gives no more.
     pub fn new(count: usize) -> Self {
         let build = || ThreadPoolBuilder::new().num_threads(count).thread_name(|i| format!("raster-{i}"));
         // One thread needs no pool.

@@ -1,4 +1,4 @@
-//! Which triangles of a raw mesh are faces: those with finite corners and an area.
+//! The faces of a raw mesh: its triangles with finite corners and an area.
 
 use super::geometry::Geometry;
 use super::pow2::{Pow2, exponent, is_usable, max_abs};

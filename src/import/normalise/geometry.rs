@@ -1,4 +1,5 @@
-//! What normalisation reads of a raw mesh: triangles, and the positions of their corners in f64.
+//! The part of a raw mesh that normalisation reads: triangles, and the positions of their corners
+//! in f64.
 
 use crate::import::raw::Soup;
 

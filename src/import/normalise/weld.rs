@@ -105,7 +105,7 @@ struct Piece {
     sorted: Vec<Bits>,
     /// Their indices in `positions`.
     order: Vec<u16>,
-    /// Where each share begins in `sorted`, and the end.
+    /// Index of each share's first position in `sorted`, then the length of `sorted`.
     begins: Vec<u32>,
     /// For each position the one among those of all pieces, with [`NEW`] where it is the first.
     merged: Vec<u32>,

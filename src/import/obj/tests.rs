@@ -4,6 +4,7 @@ use super::{assemble, read_parts};
 use crate::import::Format;
 use crate::import::bundle::{Bundle, entry};
 use crate::import::context::Context;
+use crate::import::noise::Noise;
 use crate::import::raw::RawMesh;
 use crate::limits::{Budget, Deadline, Limits};
 
@@ -23,16 +24,7 @@ fn read(text: &str, part_bytes: usize, is_plain: bool) -> String {
     }
 }
 
-struct Noise(u64);
-
 impl Noise {
-    fn below(&mut self, n: u64) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) % n
-    }
-
     fn number(&mut self) -> String {
         let whole = self.below(2_000_000) as f64 - 1e6;
         match self.below(12) {

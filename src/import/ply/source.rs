@@ -25,8 +25,8 @@ pub trait Source {
     fn skip(&mut self, numbers: usize, bytes: usize) -> Option<()>;
     /// Replaces `columns` with the values of some records of a fixed size.
     fn columns(&mut self, layout: &Layout, rows: usize, columns: &mut Columns) -> Option<()>;
-    /// How many of the next records are nothing but lists of three indices, at most `records`. 0 where
-    /// [`Source::triangles`] would be no faster than record by record.
+    /// Number of the next records, at most `records`, that are lists of three indices and nothing
+    /// else. 0 where [`Source::triangles`] would be no faster than record by record.
     fn triangles_max(&self, _layout: &Layout, _records: u64) -> u64 {
         0
     }

@@ -1,7 +1,7 @@
-//! Line and point primitives: what a file draws without area.
+//! Line and point primitives, which have no area.
 //!
-//! Where their material has a fill, they are triangles that face the camera and are shaded with the
-//! surface ([`geometry`]). Where it has none, they are lines of exact width ([`line_passes`]).
+//! Those whose material has a fill are triangles that face the camera and are shaded with the
+//! surface ([`geometry`]). The others are lines of exact width ([`line_passes`]).
 
 mod lines;
 mod triangles;

@@ -11,7 +11,7 @@ use crate::support::files::mesh::Solid;
 use crate::support::server::{Answer, CUBE_OBJ, Server, meshsnap};
 use meshsnap::service::store::Digest;
 
-/// Where a mesh of these bytes is.
+/// The path of a stored mesh of these bytes.
 pub fn url(bytes: &[u8]) -> String {
     format!("/v1/meshes/{}", Digest::of(bytes))
 }

@@ -18,7 +18,7 @@ const MOVED_MAX_PX: f64 = 1.0 / 512.0;
 const F64_XYZ: [&str; 3] = ["double x", "double y", "double z"];
 const SIZE: &str = "512";
 
-/// Where the plan puts each vertex, before it is snapped.
+/// The plan's position of each vertex, before it is snapped.
 fn on_screen(mesh: &Mesh) -> Vec<V2> {
     let plan: DrawPlan<'_> = scenes::plan(mesh, &scenes::spec(&[("style", "flat"), ("size", SIZE)]));
     let scene = scene(&plan);

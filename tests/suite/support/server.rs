@@ -26,7 +26,7 @@ pub fn meshsnap() -> Command {
 /// A running daemon; killed when dropped.
 pub struct Server {
     child: Child,
-    /// Where it listens.
+    /// Its address.
     pub address: SocketAddr,
     /// The curl line that it printed.
     pub curl_line: String,

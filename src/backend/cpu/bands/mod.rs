@@ -201,7 +201,7 @@ fn draw_batches<'a, const S: usize>(
     poll: &mut DeadlinePoll<'_>,
 ) -> ControlFlow<()> {
     let mut batch = Batch::default();
-    // The two ends of the list draw the batch that waits, and the one that was not filled.
+    // At the end, one batch waits and another is being filled: each `None` draws one.
     for triangle in lists.flat_map(|list| list.items_in(band)).map(Some).chain([None, None]) {
         let is_due = triangle.is_none_or(|triangle| batch.push(triangle.id, triangle.vertices));
         if is_due {

@@ -119,7 +119,7 @@ pub struct BandScratch {
     pub margin: u32,
     /// Depth peeling, where the plan has it.
     pub peel: Option<PeelBand>,
-    /// How far away the samples' triangles reach, where they hide lines.
+    /// The depth of the farthest corner behind each pixel, where surfaces hide lines.
     pub farthest: Farthest,
     /// Per pixel, premultiplied linear RGBA.
     pub colors: Vec<[f32; 4]>,

@@ -44,7 +44,7 @@ pub struct TriangleBin {
 /// Triangles by band, in one list.
 #[derive(Default)]
 pub struct BandLists {
-    /// Where each band's items start in `items`, and the last ones' end.
+    /// Index in `items` of each band's first item, then the end of the last band's.
     starts: Vec<u32>,
     items: Vec<ListedTriangle>,
     /// Triangles that touch many bands, with the first and last.
@@ -189,7 +189,7 @@ impl TrianglePass {
     }
 }
 
-/// Where there are samples, and bands.
+/// The rectangle of the picture that has samples, and its bands.
 pub struct Bounds {
     grid: SampleGrid,
     /// The picture's centre, 1/256 px from its corner.
@@ -218,7 +218,7 @@ impl Bounds {
     }
 }
 
-/// What is left of a chunk after culling.
+/// Triangles of a chunk that culling leaves.
 pub struct Kept {
     /// Triangles that face the viewer, and that face away; the first `counts` of them count.
     fronts: Vec<Spanned>,

@@ -1,12 +1,12 @@
-//! Stage lines, per pixel: how far away the triangles that are visible in it reach. An edge that is
-//! farther than that in all pixels along it is hidden, whatever those triangles are.
+//! Stage lines: the farthest depth, per pixel, that the triangles visible in it reach. An edge that
+//! is farther in all pixels along it is hidden, whatever those triangles are.
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 
-/// Of each pixel of a band, the least depth of any corner of the triangles in its samples. It is
-/// found when it is first asked for, because most pixels are not.
+/// The least depth, per pixel of a band, of any corner of the triangles in its samples. A pixel's
+/// depth is found when it is first asked for, because most are not.
 #[derive(Default)]
 pub struct Farthest {
     depths: Vec<f32>,
@@ -15,11 +15,11 @@ pub struct Farthest {
     columns: usize,
 }
 
-/// Of a pixel that was not asked for yet.
+/// The depth of a pixel that was not asked for yet.
 const UNKNOWN: f32 = f32::INFINITY;
 
-/// Nothing is as far away as a pixel in which something is missing: a triangle, or one of its
-/// corners, which lies behind the eye.
+/// The depth of a pixel in which something is missing: a triangle, or one of its corners, which
+/// lies behind the eye. It is farther than any edge.
 const MISSING: f32 = f32::NEG_INFINITY;
 
 impl Farthest {
@@ -28,7 +28,7 @@ impl Farthest {
         self.depths.capacity() * size_of::<f32>()
     }
 
-    /// Forgets all, for the pixels of a band that is filled.
+    /// Forgets all depths, and takes on the size of a band whose samples are filled.
     pub fn clear(&mut self, band: &SampleBand) {
         let [columns, rows] = band.range();
         self.first = [columns[0], rows[0]];
@@ -37,7 +37,7 @@ impl Farthest {
         self.depths.resize(self.columns * rows[0].abs_diff(rows[1]) as usize, UNKNOWN);
     }
 
-    /// A pixel's, which the band has.
+    /// The depth of a pixel of the band.
     #[inline(always)]
     pub fn at(&mut self, (context, band): (&RasterContext<'_>, &SampleBand), [x, y]: [i32; 2]) -> f32 {
         let at = (y - self.first[1]) as usize * self.columns + (x - self.first[0]) as usize;

@@ -132,8 +132,8 @@ impl Direction {
         self.box_along = if squared > 0.0 { 0.5 * (along[0].abs() + along[1].abs()) } else { f32::MIN_POSITIVE };
     }
 
-    /// Where a pixel lies to a piece with this direction, whose ends are given from the pixel's
-    /// centre.
+    /// The place of a pixel beside a piece with this direction. The piece's ends are given from the
+    /// pixel's centre.
     #[inline(always)]
     pub fn place(&self, [start, end]: [[f32; 2]; 2]) -> Place {
         let past = |p: [f32; 2]| -(self.along[0] * p[0] + self.along[1] * p[1]);
@@ -168,7 +168,7 @@ fn high(a: i16, b: i16) -> i16 {
     ((i32::from(a) * i32::from(b)) >> 16) as i16
 }
 
-/// How much of a pixel a stroke covers.
+/// The part of a pixel that a stroke covers, as an area and as points.
 #[derive(Clone, Copy)]
 pub struct Amount {
     /// The area, 0 to 1.
@@ -177,7 +177,7 @@ pub struct Amount {
     pub points: u32,
 }
 
-/// Where eight pixels of a row lie to a piece of an edge, in pixels.
+/// The places of eight pixels of a row beside a piece of an edge, in pixels.
 pub struct Places {
     /// Distances of the pixels' centres from the line, past the piece's start, and past its end.
     across: [f32; LANES],
@@ -187,7 +187,7 @@ pub struct Places {
 }
 
 impl Places {
-    /// For a piece with these ends, and pixels whose first centre this is.
+    /// `[start, end]` are the piece's, and `first` is the centre of the first pixel.
     #[inline(always)]
     pub fn new(pen: &Pen, direction: &Direction, [start, end]: [[f32; 2]; 2], first: [f32; 2]) -> Self {
         let (mut across, mut past) = ([0.0; LANES], [[0.0; LANES]; 2]);
@@ -231,8 +231,9 @@ impl Place {
     }
 }
 
-/// What a piece of an edge covers of a pixel within its reach; `mask`, which is empty, gets the
-/// points. `ends` are the piece's, in pixels from the pixel's centre.
+/// The part of a pixel that a piece of an edge covers. The pixel lies within the piece's reach;
+/// `ends` are the piece's, in pixels from the pixel's centre. `mask`, which is empty, gets the
+/// covered points.
 #[inline(always)]
 pub fn cover(pen: &Pen, direction: &Direction, ends: [[f32; 2]; 2], place: &Place, mask: &mut Mask) -> Option<Amount> {
     // Does the pixel reach past the start, and past the end?
@@ -365,8 +366,8 @@ pub struct Disc {
 
 /// A range of places for each word, from a first to a last that is not less.
 pub struct Range {
-    /// What moves the first place to the least number, and the last place moved likewise. Then one
-    /// comparison finds what is outside, because places below the first wrap around.
+    /// An offset that moves the first place to the least number, and the last place after that
+    /// move. One comparison then finds what is outside, because places below the first wrap around.
     shift: [i16; WORDS],
     last: [i16; WORDS],
 }

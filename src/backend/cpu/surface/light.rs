@@ -43,37 +43,14 @@ pub fn lit(base: [f32; 4], light: Light) -> [f32; 4] {
 /// Light on a surface with unit normal `n`: the bits of the other back-end.
 #[inline(always)]
 pub fn light(lights: &Lights, projection: &Projection, metallic: f32, roughness: f32, n: [f32; 3]) -> Light {
-    let [gain, gloss] = light_lanes(lights, projection, metallic, roughness, &n.map(|v| [v]));
+    let [gain, gloss] = light_lanes(quick_recip, lights, projection, metallic, roughness, &n.map(|v| [v]));
     Light { gain: gain[0], gloss: gloss[0] }
 }
 
-/// As [`light`], for several normals: gains, glosses.
+/// [`light`] on several normals: gains, then glosses. `inverse_of` is [`quick_recip`] for the bits of
+/// the other back-end. The processor's own division is quicker, for normals whose bits differ anyway.
 #[inline(always)]
 pub fn light_lanes<const N: usize>(
-    lights: &Lights,
-    projection: &Projection,
-    metallic: f32,
-    roughness: f32,
-    n: &[[f32; N]; 3],
-) -> [[f32; N]; 2] {
-    light_by(quick_recip, lights, projection, metallic, roughness, n)
-}
-
-/// As [`light_lanes`], with the processor's own division: quicker where the normal's bits differ
-/// anyway.
-#[inline(always)]
-pub fn light_on_blend<const N: usize>(
-    lights: &Lights,
-    projection: &Projection,
-    metallic: f32,
-    roughness: f32,
-    n: &[[f32; N]; 3],
-) -> [[f32; N]; 2] {
-    light_by(|w| 1.0 / w, lights, projection, metallic, roughness, n)
-}
-
-#[inline(always)]
-fn light_by<const N: usize>(
     inverse_of: impl Fn(f32) -> f32,
     lights: &Lights,
     projection: &Projection,

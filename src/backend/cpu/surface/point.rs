@@ -3,12 +3,12 @@
 
 use super::barycentric::{Barycentrics, corners};
 use super::debug;
-use super::light::{Light, light, light_lanes, light_on_blend, lit};
+use super::light::{Light, light, light_lanes, lit};
 use super::normal::{normal, normal_mapped};
 use super::texture::{Uv, blend, sample};
 use super::wire::{Place, edge_mask, fwidth_cover, wire_cover};
 use crate::backend::cpu::RasterContext;
-use crate::backend::cpu::geometry::transform::ScreenVertex;
+use crate::backend::cpu::geometry::transform::{ScreenVertex, quick_recip};
 use crate::backend::cpu::geometry::visibility::area;
 use crate::backend::cpu::vector::{facing, turned_to_viewer};
 use crate::plan::{Projection, ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, slots};
@@ -98,7 +98,8 @@ impl<'a> PointShader<'a> {
                     let normal = facing(blend(corners, b.value), b.front);
                     let normal = normal.map(|v| [v]);
                     let (metallic, roughness) = (material.metallic, material.roughness);
-                    let [gain, gloss] = light_on_blend(&surface.lights, projection, metallic, roughness, &normal);
+                    let [gain, gloss] =
+                        light_lanes(|w| 1.0 / w, &surface.lights, projection, metallic, roughness, &normal);
                     Light { gain: gain[0], gloss: gloss[0] }
                 }
                 (_, face) => {
@@ -204,7 +205,7 @@ pub fn flat_colors<const N: usize>(
     let base = with_alpha(material, material.base_color, show);
     let mut light = [[Light::NONE.gain; N], [Light::NONE.gloss; N]];
     if material.flags & flags::FACE_NORMALS != 0 {
-        light = light_lanes(&surface.lights, projection, material.metallic, material.roughness, normals);
+        light = light_lanes(quick_recip, &surface.lights, projection, material.metallic, material.roughness, normals);
     }
     let mut colors = [[0.0; N]; 4];
     for l in 0..N {

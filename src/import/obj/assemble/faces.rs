@@ -124,7 +124,7 @@ impl Splitter<'_> {
     }
 }
 
-/// What the faces of one part become.
+/// Triangles of the faces of one part of the file.
 #[derive(Default)]
 struct Piece {
     triangles: Vec<[u32; 3]>,

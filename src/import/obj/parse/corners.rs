@@ -6,7 +6,8 @@ use crate::import::obj::face::MISSING;
 /// Digits of an index that cannot overflow.
 const DIGITS_MAX: usize = 9;
 
-/// Where a face's line ends, and whether its corners have texture coordinates and normals.
+/// Index after a face's line; then two flags, true if its corners have texture coordinates, and
+/// normals.
 type FaceEnd = (usize, (bool, bool));
 
 impl Parser<'_, '_> {

@@ -16,7 +16,7 @@ use std::borrow::Cow;
 /// Corners between two deadline checks: one line may be the whole file.
 const CORNERS_PER_POLL: usize = 65_536;
 
-/// What is known before a part is parsed.
+/// Facts about the whole file that the parser of a part needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules<'a> {
     /// The byte that ends lines.

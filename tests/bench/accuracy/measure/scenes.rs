@@ -31,7 +31,7 @@ pub struct Scene {
     pub is_quick: bool,
 }
 
-/// Where a mesh is from.
+/// A mesh's origin.
 #[derive(Clone, Copy, Debug)]
 enum Source {
     /// Made for pictures of so many pixels per side.

@@ -17,8 +17,8 @@ const POSITIONS: [[f32; 3]; 4] = [[-8.0, -8.0, 0.5], [8.0, -8.0, 0.5], [8.0, 8.0
 const TRIANGLES: [[u32; 3]; 2] = [[0, 2, 1], [0, 3, 2]];
 const ONE: u16 = 0x3C00;
 
-/// Where texture coordinates begin and how they step, in texels; the sampler; and the texel that is
-/// in column or row k.
+/// The first texture coordinate and its step, in texels; the sampler; and the texel that is in
+/// column or row k.
 type Case = (f32, f32, u32, fn(i32) -> i32);
 
 #[test]

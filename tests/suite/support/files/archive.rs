@@ -13,7 +13,7 @@ pub struct Raw {
     pub method: u16,
     pub flags: u16,
     pub mode: u32,
-    /// Where the directory says that it begins, instead of where it does.
+    /// Its offset as the directory tells it, instead of the true one.
     pub start: Option<u32>,
 }
 
