@@ -78,7 +78,7 @@ pub enum DrawError {
     Device(String),
 }
 
-// They compare with the shaders.
+// These tests compare constants, structs and bindings with the shaders.
 #[cfg(test)]
 #[cfg(feature = "gpu")]
 mod tests;

@@ -73,7 +73,7 @@ pub struct RenderArgs {
     /// #rgb, #rrggbb, #rrggbbaa or transparent
     #[arg(long, value_name = "COLOR")]
     background: Option<String>,
-    /// Threads of the CPU renderer [default: one for each processor]
+    /// Threads that read, draw and decode textures [default: one for each processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Print the work that was skipped, and the time of each stage
@@ -110,7 +110,8 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
     };
     let threads = arguments.threads.map_or(cores() as usize, usize::from);
     if arguments.threads.is_some() {
-        // Those that decode textures, too. It only fails where they run already.
+        // Rayon's global pool reads files and decodes textures. This fails only if that pool is
+        // running already.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     }
     let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));

@@ -16,8 +16,7 @@ pub struct ImageSpec {
     pub samples: u32,
     /// The colour behind the mesh; alpha 0 is transparent.
     pub background: Rgba,
-    /// From 0, which encodes quickly, to 9, which makes small files. Formats that are encoded in
-    /// one way only take no notice of it.
+    /// Time that is spent to make a PNG small, from 0 to 9. Other formats ignore it.
     pub effort: u32,
 }
 

@@ -4,6 +4,9 @@
 //! once per instruction set. Rust neither fuses nor reorders floating-point operations, so all give
 //! the same bytes; only the speed differs.
 //!
+//! The innermost steps of triangles are an exception: they have a second version in AVX2 instructions
+//! (`geometry/batch_avx2.rs`).
+//!
 //! To add an instruction set (AVX-512, NEON): a variant of `Level` under its `cfg`, a list of
 //! features beside [`for_avx2_features`], a constructor that detects all of them, and an arm in
 //! [`dispatch`].
@@ -85,7 +88,10 @@ impl Isa {
     /// True if the steps of `geometry::batch` are written in this level's own instructions.
     #[inline(always)]
     pub(in crate::backend::cpu) fn has_own_batch(self) -> bool {
-        self.0 != Level::Baseline
+        #[cfg(target_arch = "x86_64")]
+        return self.has_avx2();
+        #[cfg(not(target_arch = "x86_64"))]
+        return false;
     }
 
     #[cfg(target_arch = "x86_64")]

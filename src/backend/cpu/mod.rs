@@ -24,7 +24,7 @@ mod vector;
 pub use isa::Isa;
 pub use threads::DrawingThreads;
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -61,7 +61,7 @@ pub struct RasterContext<'a> {
     vertices: &'a [ScreenVertex],
     isa: Isa,
     srgb: &'a SrgbEncoder,
-    /// The colours of triangles, where these are all that there is to know.
+    /// The colour of each triangle, where every material is flat.
     flat: Option<&'a FlatColors>,
     /// As [`CpuRenderer::plain`].
     is_plain: bool,
@@ -78,9 +78,9 @@ impl CpuRenderer {
         Self { isa, ..Self::on(Arc::new(DrawingThreads::new(threads))) }
     }
 
-    /// One that takes no shortcuts: each triangle is set up by itself and drawn in blocks, whatever
-    /// is before it, each point is shaded by itself, and each edge is searched. For tests that
-    /// compare pictures with its.
+    /// A renderer without shortcuts, for tests that compare bytes: triangles are set up one by one
+    /// and drawn in blocks, nothing is left out behind tiles, each point is shaded by itself, and
+    /// each edge is compared with every visible triangle.
     pub fn plain(threads: usize) -> Self {
         Self { is_plain: true, ..Self::new(threads) }
     }
@@ -149,7 +149,7 @@ impl CpuRenderer {
             }
             let row_len = out.len() / plan.height_px as usize;
             let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
-            run_few(pool, banding.at_once, items, |(band, out)| {
+            share.run(banding.at_once, items, |(band, out)| {
                 if deadline.check().is_ok() {
                     self.scratch.with(plan, banding, |scratch| each(&context, scratch, &bins, band, out));
                 }
@@ -240,26 +240,4 @@ fn run<T: Send>(pool: Option<&rayon::ThreadPool>, items: Vec<T>, each: impl Fn(T
         Some(pool) => pool.install(|| items.into_par_iter().for_each(each)),
         None => items.into_iter().for_each(each),
     }
-}
-
-/// The same for as many items at once as `at_once`.
-fn run_few<T: Send>(
-    pool: Option<&rayon::ThreadPool>,
-    at_once: usize,
-    items: impl Iterator<Item = T> + Send,
-    each: impl Fn(T) + Sync + Send,
-) {
-    let Some(pool) = pool else {
-        items.for_each(each);
-        return;
-    };
-    let items = Mutex::new(items);
-    let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
-    pool.install(|| {
-        (0..at_once).into_par_iter().for_each(|_| {
-            while let Some(item) = next() {
-                each(item);
-            }
-        });
-    });
 }

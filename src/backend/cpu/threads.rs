@@ -1,12 +1,13 @@
-//! The threads that the renderers of a process share.
+//! Threads that the renderers of a process share.
 //!
-//! A picture that is drawn alone has them all. Of several at once, each has its part; and when
-//! there are as many pictures as threads, each is drawn on the thread that asked for it, without a
-//! word between them. Parts are decided when a picture begins, so that a long one keeps what it
-//! got, and the system shares out the rest.
+//! A picture that is drawn alone uses all of them. `n` pictures at once use `count / n` each; where
+//! that is less than 2, a picture is drawn on its caller's thread. A picture gives up threads
+//! between two bands when another one begins, and gets none back.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
+use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Threads for drawing.
@@ -41,8 +42,13 @@ impl DrawingThreads {
 
     /// Begins a picture.
     pub fn share(&self) -> Share<'_> {
-        let drawing = self.drawing.fetch_add(1, Ordering::Relaxed) + 1;
-        Share { threads: self, count: (self.count() / drawing).max(1) }
+        self.drawing.fetch_add(1, Ordering::Relaxed);
+        Share { threads: self, count: self.part() }
+    }
+
+    /// Threads for each of the pictures that are being drawn now.
+    fn part(&self) -> usize {
+        (self.count() / self.drawing.load(Ordering::Relaxed).max(1)).max(1)
     }
 }
 
@@ -50,6 +56,26 @@ impl<'a> Share<'a> {
     /// The pool to draw on; None: the caller's thread alone.
     pub fn pool(&self) -> Option<&'a ThreadPool> {
         self.threads.pool.as_ref().filter(|_| self.count > 1)
+    }
+
+    /// Runs `each` over the items, for `at_once` of them at a time or fewer: where other pictures
+    /// have begun, some threads are left to them after their item.
+    pub fn run<T: Send>(&self, at_once: usize, items: impl Iterator<Item = T> + Send, each: impl Fn(T) + Sync + Send) {
+        let Some(pool) = self.pool() else {
+            items.for_each(each);
+            return;
+        };
+        let items = Mutex::new(items);
+        let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
+        pool.install(|| {
+            (0..at_once).into_par_iter().with_max_len(1).for_each(|loop_index| {
+                while (loop_index == 0 || loop_index < self.threads.part())
+                    && let Some(item) = next()
+                {
+                    each(item);
+                }
+            });
+        });
     }
 }
 
@@ -61,6 +87,8 @@ impl Drop for Share<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc;
+
     use super::*;
 
     #[test]
@@ -77,5 +105,40 @@ mod tests {
         assert_eq!(threads.share().count, 4, "what has ended counts no more");
         let one = DrawingThreads::new(1);
         assert_eq!((one.share().count, one.share().pool().is_some()), (1, false));
+    }
+
+    /// Picture 1 has four threads and a thousand bands, and each band waits to be let go. When each
+    /// thread has drawn one, two of them are left to picture 2, which is then drawn although no
+    /// further band of picture 1 ends.
+    #[test]
+    fn a_picture_gives_up_threads_between_two_bands() {
+        let threads = DrawingThreads::new(4);
+        let (begun, begins) = mpsc::channel();
+        let (go, gate) = mpsc::channel::<()>();
+        let gate = Mutex::new(gate);
+        let (drawn, second_drawn) = mpsc::channel();
+        let finished = AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            let (threads, finished) = (&threads, &finished);
+            scope.spawn(move || {
+                threads.share().run(4, 0..1000, |_| {
+                    let _ = begun.send(());
+                    let _ = gate.lock().unwrap().recv();
+                    finished.fetch_add(1, Ordering::Relaxed);
+                });
+            });
+            (0..4).for_each(|_| begins.recv().unwrap());
+            scope.spawn(move || {
+                let share = threads.share();
+                assert_eq!(share.count, 2);
+                (0..4).for_each(|_| go.send(()).unwrap());
+                share.run(2, 0..10, |_| drawn.send(finished.load(Ordering::Relaxed)).unwrap());
+                // Dropping `go` lets all other bands go.
+            });
+        });
+        let at_bands: Vec<usize> = second_drawn.iter().collect();
+        assert_eq!(at_bands.len(), 10);
+        assert!(at_bands.iter().all(|&finished| finished <= 4), "{at_bands:?}");
+        assert_eq!(finished.into_inner(), 1000);
     }
 }

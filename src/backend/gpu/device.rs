@@ -32,9 +32,9 @@ pub struct Gpu {
 }
 
 /// Jobs after which a software device gets new pipelines. llvmpipe compiles a kernel anew for every
-/// set of uniform values that its branches depend on, and keeps each copy (1 to 3 MiB a job) until
-/// the pipeline goes.
-const SOFTWARE_PIPELINE_JOBS: u32 = 32;
+/// set of uniform values that its branches depend on, and keeps each copy (1 to 3 MiB per job) until
+/// the pipeline goes. New pipelines cost seconds, so they are made seldom.
+const SOFTWARE_PIPELINE_JOBS: u32 = 128;
 
 /// The reason once the device is lost.
 type Lost = Arc<OnceLock<String>>;

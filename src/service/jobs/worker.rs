@@ -22,9 +22,9 @@ pub type RendererFactory = Arc<dyn Fn() -> Renderer + Send + Sync>;
 /// The threads that draw on the CPU.
 #[derive(Clone)]
 pub enum CpuThreads {
-    /// So many for each worker.
+    /// This many for each worker.
     Each(usize),
-    /// The same ones for all workers.
+    /// One pool for all workers.
     Shared(Arc<DrawingThreads>),
 }
 

@@ -72,13 +72,15 @@ class Server:
 
     def __init__(self, program):
         command = [program, "serve", "--listen", "127.0.0.1:0", "--workers", "1", "--backend", "cpu"]
-        self.child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         self.address = None
         for line in self.child.stdout:
             found = re.search(r"127\.0\.0\.1:(\d+)", line)
             if found:
                 self.address = found.group(0)
                 break
+        if self.address is None:
+            raise SystemExit(f"{program} serve ended without an address")
 
     def __enter__(self):
         return self

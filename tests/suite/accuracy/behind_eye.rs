@@ -76,9 +76,9 @@ fn sample_position(plan: &DrawPlan<'_>, sample: usize) -> V2 {
 }
 
 /// The region in which a triangle is seen: four affine functions of the screen, each a signed
-/// distance in pixels, are positive there. A point p of the screen is a sum of the corners' homogeneous (x, y, w)
-/// with weights `l`, which have to be positive; and as those add up to 1 / W, there is a line where
-/// W is the near plane's. This stays right for corners behind the eye (Olano and Greer 1997).
+/// distance in pixels, are positive there. A point p of the screen is a sum of the corners'
+/// homogeneous (x, y, w) with weights `l`, which have to be positive; and as those add up to 1 / W,
+/// there is a line where W is the near plane's. This stays right for corners behind the eye (Olano and Greer 1997).
 struct Region([V3; 4]);
 
 impl Region {

@@ -23,7 +23,7 @@ pub const BANDS_BYTES_MAX: usize = 256 << 20;
 /// Memory of a band whose height is a multiple of its margin, bytes.
 const TALL_BYTES: usize = 8 << 20;
 
-/// Memory kept from picture to picture, bytes: of a band's scratch, and of vertices.
+/// Memory kept from picture to picture, bytes: of all bands' scratch, and of vertices.
 pub const KEPT_BYTES_MAX: usize = 8 << 20;
 
 /// Bytes of a sample: depth and id.
@@ -34,14 +34,14 @@ const SAMPLE_BYTES: usize = 8;
 pub struct Banding {
     /// Rows in each band but the last.
     pub rows: u32,
-    /// Rows beyond a band that its lines material at.
+    /// Rows beyond a band that its lines look at.
     pub margin: u32,
     /// Bands that are drawn at once.
     pub at_once: usize,
 }
 
 impl Banding {
-    /// For so many threads. Bands fit the cache, unless their lines material far beyond them: then
+    /// The division for a number of threads. Bands fit the cache, unless their lines look far beyond them: then
     /// a band has as many rows as lets the threads do the most in [`BANDS_BYTES_MAX`], because
     /// small bands draw most samples for their neighbours, and of large ones there are few at once.
     pub fn new(plan: &DrawPlan<'_>, threads: usize) -> Self {
@@ -180,7 +180,12 @@ impl ScratchPool {
 
     /// Frees buffers that are too large to keep for another picture.
     pub fn trim(&self) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).retain(|scratch| scratch.bytes() <= KEPT_BYTES_MAX);
+        let mut kept = 0;
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).retain(|scratch| {
+            let fits = kept + scratch.bytes() <= KEPT_BYTES_MAX;
+            kept += if fits { scratch.bytes() } else { 0 };
+            fits
+        });
     }
 }
 
@@ -243,7 +248,7 @@ mod tests {
         }
     }
 
-    /// All kinds of plans whose lines material far beyond a band.
+    /// All kinds of plans whose lines look far beyond a band.
     fn with_wide_lines(each: &mut impl FnMut(&DrawPlan<'_>)) {
         for size_px in [[4096, 4096], [4096, 100], [100, 4096], [1, 1], [640, 480]] {
             for (samples, width_px) in [1, 4, 8, 16].into_iter().flat_map(|s| [1.0, 9.0, 110.0].map(|w| (s, w))) {

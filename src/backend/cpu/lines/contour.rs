@@ -21,7 +21,7 @@ pub fn is_drawn(context: &RasterContext<'_>, lines: &LinePass, edge: &Edge) -> b
 
 impl RasterContext<'_> {
     /// The face whose light falls on an edge's line where the pixel sees no surface, plus 1: of
-    /// those that material at the viewer the one with the highest id, so that the order of edges
+    /// those that look at the viewer the one with the highest id, so that the order of edges
     /// does not matter; of any, where none does.
     pub fn lighting_face(&self, lines: &LinePass, edge: &Edge) -> u32 {
         let towards = |face: u32| if self.faces_away(lines, face) { 0 } else { face + 1 };

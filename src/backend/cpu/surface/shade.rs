@@ -33,7 +33,7 @@ fn shade_sampled<const S: usize>(context: &RasterContext<'_>, band: &SampleBand,
 pub struct Shader<'a> {
     /// Input of the stage.
     context: &'a RasterContext<'a>,
-    /// Finds out what they material like.
+    /// Shades their points.
     points: PointShader<'a>,
 }
 

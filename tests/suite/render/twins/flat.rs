@@ -168,7 +168,8 @@ fn grid(n: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     (positions, triangles)
 }
 
-/// Each look in one of the lights, in both in a long run. Each has 4 samples per pixel, and another number.
+/// Each look in one of the lights, in both in a long run, with 4 samples per pixel and with another
+/// number.
 fn each_look() -> impl Iterator<Item = (&'static [(&'static str, &'static str)], &'static str, &'static str)> {
     LOOKS.iter().enumerate().flat_map(|(i, look)| {
         let lights = LIGHTS.iter().enumerate().filter(move |(k, _)| truth::is_long() || i % 2 == *k);
