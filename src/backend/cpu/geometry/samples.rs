@@ -130,3 +130,36 @@ impl SampleBand {
         (&self.ids[samples.clone()], &self.depth[samples])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::sample_offsets;
+
+    /// Every interval in two pixels, against the places of the samples themselves.
+    #[test]
+    fn pixels_are_those_with_a_sample_in_the_interval() {
+        let mut intervals = 0;
+        for samples in [1, 4, 8, 16] {
+            let grid = SampleGrid::new(samples);
+            for axis in [0, 1] {
+                let place = |pixel: i32, s: usize| 256 * pixel + sample_offsets(samples)[s][axis];
+                for low in 0..512 {
+                    for high in low..512 {
+                        let is_in =
+                            |pixel: &i32| (0..samples as usize).any(|s| (low..=high).contains(&place(*pixel, s)));
+                        let [first, last] = grid.pixels([low, high], [-10, 10]);
+                        let found: Vec<i32> = (first..=last).collect();
+                        assert_eq!(
+                            found,
+                            (0..2).filter(is_in).collect::<Vec<_>>(),
+                            "{samples} samples, {low} to {high}"
+                        );
+                        intervals += 1;
+                    }
+                }
+            }
+        }
+        assert_eq!(intervals, 4 * 2 * 512 * 513 / 2);
+    }
+}

@@ -1,5 +1,5 @@
-//! Stage visibility: the farthest depth in each tile of a band. A triangle that is farther nowhere
-//! shows there.
+//! Stage visibility: the farthest depth in each tile of a band. A triangle behind that depth is hidden
+//! in the whole tile.
 
 use super::samples::SampleBand;
 use crate::backend::cpu::isa::LANES;
@@ -17,7 +17,7 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// Of a band's samples as they are now.
+    /// The tiles of a band, from the depths that it has now.
     #[inline(always)]
     pub fn new(band: &SampleBand) -> Self {
         let [columns, rows] = band.range();
@@ -69,4 +69,31 @@ fn smallest(depths: &[f32]) -> f32 {
         }
     }
     lanes.iter().chain(rest).fold(f32::INFINITY, |least, &v| if v < least { v } else { least })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_hide_what_lies_behind_all_of_their_samples() {
+        let mut hidden = 0;
+        for samples in [1, 4, 8, 16] {
+            let mut band = SampleBand::new([20, 9], 3, 16, samples);
+            band.first_row = -3;
+            band.depth.fill(0.5);
+            let full = Tiles::new(&band);
+            assert!(full.hide([-3, 3], [-3, 11], 0.4), "{samples} samples");
+            assert!(!full.hide([-3, 3], [-3, 11], 0.5), "equal depths may show");
+            // The second tile of the first row has a sample in which nothing lies.
+            let empty = band.index(6, 4, samples - 1);
+            band.depth[empty] = 0.0;
+            let tiles = Tiles::new(&band);
+            let hides = |columns, rows| tiles.hide(columns, rows, 0.4);
+            assert!(hides([-3, 4], [-3, 12]) && hides([5, 12], [5, 12]), "tiles beside it hide");
+            assert!(!hides([5, 5], [-3, -3]) && !hides([-3, 5], [4, 5]), "it does not");
+            hidden += 1;
+        }
+        assert_eq!(hidden, 4);
+    }
 }

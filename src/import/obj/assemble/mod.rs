@@ -6,6 +6,8 @@ mod vertices;
 
 pub use names::Names;
 
+use rapidhash::RapidHashSet;
+
 use super::parse::Part;
 use super::skipped::Skipped;
 use crate::import::MeshError;
@@ -13,12 +15,15 @@ use crate::import::context::Context;
 use crate::import::parallel::concat;
 use crate::import::raw::RawMesh;
 
+/// Bytes of a library beside its name: in lists and sets that double as they grow.
+const LIBRARY_BYTES: u64 = 160;
+
 /// Names and counts of a text, beside its mesh.
 #[derive(Debug, Default)]
 pub struct Summary {
     /// `usemtl` names, in order of first use. A triangle's material is 1 more, or 0 without one.
     pub materials: Vec<Vec<u8>>,
-    /// Arguments of `mtllib` lines.
+    /// Arguments of `mtllib` lines, each once.
     pub libraries: Vec<Vec<u8>>,
     /// Counts of skipped lines.
     pub skipped: Skipped,
@@ -38,10 +43,8 @@ pub fn assemble(mut parts: Vec<Part<'_>>, raw: &mut RawMesh, cx: &mut Context<'_
     check_indices(&parts)?;
     cx.check_triangles(parts.iter().map(|part| part.triangles).sum())?;
     let mut summary = Summary::default();
-    for part in &mut parts {
-        summary.libraries.append(&mut part.libraries);
-        summary.skipped.add(&part.skipped);
-    }
+    parts.iter().for_each(|part| summary.skipped.add(&part.skipped));
+    summary.libraries = libraries_of(&parts, cx)?;
     let names = Names::of(&parts, cx)?;
     let lists = Lists {
         positions: concat(parts.iter_mut().map(|part| std::mem::take(&mut part.positions)).collect()),
@@ -55,6 +58,23 @@ pub fn assemble(mut parts: Vec<Part<'_>>, raw: &mut RawMesh, cx: &mut Context<'_
     faces::fill(&parts, &names, raw, cx)?;
     summary.materials = names.all;
     Ok(summary)
+}
+
+/// The distinct arguments of `mtllib` lines, in the text's order.
+fn libraries_of(parts: &[Part<'_>], cx: &mut Context<'_>) -> Result<Vec<Vec<u8>>, MeshError> {
+    let mut seen = RapidHashSet::default();
+    let mut libraries = Vec::new();
+    for part in parts {
+        cx.deadline.check()?;
+        for line in part.libraries.iter().map(AsRef::as_ref) {
+            if !seen.contains(line) {
+                cx.budget.spend("the OBJ file's libraries", 1, LIBRARY_BYTES + 2 * line.len() as u64)?;
+                seen.insert(line);
+                libraries.push(line.to_vec());
+            }
+        }
+    }
+    Ok(libraries)
 }
 
 /// Refuses indices beyond what the text has. Without any texture coordinates or normals, indices

@@ -49,7 +49,7 @@ pub struct Part<'t> {
     /// The name of each `usemtl` line.
     pub materials: Vec<Cow<'t, [u8]>>,
     /// Arguments of `mtllib` lines.
-    pub libraries: Vec<Vec<u8>>,
+    pub libraries: Vec<Cow<'t, [u8]>>,
     /// Triangles that faces, segments and points become, at most.
     pub triangles: u64,
     /// Counts of skipped lines.

@@ -24,13 +24,8 @@ impl<'t> Parser<'t, '_> {
             Cow::Owned(line) => Cow::Owned(name(&line).to_vec()),
         };
         match keyword(&line) {
-            Some(b"usemtl") => {
-                let name: Cow<'t, [u8]> = name(line);
-                if !name.is_empty() {
-                    self.part.materials.push(name);
-                }
-            }
-            Some(b"mtllib") => self.part.libraries.push(name(line).into_owned()),
+            Some(b"usemtl") => self.part.materials.extend(Some(name(line)).filter(|name| !name.is_empty())),
+            Some(b"mtllib") => self.part.libraries.extend(Some(name(line)).filter(|name| !name.is_empty())),
             _ => {}
         }
         Ok(self.bytes.len() - lines.rest_bytes())

@@ -1,11 +1,12 @@
 //! Meshes made to cost a lot: refused by a limit, in time, before anything is allocated.
 
-use crate::support::files::mesh::{Gltf, Solid, read, read_limited};
-use crate::support::files::ply::Encoding;
-use crate::support::work::within_bytes;
 use meshsnap::import::{Bundle, MeshFault, import};
 use meshsnap::limits::{Budget, Deadline, Limits};
 use serde_json::{Value, json};
+
+use crate::support::files::mesh::{Gltf, Solid, read, read_limited};
+use crate::support::files::ply::Encoding;
+use crate::support::work::within_bytes;
 
 #[test]
 fn counts_are_paid_before_they_are_believed() {
@@ -117,6 +118,20 @@ fn obj_text_that_explodes_is_refused() {
     let mesh = read_limited(changes.as_bytes(), None, &Limits { memory_bytes: 64 << 20, ..Limits::default() }).unwrap();
     assert_eq!(mesh.triangles.len(), 200_000);
     assert_eq!(mesh.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["a", "b"]);
+}
+
+#[test]
+fn names_of_libraries_take_the_memory_that_was_paid_for() {
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let limits = Limits { memory_bytes: 64 << 20, ..Limits::default() };
+    let distinct: String = (0..400_000).map(|i| format!("mtllib {i}\n")).collect();
+    let cases = [(distinct, false), ("mtllib a\n".repeat(1_000_000), true), ("mtllib\n".repeat(2_000_000), true)];
+    for (lines, is_read) in cases {
+        let bundle = Bundle::of_one(format!("{lines}{triangle}").into_bytes());
+        let mut budget = Budget::new(&limits);
+        let read = || import(&bundle, None, &limits, &mut budget, &Deadline::default()).is_ok();
+        assert_eq!(within_bytes(limits.memory_bytes, "an OBJ file of libraries", read), is_read);
+    }
 }
 
 #[test]
