@@ -8,14 +8,11 @@ mod affine;
 pub mod bundle;
 pub(crate) mod context;
 mod corners;
-mod decimal;
 mod error;
 mod fbx;
 mod formats;
 mod gltf;
 mod metadata;
-#[cfg(test)]
-mod noise;
 mod normalise;
 mod obj;
 mod off;

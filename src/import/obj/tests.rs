@@ -4,7 +4,7 @@ use super::{assemble, read_parts};
 use crate::import::Format;
 use crate::import::bundle::{Bundle, entry};
 use crate::import::context::Context;
-use crate::import::noise::Noise;
+use crate::import::obj::test_random::Random;
 use crate::import::raw::RawMesh;
 use crate::limits::{Budget, Deadline, Limits};
 
@@ -24,7 +24,7 @@ fn read(text: &str, part_bytes: usize, is_plain: bool) -> String {
     }
 }
 
-impl Noise {
+impl Random {
     fn number(&mut self) -> String {
         let whole = self.below(2_000_000) as f64 - 1e6;
         match self.below(12) {
@@ -51,7 +51,7 @@ impl Noise {
     }
 
     fn line(&mut self, counts: &mut [u64; 3]) -> String {
-        let numbers = |noise: &mut Self, n: u64| (0..n).map(|_| noise.number()).collect::<Vec<_>>().join(" ");
+        let numbers = |random: &mut Self, n: u64| (0..n).map(|_| random.number()).collect::<Vec<_>>().join(" ");
         match self.below(40) {
             0 => format!("usemtl {}", ["a", "b", "c d # e"][self.below(3) as usize]),
             1 => "# a comment \\".into(),
@@ -103,14 +103,14 @@ impl Noise {
 
 #[test]
 fn parts_threads_and_both_ways_agree() {
-    let mut noise = Noise(0x0123_4567_89AB_CDEF);
+    let mut random = Random(0x0123_4567_89AB_CDEF);
     let (mut meshes, mut errors) = (0, 0);
     for round in 0..60 {
-        let mut text = noise.text(300);
+        let mut text = random.text(300);
         if round % 3 == 0 {
             // Something is broken somewhere.
-            let at = noise.below(text.len() as u64) as usize;
-            text.insert_str(at, ["\nf 1 2 999999\n", "\nv 1 2\n", "\nf 1 2 -9999\n", "x"][noise.below(4) as usize]);
+            let at = random.below(text.len() as u64) as usize;
+            text.insert_str(at, ["\nf 1 2 999999\n", "\nv 1 2\n", "\nf 1 2 -9999\n", "x"][random.below(4) as usize]);
         }
         let expected = read(&text, usize::MAX, false);
         if expected.starts_with("MeshError") {

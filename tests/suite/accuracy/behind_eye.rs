@@ -37,7 +37,7 @@ fn triangles_with_corners_behind_the_eye_are_where_they_should_be() {
     let (mut worst, mut seen, mut wrong) = (0.0_f64, 0, 0);
     let (mut drawn, count) = (0, cases(10_000, 100_000));
     for mut renderer in renderers() {
-        let count = if renderer.kind().name() == "cpu" { count } else { count / 10 };
+        let count = if renderer.kind().name() == "cpu" { count } else { count / 30 };
         for i in 0..count {
             let near = [0.001, 0.05, 0.3][i % 3];
             let behind = 1 + i / 3 % 2;

@@ -38,7 +38,7 @@ fn powers_of_two_give_the_same_mesh() {
 #[test]
 fn powers_of_two_give_the_same_bytes() {
     let exponents: Vec<i32> =
-        cases(vec![-100, -1, 100], (-100..=100).filter(|k: &i32| k % 10 == 0 || k.abs() < 4).collect());
+        cases(vec![-100, 100], (-100..=100).filter(|k: &i32| k % 10 == 0 || k.abs() < 4).collect());
     let mut compared = 0;
     let mut renderers = renderers();
     for (name, obj) in MESHES {

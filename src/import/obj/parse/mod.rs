@@ -2,6 +2,7 @@
 //! goes to [`statement`], line by line.
 
 mod corners;
+mod decimal;
 mod numbers;
 mod statement;
 

@@ -1,7 +1,7 @@
 //! Lines of numbers in their plainest form: decimals with white space between them.
 
 use super::Parser;
-use crate::import::decimal;
+use super::decimal;
 
 impl Parser<'_, '_> {
     /// A position without a weight, with a colour if the file has colours.

@@ -1,9 +1,9 @@
 //! Any line of an OBJ text, word by word. Harmless content is dropped or completed: bytes that are
 //! not UTF-8, empty faces, partial colours.
 
+use super::decimal;
 use super::numbers::{opaque, upright};
 use super::{CORNERS_PER_POLL, Fault, Parser};
-use crate::import::decimal;
 use crate::import::obj::face::{Counts, MISSING, parse_corner, show};
 use crate::import::obj::lines::{Lines, uncommented};
 use crate::import::text::{before_comment, is_c_nan};

@@ -214,7 +214,7 @@ fn only_where_the_mesh_goes_on_there_are_samples_beyond_the_picture() {
 fn the_longest_sides_have_borders_too() {
     let mesh = scenes::mesh(&shapes::sheet(9));
     let mut cases = 0;
-    for (size, samples, px) in [("4096x60", "4", "100"), ("60x4096", "4", "100"), ("4096x140", "16", "9")] {
+    for (size, samples, px) in [("4096x60", "4", "100"), ("60x4096", "4", "100"), ("4096x60", "16", "9")] {
         let keys = [
             ("style", "wire"),
             ("size", size),

@@ -89,7 +89,7 @@ fn exponent_at(bytes: &[u8], begin: usize) -> Option<(i64, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::noise::Noise;
+    use crate::import::obj::test_random::Random;
 
     /// Compares a text with std, and counts it.
     fn check(text: &str, count: &mut u64) {
@@ -126,28 +126,28 @@ mod tests {
 
     #[test]
     fn random_texts_are_as_std_has_them() {
-        let (mut noise, mut count) = (Noise(0x9E37_79B9_7F4A_7C15), 0);
+        let (mut random, mut count) = (Random(0x9E37_79B9_7F4A_7C15), 0);
         for _ in 0..200_000 {
             // Digits, with a point and an exponent somewhere.
-            let digits = noise.below(22) + 1;
-            let point = noise.below(digits + 4);
-            let mut text = ["", "-", "+"][noise.below(3) as usize].to_owned();
+            let digits = random.below(22) + 1;
+            let point = random.below(digits + 4);
+            let mut text = ["", "-", "+"][random.below(3) as usize].to_owned();
             for i in 0..digits {
                 if i == point {
                     text.push('.');
                 }
-                text.push(char::from(b'0' + noise.below(10) as u8));
+                text.push(char::from(b'0' + random.below(10) as u8));
             }
-            if noise.below(3) == 0 {
-                text += &format!("e{}", noise.below(60) as i64 - 30);
+            if random.below(3) == 0 {
+                text += &format!("e{}", random.below(60) as i64 - 30);
             }
             check(&text, &mut count);
             // Every f64, in three forms.
-            let value = f64::from_bits(noise.below(1 << 53) << 11 ^ noise.below(1 << 40));
+            let value = f64::from_bits(random.below(1 << 53) << 11 ^ random.below(1 << 40));
             check(&format!("{value}"), &mut count);
             check(&format!("{value:e}"), &mut count);
-            let near = (noise.below(2_000_000_000) as f64 - 1e9) / 1e6;
-            check(&format!("{near:.*}", noise.below(10) as usize), &mut count);
+            let near = (random.below(2_000_000_000) as f64 - 1e9) / 1e6;
+            check(&format!("{near:.*}", random.below(10) as usize), &mut count);
         }
         assert_eq!(count, 800_000);
     }
