@@ -7,6 +7,7 @@ use super::bin::Bin;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::clip_triangle;
 use crate::backend::cpu::geometry::samples::SampleGrid;
+use crate::backend::cpu::geometry::setups::Corners;
 use crate::backend::cpu::geometry::transform::{OUTSIDE, ScreenVertex, homogeneous};
 use crate::backend::cpu::geometry::visibility::{area, passes_culling};
 use crate::backend::cpu::isa::{LANES, dispatch};
@@ -60,29 +61,44 @@ struct Spanned {
     bands: [u16; 2],
 }
 
+impl Spanned {
+    #[inline(always)]
+    fn span(self) -> Range<usize> {
+        self.bands[0] as usize..self.bands[1] as usize + 1
+    }
+
+    #[inline(always)]
+    fn is_tall(self) -> bool {
+        self.span().len() > TALL_BANDS
+    }
+}
+
 impl BandLists {
     fn new(spanned: &[Spanned], bands: usize) -> Self {
-        let span = |s: &Spanned| s.bands[0] as usize..s.bands[1] as usize + 1;
-        let is_tall = |s: &&Spanned| span(s).len() > TALL_BANDS;
+        let mut lists = Self { starts: vec![0; bands + 2], all: Vec::with_capacity(spanned.len()), ..Self::default() };
         // Counts, shifted by one band, become starts, which the second pass moves to the ends.
-        let mut starts = vec![0_u32; bands + 2];
-        for s in spanned.iter().filter(|s| !is_tall(s)) {
-            for band in span(s) {
-                starts[band + 2] += 1;
+        for s in spanned {
+            lists.all.push(s.id);
+            if s.is_tall() {
+                lists.tall.push(*s);
+                continue;
+            }
+            for band in s.span() {
+                lists.starts[band + 2] += 1;
             }
         }
-        for band in 2..starts.len() {
-            starts[band] += starts[band - 1];
+        for band in 2..lists.starts.len() {
+            lists.starts[band] += lists.starts[band - 1];
         }
-        let mut items = vec![0; starts[bands + 1] as usize];
-        for s in spanned.iter().filter(|s| !is_tall(s)) {
-            for band in span(s) {
-                items[starts[band + 1] as usize] = s.id;
-                starts[band + 1] += 1;
+        lists.items.resize(lists.starts[bands + 1] as usize, 0);
+        for s in spanned.iter().filter(|s| !s.is_tall()) {
+            for band in s.span() {
+                let place = &mut lists.starts[band + 1];
+                lists.items[*place as usize] = s.id;
+                *place += 1;
             }
         }
-        let tall = spanned.iter().filter(is_tall).copied().collect();
-        Self { starts, items, tall, all: spanned.iter().map(|s| s.id).collect() }
+        lists
     }
 
     /// Ids of the band's triangles: of those in few bands, and of others.
@@ -290,17 +306,16 @@ struct Seen {
 impl Group {
     #[inline(always)]
     fn load(context: &RasterContext<'_>, first: usize, end: usize) -> Self {
-        let (mut x, mut y) = ([[0; LANES]; 3], [[0; LANES]; 3]);
         let len = (end - first).min(LANES);
+        let mut ids = [first as u32; LANES];
         for l in 0..len {
-            let corners = context.screen_triangle((first + l) as u32);
-            for k in 0..3 {
-                (x[k][l], y[k][l]) = (corners[k].x, corners[k].y);
-            }
+            ids[l] += l as u32;
         }
+        let Corners { x, y, .. } = Corners::new(context, &ids);
         let (mut area, mut is_outside) = ([0; LANES], [false; LANES]);
         for l in 0..LANES {
-            let d = |a: i32, b: i32| i64::from(a) - i64::from(b);
+            // Only what lies outside wraps, and its area is not looked at.
+            let d = |a: i32, b: i32| i64::from(a.wrapping_sub(b));
             area[l] = d(x[1][l], x[0][l]) * d(y[2][l], y[0][l]) - d(x[2][l], x[0][l]) * d(y[1][l], y[0][l]);
             is_outside[l] = (x[0][l] == OUTSIDE) | (x[1][l] == OUTSIDE) | (x[2][l] == OUTSIDE);
         }

@@ -129,7 +129,7 @@ fn boxes<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band: 
         // SAFETY: the processor has AVX2, as `isa` says.
         return unsafe { super::batch_avx2::boxes::<S>(context, ids, band) };
     }
-    Boxes::new::<S>(&Corners::load(context, ids), band)
+    Boxes::new::<S>(&Corners::new(context, ids), band)
 }
 
 #[inline(always)]
@@ -140,7 +140,7 @@ fn set_up<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band:
         // SAFETY: the processor has AVX2, as `isa` says.
         return unsafe { super::batch_avx2::set_up::<S>(context, ids, band, setups) };
     }
-    *setups = Setups::new::<S>(&Corners::load(context, ids), band);
+    *setups = Setups::new::<S>(&Corners::new(context, ids), band);
 }
 
 /// Draws a triangle block by block. Returns the number of samples tested.

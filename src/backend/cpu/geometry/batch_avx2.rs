@@ -8,6 +8,7 @@ use std::arch::asm;
 use std::arch::x86_64::*;
 
 use super::samples::{SampleBand, SampleGrid};
+use super::setups;
 use super::setups::{Boxes, EXTENT_MAX, SHORT_MAX, SIZES, Setups, class, lane_offsets};
 use super::transform::ScreenVertex;
 use super::visibility::Parts;
@@ -39,6 +40,17 @@ fn load_corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Corners {
         z[k] = _mm256_castsi256_ps(_mm256_unpacklo_epi64(ab, cd));
     }
     Corners { x, y, z }
+}
+
+/// As `Corners::load` of `setups`.
+#[target_feature(enable = "avx2")]
+pub fn corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> setups::Corners {
+    let Corners { x, y, z } = load_corners(context, ids);
+    setups::Corners {
+        x: [to_ints(x[0]), to_ints(x[1]), to_ints(x[2])],
+        y: [to_ints(y[0]), to_ints(y[1]), to_ints(y[2])],
+        z: [to_floats(z[0]), to_floats(z[1]), to_floats(z[2])],
+    }
 }
 
 /// As `Boxes::new`.
