@@ -24,13 +24,14 @@ pub fn means(colors: &[[f32; 4]], ids: &[[u32; SAMPLES]; LANES], out: &mut [[f32
         let weights = weights(ids);
         let mut places = [[0_u32; SAMPLES]; PIXELS];
         // SAFETY: as above.
-        unsafe { _mm256_storeu_si256(places.as_mut_ptr().cast(), _mm256_min_epu32(ids, _mm256_set1_epi32(last as i32))) };
+        unsafe {
+            _mm256_storeu_si256(places.as_mut_ptr().cast(), _mm256_min_epu32(ids, _mm256_set1_epi32(last as i32)))
+        };
         // SAFETY: no place is beyond `last`, which is an index of `colors`. A colour has the size of
         // a vector.
         let color = |place: u32| unsafe { _mm_loadu_ps(colors.as_ptr().add(place as usize).cast()) };
-        let part = |s: usize, weight: __m256| {
-            _mm256_mul_ps(weight, _mm256_set_m128(color(places[1][s]), color(places[0][s])))
-        };
+        let part =
+            |s: usize, weight: __m256| _mm256_mul_ps(weight, _mm256_set_m128(color(places[1][s]), color(places[0][s])));
         let sum = _mm256_add_ps(_mm256_setzero_ps(), part(0, _mm256_permute_ps::<0x00>(weights)));
         let sum = _mm256_add_ps(sum, part(1, _mm256_permute_ps::<0x55>(weights)));
         let sum = _mm256_add_ps(sum, part(2, _mm256_permute_ps::<0xAA>(weights)));
