@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::bin::Bin;
 use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::geometry::batch::corners;
 use crate::backend::cpu::geometry::clip::clip_triangle;
 use crate::backend::cpu::geometry::samples::SampleGrid;
 use crate::backend::cpu::geometry::setups::Corners;
@@ -311,7 +312,7 @@ impl Group {
         for l in 0..len {
             ids[l] += l as u32;
         }
-        let Corners { x, y, .. } = Corners::new(context, &ids);
+        let Corners { x, y, .. } = corners(context, &ids);
         let (mut area, mut is_outside) = ([0; LANES], [false; LANES]);
         for l in 0..LANES {
             // Only what lies outside wraps, and its area is not looked at.

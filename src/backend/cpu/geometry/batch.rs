@@ -79,7 +79,10 @@ impl Batch {
     /// blocks.
     #[inline(always)]
     pub fn draw<const S: usize>(&mut self, context: &RasterContext<'_>, band: &mut SampleBand) -> u64 {
-        let len = std::mem::take(&mut self.len);
+        let len = std::mem::take(&mut self.len).min(ROOM);
+        // Lanes without a triangle repeat the last one, which needs no clipping either.
+        let last = self.ids[len.saturating_sub(1)];
+        self.ids[len..len.next_multiple_of(LANES)].fill(last);
         let (groups, _) = self.ids.as_chunks::<LANES>();
         for (ids, setups) in groups.iter().zip(&mut self.setups).take(len.div_ceil(LANES)) {
             set_up::<S>(context, ids, band, setups);
@@ -121,6 +124,18 @@ impl Batch {
     }
 }
 
+/// Corners of eight triangles by id.
+#[inline(always)]
+#[allow(unsafe_code)]
+pub fn corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Corners {
+    #[cfg(target_arch = "x86_64")]
+    if context.isa.has_avx2() {
+        // SAFETY: the processor has AVX2, as `isa` says.
+        return unsafe { super::batch_avx2::corners(context, ids) };
+    }
+    Corners::load(context, ids)
+}
+
 #[inline(always)]
 #[allow(unsafe_code)]
 fn boxes<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band: &SampleBand) -> Boxes {
@@ -129,7 +144,7 @@ fn boxes<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band: 
         // SAFETY: the processor has AVX2, as `isa` says.
         return unsafe { super::batch_avx2::boxes::<S>(context, ids, band) };
     }
-    Boxes::new::<S>(&Corners::new(context, ids), band)
+    Boxes::new::<S>(&Corners::load(context, ids), band)
 }
 
 #[inline(always)]
@@ -140,7 +155,7 @@ fn set_up<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band:
         // SAFETY: the processor has AVX2, as `isa` says.
         return unsafe { super::batch_avx2::set_up::<S>(context, ids, band, setups) };
     }
-    *setups = Setups::new::<S>(&Corners::new(context, ids), band);
+    *setups = Setups::new::<S>(&Corners::load(context, ids), band);
 }
 
 /// Draws a triangle block by block. Returns the number of samples tested.

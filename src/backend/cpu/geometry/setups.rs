@@ -50,18 +50,7 @@ pub struct Setups {
 impl Corners {
     /// Those of triangles by id.
     #[inline(always)]
-    #[allow(unsafe_code)]
-    pub fn new(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if context.isa.has_avx2() {
-            // SAFETY: the processor has AVX2, as `isa` says.
-            return unsafe { super::batch_avx2::corners(context, ids) };
-        }
-        Self::load(context, ids)
-    }
-
-    #[inline(always)]
-    fn load(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Self {
+    pub fn load(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Self {
         let (mut x, mut y, mut z) = ([[0; LANES]; 3], [[0; LANES]; 3], [[0.0; LANES]; 3]);
         for l in 0..LANES {
             let corners = context.screen_triangle(ids[l]);
