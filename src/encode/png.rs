@@ -1,14 +1,13 @@
 //! PNG in two ways: quickly for a picture that one client waits for, and small for one that is
 //! stored.
 //!
-//! Quickly means one filter for the whole picture, Paeth, and Huffman codes that are not fitted to
-//! it. What Paeth leaves of a rendering is mostly runs of zeros, so trying more filters pays little.
-//! A row that equals the one above it, as in background and flat faces, is written as zeros without
-//! computing anything.
+//! Quickly means one filter for the whole picture, Paeth, and a compressor for what it leaves of a
+//! rendering ([`deflate`](super::deflate)): mostly runs of zeros, so trying more filters pays little. A row that
+//! equals the one above it, as in background and flat faces, is zeros without computing anything.
 
-use fdeflate::Compressor;
 use png::{BitDepth, ColorType, DeflateCompression, Encoder, Filter, chunk};
 
+use super::deflate::{Compressor, Histogram};
 use super::{EncodeError, drop_alpha};
 use crate::image::Image;
 use crate::limits::Deadline;
@@ -18,6 +17,9 @@ const SMALL_EFFORT_MIN: u32 = 4;
 
 /// Bytes that are compared with the row above at a time: 8 pixels.
 const BLOCK: usize = 32;
+
+/// Rows that are counted to fit the codes, about.
+const COUNTED_ROWS: usize = 32;
 
 /// Rows compressed between two polls of the deadline.
 const POLL_ROWS: usize = 64;
@@ -29,9 +31,9 @@ pub fn encode(image: &Image, effort: u32, deadline: &Deadline) -> Result<Vec<u8>
 
 fn quick(image: &Image) -> Result<Vec<u8>, EncodeError> {
     let (color, data) = if image.is_opaque() {
-        (ColorType::Rgb, compressed::<3>(image)?)
+        (ColorType::Rgb, compressed::<3>(image))
     } else {
-        (ColorType::Rgba, compressed::<4>(image)?)
+        (ColorType::Rgba, compressed::<4>(image))
     };
     let mut bytes = Vec::with_capacity(data.len() + 128);
     let mut writer = encoder(&mut bytes, image, color).write_header()?;
@@ -86,60 +88,70 @@ fn encoder<'a>(bytes: &'a mut Vec<u8>, image: &Image, color: ColorType) -> Encod
 }
 
 /// The filtered rows as a zlib stream. Of each pixel, `CHANNELS` bytes are stored.
-fn compressed<const CHANNELS: usize>(image: &Image) -> Result<Vec<u8>, EncodeError> {
+fn compressed<const CHANNELS: usize>(image: &Image) -> Vec<u8> {
     let row_len = image.width_px as usize * 4;
-    let mut compressor = Compressor::new(Vec::with_capacity(image.rgba.len() / 8))?;
+    let nothing = vec![0; row_len];
+    let above = std::iter::once(&nothing[..]).chain(image.rgba.chunks_exact(row_len));
+    let rows = || image.rgba.chunks_exact(row_len).zip(above.clone());
     let mut line = vec![0; 1 + image.width_px as usize * CHANNELS];
-    let mut above = &vec![0; row_len][..];
-    for row in image.rgba.chunks_exact(row_len) {
-        line.fill(0);
-        line[0] = Filter::Paeth as u8;
+    line[0] = Filter::Paeth as u8;
+    let mut histogram = Histogram::new();
+    let step = (image.height_px as usize / COUNTED_ROWS).max(1);
+    for (row, above) in rows().skip(step / 2).step_by(step) {
         filter_row::<CHANNELS>(row, above, &mut line[1..]);
-        compressor.write_data(&line)?;
-        above = row;
+        histogram.add(&line);
     }
-    Ok(compressor.finish()?)
+    let mut compressor = Compressor::new(&histogram, image.rgba.len() / 8);
+    for (row, above) in rows() {
+        filter_row::<CHANNELS>(row, above, &mut line[1..]);
+        compressor.write_row(&line);
+    }
+    compressor.finish()
 }
 
-/// Filters a row by Paeth: PNG specification, 9.2 and 9.4. `out` is zeros, which is what remains of
-/// a pixel that equals the one above if the left neighbours are equal too.
+/// Filters a row by Paeth: PNG specification, 9.2 and 9.4.
 fn filter_row<const CHANNELS: usize>(row: &[u8], above: &[u8], out: &mut [u8]) {
-    let (blocks, rest) = row.as_chunks::<BLOCK>();
-    let (blocks_above, rest_above) = above.as_chunks::<BLOCK>();
     // Left of the first pixel are zeros.
-    let mut left = [[0; 4]; 2];
-    for (i, (block, block_above)) in blocks.iter().zip(blocks_above).enumerate() {
-        if block != block_above || left[0] != left[1] {
-            let residuals = filter_block(block, block_above, left);
-            let out = &mut out[i * BLOCK / 4 * CHANNELS..][..BLOCK / 4 * CHANNELS];
-            if CHANNELS == 3 {
-                out.copy_from_slice(&without_alpha(&residuals))
-            } else {
-                out.copy_from_slice(&residuals)
-            }
+    let (first, first_above) = (first_block(row), first_block(above));
+    let blocks = row.len() / BLOCK;
+    for i in 0..blocks {
+        let at = i * BLOCK;
+
+        let (Some(block), Some(block_above)) = (row[at..].first_chunk(), above[at..].first_chunk()) else { break };
+        let (left, above_left) = match at.checked_sub(4) {
+            Some(at) => (row[at..].first_chunk().unwrap_or(&first), above[at..].first_chunk().unwrap_or(&first_above)),
+            None => (&first, &first_above),
+        };
+        let out = &mut out[i * BLOCK / 4 * CHANNELS..][..BLOCK / 4 * CHANNELS];
+        if block == block_above && left[..4] == above_left[..4] {
+            out.fill(0);
+            continue;
         }
-        left = [block, block_above].map(|block| block.as_chunks().0[BLOCK / 4 - 1]);
+        let residuals = filter_block(block, block_above, left, above_left);
+        if CHANNELS == 3 { out.copy_from_slice(&without_alpha(&residuals)) } else { out.copy_from_slice(&residuals) }
     }
-    let out = out[blocks.len() * BLOCK / 4 * CHANNELS..].as_chunks_mut::<CHANNELS>().0;
-    for ((pixel, above), out) in rest.as_chunks::<4>().0.iter().zip(rest_above.as_chunks::<4>().0).zip(out) {
+    let at = |row: &[u8], i: usize, k: usize| if i == 0 { 0 } else { row[4 * (i - 1) + k] };
+    for i in blocks * BLOCK / 4..row.len() / 4 {
         for k in 0..CHANNELS {
-            out[k] = pixel[k].wrapping_sub(predicted(left[0][k], above[k], left[1][k]));
+            let value = predicted(at(row, i, k), above[4 * i + k], at(above, i, k));
+            out[i * CHANNELS + k] = row[4 * i + k].wrapping_sub(value);
         }
-        left = [*pixel, *above];
     }
 }
 
-/// Filters the bytes of a block, given the pixels left of it and left above it.
+/// Filters the bytes of a block, given those left of it, above it, and left above it.
 #[inline]
-fn filter_block(block: &[u8; BLOCK], above: &[u8; BLOCK], left: [[u8; 4]; 2]) -> [u8; BLOCK] {
-    let shifted = |first: [u8; 4], block: &[u8; BLOCK]| {
-        let mut shifted = [0; BLOCK];
-        shifted[..4].copy_from_slice(&first);
-        shifted[4..].copy_from_slice(&block[..BLOCK - 4]);
-        shifted
-    };
-    let (left, above_left) = (shifted(left[0], block), shifted(left[1], above));
+fn filter_block(block: &[u8; BLOCK], above: &[u8; BLOCK], left: &[u8; BLOCK], above_left: &[u8; BLOCK]) -> [u8; BLOCK] {
     std::array::from_fn(|i| block[i].wrapping_sub(predicted(left[i], above[i], above_left[i])))
+}
+
+/// What lies left of a row's first block.
+fn first_block(row: &[u8]) -> [u8; BLOCK] {
+    let mut block = [0; BLOCK];
+    if let Some(start) = row.first_chunk::<{ BLOCK - 4 }>() {
+        block[4..].copy_from_slice(start);
+    }
+    block
 }
 
 /// The first three of each four bytes, in whole words: byte by byte takes twice as long as the
@@ -216,7 +228,7 @@ mod tests {
                 let mut rgba: Vec<u8> = (0..width_px * 4).map(|i| (i * 7 % 11) as u8).collect::<Vec<_>>().repeat(3);
                 rgba[(width_px * 4 + changed) as usize] ^= 5;
                 let image = Image { width_px, height_px: 3, rgba };
-                let stream = compressed::<4>(&image).unwrap();
+                let stream = compressed::<4>(&image);
                 assert_eq!(fdeflate::decompress_to_vec(&stream).unwrap(), lines(&image), "{width_px} {changed}");
             }
         }

@@ -30,6 +30,7 @@ use rayon::prelude::*;
 
 use self::bands::bins::Bins;
 use self::bands::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, ScratchPool};
+use self::isa::LANES;
 use self::resolve::SrgbEncoder;
 use self::surface::flat::FlatColors;
 use super::{BackendKind, DrawError, Renderer};
@@ -201,6 +202,20 @@ impl RasterContext<'_> {
             (None, Some(hull)) => hull.triangles[id - self.plan.triangles.len()],
             (None, None) => [0; 3],
         }
+    }
+
+    /// Vertex indices of eight triangles.
+    #[inline(always)]
+    fn indices_of(&self, ids: &[u32; LANES]) -> [[u32; 3]; LANES] {
+        let triangles: &[[u32; 3]] = &self.plan.triangles;
+        let mut indices = [[0; 3]; LANES];
+        for l in 0..LANES {
+            indices[l] = match triangles.get(ids[l] as usize) {
+                Some(triangle) => *triangle,
+                None => self.triangle(ids[l]),
+            };
+        }
+        indices
     }
 
     /// True if a triangle belongs to the outline mesh.

@@ -9,31 +9,29 @@ use crate::plan::DrawPlan;
 /// Cells of the table of bytes: so many that none holds two thresholds.
 const CELLS: usize = 4096;
 
-/// Linear light to sRGB bytes by the 255 thresholds: the cell that a value lies in leaves two bytes
-/// to choose from, and one comparison decides.
-pub struct SrgbEncoder {
-    cells: Box<[Cell; CELLS]>,
-}
+/// Indices that a cell may have before it is known to be below [`CELLS`].
+const INDICES: usize = 2 * CELLS;
 
-/// The values from `i / CELLS` to the next cell.
-#[derive(Clone, Copy, Default)]
-struct Cell {
-    /// The next threshold.
-    threshold: f32,
-    /// The byte below it.
-    byte: u32,
+/// Linear light to sRGB bytes by the 255 thresholds: the cell that a value lies in leaves two bytes
+/// to choose from, and one comparison decides. Both tables fit the first-level cache beside others.
+pub struct SrgbEncoder {
+    /// By cell, which is `v * CELLS` rounded to the nearest: the byte at its start.
+    bytes: Box<[u8; INDICES]>,
+    /// By byte, the value from which it is one more.
+    thresholds: [f32; 256],
 }
 
 impl SrgbEncoder {
-    /// Builds the table.
+    /// Builds the tables.
     pub fn new() -> Self {
-        let thresholds = srgb8_thresholds();
-        let mut cells = Box::new([Cell::default(); CELLS]);
-        for (i, cell) in cells.iter_mut().enumerate() {
-            let byte = thresholds.partition_point(|&t| t <= i as f32 / CELLS as f32);
-            *cell = Cell { threshold: thresholds.get(byte).copied().unwrap_or(f32::INFINITY), byte: byte as u32 };
+        let all = srgb8_thresholds();
+        let mut bytes = Box::new([u8::MAX; INDICES]);
+        for (i, byte) in bytes.iter_mut().enumerate().take(CELLS + 1) {
+            *byte = all.partition_point(|&t| t <= (i as f32 - 0.5) / CELLS as f32) as u8;
         }
-        Self { cells }
+        let mut thresholds = [f32::INFINITY; 256];
+        thresholds[..255].copy_from_slice(&all);
+        Self { bytes, thresholds }
     }
 
     /// The byte for a linear value; out of range is clamped, NaN is 0.
@@ -41,8 +39,10 @@ impl SrgbEncoder {
     pub fn encode(&self, v: f32) -> u8 {
         let v = if v > 0.0 { v } else { 0.0 };
         let v = if v < 1.0 { v } else { 1.0 };
-        let Cell { threshold, byte } = self.cells[((v * CELLS as f32) as i32 as usize).min(CELLS - 1)];
-        (byte + u32::from(threshold <= v)) as u8
+        // Adding 2^23 leaves the nearest integer in the low bits.
+        let cell = (v * CELLS as f32 + 8_388_608.0).to_bits() as usize % INDICES;
+        let byte = self.bytes[cell];
+        byte + u8::from(self.thresholds[usize::from(byte)] <= v)
     }
 }
 
@@ -77,6 +77,13 @@ fn resolve_kernel(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], 
             out.fill(last.pixel);
             continue;
         }
+        if are_opaque(group) {
+            for (&[r, g, b, _], out) in group.iter().zip(&mut *out) {
+                *out = [srgb.encode(r), srgb.encode(g), srgb.encode(b), 255];
+            }
+            last = Last { bits: group[LANES - 1].map(f32::to_bits), pixel: out[LANES - 1] };
+            continue;
+        }
         for (&c, out) in group.iter().zip(&mut *out) {
             *out = resolve_pixel(plan, srgb, c);
         }
@@ -85,6 +92,12 @@ fn resolve_kernel(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], 
     for (&c, out) in rest.iter().zip(rest_out) {
         *out = resolve_pixel(plan, srgb, c);
     }
+}
+
+/// True if no colour of a group lets any background through.
+#[inline(always)]
+fn are_opaque(group: &[[f32; 4]; LANES]) -> bool {
+    group.iter().fold(0, |difference, c| difference | (c[3].to_bits() ^ 1.0_f32.to_bits())) == 0
 }
 
 /// A colour, by its bits because a zero's sign matters, and its pixel.

@@ -178,14 +178,35 @@ fn triangles_sampled<const S: usize>(context: &RasterContext<'_>, bins: &Bins, b
             return;
         }
     }
+    if context.is_plain {
+        draw_plainly::<S>(context, bins, band, samples, &mut poll);
+        return;
+    }
     let lists_of: [fn(&TriangleBin) -> &BandLists; 2] = [|chunk| &chunk.fronts, |chunk| &chunk.backs];
     for (i, list_of) in lists_of.into_iter().enumerate() {
         let lists = || bins.triangles.iter().map(list_of);
-        if lists().all(|list| list.items_in(band).next().is_none()) {
+        if lists().all(|list| list.is_empty_in(band)) {
             continue;
         }
-        let tiles = (i == 1 && !context.is_plain).then(|| Tiles::new(samples));
+        let tiles = (i == 1).then(|| Tiles::new(samples));
         if draw_batches::<S>(context, (lists(), band), samples, tiles.as_ref(), &mut poll).is_break() {
+            return;
+        }
+    }
+}
+
+/// Draws a band's triangles one by one.
+fn draw_plainly<const S: usize>(
+    context: &RasterContext<'_>,
+    bins: &Bins,
+    band: usize,
+    samples: &mut SampleBand,
+    poll: &mut DeadlinePoll<'_>,
+) {
+    for id in bins.triangles.iter().flat_map(|chunk| chunk.whole_in(band)) {
+        let setup = Setup::new(&context.screen_triangle(id));
+        let tested = setup.map_or(0, |setup| visibility::draw::<S>(&setup, id, &mut Nearest(samples)));
+        if poll.is_expired(tested) {
             return;
         }
     }
@@ -200,18 +221,25 @@ fn draw_batches<'a, const S: usize>(
     tiles: Option<&Tiles>,
     poll: &mut DeadlinePoll<'_>,
 ) -> ControlFlow<()> {
-    let mut batch = Batch::default();
-    // At the end, one batch waits and another is being filled: each `None` draws one.
-    for triangle in lists.flat_map(|list| list.items_in(band)).map(Some).chain([None, None]) {
-        let is_due = triangle.is_none_or(|triangle| batch.push(triangle.id, triangle.vertices));
-        if is_due {
-            let tested = batch.draw::<S>(context, samples, tiles);
-            if poll.is_expired_after(LANES as u64, tested) {
-                return ControlFlow::Break(());
+    let mut batch = Batch::new();
+    let mut draw = |batch: &mut Batch, samples: &mut SampleBand| {
+        let triangles = batch.len() as u64;
+        let tested = batch.draw::<S>(context, samples);
+        if poll.is_expired_after(triangles, tested) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    for list in lists {
+        let (listed, tall) = list.items_in(band);
+        for ids in listed.chunks(LANES).chain(tall.as_slice().chunks(LANES)) {
+            match tiles {
+                Some(tiles) => batch.push_seen::<S>(context, samples, tiles, ids),
+                None => batch.push(ids),
+            }
+            if batch.is_full() {
+                draw(&mut batch, samples)?;
             }
         }
     }
-    ControlFlow::Continue(())
+    draw(&mut batch, samples)
 }
 
 #[inline(always)]

@@ -5,8 +5,10 @@ use std::ops::Range;
 
 use super::bin::Bin;
 use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::geometry::batch::corners;
 use crate::backend::cpu::geometry::clip::clip_triangle;
 use crate::backend::cpu::geometry::samples::SampleGrid;
+use crate::backend::cpu::geometry::setups::Corners;
 use crate::backend::cpu::geometry::transform::{OUTSIDE, ScreenVertex, homogeneous};
 use crate::backend::cpu::geometry::visibility::{area, passes_culling};
 use crate::backend::cpu::isa::{LANES, dispatch};
@@ -46,20 +48,11 @@ pub struct TriangleBin {
 pub struct BandLists {
     /// Index in `items` of each band's first item, then the end of the last band's.
     starts: Vec<u32>,
-    items: Vec<ListedTriangle>,
-    /// Triangles that touch many bands, with the first and last.
-    tall: Vec<(ListedTriangle, [u16; 2])>,
+    items: Vec<u32>,
+    /// Triangles that touch many bands.
+    tall: Vec<Spanned>,
     /// Every triangle's id once, in ascending order.
     pub all: Vec<u32>,
-}
-
-/// A triangle in a list, with what would else be looked up all over memory.
-#[derive(Clone, Copy, Default)]
-pub struct ListedTriangle {
-    /// Its id.
-    pub id: u32,
-    /// Indices of its vertices.
-    pub vertices: [u32; 3],
 }
 
 /// A triangle's id, and the first and last band that it touches.
@@ -69,39 +62,60 @@ struct Spanned {
     bands: [u16; 2],
 }
 
-impl BandLists {
-    fn new(spanned: &[Spanned], bands: usize, vertices_of: impl Fn(u32) -> [u32; 3]) -> Self {
-        let span = |s: &Spanned| s.bands[0] as usize..s.bands[1] as usize + 1;
-        let is_tall = |s: &&Spanned| span(s).len() > TALL_BANDS;
-        // Counts, shifted by one band, become starts, which the second pass moves to the ends.
-        let mut starts = vec![0_u32; bands + 2];
-        for s in spanned.iter().filter(|s| !is_tall(s)) {
-            for band in span(s) {
-                starts[band + 2] += 1;
-            }
-        }
-        for band in 2..starts.len() {
-            starts[band] += starts[band - 1];
-        }
-        let listed = |id: u32| ListedTriangle { id, vertices: vertices_of(id) };
-        let mut items = vec![ListedTriangle::default(); starts[bands + 1] as usize];
-        for s in spanned.iter().filter(|s| !is_tall(s)) {
-            let triangle = listed(s.id);
-            for band in span(s) {
-                items[starts[band + 1] as usize] = triangle;
-                starts[band + 1] += 1;
-            }
-        }
-        let tall = spanned.iter().filter(is_tall).map(|s| (listed(s.id), s.bands)).collect();
-        Self { starts, items, tall, all: spanned.iter().map(|s| s.id).collect() }
+impl Spanned {
+    #[inline(always)]
+    fn span(self) -> Range<usize> {
+        self.bands[0] as usize..self.bands[1] as usize + 1
     }
 
-    /// The band's triangles.
-    pub fn items_in(&self, band: usize) -> impl Iterator<Item = ListedTriangle> {
+    #[inline(always)]
+    fn is_tall(self) -> bool {
+        self.span().len() > TALL_BANDS
+    }
+}
+
+impl BandLists {
+    fn new(spanned: &[Spanned], bands: usize) -> Self {
+        let mut lists = Self { starts: vec![0; bands + 2], all: Vec::with_capacity(spanned.len()), ..Self::default() };
+        // Counts, shifted by one band, become starts, which the second pass moves to the ends.
+        for s in spanned {
+            lists.all.push(s.id);
+            if s.is_tall() {
+                lists.tall.push(*s);
+                continue;
+            }
+            for band in s.span() {
+                lists.starts[band + 2] += 1;
+            }
+        }
+        for band in 2..lists.starts.len() {
+            lists.starts[band] += lists.starts[band - 1];
+        }
+        lists.items.resize(lists.starts[bands + 1] as usize, 0);
+        for s in spanned.iter().filter(|s| !s.is_tall()) {
+            for band in s.span() {
+                let place = &mut lists.starts[band + 1];
+                lists.items[*place as usize] = s.id;
+                *place += 1;
+            }
+        }
+        lists
+    }
+
+    /// Ids of the band's triangles: of those in few bands, and of others.
+    pub fn items_in(&self, band: usize) -> (&[u32], Vec<u32>) {
+        let is_here = |s: &&Spanned| (s.bands[0] as usize..=s.bands[1] as usize).contains(&band);
+        (self.listed_in(band), self.tall.iter().filter(is_here).map(|s| s.id).collect())
+    }
+
+    /// True if the band has no triangle.
+    pub fn is_empty_in(&self, band: usize) -> bool {
+        self.tall.is_empty() && self.listed_in(band).is_empty()
+    }
+
+    fn listed_in(&self, band: usize) -> &[u32] {
         let at = |i: usize| self.starts.get(i).map_or(0, |&start| start as usize);
-        let is_here = move |[first, last]: [u16; 2]| (first as usize..=last as usize).contains(&band);
-        let tall = self.tall.iter().filter(move |(_, bands)| is_here(*bands)).map(|(triangle, _)| *triangle);
-        self.items[at(band)..at(band + 1)].iter().copied().chain(tall)
+        &self.items[at(band)..at(band + 1)]
     }
 }
 
@@ -124,8 +138,8 @@ impl TriangleBin {
         keep(context.isa, context, &bounds, pass, &mut kept);
         let mut bin = Self {
             ids: pass.ids.clone(),
-            fronts: BandLists::new(&kept.fronts[..kept.counts[0]], bands, |id| context.triangle(id)),
-            backs: BandLists::new(&kept.backs[..kept.counts[1]], bands, |id| context.triangle(id)),
+            fronts: BandLists::new(&kept.fronts[..kept.counts[0]], bands),
+            backs: BandLists::new(&kept.backs[..kept.counts[1]], bands),
             pieces: Vec::new(),
             piece_bands: Bin::new(bands, TALL_BANDS),
         };
@@ -163,7 +177,10 @@ impl TriangleBin {
 
     /// The band's triangles that need no clipping.
     pub fn whole_in(&self, band: usize) -> impl Iterator<Item = u32> {
-        self.fronts.items_in(band).chain(self.backs.items_in(band)).map(|triangle| triangle.id)
+        [&self.fronts, &self.backs].into_iter().flat_map(move |lists| {
+            let (listed, tall) = lists.items_in(band);
+            listed.iter().copied().chain(tall)
+        })
     }
 
     /// The band's clipped pieces with their ids.
@@ -290,17 +307,16 @@ struct Seen {
 impl Group {
     #[inline(always)]
     fn load(context: &RasterContext<'_>, first: usize, end: usize) -> Self {
-        let (mut x, mut y) = ([[0; LANES]; 3], [[0; LANES]; 3]);
         let len = (end - first).min(LANES);
+        let mut ids = [first as u32; LANES];
         for l in 0..len {
-            let corners = context.screen_triangle((first + l) as u32);
-            for k in 0..3 {
-                (x[k][l], y[k][l]) = (corners[k].x, corners[k].y);
-            }
+            ids[l] += l as u32;
         }
+        let Corners { x, y, .. } = corners(context, &ids);
         let (mut area, mut is_outside) = ([0; LANES], [false; LANES]);
         for l in 0..LANES {
-            let d = |a: i32, b: i32| i64::from(a) - i64::from(b);
+            // Only what lies outside wraps, and its area is not looked at.
+            let d = |a: i32, b: i32| i64::from(a.wrapping_sub(b));
             area[l] = d(x[1][l], x[0][l]) * d(y[2][l], y[0][l]) - d(x[2][l], x[0][l]) * d(y[1][l], y[0][l]);
             is_outside[l] = (x[0][l] == OUTSIDE) | (x[1][l] == OUTSIDE) | (x[2][l] == OUTSIDE);
         }
@@ -352,15 +368,17 @@ mod tests {
     #[test]
     fn each_band_lists_the_items_that_touch_it() {
         let spanned: Vec<Spanned> = (100..).zip(SPANS).map(|(id, bands)| Spanned { id, bands }).collect();
-        let lists = BandLists::new(&spanned, 20, |id| [id, 0, 1]);
+        let lists = BandLists::new(&spanned, 20);
         for band in 0..20 {
-            let mut found: Vec<u32> = lists.items_in(band as usize).map(|triangle| triangle.id).collect();
+            let (listed, tall) = lists.items_in(band as usize);
+            let mut found = [listed, &tall].concat();
+            assert!(found.is_empty() || !lists.is_empty_in(band as usize), "band {band}");
             found.sort_unstable();
             assert_eq!(found, items_of(band), "band {band}");
         }
         // Items that touch few bands are not visited in the others.
         assert_eq!(lists.tall.len(), 2);
-        assert_eq!(BandLists::default().items_in(3).count(), 0);
+        assert_eq!(BandLists::default().items_in(3), (&[][..], Vec::new()));
     }
 
     #[test]

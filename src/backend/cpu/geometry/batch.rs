@@ -1,115 +1,198 @@
-//! Stage visibility, eight triangles at a time: set-up in lanes, and a short way for small ones.
+//! Stage visibility, many triangles at a time: set-up in lanes, and a short way for small ones.
 //!
 //! Larger triangles are drawn in the blocks of [`visibility`](super::visibility).
 
 use super::nearest::{Nearest, update};
 use super::samples::SampleBand;
-use super::setups::{Corners, Setups, lane_offsets};
+use super::setups::{Boxes, Corners, Setups, class, lane_offsets};
 use super::tiles::Tiles;
 use super::visibility;
-use super::visibility::{Part, Setup};
+use super::visibility::{Parts, Setup};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::isa::{Isa, LANES};
 
-/// Draws triangles that need no clipping. Eight are collected while the eight before them wait with
-/// their corners loaded, so that the memory is read ahead of what needs it.
-#[derive(Default)]
+/// Triangles that are drawn together. Those of a size are drawn one after the other, because a
+/// processor that has just drawn so many rows and columns guesses right that it will do so again.
+const BATCH: usize = 128;
+
+/// Room for those, and for what is added at once.
+const ROOM: usize = BATCH + LANES;
+
+/// Collects triangles that need no clipping, and draws them.
 pub struct Batch {
-    /// Triangles of which only the indices are known.
-    ids: [u32; LANES],
-    vertices: [[u32; 3]; LANES],
+    ids: [u32; ROOM],
     len: usize,
-    waiting: Corners,
+    setups: [Setups; ROOM / LANES],
 }
 
 impl Batch {
-    /// Adds a triangle. True if the batch is full, and to be drawn now.
-    #[inline(always)]
-    pub fn push(&mut self, id: u32, vertices: [u32; 3]) -> bool {
-        self.ids[self.len % LANES] = id;
-        self.vertices[self.len % LANES] = vertices;
-        self.len += 1;
-        self.len == LANES
+    /// An empty one.
+    pub fn new() -> Self {
+        Self { ids: [0; ROOM], len: 0, setups: [Setups::EMPTY; ROOM / LANES] }
     }
 
-    /// Loads the new triangles' corners and draws those that wait, except where `tiles` hides them.
-    /// Returns the number of samples tested.
+    /// True if it is full, and to be drawn before more is added.
     #[inline(always)]
-    pub fn draw<const S: usize>(
+    pub fn is_full(&self) -> bool {
+        self.len >= BATCH
+    }
+
+    /// Number of its triangles.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Adds up to [`LANES`] triangles.
+    #[inline(always)]
+    pub fn push(&mut self, ids: &[u32]) {
+        for &id in ids {
+            self.ids[self.len % ROOM] = id;
+            self.len += 1;
+        }
+    }
+
+    /// Adds those of up to [`LANES`] triangles that `tiles` do not hide.
+    #[inline(always)]
+    pub fn push_seen<const S: usize>(
         &mut self,
         context: &RasterContext<'_>,
-        band: &mut SampleBand,
-        tiles: Option<&Tiles>,
-    ) -> u64 {
-        let next = load_corners(context, self);
-        let corners = std::mem::replace(&mut self.waiting, next);
-        self.len = 0;
-        let setups = set_up::<S>(context.isa, &corners, band);
+        band: &SampleBand,
+        tiles: &Tiles,
+        ids: &[u32],
+    ) {
+        let mut lanes = [ids.first().map_or(0, |&id| id); LANES];
+        for (lane, &id) in lanes.iter_mut().zip(ids) {
+            *lane = id;
+        }
+        let Boxes { bounds: [columns, rows], depth_max } = boxes::<S>(context, &lanes, band);
+        for l in 0..ids.len().min(LANES) {
+            let (columns, rows) = ([columns[0][l], columns[1][l]], [rows[0][l], rows[1][l]]);
+            let is_empty = (columns[0] > columns[1]) | (rows[0] > rows[1]);
+            // Written in any case, kept by the count.
+            self.ids[self.len % ROOM] = lanes[l];
+            self.len += usize::from(!is_empty && !tiles.hide(columns, rows, depth_max[l]));
+        }
+    }
+
+    /// Draws what was added. Returns the number of samples tested of triangles that are drawn in
+    /// blocks.
+    #[inline(always)]
+    pub fn draw<const S: usize>(&mut self, context: &RasterContext<'_>, band: &mut SampleBand) -> u64 {
+        let len = std::mem::take(&mut self.len).min(ROOM);
+        // Lanes without a triangle repeat the last one, which needs no clipping either.
+        let last = self.ids[len.saturating_sub(1)];
+        self.ids[len..len.next_multiple_of(LANES)].fill(last);
+        let (groups, _) = self.ids.as_chunks::<LANES>();
+        for (ids, setups) in groups.iter().zip(&mut self.setups).take(len.div_ceil(LANES)) {
+            set_up::<S>(context, ids, band, setups);
+        }
+        let (order, ends) = self.by_class(len);
+        for &i in &order[..ends[class::SHORT as usize]] {
+            let (group, l) = (usize::from(i) / LANES, usize::from(i) % LANES);
+            draw_lane::<S, LANES>(context.isa, &self.setups[group].parts, l, self.ids[usize::from(i)], band);
+        }
         let mut tested = 0;
-        for l in 0..corners.len {
-            let [[left, right], [top, bottom]] = setups.bounds_of(l);
-            if left > right || top > bottom {
-                continue;
-            }
-            let depth_max = setups.depth_range[1][l];
-            if tiles.is_some_and(|tiles| tiles.hide([left, right], [top, bottom], depth_max)) {
-                continue;
-            }
-            let id = corners.ids[l];
-            if setups.is_short[l] && !context.is_plain {
-                draw_short::<S>(context.isa, &setups.short(l), id, band);
-                tested += ((right - left + 1) * (bottom - top + 1)) as u64 * S as u64;
-            } else if let Some(setup) = Setup::new(&context.screen_triangle(id)) {
+        for &i in &order[ends[class::SHORT as usize]..ends[class::LONG as usize]] {
+            let id = self.ids[usize::from(i)];
+            if let Some(setup) = Setup::new(&context.screen_triangle(id)) {
                 tested += draw_long::<S>(context, &setup, id, band);
             }
         }
         tested
     }
+
+    /// Indices of triangles, sorted by class, and the end of each class among them.
+    #[inline(always)]
+    fn by_class(&self, len: usize) -> ([u8; ROOM], [usize; class::COUNT]) {
+        let class_of = |i: usize| self.setups[i / LANES].classes[i % LANES] as usize % class::COUNT;
+        let (mut order, mut ends) = ([0; ROOM], [0; class::COUNT]);
+        for i in 0..len {
+            ends[class_of(i)] += 1;
+        }
+        let mut sum = 0;
+        for end in &mut ends {
+            // The start, which the next loop moves to the end.
+            sum += std::mem::replace(end, sum);
+        }
+        for i in 0..len {
+            let end = &mut ends[class_of(i)];
+            order[*end % ROOM] = i as u8;
+            *end += 1;
+        }
+        (order, ends)
+    }
+}
+
+/// Corners of eight triangles by id.
+#[inline(always)]
+#[allow(unsafe_code)]
+pub fn corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Corners {
+    #[cfg(target_arch = "x86_64")]
+    if context.isa.has_avx2() {
+        // SAFETY: the processor has AVX2, as `isa` says.
+        return unsafe { super::batch_avx2::corners(context, ids) };
+    }
+    Corners::load(context, ids)
 }
 
 #[inline(always)]
 #[allow(unsafe_code)]
-fn set_up<const S: usize>(isa: Isa, corners: &Corners, band: &SampleBand) -> Setups {
+fn boxes<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band: &SampleBand) -> Boxes {
     #[cfg(target_arch = "x86_64")]
-    if isa.has_avx2() {
+    if context.isa.has_avx2() {
         // SAFETY: the processor has AVX2, as `isa` says.
-        return unsafe { super::batch_avx2::set_up::<S>(corners, band) };
+        return unsafe { super::batch_avx2::boxes::<S>(context, ids, band) };
     }
-    let _ = isa;
-    Setups::new::<S>(corners, band)
+    Boxes::new::<S>(&Corners::load(context, ids), band)
+}
+
+#[inline(always)]
+#[allow(unsafe_code)]
+fn set_up<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band: &SampleBand, setups: &mut Setups) {
+    #[cfg(target_arch = "x86_64")]
+    if context.isa.has_avx2() {
+        // SAFETY: the processor has AVX2, as `isa` says.
+        return unsafe { super::batch_avx2::set_up::<S>(context, ids, band, setups) };
+    }
+    *setups = Setups::new::<S>(&Corners::load(context, ids), band);
 }
 
 /// Draws a triangle block by block. Returns the number of samples tested.
 #[inline(always)]
 fn draw_long<const S: usize>(context: &RasterContext<'_>, setup: &Setup, id: u32, band: &mut SampleBand) -> u64 {
-    if context.is_plain || !context.isa.has_own_batch() || setup.depth_range[0] <= 0.0 {
+    if !context.isa.has_own_batch() || setup.depth_range[0] <= 0.0 {
         return visibility::draw::<S>(setup, id, &mut Nearest(band));
     }
     let mut parts = 0;
     let (size_px, range) = (band.size_px, band.range());
     visibility::for_each_part::<S>(setup, size_px, range, |part| {
-        draw_short::<S>(context.isa, part, id, band);
+        draw_lane::<S, 1>(context.isa, part, 0, id, band);
         parts += 1;
     });
     parts * (64 * S as u64)
 }
 
-/// Draws part of a triangle whose depths are above 0.
+/// Draws part `l` of a triangle whose depths are above 0.
 #[inline(always)]
 #[allow(unsafe_code)]
-fn draw_short<const S: usize>(isa: Isa, part: &Part, id: u32, band: &mut SampleBand) {
+fn draw_lane<const S: usize, const N: usize>(isa: Isa, parts: &Parts<N>, l: usize, id: u32, band: &mut SampleBand) {
     #[cfg(target_arch = "x86_64")]
     if isa.has_avx2() {
         // SAFETY: the processor has AVX2, as `isa` says.
-        return unsafe { super::batch_avx2::draw_short::<S>(part, id, band) };
+        return unsafe { super::batch_avx2::draw_lane::<S, N>(parts, l, id, band) };
     }
     let _ = isa;
-    draw_part::<S>(part, id, band);
+    draw_part::<S, N>(parts, l, id, band);
 }
 
 #[inline(always)]
-fn draw_part<const S: usize>(part: &Part, id: u32, band: &mut SampleBand) {
-    let Part { bounds: [[left, right], [top, bottom]], dx, dy, edges, from, depth, depth_range } = *part;
+fn draw_part<const S: usize, const N: usize>(parts: &Parts<N>, l: usize, id: u32, band: &mut SampleBand) {
+    let [[left, right], [top, bottom]] = parts.bounds_of(l);
+    let [dx, dy, edges] = [&parts.dx, &parts.dy, &parts.edges].map(|v| [v[0][l], v[1][l], v[2][l]]);
+    let from = [parts.from[0][l], parts.from[1][l]];
+    let depth = [parts.depth[0][l], parts.depth[1][l], parts.depth[2][l]];
+    let depth_range = [parts.depth_range[0][l], parts.depth_range[1][l]];
     let pixels = (LANES / S).max(1);
     for part in 0..S.div_ceil(LANES) {
         let [offset_x, offset_y] = lane_offsets::<S>(part);
@@ -145,16 +228,4 @@ fn draw_part<const S: usize>(part: &Part, id: u32, band: &mut SampleBand) {
             }
         }
     }
-}
-
-#[inline(always)]
-fn load_corners(context: &RasterContext<'_>, batch: &Batch) -> Corners {
-    let mut corners = Corners { ids: batch.ids, len: batch.len.min(LANES), ..Corners::default() };
-    for l in 0..corners.len {
-        for k in 0..3 {
-            let v = &context.vertices[batch.vertices[l][k] as usize];
-            (corners.x[k][l], corners.y[k][l], corners.z[k][l]) = (v.x, v.y, v.z);
-        }
-    }
-    corners
 }

@@ -8,17 +8,69 @@ use std::arch::asm;
 use std::arch::x86_64::*;
 
 use super::samples::{SampleBand, SampleGrid};
-use super::setups::{Corners, EXTENT_MAX, SHORT_MAX, Setups, lane_offsets};
-use super::visibility::Part;
+use super::setups;
+use super::setups::{Boxes, EXTENT_MAX, SHORT_MAX, SIZES, Setups, class, lane_offsets};
+use super::transform::ScreenVertex;
+use super::visibility::Parts;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::isa::LANES;
 use crate::plan::sample_offsets;
 
+/// Corners of eight triangles.
+struct Corners {
+    x: [__m256i; 3],
+    y: [__m256i; 3],
+    z: [__m256; 3],
+}
+
+/// As `Corners::load`.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn load_corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Corners {
+    let triangles = context.indices_of(ids);
+    let (mut x, mut y, mut z) = ([_mm256_setzero_si256(); 3], [_mm256_setzero_si256(); 3], [_mm256_setzero_ps(); 3]);
+    for k in 0..3 {
+        let vertex = |l: usize| from_vertex(&context.vertices[triangles[l][k] as usize]);
+        let pair = |l: usize| _mm256_set_m128i(vertex(l + 4), vertex(l));
+        let (a, b, c, d) = (pair(0), pair(1), pair(2), pair(3));
+        let (ab, cd) = (_mm256_unpacklo_epi32(a, b), _mm256_unpacklo_epi32(c, d));
+        x[k] = _mm256_unpacklo_epi64(ab, cd);
+        y[k] = _mm256_unpackhi_epi64(ab, cd);
+        let (ab, cd) = (_mm256_unpackhi_epi32(a, b), _mm256_unpackhi_epi32(c, d));
+        z[k] = _mm256_castsi256_ps(_mm256_unpacklo_epi64(ab, cd));
+    }
+    Corners { x, y, z }
+}
+
+/// As `Corners::load` of `setups`.
+#[target_feature(enable = "avx2")]
+pub fn corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> setups::Corners {
+    let Corners { x, y, z } = load_corners(context, ids);
+    setups::Corners {
+        x: [to_ints(x[0]), to_ints(x[1]), to_ints(x[2])],
+        y: [to_ints(y[0]), to_ints(y[1]), to_ints(y[2])],
+        z: [to_floats(z[0]), to_floats(z[1]), to_floats(z[2])],
+    }
+}
+
+/// As `Boxes::new`.
+#[target_feature(enable = "avx2")]
+pub fn boxes<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band: &SampleBand) -> Boxes {
+    let Corners { x, y, z } = load_corners(context, ids);
+    let [columns, rows] = band.range();
+    let half = [band.size_px[0] as i32 * 128, band.size_px[1] as i32 * 128];
+    let (left, right, _) = bounds::<S>(&x, half[0], columns);
+    let (top, bottom, _) = bounds::<S>(&y, half[1], rows);
+    Boxes {
+        bounds: [[to_ints(left), to_ints(right)], [to_ints(top), to_ints(bottom)]],
+        depth_max: to_floats(_mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2])),
+    }
+}
+
 /// As `Setups::new`.
 #[target_feature(enable = "avx2")]
-pub fn set_up<const S: usize>(corners: &Corners, band: &SampleBand) -> Setups {
-    let mut s = Setups::default();
-    let (x, y) = (load3(&corners.x), load3(&corners.y));
-    let z = [from_floats(&corners.z[0]), from_floats(&corners.z[1]), from_floats(&corners.z[2])];
+pub fn set_up<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band: &SampleBand, s: &mut Setups) {
+    let Corners { x, y, z } = load_corners(context, ids);
     let [columns, rows] = band.range();
     let half = [band.size_px[0] as i32 * 128, band.size_px[1] as i32 * 128];
     let (left, right, is_narrow) = bounds::<S>(&x, half[0], columns);
@@ -27,17 +79,28 @@ pub fn set_up<const S: usize>(corners: &Corners, band: &SampleBand) -> Setups {
     let depth_max = _mm256_max_ps(_mm256_max_ps(z[0], z[1]), z[2]);
     let is_deep = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_GT_OQ>(depth_min, _mm256_setzero_ps()));
     let is_short = _mm256_and_si256(_mm256_and_si256(is_narrow, is_low), is_deep);
-    let is_short = _mm256_movemask_ps(_mm256_castsi256_ps(is_short));
-    for l in 0..LANES {
-        s.is_short[l] = is_short >> l & 1 != 0;
-    }
-    s.bounds = [[to_ints(left), to_ints(right)], [to_ints(top), to_ints(bottom)]];
-    s.depth_range = [to_floats(depth_min), to_floats(depth_max)];
+    s.classes = to_ints(classes::<S>([left, right], [top, bottom], is_short));
+    s.parts.bounds = [[to_ints(left), to_ints(right)], [to_ints(top), to_ints(bottom)]];
+    s.parts.depth_range = [to_floats(depth_min), to_floats(depth_max)];
     let shift = sample_offsets(S as u32)[0][0] & 15;
     let corner =
         |first: __m256i, half: i32| _mm256_add_epi32(_mm256_slli_epi32::<8>(first), _mm256_set1_epi32(shift - half));
-    planes(&mut s, x, y, z, [corner(left, half[0]), corner(top, half[1])]);
-    s
+    planes(&mut s.parts, x, y, z, [corner(left, half[0]), corner(top, half[1])]);
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn classes<const S: usize>(columns: [__m256i; 2], rows: [__m256i; 2], is_short: __m256i) -> __m256i {
+    let is_empty = _mm256_or_si256(_mm256_cmpgt_epi32(columns[0], columns[1]), _mm256_cmpgt_epi32(rows[0], rows[1]));
+    let pixels = ((LANES / S).max(1) as i32).trailing_zeros() as i32;
+    let vectors = _mm256_sra_epi32(_mm256_sub_epi32(columns[1], columns[0]), _mm_cvtsi32_si128(pixels));
+    let rows = _mm256_sub_epi32(rows[1], rows[0]);
+    let sizes = _mm256_set1_epi32(SIZES);
+    let is_small = _mm256_and_si256(_mm256_cmpgt_epi32(sizes, rows), _mm256_cmpgt_epi32(sizes, vectors));
+    let small = _mm256_add_epi32(_mm256_mullo_epi32(rows, sizes), vectors);
+    let short = _mm256_blendv_epi8(_mm256_set1_epi32(class::SHORT), small, is_small);
+    let any = _mm256_blendv_epi8(_mm256_set1_epi32(class::LONG), short, is_short);
+    _mm256_blendv_epi8(any, _mm256_set1_epi32(class::EMPTY), is_empty)
 }
 
 /// First and last pixel along an axis, and which lanes are short along it.
@@ -62,7 +125,7 @@ fn bounds<const S: usize>(v: &[__m256i; 3], half: i32, [from, to]: [i32; 2]) -> 
 /// Edges and depth.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn planes(s: &mut Setups, x: [__m256i; 3], y: [__m256i; 3], z: [__m256; 3], corner: [__m256i; 2]) {
+fn planes(s: &mut Parts<LANES>, x: [__m256i; 3], y: [__m256i; 3], z: [__m256; 3], corner: [__m256i; 2]) {
     let sub = |a, b| _mm256_sub_epi32(a, b);
     let cross = |ax, ay, bx, by| sub(_mm256_mullo_epi32(ax, by), _mm256_mullo_epi32(bx, ay));
     let area = cross(sub(x[1], x[0]), sub(y[1], y[0]), sub(x[2], x[0]), sub(y[2], y[0]));
@@ -109,56 +172,71 @@ fn recip(w: __m256) -> __m256 {
 
 /// As `draw_part`.
 #[target_feature(enable = "avx2")]
-pub fn draw_short<const S: usize>(t: &Part, id: u32, band: &mut SampleBand) {
-    let [[left, right], [top, bottom]] = t.bounds;
+pub fn draw_lane<const S: usize, const N: usize>(t: &Parts<N>, l: usize, id: u32, band: &mut SampleBand) {
+    let [[left, right], [top, bottom]] = t.bounds_of(l);
     let pixels = (LANES / S).max(1);
+    let (rows, vectors) = ((bottom - top) as u32 as usize, (right - left) as u32 as usize / pixels);
+    // From the first sample to the end of the last vector.
+    let (first, stride) = (band.index(left, top, 0), band.stride);
+    let width = vectors * (pixels * S) + LANES * S.div_ceil(LANES);
+    let end = rows.saturating_mul(stride).saturating_add(width).saturating_add(first);
+    let Some(depths) = band.depth.get_mut(first..end) else { return };
+    let Some(ids) = band.ids.get_mut(first..end) else { return };
     let id = _mm256_set1_epi32(id as i32);
-    let range = [_mm256_set1_ps(t.depth_range[0]), _mm256_set1_ps(t.depth_range[1])];
-    let (depth, across) = (_mm256_set1_ps(t.depth[0]), _mm256_set1_ps(t.depth[1]));
+    let range = [_mm256_set1_ps(t.depth_range[0][l]), _mm256_set1_ps(t.depth_range[1][l])];
+    let (depth, across) = (_mm256_set1_ps(t.depth[0][l]), _mm256_set1_ps(t.depth[1][l]));
     for part in 0..S.div_ceil(LANES) {
         let offsets = lane_offsets::<S>(part);
         let [offset_x, offset_y] = [from_ints(&offsets[0]), from_ints(&offsets[1])];
         let edge = |k: usize| {
-            let down = _mm256_mullo_epi32(_mm256_set1_epi32(t.dx[k]), offset_y);
-            let right = _mm256_mullo_epi32(_mm256_set1_epi32(t.dy[k]), offset_x);
-            _mm256_add_epi32(_mm256_set1_epi32(t.edges[k]), _mm256_sub_epi32(down, right))
+            let down = _mm256_mullo_epi32(_mm256_set1_epi32(t.dx[k][l]), offset_y);
+            let right = _mm256_mullo_epi32(_mm256_set1_epi32(t.dy[k][l]), offset_x);
+            _mm256_add_epi32(_mm256_set1_epi32(t.edges[k][l]), _mm256_sub_epi32(down, right))
         };
-        let edges = [edge(0), edge(1), edge(2)];
-        let first_x = _mm256_add_epi32(_mm256_set1_epi32(t.from[0]), _mm256_slli_epi32::<4>(offset_x));
-        let first_y = _mm256_add_epi32(_mm256_set1_epi32(t.from[1]), _mm256_slli_epi32::<4>(offset_y));
-        for row in 0..=bottom - top {
-            let y = _mm256_cvtepi32_ps(_mm256_add_epi32(first_y, _mm256_set1_epi32(256 * row)));
-            let depth_y = _mm256_mul_ps(_mm256_set1_ps(t.depth[2]), y);
-            let in_row = |k: usize| _mm256_add_epi32(edges[k], _mm256_set1_epi32(16 * t.dx[k] * row));
-            let (mut e0, mut e1, mut e2) = (in_row(0), in_row(1), in_row(2));
+        let mut edges = [edge(0), edge(1), edge(2)];
+        let down = |k: usize| _mm256_set1_epi32(16 * t.dx[k][l]);
+        let right = |k: usize| _mm256_set1_epi32(16 * pixels as i32 * t.dy[k][l]);
+        let (downs, rights) = ([down(0), down(1), down(2)], [right(0), right(1), right(2)]);
+        let first_x = _mm256_add_epi32(_mm256_set1_epi32(t.from[0][l]), _mm256_slli_epi32::<4>(offset_x));
+        let mut y = _mm256_add_epi32(_mm256_set1_epi32(t.from[1][l]), _mm256_slli_epi32::<4>(offset_y));
+        for row in 0..=rows {
+            let depth_y = _mm256_mul_ps(_mm256_set1_ps(t.depth[2][l]), _mm256_cvtepi32_ps(y));
+            let [mut e0, mut e1, mut e2] = edges;
             let mut x = first_x;
-            let mut at = band.index(left, top + row, 0) + LANES * part;
-            for _ in (0..=right - left).step_by(pixels) {
+            for vector in 0..=vectors {
                 let outside = _mm256_or_si256(_mm256_or_si256(e0, e1), e2);
                 let plane = _mm256_add_ps(depth, _mm256_mul_ps(across, _mm256_cvtepi32_ps(x)));
                 let z = _mm256_min_ps(_mm256_max_ps(_mm256_add_ps(plane, depth_y), range[0]), range[1]);
-                if let Some((depths, ids)) = band.lanes_mut(at) {
-                    update(outside, z, id, depths, ids);
-                }
-                let step = |e: __m256i, k: usize| _mm256_sub_epi32(e, _mm256_set1_epi32(16 * pixels as i32 * t.dy[k]));
-                (e0, e1, e2) = (step(e0, 0), step(e1, 1), step(e2, 2));
+                let at = row * stride + vector * (pixels * S) + LANES * part;
+                // SAFETY: `at + LANES` is at most `rows * stride + width`, the length of both slices:
+                // `row` is at most `rows`, `vector` at most `vectors`.
+                unsafe { update(outside, z, id, depths.as_mut_ptr().add(at), ids.as_mut_ptr().add(at)) };
+                (e0, e1, e2) =
+                    (_mm256_sub_epi32(e0, rights[0]), _mm256_sub_epi32(e1, rights[1]), _mm256_sub_epi32(e2, rights[2]));
                 x = _mm256_add_epi32(x, _mm256_set1_epi32(256 * pixels as i32));
-                at += pixels * S;
             }
+            for k in 0..3 {
+                edges[k] = _mm256_add_epi32(edges[k], downs[k]);
+            }
+            y = _mm256_add_epi32(y, _mm256_set1_epi32(256));
         }
     }
 }
 
 /// As [`update`](super::nearest::update), for depths above 0.
+///
+/// # Safety
+///
+/// From both pointers on, [`LANES`] values may be read and written.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn update(outside: __m256i, z: __m256, id: __m256i, depths: &mut [f32; LANES], ids: &mut [u32; LANES]) {
-    // SAFETY: the arrays have the size of a vector, and loads and stores need no alignment. The empty
+unsafe fn update(outside: __m256i, z: __m256, id: __m256i, depths: *mut f32, ids: *mut u32) {
+    // SAFETY: the caller vouches for the pointers, and loads and stores need no alignment. The empty
     // assembly changes nothing. It only keeps the compiler from seeing that a store keeps some of what
     // was there.
     unsafe {
-        let old_depths = _mm256_loadu_ps(depths.as_ptr());
-        let old_ids = _mm256_loadu_si256(ids.as_ptr().cast());
+        let old_depths = _mm256_loadu_ps(depths);
+        let old_ids = _mm256_loadu_si256(ids.cast());
         let nearer = _mm256_cmp_ps::<_CMP_GT_OQ>(z, old_depths);
         let is_lower = _mm256_cmpeq_epi32(_mm256_min_epu32(id, old_ids), id);
         let tied = _mm256_and_ps(_mm256_cmp_ps::<_CMP_EQ_OQ>(z, old_depths), _mm256_castsi256_ps(is_lower));
@@ -166,15 +244,17 @@ fn update(outside: __m256i, z: __m256, id: __m256i, depths: &mut [f32; LANES], i
         let mut new_depths = _mm256_blendv_ps(old_depths, z, change);
         let mut new_ids = _mm256_blendv_ps(_mm256_castsi256_ps(old_ids), _mm256_castsi256_ps(id), change);
         asm!("/* {0} {1} */", inout(ymm_reg) new_depths, inout(ymm_reg) new_ids, options(pure, nomem, nostack, preserves_flags));
-        _mm256_storeu_ps(depths.as_mut_ptr(), new_depths);
-        _mm256_storeu_ps(ids.as_mut_ptr().cast(), new_ids);
+        _mm256_storeu_ps(depths, new_depths);
+        _mm256_storeu_ps(ids.cast(), new_ids);
     }
 }
 
 #[inline]
 #[target_feature(enable = "avx2")]
-fn load3(v: &[[i32; LANES]; 3]) -> [__m256i; 3] {
-    [from_ints(&v[0]), from_ints(&v[1]), from_ints(&v[2])]
+fn from_vertex(v: &ScreenVertex) -> __m128i {
+    const { assert!(size_of::<ScreenVertex>() == size_of::<__m128i>()) };
+    // SAFETY: the vertex has the size of a vector and no padding, and the load needs no alignment.
+    unsafe { _mm_loadu_si128(std::ptr::from_ref(v).cast()) }
 }
 
 #[inline]
@@ -182,13 +262,6 @@ fn load3(v: &[[i32; LANES]; 3]) -> [__m256i; 3] {
 fn from_ints(v: &[i32; LANES]) -> __m256i {
     // SAFETY: the array has the size of a vector, and the load needs no alignment.
     unsafe { _mm256_loadu_si256(v.as_ptr().cast()) }
-}
-
-#[inline]
-#[target_feature(enable = "avx2")]
-fn from_floats(v: &[f32; LANES]) -> __m256 {
-    // SAFETY: as above.
-    unsafe { _mm256_loadu_ps(v.as_ptr()) }
 }
 
 #[inline]

@@ -12,7 +12,7 @@ mod batch_avx2;
 pub(crate) mod clip;
 pub(crate) mod nearest;
 pub(crate) mod samples;
-mod setups;
+pub(crate) mod setups;
 pub(crate) mod tiles;
 pub(crate) mod transform;
 pub(crate) mod visibility;

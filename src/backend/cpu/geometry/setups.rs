@@ -5,7 +5,8 @@
 
 use super::samples::{SampleBand, SampleGrid};
 use super::transform::recip;
-use super::visibility::Part;
+use super::visibility::Parts;
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::isa::LANES;
 use crate::plan::sample_offsets;
 
@@ -16,70 +17,124 @@ pub const EXTENT_MAX: i32 = 64 * 256;
 /// Largest width and height of what is drawn without looking which blocks are empty, pixels.
 pub const SHORT_MAX: i32 = 16;
 
-/// Corners of up to eight triangles.
-#[derive(Default)]
+/// Rows, and vectors in a row, up to which triangles are drawn together with others of the same size.
+pub const SIZES: i32 = 4;
+
+/// How a triangle is drawn: a number below `SIZES * SIZES` for those of each small size, or one of
+/// these.
+pub mod class {
+    /// Other triangles drawn by lanes.
+    pub const SHORT: i32 = super::SIZES * super::SIZES;
+    /// Triangles drawn in blocks.
+    pub const LONG: i32 = SHORT + 1;
+    /// Triangles without samples.
+    pub const EMPTY: i32 = LONG + 1;
+    /// Number of classes.
+    pub const COUNT: usize = EMPTY as usize + 1;
+}
+
+/// Corners of eight triangles.
 pub struct Corners {
-    pub ids: [u32; LANES],
-    pub len: usize,
     pub x: [[i32; LANES]; 3],
     pub y: [[i32; LANES]; 3],
     pub z: [[f32; LANES]; 3],
 }
 
-/// Eight triangles, ready to be drawn. Lanes that are not short have their bounds and their depth
-/// range alone.
-#[derive(Default)]
+/// Eight triangles, ready to be drawn. Long ones have their bounds and their depth range alone.
 pub struct Setups {
+    pub parts: Parts<LANES>,
+    /// As [`class`] says.
+    pub classes: [i32; LANES],
+}
+
+impl Corners {
+    /// Those of triangles by id.
+    #[inline(always)]
+    pub fn load(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Self {
+        let (mut x, mut y, mut z) = ([[0; LANES]; 3], [[0; LANES]; 3], [[0.0; LANES]; 3]);
+        for l in 0..LANES {
+            let corners = context.screen_triangle(ids[l]);
+            for k in 0..3 {
+                (x[k][l], y[k][l], z[k][l]) = (corners[k].x, corners[k].y, corners[k].z);
+            }
+        }
+        Self { x, y, z }
+    }
+}
+
+/// Pixels and nearest depth of eight triangles.
+pub struct Boxes {
     /// First and last column, and row; the first beyond the last where there are no samples.
     pub bounds: [[[i32; LANES]; 2]; 2],
-    pub is_short: [bool; LANES],
-    /// Change of the edge functions.
-    pub dx: [[i32; LANES]; 3],
-    pub dy: [[i32; LANES]; 3],
-    /// Edge functions in sixteenths at the first pixel's corner.
-    pub edges: [[i32; LANES]; 3],
-    /// That corner from the triangle's first, 1/256 px.
-    pub from: [[i32; LANES]; 2],
-    /// Depth at the triangle's first corner, and its change per 1/256 px.
-    pub depth: [[f32; LANES]; 3],
-    pub depth_range: [[f32; LANES]; 2],
+    pub depth_max: [f32; LANES],
+}
+
+impl Boxes {
+    #[inline(always)]
+    pub fn new<const S: usize>(corners: &Corners, band: &SampleBand) -> Self {
+        let grid = SampleGrid::new(S as u32);
+        let (half, ranges) = (band.size_px.map(|size| size as i32 * 128), band.range());
+        let mut boxes = Self { bounds: [[[0; LANES]; 2]; 2], depth_max: [0.0; LANES] };
+        for l in 0..LANES {
+            for (k, v) in [lane(&corners.x, l), lane(&corners.y, l)].into_iter().enumerate() {
+                let (low, high) = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
+                [boxes.bounds[k][0][l], boxes.bounds[k][1][l]] =
+                    grid.pixels([low + half[k], high + half[k]], ranges[k]);
+            }
+            let z = lane(&corners.z, l);
+            boxes.depth_max[l] = z[0].max(z[1]).max(z[2]);
+        }
+        boxes
+    }
 }
 
 impl Setups {
+    /// Nothing yet.
+    pub const EMPTY: Self = Self { parts: Parts::EMPTY, classes: [class::EMPTY; LANES] };
+
     #[inline(always)]
     pub fn new<const S: usize>(corners: &Corners, band: &SampleBand) -> Self {
-        let mut s = Self::default();
-        let grid = SampleGrid::new(S as u32);
+        let mut s = Self::EMPTY;
+        let Boxes { bounds, depth_max } = Boxes::new::<S>(corners, band);
         let half = band.size_px.map(|size| size as i32 * 128);
-        let ranges = band.range();
         let shift = sample_offsets(S as u32)[0][0] & 15;
         for l in 0..LANES {
             let (x, y, z) = (lane(&corners.x, l), lane(&corners.y, l), lane(&corners.z, l));
-            let low = [x[0].min(x[1]).min(x[2]), y[0].min(y[1]).min(y[2])];
-            let high = [x[0].max(x[1]).max(x[2]), y[0].max(y[1]).max(y[2])];
-            let columns = grid.pixels([low[0] + half[0], high[0] + half[0]], ranges[0]);
-            let rows = grid.pixels([low[1] + half[1], high[1] + half[1]], ranges[1]);
-            s.bounds[0][0][l] = columns[0];
-            s.bounds[0][1][l] = columns[1];
-            s.bounds[1][0][l] = rows[0];
-            s.bounds[1][1][l] = rows[1];
-            s.is_short[l] = (high[0] - low[0] <= EXTENT_MAX)
-                & (high[1] - low[1] <= EXTENT_MAX)
-                & (columns[1].wrapping_sub(columns[0]) < SHORT_MAX)
-                & (rows[1].wrapping_sub(rows[0]) < SHORT_MAX)
-                & (z[0].min(z[1]).min(z[2]) > 0.0);
-            s.depth_range[0][l] = z[0].min(z[1]).min(z[2]);
-            s.depth_range[1][l] = z[0].max(z[1]).max(z[2]);
+            let extent = |v: [i32; 3]| v[0].max(v[1]).max(v[2]) - v[0].min(v[1]).min(v[2]);
+            let [[left, right], [top, bottom]] =
+                [[bounds[0][0][l], bounds[0][1][l]], [bounds[1][0][l], bounds[1][1][l]]];
+            let (columns, rows) = (right.wrapping_sub(left), bottom.wrapping_sub(top));
+            let depth_min = z[0].min(z[1]).min(z[2]);
+            let is_short = (extent(x) <= EXTENT_MAX)
+                & (extent(y) <= EXTENT_MAX)
+                & (columns < SHORT_MAX)
+                & (rows < SHORT_MAX)
+                & (depth_min > 0.0);
+            let vectors = columns / (LANES / S).max(1) as i32;
+            s.classes[l] = if (left > right) | (top > bottom) {
+                class::EMPTY
+            } else if !is_short {
+                class::LONG
+            } else if (rows < SIZES) & (vectors < SIZES) {
+                rows * SIZES + vectors
+            } else {
+                class::SHORT
+            };
+            s.parts.depth_range[0][l] = depth_min;
             // What follows means nothing where it wraps: those lanes are not short.
             let corner = [
-                columns[0].wrapping_mul(256).wrapping_sub(half[0]).wrapping_add(shift),
-                rows[0].wrapping_mul(256).wrapping_sub(half[1]).wrapping_add(shift),
+                left.wrapping_mul(256).wrapping_sub(half[0]).wrapping_add(shift),
+                top.wrapping_mul(256).wrapping_sub(half[1]).wrapping_add(shift),
             ];
-            s.set_lane(l, x, y, z, corner);
+            s.parts.set_lane(l, x, y, z, corner);
         }
+        s.parts.bounds = bounds;
+        s.parts.depth_range[1] = depth_max;
         s
     }
+}
 
+impl Parts<LANES> {
     /// Edges and depth, as `Setup`, `Edges::new` and `Edges::at` of [`visibility`] have them.
     #[inline(always)]
     fn set_lane(&mut self, l: usize, x: [i32; 3], y: [i32; 3], z: [f32; 3], corner: [i32; 2]) {
@@ -106,26 +161,6 @@ impl Setups {
         }
         self.from[0][l] = corner[0].wrapping_sub(x[0]);
         self.from[1][l] = corner[1].wrapping_sub(y[0]);
-    }
-
-    #[inline(always)]
-    pub fn bounds_of(&self, l: usize) -> [[i32; 2]; 2] {
-        let [[left, right], [top, bottom]] = &self.bounds;
-        [[left[l], right[l]], [top[l], bottom[l]]]
-    }
-
-    /// The short triangle of lane `l`.
-    #[inline(always)]
-    pub fn short(&self, l: usize) -> Part {
-        Part {
-            bounds: self.bounds_of(l),
-            dx: lane(&self.dx, l),
-            dy: lane(&self.dy, l),
-            edges: lane(&self.edges, l),
-            from: [self.from[0][l], self.from[1][l]],
-            depth: lane(&self.depth, l),
-            depth_range: [self.depth_range[0][l], self.depth_range[1][l]],
-        }
     }
 }
 

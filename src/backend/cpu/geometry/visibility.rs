@@ -113,40 +113,61 @@ pub fn for_each_part<const S: usize>(
     setup: &Setup,
     size_px: [u32; 2],
     range: [[i32; 2]; 2],
-    mut each: impl FnMut(&Part),
+    mut each: impl FnMut(&Parts<1>),
 ) {
     let edges = Edges::new(setup);
     let Some(bounds) = setup.bounds(size_px, range) else { return };
     for_each_block::<S>(&edges, bounds, size_px, |block| {
-        each(&Part {
-            bounds: [[block.column, block.column + block.size[0] - 1], [block.row, block.row + block.size[1] - 1]],
-            dx: edges.dx,
-            dy: edges.dy,
-            edges: block.values,
-            from: [block.corner[0] - setup.x[0], block.corner[1] - setup.y[0]],
-            depth: setup.depth,
-            depth_range: setup.depth_range,
+        let [last_column, last_row] = [block.column + block.size[0] - 1, block.row + block.size[1] - 1];
+        each(&Parts {
+            bounds: [[[block.column], [last_column]], [[block.row], [last_row]]],
+            dx: edges.dx.map(|v| [v]),
+            dy: edges.dy.map(|v| [v]),
+            edges: block.values.map(|v| [v]),
+            from: [[block.corner[0] - setup.x[0]], [block.corner[1] - setup.y[0]]],
+            depth: setup.depth.map(|v| [v]),
+            depth_range: setup.depth_range.map(|v| [v]),
         });
     });
 }
 
-/// A rectangle of pixels, and what a triangle is there.
-pub struct Part {
+/// `N` rectangles of pixels, and what a triangle is in each.
+pub struct Parts<const N: usize> {
     /// First and last column, and row.
-    pub bounds: [[i32; 2]; 2],
+    pub bounds: [[[i32; N]; 2]; 2],
     /// Change of the edge functions.
-    pub dx: [i32; 3],
+    pub dx: [[i32; N]; 3],
     /// As `dx`.
-    pub dy: [i32; 3],
+    pub dy: [[i32; N]; 3],
     /// Edge functions in sixteenths at the first pixel's corner (moved by what the samples leave
     /// modulo 16).
-    pub edges: [i32; 3],
+    pub edges: [[i32; N]; 3],
     /// That corner from the triangle's first, 1/256 px.
-    pub from: [i32; 2],
+    pub from: [[i32; N]; 2],
     /// As [`Setup::depth`].
-    pub depth: [f32; 3],
+    pub depth: [[f32; N]; 3],
     /// As [`Setup::depth_range`].
-    pub depth_range: [f32; 2],
+    pub depth_range: [[f32; N]; 2],
+}
+
+impl<const N: usize> Parts<N> {
+    /// Nothing yet.
+    pub const EMPTY: Self = Self {
+        bounds: [[[0; N]; 2]; 2],
+        dx: [[0; N]; 3],
+        dy: [[0; N]; 3],
+        edges: [[0; N]; 3],
+        from: [[0; N]; 2],
+        depth: [[0.0; N]; 3],
+        depth_range: [[0.0; N]; 2],
+    };
+
+    /// First and last column, and row, of rectangle `i`.
+    #[inline(always)]
+    pub fn bounds_of(&self, i: usize) -> [[i32; 2]; 2] {
+        let [[left, right], [top, bottom]] = &self.bounds;
+        [[left[i], right[i]], [top[i], bottom[i]]]
+    }
 }
 
 #[inline(always)]

@@ -8,7 +8,7 @@ use super::shade::Shader;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
-use crate::backend::cpu::isa::{LANES, dispatch};
+use crate::backend::cpu::isa::{Isa, LANES, dispatch};
 use crate::backend::cpu::vector::turned_to_viewer;
 use crate::plan::{DrawPlan, SurfacePass, flags};
 
@@ -172,6 +172,9 @@ fn shade_sampled<const S: usize>(
                 continue;
             }
             let (pixels, _) = group.as_chunks::<S>();
+            if are_means_known::<S>(context.isa, flat, pixels, out) {
+                continue;
+            }
             for (x, (ids, out)) in (x..).zip(pixels.iter().zip(out)) {
                 *out = mean(flat, ids);
                 if out[3].is_nan() {
@@ -187,6 +190,23 @@ fn shade_sampled<const S: usize>(
 #[inline(never)]
 fn pixel_by_point<const S: usize>(context: &RasterContext<'_>, band: &SampleBand, [x, y]: [u32; 2]) -> [f32; 4] {
     Shader::new(context).pixel::<S>(band, x, y)
+}
+
+/// Fills a group's pixels with the means of their samples at once, where this processor can. True
+/// if it did, and knew all colours.
+#[inline(always)]
+#[allow(unsafe_code)]
+fn are_means_known<const S: usize>(isa: Isa, flat: &FlatColors, pixels: &[[u32; S]], out: &mut [[f32; 4]]) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    if let (true, Some(ids), Some(out)) =
+        (isa.has_avx2(), pixels.as_flattened().as_chunks().0.first_chunk(), out.first_chunk_mut())
+        && S == 4
+    {
+        // SAFETY: the processor has AVX2, as `isa` says.
+        return unsafe { super::flat_avx2::means(&flat.colors, ids, out) };
+    }
+    let _ = (isa, flat, pixels, out);
+    false
 }
 
 /// The mean of the samples' colours. Each triangle's share is added at once, at its first sample,

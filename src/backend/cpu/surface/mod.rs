@@ -7,6 +7,8 @@
 pub(crate) mod barycentric;
 pub(crate) mod debug;
 pub(crate) mod flat;
+#[cfg(target_arch = "x86_64")]
+mod flat_avx2;
 pub(crate) mod light;
 pub(crate) mod normal;
 pub(crate) mod point;

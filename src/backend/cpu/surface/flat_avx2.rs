@@ -1,0 +1,66 @@
+//! Stage shade: the means of `flat` in AVX2 instructions, lane for lane the same, for 4 samples per
+//! pixel. Compilers make branches and single lanes of the loops there.
+
+#![allow(unsafe_code)]
+
+use std::arch::x86_64::*;
+
+use crate::backend::cpu::isa::LANES;
+
+/// Samples per pixel.
+const SAMPLES: usize = 4;
+
+/// Pixels in a vector of ids.
+const PIXELS: usize = LANES / SAMPLES;
+
+/// As `mean` of each pixel, given the ids of its samples. True if no colour is unknown.
+#[target_feature(enable = "avx2")]
+pub fn means(colors: &[[f32; 4]], ids: &[[u32; SAMPLES]; LANES], out: &mut [[f32; 4]; LANES]) -> bool {
+    let Some(last) = colors.len().checked_sub(1).and_then(|last| u32::try_from(last).ok()) else { return false };
+    let mut unknown = _mm256_setzero_ps();
+    for (ids, out) in ids.as_chunks::<PIXELS>().0.iter().zip(out.as_chunks_mut::<PIXELS>().0) {
+        // SAFETY: the array has the size of a vector, and the load needs no alignment.
+        let ids = unsafe { _mm256_loadu_si256(ids.as_ptr().cast()) };
+        let weights = weights(ids);
+        let mut places = [[0_u32; SAMPLES]; PIXELS];
+        // SAFETY: as above.
+        unsafe {
+            _mm256_storeu_si256(places.as_mut_ptr().cast(), _mm256_min_epu32(ids, _mm256_set1_epi32(last as i32)))
+        };
+        // SAFETY: no place is beyond `last`, which is an index of `colors`. A colour has the size of
+        // a vector.
+        let color = |place: u32| unsafe { _mm_loadu_ps(colors.as_ptr().add(place as usize).cast()) };
+        let part =
+            |s: usize, weight: __m256| _mm256_mul_ps(weight, _mm256_set_m128(color(places[1][s]), color(places[0][s])));
+        let sum = _mm256_add_ps(_mm256_setzero_ps(), part(0, _mm256_permute_ps::<0x00>(weights)));
+        let sum = _mm256_add_ps(sum, part(1, _mm256_permute_ps::<0x55>(weights)));
+        let sum = _mm256_add_ps(sum, part(2, _mm256_permute_ps::<0xAA>(weights)));
+        let sum = _mm256_add_ps(sum, part(3, _mm256_permute_ps::<0xFF>(weights)));
+        unknown = _mm256_or_ps(unknown, _mm256_cmp_ps::<_CMP_UNORD_Q>(sum, sum));
+        // SAFETY: the array has the size of a vector, and the store needs no alignment.
+        unsafe { _mm256_storeu_ps(out.as_mut_ptr().cast(), sum) };
+    }
+    _mm256_testz_ps(unknown, unknown) != 0
+}
+
+/// As `weights`, of two pixels.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn weights(ids: __m256i) -> __m256 {
+    // Equal to the sample that is so many further on, round and round.
+    let same = [
+        _mm256_cmpeq_epi32(ids, _mm256_shuffle_epi32::<0b00_11_10_01>(ids)),
+        _mm256_cmpeq_epi32(ids, _mm256_shuffle_epi32::<0b01_00_11_10>(ids)),
+        _mm256_cmpeq_epi32(ids, _mm256_shuffle_epi32::<0b10_01_00_11>(ids)),
+    ];
+    let more = _mm256_add_epi32(_mm256_add_epi32(same[0], same[1]), same[2]);
+    let counts = _mm256_sub_epi32(_mm256_set1_epi32(1), more);
+    // Samples for which the other one comes first.
+    let lanes = |a: i32, b: i32, c: i32, d: i32| _mm256_setr_epi32(a, b, c, d, a, b, c, d);
+    let before = [lanes(0, 0, 0, -1), lanes(0, 0, -1, -1), lanes(0, -1, -1, -1)];
+    let is_later = _mm256_or_si256(
+        _mm256_or_si256(_mm256_and_si256(same[0], before[0]), _mm256_and_si256(same[1], before[1])),
+        _mm256_and_si256(same[2], before[2]),
+    );
+    _mm256_mul_ps(_mm256_cvtepi32_ps(_mm256_andnot_si256(is_later, counts)), _mm256_set1_ps(1.0 / SAMPLES as f32))
+}
