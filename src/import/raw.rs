@@ -62,13 +62,13 @@ impl Soup {
         self.records.len() / self.record_bytes
     }
 
-    /// The position of a corner.
+    /// The bits of the coordinates of a triangle's corners.
     #[inline(always)]
-    pub fn corner(&self, triangle: usize, corner: usize) -> [f64; 3] {
-        let begin = triangle * self.record_bytes + self.offset + 12 * corner;
-        let bytes = &self.records[begin..begin + 12];
-        let float = |at: usize| f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
-        [f64::from(float(0)), f64::from(float(4)), f64::from(float(8))]
+    pub fn corners(&self, triangle: usize) -> [[u32; 3]; 3] {
+        let begin = triangle * self.record_bytes + self.offset;
+        let bytes = &self.records[begin..begin + 36];
+        let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+        [[word(0), word(4), word(8)], [word(12), word(16), word(20)], [word(24), word(28), word(32)]]
     }
 }
 

@@ -72,7 +72,13 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
         materials: Materials::new(&lists, cx)?,
         of_mesh: vec![None; doc.meshes.len()],
         uses_default_material: false,
+        instances: vec![0; doc.meshes.len()],
     };
+    for instance in &scene.instances {
+        if let Some(count) = meshes.instances.get_mut(instance.mesh) {
+            *count += 1;
+        }
+    }
     for instance in &scene.instances {
         meshes.show(instance, &mut raw, cx)?;
     }
@@ -96,6 +102,8 @@ struct Meshes<'a> {
     materials: Materials<'a>,
     of_mesh: Vec<Option<Rc<Vec<Primitive>>>>,
     uses_default_material: bool,
+    /// How often each mesh is instanced by nodes.
+    instances: Vec<u32>,
 }
 
 impl Meshes<'_> {
@@ -125,6 +133,17 @@ impl Meshes<'_> {
             return Ok(());
         }
         let default_material = self.materials.count();
+        let keeps_shape = joints.is_none() && weights.iter().all(|weight| *weight == 0.0);
+        if let ([placement], true, 1) = (&placements[..], keeps_shape, self.instances[instance.mesh]) {
+            self.of_mesh[instance.mesh] = None;
+            if let Some(primitives) = Rc::into_inner(primitives) {
+                for primitive in primitives {
+                    self.uses_default_material |= primitive.material().is_none();
+                    primitive.append_only(raw, placement, default_material, cx)?;
+                }
+            }
+            return Ok(());
+        }
         for primitive in primitives.iter() {
             self.uses_default_material |= primitive.material().is_none();
             let mut shape = Shape::of(primitive);

@@ -1,14 +1,19 @@
 //! The faces of a raw mesh: its triangles with finite corners and an area.
 
 use super::geometry::Geometry;
+use super::local::{CORNERS_MAX, Local};
 use super::pow2::{Pow2, exponent, is_usable, max_abs};
-use crate::import::parallel::map;
+use crate::import::parallel::{map, map_with};
 use crate::limits::{Deadline, Stopped};
 use crate::mesh::vector::{cross, dot, sub};
-use std::ops::Range;
 
 /// Triangles handed to a thread at a time.
 const TRIANGLES_PER_PIECE: usize = 16_384;
+const _: () = assert!(3 * TRIANGLES_PER_PIECE <= CORNERS_MAX);
+/// Positions, likewise.
+const POSITIONS_PER_PIECE: usize = 32_768;
+/// Triangles whose normals are made unit at a time.
+const BLOCK: usize = 64;
 
 /// A box around some positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,51 +48,84 @@ impl Bounds {
         }
     }
 
+    /// The box scaled by a power of two.
+    #[must_use]
+    pub fn scaled(&self, by: Pow2) -> Self {
+        Self { low: by.of3(self.low), high: by.of3(self.high) }
+    }
+
     /// The largest magnitude of a coordinate; infinite without a position.
     pub fn largest(&self) -> f64 {
         max_abs(&self.low).max(max_abs(&self.high))
     }
 }
 
-/// The box around the triangles whose corners are all usable, and true if f32 has all of their
-/// coordinates exactly.
-pub fn survey<G: Geometry>(geometry: &G, deadline: &Deadline) -> Result<(Bounds, bool), Stopped> {
-    let pieces = map(pieces(geometry.triangles()), |piece| {
+/// The largest magnitude among usable positions, and true if f32 has all of these exactly.
+pub fn survey(positions: &[[f64; 3]], deadline: &Deadline) -> Result<(f64, bool), Stopped> {
+    let pieces = map(positions.chunks(POSITIONS_PER_PIECE).collect(), |piece: &[[f64; 3]]| {
         deadline.check()?;
-        let (mut bounds, mut is_f32) = (Bounds::EMPTY, true);
-        for triangle in piece {
-            let [a, b, c] = geometry.corners(triangle);
-            if is_usable(&a) & is_usable(&b) & is_usable(&c) {
-                bounds = bounds.with(a).with(b).with(c);
-                is_f32 &= has_f32(a) & has_f32(b) & has_f32(c);
+        let (mut largest, mut is_f32) = ([0.0_f64; 3], true);
+        for p in piece.iter().filter(|p| is_usable(p)) {
+            for (largest, c) in largest.iter_mut().zip(p) {
+                *largest = if c.abs() > *largest { c.abs() } else { *largest };
             }
+            is_f32 &= has_f32(*p);
         }
-        Ok((bounds, is_f32))
+        Ok((max_abs(&largest), is_f32))
     });
-    let mut all = (Bounds::EMPTY, true);
+    let mut all = (0.0_f64, true);
     for piece in pieces {
-        let (bounds, is_f32) = piece?;
-        all = (all.0.union(bounds), all.1 & is_f32);
+        let (largest, is_f32) = piece?;
+        all = (all.0.max(largest), all.1 & is_f32);
     }
     Ok(all)
 }
 
+/// True if f32 has all coordinates of the usable triangles exactly.
+pub fn have_f32<G: Geometry>(geometry: &G, deadline: &Deadline) -> Result<bool, Stopped> {
+    for triangle in 0..geometry.triangles() {
+        if triangle.is_multiple_of(TRIANGLES_PER_PIECE) {
+            deadline.check()?;
+        }
+        let corners = geometry.corners(triangle);
+        if corners.iter().all(is_usable) && !corners.into_iter().all(has_f32) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
 /// The faces of a mesh.
 #[derive(Debug)]
-pub struct Faces {
+pub struct Faces<K> {
     /// A unit normal for each.
     pub normals: Vec<[f32; 3]>,
+    /// The corners of each, as numbers in its piece.
+    pub triangles: Vec<[u32; 3]>,
+    /// The pieces, in order.
+    pub pieces: Vec<Piece<K>>,
     /// The triangle of each; None if all triangles are faces.
     pub kept: Option<Vec<u32>>,
-    /// The box around them, scaled.
+    /// The box around them.
     pub bounds: Bounds,
+    /// The box around the triangles whose corners are all usable.
+    pub usable: Bounds,
     /// Triangles with a corner that is NaN or infinite.
     pub nonfinite: u64,
     /// Triangles without an area.
     pub degenerate: u64,
 }
 
-impl Faces {
+/// Some faces that follow each other.
+#[derive(Debug)]
+pub struct Piece<K> {
+    /// How many.
+    pub faces: usize,
+    /// Their distinct corners, in the order of their first use.
+    pub keys: Vec<K>,
+}
+
+impl<K> Faces<K> {
     /// The triangle of a face.
     #[inline]
     pub fn triangle(&self, face: usize) -> usize {
@@ -95,37 +133,44 @@ impl Faces {
     }
 }
 
-/// Picks the faces; `down` brings their positions to about 1, so that no relevant product over- or
-/// underflows.
-pub fn pick<G: Geometry>(geometry: &G, down: Pow2, deadline: &Deadline) -> Result<Faces, Stopped> {
-    let mut normals = vec![[0.0_f32; 3]; geometry.triangles()];
-    let places = pieces(geometry.triangles()).into_iter().zip(normals.chunks_mut(TRIANGLES_PER_PIECE)).collect();
-    let done = map(places, |(piece, normals)| {
-        deadline.check()?;
-        let (mut bounds, mut nonfinite, mut degenerate) = (Bounds::EMPTY, 0, 0);
-        for (triangle, place) in piece.zip(normals) {
-            let [a, b, c] = geometry.corners(triangle);
-            // NaN marks a triangle that is no face.
-            *place = [f32::NAN; 3];
-            if !(is_usable(&a) & is_usable(&b) & is_usable(&c)) {
-                nonfinite += 1;
-                continue;
-            }
-            let (a, b, c) = (down.of3(a), down.of3(b), down.of3(c));
-            match face_normal(a, b, c) {
-                Some([x, y, z]) => {
-                    *place = [x as f32, y as f32, z as f32];
-                    bounds = bounds.with(a).with(b).with(c);
-                }
-                None => degenerate += 1,
-            }
-        }
-        Ok((bounds, nonfinite, degenerate))
-    });
-    let mut faces = Faces { normals: Vec::new(), kept: None, bounds: Bounds::EMPTY, nonfinite: 0, degenerate: 0 };
-    for piece in done {
-        let (bounds, nonfinite, degenerate) = piece?;
+/// Picks the faces. `down` brings their positions to about 1, so that no relevant product over- or
+/// underflows. None is for positions that f32 has exactly: then none does anyway, and scaling by
+/// powers of two changes no bit of a normal.
+pub fn pick<G: Geometry>(geometry: &G, down: Option<Pow2>, deadline: &Deadline) -> Result<Faces<G::Key>, Stopped> {
+    match down {
+        None => pick_scaled(geometry, |p| p, deadline),
+        Some(down) => pick_scaled(geometry, |p| down.of3(p), deadline),
+    }
+}
+
+fn pick_scaled<G: Geometry>(
+    geometry: &G,
+    scale: impl Fn([f64; 3]) -> [f64; 3] + Sync + Send,
+    deadline: &Deadline,
+) -> Result<Faces<G::Key>, Stopped> {
+    let count = geometry.triangles();
+    let (mut normals, mut triangles) = (vec![[0.0_f32; 3]; count], vec![[0_u32; 3]; count]);
+    let places = normals.chunks_mut(TRIANGLES_PER_PIECE).zip(triangles.chunks_mut(TRIANGLES_PER_PIECE));
+    let done =
+        map_with((0..).step_by(TRIANGLES_PER_PIECE).zip(places).collect(), Local::new, |local, (begin, (n, t))| {
+            deadline.check()?;
+            Ok(pick_piece(geometry, begin, &scale, (n, t), local))
+        });
+    let mut faces = Faces {
+        normals: Vec::new(),
+        triangles: Vec::new(),
+        pieces: Vec::with_capacity(done.len()),
+        kept: None,
+        bounds: Bounds::EMPTY,
+        usable: Bounds::EMPTY,
+        nonfinite: 0,
+        degenerate: 0,
+    };
+    for done in done {
+        let Picked { piece, bounds, usable, nonfinite, degenerate } = done?;
+        faces.pieces.push(piece);
         faces.bounds = faces.bounds.union(bounds);
+        faces.usable = faces.usable.union(usable);
         faces.nonfinite += nonfinite;
         faces.degenerate += degenerate;
     }
@@ -133,10 +178,72 @@ pub fn pick<G: Geometry>(geometry: &G, down: Pow2, deadline: &Deadline) -> Resul
         let is_face = |normal: &[f32; 3]| !normal[0].is_nan();
         let kept = (0..).zip(&normals).filter(|(_, normal)| is_face(normal)).map(|(triangle, _)| triangle);
         faces.kept = Some(kept.collect());
+        let mut of_triangles = normals.iter();
+        triangles.retain(|_| of_triangles.next().is_some_and(is_face));
         normals.retain(is_face);
     }
-    faces.normals = normals;
+    (faces.normals, faces.triangles) = (normals, triangles);
     Ok(faces)
+}
+
+/// What was found in a piece.
+struct Picked<K> {
+    piece: Piece<K>,
+    bounds: Bounds,
+    usable: Bounds,
+    nonfinite: u64,
+    degenerate: u64,
+}
+
+/// Fills in the normals of some triangles from `begin` on, with NaN for those that are no faces, and
+/// the local numbers of the others' corners.
+fn pick_piece<G: Geometry>(
+    geometry: &G,
+    begin: usize,
+    scale: impl Fn([f64; 3]) -> [f64; 3],
+    (normals, triangles): (&mut [[f32; 3]], &mut [[u32; 3]]),
+    local: &mut Local<G::Key>,
+) -> Picked<G::Key> {
+    let piece = begin..begin + normals.len();
+    local.begin(3 * normals.len(), piece.clone().flat_map(|triangle| geometry.keys(triangle)));
+    let (mut usable, mut nonfinite, mut degenerate) = (Bounds::EMPTY, 0, 0);
+    let blocks = normals.chunks_mut(BLOCK).zip(triangles.chunks_mut(BLOCK));
+    for (begin, (normals, triangles)) in piece.clone().step_by(BLOCK).zip(blocks) {
+        let mut all = [Normal::default(); BLOCK];
+        for (triangle, normal) in (begin..).zip(&mut all[..normals.len()]) {
+            let [a, b, c] = geometry.corners(triangle);
+            if is_usable(&a) & is_usable(&b) & is_usable(&c) {
+                usable = usable.with(a).with(b).with(c);
+                *normal = Normal::of(scale(a), scale(b), scale(c));
+            }
+        }
+        for (place, normal) in normals.iter_mut().zip(&all) {
+            *place = normal.unit();
+        }
+        for (triangle, (normal, place)) in (begin..).zip(normals.iter_mut().zip(triangles)) {
+            let keys = geometry.keys(triangle);
+            if normal[0].is_nan() {
+                match sliver(geometry.corners(triangle), &scale) {
+                    Some(Some(n)) => *normal = n,
+                    Some(None) => degenerate += 1,
+                    None => nonfinite += 1,
+                }
+            }
+            if !normal[0].is_nan() {
+                let [a, b, c] = keys;
+                *place = [local.number(a), local.number(b), local.number(c)];
+            }
+        }
+    }
+    let is_face = |normal: &&[f32; 3]| !normal[0].is_nan();
+    let mut bounds = usable;
+    if degenerate > 0 {
+        let faces = piece.zip(normals.iter()).filter(|(_, normal)| is_face(normal));
+        let corners = faces.flat_map(|(triangle, _)| geometry.corners(triangle));
+        bounds = corners.fold(Bounds::EMPTY, Bounds::with);
+    }
+    let piece = Piece { faces: normals.iter().filter(is_face).count(), keys: local.finish() };
+    Picked { piece, bounds, usable, nonfinite, degenerate }
 }
 
 /// True if f32 has these coordinates exactly.
@@ -146,34 +253,94 @@ fn has_f32(p: [f64; 3]) -> bool {
     is_exact(p[0]) & is_exact(p[1]) & is_exact(p[2])
 }
 
-fn pieces(triangles: usize) -> Vec<Range<usize>> {
-    let begins = (0..triangles).step_by(TRIANGLES_PER_PIECE);
-    begins.map(|begin| begin..(begin + TRIANGLES_PER_PIECE).min(triangles)).collect()
+/// A normal of any length, and the square of its length.
+#[derive(Clone, Copy, Default)]
+struct Normal {
+    n: [f64; 3],
+    length2: f64,
 }
 
-/// The unit normal, or none if the area is exactly zero. Good for edges of any length.
-#[inline(always)]
-fn face_normal(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> Option<[f64; 3]> {
-    let (e, f) = (sub(b, a), sub(c, a));
-    let n = cross(e, f);
-    let length2 = dot(n, n);
-    if length2 > 1e-200 {
-        let length = length2.sqrt();
-        return Some([n[0] / length, n[1] / length, n[2] / length]);
+impl Normal {
+    #[inline(always)]
+    fn of(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> Self {
+        let n = cross(sub(b, a), sub(c, a));
+        Self { n, length2: dot(n, n) }
     }
-    sliver_normal(e, f)
+
+    /// The unit normal; NaN for tiny edges or a sliver: products may have underflowed.
+    #[inline(always)]
+    fn unit(&self) -> [f32; 3] {
+        let length = if self.length2 > 1e-200 { self.length2.sqrt() } else { f64::NAN };
+        [(self.n[0] / length) as f32, (self.n[1] / length) as f32, (self.n[2] / length) as f32]
+    }
 }
 
-/// As [`face_normal`], for tiny edges or a sliver: products may have underflowed.
+/// The unit normal of any triangle with usable corners, or none if the area is exactly zero. Good
+/// for edges of any length.
 #[cold]
-fn sliver_normal(e: [f64; 3], f: [f64; 3]) -> Option<[f64; 3]> {
-    let (e, f) = (rescale(e)?, rescale(f)?);
-    let n = rescale(cross(e, f))?;
-    let length = dot(n, n).sqrt();
-    Some(n.map(|x| x / length))
+fn sliver(corners: [[f64; 3]; 3], scale: impl Fn([f64; 3]) -> [f64; 3]) -> Option<Option<[f32; 3]>> {
+    if !corners.iter().all(is_usable) {
+        return None;
+    }
+    let [a, b, c] = corners.map(scale);
+    let normal = || {
+        let (e, f) = (rescale(sub(b, a))?, rescale(sub(c, a))?);
+        let n = rescale(cross(e, f))?;
+        let length = dot(n, n).sqrt();
+        Some(n.map(|x| (x / length) as f32))
+    };
+    Some(normal())
 }
 
 fn rescale(v: [f64; 3]) -> Option<[f64; 3]> {
     let size = max_abs(&v);
     (size > 0.0).then(|| Pow2::new(-exponent(size)).of3(v))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::import::noise::Noise;
+    use crate::import::normalise::geometry::Indexed;
+
+    /// Triangles of f32 corners of any size, many without an area or a finite corner.
+    fn odd_triangles(noise: &mut Noise, exponents: u64) -> Vec<[f64; 3]> {
+        let mut corner = || {
+            let sign = noise.below(2) << 31;
+            let exponent = 127 - exponents / 2 + noise.below(exponents);
+            let bits = (sign | exponent << 23 | noise.below(1 << 23)) as u32;
+            match noise.below(40) {
+                0 => f64::NAN,
+                1..8 => 0.0,
+                8..12 => 1.0,
+                _ => f64::from(f32::from_bits(bits)),
+            }
+        };
+        (0..60_000).map(|_| std::array::from_fn(|_| corner())).collect()
+    }
+
+    #[test]
+    fn scaling_changes_no_face_of_f32() {
+        let mut noise = Noise(7);
+        let triangles: Vec<[u32; 3]> = (0..20_000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        for exponents in [1, 20, 254] {
+            let mut positions = odd_triangles(&mut noise, exponents);
+            // Slivers and triangles without an area.
+            for corners in positions.chunks_exact_mut(3).step_by(7) {
+                corners[2] = std::array::from_fn(|k| corners[0][k] * 0.5 + corners[1][k] * 0.5);
+                corners[2] = corners[2].map(|c| f64::from(c as f32));
+            }
+            let geometry = Indexed { positions: &positions, triangles: &triangles };
+            let pick = |down: Option<i32>| pick(&geometry, down.map(Pow2::new), &Deadline::default()).unwrap();
+            let plain = pick(None);
+            assert!(plain.nonfinite > 100 && plain.degenerate > 10, "{} {}", plain.nonfinite, plain.degenerate);
+            let bits = |faces: &Faces<u32>| faces.normals.iter().map(|n| n.map(f32::to_bits)).collect::<Vec<_>>();
+            for down in [-128, -1, 3, 100] {
+                let scaled = pick(Some(down));
+                assert!(bits(&plain) == bits(&scaled) && plain.kept == scaled.kept, "{exponents} {down}");
+                assert_eq!((plain.bounds, plain.usable), (scaled.bounds, scaled.usable));
+                assert_eq!([plain.nonfinite, plain.degenerate], [scaled.nonfinite, scaled.degenerate]);
+            }
+        }
+    }
 }

@@ -5,20 +5,56 @@ use crate::import::raw::Soup;
 
 /// Triangles and positions, wherever they are stored.
 pub trait Geometry: Sync {
+    /// What tells corners apart: corners with equal keys have equal positions.
+    type Key: Key;
+
     /// Number of triangles.
     fn triangles(&self) -> usize;
-    /// Number of vertices.
-    fn vertices(&self) -> usize;
-    /// The vertices of a triangle.
-    fn triangle(&self, triangle: usize) -> [u32; 3];
-    /// The position of a vertex, in the file's units.
-    fn position(&self, vertex: u32) -> [f64; 3];
+    /// The keys of a triangle's corners.
+    fn keys(&self, triangle: usize) -> [Self::Key; 3];
+    /// The position of a corner, in the file's units.
+    fn position(&self, key: Self::Key) -> [f64; 3];
+    /// The vertices that keys are indices of, or none where keys are positions.
+    fn vertices(&self) -> Option<&[[f64; 3]]>;
 
     /// The corners of a triangle.
     #[inline(always)]
     fn corners(&self, triangle: usize) -> [[f64; 3]; 3] {
-        let [a, b, c] = self.triangle(triangle);
+        let [a, b, c] = self.keys(triangle);
         [self.position(a), self.position(b), self.position(c)]
+    }
+}
+
+/// Tells corners apart.
+pub trait Key: Copy + Eq + Send + Sync {
+    /// A number below 2^32 that is unique among keys, if there is one.
+    fn index(self) -> Option<u32>;
+    /// Three words that equal keys, and they alone, have in common.
+    fn words(self) -> [u32; 3];
+}
+
+impl Key for u32 {
+    #[inline(always)]
+    fn index(self) -> Option<u32> {
+        Some(self)
+    }
+
+    #[inline(always)]
+    fn words(self) -> [u32; 3] {
+        [self, 0, 0]
+    }
+}
+
+/// The bits of a position.
+impl Key for [u32; 3] {
+    #[inline(always)]
+    fn index(self) -> Option<u32> {
+        None
+    }
+
+    #[inline(always)]
+    fn words(self) -> [u32; 3] {
+        self
     }
 }
 
@@ -31,16 +67,14 @@ pub struct Indexed<'a> {
 }
 
 impl Geometry for Indexed<'_> {
+    type Key = u32;
+
     fn triangles(&self) -> usize {
         self.triangles.len()
     }
 
-    fn vertices(&self) -> usize {
-        self.positions.len()
-    }
-
     #[inline(always)]
-    fn triangle(&self, triangle: usize) -> [u32; 3] {
+    fn keys(&self, triangle: usize) -> [u32; 3] {
         self.triangles[triangle]
     }
 
@@ -48,25 +82,30 @@ impl Geometry for Indexed<'_> {
     fn position(&self, vertex: u32) -> [f64; 3] {
         self.positions[vertex as usize]
     }
+
+    fn vertices(&self) -> Option<&[[f64; 3]]> {
+        Some(self.positions)
+    }
 }
 
 impl Geometry for Soup {
+    type Key = [u32; 3];
+
     fn triangles(&self) -> usize {
         Soup::triangles(self)
     }
 
-    fn vertices(&self) -> usize {
-        Soup::triangles(self) * 3
+    #[inline(always)]
+    fn keys(&self, triangle: usize) -> [[u32; 3]; 3] {
+        Soup::corners(self, triangle)
     }
 
     #[inline(always)]
-    fn triangle(&self, triangle: usize) -> [u32; 3] {
-        let first = triangle as u32 * 3;
-        [first, first + 1, first + 2]
+    fn position(&self, [x, y, z]: [u32; 3]) -> [f64; 3] {
+        [f64::from(f32::from_bits(x)), f64::from(f32::from_bits(y)), f64::from(f32::from_bits(z))]
     }
 
-    #[inline(always)]
-    fn position(&self, vertex: u32) -> [f64; 3] {
-        self.corner(vertex as usize / 3, vertex as usize % 3)
+    fn vertices(&self) -> Option<&[[f64; 3]]> {
+        None
     }
 }

@@ -6,20 +6,23 @@
 pub(crate) mod attributes;
 mod faces;
 mod geometry;
+mod hasher;
+mod local;
 mod number;
 pub(crate) mod pow2;
 pub(crate) mod precision;
 #[cfg(test)]
 mod tests;
-pub(crate) mod weld;
+mod weld;
 use self::attributes::Attributes;
 use self::faces::{Bounds, Faces};
 use self::geometry::{Geometry, Indexed};
-use self::number::Numbered;
+use self::number::{Numbered, is_collapsed, number};
 use self::pow2::{Pow2, exponent, is_usable, max_abs};
 use super::raw::RawMesh;
 use super::{ImportReport, Imported, MeshError, MeshFault};
 use crate::import::context::Context;
+use crate::import::parallel::map;
 use crate::limits::Stopped;
 use crate::mesh::vector::sub;
 use crate::mesh::{LineOrPoint, MaterialSlot, Mesh, ToFile, primitives};
@@ -31,7 +34,7 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     let (positions, triangles) = (std::mem::take(&mut raw.positions), std::mem::take(&mut raw.triangles));
     let indexed = Indexed { positions: &positions, triangles: &triangles };
     let [triangle_count, vertex_count] = match &soup {
-        Some(soup) => [soup.triangles(), soup.vertices()],
+        Some(soup) => [soup.triangles(), 3 * soup.triangles()],
         None => [triangles.len(), positions.len()],
     };
     cx.check_triangles(triangle_count as u64 + primitives::triangles(&raw.lines_and_points))?;
@@ -40,20 +43,21 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     if vertex_count > VERTICES_MAX {
         return Err(MeshError::new(MeshFault::Unsupported, "the mesh has more than a billion corners or vertices"));
     }
-    cx.budget.spend("the welded vertices", vertex_count as u64, BYTES_PER_VERTEX)?;
+    cx.budget.spend("the welded vertices", vertex_count as u64, number::BYTES_PER_VERTEX)?;
 
     let (mut mesh, kept) = match &soup {
-        Some(soup) => shape(soup, true, &mut raw, cx)?,
-        None => shape(&indexed, false, &mut raw, cx)?,
+        Some(soup) => shape(soup, &mut raw, cx)?,
+        None => shape(&indexed, &mut raw, cx)?,
     };
     drop(positions);
     let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
     if has_attributes {
+        let of_soup = |triangle| [3 * triangle, 3 * triangle + 1, 3 * triangle + 2];
         mesh.attribute_triangles = match (&soup, &kept) {
             (None, None) => triangles,
             (None, Some(kept)) => kept.iter().map(|&triangle| triangles[triangle as usize]).collect(),
-            (Some(soup), None) => (0..soup.triangles()).map(|triangle| soup.triangle(triangle)).collect(),
-            (Some(soup), Some(kept)) => kept.iter().map(|&triangle| soup.triangle(triangle as usize)).collect(),
+            (Some(soup), None) => (0..soup.triangles() as u32).map(of_soup).collect(),
+            (Some(_), Some(kept)) => kept.iter().map(|&triangle| of_soup(triangle)).collect(),
         };
     }
     mesh.edge_masks = pick(std::mem::take(&mut raw.edge_masks), kept.as_deref());
@@ -65,8 +69,9 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     }
     (mesh.normals, mesh.uvs, mesh.colors) = (normals, uvs, colors);
     mesh.materials = raw.materials;
-    let of_lines_and_points = mesh.lines_and_points.iter().map(|one| one.material);
-    let slots = mesh.triangle_materials.iter().copied().chain(of_lines_and_points).max().unwrap_or(0) as usize + 1;
+    let of_triangles = mesh.triangle_materials.iter().copied().max();
+    let of_lines_and_points = mesh.lines_and_points.iter().map(|one| one.material).max();
+    let slots = of_triangles.max(of_lines_and_points).unwrap_or(0) as usize + 1;
     while mesh.materials.len() < slots {
         mesh.materials.push(MaterialSlot::default());
     }
@@ -79,37 +84,46 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
 /// unless all triangles are faces.
 fn shape<G: Geometry>(
     geometry: &G,
-    is_soup: bool,
     raw: &mut RawMesh,
     cx: &Context<'_>,
 ) -> Result<(Mesh, Option<Vec<u32>>), MeshError> {
-    let (around_usable, has_only_f32) = faces::survey(geometry, cx.deadline)?;
-    if raw.is_f32 && has_only_f32 {
-        raw.report.warnings.extend(precision::warning(&around_usable));
+    let vertices = geometry.vertices().unwrap_or_default();
+    let vertex = |v: u32| vertices.get(v as usize).copied().unwrap_or([f64::NAN; 3]);
+    // Triangles without vertices of their own are f32.
+    let (largest_of_all, has_only_f32) = faces::survey(vertices, cx.deadline)?;
+    // All vertices are likely used. If their largest decides, the faces are picked once.
+    let guess = (!has_only_f32).then(|| scale_exponent(largest_of_all));
+    let mut faces = faces::pick(geometry, guess.map(|exponent| Pow2::new(-exponent)), cx.deadline)?;
+    if raw.is_f32 && (has_only_f32 || faces::have_f32(geometry, cx.deadline)?) {
+        raw.report.warnings.extend(precision::warning(&faces.usable));
     }
-    raw.report.dropped_lines_and_points = drop_bad(geometry, &mut raw.lines_and_points);
-    let of_lines = raw.lines_and_points.iter().flat_map(|one| one.ends).map(|v| geometry.position(v));
+    raw.report.dropped_lines_and_points = drop_bad(vertex, &mut raw.lines_and_points);
+    let of_lines = raw.lines_and_points.iter().flat_map(|one| one.ends).map(vertex);
     let around_lines = of_lines.fold(Bounds::EMPTY, Bounds::with);
     // The largest magnitude becomes about 1. After that no relevant product over- or underflows.
-    let largest = around_usable.union(around_lines).largest();
-    let file_exponent = if largest > 0.0 && largest.is_finite() { exponent(largest) } else { 0 };
+    let file_exponent = scale_exponent(faces.usable.union(around_lines).largest());
     let down = Pow2::new(-file_exponent);
-
-    let faces = faces::pick(geometry, down, cx.deadline)?;
+    if guess.is_some_and(|guess| guess != file_exponent) {
+        faces = faces::pick(geometry, Some(down), cx.deadline)?;
+    }
     raw.report.dropped_nonfinite_faces = faces.nonfinite;
     raw.report.dropped_degenerate_faces = faces.degenerate;
     if faces.normals.is_empty() && raw.lines_and_points.is_empty() {
         return Err(empty(&raw.report));
     }
-    let of_lines = raw.lines_and_points.iter().flat_map(|one| one.ends).map(|v| down.of3(geometry.position(v)));
-    let unit_box = UnitBox::around(of_lines.fold(faces.bounds, Bounds::with));
-    let (mut mesh, kept) = weld(geometry, is_soup, faces, (down, &unit_box), raw, cx)?;
+    let unit_box = UnitBox::around(faces.bounds.union(around_lines).scaled(down));
+    let (mut mesh, kept) = weld(geometry, faces, (down, &unit_box), raw, cx)?;
     if mesh.triangles.is_empty() && mesh.lines_and_points.is_empty() {
         return Err(empty(&raw.report));
     }
     mesh.bounds = bounds(&mesh.positions);
     mesh.to_file = unit_box.to_file(file_exponent);
     Ok((mesh, kept))
+}
+
+/// The exponent of the power of two that positions up to `largest` are divided by.
+fn scale_exponent(largest: f64) -> i32 {
+    if largest > 0.0 && largest.is_finite() { exponent(largest) } else { 0 }
 }
 
 /// The items of the kept triangles.
@@ -120,15 +134,15 @@ fn pick<T: Copy>(all: Vec<T>, kept: Option<&[u32]>) -> Vec<T> {
     }
 }
 
+/// Positions handed to a thread at a time.
+const POSITIONS_PER_PIECE: usize = 65_536;
 /// Most vertices, or corners of triangles that share none. Welding marks numbers with a bit.
 const VERTICES_MAX: usize = 1 << 30;
-/// Memory beside the raw mesh: a face, its normal, two index triples, a mask and a material.
-const BYTES_PER_TRIANGLE: u64 = 20 + 12 + 12 + 12 + 1 + 4;
+/// Memory beside the raw mesh: a triangle's normal, its distinct corners in its piece, its number
+/// among all and among those that are left, two index triples, a mask and a material.
+const BYTES_PER_TRIANGLE: u64 = 12 + 12 + 4 + 8 + 12 + 12 + 1 + 4;
 /// Two index pairs and a material.
 const BYTES_PER_LINE_OR_POINT: u64 = 8 + 8 + 4;
-/// Welding, and a number in the order of first use with its position.
-const BYTES_PER_VERTEX: u64 = weld::BYTES_PER_POSITION + 4 + 12;
-
 /// The map from (scaled) file space to the unit box.
 struct UnitBox {
     centre: [f64; 3],
@@ -165,21 +179,16 @@ impl UnitBox {
 /// corners became equal.
 fn weld<G: Geometry>(
     geometry: &G,
-    is_soup: bool,
-    mut faces: Faces,
+    mut faces: Faces<G::Key>,
     (down, unit_box): (Pow2, &UnitBox),
     raw: &mut RawMesh,
     cx: &Context<'_>,
 ) -> Result<(Mesh, Option<Vec<u32>>), Stopped> {
-    let position = |v: u32| unit_box.to_unit(down.of3(geometry.position(v)));
-    let Numbered { positions, mut triangles, ends } = if is_soup {
-        number::corners(geometry, &faces, position, cx.deadline)?
-    } else {
-        number::vertices(geometry, &faces, raw.lines_and_points.iter().map(|one| one.ends), position, cx.deadline)?
-    };
-    let is_collapsed = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
-    let collapsed = triangles.iter().filter(|triangle| is_collapsed(triangle)).count();
-    raw.report.dropped_collapsed_faces = collapsed as u64;
+    let position = |p: [f64; 3]| unit_box.to_unit(down.of3(p));
+    let ends = raw.lines_and_points.iter().map(|one| one.ends);
+    let Numbered { positions, ends, collapsed } = number(geometry, &mut faces, ends, position, cx.deadline)?;
+    let mut triangles = std::mem::take(&mut faces.triangles);
+    raw.report.dropped_collapsed_faces = collapsed;
     if collapsed > 0 {
         let left: Vec<usize> = (0..triangles.len()).filter(|&face| !is_collapsed(&triangles[face])).collect();
         faces.kept = Some(left.iter().map(|&face| faces.triangle(face) as u32).collect());
@@ -222,9 +231,13 @@ fn drop_unused(mesh: &mut Mesh) {
 }
 
 fn bounds(positions: &[[f32; 3]]) -> [[f32; 3]; 2] {
-    positions.iter().fold([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]], |[low, high], p| {
-        [std::array::from_fn(|k| low[k].min(p[k])), std::array::from_fn(|k| high[k].max(p[k]))]
-    })
+    let empty = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+    let with = |[low, high]: [[f32; 3]; 2], [l, h]: [&[f32; 3]; 2]| {
+        [std::array::from_fn(|k| low[k].min(l[k])), std::array::from_fn(|k| high[k].max(h[k]))]
+    };
+    let around = |piece: &[[f32; 3]]| piece.iter().fold(empty, |bounds, p| with(bounds, [p, p]));
+    let pieces = map(positions.chunks(POSITIONS_PER_PIECE).collect(), around);
+    pieces.iter().fold(empty, |bounds, [low, high]| with(bounds, [low, high]))
 }
 
 fn empty(report: &ImportReport) -> MeshError {
@@ -251,10 +264,10 @@ fn empty(report: &ImportReport) -> MeshError {
 
 /// Drops lines and points with an unusable end, and segments without a length. Returns their
 /// number.
-fn drop_bad<G: Geometry>(geometry: &G, lines_and_points: &mut Vec<LineOrPoint>) -> u64 {
+fn drop_bad(vertex: impl Fn(u32) -> [f64; 3], lines_and_points: &mut Vec<LineOrPoint>) -> u64 {
     let before = lines_and_points.len();
     lines_and_points.retain(|one| {
-        let [a, b] = one.ends.map(|v| geometry.position(v));
+        let [a, b] = one.ends.map(&vertex);
         is_usable(&a) && is_usable(&b) && (one.is_point() || a != b)
     });
     (before - lines_and_points.len()) as u64

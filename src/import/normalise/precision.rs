@@ -67,15 +67,22 @@ mod tests {
 
     #[test]
     fn only_coordinates_of_f32_are_called_coarse() {
-        use crate::import::normalise::faces::survey;
+        use crate::import::normalise::faces::{have_f32, pick, survey};
         use crate::import::normalise::geometry::Indexed;
         let triangles = [[0, 1, 2], [0, 1, 3]];
-        let survey = |x: f64| {
+        let check = |x: f64| {
             let positions = [[1e9, 0.0, 0.0], [x, 0.0, 0.0], [1e9, 64.0, 0.0], [f64::NAN; 3]];
-            survey(&Indexed { positions: &positions, triangles: &triangles }, &Deadline::default()).unwrap()
+            let geometry = Indexed { positions: &positions, triangles: &triangles };
+            let usable = pick(&geometry, None, &Deadline::default()).unwrap().usable;
+            (
+                usable,
+                survey(&positions, &Deadline::default()).unwrap(),
+                have_f32(&geometry, &Deadline::default()).unwrap(),
+            )
         };
         let bounds = Bounds { low: [1e9, 0.0, 0.0], high: [1e9 + 64.0, 64.0, 0.0] };
-        assert_eq!(survey(1e9 + 64.0), (bounds, true));
-        assert!(!survey(1e9 + 0.5).1);
+        assert_eq!(check(1e9 + 64.0), (bounds, (1e9 + 64.0, true), true));
+        let (_, survey, have_f32) = check(1e9 + 0.5);
+        assert_eq!((survey, have_f32), ((1e9 + 0.5, false), false));
     }
 }

@@ -83,3 +83,21 @@ fn soups_and_indices_agree_on_any_number_of_threads() {
     }
     assert!(dropped[0] > 100 && dropped[1] > 100, "{dropped:?}");
 }
+
+#[test]
+fn what_no_face_uses_changes_nothing() {
+    let mesh = |unused: &[[f64; 3]]| {
+        let corners = corners(20, 0);
+        let mut raw = raw(&corners, false);
+        raw.positions.iter_mut().flatten().for_each(|c| *c *= 0.1);
+        raw.colors.clear();
+        raw.positions.extend(unused);
+        let Imported { mesh, report } = finish(raw);
+        format!("{mesh:?} {report:?}")
+    };
+    let plain = mesh(&[]);
+    // The first decides at what scale faces are picked first.
+    for unused in [[1e30 + 0.1, 0.1, 0.1], [0.1, f64::INFINITY, 0.1], [f64::NAN; 3], [1e-30; 3]] {
+        assert!(mesh(&[unused]) == plain, "{unused:?}");
+    }
+}

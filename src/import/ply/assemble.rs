@@ -9,6 +9,7 @@ use crate::import::context::Context;
 use crate::import::polygon::{ALL_EDGES, Triangulator};
 use crate::import::raw::RawMesh;
 use crate::warning::Warning;
+use bytemuck::allocation::try_cast_vec;
 
 /// Corners between two deadline checks.
 const CORNERS_PER_POLL: usize = 65_536;
@@ -19,7 +20,7 @@ const VERTEX_BYTES: u64 = 2 * (24 + 12 + 8 + 16);
 /// if no face has one.
 pub fn assemble(
     vertices: Vertices,
-    faces: &Faces,
+    faces: &mut Faces,
     raw: &mut RawMesh,
     cx: &mut Context<'_>,
 ) -> Result<Vec<u32>, MeshError> {
@@ -27,21 +28,28 @@ pub fn assemble(
     let Vertices { positions, is_f32, normals, uvs, colors } = vertices;
     raw.is_f32 = is_f32;
     (raw.positions, raw.normals, raw.uvs, raw.colors) = (positions, normals, uvs, colors);
-    let mut splitter = Splitter::new(faces, raw, cx)?;
+    let is_needed = Splitter::is_needed_for(faces, raw);
     // An upper bound: every polygon has two triangles fewer than corners.
     let triangles = faces.corners.len() - 2 * faces.arities.len();
-    cx.check_triangles(triangles as u64)?;
-    cx.budget.spend("the PLY triangles", triangles as u64, 12 + 1 + 4 + 4)?;
-    raw.triangles.reserve_exact(triangles);
-    raw.edge_masks.reserve_exact(triangles);
-    if !splitter.is_needed() && faces.textures.is_empty() && faces.arities.iter().all(|arity| *arity == 3) {
+    if !is_needed && faces.textures.is_empty() && faces.arities.iter().all(|arity| *arity == 3) {
+        Splitter::new(faces, raw, cx)?;
+        cx.check_triangles(triangles as u64)?;
+        cx.budget.spend("the PLY triangles", triangles as u64, 12 + 1 + 4 + 4)?;
         cx.deadline.check()?;
-        raw.triangles.extend(faces.corners.chunks_exact(3).map(|face| [face[0], face[1], face[2]]));
-        raw.edge_masks.resize(triangles, ALL_EDGES);
+        raw.triangles = match try_cast_vec(std::mem::take(&mut faces.corners)) {
+            Ok(triangles) => triangles,
+            Err((_, corners)) => corners.chunks_exact(3).map(|face| [face[0], face[1], face[2]]).collect(),
+        };
+        raw.edge_masks = vec![ALL_EDGES; triangles];
         raw.triangle_materials = vec![0; triangles];
         raw.report.polygons_by_arity[3] += triangles as u64;
         return Ok(Vec::new());
     }
+    let mut splitter = Splitter::new(faces, raw, cx)?;
+    cx.check_triangles(triangles as u64)?;
+    cx.budget.spend("the PLY triangles", triangles as u64, 12 + 1 + 4 + 4)?;
+    raw.triangles.reserve_exact(triangles);
+    raw.edge_masks.reserve_exact(triangles);
     let mut textures = Vec::with_capacity(if faces.textures.is_empty() { 0 } else { triangles });
     let mut triangulator = Triangulator::default();
     let mut own = Vec::new();
@@ -116,6 +124,11 @@ impl<'a> Splitter<'a> {
             }
         }
         Ok(splitter)
+    }
+
+    /// True if corners of `faces` have attributes of their own.
+    fn is_needed_for(faces: &Faces, raw: &RawMesh) -> bool {
+        !faces.uvs.is_empty() || !faces.colors.is_empty() && raw.colors.is_empty()
     }
 
     fn is_needed(&self) -> bool {

@@ -43,7 +43,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let header = header::parse(bytes)?;
     check_counts(&header, bytes.len())?;
     let at = header.body_at;
-    let body = match header.encoding {
+    let mut body = match header.encoding {
         Encoding::Text => read_body(&mut Text::new(bytes, at, header.newline), &header, cx)?,
         Encoding::LittleEndian => read_body(&mut Binary::<false>::new(bytes, at), &header, cx)?,
         Encoding::BigEndian => read_body(&mut Binary::<true>::new(bytes, at), &header, cx)?,
@@ -54,7 +54,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let generator =
         metadata::first_comment(&bytes[..at], b"comment", |comment| header::texture_file(comment).is_some());
     raw.report.metadata = FileMetadata::by(generator);
-    let textures = assemble::assemble(body.vertices, &body.faces, &mut raw, cx)?;
+    let textures = assemble::assemble(body.vertices, &mut body.faces, &mut raw, cx)?;
     if body.faces.arities.is_empty() {
         body.edges.apply(&mut raw, cx)?;
     }

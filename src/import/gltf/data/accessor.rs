@@ -6,9 +6,12 @@ use super::buffers::{Buffers, View};
 use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::gltf::document::schema::{Accessor, Document, Sparse};
+use crate::import::parallel::map;
 
 /// Elements without data that even the smallest file may declare.
 const ZEROS_MAX: u64 = 1 << 16;
+/// Elements decoded by a thread at a time.
+const ELEMENTS_PER_PIECE: usize = 32_768;
 
 /// Reads accessors of one file.
 pub struct Reader<'a> {
@@ -75,17 +78,17 @@ impl<'a> Reader<'a> {
         let mut out = vec![[0.0; N]; shape.count as usize];
         if shape.component == Component::F32 {
             // The same without a decision for each number.
-            self.each(index, &shape, cx, |at, bytes| {
-                for (value, own) in out[at].iter_mut().zip(bytes.chunks_exact(4)) {
-                    *value = f64::from(f32::from_le_bytes([own[0], own[1], own[2], own[3]]));
-                }
-            })?;
+            let decode = |bytes: &[u8]| {
+                let number = |own: &[u8]| f64::from(f32::from_le_bytes([own[0], own[1], own[2], own[3]]));
+                std::array::from_fn(|k| number(&bytes[4 * k..4 * k + 4]))
+            };
+            self.fill(index, &shape, &mut out, decode, cx)?;
             return Ok(out);
         }
-        self.each(index, &shape, cx, |at, bytes| {
-            out[at] =
-                std::array::from_fn(|k| shape.component.decode(&bytes[k * size..(k + 1) * size], shape.normalised));
-        })?;
+        let decode = |bytes: &[u8]| {
+            std::array::from_fn(|k| shape.component.decode(&bytes[k * size..(k + 1) * size], shape.normalised))
+        };
+        self.fill(index, &shape, &mut out, decode, cx)?;
         Ok(out)
     }
 
@@ -100,7 +103,15 @@ impl<'a> Reader<'a> {
         cx.budget.spend("glTF indices", shape.count, 4)?;
         self.check_zeros(index, cx)?;
         let mut out = vec![0; shape.count as usize];
-        self.each(index, &shape, cx, |at, bytes| out[at] = decode_unsigned(bytes))?;
+        match shape.component {
+            Component::U16 => {
+                self.fill(index, &shape, &mut out, |b| u32::from(u16::from_le_bytes([b[0], b[1]])), cx)?;
+            }
+            Component::U32 => {
+                self.fill(index, &shape, &mut out, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]), cx)?;
+            }
+            _ => self.fill(index, &shape, &mut out, decode_unsigned, cx)?,
+        }
         Ok(out)
     }
 
@@ -126,14 +137,15 @@ impl<'a> Reader<'a> {
         Err(broken(index, &format!("has {count} elements and no data, in an upload that has room for {most}")))
     }
 
-    /// Gives every element's bytes to `take`: those of the buffer view, then the sparse
-    /// replacements.
-    fn each(
+    /// Fills in what `decode` makes of every element's bytes: those of the buffer view, then the
+    /// sparse replacements.
+    fn fill<T: Send>(
         &mut self,
         index: usize,
         shape: &Shape,
+        out: &mut [T],
+        decode: impl Fn(&[u8]) -> T + Sync + Send,
         cx: &mut Context<'_>,
-        mut take: impl FnMut(usize, &[u8]),
     ) -> Result<(), MeshError> {
         cx.deadline.check()?;
         let accessor = self.accessor(index)?;
@@ -145,12 +157,20 @@ impl<'a> Reader<'a> {
             let view = self.buffers.view(view.0, cx)?;
             let stride = view.stride_bytes.unwrap_or(size);
             let span = Span { offset: accessor.byte_offset.0, stride, size, component, count: shape.count };
-            for (at, bytes) in span.elements(&what, &view)? {
-                take(at, bytes);
-            }
+            let data = span.data(&what, &view)?;
+            let (stride, size) = (stride as usize, size as usize);
+            let pieces = (0..).step_by(ELEMENTS_PER_PIECE).zip(out.chunks_mut(ELEMENTS_PER_PIECE)).collect();
+            map(pieces, |(begin, out): (usize, &mut [T])| {
+                // The last element may end before its stride does.
+                for (place, bytes) in out.iter_mut().zip(data[begin * stride..].chunks(stride)) {
+                    *place = decode(&bytes[..size]);
+                }
+            });
         }
         match &accessor.sparse {
-            Some(sparse) => self.replace(index, sparse, shape.count, [component, size], cx, take),
+            Some(sparse) => {
+                self.replace(index, sparse, shape.count, [component, size], cx, |at, bytes| out[at] = decode(bytes))
+            }
             None => Ok(()),
         }
     }
@@ -177,14 +197,14 @@ impl<'a> Reader<'a> {
         let targets = self.buffers.view(sparse.indices.buffer_view.0, cx)?;
         let offset = sparse.indices.byte_offset.0;
         let span = Span { offset, stride: target, size: target, component: target, count: replaced };
-        let targets = span.elements(&what, &targets)?.map(|(_, bytes)| decode_unsigned(bytes));
+        let targets = span.elements(&what, &targets)?.map(decode_unsigned);
         cx.budget.spend("glTF indices", replaced, 4)?;
         let targets: Vec<u32> = targets.collect();
         let values = self.buffers.view(sparse.values.buffer_view.0, cx)?;
         let span = Span { offset: sparse.values.byte_offset.0, stride: size, size, component, count: replaced };
         let values = span.elements(&what, &values)?;
         let mut next = 0;
-        for (target, (_, bytes)) in targets.into_iter().zip(values) {
+        for (target, bytes) in targets.into_iter().zip(values) {
             if u64::from(target) >= count {
                 return Err(broken(index, &format!("has a sparse index {target}, and {count} elements")));
             }
@@ -209,12 +229,19 @@ struct Span {
 }
 
 impl Span {
-    /// The bytes of each element, after a check that all lie in the view and are aligned.
+    /// The bytes of each element, after the check of [`Self::data`].
     fn elements<'v>(
         self,
         what: &str,
         view: &'v View<'_>,
-    ) -> Result<impl Iterator<Item = (usize, &'v [u8])> + use<'v>, MeshError> {
+    ) -> Result<impl Iterator<Item = &'v [u8]> + use<'v>, MeshError> {
+        let data = self.data(what, view)?;
+        let (stride, size) = (self.stride as usize, self.size as usize);
+        Ok((0..self.count as usize).map(move |i| &data[i * stride..i * stride + size]))
+    }
+
+    /// The bytes from the first element on, after a check that all lie in the view and are aligned.
+    fn data<'v>(self, what: &str, view: &'v View<'_>) -> Result<&'v [u8], MeshError> {
         let Self { offset, stride, size, component, count } = self;
         let bytes = view.bytes();
         if stride < size {
@@ -240,9 +267,7 @@ impl Span {
             )));
         }
         // An empty accessor may have any offset.
-        let data = bytes.get(offset as usize..).unwrap_or_default();
-        let (stride, size) = (stride as usize, size as usize);
-        Ok((0..count as usize).map(move |i| (i, &data[i * stride..i * stride + size])))
+        Ok(bytes.get(offset as usize..).unwrap_or_default())
     }
 }
 

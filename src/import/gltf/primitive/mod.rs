@@ -22,6 +22,7 @@ use crate::import::raw::{RawMesh, extend_attribute};
 use crate::mesh::LineOrPoint;
 use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
 use crate::warning::Warning;
+use std::ops::Range;
 
 /// Decoded data of one primitive.
 #[derive(Debug, Default)]
@@ -107,8 +108,9 @@ impl Primitive {
         out.targets = vertices.targets(reader)?;
         let indices = vertices.indices(reader, cx)?;
         let count = out.positions.len();
-        out.triangles = triangles::of(what, vertices.mode(), indices.as_deref(), count, cx)?;
+        triangles::check_indices(what, indices.as_deref().unwrap_or_default(), count)?;
         out.lines_and_points = triangles::lines_and_points(vertices.mode(), indices.as_deref(), count, cx)?;
+        out.triangles = triangles::of(vertices.mode(), indices, count, cx)?;
         if source.has_ngons && vertices.mode() == mode::TRIANGLES {
             cx.budget.spend("glTF polygons", out.triangles.len() as u64, 1)?;
             (out.edge_masks, out.polygons_by_arity) = ngons::edge_masks(&out.triangles);
@@ -130,19 +132,9 @@ impl Primitive {
         let before = raw.positions.len();
         let after = before + self.positions.len();
         cx.deadline.check()?;
-        cx.check_triangles(raw.triangles.len() as u64 + self.triangle_count())?;
-        // Lists double when they grow.
-        cx.budget.spend("glTF vertices", self.positions.len() as u64, 2 * (24 + 12 + 8 + 16))?;
-        cx.budget.spend("glTF triangles", self.triangles.len() as u64, 2 * (12 + 1 + 4))?;
-        if after >= u32::MAX as usize {
-            return Err(MeshError::broken("the glTF file has more than 4 billion vertices, with its instances"));
-        }
+        self.pay(raw, cx)?;
         raw.positions.extend(shape.positions.iter().map(|p| transform.point(*p)));
-        let matrix = transform.normal_matrix();
-        let normals = shape.normals.iter().map(|n| turn(&matrix, n));
-        extend_attribute(&mut raw.normals, before, after, [0.0; 3], normals);
-        extend_attribute(&mut raw.uvs, before, after, [0.0; 2], self.uvs.iter().map(|t| t.map(|c| c as f32)));
-        extend_attribute(&mut raw.colors, before, after, [1.0; 4], self.colors.iter().map(|c| c.map(|v| v as f32)));
+        self.append_attributes(shape, raw, transform, before..after);
 
         let base = before as u32;
         let turns = transform.is_mirroring();
@@ -153,6 +145,63 @@ impl Primitive {
         }));
         let masks = self.edge_masks.iter().zip(&self.triangles);
         raw.edge_masks.extend(masks.map(|(&m, t)| if mirrored(t) { ngons::mirrored(m) } else { m }));
+        self.append_rest(raw, base, default_material, cx)
+    }
+
+    /// As [`Self::append`], for the only instance of a primitive that keeps its shape: its lists
+    /// become those of the mesh where that has none yet.
+    pub fn append_only(
+        mut self,
+        raw: &mut RawMesh,
+        transform: &Affine,
+        default_material: usize,
+        cx: &mut Context<'_>,
+    ) -> Result<(), MeshError> {
+        if !raw.positions.is_empty() || !raw.triangles.is_empty() || transform.is_mirroring() {
+            return self.append(&Shape::of(&self), raw, transform, default_material, cx);
+        }
+        cx.deadline.check()?;
+        self.pay(raw, cx)?;
+        self.append_attributes(&Shape::of(&self), raw, transform, 0..self.positions.len());
+        raw.positions = std::mem::take(&mut self.positions);
+        if *transform != Affine::IDENTITY {
+            raw.positions.iter_mut().for_each(|p| *p = transform.point(*p));
+        }
+        raw.triangles = std::mem::take(&mut self.triangles);
+        raw.edge_masks.extend(&self.edge_masks);
+        self.append_rest(raw, 0, default_material, cx)
+    }
+
+    /// Pays for an instance.
+    fn pay(&self, raw: &RawMesh, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        cx.check_triangles(raw.triangles.len() as u64 + self.triangle_count())?;
+        // Lists double when they grow.
+        cx.budget.spend("glTF vertices", self.positions.len() as u64, 2 * (24 + 12 + 8 + 16))?;
+        cx.budget.spend("glTF triangles", self.triangles.len() as u64, 2 * (12 + 1 + 4))?;
+        if raw.positions.len() + self.positions.len() >= u32::MAX as usize {
+            return Err(MeshError::broken("the glTF file has more than 4 billion vertices, with its instances"));
+        }
+        Ok(())
+    }
+
+    /// Adds the attributes of an instance whose vertices have the numbers `of`.
+    fn append_attributes(&self, shape: &Shape<'_>, raw: &mut RawMesh, transform: &Affine, of: Range<usize>) {
+        raw.report.file_vertices += of.len() as u64;
+        let matrix = transform.normal_matrix();
+        let normals = shape.normals.iter().map(|n| turn(&matrix, n));
+        extend_attribute(&mut raw.normals, of.start, of.end, [0.0; 3], normals);
+        extend_attribute(&mut raw.uvs, of.start, of.end, [0.0; 2], self.uvs.iter().map(|t| t.map(|c| c as f32)));
+        extend_attribute(&mut raw.colors, of.start, of.end, [1.0; 4], self.colors.iter().map(|c| c.map(|v| v as f32)));
+    }
+
+    /// Adds what an instance has beside vertices and triangles; `base` is its first vertex.
+    fn append_rest(
+        &self,
+        raw: &mut RawMesh,
+        base: u32,
+        default_material: usize,
+        cx: &mut Context<'_>,
+    ) -> Result<(), MeshError> {
         raw.edge_masks.resize(raw.triangles.len(), ALL_EDGES);
         let material = self.material.unwrap_or(default_material) as u32;
         raw.triangle_materials.resize(raw.triangles.len(), material);
@@ -163,7 +212,6 @@ impl Primitive {
         )?;
         raw.lines_and_points
             .extend(self.lines_and_points.iter().map(|ends| LineOrPoint { ends: ends.map(|v| v + base), material }));
-        raw.report.file_vertices += self.positions.len() as u64;
         for (all, own) in raw.report.polygons_by_arity.iter_mut().zip(self.polygons_by_arity) {
             *all += own;
         }

@@ -5,6 +5,7 @@ use crate::import::context::Context;
 use crate::import::gltf::document::schema::mode;
 use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
 use crate::pluralise::pluralise;
+use bytemuck::allocation::try_cast_vec as cast_vec;
 
 /// The number of triangles from a number of corners. Corners of an incomplete triangle are ignored.
 pub fn count(mode: usize, corners: u64) -> u64 {
@@ -50,25 +51,40 @@ pub fn lines_and_points(
         .collect())
 }
 
-/// The triangles of primitive `what`, which has this many `vertices`.
+/// Refuses indices beyond the vertices of primitive `what`.
+pub fn check_indices(what: &str, indices: &[u32], vertices: usize) -> Result<(), MeshError> {
+    // The maximum of a list is found faster than the first index that is too large.
+    let is_bad = |i: u32| i as usize >= vertices;
+    match indices.iter().copied().max().filter(|largest| is_bad(*largest)) {
+        None => Ok(()),
+        Some(largest) => {
+            let bad = indices.iter().copied().find(|i| is_bad(*i)).unwrap_or(largest);
+            let has = pluralise(vertices, "vertex", "vertices");
+            Err(MeshError::broken(format!("{what} of the glTF file has the vertex index {bad}, and {has}")))
+        }
+    }
+}
+
+/// The triangles of a primitive, which has this many `vertices`. Its indices are checked.
 pub fn of(
-    what: &str,
     mode: usize,
-    indices: Option<&[u32]>,
+    indices: Option<Vec<u32>>,
     vertices: usize,
     cx: &mut Context<'_>,
 ) -> Result<Vec<[u32; 3]>, MeshError> {
-    if let Some(bad) = indices.into_iter().flatten().find(|&&i| i as usize >= vertices) {
-        return Err(MeshError::broken(format!(
-            "{what} of the glTF file has the vertex index {bad}, and {}",
-            pluralise(vertices, "vertex", "vertices")
-        )));
-    }
-    let corners = indices.map_or(vertices, <[u32]>::len);
+    let corners = indices.as_ref().map_or(vertices, Vec::len);
     let count = count(mode, corners as u64);
     cx.check_triangles(count)?;
     cx.budget.spend("glTF triangles", count, 12)?;
-    let at = |i: usize| indices.map_or(i as u32, |list| list[i]);
+    let indices = match indices {
+        // The list is one of triangles already.
+        Some(list) if mode == mode::TRIANGLES => match cast_vec(list) {
+            Ok(triangles) => return Ok(triangles),
+            Err((_, list)) => Some(list),
+        },
+        other => other,
+    };
+    let at = |i: usize| indices.as_ref().map_or(i as u32, |list| list[i]);
     Ok((0..count as usize)
         .map(|i| match mode {
             mode::TRIANGLE_STRIP => [at(i), at(i + 1 + i % 2), at(i + 2 - i % 2)],

@@ -72,3 +72,24 @@ fn hidden_nodes_hide_what_is_below_them() {
     gltf.json["nodes"][0]["extensions"] = json!({ "KHR_node_visibility": { "visible": false } });
     assert_eq!(read(&gltf.glb()).unwrap_err().fault, MeshFault::Empty);
 }
+
+#[test]
+fn the_only_instance_is_as_one_of_several() {
+    let torn = Solid::cuboid().triangulated(&[[0, 2, 3], [4, 5, 7]]);
+    let placed = [json!({}), json!({ "translation": [3, 0, 1], "scale": [2, 1, 4] }), json!({ "scale": [-1, 1, 1] })];
+    for placed in placed {
+        let with_nodes = |count: usize| {
+            let mut gltf = torn.gltf();
+            let mut node = placed.clone();
+            node["mesh"] = 0.into();
+            gltf.json["nodes"] = json!(vec![node; count]);
+            gltf.json["scenes"] = json!([{ "nodes": (0..count).collect::<Vec<_>>() }]);
+            read(&gltf.glb()).unwrap()
+        };
+        let (one, two) = (with_nodes(1), with_nodes(2));
+        assert_eq!((one.triangles.len(), two.triangles.len()), (2, 4));
+        assert_eq!(corners(&one)[..], corners(&two)[..2], "{placed}");
+        assert_eq!((&one.positions, &one.face_normals[..]), (&two.positions, &two.face_normals[..2]));
+        assert_eq!(one.report.file_vertices * 2, two.report.file_vertices);
+    }
+}
