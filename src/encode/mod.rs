@@ -1,7 +1,6 @@
 //! Encoders: a finished [`Image`] to the bytes of a file. The same picture always gives the same
 //! bytes.
 
-mod deflate;
 mod png;
 
 use image::ImageEncoder as _;

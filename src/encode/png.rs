@@ -1,13 +1,14 @@
 //! PNG in two ways: quickly for a picture that one client waits for, and small for one that is
 //! stored.
 //!
-//! Quickly means one filter for the whole picture, Paeth, and a compressor for what it leaves of a
-//! rendering ([`deflate`](super::deflate)): mostly runs of zeros, so trying more filters pays little. A row that
-//! equals the one above it, as in background and flat faces, is zeros without computing anything.
+//! Quickly means one filter for the whole picture, Paeth, and Huffman codes that are not fitted to
+//! it. What Paeth leaves of a rendering is mostly runs of zeros, so trying more filters pays little.
+//! A row that equals the one above it, as in background and flat faces, is written as zeros without
+//! computing anything.
 
+use fdeflate::Compressor;
 use png::{BitDepth, ColorType, DeflateCompression, Encoder, Filter, chunk};
 
-use super::deflate::{Compressor, Histogram};
 use super::{EncodeError, drop_alpha};
 use crate::image::Image;
 use crate::limits::Deadline;
@@ -17,9 +18,6 @@ const SMALL_EFFORT_MIN: u32 = 4;
 
 /// Bytes that are compared with the row above at a time: 8 pixels.
 const BLOCK: usize = 32;
-
-/// Rows that are counted to fit the codes, about.
-const COUNTED_ROWS: usize = 32;
 
 /// Rows compressed between two polls of the deadline.
 const POLL_ROWS: usize = 64;
@@ -31,9 +29,9 @@ pub fn encode(image: &Image, effort: u32, deadline: &Deadline) -> Result<Vec<u8>
 
 fn quick(image: &Image) -> Result<Vec<u8>, EncodeError> {
     let (color, data) = if image.is_opaque() {
-        (ColorType::Rgb, compressed::<3>(image))
+        (ColorType::Rgb, compressed::<3>(image)?)
     } else {
-        (ColorType::Rgba, compressed::<4>(image))
+        (ColorType::Rgba, compressed::<4>(image)?)
     };
     let mut bytes = Vec::with_capacity(data.len() + 128);
     let mut writer = encoder(&mut bytes, image, color).write_header()?;
@@ -88,25 +86,18 @@ fn encoder<'a>(bytes: &'a mut Vec<u8>, image: &Image, color: ColorType) -> Encod
 }
 
 /// The filtered rows as a zlib stream. Of each pixel, `CHANNELS` bytes are stored.
-fn compressed<const CHANNELS: usize>(image: &Image) -> Vec<u8> {
+fn compressed<const CHANNELS: usize>(image: &Image) -> Result<Vec<u8>, EncodeError> {
     let row_len = image.width_px as usize * 4;
-    let nothing = vec![0; row_len];
-    let above = std::iter::once(&nothing[..]).chain(image.rgba.chunks_exact(row_len));
-    let rows = || image.rgba.chunks_exact(row_len).zip(above.clone());
+    let mut compressor = Compressor::new(Vec::with_capacity(image.rgba.len() / 8))?;
     let mut line = vec![0; 1 + image.width_px as usize * CHANNELS];
     line[0] = Filter::Paeth as u8;
-    let mut histogram = Histogram::new();
-    let step = (image.height_px as usize / COUNTED_ROWS).max(1);
-    for (row, above) in rows().skip(step / 2).step_by(step) {
+    let mut above = &vec![0; row_len][..];
+    for row in image.rgba.chunks_exact(row_len) {
         filter_row::<CHANNELS>(row, above, &mut line[1..]);
-        histogram.add(&line);
+        compressor.write_data(&line)?;
+        above = row;
     }
-    let mut compressor = Compressor::new(&histogram, image.rgba.len() / 8);
-    for (row, above) in rows() {
-        filter_row::<CHANNELS>(row, above, &mut line[1..]);
-        compressor.write_row(&line);
-    }
-    compressor.finish()
+    Ok(compressor.finish()?)
 }
 
 /// Filters a row by Paeth: PNG specification, 9.2 and 9.4.
@@ -116,7 +107,6 @@ fn filter_row<const CHANNELS: usize>(row: &[u8], above: &[u8], out: &mut [u8]) {
     let blocks = row.len() / BLOCK;
     for i in 0..blocks {
         let at = i * BLOCK;
-
         let (Some(block), Some(block_above)) = (row[at..].first_chunk(), above[at..].first_chunk()) else { break };
         let (left, above_left) = match at.checked_sub(4) {
             Some(at) => (row[at..].first_chunk().unwrap_or(&first), above[at..].first_chunk().unwrap_or(&first_above)),
@@ -145,7 +135,7 @@ fn filter_block(block: &[u8; BLOCK], above: &[u8; BLOCK], left: &[u8; BLOCK], ab
     std::array::from_fn(|i| block[i].wrapping_sub(predicted(left[i], above[i], above_left[i])))
 }
 
-/// What lies left of a row's first block.
+/// The bytes left of a row's first block, and its own but the last pixel.
 fn first_block(row: &[u8]) -> [u8; BLOCK] {
     let mut block = [0; BLOCK];
     if let Some(start) = row.first_chunk::<{ BLOCK - 4 }>() {
@@ -205,8 +195,8 @@ mod tests {
         }
     }
 
-    /// The filtered rows without the shortcut for equal pixels.
-    fn lines(image: &Image) -> Vec<u8> {
+    /// The filtered rows of so many channels, without the shortcut for equal pixels.
+    fn lines(image: &Image, channels: usize) -> Vec<u8> {
         let row_len = image.width_px as usize * 4;
         let at = |x: i64, y: i64| if x < 0 || y < 0 { 0 } else { image.rgba[y as usize * row_len + x as usize] };
         let mut lines = Vec::new();
@@ -214,6 +204,7 @@ mod tests {
             lines.push(4);
             lines.extend(
                 (0..row_len as i64)
+                    .filter(|x| (*x as usize) % 4 < channels)
                     .map(|x| at(x, y).wrapping_sub(predicted(at(x - 4, y), at(x, y - 1), at(x - 4, y - 1)))),
             );
         }
@@ -228,8 +219,10 @@ mod tests {
                 let mut rgba: Vec<u8> = (0..width_px * 4).map(|i| (i * 7 % 11) as u8).collect::<Vec<_>>().repeat(3);
                 rgba[(width_px * 4 + changed) as usize] ^= 5;
                 let image = Image { width_px, height_px: 3, rgba };
-                let stream = compressed::<4>(&image);
-                assert_eq!(fdeflate::decompress_to_vec(&stream).unwrap(), lines(&image), "{width_px} {changed}");
+                for (channels, stream) in [(3, compressed::<3>(&image)), (4, compressed::<4>(&image))] {
+                    let filtered = fdeflate::decompress_to_vec(&stream.unwrap()).unwrap();
+                    assert_eq!(filtered, lines(&image, channels), "{width_px} {changed} {channels}");
+                }
             }
         }
     }

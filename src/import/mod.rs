@@ -23,6 +23,8 @@ pub mod raw;
 mod report;
 mod sniff;
 mod stl;
+#[cfg(test)]
+mod test_random;
 mod text;
 mod three_mf;
 

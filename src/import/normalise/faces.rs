@@ -300,16 +300,16 @@ fn rescale(v: [f64; 3]) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::noise::Noise;
     use crate::import::normalise::geometry::Indexed;
+    use crate::import::test_random::Random;
 
     /// Triangles of f32 corners of any size, many without an area or a finite corner.
-    fn odd_triangles(noise: &mut Noise, exponents: u64) -> Vec<[f64; 3]> {
+    fn odd_triangles(random: &mut Random, exponents: u64) -> Vec<[f64; 3]> {
         let mut corner = || {
-            let sign = noise.below(2) << 31;
-            let exponent = 127 - exponents / 2 + noise.below(exponents);
-            let bits = (sign | exponent << 23 | noise.below(1 << 23)) as u32;
-            match noise.below(40) {
+            let sign = random.below(2) << 31;
+            let exponent = 127 - exponents / 2 + random.below(exponents);
+            let bits = (sign | exponent << 23 | random.below(1 << 23)) as u32;
+            match random.below(40) {
                 0 => f64::NAN,
                 1..8 => 0.0,
                 8..12 => 1.0,
@@ -321,10 +321,10 @@ mod tests {
 
     #[test]
     fn scaling_changes_no_face_of_f32() {
-        let mut noise = Noise(7);
+        let mut random = Random(7);
         let triangles: Vec<[u32; 3]> = (0..20_000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         for exponents in [1, 20, 254] {
-            let mut positions = odd_triangles(&mut noise, exponents);
+            let mut positions = odd_triangles(&mut random, exponents);
             // Slivers and triangles without an area.
             for corners in positions.chunks_exact_mut(3).step_by(7) {
                 corners[2] = std::array::from_fn(|k| corners[0][k] * 0.5 + corners[1][k] * 0.5);

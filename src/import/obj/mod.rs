@@ -13,8 +13,6 @@ mod parse;
 mod skipped;
 mod sniff;
 #[cfg(test)]
-mod test_random;
-#[cfg(test)]
 mod tests;
 
 pub use sniff::is_obj;

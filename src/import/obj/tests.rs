@@ -4,8 +4,8 @@ use super::{assemble, read_parts};
 use crate::import::Format;
 use crate::import::bundle::{Bundle, entry};
 use crate::import::context::Context;
-use crate::import::obj::test_random::Random;
 use crate::import::raw::RawMesh;
+use crate::import::test_random::Random;
 use crate::limits::{Budget, Deadline, Limits};
 
 /// Everything that a text becomes, or its error.

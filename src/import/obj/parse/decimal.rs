@@ -89,7 +89,7 @@ fn exponent_at(bytes: &[u8], begin: usize) -> Option<(i64, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::obj::test_random::Random;
+    use crate::import::test_random::Random;
 
     /// Compares a text with std, and counts it.
     fn check(text: &str, count: &mut u64) {
