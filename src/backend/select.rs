@@ -36,7 +36,7 @@ impl Backends {
         Self::sharing(host, Arc::new(cpu::DrawingThreads::new(threads)))
     }
 
-    /// The same for one of several workers, whose CPU paths share threads.
+    /// Renderers for one of several workers, whose CPU renderers share threads.
     pub fn sharing(host: Arc<GpuHost>, threads: Arc<cpu::DrawingThreads>) -> Self {
         Self { cpu: cpu::CpuRenderer::on(threads), host, gpu: None }
     }

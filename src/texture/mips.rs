@@ -98,13 +98,13 @@ fn shrink(
 ) -> Result<Vec<[f32; 4]>, Stopped> {
     let to = size.map(|s| side(s, 1));
     let columns: Vec<Taps> = (0..to[0]).map(|x| Taps::of(size[0], x)).collect();
-    let is_plain = !by_alpha && size.iter().all(|s| s.is_multiple_of(2));
+    let has_even_sides = !by_alpha && size.iter().all(|s| s.is_multiple_of(2));
     let mut out = vec![[0.0; 4]; to[0] as usize * to[1] as usize];
     let rows = out.par_chunks_exact_mut(to[0] as usize).enumerate().with_min_len(ROWS_MIN);
     let buffer = || (vec![[0.0; 4]; 2 * size[0] as usize], vec![Sum::default(); to[0] as usize]);
     rows.try_for_each_init(buffer, |(lines, sums), (y, out)| {
         deadline.check()?;
-        if is_plain {
+        if has_even_sides {
             let (upper, lower) = lines.split_at_mut(size[0] as usize);
             read(2 * y as u32, upper);
             read(2 * y as u32 + 1, lower);

@@ -27,7 +27,7 @@ impl<'a> DeadlinePoll<'a> {
         self.is_expired_after(1, samples)
     }
 
-    /// The same after several triangles.
+    /// True if the deadline has passed, after several triangles with this many samples together.
     #[inline(always)]
     pub fn is_expired_after(&mut self, triangles: u64, samples: u64) -> bool {
         let work = samples + triangles * WORK_PER_TRIANGLE;

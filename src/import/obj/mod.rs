@@ -60,7 +60,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
 fn read_parts<'t>(
     text: &'t [u8],
     part_bytes: usize,
-    is_plain: bool,
+    is_quick: bool,
     cx: &mut Context<'_>,
 ) -> Result<Vec<Part<'t>>, MeshError> {
     let newline = lines::newline(text);
@@ -71,7 +71,7 @@ fn read_parts<'t>(
     let deadline = cx.deadline;
     deadline.check()?;
     let is_colored = parse::has_colored_vertex(text, newline, || deadline.check().is_ok()).unwrap_or(false);
-    let rules = Rules { newline, is_colored, before: None, is_plain, deadline };
+    let rules = Rules { newline, is_colored, before: None, is_quick, deadline };
     let mut parts = parallel::map(pieces.iter().copied().enumerate().collect(), |(i, piece)| {
         parse(piece, Rules { before: (i == 0).then(Counts::default), ..rules })
     });

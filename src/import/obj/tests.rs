@@ -9,7 +9,7 @@ use crate::import::test_random::Random;
 use crate::limits::{Budget, Deadline, Limits};
 
 /// Everything that a text becomes, or its error.
-fn read(text: &str, part_bytes: usize, is_plain: bool) -> String {
+fn read(text: &str, part_bytes: usize, is_quick: bool) -> String {
     let limits = Limits::default();
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let files = Bundle::of_one(text.as_bytes().to_vec()).into_files();
@@ -17,7 +17,7 @@ fn read(text: &str, part_bytes: usize, is_plain: bool) -> String {
     let mut cx = Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
     let mut raw = RawMesh::default();
     let summary =
-        read_parts(text.as_bytes(), part_bytes, is_plain, &mut cx).and_then(|parts| assemble(parts, &mut raw, &mut cx));
+        read_parts(text.as_bytes(), part_bytes, is_quick, &mut cx).and_then(|parts| assemble(parts, &mut raw, &mut cx));
     match summary {
         Ok(summary) => format!("{summary:?} {raw:?}"),
         Err(error) => format!("{error:?}"),
@@ -121,9 +121,9 @@ fn parts_threads_and_both_ways_agree() {
         for threads in [1, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             for part_bytes in [1, 50, 2000, usize::MAX] {
-                for is_plain in [false, true] {
-                    let given = pool.install(|| read(&text, part_bytes, is_plain));
-                    assert!(given == expected, "{threads} threads, parts of {part_bytes}, {is_plain}: {text}");
+                for is_quick in [false, true] {
+                    let given = pool.install(|| read(&text, part_bytes, is_quick));
+                    assert!(given == expected, "{threads} threads, parts of {part_bytes}, {is_quick}: {text}");
                 }
             }
         }

@@ -30,7 +30,8 @@ pub trait Source {
     fn triangles_max(&self, _layout: &Layout, _records: u64) -> u64 {
         0
     }
-    /// Reads up to `records` of them, as long as indices are below `vertices`. Appends the indices.
+    /// Reads up to `records` such triangles, as long as indices are below `vertices`. Appends the
+    /// indices.
     fn triangles(&mut self, _records: u64, _vertices: u32, _corners: &mut Vec<u32>) {}
     /// True if [`Source::columns`] works.
     fn is_in_columns(&self) -> bool;

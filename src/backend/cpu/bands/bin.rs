@@ -1,6 +1,6 @@
-//! Items by band of rows.
+//! Lists of items per band of rows.
 
-/// A chunk's items by band.
+/// The items of one chunk, listed per band.
 #[derive(Default)]
 pub struct Bin {
     by_band: Vec<Vec<u32>>,

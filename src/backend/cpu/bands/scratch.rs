@@ -74,8 +74,8 @@ impl Banding {
         best.evened(plan)
     }
 
-    /// With as many bands as all threads take equally many of, if that makes them no taller than by
-    /// a fifth.
+    /// Changes the height so that every thread draws the same number of bands. Keeps the old height
+    /// if the new one would be more than a fifth larger.
     fn evened(self, plan: &DrawPlan<'_>) -> Self {
         if self.margin == 0 {
             return self;

@@ -264,14 +264,14 @@ fn keep_kernel(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass
     // f32 divides exactly enough: rows are below 2^13.
     let per_row = 1.0 / bounds.rows as f32;
     for first in pass.ids.clone().step_by(LANES) {
-        let group = Group::load(context, first, pass.ids.end);
+        let lanes = TriangleLanes::load(context, first, pass.ids.end);
         let [drawn_front, drawn_back] = match has_masks {
-            true => group.drawn(|id| pass.faces_of(plan, id)),
-            false => group.drawn(|_| Some(pass.faces)),
+            true => lanes.drawn(|id| pass.faces_of(plan, id)),
+            false => lanes.drawn(|_| Some(pass.faces)),
         };
-        let seen = group.seen(bounds);
+        let seen = lanes.seen(bounds);
         for l in 0..LANES {
-            let area = group.area[l];
+            let area = lanes.area[l];
             let bands = [0, 1].map(|k| ((seen.rows[k][l] as f32 + 0.5) * per_row) as u16);
             let spanned = Spanned { id: (first + l) as u32, bands };
             // Written in any case, kept by the count.
@@ -280,15 +280,15 @@ fn keep_kernel(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass
             kept.counts[0] += usize::from(drawn_front[l] & seen.any[l] & (area < 0));
             kept.counts[1] += usize::from(drawn_back[l] & seen.any[l] & (area > 0));
         }
-        if group.is_outside != [false; LANES] {
-            let outside = (0..LANES).filter(|&l| group.is_outside[l] && (drawn_front[l] || drawn_back[l]));
+        if lanes.is_outside != [false; LANES] {
+            let outside = (0..LANES).filter(|&l| lanes.is_outside[l] && (drawn_front[l] || drawn_back[l]));
             kept.outside.extend(outside.map(|l| (first + l) as u32));
         }
     }
 }
 
 /// Eight triangles on screen.
-struct Group {
+struct TriangleLanes {
     first: usize,
     /// Lanes that hold a triangle.
     len: usize,
@@ -304,7 +304,7 @@ struct Seen {
     rows: [[i32; LANES]; 2],
 }
 
-impl Group {
+impl TriangleLanes {
     #[inline(always)]
     fn load(context: &RasterContext<'_>, first: usize, end: usize) -> Self {
         let len = (end - first).min(LANES);

@@ -11,11 +11,11 @@ use super::visibility::{Parts, Setup};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::isa::{Isa, LANES};
 
-/// Triangles that are drawn together. Those of a size are drawn one after the other, because a
-/// processor that has just drawn so many rows and columns guesses right that it will do so again.
+/// Triangles in a batch. Triangles of equal size are drawn one after the other, so that the
+/// processor predicts the lengths of the loops over their rows and columns.
 const BATCH: usize = 128;
 
-/// Room for those, and for what is added at once.
+/// Room for a batch, and for the triangles that are added at once.
 const ROOM: usize = BATCH + LANES;
 
 /// Collects triangles that need no clipping, and draws them.
@@ -26,18 +26,18 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// An empty one.
+    /// An empty batch.
     pub fn new() -> Self {
         Self { ids: [0; ROOM], len: 0, setups: [Setups::EMPTY; ROOM / LANES] }
     }
 
-    /// True if it is full, and to be drawn before more is added.
+    /// True if the batch is full. It has to be drawn before more is added.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.len >= BATCH
     }
 
-    /// Number of its triangles.
+    /// Number of triangles in the batch.
     #[inline(always)]
     pub fn len(&self) -> usize {
         self.len

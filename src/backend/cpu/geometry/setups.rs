@@ -121,7 +121,7 @@ impl Setups {
                 class::SHORT
             };
             s.parts.depth_range[0][l] = depth_min;
-            // What follows means nothing where it wraps: those lanes are not short.
+            // These values may wrap around in lanes that are not short, where nothing reads them.
             let corner = [
                 left.wrapping_mul(256).wrapping_sub(half[0]).wrapping_add(shift),
                 top.wrapping_mul(256).wrapping_sub(half[1]).wrapping_add(shift),
@@ -170,8 +170,8 @@ fn lane<T: Copy>(v: &[[T; LANES]; 3], l: usize) -> [T; 3] {
     [v[0][l], v[1][l], v[2][l]]
 }
 
-/// Each lane's sample from the pixel's corner (moved by what the samples leave modulo 16), in 1/16
-/// px: across, down.
+/// Offset of each lane's sample from the corner of the vector's first pixel, 1/16 px: across, down.
+/// The remainder modulo 16 that all samples share is in the corner already.
 #[inline(always)]
 pub fn lane_offsets<const S: usize>(part: usize) -> [[i32; LANES]; 2] {
     let offsets = sample_offsets(S as u32);

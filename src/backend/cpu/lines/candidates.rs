@@ -14,7 +14,8 @@ use crate::plan::Edge;
 /// Farthest apart that corners may lie for areas to fit 32 bits, 1/256 px.
 const NEAR: u32 = 1 << 14;
 
-/// Triangles to be examined, and those that were last.
+/// Up to eight triangles that wait to be examined. Slots after `len` keep triangles that were
+/// examined before, so that they are not taken again.
 pub struct Candidates {
     ids: [u32; LANES],
     /// Those of `ids` that are not examined yet come first.
@@ -22,14 +23,14 @@ pub struct Candidates {
 }
 
 impl Candidates {
-    /// None.
+    /// An empty list.
     #[inline(always)]
     pub fn new() -> Self {
         Self { ids: [NOTHING; LANES], len: 0 }
     }
 
-    /// Adds a triangle, unless it is there already or was lately. True if there is room for no
-    /// more: then they are to be examined.
+    /// Adds a triangle unless it waits already or is in a kept slot. True if the list is full and
+    /// has to be taken.
     #[inline(always)]
     pub fn push(&mut self, id: u32) -> bool {
         let mut is_known = u32::from(id == NOTHING);

@@ -33,7 +33,7 @@ pub struct LineDrawer<'a> {
     /// Rows of the picture that are drawn.
     pub(super) rows: [i32; 2],
     pub(super) pen: Pen,
-    /// The edge's.
+    /// The edge's direction.
     pub(super) direction: Direction,
     /// Windows per pixel of an edge's length.
     windows: f32,
@@ -41,7 +41,7 @@ pub struct LineDrawer<'a> {
     is_hidden: bool,
     hidden: HiddenIntervals,
     /// Pixels since the last deadline poll.
-    pixels_since_poll: i32,
+    pixels_since_poll: u64,
     /// Shown intervals of the edge in the window.
     intervals: Vec<[f32; 2]>,
 }
@@ -122,7 +122,7 @@ impl<'a> LineDrawer<'a> {
         for y in first..=last {
             let row = (y - self.rows[0]) as usize * width_px as usize;
             let [from, to] = area.columns(y, width_px);
-            self.pixels_since_poll += (to - from).max(0);
+            self.pixels_since_poll += u64::from((to - from).max(0) as u32);
             let mut x = from;
             while x <= to {
                 let centers = [x as f32 + 0.5, y as f32 + 0.5];

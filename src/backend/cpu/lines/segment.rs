@@ -97,7 +97,8 @@ impl Segment {
         if self.along[0].abs() >= self.along[1].abs() { [0, 1] } else { [1, 0] }
     }
 
-    /// Replaces `pixels` by those of [`Segment::walk`].
+    /// Collects the pixels that the edge passes in a range of it, in steps of half a pixel. A pixel
+    /// may occur twice.
     #[inline(always)]
     pub fn pixels(&self, [from, to]: [f32; 2], pixels: &mut Vec<[i32; 2]>) {
         pixels.clear();
@@ -122,7 +123,7 @@ impl Segment {
         }
     }
 
-    /// The pixels that the edge passes in a range of it, some twice.
+    /// The pixels of [`Segment::pixels`], one by one.
     #[inline(always)]
     pub fn walk(&self, [from, to]: [f32; 2]) -> Walk {
         let steps = (self.length * (to - from) * 2.0) as u32 + 1;

@@ -12,10 +12,11 @@ use crate::backend::cpu::isa::{Isa, LANES, dispatch};
 use crate::backend::cpu::vector::turned_to_viewer;
 use crate::plan::{DrawPlan, SurfacePass, flags};
 
-/// A colour that is not known: of a clipped triangle, or none that a weight of 0 makes 0.
+/// Marks a colour that is computed per pixel: the triangle is clipped, or its colour is not finite
+/// (infinity times a weight of 0 is not 0).
 const UNKNOWN: [f32; 4] = [f32::NAN; 4];
 
-/// Colours by triangle id. Only those of triangles in the bins are there.
+/// Colours by triangle id, for the triangles in the bins.
 #[derive(Default)]
 pub struct FlatColors {
     /// Premultiplied linear RGBA; after the last triangle's, that of no triangle.
@@ -47,7 +48,11 @@ impl FlatColors {
             (rest, next) = (after, bin.ids.end);
             jobs.push((bin, own));
         }
-        let each = |(bin, own): (&TriangleBin, &mut [[f32; 4]])| find_colors(context.isa, context, bin, own);
+        let each = |(bin, own): (&TriangleBin, &mut [[f32; 4]])| {
+            if context.deadline.check().is_ok() {
+                find_colors(context.isa, context, bin, own);
+            }
+        };
         match pool {
             Some(pool) => pool.install(|| jobs.into_par_iter().for_each(each)),
             None => jobs.into_iter().for_each(each),

@@ -27,7 +27,7 @@ pub struct Rules<'a> {
     /// The counts before the part; None if they are not known yet.
     pub before: Option<Counts>,
     /// False: every line goes word by word. Tests compare both ways.
-    pub is_plain: bool,
+    pub is_quick: bool,
     /// Polled inside long lines.
     pub deadline: &'a Deadline,
 }
@@ -127,7 +127,7 @@ pub fn parse<'t>(bytes: &'t [u8], rules: Rules<'_>) -> Result<Part<'t>, Fault> {
     let mut parser = Parser { bytes, rules, part: Part::default(), line: Vec::new() };
     let mut at = 0;
     while at < bytes.len() {
-        let plain = if rules.is_plain { parser.plain_line(at)? } else { None };
+        let plain = if rules.is_quick { parser.plain_line(at)? } else { None };
         at = match plain {
             Some(end) => {
                 parser.part.lines += 1;
