@@ -107,23 +107,24 @@ mod tests {
         assert_eq!((one.share().count, one.share().pool().is_some()), (1, false));
     }
 
-    /// Picture 1 has four threads and a thousand bands, and each band waits to be let go. When each
-    /// thread has drawn one, two of them are left to picture 2, which is then drawn although no
-    /// further band of picture 1 ends.
+    /// Picture 1 has four threads and a thousand bands. The first four are let go when picture 2 has
+    /// begun, and the others when it is drawn. So two threads of picture 1 are left to picture 2.
     #[test]
     fn a_picture_gives_up_threads_between_two_bands() {
         let threads = DrawingThreads::new(4);
         let (begun, begins) = mpsc::channel();
-        let (go, gate) = mpsc::channel::<()>();
-        let gate = Mutex::new(gate);
+        let (first, first_gates): (Vec<_>, Vec<_>) = (0..4).map(|_| mpsc::channel::<()>()).unzip();
+        let first_gates: Vec<_> = first_gates.into_iter().map(Mutex::new).collect();
+        let (others, others_gate) = mpsc::channel::<()>();
+        let others_gate = Mutex::new(others_gate);
         let (drawn, second_drawn) = mpsc::channel();
         let finished = AtomicUsize::new(0);
         std::thread::scope(|scope| {
             let (threads, finished) = (&threads, &finished);
             scope.spawn(move || {
-                threads.share().run(4, 0..1000, |_| {
+                threads.share().run(4, 0..1000, |band| {
                     let _ = begun.send(());
-                    let _ = gate.lock().unwrap().recv();
+                    let _ = first_gates.get(band).unwrap_or(&others_gate).lock().unwrap().recv();
                     finished.fetch_add(1, Ordering::Relaxed);
                 });
             });
@@ -131,9 +132,9 @@ mod tests {
             scope.spawn(move || {
                 let share = threads.share();
                 assert_eq!(share.count, 2);
-                (0..4).for_each(|_| go.send(()).unwrap());
+                drop(first);
                 share.run(2, 0..10, |_| drawn.send(finished.load(Ordering::Relaxed)).unwrap());
-                // Dropping `go` lets all other bands go.
+                drop(others);
             });
         });
         let at_bands: Vec<usize> = second_drawn.iter().collect();
