@@ -127,7 +127,7 @@ fn names_of_libraries_take_the_memory_that_was_paid_for() {
     let distinct: String = (0..400_000).map(|i| format!("mtllib {i}\n")).collect();
     let cases = [(distinct, false), ("mtllib a\n".repeat(1_000_000), true), ("mtllib\n".repeat(2_000_000), true)];
     for (lines, is_read) in cases {
-        let bundle = Bundle::of_one(format!("{lines}{triangle}").into_bytes());
+        let bundle = Bundle::of_one(format!("{triangle}{lines}").into_bytes());
         let mut budget = Budget::new(&limits);
         let read = || import(&bundle, None, &limits, &mut budget, &Deadline::default()).is_ok();
         assert_eq!(within_bytes(limits.memory_bytes, "an OBJ file of libraries", read), is_read);
