@@ -102,7 +102,7 @@ struct Meshes<'a> {
     materials: Materials<'a>,
     of_mesh: Vec<Option<Rc<Vec<Primitive>>>>,
     uses_default_material: bool,
-    /// How often each mesh is instanced by nodes.
+    /// Number of instances of each mesh.
     instances: Vec<u32>,
 }
 

@@ -100,7 +100,7 @@ pub fn have_f32<G: Geometry>(geometry: &G, deadline: &Deadline) -> Result<bool, 
 pub struct Faces<K> {
     /// A unit normal for each.
     pub normals: Vec<[f32; 3]>,
-    /// The corners of each, as numbers in its piece.
+    /// The corners of each face, as numbers in its piece.
     pub triangles: Vec<[u32; 3]>,
     /// The pieces, in order.
     pub pieces: Vec<Piece<K>>,
@@ -119,7 +119,7 @@ pub struct Faces<K> {
 /// Some faces that follow each other.
 #[derive(Debug)]
 pub struct Piece<K> {
-    /// How many.
+    /// Number of faces.
     pub faces: usize,
     /// Their distinct corners, in the order of their first use.
     pub keys: Vec<K>,
@@ -186,7 +186,7 @@ fn pick_scaled<G: Geometry>(
     Ok(faces)
 }
 
-/// What was found in a piece.
+/// The faces of a piece, with the bounds and counts of its triangles.
 struct Picked<K> {
     piece: Piece<K>,
     bounds: Bounds,

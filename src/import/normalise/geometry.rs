@@ -5,7 +5,7 @@ use crate::import::raw::Soup;
 
 /// Triangles and positions, wherever they are stored.
 pub trait Geometry: Sync {
-    /// What tells corners apart: corners with equal keys have equal positions.
+    /// The identity of a corner: corners with equal keys have equal positions.
     type Key: Key;
 
     /// Number of triangles.
@@ -25,7 +25,7 @@ pub trait Geometry: Sync {
     }
 }
 
-/// Tells corners apart.
+/// The identity of a corner.
 pub trait Key: Copy + Eq + Send + Sync {
     /// A number below 2^32 that is unique among keys, if there is one.
     fn index(self) -> Option<u32>;

@@ -6,13 +6,13 @@ use std::hash::{BuildHasher, RandomState};
 pub struct Hasher([u64; 2]);
 
 impl Hasher {
-    /// With a new key.
+    /// A hasher with a new key.
     pub fn new() -> Self {
         let random = RandomState::new();
         Self([random.hash_one(0_u64), random.hash_one(1_u64)])
     }
 
-    /// From both halves of a 128-bit product, as in wyhash.
+    /// The hash, from both halves of a 128-bit product as in wyhash.
     #[inline(always)]
     pub fn hash(&self, [x, y, z]: [u32; 3]) -> u64 {
         let a = (u64::from(x) | u64::from(y) << 32) ^ self.0[0];

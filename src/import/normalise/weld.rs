@@ -30,7 +30,7 @@ pub struct Welded {
     /// For each position of each piece the number of the distinct one, with [`NEW`] where it is the
     /// first.
     pub numbers: Vec<Vec<u32>>,
-    /// How many distinct ones there are.
+    /// Number of distinct positions.
     pub count: usize,
 }
 

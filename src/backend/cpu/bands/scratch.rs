@@ -41,9 +41,9 @@ pub struct Banding {
 }
 
 impl Banding {
-    /// The division for a number of threads. Bands fit the cache, unless their lines look far beyond them: then
-    /// a band has as many rows as lets the threads do the most in [`BANDS_BYTES_MAX`], because
-    /// small bands draw most samples for their neighbours, and of large ones there are few at once.
+    /// The division for a number of threads. Bands fit the cache, unless their lines look far beyond
+    /// them: then a band has as many rows as lets the threads do the most in [`BANDS_BYTES_MAX`],
+    /// because small bands draw most samples for their neighbours, and few large ones fit at once.
     pub fn new(plan: &DrawPlan<'_>, threads: usize) -> Self {
         let margin = plan.line_margin_rows();
         let cached = (BAND_BYTES / (row_bytes(plan, 1) + row_bytes(plan, 0)).max(1)) as u32;

@@ -20,8 +20,8 @@ pub const SHORT_MAX: i32 = 16;
 /// Rows, and vectors in a row, up to which triangles are drawn together with others of the same size.
 pub const SIZES: i32 = 4;
 
-/// How a triangle is drawn: a number below `SIZES * SIZES` for those of each small size, or one of
-/// these.
+/// Classes of triangles by the way they are drawn: a number below `SIZES * SIZES` for each small
+/// size, or one of these.
 pub mod class {
     /// Other triangles drawn by lanes.
     pub const SHORT: i32 = super::SIZES * super::SIZES;
@@ -43,12 +43,12 @@ pub struct Corners {
 /// Eight triangles, ready to be drawn. Long ones have their bounds and their depth range alone.
 pub struct Setups {
     pub parts: Parts<LANES>,
-    /// As [`class`] says.
+    /// The class of each triangle, see [`class`].
     pub classes: [i32; LANES],
 }
 
 impl Corners {
-    /// Those of triangles by id.
+    /// The corners of triangles by id.
     #[inline(always)]
     pub fn load(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Self {
         let (mut x, mut y, mut z) = ([[0; LANES]; 3], [[0; LANES]; 3], [[0.0; LANES]; 3]);
@@ -89,7 +89,7 @@ impl Boxes {
 }
 
 impl Setups {
-    /// Nothing yet.
+    /// Eight triangles without samples.
     pub const EMPTY: Self = Self { parts: Parts::EMPTY, classes: [class::EMPTY; LANES] };
 
     #[inline(always)]
