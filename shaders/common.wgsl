@@ -108,6 +108,10 @@ const LIT_PASS: u32 = 16u;
 const FIRST_PASS: u32 = 32u;
 // It is the fronts of faces that look away, because the surface is inside out.
 const INSIDE_OUT: u32 = 64u;
+// Only pixels that are marked get strokes; elsewhere holes tell what lines cover.
+const HOLES: u32 = 128u;
+// Rims alone are drawn, and the pixels that they reach marked.
+const RIM_PASS: u32 = 256u;
 
 const SURFACE: u32 = 1u;
 const HULL: u32 = 2u;
@@ -124,6 +128,8 @@ const FOUR_SAMPLES: u32 = 4096u;
 const LIT_LINES: u32 = 8192u;
 // A line pass is a contour.
 const CONTOURS: u32 = 16384u;
+// Holes in faces tell what a line pass covers.
+const HOLED: u32 = 32768u;
 const PASS_MASKS: u32 = 0x100000u;
 const HULL_MATERIALS: u32 = 0x400000u;
 const PEELING: u32 = 0x800000u;

@@ -36,11 +36,20 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
     let at = STROKE_WORDS * i;
     let sum = area_sum(at);
     let all = point_sum(at);
-    if (sum.x | sum.y | all.x | all.y) == 0u {
+    let by_holes = has(HOLED) && (batch.line_flags & HOLES) != 0u && (strokes[at + HOLE_WORD] & MARKED) == 0u;
+    if !by_holes && (sum.x | sum.y | all.x | all.y) == 0u {
+        strokes[at + HOLE_WORD] = 0u;
         return;
     }
-    let points = covered_points(at);
-    let cover = covered_share(sum, all, points, slack_of(at));
+    var points = 0u;
+    var cover = 0.0;
+    if by_holes {
+        let unit = 65536u;
+        cover = f32(unit - min(strokes[at + HOLE_WORD], unit)) * (1.0 / f32(unit));
+    } else {
+        points = covered_points(at);
+        cover = covered_share(sum, all, points, slack_of(at));
+    }
     if cover > 0.0 {
         var color = line_colors[batch.line_pass];
         var under = colors[i];

@@ -71,7 +71,14 @@ fn edge(
 fn shares_of(edge: vec4<u32>) -> u32 {
     let s = segment_of(edge);
     let rows = rows_of(s.start.y, s.start.y + s.along.y);
-    return select(0u, window_count(s) * batch.line_slices, s.drawn && rows.x <= rows.y);
+    if !s.drawn || rows.x > rows.y {
+        return 0u;
+    }
+    // Rims are drawn first, because they mark the pixels that the other edges are drawn into.
+    if has(HOLED) && (batch.line_flags & (HOLES | RIM_PASS)) != 0u && is_silhouette(edge) != is_rim_pass() {
+        return 0u;
+    }
+    return window_count(s) * batch.line_slices;
 }
 
 // Draws every 64th share of the workgroup's, whose edges begin at `first`, from where the thread
@@ -102,7 +109,7 @@ fn draw_shares(first: u32, self_at: u32, thread: u32) {
                 let found = paused.search - 1u;
                 search = Search(range, found / 4u, paused.begin, paused.hidden_from, found % 4u);
                 paused.search = 0u;
-            } else if window.rows.x <= window.rows.y {
+            } else if window.rows.x <= window.rows.y && gets_strokes(s, window) {
                 search = begin_search(s, range);
             } else {
                 search = Search(range, 0u, range.y, BEYOND, WHOLE);
@@ -241,12 +248,45 @@ fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32
             x++;
             // A full pixel stays full. Only a lit line goes on, to find the face that lights it.
             found = touches(place_of(s.direction, start - center, end - center)) && owns(s, window, center)
-                && (is_lit || !is_full(at));
+                && (is_lit || !is_full(at)) && (!only_marked() || is_marked(at));
+        }
+        if found && is_rim_pass() {
+            atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], MARKED);
         }
         if found && add_stroke(at, s.direction, start - center, end - center) && is_lit {
             atomicMax(&owners[at], lighting_face(edge));
         }
     }
+}
+
+// True if only marked pixels get strokes.
+fn only_marked() -> bool {
+    return has(HOLED) && (batch.line_flags & (HOLES | RIM_PASS)) == HOLES;
+}
+
+// True if rims alone are drawn, and mark the pixels that they reach.
+fn is_rim_pass() -> bool {
+    return has(HOLED) && (batch.line_flags & RIM_PASS) != 0u;
+}
+
+fn is_marked(pixel_at: u32) -> bool {
+    return (atomicLoad(&strokes[pixel_at * STROKE_WORDS + HOLE_WORD]) & MARKED) != 0u;
+}
+
+// False if no pixel of a share gets strokes.
+fn gets_strokes(s: Segment, window: Window) -> bool {
+    if !only_marked() {
+        return true;
+    }
+    for (var y = window.first; y <= window.rows.y; y += i32(batch.line_slices)) {
+        let columns = columns_of(s, window.ends, y);
+        for (var x = columns.x; x <= columns.y; x++) {
+            if is_marked(u32((y - batch.row_first) * frame.width + x)) {
+                return true;
+            }
+        }
+    }
+    return false;
 }
 
 // True if the pixel belongs to this window of the edge.

@@ -4,8 +4,6 @@
 // The CPU sorts all intervals in which something hides the edge. A thread here has no room for
 // them, so it finds one interval per scan along the edge.
 
-const NOTHING: u32 = 0xFFFFFFFFu;
-
 // Smallest ratio of a hiding surface's depth to the edge's: covers the rounding of f32.
 const NEARER_RATIO: f32 = 1.0000019073486328;
 
@@ -141,22 +139,6 @@ fn scan_along(edge: vec4<u32>, s: Segment, search: Search) -> Scan {
         }
     }
     return scan;
-}
-
-// Id and depth bits of a sample.
-fn seen_at(pixel: vec2<i32>, sample: u32) -> vec2<u32> {
-    if !has_samples(pixel) {
-        return vec2(NOTHING, 0u);
-    }
-    let row = (pixel.y - batch.seen_first) * (frame.width + 2 * batch.seen_margin);
-    let word = samples[u32(row + pixel.x + batch.seen_margin) * u32(sample_count()) + sample];
-    return vec2(select(~word.x, NOTHING, word.y == 0u), word.y);
-}
-
-// True if the visibility buffer holds a pixel of the picture or beyond.
-fn has_samples(pixel: vec2<i32>) -> bool {
-    return all(pixel >= vec2(-batch.seen_margin, batch.seen_first))
-        && all(pixel < vec2(frame.width + batch.seen_margin, batch.seen_end));
 }
 
 // True if every triangle visible along the edge is nearer than all of it.

@@ -10,7 +10,7 @@ const GENERATOR: u32 = 181u;
 const AREA_UNIT: f32 = 65536.0;
 
 // Words per pixel.
-const STROKE_WORDS: u32 = 12u;
+const STROKE_WORDS: u32 = 13u;
 // The sum of the strokes' areas.
 const AREA_WORD: u32 = 0u;
 // The sum of their counts of points.
@@ -22,3 +22,8 @@ const MASK_WORD: u32 = 3u;
 const MASK_WORDS: u32 = 8u;
 // The largest difference between a stroke's area and its points.
 const SLACK_WORD: u32 = 11u;
+// The area that holes leave free, or MARKED. No twin: the CPU's are in Holes,
+// src/backend/cpu/lines/holes/mod.rs.
+const HOLE_WORD: u32 = 12u;
+// Bit of a pixel that gets strokes although the pass has holes.
+const MARKED: u32 = 0x80000000u;

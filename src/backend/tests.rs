@@ -12,6 +12,7 @@ use wgpu::naga;
 
 use super::cpu::geometry::transform::{GUARD, OUTSIDE, ScreenVertex};
 use super::cpu::geometry::{clip, samples};
+use super::cpu::lines::holes::{self, inset};
 use super::cpu::lines::{coverage, hidden_lines, segment, stroke};
 use super::cpu::surface::texture;
 use super::gpu::params::{Batch, FACES_BACK, FACES_BOTH, FACES_FRONT, Frame, OWN_TRIANGLES, line_flags};
@@ -38,10 +39,11 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     }
     // Pipeline key.
     add_same!("", key: SURFACE HULL FACE_NORMALS VERTEX_NORMALS WIRES TRIANGLE_MATERIALS EDGE_MASKS LINES CLIPPED
-        EIGHT_SAMPLES SIXTEEN_SAMPLES FOUR_SAMPLES LIT_LINES CONTOURS PASS_MASKS HULL_MATERIALS PEELING BEHIND_SURFACE
+        EIGHT_SAMPLES SIXTEEN_SAMPLES FOUR_SAMPLES LIT_LINES CONTOURS HOLED PASS_MASKS HULL_MATERIALS PEELING BEHIND_SURFACE
         WIRES_ONLY PEELED_HULL DERIVATIVE_NORMALS VERTEX_COLORS UVS TEXTURES WIRE_MINIMUM WIRE_LIT DEBUG VARYING);
     // Line flags, pass masks, faces.
-    add_same!("", line_flags: SHOWN_VISIBLE SHOWN_HIDDEN SKIP_BACK CONTOUR LIT_PASS FIRST_PASS INSIDE_OUT);
+    add_same!("", line_flags: SHOWN_VISIBLE SHOWN_HIDDEN SKIP_BACK CONTOUR LIT_PASS FIRST_PASS INSIDE_OUT HOLES
+        RIM_PASS);
     add!(
         "PASS_LAYER" = pass_mask::LAYER,
         "PASS_FRONT_ONLY" = pass_mask::FRONT_ONLY,
@@ -78,6 +80,8 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("STROKES_SIDE_BY_SIDE" = coverage::STROKES_SIDE_BY_SIDE, "ALPHA_MIN" = coverage::ALPHA_MIN);
     add!("NEARER_RATIO" = hidden_lines::NEARER_RATIO, "SNAP_ERROR" = hidden_lines::SNAP_ERROR);
     add!("INTERVAL_MIN_PX" = hidden_lines::INTERVAL_MIN_PX, "GAP_MIN_PX" = hidden_lines::GAP_MIN_PX);
+    add!("MARKED" = holes::MARKED, "FACES_MAX" = holes::FACES_MAX, "HOLE_UNIT" = inset::HOLE_UNIT);
+    add!("INSIDE" = inset::INSIDE, "NARROW_PX" = inset::NARROW_PX, "LEVEL_PX" = inset::LEVEL_PX);
     // Sample offsets, a nibble each.
     let nibbles = |samples: u32, axis: usize, from: usize| {
         let offsets = sample_offsets(samples).iter().skip(from).take(8);
@@ -105,13 +109,14 @@ const SHADER_ONLY: &[&str] = &[
     "CARRY_WORD",
     "MASK_WORD",
     "SLACK_WORD",
+    "HOLE_WORD",
 ];
 
 /// Every kernel in each of its variants.
 fn kernels() -> Vec<Kernel> {
     let mut all =
         vec![Kernel::Transform, Kernel::Clip, Kernel::Composite, Kernel::Shade, Kernel::Edge, Kernel::Coverage];
-    all.extend([Kernel::LineLight, Kernel::Resolve]);
+    all.extend([Kernel::Holes, Kernel::LineLight, Kernel::Resolve]);
     for write in [SampleWrite::Both, SampleWrite::Depth, SampleWrite::Id] {
         for target in [SampleTarget::Visibility, SampleTarget::Layer] {
             all.extend([Kernel::Visibility { write, target }, Kernel::VisibilityTile { write, target }]);

@@ -4,7 +4,7 @@ use super::context::PlanContext;
 use super::peeling::{pass_masks, peeling_pass};
 use super::projection::Projection;
 use super::skips::SkipKind;
-use super::{DrawPlan, HullPass, PlanError};
+use super::{DrawPlan, HullPass, PlanError, pass_mask};
 use super::{costs, lines, margin, outline, primitives, surface};
 use crate::limits::{Budget, Deadline};
 use crate::scene::Scene;
@@ -43,6 +43,11 @@ pub fn build_keeping<'m>(
     };
     let peeling = peeling_pass(groups, hull.is_some(), &mut cx.skips);
     let pass_masks = pass_masks(groups, &geometry, surface.is_some(), peeling.as_ref());
+    // Triangles that stand for points and lines have sides that are no edges, and layers show other
+    // edges than the surface.
+    let is_one_surface = geometry.triangles.len() == scene.mesh.triangles.len()
+        && pass_masks.iter().all(|&mask| mask == pass_mask::SURFACE);
+    lines.iter_mut().for_each(|pass| pass.is_complete &= is_one_surface);
     let is_unclipped = cx.skips.skip(
         SkipKind::Clipping,
         camera.contains_mesh,

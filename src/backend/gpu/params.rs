@@ -92,8 +92,12 @@ pub mod line_flags {
     pub const FIRST_PASS: u32 = 32;
     /// The surface is inside out: the fronts of faces face away.
     pub const INSIDE_OUT: u32 = 64;
+    /// Only pixels that are marked get strokes; elsewhere holes tell what lines cover.
+    pub const HOLES: u32 = 128;
+    /// Rims alone are drawn, and the pixels that they reach marked.
+    pub const RIM_PASS: u32 = 256;
 
-    /// The bits of a pass, [`FIRST_PASS`] aside.
+    /// The bits of a pass; [`FIRST_PASS`], [`HOLES`] and [`RIM_PASS`] aside.
     pub fn of(lines: &LinePass, something_hides: bool, lights_lines: bool) -> u32 {
         let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
         // Without a surface nothing hides a line, and there is no visibility buffer to read.

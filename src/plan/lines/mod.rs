@@ -7,13 +7,15 @@ pub use build::passes;
 
 use std::sync::Arc;
 
-use super::DrawPlan;
+use super::{DrawPlan, Faces, SurfacePass};
 
 /// Lines along edges, of one width and colour.
 #[derive(Clone, Debug)]
 pub struct LinePass {
     /// Each edge once. Passes may share a list.
     pub edges: Arc<[Edge]>,
+    /// True if these are all edges of all triangles of the plan, and these are all opaque.
+    pub is_complete: bool,
     /// Full width, pixels.
     pub width_px: f32,
     /// Width of the soft ramp, both sides together, pixels.
@@ -47,6 +49,27 @@ impl LinePass {
     /// Coverage in the middle of a line by its ramp alone, 0 to 1.
     pub fn peak(&self) -> f32 {
         if self.smoothing_px > self.width_px { self.width_px / self.smoothing_px } else { 1.0 }
+    }
+
+    /// Widths of lines whose coverage holes in faces may tell, pixels, for a number of samples per
+    /// pixel.
+    ///
+    /// What is left of a visible face around a point of its inset is a disc as wide as the line. It
+    /// contains a sample if its radius is at least that of the largest circle without one, which is
+    /// .708, .396, .263 and .193 px for 1, 4, 8 and 16 samples. Wide lines leave few holes.
+    pub fn holes_width_px(samples: u32) -> std::ops::RangeInclusive<f32> {
+        let least = match samples {
+            1 => 1.5,
+            4 => 0.8,
+            8 => 0.55,
+            _ => 0.4,
+        };
+        least..=8.0
+    }
+
+    /// How far from a face that is hidden in part its lines may end, pixels.
+    pub fn hidden_reach_px(&self) -> u32 {
+        (0.5 * self.width_px) as u32 + 1
     }
 
     /// Length of the windows in which an edge's visible parts are looked for, pixels.
@@ -84,6 +107,22 @@ impl DrawPlan<'_> {
         something_hides && self.lines.iter().any(|lines| lines.shown != Shown::All)
     }
 
+    /// True if any pass may find the coverage of its lines by holes in faces.
+    pub fn has_holes(&self) -> bool {
+        self.lines.iter().any(|lines| self.has_holes_under(lines))
+    }
+
+    /// True if a pass may find the coverage of its lines by holes in faces: lines of all edges of an
+    /// opaque surface that hides what lies behind it, without ramps.
+    pub fn has_holes_under(&self, lines: &LinePass) -> bool {
+        let is_whole = |surface: &SurfacePass<'_>| surface.faces == Faces::Both;
+        lines.is_complete
+            && lines.shown == Shown::Visible
+            && lines.smoothing_px == 0.0
+            && LinePass::holes_width_px(self.samples).contains(&lines.width_px)
+            && self.surface.as_ref().is_some_and(is_whole)
+    }
+
     /// True if any line is lit and there is a visible surface to take the light from.
     pub fn lights_lines(&self) -> bool {
         self.surface.as_ref().is_some_and(|surface| surface.is_shaded) && self.lines.iter().any(|lines| lines.lit)
@@ -110,13 +149,13 @@ pub enum Shown {
     Hidden,
 }
 
-/// An edge and the first two faces it belongs to.
+/// An edge and the two faces it belongs to.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Edge {
     /// Indices into the plan's positions.
     pub vertices: [u32; 2],
-    /// Triangle indices; [`Edge::NO_FACE`] where there is no second face.
+    /// Triangle indices; [`Edge::NO_FACE`] where there is no second face, or more than two.
     pub faces: [u32; 2],
 }
 

@@ -32,6 +32,7 @@ pub fn line_plan<'a>(positions: &'a [[f32; 3]], edges: &[[u32; 2]], width_px: f3
     let edges = edges.iter().map(|&vertices| Edge { vertices, faces: [Edge::NO_FACE; 2] });
     let pass = LinePass {
         edges: edges.collect::<Arc<[Edge]>>(),
+        is_complete: false,
         width_px,
         smoothing_px: 0.0,
         color: [1.0; 4],

@@ -22,7 +22,23 @@ pub struct Bins {
     /// For depth peeling.
     pub peel: Vec<TriangleBin>,
     /// By line pass.
-    pub edges: Vec<Vec<Bin>>,
+    pub edges: Vec<Vec<EdgeBin>>,
+}
+
+/// A chunk's edges by band.
+#[derive(Default)]
+pub struct EdgeBin {
+    /// Those that are rims; empty where the pass has no holes.
+    pub rims: Bin,
+    /// The others.
+    pub others: Bin,
+}
+
+impl EdgeBin {
+    /// True if the band has no edge.
+    pub fn is_empty_in(&self, band: usize) -> bool {
+        self.rims.items_in(band).chain(self.others.items_in(band)).next().is_none()
+    }
 }
 
 /// Sorts the plan's triangles and edges into bands of `rows`; triangles of the visibility buffer
@@ -45,7 +61,7 @@ pub fn bin(
     let bin_pass = |pass: &LinePass| {
         map(pool, chunks(0..pass.edges.len()).collect(), |range| match context.deadline.check() {
             Ok(()) => bin_edges(context, pass, rows, range),
-            Err(Stopped) => Bin::default(),
+            Err(Stopped) => EdgeBin::default(),
         })
     };
     let edges = plan.lines.iter().map(bin_pass).collect();
@@ -84,9 +100,10 @@ fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
     plan.height_px.div_ceil(rows) as usize
 }
 
-fn bin_edges(context: &RasterContext<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> Bin {
-    let mut bin = Bin::new(band_count(context.plan, rows), TALL_EDGE_BANDS);
-    let reach = pass.reach_px();
+fn bin_edges(context: &RasterContext<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> EdgeBin {
+    let empty = || Bin::new(band_count(context.plan, rows), TALL_EDGE_BANDS);
+    let mut bin = EdgeBin { rims: empty(), others: empty() };
+    let (reach, has_holes) = (pass.reach_px(), context.plan.has_holes_under(pass));
     for i in range {
         let edge = &pass.edges[i];
         if !contour::is_drawn(context, pass, edge) {
@@ -95,7 +112,10 @@ fn bin_edges(context: &RasterContext<'_>, pass: &LinePass, rows: u32, range: Ran
         if let Some(segment) = Segment::new(context, edge) {
             let [first, last] = segment.rows(reach, context.plan.height_px);
             if first <= last {
-                bin.push(i as u32, [first, last].map(|row| row as usize / rows as usize));
+                let bands = [first, last].map(|row| row as usize / rows as usize);
+                let is_rim = has_holes && context.is_silhouette(edge);
+                let bin = if is_rim { &mut bin.rims } else { &mut bin.others };
+                bin.push(i as u32, bands);
             }
         }
     }

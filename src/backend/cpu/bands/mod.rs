@@ -11,7 +11,7 @@ pub(crate) mod triangle_bins;
 use std::ops::ControlFlow;
 
 use self::bin::Bin;
-use self::bins::Bins;
+use self::bins::{Bins, EdgeBin};
 use self::scratch::BandScratch;
 use self::triangle_bins::{BandLists, TriangleBin};
 use super::isa::{LANES, dispatch};
@@ -23,10 +23,13 @@ use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
 use crate::backend::cpu::geometry::tiles::Tiles;
 use crate::backend::cpu::geometry::visibility;
 use crate::backend::cpu::geometry::visibility::Setup;
-use crate::backend::cpu::lines::coverage::{LineCompositor, LineCoverage};
+use crate::backend::cpu::lines::coverage::LineCompositor;
 use crate::backend::cpu::lines::edge::{LineDrawer, LineTarget};
 use crate::backend::cpu::lines::farthest::Farthest;
+use crate::backend::cpu::lines::holes::dig::add_holes;
+use crate::backend::cpu::lines::holes::{self, Holes};
 use crate::backend::cpu::lines::line_light;
+use crate::backend::cpu::lines::plain::add_holes_plainly;
 use crate::backend::cpu::peeling::composite;
 use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::flat::shade_flat;
@@ -97,21 +100,46 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
         scratch.farthest.clear(&scratch.samples);
     }
     let compositor = LineCompositor::new(plan, &scratch.samples, scratch.peel.as_ref());
-    for (pass, bins) in plan.lines.iter().zip(&bins.edges) {
-        if bins.iter().all(|chunk| chunk.items_in(band).next().is_none()) {
+    for (pass, edges) in plan.lines.iter().zip(&bins.edges) {
+        if edges.iter().all(|chunk| chunk.is_empty_in(band)) {
             continue;
         }
         let lit_pixels = if pass.lit && plan.lights_lines() { pixels } else { 0 };
-        scratch.coverage.clear();
-        scratch.coverage.resize(pixels, LineCoverage::default());
+        scratch.strokes.reset(pixels);
         scratch.owners.clear();
         scratch.owners.resize(lit_pixels, 0);
-        let target = &mut LineTarget { coverage: &mut scratch.coverage, owners: &mut scratch.owners };
-        draw_edges(context.isa, context, pass, bins, band, (&scratch.samples, &mut scratch.farthest), target);
+        find_holes(context, pass, (&bins.triangles, band), &scratch.samples, &mut scratch.holes);
+        let target =
+            &mut LineTarget { strokes: &mut scratch.strokes, owners: &mut scratch.owners, holes: &mut scratch.holes };
+        draw_edges(context.isa, context, pass, edges, band, (&scratch.samples, &mut scratch.farthest), target);
+        if lit_pixels > 0 {
+            scratch.holes.own(&mut scratch.owners);
+        }
         scratch.light.clear();
         scratch.light.resize(lit_pixels, Light::NONE);
         line_light::light_lines(context, &scratch.samples, &scratch.owners, &mut scratch.light);
-        compositor.composite(pass, &scratch.coverage, &scratch.light, &mut scratch.colors);
+        compositor.composite(pass, (&scratch.strokes, &scratch.holes), &scratch.light, &mut scratch.colors);
+    }
+}
+
+/// Finds the holes of a pass in a band, without the marks of rims.
+fn find_holes(
+    context: &RasterContext<'_>,
+    pass: &LinePass,
+    triangles: (&[TriangleBin], usize),
+    samples: &SampleBand,
+    holes: &mut Holes,
+) {
+    if !context.plan.has_holes_under(pass) {
+        holes.clear();
+        return;
+    }
+    holes.reset(samples);
+    holes::mark_odd_samples(context, samples, holes);
+    if context.is_plain {
+        add_holes_plainly(context, pass, samples, holes);
+    } else {
+        add_holes(context.isa, context, pass, triangles, samples, holes);
     }
 }
 
@@ -155,7 +183,7 @@ dispatch! {
     pub fn draw_edges(
         context: &RasterContext<'_>,
         pass: &LinePass,
-        bins: &[Bin],
+        bins: &[EdgeBin],
         band: usize,
         seen: (&SampleBand, &mut Farthest),
         target: &mut LineTarget<'_>,
@@ -246,19 +274,22 @@ fn draw_batches<'a, const S: usize>(
 fn edges_kernel(
     context: &RasterContext<'_>,
     pass: &LinePass,
-    bins: &[Bin],
+    bins: &[EdgeBin],
     band: usize,
     seen: (&SampleBand, &mut Farthest),
     target: &mut LineTarget<'_>,
 ) {
     let mut drawer = LineDrawer::new(context, pass, seen);
-    for chunk in bins {
-        for (i, edge) in chunk.items_in(band).enumerate() {
+    let lists: [fn(&EdgeBin) -> &Bin; 2] = [|chunk| &chunk.rims, |chunk| &chunk.others];
+    for (list, marks) in lists.into_iter().zip([true, false]) {
+        drawer.marks = marks;
+        for (i, edge) in bins.iter().flat_map(|chunk| list(chunk).items_in(band)).enumerate() {
             // An edge of a wide line is as much work as hundreds of others.
             if (i % EDGES_PER_POLL == 0 || drawer.is_poll_due()) && context.deadline.check().is_err() {
                 return;
             }
             drawer.draw(&pass.edges[edge as usize], target);
         }
+        target.holes.collect_marks();
     }
 }

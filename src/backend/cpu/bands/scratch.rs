@@ -4,8 +4,9 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::isa::LANES;
-use crate::backend::cpu::lines::coverage::LineCoverage;
+use crate::backend::cpu::lines::coverage::BandStrokes;
 use crate::backend::cpu::lines::farthest::Farthest;
+use crate::backend::cpu::lines::holes::Holes;
 use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::light::Light;
 use crate::plan::DrawPlan;
@@ -23,8 +24,12 @@ pub const BANDS_BYTES_MAX: usize = 256 << 20;
 /// Memory of a band whose height is a multiple of its margin, bytes.
 const TALL_BYTES: usize = 8 << 20;
 
-/// Memory kept from picture to picture, bytes: of all bands' scratch, and of vertices.
+/// Memory kept from picture to picture, bytes: of vertices, and of colours of faces.
 pub const KEPT_BYTES_MAX: usize = 8 << 20;
+
+/// The same of all bands' scratch. A picture of 512 x 512 pixels with lines takes 16 MiB on two
+/// threads; memory from the system costs as much time as drawing in it.
+const KEPT_SCRATCH_BYTES_MAX: usize = 24 << 20;
 
 /// Bytes of a sample: depth and id.
 const SAMPLE_BYTES: usize = 8;
@@ -104,9 +109,10 @@ fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
         return samples(columns) * SAMPLE_BYTES + farthest;
     }
     let light = if plan.lights_lines() { size_of::<Light>() + size_of::<u32>() } else { 0 };
-    let coverage = if plan.lines.is_empty() { 0 } else { size_of::<LineCoverage>() };
+    let coverage = if plan.lines.is_empty() { 0 } else { BandStrokes::PIXEL_BYTES };
+    let holes = if plan.has_holes() { Holes::row_bytes(plan.width_px) } else { 0 };
     let peel = if plan.peeling().is_some() { PeelBand::SAMPLE_BYTES } else { 0 };
-    plan.width_px as usize * (size_of::<[f32; 4]>() + light + coverage) + samples(plan.width_px) * peel
+    plan.width_px as usize * (size_of::<[f32; 4]>() + light + coverage) + holes + samples(plan.width_px) * peel
 }
 
 /// A band's buffers, kept from band to band.
@@ -123,8 +129,10 @@ pub struct BandScratch {
     pub farthest: Farthest,
     /// Per pixel, premultiplied linear RGBA.
     pub colors: Vec<[f32; 4]>,
-    /// Line coverage of the current line pass.
-    pub coverage: Vec<LineCoverage>,
+    /// Strokes of the current line pass.
+    pub strokes: BandStrokes,
+    /// Holes of the current line pass.
+    pub holes: Holes,
     /// Per pixel, where the pass is lit: the face that lights its lines, plus 1.
     pub owners: Vec<u32>,
     /// Per pixel, the light on its lines.
@@ -140,7 +148,8 @@ impl BandScratch {
             peel: None,
             farthest: Farthest::default(),
             colors: Vec::new(),
-            coverage: Vec::new(),
+            strokes: BandStrokes::default(),
+            holes: Holes::default(),
             owners: Vec::new(),
             light: Vec::new(),
         }
@@ -152,7 +161,8 @@ impl BandScratch {
             + self.peel.as_ref().map_or(0, PeelBand::bytes)
             + self.farthest.bytes()
             + self.colors.capacity() * size_of::<[f32; 4]>()
-            + self.coverage.capacity() * size_of::<LineCoverage>()
+            + self.strokes.bytes()
+            + self.holes.bytes()
             + self.owners.capacity() * size_of::<u32>()
             + self.light.capacity() * size_of::<Light>()
     }
@@ -182,7 +192,7 @@ impl ScratchPool {
     pub fn trim(&self) {
         let mut kept = 0;
         self.0.lock().unwrap_or_else(PoisonError::into_inner).retain(|scratch| {
-            let fits = kept + scratch.bytes() <= KEPT_BYTES_MAX;
+            let fits = kept + scratch.bytes() <= KEPT_SCRATCH_BYTES_MAX;
             kept += if fits { scratch.bytes() } else { 0 };
             fits
         });
@@ -213,6 +223,7 @@ mod tests {
         let (edges, shown) = (Arc::from([]), Shown::All);
         let pass = LinePass {
             edges,
+            is_complete: false,
             width_px: 1.0,
             smoothing_px: 0.0,
             color: zero,
@@ -233,7 +244,7 @@ mod tests {
         let mut bytes = 0;
         pool.with(plan, banding, |scratch| {
             scratch.colors.resize(pixels, [0.0; 4]);
-            scratch.coverage.resize(pixels, LineCoverage::default());
+            scratch.strokes.reset(pixels);
             bytes = scratch.bytes();
         });
         pool.trim();
@@ -259,6 +270,9 @@ mod tests {
                     plan.surface = Some(surface);
                     for lines in &mut plan.lines {
                         (lines.width_px, lines.shown, lines.lit) = (width_px, Shown::Hidden, true);
+                    }
+                    if let Some(first) = plan.lines.first_mut() {
+                        (first.shown, first.is_complete) = (Shown::Visible, true);
                     }
                     let peel = PeelingPass { count_max: 16, behind_surface: false, wires_only: false, fade: 1.0 };
                     plan.peeling = Some(peel).filter(|_| layered);
@@ -304,8 +318,12 @@ mod tests {
                 if plan.hides_lines() {
                     scratch.farthest.clear(&scratch.samples);
                 }
+                if plan.has_holes() {
+                    scratch.samples.shown = [0, banding.rows];
+                    scratch.holes.reset(&scratch.samples);
+                }
                 scratch.colors = Vec::with_capacity(pixels);
-                scratch.coverage = Vec::with_capacity(pixels);
+                scratch.strokes.reset(pixels);
                 scratch.owners = Vec::with_capacity(pixels);
                 scratch.light = Vec::with_capacity(pixels);
                 scratch.peel = plan.peeling().map(|_| PeelBand::new(&scratch.samples, scratch.rows));
@@ -324,6 +342,6 @@ mod tests {
         wide.surface = Some(SurfacePass::new(Faces::Both, Vec::new()));
         (wide.lines[0].width_px, wide.lines[0].shown) = (50.0, Shown::Visible);
         let (kept, bytes) = is_kept(&wide);
-        assert!(!kept && bytes > KEPT_BYTES_MAX, "{bytes}");
+        assert!(!kept && bytes > KEPT_SCRATCH_BYTES_MAX, "{bytes}");
     }
 }

@@ -136,9 +136,10 @@ pub fn corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Corners {
     Corners::load(context, ids)
 }
 
+/// Pixels and nearest depth of eight triangles.
 #[inline(always)]
 #[allow(unsafe_code)]
-fn boxes<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band: &SampleBand) -> Boxes {
+pub fn boxes<const S: usize>(context: &RasterContext<'_>, ids: &[u32; LANES], band: &SampleBand) -> Boxes {
     #[cfg(target_arch = "x86_64")]
     if context.isa.has_avx2() {
         // SAFETY: the processor has AVX2, as `isa` says.

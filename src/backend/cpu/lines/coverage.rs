@@ -7,6 +7,7 @@
 //! answer; where they do, the share of the points that are left of the sum says how much of it is
 //! ([`LineCoverage::covered_share`]).
 
+use super::holes::Holes;
 use super::stroke::{Amount, Mask, POINTS, WORDS, count};
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::recip;
@@ -15,6 +16,9 @@ use crate::backend::cpu::resolve::{is_composited, over_background};
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::sample_partition::sample_partition;
 use crate::plan::{DrawPlan, LinePass};
+
+/// The mask of a pixel without strokes.
+const NO_POINTS: Mask = [0; WORDS];
 
 /// Steps to the pixel of a sum of areas.
 pub const AREA_UNIT: f32 = 65_536.0;
@@ -77,6 +81,57 @@ impl LineCoverage {
     }
 }
 
+/// The strokes of a band's pixels. Most pixels have none, and take no room for them.
+#[derive(Default)]
+pub struct BandStrokes {
+    /// Per pixel, 1 more than its index in `coverage`; 0 where there are none.
+    places: Vec<u32>,
+    coverage: Vec<LineCoverage>,
+}
+
+impl BandStrokes {
+    /// Bytes of a pixel, if it has strokes.
+    pub const PIXEL_BYTES: usize = size_of::<u32>() + size_of::<LineCoverage>();
+
+    /// Allocated bytes.
+    pub fn bytes(&self) -> usize {
+        self.places.capacity() * size_of::<u32>() + self.coverage.capacity() * size_of::<LineCoverage>()
+    }
+
+    /// Forgets all strokes, and takes on a number of pixels.
+    pub fn reset(&mut self, pixels: usize) {
+        self.places.clear();
+        self.places.reserve_exact(pixels);
+        self.places.resize(pixels, 0);
+        self.coverage.clear();
+        // What is not touched takes no memory.
+        self.coverage.reserve_exact(pixels);
+    }
+
+    /// The strokes of a pixel, if it has any.
+    #[inline(always)]
+    pub fn of(&self, pixel: usize) -> Option<&LineCoverage> {
+        self.coverage.get((self.places[pixel] as usize).wrapping_sub(1))
+    }
+
+    /// As [`LineCoverage::is_full`].
+    #[inline(always)]
+    pub fn is_full(&self, pixel: usize) -> bool {
+        self.of(pixel).is_some_and(LineCoverage::is_full)
+    }
+
+    /// As [`LineCoverage::add`].
+    #[inline(always)]
+    pub fn add(&mut self, pixel: usize, amount: Amount, mask: &Mask, peak: f32) {
+        let place = &mut self.places[pixel];
+        if *place == 0 {
+            self.coverage.push(LineCoverage::default());
+            *place = self.coverage.len() as u32;
+        }
+        self.coverage[*place as usize - 1].add(amount, mask, peak);
+    }
+}
+
 /// Rounds as the shaders round a number of two words.
 #[inline(always)]
 fn to_f32(v: u64) -> f32 {
@@ -107,15 +162,25 @@ impl<'a> LineCompositor<'a> {
     }
 
     /// Composites the lines of a pass over the colours. `light` is empty where they are not lit.
-    pub fn composite(&self, lines: &LinePass, coverage: &[LineCoverage], light: &[Light], colors: &mut [[f32; 4]]) {
+    pub fn composite(
+        &self,
+        lines: &LinePass,
+        (strokes, holes): (&BandStrokes, &Holes),
+        light: &[Light],
+        colors: &mut [[f32; 4]],
+    ) {
         let peak = lines.peak();
-        for (i, (coverage, c)) in coverage.iter().zip(colors).enumerate() {
-            let cover = coverage.covered_share(peak);
+        for (i, c) in colors.iter_mut().enumerate() {
+            let (cover, mask) = match (holes.covered_share(i), strokes.of(i)) {
+                (Some(cover), _) => (cover, &NO_POINTS),
+                (None, Some(coverage)) => (coverage.covered_share(peak), &coverage.mask),
+                (None, None) => continue,
+            };
             if cover > 0.0 {
                 let under = if is_composited(c) {
                     [c[0], c[1], c[2], -c[3]]
                 } else {
-                    over_background(self.uncovered(i, *c, &coverage.mask, lines.color[3] * peak), self.plan.background)
+                    over_background(self.uncovered(i, *c, mask, lines.color[3] * peak), self.plan.background)
                 };
                 let color = light.get(i).map_or(lines.color, |light| light.on_premultiplied(lines.color));
                 *c = std::array::from_fn(|k| cover * color[k] + under[k] * (1.0 - cover * color[3]));

@@ -6,22 +6,25 @@
 //! pixel's lines depend only on what is near it.
 
 use super::farthest::Farthest;
+use super::holes::Holes;
 use super::segment::{SLACK_PX, Segment, rows};
 use super::stroke::{self, Direction, Mask, Pen, Places};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::LANES;
-use crate::backend::cpu::lines::coverage::LineCoverage;
+use crate::backend::cpu::lines::coverage::BandStrokes;
 use crate::backend::cpu::lines::hidden_lines::HiddenIntervals;
 use crate::plan::{Edge, LinePass, Shown};
 
 /// Output of a line pass: rows of a band.
 pub struct LineTarget<'a> {
-    /// Line coverage per pixel.
-    pub coverage: &'a mut [LineCoverage],
+    /// Strokes per pixel.
+    pub strokes: &'a mut BandStrokes,
     /// Per pixel, the face that lights its lines, plus 1; empty where no lines are lit.
     pub owners: &'a mut [u32],
+    /// Where it has any, only the pixels that it marks get strokes.
+    pub holes: &'a mut Holes,
 }
 
 /// Draws the edges of a pass into a band.
@@ -40,6 +43,8 @@ pub struct LineDrawer<'a> {
     /// True if a surface may hide a line.
     is_hidden: bool,
     hidden: HiddenIntervals,
+    /// True if the edges are rims: they are drawn everywhere, and mark the pixels that they reach.
+    pub marks: bool,
     /// Pixels since the last deadline poll.
     pixels_since_poll: u64,
     /// Shown intervals of the edge in the window.
@@ -66,6 +71,7 @@ impl<'a> LineDrawer<'a> {
             windows: 1.0 / lines.window_px(),
             is_hidden: something_hides && lines.shown != Shown::All,
             hidden: HiddenIntervals::default(),
+            marks: false,
             pixels_since_poll: 0,
             intervals: Vec::new(),
         }
@@ -84,6 +90,9 @@ impl<'a> LineDrawer<'a> {
     /// Draws one edge.
     #[inline(always)]
     pub fn draw(&mut self, edge: &Edge, target: &mut LineTarget<'_>) {
+        if self.keeps_to_marks(target) && !self.is_near_marks(edge, target.holes) {
+            return;
+        }
         let Some(segment) = Segment::new(self.context, edge) else { return };
         let mut has_direction = false;
         let owner =
@@ -94,7 +103,10 @@ impl<'a> LineDrawer<'a> {
             let range = [window as f32 * step, (window + 1) as f32 * step];
             let [a, b] = range.map(|t| segment.point(t));
             let [first, last] = rows(a[1], b[1], self.pen.reach, self.rows);
-            if first > last || !self.collect_intervals(edge, &segment, range) {
+            if first > last
+                || (self.keeps_to_marks(target) && !self.may_touch_marks([a[0], b[0]], [first, last], target.holes))
+                || !self.collect_intervals(edge, &segment, range)
+            {
                 continue;
             }
             if !has_direction {
@@ -111,6 +123,41 @@ impl<'a> LineDrawer<'a> {
                 }
             }
         }
+    }
+
+    /// True if only pixels that are marked get strokes.
+    #[inline(always)]
+    fn keeps_to_marks(&self, target: &LineTarget<'_>) -> bool {
+        !self.marks && !target.holes.is_empty()
+    }
+
+    /// True if a pixel within the line's reach gets strokes. If it is a rim's, it is marked.
+    #[inline(always)]
+    pub(super) fn may_draw(&self, pixel: usize, holes: &mut Holes) -> bool {
+        if self.marks {
+            holes.mark(pixel);
+        }
+        holes.is_marked(pixel)
+    }
+
+    /// False if no pixel in the box around an edge gets strokes: found without the edge's length.
+    #[inline(always)]
+    fn is_near_marks(&self, edge: &Edge, holes: &Holes) -> bool {
+        let [a, b] = edge.vertices.map(|v| &self.context.vertices[v as usize]);
+        if a.is_outside() || b.is_outside() {
+            return true;
+        }
+        let reach = ((self.pen.reach + SLACK_PX) * 256.0) as i32 + 1;
+        let half = self.band.size_px.map(|size| size as i32 * 128);
+        let pixels = |a: i32, b: i32, half: i32| [(a.min(b) + half - reach) >> 8, (a.max(b) + half + reach) >> 8];
+        holes.any_marked(pixels(a.x, b.x, half[0]), pixels(a.y, b.y, half[1]))
+    }
+
+    /// False if no pixel between these heights and around these places gets strokes.
+    #[inline(always)]
+    fn may_touch_marks(&self, [a, b]: [f32; 2], rows: [i32; 2], holes: &Holes) -> bool {
+        let reach = self.pen.reach + SLACK_PX;
+        holes.any_marked([(a.min(b) - reach) as i32, (a.max(b) + reach) as i32], rows)
     }
 
     /// Draws a piece of an edge into the pixels that the window owns.
@@ -134,13 +181,16 @@ impl<'a> LineDrawer<'a> {
                     let (at, center) = (row + x as usize + l, [centers[0] + l as f32, centers[1]]);
                     // A full pixel stays full. Only a lit line goes on, to find the face that
                     // lights it.
-                    if (owner == 0 && target.coverage[at].is_full()) || !window.owns(center) {
+                    if (owner == 0 && target.strokes.is_full(at))
+                        || !window.owns(center)
+                        || !self.may_draw(at, target.holes)
+                    {
                         continue;
                     }
                     let ends = [[a[0] - center[0], a[1] - center[1]], [b[0] - center[0], b[1] - center[1]]];
                     let mut mask = Mask::default();
                     if let Some(amount) = stroke::cover(&self.pen, &self.direction, ends, &places.of(l), &mut mask) {
-                        target.coverage[at].add(amount, &mask, self.pen.peak);
+                        target.strokes.add(at, amount, &mask, self.pen.peak);
                         if owner > 0 {
                             target.owners[at] = target.owners[at].max(owner);
                         }

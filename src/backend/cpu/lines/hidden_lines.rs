@@ -11,7 +11,7 @@ use super::farthest::Farthest;
 use super::segment::Segment;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::is_moderate;
-use crate::backend::cpu::geometry::samples::SampleBand;
+use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::{ScreenVertex, homogeneous, recip};
 use crate::backend::cpu::geometry::visibility::area;
 use crate::plan::Edge;
@@ -107,6 +107,7 @@ impl HiddenIntervals {
     ) {
         let mut candidates = Candidates::new();
         let across = segment.across();
+        let mut last = NOTHING;
         for i in 0..self.pixels.len() {
             let [x, y] = self.pixels[i];
             for away in -radius..=radius {
@@ -115,6 +116,11 @@ impl HiddenIntervals {
                     continue;
                 }
                 for &id in band.pixel(x, y).0 {
+                    // Most samples show the edge's own faces, which do not hide it.
+                    if (id == edge.faces[0]) | (id == edge.faces[1]) | (id == last) {
+                        continue;
+                    }
+                    last = id;
                     if candidates.push(id)
                         && self.examine((context, edge, segment), candidates.take(context, edge, segment), range)
                     {

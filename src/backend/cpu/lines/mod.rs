@@ -5,6 +5,9 @@
 //! pixels that it touches; its area comes from [`profile`]. [`coverage`] unites a pixel's strokes
 //! and composites them over the colours, under the light of [`line_light`]. Twins are in
 //! `shaders/lines/`.
+//!
+//! Where all edges of a surface are drawn, most pixels need no strokes: what [`holes`] in its faces
+//! leave free tells what lines cover. Only the pixels near rims get strokes then.
 
 pub(crate) mod candidates;
 pub(crate) mod contour;
@@ -12,8 +15,9 @@ pub(crate) mod coverage;
 pub(crate) mod edge;
 pub(crate) mod farthest;
 pub(crate) mod hidden_lines;
+pub(crate) mod holes;
 pub(crate) mod line_light;
-mod plain;
+pub(crate) mod plain;
 pub(crate) mod profile;
 pub(crate) mod segment;
 pub(crate) mod stroke;

@@ -3,11 +3,15 @@
 
 use super::edge::{LineDrawer, LineTarget, Window};
 use super::hidden_lines::{HiddenIntervals, NEARER_RATIO, hidden_by};
+use super::holes::inset::Insets;
+use super::holes::{Holes, half_width, is_hidden, looked_at};
 use super::segment::Segment;
 use super::stroke::{self, Mask};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
-use crate::plan::Edge;
+use crate::backend::cpu::geometry::setups::Corners;
+use crate::backend::cpu::isa::LANES;
+use crate::plan::{Edge, LinePass};
 
 impl HiddenIntervals {
     /// As [`HiddenIntervals::find`].
@@ -62,13 +66,48 @@ impl HiddenIntervals {
 }
 
 /// True if every triangle visible along the edge is nearer than all of it.
-fn is_behind_all((context, band): (&RasterContext<'_>, &SampleBand), segment: &Segment, range: [f32; 2]) -> bool {
+pub(super) fn is_behind_all(
+    (context, band): (&RasterContext<'_>, &SampleBand),
+    segment: &Segment,
+    range: [f32; 2],
+) -> bool {
     let nearest = segment.nearest() * NEARER_RATIO;
     let is_nearer = |id: u32| {
         id != NOTHING && context.screen_triangle(id).iter().all(|corner| !corner.is_outside() && corner.z > nearest)
     };
     let mut pixels = segment.walk(range).filter(|&[x, y]| band.has(x, y)).peekable();
     pixels.peek().is_some() && pixels.all(|[x, y]| band.pixel(x, y).0.iter().all(|&id| is_nearer(id)))
+}
+
+/// As [`add_holes`](super::holes::dig::add_holes): each pixel looks for the faces that are seen close by.
+pub fn add_holes_plainly(context: &RasterContext<'_>, pass: &LinePass, band: &SampleBand, holes: &mut Holes) {
+    let plan = context.plan;
+    let half = [plan.width_px as i32 * 128, plan.height_px as i32 * 128];
+    let reach = pass.hidden_reach_px() as i32;
+    let [columns, rows] = looked_at(band, reach);
+    for y in rows[0]..rows[1] {
+        for x in columns[0]..columns[1] {
+            let around = (-1..=1).flat_map(|down| (-1..=1).map(move |right| [x + right, y + down]));
+            let seen = around.filter(|&[x, y]| band.has(x, y)).flat_map(|[x, y]| band.pixel(x, y).0);
+            let mut ids: Vec<u32> = seen.copied().filter(|&id| (id as usize) < plan.triangles.len()).collect();
+            ids.sort_unstable();
+            ids.dedup();
+            ids.retain(|&id| !context.screen_triangle(id).iter().any(|corner| corner.is_outside()));
+            for id in ids {
+                let insets = Insets::new(&Corners::load(context, &[id; LANES]), half, half_width(pass));
+                if insets.is_open[0] == 0 {
+                    continue;
+                }
+                let inset = insets.get(0, half);
+                if is_hidden(band, half, &inset, id, [x, y]) {
+                    holes.mark_around([x, y], reach);
+                }
+                if let Some(at) = holes.index([x, y]) {
+                    holes.add(at, inset.areas(x, y)[0]);
+                }
+            }
+        }
+    }
 }
 
 impl LineDrawer<'_> {
@@ -88,13 +127,13 @@ impl LineDrawer<'_> {
                 let center = [x as f32 + 0.5, y as f32 + 0.5];
                 let ends = [a, b].map(|p| [p[0] - center[0], p[1] - center[1]]);
                 let place = self.direction.place(ends);
-                if !place.is_within(self.pen.reach) || !window.owns(center) {
+                let at = (y - self.rows[0]) as usize * width_px as usize + x as usize;
+                if !place.is_within(self.pen.reach) || !window.owns(center) || !self.may_draw(at, target.holes) {
                     continue;
                 }
                 let mut mask = Mask::default();
                 if let Some(amount) = stroke::cover(&self.pen, &self.direction, ends, &place, &mut mask) {
-                    let at = (y - self.rows[0]) as usize * width_px as usize + x as usize;
-                    target.coverage[at].add(amount, &mask, self.pen.peak);
+                    target.strokes.add(at, amount, &mask, self.pen.peak);
                     if owner > 0 {
                         target.owners[at] = target.owners[at].max(owner);
                     }

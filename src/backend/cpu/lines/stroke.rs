@@ -135,10 +135,8 @@ impl Direction {
     /// The place of a pixel beside a piece with this direction. The piece's ends are given from the
     /// pixel's centre.
     #[inline(always)]
-    pub fn place(&self, [start, end]: [[f32; 2]; 2]) -> Place {
-        let past = |p: [f32; 2]| -(self.along[0] * p[0] + self.along[1] * p[1]);
-        let across = self.along[1] * start[0] - self.along[0] * start[1];
-        Place { across, past: [past(start), past(end)] }
+    pub fn place(&self, ends: [[f32; 2]; 2]) -> Place {
+        Place::new(self.along, ends)
     }
 }
 
@@ -217,6 +215,15 @@ pub struct Place {
 }
 
 impl Place {
+    /// The place of a pixel beside a piece of an edge that runs along a unit vector. The piece's ends
+    /// are given from the pixel's centre.
+    #[inline(always)]
+    pub fn new(along: [f32; 2], [start, end]: [[f32; 2]; 2]) -> Self {
+        let past = |p: [f32; 2]| -(along[0] * p[0] + along[1] * p[1]);
+        let across = along[1] * start[0] - along[0] * start[1];
+        Self { across, past: [past(start), past(end)] }
+    }
+
     /// Distance past the nearer end.
     #[inline(always)]
     fn beyond(&self) -> f32 {

@@ -19,6 +19,7 @@ impl Kernel {
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => TILE_OF_LAYER,
             Self::Composite => COMPOSITE,
             Self::Shade => SHADE,
+            Self::Holes => HOLES,
             Self::Edge => EDGE,
             Self::Coverage => COVERAGE,
             Self::LineLight => LINE_LIGHT,
@@ -116,6 +117,14 @@ const SHADE: &[Binding] = &[
     (Slot::VertexColors, Read),
     (Slot::Texels, Read),
     (Slot::Colors, ReadWrite),
+];
+
+const HOLES: &[Binding] = &[
+    (Slot::Triangles, Read),
+    (Slot::Vertices, Read),
+    (Slot::Samples, Read),
+    (Slot::Owners, ReadWrite),
+    (Slot::Strokes, ReadWrite),
 ];
 
 const EDGE: &[Binding] = &[

@@ -6,6 +6,8 @@ use crate::backend::gpu::pipelines::{Kernel, SampleTarget, SampleWrite};
 const COMMON: &str = include_str!("../../../../shaders/common.wgsl");
 const CONTOUR: &str = include_str!("../../../../shaders/lines/contour.wgsl");
 const HIDDEN_LINES: &str = include_str!("../../../../shaders/lines/hidden_lines.wgsl");
+const INSET: &str = include_str!("../../../../shaders/lines/inset.wgsl");
+const SEEN: &str = include_str!("../../../../shaders/lines/seen.wgsl");
 const SEGMENT: &str = include_str!("../../../../shaders/lines/segment.wgsl");
 const STROKE_WORDS: &str = include_str!("../../../../shaders/lines/stroke_words.wgsl");
 const STROKE: &str = include_str!("../../../../shaders/lines/stroke.wgsl");
@@ -42,6 +44,7 @@ impl Kernel {
             Self::Composite => "composite",
             Self::VisibilityTile { .. } => "visibility_tile",
             Self::Shade => "shade",
+            Self::Holes => "holes",
             Self::Edge => "edge",
             Self::Coverage => "coverage",
             Self::LineLight => "line_light",
@@ -88,9 +91,13 @@ impl Kernel {
                     .concat()
                     .concat()
             }
+            Self::Holes => {
+                let kernel = include_str!("../../../../shaders/lines/holes.wgsl");
+                [COMMON, STROKE_WORDS, SEEN, INSET, kernel].concat()
+            }
             Self::Edge => {
                 let kernel = include_str!("../../../../shaders/lines/edge.wgsl");
-                [COMMON, TRIANGLE, PLANES, CONTOUR, SEGMENT, HIDDEN_LINES, STROKE_WORDS, STROKE, kernel].concat()
+                [COMMON, TRIANGLE, PLANES, CONTOUR, SEGMENT, SEEN, HIDDEN_LINES, STROKE_WORDS, STROKE, kernel].concat()
             }
             Self::Coverage => {
                 [COMMON, OVER, STROKE_WORDS, PEEL_STATE, include_str!("../../../../shaders/lines/coverage.wgsl")]
@@ -126,8 +133,9 @@ impl Kernel {
             Self::Composite => SHADED | key::PEELED_HULL,
             Self::Shade => SHADED | key::PEELING,
             Self::LineLight => SHADED,
-            Self::Coverage => key::SURFACE | key::HULL | key::PEELING | key::SAMPLES,
-            Self::Edge => key::CONTOURS | key::CLIPPED | key::SAMPLES,
+            Self::Coverage => key::HOLED | key::SURFACE | key::HULL | key::PEELING | key::SAMPLES,
+            Self::Holes => key::SAMPLES,
+            Self::Edge => key::HOLED | key::CONTOURS | key::CLIPPED | key::SAMPLES,
             Self::Resolve => key::SURFACE | key::HULL | key::LINES,
         }
     }

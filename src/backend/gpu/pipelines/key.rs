@@ -35,6 +35,8 @@ pub const SAMPLES: u32 = FOUR_SAMPLES | EIGHT_SAMPLES | SIXTEEN_SAMPLES;
 pub const LIT_LINES: u32 = 8192;
 /// A line pass is a contour.
 pub const CONTOURS: u32 = 16384;
+/// Holes in faces tell what a line pass covers.
+pub const HOLED: u32 = 32768;
 /// A pass mask per triangle.
 pub const PASS_MASKS: u32 = 0x10_0000;
 /// A material index per triangle of the outline mesh.
@@ -88,6 +90,7 @@ pub fn pipeline_key(plan: &DrawPlan<'_>) -> u32 {
     key | when(!plan.lines.is_empty(), LINES)
         | when(plan.lines.iter().any(|lines| lines.contour), CONTOURS)
         | when(plan.lights_lines(), LIT_LINES)
+        | when(plan.has_holes(), HOLED)
 }
 
 fn samples(count: u32) -> u32 {

@@ -31,6 +31,8 @@ pub enum Kernel {
     Composite,
     /// Samples to colours.
     Shade,
+    /// Faces to the area that their lines leave free.
+    Holes,
     /// Edges to strokes.
     Edge,
     /// Unites the strokes of a line pass in each pixel and composites them over the colours.

@@ -110,8 +110,9 @@ fn unit_iterations(samples: u32, lines: &LinePass, slices: u32) -> u32 {
     let steps = (2.0 * length) as u32 + 2;
     let key = steps * (1 + samples) + steps * (1 + 3 * samples);
     let pixels = ((length as u32).div_ceil(slices) + 1) * (length as u32 + 1);
-    // Each is found, while the others wait, and has eight words of its mask filled by halves.
-    key + pixels * (LANES + 1 + 8 * 3) + WORKGROUP
+    // Each is looked at for a mark, is found, while the others wait, and has eight words of its mask
+    // filled by halves.
+    key + pixels * (1 + LANES + 1 + 8 * 3) + WORKGROUP
 }
 
 impl Schedule {
@@ -140,23 +141,14 @@ impl Schedule {
                 line_pass: pass,
                 ..pixels
             };
-            let edges = lines.edges.len() as u32;
-            for first in (0..edges).step_by(shares.edges.max(1) as usize) {
-                let count = shares.edges.min(edges - first);
-                let batch = Batch { first: edges_first.saturating_add(first), count, ..lined };
-                let groups = count.div_ceil(shares.edges_per_group);
-                self.dispatch_groups(device, Kernel::Edge, groups, batch)?;
-                let progress_bytes = shares.progress_bytes();
-                if let (Some(Step::Dispatch { batch, workgroups, .. }), true) =
-                    (self.steps.last().copied(), progress_bytes > 0)
-                {
-                    self.steps.pop();
-                    self.steps.push(Step::Lines { batch, workgroups });
-                    self.progress_bytes = self.progress_bytes.max(progress_bytes);
-                } else if edges > shares.edges {
-                    self.steps.push(Step::Submit);
-                }
+            let has_holes = plan.has_holes_under(lines);
+            if has_holes {
+                self.holes(device, lines, lined)?;
+                self.edges(device, lines, edges_first, shares, with(lined, line_flags::RIM_PASS))?;
             }
+            let flag = if has_holes { line_flags::HOLES } else { 0 };
+            let lined = with(lined, flag);
+            self.edges(device, lines, edges_first, shares, lined)?;
             if is_lit {
                 self.dispatch(device, Kernel::LineLight, pixels.count, lined)?;
             }
@@ -164,6 +156,47 @@ impl Schedule {
         }
         Ok(())
     }
+
+    /// The holes of a pass's faces in rows of a band.
+    fn holes(&mut self, device: &DeviceTraits, lines: &LinePass, lined: Batch) -> Result<(), DrawError> {
+        let beyond = 2 * lines.hidden_reach_px();
+        let rows = lined.row_end.abs_diff(lined.row_first) + beyond;
+        self.dispatch(device, Kernel::Holes, (lined.column_end as u32 + beyond) * rows, lined)
+    }
+
+    /// The edges of a pass, in as many dispatches as that takes.
+    fn edges(
+        &mut self,
+        device: &DeviceTraits,
+        lines: &LinePass,
+        edges_first: u32,
+        shares: LineShares,
+        lined: Batch,
+    ) -> Result<(), DrawError> {
+        let edges = lines.edges.len() as u32;
+        for first in (0..edges).step_by(shares.edges.max(1) as usize) {
+            let count = shares.edges.min(edges - first);
+            let batch = Batch { first: edges_first.saturating_add(first), count, ..lined };
+            let groups = count.div_ceil(shares.edges_per_group);
+            self.dispatch_groups(device, Kernel::Edge, groups, batch)?;
+            let progress_bytes = shares.progress_bytes();
+            if let (Some(Step::Dispatch { batch, workgroups, .. }), true) =
+                (self.steps.last().copied(), progress_bytes > 0)
+            {
+                self.steps.pop();
+                self.steps.push(Step::Lines { batch, workgroups });
+                self.progress_bytes = self.progress_bytes.max(progress_bytes);
+            } else if edges > shares.edges {
+                self.steps.push(Step::Submit);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A batch with a further bit of [`line_flags`].
+fn with(lined: Batch, flag: u32) -> Batch {
+    Batch { line_flags: lined.line_flags | flag, ..lined }
 }
 
 #[cfg(test)]

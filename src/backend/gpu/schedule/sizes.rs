@@ -24,8 +24,8 @@ pub const PEEL_STATE_BYTES: u64 = 32;
 pub const SAMPLE_BYTES: u64 = 8;
 
 /// Bytes of a pixel's strokes: two sums, how often they have gone round, a bit for each of 256
-/// points, and the most that an area differs from its points'.
-pub const STROKES_BYTES: u64 = 48;
+/// points, the most that an area differs from its points', and the area of holes.
+pub const STROKES_BYTES: u64 = 52;
 
 /// Bytes per pixel of lit lines: the face that lights them.
 pub const OWNER_BYTES: u64 = 4;

@@ -35,6 +35,7 @@ pub const LARGEST: Case =
 pub fn lines(edges: Arc<[Edge]>, width_px: f32, shown: Shown) -> LinePass {
     LinePass {
         edges,
+        is_complete: false,
         width_px,
         smoothing_px: 1.0,
         color: [1.0; 4],

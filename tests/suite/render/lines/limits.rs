@@ -137,6 +137,7 @@ fn lines_of<'a>(
     let edges: Arc<[Edge]> = edges.into_iter().map(|vertices| Edge { vertices, faces: [0, Edge::NO_FACE] }).collect();
     let pass = LinePass {
         edges,
+        is_complete: false,
         width_px: 1.5,
         smoothing_px: 0.0,
         color: [1.0, 0.0, 0.0, 1.0],

@@ -1,7 +1,8 @@
-//! Lines: their formulas, looks, borders and limits, and line and point primitives.
+//! Lines: their formulas, holes, looks, borders and limits, and line and point primitives.
 
 pub mod borders;
 pub mod formulas;
+pub mod holes;
 pub mod limits;
 pub mod looks;
 pub mod primitives;

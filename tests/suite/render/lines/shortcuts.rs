@@ -39,6 +39,10 @@ const LOOKS: &[Keys<'_>] = &[
     &[("style", "wire"), ("size", "120"), ("samples", "8"), ("wire.thickness", "7"), ("wire.hidden", "fade")],
     &[("style", "hidden-line"), ("size", "110"), ("samples", "16"), ("wire.smoothing", "1.5")],
     &[("style", "wire"), ("size", "130"), ("wire.lit", "true"), ("wire.thickness", "2.5"), ("surface.opacity", "0.5")],
+    // Holes at every number of samples.
+    &[("style", "wire"), ("size", "90"), ("samples", "1"), ("wire.thickness", "1.6"), ("wire.lit", "true")],
+    &[("style", "hidden-line"), ("size", "100"), ("samples", "8"), ("wire.thickness", "2.5")],
+    &[("style", "wire"), ("size", "80x110"), ("samples", "16"), ("wire.thickness", "0.5"), ("view", "top")],
     // Behind the eye, and beyond the picture.
     &[
         ("style", "wire"),

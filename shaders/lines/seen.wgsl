@@ -1,0 +1,20 @@
+// Stage lines: what the visibility buffer shows. The CPU's is SampleBand in
+// src/backend/cpu/geometry/samples.rs.
+
+const NOTHING: u32 = 0xFFFFFFFFu;
+
+// Id and depth bits of a sample.
+fn seen_at(pixel: vec2<i32>, sample: u32) -> vec2<u32> {
+    if !has_samples(pixel) {
+        return vec2(NOTHING, 0u);
+    }
+    let row = (pixel.y - batch.seen_first) * (frame.width + 2 * batch.seen_margin);
+    let word = samples[u32(row + pixel.x + batch.seen_margin) * u32(sample_count()) + sample];
+    return vec2(select(~word.x, NOTHING, word.y == 0u), word.y);
+}
+
+// True if the visibility buffer holds a pixel of the picture or beyond.
+fn has_samples(pixel: vec2<i32>) -> bool {
+    return all(pixel >= vec2(-batch.seen_margin, batch.seen_first))
+        && all(pixel < vec2(frame.width + batch.seen_margin, batch.seen_end));
+}

@@ -1,0 +1,274 @@
+//! Stage lines, per face: its hole in the pixels around it, eight pixels of a row at a time. As the
+//! pixels of [`add_holes_plainly`](crate::backend::cpu::lines::plain::add_holes_plainly) find them.
+
+use super::inset::{Inset, Insets};
+use super::{Holes, half_width, is_hidden, looked_at};
+use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::bands::triangle_bins::TriangleBin;
+use crate::backend::cpu::deadline_poll::DeadlinePoll;
+use crate::backend::cpu::geometry::batch::{boxes, corners};
+use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
+use crate::backend::cpu::geometry::setups::Boxes;
+use crate::backend::cpu::geometry::tiles::Tiles;
+use crate::backend::cpu::isa::{LANES, dispatch};
+use crate::plan::{LinePass, sample_offsets};
+
+dispatch! {
+    /// Adds the holes of a band's faces.
+    pub fn add_holes(context: &RasterContext<'_>, pass: &LinePass, lists: (&[TriangleBin], usize), band: &SampleBand, holes: &mut Holes) = holes_kernel
+}
+
+#[inline(always)]
+fn holes_kernel(
+    context: &RasterContext<'_>,
+    pass: &LinePass,
+    lists: (&[TriangleBin], usize),
+    band: &SampleBand,
+    holes: &mut Holes,
+) {
+    for_samples!(band.samples, holes_sampled(context, pass, lists, band, holes));
+}
+
+#[inline(always)]
+fn holes_sampled<const S: usize>(
+    context: &RasterContext<'_>,
+    pass: &LinePass,
+    (bins, number): (&[TriangleBin], usize),
+    band: &SampleBand,
+    holes: &mut Holes,
+) {
+    let mut digger = Digger::<S>::new(context, pass, band);
+    let tiles = Tiles::new(band);
+    let mut poll = DeadlinePoll::new(context.deadline);
+    let mut waiting = Waiting { ids: [0; 2 * LANES], len: 0 };
+    for list in bins.iter().flat_map(|bin| [&bin.fronts, &bin.backs]) {
+        let (listed, tall) = list.items_in(number);
+        for ids in listed.chunks(LANES).chain(tall.chunks(LANES)) {
+            waiting.push_seen::<S>(context, band, &tiles, ids);
+            if waiting.len >= LANES {
+                digger.dig_all(&waiting.take(), holes);
+            }
+            if poll.is_expired_after(ids.len() as u64, std::mem::take(&mut digger.pixels) * S as u64) {
+                return;
+            }
+        }
+    }
+    if waiting.len > 0 {
+        digger.dig_all(&waiting.take(), holes);
+    }
+}
+
+/// Faces that may show, and wait until there are eight of them.
+struct Waiting {
+    ids: [u32; 2 * LANES],
+    len: usize,
+}
+
+impl Waiting {
+    /// Adds those of up to eight faces that touch samples and do not lie behind all tiles there.
+    #[inline(always)]
+    fn push_seen<const S: usize>(
+        &mut self,
+        context: &RasterContext<'_>,
+        band: &SampleBand,
+        tiles: &Tiles,
+        ids: &[u32],
+    ) {
+        let Boxes { bounds: [columns, rows], depth_max } = boxes::<S>(context, &padded(ids), band);
+        for l in 0..ids.len().min(LANES) {
+            let (columns, rows) = ([columns[0][l], columns[1][l]], [rows[0][l], rows[1][l]]);
+            let is_empty = (columns[0] > columns[1]) | (rows[0] > rows[1]);
+            let is_surface = (ids[l] as usize) < context.plan.triangles.len();
+            // Written in any case, kept by the count.
+            self.ids[self.len % (2 * LANES)] = ids[l];
+            self.len += usize::from(is_surface && !is_empty && !tiles.hide(columns, rows, depth_max[l]));
+        }
+    }
+
+    /// The first eight, or fewer in the end.
+    #[inline(always)]
+    fn take(&mut self) -> Taken {
+        let len = self.len.min(LANES);
+        let taken = Taken { ids: padded(&self.ids[..len]), len };
+        self.ids.copy_within(LANES.., 0);
+        self.len -= len;
+        taken
+    }
+}
+
+/// Up to eight faces.
+struct Taken {
+    /// Those after `len` repeat the first.
+    ids: [u32; LANES],
+    len: usize,
+}
+
+#[inline(always)]
+fn padded(ids: &[u32]) -> [u32; LANES] {
+    let mut lanes = [ids.first().map_or(0, |&id| id); LANES];
+    for (lane, &id) in lanes.iter_mut().zip(ids) {
+        *lane = id;
+    }
+    lanes
+}
+
+/// Adds faces' holes to pixels, `S` samples each.
+struct Digger<'a, const S: usize> {
+    context: &'a RasterContext<'a>,
+    band: &'a SampleBand,
+    half: [i32; 2],
+    half_width: f32,
+    looked_at: [[i32; 2]; 2],
+    reach: i32,
+    /// Places of the samples of eight pixels of a row, 1/256 px from the corner of the first.
+    offsets: [[[f32; S]; LANES]; 2],
+    /// Pixels looked at since the last poll of the deadline.
+    pixels: u64,
+}
+
+impl<'a, const S: usize> Digger<'a, S> {
+    #[inline(always)]
+    fn new(context: &'a RasterContext<'a>, pass: &LinePass, band: &'a SampleBand) -> Self {
+        let plan = context.plan;
+        let reach = pass.hidden_reach_px() as i32;
+        let samples = sample_offsets(S as u32);
+        let place = |axis: usize, pixel: usize, s: usize| {
+            let step = if axis == 0 { 256 * pixel as i32 } else { 0 };
+            (samples[s % samples.len()][axis] + step) as f32
+        };
+        Self {
+            context,
+            band,
+            half: [plan.width_px as i32 * 128, plan.height_px as i32 * 128],
+            half_width: half_width(pass),
+            looked_at: looked_at(band, reach),
+            reach,
+            offsets: std::array::from_fn(|axis| {
+                std::array::from_fn(|pixel| std::array::from_fn(|s| place(axis, pixel, s)))
+            }),
+            pixels: 0,
+        }
+    }
+
+    /// Adds the holes of some faces.
+    #[inline(always)]
+    fn dig_all(&mut self, faces: &Taken, holes: &mut Holes) {
+        let insets = Insets::new(&corners(self.context, &faces.ids), self.half, self.half_width);
+        for (l, &id) in faces.ids.iter().enumerate().take(faces.len) {
+            if insets.is_open[l] != 0 {
+                self.dig(&insets.get(l, self.half), id, holes);
+            }
+        }
+    }
+
+    /// Adds a face's hole, eight pixels at a time.
+    #[inline(always)]
+    fn dig(&mut self, inset: &Inset, id: u32, holes: &mut Holes) {
+        let [columns, rows]: [[i32; 2]; 2] = std::array::from_fn(|k| {
+            let [low, high] = inset.bounds[k];
+            [(low >> 8).max(self.looked_at[k][0]), (high >> 8).min(self.looked_at[k][1] - 1)]
+        });
+        if columns[0] > columns[1] || rows[0] > rows[1] {
+            return;
+        }
+        let mut first = columns[0];
+        while first <= columns[1] {
+            let (mut above, mut here) = (self.seen(id, first, rows[0] - 1), self.seen(id, first, rows[0]));
+            for y in rows[0]..=rows[1] {
+                let below = self.seen(id, first, y + 1);
+                let seen = above | here | below;
+                let close = (seen | seen >> 1 | seen >> 2) & ((2 << (columns[1] - first).min(LANES as i32 - 1)) - 1);
+                if close != 0 {
+                    self.dig_row(inset, id, [first, y], close, holes);
+                }
+                (above, here) = (here, below);
+            }
+            first += LANES as i32;
+        }
+        self.pixels += u64::from((columns[0].abs_diff(columns[1]) + 1) * (rows[0].abs_diff(rows[1]) + 1));
+    }
+
+    /// The pixels, from the one before `first` to the one after the eighth, that show the face.
+    #[inline(always)]
+    fn seen(&self, id: u32, first: i32, y: i32) -> u32 {
+        let [columns, rows] = self.band.range();
+        if y < rows[0] || y >= rows[1] {
+            return 0;
+        }
+        let mut seen = 0;
+        if first > columns[0] && first + (LANES as i32) < columns[1] {
+            let at = self.band.index(first - 1, y, 0);
+            let ids = self.band.ids.get(at..at + (LANES + 2) * S).unwrap_or_default();
+            for (i, ids) in ids.as_chunks::<S>().0.iter().enumerate() {
+                seen |= shows(ids, id) << i;
+            }
+            return seen;
+        }
+        for x in (first - 1).max(columns[0])..(first + LANES as i32 + 1).min(columns[1]) {
+            seen |= u32::from(self.band.pixel(x, y).0.contains(&id)) << (x - (first - 1));
+        }
+        seen
+    }
+
+    /// Adds the face's hole to some of eight pixels of a row, and marks around those in which
+    /// something hides it.
+    #[inline(always)]
+    fn dig_row(&self, inset: &Inset, id: u32, [first, y]: [i32; 2], close: u32, holes: &mut Holes) {
+        if self.may_hide(inset, id, [first, y]) {
+            for l in (0..LANES as i32).filter(|l| close >> l & 1 != 0) {
+                if is_hidden(self.band, self.half, inset, id, [first + l, y]) {
+                    holes.mark_around([first + l, y], self.reach);
+                }
+            }
+        }
+        let mut areas = inset.areas(first, y);
+        for l in 0..LANES {
+            areas[l] &= 0_u32.wrapping_sub(close >> l & 1);
+        }
+        if let Some(words) = holes.words_mut::<LANES>([first, y]) {
+            // As `Holes::add`.
+            for l in 0..LANES {
+                words[l] = words[l].wrapping_add(areas[l]);
+            }
+            return;
+        }
+        for (x, area) in (first..).zip(areas) {
+            if let Some(at) = holes.index([x, y]) {
+                holes.add(at, area);
+            }
+        }
+    }
+
+    /// False if [`is_hidden`] is false of eight pixels of a row.
+    #[inline(always)]
+    fn may_hide(&self, inset: &Inset, id: u32, [first, y]: [i32; 2]) -> bool {
+        let columns = self.band.range()[0];
+        if first < columns[0] || first + LANES as i32 > columns[1] {
+            return true;
+        }
+        let at = self.band.index(first, y, 0);
+        let ids = self.band.ids.get(at..at + LANES * S).unwrap_or_default();
+        let corner = [(first * 256 - self.half[0]) as f32, (y * 256 - self.half[1]) as f32];
+        let (right, down) = (self.offsets[0].as_flattened(), self.offsets[1].as_flattened());
+        let mut hides = [0_u32; LANES];
+        let groups =
+            ids.as_chunks::<LANES>().0.iter().zip(right.as_chunks::<LANES>().0).zip(down.as_chunks::<LANES>().0);
+        for ((ids, right), down) in groups {
+            for l in 0..LANES {
+                let is_inside = inset.contains([corner[0] + right[l], corner[1] + down[l]]);
+                hides[l] |= u32::from(is_inside & (ids[l] != id));
+            }
+        }
+        hides.iter().fold(0, |any, hides| any | hides) != 0
+    }
+}
+
+/// True if any of a pixel's samples shows a face.
+#[inline(always)]
+fn shows<const S: usize>(ids: &[u32; S], id: u32) -> u32 {
+    let mut shows = false;
+    for s in 0..S {
+        shows |= ids[s] == id;
+    }
+    u32::from(shows)
+}

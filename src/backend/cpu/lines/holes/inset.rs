@@ -1,0 +1,314 @@
+//! Stage lines, per face: the part of it that its lines leave free. Twin of
+//! `shaders/lines/inset.wgsl`.
+//!
+//! A face's inset is what lies at least half a line's width from its three sides. It is the triangle
+//! scaled about its incentre by `(r - w/2) / r`, r being the radius of the inscribed circle, and is
+//! empty where r is not larger than w/2.
+
+use crate::backend::cpu::geometry::setups::Corners;
+use crate::backend::cpu::geometry::transform::{recip, rsqrt};
+use crate::backend::cpu::isa::LANES;
+
+/// Steps to the pixel of a hole's area.
+pub const HOLE_UNIT: f32 = 65_536.0;
+
+/// Distance from a face's sides from which a sample counts as inside, 1/256 px. Closer to a side,
+/// rounding decides which face it shows.
+pub const INSIDE: f32 = 16.0;
+
+/// Sides of an inset that are narrower than this add no area, pixels.
+pub const NARROW_PX: f32 = 1e-4;
+
+/// Sides that rise less than this within a pixel count as straight there, pixels.
+pub const LEVEL_PX: f32 = 1.0 / 1024.0;
+
+/// Eight faces' insets, still in lanes.
+pub struct Insets {
+    corners: [[[i32; LANES]; 2]; 3],
+    /// Per side, from corner k to the next, the unit vector along it, turned so that the inside lies on
+    /// the same hand for all faces.
+    units: [[[f32; LANES]; 2]; 3],
+    /// Corners of the insets, pixels from the corner of the pixel that corner 0 lies in.
+    insets: [[[f32; LANES]; 2]; 3],
+    slopes: [[f32; LANES]; 3],
+    turn: [f32; LANES],
+    /// 1 where there is an inset.
+    pub is_open: [u32; LANES],
+}
+
+/// A face's inset.
+pub struct Inset {
+    /// Pixel of the first corner.
+    base: [i32; 2],
+    sides: [Side; 3],
+    /// 1 or -1: the hand of the face.
+    turn: f32,
+    /// Least and greatest coordinates of the face, 1/256 px from the picture's corner.
+    pub bounds: [[i32; 2]; 2],
+}
+
+/// A side of a face and of its inset.
+#[derive(Clone, Copy, Default)]
+struct Side {
+    /// The face's corner at its start, 1/256 px from the picture's centre.
+    corner: [f32; 2],
+    unit: [f32; 2],
+    /// Ends of the inset's side, pixels from the base.
+    ends: [[f32; 2]; 2],
+    slope: f32,
+}
+
+impl Insets {
+    /// The insets of faces of a picture half as large as `half`, 1/256 px, under lines half as wide
+    /// as `half_width`, 1/256 px.
+    #[inline(always)]
+    pub fn new(faces: &Corners, half: [i32; 2], half_width: f32) -> Self {
+        let corners: [[[i32; LANES]; 2]; 3] = std::array::from_fn(|k| [faces.x[k], faces.y[k]]);
+        let zero = [0.0; LANES];
+        let (mut units, mut insets, mut slopes) = ([[zero; 2]; 3], [[zero; 2]; 3], [zero; 3]);
+        let (mut turn, mut is_open) = (zero, [0; LANES]);
+        for l in 0..LANES {
+            // Vectors along the sides; the coordinates' differences are exact.
+            let mut along = [[0.0_f32; 2]; 3];
+            let (mut length, mut inverse) = ([0.0_f32; 3], [0.0_f32; 3]);
+            for k in 0..3 {
+                for axis in 0..2 {
+                    along[k][axis] = corners[(k + 1) % 3][axis][l].wrapping_sub(corners[k][axis][l]) as f32;
+                }
+                // A side without length, of a face without area, may have any direction.
+                let squared = (along[k][0] * along[k][0] + along[k][1] * along[k][1]).max(1.0);
+                inverse[k] = rsqrt(squared);
+                length[k] = squared * inverse[k];
+            }
+            let area = along[0][0] * along[1][1] - along[0][1] * along[1][0];
+            let inverse_around = recip((length[0] + length[1]) + length[2]);
+            let radius = area.abs() * inverse_around;
+            let is_clear = radius > half_width;
+            is_open[l] = u32::from(is_clear);
+            turn[l] = if area < 0.0 { -1.0 } else { 1.0 };
+            let share = 1.0 - half_width * recip(if is_clear { radius } else { 1.0 });
+            for axis in 0..2 {
+                // From the first corner. The weight of a corner is the length of the side facing it.
+                let (to_second, to_third) = (along[0][axis], -along[2][axis]);
+                let centre = (length[2] * to_second + length[0] * to_third) * inverse_around;
+                let corner = corners[0][axis][l].wrapping_add(half[axis]) & 255;
+                for (k, from_first) in [0.0, to_second, to_third].into_iter().enumerate() {
+                    let at = centre + (from_first - centre) * share;
+                    insets[k][axis][l] = (at + corner as f32) * (1.0 / 256.0);
+                }
+            }
+            for k in 0..3 {
+                for axis in 0..2 {
+                    units[k][axis][l] = along[k][axis] * (inverse[k] * turn[l]);
+                }
+                let next = (k + 1) % 3;
+                let (right, down) = (insets[next][0][l] - insets[k][0][l], insets[next][1][l] - insets[k][1][l]);
+                let is_narrow = right.abs() < NARROW_PX;
+                let inverse = recip(if is_narrow { 1.0 } else { right.abs() });
+                let slope = if right < 0.0 { -(down * inverse) } else { down * inverse };
+                slopes[k][l] = if is_narrow { 0.0 } else { slope };
+            }
+        }
+        Self { corners, units, insets, slopes, turn, is_open }
+    }
+
+    /// Face l's.
+    #[inline(always)]
+    pub fn get(&self, l: usize, half: [i32; 2]) -> Inset {
+        let corner = |k: usize| [self.corners[k][0][l], self.corners[k][1][l]];
+        let [a, b, c] = [corner(0), corner(1), corner(2)];
+        let end = |k: usize| [self.insets[k][0][l], self.insets[k][1][l]];
+        let side = |k: usize| Side {
+            corner: corner(k).map(|v| v as f32),
+            unit: [self.units[k][0][l], self.units[k][1][l]],
+            ends: [end(k), end((k + 1) % 3)],
+            slope: self.slopes[k][l],
+        };
+        let place = |v: i32, axis: usize| v + half[axis];
+        Inset {
+            base: [place(a[0], 0) >> 8, place(a[1], 1) >> 8],
+            sides: [side(0), side(1), side(2)],
+            turn: self.turn[l],
+            bounds: std::array::from_fn(|axis| {
+                let (low, high) = (a[axis].min(b[axis]).min(c[axis]), a[axis].max(b[axis]).max(c[axis]));
+                [place(low, axis), place(high, axis)]
+            }),
+        }
+    }
+}
+
+impl Inset {
+    /// True if a sample, in 1/256 px from the picture's centre, lies well inside the face.
+    #[inline(always)]
+    pub fn contains(&self, [x, y]: [f32; 2]) -> bool {
+        let mut is_inside = true;
+        for side in &self.sides {
+            let from_corner = [x - side.corner[0], y - side.corner[1]];
+            is_inside &= side.unit[0] * from_corner[1] - side.unit[1] * from_corner[0] >= INSIDE;
+        }
+        is_inside
+    }
+
+    /// Area of the inset in each of eight pixels of row `y`, from column `first` on.
+    ///
+    /// The area of a polygon in the unit square is the sum, over its sides, of the signed area that
+    /// lies inside the square between the side and the square's upper border.
+    #[inline(always)]
+    pub fn areas(&self, first: i32, y: i32) -> [u32; LANES] {
+        let (left, top) = ((first - self.base[0]) as f32, (y - self.base[1]) as f32);
+        let mut areas = [0.0_f32; LANES];
+        for side in &self.sides {
+            let [[x0, y0], [x1, _]] = side.ends;
+            let y0 = y0 - top;
+            for l in 0..LANES {
+                let x = left + l as f32;
+                let start = x0 - x;
+                let (from, to) = (clamp(start), clamp(x1 - x));
+                let width = to - from;
+                let (high, low) = (y0 + (from - start) * side.slope, y0 + (to - start) * side.slope);
+                areas[l] -= width * mean_clamped(high, low);
+            }
+        }
+        let mut units = [0; LANES];
+        for l in 0..LANES {
+            units[l] = (clamp(areas[l] * self.turn) * HOLE_UNIT + 0.5) as i32 as u32;
+        }
+        units
+    }
+}
+
+#[inline(always)]
+fn clamp(v: f32) -> f32 {
+    v.max(0.0).min(1.0)
+}
+
+/// Mean of what grows evenly from `a` to `b`, clamped to 0 to 1.
+#[inline(always)]
+fn mean_clamped(a: f32, b: f32) -> f32 {
+    let (low, high) = (clamp(a), clamp(b));
+    // An integral of the clamped function.
+    let integral = |v: f32, clamped: f32| 0.5 * clamped * clamped + (v - 1.0).max(0.0);
+    let rise = b - a;
+    let mean = (integral(b, high) - integral(a, low)) / rise;
+    let middle = 0.5 * (low + high);
+    // Between the clamped ends, however the difference of the integrals was rounded.
+    let mean = mean.max(low.min(high)).min(low.max(high));
+    if rise.abs() > LEVEL_PX { mean } else { middle }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HALF: [i32; 2] = [64 * 128; 2];
+
+    /// xorshift64
+    fn random(state: &mut u64, below: i32) -> i32 {
+        *state ^= *state << 13;
+        *state ^= *state >> 7;
+        *state ^= *state << 17;
+        ((*state >> 33) % below as u64) as i32
+    }
+
+    fn inset_of(corners: [[i32; 2]; 3], width_px: f32) -> Option<Inset> {
+        let lanes = |axis: usize| std::array::from_fn(|k| [corners[k][axis]; LANES]);
+        let insets = Insets::new(&Corners { x: lanes(0), y: lanes(1), z: [[0.0; LANES]; 3] }, HALF, width_px * 128.0);
+        (insets.is_open[5] != 0).then(|| insets.get(5, HALF))
+    }
+
+    /// Keeps what of a polygon lies where `distance` is not negative.
+    fn clip(polygon: &[[f64; 2]], distance: impl Fn([f64; 2]) -> f64) -> Vec<[f64; 2]> {
+        let mut kept = Vec::new();
+        for (i, &p) in polygon.iter().enumerate() {
+            let q = polygon[(i + 1) % polygon.len()];
+            let (at_p, at_q) = (distance(p), distance(q));
+            if at_p >= 0.0 {
+                kept.push(p);
+            }
+            if (at_p >= 0.0) != (at_q >= 0.0) {
+                let t = at_p / (at_p - at_q);
+                kept.push([p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]);
+            }
+        }
+        kept
+    }
+
+    /// Area of a pixel that lies at least half the width inside of all sides.
+    fn truth(corners: [[i32; 2]; 3], width_px: f64, [x, y]: [i32; 2]) -> f64 {
+        let px = corners.map(|c| std::array::from_fn(|k| f64::from(c[k] + HALF[k]) / 256.0));
+        let [a, b, c]: [[f64; 2]; 3] = px;
+        let turn = ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum();
+        let (x, y) = (f64::from(x), f64::from(y));
+        let mut rest = vec![[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]];
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            let way = [q[0] - p[0], q[1] - p[1]];
+            let length = way[0].hypot(way[1]);
+            rest = clip(&rest, |v| turn * (way[0] * (v[1] - p[1]) - way[1] * (v[0] - p[0])) / length - 0.5 * width_px);
+        }
+        let twice = |i: usize| {
+            let (p, q) = (rest[i], rest[(i + 1) % rest.len()]);
+            p[0] * q[1] - p[1] * q[0]
+        };
+        0.5 * (0..rest.len()).map(twice).sum::<f64>().abs()
+    }
+
+    #[test]
+    fn areas_are_those_of_the_clipped_face() {
+        let mut state = 0x9E37_79B9_7F4A_7C15;
+        let (mut open, mut partial, mut farthest) = (0, 0, 0.0_f64);
+        for case in 0..4000 {
+            // From a pixel to the whole picture, level and steep sides among them.
+            let size = [400, 1500, 5000, 16_000][case % 4];
+            let mut corners: [[i32; 2]; 3] =
+                std::array::from_fn(|_| std::array::from_fn(|_| random(&mut state, size) - size / 2));
+            if case % 5 == 0 {
+                corners[1][case % 2] = corners[0][case % 2] + (case as i32 % 3);
+            }
+            let width_px = [0.4, 1.0, 2.5][case % 3];
+            let Some(inset) = inset_of(corners, width_px) else {
+                let all: f64 = (0..64)
+                    .flat_map(|y| (0..64).map(move |x| [x, y]))
+                    .map(|at| truth(corners, f64::from(width_px), at))
+                    .sum();
+                assert!(all < 1e-3, "{case}: {all} is left of {corners:?}");
+                continue;
+            };
+            open += 1;
+            for y in (0..64).step_by(1 + case % 3) {
+                for first in (0..64).step_by(LANES) {
+                    for (x, area) in (first..).zip(inset.areas(first, y)) {
+                        let (area, want) =
+                            (f64::from(area) / f64::from(HOLE_UNIT), truth(corners, f64::from(width_px), [x, y]));
+                        partial += usize::from(want > 0.01 && want < 0.99);
+                        farthest = farthest.max((area - want).abs());
+                        assert!((area - want).abs() < 1e-3, "{case}: {area} is not {want} at {x} {y} of {corners:?}");
+                    }
+                }
+            }
+        }
+        assert!(open > 2000 && partial > 20_000, "{open} faces, {partial} pixels; off by {farthest}");
+    }
+
+    #[test]
+    fn samples_well_inside_are_those_far_from_every_side() {
+        let corners = [[0, 0], [2000, 100], [300, 1700]];
+        let mut inside = 0;
+        for turned in [corners, [corners[0], corners[2], corners[1]]] {
+            let inset = inset_of(turned, 1.0).unwrap();
+            for (x, y) in (-10..210).flat_map(|x| (-10..210).map(move |y| (10 * x, 10 * y))) {
+                let nearest = [0, 1, 2].map(|k| {
+                    let (p, q) = (corners[k], corners[(k + 1) % 3]);
+                    let way = [f64::from(q[0] - p[0]), f64::from(q[1] - p[1])];
+                    (way[0] * f64::from(y - p[1]) - way[1] * f64::from(x - p[0])) / way[0].hypot(way[1])
+                });
+                let nearest = nearest.into_iter().fold(f64::INFINITY, f64::min);
+                if (nearest - f64::from(INSIDE)).abs() > 0.01 {
+                    let is_inside = inset.contains([x as f32, y as f32]);
+                    assert_eq!(is_inside, nearest > f64::from(INSIDE), "{x} {y}");
+                    inside += usize::from(is_inside);
+                }
+            }
+        }
+        assert!(inside > 10_000, "{inside}");
+    }
+}

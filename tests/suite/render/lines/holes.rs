@@ -1,0 +1,131 @@
+//! Lines whose coverage holes in faces tell: against the same lines as strokes alone, on both
+//! back-ends. What the lines should be is the accuracy suite's to say.
+
+use meshsnap::backend::Renderer;
+use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::backend::gpu::GpuRenderer;
+use meshsnap::image::Image;
+use meshsnap::limits::Deadline;
+use meshsnap::mesh::Mesh;
+use meshsnap::plan::DrawPlan;
+
+use crate::support::gpus::gpus;
+use crate::support::likeness::{Likeness, Tolerance};
+use crate::support::{scenes, shapes};
+
+/// A request's keys.
+type Keys<'k> = &'k [(&'k str, &'k str)];
+
+/// Every number of samples, at the least width and others.
+const LOOKS: &[Keys<'_>] = &[
+    &[("style", "wire"), ("size", "150x120")],
+    &[("style", "hidden-line"), ("size", "200"), ("wire.thickness", "0.8"), ("view", "right")],
+    &[("style", "wire"), ("size", "120"), ("samples", "1"), ("wire.thickness", "1.5")],
+    &[("style", "wire"), ("size", "120"), ("samples", "8"), ("wire.thickness", "3"), ("wire.lit", "true")],
+    &[("style", "wire"), ("size", "110"), ("samples", "16"), ("wire.thickness", "0.4")],
+    &[("style", "wire"), ("size", "160"), ("wire.thickness", "8"), ("view", "top")],
+    &[("style", "wire"), ("size", "100"), ("camera.projection", "orthographic"), ("camera.height", "0.6")],
+    &[
+        ("style", "wire"),
+        ("size", "120x100"),
+        ("camera.eye", "0.2,0.35,0.3"),
+        ("camera.target", "-0.8,0,-0.9"),
+        ("camera.fov_deg", "80"),
+    ],
+];
+
+/// Sheets, what touches or passes through itself, borders, and an edge of three faces.
+fn meshes() -> [(&'static str, Mesh); 9] {
+    let ball = |n| {
+        let mut shape = shapes::Obj::default();
+        shape.ball([0.0; 3], 1.0, n);
+        shape.finish()
+    };
+    [
+        ("sheet", shapes::sheet(30)),
+        ("fin", shapes::FIN.to_owned()),
+        ("boxes on a floor", shapes::boxes_on_a_floor()),
+        ("stacked boxes", shapes::stacked_boxes()),
+        ("room", shapes::room_with_t_junctions()),
+        ("balls that pass through each other", balls_through_each_other()),
+        ("gear", shapes::gear(12)),
+        ("ball", ball(40)),
+        ("hairs", hairs()),
+    ]
+    .map(|(name, obj)| (name, scenes::mesh(&obj)))
+}
+
+fn balls_through_each_other() -> String {
+    let mut shape = shapes::Obj::default();
+    shape.ball([0.0; 3], 1.0, 14);
+    shape.ball([0.7, 0.4, 0.2], 0.8, 11);
+    shape.finish()
+}
+
+/// Slivers without a sample before a wall of large faces.
+fn hairs() -> String {
+    let mut shape = shapes::Obj::default();
+    shape.cuboid([-1.0, -1.0, -1.0], [1.0, 1.0, 0.0]);
+    for i in 0..8 {
+        let at = f64::from(i) * 0.2 - 0.7;
+        let corners = [[at, -0.8, 0.3], [at + 1e-5, -0.8, 0.3], [at + 0.1, 0.8, 0.35]].map(|p| shape.vertex(p));
+        shape.face(&corners);
+    }
+    shape.finish()
+}
+
+/// The plan's picture, and that by strokes alone.
+fn both(renderer: &mut dyn Renderer, plan: &mut DrawPlan<'_>) -> [Image; 2] {
+    let deadline = Deadline::default();
+    let by_holes = renderer.draw(plan, &deadline).unwrap();
+    plan.lines.iter_mut().for_each(|pass| pass.is_complete = false);
+    [by_holes, renderer.draw(plan, &deadline).unwrap()]
+}
+
+#[test]
+fn holes_and_strokes_tell_of_the_same_lines() {
+    let mut renderers: Vec<Box<dyn Renderer>> = vec![Box::new(CpuRenderer::new(2))];
+    renderers.extend(gpus().into_iter().flatten().map(|gpu| Box::new(GpuRenderer::new(gpu.clone())) as Box<_>));
+    let (mut cases, mut different) = (0, 0);
+    for (name, mesh) in &meshes() {
+        for (i, keys) in LOOKS.iter().enumerate() {
+            for renderer in &mut renderers {
+                let mut plan = scenes::plan(mesh, &scenes::spec(keys));
+                assert!(plan.has_holes(), "{name}, look {i}");
+                let [by_holes, by_strokes] = both(renderer.as_mut(), &mut plan);
+                let likeness = Likeness::of(&by_holes, &by_strokes);
+                // Where strokes overlap, their union is an estimate: that is what holes are for.
+                likeness
+                    .assert(Tolerance { max: 32, share: 0.15 }, &format!("{name}, look {i}, {:?}", renderer.kind()));
+                different += usize::from(likeness.differing() > 0);
+                cases += 1;
+            }
+        }
+    }
+    assert_eq!(cases, renderers.len() * 9 * LOOKS.len());
+    assert!(different > cases / 2, "{different} of {cases} pictures have a pixel that holes tell");
+}
+
+#[test]
+fn what_holes_cannot_tell_is_left_to_strokes() {
+    let mesh = scenes::mesh(&shapes::sheet(8));
+    let wire = ("style", "wire");
+    let cases: &[(&[(&str, &str)], bool)] = &[
+        (&[wire], true),
+        (&[wire, ("wire.thickness", "0.79")], false),
+        (&[wire, ("wire.thickness", "8.1")], false),
+        (&[wire, ("samples", "1")], false),
+        (&[wire, ("samples", "16"), ("wire.thickness", "0.5")], true),
+        (&[wire, ("wire.smoothing", "0.5")], false),
+        (&[wire, ("wire.hidden", "show")], false),
+        (&[wire, ("wire.edges", "polygons")], false),
+        (&[wire, ("surface.opacity", "0.5")], false),
+        (&[wire, ("surface.cull", "back")], false),
+        (&[("style", "outline"), ("outline.method", "contour")], false),
+        (&[("style", "hidden-line")], true),
+    ];
+    for (keys, has_holes) in cases {
+        let plan = scenes::plan(&mesh, &scenes::spec(keys));
+        assert_eq!(plan.has_holes(), *has_holes, "{keys:?}");
+    }
+}
