@@ -202,11 +202,16 @@ impl Corners {
         self.v.push(v);
     }
 
-    /// Takes back the last corners, so that `len` are left.
-    fn truncate(&mut self, len: usize) {
-        self.v.truncate(len);
-        self.vt.truncate(len);
-        self.vn.truncate(len);
+    /// Adds the corners of a face; `form` says what they have.
+    #[inline]
+    fn extend(&mut self, corners: &[[u32; 3]], form: (bool, bool)) {
+        for (kind, has, list) in [(1, form.0, &mut self.vt), (2, form.1, &mut self.vn)] {
+            if has || !list.is_empty() {
+                list.resize(self.v.len(), MISSING);
+                list.extend(corners.iter().map(|corner| corner[kind]));
+            }
+        }
+        self.v.extend(corners.iter().map(|corner| corner[0]));
     }
 }
 
