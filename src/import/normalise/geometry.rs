@@ -17,6 +17,9 @@ pub trait Geometry: Sync {
     /// The vertices that keys are indices of, or none where keys are positions.
     fn vertices(&self) -> Option<&[[f64; 3]]>;
 
+    /// True if no scaled triangle with an unusable corner has a normal of finite length.
+    fn unusable_shows(&self) -> bool;
+
     /// The corners of a triangle.
     #[inline(always)]
     fn corners(&self, triangle: usize) -> [[f64; 3]; 3] {
@@ -27,16 +30,20 @@ pub trait Geometry: Sync {
 
 /// The identity of a corner.
 pub trait Key: Copy + Eq + Send + Sync {
-    /// A number below 2^32 that is unique among keys, if there is one.
-    fn index(self) -> Option<u32>;
+    /// True if keys are indices.
+    const IS_INDEX: bool;
+    /// The index, if keys are.
+    fn index(self) -> u32;
     /// Three words that equal keys, and they alone, have in common.
     fn words(self) -> [u32; 3];
 }
 
 impl Key for u32 {
+    const IS_INDEX: bool = true;
+
     #[inline(always)]
-    fn index(self) -> Option<u32> {
-        Some(self)
+    fn index(self) -> u32 {
+        self
     }
 
     #[inline(always)]
@@ -47,9 +54,11 @@ impl Key for u32 {
 
 /// The bits of a position.
 impl Key for [u32; 3] {
+    const IS_INDEX: bool = false;
+
     #[inline(always)]
-    fn index(self) -> Option<u32> {
-        None
+    fn index(self) -> u32 {
+        0
     }
 
     #[inline(always)]
@@ -64,6 +73,8 @@ pub struct Indexed<'a> {
     pub positions: &'a [[f64; 3]],
     /// The triangles.
     pub triangles: &'a [[u32; 3]],
+    /// True if all positions are usable.
+    pub is_usable: bool,
 }
 
 impl Geometry for Indexed<'_> {
@@ -86,6 +97,10 @@ impl Geometry for Indexed<'_> {
     fn vertices(&self) -> Option<&[[f64; 3]]> {
         Some(self.positions)
     }
+
+    fn unusable_shows(&self) -> bool {
+        self.is_usable
+    }
 }
 
 impl Geometry for Soup {
@@ -107,5 +122,11 @@ impl Geometry for Soup {
 
     fn vertices(&self) -> Option<&[[f64; 3]]> {
         None
+    }
+
+    /// A normal of finite f32 has a finite length in f64. An infinite or NaN coordinate makes all
+    /// or two of a normal's so, because the products of its differences do not cancel out.
+    fn unusable_shows(&self) -> bool {
+        true
     }
 }

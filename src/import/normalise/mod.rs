@@ -32,7 +32,6 @@ use crate::pluralise::pluralise;
 pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, MeshError> {
     let soup = raw.soup.take();
     let (positions, triangles) = (std::mem::take(&mut raw.positions), std::mem::take(&mut raw.triangles));
-    let indexed = Indexed { positions: &positions, triangles: &triangles };
     let [triangle_count, vertex_count] = match &soup {
         Some(soup) => [soup.triangles(), 3 * soup.triangles()],
         None => [triangles.len(), positions.len()],
@@ -46,8 +45,14 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     cx.budget.spend("the welded vertices", vertex_count as u64, number::BYTES_PER_VERTEX)?;
 
     let (mut mesh, kept) = match &soup {
-        Some(soup) => shape(soup, &mut raw, cx)?,
-        None => shape(&indexed, &mut raw, cx)?,
+        Some(soup) => shape(soup, None, &mut raw, cx)?,
+        None => {
+            let survey = faces::survey(&positions, cx.deadline)?;
+            let indexed = Indexed { positions: &positions, triangles: &triangles, is_usable: survey.is_usable };
+            // All vertices are likely used. If their largest decides, the faces are picked once.
+            let guess = (!survey.is_f32).then(|| scale_exponent(survey.largest));
+            shape(&indexed, guess, &mut raw, cx)?
+        }
     };
     drop(positions);
     let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
@@ -81,20 +86,18 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
 }
 
 /// Positions, triangles, normals, lines and bounds of the mesh, and the triangle of each face
-/// unless all triangles are faces.
+/// unless all triangles are faces. `guess` is the likely exponent of the power of two that positions
+/// are divided by, None if f32 has them all.
 fn shape<G: Geometry>(
     geometry: &G,
+    guess: Option<i32>,
     raw: &mut RawMesh,
     cx: &Context<'_>,
 ) -> Result<(Mesh, Option<Vec<u32>>), MeshError> {
     let vertices = geometry.vertices().unwrap_or_default();
     let vertex = |v: u32| vertices.get(v as usize).copied().unwrap_or([f64::NAN; 3]);
-    // Triangles without vertices of their own are f32.
-    let (largest_of_all, has_only_f32) = faces::survey(vertices, cx.deadline)?;
-    // All vertices are likely used. If their largest decides, the faces are picked once.
-    let guess = (!has_only_f32).then(|| scale_exponent(largest_of_all));
     let mut faces = faces::pick(geometry, guess.map(|exponent| Pow2::new(-exponent)), cx.deadline)?;
-    if raw.is_f32 && (has_only_f32 || faces::have_f32(geometry, cx.deadline)?) {
+    if raw.is_f32 && (guess.is_none() || faces::have_f32(geometry, cx.deadline)?) {
         raw.report.warnings.extend(precision::warning(&faces.usable));
     }
     raw.report.dropped_lines_and_points = drop_bad(vertex, &mut raw.lines_and_points);

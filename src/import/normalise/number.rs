@@ -48,7 +48,7 @@ pub fn number<G: Geometry>(
             let chunks = vertices.chunks(VERTICES_PER_PIECE).collect();
             let all = map(chunks, |chunk: &[[f64; 3]]| chunk.iter().map(|p| bits(*p)).collect());
             let of_pieces: Vec<Vec<u32>> =
-                map(pieces, |piece: Piece<G::Key>| piece.keys.iter().filter_map(|key| key.index()).collect());
+                map(pieces, |piece: Piece<G::Key>| piece.keys.iter().map(|key| key.index()).collect());
             let welded = weld(&slices(&all), deadline)?;
             order.reserve(welded.count);
             let mut tables = of_pieces;
