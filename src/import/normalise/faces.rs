@@ -1,6 +1,6 @@
 //! The faces of a raw mesh: its triangles with finite corners and an area.
 
-use super::geometry::Geometry;
+use super::geometry::{Geometry, Key as _};
 use super::local::{CORNERS_MAX, Local};
 use super::pow2::{Pow2, exponent, is_usable, max_abs};
 use crate::import::parallel::{map, map_with};
@@ -117,7 +117,7 @@ pub fn have_f32<G: Geometry>(geometry: &G, deadline: &Deadline) -> Result<bool, 
 pub struct Faces<K> {
     /// A unit normal for each.
     pub normals: Vec<[f32; 3]>,
-    /// The corners of each face, as numbers in its piece.
+    /// The corners of each face, as numbers in its piece; empty where keys are indices.
     pub triangles: Vec<[u32; 3]>,
     /// The pieces, in order.
     pub pieces: Vec<Piece<K>>,
@@ -166,8 +166,10 @@ fn pick_scaled<G: Geometry>(
     deadline: &Deadline,
 ) -> Result<Faces<G::Key>, Stopped> {
     let count = geometry.triangles();
-    let (mut normals, mut triangles) = (vec![[0.0_f32; 3]; count], vec![[0_u32; 3]; count]);
-    let places = normals.chunks_mut(TRIANGLES_PER_PIECE).zip(triangles.chunks_mut(TRIANGLES_PER_PIECE));
+    let mut normals = vec![[0.0_f32; 3]; count];
+    let mut triangles = vec![[0_u32; 3]; if G::Key::IS_INDEX { 0 } else { count }];
+    let mut pieces = triangles.chunks_mut(TRIANGLES_PER_PIECE);
+    let places = normals.chunks_mut(TRIANGLES_PER_PIECE).map(|normals| (normals, pieces.next().unwrap_or_default()));
     let done =
         map_with((0..).step_by(TRIANGLES_PER_PIECE).zip(places).collect(), Local::new, |local, (begin, (n, t))| {
             deadline.check()?;
@@ -213,7 +215,7 @@ struct Picked<K> {
 }
 
 /// Fills in the normals of some triangles from `begin` on, with NaN for those that are no faces, and
-/// the local numbers of the others' corners.
+/// the local numbers of the others' corners if there is room for them.
 fn pick_piece<G: Geometry>(
     geometry: &G,
     begin: usize,
@@ -224,13 +226,14 @@ fn pick_piece<G: Geometry>(
     let piece = begin..begin + normals.len();
     local.begin(piece.clone().map(|triangle| geometry.keys(triangle)));
     let (mut nonfinite, mut degenerate) = (0, 0);
-    let blocks = normals.chunks_mut(BLOCK).zip(triangles.chunks_mut(BLOCK));
-    for (begin, (normals, triangles)) in piece.clone().step_by(BLOCK).zip(blocks) {
+    let mut places = triangles.chunks_mut(BLOCK);
+    for (begin, normals) in piece.clone().step_by(BLOCK).zip(normals.chunks_mut(BLOCK)) {
+        let places = places.next().unwrap_or_default();
         let mut block = Block::default();
         block.fill(begin..begin + normals.len(), geometry, &scale);
         block.units(normals);
-        for (triangle, (normal, place)) in (begin..).zip(normals.iter_mut().zip(triangles)) {
-            let keys = geometry.keys(triangle);
+        for (i, normal) in normals.iter_mut().enumerate() {
+            let triangle = begin + i;
             if normal[0].is_nan() {
                 match sliver(geometry.corners(triangle), &scale) {
                     Some(Some(n)) => *normal = n,
@@ -239,8 +242,11 @@ fn pick_piece<G: Geometry>(
                 }
             }
             if !normal[0].is_nan() {
-                let [a, b, c] = keys;
-                *place = [local.number(a), local.number(b), local.number(c)];
+                let [a, b, c] = geometry.keys(triangle);
+                let numbers = [local.number(a), local.number(b), local.number(c)];
+                if let Some(place) = places.get_mut(i) {
+                    *place = numbers;
+                }
             }
         }
     }
@@ -370,7 +376,7 @@ mod tests {
                 corners[2] = std::array::from_fn(|k| corners[0][k] * 0.5 + corners[1][k] * 0.5);
                 corners[2] = corners[2].map(|c| f64::from(c as f32));
             }
-            let geometry = Indexed { positions: &positions, triangles: &triangles, is_usable: false };
+            let geometry = Indexed { positions, triangles: triangles.clone(), is_usable: false };
             let pick = |down: Option<i32>| pick(&geometry, down.map(Pow2::new), &Deadline::default()).unwrap();
             let plain = pick(None);
             assert!(plain.nonfinite > 100 && plain.degenerate > 10, "{} {}", plain.nonfinite, plain.degenerate);

@@ -14,8 +14,8 @@ pub trait Geometry: Sync {
     fn keys(&self, triangle: usize) -> [Self::Key; 3];
     /// The position of a corner, in the file's units.
     fn position(&self, key: Self::Key) -> [f64; 3];
-    /// The vertices that keys are indices of, or none where keys are positions.
-    fn vertices(&self) -> Option<&[[f64; 3]]>;
+    /// The vertices and triangles that keys are indices of, or none where keys are positions.
+    fn indexed(&mut self) -> Option<&mut Indexed>;
 
     /// True if no scaled triangle with an unusable corner has a normal of finite length.
     fn unusable_shows(&self) -> bool;
@@ -68,16 +68,16 @@ impl Key for [u32; 3] {
 }
 
 /// Triangles that are indices of positions.
-pub struct Indexed<'a> {
+pub struct Indexed {
     /// The positions.
-    pub positions: &'a [[f64; 3]],
+    pub positions: Vec<[f64; 3]>,
     /// The triangles.
-    pub triangles: &'a [[u32; 3]],
+    pub triangles: Vec<[u32; 3]>,
     /// True if all positions are usable.
     pub is_usable: bool,
 }
 
-impl Geometry for Indexed<'_> {
+impl Geometry for Indexed {
     type Key = u32;
 
     fn triangles(&self) -> usize {
@@ -94,8 +94,8 @@ impl Geometry for Indexed<'_> {
         self.positions[vertex as usize]
     }
 
-    fn vertices(&self) -> Option<&[[f64; 3]]> {
-        Some(self.positions)
+    fn indexed(&mut self) -> Option<&mut Indexed> {
+        Some(self)
     }
 
     fn unusable_shows(&self) -> bool {
@@ -120,7 +120,7 @@ impl Geometry for Soup {
         [f64::from(f32::from_bits(x)), f64::from(f32::from_bits(y)), f64::from(f32::from_bits(z))]
     }
 
-    fn vertices(&self) -> Option<&[[f64; 3]]> {
+    fn indexed(&mut self) -> Option<&mut Indexed> {
         None
     }
 

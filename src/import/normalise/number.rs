@@ -4,7 +4,7 @@
 use super::faces::{Faces, Piece};
 use super::geometry::{Geometry, Key};
 use super::weld::{Bits, NEW, Welded, weld};
-use crate::import::parallel::map;
+use crate::import::parallel::{concat, each_piece, map, map_items};
 use crate::limits::{Deadline, Stopped};
 
 /// Vertices that a thread welds at a time.
@@ -16,68 +16,93 @@ const UNSEEN: u32 = u32::MAX;
 pub const BYTES_PER_VERTEX: u64 = 12 + 4 + super::weld::BYTES_PER_POSITION + 12;
 
 /// Welded positions and what uses them.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Numbered {
     /// The positions.
     pub positions: Vec<[f32; 3]>,
+    /// Faces, three positions each, some of them equal.
+    pub triangles: Vec<[u32; 3]>,
     /// The ends of lines and points.
     pub ends: Vec<[u32; 2]>,
     /// Faces of which two corners became equal.
     pub collapsed: u64,
 }
 
-/// Welds the positions and makes the triangles of `faces` refer to them. `position` brings one into
-/// the unit box.
+/// Welds the positions and numbers the corners of `faces`. `position` brings one into the unit box.
+/// The positions of `geometry` are gone then, and its triangles too unless they are kept.
 pub fn number<G: Geometry>(
-    geometry: &G,
+    geometry: &mut G,
     faces: &mut Faces<G::Key>,
-    ends: impl ExactSizeIterator<Item = [u32; 2]>,
+    ends: impl Iterator<Item = [u32; 2]> + Clone,
     position: impl Fn([f64; 3]) -> [f32; 3] + Sync,
-    deadline: &Deadline,
+    (keeps_triangles, deadline): (bool, &Deadline),
 ) -> Result<Numbered, Stopped> {
     let bits = |p: [f64; 3]| {
         let [x, y, z] = position(p);
         [x.to_bits(), y.to_bits(), z.to_bits()]
     };
     let pieces = std::mem::take(&mut faces.pieces);
+    if let Some(indexed) = geometry.indexed() {
+        let positions = std::mem::take(&mut indexed.positions);
+        let all: Vec<Vec<Bits>> =
+            map(positions.chunks(VERTICES_PER_PIECE).collect(), |chunk| chunk.iter().map(|p| bits(*p)).collect());
+        drop(positions);
+        let of_faces = pieces.iter().flat_map(|piece| piece.keys.iter().map(|key| key.index()));
+        let (positions, numbers) = number_vertices(all, of_faces.chain(ends.clone().flatten()), deadline)?;
+        let ends = ends.map(|ends| ends.map(|v| numbers[v as usize])).collect();
+        let file = &mut indexed.triangles;
+        let mut triangles = match &faces.kept {
+            Some(kept) => map_items(kept, |triangle| file[*triangle as usize]),
+            None if keeps_triangles => map_items(file, |triangle| *triangle),
+            None => std::mem::take(file),
+        };
+        let collapsed = each_piece(&mut triangles, |piece| renumber(piece, &numbers)).iter().sum();
+        return Ok(Numbered { positions, triangles, ends, collapsed });
+    }
     let counts: Vec<usize> = pieces.iter().map(|piece| piece.faces).collect();
-    let mut order = Order::default();
-    let mut of_ends = Vec::new();
-    let tables = match geometry.vertices() {
-        Some(vertices) => {
-            let chunks = vertices.chunks(VERTICES_PER_PIECE).collect();
-            let all = map(chunks, |chunk: &[[f64; 3]]| chunk.iter().map(|p| bits(*p)).collect());
-            let of_pieces: Vec<Vec<u32>> =
-                map(pieces, |piece: Piece<G::Key>| piece.keys.iter().map(|key| key.index()).collect());
-            let welded = weld(&slices(&all), deadline)?;
-            order.reserve(welded.count);
-            let mut tables = of_pieces;
-            let mut number = |vertex: u32| {
-                let (piece, at) = (vertex as usize / VERTICES_PER_PIECE, vertex as usize % VERTICES_PER_PIECE);
-                order.number(welded.numbers[piece][at], all[piece][at])
-            };
-            for table in &mut tables {
-                deadline.check()?;
-                table.iter_mut().for_each(|vertex| *vertex = number(*vertex));
-            }
-            of_ends = ends.map(|[a, b]| [number(a), number(b)]).collect();
-            tables
+    let all: Vec<Vec<Bits>> =
+        map(pieces, |piece: Piece<G::Key>| piece.keys.iter().map(|key| bits(geometry.position(*key))).collect());
+    let Welded { numbers: mut tables, count } = weld(&slices(&all), deadline)?;
+    let mut order = Order::of(count);
+    for (table, bits) in tables.iter_mut().zip(&all) {
+        deadline.check()?;
+        table.iter_mut().zip(bits).for_each(|(number, bits)| *number = order.number(*number, *bits));
+    }
+    let mut triangles = std::mem::take(&mut faces.triangles);
+    let mut tasks = Vec::with_capacity(counts.len());
+    let mut rest = triangles.as_mut_slice();
+    for (count, table) in counts.iter().zip(&tables) {
+        let (own, after) = rest.split_at_mut(*count);
+        tasks.push((own, table));
+        rest = after;
+    }
+    let collapsed = map(tasks, |(triangles, table)| renumber(triangles, table)).iter().sum();
+    Ok(Numbered { positions: order.positions, triangles, ends: Vec::new(), collapsed })
+}
+
+/// Welded positions in the order of their first use, and the number of each vertex; those that are
+/// not used have none.
+fn number_vertices(
+    all: Vec<Vec<Bits>>,
+    used: impl Iterator<Item = u32>,
+    deadline: &Deadline,
+) -> Result<(Vec<[f32; 3]>, Vec<u32>), Stopped> {
+    let Welded { numbers, count } = weld(&slices(&all), deadline)?;
+    let mut order = Order::of(count);
+    for (vertex, since_poll) in used.zip((0..VERTICES_PER_PIECE).cycle()) {
+        if since_poll == 0 {
+            deadline.check()?;
         }
-        None => {
-            let all = map(pieces, |piece: Piece<G::Key>| {
-                piece.keys.iter().map(|key| bits(geometry.position(*key))).collect()
-            });
-            let Welded { numbers: mut tables, count } = weld(&slices(&all), deadline)?;
-            order.reserve(count);
-            for (table, bits) in tables.iter_mut().zip(&all) {
-                deadline.check()?;
-                table.iter_mut().zip(bits).for_each(|(number, bits)| *number = order.number(*number, *bits));
-            }
-            tables
-        }
-    };
-    let collapsed = renumber(&mut faces.triangles, &counts, &tables);
-    Ok(Numbered { positions: order.positions, ends: of_ends, collapsed })
+        let (piece, at) = (vertex as usize / VERTICES_PER_PIECE, vertex as usize % VERTICES_PER_PIECE);
+        order.number(numbers[piece][at], all[piece][at]);
+    }
+    drop(all);
+    let Order { numbers: of_welded, positions } = order;
+    let numbers = map(numbers, |mut piece| {
+        piece.iter_mut().for_each(|number| *number = of_welded[(*number & !NEW) as usize]);
+        piece
+    });
+    Ok((positions, concat(numbers)))
 }
 
 fn slices(all: &[Vec<Bits>]) -> Vec<&[Bits]> {
@@ -85,7 +110,6 @@ fn slices(all: &[Vec<Bits>]) -> Vec<&[Bits]> {
 }
 
 /// The order of first use.
-#[derive(Default)]
 struct Order {
     /// By the number among the welded positions.
     numbers: Vec<u32>,
@@ -93,10 +117,9 @@ struct Order {
 }
 
 impl Order {
-    /// Makes room for so many welded positions.
-    fn reserve(&mut self, count: usize) {
-        self.numbers = vec![UNSEEN; count];
-        self.positions.reserve_exact(count);
+    /// An order of so many welded positions.
+    fn of(count: usize) -> Self {
+        Self { numbers: vec![UNSEEN; count], positions: Vec::with_capacity(count) }
     }
 
     /// The number of a welded position.
@@ -112,26 +135,16 @@ impl Order {
     }
 }
 
-/// Turns the numbers of pieces, each of so many triangles, into those of their tables. Returns how
-/// many triangles have equal corners then.
-fn renumber(triangles: &mut [[u32; 3]], counts: &[usize], tables: &[Vec<u32>]) -> u64 {
-    let mut tasks = Vec::with_capacity(counts.len());
-    let mut rest = triangles;
-    for (count, table) in counts.iter().zip(tables) {
-        let (own, after) = rest.split_at_mut(*count);
-        tasks.push((own, table));
-        rest = after;
+/// Replaces the corners of triangles by their values in a table. Returns how many triangles have
+/// equal corners then.
+fn renumber(triangles: &mut [[u32; 3]], table: &[u32]) -> u64 {
+    let mut collapsed = 0;
+    for triangle in triangles {
+        let [a, b, c] = *triangle;
+        *triangle = [table[a as usize], table[b as usize], table[c as usize]];
+        collapsed += u64::from(is_collapsed(triangle));
     }
-    let collapsed = map(tasks, |(triangles, table): (&mut [[u32; 3]], &Vec<u32>)| {
-        let mut collapsed = 0;
-        for triangle in triangles {
-            let [a, b, c] = *triangle;
-            *triangle = [table[a as usize], table[b as usize], table[c as usize]];
-            collapsed += u64::from(is_collapsed(triangle));
-        }
-        collapsed
-    });
-    collapsed.iter().sum()
+    collapsed
 }
 
 /// True if two corners are equal.
