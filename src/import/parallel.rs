@@ -49,15 +49,20 @@ pub fn concat<T: Copy + Default + Send + Sync>(mut lists: Vec<Vec<T>>) -> Vec<T>
     if lists.len() < 2 {
         return lists.pop().unwrap_or_default();
     }
-    let mut all = vec![T::default(); lists.iter().map(Vec::len).sum()];
+    concat_slices(&lists.iter().map(Vec::as_slice).collect::<Vec<_>>())
+}
+
+/// One list of the items of several.
+pub fn concat_slices<T: Copy + Default + Send + Sync>(lists: &[&[T]]) -> Vec<T> {
+    let mut all = vec![T::default(); lists.iter().map(|list| list.len()).sum()];
     let mut places = Vec::with_capacity(lists.len());
     let mut rest = all.as_mut_slice();
     for list in lists {
         let (place, after) = rest.split_at_mut(list.len());
-        places.push((place, list));
+        places.push((place, *list));
         rest = after;
     }
-    map(places, |(place, list)| place.copy_from_slice(&list));
+    map(places, |(place, list)| place.copy_from_slice(list));
     all
 }
 

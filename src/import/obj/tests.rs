@@ -1,6 +1,6 @@
 //! Parts of any size, threads and both ways to parse a line give the same mesh.
 
-use super::{assemble, read_parts};
+use super::read_text;
 use crate::import::Format;
 use crate::import::bundle::{Bundle, entry};
 use crate::import::context::Context;
@@ -16,9 +16,7 @@ fn read(text: &str, part_bytes: usize, is_quick: bool) -> String {
     let (folder, _) = entry::choose(files, None, Some(Format::Obj), &deadline).unwrap();
     let mut cx = Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
     let mut raw = RawMesh::default();
-    let summary =
-        read_parts(text.as_bytes(), part_bytes, is_quick, &mut cx).and_then(|parts| assemble(parts, &mut raw, &mut cx));
-    match summary {
+    match read_text(text.as_bytes(), part_bytes, is_quick, &mut raw, &mut cx) {
         Ok(summary) => format!("{summary:?} {raw:?}"),
         Err(error) => format!("{error:?}"),
     }

@@ -1,7 +1,7 @@
 //! The vertices of a raw mesh: the file's positions, or one for each combination of a position
 //! with a texture coordinate and a normal.
 
-use super::{Lists, Names};
+use super::{Names, Room};
 use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::obj::face::MISSING;
@@ -18,11 +18,12 @@ const CORNERS_PER_PAYMENT: u64 = 65_536;
 /// table.
 const VERTEX_BYTES: u64 = 2 * (16 + 24 + 8 + 12 + 16) + 2 * (12 + 4 + 1);
 
-/// Fills in positions and attributes, and makes the corners of `parts` refer to them.
+/// Fills in positions and attributes, and makes the corners of all `parts` refer to them.
 pub fn fill(
     parts: &mut [Part<'_>],
+    corners: &mut [u32],
     names: &Names,
-    lists: Lists,
+    lists: Room,
     raw: &mut RawMesh,
     cx: &mut Context<'_>,
 ) -> Result<(), MeshError> {
@@ -37,6 +38,7 @@ pub fn fill(
     let mut uses = [false; 2];
     let mut last = None;
     let mut unpaid = 0;
+    let mut corners = corners.iter_mut();
     for (number, part) in parts.iter_mut().enumerate() {
         let mut at = 0;
         for group in &part.groups {
@@ -47,21 +49,20 @@ pub fn fill(
             }
             let form = (group.form.0 && has_uvs, group.form.1 && has_normals);
             uses = [uses[0] | form.0, uses[1] | form.1];
-            for _ in 0..u64::from(group.faces) * u64::from(group.arity) {
+            for v in corners.by_ref().take(group.faces as usize * group.arity as usize) {
                 if unpaid == 0 {
                     cx.deadline.check()?;
                     cx.budget.spend("the vertices of the OBJ file", CORNERS_PER_PAYMENT, VERTEX_BYTES)?;
                     unpaid = CORNERS_PER_PAYMENT;
                 }
                 unpaid -= 1;
-                let vt = if form.0 { part.corners.vt[at] } else { MISSING };
-                let vn = if form.1 { part.corners.vn[at] } else { MISSING };
-                let v = &mut part.corners.v[at];
+                let vt = if form.0 { part.corner_uvs[at] } else { MISSING };
+                let vn = if form.1 { part.corner_normals[at] } else { MISSING };
                 *v = combinations.number([*v, vt, vn]);
                 at += 1;
             }
         }
-        (part.corners.vt, part.corners.vn) = (Vec::new(), Vec::new());
+        (part.corner_uvs, part.corner_normals) = (Vec::new(), Vec::new());
     }
     let all = &combinations.all;
     if all.len() >= u32::MAX as usize {

@@ -11,7 +11,7 @@ const DIGITS_MAX: usize = 9;
 /// normals.
 type FaceEnd = (usize, (bool, bool));
 
-impl Parser<'_, '_> {
+impl Parser<'_, '_, '_> {
     /// A face of three or more corners, all `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     #[inline]
     pub(super) fn plain_face(&mut self, at: usize) -> Result<Option<usize>, Fault> {
@@ -25,7 +25,9 @@ impl Parser<'_, '_> {
             largest = std::array::from_fn(|kind| largest[kind].max(corner[kind]));
         }
         self.see([largest[0], if form.0 { largest[1] } else { MISSING }, if form.1 { largest[2] } else { MISSING }], 1);
-        self.part.corners.extend(&self.line, form);
+        let line = std::mem::take(&mut self.line);
+        self.add_corners(&line, form);
+        self.line = line;
         self.part.triangles += arity as u64 - 2;
         self.count_face(arity, form);
         Ok(Some(end))
@@ -34,7 +36,7 @@ impl Parser<'_, '_> {
     /// A triangle or quad of positive `v`, in a part that has had nothing else yet.
     #[inline]
     fn plain_triangle_or_quad(&mut self, at: usize) -> Option<usize> {
-        if !(self.part.corners.vt.is_empty() && self.part.corners.vn.is_empty()) {
+        if !(self.part.corner_uvs.is_empty() && self.part.corner_normals.is_empty()) {
             return None;
         }
         let mut face = [0; 4];
@@ -51,7 +53,7 @@ impl Parser<'_, '_> {
                 self.end_of_line(at)?
             }
         };
-        self.part.corners.v.extend_from_slice(&face[..arity]);
+        self.lists.corners.extend(&face[..arity]);
         let largest = face.into_iter().fold(0, u32::max);
         self.see([largest, MISSING, MISSING], 1);
         self.part.triangles += arity as u64 - 2;
@@ -140,7 +142,7 @@ impl Parser<'_, '_> {
         if at - begin > 1 + DIGITS_MAX || index == 0 {
             return None;
         }
-        let (before, own) = (self.rules.before?, self.part.counts());
+        let (before, own) = (self.rules.before?, self.counts());
         let count = [before.v + own.v, before.vt + own.vt, before.vn + own.vn][kind];
         Some((u32::try_from(count.checked_sub(index)?).ok()?, at))
     }
