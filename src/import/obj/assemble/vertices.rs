@@ -6,6 +6,7 @@ use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::obj::face::MISSING;
 use crate::import::obj::parse::Part;
+use crate::import::parallel::map;
 use crate::import::raw::RawMesh;
 use rapidhash::RapidHashMap;
 
@@ -31,6 +32,13 @@ pub fn fill(
     let (has_uvs, has_normals) = (!lists.uvs.is_empty(), !lists.normals.is_empty());
     if !forms.any(|(vt, vn)| vt && has_uvs || vn && has_normals) {
         (raw.positions, raw.colors) = (lists.positions, lists.colors);
+        return Ok(());
+    }
+    if let Some(uses) = uses_of_vertices(parts, corners, &lists) {
+        cx.deadline.check()?;
+        (raw.positions, raw.colors) = (lists.positions, lists.colors);
+        raw.uvs = if uses.0 { lists.uvs } else { Vec::new() };
+        raw.normals = if uses.1 { lists.normals } else { Vec::new() };
         return Ok(());
     }
     cx.budget.spend("the vertices of the OBJ file", lists.positions.len() as u64, 4)?;
@@ -80,6 +88,31 @@ pub fn fill(
         raw.colors = all.iter().map(|one| lists.colors[one.key[0] as usize]).collect();
     }
     Ok(())
+}
+
+/// What faces use of texture coordinates and normals, if they belong to vertices: each corner has those
+/// with the number of its position, as many programs write them. Then the lists are those of a mesh
+/// already.
+fn uses_of_vertices(parts: &[Part<'_>], corners: &[u32], lists: &Room) -> Option<(bool, bool)> {
+    let mut groups = parts.iter().flat_map(|part| &part.groups);
+    let form = groups.next()?.form;
+    let is_whole = |has: bool, count: usize| !has || count == lists.positions.len();
+    if !is_whole(form.0, lists.uvs.len()) || !is_whole(form.1, lists.normals.len()) {
+        return None;
+    }
+    // Corners of more than one kind share nothing, and repairs count what is used.
+    if groups.any(|group| group.form != form) || lists.uvs.iter().flatten().any(|c| !c.is_finite()) {
+        return None;
+    }
+    let mut rest = corners;
+    let own_corners = parts.iter().map(|part| {
+        let count = part.groups.iter().map(|group| group.faces as usize * group.arity as usize).sum();
+        (part, rest.split_off(..count).unwrap_or_default())
+    });
+    let is_same = map(own_corners.collect(), |(part, corners): (&Part<'_>, &[u32])| {
+        (!form.0 || part.corner_uvs == corners) && (!form.1 || part.corner_normals == corners)
+    });
+    is_same.into_iter().all(|same| same).then_some(form)
 }
 
 /// Numbers the distinct combinations of indices, separately for each run of faces.
