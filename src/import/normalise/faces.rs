@@ -307,12 +307,11 @@ impl Block {
     #[inline(always)]
     fn units(&self, normals: &mut [[f32; 3]]) {
         let mut unit = [[0.0_f32; BLOCK]; 3];
-        for i in 0..BLOCK {
-            let length2 = self.length2[i];
+        for (i, length2) in self.length2.into_iter().enumerate() {
             let is_long = length2 > 1e-200 && length2 < f64::INFINITY;
             let length = if is_long { length2 } else { f64::NAN }.sqrt();
-            for k in 0..3 {
-                unit[k][i] = (self.n[k][i] / length) as f32;
+            for (unit, n) in unit.iter_mut().zip(&self.n) {
+                unit[i] = (n[i] / length) as f32;
             }
         }
         for (i, normal) in normals.iter_mut().enumerate().take(BLOCK) {
