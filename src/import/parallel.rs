@@ -27,21 +27,42 @@ pub fn map_with<T: Send, M, R: Send>(
     items.into_par_iter().map_init(memory, each).collect()
 }
 
+/// Items handed to a thread at a time by [`map_items`] and [`each_piece`].
+const ITEMS_PER_PIECE: usize = 16_384;
+
+/// What `each` makes of the items of a long list.
+pub fn map_items<T: Sync, R: Send>(items: &[T], each: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    if items.len() <= ITEMS_PER_PIECE {
+        return items.iter().map(each).collect();
+    }
+    items.par_iter().with_min_len(ITEMS_PER_PIECE).map(each).collect()
+}
+
+/// The results of `each` for pieces of a long list, in their order.
+pub fn each_piece<T: Send, R: Send>(items: &mut [T], each: impl Fn(&mut [T]) -> R + Sync + Send) -> Vec<R> {
+    map(items.chunks_mut(ITEMS_PER_PIECE).collect(), each)
+}
+
 /// One list of the items of several.
 pub fn concat<T: Copy + Default + Send + Sync>(mut lists: Vec<Vec<T>>) -> Vec<T> {
     lists.retain(|list| !list.is_empty());
     if lists.len() < 2 {
         return lists.pop().unwrap_or_default();
     }
-    let mut all = vec![T::default(); lists.iter().map(Vec::len).sum()];
+    concat_slices(&lists.iter().map(Vec::as_slice).collect::<Vec<_>>())
+}
+
+/// One list of the items of several.
+pub fn concat_slices<T: Copy + Default + Send + Sync>(lists: &[&[T]]) -> Vec<T> {
+    let mut all = vec![T::default(); lists.iter().map(|list| list.len()).sum()];
     let mut places = Vec::with_capacity(lists.len());
     let mut rest = all.as_mut_slice();
     for list in lists {
         let (place, after) = rest.split_at_mut(list.len());
-        places.push((place, list));
+        places.push((place, *list));
         rest = after;
     }
-    map(places, |(place, list)| place.copy_from_slice(&list));
+    map(places, |(place, list)| place.copy_from_slice(list));
     all
 }
 
@@ -59,6 +80,11 @@ mod tests {
         };
         assert_eq!(map_with((0..1000).collect(), Vec::new, fill), (0..1000).map(|i| i * 2).collect::<Vec<_>>());
         assert_eq!(map_with(vec![7], Vec::new, fill), [14]);
+        let mut many: Vec<u32> = (0..100_000).collect();
+        assert_eq!(each_piece(&mut many, |piece| piece.iter_mut().for_each(|i| *i *= 2)).len(), 7);
+        for count in [0, 7, 100_000] {
+            assert_eq!(map_items(&many[..count], |i| i / 2), (0..count as u32).collect::<Vec<_>>());
+        }
         let lists: Vec<Vec<u32>> = (0..100).map(|i| (i * 10..i * 10 + i % 7).collect()).collect();
         assert_eq!(concat(lists.clone()), lists.concat());
         assert_eq!((concat(vec![vec![1, 2]]), concat::<u8>(vec![])), (vec![1, 2], vec![]));

@@ -1,6 +1,7 @@
 //! Repairs vertex attributes: values become finite, normals become unit, and unusable arrays are
 //! dropped.
 
+use crate::import::parallel::each_piece;
 use crate::import::raw::RawMesh;
 use crate::mesh::Mesh;
 use crate::warning::Warning;
@@ -20,18 +21,22 @@ pub struct Attributes {
 /// already.
 pub fn repair(raw: &mut RawMesh, count: usize, mesh: &Mesh) -> Attributes {
     let mut colors = std::mem::take(&mut raw.colors);
-    for component in colors.iter_mut().flatten() {
-        // 1 for a NaN: no tint.
-        *component = if component.is_nan() { 1.0 } else { component.clamp(0.0, 1.0) };
-    }
-    let mut uvs = std::mem::take(&mut raw.uvs);
-    let mut bad_uvs = 0_u64;
-    for uv in &mut uvs {
-        if !(uv[0].is_finite() && uv[1].is_finite()) {
-            *uv = [0.0; 2];
-            bad_uvs += 1;
+    each_piece(&mut colors, |piece| {
+        for component in piece.iter_mut().flatten() {
+            // 1 for a NaN: no tint.
+            *component = if component.is_nan() { 1.0 } else { component.clamp(0.0, 1.0) };
         }
-    }
+    });
+    let mut uvs = std::mem::take(&mut raw.uvs);
+    let bad_uvs = each_piece(&mut uvs, |piece| {
+        let mut bad = 0_u64;
+        for uv in piece.iter_mut().filter(|uv| !(uv[0].is_finite() && uv[1].is_finite())) {
+            *uv = [0.0; 2];
+            bad += 1;
+        }
+        bad
+    });
+    let bad_uvs: u64 = bad_uvs.iter().sum();
     if bad_uvs > 0 {
         raw.report.warnings.push(Warning {
             code: "uvs_repaired",
@@ -53,13 +58,20 @@ fn repair_normals(raw: &mut RawMesh, count: usize, mesh: &Mesh) -> Vec<[f32; 3]>
     if normals.len() != count {
         return Vec::new();
     }
-    let mut is_bad = vec![false; normals.len()];
-    for (normal, bad) in normals.iter_mut().zip(&mut is_bad) {
-        match unit(*normal) {
-            Some(n) => *normal = n,
-            None => (*normal, *bad) = ([0.0; 3], true),
+    let all_good = each_piece(&mut normals, |piece| {
+        let mut all_good = true;
+        for normal in piece {
+            let unit = unit(*normal);
+            all_good &= unit.is_some();
+            *normal = unit.unwrap_or([0.0; 3]);
         }
+        all_good
+    });
+    if all_good.into_iter().all(|good| good) {
+        let is_used = !(mesh.attribute_triangles.is_empty() && mesh.line_point_attributes.is_empty());
+        return if is_used { normals } else { Vec::new() };
     }
+    let mut is_bad: Vec<bool> = normals.iter().map(|normal| *normal == [0.0; 3]).collect();
     let mut used_bad = 0_u64;
     let mut used_good = 0_u64;
     for (triangle, face) in mesh.attribute_triangles.iter().zip(&mesh.face_normals) {

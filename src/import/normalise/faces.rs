@@ -1,6 +1,6 @@
 //! The faces of a raw mesh: its triangles with finite corners and an area.
 
-use super::geometry::Geometry;
+use super::geometry::{Geometry, Key as _};
 use super::local::{CORNERS_MAX, Local};
 use super::pow2::{Pow2, exponent, is_usable, max_abs};
 use crate::import::parallel::{map, map_with};
@@ -60,23 +60,40 @@ impl Bounds {
     }
 }
 
-/// The largest magnitude among usable positions, and true if f32 has all of these exactly.
-pub fn survey(positions: &[[f64; 3]], deadline: &Deadline) -> Result<(f64, bool), Stopped> {
+/// Facts about some positions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Survey {
+    /// The largest magnitude among usable ones.
+    pub largest: f64,
+    /// True if f32 has all usable ones exactly.
+    pub is_f32: bool,
+    /// True if all are usable.
+    pub is_usable: bool,
+}
+
+/// Looks at all positions.
+pub fn survey(positions: &[[f64; 3]], deadline: &Deadline) -> Result<Survey, Stopped> {
     let pieces = map(positions.chunks(POSITIONS_PER_PIECE).collect(), |piece: &[[f64; 3]]| {
         deadline.check()?;
-        let (mut largest, mut is_f32) = ([0.0_f64; 3], true);
-        for p in piece.iter().filter(|p| is_usable(p)) {
+        let (mut largest, mut is_f32, mut all_usable) = ([0.0_f64; 3], true, true);
+        for p in piece {
+            if !is_usable(p) {
+                all_usable = false;
+                continue;
+            }
             for (largest, c) in largest.iter_mut().zip(p) {
                 *largest = if c.abs() > *largest { c.abs() } else { *largest };
             }
             is_f32 &= has_f32(*p);
         }
-        Ok((max_abs(&largest), is_f32))
+        Ok(Survey { largest: max_abs(&largest), is_f32, is_usable: all_usable })
     });
-    let mut all = (0.0_f64, true);
+    let mut all = Survey { largest: 0.0, is_f32: true, is_usable: true };
     for piece in pieces {
-        let (largest, is_f32) = piece?;
-        all = (all.0.max(largest), all.1 & is_f32);
+        let piece = piece?;
+        all.largest = all.largest.max(piece.largest);
+        all.is_f32 &= piece.is_f32;
+        all.is_usable &= piece.is_usable;
     }
     Ok(all)
 }
@@ -100,7 +117,7 @@ pub fn have_f32<G: Geometry>(geometry: &G, deadline: &Deadline) -> Result<bool, 
 pub struct Faces<K> {
     /// A unit normal for each.
     pub normals: Vec<[f32; 3]>,
-    /// The corners of each face, as numbers in its piece.
+    /// The corners of each face, as numbers in its piece; empty where keys are indices.
     pub triangles: Vec<[u32; 3]>,
     /// The pieces, in order.
     pub pieces: Vec<Piece<K>>,
@@ -149,8 +166,10 @@ fn pick_scaled<G: Geometry>(
     deadline: &Deadline,
 ) -> Result<Faces<G::Key>, Stopped> {
     let count = geometry.triangles();
-    let (mut normals, mut triangles) = (vec![[0.0_f32; 3]; count], vec![[0_u32; 3]; count]);
-    let places = normals.chunks_mut(TRIANGLES_PER_PIECE).zip(triangles.chunks_mut(TRIANGLES_PER_PIECE));
+    let mut normals = vec![[0.0_f32; 3]; count];
+    let mut triangles = vec![[0_u32; 3]; if G::Key::IS_INDEX { 0 } else { count }];
+    let mut pieces = triangles.chunks_mut(TRIANGLES_PER_PIECE);
+    let places = normals.chunks_mut(TRIANGLES_PER_PIECE).map(|normals| (normals, pieces.next().unwrap_or_default()));
     let done =
         map_with((0..).step_by(TRIANGLES_PER_PIECE).zip(places).collect(), Local::new, |local, (begin, (n, t))| {
             deadline.check()?;
@@ -196,7 +215,7 @@ struct Picked<K> {
 }
 
 /// Fills in the normals of some triangles from `begin` on, with NaN for those that are no faces, and
-/// the local numbers of the others' corners.
+/// the local numbers of the others' corners if there is room for them.
 fn pick_piece<G: Geometry>(
     geometry: &G,
     begin: usize,
@@ -205,23 +224,16 @@ fn pick_piece<G: Geometry>(
     local: &mut Local<G::Key>,
 ) -> Picked<G::Key> {
     let piece = begin..begin + normals.len();
-    local.begin(3 * normals.len(), piece.clone().flat_map(|triangle| geometry.keys(triangle)));
-    let (mut usable, mut nonfinite, mut degenerate) = (Bounds::EMPTY, 0, 0);
-    let blocks = normals.chunks_mut(BLOCK).zip(triangles.chunks_mut(BLOCK));
-    for (begin, (normals, triangles)) in piece.clone().step_by(BLOCK).zip(blocks) {
-        let mut all = [Normal::default(); BLOCK];
-        for (triangle, normal) in (begin..).zip(&mut all[..normals.len()]) {
-            let [a, b, c] = geometry.corners(triangle);
-            if is_usable(&a) & is_usable(&b) & is_usable(&c) {
-                usable = usable.with(a).with(b).with(c);
-                *normal = Normal::of(scale(a), scale(b), scale(c));
-            }
-        }
-        for (place, normal) in normals.iter_mut().zip(&all) {
-            *place = normal.unit();
-        }
-        for (triangle, (normal, place)) in (begin..).zip(normals.iter_mut().zip(triangles)) {
-            let keys = geometry.keys(triangle);
+    local.begin(piece.clone().map(|triangle| geometry.keys(triangle)));
+    let (mut nonfinite, mut degenerate) = (0, 0);
+    let mut places = triangles.chunks_mut(BLOCK);
+    for (begin, normals) in piece.clone().step_by(BLOCK).zip(normals.chunks_mut(BLOCK)) {
+        let places = places.next().unwrap_or_default();
+        let mut block = Block::default();
+        block.fill(begin..begin + normals.len(), geometry, &scale);
+        block.units(normals);
+        for (i, normal) in normals.iter_mut().enumerate() {
+            let triangle = begin + i;
             if normal[0].is_nan() {
                 match sliver(geometry.corners(triangle), &scale) {
                     Some(Some(n)) => *normal = n,
@@ -230,20 +242,23 @@ fn pick_piece<G: Geometry>(
                 }
             }
             if !normal[0].is_nan() {
-                let [a, b, c] = keys;
-                *place = [local.number(a), local.number(b), local.number(c)];
+                let [a, b, c] = geometry.keys(triangle);
+                let numbers = [local.number(a), local.number(b), local.number(c)];
+                if let Some(place) = places.get_mut(i) {
+                    *place = numbers;
+                }
             }
         }
     }
-    let is_face = |normal: &&[f32; 3]| !normal[0].is_nan();
-    let mut bounds = usable;
+    let keys = local.finish();
+    let bounds = keys.iter().map(|key| geometry.position(*key)).fold(Bounds::EMPTY, Bounds::with);
+    let mut usable = bounds;
     if degenerate > 0 {
-        let faces = piece.zip(normals.iter()).filter(|(_, normal)| is_face(normal));
-        let corners = faces.flat_map(|(triangle, _)| geometry.corners(triangle));
-        bounds = corners.fold(Bounds::EMPTY, Bounds::with);
+        let corners = piece.map(|triangle| geometry.corners(triangle)).filter(|corners| corners.iter().all(is_usable));
+        usable = corners.flatten().fold(Bounds::EMPTY, Bounds::with);
     }
-    let piece = Piece { faces: normals.iter().filter(is_face).count(), keys: local.finish() };
-    Picked { piece, bounds, usable, nonfinite, degenerate }
+    let faces = normals.len() - nonfinite as usize - degenerate as usize;
+    Picked { piece: Piece { faces, keys }, bounds, usable, nonfinite, degenerate }
 }
 
 /// True if f32 has these coordinates exactly.
@@ -253,25 +268,55 @@ fn has_f32(p: [f64; 3]) -> bool {
     is_exact(p[0]) & is_exact(p[1]) & is_exact(p[2])
 }
 
-/// A normal of any length, and the square of its length.
-#[derive(Clone, Copy, Default)]
-struct Normal {
-    n: [f64; 3],
-    length2: f64,
+/// Normals of any length and the squares of their lengths, a list for each number.
+struct Block {
+    n: [[f64; BLOCK]; 3],
+    length2: [f64; BLOCK],
 }
 
-impl Normal {
+impl Default for Block {
+    fn default() -> Self {
+        Self { n: [[0.0; BLOCK]; 3], length2: [0.0; BLOCK] }
+    }
+}
+
+impl Block {
+    /// The normals of some triangles. One with an unusable corner gets a length of zero, or one
+    /// that is not finite.
     #[inline(always)]
-    fn of(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> Self {
-        let n = cross(sub(b, a), sub(c, a));
-        Self { n, length2: dot(n, n) }
+    fn fill<G: Geometry>(
+        &mut self,
+        triangles: std::ops::Range<usize>,
+        geometry: &G,
+        scale: impl Fn([f64; 3]) -> [f64; 3],
+    ) {
+        let is_sure = geometry.unusable_shows();
+        for (i, triangle) in triangles.enumerate().take(BLOCK) {
+            let [a, b, c] = geometry.corners(triangle);
+            if is_sure || is_usable(&a) & is_usable(&b) & is_usable(&c) {
+                let (a, b, c) = (scale(a), scale(b), scale(c));
+                let n = cross(sub(b, a), sub(c, a));
+                (self.n[0][i], self.n[1][i], self.n[2][i]) = (n[0], n[1], n[2]);
+                self.length2[i] = dot(n, n);
+            }
+        }
     }
 
-    /// The unit normal; NaN for tiny edges or a sliver: products may have underflowed.
+    /// The unit normals; NaN for unusable corners, and for tiny edges or a sliver: products may
+    /// have underflowed.
     #[inline(always)]
-    fn unit(&self) -> [f32; 3] {
-        let length = if self.length2 > 1e-200 { self.length2.sqrt() } else { f64::NAN };
-        [(self.n[0] / length) as f32, (self.n[1] / length) as f32, (self.n[2] / length) as f32]
+    fn units(&self, normals: &mut [[f32; 3]]) {
+        let mut unit = [[0.0_f32; BLOCK]; 3];
+        for (i, length2) in self.length2.into_iter().enumerate() {
+            let is_long = length2 > 1e-200 && length2 < f64::INFINITY;
+            let length = if is_long { length2 } else { f64::NAN }.sqrt();
+            for (unit, n) in unit.iter_mut().zip(&self.n) {
+                unit[i] = (n[i] / length) as f32;
+            }
+        }
+        for (i, normal) in normals.iter_mut().enumerate().take(BLOCK) {
+            *normal = [unit[0][i], unit[1][i], unit[2][i]];
+        }
     }
 }
 
@@ -330,7 +375,7 @@ mod tests {
                 corners[2] = std::array::from_fn(|k| corners[0][k] * 0.5 + corners[1][k] * 0.5);
                 corners[2] = corners[2].map(|c| f64::from(c as f32));
             }
-            let geometry = Indexed { positions: &positions, triangles: &triangles };
+            let geometry = Indexed { positions, triangles: triangles.clone(), is_usable: false };
             let pick = |down: Option<i32>| pick(&geometry, down.map(Pow2::new), &Deadline::default()).unwrap();
             let plain = pick(None);
             assert!(plain.nonfinite > 100 && plain.degenerate > 10, "{} {}", plain.nonfinite, plain.degenerate);

@@ -14,8 +14,11 @@ pub trait Geometry: Sync {
     fn keys(&self, triangle: usize) -> [Self::Key; 3];
     /// The position of a corner, in the file's units.
     fn position(&self, key: Self::Key) -> [f64; 3];
-    /// The vertices that keys are indices of, or none where keys are positions.
-    fn vertices(&self) -> Option<&[[f64; 3]]>;
+    /// The vertices and triangles that keys are indices of, or none where keys are positions.
+    fn indexed(&mut self) -> Option<&mut Indexed>;
+
+    /// True if no scaled triangle with an unusable corner has a normal of finite length.
+    fn unusable_shows(&self) -> bool;
 
     /// The corners of a triangle.
     #[inline(always)]
@@ -27,16 +30,20 @@ pub trait Geometry: Sync {
 
 /// The identity of a corner.
 pub trait Key: Copy + Eq + Send + Sync {
-    /// A number below 2^32 that is unique among keys, if there is one.
-    fn index(self) -> Option<u32>;
+    /// True if keys are indices.
+    const IS_INDEX: bool;
+    /// The index, if keys are.
+    fn index(self) -> u32;
     /// Three words that equal keys, and they alone, have in common.
     fn words(self) -> [u32; 3];
 }
 
 impl Key for u32 {
+    const IS_INDEX: bool = true;
+
     #[inline(always)]
-    fn index(self) -> Option<u32> {
-        Some(self)
+    fn index(self) -> u32 {
+        self
     }
 
     #[inline(always)]
@@ -47,9 +54,11 @@ impl Key for u32 {
 
 /// The bits of a position.
 impl Key for [u32; 3] {
+    const IS_INDEX: bool = false;
+
     #[inline(always)]
-    fn index(self) -> Option<u32> {
-        None
+    fn index(self) -> u32 {
+        0
     }
 
     #[inline(always)]
@@ -59,14 +68,16 @@ impl Key for [u32; 3] {
 }
 
 /// Triangles that are indices of positions.
-pub struct Indexed<'a> {
+pub struct Indexed {
     /// The positions.
-    pub positions: &'a [[f64; 3]],
+    pub positions: Vec<[f64; 3]>,
     /// The triangles.
-    pub triangles: &'a [[u32; 3]],
+    pub triangles: Vec<[u32; 3]>,
+    /// True if all positions are usable.
+    pub is_usable: bool,
 }
 
-impl Geometry for Indexed<'_> {
+impl Geometry for Indexed {
     type Key = u32;
 
     fn triangles(&self) -> usize {
@@ -83,8 +94,12 @@ impl Geometry for Indexed<'_> {
         self.positions[vertex as usize]
     }
 
-    fn vertices(&self) -> Option<&[[f64; 3]]> {
-        Some(self.positions)
+    fn indexed(&mut self) -> Option<&mut Indexed> {
+        Some(self)
+    }
+
+    fn unusable_shows(&self) -> bool {
+        self.is_usable
     }
 }
 
@@ -105,7 +120,13 @@ impl Geometry for Soup {
         [f64::from(f32::from_bits(x)), f64::from(f32::from_bits(y)), f64::from(f32::from_bits(z))]
     }
 
-    fn vertices(&self) -> Option<&[[f64; 3]]> {
+    fn indexed(&mut self) -> Option<&mut Indexed> {
         None
+    }
+
+    /// A normal of finite f32 has a finite length in f64. An infinite or NaN coordinate makes all
+    /// or two of a normal's so, because the products of its differences do not cancel out.
+    fn unusable_shows(&self) -> bool {
+        true
     }
 }

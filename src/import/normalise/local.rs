@@ -7,10 +7,14 @@ use super::hasher::Hasher;
 pub const CORNERS_MAX: usize = 65_535;
 /// A free slot.
 const FREE: u16 = u16::MAX;
+/// Most slots by index, for indices that lie close together.
+const SLOTS_MAX: usize = 1 << 17;
+/// Slots of a hash table at first.
+const SLOTS_MIN: usize = 1 << 16;
 
 /// The distinct corners of one piece after the other.
 pub struct Local<K> {
-    /// A hash table, or one by the index after `base`.
+    /// One for each index from `base` on, or a hash table.
     slots: Vec<u16>,
     keys: Vec<K>,
     base: Option<u32>,
@@ -23,38 +27,75 @@ impl<K: Key> Local<K> {
         Self { slots: Vec::new(), keys: Vec::new(), base: None, hasher: Hasher::new() }
     }
 
-    /// Begins a piece of at most [`CORNERS_MAX`] corners with the given keys. Indices that lie
-    /// close together need no hash.
-    pub fn begin(&mut self, corners: usize, keys: impl Iterator<Item = K>) {
-        debug_assert!(corners <= CORNERS_MAX);
-        let slots = (corners * 2).next_power_of_two();
+    /// Begins a piece of some triangles, of at most [`CORNERS_MAX`] corners. Indices that lie close
+    /// together need no hash.
+    pub fn begin(&mut self, triangles: impl Iterator<Item = [K; 3]>) {
         self.keys.clear();
         self.slots.clear();
+        self.base = None;
+        let mut slots = SLOTS_MIN;
+        if K::IS_INDEX {
+            let (mut low, mut high) = (u32::MAX, 0);
+            for [a, b, c] in triangles.map(|keys| keys.map(K::index)) {
+                low = low.min(a).min(b).min(c);
+                high = high.max(a).max(b).max(c);
+            }
+            let range = high.saturating_sub(low) as usize + 1;
+            if range <= SLOTS_MAX {
+                (self.base, slots) = (Some(low), range);
+            }
+        }
         self.slots.resize(slots, FREE);
-        let range = keys.map_while(K::index).fold((u32::MAX, 0), |(low, high), at| (at.min(low), at.max(high)));
-        self.base = (range.0 <= range.1 && ((range.1 - range.0) as usize) < slots).then_some(range.0);
     }
 
     /// The number of a corner.
     #[inline(always)]
     pub fn number(&mut self, key: K) -> u32 {
+        if let Some(base) = self.base {
+            let slot = &mut self.slots[key.index().wrapping_sub(base) as usize];
+            if *slot == FREE {
+                *slot = self.keys.len() as u16;
+                self.keys.push(key);
+            }
+            return u32::from(*slot);
+        }
         let mask = self.slots.len() - 1;
-        let begin = match (key.index(), self.base) {
-            (Some(index), Some(base)) => index.wrapping_sub(base) as usize,
-            _ => self.hasher.hash(key.words()) as usize,
-        };
-        let mut at = begin & mask;
+        let mut at = self.hasher.hash(key.words()) as usize & mask;
         loop {
             let known = self.slots[at];
             if known == FREE {
-                self.slots[at] = self.keys.len() as u16;
-                self.keys.push(key);
-                return self.keys.len() as u32 - 1;
+                return self.add(key, at);
             }
             if self.keys[usize::from(known)] == key {
                 return u32::from(known);
             }
             at = (at + 1) & mask;
+        }
+    }
+
+    /// Adds a new corner to the hash table, at a free slot.
+    fn add(&mut self, key: K, at: usize) -> u32 {
+        let number = self.keys.len();
+        self.slots[at] = number as u16;
+        self.keys.push(key);
+        if self.keys.len() * 4 > self.slots.len() {
+            self.grow();
+        }
+        number as u32
+    }
+
+    /// Doubles the hash table.
+    #[cold]
+    fn grow(&mut self) {
+        let slots = self.slots.len() * 2;
+        self.slots.clear();
+        self.slots.resize(slots, FREE);
+        for (key, number) in self.keys.iter().zip(0..) {
+            let mut at = self.hasher.hash(key.words()) as usize & (slots - 1);
+            while self.slots[at] != FREE {
+                at = (at + 1) & (slots - 1);
+            }
+            self.slots[at] = number;
         }
     }
 
@@ -70,7 +111,7 @@ mod tests {
 
     fn check<K: Key + std::hash::Hash>(local: &mut Local<K>, keys: &[K], is_by_index: bool) {
         let mut known = std::collections::HashMap::new();
-        local.begin(keys.len(), keys.iter().copied());
+        local.begin(keys.iter().map(|key| [*key; 3]));
         assert_eq!(local.base.is_some(), is_by_index);
         for key in keys {
             let next = known.len() as u32;

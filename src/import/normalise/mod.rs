@@ -22,7 +22,7 @@ use self::pow2::{Pow2, exponent, is_usable, max_abs};
 use super::raw::RawMesh;
 use super::{ImportReport, Imported, MeshError, MeshFault};
 use crate::import::context::Context;
-use crate::import::parallel::map;
+use crate::import::parallel::{map, map_items};
 use crate::limits::Stopped;
 use crate::mesh::vector::sub;
 use crate::mesh::{LineOrPoint, MaterialSlot, Mesh, ToFile, primitives};
@@ -30,12 +30,10 @@ use crate::pluralise::pluralise;
 
 /// Brings an imported mesh into its normal form.
 pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, MeshError> {
-    let soup = raw.soup.take();
-    let (positions, triangles) = (std::mem::take(&mut raw.positions), std::mem::take(&mut raw.triangles));
-    let indexed = Indexed { positions: &positions, triangles: &triangles };
+    let mut soup = raw.soup.take();
     let [triangle_count, vertex_count] = match &soup {
         Some(soup) => [soup.triangles(), 3 * soup.triangles()],
-        None => [triangles.len(), positions.len()],
+        None => [raw.triangles.len(), raw.positions.len()],
     };
     cx.check_triangles(triangle_count as u64 + primitives::triangles(&raw.lines_and_points))?;
     cx.budget.spend("the triangles", triangle_count as u64, BYTES_PER_TRIANGLE)?;
@@ -45,19 +43,29 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     }
     cx.budget.spend("the welded vertices", vertex_count as u64, number::BYTES_PER_VERTEX)?;
 
-    let (mut mesh, kept) = match &soup {
-        Some(soup) => shape(soup, &mut raw, cx)?,
-        None => shape(&indexed, &mut raw, cx)?,
-    };
-    drop(positions);
     let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
+    let (mut mesh, kept, triangles) = match &mut soup {
+        Some(soup) => {
+            let (mesh, kept) = shape(soup, None, &mut raw, cx)?;
+            (mesh, kept, Vec::new())
+        }
+        None => {
+            let (positions, triangles) = (std::mem::take(&mut raw.positions), std::mem::take(&mut raw.triangles));
+            let survey = faces::survey(&positions, cx.deadline)?;
+            let mut indexed = Indexed { positions, triangles, is_usable: survey.is_usable };
+            // All vertices are likely used. If their largest decides, the faces are picked once.
+            let guess = (!survey.is_f32).then(|| scale_exponent(survey.largest));
+            let (mesh, kept) = shape(&mut indexed, guess, &mut raw, cx)?;
+            (mesh, kept, indexed.triangles)
+        }
+    };
     if has_attributes {
         let of_soup = |triangle| [3 * triangle, 3 * triangle + 1, 3 * triangle + 2];
         mesh.attribute_triangles = match (&soup, &kept) {
             (None, None) => triangles,
-            (None, Some(kept)) => kept.iter().map(|&triangle| triangles[triangle as usize]).collect(),
+            (None, Some(kept)) => map_items(kept, |&triangle| triangles[triangle as usize]),
             (Some(soup), None) => (0..soup.triangles() as u32).map(of_soup).collect(),
-            (Some(_), Some(kept)) => kept.iter().map(|&triangle| of_soup(triangle)).collect(),
+            (Some(_), Some(kept)) => map_items(kept, |&triangle| of_soup(triangle)),
         };
     }
     mesh.edge_masks = pick(std::mem::take(&mut raw.edge_masks), kept.as_deref());
@@ -81,22 +89,20 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
 }
 
 /// Positions, triangles, normals, lines and bounds of the mesh, and the triangle of each face
-/// unless all triangles are faces.
+/// unless all triangles are faces. `guess` is the likely exponent of the power of two that positions
+/// are divided by, None if f32 has them all.
 fn shape<G: Geometry>(
-    geometry: &G,
+    geometry: &mut G,
+    guess: Option<i32>,
     raw: &mut RawMesh,
     cx: &Context<'_>,
 ) -> Result<(Mesh, Option<Vec<u32>>), MeshError> {
-    let vertices = geometry.vertices().unwrap_or_default();
-    let vertex = |v: u32| vertices.get(v as usize).copied().unwrap_or([f64::NAN; 3]);
-    // Triangles without vertices of their own are f32.
-    let (largest_of_all, has_only_f32) = faces::survey(vertices, cx.deadline)?;
-    // All vertices are likely used. If their largest decides, the faces are picked once.
-    let guess = (!has_only_f32).then(|| scale_exponent(largest_of_all));
     let mut faces = faces::pick(geometry, guess.map(|exponent| Pow2::new(-exponent)), cx.deadline)?;
-    if raw.is_f32 && (has_only_f32 || faces::have_f32(geometry, cx.deadline)?) {
+    if raw.is_f32 && (guess.is_none() || faces::have_f32(geometry, cx.deadline)?) {
         raw.report.warnings.extend(precision::warning(&faces.usable));
     }
+    let vertices = geometry.indexed().map(|indexed| indexed.positions.as_slice()).unwrap_or_default();
+    let vertex = |v: u32| vertices.get(v as usize).copied().unwrap_or([f64::NAN; 3]);
     raw.report.dropped_lines_and_points = drop_bad(vertex, &mut raw.lines_and_points);
     let of_lines = raw.lines_and_points.iter().flat_map(|one| one.ends).map(vertex);
     let around_lines = of_lines.fold(Bounds::EMPTY, Bounds::with);
@@ -127,10 +133,10 @@ fn scale_exponent(largest: f64) -> i32 {
 }
 
 /// The items of the kept triangles.
-fn pick<T: Copy>(all: Vec<T>, kept: Option<&[u32]>) -> Vec<T> {
+fn pick<T: Copy + Send + Sync>(all: Vec<T>, kept: Option<&[u32]>) -> Vec<T> {
     match kept {
         None => all,
-        Some(kept) => kept.iter().map(|&triangle| all[triangle as usize]).collect(),
+        Some(kept) => map_items(kept, |&triangle| all[triangle as usize]),
     }
 }
 
@@ -178,7 +184,7 @@ impl UnitBox {
 /// Welds positions, numbered in the order of their first use. Drops triangles and segments whose
 /// corners became equal.
 fn weld<G: Geometry>(
-    geometry: &G,
+    geometry: &mut G,
     mut faces: Faces<G::Key>,
     (down, unit_box): (Pow2, &UnitBox),
     raw: &mut RawMesh,
@@ -186,8 +192,9 @@ fn weld<G: Geometry>(
 ) -> Result<(Mesh, Option<Vec<u32>>), Stopped> {
     let position = |p: [f64; 3]| unit_box.to_unit(down.of3(p));
     let ends = raw.lines_and_points.iter().map(|one| one.ends);
-    let Numbered { positions, ends, collapsed } = number(geometry, &mut faces, ends, position, cx.deadline)?;
-    let mut triangles = std::mem::take(&mut faces.triangles);
+    let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
+    let Numbered { positions, mut triangles, ends, collapsed } =
+        number(geometry, &mut faces, ends, position, (has_attributes, cx.deadline))?;
     raw.report.dropped_collapsed_faces = collapsed;
     if collapsed > 0 {
         let left: Vec<usize> = (0..triangles.len()).filter(|&face| !is_collapsed(&triangles[face])).collect();
@@ -196,7 +203,6 @@ fn weld<G: Geometry>(
         triangles.retain(|triangle| !is_collapsed(triangle));
     }
     let mut mesh = Mesh { positions, triangles, face_normals: faces.normals, ..Mesh::default() };
-    let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
     for (one, ends) in raw.lines_and_points.iter().zip(ends) {
         if ends[0] == ends[1] && !one.is_point() {
             raw.report.dropped_lines_and_points += 1;

@@ -72,11 +72,11 @@ mod tests {
         let triangles = [[0, 1, 2], [0, 1, 3]];
         let check = |x: f64| {
             let positions = [[1e9, 0.0, 0.0], [x, 0.0, 0.0], [1e9, 64.0, 0.0], [f64::NAN; 3]];
-            let geometry = Indexed { positions: &positions, triangles: &triangles };
+            let geometry = Indexed { positions: positions.to_vec(), triangles: triangles.to_vec(), is_usable: false };
             let usable = pick(&geometry, None, &Deadline::default()).unwrap().usable;
             (
                 usable,
-                survey(&positions, &Deadline::default()).unwrap(),
+                survey(&positions, &Deadline::default()).map(|survey| (survey.largest, survey.is_f32)).unwrap(),
                 have_f32(&geometry, &Deadline::default()).unwrap(),
             )
         };

@@ -84,9 +84,9 @@ fn sort_into_shares(pieces: &[&[Bits]], hasher: &Hasher, deadline: &Deadline) ->
 
 /// Finds the positions of pieces that are equal.
 fn compare_shares(pieces: Vec<Piece>, shares: usize, hasher: &Hasher, deadline: &Deadline) -> Result<Welded, Stopped> {
-    let found = map_with((0..shares).collect(), Vec::new, |slots, share| {
+    let found = map_with((0..shares).collect(), Default::default, |memory, share| {
         deadline.check()?;
-        Ok(compare_share(&pieces, share, slots, hasher))
+        Ok(compare_share(&pieces, share, memory, hasher))
     });
     let found = found.into_iter().collect::<Result<Vec<_>, Stopped>>()?;
     // Positions of a share are numbered after those of the shares before it.
@@ -119,33 +119,38 @@ fn compare_shares(pieces: Vec<Piece>, shares: usize, hasher: &Hasher, deadline: 
 
 /// For each position of a share its number among the distinct ones of the share, with [`NEW`] where
 /// it is the first; and how many there are.
-fn compare_share(pieces: &[Piece], share: usize, slots: &mut Vec<(Bits, u32)>, hasher: &Hasher) -> (Vec<u32>, usize) {
+fn compare_share(
+    pieces: &[Piece],
+    share: usize,
+    (slots, distinct): &mut (Vec<u32>, Vec<Bits>),
+    hasher: &Hasher,
+) -> (Vec<u32>, usize) {
     let total: usize = pieces.iter().map(|piece| piece.share(share).len()).sum();
     let mut numbers = Vec::with_capacity(total);
+    distinct.clear();
     slots.clear();
-    slots.resize((total * 2).next_power_of_two(), ([0; 3], UNUSED));
+    slots.resize((total * 2).next_power_of_two(), UNUSED);
     let mask = slots.len() - 1;
-    let mut distinct = 0;
     for piece in pieces {
         for &bits in &piece.sorted[piece.share(share)] {
             let mut at = hasher.hash(bits) as usize & mask;
             loop {
-                let slot = &mut slots[at];
-                if slot.1 == UNUSED {
-                    *slot = (bits, distinct);
-                    numbers.push(distinct | NEW);
-                    distinct += 1;
+                let known = slots[at];
+                if known == UNUSED {
+                    slots[at] = distinct.len() as u32;
+                    numbers.push(slots[at] | NEW);
+                    distinct.push(bits);
                     break;
                 }
-                if slot.0 == bits {
-                    numbers.push(slot.1);
+                if distinct[known as usize] == bits {
+                    numbers.push(known);
                     break;
                 }
                 at = (at + 1) & mask;
             }
         }
     }
-    (numbers, distinct as usize)
+    (numbers, distinct.len())
 }
 
 #[cfg(test)]

@@ -32,12 +32,51 @@ fn end_of_line(text: &[u8], mut from: usize, newline: u8) -> Option<usize> {
     }
 }
 
-/// The most numbers and keywords that a text can have: each ends with white space, a slash or the
-/// text.
-pub fn words_max(text: &[u8]) -> u64 {
-    // Sums in bytes, which a vector has many of.
-    let of_block = |block: &[u8]| block.iter().fold(0_u8, |sum, &b| sum + u8::from(b <= b' ' || b == b'/'));
-    text.chunks(255).map(|block| u64::from(of_block(block))).sum::<u64>() + 1
+/// What a part seems to have, from a look at its white space and the begins of its lines.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Census {
+    /// The most numbers and keywords that it can have: each ends with white space, a slash or the
+    /// text.
+    pub words: u64,
+    /// Lines that begin with `v `.
+    pub v: usize,
+    /// Lines that begin with `vt`.
+    pub vt: usize,
+    /// Lines that begin with `vn`.
+    pub vn: usize,
+    /// Lines that begin with `f `.
+    pub f: usize,
+}
+
+/// Looks at a part.
+pub fn census(part: &[u8], newline: u8) -> Census {
+    /// Bytes whose counts fit a byte, which a vector has many of.
+    const BLOCK: usize = 255;
+    let mut all = Census { words: 1, ..Census::default() };
+    let first = [newline].into_iter().chain(part.iter().copied().take(2)).collect::<Vec<_>>();
+    for begin in std::iter::once(None).chain((0..part.len()).step_by(BLOCK).map(Some)) {
+        // The first line follows no line.
+        let (block, next) = match begin {
+            None => (&first[..1], &first[1..]),
+            Some(begin) => (&part[begin..part.len().min(begin + BLOCK)], &part[begin + 1..]),
+        };
+        let [mut v, mut vt, mut vn, mut f] = [0_u8; 4];
+        for ((&end, &a), &b) in block.iter().zip(next).zip(next.get(1..).unwrap_or_default()) {
+            let (is_v, is_f) = ((end == newline) & (a == b'v'), (end == newline) & (a == b'f'));
+            v += u8::from(is_v & (b == b' '));
+            vt += u8::from(is_v & (b == b't'));
+            vn += u8::from(is_v & (b == b'n'));
+            f += u8::from(is_f & (b == b' '));
+        }
+        if begin.is_some() {
+            all.words += u64::from(block.iter().fold(0_u8, |sum, &b| sum + u8::from(b <= b' ' || b == b'/')));
+        }
+        all.v += usize::from(v);
+        all.vt += usize::from(vt);
+        all.vn += usize::from(vn);
+        all.f += usize::from(f);
+    }
+    all
 }
 
 #[cfg(test)]
@@ -63,8 +102,20 @@ mod tests {
     fn words_are_no_more_than_counted() {
         for text in ["", "v", "f 1/2/3 4//5\n", "\t\n ", "a#b"] {
             let words = text.split([' ', '/', '\n', '\t']).filter(|word| !word.is_empty()).count() as u64;
-            assert!((words..=text.len() as u64 + 1).contains(&words_max(text.as_bytes())), "{text}");
+            assert!((words..=text.len() as u64 + 1).contains(&census(text.as_bytes(), b'\n').words), "{text}");
         }
-        assert_eq!(words_max("1 ".repeat(10_000).as_bytes()), 10_001);
+        assert_eq!(census("1 ".repeat(10_000).as_bytes(), b'\n').words, 10_001);
+    }
+
+    #[test]
+    fn lines_are_known_by_their_begin() {
+        for count in [0, 1, 2, 100, 1000] {
+            for begin in ["", "#", "\n", "v 1 2 3\n", "vn"] {
+                let text = begin.to_owned() + &"v 1 2 3\nvt 1 2\nvt 1\nvn 1 2 3\nf 1 1 1\nvp 1\n f\nvf".repeat(count);
+                let count = |keyword: &str| text.split('\n').filter(|line| line.starts_with(keyword)).count();
+                let Census { v, vt, vn, f, .. } = census(text.as_bytes(), b'\n');
+                assert_eq!([v, vt, vn, f], ["v ", "vt", "vn", "f "].map(count), "{begin:?}");
+            }
+        }
     }
 }

@@ -17,10 +17,10 @@ mod tests;
 
 pub use sniff::is_obj;
 
-use self::assemble::assemble;
+use self::assemble::{Room, Summary, assemble};
 use self::cut::PART_BYTES;
 use self::face::Counts;
-use self::parse::{Fault, Part, Rules, parse};
+use self::parse::{Fault, Part, Places, Rules, parse};
 use super::raw::RawMesh;
 use super::{Format, MeshError, parallel, text};
 use crate::import::FileMetadata;
@@ -36,11 +36,10 @@ const BYTES_PER_WORD: u64 = 24;
 /// Reads an OBJ file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     let text = text::to_utf8(bytes, cx.budget)?;
-    let parts = read_parts(&text, PART_BYTES, true, cx)?;
     let mut raw = RawMesh::default();
     raw.report.format = Format::Obj;
     raw.report.metadata = FileMetadata::by(metadata::first_comment(&text, b"#", |_| false));
-    let summary = assemble(parts, &mut raw, cx)?;
+    let summary = read_text(&text, PART_BYTES, true, &mut raw, cx)?;
     // What is said of skipped lines comes first.
     raw.report.warnings.splice(0..0, summary.skipped.warnings());
     linearise(&mut raw.colors);
@@ -56,24 +55,27 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     Ok(raw)
 }
 
-/// The parts of a text, in its order.
-fn read_parts<'t>(
-    text: &'t [u8],
+/// Reads all of a text, in parts of about `part_bytes`.
+fn read_text(
+    text: &[u8],
     part_bytes: usize,
     is_quick: bool,
+    raw: &mut RawMesh,
     cx: &mut Context<'_>,
-) -> Result<Vec<Part<'t>>, MeshError> {
+) -> Result<Summary, MeshError> {
     let newline = lines::newline(text);
     let text = lines::without_mark(text);
     let pieces = cut::cut(text, newline, part_bytes);
-    let words = parallel::map(pieces.clone(), cut::words_max);
-    cx.budget.spend("the OBJ file", words.iter().sum(), BYTES_PER_WORD)?;
+    let census = parallel::map(pieces.clone(), |piece| cut::census(piece, newline));
+    cx.budget.spend("the OBJ file", census.iter().map(|part| part.words).sum(), BYTES_PER_WORD)?;
     let deadline = cx.deadline;
     deadline.check()?;
     let is_colored = parse::has_colored_vertex(text, newline, || deadline.check().is_ok()).unwrap_or(false);
     let rules = Rules { newline, is_colored, before: None, is_quick, deadline };
-    let mut parts = parallel::map(pieces.iter().copied().enumerate().collect(), |(i, piece)| {
-        parse(piece, Rules { before: (i == 0).then(Counts::default), ..rules })
+    let mut room = Room::new(census, is_colored);
+    let tasks = pieces.iter().copied().zip(room.places()).enumerate().collect();
+    let mut parts = parallel::map(tasks, |(i, (piece, places))| {
+        parse(piece, places, Rules { before: (i == 0).then(Counts::default), ..rules })
     });
     if parts.iter().any(|part| matches!(part, Err(Fault::NeedsCounts))) {
         parts = with_counts(&pieces, parts, rules);
@@ -85,7 +87,7 @@ fn read_parts<'t>(
         lines_before += part.lines;
         all.push(part);
     }
-    Ok(all)
+    assemble(all, room, raw, cx)
 }
 
 /// Parses the parts again that need the counts of those before them.
@@ -105,7 +107,7 @@ fn with_counts<'t>(
         sum = sum + own;
     }
     parallel::map(parts.into_iter().zip(pieces).zip(befores).collect(), |((part, piece), before)| match part {
-        Err(Fault::NeedsCounts) => parse(piece, Rules { before: Some(before), ..rules }),
+        Err(Fault::NeedsCounts) => parse(piece, Places::default(), Rules { before: Some(before), ..rules }),
         other => other,
     })
 }

@@ -1,27 +1,31 @@
 //! Parts of any size, threads and both ways to parse a line give the same mesh.
 
-use super::{assemble, read_parts};
-use crate::import::Format;
+use super::assemble::Summary;
+use super::read_text;
 use crate::import::bundle::{Bundle, entry};
 use crate::import::context::Context;
 use crate::import::raw::RawMesh;
 use crate::import::test_random::Random;
+use crate::import::{Format, MeshError};
 use crate::limits::{Budget, Deadline, Limits};
 
 /// Everything that a text becomes, or its error.
 fn read(text: &str, part_bytes: usize, is_quick: bool) -> String {
+    match try_read(text, part_bytes, is_quick) {
+        Ok((summary, raw)) => format!("{summary:?} {raw:?}"),
+        Err(error) => format!("{error:?}"),
+    }
+}
+
+fn try_read(text: &str, part_bytes: usize, is_quick: bool) -> Result<(Summary, RawMesh), MeshError> {
     let limits = Limits::default();
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let files = Bundle::of_one(text.as_bytes().to_vec()).into_files();
     let (folder, _) = entry::choose(files, None, Some(Format::Obj), &deadline).unwrap();
     let mut cx = Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
     let mut raw = RawMesh::default();
-    let summary =
-        read_parts(text.as_bytes(), part_bytes, is_quick, &mut cx).and_then(|parts| assemble(parts, &mut raw, &mut cx));
-    match summary {
-        Ok(summary) => format!("{summary:?} {raw:?}"),
-        Err(error) => format!("{error:?}"),
-    }
+    let summary = read_text(text.as_bytes(), part_bytes, is_quick, &mut raw, &mut cx)?;
+    Ok((summary, raw))
 }
 
 impl Random {
@@ -145,4 +149,33 @@ fn too_much_work_is_left_to_one_thread() {
     let whole = read(&text, usize::MAX, true);
     assert!(whole.contains("polygons_fanned"), "{}", &whole[..200]);
     assert!(read(&text, 10_000, true) == whole);
+}
+
+#[test]
+fn attributes_of_vertices_are_those_of_corners() {
+    let count = 300;
+    let lists: String =
+        (0..count).map(|i| format!("v {i} {} 0\nvt {} 0.{i}\nvn 0 {i} 1\n", i % 7, f64::from(i) / 7.0)).collect();
+    for form in ["a/a/a", "a/a", "a//a"] {
+        // Not all vertices are used, and none in order.
+        let corner = |i: u32| format!(" {}", form.replace('a', &(i * 7 % 250 + 1).to_string()));
+        let face = |i: u32| format!("f{}\n", (i..i + 3 + i % 2).map(corner).collect::<String>());
+        let faces: String = (0..400).map(face).collect();
+        // One texture coordinate and one normal more than vertices, and they belong to corners.
+        for more in ["", "vt 0 0\nvn 0 0 1\n"] {
+            let resolved = |text: &str| {
+                let raw = try_read(text, 500, true).unwrap().1;
+                let corner = |v: &u32| {
+                    let v = *v as usize;
+                    (raw.positions[v], raw.uvs.get(v).copied(), raw.normals.get(v).copied())
+                };
+                let corners: Vec<_> = raw.triangles.iter().flatten().map(corner).collect();
+                (format!("{corners:?}"), raw.positions.len())
+            };
+            let (given, vertices) = resolved(&format!("{lists}{more}{faces}"));
+            let (expected, _) = resolved(&format!("{lists}vt nan 0\nvn 0 0 1\n{faces}"));
+            assert!(given == expected, "{form}");
+            assert_eq!(vertices, if more.is_empty() { count as usize } else { 250 }, "{form}");
+        }
+    }
 }

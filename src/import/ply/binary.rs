@@ -95,19 +95,37 @@ fn triangle<const BIG: bool>(record: &[u8], vertices: u32) -> Option<[u32; 3]> {
     (record[0] == 3 && triangle[0] < below && triangle[1] < below && triangle[2] < below).then_some(triangle)
 }
 
+/// The length of the run that a list begins with. For each of its pieces there is the length of the
+/// run it begins with, and its own.
+fn leading(runs: &[(usize, usize)]) -> usize {
+    let whole = runs.iter().take_while(|(run, all)| run == all).count();
+    runs.iter().take(whole + 1).map(|(run, _)| run).sum()
+}
+
 impl<const BIG: bool> Source for Binary<'_, BIG> {
     fn triangles_max(&self, layout: &Layout, records: u64) -> u64 {
         if !is_triangles(layout) {
             return 0;
         }
-        let run = self.bytes[self.at..].chunks_exact(TRIANGLE_BYTES).take_while(|record| record[0] == 3).count();
-        records.min(run as u64)
+        let body = &self.bytes[self.at..];
+        let body =
+            &body[..body.len().min(usize::try_from(records).unwrap_or(usize::MAX).saturating_mul(TRIANGLE_BYTES))];
+        let runs = map(body.chunks(TRIANGLES_PER_PIECE * TRIANGLE_BYTES).collect(), |records: &[u8]| {
+            let run = records.chunks_exact(TRIANGLE_BYTES).take_while(|record| record[0] == 3).count();
+            (run, records.len() / TRIANGLE_BYTES)
+        });
+        leading(&runs) as u64
     }
 
     fn triangles(&mut self, records: u64, vertices: u32, corners: &mut Vec<u32>) {
         let count = records as usize;
         let before = corners.len();
-        corners.resize(before + 3 * count, 0);
+        if before == 0 {
+            // Zeros from the system, which nobody has to write.
+            *corners = vec![0; 3 * count];
+        } else {
+            corners.resize(before + 3 * count, 0);
+        }
         let records =
             self.bytes[self.at..self.at + count * TRIANGLE_BYTES].chunks(TRIANGLES_PER_PIECE * TRIANGLE_BYTES);
         let pieces = records.zip(corners[before..].chunks_mut(3 * TRIANGLES_PER_PIECE)).collect();
@@ -120,9 +138,7 @@ impl<const BIG: bool> Source for Binary<'_, BIG> {
             }
             (run, records.len() / TRIANGLE_BYTES)
         });
-        // Up to the first record that is something else.
-        let whole = runs.iter().take_while(|(run, all)| run == all).count();
-        let run: usize = runs.iter().take(whole + 1).map(|(run, _)| run).sum();
+        let run = leading(&runs);
         corners.truncate(before + 3 * run);
         self.at += run * TRIANGLE_BYTES;
     }
@@ -142,19 +158,20 @@ impl<const BIG: bool> Source for Binary<'_, BIG> {
         self.take(bytes).map(|_| ())
     }
 
-    fn columns(&mut self, layout: &Layout, rows: usize, columns: &mut Columns) -> Option<()> {
-        let stride = layout.stride?;
-        let block = self.take(rows.checked_mul(stride)?)?;
+    fn block(&mut self, bytes: usize) -> Option<&[u8]> {
+        self.take(bytes)
+    }
+
+    fn columns(layout: &Layout, stride: usize, records: &[u8], columns: &mut Columns) {
         for step in &layout.steps {
             let Step::Value { kind, slot, offset } = *step else { continue };
             let column = &mut columns[slot];
             column.clear();
             by_kind!(kind, T => {
                 let of_record = |record: &[u8]| T::read::<BIG>(&record[offset..offset + size_of::<T>()]);
-                column.extend(block.chunks_exact(stride).map(of_record));
+                column.extend(records.chunks_exact(stride).map(of_record));
             });
         }
-        Some(())
     }
 
     fn is_in_columns(&self) -> bool {

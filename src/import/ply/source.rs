@@ -23,8 +23,10 @@ pub trait Source {
     fn values(&mut self, kind: Kind, count: usize, items: &mut Vec<f64>) -> Option<()>;
     /// Skips some numbers, which take `bytes` in a binary body.
     fn skip(&mut self, numbers: usize, bytes: usize) -> Option<()>;
-    /// Replaces `columns` with the values of some records of a fixed size.
-    fn columns(&mut self, layout: &Layout, rows: usize, columns: &mut Columns) -> Option<()>;
+    /// The next `bytes`, which are records of a fixed size.
+    fn block(&mut self, bytes: usize) -> Option<&[u8]>;
+    /// Replaces `columns` with the values of such records, of `stride` bytes each.
+    fn columns(layout: &Layout, stride: usize, records: &[u8], columns: &mut Columns);
     /// Number of the next records, at most `records`, that are lists of three indices and nothing
     /// else. 0 where [`Source::triangles`] would be no faster than record by record.
     fn triangles_max(&self, _layout: &Layout, _records: u64) -> u64 {
@@ -33,7 +35,7 @@ pub trait Source {
     /// Reads up to `records` such triangles, as long as indices are below `vertices`. Appends the
     /// indices.
     fn triangles(&mut self, _records: u64, _vertices: u32, _corners: &mut Vec<u32>) {}
-    /// True if [`Source::columns`] works.
+    /// True if [`Source::block`] and [`Source::columns`] work.
     fn is_in_columns(&self) -> bool;
     /// An upper bound for the numbers left.
     fn numbers_left(&self, kind: Kind) -> u64;

@@ -55,9 +55,11 @@ impl Source for Text<'_> {
         Some(())
     }
 
-    fn columns(&mut self, _layout: &Layout, _rows: usize, _columns: &mut Columns) -> Option<()> {
+    fn block(&mut self, _bytes: usize) -> Option<&[u8]> {
         None
     }
+
+    fn columns(_layout: &Layout, _stride: usize, _records: &[u8], _columns: &mut Columns) {}
 
     fn is_in_columns(&self) -> bool {
         false

@@ -6,6 +6,8 @@ use super::layout::{Layout, Slot};
 use super::source::{Columns, Cost, Meter, Source, each_record, ends_within};
 use crate::import::MeshError;
 use crate::import::context::Context;
+use crate::import::parallel::map_with;
+use crate::limits::Stopped;
 use std::ops::Range;
 
 /// Slots of a vertex's numbers.
@@ -17,8 +19,8 @@ const UV: Range<usize> = 10..12;
 
 /// Vertices per block: few enough that their columns stay in the nearest caches.
 const BLOCK: usize = 512;
-/// Blocks between two deadline checks.
-const BLOCKS_PER_POLL: u64 = 128;
+/// Vertices handed to a thread at a time.
+const VERTICES_PER_PIECE: usize = 32 * BLOCK;
 
 /// The vertices read so far, each list as in [`crate::import::raw::RawMesh`].
 #[derive(Debug, Default)]
@@ -49,36 +51,39 @@ pub fn read<S: Source>(
     if !layout.has(POSITION) {
         return Err(MeshError::broken("the vertices of the PLY file lack one of the numbers x, y and z"));
     }
-    let mut vertices = Vertices::reserve(&layout, element.count, cx)?;
-    let mut columns = Columns::default();
+    let mut vertices = Vertices::of_zeros(&layout, element.count, cx)?;
+    let mut places = vertices.places();
     if let (Some(stride), true) = (layout.stride, source.is_in_columns()) {
-        let mut left = element.count;
-        for block in 0.. {
-            if block % BLOCKS_PER_POLL == 0 {
-                cx.deadline.check()?;
+        let bytes = usize::try_from(element.count).ok().and_then(|count| count.checked_mul(stride));
+        let Some(records) = bytes.and_then(|bytes| source.block(bytes)) else {
+            return Err(ends_within(source, element, stride, 0));
+        };
+        let pieces = records.chunks(VERTICES_PER_PIECE * stride).map(|records| {
+            let rows = records.len() / stride;
+            (records, places.next(rows))
+        });
+        let done = map_with(pieces.collect(), Columns::default, |columns, (records, mut places)| {
+            cx.deadline.check()?;
+            for records in records.chunks(BLOCK * stride) {
+                S::columns(&layout, stride, records, columns);
+                places.next(records.len() / stride).fill(&layout, columns);
             }
-            let rows = left.min(BLOCK as u64);
-            if rows == 0 {
-                break;
-            }
-            source
-                .columns(&layout, rows as usize, &mut columns)
-                .ok_or_else(|| ends_within(source, element, stride, element.count - left))?;
-            vertices.append(&layout, &columns);
-            left -= rows;
-        }
+            Ok(())
+        });
+        done.into_iter().collect::<Result<(), Stopped>>()?;
     } else {
+        let mut columns = Columns::default();
         each_record(source, element, &layout, (Cost::default(), meter), cx, |row| {
             for (column, value) in columns.iter_mut().zip(row.values) {
                 column.push(value);
             }
             if columns[0].len() == BLOCK {
-                vertices.append(&layout, &columns);
+                places.next(BLOCK).fill(&layout, &columns);
                 columns.iter_mut().for_each(Vec::clear);
             }
             Ok(0)
         })?;
-        vertices.append(&layout, &columns);
+        places.next(columns[0].len()).fill(&layout, &columns);
     }
     vertices.is_f32 = layout.kinds[POSITION].iter().all(|kind| *kind == Some(Kind::F32));
     let kinds = &layout.kinds[COLOR.start..=ALPHA];
@@ -106,9 +111,9 @@ fn slot(name: &str) -> Option<Slot> {
 }
 
 impl Vertices {
-    /// Reserves room for all values of the layout. The count was checked against the length of the
+    /// Lists of zeros for all values of the layout. The count was checked against the length of the
     /// file.
-    fn reserve(layout: &Layout, count: u64, cx: &mut Context<'_>) -> Result<Self, MeshError> {
+    fn of_zeros(layout: &Layout, count: u64, cx: &mut Context<'_>) -> Result<Self, MeshError> {
         let room = |is_there: bool| if is_there { count as usize } else { 0 };
         let rooms = [room(layout.has(NORMAL)), room(layout.has(UV)), room(layout.has(COLOR))];
         cx.budget.spend("the PLY vertices", count, 24)?;
@@ -116,32 +121,56 @@ impl Vertices {
             cx.budget.spend("what PLY vertices have beside positions", room as u64, bytes)?;
         }
         Ok(Self {
-            positions: Vec::with_capacity(count as usize),
+            positions: vec![[0.0; 3]; count as usize],
             is_f32: false,
-            normals: Vec::with_capacity(rooms[0]),
-            uvs: Vec::with_capacity(rooms[1]),
-            colors: Vec::with_capacity(rooms[2]),
+            normals: vec![[0.0; 3]; rooms[0]],
+            uvs: vec![[0.0; 2]; rooms[1]],
+            colors: vec![[0.0; 4]; rooms[2]],
         })
     }
 
-    fn append(&mut self, layout: &Layout, columns: &Columns) {
-        let rows = 0..columns[POSITION.start].len();
+    fn places(&mut self) -> Places<'_> {
+        let Self { positions, normals, uvs, colors, .. } = self;
+        Places { positions, normals, uvs, colors }
+    }
+}
+
+/// Places of vertices that follow each other.
+struct Places<'a> {
+    positions: &'a mut [[f64; 3]],
+    normals: &'a mut [[f32; 3]],
+    uvs: &'a mut [[f32; 2]],
+    colors: &'a mut [[f32; 4]],
+}
+
+impl<'a> Places<'a> {
+    /// Takes the first places, of so many vertices.
+    fn next(&mut self, rows: usize) -> Self {
+        fn cut<'a, T>(list: &mut &'a mut [T], rows: usize) -> &'a mut [T] {
+            // Vertices may lack an attribute.
+            list.split_off_mut(..rows).unwrap_or_default()
+        }
+        Self {
+            positions: cut(&mut self.positions, rows),
+            normals: cut(&mut self.normals, rows),
+            uvs: cut(&mut self.uvs, rows),
+            colors: cut(&mut self.colors, rows),
+        }
+    }
+
+    fn fill(self, layout: &Layout, columns: &Columns) {
         let [x, y, z] = triple(columns, POSITION);
-        self.positions.extend(rows.clone().map(|i| [x[i], y[i], z[i]]));
-        if layout.has(NORMAL) {
-            let [x, y, z] = triple(columns, NORMAL);
-            self.normals.extend(rows.clone().map(|i| [x[i] as f32, y[i] as f32, z[i] as f32]));
-        }
-        if layout.has(UV) {
-            let [u, v] = [&columns[UV.start], &columns[UV.start + 1]];
-            self.uvs.extend(rows.clone().map(|i| upright([u[i], v[i]])));
-        }
-        if layout.has(COLOR) {
-            let [r, g, b] = triple(columns, COLOR);
-            let a = layout.kinds[ALPHA].map(|_| &columns[ALPHA]);
-            let alpha = |i: usize| a.map_or(1.0, |a| a[i] as f32);
-            self.colors.extend(rows.map(|i| [r[i] as f32, g[i] as f32, b[i] as f32, alpha(i)]));
-        }
+        (0..).zip(self.positions).for_each(|(i, place): (usize, _)| *place = [x[i], y[i], z[i]]);
+        let [x, y, z] = triple(columns, NORMAL);
+        (0..).zip(self.normals).for_each(|(i, place): (usize, _)| *place = [x[i] as f32, y[i] as f32, z[i] as f32]);
+        let [u, v] = [&columns[UV.start], &columns[UV.start + 1]];
+        (0..).zip(self.uvs).for_each(|(i, place): (usize, _)| *place = upright([u[i], v[i]]));
+        let [r, g, b] = triple(columns, COLOR);
+        let a = layout.kinds[ALPHA].map(|_| &columns[ALPHA]);
+        let alpha = |i: usize| a.map_or(1.0, |a| a[i] as f32);
+        (0..)
+            .zip(self.colors)
+            .for_each(|(i, place): (usize, _)| *place = [r[i] as f32, g[i] as f32, b[i] as f32, alpha(i)]);
     }
 }
 

@@ -25,14 +25,14 @@ pub enum Colors {
 
 impl Colors {
     /// Detects the convention from the header and the attribute bytes. None if no triangle has a
-    /// colour.
-    pub fn of(header: &[u8], mut attributes: impl Iterator<Item = u16>) -> Option<Self> {
+    /// colour. `any_is_flagged` is true if an attribute is [`is_flagged`].
+    pub fn of(header: &[u8], any_is_flagged: impl FnOnce() -> bool) -> Option<Self> {
         let at = header.windows(MAGICS.len()).position(|word| word == MAGICS);
         if let Some(bytes) = at.and_then(|at| header.get(at + MAGICS.len()..at + MAGICS.len() + 3)) {
             let [r, g, b] = [bytes[0], bytes[1], bytes[2]].map(|byte| linear(f64::from(byte) / 255.0));
             return Some(Self::Magics { object: [r, g, b, 1.0] });
         }
-        attributes.any(|attribute| attribute & FLAG != 0).then_some(Self::VisCam)
+        any_is_flagged().then_some(Self::VisCam)
     }
 
     /// Linear RGBA of a triangle. In the Magics convention 0 means no colour, because programs that
@@ -50,6 +50,12 @@ impl Colors {
     }
 }
 
+/// True if bit 15 is set.
+#[inline(always)]
+pub fn is_flagged(attribute: u16) -> bool {
+    attribute & FLAG != 0
+}
+
 fn linear(v: f64) -> f32 {
     srgb_to_linear(v) as f32
 }
@@ -61,17 +67,19 @@ mod tests {
     #[test]
     fn both_ways_are_told_apart() {
         let mut header = [b' '; 80];
-        assert_eq!(Colors::of(&header, [0, 1, 0x7FFF].into_iter()), None);
-        let viscam = Colors::of(&header, [0, FLAG].into_iter()).unwrap();
+        let of =
+            |header: &[u8; 80], attributes: &[u16]| Colors::of(header, || attributes.iter().any(|a| is_flagged(*a)));
+        assert_eq!(of(&header, &[0, 1, 0x7FFF]), None);
+        let viscam = of(&header, &[0, FLAG]).unwrap();
         assert_eq!(viscam.color(FLAG | 31), [0.0, 0.0, 1.0, 1.0]);
         assert_eq!((viscam.color(FLAG | 31 << 10), viscam.color(31)), ([1.0, 0.0, 0.0, 1.0], WHITE));
         header[40..50].copy_from_slice(b"COLOR=\xFF\x00\x00\xFF");
-        let magics = Colors::of(&header, [].into_iter()).unwrap();
+        let magics = of(&header, &[]).unwrap();
         assert_eq!(magics.color(31 << 10), [0.0, 0.0, 1.0, 1.0]);
         assert_eq!([magics.color(0), magics.color(FLAG), magics.color(FLAG | 31)], [[1.0, 0.0, 0.0, 1.0]; 3]);
         // Cut off by the header's end.
         header[40..50].fill(b' ');
         header[74..].copy_from_slice(MAGICS);
-        assert_eq!(Colors::of(&header, [].into_iter()), None);
+        assert_eq!(of(&header, &[]), None);
     }
 }

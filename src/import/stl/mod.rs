@@ -3,13 +3,14 @@
 
 mod color;
 
-use self::color::Colors;
+use self::color::{Colors, is_flagged};
 use super::polygon::ALL_EDGES;
 use super::raw::{RawMesh, Soup};
 use super::{Format, MeshError, text};
 use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
+use crate::import::parallel::map;
 use crate::mesh::{MaterialSlot, UpAxis};
 use crate::pluralise::pluralise;
 use crate::warning::Warning;
@@ -18,6 +19,8 @@ use crate::warning::Warning;
 const HEADER_BYTES: usize = 84;
 /// Bytes per triangle: a normal, three corners and two attribute bytes.
 const TRIANGLE_BYTES: usize = 50;
+/// Triangles handed to a thread at a time.
+const TRIANGLES_PER_PIECE: usize = 16_384;
 
 /// Reads either kind of file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
@@ -135,16 +138,23 @@ fn read_binary(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError>
 
 /// Gives each triangle's three vertices the colour in its attribute bytes.
 fn paint(raw: &mut RawMesh, header: &[u8], (body, count): (&[u8], u64), cx: &mut Context<'_>) -> Result<(), MeshError> {
-    let attributes =
-        || body.chunks_exact(TRIANGLE_BYTES).map(|triangle| u16::from_le_bytes([triangle[48], triangle[49]]));
-    let Some(colors) = Colors::of(header, attributes()) else { return Ok(()) };
+    let any_is_flagged = || {
+        let pieces = body.chunks(TRIANGLES_PER_PIECE * TRIANGLE_BYTES).collect();
+        map(pieces, |piece: &[u8]| attributes(piece).any(is_flagged)).contains(&true)
+    };
+    let Some(colors) = Colors::of(header, any_is_flagged) else { return Ok(()) };
     cx.deadline.check()?;
     cx.budget.spend("the colours of STL triangles", 3 * count, 16)?;
     raw.colors.reserve_exact(3 * count as usize);
-    raw.colors.extend(attributes().flat_map(|attribute| [colors.color(attribute); 3]));
+    raw.colors.extend(attributes(body).flat_map(|attribute| [colors.color(attribute); 3]));
     // Vertex colours are final: white takes the place of the grey of files without colours.
     raw.materials = vec![MaterialSlot { base_color: Some([1.0; 4]), ..MaterialSlot::default() }];
     Ok(())
+}
+
+/// The attribute bytes of triangles.
+fn attributes(triangles: &[u8]) -> impl Iterator<Item = u16> {
+    triangles.as_chunks::<TRIANGLE_BYTES>().0.iter().map(|triangle| u16::from_le_bytes([triangle[48], triangle[49]]))
 }
 
 /// Reads ASCII word by word: exporters disagree on lines and indentation, but every corner is

@@ -17,6 +17,7 @@ use crate::import::gltf::data::attribute;
 use crate::import::gltf::document::schema;
 use crate::import::gltf::document::schema::mode;
 use crate::import::gltf::material::Materials;
+use crate::import::parallel::{each_piece, map_items};
 use crate::import::polygon::ALL_EDGES;
 use crate::import::raw::{RawMesh, extend_attribute};
 use crate::mesh::LineOrPoint;
@@ -162,11 +163,16 @@ impl Primitive {
         }
         cx.deadline.check()?;
         self.pay(raw, cx)?;
-        self.append_attributes(&Shape::of(&self), raw, transform, 0..self.positions.len());
+        let count = self.positions.len();
+        raw.report.file_vertices += count as u64;
         raw.positions = std::mem::take(&mut self.positions);
         if *transform != Affine::IDENTITY {
-            raw.positions.iter_mut().for_each(|p| *p = transform.point(*p));
+            each_piece(&mut raw.positions, |piece| piece.iter_mut().for_each(|p| *p = transform.point(*p)));
         }
+        let matrix = transform.normal_matrix();
+        raw.normals = whole(&self.normals, count, |n| turn(&matrix, n));
+        raw.uvs = whole(&self.uvs, count, |t| t.map(|c| c as f32));
+        raw.colors = whole(&self.colors, count, |c| c.map(|v| v as f32));
         raw.triangles = std::mem::take(&mut self.triangles);
         raw.edge_masks.extend(&self.edge_masks);
         self.append_rest(raw, 0, default_material, cx)
@@ -228,6 +234,11 @@ impl Primitive {
         let of = |ends: &[u32; 2]| if ends[0] == ends[1] { POINT_TRIANGLES } else { SEGMENT_TRIANGLES };
         self.triangles.len() as u64 + self.lines_and_points.iter().map(of).sum::<u64>()
     }
+}
+
+/// What `each` makes of the values of an attribute, if there are `count` of them.
+fn whole<T: Sync, R: Send>(values: &[T], count: usize, each: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    if values.len() == count { map_items(values, each) } else { Vec::new() }
 }
 
 /// A transformed normal of unit length, or zero if it has no direction. Made unit in f64, because

@@ -9,14 +9,32 @@ use crate::import::polygon::{ALL_EDGES, Triangulator, WORK_MAX};
 use crate::import::raw::RawMesh;
 use crate::limits::{Deadline, Stopped};
 use crate::mesh::LineOrPoint;
+use bytemuck::allocation::try_cast_vec;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Faces between two deadline checks.
 const FACES_PER_POLL: u32 = 65_536;
 
 /// Fills in triangles, segments and points.
-pub fn fill(parts: &[Part<'_>], names: &Names, raw: &mut RawMesh, cx: &Context<'_>) -> Result<(), MeshError> {
-    let splitter = Splitter { parts, names, positions: &raw.positions, deadline: cx.deadline };
+pub fn fill(
+    parts: &[Part<'_>],
+    corners: Vec<u32>,
+    names: &Names,
+    raw: &mut RawMesh,
+    cx: &Context<'_>,
+) -> Result<(), MeshError> {
+    if parts.iter().flat_map(|part| &part.groups).all(|group| group.arity == 3) {
+        return fill_triangles(parts, corners, names, raw, cx);
+    }
+    let mut rest = corners.as_slice();
+    let corners = parts.iter().map(|part| {
+        let of_group = |group: &Group| group.faces as usize * group.arity as usize;
+        let (own, after) = rest.split_at(part.groups.iter().map(of_group).sum());
+        rest = after;
+        own
+    });
+    let corners: Vec<&[u32]> = corners.collect();
+    let splitter = Splitter { parts, corners: &corners, names, positions: &raw.positions, deadline: cx.deadline };
     let side_by_side = if parts.len() > 1 { splitter.side_by_side()? } else { None };
     let (mut pieces, triangulator) = match side_by_side {
         Some(done) => done,
@@ -34,8 +52,43 @@ pub fn fill(parts: &[Part<'_>], names: &Names, raw: &mut RawMesh, cx: &Context<'
     Ok(())
 }
 
+/// As [`fill`], for triangles and nothing else: their corners are them already.
+fn fill_triangles(
+    parts: &[Part<'_>],
+    corners: Vec<u32>,
+    names: &Names,
+    raw: &mut RawMesh,
+    cx: &Context<'_>,
+) -> Result<(), MeshError> {
+    raw.triangles = match try_cast_vec(corners) {
+        Ok(triangles) => triangles,
+        Err((_, corners)) => corners.as_chunks().0.to_vec(),
+    };
+    let count = raw.triangles.len();
+    raw.edge_masks = vec![ALL_EDGES; count];
+    // Most files have one material, or none. Zeros come from the system, and nobody has to write
+    // them.
+    raw.triangle_materials = vec![0; count];
+    let mut at = 0;
+    for (number, part) in parts.iter().enumerate() {
+        cx.deadline.check()?;
+        for group in &part.groups {
+            let end = at + group.faces as usize;
+            let material = names.material(number, group);
+            if material > 0 {
+                raw.triangle_materials[at..end].fill(material);
+            }
+            at = end;
+        }
+    }
+    raw.report.polygons_by_arity[3] += count as u64;
+    Ok(())
+}
+
 struct Splitter<'a> {
     parts: &'a [Part<'a>],
+    /// Those of each part.
+    corners: &'a [&'a [u32]],
     names: &'a Names,
     positions: &'a [[f64; 3]],
     deadline: &'a Deadline,
@@ -86,7 +139,7 @@ impl Splitter<'_> {
         let part = &self.parts[number];
         let mut piece = Piece::default();
         piece.reserve(&part.groups);
-        let mut corners = part.corners.v.as_slice();
+        let mut corners = self.corners[number];
         for group in &part.groups {
             let material = self.names.material(number, group);
             let (own, after) = corners.split_at(group.faces as usize * group.arity as usize);

@@ -7,12 +7,13 @@ mod vertices;
 pub use names::Names;
 
 use rapidhash::RapidHashSet;
+use std::mem::take;
 
-use super::parse::Part;
+use super::cut::Census;
+use super::parse::{Part, Places, join};
 use super::skipped::Skipped;
 use crate::import::MeshError;
 use crate::import::context::Context;
-use crate::import::parallel::concat;
 use crate::import::raw::RawMesh;
 
 /// Bytes of a library beside its name: in lists and sets that double as they grow.
@@ -29,33 +30,84 @@ pub struct Summary {
     pub skipped: Skipped,
 }
 
-/// The lists of a text, whole.
+/// The lists of a text, whole; or room for them.
 #[derive(Debug, Default)]
-struct Lists {
+pub struct Room {
     positions: Vec<[f64; 3]>,
     colors: Vec<[f32; 4]>,
     uvs: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
+    corners: Vec<u32>,
+    /// What each part seems to have.
+    census: Vec<Census>,
 }
 
-/// Fills in vertices and triangles.
-pub fn assemble(mut parts: Vec<Part<'_>>, raw: &mut RawMesh, cx: &mut Context<'_>) -> Result<Summary, MeshError> {
+impl Room {
+    /// Room for what parts seem to have, if all faces are triangles.
+    pub fn new(census: Vec<Census>, is_colored: bool) -> Self {
+        let sum = |count: fn(&Census) -> usize| census.iter().map(count).sum::<usize>();
+        Self {
+            positions: vec![[0.0; 3]; sum(|part| part.v)],
+            colors: vec![[0.0; 4]; if is_colored { sum(|part| part.v) } else { 0 }],
+            uvs: vec![[0.0; 2]; sum(|part| part.vt)],
+            normals: vec![[0.0; 3]; sum(|part| part.vn)],
+            corners: vec![0; sum(|part| 3 * part.f)],
+            census,
+        }
+    }
+
+    /// The places of the parts.
+    pub fn places(&mut self) -> Vec<Places<'_>> {
+        fn cut<'r, T>(list: &mut &'r mut [T], count: usize) -> &'r mut [T] {
+            list.split_off_mut(..count).unwrap_or_default()
+        }
+        let Self { positions, colors, uvs, normals, corners, census } = self;
+        let mut rest = Places { positions, colors, uvs, normals, corners };
+        let next = |part: &Census| Places {
+            positions: cut(&mut rest.positions, part.v),
+            colors: cut(&mut rest.colors, part.v),
+            uvs: cut(&mut rest.uvs, part.vt),
+            normals: cut(&mut rest.normals, part.vn),
+            corners: cut(&mut rest.corners, 3 * part.f),
+        };
+        census.iter().map(next).collect()
+    }
+
+    /// The lists, with what found no room in the parts.
+    fn joined(self, parts: &mut [Part<'_>]) -> Self {
+        let Self { positions, colors, uvs, normals, corners, census } = self;
+        let is_colored = usize::from(!colors.is_empty());
+        let mut parts: Vec<(&Census, &mut Part<'_>)> = census.iter().zip(parts).collect();
+        Self {
+            positions: join(positions, parts.iter_mut().map(|(of, part)| (of.v, take(&mut part.positions)))),
+            colors: join(colors, parts.iter_mut().map(|(of, part)| (of.v * is_colored, take(&mut part.colors)))),
+            uvs: join(uvs, parts.iter_mut().map(|(of, part)| (of.vt, take(&mut part.uvs)))),
+            normals: join(normals, parts.iter_mut().map(|(of, part)| (of.vn, take(&mut part.normals)))),
+            corners: join(corners, parts.iter_mut().map(|(of, part)| (3 * of.f, take(&mut part.corners)))),
+            census: Vec::new(),
+        }
+    }
+}
+
+/// Fills in vertices and triangles. `room` has the places of the parts.
+pub fn assemble(
+    mut parts: Vec<Part<'_>>,
+    room: Room,
+    raw: &mut RawMesh,
+    cx: &mut Context<'_>,
+) -> Result<Summary, MeshError> {
     check_indices(&parts)?;
     cx.check_triangles(parts.iter().map(|part| part.triangles).sum())?;
     let mut summary = Summary::default();
     parts.iter().for_each(|part| summary.skipped.add(&part.skipped));
     summary.libraries = libraries_of(&parts, cx)?;
     let names = Names::of(&parts, cx)?;
-    let lists = Lists {
-        positions: concat(parts.iter_mut().map(|part| std::mem::take(&mut part.positions)).collect()),
-        colors: concat(parts.iter_mut().map(|part| std::mem::take(&mut part.colors)).collect()),
-        uvs: concat(parts.iter_mut().map(|part| std::mem::take(&mut part.uvs)).collect()),
-        normals: concat(parts.iter_mut().map(|part| std::mem::take(&mut part.normals)).collect()),
-    };
+    let mut lists = room.joined(&mut parts);
     cx.deadline.check()?;
     raw.report.file_vertices = lists.positions.len() as u64;
-    vertices::fill(&mut parts, &names, lists, raw, cx)?;
-    faces::fill(&parts, &names, raw, cx)?;
+    let mut corners = take(&mut lists.corners);
+    vertices::fill(&mut parts, &mut corners, &names, lists, raw, cx)?;
+    faces::fill(&parts, corners, &names, raw, cx)?;
     summary.materials = names.all;
     Ok(summary)
 }

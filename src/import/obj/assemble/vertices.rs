@@ -1,11 +1,12 @@
 //! The vertices of a raw mesh: the file's positions, or one for each combination of a position
 //! with a texture coordinate and a normal.
 
-use super::{Lists, Names};
+use super::{Names, Room};
 use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::obj::face::MISSING;
 use crate::import::obj::parse::Part;
+use crate::import::parallel::map;
 use crate::import::raw::RawMesh;
 use rapidhash::RapidHashMap;
 
@@ -18,11 +19,12 @@ const CORNERS_PER_PAYMENT: u64 = 65_536;
 /// table.
 const VERTEX_BYTES: u64 = 2 * (16 + 24 + 8 + 12 + 16) + 2 * (12 + 4 + 1);
 
-/// Fills in positions and attributes, and makes the corners of `parts` refer to them.
+/// Fills in positions and attributes, and makes the corners of all `parts` refer to them.
 pub fn fill(
     parts: &mut [Part<'_>],
+    corners: &mut [u32],
     names: &Names,
-    lists: Lists,
+    lists: Room,
     raw: &mut RawMesh,
     cx: &mut Context<'_>,
 ) -> Result<(), MeshError> {
@@ -32,11 +34,19 @@ pub fn fill(
         (raw.positions, raw.colors) = (lists.positions, lists.colors);
         return Ok(());
     }
+    if let Some(uses) = uses_of_vertices(parts, corners, &lists) {
+        cx.deadline.check()?;
+        (raw.positions, raw.colors) = (lists.positions, lists.colors);
+        raw.uvs = if uses.0 { lists.uvs } else { Vec::new() };
+        raw.normals = if uses.1 { lists.normals } else { Vec::new() };
+        return Ok(());
+    }
     cx.budget.spend("the vertices of the OBJ file", lists.positions.len() as u64, 4)?;
     let mut combinations = Combinations::new(lists.positions.len());
     let mut uses = [false; 2];
     let mut last = None;
     let mut unpaid = 0;
+    let mut corners = corners.iter_mut();
     for (number, part) in parts.iter_mut().enumerate() {
         let mut at = 0;
         for group in &part.groups {
@@ -47,21 +57,20 @@ pub fn fill(
             }
             let form = (group.form.0 && has_uvs, group.form.1 && has_normals);
             uses = [uses[0] | form.0, uses[1] | form.1];
-            for _ in 0..u64::from(group.faces) * u64::from(group.arity) {
+            for v in corners.by_ref().take(group.faces as usize * group.arity as usize) {
                 if unpaid == 0 {
                     cx.deadline.check()?;
                     cx.budget.spend("the vertices of the OBJ file", CORNERS_PER_PAYMENT, VERTEX_BYTES)?;
                     unpaid = CORNERS_PER_PAYMENT;
                 }
                 unpaid -= 1;
-                let vt = if form.0 { part.corners.vt[at] } else { MISSING };
-                let vn = if form.1 { part.corners.vn[at] } else { MISSING };
-                let v = &mut part.corners.v[at];
+                let vt = if form.0 { part.corner_uvs[at] } else { MISSING };
+                let vn = if form.1 { part.corner_normals[at] } else { MISSING };
                 *v = combinations.number([*v, vt, vn]);
                 at += 1;
             }
         }
-        (part.corners.vt, part.corners.vn) = (Vec::new(), Vec::new());
+        (part.corner_uvs, part.corner_normals) = (Vec::new(), Vec::new());
     }
     let all = &combinations.all;
     if all.len() >= u32::MAX as usize {
@@ -79,6 +88,31 @@ pub fn fill(
         raw.colors = all.iter().map(|one| lists.colors[one.key[0] as usize]).collect();
     }
     Ok(())
+}
+
+/// What faces use of texture coordinates and normals, if they belong to vertices: each corner has those
+/// with the number of its position, as many programs write them. Then the lists are those of a mesh
+/// already.
+fn uses_of_vertices(parts: &[Part<'_>], corners: &[u32], lists: &Room) -> Option<(bool, bool)> {
+    let mut groups = parts.iter().flat_map(|part| &part.groups);
+    let form = groups.next()?.form;
+    let is_whole = |has: bool, count: usize| !has || count == lists.positions.len();
+    if !is_whole(form.0, lists.uvs.len()) || !is_whole(form.1, lists.normals.len()) {
+        return None;
+    }
+    // Corners of more than one kind share nothing, and repairs count what is used.
+    if groups.any(|group| group.form != form) || lists.uvs.iter().flatten().any(|c| !c.is_finite()) {
+        return None;
+    }
+    let mut rest = corners;
+    let own_corners = parts.iter().map(|part| {
+        let count = part.groups.iter().map(|group| group.faces as usize * group.arity as usize).sum();
+        (part, rest.split_off(..count).unwrap_or_default())
+    });
+    let is_same = map(own_corners.collect(), |(part, corners): (&Part<'_>, &[u32])| {
+        (!form.0 || part.corner_uvs == corners) && (!form.1 || part.corner_normals == corners)
+    });
+    is_same.into_iter().all(|same| same).then_some(form)
 }
 
 /// Numbers the distinct combinations of indices, separately for each run of faces.

@@ -1,5 +1,6 @@
 //! Faces in their plainest form: all corners alike, short indices without a sign, or relative ones.
 
+use super::decimal::whole;
 use super::{CORNERS_PER_POLL, Fault, Parser};
 use crate::import::obj::face::MISSING;
 
@@ -10,30 +11,70 @@ const DIGITS_MAX: usize = 9;
 /// normals.
 type FaceEnd = (usize, (bool, bool));
 
-impl Parser<'_, '_> {
+impl Parser<'_, '_, '_> {
     /// A face of three or more corners, all `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     #[inline]
     pub(super) fn plain_face(&mut self, at: usize) -> Result<Option<usize>, Fault> {
-        let before = self.part.corners.v.len();
-        let largest = self.part.largest;
-        let parsed = self.plain_corners(at, before)?;
-        match parsed {
-            Some((end, form)) => {
-                let arity = self.part.corners.v.len() - before;
-                self.part.triangles += arity as u64 - 2;
-                self.count_face(arity, form);
-                Ok(Some(end))
-            }
-            None => {
-                self.part.corners.truncate(before);
-                self.part.largest = largest;
-                Ok(None)
-            }
+        if let Some(end) = self.plain_triangle_or_quad(at) {
+            return Ok(Some(end));
         }
+        let Some((end, form)) = self.plain_corners(at)? else { return Ok(None) };
+        let arity = self.line.len();
+        let mut largest = [0; 3];
+        for corner in &self.line {
+            largest = std::array::from_fn(|kind| largest[kind].max(corner[kind]));
+        }
+        self.see([largest[0], if form.0 { largest[1] } else { MISSING }, if form.1 { largest[2] } else { MISSING }], 1);
+        let line = std::mem::take(&mut self.line);
+        self.add_corners(&line, form);
+        self.line = line;
+        self.part.triangles += arity as u64 - 2;
+        self.count_face(arity, form);
+        Ok(Some(end))
     }
 
+    /// A triangle or quad of positive `v`, in a part that has had nothing else yet.
     #[inline]
-    fn plain_corners(&mut self, mut at: usize, before: usize) -> Result<Option<FaceEnd>, Fault> {
+    fn plain_triangle_or_quad(&mut self, at: usize) -> Option<usize> {
+        if !(self.part.corner_uvs.is_empty() && self.part.corner_normals.is_empty()) {
+            return None;
+        }
+        let mut face = [0; 4];
+        let (mut arity, mut at) = (3, at);
+        for index in &mut face[..3] {
+            (*index, at) = self.plain_index(at)?;
+        }
+        // White space ends the line and each number before, so that corners are whole words.
+        let end = match self.end_of_line(at) {
+            Some(end) => end,
+            None => {
+                (face[3], at) = self.plain_index(at)?;
+                arity = 4;
+                self.end_of_line(at)?
+            }
+        };
+        self.lists.corners.extend(&face[..arity]);
+        let largest = face.into_iter().fold(0, u32::max);
+        self.see([largest, MISSING, MISSING], 1);
+        self.part.triangles += arity as u64 - 2;
+        self.count_face(arity, (false, false));
+        Some(end)
+    }
+
+    /// A zero-based index from a positive one after any white space, and where it ends.
+    #[inline(always)]
+    fn plain_index(&self, mut at: usize) -> Option<(u32, usize)> {
+        while let Some(b' ' | b'\t') = self.bytes.get(at) {
+            at += 1;
+        }
+        let (index, end) = whole(self.bytes, at);
+        (end - at <= DIGITS_MAX && index > 0).then(|| (index as u32 - 1, end))
+    }
+
+    /// The corners of the face at `at`, in `self.line`.
+    #[inline]
+    fn plain_corners(&mut self, mut at: usize) -> Result<Option<FaceEnd>, Fault> {
+        self.line.clear();
         let mut form = None;
         loop {
             while let Some(b' ' | b'\t' | b'\r') = self.bytes.get(at) {
@@ -53,29 +94,27 @@ impl Parser<'_, '_> {
                 return Ok(None);
             }
             at = end;
-            self.see(corner, 1);
-            self.part.corners.push(corner);
-            if self.part.corners.v.len().is_multiple_of(CORNERS_PER_POLL) {
+            self.line.push(corner);
+            if self.line.len().is_multiple_of(CORNERS_PER_POLL) {
                 self.rules.deadline.check()?;
             }
         }
-        let is_face = self.part.corners.v.len() - before >= 3;
+        let is_face = self.line.len() >= 3;
         Ok(form.filter(|_| is_face).map(|form| (at, form)))
     }
 
     /// A corner, and where it ends.
     #[inline]
     fn plain_corner(&self, at: usize) -> Option<([u32; 3], usize)> {
-        let counts = [self.part.positions.len(), self.part.uvs.len(), self.part.normals.len()];
-        let (v, mut at) = self.index(at, 0, counts)?;
+        let (v, mut at) = self.index(at, 0)?;
         let (mut vt, mut vn) = (MISSING, MISSING);
         if self.bytes.get(at) == Some(&b'/') {
             at += 1;
             if self.bytes.get(at) != Some(&b'/') {
-                (vt, at) = self.index(at, 1, counts)?;
+                (vt, at) = self.index(at, 1)?;
             }
             if self.bytes.get(at) == Some(&b'/') {
-                (vn, at) = self.index(at + 1, 2, counts)?;
+                (vn, at) = self.index(at + 1, 2)?;
             }
         }
         let ends = self.bytes.get(at).is_none_or(u8::is_ascii_whitespace);
@@ -84,23 +123,28 @@ impl Parser<'_, '_> {
 
     /// A zero-based index from a one-based or relative one, and where it ends.
     #[inline]
-    fn index(&self, begin: usize, kind: usize, counts: [usize; 3]) -> Option<(u32, usize)> {
-        let is_relative = self.bytes.get(begin) == Some(&b'-');
-        let digits_begin = begin + usize::from(is_relative);
-        let (mut at, mut index) = (digits_begin, 0_u32);
-        while let Some(digit) = self.bytes.get(at).map(|b| b.wrapping_sub(b'0')).filter(|digit| *digit < 10) {
-            index = index.wrapping_mul(10).wrapping_add(u32::from(digit));
-            at += 1;
-        }
-        if at - digits_begin > DIGITS_MAX || index == 0 {
+    fn index(&self, begin: usize, kind: usize) -> Option<(u32, usize)> {
+        let (index, at) = whole(self.bytes, begin);
+        if at - begin > DIGITS_MAX {
             return None;
         }
-        if !is_relative {
-            return Some((index - 1, at));
+        if index > 0 {
+            return Some((index as u32 - 1, at));
         }
-        let before = self.rules.before?;
-        let count = [before.v, before.vt, before.vn][kind] + counts[kind] as u64;
-        Some((u32::try_from(count.checked_sub(u64::from(index))?).ok()?, at))
+        self.relative_index(begin, kind)
+    }
+
+    fn relative_index(&self, begin: usize, kind: usize) -> Option<(u32, usize)> {
+        if self.bytes.get(begin) != Some(&b'-') {
+            return None;
+        }
+        let (index, at) = whole(self.bytes, begin + 1);
+        if at - begin > 1 + DIGITS_MAX || index == 0 {
+            return None;
+        }
+        let (before, own) = (self.rules.before?, self.counts());
+        let count = [before.v + own.v, before.vt + own.vt, before.vn + own.vn][kind];
+        Some((u32::try_from(count.checked_sub(index)?).ok()?, at))
     }
 
     /// Remembers the largest indices; `ahead` lines after those counted.

@@ -9,32 +9,33 @@ const POWERS: [f64; 23] = [
 const EXACT_MAX: u64 = 1 << 53;
 /// Digits that always fit an u64.
 const DIGITS_MAX: usize = 19;
+/// Powers of ten up to that of [`DIGITS_MAX`].
+const WHOLE_POWERS: [u64; DIGITS_MAX + 1] = {
+    let mut powers = [1; DIGITS_MAX + 1];
+    let mut i = 1;
+    while i <= DIGITS_MAX {
+        powers[i] = 10 * powers[i - 1];
+        i += 1;
+    }
+    powers
+};
 
 /// Parses the number at `bytes[begin..]`, up to white space or the end. Returns it, and where it
 /// ends. None if the word there is no plain decimal: it may still be a number that
 /// [`str::parse`] takes, such as `inf`.
-#[inline]
+#[inline(always)]
 pub fn leading(bytes: &[u8], begin: usize) -> Option<(f64, usize)> {
-    let mut at = begin;
-    let sign = *bytes.get(at)?;
-    at += usize::from(sign == b'-' || sign == b'+');
-    let digits_begin = at;
-    let mut digits = 0_u64;
-    while let Some(digit) = digit(bytes, at) {
-        digits = digits.wrapping_mul(10).wrapping_add(digit);
-        at += 1;
-    }
+    let sign = *bytes.get(begin)?;
+    let digits_begin = begin + usize::from(sign == b'-' || sign == b'+');
+    let (mut digits, mut at) = whole(bytes, digits_begin);
     let mut count = at - digits_begin;
     let mut exponent = 0;
     if bytes.get(at) == Some(&b'.') {
-        at += 1;
-        let fraction_begin = at;
-        while let Some(digit) = digit(bytes, at) {
-            digits = digits.wrapping_mul(10).wrapping_add(digit);
-            at += 1;
-        }
-        count += at - fraction_begin;
-        exponent = fraction_begin as i64 - at as i64;
+        let (fraction, end) = whole(bytes, at + 1);
+        let more = end - (at + 1);
+        digits = digits.wrapping_mul(WHOLE_POWERS[more.min(DIGITS_MAX)]).wrapping_add(fraction);
+        count += more;
+        (exponent, at) = (-(more as i64), end);
     }
     if count == 0 {
         return None;
@@ -46,21 +47,63 @@ pub fn leading(bytes: &[u8], begin: usize) -> Option<(f64, usize)> {
     if bytes.get(at).is_some_and(|b| !b.is_ascii_whitespace()) {
         return None;
     }
-    if count > DIGITS_MAX || digits > EXACT_MAX || exponent.abs() >= POWERS.len() as i64 {
-        return Some((std::str::from_utf8(&bytes[begin..at]).ok()?.parse().ok()?, at));
+    if count > DIGITS_MAX || digits > EXACT_MAX || exponent.unsigned_abs() >= POWERS.len() as u64 {
+        return Some((by_std(&bytes[begin..at])?, at));
     }
     // Both operands are exact, so that the one operation rounds once (Clinger, "How to read
     // floating point numbers accurately", 1990).
     let power = POWERS[exponent.unsigned_abs() as usize];
-    let value = if exponent < 0 { digits as f64 / power } else { digits as f64 * power };
+    // From a signed integer, which takes one instruction.
+    let digits = digits.cast_signed() as f64;
+    let value = if exponent < 0 { digits / power } else { digits * power };
     Some((if sign == b'-' { -value } else { value }, at))
+}
+
+#[cold]
+fn by_std(word: &[u8]) -> Option<f64> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+/// The whole number that begins at `at`, modulo 2^64, and where its digits end.
+#[inline(always)]
+pub fn whole(bytes: &[u8], mut at: usize) -> (u64, usize) {
+    let mut value = 0_u64;
+    while let Some((eight, _)) = bytes.get(at..).and_then(|rest| rest.split_first_chunk::<8>()) {
+        let digits = u64::from_le_bytes(*eight) ^ 0x3030_3030_3030_3030;
+        // A byte that is no digit has a high bit before or after the addition. What carries into
+        // the bytes after it does not matter.
+        let others = (digits.wrapping_add(0x0606_0606_0606_0606) | digits) & 0xF0F0_F0F0_F0F0_F0F0;
+        let count = others.trailing_zeros() as usize / 8;
+        // Zeros take the place of what follows, in front.
+        let number = eight_digits(digits.unbounded_shl(64 - 8 * count as u32));
+        value = value.wrapping_mul(WHOLE_POWERS[count]).wrapping_add(number);
+        at += count;
+        if count < 8 {
+            return (value, at);
+        }
+    }
+    while let Some(digit) = digit(bytes, at) {
+        value = value.wrapping_mul(10).wrapping_add(digit);
+        at += 1;
+    }
+    (value, at)
+}
+
+/// The number of eight digits, one a byte, the lowest byte first: pairs, then fours, then all.
+#[inline(always)]
+fn eight_digits(digits: u64) -> u64 {
+    const EVEN_PAIRS: u64 = 0x0000_00FF_0000_00FF;
+    let pairs = digits.wrapping_mul(10).wrapping_add(digits >> 8);
+    let first = (pairs & EVEN_PAIRS).wrapping_mul(100 + (1_000_000 << 32));
+    let second = (pairs >> 16 & EVEN_PAIRS).wrapping_mul(1 + (10_000 << 32));
+    first.wrapping_add(second) >> 32
 }
 
 /// Parses a whole word, as [`str::parse`] does.
 pub fn parse(word: &[u8]) -> Option<f64> {
     match leading(word, 0) {
         Some((value, end)) if end == word.len() => Some(value),
-        _ => std::str::from_utf8(word).ok()?.parse().ok(),
+        _ => by_std(word),
     }
 }
 
@@ -122,6 +165,24 @@ mod tests {
             (leading(b"1.5x", 0), leading(b"nan", 0), leading(b"", 0), leading(b" 1", 0)),
             (None, None, None, None)
         );
+    }
+
+    #[test]
+    fn digits_end_where_they_end() {
+        let mut count = 0;
+        // Every byte after every number of digits, near the text's end and far from it.
+        for (digits, byte, more) in
+            (0..=20).flat_map(|n| (0..=255_u8).flat_map(move |byte| [0, 1, 20].map(|more| (n, byte, more))))
+        {
+            let mut text = b"98765432109876543210"[..digits].to_vec();
+            text.push(byte);
+            text.resize(text.len() + more, b'7');
+            let end = text.iter().position(|b| !b.is_ascii_digit()).unwrap_or(text.len());
+            let fold = |value: u64, b: &u8| value.wrapping_mul(10).wrapping_add(u64::from(b - b'0'));
+            assert_eq!(whole(&text, 0), (text[..end].iter().fold(0, fold), end), "{text:?}");
+            count += 1;
+        }
+        assert_eq!(count, 21 * 256 * 3);
     }
 
     #[test]

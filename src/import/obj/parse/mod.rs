@@ -3,11 +3,14 @@
 
 mod corners;
 mod decimal;
+mod list;
 mod numbers;
 mod statement;
 
+pub use list::{Filled, join};
 pub use statement::{count, has_colored_vertex};
 
+use self::list::List;
 use super::face::{Counts, MISSING};
 use super::skipped::Skipped;
 use crate::import::MeshError;
@@ -36,17 +39,21 @@ pub struct Rules<'a> {
 #[derive(Debug, Default)]
 pub struct Part<'t> {
     /// `v` lines.
-    pub positions: Vec<[f64; 3]>,
+    pub positions: Filled<[f64; 3]>,
     /// Colours of the vertices as in the file, if they have any.
-    pub colors: Vec<[f32; 4]>,
+    pub colors: Filled<[f32; 4]>,
     /// `vt` lines, v down.
-    pub uvs: Vec<[f32; 2]>,
+    pub uvs: Filled<[f32; 2]>,
     /// `vn` lines.
-    pub normals: Vec<[f32; 3]>,
+    pub normals: Filled<[f32; 3]>,
     /// Faces, segments and points, run-length coded.
     pub groups: Vec<Group>,
-    /// Their corners.
-    pub corners: Corners,
+    /// The positions of their corners, as zero-based indices.
+    pub corners: Filled<u32>,
+    /// Texture coordinates of the corners, [`MISSING`] where one has none. Empty if none has any.
+    pub corner_uvs: Vec<u32>,
+    /// Normals, in the same way.
+    pub corner_normals: Vec<u32>,
     /// The name of each `usemtl` line.
     pub materials: Vec<Cow<'t, [u8]>>,
     /// Arguments of `mtllib` lines.
@@ -61,15 +68,28 @@ pub struct Part<'t> {
     pub lines: u64,
 }
 
-/// Zero-based indices of corners.
+/// Places for the lists of a part, of any length.
 #[derive(Debug, Default)]
-pub struct Corners {
+pub struct Places<'r> {
     /// Positions.
-    pub v: Vec<u32>,
-    /// Texture coordinates, [`MISSING`] where a corner has none. Empty if no corner has one.
-    pub vt: Vec<u32>,
-    /// Normals, in the same way.
-    pub vn: Vec<u32>,
+    pub positions: &'r mut [[f64; 3]],
+    /// Colours.
+    pub colors: &'r mut [[f32; 4]],
+    /// Texture coordinates.
+    pub uvs: &'r mut [[f32; 2]],
+    /// Normals.
+    pub normals: &'r mut [[f32; 3]],
+    /// Corners.
+    pub corners: &'r mut [u32],
+}
+
+/// The lists of a part.
+struct Lists<'r> {
+    positions: List<'r, [f64; 3]>,
+    colors: List<'r, [f32; 4]>,
+    uvs: List<'r, [f32; 2]>,
+    normals: List<'r, [f32; 3]>,
+    corners: List<'r, u32>,
 }
 
 /// Consecutive faces with the same number of corners, attributes and material.
@@ -122,9 +142,16 @@ impl Fault {
 }
 
 /// Parses one part.
-pub fn parse<'t>(bytes: &'t [u8], rules: Rules<'_>) -> Result<Part<'t>, Fault> {
+pub fn parse<'t>(bytes: &'t [u8], places: Places<'_>, rules: Rules<'_>) -> Result<Part<'t>, Fault> {
     rules.deadline.check()?;
-    let mut parser = Parser { bytes, rules, part: Part::default(), line: Vec::new() };
+    let lists = Lists {
+        positions: List::new(places.positions),
+        colors: List::new(places.colors),
+        uvs: List::new(places.uvs),
+        normals: List::new(places.normals),
+        corners: List::new(places.corners),
+    };
+    let mut parser = Parser { bytes, rules, lists, part: Part::default(), line: Vec::new() };
     let mut at = 0;
     while at < bytes.len() {
         let plain = if rules.is_quick { parser.plain_line(at)? } else { None };
@@ -136,18 +163,27 @@ pub fn parse<'t>(bytes: &'t [u8], rules: Rules<'_>) -> Result<Part<'t>, Fault> {
             None => parser.any_line(at)?,
         };
     }
-    Ok(parser.part)
+    let Parser { lists, part, .. } = parser;
+    Ok(Part {
+        positions: lists.positions.finish(),
+        colors: lists.colors.finish(),
+        uvs: lists.uvs.finish(),
+        normals: lists.normals.finish(),
+        corners: lists.corners.finish(),
+        ..part
+    })
 }
 
-struct Parser<'t, 'a> {
+struct Parser<'t, 'a, 'r> {
     bytes: &'t [u8],
     rules: Rules<'a>,
+    lists: Lists<'r>,
     part: Part<'t>,
     /// The corners of a face in its general form.
     line: Vec<[u32; 3]>,
 }
 
-impl Parser<'_, '_> {
+impl Parser<'_, '_, '_> {
     /// Parses the line at `at` if it is in the plainest form, and gives the begin of the next.
     #[inline]
     fn plain_line(&mut self, at: usize) -> Result<Option<usize>, Fault> {
@@ -175,6 +211,26 @@ impl Parser<'_, '_> {
         }
     }
 
+    /// The counts so far.
+    fn counts(&self) -> Counts {
+        let Lists { positions, uvs, normals, .. } = &self.lists;
+        Counts { v: positions.len() as u64, vt: uvs.len() as u64, vn: normals.len() as u64 }
+    }
+
+    /// Adds the corners of a face; `form` says what they have.
+    #[inline]
+    fn add_corners(&mut self, corners: &[[u32; 3]], form: (bool, bool)) {
+        let Part { corner_uvs, corner_normals, .. } = &mut self.part;
+        let before = self.lists.corners.len();
+        for (kind, has, list) in [(1, form.0, corner_uvs), (2, form.1, corner_normals)] {
+            if has || !list.is_empty() {
+                list.resize(before, MISSING);
+                list.extend(corners.iter().map(|corner| corner[kind]));
+            }
+        }
+        corners.iter().for_each(|corner| self.lists.corners.push(corner[0]));
+    }
+
     /// Counts a face whose corners were added.
     #[inline]
     fn count_face(&mut self, arity: usize, form: (bool, bool)) {
@@ -191,33 +247,4 @@ impl Parser<'_, '_> {
         }
         part.groups.push(Group { arity, faces: 1, form, material });
     }
-}
-
-impl Corners {
-    /// Adds a corner, with [`MISSING`] for what it lacks.
-    #[inline]
-    fn push(&mut self, [v, vt, vn]: [u32; 3]) {
-        add(&mut self.vt, vt, self.v.len());
-        add(&mut self.vn, vn, self.v.len());
-        self.v.push(v);
-    }
-
-    /// Takes back the last corners, so that `len` are left.
-    fn truncate(&mut self, len: usize) {
-        self.v.truncate(len);
-        self.vt.truncate(len);
-        self.vn.truncate(len);
-    }
-}
-
-/// Adds the attribute of a corner; `before` corners come before it.
-#[inline]
-fn add(list: &mut Vec<u32>, index: u32, before: usize) {
-    if list.is_empty() {
-        if index == MISSING {
-            return;
-        }
-        list.resize(before, MISSING);
-    }
-    list.push(index);
 }

@@ -3,14 +3,14 @@
 use super::Parser;
 use super::decimal;
 
-impl Parser<'_, '_> {
+impl Parser<'_, '_, '_> {
     /// A position without a weight, with a colour if the file has colours.
     #[inline]
     pub(super) fn plain_vertex(&mut self, at: usize) -> Option<usize> {
         let (position, at) = self.decimals::<3>(at)?;
         if !self.rules.is_colored {
             let end = self.end_of_line(at)?;
-            self.part.positions.push(position);
+            self.lists.positions.push(position);
             return Some(end);
         }
         let (color, at) = self.decimals::<3>(at)?;
@@ -18,8 +18,8 @@ impl Parser<'_, '_> {
         if !color.iter().all(|c| c.is_finite()) {
             return None;
         }
-        self.part.positions.push(position);
-        self.part.colors.push(opaque(color));
+        self.lists.positions.push(position);
+        self.lists.colors.push(opaque(color));
         Some(end)
     }
 
@@ -28,7 +28,7 @@ impl Parser<'_, '_> {
     pub(super) fn plain_normal(&mut self, at: usize) -> Option<usize> {
         let (normal, at) = self.after_space::<3>(at)?;
         let end = self.end_of_line(at)?;
-        self.part.normals.push(normal.map(|c| c as f32));
+        self.lists.normals.push(normal.map(|c| c as f32));
         Some(end)
     }
 
@@ -40,7 +40,7 @@ impl Parser<'_, '_> {
             Some(end) => end,
             None => self.end_of_line(self.decimals::<1>(at)?.1)?,
         };
-        self.part.uvs.push(upright(uv));
+        self.lists.uvs.push(upright(uv));
         Some(end)
     }
 

@@ -10,7 +10,7 @@ use crate::import::text::{before_comment, is_c_nan};
 use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
 use std::borrow::Cow;
 
-impl<'t> Parser<'t, '_> {
+impl<'t> Parser<'t, '_, '_> {
     /// Parses the line at `at`, and gives the begin of the next.
     #[cold]
     pub(super) fn any_line(&mut self, at: usize) -> Result<usize, Fault> {
@@ -38,12 +38,12 @@ impl<'t> Parser<'t, '_> {
             b"v" => self.vertex(words),
             b"vt" => {
                 let [u, v] = self.numbers(b"vt", "a texture coordinate needs two numbers", words)?;
-                self.part.uvs.push(upright([u, v]));
+                self.lists.uvs.push(upright([u, v]));
                 Ok(())
             }
             b"vn" => {
                 let normal: [f64; 3] = self.numbers(b"vn", "a normal needs three numbers", words)?;
-                self.part.normals.push(normal.map(|c| c as f32));
+                self.lists.normals.push(normal.map(|c| c as f32));
                 Ok(())
             }
             b"f" | b"fo" => self.face(words),
@@ -66,13 +66,13 @@ impl<'t> Parser<'t, '_> {
         let is_colored = self.rules.is_colored;
         self.part.skipped.colors += u64::from(is_colored != color.is_some());
         if is_colored {
-            self.part.colors.push(opaque(color.unwrap_or([1.0; 3])));
+            self.lists.colors.push(opaque(color.unwrap_or([1.0; 3])));
         } else if count == 4
             && let Some(weight) = finite(all[3]).filter(|weight| *weight != 0.0)
         {
             position = position.map(|c| c / weight);
         }
-        self.part.positions.push(position);
+        self.lists.positions.push(position);
         Ok(())
     }
 
@@ -124,7 +124,7 @@ impl<'t> Parser<'t, '_> {
             let [v, vt, vn] = self.line[i];
             let corner = [v, if form.0 { vt } else { MISSING }, if form.1 { vn } else { MISSING }];
             self.see(corner, 0);
-            self.part.corners.push(corner);
+            self.add_corners(&[corner], form);
         }
         self.part.triangles += arity as u64 - 2;
         self.count_face(arity, form);
@@ -144,10 +144,10 @@ impl<'t> Parser<'t, '_> {
                 // The first corner has nothing to be joined to, and an equal one no length.
                 let Some(from) = from.filter(|from| *from != v) else { continue };
                 self.see([from, MISSING, MISSING], 0);
-                self.part.corners.push([from, MISSING, MISSING]);
+                self.add_corners(&[[from, MISSING, MISSING]], (false, false));
             }
             self.see([v, MISSING, MISSING], 0);
-            self.part.corners.push([v, MISSING, MISSING]);
+            self.add_corners(&[[v, MISSING, MISSING]], (false, false));
             self.part.triangles += if are_joined { SEGMENT_TRIANGLES } else { POINT_TRIANGLES };
             self.count_face(if are_joined { 2 } else { 1 }, (false, false));
         }
@@ -155,7 +155,7 @@ impl<'t> Parser<'t, '_> {
     }
 
     fn corner(&self, word: &[u8]) -> Result<[u32; 3], Fault> {
-        let counts = self.rules.before.unwrap_or_default() + self.part.counts();
+        let counts = self.rules.before.unwrap_or_default() + self.counts();
         match parse_corner(word, counts) {
             _ if self.rules.before.is_none() && word.contains(&b'-') => Err(Fault::NeedsCounts),
             Ok(corner) => Ok(corner),
