@@ -19,8 +19,8 @@ fn is_drawn(edge: vec4<u32>) -> bool {
     return is_silhouette(edge);
 }
 
-// True if all faces lie on one side of the edge on screen, or there is only one face, even if it is
-// seen edge-on.
+// True if all faces lie on one side of the edge on screen, or there is no second face, even if the
+// first is seen edge-on.
 fn is_silhouette(edge: vec4<u32>) -> bool {
     if edge.w == NO_FACE {
         return true;

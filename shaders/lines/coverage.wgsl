@@ -38,14 +38,16 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
     let all = point_sum(at);
     let by_holes = has(HOLED) && (batch.line_flags & HOLES) != 0u && (strokes[at + HOLE_WORD] & MARKED) == 0u;
     if !by_holes && (sum.x | sum.y | all.x | all.y) == 0u {
-        strokes[at + HOLE_WORD] = 0u;
+        if has(HOLED) {
+            strokes[at + HOLE_WORD] = 0u;
+        }
         return;
     }
     var points = 0u;
     var cover = 0.0;
     if by_holes {
-        let unit = 65536u;
-        cover = f32(unit - min(strokes[at + HOLE_WORD], unit)) * (1.0 / f32(unit));
+        let covered = u32(HOLE_UNIT) - min(strokes[at + HOLE_WORD], u32(HOLE_UNIT));
+        cover = f32(covered) * (1.0 / HOLE_UNIT);
     } else {
         points = covered_points(at);
         cover = covered_share(sum, all, points, slack_of(at));

@@ -1,9 +1,6 @@
 // Stage lines, per face: the part of it that its lines leave free. Twin of
 // src/backend/cpu/lines/holes/inset.rs; holes.wgsl declares the buffers.
 
-// Steps to the pixel of a hole's area.
-const HOLE_UNIT: f32 = 65536.0;
-
 // Distance from a face's sides from which a sample counts as inside, 1/256 px.
 const INSIDE: f32 = 16.0;
 

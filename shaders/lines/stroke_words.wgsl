@@ -9,6 +9,9 @@ const GENERATOR: u32 = 181u;
 // Steps to the pixel of a sum of areas.
 const AREA_UNIT: f32 = 65536.0;
 
+// Steps to the pixel of a hole's area.
+const HOLE_UNIT: f32 = 65536.0;
+
 // Words per pixel.
 const STROKE_WORDS: u32 = 13u;
 // The sum of the strokes' areas.
@@ -22,8 +25,7 @@ const MASK_WORD: u32 = 3u;
 const MASK_WORDS: u32 = 8u;
 // The largest difference between a stroke's area and its points.
 const SLACK_WORD: u32 = 11u;
-// The area that holes leave free, or MARKED. No twin: the CPU's are in Holes,
-// src/backend/cpu/lines/holes/mod.rs.
+// The area of holes, and MARKED. The CPU's are in Holes, src/backend/cpu/lines/holes/mod.rs.
 const HOLE_WORD: u32 = 12u;
 // Bit of a pixel that gets strokes although the pass has holes.
 const MARKED: u32 = 0x80000000u;

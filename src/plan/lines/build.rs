@@ -63,8 +63,9 @@ impl Source<'_> {
                 deadline.check()?;
             }
             if style.draws(mesh, groups, edge) {
-                // Of more than two faces, none is the other side of the surface.
-                let faces = if edge.face_count > 2 { [edge.faces[0], Edge::NO_FACE] } else { edge.faces };
+                // Holes ask for rims: of more than two faces, none is the other side of the surface.
+                let is_crowded = style.has_all_edges && edge.face_count > 2;
+                let faces = if is_crowded { [edge.faces[0], Edge::NO_FACE] } else { edge.faces };
                 let all = Edge::new(&mesh.positions, edge.vertices, faces);
                 if let Some(edge) = silhouettes.map_or(Some(all), |s| s.edge(mesh, i, all)) {
                     each(edge);

@@ -67,7 +67,8 @@ impl LinePass {
         least..=8.0
     }
 
-    /// How far from a face that is hidden in part its lines may end, pixels.
+    /// Pixels up to this far from one in which a face is hidden in part get strokes: the visible part
+    /// of its lines may end there.
     pub fn hidden_reach_px(&self) -> u32 {
         (0.5 * self.width_px) as u32 + 1
     }
@@ -113,7 +114,8 @@ impl DrawPlan<'_> {
     }
 
     /// True if a pass may find the coverage of its lines by holes in faces: lines of all edges of an
-    /// opaque surface that hides what lies behind it, without ramps.
+    /// opaque surface that hides what lies behind it, without ramps, of the widths that the samples
+    /// allow.
     pub fn has_holes_under(&self, lines: &LinePass) -> bool {
         let is_whole = |surface: &SurfacePass<'_>| surface.faces == Faces::Both;
         lines.is_complete
@@ -155,7 +157,9 @@ pub enum Shown {
 pub struct Edge {
     /// Indices into the plan's positions.
     pub vertices: [u32; 2],
-    /// Triangle indices; [`Edge::NO_FACE`] where there is no second face, or more than two.
+    /// Triangle indices; [`Edge::NO_FACE`] where there is no second face. In a pass of all edges it
+    /// also stands for all but the first of more than two; in a contour those beside the widest gap
+    /// are kept.
     pub faces: [u32; 2],
 }
 

@@ -28,8 +28,8 @@ pub struct LineStyle {
     /// As [`LinePass::contour`].
     pub contour: bool,
     class: Class,
-    /// As [`LinePass::is_complete`].
-    is_complete: bool,
+    /// True if every edge has the style.
+    pub has_all_edges: bool,
     /// By index into [`MaterialGroups::styles`], which materials' edges; empty: all.
     styles: Vec<bool>,
 }
@@ -38,7 +38,7 @@ impl LineStyle {
     /// Unlit lines along all edges that they are given.
     pub fn everywhere(width_px: f32, smoothing_px: f32, color: [f32; 4], hidden: Hidden) -> Self {
         let (lit, contour, class, styles) = (false, false, Class::All, Vec::new());
-        Self { width_px, smoothing_px, color, hidden, lit, contour, class, is_complete: false, styles }
+        Self { width_px, smoothing_px, color, hidden, lit, contour, class, has_all_edges: false, styles }
     }
 
     /// True if the lines are visible at all.
@@ -58,7 +58,7 @@ impl LineStyle {
     pub fn passes(&self, edges: &Arc<[Edge]>, hides: bool, unseen_side: Option<Side>) -> Vec<LinePass> {
         let pass = |shown, color| LinePass {
             edges: edges.clone(),
-            is_complete: self.is_complete,
+            is_complete: self.has_all_edges,
             width_px: self.width_px,
             smoothing_px: self.smoothing_px,
             color,
@@ -111,7 +111,7 @@ fn wire_styles(groups: &MaterialGroups<'_>) -> Vec<LineStyle> {
         lit: wire.lit,
         contour: false,
         class: class_of(&wire),
-        is_complete: class_of(&wire) == Class::All && styles.iter().all(|&has| has),
+        has_all_edges: class_of(&wire) == Class::All && styles.iter().all(|&has| has),
         styles: if styles.iter().all(|&has| has) { Vec::new() } else { styles },
     };
     kinds.into_iter().map(style).collect()
@@ -128,7 +128,7 @@ fn topology_styles(topology: &Topology) -> Vec<LineStyle> {
             lit: false,
             contour: false,
             class,
-            is_complete: false,
+            has_all_edges: false,
             styles: Vec::new(),
         })
     };

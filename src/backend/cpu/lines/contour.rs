@@ -54,7 +54,7 @@ impl RasterContext<'_> {
     /// True if all faces lie on one side of the edge on screen: there the surface ends, or turns
     /// back under itself. The winding of faces does not matter.
     pub fn is_silhouette(&self, edge: &Edge) -> bool {
-        // With only one face the surface ends here, even if that face is seen edge-on.
+        // Without a second face the surface ends here, even if the first is seen edge-on.
         if edge.faces[1] == Edge::NO_FACE {
             return true;
         }

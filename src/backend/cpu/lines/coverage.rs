@@ -81,7 +81,8 @@ impl LineCoverage {
     }
 }
 
-/// The strokes of a band's pixels. Most pixels have none, and take no room for them.
+/// The strokes of a band's pixels. Most pixels have none: room for theirs is reserved, but not
+/// touched.
 #[derive(Default)]
 pub struct BandStrokes {
     /// Per pixel, 1 more than its index in `coverage`; 0 where there are none.

@@ -143,7 +143,7 @@ impl Schedule {
             };
             let has_holes = plan.has_holes_under(lines);
             if has_holes {
-                self.holes(device, lines, lined)?;
+                self.holes(device, (plan.width_px, lines), lined)?;
                 self.edges(device, lines, edges_first, shares, with(lined, line_flags::RIM_PASS))?;
             }
             let flag = if has_holes { line_flags::HOLES } else { 0 };
@@ -158,10 +158,15 @@ impl Schedule {
     }
 
     /// The holes of a pass's faces in rows of a band.
-    fn holes(&mut self, device: &DeviceTraits, lines: &LinePass, lined: Batch) -> Result<(), DrawError> {
+    fn holes(
+        &mut self,
+        device: &DeviceTraits,
+        (width_px, lines): (u32, &LinePass),
+        lined: Batch,
+    ) -> Result<(), DrawError> {
         let beyond = 2 * lines.hidden_reach_px();
         let rows = lined.row_end.abs_diff(lined.row_first) + beyond;
-        self.dispatch(device, Kernel::Holes, (lined.column_end as u32 + beyond) * rows, lined)
+        self.dispatch(device, Kernel::Holes, (width_px + beyond) * rows, lined)
     }
 
     /// The edges of a pass, in as many dispatches as that takes.

@@ -104,6 +104,11 @@ fn uses_of_vertices(parts: &[Part<'_>], corners: &[u32], lists: &Room) -> Option
     if groups.any(|group| group.form != form) || lists.uvs.iter().flatten().any(|c| !c.is_finite()) {
         return None;
     }
+    // A normal without direction is repaired from the faces of its own run.
+    let has_direction = |n: &[f32; 3]| n.iter().all(|c| c.is_finite()) && *n != [0.0; 3];
+    if form.1 && !lists.normals.iter().all(has_direction) {
+        return None;
+    }
     let mut rest = corners;
     let own_corners = parts.iter().map(|part| {
         let count = part.groups.iter().map(|group| group.faces as usize * group.arity as usize).sum();

@@ -31,7 +31,7 @@ pub const MARKED: u32 = 1 << 31;
 pub const FACES_MAX: u32 = 9 * 16;
 const _: () = assert!(FACES_MAX as f32 * HOLE_UNIT < MARKED as f32);
 
-/// Per pixel of a band, the area that its holes leave free, or that it is marked.
+/// Per pixel of a band, the area of holes, and whether it is marked.
 #[derive(Default)]
 pub struct Holes {
     /// Areas in [`HOLE_UNIT`]s, and [`MARKED`]. Empty where the pass has no holes.
@@ -93,7 +93,7 @@ impl Holes {
         self.words[at] |= MARKED;
     }
 
-    /// Adds to the area that is free in a pixel, by its index. Of [`FACES_MAX`] faces, the sum stays
+    /// Adds to the area of holes in a pixel, by its index. Of [`FACES_MAX`] faces, the sum stays
     /// below the mark.
     #[inline(always)]
     pub fn add(&mut self, at: usize, area: u32) {
