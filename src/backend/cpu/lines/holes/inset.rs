@@ -179,7 +179,7 @@ impl Inset {
 
 #[inline(always)]
 fn clamp(v: f32) -> f32 {
-    v.max(0.0).min(1.0)
+    v.clamp(0.0, 1.0)
 }
 
 /// Mean of what grows evenly from `a` to `b`, clamped to 0 to 1.
