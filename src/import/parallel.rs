@@ -30,7 +30,7 @@ pub fn map_with<T: Send, M, R: Send>(
 /// Items handed to a thread at a time by [`map_items`] and [`each_piece`].
 const ITEMS_PER_PIECE: usize = 16_384;
 
-/// What `each` makes of the items of a long list.
+/// The results of `each` for the items of a long list.
 pub fn map_items<T: Sync, R: Send>(items: &[T], each: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     if items.len() <= ITEMS_PER_PIECE {
         return items.iter().map(each).collect();

@@ -32,7 +32,7 @@ fn end_of_line(text: &[u8], mut from: usize, newline: u8) -> Option<usize> {
     }
 }
 
-/// What a part seems to have, from a look at its white space and the begins of its lines.
+/// An estimate of a part's content, from a look at its white space and the begins of its lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Census {
     /// The most numbers and keywords that it can have: each ends with white space, a slash or the

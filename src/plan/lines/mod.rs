@@ -54,8 +54,8 @@ impl LinePass {
     /// Widths of lines whose coverage holes in faces may tell, pixels, for a number of samples per
     /// pixel.
     ///
-    /// What is left of a visible face around a point of its inset is a disc as wide as the line. It
-    /// contains a sample if its radius is at least that of the largest circle without one, which is
+    /// Around each point of a visible inset lies a disc of the face, as wide as the line. It contains
+    /// a sample if its radius is at least that of the largest circle without one, which is
     /// .708, .396, .263 and .193 px for 1, 4, 8 and 16 samples. Wide lines leave few holes.
     pub fn holes_width_px(samples: u32) -> std::ops::RangeInclusive<f32> {
         let least = match samples {

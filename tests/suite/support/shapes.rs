@@ -181,3 +181,19 @@ impl Random {
         from + (to - from) * ((self.next() >> 11) as f64 / (1_u64 << 53) as f64)
     }
 }
+
+/// What makes lines hard: an open sheet, an edge of three faces, faces that touch, seams with
+/// T-junctions, silhouettes.
+pub fn hard_for_lines() -> [(&'static str, String); 7] {
+    let mut ball = Obj::default();
+    ball.ball([0.0; 3], 1.0, 40);
+    [
+        ("sheet", sheet(30)),
+        ("fin", FIN.to_owned()),
+        ("boxes on a floor", boxes_on_a_floor()),
+        ("stacked boxes", stacked_boxes()),
+        ("room", room_with_t_junctions()),
+        ("gear", gear(12)),
+        ("ball", ball.finish()),
+    ]
+}

@@ -23,7 +23,7 @@ pub struct LineTarget<'a> {
     pub strokes: &'a mut BandStrokes,
     /// Per pixel, the face that lights its lines, plus 1; empty where no lines are lit.
     pub owners: &'a mut [u32],
-    /// Where it has any, only the pixels that it marks get strokes.
+    /// The pass's holes. If there are any, only marked pixels get strokes.
     pub holes: &'a mut Holes,
 }
 

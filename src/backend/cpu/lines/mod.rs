@@ -6,8 +6,8 @@
 //! and composites them over the colours, under the light of [`line_light`]. Twins are in
 //! `shaders/lines/`.
 //!
-//! Where all edges of a surface are drawn, most pixels need no strokes: what [`holes`] in its faces
-//! leave free tells what lines cover. Only the pixels near rims get strokes then.
+//! Most pixels need no strokes where all edges of a surface are drawn: [`holes`] in its faces are
+//! what its lines leave free. Only the pixels near rims get strokes then.
 
 pub(crate) mod candidates;
 pub(crate) mod contour;

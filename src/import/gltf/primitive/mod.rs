@@ -236,7 +236,7 @@ impl Primitive {
     }
 }
 
-/// What `each` makes of the values of an attribute, if there are `count` of them.
+/// The results of `each` for the values of an attribute, if there are `count` of them.
 fn whole<T: Sync, R: Send>(values: &[T], count: usize, each: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     if values.len() == count { map_items(values, each) } else { Vec::new() }
 }

@@ -38,7 +38,7 @@ pub struct Room {
     uvs: Vec<[f32; 2]>,
     normals: Vec<[f32; 3]>,
     corners: Vec<u32>,
-    /// What each part seems to have.
+    /// The estimated content of each part.
     census: Vec<Census>,
 }
 

@@ -90,7 +90,7 @@ pub fn fill(
     Ok(())
 }
 
-/// What faces use of texture coordinates and normals, if they belong to vertices: each corner has those
+/// Use of texture coordinates and of normals by faces, if both belong to vertices: each corner has those
 /// with the number of its position, as many programs write them. Then the lists are those of a mesh
 /// already.
 fn uses_of_vertices(parts: &[Part<'_>], corners: &[u32], lists: &Room) -> Option<(bool, bool)> {

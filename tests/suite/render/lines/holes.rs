@@ -35,24 +35,10 @@ const LOOKS: &[Keys<'_>] = &[
 ];
 
 /// Sheets, what touches or passes through itself, borders, and an edge of three faces.
-fn meshes() -> [(&'static str, Mesh); 9] {
-    let ball = |n| {
-        let mut shape = shapes::Obj::default();
-        shape.ball([0.0; 3], 1.0, n);
-        shape.finish()
-    };
-    [
-        ("sheet", shapes::sheet(30)),
-        ("fin", shapes::FIN.to_owned()),
-        ("boxes on a floor", shapes::boxes_on_a_floor()),
-        ("stacked boxes", shapes::stacked_boxes()),
-        ("room", shapes::room_with_t_junctions()),
-        ("balls that pass through each other", balls_through_each_other()),
-        ("gear", shapes::gear(12)),
-        ("ball", ball(40)),
-        ("hairs", hairs()),
-    ]
-    .map(|(name, obj)| (name, scenes::mesh(&obj)))
+fn meshes() -> Vec<(&'static str, Mesh)> {
+    let own = [("balls that pass through each other", balls_through_each_other()), ("hairs", hairs())];
+    let all = shapes::hard_for_lines().into_iter().chain(own);
+    all.map(|(name, obj)| (name, scenes::mesh(&obj))).collect()
 }
 
 fn balls_through_each_other() -> String {

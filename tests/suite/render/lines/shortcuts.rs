@@ -13,24 +13,12 @@ type Keys<'k> = &'k [(&'k str, &'k str)];
 
 /// Open meshes, an edge of three faces, edges in the plane of another face, what covers itself
 /// twice, and meshes whose triangles are smaller than a pixel.
-fn meshes() -> [(&'static str, Mesh); 9] {
-    let ball = |n| {
-        let mut shape = shapes::Obj::default();
-        shape.ball([0.0; 3], 1.0, n);
-        shape.finish()
-    };
-    [
-        ("sheet", shapes::sheet(30)),
-        ("fin", shapes::FIN.to_owned()),
-        ("boxes on a floor", shapes::boxes_on_a_floor()),
-        ("stacked boxes", shapes::stacked_boxes()),
-        ("room", shapes::room_with_t_junctions()),
-        ("two balls", shapes::two_balls()),
-        ("gear", shapes::gear(12)),
-        ("ball", ball(40)),
-        ("fine ball", ball(160)),
-    ]
-    .map(|(name, obj)| (name, scenes::mesh(&obj)))
+fn meshes() -> Vec<(&'static str, Mesh)> {
+    let mut fine = shapes::Obj::default();
+    fine.ball([0.0; 3], 1.0, 160);
+    let own = [("two balls", shapes::two_balls()), ("fine ball", fine.finish())];
+    let all = shapes::hard_for_lines().into_iter().chain(own);
+    all.map(|(name, obj)| (name, scenes::mesh(&obj))).collect()
 }
 
 const LOOKS: &[Keys<'_>] = &[

@@ -1,9 +1,9 @@
 //! Stage lines, per face and pixel: what the lines along all edges of a surface leave free of it.
 //! Twin of `shaders/lines/holes.wgsl`.
 //!
-//! Where a pixel shows one sheet of faces all of whose sides are lines, the lines cover what the
-//! faces' [insets](inset) leave. Insets do not overlap, so their areas add up. Pixels in
-//! which that may not hold are marked, and get strokes:
+//! Lines cover all of a sheet of faces but the faces' [insets](inset), if each side of each face is a
+//! line. Insets do not overlap, so their areas add up. Pixels in which that may not hold are marked,
+//! and get strokes:
 //!
 //! - a sample shows no face, or one that is clipped or belongs to a hull;
 //! - a visible part of a rim is within a line's reach: a rim is an edge at which the sheet ends on
