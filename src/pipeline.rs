@@ -5,10 +5,10 @@
 //! too. The library calls [`draw`], which turns a mesh that is read already into a picture.
 //! [`inspect`] reports what is in a file and draws nothing.
 //!
-//! Invariant: nothing from here down reads a clock, a file or the environment, or knows an async
-//! runtime.
+//! Invariant: nothing from here down reads a file or the environment, or knows an async runtime. A
+//! clock is read to time the stages of drawing, and nothing depends on it.
 
-use crate::backend::{BackendKind, Backends, DrawError};
+use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes};
 use crate::encode::{self, EncodeError};
 use crate::image::{Image, ImageFormat};
 use crate::import::{self, Bundle, Format, Imported, MeshError};
@@ -47,8 +47,8 @@ pub fn render(
     ended(Stage::Encode);
 
     let warnings = [report.warnings, drawn.warnings].concat();
-    let Drawn { backend, skips, selection, .. } = drawn;
-    Ok(Output { bytes, format, backend, skips, warnings, selection })
+    let Drawn { backend, draw_times, skips, selection, .. } = drawn;
+    Ok(Output { bytes, format, backend, draw_times, skips, warnings, selection })
 }
 
 /// Draws a mesh that is in memory already, as often as wanted.
@@ -78,7 +78,8 @@ pub fn draw(
     warnings.extend(plan::undrawn_primitives(&scene));
     warnings.extend(plan::out_of_view(&plan));
     let selection = selected.as_ref().map(|selected| selected.selection.clone());
-    Ok(Drawn { image: drawn.image, backend: drawn.backend, skips: plan.skips, warnings, selection })
+    let (skips, Chosen { image, backend, draw_times }) = (plan.skips, drawn);
+    Ok(Drawn { image, backend, draw_times, skips, warnings, selection })
 }
 
 /// Reports what is in a file.
@@ -115,6 +116,8 @@ pub struct Output {
     pub format: ImageFormat,
     /// The back-end that drew it.
     pub backend: BackendKind,
+    /// The durations of the stages of drawing, as far as the back-end times them.
+    pub draw_times: DrawTimes,
     /// The parts of drawing that the plan leaves out, with reasons.
     pub skips: Vec<Skip>,
     /// Faults that the importer noticed, and parts of the request that do not go with the mesh.
@@ -130,6 +133,8 @@ pub struct Drawn {
     pub image: Image,
     /// The back-end that drew it.
     pub backend: BackendKind,
+    /// The durations of the stages of drawing, as far as the back-end times them.
+    pub draw_times: DrawTimes,
     /// The parts of drawing that the plan leaves out, with reasons.
     pub skips: Vec<Skip>,
     /// Parts of the request that do not go with the mesh.

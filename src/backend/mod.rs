@@ -11,6 +11,7 @@
 
 pub mod cpu;
 mod device;
+mod draw_times;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod host;
@@ -19,6 +20,7 @@ pub(crate) mod sample_partition;
 mod select;
 
 pub use device::{GpuDevice, GpuInfo, GpuKind, GpuState, GpuStatus, HardwareHint, Opener};
+pub use draw_times::{DrawStage, DrawTimes};
 pub use host::GpuHost;
 pub use select::{Backends, Chosen};
 
@@ -37,6 +39,11 @@ pub trait Renderer {
     /// complement of the triangle id in the lower (so that of equal depths the lowest id wins), 0
     /// where there is nothing.
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError>;
+
+    /// The durations of the last picture's stages, as far as this back-end times them.
+    fn draw_times(&self) -> DrawTimes {
+        DrawTimes::default()
+    }
 
     /// `cpu` or `gpu`.
     fn kind(&self) -> BackendKind;

@@ -7,7 +7,7 @@ use super::device::{GpuDevice, GpuKind, drop_catching_panics};
 #[cfg(feature = "gpu")]
 use super::gpu;
 use super::host::GpuHost;
-use super::{BackendKind, DrawError, Renderer, cpu};
+use super::{BackendKind, DrawError, DrawTimes, Renderer, cpu};
 use crate::image::Image;
 use crate::limits::Deadline;
 use crate::plan::DrawPlan;
@@ -28,6 +28,8 @@ pub struct Chosen {
     pub image: Image,
     /// The back-end that drew it.
     pub backend: BackendKind,
+    /// The durations of its stages, as far as the back-end times them.
+    pub draw_times: DrawTimes,
 }
 
 impl Backends {
@@ -84,7 +86,8 @@ impl Backends {
     }
 
     fn draw_on_cpu(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Chosen, DrawError> {
-        Ok(Chosen { image: self.cpu.draw(plan, deadline)?, backend: self.cpu.kind() })
+        let image = self.cpu.draw(plan, deadline)?;
+        Ok(Chosen { image, backend: self.cpu.kind(), draw_times: self.cpu.draw_times() })
     }
 
     /// Draws on the GPU; where that is lost, once more on a fresh one.
@@ -97,7 +100,7 @@ impl Backends {
                 image
             }
         };
-        Ok(Chosen { image, backend: BackendKind::Gpu })
+        Ok(Chosen { image, backend: BackendKind::Gpu, draw_times: DrawTimes::default() })
     }
 
     fn try_gpu(

@@ -3,8 +3,6 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use bytes::Bytes;
-
 use super::files;
 use crate::cli::error::CliError;
 use crate::import::{Bundle, BundleFile};
@@ -22,7 +20,7 @@ pub fn read(names: &[String], entry: Option<String>, limits: &Limits) -> Result<
         return Err(CliError::usage("`-`, standard input, can be given once"));
     }
     if let [single] = names {
-        let bytes = Bytes::from(files::read(single, limits.memory_bytes)?);
+        let bytes = files::read(single, limits.memory_bytes)?;
         if single == "-" {
             return Ok(Bundle::of_one(bytes).with_entry(entry));
         }

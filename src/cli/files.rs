@@ -1,33 +1,66 @@
 //! Reads and writes files; the name `-` means a standard stream.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, IsTerminal as _, Read, Write as _};
+use std::io::{self, ErrorKind, IsTerminal as _, Read as _, Seek as _, Write as _};
+
+use bytes::Bytes;
 
 use crate::cli::error::CliError;
 
+/// Files from this size on are read into large pages, bytes.
+const LARGE_BYTES: u64 = 4 << 20;
+
 /// Reads a whole file, or standard input for `-`, of at most `bytes_max`.
-pub fn read(name: &str, bytes_max: u64) -> Result<Vec<u8>, CliError> {
+pub fn read(name: &str, bytes_max: u64) -> Result<Bytes, CliError> {
     let failed = |error: io::Error| CliError::input(format!("{name}: cannot be read: {error}"));
+    let limit = bytes_max.saturating_add(1);
     let mut bytes = Vec::new();
-    let limited =
-        |reader: &mut dyn Read, bytes: &mut Vec<u8>| reader.take(bytes_max.saturating_add(1)).read_to_end(bytes);
     if name == "-" {
-        limited(&mut io::stdin().lock(), &mut bytes).map_err(failed)?;
+        io::stdin().lock().take(limit).read_to_end(&mut bytes).map_err(failed)?;
     } else {
         let mut file = File::open(name).map_err(failed)?;
         // One read into a buffer of the right size. The length is a hint: files may grow, and some
         // have none.
         let length = file.metadata().map_or(0, |metadata| metadata.len()).min(bytes_max);
+        if length >= LARGE_BYTES {
+            if let Some(bytes) = read_large(&mut file, length).map_err(failed)? {
+                return Ok(bytes);
+            }
+            file.rewind().map_err(failed)?;
+        }
         bytes
             .try_reserve_exact(usize::try_from(length).unwrap_or(0).saturating_add(1))
             .map_err(|_| CliError::input(format!("{name}: there is no memory for its {length} bytes")))?;
-        limited(&mut file, &mut bytes).map_err(failed)?;
+        file.take(limit).read_to_end(&mut bytes).map_err(failed)?;
     }
     if bytes.len() as u64 > bytes_max {
         let sentence = format!("{name}: is larger than {bytes_max} bytes (raise it with --limit-memory-bytes)");
         return Err(CliError::input(sentence));
     }
-    Ok(bytes)
+    Ok(bytes.into())
+}
+
+/// Reads a file of this length into large pages, where the system has them. None if it has none, or
+/// if the file has another length.
+#[cfg(target_os = "linux")]
+fn read_large(file: &mut File, length: u64) -> io::Result<Option<Bytes>> {
+    let Ok(length) = usize::try_from(length) else { return Ok(None) };
+    let Ok(mut pages) = memmap2::MmapMut::map_anon(length) else { return Ok(None) };
+    if pages.advise(memmap2::Advice::HugePage).is_err() {
+        return Ok(None);
+    }
+    match file.read_exact(&mut pages) {
+        Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(None),
+        other => other?,
+    }
+    let has_more = file.read(&mut [0])? > 0;
+    Ok((!has_more).then(|| Bytes::from_owner(pages)))
+}
+
+/// No system but Linux is asked for large pages.
+#[cfg(not(target_os = "linux"))]
+fn read_large(_file: &mut File, _length: u64) -> io::Result<Option<Bytes>> {
+    Ok(None)
 }
 
 /// Writes a whole file, or standard output for `-`.
@@ -55,5 +88,46 @@ pub fn print(bytes: &[u8]) -> Result<(), CliError> {
             Err(CliError::ours(format!("standard output cannot be written: {error}")))
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bytes that differ from page to page.
+    fn bytes_of(length: usize) -> Vec<u8> {
+        (0..length).map(|i| (i / 4096 + i) as u8).collect()
+    }
+
+    #[test]
+    fn files_of_all_sizes_are_read_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh");
+        let name = path.to_str().unwrap();
+        let large = LARGE_BYTES as usize;
+        let mut read_whole = 0;
+        for length in [0, 1, large - 1, large, large + 1, 3 * large + 12_345] {
+            let bytes = bytes_of(length);
+            std::fs::write(&path, &bytes).unwrap();
+            assert!(read(name, u64::MAX).unwrap() == bytes, "{length}");
+            assert!(read(name, length as u64).unwrap() == bytes, "{length} of as many");
+            assert_eq!(read(name, (length as u64).saturating_sub(1)).is_err(), length > 0, "{length} of one less");
+            read_whole += 1;
+        }
+        assert_eq!(read_whole, 6);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_file_of_another_length_is_not_read_into_large_pages() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh");
+        let bytes = bytes_of(1 << 20);
+        std::fs::write(&path, &bytes).unwrap();
+        let read_as = |length: u64| read_large(&mut File::open(&path).unwrap(), length).unwrap();
+        assert!(read_as(1 << 20).is_none_or(|read| read == bytes), "kernels may be built without large pages");
+        assert!(read_as((1 << 20) - 1).is_none(), "it has grown");
+        assert!(read_as((1 << 20) + 1).is_none(), "it has shrunk");
     }
 }

@@ -222,6 +222,11 @@ fn explain(output: &Output, gpu: &GpuStatus, times: &[(Stage, Duration)], total:
     }
     for (stage, took) in times {
         eprintln!("{:<6} {:9.3} ms", format!("{stage:?}").to_lowercase(), took.as_secs_f64() * 1e3);
+        if *stage == Stage::Render {
+            for (part, took) in output.draw_times.parts() {
+                eprintln!("  {:<10} {:9.3} ms", part.name(), took.as_secs_f64() * 1e3);
+            }
+        }
     }
     eprintln!("{:<6} {:9.3} ms", "total", total.as_secs_f64() * 1e3);
 }

@@ -17,6 +17,7 @@ mod isa;
 pub(super) mod lines;
 mod peeling;
 mod resolve;
+mod stopwatch;
 pub(super) mod surface;
 mod threads;
 mod vector;
@@ -32,8 +33,9 @@ use self::bands::bins::Bins;
 use self::bands::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, ScratchPool};
 use self::isa::LANES;
 use self::resolve::SrgbEncoder;
+use self::stopwatch::Stopwatch;
 use self::surface::flat::FlatColors;
-use super::{BackendKind, DrawError, Renderer};
+use super::{BackendKind, DrawError, DrawStage, DrawTimes, Renderer};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::image::Image;
 use crate::limits::Deadline;
@@ -50,6 +52,8 @@ pub struct CpuRenderer {
     scratch: ScratchPool,
     srgb: SrgbEncoder,
     flat: FlatColors,
+    /// Of the last picture.
+    draw_times: DrawTimes,
     /// True if no shortcuts are taken.
     is_plain: bool,
 }
@@ -61,6 +65,7 @@ pub struct RasterContext<'a> {
     /// The positions', then the hull's own.
     vertices: &'a [ScreenVertex],
     isa: Isa,
+    watch: &'a Stopwatch,
     srgb: &'a SrgbEncoder,
     /// The colour of each triangle, where every material is flat.
     flat: Option<&'a FlatColors>,
@@ -95,6 +100,7 @@ impl CpuRenderer {
             scratch: ScratchPool::default(),
             srgb: SrgbEncoder::new(),
             flat: FlatColors::default(),
+            draw_times: DrawTimes::default(),
             is_plain: false,
         }
     }
@@ -112,12 +118,18 @@ impl CpuRenderer {
         self.vertices.extend(own.iter().map(ScreenVertex::from));
     }
 
-    fn context<'a>(&'a self, plan: &'a DrawPlan<'a>, deadline: &'a Deadline) -> RasterContext<'a> {
+    fn context<'a>(
+        &'a self,
+        plan: &'a DrawPlan<'a>,
+        deadline: &'a Deadline,
+        watch: &'a Stopwatch,
+    ) -> RasterContext<'a> {
         RasterContext {
             plan,
             deadline,
             vertices: &self.vertices,
             isa: self.isa,
+            watch,
             srgb: &self.srgb,
             flat: None,
             is_plain: self.is_plain,
@@ -137,16 +149,21 @@ impl CpuRenderer {
         let threads = self.threads.clone();
         let share = threads.share();
         let pool = share.pool();
+        let watch = Stopwatch::default();
+        let mut lap = watch.begin();
         self.transform(plan, pool);
+        lap.end(DrawStage::Transform);
         let mut flat = std::mem::take(&mut self.flat);
-        let mut context = self.context(plan, deadline);
+        let mut context = self.context(plan, deadline, &watch);
         // As many bands at once as were paid for, or fewer.
         let mut banding = Banding::new(plan, threads.count());
         banding.at_once = banding.at_once.min(share.count);
         let drawn = bands::bins::bin(&context, pool, [banding.rows, banding.margin]).map(|bins| {
+            lap.end(DrawStage::Sort);
             if FlatColors::suffice(plan) && !context.is_plain {
                 flat.find(&context, pool, &bins.triangles);
                 context.flat = Some(&flat);
+                lap.end(DrawStage::FaceColors);
             }
             let row_len = out.len() / plan.height_px as usize;
             let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
@@ -157,6 +174,7 @@ impl CpuRenderer {
             });
         });
         self.flat = flat;
+        self.draw_times = watch.times(lap.end_untold());
         self.trim();
         drawn?;
         Ok(deadline.check()?)
@@ -242,6 +260,10 @@ impl Renderer for CpuRenderer {
         let mut words = vec![0_u64; plan.width_px as usize * plan.height_px as usize * plan.samples as usize];
         self.draw_bands(plan, deadline, &mut words, bands::draw_visibility)?;
         Ok(words)
+    }
+
+    fn draw_times(&self) -> DrawTimes {
+        self.draw_times
     }
 
     fn kind(&self) -> BackendKind {

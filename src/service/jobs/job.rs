@@ -9,7 +9,7 @@ use tokio::sync::watch;
 use uuid::Uuid;
 
 use super::upload_budget::Reservation;
-use crate::backend::BackendKind;
+use crate::backend::{BackendKind, DrawTimes};
 use crate::image::ImageFormat;
 use crate::import::{Bundle, Format};
 use crate::limits::Deadline;
@@ -104,13 +104,15 @@ pub struct Finished {
     pub selection: Option<QualitySelection>,
     /// The duration of each stage.
     pub timings: Timings,
+    /// The durations of the stages of drawing, as far as the back-end times them.
+    pub draw_times: DrawTimes,
 }
 
 impl Finished {
     /// Takes over the pipeline's output.
     pub fn new(output: Output, timings: Timings) -> Self {
-        let Output { bytes, format, backend, warnings, selection, .. } = output;
-        Self { picture: bytes.into(), format, backend, warnings, selection, timings }
+        let Output { bytes, format, backend, draw_times, warnings, selection, .. } = output;
+        Self { picture: bytes.into(), format, backend, warnings, selection, timings, draw_times }
     }
 }
 

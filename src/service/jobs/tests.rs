@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use super::*;
-use crate::backend::BackendKind;
+use crate::backend::{BackendKind, DrawTimes};
 use crate::image::ImageFormat;
 use crate::import::Bundle;
 use crate::limits::{Deadline, Stopped};
@@ -70,6 +70,7 @@ fn output(bytes: usize) -> Output {
         bytes: vec![7; bytes],
         format: ImageFormat::Png,
         backend: BackendKind::Cpu,
+        draw_times: DrawTimes::default(),
         skips,
         warnings,
         selection: None,

@@ -16,6 +16,7 @@ use self::scratch::BandScratch;
 use self::triangle_bins::{BandLists, TriangleBin};
 use super::isa::{LANES, dispatch};
 use super::{RasterContext, resolve};
+use crate::backend::DrawStage;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::batch::Batch;
 use crate::backend::cpu::geometry::nearest::Nearest;
@@ -44,7 +45,9 @@ const EDGES_PER_POLL: usize = 256;
 pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize, rgba: &mut [u8]) {
     let (plan, isa) = (context.plan, context.isa);
     let pixels = rgba.len() / 4;
+    let mut lap = context.watch.begin();
     fill_samples(context, scratch, bins, band);
+    lap.end(DrawStage::Visibility);
     scratch.colors.clear();
     scratch.colors.resize(pixels, [0.0; 4]);
     if let Some(pass) = plan.peeling() {
@@ -55,8 +58,13 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
     } else if plan.is_shaded() {
         shade_band(isa, context, &scratch.samples, &mut scratch.colors);
     }
-    draw_lines(context, scratch, bins, band);
+    lap.end(DrawStage::Shade);
+    if !plan.lines.is_empty() {
+        draw_lines(context, scratch, bins, band);
+        lap.end(DrawStage::Lines);
+    }
     resolve::resolve(isa, plan, context.srgb, &scratch.colors, rgba);
+    lap.end(DrawStage::Resolve);
 }
 
 /// Draws band number `band` of the visibility buffer alone, as

@@ -13,7 +13,10 @@ use crate::service::jobs::{Finished, Job};
 
 /// A picture, with its back-end, timings and warnings as headers.
 pub fn picture(finished: &Finished) -> Response {
-    let timings = finished.timings.parts().map(|(name, took)| format!("{name};dur={:.3}", took.as_secs_f64() * 1e3));
+    // The stages of drawing are parts of `render`.
+    let drawing = finished.draw_times.parts().map(|(stage, took)| (stage.name(), took));
+    let timings = finished.timings.parts().into_iter().chain(drawing);
+    let timings: Vec<_> = timings.map(|(name, took)| format!("{name};dur={:.3}", took.as_secs_f64() * 1e3)).collect();
     let headers = [
         (header::CONTENT_TYPE, HeaderValue::from_static(media_type(finished.format))),
         conditional::etag(&conditional::content_tag(&finished.picture)),

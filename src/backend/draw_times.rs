@@ -1,0 +1,57 @@
+//! How long each stage of drawing took, for reports.
+
+use std::time::Duration;
+
+/// A stage of drawing that is timed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DrawStage {
+    /// Vertices to the screen.
+    Transform,
+    /// Triangles and edges into bands of rows.
+    Sort,
+    /// Colours of whole faces.
+    FaceColors,
+    /// Triangles into samples.
+    Visibility,
+    /// Samples to colours.
+    Shade,
+    /// Edges over colours.
+    Lines,
+    /// Colours to bytes.
+    Resolve,
+}
+
+impl DrawStage {
+    /// All of them, in order.
+    pub const ALL: [Self; 7] =
+        [Self::Transform, Self::Sort, Self::FaceColors, Self::Visibility, Self::Shade, Self::Lines, Self::Resolve];
+
+    /// The word used in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Transform => "transform",
+            Self::Sort => "sort",
+            Self::FaceColors => "face_colors",
+            Self::Visibility => "visibility",
+            Self::Shade => "shade",
+            Self::Lines => "lines",
+            Self::Resolve => "resolve",
+        }
+    }
+}
+
+/// The duration of each stage of one picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DrawTimes([Duration; DrawStage::ALL.len()]);
+
+impl DrawTimes {
+    /// Adds to the duration of a stage.
+    pub fn add(&mut self, stage: DrawStage, took: Duration) {
+        self.0[stage as usize] += took;
+    }
+
+    /// The stages that took time, in order. None if nothing was timed.
+    pub fn parts(&self) -> impl Iterator<Item = (DrawStage, Duration)> {
+        DrawStage::ALL.into_iter().zip(self.0).filter(|(_, took)| !took.is_zero())
+    }
+}
