@@ -67,7 +67,7 @@ pub enum Task {
 #[derive(Debug)]
 pub enum Product {
     /// The outcome of [`Task::Draw`].
-    Picture(Output),
+    Picture(Box<Output>),
     /// The outcome of [`Task::Inspect`], as JSON.
     Report(String),
 }

@@ -111,7 +111,7 @@ fn fixture(settings: JobSettings) -> Fixture {
             ended(Stage::Parse);
             let output = fake_render(work, deadline, &gate)?;
             ended(Stage::Encode);
-            Ok(Product::Picture(output))
+            Ok(Product::Picture(Box::new(output)))
         })
     });
     Fixture { jobs: Jobs::start(settings, factory).unwrap(), budget: UploadBudget::new(1 << 20), open, renderers }

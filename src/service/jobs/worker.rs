@@ -41,7 +41,8 @@ pub fn pipeline_renderers(gpu: Arc<GpuHost>, threads: CpuThreads, limits: Limits
             match task {
                 Task::Draw(spec) => {
                     let job = pipeline::Job { bundle, format_in: *format_in, spec };
-                    pipeline::render(job, &mut backends, &limits, deadline, ended).map(Product::Picture)
+                    pipeline::render(job, &mut backends, &limits, deadline, ended)
+                        .map(|output| Product::Picture(Box::new(output)))
                 }
                 Task::Inspect { time_s } => {
                     let options = import::Options { format: *format_in, time_s: *time_s };
@@ -86,7 +87,7 @@ fn run_job(renderer: &mut Renderer, job: &Job, work: &Work, started: Instant) ->
         stage_began = now;
     });
     match result {
-        Ok(Product::Picture(output)) => JobState::Done(Arc::new(Finished::new(output, timings))),
+        Ok(Product::Picture(output)) => JobState::Done(Arc::new(Finished::new(*output, timings))),
         Ok(Product::Report(json)) => JobState::Inspected(json.into()),
         Err(error) => JobState::Failed(Arc::new(Failure::Render(error))),
     }

@@ -5,6 +5,7 @@
 //!     cargo bench --bench stages -- --mesh bunny.obj          # this mesh instead, as often as it is named
 //!     cargo bench --bench stages -- --threads 1 --rounds 50
 //!     cargo bench --bench stages -- --growth                  # time and memory against triangles, pixels, samples
+//!     cargo bench --bench stages -- --growth --write          # the same into docs/growth.md and docs/growth.svg
 //!     cargo bench --bench stages -- --gate                    # fails where a stage has become slower
 //!     cargo bench --bench stages -- --write                   # keeps today's ratios for the gate
 //!
@@ -17,6 +18,7 @@
 
 mod growth;
 mod meshes;
+mod plot;
 mod reference;
 mod rounds;
 
@@ -40,7 +42,10 @@ struct Options {
 fn main() -> ExitCode {
     let options = options();
     if options.growth {
-        growth::print(options.threads);
+        let (tables, plot) = growth::measure(options.threads);
+        if options.write {
+            write_growth(&tables, &plot, options.threads);
+        }
         return ExitCode::SUCCESS;
     }
     let meshes = if options.meshes.is_empty() {
@@ -81,6 +86,16 @@ fn print(rows: &[Row], threads: usize) {
     for row in rows {
         println!("| {} | {} | {:.3} | {:.3} | {} |", row.mesh, row.stage, row.ms, row.ratio, row.note);
     }
+}
+
+fn write_growth(tables: &str, plot: &str, threads: usize) {
+    let docs = concat!(env!("CARGO_MANIFEST_DIR"), "/docs");
+    let head = format!(
+        "# How cost grows\n\nMilliseconds on the CPU with {threads} threads, 512 x 512 px and 4 samples unless a row says otherwise; least \
+         of three. Measured by `cargo bench --bench stages -- --growth --write`.\n\n![time against triangles](growth.svg)\n"
+    );
+    std::fs::write(format!("{docs}/growth.md"), head + tables).unwrap();
+    std::fs::write(format!("{docs}/growth.svg"), plot).unwrap();
 }
 
 fn path() -> &'static str {

@@ -78,3 +78,51 @@ pub fn stl(torus: &Torus) -> Vec<u8> {
     }
     bytes
 }
+
+/// Squares behind each other, as OBJ.
+pub fn layers(count: usize) -> Vec<u8> {
+    let mut text = String::new();
+    for k in 0..count {
+        let z = k as f64 / count as f64;
+        writeln!(text, "v -1 -1 {z:.6}\nv 1 -1 {z:.6}\nv 1 1 {z:.6}\nv -1 1 {z:.6}\nf -4 -3 -2 -1").unwrap();
+    }
+    text.into_bytes()
+}
+
+/// Triangles as long as the picture and a thousandth of it wide, in all directions, as OBJ.
+pub fn needles(count: usize) -> Vec<u8> {
+    let mut text = String::new();
+    for k in 0..count {
+        let turn = k as f64 * 2.399_963;
+        let (x, y, z) = (turn.cos(), turn.sin(), (k as f64 * 0.618_034).fract() - 0.5);
+        writeln!(
+            text,
+            "v {x:.6} {y:.6} {z:.6}\nv {:.6} {:.6} {z:.6}\nv {:.6} {:.6} {:.6}\nf -3 -2 -1",
+            -x,
+            -y,
+            -x + 0.002 * y,
+            -y - 0.002 * x,
+            -z
+        )
+        .unwrap();
+    }
+    text.into_bytes()
+}
+
+/// Small triangles around the middle of one large one, as binary STL.
+pub fn specks(count: usize) -> Vec<u8> {
+    let mut bytes = vec![0; 80];
+    bytes.extend((count as u32 + 1).to_le_bytes());
+    let mut push = |corners: [[f32; 3]; 3]| {
+        bytes.extend([0; 12]);
+        corners.iter().flatten().for_each(|c| bytes.extend(c.to_le_bytes()));
+        bytes.extend([0; 2]);
+    };
+    push([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]]);
+    for k in 0..count {
+        let turn = k as f32 * 2.399_963;
+        let at = [turn.cos(), turn.sin(), (k as f32 * 0.618_034).fract()].map(|c| c * 1e-3);
+        push([at, [at[0] + 1e-4, at[1], at[2]], [at[0], at[1] + 1e-4, at[2] + 1e-4]]);
+    }
+    bytes
+}
