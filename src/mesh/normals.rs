@@ -1,18 +1,35 @@
 //! Vertex normals, for meshes that bring none.
 
+use rayon::prelude::*;
+
 use super::vector::{dot, sub};
+
+/// Memory that [`angle_weighted`] takes beside its result and a sum per position, bytes.
+pub fn working_bytes(triangles: usize) -> u64 {
+    (triangles.min(BLOCK) * size_of::<[f64; 3]>()) as u64
+}
 
 /// A unit normal per position: the mean of its faces' normals, each weighted by the angle of the
 /// face's corner there. So the normals do not depend on how a flat region was cut into triangles.
 pub fn angle_weighted(positions: &[[f32; 3]], triangles: &[[u32; 3]], face_normals: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let mut sums = vec![[0.0_f64; 3]; positions.len()];
-    for (triangle, normal) in triangles.iter().zip(face_normals) {
-        let normal = normal.map(f64::from);
-        let angles = corner_angles(triangle.map(|v| positions[v as usize].map(f64::from)));
-        for (&v, angle) in triangle.iter().zip(angles) {
-            let sum = &mut sums[v as usize];
-            for k in 0..3 {
-                sum[k] += normal[k] * angle;
+    let angles_of = |triangle: &[u32; 3]| corner_angles(triangle.map(|v| positions[v as usize].map(f64::from)));
+    // Angles are found by several threads, a block at a time. Sums keep the order of the triangles.
+    let mut angles = vec![[0.0; 3]; triangles.len().min(BLOCK)];
+    for (triangles, face_normals) in triangles.chunks(BLOCK).zip(face_normals.chunks(BLOCK)) {
+        let find = |(angles, triangle): (&mut [f64; 3], &[u32; 3])| *angles = angles_of(triangle);
+        if triangles.len() <= PIECE {
+            angles.iter_mut().zip(triangles).for_each(find);
+        } else {
+            angles.par_iter_mut().zip(triangles).with_min_len(PIECE).for_each(find);
+        }
+        for ((triangle, normal), angles) in triangles.iter().zip(face_normals).zip(&angles) {
+            let normal = normal.map(f64::from);
+            for (&v, angle) in triangle.iter().zip(angles) {
+                let sum = &mut sums[v as usize];
+                for k in 0..3 {
+                    sum[k] += normal[k] * angle;
+                }
             }
         }
     }
@@ -28,6 +45,11 @@ pub fn angle_weighted(positions: &[[f32; 3]], triangles: &[[u32; 3]], face_norma
     }
     normals
 }
+
+/// Triangles whose angles are kept at a time: 3 MiB.
+const BLOCK: usize = 1 << 17;
+/// Triangles that a thread does at least.
+const PIECE: usize = 1 << 12;
 
 /// The squared length, in radians, up to which a sum of weighted normals counts as cancelled: the
 /// rest is rounding.

@@ -27,6 +27,9 @@ impl UnionFind {
 
     /// Unites the sets of `a` and `b`. Returns whether they were different.
     pub fn unite(&mut self, a: u32, b: u32) -> bool {
+        if self.parent[a as usize] == self.parent[b as usize] {
+            return false;
+        }
         let (a, b) = (self.find(a), self.find(b));
         // No ranks are kept: taking the lower number keeps trees shallow for meshes in any usual
         // order.

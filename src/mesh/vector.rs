@@ -17,3 +17,28 @@ pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
+
+/// True if a position is not larger than another: `a <= b`, without branches, because the order of
+/// positions cannot be predicted.
+#[inline(always)]
+pub fn is_in_order([ax, ay, az]: [f32; 3], [bx, by, bz]: [f32; 3]) -> bool {
+    (ax < bx) | ((ax == bx) & ((ay < by) | ((ay == by) & (az <= bz))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_are_ordered_as_arrays_are() {
+        let values = [-1.0, -0.0, 0.0, 0.5];
+        let positions = || {
+            values
+                .into_iter()
+                .flat_map(move |x| values.into_iter().flat_map(move |y| values.into_iter().map(move |z| [x, y, z])))
+        };
+        for a in positions() {
+            assert!(positions().all(|b| is_in_order(a, b) == (a <= b)), "{a:?}");
+        }
+    }
+}

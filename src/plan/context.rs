@@ -1,6 +1,7 @@
 //! The state that the stages of one plan share: budget, deadline, skips, and the mesh's edges.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::PlanError;
 use super::edges::silhouettes::Silhouettes;
@@ -8,6 +9,7 @@ use super::skips::{SkipKind, Skips};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
+use crate::mesh::topology::{ORIENTATION_BYTES, Orientation, orientation};
 use crate::scene::Scene;
 
 /// Items that are worked through between two checks of the deadline.
@@ -40,6 +42,24 @@ impl<'c> PlanContext<'c> {
         let edges = Arc::new(EdgeList::of(mesh, self.budget)?);
         self.edges = Some(Arc::clone(&edges));
         Ok(edges)
+    }
+
+    /// The edges of the mesh, and its orientation if they are closed. Another thread may find the
+    /// orientation in the meantime.
+    pub fn edges_and_orientation(&mut self, mesh: &Mesh) -> Result<(Arc<EdgeList>, Option<Orientation>), PlanError> {
+        self.budget.spend("the orientation", mesh.positions.len() as u64, ORIENTATION_BYTES)?;
+        let is_done_and_open = AtomicBool::new(false);
+        let mut edges = || {
+            let edges = self.edges(mesh);
+            let is_closed = edges.as_ref().is_ok_and(|edges| edges.is_closed());
+            is_done_and_open.store(!is_closed, Ordering::Relaxed);
+            (edges, is_closed)
+        };
+        // Needless for open meshes, and so not begun once the mesh is known to be open.
+        let orientation = || (!is_done_and_open.load(Ordering::Relaxed)).then(|| orientation(mesh));
+        let ((edges, is_closed), orientation) =
+            if mesh.triangles.len() < CHECK_EVERY { (edges(), orientation()) } else { rayon::join(edges, orientation) };
+        Ok((edges?, orientation.filter(|_| is_closed)))
     }
 
     /// The edges of the mesh, and which of them may be silhouette edges. Contours and hulls share

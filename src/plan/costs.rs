@@ -4,6 +4,7 @@ use super::HullPass;
 use super::geometry::Geometry;
 use super::peeling::needed_pass;
 use crate::limits::{Budget, LimitExceeded};
+use crate::mesh::normals::working_bytes;
 use crate::scene::{MaterialGroups, Scene};
 use crate::spec::Shading;
 
@@ -42,6 +43,7 @@ pub fn spend_plan(scene: &Scene<'_, '_>, geometry: &Geometry<'_>, budget: &mut B
     let is_smooth = groups.styles.iter().any(|l| l.surface.is_some_and(|s| s.shading == Shading::Smooth));
     if is_smooth && mesh.normals.is_empty() {
         budget.spend("vertex normals", vertices, NORMAL_BYTES)?;
+        budget.spend("vertex normals", working_bytes(geometry.triangles.len()), 1)?;
     }
     Ok(())
 }

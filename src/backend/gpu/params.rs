@@ -208,7 +208,7 @@ pub fn corner_triangles<'a>(surface: &'a SurfacePass<'_>, own: &[[u32; 3]]) -> (
 /// The lists of edges of line passes, each once, and where each pass's begins when they lie one
 /// after the other.
 pub fn edge_lists(passes: &[LinePass]) -> (Vec<&[Edge]>, Vec<u32>) {
-    let mut lists: Vec<(&Arc<[Edge]>, u32)> = Vec::new();
+    let mut lists: Vec<(&Arc<Vec<Edge>>, u32)> = Vec::new();
     let mut next = 0_u32;
     let starts = passes.iter().map(|LinePass { edges, .. }| {
         if let Some((_, start)) = lists.iter().find(|(list, _)| Arc::ptr_eq(list, edges)) {

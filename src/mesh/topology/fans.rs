@@ -4,7 +4,7 @@
 //! a manifold surface has one fan; a vertex where two surfaces touch has two.
 
 use crate::mesh::Mesh;
-use crate::mesh::edges::{EdgeList, MeshEdge, NO_FACE};
+use crate::mesh::edges::{Edge, EdgeList};
 use crate::mesh::union_find::UnionFind;
 
 /// The fans of a mesh, as sets of triangle corners. Corner `3 t + i` is corner `i` of triangle `t`.
@@ -20,7 +20,7 @@ impl<'a> Fans<'a> {
     pub fn of(mesh: &'a Mesh, edges: &EdgeList) -> Self {
         let (triangles, vertices) = (&mesh.triangles, mesh.positions.len());
         let mut fans = Self { triangles, vertices, corners: UnionFind::new(triangles.len() * 3) };
-        for edge in edges.edges.iter().filter(|edge| edge.faces[1] != NO_FACE) {
+        for edge in edges.edges.iter().filter(|edge| edge.faces[1] != Edge::NO_FACE) {
             fans.unite(edge, edge.faces[1]);
         }
         for &[edge, face] in &edges.further_faces {
@@ -52,7 +52,7 @@ impl<'a> Fans<'a> {
     pub fn into_boundary_loops(mut self, edges: &EdgeList) -> u64 {
         let mut is_met = vec![false; self.triangles.len() * 3];
         let mut loops = 0;
-        for edge in edges.edges.iter().filter(|edge| edge.face_count == 1) {
+        for edge in edges.iter().filter(|edge| edge.face_count == 1) {
             let ends = edge.vertices.map(|vertex| self.corner(edge.faces[0], vertex));
             for end in ends {
                 let fan = self.corners.find(end) as usize;
@@ -64,7 +64,7 @@ impl<'a> Fans<'a> {
     }
 
     /// Unites the fans of the edge's first face and of `face`, at both ends of the edge.
-    fn unite(&mut self, edge: &MeshEdge, face: u32) {
+    fn unite(&mut self, edge: &Edge, face: u32) {
         for vertex in edge.vertices {
             self.corners.unite(self.corner(edge.faces[0], vertex), self.corner(face, vertex));
         }

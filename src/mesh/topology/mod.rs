@@ -59,12 +59,15 @@ const BYTES_PER_TRIANGLE: u64 = 3 * (4 + 1) + 4 + 4 + 1;
 /// Memory at the peak: the vertex's set and mark.
 const BYTES_PER_VERTEX: u64 = 4 + 1;
 
+/// Memory of [`orientation`] per vertex: its set, and a volume.
+pub const ORIENTATION_BYTES: u64 = 4 + 8;
+
 impl Topology {
     /// Finds the topology of `mesh`, whose edges are `edges`.
     pub fn of(mesh: &Mesh, edges: &EdgeList, budget: &mut Budget, deadline: &Deadline) -> Result<Self, Exhausted> {
         budget.spend("the topology", mesh.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
         budget.spend("the topology", mesh.positions.len() as u64, BYTES_PER_VERTEX)?;
-        let (_, components, vertices) = components(mesh);
+        let (components, vertices) = components(mesh);
         deadline.check()?;
         let duplicate_faces = duplicates(mesh);
         deadline.check()?;
@@ -74,21 +77,21 @@ impl Topology {
         let surfaces = Surfaces::of(mesh, edges, &mut fans);
         deadline.check()?;
         let count = |test: fn(u32, bool) -> bool| {
-            edges.edges.iter().filter(|e| test(e.face_count, e.has_inconsistent_winding)).count() as u64
+            edges.iter().filter(|e| test(e.face_count, e.has_inconsistent_winding)).count() as u64
         };
         Ok(Self {
             components,
-            edges: edges.edges.len() as u64,
+            edges: edges.len() as u64,
             open_edges: count(|faces, _| faces == 1),
             boundary_loops: fans.into_boundary_loops(edges),
             nonmanifold_edges: count(|faces, _| faces > 2),
             nonmanifold_vertices,
             duplicate_faces,
             inconsistent_edges: count(|faces, is_inconsistent| faces == 2 && is_inconsistent),
-            euler_characteristic: vertices as i64 - edges.edges.len() as i64 + mesh.triangles.len() as i64,
-            is_watertight: !edges.edges.is_empty() && edges.is_closed(),
+            euler_characteristic: vertices as i64 - edges.len() as i64 + mesh.triangles.len() as i64,
+            is_watertight: !edges.is_empty() && edges.is_closed(),
             is_orientable: surfaces.is_orientable,
-            genus: surfaces.genus().filter(|_| nonmanifold_vertices == 0 && !edges.edges.is_empty()),
+            genus: surfaces.genus().filter(|_| nonmanifold_vertices == 0 && !edges.is_empty()),
             closed_surfaces: surfaces.closed.into_iter().collect(),
         })
     }
@@ -107,8 +110,14 @@ pub enum Orientation {
 
 /// The orientation of a closed mesh, by the signed volume of each component: the sum of
 /// `a . (b x c)` over its faces.
+///
+/// The caller has spent [`ORIENTATION_BYTES`] for each vertex.
 pub fn orientation(mesh: &Mesh) -> Orientation {
-    let mut sets = components(mesh).0;
+    let mut sets = UnionFind::new(mesh.positions.len());
+    for t in &mesh.triangles {
+        sets.unite(t[0], t[1]);
+        sets.unite(t[0], t[2]);
+    }
     let mut volumes = vec![0.0_f64; mesh.positions.len()];
     for t in &mesh.triangles {
         let [a, b, c] = t.map(|v| mesh.positions[v as usize].map(f64::from));
@@ -123,9 +132,9 @@ pub fn orientation(mesh: &Mesh) -> Orientation {
     }
 }
 
-/// The vertices as sets that triangles connect, the number of these sets, and the number of
-/// vertices in them. Vertices of lines and points alone do not count.
-fn components(mesh: &Mesh) -> (UnionFind, u64, u64) {
+/// The number of sets of vertices that triangles connect, and the number of vertices in them.
+/// Vertices of lines and points alone do not count.
+fn components(mesh: &Mesh) -> (u64, u64) {
     let mut sets = UnionFind::new(mesh.positions.len());
     let mut is_met = vec![false; mesh.positions.len()];
     let (mut united, mut vertices) = (0, 0);
@@ -135,7 +144,7 @@ fn components(mesh: &Mesh) -> (UnionFind, u64, u64) {
             vertices += u64::from(!std::mem::replace(&mut is_met[v as usize], true));
         }
     }
-    (sets, vertices - united, vertices)
+    (vertices - united, vertices)
 }
 
 /// The number of faces with the vertices of an earlier face.

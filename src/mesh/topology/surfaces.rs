@@ -3,7 +3,7 @@
 
 use super::fans::Fans;
 use crate::mesh::Mesh;
-use crate::mesh::edges::{EdgeList, NO_FACE};
+use crate::mesh::edges::{Edge, EdgeList};
 use crate::mesh::union_find::ParityUnionFind;
 use std::collections::BTreeMap;
 
@@ -27,13 +27,13 @@ impl Surfaces {
     pub fn of(mesh: &Mesh, edges: &EdgeList, fans: &mut Fans<'_>) -> Self {
         let count = mesh.triangles.len();
         let mut faces = ParityUnionFind::new(count);
-        for edge in edges.edges.iter().filter(|edge| edge.face_count == 2) {
+        for edge in edges.iter().filter(|edge| edge.face_count == 2) {
             faces.unite(edge.faces[0], edge.faces[1], edge.has_inconsistent_winding);
         }
         // Euler characteristic and flags, at the representative face of each surface. Fans count as
         // vertices, because a surface that is cut apart at a vertex has that vertex twice.
         let (mut euler, mut flags) = (vec![0_i32; count], vec![0_u8; count]);
-        for edge in &edges.edges {
+        for edge in edges.iter() {
             let (surface, side) = faces.find(edge.faces[0]);
             if edge.face_count == 2 {
                 euler[surface as usize] -= 1;
@@ -41,7 +41,7 @@ impl Surfaces {
                 flags[surface as usize] |= if agrees { 0 } else { IS_ONE_SIDED };
             } else {
                 flags[surface as usize] |= IS_OPEN;
-                if edge.faces[1] != NO_FACE {
+                if edge.faces[1] != Edge::NO_FACE {
                     flags[faces.find(edge.faces[1]).0 as usize] |= IS_OPEN;
                 }
             }

@@ -4,4 +4,5 @@
 //! once.
 
 pub(crate) mod edge_class;
+pub(crate) mod select;
 pub(crate) mod silhouettes;

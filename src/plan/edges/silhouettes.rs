@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
-use crate::mesh::edges::EdgeList;
-use crate::mesh::topology::{Orientation, orientation};
+use crate::mesh::edges::{EdgeList, MeshEdge};
+use crate::mesh::topology::Orientation;
 use crate::mesh::vector::{cross, dot};
 use crate::plan::{Edge, Side};
 use crate::scene::{Fill, MaterialGroups};
@@ -14,7 +14,7 @@ use crate::spec::{Cull, Layers};
 /// Finds the faces that decide whether an edge is a silhouette edge. Of an edge's faces only those
 /// count that are drawn.
 pub struct Silhouettes {
-    /// By material: not drawn while others are, and without a hull.
+    /// By material: not drawn while others are, and without a hull. Empty where there is none.
     is_absent: Vec<bool>,
     /// All faces of the edges that have more than two.
     crowded: BTreeMap<u32, Vec<u32>>,
@@ -28,7 +28,10 @@ impl Silhouettes {
         budget.spend("materials", groups.material_count() as u64, 1)?;
         let has_fill = groups.has_fill();
         let is_absent = |m: usize| has_fill && groups.fill(m) == Fill::None && !groups.is_outlined(m);
-        let is_absent = (0..groups.material_count()).map(is_absent).collect();
+        let mut is_absent: Vec<bool> = (0..groups.material_count()).map(is_absent).collect();
+        if !is_absent.contains(&true) {
+            is_absent = Vec::new();
+        }
         let mut crowded: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for &[edge, face] in &list.further_faces {
             let first_two = list.edges[edge as usize].faces;
@@ -39,9 +42,10 @@ impl Silhouettes {
 
     /// The edge numbered `index` with the faces that decide whether it is a silhouette edge; None
     /// where no view makes it one.
-    pub fn edge(&self, mesh: &Mesh, index: u32, edge: Edge) -> Option<Edge> {
+    pub fn edge(&self, mesh: &Mesh, index: usize, edge: &MeshEdge) -> Option<Edge> {
         let is_drawn = |face: &u32| *face != Edge::NO_FACE && !self.is_absent(mesh, *face);
-        let faces = if let Some(all) = self.crowded.get(&index) {
+        let crowded = if edge.face_count > 2 { self.crowded.get(&(index as u32)) } else { None };
+        let faces = if let Some(all) = crowded {
             let faces: Vec<u32> = all.iter().copied().filter(is_drawn).collect();
             match faces[..] {
                 [] => [Edge::NO_FACE; 2],
@@ -53,11 +57,11 @@ impl Silhouettes {
             let [a, b] = edge.faces.map(|face| if is_drawn(&face) { face } else { Edge::NO_FACE });
             if a == Edge::NO_FACE { [b, a] } else { [a, b] }
         };
-        (faces[0] != Edge::NO_FACE).then_some(Edge { faces, ..edge })
+        (faces[0] != Edge::NO_FACE).then_some(Edge { vertices: edge.vertices, faces })
     }
 
     fn is_absent(&self, mesh: &Mesh, face: u32) -> bool {
-        self.is_absent.get(mesh.triangle_materials[face as usize] as usize) == Some(&true)
+        !self.is_absent.is_empty() && self.is_absent.get(mesh.triangle_materials[face as usize] as usize) == Some(&true)
     }
 }
 
@@ -97,13 +101,15 @@ fn least_axis(v: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|k| if Some(k) == least { 1.0 } else { 0.0 })
 }
 
-/// The side that no face shows: the inside of a closed, opaque surface that is seen from outside.
-pub fn unseen_side(mesh: &Mesh, groups: &MaterialGroups<'_>, list: &EdgeList) -> Option<Side> {
+/// True if a closed surface of these materials hides its inside.
+pub fn hides_inside(groups: &MaterialGroups<'_>) -> bool {
     let covers = if groups.has_fill() { Fill::Opaque } else { Fill::None };
-    if (0..groups.material_count()).any(|m| groups.fill(m) != covers) || !list.is_closed() {
-        return None;
-    }
-    let (unseen, culled) = match orientation(mesh) {
+    (0..groups.material_count()).all(|m| groups.fill(m) == covers)
+}
+
+/// The side that no face shows: the inside of a closed, opaque surface that is seen from outside.
+pub fn unseen_side(groups: &MaterialGroups<'_>, orientation: Orientation) -> Option<Side> {
+    let (unseen, culled) = match orientation {
         Orientation::Outward => (Side::Back, Cull::Front),
         Orientation::Inward => (Side::Front, Cull::Back),
         Orientation::Mixed => return None,

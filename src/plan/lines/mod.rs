@@ -3,6 +3,7 @@
 pub(crate) mod build;
 pub(crate) mod styles;
 
+pub use crate::mesh::edges::Edge;
 pub use build::passes;
 
 use std::sync::Arc;
@@ -12,8 +13,10 @@ use super::{DrawPlan, Faces, SurfacePass};
 /// Lines along edges, of one width and colour.
 #[derive(Clone, Debug)]
 pub struct LinePass {
-    /// Each edge once. Passes may share a list.
-    pub edges: Arc<[Edge]>,
+    /// Each edge once, with two of its faces. In a pass of all edges, [`Edge::NO_FACE`] also stands
+    /// for all but the first of more than two faces; in a contour those beside the widest gap are
+    /// kept. Passes may share a list.
+    pub edges: Arc<Vec<Edge>>,
     /// True if these are all edges of all triangles of the plan, and these are all opaque.
     pub is_complete: bool,
     /// Full width, pixels.
@@ -149,28 +152,4 @@ pub enum Shown {
     Visible,
     /// The parts that a surface hides.
     Hidden,
-}
-
-/// An edge and the two faces it belongs to.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Edge {
-    /// Indices into the plan's positions.
-    pub vertices: [u32; 2],
-    /// Triangle indices; [`Edge::NO_FACE`] where there is no second face. In a pass of all edges it
-    /// also stands for all but the first of more than two; in a contour those beside the widest gap
-    /// are kept.
-    pub faces: [u32; 2],
-}
-
-impl Edge {
-    /// No triangle.
-    pub const NO_FACE: u32 = u32::MAX;
-
-    /// An edge that runs from the smaller position to the larger, so that a line's bytes do not
-    /// depend on the order, the numbers and the winding of the faces that have the edge.
-    pub fn new(positions: &[[f32; 3]], [a, b]: [u32; 2], faces: [u32; 2]) -> Self {
-        let is_in_order = positions[a as usize] <= positions[b as usize];
-        Self { vertices: if is_in_order { [a, b] } else { [b, a] }, faces }
-    }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::mesh::Mesh;
-use crate::mesh::edges::{MeshEdge, NO_FACE};
+use crate::mesh::edges::{EdgeList, MeshEdge};
 use crate::plan::edges::edge_class::{Class, belongs_to, class_of, cos_deg};
 use crate::plan::peeling::FADE;
 use crate::plan::{Edge, LinePass, Shown, Side};
@@ -46,16 +46,28 @@ impl LineStyle {
         self.width_px + self.smoothing_px > 0.0 && self.color[3] > 0.0
     }
 
+    /// True if the style's lines are all edges of this list as they are.
+    pub fn takes_all(&self, list: &EdgeList) -> bool {
+        let is_all = match self.class {
+            Class::All => true,
+            Class::Polygon => list.has_polygon_edges_alone(),
+            _ => false,
+        };
+        // A contour and holes ask for other faces than the first two.
+        let takes_first_two = !self.contour && (list.further_faces.is_empty() || !self.has_all_edges);
+        is_all && self.styles.is_empty() && takes_first_two
+    }
+
     /// True if an edge has this style.
     pub fn draws(&self, mesh: &Mesh, groups: &MaterialGroups<'_>, edge: &MeshEdge) -> bool {
-        let mut faces = edge.faces.into_iter().filter(|&face| face != NO_FACE);
+        let mut faces = edge.faces.into_iter().filter(|&face| face != Edge::NO_FACE);
         let style = |face: u32| groups.style_of[mesh.triangle_materials[face as usize] as usize] as usize;
         let has_material = self.styles.is_empty() || faces.any(|face| self.styles[style(face)]);
         has_material && belongs_to(self.class, mesh, edge)
     }
 
     /// The passes that draw these edges, those of hidden parts first.
-    pub fn passes(&self, edges: &Arc<[Edge]>, hides: bool, unseen_side: Option<Side>) -> Vec<LinePass> {
+    pub fn passes(&self, edges: &Arc<Vec<Edge>>, hides: bool, unseen_side: Option<Side>) -> Vec<LinePass> {
         let pass = |shown, color| LinePass {
             edges: edges.clone(),
             is_complete: self.has_all_edges,

@@ -1,7 +1,7 @@
 //! The edges of each triangle that barycentric wires follow.
 
 use crate::mesh::Mesh;
-use crate::mesh::edges::{EdgeList, NO_FACE};
+use crate::mesh::edges::{Edge, EdgeList};
 use crate::plan::PlanError;
 use crate::plan::context::PlanContext;
 use crate::plan::edges::edge_class::{Class, belongs_to, class_of};
@@ -44,10 +44,10 @@ pub fn edge_masks(
 
 /// Sets the bits of edges that belong to their triangle's class, where that depends on neighbours.
 fn mark(mesh: &Mesh, list: &EdgeList, masks: &mut [u8], class_at: impl Fn(usize) -> Class) {
-    let first_two = list.edges.iter().flat_map(|edge| edge.faces.map(|face| (edge, face)));
-    let further = list.further_faces.iter().map(|&[edge, face]| (&list.edges[edge as usize], face));
-    for (edge, face) in first_two.chain(further).filter(|&(_, face)| face != NO_FACE) {
-        if belongs_to(class_at(face as usize), mesh, edge) {
+    let first_two = list.iter().flat_map(|edge| edge.faces.map(|face| (edge, face)));
+    let further = list.further_faces.iter().map(|&[edge, face]| (list.get(edge as usize), face));
+    for (edge, face) in first_two.chain(further).filter(|&(_, face)| face != Edge::NO_FACE) {
+        if belongs_to(class_at(face as usize), mesh, &edge) {
             masks[face as usize] |= corner_bit(&mesh.triangles[face as usize], edge.vertices);
         }
     }

@@ -31,7 +31,7 @@ const WIDTHS_PX: [f32; 9] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 8.0, 16.0];
 pub fn line_plan<'a>(positions: &'a [[f32; 3]], edges: &[[u32; 2]], width_px: f32) -> DrawPlan<'a> {
     let edges = edges.iter().map(|&vertices| Edge { vertices, faces: [Edge::NO_FACE; 2] });
     let pass = LinePass {
-        edges: edges.collect::<Arc<[Edge]>>(),
+        edges: Arc::new(edges.collect()),
         is_complete: false,
         width_px,
         smoothing_px: 0.0,

@@ -66,7 +66,7 @@ fn a_box_is_watertight_and_its_quads_stay_quads() {
     let topology = Topology::of(&mesh, &edges, &mut budget, &Deadline::default()).unwrap();
     assert_eq!((topology.components, topology.euler_characteristic, topology.is_watertight), (1, 2, true));
     assert_eq!((mesh.triangles.len(), topology.edges), (12, 18));
-    assert_eq!(edges.edges.iter().filter(|e| e.is_polygon_edge).count(), 12);
+    assert_eq!(edges.iter().filter(|e| e.is_polygon_edge).count(), 12);
     // Two units long becomes one: the scale is the next power of two.
     assert_eq!(mesh.to_file.scale, 2.0);
     assert_eq!(mesh.bounds, [[-0.25, -0.5, -0.125], [0.25, 0.5, 0.125]]);

@@ -220,7 +220,7 @@ mod tests {
             screen_up: axis,
             screen_right: axis,
         };
-        let (edges, shown) = (Arc::from([]), Shown::All);
+        let (edges, shown) = (Arc::default(), Shown::All);
         let pass = LinePass {
             edges,
             is_complete: false,

@@ -32,7 +32,7 @@ pub const LARGEST: Case =
     Case { size_px: [4096; 2], samples: 4, is_peeled: true, passes: 1, width_px: 1.0, shown: Shown::All, beyond: 0 };
 
 /// Some lines of a width, lit.
-pub fn lines(edges: Arc<[Edge]>, width_px: f32, shown: Shown) -> LinePass {
+pub fn lines(edges: Arc<Vec<Edge>>, width_px: f32, shown: Shown) -> LinePass {
     LinePass {
         edges,
         is_complete: false,
@@ -47,8 +47,8 @@ pub fn lines(edges: Arc<[Edge]>, width_px: f32, shown: Shown) -> LinePass {
 }
 
 /// A list of edges that do not matter.
-pub fn edges(count: u32) -> Arc<[Edge]> {
-    (0..count).map(|v| Edge { vertices: [v, v + 1], faces: [Edge::NO_FACE; 2] }).collect()
+pub fn edges(count: u32) -> Arc<Vec<Edge>> {
+    Arc::new((0..count).map(|v| Edge { vertices: [v, v + 1], faces: [Edge::NO_FACE; 2] }).collect())
 }
 
 /// A plan of these triangles, all clipped, under passes over one list of edges.

@@ -14,7 +14,7 @@ fn counts(obj: &str) -> [usize; 4] {
     let list = EdgeList::of(&mesh, &mut budget).unwrap();
     let limit = cos_deg(30.0);
     [Class::Feature(limit), Class::Crease(limit), Class::Boundary, Class::Nonmanifold]
-        .map(|class| list.edges.iter().filter(|edge| belongs_to(class, &mesh, edge)).count())
+        .map(|class| list.iter().filter(|edge| belongs_to(class, &mesh, edge)).count())
 }
 
 #[test]

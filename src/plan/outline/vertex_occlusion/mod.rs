@@ -8,9 +8,9 @@
 
 use std::f64::consts::TAU;
 
-use crate::limits::Stopped;
 use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
+use crate::plan::edges::select::select;
 use crate::plan::outline::EdgeEnd;
 use crate::plan::outline::silhouette_edges::ScreenMesh;
 use crate::plan::outline::sort::sort;
@@ -29,7 +29,7 @@ pub struct VertexOcclusion {
 }
 
 /// From one angle to a larger one, both from 0 to a whole turn.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::Zeroable)]
 struct Arc {
     vertex: u32,
     from: f64,
@@ -119,25 +119,16 @@ fn arcs(ends: &[EdgeEnd], view: &ScreenMesh<'_>, cx: &mut PlanContext<'_>) -> Re
     for end in ends {
         has_end[end.vertex as usize / 64] |= 1 << (end.vertex % 64);
     }
-    let each = |each: &mut dyn FnMut(Arc)| {
-        for (i, triangle) in view.mesh.triangles.iter().enumerate() {
-            if i % CHECK_EVERY == 0 {
-                cx.deadline.check()?;
-            }
-            let is_listed = |v: u32| has_end[v as usize / 64] >> (v % 64) & 1 == 1;
+    let is_listed = |v: u32| has_end[v as usize / 64] >> (v % 64) & 1 == 1;
+    select("an outline's corners", view.mesh.triangles.len(), cx, |range, found| {
+        for i in range {
+            let triangle = view.mesh.triangles[i];
             for k in (0..3).filter(|&k| is_listed(triangle[k])) {
                 let corners = [0, 1, 2].map(|j| triangle[(k + j) % 3]);
-                face_arcs(view, i as u32, corners).into_iter().flatten().for_each(&mut *each);
+                face_arcs(view, i as u32, corners).into_iter().flatten().for_each(&mut *found);
             }
         }
-        Ok::<(), Stopped>(())
-    };
-    let mut count = 0;
-    each(&mut |_| count += 1)?;
-    cx.budget.spend("an outline's corners", count, size_of::<Arc>() as u64)?;
-    let mut arcs = Vec::with_capacity(count as usize);
-    each(&mut |arc| arcs.push(arc))?;
-    Ok(arcs)
+    })
 }
 
 /// The arc that a face covers around its first corner, in two where it goes past a whole turn. None

@@ -72,7 +72,7 @@ fn concave_polygons_are_cut_inside() {
                 let area = area * mesh.to_file.scale * mesh.to_file.scale;
                 assert!((area.abs() - signed.abs()).abs() < 1e-5 * signed.abs(), "{area} {signed} {outline:?}");
                 // Every corner is joined to the next by an edge that is drawn.
-                let drawn = edges(&mesh).edges.iter().filter(|e| e.is_polygon_edge).count();
+                let drawn = edges(&mesh).iter().filter(|e| e.is_polygon_edge).count();
                 let bridges = usize::from(n == 10 && outline[0] == outline[4]);
                 assert_eq!(drawn, n - bridges, "{outline:?}");
                 cases += 1;
@@ -95,7 +95,7 @@ fn convex_quads_are_cut_along_the_shorter_diagonal() {
     };
     for first in 0..4 {
         let mesh = quad(first);
-        let hidden = edges(&mesh).edges.into_iter().find(|e| !e.is_polygon_edge).unwrap();
+        let hidden = edges(&mesh).iter().find(|e| !e.is_polygon_edge).unwrap();
         let [a, b] = hidden.vertices.map(|v| mesh.positions[v as usize]);
         assert_eq!((a[0] - b[0]).abs() * 4.0, 2.0, "from (3, 0) to (1, 1)");
     }

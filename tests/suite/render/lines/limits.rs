@@ -134,9 +134,9 @@ fn lines_of<'a>(
 ) -> DrawPlan<'a> {
     let mut plan = scenes::screen_plan([64, 48], 4, 1.0, positions, triangles);
     plan.projection.clip = clip;
-    let edges: Arc<[Edge]> = edges.into_iter().map(|vertices| Edge { vertices, faces: [0, Edge::NO_FACE] }).collect();
+    let edges = edges.into_iter().map(|vertices| Edge { vertices, faces: [0, Edge::NO_FACE] }).collect();
     let pass = LinePass {
-        edges,
+        edges: Arc::new(edges),
         is_complete: false,
         width_px: 1.5,
         smoothing_px: 0.0,

@@ -1,10 +1,11 @@
 //! The silhouette edges of a view: where surfaces end on screen, and on which side of each edge
 //! nothing is.
 
-use crate::limits::Stopped;
 use crate::mesh::Mesh;
-use crate::mesh::edges::EdgeList;
-use crate::plan::context::{CHECK_EVERY, PlanContext};
+use crate::mesh::edges::{EdgeList, MeshEdge};
+use crate::mesh::vector::is_in_order;
+use crate::plan::context::PlanContext;
+use crate::plan::edges::select::{map, select};
 use crate::plan::edges::silhouettes::Silhouettes;
 use crate::plan::projection::row_dot;
 use crate::plan::{Edge, PlanError, Projection};
@@ -12,7 +13,7 @@ use crate::scene::{Fill, MaterialGroups, Scene, Thickness};
 use crate::spec::Cull;
 
 /// An edge beside which an outline is drawn.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Zeroable)]
 pub struct SilhouetteEdge {
     /// Its ends.
     pub vertices: [u32; 2],
@@ -48,17 +49,9 @@ impl<'a> ScreenMesh<'a> {
         budget.spend("an outline", mesh.positions.len() as u64, size_of::<[f64; 3]>() as u64)?;
         budget.spend("an outline", mesh.triangles.len() as u64, 1)?;
         budget.spend("materials", groups.material_count() as u64, 1)?;
-        let mut places = Vec::with_capacity(mesh.positions.len());
-        for positions in mesh.positions.chunks(CHECK_EVERY) {
-            deadline.check()?;
-            let rows = [&projection.x, &projection.y, &projection.w];
-            places.extend(positions.iter().map(|p| rows.map(|row| row_dot(row, *p))));
-        }
-        let mut facings = Vec::with_capacity(mesh.triangles.len());
-        for triangles in mesh.triangles.chunks(CHECK_EVERY) {
-            deadline.check()?;
-            facings.extend(triangles.iter().map(|triangle| facing(mesh, &places, *triangle)));
-        }
+        let rows = [&projection.x, &projection.y, &projection.w];
+        let places = map(&mesh.positions, deadline, |p| rows.map(|row| row_dot(row, *p)))?;
+        let facings = map(&mesh.triangles, deadline, |triangle| facing(mesh, &places, *triangle))?;
         let culls = (0..groups.material_count()).map(|m| cull(groups, m)).collect();
         Ok(Self { mesh, projection, places, facing: facings, culls })
     }
@@ -71,27 +64,37 @@ impl<'a> ScreenMesh<'a> {
         silhouettes: &Silhouettes,
         cx: &mut PlanContext<'_>,
     ) -> Result<Vec<SilhouetteEdge>, PlanError> {
-        let each = |each: &mut dyn FnMut(SilhouetteEdge)| {
-            for (i, edge) in list.edges.iter().enumerate() {
-                if i % CHECK_EVERY == 0 {
-                    cx.deadline.check()?;
+        select("an outline's edges", list.len(), cx, |range, found| {
+            for i in range {
+                let edge = list.get(i);
+                if self.is_surely_inside(&edge) {
+                    continue;
                 }
-                let edge = Edge::new(&self.mesh.positions, edge.vertices, edge.faces);
-                let Some(edge) = silhouettes.edge(self.mesh, i as u32, edge) else { continue };
-                let faces = self.drawn(edge.faces);
-                let Some(material) = self.material(faces, outlines) else { continue };
-                for &free in self.free_sides(edge.vertices, faces) {
-                    each(SilhouetteEdge { vertices: edge.vertices, faces, free, material });
+                if let Some(edge) = silhouettes.edge(self.mesh, i, &edge) {
+                    self.each_side(&edge, outlines, found);
                 }
             }
-            Ok::<(), Stopped>(())
-        };
-        let mut count = 0;
-        each(&mut |_| count += 1)?;
-        cx.budget.spend("an outline's edges", count, size_of::<SilhouetteEdge>() as u64)?;
-        let mut found = Vec::with_capacity(count as usize);
-        each(&mut |edge| found.push(edge))?;
-        Ok(found)
+        })
+    }
+
+    /// Calls `each` with each side of an edge on which an outline is drawn.
+    fn each_side(&self, edge: &Edge, outlines: &[Option<Thickness>], each: &mut dyn FnMut(SilhouetteEdge)) {
+        let faces = self.drawn(edge.faces);
+        let Some(material) = self.material(faces, outlines) else { return };
+        for &free in self.free_sides(edge.vertices, faces) {
+            each(SilhouetteEdge { vertices: edge.vertices, faces, free, material });
+        }
+    }
+
+    /// True for most edges of a surface that are no silhouette edges: their two faces go on into each
+    /// other, show the same side, and both are drawn or neither is.
+    fn is_surely_inside(&self, edge: &MeshEdge) -> bool {
+        if edge.face_count != 2 || edge.has_inconsistent_winding {
+            return false;
+        }
+        let [a, b] = edge.faces.map(|face| face as usize);
+        let materials = &self.mesh.triangle_materials;
+        self.facing[a] == self.facing[b] && self.facing[a] != 0 && materials[a] == materials[b]
     }
 
     /// The side that a face shows: -1 its front, 1 its back, 0 neither. None where that side is
@@ -154,10 +157,9 @@ fn facing(mesh: &Mesh, places: &[[f64; 3]], triangle: [u32; 3]) -> i8 {
     let mut sorted = triangle;
     let mut is_even = true;
     for (i, j) in [(0, 1), (1, 2), (0, 1)] {
-        if mesh.positions[sorted[i] as usize] > mesh.positions[sorted[j] as usize] {
-            sorted.swap(i, j);
-            is_even = !is_even;
-        }
+        let is_swapped = !is_in_order(mesh.positions[sorted[i] as usize], mesh.positions[sorted[j] as usize]);
+        (sorted[i], sorted[j]) = if is_swapped { (sorted[j], sorted[i]) } else { (sorted[i], sorted[j]) };
+        is_even ^= is_swapped;
     }
     let [a, b, c] = sorted.map(|v| places[v as usize]);
     let (x, y, w) = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
@@ -165,3 +167,6 @@ fn facing(mesh: &Mesh, places: &[[f64; 3]], triangle: [u32; 3]) -> i8 {
     let sign = i8::from(volume > 0.0) - i8::from(volume < 0.0);
     if is_even { sign } else { -sign }
 }
+
+#[cfg(test)]
+mod tests;
