@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::bin::Bin;
 use super::triangle_bins::{TriangleBin, TrianglePass};
 use crate::backend::cpu::lines::contour;
-use crate::backend::cpu::lines::segment::Segment;
+use crate::backend::cpu::lines::segment::{PixelBox, Segment};
 use crate::backend::cpu::{CHUNK, RasterContext};
 use crate::limits::Stopped;
 use crate::plan::{DrawPlan, Faces, HullPass, LinePass, pass_mask};
@@ -32,12 +32,22 @@ pub struct EdgeBin {
     pub rims: Bin,
     /// The others.
     pub others: Bin,
+    /// The pixels around each edge of the chunk, from the first on; empty where the pass has no holes.
+    boxes: Vec<PixelBox>,
+    /// The chunk's first edge.
+    first: u32,
 }
 
 impl EdgeBin {
     /// True if the band has no edge.
     pub fn is_empty_in(&self, band: usize) -> bool {
         self.rims.items_in(band).chain(self.others.items_in(band)).next().is_none()
+    }
+
+    /// The pixels around an edge of the chunk, where the pass has holes.
+    #[inline(always)]
+    pub fn pixel_box(&self, edge: u32) -> Option<&PixelBox> {
+        self.boxes.get(edge.wrapping_sub(self.first) as usize)
     }
 }
 
@@ -102,8 +112,9 @@ fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
 
 fn bin_edges(context: &RasterContext<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> EdgeBin {
     let empty = || Bin::new(band_count(context.plan, rows), TALL_EDGE_BANDS);
-    let mut bin = EdgeBin { rims: empty(), others: empty() };
     let (reach, has_holes) = (pass.reach_px(), context.plan.has_holes_under(pass));
+    let boxes = vec![PixelBox::default(); if has_holes { range.len() } else { 0 }];
+    let mut bin = EdgeBin { rims: empty(), others: empty(), boxes, first: range.start as u32 };
     for i in range {
         let edge = &pass.edges[i];
         if !contour::is_drawn(context, pass, edge) {
@@ -113,6 +124,10 @@ fn bin_edges(context: &RasterContext<'_>, pass: &LinePass, rows: u32, range: Ran
             let [first, last] = segment.rows(reach, context.plan.height_px);
             if first <= last {
                 let bands = [first, last].map(|row| row as usize / rows as usize);
+                let first = bin.first as usize;
+                if let Some(place) = bin.boxes.get_mut(i - first) {
+                    *place = segment.pixel_box(reach);
+                }
                 let is_rim = has_holes && context.is_silhouette(edge);
                 let bin = if is_rim { &mut bin.rims } else { &mut bin.others };
                 bin.push(i as u32, bands);

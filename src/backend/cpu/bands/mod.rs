@@ -291,12 +291,16 @@ fn edges_kernel(
     let lists: [fn(&EdgeBin) -> &Bin; 2] = [|chunk| &chunk.rims, |chunk| &chunk.others];
     for (list, marks) in lists.into_iter().zip([true, false]) {
         drawer.marks = marks;
-        for (i, edge) in bins.iter().flat_map(|chunk| list(chunk).items_in(band)).enumerate() {
+        let listed = bins.iter().flat_map(|chunk| list(chunk).items_in(band).map(move |edge| (chunk, edge)));
+        for (i, (chunk, edge)) in listed.enumerate() {
             // An edge of a wide line is as much work as hundreds of others.
             if (i % EDGES_PER_POLL == 0 || drawer.is_poll_due()) && context.deadline.check().is_err() {
                 return;
             }
-            drawer.draw(&pass.edges[edge as usize], target);
+            // Most edges are far from all pixels with strokes.
+            if drawer.may_draw_in(chunk.pixel_box(edge), target) {
+                drawer.draw(&pass.edges[edge as usize], target);
+            }
         }
         target.holes.collect_marks();
     }

@@ -7,7 +7,7 @@
 
 use super::farthest::Farthest;
 use super::holes::Holes;
-use super::segment::{SLACK_PX, Segment, rows};
+use super::segment::{PixelBox, SLACK_PX, Segment, rows};
 use super::stroke::{self, Direction, Mask, Pen, Places};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
@@ -90,9 +90,6 @@ impl<'a> LineDrawer<'a> {
     /// Draws one edge.
     #[inline(always)]
     pub fn draw(&mut self, edge: &Edge, target: &mut LineTarget<'_>) {
-        if self.keeps_to_marks(target) && !self.is_near_marks(edge, target.holes) {
-            return;
-        }
         let Some(segment) = Segment::new(self.context, edge) else { return };
         let mut has_direction = false;
         let owner =
@@ -104,7 +101,9 @@ impl<'a> LineDrawer<'a> {
             let [a, b] = range.map(|t| segment.point(t));
             let [first, last] = rows(a[1], b[1], self.pen.reach, self.rows);
             if first > last
-                || (self.keeps_to_marks(target) && !self.may_touch_marks([a[0], b[0]], [first, last], target.holes))
+                || (windows > 1
+                    && self.keeps_to_marks(target)
+                    && !self.may_touch_marks([a[0], b[0]], [first, last], target.holes))
                 || !self.collect_intervals(edge, &segment, range)
             {
                 continue;
@@ -140,17 +139,16 @@ impl<'a> LineDrawer<'a> {
         holes.is_marked(pixel)
     }
 
-    /// False if no pixel in the box around an edge gets strokes: found without the edge's length.
+    /// False if no pixel in the box around an edge gets strokes: found without looking at the edge.
     #[inline(always)]
-    fn is_near_marks(&self, edge: &Edge, holes: &Holes) -> bool {
-        let [a, b] = edge.vertices.map(|v| &self.context.vertices[v as usize]);
-        if a.is_outside() || b.is_outside() {
+    pub fn may_draw_in(&self, pixels: Option<&PixelBox>, target: &LineTarget<'_>) -> bool {
+        if self.context.is_plain || !self.keeps_to_marks(target) {
             return true;
         }
-        let reach = ((self.pen.reach + SLACK_PX) * 256.0) as i32 + 1;
-        let half = self.band.size_px.map(|size| size as i32 * 128);
-        let pixels = |a: i32, b: i32, half: i32| [(a.min(b) + half - reach) >> 8, (a.max(b) + half + reach) >> 8];
-        holes.any_marked(pixels(a.x, b.x, half[0]), pixels(a.y, b.y, half[1]))
+        pixels.is_none_or(|pixels| {
+            let [columns, rows] = pixels.map(|range| range.map(i32::from));
+            target.holes.any_marked(columns, rows)
+        })
     }
 
     /// False if no pixel between these heights and around these places gets strokes.

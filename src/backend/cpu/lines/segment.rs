@@ -10,6 +10,9 @@ use crate::plan::Edge;
 /// Slack for roundings where only too much is harmless, pixels.
 pub const SLACK_PX: f32 = 0.05;
 
+/// First and last column, and first and last row.
+pub type PixelBox = [[i16; 2]; 2];
+
 /// An edge on screen.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment {
@@ -48,6 +51,18 @@ impl Segment {
     pub fn rows(&self, reach: f32, height_px: u32) -> [i32; 2] {
         let (a, b) = (self.start[1], self.start[1] + self.along[1]);
         rows(a, b, reach, [0, height_px as i32])
+    }
+
+    /// First and last column, and row, that a line of this reach may touch. They may lie beyond the
+    /// picture.
+    #[inline(always)]
+    pub fn pixel_box(&self, reach: f32) -> PixelBox {
+        let reach = reach + SLACK_PX;
+        std::array::from_fn(|k| {
+            let (a, b) = (self.start[k], self.start[k] + self.along[k]);
+            // Rounds towards zero, and no number is too large.
+            [(a.min(b) - reach) as i16, (a.max(b) + reach) as i16]
+        })
     }
 
     /// Ends, in 1/256 px from the picture's centre.
