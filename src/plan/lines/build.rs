@@ -39,8 +39,8 @@ pub fn passes(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<Lin
         let edges = source.edges(style, cx)?;
         if !edges.is_empty() {
             let drawn = style.passes(&edges, hides, unseen_side);
-            // Entries in the lists of up to four bands of the picture.
-            cx.budget.spend("lists of edges", (drawn.len() * edges.len()) as u64, 16)?;
+            // Entries in the lists of up to four bands of the picture, and a box of pixels.
+            cx.budget.spend("lists of edges", (drawn.len() * edges.len()) as u64, 16 + 8)?;
             passes.extend(drawn);
         }
     }
