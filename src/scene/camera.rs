@@ -206,6 +206,8 @@ impl ExtentLanes {
         minus: [[f64::NEG_INFINITY; LANES]; 2],
     };
 
+    // Loops over lanes and axes walk several arrays at once; an index says that best.
+    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn add(&mut self, block: &[[f32; 3]; LANES], axes: [DVec3; 3], slopes: DVec2) {
         // Not `f64::min` and `max`, which look for NaN.

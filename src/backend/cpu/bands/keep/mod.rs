@@ -279,7 +279,8 @@ mod tests {
             for margin in [0, 5] {
                 let all = is_kept_alike(samples, margin, Vec::new());
                 assert!(all.iter().all(|&count| count > 50), "{all:?}");
-                let mask = |i: u32| (i % 3 != 0) as u8 * pass_mask::SURFACE | (i % 5 == 0) as u8 * pass_mask::BACK_ONLY;
+                let drawn = |i: u32| if i.is_multiple_of(3) { 0 } else { pass_mask::SURFACE };
+                let mask = |i: u32| if i.is_multiple_of(5) { drawn(i) | pass_mask::BACK_ONLY } else { drawn(i) };
                 let some = is_kept_alike(samples, margin, (0..1499).map(mask).collect());
                 assert!((0..3).all(|k| some[k] > 20 && some[k] < all[k]), "{some:?} of {all:?}");
             }
