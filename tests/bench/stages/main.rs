@@ -5,6 +5,7 @@
 //!     cargo bench --bench stages -- --mesh bunny.obj          # this mesh instead, as often as it is named
 //!     cargo bench --bench stages -- --threads 1 --rounds 50
 //!     cargo bench --bench stages -- --growth                  # time and memory against triangles, pixels, samples
+//!     cargo bench --bench stages -- --fill                  # triangles and samples a second, one thread
 //!     cargo bench --bench stages -- --gate                    # fails where a stage has become slower
 //!     cargo bench --bench stages -- --write                   # keeps today's ratios for the gate
 //!
@@ -15,6 +16,7 @@
 // A tool for developers: giving up loudly is fine.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod fill;
 mod growth;
 mod meshes;
 mod reference;
@@ -35,10 +37,15 @@ struct Options {
     gate: bool,
     write: bool,
     growth: bool,
+    fill: bool,
 }
 
 fn main() -> ExitCode {
     let options = options();
+    if options.fill {
+        fill::print();
+        return ExitCode::SUCCESS;
+    }
     if options.growth {
         growth::print(options.threads);
         return ExitCode::SUCCESS;
@@ -58,7 +65,8 @@ fn main() -> ExitCode {
 
 fn options() -> Options {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut options = Options { meshes: Vec::new(), threads, rounds: 15, gate: false, write: false, growth: false };
+    let mut options =
+        Options { meshes: Vec::new(), threads, rounds: 15, gate: false, write: false, growth: false, fill: false };
     let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
     while let Some(name) = arguments.next() {
         let mut value = || arguments.next().unwrap_or_else(|| panic!("{name} lacks its value"));
@@ -69,6 +77,7 @@ fn options() -> Options {
             "--gate" => options.gate = true,
             "--write" => options.write = true,
             "--growth" => options.growth = true,
+            "--fill" => options.fill = true,
             other => panic!("{other} is unknown: see the top of tests/bench/stages/main.rs"),
         }
     }
