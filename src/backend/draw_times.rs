@@ -13,7 +13,7 @@ pub enum DrawStage {
     FaceColors,
     /// Triangles into samples.
     Visibility,
-    /// Samples to colours.
+    /// Samples to colours; where no line is drawn over faces of one colour each, to bytes too.
     Shade,
     /// Edges over colours.
     Lines,

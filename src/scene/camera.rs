@@ -62,14 +62,15 @@ impl Camera {
             (None, Some(eye), Some(target)) => explicit_axes(mesh, up, eye, target),
             _ => (named_axes(spec, up), None),
         };
-        let extents = Extents::new(mesh, axes);
+        let slopes = tangents * inner;
+        let extents = Extents::new(mesh, axes, slopes);
         let mut camera = match (spec.projection, explicit) {
             (Kind::Perspective, Some((target, distance))) => {
                 let to = DVec2::new(axes[0].dot(target), axes[1].dot(target));
                 Self::new(axes, to, axes[2].dot(target) + distance, tangents, Kind::Perspective)
             }
             (Kind::Perspective, None) => {
-                let (center, distance) = fit_perspective(mesh, axes, tangents * inner, border.grow);
+                let (center, distance) = extents.fit_perspective(slopes, border.grow);
                 Self::new(axes, center, distance, tangents, Kind::Perspective)
             }
             (Kind::Orthographic, _) => {
@@ -131,20 +132,40 @@ impl Camera {
     }
 }
 
+/// Vertices that are looked at side by side.
+const LANES: usize = 4;
+
 /// Bounds of the mesh in camera axes.
 struct Extents {
     low: DVec3,
     high: DVec3,
+    /// Largest `across + slope z`, and `slope z - across`, of the view pyramid's slopes.
+    plus: DVec2,
+    minus: DVec2,
 }
 
 impl Extents {
-    fn new(mesh: &Mesh, axes: [DVec3; 3]) -> Self {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for p in positions(mesh, axes) {
-            low = low.min(p);
-            high = high.max(p);
+    fn new(mesh: &Mesh, axes: [DVec3; 3], slopes: DVec2) -> Self {
+        let Some(&first) = mesh.positions.first() else {
+            let nothing = DVec2::NEG_INFINITY;
+            return Self { low: DVec3::ZERO, high: DVec3::ZERO, plus: nothing, minus: nothing };
+        };
+        let mut lanes = ExtentLanes::EMPTY;
+        let (blocks, rest) = mesh.positions.as_chunks();
+        for block in blocks {
+            lanes.add(block, axes, slopes);
         }
-        if mesh.positions.is_empty() { Self { low: DVec3::ZERO, high: DVec3::ZERO } } else { Self { low, high } }
+        let mut last = [first; LANES];
+        last[..rest.len()].copy_from_slice(rest);
+        lanes.add(&last, axes, slopes);
+        let least = |v: [f64; LANES]| v.into_iter().fold(f64::INFINITY, f64::min);
+        let most = |v: [f64; LANES]| v.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        Self {
+            low: DVec3::from(lanes.low.map(least)),
+            high: DVec3::from(lanes.high.map(most)),
+            plus: DVec2::from(lanes.plus.map(most)),
+            minus: DVec2::from(lanes.minus.map(most)),
+        }
     }
 
     fn center(&self) -> DVec2 {
@@ -154,32 +175,61 @@ impl Extents {
     fn half(&self) -> DVec2 {
         ((self.high - self.low) * 0.5).truncate()
     }
+
+    /// Centre and distance at which the mesh, grown by `grow`, touches the pyramid of these slopes.
+    fn fit_perspective(&self, slopes: DVec2, grow: f64) -> (DVec2, f64) {
+        let Self { plus, minus, .. } = *self;
+        if plus == DVec2::NEG_INFINITY {
+            return (DVec2::ZERO, 1.0);
+        }
+        let lean = DVec2::new((1.0 + slopes.x * slopes.x).sqrt(), (1.0 + slopes.y * slopes.y).sqrt()) * grow;
+        let distance = ((plus + minus + 2.0 * lean) / (2.0 * slopes)).max_element();
+        // A mesh seen as a point or a line would give no distance at all, and a very wide view hardly
+        // any.
+        ((plus - minus) * 0.5, distance.max(self.high.z + grow + 1e-3))
+    }
 }
 
-fn positions(mesh: &Mesh, axes: [DVec3; 3]) -> impl Iterator<Item = DVec3> {
-    mesh.positions.iter().map(move |p| {
-        let p = DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
-        DVec3::new(axes[0].dot(p), axes[1].dot(p), axes[2].dot(p))
-    })
+/// The bounds of every fourth vertex.
+struct ExtentLanes {
+    low: [[f64; LANES]; 3],
+    high: [[f64; LANES]; 3],
+    plus: [[f64; LANES]; 2],
+    minus: [[f64; LANES]; 2],
 }
 
-/// Centre and distance at which the mesh, grown by `grow`, touches the pyramid of these slopes.
-fn fit_perspective(mesh: &Mesh, axes: [DVec3; 3], slopes: DVec2, grow: f64) -> (DVec2, f64) {
-    let (mut plus, mut minus, mut nearest) = (DVec2::NEG_INFINITY, DVec2::NEG_INFINITY, f64::NEG_INFINITY);
-    for p in positions(mesh, axes) {
-        let across = p.truncate();
-        plus = plus.max(across + slopes * p.z);
-        minus = minus.max(slopes * p.z - across);
-        nearest = nearest.max(p.z);
+impl ExtentLanes {
+    const EMPTY: Self = Self {
+        low: [[f64::INFINITY; LANES]; 3],
+        high: [[f64::NEG_INFINITY; LANES]; 3],
+        plus: [[f64::NEG_INFINITY; LANES]; 2],
+        minus: [[f64::NEG_INFINITY; LANES]; 2],
+    };
+
+    // Loops over lanes and axes walk several arrays at once; an index says that best.
+    #[allow(clippy::needless_range_loop)]
+    #[inline(always)]
+    fn add(&mut self, block: &[[f32; 3]; LANES], axes: [DVec3; 3], slopes: DVec2) {
+        // Not `f64::min` and `max`, which look for NaN.
+        let min = |a: f64, b: f64| if a < b { a } else { b };
+        let max = |a: f64, b: f64| if a > b { a } else { b };
+        let (slopes, mut p) = ([slopes.x, slopes.y], [[0.0; LANES]; 3]);
+        for k in 0..3 {
+            for l in 0..LANES {
+                let [x, y, z] = [f64::from(block[l][0]), f64::from(block[l][1]), f64::from(block[l][2])];
+                p[k][l] = (axes[k].x * x + axes[k].y * y) + axes[k].z * z;
+                self.low[k][l] = min(p[k][l], self.low[k][l]);
+                self.high[k][l] = max(p[k][l], self.high[k][l]);
+            }
+        }
+        for k in 0..2 {
+            for l in 0..LANES {
+                let lean = slopes[k] * p[2][l];
+                self.plus[k][l] = max(p[k][l] + lean, self.plus[k][l]);
+                self.minus[k][l] = max(lean - p[k][l], self.minus[k][l]);
+            }
+        }
     }
-    if mesh.positions.is_empty() {
-        return (DVec2::ZERO, 1.0);
-    }
-    let lean = DVec2::new((1.0 + slopes.x * slopes.x).sqrt(), (1.0 + slopes.y * slopes.y).sqrt()) * grow;
-    let distance = ((plus + minus + 2.0 * lean) / (2.0 * slopes)).max_element();
-    // A mesh seen as a point or a line would give no distance at all, and a very wide view hardly
-    // any.
-    ((plus - minus) * 0.5, distance.max(nearest + grow + 1e-3))
 }
 
 type Explicit = Option<(DVec3, f64)>;

@@ -4,8 +4,8 @@
 //! once per instruction set. Rust neither fuses nor reorders floating-point operations, so all give
 //! the same bytes; only the speed differs.
 //!
-//! The innermost steps of triangles are an exception: they have a second version in AVX2 instructions
-//! (`geometry/batch_avx2.rs`).
+//! The innermost steps of triangles are an exception: they have a second version in AVX2 instructions,
+//! in files whose names end so.
 //!
 //! To add an instruction set (AVX-512, NEON): a variant of `Level` under its `cfg`, a list of
 //! features beside [`for_avx2_features`], a constructor that detects all of them, and an arm in

@@ -25,6 +25,7 @@ mod vector;
 pub use isa::Isa;
 pub use threads::DrawingThreads;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -220,6 +221,17 @@ impl RasterContext<'_> {
             (None, Some(hull)) => hull.triangles[id - self.plan.triangles.len()],
             (None, None) => [0; 3],
         }
+    }
+
+    /// Vertex indices of the triangles with these ids; None if they are not all of the mesh or all
+    /// of the outline mesh.
+    fn triangles_of(&self, ids: &Range<usize>) -> Option<&[[u32; 3]]> {
+        let own: &[[u32; 3]] = &self.plan.triangles;
+        let from_hull = || {
+            let first = ids.start.checked_sub(own.len())?;
+            self.plan.hull.as_ref()?.triangles.get(first..ids.end - own.len())
+        };
+        own.get(ids.clone()).or_else(from_hull)
     }
 
     /// Vertex indices of eight triangles.

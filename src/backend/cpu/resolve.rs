@@ -44,6 +44,29 @@ impl SrgbEncoder {
         let byte = self.bytes[cell];
         byte + u8::from(self.thresholds[usize::from(byte)] <= v)
     }
+
+    /// As [`encode`](Self::encode) of three channels each, with 255 for alpha.
+    #[inline(always)]
+    fn encode_opaque(&self, colors: &[[f32; 4]; LANES], out: &mut [[u8; 4]; LANES]) {
+        let (mut values, mut cells) = ([[0.0; 4]; LANES], [[0; 4]; LANES]);
+        for l in 0..LANES {
+            for k in 0..4 {
+                let v = colors[l][k];
+                let v = if v > 0.0 { v } else { 0.0 };
+                let v = if v < 1.0 { v } else { 1.0 };
+                values[l][k] = v;
+                cells[l][k] = (v * CELLS as f32 + 8_388_608.0).to_bits() % INDICES as u32;
+            }
+        }
+        for l in 0..LANES {
+            let mut pixel = [u8::MAX; 4];
+            for k in 0..3 {
+                let byte = self.bytes[cells[l][k] as usize];
+                pixel[k] = byte + u8::from(self.thresholds[usize::from(byte)] <= values[l][k]);
+            }
+            out[l] = pixel;
+        }
+    }
 }
 
 /// True if alpha is negative: lines have already blended the background into this colour. Otherwise
@@ -67,30 +90,68 @@ dispatch! {
 
 #[inline(always)]
 fn resolve_kernel(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], rgba: &mut [u8]) {
-    let mut last = Last::of([0.0; 4], plan, srgb);
-    let (groups, rest) = colors.as_chunks::<LANES>();
+    let mut resolver = Resolver::new(plan, srgb);
     let (pixels, _) = rgba.as_chunks_mut::<4>();
-    let (outs, rest_out) = pixels.split_at_mut(groups.len() * LANES);
-    for (group, out) in groups.iter().zip(outs.chunks_exact_mut(LANES)) {
+    for (group, out) in colors.chunks(LANES).zip(pixels.chunks_mut(LANES)) {
+        resolver.resolve(group, out);
+    }
+}
+
+/// Resolves groups of pixels.
+pub struct Resolver<'a> {
+    plan: &'a DrawPlan<'a>,
+    srgb: &'a SrgbEncoder,
+    last: Last,
+}
+
+impl<'a> Resolver<'a> {
+    /// One for a band.
+    #[inline(always)]
+    pub fn new(plan: &'a DrawPlan<'a>, srgb: &'a SrgbEncoder) -> Self {
+        Self { plan, srgb, last: Last::of([0.0; 4], plan, srgb) }
+    }
+
+    /// The bytes of a colour.
+    #[inline(always)]
+    pub fn pixel(&self, color: [f32; 4]) -> [u8; 4] {
+        resolve_pixel(self.plan, self.srgb, color)
+    }
+
+    /// Resolves up to [`LANES`] neighbours of which some differ.
+    #[inline(always)]
+    pub fn mixed(&self, colors: &[[f32; 4]; LANES], out: &mut [[u8; 4]]) {
+        match out.first_chunk_mut() {
+            Some(out) if are_opaque(colors) => self.srgb.encode_opaque(colors, out),
+            _ => {
+                for (&c, out) in colors.iter().zip(out) {
+                    *out = resolve_pixel(self.plan, self.srgb, c);
+                }
+            }
+        }
+    }
+
+    /// Resolves up to [`LANES`] neighbours.
+    #[inline(always)]
+    pub fn resolve(&mut self, colors: &[[f32; 4]], out: &mut [[u8; 4]]) {
+        let (Some(group), Some(pixels)) = (colors.first_chunk(), out.first_chunk_mut()) else {
+            for (&c, out) in colors.iter().zip(out) {
+                *out = resolve_pixel(self.plan, self.srgb, c);
+            }
+            return;
+        };
         // Neighbours are often the same colour to the bit: large flat faces, the background.
-        if last.is_all(group) {
-            out.fill(last.pixel);
-            continue;
+        if self.last.is_all(group) {
+            pixels.fill(self.last.pixel);
+            return;
         }
         if are_opaque(group) {
-            for (&[r, g, b, _], out) in group.iter().zip(&mut *out) {
-                *out = [srgb.encode(r), srgb.encode(g), srgb.encode(b), 255];
+            self.srgb.encode_opaque(group, pixels);
+        } else {
+            for (&c, out) in group.iter().zip(&mut *pixels) {
+                *out = resolve_pixel(self.plan, self.srgb, c);
             }
-            last = Last { bits: group[LANES - 1].map(f32::to_bits), pixel: out[LANES - 1] };
-            continue;
         }
-        for (&c, out) in group.iter().zip(&mut *out) {
-            *out = resolve_pixel(plan, srgb, c);
-        }
-        last = Last { bits: group[LANES - 1].map(f32::to_bits), pixel: out[LANES - 1] };
-    }
-    for (&c, out) in rest.iter().zip(rest_out) {
-        *out = resolve_pixel(plan, srgb, c);
+        self.last = Last { bits: group[LANES - 1].map(f32::to_bits), pixel: pixels[LANES - 1] };
     }
 }
 
@@ -160,6 +221,11 @@ mod tests {
             let v = i as f32 / (8 * CELLS) as f32;
             assert_eq!(encoder.encode(v), thresholds.partition_point(|&t| t <= v) as u8, "{v}");
         }
+        let group: [[f32; 4]; LANES] = std::array::from_fn(|l| [0, 1, 2, 3].map(|k| thresholds[8 * (4 * l + k) % 255]));
+        let mut pixels = [[0; 4]; LANES];
+        encoder.encode_opaque(&group, &mut pixels);
+        let want = group.map(|[r, g, b, _]| [encoder.encode(r), encoder.encode(g), encoder.encode(b), 255]);
+        assert_eq!(pixels, want);
         let odd = [-1.0, -0.0, f32::NAN, f32::NEG_INFINITY, 1.0, 7.0, f32::INFINITY];
         assert_eq!(odd.map(|v| encoder.encode(v)), [0, 0, 0, 0, 255, 255, 255]);
     }

@@ -6,6 +6,7 @@
 //!     cargo bench --bench stages -- --threads 1 --rounds 50
 //!     cargo bench --bench stages -- --growth                  # time and memory against triangles, pixels, samples
 //!     cargo bench --bench stages -- --growth --write          # the same into docs/growth.md and docs/growth.svg
+//!     cargo bench --bench stages -- --fill                  # triangles and samples a second, one thread
 //!     cargo bench --bench stages -- --gate                    # fails where a stage has become slower
 //!     cargo bench --bench stages -- --write                   # keeps today's ratios for the gate
 //!
@@ -16,6 +17,7 @@
 // A tool for developers: giving up loudly is fine.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod fill;
 mod growth;
 mod meshes;
 mod plot;
@@ -37,10 +39,15 @@ struct Options {
     gate: bool,
     write: bool,
     growth: bool,
+    fill: bool,
 }
 
 fn main() -> ExitCode {
     let options = options();
+    if options.fill {
+        fill::print();
+        return ExitCode::SUCCESS;
+    }
     if options.growth {
         let (tables, plot) = growth::measure(options.threads);
         if options.write {
@@ -63,7 +70,8 @@ fn main() -> ExitCode {
 
 fn options() -> Options {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut options = Options { meshes: Vec::new(), threads, rounds: 15, gate: false, write: false, growth: false };
+    let mut options =
+        Options { meshes: Vec::new(), threads, rounds: 15, gate: false, write: false, growth: false, fill: false };
     let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
     while let Some(name) = arguments.next() {
         let mut value = || arguments.next().unwrap_or_else(|| panic!("{name} lacks its value"));
@@ -74,6 +82,7 @@ fn options() -> Options {
             "--gate" => options.gate = true,
             "--write" => options.write = true,
             "--growth" => options.growth = true,
+            "--fill" => options.fill = true,
             other => panic!("{other} is unknown: see the top of tests/bench/stages/main.rs"),
         }
     }

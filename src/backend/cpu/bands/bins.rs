@@ -5,7 +5,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::bin::Bin;
-use super::triangle_bins::{TriangleBin, TrianglePass};
+use super::keep::TrianglePass;
+use super::triangle_bins::TriangleBin;
 use crate::backend::cpu::lines::contour;
 use crate::backend::cpu::lines::segment::{PixelBox, Segment};
 use crate::backend::cpu::{CHUNK, RasterContext};

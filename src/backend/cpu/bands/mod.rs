@@ -5,6 +5,8 @@
 
 mod bin;
 pub(crate) mod bins;
+mod keep;
+pub(crate) mod lists;
 pub(crate) mod scratch;
 pub(crate) mod triangle_bins;
 
@@ -12,8 +14,9 @@ use std::ops::ControlFlow;
 
 use self::bin::Bin;
 use self::bins::{Bins, EdgeBin};
+use self::lists::BandLists;
 use self::scratch::BandScratch;
-use self::triangle_bins::{BandLists, TriangleBin};
+use self::triangle_bins::TriangleBin;
 use super::isa::{LANES, dispatch};
 use super::{RasterContext, resolve};
 use crate::backend::DrawStage;
@@ -33,7 +36,7 @@ use crate::backend::cpu::lines::line_light;
 use crate::backend::cpu::lines::plain::add_holes_plainly;
 use crate::backend::cpu::peeling::composite;
 use crate::backend::cpu::peeling::state::PeelBand;
-use crate::backend::cpu::surface::flat::shade_flat;
+use crate::backend::cpu::surface::flat::{draw_flat, shade_flat};
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::cpu::surface::shade;
 use crate::plan::LinePass;
@@ -48,6 +51,11 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
     let mut lap = context.watch.begin();
     fill_samples(context, scratch, bins, band);
     lap.end(DrawStage::Visibility);
+    if let (true, Some(flat)) = (plan.lines.is_empty(), context.flat) {
+        draw_flat(isa, context, flat, &scratch.samples, rgba);
+        lap.end(DrawStage::Shade);
+        return;
+    }
     scratch.colors.clear();
     scratch.colors.resize(pixels, [0.0; 4]);
     if let Some(pass) = plan.peeling() {
@@ -264,14 +272,23 @@ fn draw_batches<'a, const S: usize>(
         if poll.is_expired_after(triangles, tested) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     for list in lists {
-        let (listed, tall) = list.items_in(band);
-        for ids in listed.chunks(LANES).chain(tall.as_slice().chunks(LANES)) {
-            match tiles {
-                Some(tiles) => batch.push_seen::<S>(context, samples, tiles, ids),
-                None => batch.push(ids),
+        if let Some(tiles) = tiles {
+            let (listed, tall) = list.boxed_in(band);
+            for faces in listed.chunks(LANES).chain(tall.chunks(LANES)) {
+                batch.push_seen(context.isa, samples, tiles, faces);
+                if batch.is_full() {
+                    draw(&mut batch, samples)?;
+                }
             }
-            if batch.is_full() {
-                draw(&mut batch, samples)?;
+            continue;
+        }
+        let (listed, tall) = list.items_in(band);
+        for mut ids in [listed, &tall] {
+            while !ids.is_empty() {
+                ids = batch.fill(ids);
+                if batch.is_full() {
+                    draw(&mut batch, samples)?;
+                }
             }
         }
     }

@@ -8,6 +8,7 @@ use crate::backend::cpu::lines::coverage::BandStrokes;
 use crate::backend::cpu::lines::farthest::Farthest;
 use crate::backend::cpu::lines::holes::Holes;
 use crate::backend::cpu::peeling::state::PeelBand;
+use crate::backend::cpu::surface::flat::FlatColors;
 use crate::backend::cpu::surface::light::Light;
 use crate::plan::DrawPlan;
 
@@ -112,7 +113,9 @@ fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
     let coverage = if plan.lines.is_empty() { 0 } else { BandStrokes::PIXEL_BYTES };
     let holes = if plan.has_holes() { Holes::row_bytes(plan.width_px) } else { 0 };
     let peel = if plan.peeling().is_some() { PeelBand::SAMPLE_BYTES } else { 0 };
-    plan.width_px as usize * (size_of::<[f32; 4]>() + light + coverage) + holes + samples(plan.width_px) * peel
+    // A plan of flat faces alone needs no colours of pixels.
+    let color = if plan.lines.is_empty() && FlatColors::suffice(plan) { 0 } else { size_of::<[f32; 4]>() };
+    plan.width_px as usize * (color + light + coverage) + holes + samples(plan.width_px) * peel
 }
 
 /// A band's buffers, kept from band to band.

@@ -9,6 +9,7 @@ use super::tiles::Tiles;
 use super::visibility;
 use super::visibility::{Parts, Setup};
 use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::bands::lists::BoxedFace;
 use crate::backend::cpu::isa::{Isa, LANES};
 
 /// Triangles in a batch. Triangles of equal size are drawn one after the other, so that the
@@ -43,35 +44,28 @@ impl Batch {
         self.len
     }
 
-    /// Adds up to [`LANES`] triangles.
+    /// Adds as many triangles as there is room for. Returns the others.
     #[inline(always)]
-    pub fn push(&mut self, ids: &[u32]) {
-        for &id in ids {
-            self.ids[self.len % ROOM] = id;
-            self.len += 1;
-        }
+    pub fn fill<'i>(&mut self, ids: &'i [u32]) -> &'i [u32] {
+        let len = self.len.min(BATCH);
+        let (taken, rest) = ids.split_at(ids.len().min(BATCH - len));
+        self.ids[len..len + taken.len()].copy_from_slice(taken);
+        self.len = len + taken.len();
+        rest
     }
 
-    /// Adds those of up to [`LANES`] triangles that `tiles` do not hide.
+    /// Adds those of up to [`LANES`] triangles that `tiles` do not hide. There is room for them
+    /// unless the batch is full.
     #[inline(always)]
-    pub fn push_seen<const S: usize>(
-        &mut self,
-        context: &RasterContext<'_>,
-        band: &SampleBand,
-        tiles: &Tiles,
-        ids: &[u32],
-    ) {
-        let mut lanes = [ids.first().map_or(0, |&id| id); LANES];
-        for (lane, &id) in lanes.iter_mut().zip(ids) {
-            *lane = id;
-        }
-        let Boxes { bounds: [columns, rows], depth_max } = boxes::<S>(context, &lanes, band);
-        for l in 0..ids.len().min(LANES) {
-            let (columns, rows) = ([columns[0][l], columns[1][l]], [rows[0][l], rows[1][l]]);
-            let is_empty = (columns[0] > columns[1]) | (rows[0] > rows[1]);
-            // Written in any case, kept by the count.
-            self.ids[self.len % ROOM] = lanes[l];
-            self.len += usize::from(!is_empty && !tiles.hide(columns, rows, depth_max[l]));
+    pub fn push_seen(&mut self, isa: Isa, band: &SampleBand, tiles: &Tiles, faces: &[BoxedFace]) {
+        let mut seen = tiles.seen(isa, faces, band.range()[1]);
+        while seen != 0 {
+            let l = seen.trailing_zeros() as usize;
+            if let (Some(place), Some(face)) = (self.ids.get_mut(self.len), faces.get(l)) {
+                *place = face.id;
+                self.len += 1;
+            }
+            seen &= seen - 1;
         }
     }
 

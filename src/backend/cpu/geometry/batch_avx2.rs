@@ -17,20 +17,26 @@ use crate::backend::cpu::isa::LANES;
 use crate::plan::sample_offsets;
 
 /// Corners of eight triangles.
-struct Corners {
-    x: [__m256i; 3],
-    y: [__m256i; 3],
-    z: [__m256; 3],
+pub struct Corners {
+    pub x: [__m256i; 3],
+    pub y: [__m256i; 3],
+    pub z: [__m256; 3],
 }
 
 /// As `Corners::load`.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn load_corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Corners {
-    let triangles = context.indices_of(ids);
+    load(context.vertices, &context.indices_of(ids))
+}
+
+/// Corners of triangles by the indices of their vertices.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub fn load(vertices: &[ScreenVertex], triangles: &[[u32; 3]; LANES]) -> Corners {
     let (mut x, mut y, mut z) = ([_mm256_setzero_si256(); 3], [_mm256_setzero_si256(); 3], [_mm256_setzero_ps(); 3]);
     for k in 0..3 {
-        let vertex = |l: usize| from_vertex(&context.vertices[triangles[l][k] as usize]);
+        let vertex = |l: usize| from_vertex(&vertices[triangles[l][k] as usize]);
         let pair = |l: usize| _mm256_set_m128i(vertex(l + 4), vertex(l));
         let (a, b, c, d) = (pair(0), pair(1), pair(2), pair(3));
         let (ab, cd) = (_mm256_unpacklo_epi32(a, b), _mm256_unpacklo_epi32(c, d));
@@ -110,16 +116,24 @@ fn bounds<const S: usize>(v: &[__m256i; 3], half: i32, [from, to]: [i32; 2]) -> 
     let grid = SampleGrid::new(S as u32);
     let low = _mm256_min_epi32(_mm256_min_epi32(v[0], v[1]), v[2]);
     let high = _mm256_max_epi32(_mm256_max_epi32(v[0], v[1]), v[2]);
+    let [first, last] = pixels([low, high], half, grid, [from, to]);
+    let is_small = _mm256_cmpgt_epi32(_mm256_set1_epi32(EXTENT_MAX + 1), _mm256_sub_epi32(high, low));
+    let is_short = _mm256_cmpgt_epi32(_mm256_set1_epi32(SHORT_MAX), _mm256_sub_epi32(last, first));
+    (first, last, _mm256_and_si256(is_small, is_short))
+}
+
+/// As `pixels` of the grid, of coordinates from the picture's centre, which is `half` from its
+/// corner.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub fn pixels([low, high]: [__m256i; 2], half: i32, grid: SampleGrid, [from, to]: [i32; 2]) -> [__m256i; 2] {
     let (cells, pixels) = (_mm_cvtsi32_si128(8 - grid.shift), _mm_cvtsi32_si128(grid.shift));
     let first = _mm256_sra_epi32(_mm256_add_epi32(low, _mm256_set1_epi32(half + grid.border - 1)), cells);
     let last = _mm256_sra_epi32(_mm256_add_epi32(high, _mm256_set1_epi32(half - grid.border)), cells);
     let is_empty = _mm256_cmpgt_epi32(first, last);
     let last = _mm256_blendv_epi8(_mm256_sra_epi32(last, pixels), _mm256_set1_epi32(i32::MIN), is_empty);
     let first = _mm256_max_epi32(_mm256_sra_epi32(first, pixels), _mm256_set1_epi32(from));
-    let last = _mm256_min_epi32(last, _mm256_set1_epi32(to - 1));
-    let is_small = _mm256_cmpgt_epi32(_mm256_set1_epi32(EXTENT_MAX + 1), _mm256_sub_epi32(high, low));
-    let is_short = _mm256_cmpgt_epi32(_mm256_set1_epi32(SHORT_MAX), _mm256_sub_epi32(last, first));
-    (first, last, _mm256_and_si256(is_small, is_short))
+    [first, _mm256_min_epi32(last, _mm256_set1_epi32(to - 1))]
 }
 
 /// Edges and depth.
@@ -155,6 +169,22 @@ fn planes(s: &mut Parts<LANES>, x: [__m256i; 3], y: [__m256i; 3], z: [__m256; 3]
         s.dy[k] = to_ints(dy);
     }
     s.from = [to_ints(sub(corner[0], x[0])), to_ints(sub(corner[1], y[0]))];
+}
+
+/// Columns of four rows, in each half.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub fn transposed([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
+    let double = |v: __m256| _mm256_castps_pd(v);
+    let single = |v: __m256d| _mm256_castpd_ps(v);
+    let (ab, cd) = (double(_mm256_unpacklo_ps(a, b)), double(_mm256_unpacklo_ps(c, d)));
+    let (ab_high, cd_high) = (double(_mm256_unpackhi_ps(a, b)), double(_mm256_unpackhi_ps(c, d)));
+    [
+        single(_mm256_unpacklo_pd(ab, cd)),
+        single(_mm256_unpackhi_pd(ab, cd)),
+        single(_mm256_unpacklo_pd(ab_high, cd_high)),
+        single(_mm256_unpackhi_pd(ab_high, cd_high)),
+    ]
 }
 
 /// As [`recip`](super::transform::recip).
@@ -264,9 +294,17 @@ fn from_ints(v: &[i32; LANES]) -> __m256i {
     unsafe { _mm256_loadu_si256(v.as_ptr().cast()) }
 }
 
+/// A bit for each lane, its highest.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn to_ints(v: __m256i) -> [i32; LANES] {
+pub fn bits(v: __m256i) -> u32 {
+    _mm256_movemask_ps(_mm256_castsi256_ps(v)) as u32
+}
+
+/// The lanes of a vector.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub fn to_ints(v: __m256i) -> [i32; LANES] {
     let mut out = [0; LANES];
     // SAFETY: the array has the size of a vector, and the store needs no alignment.
     unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), v) };

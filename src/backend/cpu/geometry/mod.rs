@@ -8,7 +8,7 @@
 
 pub(crate) mod batch;
 #[cfg(target_arch = "x86_64")]
-mod batch_avx2;
+pub(crate) mod batch_avx2;
 pub(crate) mod clip;
 pub(crate) mod nearest;
 pub(crate) mod samples;

@@ -9,6 +9,7 @@ use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
 use crate::backend::cpu::isa::{Isa, LANES, dispatch};
+use crate::backend::cpu::resolve::Resolver;
 use crate::backend::cpu::vector::turned_to_viewer;
 use crate::plan::{DrawPlan, SurfacePass, flags};
 
@@ -97,6 +98,15 @@ fn find_in_list(context: &RasterContext<'_>, ids: &[u32], is_front: bool, (first
         return;
     };
     let mut group = Group { ids: [0; LANES], len: 0, material: 0 };
+    if surface.materials.len() == 1 {
+        for ids in ids.chunks(LANES) {
+            group.ids = [ids[0]; LANES];
+            group.ids[..ids.len()].copy_from_slice(ids);
+            group.len = ids.len();
+            group.color(context, surface, is_front, (first, &mut *colors));
+        }
+        return;
+    }
     for &id in ids {
         let material = surface.triangle_materials.get(id as usize).map_or(0, |&m| m);
         if group.len == LANES || (group.material != material && group.len > 0) {
@@ -131,24 +141,63 @@ impl Group {
         let material = surface.material(self.ids[0] as usize);
         let mut normals = [[0.0; LANES]; 3];
         if material.flags & flags::FACE_NORMALS != 0 {
-            for l in 0..self.len {
-                let normal = turned_to_viewer(surface.face_normals[self.ids[l] as usize], is_front);
-                for k in 0..3 {
-                    normals[k][l] = normal[k];
-                }
-            }
+            normals = self.normals(context.isa, surface, is_front);
         }
         let colors = flat_colors(surface, material, &context.plan.projection, Show::ALL, &normals);
+        if self.are_written(context.isa, &colors, (first, &mut *out)) {
+            return;
+        }
         for l in 0..self.len {
             let color = [colors[0][l], colors[1][l], colors[2][l], colors[3][l]];
             out[self.ids[l] as usize - first] = if color.iter().all(|v| v.is_finite()) { color } else { UNKNOWN };
         }
+    }
+
+    /// Normals on the viewer's side.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    fn normals(&self, isa: Isa, surface: &SurfacePass<'_>, is_front: bool) -> [[f32; LANES]; 3] {
+        #[cfg(target_arch = "x86_64")]
+        if isa.has_avx2() && self.len == LANES {
+            // SAFETY: the processor has AVX2, as `isa` says.
+            if let Some(normals) = unsafe { super::flat_avx2::normals(&surface.face_normals, &self.ids, is_front) } {
+                return normals;
+            }
+        }
+        let _ = isa;
+        let mut normals = [[0.0; LANES]; 3];
+        for l in 0..self.len {
+            let normal = turned_to_viewer(surface.face_normals[self.ids[l] as usize], is_front);
+            for k in 0..3 {
+                normals[k][l] = normal[k];
+            }
+        }
+        normals
+    }
+
+    /// Writes eight colours at once, where this processor can. True if it did, and all are finite.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    fn are_written(&self, isa: Isa, colors: &[[f32; LANES]; 4], (first, out): (usize, &mut [[f32; 4]])) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        if isa.has_avx2() && self.len == LANES {
+            // SAFETY: the processor has AVX2, as `isa` says.
+            return unsafe { super::flat_avx2::write(colors, &self.ids, first as u32, out) };
+        }
+        let _ = (isa, colors, first, out);
+        false
     }
 }
 
 dispatch! {
     /// Shades every pixel of the band into `colors`, as [`shade`](super::shade::shade) does.
     pub fn shade_flat(context: &RasterContext<'_>, flat: &FlatColors, band: &SampleBand, colors: &mut [[f32; 4]]) = shade
+}
+
+dispatch! {
+    /// Shades every pixel of the band and resolves it into `rgba`: where nothing is drawn over the
+    /// surface.
+    pub fn draw_flat(context: &RasterContext<'_>, flat: &FlatColors, band: &SampleBand, rgba: &mut [u8]) = draw
 }
 
 #[inline(always)]
@@ -163,31 +212,93 @@ fn shade_sampled<const S: usize>(
     band: &SampleBand,
     colors: &mut [[f32; 4]],
 ) {
+    let shader = FlatShader::<S> { context, flat, band };
     let width = band.size_px[0] as usize;
     for (y, line) in (band.shown[0]..band.shown[1]).zip(colors.chunks_exact_mut(width)) {
-        let first = band.index(0, y as i32, 0);
-        let row = &band.ids[first..first + width * S];
-        let groups = row.chunks(LANES * S).zip(line.chunks_mut(LANES));
-        for (x, (group, out)) in (0..).step_by(LANES).zip(groups) {
-            // Without a way out in between, this is a few vector instructions.
-            let difference = group.iter().fold(0, |other, id| other | (id ^ group[0]));
-            let color = flat.of(group[0]);
-            if difference == 0 && !color[3].is_nan() {
-                out.fill(color);
-                continue;
-            }
-            let (pixels, _) = group.as_chunks::<S>();
-            if are_means_known::<S>(context.isa, flat, pixels, out) {
-                continue;
-            }
-            for (x, (ids, out)) in (x..).zip(pixels.iter().zip(out)) {
-                *out = mean(flat, ids);
-                if out[3].is_nan() {
-                    *out = pixel_by_point::<S>(context, band, [x, y]);
-                }
+        let groups = shader.row(y).chunks(LANES * S).zip(line.chunks_mut(LANES));
+        for (x, (ids, out)) in (0..).step_by(LANES).zip(groups) {
+            match shader.only_color(ids) {
+                Some(color) => out.fill(color),
+                None => shader.mixed(ids, [x, y], out),
             }
         }
     }
+}
+
+#[inline(always)]
+fn draw(context: &RasterContext<'_>, flat: &FlatColors, band: &SampleBand, rgba: &mut [u8]) {
+    for_samples!(band.samples, draw_sampled(context, flat, band, rgba));
+}
+
+#[inline(always)]
+fn draw_sampled<const S: usize>(context: &RasterContext<'_>, flat: &FlatColors, band: &SampleBand, rgba: &mut [u8]) {
+    let shader = FlatShader::<S> { context, flat, band };
+    let resolver = Resolver::new(context.plan, context.srgb);
+    let mut last = None;
+    let (pixels, _) = rgba.as_chunks_mut::<4>();
+    for (y, line) in (band.shown[0]..band.shown[1]).zip(pixels.chunks_exact_mut(band.size_px[0] as usize)) {
+        let groups = shader.row(y).chunks(LANES * S).zip(line.chunks_mut(LANES));
+        for (x, (ids, out)) in (0..).step_by(LANES).zip(groups) {
+            // Neighbours often have the same id: large flat faces, the background.
+            if let Some((_, pixel)) = last.filter(|(id, _)| is_all(ids, *id)) {
+                out.fill(pixel);
+                continue;
+            }
+            if let Some(color) = shader.only_color(ids) {
+                let pixel = resolver.pixel(color);
+                last = Some((ids[0], pixel));
+                out.fill(pixel);
+                continue;
+            }
+            let mut colors = [[0.0; 4]; LANES];
+            shader.mixed(ids, [x, y], &mut colors[..out.len()]);
+            resolver.mixed(&colors, out);
+        }
+    }
+}
+
+/// Shades groups of up to eight pixels in a row.
+struct FlatShader<'a, const S: usize> {
+    context: &'a RasterContext<'a>,
+    flat: &'a FlatColors,
+    band: &'a SampleBand,
+}
+
+impl<const S: usize> FlatShader<'_, S> {
+    /// Ids of a row of the picture.
+    #[inline(always)]
+    fn row(&self, y: u32) -> &[u32] {
+        let first = self.band.index(0, y as i32, 0);
+        &self.band.ids[first..first + self.band.size_px[0] as usize * S]
+    }
+
+    /// The colour of all samples, if they have one id and its colour is known.
+    #[inline(always)]
+    fn only_color(&self, ids: &[u32]) -> Option<[f32; 4]> {
+        Some(self.flat.of(ids[0])).filter(|color| is_all(ids, ids[0]) && !color[3].is_nan())
+    }
+
+    /// Shades pixels from column `x`, row `y` on.
+    #[inline(always)]
+    fn mixed(&self, ids: &[u32], [x, y]: [u32; 2], out: &mut [[f32; 4]]) {
+        let (pixels, _) = ids.as_chunks::<S>();
+        if are_means_known::<S>(self.context.isa, self.flat, pixels, out) {
+            return;
+        }
+        for (x, (ids, out)) in (x..).zip(pixels.iter().zip(out)) {
+            *out = mean(self.flat, ids);
+            if out[3].is_nan() {
+                *out = pixel_by_point::<S>(self.context, self.band, [x, y]);
+            }
+        }
+    }
+}
+
+/// True if there are no other ids.
+#[inline(always)]
+fn is_all(ids: &[u32], id: u32) -> bool {
+    // Without a way out in between, this is a few vector instructions.
+    ids.iter().fold(0, |difference, other| difference | (other ^ id)) == 0
 }
 
 /// A pixel with a colour that is not known.

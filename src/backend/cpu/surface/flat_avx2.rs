@@ -1,10 +1,11 @@
-//! Stage shade: the means of `flat` in AVX2 instructions, lane for lane the same, for 4 samples per
+//! Stage shade: steps of `flat` in AVX2 instructions, lane for lane the same; means for 4 samples per
 //! pixel. Compilers make branches and single lanes of the loops there.
 
 #![allow(unsafe_code)]
 
 use std::arch::x86_64::*;
 
+use crate::backend::cpu::geometry::batch_avx2::transposed;
 use crate::backend::cpu::isa::LANES;
 
 /// Samples per pixel.
@@ -41,6 +42,70 @@ pub fn means(colors: &[[f32; 4]], ids: &[[u32; SAMPLES]; LANES], out: &mut [[f32
         unsafe { _mm256_storeu_ps(out.as_mut_ptr().cast(), sum) };
     }
     _mm256_testz_ps(unknown, unknown) != 0
+}
+
+/// Normals of triangles, turned to the viewer; None if some id is not below the last normal's.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub fn normals(normals: &[[f32; 3]], ids: &[u32; LANES], is_front: bool) -> Option<[[f32; LANES]; 3]> {
+    let last = normals.len().checked_sub(2).and_then(|last| i32::try_from(last).ok())?;
+    // SAFETY: the array has the size of a vector, and the load needs no alignment.
+    if !are_all_up_to(unsafe { _mm256_loadu_si256(ids.as_ptr().cast()) }, last) {
+        return None;
+    }
+    // SAFETY: as above, no id is beyond `last`. Four numbers are a normal and a part of the next, which
+    // there is.
+    let normal = |l: usize| unsafe { _mm_loadu_ps(normals.as_ptr().add(ids[l] as usize).cast()) };
+    let pair = |l: usize| _mm256_set_m128(normal(l + 4), normal(l));
+    let [x, y, z, _] = transposed([pair(0), pair(1), pair(2), pair(3)]);
+    let sign = _mm256_set1_ps(if is_front { 0.0 } else { -0.0 });
+    let mut out = [[0.0; LANES]; 3];
+    for (out, v) in out.iter_mut().zip([x, y, z]) {
+        // SAFETY: as above, for a store.
+        unsafe { _mm256_storeu_ps(out.as_mut_ptr(), _mm256_xor_ps(v, sign)) };
+    }
+    Some(out)
+}
+
+/// Writes colours of triangles, whose first is number `first`, if all are finite.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub fn write(colors: &[[f32; LANES]; 4], ids: &[u32; LANES], first: u32, out: &mut [[f32; 4]]) -> bool {
+    let Some(last) = out.len().checked_sub(1).and_then(|last| i32::try_from(last).ok()) else { return false };
+    // SAFETY: arrays have the size of a vector, and loads need no alignment.
+    let places = unsafe { _mm256_loadu_si256(ids.as_ptr().cast()) };
+    let places = _mm256_sub_epi32(places, _mm256_set1_epi32(first as i32));
+    // SAFETY: as above.
+    let of = |k: usize| unsafe { _mm256_loadu_ps(colors[k].as_ptr()) };
+    let [r, g, b, a] = [of(0), of(1), of(2), of(3)];
+    // What is not finite is not a number after it is multiplied by 0.
+    let no = |v: __m256| _mm256_mul_ps(v, _mm256_setzero_ps());
+    let sum = _mm256_add_ps(_mm256_add_ps(no(r), no(g)), _mm256_add_ps(no(b), no(a)));
+    let is_odd = _mm256_cmp_ps::<_CMP_UNORD_Q>(sum, sum);
+    if _mm256_testz_ps(is_odd, is_odd) == 0 || !are_all_up_to(places, last) {
+        return false;
+    }
+    let mut at = [0_u32; LANES];
+    // SAFETY: as above, for a store.
+    unsafe { _mm256_storeu_si256(at.as_mut_ptr().cast(), places) };
+    let colors = transposed([r, g, b, a]);
+    for (l, color) in colors.into_iter().enumerate() {
+        // SAFETY: no place is beyond `last`, which is an index of `out`. A colour has the size of
+        // half a vector.
+        unsafe {
+            _mm_storeu_ps(out.as_mut_ptr().add(at[l] as usize).cast(), _mm256_castps256_ps128(color));
+            _mm_storeu_ps(out.as_mut_ptr().add(at[l + 4] as usize).cast(), _mm256_extractf128_ps::<1>(color));
+        }
+    }
+    true
+}
+
+/// True if no lane is beyond `last`.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn are_all_up_to(v: __m256i, last: i32) -> bool {
+    let kept = _mm256_min_epu32(v, _mm256_set1_epi32(last));
+    _mm256_movemask_epi8(_mm256_cmpeq_epi32(kept, v)) == -1
 }
 
 /// As `weights`, of two pixels.

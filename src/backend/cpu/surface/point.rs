@@ -207,12 +207,12 @@ pub fn flat_colors<const N: usize>(
     if material.flags & flags::FACE_NORMALS != 0 {
         light = light_lanes(quick_recip, &surface.lights, projection, material.metallic, material.roughness, normals);
     }
-    let mut colors = [[0.0; N]; 4];
-    for l in 0..N {
-        let color = lit(base, Light { gain: light[0][l], gloss: light[1][l] });
-        let color = premultiplied(color, material.emissive);
-        for k in 0..4 {
-            colors[k][l] = color[k];
+    // As `lit` and `premultiplied`, channel by channel.
+    let mut colors = [[0.0; N], [0.0; N], [0.0; N], [base[3]; N]];
+    for k in 0..3 {
+        for l in 0..N {
+            let lit = (base[k] * light[0][l] + light[1][l]).clamp(0.0, 1.0);
+            colors[k][l] = (lit + material.emissive[k]) * base[3];
         }
     }
     colors

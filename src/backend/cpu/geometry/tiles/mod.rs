@@ -1,19 +1,27 @@
 //! Stage visibility: the farthest depth in each tile of a band. A triangle behind that depth is hidden
 //! in the whole tile.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+
 use super::samples::SampleBand;
-use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::bands::lists::{BoxedFace, unpair};
+use crate::backend::cpu::isa::{Isa, LANES};
 
 /// Pixels along a tile's side.
-const TILE: usize = 8;
+const TILE: usize = 1 << TILE_SHIFT;
+
+/// Its binary logarithm.
+pub const TILE_SHIFT: i32 = 3;
 
 /// The smallest depth (reversed: the farthest) of each tile of 8 x 8 pixels.
 #[derive(Default)]
 pub struct Tiles {
-    columns: usize,
+    pub columns: usize,
     /// First column and row that have samples.
-    first: [i32; 2],
-    depth_min: Vec<f32>,
+    pub first: [i32; 2],
+    /// Row by row.
+    pub depth_min: Vec<f32>,
 }
 
 impl Tiles {
@@ -36,6 +44,33 @@ impl Tiles {
             }
         }
         tiles
+    }
+
+    /// Bits of up to eight faces that the tiles do not hide, in these rows of samples.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub fn seen(&self, isa: Isa, faces: &[BoxedFace], rows: [i32; 2]) -> u32 {
+        #[cfg(target_arch = "x86_64")]
+        if isa.has_avx2() {
+            // SAFETY: the processor has AVX2, as `isa` says.
+            if let Some(seen) = unsafe { avx2::seen(self, faces, rows) } {
+                return seen;
+            }
+        }
+        let _ = isa;
+        self.seen_one_by_one(faces, rows)
+    }
+
+    #[inline(never)]
+    fn seen_one_by_one(&self, faces: &[BoxedFace], [from, to]: [i32; 2]) -> u32 {
+        let mut seen = 0;
+        for (l, face) in faces.iter().enumerate().take(LANES) {
+            let [top, bottom] = unpair(face.rows);
+            let rows = [top.max(from), bottom.min(to - 1)];
+            let is_seen = rows[0] <= rows[1] && !self.hide(unpair(face.columns), rows, face.depth_max);
+            seen |= u32::from(is_seen) << l;
+        }
+        seen
     }
 
     /// True if every sample of the tiles that touch these columns and rows is nearer than
@@ -74,6 +109,7 @@ fn smallest(depths: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::backend::cpu::bands::lists::pair;
 
     #[test]
     fn tiles_hide_what_lies_behind_all_of_their_samples() {
@@ -95,5 +131,39 @@ mod tests {
             hidden += 1;
         }
         assert_eq!(hidden, 4);
+    }
+
+    /// Boxes of all sizes at all places, between tiles of chance depths.
+    #[test]
+    fn every_instruction_set_sees_the_same_faces() {
+        let mut band = SampleBand::new([40, 30], 5, 36, 4);
+        band.first_row = -3;
+        let mut state = 1_u32;
+        let mut chance = |below: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % below
+        };
+        band.depth.iter_mut().for_each(|depth| *depth = 0.5 + chance(100) as f32 / 1000.0);
+        let tiles = Tiles::new(&band);
+        let mut found = [0; 2];
+        for round in 0..4000 {
+            let most = if round % 2 == 0 { 9 } else { 25 };
+            let mut faces = [BoxedFace::default(); LANES];
+            for face in &mut faces {
+                let mut interval = |first: i32, len: u32| {
+                    let from = chance(len) as i32;
+                    pair([first + from, first + (from + chance(most) as i32).min(len as i32 - 1)])
+                };
+                (face.columns, face.rows) = (interval(-5, 50), interval(-3, 36));
+                face.depth_max = 0.49 + chance(30) as f32 / 1000.0;
+            }
+            let range = [chance(10) as i32 - 3, 33 - chance(10) as i32];
+            let want = tiles.seen_one_by_one(&faces, range);
+            for isa in Isa::available() {
+                assert_eq!(tiles.seen(isa, &faces, range), want, "round {round}, {isa:?}");
+            }
+            found = [found[0] + want.count_ones(), found[1] + want.count_zeros() - 24];
+        }
+        assert!(found.iter().all(|&count| count > 3000), "{found:?}");
     }
 }

@@ -1,0 +1,290 @@
+//! Culling of triangles, before they are sorted into bands: what faces away, and what no sample can
+//! show.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+
+use std::ops::Range;
+
+use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::bands::lists::{BoxedFace, KeptFaces, pair};
+use crate::backend::cpu::geometry::samples::SampleGrid;
+use crate::backend::cpu::geometry::setups::Corners;
+use crate::backend::cpu::geometry::transform::{OUTSIDE, ScreenVertex};
+use crate::backend::cpu::isa::LANES;
+use crate::plan::{DrawPlan, Faces, pass_mask};
+
+/// Triangles of one pass.
+pub struct TrianglePass {
+    /// Their ids.
+    pub ids: Range<usize>,
+    /// Bit that a triangle's pass mask must have; 0 for the outline mesh, which has no masks.
+    pub pass_bit: u8,
+    /// The faces that are drawn, where a triangle's pass mask does not say.
+    pub faces: Faces,
+}
+
+impl TrianglePass {
+    /// Drawn faces of a triangle; None if the pass does not draw it.
+    #[inline(always)]
+    pub fn faces_of(&self, plan: &DrawPlan<'_>, id: usize) -> Option<Faces> {
+        if self.pass_bit == 0 {
+            return Some(self.faces);
+        }
+        match plan.pass_masks.get(id) {
+            None => Some(self.faces),
+            Some(mask) if mask & self.pass_bit == 0 => None,
+            Some(mask) if mask & pass_mask::FRONT_ONLY != 0 => Some(Faces::Front),
+            Some(mask) if mask & pass_mask::BACK_ONLY != 0 => Some(Faces::Back),
+            _ => Some(self.faces),
+        }
+    }
+
+    /// Bits of the lanes whose fronts, and whose backs, are drawn, of so many triangles.
+    #[inline(always)]
+    pub fn drawn(&self, plan: &DrawPlan<'_>, first: usize, len: usize) -> [u32; 2] {
+        let bits = |faces: Option<Faces>| {
+            let front = matches!(faces, Some(Faces::Both | Faces::Front));
+            let back = matches!(faces, Some(Faces::Both | Faces::Back));
+            [u32::from(front), u32::from(back)]
+        };
+        if self.pass_bit == 0 || plan.pass_masks.is_empty() {
+            let all = (1 << len) - 1;
+            let [front, back] = bits(Some(self.faces));
+            return [front * all, back * all];
+        }
+        let mut drawn = [0; 2];
+        for l in 0..len {
+            let [front, back] = bits(self.faces_of(plan, first + l));
+            drawn = [drawn[0] | front << l, drawn[1] | back << l];
+        }
+        drawn
+    }
+}
+
+/// The rectangle of the picture that has samples, and its bands.
+pub struct Bounds {
+    pub grid: SampleGrid,
+    /// The picture's centre, 1/256 px from its corner.
+    pub half: [i32; 2],
+    /// Columns, and rows, that have samples.
+    pub ranges: [[i32; 2]; 2],
+    /// Rows of a band.
+    pub rows: i32,
+    /// Rows beyond a band that it sees.
+    pub margin: i32,
+    /// The picture's last row.
+    pub row_last: i32,
+}
+
+impl Bounds {
+    /// Those of a plan's picture.
+    pub fn new(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2]) -> Self {
+        Self {
+            grid: SampleGrid::new(plan.samples),
+            half: [plan.width_px, plan.height_px].map(|size| size as i32 * 128),
+            ranges: [plan.seen_range(plan.width_px), plan.seen_range(plan.height_px)],
+            rows: rows as i32,
+            margin: margin as i32,
+            row_last: plan.height_px as i32 - 1,
+        }
+    }
+
+    /// First and last band that a triangle on screen touches, or comes as close to as `margin`
+    /// rows; None if it touches no column or row of samples.
+    #[inline(always)]
+    pub fn bands_of(&self, v: &[ScreenVertex; 3]) -> Option<[usize; 2]> {
+        let [[left, right], rows] = self.pixels_of([[v[0].x, v[1].x, v[2].x], [v[0].y, v[1].y, v[2].y]]);
+        let [top, bottom] = self.with_margin(rows);
+        (left <= right && top <= bottom).then(|| [top, bottom].map(|row| (row / self.rows) as usize))
+    }
+
+    /// Columns, and rows, of pixels that may have samples in a triangle.
+    #[inline(always)]
+    fn pixels_of(&self, corners: [[i32; 3]; 2]) -> [[i32; 2]; 2] {
+        let axis = |k: usize| {
+            let v = corners[k];
+            let (low, high) = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
+            // Only what lies outside wraps.
+            let from_corner = [low.wrapping_add(self.half[k]), high.wrapping_add(self.half[k])];
+            self.grid.pixels(from_corner, self.ranges[k])
+        };
+        [axis(0), axis(1)]
+    }
+
+    #[inline(always)]
+    fn with_margin(&self, [top, bottom]: [i32; 2]) -> [i32; 2] {
+        [(top - self.margin).max(0), bottom.saturating_add(self.margin).min(self.row_last)]
+    }
+}
+
+/// Triangles of a chunk that culling leaves.
+pub struct Kept {
+    /// Triangles that face the viewer.
+    pub fronts: KeptFaces,
+    /// Triangles that face away, with boxes.
+    pub backs: KeptFaces,
+    /// Triangles with a corner behind the eye or far outside the picture.
+    pub outside: Vec<u32>,
+}
+
+impl Kept {
+    /// Room for so many triangles.
+    pub fn with_room_for(triangles: usize) -> Self {
+        Self {
+            fronts: KeptFaces::with_room_for(triangles, false),
+            backs: KeptFaces::with_room_for(triangles, true),
+            outside: Vec::new(),
+        }
+    }
+}
+
+/// Culls the triangles of a pass.
+#[allow(unsafe_code)]
+pub fn keep(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass) -> Kept {
+    #[cfg(target_arch = "x86_64")]
+    if let (true, Some(triangles)) = (context.isa.has_avx2(), context.triangles_of(&pass.ids)) {
+        // SAFETY: the processor has AVX2, as `isa` says.
+        return unsafe { avx2::keep(context, bounds, pass, triangles) };
+    }
+    keep_plainly(context, bounds, pass)
+}
+
+fn keep_plainly(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass) -> Kept {
+    let mut kept = Kept::with_room_for(pass.ids.len());
+    for first in pass.ids.clone().step_by(LANES) {
+        let len = (pass.ids.end - first).min(LANES);
+        let mut ids = [first as u32; LANES];
+        for l in 0..len {
+            ids[l] += l as u32;
+        }
+        let corners = Corners::load(context, &ids);
+        let drawn = pass.drawn(context.plan, first, len);
+        for l in 0..len {
+            let lane = Lane::new(&corners, l, bounds);
+            let is_drawn = |k: usize| drawn[k] >> l & 1 != 0;
+            if lane.is_outside && (is_drawn(0) || is_drawn(1)) {
+                kept.outside.push(ids[l]);
+            }
+            if lane.is_seen && lane.area < 0 && is_drawn(0) {
+                kept.fronts.ids.push(ids[l]);
+                kept.fronts.spans.push(lane.span);
+            }
+            if lane.is_seen && lane.area > 0 && is_drawn(1) {
+                kept.backs.ids.push(ids[l]);
+                kept.backs.spans.push(lane.span);
+                kept.backs.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
+            }
+        }
+    }
+    kept
+}
+
+/// A triangle on screen.
+struct Lane {
+    is_outside: bool,
+    is_seen: bool,
+    area: i64,
+    /// As [`KeptFaces`] has it.
+    span: u32,
+    boxed: BoxedFace,
+}
+
+impl Lane {
+    #[inline(always)]
+    fn new(corners: &Corners, l: usize, bounds: &Bounds) -> Self {
+        let of = |v: &[[i32; LANES]; 3]| [v[0][l], v[1][l], v[2][l]];
+        let (x, y) = (of(&corners.x), of(&corners.y));
+        let z = [corners.z[0][l], corners.z[1][l], corners.z[2][l]];
+        let is_outside = (x[0] == OUTSIDE) | (x[1] == OUTSIDE) | (x[2] == OUTSIDE);
+        let [columns, rows] = bounds.pixels_of([x, y]);
+        let [top, bottom] = bounds.with_margin(rows);
+        let is_seen = (columns[0] <= columns[1]) & (top <= bottom) & !is_outside;
+        Self {
+            is_outside,
+            is_seen,
+            area: area_of(x, y),
+            span: if is_seen { pair([top / bounds.rows, bottom / bounds.rows]) } else { 0 },
+            boxed: BoxedFace { id: 0, columns: pair(columns), rows: pair(rows), depth_max: z[0].max(z[1]).max(z[2]) },
+        }
+    }
+}
+
+/// Twice the signed area. Only what lies outside wraps, and its area is not looked at.
+#[inline(always)]
+pub fn area_of(x: [i32; 3], y: [i32; 3]) -> i64 {
+    let d = |a: i32, b: i32| i64::from(a.wrapping_sub(b));
+    d(x[1], x[0]) * d(y[2], y[0]) - d(x[2], x[0]) * d(y[1], y[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::cpu::stopwatch::Stopwatch;
+    use crate::backend::cpu::{CpuRenderer, Isa};
+    use crate::limits::Deadline;
+    use crate::plan::{HullPass, Projection};
+
+    fn projection() -> Projection {
+        let [right, up, back] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let row = |axis: [f32; 3], scale: f32, offset: f32| [axis[0] * scale, axis[1] * scale, axis[2] * scale, offset];
+        Projection {
+            x: row(right, 60.0 * 256.0, 0.0),
+            y: row(up, -40.0 * 256.0, 0.0),
+            z: row(back, 0.2, 0.5),
+            w: [0.0, 0.0, -1.0, 1.4],
+            near_w: 0.5,
+            clip: true,
+            to_viewer: back,
+            screen_up: up,
+            screen_right: right,
+        }
+    }
+
+    /// Triangles of all sizes, some of them behind the eye or far outside; those with a mask are
+    /// drawn from one side, or not.
+    fn is_kept_alike(samples: u32, margin: u32, masks: Vec<u8>) -> [usize; 3] {
+        let mut state = 1_u32;
+        let mut chance = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let mut positions = Vec::new();
+        for i in 0..1500 {
+            let size = [0.01, 0.1, 1.0, 40.0][i / 8 % 4];
+            let at = [chance(), chance(), chance()].map(|v| 2.4 * v - 1.2);
+            (0..3).for_each(|_| positions.push(at.map(|v| v + size * (chance() - 0.5))));
+        }
+        let triangles: Vec<[u32; 3]> = (0..1499).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let mut plan = DrawPlan::new([120, 90], &positions, &triangles, projection());
+        (plan.samples, plan.pass_masks, plan.margin_px) = (samples, masks.into(), margin);
+        plan.hull = Some(HullPass::default());
+        let deadline = Deadline::default();
+        let pass = TrianglePass { ids: 3..triangles.len(), pass_bit: pass_mask::SURFACE, faces: Faces::Both };
+        let bounds = Bounds::new(&plan, [17, margin]);
+        let lists = |isa: Isa| {
+            let mut cpu = CpuRenderer::with_isa(1, isa);
+            cpu.transform(&plan, None);
+            let kept = keep(&cpu.context(&plan, &deadline, &Stopwatch::default()), &bounds, &pass);
+            let [fronts, backs] = [kept.fronts, kept.backs].map(|kept| (kept.ids, kept.spans, kept.boxed));
+            (fronts, backs, kept.outside)
+        };
+        let all: Vec<_> = Isa::available().into_iter().map(lists).collect();
+        assert!(all.iter().all(|found| *found == all[0]), "{samples} samples, margin {margin}");
+        [all[0].0.0.len(), all[0].1.0.len(), all[0].2.len()]
+    }
+
+    #[test]
+    fn every_instruction_set_keeps_the_same() {
+        for samples in [1, 4, 8, 16] {
+            for margin in [0, 5] {
+                let all = is_kept_alike(samples, margin, Vec::new());
+                assert!(all.iter().all(|&count| count > 50), "{all:?}");
+                let drawn = |i: u32| if i.is_multiple_of(3) { 0 } else { pass_mask::SURFACE };
+                let mask = |i: u32| if i.is_multiple_of(5) { drawn(i) | pass_mask::BACK_ONLY } else { drawn(i) };
+                let some = is_kept_alike(samples, margin, (0..1499).map(mask).collect());
+                assert!((0..3).all(|k| some[k] > 20 && some[k] < all[k]), "{some:?} of {all:?}");
+            }
+        }
+    }
+}
