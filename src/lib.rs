@@ -62,6 +62,7 @@ mod library;
 pub mod limits;
 #[doc(hidden)]
 pub mod mesh;
+mod parallel;
 #[doc(hidden)]
 pub mod pipeline;
 #[doc(hidden)]

@@ -50,7 +50,7 @@ impl DrawTimes {
         self.0[stage as usize] += took;
     }
 
-    /// The stages that took time, in order. None if nothing was timed.
+    /// The stages that took time, in order. Empty if nothing was timed.
     pub fn parts(&self) -> impl Iterator<Item = (DrawStage, Duration)> {
         DrawStage::ALL.into_iter().zip(self.0).filter(|(_, took)| !took.is_zero())
     }

@@ -73,7 +73,7 @@ pub struct RenderArgs {
     /// #rgb, #rrggbb, #rrggbbaa or transparent
     #[arg(long, value_name = "COLOR")]
     background: Option<String>,
-    /// Threads that read, draw and decode textures [default: one for each processor]
+    /// Threads that read, plan, draw and decode textures [default: one for each processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Print the work that was skipped, and the time of each stage
@@ -98,11 +98,12 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
     let format_in = format_in(arguments.format_in.as_deref())?;
     let spec = read_spec(arguments, &limits)?;
 
+    let began = Instant::now();
     let progress = Progress::start("reading");
     let bundle = bundle::read(&arguments.meshes, arguments.entry.clone(), &limits)?;
     progress.next("parsing");
-    let began = Instant::now();
-    let (mut times, mut stage_began) = (Vec::new(), began);
+    let read = began.elapsed();
+    let (mut times, mut stage_began) = (Vec::new(), Instant::now());
     let mut ended = |stage| {
         progress.next(after(stage));
         times.push((stage, stage_began.elapsed()));
@@ -110,7 +111,7 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
     };
     let threads = arguments.threads.map_or(cores() as usize, usize::from);
     if arguments.threads.is_some() {
-        // Rayon's global pool reads files and decodes textures. This fails only if that pool is
+        // Rayon's global pool parses files, finds edges, normals and outlines, and decodes textures. This fails only if that pool is
         // running already.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     }
@@ -126,7 +127,7 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
         eprintln!("meshsnap: {mesh_name}: warning: {}", warning.detail);
     }
     if arguments.explain {
-        explain(&output, &gpu.status(), &times, began.elapsed());
+        explain(&output, &gpu.status(), read, &times, began.elapsed());
     }
     Ok(())
 }
@@ -205,7 +206,7 @@ fn after(stage: Stage) -> &'static str {
 }
 
 /// Prints what `--explain` asks for.
-fn explain(output: &Output, gpu: &GpuStatus, times: &[(Stage, Duration)], total: Duration) {
+fn explain(output: &Output, gpu: &GpuStatus, read: Duration, times: &[(Stage, Duration)], total: Duration) {
     eprintln!("drawn by {}", output.backend.name());
     if let Some(selection) = &output.selection {
         let (error, time_ms) = (selection.expected_error, selection.expected_time_ms);
@@ -220,11 +221,12 @@ fn explain(output: &Output, gpu: &GpuStatus, times: &[(Stage, Duration)], total:
     for skip in &output.skips {
         eprintln!("skipped {}: {}", skip.kind, skip.why);
     }
+    eprintln!("{:<6} {:9.3} ms", "read", read.as_secs_f64() * 1e3);
     for (stage, took) in times {
         eprintln!("{:<6} {:9.3} ms", format!("{stage:?}").to_lowercase(), took.as_secs_f64() * 1e3);
         if *stage == Stage::Render {
             for (part, took) in output.draw_times.parts() {
-                eprintln!("  {:<10} {:9.3} ms", part.name(), took.as_secs_f64() * 1e3);
+                eprintln!("  {:<12} {:9.3} ms", part.name(), took.as_secs_f64() * 1e3);
             }
         }
     }

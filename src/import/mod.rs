@@ -16,7 +16,6 @@ mod metadata;
 mod normalise;
 mod obj;
 mod off;
-mod parallel;
 mod ply;
 mod polygon;
 pub mod raw;

@@ -55,7 +55,7 @@ impl<'c> PlanContext<'c> {
             is_done_and_open.store(!is_closed, Ordering::Relaxed);
             (edges, is_closed)
         };
-        // Needless for open meshes, and so not begun once the mesh is known to be open.
+        // Open meshes need none: it is not begun once the mesh is known to be open.
         let orientation = || (!is_done_and_open.load(Ordering::Relaxed)).then(|| orientation(mesh));
         let ((edges, is_closed), orientation) =
             if mesh.triangles.len() < CHECK_EVERY { (edges(), orientation()) } else { rayon::join(edges, orientation) };

@@ -175,7 +175,7 @@ impl CpuRenderer {
             });
         });
         self.flat = flat;
-        self.draw_times = watch.times(lap.end_untold());
+        self.draw_times = watch.times(lap.restart());
         self.trim();
         drawn?;
         Ok(deadline.check()?)

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::backend::draw_times::{DrawStage, DrawTimes};
 
-/// Stages that one thread after another runs, in order.
+/// The stages of a band, in order. Each thread runs them for its own bands.
 const BAND_STAGES: [DrawStage; 4] = [DrawStage::Visibility, DrawStage::Shade, DrawStage::Lines, DrawStage::Resolve];
 
 /// Time of each stage, summed over all threads.
@@ -44,12 +44,12 @@ pub struct Lap<'a> {
 impl Lap<'_> {
     /// Ends a stage, and begins the next.
     pub fn end(&mut self, stage: DrawStage) {
-        let nanoseconds = u64::try_from(self.end_untold().as_nanos()).unwrap_or(u64::MAX);
+        let nanoseconds = u64::try_from(self.restart().as_nanos()).unwrap_or(u64::MAX);
         self.watch.nanoseconds[stage as usize].fetch_add(nanoseconds, Ordering::Relaxed);
     }
 
-    /// Ends what other laps tell the stages of. Returns its duration.
-    pub fn end_untold(&mut self) -> Duration {
+    /// The time since the last stage ended. Begins the next.
+    pub fn restart(&mut self) -> Duration {
         let now = Instant::now();
         now.duration_since(std::mem::replace(&mut self.began, now))
     }

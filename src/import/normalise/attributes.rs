@@ -1,9 +1,9 @@
 //! Repairs vertex attributes: values become finite, normals become unit, and unusable arrays are
 //! dropped.
 
-use crate::import::parallel::each_piece;
 use crate::import::raw::RawMesh;
 use crate::mesh::Mesh;
+use crate::parallel::each_piece;
 use crate::warning::Warning;
 
 /// The repaired attributes: each empty, or one value per raw vertex.

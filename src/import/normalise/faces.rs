@@ -3,9 +3,9 @@
 use super::geometry::{Geometry, Key as _};
 use super::local::{CORNERS_MAX, Local};
 use super::pow2::{Pow2, exponent, is_usable, max_abs};
-use crate::import::parallel::{map, map_with};
 use crate::limits::{Deadline, Stopped};
 use crate::mesh::vector::{cross, dot, sub};
+use crate::parallel::{map, map_with};
 
 /// Triangles handed to a thread at a time.
 const TRIANGLES_PER_PIECE: usize = 16_384;

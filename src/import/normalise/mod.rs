@@ -22,10 +22,10 @@ use self::pow2::{Pow2, exponent, is_usable, max_abs};
 use super::raw::RawMesh;
 use super::{ImportReport, Imported, MeshError, MeshFault};
 use crate::import::context::Context;
-use crate::import::parallel::{map, map_items};
 use crate::limits::Stopped;
 use crate::mesh::vector::sub;
 use crate::mesh::{LineOrPoint, MaterialSlot, Mesh, ToFile, primitives};
+use crate::parallel::{map, map_items};
 use crate::pluralise::pluralise;
 
 /// Brings an imported mesh into its normal form.

@@ -4,8 +4,8 @@
 use super::faces::{Faces, Piece};
 use super::geometry::{Geometry, Key};
 use super::weld::{Bits, NEW, Welded, weld};
-use crate::import::parallel::{concat, each_piece, map, map_items};
 use crate::limits::{Deadline, Stopped};
+use crate::parallel::{concat, each_piece, map, map_items};
 use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::Relaxed;
 

@@ -4,8 +4,8 @@
 //! fit a core's cache. Threads take pieces and shares, and never wait for each other's memory.
 
 use super::hasher::Hasher;
-use crate::import::parallel::{map, map_with};
 use crate::limits::{Deadline, Stopped};
+use crate::parallel::{map, map_with};
 use std::ops::Range;
 
 /// Positions of a share, about.

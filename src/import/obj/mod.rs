@@ -22,11 +22,12 @@ use self::cut::PART_BYTES;
 use self::face::Counts;
 use self::parse::{Fault, Part, Places, Rules, parse};
 use super::raw::RawMesh;
-use super::{Format, MeshError, parallel, text};
+use super::{Format, MeshError, text};
 use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
 use crate::mesh::MaterialSlot;
+use crate::parallel;
 use crate::srgb::srgb_to_linear;
 
 /// Bytes that a number or a keyword becomes, at most. A `v` line of four words takes 96 bytes: three

@@ -3,7 +3,7 @@
 use super::header::Kind;
 use super::layout::{Layout, Step};
 use super::source::{Columns, Source};
-use crate::import::parallel::map;
+use crate::parallel::map;
 
 /// Reads numbers. `BIG`: most significant byte first.
 pub struct Binary<'a, const BIG: bool> {

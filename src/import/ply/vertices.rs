@@ -6,8 +6,8 @@ use super::layout::{Layout, Slot};
 use super::source::{Columns, Cost, Meter, Source, each_record, ends_within};
 use crate::import::MeshError;
 use crate::import::context::Context;
-use crate::import::parallel::map_with;
 use crate::limits::Stopped;
+use crate::parallel::map_with;
 use std::ops::Range;
 
 /// Slots of a vertex's numbers.

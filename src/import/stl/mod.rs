@@ -10,8 +10,8 @@ use super::{Format, MeshError, text};
 use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
-use crate::import::parallel::map;
 use crate::mesh::{MaterialSlot, UpAxis};
+use crate::parallel::map;
 use crate::pluralise::pluralise;
 use crate::warning::Warning;
 

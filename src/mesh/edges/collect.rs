@@ -2,22 +2,22 @@
 //!
 //! A side of triangle `t` has the number `3 t + i` and goes from corner `i` to corner `i + 1`. Sides
 //! are sorted by their lower vertex; in the bucket of a vertex those with the same upper vertex are
-//! mates. The first of mates becomes an edge, so edges come in the order of their first triangles.
-//! Loops decide little by branches, because the order of a mesh's triangles cannot be predicted.
+//! mates. The first side of each set of mates becomes an edge, so edges come in the order of their
+//! first triangles. Loops avoid branches, because the order of a mesh's triangles cannot be predicted.
 
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
 use bytemuck::allocation::zeroed_vec;
-use rayon::prelude::*;
 
 use super::{Edge, EdgeList, FACE_COUNT, HAS_INCONSISTENT_WINDING, IS_POLYGON_EDGE};
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
+use crate::parallel::map;
 
-/// Pieces of a long list that are worked on at once while sides are sorted. Each takes a number per
-/// vertex. It is fixed so that budgets do not depend on the number of threads.
+/// Pieces that the sides are counted and sorted in. Each takes a number per vertex. Their number is
+/// fixed so that budgets do not depend on the number of threads.
 const SORTED_AT_ONCE: usize = 4;
 
 /// Triangles from which a mesh is shared among threads.
@@ -29,7 +29,7 @@ const PIECE: usize = 1 << 14;
 /// The longest bucket that is searched pair by pair. The hub of a hostile fan has millions of sides.
 const PAIRS_MAX: usize = 24;
 
-/// Sides that are looked through before edges are made of some.
+/// Sides in a block: those of a block that come first are found, and then made into edges.
 const BLOCK: usize = 384;
 
 /// A side that has mates and is not the first of them.
@@ -43,23 +43,19 @@ pub fn collect(mesh: &Mesh, budget: &mut Budget) -> Result<EdgeList, LimitExceed
     // Sorted sides, and their mates.
     budget.spend("the edges", sides as u64, 8 + 4)?;
     let buckets = Buckets::of(mesh, pieces);
-    if buckets.longest > PAIRS_MAX {
-        // A thread may sort a copy of a bucket.
-        budget.spend("the edges", (pieces * buckets.longest).min(sides) as u64, 8)?;
-    }
+    // Each thread may sort a copy of a bucket.
+    budget.spend("the edges", buckets.in_long_ones as u64, 8)?;
     let mates: Vec<AtomicU32> = zeroed_vec(sides);
-    let crowded_count: usize = in_pieces(vertices, |range| {
+    let crowded_counts: Vec<usize> = in_pieces(vertices, |range| {
         let mut count = 0;
         buckets.mark_mates(&mates, range, &mut |_| count += 1);
         count
-    })
-    .into_iter()
-    .sum();
+    });
+    let crowded_count = crowded_counts.iter().sum();
     budget.spend("the edges", crowded_count as u64, size_of::<[u32; 2]>() as u64)?;
-    let mut crowded = Vec::new();
-    if crowded_count > 0 {
-        crowded.reserve_exact(crowded_count);
-        buckets.mark_mates(&mates, 0..vertices, &mut |mate| crowded.push(mate));
+    let mut crowded = Vec::with_capacity(crowded_count);
+    for (range, _) in pieces_of(vertices).into_iter().zip(crowded_counts).filter(|(_, count)| *count > 0) {
+        buckets.mark_mates(&mates, range, &mut |mate| crowded.push(mate));
     }
     drop(buckets);
     let counts = in_pieces(mesh.triangles.len(), |range| first_sides(&mates, range).count());
@@ -67,16 +63,18 @@ pub fn collect(mesh: &Mesh, budget: &mut Budget) -> Result<EdgeList, LimitExceed
     budget.spend("the edges", count as u64, size_of::<Edge>() as u64 + 1)?;
     let (mut edges, mut kinds) = (zeroed_vec(count), zeroed_vec(count));
     fill(mesh, &mates, &counts, &mut edges, &mut kinds);
-    let further_faces = if crowded.is_empty() { crowded } else { add_further_faces(mesh, &mates, crowded, &mut kinds) };
+    let further_faces = add_further_faces(mesh, &mates, crowded, (&counts, &mut kinds));
     Ok(EdgeList { edges: Arc::new(edges), further_faces, kinds })
 }
 
 /// The results of `each` for ranges of a long list, in order. A short one is a single range.
 fn in_pieces<R: Send>(count: usize, each: impl Fn(Range<usize>) -> R + Sync + Send) -> Vec<R> {
-    if count < SHARED_FROM {
-        return vec![each(0..count)];
-    }
-    ranges(count, PIECE).into_par_iter().map(each).collect()
+    map(pieces_of(count), each)
+}
+
+/// The ranges of [`in_pieces`].
+fn pieces_of(count: usize) -> Vec<Range<usize>> {
+    if count < SHARED_FROM { ranges(count, count) } else { ranges(count, PIECE) }
 }
 
 fn ranges(count: usize, length: usize) -> Vec<Range<usize>> {
@@ -95,8 +93,8 @@ struct Buckets {
     starts: Vec<u32>,
     /// The upper vertex above the number of each side. Threads write to places of their own.
     sides: Vec<AtomicU64>,
-    /// The length of the longest bucket.
-    longest: usize,
+    /// The number of sides in buckets longer than [`PAIRS_MAX`].
+    in_long_ones: usize,
 }
 
 impl Buckets {
@@ -112,9 +110,9 @@ impl Buckets {
             counts
         };
         // By piece and vertex: first the number of sides, then the place of the next one.
-        let mut places: Vec<Vec<u32>> = each_of(triangles.iter().collect(), count);
+        let mut places: Vec<Vec<u32>> = map(triangles.iter().collect(), count);
         let mut starts = vec![0_u32; vertices + 1];
-        let (mut next, mut longest) = (0_u32, 0);
+        let (mut next, mut in_long_ones) = (0_u32, 0);
         for (vertex, start) in starts.iter_mut().enumerate() {
             *start = next;
             for place in places.iter_mut().filter_map(|places| places.get_mut(vertex)) {
@@ -123,7 +121,8 @@ impl Buckets {
                     next += std::mem::replace(place, next);
                 }
             }
-            longest = longest.max(next - *start);
+            let length = (next - *start) as usize;
+            in_long_ones += if length > PAIRS_MAX { length } else { 0 };
         }
         let sides: Vec<AtomicU64> = zeroed_vec(3 * mesh.triangles.len());
         let scatter = |(range, places): (Range<usize>, &mut Vec<u32>)| {
@@ -135,8 +134,8 @@ impl Buckets {
                 }
             }
         };
-        each_of(triangles.into_iter().zip(&mut places).collect(), scatter);
-        Self { starts, sides, longest: longest as usize }
+        map(triangles.into_iter().zip(&mut places).collect(), scatter);
+        Self { starts, sides, in_long_ones }
     }
 
     /// Sets, by side, the second of its mates if it is the first, 0 if it has none, and else
@@ -150,6 +149,7 @@ impl Buckets {
                 9..=PAIRS_MAX => pair_up::<PAIRS_MAX>(bucket, mates, each),
                 _ => {
                     copy.clear();
+                    copy.reserve_exact(bucket.len());
                     copy.extend(bucket.iter().map(|side| side.load(Relaxed)));
                     copy.sort_unstable();
                     copy.chunk_by(|a, b| a >> 32 == b >> 32).for_each(|same| mark(same, mates, each));
@@ -157,14 +157,6 @@ impl Buckets {
             }
         }
     }
-}
-
-/// The results of `each` for some items; a single one is left to the calling thread.
-fn each_of<T: Send, R: Send>(items: Vec<T>, each: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
-    if items.len() < 2 {
-        return items.into_iter().map(each).collect();
-    }
-    items.into_par_iter().map(each).collect()
 }
 
 /// Marks the mates in a bucket of at most `MAX` sides.
@@ -213,14 +205,13 @@ fn first_sides(mates: &[AtomicU32], triangles: Range<usize>) -> impl Iterator<It
 /// Writes the edges, of which there are so many in each piece of triangles.
 fn fill(mesh: &Mesh, mates: &[AtomicU32], counts: &[usize], mut edges: &mut [Edge], mut kinds: &mut [u8]) {
     let mut pieces = Vec::with_capacity(counts.len());
-    let length = if counts.len() < 2 { mesh.triangles.len() } else { PIECE };
-    for (range, &count) in ranges(mesh.triangles.len(), length).into_iter().zip(counts) {
+    for (range, &count) in pieces_of(mesh.triangles.len()).into_iter().zip(counts) {
         let (own_edges, other_edges) = edges.split_at_mut(count);
         let (own_kinds, other_kinds) = kinds.split_at_mut(count);
         pieces.push((range, own_edges, own_kinds));
         (edges, kinds) = (other_edges, other_kinds);
     }
-    each_of(pieces, |(range, edges, kinds)| {
+    map(pieces, |(range, edges, kinds): (Range<usize>, &mut [Edge], &mut [u8])| {
         let mut places = edges.iter_mut().zip(kinds);
         let mut firsts = [0_u32; BLOCK];
         for block in ranges(3 * range.len(), BLOCK) {
@@ -254,12 +245,27 @@ fn edge_of(mesh: &Mesh, side: u32, mate: u32) -> (Edge, u8) {
     (Edge::new(&mesh.positions, [start, end], [face, second]), kind)
 }
 
-/// Adds third and further sides to the kinds of their edges. They come with the first side of their
-/// edge, and are returned as edges and faces, in mesh order.
-fn add_further_faces(mesh: &Mesh, mates: &[AtomicU32], mut sides: Vec<[u32; 2]>, kinds: &mut [u8]) -> Vec<[u32; 2]> {
-    // By first side: its edge.
-    for (side, edge) in first_sides(mates, 0..mesh.triangles.len()).zip(0_u32..) {
-        mates[side].store(edge, Relaxed);
+/// Adds third and further sides to the kinds of their edges, of which there are so many in each piece
+/// of triangles. They come with the first side of their edge, and are returned as edges and faces, in
+/// mesh order.
+fn add_further_faces(
+    mesh: &Mesh,
+    mates: &[AtomicU32],
+    mut sides: Vec<[u32; 2]>,
+    (counts, kinds): (&[usize], &mut [u8]),
+) -> Vec<[u32; 2]> {
+    sides.sort_unstable_by_key(|[first, _]| *first);
+    let (mut firsts, mut next_edge) = (sides.iter().map(|[first, _]| *first as usize).peekable(), 0);
+    for (range, &count) in pieces_of(mesh.triangles.len()).into_iter().zip(counts) {
+        let end = 3 * range.end;
+        if firsts.peek().is_some_and(|first| *first < end) {
+            // By first side: its edge.
+            for (side, edge) in first_sides(mates, range).zip(next_edge..) {
+                mates[side].store(edge, Relaxed);
+            }
+            while firsts.next_if(|first| *first < end).is_some() {}
+        }
+        next_edge += count as u32;
     }
     sides.sort_unstable_by_key(|[_, side]| *side);
     for [first, side] in &mut sides {

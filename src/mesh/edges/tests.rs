@@ -139,3 +139,22 @@ fn an_edge_runs_from_the_smaller_position_to_the_larger() {
     let vertices: Vec<[u32; 2]> = list.iter().map(|edge| edge.vertices).collect();
     assert_eq!(vertices, [[1, 0], [2, 1], [2, 0]]);
 }
+
+#[test]
+fn too_small_a_budget_is_refused_at_every_step() {
+    // A hub with a long bucket, and an edge of three faces.
+    let mut triangles: Vec<[u32; 3]> = (1..100).map(|v| [0, v, v + 1]).collect();
+    triangles.push([0, 1, 101]);
+    triangles.push([1, 0, 102]);
+    let mesh =
+        Mesh { positions: vec![[0.0; 3]; 103], edge_masks: vec![7; triangles.len()], triangles, ..Mesh::default() };
+    let of = |memory_bytes: u64| {
+        let mut budget = Budget::new(&Limits { memory_bytes, ..Limits::default() });
+        EdgeList::of(&mesh, &mut budget).map(|list| (list, budget.spent_bytes()))
+    };
+    let (list, spent_bytes) = of(1 << 30).unwrap();
+    assert_eq!(list.further_faces.len(), 1);
+    let refused = (0..spent_bytes).filter(|&bytes| of(bytes).is_err()).count();
+    assert_eq!(refused as u64, spent_bytes);
+    assert!(of(spent_bytes).is_ok());
+}

@@ -56,10 +56,19 @@ struct Source<'s> {
 }
 
 impl Source<'_> {
-    /// The edges that have a style.
+    /// The edges that have a style. Holes ask for rims: of more than two faces, none is the other side
+    /// of the surface.
     fn edges(&self, style: &LineStyle, cx: &mut PlanContext<'_>) -> Result<Arc<Vec<Edge>>, PlanError> {
         if style.takes_all(self.list) {
-            return Ok(Arc::clone(&self.list.edges));
+            if !style.has_all_edges || self.list.further_faces.is_empty() {
+                return Ok(Arc::clone(&self.list.edges));
+            }
+            cx.budget.spend("drawn edges", self.list.len() as u64, size_of::<Edge>() as u64)?;
+            let mut edges = self.list.edges.to_vec();
+            for &[edge, _] in &self.list.further_faces {
+                edges[edge as usize].faces[1] = Edge::NO_FACE;
+            }
+            return Ok(Arc::new(edges));
         }
         let found = select("drawn edges", self.list.len(), cx, |range, found| self.each(style, range, found))?;
         Ok(Arc::new(found))
@@ -72,7 +81,6 @@ impl Source<'_> {
         for i in range {
             let edge = self.list.get(i);
             if style.draws(mesh, groups, &edge) {
-                // Holes ask for rims: of more than two faces, none is the other side of the surface.
                 let is_crowded = style.has_all_edges && edge.face_count > 2;
                 let faces = if is_crowded { [edge.faces[0], Edge::NO_FACE] } else { edge.faces };
                 let all = Edge { vertices: edge.vertices, faces };

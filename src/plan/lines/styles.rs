@@ -46,16 +46,14 @@ impl LineStyle {
         self.width_px + self.smoothing_px > 0.0 && self.color[3] > 0.0
     }
 
-    /// True if the style's lines are all edges of this list as they are.
+    /// True if the style's lines are all edges of this list; a contour asks for other faces than theirs.
     pub fn takes_all(&self, list: &EdgeList) -> bool {
         let is_all = match self.class {
             Class::All => true,
             Class::Polygon => list.has_polygon_edges_alone(),
             _ => false,
         };
-        // A contour and holes ask for other faces than the first two.
-        let takes_first_two = !self.contour && (list.further_faces.is_empty() || !self.has_all_edges);
-        is_all && self.styles.is_empty() && takes_first_two
+        is_all && self.styles.is_empty() && !self.contour
     }
 
     /// True if an edge has this style.

@@ -61,16 +61,17 @@ impl Growth {
             let (triangles, len, bundle) = (2 * n * n, bytes.len(), Bundle::of_one(bytes));
             // A renderer keeps its buffers, which would count for the next size.
             self.cpu = CpuRenderer::new(self.threads);
-            forget_peak();
+            let has_peak = forget_peak();
             let before = memory_mb("VmRSS:");
             let (parse_ms, mesh) = least(|| import(&bundle));
             let [flat_plan, flat] = self.look(&mesh, &[("style", "flat")]);
             let peak = memory_mb("VmHWM:") - before + len as f64 / 1e6;
+            let peak = if has_peak { format!("{peak:.0}") } else { "not known".to_owned() };
             let [wire_plan, wire] = self.look(&mesh, &[("style", "wire")]);
             let mb_per_s = len as f64 / 1e3 / parse_ms;
             let ns = (flat_plan + flat) * 1e6 / triangles as f64;
             self.line(&format!(
-                "| {triangles} | {parse_ms:.2} | {mb_per_s:.0} | {flat_plan:.2} | {flat:.2} | {wire_plan:.2} | {wire:.2} | {peak:.0} | {ns:.0} |"
+                "| {triangles} | {parse_ms:.2} | {mb_per_s:.0} | {flat_plan:.2} | {flat:.2} | {wire_plan:.2} | {wire:.2} | {peak} | {ns:.0} |"
             ));
             for (series, ms) in [("parse", parse_ms), ("flat", flat_plan + flat), ("wire", wire_plan + wire)] {
                 self.points.push(Point { series, triangles: triangles as f64, ms });
@@ -157,7 +158,8 @@ fn memory_mb(line: &str) -> f64 {
     kib.unwrap_or(0.0) * 1.024e-3
 }
 
-/// Sets this process's peak memory back to what it has now (Linux, proc(5): clear_refs).
-fn forget_peak() {
-    let _ = std::fs::write("/proc/self/clear_refs", "5");
+/// Sets this process's peak memory back to what it has now (Linux, proc(5): clear_refs). True if the
+/// system can.
+fn forget_peak() -> bool {
+    std::fs::write("/proc/self/clear_refs", "5").is_ok()
 }

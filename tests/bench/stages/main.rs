@@ -101,7 +101,7 @@ fn write_growth(tables: &str, plot: &str, threads: usize) {
     let docs = concat!(env!("CARGO_MANIFEST_DIR"), "/docs");
     let head = format!(
         "# How cost grows\n\nMilliseconds on the CPU with {threads} threads, 512 x 512 px and 4 samples unless a row says otherwise; least \
-         of three. Measured by `cargo bench --bench stages -- --growth --write`.\n\n![time against triangles](growth.svg)\n"
+         of three, or the only one of what takes over a second. Measured by `cargo bench --bench stages -- --growth --write`.\n\n![time against triangles](growth.svg)\n"
     );
     std::fs::write(format!("{docs}/growth.md"), head + tables).unwrap();
     std::fs::write(format!("{docs}/growth.svg"), plot).unwrap();

@@ -103,9 +103,14 @@ impl Least {
     }
 }
 
-/// A mesh with default limits.
+/// The default limits, but for memory: the largest mesh has ten million triangles.
+fn limits() -> Limits {
+    Limits { memory_bytes: 16 << 30, ..Limits::default() }
+}
+
+/// A mesh.
 pub fn import(bundle: &Bundle) -> Mesh {
-    let limits = Limits::default();
+    let limits = limits();
     let Imported { mesh, .. } =
         meshsnap::import::import(bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap();
     mesh
@@ -118,9 +123,9 @@ pub fn spec(keys: &[(&str, &str)]) -> Spec {
     request::read(None, &keys, &rules).unwrap()
 }
 
-/// A plan with default limits.
+/// A plan.
 pub fn plan<'m>(mesh: &'m Mesh, spec: &Spec) -> DrawPlan<'m> {
-    let mut budget = Budget::new(&Limits::default());
+    let mut budget = Budget::new(&limits());
     let scene = Scene::new(mesh, spec, &mut budget).unwrap();
     plan::build(&scene, &mut budget, &Deadline::default()).unwrap()
 }

@@ -200,7 +200,8 @@ fn explain_tells_what_was_skipped_and_how_long_it_took() {
     let arguments = ["render", "-", "-o", "-", "--size", "16", "--style", "flat", "--backend", "cpu", "--explain"];
     let output = run(&arguments, CUBE_OBJ);
     let stderr = String::from_utf8(output.stderr).unwrap();
-    for part in ["drawn by cpu", "gpu: no", "parse", "plan", "render", "visibility", "shade", "encode", "total"] {
+    for part in ["drawn by cpu", "gpu: no", "read", "parse", "plan", "render", "visibility", "shade", "encode", "total"]
+    {
         assert!(stderr.contains(part), "{part}: {stderr}");
     }
     assert!(stderr.contains("skipped "), "{stderr}");

@@ -66,7 +66,9 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
     } else if plan.is_shaded() {
         shade_band(isa, context, &scratch.samples, &mut scratch.colors);
     }
-    lap.end(DrawStage::Shade);
+    if plan.peeling().is_some() || plan.is_shaded() {
+        lap.end(DrawStage::Shade);
+    }
     if !plan.lines.is_empty() {
         draw_lines(context, scratch, bins, band);
         lap.end(DrawStage::Lines);

@@ -6,7 +6,7 @@ use super::buffers::{Buffers, View};
 use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::gltf::document::schema::{Accessor, Document, Sparse};
-use crate::import::parallel::map;
+use crate::parallel::map;
 
 /// Elements without data that even the smallest file may declare.
 const ZEROS_MAX: u64 = 1 << 16;

@@ -17,11 +17,11 @@ use crate::import::gltf::data::attribute;
 use crate::import::gltf::document::schema;
 use crate::import::gltf::document::schema::mode;
 use crate::import::gltf::material::Materials;
-use crate::import::parallel::{each_piece, map_items};
 use crate::import::polygon::ALL_EDGES;
 use crate::import::raw::{RawMesh, extend_attribute};
 use crate::mesh::LineOrPoint;
 use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
+use crate::parallel::{each_piece, map_items};
 use crate::warning::Warning;
 use std::ops::Range;
 

@@ -4,11 +4,11 @@ use super::Names;
 use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::obj::parse::{Group, Part};
-use crate::import::parallel::{concat, map};
 use crate::import::polygon::{ALL_EDGES, Triangulator, WORK_MAX};
 use crate::import::raw::RawMesh;
 use crate::limits::{Deadline, Stopped};
 use crate::mesh::LineOrPoint;
+use crate::parallel::{concat, map};
 use bytemuck::allocation::try_cast_vec;
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -6,8 +6,8 @@ use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::obj::face::MISSING;
 use crate::import::obj::parse::Part;
-use crate::import::parallel::map;
 use crate::import::raw::RawMesh;
+use crate::parallel::map;
 use rapidhash::RapidHashMap;
 
 /// Combinations of one position that are compared one by one. More are looked up by their hash:

@@ -1,7 +1,7 @@
 //! Lists of a part that begin in room for the whole text, so that they need not be put together
 //! afterwards.
 
-use crate::import::parallel::concat_slices;
+use crate::parallel::concat_slices;
 
 /// A list of a part while it grows: first in its place of the room, then beside it.
 #[derive(Debug)]

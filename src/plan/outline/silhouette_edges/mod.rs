@@ -86,8 +86,8 @@ impl<'a> ScreenMesh<'a> {
         }
     }
 
-    /// True for most edges of a surface that are no silhouette edges: their two faces go on into each
-    /// other, show the same side, and both are drawn or neither is.
+    /// True for most edges of a surface that are no silhouette edges: their two faces wind
+    /// alike, show the same side, and both are drawn or neither is.
     fn is_surely_inside(&self, edge: &MeshEdge) -> bool {
         if edge.face_count != 2 || edge.has_inconsistent_winding {
             return false;

@@ -1,4 +1,4 @@
-//! Work on many pieces of a file at once.
+//! Work on many pieces of a file or a mesh at once.
 //!
 //! It is done by the thread pool that the caller is in, or else by rayon's own, which has a thread
 //! for each core. A single piece is done by the calling thread. No result depends on the number
