@@ -96,7 +96,7 @@ impl Growth {
         self.header("Edges drawn, 70 k triangles", &["edges", "plan", "render"]);
         for (name, keys) in [
             ("none", &[("style", "flat")] as Keys<'_>),
-            ("sharp ones", &[("style", "flat"), ("wire.enabled", "true"), ("wire.edges", "feature")]),
+            ("sharp ones", &[("style", "wire"), ("wire.edges", "feature")]),
             ("all", &[("style", "wire")]),
             ("all, hidden ones too", &[("style", "wire"), ("wire.hidden", "fade")]),
         ] {
