@@ -145,8 +145,8 @@ pub enum Exhausted {
     Stopped(#[from] Stopped),
 }
 
-/// A flag that says "stop", raised by the job's owner. The pipeline asks no clock whether to stop: it polls the flag
-/// between stages and inside long loops.
+/// A flag that says "stop", raised by the job's owner. The pipeline asks no clock whether to stop: it
+/// polls the flag between stages and inside long loops.
 #[derive(Clone, Debug, Default)]
 pub struct Deadline(Arc<DeadlineState>);
 

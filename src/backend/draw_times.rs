@@ -1,4 +1,4 @@
-//! How long each stage of drawing took, for reports.
+//! The duration of each stage of drawing, for reports.
 
 use std::time::Duration;
 

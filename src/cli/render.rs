@@ -111,8 +111,8 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
     };
     let threads = arguments.threads.map_or(cores() as usize, usize::from);
     if arguments.threads.is_some() {
-        // Rayon's global pool parses files, finds edges, normals and outlines, and decodes textures. This fails only if that pool is
-        // running already.
+        // Rayon's global pool parses files, finds edges, normals and outlines, and decodes textures. This
+        // fails only if that pool is running already.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     }
     let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));

@@ -5,7 +5,7 @@
 //! the same bytes; only the speed differs.
 //!
 //! The innermost steps of triangles are an exception: they have a second version in AVX2 instructions,
-//! in files whose names end so.
+//! in files called `avx2.rs` or `*_avx2.rs`.
 //!
 //! To add an instruction set (AVX-512, NEON): a variant of `Level` under its `cfg`, a list of
 //! features beside [`for_avx2_features`], a constructor that detects all of them, and an arm in

@@ -156,7 +156,7 @@ fn push<T: Item, const N: usize>(items: &mut Vec<T>, count: usize, vectors: [__m
     }
 }
 
-/// What any bits make.
+/// A type of which any bits are a value.
 ///
 /// # Safety
 ///

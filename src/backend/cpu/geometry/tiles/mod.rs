@@ -12,16 +12,16 @@ use crate::backend::cpu::isa::{Isa, LANES};
 const TILE: usize = 1 << TILE_SHIFT;
 
 /// Its binary logarithm.
-pub const TILE_SHIFT: i32 = 3;
+const TILE_SHIFT: i32 = 3;
 
 /// The smallest depth (reversed: the farthest) of each tile of 8 x 8 pixels.
 #[derive(Default)]
 pub struct Tiles {
-    pub columns: usize,
+    columns: usize,
     /// First column and row that have samples.
-    pub first: [i32; 2],
+    first: [i32; 2],
     /// Row by row.
-    pub depth_min: Vec<f32>,
+    depth_min: Vec<f32>,
 }
 
 impl Tiles {
