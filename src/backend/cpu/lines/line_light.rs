@@ -8,9 +8,9 @@
 
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::SampleBand;
-use crate::backend::cpu::surface::barycentric::{Barycentrics, corners};
+use crate::backend::cpu::surface::barycentric::{Barycentrics, Corners};
 use crate::backend::cpu::surface::light::{Light, light as light_on};
-use crate::backend::cpu::surface::normal::normal;
+use crate::backend::cpu::surface::normal::normals;
 use crate::backend::cpu::surface::wire::Place;
 use crate::plan::{SurfacePass, flags, sample_offsets};
 
@@ -56,9 +56,10 @@ fn point(context: &RasterContext<'_>, surface: &SurfacePass<'_>, id: u32, at: [f
     if material.flags & flags::LIT == 0 {
         return Light::NONE;
     }
-    let mut b = Barycentrics::new(&corners(context, id, at));
-    b.value = inside(b.value);
-    let normal = normal(surface, material, &Place { context, id, at, b });
+    let (ids, at) = ([id], at.map(|v| [v]));
+    let mut b = Barycentrics::new(&Corners::new(context, &ids, &at));
+    b.value = inside(b.value.map(|[v]| v)).map(|v| [v]);
+    let normal = normals(surface, material, &Place { context, ids, at, b }).map(|[v]| v);
     light_on(&surface.lights, &context.plan.projection, material.metallic, material.roughness, normal)
 }
 

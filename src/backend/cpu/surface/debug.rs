@@ -1,10 +1,10 @@
 //! Stage shade, per point: debug views, which show a triangle's numbers as colours. Twin of
 //! `shaders/surface/debug.wgsl`.
 
-use super::barycentric::{Corner, edge_distances_px};
+use super::barycentric::{Corners, edge_distances_px};
 use super::light::{light, lit};
-use super::normal::normal;
-use super::texture::{Uv, blend, floor};
+use super::normal::normals;
+use super::texture::{Uv, blend, floor, of_corners};
 use super::wire::{Place, edge_mask, is_drawn};
 use crate::backend::cpu::vector::dot;
 use crate::plan::{ShadedMaterial, SurfacePass, debug_views, flags};
@@ -13,41 +13,40 @@ use crate::plan::{ShadedMaterial, SurfacePass, debug_views, flags};
 pub fn color(
     surface: &SurfacePass<'_>,
     material: &ShadedMaterial,
-    place: &Place<'_>,
-    corners: &[Corner; 3],
+    place: &Place<'_, 1>,
+    corners: &Corners<1>,
 ) -> [f32; 4] {
-    let b = place.b.value;
+    let [b0, b1, b2] = place.b.value.map(|[v]| v);
     let projection = &place.context.plan.projection;
+    let normal = || normals(surface, material, place).map(|[v]| v);
     match (material.flags & flags::DEBUG) >> flags::DEBUG_SHIFT {
-        debug_views::BARYCENTRIC => shown(b),
-        debug_views::MIN_BARYCENTRIC => shown([3.0 * b[0].min(b[1]).min(b[2]); 3]),
+        debug_views::BARYCENTRIC => shown([b0, b1, b2]),
+        debug_views::MIN_BARYCENTRIC => shown([3.0 * b0.min(b1).min(b2); 3]),
         debug_views::EDGE_DISTANCE => {
-            let mask = edge_mask(surface, place.id);
+            let mask = edge_mask(surface, place.ids[0]);
             let px = edge_distances_px(corners);
             let nearest = (0..3).filter(|&i| is_drawn(mask, i)).fold(8.0_f32, |least, i| least.min(px[i]));
             shown([nearest / 8.0; 3])
         }
         debug_views::NORMAL if material.flags & flags::LIT != 0 => {
-            let n = normal(surface, material, place);
+            let n = normal();
             let axes = [projection.screen_right, projection.screen_up, projection.to_viewer];
             shown(axes.map(|axis| 0.5 + 0.5 * dot(n, axis)))
         }
         debug_views::UV => match &surface.uvs {
-            Some(uvs) => shown(checker(Uv::new(uvs, place.id, &place.b).at)),
+            Some(uvs) => shown(checker(Uv::new(uvs, &place.ids, &place.b).at.map(|[v]| v))),
             None => shown([0.5; 3]),
         },
         debug_views::FACE_ORIENTATION => {
-            let paint = if place.b.front { [0.36, 0.56, 0.86] } else { [0.86, 0.30, 0.26] };
+            let paint = if place.b.front[0] { [0.36, 0.56, 0.86] } else { [0.86, 0.30, 0.26] };
             if material.flags & flags::LIT == 0 {
                 return shown(paint);
             }
-            let n = normal(surface, material, place);
-            lit(shown(paint), light(&surface.lights, projection, 0.0, material.roughness, n))
+            lit(shown(paint), light(&surface.lights, projection, 0.0, material.roughness, normal()))
         }
         debug_views::VERTEX_COLOR => match &surface.colors {
             Some(colors) => {
-                let corners = colors.triangles[place.id as usize].map(|i| colors.values[i as usize]);
-                let [r, g, b, _] = blend(corners, b);
+                let [[r], [g], [b], _] = blend(&of_corners(colors, &place.ids), &place.b.value);
                 [r, g, b, 1.0]
             }
             None => shown([0.5; 3]),

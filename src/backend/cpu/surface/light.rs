@@ -33,33 +33,59 @@ impl Light {
     }
 }
 
+/// As [`Light`], at `N` points.
+pub struct LightLanes<const N: usize> {
+    pub gain: [f32; N],
+    pub gloss: [f32; N],
+}
+
+impl<const N: usize> LightLanes<N> {
+    /// The base colours as they are.
+    pub const NONE: Self = Self { gain: [Light::NONE.gain; N], gloss: [Light::NONE.gloss; N] };
+}
+
 /// A colour with straight alpha under light, clamped to 1.
 #[inline(always)]
 pub fn lit(base: [f32; 4], light: Light) -> [f32; 4] {
-    let [r, g, b] = [0, 1, 2].map(|k| (base[k] * light.gain + light.gloss).clamp(0.0, 1.0));
-    [r, g, b, base[3]]
+    lit_lanes(&base.map(|v| [v]), &LightLanes { gain: [light.gain], gloss: [light.gloss] }).map(|[v]| v)
+}
+
+/// As [`lit`], at `N` points.
+#[inline(always)]
+pub fn lit_lanes<const N: usize>(base: &[[f32; N]; 4], light: &LightLanes<N>) -> [[f32; N]; 4] {
+    let mut colors = *base;
+    for k in 0..3 {
+        for l in 0..N {
+            colors[k][l] = (base[k][l] * light.gain[l] + light.gloss[l]).clamp(0.0, 1.0);
+        }
+    }
+    colors
 }
 
 /// Light on a surface with unit normal `n`: the bits of the other back-end.
 #[inline(always)]
 pub fn light(lights: &Lights, projection: &Projection, metallic: f32, roughness: f32, n: [f32; 3]) -> Light {
-    let [gain, gloss] = light_lanes(quick_recip, lights, projection, metallic, roughness, &n.map(|v| [v]));
-    Light { gain: gain[0], gloss: gloss[0] }
+    let LightLanes { gain: [gain], gloss: [gloss] } =
+        light_lanes(quick_recip, lights, projection, &[metallic], &[roughness], &n.map(|v| [v]));
+    Light { gain, gloss }
 }
 
-/// [`light`] on several normals: gains, then glosses. `inverse_of` is [`quick_recip`] for the bits of
+/// [`light`] at `N` points. `inverse_of` is [`quick_recip`] for the bits of
 /// the other back-end. The processor's own division is quicker, for normals whose bits differ anyway.
 #[inline(always)]
 pub fn light_lanes<const N: usize>(
     inverse_of: impl Fn(f32) -> f32,
     lights: &Lights,
     projection: &Projection,
-    metallic: f32,
-    roughness: f32,
+    metallic: &[f32; N],
+    roughness: &[f32; N],
     n: &[[f32; N]; 3],
-) -> [[f32; N]; 2] {
-    let alpha = (roughness * roughness).max(0.0025);
-    let alpha_squared = alpha * alpha;
+) -> LightLanes<N> {
+    let mut alpha_squared = [0.0; N];
+    for l in 0..N {
+        let alpha = (roughness[l] * roughness[l]).max(0.0025);
+        alpha_squared[l] = alpha * alpha;
+    }
     let (mut diffuse, mut shine, mut strength) = ([0.0; N], [0.0; N], 0.0);
     for lamp in &lights.lamps {
         let light_half = dot(lamp.to_light, lamp.halfway);
@@ -67,9 +93,9 @@ pub fn light_lanes<const N: usize>(
             let n = [n[0][l], n[1][l], n[2][l]];
             let n_light = dot(n, lamp.to_light).max(0.0);
             let n_half = dot(n, lamp.halfway).max(0.0);
-            let lobe = n_half * n_half * (alpha_squared - 1.0) + 1.0;
+            let lobe = n_half * n_half * (alpha_squared[l] - 1.0) + 1.0;
             let spread = lobe * lobe * (light_half * light_half).max(0.1);
-            let gloss = alpha_squared * inverse_of(spread * (4.0 * roughness + 2.0));
+            let gloss = alpha_squared[l] * inverse_of(spread * (4.0 * roughness[l] + 2.0));
             let direct = lamp.strength * n_light;
             diffuse[l] += direct;
             shine[l] += direct * gloss;
@@ -77,29 +103,33 @@ pub fn light_lanes<const N: usize>(
         strength += lamp.strength;
     }
     // F0 = 0.04 (1 - metallic) + metallic base.
-    let matte = 1.0 - metallic;
-    let (mut gain, mut gloss) = ([0.0; N], [0.0; N]);
+    let mut light = LightLanes::NONE;
     for l in 0..N {
+        let matte = 1.0 - metallic[l];
         let n_up = dot([n[0][l], n[1][l], n[2][l]], projection.screen_up);
         let ambient = lights.ambient * (0.7 + 0.3 * n_up);
-        gain[l] = matte * (ambient + diffuse[l]) + metallic * shine[l];
-        gloss[l] = 0.04 * matte * shine[l];
+        light.gain[l] = matte * (ambient + diffuse[l]) + metallic[l] * shine[l];
+        light.gloss[l] = 0.04 * matte * shine[l];
     }
-    if metallic > 0.0 {
-        for l in 0..N {
-            let n = [n[0][l], n[1][l], n[2][l]];
-            let (n_view, n_up) = (dot(n, projection.to_viewer), dot(n, projection.screen_up));
-            // Schlick's rise towards grazing angles, less of it where the surface is rough.
-            let grazing = 1.0 - n_view.clamp(0.0, 1.0);
-            let square = grazing * grazing;
-            let rise = square * square * grazing * (1.0 - roughness);
-            let mirrored = 2.0 * (n_view * n_up) - dot(projection.to_viewer, projection.screen_up);
-            let seen = metallic * (lights.ambient + 0.5 * strength) * studio(&inverse_of, mirrored, roughness);
-            gain[l] += seen * (1.0 - rise);
-            gloss[l] += seen * rise;
-        }
+    if metallic.iter().all(|metallic| *metallic <= 0.0) {
+        return light;
     }
-    [gain, gloss]
+    for l in 0..N {
+        let n = [n[0][l], n[1][l], n[2][l]];
+        let (n_view, n_up) = (dot(n, projection.to_viewer), dot(n, projection.screen_up));
+        // Schlick's rise towards grazing angles, less of it where the surface is rough.
+        let grazing = 1.0 - n_view.clamp(0.0, 1.0);
+        let square = grazing * grazing;
+        let rise = square * square * grazing * (1.0 - roughness[l]);
+        let mirrored = 2.0 * (n_view * n_up) - dot(projection.to_viewer, projection.screen_up);
+        let studio = studio(&inverse_of, mirrored, roughness[l]);
+        let seen = metallic[l] * (lights.ambient + 0.5 * strength) * studio;
+        let (gain, gloss) = (light.gain[l] + seen * (1.0 - rise), light.gloss[l] + seen * rise);
+        let is_metal = metallic[l] > 0.0;
+        light.gain[l] = if is_metal { gain } else { light.gain[l] };
+        light.gloss[l] = if is_metal { gloss } else { light.gloss[l] };
+    }
+    light
 }
 
 /// Brightness of the studio in a direction that rises by `up` (the sine of its elevation).

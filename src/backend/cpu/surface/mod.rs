@@ -1,7 +1,7 @@
 //! Stage shade: from visible samples to colours.
 //!
 //! [`shade`] groups a pixel's samples by triangle, [`point`] shades each group once, at the mean of
-//! its samples. The rest is its formulas: [`barycentric`] coordinates, [`texture`] lookups, the
+//! its samples; groups of neighbouring pixels are [`waiting`] until eight are shaded together. The rest is its formulas: [`barycentric`] coordinates, [`texture`] lookups, the
 //! [`normal`], [`light`], [`wire`] and [`debug`] views. Twins are in `shaders/surface/`.
 
 pub(crate) mod barycentric;
@@ -14,4 +14,5 @@ pub(crate) mod normal;
 pub(crate) mod point;
 pub(crate) mod shade;
 pub(crate) mod texture;
+mod waiting;
 pub(crate) mod wire;

@@ -1,16 +1,16 @@
-//! Stage shade, per point: the colour of a point of the surface. Twin of
+//! Stage shade, per point: the colours of points of the surface, one or eight at a time. Twin of
 //! `shaders/surface/point.wgsl`.
 
-use super::barycentric::{Barycentrics, corners};
+use super::barycentric::{Barycentrics, Corners};
 use super::debug;
-use super::light::{Light, light, light_lanes, lit};
-use super::normal::{normal, normal_mapped};
-use super::texture::{Uv, blend, sample};
-use super::wire::{Place, edge_mask, fwidth_cover, wire_cover};
+use super::light::{Light, LightLanes, light_lanes, lit_lanes};
+use super::normal::{face_normals, normal_mapped, normals, to_viewer};
+use super::texture::{Uv, blend, of_corners, sample};
+use super::wire::{Place, edge_mask, fwidth_covers, wire_covers};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, quick_recip};
 use crate::backend::cpu::geometry::visibility::area;
-use crate::backend::cpu::vector::{facing, turned_to_viewer};
+use crate::backend::cpu::vector::facing;
 use crate::plan::{Projection, ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, slots};
 
 /// Flags that the common materials do not have, textures aside.
@@ -41,7 +41,7 @@ impl Show {
     pub const ALL: Self = Self { fill: true, wires: 1.0 };
 }
 
-/// Shades points of surface triangles.
+/// Shades points of surface triangles one by one.
 pub struct PointShader<'a> {
     context: &'a RasterContext<'a>,
     /// Flat colours do not change over a triangle: the last one is kept.
@@ -65,121 +65,220 @@ impl<'a> PointShader<'a> {
 
     /// Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the
     /// picture's centre.
+    #[inline(never)]
     pub fn color(&mut self, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> [f32; 4] {
         let material = surface.material(id as usize);
-        let is_textured = is_textured(surface, material);
-        if material.flags & GENERAL != 0 || is_textured {
-            return self.general(surface, material, id, at, is_textured);
+        let points = Points { context: self.context, surface, material, show: self.show };
+        let color = points.colors(&[id], &at.map(|v| [v])).map(|[v]| v);
+        if is_flat(surface, material) {
+            self.flat = Some((id, color));
         }
-        if material.flags & VARYING != 0 {
-            return self.common(surface, material, id, at);
-        }
-        let mut normal = [[0.0]; 3];
-        if material.flags & flags::FACE_NORMALS != 0 {
-            let is_front = self.is_front(id, at);
-            normal = turned_to_viewer(surface.face_normals[id as usize], is_front).map(|v| [v]);
-        }
-        let [r, g, b, a] = flat_colors(surface, material, &self.context.plan.projection, self.show, &normal);
-        let color = [r[0], g[0], b[0], a[0]];
-        self.flat = Some((id, color));
         color
+    }
+}
+
+/// Points of triangles of one material, to be shaded.
+pub struct Points<'a> {
+    /// Everything that is drawn.
+    pub context: &'a RasterContext<'a>,
+    /// The triangles' pass.
+    pub surface: &'a SurfacePass<'a>,
+    /// Their material.
+    pub material: &'a ShadedMaterial,
+    /// Shown parts of it.
+    pub show: Show,
+}
+
+impl Points<'_> {
+    /// Premultiplied linear RGBA of `N` points: of triangles `ids` at `at`, columns, then rows, in
+    /// 1/256 px from the picture's centre.
+    #[inline(always)]
+    pub fn colors<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2]) -> [[f32; N]; 4] {
+        let is_textured = is_textured(self.surface, self.material);
+        if self.material.flags & flags::DEBUG != 0 {
+            return self.debug_colors(ids, at);
+        }
+        if self.material.flags & GENERAL != 0 || is_textured {
+            return self.general(ids, at, is_textured);
+        }
+        if self.material.flags & VARYING != 0 {
+            return self.common(ids, at);
+        }
+        let mut normals = [[0.0; N]; 3];
+        if self.material.flags & flags::FACE_NORMALS != 0 {
+            normals = face_normals(self.surface, ids, &self.are_front(ids, at));
+        }
+        flat_colors(self.surface, self.material, &self.context.plan.projection, self.show, &normals)
     }
 
     /// One base colour, smooth or with a wire by fwidth.
-    fn common(&self, surface: &SurfacePass<'_>, material: &ShadedMaterial, id: u32, at: [f32; 2]) -> [f32; 4] {
-        let b = Barycentrics::new(&corners(self.context, id, at));
-        let base = with_alpha(material, material.base_color, self.show);
-        let mut light = Light::NONE;
-        if material.flags & flags::LIT != 0 {
-            let projection = &self.context.plan.projection;
-            light = match (&surface.vertex_normals, surface.face_normals.get(id as usize)) {
-                (Some(normals), _) if material.flags & flags::VERTEX_NORMALS != 0 => {
-                    let corners = normals.triangles[id as usize].map(|i| normals.values[i as usize]);
-                    let normal = facing(blend(corners, b.value), b.front);
-                    let normal = normal.map(|v| [v]);
-                    let (metallic, roughness) = (material.metallic, material.roughness);
-                    let [gain, gloss] =
-                        light_lanes(|w| 1.0 / w, &surface.lights, projection, metallic, roughness, &normal);
-                    Light { gain: gain[0], gloss: gloss[0] }
-                }
-                (_, face) => {
-                    let normal = face.map_or(projection.to_viewer, |normal| turned_to_viewer(*normal, b.front));
-                    self.light(surface, material.metallic, material.roughness, normal)
-                }
-            };
-        }
-        let color = premultiplied(lit(base, light), material.emissive);
-        if material.flags & flags::WIRE_FWIDTH == 0 || self.show.wires == 0.0 {
+    #[inline(always)]
+    fn common<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2]) -> [[f32; N]; 4] {
+        let Self { context, surface, material, show } = self;
+        let b = Barycentrics::new(&Corners::new(context, ids, at));
+        let base = with_alpha(material, material.base_color, *show);
+        let projection = &context.plan.projection;
+        let (metallic, roughness) = ([material.metallic; N], [material.roughness; N]);
+        let light = if material.flags & flags::LIT == 0 {
+            LightLanes::NONE
+        } else if let (Some(normals), true) = (&surface.vertex_normals, material.flags & flags::VERTEX_NORMALS != 0) {
+            let normal = facing(&blend(&of_corners(normals, ids), &b.value), &b.front);
+            light_lanes(|w| 1.0 / w, &surface.lights, projection, &metallic, &roughness, &normal)
+        } else {
+            let has_normals = ids.iter().all(|id| (*id as usize) < surface.face_normals.len());
+            let normal = if has_normals { face_normals(surface, ids, &b.front) } else { to_viewer(projection) };
+            light_lanes(quick_recip, &surface.lights, projection, &metallic, &roughness, &normal)
+        };
+        let emissive = material.emissive.map(|v| [v; N]);
+        let color = premultiplied(&lit_lanes(&base.map(|v| [v; N]), &light), &emissive);
+        if material.flags & flags::WIRE_FWIDTH == 0 || show.wires == 0.0 {
             return color;
         }
-        over(self.show.wires * fwidth_cover(edge_mask(surface, id), material, &b), material.wire_color, color)
+        let masks = ids.map(|id| edge_mask(surface, id));
+        let covers = fwidth_covers(&masks, material, &b).map(|cover| show.wires * cover);
+        over(&covers, material.wire_color, &color)
     }
 
-    /// Every material there is.
-    #[inline(never)]
-    fn general(
-        &self,
-        surface: &SurfacePass<'_>,
-        material: &ShadedMaterial,
-        id: u32,
-        at: [f32; 2],
-        is_textured: bool,
-    ) -> [f32; 4] {
-        let c = corners(self.context, id, at);
-        let is_deciding = is_textured || material.flags & DECIDING != 0;
-        let b = if is_deciding { Barycentrics::exact(&c) } else { Barycentrics::new(&c) };
-        let place = Place { context: self.context, id, at, b };
-        let has_wire = material.flags & flags::WIRES != 0 && self.show.wires > 0.0;
-        let cover = if has_wire { self.show.wires * wire_cover(surface, material, &place) } else { 0.0 };
-        if material.flags & flags::DEBUG != 0 && !self.show.fill {
-            return material.wire_color.map(|v| cover * v);
-        }
-        if material.flags & flags::DEBUG != 0 {
-            return over(cover, material.wire_color, debug::color(surface, material, &place, &c));
-        }
-        let uv = surface.uvs.as_ref().filter(|_| is_textured).map(|uvs| Uv::new(uvs, id, &place.b));
-        let texture = |slot: usize| match &uv {
-            Some(uv) if material.textures[slot].texture != TEXTURE_NONE => {
-                sample(&surface.textures, &material.textures[slot], uv)
-            }
-            _ => [1.0; 4],
-        };
-        let base = with_alpha(material, base_color(surface, material, &place, texture(slots::BASE)), self.show);
-        if base[3] == 0.0 && cover == 0.0 {
-            return [0.0; 4];
-        }
-        let mut light = Light::NONE;
-        if material.flags & flags::LIT != 0 {
-            let [_, roughness, metallic, _] = texture(slots::METALLIC_ROUGHNESS);
-            let mut normal = normal(surface, material, &place);
-            if let Some(uv) = uv.as_ref().filter(|_| material.textures[slots::NORMAL].texture != TEXTURE_NONE) {
-                normal = normal_mapped(surface, material, &place, uv, normal);
-            }
-            let own = |flag: u32, textured: f32| if material.flags & flag != 0 { 1.0 } else { textured };
-            let metallic = material.metallic * own(flags::OWN_METALLIC, metallic);
-            let roughness = material.roughness * own(flags::OWN_ROUGHNESS, roughness);
-            light = self.light(surface, metallic, roughness, normal);
-        }
-        let [r, g, b, _] = texture(slots::EMISSIVE);
-        let emissive = [material.emissive[0] * r, material.emissive[1] * g, material.emissive[2] * b];
-        if material.flags & flags::WIRE_LIT != 0 {
-            return lit_wire(cover, material.wire_color, base, light, emissive);
-        }
-        over(cover, material.wire_color, premultiplied(lit(base, light), emissive))
-    }
-
-    /// Light at a point with this normal.
+    /// Every material there is, but for debug views.
     #[inline(always)]
-    pub fn light(&self, surface: &SurfacePass<'_>, metallic: f32, roughness: f32, normal: [f32; 3]) -> Light {
-        light(&surface.lights, &self.context.plan.projection, metallic, roughness, normal)
+    fn general<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2], is_textured: bool) -> [[f32; N]; 4] {
+        let Self { context, surface, material, .. } = self;
+        let place = self.place(ids, at, &Corners::new(context, ids, at), is_textured);
+        let covers = self.wire_covers(&place);
+        let texels = self.texels(&place, is_textured);
+        let base = self.base_colors(&place, &texels[slots::BASE]);
+        let mut light = LightLanes::NONE;
+        if material.flags & flags::LIT != 0 {
+            let mut normal = normals(surface, material, &place);
+            if let (Some(uvs), true) = (&surface.uvs, is_textured && self.has_texture(slots::NORMAL)) {
+                normal = normal_mapped(uvs, material, &place, &texels[slots::NORMAL], &normal);
+            }
+            let [_, roughness, metallic, _] = &texels[slots::METALLIC_ROUGHNESS];
+            let own = |flag: u32, factor: f32, textured: &[f32; N]| {
+                let is_own = material.flags & flag != 0;
+                textured.map(|v| factor * if is_own { 1.0 } else { v })
+            };
+            let metallic = own(flags::OWN_METALLIC, material.metallic, metallic);
+            let roughness = own(flags::OWN_ROUGHNESS, material.roughness, roughness);
+            light = light_lanes(quick_recip, &surface.lights, &context.plan.projection, &metallic, &roughness, &normal);
+        }
+        let mut emissive = [[0.0; N]; 3];
+        for k in 0..3 {
+            for l in 0..N {
+                emissive[k][l] = material.emissive[k] * texels[slots::EMISSIVE][k][l];
+            }
+        }
+        let mut colors = if material.flags & flags::WIRE_LIT != 0 {
+            lit_wires(&covers, material.wire_color, &base, &light, &emissive)
+        } else {
+            over(&covers, material.wire_color, &premultiplied(&lit_lanes(&base, &light), &emissive))
+        };
+        for l in 0..N {
+            let is_nothing = (base[3][l] == 0.0) & (covers[l] == 0.0);
+            for k in 0..4 {
+                colors[k][l] = if is_nothing { 0.0 } else { colors[k][l] };
+            }
+        }
+        colors
     }
 
-    fn is_front(&self, id: u32, at: [f32; 2]) -> bool {
-        let vertices = self.context.screen_triangle(id);
-        if vertices.iter().any(ScreenVertex::is_outside) {
-            return Barycentrics::new(&corners(self.context, id, at)).front;
+    /// Debug views under wires.
+    #[cold]
+    #[inline(never)]
+    fn debug_colors<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2]) -> [[f32; N]; 4] {
+        let mut colors = [[0.0; N]; 4];
+        for l in 0..N {
+            let (ids, at) = ([ids[l]], at.map(|v| [v[l]]));
+            let corners = Corners::new(self.context, &ids, &at);
+            let place = self.place(&ids, &at, &corners, false);
+            let cover = self.wire_covers(&place);
+            let color = if self.show.fill {
+                let view = debug::color(self.surface, self.material, &place, &corners);
+                over(&cover, self.material.wire_color, &view.map(|v| [v])).map(|[v]| v)
+            } else {
+                self.material.wire_color.map(|v| cover[0] * v)
+            };
+            for k in 0..4 {
+                colors[k][l] = color[k];
+            }
         }
-        area(&vertices) < 0
+        colors
+    }
+
+    #[inline(always)]
+    fn place<const N: usize>(
+        &self,
+        ids: &[u32; N],
+        at: &[[f32; N]; 2],
+        corners: &Corners<N>,
+        is_textured: bool,
+    ) -> Place<'_, N> {
+        let is_deciding = is_textured || self.material.flags & DECIDING != 0;
+        let b = if is_deciding { Barycentrics::exact(corners) } else { Barycentrics::new(corners) };
+        Place { context: self.context, ids: *ids, at: *at, b }
+    }
+
+    /// What wires cover, by their shown opacity.
+    #[inline(always)]
+    fn wire_covers<const N: usize>(&self, place: &Place<'_, N>) -> [f32; N] {
+        if self.material.flags & flags::WIRES == 0 || self.show.wires <= 0.0 {
+            return [0.0; N];
+        }
+        wire_covers(self.surface, self.material, place).map(|cover| self.show.wires * cover)
+    }
+
+    #[inline(always)]
+    fn has_texture(&self, slot: usize) -> bool {
+        self.material.textures[slot].texture != TEXTURE_NONE
+    }
+
+    /// Texels by slot; white where there is no texture.
+    #[inline(always)]
+    fn texels<const N: usize>(&self, place: &Place<'_, N>, is_textured: bool) -> [[[f32; N]; 4]; 4] {
+        let mut texels = [[[1.0; N]; 4]; 4];
+        let Some(uvs) = self.surface.uvs.as_ref().filter(|_| is_textured) else { return texels };
+        let uv = Uv::new(uvs, &place.ids, &place.b);
+        for (slot, texels) in texels.iter_mut().enumerate() {
+            let is_light = slot == slots::METALLIC_ROUGHNESS || slot == slots::NORMAL;
+            if self.has_texture(slot) && (!is_light || self.material.flags & flags::LIT != 0) {
+                *texels = sample(&self.surface.textures, &self.material.textures[slot], &uv);
+            }
+        }
+        texels
+    }
+
+    /// Base colours with straight alpha, as [`with_alpha`] leaves it.
+    #[inline(always)]
+    fn base_colors<const N: usize>(&self, place: &Place<'_, N>, texels: &[[f32; N]; 4]) -> [[f32; N]; 4] {
+        let tint = match &self.surface.colors {
+            Some(colors) if self.material.flags & flags::VERTEX_COLORS != 0 => {
+                blend(&of_corners(colors, &place.ids), &place.b.value)
+            }
+            _ => [[1.0; N]; 4],
+        };
+        let mut base = [[0.0; N]; 4];
+        for l in 0..N {
+            let own = |k: usize| self.material.base_color[k] * tint[k][l] * texels[k][l];
+            let color = with_alpha(self.material, [own(0), own(1), own(2), own(3)], self.show);
+            for k in 0..4 {
+                base[k][l] = color[k];
+            }
+        }
+        base
+    }
+
+    #[inline(always)]
+    fn are_front<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2]) -> [bool; N] {
+        let mut front = [false; N];
+        for l in 0..N {
+            let vertices = self.context.screen_triangle(ids[l]);
+            front[l] = if vertices.iter().any(ScreenVertex::is_outside) {
+                Barycentrics::new(&Corners::new(self.context, &[ids[l]], &at.map(|v| [v[l]]))).front[0]
+            } else {
+                area(&vertices) < 0
+            };
+        }
+        front
     }
 }
 
@@ -203,63 +302,67 @@ pub fn flat_colors<const N: usize>(
     normals: &[[f32; N]; 3],
 ) -> [[f32; N]; 4] {
     let base = with_alpha(material, material.base_color, show);
-    let mut light = [[Light::NONE.gain; N], [Light::NONE.gloss; N]];
+    let mut light = LightLanes::NONE;
     if material.flags & flags::FACE_NORMALS != 0 {
-        light = light_lanes(quick_recip, &surface.lights, projection, material.metallic, material.roughness, normals);
+        let (metallic, roughness) = ([material.metallic; N], [material.roughness; N]);
+        light = light_lanes(quick_recip, &surface.lights, projection, &metallic, &roughness, normals);
     }
-    // As `lit` and `premultiplied`, channel by channel.
-    let mut colors = [[0.0; N], [0.0; N], [0.0; N], [base[3]; N]];
+    premultiplied(&lit_lanes(&base.map(|v| [v; N]), &light), &material.emissive.map(|v| [v; N]))
+}
+
+/// The base colour with the material's cutoff, blending and opacity applied to alpha.
+#[inline(always)]
+fn with_alpha(material: &ShadedMaterial, mut base: [f32; 4], show: Show) -> [f32; 4] {
+    // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.
+    base[3] = if base[3] > 0.0 { base[3].min(1.0) } else { 0.0 };
+    let is_cut = material.flags & flags::MASK != 0 && base[3] < material.alpha_cutoff;
+    let is_hidden = is_cut || !show.fill || material.flags & flags::FILL == 0;
+    if material.flags & flags::BLEND == 0 {
+        base[3] = 1.0;
+    }
+    base[3] *= material.opacity;
+    base.map(|v| if is_hidden { 0.0 } else { v })
+}
+
+#[inline(always)]
+fn premultiplied<const N: usize>(straight: &[[f32; N]; 4], emissive: &[[f32; N]; 3]) -> [[f32; N]; 4] {
+    let mut colors = *straight;
     for k in 0..3 {
         for l in 0..N {
-            let lit = (base[k] * light[0][l] + light[1][l]).clamp(0.0, 1.0);
-            colors[k][l] = (lit + material.emissive[k]) * base[3];
+            colors[k][l] = (straight[k][l] + emissive[k][l]) * straight[3][l];
         }
     }
     colors
 }
 
-/// The base colour with the material's cutoff, blending and opacity applied to alpha.
-fn with_alpha(material: &ShadedMaterial, mut base: [f32; 4], show: Show) -> [f32; 4] {
-    // Barycentrics round to a little below 0 and above 1, and so does alpha that they blend.
-    base[3] = if base[3] > 0.0 { base[3].min(1.0) } else { 0.0 };
-    let is_cut = material.flags & flags::MASK != 0 && base[3] < material.alpha_cutoff;
-    if is_cut || !show.fill || material.flags & flags::FILL == 0 {
-        return [0.0; 4];
-    }
-    if material.flags & flags::BLEND == 0 {
-        base[3] = 1.0;
-    }
-    base[3] *= material.opacity;
-    base
-}
-
-/// Base colour with straight alpha.
-fn base_color(surface: &SurfacePass<'_>, material: &ShadedMaterial, place: &Place<'_>, texel: [f32; 4]) -> [f32; 4] {
-    let tint = match &surface.colors {
-        Some(colors) if material.flags & flags::VERTEX_COLORS != 0 => {
-            blend(colors.triangles[place.id as usize].map(|i| colors.values[i as usize]), place.b.value)
+/// Wires as paint: over the base colour, under the light.
+#[inline(always)]
+fn lit_wires<const N: usize>(
+    covers: &[f32; N],
+    wire: [f32; 4],
+    base: &[[f32; N]; 4],
+    light: &LightLanes<N>,
+    emissive: &[[f32; N]; 3],
+) -> [[f32; N]; 4] {
+    let mut colors = over(covers, wire, &premultiplied(base, &[[0.0; N]; 3]));
+    for l in 0..N {
+        let left = base[3][l] * (1.0 - covers[l] * wire[3]);
+        let light = Light { gain: light.gain[l], gloss: light.gloss[l] };
+        let lit = light.on_premultiplied([colors[0][l], colors[1][l], colors[2][l], colors[3][l]]);
+        for k in 0..3 {
+            colors[k][l] = lit[k] + emissive[k][l] * left;
         }
-        _ => [1.0; 4],
-    };
-    std::array::from_fn(|k| material.base_color[k] * tint[k] * texel[k])
+    }
+    colors
 }
 
 #[inline(always)]
-fn premultiplied(straight: [f32; 4], emissive: [f32; 3]) -> [f32; 4] {
-    let alpha = straight[3];
-    let [r, g, b] = [0, 1, 2].map(|k| (straight[k] + emissive[k]) * alpha);
-    [r, g, b, alpha]
-}
-
-/// The wire as paint: over the base colour, under the light.
-fn lit_wire(cover: f32, wire: [f32; 4], base: [f32; 4], light: Light, emissive: [f32; 3]) -> [f32; 4] {
-    let [r, g, b, alpha] = base;
-    let painted = over(cover, wire, [r * alpha, g * alpha, b * alpha, alpha]);
-    let left = alpha * (1.0 - cover * wire[3]);
-    let [r, g, b, alpha] = light.on_premultiplied(painted);
-    [r + emissive[0] * left, g + emissive[1] * left, b + emissive[2] * left, alpha]
-}
-
-fn over(cover: f32, top: [f32; 4], under: [f32; 4]) -> [f32; 4] {
-    std::array::from_fn(|k| cover * top[k] + under[k] * (1.0 - cover * top[3]))
+fn over<const N: usize>(covers: &[f32; N], top: [f32; 4], under: &[[f32; N]; 4]) -> [[f32; N]; 4] {
+    let mut colors = *under;
+    for k in 0..4 {
+        for l in 0..N {
+            colors[k][l] = covers[l] * top[k] + under[k][l] * (1.0 - covers[l] * top[3]);
+        }
+    }
+    colors
 }

@@ -5,10 +5,12 @@
 //! ([`point`](super::point)), and weigh their share.
 
 use super::point::{PointShader, Show};
+use super::waiting::{Point, Waiting};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
 use crate::backend::cpu::geometry::transform::recip;
-use crate::plan::sample_offsets;
+use crate::backend::cpu::isa::LANES;
+use crate::plan::{SurfacePass, sample_offsets};
 
 /// Shades every pixel of the band into `colors` (premultiplied linear RGBA, row by row, nothing
 /// behind it).
@@ -19,12 +21,17 @@ pub fn shade(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32;
 
 #[inline(always)]
 fn shade_sampled<const S: usize>(context: &RasterContext<'_>, band: &SampleBand, colors: &mut [[f32; 4]]) {
-    let width = band.size_px[0];
+    let width = band.size_px[0] as usize;
     let mut shader = Shader::new(context);
-    for y in band.shown[0]..band.shown[1] {
-        let line = &mut colors[((y - band.shown[0]) * width) as usize..][..width as usize];
-        for (x, color) in (0_u32..).zip(line) {
-            *color = shader.pixel::<S>(band, x, y);
+    let surface = context.plan.surface.as_ref().filter(|surface| surface.is_shaded && !context.is_plain);
+    for (y, row) in (band.shown[0]..band.shown[1]).zip(colors.chunks_exact_mut(width)) {
+        match surface {
+            Some(surface) => shader.row_together::<S>(surface, band, y, row),
+            None => {
+                for (x, color) in (0_u32..).zip(row) {
+                    *color = shader.pixel::<S>(band, x, y);
+                }
+            }
         }
     }
 }
@@ -41,6 +48,54 @@ impl<'a> Shader<'a> {
     /// One for a band.
     pub fn new(context: &'a RasterContext<'a>) -> Self {
         Self { context, points: PointShader::new(context) }
+    }
+
+    /// Shades a row of the picture, eight points at a time. Each pixel sums up what its triangles add
+    /// in the order of [`mixed_pixel`](Self::mixed_pixel).
+    #[inline(always)]
+    fn row_together<const S: usize>(
+        &mut self,
+        surface: &SurfacePass<'_>,
+        band: &SampleBand,
+        y: u32,
+        row: &mut [[f32; 4]],
+    ) {
+        row.fill([0.0; 4]);
+        let triangles = self.context.plan.triangles.len() as u32;
+        let first = band.index(0, y as i32, 0);
+        let (pixels, _) = band.ids[first..first + row.len() * S].as_chunks::<S>();
+        let mut waiting = Waiting::new(self.context, surface);
+        for (group, pixels) in (0_u32..).zip(pixels.chunks(LANES)) {
+            if pixels.as_flattened().iter().fold(0, |any, id| any | (id ^ NOTHING)) == 0 {
+                continue;
+            }
+            for (x, ids) in (LANES as u32 * group..).zip(pixels) {
+                if ids.iter().any(|&id| id >= triangles && id != NOTHING) {
+                    row[x as usize] = self.pixel::<S>(band, x, y);
+                    continue;
+                }
+                if ids[0] != NOTHING && ids.iter().all(|&id| id == ids[0]) {
+                    let at = self.mean_place([x, y], [128 * S as i32; 2], S as i32);
+                    waiting.push(Point { id: ids[0], at, weight: 1.0, pixel: x }, row);
+                    continue;
+                }
+                for_each_triangle(ids, |id, offset, count| {
+                    let (at, weight) = (self.mean_place([x, y], offset, count), count as f32 / S as f32);
+                    waiting.push(Point { id, at, weight, pixel: x }, row);
+                });
+            }
+        }
+        waiting.shade(row);
+    }
+
+    /// The mean of `count` samples of a pixel, whose offsets in 1/256 px add up to `offset_sum`: in 1/256
+    /// px from the picture's centre.
+    #[inline(always)]
+    fn mean_place(&self, [x, y]: [u32; 2], offset_sum: [i32; 2], count: i32) -> [f32; 2] {
+        let plan = self.context.plan;
+        let scale = recip(count as f32);
+        let corner = [x as i32 * 256 - plan.width_px as i32 * 128, y as i32 * 256 - plan.height_px as i32 * 128];
+        [corner[0] as f32 + offset_sum[0] as f32 * scale, corner[1] as f32 + offset_sum[1] as f32 * scale]
     }
 
     /// The colour of a pixel of the picture.
@@ -85,23 +140,11 @@ impl<'a> Shader<'a> {
         show: impl Fn(u32) -> Show,
         mut each: impl FnMut([bool; S], [f32; 4]),
     ) {
-        let offsets = sample_offsets(S as u32);
-        for s in 0..S {
-            // Each triangle is shaded once, at the first of its samples.
-            if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {
-                continue;
-            }
-            let (mut offset, mut count) = ([0, 0], 0);
-            for (id, at) in ids.iter().zip(offsets) {
-                if *id == ids[s] {
-                    offset = [offset[0] + at[0], offset[1] + at[1]];
-                    count += 1;
-                }
-            }
-            self.points.show = show(ids[s]);
-            let color = self.group(ids[s], x, y, offset, count);
-            each(ids.map(|id| id == ids[s]), color);
-        }
+        for_each_triangle(&ids, |own, offset, count| {
+            self.points.show = show(own);
+            let color = self.group(own, x, y, offset, count);
+            each(ids.map(|id| id == own), color);
+        });
     }
 
     /// The colour of triangle `id` at the mean of `count` samples whose offsets in 1/256 px add up
@@ -115,13 +158,30 @@ impl<'a> Shader<'a> {
             return color;
         }
         let plan = self.context.plan;
-        let scale = recip(count as f32);
-        let corner = [x as i32 * 256 - plan.width_px as i32 * 128, y as i32 * 256 - plan.height_px as i32 * 128];
-        let at = [corner[0] as f32 + offset_sum[0] as f32 * scale, corner[1] as f32 + offset_sum[1] as f32 * scale];
+        let at = self.mean_place([x, y], offset_sum, count);
         match (self.context.is_hull(id), &plan.surface, &plan.hull) {
             (false, Some(surface), _) if surface.is_shaded => self.points.color(surface, id, at),
             (true, _, Some(hull)) => hull.color(id as usize),
             _ => [0.0; 4],
         }
+    }
+}
+
+/// Calls `each` with every triangle among a pixel's samples, by the first of its samples: its id, the
+/// sum of its samples' offsets in 1/256 px, and their number.
+#[inline(always)]
+fn for_each_triangle<const S: usize>(ids: &[u32; S], mut each: impl FnMut(u32, [i32; 2], i32)) {
+    let offsets = sample_offsets(S as u32);
+    for s in 0..S {
+        if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {
+            continue;
+        }
+        let (mut offset, mut count) = ([0, 0], 0);
+        for (id, at) in ids.iter().zip(offsets) {
+            let is_own = i32::from(*id == ids[s]);
+            offset = [offset[0] + is_own * at[0], offset[1] + is_own * at[1]];
+            count += is_own;
+        }
+        each(ids[s], offset, count);
     }
 }

@@ -1,4 +1,4 @@
-//! Stage shade, per point: texture lookups. Twin of `shaders/surface/texture.wgsl`.
+//! Stage shade, per point: texture lookups, for `N` points side by side. Twin of `shaders/surface/texture.wgsl`.
 //!
 //! The same bits on both back-ends, because texels decide what a mask leaves and where nearest
 //! texels change.
@@ -9,57 +9,109 @@ use crate::plan::{CornerValues, Texture, TextureUse, Textures, samplers};
 /// Largest coordinate: beyond it f32 has too few fractional bits.
 pub const UV_MAX: f32 = 1_048_576.0;
 
-/// Texture coordinates at a point, and how they change a pixel to the right and a pixel down.
-pub struct Uv {
-    /// At the point.
-    pub at: [f32; 2],
-    d: [[f32; 2]; 2],
+/// Texture coordinates at `N` points, and how they change a pixel to the right and a pixel down:
+/// `[component][lane]`.
+pub struct Uv<const N: usize> {
+    /// At the points.
+    pub at: [[f32; N]; 2],
+    d: [[[f32; N]; 2]; 2],
 }
 
-impl Uv {
-    /// The coordinates of triangle `id` at these barycentrics.
-    pub fn new(uvs: &CornerValues<'_, [f32; 2]>, id: u32, b: &Barycentrics) -> Self {
-        let corners = uvs.triangles[id as usize].map(|i| uvs.values[i as usize]);
-        Self { at: blend(corners, b.value), d: b.derivatives().map(|d| blend(corners, d)) }
+impl<const N: usize> Uv<N> {
+    /// The coordinates of triangles at these barycentrics.
+    #[inline(always)]
+    pub fn new(uvs: &CornerValues<'_, [f32; 2]>, ids: &[u32; N], b: &Barycentrics<N>) -> Self {
+        let corners = of_corners(uvs, ids);
+        let [right, down] = b.derivatives();
+        Self { at: blend(&corners, &b.value), d: [blend(&corners, &right), blend(&corners, &down)] }
     }
 }
 
-/// `w0 p0 + w1 p1 + w2 p2`.
-pub fn blend<const N: usize>([p, q, r]: [[f32; N]; 3], w: [f32; 3]) -> [f32; N] {
-    std::array::from_fn(|k| (w[0] * p[k] + w[1] * q[k]) + w[2] * r[k])
+/// Values at the corners of triangles: `[corner][component][lane]`.
+#[inline(always)]
+pub fn of_corners<const K: usize, const N: usize>(
+    values: &CornerValues<'_, [f32; K]>,
+    ids: &[u32; N],
+) -> [[[f32; N]; K]; 3] {
+    let mut corners = [[[0.0; N]; K]; 3];
+    for l in 0..N {
+        let indices = values.triangles[ids[l] as usize];
+        for (corner, i) in corners.iter_mut().zip(indices) {
+            let value = values.values[i as usize];
+            for k in 0..K {
+                corner[k][l] = value[k];
+            }
+        }
+    }
+    corners
+}
+
+/// `w0 p0 + w1 p1 + w2 p2`, component by component and lane by lane.
+#[inline(always)]
+pub fn blend<const K: usize, const N: usize>([p, q, r]: &[[[f32; N]; K]; 3], w: &[[f32; N]; 3]) -> [[f32; N]; K] {
+    let mut out = [[0.0; N]; K];
+    for k in 0..K {
+        for l in 0..N {
+            out[k][l] = (w[0][l] * p[k][l] + w[1][l] * q[k][l]) + w[2][l] * r[k][l];
+        }
+    }
+    out
 }
 
 /// Linear RGBA of a texture, trilinear; white where there is none
 /// ([`TEXTURE_NONE`](crate::plan::TEXTURE_NONE)).
-pub fn sample(textures: &Textures, used: &TextureUse, uv: &Uv) -> [f32; 4] {
+#[inline(always)]
+pub fn sample<const N: usize>(textures: &Textures, used: &TextureUse, uv: &Uv<N>) -> [[f32; N]; 4] {
+    let mut out = [[1.0; N]; 4];
     let Some(image) = textures.images.get(used.texture as usize) else {
-        return [1.0; 4];
+        return out;
     };
-    let at = used.transform.map(|[a, b, c]| bounded((a * uv.at[0] + b * uv.at[1]) + c));
     let size = [image.width as f32, image.height as f32];
-    let steps = uv.d.map(|d| {
-        let texels: [f32; 2] = std::array::from_fn(|k| {
-            let [a, b, _] = used.transform[k];
-            (a * d[0] + b * d[1]) * size[k]
-        });
-        texels[0] * texels[0] + texels[1] * texels[1]
-    });
-    let lod = half_log2(steps[0].max(steps[1])).min(image.levels as f32 - 1.0).max(image.first_level as f32);
-    if used.sampler & samplers::NEAREST != 0 {
-        return nearest(textures, image, (lod + 0.5) as u32, at, used.sampler);
+    let (mut at, mut lods) = ([[0.0; 2]; N], [0.0; N]);
+    for l in 0..N {
+        for k in 0..2 {
+            let [a, b, c] = used.transform[k];
+            at[l][k] = bounded((a * uv.at[0][l] + b * uv.at[1][l]) + c);
+        }
+        let mut steps = [0.0_f32; 2];
+        for (step, d) in steps.iter_mut().zip(&uv.d) {
+            let texels = |k: usize| (used.transform[k][0] * d[0][l] + used.transform[k][1] * d[1][l]) * size[k];
+            *step = texels(0) * texels(0) + texels(1) * texels(1);
+        }
+        lods[l] = half_log2(steps[0].max(steps[1])).min(image.levels as f32 - 1.0).max(image.first_level as f32);
+    }
+    for l in 0..N {
+        let texel = filtered(textures, image, lods[l], at[l], used.sampler);
+        for k in 0..4 {
+            out[k][l] = texel[k];
+        }
+    }
+    out
+}
+
+#[inline(always)]
+fn filtered(textures: &Textures, image: &Texture, lod: f32, at: [f32; 2], sampler: u32) -> [f32; 4] {
+    if sampler & samplers::NEAREST != 0 {
+        return nearest(textures, image, (lod + 0.5) as u32, at, sampler);
     }
     let level = lod as u32;
     let share = lod - level as f32;
-    let fine = bilinear(textures, image, level, at, used.sampler);
-    if share > 0.0 { mix(fine, bilinear(textures, image, level + 1, at, used.sampler), share) } else { fine }
+    let mut sum = [0.0; 4];
+    for step in 0..=u32::from(share > 0.0) {
+        let color = bilinear(textures, image, level + step, at, sampler);
+        sum = if step == 0 { color } else { mix(sum, color, share) };
+    }
+    sum
 }
 
 /// Clamps a coordinate to the range with fractional bits; NaN and infinity are 0.
+#[inline(always)]
 fn bounded(v: f32) -> f32 {
     if v.abs() <= 1e30 { v.clamp(-UV_MAX, UV_MAX) } else { 0.0 }
 }
 
 /// Half the binary logarithm, to 1e-4: exact at powers of two, a polynomial in between.
+#[inline(always)]
 fn half_log2(v: f32) -> f32 {
     let bits = if v < 1e30 { v.max(1e-30) } else { 1e30 }.to_bits();
     let t = f32::from_bits(bits & 0x007F_FFFF | 0x3F80_0000) - 1.0;
@@ -67,6 +119,7 @@ fn half_log2(v: f32) -> f32 {
     0.5 * (((bits >> 23) as i32 - 127) as f32 + (t + (t * (1.0 - t)) * bend))
 }
 
+#[inline(always)]
 fn bilinear(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], sampler: u32) -> [f32; 4] {
     let (first, size) = level_of(image, level);
     let (mut low, mut high, mut share) = ([0; 2], [0; 2], [0.0; 2]);
@@ -94,6 +147,7 @@ fn nearest(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], sampl
 }
 
 /// First texel and size of a level.
+#[inline(always)]
 fn level_of(image: &Texture, level: u32) -> (u32, [i32; 2]) {
     let size = |level: u32| [image.width, image.height].map(|side| (side >> level).max(1));
     let level = level.min(image.levels.max(1) - 1);
@@ -102,6 +156,7 @@ fn level_of(image: &Texture, level: u32) -> (u32, [i32; 2]) {
 }
 
 /// A coordinate in 0 to 1.
+#[inline(always)]
 fn wrapped(u: f32, wrap: u32) -> f32 {
     match wrap {
         samplers::REPEAT => u - floor(u) as f32,
@@ -111,6 +166,7 @@ fn wrapped(u: f32, wrap: u32) -> f32 {
 }
 
 /// A texel that may lie one beyond the edge.
+#[inline(always)]
 fn texel_index(i: i32, size: i32, wrap: u32) -> i32 {
     if wrap == samplers::REPEAT {
         return if i < 0 {
@@ -125,21 +181,25 @@ fn texel_index(i: i32, size: i32, wrap: u32) -> i32 {
     i.min(size - 1).max(0)
 }
 
+#[inline(always)]
 fn texel(textures: &Textures, index: u32) -> [f32; 4] {
     textures.texels.get(index as usize).map_or([1.0; 4], |texel| texel.map(half_to_f32))
 }
 
 /// Exact for finite halves: the bits moved into place, and the exponents' difference multiplied in.
+#[inline(always)]
 fn half_to_f32(half: u16) -> f32 {
     let size = f32::from_bits(u32::from(half & 0x7FFF) << 13) * f32::from_bits((112 + 127) << 23);
-    if half & 0x8000 == 0 { size } else { -size }
+    f32::from_bits(size.to_bits() | u32::from(half & 0x8000) << 16)
 }
 
+#[inline(always)]
 fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
     std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
 }
 
 /// For |v| < 2^31; the standard one is a call where the baseline's instructions have none.
+#[inline(always)]
 pub fn floor(v: f32) -> i32 {
     let i = v as i32;
     if i as f32 > v { i - 1 } else { i }

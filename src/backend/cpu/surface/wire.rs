@@ -4,56 +4,72 @@ use super::barycentric::{Barycentrics, Quad};
 use crate::backend::cpu::RasterContext;
 use crate::plan::{ShadedMaterial, SurfacePass, flags};
 
-/// A shaded point: its triangle and its position.
-pub struct Place<'a> {
+/// `N` shaded points: their triangles and their positions.
+pub struct Place<'a, const N: usize> {
     /// Everything that is drawn.
     pub context: &'a RasterContext<'a>,
-    /// The triangle.
-    pub id: u32,
-    /// In 1/256 px from the picture's centre.
-    pub at: [f32; 2],
-    /// At the point.
-    pub b: Barycentrics,
+    /// The triangles.
+    pub ids: [u32; N],
+    /// Columns, then rows, in 1/256 px from the picture's centre.
+    pub at: [[f32; N]; 2],
+    /// At the points.
+    pub b: Barycentrics<N>,
 }
 
-/// 1 on the wire, 0 away from it.
-pub fn wire_cover(surface: &SurfacePass<'_>, material: &ShadedMaterial, place: &Place<'_>) -> f32 {
-    let mask = edge_mask(surface, place.id);
+/// 1 on the wire, 0 away from it, of points of one material.
+#[inline(always)]
+pub fn wire_covers<const N: usize>(
+    surface: &SurfacePass<'_>,
+    material: &ShadedMaterial,
+    place: &Place<'_, N>,
+) -> [f32; N] {
+    let masks = place.ids.map(|id| edge_mask(surface, id));
     let b = &place.b;
     if material.flags & flags::WIRE_FWIDTH != 0 {
-        return fwidth_cover(mask, material, b);
+        return fwidth_covers(&masks, material, b);
     }
     let (thickness, end) = (material.wire_thickness, material.wire_thickness + material.wire_smoothing);
-    let nearest = min_drawn(mask, b.value);
+    let nearest = min_drawn(&masks, &b.value);
+    let mut covers = [0.0; N];
     if material.flags & flags::WIRE_FWIDTH_MIN != 0 {
         // As a GPU's derivatives of the minimum would be: across a corner's bisector they mix two
         // coordinates.
-        let quad = Quad::around(place.context.plan, place.at);
-        let [own, across, down] = quad.barycentrics(place.context, place.id).map(|value| min_drawn(mask, value));
-        let d = (across - own).abs() + (down - own).abs();
-        return 1.0 - smoothstep(thickness * d, end * d, nearest);
+        let quad = Quad::around(place.context.plan, &place.at);
+        let [own, across, down] = quad.barycentrics(place.context, &place.ids).map(|value| min_drawn(&masks, &value));
+        for l in 0..N {
+            let d = (across[l] - own[l]).abs() + (down[l] - own[l]).abs();
+            covers[l] = 1.0 - smoothstep(thickness * d, end * d, nearest[l]);
+        }
+        return covers;
     }
-    if material.flags & flags::WIRE_BARYCENTRIC != 0 {
-        return 1.0 - smoothstep(0.0, 0.1 * thickness, nearest);
+    let is_soft = material.flags & flags::WIRE_BARYCENTRIC != 0;
+    for l in 0..N {
+        let soft = 1.0 - smoothstep(0.0, 0.1 * thickness, nearest[l]);
+        let hard = if nearest[l] < 0.02 * thickness { 1.0 } else { 0.0 };
+        covers[l] = if is_soft { soft } else { hard };
     }
-    if nearest < 0.02 * thickness { 1.0 } else { 0.0 }
+    covers
 }
 
-/// The smoothstep of each coordinate by its own exact width, and the minimum of the three.
+/// The smoothstep of each coordinate by its own exact width, and the minimum of the three, of points
+/// in triangles whose drawn edges `masks` say.
 #[inline(always)]
-pub fn fwidth_cover(mask: u8, material: &ShadedMaterial, b: &Barycentrics) -> f32 {
+pub fn fwidth_covers<const N: usize>(masks: &[u8; N], material: &ShadedMaterial, b: &Barycentrics<N>) -> [f32; N] {
     let (thickness, end) = (material.wire_thickness, material.wire_thickness + material.wire_smoothing);
-    let mut away = 1.0_f32;
+    let mut away = [1.0_f32; N];
     for i in 0..3 {
-        if is_drawn(mask, i) {
-            let d = b.fwidth(i);
-            away = away.min(smoothstep(thickness * d, end * d, b.value[i]));
+        let widths = b.fwidth(i);
+        for l in 0..N {
+            let step = smoothstep(thickness * widths[l], end * widths[l], b.value[i][l]);
+            let nearer = away[l].min(step);
+            away[l] = if is_drawn(masks[l], i) { nearer } else { away[l] };
         }
     }
-    1.0 - away
+    away.map(|away| 1.0 - away)
 }
 
 /// The edges of a triangle that are drawn: bit i runs from corner i to i + 1.
+#[inline(always)]
 pub fn edge_mask(surface: &SurfacePass<'_>, id: u32) -> u8 {
     surface.edge_masks.get(id as usize).copied().unwrap_or(0b111)
 }
@@ -66,16 +82,23 @@ pub fn is_drawn(mask: u8, i: usize) -> bool {
 }
 
 /// The smallest coordinate of a drawn edge; far away where none is drawn.
-fn min_drawn(mask: u8, value: [f32; 3]) -> f32 {
-    (0..3).filter(|&i| is_drawn(mask, i)).fold(1e30, |least, i| value[i].min(least))
+#[inline(always)]
+fn min_drawn<const N: usize>(masks: &[u8; N], value: &[[f32; N]; 3]) -> [f32; N] {
+    let mut least = [1e30_f32; N];
+    for i in 0..3 {
+        for l in 0..N {
+            let nearer = value[i][l].min(least[l]);
+            least[l] = if is_drawn(masks[l], i) { nearer } else { least[l] };
+        }
+    }
+    least
 }
 
 /// 0 up to `from`, 1 from `to` on.
 #[inline(always)]
 pub fn smoothstep(from: f32, to: f32, v: f32) -> f32 {
-    if to <= from {
-        return if v < from { 0.0 } else { 1.0 };
-    }
     let t = ((v - from) / (to - from)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
+    let smooth = t * t * (3.0 - 2.0 * t);
+    let sharp = if v < from { 0.0 } else { 1.0 };
+    if to <= from { sharp } else { smooth }
 }

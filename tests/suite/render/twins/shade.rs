@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use meshsnap::backend::Renderer;
-use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::backend::cpu::{CpuRenderer, Isa};
 use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
@@ -142,6 +142,34 @@ fn parts_of_different_looks_agree() {
         cases += 1;
     });
     assert_eq!(cases, 4);
+}
+
+/// On the CPU alone: eight points at a time, on each instruction set, against one by one.
+#[test]
+fn points_have_the_same_colours_together_and_one_by_one() {
+    let mut plain = CpuRenderer::plain(1);
+    let mut others: Vec<CpuRenderer> = Isa::available().into_iter().map(|isa| CpuRenderer::with_isa(2, isa)).collect();
+    let materials: &'static [u32] = (0..10_000).map(|t| t / 3 % LOOKS.len() as u32).collect::<Vec<_>>().leak();
+    let mut cases = 0;
+    each_view(|view, plan| {
+        let mut agree = |plan: &DrawPlan<'_>, what: &str| {
+            let want = plain.draw(plan, &Deadline::default()).unwrap();
+            for other in &mut others {
+                assert!(other.draw(plan, &Deadline::default()).unwrap() == want, "{what}, {view}");
+            }
+            cases += 1;
+        };
+        for (name, look) in LOOKS {
+            let surface = plan.surface.as_mut().unwrap();
+            surface.materials = vec![with(base_look(), *look)];
+            agree(plan, name);
+        }
+        let surface = plan.surface.as_mut().unwrap();
+        surface.materials = LOOKS.iter().map(|(_, look)| with(base_look(), *look)).collect();
+        surface.triangle_materials = materials[..surface.face_normals.len()].into();
+        agree(plan, "all of them");
+    });
+    assert_eq!(cases, 4 * (LOOKS.len() + 1));
 }
 
 #[test]

@@ -4,6 +4,7 @@
 use super::inset::{Inset, Insets};
 use super::{Holes, half_width, is_hidden, looked_at};
 use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::bands::lists::BoxedFace;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::batch::{boxes, corners};
@@ -41,14 +42,18 @@ fn holes_sampled<const S: usize>(
     let tiles = Tiles::new(band);
     let mut poll = DeadlinePoll::new(context.deadline);
     let mut waiting = Waiting { ids: [0; 2 * LANES], len: 0 };
-    for list in bins.iter().flat_map(|bin| [&bin.fronts, &bin.backs]) {
-        let (listed, tall) = list.items_in(number);
+    for bin in bins {
+        let (listed, tall) = bin.fronts.items_in(number);
         for ids in listed.chunks(LANES).chain(tall.chunks(LANES)) {
             waiting.push_seen::<S>(context, band, &tiles, ids);
-            if waiting.len >= LANES {
-                digger.dig_all(&waiting.take(), holes);
+            if digger.are_dug(&mut waiting, ids.len(), &mut poll, holes) {
+                return;
             }
-            if poll.is_expired_after(ids.len() as u64, std::mem::take(&mut digger.pixels) * S as u64) {
+        }
+        let (listed, tall) = bin.backs.boxed_in(number);
+        for faces in listed.chunks(LANES).chain(tall.chunks(LANES)) {
+            waiting.push_boxed(context, band, &tiles, faces);
+            if digger.are_dug(&mut waiting, faces.len(), &mut poll, holes) {
                 return;
             }
         }
@@ -82,6 +87,18 @@ impl Waiting {
             // Written in any case, kept by the count.
             self.ids[self.len % (2 * LANES)] = ids[l];
             self.len += usize::from(is_surface && !is_empty && !tiles.hide(columns, rows, depth_max[l]));
+        }
+    }
+
+    /// As `push_seen`, of faces with boxes.
+    #[inline(always)]
+    fn push_boxed(&mut self, context: &RasterContext<'_>, band: &SampleBand, tiles: &Tiles, faces: &[BoxedFace]) {
+        let mut seen = tiles.seen(context.isa, faces, band.range()[1]);
+        while seen != 0 {
+            let id = faces[seen.trailing_zeros() as usize % faces.len()].id;
+            self.ids[self.len % (2 * LANES)] = id;
+            self.len += usize::from((id as usize) < context.plan.triangles.len());
+            seen &= seen - 1;
         }
     }
 
@@ -148,6 +165,22 @@ impl<'a, const S: usize> Digger<'a, S> {
             }),
             pixels: 0,
         }
+    }
+
+    /// Adds the holes of the faces that wait if there are eight. True if time is up, given how many
+    /// faces were looked at before.
+    #[inline(always)]
+    fn are_dug(
+        &mut self,
+        waiting: &mut Waiting,
+        looked_at: usize,
+        poll: &mut DeadlinePoll<'_>,
+        holes: &mut Holes,
+    ) -> bool {
+        if waiting.len >= LANES {
+            self.dig_all(&waiting.take(), holes);
+        }
+        poll.is_expired_after(looked_at as u64, std::mem::take(&mut self.pixels) * S as u64)
     }
 
     /// Adds the holes of some faces.
