@@ -16,6 +16,8 @@ RUN apt-get update -qq \
 COPY --from=build /usr/local/bin/meshsnap /usr/local/bin/meshsnap
 # The Vulkan loader complains on standard error where this is missing.
 ENV XDG_RUNTIME_DIR=/tmp
+# Large pages for large lists, where the kernel allows them on request (docs/operations.md, "Large pages").
+ENV GLIBC_TUNABLES=glibc.malloc.hugetlb=1
 USER meshsnap
 # A container must listen beyond loopback to be reached at all, and that needs a decision about keys: set
 # MESHSNAP_API_KEYS, or MESHSNAP_NO_AUTH=true where the network around the container keeps strangers out.
