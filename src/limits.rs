@@ -86,10 +86,19 @@ pub fn check(what: &str, given: u64, limit: u64, flag: &'static str) -> Result<(
     Ok(())
 }
 
+/// Memory that was taken from a budget.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Spent {
+    what: Box<str>,
+    bytes: u64,
+}
+
 /// Bytes that one job may still allocate and pixels that it may still decode. Spend first, allocate
 /// after.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Budget {
+    /// What is spent while [`record`](Self::record) runs.
+    recorded: Option<Vec<Spent>>,
     spent: u64,
     limit: u64,
     texture_px: u64,
@@ -101,15 +110,35 @@ impl Budget {
     /// An unspent budget of `limits.memory_bytes`, with the limits on textures.
     pub fn new(limits: &Limits) -> Self {
         let Limits { memory_bytes, texture_px, texture_total_px, .. } = *limits;
-        Self { spent: 0, limit: memory_bytes, texture_px, texture_total_px, textures_px: 0 }
+        Self { recorded: None, spent: 0, limit: memory_bytes, texture_px, texture_total_px, textures_px: 0 }
     }
 
     /// Takes `count * size_bytes` from the budget for `what`, or refuses.
     pub fn spend(&mut self, what: &str, count: u64, size_bytes: u64) -> Result<(), LimitExceeded> {
-        let wanted = self.spent.saturating_add(count.saturating_mul(size_bytes));
+        let bytes = count.saturating_mul(size_bytes);
+        let wanted = self.spent.saturating_add(bytes);
         check(&format!("the memory for {what}, in bytes,"), wanted, self.limit, "--limit-memory-bytes")?;
         self.spent = wanted;
+        if let Some(recorded) = &mut self.recorded {
+            recorded.push(Spent { what: what.into(), bytes });
+        }
         Ok(())
+    }
+
+    /// Runs `work`, and returns what it spent as well, in order.
+    pub fn record<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> (T, Vec<Spent>) {
+        let outer = self.recorded.replace(Vec::new());
+        let done = work(self);
+        let spent = std::mem::replace(&mut self.recorded, outer).unwrap_or_default();
+        if let Some(outer) = &mut self.recorded {
+            outer.extend(spent.iter().cloned());
+        }
+        (done, spent)
+    }
+
+    /// Takes from the budget what was spent before on the same thing, or refuses in the same words.
+    pub fn spend_again(&mut self, spent: &[Spent]) -> Result<(), LimitExceeded> {
+        spent.iter().try_for_each(|Spent { what, bytes }| self.spend(what, *bytes, 1))
     }
 
     /// Takes the pixels of a texture from the budget, or refuses. `what` names it: "image 3".

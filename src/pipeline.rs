@@ -14,7 +14,7 @@ use crate::image::{Image, ImageFormat};
 use crate::import::{self, Bundle, Format, Imported, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
-use crate::plan::{self, Skip};
+use crate::plan::{self, Prepared, Skip};
 pub use crate::plan::{PlanError, QualitySelection};
 use crate::report::Report;
 use crate::scene::{Scene, SceneError};
@@ -35,25 +35,37 @@ pub fn render(
 
     // Bytes -> Mesh
     let options = import::Options { format: job.format_in, time_s: job.spec.time_s };
-    let Imported { mesh, report } = import::import(job.bundle, options, limits, &mut budget, deadline)?;
+    let model = Model::read(job.bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
 
+    render_model(&model, job.spec, backends, &mut budget, deadline, ended)
+}
+
+/// Turns a mesh that is in memory already into the bytes of a picture.
+pub fn render_model(
+    model: &Model,
+    spec: &Spec,
+    backends: &mut Backends,
+    budget: &mut Budget,
+    deadline: &Deadline,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Output, RenderError> {
     // Mesh -> Scene -> DrawPlan -> Image
-    let drawn = draw(&mesh, job.spec, backends, &mut budget, deadline, ended)?;
+    let drawn = draw(model, spec, backends, budget, deadline, ended)?;
 
     // Image -> bytes
-    let format = job.spec.image.format.unwrap_or(ImageFormat::Png);
-    let bytes = encode::encode(&drawn.image, format, job.spec.image.effort, deadline)?;
+    let format = spec.image.format.unwrap_or(ImageFormat::Png);
+    let bytes = encode::encode(&drawn.image, format, spec.image.effort, deadline)?;
     ended(Stage::Encode);
 
-    let warnings = [report.warnings, drawn.warnings].concat();
+    let warnings = [model.warnings.clone(), drawn.warnings].concat();
     let Drawn { backend, draw_times, skips, selection, .. } = drawn;
     Ok(Output { bytes, format, backend, draw_times, skips, warnings, selection })
 }
 
 /// Draws a mesh that is in memory already, as often as wanted.
 pub fn draw(
-    mesh: &Mesh,
+    model: &Model,
     spec: &Spec,
     backends: &mut Backends,
     budget: &mut Budget,
@@ -61,10 +73,11 @@ pub fn draw(
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Drawn, RenderError> {
     // Mesh -> Scene -> DrawPlan
+    let Model { mesh, prepared, .. } = model;
     let selected = plan::select_quality(spec, mesh.triangles.len(), backends.has_gpu());
     let spec = selected.as_ref().map_or(spec, |selected| &selected.spec);
     let scene = Scene::new(mesh, spec, budget)?;
-    let plan = plan::build(&scene, budget, deadline)?;
+    let plan = plan::build_from(&scene, prepared, budget, deadline)?;
     let bands_bytes = backends.bands_bytes(spec.backend, &plan);
     budget.spend("bands of the picture", bands_bytes, 1).map_err(PlanError::Limit)?;
     ended(Stage::Plan);
@@ -94,6 +107,46 @@ pub fn inspect(
     let Imported { mesh, report } = import::import(bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
     Report::of(&mesh, &report, bundle.bytes_len(), &mut budget, deadline)
+}
+
+/// A mesh in memory: imported once, and drawn as often as wanted. What one picture finds out about
+/// it, such as its edges, serves the next.
+#[derive(Debug, Default)]
+pub struct Model {
+    /// The mesh.
+    mesh: Mesh,
+    /// Faults of the file that were tolerated.
+    warnings: Vec<Warning>,
+    prepared: Prepared,
+}
+
+impl Model {
+    /// Reads a file.
+    pub fn read(
+        bundle: &Bundle,
+        options: impl Into<import::Options>,
+        limits: &Limits,
+        budget: &mut Budget,
+        deadline: &Deadline,
+    ) -> Result<Self, MeshError> {
+        let Imported { mesh, report } = import::import(bundle, options, limits, budget, deadline)?;
+        Ok(Self { mesh, warnings: report.warnings, prepared: Prepared::default() })
+    }
+
+    /// The mesh.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    /// Faults of the file that were tolerated.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// Memory that it takes, with what pictures have found out so far, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.mesh.bytes() + self.prepared.bytes()
+    }
 }
 
 /// The input of [`render`].

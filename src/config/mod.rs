@@ -53,6 +53,10 @@ pub struct Config {
     pub mesh_bytes: u64,
     /// Most stored meshes.
     pub mesh_count: u64,
+    /// Most bytes of stored meshes that stay in memory as they are drawn.
+    pub resident_bytes: u64,
+    /// Most bytes of pictures of stored meshes that stay in memory.
+    pub picture_bytes: u64,
     /// Filter of the log, in the syntax of `tracing`.
     pub log: String,
     /// True for a JSON log, false for text. None: text if standard error is a terminal.
@@ -80,6 +84,8 @@ impl Default for Config {
             result_count: 10_000,
             mesh_bytes: 256 << 20,
             mesh_count: 1000,
+            resident_bytes: 512 << 20,
+            picture_bytes: 128 << 20,
             log: "info".into(),
             log_json: None,
             limits: Limits::default(),

@@ -65,6 +65,10 @@ pub const SETTINGS: &[Setting] = &[
     number("mesh-count", "Most stored meshes; the least recently used is dropped first", 1, 1 << 20, |c| {
         &mut c.mesh_count
     }),
+    number("resident-bytes", "Most bytes of stored meshes kept as they are drawn", 0, u64::MAX, |c| {
+        &mut c.resident_bytes
+    }),
+    number("picture-bytes", "Most bytes of drawn pictures of stored meshes", 0, u64::MAX, |c| &mut c.picture_bytes),
     text(
         "log",
         "Filter of the log: error, warn, info, debug, or the syntax of tracing",

@@ -1,18 +1,21 @@
 //! Reading a mesh: one file, or several that belong together.
 
+use std::sync::Arc;
+
 use bytes::Bytes;
 
 use super::Error;
-use crate::import::{self, Bundle, BundleFile, Format, Imported, MeshError, MeshFault, Options};
+use crate::import::{self, Bundle, BundleFile, Format, MeshError, MeshFault, Options};
 use crate::limits::{Budget, Deadline, Limits};
-use crate::mesh;
+use crate::pipeline::Model;
 use crate::warning::Warning;
 
 /// A mesh, imported once and drawn as often as needed: welded, finite, in a unit box.
+/// What the first picture finds out, such as edges and textures, is kept for the next. Clones share
+/// it.
 #[derive(Clone, Debug)]
 pub struct Mesh {
-    pub(super) imported: mesh::Mesh,
-    warnings: Vec<Warning>,
+    pub(super) model: Arc<Model>,
 }
 
 impl Mesh {
@@ -31,31 +34,31 @@ impl Mesh {
 
     /// Triangles after triangulation.
     pub fn triangle_count(&self) -> usize {
-        self.imported.triangles.len()
+        self.model.mesh().triangles.len()
     }
 
     /// Different positions.
     pub fn position_count(&self) -> usize {
-        self.imported.positions.len()
+        self.model.mesh().positions.len()
     }
 
     /// Smallest and largest corner of the bounding box, in the file's own units.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
-        let to_file = &self.imported.to_file;
-        self.imported
-            .bounds
+        let mesh = self.model.mesh();
+        let to_file = &mesh.to_file;
+        mesh.bounds
             .map(|corner| std::array::from_fn(|axis| to_file.centre[axis] + to_file.scale * f64::from(corner[axis])))
     }
 
     /// The asset's own names of its materials, in the file's order; an empty name where it gives
     /// none.
     pub fn material_names(&self) -> impl Iterator<Item = &str> {
-        self.imported.materials.iter().map(|material| material.name.as_str())
+        self.model.mesh().materials.iter().map(|material| material.name.as_str())
     }
 
     /// Warnings: faults of the file that were tolerated.
     pub fn warnings(&self) -> &[Warning] {
-        &self.warnings
+        self.model.warnings()
     }
 }
 
@@ -129,9 +132,8 @@ impl MeshReader {
     pub fn read(self) -> Result<Mesh, Error> {
         let bundle = bundle(self.files)?.with_entry(self.entry);
         let mut budget = Budget::new(&self.limits);
-        let Imported { mesh, report } =
-            import::import(&bundle, self.options, &self.limits, &mut budget, &self.deadline)?;
-        Ok(Mesh { imported: mesh, warnings: report.warnings })
+        let model = Model::read(&bundle, self.options, &self.limits, &mut budget, &self.deadline)?;
+        Ok(Mesh { model: Arc::new(model) })
     }
 }
 

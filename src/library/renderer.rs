@@ -89,7 +89,7 @@ impl Renderer {
             spec.backend = backend;
         }
         let mut budget = Budget::new(&self.limits);
-        let drawn = pipeline::draw(&mesh.imported, &spec, &mut self.backends, &mut budget, deadline, &mut |_| {})?;
+        let drawn = pipeline::draw(&mesh.model, &spec, &mut self.backends, &mut budget, deadline, &mut |_| {})?;
         Ok(Picture { image: drawn.image, backend: drawn.backend, skips: drawn.skips, warnings: drawn.warnings })
     }
 

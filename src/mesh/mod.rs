@@ -15,7 +15,7 @@ pub(crate) mod vector;
 pub use material::MaterialSlot;
 pub use primitives::LineOrPoint;
 
-use material::{FileCamera, ImageSource};
+use material::{FileCamera, ImageContent, ImageSource};
 
 /// A triangle mesh in its normal form.
 ///
@@ -66,6 +66,25 @@ pub struct Mesh {
     pub to_file: ToFile,
     /// The axis that points up in the format's convention.
     pub up: UpAxis,
+}
+
+impl Mesh {
+    /// Memory of its lists and images, bytes.
+    pub fn bytes(&self) -> u64 {
+        let of_positions = size_of_val(&self.positions[..]) + size_of_val(&self.triangles[..]);
+        let of_faces =
+            size_of_val(&self.face_normals[..]) + self.edge_masks.len() + size_of_val(&self.triangle_materials[..]);
+        let of_corners = size_of_val(&self.attribute_triangles[..]) + size_of_val(&self.line_point_attributes[..]);
+        let of_attributes = size_of_val(&self.normals[..]) + size_of_val(&self.uvs[..]) + size_of_val(&self.colors[..]);
+        let of_others =
+            size_of_val(&self.lines_and_points[..]) + size_of_val(&self.materials[..]) + size_of_val(&self.cameras[..]);
+        let of_image = |image: &ImageSource| match &image.content {
+            ImageContent::Encoded(bytes) => bytes.len(),
+            ImageContent::Missing(_) | ImageContent::Absent => 0,
+        };
+        let of_images: usize = self.images.iter().map(of_image).sum();
+        (of_positions + of_faces + of_corners + of_attributes + of_others + of_images) as u64
+    }
 }
 
 /// The way from the unit box to the file's space: `file = centre + scale * unit`. The scale is a

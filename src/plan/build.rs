@@ -2,6 +2,7 @@
 
 use super::context::PlanContext;
 use super::peeling::{pass_masks, peeling_pass};
+use super::prepared::Prepared;
 use super::projection::Projection;
 use super::skips::SkipKind;
 use super::{DrawPlan, HullPass, PlanError, pass_mask};
@@ -14,6 +15,16 @@ pub fn build<'m>(scene: &Scene<'m, '_>, budget: &mut Budget, deadline: &Deadline
     build_keeping(scene, budget, deadline, &[])
 }
 
+/// As [`build`], from what earlier plans found out about the mesh. Keeps what this one finds out.
+pub fn build_from<'m>(
+    scene: &Scene<'m, '_>,
+    prepared: &Prepared,
+    budget: &mut Budget,
+    deadline: &Deadline,
+) -> Result<DrawPlan<'m>, PlanError> {
+    build_in(scene, PlanContext::new(budget, deadline, &[]).with(prepared))
+}
+
 /// As [`build`], but nothing in `keep` is skipped, for tests: the picture is the same to the byte.
 pub fn build_keeping<'m>(
     scene: &Scene<'m, '_>,
@@ -21,7 +32,10 @@ pub fn build_keeping<'m>(
     deadline: &Deadline,
     keep: &[SkipKind],
 ) -> Result<DrawPlan<'m>, PlanError> {
-    let mut cx = PlanContext::new(budget, deadline, keep);
+    build_in(scene, PlanContext::new(budget, deadline, keep))
+}
+
+fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPlan<'m>, PlanError> {
     let Scene { spec, groups, camera, .. } = scene;
     let geometry = primitives::geometry(scene, &mut cx)?;
     costs::spend_plan(scene, &geometry, cx.budget)?;

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::PlanError;
 use super::edges::silhouettes::Silhouettes;
+use super::prepared::Prepared;
 use super::skips::{SkipKind, Skips};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
@@ -23,6 +24,8 @@ pub struct PlanContext<'c> {
     pub deadline: &'c Deadline,
     /// The skips so far.
     pub skips: Skips<'c>,
+    /// What is known about the mesh, if anybody keeps it.
+    pub prepared: Option<&'c Prepared>,
     edges: Option<Arc<EdgeList>>,
     silhouettes: Option<Arc<Silhouettes>>,
 }
@@ -30,7 +33,12 @@ pub struct PlanContext<'c> {
 impl<'c> PlanContext<'c> {
     /// A context in which nothing in `keep` is ever skipped.
     pub fn new(budget: &'c mut Budget, deadline: &'c Deadline, keep: &'c [SkipKind]) -> Self {
-        Self { budget, deadline, skips: Skips::new(keep), edges: None, silhouettes: None }
+        Self { budget, deadline, skips: Skips::new(keep), prepared: None, edges: None, silhouettes: None }
+    }
+
+    /// The same with what is known about the mesh.
+    pub fn with(self, prepared: &'c Prepared) -> Self {
+        Self { prepared: Some(prepared), ..self }
     }
 
     /// The edges of the mesh, found when a stage first needs them.
@@ -39,7 +47,11 @@ impl<'c> PlanContext<'c> {
             return Ok(Arc::clone(edges));
         }
         self.deadline.check()?;
-        let edges = Arc::new(EdgeList::of(mesh, self.budget)?);
+        let find = |budget: &mut Budget| EdgeList::of(mesh, budget);
+        let edges = match self.prepared {
+            Some(prepared) => prepared.edges(self.budget, find)?,
+            None => Arc::new(find(self.budget)?),
+        };
         self.edges = Some(Arc::clone(&edges));
         Ok(edges)
     }
@@ -48,6 +60,12 @@ impl<'c> PlanContext<'c> {
     /// orientation in the meantime.
     pub fn edges_and_orientation(&mut self, mesh: &Mesh) -> Result<(Arc<EdgeList>, Option<Orientation>), PlanError> {
         self.budget.spend("the orientation", mesh.positions.len() as u64, ORIENTATION_BYTES)?;
+        if let Some(prepared) = self.prepared
+            && let Some(is_closed) = prepared.known_edges().map(EdgeList::is_closed)
+        {
+            let edges = self.edges(mesh)?;
+            return Ok((edges, is_closed.then(|| prepared.orientation(|| orientation(mesh)))));
+        }
         let is_done_and_open = AtomicBool::new(false);
         let mut edges = || {
             let edges = self.edges(mesh);
@@ -59,7 +77,11 @@ impl<'c> PlanContext<'c> {
         let orientation = || (!is_done_and_open.load(Ordering::Relaxed)).then(|| orientation(mesh));
         let ((edges, is_closed), orientation) =
             if mesh.triangles.len() < CHECK_EVERY { (edges(), orientation()) } else { rayon::join(edges, orientation) };
-        Ok((edges?, orientation.filter(|_| is_closed)))
+        let (edges, orientation) = (edges?, orientation.filter(|_| is_closed));
+        if let (Some(prepared), Some(orientation)) = (self.prepared, orientation) {
+            prepared.orientation(|| orientation);
+        }
+        Ok((edges, orientation))
     }
 
     /// The edges of the mesh, and which of them may be silhouette edges. Contours and hulls share

@@ -1,8 +1,11 @@
 //! The daemon: [`http`] in front of [`jobs`] (the queue, the workers and their results) and
-//! [`store`] (meshes that stay).
+//! [`store`] (meshes that stay). [`residents`] and [`pictures`] remember what was read and drawn.
 //!
-//! Architecture invariant: [`jobs`] and [`store`] do not know HTTP.
+//! Architecture invariant: [`http`] alone knows HTTP.
 
+mod cache;
 pub mod http;
 pub mod jobs;
+pub mod pictures;
+pub mod residents;
 pub mod store;

@@ -11,12 +11,14 @@
 // A tool for developers: giving up loudly is fine.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod served;
+
 use std::collections::BTreeMap;
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
-use std::net::TcpStream;
-use std::process::{Child, Command, ExitCode, Stdio};
+use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+
+use served::{exchange, resident_bytes, start};
 
 /// Memory may still grow by this much after warm-up: allocators keep what their busiest moment
 /// needed.
@@ -43,7 +45,11 @@ fn main() -> ExitCode {
     let mesh = std::fs::read(&options.mesh).unwrap_or_else(|e| panic!("{}: {e}", options.mesh));
     let (mut child, address) = match &options.url {
         Some(url) => (None, url.clone()),
-        None => start(&options.serve),
+        None => {
+            let (child, address) = start(&options.serve);
+            println!("server idle: {} kB resident", resident_bytes(&child).unwrap_or(0) / 1024);
+            (Some(child), address)
+        }
     };
     let head = format!(
         "POST /v1/render?{} HTTP/1.1\r\nHost: {address}\r\nContent-Length: {}\r\n\r\n",
@@ -110,24 +116,13 @@ fn options() -> Options {
     options
 }
 
-fn start(more: &[String]) -> (Option<Child>, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_meshsnap"));
-    command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu", "--log", "warn"]).args(more);
-    let mut child = command.stdout(Stdio::piped()).spawn().expect("the server starts");
-    let mut line = String::new();
-    BufReader::new(child.stdout.take().expect("a pipe")).read_line(&mut line).expect("the server says where it is");
-    let address = line.trim().rsplit('/').next().unwrap_or_default().to_owned();
-    println!("server idle: {} kB resident", resident_bytes(&child).unwrap_or(0) / 1024);
-    (Some(child), address)
-}
-
 fn client(address: &str, request: &[u8], stop: &AtomicBool) -> Seen {
     let mut seen = Seen::default();
     let mut stream = None;
     while !stop.load(Ordering::Relaxed) {
         let began = Instant::now();
         match exchange(&mut stream, address, request) {
-            Ok(status) => {
+            Ok((status, _)) => {
                 *seen.statuses.entry(status).or_default() += 1;
                 if status == 200 {
                     seen.drawn.push(began.elapsed());
@@ -144,43 +139,6 @@ fn client(address: &str, request: &[u8], stop: &AtomicBool) -> Seen {
         }
     }
     seen
-}
-
-fn exchange(stream: &mut Option<TcpStream>, address: &str, request: &[u8]) -> std::io::Result<u16> {
-    let stream = match stream {
-        Some(stream) => stream,
-        None => {
-            let fresh = TcpStream::connect(address)?;
-            fresh.set_nodelay(true)?;
-            fresh.set_read_timeout(Some(Duration::from_secs(60)))?;
-            stream.insert(fresh)
-        }
-    };
-    stream.write_all(request)?;
-    let mut answer = Vec::new();
-    let mut chunk = [0; 16 * 1024];
-    let (end, length) = loop {
-        let count = stream.read(&mut chunk)?;
-        if count == 0 {
-            return Err(std::io::ErrorKind::UnexpectedEof.into());
-        }
-        answer.extend_from_slice(&chunk[..count]);
-        if let Some(end) = answer.windows(4).position(|w| w == b"\r\n\r\n") {
-            let head = String::from_utf8_lossy(&answer[..end]).to_ascii_lowercase();
-            let length = head.lines().find_map(|l| l.strip_prefix("content-length: ")?.trim().parse::<usize>().ok());
-            break (end + 4, length.unwrap_or(0));
-        }
-    };
-    let mut rest = vec![0; (end + length).saturating_sub(answer.len())];
-    stream.read_exact(&mut rest)?;
-    let status = String::from_utf8_lossy(&answer[..end]).split(' ').nth(1).and_then(|s| s.parse().ok());
-    status.ok_or_else(|| std::io::ErrorKind::InvalidData.into())
-}
-
-fn resident_bytes(child: &Child) -> Option<u64> {
-    let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmRSS:"))?;
-    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
 }
 
 fn report(seen: Vec<Seen>, took: Duration, resident: &[u64]) -> ExitCode {

@@ -1,6 +1,7 @@
 //! The surface of a plan: its materials, and the arrays that they read.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use super::edge_masks::edge_masks;
 use super::textures::TextureLoader;
@@ -8,9 +9,10 @@ use super::{lights, materials};
 use crate::mesh::normals;
 use crate::plan::context::PlanContext;
 use crate::plan::geometry::Geometry;
+use crate::plan::prepared::Prepared;
 use crate::plan::projection::Projection;
 use crate::plan::shared_slice::SharedSlice;
-use crate::plan::skips::{SkipKind, Skips};
+use crate::plan::skips::SkipKind;
 use crate::plan::{CornerValues, Faces, PlanError, ShadedMaterial, SurfacePass, Textures, flags};
 use crate::scene::Scene;
 use crate::spec::Cull;
@@ -58,7 +60,7 @@ pub fn surface_pass<'m>(
         textures,
         lights: lights::lights(&scene.spec.light, &scene.camera),
     };
-    add_attributes(scene, geometry, &mut pass, &mut cx.skips);
+    add_attributes(scene, geometry, &mut pass, cx);
     Ok(Some(pass))
 }
 
@@ -67,7 +69,7 @@ fn materials_and_textures(
     scene: &Scene<'_, '_>,
     geometry: &Geometry<'_>,
     cx: &mut PlanContext<'_>,
-) -> Result<(Vec<ShadedMaterial>, Textures), PlanError> {
+) -> Result<(Vec<ShadedMaterial>, Arc<Textures>), PlanError> {
     let mesh = scene.mesh;
     let mut loader = TextureLoader::new(mesh, cx.budget, cx.deadline);
     let mut materials = Vec::with_capacity(mesh.materials.len());
@@ -84,7 +86,7 @@ fn materials_and_textures(
         }
     }
     let projection = Projection::new(&scene.camera, scene.size_px(), true);
-    let textures = loader.finish(geometry, &projection, &mut cx.skips)?;
+    let textures = loader.finish(geometry, &projection, cx.prepared, &mut cx.skips)?;
     Ok((materials, textures))
 }
 
@@ -104,8 +106,9 @@ fn add_attributes<'m>(
     scene: &Scene<'m, '_>,
     geometry: &Geometry<'m>,
     pass: &mut SurfacePass<'m>,
-    skips: &mut Skips<'_>,
+    cx: &mut PlanContext<'_>,
 ) {
+    let skips = &mut cx.skips;
     let mesh = scene.mesh;
     let all = pass.all_flags();
     let reads = |flag: u32| pass.is_shaded && all & flag != 0;
@@ -114,7 +117,7 @@ fn add_attributes<'m>(
         pass.face_normals = geometry.face_normals.clone();
     }
     if !skips.skip(SkipKind::VertexNormals, !reads(flags::VERTEX_NORMALS), "no material is shaded smoothly") {
-        pass.vertex_normals = Some(vertex_normals(geometry));
+        pass.vertex_normals = Some(vertex_normals(scene, geometry, cx.prepared));
     }
     let samples = pass.is_shaded && pass.materials.iter().any(materials::samples);
     let shows_uvs =
@@ -131,10 +134,17 @@ fn add_attributes<'m>(
 }
 
 /// The file's own vertex normals; angle-weighted ones where it has none.
-fn vertex_normals<'m>(geometry: &Geometry<'m>) -> CornerValues<'m, [f32; 3]> {
+fn vertex_normals<'m>(
+    scene: &Scene<'m, '_>,
+    geometry: &Geometry<'m>,
+    prepared: Option<&Prepared>,
+) -> CornerValues<'m, [f32; 3]> {
     if geometry.normals.is_empty() {
-        let values = normals::angle_weighted(&geometry.positions, &geometry.triangles, &geometry.face_normals);
-        return CornerValues { values: values.into(), triangles: geometry.triangles.clone() };
+        let find = || normals::angle_weighted(&geometry.positions, &geometry.triangles, &geometry.face_normals);
+        // Triangles that stand for lines and points have normals of their own picture.
+        let prepared = prepared.filter(|_| geometry.positions.len() == scene.mesh.positions.len());
+        let values = prepared.map_or_else(|| Arc::new(find()), |prepared| prepared.vertex_normals(find));
+        return CornerValues { values: SharedSlice::Owned(values), triangles: geometry.triangles.clone() };
     }
     CornerValues { values: geometry.normals.clone(), triangles: geometry.attribute_triangles.clone() }
 }

@@ -9,6 +9,7 @@ pub(crate) mod textures;
 
 pub use build::surface_pass;
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use super::Faces;
 use super::shared_slice::SharedSlice;
@@ -37,7 +38,7 @@ pub struct SurfacePass<'a> {
     /// where wires follow all edges.
     pub edge_masks: Cow<'a, [u8]>,
     /// The textures that materials sample.
-    pub textures: Textures,
+    pub textures: Arc<Textures>,
     /// The lamps and the ambient light.
     pub lights: Lights,
 }
@@ -250,7 +251,7 @@ impl<'a> SurfacePass<'a> {
             uvs: None,
             colors: None,
             edge_masks: Cow::Borrowed(&[]),
-            textures: Textures::default(),
+            textures: Arc::default(),
             lights: Lights::default(),
         }
     }

@@ -2,6 +2,7 @@
 //! the picture can show.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -9,6 +10,7 @@ use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
 use crate::mesh::material::{ImageContent, ImageSource, TextureRef, Wrap};
 use crate::plan::geometry::Geometry;
+use crate::plan::prepared::{Prepared, PreparedTextures};
 use crate::plan::projection::Projection;
 use crate::plan::skips::{SkipKind, Skips};
 use crate::plan::surface::closeup;
@@ -97,10 +99,11 @@ impl<'a> TextureLoader<'a> {
         self,
         geometry: &Geometry<'_>,
         projection: &Projection,
+        prepared: Option<&Prepared>,
         skips: &mut Skips<'_>,
-    ) -> Result<Textures, PlanError> {
+    ) -> Result<Arc<Textures>, PlanError> {
         if self.wanted.is_empty() {
-            return Ok(Textures::default());
+            return Ok(Arc::default());
         }
         let Self { mesh, budget, deadline, wanted, uses, .. } = self;
         let sizes: Vec<[u32; 2]> = wanted.iter().map(|w| [w.header.width, w.header.height]).collect();
@@ -115,6 +118,17 @@ impl<'a> TextureLoader<'a> {
         let texels = |w: &Wanted, first: u32| mips::texels(w.header.width, w.header.height, first);
         let total: u64 = wanted.iter().zip(&first_levels).map(|(w, &first)| texels(w, first)).sum();
         budget.spend("textures", total, 8)?;
+        let of_wanted = |w: &Wanted| (w.image, w.is_color);
+        // Levels that are finer than any pixel asks for change nothing. Where some had to be left out,
+        // pixels see which.
+        let are_all = first_levels.iter().zip(&finest).all(|(first, finest)| first <= finest);
+        let kept = prepared.filter(|_| are_all).and_then(Prepared::textures);
+        if let Some(kept) =
+            kept.filter(|kept| kept.have(&wanted.iter().map(of_wanted).collect::<Vec<_>>(), &first_levels))
+        {
+            budget.spend_again(&kept.spent)?;
+            return Ok(kept.textures);
+        }
         let mut textures = Textures { texels: vec![[0; 4]; total as usize], images: Vec::new() };
         let mut images = Vec::new();
         let mut rest = &mut textures.texels[..];
@@ -128,7 +142,13 @@ impl<'a> TextureLoader<'a> {
             images.push(Decoding { image: &mesh.images[want.image as usize], want, first_level, out });
             rest = others;
         }
-        decode_all(images, budget, deadline)?;
+        let (decoded, spent) = budget.record(|budget| decode_all(images, budget, deadline));
+        decoded?;
+        let textures = Arc::new(textures);
+        if let Some(prepared) = prepared.filter(|_| are_all) {
+            let images = wanted.iter().map(of_wanted).collect();
+            prepared.keep_textures(PreparedTextures { images, textures: Arc::clone(&textures), spent });
+        }
         Ok(textures)
     }
 }

@@ -11,6 +11,8 @@ use crate::config::{Config, cores, why_no_gpu};
 use crate::limits::Limits;
 use crate::request::{self, Rules};
 use crate::service::jobs::{CpuThreads, JobSettings, Jobs, UploadBudget, pipeline_renderers};
+use crate::service::pictures::Pictures;
+use crate::service::residents::Residents;
 use crate::service::store::Store;
 
 /// The state that all handlers share.
@@ -27,6 +29,10 @@ pub struct AppState {
     pub upload_budget: Arc<UploadBudget>,
     /// The stored meshes.
     pub meshes: Store,
+    /// Stored meshes as they are drawn.
+    pub residents: Arc<Residents>,
+    /// Pictures that were drawn.
+    pub pictures: Pictures,
     /// Time limit for reading one request body.
     pub body_timeout: Duration,
     /// Number of worker threads.
@@ -44,7 +50,8 @@ impl AppState {
             given => CpuThreads::Each(to_usize(given)),
         };
         let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));
-        let renderers = pipeline_renderers(gpu.clone(), threads, config.limits.clone());
+        let residents = Arc::new(Residents::new(config.resident_bytes));
+        let renderers = pipeline_renderers(gpu.clone(), threads, config.limits.clone(), residents.clone());
         let Limits { queue_per_worker, job_ms, .. } = config.limits;
         let settings = JobSettings {
             workers: to_usize(config.workers),
@@ -63,6 +70,8 @@ impl AppState {
             gpu,
             upload_budget: UploadBudget::new(config.uploads_bytes),
             meshes: Store::new(config.mesh_bytes, to_usize(config.mesh_count)),
+            residents,
+            pictures: Pictures::new(config.picture_bytes),
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             workers: config.workers,
             api_keys: config.api_keys.clone(),

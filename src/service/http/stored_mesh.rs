@@ -30,11 +30,13 @@ pub fn unknown() -> ApiError {
 
 /// A worker's task on a stored mesh.
 pub fn work_on(stored: &StoredMesh, reading: Reading, task: Task) -> Work {
-    work(stored.mesh.bundle.clone(), reading, task, stored.memory.clone())
+    // Debug output is unambiguous.
+    let key = format!("{} {reading:?}", stored.mesh.digest);
+    Work { mesh_key: Some(key), ..work(stored.mesh.bundle.clone(), reading, task, stored.memory.clone()) }
 }
 
 /// A worker's task on a bundle that is read in the given way.
 pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Reservation>) -> Work {
     let Reading { format_in, entry } = reading;
-    Work { bundle: bundle.with_entry(entry), format_in, task, memory }
+    Work { bundle: bundle.with_entry(entry), format_in, mesh_key: None, task, memory }
 }

@@ -45,6 +45,8 @@ pub struct Work {
     pub bundle: Bundle,
     /// The mesh's format. None: found from the bytes.
     pub format_in: Option<Format>,
+    /// The name under which the mesh may stay in memory as it was read; None if it is not to.
+    pub mesh_key: Option<String>,
     /// The task on the mesh.
     pub task: Task,
     /// The memory of `bundle`, shared with all other holders of the same bytes.

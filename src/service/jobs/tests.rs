@@ -31,7 +31,7 @@ fn work(budget: &Arc<UploadBudget>, mesh: &'static [u8]) -> Work {
     let mut reservation = budget.reserve();
     reservation.grow(mesh.len() as u64).unwrap();
     let (bundle, task) = (Bundle::of_one(Bytes::from_static(mesh)), Task::Draw(Box::new(spec())));
-    Work { bundle, format_in: None, task, memory: Arc::new(reservation) }
+    Work { bundle, format_in: None, mesh_key: None, task, memory: Arc::new(reservation) }
 }
 
 /// Any specification: the fake renderer does not read it.

@@ -9,8 +9,9 @@ use super::registry::JobRegistry;
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{Backends, GpuHost};
 use crate::import;
-use crate::limits::{Deadline, Limits};
-use crate::pipeline::{self, RenderError, Stage};
+use crate::limits::{Budget, Deadline, Limits};
+use crate::pipeline::{self, Model, Output, RenderError, Stage};
+use crate::service::residents::{Resident, Residents};
 
 /// A worker's renderer, which does one job after the other.
 pub type Renderer = Box<dyn FnMut(&Work, &Deadline, &mut dyn FnMut(Stage)) -> Result<Product, RenderError>>;
@@ -29,20 +30,30 @@ pub enum CpuThreads {
 }
 
 /// Renderers that run [`crate::pipeline`].
-pub fn pipeline_renderers(gpu: Arc<GpuHost>, threads: CpuThreads, limits: Limits) -> RendererFactory {
+pub fn pipeline_renderers(
+    gpu: Arc<GpuHost>,
+    threads: CpuThreads,
+    limits: Limits,
+    residents: Arc<Residents>,
+) -> RendererFactory {
     Arc::new(move || {
         let mut backends = match &threads {
             CpuThreads::Each(count) => Backends::new(gpu.clone(), *count),
             CpuThreads::Shared(threads) => Backends::sharing(gpu.clone(), threads.clone()),
         };
-        let limits = limits.clone();
+        let (limits, residents) = (limits.clone(), residents.clone());
         Box::new(move |work, deadline, ended| {
-            let Work { bundle, format_in, task, .. } = work;
+            let Work { bundle, format_in, mesh_key, task, .. } = work;
             match task {
                 Task::Draw(spec) => {
                     let job = pipeline::Job { bundle, format_in: *format_in, spec };
-                    pipeline::render(job, &mut backends, &limits, deadline, ended)
-                        .map(|output| Product::Picture(Box::new(output)))
+                    let output = match mesh_key {
+                        Some(key) => {
+                            render_stored((key.as_str(), job), &residents, &mut backends, &limits, deadline, ended)?
+                        }
+                        None => pipeline::render(job, &mut backends, &limits, deadline, ended)?,
+                    };
+                    Ok(Product::Picture(Box::new(output)))
                 }
                 Task::Inspect { time_s } => {
                     let options = import::Options { format: *format_in, time_s: *time_s };
@@ -52,6 +63,31 @@ pub fn pipeline_renderers(gpu: Arc<GpuHost>, threads: CpuThreads, limits: Limits
             }
         })
     })
+}
+
+/// As [`pipeline::render`], of a mesh that may be in memory, or stays there.
+fn render_stored(
+    (key, job): (&str, pipeline::Job<'_>),
+    residents: &Residents,
+    backends: &mut Backends,
+    limits: &Limits,
+    deadline: &Deadline,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Output, RenderError> {
+    let time_s = job.spec.time_s;
+    // Exact, and different for 0 and -0.
+    let key = time_s.map_or_else(|| key.to_owned(), |time_s| format!("{key} at {time_s:?} s"));
+    let resident = residents.find(&key, deadline, || {
+        let mut budget = Budget::new(limits);
+        let options = import::Options { format: job.format_in, time_s };
+        let model = Model::read(job.bundle, options, limits, &mut budget, deadline)?;
+        Ok(Resident { model, budget })
+    })?;
+    ended(Stage::Parse);
+    let mut budget = resident.budget.clone();
+    let output = pipeline::render_model(&resident.model, job.spec, backends, &mut budget, deadline, ended);
+    residents.weigh(&key, &resident);
+    output
 }
 
 /// Does jobs until the registry is drained.

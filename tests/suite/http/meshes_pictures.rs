@@ -108,7 +108,9 @@ fn who_has_the_picture_costs_no_worker() {
         let client = scope.spawn(|| server.post("/v1/render?size=4096", CUBE_OBJ));
         server.wait_for_load(|load| load["running"] == 1);
         // There is no worker to be had.
-        server.get(&path).problem(429, "queue_full");
+        server.get(&format!("{path}&view=top")).problem(429, "queue_full");
+        let kept = server.get(&path);
+        assert_eq!((kept.header("x-cache"), &kept.body), (Some("hit"), &drawn.body));
         let unmodified = server.request("GET", &path, &[&known], b"");
         assert_eq!((unmodified.status, unmodified.body.len()), (304, 0));
         assert_eq!(unmodified.header("etag"), drawn.header("etag"));

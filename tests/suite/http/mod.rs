@@ -3,6 +3,7 @@
 pub mod answers;
 pub mod bad;
 pub mod jobs;
+pub mod kept;
 pub mod meshes;
 pub mod meshes_bad;
 pub mod meshes_pictures;

@@ -6,11 +6,8 @@ use serde::Serialize;
 
 use crate::backend::GpuStatus;
 use crate::import::Format;
-use crate::limits::Limits;
 use crate::request::{self, Style, word_for, words_of};
 use crate::service::http::state::AppState;
-use crate::service::jobs::JobLoad;
-use crate::service::store::StoreLoad;
 use crate::spec::BackendChoice;
 
 /// The capabilities of this process, its limits and its load.
@@ -56,6 +53,10 @@ struct LoadDto {
     kept_result_bytes: u64,
     stored_meshes: usize,
     stored_mesh_bytes: u64,
+    resident_meshes: usize,
+    resident_mesh_bytes: u64,
+    kept_pictures: usize,
+    kept_picture_bytes: u64,
 }
 
 #[derive(Serialize)]
@@ -74,6 +75,8 @@ struct LimitsDto {
     queue_per_worker: u64,
     mesh_bytes: u64,
     mesh_count: usize,
+    resident_bytes: u64,
+    picture_bytes: u64,
 }
 
 impl CapabilitiesDto {
@@ -91,8 +94,8 @@ impl CapabilitiesDto {
             paths,
             backend: BackendDto::new(state.rules.backend, state.gpu.status()),
             workers: state.workers,
-            load: LoadDto::new(state.jobs.load(), state.meshes.load()),
-            limits: LimitsDto::new(&state.rules.limits, state.meshes.limits()),
+            load: LoadDto::new(state),
+            limits: LimitsDto::new(state),
         }
     }
 }
@@ -114,7 +117,9 @@ impl BackendDto {
 }
 
 impl LoadDto {
-    fn new(jobs: JobLoad, meshes: StoreLoad) -> Self {
+    fn new(state: &AppState) -> Self {
+        let (jobs, meshes) = (state.jobs.load(), state.meshes.load());
+        let (residents, pictures) = (state.residents.load(), state.pictures.load());
         Self {
             queued: jobs.queued,
             running: jobs.running,
@@ -122,12 +127,17 @@ impl LoadDto {
             kept_result_bytes: jobs.kept_bytes,
             stored_meshes: meshes.count,
             stored_mesh_bytes: meshes.bytes,
+            resident_meshes: residents.count,
+            resident_mesh_bytes: residents.bytes,
+            kept_pictures: pictures.count,
+            kept_picture_bytes: pictures.bytes,
         }
     }
 }
 
 impl LimitsDto {
-    fn new(limits: &Limits, (mesh_bytes, mesh_count): (u64, usize)) -> Self {
+    fn new(state: &AppState) -> Self {
+        let (limits, (mesh_bytes, mesh_count)) = (&state.rules.limits, state.meshes.limits());
         Self {
             body_bytes: limits.body_bytes,
             memory_bytes: limits.memory_bytes,
@@ -143,6 +153,8 @@ impl LimitsDto {
             queue_per_worker: limits.queue_per_worker,
             mesh_bytes,
             mesh_count,
+            resident_bytes: state.residents.limit_bytes(),
+            picture_bytes: state.pictures.limit_bytes(),
         }
     }
 }

@@ -14,7 +14,7 @@ use axum::http::HeaderMap;
 
 use self::body::{BodyKind, BodyLimits, Upload};
 use self::query::Query;
-use super::address::Address;
+use super::address::{Address, render_key};
 use super::error::ApiError;
 use super::state::AppState;
 use super::{negotiate, stored_mesh};
@@ -28,6 +28,8 @@ use crate::spec::Spec;
 pub struct Received {
     /// The work for a worker.
     pub work: Work,
+    /// The render key of the picture, if the mesh is stored.
+    pub key: Option<String>,
     /// The address of the picture, if the mesh is stored.
     pub address: Option<Address>,
 }
@@ -56,14 +58,15 @@ pub async fn receive(state: &AppState, request: Request) -> Result<Received, Api
         let digest = Digest::parse(&name).ok_or_else(|| request::bad_mesh_name(&name))?;
         let spec = with_format(spec)?;
         let stored = stored_mesh::find(state, Some(&name))?;
+        let key = Some(render_key(state, digest, &reading, &spec));
         let keys = request::all_dotted(document, &overrides, &spec, &state.rules);
         let address = keys.and_then(|keys| Address::new(state, digest, &reading, &spec, &keys));
-        return Ok(Received { work: stored_mesh::work_on(&stored, reading, Task::Draw(spec)), address });
+        return Ok(Received { work: stored_mesh::work_on(&stored, reading, Task::Draw(spec)), key, address });
     }
     upload.bundle.check_sent().map_err(|error| ApiError::from(&error))?;
     let spec = with_format(request::read(upload.document.as_deref(), &overrides, &state.rules)?)?;
     let memory = Arc::new(upload.reservation);
-    Ok(Received { work: stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory), address: None })
+    Ok(Received { work: stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory), key: None, address: None })
 }
 
 /// The body, if it is a request document that names a stored mesh. A request with `format_in` has a

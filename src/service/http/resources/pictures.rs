@@ -46,7 +46,7 @@ pub async fn get(
         ([(header::CONTENT_TYPE, media_type)], responses::body_of_unknown_length()).into_response()
     } else {
         let work = stored_mesh::work_on(&stored, reading, Task::Draw(Box::new(spec)));
-        responses::picture(&*run::draw(&state, work).await?)
+        responses::found(&state.pictures.find(&tag, run::draw(&state, work)).await?)
     };
     // The render key replaces the tag of the picture's bytes, which HEAD and 304 cannot know.
     for (name, value) in cached {

@@ -16,13 +16,17 @@ use crate::service::http::state::AppState;
 /// Draws while the client waits. With `Prefer: respond-async`, accepts a job instead.
 pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
     let respond_async = negotiate::prefer(request.headers()).respond_async;
-    let Received { work, address } = receive::receive(&state, request).await?;
+    let Received { work, key, address } = receive::receive(&state, request).await?;
     if respond_async {
         let mut response = responses::accepted(&*state.jobs.submit(work, true)?);
         responses::set_preference_applied(&mut response, "respond-async");
         return Ok(response);
     }
-    let mut response = responses::picture(&*run::draw(&state, work).await?);
+    let drawing = run::draw(&state, work);
+    let mut response = match key {
+        Some(key) => responses::found(&state.pictures.find(&key, drawing).await?),
+        None => responses::picture(&*drawing.await?),
+    };
     if let Some((location, (name, etag))) =
         address.and_then(|at| Some((HeaderValue::from_str(&at.url).ok()?, conditional::etag(&at.etag))))
     {

@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::service::http::conditional;
 use crate::service::http::dto::{JobDto, media_type};
 use crate::service::jobs::{Finished, Job};
+use crate::service::pictures::{Found, Source};
 
 /// A picture, with its back-end, timings and warnings as headers.
 pub fn picture(finished: &Finished) -> Response {
@@ -39,6 +40,19 @@ pub fn picture(finished: &Finished) -> Response {
     });
     let mut response = (StatusCode::OK, headers, finished.picture.clone()).into_response();
     response.headers_mut().extend(choice.into_iter().flatten().chain(warnings));
+    response
+}
+
+/// As [`picture`], and whether it was in memory. A picture that this request has not drawn brings its
+/// age instead of timings.
+pub fn found(found: &Found) -> Response {
+    let mut response = picture(&found.finished);
+    let headers = response.headers_mut();
+    headers.insert("x-cache", HeaderValue::from_static(found.source.name()));
+    if found.source != Source::Miss {
+        headers.remove("server-timing");
+        headers.insert(header::AGE, HeaderValue::from(found.age.as_secs()));
+    }
     response
 }
 

@@ -128,7 +128,7 @@ fn plan<'a>(uvs: &'a [[f32; 2]], look: ShadedMaterial, textures: Textures) -> Dr
     let surface = plan.surface.as_mut().unwrap();
     surface.materials = vec![look];
     surface.uvs = Some(CornerValues { values: uvs.into(), triangles: (&TRIANGLES).into() });
-    surface.textures = textures;
+    surface.textures = textures.into();
     plan
 }
 

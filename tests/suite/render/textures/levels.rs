@@ -49,7 +49,13 @@ pub fn plan_of<'a>(mesh: &'a Mesh, keep: &[SkipKind], limits: &Limits) -> Result
 
 /// All levels of the textures.
 pub fn textures(mesh: &Mesh) -> Textures {
-    plan_of(mesh, &[SkipKind::FineTextureLevels], &Limits::default()).unwrap().surface.unwrap().textures
+    plan_of(mesh, &[SkipKind::FineTextureLevels], &Limits::default())
+        .unwrap()
+        .surface
+        .unwrap()
+        .textures
+        .as_ref()
+        .clone()
 }
 
 pub fn error(mesh: &Mesh) -> PlanError {
@@ -267,7 +273,7 @@ fn a_small_budget_decodes_one_after_the_other() {
             let middle = (low + high) / 2;
             if plan(middle).is_ok() { high = middle } else { low = middle }
         }
-        let texels = |memory_bytes| plan(memory_bytes).unwrap().surface.unwrap().textures.texels;
+        let texels = |memory_bytes| plan(memory_bytes).unwrap().surface.unwrap().textures.texels.clone();
         assert_eq!(texels(high), texels(1 << 30));
         (high, texels(high).len())
     };

@@ -287,7 +287,7 @@ fn dress<'a>(mesh: &'a Mesh, plan: &mut DrawPlan<'a>) {
     surface.face_normals = (&mesh.face_normals).into();
     surface.colors = Some(CornerValues { values: colors.into(), triangles: (&mesh.triangles).into() });
     surface.uvs = Some(CornerValues { values: uvs.into(), triangles: (&mesh.triangles).into() });
-    surface.textures = textures();
+    surface.textures = textures().into();
 }
 
 fn base_look() -> ShadedMaterial {

@@ -1,0 +1,94 @@
+//! What plans find out about a mesh whatever the picture, kept for the next picture of the mesh.
+//!
+//! Invariant: what is kept changes no byte, no skip and no refusal. A plan that takes it spends what
+//! finding it took.
+
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+use crate::limits::{Budget, LimitExceeded, Spent};
+use crate::mesh::edges::{Edge, EdgeList};
+use crate::mesh::topology::Orientation;
+use crate::texture::Textures;
+
+/// What is known about one mesh, which must not change. Each part is found when a plan first needs
+/// it. Plans that need it at the same time may each find it, and the first one's is kept.
+#[derive(Debug, Default)]
+pub struct Prepared {
+    edges: OnceLock<(Arc<EdgeList>, Vec<Spent>)>,
+    orientation: OnceLock<Orientation>,
+    vertex_normals: OnceLock<Arc<Vec<[f32; 3]>>>,
+    textures: Mutex<Option<PreparedTextures>>,
+}
+
+/// Textures of a mesh, decoded.
+#[derive(Clone, Debug)]
+pub struct PreparedTextures {
+    /// The images, by index, and whether each was read as colours.
+    pub images: Vec<(u32, bool)>,
+    /// The textures.
+    pub textures: Arc<Textures>,
+    /// What was spent on decoding.
+    pub spent: Vec<Spent>,
+}
+
+impl Prepared {
+    /// The edges, paid for; found by `find` if they are not known.
+    pub fn edges(
+        &self,
+        budget: &mut Budget,
+        find: impl FnOnce(&mut Budget) -> Result<EdgeList, LimitExceeded>,
+    ) -> Result<Arc<EdgeList>, LimitExceeded> {
+        if let Some((edges, spent)) = self.edges.get() {
+            budget.spend_again(spent)?;
+            return Ok(Arc::clone(edges));
+        }
+        let (edges, spent) = budget.record(find);
+        let edges = Arc::new(edges?);
+        Ok(Arc::clone(&self.edges.get_or_init(|| (edges, spent)).0))
+    }
+
+    /// The edges, if they are known.
+    pub fn known_edges(&self) -> Option<&EdgeList> {
+        self.edges.get().map(|(edges, _)| &**edges)
+    }
+
+    /// The orientation of the faces.
+    pub fn orientation(&self, find: impl FnOnce() -> Orientation) -> Orientation {
+        *self.orientation.get_or_init(find)
+    }
+
+    /// Vertex normals for a mesh that brings none.
+    pub fn vertex_normals(&self, find: impl FnOnce() -> Vec<[f32; 3]>) -> Arc<Vec<[f32; 3]>> {
+        Arc::clone(self.vertex_normals.get_or_init(|| Arc::new(find())))
+    }
+
+    /// The textures that were kept last.
+    pub fn textures(&self) -> Option<PreparedTextures> {
+        self.locked_textures().clone()
+    }
+
+    /// Keeps textures instead of those before.
+    pub fn keep_textures(&self, textures: PreparedTextures) {
+        *self.locked_textures() = Some(textures);
+    }
+
+    /// Memory of what is kept, bytes.
+    pub fn bytes(&self) -> u64 {
+        let edges = self.edges.get().map_or(0, |(edges, _)| edges.len() * (size_of::<Edge>() + 1));
+        let normals = self.vertex_normals.get().map_or(0, |normals| size_of_val(&normals[..]));
+        let textures = self.locked_textures().as_ref().map_or(0, |kept| size_of_val(&kept.textures.texels[..]));
+        (edges + normals + textures) as u64
+    }
+
+    fn locked_textures(&self) -> MutexGuard<'_, Option<PreparedTextures>> {
+        self.textures.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl PreparedTextures {
+    /// True if these are the wanted images, none of them coarser than `first_levels`.
+    pub fn have(&self, images: &[(u32, bool)], first_levels: &[u32]) -> bool {
+        let kept = self.textures.images.iter().map(|texture| texture.first_level);
+        self.images == images && kept.zip(first_levels).all(|(kept, wanted)| kept <= *wanted)
+    }
+}

@@ -1,0 +1,36 @@
+//! A cache under a cap of bytes, for [`pictures`](super::pictures) and [`residents`](super::residents).
+
+use quick_cache::sync::{Cache, DefaultLifecycle};
+use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
+
+/// A cache by names. What is used least goes first.
+pub type ByteCache<V> = Cache<String, V, ByBytes>;
+
+/// A value that is weighed by its bytes.
+pub trait Weighed {
+    /// Its bytes, always the same.
+    fn bytes(&self) -> u64;
+}
+
+/// Weighs names and values.
+#[derive(Clone, Debug)]
+pub struct ByBytes;
+
+impl<V: Weighed> Weighter<String, V> for ByBytes {
+    fn weight(&self, name: &String, value: &V) -> u64 {
+        name.len() as u64 + value.bytes()
+    }
+}
+
+/// A cache for `bytes` in all, of values that take `typical_bytes` each on an average.
+pub fn with_room_for<V: Weighed + Clone>(bytes: u64, typical_bytes: u64) -> ByteCache<V> {
+    let count = usize::try_from(bytes / typical_bytes.max(1)).unwrap_or(usize::MAX).clamp(16, 1 << 16);
+    // One shard, so that a single value may take all the room.
+    let options = OptionsBuilder::new().shards(1).estimated_items_capacity(count).weight_capacity(bytes.max(1)).build();
+    match options {
+        Ok(options) => {
+            Cache::with_options(options, ByBytes, DefaultHashBuilder::default(), DefaultLifecycle::default())
+        }
+        Err(_) => Cache::with_weighter(count, bytes.max(1), ByBytes),
+    }
+}

@@ -1,0 +1,116 @@
+//! Stored meshes in the form in which they are drawn, kept in memory so that the next picture reads no
+//! file. The least useful go first.
+//!
+//! Invariant: no picture, warning or refusal depends on what is kept.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use quick_cache::sync::GuardResult;
+
+use super::cache::{ByteCache, Weighed, with_room_for};
+use crate::limits::{Budget, Deadline};
+use crate::pipeline::{Model, RenderError};
+
+/// The time between two looks at the deadline of a job that waits for another job's reading.
+const WAIT: Duration = Duration::from_millis(10);
+
+/// Bytes of a mesh on an average, to size tables.
+const TYPICAL_BYTES: u64 = 1 << 20;
+
+/// A mesh in memory.
+#[derive(Debug)]
+pub struct Resident {
+    /// The mesh.
+    pub model: Model,
+    /// A job's budget after reading it, so that a job that reads nothing has as much left.
+    pub budget: Budget,
+}
+
+/// The meshes in memory. One cap holds for the bytes of all that are kept; one that a job draws when it
+/// has to make room is that job's memory until the job ends.
+#[derive(Debug)]
+pub struct Residents {
+    cache: ByteCache<Kept>,
+    bytes: u64,
+}
+
+/// The content of [`Residents`] at one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ResidentLoad {
+    /// Number of meshes.
+    pub count: usize,
+    /// Their bytes.
+    pub bytes: u64,
+}
+
+#[derive(Clone, Debug)]
+struct Kept {
+    resident: Arc<Resident>,
+    /// The bytes that it counts with.
+    bytes: u64,
+}
+
+impl Weighed for Kept {
+    fn bytes(&self) -> u64 {
+        self.bytes
+    }
+}
+
+impl Residents {
+    /// Room for meshes of so many bytes together. None are kept if it is 0.
+    pub fn new(bytes: u64) -> Self {
+        Self { cache: with_room_for(bytes, TYPICAL_BYTES), bytes }
+    }
+
+    /// The mesh of this key, read by `read` if it is not in memory. However many jobs ask at the same
+    /// moment, one reads; if that fails, the next one tries.
+    pub fn find(
+        &self,
+        key: &str,
+        deadline: &Deadline,
+        read: impl FnOnce() -> Result<Resident, RenderError>,
+    ) -> Result<Arc<Resident>, RenderError> {
+        if self.bytes == 0 {
+            return read().map(Arc::new);
+        }
+        loop {
+            match self.cache.get_value_or_guard(key, Some(WAIT)) {
+                GuardResult::Value(kept) => return Ok(kept.resident),
+                GuardResult::Guard(guard) => {
+                    let resident = Arc::new(read()?);
+                    // An error says that it was removed in the meantime.
+                    let _ = guard.insert(Kept::new(&resident));
+                    return Ok(resident);
+                }
+                GuardResult::Timeout => deadline.check()?,
+            }
+        }
+    }
+
+    /// Counts what a picture has added to a mesh. Others may have to make room for it.
+    pub fn weigh(&self, key: &str, resident: &Arc<Resident>) {
+        let now = Kept::new(resident);
+        let is_other = |kept: &Kept| Arc::ptr_eq(&kept.resident, resident) && kept.bytes != now.bytes;
+        if self.cache.peek(key).is_some_and(|kept| is_other(&kept)) {
+            // An error says that it was removed in the meantime.
+            let _ = self.cache.replace(key.to_owned(), now, true);
+        }
+    }
+
+    /// Most bytes.
+    pub fn limit_bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// The content at this moment.
+    pub fn load(&self) -> ResidentLoad {
+        ResidentLoad { count: self.cache.len(), bytes: self.cache.weight() }
+    }
+}
+
+impl Kept {
+    fn new(resident: &Arc<Resident>) -> Self {
+        Self { resident: Arc::clone(resident), bytes: resident.model.bytes() }
+    }
+}

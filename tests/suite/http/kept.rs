@@ -1,0 +1,166 @@
+//! Stored meshes and their pictures that stay in memory: what is kept is never wrong, never too much,
+//! and made once.
+#![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::http::meshes::url;
+use crate::support::server::{Answer, CUBE_OBJ, Server};
+use crate::support::shapes;
+
+/// A torus of a size of its own.
+fn torus(name: usize) -> Vec<u8> {
+    shapes::torus(24 + name).into_bytes()
+}
+
+/// Milliseconds of a stage.
+fn stage_ms(answer: &Answer, stage: &str) -> Option<f64> {
+    let timings = answer.header("server-timing")?;
+    timings.split(", ").find_map(|part| part.strip_prefix(&format!("{stage};dur="))?.parse().ok())
+}
+
+#[test]
+fn a_picture_is_drawn_once_and_a_mesh_read_once() {
+    let server = Server::start(&[]);
+    let mesh = torus(100);
+    server.post("/v1/meshes", &mesh);
+    let path = |rest: &str| format!("{}/render.png?size=64&{rest}", url(&mesh));
+    let first = server.get(&path("style=wire"));
+    assert_eq!((first.header("x-cache"), first.header("age")), (Some("miss"), None));
+    let second = server.get(&path("style=wire"));
+    assert_eq!((second.header("x-cache"), second.header("age")), (Some("hit"), Some("0")));
+    assert_eq!((&second.body, second.header("server-timing")), (&first.body, None));
+    for name in ["etag", "content-type", "cache-control", "x-render-backend"] {
+        assert!(first.header(name).is_some() && first.header(name) == second.header(name), "{name}");
+    }
+    // The same request in other words, and as a document.
+    assert_eq!(server.get(&path("style=wire&view=iso")).header("x-cache"), Some("hit"));
+    let document = format!(r##"{{"mesh":"{}","style":"wire","image":{{"height":64,"width":64}}}}"##, &url(&mesh)[11..]);
+    let posted = server.post("/v1/render", document.as_bytes());
+    assert_eq!((posted.header("x-cache"), &posted.body), (Some("hit"), &first.body));
+    assert!(posted.header("content-location").is_some());
+    // Another camera is another picture of the same mesh.
+    let turned = server.get(&path("style=wire&view=top"));
+    assert_eq!(turned.header("x-cache"), Some("miss"));
+    let (read, kept) = (stage_ms(&first, "parse").unwrap(), stage_ms(&turned, "parse").unwrap());
+    assert!(kept < read / 4.0, "{kept} ms, and {read} ms to read it");
+    let load = server.get("/v1/capabilities").json()["load"].take();
+    assert_eq!((&load["resident_meshes"], &load["kept_pictures"]), (&1.into(), &2.into()));
+    assert!(load["resident_mesh_bytes"].as_u64().unwrap() > mesh.len() as u64 / 4, "{load}");
+    // What is sent is drawn anew.
+    assert_eq!(server.post("/v1/render?size=64", &mesh).header("x-cache"), None);
+}
+
+#[test]
+fn what_is_kept_changes_no_byte() {
+    let kept = Server::start(&[]);
+    let none = Server::start(&["--resident-bytes", "0", "--picture-bytes", "0"]);
+    let mesh = torus(40);
+    for server in [&kept, &none] {
+        server.post("/v1/meshes", &mesh);
+    }
+    let mut compared = 0;
+    for style in ["flat", "smooth", "wire", "outline", "hidden-line", "topology", "wireframe"] {
+        for rest in ["view=iso", "view=front&samples=1", "view=top&camera.projection=orthographic", "view=iso"] {
+            let path = format!("{}/render.png?size=48&style={style}&{rest}", url(&mesh));
+            let (warm, cold) = (kept.get(&path), none.get(&path));
+            assert_eq!((warm.status, cold.status, cold.header("x-cache")), (200, 200, Some("miss")), "{path}");
+            assert!(warm.body == cold.body, "{path}");
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 28);
+    let load = none.get("/v1/capabilities").json()["load"].take();
+    assert_eq!((&load["resident_meshes"], &load["kept_pictures"]), (&0.into(), &0.into()));
+}
+
+#[test]
+fn requests_for_one_picture_draw_it_once() {
+    const CLIENTS: usize = 24;
+    let server = Server::start(&["--workers", "2"]);
+    let mesh = torus(160);
+    server.post("/v1/meshes", &mesh);
+    let path = format!("{}/render.png?size=512&style=wire&samples=16", url(&mesh));
+    let answers: Vec<Answer> = std::thread::scope(|scope| {
+        let clients: Vec<_> = (0..CLIENTS).map(|_| scope.spawn(|| server.get(&path))).collect();
+        clients.into_iter().map(|client| client.join().unwrap()).collect()
+    });
+    let of = |source: &str| answers.iter().filter(|answer| answer.header("x-cache") == Some(source)).count();
+    assert!(answers.iter().all(|answer| answer.status == 200 && answer.body == answers[0].body));
+    assert_eq!((of("miss"), of("hit") + of("coalesced")), (1, CLIENTS - 1));
+}
+
+#[test]
+fn faults_are_not_kept() {
+    let server = Server::start(&["--limit-memory-bytes", "3000000"]);
+    let mesh = torus(20);
+    assert_eq!(server.post("/v1/meshes", &mesh).status, 201);
+    let path = format!("{}/render.png?size=", url(&mesh));
+    for _ in 0..3 {
+        assert_eq!(server.get(&format!("{path}3000")).status, 422);
+        server.get(&format!("{path}16")).picture(16, 16);
+    }
+}
+
+#[test]
+fn the_room_is_never_exceeded_and_no_picture_is_wrong() {
+    const ROOM: u64 = 400_000;
+    const MESHES: usize = 12;
+    let server = Server::start(&["--resident-bytes", "400000", "--picture-bytes", "20000", "--workers", "3"]);
+    let meshes: Vec<_> = (0..MESHES).map(torus).collect();
+    let path = |i: usize, look: usize| {
+        let look = ["style=flat", "style=wire&view=top", "style=outline"][look % 3];
+        format!("{}/render.png?size=32&{look}", url(&meshes[i]))
+    };
+    let sent: Vec<Vec<Vec<u8>>> = (0..MESHES)
+        .map(|i| {
+            server.post("/v1/meshes", &meshes[i]);
+            let query = |look: usize| path(i, look).split_once('?').unwrap().1.to_owned();
+            (0..3).map(|look| server.post(&format!("/v1/render?{}", query(look)), &meshes[i]).body).collect()
+        })
+        .collect();
+    let is_busy = AtomicBool::new(true);
+    let (mut drawn, mut looks) = (0, 0);
+    std::thread::scope(|scope| {
+        let watch = scope.spawn(|| {
+            let mut looks = 0;
+            while is_busy.load(Ordering::Relaxed) || looks == 0 {
+                let load = server.get("/v1/capabilities").json()["load"].take();
+                assert!(load["resident_mesh_bytes"].as_u64().unwrap() <= ROOM, "{load}");
+                assert!(load["kept_picture_bytes"].as_u64().unwrap() <= 20_000, "{load}");
+                looks += 1;
+            }
+            looks
+        });
+        let clients: Vec<_> = (0..6_usize)
+            .map(|client| {
+                let (server, sent, path) = (&server, &sent, &path);
+                scope.spawn(move || {
+                    for step in 0..60_usize {
+                        // Some meshes are asked for more often than others.
+                        let i = (step * step + 5 * client) % (1 + step % MESHES);
+                        let answer = server.get(&path(i, step + client));
+                        assert!(answer.body == sent[i][(step + client) % 3], "mesh {i}, step {step}");
+                    }
+                    60
+                })
+            })
+            .collect();
+        drawn = clients.into_iter().map(|client| client.join().unwrap()).sum();
+        is_busy.store(false, Ordering::Relaxed);
+        looks = watch.join().unwrap();
+    });
+    assert!(drawn == 360 && looks > 3, "{drawn} pictures, {looks} looks");
+    let load = server.get("/v1/capabilities").json()["load"].take();
+    assert!(load["resident_meshes"].as_u64().unwrap() > 0, "{load}");
+}
+
+#[test]
+fn a_mesh_that_is_gone_has_no_picture() {
+    let server = Server::start(&[]);
+    server.post("/v1/meshes", CUBE_OBJ);
+    let path = format!("{}/render.png?size=16", url(CUBE_OBJ));
+    server.get(&path).picture(16, 16);
+    assert_eq!(server.request("DELETE", &url(CUBE_OBJ), &[], b"").status, 204);
+    server.get(&path).problem(404, "mesh_unknown");
+}

@@ -1,0 +1,87 @@
+//! What earlier pictures found out about a mesh changes no later one: no byte, no skip, no refusal.
+
+use image::ImageFormat;
+use meshsnap::backend::Renderer;
+use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap::mesh::Mesh;
+use meshsnap::plan::{self, PlanError, Prepared};
+use meshsnap::scene::Scene;
+use meshsnap::spec::Spec;
+
+use crate::render::textures::levels::{encode, model_of};
+use crate::support::scenes::{self, SCENES};
+
+/// Draws a mesh as it was found before, and anew.
+fn is_drawn_alike(cpu: &mut CpuRenderer, mesh: &Mesh, spec: &Spec, prepared: &Prepared, what: &str) {
+    let (limits, deadline) = (Limits::default(), Deadline::default());
+    let (mut fresh, mut warm) = (Budget::new(&limits), Budget::new(&limits));
+    let scene = Scene::new(mesh, spec, &mut fresh).unwrap();
+    let plan = plan::build(&scene, &mut fresh, &deadline).unwrap();
+    let scene = Scene::new(mesh, spec, &mut warm).unwrap();
+    let again = plan::build_from(&scene, prepared, &mut warm, &deadline).unwrap();
+    assert_eq!((&again.skips, warm.spent_bytes()), (&plan.skips, fresh.spent_bytes()), "{what}");
+    assert!(cpu.draw(&again, &deadline).unwrap() == cpu.draw(&plan, &deadline).unwrap(), "{what}");
+}
+
+#[test]
+fn scenes_are_the_same_whatever_is_known() {
+    let mut cpu = CpuRenderer::new(2);
+    let (mut drawn, mut known) = (0, 0);
+    for scene in SCENES {
+        let mesh = scenes::mesh(&(scene.obj)());
+        let prepared = Prepared::default();
+        // Another look and another camera come first, and the scene twice.
+        for keys in
+            [&[("style", "outline"), ("size", "40")][..], &[("style", "smooth"), ("size", "40"), ("view", "top")]]
+        {
+            is_drawn_alike(&mut cpu, &mesh, &scenes::spec(keys), &prepared, scene.name);
+        }
+        let before = prepared.bytes();
+        for _ in 0..2 {
+            is_drawn_alike(&mut cpu, &mesh, &scene.spec(), &prepared, scene.name);
+            drawn += 1;
+        }
+        known += usize::from(before > 0);
+    }
+    assert_eq!((drawn, known), (2 * SCENES.len(), SCENES.len()));
+}
+
+#[test]
+fn textures_are_decoded_again_only_where_finer_levels_are_needed() {
+    let picture = image::RgbImage::from_fn(512, 512, |x, y| image::Rgb([(x * y) as u8, x as u8, (x ^ y) as u8]));
+    let mesh = model_of(&encode(&picture.into(), ImageFormat::Png));
+    let mut cpu = CpuRenderer::new(2);
+    let prepared = Prepared::default();
+    let mut bytes = Vec::new();
+    for (size, view) in [("48", "front"), ("48", "iso"), ("200", "front"), ("48", "front"), ("200", "iso")] {
+        let spec = scenes::spec(&[("style", "smooth"), ("size", size), ("view", view)]);
+        is_drawn_alike(&mut cpu, &mesh, &spec, &prepared, size);
+        bytes.push(prepared.bytes());
+    }
+    assert!(bytes[0] > 0 && bytes[2] > bytes[1], "{bytes:?}");
+    assert_eq!([bytes[1], bytes[3], bytes[4]], [bytes[0], bytes[2], bytes[2]], "{bytes:?}");
+}
+
+#[test]
+fn a_budget_refuses_in_the_same_words() {
+    let scene = SCENES.iter().find(|scene| scene.name == "torus-smooth").unwrap();
+    let mesh = scenes::mesh(&(scene.obj)());
+    let spec = scenes::spec(&[("style", "outline"), ("outline.method", "contour"), ("size", "40")]);
+    let build = |prepared: &Prepared, memory_bytes: u64| -> Result<u64, PlanError> {
+        let mut budget = Budget::new(&Limits { memory_bytes, ..Limits::default() });
+        let scene = Scene::new(&mesh, &spec, &mut budget)?;
+        plan::build_from(&scene, prepared, &mut budget, &Deadline::default())?;
+        Ok(budget.spent_bytes())
+    };
+    let warm = Prepared::default();
+    let needed = build(&warm, u64::MAX).unwrap();
+    let mut refused = 0;
+    for step in 0..200 {
+        let bytes = needed * step / 200;
+        let (cold, again) = (build(&Prepared::default(), bytes), build(&warm, bytes));
+        assert_eq!(cold.as_ref().unwrap_err().to_string(), again.unwrap_err().to_string(), "{bytes} bytes");
+        refused += 1;
+    }
+    assert_eq!((refused, build(&warm, needed).unwrap()), (200, needed));
+}
