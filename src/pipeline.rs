@@ -145,7 +145,8 @@ impl Model {
 
     /// Memory that it takes, with what pictures have found out so far, bytes.
     pub fn bytes(&self) -> u64 {
-        self.mesh.bytes() + self.prepared.bytes()
+        let warnings = self.warnings.iter().map(Warning::bytes).sum::<usize>();
+        size_of::<Self>() as u64 + self.mesh.bytes() + self.prepared.bytes() + warnings as u64
     }
 }
 

@@ -8,3 +8,10 @@ pub struct Warning {
     /// One sentence for the user.
     pub detail: String,
 }
+
+impl Warning {
+    /// Memory that it takes, bytes.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>() + self.detail.len()
+    }
+}

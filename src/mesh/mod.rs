@@ -69,7 +69,7 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Memory of its lists and images, bytes.
+    /// Memory of its lists, names and images, bytes.
     pub fn bytes(&self) -> u64 {
         let of_positions = size_of_val(&self.positions[..]) + size_of_val(&self.triangles[..]);
         let of_faces =
@@ -80,10 +80,14 @@ impl Mesh {
             size_of_val(&self.lines_and_points[..]) + size_of_val(&self.materials[..]) + size_of_val(&self.cameras[..]);
         let of_image = |image: &ImageSource| match &image.content {
             ImageContent::Encoded(bytes) => bytes.len(),
-            ImageContent::Missing(_) | ImageContent::Absent => 0,
+            ImageContent::Missing(sentence) => sentence.len(),
+            ImageContent::Absent => 0,
         };
-        let of_images: usize = self.images.iter().map(of_image).sum();
-        (of_positions + of_faces + of_corners + of_attributes + of_others + of_images) as u64
+        let of_images: usize =
+            self.images.iter().map(|image| size_of::<ImageSource>() + image.name.len() + of_image(image)).sum();
+        let of_names: usize = self.materials.iter().map(|material| material.name.len()).sum::<usize>()
+            + self.cameras.iter().map(|camera| camera.name.len()).sum::<usize>();
+        (of_positions + of_faces + of_corners + of_attributes + of_others + of_images + of_names) as u64
     }
 }
 

@@ -6,12 +6,13 @@
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use crate::limits::{Budget, LimitExceeded, Spent};
-use crate::mesh::edges::{Edge, EdgeList};
+use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Orientation;
 use crate::texture::Textures;
 
 /// What is known about one mesh, which must not change. Each part is found when a plan first needs
-/// it. Plans that need it at the same time may each find it, and the first one's is kept.
+/// it. Plans that need it at the same time may each find it, and the first one's is kept: a thread that
+/// waited for another's work could be one that this work needs.
 #[derive(Debug, Default)]
 pub struct Prepared {
     edges: OnceLock<(Arc<EdgeList>, Vec<Spent>)>,
@@ -27,8 +28,6 @@ pub struct PreparedTextures {
     pub images: Vec<(u32, bool)>,
     /// The textures.
     pub textures: Arc<Textures>,
-    /// What was spent on decoding.
-    pub spent: Vec<Spent>,
 }
 
 impl Prepared {
@@ -54,12 +53,19 @@ impl Prepared {
 
     /// The orientation of the faces.
     pub fn orientation(&self, find: impl FnOnce() -> Orientation) -> Orientation {
-        *self.orientation.get_or_init(find)
+        self.orientation.get().copied().unwrap_or_else(|| {
+            let found = find();
+            *self.orientation.get_or_init(|| found)
+        })
     }
 
     /// Vertex normals for a mesh that brings none.
     pub fn vertex_normals(&self, find: impl FnOnce() -> Vec<[f32; 3]>) -> Arc<Vec<[f32; 3]>> {
-        Arc::clone(self.vertex_normals.get_or_init(|| Arc::new(find())))
+        if let Some(normals) = self.vertex_normals.get() {
+            return Arc::clone(normals);
+        }
+        let found = Arc::new(find());
+        Arc::clone(self.vertex_normals.get_or_init(|| found))
     }
 
     /// The textures that were kept last.
@@ -74,7 +80,7 @@ impl Prepared {
 
     /// Memory of what is kept, bytes.
     pub fn bytes(&self) -> u64 {
-        let edges = self.edges.get().map_or(0, |(edges, _)| edges.len() * (size_of::<Edge>() + 1));
+        let edges = self.edges.get().map_or(0, |(edges, _)| edges.bytes());
         let normals = self.vertex_normals.get().map_or(0, |normals| size_of_val(&normals[..]));
         let textures = self.locked_textures().as_ref().map_or(0, |kept| size_of_val(&kept.textures.texels[..]));
         (edges + normals + textures) as u64

@@ -25,7 +25,7 @@ impl<V: Weighed> Weighter<String, V> for ByBytes {
 /// A cache for `bytes` in all, of values that take `typical_bytes` each on an average.
 pub fn with_room_for<V: Weighed + Clone>(bytes: u64, typical_bytes: u64) -> ByteCache<V> {
     let count = usize::try_from(bytes / typical_bytes.max(1)).unwrap_or(usize::MAX).clamp(16, 1 << 16);
-    // One shard, so that a single value may take all the room.
+    // One shard, so that a single value may take nearly all the room.
     let options = OptionsBuilder::new().shards(1).estimated_items_capacity(count).weight_capacity(bytes.max(1)).build();
     match options {
         Ok(options) => {

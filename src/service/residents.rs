@@ -12,6 +12,9 @@ use super::cache::{ByteCache, Weighed, with_room_for};
 use crate::limits::{Budget, Deadline};
 use crate::pipeline::{Model, RenderError};
 
+/// Bytes that a mesh takes in the cache beside its lists: their heads, the key, places in tables.
+const OVERHEAD_BYTES: u64 = 4096;
+
 /// The time between two looks at the deadline of a job that waits for another job's reading.
 const WAIT: Duration = Duration::from_millis(10);
 
@@ -27,8 +30,9 @@ pub struct Resident {
     pub budget: Budget,
 }
 
-/// The meshes in memory. One cap holds for the bytes of all that are kept; one that a job draws when it
-/// has to make room is that job's memory until the job ends.
+/// The meshes in memory. One cap holds for the bytes of all that are kept. What a picture adds to a mesh
+/// counts from the picture's end on, and a mesh that a job draws when it has to make room is that job's
+/// memory until the job ends.
 #[derive(Debug)]
 pub struct Residents {
     cache: ByteCache<Kept>,
@@ -91,11 +95,18 @@ impl Residents {
     /// Counts what a picture has added to a mesh. Others may have to make room for it.
     pub fn weigh(&self, key: &str, resident: &Arc<Resident>) {
         let now = Kept::new(resident);
-        let is_other = |kept: &Kept| Arc::ptr_eq(&kept.resident, resident) && kept.bytes != now.bytes;
-        if self.cache.peek(key).is_some_and(|kept| is_other(&kept)) {
-            // An error says that it was removed in the meantime.
-            let _ = self.cache.replace(key.to_owned(), now, true);
+        // Of two pictures that end together, the one that was weighed first must not win.
+        let has_grown = |kept: &Kept| Arc::ptr_eq(&kept.resident, resident) && kept.bytes < now.bytes;
+        if self.cache.peek(key).is_some_and(|kept| has_grown(&kept))
+            && self.cache.replace(key.to_owned(), now, true).is_err()
+        {
+            tracing::debug!(key, "a mesh in memory was dropped: with what a picture added it is too large to keep");
         }
+    }
+
+    /// Forgets the meshes whose keys begin with this.
+    pub fn forget(&self, prefix: &str) {
+        self.cache.retain(|key, _| !key.starts_with(prefix));
     }
 
     /// Most bytes.
@@ -111,6 +122,6 @@ impl Residents {
 
 impl Kept {
     fn new(resident: &Arc<Resident>) -> Self {
-        Self { resident: Arc::clone(resident), bytes: resident.model.bytes() }
+        Self { resident: Arc::clone(resident), bytes: resident.model.bytes() + OVERHEAD_BYTES }
     }
 }

@@ -10,8 +10,8 @@ cargo build --release --locked --quiet
 
 picture="$(mktemp --suffix .png)"
 trap 'rm -f "$picture"' EXIT
-# Prints the milliseconds that one picture takes with these tunables.
-time_ms() {
+# Prints the hundredths of a millisecond that one picture takes with these tunables.
+time_10us() {
   local began ended
   began=$(date +%s%N)
   GLIBC_TUNABLES="$1" target/release/meshsnap render "$mesh" --backend cpu -o "$picture" >/dev/null 2>&1
@@ -20,8 +20,8 @@ time_ms() {
 }
 without=() with=()
 for _ in $(seq "$rounds"); do
-  without+=("$(time_ms "")")
-  with+=("$(time_ms glibc.malloc.hugetlb=1)")
+  without+=("$(time_10us "")")
+  with+=("$(time_10us glibc.malloc.hugetlb=1)")
 done
 median() { printf '%s\n' "$@" | sort -n | sed -n "$((($# + 1) / 2))p"; }
 awk -v a="$(median "${without[@]}")" -v b="$(median "${with[@]}")" \

@@ -17,7 +17,7 @@ pub fn dots<const N: usize>(a: &[[f32; N]; 3], b: &[[f32; N]; 3]) -> [f32; N] {
     out
 }
 
-/// `each` of the components of two vectors.
+/// `each` applied to the components of two vectors.
 #[inline(always)]
 pub fn zip<const N: usize>(a: &[[f32; N]; 3], b: &[[f32; N]; 3], each: impl Fn(f32, f32) -> f32) -> [[f32; N]; 3] {
     let mut out = [[0.0; N]; 3];

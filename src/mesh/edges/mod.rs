@@ -81,6 +81,11 @@ impl EdgeList {
         self.edges.len()
     }
 
+    /// Memory of the list, bytes.
+    pub fn bytes(&self) -> usize {
+        self.len() * (size_of::<Edge>() + 1) + size_of_val(&self.further_faces[..])
+    }
+
     /// True if there are no edges.
     pub fn is_empty(&self) -> bool {
         self.edges.is_empty()

@@ -119,18 +119,19 @@ impl<'a> TextureLoader<'a> {
         let total: u64 = wanted.iter().zip(&first_levels).map(|(w, &first)| texels(w, first)).sum();
         budget.spend("textures", total, 8)?;
         let of_wanted = |w: &Wanted| (w.image, w.is_color);
-        // Levels that are finer than any pixel asks for change nothing. Where some had to be left out,
-        // pixels see which.
+        // Levels that are finer than any pixel asks for change nothing. Where there was no room for levels
+        // that pixels ask for, the picture depends on which were left out: such textures are not shared.
         let are_all = first_levels.iter().zip(&finest).all(|(first, finest)| first <= finest);
+        let decoding: Vec<u64> = wanted.iter().map(Wanted::decoding_bytes).collect();
+        // Also where nothing is decoded: what is kept must refuse no less.
+        let batches = spend_on_decoding(&decoding, budget)?;
         let kept = prepared.filter(|_| are_all).and_then(Prepared::textures);
-        if let Some(kept) =
-            kept.filter(|kept| kept.have(&wanted.iter().map(of_wanted).collect::<Vec<_>>(), &first_levels))
-        {
-            budget.spend_again(&kept.spent)?;
+        let images: Vec<(u32, bool)> = wanted.iter().map(of_wanted).collect();
+        if let Some(kept) = kept.filter(|kept| kept.have(&images, &first_levels)) {
             return Ok(kept.textures);
         }
         let mut textures = Textures { texels: vec![[0; 4]; total as usize], images: Vec::new() };
-        let mut images = Vec::new();
+        let mut decodings = Vec::new();
         let mut rest = &mut textures.texels[..];
         let mut first_texel = 0;
         for (want, &first_level) in wanted.iter().zip(&first_levels) {
@@ -139,17 +140,23 @@ impl<'a> TextureLoader<'a> {
             let levels = mips::count(width, height);
             textures.images.push(Texture { width, height, first_level, levels, first_texel, padding: [0; 3] });
             first_texel += out.len() as u32;
-            images.push(Decoding { image: &mesh.images[want.image as usize], want, first_level, out });
+            decodings.push(Decoding { image: &mesh.images[want.image as usize], want, first_level, out });
             rest = others;
         }
-        let (decoded, spent) = budget.record(|budget| decode_all(images, budget, deadline));
-        decoded?;
+        decode_all(decodings, &batches, deadline)?;
         let textures = Arc::new(textures);
         if let Some(prepared) = prepared.filter(|_| are_all) {
-            let images = wanted.iter().map(of_wanted).collect();
-            prepared.keep_textures(PreparedTextures { images, textures: Arc::clone(&textures), spent });
+            prepared.keep_textures(PreparedTextures { images, textures: Arc::clone(&textures) });
         }
         Ok(textures)
+    }
+}
+
+impl Wanted {
+    /// Memory that decoding takes beside the levels.
+    fn decoding_bytes(&self) -> u64 {
+        let Header { width, height, decoding_bytes, .. } = self.header;
+        decoding_bytes.saturating_add(mips::working_bytes(width, height))
     }
 }
 
@@ -162,12 +169,6 @@ struct Decoding<'a> {
 }
 
 impl Decoding<'_> {
-    /// Memory that decoding takes beside the levels.
-    fn bytes(&self) -> u64 {
-        let Header { width, height, decoding_bytes, .. } = self.want.header;
-        decoding_bytes.saturating_add(mips::working_bytes(width, height))
-    }
-
     fn run(self, deadline: &Deadline) -> Result<(), PlanError> {
         deadline.check()?;
         let ImageContent::Encoded(encoded) = &self.image.content else { return Ok(()) };
@@ -177,26 +178,36 @@ impl Decoding<'_> {
     }
 }
 
-/// Decodes images, a few at once, each few in the memory of those before. Which are decoded
-/// together follows from their sizes and the budget alone, so that threads change no refusal.
-fn decode_all(mut images: Vec<Decoding<'_>>, budget: &mut Budget, deadline: &Deadline) -> Result<(), PlanError> {
-    let mut most = 0;
-    while !images.is_empty() {
+/// Spends what decoding images takes, given the bytes for each: a few images at once, each few in the
+/// memory of those before. Returns how many are decoded together, batch by batch. That follows from
+/// sizes and the budget alone, so that threads change no refusal.
+fn spend_on_decoding(decoding_bytes: &[u64], budget: &mut Budget) -> Result<Vec<usize>, PlanError> {
+    let (mut batches, mut most, mut left) = (Vec::new(), 0, decoding_bytes);
+    while !left.is_empty() {
         let mut bytes = 0_u64;
-        let fits = |image: &&Decoding<'_>| {
-            bytes = bytes.saturating_add(image.bytes());
+        let fits = |image: &&u64| {
+            bytes = bytes.saturating_add(**image);
             bytes <= TOGETHER_BYTES_MAX
         };
-        let mut count = images.iter().take_while(fits).count().max(1);
-        let mut together: u64 = images[..count].iter().map(Decoding::bytes).sum();
+        let mut count = left.iter().take_while(fits).count().max(1);
+        let mut together: u64 = left[..count].iter().fold(0, |sum, bytes| sum.saturating_add(*bytes));
         if count > 1 && budget.spend("decoding textures", together.saturating_sub(most), 1).is_err() {
-            (count, together) = (1, images[0].bytes());
+            (count, together) = (1, left[0]);
         }
         if count == 1 {
             budget.spend("decoding textures", together.saturating_sub(most), 1)?;
         }
         most = most.max(together);
-        let others = images.split_off(count);
+        batches.push(count);
+        left = &left[count..];
+    }
+    Ok(batches)
+}
+
+/// Decodes images, so many together as `batches` says.
+fn decode_all(mut images: Vec<Decoding<'_>>, batches: &[usize], deadline: &Deadline) -> Result<(), PlanError> {
+    for &count in batches {
+        let others = images.split_off(count.min(images.len()));
         // Of several errors, the first image's.
         let results: Vec<_> = images.into_par_iter().map(|image| image.run(deadline)).collect();
         results.into_iter().collect::<Result<(), _>>()?;

@@ -30,7 +30,7 @@ pub fn unknown() -> ApiError {
 
 /// A worker's task on a stored mesh.
 pub fn work_on(stored: &StoredMesh, reading: Reading, task: Task) -> Work {
-    // Debug output is unambiguous.
+    // Debug output has every field, and quotes texts: two ways of reading never share a key.
     let key = format!("{} {reading:?}", stored.mesh.digest);
     Work { mesh_key: Some(key), ..work(stored.mesh.bundle.clone(), reading, task, stored.memory.clone()) }
 }

@@ -4,11 +4,16 @@
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use tokio::sync::watch;
+
+use crate::backend::BackendKind;
 use crate::service::cache::{ByteCache, Weighed, with_room_for};
 use crate::service::jobs::Finished;
+use crate::warning::Warning;
 
 /// Bytes of a picture on an average, to size tables.
 const TYPICAL_BYTES: u64 = 32 << 10;
@@ -16,10 +21,16 @@ const TYPICAL_BYTES: u64 = 32 << 10;
 /// Bytes that a picture takes beside its own.
 const OVERHEAD_BYTES: u64 = 1024;
 
+/// The time for which a picture is used. It is that of `Cache-Control`, so that no answer is stale when it
+/// is given.
+const KEPT_FOR: Duration = Duration::from_secs(24 * 3600);
+
 /// The pictures. One cap holds for the bytes of all.
 #[derive(Debug)]
 pub struct Pictures {
     cache: ByteCache<Kept>,
+    /// By key, what tells the others of a picture that is being drawn.
+    drawing: Mutex<HashMap<String, watch::Sender<Option<Kept>>>>,
     bytes: u64,
 }
 
@@ -54,6 +65,19 @@ pub struct PictureLoad {
     pub bytes: u64,
 }
 
+/// What a request finds.
+enum Joined<'a> {
+    Kept(Kept),
+    First(First<'a>),
+    Second(watch::Receiver<Option<Kept>>),
+}
+
+/// The request that draws. When it is dropped, the others hear of its end.
+struct First<'a> {
+    pictures: &'a Pictures,
+    key: &'a str,
+}
+
 #[derive(Clone, Debug)]
 struct Kept {
     finished: Arc<Finished>,
@@ -62,35 +86,62 @@ struct Kept {
 
 impl Weighed for Kept {
     fn bytes(&self) -> u64 {
-        self.finished.picture.len() as u64 + OVERHEAD_BYTES
+        let warnings: usize = self.finished.warnings.iter().map(Warning::bytes).sum();
+        (self.finished.picture.len() + warnings) as u64 + OVERHEAD_BYTES
     }
 }
 
 impl Pictures {
-    /// Room for pictures of so many bytes together. None are kept, and none are waited for, if it is 0.
+    /// Room for pictures of so many bytes together. None are kept if it is 0.
     pub fn new(bytes: u64) -> Self {
-        Self { cache: with_room_for(bytes, TYPICAL_BYTES), bytes }
+        Self { cache: with_room_for(bytes, TYPICAL_BYTES), drawing: Mutex::default(), bytes }
     }
 
     /// The picture of this key, drawn by `draw` if it is not in memory. Requests for the same picture
-    /// wait for the first. If that one fails or its client hangs up, the next one draws.
+    /// wait for the first. If that one fails or its client hangs up, each of the others draws for itself:
+    /// none waits longer than for one drawing.
     pub async fn find<E>(&self, key: &str, draw: impl Future<Output = Result<Arc<Finished>, E>>) -> Result<Found, E> {
-        if self.bytes == 0 {
-            return Ok(Found { finished: draw.await?, source: Source::Miss, age: Duration::ZERO });
-        }
-        if let Some(kept) = self.cache.get(key) {
-            return Ok(kept.found(Source::Hit));
-        }
-        match self.cache.get_value_or_guard_async(key).await {
-            Ok(kept) => Ok(kept.found(Source::Coalesced)),
-            Err(guard) => {
-                let kept = Kept { finished: draw.await?, drawn: Instant::now() };
-                let found = kept.found(Source::Miss);
-                // An error says that it was removed in the meantime.
-                let _ = guard.insert(kept);
-                Ok(found)
+        let drawn = match self.join(key) {
+            Joined::Kept(kept) => return Ok(kept.found(Source::Hit)),
+            Joined::Second(mut first) => {
+                if let Ok(kept) = first.wait_for(Option::is_some).await
+                    && let Some(kept) = kept.as_ref()
+                {
+                    return Ok(kept.found(Source::Coalesced));
+                }
+                Kept { finished: draw.await?, drawn: Instant::now() }
             }
+            Joined::First(first) => {
+                let kept = Kept { finished: draw.await?, drawn: Instant::now() };
+                if is_for_later(key, &kept.finished) {
+                    self.cache.insert(key.to_owned(), kept.clone());
+                }
+                first.tell(kept)
+            }
+        };
+        Ok(drawn.found(Source::Miss))
+    }
+
+    fn join<'a>(&'a self, key: &'a str) -> Joined<'a> {
+        if self.bytes > 0
+            && let Some(kept) = self.cache.get(key).filter(|kept| kept.drawn.elapsed() < KEPT_FOR)
+        {
+            return Joined::Kept(kept);
         }
+        let mut drawing = self.locked();
+        if let Some(first) = drawing.get(key) {
+            return Joined::Second(first.subscribe());
+        }
+        // The first may have ended between the two looks.
+        if let Some(kept) = self.cache.get(key).filter(|kept| kept.drawn.elapsed() < KEPT_FOR) {
+            return Joined::Kept(kept);
+        }
+        drawing.insert(key.to_owned(), watch::Sender::new(None));
+        Joined::First(First { pictures: self, key })
+    }
+
+    fn locked(&self) -> MutexGuard<'_, HashMap<String, watch::Sender<Option<Kept>>>> {
+        self.drawing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Most bytes.
@@ -113,6 +164,28 @@ impl Source {
             Self::Coalesced => "coalesced",
         }
     }
+}
+
+impl First<'_> {
+    /// Gives the picture to those who wait.
+    fn tell(self, kept: Kept) -> Kept {
+        if let Some(others) = self.pictures.locked().get(self.key) {
+            others.send_replace(Some(kept.clone()));
+        }
+        kept
+    }
+}
+
+impl Drop for First<'_> {
+    fn drop(&mut self) {
+        self.pictures.locked().remove(self.key);
+    }
+}
+
+/// False for a picture that the CPU drew in place of a GPU: the GPU may be back soon. The keys of
+/// pictures that a GPU may draw are weak tags.
+fn is_for_later(key: &str, finished: &Finished) -> bool {
+    !(key.starts_with("W/") && finished.backend == BackendKind::Cpu)
 }
 
 impl Kept {

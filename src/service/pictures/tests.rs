@@ -18,26 +18,75 @@ fn picture(bytes: usize) -> Arc<Finished> {
     })
 }
 
+/// A request that draws for ever, or until it is aborted.
+fn endless(pictures: &Arc<Pictures>) -> tokio::task::JoinHandle<Result<Found, &'static str>> {
+    let pictures = pictures.clone();
+    tokio::spawn(async move { pictures.find("a", pending()).await })
+}
+
 #[tokio::test]
-async fn the_next_one_draws_where_the_first_fails_or_hangs_up() {
+async fn the_others_draw_for_themselves_where_the_first_fails_or_hangs_up() {
     let pictures = Arc::new(Pictures::new(1 << 20));
-    // Hangs up while it draws.
-    let gone = tokio::spawn({
-        let pictures = pictures.clone();
-        async move { pictures.find("a", pending::<Result<_, ()>>()).await }
-    });
+    let gone = endless(&pictures);
     tokio::task::yield_now().await;
-    let waits = tokio::spawn({
-        let pictures = pictures.clone();
-        async move { pictures.find("a", async { Err::<Arc<Finished>, _>("no paint") }).await }
-    });
+    let others: Vec<_> = (0..3)
+        .map(|i| {
+            let pictures = pictures.clone();
+            tokio::spawn(async move {
+                let drawn = if i == 1 { Err("no paint") } else { Ok(picture(10)) };
+                pictures.find("a", async { drawn }).await.map(|found| found.source)
+            })
+        })
+        .collect();
     tokio::task::yield_now().await;
     gone.abort();
-    assert_eq!(waits.await.unwrap().unwrap_err(), "no paint");
+    let mut sources = Vec::new();
+    for other in others {
+        sources.push(other.await.unwrap());
+    }
+    assert_eq!(sources, [Ok(Source::Miss), Err("no paint"), Ok(Source::Miss)]);
+    // Nothing is left of them: the next one is the first again.
+    assert!(pictures.locked().is_empty());
     let found = pictures.find("a", async { Ok::<_, ()>(picture(10)) }).await.unwrap();
     assert_eq!(found.source, Source::Miss);
     let again = pictures.find("a", async { Err(()) }).await.unwrap();
     assert_eq!((again.source, again.finished.picture.len()), (Source::Hit, 10));
+}
+
+#[tokio::test]
+async fn those_who_wait_get_the_first_ones_picture() {
+    let pictures = Arc::new(Pictures::new(0));
+    let (paint, dries) = tokio::sync::oneshot::channel::<()>();
+    let first = tokio::spawn({
+        let pictures = pictures.clone();
+        async move {
+            let draw = async {
+                dries.await.unwrap();
+                Ok::<_, ()>(picture(10))
+            };
+            pictures.find("a", draw).await
+        }
+    });
+    tokio::task::yield_now().await;
+    let second = tokio::spawn({
+        let pictures = pictures.clone();
+        async move { pictures.find("a", async { Err(()) }).await }
+    });
+    tokio::task::yield_now().await;
+    paint.send(()).unwrap();
+    let sources = [first.await.unwrap().unwrap().source, second.await.unwrap().unwrap().source];
+    assert_eq!(sources, [Source::Miss, Source::Coalesced]);
+    assert_eq!(pictures.load().count, 0);
+}
+
+#[tokio::test]
+async fn a_picture_in_place_of_a_gpus_is_not_kept() {
+    let pictures = Pictures::new(1 << 20);
+    for key in ["W/a", "W/a", "a"] {
+        let found = pictures.find(key, async { Ok::<_, ()>(picture(10)) }).await.unwrap();
+        assert_eq!(found.source, Source::Miss, "{key}");
+    }
+    assert_eq!(pictures.load().count, 1);
 }
 
 #[tokio::test]

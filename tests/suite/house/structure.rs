@@ -47,7 +47,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("service/cache", &[]),
     ("service/residents", &["service/cache", "pipeline", "limits"]),
-    ("service/pictures", &["service/cache", "service/jobs", "backend", "image"]),
+    ("service/pictures", &["service/cache", "service/jobs", "backend", "image", "warning"]),
     ("service/store", &["service/jobs", "import", "mesh", "limits"]),
     (
         "service/http",

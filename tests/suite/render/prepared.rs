@@ -9,8 +9,12 @@ use meshsnap::plan::{self, PlanError, Prepared};
 use meshsnap::scene::Scene;
 use meshsnap::spec::Spec;
 
-use crate::render::textures::levels::{encode, model_of};
+use rayon::prelude::*;
+use serde_json::json;
+
+use crate::render::textures::levels::{encode, model, model_of};
 use crate::support::scenes::{self, SCENES};
+use crate::support::shapes;
 
 /// Draws a mesh as it was found before, and anew.
 fn is_drawn_alike(cpu: &mut CpuRenderer, mesh: &Mesh, spec: &Spec, prepared: &Prepared, what: &str) {
@@ -84,4 +88,57 @@ fn a_budget_refuses_in_the_same_words() {
         refused += 1;
     }
     assert_eq!((refused, build(&warm, needed).unwrap()), (200, needed));
+}
+
+/// Two images, which a tight budget decodes one after the other: what an easy picture left behind
+/// changes nothing for one that has little room, or the other way round.
+#[test]
+fn a_budget_refuses_textures_alike() {
+    let picture = image::RgbImage::from_fn(128, 128, |x, y| image::Rgb([(x * y) as u8, x as u8, (x ^ y) as u8]));
+    let picture = encode(&picture.into(), ImageFormat::Png);
+    let material =
+        json!({ "emissiveFactor": [1, 1, 1], "emissiveTexture": { "index": 0 }, "normalTexture": { "index": 0 } });
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let mesh = model(&[corners], &[[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]], &picture, material);
+    let spec = scenes::spec(&[("style", "smooth"), ("size", "200")]);
+    let build = |prepared: &Prepared, memory_bytes: u64| -> Result<u64, String> {
+        let mut budget = Budget::new(&Limits { memory_bytes, ..Limits::default() });
+        let scene = Scene::new(&mesh, &spec, &mut budget).map_err(|error| error.to_string())?;
+        let plan = plan::build_from(&scene, prepared, &mut budget, &Deadline::default());
+        plan.map_err(|error| error.to_string()).map(|_| budget.spent_bytes())
+    };
+    let roomy = Prepared::default();
+    let most = build(&roomy, u64::MAX).unwrap();
+    let tight = (0..=400).find_map(|step| {
+        let prepared = Prepared::default();
+        build(&prepared, most / 2 + most * step / 800).ok().map(|_| prepared)
+    });
+    let (tight, mut seen) = (tight.unwrap(), [0; 2]);
+    for step in 0..=400 {
+        let bytes = most / 2 + most * step / 800;
+        let cold = build(&Prepared::default(), bytes);
+        assert_eq!([build(&roomy, bytes), build(&tight, bytes)], [cold.clone(), cold.clone()], "{bytes} bytes");
+        seen[usize::from(cold.is_ok_and(|spent| spent < most))] += 1;
+    }
+    assert!(seen[1] > 5 && seen[0] > 5, "{seen:?}: some decode one after the other");
+}
+
+/// Views of one mesh, drawn by the threads of a pool that also finds its normals.
+#[test]
+fn plans_of_one_mesh_may_be_made_in_a_pool() {
+    let mesh = scenes::mesh(&shapes::torus(100));
+    let prepared = Prepared::default();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let views: Vec<u32> = (0..24).collect();
+    let made = pool.install(|| {
+        let make = |_: &u32| {
+            let spec = scenes::spec(&[("style", "smooth"), ("size", "40")]);
+            let mut budget = Budget::new(&Limits::default());
+            let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
+            plan::build_from(&scene, &prepared, &mut budget, &Deadline::default()).unwrap();
+            1
+        };
+        views.par_iter().map(make).sum::<u32>()
+    });
+    assert_eq!(made, 24);
 }

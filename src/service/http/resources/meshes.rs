@@ -63,8 +63,12 @@ pub async fn get(
 
 /// Removes a mesh. Jobs that already draw it go on.
 pub async fn delete(State(state): State<Arc<AppState>>, id: PathName) -> Result<Response, ApiError> {
-    match state.meshes.remove(stored_mesh::digest(text_of(id).as_deref())?) {
-        true => Ok(StatusCode::NO_CONTENT.into_response()),
+    let digest = stored_mesh::digest(text_of(id).as_deref())?;
+    match state.meshes.remove(digest) {
+        true => {
+            state.residents.forget(&digest.to_string());
+            Ok(StatusCode::NO_CONTENT.into_response())
+        }
         false => Err(stored_mesh::unknown()),
     }
 }
