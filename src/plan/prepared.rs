@@ -92,9 +92,12 @@ impl Prepared {
 }
 
 impl PreparedTextures {
-    /// True if these are the wanted images, none of them coarser than `first_levels`.
-    pub fn have(&self, images: &[(u32, bool)], first_levels: &[u32]) -> bool {
+    /// True if these are the wanted images and show the same as textures that begin with `first_levels`,
+    /// given the finest levels that pixels ask for. Levels finer than those change nothing. But of an image
+    /// that begins with a coarser one, for lack of room, pixels show the first that there is.
+    pub fn have(&self, images: &[(u32, bool)], first_levels: &[u32], finest: &[u32]) -> bool {
         let kept = self.textures.images.iter().map(|texture| texture.first_level);
-        self.images == images && kept.zip(first_levels).all(|(kept, wanted)| kept <= *wanted)
+        let is_same = |((kept, &first), &finest): ((u32, &u32), &u32)| kept == first || kept < first && first <= finest;
+        self.images == images && kept.zip(first_levels).zip(finest).all(is_same)
     }
 }

@@ -119,15 +119,12 @@ impl<'a> TextureLoader<'a> {
         let total: u64 = wanted.iter().zip(&first_levels).map(|(w, &first)| texels(w, first)).sum();
         budget.spend("textures", total, 8)?;
         let of_wanted = |w: &Wanted| (w.image, w.is_color);
-        // Levels that are finer than any pixel asks for change nothing. Where there was no room for levels
-        // that pixels ask for, the picture depends on which were left out: such textures are not shared.
-        let are_all = first_levels.iter().zip(&finest).all(|(first, finest)| first <= finest);
         let decoding: Vec<u64> = wanted.iter().map(Wanted::decoding_bytes).collect();
         // Also where nothing is decoded: what is kept must refuse no less.
         let batches = spend_on_decoding(&decoding, budget)?;
-        let kept = prepared.filter(|_| are_all).and_then(Prepared::textures);
+        let kept = prepared.and_then(Prepared::textures);
         let images: Vec<(u32, bool)> = wanted.iter().map(of_wanted).collect();
-        if let Some(kept) = kept.filter(|kept| kept.have(&images, &first_levels)) {
+        if let Some(kept) = kept.filter(|kept| kept.have(&images, &first_levels, &finest)) {
             return Ok(kept.textures);
         }
         let mut textures = Textures { texels: vec![[0; 4]; total as usize], images: Vec::new() };
@@ -145,7 +142,7 @@ impl<'a> TextureLoader<'a> {
         }
         decode_all(decodings, &batches, deadline)?;
         let textures = Arc::new(textures);
-        if let Some(prepared) = prepared.filter(|_| are_all) {
+        if let Some(prepared) = prepared {
             prepared.keep_textures(PreparedTextures { images, textures: Arc::clone(&textures) });
         }
         Ok(textures)

@@ -90,6 +90,29 @@ fn a_budget_refuses_in_the_same_words() {
     assert_eq!((refused, build(&warm, needed).unwrap()), (200, needed));
 }
 
+/// So large that there is no room for the finest level, which a close view asks for.
+#[test]
+fn textures_that_do_not_fit_are_kept_as_they_are() {
+    let picture = image::RgbImage::from_fn(4096, 4096, |x, y| image::Rgb([(x ^ y) as u8, (x >> 4) as u8, y as u8]));
+    let mesh = model_of(&encode(&picture.into(), ImageFormat::Png));
+    let mut cpu = CpuRenderer::new(2);
+    let prepared = Prepared::default();
+    let close = [("camera.eye", "0.3,0.3,0.01"), ("camera.target", "0.3,0.3,0")];
+    let mut bytes = Vec::new();
+    for near in [&close[..], &close, &[], &close] {
+        let spec = scenes::spec(&[&[("style", "smooth"), ("size", "64"), ("surface.shading", "unlit")], near].concat());
+        is_drawn_alike(&mut cpu, &mesh, &spec, &prepared, "a large texture");
+        bytes.push(prepared.bytes());
+    }
+    // All levels but the finest.
+    assert!(bytes.iter().all(|&bytes| bytes == bytes_of_levels_from(2048)), "{bytes:?}");
+}
+
+/// Half floats of all levels of a square texture.
+fn bytes_of_levels_from(side: u64) -> u64 {
+    (0..=side.ilog2()).map(|level| 8 * (side >> level).pow(2)).sum()
+}
+
 /// Two images, which a tight budget decodes one after the other: what an easy picture left behind
 /// changes nothing for one that has little room, or the other way round.
 #[test]
