@@ -97,7 +97,7 @@ pub struct Spent {
 /// after.
 #[derive(Clone, Debug)]
 pub struct Budget {
-    /// What is spent while [`record`](Self::record) runs.
+    /// A list of all that is spent while [`record`](Self::record) runs; None at other times.
     recorded: Option<Vec<Spent>>,
     spent: u64,
     limit: u64,

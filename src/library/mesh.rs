@@ -11,8 +11,8 @@ use crate::pipeline::Model;
 use crate::warning::Warning;
 
 /// A mesh, imported once and drawn as often as needed: welded, finite, in a unit box.
-/// What the first picture finds out, such as edges and textures, is kept for the next. Clones share
-/// it.
+/// Edges, textures and vertex normals that a picture needs are kept for the next one. Clones share
+/// them.
 #[derive(Clone, Debug)]
 pub struct Mesh {
     pub(super) model: Arc<Model>,

@@ -24,7 +24,7 @@ pub struct PlanContext<'c> {
     pub deadline: &'c Deadline,
     /// The skips so far.
     pub skips: Skips<'c>,
-    /// What is known about the mesh, if anybody keeps it.
+    /// Facts about the mesh from earlier plans, if they are kept.
     pub prepared: Option<&'c Prepared>,
     edges: Option<Arc<EdgeList>>,
     silhouettes: Option<Arc<Silhouettes>>,

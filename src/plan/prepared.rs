@@ -1,4 +1,4 @@
-//! What plans find out about a mesh whatever the picture, kept for the next picture of the mesh.
+//! Facts about a mesh that do not depend on the picture, kept from one plan of the mesh to the next.
 //!
 //! Invariant: what is kept changes no byte, no skip and no refusal. A plan that takes it spends what
 //! finding it took.
@@ -10,9 +10,9 @@ use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Orientation;
 use crate::texture::Textures;
 
-/// What is known about one mesh, which must not change. Each part is found when a plan first needs
-/// it. Plans that need it at the same time may each find it, and the first one's is kept: a thread that
-/// waited for another's work could be one that this work needs.
+/// Facts about one mesh, which must not change. Each is found when a plan first needs it. Plans that
+/// need it at the same time may each find it, and the first one's is kept: a thread that waited for
+/// another's work could be one that this work needs.
 #[derive(Debug, Default)]
 pub struct Prepared {
     edges: OnceLock<(Arc<EdgeList>, Vec<Spent>)>,

@@ -34,18 +34,18 @@ pub struct Pictures {
     bytes: u64,
 }
 
-/// A picture, and where it came from.
+/// A picture and its origin.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// The picture.
     pub finished: Arc<Finished>,
-    /// Where it came from.
+    /// Its origin.
     pub source: Source,
     /// The time since it was drawn.
     pub age: Duration,
 }
 
-/// Where a picture came from.
+/// The origin of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// It was in memory.
@@ -65,7 +65,7 @@ pub struct PictureLoad {
     pub bytes: u64,
 }
 
-/// What a request finds.
+/// The place of a request among those for the same picture.
 enum Joined<'a> {
     Kept(Kept),
     First(First<'a>),
@@ -123,9 +123,7 @@ impl Pictures {
     }
 
     fn join<'a>(&'a self, key: &'a str) -> Joined<'a> {
-        if self.bytes > 0
-            && let Some(kept) = self.cache.get(key).filter(|kept| kept.drawn.elapsed() < KEPT_FOR)
-        {
+        if let Some(kept) = self.known(key) {
             return Joined::Kept(kept);
         }
         let mut drawing = self.locked();
@@ -133,11 +131,16 @@ impl Pictures {
             return Joined::Second(first.subscribe());
         }
         // The first may have ended between the two looks.
-        if let Some(kept) = self.cache.get(key).filter(|kept| kept.drawn.elapsed() < KEPT_FOR) {
+        if let Some(kept) = self.known(key) {
             return Joined::Kept(kept);
         }
         drawing.insert(key.to_owned(), watch::Sender::new(None));
         Joined::First(First { pictures: self, key })
+    }
+
+    /// The picture in memory, unless it is too old.
+    fn known(&self, key: &str) -> Option<Kept> {
+        self.cache.get(key).filter(|kept| kept.drawn.elapsed() < KEPT_FOR)
     }
 
     fn locked(&self) -> MutexGuard<'_, HashMap<String, watch::Sender<Option<Kept>>>> {

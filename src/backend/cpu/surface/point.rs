@@ -218,7 +218,7 @@ impl Points<'_> {
         Place { context: self.context, ids: *ids, at: *at, b }
     }
 
-    /// What wires cover, by their shown opacity.
+    /// Coverage of the wires times their shown opacity.
     #[inline(always)]
     fn wire_covers<const N: usize>(&self, place: &Place<'_, N>) -> [f32; N] {
         if self.material.flags & flags::WIRES == 0 || self.show.wires <= 0.0 {

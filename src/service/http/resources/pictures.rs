@@ -45,8 +45,12 @@ pub async fn get(
         let media_type = HeaderValue::from_static(media_type(format));
         ([(header::CONTENT_TYPE, media_type)], responses::body_of_unknown_length()).into_response()
     } else {
-        let work = stored_mesh::work_on(&stored, reading, Task::Draw(Box::new(spec)));
-        responses::found(&state.pictures.find(&tag, run::draw(&state, work)).await?)
+        // No work is made for a picture that is in memory.
+        let drawing = async {
+            let work = stored_mesh::work_on(&stored, reading, Task::Draw(Box::new(spec)));
+            run::draw(&state, work).await
+        };
+        responses::found(&state.pictures.find(&tag, drawing).await?, Some(&tag))
     };
     // The render key replaces the tag of the picture's bytes, which HEAD and 304 cannot know.
     for (name, value) in cached {

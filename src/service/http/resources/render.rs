@@ -24,7 +24,10 @@ pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Resul
     }
     let drawing = run::draw(&state, work);
     let mut response = match key {
-        Some(key) => responses::found(&state.pictures.find(&key, drawing).await?),
+        Some(key) => {
+            let tag = address.as_ref().map(|at| at.etag.as_str());
+            responses::found(&state.pictures.find(&key, drawing).await?, tag)
+        }
         None => responses::picture(&*drawing.await?),
     };
     if let Some((location, (name, etag))) =

@@ -14,13 +14,17 @@ use crate::service::pictures::{Found, Source};
 
 /// A picture, with its back-end, timings and warnings as headers.
 pub fn picture(finished: &Finished) -> Response {
+    picture_with_tag(finished, &conditional::content_tag(&finished.picture))
+}
+
+fn picture_with_tag(finished: &Finished, tag: &str) -> Response {
     // The stages of drawing are parts of `render`.
     let drawing = finished.draw_times.parts().map(|(stage, took)| (stage.name(), took));
     let timings = finished.timings.parts().into_iter().chain(drawing);
     let timings: Vec<_> = timings.map(|(name, took)| format!("{name};dur={:.3}", took.as_secs_f64() * 1e3)).collect();
     let headers = [
         (header::CONTENT_TYPE, HeaderValue::from_static(media_type(finished.format))),
-        conditional::etag(&conditional::content_tag(&finished.picture)),
+        conditional::etag(tag),
         (HeaderName::from_static("x-render-backend"), HeaderValue::from_static(finished.backend.name())),
         (HeaderName::from_static("server-timing"), header_text(&timings.join(", "))),
     ];
@@ -44,9 +48,12 @@ pub fn picture(finished: &Finished) -> Response {
 }
 
 /// As [`picture`], and whether it was in memory. A picture that this request has not drawn brings its
-/// age instead of timings.
-pub fn found(found: &Found) -> Response {
-    let mut response = picture(&found.finished);
+/// age instead of timings. Its tag is `tag`, if it has an address; the bytes are then not hashed.
+pub fn found(found: &Found, tag: Option<&str>) -> Response {
+    let mut response = match tag {
+        Some(tag) => picture_with_tag(&found.finished, tag),
+        None => picture(&found.finished),
+    };
     let headers = response.headers_mut();
     headers.insert("x-cache", HeaderValue::from_static(found.source.name()));
     if found.source != Source::Miss {
