@@ -1,9 +1,10 @@
 // Stage lines, per edge: lines of exact width. Twin of src/backend/cpu/lines/edge.rs.
 //
-// Edges are cut into windows and those into slices of rows: shares, which are dealt out to the
-// threads of a workgroup. A thread works in units: one scan along its window, and the drawing of
-// the interval found. Where dispatches must be short, a thread pauses after a number of units and
-// the next dispatch continues there.
+// Edges are cut into windows and those into slices of rows: shares. A workgroup has some edges. Its
+// threads look at a share each, to find out where there is something to draw. Those shares are drawn
+// one after the other, each by all threads together. Where dispatches must be short, a workgroup
+// pauses after a number of units of work, and the next dispatch continues there. A unit is a look at
+// shares, the search for what hides one, or the drawing of a part of it.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(2) var<storage, read> triangles: array<u32>;
@@ -16,45 +17,89 @@
 @group(1) @binding(11) var<storage, read_write> owners: array<atomic<u32>>;
 // Strokes per pixel, as stroke_words.wgsl lays them out.
 @group(1) @binding(12) var<storage, read_write> strokes: array<atomic<u32>>;
-// Number of paused threads, then the state of each.
+// Number of paused workgroups, then the state of each.
 @group(1) @binding(21) var<storage, read_write> progress: Progress;
 
 struct Progress {
     left: atomic<u32>,
-    threads: array<Paused>,
+    groups: array<Paused>,
 };
 
-// A thread that is not done, or all zeros.
+// A workgroup that is not done, or all zeros.
 struct Paused {
-    // Its next share, plus 1.
+    // Its next share.
     share: u32,
-    // `state` and `radius` of the search in that share, plus 1; 0 if it has not begun.
-    search: u32,
+    // 1 if a part of that share is drawn: up to `begin`, where it is hidden from `hidden_from` on.
+    is_begun: u32,
     begin: f32,
     hidden_from: f32,
 };
+
+// Threads of a workgroup: a share has few samples and pixels, and few threads hardly wait for each other.
+const LINE_THREADS: u32 = 32u;
 
 // `line_units` where a dispatch may take as long as it takes.
 const NO_LIMIT: u32 = 0xFFFFFFFFu;
 
 // Per edge of the workgroup, one per thread: end of its shares among all shares.
-var<workgroup> share_ends: array<u32, WORKGROUP>;
+var<workgroup> share_ends: array<u32, LINE_THREADS>;
 
-@compute @workgroup_size(WORKGROUP)
+// Bits of the shares with something to draw, of those that the threads look at; and a copy.
+var<workgroup> due: atomic<u32>;
+var<workgroup> due_now: u32;
+
+// A stroke that is to be added to a pixel.
+struct Waiting {
+    // The edge's direction, and the ends of a part of it, in pixels from the pixel's centre.
+    direction: vec2<f32>,
+    start: vec2<f32>,
+    end: vec2<f32>,
+    // The pixel.
+    at: u32,
+    // The face that lights the line, plus 1, where it is lit.
+    face: u32,
+};
+
+// Strokes that wait until there is one for each thread. At most 31 wait before each thread adds one, so 64
+// places are enough.
+var<workgroup> waiting: array<Waiting, 2u * LINE_THREADS>;
+var<workgroup> waiting_count: atomic<u32>;
+var<workgroup> waiting_now: u32;
+
+// Units of work that are left to the workgroup, the same in all threads.
+var<private> units_left: u32;
+
+// `begin` and `hidden_from` of a share of which nothing is drawn yet.
+fn fresh() -> vec2<f32> {
+    return vec2(-1.0, BEYOND);
+}
+
+// The same of a share that is drawn.
+fn done() -> vec2<f32> {
+    return vec2(BEYOND, BEYOND);
+}
+
+@compute @workgroup_size(LINE_THREADS)
 fn edge(
     @builtin(workgroup_id) workgroup: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
     let group = workgroup.x + workgroup.y * groups.x;
+    let first = batch.first + group * batch.edges_per_group;
     let i = group * batch.edges_per_group + thread;
     var shares = 0u;
     if thread < batch.edges_per_group && i < batch.count {
         shares = shares_of(edges[batch.first + i]);
     }
     share_ends[thread] = shares;
+    if thread == 0u {
+        atomicStore(&due, 0u);
+        atomicStore(&waiting_count, 0u);
+        begin_runs();
+    }
     workgroupBarrier();
-    for (var step = 1u; step < WORKGROUP; step *= 2u) {
+    for (var step = 1u; step < LINE_THREADS; step *= 2u) {
         var before = 0u;
         if thread >= step {
             before = share_ends[thread - step];
@@ -63,9 +108,7 @@ fn edge(
         share_ends[thread] += before;
         workgroupBarrier();
     }
-    if share_ends[WORKGROUP - 1u] > 0u {
-        draw_shares(batch.first + group * batch.edges_per_group, group * WORKGROUP + thread, thread);
-    }
+    draw_shares(first, group, thread);
 }
 
 fn shares_of(edge: vec4<u32>) -> u32 {
@@ -81,90 +124,156 @@ fn shares_of(edge: vec4<u32>) -> u32 {
     return window_count(s) * batch.line_slices;
 }
 
-// Draws every 64th share of the workgroup's, whose edges begin at `first`, from where the thread
-// paused.
-fn draw_shares(first: u32, self_at: u32, thread: u32) {
-    let all = share_ends[WORKGROUP - 1u];
+// Draws the shares of the workgroup, whose edges begin at `first`, from where it paused.
+fn draw_shares(first: u32, group: u32, thread: u32) {
+    let all = share_ends[LINE_THREADS - 1u];
     let may_pause = batch.line_units != NO_LIMIT;
-    var next = thread;
-    var paused = Paused(0u, 0u, 0.0, 0.0);
+    units_left = batch.line_units;
+    var next = 0u;
+    var drawn_to = fresh();
     if may_pause {
-        paused = progress.threads[self_at];
-        next = select(thread, paused.share - 1u, paused.share > 0u);
+        let paused = progress.groups[group];
+        next = paused.share;
+        drawn_to = select(fresh(), vec2(paused.begin, paused.hidden_from), paused.is_begun != 0u);
+        // Before the first thread writes it again.
+        storageBarrier();
     }
-    var units = batch.line_units;
-    var has_share = false;
-    var edge = vec4(0u);
-    var s: Segment;
-    var window: Window;
-    var search: Search;
-    while next < all && units > 0u {
-        if !has_share {
-            let slot = edge_of_share(next);
-            edge = edges[first + slot];
-            s = segment_of(edge);
-            window = window_of(s, next - select(0u, share_ends[max(slot, 1u) - 1u], slot > 0u));
-            let range = widened(s, window.range);
-            if paused.search > 0u {
-                let found = paused.search - 1u;
-                search = Search(range, found / 4u, paused.begin, paused.hidden_from, found % 4u);
-                paused.search = 0u;
-            } else if window.rows.x <= window.rows.y && gets_strokes(s, window) {
-                search = begin_search(s, range);
-            } else {
-                search = Search(range, 0u, range.y, BEYOND, WHOLE);
-            }
-            has_share = true;
+    while next < all && units_left > 0u {
+        let base = next - next % LINE_THREADS;
+        let own = base + thread;
+        if own >= next && own < all && is_due(first, own) {
+            atomicOr(&due, 1u << thread);
         }
-        // Threads that have found an interval wait here for those that have not. Not where loops
-        // are limited, because there an iteration of one thread counts for all.
-        let units_before = units;
-        var interval = vec2(0.0);
-        while search.begin < search.range.y && interval.x >= interval.y && units > 0u {
-            units--;
-            interval = next_interval(edge, s, &search);
-            if may_pause {
+        units_left--;
+        workgroupBarrier();
+        if thread == 0u {
+            due_now = atomicExchange(&due, 0u);
+        }
+        var left = workgroupUniformLoad(&due_now);
+        next = min(base + LINE_THREADS, all);
+        while left != 0u {
+            let share = base + firstTrailingBit(left);
+            if units_left == 0u {
+                next = share;
                 break;
             }
-        }
-        if units == units_before {
-            // Starting a share is work too.
-            units--;
-        }
-        if interval.x < interval.y {
-            draw_interval(edge, s, window, interval);
-        }
-        // Also where it is no number.
-        if !(search.begin < search.range.y) {
-            next += WORKGROUP;
-            has_share = false;
+            drawn_to = draw_share(first, share, drawn_to, thread);
+            if drawn_to.x < BEYOND {
+                next = share;
+                break;
+            }
+            drawn_to = fresh();
+            left &= left - 1u;
         }
     }
-    if may_pause {
-        var left = Paused(all + WORKGROUP, 0u, 0.0, 0.0);
+    draw_waiting(1u, thread);
+    if may_pause && thread == 0u && all > 0u {
+        progress.groups[group] = Paused(next, select(0u, 1u, drawn_to.x >= 0.0), drawn_to.x, drawn_to.y);
         if next < all {
             atomicAdd(&progress.left, 1u);
-            left.share = next + 1u;
-            if has_share {
-                left.search = search.radius * 4u + search.state + 1u;
-                left.begin = search.begin;
-                left.hidden_from = search.hidden_from;
-            }
         }
-        progress.threads[self_at] = left;
     }
 }
 
 // Edge of the workgroup that a share belongs to: the first whose shares end after it.
 fn edge_of_share(share: u32) -> u32 {
     var slot = 0u;
-    for (var step = WORKGROUP / 2u; step > 0u; step /= 2u) {
+    for (var step = LINE_THREADS / 2u; step > 0u; step /= 2u) {
         if share_ends[slot + step - 1u] <= share {
             slot += step;
         }
     }
     return slot;
 }
+
+// The first share of an edge of the workgroup.
+fn first_share_of(slot: u32) -> u32 {
+    return select(0u, share_ends[max(slot, 1u) - 1u], slot > 0u);
+}
+
+// True if a share may have something to draw.
+fn is_due(first: u32, share: u32) -> bool {
+    let slot = edge_of_share(share);
+    let s = segment_of(edges[first + slot]);
+    let window = window_of(s, share - first_share_of(slot));
+    return window.first <= window.rows.y && gets_strokes(s, window);
+}
+
+// Draws a share, by all threads of the workgroup. Returns how far it is drawn.
+//
+// One loop for all steps, because compilers copy what is called into each place that calls it, and
+// here that is most of the kernel.
+fn draw_share(first: u32, share: u32, drawn_to: vec2<f32>, thread: u32) -> vec2<f32> {
+    let slot = edge_of_share(share);
+    let edge = edges[first + slot];
+    let s = segment_of(edge);
+    let window = window_of(s, share - first_share_of(slot));
+    let range = widened(s, window.range);
+    let shows_visible = (batch.line_flags & SHOWN_VISIBLE) != 0u;
+    let shows_hidden = (batch.line_flags & SHOWN_HIDDEN) != 0u;
+    var step = DRAW_ALL;
+    if shows_visible || shows_hidden {
+        step = select(FIND_ALONG, select(DRAW_NOTHING, DRAW_ALL, shows_hidden), is_all_hidden(s, range, thread));
+    }
+    units_left--;
+    var begin = max(range.x, drawn_to.x);
+    var hidden_from = drawn_to.y;
+    // Also ends where `begin` is no number.
+    while step < DRAW_RUNS || (step == DRAW_RUNS && begin < range.y) {
+        var interval = vec2(0.0);
+        var run = vec2(begin, BEYOND);
+        if step == FIND_ALONG || step == FIND_AROUND || (step == DRAW_RUNS && has_too_many()) {
+            run = look_around(edge, s, range, step, begin, thread);
+        }
+        if step == FIND_ALONG {
+            // Where an edge passes under another surface, a sliver of that may have its samples only
+            // beside the edge.
+            step = select(select(DRAW_NOTHING, DRAW_ALL, shows_visible), FIND_AROUND, count_found(thread) > 0u);
+        } else if step == FIND_AROUND {
+            count_found(thread);
+            step = DRAW_RUNS;
+        } else if step == DRAW_ALL {
+            interval = range;
+            step = DRAW_NOTHING;
+        } else {
+            if units_left == 0u {
+                return vec2(begin, hidden_from);
+            }
+            units_left--;
+            run = joined_run(run, begin, thread);
+            if run.x > begin {
+                // Hidden from here on, perhaps farther than this.
+                hidden_from = min(hidden_from, begin);
+                begin = run.x;
+                if !shows_visible && run.x >= range.y {
+                    interval = vec2(hidden_from, range.y);
+                }
+            } else {
+                let end = min(run.y, range.y);
+                let is_gap = begin > range.x && end < range.y;
+                let least = rn(s.inverse_length * select(INTERVAL_MIN_PX, GAP_MIN_PX, is_gap));
+                if !shows_visible {
+                    interval = vec2(hidden_from, begin);
+                } else if end - begin > least {
+                    interval = vec2(begin, end);
+                }
+                begin = end;
+                hidden_from = BEYOND;
+            }
+        }
+        if interval.x < interval.y {
+            draw_interval(edge, s, window, interval, thread);
+        }
+    }
+    return done();
+}
+
+// Steps of `draw_share`.
+const FIND_ALONG: u32 = 0u;
+const FIND_AROUND: u32 = 1u;
+const DRAW_ALL: u32 = 2u;
+const DRAW_RUNS: u32 = 3u;
+const DRAW_NOTHING: u32 = 4u;
 
 // Windows of an edge: what is visible close to a pixel is found close to it.
 fn window_count(s: Segment) -> u32 {
@@ -222,40 +331,60 @@ fn window_of(s: Segment, share: u32) -> Window {
     return Window(number, count, range, ends, rows, rows.x + i32(share % batch.line_slices));
 }
 
-// Draws a part of an edge into the pixels of a share.
-fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32>) {
+// Finds the pixels of a share that a part of an edge touches, and lets them wait. As soon as there is one
+// for each thread, they are drawn: that takes far longer than finding them.
+fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32>, thread: u32) {
     let is_lit = (batch.line_flags & LIT_PASS) != 0u;
     let start = point_at(s, interval.x);
     let end = point_at(s, interval.y);
-    var y = window.first;
-    var columns = columns_of(s, window.ends, y);
-    var x = columns.x;
-    while y <= window.rows.y {
-        // Finding a pixel is far cheaper than covering it, so threads that have found theirs wait
-        // here for the others.
-        var center = vec2(0.0);
-        var at = 0u;
-        var found = false;
-        while !found && y <= window.rows.y {
-            if x > columns.y {
-                y += i32(batch.line_slices);
-                columns = columns_of(s, window.ends, y);
-                x = columns.x;
-                continue;
+    let reach = reach_of_line() + SLACK_PX;
+    let low = max(i32(min(window.ends.x, window.ends.z) - reach), 0);
+    let high = min(i32(max(window.ends.x, window.ends.z) + reach), frame.width - 1);
+    if low > high || window.first > window.rows.y {
+        return;
+    }
+    let columns = u32(high - low) + 1u;
+    let pixels = columns * (u32(window.rows.y - window.first) / batch.line_slices + 1u);
+    for (var done_pixels = 0u; done_pixels < pixels; done_pixels += LINE_THREADS) {
+        let p = done_pixels + thread;
+        let pixel = vec2(low + i32(p % columns), window.first + i32(p / columns * batch.line_slices));
+        let center = vec2<f32>(pixel) + 0.5;
+        let at = u32((pixel.y - batch.row_first) * frame.width + pixel.x);
+        // A full pixel stays full. Only a lit line goes on, to find the face that lights it.
+        if p < pixels && touches(place_of(s.direction, start - center, end - center)) && owns(s, window, center)
+            && (!only_marked() || is_marked(at)) && (is_lit || !is_full(at)) {
+            if is_rim_pass() {
+                atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], MARKED);
             }
-            center = vec2(f32(x), f32(y)) + 0.5;
-            at = u32((y - batch.row_first) * frame.width + x);
-            x++;
-            // A full pixel stays full. Only a lit line goes on, to find the face that lights it.
-            found = touches(place_of(s.direction, start - center, end - center)) && owns(s, window, center)
-                && (is_lit || !is_full(at)) && (!only_marked() || is_marked(at));
+            var face = 0u;
+            if is_lit {
+                face = lighting_face(edge);
+            }
+            waiting[atomicAdd(&waiting_count, 1u)] = Waiting(s.direction, start - center, end - center, at, face);
         }
-        if found && is_rim_pass() {
-            atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], MARKED);
+        draw_waiting(LINE_THREADS, thread);
+    }
+}
+
+// Draws up to 32 waiting strokes, one for each thread. Does nothing if fewer than `least` wait.
+fn draw_waiting(least: u32, thread: u32) {
+    workgroupBarrier();
+    if thread == 0u {
+        let count = atomicLoad(&waiting_count);
+        waiting_now = count;
+        if count >= least {
+            atomicStore(&waiting_count, count - min(count, LINE_THREADS));
         }
-        if found && add_stroke(at, s.direction, start - center, end - center) && is_lit {
-            atomicMax(&owners[at], lighting_face(edge));
-        }
+    }
+    let count = workgroupUniformLoad(&waiting_now);
+    if count < least {
+        return;
+    }
+    let stroke = waiting[count - 1u - min(thread, count - 1u)];
+    // Before another thread puts a new one in its place.
+    workgroupBarrier();
+    if thread < count && add_stroke(stroke.at, stroke.direction, stroke.start, stroke.end) && stroke.face > 0u {
+        atomicMax(&owners[stroke.at], stroke.face);
     }
 }
 

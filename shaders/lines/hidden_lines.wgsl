@@ -1,8 +1,8 @@
 // Stage lines, per piece of an edge: hidden-line removal, which finds the intervals that no
 // triangle hides. Twin of src/backend/cpu/lines/hidden_lines.rs; edge.wgsl declares the buffers.
 //
-// The CPU sorts all intervals in which something hides the edge. A thread here has no room for
-// them, so it finds one interval per scan along the edge.
+// The threads of a workgroup find the triangles and their intervals together. The CPU sorts the
+// intervals; here they are walked through in order.
 
 // Smallest ratio of a hiding surface's depth to the edge's: covers the rounding of f32.
 const NEARER_RATIO: f32 = 1.0000019073486328;
@@ -21,157 +21,190 @@ const GAP_MIN_PX: f32 = 0.25;
 
 const MIN_POSITIVE: f32 = 1.17549435e-38;
 
-// State of the search for the shown intervals in a range of the edge.
-struct Search {
-    range: vec2<f32>,
-    // Pixels beside and beyond the edge whose triangles are candidates too.
-    radius: u32,
-    // Start of the rest to be searched; the range's end when finished.
-    begin: f32,
-    // Start of the hidden interval whose end is not found yet.
-    hidden_from: f32,
-    // UNSCANNED, WHOLE (the range is one interval), or INTERVALS.
-    state: u32,
-};
-
-const UNSCANNED: u32 = 0u;
-const WHOLE: u32 = 1u;
-const INTERVALS: u32 = 2u;
-
 // More than any place on an edge.
 const BEYOND: f32 = 2.0;
 
-// Result of one scan along a range, from `begin` on.
-struct Scan {
-    // End of the hidden interval that starts at `begin`.
-    until: f32,
-    // Start of the next hidden interval.
-    next: f32,
-    any: bool,
-};
+// Places for triangles that were looked at, and for the intervals that they hide.
+const IDS_MAX: u32 = 512u;
+const INTERVALS_MAX: u32 = 512u;
 
-fn begin_search(s: Segment, range: vec2<f32>) -> Search {
-    if (batch.line_flags & (SHOWN_VISIBLE | SHOWN_HIDDEN)) == 0u {
-        return Search(range, 0u, range.x, BEYOND, WHOLE);
+// A table of the triangles that were looked at.
+var<workgroup> seen_ids: array<atomic<u32>, IDS_MAX>;
+
+// Intervals that a triangle hides. If they are more than there is room for, they are found anew whenever
+// they are needed.
+var<workgroup> hidden: array<vec2<f32>, INTERVALS_MAX>;
+var<workgroup> hidden_count: atomic<u32>;
+
+// Bits of what the samples along the edge are.
+var<workgroup> looks: atomic<u32>;
+const NEARER: u32 = 1u;
+const OTHER: u32 = 2u;
+
+// What `joined_run` returns, as bits.
+var<workgroup> run_bits: array<atomic<u32>, 2>;
+
+// Copies that all threads read.
+var<workgroup> word_now: u32;
+var<workgroup> run_now: vec2<u32>;
+
+// Finds out whether every triangle visible along a range of the edge is nearer than all of it. Forgets
+// what was found for others.
+fn is_all_hidden(s: Segment, range: vec2<f32>, thread: u32) -> bool {
+    for (var i = thread; i < IDS_MAX; i += LINE_THREADS) {
+        atomicStore(&seen_ids[i], NOTHING);
     }
-    if is_fully_hidden(s, range) {
-        let shows_hidden = (batch.line_flags & SHOWN_HIDDEN) != 0u;
-        return Search(range, 0u, select(range.y, range.x, shows_hidden), BEYOND, WHOLE);
+    if thread == 0u {
+        atomicStore(&hidden_count, 0u);
+        atomicStore(&looks, 0u);
     }
-    return Search(range, 0u, range.x, BEYOND, UNSCANNED);
+    workgroupBarrier();
+    look_along(s, range, thread);
+    workgroupBarrier();
+    if thread == 0u {
+        word_now = atomicLoad(&looks);
+    }
+    return workgroupUniformLoad(&word_now) == NEARER;
 }
 
-// Scans along the edge once and returns an interval to draw; empty (x >= y) if this scan has
-// completed none.
-fn next_interval(edge: vec4<u32>, s: Segment, search: ptr<function, Search>) -> vec2<f32> {
-    let range = (*search).range;
-    let begin = (*search).begin;
-    if (*search).state == WHOLE {
-        (*search).begin = range.y;
-        return range;
-    }
-    let scan = scan_along(edge, s, *search);
-    let shows_visible = (batch.line_flags & SHOWN_VISIBLE) != 0u;
-    if (*search).state == UNSCANNED {
-        if !scan.any {
-            (*search).begin = range.y;
-            return select(vec2(0.0), range, shows_visible);
-        }
-        // Where an edge passes under another surface, a sliver of that may have its samples only
-        // beside the edge.
-        (*search).state = INTERVALS;
-        (*search).radius = 1u;
-        return vec2(0.0);
-    }
-    let hidden_from = (*search).hidden_from;
-    if scan.until > begin {
-        // Hidden from here on, perhaps farther than this scan has shown.
-        (*search).hidden_from = min(hidden_from, begin);
-        (*search).begin = scan.until;
-        return select(vec2(0.0), vec2(min(hidden_from, begin), range.y), !shows_visible && scan.until >= range.y);
-    }
-    let end = min(scan.next, range.y);
-    (*search).begin = end;
-    (*search).hidden_from = BEYOND;
-    if !shows_visible {
-        return vec2(hidden_from, begin);
-    }
-    let is_gap = begin > range.x && end < range.y;
-    let is_interval = end - begin > rn(s.inverse_length * select(INTERVAL_MIN_PX, GAP_MIN_PX, is_gap));
-    return select(vec2(0.0), vec2(begin, end), is_interval);
-}
-
-// Combines the hidden intervals of all triangles visible along the edge.
-fn scan_along(edge: vec4<u32>, s: Segment, search: Search) -> Scan {
-    let count = u32(sample_count());
-    // Samples of the pixel itself and, with a radius, of one on each side of it across the edge.
-    let words = count * (2u * search.radius + 1u);
-    let across = select(vec2(1, 0), vec2(0, 1), abs(s.along.x) >= abs(s.along.y));
-    var scan = Scan(search.begin, 2.0, false);
-    var recent = vec4(NOTHING);
-    var last = vec2(OUTSIDE);
-    let beyond = f32(search.radius) * s.inverse_length;
-    let walked = vec2(search.range.x - beyond, search.range.y + beyond);
-    let steps = walk_steps(s, walked);
-    for (var i = 0u; i <= steps; i++) {
-        let pixel = walk_pixel(s, walked, i);
-        if all(pixel == last) {
-            continue;
-        }
-        last = pixel;
-        for (var n = 0u; n < words; n++) {
-            let id = seen_at(pixel + (i32(n / count) - i32(search.radius)) * across, n % count).x;
-            if id == NOTHING || any(recent == vec4(id)) {
-                continue;
-            }
-            recent = vec4(id, recent.xyz);
-            var interval = hidden_by(edge, s, id);
-            interval = vec2(max(interval.x, search.range.x), min(interval.y, search.range.y));
-            if interval.x >= interval.y {
-                continue;
-            }
-            scan.any = true;
-            if interval.x <= scan.until {
-                scan.until = max(scan.until, interval.y);
-            } else {
-                scan.next = min(scan.next, interval.x);
-            }
-        }
-    }
-    return scan;
-}
-
-// True if every triangle visible along the edge is nearer than all of it.
-fn is_fully_hidden(s: Segment, range: vec2<f32>) -> bool {
+// Finds out whether the samples along the edge are nearer than all of it.
+fn look_along(s: Segment, range: vec2<f32>, thread: u32) {
     let nearest = rn(max(depth_of(s, 0.0), depth_of(s, 1.0)) * NEARER_RATIO);
     let count = u32(sample_count());
-    var last_id = NOTHING;
-    var last = vec2(OUTSIDE);
-    let steps = walk_steps(s, range);
-    for (var i = 0u; i <= steps; i++) {
-        let pixel = walk_pixel(s, range, i);
-        if all(pixel == last) || !has_samples(pixel) {
+    let items = (walk_steps(s, range) + 1u) * count;
+    var found = 0u;
+    for (var i = thread; i < items && (found & OTHER) == 0u; i += LINE_THREADS) {
+        let pixel = walk_pixel(s, range, i / count);
+        if has_samples(pixel) {
+            found |= select(OTHER, NEARER, is_nearer(seen_at(pixel, i % count), nearest));
+        }
+    }
+    atomicOr(&looks, found);
+}
+
+// True if a sample, and all of its triangle, is nearer than a depth.
+fn is_nearer(seen: vec2<u32>, depth: f32) -> bool {
+    if seen.x == NOTHING || bitcast<f32>(seen.y) <= depth {
+        return false;
+    }
+    let corners = corners_of_id(seen.x);
+    let a = vertices[corners.x];
+    let b = vertices[corners.y];
+    let c = vertices[corners.z];
+    return a.x != OUTSIDE && b.x != OUTSIDE && c.x != OUTSIDE && min(min(a.z, b.z), c.z) > depth;
+}
+
+// Looks at the triangles that are visible along the edge, or at a pixel's distance (FIND_AROUND and
+// DRAW_RUNS). Adds the intervals that they hide, or (DRAW_RUNS) joins them to a run from `begin`.
+fn look_around(edge: vec4<u32>, s: Segment, range: vec2<f32>, step: u32, begin: f32, thread: u32) -> vec2<f32> {
+    let radius = select(1u, 0u, step == FIND_ALONG);
+    let beyond = f32(radius) * s.inverse_length;
+    let walked = vec2(range.x - beyond, range.y + beyond);
+    let items = items_along(s, walked, radius);
+    var run = vec2(begin, BEYOND);
+    for (var i = thread; i < items; i += LINE_THREADS) {
+        let id = id_along(s, walked, radius, i);
+        // Most samples show the edge's own faces, which do not hide it.
+        if id == NOTHING || id == edge.z || id == edge.w || (step != DRAW_RUNS && !is_new(id)) {
             continue;
         }
-        last = pixel;
-        for (var n = 0u; n < count; n++) {
-            let seen = seen_at(pixel, n);
-            if seen.x == NOTHING || bitcast<f32>(seen.y) <= nearest {
-                return false;
-            }
-            if seen.x != last_id {
-                last_id = seen.x;
-                let corners = corners_of_id(seen.x);
-                let a = vertices[corners.x];
-                let b = vertices[corners.y];
-                let c = vertices[corners.z];
-                if a.x == OUTSIDE || b.x == OUTSIDE || c.x == OUTSIDE || min(min(a.z, b.z), c.z) <= nearest {
-                    return false;
-                }
+        let all = hidden_by(edge, s, id);
+        let interval = vec2(max(all.x, range.x), min(all.y, range.y));
+        if !(interval.x < interval.y) {
+            continue;
+        }
+        if step == DRAW_RUNS {
+            run = joined(run, begin, interval);
+        } else {
+            let at = atomicAdd(&hidden_count, 1u);
+            if at < INTERVALS_MAX {
+                hidden[at] = interval;
             }
         }
     }
-    return last_id != NOTHING;
+    return run;
+}
+
+// Number of the intervals that all threads have found.
+fn count_found(thread: u32) -> u32 {
+    workgroupBarrier();
+    if thread == 0u {
+        word_now = atomicLoad(&hidden_count);
+    }
+    return workgroupUniformLoad(&word_now);
+}
+
+// True if there are more intervals than there is room for.
+fn has_too_many() -> bool {
+    return atomicLoad(&hidden_count) > INTERVALS_MAX;
+}
+
+// Samples along a part of the edge: of a pixel in each step and, with a radius, of those beside it across
+// the edge.
+fn items_along(s: Segment, walked: vec2<f32>, radius: u32) -> u32 {
+    return (walk_steps(s, walked) + 1u) * (2u * radius + 1u) * u32(sample_count());
+}
+
+// The triangle in one of those samples.
+fn id_along(s: Segment, walked: vec2<f32>, radius: u32, i: u32) -> u32 {
+    let count = u32(sample_count());
+    let words = (2u * radius + 1u) * count;
+    let across = select(vec2(1, 0), vec2(0, 1), abs(s.along.x) >= abs(s.along.y));
+    let n = i % words;
+    let pixel = walk_pixel(s, walked, i / words) + (i32(n / count) - i32(radius)) * across;
+    return seen_at(pixel, n % count).x;
+}
+
+// True if no thread has looked at a triangle yet. Also where there is no room to remember it: to look at
+// one twice is only slower.
+fn is_new(id: u32) -> bool {
+    // The upper 9 bits of a product by the golden ratio: a place of 512.
+    var at = (id * 2654435761u) >> 23u;
+    for (var tries = 0u; tries < 16u; tries++) {
+        let before = atomicCompareExchangeWeak(&seen_ids[at], NOTHING, id);
+        if before.exchanged || before.old_value == id {
+            return before.exchanged;
+        }
+        // It may fail without a reason.
+        if before.old_value != NOTHING {
+            at = (at + 1u) % IDS_MAX;
+        }
+    }
+    return true;
+}
+
+// To be called by one thread before the others call `joined_run`.
+fn begin_runs() {
+    atomicStore(&run_bits[0], 0u);
+    atomicStore(&run_bits[1], bitcast<u32>(BEYOND));
+}
+
+// Where the hidden interval ends that `begin` lies in, if there is one, and where the next begins; given
+// what this thread has found beside the list.
+fn joined_run(found: vec2<f32>, begin: f32, thread: u32) -> vec2<f32> {
+    var own = found;
+    let count = atomicLoad(&hidden_count);
+    if count <= INTERVALS_MAX {
+        for (var i = thread; i < count; i += LINE_THREADS) {
+            own = joined(own, begin, hidden[i]);
+        }
+    }
+    // Numbers that are not negative are in the order of their bits.
+    atomicMax(&run_bits[0], bitcast<u32>(own.x));
+    atomicMin(&run_bits[1], bitcast<u32>(own.y));
+    workgroupBarrier();
+    if thread == 0u {
+        run_now = vec2(atomicExchange(&run_bits[0], 0u), atomicExchange(&run_bits[1], bitcast<u32>(BEYOND)));
+    }
+    return bitcast<vec2<f32>>(workgroupUniformLoad(&run_now));
+}
+
+// A run from `begin` with one more hidden interval.
+fn joined(run: vec2<f32>, begin: f32, interval: vec2<f32>) -> vec2<f32> {
+    if interval.x <= begin {
+        return vec2(max(run.x, interval.y), run.y);
+    }
+    return vec2(run.x, min(run.y, interval.x));
 }
 
 // Vertex indices of a triangle.

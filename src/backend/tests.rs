@@ -80,6 +80,8 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("STROKES_SIDE_BY_SIDE" = coverage::STROKES_SIDE_BY_SIDE, "ALPHA_MIN" = coverage::ALPHA_MIN);
     add!("NEARER_RATIO" = hidden_lines::NEARER_RATIO, "SNAP_ERROR" = hidden_lines::SNAP_ERROR);
     add!("INTERVAL_MIN_PX" = hidden_lines::INTERVAL_MIN_PX, "GAP_MIN_PX" = hidden_lines::GAP_MIN_PX);
+    add!("IDS_MAX" = line_shares::IDS_MAX, "INTERVALS_MAX" = line_shares::INTERVALS_MAX);
+    add!("LINE_THREADS" = line_shares::LINE_THREADS);
     add!("MARKED" = holes::MARKED, "FACES_MAX" = holes::FACES_MAX, "HOLE_UNIT" = inset::HOLE_UNIT);
     add!("INSIDE" = inset::INSIDE, "NARROW_PX" = inset::NARROW_PX, "LEVEL_PX" = inset::LEVEL_PX);
     // Sample offsets, a nibble each.
@@ -99,9 +101,13 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
 /// Constants that only shaders have: the states of a search, places in their own buffers, what fits
 /// their 32 bits.
 const SHADER_ONLY: &[&str] = &[
-    "UNSCANNED",
-    "WHOLE",
-    "INTERVALS",
+    "NEARER",
+    "OTHER",
+    "FIND_ALONG",
+    "FIND_AROUND",
+    "DRAW_ALL",
+    "DRAW_RUNS",
+    "DRAW_NOTHING",
     "BEYOND",
     "SMALL",
     "AREA_WORD",
@@ -325,7 +331,8 @@ fn snake_case(name: &str) -> String {
 fn kernels_have_the_entry_points_and_overrides_that_pipelines_name() {
     for (kernel, module) in parsed() {
         let entries: Vec<_> = module.entry_points.iter().map(|e| (e.name.as_str(), e.workgroup_size)).collect();
-        assert_eq!(entries, [(kernel.entry(), [WORKGROUP, 1, 1])], "{kernel:?}");
+        let threads = if kernel == Kernel::Edge { line_shares::LINE_THREADS } else { WORKGROUP };
+        assert_eq!(entries, [(kernel.entry(), [threads, 1, 1])], "{kernel:?}");
         let mut declared: Vec<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
         let mut given: Vec<_> = kernel.constants(0).into_iter().map(|(name, _)| name).collect();
         declared.sort_unstable();

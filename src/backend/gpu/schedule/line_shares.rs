@@ -6,14 +6,15 @@ use super::step::Step;
 use crate::backend::DrawError;
 use crate::backend::gpu::params::{Batch, line_flags};
 use crate::backend::gpu::pipelines::Kernel;
-use crate::backend::gpu::schedule::{Schedule, WORKGROUP};
+use crate::backend::gpu::schedule::Schedule;
 use crate::plan::{DrawPlan, LinePass};
 
 /// Edges per dispatch.
 const EDGE_CHUNK: u32 = 1 << 20;
 
-/// The same where each may cross a large picture.
+/// The same where each may cross a large picture: in software, and on a real device.
 const EDGE_CHUNK_LONG: u32 = 1 << 17;
+const EDGE_CHUNK_LONG_HARDWARE: u32 = 1 << 19;
 
 /// Samples that a dispatch may read at most, if the length of its edges is not known: a second or
 /// so of work.
@@ -23,7 +24,7 @@ const BLIND_LOOKS_MAX: u64 = 1 << 34;
 const BUSY_EDGES: usize = 1 << 15;
 
 /// Workgroups that keep all of a GPU busy, and all of a processor.
-const BUSY_GROUPS: u32 = 1024;
+const BUSY_GROUPS: u32 = 4096;
 const BUSY_GROUPS_SOFTWARE: u32 = 16;
 
 /// Slices of a window, at most.
@@ -39,31 +40,33 @@ const ITERATIONS_MAX_HARDWARE: u32 = 1 << 24;
 /// Lines from this reach on may take long on a real device too, pixels.
 const WIDE_PX: f32 = 8.0;
 
-/// Threads that run in step on a processor: while one of them is in a loop, the others wait in it,
-/// and it counts for all.
-const LANES: u32 = 16;
+/// Threads of a workgroup of the edge kernel.
+pub const LINE_THREADS: u32 = 32;
+
+/// Triangles that a workgroup remembers, and intervals that they hide of an edge.
+pub const IDS_MAX: u32 = 512;
+pub const INTERVALS_MAX: u32 = 512;
 
 /// Units of work without end.
 pub const NO_LIMIT: u32 = u32::MAX;
 
-/// Bytes before what paused threads remember: how many there are.
+/// Bytes before what paused workgroups remember: how many there are.
 pub const PROGRESS_HEAD_BYTES: u64 = 4;
 
-/// Bytes of what a paused thread remembers.
+/// Bytes of what a paused workgroup remembers.
 pub const PAUSED_BYTES: u64 = 16;
 
 /// Parameters of the edge kernel for a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineShares {
-    /// Threads that share a window of an edge, by rows, where the line is so wide that it has many
-    /// pixels.
+    /// Shares of a window of an edge, by rows, where the line is so wide that it has many pixels.
     pub slices: u32,
-    /// Edges that the threads of a workgroup share.
+    /// Edges of a workgroup.
     pub edges_per_group: u32,
     /// Edges per dispatch, at most.
     pub edges: u32,
-    /// Looks along an edge, each with what it has found to draw, and shares without a look, after
-    /// which a thread pauses until the next round.
+    /// Units of work after which a workgroup pauses until the next round: looks at as many shares as it
+    /// has threads, searches along a share, parts that are drawn. At least one of each.
     pub units: u32,
 }
 
@@ -71,48 +74,54 @@ impl LineShares {
     /// The parameters of a pass of the plan.
     pub fn new(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> Self {
         let side = lines.window_px() + 2.0 * lines.reach_px();
-        // Few edges leave most of a GPU idle, so threads may look along them twice; a processor has
+        // Few edges leave most of a GPU idle, so workgroups may look along them twice; a processor has
         // nothing to spare.
         let is_idle = !device.loops_are_limited && lines.edges.len() < BUSY_EDGES;
-        let pixels = if is_idle { 64.0 } else { 400.0 };
+        let pixels = if is_idle { 256.0 } else { 1600.0 };
         let slices = (side * 2.0 * lines.reach_px() / pixels).ceil().clamp(1.0, SLICES_MAX) as u32;
         let groups = if device.loops_are_limited { BUSY_GROUPS_SOFTWARE } else { BUSY_GROUPS };
         let unit = unit_iterations(plan.samples, lines, slices);
         let units = match device.loops_are_limited {
-            true => (ITERATIONS_MAX / unit).max(1),
-            false if lines.reach_px() > WIDE_PX => (ITERATIONS_MAX_HARDWARE / unit).max(1),
+            true => (ITERATIONS_MAX / unit).max(3),
+            false if lines.reach_px() > WIDE_PX => (ITERATIONS_MAX_HARDWARE / unit).max(3),
             false => NO_LIMIT,
         };
-        let edges = edges_a_dispatch(plan, lines);
-        Self { slices, edges_per_group: edges.div_ceil(groups).clamp(1, WORKGROUP), edges, units }
+        let edges = edges_a_dispatch(plan, lines, device);
+        Self { slices, edges_per_group: edges.div_ceil(groups).clamp(1, LINE_THREADS), edges, units }
     }
 
-    /// Bytes of what paused threads remember.
+    /// Bytes of what paused workgroups remember.
     pub fn progress_bytes(&self) -> u64 {
-        let threads = self.edges.div_ceil(self.edges_per_group) * WORKGROUP;
-        if self.units == NO_LIMIT { 0 } else { PROGRESS_HEAD_BYTES + PAUSED_BYTES * u64::from(threads) }
+        let groups = self.edges.div_ceil(self.edges_per_group.max(1));
+        if self.units == NO_LIMIT { 0 } else { PROGRESS_HEAD_BYTES + PAUSED_BYTES * u64::from(groups) }
     }
 }
 
-fn edges_a_dispatch(plan: &DrawPlan<'_>, lines: &LinePass) -> u32 {
+fn edges_a_dispatch(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits) -> u32 {
     // Half a pixel a step, the samples of up to three pixels in each.
     let longest = 2 * u64::from(plan.width_px + plan.height_px) * 3 * u64::from(plan.samples);
     let key_bits = longest.saturating_mul(lines.edges.len() as u64);
-    let most = if key_bits > BLIND_LOOKS_MAX { EDGE_CHUNK_LONG } else { EDGE_CHUNK };
+    let long = if device.loops_are_limited { EDGE_CHUNK_LONG } else { EDGE_CHUNK_LONG_HARDWARE };
+    let most = if key_bits > BLIND_LOOKS_MAX { long } else { EDGE_CHUNK };
     lines.edges.len().min(most as usize) as u32
 }
 
-/// Loop iterations that one unit of work takes at most: a window is begun, looked along, and a part
-/// of the edge drawn.
+/// Loop iterations of a thread that one unit of work takes at most.
 fn unit_iterations(samples: u32, lines: &LinePass, slices: u32) -> u32 {
     let length = lines.window_px() + 2.0 * lines.reach_px() + 4.0;
-    // Half a pixel a step; its samples when it is begun, then those of three pixels side by side.
+    // Half a pixel a step.
     let steps = (2.0 * length) as u32 + 2;
-    let key = steps * (1 + samples) + steps * (1 + 3 * samples);
+    let of_threads = |items: u32| items.div_ceil(LINE_THREADS);
     let pixels = ((length as u32).div_ceil(slices) + 1) * (length as u32 + 1);
-    // Each is looked at for a mark, is found, while the others wait, and has eight words of its mask
-    // filled by halves.
-    key + pixels * (1 + LANES + 1 + 8 * 3) + WORKGROUP
+    // A thread looks at all pixels of its share for a mark.
+    let look = pixels + LINE_THREADS.ilog2();
+    // The table of triangles is emptied. Samples are looked at twice, then those of three pixels side by side;
+    // each triangle may take 16 tries.
+    let search = IDS_MAX / LINE_THREADS + 18 * of_threads(steps * samples) + 17 * of_threads(3 * steps * samples);
+    // Each pixel has eight words of its mask filled by halves.
+    let draw = of_threads(pixels) * (1 + 8 * 3);
+    let run = of_threads(3 * steps * samples).max(INTERVALS_MAX / LINE_THREADS);
+    look.max(search + draw).max(run + draw) + LINE_THREADS
 }
 
 impl Schedule {
@@ -232,7 +241,7 @@ mod tests {
             let Some(lines) = plan.lines.first() else { return };
             let LineShares { slices, units, .. } = LineShares::new(plan, lines, &DEVICE);
             let iterations = unit_iterations(plan.samples, lines, slices);
-            assert!(units >= 1 && u64::from(units) * u64::from(iterations) <= 65_535, "{iterations}: {case:?}");
+            assert!(units >= 3 && u64::from(units) * u64::from(iterations) <= 65_535, "{iterations}: {case:?}");
             cases += 1;
         });
         assert!(cases > 100, "{cases}");
