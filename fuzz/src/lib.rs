@@ -198,7 +198,7 @@ fn run_pipeline(bytes: &[u8]) {
 }
 
 fn no_gpu() -> Arc<GpuHost> {
-    Arc::new(GpuHost::new(HardwareHint::None { reason: "targets draw on the CPU".into() }))
+    Arc::new(GpuHost::new(HardwareHint::None { reason: "targets draw on the CPU".into() }, None))
 }
 
 /// The bytes before the first zero byte, and those after it.

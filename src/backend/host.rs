@@ -1,13 +1,14 @@
-//! The process's one GPU: opened on first need, probed before it is used, opened again when it was
-//! lost.
+//! The process's one GPU: opened on first need, probed before it first draws with a number of samples,
+//! opened again when it was lost.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::DrawError;
 use super::device::{GpuDevice, GpuKind, GpuState, GpuStatus, HardwareHint, Opener, drop_catching_panics};
-use super::probe::probe;
+use super::probe::{ProbeError, probe};
 
 /// Jobs in a row that lost the device, after which `auto` goes on with the CPU.
 const LOSSES_MAX: u32 = 3;
@@ -32,6 +33,8 @@ struct Slot {
     failed: Option<String>,
     /// True once an opening has succeeded. From then on a failure counts as a loss.
     opened_before: bool,
+    /// Bits of the numbers of samples per pixel with which the current device has drawn the probe.
+    probed: u32,
 }
 
 /// Reason of a failed opening.
@@ -43,9 +46,9 @@ enum OpenError {
 }
 
 impl GpuHost {
-    /// The host of Vulkan's GPUs. Nothing is loaded yet.
-    pub fn new(hint: HardwareHint) -> Self {
-        Self::with_opener(hint, Box::new(open))
+    /// The host of Vulkan's GPUs, whose pipelines are kept in the folder `cache`. Nothing is loaded yet.
+    pub fn new(hint: HardwareHint, cache: Option<PathBuf>) -> Self {
+        Self::with_opener(hint, Box::new(move |kind| open(kind, cache.as_deref())))
     }
 
     /// A host whose devices `open` opens.
@@ -79,28 +82,69 @@ impl GpuHost {
         self.without.get().is_none()
     }
 
-    /// The device for a request of this kind. It is opened on first use; other workers wait
-    /// meanwhile.
+    /// The device for a request of this kind. It is opened on first use, and draws the probe on first
+    /// use of a number of samples per pixel; other workers wait meanwhile.
     ///
     /// `NoGpu` is final. `DeviceLost` means that a device that was there is gone, and that another
     /// try may help.
-    pub fn device(&self, kind: GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> {
+    pub fn device(&self, kind: GpuKind, samples: u32) -> Result<Arc<dyn GpuDevice>, DrawError> {
         self.check_auto(kind)?;
         let mut slot = self.device.lock().unwrap_or_else(PoisonError::into_inner);
         // The previous holder of the lock may have decided it.
         self.check_auto(kind)?;
         if let Some(device) = slot.current.clone() {
-            let Some(reason) = device.lost().map(str::to_owned) else { return Ok(device) };
-            self.retire(slot.current.take(), &reason);
-            return Err(DrawError::DeviceLost(reason));
+            if let Some(reason) = device.lost().map(str::to_owned) {
+                self.retire(slot.current.take(), &reason);
+                return Err(DrawError::DeviceLost(reason));
+            }
+            return self.ensure_probed(&mut slot, device, samples);
         }
         if let Some(reason) = &slot.failed {
             return Err(DrawError::NoGpu(reason.clone()));
         }
-        match self.open_and_probe(kind) {
-            Ok(device) => self.opened(&mut slot, device, kind),
+        match self.open_and_probe(kind, samples) {
+            Ok(device) => {
+                slot.probed = samples;
+                self.opened(&mut slot, device, kind)
+            }
             Err(error) => Err(self.not_opened(&mut slot, error, kind)),
         }
+    }
+
+    /// The current device, if it draws the probe with so many samples per pixel. One that draws it wrong
+    /// is not used again.
+    fn ensure_probed(
+        &self,
+        slot: &mut Slot,
+        device: Arc<dyn GpuDevice>,
+        samples: u32,
+    ) -> Result<Arc<dyn GpuDevice>, DrawError> {
+        if slot.probed & samples != 0 {
+            return Ok(device);
+        }
+        let attempt = || probe(&mut *device.clone().renderer(), samples);
+        let result = catch_unwind(AssertUnwindSafe(attempt));
+        if let Some(reason) = device.lost().map(str::to_owned) {
+            self.retire(slot.current.take(), &reason);
+            return Err(DrawError::DeviceLost(reason));
+        }
+        let reason = match result {
+            Ok(Ok(())) => {
+                slot.probed |= samples;
+                return Ok(device);
+            }
+            // Refused, perhaps for lack of memory: that says nothing about its numbers.
+            Ok(Err(ProbeError::Draw(error))) => return Err(error),
+            Ok(Err(error)) => format!("{}: {error}", device.info().name),
+            Err(_) => format!("{}: probing it panicked; the log has more", device.info().name),
+        };
+        drop_catching_panics((slot.current.take(), device));
+        slot.failed = Some(reason.clone());
+        self.go_without(reason.clone(), true);
+        self.set_status(|status| {
+            *status = GpuStatus { state: GpuState::Failed, info: None, reason: Some(reason.clone()) }
+        });
+        Err(DrawError::NoGpu(reason))
     }
 
     /// Reports that a job found the device lost. True for the first report.
@@ -207,14 +251,15 @@ impl GpuHost {
         drop_catching_panics(device);
     }
 
-    fn open_and_probe(&self, kind: GpuKind) -> Result<Arc<dyn GpuDevice>, OpenError> {
+    fn open_and_probe(&self, kind: GpuKind, samples: u32) -> Result<Arc<dyn GpuDevice>, OpenError> {
         let attempt = || {
             let device = (self.open)(kind).map_err(|error| match error {
                 DrawError::NoGpu(reason) => OpenError::Absent(reason),
                 other => OpenError::Unusable(other.to_string()),
             })?;
             let name = device.info().name.clone();
-            probe(&mut *device.clone().renderer()).map_err(|error| OpenError::Unusable(format!("{name}: {error}")))?;
+            probe(&mut *device.clone().renderer(), samples)
+                .map_err(|error| OpenError::Unusable(format!("{name}: {error}")))?;
             Ok(device)
         };
         // A panic in wgpu disables the GPU but does not fail the job.
@@ -224,13 +269,13 @@ impl GpuHost {
 }
 
 #[cfg(feature = "gpu")]
-fn open(kind: GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> {
+fn open(kind: GpuKind, cache: Option<&Path>) -> Result<Arc<dyn GpuDevice>, DrawError> {
     use super::gpu::{AtomicsChoice, Gpu};
-    Ok(Arc::new(Gpu::open(kind, AtomicsChoice::Best)?))
+    Ok(Arc::new(Gpu::open(kind, AtomicsChoice::Best, cache)?))
 }
 
 #[cfg(not(feature = "gpu"))]
-fn open(_: GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> {
+fn open(_: GpuKind, _: Option<&Path>) -> Result<Arc<dyn GpuDevice>, DrawError> {
     Err(DrawError::NoGpu("this program was built without the feature `gpu`".to_owned()))
 }
 

@@ -92,15 +92,15 @@ impl Backends {
 
     /// Draws on the GPU; where that is lost, once more on a fresh one.
     fn draw_on_gpu(&mut self, kind: GpuKind, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Chosen, DrawError> {
-        let image = match self.try_gpu(kind, plan, deadline, Attempt::First) {
+        let (image, draw_times) = match self.try_gpu(kind, plan, deadline, Attempt::First) {
             Err(DrawError::DeviceLost(_)) => self.try_gpu(kind, plan, deadline, Attempt::Second)?,
             result => {
-                let image = result?;
+                let drawn = result?;
                 self.host.count_success();
-                image
+                drawn
             }
         };
-        Ok(Chosen { image, backend: BackendKind::Gpu, draw_times: DrawTimes::default() })
+        Ok(Chosen { image, backend: BackendKind::Gpu, draw_times })
     }
 
     fn try_gpu(
@@ -109,14 +109,18 @@ impl Backends {
         plan: &DrawPlan<'_>,
         deadline: &Deadline,
         attempt: Attempt,
-    ) -> Result<Image, DrawError> {
+    ) -> Result<(Image, DrawTimes), DrawError> {
         if self.gpu.as_ref().is_some_and(|(_, device)| device.lost().is_some()) {
             // The old renderer would keep a lost device alive.
             drop_catching_panics(self.gpu.take());
         }
-        let found = self.host.device(kind);
+        let found = self.host.device(kind, plan.samples);
         if let (Err(DrawError::DeviceLost(reason)), Attempt::First) = (&found, attempt) {
             self.host.count_loss(reason);
+        }
+        if let Err(DrawError::NoGpu(_)) = &found {
+            // The device failed a probe: the old renderer would keep it alive.
+            drop_catching_panics(self.gpu.take());
         }
         let device = found?;
         let result = self.draw_on(&device, plan, deadline);
@@ -134,7 +138,7 @@ impl Backends {
         device: &Arc<dyn GpuDevice>,
         plan: &DrawPlan<'_>,
         deadline: &Deadline,
-    ) -> Result<Image, DrawError> {
+    ) -> Result<(Image, DrawTimes), DrawError> {
         let (mut renderer, device) = match self.gpu.take() {
             Some((renderer, own)) if Arc::ptr_eq(&own, device) => (renderer, own),
             old => {
@@ -143,7 +147,7 @@ impl Backends {
             }
         };
         // wgpu may panic on a lost device.
-        let drawn = catch_unwind(AssertUnwindSafe(|| renderer.draw(plan, deadline)));
+        let drawn = catch_unwind(AssertUnwindSafe(|| Ok((renderer.draw(plan, deadline)?, renderer.draw_times()))));
         let result = match (drawn, device.lost()) {
             (Ok(result), _) => result,
             (Err(_), Some(reason)) => Err(DrawError::DeviceLost(reason.to_owned())),

@@ -76,6 +76,9 @@ pub struct RenderArgs {
     /// Threads that read, plan, draw and decode textures [default: one for each processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Folder for what the GPU's driver makes of shaders, so that the next start is faster
+    #[arg(long, value_name = "FOLDER", env = "MESHSNAP_CACHE_DIR")]
+    cache_dir: Option<PathBuf>,
     /// Print the work that was skipped, and the time of each stage
     #[arg(long)]
     explain: bool,
@@ -115,7 +118,7 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
         // fails only if that pool is running already.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     }
-    let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));
+    let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), arguments.cache_dir.clone()));
     let mut backends = Backends::new(gpu.clone(), threads);
     let job = Job { bundle: &bundle, format_in, spec: &spec };
     let output = pipeline::render(job, &mut backends, &limits, &Deadline::default(), &mut ended)

@@ -23,6 +23,8 @@ pub struct Config {
     pub listen: String,
     /// Folder for meshes and results. Reserved: this version keeps them in memory.
     pub data_dir: Option<PathBuf>,
+    /// Folder for what makes the next start faster.
+    pub cache_dir: Option<PathBuf>,
     /// Number of threads that draw.
     pub workers: u64,
     /// Threads within one CPU render; 0 means that the workers share the cores: a picture that is
@@ -70,6 +72,7 @@ impl Default for Config {
         Self {
             listen: "127.0.0.1:8080".into(),
             data_dir: None,
+            cache_dir: None,
             workers: cores(),
             worker_threads: 0,
             backend: BackendChoice::Auto,
@@ -177,13 +180,13 @@ mod tests {
     #[test]
     fn every_default_is_allowed_and_survives_being_written_and_read() {
         let mut checked = 0;
-        for setting in SETTINGS.iter().filter(|s| s.has_flag && s.key != "data-dir") {
+        for setting in SETTINGS.iter().filter(|s| s.has_flag && !s.key.ends_with("-dir")) {
             let (default, mut copy) = (Config::default(), Config::default());
             setting.set(&mut copy, &setting.show(&default)).unwrap_or_else(|e| panic!("{}: {e}", setting.key));
             assert_eq!(copy, default, "{}", setting.key);
             checked += 1;
         }
-        assert_eq!(checked, SETTINGS.len() - 2);
+        assert_eq!(checked, SETTINGS.len() - 3);
     }
 
     #[test]

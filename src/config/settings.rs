@@ -1,5 +1,7 @@
 //! The table of settings: one line for each, with the values it allows and the field it sets.
 
+use std::path::PathBuf;
+
 use super::Config;
 use crate::limits::{IMAGE_PX_MAX, JOB_MS_MAX};
 use crate::spec::BackendChoice;
@@ -41,8 +43,14 @@ pub const SETTINGS: &[Setting] = &[
     text(
         "data-dir",
         "Folder for meshes and results (reserved: this version keeps them in memory)",
-        set_data_dir,
-        data_dir,
+        |c, v| set_folder(&mut c.data_dir, v),
+        |c| show_folder(&c.data_dir),
+    ),
+    text(
+        "cache-dir",
+        "Folder for what the GPU's driver makes of shaders, so that the next start is faster",
+        |c, v| set_folder(&mut c.cache_dir, v),
+        |c| show_folder(&c.cache_dir),
     ),
     number("workers", "Number of threads that draw", 1, 1024, |c| &mut c.workers),
     number("worker-threads", "Threads within one CPU render; 0: the workers share the cores", 0, 1024, |c| {
@@ -147,13 +155,13 @@ fn set(place: &mut String, value: &str) -> Result<(), String> {
     Ok(())
 }
 
-fn set_data_dir(config: &mut Config, value: &str) -> Result<(), String> {
-    config.data_dir = Some(value.into());
+fn set_folder(place: &mut Option<PathBuf>, value: &str) -> Result<(), String> {
+    *place = Some(value.into());
     Ok(())
 }
 
-fn data_dir(config: &Config) -> String {
-    config.data_dir.as_ref().map(|d| d.display().to_string()).unwrap_or_default()
+fn show_folder(folder: &Option<PathBuf>) -> String {
+    folder.as_ref().map(|folder| folder.display().to_string()).unwrap_or_default()
 }
 
 fn set_word<T: Copy>(place: &mut T, words: &[(&str, T)], value: &str) -> Result<(), String> {

@@ -95,7 +95,7 @@ impl Renderer {
 
     fn new(backend: Option<BackendChoice>, hint: HardwareHint) -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let backends = Backends::new(Arc::new(GpuHost::new(hint)), threads);
+        let backends = Backends::new(Arc::new(GpuHost::new(hint, None)), threads);
         Self { backends, backend, limits: Limits::default() }
     }
 }

@@ -82,5 +82,6 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
         lines,
         background: spec.image.background.premultiplied(),
         skips: cx.skips.done,
+        mesh: cx.prepared.map(Prepared::token),
     })
 }

@@ -33,7 +33,7 @@ pub use error::PlanError;
 pub use lines::{Edge, LinePass, Shown, Side};
 pub use outline::{HullPass, HullVertex};
 pub use peeling::{PeelingPass, pass_mask};
-pub use prepared::Prepared;
+pub use prepared::{MeshToken, Prepared};
 pub use projection::Projection;
 pub use quality::{QualitySelection, SelectedSpec, select_quality};
 pub use shared_slice::SharedSlice;
@@ -45,6 +45,7 @@ pub use surface::{
 pub use warnings::{is_out_of_view, out_of_view, undrawn_primitives, unknown_materials};
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// Everything a back-end needs for one picture.
 ///
@@ -83,6 +84,8 @@ pub struct DrawPlan<'a> {
     pub background: [f32; 4],
     /// Work that the plan leaves out, and why.
     pub skips: Vec<Skip>,
+    /// The mesh that the plan borrows from, where it may be drawn again.
+    pub mesh: Option<Arc<MeshToken>>,
 }
 
 /// The side of triangles that a pass draws.
@@ -119,6 +122,7 @@ impl<'a> DrawPlan<'a> {
             lines: Vec::new(),
             background: [0.0; 4],
             skips: Vec::new(),
+            mesh: None,
         }
     }
 

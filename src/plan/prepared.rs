@@ -15,11 +15,17 @@ use crate::texture::Textures;
 /// another's work could be one that this work needs.
 #[derive(Debug, Default)]
 pub struct Prepared {
+    token: Arc<MeshToken>,
     edges: OnceLock<(Arc<EdgeList>, Vec<Spent>)>,
     orientation: OnceLock<Orientation>,
     vertex_normals: OnceLock<Arc<Vec<[f32; 3]>>>,
     textures: Mutex<Option<PreparedTextures>>,
 }
+
+/// The identity of a mesh: no two meshes have one in common. Lists that a plan borrows from a mesh are
+/// not changed as long as its token lives.
+#[derive(Debug, Default)]
+pub struct MeshToken;
 
 /// Textures of a mesh, decoded.
 #[derive(Clone, Debug)]
@@ -31,6 +37,11 @@ pub struct PreparedTextures {
 }
 
 impl Prepared {
+    /// The mesh's identity.
+    pub fn token(&self) -> Arc<MeshToken> {
+        Arc::clone(&self.token)
+    }
+
     /// The edges, paid for; found by `find` if they are not known.
     pub fn edges(
         &self,

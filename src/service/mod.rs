@@ -1,5 +1,6 @@
 //! The daemon: [`http`] in front of [`jobs`] (the queue, the workers and their results) and
-//! [`store`] (meshes that stay). [`residents`] and [`pictures`] remember what was read and drawn.
+//! [`store`] (meshes that stay). [`residents`] and [`pictures`] remember what was read and drawn. [`warm_up`]
+//! makes the first picture come sooner.
 //!
 //! Architecture invariant: [`http`] alone knows HTTP.
 
@@ -9,3 +10,4 @@ pub mod jobs;
 pub mod pictures;
 pub mod residents;
 pub mod store;
+pub mod warm_up;

@@ -3,6 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::handles::Handles;
+use super::residents::Source;
 use crate::backend::DrawError;
 use crate::backend::gpu::pipelines::{SLOTS, Slot};
 
@@ -44,6 +45,10 @@ impl SpareBuffers {
 #[derive(Default)]
 pub struct Buffers {
     storage: [Option<wgpu::Buffer>; SLOTS],
+    /// Buffers of others that the current job reads in the place of these.
+    bound: [Option<wgpu::Buffer>; SLOTS],
+    /// Buffers that the current job has filled, to be kept for others if it succeeds.
+    filled: Vec<(Slot, Source, wgpu::Buffer)>,
     /// Uniforms of a plan.
     pub frame: Option<wgpu::Buffer>,
     /// Uniforms of the dispatches.
@@ -52,20 +57,44 @@ pub struct Buffers {
     pub staging: Option<wgpu::Buffer>,
     /// Buffer from which the CPU reads the work list's length.
     counts: Option<wgpu::Buffer>,
+    /// Places for times, and the buffer that they are written to.
+    queries: Option<(wgpu::QuerySet, wgpu::Buffer)>,
 }
 
 impl Buffers {
     /// A buffer of at least `size` bytes for the slot; what it held is lost if it had to grow.
     pub fn reserve(&mut self, gpu: &Handles, slot: Slot, size: u64) -> Result<&wgpu::Buffer, DrawError> {
         use wgpu::BufferUsages as U;
-        let limit = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
-        if size > limit {
-            return Err(DrawError::Device(format!(
-                "it needs a buffer of {size} bytes, and the GPU's limit is {limit}"
-            )));
-        }
+        let limit = check_size(gpu, size)?;
         let usage = U::STORAGE | U::COPY_DST | U::COPY_SRC;
         Ok(grow(gpu, &mut self.storage[slot as usize], size, limit, usage))
+    }
+
+    /// Lets the job read another buffer in the place of the slot's own.
+    pub fn bind(&mut self, slot: Slot, buffer: wgpu::Buffer) {
+        self.bound[slot as usize] = Some(buffer);
+    }
+
+    /// Notes a buffer that is to be kept if the job succeeds.
+    pub fn keep_later(&mut self, slot: Slot, source: &Source, buffer: &wgpu::Buffer) {
+        self.filled.push((slot, source.clone(), buffer.clone()));
+    }
+
+    /// To be called after each job. Returns what is to be kept.
+    pub fn unbind_all(&mut self) -> Vec<(Slot, Source, wgpu::Buffer)> {
+        self.bound = Default::default();
+        std::mem::take(&mut self.filled)
+    }
+
+    /// A new buffer of just the size of slices of whole words, filled with them.
+    pub fn filled(gpu: &Handles, parts: &[&[u8]]) -> Result<wgpu::Buffer, DrawError> {
+        let size = parts.iter().map(|part| part.len() as u64).sum();
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        check_size(gpu, size)?;
+        let descriptor = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false };
+        let buffer = gpu.device.create_buffer(&descriptor);
+        write_slices(gpu, &buffer, parts);
+        Ok(buffer)
     }
 
     /// Reserves and fills a buffer. The length is rounded up to whole words with zeros.
@@ -86,11 +115,7 @@ impl Buffers {
     /// Reserves a buffer and fills it with slices of whole words, one after the other.
     pub fn upload_slices(&mut self, gpu: &Handles, slot: Slot, parts: &[&[u8]]) -> Result<(), DrawError> {
         let buffer = self.reserve(gpu, slot, parts.iter().map(|part| part.len() as u64).sum())?;
-        let mut at = 0;
-        for part in parts.iter().filter(|part| !part.is_empty()) {
-            gpu.queue.write_buffer(buffer, at, part);
-            at += part.len() as u64;
-        }
+        write_slices(gpu, buffer, parts);
         Ok(())
     }
 
@@ -104,9 +129,12 @@ impl Buffers {
         Ok(())
     }
 
-    /// The slot's buffer, or an empty one where the plan needs none.
-    pub fn storage(&mut self, gpu: &Handles, slot: Slot) -> Result<&wgpu::Buffer, DrawError> {
-        self.reserve(gpu, slot, 0)
+    /// The buffer that the job reads as the slot's, or an empty one where the plan needs none.
+    pub fn storage(&mut self, gpu: &Handles, slot: Slot) -> Result<wgpu::Buffer, DrawError> {
+        if let Some(buffer) = &self.bound[slot as usize] {
+            return Ok(buffer.clone());
+        }
+        self.reserve(gpu, slot, 0).cloned()
     }
 
     /// Fills a uniform buffer.
@@ -138,9 +166,40 @@ impl Buffers {
         grow(gpu, &mut self.counts, 8, SIZE_MIN, U::MAP_READ | U::COPY_DST)
     }
 
+    /// Places for so many times, and a buffer of `size` bytes for them.
+    pub fn queries(&mut self, gpu: &Handles, count: u32, size: u64) -> (wgpu::QuerySet, wgpu::Buffer) {
+        use wgpu::BufferUsages as U;
+        let make = || {
+            let ty = wgpu::QueryType::Timestamp;
+            let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor { label: None, ty, count });
+            let usage = U::QUERY_RESOLVE | U::COPY_SRC;
+            let descriptor = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false };
+            (queries, gpu.device.create_buffer(&descriptor))
+        };
+        self.queries.get_or_insert_with(make).clone()
+    }
+
     fn bytes(&self) -> u64 {
         let all = self.storage.iter().chain([&self.frame, &self.batches, &self.staging, &self.counts]);
         all.flatten().map(wgpu::Buffer::size).sum()
+    }
+}
+
+/// The largest size of a buffer, if this one is not larger.
+fn check_size(gpu: &Handles, size: u64) -> Result<u64, DrawError> {
+    let limit = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
+    if size > limit {
+        return Err(DrawError::Device(format!("it needs a buffer of {size} bytes, and the GPU's limit is {limit}")));
+    }
+    Ok(limit)
+}
+
+/// Fills a buffer with slices of whole words, one after the other.
+fn write_slices(gpu: &Handles, buffer: &wgpu::Buffer, parts: &[&[u8]]) {
+    let mut at = 0;
+    for part in parts.iter().filter(|part| !part.is_empty()) {
+        gpu.queue.write_buffer(buffer, at, part);
+        at += part.len() as u64;
     }
 }
 

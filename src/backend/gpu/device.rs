@@ -1,13 +1,17 @@
 //! One opened GPU: adapter, device, queue, and what it can do. Shared by all workers.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::path::Path;
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock, mpsc};
+use std::thread;
 use std::time::Duration;
 
 use super::buffers::SpareBuffers;
 use super::handles::Handles;
-use crate::backend::gpu::pipelines::PipelineCache;
+use super::residents::ResidentBuffers;
+use crate::backend::gpu::pipelines::file::PipelineFile;
+use crate::backend::gpu::pipelines::{Kernel, Pipelines};
 use crate::backend::{DrawError, GpuDevice, GpuInfo, GpuKind, Renderer};
 use crate::limits::Deadline;
 
@@ -23,9 +27,12 @@ pub enum AtomicsChoice {
 /// An opened GPU.
 pub struct Gpu {
     pub(super) handles: Handles,
-    pub(super) pipelines: PipelineCache,
+    pub(super) pipelines: Pipelines,
     pub(super) spare_buffers: SpareBuffers,
+    pub(super) residents: ResidentBuffers<wgpu::Buffer>,
     pub(super) int64_atomics: bool,
+    /// Nanoseconds of a step of its clock, if it has one.
+    pub(super) clock_step_ns: Option<f32>,
     info: GpuInfo,
     lost: Lost,
     jobs_ended: AtomicU32,
@@ -35,6 +42,10 @@ pub struct Gpu {
 /// set of uniform values that its branches depend on, and keeps each copy (1 to 3 MiB per job) until
 /// the pipeline goes. New pipelines cost seconds, so they are made seldom.
 const SOFTWARE_PIPELINE_JOBS: u32 = 128;
+
+/// Memory for what stays on a device, bytes; and on a software one, whose memory is the process's.
+const RESIDENT_BYTES: u64 = 1 << 30;
+const RESIDENT_BYTES_SOFTWARE: u64 = 64 << 20;
 
 /// The reason once the device is lost.
 type Lost = Arc<OnceLock<String>>;
@@ -53,8 +64,9 @@ const PAUSE_MAX: Duration = Duration::from_millis(2);
 const HUNG_AFTER: Duration = Duration::from_secs(120);
 
 impl Gpu {
-    /// Opens the best adapter of the given kind.
-    pub fn open(kind: GpuKind, atomics: AtomicsChoice) -> Result<Self, DrawError> {
+    /// Opens the best adapter of the given kind. Its pipelines are kept in the folder `cache`, for the
+    /// next process.
+    pub fn open(kind: GpuKind, atomics: AtomicsChoice, cache: Option<&Path>) -> Result<Self, DrawError> {
         let adapter = find_adapter(kind)?;
         let info = adapter.get_info();
         let limits = adapter.limits();
@@ -64,9 +76,11 @@ impl Gpu {
         }
         let int64 = wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX;
         let int64_atomics = atomics == AtomicsChoice::Best && adapter.features().contains(int64);
+        let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::PIPELINE_CACHE;
+        let atomics = if int64_atomics { int64 } else { wgpu::Features::empty() };
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("meshsnap"),
-            required_features: if int64_atomics { int64 } else { wgpu::Features::empty() },
+            required_features: adapter.features() & wanted | atomics,
             required_limits: limits.clone(),
             experimental_features: wgpu::ExperimentalFeatures::disabled(),
             memory_hints: wgpu::MemoryHints::MemoryUsage,
@@ -85,14 +99,21 @@ impl Gpu {
         device
             .on_uncaptured_error(Arc::new(|error| tracing::error!(%error, "the GPU reported an error outside a job")));
 
+        let file = cache.and_then(|folder| PipelineFile::open(folder, &info, &device));
+        let has_clock = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+        let clock_step_ns = has_clock.then(|| queue.get_timestamp_period());
+        tracing::debug!(name = info.name, "opened a device");
         let features = if int64_atomics { vec!["int64-atomics"] } else { vec![] };
+        let is_software = info.device_type == wgpu::DeviceType::Cpu;
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
         Ok(Self {
             handles: Handles { device, queue, limits },
-            pipelines: PipelineCache::default(),
+            pipelines: Pipelines::kept_in(file),
             spare_buffers: SpareBuffers::default(),
+            residents: ResidentBuffers::new(if is_software { RESIDENT_BYTES_SOFTWARE } else { RESIDENT_BYTES }),
             int64_atomics,
+            clock_step_ns,
             info,
             lost,
             jobs_ended: AtomicU32::new(0),
@@ -102,6 +123,11 @@ impl Gpu {
     /// The opened device.
     pub fn info(&self) -> &GpuInfo {
         &self.info
+    }
+
+    /// Memory on the device for what meshes bring, kept for the next pictures, bytes.
+    pub fn resident_bytes(&self) -> u64 {
+        self.residents.bytes()
     }
 
     /// The reason if the device is lost.
@@ -125,6 +151,40 @@ impl Gpu {
         if self.is_software() && count.is_multiple_of(SOFTWARE_PIPELINE_JOBS) {
             self.pipelines.clear();
         }
+    }
+
+    /// Makes the pipelines of kernels that have none for this key, on all cores.
+    pub(super) fn make_pipelines(&self, kernels: &[Kernel], key: u32) -> Result<(), DrawError> {
+        let missing = self.pipelines.missing(kernels, key);
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let next = AtomicUsize::new(0);
+        let make = || {
+            self.scoped(|| {
+                while let Some(&kernel) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    self.pipelines.get(&self.handles.device, kernel, key);
+                }
+                Ok(())
+            })
+        };
+        let threads = thread::available_parallelism().map_or(1, usize::from).min(missing.len());
+        let result = thread::scope(|scope| {
+            // Where the system gives no more threads, the others do all.
+            let spawn = |_| thread::Builder::new().name("pipelines".into()).spawn_scoped(scope, make).ok();
+            let others: Vec<_> = (1..threads).filter_map(spawn).collect();
+            let own = make();
+            let others = others.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
+            others.chain([own]).collect::<Result<(), DrawError>>()
+        });
+        if result.is_err() {
+            // One that could not be made stays among them.
+            self.pipelines.clear();
+            return result;
+        }
+        tracing::debug!(pipelines = missing.len(), "made pipelines");
+        self.pipelines.save();
+        Ok(())
     }
 
     /// Runs `work` and turns the device's errors on this thread into an error.
@@ -165,7 +225,7 @@ impl Gpu {
             // Another worker's poll may run our callback: then this wakes up at once.
             match news.recv_timeout(pause) {
                 Ok(news) => return Ok(news),
-                Err(mpsc::RecvTimeoutError::Timeout) if pause.is_zero() => std::thread::yield_now(),
+                Err(mpsc::RecvTimeoutError::Timeout) if pause.is_zero() => thread::yield_now(),
                 Err(mpsc::RecvTimeoutError::Timeout) => waited += pause,
                 Err(mpsc::RecvTimeoutError::Disconnected) => return Err(self.declare_lost("it forgot a job")),
             }

@@ -2,7 +2,8 @@
 //!
 //! In reading order: `device` opens a GPU; `schedule` computes the dispatches for a plan;
 //! `recorder` turns them into commands; `pipelines` holds each kernel's source, bindings and
-//! specialisation; `params` the uniforms, `buffers` the memory, `pass_mask` the passes over
+//! specialisation; `stage_clock` times the stages; `params` the uniforms, `buffers` a job's memory, `residents` what
+//! stays in memory for the next job, `pass_mask` the passes over
 //! triangles.
 //!
 //! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
@@ -15,7 +16,9 @@ pub(super) mod params;
 pub(crate) mod pass_mask;
 pub(crate) mod pipelines;
 mod recorder;
+mod residents;
 pub(super) mod schedule;
+mod stage_clock;
 
 use std::sync::Arc;
 
@@ -24,20 +27,22 @@ pub use self::schedule::sizes::bands_bytes;
 pub use crate::backend::{GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
-use self::handles::Handles;
 use self::params::{attributes, corner_triangles, edge_lists, hull_materials, sample_masks};
 use self::pipelines::Slot;
+use self::pipelines::key::pipeline_key;
 use self::recorder::Recorder;
+use self::residents::{Found, Source};
 use self::schedule::Schedule;
 use self::schedule::sizes::{
     DeviceTraits, OWNER_BYTES, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, samples,
     work_bytes,
 };
 use self::schedule::step::{Band, Goal, Step};
-use super::{BackendKind, DrawError, Renderer};
+use self::stage_clock::StageClock;
+use super::{BackendKind, DrawError, DrawTimes, Renderer};
 use crate::image::{Image, srgb8_thresholds};
 use crate::limits::Deadline;
-use crate::plan::{DrawPlan, HullVertex};
+use crate::plan::{CornerValues, DrawPlan, HullVertex, SurfacePass};
 
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
@@ -48,12 +53,14 @@ const TILE_WORKGROUPS_SOFTWARE: u32 = 64;
 /// Draws on the GPU. Each worker has its own; the device, its pipelines and buffers are shared.
 pub struct GpuRenderer {
     gpu: Arc<Gpu>,
+    /// Of the last picture, by the device's clock.
+    draw_times: DrawTimes,
 }
 
 impl GpuRenderer {
     /// A renderer on an opened GPU.
     pub fn new(gpu: Arc<Gpu>) -> Self {
-        Self { gpu }
+        Self { gpu, draw_times: DrawTimes::default() }
     }
 
     /// The GPU that it draws on.
@@ -86,7 +93,8 @@ impl GpuRenderer {
         }
         self.job(|gpu, buffers| {
             let schedule = Schedule::new(plan, &traits(gpu), goal)?;
-            upload_geometry(&gpu.handles, buffers, plan, &schedule)?;
+            gpu.make_pipelines(&schedule.kernels(), pipeline_key(plan))?;
+            upload_geometry(gpu, buffers, plan, &schedule)?;
             buffers.staging(&gpu.handles, u64::from(schedule.banding.rows) * row_words as u64 * 8)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
             let mut words = Vec::with_capacity(len);
@@ -106,6 +114,11 @@ impl GpuRenderer {
         self.gpu.check()?;
         let mut buffers = self.gpu.spare_buffers.take();
         let result = self.gpu.scoped(|| job(&self.gpu, &mut buffers));
+        let filled = buffers.unbind_all();
+        if result.is_ok() {
+            // Not before: a buffer may not have been filled if something went wrong.
+            filled.into_iter().for_each(|(slot, source, buffer)| self.gpu.residents.keep(slot, &source, buffer));
+        }
         self.gpu.job_ended();
         // After an error the buffers may still be in use, and the staging buffer may be half
         // mapped.
@@ -118,6 +131,29 @@ impl GpuRenderer {
 
 impl Renderer for GpuRenderer {
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
+        match self.draw_once(plan, deadline) {
+            // Perhaps there was no memory left.
+            Err(DrawError::Device(_)) if self.gpu.residents.clear() => self.draw_once(plan, deadline),
+            result => result,
+        }
+    }
+
+    fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
+        self.words(plan, Goal::Samples, Slot::Samples, deadline)
+    }
+
+    fn draw_times(&self) -> DrawTimes {
+        self.draw_times
+    }
+
+    fn kind(&self) -> BackendKind {
+        BackendKind::Gpu
+    }
+}
+
+impl GpuRenderer {
+    fn draw_once(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
+        self.draw_times = DrawTimes::default();
         deadline.check()?;
         let row_bytes = u64::from(plan.width_px) * 4;
         let size = row_bytes * u64::from(plan.height_px);
@@ -125,28 +161,35 @@ impl Renderer for GpuRenderer {
         if size == 0 {
             return Ok(image);
         }
+        let times_at = size.next_multiple_of(8);
+        let mut times = DrawTimes::default();
         self.job(|gpu, buffers| {
             let schedule = Schedule::new(plan, &traits(gpu), Goal::Picture)?;
-            upload_geometry(&gpu.handles, buffers, plan, &schedule)?;
-            upload_shading(&gpu.handles, buffers, plan, &schedule)?;
-            buffers.staging(&gpu.handles, size)?;
+            gpu.make_pipelines(&schedule.kernels(), pipeline_key(plan))?;
+            upload_geometry(gpu, buffers, plan, &schedule)?;
+            upload_shading(gpu, buffers, plan, &schedule)?;
+            buffers.staging(&gpu.handles, times_at + StageClock::BYTES)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
+            recorder.start_clock();
             execute(&mut recorder, plan, &schedule, |recorder, Band { rows: [first, end] }| {
                 let to = u64::from(first) * row_bytes;
                 recorder.copy_out(Slot::Rgba, 0, u64::from(end - first) * row_bytes, to)?;
+                if end == plan.height_px {
+                    recorder.copy_times(times_at);
+                }
                 recorder.submit()
             })?;
-            recorder.read_staging(size, |bytes| image.rgba = bytes.to_vec())?;
-            Ok(image)
-        })
-    }
-
-    fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
-        self.words(plan, Goal::Samples, Slot::Samples, deadline)
-    }
-
-    fn kind(&self) -> BackendKind {
-        BackendKind::Gpu
+            let mut stamps = Vec::new();
+            recorder.read_staging(times_at + StageClock::BYTES, |bytes| {
+                let (picture, after) = bytes.split_at(times_at as usize);
+                image.rgba = picture[..size as usize].to_vec();
+                stamps = after.to_vec();
+            })?;
+            times = recorder.times(&stamps);
+            Ok(())
+        })?;
+        self.draw_times = times;
+        Ok(image)
     }
 }
 
@@ -160,17 +203,47 @@ fn traits(gpu: &Gpu) -> DeviceTraits {
     }
 }
 
-/// Uploads the input of transform and visibility, and reserves their output.
+/// Gives a slot its input: the buffer that is kept for its source, or else the slices.
+fn supply(
+    gpu: &Gpu,
+    buffers: &mut Buffers,
+    slot: Slot,
+    source: Option<Source>,
+    parts: &[&[u8]],
+) -> Result<(), DrawError> {
+    if let Some(source) = &source {
+        let buffer = match gpu.residents.find(slot, source) {
+            Found::Buffer(buffer) => Some(buffer),
+            Found::Wanted => {
+                let buffer = Buffers::filled(&gpu.handles, parts)?;
+                buffers.keep_later(slot, source, &buffer);
+                Some(buffer)
+            }
+            Found::Unwanted => None,
+        };
+        if let Some(buffer) = buffer {
+            buffers.bind(slot, buffer);
+            return Ok(());
+        }
+    }
+    buffers.upload_slices(&gpu.handles, slot, parts)
+}
+
+/// Supplies the input of transform and visibility, and reserves their output.
 fn upload_geometry(
-    gpu: &Handles,
+    gpu: &Gpu,
     buffers: &mut Buffers,
     plan: &DrawPlan<'_>,
     schedule: &Schedule,
 ) -> Result<(), DrawError> {
-    buffers.upload(gpu, Slot::Positions, bytemuck::cast_slice(&plan.positions))?;
+    let mesh = plan.mesh.as_ref();
+    let positions = Source::of(&plan.positions, mesh);
+    supply(gpu, buffers, Slot::Positions, positions, &[bytemuck::cast_slice(&plan.positions)])?;
     let (corners, own) = plan.hull.as_ref().map_or((&[][..], &[][..]), |hull| (&hull.triangles, &hull.vertices));
-    let triangles = [bytemuck::cast_slice(&plan.triangles), bytemuck::cast_slice(corners)];
-    buffers.upload_slices(gpu, Slot::Triangles, &triangles)?;
+    let triangles = Source::of(&plan.triangles, mesh).filter(|_| corners.is_empty());
+    let slices = [bytemuck::cast_slice(&plan.triangles), bytemuck::cast_slice(corners)];
+    supply(gpu, buffers, Slot::Triangles, triangles, &slices)?;
+    let gpu = &gpu.handles;
     let transformed = plan.positions.len() as u64 * size_of::<HullVertex>() as u64;
     buffers.upload_at(gpu, Slot::Vertices, transformed, bytemuck::cast_slice(own))?;
     if let Some(hull) = &plan.hull {
@@ -191,40 +264,23 @@ fn upload_geometry(
     Ok(())
 }
 
-/// Uploads the input of shade, lines and resolve, and reserves their output.
-fn upload_shading(
-    gpu: &Handles,
-    buffers: &mut Buffers,
-    plan: &DrawPlan<'_>,
-    schedule: &Schedule,
-) -> Result<(), DrawError> {
+/// Supplies the input of shade, lines and resolve, and reserves their output.
+fn upload_shading(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
     let band_pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);
     if has_visibility(plan) || !plan.lines.is_empty() {
-        buffers.reserve(gpu, Slot::Colors, band_pixels * color_bytes(plan))?;
+        buffers.reserve(&gpu.handles, Slot::Colors, band_pixels * color_bytes(plan))?;
     }
     if let Some(surface) = &plan.surface {
-        buffers.upload(gpu, Slot::Attributes, &attributes(surface))?;
-        buffers.upload(gpu, Slot::Materials, bytemuck::cast_slice(&surface.materials))?;
-        buffers.upload(gpu, Slot::FaceNormals, bytemuck::cast_slice(&surface.face_normals))?;
-        if let Some(normals) = &surface.vertex_normals {
-            buffers.upload(gpu, Slot::Normals, bytemuck::cast_slice(&normals.values))?;
-        }
-        if let Some(uvs) = &surface.uvs {
-            buffers.upload(gpu, Slot::Uvs, bytemuck::cast_slice(&uvs.values))?;
-        }
-        if let Some(colors) = &surface.colors {
-            buffers.upload(gpu, Slot::VertexColors, bytemuck::cast_slice(&colors.values))?;
-        }
-        let triangles = corner_triangles(surface, &plan.triangles).0;
-        let triangles: Vec<&[u8]> = triangles.into_iter().map(bytemuck::cast_slice).collect();
-        buffers.upload_slices(gpu, Slot::CornerTriangles, &triangles)?;
-        let (images, texels) = (&surface.textures.images, &surface.textures.texels);
-        buffers.upload_slices(gpu, Slot::Texels, &[bytemuck::cast_slice(images), bytemuck::cast_slice(texels)])?;
+        upload_surface(gpu, buffers, plan, surface)?;
     }
     if !plan.lines.is_empty() {
-        let edges: Vec<&[u8]> = edge_lists(&plan.lines).0.into_iter().map(bytemuck::cast_slice).collect();
+        let (lists, _) = edge_lists(&plan.lines);
+        let slices: Vec<&[u8]> = lists.iter().map(|list| bytemuck::cast_slice(list)).collect();
+        let source = plan.lines.first().filter(|_| lists.len() == 1);
+        let source = source.and_then(|lines| Source::of_arc(&lines.edges, size_of_val(&lines.edges[..])));
+        supply(gpu, buffers, Slot::Edges, source, &slices)?;
+        let gpu = &gpu.handles;
         let colors: Vec<[f32; 4]> = plan.lines.iter().map(|lines| lines.color).collect();
-        buffers.upload_slices(gpu, Slot::Edges, &edges)?;
         buffers.upload(gpu, Slot::LineColors, bytemuck::cast_slice(&colors))?;
         buffers.upload(gpu, Slot::SampleMasks, bytemuck::cast_slice(&sample_masks(plan.samples)))?;
         buffers.reserve(gpu, Slot::Strokes, band_pixels * STROKES_BYTES)?;
@@ -233,9 +289,47 @@ fn upload_shading(
             buffers.reserve(gpu, Slot::Owners, band_pixels * OWNER_BYTES)?;
         }
     }
-    buffers.upload(gpu, Slot::Thresholds, bytemuck::cast_slice(&srgb8_thresholds()))?;
-    buffers.reserve(gpu, Slot::Rgba, band_pixels * 4)?;
+    buffers.upload(&gpu.handles, Slot::Thresholds, bytemuck::cast_slice(&srgb8_thresholds()))?;
+    buffers.reserve(&gpu.handles, Slot::Rgba, band_pixels * 4)?;
     Ok(())
+}
+
+/// Supplies what shading reads of the surface.
+fn upload_surface(
+    gpu: &Gpu,
+    buffers: &mut Buffers,
+    plan: &DrawPlan<'_>,
+    surface: &SurfacePass<'_>,
+) -> Result<(), DrawError> {
+    let mesh = plan.mesh.as_ref();
+    buffers.upload(&gpu.handles, Slot::Attributes, &attributes(surface))?;
+    buffers.upload(&gpu.handles, Slot::Materials, bytemuck::cast_slice(&surface.materials))?;
+    let face_normals = &surface.face_normals;
+    supply(gpu, buffers, Slot::FaceNormals, Source::of(face_normals, mesh), &[bytemuck::cast_slice(face_normals)])?;
+    if let Some(CornerValues { values, .. }) = &surface.vertex_normals {
+        supply(gpu, buffers, Slot::Normals, Source::of(values, mesh), &[bytemuck::cast_slice(values)])?;
+    }
+    if let Some(CornerValues { values, .. }) = &surface.uvs {
+        supply(gpu, buffers, Slot::Uvs, Source::of(values, mesh), &[bytemuck::cast_slice(values)])?;
+    }
+    if let Some(CornerValues { values, .. }) = &surface.colors {
+        supply(gpu, buffers, Slot::VertexColors, Source::of(values, mesh), &[bytemuck::cast_slice(values)])?;
+    }
+    let lists = corner_triangles(surface, &plan.triangles).0;
+    let all = [
+        surface.vertex_normals.as_ref().map(|normals| &normals.triangles),
+        surface.uvs.as_ref().map(|uvs| &uvs.triangles),
+        surface.colors.as_ref().map(|colors| &colors.triangles),
+    ];
+    let source = match lists[..] {
+        [list] => all.into_iter().flatten().find(|of| std::ptr::eq(&of[..], list)).and_then(|of| Source::of(of, mesh)),
+        _ => None,
+    };
+    let slices: Vec<&[u8]> = lists.into_iter().map(bytemuck::cast_slice).collect();
+    supply(gpu, buffers, Slot::CornerTriangles, source, &slices)?;
+    let (images, texels) = (&surface.textures.images[..], &surface.textures.texels[..]);
+    let source = Source::of_arc(&surface.textures, size_of_val(images) + size_of_val(texels));
+    supply(gpu, buffers, Slot::Texels, source, &[bytemuck::cast_slice(images), bytemuck::cast_slice(texels)])
 }
 
 /// Records all steps; `end_band` takes a finished band's rows away.

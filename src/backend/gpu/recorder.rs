@@ -9,10 +9,11 @@ use super::buffers::Buffers;
 use super::device::Gpu;
 use super::handles::Handles;
 use super::params::{BATCH_STRIDE, Batch, Frame, pack};
-use crate::backend::DrawError;
 use crate::backend::gpu::pipelines::key::pipeline_key;
 use crate::backend::gpu::pipelines::{Kernel, Pipeline, Slot, uniforms_layout};
 use crate::backend::gpu::schedule::tiles::Tiles;
+use crate::backend::gpu::stage_clock::StageClock;
+use crate::backend::{DrawError, DrawStage, DrawTimes};
 use crate::limits::Deadline;
 use crate::plan::DrawPlan;
 
@@ -26,7 +27,8 @@ pub struct Recorder<'a> {
     key: u32,
     kernels: HashMap<Kernel, (Arc<Pipeline>, wgpu::BindGroup)>,
     encoder: Option<wgpu::CommandEncoder>,
-    pass: Option<wgpu::ComputePass<'static>>,
+    pass: Option<(DrawStage, wgpu::ComputePass<'static>)>,
+    clock: Option<StageClock>,
     in_flight: Option<mpsc::Receiver<()>>,
 }
 
@@ -63,8 +65,28 @@ impl<'a> Recorder<'a> {
             kernels: HashMap::new(),
             encoder: None,
             pass: None,
+            clock: None,
             in_flight: None,
         }
+    }
+
+    /// Times the stages from now on, where the device can; to be called before the first dispatch.
+    pub fn start_clock(&mut self) {
+        self.clock = StageClock::new(self.gpu, self.buffers);
+    }
+
+    /// Copies the times to `offset` in the staging buffer, of which they take [`StageClock::BYTES`].
+    pub fn copy_times(&mut self, offset: u64) {
+        self.pass = None;
+        if let (Some(clock), Some(to)) = (&self.clock, self.buffers.staging.clone()) {
+            let encoder = self.encoder.get_or_insert_with(|| new_encoder(self.gpu));
+            clock.copy(encoder, &to, offset);
+        }
+    }
+
+    /// The durations of the stages, given the bytes that [`copy_times`](Self::copy_times) has copied.
+    pub fn times(&self, bytes: &[u8]) -> DrawTimes {
+        self.clock.as_ref().map_or_else(DrawTimes::default, |clock| clock.times(bytes))
     }
 
     /// Runs a kernel.
@@ -73,8 +95,8 @@ impl<'a> Recorder<'a> {
             let bound = self.bind(kernel)?;
             self.kernels.insert(kernel, bound);
         }
-        self.begin_pass();
-        if let (Some(pass), Some((pipeline, group))) = (&mut self.pass, self.kernels.get(&kernel)) {
+        self.begin_pass(kernel.stage());
+        if let (Some((_, pass)), Some((pipeline, group))) = (&mut self.pass, self.kernels.get(&kernel)) {
             pass.set_pipeline(&pipeline.pipeline);
             pass.set_bind_group(0, &self.uniforms, &[(batch * BATCH_STRIDE) as u32]);
             pass.set_bind_group(1, group, &[]);
@@ -86,10 +108,8 @@ impl<'a> Recorder<'a> {
     /// Draws the items of the work list: reads its length, then runs the kernel in rounds.
     pub fn tiles_in_rounds(&mut self, kernel: Kernel, batch: &Batch, tiles: &Tiles) -> Result<(), DrawError> {
         let mut counts = [0; 2];
-        let (work, to) = (
-            self.buffers.storage(&self.gpu.handles, Slot::Work)?.clone(),
-            self.buffers.counts(&self.gpu.handles).clone(),
-        );
+        let (work, to) =
+            (self.buffers.storage(&self.gpu.handles, Slot::Work)?, self.buffers.counts(&self.gpu.handles).clone());
         self.encoder().copy_buffer_to_buffer(&work, 0, &to, 0, Some(8));
         self.read(&to, 8, |bytes| counts = bytemuck::pod_read_unaligned(bytes))?;
         let [large, huge] = counts.map(|count: u32| count.min(batch.capacity));
@@ -112,7 +132,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Draws lines in rounds until no thread is paused.
+    /// Draws lines in rounds until no workgroup is paused.
     pub fn lines_in_rounds(&mut self, batch: usize, workgroups: [u32; 2], bytes: u64) -> Result<(), DrawError> {
         self.clear(Slot::Progress, bytes)?;
         loop {
@@ -127,7 +147,7 @@ impl<'a> Recorder<'a> {
     /// Reads one word of a buffer, when all that was recorded is done.
     pub fn read_word(&mut self, slot: Slot, index: u32) -> Result<u32, DrawError> {
         let (from, to) =
-            (self.buffers.storage(&self.gpu.handles, slot)?.clone(), self.buffers.counts(&self.gpu.handles).clone());
+            (self.buffers.storage(&self.gpu.handles, slot)?, self.buffers.counts(&self.gpu.handles).clone());
         self.encoder().copy_buffer_to_buffer(&from, u64::from(index) * 4, &to, 0, Some(4));
         let mut word = 0;
         self.read(&to, 4, |bytes| word = bytemuck::pod_read_unaligned(bytes))?;
@@ -136,14 +156,14 @@ impl<'a> Recorder<'a> {
 
     /// Fills the first `size` bytes of a buffer with zeros.
     pub fn clear(&mut self, slot: Slot, size: u64) -> Result<(), DrawError> {
-        let buffer = self.buffers.storage(&self.gpu.handles, slot)?.clone();
+        let buffer = self.buffers.storage(&self.gpu.handles, slot)?;
         self.encoder().clear_buffer(&buffer, 0, Some(size));
         Ok(())
     }
 
     /// Copies `size` bytes of a buffer, from `first` on, to `offset` in the staging buffer.
     pub fn copy_out(&mut self, slot: Slot, first: u64, size: u64, offset: u64) -> Result<(), DrawError> {
-        let from = self.buffers.storage(&self.gpu.handles, slot)?.clone();
+        let from = self.buffers.storage(&self.gpu.handles, slot)?;
         if let Some(to) = self.buffers.staging.clone() {
             self.encoder().copy_buffer_to_buffer(&from, first, &to, offset, Some(size));
         }
@@ -195,7 +215,7 @@ impl<'a> Recorder<'a> {
         let pipeline = self.gpu.pipelines.get(&self.gpu.handles.device, kernel, self.key);
         let mut bound = Vec::new();
         for &(slot, _) in kernel.buffers() {
-            bound.push((slot, self.buffers.storage(&self.gpu.handles, kernel.bound_at(slot))?.clone()));
+            bound.push((slot, self.buffers.storage(&self.gpu.handles, kernel.bound_at(slot))?));
         }
         let entries: Vec<_> = bound
             .iter()
@@ -209,21 +229,27 @@ impl<'a> Recorder<'a> {
         Ok((pipeline, group))
     }
 
-    fn begin_pass(&mut self) {
-        if self.pass.is_none() {
-            let descriptor = wgpu::ComputePassDescriptor { label: None, timestamp_writes: None };
-            let pass = self.encoder().begin_compute_pass(&descriptor).forget_lifetime();
-            self.pass = Some(pass);
+    /// Begins a pass for a stage, if the stage needs another.
+    fn begin_pass(&mut self, stage: DrawStage) {
+        if self.pass.as_ref().is_some_and(|(of, _)| *of == stage || self.clock.is_none()) {
+            return;
         }
+        self.pass = None;
+        let encoder = self.encoder.get_or_insert_with(|| new_encoder(self.gpu));
+        let timestamp_writes = self.clock.as_mut().and_then(|clock| clock.begin(stage));
+        let descriptor = wgpu::ComputePassDescriptor { label: None, timestamp_writes };
+        self.pass = Some((stage, encoder.begin_compute_pass(&descriptor).forget_lifetime()));
     }
 
     /// The encoder, outside any pass.
     fn encoder(&mut self) -> &mut wgpu::CommandEncoder {
         self.pass = None;
-        self.encoder.get_or_insert_with(|| {
-            self.gpu.handles.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None })
-        })
+        self.encoder.get_or_insert_with(|| new_encoder(self.gpu))
     }
+}
+
+fn new_encoder(gpu: &Gpu) -> wgpu::CommandEncoder {
+    gpu.handles.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None })
 }
 
 /// Uploads batches, a share at a time, into a buffer with room for one more.

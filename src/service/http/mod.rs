@@ -35,6 +35,7 @@ use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 
 use crate::config::{Config, cores};
+use crate::service::warm_up::WarmUp;
 use state::AppState;
 
 /// Time beyond a job's deadline after which the process ends without the jobs that still run.
@@ -93,6 +94,7 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     let router = router::router(&state);
     tracing::info!(%address, workers = config.workers, "ready");
     ready(address);
+    let warm_up = WarmUp::start(&state.gpu, config.backend);
 
     let stop = async {
         tokio::select! {
@@ -107,6 +109,8 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     };
     let header_timeout = Duration::from_millis(config.header_timeout_ms);
     connection::accept::run(listener, router, config.connections as usize, header_timeout, stop).await;
+    warm_up.stop();
+    warm_up.wait(WORKERS_GRACE);
     state.jobs.join(WORKERS_GRACE);
     tracing::info!("ended");
     Ok(())

@@ -23,7 +23,7 @@ pub struct AppState {
     pub schema: StaticDocument,
     /// The job queue and its workers.
     pub jobs: Jobs,
-    /// The process's GPU, opened on first need.
+    /// The process's GPU.
     pub gpu: Arc<GpuHost>,
     /// The memory that uploads share.
     pub upload_budget: Arc<UploadBudget>,
@@ -49,7 +49,7 @@ impl AppState {
             0 => CpuThreads::Shared(Arc::new(DrawingThreads::new(to_usize(cores())))),
             given => CpuThreads::Each(to_usize(given)),
         };
-        let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu())));
+        let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), config.cache_dir.clone()));
         let residents = Arc::new(Residents::new(config.resident_bytes));
         let renderers = pipeline_renderers(gpu.clone(), threads, config.limits.clone(), residents.clone());
         let Limits { queue_per_worker, job_ms, .. } = config.limits;

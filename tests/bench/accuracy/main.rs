@@ -48,7 +48,7 @@ fn main() {
         return write_table();
     }
     let options = options();
-    let gpu = match Gpu::open(GpuKind::Any, AtomicsChoice::Best) {
+    let gpu = match Gpu::open(GpuKind::Any, AtomicsChoice::Best, None) {
         Ok(gpu) => Some(Arc::new(gpu)),
         Err(reason) => {
             println!("CPU alone: {reason}");

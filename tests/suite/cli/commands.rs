@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Output, Stdio};
 
 use crate::support::server::{CUBE_OBJ, Server, meshsnap};
+use crate::support::skip::{Need, skip};
 
 fn run(arguments: &[&str], stdin: &[u8]) -> Output {
     let mut command = meshsnap();
@@ -205,6 +206,42 @@ fn explain_tells_what_was_skipped_and_how_long_it_took() {
         assert!(stderr.contains(part), "{part}: {stderr}");
     }
     assert!(stderr.contains("skipped "), "{stderr}");
+}
+
+/// What a driver makes of shaders is kept, and read again; damage costs time and nothing else.
+#[test]
+fn kept_shaders_change_no_picture() {
+    let folder = std::env::temp_dir().join(format!("meshsnap-shaders-{}", std::process::id()));
+    let cache_dir = folder.to_str().unwrap();
+    let draw = || {
+        run(
+            &["render", "-", "--backend", "gpu", "--size", "32", "--cache-dir", cache_dir, "--explain", "-o", "-"],
+            CUBE_OBJ,
+        )
+    };
+    let first = draw();
+    let said = String::from_utf8(first.stderr).unwrap();
+    if said.contains("there is no GPU to draw on") {
+        skip(Need::Gpu, "Vulkan");
+        return;
+    }
+    assert!(first.status.success() && said.contains("drawn by gpu"), "{said}");
+    for stage in ["  transform", "  visibility", "  shade", "  resolve"] {
+        assert!(said.contains(stage), "{stage}: {said}");
+    }
+    let files: Vec<_> =
+        std::fs::read_dir(&folder).map(|all| all.map(|file| file.unwrap().path()).collect()).unwrap_or_default();
+    assert_eq!(files.len(), 1, "{files:?}");
+    assert!(draw().stdout == first.stdout, "the second start draws another picture");
+    for file in &files {
+        let mut bytes = std::fs::read(file).unwrap();
+        let last = bytes.len() - 1;
+        bytes[last] ^= 1;
+        std::fs::write(file, &bytes).unwrap();
+        assert!(draw().stdout == first.stdout, "a damaged file changes the picture");
+        assert_ne!(std::fs::read(file).unwrap(), bytes, "a damaged file stays");
+    }
+    let _ = std::fs::remove_dir_all(&folder);
 }
 
 #[test]

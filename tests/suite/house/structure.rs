@@ -49,9 +49,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("service/residents", &["service/cache", "pipeline", "limits"]),
     ("service/pictures", &["service/cache", "service/jobs", "backend", "image", "warning"]),
     ("service/store", &["service/jobs", "import", "mesh", "limits"]),
+    ("service/warm_up", &["pipeline", "request", "backend", "spec", "import", "limits"]),
     (
         "service/http",
         &[
+            "service/warm_up",
             "service/store",
             "service/jobs",
             "service/residents",
@@ -119,7 +121,7 @@ const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("memmap2::", &["cli"]),
     ("clap::", &["cli", "main.rs", "config"]),
     ("tokio::", &["service/", "main.rs", "cli", "telemetry"]),
-    ("std::fs", &["cli", "config", "main.rs", "service/http/"]),
+    ("std::fs", &["cli", "config", "main.rs", "service/http/", "backend/gpu/pipelines/file.rs"]),
     ("std::env", &["cli", "config", "main.rs", "telemetry"]),
     ("Instant::now", &["cli", "service/", "telemetry", "main.rs", "backend/cpu/stopwatch.rs"]),
     ("SystemTime", &["cli", "service/", "telemetry", "main.rs"]),

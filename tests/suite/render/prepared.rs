@@ -3,6 +3,7 @@
 use image::ImageFormat;
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use meshsnap::plan::{self, PlanError, Prepared};
@@ -13,11 +14,12 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use crate::render::textures::levels::{encode, model, model_of};
+use crate::support::gpus::gpus;
 use crate::support::scenes::{self, SCENES};
 use crate::support::shapes;
 
 /// Draws a mesh as it was found before, and anew.
-fn is_drawn_alike(cpu: &mut CpuRenderer, mesh: &Mesh, spec: &Spec, prepared: &Prepared, what: &str) {
+fn is_drawn_alike(renderer: &mut dyn Renderer, mesh: &Mesh, spec: &Spec, prepared: &Prepared, what: &str) {
     let (limits, deadline) = (Limits::default(), Deadline::default());
     let (mut fresh, mut warm) = (Budget::new(&limits), Budget::new(&limits));
     let scene = Scene::new(mesh, spec, &mut fresh).unwrap();
@@ -25,7 +27,7 @@ fn is_drawn_alike(cpu: &mut CpuRenderer, mesh: &Mesh, spec: &Spec, prepared: &Pr
     let scene = Scene::new(mesh, spec, &mut warm).unwrap();
     let again = plan::build_from(&scene, prepared, &mut warm, &deadline).unwrap();
     assert_eq!((&again.skips, warm.spent_bytes()), (&plan.skips, fresh.spent_bytes()), "{what}");
-    assert!(cpu.draw(&again, &deadline).unwrap() == cpu.draw(&plan, &deadline).unwrap(), "{what}");
+    assert!(renderer.draw(&again, &deadline).unwrap() == renderer.draw(&plan, &deadline).unwrap(), "{what}");
 }
 
 #[test]
@@ -49,6 +51,42 @@ fn scenes_are_the_same_whatever_is_known() {
         known += usize::from(before > 0);
     }
     assert_eq!((drawn, known), (2 * SCENES.len(), SCENES.len()));
+}
+
+/// From the third picture on, a mesh's lists are on the device already.
+#[test]
+fn what_stays_on_a_gpu_changes_no_pixel() {
+    let Some(gpus) = gpus() else { return };
+    let picture = image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([(x * y) as u8, x as u8, (x ^ y) as u8]));
+    let textured = model_of(&encode(&picture.into(), ImageFormat::Png));
+    let mut meshes = vec![(textured, vec![scenes::spec(&[("style", "smooth"), ("size", "64")])], Prepared::default())];
+    for scene in SCENES.iter().step_by(6) {
+        let outline = scenes::spec(&[("style", "outline"), ("size", "40")]);
+        meshes.push((scenes::mesh(&(scene.obj)()), vec![scene.spec(), outline], Prepared::default()));
+    }
+    let mut drawn = 0;
+    for gpu in gpus {
+        let mut renderer = GpuRenderer::new(gpu.clone());
+        for round in 0..4 {
+            for (mesh, specs, prepared) in &meshes {
+                for spec in specs {
+                    is_drawn_alike(&mut renderer, mesh, spec, prepared, &format!("round {round}"));
+                    drawn += 1;
+                }
+            }
+        }
+    }
+    assert!(drawn >= 4 * (1 + 2 * 6), "{drawn}");
+    assert!(gpus.iter().all(|gpu| gpu.resident_bytes() > 1000), "nothing stayed");
+    // Meshes of one size come and go, so that one lies where another did.
+    let mut renderer = GpuRenderer::new(gpus[0].clone());
+    for i in 0..24 {
+        let prepared = Prepared::default();
+        let mesh = scenes::mesh(&format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 {} 1\nf 1 2 3\nf 1 2 4\n", 1 + i % 5));
+        for _ in 0..3 {
+            is_drawn_alike(&mut renderer, &mesh, &scenes::spec(&[("size", "24")]), &prepared, "a short life");
+        }
+    }
 }
 
 #[test]

@@ -3,11 +3,14 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::GpuKind;
 use meshsnap::backend::{BackendKind, Backends, DrawError, GpuHost, GpuState, HardwareHint, Opener, Renderer as _};
 use meshsnap::limits::Deadline;
+use meshsnap::plan::DrawPlan;
+use meshsnap::service::warm_up::WarmUp;
 use meshsnap::spec::BackendChoice;
 
 use crate::support::fake_gpus::{Act, Machine, Open, job};
@@ -228,6 +231,49 @@ fn workers_share_the_device_and_one_loss_is_one_loss() {
     assert_eq!((machine.opened().len(), machine.0.lock().unwrap().renderers), (2, 12));
     assert_eq!(Arc::strong_count(&device), 1, "nobody holds the lost device");
     check(&mut workers[0], &[(Auto, Ok(ByGpu))]);
+}
+
+/// A device is probed with a number of samples before it first draws with it.
+#[test]
+fn a_gpu_that_is_wrong_with_many_samples_draws_none_of_them() {
+    let machine = Machine::new(&[Open::WrongAtSixteen], &[]);
+    let host = machine.host(HardwareHint::Maybe);
+    let mut backends = Backends::new(host.clone(), 1);
+    check(&mut backends, &[(Auto, Ok(ByGpu))]);
+    assert_eq!(host.status().state, GpuState::Ready);
+    let fine = || DrawPlan { samples: 16, ..job() };
+    let chosen = backends.draw(Auto, &fine(), &Deadline::default()).unwrap();
+    let want = CpuRenderer::new(1).draw(&fine(), &Deadline::default()).unwrap();
+    assert_eq!((chosen.backend, chosen.image), (ByCpu, want));
+    let status = host.status();
+    assert_eq!(status.state, GpuState::Failed);
+    assert!(status.reason.is_some_and(|reason| reason.contains("where samples = 16")));
+    check(&mut backends, &[(Auto, Ok(ByCpu)), (Gpu, Err("where samples = 16"))]);
+    assert_eq!(machine.opened().len(), 1, "it is not opened again");
+}
+
+/// Number of styles.
+const STYLES: usize = 8;
+
+#[test]
+fn a_warm_gpu_has_drawn_every_style() {
+    let machine = Machine::new(&[Open::Hardware], &[]);
+    let warm_up = WarmUp::start(&machine.host(HardwareHint::Maybe), Auto);
+    assert!(warm_up.wait(Duration::from_secs(30)), "it takes too long");
+    let drawn = |machine: &Machine| machine.0.lock().unwrap().drawn_px.iter().filter(|&&px| px == 64).count();
+    assert_eq!((machine.opened(), drawn(&machine)), (vec![GpuKind::Hardware], STYLES));
+    // Without hardware, or need of it, nothing is opened. A software GPU, or none, is left alone.
+    let cases: [(&[Open], HardwareHint, BackendChoice); 4] = [
+        (&[], none(), Auto),
+        (&[], HardwareHint::Maybe, Cpu),
+        (&[Open::Software], HardwareHint::Maybe, Auto),
+        (&[Open::Absent], HardwareHint::Maybe, Gpu),
+    ];
+    for (opens, hint, backend) in cases {
+        let machine = Machine::new(opens, &[]);
+        assert!(WarmUp::start(&machine.host(hint), backend).wait(Duration::from_secs(30)));
+        assert_eq!((machine.opened().len(), drawn(&machine)), (opens.len(), 0), "{opens:?} {backend:?}");
+    }
 }
 
 #[test]

@@ -19,6 +19,8 @@ pub enum Open {
     Software,
     /// Hardware that computes wrong numbers.
     Wrong,
+    /// The same, with 16 samples per pixel alone.
+    WrongAtSixteen,
     /// Hardware that breaks while it is probed.
     Broken,
     Absent,
@@ -46,6 +48,8 @@ pub struct Story {
     opens: VecDeque<Open>,
     acts: VecDeque<Act>,
     opened: Vec<GpuKind>,
+    /// Sides of the pictures that were drawn, pixels.
+    pub drawn_px: Vec<u32>,
     pub devices: Vec<Arc<Fake>>,
     pub renderers: usize,
 }
@@ -143,7 +147,8 @@ impl Renderer for FakeRenderer {
         }
         deadline.check()?;
         let mut image = CpuRenderer::new(1).draw(plan, deadline)?;
-        if matches!(fake.open, Open::Wrong) {
+        fake.machine.0.lock().unwrap().drawn_px.push(plan.width_px);
+        if matches!(fake.open, Open::Wrong) || matches!(fake.open, Open::WrongAtSixteen) && plan.samples == 16 {
             image.rgba[0] ^= 0x80;
         }
         Ok(image)

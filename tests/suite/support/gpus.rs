@@ -13,7 +13,7 @@ use super::skip::{Need, skip};
 pub fn gpus() -> Option<&'static [Arc<Gpu>; 2]> {
     static GPUS: OnceLock<Option<[Arc<Gpu>; 2]>> = OnceLock::new();
     let opened = GPUS.get_or_init(|| {
-        let open = |atomics| Gpu::open(GpuKind::Any, atomics).map(Arc::new);
+        let open = |atomics| Gpu::open(GpuKind::Any, atomics, None).map(Arc::new);
         match (open(AtomicsChoice::Best), open(AtomicsChoice::Force32)) {
             (Ok(best), Ok(force32)) => {
                 println!("GPU: {:?}", best.info());

@@ -52,6 +52,16 @@ impl Kernel {
         }
     }
 
+    /// The kernel in the first of its phases, whose source is that of all.
+    pub fn in_one_phase(self) -> Self {
+        let first = |write: SampleWrite| if write == SampleWrite::Id { SampleWrite::Depth } else { write };
+        match self {
+            Self::Visibility { write, target } => Self::Visibility { write: first(write), target },
+            Self::VisibilityTile { write, target } => Self::VisibilityTile { write: first(write), target },
+            other => other,
+        }
+    }
+
     /// WGSL has no include: a kernel is its files, one after the other.
     pub fn source(self) -> String {
         let keep_nearest = |write: SampleWrite| if write == SampleWrite::Both { SAMPLES_64 } else { SAMPLES_32 };

@@ -1,10 +1,14 @@
 //! The compute pipelines, made when a plan first needs them.
 
 pub(crate) mod bindings;
+pub(crate) mod file;
 pub(crate) mod kernels;
 pub(crate) mod key;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use self::file::PipelineFile;
+use crate::backend::DrawStage;
 
 /// A kernel, in one of its variants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -112,25 +116,60 @@ pub struct Pipeline {
     pub buffers: wgpu::BindGroupLayout,
 }
 
-/// All pipelines of a device so far.
+/// All pipelines of a device so far. Threads that need the same one make it once; different ones are
+/// made side by side.
 #[derive(Default)]
-pub struct PipelineCache {
-    made: Mutex<HashMap<(Kernel, u32), Arc<Pipeline>>>,
+pub struct Pipelines {
+    made: Mutex<HashMap<(Kernel, u32), Arc<OnceLock<Arc<Pipeline>>>>>,
+    /// By kernel, without the phase: its code as wgpu has checked it.
+    modules: Mutex<HashMap<Kernel, Arc<OnceLock<wgpu::ShaderModule>>>>,
+    /// The driver's own form of the pipelines, kept on disk.
+    file: Option<PipelineFile>,
 }
 
-impl PipelineCache {
+impl Pipelines {
+    /// None so far; what the driver makes of them is kept in `file`.
+    pub fn kept_in(file: Option<PipelineFile>) -> Self {
+        Self { file, ..Self::default() }
+    }
+
     /// The pipeline of a kernel for a plan with this key.
     pub fn get(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Arc<Pipeline> {
         let key = key & kernel.key_bits();
-        // The lock is held while compiling, because workers that start together need the same
-        // pipelines.
-        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        made.entry((kernel, key)).or_insert_with(|| Arc::new(kernel.compile(device, key))).clone()
+        let place =
+            Arc::clone(self.made.lock().unwrap_or_else(PoisonError::into_inner).entry((kernel, key)).or_default());
+        Arc::clone(place.get_or_init(|| Arc::new(self.make(device, kernel, key))))
+    }
+
+    /// Those of the kernels that have no pipeline for this key yet.
+    pub fn missing(&self, kernels: &[Kernel], key: u32) -> Vec<Kernel> {
+        let made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_made =
+            |kernel: &Kernel| made.get(&(*kernel, key & kernel.key_bits())).is_some_and(|p| p.get().is_some());
+        kernels.iter().copied().filter(|kernel| !is_made(kernel)).collect()
+    }
+
+    /// Writes the driver's form of all pipelines to disk.
+    pub fn save(&self) {
+        if let Some(file) = &self.file {
+            file.save();
+        }
     }
 
     /// Drops all pipelines; jobs that use one keep it until they end.
     pub fn clear(&self) {
         self.made.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        self.modules.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
+
+    fn make(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Pipeline {
+        let place = Arc::clone(
+            self.modules.lock().unwrap_or_else(PoisonError::into_inner).entry(kernel.in_one_phase()).or_default(),
+        );
+        let module = place.get_or_init(|| kernel.module(device));
+        let pipeline = kernel.compile(device, key, module, self.file.as_ref().map(PipelineFile::cache));
+        tracing::debug!(?kernel, key, "made a pipeline");
+        pipeline
     }
 }
 
@@ -155,10 +194,31 @@ fn layout_entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEnt
 }
 
 impl Kernel {
-    fn compile(self, device: &wgpu::Device, key: u32) -> Pipeline {
-        let label = Some(self.entry());
+    /// The stage that the kernel belongs to.
+    pub fn stage(self) -> DrawStage {
+        match self {
+            Self::Transform => DrawStage::Transform,
+            Self::Visibility { .. } | Self::Clip | Self::VisibilityTile { .. } => DrawStage::Visibility,
+            Self::Composite | Self::Shade => DrawStage::Shade,
+            Self::Holes | Self::Edge | Self::Coverage | Self::LineLight => DrawStage::Lines,
+            Self::Resolve => DrawStage::Resolve,
+        }
+    }
+
+    /// The kernel's code, checked.
+    fn module(self, device: &wgpu::Device) -> wgpu::ShaderModule {
         let source = wgpu::ShaderSource::Wgsl(self.source().into());
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
+        device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(self.entry()), source })
+    }
+
+    fn compile(
+        self,
+        device: &wgpu::Device,
+        key: u32,
+        module: &wgpu::ShaderModule,
+        cache: Option<&wgpu::PipelineCache>,
+    ) -> Pipeline {
+        let label = Some(self.entry());
         let entries: Vec<_> = self.buffers().iter().map(|&(slot, access)| buffer_entry(slot, access)).collect();
         let buffers = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -169,14 +229,14 @@ impl Kernel {
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label,
             layout: Some(&layout),
-            module: &module,
+            module,
             entry_point: label,
             compilation_options: wgpu::PipelineCompilationOptions {
                 constants: &self.constants(key),
                 // The kernels write their workgroup memory before they read it.
                 zero_initialize_workgroup_memory: false,
             },
-            cache: None,
+            cache,
         });
         Pipeline { pipeline, buffers }
     }

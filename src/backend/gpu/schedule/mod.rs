@@ -51,7 +51,7 @@ pub struct Schedule {
     pub layers: u32,
     /// Runs of the tile kernel.
     pub tiles: Tiles,
-    /// Bytes for the state of paused threads of the edge kernel.
+    /// Bytes for the state of paused workgroups of the edge kernel.
     pub progress_bytes: u64,
     /// The result.
     pub goal: Goal,
@@ -102,6 +102,22 @@ impl Schedule {
             schedule.steps.push(Step::EndBand(Band { rows: [first, end] }));
         }
         Ok(schedule)
+    }
+
+    /// The kernels of all steps.
+    pub fn kernels(&self) -> Vec<Kernel> {
+        let mut kernels = Vec::new();
+        for step in &self.steps {
+            let kernel = match *step {
+                Step::Dispatch { kernel, .. } | Step::Tiles { kernel, .. } => kernel,
+                Step::Lines { .. } => Kernel::Edge,
+                _ => continue,
+            };
+            if !kernels.contains(&kernel) {
+                kernels.push(kernel);
+            }
+        }
+        kernels
     }
 
     fn transform(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits) -> Result<(), DrawError> {

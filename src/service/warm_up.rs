@@ -1,0 +1,85 @@
+//! Opens the GPU right after the start and makes the pipelines of every style, so that the first
+//! pictures need not wait for that.
+
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use crate::backend::{Backends, GpuHost, GpuKind};
+use crate::import::Bundle;
+use crate::limits::{Budget, Deadline, Limits};
+use crate::pipeline::{self, Model};
+use crate::request::{self, Rules, Style};
+use crate::spec::BackendChoice;
+use crate::spec::words::Words as _;
+
+/// One triangle. The looks of a plain mesh need no other pipelines; textures, colours, several materials
+/// and other numbers of samples do.
+const MESH: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+/// A thread that warms a GPU up.
+pub struct WarmUp {
+    deadline: Arc<Deadline>,
+    thread: Option<thread::JoinHandle<()>>,
+}
+
+impl WarmUp {
+    /// Starts the thread, unless there is no hardware to warm up, or no request of this default back-end
+    /// would use it. A software GPU is not warmed up: it would take the cores from the requests.
+    pub fn start(gpu: &Arc<GpuHost>, backend: BackendChoice) -> Self {
+        let deadline = Arc::new(Deadline::default());
+        let mut warm_up = Self { deadline: Arc::clone(&deadline), thread: None };
+        if backend != BackendChoice::Cpu && gpu.may_have_hardware() {
+            let gpu = Arc::clone(gpu);
+            match thread::Builder::new().name("warm-up".into()).spawn(move || warm(gpu, &deadline)) {
+                Ok(thread) => warm_up.thread = Some(thread),
+                Err(error) => tracing::warn!(%error, "the GPU is not warmed up"),
+            }
+        }
+        warm_up
+    }
+
+    /// Begins no further style from now on.
+    pub fn stop(&self) {
+        self.deadline.stop();
+    }
+
+    /// Waits until the thread has ended, no longer than `time_max`: a driver may crash if the process ends
+    /// while a thread uses its device, and it may also hang. True if it has ended.
+    pub fn wait(&self, time_max: Duration) -> bool {
+        let began = Instant::now();
+        let is_running = || self.thread.as_ref().is_some_and(|thread| !thread.is_finished());
+        while is_running() && began.elapsed() < time_max {
+            thread::sleep(Duration::from_millis(2));
+        }
+        !is_running()
+    }
+}
+
+fn warm(gpu: Arc<GpuHost>, deadline: &Deadline) {
+    let began = Instant::now();
+    let limits = Limits::default();
+    let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
+    let bundle = Bundle::of_one(MESH.to_vec());
+    let model = match Model::read(&bundle, None, &limits, &mut Budget::new(&limits), deadline) {
+        Ok(model) => model,
+        Err(error) => return tracing::debug!(%error, "the GPU is not warmed up"),
+    };
+    let mut backends = Backends::new(gpu.clone(), 1);
+    for &(style, _) in Style::ALL {
+        let keys = [("style", style), ("size", "64")].map(|(key, value)| (key.to_owned(), value.to_owned()));
+        let Ok(spec) = request::read(None, &keys, &rules) else { continue };
+        let device = gpu.device(GpuKind::Hardware, spec.image.samples);
+        if let (Err(error), Ok(())) = (&device, deadline.check()) {
+            tracing::debug!(%error, "the GPU is not warmed up");
+        }
+        if device.is_err() || deadline.check().is_err() {
+            return;
+        }
+        let drawn = pipeline::draw(&model, &spec, &mut backends, &mut Budget::new(&limits), deadline, &mut |_| ());
+        if let Err(error) = drawn {
+            tracing::debug!(style, %error, "a style was not warmed up");
+        }
+    }
+    tracing::info!(ms = began.elapsed().as_millis(), "the GPU is warm");
+}
