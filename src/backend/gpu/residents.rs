@@ -216,7 +216,8 @@ mod tests {
             residents.keep(Slot::Positions, &sources[i], i as u32);
         };
         let found = |i: usize| residents.find(Slot::Positions, &sources[i]) == Found::Buffer(i as u32);
-        (keep(0), keep(1));
+        keep(0);
+        keep(1);
         assert!(found(1) && found(0));
         keep(2);
         assert!(found(0) && !found(1) && found(2));
@@ -251,7 +252,7 @@ mod tests {
         let values = [1.0_f32; 3];
         let borrowed = SharedSlice::Borrowed(&values[..]);
         assert!(Source::of(&borrowed, None).is_none());
-        let (a, b) = (Arc::new(MeshToken::default()), Arc::new(MeshToken::default()));
+        let (a, b) = (Arc::new(MeshToken), Arc::new(MeshToken));
         let key = |mesh| Source::of(&borrowed, Some(mesh)).unwrap().key(Slot::Positions);
         assert!(key(&a) == key(&a) && key(&a) != key(&b), "another mesh may lie where the first one did");
     }

@@ -116,13 +116,16 @@ pub struct Pipeline {
     pub buffers: wgpu::BindGroupLayout,
 }
 
+/// Things by key, each made by the first thread that needs it.
+type MadeOnce<K, T> = Mutex<HashMap<K, Arc<OnceLock<T>>>>;
+
 /// All pipelines of a device so far. Threads that need the same one make it once; different ones are
 /// made side by side.
 #[derive(Default)]
 pub struct Pipelines {
-    made: Mutex<HashMap<(Kernel, u32), Arc<OnceLock<Arc<Pipeline>>>>>,
+    made: MadeOnce<(Kernel, u32), Arc<Pipeline>>,
     /// By kernel, without the phase: its code as wgpu has checked it.
-    modules: Mutex<HashMap<Kernel, Arc<OnceLock<wgpu::ShaderModule>>>>,
+    modules: MadeOnce<Kernel, wgpu::ShaderModule>,
     /// The driver's own form of the pipelines, kept on disk.
     file: Option<PipelineFile>,
 }

@@ -1,0 +1,106 @@
+//! The GPU: time to its first picture, time of each stage by its own clock, and pictures a second without
+//! encoding, on any number of workers.
+//!
+//!     cargo bench --bench gpu                              # bumpy tori of 70 k and 1 M triangles, 512 px
+//!     cargo bench --bench gpu -- --mesh bunny.obj --size 256 --workers 16 --rounds 200
+
+// A tool for developers: giving up loudly is fine.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+#[allow(dead_code)] // others draw the other meshes
+#[path = "stages/meshes.rs"]
+mod meshes;
+
+use std::sync::Arc;
+use std::thread;
+use std::time::Instant;
+
+use meshes::MeshFile;
+use meshsnap::backend::Renderer as _;
+use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
+use meshsnap::import::{self, Bundle};
+use meshsnap::limits::{Budget, Deadline, Limits};
+use meshsnap::mesh::Mesh;
+use meshsnap::plan::{self, Prepared};
+use meshsnap::request::{self, Rules};
+use meshsnap::scene::Scene;
+use meshsnap::spec::BackendChoice;
+
+const LOOKS: [&str; 3] = ["flat", "wire", "outline"];
+
+fn main() {
+    let (mut file, mut size, mut workers, mut rounds) = (None, "512".to_owned(), 1, 60_usize);
+    let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
+    while let Some(name) = arguments.next() {
+        let value = arguments.next().unwrap_or_else(|| panic!("{name} needs a value"));
+        match name.as_str() {
+            "--mesh" => file = Some(value),
+            "--size" => size = value,
+            "--workers" => workers = value.parse().expect("a number"),
+            "--rounds" => rounds = value.parse().expect("a number"),
+            other => panic!("there is no option {other}"),
+        }
+    }
+    let files = match file {
+        Some(path) => vec![meshes::file(&path)],
+        None => meshes::made()
+            .into_iter()
+            .filter(|file| ["torus 70 k OBJ", "torus 1 M STL"].contains(&&*file.name))
+            .collect(),
+    };
+    let began = Instant::now();
+    let gpu = Arc::new(Gpu::open(GpuKind::Any, AtomicsChoice::Best, None).expect("a GPU"));
+    println!("{}: opened in {:.0} ms; {size} px, {workers} workers", gpu.info().name, ms(began));
+    for file in files {
+        let mesh = read(&file);
+        for look in LOOKS {
+            measure(&gpu, (&file.name, &mesh), (look, &size), workers, rounds.max(1));
+        }
+    }
+}
+
+fn ms(began: Instant) -> f64 {
+    began.elapsed().as_secs_f64() * 1e3
+}
+
+fn read(file: &MeshFile) -> Mesh {
+    let limits = Limits { memory_bytes: 16 << 30, ..Limits::default() };
+    let bundle = Bundle::of_one(file.bytes.clone());
+    import::import(&bundle, None, &limits, &mut Budget::new(&limits), &Deadline::default()).unwrap().mesh
+}
+
+/// Draws one look of a mesh `rounds` times on each worker, and prints a line.
+fn measure(gpu: &Arc<Gpu>, (name, mesh): (&str, &Mesh), (look, size): (&str, &str), workers: usize, rounds: usize) {
+    let limits = Limits { memory_bytes: 16 << 30, ..Limits::default() };
+    let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
+    let keys = [("style", look), ("size", size)].map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let spec = request::read(None, &keys, &Rules { limits: limits.clone(), backend: BackendChoice::Gpu }).unwrap();
+    let scene = Scene::new(mesh, &spec, &mut budget).unwrap();
+    let prepared = Prepared::default();
+    let plan = plan::build_from(&scene, &prepared, &mut budget, &deadline).unwrap();
+    let draw = |renderer: &mut GpuRenderer| {
+        let began = Instant::now();
+        renderer.draw(&plan, &deadline).unwrap();
+        ms(began)
+    };
+    let first = draw(&mut GpuRenderer::new(gpu.clone()));
+    let all = Instant::now();
+    let drawn = thread::scope(|scope| {
+        let worker = || {
+            let mut renderer = GpuRenderer::new(gpu.clone());
+            let least = (0..rounds).map(|_| draw(&mut renderer)).fold(f64::INFINITY, f64::min);
+            (least, renderer.draw_times())
+        };
+        let workers: Vec<_> = (0..workers).map(|_| scope.spawn(worker)).collect();
+        workers.into_iter().map(|worker| worker.join().unwrap()).collect::<Vec<_>>()
+    });
+    let rate = (workers * rounds) as f64 / all.elapsed().as_secs_f64();
+    let (least, times) = drawn.first().expect("a worker");
+    let parts: Vec<String> =
+        times.parts().map(|(stage, took)| format!("{} {:.3}", stage.name(), took.as_secs_f64() * 1e3)).collect();
+    let device: f64 = times.parts().map(|(_, took)| took.as_secs_f64() * 1e3).sum();
+    println!(
+        "{name}, {look}: first {first:.0} ms, least {least:.2} ms, {rate:.0}/s; device {device:.3} ms: {}",
+        parts.join(", ")
+    );
+}
