@@ -153,7 +153,8 @@ impl Gpu {
         }
     }
 
-    /// Makes the pipelines of kernels that have none for this key, on all cores.
+    /// Makes the pipelines of kernels that have none for this key: on all cores, or for a software device
+    /// on this thread alone. Its compiler leaves much memory to each thread that it has run on.
     pub(super) fn make_pipelines(&self, kernels: &[Kernel], key: u32) -> Result<(), DrawError> {
         let missing = self.pipelines.missing(kernels, key);
         if missing.is_empty() {
@@ -168,7 +169,8 @@ impl Gpu {
                 Ok(())
             })
         };
-        let threads = thread::available_parallelism().map_or(1, usize::from).min(missing.len());
+        let cores = thread::available_parallelism().map_or(1, usize::from);
+        let threads = if self.is_software() { 1 } else { cores.min(missing.len()) };
         let result = thread::scope(|scope| {
             // Where the system gives no more threads, the others do all.
             let spawn = |_| thread::Builder::new().name("pipelines".into()).spawn_scoped(scope, make).ok();
