@@ -138,13 +138,8 @@ impl GpuHost {
             Ok(Err(error)) => format!("{}: {error}", device.info().name),
             Err(_) => format!("{}: probing it panicked; the log has more", device.info().name),
         };
-        drop_catching_panics((slot.current.take(), device));
-        slot.failed = Some(reason.clone());
-        self.go_without(reason.clone(), true);
-        self.set_status(|status| {
-            *status = GpuStatus { state: GpuState::Failed, info: None, reason: Some(reason.clone()) }
-        });
-        Err(DrawError::NoGpu(reason))
+        drop_catching_panics((std::mem::take(slot), device));
+        Err(self.not_opened(slot, OpenError::Unusable(reason), GpuKind::Any))
     }
 
     /// Reports that a job found the device lost. True for the first report.

@@ -2,9 +2,8 @@
 //!
 //! In reading order: `device` opens a GPU; `schedule` computes the dispatches for a plan;
 //! `recorder` turns them into commands; `pipelines` holds each kernel's source, bindings and
-//! specialisation; `stage_clock` times the stages; `params` the uniforms, `buffers` a job's memory, `residents` what
-//! stays in memory for the next job, `pass_mask` the passes over
-//! triangles.
+//! specialisation; `stage_clock` times the stages; `params` holds the uniforms, `buffers` a job's memory,
+//! `residents` what stays in memory for the next job, `pass_mask` the passes over triangles.
 //!
 //! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
 //! thread.

@@ -27,8 +27,8 @@ pub struct Source {
 }
 
 impl Source {
-    /// A list in an `Arc` that is kept in more places than one: perhaps by what lives longer than this plan.
-    /// If it does not, nobody asks for the list again.
+    /// A list in an `Arc` that has a holder beside this plan, and so may be drawn again. None if the plan is
+    /// its only holder.
     pub fn of_arc<T: Any + Send + Sync>(list: &Arc<T>, bytes: usize) -> Option<Self> {
         let owner: Arc<Owner> = list.clone();
         let is_kept = Arc::strong_count(list) > 2;

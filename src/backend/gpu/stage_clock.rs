@@ -1,9 +1,10 @@
 //! The duration of each stage on the device, by its own clock.
 
+use std::time::Duration;
+
 use super::buffers::Buffers;
 use super::device::Gpu;
 use crate::backend::{DrawStage, DrawTimes};
-use std::time::Duration;
 
 /// Passes of one job that are timed. A job of more passes has no times.
 const PASSES_MAX: usize = 128;
