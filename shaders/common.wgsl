@@ -86,6 +86,9 @@ struct Batch {
     column_end: i32,
     // Columns beyond the picture, on each side.
     seen_margin: i32,
+    // Size of the largest triangle that a thread draws by itself, 1/256 px. At most 4096, so that edge values
+    // fit 32 bits.
+    alone_size: i32,
 };
 
 // Threads of a workgroup, in every kernel.

@@ -59,8 +59,8 @@ pub fn render_model(
     ended(Stage::Encode);
 
     let warnings = [model.warnings.clone(), drawn.warnings].concat();
-    let Drawn { backend, draw_times, skips, selection, .. } = drawn;
-    Ok(Output { bytes, format, backend, draw_times, skips, warnings, selection })
+    let Drawn { backend, is_substitute, draw_times, skips, selection, .. } = drawn;
+    Ok(Output { bytes, format, backend, is_substitute, draw_times, skips, warnings, selection })
 }
 
 /// Draws a mesh that is in memory already, as often as wanted.
@@ -91,8 +91,8 @@ pub fn draw(
     warnings.extend(plan::undrawn_primitives(&scene));
     warnings.extend(plan::out_of_view(&plan));
     let selection = selected.as_ref().map(|selected| selected.selection.clone());
-    let (skips, Chosen { image, backend, draw_times }) = (plan.skips, drawn);
-    Ok(Drawn { image, backend, draw_times, skips, warnings, selection })
+    let (skips, Chosen { image, backend, draw_times, is_substitute }) = (plan.skips, drawn);
+    Ok(Drawn { image, backend, is_substitute, draw_times, skips, warnings, selection })
 }
 
 /// Reports what is in a file.
@@ -170,6 +170,8 @@ pub struct Output {
     pub format: ImageFormat,
     /// The back-end that drew it.
     pub backend: BackendKind,
+    /// True if the CPU drew it because a GPU that was chosen could not.
+    pub is_substitute: bool,
     /// The durations of the stages of drawing, as far as the back-end times them.
     pub draw_times: DrawTimes,
     /// The parts of drawing that the plan leaves out, with reasons.
@@ -187,6 +189,8 @@ pub struct Drawn {
     pub image: Image,
     /// The back-end that drew it.
     pub backend: BackendKind,
+    /// True if the CPU drew it because a GPU that was chosen could not.
+    pub is_substitute: bool,
     /// The durations of the stages of drawing, as far as the back-end times them.
     pub draw_times: DrawTimes,
     /// The parts of drawing that the plan leaves out, with reasons.

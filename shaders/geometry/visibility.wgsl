@@ -1,11 +1,7 @@
 // Stage visibility, per triangle: the samples that it covers, and its depth at each. Twin of
 // src/backend/cpu/geometry/visibility.rs.
 //
-// A thread draws a triangle of up to 16 x 16 pixels itself; larger ones go to the work list for
-// visibility_tile.wgsl.
-
-// Triangles of this size in 1/256 px have edge values that fit 32 bits.
-const SMALL: i32 = 4096;
+// A thread draws a small triangle itself; larger ones go to the work list for visibility_tile.wgsl.
 
 @compute @workgroup_size(WORKGROUP)
 fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -31,7 +27,7 @@ fn visibility(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgr
     let size_x = max(max(x.x, x.y), x.z) - min(min(x.x, x.y), x.z);
     let size_y = max(max(y.x, y.y), y.z) - min(min(y.x, y.y), y.z);
     let setup = setup_of(v.a, v.b, v.c, area);
-    if max(size_x, size_y) <= SMALL {
+    if max(size_x, size_y) <= batch.alone_size {
         draw_small(setup, bounds, t);
     } else {
         append_work_item(setup, bounds.zw - bounds.xy, t);

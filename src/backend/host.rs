@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::DrawError;
+use super::costs::CostModel;
 use super::device::{GpuDevice, GpuKind, GpuState, GpuStatus, HardwareHint, Opener, drop_catching_panics};
 use super::probe::{ProbeError, probe};
 
@@ -24,6 +25,7 @@ pub struct GpuHost {
     status: Mutex<GpuStatus>,
     /// Jobs in a row that lost the device.
     losses: AtomicU32,
+    costs: CostModel,
 }
 
 #[derive(Default)]
@@ -48,11 +50,11 @@ enum OpenError {
 impl GpuHost {
     /// The host of Vulkan's GPUs, whose pipelines are kept in the folder `cache`. Nothing is loaded yet.
     pub fn new(hint: HardwareHint, cache: Option<PathBuf>) -> Self {
-        Self::with_opener(hint, Box::new(move |kind| open(kind, cache.as_deref())))
+        Self::with_opener(hint, CostModel::learning(), Box::new(move |kind| open(kind, cache.as_deref())))
     }
 
-    /// A host whose devices `open` opens.
-    pub fn with_opener(hint: HardwareHint, open: Box<Opener>) -> Self {
+    /// A host whose devices `open` opens. While one is busy, `costs` says which jobs it gets.
+    pub fn with_opener(hint: HardwareHint, costs: CostModel, open: Box<Opener>) -> Self {
         let status = match &hint {
             HardwareHint::None { reason } => {
                 GpuStatus { state: GpuState::None, info: None, reason: Some(reason.clone()) }
@@ -64,7 +66,8 @@ impl GpuHost {
             tracing::info!(reason, "no hardware GPU: `auto` means the CPU");
             let _ = without.set(reason);
         }
-        Self { open, without, device: Mutex::default(), status: Mutex::new(status), losses: AtomicU32::new(0) }
+        let (device, status) = (Mutex::default(), Mutex::new(status));
+        Self { open, without, device, status, losses: AtomicU32::new(0), costs }
     }
 
     /// The status. Does not wait for an opening.
@@ -75,6 +78,11 @@ impl GpuHost {
             status.reason = status.reason.map(|reason| format!("`auto` means the CPU all the same: {reason}"));
         }
         status
+    }
+
+    /// The costs of drawing here.
+    pub(super) fn costs(&self) -> &CostModel {
+        &self.costs
     }
 
     /// True as long as `auto` may choose a GPU.

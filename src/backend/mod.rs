@@ -3,12 +3,13 @@
 //!
 //! Each stage is written twice, in twins of the same name: `shaders/ROOM/NAME.wgsl` and
 //! `src/backend/cpu/ROOM/NAME.rs`. The module's tests hold the constants, structs and bindings that
-//! the two share. `select` chooses a back-end per job, `host` owns the process's GPU, and
-//! [`probe`] checks a GPU before it is used.
+//! the two share. `select` chooses a back-end per job, by `costs` where both could draw it; `host`
+//! owns the process's GPU, and [`probe`] checks a GPU before it is used.
 //!
 //! **Invariant:** nothing here imports a mesh or a scene, and the two back-ends do not import each
 //! other.
 
+mod costs;
 pub mod cpu;
 mod device;
 mod draw_times;
@@ -19,6 +20,7 @@ pub mod probe;
 pub(crate) mod sample_partition;
 mod select;
 
+pub use costs::CostModel;
 pub use device::{GpuDevice, GpuInfo, GpuKind, GpuState, GpuStatus, HardwareHint, Opener};
 pub use draw_times::{DrawStage, DrawTimes};
 pub use host::GpuHost;

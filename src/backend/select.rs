@@ -3,6 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 
+use super::costs::PlanSize;
 use super::device::{GpuDevice, GpuKind, drop_catching_panics};
 #[cfg(feature = "gpu")]
 use super::gpu;
@@ -30,6 +31,8 @@ pub struct Chosen {
     pub backend: BackendKind,
     /// The durations of its stages, as far as the back-end times them.
     pub draw_times: DrawTimes,
+    /// True if the CPU drew it because a GPU that was chosen could not.
+    pub is_substitute: bool,
 }
 
 impl Backends {
@@ -58,15 +61,19 @@ impl Backends {
         match choice {
             BackendChoice::Cpu => self.draw_on_cpu(plan, deadline),
             BackendChoice::Gpu => self.draw_on_gpu(GpuKind::Any, plan, deadline),
+            BackendChoice::Auto if self.has_gpu() && self.host.costs().prefers_cpu(PlanSize::of(plan)) => {
+                self.draw_on_cpu(plan, deadline)
+            }
             BackendChoice::Auto => match self.draw_on_gpu(GpuKind::Hardware, plan, deadline) {
                 Ok(chosen) => Ok(chosen),
                 Err(DrawError::Stopped(stopped)) => Err(stopped.into()),
                 Err(error) => {
-                    // A missing GPU is not logged again: the host has logged it.
-                    if !matches!(error, DrawError::NoGpu(_)) {
+                    // Where there is no GPU, the CPU takes nobody's place. The host has logged it.
+                    let is_substitute = !matches!(error, DrawError::NoGpu(_));
+                    if is_substitute {
                         tracing::warn!(%error, "the CPU draws this job");
                     }
-                    self.draw_on_cpu(plan, deadline)
+                    Ok(Chosen { is_substitute, ..self.draw_on_cpu(plan, deadline)? })
                 }
             },
         }
@@ -86,8 +93,9 @@ impl Backends {
     }
 
     fn draw_on_cpu(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Chosen, DrawError> {
-        let image = self.cpu.draw(plan, deadline)?;
-        Ok(Chosen { image, backend: self.cpu.kind(), draw_times: self.cpu.draw_times() })
+        let draw = || self.cpu.draw(plan, deadline);
+        let image = self.host.costs().timed(BackendKind::Cpu, PlanSize::of(plan), draw)?;
+        Ok(Chosen { image, backend: self.cpu.kind(), draw_times: self.cpu.draw_times(), is_substitute: false })
     }
 
     /// Draws on the GPU; where that is lost, once more on a fresh one.
@@ -100,7 +108,7 @@ impl Backends {
                 drawn
             }
         };
-        Ok(Chosen { image, backend: BackendKind::Gpu, draw_times })
+        Ok(Chosen { image, backend: BackendKind::Gpu, draw_times, is_substitute: false })
     }
 
     fn try_gpu(
@@ -123,7 +131,9 @@ impl Backends {
             drop_catching_panics(self.gpu.take());
         }
         let device = found?;
-        let result = self.draw_on(&device, plan, deadline);
+        let host = self.host.clone();
+        let draw = || self.draw_on(&device, plan, deadline);
+        let result = host.costs().timed(BackendKind::Gpu, PlanSize::of(plan), draw);
         if let Err(DrawError::DeviceLost(reason)) = &result {
             // Workers that share a device lose it together, which counts as one loss.
             if self.host.note_lost(&device, reason) && attempt == Attempt::First {

@@ -30,6 +30,15 @@ pub struct Resident {
     pub budget: Budget,
 }
 
+/// A mesh that a job draws.
+#[derive(Debug)]
+pub struct Found {
+    /// The mesh.
+    pub resident: Arc<Resident>,
+    /// True if it was in memory; false if this job has read it.
+    pub was_kept: bool,
+}
+
 /// The meshes in memory. One cap holds for the bytes of all that are kept. What a picture adds to a mesh
 /// counts from the picture's end on, and a mesh that a job draws when it has to make room is that job's
 /// memory until the job ends.
@@ -74,18 +83,18 @@ impl Residents {
         key: &str,
         deadline: &Deadline,
         read: impl FnOnce() -> Result<Resident, RenderError>,
-    ) -> Result<Arc<Resident>, RenderError> {
+    ) -> Result<Found, RenderError> {
         if self.bytes == 0 {
-            return read().map(Arc::new);
+            return read().map(|read| Found { resident: Arc::new(read), was_kept: false });
         }
         loop {
             match self.cache.get_value_or_guard(key, Some(WAIT)) {
-                GuardResult::Value(kept) => return Ok(kept.resident),
+                GuardResult::Value(kept) => return Ok(Found { resident: kept.resident, was_kept: true }),
                 GuardResult::Guard(guard) => {
                     let resident = Arc::new(read()?);
                     // An error says that it was removed in the meantime.
                     let _ = guard.insert(Kept::new(&resident));
-                    return Ok(resident);
+                    return Ok(Found { resident, was_kept: false });
                 }
                 GuardResult::Timeout => deadline.check()?,
             }

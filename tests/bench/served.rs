@@ -8,10 +8,30 @@ use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+/// An answer to a request.
+pub struct Answer {
+    pub status: u16,
+    /// The status line and the headers, in lower case.
+    head: String,
+    pub body: Vec<u8>,
+}
+
+impl Answer {
+    /// A header, whose name is given in lower case.
+    pub fn header(&self, name: &str) -> Option<&str> {
+        self.head.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": ")).map(str::trim)
+    }
+}
+
 /// Starts a server on the CPU with more arguments. Its address.
 pub fn start(more: &[String]) -> (Child, String) {
+    start_on("cpu", more)
+}
+
+/// Starts a server on a back-end with more arguments. Its address.
+pub fn start_on(backend: &str, more: &[String]) -> (Child, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_meshsnap"));
-    command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu", "--log", "warn"]).args(more);
+    command.args(["serve", "--listen", "127.0.0.1:0", "--backend", backend, "--log", "warn"]).args(more);
     let mut child = command.stdout(Stdio::piped()).spawn().expect("the server starts");
     let mut line = String::new();
     BufReader::new(child.stdout.take().expect("a pipe")).read_line(&mut line).expect("the server says where it is");
@@ -21,6 +41,11 @@ pub fn start(more: &[String]) -> (Child, String) {
 
 /// Sends a request, on the open connection if there is one. The answer's status and body.
 pub fn exchange(stream: &mut Option<TcpStream>, address: &str, request: &[u8]) -> std::io::Result<(u16, Vec<u8>)> {
+    ask(stream, address, request).map(|answer| (answer.status, answer.body))
+}
+
+/// Sends a request, on the open connection if there is one.
+pub fn ask(stream: &mut Option<TcpStream>, address: &str, request: &[u8]) -> std::io::Result<Answer> {
     let stream = match stream {
         Some(stream) => stream,
         None => {
@@ -33,7 +58,7 @@ pub fn exchange(stream: &mut Option<TcpStream>, address: &str, request: &[u8]) -
     stream.write_all(request)?;
     let mut answer = Vec::new();
     let mut chunk = [0; 16 * 1024];
-    let (end, length) = loop {
+    let (end, head, length) = loop {
         let count = stream.read(&mut chunk)?;
         if count == 0 {
             return Err(std::io::ErrorKind::UnexpectedEof.into());
@@ -42,14 +67,14 @@ pub fn exchange(stream: &mut Option<TcpStream>, address: &str, request: &[u8]) -
         if let Some(end) = answer.windows(4).position(|w| w == b"\r\n\r\n") {
             let head = String::from_utf8_lossy(&answer[..end]).to_ascii_lowercase();
             let length = head.lines().find_map(|l| l.strip_prefix("content-length: ")?.trim().parse::<usize>().ok());
-            break (end + 4, length.unwrap_or(0));
+            break (end + 4, head, length.unwrap_or(0));
         }
     };
     let mut rest = vec![0; (end + length).saturating_sub(answer.len())];
     stream.read_exact(&mut rest)?;
-    let status = String::from_utf8_lossy(&answer[..end]).split(' ').nth(1).and_then(|s| s.parse().ok());
+    let status = head.split(' ').nth(1).and_then(|status| status.parse().ok());
     let body = [&answer[end..], &rest].concat();
-    Ok((status.ok_or(std::io::ErrorKind::InvalidData)?, body))
+    Ok(Answer { status: status.ok_or(std::io::ErrorKind::InvalidData)?, head, body })
 }
 
 /// Resident memory of a process.

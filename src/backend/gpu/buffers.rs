@@ -3,6 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::handles::Handles;
+use super::params::Batch;
 use super::residents::Source;
 use crate::backend::DrawError;
 use crate::backend::gpu::pipelines::{SLOTS, Slot};
@@ -12,6 +13,9 @@ const SET_BYTES_MAX: u64 = 256 << 20;
 
 /// Largest memory of all kept sets, bytes: on a software implementation it is the process's memory.
 const KEPT_BYTES_MAX: u64 = 2 * SET_BYTES_MAX;
+
+/// Longest input that is remembered, so that it is not written again where the next job has the same.
+const REMEMBERED_BYTES_MAX: usize = 8 << 10;
 
 /// Smallest buffer: a binding may not be empty, and a struct must fit in.
 const SIZE_MIN: u64 = 256;
@@ -27,6 +31,17 @@ impl SpareBuffers {
     /// A set for a job.
     pub fn take(&self) -> Buffers {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
+    }
+
+    /// Frees all sets.
+    pub fn clear(&self) {
+        let freed = std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner));
+        drop(freed);
+    }
+
+    /// Memory of all sets, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).iter().map(Buffers::bytes).sum()
     }
 
     /// A set that a finished job used. It is not kept where it, or all sets together, would be too
@@ -45,6 +60,10 @@ impl SpareBuffers {
 #[derive(Default)]
 pub struct Buffers {
     storage: [Option<wgpu::Buffer>; SLOTS],
+    /// The bytes with which a slot's own buffer begins, if they were [uploaded](Self::upload) and are short:
+    /// colour thresholds, materials and such are often those of the last job. No kernel writes to what is
+    /// uploaded.
+    known: [Vec<u8>; SLOTS],
     /// Buffers of others that the current job reads in the place of these.
     bound: [Option<wgpu::Buffer>; SLOTS],
     /// Buffers that the current job has filled, to be kept for others if it succeeds.
@@ -53,6 +72,10 @@ pub struct Buffers {
     pub frame: Option<wgpu::Buffer>,
     /// Uniforms of the dispatches.
     pub batches: Option<wgpu::Buffer>,
+    /// Those with which `batches` begins, if they are known.
+    pub known_batches: Vec<Batch>,
+    /// The last job's uniforms of a plan and of the dispatches, and what binds them.
+    pub uniforms: Option<(wgpu::Buffer, wgpu::Buffer, wgpu::BindGroup)>,
     /// Buffer from which the CPU reads results.
     pub staging: Option<wgpu::Buffer>,
     /// Buffer from which the CPU reads the work list's length.
@@ -99,7 +122,14 @@ impl Buffers {
 
     /// Reserves and fills a buffer. The length is rounded up to whole words with zeros.
     pub fn upload(&mut self, gpu: &Handles, slot: Slot, bytes: &[u8]) -> Result<(), DrawError> {
-        let buffer = self.reserve(gpu, slot, bytes.len().next_multiple_of(4) as u64)?;
+        let size = bytes.len().next_multiple_of(4) as u64;
+        let has_room = self.storage[slot as usize].as_ref().is_some_and(|buffer| buffer.size() >= size);
+        if has_room && !bytes.is_empty() && self.known[slot as usize] == bytes {
+            return Ok(());
+        }
+        let is_short = bytes.len() <= REMEMBERED_BYTES_MAX;
+        self.known[slot as usize] = if is_short { bytes.to_vec() } else { Vec::new() };
+        let buffer = self.reserve(gpu, slot, size)?;
         let (words, rest) = bytes.split_at(bytes.len() & !3);
         if !words.is_empty() {
             gpu.queue.write_buffer(buffer, 0, words);
@@ -114,6 +144,7 @@ impl Buffers {
 
     /// Reserves a buffer and fills it with slices of whole words, one after the other.
     pub fn upload_slices(&mut self, gpu: &Handles, slot: Slot, parts: &[&[u8]]) -> Result<(), DrawError> {
+        self.known[slot as usize].clear();
         let buffer = self.reserve(gpu, slot, parts.iter().map(|part| part.len() as u64).sum())?;
         write_slices(gpu, buffer, parts);
         Ok(())
@@ -122,6 +153,7 @@ impl Buffers {
     /// Reserves a buffer and fills it with whole words from a place on; what is before them is for
     /// a kernel to write.
     pub fn upload_at(&mut self, gpu: &Handles, slot: Slot, at: u64, bytes: &[u8]) -> Result<(), DrawError> {
+        self.known[slot as usize].clear();
         let buffer = self.reserve(gpu, slot, at + bytes.len() as u64)?;
         if !bytes.is_empty() {
             gpu.queue.write_buffer(buffer, at, bytes);

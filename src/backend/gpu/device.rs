@@ -3,13 +3,14 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
-use std::sync::{Arc, OnceLock, mpsc};
+use std::sync::{Arc, Mutex, OnceLock, mpsc};
 use std::thread;
 use std::time::Duration;
 
 use super::buffers::SpareBuffers;
 use super::handles::Handles;
 use super::residents::ResidentBuffers;
+use super::submissions::Submissions;
 use crate::backend::gpu::pipelines::file::PipelineFile;
 use crate::backend::gpu::pipelines::{Kernel, Pipelines};
 use crate::backend::{DrawError, GpuDevice, GpuInfo, GpuKind, Renderer};
@@ -29,6 +30,7 @@ pub struct Gpu {
     pub(super) handles: Handles,
     pub(super) pipelines: Pipelines,
     pub(super) spare_buffers: SpareBuffers,
+    pub(super) submissions: Submissions,
     pub(super) residents: ResidentBuffers<wgpu::Buffer>,
     pub(super) int64_atomics: bool,
     /// Nanoseconds of a step of its clock, if it has one.
@@ -36,6 +38,19 @@ pub struct Gpu {
     info: GpuInfo,
     lost: Lost,
     jobs_ended: AtomicU32,
+    /// Held by the thread that polls.
+    polling: Mutex<()>,
+    /// Renderers that draw on it.
+    renderers: AtomicUsize,
+    /// Jobs that it is drawing.
+    jobs: AtomicUsize,
+}
+
+/// A job that a device draws, until this is dropped.
+pub(super) struct Drawing<'a> {
+    jobs: &'a AtomicUsize,
+    /// True if no other job was there when this one began.
+    pub is_alone: bool,
 }
 
 /// Jobs after which a software device gets new pipelines. llvmpipe compiles a kernel anew for every
@@ -111,12 +126,16 @@ impl Gpu {
             handles: Handles { device, queue, limits },
             pipelines: Pipelines::kept_in(file),
             spare_buffers: SpareBuffers::default(),
+            submissions: Submissions::default(),
             residents: ResidentBuffers::new(if is_software { RESIDENT_BYTES_SOFTWARE } else { RESIDENT_BYTES }),
             int64_atomics,
             clock_step_ns,
             info,
             lost,
             jobs_ended: AtomicU32::new(0),
+            polling: Mutex::new(()),
+            renderers: AtomicUsize::new(0),
+            jobs: AtomicUsize::new(0),
         })
     }
 
@@ -128,6 +147,29 @@ impl Gpu {
     /// Memory on the device for what meshes bring, kept for the next pictures, bytes.
     pub fn resident_bytes(&self) -> u64 {
         self.residents.bytes()
+    }
+
+    /// Memory on the device for the buffers of jobs, kept for the next ones, bytes. None is kept without a
+    /// renderer.
+    pub fn spare_bytes(&self) -> u64 {
+        self.spare_buffers.bytes()
+    }
+
+    /// Counts a job.
+    pub(super) fn begin_job(&self) -> Drawing<'_> {
+        Drawing { jobs: &self.jobs, is_alone: self.jobs.fetch_add(1, Ordering::Relaxed) == 0 }
+    }
+
+    /// To be called for each new renderer.
+    pub(super) fn renderer_made(&self) {
+        self.renderers.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// To be called when a renderer is dropped.
+    pub(super) fn renderer_dropped(&self) {
+        if self.renderers.fetch_sub(1, Ordering::AcqRel) == 1 {
+            self.spare_buffers.clear();
+        }
     }
 
     /// The reason if the device is lost.
@@ -189,20 +231,11 @@ impl Gpu {
         Ok(())
     }
 
-    /// Runs `work` and turns the device's errors on this thread into an error.
+    /// Runs `work` and turns the device's errors on this thread into an error: its loss, above all.
     pub(super) fn scoped<T>(&self, work: impl FnOnce() -> Result<T, DrawError>) -> Result<T, DrawError> {
-        use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
-        let [a, b, c] = [Internal, OutOfMemory, Validation].map(|filter| self.handles.device.push_error_scope(filter));
-        let result = work();
-        // Innermost first. On wgpu's own back-ends these futures are ready at once.
-        let errors = [c, b, a].map(|scope| pollster::block_on(scope.pop()));
+        let result = self.handles.scoped(work);
         self.check()?;
-        // Whatever went wrong first on the device is the cause of what `work` saw.
-        match (errors.into_iter().flatten().next(), result) {
-            (_, Err(DrawError::Stopped(stopped))) => Err(DrawError::Stopped(stopped)),
-            (Some(error), _) => Err(DrawError::Device(error.to_string())),
-            (None, result) => result,
-        }
+        result
     }
 
     /// Waits until a callback of the device has sent a value, and polls the deadline meanwhile.
@@ -216,12 +249,7 @@ impl Gpu {
         while waited < HUNG_AFTER {
             deadline.check()?;
             self.check()?;
-            // Real device loss panics inside poll, whatever handlers are set.
-            match catch_unwind(AssertUnwindSafe(|| self.handles.device.poll(wgpu::PollType::Poll))) {
-                Ok(Ok(_)) => {}
-                Ok(Err(error)) => return Err(DrawError::Device(error.to_string())),
-                Err(_) => return Err(self.declare_lost("polling it failed")),
-            }
+            self.poll()?;
             polls += 1;
             let pause = if polls <= EAGER_POLLS { Duration::ZERO } else { (waited / 8).clamp(PAUSE_MIN, PAUSE_MAX) };
             // Another worker's poll may run our callback: then this wakes up at once.
@@ -235,9 +263,27 @@ impl Gpu {
         Err(self.declare_lost("it did not answer for two minutes"))
     }
 
+    /// Runs the callbacks that are due, unless another thread is at it: its polls run ours too, and many
+    /// that poll at once hold up those that submit.
+    fn poll(&self) -> Result<(), DrawError> {
+        let Ok(_polling) = self.polling.try_lock() else { return Ok(()) };
+        // Real device loss panics inside poll, whatever handlers are set.
+        match catch_unwind(AssertUnwindSafe(|| self.handles.device.poll(wgpu::PollType::Poll))) {
+            Ok(Ok(_)) => Ok(()),
+            Ok(Err(error)) => Err(DrawError::Device(error.to_string())),
+            Err(_) => Err(self.declare_lost("polling it failed")),
+        }
+    }
+
     /// Marks the device as lost.
     pub(super) fn declare_lost(&self, reason: &str) -> DrawError {
         DrawError::DeviceLost(self.lost.get_or_init(|| reason.to_owned()).clone())
+    }
+}
+
+impl Drop for Drawing<'_> {
+    fn drop(&mut self) {
+        self.jobs.fetch_sub(1, Ordering::Relaxed);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The wgpu back-end: the CPU's stages as compute shaders, headless.
 //!
 //! In reading order: `device` opens a GPU; `schedule` computes the dispatches for a plan;
-//! `recorder` turns them into commands; `pipelines` holds each kernel's source, bindings and
+//! `recorder` turns them into commands, `submissions` hands them over; `pipelines` holds each kernel's source, bindings and
 //! specialisation; `stage_clock` times the stages; `params` holds the uniforms, `buffers` a job's memory,
 //! `residents` what stays in memory for the next job, `pass_mask` the passes over triangles.
 //!
@@ -18,6 +18,7 @@ mod recorder;
 mod residents;
 pub(super) mod schedule;
 mod stage_clock;
+mod submissions;
 
 use std::sync::Arc;
 
@@ -59,6 +60,7 @@ pub struct GpuRenderer {
 impl GpuRenderer {
     /// A renderer on an opened GPU.
     pub fn new(gpu: Arc<Gpu>) -> Self {
+        gpu.renderer_made();
         Self { gpu, draw_times: DrawTimes::default() }
     }
 
@@ -128,6 +130,12 @@ impl GpuRenderer {
     }
 }
 
+impl Drop for GpuRenderer {
+    fn drop(&mut self) {
+        self.gpu.renderer_dropped();
+    }
+}
+
 impl Renderer for GpuRenderer {
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
         match self.draw_once(plan, deadline) {
@@ -162,6 +170,7 @@ impl GpuRenderer {
         }
         let times_at = size.next_multiple_of(8);
         let mut times = DrawTimes::default();
+        let drawing = self.gpu.begin_job();
         self.job(|gpu, buffers| {
             let schedule = Schedule::new(plan, &traits(gpu), Goal::Picture)?;
             gpu.make_pipelines(&schedule.kernels(), pipeline_key(plan))?;
@@ -169,7 +178,9 @@ impl GpuRenderer {
             upload_shading(gpu, buffers, plan, &schedule)?;
             buffers.staging(&gpu.handles, times_at + StageClock::BYTES)?;
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
-            recorder.start_clock();
+            if drawing.is_alone {
+                recorder.start_clock();
+            }
             execute(&mut recorder, plan, &schedule, |recorder, Band { rows: [first, end] }| {
                 let to = u64::from(first) * row_bytes;
                 recorder.copy_out(Slot::Rgba, 0, u64::from(end - first) * row_bytes, to)?;
@@ -179,7 +190,8 @@ impl GpuRenderer {
                 recorder.submit()
             })?;
             let mut stamps = Vec::new();
-            recorder.read_staging(times_at + StageClock::BYTES, |bytes| {
+            let read = if drawing.is_alone { times_at + StageClock::BYTES } else { times_at };
+            recorder.read_staging(read, |bytes| {
                 let (picture, after) = bytes.split_at(times_at as usize);
                 image.rgba = picture[..size as usize].to_vec();
                 stamps = after.to_vec();

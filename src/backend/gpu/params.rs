@@ -72,6 +72,7 @@ pub struct Batch {
     pub column_first: i32,
     pub column_end: i32,
     pub seen_margin: i32,
+    pub alone_size: i32,
 }
 
 /// Bits of [`Batch::line_flags`].

@@ -182,6 +182,10 @@ impl From<Refusal> for ApiError {
                 let error = Self::new(Fault::Busy, "queue_full", detail);
                 error.flag("--queue").retry_after(retry_after_s)
             }
+            Refusal::TooLate { retry_after_s, .. } => {
+                let error = Self::new(Fault::Busy, "too_late", detail);
+                error.flag("--limit-job-ms").retry_after(retry_after_s)
+            }
             Refusal::Draining => Self::draining(detail),
         }
     }

@@ -15,6 +15,9 @@ use crate::service::pictures::Pictures;
 use crate::service::residents::Residents;
 use crate::service::store::Store;
 
+/// Time without work after which a worker frees the memory in which it draws.
+const IDLE_TIME: Duration = Duration::from_secs(10);
+
 /// The state that all handlers share.
 pub struct AppState {
     /// The limits and defaults by which request documents are read.
@@ -56,6 +59,7 @@ impl AppState {
         let settings = JobSettings {
             workers: to_usize(config.workers),
             queue: to_usize(queue_per_worker.saturating_mul(config.workers)),
+            idle_time: IDLE_TIME,
             job_time: Duration::from_millis(job_ms),
             result_ttl: Duration::from_millis(config.result_ttl_ms),
             result_bytes: config.result_bytes,

@@ -69,7 +69,12 @@ pub enum Task {
 #[derive(Debug)]
 pub enum Product {
     /// The outcome of [`Task::Draw`].
-    Picture(Box<Output>),
+    Picture {
+        /// The picture.
+        output: Box<Output>,
+        /// True if its mesh was in memory.
+        mesh_was_kept: bool,
+    },
     /// The outcome of [`Task::Inspect`], as JSON.
     Report(String),
 }
@@ -100,10 +105,14 @@ pub struct Finished {
     pub format: ImageFormat,
     /// The back-end that drew it.
     pub backend: BackendKind,
+    /// True if the CPU drew it because a GPU that was chosen could not.
+    pub is_substitute: bool,
     /// Faults of the file in spite of which it was drawn.
     pub warnings: Vec<Warning>,
     /// The techniques chosen for a request with a quality target.
     pub selection: Option<QualitySelection>,
+    /// True if the mesh was in memory as it is drawn, so that nothing was read.
+    pub mesh_was_kept: bool,
     /// The duration of each stage.
     pub timings: Timings,
     /// The durations of the stages of drawing, as far as the back-end times them.
@@ -113,8 +122,18 @@ pub struct Finished {
 impl Finished {
     /// Takes over the pipeline's output.
     pub fn new(output: Output, timings: Timings) -> Self {
-        let Output { bytes, format, backend, draw_times, warnings, selection, .. } = output;
-        Self { picture: bytes.into(), format, backend, warnings, selection, timings, draw_times }
+        let Output { bytes, format, backend, is_substitute, draw_times, warnings, selection, .. } = output;
+        Self {
+            picture: bytes.into(),
+            format,
+            backend,
+            is_substitute,
+            warnings,
+            selection,
+            mesh_was_kept: false,
+            timings,
+            draw_times,
+        }
     }
 }
 
@@ -204,13 +223,17 @@ pub struct Job {
     pub accepted_unix_ms: u64,
     /// Number in the order of acceptance.
     pub(super) serial: u64,
+    /// The time for which it will occupy a worker, as far as is known.
+    pub(super) estimate: Duration,
+    /// Its place in the queue: a time since the registry's beginning.
+    pub(super) rank: Duration,
     pub(super) deadline: Deadline,
     pub(super) state: watch::Sender<JobState>,
     work: Mutex<Option<Work>>,
 }
 
 impl Job {
-    pub(super) fn new(work: Work, is_kept: bool, serial: u64) -> Self {
+    pub(super) fn new(work: Work, is_kept: bool, serial: u64, estimate: Duration, rank: Duration) -> Self {
         let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Self {
             id: JobId::new(),
@@ -218,6 +241,8 @@ impl Job {
             accepted: Instant::now(),
             accepted_unix_ms: u64::try_from(since_1970.as_millis()).unwrap_or(u64::MAX),
             serial,
+            estimate,
+            rank,
             deadline: Deadline::default(),
             state: watch::Sender::new(JobState::Queued),
             work: Mutex::new(Some(work)),

@@ -5,10 +5,11 @@
 //! dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
 //!
 //! Reading order: [`job`] (one job and its states), [`registry`] (all jobs, behind one lock),
-//! [`worker`] (does the jobs), [`clock`] (ends overdue jobs), [`upload_budget`] (memory of
-//! uploads).
+//! [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs),
+//! [`upload_budget`] (memory of uploads).
 
 mod clock;
+mod estimates;
 mod job;
 mod registry;
 #[cfg(test)]
@@ -33,6 +34,8 @@ pub struct JobSettings {
     pub workers: usize,
     /// Most jobs that wait, over all workers.
     pub queue: usize,
+    /// Time without work after which a worker drops its renderer, and with it the memory in which it draws.
+    pub idle_time: Duration,
     /// Longest time from acceptance to the encoded picture.
     pub job_time: Duration,
     /// Time for which the result of a kept job can be fetched.
@@ -54,6 +57,19 @@ pub enum Refusal {
         /// Seconds until a place should be free.
         retry_after_s: u64,
     },
+    /// The jobs that were accepted before would leave too little time.
+    #[error(
+        "the work that was accepted before takes about {wait_ms} ms, and this job had to end within {limit_ms} ms; \
+         try again in {retry_after_s} s"
+    )]
+    TooLate {
+        /// Time until a worker would be free, as far as is known.
+        wait_ms: u64,
+        /// The longest time that a job may take, waiting included.
+        limit_ms: u64,
+        /// Seconds until there should be time enough.
+        retry_after_s: u64,
+    },
     /// The process shuts down.
     #[error("the server is shutting down and takes no new work")]
     Draining,
@@ -66,6 +82,8 @@ pub struct JobLoad {
     pub queued: usize,
     /// Number of busy workers.
     pub running: usize,
+    /// Time after which a job that is accepted now would begin, as far as is known.
+    pub wait: Duration,
     /// Number of ended jobs that can be found by their ids.
     pub kept: usize,
     /// Encoded bytes of their results.

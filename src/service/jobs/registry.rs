@@ -5,6 +5,11 @@
 //!
 //! The queue is not a channel, because a cancelled or overdue job must leave it at once and free
 //! its place and its memory.
+//!
+//! Short jobs overtake long ones: a job ranks as if it had been accepted later by [`PATIENCE`] times its
+//! estimate, at most a quarter of the time that a job may take. A job is refused that would not begin and
+//! end within the other three quarters. So an accepted job ends in time, as far as the estimates are right:
+//! only what is accepted in the first quarter of its time can overtake it.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -12,12 +17,19 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
+use super::estimates::{Estimates, Size};
 use super::job::{Job, JobId, JobState, Work};
 use super::{JobLoad, JobSettings, Refusal};
+
+/// The rank that a job loses for each second of its estimate, seconds.
+const PATIENCE: u32 = 4;
 
 /// All jobs, and the conditions that threads wait for.
 pub struct JobRegistry {
     pub(super) settings: JobSettings,
+    pub(super) estimates: Estimates,
+    /// The time from which ranks count.
+    began: Instant,
     inner: Mutex<Inner>,
     /// Wakes workers: a job was queued, or draining began.
     work: Condvar,
@@ -29,11 +41,14 @@ pub struct JobRegistry {
 
 #[derive(Default)]
 struct Inner {
-    queue: VecDeque<Arc<Job>>,
+    /// By rank and number.
+    queue: BTreeMap<(Duration, u64), (Arc<Job>, Size)>,
+    /// The estimates of all queued jobs together.
+    queued_time: Duration,
     /// Queued and running jobs in the order of acceptance, which is the order of their deadlines.
     active: BTreeMap<u64, Arc<Job>>,
-    /// Number of busy workers. A cancelled job may occupy its worker for a moment longer.
-    busy: usize,
+    /// Jobs that occupy a worker, by number. A cancelled one may do so for a moment longer.
+    running: HashMap<u64, Running>,
     kept: HashMap<JobId, Arc<Job>>,
     /// Kept jobs that have ended, oldest first.
     ended: VecDeque<EndedJob>,
@@ -41,8 +56,23 @@ struct Inner {
     ended_bytes: u64,
     draining: bool,
     serial: u64,
-    /// Running mean of the time that a job occupies a worker.
-    mean: Duration,
+}
+
+/// What a worker does next.
+pub enum Next {
+    /// It does this job.
+    Job(Arc<Job>, Work),
+    /// It has waited in vain.
+    Idle,
+    /// It ends: there will be no more.
+    End,
+}
+
+/// A job that occupies a worker.
+struct Running {
+    job: Arc<Job>,
+    size: Size,
+    since: Instant,
 }
 
 /// A kept job that has ended.
@@ -56,21 +86,33 @@ impl JobRegistry {
     /// An empty registry.
     pub fn new(settings: JobSettings) -> Self {
         let outstanding = watch::Sender::new(0);
-        Self { settings, inner: Mutex::default(), work: Condvar::new(), clock: Condvar::new(), outstanding }
+        Self {
+            settings,
+            estimates: Estimates::new(),
+            began: Instant::now(),
+            inner: Mutex::default(),
+            work: Condvar::new(),
+            clock: Condvar::new(),
+            outstanding,
+        }
     }
 
     /// Checks that a job would be accepted now.
     pub fn would_accept(&self) -> Result<(), Refusal> {
-        self.check(&self.lock())
+        self.check(&self.lock(), Duration::ZERO)
     }
 
     /// Queues work. A kept job can be found by its id until its result expires.
     pub fn submit(&self, work: Work, is_kept: bool) -> Result<Arc<Job>, Refusal> {
+        let size = self.estimates.size(&work);
+        let estimate = self.estimates.estimate(size);
         let mut inner = self.lock();
-        self.check(&inner)?;
+        self.check(&inner, estimate)?;
         inner.serial += 1;
-        let job = Arc::new(Job::new(work, is_kept, inner.serial));
-        inner.queue.push_back(job.clone());
+        let rank = self.began.elapsed() + (estimate * PATIENCE).min(self.settings.job_time / 4);
+        let job = Arc::new(Job::new(work, is_kept, inner.serial, estimate, rank));
+        inner.queue.insert((rank, job.serial), (job.clone(), size));
+        inner.queued_time += estimate;
         if inner.active.is_empty() {
             self.clock.notify_one();
         }
@@ -83,30 +125,41 @@ impl JobRegistry {
         Ok(job)
     }
 
-    /// Waits for the next job, and counts the worker as busy. None once there will be no more.
-    pub fn take(&self) -> Option<(Arc<Job>, Work)> {
+    /// Waits for the next job, no longer than `time_max`, and counts the worker as busy.
+    pub fn take(&self, time_max: Option<Duration>) -> Next {
+        let until = time_max.and_then(|time_max| Instant::now().checked_add(time_max));
         let mut inner = self.lock();
         loop {
-            if let Some(job) = inner.queue.pop_front() {
+            if let Some((_, (job, size))) = inner.queue.pop_first() {
+                inner.queued_time = inner.queued_time.saturating_sub(job.estimate);
                 if let Some(work) = job.take_work() {
-                    inner.busy += 1;
+                    inner.running.insert(job.serial, Running { job: job.clone(), size, since: Instant::now() });
                     job.state.send_replace(JobState::Running);
                     self.publish(&inner);
-                    return Some((job, work));
+                    return Next::Job(job, work);
                 }
-            } else if inner.draining {
-                return None;
-            } else {
-                inner = self.work.wait(inner).unwrap_or_else(PoisonError::into_inner);
+                continue;
             }
+            if inner.draining {
+                return Next::End;
+            }
+            inner = match until.map(|until| until.saturating_duration_since(Instant::now())) {
+                None => self.work.wait(inner).unwrap_or_else(PoisonError::into_inner),
+                Some(Duration::ZERO) => return Next::Idle,
+                Some(time) => self.work.wait_timeout(inner, time).unwrap_or_else(PoisonError::into_inner).0,
+            };
         }
     }
 
     /// Ends the job of a worker, which is free again after `took`.
     pub fn finish(&self, job: &Job, state: JobState, took: Duration) {
         let mut inner = self.lock();
-        inner.busy = inner.busy.saturating_sub(1);
-        inner.mean = if inner.mean.is_zero() { took } else { (inner.mean * 7 + took) / 8 };
+        if let Some(running) = inner.running.remove(&job.serial)
+            // What ended early says how long it takes only if that is longer than was thought.
+            && (matches!(state, JobState::Done(_) | JobState::Inspected(_)) || took > job.estimate)
+        {
+            self.estimates.learn(running.size, took);
+        }
         self.end_locked(&mut inner, job, state);
         self.publish(&inner);
     }
@@ -125,7 +178,8 @@ impl JobRegistry {
         }
         job.deadline.stop();
         if job.take_work().is_some() {
-            inner.queue.retain(|queued| queued.serial != job.serial);
+            inner.queue.remove(&(job.rank, job.serial));
+            inner.queued_time = inner.queued_time.saturating_sub(job.estimate);
         }
         if job.is_kept {
             let bytes = if let JobState::Done(finished) = &state { finished.picture.len() as u64 } else { 0 };
@@ -147,7 +201,8 @@ impl JobRegistry {
         let inner = self.lock();
         JobLoad {
             queued: inner.queue.len(),
-            running: inner.busy,
+            running: inner.running.len(),
+            wait: self.wait(&inner),
             kept: inner.ended.len(),
             kept_bytes: inner.ended_bytes,
         }
@@ -193,23 +248,33 @@ impl JobRegistry {
         }
     }
 
-    fn check(&self, inner: &Inner) -> Result<(), Refusal> {
+    /// Checks that a job may be accepted of which this is known.
+    fn check(&self, inner: &Inner, estimate: Duration) -> Result<(), Refusal> {
         if inner.draining {
             return Err(Refusal::Draining);
         }
         let queue = self.settings.queue;
         // Idle workers count as places, so that a queue of 0 accepts a job that can start at once.
-        let idle = self.settings.workers.saturating_sub(inner.busy);
+        let idle = self.settings.workers.saturating_sub(inner.running.len());
+        let wait = self.wait(inner);
         if inner.queue.len() >= queue + idle {
-            return Err(Refusal::QueueFull { queue, retry_after_s: self.retry_after_s(inner) });
+            return Err(Refusal::QueueFull { queue, retry_after_s: retry_after_s(wait) });
+        }
+        let limit = self.settings.job_time;
+        let ends = wait.saturating_add(estimate);
+        // A job that begins at once is never refused for its estimate alone.
+        if inner.queue.len() >= idle && ends > limit / 4 * 3 {
+            let retry_after_s = retry_after_s((ends - limit / 4 * 3).min(wait));
+            return Err(Refusal::TooLate { wait_ms: to_ms(wait), limit_ms: to_ms(limit), retry_after_s });
         }
         Ok(())
     }
 
-    /// Expected time in seconds until the waiting jobs are done, between 1 and 30.
-    fn retry_after_s(&self, inner: &Inner) -> u64 {
-        let waiting = inner.mean.as_secs_f64() * inner.queue.len() as f64 / self.settings.workers.max(1) as f64;
-        waiting.ceil().clamp(1.0, 30.0) as u64
+    /// Time until the jobs that were accepted are done, as far as the estimates know.
+    fn wait(&self, inner: &Inner) -> Duration {
+        let limit = self.settings.job_time;
+        let running: Duration = inner.running.values().map(|running| running.remaining(limit)).sum();
+        (inner.queued_time + running) / u32::try_from(self.settings.workers.max(1)).unwrap_or(u32::MAX)
     }
 
     /// Drops results that are too old or too many. The newest stays, however large.
@@ -229,10 +294,28 @@ impl JobRegistry {
     }
 
     fn publish(&self, inner: &Inner) {
-        self.outstanding.send_replace(inner.queue.len() + inner.busy);
+        self.outstanding.send_replace(inner.queue.len() + inner.running.len());
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+impl Running {
+    /// Time until it ends, as far as is known. A job that takes longer than its estimate is expected to
+    /// take as long again as it is late. It stops when its time is up.
+    fn remaining(&self, limit: Duration) -> Duration {
+        let so_far = self.since.elapsed();
+        so_far.abs_diff(self.job.estimate).min(limit.saturating_sub(self.job.accepted.elapsed()))
+    }
+}
+
+/// Seconds after which to try again, between 1 and 30.
+fn retry_after_s(wait: Duration) -> u64 {
+    wait.as_secs_f64().ceil().clamp(1.0, 30.0) as u64
+}
+
+fn to_ms(time: Duration) -> u64 {
+    u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
 }

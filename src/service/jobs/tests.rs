@@ -16,10 +16,14 @@ use crate::spec::{BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPres
 
 const SOON: Duration = Duration::from_secs(10);
 
+/// The time that a job takes whose mesh is "nap".
+const NAP: Duration = Duration::from_millis(50);
+
 fn settings() -> JobSettings {
     JobSettings {
         workers: 1,
         queue: 2,
+        idle_time: SOON,
         job_time: Duration::from_secs(30),
         result_ttl: Duration::from_secs(60),
         result_bytes: 1000,
@@ -27,11 +31,13 @@ fn settings() -> JobSettings {
     }
 }
 
+/// Work on a mesh that is stored if it is a nap: how long a stored mesh takes is known after one job.
 fn work(budget: &Arc<UploadBudget>, mesh: &'static [u8]) -> Work {
     let mut reservation = budget.reserve();
     reservation.grow(mesh.len() as u64).unwrap();
+    let mesh_key = (mesh == b"nap").then(|| "nap".to_owned());
     let (bundle, task) = (Bundle::of_one(Bytes::from_static(mesh)), Task::Draw(Box::new(spec())));
-    Work { bundle, format_in: None, mesh_key: None, task, memory: Arc::new(reservation) }
+    Work { bundle, format_in: None, mesh_key, task, memory: Arc::new(reservation) }
 }
 
 /// Any specification: the fake renderer does not read it.
@@ -70,6 +76,7 @@ fn output(bytes: usize) -> Output {
         bytes: vec![7; bytes],
         format: ImageFormat::Png,
         backend: BackendKind::Cpu,
+        is_substitute: false,
         draw_times: DrawTimes::default(),
         skips,
         warnings,
@@ -84,6 +91,10 @@ fn fake_render(work: &Work, deadline: &Deadline, gate: &Mutex<Receiver<()>>) -> 
         b"wait" => {
             gate.lock().unwrap().recv_timeout(SOON).map_or(Err(RenderError::Stopped(Stopped)), |()| Ok(output(1)))
         }
+        b"nap" => {
+            std::thread::sleep(NAP);
+            Ok(output(1))
+        }
         b"spin" => loop {
             deadline.check()?;
             std::thread::sleep(Duration::from_millis(1));
@@ -96,6 +107,7 @@ struct Fixture {
     jobs: Jobs,
     budget: Arc<UploadBudget>,
     open: Sender<()>,
+    /// Number of renderers that were made. Each holds it.
     renderers: Arc<AtomicUsize>,
 }
 
@@ -106,12 +118,13 @@ fn fixture(settings: JobSettings) -> Fixture {
     let made = renderers.clone();
     let factory: RendererFactory = Arc::new(move || {
         made.fetch_add(1, Ordering::Relaxed);
-        let gate = gate.clone();
+        let (gate, made) = (gate.clone(), made.clone());
         Box::new(move |work, deadline, ended| {
+            let _alive = &made;
             ended(Stage::Parse);
             let output = fake_render(work, deadline, &gate)?;
             ended(Stage::Encode);
-            Ok(Product::Picture(Box::new(output)))
+            Ok(Product::Picture { output: Box::new(output), mesh_was_kept: false })
         })
     });
     Fixture { jobs: Jobs::start(settings, factory).unwrap(), budget: UploadBudget::new(1 << 20), open, renderers }
@@ -259,6 +272,71 @@ fn results_are_kept_for_a_while_and_within_their_memory() {
         std::thread::sleep(Duration::from_millis(5));
     }
     assert_eq!(short_lived.jobs.load(), JobLoad::default());
+}
+
+#[test]
+fn a_job_that_cannot_end_in_time_is_refused_at_once() {
+    let fixture = fixture(JobSettings { queue: 1000, job_time: 10 * NAP, ..settings() });
+    assert!(matches!(wait(&fixture.submit(b"nap", false).unwrap()), JobState::Done(_)));
+    let accepted: Vec<_> = std::iter::from_fn(|| fixture.submit(b"nap", false).ok()).take(100).collect();
+    let refusal = fixture.submit(b"nap", false).unwrap_err();
+    assert!(matches!(refusal, Refusal::TooLate { wait_ms: 1.., limit_ms: 500, retry_after_s: 1 }), "{refusal:?}");
+    // Three quarters of the time are room for 7 naps. A nap takes somewhat longer on a busy machine.
+    assert!((3..=8).contains(&accepted.len()), "{}", accepted.len());
+    assert!(fixture.jobs.load().wait >= NAP);
+    assert!(accepted.iter().all(|job| matches!(wait(job), JobState::Done(_))), "what was accepted ends in time");
+    assert!(matches!(wait(&fixture.submit(b"nap", false).unwrap()), JobState::Done(_)), "there is time again");
+}
+
+#[test]
+fn a_job_that_begins_at_once_is_never_refused_for_its_estimate() {
+    let fixture = fixture(JobSettings { job_time: NAP / 2, ..settings() });
+    for _ in 0..3 {
+        // It ends too late, and the server knows that from the first on.
+        assert!(matches!(wait(&fixture.submit(b"nap", false).unwrap()), JobState::Failed(_)));
+        while fixture.jobs.load().running > 0 {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
+
+#[test]
+fn short_jobs_overtake_long_ones_for_a_while() {
+    let fixture = fixture(JobSettings { queue: 1000, job_time: 40 * NAP, ..settings() });
+    assert!(matches!(wait(&fixture.submit(b"nap", false).unwrap()), JobState::Done(_)));
+    fixture.occupy();
+    let long = fixture.submit(b"nap", false).unwrap();
+    let short = fixture.submit(b"1", false).unwrap();
+    fixture.open.send(()).unwrap();
+    assert!(matches!(wait(&short), JobState::Done(_)));
+    assert!(!long.state().is_final(), "the short job was first");
+    assert!(matches!(wait(&long), JobState::Done(_)));
+
+    fixture.occupy();
+    let long = fixture.submit(b"nap", false).unwrap();
+    // Its patience is four times as long as it takes.
+    std::thread::sleep(6 * NAP);
+    let short = fixture.submit(b"1", false).unwrap();
+    fixture.open.send(()).unwrap();
+    assert!(matches!(wait(&long), JobState::Done(_)));
+    assert!(long.accepted < short.accepted && !matches!(short.state(), JobState::Failed(_)));
+    let order = [&long, &short].map(|job| job.rank);
+    assert!(order[0] < order[1], "{order:?}");
+}
+
+#[test]
+fn an_idle_worker_drops_its_renderer() {
+    let fixture = fixture(JobSettings { idle_time: Duration::from_millis(20), ..settings() });
+    for round in 1..4 {
+        assert!(matches!(wait(&fixture.submit(b"1", false).unwrap()), JobState::Done(_)));
+        assert_eq!(fixture.renderers.load(Ordering::Relaxed), round, "a fresh renderer");
+        let began = Instant::now();
+        // The fixture and the factory hold the number as well.
+        while Arc::strong_count(&fixture.renderers) > 2 {
+            assert!(began.elapsed() < SOON, "the renderer was not dropped");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
 }
 
 #[test]

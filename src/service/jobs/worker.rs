@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::job::{Failure, Finished, Job, JobState, Product, Task, Timings, Work};
-use super::registry::JobRegistry;
+use super::registry::{JobRegistry, Next};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{Backends, GpuHost};
 use crate::import;
 use crate::limits::{Budget, Deadline, Limits};
 use crate::pipeline::{self, Model, Output, RenderError, Stage};
-use crate::service::residents::{Resident, Residents};
+use crate::service::residents::{Found, Resident, Residents};
 
 /// A worker's renderer, which does one job after the other.
 pub type Renderer = Box<dyn FnMut(&Work, &Deadline, &mut dyn FnMut(Stage)) -> Result<Product, RenderError>>;
@@ -47,13 +47,13 @@ pub fn pipeline_renderers(
             match task {
                 Task::Draw(spec) => {
                     let job = pipeline::Job { bundle, format_in: *format_in, spec };
-                    let output = match mesh_key {
+                    let (output, mesh_was_kept) = match mesh_key {
                         Some(key) => {
                             render_stored((key.as_str(), job), &residents, &mut backends, &limits, deadline, ended)?
                         }
-                        None => pipeline::render(job, &mut backends, &limits, deadline, ended)?,
+                        None => (pipeline::render(job, &mut backends, &limits, deadline, ended)?, false),
                     };
-                    Ok(Product::Picture(Box::new(output)))
+                    Ok(Product::Picture { output: Box::new(output), mesh_was_kept })
                 }
                 Task::Inspect { time_s } => {
                     let options = import::Options { format: *format_in, time_s: *time_s };
@@ -65,7 +65,7 @@ pub fn pipeline_renderers(
     })
 }
 
-/// As [`pipeline::render`], of a mesh that may be in memory, or stays there.
+/// As [`pipeline::render`], of a mesh that may be in memory, or stays there. True if it was there.
 fn render_stored(
     (key, job): (&str, pipeline::Job<'_>),
     residents: &Residents,
@@ -73,11 +73,11 @@ fn render_stored(
     limits: &Limits,
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
-) -> Result<Output, RenderError> {
+) -> Result<(Output, bool), RenderError> {
     let time_s = job.spec.time_s;
     // Exact, and different for 0 and -0.
     let key = time_s.map_or_else(|| key.to_owned(), |time_s| format!("{key} at {time_s:?} s"));
-    let resident = residents.find(&key, deadline, || {
+    let Found { resident, was_kept } = residents.find(&key, deadline, || {
         let mut budget = Budget::new(limits);
         let options = import::Options { format: job.format_in, time_s };
         let model = Model::read(job.bundle, options, limits, &mut budget, deadline)?;
@@ -87,14 +87,23 @@ fn render_stored(
     let mut budget = resident.budget.clone();
     let output = pipeline::render_model(&resident.model, job.spec, backends, &mut budget, deadline, ended);
     residents.weigh(&key, &resident);
-    output
+    Ok((output?, was_kept))
 }
 
 /// Does jobs until the registry is drained.
 pub fn run(registry: &JobRegistry, renderers: &RendererFactory) {
-    // It is made with the first job, so that an idle process holds no renderer.
+    // It is made with the first job and dropped when there was none for long, so that an idle process holds
+    // no renderer.
     let mut renderer: Option<Renderer> = None;
-    while let Some((job, work)) = registry.take() {
+    loop {
+        let (job, work) = match registry.take(renderer.is_some().then_some(registry.settings.idle_time)) {
+            Next::Job(job, work) => (job, work),
+            Next::Idle => {
+                drop_renderer(&mut renderer);
+                continue;
+            }
+            Next::End => return,
+        };
         let started = Instant::now();
         let attempt = catch_unwind(AssertUnwindSafe(|| {
             let renderer = renderer.get_or_insert_with(|| renderers());
@@ -102,9 +111,7 @@ pub fn run(registry: &JobRegistry, renderers: &RendererFactory) {
         }));
         let state = attempt.unwrap_or_else(|_| {
             tracing::error!(job = %job.id, "a job panicked; its worker goes on with a fresh renderer");
-            // The renderer may be in an undefined state, and dropping it may panic as well.
-            let broken = renderer.take();
-            let _ = catch_unwind(AssertUnwindSafe(|| drop(broken)));
+            drop_renderer(&mut renderer);
             JobState::Failed(Arc::new(Failure::Panicked))
         });
         // The memory is freed before the end is announced, so that a client that waits for the end
@@ -112,6 +119,13 @@ pub fn run(registry: &JobRegistry, renderers: &RendererFactory) {
         drop(work);
         registry.finish(&job, state, started.elapsed());
     }
+}
+
+/// Drops a renderer. After a panic it may be in an undefined state, and on a lost device dropping it may
+/// panic as well.
+fn drop_renderer(renderer: &mut Option<Renderer>) {
+    let renderer = renderer.take();
+    let _ = catch_unwind(AssertUnwindSafe(|| drop(renderer)));
 }
 
 fn run_job(renderer: &mut Renderer, job: &Job, work: &Work, started: Instant) -> JobState {
@@ -123,7 +137,9 @@ fn run_job(renderer: &mut Renderer, job: &Job, work: &Work, started: Instant) ->
         stage_began = now;
     });
     match result {
-        Ok(Product::Picture(output)) => JobState::Done(Arc::new(Finished::new(*output, timings))),
+        Ok(Product::Picture { output, mesh_was_kept }) => {
+            JobState::Done(Arc::new(Finished { mesh_was_kept, ..Finished::new(*output, timings) }))
+        }
         Ok(Product::Report(json)) => JobState::Inspected(json.into()),
         Err(error) => JobState::Failed(Arc::new(Failure::Render(error))),
     }

@@ -10,7 +10,6 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use crate::backend::BackendKind;
 use crate::service::cache::{ByteCache, Weighed, with_room_for};
 use crate::service::jobs::Finished;
 use crate::warning::Warning;
@@ -113,7 +112,8 @@ impl Pictures {
             }
             Joined::First(first) => {
                 let kept = Kept { finished: draw.await?, drawn: Instant::now() };
-                if is_for_later(key, &kept.finished) {
+                // Another picture is due when the GPU is back.
+                if !kept.finished.is_substitute {
                     self.cache.insert(key.to_owned(), kept.clone());
                 }
                 first.tell(kept)
@@ -183,12 +183,6 @@ impl Drop for First<'_> {
     fn drop(&mut self) {
         self.pictures.locked().remove(self.key);
     }
-}
-
-/// False for a picture that the CPU drew in place of a GPU: the GPU may be back soon. The keys of
-/// pictures that a GPU may draw are weak tags.
-fn is_for_later(key: &str, finished: &Finished) -> bool {
-    !(key.starts_with("W/") && finished.backend == BackendKind::Cpu)
 }
 
 impl Kept {

@@ -11,8 +11,10 @@ fn picture(bytes: usize) -> Arc<Finished> {
         picture: vec![7; bytes].into(),
         format: ImageFormat::Png,
         backend: BackendKind::Cpu,
+        is_substitute: false,
         warnings: Vec::new(),
         selection: None,
+        mesh_was_kept: false,
         timings: Timings::default(),
         draw_times: DrawTimes::default(),
     })
@@ -82,11 +84,15 @@ async fn those_who_wait_get_the_first_ones_picture() {
 #[tokio::test]
 async fn a_picture_in_place_of_a_gpus_is_not_kept() {
     let pictures = Pictures::new(1 << 20);
-    for key in ["W/a", "W/a", "a"] {
-        let found = pictures.find(key, async { Ok::<_, ()>(picture(10)) }).await.unwrap();
-        assert_eq!(found.source, Source::Miss, "{key}");
+    for is_substitute in [true, true, false] {
+        let mut drawn = picture(10);
+        Arc::get_mut(&mut drawn).unwrap().is_substitute = is_substitute;
+        let found = pictures.find("W/a", async { Ok::<_, ()>(drawn) }).await.unwrap();
+        assert_eq!(found.source, Source::Miss, "{is_substitute}");
     }
-    assert_eq!(pictures.load().count, 1);
+    // The CPU drew this one because it was quicker.
+    let again = pictures.find("W/a", async { Err(()) }).await.unwrap();
+    assert_eq!((again.source, pictures.load().count), (Source::Hit, 1));
 }
 
 #[tokio::test]

@@ -117,13 +117,13 @@ const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("wgpu::", &["backend/gpu/"]),
     ("axum::", &["service/http/"]),
     ("sha2::", &["service/store/"]),
-    ("quick_cache::", &["service/cache", "service/residents"]),
+    ("quick_cache::", &["service/cache", "service/residents", "service/jobs/estimates"]),
     ("memmap2::", &["cli"]),
     ("clap::", &["cli", "main.rs", "config"]),
     ("tokio::", &["service/", "main.rs", "cli", "telemetry"]),
     ("std::fs", &["cli", "config", "main.rs", "service/http/", "backend/gpu/pipelines/file.rs"]),
     ("std::env", &["cli", "config", "main.rs", "telemetry"]),
-    ("Instant::now", &["cli", "service/", "telemetry", "main.rs", "backend/cpu/stopwatch.rs"]),
+    ("Instant::now", &["cli", "service/", "telemetry", "main.rs", "backend/cpu/stopwatch.rs", "backend/costs.rs"]),
     ("SystemTime", &["cli", "service/", "telemetry", "main.rs"]),
 ];
 

@@ -17,7 +17,7 @@ fn torus(name: usize) -> Vec<u8> {
 /// Milliseconds of a stage.
 fn stage_ms(answer: &Answer, stage: &str) -> Option<f64> {
     let timings = answer.header("server-timing")?;
-    timings.split(", ").find_map(|part| part.strip_prefix(&format!("{stage};dur="))?.parse().ok())
+    timings.split(", ").find_map(|part| part.strip_prefix(&format!("{stage};dur="))?.split(';').next()?.parse().ok())
 }
 
 #[test]
@@ -28,6 +28,7 @@ fn a_picture_is_drawn_once_and_a_mesh_read_once() {
     let path = |rest: &str| format!("{}/render.png?size=64&{rest}", url(&mesh));
     let first = server.get(&path("style=wire"));
     assert_eq!((first.header("x-cache"), first.header("age")), (Some("miss"), None));
+    assert!(!first.header("server-timing").unwrap().contains("resident"));
     let second = server.get(&path("style=wire"));
     assert_eq!(second.header("x-cache"), Some("hit"));
     assert!(second.header("age").unwrap().parse::<u32>().unwrap() < 60);
@@ -47,6 +48,7 @@ fn a_picture_is_drawn_once_and_a_mesh_read_once() {
         let turned = server.get(&path(&format!("style=wire&view={view}")));
         assert_eq!(turned.header("x-cache"), Some("miss"));
         kept_ms = kept_ms.min(stage_ms(&turned, "parse").unwrap());
+        assert!(turned.header("server-timing").unwrap().contains(";desc=resident"));
     }
     let read_ms = stage_ms(&first, "parse").unwrap();
     assert!(kept_ms < read_ms / 4.0, "{kept_ms} ms, and {read_ms} ms to read it");

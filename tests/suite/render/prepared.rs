@@ -1,9 +1,11 @@
 //! What earlier pictures found out about a mesh changes no later one: no byte, no skip, no refusal.
 
+use std::sync::Arc;
+
 use image::ImageFormat;
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
-use meshsnap::backend::gpu::GpuRenderer;
+use meshsnap::backend::gpu::{AtomicsChoice, Gpu, GpuKind, GpuRenderer};
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::Mesh;
 use meshsnap::plan::{self, PlanError, Prepared};
@@ -86,6 +88,23 @@ fn what_stays_on_a_gpu_changes_no_pixel() {
         for _ in 0..3 {
             is_drawn_alike(&mut renderer, &mesh, &scenes::spec(&[("size", "24")]), &prepared, "a short life");
         }
+    }
+}
+
+#[test]
+fn a_gpu_without_a_renderer_keeps_no_buffers_for_jobs() {
+    if gpus().is_none() {
+        return;
+    }
+    let gpu = Arc::new(Gpu::open(GpuKind::Any, AtomicsChoice::Best, None).unwrap());
+    let mesh = scenes::mesh("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let mut renderers = [GpuRenderer::new(gpu.clone()), GpuRenderer::new(gpu.clone())].into_iter();
+    for left in [1, 0] {
+        let mut renderer = renderers.next().unwrap();
+        is_drawn_alike(&mut renderer, &mesh, &scenes::spec(&[("size", "24")]), &Prepared::default(), "spare");
+        assert!(gpu.spare_bytes() > 0);
+        drop(renderer);
+        assert_eq!(gpu.spare_bytes() > 0, left > 0, "{left} left");
     }
 }
 

@@ -3,11 +3,13 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::GpuKind;
-use meshsnap::backend::{BackendKind, Backends, DrawError, GpuHost, GpuState, HardwareHint, Opener, Renderer as _};
+use meshsnap::backend::{
+    BackendKind, Backends, CostModel, DrawError, GpuHost, GpuState, HardwareHint, Opener, Renderer as _,
+};
 use meshsnap::limits::Deadline;
 use meshsnap::plan::DrawPlan;
 use meshsnap::service::warm_up::WarmUp;
@@ -233,6 +235,30 @@ fn workers_share_the_device_and_one_loss_is_one_loss() {
     check(&mut workers[0], &[(Auto, Ok(ByGpu))]);
 }
 
+#[test]
+fn while_the_gpu_is_busy_the_cpu_draws_what_is_small() {
+    let (open, gate) = std::sync::mpsc::channel();
+    let machine = Machine::new(&[Open::Hardware], &[Act::Waits]);
+    machine.0.lock().unwrap().gate = Some(gate);
+    let host = machine.host(HardwareHint::Maybe);
+    let busy = std::thread::spawn({
+        let host = host.clone();
+        move || draw(&mut Backends::new(host, 1), Auto).unwrap()
+    });
+    let began = Instant::now();
+    while machine.0.lock().unwrap().gate.is_some() {
+        assert!(began.elapsed() < Duration::from_secs(30), "the GPU got no job");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    // The job is small, and nobody has to wait for it.
+    let mut backends = Backends::new(host, 1);
+    check(&mut backends, &[(Auto, Ok(ByCpu)), (Gpu, Ok(ByGpu)), (Auto, Ok(ByCpu))]);
+    assert!(!backends.draw(Auto, &job(), &Deadline::default()).unwrap().is_substitute);
+    open.send(()).unwrap();
+    assert_eq!(busy.join().unwrap(), ByGpu);
+    check(&mut backends, &[(Auto, Ok(ByGpu))]);
+}
+
 /// A device is probed with a number of samples before it first draws with it.
 #[test]
 fn a_gpu_that_is_wrong_with_many_samples_draws_none_of_them() {
@@ -295,7 +321,7 @@ fn a_report_does_not_wait_for_a_driver() {
         let _ = ends.1.recv();
         Err(DrawError::NoGpu("slow and nothing".into()))
     });
-    let host = Arc::new(GpuHost::with_opener(HardwareHint::Maybe, open));
+    let host = Arc::new(GpuHost::with_opener(HardwareHint::Maybe, CostModel::fixed(), open));
     let worker = std::thread::spawn({
         let host = host.clone();
         move || draw(&mut Backends::new(host, 1), Auto).unwrap()

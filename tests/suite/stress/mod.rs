@@ -2,6 +2,7 @@
 
 pub mod depth;
 pub mod faces;
+pub mod interleavings;
 pub mod order;
 pub mod report;
 pub mod scale;

@@ -1,11 +1,13 @@
 //! A machine whose GPUs are missing, wrong, lost or refuse, as a test tells them.
 
 use std::collections::VecDeque;
+use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, OnceLock};
+use std::time::Duration;
 
 use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::backend::gpu::{GpuInfo, GpuKind};
-use meshsnap::backend::{BackendKind, DrawError, GpuDevice, GpuHost, HardwareHint, Opener, Renderer};
+use meshsnap::backend::{BackendKind, CostModel, DrawError, GpuDevice, GpuHost, HardwareHint, Opener, Renderer};
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::plan::DrawPlan;
@@ -37,6 +39,8 @@ pub enum Act {
     /// As wgpu does on a lost device.
     PanicsLost,
     Stops,
+    /// Draws as soon as the machine's gate is open.
+    Waits,
 }
 
 /// A machine whose devices do as they are told.
@@ -52,6 +56,8 @@ pub struct Story {
     pub drawn_px: Vec<u32>,
     pub devices: Vec<Arc<Fake>>,
     pub renderers: usize,
+    /// What [`Act::Waits`] waits for.
+    pub gate: Option<Receiver<()>>,
 }
 
 impl Machine {
@@ -66,7 +72,7 @@ impl Machine {
     pub fn host(&self, hint: HardwareHint) -> Arc<GpuHost> {
         let machine = self.clone();
         let open: Box<Opener> = Box::new(move |kind| machine.open(kind));
-        Arc::new(GpuHost::with_opener(hint, open))
+        Arc::new(GpuHost::with_opener(hint, CostModel::fixed(), open))
     }
 
     fn open(&self, kind: GpuKind) -> Result<Arc<dyn GpuDevice>, DrawError> {
@@ -144,9 +150,17 @@ impl Renderer for FakeRenderer {
                 panic!("as wgpu does");
             }
             Act::Stops => deadline.stop(),
+            Act::Waits => {
+                let gate = fake.machine.0.lock().unwrap().gate.take().expect("a gate");
+                gate.recv_timeout(Duration::from_secs(30)).expect("the gate opens");
+            }
         }
         deadline.check()?;
         let mut image = CpuRenderer::new(1).draw(plan, deadline)?;
+        // Pulled out in the meantime.
+        if fake.lost.get().is_some() {
+            return Err(gone());
+        }
         fake.machine.0.lock().unwrap().drawn_px.push(plan.width_px);
         if matches!(fake.open, Open::Wrong) || matches!(fake.open, Open::WrongAtSixteen) && plan.samples == 16 {
             image.rgba[0] ^= 0x80;

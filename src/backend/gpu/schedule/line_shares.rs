@@ -12,9 +12,10 @@ use crate::plan::{DrawPlan, LinePass};
 /// Edges per dispatch.
 const EDGE_CHUNK: u32 = 1 << 20;
 
-/// The same where each may cross a large picture: in software, and on a real device.
+/// The same where each may cross a large picture: in software; and on a real device, times the picture's
+/// width and height together. Needles that cross 4096 px in crowds take half a second then.
 const EDGE_CHUNK_LONG: u32 = 1 << 17;
-const EDGE_CHUNK_LONG_HARDWARE: u32 = 1 << 19;
+const EDGE_CHUNK_LONG_HARDWARE: u32 = 1 << 29;
 
 /// Samples that a dispatch may read at most, if the length of its edges is not known: a second or
 /// so of work.
@@ -101,7 +102,8 @@ fn edges_a_dispatch(plan: &DrawPlan<'_>, lines: &LinePass, device: &DeviceTraits
     // Half a pixel a step, the samples of up to three pixels in each.
     let longest = 2 * u64::from(plan.width_px + plan.height_px) * 3 * u64::from(plan.samples);
     let key_bits = longest.saturating_mul(lines.edges.len() as u64);
-    let long = if device.loops_are_limited { EDGE_CHUNK_LONG } else { EDGE_CHUNK_LONG_HARDWARE };
+    let sides = (plan.width_px + plan.height_px).max(1);
+    let long = if device.loops_are_limited { EDGE_CHUNK_LONG } else { EDGE_CHUNK_LONG_HARDWARE / sides };
     let most = if key_bits > BLIND_LOOKS_MAX { long } else { EDGE_CHUNK };
     lines.edges.len().min(most as usize) as u32
 }
@@ -231,6 +233,16 @@ mod tests {
             let drawn = schedule.steps.iter().filter(|step| matches!(step, Step::Lines { .. })).count();
             let bands = size_px.div_ceil(schedule.banding.rows);
             assert_eq!(drawn as u32, bands * count.div_ceil(most));
+        }
+    }
+
+    #[test]
+    fn a_real_gpu_gets_fewer_edges_at_a_time_the_larger_the_picture() {
+        let real = DeviceTraits { loops_are_limited: false, ..DEVICE };
+        for (size_px, most) in [(512, 1 << 19), (4096, 1 << 16)] {
+            let mut plan = plan(&[], Case { size_px: [size_px; 2], ..LARGEST });
+            plan.lines = vec![lines(edges(2 << 20), 1.0, Shown::Visible)];
+            assert_eq!(LineShares::new(&plan, &plan.lines[0], &real).edges, most, "{size_px} px");
         }
     }
 

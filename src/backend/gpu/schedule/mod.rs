@@ -12,7 +12,7 @@ pub(crate) mod test_plans;
 pub(crate) mod tiles;
 use self::sizes::{Banding, DeviceTraits, has_visibility};
 use self::step::{Band, Goal, Step};
-use self::tiles::Tiles;
+use self::tiles::{Tiles, alone_size};
 use super::params::{Batch, edge_lists, faces_code};
 use crate::backend::DrawError;
 use crate::backend::gpu::pass_mask::Pass;
@@ -187,6 +187,7 @@ impl Schedule {
                         large_end: u32::MAX,
                         huge_end: u32::MAX,
                         pass_bit: u32::from(pass_bit),
+                        alone_size: alone_size(in_chunk, device),
                         ..band
                     };
                     self.steps.push(Step::ClearWork);

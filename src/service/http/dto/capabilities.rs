@@ -49,6 +49,7 @@ struct GpuDto {
 struct LoadDto {
     queued: usize,
     running: usize,
+    wait_ms: u64,
     kept_results: usize,
     kept_result_bytes: u64,
     stored_meshes: usize,
@@ -123,6 +124,7 @@ impl LoadDto {
         Self {
             queued: jobs.queued,
             running: jobs.running,
+            wait_ms: u64::try_from(jobs.wait.as_millis()).unwrap_or(u64::MAX),
             kept_results: jobs.kept,
             kept_result_bytes: jobs.kept_bytes,
             stored_meshes: meshes.count,

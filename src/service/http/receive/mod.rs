@@ -24,6 +24,10 @@ use crate::service::jobs::{Task, Work};
 use crate::service::store::{Digest, Reading};
 use crate::spec::Spec;
 
+/// Longest document, bytes, that is read although the queue is full: that of a stored mesh's picture, which
+/// may be in memory.
+const DOCUMENT_BYTES_MAX: u64 = 64 << 10;
+
 /// A request for a picture that was found valid.
 pub struct Received {
     /// The work for a worker.
@@ -44,7 +48,12 @@ pub async fn receive(state: &AppState, request: Request) -> Result<Received, Api
     if !body::is_multipart(request.headers()) && !body::is_json(request.headers()) {
         request::read(None, &overrides, &state.rules).map_err(query::query_error)?;
     }
-    state.jobs.would_accept()?;
+    // A picture that is in memory needs no worker. A document that names its mesh is short.
+    let names_mesh = body::is_json(request.headers())
+        && body::announced_length(request.headers()).is_some_and(|length| length <= DOCUMENT_BYTES_MAX);
+    if !names_mesh {
+        state.jobs.would_accept()?;
+    }
 
     let headers = request.headers().clone();
     let upload = read_upload(state, request).await?;

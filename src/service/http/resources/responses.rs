@@ -21,7 +21,12 @@ fn picture_with_tag(finished: &Finished, tag: &str) -> Response {
     // The stages of drawing are parts of `render`.
     let drawing = finished.draw_times.parts().map(|(stage, took)| (stage.name(), took));
     let timings = finished.timings.parts().into_iter().chain(drawing);
-    let timings: Vec<_> = timings.map(|(name, took)| format!("{name};dur={:.3}", took.as_secs_f64() * 1e3)).collect();
+    let timings: Vec<_> = timings
+        .map(|(name, took)| {
+            let note = if name == "parse" && finished.mesh_was_kept { ";desc=resident" } else { "" };
+            format!("{name};dur={:.3}{note}", took.as_secs_f64() * 1e3)
+        })
+        .collect();
     let headers = [
         (header::CONTENT_TYPE, HeaderValue::from_static(media_type(finished.format))),
         conditional::etag(tag),

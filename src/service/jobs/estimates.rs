@@ -1,0 +1,170 @@
+//! Estimates of how long jobs take, learnt from the jobs that have ended.
+//!
+//! An estimate is a formula of the job's size (bytes and samples), times a factor. There is a factor for
+//! each kind of job and, as soon as one of them has ended, for the same kind of job on the same stored mesh:
+//! a stored mesh is asked for again and again, and its size in bytes says little about what it takes.
+
+use std::hash::{BuildHasher as _, RandomState};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use quick_cache::sync::Cache;
+
+use super::job::{Task, Work};
+use crate::spec::{BackendChoice, Spec};
+
+/// Nanoseconds of the formula: for any job, for each byte of the files, for each sample of the picture.
+/// They give the factors a sensible start, and weigh bytes against samples.
+const JOB_NS: f64 = 500_000.0;
+const BYTE_NS: f64 = 5.0;
+const SAMPLE_NS: f64 = 5.0;
+
+/// Part of the way that a factor goes towards what the last job took.
+const STEP: f64 = 0.125;
+
+/// The same for a mesh, of which few jobs are known.
+const MESH_STEP: f64 = 0.5;
+
+/// The largest factor, and the inverse of the smallest, as a power of two. One job that waited for a
+/// driver says little about the next.
+const POWER_MAX: f64 = 14.0;
+
+/// Stored meshes whose factors are kept, times the kinds of jobs. The least used go first.
+const MESHES: usize = 4096;
+
+/// Numbers of kinds of tasks, and of kinds of jobs: each task by the CPU, and by whoever is there.
+const TASKS: usize = 4;
+const KINDS: usize = 2 * TASKS;
+
+/// What is known about the durations of jobs.
+#[derive(Debug)]
+pub struct Estimates {
+    /// Powers of two of the factors, by kind.
+    kinds: Mutex<[f64; KINDS]>,
+    /// The same by [`Size::mesh`].
+    meshes: Cache<u64, f64>,
+    hasher: RandomState,
+}
+
+/// What an estimate depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size {
+    /// The duration by the formula, seconds.
+    formula_s: f64,
+    kind: usize,
+    /// A hash of the mesh's key and the kind, if the mesh is stored. Two that are equal by chance make an
+    /// estimate worse, and nothing else.
+    mesh: Option<u64>,
+}
+
+impl Estimates {
+    /// Nothing is known yet.
+    pub fn new() -> Self {
+        Self { kinds: Mutex::new([0.0; KINDS]), meshes: Cache::new(MESHES), hasher: RandomState::new() }
+    }
+
+    /// The size of a job.
+    pub fn size(&self, work: &Work) -> Size {
+        let samples = match &work.task {
+            Task::Draw(spec) => {
+                let image = &spec.image;
+                f64::from(image.width_px) * f64::from(image.height_px) * f64::from(image.samples)
+            }
+            Task::Inspect { .. } => 0.0,
+        };
+        let formula_ns = JOB_NS + BYTE_NS * work.bundle.bytes_len() as f64 + SAMPLE_NS * samples;
+        let kind = kind(&work.task);
+        let mesh = work.mesh_key.as_ref().map(|key| self.hasher.hash_one((kind, key)));
+        Size { formula_s: formula_ns * 1e-9, kind, mesh }
+    }
+
+    /// The time for which a job of this size is likely to occupy a worker.
+    pub fn estimate(&self, size: Size) -> Duration {
+        let power = size.mesh.and_then(|mesh| self.meshes.get(&mesh)).unwrap_or_else(|| self.locked()[size.kind]);
+        Duration::from_secs_f64(size.formula_s * power.exp2())
+    }
+
+    /// Learns from a job that occupied a worker for this long.
+    pub fn learn(&self, size: Size, took: Duration) {
+        let seen = (took.as_secs_f64().max(1e-9) / size.formula_s).log2().clamp(-POWER_MAX, POWER_MAX);
+        let mut kinds = self.locked();
+        let power = &mut kinds[size.kind];
+        *power += STEP * (seen - *power);
+        drop(kinds);
+        if let Some(mesh) = size.mesh {
+            let power = self.meshes.get(&mesh).map_or(seen, |power| power + MESH_STEP * (seen - power));
+            self.meshes.insert(mesh, power);
+        }
+    }
+
+    fn locked(&self) -> std::sync::MutexGuard<'_, [f64; KINDS]> {
+        self.kinds.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The number of the kind of a task.
+fn kind(task: &Task) -> usize {
+    let Task::Draw(spec) = task else { return 0 };
+    let Spec { layers, materials, topology, .. } = &**spec;
+    let mut all = materials.iter().map(|(_, layers)| layers).chain([layers]);
+    let task = if all.clone().any(|layers| layers.wire.is_some()) || topology.is_some() {
+        1
+    } else if all.any(|layers| layers.outline.is_some()) {
+        2
+    } else {
+        3
+    };
+    if spec.backend == BackendChoice::Cpu { task } else { TASKS + task }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A plain job that takes so many milliseconds by the formula.
+    fn size(formula_ms: f64, mesh: Option<u64>) -> Size {
+        Size { formula_s: formula_ms * 1e-3, kind: 1, mesh }
+    }
+
+    fn ms(estimates: &Estimates, size: Size) -> f64 {
+        estimates.estimate(size).as_secs_f64() * 1e3
+    }
+
+    #[test]
+    fn estimates_come_near_to_what_jobs_take_and_grow_with_their_size() {
+        let estimates = Estimates::new();
+        assert!((ms(&estimates, size(2.0, None)) - 2.0).abs() < 1e-6);
+        for _ in 0..60 {
+            estimates.learn(size(2.0, None), Duration::from_millis(20));
+        }
+        assert!((ms(&estimates, size(2.0, None)) - 20.0).abs() < 0.1);
+        assert!((ms(&estimates, size(4.0, None)) - 40.0).abs() < 0.2);
+        let other = Size { kind: 2, ..size(2.0, None) };
+        assert!((ms(&estimates, other) - 2.0).abs() < 1e-6, "other kinds of jobs");
+    }
+
+    #[test]
+    fn a_stored_mesh_is_known_after_one_job_and_says_little_about_others() {
+        let estimates = Estimates::new();
+        estimates.learn(size(1.0, Some(7)), Duration::from_secs(5));
+        assert!((ms(&estimates, size(1.0, Some(7))) - 5000.0).abs() < 1.0);
+        let other = ms(&estimates, size(1.0, Some(8)));
+        assert!(other > 1.0 && other < 5.0, "{other}");
+    }
+
+    #[test]
+    fn no_job_makes_an_estimate_absurd() {
+        let estimates = Estimates::new();
+        for took in [Duration::ZERO, Duration::MAX] {
+            for _ in 0..1000 {
+                estimates.learn(size(1.0, Some(1)), took);
+            }
+            let estimate = ms(&estimates, size(1.0, Some(1)));
+            assert!((1.0 / 20_000.0..20_000.0).contains(&estimate), "{estimate}");
+        }
+        for mesh in 0..20_000 {
+            estimates.learn(size(1.0, Some(mesh)), Duration::from_millis(1));
+        }
+        assert!(estimates.meshes.len() <= 2 * MESHES, "{}", estimates.meshes.len());
+    }
+}
