@@ -12,9 +12,16 @@ use crate::plan::DrawPlan;
 /// Part of the way that a factor goes towards what the last picture took.
 const STEP: f64 = 0.125;
 
-/// The largest factor, and the inverse of the smallest, as a power of two. A picture that waited for
-/// pipelines says little about the next.
+/// Farthest that one picture may seem to lie from the factor, as a power of two: one that waited for pipelines
+/// says little about the next.
+const SURPRISE_MAX: f64 = 1.0;
+
+/// The largest factor, and the inverse of the smallest, as a power of two.
 const POWER_MAX: f64 = 6.0;
+
+/// Part of the way that a back-end's factor goes back to 1 with each picture that the other one draws: a
+/// back-end that draws nothing is tried again some time.
+const FORGET: f64 = 1.0 / 64.0;
 
 /// Kinds of plans: with lines or without, with transparent layers or without.
 const KINDS: usize = 4;
@@ -87,11 +94,17 @@ impl CostModel {
         if !self.learns {
             return;
         }
-        let seen = (took.as_secs_f64().max(1e-9) / formula_s(backend, size)).log2().clamp(-POWER_MAX, POWER_MAX);
-        let power = &self.powers[backend as usize][size.kind];
-        let before = f64::from_bits(power.load(Ordering::Relaxed));
+        let seen = (took.as_secs_f64().max(1e-9) / formula_s(backend, size)).log2();
         // Where two pictures end at once, one of them may be forgotten.
-        power.store((before + STEP * (seen - before)).to_bits(), Ordering::Relaxed);
+        for (of, powers) in self.powers.iter().enumerate() {
+            let power = &powers[size.kind];
+            let before = f64::from_bits(power.load(Ordering::Relaxed));
+            let step = match of == backend as usize {
+                true => STEP * (seen - before).clamp(-SURPRISE_MAX, SURPRISE_MAX),
+                false => -FORGET * before,
+            };
+            power.store((before + step).clamp(-POWER_MAX, POWER_MAX).to_bits(), Ordering::Relaxed);
+        }
     }
 
     fn seconds(&self, backend: BackendKind, size: PlanSize) -> f64 {
@@ -150,7 +163,7 @@ mod tests {
     fn a_gpu_that_keeps_jobs_waiting_loses_them_until_it_is_quick_again() {
         let costs = CostModel::learning();
         let _busy = costs.begin_on_gpu();
-        let learn = |ms| (0..40).for_each(|_| costs.learn(BackendKind::Gpu, LARGE, Duration::from_millis(ms)));
+        let learn = |ms| (0..80).for_each(|_| costs.learn(BackendKind::Gpu, LARGE, Duration::from_millis(ms)));
         learn(20);
         assert!(costs.prefers_cpu(LARGE));
         learn(1);
@@ -163,11 +176,22 @@ mod tests {
     }
 
     #[test]
+    fn a_back_end_that_draws_nothing_is_tried_again() {
+        let costs = CostModel::learning();
+        let first = costs.seconds(BackendKind::Cpu, SMALL);
+        (0..40).for_each(|_| costs.learn(BackendKind::Cpu, SMALL, Duration::from_secs(1)));
+        let slow = costs.seconds(BackendKind::Cpu, SMALL);
+        (0..400).for_each(|_| costs.learn(BackendKind::Gpu, SMALL, Duration::from_micros(400)));
+        let again = costs.seconds(BackendKind::Cpu, SMALL);
+        assert!(slow > 10.0 * first && again < 1.1 * first, "{first} {slow} {again}");
+    }
+
+    #[test]
     fn one_picture_that_waited_for_long_changes_little() {
         let costs = CostModel::learning();
         let before = costs.seconds(BackendKind::Gpu, LARGE);
         costs.learn(BackendKind::Gpu, LARGE, Duration::from_secs(100));
         let after = costs.seconds(BackendKind::Gpu, LARGE);
-        assert!(after > before && after < 2.0 * before, "{before} {after}");
+        assert!(after > before && after < 1.1 * before, "{before} {after}");
     }
 }

@@ -68,7 +68,7 @@ impl Backends {
                 Ok(chosen) => Ok(chosen),
                 Err(DrawError::Stopped(stopped)) => Err(stopped.into()),
                 Err(error) => {
-                    // Where there is no GPU, the CPU takes nobody's place. The host has logged it.
+                    // Without a GPU the CPU is no substitute for one. The host has logged the reason.
                     let is_substitute = !matches!(error, DrawError::NoGpu(_));
                     if is_substitute {
                         tracing::warn!(%error, "the CPU draws this job");

@@ -16,8 +16,8 @@ cargo xtask COMMAND
   test FILTER...             tests of the suite whose names contain a filter
   bless pictures|schema|tables|examples
                              store what tests compare with anew, then test against it
-  bench [accuracy|load|stages] [OPTIONS]
-                             measure error and time (accuracy), or a server under load
+  bench [accuracy|load|cached|browse|gpu|stages] [OPTIONS]
+                             measure error and time (accuracy), a server, a GPU, or stages
   goals                      measure the goals of docs/accuracy.md that tests hold
   gallery [cpu|gpu]          draw docs/gallery anew
   fuzz SECONDS [TARGET...]   fuzz all targets, or the named ones

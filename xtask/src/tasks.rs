@@ -75,7 +75,7 @@ pub fn bless(name: &str) -> Result {
 /// A benchmark by name; accuracy where none is named.
 pub fn bench(arguments: &[&str]) -> Result {
     let (name, options) = match arguments {
-        [name @ ("accuracy" | "load" | "stages"), options @ ..] => (*name, options),
+        [name @ ("accuracy" | "load" | "cached" | "browse" | "gpu" | "stages"), options @ ..] => (*name, options),
         options => ("accuracy", options),
     };
     let mut command = cargo(&["bench", "--locked", "--bench", name, "--"]);

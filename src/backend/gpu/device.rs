@@ -3,14 +3,14 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, mpsc};
+use std::sync::{Arc, Mutex, OnceLock, TryLockError, mpsc};
 use std::thread;
 use std::time::Duration;
 
 use super::buffers::SpareBuffers;
 use super::handles::Handles;
 use super::residents::ResidentBuffers;
-use super::submissions::Submissions;
+use super::schedule::sizes::ALONE_SIZE;
 use crate::backend::gpu::pipelines::file::PipelineFile;
 use crate::backend::gpu::pipelines::{Kernel, Pipelines};
 use crate::backend::{DrawError, GpuDevice, GpuInfo, GpuKind, Renderer};
@@ -21,7 +21,8 @@ use crate::limits::Deadline;
 pub enum AtomicsChoice {
     /// 64-bit atomics where the device has them.
     Best,
-    /// Two passes of 32-bit atomics, as on a device without; for tests.
+    /// Two passes of 32-bit atomics, as on a device without; for tests. A software device then shares few
+    /// triangles among its threads as hardware does.
     Force32,
 }
 
@@ -30,9 +31,10 @@ pub struct Gpu {
     pub(super) handles: Handles,
     pub(super) pipelines: Pipelines,
     pub(super) spare_buffers: SpareBuffers,
-    pub(super) submissions: Submissions,
     pub(super) residents: ResidentBuffers<wgpu::Buffer>,
     pub(super) int64_atomics: bool,
+    /// Size of the largest triangle that a thread draws by itself where there are few, 1/256 px.
+    pub(super) alone_size_of_few: i32,
     /// Nanoseconds of a step of its clock, if it has one.
     pub(super) clock_step_ns: Option<f32>,
     info: GpuInfo,
@@ -49,7 +51,7 @@ pub struct Gpu {
 /// A job that a device draws, until this is dropped.
 pub(super) struct Drawing<'a> {
     jobs: &'a AtomicUsize,
-    /// True if no other job was there when this one began.
+    /// True if no other job was being drawn when this one began.
     pub is_alone: bool,
 }
 
@@ -61,6 +63,9 @@ const SOFTWARE_PIPELINE_JOBS: u32 = 128;
 /// Memory for what stays on a device, bytes; and on a software one, whose memory is the process's.
 const RESIDENT_BYTES: u64 = 1 << 30;
 const RESIDENT_BYTES_SOFTWARE: u64 = 64 << 20;
+
+/// [`Gpu::alone_size_of_few`] of hardware: 4 px. Larger triangles are drawn by a workgroup each.
+const ALONE_SIZE_OF_FEW: i32 = 1024;
 
 /// The reason once the device is lost.
 type Lost = Arc<OnceLock<String>>;
@@ -81,7 +86,7 @@ const HUNG_AFTER: Duration = Duration::from_secs(120);
 impl Gpu {
     /// Opens the best adapter of the given kind. Its pipelines are kept in the folder `cache`, for the
     /// next process.
-    pub fn open(kind: GpuKind, atomics: AtomicsChoice, cache: Option<&Path>) -> Result<Self, DrawError> {
+    pub fn open(kind: GpuKind, atomics_choice: AtomicsChoice, cache: Option<&Path>) -> Result<Self, DrawError> {
         let adapter = find_adapter(kind)?;
         let info = adapter.get_info();
         let limits = adapter.limits();
@@ -90,7 +95,7 @@ impl Gpu {
             return Err(no_gpu(format!("{} binds {has} storage buffers, and {STORAGE_BUFFERS} are needed", info.name)));
         }
         let int64 = wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX;
-        let int64_atomics = atomics == AtomicsChoice::Best && adapter.features().contains(int64);
+        let int64_atomics = atomics_choice == AtomicsChoice::Best && adapter.features().contains(int64);
         let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::PIPELINE_CACHE;
         let atomics = if int64_atomics { int64 } else { wgpu::Features::empty() };
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
@@ -126,9 +131,13 @@ impl Gpu {
             handles: Handles { device, queue, limits },
             pipelines: Pipelines::kept_in(file),
             spare_buffers: SpareBuffers::default(),
-            submissions: Submissions::default(),
             residents: ResidentBuffers::new(if is_software { RESIDENT_BYTES_SOFTWARE } else { RESIDENT_BYTES }),
             int64_atomics,
+            alone_size_of_few: if is_software && atomics_choice == AtomicsChoice::Best {
+                ALONE_SIZE
+            } else {
+                ALONE_SIZE_OF_FEW
+            },
             clock_step_ns,
             info,
             lost,
@@ -231,11 +240,20 @@ impl Gpu {
         Ok(())
     }
 
-    /// Runs `work` and turns the device's errors on this thread into an error: its loss, above all.
+    /// Runs `work` and turns the device's errors on this thread into an error.
     pub(super) fn scoped<T>(&self, work: impl FnOnce() -> Result<T, DrawError>) -> Result<T, DrawError> {
-        let result = self.handles.scoped(work);
+        use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
+        let [a, b, c] = [Internal, OutOfMemory, Validation].map(|filter| self.handles.device.push_error_scope(filter));
+        let result = work();
+        // Innermost first. On wgpu's own back-ends these futures are ready at once.
+        let errors = [c, b, a].map(|scope| pollster::block_on(scope.pop()));
         self.check()?;
-        result
+        // Whatever went wrong first on the device is the cause of what `work` saw.
+        match (errors.into_iter().flatten().next(), result) {
+            (_, Err(DrawError::Stopped(stopped))) => Err(DrawError::Stopped(stopped)),
+            (Some(error), _) => Err(DrawError::Device(error.to_string())),
+            (None, result) => result,
+        }
     }
 
     /// Waits until a callback of the device has sent a value, and polls the deadline meanwhile.
@@ -266,7 +284,11 @@ impl Gpu {
     /// Runs the callbacks that are due, unless another thread is at it: its polls run ours too, and many
     /// that poll at once hold up those that submit.
     fn poll(&self) -> Result<(), DrawError> {
-        let Ok(_polling) = self.polling.try_lock() else { return Ok(()) };
+        let _polling = match self.polling.try_lock() {
+            Err(TryLockError::WouldBlock) => return Ok(()),
+            Err(TryLockError::Poisoned(polling)) => polling.into_inner(),
+            Ok(polling) => polling,
+        };
         // Real device loss panics inside poll, whatever handlers are set.
         match catch_unwind(AssertUnwindSafe(|| self.handles.device.poll(wgpu::PollType::Poll))) {
             Ok(Ok(_)) => Ok(()),

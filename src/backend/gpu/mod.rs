@@ -1,7 +1,7 @@
 //! The wgpu back-end: the CPU's stages as compute shaders, headless.
 //!
 //! In reading order: `device` opens a GPU; `schedule` computes the dispatches for a plan;
-//! `recorder` turns them into commands, `submissions` hands them over; `pipelines` holds each kernel's source, bindings and
+//! `recorder` turns them into commands; `pipelines` holds each kernel's source, bindings and
 //! specialisation; `stage_clock` times the stages; `params` holds the uniforms, `buffers` a job's memory,
 //! `residents` what stays in memory for the next job, `pass_mask` the passes over triangles.
 //!
@@ -18,7 +18,6 @@ mod recorder;
 mod residents;
 pub(super) mod schedule;
 mod stage_clock;
-mod submissions;
 
 use std::sync::Arc;
 
@@ -209,6 +208,7 @@ fn traits(gpu: &Gpu) -> DeviceTraits {
         binding_bytes_max: gpu.handles.limits.max_storage_buffer_binding_size.min(gpu.handles.limits.max_buffer_size),
         workgroups_max: gpu.handles.limits.max_compute_workgroups_per_dimension,
         tile_workgroups: if gpu.is_software() { TILE_WORKGROUPS_SOFTWARE } else { TILE_WORKGROUPS },
+        alone_size_of_few: gpu.alone_size_of_few,
         int64_atomics: gpu.int64_atomics,
         loops_are_limited: gpu.is_software(),
     }

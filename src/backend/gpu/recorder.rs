@@ -175,7 +175,7 @@ impl<'a> Recorder<'a> {
                 // A job that has given up has dropped the receiver.
                 let _ = sender.send(());
             });
-            self.gpu.submissions.submit(&self.gpu.handles, encoder)?;
+            self.gpu.handles.queue.submit([encoder.finish()]);
             if let Some(before) = self.in_flight.replace(done) {
                 self.gpu.wait(&before, self.deadline)?;
             }

@@ -1,7 +1,7 @@
 //! The duration of each stage on the device, by its own clock.
 //!
-//! Jobs are timed that are alone on the device: writing times between the stages keeps an NVIDIA H200 busy
-//! for a third of a small job's time, and other jobs would wait for that.
+//! Only jobs that find the device idle are timed: times between the stages take time themselves, for which
+//! other jobs would wait (docs/gpu-notes.md).
 
 use std::time::Duration;
 

@@ -1,8 +1,8 @@
 //! Estimates of how long jobs take, learnt from the jobs that have ended.
 //!
-//! An estimate is a formula of the job's size (bytes and samples), times a factor. There is a factor for
-//! each kind of job and, as soon as one of them has ended, for the same kind of job on the same stored mesh:
-//! a stored mesh is asked for again and again, and its size in bytes says little about what it takes.
+//! An estimate is a formula of the job's size (bytes that are to be read, and samples), times a factor. There
+//! is a factor for each kind of job, and one for each kind of job on a stored mesh that was drawn before:
+//! such a mesh is asked for again and again, and its size in bytes says little about what it takes.
 
 use std::hash::{BuildHasher as _, RandomState};
 use std::sync::{Mutex, PoisonError};
@@ -13,8 +13,8 @@ use quick_cache::sync::Cache;
 use super::job::{Task, Work};
 use crate::spec::{BackendChoice, Spec};
 
-/// Nanoseconds of the formula: for any job, for each byte of the files, for each sample of the picture.
-/// They give the factors a sensible start, and weigh bytes against samples.
+/// Nanoseconds of the formula: for any job, for each byte that is to be read, for each sample of the
+/// picture. They give the factors a sensible start, and weigh bytes against samples.
 const JOB_NS: f64 = 500_000.0;
 const BYTE_NS: f64 = 5.0;
 const SAMPLE_NS: f64 = 5.0;
@@ -25,16 +25,20 @@ const STEP: f64 = 0.125;
 /// The same for a mesh, of which few jobs are known.
 const MESH_STEP: f64 = 0.5;
 
-/// The largest factor, and the inverse of the smallest, as a power of two. One job that waited for a
-/// driver says little about the next.
+/// Farthest that one job may seem to lie from a kind's factor, as a power of two: one that waited for a
+/// driver, or that was made to be slow, says little about the next.
+const SURPRISE_MAX: f64 = 3.0;
+
+/// The largest factor, and the inverse of the smallest, as a power of two.
 const POWER_MAX: f64 = 14.0;
 
-/// Stored meshes whose factors are kept, times the kinds of jobs. The least used go first.
+/// Pairs of a stored mesh and a kind of job whose factors are kept. The least used go first.
 const MESHES: usize = 4096;
 
-/// Numbers of kinds of tasks, and of kinds of jobs: each task by the CPU, and by whoever is there.
+/// Numbers of kinds of tasks, and of kinds of jobs: each task on the CPU or on any back-end, of a mesh that
+/// is to be read or of one that was drawn before.
 const TASKS: usize = 4;
-const KINDS: usize = 2 * TASKS;
+const KINDS: usize = 4 * TASKS;
 
 /// What is known about the durations of jobs.
 #[derive(Debug)]
@@ -52,9 +56,11 @@ pub struct Size {
     /// The duration by the formula, seconds.
     formula_s: f64,
     kind: usize,
-    /// A hash of the mesh's key and the kind, if the mesh is stored. Two that are equal by chance make an
+    /// A hash of the mesh's key and the task, if the mesh is stored. Two that are equal by chance make an
     /// estimate worse, and nothing else.
     mesh: Option<u64>,
+    /// True for a mesh that was drawn before, and so is likely to be in memory.
+    is_known: bool,
 }
 
 impl Estimates {
@@ -72,15 +78,18 @@ impl Estimates {
             }
             Task::Inspect { .. } => 0.0,
         };
-        let formula_ns = JOB_NS + BYTE_NS * work.bundle.bytes_len() as f64 + SAMPLE_NS * samples;
         let kind = kind(&work.task);
         let mesh = work.mesh_key.as_ref().map(|key| self.hasher.hash_one((kind, key)));
-        Size { formula_s: formula_ns * 1e-9, kind, mesh }
+        let is_known = mesh.is_some_and(|mesh| self.meshes.get(&mesh).is_some());
+        let bytes = if is_known { 0 } else { work.bundle.bytes_len() };
+        let formula_ns = JOB_NS + BYTE_NS * bytes as f64 + SAMPLE_NS * samples;
+        Size { formula_s: formula_ns * 1e-9, kind: kind + if is_known { 2 * TASKS } else { 0 }, mesh, is_known }
     }
 
     /// The time for which a job of this size is likely to occupy a worker.
     pub fn estimate(&self, size: Size) -> Duration {
-        let power = size.mesh.and_then(|mesh| self.meshes.get(&mesh)).unwrap_or_else(|| self.locked()[size.kind]);
+        let of_mesh = size.mesh.filter(|_| size.is_known).and_then(|mesh| self.meshes.get(&mesh));
+        let power = of_mesh.unwrap_or_else(|| self.locked()[size.kind]);
         Duration::from_secs_f64(size.formula_s * power.exp2())
     }
 
@@ -89,11 +98,14 @@ impl Estimates {
         let seen = (took.as_secs_f64().max(1e-9) / size.formula_s).log2().clamp(-POWER_MAX, POWER_MAX);
         let mut kinds = self.locked();
         let power = &mut kinds[size.kind];
-        *power += STEP * (seen - *power);
+        *power += STEP * (seen - *power).clamp(-SURPRISE_MAX, SURPRISE_MAX);
+        // What a mesh takes that was drawn before, if nothing else is known.
+        let usual = if size.is_known { *power } else { kinds[size.kind + 2 * TASKS] };
         drop(kinds);
         if let Some(mesh) = size.mesh {
-            let power = self.meshes.get(&mesh).map_or(seen, |power| power + MESH_STEP * (seen - power));
-            self.meshes.insert(mesh, power);
+            let power = self.meshes.get(&mesh).unwrap_or(usual);
+            let step = if size.is_known { MESH_STEP * (seen - power) } else { 0.0 };
+            self.meshes.insert(mesh, power + step);
         }
     }
 
@@ -121,9 +133,10 @@ fn kind(task: &Task) -> usize {
 mod tests {
     use super::*;
 
-    /// A plain job that takes so many milliseconds by the formula.
+    /// A plain job that takes so many milliseconds by the formula, perhaps on a mesh that was drawn before.
     fn size(formula_ms: f64, mesh: Option<u64>) -> Size {
-        Size { formula_s: formula_ms * 1e-3, kind: 1, mesh }
+        let is_known = mesh.is_some();
+        Size { formula_s: formula_ms * 1e-3, kind: 1 + if is_known { 2 * TASKS } else { 0 }, mesh, is_known }
     }
 
     fn ms(estimates: &Estimates, size: Size) -> f64 {
@@ -134,22 +147,36 @@ mod tests {
     fn estimates_come_near_to_what_jobs_take_and_grow_with_their_size() {
         let estimates = Estimates::new();
         assert!((ms(&estimates, size(2.0, None)) - 2.0).abs() < 1e-6);
-        for _ in 0..60 {
+        for _ in 0..80 {
             estimates.learn(size(2.0, None), Duration::from_millis(20));
         }
         assert!((ms(&estimates, size(2.0, None)) - 20.0).abs() < 0.1);
         assert!((ms(&estimates, size(4.0, None)) - 40.0).abs() < 0.2);
         let other = Size { kind: 2, ..size(2.0, None) };
         assert!((ms(&estimates, other) - 2.0).abs() < 1e-6, "other kinds of jobs");
+        assert!((ms(&estimates, size(2.0, Some(7))) - 2.0).abs() < 1e-6, "nothing is read of a mesh in memory");
     }
 
     #[test]
-    fn a_stored_mesh_is_known_after_one_job_and_says_little_about_others() {
+    fn a_slow_mesh_is_soon_known_and_says_little_about_others() {
         let estimates = Estimates::new();
-        estimates.learn(size(1.0, Some(7)), Duration::from_secs(5));
-        assert!((ms(&estimates, size(1.0, Some(7))) - 5000.0).abs() < 1.0);
-        let other = ms(&estimates, size(1.0, Some(8)));
-        assert!(other > 1.0 && other < 5.0, "{other}");
+        let slow = size(1.0, Some(7));
+        estimates.learn(slow, Duration::from_secs(4));
+        assert!(ms(&estimates, slow) < 100.0, "it may have waited for a driver");
+        for _ in 0..6 {
+            estimates.learn(slow, Duration::from_secs(4));
+        }
+        let (slow, other) = (ms(&estimates, slow), ms(&estimates, size(1.0, Some(8))));
+        assert!((2000.0..4000.0).contains(&slow), "{slow}");
+        assert!(other < 10.0, "{other}");
+    }
+
+    #[test]
+    fn a_mesh_that_is_read_first_is_thought_to_be_quick_then() {
+        let estimates = Estimates::new();
+        let first = Size { mesh: Some(7), ..size(1.0, None) };
+        estimates.learn(first, Duration::from_secs(4));
+        assert!(ms(&estimates, size(1.0, Some(7))) < 1.1);
     }
 
     #[test]

@@ -7,9 +7,9 @@
 //! its place and its memory.
 //!
 //! Short jobs overtake long ones: a job ranks as if it had been accepted later by [`PATIENCE`] times its
-//! estimate, at most a quarter of the time that a job may take. A job is refused that would not begin and
-//! end within the other three quarters. So an accepted job ends in time, as far as the estimates are right:
-//! only what is accepted in the first quarter of its time can overtake it.
+//! estimate, at most a quarter of the time that a job may take. A job is refused if it, or any job that it
+//! might overtake, would then not end within the other three quarters. So an accepted job ends in time, as
+//! far as the estimates are right: only what is accepted in the first quarter of its time can overtake it.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -105,7 +105,7 @@ impl JobRegistry {
     /// Queues work. A kept job can be found by its id until its result expires.
     pub fn submit(&self, work: Work, is_kept: bool) -> Result<Arc<Job>, Refusal> {
         let size = self.estimates.size(&work);
-        let estimate = self.estimates.estimate(size);
+        let estimate = self.estimates.estimate(size).min(self.settings.job_time);
         let mut inner = self.lock();
         self.check(&inner, estimate)?;
         inner.serial += 1;
@@ -261,17 +261,23 @@ impl JobRegistry {
             return Err(Refusal::QueueFull { queue, retry_after_s: retry_after_s(wait) });
         }
         let limit = self.settings.job_time;
-        let ends = wait.saturating_add(estimate);
+        let longest = inner.queue.values().map(|(job, _)| job.estimate).fold(estimate, Duration::max);
+        let ends = wait.saturating_add(longest);
         // A job that begins at once is never refused for its estimate alone.
         if inner.queue.len() >= idle && ends > limit / 4 * 3 {
-            let retry_after_s = retry_after_s((ends - limit / 4 * 3).min(wait));
-            return Err(Refusal::TooLate { wait_ms: to_ms(wait), limit_ms: to_ms(limit), retry_after_s });
+            let (wait_ms, takes_ms) = (to_ms(wait), to_ms(estimate));
+            let retry_after_s = retry_after_s(ends - limit / 4 * 3);
+            return Err(Refusal::TooLate { wait_ms, takes_ms, limit_ms: to_ms(limit), retry_after_s });
         }
         Ok(())
     }
 
-    /// Time until the jobs that were accepted are done, as far as the estimates know.
+    /// Time until the jobs that were accepted are done, as far as the estimates know. None while a worker is
+    /// idle.
     fn wait(&self, inner: &Inner) -> Duration {
+        if inner.queue.len() + inner.running.len() < self.settings.workers {
+            return Duration::ZERO;
+        }
         let limit = self.settings.job_time;
         let running: Duration = inner.running.values().map(|running| running.remaining(limit)).sum();
         (inner.queued_time + running) / u32::try_from(self.settings.workers.max(1)).unwrap_or(u32::MAX)

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
+use super::registry::Next;
 use super::*;
 use crate::backend::{BackendKind, DrawTimes};
 use crate::image::ImageFormat;
@@ -15,9 +16,6 @@ use crate::spec::color::Rgba;
 use crate::spec::{BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, ProjectionKind, Spec};
 
 const SOON: Duration = Duration::from_secs(10);
-
-/// The time that a job takes whose mesh is "nap".
-const NAP: Duration = Duration::from_millis(50);
 
 fn settings() -> JobSettings {
     JobSettings {
@@ -31,13 +29,11 @@ fn settings() -> JobSettings {
     }
 }
 
-/// Work on a mesh that is stored if it is a nap: how long a stored mesh takes is known after one job.
 fn work(budget: &Arc<UploadBudget>, mesh: &'static [u8]) -> Work {
     let mut reservation = budget.reserve();
     reservation.grow(mesh.len() as u64).unwrap();
-    let mesh_key = (mesh == b"nap").then(|| "nap".to_owned());
     let (bundle, task) = (Bundle::of_one(Bytes::from_static(mesh)), Task::Draw(Box::new(spec())));
-    Work { bundle, format_in: None, mesh_key, task, memory: Arc::new(reservation) }
+    Work { bundle, format_in: None, mesh_key: None, task, memory: Arc::new(reservation) }
 }
 
 /// Any specification: the fake renderer does not read it.
@@ -90,10 +86,6 @@ fn fake_render(work: &Work, deadline: &Deadline, gate: &Mutex<Receiver<()>>) -> 
         b"panic" => panic!("asked to"),
         b"wait" => {
             gate.lock().unwrap().recv_timeout(SOON).map_or(Err(RenderError::Stopped(Stopped)), |()| Ok(output(1)))
-        }
-        b"nap" => {
-            std::thread::sleep(NAP);
-            Ok(output(1))
         }
         b"spin" => loop {
             deadline.check()?;
@@ -274,54 +266,81 @@ fn results_are_kept_for_a_while_and_within_their_memory() {
     assert_eq!(short_lived.jobs.load(), JobLoad::default());
 }
 
-#[test]
-fn a_job_that_cannot_end_in_time_is_refused_at_once() {
-    let fixture = fixture(JobSettings { queue: 1000, job_time: 10 * NAP, ..settings() });
-    assert!(matches!(wait(&fixture.submit(b"nap", false).unwrap()), JobState::Done(_)));
-    let accepted: Vec<_> = std::iter::from_fn(|| fixture.submit(b"nap", false).ok()).take(100).collect();
-    let refusal = fixture.submit(b"nap", false).unwrap_err();
-    assert!(matches!(refusal, Refusal::TooLate { wait_ms: 1.., limit_ms: 500, retry_after_s: 1 }), "{refusal:?}");
-    // Three quarters of the time are room for 7 naps. A nap takes somewhat longer on a busy machine.
-    assert!((3..=8).contains(&accepted.len()), "{}", accepted.len());
-    assert!(fixture.jobs.load().wait >= NAP);
-    assert!(accepted.iter().all(|job| matches!(wait(job), JobState::Done(_))), "what was accepted ends in time");
-    assert!(matches!(wait(&fixture.submit(b"nap", false).unwrap()), JobState::Done(_)), "there is time again");
+/// A registry without threads, for jobs that are thought to take 1 s, and reports that are thought to take
+/// `report`.
+fn registry(workers: usize, report: Duration, job_time: Duration) -> (JobRegistry, Arc<UploadBudget>) {
+    let registry = JobRegistry::new(JobSettings { workers, queue: 1000, job_time, ..settings() });
+    let budget = UploadBudget::new(1 << 20);
+    for _ in 0..200 {
+        registry.estimates.learn(registry.estimates.size(&work(&budget, b"1")), Duration::from_secs(1));
+        registry.estimates.learn(registry.estimates.size(&report_on(&budget)), report);
+    }
+    (registry, budget)
 }
 
-#[test]
-fn a_job_that_begins_at_once_is_never_refused_for_its_estimate() {
-    let fixture = fixture(JobSettings { job_time: NAP / 2, ..settings() });
-    for _ in 0..3 {
-        // It ends too late, and the server knows that from the first on.
-        assert!(matches!(wait(&fixture.submit(b"nap", false).unwrap()), JobState::Failed(_)));
-        while fixture.jobs.load().running > 0 {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+fn report_on(budget: &Arc<UploadBudget>) -> Work {
+    Work { task: Task::Inspect { time_s: None }, ..work(budget, b"1") }
+}
+
+/// Gives each worker a job of 1 s.
+fn occupy_all(registry: &JobRegistry, budget: &Arc<UploadBudget>) {
+    for _ in 0..registry.settings.workers {
+        registry.submit(work(budget, b"1"), false).unwrap();
+        assert!(matches!(registry.take(None), Next::Job(..)));
     }
 }
 
 #[test]
-fn short_jobs_overtake_long_ones_for_a_while() {
-    let fixture = fixture(JobSettings { queue: 1000, job_time: 40 * NAP, ..settings() });
-    assert!(matches!(wait(&fixture.submit(b"nap", false).unwrap()), JobState::Done(_)));
-    fixture.occupy();
-    let long = fixture.submit(b"nap", false).unwrap();
-    let short = fixture.submit(b"1", false).unwrap();
-    fixture.open.send(()).unwrap();
-    assert!(matches!(wait(&short), JobState::Done(_)));
-    assert!(!long.state().is_final(), "the short job was first");
-    assert!(matches!(wait(&long), JobState::Done(_)));
+fn a_job_that_cannot_end_in_time_is_refused_at_once() {
+    let (registry, budget) = registry(2, Duration::from_secs(1), Duration::from_secs(40));
+    assert_eq!(registry.load().wait, Duration::ZERO);
+    occupy_all(&registry, &budget);
+    let accepted: Vec<_> = std::iter::from_fn(|| registry.submit(work(&budget, b"1"), false).ok()).take(500).collect();
+    // Each worker has one; 57 more, and the one that is asked for, fill the 30 s of both. A second or two more
+    // or less is the time that this took.
+    assert!((54..=60).contains(&accepted.len()), "{}", accepted.len());
+    let refusal = registry.submit(work(&budget, b"1"), false).unwrap_err();
+    assert!(
+        matches!(refusal, Refusal::TooLate { wait_ms: 27_000..=30_000, limit_ms: 40_000, retry_after_s: 1..=3, .. }),
+        "{refusal:?}"
+    );
+    assert!(registry.load().wait > Duration::from_secs(27));
+    accepted.iter().for_each(|job| registry.end(job, JobState::Cancelled));
+    assert!(registry.submit(work(&budget, b"1"), false).is_ok(), "there is time again");
+}
 
-    fixture.occupy();
-    let long = fixture.submit(b"nap", false).unwrap();
-    // Its patience is four times as long as it takes.
-    std::thread::sleep(6 * NAP);
-    let short = fixture.submit(b"1", false).unwrap();
-    fixture.open.send(()).unwrap();
-    assert!(matches!(wait(&long), JobState::Done(_)));
-    assert!(long.accepted < short.accepted && !matches!(short.state(), JobState::Failed(_)));
-    let order = [&long, &short].map(|job| job.rank);
-    assert!(order[0] < order[1], "{order:?}");
+#[test]
+fn a_job_that_begins_at_once_is_never_refused_for_its_estimate() {
+    let (registry, budget) = registry(1, Duration::from_secs(1000), Duration::from_secs(4));
+    let job = registry.submit(report_on(&budget), false).unwrap();
+    assert_eq!(job.estimate, registry.settings.job_time, "no job takes longer");
+    assert!(matches!(registry.submit(report_on(&budget), false), Err(Refusal::TooLate { .. })));
+}
+
+#[test]
+fn short_jobs_overtake_long_ones_for_a_while() {
+    let (registry, budget) = registry(1, Duration::from_secs(8), Duration::from_secs(40));
+    occupy_all(&registry, &budget);
+    let long = registry.submit(report_on(&budget), false).unwrap();
+    let short = registry.submit(work(&budget, b"1"), false).unwrap();
+    // 4 s and, at most, a quarter of 40 s behind.
+    assert!((5..7).contains(&(long.rank - short.rank).as_secs()), "{:?} {:?}", long.rank, short.rank);
+    for expected in [short, long] {
+        let Next::Job(job, _) = registry.take(None) else { panic!("no job") };
+        assert_eq!(job.id, expected.id);
+        registry.finish(&job, JobState::Cancelled, Duration::ZERO);
+    }
+}
+
+/// However many short jobs overtake a long one, each worker has time for it.
+#[test]
+fn a_long_job_that_was_accepted_keeps_its_time() {
+    let (registry, budget) = registry(2, Duration::from_secs(20), Duration::from_secs(40));
+    occupy_all(&registry, &budget);
+    let long = registry.submit(report_on(&budget), false).unwrap();
+    let overtaking = std::iter::from_fn(|| registry.submit(work(&budget, b"1"), false).ok()).take(500);
+    let before: Duration = overtaking.filter(|job| job.rank < long.rank).map(|job| job.estimate).sum();
+    assert!(before >= Duration::from_secs(1) && before / 2 + long.estimate < Duration::from_secs(30), "{before:?}");
 }
 
 #[test]

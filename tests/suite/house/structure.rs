@@ -123,6 +123,7 @@ const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("tokio::", &["service/", "main.rs", "cli", "telemetry"]),
     ("std::fs", &["cli", "config", "main.rs", "service/http/", "backend/gpu/pipelines/file.rs"]),
     ("std::env", &["cli", "config", "main.rs", "telemetry"]),
+    // Who draws may depend on what both back-ends took: decision 22.
     ("Instant::now", &["cli", "service/", "telemetry", "main.rs", "backend/cpu/stopwatch.rs", "backend/costs.rs"]),
     ("SystemTime", &["cli", "service/", "telemetry", "main.rs"]),
 ];

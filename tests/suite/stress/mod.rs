@@ -1,4 +1,5 @@
-//! Extreme numbers: the changes to a picture that they may cause, and those that they may not.
+//! Extreme numbers, and events in any order: the changes to a picture that they may cause, and those that they
+//! may not.
 
 pub mod depth;
 pub mod faces;

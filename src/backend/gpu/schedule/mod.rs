@@ -30,9 +30,10 @@ pub const PIECES_MAX: u32 = 6;
 ///
 /// The most that a job within all other limits takes: of 4096 rows at 4 samples, layers make 32
 /// bands of 128 rows. In each, 10 million triangles that may need clipping are 77 chunks, for the
-/// surface and 16 layers, filled and hull, in two phases: 17 * 77 * 2 * 2 = 5236. 64 passes of 30
-/// million edges are 29 chunks each and three more for their coverage, 2048. That makes 0.23
-/// million. Margin rows are no bands of their own and do not add to it.
+/// surface and 16 layers, filled and hull, in two phases: 17 * 77 * 2 * 2 = 5236. A pass of 30
+/// million edges that may be long is 229 chunks and three more for its coverage; 48 such passes are
+/// 11,136. That makes 0.52 million; a job with more is refused. Margin rows are no bands of their own
+/// and do not add to it.
 const BATCHES_MAX: usize = 1 << 19;
 
 /// Threads of a workgroup, in every kernel.

@@ -42,12 +42,17 @@ pub struct DeviceTraits {
     pub workgroups_max: u32,
     /// Workgroups that share the large triangles.
     pub tile_workgroups: u32,
+    /// Size of the largest triangle that a thread draws by itself where there are few, 1/256 px.
+    pub alone_size_of_few: i32,
     /// 64-bit atomics.
     pub int64_atomics: bool,
     /// True if a thread's loops are cut off after a number of iterations: see
     /// [`Tiles`](super::tiles::Tiles).
     pub loops_are_limited: bool,
 }
+
+/// The size of the largest triangle that a thread may draw by itself, 1/256 px: its edge values fit 32 bits.
+pub const ALONE_SIZE: i32 = 4096;
 
 /// Division of the picture into bands of rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,6 +129,7 @@ pub fn bands_bytes(plan: &DrawPlan<'_>) -> u64 {
         binding_bytes_max: u64::MAX,
         workgroups_max: u32::MAX,
         tile_workgroups: 1,
+        alone_size_of_few: ALONE_SIZE,
         int64_atomics: true,
         loops_are_limited: false,
     };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::sizes::DeviceTraits;
+use super::sizes::{ALONE_SIZE, DeviceTraits};
 use crate::plan::{DrawPlan, Edge, Faces, LinePass, PeelingPass, Projection, Shown, SurfacePass, pass_mask};
 
 /// A software adapter.
@@ -10,6 +10,7 @@ pub const DEVICE: DeviceTraits = DeviceTraits {
     binding_bytes_max: 128 << 20,
     workgroups_max: 65_535,
     tile_workgroups: 64,
+    alone_size_of_few: ALONE_SIZE,
     int64_atomics: false,
     loops_are_limited: true,
 };

@@ -1,6 +1,6 @@
 //! Number of runs of the kernel that draws large triangles.
 
-use super::sizes::{Banding, DeviceTraits};
+use super::sizes::{ALONE_SIZE, Banding, DeviceTraits};
 use crate::plan::DrawPlan;
 
 /// Sample tests that may be handed to the device without looking at how many it really is: a second
@@ -13,12 +13,7 @@ pub const TILE_PX: u32 = 64;
 /// Triangles of this many pixels, wide or high, are shared out over all workgroups.
 pub const HUGE_PX: u32 = 128;
 
-/// The size of the largest triangle that a thread draws by itself, 1/256 px: its edge values fit 32 bits. And
-/// the same where there are few.
-const ALONE_SIZE: i32 = 4096;
-const ALONE_SIZE_OF_FEW: i32 = 1024;
-
-/// Fewer triangles than this leave threads of a real GPU idle.
+/// Fewer triangles than this in a dispatch leave most of a large GPU idle if each is drawn by one thread.
 const FEW_TRIANGLES: u32 = 1 << 15;
 
 /// Tiles of a large triangle, at most: three wide and high, because it need not begin where a tile
@@ -76,10 +71,9 @@ impl Tiles {
     }
 }
 
-/// The size of the largest triangle of so many that a thread draws by itself, 1/256 px. A few triangles
-/// leave most of a real GPU idle while each is drawn by one thread.
+/// The size of the largest triangle of so many that a thread draws by itself, 1/256 px.
 pub fn alone_size(count: u32, device: &DeviceTraits) -> i32 {
-    if count < FEW_TRIANGLES && !device.loops_are_limited { ALONE_SIZE_OF_FEW } else { ALONE_SIZE }
+    if count < FEW_TRIANGLES { device.alone_size_of_few } else { ALONE_SIZE }
 }
 
 #[cfg(test)]
@@ -89,7 +83,7 @@ mod tests {
 
     #[test]
     fn few_triangles_keep_a_real_gpu_busy() {
-        let real = DeviceTraits { loops_are_limited: false, ..DEVICE };
+        let real = DeviceTraits { alone_size_of_few: 1024, ..DEVICE };
         let sizes = [(968, &real), (1 << 20, &real), (968, &DEVICE)].map(|(count, device)| alone_size(count, device));
         assert_eq!(sizes, [1024, 4096, 4096]);
     }

@@ -49,9 +49,9 @@ pub async fn receive(state: &AppState, request: Request) -> Result<Received, Api
         request::read(None, &overrides, &state.rules).map_err(query::query_error)?;
     }
     // A picture that is in memory needs no worker. A document that names its mesh is short.
-    let names_mesh = body::is_json(request.headers())
+    let is_short_json = body::is_json(request.headers())
         && body::announced_length(request.headers()).is_some_and(|length| length <= DOCUMENT_BYTES_MAX);
-    if !names_mesh {
+    if !is_short_json {
         state.jobs.would_accept()?;
     }
 
