@@ -42,7 +42,7 @@ pub struct CostModel {
     on_gpu: AtomicU32,
 }
 
-/// What a cost depends on.
+/// The size of a plan, on which its cost depends.
 #[derive(Clone, Copy, Debug)]
 pub struct PlanSize {
     /// 1, triangles, samples, edges.

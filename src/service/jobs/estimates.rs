@@ -40,7 +40,7 @@ const MESHES: usize = 4096;
 const TASKS: usize = 4;
 const KINDS: usize = 4 * TASKS;
 
-/// What is known about the durations of jobs.
+/// Factors between the durations of jobs and the formula.
 #[derive(Debug)]
 pub struct Estimates {
     /// Powers of two of the factors, by kind.
@@ -50,7 +50,7 @@ pub struct Estimates {
     hasher: RandomState,
 }
 
-/// What an estimate depends on.
+/// The size of a job, on which its estimate depends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
     /// The duration by the formula, seconds.
@@ -99,7 +99,7 @@ impl Estimates {
         let mut kinds = self.locked();
         let power = &mut kinds[size.kind];
         *power += STEP * (seen - *power).clamp(-SURPRISE_MAX, SURPRISE_MAX);
-        // What a mesh takes that was drawn before, if nothing else is known.
+        // The factor of a mesh that was drawn before, if nothing else is known of it.
         let usual = if size.is_known { *power } else { kinds[size.kind + 2 * TASKS] };
         drop(kinds);
         if let Some(mesh) = size.mesh {

@@ -59,14 +59,15 @@ pub enum Refusal {
     },
     /// The jobs that were accepted before would leave too little time.
     #[error(
-        "the work that was accepted before takes about {wait_ms} ms and this job {takes_ms} ms, which is too near \
-         to the limit of {limit_ms} ms; try again in {retry_after_s} s"
+        "the work that was accepted before takes about {wait_ms} ms{}, which is too near to the limit of \
+         {limit_ms} ms; try again in {retry_after_s} s",
+        takes_ms.map(|ms| format!(" and this job {ms} ms")).unwrap_or_default()
     )]
     TooLate {
         /// Time until a worker would be free, as far as is known.
         wait_ms: u64,
-        /// Time that the job itself takes, as far as is known.
-        takes_ms: u64,
+        /// Time that the job itself takes, as far as is known; None before its upload.
+        takes_ms: Option<u64>,
         /// The longest time that a job may take, waiting included.
         limit_ms: u64,
         /// Seconds until there should be time enough.

@@ -58,7 +58,7 @@ struct Inner {
     serial: u64,
 }
 
-/// What a worker does next.
+/// The next step of a worker.
 pub enum Next {
     /// It does this job.
     Job(Arc<Job>, Work),
@@ -99,7 +99,7 @@ impl JobRegistry {
 
     /// Checks that a job would be accepted now.
     pub fn would_accept(&self) -> Result<(), Refusal> {
-        self.check(&self.lock(), Duration::ZERO)
+        self.check(&self.lock(), None)
     }
 
     /// Queues work. A kept job can be found by its id until its result expires.
@@ -107,7 +107,7 @@ impl JobRegistry {
         let size = self.estimates.size(&work);
         let estimate = self.estimates.estimate(size).min(self.settings.job_time);
         let mut inner = self.lock();
-        self.check(&inner, estimate)?;
+        self.check(&inner, Some(estimate))?;
         inner.serial += 1;
         let rank = self.began.elapsed() + (estimate * PATIENCE).min(self.settings.job_time / 4);
         let job = Arc::new(Job::new(work, is_kept, inner.serial, estimate, rank));
@@ -248,8 +248,8 @@ impl JobRegistry {
         }
     }
 
-    /// Checks that a job may be accepted of which this is known.
-    fn check(&self, inner: &Inner, estimate: Duration) -> Result<(), Refusal> {
+    /// Checks that a job may be accepted whose estimate is this, if it is known yet.
+    fn check(&self, inner: &Inner, estimate: Option<Duration>) -> Result<(), Refusal> {
         if inner.draining {
             return Err(Refusal::Draining);
         }
@@ -261,11 +261,12 @@ impl JobRegistry {
             return Err(Refusal::QueueFull { queue, retry_after_s: retry_after_s(wait) });
         }
         let limit = self.settings.job_time;
-        let longest = inner.queue.values().map(|(job, _)| job.estimate).fold(estimate, Duration::max);
+        let longest =
+            inner.queue.values().map(|(job, _)| job.estimate).fold(estimate.unwrap_or_default(), Duration::max);
         let ends = wait.saturating_add(longest);
         // A job that begins at once is never refused for its estimate alone.
         if inner.queue.len() >= idle && ends > limit / 4 * 3 {
-            let (wait_ms, takes_ms) = (to_ms(wait), to_ms(estimate));
+            let (wait_ms, takes_ms) = (to_ms(wait), estimate.map(to_ms));
             let retry_after_s = retry_after_s(ends - limit / 4 * 3);
             return Err(Refusal::TooLate { wait_ms, takes_ms, limit_ms: to_ms(limit), retry_after_s });
         }

@@ -304,6 +304,8 @@ fn a_job_that_cannot_end_in_time_is_refused_at_once() {
         matches!(refusal, Refusal::TooLate { wait_ms: 27_000..=30_000, limit_ms: 40_000, retry_after_s: 1..=3, .. }),
         "{refusal:?}"
     );
+    assert!(refusal.to_string().contains(" and this job "), "{refusal}");
+    assert!(!registry.would_accept().unwrap_err().to_string().contains("this job"), "nothing is known of it yet");
     assert!(registry.load().wait > Duration::from_secs(27));
     accepted.iter().for_each(|job| registry.end(job, JobState::Cancelled));
     assert!(registry.submit(work(&budget, b"1"), false).is_ok(), "there is time again");
