@@ -11,14 +11,15 @@ size=200
 columns=4
 # From the plainest look to the ones that look inside.
 looks=(
-  flat flat-derivative smooth unlit
-  three-point light-direction glow transparent
-  wire wire-lit hidden-line feature-edges
-  wire-fwidth wire-fwidth-min wire-barycentric wire-threshold
-  wireframe wireframe-fwidth boundary topology
-  outline-hull outline contour materials
-  debug-barycentric debug-min-barycentric debug-edge-distance debug-normal
-  debug-uv debug-face-orientation debug-vertex-color max-error
+  technical smooth flat flat-derivative
+  unlit three-point light-direction glow
+  transparent wire wire-lit hidden-line
+  feature-edges wire-fwidth wire-fwidth-min wire-barycentric
+  wire-threshold wireframe wireframe-fwidth boundary
+  topology outline-hull outline contour
+  materials debug-barycentric debug-min-barycentric debug-edge-distance
+  debug-normal debug-uv debug-face-orientation debug-vertex-color
+  max-error
 )
 for request in api/examples/*.json; do
   name=$(basename "$request" .json)

@@ -8,7 +8,7 @@
 //! Invariant: nothing from here down reads a file or the environment, or knows an async runtime. A
 //! clock is read to time the stages of drawing, and nothing depends on it.
 
-use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes};
+use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, GpuDevice};
 use crate::encode::{self, EncodeError};
 use crate::image::{Image, ImageFormat};
 use crate::import::{self, Bundle, Format, Imported, MeshError};
@@ -90,9 +90,23 @@ pub fn draw(
     warnings.extend(selected.iter().flat_map(|selected| selected.warnings.iter().cloned()));
     warnings.extend(plan::undrawn_primitives(&scene));
     warnings.extend(plan::out_of_view(&plan));
+    warnings.extend(plan.warnings.iter().cloned());
     let selection = selected.as_ref().map(|selected| selected.selection.clone());
     let (skips, Chosen { image, backend, draw_times, is_substitute }) = (plan.skips, drawn);
     Ok(Drawn { image, backend, is_substitute, draw_times, skips, warnings, selection })
+}
+
+/// Makes what a picture needs on a device and can be made without drawing, such as pipelines.
+pub fn make_ready(
+    model: &Model,
+    spec: &Spec,
+    device: &dyn GpuDevice,
+    budget: &mut Budget,
+    deadline: &Deadline,
+) -> Result<(), RenderError> {
+    let scene = Scene::new(&model.mesh, spec, budget)?;
+    let plan = plan::build_from(&scene, &model.prepared, budget, deadline)?;
+    Ok(device.make_ready(&plan)?)
 }
 
 /// Reports what is in a file.

@@ -112,9 +112,12 @@ fn edge(
 }
 
 fn shares_of(edge: vec4<u32>) -> u32 {
+    if !is_drawn(edge) {
+        return 0u;
+    }
     let s = segment_of(edge);
     let rows = rows_of(s.start.y, s.start.y + s.along.y);
-    if !s.drawn || rows.x > rows.y {
+    if !s.exists || rows.x > rows.y {
         return 0u;
     }
     // Rims are drawn first, because they mark the pixels that the other edges are drawn into.

@@ -17,15 +17,17 @@ struct Segment {
     inverse_length: f32,
     // Unit vector along; zero for a point.
     direction: vec2<f32>,
-    drawn: bool,
+    // False if nothing is left of it after clipping.
+    exists: bool,
 };
 
+// The edge on screen. Callers ask `is_drawn` first: compilers copy what is asked here into each of them.
 fn segment_of(edge: vec4<u32>) -> Segment {
     var a = vertices[edge.x];
     var b = vertices[edge.y];
-    var drawn = is_drawn(edge);
-    if drawn && (a.x == OUTSIDE || b.x == OUTSIDE) {
-        drawn = has(CLIPPED) && clip_segment(edge.xy, &a, &b);
+    var exists = true;
+    if a.x == OUTSIDE || b.x == OUTSIDE {
+        exists = has(CLIPPED) && clip_segment(edge.xy, &a, &b);
     }
     let half = vec2(frame.width, frame.height) * 128;
     let start = vec2<f32>(vec2(a.x, a.y) + half) * (1.0 / 256.0);
@@ -37,7 +39,7 @@ fn segment_of(edge: vec4<u32>) -> Segment {
         inverse = rsqrt(squared);
     }
     let ends = vec4(f32(a.x), f32(a.y), f32(b.x), f32(b.y));
-    return Segment(ends, vec2(a.z, b.z), start, along, rn(squared * inverse), inverse, rn2(along * inverse), drawn);
+    return Segment(ends, vec2(a.z, b.z), start, along, rn(squared * inverse), inverse, rn2(along * inverse), exists);
 }
 
 // Depth at t of the way.

@@ -5,6 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use super::{DrawError, Renderer};
+use crate::plan::DrawPlan;
 
 /// Knowledge about the machine before any driver is loaded. Loading Vulkan to find out costs time,
 /// and a software one brings a whole compiler with it.
@@ -61,6 +62,10 @@ pub trait GpuDevice: Send + Sync {
 
     /// A renderer on it, for one thread.
     fn renderer(self: Arc<Self>) -> Box<dyn Renderer>;
+
+    /// Makes what pictures of this plan's kind need and can be made without drawing. A device that gains
+    /// nothing by that does nothing.
+    fn make_ready(&self, plan: &DrawPlan<'_>) -> Result<(), DrawError>;
 }
 
 /// Opens a device.

@@ -4,7 +4,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
 
 use super::DrawError;
 use super::costs::CostModel;
@@ -21,6 +21,9 @@ pub struct GpuHost {
     without: OnceLock<String>,
     /// Held while a device is opened.
     device: Mutex<Slot>,
+    opening: Mutex<Opening>,
+    /// Notified when `opening` changes.
+    opening_changed: Condvar,
     /// Never held for long: reports must not wait for a driver.
     status: Mutex<GpuStatus>,
     /// Jobs in a row that lost the device.
@@ -37,6 +40,18 @@ struct Slot {
     opened_before: bool,
     /// Bits of the numbers of samples per pixel with which the current device has drawn the probe.
     probed: u32,
+}
+
+/// Progress of an opening, for threads that wait for its end.
+#[derive(Default)]
+enum Opening {
+    /// No device is being opened.
+    #[default]
+    None,
+    /// One is being opened.
+    Begun,
+    /// It is open, and draws its probe.
+    Probing(Arc<dyn GpuDevice>),
 }
 
 /// Reason of a failed opening.
@@ -67,7 +82,8 @@ impl GpuHost {
             let _ = without.set(reason);
         }
         let (device, status) = (Mutex::default(), Mutex::new(status));
-        Self { open, without, device, status, losses: AtomicU32::new(0), costs }
+        let (opening, opening_changed) = (Mutex::default(), Condvar::new());
+        Self { open, without, device, opening, opening_changed, status, losses: AtomicU32::new(0), costs }
     }
 
     /// The status. Does not wait for an opening.
@@ -91,13 +107,19 @@ impl GpuHost {
     }
 
     /// The device for a request of this kind. It is opened on first use, and draws the probe on first
-    /// use of a number of samples per pixel; other workers wait meanwhile.
+    /// use of a number of samples per pixel; other workers wait meanwhile. A thread that opens it calls
+    /// `opened` before it draws the probe, and one that waits may call it meanwhile.
     ///
     /// `NoGpu` is final. `DeviceLost` means that a device that was there is gone, and that another
     /// try may help.
-    pub fn device(&self, kind: GpuKind, samples: u32) -> Result<Arc<dyn GpuDevice>, DrawError> {
+    pub fn device(
+        &self,
+        kind: GpuKind,
+        samples: u32,
+        opened: &dyn Fn(&Arc<dyn GpuDevice>),
+    ) -> Result<Arc<dyn GpuDevice>, DrawError> {
         self.check_auto(kind)?;
-        let mut slot = self.device.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut slot = self.lock_device(opened);
         // The previous holder of the lock may have decided it.
         self.check_auto(kind)?;
         if let Some(device) = slot.current.clone() {
@@ -110,7 +132,7 @@ impl GpuHost {
         if let Some(reason) = &slot.failed {
             return Err(DrawError::NoGpu(reason.clone()));
         }
-        match self.open_and_probe(kind, samples) {
+        match self.open_and_probe(kind, samples, opened) {
             Ok(device) => {
                 slot.probed = samples;
                 self.opened(&mut slot, device, kind)
@@ -254,20 +276,57 @@ impl GpuHost {
         drop_catching_panics(device);
     }
 
-    fn open_and_probe(&self, kind: GpuKind, samples: u32) -> Result<Arc<dyn GpuDevice>, OpenError> {
+    fn open_and_probe(
+        &self,
+        kind: GpuKind,
+        samples: u32,
+        opened: &dyn Fn(&Arc<dyn GpuDevice>),
+    ) -> Result<Arc<dyn GpuDevice>, OpenError> {
         let attempt = || {
+            self.set_opening(Opening::Begun);
             let device = (self.open)(kind).map_err(|error| match error {
                 DrawError::NoGpu(reason) => OpenError::Absent(reason),
                 other => OpenError::Unusable(other.to_string()),
             })?;
             let name = device.info().name.clone();
+            self.set_opening(Opening::Probing(device.clone()));
+            opened(&device);
             probe(&mut *device.clone().renderer(), samples)
                 .map_err(|error| OpenError::Unusable(format!("{name}: {error}")))?;
             Ok(device)
         };
         // A panic in wgpu disables the GPU but does not fail the job.
-        catch_unwind(AssertUnwindSafe(attempt))
-            .unwrap_or_else(|_| Err(OpenError::Unusable("opening the GPU panicked; the log has more".to_owned())))
+        let result = catch_unwind(AssertUnwindSafe(attempt))
+            .unwrap_or_else(|_| Err(OpenError::Unusable("opening the GPU panicked; the log has more".to_owned())));
+        self.set_opening(Opening::None);
+        result
+    }
+
+    /// The slot. While another thread opens a device, this one waits, and calls `opened` when it is open.
+    fn lock_device(&self, opened: &dyn Fn(&Arc<dyn GpuDevice>)) -> MutexGuard<'_, Slot> {
+        match self.device.try_lock() {
+            Ok(slot) => return slot,
+            Err(TryLockError::Poisoned(slot)) => return slot.into_inner(),
+            Err(TryLockError::WouldBlock) => {}
+        }
+        let opening = self.opening.lock().unwrap_or_else(PoisonError::into_inner);
+        let begun = |opening: &mut Opening| matches!(opening, Opening::Begun);
+        let opening = self.opening_changed.wait_while(opening, begun).unwrap_or_else(PoisonError::into_inner);
+        let probing = if let Opening::Probing(device) = &*opening { Some(device.clone()) } else { None };
+        drop(opening);
+        if let Some(device) = probing {
+            opened(&device);
+            // The last reference if the probe has failed meanwhile.
+            drop_catching_panics(device);
+        }
+        self.device.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn set_opening(&self, opening: Opening) {
+        let before = std::mem::replace(&mut *self.opening.lock().unwrap_or_else(PoisonError::into_inner), opening);
+        self.opening_changed.notify_all();
+        // The last reference to a device that could not be used.
+        drop_catching_panics(before);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
+use std::thread;
 
 use super::costs::PlanSize;
 use super::device::{GpuDevice, GpuKind, drop_catching_panics};
@@ -122,7 +123,7 @@ impl Backends {
             // The old renderer would keep a lost device alive.
             drop_catching_panics(self.gpu.take());
         }
-        let found = self.host.device(kind, plan.samples);
+        let found = self.find_device(kind, plan);
         if let (Err(DrawError::DeviceLost(reason)), Attempt::First) = (&found, attempt) {
             self.host.count_loss(reason);
         }
@@ -141,6 +142,22 @@ impl Backends {
             }
         }
         result
+    }
+
+    /// The host's device. If it is being opened, the plan's pipelines are made while it draws its probe. Their
+    /// end is waited for even if the probe fails: a compiling driver cannot be stopped.
+    fn find_device(&self, kind: GpuKind, plan: &DrawPlan<'_>) -> Result<Arc<dyn GpuDevice>, DrawError> {
+        thread::scope(|scope| {
+            self.host.device(kind, plan.samples, &|device| {
+                let device = device.clone();
+                // If this fails, drawing makes them again, and reports the error.
+                let make_ready = move || {
+                    let _ = catch_unwind(AssertUnwindSafe(|| device.make_ready(plan)));
+                    drop_catching_panics(device);
+                };
+                let _ = thread::Builder::new().name("make-ready".into()).spawn_scoped(scope, make_ready);
+            })
+        })
     }
 
     fn draw_on(

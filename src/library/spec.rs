@@ -40,6 +40,8 @@ macro_rules! styles {
 }
 
 styles! {
+    /// The mesh as it is meant to look: smooth by its own normals, or with creases where it has none.
+    auto = "auto",
     /// One normal per face.
     flat = "flat",
     /// Normals blended between vertices.
@@ -56,6 +58,8 @@ styles! {
     hidden_line = "hidden-line",
     /// Flat surface, and polygon edges, open edges and non-manifold edges in a colour each.
     topology = "topology",
+    /// Smooth surface, feature edges and a contour, as in a technical drawing.
+    technical = "technical",
 }
 
 impl Spec {

@@ -94,12 +94,9 @@ pub struct ImageSource {
 /// The bytes of an image, or why there are none.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ImageContent {
-    /// The bytes as the file has them: PNG, JPEG, WebP or KTX2 if the file is valid.
+    /// The bytes as the file has them, of any encoding.
     Encoded(Arc<[u8]>),
-    /// The upload lacks the image, and by the format's rules the model is incomplete without it.
-    /// Sampling it is an error, with this sentence.
-    Missing(String),
-    /// The upload lacks the image, and by the format's custom the model is shown without it.
+    /// The upload lacks the image. The model is drawn without it.
     Absent,
 }
 

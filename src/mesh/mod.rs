@@ -3,6 +3,7 @@
 //!
 //! **Invariant**: nothing in this room, and nothing after it, depends on the file format.
 
+pub mod creases;
 pub mod edges;
 pub mod material;
 pub mod measure;
@@ -80,7 +81,6 @@ impl Mesh {
             size_of_val(&self.lines_and_points[..]) + size_of_val(&self.materials[..]) + size_of_val(&self.cameras[..]);
         let of_image = |image: &ImageSource| match &image.content {
             ImageContent::Encoded(bytes) => bytes.len(),
-            ImageContent::Missing(sentence) => sentence.len(),
             ImageContent::Absent => 0,
         };
         let of_images: usize =

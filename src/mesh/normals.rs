@@ -56,7 +56,7 @@ const PIECE: usize = 1 << 12;
 const CANCELLED_SQUARED: f64 = 1e-12;
 
 /// The unit vector of a sum of weighted normals; None where they cancel each other.
-fn unit(v: [f64; 3]) -> Option<[f32; 3]> {
+pub(super) fn unit(v: [f64; 3]) -> Option<[f32; 3]> {
     let length2 = dot(v, v);
     (length2 > CANCELLED_SQUARED).then(|| {
         let length = length2.sqrt();
@@ -65,7 +65,7 @@ fn unit(v: [f64; 3]) -> Option<[f32; 3]> {
 }
 
 /// The angles of a triangle's corners, radians.
-fn corner_angles([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
+pub(super) fn corner_angles([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
     let (ab, bc, ca) = (sub(b, a), sub(c, b), sub(a, c));
     let length = [dot(ab, ab), dot(bc, bc), dot(ca, ca)].map(f64::sqrt);
     let angle = |u: [f64; 3], v: [f64; 3], scale: f64| {

@@ -12,6 +12,7 @@ use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::{ORIENTATION_BYTES, Orientation, orientation};
 use crate::scene::Scene;
+use crate::warning::Warning;
 
 /// Items that are worked through between two checks of the deadline.
 pub const CHECK_EVERY: usize = 1 << 16;
@@ -24,6 +25,8 @@ pub struct PlanContext<'c> {
     pub deadline: &'c Deadline,
     /// The skips so far.
     pub skips: Skips<'c>,
+    /// What the picture has to go without, and why.
+    pub warnings: Vec<Warning>,
     /// Facts about the mesh from earlier plans, if they are kept.
     pub prepared: Option<&'c Prepared>,
     edges: Option<Arc<EdgeList>>,
@@ -33,7 +36,15 @@ pub struct PlanContext<'c> {
 impl<'c> PlanContext<'c> {
     /// A context in which nothing in `keep` is ever skipped.
     pub fn new(budget: &'c mut Budget, deadline: &'c Deadline, keep: &'c [SkipKind]) -> Self {
-        Self { budget, deadline, skips: Skips::new(keep), prepared: None, edges: None, silhouettes: None }
+        Self {
+            budget,
+            deadline,
+            skips: Skips::new(keep),
+            warnings: Vec::new(),
+            prepared: None,
+            edges: None,
+            silhouettes: None,
+        }
     }
 
     /// The same with what is known about the mesh.

@@ -1,8 +1,7 @@
 //! Errors of making a plan. The input is always at fault.
 
-use crate::limits::{LimitExceeded, Stopped};
+use crate::limits::{Exhausted, LimitExceeded, Stopped};
 use crate::scene::SceneError;
-use crate::texture::TextureError;
 
 /// A mesh and a request that do not make a picture. The text is safe to show to clients.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -10,9 +9,6 @@ pub enum PlanError {
     /// The picture takes more than is allowed.
     #[error(transparent)]
     Limit(#[from] LimitExceeded),
-    /// A texture that the picture needs cannot be read. The mesh is at fault.
-    #[error(transparent)]
-    Texture(#[from] TextureError),
     /// The request asks for the file's camera, and there is none.
     #[error("`camera.from_file` is true, and the file has no camera")]
     NoCamera,
@@ -26,6 +22,15 @@ impl From<SceneError> for PlanError {
         match error {
             SceneError::Limit(limit) => Self::Limit(limit),
             SceneError::NoCamera => Self::NoCamera,
+        }
+    }
+}
+
+impl From<Exhausted> for PlanError {
+    fn from(exhausted: Exhausted) -> Self {
+        match exhausted {
+            Exhausted::Limit(limit) => Self::Limit(limit),
+            Exhausted::Stopped(stopped) => Self::Stopped(stopped),
         }
     }
 }

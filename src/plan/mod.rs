@@ -44,6 +44,7 @@ pub use surface::{
 };
 pub use warnings::{is_out_of_view, out_of_view, undrawn_primitives, unknown_materials};
 
+use crate::warning::Warning;
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -84,6 +85,8 @@ pub struct DrawPlan<'a> {
     pub background: [f32; 4],
     /// Work that the plan leaves out, and why.
     pub skips: Vec<Skip>,
+    /// What the picture goes without although it was asked for, and why.
+    pub warnings: Vec<Warning>,
     /// The mesh that the plan borrows from, where it may be drawn again.
     pub mesh: Option<Arc<MeshToken>>,
 }
@@ -122,6 +125,7 @@ impl<'a> DrawPlan<'a> {
             lines: Vec::new(),
             background: [0.0; 4],
             skips: Vec::new(),
+            warnings: Vec::new(),
             mesh: None,
         }
     }

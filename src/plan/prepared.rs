@@ -6,9 +6,10 @@
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use crate::limits::{Budget, LimitExceeded, Spent};
+use crate::mesh::creases::CreasedNormals;
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Orientation;
-use crate::texture::Textures;
+use crate::texture::{TextureError, Textures};
 
 /// Facts about one mesh, which must not change. Each is found when a plan first needs it. Plans that
 /// need it at the same time may each find it, and the first one's is kept: a thread that waited for
@@ -18,8 +19,21 @@ pub struct Prepared {
     token: Arc<MeshToken>,
     edges: OnceLock<(Arc<EdgeList>, Vec<Spent>)>,
     orientation: OnceLock<Orientation>,
-    vertex_normals: OnceLock<Arc<Vec<[f32; 3]>>>,
+    vertex_normals: Mutex<Option<VertexNormals>>,
     textures: Mutex<Option<PreparedTextures>>,
+}
+
+/// Vertex normals of a mesh that brings none.
+#[derive(Clone, Debug)]
+pub struct VertexNormals {
+    /// The cosines of the crease angles, by material.
+    crease_cos: Arc<[f64]>,
+    /// What finding them took.
+    spent: Arc<[Spent]>,
+    /// The normals.
+    pub normals: Arc<Vec<[f32; 3]>>,
+    /// Three indices into them per triangle; None if they go by position.
+    pub triangles: Option<Arc<Vec<[u32; 3]>>>,
 }
 
 /// The identity of a mesh: no two meshes have one in common. Lists that a plan borrows from a mesh are
@@ -34,6 +48,8 @@ pub struct PreparedTextures {
     pub images: Vec<(u32, bool)>,
     /// The textures.
     pub textures: Arc<Textures>,
+    /// Indices of those without pixels, because their images are broken, with the faults.
+    pub broken: Arc<[(u32, TextureError)]>,
 }
 
 impl Prepared {
@@ -70,13 +86,24 @@ impl Prepared {
         })
     }
 
-    /// Vertex normals for a mesh that brings none.
-    pub fn vertex_normals(&self, find: impl FnOnce() -> Vec<[f32; 3]>) -> Arc<Vec<[f32; 3]>> {
-        if let Some(normals) = self.vertex_normals.get() {
-            return Arc::clone(normals);
+    /// Vertex normals for a mesh that brings none, with creases, paid for; found by `find` if those that
+    /// were found last have other crease angles.
+    pub fn vertex_normals<E: From<LimitExceeded>>(
+        &self,
+        crease_cos: &[f64],
+        budget: &mut Budget,
+        find: impl FnOnce(&mut Budget) -> Result<CreasedNormals, E>,
+    ) -> Result<VertexNormals, E> {
+        let kept = self.locked_normals().clone();
+        if let Some(kept) = kept.filter(|kept| *kept.crease_cos == *crease_cos) {
+            budget.spend_again(&kept.spent)?;
+            return Ok(kept);
         }
-        let found = Arc::new(find());
-        Arc::clone(self.vertex_normals.get_or_init(|| found))
+        let (found, spent) = budget.record(find);
+        let found = VertexNormals { crease_cos: crease_cos.into(), spent: spent.into(), ..VertexNormals::new(found?) };
+        let before = self.locked_normals().replace(found.clone());
+        drop(before);
+        Ok(found)
     }
 
     /// The textures that were kept last.
@@ -92,13 +119,30 @@ impl Prepared {
     /// Memory of what is kept, bytes.
     pub fn bytes(&self) -> u64 {
         let edges = self.edges.get().map_or(0, |(edges, _)| edges.bytes());
-        let normals = self.vertex_normals.get().map_or(0, |normals| size_of_val(&normals[..]));
+        let normals = self.locked_normals().as_ref().map_or(0, VertexNormals::bytes);
         let textures = self.locked_textures().as_ref().map_or(0, |kept| size_of_val(&kept.textures.texels[..]));
         (edges + normals + textures) as u64
     }
 
+    fn locked_normals(&self) -> MutexGuard<'_, Option<VertexNormals>> {
+        self.vertex_normals.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn locked_textures(&self) -> MutexGuard<'_, Option<PreparedTextures>> {
         self.textures.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl VertexNormals {
+    /// Normals that are not kept.
+    pub fn new(found: CreasedNormals) -> Self {
+        let CreasedNormals { normals, triangles } = found;
+        let (crease_cos, spent) = (Arc::default(), Arc::default());
+        Self { crease_cos, spent, normals: Arc::new(normals), triangles: triangles.map(Arc::new) }
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.normals[..]) + self.triangles.as_ref().map_or(0, |triangles| size_of_val(&triangles[..]))
     }
 }
 

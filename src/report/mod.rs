@@ -4,7 +4,6 @@
 //! transfer objects, and their field names are part of the public interface.
 
 mod bounds;
-mod image_header;
 mod text;
 mod topology;
 
@@ -17,6 +16,7 @@ use crate::mesh::material::{FileLens, ImageContent, ImageSource};
 use crate::mesh::measure::Measures;
 use crate::mesh::topology::Topology;
 use crate::mesh::{Mesh, UpAxis};
+use crate::texture::{TextureError, decode, fault_warnings};
 use serde::Serialize;
 
 /// The contents of a file. Counts are null where the format has no such thing.
@@ -75,8 +75,7 @@ struct Arity {
     count: u64,
 }
 
-/// An image by its header. Fields are null where the upload lacks the image or the format is
-/// unknown.
+/// An image by its header. Fields are null where the upload lacks the image or it cannot be read.
 #[derive(Clone, Debug, Serialize)]
 struct TextureReport {
     name: String,
@@ -138,6 +137,9 @@ impl Report {
         let cameras = mesh.cameras.iter().map(|camera| camera.name.len() + size_of::<CameraReport>());
         // A name is copied once into the report, and JSON may escape each of its bytes as six.
         budget.spend("the report", names.chain(images).chain(cameras).sum::<usize>() as u64, 1 + 6)?;
+        // A sentence for each image that cannot be read.
+        budget.spend("the report", mesh.images.len() as u64, 512)?;
+        deadline.check()?;
         Ok(Self::new(mesh, import, file_bytes, topology))
     }
 
@@ -165,7 +167,9 @@ impl Report {
             extensions_required,
         } = import.metadata.clone();
         let arities = import.polygons_by_arity.iter().enumerate().filter(|&(_, &count)| count > 0);
-        let warnings = import.warnings.iter();
+        let (textures, faults): (Vec<_>, Vec<_>) = mesh.images.iter().map(texture).unzip();
+        let faults: Vec<_> = faults.into_iter().flatten().collect();
+        let warnings = import.warnings.iter().cloned().chain(fault_warnings(&faults));
         let measures = Measures::of(mesh);
         let points = mesh.lines_and_points.iter().filter(|one| one.is_point()).count() as u64;
         Self {
@@ -186,7 +190,7 @@ impl Report {
             lines: mesh.lines_and_points.len() as u64 - points,
             points,
             materials: mesh.materials.iter().map(|m| m.name.clone()).collect(),
-            textures: mesh.images.iter().map(texture).collect(),
+            textures,
             animations,
             skins,
             cameras,
@@ -204,23 +208,23 @@ impl Report {
             dropped_degenerate_faces: import.dropped_degenerate_faces,
             dropped_collapsed_faces: import.dropped_collapsed_faces,
             dropped_loose: import.dropped_lines_and_points,
-            warnings: warnings.map(|w| WarningReport { code: w.code, detail: w.detail.clone() }).collect(),
+            warnings: warnings.map(|w| WarningReport { code: w.code, detail: w.detail }).collect(),
         }
     }
 }
 
-fn texture(image: &ImageSource) -> TextureReport {
+/// An image, and why it cannot be read.
+fn texture(image: &ImageSource) -> (TextureReport, Option<TextureError>) {
     let name = image.name.clone();
-    let ImageContent::Encoded(bytes) = &image.content else {
-        return TextureReport { name, format: None, width_px: None, height_px: None, file_bytes: None };
-    };
-    let header = image_header::read(bytes);
-    TextureReport {
-        name,
-        format: header.format,
-        width_px: header.size_px.map(|size| size[0]),
-        height_px: header.size_px.map(|size| size[1]),
-        file_bytes: Some(bytes.len() as u64),
+    let none = TextureReport { name, format: None, width_px: None, height_px: None, file_bytes: None };
+    let ImageContent::Encoded(bytes) = &image.content else { return (none, None) };
+    let file_bytes = Some(bytes.len() as u64);
+    match decode::check(&image.name, bytes) {
+        Ok(header) => {
+            let [width_px, height_px] = [header.width, header.height].map(Some);
+            (TextureReport { format: Some(header.encoding_name()), width_px, height_px, file_bytes, ..none }, None)
+        }
+        Err(fault) => (TextureReport { file_bytes, ..none }, Some(fault)),
     }
 }
 

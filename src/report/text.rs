@@ -68,9 +68,8 @@ fn texture(texture: &TextureReport) -> String {
     let name = printable(&texture.name);
     match (texture.format, texture.width_px.zip(texture.height_px)) {
         (Some(format), Some((width, height))) => format!("{name} {width}x{height} {format}"),
-        (Some(format), None) => format!("{name} (broken {format})"),
-        (None, _) if texture.file_bytes.is_some() => format!("{name} (in a format that is not known)"),
-        (None, _) => format!("{name} (missing)"),
+        _ if texture.file_bytes.is_some() => format!("{name} (unreadable)"),
+        _ => format!("{name} (missing)"),
     }
 }
 

@@ -4,7 +4,9 @@ use super::error::{RequestError, RequestFault};
 use crate::request::style::Style;
 use crate::request::table::dependent::Dependent;
 use crate::spec::color::Rgba;
-use crate::spec::{Hidden, Layers, Outline, OutlineUnit, Shading, Surface, Wire, WireMethod};
+use crate::spec::{
+    Hidden, Layers, Outline, OutlineMethod, OutlineUnit, Shading, Surface, Wire, WireEdges, WireMethod, WireThickness,
+};
 
 /// Largest thickness of a wire whose method does not measure it in pixels.
 pub const MULTIPLE_MAX: f32 = 10.0;
@@ -46,12 +48,13 @@ impl LayersDraft {
         let wire = Some(WireDraft::default());
         let (surface, wire, outline) = match style {
             Style::Flat | Style::Topology => (surface(Shading::Flat), None, None),
-            Style::Smooth => (surface(Shading::Smooth), None, None),
+            Style::Auto | Style::Smooth => (surface(Shading::Smooth), None, None),
             Style::Unlit => (surface(Shading::Unlit), None, None),
             Style::Wire => (surface(Shading::Flat), wire, None),
             Style::Wireframe => (None, wire, None),
             Style::Outline => (surface(Shading::Smooth), None, Some(Outline::default())),
             Style::HiddenLine => (white(), wire, None),
+            Style::Technical => (surface(Shading::Smooth), Some(feature_edges()), Some(contour())),
         };
         let hidden = if style == Style::Wireframe { Hidden::Fade } else { Hidden::Hide };
         Self { surface, wire, outline, hidden }
@@ -75,10 +78,10 @@ impl LayersDraft {
         });
         if let Some(Wire { method, thickness, .. }) = wire
             && method != WireMethod::Exact
-            && thickness > MULTIPLE_MAX
+            && thickness.largest() > MULTIPLE_MAX
         {
             let allowed = format!("a number from 0 to {MULTIPLE_MAX} where `{prefix}wire.method` is not exact");
-            return too_thick("wire.thickness", thickness, allowed);
+            return too_thick("wire.thickness", thickness.largest(), allowed);
         }
         if let Some(Outline { unit: OutlineUnit::Px, thickness: Some(thickness), .. }) = self.outline
             && thickness > OUTLINE_PX_MAX
@@ -88,4 +91,16 @@ impl LayersDraft {
         }
         Ok(Layers { surface: self.surface, wire, outline: self.outline })
     }
+}
+
+/// The lines of [`Style::Technical`]: 1 px wide.
+fn feature_edges() -> WireDraft {
+    let thickness = WireThickness::Given(1.0);
+    WireDraft { line: Wire { edges: WireEdges::Feature, thickness, ..Wire::default() }, ..WireDraft::default() }
+}
+
+/// The contour of [`Style::Technical`], twice as wide.
+fn contour() -> Outline {
+    let (method, unit) = (OutlineMethod::Contour, OutlineUnit::Px);
+    Outline { method, unit, thickness: Some(2.0), ..Outline::default() }
 }

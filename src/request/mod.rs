@@ -39,7 +39,7 @@ use table::value::{Given, Kind, Value};
 use table::{FIELDS, MATERIALS};
 
 /// The style of a request that names none.
-const STYLE_DEFAULT: Style = Style::Flat;
+const STYLE_DEFAULT: Style = Style::Auto;
 
 /// Most materials of one request: more than any asset has.
 const MATERIALS_MAX: usize = 1000;

@@ -145,6 +145,9 @@ fn of_kind(kind: &Kind, image_px: u64) -> Json {
     };
     match kind {
         Kind::Number { min, max } => json!({ "type": "number", "minimum": min, "maximum": max }),
+        Kind::NumberOr { word, min, max } => {
+            json!({ "anyOf": [{ "type": "number", "minimum": min, "maximum": max }, { "const": word }] })
+        }
         Kind::Above0 { max } => json!({ "type": "number", "exclusiveMinimum": 0, "maximum": max }),
         Kind::OneOf(values) => json!({ "enum": values }),
         Kind::Pixels => whole(),

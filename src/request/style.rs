@@ -5,6 +5,8 @@ use crate::spec::words::word_enums;
 word_enums! {
     /// A preset: the layers that are drawn, and how.
     pub enum Style {
+        /// The mesh as it is meant to look: smooth by the file's normals, or with creases where it has none.
+        Auto = "auto",
         /// One normal per face.
         Flat = "flat",
         /// Interpolated normals.
@@ -21,5 +23,7 @@ word_enums! {
         HiddenLine = "hidden-line",
         /// Flat surface, and edges coloured by their number of faces.
         Topology = "topology",
+        /// Smooth surface, feature edges and a contour, as in a technical drawing.
+        Technical = "technical",
     }
 }

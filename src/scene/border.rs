@@ -52,7 +52,7 @@ pub fn border(mesh: &Mesh, groups: &MaterialGroups<'_>, spec: &Spec) -> Border {
             }
         }
         if let Some(wire) = style.wire.filter(|wire| wire.method == WireMethod::Exact) {
-            border.px = border.px.max(f64::from(0.5 * (dots * wire.thickness + wire.smoothing)));
+            border.px = border.px.max(f64::from(0.5 * (dots * wire.thickness.largest() + wire.smoothing)));
         }
     }
     if let Some(topology) = &spec.topology {

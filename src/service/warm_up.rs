@@ -1,17 +1,19 @@
 //! Opens the GPU right after the start and makes the pipelines of every style, so that the first
 //! pictures need not wait for that.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::backend::{Backends, GpuHost, GpuKind};
+use crate::backend::{Backends, DrawError, GpuDevice, GpuHost, GpuKind};
 use crate::import::Bundle;
 use crate::limits::{Budget, Deadline, Limits};
 use crate::pipeline::{self, Model};
 use crate::request::{self, Rules, Style};
-use crate::spec::BackendChoice;
 use crate::spec::words::Words as _;
+use crate::spec::{BackendChoice, Spec};
 
 /// One triangle. The looks of a plain mesh need no other pipelines; textures, colours, several materials
 /// and other numbers of samples do.
@@ -66,20 +68,66 @@ fn warm(gpu: Arc<GpuHost>, deadline: &Deadline) {
         Err(error) => return tracing::debug!(%error, "the GPU is not warmed up"),
     };
     let mut backends = Backends::new(gpu.clone(), 1);
-    for &(style, _) in Style::ALL {
+    let specs = Style::ALL.iter().filter_map(|&(style, _)| {
         let keys = [("style", style), ("size", "64")].map(|(key, value)| (key.to_owned(), value.to_owned()));
-        let Ok(spec) = request::read(None, &keys, &rules) else { continue };
-        let device = gpu.device(GpuKind::Hardware, spec.image.samples);
-        if let (Err(error), Ok(())) = (&device, deadline.check()) {
+        Some((style, request::read(None, &keys, &rules).ok()?))
+    });
+    let specs: Vec<(&str, Spec)> = specs.collect();
+    if let Err(error) = make_ready(&gpu, &model, &specs, &limits, deadline) {
+        if deadline.check().is_ok() {
             tracing::debug!(%error, "the GPU is not warmed up");
         }
-        if device.is_err() || deadline.check().is_err() {
+        return;
+    }
+    tracing::debug!(ms = began.elapsed().as_millis(), "the GPU is open");
+    for (style, spec) in &specs {
+        if deadline.check().is_err() || !gpu.may_have_hardware() {
             return;
         }
-        let drawn = pipeline::draw(&model, &spec, &mut backends, &mut Budget::new(&limits), deadline, &mut |_| ());
+        let drawn = pipeline::draw(&model, spec, &mut backends, &mut Budget::new(&limits), deadline, &mut |_| ());
         if let Err(error) = drawn {
             tracing::debug!(style, %error, "a style was not warmed up");
         }
     }
     tracing::info!(ms = began.elapsed().as_millis(), "the GPU is warm");
+}
+
+/// Opens the device and, while it draws its probe, begins to make the pipelines of all styles. The driver
+/// takes the longest for lines, so the styles with lines come first. One style comes after the other: the
+/// driver takes longer for each pipeline if it makes many at a time.
+fn make_ready(
+    gpu: &GpuHost,
+    model: &Model,
+    specs: &[(&str, Spec)],
+    limits: &Limits,
+    deadline: &Deadline,
+) -> Result<(), DrawError> {
+    let samples = specs.first().map_or(1, |(_, spec)| spec.image.samples);
+    let make = &|device: &Arc<dyn GpuDevice>, style: &str, spec: &Spec| {
+        let made = || pipeline::make_ready(model, spec, &**device, &mut Budget::new(limits), deadline);
+        // wgpu may panic on a lost device.
+        if let Ok(Err(error)) = catch_unwind(AssertUnwindSafe(made)) {
+            tracing::debug!(style, %error, "a style's pipelines were not made ahead");
+        }
+    };
+    let is_usable = &AtomicBool::new(true);
+    thread::scope(|scope| {
+        let opened = |device: &Arc<dyn GpuDevice>| {
+            let device = Arc::clone(device);
+            let make_all = move || {
+                let (lines, others): (Vec<_>, Vec<_>) = specs.iter().partition(|(_, spec)| spec.layers.wire.is_some());
+                for (style, spec) in lines.into_iter().chain(others) {
+                    if deadline.check().is_ok() && is_usable.load(Ordering::Relaxed) && device.lost().is_none() {
+                        make(&device, style, spec);
+                    }
+                }
+            };
+            // Dropping the device may panic, too.
+            let make_all = move || drop(catch_unwind(AssertUnwindSafe(make_all)));
+            let _ = thread::Builder::new().name("warm-up".into()).spawn_scoped(scope, make_all);
+        };
+        let device = gpu.device(GpuKind::Hardware, samples, &opened);
+        is_usable.store(device.is_ok(), Ordering::Relaxed);
+        device.map(drop)
+    })
 }

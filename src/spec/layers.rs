@@ -74,6 +74,9 @@ pub struct Surface {
     pub shading: Shading,
     /// Source of the normals of [`Shading::Flat`].
     pub normals: FlatNormals,
+    /// An edge is a crease, where [`Shading::Smooth`] ends, if its faces' normals differ by more than this:
+    /// degrees, 0 to 180. 180: no creases. For meshes that bring no vertex normals.
+    pub crease_angle_deg: f64,
     /// Overrides the file's own base colours and their textures; None keeps them (grey where there
     /// are none).
     pub color: Option<Rgba>,
@@ -98,6 +101,7 @@ impl Default for Surface {
         Self {
             shading: Shading::Flat,
             normals: FlatNormals::Face,
+            crease_angle_deg: 30.0,
             color: None,
             metallic: None,
             roughness: None,
@@ -142,8 +146,8 @@ pub struct Wire {
     pub method: WireMethod,
     /// Line colour.
     pub color: Rgba,
-    /// `exact`: full width, pixels, 0 to 100. Other methods: t, in the method's unit, 0 to 10.
-    pub thickness: f32,
+    /// How thick the lines are.
+    pub thickness: WireThickness,
     /// `exact`: extra ramp, pixels. `fwidth` and `fwidth-min`: s, width of the smoothstep in
     /// multiples of `d`. 0 to 10.
     pub smoothing: f32,
@@ -160,16 +164,36 @@ pub struct Wire {
     pub hidden: Hidden,
 }
 
+/// The thickness of a wire.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WireThickness {
+    /// `exact`: 1 pixel where that leaves most of the surface free, and thinner or fainter where edges lie
+    /// close on screen. Other methods: 1.
+    Auto,
+    /// `exact`: full width, pixels, 0 to 100. Other methods: t, in the method's unit, 0 to 10.
+    Given(f32),
+}
+
+impl WireThickness {
+    /// The number that is given, or 1: the most that [`Auto`](Self::Auto) stands for.
+    pub fn largest(self) -> f32 {
+        match self {
+            Self::Auto => 1.0,
+            Self::Given(thickness) => thickness,
+        }
+    }
+}
+
 impl Default for Wire {
     fn default() -> Self {
         Self {
             method: WireMethod::Exact,
             color: Rgba::BLACK,
-            thickness: 1.0,
+            thickness: WireThickness::Auto,
             smoothing: 0.0,
             opacity: 1.0,
             lit: false,
-            edges: WireEdges::Triangles,
+            edges: WireEdges::Polygons,
             feature_angle_deg: 30.0,
             hidden: Hidden::Hide,
         }

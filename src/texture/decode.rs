@@ -9,7 +9,7 @@ use std::io::{BufRead, Cursor, Seek};
 use crate::srgb::srgb_to_linear;
 use crate::texture::TextureError;
 use crate::texture::basis::{self, BasisHeader, KTX2_MAGIC};
-use crate::texture::png::CriticalChunks;
+use crate::texture::png::{self, CriticalChunks};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Limits};
 
 /// The size of an image and the cost of decoding it, from its first bytes.
@@ -27,7 +27,7 @@ pub struct Header {
 /// The decoder that an image needs.
 #[derive(Clone, Copy, Debug)]
 enum Encoding {
-    /// PNG, JPEG or WebP, by the `image` crate.
+    /// One that the `image` crate reads.
     Picture(ImageFormat),
     /// Basis Universal in KTX2.
     Basis(BasisHeader),
@@ -66,7 +66,8 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<Header, TextureError> {
         return Ok(Header { encoding: Encoding::Basis(basis), width, height, decoding_bytes });
     }
     let format = sniff(bytes).ok_or_else(|| {
-        TextureError::Unsupported(format!("{name} of the mesh is neither a PNG, a JPEG, a WebP nor a KTX2 image"))
+        let known = "a PNG, a JPEG, a WebP, a KTX2, a BMP, a DDS nor a TGA image";
+        TextureError::Unsupported(format!("{name} of the mesh is neither {known}"))
     })?;
     let encoding = Encoding::Picture(format);
     let decoder = match (open(bytes, format, ALLOWANCE_BYTES), png_size(bytes)) {
@@ -75,12 +76,13 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<Header, TextureError> {
         (Err(ImageError::Limits(_)), Some([width, height])) if format == ImageFormat::Png => {
             return Ok(Header { encoding, width, height, decoding_bytes: u64::MAX });
         }
-        (Err(error), _) => return Err(broken(name, &error)),
+        (Err(error), _) => return Err(fault(name, &error)),
     };
     let (width, height) = decoder.dimensions();
     if width == 0 || height == 0 {
         return Err(TextureError::Broken(format!("{name} of the mesh has no pixels")));
     }
+    kind(name, decoder.color_type())?;
     // Beside the result, JPEG keeps 16-bit coefficients and WebP its planes; both copy the input.
     let times = if format == ImageFormat::Png { 1 } else { 4 };
     let decoding_bytes = decoder.total_bytes().saturating_mul(times).saturating_add(bytes.len() as u64);
@@ -97,25 +99,34 @@ pub fn decode(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, Textu
         }
     };
     let limit_bytes = header.decoding_bytes.saturating_add(ALLOWANCE_BYTES);
-    let decoder = open(bytes, format, limit_bytes).map_err(|error| broken(name, &error))?;
+    let decoder = open(bytes, format, limit_bytes).map_err(|error| fault(name, &error))?;
     let (width, height) = decoder.dimensions();
-    let (channels, is_wide) = match decoder.color_type() {
-        ColorType::L8 => (1, false),
-        ColorType::La8 => (2, false),
-        ColorType::Rgb8 => (3, false),
-        ColorType::Rgba8 => (4, false),
-        ColorType::L16 => (1, true),
-        ColorType::La16 => (2, true),
-        ColorType::Rgb16 => (3, true),
-        ColorType::Rgba16 => (4, true),
-        other => {
-            let detail = format!("{name} of the mesh has pixels of an unknown kind ({other:?})");
-            return Err(TextureError::Unsupported(detail));
-        }
-    };
+    let (channels, is_wide) = kind(name, decoder.color_type())?;
     let mut pixels = vec![0; decoder.total_bytes() as usize];
-    decoder.read_image(&mut pixels).map_err(|error| broken(name, &error))?;
+    decoder.read_image(&mut pixels).map_err(|error| fault(name, &error))?;
     Ok(Pixels { width, height, channels, is_wide, bytes: pixels })
+}
+
+/// Finds faults without decoding: those of the header, and false checksums. Pixels may be broken beyond
+/// that.
+pub fn check(name: &str, bytes: &[u8]) -> Result<Header, TextureError> {
+    let header = header(name, bytes)?;
+    match header.encoding {
+        Encoding::Picture(ImageFormat::Png) if !png::is_whole(bytes) => Err(TextureError::Broken(format!(
+            "{name} of the mesh is damaged: a checksum is false, or its end is missing"
+        ))),
+        _ => Ok(header),
+    }
+}
+
+impl Header {
+    /// The encoding's name: `png`, `ktx2`.
+    pub fn encoding_name(&self) -> &'static str {
+        match &self.encoding {
+            Encoding::Picture(format) => format.extensions_str().first().copied().unwrap_or_default(),
+            Encoding::Basis(_) => "ktx2",
+        }
+    }
 }
 
 impl Pixels {
@@ -190,9 +201,43 @@ fn sniff(bytes: &[u8]) -> Option<ImageFormat> {
         Some(ImageFormat::Jpeg)
     } else if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
         Some(ImageFormat::WebP)
+    } else if bytes.starts_with(b"DDS ") {
+        Some(ImageFormat::Dds)
+    } else if bytes.starts_with(b"BM") {
+        Some(ImageFormat::Bmp)
+    } else if is_tga(bytes) {
+        Some(ImageFormat::Tga)
     } else {
         None
     }
+}
+
+/// True for a TGA header. It has no magic number, but few other bytes make sense as one. Truevision TGA File
+/// Format Specification 2.0: type of the colour map, type of the image, bits per pixel, and two reserved
+/// bits.
+fn is_tga(bytes: &[u8]) -> bool {
+    let Some(&[_, map, kind, .., bits, descriptor]) = bytes.first_chunk::<18>() else { return false };
+    let is_mapped = matches!(kind, 1 | 9);
+    let is_kind = is_mapped || matches!(kind, 2 | 3 | 10 | 11);
+    is_kind && map <= 1 && (map == 1 || !is_mapped) && matches!(bits, 8 | 15 | 16 | 24 | 32) && descriptor >> 6 == 0
+}
+
+/// Channels, and whether they have 16 bits.
+fn kind(name: &str, color_type: ColorType) -> Result<(usize, bool), TextureError> {
+    Ok(match color_type {
+        ColorType::L8 => (1, false),
+        ColorType::La8 => (2, false),
+        ColorType::Rgb8 => (3, false),
+        ColorType::Rgba8 => (4, false),
+        ColorType::L16 => (1, true),
+        ColorType::La16 => (2, true),
+        ColorType::Rgb16 => (3, true),
+        ColorType::Rgba16 => (4, true),
+        other => {
+            let detail = format!("{name} of the mesh has pixels of an unknown kind ({other:?})");
+            return Err(TextureError::Unsupported(detail));
+        }
+    })
 }
 
 /// A decoder that may allocate `limit_bytes` beside its result.
@@ -223,7 +268,11 @@ fn limited<'b>(
 }
 
 /// The decoder's message can quote the file, so control characters and length are cut.
-fn broken(name: &str, error: &ImageError) -> TextureError {
+fn fault(name: &str, error: &ImageError) -> TextureError {
     let why: String = error.to_string().chars().filter(|c| !c.is_control()).take(200).collect();
-    TextureError::Broken(format!("{name} of the mesh cannot be decoded: {why}"))
+    let detail = format!("{name} of the mesh cannot be decoded: {why}");
+    match error {
+        ImageError::Unsupported(_) => TextureError::Unsupported(detail),
+        _ => TextureError::Broken(detail),
+    }
 }

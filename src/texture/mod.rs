@@ -4,7 +4,8 @@
 //! bytes -> Header (size, memory) -> Pixels (as stored) -> levels (linear RGBA, half floats)
 //! ```
 //!
-//! - [`decode`]: an image's header, then its pixels. The `image` crate decodes PNG, JPEG and WebP.
+//! - [`decode`]: an image's header, then its pixels. The `image` crate decodes PNG, JPEG, WebP, BMP, TGA and
+//!   DDS.
 //! - [`basis`]: KTX2 files with Basis Universal data.
 //! - [`png`]: drops a PNG's ancillary chunks before the decoder reads them.
 //! - [`mips`]: makes the levels of one image.
@@ -16,12 +17,16 @@
 //!
 //! **Invariant**: the encoding is sniffed from the bytes. A file name or a declared type is not
 //! trusted.
+//!
+//! An image that cannot be read is a warning ([`fault_warnings`]), and its materials are drawn without it.
 
 pub(crate) mod basis;
 pub(crate) mod decode;
 pub(crate) mod fit;
 pub(crate) mod mips;
 pub(crate) mod png;
+
+use crate::warning::Warning;
 
 /// Decoded textures with their levels.
 #[derive(Clone, Debug, Default)]
@@ -58,13 +63,28 @@ pub struct Texture {
 /// show to a client.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TextureError {
-    /// The upload lacks the image, and the format says that the model is incomplete without it.
-    #[error("{0}")]
-    Missing(String),
     /// The image's data contradicts its own format.
     #[error("{0}")]
     Broken(String),
     /// The image may be valid, but its encoding is not read here.
     #[error("{0}")]
     Unsupported(String),
+}
+
+/// Warnings of images that cannot be read: one for each kind of fault, with the first image's reason.
+pub(crate) fn fault_warnings(faults: &[TextureError]) -> Vec<Warning> {
+    let is_broken = |fault: &&TextureError| matches!(fault, TextureError::Broken(_));
+    let (broken, unsupported): (Vec<_>, Vec<_>) = faults.iter().partition(is_broken);
+    let warning = |faults: Vec<&TextureError>, code: &'static str| {
+        let first = faults.first()?;
+        let detail = match faults.len() {
+            1 => format!("{first}; what it belongs to is drawn without it"),
+            n => format!("{first}; so it is with {} more, and what they belong to is drawn without them", n - 1),
+        };
+        Some(Warning { code, detail })
+    };
+    [(broken, "textures_broken"), (unsupported, "textures_unsupported")]
+        .into_iter()
+        .filter_map(|(faults, code)| warning(faults, code))
+        .collect()
 }

@@ -15,6 +15,7 @@ use crate::backend::gpu::pipelines::file::PipelineFile;
 use crate::backend::gpu::pipelines::{Kernel, Pipelines};
 use crate::backend::{DrawError, GpuDevice, GpuInfo, GpuKind, Renderer};
 use crate::limits::Deadline;
+use crate::plan::DrawPlan;
 
 /// Atomics that write visibility samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -369,5 +370,11 @@ impl GpuDevice for Gpu {
 
     fn renderer(self: Arc<Self>) -> Box<dyn Renderer> {
         Box::new(super::GpuRenderer::new(self))
+    }
+
+    /// Makes the pipelines. A software device makes none ahead: it would take the cores from others, and
+    /// memory for each thread.
+    fn make_ready(&self, plan: &DrawPlan<'_>) -> Result<(), DrawError> {
+        if Self::is_software(self) { Ok(()) } else { super::make_pipelines_of(self, plan) }
     }
 }

@@ -43,6 +43,12 @@ use crate::image::{Image, srgb8_thresholds};
 use crate::limits::Deadline;
 use crate::plan::{CornerValues, DrawPlan, HullVertex, SurfacePass};
 
+/// Makes the pipelines for a picture of the plan.
+fn make_pipelines_of(gpu: &Gpu, plan: &DrawPlan<'_>) -> Result<(), DrawError> {
+    let schedule = Schedule::new(plan, &traits(gpu), Goal::Picture)?;
+    gpu.make_pipelines(&schedule.kernels(), pipeline_key(plan))
+}
+
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
 

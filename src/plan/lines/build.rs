@@ -16,7 +16,7 @@ use crate::spec::Hidden;
 /// The passes that draw wires, topology and contours.
 pub fn passes(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<LinePass>, PlanError> {
     let Scene { mesh, groups, camera, .. } = scene;
-    let styles = line_styles(scene);
+    let mut styles = line_styles(scene);
     let hides = groups.hides_lines();
     let is_unneeded = styles.is_empty() && !groups.has_hull();
     if cx.skips.skip(SkipKind::Adjacency, is_unneeded, "no line asks which triangles are neighbours") {
@@ -28,6 +28,7 @@ pub fn passes(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<Lin
         true => cx.edges_and_orientation(mesh)?,
         false => (cx.edges(mesh)?, None),
     };
+    styles.iter_mut().for_each(|style| style.settle(&list));
     let unseen_side = orientation.and_then(|orientation| unseen_side(groups, orientation));
     let silhouettes = match styles.iter().any(|style| style.contour) {
         true => Some(cx.silhouettes(scene)?.1),

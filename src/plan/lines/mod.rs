@@ -1,5 +1,6 @@
 //! Lines of exact width: wires, topology and contours.
 
+pub(crate) mod auto_width;
 pub(crate) mod build;
 pub(crate) mod styles;
 

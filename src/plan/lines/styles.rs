@@ -3,13 +3,15 @@
 use std::sync::Arc;
 
 use crate::mesh::Mesh;
+use crate::mesh::creases::sharp_cos;
 use crate::mesh::edges::{EdgeList, MeshEdge};
-use crate::plan::edges::edge_class::{Class, belongs_to, class_of, cos_deg};
+use crate::plan::edges::edge_class::{Class, belongs_to, class_of};
+use crate::plan::lines::auto_width::AutoWidth;
 use crate::plan::peeling::FADE;
 use crate::plan::{Edge, LinePass, Shown, Side};
 use crate::scene::{MaterialGroups, Scene};
 use crate::spec::color::Rgba;
-use crate::spec::{Hidden, OutlineMethod, Topology, Wire, WireMethod};
+use crate::spec::{Hidden, OutlineMethod, Topology, Wire, WireEdges, WireMethod, WireThickness};
 
 /// Width of edges that tell of a fault, in multiples of a polygon edge's.
 const FAULT_WIDTH: f32 = 2.5;
@@ -64,6 +66,11 @@ impl LineStyle {
         has_material && belongs_to(self.class, mesh, edge)
     }
 
+    /// Notes that a style has every edge of this list, if it follows polygons and there are no diagonals.
+    pub fn settle(&mut self, list: &EdgeList) {
+        self.has_all_edges |= self.class == Class::Polygon && self.takes_all(list);
+    }
+
     /// The passes that draw these edges, those of hidden parts first.
     pub fn passes(&self, edges: &Arc<Vec<Edge>>, hides: bool, unseen_side: Option<Side>) -> Vec<LinePass> {
         let pass = |shown, color| LinePass {
@@ -90,7 +97,7 @@ impl LineStyle {
 
 /// The line styles of a scene, in the order in which they are drawn.
 pub fn line_styles(scene: &Scene<'_, '_>) -> Vec<LineStyle> {
-    let mut styles = wire_styles(&scene.groups);
+    let mut styles = wire_styles(scene);
     styles.extend(scene.spec.topology.iter().flat_map(topology_styles));
     styles.extend(contour_styles(scene));
     styles.retain(LineStyle::is_seen);
@@ -102,8 +109,23 @@ pub fn wire_color(wire: &Wire) -> [f32; 4] {
     wire.color.premultiplied().map(|v| v * wire.opacity)
 }
 
+/// The width of a wire along edges of materials with some styles. Feature and boundary edges are taken to be
+/// few.
+fn width(scene: &Scene<'_, '_>, wire: &Wire, styles: &[bool]) -> AutoWidth {
+    let are_polygons = wire.edges == WireEdges::Polygons;
+    match wire.thickness {
+        WireThickness::Given(width_px) => AutoWidth { width_px, opacity: 1.0 },
+        WireThickness::Auto if are_polygons || wire.edges == WireEdges::Triangles => {
+            let style = |i: usize| scene.groups.style_of[scene.mesh.triangle_materials[i] as usize] as usize;
+            AutoWidth::of(scene, are_polygons, |i| styles[style(i)])
+        }
+        WireThickness::Auto => AutoWidth::WIDEST,
+    }
+}
+
 /// Wires of exact width, each style once.
-fn wire_styles(groups: &MaterialGroups<'_>) -> Vec<LineStyle> {
+fn wire_styles(scene: &Scene<'_, '_>) -> Vec<LineStyle> {
+    let groups = &scene.groups;
     let mut kinds: Vec<(Wire, Vec<bool>)> = Vec::new();
     for (index, layers) in groups.styles.iter().enumerate() {
         let Some(wire) = layers.wire.filter(|wire| wire.method == WireMethod::Exact) else { continue };
@@ -113,16 +135,19 @@ fn wire_styles(groups: &MaterialGroups<'_>) -> Vec<LineStyle> {
         });
         kinds[at].1[index] = true;
     }
-    let style = |(wire, styles): (Wire, Vec<bool>)| LineStyle {
-        width_px: wire.thickness,
-        smoothing_px: wire.smoothing,
-        color: wire_color(&wire),
-        hidden: wire.hidden,
-        lit: wire.lit,
-        contour: false,
-        class: class_of(&wire),
-        has_all_edges: class_of(&wire) == Class::All && styles.iter().all(|&has| has),
-        styles: if styles.iter().all(|&has| has) { Vec::new() } else { styles },
+    let style = |(wire, styles): (Wire, Vec<bool>)| {
+        let AutoWidth { width_px, opacity } = width(scene, &wire, &styles);
+        LineStyle {
+            width_px,
+            smoothing_px: wire.smoothing,
+            color: wire_color(&wire).map(|v| v * opacity),
+            hidden: wire.hidden,
+            lit: wire.lit,
+            contour: false,
+            class: class_of(&wire),
+            has_all_edges: class_of(&wire) == Class::All && styles.iter().all(|&has| has),
+            styles: if styles.iter().all(|&has| has) { Vec::new() } else { styles },
+        }
     };
     kinds.into_iter().map(style).collect()
 }
@@ -142,7 +167,7 @@ fn topology_styles(topology: &Topology) -> Vec<LineStyle> {
             styles: Vec::new(),
         })
     };
-    let crease = Class::Crease(cos_deg(topology.crease_angle_deg));
+    let crease = Class::Crease(sharp_cos(topology.crease_angle_deg));
     let kinds = [
         style(topology.polygon, Class::Polygon, 1.0, Hidden::Hide),
         style(topology.crease, crease, FAULT_WIDTH, Hidden::Hide),

@@ -69,7 +69,7 @@ fn line_style(scene: &Scene<'_, '_>, layers: &Layers, is_point: bool) -> Option<
     };
     match (layers.wire, layers.outline) {
         (Some(wire), _) if wire.method == WireMethod::Exact => {
-            Some(style(wire.thickness, wire.smoothing, wire_color(&wire), wire.hidden))
+            Some(style(wire.thickness.largest(), wire.smoothing, wire_color(&wire), wire.hidden))
         }
         // The other methods measure in multiples of a triangle's size, and there is no triangle.
         (Some(wire), _) => Some(style(LINE_PX as f32, 0.0, wire_color(&wire), wire.hidden)),

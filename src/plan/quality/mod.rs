@@ -15,7 +15,7 @@ use error_table::ErrorTable;
 use crate::spec::words::word_for;
 use crate::spec::{
     BackendChoice, FlatNormals, Hidden, Layers, OutlineMethod, QualityTarget, Shading, Spec, WIRE_METHODS, Wire,
-    WireMethod,
+    WireMethod, WireThickness,
 };
 use crate::warning::Warning;
 
@@ -159,10 +159,16 @@ fn as_wide(wire: &Wire, method: WireMethod) -> Option<Wire> {
     if method == WireMethod::Exact {
         return Some(*wire);
     }
-    let smoothing = wire.thickness.min(1.0);
-    let thickness = 0.5 * (wire.thickness - smoothing);
+    let width_px = wire.thickness.largest();
+    let smoothing = width_px.min(1.0);
+    let thickness = 0.5 * (width_px - smoothing);
     // Within what a request may give itself.
-    (smoothing > 0.0 && thickness <= 10.0).then_some(Wire { method, thickness, smoothing, ..*wire })
+    (smoothing > 0.0 && thickness <= 10.0).then_some(Wire {
+        method,
+        thickness: WireThickness::Given(thickness),
+        smoothing,
+        ..*wire
+    })
 }
 
 /// The error and the time of a picture; None where the table does not have one of its techniques.

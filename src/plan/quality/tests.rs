@@ -108,11 +108,11 @@ fn a_gpu_is_chosen_where_there_is_one_and_the_table_knows_it() {
 fn another_method_draws_as_wide() {
     let asked = spec(&[LINES, &[("max_error", "99")]].concat());
     let wire = select_from(&table(true), &asked, 100_000, false).unwrap().spec.layers.wire.unwrap();
-    assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Fwidth, 1.0, 1.0));
+    assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Fwidth, WireThickness::Given(0.0), 1.0));
     let exact = asked.layers.wire.unwrap();
-    let wide = |thickness| as_wide(&Wire { thickness, ..exact }, WireMethod::Fwidth);
+    let wide = |width_px| as_wide(&Wire { thickness: WireThickness::Given(width_px), ..exact }, WireMethod::Fwidth);
     let thin = wide(0.5).unwrap();
-    assert_eq!((thin.thickness, thin.smoothing), (0.0, 0.5));
+    assert_eq!((thin.thickness, thin.smoothing), (WireThickness::Given(0.0), 0.5));
     assert!(wide(0.0).is_none() && wide(21.5).is_none() && wide(21.0).is_some());
 }
 

@@ -6,16 +6,18 @@ use std::sync::Arc;
 use super::edge_masks::edge_masks;
 use super::textures::TextureLoader;
 use super::{lights, materials};
-use crate::mesh::normals;
+use crate::limits::Budget;
+use crate::mesh::creases::{CreaseAngles, creased, sharp_cos};
 use crate::plan::context::PlanContext;
 use crate::plan::geometry::Geometry;
-use crate::plan::prepared::Prepared;
+use crate::plan::prepared::VertexNormals;
 use crate::plan::projection::Projection;
 use crate::plan::shared_slice::SharedSlice;
 use crate::plan::skips::SkipKind;
 use crate::plan::{CornerValues, Faces, PlanError, ShadedMaterial, SurfacePass, Textures, flags};
 use crate::scene::Scene;
-use crate::spec::Cull;
+use crate::spec::{Cull, Layers};
+use crate::texture::fault_warnings;
 
 /// The pass that is filled, or only hides lines; None where the request needs neither.
 pub fn surface_pass<'m>(
@@ -60,7 +62,7 @@ pub fn surface_pass<'m>(
         textures,
         lights: lights::lights(&scene.spec.light, &scene.camera),
     };
-    add_attributes(scene, geometry, &mut pass, cx);
+    add_attributes(scene, geometry, &mut pass, cx)?;
     Ok(Some(pass))
 }
 
@@ -86,8 +88,10 @@ fn materials_and_textures(
         }
     }
     let projection = Projection::new(&scene.camera, scene.size_px(), true);
-    let textures = loader.finish(geometry, &projection, cx.prepared, &mut cx.skips)?;
-    Ok((materials, textures))
+    let loaded = loader.finish(geometry, &projection, cx.prepared, &mut cx.skips)?;
+    materials.iter_mut().for_each(|material| materials::remove_textures(material, mesh, &loaded.broken));
+    cx.warnings.extend(fault_warnings(&loaded.faults));
+    Ok((materials, loaded.textures))
 }
 
 /// By material, whether any triangle has it.
@@ -107,18 +111,18 @@ fn add_attributes<'m>(
     geometry: &Geometry<'m>,
     pass: &mut SurfacePass<'m>,
     cx: &mut PlanContext<'_>,
-) {
-    let skips = &mut cx.skips;
+) -> Result<(), PlanError> {
     let mesh = scene.mesh;
     let all = pass.all_flags();
     let reads = |flag: u32| pass.is_shaded && all & flag != 0;
     let is_unlit = !reads(flags::FACE_NORMALS);
-    if !skips.skip(SkipKind::FaceNormals, is_unlit, "no material is lit by them") {
+    if !cx.skips.skip(SkipKind::FaceNormals, is_unlit, "no material is lit by them") {
         pass.face_normals = geometry.face_normals.clone();
     }
-    if !skips.skip(SkipKind::VertexNormals, !reads(flags::VERTEX_NORMALS), "no material is shaded smoothly") {
-        pass.vertex_normals = Some(vertex_normals(scene, geometry, cx.prepared));
+    if !cx.skips.skip(SkipKind::VertexNormals, !reads(flags::VERTEX_NORMALS), "no material is shaded smoothly") {
+        pass.vertex_normals = Some(vertex_normals(scene, geometry, cx)?);
     }
+    let skips = &mut cx.skips;
     let samples = pass.is_shaded && pass.materials.iter().any(materials::samples);
     let shows_uvs =
         pass.materials.iter().any(|m| m.flags & flags::DEBUG == super::debug_views::UV << flags::DEBUG_SHIFT);
@@ -131,20 +135,42 @@ fn add_attributes<'m>(
         let triangles = geometry.attribute_triangles.clone();
         pass.colors = Some(CornerValues { values: (&mesh.colors).into(), triangles });
     }
+    Ok(())
 }
 
-/// The file's own vertex normals; angle-weighted ones where it has none.
+/// The file's own vertex normals; angle-weighted ones with creases where it has none.
 fn vertex_normals<'m>(
     scene: &Scene<'m, '_>,
     geometry: &Geometry<'m>,
-    prepared: Option<&Prepared>,
-) -> CornerValues<'m, [f32; 3]> {
+    cx: &mut PlanContext<'_>,
+) -> Result<CornerValues<'m, [f32; 3]>, PlanError> {
     if geometry.normals.is_empty() {
-        let find = || normals::angle_weighted(&geometry.positions, &geometry.triangles, &geometry.face_normals);
-        // Triangles that stand for lines and points have normals of their own picture.
-        let prepared = prepared.filter(|_| geometry.positions.len() == scene.mesh.positions.len());
-        let values = prepared.map_or_else(|| Arc::new(find()), |prepared| prepared.vertex_normals(find));
-        return CornerValues { values: SharedSlice::Owned(values), triangles: geometry.triangles.clone() };
+        let found = creased_normals(scene, geometry, cx)?;
+        let triangles = found.triangles.map_or_else(|| geometry.triangles.clone(), SharedSlice::Owned);
+        return Ok(CornerValues { values: SharedSlice::Owned(found.normals), triangles });
     }
-    CornerValues { values: geometry.normals.clone(), triangles: geometry.attribute_triangles.clone() }
+    Ok(CornerValues { values: geometry.normals.clone(), triangles: geometry.attribute_triangles.clone() })
+}
+
+/// Vertex normals with the creases of each material's angle.
+fn creased_normals(
+    scene: &Scene<'_, '_>,
+    geometry: &Geometry<'_>,
+    cx: &mut PlanContext<'_>,
+) -> Result<VertexNormals, PlanError> {
+    // A material without a surface has no creases of its own.
+    let angle = |layers: &Layers| layers.surface.map_or(180.0, |surface| surface.crease_angle_deg);
+    let mut cos: Vec<f64> = scene.groups.by_material.iter().map(|layers| sharp_cos(angle(layers))).collect();
+    if cos.iter().all(|one| *one == cos[0]) {
+        cos.truncate(1);
+    }
+    let angles = CreaseAngles { cos_by_material: &cos, triangle_materials: &geometry.triangle_materials };
+    let Geometry { positions, triangles, face_normals, .. } = geometry;
+    let deadline = cx.deadline;
+    let find = |budget: &mut Budget| creased(positions, triangles, face_normals, angles, budget, deadline);
+    // Triangles that stand for lines and points have normals of their own picture.
+    match cx.prepared.filter(|_| positions.len() == scene.mesh.positions.len()) {
+        Some(prepared) => Ok(prepared.vertex_normals(&cos, cx.budget, find)?),
+        None => Ok(VertexNormals::new(find(cx.budget)?)),
+    }
 }

@@ -4,7 +4,7 @@ use super::textures::TextureLoader;
 use crate::mesh::material::{AlphaMode, TextureRef};
 use crate::mesh::{MaterialSlot, Mesh};
 use crate::plan::lines::styles::wire_color;
-use crate::plan::{PlanError, ShadedMaterial, TEXTURE_NONE, flags, slots};
+use crate::plan::{PlanError, ShadedMaterial, TEXTURE_NONE, TextureUse, flags, slots};
 use crate::spec::color::Rgba;
 use crate::spec::{DebugView, FlatNormals, Layers, Shading, Surface, Wire, WireMethod};
 
@@ -27,13 +27,22 @@ pub fn shaded_material(
         material.flags = flags::FILL | shading_flags(slot, surface);
         fill(&mut material, mesh, slot, surface);
         if surface.textures && surface.debug == DebugView::None {
-            sample(&mut material, slot, surface, textures)?;
+            sample(&mut material, mesh, slot, surface, textures)?;
         }
     }
     if let Some(wire) = layers.wire.as_ref().filter(|wire| wire.method != WireMethod::Exact) {
         wire_of(&mut material, wire);
     }
     Ok(material)
+}
+
+/// Takes textures from a material, those of these indices. It looks as if its file did not mention them.
+pub fn remove_textures(material: &mut ShadedMaterial, mesh: &Mesh, indices: &[u32]) {
+    for place in 0..material.textures.len() {
+        if indices.contains(&material.textures[place].texture) {
+            remove_texture(material, mesh, place);
+        }
+    }
 }
 
 /// Loads all textures of a material that samples none.
@@ -50,6 +59,20 @@ pub fn load_all(slot: &MaterialSlot, textures: &mut TextureLoader<'_>) -> Result
         }
     }
     Ok(())
+}
+
+fn remove_texture(material: &mut ShadedMaterial, mesh: &Mesh, place: usize) {
+    material.textures[place] = TextureUse::NONE;
+    match place {
+        // The factor of a texture, on its own, would be a lamp.
+        slots::EMISSIVE => material.emissive = [0.0; 3],
+        // White, as a factor, says nothing.
+        slots::BASE if mesh.colors.is_empty() && material.base_color[..3] == [1.0; 3] => {
+            let [r, g, b, _] = Rgba::from_srgb8(DEFAULT_COLOR).0;
+            material.base_color = [r, g, b, material.base_color[3]];
+        }
+        _ => {}
+    }
 }
 
 fn fill(material: &mut ShadedMaterial, mesh: &Mesh, slot: &MaterialSlot, surface: &Surface) {
@@ -117,6 +140,7 @@ fn shading_flags(slot: &MaterialSlot, surface: &Surface) -> u32 {
 
 fn sample(
     material: &mut ShadedMaterial,
+    mesh: &Mesh,
     slot: &MaterialSlot,
     surface: &Surface,
     textures: &mut TextureLoader<'_>,
@@ -132,7 +156,10 @@ fn sample(
     ];
     for (place, is_needed, texture, is_color) in wanted {
         if let Some(texture) = texture.as_ref().filter(|_| is_needed) {
-            material.textures[place] = textures.load(texture, is_color)?;
+            match textures.load(texture, is_color)? {
+                Some(texture) => material.textures[place] = texture,
+                None => remove_texture(material, mesh, place),
+            }
         }
     }
     Ok(())
@@ -140,7 +167,7 @@ fn sample(
 
 fn wire_of(material: &mut ShadedMaterial, wire: &Wire) {
     material.wire_color = wire_color(wire);
-    material.wire_thickness = wire.thickness;
+    material.wire_thickness = wire.thickness.largest();
     material.wire_smoothing = wire.smoothing;
     material.flags |= match wire.method {
         WireMethod::Exact => 0,

@@ -22,7 +22,8 @@ use crate::texture::{Texture, TextureError, Textures, fit, mips};
 /// Memory of images that are decoded at once, bytes: three of 2048 x 2048 texels in JPEG.
 const TOGETHER_BYTES_MAX: u64 = 256 << 20;
 
-/// Collects the textures that materials sample, and decodes them at the end.
+/// Collects the textures that materials sample, and decodes them at the end. An image that cannot be read
+/// is a fault, and the picture goes on without it.
 pub struct TextureLoader<'a> {
     mesh: &'a Mesh,
     budget: &'a mut Budget,
@@ -30,8 +31,22 @@ pub struct TextureLoader<'a> {
     material: u32,
     is_used: bool,
     wanted: Vec<Wanted>,
-    known: BTreeMap<(u32, bool), usize>,
+    /// Index into `wanted` by image and way of reading; None for an image that cannot be read.
+    known: BTreeMap<(u32, bool), Option<usize>>,
     uses: Vec<Use>,
+    /// By image.
+    faults: BTreeMap<u32, TextureError>,
+}
+
+/// The textures of a picture.
+#[derive(Debug, Default)]
+pub struct LoadedTextures {
+    /// The textures, decoded.
+    pub textures: Arc<Textures>,
+    /// Indices of those without pixels, because their images are broken.
+    pub broken: Vec<u32>,
+    /// The fault of each image that cannot be read.
+    pub faults: Vec<TextureError>,
 }
 
 /// An image that is read in one way: as colours or as numbers.
@@ -53,6 +68,7 @@ impl<'a> TextureLoader<'a> {
             wanted: Vec::new(),
             known: BTreeMap::new(),
             uses: Vec::new(),
+            faults: BTreeMap::new(),
         }
     }
 
@@ -63,35 +79,48 @@ impl<'a> TextureLoader<'a> {
         self.is_used = is_used;
     }
 
-    /// A texture for a material; `is_color` says that texels are sRGB.
-    pub fn load(&mut self, texture: &TextureRef, is_color: bool) -> Result<TextureUse, PlanError> {
+    /// A texture for a material; `is_color` says that texels are sRGB. None if the picture has to go on
+    /// without it.
+    pub fn load(&mut self, texture: &TextureRef, is_color: bool) -> Result<Option<TextureUse>, PlanError> {
+        if !self.is_used {
+            return Ok(Some(TextureUse::NONE));
+        }
         // Without texture coordinates a texture has no place on the mesh.
-        let Some(image) =
-            self.mesh.images.get(texture.image as usize).filter(|_| self.is_used && !self.mesh.uvs.is_empty())
-        else {
-            return Ok(TextureUse::NONE);
-        };
-        let bytes = match &image.content {
-            ImageContent::Encoded(bytes) => bytes,
-            ImageContent::Missing(sentence) => return Err(TextureError::Missing(sentence.clone()).into()),
-            ImageContent::Absent => return Ok(TextureUse::NONE),
-        };
-        let index = match self.known.get(&(texture.image, is_color)) {
-            Some(&index) => index,
-            None => {
-                let header = decode::header(&image.name, bytes)?;
-                self.budget.spend_texture(&image.name, header.width, header.height)?;
-                self.budget.spend("textures", 1, 256)?;
-                self.wanted.push(Wanted { image: texture.image, is_color, header });
-                self.known.insert((texture.image, is_color), self.wanted.len() - 1);
-                self.wanted.len() - 1
-            }
-        };
+        if self.mesh.uvs.is_empty() {
+            return Ok(None);
+        }
+        let Some(index) = self.index_of(texture.image, is_color)? else { return Ok(None) };
         let Header { width, height, .. } = self.wanted[index].header;
         let texels = f64::from(width) * f64::from(height);
         self.budget.spend("textures", 1, 2 * size_of::<Use>() as u64)?;
         self.uses.push(Use { material: self.material, texture: index, transform: texture.transform, texels });
-        Ok(TextureUse { transform: texture.transform, texture: index as u32, sampler: sampler(texture) })
+        Ok(Some(TextureUse { transform: texture.transform, texture: index as u32, sampler: sampler(texture) }))
+    }
+
+    /// The place of an image in `wanted`; None if it is absent or its header cannot be read.
+    fn index_of(&mut self, image: u32, is_color: bool) -> Result<Option<usize>, PlanError> {
+        if let Some(&known) = self.known.get(&(image, is_color)) {
+            return Ok(known);
+        }
+        let source = self.mesh.images.get(image as usize);
+        let Some((source, ImageContent::Encoded(bytes))) = source.map(|source| (source, &source.content)) else {
+            return Ok(None);
+        };
+        // With the sentence of a fault.
+        self.budget.spend("textures", 1, 1024)?;
+        let index = match decode::header(&source.name, bytes) {
+            Ok(header) => {
+                self.budget.spend_texture(&source.name, header.width, header.height)?;
+                self.wanted.push(Wanted { image, is_color, header });
+                Some(self.wanted.len() - 1)
+            }
+            Err(fault) => {
+                self.faults.insert(image, fault);
+                None
+            }
+        };
+        self.known.insert((image, is_color), index);
+        Ok(index)
     }
 
     /// Decodes all textures that were loaded.
@@ -101,11 +130,11 @@ impl<'a> TextureLoader<'a> {
         projection: &Projection,
         prepared: Option<&Prepared>,
         skips: &mut Skips<'_>,
-    ) -> Result<Arc<Textures>, PlanError> {
-        if self.wanted.is_empty() {
-            return Ok(Arc::default());
+    ) -> Result<LoadedTextures, PlanError> {
+        let Self { mesh, budget, deadline, wanted, uses, faults, .. } = self;
+        if wanted.is_empty() {
+            return Ok(LoadedTextures { faults: faults.into_values().collect(), ..LoadedTextures::default() });
         }
-        let Self { mesh, budget, deadline, wanted, uses, .. } = self;
         let sizes: Vec<[u32; 2]> = wanted.iter().map(|w| [w.header.width, w.header.height]).collect();
         let mut finest = closeup::finest_levels(mesh, geometry, projection, &uses, wanted.len(), deadline)?;
         for (level, size) in finest.iter_mut().zip(&sizes) {
@@ -125,7 +154,7 @@ impl<'a> TextureLoader<'a> {
         let kept = prepared.and_then(Prepared::textures);
         let images: Vec<(u32, bool)> = wanted.iter().map(of_wanted).collect();
         if let Some(kept) = kept.filter(|kept| kept.have(&images, &first_levels, &finest)) {
-            return Ok(kept.textures);
+            return Ok(LoadedTextures::new(&kept, faults));
         }
         let mut textures = Textures { texels: vec![[0; 4]; total as usize], images: Vec::new() };
         let mut decodings = Vec::new();
@@ -140,12 +169,26 @@ impl<'a> TextureLoader<'a> {
             decodings.push(Decoding { image: &mesh.images[want.image as usize], want, first_level, out });
             rest = others;
         }
-        decode_all(decodings, &batches, deadline)?;
-        let textures = Arc::new(textures);
+        let broken = decode_all(decodings, &batches, deadline)?;
+        let decoded = PreparedTextures { images, textures: Arc::new(textures), broken: broken.into() };
+        let loaded = LoadedTextures::new(&decoded, faults);
         if let Some(prepared) = prepared {
-            prepared.keep_textures(PreparedTextures { images, textures: Arc::clone(&textures) });
+            prepared.keep_textures(decoded);
         }
-        Ok(textures)
+        Ok(loaded)
+    }
+}
+
+impl LoadedTextures {
+    /// Decoded textures, and the faults of images that were not decoded at all.
+    fn new(decoded: &PreparedTextures, mut faults: BTreeMap<u32, TextureError>) -> Self {
+        // An image that is read in two ways is broken once.
+        faults.extend(decoded.broken.iter().map(|(index, fault)| (decoded.images[*index as usize].0, fault.clone())));
+        Self {
+            textures: Arc::clone(&decoded.textures),
+            broken: decoded.broken.iter().map(|(index, _)| *index).collect(),
+            faults: faults.into_values().collect(),
+        }
     }
 }
 
@@ -166,12 +209,17 @@ struct Decoding<'a> {
 }
 
 impl Decoding<'_> {
-    fn run(self, deadline: &Deadline) -> Result<(), PlanError> {
+    /// Returns the fault of an image that is broken.
+    fn run(self, deadline: &Deadline) -> Result<Option<TextureError>, PlanError> {
         deadline.check()?;
-        let ImageContent::Encoded(encoded) = &self.image.content else { return Ok(()) };
-        let pixels = decode::decode(&self.image.name, encoded, &self.want.header)?;
-        mips::fill(&pixels, self.want.is_color, self.first_level, self.out, deadline)?;
-        Ok(())
+        let ImageContent::Encoded(encoded) = &self.image.content else { return Ok(None) };
+        match decode::decode(&self.image.name, encoded, &self.want.header) {
+            Ok(pixels) => {
+                mips::fill(&pixels, self.want.is_color, self.first_level, self.out, deadline)?;
+                Ok(None)
+            }
+            Err(fault) => Ok(Some(fault)),
+        }
     }
 }
 
@@ -201,16 +249,26 @@ fn spend_on_decoding(decoding_bytes: &[u64], budget: &mut Budget) -> Result<Vec<
     Ok(batches)
 }
 
-/// Decodes images, so many together as `batches` says.
-fn decode_all(mut images: Vec<Decoding<'_>>, batches: &[usize], deadline: &Deadline) -> Result<(), PlanError> {
+/// Decodes images, so many together as `batches` says. Returns the faults of those that are broken, with
+/// their places.
+fn decode_all(
+    mut images: Vec<Decoding<'_>>,
+    batches: &[usize],
+    deadline: &Deadline,
+) -> Result<Vec<(u32, TextureError)>, PlanError> {
+    let mut faults = Vec::new();
+    let mut first = 0;
     for &count in batches {
         let others = images.split_off(count.min(images.len()));
         // Of several errors, the first image's.
         let results: Vec<_> = images.into_par_iter().map(|image| image.run(deadline)).collect();
-        results.into_iter().collect::<Result<(), _>>()?;
+        for (index, result) in (first..).zip(results) {
+            faults.extend(result?.map(|fault| (index, fault)));
+        }
+        first += count as u32;
         images = others;
     }
-    Ok(())
+    Ok(faults)
 }
 
 /// Bits as in [`TextureUse::sampler`].

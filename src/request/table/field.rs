@@ -5,6 +5,7 @@ use serde_json::Value as Json;
 use super::dependent::Dependent;
 use super::value::{COORDINATE_MAX, Kind, Value};
 use crate::request::draft::Draft;
+use crate::spec::WireThickness;
 use crate::spec::color::Rgba;
 use crate::spec::words::{Words, words_of};
 
@@ -98,6 +99,20 @@ places! {
     [f64; 3]: Kind::Point, Value::Point(v) => v;
     Rgba: Kind::Color, Value::Color(v) => v;
     bool: Kind::Flag, Value::Flag(v) => v;
+}
+
+impl Place for WireThickness {
+    fn kind() -> Kind {
+        Kind::NumberOr { word: "auto", min: 0.0, max: 100.0 }
+    }
+
+    fn of(value: Value) -> Option<Self> {
+        match value {
+            Value::Word(_) => Some(Self::Auto),
+            Value::Number(v) => Some(Self::Given(v as f32)),
+            _ => None,
+        }
+    }
 }
 
 impl<W: Words> Place for W {

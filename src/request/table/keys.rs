@@ -33,6 +33,9 @@ fn layers() -> Vec<Field> {
             "Lighting; by default the style's, or flat.";
         "surface.normals" |d| d.surface().normals, default "face";
             "Normals of flat shading: the triangle's own, or screen-space derivatives in blocks of 2 x 2 pixels, like a GPU's dFdx.";
+        "surface.crease_angle_deg" |d| d.surface().crease_angle_deg, in ANGLE, default 30;
+            "Smooth shading of a mesh without vertex normals: an edge is a crease, where smoothness ends, if its faces' \
+             normals differ by more than this. 180: no creases.";
         "surface.color" |d| d.surface().color;
             "Overrides the file's base colours and their textures; null keeps them. By default the style's, or null.";
         "surface.metallic" |d| d.surface().metallic, in SHARE, default Null;
@@ -54,8 +57,9 @@ fn layers() -> Vec<Field> {
             wire_methods();
         "wire.color" |d| d.wire().color, default "#000";
             "The lines' colour.";
-        "wire.thickness" |d| d.wire().thickness, in number(0.0, 100.0), default 1;
-            "exact: full width in pixels; other methods: multiples of the method's own unit, at most 10.";
+        "wire.thickness" |d| d.wire().thickness, default "auto";
+            "exact: full width in pixels; auto: 1, and thinner or fainter where lines would cover more than about a third of \
+             the surface. Other methods: multiples of the method's own unit, at most 10; auto: 1.";
         "wire.smoothing" |d| d.wire_draft().smoothing, in number(0.0, 10.0);
             "exact: pixels of a ramp beyond the box filter, by default 0; fwidth and fwidth-min: width of the smoothstep in \
              multiples, by default 1.";
@@ -63,8 +67,8 @@ fn layers() -> Vec<Field> {
             "Multiplies the colour's own opacity.";
         "wire.lit" |d| d.wire().lit, default false;
             "Mixes the lines into the base colour before lighting, instead of drawing them over the lit surface.";
-        "wire.edges" |d| d.wire().edges, default "triangles";
-            "triangles: all edges; polygons: edges of the file's polygons; feature: edges where the surface bends by more than \
+        "wire.edges" |d| d.wire().edges, default "polygons";
+            "polygons: edges of the file's polygons; triangles: also the diagonals between them; feature: edges where the surface bends by more than \
              feature_angle_deg or ends; boundary: edges with one face.";
         "wire.feature_angle_deg" |d| d.wire().feature_angle_deg, in ANGLE, default 30;
             "For edges=feature: the smallest angle between two faces' normals that makes an edge.";

@@ -87,6 +87,15 @@ pub enum Kind {
         /// The largest, which is allowed.
         max: f64,
     },
+    /// A finite number in a closed range, or a word.
+    NumberOr {
+        /// The word.
+        word: &'static str,
+        /// The smallest, which is allowed.
+        min: f64,
+        /// The largest, which is allowed.
+        max: f64,
+    },
     /// A finite number above 0.
     Above0 {
         /// The largest, which is allowed.
@@ -121,7 +130,7 @@ pub enum Value {
     Whole(u32),
     /// Width and height.
     Size(u32, u32),
-    /// Index in the list of words.
+    /// Index in the list of words; 0 for an only one.
     Word(usize),
     /// A colour.
     Color(Rgba),
@@ -142,6 +151,7 @@ impl Kind {
     pub fn allowed(&self, image_px_max: u64) -> String {
         match self {
             Self::Number { min, max } => format!("a number from {} to {}", short(*min), short(*max)),
+            Self::NumberOr { word, min, max } => format!("{word} or a number from {} to {}", short(*min), short(*max)),
             Self::Above0 { max } => format!("a number above 0, at most {}", short(*max)),
             Self::OneOf(values) => values.iter().map(u32::to_string).collect::<Vec<_>>().join(" or "),
             Self::Pixels => format!("a whole number from 1 to {image_px_max}"),
@@ -177,7 +187,9 @@ impl Kind {
     /// The name of a kind that JSON writes without quotes, for the advice about quotes.
     fn bare(&self) -> Option<&'static str> {
         match self {
-            Self::Number { .. } | Self::Above0 { .. } | Self::OneOf(_) | Self::Pixels => Some("a number"),
+            Self::Number { .. } | Self::NumberOr { .. } | Self::Above0 { .. } | Self::OneOf(_) | Self::Pixels => {
+                Some("a number")
+            }
             Self::Flag => Some("a truth value"),
             Self::Size | Self::Words(_) | Self::Color | Self::Point | Self::Direction => None,
         }
@@ -188,6 +200,10 @@ impl Kind {
         Some(match self {
             // NaN and the infinities are in no range.
             Self::Number { min, max } => Some(given.number()?).filter(|n| (*min..=*max).contains(n)).map(Value::Number),
+            Self::NumberOr { word, .. } if given.text() == Some(word) => Some(Value::Word(0)),
+            Self::NumberOr { min, max, .. } => {
+                Some(given.number()?).filter(|n| (*min..=*max).contains(n)).map(Value::Number)
+            }
             Self::Above0 { max } => Some(given.number()?).filter(|n| *n > 0.0 && n <= max).map(Value::Number),
             Self::OneOf(values) => {
                 let number = given.number()?;

@@ -7,7 +7,7 @@ use super::*;
 use crate::mesh::UpAxis;
 use crate::spec::{
     DebugView, FlatNormals, Hidden, LightPreset, NamedView, Outline, OutlineMethod, OutlineUnit, Shading, WireEdges,
-    WireMethod,
+    WireMethod, WireThickness,
 };
 
 pub fn rules() -> Rules {
@@ -30,6 +30,7 @@ fn is_layer(name: &str) -> bool {
 #[test]
 fn every_style_has_its_layers() {
     let cases = [
+        ("auto", Some(Shading::Smooth), None, false),
         ("flat", Some(Shading::Flat), None, false),
         ("smooth", Some(Shading::Smooth), None, false),
         ("unlit", Some(Shading::Unlit), None, false),
@@ -38,6 +39,7 @@ fn every_style_has_its_layers() {
         ("outline", Some(Shading::Smooth), None, true),
         ("hidden-line", Some(Shading::Unlit), Some(Hidden::Hide), false),
         ("topology", Some(Shading::Flat), None, false),
+        ("technical", Some(Shading::Smooth), Some(Hidden::Hide), true),
     ];
     assert_eq!(cases.len(), Style::ALL.len());
     for (style, shading, hidden, outline) in cases {
@@ -47,10 +49,10 @@ fn every_style_has_its_layers() {
         assert_eq!(spec.layers.outline.is_some(), outline, "{style}");
         assert_eq!(spec.topology.is_some(), style == "topology");
         if let Some(wire) = spec.layers.wire {
-            assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Exact, 1.0, 0.0));
+            assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Exact, WireThickness::Auto, 0.0));
         }
     }
-    assert_eq!(query(&[]).unwrap(), query(&[("style", "flat")]).unwrap());
+    assert_eq!(query(&[]).unwrap(), query(&[("style", "auto")]).unwrap());
 }
 
 #[test]
@@ -123,7 +125,7 @@ fn every_key_reaches_its_field() {
     assert_eq!((surface.normals, surface.debug), (FlatNormals::Derivative, DebugView::EdgeDistance));
     assert_eq!((surface.emissive, surface.opacity, surface.textures), (Rgba::parse("#100"), 0.5, false));
     let wire = spec.layers.wire.unwrap();
-    assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Fwidth, 2.0, 1.0));
+    assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Fwidth, WireThickness::Given(2.0), 1.0));
     assert_eq!((wire.edges, wire.hidden, wire.opacity), (WireEdges::Feature, Hidden::Show, 0.5));
     assert_eq!((wire.lit, wire.feature_angle_deg), (true, 45.0));
     assert_eq!(
@@ -205,7 +207,7 @@ fn null_is_the_default_or_as_if_the_key_were_not_there() {
         }
         query(&[(key, "null")]).unwrap_or_else(|error| panic!("{error}"));
     }
-    assert_eq!(keys.len(), 61);
+    assert_eq!(keys.len(), 62);
     for document in [r#"{"style":null}"#, r#"{"camera":null,"light":null,"image":null}"#, r#"{"materials":null}"#] {
         assert_eq!(json(document).unwrap(), json("{}").unwrap(), "{document}");
     }
@@ -293,13 +295,13 @@ fn stated_defaults_are_the_defaults() {
         assert_eq!(json(&with.to_string()).unwrap(), json(&without.to_string()).unwrap(), "{}", field.key);
         checked += 1;
     }
-    assert_eq!(checked, 46);
+    assert_eq!(checked, 47);
 }
 
 #[test]
 fn the_vocabulary_has_every_word() {
     let vocabulary = vocabulary();
-    assert_eq!(vocabulary["style"].len(), 8);
+    assert_eq!(vocabulary["style"].len(), 10);
     assert_eq!(vocabulary["surface.debug"].len(), 8);
     assert_eq!(vocabulary["wire.method"], words_of::<WireMethod>());
     assert_eq!(vocabulary.len(), 16);

@@ -249,7 +249,6 @@ impl From<&PlanError> for ApiError {
         let code = match error {
             PlanError::Limit(limit) => return limit.into(),
             PlanError::Stopped(stopped) => return Self::deadline(stopped.to_string()),
-            PlanError::Texture(_) => "texture_broken",
             PlanError::NoCamera => "no_camera",
         };
         Self::new(Fault::Content, code, error.to_string())

@@ -51,20 +51,41 @@ pub fn face_normal([a, b, c]: [V3; 3]) -> Option<V3> {
     (length(n) > 0.0).then(|| unit(n))
 }
 
-/// A normal a position: the mean of its faces' normals, weighted by the angle of each face there.
-pub fn smooth_normals(positions: &[V3], triangles: &[[u32; 3]]) -> Vec<V3> {
-    let mut sums = vec![[0.0; 3]; positions.len()];
-    for t in triangles {
-        let p = t.map(|v| positions[v as usize]);
-        let Some(normal) = face_normal(p) else { continue };
-        for k in 0..3 {
-            let (u, v) = (sub(p[(k + 1) % 3], p[k]), sub(p[(k + 2) % 3], p[k]));
-            let angle = length(cross(u, v)).atan2(dot(u, v));
-            let sum = &mut sums[t[k] as usize];
-            *sum = std::array::from_fn(|i| sum[i] + angle * normal[i]);
-        }
+/// A normal per corner of each triangle: the mean of the normals of the faces on its side of the creases at
+/// its position, weighted by the angle of each face there.
+///
+/// A crease is an edge whose two faces' normals differ by more than `crease_deg`.
+pub fn smooth_normals(positions: &[V3], triangles: &[[u32; 3]], crease_deg: f64) -> Vec<[V3; 3]> {
+    let normals: Vec<Option<V3>> = triangles.iter().map(|t| face_normal(t.map(|v| positions[v as usize]))).collect();
+    let mut faces_at = vec![Vec::new(); positions.len()];
+    for (f, t) in triangles.iter().enumerate().filter(|(f, _)| normals[*f].is_some()) {
+        t.iter().for_each(|&v| faces_at[v as usize].push(f));
     }
-    sums.into_iter().map(|sum| if length(sum) > 0.0 { unit(sum) } else { sum }).collect()
+    let is_crease = |f: usize, g: usize| {
+        let angle = |a: V3, b: V3| length(cross(a, b)).atan2(dot(a, b)).to_degrees();
+        normals[f].zip(normals[g]).is_some_and(|(a, b)| angle(a, b) > crease_deg)
+    };
+    let share_edge =
+        |f: usize, g: usize| f != g && triangles[f].iter().filter(|v| triangles[g].contains(v)).count() == 2;
+    let corner = |f: usize, v: u32| {
+        let faces = &faces_at[v as usize];
+        let has_crease = faces.iter().any(|&f| faces.iter().any(|&g| share_edge(f, g) && is_crease(f, g)));
+        let mut side = if has_crease { vec![f] } else { faces.clone() };
+        let joins = |side: &[usize], g: usize| side.iter().any(|&h| share_edge(g, h) && !is_crease(g, h));
+        while let Some(&more) = faces.iter().find(|&&g| !side.contains(&g) && joins(&side, g)) {
+            side.push(more);
+        }
+        let sum = side.iter().fold([0.0; 3], |sum, &g| {
+            let (t, normal) = (triangles[g], normals[g].unwrap_or_default());
+            let k = t.iter().position(|&u| u == v).unwrap_or_default();
+            let at = |step: usize| positions[t[(k + step) % 3] as usize];
+            let (a, b) = (sub(at(1), at(0)), sub(at(2), at(0)));
+            let angle = length(cross(a, b)).atan2(dot(a, b));
+            std::array::from_fn(|i| sum[i] + angle * normal[i])
+        });
+        if length(sum) > 0.0 { unit(sum) } else { sum }
+    };
+    (0..triangles.len()).map(|f| triangles[f].map(|v| corner(f, v))).collect()
 }
 
 /// Perspective-correct weights of a triangle's corners at a point: the ray's own, by ratios of

@@ -110,11 +110,20 @@ fn normals_weights_and_light_are_what_is_known() {
     });
     let triangles: Vec<[u32; 3]> =
         shape.triangulated().polygons.iter().map(|p| [p[0] as u32, p[1] as u32, p[2] as u32]).collect();
-    let normals = smooth_normals(&shape.vertices, &triangles);
-    let inner: Vec<usize> =
-        (0..shape.vertices.len()).filter(|v| v % 97 > 0 && v % 97 < 96 && (97..97 * 48).contains(v)).collect();
-    assert!(inner.iter().all(|&v| dot(normals[v], shape.vertices[v]) > 0.9999));
-    assert!(inner.len() > 4000);
+    let normals = smooth_normals(&shape.vertices, &triangles, 30.0);
+    let corners = triangles.iter().flatten().map(|&v| v as usize).zip(normals.into_iter().flatten());
+    let inner: Vec<(usize, [f64; 3])> =
+        corners.filter(|(v, _)| v % 97 > 0 && v % 97 < 96 && (97..97 * 48).contains(v)).collect();
+    assert!(inner.iter().all(|(v, normal)| dot(*normal, shape.vertices[*v]) > 0.9999));
+    assert!(inner.len() > 6 * 4000);
+    // Without creases a cube's corner points along its diagonal, with creases along its faces.
+    let vertices: Vec<[f64; 3]> = (0..8).map(|i| [0, 1, 2].map(|k| f64::from(i >> k & 1) - 0.5)).collect();
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5_u32]];
+    let faces: Vec<[u32; 3]> = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
+    for (crease_deg, share) in [(180.0, 3.0_f64.sqrt().recip()), (89.0, 1.0)] {
+        let normals = smooth_normals(&vertices, &faces, crease_deg);
+        assert!(normals.iter().flatten().flatten().all(|n| n.abs() < 1e-9 || (n.abs() - share).abs() < 1e-9));
+    }
     assert_eq!(face_normal([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), Some([0.0, 0.0, 1.0]));
 
     // Perspective weights: project a known mixture of corners, and find the mixture again.

@@ -64,12 +64,11 @@ pub fn color_errors(plan: &DrawPlan<'_>, image: &Image, normals: &[[V3; 3]]) -> 
 
 /// Exact normals at the corners of the plan's triangles.
 fn true_normals(scene: &Scene, is_smooth: bool) -> Vec<[V3; 3]> {
-    let smooth = smooth_normals(&scene.positions, &scene.triangles);
-    let corners = |t: &[u32; 3]| {
-        let flat = face_normal(t.map(|v| scene.positions[v as usize])).unwrap_or([0.0, 0.0, 1.0]);
-        if is_smooth { t.map(|v| smooth[v as usize]) } else { [flat; 3] }
-    };
-    scene.triangles.iter().map(corners).collect()
+    if is_smooth {
+        return smooth_normals(&scene.positions, &scene.triangles, 30.0);
+    }
+    let flat = |t: &[u32; 3]| [face_normal(t.map(|v| scene.positions[v as usize])).unwrap_or([0.0, 0.0, 1.0]); 3];
+    scene.triangles.iter().map(flat).collect()
 }
 
 #[test]

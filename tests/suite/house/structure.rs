@@ -16,10 +16,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("parallel", &[]),
     ("mesh", &["parallel", "limits", "warning"]),
     ("import", &["mesh", "parallel", "srgb", "limits", "warning", "pluralise"]),
-    ("report", &["import", "mesh", "limits", "warning", "pluralise"]),
+    ("report", &["import", "texture", "mesh", "limits", "warning", "pluralise"]),
     ("spec", &["mesh", "image", "srgb", "limits"]),
     ("request", &["spec", "mesh", "image", "limits"]),
-    ("texture", &["mesh", "srgb", "limits"]),
+    ("texture", &["mesh", "srgb", "limits", "warning"]),
     ("scene", &["spec", "mesh", "limits"]),
     ("plan", &["scene", "spec", "texture", "mesh", "image", "limits", "warning"]),
     // Of spec the choice of a back-end alone.

@@ -46,7 +46,7 @@ fn the_schema_is_valid_and_describes_every_key() {
         assert!(property["description"].as_str().is_some_and(|text| text.ends_with('.')), "{key}: {property}");
         described += 1;
     }
-    assert_eq!(described, 72);
+    assert_eq!(described, 73);
 }
 
 /// Documents that are understood.
@@ -57,7 +57,7 @@ const GOOD: &[&str] = &[
     r#"{"scene":{"time_s":0}}"#,
     r#"{"scene":{"time_s":null}}"#,
     r#"{"style":"topology"}"#,
-    r##"{"surface":{"shading":"smooth","normals":"derivative","color":"#c8ccd2","metallic":0,"roughness":0.6,
+    r##"{"surface":{"shading":"smooth","normals":"derivative","crease_angle_deg":180,"color":"#c8ccd2","metallic":0,"roughness":0.6,
         "emissive":"#000","opacity":1,"textures":true,"cull":"back","debug":"edge-distance"}}"##,
     r#"{"surface":null,"wire":{},"outline":null,"topology":{}}"#,
     r#"{"surface":{"color":null,"metallic":null,"roughness":null,"emissive":null}}"#,

@@ -20,7 +20,7 @@ use crate::support::server::{Server, meshsnap};
 use crate::support::skip::{Need, skip};
 
 /// Requests under api/examples.
-const EXAMPLES: usize = 32;
+const EXAMPLES: usize = 33;
 
 const SIZE_PX: u32 = 256;
 
@@ -274,13 +274,13 @@ fn the_examples_show_every_look() {
     ] {
         for word in &vocabulary[key] {
             // A default needs no word.
-            let is_default = ["none", "face", "exact", "triangles"].contains(word);
+            let is_default = ["none", "face", "exact", "triangles", "auto"].contains(word);
             let is_shown = all.iter().any(|document| document.pointer(at).is_some_and(|v| v == word));
             assert!(is_shown || is_default, "no example has {key}={word}");
             words += 1;
         }
     }
-    assert_eq!(words, 34);
+    assert_eq!(words, 36);
 }
 
 /// As a stranger would: from the root of a clone, exactly the line that the server prints.

@@ -18,6 +18,7 @@ use serde_json::json;
 use crate::render::textures::levels::{encode, model, model_of};
 use crate::support::gpus::gpus;
 use crate::support::scenes::{self, SCENES};
+use crate::support::server::CUBE_OBJ;
 use crate::support::shapes;
 
 /// Draws a mesh as it was found before, and anew.
@@ -53,6 +54,41 @@ fn scenes_are_the_same_whatever_is_known() {
         known += usize::from(before > 0);
     }
     assert_eq!((drawn, known), (2 * SCENES.len(), SCENES.len()));
+}
+
+/// Other crease angles, of all or of some materials, and back again; with normals by position, and with
+/// texture coordinates that have an order of their own.
+#[test]
+fn creases_are_those_that_each_picture_asks_for() {
+    let cube = scenes::mesh(&String::from_utf8_lossy(CUBE_OBJ));
+    let balls = scenes::mesh(&shapes::two_balls());
+    let picture = image::RgbImage::from_fn(16, 16, |x, y| image::Rgb([(x * y) as u8, x as u8, (x ^ y) as u8]));
+    let textured = model_of(&encode(&picture.into(), ImageFormat::Png));
+    let mut renderers: Vec<Box<dyn Renderer>> = vec![Box::new(CpuRenderer::new(2))];
+    let on_gpus = gpus().into_iter().flatten().map(|gpu| Box::new(GpuRenderer::new(gpu.clone())) as Box<dyn Renderer>);
+    renderers.extend(on_gpus);
+    let mut pictures = std::collections::BTreeSet::new();
+    let mut drawn = 0;
+    for renderer in &mut renderers {
+        for mesh in [&cube, &balls, &textured] {
+            let prepared = Prepared::default();
+            for angle in ["30", "30", "180", "180", "30", "10", "30"] {
+                let other = format!(r#"{{"left":{{"surface":{{"crease_angle_deg":{}}}}}}}"#, 3 * drawn % 180);
+                for materials in ["{}", &other] {
+                    let keys = [("style", "smooth"), ("size", "40"), ("surface.crease_angle_deg", angle)];
+                    let spec = scenes::spec(&[&keys[..], &[("materials", materials)]].concat());
+                    is_drawn_alike(&mut **renderer, mesh, &spec, &prepared, angle);
+                    let mut budget = Budget::new(&Limits::default());
+                    let scene = Scene::new(mesh, &spec, &mut budget).unwrap();
+                    let plan = plan::build_from(&scene, &prepared, &mut budget, &Deadline::default()).unwrap();
+                    pictures.insert(renderer.draw(&plan, &Deadline::default()).unwrap().rgba);
+                    drawn += 1;
+                }
+            }
+        }
+    }
+    assert_eq!(drawn, renderers.len() * 3 * 7 * 2);
+    assert!(pictures.len() > 8, "{} pictures: the angles change nothing", pictures.len());
 }
 
 /// From the third picture on, a mesh's lists are on the device already.

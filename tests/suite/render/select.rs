@@ -141,6 +141,42 @@ fn the_choice_follows_what_the_machine_has() {
     assert_eq!(checked, 12);
 }
 
+/// Jobs whose device is being opened have their pipelines made while it draws the probe. What becomes of that
+/// changes no picture.
+#[test]
+fn a_device_is_made_ready_while_it_is_probed() {
+    let cases = [(Open::Hardware, false, ByGpu), (Open::Hardware, true, ByGpu), (Open::Wrong, true, ByCpu)];
+    for (open, ready_panics, by) in cases {
+        let machine = Machine::new(&[open], &[]);
+        let (open_gate, gate) = std::sync::mpsc::channel();
+        let mut story = machine.0.lock().unwrap();
+        (story.ready_panics, story.probe_gate) = (ready_panics, Some(gate));
+        drop(story);
+        let host = machine.host(HardwareHint::Maybe);
+        let made_ready = || machine.0.lock().unwrap().made_ready;
+        std::thread::scope(|scope| {
+            let began = Instant::now();
+            // The gate is shut: neither the job that opens the device has a picture, nor the one that waits.
+            let jobs = [1, 2].map(|count| {
+                let job = scope.spawn(|| draw(&mut Backends::new(host.clone(), 1), Auto));
+                while made_ready() < count {
+                    assert!(began.elapsed() < Duration::from_secs(30), "{} made ready", made_ready());
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                job
+            });
+            assert!(!machine.0.lock().unwrap().drawn_px.contains(&job().width_px));
+            open_gate.send(()).unwrap();
+            for job in jobs {
+                assert_eq!(job.join().unwrap().unwrap(), by, "{open:?}");
+            }
+        });
+        // An open device is not made ready again.
+        check(&mut Backends::new(host, 1), &[(Auto, Ok(by))]);
+        assert_eq!(made_ready(), 2);
+    }
+}
+
 #[test]
 fn a_refused_plan_goes_to_the_cpu_and_the_gpu_stays() {
     let machine = Machine::new(&[Open::Hardware], &[Act::Refuses, Act::Refuses, Act::Draws]);
@@ -279,7 +315,7 @@ fn a_gpu_that_is_wrong_with_many_samples_draws_none_of_them() {
 }
 
 /// Number of styles.
-const STYLES: usize = 8;
+const STYLES: usize = 10;
 
 #[test]
 fn a_warm_gpu_has_drawn_every_style() {
@@ -288,6 +324,7 @@ fn a_warm_gpu_has_drawn_every_style() {
     assert!(warm_up.wait(Duration::from_secs(30)), "it takes too long");
     let drawn = |machine: &Machine| machine.0.lock().unwrap().drawn_px.iter().filter(|&&px| px == 64).count();
     assert_eq!((machine.opened(), drawn(&machine)), (vec![GpuKind::Hardware], STYLES));
+    assert_eq!(machine.0.lock().unwrap().made_ready, STYLES);
     // Without hardware, or need of it, nothing is opened. A software GPU, or none, is left alone.
     let cases: [(&[Open], HardwareHint, BackendChoice); 4] = [
         (&[], none(), Auto),

@@ -56,6 +56,12 @@ pub struct Story {
     pub drawn_px: Vec<u32>,
     pub devices: Vec<Arc<Fake>>,
     pub renderers: usize,
+    /// Plans that devices were made ready for.
+    pub made_ready: usize,
+    /// True if making a device ready panics.
+    pub ready_panics: bool,
+    /// What the first probe waits for.
+    pub probe_gate: Option<Receiver<()>>,
     /// What [`Act::Waits`] waits for.
     pub gate: Option<Receiver<()>>,
 }
@@ -127,6 +133,15 @@ impl GpuDevice for Fake {
         self.machine.0.lock().unwrap().renderers += 1;
         Box::new(FakeRenderer(self))
     }
+
+    fn make_ready(&self, _: &DrawPlan<'_>) -> Result<(), DrawError> {
+        let mut story = self.machine.0.lock().unwrap();
+        story.made_ready += 1;
+        let panics = story.ready_panics;
+        drop(story);
+        assert!(!panics, "a driver that cannot compile");
+        Ok(())
+    }
 }
 
 struct FakeRenderer(Arc<Fake>);
@@ -171,6 +186,10 @@ impl Renderer for FakeRenderer {
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
         if matches!(self.0.open, Open::Broken) {
             return Err(DrawError::Device("no such shader".into()));
+        }
+        let gate = self.0.machine.0.lock().unwrap().probe_gate.take();
+        if let Some(gate) = gate {
+            gate.recv_timeout(Duration::from_secs(30)).expect("the gate opens");
         }
         CpuRenderer::new(1).draw_visibility(plan, deadline)
     }

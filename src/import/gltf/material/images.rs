@@ -1,17 +1,19 @@
 //! Textures, samplers and images of materials.
 
-use crate::import::MeshError;
+use crate::import::bundle::show_all;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::import::gltf::data::buffers;
 use crate::import::gltf::data::buffers::Uri;
 use crate::import::gltf::document::lists;
 use crate::import::gltf::document::lists::{Lists, TextureInfo, Transform, entry};
+use crate::import::{MeshError, MeshFault};
 use crate::mesh::material::{ImageContent, ImageSource, TextureRef, Wrap};
 use crate::warning::Warning;
 use serde::Deserialize;
 use serde_json::value::RawValue;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The images that drawn materials use, collected while they are read.
 #[derive(Debug, Default)]
@@ -24,6 +26,10 @@ pub struct Images {
     /// be quadratic.
     textures: BTreeMap<usize, lists::Texture>,
     samplers: BTreeMap<usize, lists::Sampler>,
+    /// URIs of images that the upload lacks.
+    missing: Vec<String>,
+    /// Why images cannot be found in the file.
+    broken: Vec<String>,
 }
 
 impl Images {
@@ -90,12 +96,47 @@ impl Images {
         cx.budget.spend("a glTF image's description", raw_bytes, 1)?;
         let image: lists::Image = entry("image", &lists.images, index)?;
         let name = name(index, &image);
-        let content = content(&name, index, &image, reader, cx)?;
-        cx.budget.spend("images", 1, size_of::<ImageSource>() as u64 * 2 + 64)?;
+        let content = self.content(&name, index, &image, reader, cx)?;
+        cx.budget.spend("images", 1, size_of::<ImageSource>() as u64 * 2 + 1024)?;
         let place = self.sources.len() as u32;
         self.sources.push(ImageSource { name, content });
         self.known.insert(index, place);
         Ok(place)
+    }
+
+    /// The bytes of an image, still encoded. Without them the model is drawn without the image.
+    fn content(
+        &mut self,
+        name: &str,
+        index: usize,
+        image: &lists::Image,
+        reader: &mut Reader<'_>,
+        cx: &mut Context<'_>,
+    ) -> Result<ImageContent, MeshError> {
+        match encoded(name, index, image, reader, cx) {
+            Ok(Some(bytes)) => Ok(ImageContent::Encoded(bytes)),
+            Ok(None) => {
+                self.missing.push(buffers::printable(image.uri.as_deref().unwrap_or_default()));
+                Ok(ImageContent::Absent)
+            }
+            Err(error) if matches!(error.fault, MeshFault::Broken | MeshFault::OutsideBundle) => {
+                self.broken.push(error.detail);
+                Ok(ImageContent::Absent)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Warnings of images that are not there.
+    pub fn warnings(&self) -> impl Iterator<Item = Warning> {
+        let names = show_all(self.missing.iter().map(String::as_str));
+        let missing = format!("the upload lacks {names}: add the files, or embed them, to see these textures");
+        let missing = (!self.missing.is_empty()).then_some(Warning { code: "textures_missing", detail: missing });
+        let broken = self.broken.first().map(|first| {
+            let detail = format!("{first}; it is drawn without (images: {})", self.broken.len());
+            Warning { code: "textures_broken", detail }
+        });
+        missing.into_iter().chain(broken)
     }
 }
 
@@ -116,26 +157,26 @@ fn once<'a, T: Clone + Deserialize<'a>>(
     Ok(parsed)
 }
 
-/// The bytes of an image, still encoded.
-fn content(
+/// The bytes of an image, paid for; None if the upload lacks it.
+fn encoded(
     name: &str,
     index: usize,
     image: &lists::Image,
     reader: &mut Reader<'_>,
     cx: &mut Context<'_>,
-) -> Result<ImageContent, MeshError> {
+) -> Result<Option<Arc<[u8]>>, MeshError> {
     if let Some(view) = image.buffer_view {
         let view = reader.view(view.0, cx)?;
         cx.budget.spend("an image of the glTF file", view.bytes().len() as u64, 1)?;
-        return Ok(ImageContent::Encoded(view.bytes().into()));
+        return Ok(Some(view.bytes().into()));
     }
     match &image.uri {
         Some(uri) => Ok(match buffers::from_uri(uri, &format!("image {index}"), cx)? {
             Uri::Bytes(bytes) => {
                 cx.budget.spend("an image of the glTF file", bytes.len() as u64, 1)?;
-                ImageContent::Encoded(bytes.into())
+                Some(bytes.into())
             }
-            Uri::Outside(sentence) => ImageContent::Missing(sentence),
+            Uri::Outside(_) => None,
         }),
         None => Err(MeshError::broken(format!("{name} of the glTF file has neither a URI nor a buffer view"))),
     }

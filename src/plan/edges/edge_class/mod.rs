@@ -1,6 +1,7 @@
 //! Classes of edges: which edges of a mesh a line style follows.
 
 use crate::mesh::Mesh;
+use crate::mesh::creases::sharp_cos;
 use crate::mesh::edges::MeshEdge;
 use crate::spec::{Wire, WireEdges};
 
@@ -11,10 +12,10 @@ pub enum Class {
     All,
     /// Edges of the file's polygons, without the diagonals of triangulation.
     Polygon,
-    /// Edges whose faces meet at an angle with a cosine below this, and edges without exactly two
-    /// faces.
+    /// Edges whose faces meet at an angle with a cosine below this ([`sharp_cos`]), and edges without
+    /// exactly two faces.
     Feature(f64),
-    /// Edges of exactly two faces that meet at an angle with a cosine below this.
+    /// Edges of exactly two faces that meet at an angle with a cosine below this ([`sharp_cos`]).
     Crease(f64),
     /// Edges with one face.
     Boundary,
@@ -27,7 +28,7 @@ pub fn class_of(wire: &Wire) -> Class {
     match wire.edges {
         WireEdges::Triangles => Class::All,
         WireEdges::Polygons => Class::Polygon,
-        WireEdges::Feature => Class::Feature(cos_deg(wire.feature_angle_deg)),
+        WireEdges::Feature => Class::Feature(sharp_cos(wire.feature_angle_deg)),
         WireEdges::Boundary => Class::Boundary,
     }
 }
@@ -52,11 +53,6 @@ pub fn belongs_to(class: Class, mesh: &Mesh, edge: &MeshEdge) -> bool {
         Class::Boundary => edge.face_count == 1,
         Class::Nonmanifold => edge.face_count > 2 || (edge.face_count == 2 && edge.has_inconsistent_winding),
     }
-}
-
-/// The cosine of an angle in degrees.
-pub fn cos_deg(degrees: f64) -> f64 {
-    libm::cos(degrees.to_radians())
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ fn counts(obj: &str) -> [usize; 4] {
     let bundle = crate::import::Bundle::of_one(obj.as_bytes().to_vec());
     let mesh = crate::import::import(&bundle, None, &limits, &mut budget, &Deadline::default()).unwrap().mesh;
     let list = EdgeList::of(&mesh, &mut budget).unwrap();
-    let limit = cos_deg(30.0);
+    let limit = sharp_cos(30.0);
     [Class::Feature(limit), Class::Crease(limit), Class::Boundary, Class::Nonmanifold]
         .map(|class| list.iter().filter(|edge| belongs_to(class, &mesh, edge)).count())
 }

@@ -5,6 +5,7 @@
 use std::process::Output;
 
 use crate::http::answers::FORM;
+use crate::render::textures::levels::encode;
 use crate::support::files::bundle::{Model, files, read_bundle, zipped};
 use crate::support::server::{Answer, CUBE_OBJ, Server, meshsnap};
 use meshsnap::import::Bundle;
@@ -136,12 +137,13 @@ fn folders_on_the_command_line_are_those_of_the_bundle() {
         std::fs::write(&path, bytes).unwrap();
         path.to_str().unwrap().to_owned()
     };
+    let picture = encode(&image::RgbImage::new(2, 2).into(), image::ImageFormat::Png);
     let obj = "mtllib ../lib/m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl A\nf 1 2 3\n";
     let files = [
         write("models/m.obj", obj.as_bytes()),
         write("lib/m.mtl", b"newmtl A\nmap_Kd tex/same.png\nnorm ../models/same.png\n"),
-        write("lib/tex/same.png", b"\x89PNG"),
-        write("models/same.png", b"\x89PNG"),
+        write("lib/tex/same.png", &picture),
+        write("models/same.png", &picture),
     ];
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
     let warnings = |files: &[&str]| {

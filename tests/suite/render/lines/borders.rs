@@ -10,6 +10,7 @@ use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
 use meshsnap::plan::{DrawPlan, SkipKind};
+use meshsnap::spec::WireThickness::Given;
 use meshsnap::spec::color::Rgba;
 use meshsnap::spec::{Hidden, Outline, OutlineMethod, OutlineUnit, Spec};
 
@@ -63,7 +64,7 @@ fn outline(method: OutlineMethod, px: f32) -> Option<Outline> {
 }
 
 fn wire(spec: &mut Spec, px: f32, hidden: Hidden) {
-    spec.layers.wire.iter_mut().for_each(|wire| (wire.thickness, wire.hidden, wire.color) = (px, hidden, RED));
+    spec.layers.wire.iter_mut().for_each(|wire| (wire.thickness, wire.hidden, wire.color) = (Given(px), hidden, RED));
 }
 
 fn meshes() -> [Mesh; 4] {

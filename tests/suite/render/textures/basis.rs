@@ -1,6 +1,6 @@
 //! Basis Universal textures.
 
-use crate::render::textures::levels::{error, model_of, textures, value};
+use crate::render::textures::levels::{model_of, textures, value, warning};
 use crate::support::data;
 use crate::support::files::mesh::Noise;
 use crate::support::work::within_bytes;
@@ -74,8 +74,7 @@ fn other_ktx2_files_are_named() {
     ];
     let mut ran = 0;
     for (bytes, word) in cases {
-        let PlanError::Texture(error) = error(&model_of(&bytes)) else { panic!("not a texture's error") };
-        let detail = error.to_string();
+        let detail = warning(&model_of(&bytes));
         assert!(detail.contains("image 0") && detail.contains(word), "{word}: {detail}");
         ran += 1;
     }

@@ -5,3 +5,4 @@ pub mod basis;
 pub mod closeup;
 pub mod formulas;
 pub mod levels;
+pub mod without;

@@ -266,7 +266,9 @@ fn each_view(mut each: impl FnMut(&str, &mut DrawPlan<'_>)) {
     for (name, obj, camera) in [("torus", shapes::torus(16), &[][..]), ("inside a sheet", shapes::sheet(12), INSIDE)] {
         let mesh = scenes::mesh(&obj);
         for samples in ["1", "4"] {
-            let keys = [&[("style", "smooth"), ("size", "113x83"), ("samples", samples)], camera].concat();
+            let own =
+                [("style", "smooth"), ("surface.crease_angle_deg", "180"), ("size", "113x83"), ("samples", samples)];
+            let keys = [&own, camera].concat();
             let spec = scenes::spec(&keys);
             let mut plan = scenes::plan(&mesh, &spec);
             assert_eq!(plan.projection.clip, !camera.is_empty());

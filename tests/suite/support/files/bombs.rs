@@ -14,6 +14,9 @@ pub struct Bomb {
     pub code: &'static str,
 }
 
+/// The code of an upload that is drawn, without the part that costs.
+pub const DRAWN: &str = "";
+
 /// A count that no memory has room for.
 const HUGE: u64 = 4_000_000_000_000;
 
@@ -57,7 +60,7 @@ fn images() -> Vec<Case> {
     vec![
         ("PNG, 30000 x 30000", textured("a.png", &png(30_000, 30_000)), "limit_exceeded"),
         ("PNG, 2^31 x 2^31", textured("a.png", &png(1 << 31, 1 << 31)), "limit_exceeded"),
-        ("PNG, 8192 x 8192 without its pixels", textured("a.png", &png(8192, 8192)), "texture_broken"),
+        ("PNG, 8192 x 8192 without its pixels", textured("a.png", &png(8192, 8192)), DRAWN),
         ("JPEG, 65500 x 65500", textured("a.jpg", &jpeg(65_500)), "limit_exceeded"),
         ("WebP, 16383 x 16383", textured("a.webp", &webp(16_383)), "limit_exceeded"),
         ("KTX2, 30000 x 30000", textured("a.ktx2", &ktx2(30_000)), "limit_exceeded"),
