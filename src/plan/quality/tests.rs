@@ -108,7 +108,7 @@ fn a_gpu_is_chosen_where_there_is_one_and_the_table_knows_it() {
 fn another_method_draws_as_wide() {
     let asked = spec(&[LINES, &[("max_error", "99")]].concat());
     let wire = select_from(&table(true), &asked, 100_000, false).unwrap().spec.layers.wire.unwrap();
-    assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Fwidth, WireThickness::Given(0.0), 1.0));
+    assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Fwidth, WireThickness::Given(1.0), 1.0));
     let exact = asked.layers.wire.unwrap();
     let wide = |width_px| as_wide(&Wire { thickness: WireThickness::Given(width_px), ..exact }, WireMethod::Fwidth);
     let thin = wide(0.5).unwrap();

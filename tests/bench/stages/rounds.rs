@@ -22,7 +22,7 @@ use crate::reference::Reference;
 const LOOKS: &[(&str, &[(&str, &str)])] = &[
     ("flat", &[("style", "flat")]),
     ("smooth", &[("style", "smooth")]),
-    ("wire", &[("style", "wire")]),
+    ("wire", &[("style", "wire"), ("wire.edges", "triangles"), ("wire.thickness", "1")]),
     ("outline", &[("style", "outline")]),
     ("xray", &[("style", "flat"), ("surface.opacity", "0.5")]),
 ];

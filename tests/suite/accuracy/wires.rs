@@ -238,6 +238,8 @@ fn lines_are_exact(folder: &Path, names: &[&str]) {
             ("style", "wireframe"),
             ("wire.hidden", "hide"),
             ("wire.color", "fff"),
+            ("wire.edges", "triangles"),
+            ("wire.thickness", "1"),
         ];
         let spec = scenes::spec(&keys);
         let plan = scenes::plan(&mesh, &spec);

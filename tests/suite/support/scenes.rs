@@ -9,7 +9,7 @@ use meshsnap::request;
 use meshsnap::request::Rules;
 use meshsnap::spec::BackendChoice;
 use meshsnap::spec::color::Rgba;
-use meshsnap::spec::{DebugView, Layers, Spec};
+use meshsnap::spec::{DebugView, Layers, Spec, WireEdges, WireThickness};
 
 use crate::support::shapes;
 
@@ -26,6 +26,11 @@ impl Scene {
     /// The spec of the keys, with the scene's edit.
     pub fn spec(&self) -> Spec {
         let mut spec = spec(self.keys);
+        let asks_for = |key: &str| self.keys.iter().any(|(given, _)| *given == key);
+        if let Some(wire) = &mut spec.layers.wire {
+            wire.edges = if asks_for("wire.edges") { wire.edges } else { WireEdges::Triangles };
+            wire.thickness = if asks_for("wire.thickness") { wire.thickness } else { WireThickness::Given(1.0) };
+        }
         (self.edit)(&mut spec);
         spec
     }

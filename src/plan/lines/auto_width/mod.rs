@@ -1,5 +1,7 @@
 //! The width of wires whose thickness is left open: lines that let the surface be seen.
 
+use rayon::prelude::*;
+
 use crate::mesh::Mesh;
 use crate::plan::Projection;
 use crate::plan::projection::row_dot;
@@ -12,8 +14,20 @@ const COVERED_MAX: f64 = 0.35;
 /// instead: far below a pixel, width and opacity look the same, and these are drawn sooner.
 const WIDTHS_PX: [f64; 2] = [0.8, 1.0];
 
-/// Faces that are looked at, at most: every so many of a larger mesh.
-const FACES_MAX: usize = 1 << 13;
+/// Faces that a thread takes at a time.
+const CHUNK: usize = 1 << 14;
+
+/// Leading bits of a diameter's mantissa that tell its class: classes are 3 % apart.
+const MANTISSA_BITS: u32 = 5;
+
+/// The exponents of the smallest and the largest diameter: from 2^-10 to 2^10 px.
+const EXPONENTS: [i64; 2] = [-10, 10];
+
+/// Classes of diameters.
+const CLASSES: usize = ((EXPONENTS[1] - EXPONENTS[0]) << MANTISSA_BITS) as usize;
+
+/// Steps of widths and opacities in 1, coarse enough for the order of the faces to leave no trace.
+const STEPS: f64 = 256.0;
 
 /// Width and opacity of lines.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,61 +47,114 @@ impl AutoWidth {
     ///
     /// Lines of width w cover `1 - (1 - w / 2r)^2` of a triangle whose inscribed circle has the radius r, and
     /// all of it from w = 2r on. With diagonals left out, `r = 2 area / length of drawn edges` is taken.
-    pub fn of(scene: &Scene<'_, '_>, are_polygons: bool, has_lines: impl Fn(usize) -> bool) -> Self {
-        let faces = faces(scene, are_polygons, has_lines);
-        let area: f64 = faces.iter().map(|[area, _]| area).sum();
-        let covered = |width_px: f64| {
-            let share = |[area, diameter]: &[f64; 2]| {
-                let free = (1.0 - width_px / diameter).max(0.0);
-                area * (1.0 - free * free)
-            };
-            faces.iter().map(share).sum::<f64>() / area
-        };
+    pub fn of(scene: &Scene<'_, '_>, are_polygons: bool, has_lines: impl Fn(usize) -> bool + Sync) -> Self {
+        let faces = FaceSizes::of(scene, are_polygons, has_lines);
         let [mut thin, mut wide] = WIDTHS_PX;
-        // Not true either if no face has an area.
-        if !(covered(wide) > COVERED_MAX) {
+        let step = |v: f64| ((v * STEPS).round() / STEPS) as f32;
+        if faces.covered(wide) <= COVERED_MAX {
             return Self::WIDEST;
         }
-        let least = covered(thin);
+        let least = faces.covered(thin);
         if least >= COVERED_MAX {
-            return Self { width_px: thin as f32, opacity: (COVERED_MAX / least) as f32 };
+            return Self { width_px: thin as f32, opacity: step(COVERED_MAX / least) };
         }
-        for _ in 0..10 {
+        for _ in 0..12 {
             let middle = 0.5 * (thin + wide);
-            if covered(middle) > COVERED_MAX { wide = middle } else { thin = middle }
+            if faces.covered(middle) > COVERED_MAX { wide = middle } else { thin = middle }
         }
-        Self { width_px: thin as f32, opacity: 1.0 }
+        Self { width_px: step(thin), opacity: 1.0 }
     }
 }
 
-/// Area on screen and diameter of the inscribed circle of each face that is looked at, pixels. Those with a
-/// corner behind the near plane or the centre outside the picture are left out.
-fn faces(scene: &Scene<'_, '_>, are_polygons: bool, has_lines: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
-    let mesh: &Mesh = scene.mesh;
-    let projection = Projection::new(&scene.camera, scene.size_px(), true);
-    let half = scene.size_px().map(|px| 0.5 * f64::from(px));
-    let near_w = f64::from(projection.near_w);
-    let place = |v: u32| {
-        let p = mesh.positions[v as usize];
-        let [x, y, w] = [&projection.x, &projection.y, &projection.w].map(|row| row_dot(row, p));
-        (w >= near_w).then(|| [x / w / 256.0, y / w / 256.0])
-    };
-    let of = |i: usize| {
-        let [a, b, c] = mesh.triangles[i].map(place);
+/// Areas of faces on screen, by the diameter of their inscribed circles. Whole numbers, whose sums do not
+/// depend on an order.
+struct FaceSizes([u64; CLASSES]);
+
+impl FaceSizes {
+    /// Faces with a corner behind the near plane or the centre outside the picture are left out.
+    fn of(scene: &Scene<'_, '_>, are_polygons: bool, has_lines: impl Fn(usize) -> bool + Sync) -> Self {
+        let view = View::new(scene, are_polygons);
+        let count = scene.mesh.triangles.len();
+        let chunk = |first: usize| {
+            let mut sizes = Self([0; CLASSES]);
+            for i in (first..count.min(first + CHUNK)).filter(|&i| has_lines(i)) {
+                if let Some([area, diameter]) = view.size_of(i) {
+                    sizes.0[class_of(diameter)] += (area * 256.0).round() as u64;
+                }
+            }
+            sizes
+        };
+        if count <= CHUNK {
+            return chunk(0);
+        }
+        let chunks: Vec<Self> = (0..count.div_ceil(CHUNK)).into_par_iter().map(|i| chunk(i * CHUNK)).collect();
+        Self(std::array::from_fn(|class| chunks.iter().map(|sizes| sizes.0[class]).sum()))
+    }
+
+    /// The share of the faces that lines of a width cover, 0 to 1; 0 if there are none.
+    fn covered(&self, width_px: f64) -> f64 {
+        let (mut covered, mut all) = (0.0, 0.0);
+        for (class, &area) in self.0.iter().enumerate() {
+            let free = (1.0 - width_px / diameter_of(class)).max(0.0);
+            all += area as f64;
+            covered += area as f64 * (1.0 - free * free);
+        }
+        if all > 0.0 { covered / all } else { 0.0 }
+    }
+}
+
+/// The class of a diameter, by the leading bits of its binary form.
+fn class_of(diameter: f64) -> usize {
+    let leading = (diameter.to_bits() >> (52 - MANTISSA_BITS)) as i64 - ((1023 + EXPONENTS[0]) << MANTISSA_BITS);
+    leading.clamp(0, CLASSES as i64 - 1) as usize
+}
+
+/// The diameter in the middle of a class.
+fn diameter_of(class: usize) -> f64 {
+    let leading = class as i64 + ((1023 + EXPONENTS[0]) << MANTISSA_BITS);
+    f64::from_bits(((leading as u64) << (52 - MANTISSA_BITS)) | 1 << (51 - MANTISSA_BITS))
+}
+
+/// A mesh as it is seen.
+struct View<'a> {
+    mesh: &'a Mesh,
+    projection: Projection,
+    /// Half the picture's width and height.
+    half_px: [f64; 2],
+    are_polygons: bool,
+}
+
+impl<'a> View<'a> {
+    fn new(scene: &Scene<'a, '_>, are_polygons: bool) -> Self {
+        let projection = Projection::new(&scene.camera, scene.size_px(), true);
+        let half_px = scene.size_px().map(|px| 0.5 * f64::from(px));
+        Self { mesh: scene.mesh, projection, half_px, are_polygons }
+    }
+
+    /// The area of a face on screen and the diameter of its inscribed circle, pixels.
+    fn size_of(&self, face: usize) -> Option<[f64; 2]> {
+        let [a, b, c] = self.mesh.triangles[face].map(|v| self.place_of(v));
         let corners = [a?, b?, c?];
-        let is_inside = |k: usize| (corners.iter().map(|corner| corner[k]).sum::<f64>() / 3.0).abs() <= half[k];
+        let is_inside = |k: usize| (corners.iter().map(|corner| corner[k]).sum::<f64>() / 3.0).abs() <= self.half_px[k];
         if !is_inside(0) || !is_inside(1) {
             return None;
         }
         let ways = [0, 1, 2].map(|k| [0, 1].map(|axis| corners[(k + 1) % 3][axis] - corners[k][axis]));
-        let area = 0.5 * (ways[0][0] * ways[1][1] - ways[0][1] * ways[1][0]).abs();
-        let mask = if are_polygons { mesh.edge_masks.get(i).copied().unwrap_or(7) } else { 7 };
+        // A face may be far larger than the picture.
+        let picture = 4.0 * self.half_px[0] * self.half_px[1];
+        let area = (0.5 * (ways[0][0] * ways[1][1] - ways[0][1] * ways[1][0]).abs()).min(picture);
+        let mask = if self.are_polygons { self.mesh.edge_masks.get(face).copied().unwrap_or(7) } else { 7 };
         let drawn = (0..3).filter(|k| mask >> k & 1 == 1);
         let length: f64 = drawn.map(|k: usize| (ways[k][0] * ways[k][0] + ways[k][1] * ways[k][1]).sqrt()).sum();
         (area > 0.0).then_some([area, 4.0 * area / length])
-    };
-    let step = mesh.triangles.len().div_ceil(FACES_MAX).max(1);
-    (0..mesh.triangles.len()).step_by(step).filter(|&i| has_lines(i)).filter_map(of).collect()
+    }
+
+    /// A vertex on screen, pixels from the centre; None behind the near plane.
+    fn place_of(&self, vertex: u32) -> Option<[f64; 2]> {
+        let p = self.mesh.positions[vertex as usize];
+        let [x, y, w] = [&self.projection.x, &self.projection.y, &self.projection.w].map(|row| row_dot(row, p));
+        (w >= f64::from(self.projection.near_w)).then(|| [x / w / 256.0, y / w / 256.0])
+    }
 }
 
 #[cfg(test)]

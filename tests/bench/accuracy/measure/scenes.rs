@@ -24,7 +24,7 @@ pub struct Scene {
     source: Source,
     /// True if a unit of the mesh is a pixel.
     is_flat: bool,
-    keys: &'static [(&'static str, &'static str)],
+    pub keys: &'static [(&'static str, &'static str)],
     /// The true width of lines; of a hull, of the strip that shows.
     pub width_px: f64,
     /// True if `--quick` draws it.

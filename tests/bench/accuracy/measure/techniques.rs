@@ -117,6 +117,9 @@ impl Technique {
         let mut keys: Vec<(&str, String)> = keys.into_iter().map(|(k, v)| (k, v.to_owned())).collect();
         match self {
             Wire(method) => {
+                if scene.keys.iter().all(|(key, _)| *key != "wire.edges") {
+                    keys.push(("wire.edges", "triangles".to_owned()));
+                }
                 keys.push(("wire.thickness", thickness.to_string()));
                 if method.info().unit == ThicknessUnit::Derivatives {
                     keys.push(("wire.smoothing", scene.width_px.min(1.0).to_string()));

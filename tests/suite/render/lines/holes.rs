@@ -16,17 +16,20 @@ use crate::support::{scenes, shapes};
 /// A request's keys.
 type Keys<'k> = &'k [(&'k str, &'k str)];
 
+const ALL: (&str, &str) = ("wire.edges", "triangles");
+
 /// Every number of samples, at the least width and others.
 const LOOKS: &[Keys<'_>] = &[
-    &[("style", "wire"), ("size", "150x120")],
-    &[("style", "hidden-line"), ("size", "200"), ("wire.thickness", "0.8"), ("view", "right")],
-    &[("style", "wire"), ("size", "120"), ("samples", "1"), ("wire.thickness", "1.5")],
-    &[("style", "wire"), ("size", "120"), ("samples", "8"), ("wire.thickness", "3"), ("wire.lit", "true")],
-    &[("style", "wire"), ("size", "110"), ("samples", "16"), ("wire.thickness", "0.4")],
-    &[("style", "wire"), ("size", "160"), ("wire.thickness", "8"), ("view", "top")],
-    &[("style", "wire"), ("size", "100"), ("camera.projection", "orthographic"), ("camera.height", "0.6")],
+    &[("style", "wire"), ALL, ("size", "150x120"), ("wire.thickness", "1")],
+    &[("style", "hidden-line"), ALL, ("size", "200"), ("wire.thickness", "0.8"), ("view", "right")],
+    &[("style", "wire"), ALL, ("size", "120"), ("samples", "1"), ("wire.thickness", "1.5")],
+    &[("style", "wire"), ALL, ("size", "120"), ("samples", "8"), ("wire.thickness", "3"), ("wire.lit", "true")],
+    &[("style", "wire"), ALL, ("size", "110"), ("samples", "16"), ("wire.thickness", "0.4")],
+    &[("style", "wire"), ALL, ("size", "160"), ("wire.thickness", "8"), ("view", "top")],
+    &[("style", "wire"), ALL, ("size", "100"), ("camera.projection", "orthographic"), ("camera.height", "0.6")],
     &[
         ("style", "wire"),
+        ALL,
         ("size", "120x100"),
         ("camera.eye", "0.2,0.35,0.3"),
         ("camera.target", "-0.8,0,-0.9"),
@@ -97,18 +100,18 @@ fn what_holes_cannot_tell_is_left_to_strokes() {
     let mesh = scenes::mesh(&shapes::sheet(8));
     let wire = ("style", "wire");
     let cases: &[(&[(&str, &str)], bool)] = &[
-        (&[wire], true),
-        (&[wire, ("wire.thickness", "0.79")], false),
-        (&[wire, ("wire.thickness", "8.1")], false),
-        (&[wire, ("samples", "1")], false),
-        (&[wire, ("samples", "16"), ("wire.thickness", "0.5")], true),
-        (&[wire, ("wire.smoothing", "0.5")], false),
-        (&[wire, ("wire.hidden", "show")], false),
-        (&[wire, ("wire.edges", "polygons")], false),
-        (&[wire, ("surface.opacity", "0.5")], false),
-        (&[wire, ("surface.cull", "back")], false),
+        (&[wire, ALL, ("wire.thickness", "1")], true),
+        (&[wire, ALL, ("wire.thickness", "0.79")], false),
+        (&[wire, ALL, ("wire.thickness", "8.1")], false),
+        (&[wire, ALL, ("samples", "1")], false),
+        (&[wire, ALL, ("samples", "16"), ("wire.thickness", "0.5")], true),
+        (&[wire, ALL, ("wire.smoothing", "0.5")], false),
+        (&[wire, ALL, ("wire.hidden", "show")], false),
+        (&[wire], false),
+        (&[wire, ALL, ("surface.opacity", "0.5")], false),
+        (&[wire, ALL, ("surface.cull", "back")], false),
         (&[("style", "outline"), ("outline.method", "contour")], false),
-        (&[("style", "hidden-line")], true),
+        (&[("style", "hidden-line"), ALL], true),
     ];
     for (keys, has_holes) in cases {
         let plan = scenes::plan(&mesh, &scenes::spec(keys));

@@ -28,7 +28,8 @@ pub const MESHES: [Named; 5] = [
 pub const LOOKS: [(&str, Keys); 9] = [
     ("flat", &[("style", "flat"), ("surface.metallic", "1"), ("light.preset", "three-point")]),
     ("smooth", &[("style", "smooth"), ("camera.projection", "orthographic")]),
-    ("wire", &[("style", "wire"), ("wire.edges", "polygons")]),
+    // Strokes: an area of a hole may be rounded otherwise if its face begins at another corner.
+    ("wire", &[("style", "wire"), ("wire.thickness", "0.7")]),
     ("wireframe", &[("style", "wireframe"), ("background", "transparent")]),
     ("fwidth", &[("style", "wireframe"), ("wire.method", "fwidth")]),
     (
