@@ -1,6 +1,8 @@
 // Stage lines, per pixel: the union of its strokes, composited over the colours. Twin of
 // src/backend/cpu/lines/coverage.rs.
 
+@group(1) @binding(2) var<storage, read> triangles: array<u32>;
+@group(1) @binding(3) var<storage, read> vertices: array<Vertex>;
 // Visibility buffer; 0 where a sample shows nothing.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
 // Peeled layers per sample.
@@ -34,9 +36,16 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
         colors[i] = flip_alpha_sign(frame.background);
     }
     let at = STROKE_WORDS * i;
+    var by_holes = false;
+    if has(HOLED) && (batch.line_flags & HOLES) != 0u {
+        let marks = strokes[at + HOLE_WORD] & (MARKED | STROKED);
+        by_holes = marks == 0u;
+        if marks == MARKED {
+            add_points(i);
+        }
+    }
     let sum = area_sum(at);
     let all = point_sum(at);
-    let by_holes = has(HOLED) && (batch.line_flags & HOLES) != 0u && (strokes[at + HOLE_WORD] & MARKED) == 0u;
     if !by_holes && (sum.x | sum.y | all.x | all.y) == 0u {
         if has(HOLED) {
             strokes[at + HOLE_WORD] = 0u;
@@ -46,7 +55,7 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
     var points = 0u;
     var cover = 0.0;
     if by_holes {
-        let covered = u32(HOLE_UNIT) - min(strokes[at + HOLE_WORD], u32(HOLE_UNIT));
+        let covered = u32(HOLE_UNIT) - min(strokes[at + HOLE_WORD] & (STROKED - 1u), u32(HOLE_UNIT));
         cover = f32(covered) * (1.0 / HOLE_UNIT);
     } else {
         points = covered_points(at);

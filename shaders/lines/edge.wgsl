@@ -355,9 +355,9 @@ fn draw_interval(edge: vec4<u32>, s: Segment, window: Window, interval: vec2<f32
         let at = u32((pixel.y - batch.row_first) * frame.width + pixel.x);
         // A full pixel stays full. Only a lit line goes on, to find the face that lights it.
         if p < pixels && touches(place_of(s.direction, start - center, end - center)) && owns(s, window, center)
-            && (!only_marked() || is_marked(at)) && (is_lit || !is_full(at)) {
+            && (!only_stroked() || is_stroked(at)) && (is_lit || !is_full(at)) {
             if is_rim_pass() {
-                atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], MARKED);
+                atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], point_marks());
             }
             var face = 0u;
             if is_lit {
@@ -391,8 +391,8 @@ fn draw_waiting(least: u32, thread: u32) {
     }
 }
 
-// True if only marked pixels get strokes.
-fn only_marked() -> bool {
+// True if only some pixels get strokes.
+fn only_stroked() -> bool {
     return has(HOLED) && (batch.line_flags & (HOLES | RIM_PASS)) == HOLES;
 }
 
@@ -401,19 +401,19 @@ fn is_rim_pass() -> bool {
     return has(HOLED) && (batch.line_flags & RIM_PASS) != 0u;
 }
 
-fn is_marked(pixel_at: u32) -> bool {
-    return (atomicLoad(&strokes[pixel_at * STROKE_WORDS + HOLE_WORD]) & MARKED) != 0u;
+fn is_stroked(pixel_at: u32) -> bool {
+    return (atomicLoad(&strokes[pixel_at * STROKE_WORDS + HOLE_WORD]) & STROKED) != 0u;
 }
 
 // False if no pixel of a share gets strokes.
 fn gets_strokes(s: Segment, window: Window) -> bool {
-    if !only_marked() {
+    if !only_stroked() {
         return true;
     }
     for (var y = window.first; y <= window.rows.y; y += i32(batch.line_slices)) {
         let columns = columns_of(s, window.ends, y);
         for (var x = columns.x; x <= columns.y; x++) {
-            if is_marked(u32((y - batch.row_first) * frame.width + x)) {
+            if is_stroked(u32((y - batch.row_first) * frame.width + x)) {
                 return true;
             }
         }

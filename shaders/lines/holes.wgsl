@@ -16,6 +16,9 @@
 // Faces in nine pixels, at most: one for each sample.
 const FACES_MAX: u32 = 144u;
 
+// Faces pass through each other where their planes meet within this distance of a sample, pixels.
+const CROSSING_PX: f32 = 6.0;
+
 @compute @workgroup_size(WORKGROUP)
 fn holes(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = i32(gid.x + gid.y * groups.x * WORKGROUP);
@@ -30,16 +33,20 @@ fn holes(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
     let count = u32(sample_count());
     var faces: array<u32, FACES_MAX>;
     var face_count = 0u;
-    // True if a sample of the pixel shows no face of the surface.
+    // Does a sample of the pixel show nothing? Does one show a hull, or one close by a clipped face?
+    var shows_nothing = false;
     var is_odd = false;
+    var shows_face = false;
     var last = NOTHING;
     for (var n = 0u; n < 9u * count; n++) {
         let place = n / count;
         let id = seen_at(pixel + vec2(i32(place % 3u), i32(place / 3u)) - 1, n % count).x;
         if id >= frame.triangle_count {
-            is_odd = is_odd || place == 4u;
+            shows_nothing = shows_nothing || (place == 4u && id == NOTHING);
+            is_odd = is_odd || (place == 4u && id != NOTHING);
             continue;
         }
+        shows_face = shows_face || place == 4u;
         if id == last {
             continue;
         }
@@ -54,7 +61,7 @@ fn holes(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         }
     }
     var free = 0u;
-    var is_hidden = false;
+    var marks = 0u;
     for (var k = 0u; k < face_count; k++) {
         let id = faces[k];
         let a = vertices[triangles[3u * id]];
@@ -66,45 +73,87 @@ fn holes(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         }
         let inset = inset_of(vec2(a.x, a.y), vec2(b.x, b.y), vec2(c.x, c.y));
         if inset.is_open {
-            is_hidden = is_hidden || hides_part(inset, id, pixel);
+            marks |= marks_of_hidden(inset, id, pixel);
             free += inset_area(inset, pixel);
         }
     }
-    if is_hidden {
-        mark_around(pixel, reach);
+    if marks != 0u {
+        mark_around(pixel, reach, marks);
     }
     if is_shown {
         let at = u32((pixel.y - batch.row_first) * frame.width + pixel.x);
         atomicAdd(&strokes[at * STROKE_WORDS + HOLE_WORD], free);
         if is_odd {
-            atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], MARKED);
-        } else if (batch.line_flags & LIT_PASS) != 0u && free < u32(HOLE_UNIT) {
-            // Its light is that of its samples; any face will do.
-            atomicMax(&owners[at], 1u);
+            atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], MARKED | STROKED);
+        } else {
+            if shows_nothing {
+                atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], point_marks());
+            }
+            if (batch.line_flags & LIT_PASS) != 0u && shows_face {
+                // Its light is that of its samples; any face will do.
+                atomicMax(&owners[at], 1u);
+            }
         }
     }
 }
 
-// True if something else than the face shows in a sample of the pixel that lies well inside it.
-fn hides_part(inset: Inset, id: u32, pixel: vec2<i32>) -> bool {
+// Marks for the pixels around one: 0 unless something else than the face shows in a sample of the pixel
+// that lies well inside it.
+fn marks_of_hidden(inset: Inset, id: u32, pixel: vec2<i32>) -> u32 {
     let corner = pixel_corner(pixel);
-    var is_hidden = false;
+    var marks = 0u;
     for (var s = 0; s < sample_count(); s++) {
-        if seen_at(pixel, u32(s)).x != id {
-            is_hidden = is_hidden || inset_contains(inset, vec2<f32>(corner + sample_offset(s)));
+        let seen = seen_at(pixel, u32(s));
+        let at = corner + sample_offset(s);
+        if seen.x != id && inset_contains(inset, vec2<f32>(at)) {
+            let is_crossing = may_cross(id, seen.x, at, bitcast<f32>(seen.y));
+            marks |= select(point_marks(), MARKED | STROKED, is_crossing);
         }
     }
-    return is_hidden;
+    return marks;
+}
+
+// False if the planes of a face and of one that hides it at a sample, where it has this depth, meet far
+// from there.
+fn may_cross(behind: u32, before: u32, at: vec2<i32>, depth: f32) -> bool {
+    if before >= frame.triangle_count {
+        return true;
+    }
+    let p = array<Vertex, 3>(
+        vertices[triangles[3u * behind]],
+        vertices[triangles[3u * behind + 1u]],
+        vertices[triangles[3u * behind + 2u]],
+    );
+    let q = array<Vertex, 3>(
+        vertices[triangles[3u * before]],
+        vertices[triangles[3u * before + 1u]],
+        vertices[triangles[3u * before + 2u]],
+    );
+    if q[0].x == OUTSIDE || q[1].x == OUTSIDE || q[2].x == OUTSIDE {
+        return true;
+    }
+    let areas = array<vec2<u32>, 2>(area_of(p[0], p[1], p[2]), area_of(q[0], q[1], q[2]));
+    if is_zero(areas[0]) || is_zero(areas[1]) {
+        return true;
+    }
+    let far = setup_of(p[0], p[1], p[2], areas[0]);
+    let near = setup_of(q[0], q[1], q[2], areas[1]);
+    let z = rn(far.depth.x + rn(far.depth.y * f32(at.x - far.x.x))) + rn(far.depth.z * f32(at.y - far.y.x));
+    // Squares of depths may be too small for f32.
+    let scale = 8388608.0;
+    let gap = rn((depth - z) * scale);
+    let slope = rn2(rn2(vec2(far.depth.y - near.depth.y, far.depth.z - near.depth.z) * scale) * (CROSSING_PX * 256.0));
+    return rn(gap * gap) <= rn(slope.x * slope.x) + rn(slope.y * slope.y);
 }
 
 // Marks the shown pixels up to so far away.
-fn mark_around(pixel: vec2<i32>, reach: i32) {
+fn mark_around(pixel: vec2<i32>, reach: i32, marks: u32) {
     let low = max(pixel - reach, vec2(0, batch.row_first));
     let high = min(pixel + reach, vec2(frame.width, batch.row_end) - 1);
     for (var y = low.y; y <= high.y; y++) {
         for (var x = low.x; x <= high.x; x++) {
             let at = u32((y - batch.row_first) * frame.width + x);
-            atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], MARKED);
+            atomicOr(&strokes[at * STROKE_WORDS + HOLE_WORD], marks);
         }
     }
 }

@@ -4,9 +4,6 @@
 // Farthest from the middle of a unit box to its corner.
 const BOX_RADIUS: f32 = 0.70710678;
 
-// Steps to the pixel in which along and across are measured.
-const UNIT: f32 = 16384.0;
-
 // Largest scaled area.
 const LIMIT: f32 = 16000.0;
 
@@ -153,10 +150,6 @@ fn is_full(pixel_at: u32) -> bool {
     return last == 0xFFFFFFFFu;
 }
 
-fn units(v: f32) -> i32 {
-    return round_to_i32(clamp(v, -1.0, 1.0) * UNIT);
-}
-
 fn square_unit() -> f32 {
     return f32(1u << batch.line_exponent);
 }
@@ -193,12 +186,11 @@ fn points_of(stroke: Stroke, word: u32) -> u32 {
         | four_points(stroke, bounds, word, 8u) | four_points(stroke, bounds, word, 12u);
 }
 
-// Bit j of word l is point 16 j + l, here for j from `first` on. Where a point lies: i steps to the
-// right, 181 i down.
+// Those of the points from bit `first` on.
 fn four_points(stroke: Stroke, bounds: Bounds, word: u32, first: u32) -> u32 {
-    let i = 16u * (vec4(first) + vec4(0u, 1u, 2u, 3u)) + word;
-    let x = (2 * vec4<i32>(i) - 255) * 128;
-    let y = (2 * vec4<i32>((GENERATOR * i) & vec4(POINTS - 1u)) - 255) * 128;
+    let points = lattice_points(word, first);
+    let x = points.x;
+    let y = points.y;
     var covered = vec4(false);
     if stroke.has_strip {
         let across = ((-stroke.along.y * x) >> vec4(16u)) + ((stroke.along.x * y) >> vec4(16u));
@@ -217,10 +209,6 @@ fn four_points(stroke: Stroke, bounds: Bounds, word: u32, first: u32) -> u32 {
     }
     let bits = select(vec4(0u), vec4(1u, 2u, 4u, 8u), covered);
     return ((bits.x | bits.y) | (bits.z | bits.w)) << first;
-}
-
-fn product(v: vec2<i32>, x: vec4<i32>, y: vec4<i32>) -> vec4<i32> {
-    return ((v.x * x) >> vec4(16u)) + ((v.y * y) >> vec4(16u));
 }
 
 // Coverage of a pixel's box by a strip whose middle is that far away: the integral over the strip's

@@ -25,7 +25,15 @@ const MASK_WORD: u32 = 3u;
 const MASK_WORDS: u32 = 8u;
 // The largest difference between a stroke's area and its points.
 const SLACK_WORD: u32 = 11u;
-// The area of holes, and MARKED. The CPU's are in Holes, src/backend/cpu/lines/holes/mod.rs.
+// The area of holes, and the marks below. The CPU's are in Holes, src/backend/cpu/lines/holes/mod.rs.
 const HOLE_WORD: u32 = 12u;
-// Bit of a pixel that gets strokes although the pass has holes.
+// Bit of a pixel in which areas do not tell what is free.
 const MARKED: u32 = 0x80000000u;
+// Bit of a marked pixel that gets the strokes of all edges, because points do not tell either.
+const STROKED: u32 = 0x40000000u;
+
+// The marks of a pixel in which points tell. With one sample per pixel strokes do instead: a rim that no
+// sample shows may count as hidden, and the strokes of the edges beside it make up for it.
+fn point_marks() -> u32 {
+    return select(MARKED, MARKED | STROKED, sample_count() == 1);
+}

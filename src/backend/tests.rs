@@ -82,7 +82,8 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("INTERVAL_MIN_PX" = hidden_lines::INTERVAL_MIN_PX, "GAP_MIN_PX" = hidden_lines::GAP_MIN_PX);
     add!("IDS_MAX" = line_shares::IDS_MAX, "INTERVALS_MAX" = line_shares::INTERVALS_MAX);
     add!("LINE_THREADS" = line_shares::LINE_THREADS);
-    add!("MARKED" = holes::MARKED, "FACES_MAX" = holes::FACES_MAX, "HOLE_UNIT" = inset::HOLE_UNIT);
+    add!("MARKED" = holes::MARKED, "STROKED" = holes::STROKED, "CROSSING_PX" = holes::CROSSING_PX);
+    add!("FACES_MAX" = holes::FACES_MAX, "HOLE_UNIT" = inset::HOLE_UNIT);
     add!("INSIDE" = inset::INSIDE, "NARROW_PX" = inset::NARROW_PX, "LEVEL_PX" = inset::LEVEL_PX);
     // Sample offsets, a nibble each.
     let nibbles = |samples: u32, axis: usize, from: usize| {

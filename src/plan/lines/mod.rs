@@ -71,7 +71,7 @@ impl LinePass {
         least..=8.0
     }
 
-    /// Pixels up to this far from one in which a face is hidden in part get strokes: the visible part
+    /// Pixels up to this far from one in which a face is hidden in part are marked: the visible part
     /// of its lines may end there.
     pub fn hidden_reach_px(&self) -> u32 {
         (0.5 * self.width_px) as u32 + 1

@@ -1,6 +1,7 @@
 //! Sorting of triangles and edges into bands of rows, before the stage visibility.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
@@ -11,7 +12,7 @@ use crate::backend::cpu::lines::contour;
 use crate::backend::cpu::lines::segment::{PixelBox, Segment};
 use crate::backend::cpu::{CHUNK, RasterContext};
 use crate::limits::Stopped;
-use crate::plan::{DrawPlan, Faces, HullPass, LinePass, pass_mask};
+use crate::plan::{DrawPlan, Edge, Faces, HullPass, LinePass, pass_mask};
 
 /// Edges that touch this many bands are listed once for all of them.
 const TALL_EDGE_BANDS: usize = 4;
@@ -29,10 +30,19 @@ pub struct Bins {
 /// A chunk's edges by band.
 #[derive(Default)]
 pub struct EdgeBin {
+    /// The chunk.
+    edges: Range<usize>,
+    /// Rows of a band.
+    rows: u32,
     /// Those that are rims; empty where the pass has no holes.
     pub rims: Bin,
-    /// The others.
-    pub others: Bin,
+    /// The others. Where the pass has holes, few bands need them: they are sorted when one does.
+    others: OnceLock<OtherEdges>,
+}
+
+/// Edges that are no rims.
+pub struct OtherEdges {
+    pub bin: Bin,
     /// The pixels around each edge of the chunk, from the first on; empty where the pass has no holes.
     boxes: Vec<PixelBox>,
     /// The chunk's first edge.
@@ -40,9 +50,56 @@ pub struct EdgeBin {
 }
 
 impl EdgeBin {
-    /// True if the band has no edge.
+    fn new(context: &RasterContext<'_>, pass: &LinePass, rows: u32, edges: Range<usize>) -> Self {
+        let bands = band_count(context.plan, rows);
+        let mut bin = Self { edges, rows, rims: Bin::new(bands, TALL_EDGE_BANDS), others: OnceLock::new() };
+        if !context.plan.has_holes_under(pass) {
+            bin.others(context, pass);
+            return bin;
+        }
+        for i in bin.edges.clone() {
+            let edge = &pass.edges[i];
+            if context.is_silhouette(edge)
+                && contour::is_drawn(context, pass, edge)
+                && let Some((_, bands)) = placed(context, edge, pass.reach_px(), rows)
+            {
+                bin.rims.push(i as u32, bands);
+            }
+        }
+        bin
+    }
+
+    /// True if the band has no rim and, where the pass has no holes, no other edge.
     pub fn is_empty_in(&self, band: usize) -> bool {
-        self.rims.items_in(band).chain(self.others.items_in(band)).next().is_none()
+        let others = self.others.get().into_iter().flat_map(|others| others.bin.items_in(band));
+        self.rims.items_in(band).chain(others).next().is_none()
+    }
+
+    /// The edges that are no rims.
+    pub fn others(&self, context: &RasterContext<'_>, pass: &LinePass) -> &OtherEdges {
+        self.others.get_or_init(|| OtherEdges::new(context, pass, self.rows, self.edges.clone()))
+    }
+}
+
+impl OtherEdges {
+    fn new(context: &RasterContext<'_>, pass: &LinePass, rows: u32, edges: Range<usize>) -> Self {
+        let bin = Bin::new(band_count(context.plan, rows), TALL_EDGE_BANDS);
+        let has_holes = context.plan.has_holes_under(pass);
+        let boxes = vec![PixelBox::default(); if has_holes { edges.len() } else { 0 }];
+        let mut others = Self { bin, boxes, first: edges.start as u32 };
+        for (n, i) in edges.enumerate() {
+            let edge = &pass.edges[i];
+            if !contour::is_drawn(context, pass, edge) || (has_holes && context.is_silhouette(edge)) {
+                continue;
+            }
+            if let Some((segment, bands)) = placed(context, edge, pass.reach_px(), rows) {
+                if let Some(place) = others.boxes.get_mut(n) {
+                    *place = segment.pixel_box(pass.reach_px());
+                }
+                others.bin.push(i as u32, bands);
+            }
+        }
+        others
     }
 
     /// The pixels around an edge of the chunk, where the pass has holes.
@@ -50,6 +107,13 @@ impl EdgeBin {
     pub fn pixel_box(&self, edge: u32) -> Option<&PixelBox> {
         self.boxes.get(edge.wrapping_sub(self.first) as usize)
     }
+}
+
+/// An edge on screen, and the first and the last band that it reaches; None if it reaches none.
+fn placed(context: &RasterContext<'_>, edge: &Edge, reach_px: f32, rows: u32) -> Option<(Segment, [usize; 2])> {
+    let segment = Segment::new(context, edge)?;
+    let [first, last] = segment.rows(reach_px, context.plan.height_px);
+    (first <= last).then(|| (segment, [first, last].map(|row| row as usize / rows as usize)))
 }
 
 /// Sorts the plan's triangles and edges into bands of `rows`; triangles of the visibility buffer
@@ -71,7 +135,7 @@ pub fn bin(
     let (triangles, peel) = (bin_all(base, margin), bin_all(peel, 0));
     let bin_pass = |pass: &LinePass| {
         map(pool, chunks(0..pass.edges.len()).collect(), |range| match context.deadline.check() {
-            Ok(()) => bin_edges(context, pass, rows, range),
+            Ok(()) => EdgeBin::new(context, pass, rows, range),
             Err(Stopped) => EdgeBin::default(),
         })
     };
@@ -109,33 +173,6 @@ fn chunks(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
 
 fn band_count(plan: &DrawPlan<'_>, rows: u32) -> usize {
     plan.height_px.div_ceil(rows) as usize
-}
-
-fn bin_edges(context: &RasterContext<'_>, pass: &LinePass, rows: u32, range: Range<usize>) -> EdgeBin {
-    let empty = || Bin::new(band_count(context.plan, rows), TALL_EDGE_BANDS);
-    let (reach, has_holes) = (pass.reach_px(), context.plan.has_holes_under(pass));
-    let boxes = vec![PixelBox::default(); if has_holes { range.len() } else { 0 }];
-    let mut bin = EdgeBin { rims: empty(), others: empty(), boxes, first: range.start as u32 };
-    for i in range {
-        let edge = &pass.edges[i];
-        if !contour::is_drawn(context, pass, edge) {
-            continue;
-        }
-        if let Some(segment) = Segment::new(context, edge) {
-            let [first, last] = segment.rows(reach, context.plan.height_px);
-            if first <= last {
-                let bands = [first, last].map(|row| row as usize / rows as usize);
-                let first = bin.first as usize;
-                if let Some(place) = bin.boxes.get_mut(i - first) {
-                    *place = segment.pixel_box(reach);
-                }
-                let is_rim = has_holes && context.is_silhouette(edge);
-                let bin = if is_rim { &mut bin.rims } else { &mut bin.others };
-                bin.push(i as u32, bands);
-            }
-        }
-    }
-    bin
 }
 
 fn map<T: Send, U: Send>(

@@ -12,7 +12,6 @@ pub(crate) mod triangle_bins;
 
 use std::ops::ControlFlow;
 
-use self::bin::Bin;
 use self::bins::{Bins, EdgeBin};
 use self::lists::BandLists;
 use self::scratch::BandScratch;
@@ -31,6 +30,7 @@ use crate::backend::cpu::lines::coverage::LineCompositor;
 use crate::backend::cpu::lines::edge::{LineDrawer, LineTarget};
 use crate::backend::cpu::lines::farthest::Farthest;
 use crate::backend::cpu::lines::holes::dig::add_holes;
+use crate::backend::cpu::lines::holes::free_points::{add_points, add_points_plainly};
 use crate::backend::cpu::lines::holes::{self, Holes};
 use crate::backend::cpu::lines::line_light;
 use crate::backend::cpu::lines::plain::add_holes_plainly;
@@ -119,7 +119,8 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
     }
     let compositor = LineCompositor::new(plan, &scratch.samples, scratch.peel.as_ref());
     for (pass, edges) in plan.lines.iter().zip(&bins.edges) {
-        if edges.iter().all(|chunk| chunk.is_empty_in(band)) {
+        let has_faces = || plan.has_holes_under(pass) && bins.triangles.iter().any(|chunk| !chunk.is_empty_in(band));
+        if edges.iter().all(|chunk| chunk.is_empty_in(band)) && !has_faces() {
             continue;
         }
         let lit_pixels = if pass.lit && plan.lights_lines() { pixels } else { 0 };
@@ -130,6 +131,12 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
         let target =
             &mut LineTarget { strokes: &mut scratch.strokes, owners: &mut scratch.owners, holes: &mut scratch.holes };
         draw_edges(context.isa, context, pass, edges, band, (&scratch.samples, &mut scratch.farthest), target);
+        let target = (&mut scratch.strokes, &mut scratch.owners[..]);
+        if context.is_plain {
+            add_points_plainly(context, pass, &scratch.samples, &scratch.holes, target);
+        } else {
+            add_points(context.isa, context, pass, &scratch.samples, &scratch.holes, target);
+        }
         if lit_pixels > 0 {
             scratch.holes.own(&mut scratch.owners);
         }
@@ -307,20 +314,34 @@ fn edges_kernel(
     target: &mut LineTarget<'_>,
 ) {
     let mut drawer = LineDrawer::new(context, pass, seen);
-    let lists: [fn(&EdgeBin) -> &Bin; 2] = [|chunk| &chunk.rims, |chunk| &chunk.others];
-    for (list, marks) in lists.into_iter().zip([true, false]) {
-        drawer.marks = marks;
-        let listed = bins.iter().flat_map(|chunk| list(chunk).items_in(band).map(move |edge| (chunk, edge)));
-        for (i, (chunk, edge)) in listed.enumerate() {
-            // An edge of a wide line is as much work as hundreds of others.
-            if (i % EDGES_PER_POLL == 0 || drawer.is_poll_due()) && context.deadline.check().is_err() {
+    let mut polls = 0;
+    // An edge of a wide line is as much work as hundreds of others.
+    let mut is_late = |drawer: &mut LineDrawer<'_>| {
+        polls += 1;
+        (polls % EDGES_PER_POLL == 1 || drawer.is_poll_due()) && context.deadline.check().is_err()
+    };
+    drawer.marks = true;
+    for edge in bins.iter().flat_map(|chunk| chunk.rims.items_in(band)) {
+        if is_late(&mut drawer) {
+            return;
+        }
+        drawer.draw(&pass.edges[edge as usize], target);
+    }
+    drawer.marks = false;
+    // Most bands with holes need no other edges.
+    if !target.holes.collect_stroked() {
+        return;
+    }
+    for chunk in bins {
+        let others = chunk.others(context, pass);
+        for edge in others.bin.items_in(band) {
+            if is_late(&mut drawer) {
                 return;
             }
             // Most edges are far from all pixels with strokes.
-            if drawer.may_draw_in(chunk.pixel_box(edge), target) {
+            if drawer.may_draw_in(others.pixel_box(edge), target) {
                 drawer.draw(&pass.edges[edge as usize], target);
             }
         }
-        target.holes.collect_marks();
     }
 }

@@ -73,6 +73,11 @@ impl TriangleBin {
         self.pieces.iter().map(|(id, _)| *id)
     }
 
+    /// True if the band has no triangle.
+    pub fn is_empty_in(&self, band: usize) -> bool {
+        self.fronts.is_empty_in(band) && self.backs.is_empty_in(band) && self.pieces_in(band).next().is_none()
+    }
+
     /// The band's triangles that need no clipping.
     pub fn whole_in(&self, band: usize) -> impl Iterator<Item = u32> {
         [&self.fronts, &self.backs].into_iter().flat_map(move |lists| {

@@ -58,8 +58,27 @@ impl RasterContext<'_> {
         if edge.faces[1] == Edge::NO_FACE {
             return true;
         }
-        let [a, b] = edge.faces.map(|face| self.side_of(edge, face));
+        let [a, b] = self.sides_on_screen(edge).unwrap_or_else(|| edge.faces.map(|face| self.side_of(edge, face)));
         (a < 0 || b < 0) != (a > 0 || b > 0)
+    }
+
+    /// As [`side_of`](Self::side_of) finds them, of two faces of the mesh that are wholly on screen.
+    #[inline(always)]
+    fn sides_on_screen(&self, edge: &Edge) -> Option<[i32; 2]> {
+        let [a, b] = edge.vertices;
+        let [start, end] = [self.vertices[a as usize], self.vertices[b as usize]];
+        let along = [i64::from(end.x) - i64::from(start.x), i64::from(end.y) - i64::from(start.y)];
+        let mut is_outside = start.is_outside() | end.is_outside();
+        let mut sides = [0; 2];
+        for (side, face) in sides.iter_mut().zip(edge.faces) {
+            let [p, q, r] = *self.plan.triangles.get(face as usize)?;
+            // The corner that is not of the edge.
+            let third = *self.vertices.get((p ^ q ^ r ^ a ^ b) as usize)?;
+            is_outside |= third.is_outside();
+            let to_third = [i64::from(third.x) - i64::from(start.x), i64::from(third.y) - i64::from(start.y)];
+            *side = (along[0] * to_third[1] - along[1] * to_third[0]).signum() as i32;
+        }
+        (!is_outside).then_some(sides)
     }
 
     /// Side of the edge on which a face lies on screen: -1, 1, or 0 if it is seen edge-on or is

@@ -209,7 +209,7 @@ impl<'a> LineCompositor<'a> {
 }
 
 /// The points assigned to a sample, as a mask.
-fn points_of_sample(samples: u32, sample: u32) -> Mask {
+pub fn points_of_sample(samples: u32, sample: u32) -> Mask {
     let mut mask = [0; WORDS];
     for (point, &cell) in sample_partition(samples).iter().enumerate() {
         if u32::from(cell) == sample {

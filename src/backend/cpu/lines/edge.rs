@@ -23,7 +23,7 @@ pub struct LineTarget<'a> {
     pub strokes: &'a mut BandStrokes,
     /// Per pixel, the face that lights its lines, plus 1; empty where no lines are lit.
     pub owners: &'a mut [u32],
-    /// The pass's holes. If there are any, only marked pixels get strokes.
+    /// The pass's holes. If there are any, only some pixels get strokes.
     pub holes: &'a mut Holes,
 }
 
@@ -102,8 +102,8 @@ impl<'a> LineDrawer<'a> {
             let [first, last] = rows(a[1], b[1], self.pen.reach, self.rows);
             if first > last
                 || (windows > 1
-                    && self.keeps_to_marks(target)
-                    && !self.may_touch_marks([a[0], b[0]], [first, last], target.holes))
+                    && self.is_kept_off(target)
+                    && !self.may_touch_stroked([a[0], b[0]], [first, last], target.holes))
                 || !self.collect_intervals(edge, &segment, range)
             {
                 continue;
@@ -124,9 +124,9 @@ impl<'a> LineDrawer<'a> {
         }
     }
 
-    /// True if only pixels that are marked get strokes.
+    /// True if only some pixels get strokes.
     #[inline(always)]
-    fn keeps_to_marks(&self, target: &LineTarget<'_>) -> bool {
+    fn is_kept_off(&self, target: &LineTarget<'_>) -> bool {
         !self.marks && !target.holes.is_empty()
     }
 
@@ -136,26 +136,26 @@ impl<'a> LineDrawer<'a> {
         if self.marks {
             holes.mark(pixel);
         }
-        holes.is_marked(pixel)
+        self.marks || holes.is_stroked(pixel)
     }
 
     /// False if no pixel in the box around an edge gets strokes: found without looking at the edge.
     #[inline(always)]
     pub fn may_draw_in(&self, pixels: Option<&PixelBox>, target: &LineTarget<'_>) -> bool {
-        if self.context.is_plain || !self.keeps_to_marks(target) {
+        if self.context.is_plain || !self.is_kept_off(target) {
             return true;
         }
         pixels.is_none_or(|pixels| {
             let [columns, rows] = pixels.map(|range| range.map(i32::from));
-            target.holes.any_marked(columns, rows)
+            target.holes.any_stroked(columns, rows)
         })
     }
 
     /// False if no pixel between these heights and around these places gets strokes.
     #[inline(always)]
-    fn may_touch_marks(&self, [a, b]: [f32; 2], rows: [i32; 2], holes: &Holes) -> bool {
+    fn may_touch_stroked(&self, [a, b]: [f32; 2], rows: [i32; 2], holes: &Holes) -> bool {
         let reach = self.pen.reach + SLACK_PX;
-        holes.any_marked([(a.min(b) - reach) as i32, (a.max(b) + reach) as i32], rows)
+        holes.any_stroked([(a.min(b) - reach) as i32, (a.max(b) + reach) as i32], rows)
     }
 
     /// Draws a piece of an edge into the pixels that the window owns.
@@ -171,8 +171,8 @@ impl<'a> LineDrawer<'a> {
             let mut x = from;
             while x <= to {
                 let centers = [x as f32 + 0.5, y as f32 + 0.5];
-                let places = Places::new(&self.pen, &self.direction, [a, b], centers);
-                let mut touched = places.touched & lanes_up_to(to - x);
+                let places = Places::new(&self.direction, [a, b], centers);
+                let mut touched = places.within(self.pen.reach) & lanes_up_to(to - x);
                 while touched != 0 {
                     let l = touched.trailing_zeros() as usize % LANES;
                     touched &= touched - 1;

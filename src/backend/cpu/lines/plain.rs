@@ -4,7 +4,7 @@
 use super::edge::{LineDrawer, LineTarget, Window};
 use super::hidden_lines::{HiddenIntervals, NEARER_RATIO, hidden_by};
 use super::holes::inset::Insets;
-use super::holes::{Holes, half_width, is_hidden, looked_at};
+use super::holes::{Holes, half_width, looked_at, marks_of_hidden};
 use super::segment::Segment;
 use super::stroke::{self, Mask};
 use crate::backend::cpu::RasterContext;
@@ -99,9 +99,7 @@ pub fn add_holes_plainly(context: &RasterContext<'_>, pass: &LinePass, band: &Sa
                     continue;
                 }
                 let inset = insets.get(0, half);
-                if is_hidden(band, half, &inset, id, [x, y]) {
-                    holes.mark_around([x, y], reach);
-                }
+                holes.mark_around([x, y], reach, marks_of_hidden(context, band, half, (&inset, id), [x, y]));
                 if let Some(at) = holes.index([x, y]) {
                     holes.add(at, inset.areas(x, y)[0]);
                 }

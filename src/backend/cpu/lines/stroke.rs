@@ -140,8 +140,15 @@ impl Direction {
     }
 }
 
+/// A distance from a pixel's centre, in [`UNIT`]s. Beyond a pixel away, all points are on one side.
 #[inline(always)]
-fn units_of(direction: [f32; 2]) -> [i16; 2] {
+pub fn units(px: f32) -> i16 {
+    round_to_i32(px.clamp(-1.0, 1.0) * UNIT) as i16
+}
+
+/// A unit vector, in [`UNIT`]s.
+#[inline(always)]
+pub fn units_of(direction: [f32; 2]) -> [i16; 2] {
     direction.map(|v| round_to_i32(v * UNIT) as i16)
 }
 
@@ -151,12 +158,18 @@ dispatch! {
 }
 
 #[inline(always)]
-fn places_kernel([x, y]: [i16; 2], places: &mut PerPoint) {
-    for ((right, down), place) in LATTICE[0].iter().zip(&LATTICE[1]).zip(places) {
+fn places_kernel(direction: [i16; 2], places: &mut PerPoint) {
+    for ((right, down), places) in LATTICE[0].iter().zip(&LATTICE[1]).zip(places) {
         for l in 0..WORDS {
-            place[l] = high(x, right[l]).wrapping_add(high(y, down[l]));
+            places[l] = place(direction, [right[l], down[l]]);
         }
     }
+}
+
+/// The place of a point in a direction.
+#[inline(always)]
+fn place(direction: [i16; 2], point: [i16; 2]) -> i16 {
+    high(direction[0], point[0]).wrapping_add(high(direction[1], point[1]))
 }
 
 /// The upper half of a product. Sums of these do not overflow; they are written as wrapping ones,
@@ -180,24 +193,30 @@ pub struct Places {
     /// Distances of the pixels' centres from the line, past the piece's start, and past its end.
     across: [f32; LANES],
     past: [[f32; LANES]; 2],
-    /// Bit l: the stroke may touch pixel l.
-    pub touched: u32,
 }
 
 impl Places {
     /// `[start, end]` are the piece's, and `first` is the centre of the first pixel.
     #[inline(always)]
-    pub fn new(pen: &Pen, direction: &Direction, [start, end]: [[f32; 2]; 2], first: [f32; 2]) -> Self {
+    pub fn new(direction: &Direction, [start, end]: [[f32; 2]; 2], first: [f32; 2]) -> Self {
         let (mut across, mut past) = ([0.0; LANES], [[0.0; LANES]; 2]);
-        let mut is_touched = [0_u32; LANES];
         for l in 0..LANES {
             let x = first[0] + l as f32;
             let from = |p: [f32; 2]| [p[0] - x, p[1] - first[1]];
             let place = direction.place([from(start), from(end)]);
             (across[l], past[0][l], past[1][l]) = (place.across, place.past[0], place.past[1]);
-            is_touched[l] = u32::from(place.is_within(pen.reach)) << l;
         }
-        Self { across, past, touched: is_touched.iter().fold(0, |all, bit| all | bit) }
+        Self { across, past }
+    }
+
+    /// Bits of the pixels that are no farther from the piece than this.
+    #[inline(always)]
+    pub fn within(&self, reach: f32) -> u32 {
+        let mut is_within = [0_u32; LANES];
+        for l in 0..LANES {
+            is_within[l] = u32::from(self.of(l).is_within(reach)) << l;
+        }
+        is_within.iter().fold(0, |all, bit| all | bit)
     }
 
     /// Pixel l's.
@@ -267,6 +286,36 @@ pub fn cover(pen: &Pen, direction: &Direction, ends: [[f32; 2]; 2], place: &Plac
     (points > 0).then_some(Amount { area: points as f32 * (pen.peak * (1.0 / POINTS as f32)), points })
 }
 
+/// The points that lie at least `least` along `normal`, a unit vector, from the pixel's centre: both in
+/// [`UNIT`]s.
+#[derive(Clone, Copy, Default)]
+pub struct HalfPlane {
+    pub normal: [i16; 2],
+    pub least: i16,
+}
+
+/// The points that lie in three half planes.
+#[inline(always)]
+pub fn points_within(sides: &[HalfPlane; 3]) -> Mask {
+    let mut outside = [0; WORDS];
+    for (right, down) in LATTICE[0].iter().zip(&LATTICE[1]) {
+        for l in 0..WORDS {
+            let mut is_outside = false;
+            for side in sides {
+                is_outside |= place(side.normal, [right[l], down[l]]) < side.least;
+            }
+            push(&mut outside[l], is_outside);
+        }
+    }
+    outside.map(|word| !word)
+}
+
+/// True if a point, by its number, lies in a half plane.
+pub fn is_point_within(side: &HalfPlane, point: usize) -> bool {
+    let (j, l) = (point / WORDS, point % WORDS);
+    place(side.normal, [LATTICE[0][j][l], LATTICE[1][j][l]]) >= side.least
+}
+
 /// Points of a mask.
 #[inline(always)]
 pub fn count(mask: &Mask) -> u32 {
@@ -277,7 +326,6 @@ pub fn count(mask: &Mask) -> u32 {
 
 #[inline(always)]
 fn strip(pen: &Pen, direction: &Direction, across: f32, past: [f32; 2], is_endless: bool, mask: &mut Mask) {
-    let units = |v: f32| round_to_i32(v.clamp(-1.0, 1.0) * UNIT) as i16;
     let (mut low, mut high) = ([0; WORDS], [0; WORDS]);
     if pen.half_ramp == 0.0 {
         (low, high) = ([units(-pen.half_width - across); WORDS], [units(pen.half_width - across); WORDS]);

@@ -139,6 +139,8 @@ const EDGE: &[Binding] = &[
 ];
 
 const COVERAGE: &[Binding] = &[
+    (Slot::Triangles, Read),
+    (Slot::Vertices, Read),
     (Slot::Samples, Read),
     (Slot::Colors, ReadWrite),
     (Slot::Strokes, ReadWrite),

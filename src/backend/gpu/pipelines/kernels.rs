@@ -9,6 +9,8 @@ const HIDDEN_LINES: &str = include_str!("../../../../shaders/lines/hidden_lines.
 const INSET: &str = include_str!("../../../../shaders/lines/inset.wgsl");
 const SEEN: &str = include_str!("../../../../shaders/lines/seen.wgsl");
 const SEGMENT: &str = include_str!("../../../../shaders/lines/segment.wgsl");
+const LATTICE: &str = include_str!("../../../../shaders/lines/lattice.wgsl");
+const FREE_POINTS: &str = include_str!("../../../../shaders/lines/free_points.wgsl");
 const STROKE_WORDS: &str = include_str!("../../../../shaders/lines/stroke_words.wgsl");
 const STROKE: &str = include_str!("../../../../shaders/lines/stroke.wgsl");
 const PLANES: &str = include_str!("../../../../shaders/geometry/planes.wgsl");
@@ -103,15 +105,16 @@ impl Kernel {
             }
             Self::Holes => {
                 let kernel = include_str!("../../../../shaders/lines/holes.wgsl");
-                [COMMON, STROKE_WORDS, SEEN, INSET, kernel].concat()
+                [COMMON, TRIANGLE, STROKE_WORDS, SEEN, INSET, kernel].concat()
             }
             Self::Edge => {
                 let kernel = include_str!("../../../../shaders/lines/edge.wgsl");
-                [COMMON, TRIANGLE, PLANES, CONTOUR, SEGMENT, SEEN, HIDDEN_LINES, STROKE_WORDS, STROKE, kernel].concat()
+                [COMMON, TRIANGLE, PLANES, CONTOUR, SEGMENT, SEEN, HIDDEN_LINES, STROKE_WORDS, LATTICE, STROKE, kernel]
+                    .concat()
             }
             Self::Coverage => {
-                [COMMON, OVER, STROKE_WORDS, PEEL_STATE, include_str!("../../../../shaders/lines/coverage.wgsl")]
-                    .concat()
+                let kernel = include_str!("../../../../shaders/lines/coverage.wgsl");
+                [COMMON, OVER, STROKE_WORDS, SEEN, INSET, LATTICE, FREE_POINTS, PEEL_STATE, kernel].concat()
             }
             Self::Resolve => [COMMON, OVER, include_str!("../../../../shaders/resolve.wgsl")].concat(),
         }

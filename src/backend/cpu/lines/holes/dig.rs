@@ -2,7 +2,7 @@
 //! pixels of [`add_holes_plainly`](crate::backend::cpu::lines::plain::add_holes_plainly) find them.
 
 use super::inset::{Inset, Insets};
-use super::{Holes, half_width, is_hidden, looked_at};
+use super::{Holes, half_width, looked_at, marks_of_hidden};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::BoxedFace;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
@@ -40,19 +40,23 @@ fn holes_sampled<const S: usize>(
 ) {
     let mut digger = Digger::<S>::new(context, pass, band);
     let tiles = Tiles::new(band);
+    // A band has more rows than are looked at. What counts in a row shows a sample in it or beside it.
+    let rows = [digger.looked_at[1][0] - 1, digger.looked_at[1][1] + 1];
+    let [first, end] = band.range()[1];
+    let rows = [rows[0].max(first), rows[1].min(end)];
     let mut poll = DeadlinePoll::new(context.deadline);
     let mut waiting = Waiting { ids: [0; 2 * LANES], len: 0 };
     for bin in bins {
         let (listed, tall) = bin.fronts.items_in(number);
         for ids in listed.chunks(LANES).chain(tall.chunks(LANES)) {
-            waiting.push_seen::<S>(context, band, &tiles, ids);
+            waiting.push_seen::<S>(context, (band, rows), &tiles, ids);
             if digger.are_dug(&mut waiting, ids.len(), &mut poll, holes) {
                 return;
             }
         }
         let (listed, tall) = bin.backs.boxed_in(number);
         for faces in listed.chunks(LANES).chain(tall.chunks(LANES)) {
-            waiting.push_boxed(context, band, &tiles, faces);
+            waiting.push_boxed(context, rows, &tiles, faces);
             if digger.are_dug(&mut waiting, faces.len(), &mut poll, holes) {
                 return;
             }
@@ -75,14 +79,14 @@ impl Waiting {
     fn push_seen<const S: usize>(
         &mut self,
         context: &RasterContext<'_>,
-        band: &SampleBand,
+        (band, [first, end]): (&SampleBand, [i32; 2]),
         tiles: &Tiles,
         ids: &[u32],
     ) {
         let Boxes { bounds: [columns, rows], depth_max } = boxes::<S>(context, &padded(ids), band);
         for l in 0..ids.len().min(LANES) {
             let (columns, rows) = ([columns[0][l], columns[1][l]], [rows[0][l], rows[1][l]]);
-            let is_empty = (columns[0] > columns[1]) | (rows[0] > rows[1]);
+            let is_empty = (columns[0] > columns[1]) | (rows[0] > rows[1]) | (rows[1] < first) | (rows[0] >= end);
             let is_surface = (ids[l] as usize) < context.plan.triangles.len();
             // Written in any case, kept by the count.
             self.ids[self.len % (2 * LANES)] = ids[l];
@@ -92,8 +96,8 @@ impl Waiting {
 
     /// As `push_seen`, of faces with boxes.
     #[inline(always)]
-    fn push_boxed(&mut self, context: &RasterContext<'_>, band: &SampleBand, tiles: &Tiles, faces: &[BoxedFace]) {
-        let mut seen = tiles.seen(context.isa, faces, band.range()[1]);
+    fn push_boxed(&mut self, context: &RasterContext<'_>, rows: [i32; 2], tiles: &Tiles, faces: &[BoxedFace]) {
+        let mut seen = tiles.seen(context.isa, faces, rows);
         while seen != 0 {
             let id = faces[seen.trailing_zeros() as usize % faces.len()].id;
             self.ids[self.len % (2 * LANES)] = id;
@@ -249,8 +253,9 @@ impl<'a, const S: usize> Digger<'a, S> {
     fn dig_row(&self, inset: &Inset, id: u32, [first, y]: [i32; 2], close: u32, holes: &mut Holes) {
         if self.may_hide(inset, id, [first, y]) {
             for l in (0..LANES as i32).filter(|l| close >> l & 1 != 0) {
-                if is_hidden(self.band, self.half, inset, id, [first + l, y]) {
-                    holes.mark_around([first + l, y], self.reach);
+                let marks = marks_of_hidden(self.context, self.band, self.half, (inset, id), [first + l, y]);
+                if marks != 0 {
+                    holes.mark_around([first + l, y], self.reach, marks);
                 }
             }
         }
@@ -272,7 +277,7 @@ impl<'a, const S: usize> Digger<'a, S> {
         }
     }
 
-    /// False if [`is_hidden`] is false of eight pixels of a row.
+    /// False if [`marks_of_hidden`] finds none in eight pixels of a row.
     #[inline(always)]
     fn may_hide(&self, inset: &Inset, id: u32, [first, y]: [i32; 2]) -> bool {
         let columns = self.band.range()[0];

@@ -142,11 +142,25 @@ impl Inset {
     #[inline(always)]
     pub fn contains(&self, [x, y]: [f32; 2]) -> bool {
         let mut is_inside = true;
-        for side in &self.sides {
-            let from_corner = [x - side.corner[0], y - side.corner[1]];
-            is_inside &= side.unit[0] * from_corner[1] - side.unit[1] * from_corner[0] >= INSIDE;
+        for k in 0..3 {
+            is_inside &= self.distance(k, [x, y]) >= INSIDE;
         }
         is_inside
+    }
+
+    /// The unit vector that points inwards from side k.
+    #[inline(always)]
+    pub fn normal(&self, k: usize) -> [f32; 2] {
+        let [right, down] = self.sides[k].unit;
+        [-down, right]
+    }
+
+    /// Distance of a point, both in 1/256 px from the picture's centre, inwards from side k of the
+    /// face.
+    #[inline(always)]
+    pub fn distance(&self, k: usize, [x, y]: [f32; 2]) -> f32 {
+        let side = &self.sides[k];
+        side.unit[0] * (y - side.corner[1]) - side.unit[1] * (x - side.corner[0])
     }
 
     /// Area of the inset in each of eight pixels of row `y`, from column `first` on.

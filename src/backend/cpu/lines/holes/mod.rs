@@ -2,52 +2,67 @@
 //! Twin of `shaders/lines/holes.wgsl`.
 //!
 //! Lines cover all of a sheet of faces but the faces' [insets](inset), if each side of each face is a
-//! line. Insets do not overlap, so their areas add up. Pixels in which that may not hold are marked,
-//! and get strokes:
+//! line. Insets do not overlap, so their areas add up. Pixels in which that may not hold are marked.
+//! In some of them the sheet ends, and [points](free_points) tell what is free:
 //!
-//! - a sample shows no face, or one that is clipped or belongs to a hull;
+//! - a sample shows nothing;
 //! - a visible part of a rim is within a line's reach: a rim is an edge at which the sheet ends on
 //!   screen or turns back, so that its line covers what lies behind the sheet too;
-//! - a face that is seen close by is hidden in part, as where two surfaces pass through each other.
+//! - a face that is seen close by is hidden in part by another that lies well before it.
+//!
+//! In the others the strokes of all edges are drawn:
+//!
+//! - a sample shows a hull, or one close by shows a face that is clipped;
+//! - a face that is seen close by is hidden in part by another that it passes through nearby.
 //!
 //! A face counts in a pixel if it shows a sample there or in one of the eight pixels around. What is
 //! left of a visible face around a point of its inset holds a disc as wide as the line, and
 //! `LinePass::holes_width_px` sees to it that no such disc lies between samples.
 
 pub(crate) mod dig;
+pub(crate) mod free_points;
 pub(crate) mod inset;
 
 use self::inset::{HOLE_UNIT, Inset};
 use crate::backend::cpu::RasterContext;
-use crate::backend::cpu::geometry::samples::SampleBand;
+use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
+use crate::backend::cpu::geometry::visibility::Setup;
 use crate::plan::{LinePass, sample_offsets};
 
-/// Bit of a pixel that gets strokes.
+/// Bit of a pixel in which areas do not tell what is free.
 pub const MARKED: u32 = 1 << 31;
 
-/// Faces that count in a pixel, at most: one for each of 16 samples in it and in the eight around it.
-/// The sum of their areas stays below [`MARKED`].
-pub const FACES_MAX: u32 = 9 * 16;
-const _: () = assert!(FACES_MAX as f32 * HOLE_UNIT < MARKED as f32);
+/// Bit of a marked pixel that gets the strokes of all edges, because points do not tell either.
+pub const STROKED: u32 = 1 << 30;
 
-/// Per pixel of a band, the area of holes, and whether it is marked.
+/// Faces pass through each other where their planes meet within this distance of a sample, pixels.
+pub const CROSSING_PX: f32 = 6.0;
+
+/// Faces that count in a pixel, at most: one for each of 16 samples in it and in the eight around it.
+/// The sum of their areas stays below [`STROKED`].
+pub const FACES_MAX: u32 = 9 * 16;
+const _: () = assert!(FACES_MAX as f32 * HOLE_UNIT < STROKED as f32);
+
+/// Per pixel of a band, the area of holes, and its marks.
 #[derive(Default)]
 pub struct Holes {
-    /// Areas in [`HOLE_UNIT`]s, and [`MARKED`]. Empty where the pass has no holes.
+    /// Areas in [`HOLE_UNIT`]s, and the marks. Empty where the pass has no holes.
     words: Vec<u32>,
+    /// The marks of a pixel in which points tell, if there are enough samples: see [`marks`].
+    marks: u32,
     width_px: usize,
     /// First and last row, the last excluded.
     rows: [i32; 2],
-    /// A bit per pixel that is marked, `row_words` words a row.
-    marked: Vec<u64>,
+    /// A bit per pixel that gets strokes, `row_words` words a row.
+    stroked: Vec<u64>,
     row_words: usize,
 }
 
 impl Holes {
     /// Allocated bytes.
     pub fn bytes(&self) -> usize {
-        self.words.capacity() * size_of::<u32>() + self.marked.capacity() * size_of::<u64>()
+        self.words.capacity() * size_of::<u32>() + self.stroked.capacity() * size_of::<u64>()
     }
 
     /// Bytes of a row.
@@ -64,14 +79,15 @@ impl Holes {
     pub fn reset(&mut self, band: &SampleBand) {
         self.width_px = band.size_px[0] as usize;
         self.rows = band.shown.map(|row| row as i32);
+        self.marks = marks(band.samples);
         let rows = band.shown[0].abs_diff(band.shown[1]) as usize;
         self.words.clear();
         self.words.reserve_exact(self.width_px * rows);
         self.words.resize(self.width_px * rows, 0);
         self.row_words = self.width_px.div_ceil(64);
-        self.marked.clear();
-        self.marked.reserve_exact(self.row_words * rows);
-        self.marked.resize(self.row_words * rows, 0);
+        self.stroked.clear();
+        self.stroked.reserve_exact(self.row_words * rows);
+        self.stroked.resize(self.row_words * rows, 0);
     }
 
     /// The index of a pixel that is shown.
@@ -87,14 +103,14 @@ impl Holes {
         self.words.is_empty()
     }
 
-    /// Marks a pixel by its index among the shown ones.
+    /// Marks a pixel that a rim reaches, by its index among the shown ones.
     #[inline(always)]
     pub fn mark(&mut self, at: usize) {
-        self.words[at] |= MARKED;
+        self.words[at] |= self.marks;
     }
 
     /// Adds to the area of holes in a pixel, by its index. Of [`FACES_MAX`] faces, the sum stays
-    /// below the mark.
+    /// below the marks.
     #[inline(always)]
     pub fn add(&mut self, at: usize, area: u32) {
         self.words[at] += area;
@@ -107,17 +123,27 @@ impl Holes {
         if x as usize + N > self.width_px { None } else { self.words.get_mut(at..)?.first_chunk_mut() }
     }
 
-    /// True if the pixel with this index gets strokes.
+    /// True if the pixel with this index gets the strokes of all edges.
     #[inline(always)]
-    pub fn is_marked(&self, at: usize) -> bool {
-        self.words.get(at).is_none_or(|word| word & MARKED != 0)
+    pub fn is_stroked(&self, at: usize) -> bool {
+        self.words.get(at).is_none_or(|word| word & STROKED != 0)
     }
 
-    /// The share of a pixel that lines cover; None where strokes tell.
+    /// The pixels of the picture in which points tell what is free.
+    pub(super) fn marked(&self) -> impl Iterator<Item = [i32; 2]> {
+        let width_px = self.width_px.max(1);
+        let is_of_points = |word: &u32| word & (MARKED | STROKED) == MARKED;
+        let rows = (self.rows[0]..).zip(self.words.chunks(width_px));
+        rows.flat_map(move |(y, words)| {
+            (0..).zip(words).filter(move |(_, word)| is_of_points(word)).map(move |(x, _)| [x, y])
+        })
+    }
+
+    /// The share of a pixel that lines cover; None where strokes or points tell.
     #[inline(always)]
     pub fn covered_share(&self, at: usize) -> Option<f32> {
         let &word = self.words.get(at)?;
-        let free = (word & !MARKED).min(HOLE_UNIT as u32);
+        let free = (word & (STROKED - 1)).min(HOLE_UNIT as u32);
         (word & MARKED == 0).then(|| (HOLE_UNIT as u32 - free) as f32 * (1.0 / HOLE_UNIT))
     }
 
@@ -131,10 +157,10 @@ impl Holes {
         }
     }
 
-    /// True if any pixel between these columns and rows, the last included, gets strokes. To be
-    /// asked when all marks have been [collected](Self::collect_marks).
+    /// True if any pixel between these columns and rows, the last included, gets the strokes of all
+    /// edges. To be asked when these pixels have been [collected](Self::collect_stroked).
     #[inline(always)]
-    pub fn any_marked(&self, columns: [i32; 2], rows: [i32; 2]) -> bool {
+    pub fn any_stroked(&self, columns: [i32; 2], rows: [i32; 2]) -> bool {
         if self.is_empty() {
             return true;
         }
@@ -144,7 +170,7 @@ impl Holes {
             for word in left / 64..=right / 64 {
                 let from = if word == left / 64 { left % 64 } else { 0 };
                 let to = if word == right / 64 { right % 64 } else { 63 };
-                if self.marked[row + word] >> from << from << (63 - to) != 0 {
+                if self.stroked[row + word] >> from << from << (63 - to) != 0 {
                     return true;
                 }
             }
@@ -152,26 +178,35 @@ impl Holes {
         false
     }
 
-    /// Collects the marks for [`Self::any_marked`].
-    pub fn collect_marks(&mut self) {
-        for (row, bits) in self.words.chunks(self.width_px.max(1)).zip(self.marked.chunks_mut(self.row_words.max(1))) {
+    /// Collects the pixels for [`Self::any_stroked`] when all rims are drawn. False if there are none.
+    pub fn collect_stroked(&mut self) -> bool {
+        let mut any = self.is_empty();
+        for (row, bits) in self.words.chunks(self.width_px.max(1)).zip(self.stroked.chunks_mut(self.row_words.max(1))) {
             for (pixels, bits) in row.chunks(64).zip(bits) {
-                *bits = pixels.iter().zip(0..).fold(0, |all, (word, i)| all | u64::from(word >> 31) << i);
+                *bits = pixels.iter().zip(0..).fold(0, |all, (word, i)| all | u64::from(word & STROKED != 0) << i);
+                any |= *bits != 0;
             }
         }
+        any
     }
 
     /// Marks the pixels around one of the picture's, or beyond it, up to `radius` away.
     #[inline(always)]
-    pub(super) fn mark_around(&mut self, [x, y]: [i32; 2], radius: i32) {
+    pub(super) fn mark_around(&mut self, [x, y]: [i32; 2], radius: i32, marks: u32) {
         let [left, right] = [(x - radius).max(0), (x + radius + 1).min(self.width_px as i32)];
         for y in (y - radius).max(self.rows[0])..(y + radius + 1).min(self.rows[1]) {
             let row = (y - self.rows[0]) as usize * self.width_px;
             for x in left..right {
-                self.words[row + x as usize] |= MARKED;
+                self.words[row + x as usize] |= marks;
             }
         }
     }
+}
+
+/// The marks of a pixel in which points tell. With one sample per pixel strokes do instead: a rim that
+/// no sample shows may count as hidden, and the strokes of the edges beside it make up for it.
+fn marks(samples: u32) -> u32 {
+    if samples == 1 { MARKED | STROKED } else { MARKED }
 }
 
 /// Half the width of a pass's lines, 1/256 px.
@@ -190,16 +225,22 @@ pub(super) fn looked_at(band: &SampleBand, beyond: i32) -> [[i32; 2]; 2] {
     ]
 }
 
-/// Marks the pixels around what is clipped, and those that show no face or a hull's.
+/// Gives strokes to the pixels around what is clipped and to those that show a hull, and marks those
+/// that show nothing.
 pub fn mark_odd_samples(context: &RasterContext<'_>, band: &SampleBand, holes: &mut Holes) {
     let count = context.plan.triangles.len() as u32;
     let samples = band.samples as usize;
+    let marks = holes.marks;
     for (y, words) in (holes.rows[0]..).zip(holes.words.chunks_mut(holes.width_px.max(1))) {
         let first = band.index(0, y, 0);
         let ids = &band.ids[first..first + words.len() * samples];
         for (word, ids) in words.iter_mut().zip(ids.chunks_exact(samples)) {
-            let last = ids.iter().fold(0, |last, &id| last.max(id));
-            *word |= u32::from(last >= count) * MARKED;
+            let (mut is_marked, mut is_stroked) = (false, false);
+            for &id in ids {
+                is_marked |= id >= count;
+                is_stroked |= (id >= count) & (id != NOTHING);
+            }
+            *word |= (u32::from(is_marked) * marks) | (u32::from(is_stroked) * STROKED);
         }
     }
     if !context.plan.projection.clip {
@@ -210,17 +251,54 @@ pub fn mark_odd_samples(context: &RasterContext<'_>, band: &SampleBand, holes: &
     for y in rows[0]..rows[1] {
         for x in columns[0]..columns[1] {
             if band.pixel(x, y).0.iter().any(|&id| is_clipped(id)) {
-                holes.mark_around([x, y], 1);
+                holes.mark_around([x, y], 1, MARKED | STROKED);
             }
         }
     }
 }
 
-/// True if something else than the face shows in a sample of the pixel that lies well inside it.
+/// Marks for the pixels around one: 0 unless something else than the face shows in a sample of the
+/// pixel that lies well inside it.
 #[inline(always)]
-pub(super) fn is_hidden(band: &SampleBand, half: [i32; 2], inset: &Inset, id: u32, [x, y]: [i32; 2]) -> bool {
+pub(super) fn marks_of_hidden(
+    context: &RasterContext<'_>,
+    band: &SampleBand,
+    half: [i32; 2],
+    (inset, id): (&Inset, u32),
+    [x, y]: [i32; 2],
+) -> u32 {
     let corner = [x * 256 - half[0], y * 256 - half[1]];
-    let is_inside =
-        |offset: &[i32; 2]| inset.contains([(corner[0] + offset[0]) as f32, (corner[1] + offset[1]) as f32]);
-    band.pixel(x, y).0.iter().zip(sample_offsets(band.samples)).any(|(&other, at)| other != id && is_inside(at))
+    let (ids, depths) = band.pixel(x, y);
+    let mut marks = 0;
+    for ((&other, &depth), offset) in ids.iter().zip(depths).zip(sample_offsets(band.samples)) {
+        let at = [corner[0] + offset[0], corner[1] + offset[1]];
+        if other != id && inset.contains(at.map(|v| v as f32)) {
+            let is_crossing = may_cross(context, [id, other], at, depth);
+            marks |= if is_crossing { MARKED | STROKED } else { self::marks(band.samples) };
+        }
+    }
+    marks
+}
+
+/// False if the planes of a face and of one that hides it at a sample, where it has this depth, meet
+/// far from there.
+fn may_cross(context: &RasterContext<'_>, [behind, before]: [u32; 2], [x, y]: [i32; 2], depth: f32) -> bool {
+    let is_face = |id: u32| (id as usize) < context.plan.triangles.len();
+    if !is_face(before) {
+        return true;
+    }
+    let corners = [behind, before].map(|id| context.screen_triangle(id));
+    if corners.iter().flatten().any(ScreenVertex::is_outside) {
+        return true;
+    }
+    let [Some(behind), Some(before)] = corners.map(|corners| Setup::new(&corners)) else { return true };
+    let [z, right, down] = behind.depth;
+    let depth_behind = (z + right * (x - behind.x[0]) as f32) + down * (y - behind.y[0]) as f32;
+    let gap = depth - depth_behind;
+    let slope = [right - before.depth[1], down - before.depth[2]];
+    let reach = CROSSING_PX * 256.0;
+    // Squares of depths may be too small for f32.
+    let scale = 1.0 / f32::EPSILON;
+    let (gap, slope) = (gap * scale, slope.map(|v| v * scale * reach));
+    gap * gap <= slope[0] * slope[0] + slope[1] * slope[1]
 }

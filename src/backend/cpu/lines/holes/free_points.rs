@@ -1,0 +1,210 @@
+//! Stage lines, per marked pixel: the points that its faces leave free. Twin of
+//! `shaders/lines/free_points.wgsl`.
+//!
+//! Where a sheet ends, the areas of insets do not tell what is free, because some of a face may be
+//! hidden. There each of a pixel's points is judged by the sample that it is
+//! [assigned](crate::backend::sample_partition) to: it is free if that sample shows nothing, or if the
+//! point lies in the inset of the face that the sample shows. Lines of rims are strokes, which cover
+//! the free points that they touch.
+//!
+//! A point farther from all rims than half a line's width is judged rightly, because such a disc
+//! around it shows one face, or nothing, and contains its sample. Nearer points are a rim's.
+
+use super::inset::{Inset, Insets};
+use super::{Holes, half_width};
+use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::deadline_poll::DeadlinePoll;
+use crate::backend::cpu::geometry::batch::corners;
+use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
+use crate::backend::cpu::geometry::setups::Corners;
+use crate::backend::cpu::isa::{LANES, dispatch};
+use crate::backend::cpu::lines::coverage::{BandStrokes, points_of_sample};
+use crate::backend::cpu::lines::stroke::{
+    Amount, HalfPlane, Mask, POINTS, WORDS, count, is_point_within, points_within, units, units_of,
+};
+use crate::plan::LinePass;
+
+dispatch! {
+    /// Adds what lines cover of each marked pixel, by points.
+    pub fn add_points(
+        context: &RasterContext<'_>,
+        pass: &LinePass,
+        band: &SampleBand,
+        holes: &Holes,
+        target: (&mut BandStrokes, &mut [u32]),
+    ) = points_kernel
+}
+
+/// As `add_points`, each point by itself.
+pub fn add_points_plainly(
+    context: &RasterContext<'_>,
+    pass: &LinePass,
+    band: &SampleBand,
+    holes: &Holes,
+    target: (&mut BandStrokes, &mut [u32]),
+) {
+    let judge = Judge::new(context, pass, band);
+    let mut covered = Covered { pixel: [0; 2], mask: Mask::default(), holes, target };
+    for [x, y] in holes.marked() {
+        let ids = band.pixel(x, y).0;
+        let mut mask = Mask::default();
+        for (&id, cell) in ids.iter().zip(&judge.cells).filter(|&(&id, _)| id != NOTHING) {
+            let insets = Insets::new(&Corners::load(context, &[id; LANES]), judge.half, judge.half_width);
+            let sides = judge.sides(&insets.get(0, judge.half), [x, y]);
+            for point in 0..POINTS as usize {
+                let is_free = insets.is_open[0] != 0 && sides.iter().all(|side| is_point_within(side, point));
+                let bit = 0x8000 >> (point / WORDS);
+                mask[point % WORDS] |= if is_free { 0 } else { cell[point % WORDS] & bit };
+            }
+        }
+        covered.add([x, y], &mask);
+    }
+    covered.finish();
+}
+
+#[inline(always)]
+fn points_kernel(
+    context: &RasterContext<'_>,
+    pass: &LinePass,
+    band: &SampleBand,
+    holes: &Holes,
+    target: (&mut BandStrokes, &mut [u32]),
+) {
+    let judge = Judge::new(context, pass, band);
+    let mut poll = DeadlinePoll::new(context.deadline);
+    let mut waiting = Waiting { ids: [0; LANES], pixels: [[0; 2]; LANES], len: 0 };
+    let mut covered = Covered { pixel: [0; 2], mask: Mask::default(), holes, target };
+    for pixel in holes.marked() {
+        let ids = band.pixel(pixel[0], pixel[1]).0;
+        for (s, &id) in ids.iter().enumerate() {
+            if id == NOTHING || ids[..s].contains(&id) {
+                continue;
+            }
+            waiting.push(id, pixel);
+            if waiting.len == LANES {
+                waiting.judge(context, band, &judge, &mut covered);
+            }
+        }
+        if poll.is_expired(u64::from(POINTS)) {
+            return;
+        }
+    }
+    waiting.judge(context, band, &judge, &mut covered);
+    covered.finish();
+}
+
+/// Faces that pixels show, which wait until there are eight. Those of a pixel follow each other.
+struct Waiting {
+    ids: [u32; LANES],
+    pixels: [[i32; 2]; LANES],
+    len: usize,
+}
+
+impl Waiting {
+    #[inline(always)]
+    fn push(&mut self, id: u32, pixel: [i32; 2]) {
+        (self.ids[self.len], self.pixels[self.len]) = (id, pixel);
+        self.len += 1;
+    }
+
+    /// Finds what the faces leave free of their pixels.
+    #[inline(always)]
+    fn judge(&mut self, context: &RasterContext<'_>, band: &SampleBand, judge: &Judge, covered: &mut Covered<'_>) {
+        if self.len == 0 {
+            return;
+        }
+        // Those after `len` are of the mesh, too: it has the first triangle if it has any.
+        let insets = Insets::new(&corners(context, &self.ids), judge.half, judge.half_width);
+        for l in 0..std::mem::take(&mut self.len) {
+            let [x, y] = self.pixels[l];
+            let mut cell = judge.cell_of(band.pixel(x, y).0, self.ids[l]);
+            if insets.is_open[l] != 0 {
+                let free = points_within(&judge.sides(&insets.get(l, judge.half), [x, y]));
+                for w in 0..WORDS {
+                    cell[w] &= !free[w];
+                }
+            }
+            covered.add([x, y], &cell);
+        }
+    }
+}
+
+/// The covered points of the pixel that is judged.
+struct Covered<'a> {
+    pixel: [i32; 2],
+    mask: Mask,
+    holes: &'a Holes,
+    target: (&'a mut BandStrokes, &'a mut [u32]),
+}
+
+impl Covered<'_> {
+    #[inline(always)]
+    fn add(&mut self, pixel: [i32; 2], mask: &Mask) {
+        if pixel != self.pixel {
+            self.finish();
+            self.pixel = pixel;
+        }
+        for w in 0..WORDS {
+            self.mask[w] |= mask[w];
+        }
+    }
+
+    /// Adds the points to the strokes of the pixel.
+    #[inline(always)]
+    fn finish(&mut self) {
+        let mask = std::mem::take(&mut self.mask);
+        let points = count(&mask);
+        let Some(at) = self.holes.index(self.pixel).filter(|_| points > 0) else { return };
+        // Only lines without a ramp have holes.
+        let (strokes, owners) = &mut self.target;
+        strokes.add(at, Amount { area: points as f32 * (1.0 / POINTS as f32), points }, &mask, 1.0);
+        if let Some(owner) = owners.get_mut(at) {
+            // The light is that of the samples; any face will do.
+            *owner = (*owner).max(1);
+        }
+    }
+}
+
+/// What is the same for all pixels of a band.
+struct Judge {
+    half: [i32; 2],
+    half_width: f32,
+    /// Per sample, the points that are assigned to it.
+    cells: Vec<Mask>,
+}
+
+impl Judge {
+    fn new(context: &RasterContext<'_>, pass: &LinePass, band: &SampleBand) -> Self {
+        let plan = context.plan;
+        Self {
+            half: [plan.width_px as i32 * 128, plan.height_px as i32 * 128],
+            half_width: half_width(pass),
+            cells: (0..band.samples).map(|s| points_of_sample(band.samples, s)).collect(),
+        }
+    }
+
+    /// The points of the samples that show a face.
+    #[inline(always)]
+    fn cell_of(&self, ids: &[u32], id: u32) -> Mask {
+        let mut all = Mask::default();
+        for (cell, &seen) in self.cells.iter().zip(ids) {
+            let is_own = 0_u16.wrapping_sub(u16::from(seen == id));
+            for w in 0..WORDS {
+                all[w] |= cell[w] & is_own;
+            }
+        }
+        all
+    }
+
+    /// The sides of an inset, as the points of a pixel are compared with them.
+    #[inline(always)]
+    fn sides(&self, inset: &Inset, [x, y]: [i32; 2]) -> [HalfPlane; 3] {
+        let center = [(x * 256 - self.half[0] + 128) as f32, (y * 256 - self.half[1] + 128) as f32];
+        let mut sides = [HalfPlane::default(); 3];
+        for k in 0..3 {
+            let least = (self.half_width - inset.distance(k, center)) * (1.0 / 256.0);
+            sides[k] = HalfPlane { normal: units_of(inset.normal(k)), least: units(least) };
+        }
+        sides
+    }
+}
