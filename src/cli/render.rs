@@ -17,6 +17,7 @@ use crate::import::Format;
 use crate::limits::{Deadline, Limits};
 use crate::mesh::UpAxis;
 use crate::pipeline::{self, Job, Output, Stage};
+use crate::pluralise::pluralise;
 use crate::request::{self, Rules, Style, Words, words_of};
 use crate::spec::{BackendChoice, NamedView, Spec};
 use crate::telemetry;
@@ -223,6 +224,10 @@ fn explain(output: &Output, gpu: &GpuStatus, read: Duration, times: &[(Stage, Du
     eprintln!("gpu: {}", parts.into_iter().flatten().collect::<Vec<_>>().join("; "));
     for skip in &output.skips {
         eprintln!("skipped {}: {}", skip.kind, skip.why);
+    }
+    if output.short_chains > 0 {
+        let lines = pluralise(output.short_chains, "line", "lines");
+        eprintln!("left out {lines} of the outline: shorter than outline.min_length");
     }
     eprintln!("{:<6} {:9.3} ms", "read", read.as_secs_f64() * 1e3);
     for (stage, took) in times {

@@ -111,7 +111,7 @@ fn every_key_reaches_its_field() {
                     "emissive":"#100","opacity":0.5,"textures":false,"debug":"edge-distance","cull":"back"},
         "wire": {"method":"fwidth","color":"#000","thickness":2,"opacity":0.5,"lit":true,"edges":"feature",
                  "feature_angle_deg":45,"hidden":"show"},
-        "outline": {"method":"contour","color":"#fff","thickness":3,"unit":"px"},
+        "outline": {"method":"contour","color":"#fff","thickness":3,"unit":"px","min_length":12},
         "topology": {"polygon":null,"crease":"#00f","open":"#0f0","nonmanifold":null,"crease_angle_deg":60,"thickness":2},
         "scene": {"time_s":1.25},
         "camera": {"view":"top","azimuth_deg":10,"elevation_deg":-20,"projection":"orthographic","fov_deg":50,
@@ -135,7 +135,8 @@ fn every_key_reaches_its_field() {
             method: OutlineMethod::Contour,
             color: Rgba::WHITE,
             thickness: Some(3.0),
-            unit: OutlineUnit::Px
+            unit: OutlineUnit::Px,
+            min_length: Some(12.0),
         })
     );
     let topology = spec.topology.unwrap();

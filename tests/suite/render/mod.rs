@@ -7,6 +7,8 @@ pub mod layers;
 pub mod layers_hull;
 pub mod lines;
 pub mod models;
+pub mod outlines_closed;
+pub mod outlines_specks;
 pub mod prepared;
 pub mod raster;
 pub mod select;

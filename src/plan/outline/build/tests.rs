@@ -23,7 +23,7 @@ fn triangles(count: usize) -> Mesh {
 }
 
 fn canvas(scene: &Scene<'_, '_>) -> Canvas {
-    Canvas { size_px: scene.size_px(), margin_px: 0, first_vertex: scene.mesh.positions.len() as u32 }
+    Canvas { size_px: scene.size_px(), first_vertex: scene.mesh.positions.len() as u32 }
 }
 
 fn spec() -> Spec {
@@ -45,10 +45,15 @@ fn a_hull_takes_no_more_than_it_spends() {
         let view = ScreenMesh::new(&scene, &mut cx).unwrap();
         let thicknesses = [Some(Thickness::Px(3.0))];
         let edges = view.silhouette_edges(&thicknesses, &list, &silhouettes, &mut cx).unwrap();
-        let hull = OutlineMesh::draw(&view, &thicknesses, canvas(&scene), &edges, &mut cx).unwrap();
+        let outlines = OutlineView::new(&view, &thicknesses, scene.size_px(), 0);
+        let parts = OutlineParts::of(&scene, &outlines, edges, OutlineMethod::Hull, &mut cx).unwrap();
+        let edges = &parts.edges;
+        let hull = OutlineMesh::draw(&outlines, canvas(&scene), &parts, &mut cx).unwrap();
         assert_eq!((edges.len(), edges.capacity()), (3 * count, 3 * count));
         assert!(hull.triangles.len() >= 9 * count, "{} triangles", hull.triangles.len());
         let taken = size_of::<SilhouetteEdge>() * edges.capacity()
+            + size_of::<ScreenEdge>() * parts.places.capacity()
+            + size_of::<VisiblePart>() * parts.drawn.capacity()
             + 2 * size_of::<EdgeEnd>() * edges.len()
             + size_of::<[f64; 3]>() * view.places.capacity()
             + mesh.triangles.len()
@@ -74,7 +79,15 @@ fn a_budget_that_is_too_small_is_refused_at_every_step() {
     assert_eq!(plan(enough), Ok(enough));
     let refused: std::collections::BTreeSet<String> = (0..enough).step_by(1000).filter_map(|b| plan(b).err()).collect();
     let words = |what: &str| refused.iter().any(|error| error.contains(what));
-    for what in ["outline's edges", "outline's strips", "outline's corners", "outline's triangles", "the edges"] {
+    for what in [
+        "outline's edges",
+        "outline's strips",
+        "outline's corners",
+        "outline's triangles",
+        "faces near an outline",
+        "outline's chains",
+        "the edges",
+    ] {
         assert!(words(what), "nothing of {what}: {refused:?}");
     }
 }
@@ -91,11 +104,14 @@ fn every_step_ends_when_the_job_does() {
     let view = ScreenMesh::new(&scene, &mut cx).unwrap();
     let thicknesses = [Some(Thickness::Px(3.0))];
     let edges = view.silhouette_edges(&thicknesses, &list, &silhouettes, &mut cx).unwrap();
+    let outlines = OutlineView::new(&view, &thicknesses, scene.size_px(), 0);
+    let parts = OutlineParts::of(&scene, &outlines, edges.clone(), OutlineMethod::Hull, &mut cx).unwrap();
     let mut late = PlanContext::new(&mut budget, &stopped, &[]);
     let results = [
         ScreenMesh::new(&scene, &mut late).err(),
         view.silhouette_edges(&thicknesses, &list, &silhouettes, &mut late).err(),
-        OutlineMesh::draw(&view, &thicknesses, canvas(&scene), &edges, &mut late).err(),
+        OutlineParts::of(&scene, &outlines, edges.clone(), OutlineMethod::Hull, &mut late).err(),
+        OutlineMesh::draw(&outlines, canvas(&scene), &parts, &mut late).err(),
     ];
-    assert_eq!(results, [const { Some(PlanError::Stopped(Stopped)) }; 3]);
+    assert_eq!(results, [const { Some(PlanError::Stopped(Stopped)) }; 4]);
 }
