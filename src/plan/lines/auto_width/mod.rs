@@ -1,5 +1,9 @@
 //! The width of wires whose thickness is left open: lines that let the surface be seen.
 
+mod open_edges;
+
+pub use open_edges::open_edges;
+
 use rayon::prelude::*;
 
 use crate::mesh::Mesh;
@@ -147,6 +151,16 @@ impl<'a> View<'a> {
         let drawn = (0..3).filter(|k| mask >> k & 1 == 1);
         let length: f64 = drawn.map(|k: usize| (ways[k][0] * ways[k][0] + ways[k][1] * ways[k][1]).sqrt()).sum();
         (area > 0.0).then_some([area, 4.0 * area / length])
+    }
+
+    /// The length of an edge on screen, pixels, if its middle is in the picture.
+    fn length_of(&self, vertices: [u32; 2]) -> Option<f64> {
+        let [a, b] = vertices.map(|v| self.place_of(v));
+        let (a, b) = (a?, b?);
+        let is_inside = |k: usize| (0.5 * (a[k] + b[k])).abs() <= self.half_px[k];
+        let longest = self.half_px[0] + self.half_px[1];
+        let length = ((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1])).sqrt();
+        (is_inside(0) && is_inside(1)).then_some(length.min(2.0 * longest))
     }
 
     /// A vertex on screen, pixels from the centre; None behind the near plane.

@@ -26,8 +26,9 @@ fn canvas(scene: &Scene<'_, '_>) -> Canvas {
     Canvas { size_px: scene.size_px(), first_vertex: scene.mesh.positions.len() as u32 }
 }
 
-fn spec() -> Spec {
-    let keys = [("style", "outline"), ("outline.method", "hull"), ("size", "200x160")];
+/// Hulls, with a surface that hides some of them or without.
+fn spec(surface: &str) -> Spec {
+    let keys = [("style", "outline"), ("outline.method", "hull"), ("size", "200x160"), ("surface", surface)];
     let keys: Vec<(String, String)> = keys.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
     let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
     request::read(None, &keys, &rules).unwrap()
@@ -36,7 +37,7 @@ fn spec() -> Spec {
 #[test]
 fn a_hull_takes_no_more_than_it_spends() {
     for count in [1, 10, 20_000] {
-        let (mesh, spec) = (triangles(count), spec());
+        let (mesh, spec) = (triangles(count), spec("null"));
         let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
         let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
         let mut cx = PlanContext::new(&mut budget, &deadline, &[]);
@@ -67,7 +68,7 @@ fn a_hull_takes_no_more_than_it_spends() {
 
 #[test]
 fn a_budget_that_is_too_small_is_refused_at_every_step() {
-    let (mesh, spec) = (triangles(500), spec());
+    let (mesh, spec) = (triangles(500), spec("{}"));
     let plan = |memory_bytes| {
         let mut budget = Budget::new(&Limits { memory_bytes, ..Limits::default() });
         let result = Scene::new(&mesh, &spec, &mut budget)
@@ -94,7 +95,7 @@ fn a_budget_that_is_too_small_is_refused_at_every_step() {
 
 #[test]
 fn every_step_ends_when_the_job_does() {
-    let (mesh, spec) = (triangles(100), spec());
+    let (mesh, spec) = (triangles(100), spec("{}"));
     let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
     let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
     let stopped = Deadline::default();

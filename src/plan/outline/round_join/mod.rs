@@ -145,12 +145,14 @@ fn each_join(
     mut each: impl FnMut(Join),
 ) -> Result<(), Stopped> {
     let mut each_piece = |from: usize, sweep: f64, next: usize, to: Option<usize>| {
-        // Beside edges that are not drawn there is nothing to be joined.
-        if ends[from].outer.is_none() && ends[next].outer.is_none() {
+        // An edge without a quad is hidden by the vertex's own faces, or by others, which hide the
+        // vertex too.
+        let is_missing = [from, next].map(|end| ends[end].outer.is_none());
+        let is_hidden = [from, next].map(|end| ends[end].is_hidden);
+        if is_missing == [true; 2] || (0..2).any(|k| is_missing[k] && !is_hidden[k]) {
             return;
         }
-        let is_seen = |end: usize| !ends[end].is_hidden && ends[end].outer.is_some();
-        if to.is_some() && is_seen(from) && is_seen(next) {
+        if to.is_some() && is_hidden == [false; 2] {
             return each(Join { from, sweep, to, piece: [0.0, sweep] });
         }
         let EdgeEnd { vertex, free, angle, turn, .. } = ends[from];

@@ -34,7 +34,7 @@ pub struct Cells {
 impl Cells {
     /// Cells for so many faces in a picture of this size. They are a power of two pixels wide.
     pub fn new(half: [f64; 2], faces: usize) -> Self {
-        let count = (0.5 * faces as f64).clamp(CELLS[0], CELLS[1]);
+        let count = (faces as f64).clamp(CELLS[0], CELLS[1]);
         let mut width = PX;
         while 4.0 * half[0] * half[1] > count * width * width {
             width *= 2.0;
@@ -153,13 +153,16 @@ pub struct FaceGrid {
 
 impl FaceGrid {
     /// The faces in the marked cells, of the materials that hide (`hides`, by material). None if
-    /// there are too many entries.
+    /// there is no such material, or if there are too many entries.
     pub fn of(
         view: &OutlineView<'_>,
         marks: &Marks,
         hides: &[bool],
         cx: &mut PlanContext<'_>,
     ) -> Result<Option<Self>, PlanError> {
+        if !hides.contains(&true) {
+            return Ok(None);
+        }
         let cells = marks.cells;
         let candidates = candidates(view, marks, hides, cx)?;
         let count = candidates.iter().filter(|&&is_one| is_one == 1).count();

@@ -15,6 +15,9 @@ const BESIDE: f64 = 1e-3;
 /// `vertices` are the mesh edge's, and depths that differ by less than `tiny` count as equal.
 pub fn hidden_range(face: &ScreenFace, edge: &ScreenEdge, vertices: [u32; 2], tiny: f64) -> Option<[f64; 2]> {
     let ends = &edge.ends;
+    if is_apart(face, &ends[0], &ends[1]) || highest(face, 2) <= lower(ends[0][2], ends[1][2]) {
+        return None;
+    }
     let shared = vertices.map(|v| face.vertices.contains(&v));
     if shared == [true; 2] {
         return None;
@@ -49,8 +52,44 @@ pub fn hidden_range(face: &ScreenFace, edge: &ScreenEdge, vertices: [u32; 2], ti
     }
 }
 
+/// True if the boxes around a face and an edge on screen do not touch.
+#[inline]
+fn is_apart(face: &ScreenFace, a: &[f64], b: &[f64]) -> bool {
+    let is_apart = |axis: usize| {
+        let (from, to) = (lower(a[axis], b[axis]), higher(a[axis], b[axis]));
+        highest(face, axis) < from - BESIDE || lowest(face, axis) > to + BESIDE
+    };
+    is_apart(0) || is_apart(1)
+}
+
+#[inline]
+fn highest(face: &ScreenFace, axis: usize) -> f64 {
+    let [a, b, c] = &face.corners;
+    higher(higher(a[axis], b[axis]), c[axis])
+}
+
+#[inline]
+fn lowest(face: &ScreenFace, axis: usize) -> f64 {
+    let [a, b, c] = &face.corners;
+    lower(lower(a[axis], b[axis]), c[axis])
+}
+
+// Not `f64::min` and `max`, which look for NaN.
+#[inline]
+fn higher(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+#[inline]
+fn lower(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
 /// The depth of a face at a point, if it covers the point.
 pub fn depth_at(face: &ScreenFace, point: [f64; 2]) -> Option<f64> {
+    if is_apart(face, &point, &point) {
+        return None;
+    }
     let sides = Sides::of(face);
     let values = sides.values(point);
     values.iter().all(|v| *v >= 0.0).then(|| sides.depth(face, values))

@@ -15,8 +15,8 @@ use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::outline::screen_edges::{OutlineView, PX, RECEDES, ScreenEdge};
 use crate::plan::outline::silhouette_edges::SilhouetteEdge;
-use crate::scene::{Fill, MaterialGroups};
-use crate::spec::OutlineMethod;
+use crate::scene::{Fill, MaterialGroups, barycentric_wire};
+use crate::spec::{Layers, OutlineMethod};
 
 /// Parts of an edge that are told apart. What follows the last of them counts as visible.
 const PARTS_MAX: usize = 16;
@@ -25,7 +25,8 @@ const PARTS_MAX: usize = 16;
 const CHUNK: usize = 256;
 const WAVE: usize = 64;
 
-/// Pairs of an edge and a face that are compared; where there are more, everything counts as visible.
+/// Pairs of an edge and a face that are compared. Where there are more, everything counts as
+/// visible.
 const PAIRS_MAX: usize = 1 << 26;
 
 /// Hidden parts up to this length between visible ones are drawn, 1/256 px: they are what rounding
@@ -62,12 +63,12 @@ pub struct VisiblePart {
 
 /// By material, true if its faces hide what is behind them.
 pub fn hiding_materials(groups: &MaterialGroups<'_>) -> Vec<bool> {
-    let hides = |fill: &Fill| match fill {
+    let hides = |(layers, fill): (&&Layers, &Fill)| match fill {
         Fill::Opaque => true,
         Fill::Transparent => false,
-        Fill::None => groups.needs_occluder(),
+        Fill::None => groups.needs_occluder() && barycentric_wire(layers).is_none(),
     };
-    groups.fills().iter().map(hides).collect()
+    groups.by_material.iter().zip(groups.fills()).map(hides).collect()
 }
 
 /// The visible parts of all edges, in their order. `hides` says which materials hide.
@@ -93,10 +94,7 @@ pub fn visible_parts(
         }
     }
     let grid = FaceGrid::of(view, &marks, hides, cx)?;
-    search.grid = match grid {
-        Some(grid) if pairs(&grid, places) <= PAIRS_MAX => Some(grid),
-        _ => None,
-    };
+    search.grid = grid.filter(|grid| pairs(grid, places) <= PAIRS_MAX);
     let mut all = Vec::new();
     for wave in (0..edges.len()).step_by(CHUNK * WAVE) {
         let last = edges.len().min(wave + CHUNK * WAVE);
@@ -280,3 +278,6 @@ fn each_gap(hidden: &mut [[f64; 2]], length: f64, mut each: impl FnMut([f64; 2])
         add(ranges[i], i + 1 == count);
     }
 }
+
+#[cfg(test)]
+mod tests;
