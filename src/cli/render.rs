@@ -17,7 +17,6 @@ use crate::import::Format;
 use crate::limits::{Deadline, Limits};
 use crate::mesh::UpAxis;
 use crate::pipeline::{self, Job, Output, Stage};
-use crate::pluralise::pluralise;
 use crate::request::{self, Rules, Style, Words, words_of};
 use crate::spec::{BackendChoice, NamedView, Spec};
 use crate::telemetry;
@@ -226,8 +225,7 @@ fn explain(output: &Output, gpu: &GpuStatus, read: Duration, times: &[(Stage, Du
         eprintln!("skipped {}: {}", skip.kind, skip.why);
     }
     if output.short_chains > 0 {
-        let lines = pluralise(output.short_chains, "line", "lines");
-        eprintln!("left out {lines} of the outline: shorter than outline.min_length");
+        eprintln!("lines of the outline left out, shorter than outline.min_length: {}", output.short_chains);
     }
     eprintln!("{:<6} {:9.3} ms", "read", read.as_secs_f64() * 1e3);
     for (stage, took) in times {

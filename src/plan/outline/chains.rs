@@ -19,6 +19,10 @@ const LENGTH_MIN: f64 = 4.0;
 /// outline's width.
 const BRIDGED: f64 = 1.0;
 
+/// Parts whose outline is hidden by what lies closely behind it are drawn where they are connected
+/// and shorter in all than this, in multiples of the outline's width: a line has no gaps there.
+const GAP_MAX: f64 = 2.0;
+
 /// Lengths are whole numbers, whose sums do not depend on an order: so many are the least length.
 const LEAST: f64 = 65_536.0;
 
@@ -58,13 +62,13 @@ pub fn remove_short(
     chains.join(cx.deadline)?;
     let sums = chains.sums(view, length);
     let roots: Vec<u32> = (0..parts.len()).map(|i| chains.sets.find(i as u32)).collect();
+    let is_dotted = chains.dotted(view, length.width, cx.deadline)?;
     let mut dropped = 0;
-    // What of a long chain is hidden by what lies closely behind it would be a dotted line.
     let mut keeps = Vec::with_capacity(parts.len());
-    for (i, (part, root)) in parts.iter().zip(roots).enumerate() {
+    for (i, root) in roots.into_iter().enumerate() {
         let is_long = sums[root as usize] >= LEAST as u64;
         dropped += u32::from(root == i as u32 && !is_long);
-        keeps.push(is_long && (part.shown > 0.0 || part.is_border));
+        keeps.push(is_long && !is_dotted[i]);
     }
     let mut keeps = keeps.into_iter();
     parts.retain(|_| keeps.next().unwrap_or(true));
@@ -95,9 +99,10 @@ impl<'a> Chains<'a> {
         cx: &mut PlanContext<'_>,
     ) -> Result<Self, PlanError> {
         let vertices = view.view.mesh.positions.len();
-        // A hidden edge's number, set, sum and mark; a part's set, root, sum and mark; a vertex.
+        // A hidden edge's number, set, sum and mark; a part's set, root, sum and mark,
+        // and for dotted lines set, sum and mark; a vertex.
         cx.budget.spend("an outline's chains", edges.len() as u64, 4 + 4 + 8 + 1)?;
-        cx.budget.spend("an outline's chains", parts.len() as u64, 4 + 4 + 8 + 1)?;
+        cx.budget.spend("an outline's chains", parts.len() as u64, 4 + 4 + 8 + 1 + 4 + 8 + 1)?;
         cx.budget.spend("an outline's chains", vertices as u64, 4)?;
         let mut hidden = Vec::with_capacity(edges.len());
         let mut rest = parts;
@@ -166,6 +171,31 @@ impl<'a> Chains<'a> {
             }
             *last = member as u32 + 1;
         }
+    }
+
+    /// By part, true if it belongs to a long run of parts whose outline is hidden by what lies closely
+    /// behind it: what is left of it would be a dotted line. Chains are forgotten.
+    fn dotted(&mut self, view: &OutlineView<'_>, width: f64, deadline: &Deadline) -> Result<Vec<bool>, PlanError> {
+        let parts = self.parts;
+        self.sets = UnionFind::new(parts.len());
+        self.last.fill(0);
+        let is_weak = |part: &VisiblePart| part.shown == 0.0 && !part.is_border;
+        for (i, part) in parts.iter().enumerate().filter(|(_, part)| is_weak(part)) {
+            if i % CHECK_EVERY == 0 {
+                deadline.check()?;
+            }
+            for end in (0..2).filter(|&end| part.range[end] == [0.0, 1.0][end]) {
+                self.touch(part.edge, end, i);
+            }
+        }
+        let mut lengths = vec![0_u64; parts.len()];
+        for (i, part) in parts.iter().enumerate().filter(|(_, part)| is_weak(part)) {
+            let place = &self.places[part.edge as usize];
+            let limit = GAP_MAX * width * view.reach(self.edges[part.edge as usize].material, place.ends[0][3]);
+            let own = place.way().1 * (part.range[1] - part.range[0]);
+            lengths[self.sets.find(i as u32) as usize] += share(own, limit);
+        }
+        Ok((0..parts.len()).map(|i| lengths[self.sets.find(i as u32) as usize] >= LEAST as u64).collect())
     }
 
     /// The lengths of all chains, by the part that represents each. What borders the background is

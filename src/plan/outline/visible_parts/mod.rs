@@ -41,9 +41,10 @@ const SLIVER: f64 = PX / 16.0;
 const SAMPLED: f64 = 4.0 * PX;
 const SAMPLES_MAX: f64 = 64.0;
 
-/// Where it is looked, as shares of a hull's width, and of a contour's reach.
+/// Where it is looked: at a distance of a pixel for the background, 1/256 px, and at shares of a
+/// hull's width for what hides it.
+const BESIDE: f64 = PX;
 const ACROSS: [f64; 2] = [0.3, 0.8];
-const BESIDE_CONTOUR: f64 = 2.0;
 
 /// Depths within so many units of the box are equal.
 const EQUAL: f64 = 2e-6;
@@ -193,37 +194,37 @@ impl Search<'_> {
         let is_cut = |end: usize| range[end] == [0.0, 1.0][end] && !self.places[i].is_whole[end];
         let (mut shown, mut is_border) = (0, is_cut(0) || is_cut(1));
         for k in first..last {
-            let at = self.beside(i, k);
-            let edge = self.places[i].at((k as f64 + 0.5) / count as f64);
-            let reach = self.view.reach(self.edges[i].material, edge[3]);
-            for (step, at) in at.into_iter().enumerate() {
-                let depth = match self.method {
-                    OutlineMethod::Hull => self.view.receding(edge, RECEDES, ACROSS[step] * reach),
-                    OutlineMethod::Contour => 0.0,
-                };
-                let (mut is_free, mut is_seen) = (true, true);
-                for other in grid.faces(grid.cells.at(at)).filter_map(|face| depth_at(face, at)) {
-                    is_free = false;
-                    is_seen &= self.method == OutlineMethod::Contour || other < depth;
+            let [beside, across @ ..] = self.beside(i, k);
+            if grid.faces(grid.cells.at(beside)).all(|face| depth_at(face, beside).is_none()) {
+                is_border = true;
+            } else if self.method == OutlineMethod::Hull {
+                let edge = self.places[i].at((k as f64 + 0.5) / count as f64);
+                let reach = self.view.reach(self.edges[i].material, edge[3]);
+                for (at, share) in across.into_iter().zip(ACROSS) {
+                    let depth = self.view.receding(edge, RECEDES, share * reach);
+                    let is_before = |face| depth_at(face, at).is_some_and(|other| other >= depth);
+                    shown += usize::from(!grid.faces(grid.cells.at(at)).any(is_before));
                 }
-                is_border |= is_free && step == 0;
-                shown += usize::from(is_seen);
+                continue;
             }
+            shown += ACROSS.len();
         }
         VisiblePart { edge: i as u32, range, shown: shown as f64 / (2 * (last - first)) as f64, is_border }
     }
 
-    /// The places beside an edge, on its free side, at the k-th of its [`samples`].
-    fn beside(&self, i: usize, k: usize) -> [[f64; 2]; 2] {
+    /// The places beside an edge, on its free side, at the k-th of its [`samples`]: for the
+    /// background, and across a hull.
+    fn beside(&self, i: usize, k: usize) -> [[f64; 2]; 3] {
         let (edge, place) = (&self.edges[i], &self.places[i]);
         let at = place.at((k as f64 + 0.5) / samples(place) as f64);
         let ([right, down], _) = place.way();
         let out = f64::from(edge.free);
         let reach = self.view.reach(edge.material, at[3]);
-        let steps = match self.method {
+        let [near, far] = match self.method {
             OutlineMethod::Hull => ACROSS.map(|share| share * reach),
-            OutlineMethod::Contour => [BESIDE_CONTOUR * reach; 2],
+            OutlineMethod::Contour => [BESIDE; 2],
         };
+        let steps = [BESIDE.min(near), near, far];
         steps.map(|step| [at[0] - out * down * step, at[1] + out * right * step])
     }
 }
