@@ -25,9 +25,8 @@ pub fn hidden_range(face: &ScreenFace, edge: &ScreenEdge, vertices: [u32; 2], ti
     let sides = Sides::of(face);
     let at = ends.map(|[x, y, ..]| sides.values([x, y]));
     let mut range = [0.0, 1.0];
-    for k in 0..3 {
-        let beside = BESIDE * sides.lengths[k];
-        narrow(&mut range, at[0][k] + beside, at[1][k] + beside)?;
+    for ((from, to), length) in at[0].iter().zip(&at[1]).zip(sides.lengths) {
+        narrow(&mut range, from + BESIDE * length, to + BESIDE * length)?;
     }
     let nearer = range.map(|t| {
         let values = [0, 1, 2].map(|k| at[0][k] + t * (at[1][k] - at[0][k]));

@@ -275,8 +275,8 @@ fn each_gap(hidden: &mut [[f64; 2]], length: f64, mut each: impl FnMut([f64; 2])
             ranges[count - 1][1] = 1.0;
         }
     }
-    for i in 0..count {
-        add(ranges[i], i + 1 == count);
+    for (i, range) in ranges[..count].iter().enumerate() {
+        add(*range, i + 1 == count);
     }
 }
 
