@@ -59,8 +59,8 @@ pub fn render_model(
     ended(Stage::Encode);
 
     let warnings = [model.warnings.clone(), drawn.warnings].concat();
-    let Drawn { backend, is_substitute, draw_times, skips, selection, .. } = drawn;
-    Ok(Output { bytes, format, backend, is_substitute, draw_times, skips, warnings, selection })
+    let Drawn { backend, is_substitute, draw_times, skips, short_chains, selection, .. } = drawn;
+    Ok(Output { bytes, format, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
 }
 
 /// Draws a mesh that is in memory already, as often as wanted.
@@ -92,8 +92,9 @@ pub fn draw(
     warnings.extend(plan::out_of_view(&plan));
     warnings.extend(plan.warnings.iter().cloned());
     let selection = selected.as_ref().map(|selected| selected.selection.clone());
-    let (skips, Chosen { image, backend, draw_times, is_substitute }) = (plan.skips, drawn);
-    Ok(Drawn { image, backend, is_substitute, draw_times, skips, warnings, selection })
+    let (skips, short_chains) = (plan.skips, plan.short_chains);
+    let Chosen { image, backend, draw_times, is_substitute } = drawn;
+    Ok(Drawn { image, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
 }
 
 /// Makes what a picture needs on a device and can be made without drawing, such as pipelines.
@@ -190,6 +191,8 @@ pub struct Output {
     pub draw_times: DrawTimes,
     /// The parts of drawing that the plan leaves out, with reasons.
     pub skips: Vec<Skip>,
+    /// Chains of outlines that the plan leaves out because they are short.
+    pub short_chains: u32,
     /// Faults that the importer noticed, and parts of the request that do not go with the mesh.
     pub warnings: Vec<Warning>,
     /// The values selected for a request with a quality target; None for other requests.
@@ -209,6 +212,8 @@ pub struct Drawn {
     pub draw_times: DrawTimes,
     /// The parts of drawing that the plan leaves out, with reasons.
     pub skips: Vec<Skip>,
+    /// Chains of outlines that the plan leaves out because they are short.
+    pub short_chains: u32,
     /// Parts of the request that do not go with the mesh.
     pub warnings: Vec<Warning>,
     /// The values selected for a request with a quality target; None for other requests.

@@ -224,6 +224,9 @@ fn explain(output: &Output, gpu: &GpuStatus, read: Duration, times: &[(Stage, Du
     for skip in &output.skips {
         eprintln!("skipped {}: {}", skip.kind, skip.why);
     }
+    if output.short_chains > 0 {
+        eprintln!("lines of the outline left out, shorter than outline.min_length: {}", output.short_chains);
+    }
     eprintln!("{:<6} {:9.3} ms", "read", read.as_secs_f64() * 1e3);
     for (stage, took) in times {
         eprintln!("{:<6} {:9.3} ms", format!("{stage:?}").to_lowercase(), took.as_secs_f64() * 1e3);

@@ -82,6 +82,7 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
         lines,
         background: spec.image.background.premultiplied(),
         skips: cx.skips.done,
+        short_chains: cx.short_chains,
         warnings: cx.warnings,
         mesh: cx.prepared.map(Prepared::token),
     })

@@ -27,6 +27,8 @@ pub struct PlanContext<'c> {
     pub skips: Skips<'c>,
     /// What the picture has to go without, and why.
     pub warnings: Vec<Warning>,
+    /// Chains of outlines that are left out because they are short.
+    pub short_chains: u32,
     /// Facts about the mesh from earlier plans, if they are kept.
     pub prepared: Option<&'c Prepared>,
     edges: Option<Arc<EdgeList>>,
@@ -41,6 +43,7 @@ impl<'c> PlanContext<'c> {
             deadline,
             skips: Skips::new(keep),
             warnings: Vec::new(),
+            short_chains: 0,
             prepared: None,
             edges: None,
             silhouettes: None,

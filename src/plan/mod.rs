@@ -85,6 +85,8 @@ pub struct DrawPlan<'a> {
     pub background: [f32; 4],
     /// Work that the plan leaves out, and why.
     pub skips: Vec<Skip>,
+    /// Chains of outlines that are left out because they are short: see `outline.min_length`.
+    pub short_chains: u32,
     /// What the picture goes without although it was asked for, and why.
     pub warnings: Vec<Warning>,
     /// The mesh that the plan borrows from, where it may be drawn again.
@@ -125,6 +127,7 @@ impl<'a> DrawPlan<'a> {
             lines: Vec::new(),
             background: [0.0; 4],
             skips: Vec::new(),
+            short_chains: 0,
             warnings: Vec::new(),
             mesh: None,
         }

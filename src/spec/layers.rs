@@ -230,11 +230,20 @@ pub struct Outline {
     pub thickness: Option<f32>,
     /// Unit of `thickness`.
     pub unit: OutlineUnit,
+    /// Chains of silhouette edges that are shorter on screen are not drawn, unless they border the
+    /// background: pixels, 0 to 10000. None: in proportion to the outline's width.
+    pub min_length: Option<f32>,
 }
 
 impl Default for Outline {
     fn default() -> Self {
-        Self { method: OutlineMethod::Hull, color: Rgba::BLACK, thickness: None, unit: OutlineUnit::Object }
+        Self {
+            method: OutlineMethod::Hull,
+            color: Rgba::BLACK,
+            thickness: None,
+            unit: OutlineUnit::Object,
+            min_length: None,
+        }
     }
 }
 

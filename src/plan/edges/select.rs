@@ -69,16 +69,26 @@ pub fn map<T: Sync, U: Zeroable + Send>(
     deadline: &Deadline,
     each: impl Fn(&T) -> U + Sync,
 ) -> Result<Vec<U>, Stopped> {
-    let mut results = bytemuck::allocation::zeroed_vec(items.len());
-    let chunk = |(results, items): (&mut [U], &[T])| {
+    map_indices(items.len(), deadline, |i| each(&items[i]))
+}
+
+/// The results of `each` for the numbers below `count`. The caller has spent their memory.
+pub fn map_indices<U: Zeroable + Send>(
+    count: usize,
+    deadline: &Deadline,
+    each: impl Fn(usize) -> U + Sync,
+) -> Result<Vec<U>, Stopped> {
+    let mut results = bytemuck::allocation::zeroed_vec(count);
+    let chunk = |(first, results): (usize, &mut [U])| {
         deadline.check()?;
-        results.iter_mut().zip(items).for_each(|(result, item)| *result = each(item));
+        results.iter_mut().zip(first..).for_each(|(result, i)| *result = each(i));
         Ok(())
     };
-    if items.len() <= CHUNK {
-        chunk((&mut results, items))?;
+    if count <= CHUNK {
+        chunk((0, &mut results))?;
     } else {
-        results.par_chunks_mut(CHUNK).zip(items.par_chunks(CHUNK)).try_for_each(chunk)?;
+        let numbered = results.par_chunks_mut(CHUNK).enumerate();
+        numbered.try_for_each(|(i, results)| chunk((i * CHUNK, results)))?;
     }
     Ok(results)
 }

@@ -1,6 +1,5 @@
 //! The edges that are drawn as lines, once each, in which style.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use super::styles::{LineStyle, line_styles};
@@ -8,6 +7,7 @@ use crate::mesh::edges::EdgeList;
 use crate::plan::context::PlanContext;
 use crate::plan::edges::select::select;
 use crate::plan::edges::silhouettes::{Silhouettes, hides_inside, unseen_side};
+use crate::plan::outline::parts::contours;
 use crate::plan::skips::SkipKind;
 use crate::plan::{Edge, LinePass, PlanError};
 use crate::scene::Scene;
@@ -28,18 +28,28 @@ pub fn passes(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<Lin
         true => cx.edges_and_orientation(mesh)?,
         false => (cx.edges(mesh)?, None),
     };
-    styles.iter_mut().for_each(|style| style.settle(&list));
+    styles.iter_mut().try_for_each(|style| style.settle(scene, &list, cx.deadline))?;
     let unseen_side = orientation.and_then(|orientation| unseen_side(groups, orientation));
     let silhouettes = match styles.iter().any(|style| style.contour) {
         true => Some(cx.silhouettes(scene)?.1),
         false => None,
     };
-    let source = Source { scene, list: &list, silhouettes: silhouettes.as_deref() };
+    let contours = match &silhouettes {
+        Some(silhouettes) => contours(scene, &list, silhouettes, cx)?,
+        None => None,
+    };
+    let contours = contours.map(|(edges, short_chains)| {
+        cx.short_chains += short_chains;
+        edges
+    });
+    let source = Source { scene, list: &list, silhouettes: silhouettes.as_deref(), contours };
     let mut passes = Vec::new();
     for style in &styles {
         let edges = source.edges(style, cx)?;
         if !edges.is_empty() {
-            let drawn = style.passes(&edges, hides, unseen_side);
+            let is_chosen = style.contour && source.contours.is_some();
+            let mut drawn = style.passes(&edges, hides, unseen_side.filter(|_| !is_chosen));
+            drawn.iter_mut().for_each(|pass| pass.contour &= !is_chosen);
             // Entries in the lists of up to four bands of the picture, and a box of pixels.
             cx.budget.spend("lists of edges", (drawn.len() * edges.len()) as u64, 16 + 8)?;
             passes.extend(drawn);
@@ -54,6 +64,8 @@ struct Source<'s> {
     list: &'s EdgeList,
     /// None where no style is a contour.
     silhouettes: Option<&'s Silhouettes>,
+    /// The contours of this view, by number in the list; None where back-ends find them.
+    contours: Option<Vec<u32>>,
 }
 
 impl Source<'_> {
@@ -71,15 +83,20 @@ impl Source<'_> {
             }
             return Ok(Arc::new(edges));
         }
-        let found = select("drawn edges", self.list.len(), cx, |range, found| self.each(style, range, found))?;
+        let found = match self.contours.as_ref().filter(|_| style.contour) {
+            Some(chosen) => select("drawn edges", chosen.len(), cx, |range, found| {
+                self.each(style, chosen[range].iter().map(|&i| i as usize), found);
+            })?,
+            None => select("drawn edges", self.list.len(), cx, |range, found| self.each(style, range, found))?,
+        };
         Ok(Arc::new(found))
     }
 
-    /// Calls `each` with every edge in a range that has a style.
-    fn each(&self, style: &LineStyle, range: Range<usize>, each: &mut dyn FnMut(Edge)) {
+    /// Calls `each` with every edge among these that has a style.
+    fn each(&self, style: &LineStyle, indices: impl Iterator<Item = usize>, each: &mut dyn FnMut(Edge)) {
         let Scene { mesh, groups, .. } = self.scene;
         let silhouettes = self.silhouettes.filter(|_| style.contour);
-        for i in range {
+        for i in indices {
             let edge = self.list.get(i);
             if style.draws(mesh, groups, &edge) {
                 let is_crowded = style.has_all_edges && edge.face_count > 2;

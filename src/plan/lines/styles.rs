@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use crate::limits::{Deadline, Stopped};
 use crate::mesh::Mesh;
 use crate::mesh::creases::sharp_cos;
 use crate::mesh::edges::{EdgeList, MeshEdge};
 use crate::plan::edges::edge_class::{Class, belongs_to, class_of};
-use crate::plan::lines::auto_width::AutoWidth;
+use crate::plan::lines::auto_width::{AutoWidth, open_edges};
 use crate::plan::peeling::FADE;
 use crate::plan::{Edge, LinePass, Shown, Side};
 use crate::scene::{MaterialGroups, Scene};
@@ -34,13 +35,16 @@ pub struct LineStyle {
     pub has_all_edges: bool,
     /// By index into [`MaterialGroups::styles`], which materials' edges; empty: all.
     styles: Vec<bool>,
+    /// The least width where the lines would cover most of the surface; None: always as wide.
+    thinnest_px: Option<f32>,
 }
 
 impl LineStyle {
     /// Unlit lines along all edges that they are given.
     pub fn everywhere(width_px: f32, smoothing_px: f32, color: [f32; 4], hidden: Hidden) -> Self {
         let (lit, contour, class, styles) = (false, false, Class::All, Vec::new());
-        Self { width_px, smoothing_px, color, hidden, lit, contour, class, has_all_edges: false, styles }
+        let (has_all_edges, thinnest_px) = (false, None);
+        Self { width_px, smoothing_px, color, hidden, lit, contour, class, has_all_edges, styles, thinnest_px }
     }
 
     /// True if the lines are visible at all.
@@ -67,8 +71,15 @@ impl LineStyle {
     }
 
     /// Notes that a style has every edge of this list, if it follows polygons and there are no diagonals.
-    pub fn settle(&mut self, list: &EdgeList) {
+    /// Makes lines that would cover most of the surface thinner.
+    pub fn settle(&mut self, scene: &Scene<'_, '_>, list: &EdgeList, deadline: &Deadline) -> Result<(), Stopped> {
         self.has_all_edges |= self.class == Class::Polygon && self.takes_all(list);
+        if let Some(thinnest_px) = self.thinnest_px {
+            let AutoWidth { width_px, opacity } = open_edges(scene, list, [thinnest_px, self.width_px], deadline)?;
+            self.width_px = width_px.min(self.width_px);
+            self.color = self.color.map(|v| v * opacity);
+        }
+        Ok(())
     }
 
     /// The passes that draw these edges, those of hidden parts first.
@@ -147,6 +158,7 @@ fn wire_styles(scene: &Scene<'_, '_>) -> Vec<LineStyle> {
             class: class_of(&wire),
             has_all_edges: class_of(&wire) == Class::All && styles.iter().all(|&has| has),
             styles: if styles.iter().all(|&has| has) { Vec::new() } else { styles },
+            thinnest_px: None,
         }
     };
     kinds.into_iter().map(style).collect()
@@ -165,6 +177,7 @@ fn topology_styles(topology: &Topology) -> Vec<LineStyle> {
             class,
             has_all_edges: false,
             styles: Vec::new(),
+            thinnest_px: (class == Class::Boundary).then_some(topology.thickness),
         })
     };
     let crease = Class::Crease(sharp_cos(topology.crease_angle_deg));

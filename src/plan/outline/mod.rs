@@ -6,10 +6,14 @@
 //! quad](build), and around the vertices between two of them a [round join](round_join).
 
 pub(crate) mod build;
+pub(crate) mod chains;
+pub(crate) mod parts;
 pub(crate) mod round_join;
+pub(crate) mod screen_edges;
 pub(crate) mod silhouette_edges;
 mod sort;
 pub(crate) mod vertex_occlusion;
+pub(crate) mod visible_parts;
 
 pub use build::hull_pass;
 
@@ -82,8 +86,8 @@ impl HullVertex {
 pub struct EdgeEnd {
     /// The vertex where the edge ends.
     vertex: u32,
-    /// The quad's outer corner there.
-    outer: u32,
+    /// The quad's outer corner there; None where no quad is drawn.
+    outer: Option<u32>,
     /// The material whose outline it is.
     material: u32,
     /// The free side of the edge, seen from this end: 1 where angles grow, else -1.

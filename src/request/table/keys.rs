@@ -86,6 +86,9 @@ fn layers() -> Vec<Field> {
              proportion for others.";
         "outline.unit" |d| d.outline().unit, default "object";
             "Model units, or pixels on screen. All hulls of one picture have the same.";
+        "outline.min_length" |d| d.outline().min_length, in number(0.0, 10_000.0), default Null;
+            "Lines of the outline that are shorter, in pixels, are not drawn, unless they border the background; null: in \
+             proportion to the thickness.";
     ]
 }
 

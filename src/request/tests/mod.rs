@@ -111,7 +111,7 @@ fn every_key_reaches_its_field() {
                     "emissive":"#100","opacity":0.5,"textures":false,"debug":"edge-distance","cull":"back"},
         "wire": {"method":"fwidth","color":"#000","thickness":2,"opacity":0.5,"lit":true,"edges":"feature",
                  "feature_angle_deg":45,"hidden":"show"},
-        "outline": {"method":"contour","color":"#fff","thickness":3,"unit":"px"},
+        "outline": {"method":"contour","color":"#fff","thickness":3,"unit":"px","min_length":12},
         "topology": {"polygon":null,"crease":"#00f","open":"#0f0","nonmanifold":null,"crease_angle_deg":60,"thickness":2},
         "scene": {"time_s":1.25},
         "camera": {"view":"top","azimuth_deg":10,"elevation_deg":-20,"projection":"orthographic","fov_deg":50,
@@ -135,7 +135,8 @@ fn every_key_reaches_its_field() {
             method: OutlineMethod::Contour,
             color: Rgba::WHITE,
             thickness: Some(3.0),
-            unit: OutlineUnit::Px
+            unit: OutlineUnit::Px,
+            min_length: Some(12.0),
         })
     );
     let topology = spec.topology.unwrap();
@@ -208,7 +209,7 @@ fn null_is_the_default_or_as_if_the_key_were_not_there() {
         }
         query(&[(key, "null")]).unwrap_or_else(|error| panic!("{error}"));
     }
-    assert_eq!(keys.len(), 62);
+    assert_eq!(keys.len(), 63);
     for document in [r#"{"style":null}"#, r#"{"camera":null,"light":null,"image":null}"#, r#"{"materials":null}"#] {
         assert_eq!(json(document).unwrap(), json("{}").unwrap(), "{document}");
     }
@@ -296,7 +297,7 @@ fn stated_defaults_are_the_defaults() {
         assert_eq!(json(&with.to_string()).unwrap(), json(&without.to_string()).unwrap(), "{}", field.key);
         checked += 1;
     }
-    assert_eq!(checked, 47);
+    assert_eq!(checked, 48);
 }
 
 #[test]

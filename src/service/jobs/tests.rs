@@ -75,6 +75,7 @@ fn output(bytes: usize) -> Output {
         is_substitute: false,
         draw_times: DrawTimes::default(),
         skips,
+        short_chains: 0,
         warnings,
         selection: None,
     }

@@ -56,7 +56,8 @@ fn hulls_of_many_edges_have_few_triangles_where_there_are_few_pixels() {
     let mesh = disjoint(50_000, 0.02);
     let triangles = |size: &str, px: &str| {
         let keys = [("style", "outline"), ("outline.method", "hull"), ("size", size), ("outline.unit", "px")];
-        let spec = scenes::spec(&[&keys[..], &[("outline.thickness", px)]].concat());
+        // Without a surface nothing hides an edge.
+        let spec = scenes::spec(&[&keys[..], &[("outline.thickness", px), ("surface", "null")]].concat());
         scenes::plan(&mesh, &spec).hull.unwrap().triangles.len()
     };
     // Three strips and three fans, or six at needles, however wide.

@@ -7,6 +7,7 @@ pub mod layers;
 pub mod layers_hull;
 pub mod lines;
 pub mod models;
+pub mod outlines;
 pub mod prepared;
 pub mod raster;
 pub mod select;

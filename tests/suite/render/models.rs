@@ -63,7 +63,7 @@ fn all_are_drawn_alike(meshes: &[(String, Mesh)]) {
 
 /// The models that this version reads: OBJ, STL, PLY, OFF, GLB and single-file glTF without
 /// compression, and not of points alone.
-fn readable(folder: &std::path::Path) -> Vec<(String, Mesh)> {
+pub fn readable(folder: &std::path::Path) -> Vec<(String, Mesh)> {
     let kinds = ["obj", "stl", "ply", "off", "glb", "gltf"];
     let is_mesh = |path: &std::path::PathBuf| {
         path.extension().is_some_and(|e| kinds.contains(&e.to_string_lossy().to_lowercase().as_str()))

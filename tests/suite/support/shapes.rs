@@ -63,7 +63,7 @@ impl Obj {
     }
 
     /// A grid of quads over (u, v) in the unit square; `wrap` closes it in u and v.
-    fn grid(&mut self, n: [usize; 2], wrap: [bool; 2], at: impl Fn(f64, f64) -> [f64; 3]) {
+    pub fn grid(&mut self, n: [usize; 2], wrap: [bool; 2], at: impl Fn(f64, f64) -> [f64; 3]) {
         let points = [n[0] + usize::from(!wrap[0]), n[1] + usize::from(!wrap[1])];
         let first = self.vertices + 1;
         for i in 0..points[0] {

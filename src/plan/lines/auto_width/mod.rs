@@ -1,5 +1,9 @@
 //! The width of wires whose thickness is left open: lines that let the surface be seen.
 
+mod open_edges;
+
+pub use open_edges::open_edges;
+
 use rayon::prelude::*;
 
 use crate::mesh::Mesh;
@@ -162,6 +166,16 @@ impl<'a> View<'a> {
         };
         let sum = self.mesh.triangles[face].map(of_corner).iter().fold(0_u64, |sum, v| sum.wrapping_add(*v));
         (sum ^ sum >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93) >> 32
+    }
+
+    /// The length of an edge on screen, pixels, if its middle is in the picture.
+    fn length_of(&self, vertices: [u32; 2]) -> Option<f64> {
+        let [a, b] = vertices.map(|v| self.place_of(v));
+        let (a, b) = (a?, b?);
+        let is_inside = |k: usize| (0.5 * (a[k] + b[k])).abs() <= self.half_px[k];
+        let longest = self.half_px[0] + self.half_px[1];
+        let length = ((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1])).sqrt();
+        (is_inside(0) && is_inside(1)).then_some(length.min(2.0 * longest))
     }
 
     /// A vertex on screen, pixels from the centre; None behind the near plane.

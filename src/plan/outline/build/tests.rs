@@ -23,11 +23,12 @@ fn triangles(count: usize) -> Mesh {
 }
 
 fn canvas(scene: &Scene<'_, '_>) -> Canvas {
-    Canvas { size_px: scene.size_px(), margin_px: 0, first_vertex: scene.mesh.positions.len() as u32 }
+    Canvas { size_px: scene.size_px(), first_vertex: scene.mesh.positions.len() as u32 }
 }
 
-fn spec() -> Spec {
-    let keys = [("style", "outline"), ("outline.method", "hull"), ("size", "200x160")];
+/// Hulls, with a surface that hides some of them or without.
+fn spec(surface: &str) -> Spec {
+    let keys = [("style", "outline"), ("outline.method", "hull"), ("size", "200x160"), ("surface", surface)];
     let keys: Vec<(String, String)> = keys.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
     let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
     request::read(None, &keys, &rules).unwrap()
@@ -36,7 +37,7 @@ fn spec() -> Spec {
 #[test]
 fn a_hull_takes_no_more_than_it_spends() {
     for count in [1, 10, 20_000] {
-        let (mesh, spec) = (triangles(count), spec());
+        let (mesh, spec) = (triangles(count), spec("null"));
         let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
         let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
         let mut cx = PlanContext::new(&mut budget, &deadline, &[]);
@@ -45,10 +46,15 @@ fn a_hull_takes_no_more_than_it_spends() {
         let view = ScreenMesh::new(&scene, &mut cx).unwrap();
         let thicknesses = [Some(Thickness::Px(3.0))];
         let edges = view.silhouette_edges(&thicknesses, &list, &silhouettes, &mut cx).unwrap();
-        let hull = OutlineMesh::draw(&view, &thicknesses, canvas(&scene), &edges, &mut cx).unwrap();
+        let outlines = OutlineView::new(&view, &thicknesses, scene.size_px(), 0);
+        let parts = OutlineParts::of(&scene, &outlines, edges, OutlineMethod::Hull, &mut cx).unwrap();
+        let edges = &parts.edges;
+        let hull = OutlineMesh::draw(&outlines, canvas(&scene), &parts, &mut cx).unwrap();
         assert_eq!((edges.len(), edges.capacity()), (3 * count, 3 * count));
         assert!(hull.triangles.len() >= 9 * count, "{} triangles", hull.triangles.len());
         let taken = size_of::<SilhouetteEdge>() * edges.capacity()
+            + size_of::<ScreenEdge>() * parts.places.capacity()
+            + size_of::<VisiblePart>() * parts.drawn.capacity()
             + 2 * size_of::<EdgeEnd>() * edges.len()
             + size_of::<[f64; 3]>() * view.places.capacity()
             + mesh.triangles.len()
@@ -62,7 +68,7 @@ fn a_hull_takes_no_more_than_it_spends() {
 
 #[test]
 fn a_budget_that_is_too_small_is_refused_at_every_step() {
-    let (mesh, spec) = (triangles(500), spec());
+    let (mesh, spec) = (triangles(500), spec("{}"));
     let plan = |memory_bytes| {
         let mut budget = Budget::new(&Limits { memory_bytes, ..Limits::default() });
         let result = Scene::new(&mesh, &spec, &mut budget)
@@ -74,14 +80,22 @@ fn a_budget_that_is_too_small_is_refused_at_every_step() {
     assert_eq!(plan(enough), Ok(enough));
     let refused: std::collections::BTreeSet<String> = (0..enough).step_by(1000).filter_map(|b| plan(b).err()).collect();
     let words = |what: &str| refused.iter().any(|error| error.contains(what));
-    for what in ["outline's edges", "outline's strips", "outline's corners", "outline's triangles", "the edges"] {
+    for what in [
+        "outline's edges",
+        "outline's strips",
+        "outline's corners",
+        "outline's triangles",
+        "faces near an outline",
+        "outline's chains",
+        "the edges",
+    ] {
         assert!(words(what), "nothing of {what}: {refused:?}");
     }
 }
 
 #[test]
 fn every_step_ends_when_the_job_does() {
-    let (mesh, spec) = (triangles(100), spec());
+    let (mesh, spec) = (triangles(100), spec("{}"));
     let (mut budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
     let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
     let stopped = Deadline::default();
@@ -91,11 +105,14 @@ fn every_step_ends_when_the_job_does() {
     let view = ScreenMesh::new(&scene, &mut cx).unwrap();
     let thicknesses = [Some(Thickness::Px(3.0))];
     let edges = view.silhouette_edges(&thicknesses, &list, &silhouettes, &mut cx).unwrap();
+    let outlines = OutlineView::new(&view, &thicknesses, scene.size_px(), 0);
+    let parts = OutlineParts::of(&scene, &outlines, edges.clone(), OutlineMethod::Hull, &mut cx).unwrap();
     let mut late = PlanContext::new(&mut budget, &stopped, &[]);
     let results = [
         ScreenMesh::new(&scene, &mut late).err(),
         view.silhouette_edges(&thicknesses, &list, &silhouettes, &mut late).err(),
-        OutlineMesh::draw(&view, &thicknesses, canvas(&scene), &edges, &mut late).err(),
+        OutlineParts::of(&scene, &outlines, edges.clone(), OutlineMethod::Hull, &mut late).err(),
+        OutlineMesh::draw(&outlines, canvas(&scene), &parts, &mut late).err(),
     ];
-    assert_eq!(results, [const { Some(PlanError::Stopped(Stopped)) }; 3]);
+    assert_eq!(results, [const { Some(PlanError::Stopped(Stopped)) }; 4]);
 }

@@ -101,7 +101,7 @@ impl RoundJoins {
         each_join(ends, occlusion, deadline, |join| {
             let count = chords(ends, &join, coarser) as usize;
             triangles += count;
-            vertices += count + 1 - usize::from(join.begins()) - usize::from(join.meets().is_some());
+            vertices += count + 1 - usize::from(join.begins(ends).is_some()) - usize::from(join.meets(ends).is_some());
         })?;
         grow("an outline's corners", &mut hull.vertices, vertices, cx.budget)?;
         grow("an outline's corners", &mut hull.triangles, triangles, cx.budget)?;
@@ -126,14 +126,14 @@ impl Join {
         self.piece[1] - self.piece[0]
     }
 
-    /// True if the piece starts at the outer corner of the end `from`.
-    fn begins(&self) -> bool {
-        self.piece[0] <= 0.0
+    /// The outer corner of a quad at which the piece starts, if it does.
+    fn begins(&self, ends: &[EdgeEnd]) -> Option<u32> {
+        if self.piece[0] <= 0.0 { ends[self.from].outer } else { None }
     }
 
-    /// The end at whose outer corner the piece stops, if it does.
-    fn meets(&self) -> Option<usize> {
-        self.to.filter(|_| self.piece[1] >= self.sweep)
+    /// The outer corner of a quad at which the piece stops, if it does.
+    fn meets(&self, ends: &[EdgeEnd]) -> Option<u32> {
+        self.to.filter(|_| self.piece[1] >= self.sweep).and_then(|to| ends[to].outer)
     }
 }
 
@@ -145,7 +145,14 @@ fn each_join(
     mut each: impl FnMut(Join),
 ) -> Result<(), Stopped> {
     let mut each_piece = |from: usize, sweep: f64, next: usize, to: Option<usize>| {
-        if !ends[from].is_hidden && !ends[next].is_hidden {
+        // An edge without a quad is hidden by the vertex's own faces, or by others, which hide the
+        // vertex too.
+        let is_missing = [from, next].map(|end| ends[end].outer.is_none());
+        let is_hidden = [from, next].map(|end| ends[end].is_hidden);
+        if is_missing == [true; 2] || (0..2).any(|k| is_missing[k] && !is_hidden[k]) {
+            return;
+        }
+        if to.is_some() && is_hidden == [false; 2] {
             return each(Join { from, sweep, to, piece: [0.0, sweep] });
         }
         let EdgeEnd { vertex, free, angle, turn, .. } = ends[from];
@@ -233,10 +240,10 @@ fn draw(ends: &[EdgeEnd], join: &Join, coarser: f64, first: u32, hull: &mut Hull
         first + hull.vertices.len() as u32 - 1
     };
     let count = chords(ends, join, coarser);
-    let mut last = if join.begins() { from.outer } else { corner(join.piece[0]) };
+    let mut last = join.begins(ends).unwrap_or_else(|| corner(join.piece[0]));
     for i in 1..=count {
-        let next = match join.meets() {
-            Some(to) if i == count => ends[to].outer,
+        let next = match join.meets(ends) {
+            Some(outer) if i == count => outer,
             _ => corner(join.piece[0] + join.angle() * (f64::from(i) / f64::from(count))),
         };
         hull.triangles.push([from.vertex, last, next]);

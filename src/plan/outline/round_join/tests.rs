@@ -9,7 +9,7 @@ use crate::limits::Limits;
 fn corner(vertex: u32, angles: [f64; 2], reach_px: f64) -> [EdgeEnd; 2] {
     [1, -1].map(|free| EdgeEnd {
         vertex,
-        outer: 7,
+        outer: Some(7),
         material: 0,
         free,
         angle: angles[usize::from(free < 0)],

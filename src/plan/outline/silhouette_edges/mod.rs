@@ -24,6 +24,8 @@ pub struct SilhouetteEdge {
     pub free: i8,
     /// The material whose outline it is.
     pub material: u32,
+    /// Its number in the mesh's list of edges.
+    pub index: u32,
 }
 
 /// A mesh as one view shows it.
@@ -71,18 +73,18 @@ impl<'a> ScreenMesh<'a> {
                     continue;
                 }
                 if let Some(edge) = silhouettes.edge(self.mesh, i, &edge) {
-                    self.each_side(&edge, outlines, found);
+                    self.each_side(i as u32, &edge, outlines, found);
                 }
             }
         })
     }
 
     /// Calls `each` with each side of an edge on which an outline is drawn.
-    fn each_side(&self, edge: &Edge, outlines: &[Option<Thickness>], each: &mut dyn FnMut(SilhouetteEdge)) {
+    fn each_side(&self, index: u32, edge: &Edge, outlines: &[Option<Thickness>], each: &mut dyn FnMut(SilhouetteEdge)) {
         let faces = self.drawn(edge.faces);
         let Some(material) = self.material(faces, outlines) else { return };
         for &free in self.free_sides(edge.vertices, faces) {
-            each(SilhouetteEdge { vertices: edge.vertices, faces, free, material });
+            each(SilhouetteEdge { vertices: edge.vertices, faces, free, material, index });
         }
     }
 

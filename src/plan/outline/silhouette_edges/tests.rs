@@ -46,7 +46,7 @@ fn edges_that_are_surely_inside_have_no_outline() {
         for (i, edge) in list.iter().enumerate() {
             let before = all.len();
             if let Some(edge) = silhouettes.edge(&mesh, i, &edge) {
-                view.each_side(&edge, &outlines, &mut |side| all.push(side));
+                view.each_side(i as u32, &edge, &outlines, &mut |side| all.push(side));
             }
             let is_inside = view.is_surely_inside(&edge);
             assert!(!is_inside || all.len() == before, "{edge:?}");

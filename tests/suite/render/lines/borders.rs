@@ -43,8 +43,13 @@ const LOOKS: &[fn(&mut Spec, f32)] = &[
     |spec, px| wire(spec, px, Hidden::Fade),
     |spec, px| {
         spec.layers.wire = None;
-        spec.layers.outline =
-            Some(Outline { method: OutlineMethod::Contour, color: RED, thickness: Some(px), unit: OutlineUnit::Px });
+        spec.layers.outline = Some(Outline {
+            method: OutlineMethod::Contour,
+            color: RED,
+            thickness: Some(px),
+            unit: OutlineUnit::Px,
+            min_length: None,
+        });
     },
     |spec, px| {
         wire(spec, px, Hidden::Hide);
@@ -60,7 +65,7 @@ const LOOKS: &[fn(&mut Spec, f32)] = &[
 ];
 
 fn outline(method: OutlineMethod, px: f32) -> Option<Outline> {
-    Some(Outline { method, color: RED, thickness: Some(px), unit: OutlineUnit::Px })
+    Some(Outline { method, color: RED, thickness: Some(px), unit: OutlineUnit::Px, min_length: None })
 }
 
 fn wire(spec: &mut Spec, px: f32, hidden: Hidden) {

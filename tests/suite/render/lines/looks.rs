@@ -19,7 +19,7 @@ const BLACK: Rgba = Rgba([0.0, 0.0, 0.0, 1.0]);
 
 fn contour(thickness: f32) -> Option<Outline> {
     let thickness = Some(thickness);
-    Some(Outline { method: OutlineMethod::Contour, color: BLACK, thickness, unit: OutlineUnit::Px })
+    Some(Outline { method: OutlineMethod::Contour, color: BLACK, thickness, unit: OutlineUnit::Px, min_length: None })
 }
 
 fn draw(mesh: &Mesh, spec: &Spec) -> Image {

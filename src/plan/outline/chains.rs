@@ -1,0 +1,221 @@
+//! Chains: parts of silhouette edges that are joined at vertices. Those that are too short to say
+//! anything are not drawn.
+//!
+//! Scans and coarse meshes have a multitude of tiny folds. Each has a silhouette of a few pixels,
+//! beside which an outline would be a crumb.
+
+use crate::limits::Deadline;
+use crate::mesh::union_find::UnionFind;
+use crate::plan::PlanError;
+use crate::plan::context::{CHECK_EVERY, PlanContext};
+use crate::plan::outline::screen_edges::{OutlineView, PX, ScreenEdge};
+use crate::plan::outline::silhouette_edges::SilhouetteEdge;
+use crate::plan::outline::visible_parts::VisiblePart;
+
+/// The least length of a chain, in multiples of its outline's width.
+const LENGTH_MIN: f64 = 4.0;
+
+/// Hidden edges between visible ones hold a chain together up to this length, in multiples of the
+/// outline's width.
+const BRIDGED: f64 = 1.0;
+
+/// Parts whose outline is hidden by what lies closely behind it are drawn where they are connected
+/// and shorter in all than this, in multiples of the outline's width: a line has no gaps there.
+const GAP_MAX: f64 = 2.0;
+
+/// Lengths are whole numbers, whose sums do not depend on an order: so many are the least length.
+const LEAST: f64 = 65_536.0;
+
+/// The least length of chains.
+#[derive(Clone, Debug)]
+pub struct ChainLength {
+    /// By material, in pixels; None: in proportion to the outline's width.
+    pub min_px: Vec<Option<f32>>,
+    /// The outline's whole width in multiples of its reach.
+    pub width: f64,
+}
+
+impl ChainLength {
+    /// The least length of a material's chains where its outline reaches so far, 1/256 px.
+    fn least(&self, material: u32, reach: f64) -> f64 {
+        match self.min_px.get(material as usize) {
+            Some(Some(px)) => PX * f64::from(*px),
+            _ => LENGTH_MIN * self.width * reach,
+        }
+    }
+}
+
+/// Removes the parts of short chains. Returns the number of chains that were removed.
+pub fn remove_short(
+    parts: &mut Vec<VisiblePart>,
+    view: &OutlineView<'_>,
+    edges: &[SilhouetteEdge],
+    places: &[ScreenEdge],
+    length: &ChainLength,
+    cx: &mut PlanContext<'_>,
+) -> Result<u32, PlanError> {
+    if parts.is_empty() || length.min_px.iter().all(|px| *px == Some(0.0)) {
+        return Ok(0);
+    }
+    let mut chains = Chains::new(view, edges, places, parts, cx)?;
+    chains.bridge(view, length.width, cx.deadline)?;
+    chains.join(cx.deadline)?;
+    let sums = chains.sums(view, length);
+    let roots: Vec<u32> = (0..parts.len()).map(|i| chains.sets.find(i as u32)).collect();
+    let is_dotted = chains.dotted(view, length.width, cx.deadline)?;
+    let mut dropped = 0;
+    let mut keeps = Vec::with_capacity(parts.len());
+    for (i, root) in roots.into_iter().enumerate() {
+        let is_long = sums[root as usize] >= LEAST as u64;
+        dropped += u32::from(root == i as u32 && !is_long);
+        keeps.push(is_long && !is_dotted[i]);
+    }
+    let mut keeps = keeps.into_iter();
+    parts.retain(|_| keeps.next().unwrap_or(true));
+    Ok(dropped)
+}
+
+/// Parts, and edges that are hidden wholly, joined at their vertices.
+struct Chains<'a> {
+    edges: &'a [SilhouetteEdge],
+    places: &'a [ScreenEdge],
+    parts: &'a [VisiblePart],
+    /// Edges without a visible part.
+    hidden: Vec<u32>,
+    /// By part, then by hidden edge. Representatives of sets with parts are parts.
+    sets: UnionFind,
+    /// By vertex: the last member there, plus 1.
+    last: Vec<u32>,
+    /// By hidden edge: it holds what it touches together.
+    is_bridge: Vec<bool>,
+}
+
+impl<'a> Chains<'a> {
+    fn new(
+        view: &OutlineView<'_>,
+        edges: &'a [SilhouetteEdge],
+        places: &'a [ScreenEdge],
+        parts: &'a [VisiblePart],
+        cx: &mut PlanContext<'_>,
+    ) -> Result<Self, PlanError> {
+        let vertices = view.view.mesh.positions.len();
+        // A hidden edge's number, set, sum and mark; a part's set, root, sum and mark,
+        // and for dotted lines set, sum and mark; a vertex.
+        cx.budget.spend("an outline's chains", edges.len() as u64, 4 + 4 + 8 + 1)?;
+        cx.budget.spend("an outline's chains", parts.len() as u64, 4 + 4 + 8 + 1 + 4 + 8 + 1)?;
+        cx.budget.spend("an outline's chains", vertices as u64, 4)?;
+        let mut hidden = Vec::with_capacity(edges.len());
+        let mut rest = parts;
+        for i in 0..edges.len() as u32 {
+            let count = rest.iter().take_while(|part| part.edge == i).count();
+            if count == 0 && places[i as usize].may_show {
+                hidden.push(i);
+            }
+            rest = &rest[count..];
+        }
+        let sets = UnionFind::new(parts.len() + hidden.len());
+        let is_bridge = vec![false; hidden.len()];
+        Ok(Self { edges, places, parts, hidden, sets, last: vec![0; vertices], is_bridge })
+    }
+
+    /// Finds the hidden edges that hold chains together: connected ones that are short in all.
+    fn bridge(&mut self, view: &OutlineView<'_>, width: f64, deadline: &Deadline) -> Result<(), PlanError> {
+        let first = self.parts.len();
+        for i in 0..self.hidden.len() {
+            if i % CHECK_EVERY == 0 {
+                deadline.check()?;
+            }
+            for end in 0..2 {
+                self.touch(self.hidden[i], end, first + i);
+            }
+        }
+        let mut lengths = vec![0_u64; self.hidden.len()];
+        for i in 0..self.hidden.len() {
+            let edge = self.hidden[i] as usize;
+            let limit = BRIDGED * width * view.reach(self.edges[edge].material, self.places[edge].ends[0][3]);
+            let root = self.sets.find((first + i) as u32) as usize - first;
+            lengths[root] += share(self.places[edge].way().1, limit);
+        }
+        for i in 0..self.hidden.len() {
+            let root = self.sets.find((first + i) as u32) as usize - first;
+            self.is_bridge[i] = lengths[root] <= LEAST as u64;
+        }
+        self.last.fill(0);
+        Ok(())
+    }
+
+    /// Joins all parts.
+    fn join(&mut self, deadline: &Deadline) -> Result<(), PlanError> {
+        for (i, part) in self.parts.iter().enumerate() {
+            if i % CHECK_EVERY == 0 {
+                deadline.check()?;
+            }
+            for end in (0..2).filter(|&end| part.range[end] == [0.0, 1.0][end]) {
+                self.touch(part.edge, end, i);
+            }
+        }
+        for i in 0..self.hidden.len() {
+            for end in if self.is_bridge[i] { 0..2 } else { 0..0 } {
+                self.touch(self.hidden[i], end, self.parts.len() + i);
+            }
+        }
+        Ok(())
+    }
+
+    /// Joins a member to what is at one of its edge's vertices.
+    fn touch(&mut self, edge: u32, end: usize, member: usize) {
+        if self.places[edge as usize].is_whole[end] {
+            let last = &mut self.last[self.edges[edge as usize].vertices[end] as usize];
+            if *last > 0 {
+                self.sets.unite(*last - 1, member as u32);
+            }
+            *last = member as u32 + 1;
+        }
+    }
+
+    /// By part, true if it belongs to a long run of parts whose outline is hidden by what lies closely
+    /// behind it: what is left of it would be a dotted line. Chains are forgotten.
+    fn dotted(&mut self, view: &OutlineView<'_>, width: f64, deadline: &Deadline) -> Result<Vec<bool>, PlanError> {
+        let parts = self.parts;
+        self.sets = UnionFind::new(parts.len());
+        self.last.fill(0);
+        let is_weak = |part: &VisiblePart| part.shown == 0.0 && !part.is_border;
+        for (i, part) in parts.iter().enumerate().filter(|(_, part)| is_weak(part)) {
+            if i % CHECK_EVERY == 0 {
+                deadline.check()?;
+            }
+            for end in (0..2).filter(|&end| part.range[end] == [0.0, 1.0][end]) {
+                self.touch(part.edge, end, i);
+            }
+        }
+        let mut lengths = vec![0_u64; parts.len()];
+        for (i, part) in parts.iter().enumerate().filter(|(_, part)| is_weak(part)) {
+            let place = &self.places[part.edge as usize];
+            let limit = GAP_MAX * width * view.reach(self.edges[part.edge as usize].material, place.ends[0][3]);
+            let own = place.way().1 * (part.range[1] - part.range[0]);
+            lengths[self.sets.find(i as u32) as usize] += share(own, limit);
+        }
+        Ok((0..parts.len()).map(|i| lengths[self.sets.find(i as u32) as usize] >= LEAST as u64).collect())
+    }
+
+    /// The lengths of all chains, by the part that represents each. What borders the background is
+    /// long enough.
+    fn sums(&mut self, view: &OutlineView<'_>, length: &ChainLength) -> Vec<u64> {
+        let mut sums = vec![0_u64; self.parts.len()];
+        for (i, part) in self.parts.iter().enumerate() {
+            let place = &self.places[part.edge as usize];
+            let material = self.edges[part.edge as usize].material;
+            let limit = length.least(material, view.reach(material, place.at(part.range[0])[3]));
+            let own = place.way().1 * (part.range[1] - part.range[0]) * part.shown;
+            let own = if part.is_border { LEAST as u64 } else { share(own, limit) };
+            let root = self.sets.find(i as u32) as usize;
+            sums[root] += own;
+        }
+        sums
+    }
+}
+
+/// A length as a share of a limit, as a whole number.
+fn share(length: f64, limit: f64) -> u64 {
+    (length / limit.max(1e-9) * LEAST).min(LEAST) as u64
+}
