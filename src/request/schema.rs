@@ -157,6 +157,10 @@ fn of_kind(kind: &Kind, image_px: u64) -> Json {
             json!({ "anyOf": [whole(), { "type": "string", "pattern": format!("^{side}([xX]{side})?$") }] })
         }
         Kind::Words(words) => json!({ "enum": words }),
+        Kind::WordList { words, count_max } => {
+            json!({ "type": "array", "items": { "enum": words }, "minItems": 1, "maxItems": count_max })
+        }
+        Kind::Count { min, max } => json!({ "type": "integer", "minimum": min, "maximum": max }),
         Kind::Color => {
             let hex = "[0-9a-fA-F]";
             let pattern = format!("^(transparent|#?({hex}{{3,4}}|{hex}{{6}}|{hex}{{8}}))$");

@@ -238,6 +238,20 @@ impl Default for Outline {
     }
 }
 
+/// Point primitives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Points {
+    /// Diameter with a surface, pixels, 0.5 to 64. Without one, points are wider than the wire's lines in
+    /// the proportion of this to 1.5.
+    pub size_px: f32,
+}
+
+impl Default for Points {
+    fn default() -> Self {
+        Self { size_px: 3.0 }
+    }
+}
+
 /// Edges coloured by how the mesh is connected. Kinds whose colour is None are not drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Topology {

@@ -11,10 +11,10 @@ use std::time::Duration;
 use quick_cache::sync::Cache;
 
 use super::job::{Task, Work};
-use crate::spec::{BackendChoice, Spec};
+use crate::spec::{BackendChoice, Sheet, Spec};
 
-/// Nanoseconds of the formula: for any job, for each byte that is to be read, for each sample of the
-/// picture. They give the factors a sensible start, and weigh bytes against samples.
+/// Nanoseconds of the formula: for any view, for each byte that is to be read, for each sample of all
+/// pictures. They give the factors a sensible start, and weigh bytes against samples.
 const JOB_NS: f64 = 500_000.0;
 const BYTE_NS: f64 = 5.0;
 const SAMPLE_NS: f64 = 5.0;
@@ -71,18 +71,16 @@ impl Estimates {
 
     /// The size of a job.
     pub fn size(&self, work: &Work) -> Size {
-        let samples = match &work.task {
-            Task::Draw(spec) => {
-                let image = &spec.image;
-                f64::from(image.width_px) * f64::from(image.height_px) * f64::from(image.samples)
-            }
-            Task::Inspect { .. } => 0.0,
+        let (samples, views) = match &work.task {
+            Task::Draw(spec) => drawn(spec),
+            Task::Inspect { .. } => (0.0, 1),
         };
         let kind = kind(&work.task);
-        let mesh = work.mesh_key.as_ref().map(|key| self.hasher.hash_one((kind, key)));
+        // What a mesh takes in one view says little about its sheets.
+        let mesh = work.mesh_key.as_ref().map(|key| self.hasher.hash_one((kind, key, views)));
         let is_known = mesh.is_some_and(|mesh| self.meshes.get(&mesh).is_some());
         let bytes = if is_known { 0 } else { work.bundle.bytes_len() };
-        let formula_ns = JOB_NS + BYTE_NS * bytes as f64 + SAMPLE_NS * samples;
+        let formula_ns = f64::from(views) * JOB_NS + BYTE_NS * bytes as f64 + SAMPLE_NS * samples;
         Size { formula_s: formula_ns * 1e-9, kind: kind + if is_known { 2 * TASKS } else { 0 }, mesh, is_known }
     }
 
@@ -112,6 +110,16 @@ impl Estimates {
     fn locked(&self) -> std::sync::MutexGuard<'_, [f64; KINDS]> {
         self.kinds.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Samples of all views of a request, and the number of the views. The frames of an animation have the
+/// whole size each, and so may the cells of a grid: a view takes no less for being small if its mesh is
+/// large.
+fn drawn(spec: &Spec) -> (f64, u32) {
+    let Spec { image, sheet, .. } = spec;
+    let views = sheet.as_ref().map_or(1, Sheet::count);
+    let samples = f64::from(image.width_px) * f64::from(image.height_px) * f64::from(image.samples);
+    (samples * f64::from(views), views)
 }
 
 /// The number of the kind of a task.

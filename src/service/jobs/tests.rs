@@ -13,7 +13,9 @@ use crate::import::Bundle;
 use crate::limits::{Deadline, Stopped};
 use crate::pipeline::{Output, RenderError, Stage};
 use crate::spec::color::Rgba;
-use crate::spec::{BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, ProjectionKind, Spec};
+use crate::spec::{
+    BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind, Spec,
+};
 
 const SOON: Duration = Duration::from_secs(10);
 
@@ -50,6 +52,7 @@ fn spec() -> Spec {
         eye: None,
         target: None,
         from_file: false,
+        fits_turn: false,
     };
     let image = ImageSpec { width_px: 8, height_px: 8, format: None, samples: 1, background: Rgba::WHITE, effort: 3 };
     let light = Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3 };
@@ -57,8 +60,10 @@ fn spec() -> Spec {
         layers: Layers::default(),
         materials: Vec::new(),
         topology: None,
+        points: Points::default(),
         time_s: None,
         camera,
+        sheet: None,
         light,
         image,
         backend: BackendChoice::Cpu,
