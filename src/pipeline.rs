@@ -14,7 +14,7 @@ use crate::image::{Image, ImageFormat};
 use crate::import::{self, Bundle, Format, Imported, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
-use crate::plan::{self, Prepared, Skip};
+use crate::plan::{self, Prepared, Skip, UvLayout};
 pub use crate::plan::{PlanError, QualitySelection};
 use crate::report::Report;
 use crate::scene::{Scene, SceneError};
@@ -133,7 +133,12 @@ fn draw_view(
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Drawn, RenderError> {
     // Mesh -> Scene -> DrawPlan
-    let Model { mesh, prepared, .. } = model;
+    let layout = UvLayout::of(&model.mesh, spec, budget, deadline)?;
+    let of_layout = Prepared::default();
+    let (mesh, spec, prepared) = match &layout {
+        Some(layout) => (&layout.mesh, &layout.spec, &of_layout),
+        None => (&model.mesh, spec, &model.prepared),
+    };
     let selected = plan::select_quality(spec, mesh.triangles.len(), backends.has_gpu());
     let spec = selected.as_ref().map_or(spec, |selected| &selected.spec);
     let scene = Scene::new(mesh, spec, budget)?;
@@ -150,7 +155,7 @@ fn draw_view(
     warnings.extend(selected.iter().flat_map(|selected| selected.warnings.iter().cloned()));
     warnings.extend(plan::undrawn_primitives(&scene));
     warnings.extend(plan::out_of_view(&plan));
-    warnings.extend(plan.warnings.iter().cloned());
+    warnings.extend(plan.warnings.iter().chain(layout.iter().flat_map(|layout| &layout.warnings)).cloned());
     let selection = selected.as_ref().map(|selected| selected.selection.clone());
     let (skips, Chosen { image, backend, draw_times, is_substitute }) = (plan.skips, drawn);
     Ok(Drawn { image, backend, is_substitute, draw_times, skips, warnings, selection })

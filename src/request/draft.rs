@@ -8,7 +8,7 @@ use crate::request::style::Style;
 use crate::request::table::dependent::Dependent;
 use crate::spec::words::{Words, word_for};
 use crate::spec::{
-    BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, Open, Outline, OutlineMethod, Points,
+    BackendChoice, CameraSpec, DebugView, ImageSpec, Layers, Light, LightPreset, Open, Outline, OutlineMethod, Points,
     QualityTarget, Spec, Surface, Topology, Wire, WireMethod,
 };
 
@@ -115,6 +115,7 @@ impl Draft {
         });
         let materials = materials.collect::<Result<Vec<_>, _>>()?;
         check_layers(&layers, &materials)?;
+        check_uv_layout(&layers, &materials)?;
         check_camera(&self.camera)?;
         let has_lamps = self.light.preset != LightPreset::None;
         let light = Light { ambient: self.ambient.or(if has_lamps { 0.3 } else { 1.0 }), ..self.light };
@@ -160,6 +161,19 @@ fn check_layers(layers: &Layers, materials: &[(String, Layers)]) -> Result<(), R
         }
     }
     Ok(())
+}
+
+/// Fails if some materials show the layout of texture coordinates, and others lie in space.
+fn check_uv_layout(layers: &Layers, materials: &[(String, Layers)]) -> Result<(), RequestError> {
+    let is_flat = |layers: &Layers| layers.surface.is_some_and(|surface| surface.debug == DebugView::UvLayout);
+    match materials.iter().find(|(_, of_material)| is_flat(of_material) && !is_flat(layers)) {
+        Some((name, _)) => {
+            let why = "it shows the whole mesh: give it as `surface.debug`";
+            let key = format!("materials.{name}.surface.debug");
+            Err(RequestError::new(RequestFault::Conflict, &key, word_for(DebugView::UvLayout), why))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Fails if two materials have different values of this key.

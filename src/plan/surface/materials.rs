@@ -3,6 +3,7 @@
 use super::textures::TextureLoader;
 use crate::mesh::material::{AlphaMode, TextureRef};
 use crate::mesh::{MaterialSlot, Mesh};
+use crate::plan::heat;
 use crate::plan::lines::styles::wire_color;
 use crate::plan::{PlanError, ShadedMaterial, TEXTURE_NONE, TextureUse, flags, slots};
 use crate::spec::color::Rgba;
@@ -109,7 +110,8 @@ fn fill(material: &mut ShadedMaterial, mesh: &Mesh, slot: &MaterialSlot, surface
     if surface.roughness.is_some() {
         material.flags |= flags::OWN_ROUGHNESS;
     }
-    if surface.debug == DebugView::VertexColor && !mesh.colors.is_empty() {
+    let shows_colors = surface.debug == DebugView::VertexColor && !mesh.colors.is_empty();
+    if shows_colors || heat::is_heat(surface.debug) {
         material.flags |= flags::VERTEX_COLORS;
     }
 }
@@ -123,7 +125,8 @@ fn shading_flags(slot: &MaterialSlot, surface: &Surface) -> u32 {
         DebugView::Normal => super::debug_views::NORMAL,
         DebugView::Uv => super::debug_views::UV,
         DebugView::FaceOrientation => super::debug_views::FACE_ORIENTATION,
-        DebugView::VertexColor => super::debug_views::VERTEX_COLOR,
+        // The plan computes the others as vertex colours.
+        _ => super::debug_views::VERTEX_COLOR,
     };
     let normals = match (surface.shading, surface.normals) {
         (_, FlatNormals::Face) if surface.debug == DebugView::FaceOrientation => flags::FACE_NORMALS,
