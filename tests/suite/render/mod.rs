@@ -1,5 +1,6 @@
 //! Pictures: the same on every back-end, and as they should be.
 
+pub mod diagnostics;
 pub mod examples;
 pub mod golden;
 pub mod hulls;
@@ -7,9 +8,11 @@ pub mod layers;
 pub mod layers_hull;
 pub mod lines;
 pub mod models;
+pub mod points;
 pub mod prepared;
 pub mod raster;
 pub mod select;
+pub mod sheets;
 pub mod shortcuts;
 pub mod skips;
 pub mod textures;
