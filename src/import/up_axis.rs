@@ -44,7 +44,7 @@ pub fn warning(mesh: &Mesh, report: &ImportReport) -> Option<Warning> {
         (Format::StlBinary | Format::StlAscii, UpAxis::Z) => (Axis::Z, Axis { index: 1, name: "y" }),
         _ => return None,
     };
-    let why = match said_to_be_up(report) {
+    let why = match said_to_be_up(mesh, report) {
         Some(said) if said == other.index => "as the comment of the program that wrote it tells",
         Some(_) => return None,
         None if stands_on(mesh, other, taken) => "the axis along which it is tall and stands on a flat base",
@@ -68,7 +68,7 @@ impl Axis {
 }
 
 /// The axis that the file's comment names, or that its program is known for.
-fn said_to_be_up(report: &ImportReport) -> Option<usize> {
+fn said_to_be_up(mesh: &Mesh, report: &ImportReport) -> Option<usize> {
     let comment = report.metadata.generator.as_ref()?.to_ascii_lowercase();
     let says = |axis: char| {
         let words = [format!("{axis}-up"), format!("{axis} up"), format!("{axis}up"), format!("{axis}_up")];
@@ -80,6 +80,7 @@ fn said_to_be_up(report: &ImportReport) -> Option<usize> {
         (true, false) => Some(1),
         (false, true) => Some(2),
         (true, true) => None,
+        (false, false) if mesh.triangles.len() < TRIANGLES_MIN => None,
         (false, false) => {
             let is_known =
                 |(start, formats): &&(&str, &[Format])| comment.starts_with(start) && formats.contains(&report.format);
@@ -188,7 +189,7 @@ mod tests {
             ("units mm, Z-up", 1, true),
             ("up axis: z", 1, true),
             ("Y-up", 2, false),
-            ("y up or z up", 2, false),
+            ("y up or z up", 2, true),
             ("fuzzy upper lazy-upright", 1, false),
             ("OpenSCAD obj exporter", 1, true),
         ];
@@ -198,7 +199,9 @@ mod tests {
         let metadata = FileMetadata::by(Some("Created by Blender 4.2".into()));
         for (format, is_up) in [(Format::Ply, Some(2)), (Format::Obj, None)] {
             let report = ImportReport { format, metadata: metadata.clone(), ..ImportReport::default() };
-            assert_eq!(said_to_be_up(&report), is_up, "{format}");
+            let mesh = |count| Mesh { triangles: vec![[0, 1, 2]; count], ..Mesh::default() };
+            assert_eq!(said_to_be_up(&mesh(TRIANGLES_MIN), &report), is_up, "{format}");
+            assert_eq!(said_to_be_up(&mesh(12), &report), None, "{format}");
         }
     }
 }

@@ -121,7 +121,7 @@ pub fn set_format(spec: &mut Spec, format: ImageFormat) {
 /// The keys whose values are words, and those words.
 pub fn vocabulary() -> BTreeMap<&'static str, Vec<&'static str>> {
     let of_field = |field: &'static table::field::Field| match &field.kind {
-        Kind::Words(words) => Some((field.key, words.clone())),
+        Kind::Words(words) | Kind::WordList { words, .. } => Some((field.key, words.clone())),
         _ => None,
     };
     FIELDS.iter().filter_map(of_field).chain([("style", words_of::<Style>())]).collect()

@@ -7,7 +7,7 @@ use crate::image::ImageFormat;
 pub const SHEET_VIEWS_MAX: usize = 64;
 
 /// Fewest and most steps of a turntable.
-pub const TURNTABLE_STEPS: [u32; 2] = [2, 120];
+pub const TURNTABLE_STEPS: [u32; 2] = [2, 64];
 
 /// Least width and height of a cell, pixels.
 pub const CELL_PX_MIN: u32 = 8;
@@ -73,7 +73,7 @@ mod tests {
             (4, Some(2), [2, 2]),
             (5, Some(2), [2, 3]),
             (3, Some(8), [3, 1]),
-            (120, Some(1), [1, 120]),
+            (64, Some(1), [1, 64]),
         ];
         for (count, columns, expected) in cases {
             assert_eq!(grid(count, columns), expected, "{count} {columns:?}");

@@ -13,7 +13,7 @@ use crate::plan::context::CHECK_EVERY;
 use crate::spec::{DebugView, Layers, Shading};
 
 /// Strength of the cue.
-const STRENGTH: f64 = 0.8;
+const STRENGTH: f64 = 1.5;
 
 /// Largest slope that counts: a silhouette is not darker for being far in front of what it hides.
 const SLOPE_MAX: f64 = 4.0;
@@ -120,7 +120,7 @@ impl Grid {
 
     fn index(&self, [x, y]: [i64; 2]) -> Option<usize> {
         let is_inside = x >= 0 && y >= 0 && x < self.columns as i64 && y < self.rows as i64;
-        is_inside.then_some(y as usize * self.columns + x as usize)
+        is_inside.then(|| y as usize * self.columns + x as usize)
     }
 }
 
@@ -147,7 +147,7 @@ mod tests {
             let shades = shades(&plane(slope));
             let inner: Vec<f32> = (0..10_000).filter(|i| i % 100 > 4 && i % 100 < 95).map(|i| shades[i]).collect();
             let mean = inner.iter().sum::<f32>() / inner.len() as f32;
-            assert!(inner.iter().all(|shade| (shade - mean).abs() < 0.12 * mean), "{slope} is even");
+            assert!(inner.iter().all(|shade| (shade - mean).abs() < 0.3 * mean), "{slope} is even");
             mean
         };
         let [flat, some, steep] = [0.0, 0.7, 2.5].map(inner);

@@ -102,10 +102,14 @@ fn flat_mesh(mesh: &Mesh, deadline: &Deadline) -> Result<(Mesh, Vec<Corners>), P
         [u, 1.0 - v]
     };
     let is_used = |attributes: &[u32; 3]| !mesh.uvs.is_empty() && twice_area(attributes.map(uv)) != 0.0;
-    let (mut low, mut high) = ([0.0_f64; 2], [1.0_f64; 2]);
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for at in mesh.attribute_triangles.iter().filter(|face| is_used(face)).flatten().map(|&v| uv(v)) {
         low = [low[0].min(at[0]), low[1].min(at[1])];
         high = [high[0].max(at[0]), high[1].max(at[1])];
+    }
+    let frame = [frame_start(low[0], high[0]), frame_start(low[1], high[1])];
+    for k in 0..2 {
+        (low[k], high[k]) = (low[k].min(frame[k]), high[k].max(frame[k] + 1.0));
     }
     let side = (high[0] - low[0]).max(high[1] - low[1]);
     let to_box =
@@ -133,11 +137,21 @@ fn flat_mesh(mesh: &Mesh, deadline: &Deadline) -> Result<(Mesh, Vec<Corners>), P
     flat.face_normals = vec![[0.0, 0.0, 1.0]; corners.len()];
     flat.triangle_materials = vec![0; corners.len()];
     number_corners(&mut flat, keys);
-    add_frame(&mut flat, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(to_box));
+    add_frame(
+        &mut flat,
+        [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[u, v]| to_box([u + frame[0], v + frame[1]])),
+    );
     flat.colors = COLORS.iter().map(|color| Rgba::from_srgb8(*color).0).collect();
     let half: [f32; 2] = std::array::from_fn(|k| ((high[k] - low[k]) * 0.5 / side) as f32);
     flat.bounds = [[-half[0], -half[1], 0.0], [half[0], half[1], 0.0]];
     Ok((flat, corners))
+}
+
+/// Where the texture's frame begins: a repetition of the texture that has all faces, or the texture itself.
+fn frame_start(low: f64, high: f64) -> f64 {
+    const SLACK: f64 = 1e-3;
+    let start = libm::floor(low + SLACK);
+    if start.is_finite() && high <= start + 1.0 + SLACK { start } else { 0.0 }
 }
 
 /// Gives equal corners one position.

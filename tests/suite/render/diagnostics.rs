@@ -172,7 +172,7 @@ fn a_layout_shows_faces_in_the_texture_and_marks_faults() {
     };
     obj += &square(0.3, 0.6, -0.2);
     obj += &(square(0.6, 0.6, 0.2) + &square(0.7, 0.7, 0.2));
-    let server = Server::start(&["--backend", "cpu"]);
+    let server = Server::start(&[]);
     let answer = server.post("/v1/render?surface.debug=uv-layout&size=200&view=top&sheet=null", obj.as_bytes());
     let picture = answer.picture(200, 200);
     let at = |u: f64, v: f64| {
@@ -190,7 +190,8 @@ fn a_layout_shows_faces_in_the_texture_and_marks_faults() {
     for ([u, v], expected) in cases {
         assert_eq!(at(u, v)[..3], expected, "{u} {v}");
     }
-    assert_ne!(at(1.0, 0.5)[..3], [255; 3], "the frame of the texture");
+    let right = (184..200).map(|x| picture.get_pixel(x, 100).0);
+    assert!(right.clone().any(|pixel| pixel[0] < 160), "the frame of the texture: {:?}", right.collect::<Vec<_>>());
     for debug in ["uv-layout", "uv-stretch"] {
         let answer = server.post(&format!("/v1/render?surface.debug={debug}&size=64"), shapes::torus(8).as_bytes());
         assert_eq!((answer.status, answer.header("x-warnings")), (200, Some("uvs_missing")), "{debug}");

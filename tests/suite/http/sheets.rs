@@ -34,7 +34,7 @@ fn frames(answer: &Answer) -> Vec<(RgbaImage, u32)> {
 
 #[test]
 fn each_cell_is_the_picture_of_its_view() {
-    let server = Server::start(&["--backend", "cpu"]);
+    let server = Server::start(&[]);
     let mesh = shapes::gear(9).into_bytes();
     let mut cells = 0;
     for (style, background) in [("wire", "transparent"), ("outline", "%23234"), ("technical", "%23fff")] {
@@ -60,7 +60,7 @@ fn each_cell_is_the_picture_of_its_view() {
 
 #[test]
 fn a_turntable_is_an_animation_or_a_grid_of_the_same_pictures() {
-    let server = Server::start(&["--backend", "cpu"]);
+    let server = Server::start(&[]);
     let mesh = shapes::gear(7).into_bytes();
     let mut compared = 0;
     for background in ["%23fff", "transparent"] {
@@ -89,7 +89,7 @@ fn a_turntable_is_an_animation_or_a_grid_of_the_same_pictures() {
 
 #[test]
 fn a_turntable_keeps_the_size_of_its_mesh_and_cuts_nothing() {
-    let server = Server::start(&["--backend", "cpu"]);
+    let server = Server::start(&[]);
     // A long box beside the origin, and a ring that looks the same from all around.
     let end = |z: f64| format!("v 5 0 {z}\nv 5.4 0 {z}\nv 5 0.6 {z}\nv 5 0 {}\nf -4 -3 -2\nf -4 -2 -1\n", z + 0.5);
     let long = end(0.0) + &end(9.0);
@@ -118,7 +118,7 @@ fn a_turntable_keeps_the_size_of_its_mesh_and_cuts_nothing() {
 
 #[test]
 fn labels_are_written_into_their_corners() {
-    let server = Server::start(&["--backend", "cpu"]);
+    let server = Server::start(&[]);
     let sheet = |labels: &str| {
         let keys = "size=240x120&sheet.views=front,bottom&sheet.columns=2";
         server.post(&format!("/v1/render?{keys}&sheet.labels={labels}"), CUBE_OBJ).picture(240, 120)
@@ -143,10 +143,10 @@ fn bad_sheets_are_refused_by_their_keys() {
         ("sheet.views=front,behind", "out_of_range", "sheet.views"),
         ("sheet.views=", "out_of_range", "sheet.views"),
         (&too_many, "out_of_range", "1 to 64"),
-        ("sheet.turntable=1", "out_of_range", "from 2 to 120"),
-        ("sheet.turntable=121", "out_of_range", "from 2 to 120"),
+        ("sheet.turntable=1", "out_of_range", "from 2 to 64"),
+        ("sheet.turntable=65", "out_of_range", "from 2 to 64"),
         ("sheet.turntable=2.5", "out_of_range", "whole number"),
-        ("sheet.turntable=1e99", "out_of_range", "from 2 to 120"),
+        ("sheet.turntable=1e99", "out_of_range", "from 2 to 64"),
         ("sheet.turntable=x", "wrong_type", "whole number"),
         ("sheet.columns=0", "out_of_range", "from 1 to 64"),
         ("sheet.columns=65", "out_of_range", "from 1 to 64"),
@@ -155,7 +155,7 @@ fn bad_sheets_are_refused_by_their_keys() {
         ("sheet.views=front&camera.azimuth_deg=3", "conflicting_keys", "camera.azimuth_deg"),
         ("sheet.turntable=4&camera.eye=1,2,3&camera.target=0,0,0", "conflicting_keys", "camera.eye"),
         ("sheet={}&camera.from_file=true", "conflicting_keys", "camera.from_file"),
-        ("sheet.turntable=120&size=1000", "out_of_range", "120 frames"),
+        ("sheet.turntable=64&size=513", "out_of_range", "64 frames"),
         ("sheet.turntable=64&sheet.columns=64&size=500", "out_of_range", "64 x 1 cells"),
         ("sheet=front", "wrong_type", "object"),
         ("sheet.pages=2", "unknown_key", "sheet"),
@@ -167,14 +167,14 @@ fn bad_sheets_are_refused_by_their_keys() {
     }
     assert_eq!(cases.len(), 20);
     // A format that is chosen later may leave a grid whose cells have no pixel.
-    let tiny = server.request("POST", "/v1/render?sheet.turntable=120&size=8", &["Accept: image/jpeg"], CUBE_OBJ);
+    let tiny = server.request("POST", "/v1/render?sheet.turntable=64&size=5", &["Accept: image/jpeg"], CUBE_OBJ);
     assert_eq!(tiny.status, 200);
     server.post("/v1/render?sheet=null&size=32", CUBE_OBJ).picture(32, 32);
 }
 
 #[test]
 fn sheets_of_stored_meshes_are_kept_and_jobs_draw_them() {
-    let server = Server::start(&["--backend", "cpu"]);
+    let server = Server::start(&[]);
     let mesh = shapes::torus(20).into_bytes();
     server.post("/v1/meshes", &mesh);
     let path = |rest: &str| format!("{}/render.{rest}", url(&mesh));
