@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
+use super::estimates::Estimates;
 use super::registry::Next;
 use super::*;
 use crate::backend::{BackendKind, DrawTimes};
@@ -14,7 +15,8 @@ use crate::limits::{Deadline, Stopped};
 use crate::pipeline::{Output, RenderError, Stage};
 use crate::spec::color::Rgba;
 use crate::spec::{
-    BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind, Spec,
+    BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind, Sheet,
+    SheetViews, Spec,
 };
 
 const SOON: Duration = Duration::from_secs(10);
@@ -401,4 +403,20 @@ fn many_threads_lose_no_job() {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
     runtime.block_on(async { tokio::time::timeout(SOON, fixture.jobs.idle()).await.expect("idle") });
     assert_eq!((fixture.budget.used_bytes(), fixture.jobs.load().queued, fixture.jobs.load().running), (0, 0, 0));
+}
+
+#[test]
+fn the_views_of_a_sheet_are_estimated() {
+    let (estimates, budget) = (Estimates::new(), UploadBudget::new(1 << 20));
+    let estimate = |turntable: Option<u32>, columns: Option<u32>| {
+        let mut work = work(&budget, b"v 0 0 0\n");
+        let Task::Draw(spec) = &mut work.task else { panic!("it draws") };
+        (spec.image.width_px, spec.image.height_px) = (512, 512);
+        spec.sheet = turntable.map(|steps| Sheet { views: SheetViews::Turntable(steps), columns, labels: false });
+        estimates.estimate(estimates.size(&work)).as_secs_f64()
+    };
+    let one = estimate(None, None);
+    let (animation, grid) = (estimate(Some(24), None), estimate(Some(24), Some(6)));
+    assert!((animation / one - 24.0).abs() < 0.01, "{animation} {one}");
+    assert!(grid > 1.5 * one && grid < animation, "{grid} {one}");
 }
