@@ -16,7 +16,7 @@ pub fn shape_quality([a, b, c]: [Point; 3]) -> f64 {
     let squares = [sub(b, a), sub(c, b), sub(a, c)].map(|side| dot(side, side));
     let sum = (squares[0] + squares[1]) + squares[2];
     // 4 sqrt(3) times the area, which is half of the cross product's length.
-    let quality = 3.464_101_615_137_754_6 * length(cross(sub(b, a), sub(c, a))) / sum;
+    let quality = 3.464_101_615_137_754_4 * length(cross(sub(b, a), sub(c, a))) / sum;
     if sum > 0.0 { quality.clamp(0.0, 1.0) } else { 0.0 }
 }
 

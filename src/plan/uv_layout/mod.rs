@@ -108,9 +108,8 @@ fn flat_mesh(mesh: &Mesh, deadline: &Deadline) -> Result<(Mesh, Vec<Corners>), P
         high = [high[0].max(at[0]), high[1].max(at[1])];
     }
     let frame = [frame_start(low[0], high[0]), frame_start(low[1], high[1])];
-    for k in 0..2 {
-        (low[k], high[k]) = (low[k].min(frame[k]), high[k].max(frame[k] + 1.0));
-    }
+    let (low, high): ([f64; 2], [f64; 2]) =
+        (std::array::from_fn(|k| low[k].min(frame[k])), std::array::from_fn(|k| high[k].max(frame[k] + 1.0)));
     let side = (high[0] - low[0]).max(high[1] - low[1]);
     let to_box =
         |at: [f64; 2]| -> [f64; 2] { std::array::from_fn(|k| (at[k] - (low[k] + (high[k] - low[k]) * 0.5)) / side) };

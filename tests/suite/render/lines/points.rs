@@ -90,9 +90,7 @@ fn normals_of_points_are_used_for_light() {
         ["flat", "smooth"].map(|style| middle(&draw(&mesh, &[("size", "160"), ("style", style)])))
     };
     let (facing, aside) = (with([0.0, 0.0, 1.0]), with([0.8, -0.6, 0.05]));
-    for style in 0..2 {
-        assert!(facing[style] > aside[style] + 30.0, "{facing:?} {aside:?}");
-    }
+    assert!(facing.iter().zip(&aside).all(|(facing, aside)| *facing > aside + 30.0), "{facing:?} {aside:?}");
 }
 
 #[test]
