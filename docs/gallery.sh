@@ -19,7 +19,8 @@ looks=(
   topology outline-hull outline contour
   materials debug-barycentric debug-min-barycentric debug-edge-distance
   debug-normal debug-uv debug-face-orientation debug-vertex-color
-  max-error
+  debug-aspect debug-edge-length debug-curvature debug-uv-stretch
+  debug-uv-layout sheet turntable max-error
 )
 for request in api/examples/*.json; do
   name=$(basename "$request" .json)

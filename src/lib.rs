@@ -77,6 +77,7 @@ pub mod scene;
 #[cfg(feature = "service")]
 #[doc(hidden)]
 pub mod service;
+mod sheet;
 #[doc(hidden)]
 pub mod spec;
 #[doc(hidden)]

@@ -14,10 +14,11 @@ use crate::image::{Image, ImageFormat};
 use crate::import::{self, Bundle, Format, Imported, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
-use crate::plan::{self, Prepared, Skip};
+use crate::plan::{self, Prepared, Skip, UvLayout};
 pub use crate::plan::{PlanError, QualitySelection};
 use crate::report::Report;
 use crate::scene::{Scene, SceneError};
+use crate::sheet::{self, Canvas, Layout};
 use crate::spec::Spec;
 use crate::warning::Warning;
 
@@ -51,19 +52,27 @@ pub fn render_model(
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Output, RenderError> {
     // Mesh -> Scene -> DrawPlan -> Image
-    let drawn = draw(model, spec, backends, budget, deadline, ended)?;
+    let format = spec.image.format.unwrap_or(ImageFormat::Png);
+    let animated = spec.sheet.as_ref().filter(|sheet| sheet.is_animated(format));
+    let drawn = draw_as(model, spec, animated.is_some(), backends, budget, deadline, ended)?;
 
     // Image -> bytes
-    let format = spec.image.format.unwrap_or(ImageFormat::Png);
-    let bytes = encode::encode(&drawn.image, format, spec.image.effort, deadline)?;
+    let effort = spec.image.effort;
+    let bytes = match animated {
+        Some(sheet) => encode::encode_animation(&drawn.image, sheet.count(), format, effort, deadline)?,
+        None => encode::encode(&drawn.image, format, effort, deadline)?,
+    };
     ended(Stage::Encode);
 
-    let warnings = [model.warnings.clone(), drawn.warnings].concat();
+    let mut warnings = [model.warnings.clone(), drawn.warnings].concat();
+    if spec.camera.has_own_up() {
+        warnings.retain(|warning| warning.code != import::up_axis::CODE);
+    }
     let Drawn { backend, is_substitute, draw_times, skips, short_chains, selection, .. } = drawn;
     Ok(Output { bytes, format, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
 }
 
-/// Draws a mesh that is in memory already, as often as wanted.
+/// Draws a mesh that is in memory already, as often as wanted. A turntable becomes a grid of its views.
 pub fn draw(
     model: &Model,
     spec: &Spec,
@@ -72,8 +81,64 @@ pub fn draw(
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Drawn, RenderError> {
+    draw_as(model, spec, false, backends, budget, deadline, ended)
+}
+
+/// Draws one view, or all views of a sheet: into a grid, or else as the frames of an animation, from top to
+/// bottom.
+fn draw_as(
+    model: &Model,
+    spec: &Spec,
+    is_animated: bool,
+    backends: &mut Backends,
+    budget: &mut Budget,
+    deadline: &Deadline,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Drawn, RenderError> {
+    let Some(sheet) = &spec.sheet else { return draw_view(model, spec, backends, budget, deadline, ended) };
+    let layout = Layout::new(sheet, &spec.image, is_animated);
+    let mut canvas = Canvas::new(layout, budget).map_err(PlanError::Limit)?;
+    let mut all: Option<Drawn> = None;
+    for cell in layout.cells().filter(|cell| !cell.size_px.contains(&0)) {
+        deadline.check()?;
+        // What a view takes is free again before the next.
+        let mut of_cell = budget.clone();
+        let of_view = sheet::cell_spec(spec, sheet, &cell);
+        let drawn = draw_view(model, &of_view, backends, &mut of_cell, deadline, ended)?;
+        canvas.paste(&cell, &drawn.image);
+        let Some(view) = cell.view else { continue };
+        if sheet.labels {
+            canvas.write(&cell, &sheet::label(sheet, view));
+        }
+        match &mut all {
+            Some(all) => all.add(drawn),
+            None => all = Some(drawn),
+        }
+    }
+    let mut all = match all {
+        Some(all) => all,
+        None => draw_view(model, &Spec { sheet: None, ..spec.clone() }, backends, budget, deadline, ended)?,
+    };
+    all.image = canvas.finish();
+    Ok(all)
+}
+
+/// Draws one view.
+fn draw_view(
+    model: &Model,
+    spec: &Spec,
+    backends: &mut Backends,
+    budget: &mut Budget,
+    deadline: &Deadline,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Drawn, RenderError> {
     // Mesh -> Scene -> DrawPlan
-    let Model { mesh, prepared, .. } = model;
+    let layout = UvLayout::of(&model.mesh, spec, budget, deadline)?;
+    let of_layout = Prepared::default();
+    let (mesh, spec, prepared) = match &layout {
+        Some(layout) => (&layout.mesh, &layout.spec, &of_layout),
+        None => (&model.mesh, spec, &model.prepared),
+    };
     let selected = plan::select_quality(spec, mesh.triangles.len(), backends.has_gpu());
     let spec = selected.as_ref().map_or(spec, |selected| &selected.spec);
     let scene = Scene::new(mesh, spec, budget)?;
@@ -90,7 +155,7 @@ pub fn draw(
     warnings.extend(selected.iter().flat_map(|selected| selected.warnings.iter().cloned()));
     warnings.extend(plan::undrawn_primitives(&scene));
     warnings.extend(plan::out_of_view(&plan));
-    warnings.extend(plan.warnings.iter().cloned());
+    warnings.extend(plan.warnings.iter().chain(layout.iter().flat_map(|layout| &layout.warnings)).cloned());
     let selection = selected.as_ref().map(|selected| selected.selection.clone());
     let (skips, short_chains) = (plan.skips, plan.short_chains);
     let Chosen { image, backend, draw_times, is_substitute } = drawn;
@@ -220,7 +285,24 @@ pub struct Drawn {
     pub selection: Option<QualitySelection>,
 }
 
-/// The stages whose durations a response reports. Each is announced when it ends.
+impl Drawn {
+    /// Adds what there is to say about another view of the same mesh.
+    fn add(&mut self, other: Self) {
+        if other.backend == BackendKind::Cpu {
+            self.backend = BackendKind::Cpu;
+        }
+        self.is_substitute |= other.is_substitute;
+        self.short_chains += other.short_chains;
+        other.draw_times.parts().for_each(|(stage, took)| self.draw_times.add(stage, took));
+        // Left out is what no view needed.
+        self.skips.retain(|skip| other.skips.iter().any(|other| other.kind == skip.kind));
+        let new = other.warnings.into_iter().filter(|warning| !self.warnings.contains(warning)).collect::<Vec<_>>();
+        self.warnings.extend(new);
+    }
+}
+
+/// The stages whose durations a response reports. Each is announced when it ends; of a sheet, once for each
+/// view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Bytes to mesh.

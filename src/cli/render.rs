@@ -52,6 +52,11 @@ pub struct RenderArgs {
     size: Option<String>,
     #[arg(long, help = format!("Named direction: {}", one_of::<NamedView>()))]
     view: Option<String>,
+    #[arg(long, value_name = "V,V,...", help = format!("Several views in one picture: {}", one_of::<NamedView>()))]
+    sheet: Option<String>,
+    /// N views from all around: an animated PNG or WebP, or with --set sheet.columns=C a grid
+    #[arg(long, value_name = "N")]
+    turntable: Option<String>,
     #[arg(long, allow_hyphen_values = true, help = format!("Axis that points up: {}", one_of::<UpAxis>()))]
     up: Option<String>,
     #[arg(long, help = format!("Image format: {}", one_of::<ImageFormat>()))]
@@ -106,10 +111,15 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
     let bundle = bundle::read(&arguments.meshes, arguments.entry.clone(), &limits)?;
     progress.next("parsing");
     let read = began.elapsed();
-    let (mut times, mut stage_began) = (Vec::new(), Instant::now());
+    let (mut times, mut stage_began): (Vec<(Stage, Duration)>, _) = (Vec::new(), Instant::now());
     let mut ended = |stage| {
         progress.next(after(stage));
-        times.push((stage, stage_began.elapsed()));
+        let took = stage_began.elapsed();
+        // A sheet has some stages once for each view.
+        match times.iter_mut().find(|(known, _)| *known == stage) {
+            Some((_, all)) => *all += took,
+            None => times.push((stage, took)),
+        }
         stage_began = Instant::now();
     };
     let threads = arguments.threads.map_or(cores() as usize, usize::from);
@@ -145,6 +155,8 @@ fn read_spec(arguments: &RenderArgs, limits: &Limits) -> Result<Spec, CliError> 
         ("style", &arguments.style),
         ("size", &arguments.size),
         ("view", &arguments.view),
+        ("sheet.views", &arguments.sheet),
+        ("sheet.turntable", &arguments.turntable),
         ("up", &arguments.up),
         ("format", &arguments.format),
         ("backend", &arguments.backend),

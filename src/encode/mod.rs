@@ -2,6 +2,7 @@
 //! bytes.
 
 mod png;
+mod webp;
 
 use image::ImageEncoder as _;
 use image::codecs::jpeg::JpegEncoder;
@@ -14,6 +15,12 @@ use crate::limits::{Deadline, Stopped};
 /// The lowest quality at which artefacts around thin dark lines are invisible at normal viewing
 /// distance.
 const JPEG_QUALITY: u8 = 85;
+
+/// The time of a whole animation, milliseconds: one turn is slow enough to look at.
+const ROUND_MS: u32 = 3000;
+
+/// The shortest time that players show a frame for without slowing down, milliseconds.
+const DELAY_MS_MIN: u32 = 20;
 
 /// Encoding failed, which is never the client's fault, or was stopped.
 #[derive(Debug, thiserror::Error)]
@@ -50,6 +57,30 @@ pub fn encode(image: &Image, format: ImageFormat, effort: u32, deadline: &Deadli
         }
     }
     Ok(bytes)
+}
+
+/// Encodes an animation that begins again for ever. Its frames are the picture's parts from the top to the
+/// bottom, all of one height. Only PNG and WebP have animations.
+pub fn encode_animation(
+    frames: &Image,
+    count: u32,
+    format: ImageFormat,
+    effort: u32,
+    deadline: &Deadline,
+) -> Result<Vec<u8>, EncodeError> {
+    let delay_ms = (ROUND_MS / count.max(1)).max(DELAY_MS_MIN);
+    match format {
+        ImageFormat::Png => png::encode_animation(frames, count, delay_ms, effort, deadline),
+        ImageFormat::Webp => webp::encode_animation(frames, count, delay_ms, deadline),
+        ImageFormat::Jpeg => Err(EncodeError::Failed("JPEG has no animations".to_owned())),
+    }
+}
+
+/// The pixels of frame `index` of `count`, and how many rows it has.
+fn frame(frames: &Image, index: u32, count: u32) -> (&[u8], u32) {
+    let height_px = frames.height_px / count.max(1);
+    let bytes = frames.width_px as usize * height_px as usize * 4;
+    (&frames.rgba[index as usize * bytes..][..bytes], height_px)
 }
 
 /// RGB of RGBA.

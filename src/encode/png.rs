@@ -7,7 +7,7 @@
 //! computing anything.
 
 use fdeflate::Compressor;
-use png::{BitDepth, ColorType, DeflateCompression, Encoder, Filter, chunk};
+use png::{BitDepth, BlendOp, ColorType, DeflateCompression, Encoder, Filter, chunk};
 
 use super::{EncodeError, drop_alpha};
 use crate::image::Image;
@@ -74,6 +74,44 @@ fn filtered_by(
         std::io::Write::write_all(&mut stream, rows)?;
     }
     stream.finish()?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// Encodes the frames of an animation (APNG), as [`super::encode_animation`] has them.
+pub fn encode_animation(
+    frames: &Image,
+    count: u32,
+    delay_ms: u32,
+    effort: u32,
+    deadline: &Deadline,
+) -> Result<Vec<u8>, EncodeError> {
+    let (_, height_px) = super::frame(frames, 0, count);
+    let color = if frames.is_opaque() { ColorType::Rgb } else { ColorType::Rgba };
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, frames.width_px, height_px);
+    encoder.set_color(color);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_animated(count, 0)?;
+    encoder.set_frame_delay(delay_ms.min(60_000) as u16, 1000)?;
+    // Each frame replaces the one before, also where it is transparent.
+    encoder.set_blend_op(BlendOp::Source)?;
+    if effort < SMALL_EFFORT_MIN {
+        encoder.set_filter(Filter::Paeth);
+        encoder.set_deflate_compression(DeflateCompression::FdeflateUltraFast);
+    } else {
+        encoder.set_filter(Filter::Adaptive);
+        encoder.set_deflate_compression(DeflateCompression::Level(effort.min(9) as u8));
+    }
+    let mut writer = encoder.write_header()?;
+    for index in 0..count {
+        deadline.check()?;
+        let (rgba, _) = super::frame(frames, index, count);
+        match color {
+            ColorType::Rgb => writer.write_image_data(&drop_alpha(rgba))?,
+            _ => writer.write_image_data(rgba)?,
+        }
+    }
     writer.finish()?;
     Ok(bytes)
 }

@@ -26,6 +26,7 @@ mod stl;
 mod test_random;
 mod text;
 mod three_mf;
+pub mod up_axis;
 
 pub use bundle::{BadPath, Bundle, BundleFile, Folder};
 pub use error::{MeshError, MeshFault};
@@ -97,7 +98,11 @@ pub fn import(
     budget: &mut Budget,
     deadline: &Deadline,
 ) -> Result<Imported, MeshError> {
-    open(bundle, options.into(), limits, budget, deadline, normalise)
+    open(bundle, options.into(), limits, budget, deadline, |raw, cx| {
+        let mut imported = normalise(raw, cx)?;
+        imported.report.warnings.extend(up_axis::warning(&imported.mesh, &imported.report));
+        Ok(imported)
+    })
 }
 
 /// Reads everything that [`import`] reads, and returns its report even if there is nothing to draw.

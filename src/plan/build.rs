@@ -6,7 +6,7 @@ use super::prepared::Prepared;
 use super::projection::Projection;
 use super::skips::SkipKind;
 use super::{DrawPlan, HullPass, PlanError, pass_mask};
-use super::{costs, lines, margin, outline, primitives, surface};
+use super::{costs, heat, lines, margin, outline, primitives, surface};
 use crate::limits::{Budget, Deadline};
 use crate::scene::Scene;
 
@@ -37,7 +37,8 @@ pub fn build_keeping<'m>(
 
 fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPlan<'m>, PlanError> {
     let Scene { spec, groups, camera, .. } = scene;
-    let geometry = primitives::geometry(scene, &mut cx)?;
+    let mut geometry = primitives::geometry(scene, &mut cx)?;
+    heat::paint(scene, &mut geometry, &mut cx)?;
     costs::spend_plan(scene, &geometry, cx.budget)?;
 
     let primitive_lines = primitives::line_passes(scene, &mut cx)?;

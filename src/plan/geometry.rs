@@ -1,6 +1,7 @@
 //! The positions and triangles of a plan: those of the mesh, followed by those that stand for lines
 //! and points.
 
+use super::CornerValues;
 use super::shared_slice::SharedSlice;
 use crate::mesh::Mesh;
 
@@ -22,6 +23,8 @@ pub struct Geometry<'m> {
     pub attribute_triangles: SharedSlice<'m, [u32; 3]>,
     /// Vertex normals of the file, among the attributes; empty where it has none.
     pub normals: SharedSlice<'m, [f32; 3]>,
+    /// Colours in place of the mesh's own, where points have a depth cue.
+    pub colors: Option<CornerValues<'m, [f32; 4]>>,
     /// Number of triangles that are the mesh's own. Only these have edges.
     pub mesh_triangle_count: usize,
 }
@@ -36,6 +39,7 @@ impl<'m> Geometry<'m> {
             triangle_materials: (&mesh.triangle_materials).into(),
             attribute_triangles: (&mesh.attribute_triangles).into(),
             normals: (&mesh.normals).into(),
+            colors: None,
             mesh_triangle_count: mesh.triangles.len(),
         }
     }

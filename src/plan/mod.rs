@@ -14,6 +14,7 @@ mod costs;
 mod edges;
 mod error;
 mod geometry;
+pub(crate) mod heat;
 mod lines;
 mod margin;
 mod outline;
@@ -25,6 +26,7 @@ mod quality;
 mod shared_slice;
 mod skips;
 mod surface;
+mod uv_layout;
 mod warnings;
 
 pub use crate::texture::{Texture, TextureError, Textures};
@@ -42,6 +44,7 @@ pub use surface::{
     CornerValues, Lamp, Lights, ShadedMaterial, SurfacePass, TEXTURE_NONE, TextureUse, debug_views, flags, samplers,
     slots,
 };
+pub use uv_layout::UvLayout;
 pub use warnings::{is_out_of_view, out_of_view, undrawn_primitives, unknown_materials};
 
 use crate::warning::Warning;

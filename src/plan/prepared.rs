@@ -9,6 +9,7 @@ use crate::limits::{Budget, LimitExceeded, Spent};
 use crate::mesh::creases::CreasedNormals;
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Orientation;
+use crate::texture::mips::Reading;
 use crate::texture::{TextureError, Textures};
 
 /// Facts about one mesh, which must not change. Each is found when a plan first needs it. Plans that
@@ -44,8 +45,8 @@ pub struct MeshToken;
 /// Textures of a mesh, decoded.
 #[derive(Clone, Debug)]
 pub struct PreparedTextures {
-    /// The images, by index, and whether each was read as colours.
-    pub images: Vec<(u32, bool)>,
+    /// The images, by index, and how each was read.
+    pub images: Vec<(u32, Reading)>,
     /// The textures.
     pub textures: Arc<Textures>,
     /// Indices of those without pixels, because their images are broken, with the faults.
@@ -150,7 +151,7 @@ impl PreparedTextures {
     /// True if these are the wanted images and show the same as textures that begin with `first_levels`,
     /// given the finest levels that pixels ask for. Levels finer than those change nothing. But of an image
     /// that begins with a coarser one, for lack of room, pixels show the first that there is.
-    pub fn have(&self, images: &[(u32, bool)], first_levels: &[u32], finest: &[u32]) -> bool {
+    pub fn have(&self, images: &[(u32, Reading)], first_levels: &[u32], finest: &[u32]) -> bool {
         let kept = self.textures.images.iter().map(|texture| texture.first_level);
         let is_same = |((kept, &first), &finest): ((u32, &u32), &u32)| kept == first || kept < first && first <= finest;
         self.images == images && kept.zip(first_levels).zip(finest).all(is_same)

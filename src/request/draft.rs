@@ -1,13 +1,15 @@
 //! A [`Spec`] in the making: its defaults, and what can only be settled when every key is known.
 
 use super::error::{RequestError, RequestFault};
+use crate::request::Rules;
 use crate::request::layers_draft::{LayersDraft, WireDraft};
+use crate::request::sheet_draft::SheetDraft;
 use crate::request::style::Style;
 use crate::request::table::dependent::Dependent;
 use crate::spec::words::{Words, word_for};
 use crate::spec::{
-    BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, Open, Outline, OutlineMethod, QualityTarget,
-    Spec, Surface, Topology, Wire, WireMethod,
+    BackendChoice, CameraSpec, DebugView, ImageSpec, Layers, Light, LightPreset, Open, Outline, OutlineMethod, Points,
+    QualityTarget, Spec, Surface, Topology, Wire, WireMethod,
 };
 
 /// Most different styles of exact wires and contours in one picture.
@@ -21,10 +23,14 @@ pub struct Draft {
     pub layers: LayersDraft,
     /// The topology layer, if it is on.
     pub topology: Option<Topology>,
+    /// See [`Spec::points`].
+    pub points: Points,
     /// See [`Spec::time_s`].
     pub time_s: Option<f64>,
     /// See [`Spec::camera`].
     pub camera: CameraSpec,
+    /// The sheet, if it is on.
+    pub sheet: Option<SheetDraft>,
     /// See [`Spec::light`].
     pub light: Light,
     /// By default 0.3 where there are lamps, 1 where there are none.
@@ -51,8 +57,10 @@ impl Draft {
         Self {
             layers: LayersDraft::new(style),
             topology: (style == Style::Topology).then(Topology::default),
+            points: Points::default(),
             time_s: None,
             camera: CameraSpec::default(),
+            sheet: None,
             light: Light::default(),
             ambient: Dependent::default(),
             image,
@@ -90,9 +98,15 @@ impl Draft {
         self.topology.get_or_insert_default()
     }
 
-    /// Settles what depends on several keys. Each material has a name. `backend` is the server's
-    /// default.
-    pub fn finish(self, materials: Vec<(String, LayersDraft)>, backend: BackendChoice) -> Result<Spec, RequestError> {
+    /// The sheet, which any of its keys turns on.
+    pub fn sheet(&mut self) -> &mut SheetDraft {
+        self.sheet.get_or_insert_default()
+    }
+
+    /// Settles what depends on several keys. Each material has a name. The rules have the server's
+    /// default back-end, and the largest picture.
+    pub fn finish(self, materials: Vec<(String, LayersDraft)>, rules: &Rules) -> Result<Spec, RequestError> {
+        let (backend, px_max) = (rules.backend, rules.limits.image_px);
         let quality_target = self.quality_target(&materials, backend);
         let layers = self.layers.finish("")?;
         let materials = materials.into_iter().map(|(name, layers)| {
@@ -101,14 +115,16 @@ impl Draft {
         });
         let materials = materials.collect::<Result<Vec<_>, _>>()?;
         check_layers(&layers, &materials)?;
+        check_uv_layout(&layers, &materials)?;
         check_camera(&self.camera)?;
         let has_lamps = self.light.preset != LightPreset::None;
         let light = Light { ambient: self.ambient.or(if has_lamps { 0.3 } else { 1.0 }), ..self.light };
         let ([width_px, height_px], samples) = (self.size_px, self.samples.or(self.image.samples));
         let image = ImageSpec { width_px, height_px, samples, ..self.image };
-        let Self { topology, time_s, camera, .. } = self;
+        let sheet = self.sheet.as_ref().map(|sheet| sheet.finish(&self.camera, &image, px_max)).transpose()?;
+        let Self { topology, points, time_s, camera, .. } = self;
         let backend = self.backend.or(backend);
-        Ok(Spec { layers, materials, topology, time_s, camera, light, image, backend, quality_target })
+        Ok(Spec { layers, materials, topology, points, time_s, camera, sheet, light, image, backend, quality_target })
     }
 
     fn quality_target(&self, materials: &[(String, LayersDraft)], backend: BackendChoice) -> Option<QualityTarget> {
@@ -145,6 +161,19 @@ fn check_layers(layers: &Layers, materials: &[(String, Layers)]) -> Result<(), R
         }
     }
     Ok(())
+}
+
+/// Fails if some materials show the layout of texture coordinates, and others lie in space.
+fn check_uv_layout(layers: &Layers, materials: &[(String, Layers)]) -> Result<(), RequestError> {
+    let is_flat = |layers: &Layers| layers.surface.is_some_and(|surface| surface.debug == DebugView::UvLayout);
+    match materials.iter().find(|(_, of_material)| is_flat(of_material) && !is_flat(layers)) {
+        Some((name, _)) => {
+            let why = "it shows the whole mesh: give it as `surface.debug`";
+            let key = format!("materials.{name}.surface.debug");
+            Err(RequestError::new(RequestFault::Conflict, &key, word_for(DebugView::UvLayout), why))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Fails if two materials have different values of this key.

@@ -11,6 +11,7 @@ mod draft;
 mod error;
 mod layers_draft;
 mod schema;
+mod sheet_draft;
 mod style;
 mod suggest;
 mod table;
@@ -120,7 +121,7 @@ pub fn set_format(spec: &mut Spec, format: ImageFormat) {
 /// The keys whose values are words, and those words.
 pub fn vocabulary() -> BTreeMap<&'static str, Vec<&'static str>> {
     let of_field = |field: &'static table::field::Field| match &field.kind {
-        Kind::Words(words) => Some((field.key, words.clone())),
+        Kind::Words(words) | Kind::WordList { words, .. } => Some((field.key, words.clone())),
         _ => None,
     };
     FIELDS.iter().filter_map(of_field).chain([("style", words_of::<Style>())]).collect()
@@ -140,7 +141,7 @@ fn read_items(items: Vec<Item>, overrides: &Overrides, rules: &Rules) -> Result<
     let mut draft = Draft::new(style, rules.limits.image_px);
     items.iter().try_for_each(|item| apply::apply(&mut draft, item, rules))?;
     let materials = read_materials(&draft, &of_materials, rules)?;
-    draft.finish(materials, rules.backend)
+    draft.finish(materials, rules)
 }
 
 /// The items of a document, then those of the dotted keys.

@@ -1,8 +1,8 @@
 //! The JSON Schema (draft 2020-12) of request documents, written from the table of keys.
 //!
 //! It states what the reader checks, except what a schema cannot express: `eye` and `target`
-//! differ; the hulls of several materials share a unit; limits of a material's key that depend on
-//! keys of the document; a short name and its key are not both given; the places where a document
+//! differ; what of a sheet goes with the camera and the size; `uv-layout` is not for materials alone; the
+//! hulls of several materials share a unit; limits of a material's key that depend on keys of the document; a short name and its key are not both given; the places where a document
 //! may name its mesh.
 
 use serde_json::{Map, Value as Json, json};
@@ -157,6 +157,10 @@ fn of_kind(kind: &Kind, image_px: u64) -> Json {
             json!({ "anyOf": [whole(), { "type": "string", "pattern": format!("^{side}([xX]{side})?$") }] })
         }
         Kind::Words(words) => json!({ "enum": words }),
+        Kind::WordList { words, count_max } => {
+            json!({ "type": "array", "items": { "enum": words }, "minItems": 1, "maxItems": count_max })
+        }
+        Kind::Count { min, max } => json!({ "type": "integer", "minimum": min, "maximum": max }),
         Kind::Color => {
             let hex = "[0-9a-fA-F]";
             let pattern = format!("^(transparent|#?({hex}{{3,4}}|{hex}{{6}}|{hex}{{8}}))$");

@@ -8,11 +8,10 @@ use crate::spec::{Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
 /// Width of a line primitive that is drawn with a surface, pixels.
 pub const LINE_PX: f64 = 1.5;
 
-/// Diameter of a point primitive that is drawn with a surface, pixels.
-pub const POINT_PX: f64 = 3.0;
-
-/// A point's diameter in multiples of a line's width.
-pub const POINT_WIDTH: f32 = (POINT_PX / LINE_PX) as f32;
+/// A point's diameter in multiples of a line's width, where both are drawn as lines.
+pub fn point_width(spec: &Spec) -> f32 {
+    spec.points.size_px / LINE_PX as f32
+}
 
 /// Default width of an outline in pixels.
 const OUTLINE_PX: f32 = 3.0;
@@ -36,13 +35,14 @@ pub enum Thickness {
 
 /// The room that the widest outline, the widest line and the points need.
 pub fn border(mesh: &Mesh, groups: &MaterialGroups<'_>, spec: &Spec) -> Border {
-    let mut border =
-        Border { px: if mesh.lines_and_points.is_empty() { 0.0 } else { 0.5 * POINT_PX }, ..Border::default() };
     let has_points = mesh.lines_and_points.iter().any(LineOrPoint::is_point);
+    let widest_px = if has_points { LINE_PX.max(f64::from(spec.points.size_px)) } else { 2.0 * LINE_PX };
+    let mut border =
+        Border { px: if mesh.lines_and_points.is_empty() { 0.0 } else { 0.5 * widest_px }, ..Border::default() };
     for style in &groups.styles {
         // Points without a fill are drawn as lines are, but wider.
         let has_dots = style.surface.is_none() && has_points;
-        let dots = if has_dots { POINT_WIDTH } else { 1.0 };
+        let dots = if has_dots { point_width(spec) } else { 1.0 };
         if let Some(outline) = &style.outline {
             // The inner half of a contour lies on the surface.
             let share = if outline.method == OutlineMethod::Contour { 0.5 * f64::from(dots) } else { 1.0 };

@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 
 use crate::mesh::material::{FileCamera, FileLens};
 use crate::mesh::{Mesh, UpAxis};
-use crate::spec::{CameraSpec, NamedView, ProjectionKind as Kind};
+use crate::spec::{CameraSpec, ProjectionKind as Kind};
 
 /// A placed camera. Lengths are in units of the mesh's box.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +63,11 @@ impl Camera {
             _ => (named_axes(spec, up), None),
         };
         let slopes = tangents * inner;
-        let extents = Extents::new(mesh, axes, slopes);
+        let extents = if spec.fits_turn {
+            turned_extents(mesh, (axes, frame(up)[1]), sin_cos_deg(spec.elevation_deg()), slopes)
+        } else {
+            Extents::new(mesh, axes, slopes)
+        };
         let mut camera = match (spec.projection, explicit) {
             (Kind::Perspective, Some((target, distance))) => {
                 let to = DVec2::new(axes[0].dot(target), axes[1].dot(target));
@@ -232,6 +236,45 @@ impl ExtentLanes {
     }
 }
 
+/// The bounds of a mesh that turns around the up axis through the middle of its box, in the axes of a
+/// camera above the horizon by the angle of this sine and cosine.
+///
+/// A point at distance r from the axis and height h is at `x = r sin a`, `y = h cos e - r cos a sin e` and
+/// `z = h sin e + r cos a cos e` for a turn by a; each bound is the largest over all a.
+fn turned_extents(mesh: &Mesh, (axes, up): ([DVec3; 3], DVec3), (sin_e, cos_e): (f64, f64), slopes: DVec2) -> Extents {
+    let nothing = DVec2::NEG_INFINITY;
+    let mut all = Extents { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, plus: nothing, minus: nothing };
+    if mesh.positions.is_empty() {
+        return Extents { low: DVec3::ZERO, high: DVec3::ZERO, ..all };
+    }
+    let lean_x = (1.0 + (slopes.x * cos_e) * (slopes.x * cos_e)).sqrt();
+    let [plus_y, minus_y] = [slopes.y * cos_e - sin_e, slopes.y * cos_e + sin_e].map(f64::abs);
+    let [low, high] = mesh.bounds.map(|corner| DVec3::from(corner.map(f64::from)));
+    let middle = (low + high) * 0.5;
+    let on_axis = middle - up * up.dot(middle);
+    for p in &mesh.positions {
+        let p = DVec3::from(p.map(f64::from)) - on_axis;
+        let h = up.dot(p);
+        let r = (p - up * h).length();
+        let reach = DVec3::new(r, r * sin_e.abs(), r * cos_e.abs());
+        let at = DVec3::new(0.0, h * cos_e, h * sin_e);
+        all.low = all.low.min(at - reach);
+        all.high = all.high.max(at + reach);
+        let lean = h * sin_e * slopes;
+        let across = DVec2::new(0.0, h * cos_e);
+        all.plus = all.plus.max(lean + across + DVec2::new(lean_x, plus_y) * r);
+        all.minus = all.minus.max(lean - across + DVec2::new(lean_x, minus_y) * r);
+    }
+    // From the turn's axis to the origin of the camera's axes.
+    let shift = DVec3::from(axes.map(|axis| axis.dot(on_axis)));
+    let lean = slopes * shift.z;
+    all.low += shift;
+    all.high += shift;
+    all.plus += lean + shift.truncate();
+    all.minus += lean - shift.truncate();
+    all
+}
+
 type Explicit = Option<(DVec3, f64)>;
 
 /// Axes for an explicit eye and target (file space), with the target in box units and its distance
@@ -266,17 +309,8 @@ fn file_axes(mesh: &Mesh, camera: &FileCamera) -> ([DVec3; 3], Explicit) {
 }
 
 fn named_axes(spec: &CameraSpec, up: UpAxis) -> [DVec3; 3] {
-    let (azimuth, elevation) = match spec.view {
-        NamedView::Iso => (45.0, 30.0),
-        NamedView::Front => (0.0, 0.0),
-        NamedView::Back => (180.0, 0.0),
-        NamedView::Left => (-90.0, 0.0),
-        NamedView::Right => (90.0, 0.0),
-        NamedView::Top => (0.0, 90.0),
-        NamedView::Bottom => (0.0, -90.0),
-    };
-    let (sin_a, cos_a) = sin_cos_deg(spec.azimuth_deg.unwrap_or(azimuth));
-    let (sin_e, cos_e) = sin_cos_deg(spec.elevation_deg.unwrap_or(elevation));
+    let (sin_a, cos_a) = sin_cos_deg(spec.azimuth_deg());
+    let (sin_e, cos_e) = sin_cos_deg(spec.elevation_deg());
     let [right, up, front] = frame(up);
     let back = (right * sin_a + front * cos_a) * cos_e + up * sin_e;
     let side = right * cos_a - front * sin_a;

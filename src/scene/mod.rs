@@ -8,7 +8,7 @@ mod border;
 pub mod camera;
 mod material_groups;
 
-pub use border::{LINE_PX, POINT_PX, POINT_WIDTH, Thickness};
+pub use border::{LINE_PX, Thickness, point_width};
 pub use material_groups::{Fill, MaterialGroups, barycentric_wire};
 
 use border::{border, outline_thickness};

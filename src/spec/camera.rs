@@ -6,6 +6,8 @@ use crate::mesh::UpAxis;
 word_enums! {
     /// Named directions to look from.
     pub enum NamedView {
+        /// From the front, a little from the right and from above: azimuth 30 degrees, elevation 20.
+        Auto = "auto",
         /// From the front right, above: azimuth 45 degrees, elevation 30.
         Iso = "iso",
         /// Azimuth 0.
@@ -56,12 +58,48 @@ pub struct CameraSpec {
     pub target: Option<[f64; 3]>,
     /// Uses the file's own first camera; the mesh is then not fitted. Excludes `eye`.
     pub from_file: bool,
+    /// Fits the mesh for all its turns around the up axis, so that it keeps its size and place in each.
+    pub fits_turn: bool,
+}
+
+impl NamedView {
+    /// Azimuth and elevation, degrees.
+    pub fn angles_deg(self) -> [f64; 2] {
+        match self {
+            // The front stays the widest side, and no two sides of a box look alike.
+            Self::Auto => [30.0, 20.0],
+            Self::Iso => [45.0, 30.0],
+            Self::Front => [0.0, 0.0],
+            Self::Back => [180.0, 0.0],
+            Self::Left => [-90.0, 0.0],
+            Self::Right => [90.0, 0.0],
+            Self::Top => [0.0, 90.0],
+            Self::Bottom => [0.0, -90.0],
+        }
+    }
+}
+
+impl CameraSpec {
+    /// The angle around the up axis, given or the view's.
+    pub fn azimuth_deg(&self) -> f64 {
+        self.azimuth_deg.unwrap_or(self.view.angles_deg()[0])
+    }
+
+    /// The angle above the horizon, given or the view's.
+    pub fn elevation_deg(&self) -> f64 {
+        self.elevation_deg.unwrap_or(self.view.angles_deg()[1])
+    }
+
+    /// True if the request says what is up, or where to look from.
+    pub fn has_own_up(&self) -> bool {
+        self.up.is_some() || self.eye.is_some() || self.from_file
+    }
 }
 
 impl Default for CameraSpec {
     fn default() -> Self {
         Self {
-            view: NamedView::Iso,
+            view: NamedView::Auto,
             azimuth_deg: None,
             elevation_deg: None,
             projection: ProjectionKind::Perspective,
@@ -72,6 +110,7 @@ impl Default for CameraSpec {
             eye: None,
             target: None,
             from_file: false,
+            fits_turn: false,
         }
     }
 }

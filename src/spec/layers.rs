@@ -54,6 +54,16 @@ word_enums! {
         FaceOrientation = "face-orientation",
         /// Vertex colours, unlit; grey where there are none.
         VertexColor = "vertex-color",
+        /// Shapes of triangles: dark where they are equilateral, yellow where they are slivers.
+        Aspect = "aspect",
+        /// Mean length of each triangle's edges: dark is short, yellow long.
+        EdgeLength = "edge-length",
+        /// Mean curvature: red bends outwards, blue inwards.
+        Curvature = "curvature",
+        /// Size of the texture on each triangle beside its average: red is stretched, blue is dense.
+        UvStretch = "uv-stretch",
+        /// The faces as they lie in the texture; turned over ones are orange, overlapping ones red.
+        UvLayout = "uv-layout",
     }
 
     /// Faces that are left out.
@@ -244,6 +254,20 @@ impl Default for Outline {
             unit: OutlineUnit::Object,
             min_length: None,
         }
+    }
+}
+
+/// Point primitives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Points {
+    /// Diameter with a surface, pixels, 0.5 to 64. Without one, points are wider than the wire's lines in
+    /// the proportion of this to 1.5.
+    pub size_px: f32,
+}
+
+impl Default for Points {
+    fn default() -> Self {
+        Self { size_px: 3.0 }
     }
 }
 

@@ -7,6 +7,7 @@ mod image;
 mod layers;
 mod light;
 mod quality;
+mod sheet;
 mod wire_method;
 pub(crate) mod words;
 
@@ -15,6 +16,7 @@ pub use image::*;
 pub use layers::*;
 pub use light::*;
 pub use quality::*;
+pub use sheet::*;
 pub use wire_method::*;
 
 use words::word_enums;
@@ -29,10 +31,14 @@ pub struct Spec {
     pub materials: Vec<(String, Layers)>,
     /// Edges coloured by how the mesh is connected, if any.
     pub topology: Option<Topology>,
+    /// Points of the file.
+    pub points: Points,
     /// The moment of the file's first animation, seconds. None: the rest pose.
     pub time_s: Option<f64>,
     /// Position and lens.
     pub camera: CameraSpec,
+    /// Several views of the mesh, each with a part of the picture or of the time. None: one view.
+    pub sheet: Option<Sheet>,
     /// Lamps and ambient light.
     pub light: Light,
     /// Size, format, sampling, background.

@@ -4,6 +4,7 @@
 //! their neighbours.
 
 use crate::limits::{Deadline, Stopped};
+use crate::texture::coverage;
 use crate::texture::decode::{LookupTable, Pixels};
 use half::f16;
 use rayon::prelude::*;
@@ -34,15 +35,46 @@ pub fn working_bytes(width: u32, height: u32) -> u64 {
     (texels(1) + texels(2)).saturating_mul(16).saturating_add(64 * pieces * u64::from(width) + (4 << 16))
 }
 
+/// The ways in which an image is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Reading {
+    /// Texels are colours, as sRGB, and not numbers.
+    pub is_color: bool,
+    /// The bits of the alpha below which texels are left out; 0 if none are.
+    cutoff_bits: u32,
+}
+
+impl Reading {
+    /// As colours, or as numbers.
+    pub fn plain(is_color: bool) -> Self {
+        Self { is_color, cutoff_bits: 0 }
+    }
+
+    /// As colours of which those below an alpha are left out.
+    pub fn cut_out(cutoff: f32) -> Self {
+        let is_cut = cutoff > 0.0 && cutoff <= 1.0;
+        Self { is_color: true, cutoff_bits: if is_cut { cutoff.to_bits() } else { 0 } }
+    }
+
+    /// Memory that reading so takes beside [`working_bytes`], bytes.
+    pub fn working_bytes(self, width: u32, height: u32) -> u64 {
+        if self.cutoff_bits == 0 { 0 } else { coverage::bytes(width, height) }
+    }
+
+    fn cutoff(self) -> Option<f32> {
+        (self.cutoff_bits != 0).then(|| f32::from_bits(self.cutoff_bits))
+    }
+}
+
 /// Writes the levels from `first` on to `out`, as half floats.
 pub fn fill(
     pixels: &Pixels,
-    is_color: bool,
+    reading: Reading,
     first: u32,
     mut out: &mut [[u16; 4]],
     deadline: &Deadline,
 ) -> Result<(), Stopped> {
-    let (width, height) = (pixels.width, pixels.height);
+    let (width, height, is_color) = (pixels.width, pixels.height, reading.is_color);
     if first == 0 {
         let table = pixels.lookup_table(is_color, half);
         let level = take(&mut out, [width, height]);
@@ -60,6 +92,10 @@ pub fn fill(
     let by_alpha = is_color && pixels.has_alpha();
     let table: LookupTable<f32> = pixels.lookup_table(is_color, |v| v);
     let read = |y, row: &mut [[f32; 4]]| pixels.row(y, &table, row);
+    let kept = match reading.cutoff().filter(|_| by_alpha) {
+        Some(cutoff) => Some((coverage::share(pixels, &table, cutoff, deadline)?, cutoff)),
+        None => None,
+    };
     let steps = if by_alpha { 0 } else { square_steps([width, height]).min(first) };
     let (mut level, reached) = if steps > 1 {
         (shrink_often([width, height], steps, deadline, read)?, steps)
@@ -70,7 +106,8 @@ pub fn fill(
         let size = [side(width, k), side(height, k)];
         if k >= first {
             let out = take(&mut out, size).par_iter_mut().with_min_len(ROWS_MIN << 10);
-            out.zip(&level).for_each(|(out, texel)| *out = texel.map(half));
+            let factor = kept.map_or(1.0, |(share, cutoff)| coverage::factor(&level, size, share, cutoff));
+            out.zip(&level).for_each(|(out, &[r, g, b, a])| *out = [r, g, b, (a * factor).min(1.0)].map(half));
         }
         if k + 1 == count(width, height) {
             break;

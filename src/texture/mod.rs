@@ -9,6 +9,7 @@
 //! - [`basis`]: KTX2 files with Basis Universal data.
 //! - [`png`]: drops a PNG's ancillary chunks before the decoder reads them.
 //! - [`mips`]: makes the levels of one image.
+//! - [`coverage`]: keeps cut-outs as wide at coarse levels as they are.
 //! - [`fit`]: chooses the finest level of each image, so that all textures of a picture fit.
 //!
 //! Memory is paid for first. A header says how much decoding takes, the caller spends that from the
@@ -21,6 +22,7 @@
 //! An image that cannot be read is a warning ([`fault_warnings`]), and its materials are drawn without it.
 
 pub(crate) mod basis;
+pub(crate) mod coverage;
 pub(crate) mod decode;
 pub(crate) mod fit;
 pub(crate) mod mips;

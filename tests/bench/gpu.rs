@@ -73,7 +73,8 @@ fn read(file: &MeshFile) -> Mesh {
 fn measure(gpu: &Arc<Gpu>, (name, mesh): (&str, &Mesh), (look, size): (&str, &str), workers: usize, rounds: usize) {
     let limits = Limits { memory_bytes: 16 << 30, ..Limits::default() };
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
-    let keys = [("style", look), ("size", size)].map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let keys =
+        [("style", look), ("size", size), ("view", "iso")].map(|(key, value)| (key.to_owned(), value.to_owned()));
     let spec = request::read(None, &keys, &Rules { limits: limits.clone(), backend: BackendChoice::Gpu }).unwrap();
     let scene = Scene::new(mesh, &spec, &mut budget).unwrap();
     let prepared = Prepared::default();

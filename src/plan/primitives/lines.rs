@@ -8,7 +8,7 @@ use crate::mesh::LineOrPoint;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::lines::styles::{LineStyle, wire_color};
 use crate::plan::{Edge, LinePass, PlanError};
-use crate::scene::{LINE_PX, POINT_WIDTH, Scene};
+use crate::scene::{LINE_PX, Scene, point_width};
 use crate::spec::{Hidden, Layers, WireMethod};
 
 /// Largest width of these lines, pixels.
@@ -63,7 +63,7 @@ fn by_kind(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<Vec<Ed
 /// The style of a material's wire, or else of its outline. An edge that begins where it ends is a
 /// dot.
 fn line_style(scene: &Scene<'_, '_>, layers: &Layers, is_point: bool) -> Option<LineStyle> {
-    let share = if is_point { POINT_WIDTH } else { 1.0 };
+    let share = if is_point { point_width(scene.spec) } else { 1.0 };
     let style = |width_px: f32, smoothing_px, color, hidden| {
         LineStyle::everywhere((width_px * share).min(WIDTH_MAX_PX), smoothing_px, color, hidden)
     };

@@ -3,6 +3,7 @@
 //! Those whose material has a fill are triangles that face the camera and are shaded with the
 //! surface ([`geometry`]). The others are lines of exact width ([`line_passes`]).
 
+pub mod depth_cue;
 mod lines;
 mod triangles;
 

@@ -3,16 +3,17 @@
 
 use glam::{DVec2, DVec3};
 
+use super::depth_cue::{self, Grid, Seen};
 use super::is_filled;
 use crate::limits::LimitExceeded;
 use crate::mesh::primitives::triangles;
 use crate::mesh::{LineOrPoint, Mesh};
-use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::geometry::Geometry;
+use crate::plan::{CornerValues, PlanError};
 use crate::scene::camera::Camera;
-use crate::scene::{LINE_PX, POINT_PX, Scene};
-use crate::spec::ProjectionKind;
+use crate::scene::{LINE_PX, Scene};
+use crate::spec::{Layers, ProjectionKind};
 
 /// Radius of a circle over the circumradius of the hexagon that has its area: sqrt(3 sqrt(3) / (2
 /// pi)).
@@ -37,9 +38,11 @@ pub fn geometry<'m>(scene: &Scene<'m, '_>, cx: &mut PlanContext<'_>) -> Result<G
     let triangle_count = triangles(filled().map(|(_, one)| one));
     cx.budget.spend("lines and points", triangle_count, TRIANGLE_BYTES)?;
     spend_copies(mesh, cx)?;
+    let colors = Colors::of(scene, triangle_count, cx)?;
     let corner_count = filled().map(|(_, one)| if one.is_point() { 6 } else { 4 }).sum();
     let px = 2.0 * camera.half_size.y / f64::from(scene.size_px()[1]);
-    let mut builder = Builder::new(mesh, *camera, px, triangle_count as usize, corner_count);
+    let mut builder = Builder::new(scene, px, triangle_count as usize, corner_count);
+    builder.colors = colors;
     for (n, (i, _)) in filled().enumerate() {
         if n % CHECK_EVERY == 0 {
             cx.deadline.check()?;
@@ -56,6 +59,90 @@ fn spend_copies(mesh: &Mesh, cx: &mut PlanContext<'_>) -> Result<(), LimitExceed
     cx.budget.spend("lines and points", (mesh.positions.len() + mesh.normals.len()) as u64, 12)
 }
 
+/// Colours of triangles, if points have a depth cue.
+struct Colors {
+    /// White, the mesh's colours, then one for each point that is drawn.
+    values: Vec<[f32; 4]>,
+    triangles: Vec<[u32; 3]>,
+    /// The points' shares of light, in their order, and how many of them are in use.
+    shades: Vec<f32>,
+    used: usize,
+    /// By material, whether it shows the mesh's colours.
+    shows_file: Vec<bool>,
+    is_cued: Vec<bool>,
+}
+
+impl Colors {
+    /// The colours of the mesh's triangles. None if no point has the cue.
+    fn of(scene: &Scene<'_, '_>, triangle_count: u64, cx: &mut PlanContext<'_>) -> Result<Option<Self>, PlanError> {
+        let Scene { mesh, groups, .. } = scene;
+        let materials = || mesh.materials.iter().zip(&groups.by_material);
+        let is_cued: Vec<bool> = materials().map(|(slot, layers)| depth_cue::is_cued(slot, layers)).collect();
+        let is_cued_point = |one: &LineOrPoint| one.is_point() && is_cued.get(one.material as usize) == Some(&true);
+        if !mesh.lines_and_points.iter().any(is_cued_point) {
+            return Ok(None);
+        }
+        let points = mesh.lines_and_points.iter().filter(|one| one.is_point() && is_filled(groups, one));
+        let count = points.clone().count() as u64;
+        let grid = Grid::new(scene.size_px(), point_px(scene));
+        cx.budget.spend("the depth cue of points", count, 16 + depth_cue::POINT_BYTES)?;
+        cx.budget.spend("the depth cue of points", grid.bytes(), 1)?;
+        cx.budget.spend("the colours of points", mesh.triangles.len() as u64 + triangle_count, 12)?;
+        cx.budget.spend("the colours of points", mesh.colors.len() as u64 + 1, 16)?;
+        let seen: Vec<Seen> = points.map(|point| seen(scene, point)).collect();
+        let shades = grid.shades(&seen, cx.deadline)?;
+        let shows_file = |layers: &Layers| !mesh.colors.is_empty() && layers.surface.is_some_and(|s| s.color.is_none());
+        let shows_file: Vec<bool> = groups.by_material.iter().map(|layers| shows_file(layers)).collect();
+        let mut values = Vec::with_capacity(1 + mesh.colors.len() + shades.len());
+        values.push([1.0; 4]);
+        values.extend_from_slice(&mesh.colors);
+        let triangles = Vec::with_capacity(mesh.triangles.len() + triangle_count as usize);
+        let mut colors = Self { values, triangles, shades, used: 0, shows_file, is_cued };
+        for (i, &material) in mesh.triangle_materials.iter().enumerate() {
+            let corners = mesh.attribute_triangles.get(i).copied().unwrap_or_default();
+            colors.push(corners, material);
+        }
+        Ok(Some(colors))
+    }
+
+    /// Adds a triangle with the mesh's colours.
+    fn push(&mut self, attributes: [u32; 3], material: u32) {
+        let shows_file = self.shows_file.get(material as usize) == Some(&true);
+        self.triangles.push(attributes.map(|v| if shows_file { v + 1 } else { 0 }));
+    }
+
+    /// Adds the color of the next point.
+    fn next_point(&mut self, attribute: u32, material: u32) {
+        let is_cued = self.is_cued.get(material as usize) == Some(&true);
+        let shade = self.shades.get(self.used).copied().filter(|_| is_cued).unwrap_or(1.0);
+        self.used += 1;
+        let shows_file = self.shows_file.get(material as usize) == Some(&true);
+        let of_file = if shows_file { self.values.get(attribute as usize + 1).copied() } else { None };
+        let [r, g, b, a] = of_file.unwrap_or([1.0; 4]);
+        self.values.push([r * shade, g * shade, b * shade, a]);
+    }
+}
+
+/// The width of points in pixels.
+fn point_px(scene: &Scene<'_, '_>) -> f64 {
+    f64::from(scene.spec.points.size_px)
+}
+
+/// A point's place on screen.
+fn seen(scene: &Scene<'_, '_>, point: &LineOrPoint) -> Seen {
+    let Scene { mesh, camera, .. } = scene;
+    let [width_px, height_px] = scene.size_px().map(f64::from);
+    let p = DVec3::from(mesh.positions[point.ends[0] as usize].map(f64::from));
+    let at = DVec3::from(camera.axes.map(|axis| axis.dot(p)));
+    let is_perspective = camera.kind == ProjectionKind::Perspective;
+    let w = if is_perspective { camera.distance - at.z } else { 1.0 };
+    let px = 2.0 * camera.half_size.y / height_px * w;
+    let from_center = (at.truncate() - camera.center) / px;
+    // What is behind the viewer is nowhere on screen.
+    let at_px = if w > 0.0 { DVec2::new(from_center.x, -from_center.y) } else { DVec2::NAN };
+    Seen { at_px: at_px + DVec2::new(width_px, height_px) * 0.5, depth: -at.z, px }
+}
+
 /// The arrays of a [`Geometry`] while triangles are appended.
 struct Builder<'m> {
     mesh: &'m Mesh,
@@ -68,6 +155,8 @@ struct Builder<'m> {
     triangle_materials: Vec<u32>,
     attribute_triangles: Vec<[u32; 3]>,
     normals: Vec<[f32; 3]>,
+    point_px: f64,
+    colors: Option<Colors>,
 }
 
 /// An end in camera axes.
@@ -87,7 +176,8 @@ fn copied<T: Copy>(list: &[T], more: usize) -> Vec<T> {
 }
 
 impl<'m> Builder<'m> {
-    fn new(mesh: &'m Mesh, camera: Camera, px: f64, triangle_count: usize, corner_count: usize) -> Self {
+    fn new(scene: &Scene<'m, '_>, px: f64, triangle_count: usize, corner_count: usize) -> Self {
+        let (mesh, camera) = (scene.mesh, scene.camera);
         let attributes = if mesh.line_point_attributes.is_empty() { 0 } else { triangle_count };
         Self {
             mesh,
@@ -99,6 +189,8 @@ impl<'m> Builder<'m> {
             triangle_materials: copied(&mesh.triangle_materials, triangle_count),
             attribute_triangles: copied(&mesh.attribute_triangles, attributes),
             normals: mesh.normals.clone(),
+            point_px: point_px(scene),
+            colors: None,
         }
     }
 
@@ -110,6 +202,9 @@ impl<'m> Builder<'m> {
             triangle_materials: self.triangle_materials.into(),
             attribute_triangles: self.attribute_triangles.into(),
             normals: self.normals.into(),
+            colors: self
+                .colors
+                .map(|colors| CornerValues { values: colors.values.into(), triangles: colors.triangles.into() }),
             mesh_triangle_count: self.mesh.triangles.len(),
         }
     }
@@ -121,6 +216,9 @@ impl<'m> Builder<'m> {
         self.face_viewer(attributes);
         let [a, b] = [0, 1].map(|k| self.camera_space(primitive.ends[k]));
         if primitive.is_point() {
+            if let Some(colors) = &mut self.colors {
+                colors.next_point(attributes[0], primitive.material);
+            }
             if self.w(a) >= self.camera.near {
                 self.point(self.end(a, attributes[0]), primitive);
             }
@@ -168,11 +266,11 @@ impl<'m> Builder<'m> {
         // (cos, sin) of the corners' angles.
         const CORNERS: [[f64; 2]; 6] = [[1.0, 0.0], [0.5, H], [-0.5, H], [-1.0, 0.0], [-0.5, -H], [0.5, -H]];
         const H: f64 = 0.866_025_403_784_438_6;
-        let radius_px = 0.5 * POINT_PX / HEXAGON;
+        let radius_px = 0.5 * self.point_px / HEXAGON;
         let corners = CORNERS.map(|corner| self.corner(end, DVec2::from(corner) * radius_px));
         let normal = self.normals.get(end.attribute as usize).copied();
         for k in 1..5 {
-            self.triangle([0, k, k + 1].map(|k| (corners[k], end.attribute)), normal, primitive.material);
+            self.triangle([0, k, k + 1].map(|k| (corners[k], end.attribute)), normal, primitive.material, true);
         }
     }
 
@@ -188,7 +286,7 @@ impl<'m> Builder<'m> {
             (self.corner(a, across - along), a.attribute),
         ];
         for triangle in [[0, 1, 2], [0, 2, 3]] {
-            self.triangle(triangle.map(|k| corners[k]), None, primitive.material);
+            self.triangle(triangle.map(|k| corners[k]), None, primitive.material, false);
         }
     }
 
@@ -200,7 +298,13 @@ impl<'m> Builder<'m> {
         self.positions.len() as u32 - 1
     }
 
-    fn triangle(&mut self, corners: [(u32, u32); 3], normal: Option<[f32; 3]>, material: u32) {
+    fn triangle(&mut self, corners: [(u32, u32); 3], normal: Option<[f32; 3]>, material: u32, is_point: bool) {
+        if let Some(colors) = &mut self.colors {
+            match is_point {
+                true => colors.triangles.push([colors.values.len() as u32 - 1; 3]),
+                false => colors.push(corners.map(|(_, attribute)| attribute), material),
+            }
+        }
         self.triangles.push(corners.map(|(position, _)| position));
         self.face_normals.push(normal.unwrap_or(self.camera.axes[2].as_vec3().to_array()));
         self.triangle_materials.push(material);

@@ -11,6 +11,7 @@ use crate::mesh::creases::{CreaseAngles, creased, sharp_cos};
 use crate::plan::context::PlanContext;
 use crate::plan::geometry::Geometry;
 use crate::plan::prepared::VertexNormals;
+use crate::plan::primitives::depth_cue;
 use crate::plan::projection::Projection;
 use crate::plan::shared_slice::SharedSlice;
 use crate::plan::skips::SkipKind;
@@ -78,7 +79,11 @@ fn materials_and_textures(
     let is_used = used_materials(mesh.materials.len(), geometry);
     for (index, (slot, layers)) in mesh.materials.iter().zip(&scene.groups.by_material).enumerate() {
         loader.for_material(index, is_used[index]);
-        materials.push(materials::shaded_material(mesh, slot, layers, &mut loader)?);
+        let mut material = materials::shaded_material(mesh, slot, layers, &mut loader)?;
+        if geometry.colors.is_some() && depth_cue::is_cued(slot, layers) {
+            material.flags |= flags::VERTEX_COLORS;
+        }
+        materials.push(material);
     }
     let samples = materials.iter().any(materials::samples);
     if !cx.skips.skip(SkipKind::Textures, !samples, "nothing samples one") && !samples {
@@ -131,9 +136,11 @@ fn add_attributes<'m>(
         pass.uvs = Some(CornerValues { values: (&mesh.uvs).into(), triangles });
     }
     let is_colorless = !reads(flags::VERTEX_COLORS);
-    if !mesh.colors.is_empty() && !skips.skip(SkipKind::VertexColors, is_colorless, "no material shows them") {
-        let triangles = geometry.attribute_triangles.clone();
-        pass.colors = Some(CornerValues { values: (&mesh.colors).into(), triangles });
+    let has_colors = !mesh.colors.is_empty() || geometry.colors.is_some();
+    if has_colors && !skips.skip(SkipKind::VertexColors, is_colorless, "no material shows them") {
+        let of_mesh =
+            || CornerValues { values: (&mesh.colors).into(), triangles: geometry.attribute_triangles.clone() };
+        pass.colors = Some(geometry.colors.clone().unwrap_or_else(of_mesh));
     }
     Ok(())
 }

@@ -3,10 +3,12 @@
 use super::textures::TextureLoader;
 use crate::mesh::material::{AlphaMode, TextureRef};
 use crate::mesh::{MaterialSlot, Mesh};
+use crate::plan::heat;
 use crate::plan::lines::styles::wire_color;
 use crate::plan::{PlanError, ShadedMaterial, TEXTURE_NONE, TextureUse, flags, slots};
 use crate::spec::color::Rgba;
 use crate::spec::{DebugView, FlatNormals, Layers, Shading, Surface, Wire, WireMethod};
+use crate::texture::mips::Reading;
 
 /// The colour where neither the request nor the file names one: `#c8ccd2`, a calm light grey.
 const DEFAULT_COLOR: [u8; 4] = [0xc8, 0xcc, 0xd2, 0xff];
@@ -55,7 +57,7 @@ pub fn load_all(slot: &MaterialSlot, textures: &mut TextureLoader<'_>) -> Result
     ];
     for (texture, is_color) in all {
         if let Some(texture) = texture {
-            textures.load(texture, is_color)?;
+            textures.load(texture, Reading::plain(is_color))?;
         }
     }
     Ok(())
@@ -109,7 +111,8 @@ fn fill(material: &mut ShadedMaterial, mesh: &Mesh, slot: &MaterialSlot, surface
     if surface.roughness.is_some() {
         material.flags |= flags::OWN_ROUGHNESS;
     }
-    if surface.debug == DebugView::VertexColor && !mesh.colors.is_empty() {
+    let shows_colors = surface.debug == DebugView::VertexColor && !mesh.colors.is_empty();
+    if shows_colors || heat::is_heat(surface.debug) {
         material.flags |= flags::VERTEX_COLORS;
     }
 }
@@ -123,7 +126,8 @@ fn shading_flags(slot: &MaterialSlot, surface: &Surface) -> u32 {
         DebugView::Normal => super::debug_views::NORMAL,
         DebugView::Uv => super::debug_views::UV,
         DebugView::FaceOrientation => super::debug_views::FACE_ORIENTATION,
-        DebugView::VertexColor => super::debug_views::VERTEX_COLOR,
+        // The plan computes the others as vertex colours.
+        _ => super::debug_views::VERTEX_COLOR,
     };
     let normals = match (surface.shading, surface.normals) {
         (_, FlatNormals::Face) if surface.debug == DebugView::FaceOrientation => flags::FACE_NORMALS,
@@ -156,13 +160,21 @@ fn sample(
     ];
     for (place, is_needed, texture, is_color) in wanted {
         if let Some(texture) = texture.as_ref().filter(|_| is_needed) {
-            match textures.load(texture, is_color)? {
+            let is_cut_out = place == slots::BASE && material.flags & flags::MASK != 0;
+            let reading = if is_cut_out { cut_out(material) } else { Reading::plain(is_color) };
+            match textures.load(texture, reading)? {
                 Some(texture) => material.textures[place] = texture,
                 None => remove_texture(material, mesh, place),
             }
         }
     }
     Ok(())
+}
+
+/// The reading of a base texture whose texels below the cutoff are left out. The material's own alpha
+/// multiplies theirs.
+fn cut_out(material: &ShadedMaterial) -> Reading {
+    Reading::cut_out(material.alpha_cutoff / material.base_color[3])
 }
 
 fn wire_of(material: &mut ShadedMaterial, wire: &Wire) {

@@ -17,6 +17,7 @@ use crate::plan::surface::closeup;
 use crate::plan::surface::closeup::Use;
 use crate::plan::{PlanError, TextureUse};
 use crate::texture::decode::{self, Header};
+use crate::texture::mips::Reading;
 use crate::texture::{Texture, TextureError, Textures, fit, mips};
 
 /// Memory of images that are decoded at once, bytes: three of 2048 x 2048 texels in JPEG.
@@ -32,7 +33,7 @@ pub struct TextureLoader<'a> {
     is_used: bool,
     wanted: Vec<Wanted>,
     /// Index into `wanted` by image and way of reading; None for an image that cannot be read.
-    known: BTreeMap<(u32, bool), Option<usize>>,
+    known: BTreeMap<(u32, Reading), Option<usize>>,
     uses: Vec<Use>,
     /// By image.
     faults: BTreeMap<u32, TextureError>,
@@ -49,10 +50,10 @@ pub struct LoadedTextures {
     pub faults: Vec<TextureError>,
 }
 
-/// An image that is read in one way: as colours or as numbers.
+/// An image that is read in one way.
 struct Wanted {
     image: u32,
-    is_color: bool,
+    reading: Reading,
     header: Header,
 }
 
@@ -79,9 +80,8 @@ impl<'a> TextureLoader<'a> {
         self.is_used = is_used;
     }
 
-    /// A texture for a material; `is_color` says that texels are sRGB. None if the picture has to go on
-    /// without it.
-    pub fn load(&mut self, texture: &TextureRef, is_color: bool) -> Result<Option<TextureUse>, PlanError> {
+    /// A texture for a material. None if the picture has to go on without it.
+    pub fn load(&mut self, texture: &TextureRef, reading: Reading) -> Result<Option<TextureUse>, PlanError> {
         if !self.is_used {
             return Ok(Some(TextureUse::NONE));
         }
@@ -89,7 +89,7 @@ impl<'a> TextureLoader<'a> {
         if self.mesh.uvs.is_empty() {
             return Ok(None);
         }
-        let Some(index) = self.index_of(texture.image, is_color)? else { return Ok(None) };
+        let Some(index) = self.index_of(texture.image, reading)? else { return Ok(None) };
         let Header { width, height, .. } = self.wanted[index].header;
         let texels = f64::from(width) * f64::from(height);
         self.budget.spend("textures", 1, 2 * size_of::<Use>() as u64)?;
@@ -98,8 +98,8 @@ impl<'a> TextureLoader<'a> {
     }
 
     /// The place of an image in `wanted`; None if it is absent or its header cannot be read.
-    fn index_of(&mut self, image: u32, is_color: bool) -> Result<Option<usize>, PlanError> {
-        if let Some(&known) = self.known.get(&(image, is_color)) {
+    fn index_of(&mut self, image: u32, reading: Reading) -> Result<Option<usize>, PlanError> {
+        if let Some(&known) = self.known.get(&(image, reading)) {
             return Ok(known);
         }
         let source = self.mesh.images.get(image as usize);
@@ -111,7 +111,7 @@ impl<'a> TextureLoader<'a> {
         let index = match decode::header(&source.name, bytes) {
             Ok(header) => {
                 self.budget.spend_texture(&source.name, header.width, header.height)?;
-                self.wanted.push(Wanted { image, is_color, header });
+                self.wanted.push(Wanted { image, reading, header });
                 Some(self.wanted.len() - 1)
             }
             Err(fault) => {
@@ -119,7 +119,7 @@ impl<'a> TextureLoader<'a> {
                 None
             }
         };
-        self.known.insert((image, is_color), index);
+        self.known.insert((image, reading), index);
         Ok(index)
     }
 
@@ -147,12 +147,12 @@ impl<'a> TextureLoader<'a> {
         let texels = |w: &Wanted, first: u32| mips::texels(w.header.width, w.header.height, first);
         let total: u64 = wanted.iter().zip(&first_levels).map(|(w, &first)| texels(w, first)).sum();
         budget.spend("textures", total, 8)?;
-        let of_wanted = |w: &Wanted| (w.image, w.is_color);
+        let of_wanted = |w: &Wanted| (w.image, w.reading);
         let decoding: Vec<u64> = wanted.iter().map(Wanted::decoding_bytes).collect();
         // Also where nothing is decoded: what is kept must refuse no less.
         let batches = spend_on_decoding(&decoding, budget)?;
         let kept = prepared.and_then(Prepared::textures);
-        let images: Vec<(u32, bool)> = wanted.iter().map(of_wanted).collect();
+        let images: Vec<(u32, Reading)> = wanted.iter().map(of_wanted).collect();
         if let Some(kept) = kept.filter(|kept| kept.have(&images, &first_levels, &finest)) {
             return Ok(LoadedTextures::new(&kept, faults));
         }
@@ -196,7 +196,8 @@ impl Wanted {
     /// Memory that decoding takes beside the levels.
     fn decoding_bytes(&self) -> u64 {
         let Header { width, height, decoding_bytes, .. } = self.header;
-        decoding_bytes.saturating_add(mips::working_bytes(width, height))
+        let reading_bytes = self.reading.working_bytes(width, height);
+        decoding_bytes.saturating_add(mips::working_bytes(width, height)).saturating_add(reading_bytes)
     }
 }
 
@@ -215,7 +216,7 @@ impl Decoding<'_> {
         let ImageContent::Encoded(encoded) = &self.image.content else { return Ok(None) };
         match decode::decode(&self.image.name, encoded, &self.want.header) {
             Ok(pixels) => {
-                mips::fill(&pixels, self.want.is_color, self.first_level, self.out, deadline)?;
+                mips::fill(&pixels, self.want.reading, self.first_level, self.out, deadline)?;
                 Ok(None)
             }
             Err(fault) => Ok(Some(fault)),

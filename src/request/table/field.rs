@@ -5,9 +5,9 @@ use serde_json::Value as Json;
 use super::dependent::Dependent;
 use super::value::{COORDINATE_MAX, Kind, Value};
 use crate::request::draft::Draft;
-use crate::spec::WireThickness;
 use crate::spec::color::Rgba;
 use crate::spec::words::{Words, words_of};
+use crate::spec::{NamedView, SHEET_VIEWS_MAX, WireThickness};
 
 /// A key that holds a value.
 pub struct Field {
@@ -122,6 +122,17 @@ impl<W: Words> Place for W {
 
     fn of(value: Value) -> Option<Self> {
         if let Value::Word(place) = value { W::ALL.get(place).map(|&(_, word)| word) } else { None }
+    }
+}
+
+impl Place for Vec<NamedView> {
+    fn kind() -> Kind {
+        Kind::WordList { words: words_of::<NamedView>(), count_max: SHEET_VIEWS_MAX }
+    }
+
+    fn of(value: Value) -> Option<Self> {
+        let Value::WordList(places) = value else { return None };
+        places.into_iter().map(|place| NamedView::ALL.get(place).map(|&(_, view)| view)).collect()
     }
 }
 

@@ -2,12 +2,12 @@
 //! and what it does.
 
 use serde_json::Value::Null;
+use serde_json::json;
 
 use super::field::{Field, fields};
 use super::value::Kind;
 use crate::limits::JOB_MS_MAX;
-use crate::spec::DEFAULT_EFFORT;
-use crate::spec::{WIRE_METHODS, WireMethod};
+use crate::spec::{DEFAULT_EFFORT, SHEET_VIEWS_MAX, TURNTABLE_STEPS, WIRE_METHODS, WireMethod};
 
 /// A share, such as an opacity.
 const SHARE: Kind = number(0.0, 1.0);
@@ -24,7 +24,7 @@ const fn number(min: f64, max: f64) -> Kind {
 
 /// Every key that holds a value.
 pub fn all() -> Vec<Field> {
-    [layers(), topology(), scene_and_camera(), light(), image()].into_iter().flatten().collect()
+    [layers(), topology(), scene_and_camera(), sheet(), light(), image()].into_iter().flatten().collect()
 }
 
 fn layers() -> Vec<Field> {
@@ -120,11 +120,15 @@ fn topology() -> Vec<Field> {
 
 fn scene_and_camera() -> Vec<Field> {
     fields![
+        "points.size_px" |d| d.points.size_px, in number(0.5, 64.0), default 3;
+            "Diameter of the file's points in pixels; without a surface, they are wider than the wire's lines in the proportion \
+             of this to 1.5.";
+
         "scene.time_s" |d| d.time_s, in number(0.0, TIME_S_MAX), default Null;
             "Moment of the file's first animation, in seconds; null: the rest pose.";
 
-        "camera.view" |d| d.camera.view, short "view", default "iso";
-            "Named directions; azimuth_deg and elevation_deg override its angles.";
+        "camera.view" |d| d.camera.view, short "view", default "auto";
+            "Named directions, auto being azimuth 30, elevation 20, and iso 45, 30; azimuth_deg and elevation_deg override its angles.";
         "camera.azimuth_deg" |d| d.camera.azimuth_deg, in number(-3600.0, 3600.0), default Null;
             "Angle around the up axis: 0 is the front, 90 the right; null: the view's.";
         "camera.elevation_deg" |d| d.camera.elevation_deg, in number(-90.0, 90.0), default Null;
@@ -145,6 +149,21 @@ fn scene_and_camera() -> Vec<Field> {
             "The point at the picture's centre; not the same as eye.";
         "camera.from_file" |d| d.camera.from_file, default false;
             "Uses the file's own first camera; the mesh is then not fitted.";
+    ]
+}
+
+fn sheet() -> Vec<Field> {
+    let [steps_min, steps_max] = TURNTABLE_STEPS;
+    fields![
+        "sheet.views" |d| d.sheet().views, default json!(["front", "left", "top", "iso"]);
+            "Named directions, a cell each. Excludes turntable, and angles and an eye of the camera.";
+        "sheet.turntable" |d| d.sheet().turntable, in Kind::Count { min: steps_min, max: steps_max }, default Null;
+            "Views from so many directions around the up axis, beginning with the camera's; without columns, PNG and WebP \
+             show them one after the other, in three seconds, and width and height are those of each.";
+        "sheet.columns" |d| d.sheet().columns, in Kind::Count { min: 1, max: SHEET_VIEWS_MAX as u32 }, default Null;
+            "Columns of the grid; null: as many as rows, or one more.";
+        "sheet.labels" |d| d.sheet().labels, default false;
+            "Writes the name of each view into its lower left corner.";
     ]
 }
 

@@ -40,8 +40,15 @@ pub const SECTIONS: &[Section] = &[
         turn: Some(|d, on| d.topology = on.then(|| *d.topology())),
         is_for_materials: false,
     },
+    group("points", "Points of the file."),
     group("scene", "State of the file that is drawn."),
     group("camera", "Position and lens; by default the mesh is fitted into the picture."),
+    Section {
+        name: "sheet",
+        about: "Several views in one picture: its cells share the picture's width and height.",
+        turn: Some(|d, on| d.sheet = on.then(|| d.sheet().clone())),
+        is_for_materials: false,
+    },
     group("light", "Lamps and ambient light."),
     group("image", "The picture."),
 ];
@@ -89,7 +96,7 @@ mod tests {
             assert!(field.section().is_none_or(|s| s.turn.is_some() || !s.is_for_materials), "{}", field.key);
             keys += 1;
         }
-        assert_eq!(keys, 57);
+        assert_eq!(keys, 62);
         assert_eq!(FIELDS.iter().filter(|field| field.short.is_some()).count(), 6);
     }
 }

@@ -109,6 +109,20 @@ pub enum Kind {
     Size,
     /// One of a few words.
     Words(Vec<&'static str>),
+    /// A list of such words, at least one.
+    WordList {
+        /// The words.
+        words: Vec<&'static str>,
+        /// The largest number of them.
+        count_max: usize,
+    },
+    /// A whole number in a closed range.
+    Count {
+        /// The smallest, which is allowed.
+        min: u32,
+        /// The largest, which is allowed.
+        max: u32,
+    },
     /// A colour.
     Color,
     /// Three finite numbers.
@@ -120,7 +134,7 @@ pub enum Kind {
 }
 
 /// A value that passed its [`Kind`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// `null`, for keys that allow it.
     Null,
@@ -132,6 +146,8 @@ pub enum Value {
     Size(u32, u32),
     /// Index in the list of words; 0 for an only one.
     Word(usize),
+    /// Indices in the list of words.
+    WordList(Vec<usize>),
     /// A colour.
     Color(Rgba),
     /// Three numbers.
@@ -157,6 +173,11 @@ impl Kind {
             Self::Pixels => format!("a whole number from 1 to {image_px_max}"),
             Self::Size => format!("N or WxH, with whole numbers from 1 to {image_px_max}"),
             Self::Words(words) => format!("one of {}", words.join(", ")),
+            Self::WordList { words, count_max } => {
+                let forms = "as [\"A\", \"B\"] or, in a query or a flag, A,B";
+                format!("a list of 1 to {count_max} of {}, {forms}", words.join(", "))
+            }
+            Self::Count { min, max } => format!("a whole number from {min} to {max}"),
             Self::Color => {
                 "a colour: #rgb, #rgba, #rrggbb, #rrggbbaa (with # written as %23 in a URL) or transparent".into()
             }
@@ -187,11 +208,14 @@ impl Kind {
     /// The name of a kind that JSON writes without quotes, for the advice about quotes.
     fn bare(&self) -> Option<&'static str> {
         match self {
-            Self::Number { .. } | Self::NumberOr { .. } | Self::Above0 { .. } | Self::OneOf(_) | Self::Pixels => {
-                Some("a number")
-            }
+            Self::Number { .. }
+            | Self::NumberOr { .. }
+            | Self::Above0 { .. }
+            | Self::OneOf(_)
+            | Self::Pixels
+            | Self::Count { .. } => Some("a number"),
             Self::Flag => Some("a truth value"),
-            Self::Size | Self::Words(_) | Self::Color | Self::Point | Self::Direction => None,
+            Self::Size | Self::Words(_) | Self::WordList { .. } | Self::Color | Self::Point | Self::Direction => None,
         }
     }
 
@@ -218,12 +242,35 @@ impl Kind {
                 let word = given.text()?;
                 words.iter().position(|&w| w == word).map(Value::Word)
             }
+            Self::WordList { words, count_max } => word_list(given, words, *count_max)?.map(Value::WordList),
+            Self::Count { min, max } => {
+                let number = given.number()?;
+                let in_range = (f64::from(*min)..=f64::from(*max)).contains(&number) && number.fract() == 0.0;
+                in_range.then_some(Value::Whole(number as u32))
+            }
             Self::Color => Rgba::parse(given.text()?).map(Value::Color),
             Self::Point => Some(given.point()?).filter(|p| largest(p) <= COORDINATE_MAX).map(Value::Point),
             Self::Direction => direction(given.point()?).map(Value::Point),
             Self::Flag => Some(Value::Flag(given.flag()?)),
         })
     }
+}
+
+/// The places of a list's words; None inside if it is too long, or has another word.
+fn word_list(given: &Given, words: &[&str], count_max: usize) -> Option<Option<Vec<usize>>> {
+    let given: Vec<&str> = match given {
+        Given::Json(json) => {
+            let list = json.as_array()?;
+            if list.len() > count_max {
+                return Some(None);
+            }
+            list.iter().map(Json::as_str).collect::<Option<_>>()?
+        }
+        // One more than allowed is enough to refuse it.
+        Given::Text(text) => text.split(',').map(str::trim).take(count_max + 1).collect(),
+    };
+    let places: Option<Vec<usize>> = given.iter().map(|one| words.iter().position(|word| word == one)).collect();
+    Some(places.filter(|places| (1..=count_max).contains(&places.len())))
 }
 
 /// A direction that is not zero. Only where it points counts, so tiny ones are scaled up: squares of

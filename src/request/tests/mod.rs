@@ -6,8 +6,8 @@ mod refused;
 use super::*;
 use crate::mesh::UpAxis;
 use crate::spec::{
-    DebugView, FlatNormals, Hidden, LightPreset, NamedView, Outline, OutlineMethod, OutlineUnit, Shading, WireEdges,
-    WireMethod, WireThickness,
+    DebugView, FlatNormals, Hidden, LightPreset, NamedView, Outline, OutlineMethod, OutlineUnit, Shading, Sheet,
+    SheetViews, WireEdges, WireMethod, WireThickness,
 };
 
 pub fn rules() -> Rules {
@@ -113,6 +113,7 @@ fn every_key_reaches_its_field() {
                  "feature_angle_deg":45,"hidden":"show"},
         "outline": {"method":"contour","color":"#fff","thickness":3,"unit":"px","min_length":12},
         "topology": {"polygon":null,"crease":"#00f","open":"#0f0","nonmanifold":null,"crease_angle_deg":60,"thickness":2},
+        "points": {"size_px":7.5},
         "scene": {"time_s":1.25},
         "camera": {"view":"top","azimuth_deg":10,"elevation_deg":-20,"projection":"orthographic","fov_deg":50,
                    "height":2.5,"up":"-z","margin":0.1,"eye":[1,2,3],"target":[0,0,0.5]},
@@ -144,7 +145,12 @@ fn every_key_reaches_its_field() {
     assert_eq!((topology.crease, topology.open), (Rgba::parse("#00f"), Rgba::parse("#0f0")));
     assert_eq!((topology.crease_angle_deg, topology.thickness), (60.0, 2.0));
     assert_eq!((spec.light.preset, spec.light.direction), (LightPreset::ThreePoint, Some([0.0, -1.0, 0.5])));
-    assert_eq!(spec.time_s, Some(1.25));
+    assert_eq!((spec.time_s, spec.points.size_px), (Some(1.25), 7.5));
+    let sheet = json(r#"{"sheet":{"views":["top","auto"],"columns":1,"labels":true}}"#).unwrap().sheet.unwrap();
+    assert_eq!(sheet.views, SheetViews::Named(vec![NamedView::Top, NamedView::Auto]));
+    assert_eq!((sheet.columns, sheet.labels), (Some(1), true));
+    let turntable = query(&[("sheet.turntable", "24")]).unwrap().sheet.unwrap();
+    assert_eq!(turntable, Sheet { views: SheetViews::Turntable(24), columns: None, labels: false });
     let camera = spec.camera;
     assert_eq!((camera.view, camera.up, camera.height), (NamedView::Top, Some(UpAxis::NegZ), Some(2.5)));
     assert_eq!((camera.azimuth_deg, camera.elevation_deg), (Some(10.0), Some(-20.0)));
@@ -209,7 +215,7 @@ fn null_is_the_default_or_as_if_the_key_were_not_there() {
         }
         query(&[(key, "null")]).unwrap_or_else(|error| panic!("{error}"));
     }
-    assert_eq!(keys.len(), 63);
+    assert_eq!(keys.len(), 68);
     for document in [r#"{"style":null}"#, r#"{"camera":null,"light":null,"image":null}"#, r#"{"materials":null}"#] {
         assert_eq!(json(document).unwrap(), json("{}").unwrap(), "{document}");
     }
@@ -297,14 +303,15 @@ fn stated_defaults_are_the_defaults() {
         assert_eq!(json(&with.to_string()).unwrap(), json(&without.to_string()).unwrap(), "{}", field.key);
         checked += 1;
     }
-    assert_eq!(checked, 48);
+    assert_eq!(checked, 53);
 }
 
 #[test]
 fn the_vocabulary_has_every_word() {
     let vocabulary = vocabulary();
     assert_eq!(vocabulary["style"].len(), 10);
-    assert_eq!(vocabulary["surface.debug"].len(), 8);
+    assert_eq!(vocabulary["surface.debug"].len(), 13);
     assert_eq!(vocabulary["wire.method"], words_of::<WireMethod>());
-    assert_eq!(vocabulary.len(), 16);
+    assert_eq!(vocabulary["sheet.views"], vocabulary["camera.view"]);
+    assert_eq!(vocabulary.len(), 17);
 }

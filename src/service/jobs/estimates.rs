@@ -11,13 +11,17 @@ use std::time::Duration;
 use quick_cache::sync::Cache;
 
 use super::job::{Task, Work};
+use crate::image::ImageFormat;
 use crate::spec::{BackendChoice, Spec};
 
-/// Nanoseconds of the formula: for any job, for each byte that is to be read, for each sample of the
-/// picture. They give the factors a sensible start, and weigh bytes against samples.
+/// Nanoseconds of the formula: for any view, for each byte that is to be read, for each sample of all
+/// pictures. They give the factors a sensible start, and weigh bytes against samples.
 const JOB_NS: f64 = 500_000.0;
 const BYTE_NS: f64 = 5.0;
 const SAMPLE_NS: f64 = 5.0;
+
+/// What a further view takes of a mesh, as a share of reading it.
+const VIEW_SHARE: f64 = 0.25;
 
 /// Part of the way that a factor goes towards what the last job took.
 const STEP: f64 = 0.125;
@@ -71,18 +75,18 @@ impl Estimates {
 
     /// The size of a job.
     pub fn size(&self, work: &Work) -> Size {
-        let samples = match &work.task {
-            Task::Draw(spec) => {
-                let image = &spec.image;
-                f64::from(image.width_px) * f64::from(image.height_px) * f64::from(image.samples)
-            }
-            Task::Inspect { .. } => 0.0,
+        let (samples, views) = match &work.task {
+            Task::Draw(spec) => drawn(spec),
+            Task::Inspect { .. } => (0.0, 1),
         };
         let kind = kind(&work.task);
-        let mesh = work.mesh_key.as_ref().map(|key| self.hasher.hash_one((kind, key)));
+        // What a mesh takes in one view says little about its sheets.
+        let mesh = work.mesh_key.as_ref().map(|key| self.hasher.hash_one((kind, key, views)));
         let is_known = mesh.is_some_and(|mesh| self.meshes.get(&mesh).is_some());
         let bytes = if is_known { 0 } else { work.bundle.bytes_len() };
-        let formula_ns = JOB_NS + BYTE_NS * bytes as f64 + SAMPLE_NS * samples;
+        let formula_ns = f64::from(views) * JOB_NS
+            + BYTE_NS * bytes as f64 * (1.0 + VIEW_SHARE * f64::from(views - 1))
+            + SAMPLE_NS * samples;
         Size { formula_s: formula_ns * 1e-9, kind: kind + if is_known { 2 * TASKS } else { 0 }, mesh, is_known }
     }
 
@@ -112,6 +116,17 @@ impl Estimates {
     fn locked(&self) -> std::sync::MutexGuard<'_, [f64; KINDS]> {
         self.kinds.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Samples of all views of a request, and the number of the views. The cells of a grid share the picture,
+/// and the frames of an animation have the whole size each.
+fn drawn(spec: &Spec) -> (f64, u32) {
+    let Spec { image, sheet, .. } = spec;
+    let samples = f64::from(image.width_px) * f64::from(image.height_px) * f64::from(image.samples);
+    let Some(sheet) = sheet else { return (samples, 1) };
+    let is_animated = sheet.is_animated(image.format.unwrap_or(ImageFormat::Png));
+    let frames = if is_animated { sheet.count() } else { 1 };
+    (samples * f64::from(frames), sheet.count())
 }
 
 /// The number of the kind of a task.

@@ -188,14 +188,14 @@ pub struct Timings {
 }
 
 impl Timings {
-    /// Records the duration of a stage.
+    /// Records the duration of a stage. A sheet has some stages once for each view.
     pub fn record(&mut self, stage: Stage, took: Duration) {
         *match stage {
             Stage::Parse => &mut self.parse,
             Stage::Plan => &mut self.plan,
             Stage::Render => &mut self.render,
             Stage::Encode => &mut self.encode,
-        } = took;
+        } += took;
     }
 
     /// Name and duration of every stage, in order.

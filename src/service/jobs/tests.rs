@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
+use super::estimates::Estimates;
 use super::registry::Next;
 use super::*;
 use crate::backend::{BackendKind, DrawTimes};
@@ -13,7 +14,10 @@ use crate::import::Bundle;
 use crate::limits::{Deadline, Stopped};
 use crate::pipeline::{Output, RenderError, Stage};
 use crate::spec::color::Rgba;
-use crate::spec::{BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, ProjectionKind, Spec};
+use crate::spec::{
+    BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind, Sheet,
+    SheetViews, Spec,
+};
 
 const SOON: Duration = Duration::from_secs(10);
 
@@ -50,6 +54,7 @@ fn spec() -> Spec {
         eye: None,
         target: None,
         from_file: false,
+        fits_turn: false,
     };
     let image = ImageSpec { width_px: 8, height_px: 8, format: None, samples: 1, background: Rgba::WHITE, effort: 3 };
     let light = Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3 };
@@ -57,8 +62,10 @@ fn spec() -> Spec {
         layers: Layers::default(),
         materials: Vec::new(),
         topology: None,
+        points: Points::default(),
         time_s: None,
         camera,
+        sheet: None,
         light,
         image,
         backend: BackendChoice::Cpu,
@@ -397,4 +404,20 @@ fn many_threads_lose_no_job() {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
     runtime.block_on(async { tokio::time::timeout(SOON, fixture.jobs.idle()).await.expect("idle") });
     assert_eq!((fixture.budget.used_bytes(), fixture.jobs.load().queued, fixture.jobs.load().running), (0, 0, 0));
+}
+
+#[test]
+fn the_views_of_a_sheet_are_estimated() {
+    let (estimates, budget) = (Estimates::new(), UploadBudget::new(1 << 20));
+    let estimate = |turntable: Option<u32>, columns: Option<u32>| {
+        let mut work = work(&budget, b"v 0 0 0\n");
+        let Task::Draw(spec) = &mut work.task else { panic!("it draws") };
+        (spec.image.width_px, spec.image.height_px) = (512, 512);
+        spec.sheet = turntable.map(|steps| Sheet { views: SheetViews::Turntable(steps), columns, labels: false });
+        estimates.estimate(estimates.size(&work)).as_secs_f64()
+    };
+    let one = estimate(None, None);
+    let (animation, grid) = (estimate(Some(24), None), estimate(Some(24), Some(6)));
+    assert!((animation / one - 24.0).abs() < 0.01, "{animation} {one}");
+    assert!(grid > 1.5 * one && grid < animation, "{grid} {one}");
 }

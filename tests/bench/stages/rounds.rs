@@ -116,9 +116,10 @@ pub fn import(bundle: &Bundle) -> Mesh {
     mesh
 }
 
-/// A request of 512 x 512 px unless the keys say otherwise.
+/// A request of 512 x 512 px from the view `iso`, unless the keys say otherwise.
 pub fn spec(keys: &[(&str, &str)]) -> Spec {
-    let keys: Vec<_> = keys.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
+    let keys: Vec<_> =
+        [("view", "iso")].iter().chain(keys).map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
     let rules = Rules { limits: Limits::default(), backend: BackendChoice::Cpu };
     request::read(None, &keys, &rules).unwrap()
 }

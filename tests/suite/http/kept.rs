@@ -37,7 +37,7 @@ fn a_picture_is_drawn_once_and_a_mesh_read_once() {
         assert!(first.header(name).is_some() && first.header(name) == second.header(name), "{name}");
     }
     // The same request in other words, and as a document.
-    assert_eq!(server.get(&path("style=wire&view=iso")).header("x-cache"), Some("hit"));
+    assert_eq!(server.get(&path("style=wire&view=auto")).header("x-cache"), Some("hit"));
     let document = format!(r##"{{"mesh":"{}","style":"wire","image":{{"height":64,"width":64}}}}"##, &url(&mesh)[11..]);
     let posted = server.post("/v1/render", document.as_bytes());
     assert_eq!((posted.header("x-cache"), &posted.body), (Some("hit"), &first.body));

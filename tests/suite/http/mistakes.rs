@@ -144,7 +144,7 @@ fn values_in_the_wrong_notation_are_told_the_right_one() {
     assert!(detail.contains("[x, y, z]") && detail.contains("x,y,z"), "{detail}");
     let detail = server.post("/v1/render?sise=1", CUBE_OBJ).problem(400, "unknown_key");
     let top = "did you mean size? (the keys are backend, background, camera, format, image, light, materials, \
-               max_error, outline, samples, scene, size, style, surface, topology, up, view, wire); of the mesh, a query says `format_in` and `entry`";
+               max_error, outline, points, samples, scene, sheet, size, style, surface, topology, up, view, wire); of the mesh, a query says `format_in` and `entry`";
     assert!(detail.ends_with(top), "{detail}");
 }
 

@@ -12,3 +12,4 @@ pub mod mistakes;
 pub mod openapi;
 pub mod quality_target;
 pub mod schema;
+pub mod sheets;

@@ -46,7 +46,7 @@ fn the_schema_is_valid_and_describes_every_key() {
         assert!(property["description"].as_str().is_some_and(|text| text.ends_with('.')), "{key}: {property}");
         described += 1;
     }
-    assert_eq!(described, 74);
+    assert_eq!(described, 81);
 }
 
 /// Documents that are understood.
@@ -85,6 +85,8 @@ const GOOD: &[&str] = &[
     r#"{"light":{"direction":[0,0,1e-300]}}"#,
     r##"{"image":{"width":1,"height":4096,"format":"jpg","samples":1,"background":"#fff"}}"##,
     r#"{"image":{"width":512.0,"samples":4.0,"format":null}}"#,
+    r#"{"sheet":{"views":["front","auto"],"columns":2,"labels":true},"points":{"size_px":64}}"#,
+    r#"{"sheet":{"turntable":64,"views":null},"surface":{"debug":"uv-layout"}}"#,
     r#"{"size":256,"format":"webp","samples":4,"background":"transparent","view":"iso","up":"z"}"#,
     r#"{"size":"640x480"}"#,
     r#"{"size":"640","backend":"cpu"}"#,
@@ -175,7 +177,7 @@ fn the_schema_and_the_reader_are_of_one_mind() {
         assert!(request::read(Some(document.as_bytes()), &[], &rules()).is_err(), "the reader takes {document}");
         assert!(!complaints(&validator, document).is_empty(), "the schema takes {document}");
     }
-    assert_eq!((GOOD.len(), BAD.len()), (46, 57));
+    assert_eq!((GOOD.len(), BAD.len()), (48, 57));
 }
 
 /// Documents made at random from pieces of both kinds: as many as both refuse or take; none where
@@ -257,7 +259,7 @@ fn the_schema_is_served_with_the_servers_own_limits() {
         assert!(listed.contains(&key.as_str().into()), "{key}");
         keys += 1;
     }
-    assert_eq!(keys, 19);
+    assert_eq!(keys, 21);
     assert_eq!(schema["properties"]["mesh"]["pattern"], "^[0-9a-f]{64}$");
 
     let etag = answer.header("etag").unwrap().to_owned();

@@ -20,7 +20,7 @@ use crate::support::server::{Server, meshsnap};
 use crate::support::skip::{Need, skip};
 
 /// Requests under api/examples.
-const EXAMPLES: usize = 33;
+const EXAMPLES: usize = 40;
 
 const SIZE_PX: u32 = 256;
 
@@ -190,10 +190,12 @@ fn the_lamp_has_what_looks_are_about() {
 }
 
 /// Examples that the knot, a closed surface of one material, would not do justice.
-const OF_THE_LAMP: [&str; 9] = [
+const OF_THE_LAMP: [&str; 11] = [
     "boundary",
     "debug-face-orientation",
     "debug-uv",
+    "debug-uv-layout",
+    "debug-uv-stretch",
     "debug-vertex-color",
     "feature-edges",
     "glow",
@@ -280,7 +282,7 @@ fn the_examples_show_every_look() {
             words += 1;
         }
     }
-    assert_eq!(words, 36);
+    assert_eq!(words, 41);
 }
 
 /// As a stranger would: from the root of a clone, exactly the line that the server prints.

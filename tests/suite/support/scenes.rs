@@ -212,9 +212,9 @@ pub fn mesh_of(bytes: &[u8]) -> Result<Mesh, meshsnap::import::MeshError> {
     .map(|imported| imported.mesh)
 }
 
-/// Reads dotted keys that must be good.
+/// Reads dotted keys that must be good. The view is `iso` where they name none.
 pub fn spec(keys: &[(&str, &str)]) -> Spec {
-    let keys: Vec<_> = keys.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
+    let keys: Vec<_> = [("view", "iso")].iter().chain(keys).map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
     let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
     request::read(None, &keys, &rules).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -133,9 +133,9 @@ impl Scene {
 
     /// A request for the scene, `keys` over its own.
     pub fn spec(&self, size_px: u32, keys: &[(&str, String)]) -> Spec {
-        let mut all = vec![("size".to_owned(), size_px.to_string())];
+        let view = if self.is_flat { "front" } else { "iso" };
+        let mut all = vec![("size".to_owned(), size_px.to_string()), ("view".into(), view.into())];
         if self.is_flat {
-            all.push(("view".into(), "front".into()));
             all.push(("camera.projection".into(), "orthographic".into()));
             all.push(("camera.height".into(), size_px.to_string()));
         }

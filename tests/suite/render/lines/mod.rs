@@ -5,5 +5,6 @@ pub mod formulas;
 pub mod holes;
 pub mod limits;
 pub mod looks;
+pub mod points;
 pub mod primitives;
 pub mod shortcuts;

@@ -3,6 +3,7 @@
 pub mod bad;
 pub mod basis;
 pub mod closeup;
+pub mod cut_out;
 pub mod formulas;
 pub mod levels;
 pub mod without;

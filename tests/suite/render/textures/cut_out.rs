@@ -1,0 +1,57 @@
+//! Cut-out textures seen from afar: as much is drawn as close up.
+
+use image::{DynamicImage, ImageFormat, Rgba, RgbaImage};
+use meshsnap::backend::Renderer as _;
+use meshsnap::backend::cpu::CpuRenderer;
+use meshsnap::backend::gpu::GpuRenderer;
+use meshsnap::limits::Deadline;
+use meshsnap::mesh::Mesh;
+use serde_json::json;
+
+use crate::render::textures::levels::{encode, model};
+use crate::support::gpus::gpus;
+use crate::support::likeness::{Likeness, Tolerance};
+use crate::support::scenes;
+
+/// A square with a lattice whose bars are 2 of 16 texels wide.
+fn lattice(cutoff: f64) -> Mesh {
+    let is_bar = |x: u32, y: u32| x % 16 < 2 || y % 16 < 2;
+    let image = RgbaImage::from_fn(256, 256, |x, y| Rgba([90, 140, 60, if is_bar(x, y) { 255 } else { 0 }]));
+    let image = encode(&DynamicImage::ImageRgba8(image), ImageFormat::Png);
+    let material = json!({
+        "alphaMode": "MASK", "alphaCutoff": cutoff, "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } },
+    });
+    let corners =
+        [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]], [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]];
+    let uvs = [[[0.0, 1.0], [1.0, 1.0], [1.0, 0.0]], [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]]];
+    model(&corners, &uvs, &image, material)
+}
+
+#[test]
+fn a_lattice_covers_as_much_from_afar() {
+    let mut cpu = CpuRenderer::new(2);
+    let mut gpu = gpus().map(|gpus| GpuRenderer::new(gpus[0].clone()));
+    let whole = 1.0 - (14.0_f64 / 16.0).powi(2);
+    let mut sizes = 0;
+    for cutoff in [0.5, 0.75, 0.9] {
+        let mesh = lattice(cutoff);
+        for size in ["512", "256", "128", "64", "32"] {
+            let keys = [("view", "front"), ("style", "unlit"), ("background", "transparent"), ("samples", "16")];
+            let spec = scenes::spec(
+                &[&keys[..], &[("size", size), ("camera.margin", "0"), ("camera.projection", "orthographic")]].concat(),
+            );
+            let plan = scenes::plan(&mesh, &spec);
+            let picture = cpu.draw(&plan, &Deadline::default()).unwrap();
+            let alpha: f64 = picture.rgba.chunks(4).map(|pixel| f64::from(pixel[3]) / 255.0).sum();
+            let covered = alpha / (picture.rgba.len() / 4) as f64;
+            println!("cutoff {cutoff}, {size} px: {covered:.3} of {whole:.3}");
+            assert!(covered > 0.5 * whole && covered < 2.0 * whole, "cutoff {cutoff}, {size} px: {covered} of {whole}");
+            if let Some(gpu) = &mut gpu {
+                let like = Likeness::of(&gpu.draw(&plan, &Deadline::default()).unwrap(), &picture);
+                assert!(like.is_within(Tolerance::TWINS), "{size}: {like}");
+            }
+            sizes += 1;
+        }
+    }
+    assert_eq!(sizes, 15);
+}
