@@ -7,6 +7,7 @@
 //!     cargo bench --bench stages -- --growth                  # time and memory against triangles, pixels, samples
 //!     cargo bench --bench stages -- --growth --write          # the same into docs/growth.md and docs/growth.svg
 //!     cargo bench --bench stages -- --fill                  # triangles and samples a second, one thread
+//!     cargo bench --bench stages -- --png tests/golden        # PNG of the pictures in a folder: size and time
 //!     cargo bench --bench stages -- --gate                    # fails where a stage has become slower
 //!     cargo bench --bench stages -- --write                   # keeps today's ratios for the gate
 //!
@@ -21,6 +22,7 @@ mod fill;
 mod growth;
 mod meshes;
 mod plot;
+mod png;
 mod reference;
 mod rounds;
 
@@ -40,12 +42,17 @@ struct Options {
     write: bool,
     growth: bool,
     fill: bool,
+    png: Vec<String>,
 }
 
 fn main() -> ExitCode {
     let options = options();
     if options.fill {
         fill::print();
+        return ExitCode::SUCCESS;
+    }
+    if !options.png.is_empty() {
+        png::print(&options.png, options.rounds);
         return ExitCode::SUCCESS;
     }
     if options.growth {
@@ -70,8 +77,16 @@ fn main() -> ExitCode {
 
 fn options() -> Options {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut options =
-        Options { meshes: Vec::new(), threads, rounds: 15, gate: false, write: false, growth: false, fill: false };
+    let mut options = Options {
+        meshes: Vec::new(),
+        threads,
+        rounds: 15,
+        gate: false,
+        write: false,
+        growth: false,
+        fill: false,
+        png: Vec::new(),
+    };
     let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
     while let Some(name) = arguments.next() {
         let mut value = || arguments.next().unwrap_or_else(|| panic!("{name} lacks its value"));
@@ -83,6 +98,7 @@ fn options() -> Options {
             "--write" => options.write = true,
             "--growth" => options.growth = true,
             "--fill" => options.fill = true,
+            "--png" => options.png.push(value()),
             other => panic!("{other} is unknown: see the top of tests/bench/stages/main.rs"),
         }
     }
