@@ -162,7 +162,7 @@ struct Position {
 }
 
 impl Position {
-    /// Adds up to 57 bits. There is room for eight bytes.
+    /// Adds up to 56 bits. There is room for eight bytes.
     #[inline(always)]
     fn put(self, out: &mut [u8], bits: u64, count: u32) -> Self {
         let word = self.rest | bits << self.rest_bits;
@@ -170,7 +170,7 @@ impl Position {
         if let Some(place) = out.get_mut(self.at..self.at + 8) {
             place.copy_from_slice(&word.to_le_bytes());
         }
-        Self { rest: word.unbounded_shr(filled & !7), rest_bits: filled & 7, at: self.at + (filled >> 3) as usize }
+        Self { rest: word.wrapping_shr(filled & !7), rest_bits: filled & 7, at: self.at + (filled >> 3) as usize }
     }
 }
 
@@ -290,10 +290,9 @@ impl Sink for Writer<'_> {
     #[inline(always)]
     fn four(mut self, literals: [u8; 4]) -> Self {
         let [a, b, c, d] = literals.map(|literal| self.codes[usize::from(literal)]);
-        let (to_b, to_d) = (length(a), length(c));
-        let to_c = to_b + length(b);
-        let all = bits(a) | bits(b) << to_b | (bits(c) | bits(d) << to_d) << to_c;
-        self.position = self.position.put(self.out, all, to_c + to_d + length(d));
+        let (ab, abc) = (a.wrapping_add(b), a.wrapping_add(b).wrapping_add(c));
+        let all = bits(a) | bits(b) << length(a) | bits(c) << length(ab) | bits(d) << length(abc);
+        self.position = self.position.put(self.out, all, length(abc.wrapping_add(d)));
         self
     }
 

@@ -3,19 +3,20 @@
 /// Bits of the longest code that Deflate has for literals and lengths.
 const BITS_MAX: usize = 15;
 
-/// A code as it is written, lowest bit first, and its length in bits in the upper half.
+/// A code's length in the lowest six bits, and above them the code as it is written, lowest bit
+/// first. Lengths of a few codes add up where they are, and processors shift by the lowest six bits.
 pub type Code = u32;
 
-/// The length of a code, bits.
+/// The length of a code, bits; or that of some codes whose sum this is.
 #[inline(always)]
 pub fn length(code: Code) -> u32 {
-    code >> 16
+    code & 63
 }
 
 /// The bits of a code.
 #[inline(always)]
 pub fn bits(code: Code) -> u64 {
-    u64::from(code & 0xFFFF)
+    u64::from(code >> 6)
 }
 
 /// The lengths of a complete code for symbols that occur so often, none longer than `max` bits. A
@@ -94,7 +95,7 @@ pub fn codes(lengths: &[u8]) -> impl Iterator<Item = Code> {
         }
         let code: u32 = next[usize::from(length)];
         next[usize::from(length)] += 1;
-        (code.reverse_bits() >> (32 - u32::from(length))) | u32::from(length) << 16
+        (code.reverse_bits() >> (32 - u32::from(length))) << 6 | u32::from(length)
     })
 }
 
@@ -133,7 +134,7 @@ mod tests {
                 for (i, a) in codes.iter().enumerate() {
                     for b in &codes[i + 1..] {
                         let shared = (1 << length(*a).min(length(*b))) - 1;
-                        assert_ne!(a & shared, b & shared);
+                        assert_ne!(bits(*a) & shared, bits(*b) & shared);
                     }
                 }
             }

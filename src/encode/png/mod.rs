@@ -132,7 +132,15 @@ mod tests {
     #[test]
     fn both_filters_come_back_exactly() {
         let (width_px, height_px) = (61, 40);
-        let pixel = |x: u32, y: u32| [[y * y, y * 3, y ^ 5, 255], [x * x * 7, x * 37, x * x * x, x]];
+        // Runs of any colours, which Paeth does not shorten; and columns, which it does.
+        let any = |i: u32| {
+            let mixed = i.wrapping_mul(2_654_435_761);
+            (mixed ^ mixed >> 15).wrapping_mul(2_246_822_519) >> 24
+        };
+        let pixel = |x: u32, y: u32| {
+            let runs = [97, 131, 57].map(|k| any(x / 8 + k * y));
+            [[runs[0], runs[1], runs[2], 255], [any(x), any(x + 9), any(x + 99), x]]
+        };
         for (kind, expected) in [(0, Filter::Sub), (1, Filter::Paeth)] {
             let pixels = (0..width_px * height_px).flat_map(|i| pixel(i % width_px, i / width_px)[kind]);
             let image = Image { width_px, height_px, rgba: pixels.map(|v| v as u8).collect() };
