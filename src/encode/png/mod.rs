@@ -132,13 +132,14 @@ mod tests {
     #[test]
     fn both_filters_come_back_exactly() {
         let (width_px, height_px) = (61, 40);
-        // Runs of any colours, which Paeth does not shorten; and columns, which it does.
+        // Runs of any colours that begin elsewhere in each row, which spoils Paeth; and columns, which
+        // it takes from above.
         let any = |i: u32| {
             let mixed = i.wrapping_mul(2_654_435_761);
             (mixed ^ mixed >> 15).wrapping_mul(2_246_822_519) >> 24
         };
         let pixel = |x: u32, y: u32| {
-            let runs = [97, 131, 57].map(|k| any(x / 8 + k * y));
+            let runs = [97, 131, 57].map(|k| any((x + 3 * y) / 8 + k * y));
             [[runs[0], runs[1], runs[2], 255], [any(x), any(x + 9), any(x + 99), x]]
         };
         for (kind, expected) in [(0, Filter::Sub), (1, Filter::Paeth)] {

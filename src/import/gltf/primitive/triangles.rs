@@ -59,8 +59,9 @@ pub fn lines_and_points(
 pub fn check_indices(what: &str, indices: &[u32], vertices: usize) -> Result<(), MeshError> {
     // The maximum of a list is found faster than the first index that is too large.
     let is_bad = |i: u32| i as usize >= vertices;
-    let largest = map(indices.chunks(INDICES_PER_PIECE).collect(), |piece: &[u32]| piece.iter().copied().max());
-    match largest.into_iter().flatten().max().filter(|largest| is_bad(*largest)) {
+    let largest =
+        map(indices.chunks(INDICES_PER_PIECE).collect(), |piece: &[u32]| piece.iter().copied().fold(0, u32::max));
+    match largest.into_iter().max().filter(|largest| is_bad(*largest)) {
         None => Ok(()),
         Some(largest) => {
             let bad = indices.iter().copied().find(|i| is_bad(*i)).unwrap_or(largest);
