@@ -23,6 +23,9 @@ const SMALL_EFFORT_MIN: u32 = 4;
 /// Rows that the filter and the code of a quick file are chosen by, at least, where there are so many.
 const SAMPLE_ROWS: usize = 16;
 
+/// Pixels from which Sub may take more bits than Paeth.
+const LARGE_PIXELS_MIN: usize = 1 << 16;
+
 /// Rows compressed between two polls of the deadline.
 const POLL_ROWS: usize = 64;
 
@@ -97,9 +100,10 @@ fn compressed<const CHANNELS: usize>(image: &Image) -> Vec<u8> {
         filtered::<CHANNELS>(filter, image, step / 2, step, |line| sample.add(line));
         sample.fit()
     });
-    // Paeth takes much longer.
-    let (filter, fitted) =
-        if sub.sample_bits * 25 <= paeth.sample_bits * 27 { (Filter::Sub, sub) } else { (Filter::Paeth, paeth) };
+    // Paeth takes much longer, which matters for large pictures.
+    let allowed_percent = if image.rgba.len() / 4 < LARGE_PIXELS_MIN { 100 } else { 108 };
+    let suits = sub.sample_bits * 100 <= paeth.sample_bits * allowed_percent;
+    let (filter, fitted) = if suits { (Filter::Sub, sub) } else { (Filter::Paeth, paeth) };
     let mut stream = Stream::new(&fitted, image.rgba.len() / 16);
     filtered::<CHANNELS>(filter, image, 0, 1, |line| stream.add(line));
     stream.finish()
