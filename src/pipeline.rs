@@ -35,11 +35,14 @@ pub fn render(
     let mut budget = Budget::new(limits);
 
     // Bytes -> Mesh
-    let options = import::Options { format: job.format_in, time_s: job.spec.time_s };
-    let model = Model::read(job.bundle, options, limits, &mut budget, deadline)?;
+    let Job { bundle, format_in, spec } = job;
+    let options = import::Options { format: format_in, time_s: spec.time_s };
+    let model = Model::read(&bundle, options, limits, &mut budget, deadline)?;
+    // If nobody else has them, drawing can have the memory of the files.
+    drop(bundle);
     ended(Stage::Parse);
 
-    render_model(&model, job.spec, backends, &mut budget, deadline, ended)
+    render_model(&model, spec, backends, &mut budget, deadline, ended)
 }
 
 /// Turns a mesh that is in memory already into the bytes of a picture.
@@ -231,10 +234,10 @@ impl Model {
 }
 
 /// The input of [`render`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Job<'a> {
-    /// The uploaded files: the mesh, and its materials and textures.
-    pub bundle: &'a Bundle,
+    /// The uploaded files: the mesh, and its materials and textures. Clones share their bytes.
+    pub bundle: Bundle,
     /// The mesh's format; None: sniffed from its bytes.
     pub format_in: Option<Format>,
     /// The request.

@@ -186,7 +186,7 @@ fn run_pipeline(bytes: &[u8]) {
     let overrides = fixed.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let Ok(spec) = request::read((!document.is_empty()).then_some(document), &overrides, &rules) else { return };
     let bundle = Bundle::of_one(mesh.to_vec());
-    let job = Job { bundle: &bundle, format_in: None, spec: &spec };
+    let job = Job { bundle, format_in: None, spec: &spec };
     let deadline = Deadline::default();
     let drawn =
         BACKENDS.with_borrow_mut(|backends| pipeline::render(job, backends, &rules.limits, &deadline, &mut |_| {}));

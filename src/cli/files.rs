@@ -7,8 +7,13 @@ use bytes::Bytes;
 
 use crate::cli::error::CliError;
 
-/// Files from this size on are read into large pages, bytes.
-const LARGE_BYTES: u64 = 4 << 20;
+/// Files from this size on are read into large pages, bytes. A page of 4 KiB takes longer to get than
+/// to fill.
+const LARGE_BYTES: u64 = 1 << 20;
+
+/// A large page, bytes. Memory of whole ones needs no others.
+#[cfg(target_os = "linux")]
+const LARGE_PAGE_BYTES: usize = 2 << 20;
 
 /// Reads a whole file, or standard input for `-`, of at most `bytes_max`.
 pub fn read(name: &str, bytes_max: u64) -> Result<Bytes, CliError> {
@@ -52,16 +57,17 @@ fn too_large(name: &str, bytes_max: u64) -> CliError {
 #[cfg(target_os = "linux")]
 fn read_large(file: &mut File, length: u64) -> io::Result<Option<Bytes>> {
     let Ok(length) = usize::try_from(length) else { return Ok(None) };
-    let Ok(mut pages) = memmap2::MmapMut::map_anon(length) else { return Ok(None) };
+    let Some(whole) = length.checked_next_multiple_of(LARGE_PAGE_BYTES) else { return Ok(None) };
+    let Ok(mut pages) = memmap2::MmapMut::map_anon(whole) else { return Ok(None) };
     if pages.advise(memmap2::Advice::HugePage).is_err() {
         return Ok(None);
     }
-    match file.read_exact(&mut pages) {
+    match file.read_exact(&mut pages[..length]) {
         Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(None),
         other => other?,
     }
     let has_more = file.read(&mut [0])? > 0;
-    Ok((!has_more).then(|| Bytes::from_owner(pages)))
+    Ok((!has_more).then(|| Bytes::from_owner(pages).slice(..length)))
 }
 
 /// No system but Linux is asked for large pages.

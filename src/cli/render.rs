@@ -9,6 +9,7 @@ use clap::Args;
 use super::progress::Progress;
 use super::settings::LimitSettings;
 use super::{bundle, files};
+use crate::backend::cpu::DrawingThreads;
 use crate::backend::{Backends, GpuHost, GpuStatus, HardwareHint};
 use crate::cli::error::CliError;
 use crate::config::{cores, why_no_gpu};
@@ -123,15 +124,16 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
         stage_began = Instant::now();
     };
     let threads = arguments.threads.map_or(cores() as usize, usize::from);
-    if arguments.threads.is_some() {
-        // Rayon's global pool parses files, finds edges, normals and outlines, and decodes textures. This
-        // fails only if that pool is running already.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-    }
     let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), arguments.cache_dir.clone()));
-    let mut backends = Backends::new(gpu.clone(), threads);
-    let job = Job { bundle: &bundle, format_in, spec: &spec };
-    let output = pipeline::render(job, &mut backends, &limits, &Deadline::default(), &mut ended)
+    let job = Job { bundle, format_in, spec: &spec };
+    // The threads that draw also parse the file, find edges, normals and outlines, and decode textures:
+    // a second pool would take time to start, and its idle threads time from busy ones.
+    let drawing = Arc::new(DrawingThreads::new(threads));
+    let output = drawing
+        .install(|| {
+            let mut backends = Backends::sharing(gpu.clone(), drawing.clone());
+            pipeline::render(job, &mut backends, &limits, &Deadline::default(), &mut ended)
+        })
         .map_err(|error| CliError::from(error).about(mesh_name))?;
     drop(progress);
 

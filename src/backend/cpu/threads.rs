@@ -40,6 +40,15 @@ impl DrawingThreads {
         self.pool.as_ref().map_or(1, ThreadPool::current_num_threads)
     }
 
+    /// Runs `work` on one of the threads, so that what it divides among threads is done by these; by
+    /// the caller if there is one.
+    pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        match &self.pool {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
+    }
+
     /// Begins a picture.
     pub fn share(&self) -> Share<'_> {
         self.drawing.fetch_add(1, Ordering::Relaxed);

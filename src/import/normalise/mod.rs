@@ -77,7 +77,8 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     }
     (mesh.normals, mesh.uvs, mesh.colors) = (normals, uvs, colors);
     mesh.materials = raw.materials;
-    let of_triangles = mesh.triangle_materials.iter().copied().max();
+    let largest = |piece: &[u32]| piece.iter().copied().fold(0, u32::max);
+    let of_triangles = map(mesh.triangle_materials.chunks(POSITIONS_PER_PIECE).collect(), largest).into_iter().max();
     let of_lines_and_points = mesh.lines_and_points.iter().map(|one| one.material).max();
     let slots = of_triangles.max(of_lines_and_points).unwrap_or(0) as usize + 1;
     while mesh.materials.len() < slots {

@@ -6,6 +6,7 @@ use super::geometry::{Geometry, Key};
 use super::weld::{Bits, NEW, Welded, weld};
 use crate::limits::{Deadline, Stopped};
 use crate::parallel::{concat, each_piece, map, map_items};
+use bytemuck::allocation::zeroed_vec;
 use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -137,7 +138,8 @@ fn slices(all: &[Vec<Bits>]) -> Vec<&[Bits]> {
 }
 
 /// The order of first use, found by threads side by side: for each welded position first the piece
-/// that uses it first, and then its number.
+/// that uses it first, and then its number. They are stored as complements, so that the list begins as
+/// zeros, which the system gives without a write.
 struct Order(Vec<AtomicU32>);
 
 /// Marks a piece that has counted its first use of a position.
@@ -146,7 +148,7 @@ const CLAIMED: u32 = 1 << 31;
 impl Order {
     /// An order of so many welded positions.
     fn of(count: usize) -> Self {
-        Self((0..count).map(|_| AtomicU32::new(UNSEEN)).collect())
+        Self(zeroed_vec(count))
     }
 
     #[inline(always)]
@@ -157,9 +159,8 @@ impl Order {
     /// Says that a piece uses a position.
     #[inline(always)]
     fn see(&self, welded: u32, piece: u32) {
-        let place = self.place(welded);
-        if place.load(Relaxed) > piece {
-            place.fetch_min(piece, Relaxed);
+        if self.of_welded(welded) > piece {
+            self.place(welded).fetch_max(!piece, Relaxed);
         }
     }
 
@@ -177,12 +178,12 @@ impl Order {
     /// The number of a position, or what is known so far.
     #[inline(always)]
     fn of_welded(&self, welded: u32) -> u32 {
-        self.place(welded).load(Relaxed)
+        !self.place(welded).load(Relaxed)
     }
 
     #[inline(always)]
     fn set(&self, welded: u32, number: u32) {
-        self.place(welded).store(number, Relaxed);
+        self.place(welded).store(!number, Relaxed);
     }
 
     /// Numbers the positions that pieces are the first to use; `entry` gives a position's welded

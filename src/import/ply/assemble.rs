@@ -31,7 +31,7 @@ pub fn assemble(
     let is_needed = Splitter::is_needed_for(faces, raw);
     // An upper bound: every polygon has two triangles fewer than corners.
     let triangles = faces.corners.len() - 2 * faces.arities.len();
-    if !is_needed && faces.textures.is_empty() && faces.arities.iter().all(|arity| *arity == 3) {
+    if !is_needed && faces.textures.is_empty() && faces.arities.are_triangles() {
         Splitter::new(faces, raw, cx)?;
         cx.check_triangles(triangles as u64)?;
         cx.budget.spend("the PLY triangles", triangles as u64, 12 + 1 + 4 + 4)?;
@@ -54,7 +54,7 @@ pub fn assemble(
     let mut triangulator = Triangulator::default();
     let mut own = Vec::new();
     let (mut at, mut polled) = (0, 0);
-    for (face, &arity) in faces.arities.iter().enumerate() {
+    for (face, arity) in faces.arities.iter().enumerate() {
         let corners = &faces.corners[at..at + arity as usize];
         if at - polled >= CORNERS_PER_POLL {
             cx.deadline.check()?;

@@ -84,7 +84,8 @@ fn is_triangles(layout: &Layout) -> bool {
 }
 
 /// The triangle of a record, if it is one and its indices are below `vertices`.
-fn triangle<const BIG: bool>(record: &[u8], vertices: u32) -> Option<[u32; 3]> {
+#[inline(always)]
+fn triangle<const BIG: bool>(record: &[u8; TRIANGLE_BYTES], vertices: u32) -> Option<[u32; 3]> {
     let index = |at: usize| {
         let own = [record[at], record[at + 1], record[at + 2], record[at + 3]];
         if BIG { u32::from_be_bytes(own) } else { u32::from_le_bytes(own) }
@@ -111,7 +112,7 @@ impl<const BIG: bool> Source for Binary<'_, BIG> {
         let body =
             &body[..body.len().min(usize::try_from(records).unwrap_or(usize::MAX).saturating_mul(TRIANGLE_BYTES))];
         let runs = map(body.chunks(TRIANGLES_PER_PIECE * TRIANGLE_BYTES).collect(), |records: &[u8]| {
-            let run = records.chunks_exact(TRIANGLE_BYTES).take_while(|record| record[0] == 3).count();
+            let run = records.as_chunks::<TRIANGLE_BYTES>().0.iter().take_while(|record| record[0] == 3).count();
             (run, records.len() / TRIANGLE_BYTES)
         });
         leading(&runs) as u64
@@ -131,9 +132,10 @@ impl<const BIG: bool> Source for Binary<'_, BIG> {
         let pieces = records.zip(corners[before..].chunks_mut(3 * TRIANGLES_PER_PIECE)).collect();
         let runs = map(pieces, |(records, corners): (&[u8], &mut [u32])| {
             let mut run = 0;
-            for (record, corners) in records.chunks_exact(TRIANGLE_BYTES).zip(corners.chunks_exact_mut(3)) {
+            let places = corners.as_chunks_mut::<3>().0;
+            for (record, place) in records.as_chunks::<TRIANGLE_BYTES>().0.iter().zip(places) {
                 let Some(triangle) = triangle::<BIG>(record, vertices) else { break };
-                corners.copy_from_slice(&triangle);
+                *place = triangle;
                 run += 1;
             }
             (run, records.len() / TRIANGLE_BYTES)

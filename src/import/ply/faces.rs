@@ -24,8 +24,8 @@ pub const NO_TEXTURE: u32 = u32::MAX;
 pub struct Faces {
     /// Vertex indices, face by face, all in range.
     pub corners: Vec<u32>,
-    /// Corners of each face: at least three.
-    pub arities: Vec<u32>,
+    /// Corners of each face.
+    pub arities: Arities,
     /// Texture coordinates per corner, up to the last face that has any; or empty.
     pub uvs: Vec<[f32; 2]>,
     /// Linear RGBA per face, up to the last one that has any; or empty.
@@ -36,6 +36,55 @@ pub struct Faces {
     pub short_faces: u64,
     /// Faces whose list of texture coordinates is not two numbers per corner.
     pub odd_uvs: u64,
+}
+
+/// Corners of each face: at least three. Most files have triangles alone, which take no list.
+#[derive(Debug, Default)]
+pub struct Arities {
+    /// Triangles before the first other face.
+    triangles: usize,
+    /// Corners of the faces from there on.
+    others: Vec<u32>,
+}
+
+impl Arities {
+    /// Adds a face.
+    pub fn push(&mut self, corners: u32) {
+        if corners == 3 && self.others.is_empty() {
+            self.triangles += 1;
+        } else {
+            self.others.push(corners);
+        }
+    }
+
+    /// Adds triangles.
+    pub fn push_triangles(&mut self, count: usize) {
+        if self.others.is_empty() {
+            self.triangles += count;
+        } else {
+            self.others.resize(self.others.len() + count, 3);
+        }
+    }
+
+    /// Number of faces.
+    pub fn len(&self) -> usize {
+        self.triangles + self.others.len()
+    }
+
+    /// True without a face.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// True if all faces are triangles.
+    pub fn are_triangles(&self) -> bool {
+        self.others.iter().all(|&corners| corners == 3)
+    }
+
+    /// The corners of each face.
+    pub fn iter(&self) -> impl Iterator<Item = u32> {
+        std::iter::repeat_n(3, self.triangles).chain(self.others.iter().copied())
+    }
 }
 
 impl Faces {
@@ -64,7 +113,7 @@ impl Faces {
         // Lists double when they grow.
         let cost = Cost { record: 2 * (4 + 16 + 4), item: 2 * (4 + 8) };
         let run = leading_triangles(source, element, &layout, vertices, (cost, meter), &mut self.corners, cx)?;
-        self.arities.resize(self.arities.len() + run as usize, 3);
+        self.arities.push_triangles(run as usize);
         each_record_from(run, source, element, &layout, (cost, meter), cx, |row| {
             let corners = &row.lists[CORNERS];
             let before = self.corners.len();

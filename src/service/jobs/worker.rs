@@ -46,7 +46,7 @@ pub fn pipeline_renderers(
             let Work { bundle, format_in, mesh_key, task, .. } = work;
             match task {
                 Task::Draw(spec) => {
-                    let job = pipeline::Job { bundle, format_in: *format_in, spec };
+                    let job = pipeline::Job { bundle: bundle.clone(), format_in: *format_in, spec };
                     let (output, mesh_was_kept) = match mesh_key {
                         Some(key) => {
                             render_stored((key.as_str(), job), &residents, &mut backends, &limits, deadline, ended)?
@@ -80,7 +80,7 @@ fn render_stored(
     let Found { resident, was_kept } = residents.find(&key, deadline, || {
         let mut budget = Budget::new(limits);
         let options = import::Options { format: job.format_in, time_s };
-        let model = Model::read(job.bundle, options, limits, &mut budget, deadline)?;
+        let model = Model::read(&job.bundle, options, limits, &mut budget, deadline)?;
         Ok(Resident { model, budget })
     })?;
     ended(Stage::Parse);

@@ -210,7 +210,12 @@ impl Primitive {
     ) -> Result<(), MeshError> {
         raw.edge_masks.resize(raw.triangles.len(), ALL_EDGES);
         let material = self.material.unwrap_or(default_material) as u32;
-        raw.triangle_materials.resize(raw.triangles.len(), material);
+        if raw.triangle_materials.is_empty() && material == 0 {
+            // Zeros from the system, which nobody has to write.
+            raw.triangle_materials = vec![0; raw.triangles.len()];
+        } else {
+            raw.triangle_materials.resize(raw.triangles.len(), material);
+        }
         cx.budget.spend(
             "glTF lines and points",
             self.lines_and_points.len() as u64,

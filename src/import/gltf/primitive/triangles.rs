@@ -4,8 +4,12 @@ use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::gltf::document::schema::mode;
 use crate::mesh::primitives::{POINT_TRIANGLES, SEGMENT_TRIANGLES};
+use crate::parallel::map;
 use crate::pluralise::pluralise;
 use bytemuck::allocation::try_cast_vec as cast_vec;
+
+/// Indices that a thread looks at at a time.
+const INDICES_PER_PIECE: usize = 65_536;
 
 /// The number of triangles from a number of corners. Corners of an incomplete triangle are ignored.
 pub fn count(mode: usize, corners: u64) -> u64 {
@@ -55,7 +59,9 @@ pub fn lines_and_points(
 pub fn check_indices(what: &str, indices: &[u32], vertices: usize) -> Result<(), MeshError> {
     // The maximum of a list is found faster than the first index that is too large.
     let is_bad = |i: u32| i as usize >= vertices;
-    match indices.iter().copied().max().filter(|largest| is_bad(*largest)) {
+    let largest =
+        map(indices.chunks(INDICES_PER_PIECE).collect(), |piece: &[u32]| piece.iter().copied().fold(0, u32::max));
+    match largest.into_iter().max().filter(|largest| is_bad(*largest)) {
         None => Ok(()),
         Some(largest) => {
             let bad = indices.iter().copied().find(|i| is_bad(*i)).unwrap_or(largest);

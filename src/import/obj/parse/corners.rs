@@ -53,7 +53,11 @@ impl Parser<'_, '_, '_> {
                 self.end_of_line(at)?
             }
         };
-        self.lists.corners.extend(&face[..arity]);
+        // Of known lengths, which take no call to be copied.
+        match face {
+            [a, b, c, _] if arity == 3 => self.lists.corners.extend(&[a, b, c]),
+            quad => self.lists.corners.extend(&quad),
+        }
         let largest = face.into_iter().fold(0, u32::max);
         self.see([largest, MISSING, MISSING], 1);
         self.part.triangles += arity as u64 - 2;

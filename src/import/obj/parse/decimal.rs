@@ -27,7 +27,11 @@ const WHOLE_POWERS: [u64; DIGITS_MAX + 1] = {
 pub fn leading(bytes: &[u8], begin: usize) -> Option<(f64, usize)> {
     let sign = *bytes.get(begin)?;
     let digits_begin = begin + usize::from(sign == b'-' || sign == b'+');
-    let (mut digits, mut at) = whole(bytes, digits_begin);
+    // Most numbers have one digit before the point.
+    let (mut digits, mut at) = match (digit(bytes, digits_begin), bytes.get(digits_begin + 1)) {
+        (Some(digit), Some(b'.')) => (digit, digits_begin + 1),
+        _ => whole(bytes, digits_begin),
+    };
     let mut count = at - digits_begin;
     let mut exponent = 0;
     if bytes.get(at) == Some(&b'.') {
@@ -107,7 +111,7 @@ pub fn parse(word: &[u8]) -> Option<f64> {
     }
 }
 
-#[inline]
+#[inline(always)]
 fn digit(bytes: &[u8], at: usize) -> Option<u64> {
     let digit = bytes.get(at)?.wrapping_sub(b'0');
     (digit < 10).then_some(u64::from(digit))
