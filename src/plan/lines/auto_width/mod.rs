@@ -86,7 +86,9 @@ impl FaceSizes {
         let one_in = 1_u64 << (count / LOOKED_AT).max(1).ilog2();
         let chunk = |first: usize| {
             let mut sizes = Self([0; CLASSES]);
-            for i in (first..count.min(first + CHUNK)).filter(|&i| view.hash_of(i) % one_in == 0 && has_lines(i)) {
+            for i in
+                (first..count.min(first + CHUNK)).filter(|&i| view.hash_of(i).is_multiple_of(one_in) && has_lines(i))
+            {
                 if let Some([area, diameter]) = view.size_of(i) {
                     sizes.0[class_of(diameter)] += (area * 256.0).round() as u64;
                 }

@@ -113,6 +113,8 @@ impl Technique {
         };
         if matches!(self, Contour | Hull) {
             keys.extend([("outline.method", self.name()), ("outline.unit", "px"), ("outline.color", "fff")]);
+            // The truth has the short chains, too.
+            keys.push(("outline.min_length", "0"));
         }
         let mut keys: Vec<(&str, String)> = keys.into_iter().map(|(k, v)| (k, v.to_owned())).collect();
         match self {

@@ -21,7 +21,7 @@ const SPECKS_MAX: usize = 3;
 
 /// Meshes that miss the goal, with the specks that they have: sheets that lie closely over each
 /// other, and triangles without order.
-const MORE: [(&str, usize); 2] = [("DamagedHelmet.glb", 16), ("soup.stl", 5)];
+const MORE: [(&str, usize); 2] = [("DamagedHelmet.glb", 19), ("soup.stl", 5)];
 
 #[test]
 fn outlines_specks_are_few_on_the_models_of_the_repository() {
