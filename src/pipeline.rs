@@ -38,7 +38,7 @@ pub fn render(
     let Job { bundle, format_in, spec } = job;
     let options = import::Options { format: format_in, time_s: spec.time_s };
     let model = Model::read(&bundle, options, limits, &mut budget, deadline)?;
-    // If nobody else has them, drawing can have the memory of the files.
+    // The files' memory is free for drawing, unless the caller holds them, too.
     drop(bundle);
     ended(Stage::Parse);
 

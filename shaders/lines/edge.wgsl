@@ -391,7 +391,7 @@ fn draw_waiting(least: u32, thread: u32) {
     }
 }
 
-// True if only some pixels get strokes.
+// True if only the pixels that points do not tell about get strokes.
 fn only_stroked() -> bool {
     return has(HOLED) && (batch.line_flags & (HOLES | RIM_PASS)) == HOLES;
 }

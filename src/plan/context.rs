@@ -25,7 +25,7 @@ pub struct PlanContext<'c> {
     pub deadline: &'c Deadline,
     /// The skips so far.
     pub skips: Skips<'c>,
-    /// What the picture has to go without, and why.
+    /// Warnings of parts that the picture lacks, and why.
     pub warnings: Vec<Warning>,
     /// Chains of outlines that are left out because they are short.
     pub short_chains: u32,

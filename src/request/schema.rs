@@ -1,9 +1,10 @@
 //! The JSON Schema (draft 2020-12) of request documents, written from the table of keys.
 //!
 //! It states what the reader checks, except what a schema cannot express: `eye` and `target`
-//! differ; what of a sheet goes with the camera and the size; `uv-layout` is not for materials alone; the
-//! hulls of several materials share a unit; limits of a material's key that depend on keys of the document; a short name and its key are not both given; the places where a document
-//! may name its mesh.
+//! differ; a sheet excludes some keys of the camera, and its cells have a least size; `uv-layout` is not
+//! for materials alone; the hulls of several materials share a unit; limits of a material's key that
+//! depend on keys of the document; a short name and its key are not both given; the places where a
+//! document may name its mesh.
 
 use serde_json::{Map, Value as Json, json};
 

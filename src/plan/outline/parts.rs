@@ -1,4 +1,4 @@
-//! What of the silhouette edges is drawn: their visible parts, without short chains.
+//! The parts of silhouette edges that an outline draws: the visible ones, without short chains.
 
 use crate::mesh::edges::EdgeList;
 use crate::plan::PlanError;

@@ -35,7 +35,7 @@ pub struct UvLayout {
     pub mesh: Mesh,
     /// The request, looking at that plane.
     pub spec: Spec,
-    /// What the picture has to go without.
+    /// Warnings of parts that the layout lacks.
     pub warnings: Vec<Warning>,
 }
 
@@ -146,7 +146,7 @@ fn flat_mesh(mesh: &Mesh, deadline: &Deadline) -> Result<(Mesh, Vec<Corners>), P
     Ok((flat, corners))
 }
 
-/// Where the texture's frame begins: a repetition of the texture that has all faces, or the texture itself.
+/// The lower left corner of the texture's frame: of the repetition that has all faces, or of the texture itself.
 fn frame_start(low: f64, high: f64) -> f64 {
     const SLACK: f64 = 1e-3;
     let start = libm::floor(low + SLACK);

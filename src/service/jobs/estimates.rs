@@ -20,7 +20,7 @@ const JOB_NS: f64 = 500_000.0;
 const BYTE_NS: f64 = 5.0;
 const SAMPLE_NS: f64 = 5.0;
 
-/// What a further view takes of a mesh, as a share of reading it.
+/// Time of a further view of a mesh, as a share of the time of reading it.
 const VIEW_SHARE: f64 = 0.25;
 
 /// Part of the way that a factor goes towards what the last job took.

@@ -26,7 +26,7 @@ use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
 use crate::backend::cpu::geometry::tiles::Tiles;
 use crate::backend::cpu::geometry::visibility;
 use crate::backend::cpu::geometry::visibility::Setup;
-use crate::backend::cpu::lines::coverage::LineCompositor;
+use crate::backend::cpu::lines::coverage::{BandStrokes, LineCompositor};
 use crate::backend::cpu::lines::edge::{LineDrawer, LineTarget};
 use crate::backend::cpu::lines::farthest::Farthest;
 use crate::backend::cpu::lines::holes::dig::add_holes;
@@ -131,12 +131,7 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
         let target =
             &mut LineTarget { strokes: &mut scratch.strokes, owners: &mut scratch.owners, holes: &mut scratch.holes };
         draw_edges(context.isa, context, pass, edges, band, (&scratch.samples, &mut scratch.farthest), target);
-        let target = (&mut scratch.strokes, &mut scratch.owners[..]);
-        if context.is_plain {
-            add_points_plainly(context, pass, &scratch.samples, &scratch.holes, target);
-        } else {
-            add_points(context.isa, context, pass, &scratch.samples, &scratch.holes, target);
-        }
+        find_points(context, pass, &scratch.samples, &scratch.holes, (&mut scratch.strokes, &mut scratch.owners));
         if lit_pixels > 0 {
             scratch.holes.own(&mut scratch.owners);
         }
@@ -165,6 +160,24 @@ fn find_holes(
         add_holes_plainly(context, pass, samples, holes);
     } else {
         add_holes(context.isa, context, pass, triangles, samples, holes);
+    }
+}
+
+/// Adds the points that lines cover where holes do not tell.
+fn find_points(
+    context: &RasterContext<'_>,
+    pass: &LinePass,
+    samples: &SampleBand,
+    holes: &Holes,
+    target: (&mut BandStrokes, &mut [u32]),
+) {
+    if holes.is_empty() {
+        return;
+    }
+    if context.is_plain {
+        add_points_plainly(context, pass, samples, holes, target);
+    } else {
+        add_points(context.isa, context, pass, samples, holes, target);
     }
 }
 

@@ -102,7 +102,7 @@ impl<'a> LineDrawer<'a> {
             let [first, last] = rows(a[1], b[1], self.pen.reach, self.rows);
             if first > last
                 || (windows > 1
-                    && self.is_kept_off(target)
+                    && self.only_stroked(target)
                     && !self.may_touch_stroked([a[0], b[0]], [first, last], target.holes))
                 || !self.collect_intervals(edge, &segment, range)
             {
@@ -124,9 +124,9 @@ impl<'a> LineDrawer<'a> {
         }
     }
 
-    /// True if only some pixels get strokes.
+    /// True if only the pixels that points do not tell about get strokes.
     #[inline(always)]
-    fn is_kept_off(&self, target: &LineTarget<'_>) -> bool {
+    fn only_stroked(&self, target: &LineTarget<'_>) -> bool {
         !self.marks && !target.holes.is_empty()
     }
 
@@ -142,7 +142,7 @@ impl<'a> LineDrawer<'a> {
     /// False if no pixel in the box around an edge gets strokes: found without looking at the edge.
     #[inline(always)]
     pub fn may_draw_in(&self, pixels: Option<&PixelBox>, target: &LineTarget<'_>) -> bool {
-        if self.context.is_plain || !self.is_kept_off(target) {
+        if self.context.is_plain || !self.only_stroked(target) {
             return true;
         }
         pixels.is_none_or(|pixels| {

@@ -211,7 +211,7 @@ impl Primitive {
         raw.edge_masks.resize(raw.triangles.len(), ALL_EDGES);
         let material = self.material.unwrap_or(default_material) as u32;
         if raw.triangle_materials.is_empty() && material == 0 {
-            // Zeros from the system, which nobody has to write.
+            // Memory from the system is zero already: no pass has to write it.
             raw.triangle_materials = vec![0; raw.triangles.len()];
         } else {
             raw.triangle_materials.resize(raw.triangles.len(), material);

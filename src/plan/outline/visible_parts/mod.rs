@@ -41,8 +41,8 @@ const SLIVER: f64 = PX / 16.0;
 const SAMPLED: f64 = 4.0 * PX;
 const SAMPLES_MAX: f64 = 64.0;
 
-/// Where it is looked: at a distance of a pixel for the background, 1/256 px, and at shares of a
-/// hull's width for what hides it.
+/// Places beside an edge that are looked at: a pixel away, in 1/256 px, for the background, and at
+/// shares of a hull's width for faces that hide it.
 const BESIDE: f64 = PX;
 const ACROSS: [f64; 2] = [0.3, 0.8];
 
@@ -54,7 +54,7 @@ const EQUAL: f64 = 2e-6;
 pub struct VisiblePart {
     /// The number of the edge.
     pub edge: u32,
-    /// Where it begins and ends, as shares of the edge on screen.
+    /// Its begin and its end, as shares of the edge on screen.
     pub range: [f64; 2],
     /// The share of the outline's width that is visible, 0 to 1, on average.
     pub shown: f64,

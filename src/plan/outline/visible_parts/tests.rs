@@ -1,4 +1,4 @@
-//! What faces hide of an edge, and what is left.
+//! The parts of an edge that faces hide, and the parts that are left.
 
 use super::grid::ScreenFace;
 use super::*;

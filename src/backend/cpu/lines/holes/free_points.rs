@@ -1,14 +1,15 @@
 //! Stage lines, per marked pixel: the points that its faces leave free. Twin of
 //! `shaders/lines/free_points.wgsl`.
 //!
-//! Where a sheet ends, the areas of insets do not tell what is free, because some of a face may be
-//! hidden. There each of a pixel's points is judged by the sample that it is
-//! [assigned](crate::backend::sample_partition) to: it is free if that sample shows nothing, or if the
+//! Areas of insets do not tell how much is free where a sheet ends, because some of a face may be
+//! hidden. Points do: each of a pixel's points belongs to a
+//! [sample](crate::backend::sample_partition). It is free if that sample shows nothing, or if the
 //! point lies in the inset of the face that the sample shows. Lines of rims are strokes, which cover
 //! the free points that they touch.
 //!
-//! A point farther from all rims than half a line's width is judged rightly, because such a disc
-//! around it shows one face, or nothing, and contains its sample. Nearer points are a rim's.
+//! This is exact for a point that is farther from all rims than half a line's width: a disc of that
+//! radius around it shows one face, or nothing, and contains the point's sample. Points that are
+//! nearer are covered by the rim's own stroke.
 
 use super::inset::{Inset, Insets};
 use super::{Holes, half_width};
@@ -43,14 +44,14 @@ pub fn add_points_plainly(
     holes: &Holes,
     target: (&mut BandStrokes, &mut [u32]),
 ) {
-    let judge = Judge::new(context, pass, band);
+    let test = PointTest::new(context, pass, band);
     let mut covered = Covered { pixel: [0; 2], mask: Mask::default(), holes, target };
     for [x, y] in holes.marked() {
         let ids = band.pixel(x, y).0;
         let mut mask = Mask::default();
-        for (&id, cell) in ids.iter().zip(&judge.cells).filter(|&(&id, _)| id != NOTHING) {
-            let insets = Insets::new(&Corners::load(context, &[id; LANES]), judge.half, judge.half_width);
-            let sides = judge.sides(&insets.get(0, judge.half), [x, y]);
+        for (&id, cell) in ids.iter().zip(&test.cells).filter(|&(&id, _)| id != NOTHING) {
+            let insets = Insets::new(&Corners::load(context, &[id; LANES]), test.half, test.half_width);
+            let sides = test.sides(&insets.get(0, test.half), [x, y]);
             for point in 0..POINTS as usize {
                 let is_free = insets.is_open[0] != 0 && sides.iter().all(|side| is_point_within(side, point));
                 let bit = 0x8000 >> (point / WORDS);
@@ -70,7 +71,7 @@ fn points_kernel(
     holes: &Holes,
     target: (&mut BandStrokes, &mut [u32]),
 ) {
-    let judge = Judge::new(context, pass, band);
+    let test = PointTest::new(context, pass, band);
     let mut poll = DeadlinePoll::new(context.deadline);
     let mut waiting = Waiting { ids: [0; LANES], pixels: [[0; 2]; LANES], len: 0 };
     let mut covered = Covered { pixel: [0; 2], mask: Mask::default(), holes, target };
@@ -82,14 +83,14 @@ fn points_kernel(
             }
             waiting.push(id, pixel);
             if waiting.len == LANES {
-                waiting.judge(context, band, &judge, &mut covered);
+                waiting.add_covered(context, band, &test, &mut covered);
             }
         }
         if poll.is_expired(u64::from(POINTS)) {
             return;
         }
     }
-    waiting.judge(context, band, &judge, &mut covered);
+    waiting.add_covered(context, band, &test, &mut covered);
     covered.finish();
 }
 
@@ -107,19 +108,25 @@ impl Waiting {
         self.len += 1;
     }
 
-    /// Finds what the faces leave free of their pixels.
+    /// Adds the points of the faces' samples that are not free.
     #[inline(always)]
-    fn judge(&mut self, context: &RasterContext<'_>, band: &SampleBand, judge: &Judge, covered: &mut Covered<'_>) {
+    fn add_covered(
+        &mut self,
+        context: &RasterContext<'_>,
+        band: &SampleBand,
+        test: &PointTest,
+        covered: &mut Covered<'_>,
+    ) {
         if self.len == 0 {
             return;
         }
         // Those after `len` are of the mesh, too: it has the first triangle if it has any.
-        let insets = Insets::new(&corners(context, &self.ids), judge.half, judge.half_width);
+        let insets = Insets::new(&corners(context, &self.ids), test.half, test.half_width);
         for l in 0..std::mem::take(&mut self.len) {
             let [x, y] = self.pixels[l];
-            let mut cell = judge.cell_of(band.pixel(x, y).0, self.ids[l]);
+            let mut cell = test.cell_of(band.pixel(x, y).0, self.ids[l]);
             if insets.is_open[l] != 0 {
-                let free = points_within(&judge.sides(&insets.get(l, judge.half), [x, y]));
+                let free = points_within(&test.sides(&insets.get(l, test.half), [x, y]));
                 for w in 0..WORDS {
                     cell[w] &= !free[w];
                 }
@@ -129,7 +136,7 @@ impl Waiting {
     }
 }
 
-/// The covered points of the pixel that is judged.
+/// The covered points of the pixel whose faces are looked at.
 struct Covered<'a> {
     pixel: [i32; 2],
     mask: Mask,
@@ -165,15 +172,15 @@ impl Covered<'_> {
     }
 }
 
-/// What is the same for all pixels of a band.
-struct Judge {
+/// The samples' points and the lines' width, the same for all pixels of a band.
+struct PointTest {
     half: [i32; 2],
     half_width: f32,
     /// Per sample, the points that are assigned to it.
     cells: Vec<Mask>,
 }
 
-impl Judge {
+impl PointTest {
     fn new(context: &RasterContext<'_>, pass: &LinePass, band: &SampleBand) -> Self {
         let plan = context.plan;
         Self {

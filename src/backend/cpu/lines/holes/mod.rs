@@ -49,8 +49,8 @@ const _: () = assert!(FACES_MAX as f32 * HOLE_UNIT < STROKED as f32);
 pub struct Holes {
     /// Areas in [`HOLE_UNIT`]s, and the marks. Empty where the pass has no holes.
     words: Vec<u32>,
-    /// The marks of a pixel in which points tell, if there are enough samples: see [`marks`].
-    marks: u32,
+    /// See [`point_marks`].
+    point_marks: u32,
     width_px: usize,
     /// First and last row, the last excluded.
     rows: [i32; 2],
@@ -79,7 +79,7 @@ impl Holes {
     pub fn reset(&mut self, band: &SampleBand) {
         self.width_px = band.size_px[0] as usize;
         self.rows = band.shown.map(|row| row as i32);
-        self.marks = marks(band.samples);
+        self.point_marks = point_marks(band.samples);
         let rows = band.shown[0].abs_diff(band.shown[1]) as usize;
         self.words.clear();
         self.words.reserve_exact(self.width_px * rows);
@@ -106,7 +106,7 @@ impl Holes {
     /// Marks a pixel that a rim reaches, by its index among the shown ones.
     #[inline(always)]
     pub fn mark(&mut self, at: usize) {
-        self.words[at] |= self.marks;
+        self.words[at] |= self.point_marks;
     }
 
     /// Adds to the area of holes in a pixel, by its index. Of [`FACES_MAX`] faces, the sum stays
@@ -205,7 +205,7 @@ impl Holes {
 
 /// The marks of a pixel in which points tell. With one sample per pixel strokes do instead: a rim that
 /// no sample shows may count as hidden, and the strokes of the edges beside it make up for it.
-fn marks(samples: u32) -> u32 {
+fn point_marks(samples: u32) -> u32 {
     if samples == 1 { MARKED | STROKED } else { MARKED }
 }
 
@@ -230,7 +230,7 @@ pub(super) fn looked_at(band: &SampleBand, beyond: i32) -> [[i32; 2]; 2] {
 pub fn mark_odd_samples(context: &RasterContext<'_>, band: &SampleBand, holes: &mut Holes) {
     let count = context.plan.triangles.len() as u32;
     let samples = band.samples as usize;
-    let marks = holes.marks;
+    let point_marks = holes.point_marks;
     for (y, words) in (holes.rows[0]..).zip(holes.words.chunks_mut(holes.width_px.max(1))) {
         let first = band.index(0, y, 0);
         let ids = &band.ids[first..first + words.len() * samples];
@@ -240,7 +240,7 @@ pub fn mark_odd_samples(context: &RasterContext<'_>, band: &SampleBand, holes: &
                 is_marked |= id >= count;
                 is_stroked |= (id >= count) & (id != NOTHING);
             }
-            *word |= (u32::from(is_marked) * marks) | (u32::from(is_stroked) * STROKED);
+            *word |= (u32::from(is_marked) * point_marks) | (u32::from(is_stroked) * STROKED);
         }
     }
     if !context.plan.projection.clip {
@@ -274,7 +274,7 @@ pub(super) fn marks_of_hidden(
         let at = [corner[0] + offset[0], corner[1] + offset[1]];
         if other != id && inset.contains(at.map(|v| v as f32)) {
             let is_crossing = may_cross(context, [id, other], at, depth);
-            marks |= if is_crossing { MARKED | STROKED } else { self::marks(band.samples) };
+            marks |= if is_crossing { MARKED | STROKED } else { point_marks(band.samples) };
         }
     }
     marks
