@@ -6,8 +6,9 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::bin::Bin;
-use super::keep::TrianglePass;
+use super::keep::{Sides, TrianglePass};
 use super::triangle_bins::TriangleBin;
+use crate::backend::cpu::isa::LANES;
 use crate::backend::cpu::lines::contour;
 use crate::backend::cpu::lines::segment::{PixelBox, Segment};
 use crate::backend::cpu::{CHUNK, RasterContext};
@@ -36,6 +37,8 @@ pub struct EdgeBin {
     rows: u32,
     /// Those that are rims; empty where the pass has no holes.
     pub rims: Bin,
+    /// By edge of the chunk, true for a silhouette, drawn or not; empty where the pass has no holes.
+    are_silhouettes: Vec<bool>,
     /// The others. Where the pass has holes, few bands need them: they are sorted when one does.
     others: OnceLock<OtherEdges>,
 }
@@ -50,20 +53,26 @@ pub struct OtherEdges {
 }
 
 impl EdgeBin {
-    fn new(context: &RasterContext<'_>, pass: &LinePass, rows: u32, edges: Range<usize>) -> Self {
+    fn new(
+        context: &RasterContext<'_>,
+        pass: &LinePass,
+        rows: u32,
+        (edges, triangles): (Range<usize>, &[TriangleBin]),
+    ) -> Self {
         let bands = band_count(context.plan, rows);
-        let mut bin = Self { edges, rows, rims: Bin::new(bands, TALL_EDGE_BANDS), others: OnceLock::new() };
+        let rims = Bin::new(bands, TALL_EDGE_BANDS);
+        let mut bin = Self { edges, rows, rims, are_silhouettes: Vec::new(), others: OnceLock::new() };
         if !context.plan.has_holes_under(pass) {
             bin.others(context, pass);
             return bin;
         }
-        for i in bin.edges.clone() {
-            let edge = &pass.edges[i];
-            if context.is_silhouette(edge)
-                && contour::is_drawn(context, pass, edge)
+        let edges = &pass.edges[bin.edges.clone()];
+        bin.are_silhouettes = edges.iter().map(|edge| is_silhouette(context, edge, triangles)).collect();
+        for ((i, edge), _) in (bin.edges.start as u32..).zip(edges).zip(&bin.are_silhouettes).filter(|(_, is)| **is) {
+            if contour::is_drawn(context, pass, edge)
                 && let Some((_, bands)) = placed(context, edge, pass.reach_px(), rows)
             {
-                bin.rims.push(i as u32, bands);
+                bin.rims.push(i, bands);
             }
         }
         bin
@@ -77,19 +86,25 @@ impl EdgeBin {
 
     /// The edges that are no rims.
     pub fn others(&self, context: &RasterContext<'_>, pass: &LinePass) -> &OtherEdges {
-        self.others.get_or_init(|| OtherEdges::new(context, pass, self.rows, self.edges.clone()))
+        self.others.get_or_init(|| OtherEdges::new(context, pass, self.rows, self.edges.clone(), &self.are_silhouettes))
     }
 }
 
 impl OtherEdges {
-    fn new(context: &RasterContext<'_>, pass: &LinePass, rows: u32, edges: Range<usize>) -> Self {
+    fn new(
+        context: &RasterContext<'_>,
+        pass: &LinePass,
+        rows: u32,
+        edges: Range<usize>,
+        are_silhouettes: &[bool],
+    ) -> Self {
         let bin = Bin::new(band_count(context.plan, rows), TALL_EDGE_BANDS);
         let has_holes = context.plan.has_holes_under(pass);
         let boxes = vec![PixelBox::default(); if has_holes { edges.len() } else { 0 }];
         let mut others = Self { bin, boxes, first: edges.start as u32 };
         for (n, i) in edges.enumerate() {
             let edge = &pass.edges[i];
-            if !contour::is_drawn(context, pass, edge) || (has_holes && context.is_silhouette(edge)) {
+            if are_silhouettes.get(n).is_some_and(|is| *is) || !contour::is_drawn(context, pass, edge) {
                 continue;
             }
             if let Some((segment, bands)) = placed(context, edge, pass.reach_px(), rows) {
@@ -106,6 +121,27 @@ impl OtherEdges {
     #[inline(always)]
     pub fn pixel_box(&self, edge: u32) -> Option<&PixelBox> {
         self.boxes.get(edge.wrapping_sub(self.first) as usize)
+    }
+}
+
+/// True for a silhouette, found by the sides that its faces show where that tells.
+#[inline(always)]
+fn is_silhouette(context: &RasterContext<'_>, edge: &Edge, triangles: &[TriangleBin]) -> bool {
+    let side = |face: u32| {
+        let (chunk, face) = (triangles.get(face as usize / CHUNK)?, face as usize % CHUNK);
+        let Sides { front, back } = chunk.sides.get(face / LANES)?;
+        Some([front, back].map(|bits| bits >> (face % LANES) & 1))
+    };
+    let runs_along = |face: u32| {
+        let ([p, q, r], [a, b]) = (context.triangle(face), edge.vertices);
+        ((p == a) & (q == b)) | ((q == a) & (r == b)) | ((r == a) & (p == b))
+    };
+    let [first, second] = edge.faces;
+    match (side(first), side(second)) {
+        // Faces on one side of an edge run along it the same way where they show the same side, and in
+        // turns where they do not.
+        (Some(a), Some(b)) if a != [0, 0] && b != [0, 0] => (a == b) == (runs_along(first) == runs_along(second)),
+        _ => context.is_silhouette(edge),
     }
 }
 
@@ -135,7 +171,7 @@ pub fn bin(
     let (triangles, peel) = (bin_all(base, margin), bin_all(peel, 0));
     let bin_pass = |pass: &LinePass| {
         map(pool, chunks(0..pass.edges.len()).collect(), |range| match context.deadline.check() {
-            Ok(()) => EdgeBin::new(context, pass, rows, range),
+            Ok(()) => EdgeBin::new(context, pass, rows, (range, &triangles)),
             Err(Stopped) => EdgeBin::default(),
         })
     };

@@ -155,7 +155,7 @@ fn find_holes(
         return;
     }
     holes.reset(samples);
-    holes::mark_odd_samples(context, samples, holes);
+    holes::mark_odd_samples(context.isa, context, samples, holes);
     if context.is_plain {
         add_holes_plainly(context, pass, samples, holes);
     } else {

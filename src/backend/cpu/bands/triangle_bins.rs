@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::bin::Bin;
-use super::keep::{Bounds, TrianglePass, keep};
+use super::keep::{Bounds, Sides, TrianglePass, keep};
 use super::lists::{BandLists, TALL_BANDS};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::clip::clip_triangle;
@@ -20,6 +20,8 @@ pub struct TriangleBin {
     pub fronts: BandLists,
     /// Ids of those that face away.
     pub backs: BandLists,
+    /// The sides that the chunk's triangles show.
+    pub sides: Vec<Sides>,
     /// Id and pieces of clipped triangles.
     pieces: Vec<(u32, [ScreenVertex; 3])>,
     /// Indices into `pieces`.
@@ -38,6 +40,7 @@ impl TriangleBin {
             ids: pass.ids.clone(),
             fronts: BandLists::new(kept.fronts, bands),
             backs: BandLists::new(kept.backs, bands),
+            sides: kept.sides,
             pieces: Vec::new(),
             piece_bands: Bin::new(bands, TALL_BANDS),
         };

@@ -118,18 +118,6 @@ impl Batch {
     }
 }
 
-/// Corners of eight triangles by id.
-#[inline(always)]
-#[allow(unsafe_code)]
-pub fn corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Corners {
-    #[cfg(target_arch = "x86_64")]
-    if context.isa.has_avx2() {
-        // SAFETY: the processor has AVX2, as `isa` says.
-        return unsafe { super::batch_avx2::corners(context, ids) };
-    }
-    Corners::load(context, ids)
-}
-
 /// Pixels and nearest depth of eight triangles.
 #[inline(always)]
 #[allow(unsafe_code)]

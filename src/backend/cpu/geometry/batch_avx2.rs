@@ -8,7 +8,6 @@ use std::arch::asm;
 use std::arch::x86_64::*;
 
 use super::samples::{SampleBand, SampleGrid};
-use super::setups;
 use super::setups::{Boxes, EXTENT_MAX, SHORT_MAX, SIZES, Setups, class, lane_offsets};
 use super::transform::ScreenVertex;
 use super::visibility::Parts;
@@ -26,7 +25,7 @@ pub struct Corners {
 /// As `Corners::load`.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn load_corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Corners {
+pub fn load_corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> Corners {
     load(context.vertices, &context.indices_of(ids))
 }
 
@@ -46,17 +45,6 @@ pub fn load(vertices: &[ScreenVertex], triangles: &[[u32; 3]; LANES]) -> Corners
         z[k] = _mm256_castsi256_ps(_mm256_unpacklo_epi64(ab, cd));
     }
     Corners { x, y, z }
-}
-
-/// As `Corners::load` of `setups`.
-#[target_feature(enable = "avx2")]
-pub fn corners(context: &RasterContext<'_>, ids: &[u32; LANES]) -> setups::Corners {
-    let Corners { x, y, z } = load_corners(context, ids);
-    setups::Corners {
-        x: [to_ints(x[0]), to_ints(x[1]), to_ints(x[2])],
-        y: [to_ints(y[0]), to_ints(y[1]), to_ints(y[2])],
-        z: [to_floats(z[0]), to_floats(z[1]), to_floats(z[2])],
-    }
 }
 
 /// As `Boxes::new`.
@@ -190,7 +178,7 @@ pub fn transposed([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
 /// As [`recip`](super::transform::recip).
 #[inline]
 #[target_feature(enable = "avx2")]
-fn recip(w: __m256) -> __m256 {
+pub fn recip(w: __m256) -> __m256 {
     let guess = _mm256_sub_epi32(_mm256_set1_epi32(0x7EF3_11C7), _mm256_castps_si256(w));
     let mut r = _mm256_castsi256_ps(guess);
     for _ in 0..4 {
@@ -311,9 +299,33 @@ pub fn to_ints(v: __m256i) -> [i32; LANES] {
     out
 }
 
+/// The same, of numbers without a sign.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn to_floats(v: __m256) -> [f32; LANES] {
+pub fn to_words(v: __m256i) -> [u32; LANES] {
+    to_ints(v).map(|lane| lane as u32)
+}
+
+/// A vector of such lanes.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub fn from_words(v: &[u32; LANES]) -> __m256i {
+    // SAFETY: the array has the size of a vector, and the load needs no alignment.
+    unsafe { _mm256_loadu_si256(v.as_ptr().cast()) }
+}
+
+/// A vector of such lanes.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub fn from_floats(v: &[f32; LANES]) -> __m256 {
+    // SAFETY: the array has the size of a vector, and the load needs no alignment.
+    unsafe { _mm256_loadu_ps(v.as_ptr()) }
+}
+
+/// The lanes of a vector.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub fn to_floats(v: __m256) -> [f32; LANES] {
     let mut out = [0.0; LANES];
     // SAFETY: as above.
     unsafe { _mm256_storeu_ps(out.as_mut_ptr(), v) };

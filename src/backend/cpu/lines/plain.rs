@@ -10,7 +10,7 @@ use super::stroke::{self, Mask};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::setups::Corners;
-use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::isa::{Isa, LANES};
 use crate::plan::{Edge, LinePass};
 
 impl HiddenIntervals {
@@ -101,7 +101,7 @@ pub fn add_holes_plainly(context: &RasterContext<'_>, pass: &LinePass, band: &Sa
                 let inset = insets.get(0, half);
                 holes.mark_around([x, y], reach, marks_of_hidden(context, band, half, (&inset, id), [x, y]));
                 if let Some(at) = holes.index([x, y]) {
-                    holes.add(at, inset.areas(x, y)[0]);
+                    holes.add(at, inset.areas(Isa::baseline(), x, y)[0]);
                 }
             }
         }

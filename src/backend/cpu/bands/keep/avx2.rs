@@ -4,7 +4,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Bounds, Kept, TrianglePass, area_of};
+use super::{Bounds, Kept, Sides, TrianglePass, area_of};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::{BoxedFace, KeptFaces};
 use crate::backend::cpu::geometry::batch_avx2::{Corners, bits, load, pixels, to_ints, transposed};
@@ -51,6 +51,8 @@ pub fn keep(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePass, t
         });
         let lanes = Lanes::new(&load(context.vertices, triangles), bounds);
         let drawn = pass.drawn(context.plan, first, group.len());
+        let whole = !lanes.outside & ((1 << group.len()) - 1);
+        kept.sides.push(Sides { front: (lanes.front & whole) as u8, back: (lanes.back & whole) as u8 });
         let (front, back) = (lanes.front & lanes.seen & drawn[0], lanes.back & lanes.seen & drawn[1]);
         if front != 0 {
             lanes.put(first, front, &mut kept.fronts);

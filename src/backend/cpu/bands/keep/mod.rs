@@ -126,6 +126,16 @@ pub struct Kept {
     pub backs: KeptFaces,
     /// Triangles with a corner behind the eye or far outside the picture.
     pub outside: Vec<u32>,
+    /// Of all triangles of the chunk, drawn or not.
+    pub sides: Vec<Sides>,
+}
+
+/// The sides that eight triangles in succession show: a bit for each that faces the viewer, and for each
+/// that faces away. Neither is set for what is seen edge-on, or lies outside.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sides {
+    pub front: u8,
+    pub back: u8,
 }
 
 impl Kept {
@@ -135,6 +145,7 @@ impl Kept {
             fronts: KeptFaces::with_room_for(triangles, false),
             backs: KeptFaces::with_room_for(triangles, true),
             outside: Vec::new(),
+            sides: Vec::with_capacity(triangles.div_ceil(LANES)),
         }
     }
 }
@@ -160,8 +171,11 @@ fn keep_plainly(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePas
         }
         let corners = Corners::load(context, &ids);
         let drawn = pass.drawn(context.plan, first, len);
+        let mut sides = Sides::default();
         for l in 0..len {
             let lane = Lane::new(&corners, l, bounds);
+            sides.front |= u8::from(!lane.is_outside && lane.area < 0) << l;
+            sides.back |= u8::from(!lane.is_outside && lane.area > 0) << l;
             let is_drawn = |k: usize| drawn[k] >> l & 1 != 0;
             if lane.is_outside && (is_drawn(0) || is_drawn(1)) {
                 kept.outside.push(ids[l]);
@@ -176,6 +190,7 @@ fn keep_plainly(context: &RasterContext<'_>, bounds: &Bounds, pass: &TrianglePas
                 kept.backs.boxed.push(BoxedFace { id: ids[l], ..lane.boxed });
             }
         }
+        kept.sides.push(sides);
     }
     kept
 }
@@ -267,7 +282,7 @@ mod tests {
             cpu.transform(&plan, None);
             let kept = keep(&cpu.context(&plan, &deadline, &Stopwatch::default()), &bounds, &pass);
             let [fronts, backs] = [kept.fronts, kept.backs].map(|kept| (kept.ids, kept.spans, kept.boxed));
-            (fronts, backs, kept.outside)
+            (fronts, backs, kept.outside, kept.sides)
         };
         let all: Vec<_> = Isa::available().into_iter().map(lists).collect();
         assert!(all.iter().all(|found| *found == all[0]), "{samples} samples, margin {margin}");

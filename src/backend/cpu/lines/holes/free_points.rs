@@ -15,7 +15,6 @@ use super::inset::{Inset, Insets};
 use super::{Holes, half_width};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
-use crate::backend::cpu::geometry::batch::corners;
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::setups::Corners;
 use crate::backend::cpu::isa::{LANES, dispatch};
@@ -121,7 +120,7 @@ impl Waiting {
             return;
         }
         // Those after `len` are of the mesh, too: it has the first triangle if it has any.
-        let insets = Insets::new(&corners(context, &self.ids), test.half, test.half_width);
+        let insets = Insets::of(context, &self.ids, test.half, test.half_width);
         for l in 0..std::mem::take(&mut self.len) {
             let [x, y] = self.pixels[l];
             let mut cell = test.cell_of(band.pixel(x, y).0, self.ids[l]);

@@ -25,9 +25,10 @@ pub(crate) mod inset;
 
 use self::inset::{HOLE_UNIT, Inset};
 use crate::backend::cpu::RasterContext;
-use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
+use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand, for_samples};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::geometry::visibility::Setup;
+use crate::backend::cpu::isa::dispatch;
 use crate::plan::{LinePass, sample_offsets};
 
 /// Bit of a pixel in which areas do not tell what is free.
@@ -56,13 +57,19 @@ pub struct Holes {
     rows: [i32; 2],
     /// A bit per pixel that gets strokes, `row_words` words a row.
     stroked: Vec<u64>,
+    /// The bits of [`COARSE_ROWS`] rows together.
+    stroked_coarse: Vec<u64>,
     row_words: usize,
 }
+
+/// Rows of pixels that are first looked at together.
+const COARSE_ROWS: usize = 8;
 
 impl Holes {
     /// Allocated bytes.
     pub fn bytes(&self) -> usize {
-        self.words.capacity() * size_of::<u32>() + self.stroked.capacity() * size_of::<u64>()
+        let bits = self.stroked.capacity() + self.stroked_coarse.capacity();
+        self.words.capacity() * size_of::<u32>() + bits * size_of::<u64>()
     }
 
     /// Bytes of a row.
@@ -164,18 +171,16 @@ impl Holes {
         if self.is_empty() {
             return true;
         }
-        let [left, right] = columns.map(|x| x.clamp(0, self.width_px as i32 - 1) as usize);
-        for y in rows[0].max(self.rows[0])..=rows[1].min(self.rows[1] - 1) {
-            let row = (y - self.rows[0]) as usize * self.row_words;
-            for word in left / 64..=right / 64 {
-                let from = if word == left / 64 { left % 64 } else { 0 };
-                let to = if word == right / 64 { right % 64 } else { 63 };
-                if self.stroked[row + word] >> from << from << (63 - to) != 0 {
-                    return true;
-                }
-            }
+        let columns = columns.map(|x| x.clamp(0, self.width_px as i32 - 1) as usize);
+        let (first, last) = (rows[0].max(self.rows[0]) - self.rows[0], rows[1].min(self.rows[1] - 1) - self.rows[0]);
+        if first > last {
+            return false;
         }
-        false
+        let (first, last) = (first as usize, last as usize);
+        let any = |bits: &[u64], first: usize, last: usize| {
+            (first..=last).any(|row| any_between(&bits[row * self.row_words..], columns))
+        };
+        any(&self.stroked_coarse, first / COARSE_ROWS, last / COARSE_ROWS) && any(&self.stroked, first, last)
     }
 
     /// Collects the pixels for [`Self::any_stroked`] when all rims are drawn. False if there are none.
@@ -186,6 +191,11 @@ impl Holes {
                 *bits = pixels.iter().zip(0..).fold(0, |all, (word, i)| all | u64::from(word & STROKED != 0) << i);
                 any |= *bits != 0;
             }
+        }
+        self.stroked_coarse.clear();
+        for rows in self.stroked.chunks(COARSE_ROWS * self.row_words.max(1)) {
+            let word = |i: usize| rows.iter().skip(i).step_by(self.row_words).fold(0, |all, bits| all | bits);
+            self.stroked_coarse.extend((0..self.row_words).map(word));
         }
         any
     }
@@ -201,6 +211,16 @@ impl Holes {
             }
         }
     }
+}
+
+/// True if a row has a bit between two columns, the last included.
+#[inline(always)]
+fn any_between(bits: &[u64], [left, right]: [usize; 2]) -> bool {
+    (left / 64..=right / 64).any(|word| {
+        let from = if word == left / 64 { left % 64 } else { 0 };
+        let to = if word == right / 64 { right % 64 } else { 63 };
+        bits[word] >> from << from << (63 - to) != 0
+    })
 }
 
 /// The marks of a pixel in which points tell. With one sample per pixel strokes do instead: a rim that
@@ -225,27 +245,44 @@ pub(super) fn looked_at(band: &SampleBand, beyond: i32) -> [[i32; 2]; 2] {
     ]
 }
 
-/// Gives strokes to the pixels around what is clipped and to those that show a hull, and marks those
-/// that show nothing.
-pub fn mark_odd_samples(context: &RasterContext<'_>, band: &SampleBand, holes: &mut Holes) {
+dispatch! {
+    /// Gives strokes to the pixels around what is clipped and to those that show a hull, and marks
+    /// those that show nothing.
+    pub fn mark_odd_samples(context: &RasterContext<'_>, band: &SampleBand, holes: &mut Holes) = odd_samples_kernel
+}
+
+#[inline(always)]
+fn odd_samples_kernel(context: &RasterContext<'_>, band: &SampleBand, holes: &mut Holes) {
+    for_samples!(band.samples, mark_without_face(context, band, holes));
+    if context.plan.projection.clip {
+        mark_around_clipped(context, band, holes);
+    }
+}
+
+/// Marks pixels that show nothing or a hull.
+#[inline(always)]
+fn mark_without_face<const S: usize>(context: &RasterContext<'_>, band: &SampleBand, holes: &mut Holes) {
     let count = context.plan.triangles.len() as u32;
-    let samples = band.samples as usize;
     let point_marks = holes.point_marks;
     for (y, words) in (holes.rows[0]..).zip(holes.words.chunks_mut(holes.width_px.max(1))) {
         let first = band.index(0, y, 0);
-        let ids = &band.ids[first..first + words.len() * samples];
-        for (word, ids) in words.iter_mut().zip(ids.chunks_exact(samples)) {
-            let (mut is_marked, mut is_stroked) = (false, false);
-            for &id in ids {
-                is_marked |= id >= count;
-                is_stroked |= (id >= count) & (id != NOTHING);
+        let ids = &band.ids[first..first + words.len() * S];
+        for (word, ids) in words.iter_mut().zip(ids.as_chunks::<S>().0) {
+            let (mut is_marked, mut is_stroked) = (0, 0);
+            for s in 0..S {
+                // All bits where it is true.
+                let is_odd = 0_u32.wrapping_sub(u32::from(ids[s] >= count));
+                is_marked |= is_odd & point_marks;
+                is_stroked |= is_odd & u32::from(ids[s] != NOTHING);
             }
-            *word |= (u32::from(is_marked) * point_marks) | (u32::from(is_stroked) * STROKED);
+            *word |= is_marked | (is_stroked * STROKED);
         }
     }
-    if !context.plan.projection.clip {
-        return;
-    }
+}
+
+/// Gives strokes to the pixels around those that show a clipped face.
+fn mark_around_clipped(context: &RasterContext<'_>, band: &SampleBand, holes: &mut Holes) {
+    let count = context.plan.triangles.len() as u32;
     let is_clipped = |id: u32| id < count && context.screen_triangle(id).iter().any(ScreenVertex::is_outside);
     let [columns, rows] = looked_at(band, 1);
     for y in rows[0]..rows[1] {

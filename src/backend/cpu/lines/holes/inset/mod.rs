@@ -5,9 +5,13 @@
 //! scaled about its incentre by `(r - w/2) / r`, r being the radius of the inscribed circle, and is
 //! empty where r is not larger than w/2.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+
+use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::setups::Corners;
 use crate::backend::cpu::geometry::transform::{recip, rsqrt};
-use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::isa::{Isa, LANES};
 
 /// Steps to the pixel of a hole's area.
 pub const HOLE_UNIT: f32 = 65_536.0;
@@ -21,6 +25,14 @@ pub const NARROW_PX: f32 = 1e-4;
 
 /// Sides that rise less than this within a pixel count as straight there, pixels.
 pub const LEVEL_PX: f32 = 1.0 / 1024.0;
+
+/// Faces up to this width and height, 1/256 px, are small: outside of [`Inset::open_pixels`] their areas
+/// round to nothing. The corners of an inset are off by a few times 2^-21 px then, so that what they add
+/// to a pixel beside the inset stays below half a [`HOLE_UNIT`].
+pub const SMALL: i32 = 4 * 256;
+
+/// Most columns, and rows, of pixels that a small face touches.
+pub const SMALL_PIXELS: usize = SMALL as usize / 256 + 1;
 
 /// Eight faces' insets, still in lanes.
 pub struct Insets {
@@ -59,6 +71,29 @@ struct Side {
 }
 
 impl Insets {
+    /// No insets, and room for eight.
+    #[cfg(target_arch = "x86_64")]
+    const EMPTY: Self = Self {
+        corners: [[[0; LANES]; 2]; 3],
+        units: [[[0.0; LANES]; 2]; 3],
+        insets: [[[0.0; LANES]; 2]; 3],
+        slopes: [[0.0; LANES]; 3],
+        turn: [0.0; LANES],
+        is_open: [0; LANES],
+    };
+
+    /// The insets of faces by id, see [`new`](Self::new).
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub fn of(context: &RasterContext<'_>, ids: &[u32; LANES], half: [i32; 2], half_width: f32) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if context.isa.has_avx2() {
+            // SAFETY: the processor has AVX2, as `isa` says.
+            return unsafe { avx2::insets(context, ids, half, half_width) };
+        }
+        Self::new(&Corners::load(context, ids), half, half_width)
+    }
+
     /// The insets of faces of a picture half as large as `half`, 1/256 px, under lines half as wide
     /// as `half_width`, 1/256 px.
     #[inline(always)]
@@ -163,21 +198,83 @@ impl Inset {
         side.unit[0] * (y - side.corner[1]) - side.unit[1] * (x - side.corner[0])
     }
 
+    /// The face's corner at the start of each side, 1/256 px from the picture's centre, and the unit
+    /// vector along the side, as [`distance`](Self::distance) takes them.
+    #[inline(always)]
+    pub fn sides_of_face(&self) -> [([f32; 2], [f32; 2]); 3] {
+        self.sides.map(|side| (side.corner, side.unit))
+    }
+
+    /// True if the face is at most [`SMALL`] wide and high.
+    #[inline(always)]
+    pub fn is_small(&self) -> bool {
+        self.bounds.iter().all(|[low, high]| high - low <= SMALL)
+    }
+
+    /// First and last column, and row, of the pixels in which a small face's inset has an area.
+    #[inline(always)]
+    pub fn open_pixels(&self) -> [[i32; 2]; 2] {
+        let [a, b, c] = [self.sides[0].ends[0], self.sides[1].ends[0], self.sides[2].ends[0]];
+        // For roundings: more than corners are off by, and less than faces are apart that matter.
+        const SLACK: f32 = 1.0 / 16.0;
+        // Rounds towards zero, so numbers are made positive for it.
+        const POSITIVE: i32 = 16;
+        let pixel = |v: f32| (v + POSITIVE as f32) as i32 - POSITIVE;
+        std::array::from_fn(|k| {
+            let (low, high) = (a[k].min(b[k]).min(c[k]) - SLACK, a[k].max(b[k]).max(c[k]) + SLACK);
+            [self.base[k] + pixel(low), self.base[k] + pixel(high)]
+        })
+    }
+
     /// Area of the inset in each of eight pixels of row `y`, from column `first` on.
-    ///
+    #[inline(always)]
+    pub fn areas(&self, isa: Isa, first: i32, y: i32) -> [u32; LANES] {
+        let (left, top) = ((first - self.base[0]) as f32, (y - self.base[1]) as f32);
+        let mut lefts = [left; LANES];
+        for l in 0..LANES {
+            lefts[l] += l as f32;
+        }
+        self.areas_at(isa, &lefts, &[top; LANES])
+    }
+
+    /// Area of the inset in each of four pixels of row `y`, from column `first` on, and in the four below
+    /// them.
+    #[inline(always)]
+    pub fn areas_in_two_rows(&self, isa: Isa, first: i32, y: i32) -> [u32; LANES] {
+        let (left, top) = ((first - self.base[0]) as f32, (y - self.base[1]) as f32);
+        let (mut lefts, mut tops) = ([left; LANES], [top; LANES]);
+        for l in 0..LANES {
+            lefts[l] += (l % 4) as f32;
+            tops[l] += (l / 4) as f32;
+        }
+        self.areas_at(isa, &lefts, &tops)
+    }
+
+    /// Area of the inset in each of eight pixels, given the places of their upper left corners, in pixels
+    /// from the base.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    fn areas_at(&self, isa: Isa, lefts: &[f32; LANES], tops: &[f32; LANES]) -> [u32; LANES] {
+        #[cfg(target_arch = "x86_64")]
+        if isa.has_avx2() {
+            // SAFETY: the processor has AVX2, as `isa` says.
+            return unsafe { avx2::areas(self, lefts, tops) };
+        }
+        let _ = isa;
+        self.areas_plainly(lefts, tops)
+    }
+
     /// The area of a polygon in the unit square is the sum, over its sides, of the signed area that
     /// lies inside the square between the side and the square's upper border.
     #[inline(always)]
-    pub fn areas(&self, first: i32, y: i32) -> [u32; LANES] {
-        let (left, top) = ((first - self.base[0]) as f32, (y - self.base[1]) as f32);
+    fn areas_plainly(&self, lefts: &[f32; LANES], tops: &[f32; LANES]) -> [u32; LANES] {
         let mut areas = [0.0_f32; LANES];
         for side in &self.sides {
             let [[x0, y0], [x1, _]] = side.ends;
-            let y0 = y0 - top;
             for l in 0..LANES {
-                let x = left + l as f32;
-                let start = x0 - x;
-                let (from, to) = (clamp(start), clamp(x1 - x));
+                let y0 = y0 - tops[l];
+                let start = x0 - lefts[l];
+                let (from, to) = (clamp(start), clamp(x1 - lefts[l]));
                 let width = to - from;
                 let (high, low) = (y0 + (from - start) * side.slope, y0 + (to - start) * side.slope);
                 areas[l] -= width * mean_clamped(high, low);
@@ -290,7 +387,7 @@ mod tests {
             open += 1;
             for y in (0..64).step_by(1 + case % 3) {
                 for first in (0..64).step_by(LANES) {
-                    for (x, area) in (first..).zip(inset.areas(first, y)) {
+                    for (x, area) in (first..).zip(inset.areas(Isa::detect(), first, y)) {
                         let (area, want) =
                             (f64::from(area) / f64::from(HOLE_UNIT), truth(corners, f64::from(width_px), [x, y]));
                         partial += usize::from(want > 0.01 && want < 0.99);

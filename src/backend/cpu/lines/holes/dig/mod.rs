@@ -1,13 +1,18 @@
 //! Stage lines, per face: its hole in the pixels around it, eight pixels of a row at a time. As the
 //! pixels of [`add_holes_plainly`](crate::backend::cpu::lines::plain::add_holes_plainly) find them.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod small;
+
+use self::small::{add_areas, masked};
 use super::inset::{Inset, Insets};
 use super::{Holes, half_width, looked_at, marks_of_hidden};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::lists::BoxedFace;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
-use crate::backend::cpu::geometry::batch::{boxes, corners};
+use crate::backend::cpu::geometry::batch::boxes;
 use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
 use crate::backend::cpu::geometry::setups::Boxes;
 use crate::backend::cpu::geometry::tiles::Tiles;
@@ -66,6 +71,9 @@ fn holes_sampled<const S: usize>(
         digger.dig_all(&waiting.take(), holes);
     }
 }
+
+/// Eight samples: their places, across and down, and their ids.
+type Samples<'s> = (&'s [f32; LANES], &'s [f32; LANES], &'s [u32; LANES]);
 
 /// Faces that may show, and wait until there are eight of them.
 struct Waiting {
@@ -190,7 +198,7 @@ impl<'a, const S: usize> Digger<'a, S> {
     /// Adds the holes of some faces.
     #[inline(always)]
     fn dig_all(&mut self, faces: &Taken, holes: &mut Holes) {
-        let insets = Insets::new(&corners(self.context, &faces.ids), self.half, self.half_width);
+        let insets = Insets::of(self.context, &faces.ids, self.half, self.half_width);
         for (l, &id) in faces.ids.iter().enumerate().take(faces.len) {
             if insets.is_open[l] != 0 {
                 self.dig(&insets.get(l, self.half), id, holes);
@@ -198,7 +206,7 @@ impl<'a, const S: usize> Digger<'a, S> {
         }
     }
 
-    /// Adds a face's hole, eight pixels at a time.
+    /// Adds a face's hole.
     #[inline(always)]
     fn dig(&mut self, inset: &Inset, id: u32, holes: &mut Holes) {
         let [columns, rows]: [[i32; 2]; 2] = std::array::from_fn(|k| {
@@ -208,105 +216,117 @@ impl<'a, const S: usize> Digger<'a, S> {
         if columns[0] > columns[1] || rows[0] > rows[1] {
             return;
         }
-        let mut first = columns[0];
-        while first <= columns[1] {
-            let (mut above, mut here) = (self.seen(id, first, rows[0] - 1), self.seen(id, first, rows[0]));
+        self.pixels += u64::from((columns[0].abs_diff(columns[1]) + 1) * (rows[0].abs_diff(rows[1]) + 1));
+        if inset.is_small() {
+            self.dig_small(inset, id, [columns, rows], holes);
+            return;
+        }
+        for first in (columns[0]..=columns[1]).step_by(LANES) {
+            let (mut above, mut here) =
+                (self.shown(id, first, rows[0] - 1, LANES), self.shown(id, first, rows[0], LANES));
             for y in rows[0]..=rows[1] {
-                let below = self.seen(id, first, y + 1);
-                let seen = above | here | below;
-                let close = (seen | seen >> 1 | seen >> 2) & ((2 << (columns[1] - first).min(LANES as i32 - 1)) - 1);
+                let below = self.shown(id, first, y + 1, LANES);
+                let shown = above | here | below;
+                let close = (shown | shown >> 1 | shown >> 2) & ((2 << (columns[1] - first).min(LANES as i32 - 1)) - 1);
                 if close != 0 {
-                    self.dig_row(inset, id, [first, y], close, holes);
+                    self.mark_hidden((inset, id), [first, y], (close, LANES), holes);
+                    let areas = masked(inset.areas(self.context.isa, first, y), close);
+                    add_areas::<LANES>([first, y], &areas, holes);
                 }
                 (above, here) = (here, below);
             }
-            first += LANES as i32;
         }
-        self.pixels += u64::from((columns[0].abs_diff(columns[1]) + 1) * (rows[0].abs_diff(rows[1]) + 1));
     }
 
-    /// The pixels, from the one before `first` to the one after the eighth, that show the face.
+    /// Bits of the pixels that show the face, from the one before `first` to the one after `count` of
+    /// them.
     #[inline(always)]
-    fn seen(&self, id: u32, first: i32, y: i32) -> u32 {
+    #[allow(unsafe_code)]
+    fn shown(&self, id: u32, first: i32, y: i32, count: usize) -> u32 {
         let [columns, rows] = self.band.range();
         if y < rows[0] || y >= rows[1] {
             return 0;
         }
-        let mut seen = 0;
-        if first > columns[0] && first + (LANES as i32) < columns[1] {
+        if first > columns[0] && first + (count as i32) < columns[1] {
             let at = self.band.index(first - 1, y, 0);
-            let ids = self.band.ids.get(at..at + (LANES + 2) * S).unwrap_or_default();
-            for (i, ids) in ids.as_chunks::<S>().0.iter().enumerate() {
-                seen |= shows(ids, id) << i;
+            let ids = self.band.ids.get(at..at + (count + 2) * S).unwrap_or_default();
+            #[cfg(target_arch = "x86_64")]
+            if self.context.isa.has_avx2() {
+                // SAFETY: the processor has AVX2, as `isa` says.
+                return unsafe { avx2::shown::<S>(ids, id) };
             }
-            return seen;
+            return shown_plainly::<S>(ids, id);
         }
-        for x in (first - 1).max(columns[0])..(first + LANES as i32 + 1).min(columns[1]) {
-            seen |= u32::from(self.band.pixel(x, y).0.contains(&id)) << (x - (first - 1));
+        let mut shown = 0;
+        for x in (first - 1).max(columns[0])..(first + count as i32 + 1).min(columns[1]) {
+            shown |= u32::from(self.band.pixel(x, y).0.contains(&id)) << (x - (first - 1));
         }
-        seen
+        shown
     }
 
-    /// Adds the face's hole to some of eight pixels of a row, and marks around those in which
-    /// something hides it.
+    /// Marks around those of `count` pixels of a row in which something hides the face and it counts, as
+    /// bits say.
     #[inline(always)]
-    fn dig_row(&self, inset: &Inset, id: u32, [first, y]: [i32; 2], close: u32, holes: &mut Holes) {
-        if self.may_hide(inset, id, [first, y]) {
-            for l in (0..LANES as i32).filter(|l| close >> l & 1 != 0) {
-                let marks = marks_of_hidden(self.context, self.band, self.half, (inset, id), [first + l, y]);
-                if marks != 0 {
-                    holes.mark_around([first + l, y], self.reach, marks);
-                }
-            }
-        }
-        let mut areas = inset.areas(first, y);
-        for l in 0..LANES {
-            areas[l] &= 0_u32.wrapping_sub(close >> l & 1);
-        }
-        if let Some(words) = holes.words_mut::<LANES>([first, y]) {
-            // As `Holes::add`.
-            for l in 0..LANES {
-                words[l] = words[l].wrapping_add(areas[l]);
-            }
+    fn mark_hidden(&self, face: (&Inset, u32), [first, y]: [i32; 2], (close, count): (u32, usize), holes: &mut Holes) {
+        if !self.may_hide(face, [first, y], count) {
             return;
         }
-        for (x, area) in (first..).zip(areas) {
-            if let Some(at) = holes.index([x, y]) {
-                holes.add(at, area);
+        for l in (0..count as i32).filter(|l| close >> l & 1 != 0) {
+            let marks = marks_of_hidden(self.context, self.band, self.half, face, [first + l, y]);
+            if marks != 0 {
+                holes.mark_around([first + l, y], self.reach, marks);
             }
         }
     }
 
-    /// False if [`marks_of_hidden`] finds none in eight pixels of a row.
+    /// False if [`marks_of_hidden`] finds none in so many pixels of a row, at most eight.
     #[inline(always)]
-    fn may_hide(&self, inset: &Inset, id: u32, [first, y]: [i32; 2]) -> bool {
+    #[allow(unsafe_code)]
+    fn may_hide(&self, (inset, id): (&Inset, u32), [first, y]: [i32; 2], count: usize) -> bool {
         let columns = self.band.range()[0];
-        if first < columns[0] || first + LANES as i32 > columns[1] {
+        if first < columns[0] || first + count as i32 > columns[1] {
             return true;
         }
-        let at = self.band.index(first, y, 0);
-        let ids = self.band.ids.get(at..at + LANES * S).unwrap_or_default();
+        let (at, samples) = (self.band.index(first, y, 0), (count * S).next_multiple_of(LANES));
+        // Beyond the row lies room for a vector.
+        let Some(ids) = self.band.ids.get(at..at + samples) else { return true };
         let corner = [(first * 256 - self.half[0]) as f32, (y * 256 - self.half[1]) as f32];
         let (right, down) = (self.offsets[0].as_flattened(), self.offsets[1].as_flattened());
-        let mut hides = [0_u32; LANES];
-        let groups =
-            ids.as_chunks::<LANES>().0.iter().zip(right.as_chunks::<LANES>().0).zip(down.as_chunks::<LANES>().0);
-        for ((ids, right), down) in groups {
-            for l in 0..LANES {
-                let is_inside = inset.contains([corner[0] + right[l], corner[1] + down[l]]);
-                hides[l] |= u32::from(is_inside & (ids[l] != id));
-            }
+        let places = right.as_chunks::<LANES>().0.iter().zip(down.as_chunks::<LANES>().0);
+        let samples = places.zip(ids.as_chunks::<LANES>().0).map(|((right, down), ids)| (right, down, ids));
+        #[cfg(target_arch = "x86_64")]
+        if self.context.isa.has_avx2() {
+            // SAFETY: the processor has AVX2, as `isa` says.
+            return unsafe { avx2::hides(inset, id, corner, samples) };
         }
-        hides.iter().fold(0, |any, hides| any | hides) != 0
+        hides_plainly(inset, id, corner, samples)
     }
 }
 
-/// True if any of a pixel's samples shows a face.
+/// Bits of the pixels of which a sample shows a face.
 #[inline(always)]
-fn shows<const S: usize>(ids: &[u32; S], id: u32) -> u32 {
-    let mut shows = false;
-    for s in 0..S {
-        shows |= ids[s] == id;
+fn shown_plainly<const S: usize>(ids: &[u32], id: u32) -> u32 {
+    let mut shown = 0;
+    for (i, ids) in ids.as_chunks::<S>().0.iter().enumerate() {
+        let mut any = false;
+        for s in 0..S {
+            any |= ids[s] == id;
+        }
+        shown |= u32::from(any) << i;
     }
-    u32::from(shows)
+    shown
+}
+
+/// True if a sample well inside of a face shows something else. Samples are places from a corner, across
+/// and down, with ids.
+#[inline(always)]
+fn hides_plainly<'s>(inset: &Inset, id: u32, corner: [f32; 2], samples: impl Iterator<Item = Samples<'s>>) -> bool {
+    let mut hides = [0_u32; LANES];
+    for (right, down, ids) in samples {
+        for l in 0..LANES {
+            let is_inside = inset.contains([corner[0] + right[l], corner[1] + down[l]]);
+            hides[l] |= u32::from(is_inside & (ids[l] != id));
+        }
+    }
+    hides.iter().fold(0, |any, hides| any | hides) != 0
 }
