@@ -40,6 +40,26 @@ impl Projection {
     }
 }
 
+#[cfg(test)]
+impl Projection {
+    /// From the front, 60 px a unit at the distance 1; the eye is at z = 1.4.
+    pub fn for_tests() -> Self {
+        let [right, up, back] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let row = |axis: [f32; 3], scale: f32, offset: f32| [axis[0] * scale, axis[1] * scale, axis[2] * scale, offset];
+        Self {
+            x: row(right, 60.0 * 256.0, 0.0),
+            y: row(up, -40.0 * 256.0, 0.0),
+            z: row(back, 0.2, 0.5),
+            w: [0.0, 0.0, -1.0, 1.4],
+            near_w: 0.5,
+            clip: true,
+            to_viewer: back,
+            screen_up: up,
+            screen_right: right,
+        }
+    }
+}
+
 /// `row . (p, 1)`, in f64.
 pub fn row_dot(row: &[f32; 4], p: [f32; 3]) -> f64 {
     let (row, p) = (row.map(f64::from), p.map(f64::from));

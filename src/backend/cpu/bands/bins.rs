@@ -221,3 +221,53 @@ fn map<T: Send, U: Send>(
         None => items.into_iter().map(each).collect(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::cpu::CpuRenderer;
+    use crate::backend::cpu::stopwatch::Stopwatch;
+    use crate::limits::Deadline;
+    use crate::plan::{Projection, SurfacePass};
+
+    /// Pairs of faces with a common edge, wound alike or not, some of them edge-on, behind the eye, or
+    /// without a second face.
+    #[test]
+    fn silhouettes_by_sides_are_those_by_corners() {
+        let mut state = 1_u32;
+        let mut chance = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let count = 3 * CHUNK as u32 / 2;
+        let corner = |i: u32, chance: &mut dyn FnMut() -> f32| {
+            let depth = if i.is_multiple_of(50) { 3.0 } else { 0.5 };
+            // Few places in one dimension, so that some faces have no area.
+            let across = if i.is_multiple_of(7) { 0.1 } else { chance() - 0.5 };
+            [across, chance() - 0.5, depth * chance()]
+        };
+        let positions: Vec<[f32; 3]> = (0..4 * count).map(|i| corner(i / 4, &mut chance)).collect();
+        let (mut triangles, mut edges) = (Vec::new(), Vec::new());
+        for i in 0..count {
+            let [a, b, c, d] = [4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3];
+            triangles.push([[a, b, c], [c, a, b], [b, a, c]][i as usize % 3]);
+            triangles.push(if i % 5 < 3 { [b, a, d] } else { [d, a, b] });
+            let second = if i.is_multiple_of(11) { Edge::NO_FACE } else { 2 * i + 1 };
+            edges.push(Edge { vertices: [a, b], faces: [2 * i, second] });
+        }
+        let mut plan = DrawPlan::new([200, 150], &positions, &triangles, Projection::for_tests());
+        plan.surface = Some(SurfacePass::new(Faces::Both, Vec::new()));
+        let (deadline, watch) = (Deadline::default(), Stopwatch::default());
+        let mut cpu = CpuRenderer::new(1);
+        cpu.transform(&plan, None);
+        let context = cpu.context(&plan, &deadline, &watch);
+        let bins = bin(&context, None, [40, 3]).unwrap();
+        let mut silhouettes = 0;
+        for edge in &edges {
+            let want = context.is_silhouette(edge);
+            assert_eq!(is_silhouette(&context, edge, &bins.triangles), want, "{edge:?}");
+            silhouettes += usize::from(want);
+        }
+        assert!(silhouettes > 2000 && silhouettes < edges.len() - 2000, "{silhouettes} of {}", edges.len());
+    }
+}

@@ -240,22 +240,6 @@ mod tests {
     use crate::limits::Deadline;
     use crate::plan::{HullPass, Projection};
 
-    fn projection() -> Projection {
-        let [right, up, back] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let row = |axis: [f32; 3], scale: f32, offset: f32| [axis[0] * scale, axis[1] * scale, axis[2] * scale, offset];
-        Projection {
-            x: row(right, 60.0 * 256.0, 0.0),
-            y: row(up, -40.0 * 256.0, 0.0),
-            z: row(back, 0.2, 0.5),
-            w: [0.0, 0.0, -1.0, 1.4],
-            near_w: 0.5,
-            clip: true,
-            to_viewer: back,
-            screen_up: up,
-            screen_right: right,
-        }
-    }
-
     /// Triangles of all sizes, some of them behind the eye or far outside; those with a mask are
     /// drawn from one side, or not.
     fn is_kept_alike(samples: u32, margin: u32, masks: Vec<u8>) -> [usize; 3] {
@@ -271,7 +255,7 @@ mod tests {
             (0..3).for_each(|_| positions.push(at.map(|v| v + size * (chance() - 0.5))));
         }
         let triangles: Vec<[u32; 3]> = (0..1499).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        let mut plan = DrawPlan::new([120, 90], &positions, &triangles, projection());
+        let mut plan = DrawPlan::new([120, 90], &positions, &triangles, Projection::for_tests());
         (plan.samples, plan.pass_masks, plan.margin_px) = (samples, masks.into(), margin);
         plan.hull = Some(HullPass::default());
         let deadline = Deadline::default();

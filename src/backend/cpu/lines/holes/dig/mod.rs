@@ -330,3 +330,50 @@ fn hides_plainly<'s>(inset: &Inset, id: u32, corner: [f32; 2], samples: impl Ite
     }
     hides.iter().fold(0, |any, hides| any | hides) != 0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::cpu::isa::Isa;
+
+    /// xorshift32
+    fn random(state: &mut u32) -> u32 {
+        *state ^= *state << 13;
+        *state ^= *state >> 17;
+        *state ^= *state << 5;
+        *state
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    fn are_shown_alike<const S: usize>(state: &mut u32) -> u32 {
+        let mut found = 0;
+        for case in 0..4000 {
+            let pixels = 3 + case % 8;
+            // Two ids in three.
+            let ids: Vec<u32> = (0..pixels * S).map(|_| random(state) % [3, 40][case / 8 % 2]).collect();
+            let want = shown_plainly::<S>(&ids, 2);
+            if Isa::detect().has_avx2() {
+                // SAFETY: the processor has AVX2, as `isa` says.
+                assert_eq!(unsafe { avx2::shown::<S>(&ids, 2) }, want, "{S} samples: {ids:?}");
+            }
+            assert_eq!(want >> pixels, 0);
+            found += want.count_ones();
+        }
+        found
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn every_instruction_set_finds_the_same_pixels_of_a_face() {
+        let mut state = 1;
+        let state = &mut state;
+        let found = [
+            are_shown_alike::<1>(state),
+            are_shown_alike::<4>(state),
+            are_shown_alike::<8>(state),
+            are_shown_alike::<16>(state),
+        ];
+        assert!(found.iter().all(|&found| (3000..25_900).contains(&found)), "{found:?}");
+    }
+}

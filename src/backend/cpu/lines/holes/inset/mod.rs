@@ -35,6 +35,7 @@ pub const SMALL: i32 = 4 * 256;
 pub const SMALL_PIXELS: usize = SMALL as usize / 256 + 1;
 
 /// Eight faces' insets, still in lanes.
+#[derive(Debug, PartialEq)]
 pub struct Insets {
     corners: [[[i32; LANES]; 2]; 3],
     /// Per side, from corner k to the next, the unit vector along it, turned so that the inside lies on
@@ -310,6 +311,10 @@ fn mean_clamped(a: f32, b: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::backend::cpu::CpuRenderer;
+    use crate::backend::cpu::stopwatch::Stopwatch;
+    use crate::limits::Deadline;
+    use crate::plan::{DrawPlan, Projection};
 
     const HALF: [i32; 2] = [64 * 128; 2];
 
@@ -398,6 +403,70 @@ mod tests {
             }
         }
         assert!(open > 2000 && partial > 20_000, "{open} faces, {partial} pixels; off by {farthest}");
+    }
+
+    /// Small faces of all shapes, needles among them. An area outside of the open pixels would be left out.
+    #[test]
+    fn small_insets_have_areas_in_their_open_pixels_alone() {
+        let mut state = 0x1234_5678_9ABC_DEF1;
+        let (mut open, mut empty_pixels) = (0, 0);
+        for case in 0..60_000 {
+            let size = [300, 700, SMALL + 1][case % 3];
+            let place = [random(&mut state, 8000) - 4000, random(&mut state, 8000) - 4000];
+            let mut corners: [[i32; 2]; 3] =
+                std::array::from_fn(|_| std::array::from_fn(|axis| place[axis] + random(&mut state, size)));
+            if case % 4 == 0 {
+                corners[1][case / 4 % 2] = corners[0][case / 4 % 2] + (case as i32 / 8 % 3);
+            }
+            let Some(inset) = inset_of(corners, [0.05, 0.4, 1.0][case / 3 % 3]) else { continue };
+            assert!(inset.is_small());
+            open += 1;
+            let [columns, rows] = inset.open_pixels();
+            let [[left, right], [top, bottom]] = inset.bounds.map(|b| b.map(|v| v >> 8));
+            for y in top - 1..=bottom + 1 {
+                let by_row = inset.areas(Isa::baseline(), left - 1, y);
+                for (x, area) in (left - 1..=right + 1).zip(by_row) {
+                    let is_open = (columns[0]..=columns[1]).contains(&x) && (rows[0]..=rows[1]).contains(&y);
+                    assert!(is_open || area == 0, "{case}: {area} at {x} {y} of {corners:?}");
+                    empty_pixels += usize::from(!is_open);
+                }
+                for isa in Isa::available() {
+                    assert_eq!(inset.areas(isa, left - 1, y), by_row, "{case}, {isa:?}");
+                    let (upper, lower) = (inset.areas(isa, left, y), inset.areas(isa, left, y + 1));
+                    let both = inset.areas_in_two_rows(isa, left, y);
+                    assert_eq!(both, std::array::from_fn(|l| if l < 4 { upper[l] } else { lower[l - 4] }), "{case}");
+                }
+            }
+        }
+        assert!(open > 20_000 && empty_pixels > 100_000, "{open} faces, {empty_pixels} pixels");
+    }
+
+    #[test]
+    fn every_instruction_set_finds_the_same_insets() {
+        let mut state = 0xFEDC_BA98_7654_3211;
+        let mut chance = || random(&mut state, 1 << 20) as f32 / (1 << 20) as f32;
+        let positions: Vec<[f32; 3]> = (0..9000)
+            .map(|i| {
+                let size = [0.002, 0.02, 1.0][i / 3 % 3];
+                [0.8 * (i / 9) as f32 / 1000.0 - 0.4 + size * chance(), 0.5 * size * chance(), chance()]
+            })
+            .collect();
+        let triangles: Vec<[u32; 3]> = (0..3000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let (half, deadline, watch) = ([256 * 128; 2], Deadline::default(), Stopwatch::default());
+        let plan = DrawPlan::new([256, 256], &positions, &triangles, Projection::for_tests());
+        let mut open = 0;
+        for isa in Isa::available() {
+            let mut cpu = CpuRenderer::with_isa(1, isa);
+            cpu.transform(&plan, None);
+            let context = cpu.context(&plan, &deadline, &watch);
+            for first in (0..3000).step_by(LANES) {
+                let ids = std::array::from_fn(|l| (first + l) as u32);
+                let want = Insets::new(&Corners::load(&context, &ids), half, 128.0);
+                assert_eq!(Insets::of(&context, &ids, half, 128.0), want, "{isa:?}, face {first}");
+                open += want.is_open.iter().sum::<u32>();
+            }
+        }
+        assert!((600..5400).contains(&open), "{open}");
     }
 
     #[test]
