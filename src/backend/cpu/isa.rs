@@ -4,10 +4,11 @@
 //! once per instruction set. Rust neither fuses nor reorders floating-point operations, so all give
 //! the same bytes; only the speed differs.
 //!
-//! The innermost steps of triangles are an exception: they have a second version in AVX2 instructions,
-//! in files called `avx2.rs` or `*_avx2.rs`.
+//! The innermost steps of triangles and of lines are an exception: they have a second version in AVX2
+//! instructions, in files called `avx2.rs` or `*_avx2.rs`, and the innermost of all a third one in AVX-512,
+//! `geometry/batch_avx512.rs`.
 //!
-//! To add an instruction set (AVX-512, NEON): a variant of `Level` under its `cfg`, a list of
+//! To add an instruction set (NEON): a variant of `Level` under its `cfg`, a list of
 //! features beside [`for_avx2_features`], a constructor that detects all of them, and an arm in
 //! [`dispatch`].
 
@@ -31,6 +32,9 @@ enum Level {
     Baseline,
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    /// AVX2, and the first part of AVX-512.
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
 }
 
 /// Calls a macro with the features of the AVX2 level, followed by its own input: detection and
@@ -61,12 +65,12 @@ impl Isa {
 
     /// The widest that this processor has.
     pub fn detect() -> Self {
-        Self::avx2().unwrap_or_else(Self::baseline)
+        Self::avx512().or_else(Self::avx2).unwrap_or_else(Self::baseline)
     }
 
     /// All that this processor has, the baseline first: for tests that compare them.
     pub fn available() -> Vec<Self> {
-        [Some(Self::baseline()), Self::avx2()].into_iter().flatten().collect()
+        [Some(Self::baseline()), Self::avx2(), Self::avx512()].into_iter().flatten().collect()
     }
 
     /// The name used in reports.
@@ -75,6 +79,8 @@ impl Isa {
             Level::Baseline => "baseline",
             #[cfg(target_arch = "x86_64")]
             Level::Avx2 => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => "avx512",
         }
     }
 
@@ -82,7 +88,14 @@ impl Isa {
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     pub(in crate::backend::cpu) fn has_avx2(self) -> bool {
-        self.0 == Level::Avx2
+        matches!(self.0, Level::Avx2 | Level::Avx512)
+    }
+
+    /// True if code compiled for the AVX-512 level may run.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub(in crate::backend::cpu) fn has_avx512(self) -> bool {
+        self.0 == Level::Avx512
     }
 
     /// True if the steps of `geometry::batch` are written in this level's own instructions.
@@ -99,8 +112,19 @@ impl Isa {
         for_avx2_features!(are_detected! {}).then_some(Self(Level::Avx2))
     }
 
+    #[cfg(target_arch = "x86_64")]
+    fn avx512() -> Option<Self> {
+        let is_there = Self::avx2().is_some() && std::arch::is_x86_feature_detected!("avx512f");
+        is_there.then_some(Self(Level::Avx512))
+    }
+
     #[cfg(not(target_arch = "x86_64"))]
     fn avx2() -> Option<Self> {
+        None
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    fn avx512() -> Option<Self> {
         None
     }
 }
@@ -136,7 +160,7 @@ macro_rules! dispatch_to {
                     $kernel($($arg),*)
                 }
                 if isa.has_avx2() {
-                    // SAFETY: `has_avx2` is true only of a value that `Isa::avx2` has made, which it does where the
+                    // SAFETY: `has_avx2` is true only of a value that `Isa::avx2` has made, or `Isa::avx512` by asking it, which it does where the
                     // processor reports every feature that `avx2` above enables: both lists are
                     // `for_avx2_features`'s.
                     return unsafe { avx2($($arg),*) };

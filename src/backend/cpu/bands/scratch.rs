@@ -2,8 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::backend::cpu::geometry::samples::SampleBand;
-use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::geometry::samples::{HANGOVER, SampleBand};
 use crate::backend::cpu::lines::coverage::BandStrokes;
 use crate::backend::cpu::lines::farthest::Farthest;
 use crate::backend::cpu::lines::holes::Holes;
@@ -103,7 +102,7 @@ impl Banding {
 
 /// Bytes of a row: of its samples (0), or of what there is only where a row is shown (1).
 fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
-    let samples = |columns: u32| columns as usize * plan.samples as usize + LANES;
+    let samples = |columns: u32| columns as usize * plan.samples as usize + HANGOVER;
     if part == 0 {
         let columns = plan.width_px + 2 * plan.margin_px;
         let farthest = if plan.hides_lines() { columns as usize * size_of::<f32>() } else { 0 };

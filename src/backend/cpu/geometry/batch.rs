@@ -161,6 +161,11 @@ fn draw_long<const S: usize>(context: &RasterContext<'_>, setup: &Setup, id: u32
 #[allow(unsafe_code)]
 fn draw_lane<const S: usize, const N: usize>(isa: Isa, parts: &Parts<N>, l: usize, id: u32, band: &mut SampleBand) {
     #[cfg(target_arch = "x86_64")]
+    if isa.has_avx512() {
+        // SAFETY: the processor has AVX-512, as `isa` says.
+        return unsafe { super::batch_avx512::draw_lane::<S, N>(parts, l, id, band) };
+    }
+    #[cfg(target_arch = "x86_64")]
     if isa.has_avx2() {
         // SAFETY: the processor has AVX2, as `isa` says.
         return unsafe { super::batch_avx2::draw_lane::<S, N>(parts, l, id, band) };

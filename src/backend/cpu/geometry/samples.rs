@@ -15,6 +15,9 @@ macro_rules! for_samples {
 }
 pub(crate) use for_samples;
 
+/// Samples beyond a row's last pixel, so that a vector may hang over.
+pub const HANGOVER: usize = 2 * LANES;
+
 /// No triangle.
 pub const NOTHING: u32 = u32::MAX;
 
@@ -74,7 +77,7 @@ pub struct SampleBand {
 impl SampleBand {
     /// An empty band at the top of a picture, with so many columns beyond it on each side.
     pub fn new(size_px: [u32; 2], margin: u32, rows: u32, samples: u32) -> Self {
-        let stride = (size_px[0] + 2 * margin) as usize * samples as usize + LANES;
+        let stride = (size_px[0] + 2 * margin) as usize * samples as usize + HANGOVER;
         let len = stride * rows as usize;
         let (depth, ids) = (vec![0.0; len], vec![NOTHING; len]);
         Self { size_px, margin, first_row: 0, rows, shown: [0, rows], samples, stride, depth, ids }
