@@ -26,7 +26,7 @@ use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
 use crate::backend::cpu::geometry::tiles::Tiles;
 use crate::backend::cpu::geometry::visibility;
 use crate::backend::cpu::geometry::visibility::Setup;
-use crate::backend::cpu::lines::coverage::{BandStrokes, LineCompositor};
+use crate::backend::cpu::lines::coverage::{BandStrokes, LineCompositor, composite};
 use crate::backend::cpu::lines::edge::{LineDrawer, LineTarget};
 use crate::backend::cpu::lines::farthest::Farthest;
 use crate::backend::cpu::lines::holes::dig::add_holes;
@@ -34,7 +34,7 @@ use crate::backend::cpu::lines::holes::free_points::{add_points, add_points_plai
 use crate::backend::cpu::lines::holes::{self, Holes};
 use crate::backend::cpu::lines::line_light;
 use crate::backend::cpu::lines::plain::add_holes_plainly;
-use crate::backend::cpu::peeling::composite;
+use crate::backend::cpu::peeling;
 use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::flat::{draw_flat, shade_flat};
 use crate::backend::cpu::surface::light::Light;
@@ -60,7 +60,7 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
     scratch.colors.resize(pixels, [0.0; 4]);
     if let Some(pass) = plan.peeling() {
         let peel = scratch.peel.get_or_insert_with(|| PeelBand::new(&scratch.samples, scratch.rows));
-        composite::draw(context, pass, (&bins.peel, band), &scratch.samples, peel, &mut scratch.colors);
+        peeling::composite::draw(context, pass, (&bins.peel, band), &scratch.samples, peel, &mut scratch.colors);
     } else if let Some(flat) = context.flat {
         shade_flat(isa, context, flat, &scratch.samples, &mut scratch.colors);
     } else if plan.is_shaded() {
@@ -104,7 +104,7 @@ pub fn draw_layer(
     fill_samples(context, scratch, bins, band);
     if let Some(pass) = context.plan.peeling() {
         let peel = scratch.peel.get_or_insert_with(|| PeelBand::new(&scratch.samples, scratch.rows));
-        let found = composite::find_layer(context, pass, (&bins.peel, band), &scratch.samples, peel, layer);
+        let found = peeling::composite::find_layer(context, pass, (&bins.peel, band), &scratch.samples, peel, layer);
         for_each_sample(&peel.found, words, |at| found[at]);
     }
 }
@@ -138,7 +138,8 @@ fn draw_lines(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bin
         scratch.light.clear();
         scratch.light.resize(lit_pixels, Light::NONE);
         line_light::light_lines(context, &scratch.samples, &scratch.owners, &mut scratch.light);
-        compositor.composite(pass, (&scratch.strokes, &scratch.holes), &scratch.light, &mut scratch.colors);
+        let covered = (&scratch.strokes, &scratch.holes);
+        composite(context.isa, &compositor, pass, covered, &scratch.light, &mut scratch.colors);
     }
 }
 
@@ -254,7 +255,8 @@ fn triangles_sampled<const S: usize>(context: &RasterContext<'_>, bins: &Bins, b
         if lists().all(|list| list.is_empty_in(band)) {
             continue;
         }
-        let tiles = (i == 1).then(|| Tiles::new(samples));
+        // Not in a closure, which would be compiled for the baseline.
+        let tiles = if i == 1 { Some(Tiles::new(samples)) } else { None };
         if draw_batches::<S>(context, (lists(), band), samples, tiles.as_ref(), &mut poll).is_break() {
             return;
         }

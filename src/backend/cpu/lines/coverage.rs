@@ -11,6 +11,7 @@ use super::holes::Holes;
 use super::stroke::{Amount, Mask, POINTS, WORDS, count};
 use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
 use crate::backend::cpu::geometry::transform::recip;
+use crate::backend::cpu::isa::dispatch;
 use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::resolve::{is_composited, over_background};
 use crate::backend::cpu::surface::light::Light;
@@ -162,34 +163,6 @@ impl<'a> LineCompositor<'a> {
         Self { plan, band, peel, sample_masks: (0..samples).map(|s| points_of_sample(samples, s)).collect() }
     }
 
-    /// Composites the lines of a pass over the colours. `light` is empty where they are not lit.
-    pub fn composite(
-        &self,
-        lines: &LinePass,
-        (strokes, holes): (&BandStrokes, &Holes),
-        light: &[Light],
-        colors: &mut [[f32; 4]],
-    ) {
-        let peak = lines.peak();
-        for (i, c) in colors.iter_mut().enumerate() {
-            let (cover, mask) = match (holes.covered_share(i), strokes.of(i)) {
-                (Some(cover), _) => (cover, &NO_POINTS),
-                (None, Some(coverage)) => (coverage.covered_share(peak), &coverage.mask),
-                (None, None) => continue,
-            };
-            if cover > 0.0 {
-                let under = if is_composited(c) {
-                    [c[0], c[1], c[2], -c[3]]
-                } else {
-                    over_background(self.uncovered(i, *c, mask, lines.color[3] * peak), self.plan.background)
-                };
-                let color = light.get(i).map_or(lines.color, |light| light.on_premultiplied(lines.color));
-                *c = std::array::from_fn(|k| cover * color[k] + under[k] * (1.0 - cover * color[3]));
-                c[3] = -c[3];
-            }
-        }
-    }
-
     /// The surface's colour, weighted by its share of what lines leave uncovered. At the surface's
     /// border this differs from its share of the pixel, because a line along the border covers both
     /// sides alike.
@@ -205,6 +178,46 @@ impl<'a> LineCompositor<'a> {
         };
         let weight = weight(&self.sample_masks, shown, mask, opacity);
         [surface[0] * weight, surface[1] * weight, surface[2] * weight, (surface[3] * weight).min(1.0)]
+    }
+}
+
+dispatch! {
+    /// Composites the lines of a pass over the colours. `light` is empty where they are not lit.
+    pub fn composite(
+        compositor: &LineCompositor<'_>,
+        lines: &LinePass,
+        covered: (&BandStrokes, &Holes),
+        light: &[Light],
+        colors: &mut [[f32; 4]],
+    ) = composite_kernel
+}
+
+#[inline(always)]
+fn composite_kernel(
+    compositor: &LineCompositor<'_>,
+    lines: &LinePass,
+    (strokes, holes): (&BandStrokes, &Holes),
+    light: &[Light],
+    colors: &mut [[f32; 4]],
+) {
+    let peak = lines.peak();
+    for (i, c) in colors.iter_mut().enumerate() {
+        let (cover, mask) = match (holes.covered_share(i), strokes.of(i)) {
+            (Some(cover), _) => (cover, &NO_POINTS),
+            (None, Some(coverage)) => (coverage.covered_share(peak), &coverage.mask),
+            (None, None) => continue,
+        };
+        if cover > 0.0 {
+            let under = if is_composited(c) {
+                [c[0], c[1], c[2], -c[3]]
+            } else {
+                let surface = compositor.uncovered(i, *c, mask, lines.color[3] * peak);
+                over_background(surface, compositor.plan.background)
+            };
+            let color = light.get(i).map_or(lines.color, |light| light.on_premultiplied(lines.color));
+            *c = std::array::from_fn(|k| cover * color[k] + under[k] * (1.0 - cover * color[3]));
+            c[3] = -c[3];
+        }
     }
 }
 
