@@ -31,6 +31,16 @@ impl<const S: usize> Digger<'_, S> {
         }
         let open = inset.open_pixels();
         let range = |k: usize, [first, last]: [i32; 2]| open[k][0].max(first)..open[k][1].min(last) + 1;
+        if range(0, columns).len() > COLUMNS {
+            for y in range(1, rows) {
+                let close = close[(y - rows[0]) as usize % SMALL_PIXELS];
+                if close != 0 {
+                    let areas = masked(inset.areas(self.context.isa, columns[0], y), close);
+                    add_areas::<LANES>([columns[0], y], &areas, holes);
+                }
+            }
+            return;
+        }
         for y in range(1, rows).step_by(2) {
             let row = (y - rows[0]) as usize;
             for x in range(0, columns).step_by(COLUMNS) {
