@@ -160,9 +160,9 @@ macro_rules! dispatch_to {
                     $kernel($($arg),*)
                 }
                 if isa.has_avx2() {
-                    // SAFETY: `has_avx2` is true only of a value that `Isa::avx2` has made, or `Isa::avx512` by asking it, which it does where the
-                    // processor reports every feature that `avx2` above enables: both lists are
-                    // `for_avx2_features`'s.
+                    // SAFETY: `has_avx2` is true only of a value that `Isa::avx2` has made, or `Isa::avx512` after
+                    // asking it. It makes one where the processor reports every feature that `avx2` above
+                    // enables: both lists are `for_avx2_features`'s.
                     return unsafe { avx2($($arg),*) };
                 }
             }

@@ -28,8 +28,9 @@ pub struct LinePass {
     pub color: [f32; 4],
     /// The parts of the edges that are drawn, as the visibility buffer has it.
     pub shown: Shown,
-    /// The side of all faces that lies inside a closed surface. An edge is left out if all its
-    /// faces show this side to the viewer. None: no edge is left out for this reason.
+    /// The side of all faces that lies inside a closed surface, on which every edge has two faces that run
+    /// along it in opposite directions. An edge is left out if all its faces show this side to the viewer.
+    /// None: no edge is left out for this reason.
     pub unseen_side: Option<Side>,
     /// True if only this view's silhouette edges are drawn: edges whose faces all lie on one side
     /// of them on screen.

@@ -67,7 +67,8 @@ impl EdgeBin {
             return bin;
         }
         let edges = &pass.edges[bin.edges.clone()];
-        bin.are_silhouettes = edges.iter().map(|edge| is_silhouette(context, edge, triangles)).collect();
+        let is_closed = pass.unseen_side.is_some();
+        bin.are_silhouettes = edges.iter().map(|edge| is_silhouette(context, edge, is_closed, triangles)).collect();
         for ((i, edge), _) in (bin.edges.start as u32..).zip(edges).zip(&bin.are_silhouettes).filter(|(_, is)| **is) {
             if contour::is_drawn(context, pass, edge)
                 && let Some((_, bands)) = placed(context, edge, pass.reach_px(), rows)
@@ -124,9 +125,10 @@ impl OtherEdges {
     }
 }
 
-/// True for a silhouette, found by the sides that its faces show where that tells.
+/// True for a silhouette, found by the sides that its faces show where that tells. On a closed mesh the two
+/// faces of every edge run along it in opposite directions.
 #[inline(always)]
-fn is_silhouette(context: &RasterContext<'_>, edge: &Edge, triangles: &[TriangleBin]) -> bool {
+fn is_silhouette(context: &RasterContext<'_>, edge: &Edge, is_closed: bool, triangles: &[TriangleBin]) -> bool {
     let side = |face: u32| {
         let (chunk, face) = (triangles.get(face as usize / CHUNK)?, face as usize % CHUNK);
         let Sides { front, back } = chunk.sides.get(face / LANES)?;
@@ -140,7 +142,9 @@ fn is_silhouette(context: &RasterContext<'_>, edge: &Edge, triangles: &[Triangle
     match (side(first), side(second)) {
         // Faces on one side of an edge run along it the same way where they show the same side, and in
         // turns where they do not.
-        (Some(a), Some(b)) if a != [0, 0] && b != [0, 0] => (a == b) == (runs_along(first) == runs_along(second)),
+        (Some(a), Some(b)) if a != [0, 0] && b != [0, 0] => {
+            (a == b) == (!is_closed && runs_along(first) == runs_along(second))
+        }
         _ => context.is_silhouette(edge),
     }
 }
@@ -262,12 +266,24 @@ mod tests {
         cpu.transform(&plan, None);
         let context = cpu.context(&plan, &deadline, &watch);
         let bins = bin(&context, None, [40, 3]).unwrap();
-        let mut silhouettes = 0;
+        let (mut silhouettes, mut opposite) = (0, 0);
         for edge in &edges {
             let want = context.is_silhouette(edge);
-            assert_eq!(is_silhouette(&context, edge, &bins.triangles), want, "{edge:?}");
+            assert_eq!(is_silhouette(&context, edge, false, &bins.triangles), want, "{edge:?}");
             silhouettes += usize::from(want);
+            let runs_back = |face: u32, [a, b]: [u32; 2]| {
+                let t = triangles.get(face as usize)?;
+                Some((0..3).any(|k| [t[k], t[(k + 1) % 3]] == [b, a]))
+            };
+            // As on a closed mesh.
+            if let [Some(is_back), Some(other)] = edge.faces.map(|face| runs_back(face, edge.vertices))
+                && is_back != other
+            {
+                assert_eq!(is_silhouette(&context, edge, true, &bins.triangles), want, "{edge:?}");
+                opposite += 1;
+            }
         }
         assert!(silhouettes > 2000 && silhouettes < edges.len() - 2000, "{silhouettes} of {}", edges.len());
+        assert!(opposite > 2000, "{opposite}");
     }
 }
