@@ -20,6 +20,7 @@ pub struct Prepared {
     token: Arc<MeshToken>,
     edges: OnceLock<(Arc<EdgeList>, Vec<Spent>)>,
     orientation: OnceLock<Orientation>,
+    looked_at: OnceLock<Arc<Vec<u32>>>,
     vertex_normals: Mutex<Option<VertexNormals>>,
     textures: Mutex<Option<PreparedTextures>>,
 }
@@ -87,6 +88,14 @@ impl Prepared {
         })
     }
 
+    /// The faces that are looked at for the width of lines.
+    pub fn looked_at(&self, find: impl FnOnce() -> Vec<u32>) -> Arc<Vec<u32>> {
+        Arc::clone(self.looked_at.get().unwrap_or_else(|| {
+            let found = Arc::new(find());
+            self.looked_at.get_or_init(|| found)
+        }))
+    }
+
     /// Vertex normals for a mesh that brings none, with creases, paid for; found by `find` if those that
     /// were found last have other crease angles.
     pub fn vertex_normals<E: From<LimitExceeded>>(
@@ -122,7 +131,8 @@ impl Prepared {
         let edges = self.edges.get().map_or(0, |(edges, _)| edges.bytes());
         let normals = self.locked_normals().as_ref().map_or(0, VertexNormals::bytes);
         let textures = self.locked_textures().as_ref().map_or(0, |kept| size_of_val(&kept.textures.texels[..]));
-        (edges + normals + textures) as u64
+        let looked_at = self.looked_at.get().map_or(0, |faces| size_of_val(&faces[..]));
+        (edges + normals + textures + looked_at) as u64
     }
 
     fn locked_normals(&self) -> MutexGuard<'_, Option<VertexNormals>> {
