@@ -9,6 +9,7 @@ use crate::limits::{Budget, LimitExceeded, Spent};
 use crate::mesh::creases::CreasedNormals;
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Orientation;
+use crate::plan::edges::face_runs::FaceRuns;
 use crate::texture::mips::Reading;
 use crate::texture::{TextureError, Textures};
 
@@ -21,6 +22,7 @@ pub struct Prepared {
     edges: OnceLock<(Arc<EdgeList>, Vec<Spent>)>,
     orientation: OnceLock<Orientation>,
     looked_at: OnceLock<Arc<Vec<u32>>>,
+    face_runs: OnceLock<(Arc<FaceRuns>, Vec<Spent>)>,
     vertex_normals: Mutex<Option<VertexNormals>>,
     textures: Mutex<Option<PreparedTextures>>,
 }
@@ -73,6 +75,21 @@ impl Prepared {
         let (edges, spent) = budget.record(find);
         let edges = Arc::new(edges?);
         Ok(Arc::clone(&self.edges.get_or_init(|| (edges, spent)).0))
+    }
+
+    /// The runs of faces, paid for; found by `find` if they are not known.
+    pub fn face_runs(
+        &self,
+        budget: &mut Budget,
+        find: impl FnOnce(&mut Budget) -> Result<FaceRuns, LimitExceeded>,
+    ) -> Result<Arc<FaceRuns>, LimitExceeded> {
+        if let Some((runs, spent)) = self.face_runs.get() {
+            budget.spend_again(spent)?;
+            return Ok(Arc::clone(runs));
+        }
+        let (runs, spent) = budget.record(find);
+        let runs = Arc::new(runs?);
+        Ok(Arc::clone(&self.face_runs.get_or_init(|| (runs, spent)).0))
     }
 
     /// The edges, if they are known.
@@ -132,7 +149,8 @@ impl Prepared {
         let normals = self.locked_normals().as_ref().map_or(0, VertexNormals::bytes);
         let textures = self.locked_textures().as_ref().map_or(0, |kept| size_of_val(&kept.textures.texels[..]));
         let looked_at = self.looked_at.get().map_or(0, |faces| size_of_val(&faces[..]));
-        (edges + normals + textures + looked_at) as u64
+        let runs = self.face_runs.get().map_or(0, |(runs, _)| runs.bytes());
+        (edges + normals + textures + looked_at + runs) as u64
     }
 
     fn locked_normals(&self) -> MutexGuard<'_, Option<VertexNormals>> {

@@ -3,10 +3,14 @@
 //! Cells are as small as faces usually are, so that a cell lists few of them; and only faces in the
 //! cells that edges go through are listed.
 
-use crate::limits::Stopped;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+use crate::limits::{Deadline, Stopped};
+use crate::parallel;
 use crate::plan::PlanError;
-use crate::plan::context::{CHECK_EVERY, PlanContext};
-use crate::plan::edges::select::{map, map_indices};
+use crate::plan::context::PlanContext;
+use crate::plan::edges::face_runs::FaceRuns;
+use crate::plan::edges::select::{map, select_by};
 use crate::plan::outline::ScreenPoint;
 use crate::plan::outline::screen_edges::{OutlineView, PX, before, on_screen};
 
@@ -17,8 +21,9 @@ const CELLS: [f64; 2] = [256.0, 1_048_576.0];
 /// than cells where there are more.
 const ENTRIES_MAX: usize = 1 << 20;
 
-/// The cells of a vertex behind the near plane.
-const BEHIND: u32 = u32::MAX;
+/// Runs of faces, and faces, that a thread takes at a time.
+const RUNS: usize = 64;
+const PIECE: usize = 1024;
 
 /// A grid over the picture. What lies beside the picture belongs to the cells at its border.
 #[derive(Clone, Copy, Debug)]
@@ -61,15 +66,30 @@ impl Cells {
 
     /// Calls `each` with the cells that a line or a triangle with these corners may touch.
     pub fn each<const N: usize>(&self, corners: &[[f64; 2]; N], mut each: impl FnMut(usize)) {
-        let range = |axis: usize| {
-            let all = corners.iter().map(|corner| self.along(axis, corner[axis]));
-            (all.clone().min().unwrap_or(0), all.max().unwrap_or(0))
-        };
-        let ((left, right), (top, bottom)) = (range(0), range(1));
+        self.each_row(corners, |row, from, to| (from..=to).for_each(|column| each(row * self.size[0] + column)));
+    }
+
+    /// Calls `each` with the rows of these cells, and the first and the last column in each.
+    #[inline]
+    fn each_row<const N: usize>(&self, corners: &[[f64; 2]; N], mut each: impl FnMut(usize, usize, usize)) {
+        let [[left, top], [right, bottom]] = self.around(corners);
         for row in top..=bottom {
             let (from, to) = if right - left <= 1 || top == bottom { (left, right) } else { self.across(corners, row) };
-            (from..=to).for_each(|column| each(row * self.size[0] + column));
+            each(row, from, to);
         }
+    }
+
+    /// The first and the last column and row of some points.
+    #[inline]
+    fn around<const N: usize>(&self, points: &[[f64; 2]; N]) -> [[usize; 2]; 2] {
+        let mut all = [[usize::MAX; 2], [0; 2]];
+        for point in points {
+            for axis in 0..2 {
+                let at = self.along(axis, point[axis]);
+                (all[0][axis], all[1][axis]) = (all[0][axis].min(at), all[1][axis].max(at));
+            }
+        }
+        all
     }
 
     /// The first and the last column of what lies in a row.
@@ -99,40 +119,83 @@ impl Cells {
 pub struct Marks {
     /// The grid.
     pub cells: Cells,
+    /// Words of each row.
+    row_words: usize,
     words: Vec<u64>,
 }
 
 impl Marks {
     /// No cell of a grid. The caller has spent [`Marks::bytes`].
     pub fn new(cells: Cells) -> Self {
-        Self { cells, words: vec![0; cells.len().div_ceil(64)] }
+        let row_words = cells.size[0].div_ceil(64);
+        Self { cells, row_words, words: vec![0; row_words * cells.size[1]] }
     }
 
     /// Memory for this grid.
     pub fn bytes(cells: &Cells) -> u64 {
-        cells.len() as u64 / 8 + 8
+        (cells.size[0].div_ceil(64) * cells.size[1]) as u64 * 8
     }
 
     /// Marks the cells that a line touches.
     pub fn line(&mut self, ends: &[[f64; 2]; 2]) {
-        let words = &mut self.words;
-        self.cells.each(ends, |cell| words[cell / 64] |= 1 << (cell % 64));
+        let (words, row_words) = (&mut self.words, self.row_words);
+        self.cells.each_row(ends, |row, from, to| {
+            (from..=to).for_each(|column| words[row * row_words + column / 64] |= 1 << (column % 64));
+        });
     }
 
     /// Marks the cell of a point.
-    pub fn point(&mut self, at: [f64; 2]) {
-        let cell = self.cells.at(at);
-        self.words[cell / 64] |= 1 << (cell % 64);
+    pub fn point(&mut self, [x, y]: [f64; 2]) {
+        let (column, row) = (self.cells.along(0, x), self.cells.along(1, y));
+        self.words[row * self.row_words + column / 64] |= 1 << (column % 64);
     }
 
+    /// Calls `each` with the first cell of 64 in a row, and the bits of those that are marked, from a column
+    /// to another.
     #[inline]
-    fn has(&self, cell: usize) -> bool {
-        self.words[cell / 64] >> (cell % 64) & 1 == 1
+    fn each_word(&self, row: usize, [from, to]: [usize; 2], mut each: impl FnMut(usize, u64)) {
+        for word in from / 64..=to / 64 {
+            let mut bits = self.words[row * self.row_words + word];
+            if word == from / 64 {
+                bits &= u64::MAX << (from % 64);
+            }
+            if word == to / 64 {
+                bits &= u64::MAX >> (63 - to % 64);
+            }
+            if bits != 0 {
+                each(row * self.cells.size[0] + word * 64, bits);
+            }
+        }
+    }
+
+    /// True if any cell around some points is marked.
+    fn meet<const N: usize>(&self, points: &[[f64; 2]; N]) -> bool {
+        let [[left, top], [right, bottom]] = self.cells.around(points);
+        (top..=bottom).any(|row| {
+            let mut is_met = false;
+            self.each_word(row, [left, right], |_, _| is_met = true);
+            is_met
+        })
+    }
+
+    /// Calls `each` with the marked cells that a triangle may touch.
+    #[inline]
+    fn each_marked(&self, corners: &[[f64; 2]; 3], mut each: impl FnMut(usize)) {
+        self.cells.each_row(corners, |row, from, to| {
+            if from <= to {
+                self.each_word(row, [from, to], |first, mut bits| {
+                    while bits != 0 {
+                        each(first + bits.trailing_zeros() as usize);
+                        bits &= bits - 1;
+                    }
+                });
+            }
+        });
     }
 }
 
 /// A face on screen.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::Zeroable)]
 pub struct ScreenFace {
     /// X, y and reversed depth; their area is positive.
     pub corners: [[f64; 3]; 3],
@@ -164,26 +227,26 @@ impl FaceGrid {
             return Ok(None);
         }
         let cells = marks.cells;
-        let candidates = candidates(view, marks, hides, cx)?;
-        let count = candidates.iter().filter(|&&is_one| is_one == 1).count();
-        // A face that the near plane cuts may be two.
-        cx.budget.spend("faces near an outline", count as u64, 2 * size_of::<ScreenFace>() as u64)?;
-        cx.budget.spend("faces near an outline", cells.len() as u64 + 1, 4)?;
-        let mut faces: Vec<ScreenFace> = Vec::with_capacity(count);
-        let is_listed = |i: &usize| candidates[*i] == 1;
-        (0..candidates.len()).filter(is_listed).for_each(|i| screen_faces(view, i, |face| faces.push(face)));
-        let mut first = vec![0_u32; cells.len() + 1];
-        let mut total = 0;
-        let most = ENTRIES_MAX + 8 * view.view.mesh.triangles.len();
-        each_entry(&cells, marks, &faces, cx, |_, cell| {
-            first[cell] += 1;
-            total += 1;
-            total <= most
+        let runs = near_runs(view, marks, cx)?;
+        let mesh = view.view.mesh;
+        let faces: Vec<ScreenFace> = select_by("faces near an outline", [runs.len(), RUNS], cx, |range, found| {
+            for face in runs[range].iter().flat_map(|&r| FaceRuns::faces(r as usize, mesh.triangles.len())) {
+                let material = mesh.triangle_materials[face] as usize;
+                let hides = hides.get(material).copied().unwrap_or(true);
+                if hides && !matches!(view.view.shown(face as u32), None | Some(0)) {
+                    screen_faces(view, marks, face, &mut *found);
+                }
+            }
         })?;
-        if total > most {
-            return Ok(None);
-        }
-        cx.budget.spend("faces near an outline", total as u64, 4)?;
+        let most = ENTRIES_MAX + 8 * mesh.triangles.len();
+        let Some(counts) = count_entries(marks, &faces, most, cx.deadline)? else { return Ok(None) };
+        let total = counts.iter().sum::<usize>();
+        // Entries with their cells, and without.
+        cx.budget.spend("faces near an outline", total as u64, 8 + 4)?;
+        cx.budget.spend("faces near an outline", cells.len() as u64 + 1, 4)?;
+        let pairs = entries_and_cells(marks, &faces, &counts, cx.deadline)?;
+        let mut first = vec![0_u32; cells.len() + 1];
+        pairs.iter().for_each(|&[_, cell]| first[cell as usize] += 1);
         // Each cell's end, from which the next pass counts down to its first entry.
         let mut end = 0;
         first.iter_mut().for_each(|count| {
@@ -191,11 +254,11 @@ impl FaceGrid {
             *count = end;
         });
         let mut entries = vec![0; total];
-        each_entry(&cells, marks, &faces, cx, |face, cell| {
-            first[cell] -= 1;
-            entries[first[cell] as usize] = face as u32;
-            true
-        })?;
+        for &[face, cell] in &pairs {
+            let place = &mut first[cell as usize];
+            *place -= 1;
+            entries[*place as usize] = face;
+        }
         Ok(Some(Self { cells, first, entries, faces }))
     }
 
@@ -211,42 +274,83 @@ impl FaceGrid {
     }
 }
 
-/// By face, 1 if it hides and may lie in a marked cell.
-fn candidates(
-    view: &OutlineView<'_>,
-    marks: &Marks,
-    hides: &[bool],
-    cx: &mut PlanContext<'_>,
-) -> Result<Vec<u8>, PlanError> {
-    let (mesh, cells, near) = (view.view.mesh, &marks.cells, view.near());
-    cx.budget.spend("faces near an outline", mesh.positions.len() as u64, 4)?;
-    cx.budget.spend("faces near an outline", mesh.triangles.len() as u64, 1)?;
-    let places = map(&view.view.places, cx.deadline, |&[x, y, w]| {
-        if w < near { BEHIND } else { (cells.along(0, x / w) | cells.along(1, y / w) << 16) as u32 }
-    })?;
-    let is_one = |i: usize| {
-        let material = mesh.triangle_materials[i] as usize;
-        let hides = hides.get(material).copied().unwrap_or(true);
-        if !hides || matches!(view.view.shown(i as u32), None | Some(0)) {
-            return false;
-        }
-        let corners = mesh.triangles[i].map(|v| places[v as usize]);
-        if corners.contains(&BEHIND) {
-            return true;
-        }
-        let range = |shift: u32| {
-            let [a, b, c] = corners.map(|place| (place >> shift & 0xffff) as usize);
-            a.min(b).min(c)..=a.max(b).max(c)
-        };
-        range(16).any(|row| range(0).any(|column| marks.has(row * cells.size[0] + column)))
-    };
-    Ok(map_indices(mesh.triangles.len(), cx.deadline, |i| u8::from(is_one(i)))?)
+/// The runs of faces that may lie in a marked cell, in order.
+fn near_runs(view: &OutlineView<'_>, marks: &Marks, cx: &mut PlanContext<'_>) -> Result<Vec<u32>, PlanError> {
+    let runs = &view.view.runs.runs;
+    // Marks, and the list.
+    cx.budget.spend("faces near an outline", runs.len() as u64, 1 + 4)?;
+    let run_view = &view.view.run_view;
+    let is_near = map(runs, cx.deadline, |run| u8::from(run_view.place(run).is_none_or(|place| marks.meet(&place))))?;
+    let mut near = Vec::with_capacity(runs.len());
+    near.extend(is_near.iter().zip(0..).filter(|(is_near, _)| **is_near == 1).map(|(_, r)| r));
+    Ok(near)
 }
 
-/// Calls `each` with what of a face lies before the near plane: nothing, a triangle, or two.
-fn screen_faces(view: &OutlineView<'_>, face: usize, mut each: impl FnMut(ScreenFace)) {
+/// The number of entries of each piece of the faces; None if there are more than `most` in all.
+fn count_entries(
+    marks: &Marks,
+    faces: &[ScreenFace],
+    most: usize,
+    deadline: &Deadline,
+) -> Result<Option<Vec<usize>>, Stopped> {
+    let all = AtomicUsize::new(0);
+    let counts: Result<Vec<usize>, Stopped> = parallel::map(faces.chunks(PIECE).collect(), |piece| {
+        deadline.check()?;
+        let mut count = 0;
+        // What is counted no more does not matter: there are too many already.
+        for face in piece.iter().take_while(|_| all.load(Relaxed) <= most) {
+            let before = count;
+            marks.each_marked(&flat(face), |_| count += 1);
+            all.fetch_add(count - before, Relaxed);
+        }
+        Ok(count)
+    })
+    .into_iter()
+    .collect();
+    Ok(Some(counts?).filter(|counts| counts.iter().sum::<usize>() <= most))
+}
+
+/// Every face with every marked cell that it may touch, of which there are so many in each piece.
+fn entries_and_cells(
+    marks: &Marks,
+    faces: &[ScreenFace],
+    counts: &[usize],
+    deadline: &Deadline,
+) -> Result<Vec<[u32; 2]>, Stopped> {
+    let mut all = vec![[0; 2]; counts.iter().sum()];
+    let (mut pieces, mut rest) = (Vec::with_capacity(counts.len()), &mut all[..]);
+    for ((piece, first), &count) in faces.chunks(PIECE).zip((0..).step_by(PIECE)).zip(counts) {
+        let (place, after) = rest.split_at_mut(count);
+        pieces.push((piece, first, place));
+        rest = after;
+    }
+    let fill = |(piece, first, place): (&[ScreenFace], u32, &mut [[u32; 2]])| {
+        deadline.check()?;
+        let mut places = place.iter_mut();
+        for (face, i) in piece.iter().zip(first..) {
+            marks.each_marked(&flat(face), |cell| {
+                if let Some(place) = places.next() {
+                    *place = [i, cell as u32];
+                }
+            });
+        }
+        Ok(())
+    };
+    parallel::map(pieces, fill).into_iter().collect::<Result<(), Stopped>>()?;
+    Ok(all)
+}
+
+/// The corners without their depths.
+#[inline]
+fn flat(face: &ScreenFace) -> [[f64; 2]; 3] {
+    face.corners.map(|[x, y, _]| [x, y])
+}
+
+/// Calls `each` with what of a face lies before the near plane, and may lie in a marked cell: nothing, a
+/// triangle, or two.
+#[inline]
+fn screen_faces(view: &OutlineView<'_>, marks: &Marks, face: usize, each: &mut dyn FnMut(ScreenFace)) {
     let vertices = view.view.mesh.triangles[face];
-    let corners = vertices.map(|v| view.homogeneous(v));
     let near = view.near();
     let mut face = |corners: [ScreenPoint; 3]| {
         let [a, mut b, mut c] = corners.map(|[x, y, z, _]| [x, y, z]);
@@ -258,9 +362,15 @@ fn screen_faces(view: &OutlineView<'_>, face: usize, mut each: impl FnMut(Screen
             each(ScreenFace { corners: [a, b, c], vertices });
         }
     };
-    if corners.iter().all(|corner| corner[3] >= near) {
-        return face(corners.map(on_screen));
+    let places = vertices.map(|v| view.view.place(v));
+    if places.iter().all(|place| place[2] >= near) {
+        // Most faces lie in no marked cell.
+        if marks.meet(&places.map(|[x, y, w]| [x / w, y / w])) {
+            face(vertices.map(|v| on_screen(view.homogeneous(v))));
+        }
+        return;
     }
+    let corners = vertices.map(|v| view.homogeneous(v));
     let mut cut = [[0.0; 4]; 4];
     let mut count = 0;
     for k in 0..3 {
@@ -278,32 +388,4 @@ fn screen_faces(view: &OutlineView<'_>, face: usize, mut each: impl FnMut(Screen
     for k in 2..count {
         face([cut[0], cut[k - 1], cut[k]]);
     }
-}
-
-/// Calls `each` with every face and every marked cell that it may touch, until it returns false.
-fn each_entry(
-    cells: &Cells,
-    marks: &Marks,
-    faces: &[ScreenFace],
-    cx: &PlanContext<'_>,
-    mut each: impl FnMut(usize, usize) -> bool,
-) -> Result<(), Stopped> {
-    let mut unchecked = 0;
-    for (i, face) in faces.iter().enumerate() {
-        let mut goes_on = true;
-        cells.each(&face.corners.map(|[x, y, _]| [x, y]), |cell| {
-            unchecked += 1;
-            if goes_on && marks.has(cell) {
-                goes_on = each(i, cell);
-            }
-        });
-        if !goes_on {
-            break;
-        }
-        if unchecked >= CHECK_EVERY {
-            unchecked = 0;
-            cx.deadline.check()?;
-        }
-    }
-    Ok(())
 }

@@ -177,7 +177,10 @@ impl Search<'_> {
             }
             for face in grid.faces(cell) {
                 if let Some(range) = hidden_range(face, place, vertices, tiny) {
-                    is_hidden |= range[0] <= 0.0 && range[1] >= 1.0;
+                    is_hidden = range[0] <= 0.0 && range[1] >= 1.0;
+                    if is_hidden {
+                        return;
+                    }
                     hidden.push(range);
                 }
             }
