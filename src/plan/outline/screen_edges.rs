@@ -5,7 +5,6 @@ use crate::plan::context::PlanContext;
 use crate::plan::edges::select::map;
 use crate::plan::outline::ScreenPoint;
 use crate::plan::outline::silhouette_edges::{ScreenMesh, SilhouetteEdge, near};
-use crate::plan::projection::row_dot;
 use crate::scene::Thickness;
 
 /// 1/256 px in a pixel.
@@ -141,9 +140,9 @@ impl<'a> OutlineView<'a> {
     }
 
     /// X, Y, Z, W.
+    #[inline(always)]
     pub fn homogeneous(&self, vertex: u32) -> [f64; 4] {
-        let [x, y, w] = self.view.place(vertex);
-        [x, y, row_dot(&self.view.projection.z, self.view.mesh.positions[vertex as usize]), w]
+        self.view.homogeneous(vertex)
     }
 }
 
@@ -153,6 +152,7 @@ pub fn before(near: f64, inside: &[f64; 4], outside: &[f64; 4]) -> [f64; 4] {
 }
 
 /// X, Y, Z, W on screen.
+#[inline(always)]
 pub fn on_screen([x, y, z, w]: [f64; 4]) -> ScreenPoint {
     [x / w, y / w, z / w, 1.0 / w]
 }

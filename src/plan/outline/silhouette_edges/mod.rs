@@ -13,7 +13,7 @@ use crate::plan::edges::face_runs::{FACES, FaceRuns};
 use crate::plan::edges::select::{map, select_by};
 use crate::plan::edges::silhouettes::Silhouettes;
 use crate::plan::edges::view_of_runs::RunView;
-use crate::plan::projection::row_dot;
+use crate::plan::projection::Rows;
 use crate::plan::{Edge, PlanError, Projection};
 use crate::scene::{Fill, MaterialGroups, Scene, Thickness};
 use crate::spec::Cull;
@@ -43,6 +43,7 @@ pub struct ScreenMesh<'a> {
     pub mesh: &'a Mesh,
     /// The view.
     pub projection: Projection,
+    rows: Rows,
     /// The runs of its faces.
     pub runs: Arc<FaceRuns>,
     /// The same view of runs of faces.
@@ -69,7 +70,8 @@ impl<'a> ScreenMesh<'a> {
         let sides = map(&runs.runs, deadline, |run| run_view.side(run))?;
         let mut facings = vec![0_i8; mesh.triangles.len()];
         let pieces = facings.chunks_mut(RUNS * FACES).zip(sides.chunks(RUNS)).enumerate();
-        let places = Places { mesh, rows: [projection.x, projection.y, projection.w], rounded: run_view.rounded };
+        let rows = Rows::new(&projection);
+        let places = Places { mesh, rows, rounded: run_view.rounded };
         let fill = |(piece, (facings, sides)): (usize, (&mut [i8], &[i8]))| {
             deadline.check()?;
             let runs = facings.chunks_mut(FACES).zip(sides).zip((piece * RUNS * FACES..).step_by(FACES));
@@ -87,14 +89,21 @@ impl<'a> ScreenMesh<'a> {
         let mut open_runs = Vec::with_capacity(runs.runs.len());
         open_runs.extend((0..runs.runs.len() as u32).filter(is_open));
         let culls = (0..groups.material_count()).map(|m| cull(groups, m)).collect();
-        Ok(Self { mesh, projection, runs, run_view, facing: facings, open_runs, culls })
+        Ok(Self { mesh, projection, rows, runs, run_view, facing: facings, open_runs, culls })
+    }
+
+    /// X, Y, Z and W of a position.
+    #[inline(always)]
+    pub fn homogeneous(&self, vertex: u32) -> [f64; 4] {
+        let p = self.mesh.positions[vertex as usize];
+        let [x, y, w] = self.rows.place(p);
+        [x, y, self.rows.depth(p), w]
     }
 
     /// X, Y and W of a position.
     #[inline(always)]
     pub fn place(&self, vertex: u32) -> [f64; 3] {
-        let p = self.mesh.positions[vertex as usize];
-        [&self.projection.x, &self.projection.y, &self.projection.w].map(|row| row_dot(row, p))
+        self.rows.place(self.mesh.positions[vertex as usize])
     }
 
     /// The silhouette edges of the materials that have an outline (`outlines`, by material).
@@ -199,7 +208,7 @@ pub fn near(projection: &Projection) -> f64 {
 /// The places of a mesh's corners, from which follows what side its faces show.
 struct Places<'a> {
     mesh: &'a Mesh,
-    rows: [[f32; 4]; 3],
+    rows: Rows,
     /// Volumes that rounding may take for 0.
     rounded: f64,
 }
@@ -216,10 +225,7 @@ impl Places<'_> {
 
     #[inline(always)]
     fn volume(&self, corners: [u32; 3]) -> f64 {
-        let at = |v: u32| {
-            let p = self.mesh.positions[v as usize];
-            [row_dot(&self.rows[0], p), row_dot(&self.rows[1], p), row_dot(&self.rows[2], p)]
-        };
+        let at = |v: u32| self.rows.place(self.mesh.positions[v as usize]);
         let (a, b, c) = (at(corners[0]), at(corners[1]), at(corners[2]));
         let (x, y, w) = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
         (x * c[0] + y * c[1]) + w * c[2]

@@ -15,7 +15,6 @@ use crate::plan::edges::select::{map_indices, select_by};
 use crate::plan::outline::EdgeEnd;
 use crate::plan::outline::silhouette_edges::ScreenMesh;
 use crate::plan::outline::sort::sort;
-use crate::plan::projection::row_dot;
 
 /// Limit of ends times faces at a vertex. Around a vertex with more, all ends count as visible.
 const PAIRS_MAX: usize = 1 << 12;
@@ -213,10 +212,7 @@ fn face_arcs(view: &ScreenMesh<'_>, face: u32, [at, next, last]: [u32; 3]) -> [O
 /// Change of a face's depth right and down: `Z = (gx x + gy y + c) W` for all corners, by Cramer's
 /// rule.
 fn slope(view: &ScreenMesh<'_>, corners: [u32; 3]) -> [f64; 2] {
-    let [p, q, r] = corners.map(|v| {
-        let [x, y, w] = view.place(v);
-        [x, y, row_dot(&view.projection.z, view.mesh.positions[v as usize]), w]
-    });
+    let [p, q, r] = corners.map(|v| view.homogeneous(v));
     let determinant = |[a, b, c]: [usize; 3]| {
         let minor = |i: usize, j: usize| q[i] * r[j] - q[j] * r[i];
         p[a] * minor(b, c) + p[b] * minor(c, a) + p[c] * minor(a, b)

@@ -9,7 +9,7 @@ use crate::limits::{Deadline, Stopped};
 use crate::parallel;
 use crate::plan::PlanError;
 use crate::plan::context::PlanContext;
-use crate::plan::edges::face_runs::FaceRuns;
+use crate::plan::edges::face_runs::{FACES, FaceRuns};
 use crate::plan::edges::select::{map, select_by};
 use crate::plan::outline::ScreenPoint;
 use crate::plan::outline::screen_edges::{OutlineView, PX, before, on_screen};
@@ -56,7 +56,8 @@ impl Cells {
     /// The column (axis 0) or row (1) of a coordinate.
     #[inline]
     fn along(&self, axis: usize, v: f64) -> usize {
-        (((v + self.half[axis]) * self.per_unit) as usize).min(self.size[axis] - 1)
+        let at = ((v + self.half[axis]) * self.per_unit) as i32;
+        (at.max(0) as usize).min(self.size[axis] - 1)
     }
 
     /// The cell of a point.
@@ -82,14 +83,15 @@ impl Cells {
     /// The first and the last column and row of some points.
     #[inline]
     fn around<const N: usize>(&self, points: &[[f64; 2]; N]) -> [[usize; 2]; 2] {
-        let mut all = [[usize::MAX; 2], [0; 2]];
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for point in points {
             for axis in 0..2 {
-                let at = self.along(axis, point[axis]);
-                (all[0][axis], all[1][axis]) = (all[0][axis].min(at), all[1][axis].max(at));
+                // Not `f64::min` and `max`, which look for NaN.
+                low[axis] = if point[axis] < low[axis] { point[axis] } else { low[axis] };
+                high[axis] = if point[axis] > high[axis] { point[axis] } else { high[axis] };
             }
         }
-        all
+        [[self.along(0, low[0]), self.along(1, low[1])], [self.along(0, high[0]), self.along(1, high[1])]]
     }
 
     /// The first and the last column of what lies in a row.
@@ -169,6 +171,7 @@ impl Marks {
     }
 
     /// True if any cell around some points is marked.
+    #[inline]
     fn meet<const N: usize>(&self, points: &[[f64; 2]; N]) -> bool {
         let [[left, top], [right, bottom]] = self.cells.around(points);
         (top..=bottom).any(|row| {
@@ -227,14 +230,15 @@ impl FaceGrid {
             return Ok(None);
         }
         let cells = marks.cells;
-        let runs = near_runs(view, marks, cx)?;
         let mesh = view.view.mesh;
+        let runs = near_runs(view, marks, cx)?;
+        let near = near_faces(view, marks, hides, &runs, cx)?;
         let faces: Vec<ScreenFace> = select_by("faces near an outline", [runs.len(), RUNS], cx, |range, found| {
-            for face in runs[range].iter().flat_map(|&r| FaceRuns::faces(r as usize, mesh.triangles.len())) {
-                let material = mesh.triangle_materials[face] as usize;
-                let hides = hides.get(material).copied().unwrap_or(true);
-                if hides && !matches!(view.view.shown(face as u32), None | Some(0)) {
-                    screen_faces(view, marks, face, &mut *found);
+            for (&run, &near) in runs[range.clone()].iter().zip(&near[range]) {
+                let mut rest = near;
+                while rest != 0 {
+                    screen_faces(view, run as usize * FACES + rest.trailing_zeros() as usize, &mut *found);
+                    rest &= rest - 1;
                 }
             }
         })?;
@@ -284,6 +288,39 @@ fn near_runs(view: &OutlineView<'_>, marks: &Marks, cx: &mut PlanContext<'_>) ->
     let mut near = Vec::with_capacity(runs.len());
     near.extend(is_near.iter().zip(0..).filter(|(is_near, _)| **is_near == 1).map(|(_, r)| r));
     Ok(near)
+}
+
+/// By run, the bits of the faces that hide and may lie in a marked cell.
+fn near_faces(
+    view: &OutlineView<'_>,
+    marks: &Marks,
+    hides: &[bool],
+    runs: &[u32],
+    cx: &mut PlanContext<'_>,
+) -> Result<Vec<u32>, PlanError> {
+    let (mesh, near) = (view.view.mesh, view.near());
+    let is_near = |face: usize| {
+        let hides = hides.get(mesh.triangle_materials[face] as usize).copied().unwrap_or(true);
+        if !hides || matches!(view.view.shown(face as u32), None | Some(0)) {
+            return false;
+        }
+        let [a, b, c] = mesh.triangles[face];
+        let [a, b, c] = [view.view.place(a), view.view.place(b), view.view.place(c)];
+        let is_cut = (a[2] < near) | (b[2] < near) | (c[2] < near);
+        is_cut || marks.meet(&[[a[0] / a[2], a[1] / a[2]], [b[0] / b[2], b[1] / b[2]], [c[0] / c[2], c[1] / c[2]]])
+    };
+    let bits = |&run: &u32| {
+        let faces = FaceRuns::faces(run as usize, mesh.triangles.len());
+        faces.zip(0..).fold(0_u32, |bits, (face, k)| bits | u32::from(is_near(face)) << k)
+    };
+    // Twice: in pieces, and in one list.
+    cx.budget.spend("faces near an outline", runs.len() as u64, 4 + 4)?;
+    let deadline = cx.deadline;
+    let pieces = parallel::map(runs.chunks(RUNS).collect(), |piece: &[u32]| {
+        deadline.check()?;
+        Ok(piece.iter().map(bits).collect::<Vec<u32>>())
+    });
+    Ok(pieces.into_iter().collect::<Result<Vec<_>, Stopped>>()?.concat())
 }
 
 /// The number of entries of each piece of the faces; None if there are more than `most` in all.
@@ -343,17 +380,18 @@ fn entries_and_cells(
 /// The corners without their depths.
 #[inline]
 fn flat(face: &ScreenFace) -> [[f64; 2]; 3] {
-    face.corners.map(|[x, y, _]| [x, y])
+    let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = face.corners;
+    [[ax, ay], [bx, by], [cx, cy]]
 }
 
-/// Calls `each` with what of a face lies before the near plane, and may lie in a marked cell: nothing, a
-/// triangle, or two.
+/// Calls `each` with what of a face lies before the near plane: nothing, a triangle, or two.
 #[inline]
-fn screen_faces(view: &OutlineView<'_>, marks: &Marks, face: usize, each: &mut dyn FnMut(ScreenFace)) {
+fn screen_faces(view: &OutlineView<'_>, face: usize, each: &mut dyn FnMut(ScreenFace)) {
     let vertices = view.view.mesh.triangles[face];
     let near = view.near();
     let mut face = |corners: [ScreenPoint; 3]| {
-        let [a, mut b, mut c] = corners.map(|[x, y, z, _]| [x, y, z]);
+        let [[ax, ay, az, _], [bx, by, bz, _], [cx, cy, cz, _]] = corners;
+        let (a, mut b, mut c) = ([ax, ay, az], [bx, by, bz], [cx, cy, cz]);
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
         if area < 0.0 {
             (b, c) = (c, b);
@@ -362,15 +400,10 @@ fn screen_faces(view: &OutlineView<'_>, marks: &Marks, face: usize, each: &mut d
             each(ScreenFace { corners: [a, b, c], vertices });
         }
     };
-    let places = vertices.map(|v| view.view.place(v));
-    if places.iter().all(|place| place[2] >= near) {
-        // Most faces lie in no marked cell.
-        if marks.meet(&places.map(|[x, y, w]| [x / w, y / w])) {
-            face(vertices.map(|v| on_screen(view.homogeneous(v))));
-        }
-        return;
+    let corners = [view.homogeneous(vertices[0]), view.homogeneous(vertices[1]), view.homogeneous(vertices[2])];
+    if corners.iter().all(|corner| corner[3] >= near) {
+        return face([on_screen(corners[0]), on_screen(corners[1]), on_screen(corners[2])]);
     }
-    let corners = vertices.map(|v| view.homogeneous(v));
     let mut cut = [[0.0; 4]; 4];
     let mut count = 0;
     for k in 0..3 {
