@@ -95,7 +95,17 @@ impl Camera {
     }
 
     fn new(axes: [DVec3; 3], center: DVec2, distance: f64, half_size: DVec2, kind: Kind) -> Self {
-        Self { axes, center, distance, half_size, kind, near: 0.0, far: 0.0, contains_mesh: false, reach: DVec2::INFINITY }
+        Self {
+            axes,
+            center,
+            distance,
+            half_size,
+            kind,
+            near: 0.0,
+            far: 0.0,
+            contains_mesh: false,
+            reach: DVec2::INFINITY,
+        }
     }
 
     fn set_range(&mut self, extents: &Extents, grow: f64, size_px: DVec2) {

@@ -208,7 +208,12 @@ impl ExtentLanes {
 ///
 /// A point at distance r from the axis and height h is at `x = r sin a`, `y = h cos e - r cos a sin e` and
 /// `z = h sin e + r cos a cos e` for a turn by a; each bound is the largest over all a.
-pub fn turned_extents(mesh: &Mesh, (axes, up): ([DVec3; 3], DVec3), (sin_e, cos_e): (f64, f64), slopes: DVec2) -> Extents {
+pub fn turned_extents(
+    mesh: &Mesh,
+    (axes, up): ([DVec3; 3], DVec3),
+    (sin_e, cos_e): (f64, f64),
+    slopes: DVec2,
+) -> Extents {
     let nothing = DVec2::NEG_INFINITY;
     let mut all = Extents { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, plus: nothing, minus: nothing };
     if mesh.positions.is_empty() {

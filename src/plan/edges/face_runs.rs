@@ -136,3 +136,53 @@ fn run_of(mesh: &Mesh, list: &EdgeList, faces: Range<usize>, edges: Range<usize>
     let cos = normals[..count].iter().map(|normal| dot(*normal, axis)).fold(1.0, f64::min);
     FaceRun { cos: (cos - ROUNDED) as f32, least_area: (least_area * (1.0 - ROUNDED)) as f32, is_plain, ..run }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::Limits;
+
+    #[test]
+    fn runs_have_all_edges_and_contain_their_faces() {
+        let [columns, rows] = [70, 40];
+        let at = |i: u32, j: u32| [i as f32 / 100.0 - 0.4, j as f32 / 100.0, ((i * i + 3 * j) % 7) as f32 / 200.0];
+        let positions: Vec<_> = (0..columns * rows).map(|v| at(v % columns, v / columns)).collect();
+        let squares = (0..(columns - 1) * (rows - 1)).map(|k| k / (columns - 1) * columns + k % (columns - 1));
+        let triangles: Vec<_> =
+            squares.flat_map(|a| [[a, a + 1, a + columns + 1], [a, a + columns + 1, a + columns]]).collect();
+        let triangle_materials = (0..triangles.len() as u32).map(|t| t / 1000).collect();
+        let edge_masks = vec![7; triangles.len()];
+        let mesh = Mesh { positions, triangles, edge_masks, triangle_materials, ..Mesh::default() };
+        let mut budget = Budget::new(&Limits::default());
+        let list = EdgeList::of(&mesh, &mut budget).unwrap();
+        let before = budget.spent_bytes();
+        let runs = FaceRuns::of(&mesh, &list, &mut budget).unwrap();
+        assert_eq!(budget.spent_bytes() - before, runs.bytes() as u64);
+        let (mut next_edge, mut plain) = (0, 0);
+        for (r, run) in runs.runs.iter().enumerate() {
+            let faces = FaceRuns::faces(r, mesh.triangles.len());
+            let edges = runs.edges(r);
+            assert_eq!(edges.start, next_edge);
+            next_edge = edges.end;
+            assert!(edges.clone().all(|i| faces.contains(&(list.get(i).faces[0] as usize))));
+            let is_plain = |i: usize| {
+                let [a, b] = list.get(i).faces;
+                b != Edge::NO_FACE && a / 1000 == b / 1000
+            };
+            assert_eq!(run.is_plain, edges.clone().all(is_plain));
+            plain += usize::from(run.is_plain);
+            let others = edges.map(|i| list.get(i).faces[1] as usize).filter(|&face| face < mesh.triangles.len());
+            for face in faces.chain(others) {
+                let corners = mesh.triangles[face].map(|v| mesh.positions[v as usize]);
+                let is_within = |p: [f32; 3]| (0..3).all(|k| (run.bounds[0][k]..=run.bounds[1][k]).contains(&p[k]));
+                assert!(corners.into_iter().all(is_within));
+                let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+                let normal = cross(sub(b, a), sub(c, a));
+                let area = dot(normal, normal).sqrt();
+                assert!(dot(normal, run.axis.map(f64::from)) >= f64::from(run.cos) * area && run.cos > 0.0);
+                assert!(area >= f64::from(run.least_area) && run.least_area > 0.0);
+            }
+        }
+        assert!(next_edge == list.len() && plain > 50 && plain < runs.runs.len() - 10, "{plain}");
+    }
+}
