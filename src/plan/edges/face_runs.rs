@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn runs_have_all_edges_and_contain_their_faces() {
         let [columns, rows] = [70, 40];
-        let at = |i: u32, j: u32| [i as f32 / 100.0 - 0.4, j as f32 / 100.0, ((i * i + 3 * j) % 7) as f32 / 200.0];
+        let at = |i: u32, j: u32| [i as f32 / 100.0 - 0.4, j as f32 / 100.0, ((i * i + 3 * j) % 7) as f32 / 2000.0];
         let positions: Vec<_> = (0..columns * rows).map(|v| at(v % columns, v / columns)).collect();
         let squares = (0..(columns - 1) * (rows - 1)).map(|k| k / (columns - 1) * columns + k % (columns - 1));
         let triangles: Vec<_> =

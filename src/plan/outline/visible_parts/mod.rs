@@ -3,12 +3,14 @@
 //! An outline is wider than the edge that it belongs to, and depths alone cannot tell that this
 //! edge is hidden: a face in front of it may recede faster than the outline does.
 
+mod cells;
 mod grid;
 mod hidden;
 
 use rayon::prelude::*;
 
-use self::grid::{Cells, FaceGrid, Marks};
+use self::cells::{Cells, Marks};
+use self::grid::FaceGrid;
 use self::hidden::{depth_at, hidden_range};
 use crate::limits::Stopped;
 use crate::plan::PlanError;
