@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::PlanError;
+use super::edges::face_runs::FaceRuns;
 use super::edges::silhouettes::Silhouettes;
 use super::prepared::Prepared;
 use super::skips::{SkipKind, Skips};
@@ -33,6 +34,7 @@ pub struct PlanContext<'c> {
     pub prepared: Option<&'c Prepared>,
     edges: Option<Arc<EdgeList>>,
     silhouettes: Option<Arc<Silhouettes>>,
+    face_runs: Option<Arc<FaceRuns>>,
 }
 
 impl<'c> PlanContext<'c> {
@@ -47,6 +49,7 @@ impl<'c> PlanContext<'c> {
             prepared: None,
             edges: None,
             silhouettes: None,
+            face_runs: None,
         }
     }
 
@@ -68,6 +71,22 @@ impl<'c> PlanContext<'c> {
         };
         self.edges = Some(Arc::clone(&edges));
         Ok(edges)
+    }
+
+    /// The runs of the mesh's faces, found when a stage first needs them.
+    pub fn face_runs(&mut self, mesh: &Mesh) -> Result<Arc<FaceRuns>, PlanError> {
+        if let Some(runs) = &self.face_runs {
+            return Ok(Arc::clone(runs));
+        }
+        let edges = self.edges(mesh)?;
+        self.deadline.check()?;
+        let find = |budget: &mut Budget| FaceRuns::of(mesh, &edges, budget);
+        let runs = match self.prepared {
+            Some(prepared) => prepared.face_runs(self.budget, find)?,
+            None => Arc::new(find(self.budget)?),
+        };
+        self.face_runs = Some(Arc::clone(&runs));
+        Ok(runs)
     }
 
     /// The edges of the mesh, and its orientation if they are closed. Another thread may find the

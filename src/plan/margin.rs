@@ -14,10 +14,18 @@ use super::projection::{Projection, row_dot};
 use super::skips::SkipKind;
 use crate::limits::{Deadline, Stopped};
 use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use crate::spec::ProjectionKind;
 
 /// Distance from the picture's border from which a mesh counts as inside, 1/256 px: lines look a
 /// pixel beside an edge too, and vertices are snapped.
 const INSIDE: f64 = 2.0 * 256.0;
+
+/// Distance from there, 1/256 px, up to which positions are looked at one by one.
+const SURE: f64 = 64.0;
+
+/// A limit of the errors that rounding a projection to f32 makes, per unit of the box.
+const ROUNDED: f64 = 1e-6;
 
 /// The margin where none is needed but it is kept, pixels.
 const KEPT_PX: u32 = 8;
@@ -40,12 +48,15 @@ pub fn margin_px(
     Ok(if is_skipped { 0 } else { needed_px.max(KEPT_PX) })
 }
 
-/// True if all positions are before the eye and inside the picture.
+/// True if all positions are before the eye and inside the picture. Those of the mesh are looked at where
+/// the camera cannot tell alone.
 fn is_inside(scene: &Scene<'_, '_>, geometry: &Geometry<'_>, deadline: &Deadline) -> Result<bool, Stopped> {
     let size_px = scene.size_px();
     let projection = Projection::new(&scene.camera, size_px, true);
     let half = size_px.map(|size| 128.0 * f64::from(size) - INSIDE);
-    for positions in geometry.positions.chunks(CHECK_EVERY) {
+    let known = if is_surely_inside(&scene.camera, size_px) { scene.mesh.positions.len() } else { 0 };
+    let others = geometry.positions.get(known..).unwrap_or_default();
+    for positions in others.chunks(CHECK_EVERY) {
         deadline.check()?;
         let is_inside = |p: &[f32; 3]| {
             let [x, y, w] = [&projection.x, &projection.y, &projection.w].map(|row| row_dot(row, *p));
@@ -58,6 +69,22 @@ fn is_inside(scene: &Scene<'_, '_>, geometry: &Geometry<'_>, deadline: &Deadline
     Ok(true)
 }
 
+/// True if the camera alone shows that all positions of the mesh are before the eye and inside the picture,
+/// also where the projection's rows are rounded to f32.
+fn is_surely_inside(camera: &Camera, size_px: [u32; 2]) -> bool {
+    let is_perspective = camera.kind == ProjectionKind::Perspective;
+    // The near plane is at half the least distance.
+    let nearest = if is_perspective { 2.0 * camera.near } else { 1.0 };
+    // Rounding errors of W and of a place across, generously.
+    let in_w = if is_perspective { ROUNDED * (camera.distance.abs() + 2.0) } else { 0.0 };
+    let across = ROUNDED * (camera.center.abs().max_element() + 2.0);
+    (0..2).all(|axis| {
+        let half = 128.0 * f64::from(size_px[axis]);
+        let rounded = half * (across / (camera.half_size[axis] * nearest) + in_w / nearest);
+        rounded <= SURE && half * camera.reach[axis] + INSIDE + SURE <= half
+    })
+}
+
 impl DrawPlan<'_> {
     /// Columns (or rows) that have visibility samples, from the first to before the last, given how
     /// many the picture has.
@@ -65,5 +92,57 @@ impl DrawPlan<'_> {
     pub fn seen_range(&self, size_px: u32) -> [i32; 2] {
         let margin = self.margin_px as i32;
         [-margin, size_px as i32 + margin]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::import::{Bundle, import};
+    use crate::limits::{Budget, Limits};
+    use crate::request::{self, Rules};
+    use crate::spec::BackendChoice;
+
+    #[test]
+    fn the_camera_tells_nothing_that_positions_do_not() {
+        let limits = Limits::default();
+        let mut budget = Budget::new(&limits);
+        let points = (0..300).map(|i| format!("v {} {} {}\n", i * 7 % 31, i * 11 % 23, i * 5 % 17)).collect::<String>();
+        let faces = (0..100).map(|i| format!("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3)).collect::<String>();
+        let bundle = Bundle::of_one((points + &faces).into_bytes());
+        let mesh = import(&bundle, None, &limits, &mut budget, &Deadline::default()).unwrap().mesh;
+        let mut counts = [0; 2];
+        for (margin, height, projection) in [
+            ("0.05", "null", "perspective"),
+            ("0.0", "null", "perspective"),
+            ("0.02", "null", "orthographic"),
+            ("0.0", "20", "orthographic"),
+            ("0.0", "80", "orthographic"),
+        ] {
+            for azimuth in 0..12 {
+                let azimuth = (30 * azimuth).to_string();
+                let keys = [
+                    ("camera.margin", margin),
+                    ("camera.projection", projection),
+                    ("camera.height", height),
+                    ("camera.azimuth_deg", &azimuth),
+                ];
+                let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned()));
+                let rules = Rules { limits: limits.clone(), backend: BackendChoice::Cpu };
+                let spec = request::read(None, &keys, &rules).unwrap();
+                let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
+                let is_sure = is_surely_inside(&scene.camera, scene.size_px());
+                let unsure = Scene {
+                    camera: Camera { reach: glam::DVec2::INFINITY, ..scene.camera },
+                    groups: crate::scene::MaterialGroups::new(&mesh, &spec),
+                    mesh: &mesh,
+                    spec: &spec,
+                };
+                let is_inside = is_inside(&unsure, &Geometry::of_mesh(&mesh), &Deadline::default()).unwrap();
+                assert!(!is_sure || is_inside, "{margin} {height} {projection} {azimuth}");
+                counts[usize::from(is_sure)] += 1;
+            }
+        }
+        assert!(counts[0] >= 12 && counts[1] >= 24, "{counts:?}");
     }
 }

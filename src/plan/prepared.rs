@@ -9,6 +9,7 @@ use crate::limits::{Budget, LimitExceeded, Spent};
 use crate::mesh::creases::CreasedNormals;
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Orientation;
+use crate::plan::edges::face_runs::FaceRuns;
 use crate::texture::mips::Reading;
 use crate::texture::{TextureError, Textures};
 
@@ -20,6 +21,8 @@ pub struct Prepared {
     token: Arc<MeshToken>,
     edges: OnceLock<(Arc<EdgeList>, Vec<Spent>)>,
     orientation: OnceLock<Orientation>,
+    looked_at: OnceLock<Arc<Vec<u32>>>,
+    face_runs: OnceLock<(Arc<FaceRuns>, Vec<Spent>)>,
     vertex_normals: Mutex<Option<VertexNormals>>,
     textures: Mutex<Option<PreparedTextures>>,
 }
@@ -74,6 +77,21 @@ impl Prepared {
         Ok(Arc::clone(&self.edges.get_or_init(|| (edges, spent)).0))
     }
 
+    /// The runs of faces, paid for; found by `find` if they are not known.
+    pub fn face_runs(
+        &self,
+        budget: &mut Budget,
+        find: impl FnOnce(&mut Budget) -> Result<FaceRuns, LimitExceeded>,
+    ) -> Result<Arc<FaceRuns>, LimitExceeded> {
+        if let Some((runs, spent)) = self.face_runs.get() {
+            budget.spend_again(spent)?;
+            return Ok(Arc::clone(runs));
+        }
+        let (runs, spent) = budget.record(find);
+        let runs = Arc::new(runs?);
+        Ok(Arc::clone(&self.face_runs.get_or_init(|| (runs, spent)).0))
+    }
+
     /// The edges, if they are known.
     pub fn known_edges(&self) -> Option<&EdgeList> {
         self.edges.get().map(|(edges, _)| &**edges)
@@ -85,6 +103,14 @@ impl Prepared {
             let found = find();
             *self.orientation.get_or_init(|| found)
         })
+    }
+
+    /// The faces that are looked at for the width of lines.
+    pub fn looked_at(&self, find: impl FnOnce() -> Vec<u32>) -> Arc<Vec<u32>> {
+        Arc::clone(self.looked_at.get().unwrap_or_else(|| {
+            let found = Arc::new(find());
+            self.looked_at.get_or_init(|| found)
+        }))
     }
 
     /// Vertex normals for a mesh that brings none, with creases, paid for; found by `find` if those that
@@ -122,7 +148,9 @@ impl Prepared {
         let edges = self.edges.get().map_or(0, |(edges, _)| edges.bytes());
         let normals = self.locked_normals().as_ref().map_or(0, VertexNormals::bytes);
         let textures = self.locked_textures().as_ref().map_or(0, |kept| size_of_val(&kept.textures.texels[..]));
-        (edges + normals + textures) as u64
+        let looked_at = self.looked_at.get().map_or(0, |faces| size_of_val(&faces[..]));
+        let runs = self.face_runs.get().map_or(0, |(runs, _)| runs.bytes());
+        (edges + normals + textures + looked_at + runs) as u64
     }
 
     fn locked_normals(&self) -> MutexGuard<'_, Option<VertexNormals>> {

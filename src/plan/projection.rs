@@ -65,3 +65,33 @@ pub fn row_dot(row: &[f32; 4], p: [f32; 3]) -> f64 {
     let (row, p) = (row.map(f64::from), p.map(f64::from));
     ((row[0] * p[0] + row[1] * p[1]) + row[2] * p[2]) + row[3]
 }
+
+/// The rows of a projection in f64, for many places at once.
+#[derive(Clone, Copy, Debug)]
+pub struct Rows([[f64; 4]; 4]);
+
+impl Rows {
+    /// The rows of a projection.
+    pub fn new(projection: &Projection) -> Self {
+        Self([projection.x, projection.y, projection.z, projection.w].map(|row| row.map(f64::from)))
+    }
+
+    /// X, Y and W: as [`row_dot`] gives them.
+    #[inline(always)]
+    pub fn place(&self, p: [f32; 3]) -> [f64; 3] {
+        let p = [f64::from(p[0]), f64::from(p[1]), f64::from(p[2])];
+        [self.dot(0, p), self.dot(1, p), self.dot(3, p)]
+    }
+
+    /// Z.
+    #[inline(always)]
+    pub fn depth(&self, p: [f32; 3]) -> f64 {
+        self.dot(2, [f64::from(p[0]), f64::from(p[1]), f64::from(p[2])])
+    }
+
+    #[inline(always)]
+    fn dot(&self, row: usize, p: [f64; 3]) -> f64 {
+        let row = &self.0[row];
+        ((row[0] * p[0] + row[1] * p[1]) + row[2] * p[2]) + row[3]
+    }
+}

@@ -7,6 +7,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::extents::{Extents, turned_extents};
 use crate::mesh::material::{FileCamera, FileLens};
 use crate::mesh::{Mesh, UpAxis};
 use crate::spec::{CameraSpec, ProjectionKind as Kind};
@@ -31,6 +32,9 @@ pub struct Camera {
     pub far: f64,
     /// True if all of the mesh lies safely between `near` and the guard band.
     pub contains_mesh: bool,
+    /// How far the mesh reaches from the picture's middle, as shares of half its width and height: an
+    /// upper limit, apart from rounding. Infinite where the mesh is not wholly before the eye.
+    pub reach: DVec2,
 }
 
 /// Room that a picture needs around the mesh.
@@ -86,11 +90,22 @@ impl Camera {
             }
         };
         camera.set_range(&extents, border.grow, size);
+        camera.set_reach(&extents, slopes);
         camera
     }
 
     fn new(axes: [DVec3; 3], center: DVec2, distance: f64, half_size: DVec2, kind: Kind) -> Self {
-        Self { axes, center, distance, half_size, kind, near: 0.0, far: 0.0, contains_mesh: false }
+        Self {
+            axes,
+            center,
+            distance,
+            half_size,
+            kind,
+            near: 0.0,
+            far: 0.0,
+            contains_mesh: false,
+            reach: DVec2::INFINITY,
+        }
     }
 
     fn set_range(&mut self, extents: &Extents, grow: f64, size_px: DVec2) {
@@ -108,6 +123,23 @@ impl Camera {
         // Half of the guard band, so that f32 cannot round anything out of it. Hulls need no room:
         // the plan cuts them to what may be in the picture.
         self.contains_mesh = nearest > 0.0 && px.max_element() < 2048.0;
+    }
+
+    /// Finds [`Camera::reach`] from the bounds of the mesh in a view pyramid of these slopes.
+    fn set_reach(&mut self, extents: &Extents, slopes: DVec2) {
+        let shares = match self.kind {
+            Kind::Orthographic => (extents.high.truncate() - self.center).max(self.center - extents.low.truncate()),
+            // Where `x <= plus - s z`, `(x - c) / (d - z) <= s + (plus - c - s d) / (d - z)`.
+            Kind::Perspective => {
+                let nearest = self.distance - extents.high.z;
+                if nearest <= 0.0 {
+                    return;
+                }
+                let beyond = (extents.plus - self.center).max(extents.minus + self.center) - slopes * self.distance;
+                slopes + beyond.max(DVec2::ZERO) / nearest
+            }
+        };
+        self.reach = shares / self.half_size;
     }
 
     /// Pixels per unit of the box, at the box's centre.
@@ -134,145 +166,6 @@ impl Camera {
             w,
         ]
     }
-}
-
-/// Vertices that are looked at side by side.
-const LANES: usize = 4;
-
-/// Bounds of the mesh in camera axes.
-struct Extents {
-    low: DVec3,
-    high: DVec3,
-    /// Largest `across + slope z`, and `slope z - across`, of the view pyramid's slopes.
-    plus: DVec2,
-    minus: DVec2,
-}
-
-impl Extents {
-    fn new(mesh: &Mesh, axes: [DVec3; 3], slopes: DVec2) -> Self {
-        let Some(&first) = mesh.positions.first() else {
-            let nothing = DVec2::NEG_INFINITY;
-            return Self { low: DVec3::ZERO, high: DVec3::ZERO, plus: nothing, minus: nothing };
-        };
-        let mut lanes = ExtentLanes::EMPTY;
-        let (blocks, rest) = mesh.positions.as_chunks();
-        for block in blocks {
-            lanes.add(block, axes, slopes);
-        }
-        let mut last = [first; LANES];
-        last[..rest.len()].copy_from_slice(rest);
-        lanes.add(&last, axes, slopes);
-        let least = |v: [f64; LANES]| v.into_iter().fold(f64::INFINITY, f64::min);
-        let most = |v: [f64; LANES]| v.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        Self {
-            low: DVec3::from(lanes.low.map(least)),
-            high: DVec3::from(lanes.high.map(most)),
-            plus: DVec2::from(lanes.plus.map(most)),
-            minus: DVec2::from(lanes.minus.map(most)),
-        }
-    }
-
-    fn center(&self) -> DVec2 {
-        ((self.low + self.high) * 0.5).truncate()
-    }
-
-    fn half(&self) -> DVec2 {
-        ((self.high - self.low) * 0.5).truncate()
-    }
-
-    /// Centre and distance at which the mesh, grown by `grow`, touches the pyramid of these slopes.
-    fn fit_perspective(&self, slopes: DVec2, grow: f64) -> (DVec2, f64) {
-        let Self { plus, minus, .. } = *self;
-        if plus == DVec2::NEG_INFINITY {
-            return (DVec2::ZERO, 1.0);
-        }
-        let lean = DVec2::new((1.0 + slopes.x * slopes.x).sqrt(), (1.0 + slopes.y * slopes.y).sqrt()) * grow;
-        let distance = ((plus + minus + 2.0 * lean) / (2.0 * slopes)).max_element();
-        // A mesh seen as a point or a line would give no distance at all, and a very wide view hardly
-        // any.
-        ((plus - minus) * 0.5, distance.max(self.high.z + grow + 1e-3))
-    }
-}
-
-/// The bounds of every fourth vertex.
-struct ExtentLanes {
-    low: [[f64; LANES]; 3],
-    high: [[f64; LANES]; 3],
-    plus: [[f64; LANES]; 2],
-    minus: [[f64; LANES]; 2],
-}
-
-impl ExtentLanes {
-    const EMPTY: Self = Self {
-        low: [[f64::INFINITY; LANES]; 3],
-        high: [[f64::NEG_INFINITY; LANES]; 3],
-        plus: [[f64::NEG_INFINITY; LANES]; 2],
-        minus: [[f64::NEG_INFINITY; LANES]; 2],
-    };
-
-    // Loops over lanes and axes walk several arrays at once; an index says that best.
-    #[allow(clippy::needless_range_loop)]
-    #[inline(always)]
-    fn add(&mut self, block: &[[f32; 3]; LANES], axes: [DVec3; 3], slopes: DVec2) {
-        // Not `f64::min` and `max`, which look for NaN.
-        let min = |a: f64, b: f64| if a < b { a } else { b };
-        let max = |a: f64, b: f64| if a > b { a } else { b };
-        let (slopes, mut p) = ([slopes.x, slopes.y], [[0.0; LANES]; 3]);
-        for k in 0..3 {
-            for l in 0..LANES {
-                let [x, y, z] = [f64::from(block[l][0]), f64::from(block[l][1]), f64::from(block[l][2])];
-                p[k][l] = (axes[k].x * x + axes[k].y * y) + axes[k].z * z;
-                self.low[k][l] = min(p[k][l], self.low[k][l]);
-                self.high[k][l] = max(p[k][l], self.high[k][l]);
-            }
-        }
-        for k in 0..2 {
-            for l in 0..LANES {
-                let lean = slopes[k] * p[2][l];
-                self.plus[k][l] = max(p[k][l] + lean, self.plus[k][l]);
-                self.minus[k][l] = max(lean - p[k][l], self.minus[k][l]);
-            }
-        }
-    }
-}
-
-/// The bounds of a mesh that turns around the up axis through the middle of its box, in the axes of a
-/// camera above the horizon by the angle of this sine and cosine.
-///
-/// A point at distance r from the axis and height h is at `x = r sin a`, `y = h cos e - r cos a sin e` and
-/// `z = h sin e + r cos a cos e` for a turn by a; each bound is the largest over all a.
-fn turned_extents(mesh: &Mesh, (axes, up): ([DVec3; 3], DVec3), (sin_e, cos_e): (f64, f64), slopes: DVec2) -> Extents {
-    let nothing = DVec2::NEG_INFINITY;
-    let mut all = Extents { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, plus: nothing, minus: nothing };
-    if mesh.positions.is_empty() {
-        return Extents { low: DVec3::ZERO, high: DVec3::ZERO, ..all };
-    }
-    let lean_x = (1.0 + (slopes.x * cos_e) * (slopes.x * cos_e)).sqrt();
-    let [plus_y, minus_y] = [slopes.y * cos_e - sin_e, slopes.y * cos_e + sin_e].map(f64::abs);
-    let [low, high] = mesh.bounds.map(|corner| DVec3::from(corner.map(f64::from)));
-    let middle = (low + high) * 0.5;
-    let on_axis = middle - up * up.dot(middle);
-    for p in &mesh.positions {
-        let p = DVec3::from(p.map(f64::from)) - on_axis;
-        let h = up.dot(p);
-        let r = (p - up * h).length();
-        let reach = DVec3::new(r, r * sin_e.abs(), r * cos_e.abs());
-        let at = DVec3::new(0.0, h * cos_e, h * sin_e);
-        all.low = all.low.min(at - reach);
-        all.high = all.high.max(at + reach);
-        let lean = h * sin_e * slopes;
-        let across = DVec2::new(0.0, h * cos_e);
-        all.plus = all.plus.max(lean + across + DVec2::new(lean_x, plus_y) * r);
-        all.minus = all.minus.max(lean - across + DVec2::new(lean_x, minus_y) * r);
-    }
-    // From the turn's axis to the origin of the camera's axes.
-    let shift = DVec3::from(axes.map(|axis| axis.dot(on_axis)));
-    let lean = slopes * shift.z;
-    all.low += shift;
-    all.high += shift;
-    all.plus += lean + shift.truncate();
-    all.minus += lean - shift.truncate();
-    all
 }
 
 type Explicit = Option<(DVec3, f64)>;

@@ -6,6 +6,7 @@
 
 mod border;
 pub mod camera;
+mod extents;
 mod material_groups;
 
 pub use border::{LINE_PX, Thickness, point_width};

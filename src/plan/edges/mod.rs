@@ -4,5 +4,7 @@
 //! once.
 
 pub(crate) mod edge_class;
+pub(crate) mod face_runs;
 pub(crate) mod select;
 pub(crate) mod silhouettes;
+pub(crate) mod view_of_runs;

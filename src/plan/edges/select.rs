@@ -20,8 +20,18 @@ pub fn select<T: Zeroable + Send>(
     cx: &mut PlanContext<'_>,
     each: impl Fn(Range<usize>, &mut dyn FnMut(T)) + Sync,
 ) -> Result<Vec<T>, PlanError> {
+    select_by(what, [count, CHUNK], cx, each)
+}
+
+/// As [`select`] in a list of so many items, of which a thread takes so many at a time.
+pub fn select_by<T: Zeroable + Send>(
+    what: &str,
+    [count, chunk]: [usize; 2],
+    cx: &mut PlanContext<'_>,
+    each: impl Fn(Range<usize>, &mut dyn FnMut(T)) + Sync,
+) -> Result<Vec<T>, PlanError> {
     let deadline = cx.deadline;
-    let chunks = || (0..count).step_by(CHUNK).map(|from| from..count.min(from + CHUNK));
+    let chunks = || (0..count).step_by(chunk).map(|from| from..count.min(from + chunk));
     let found = |range: Range<usize>| {
         deadline.check()?;
         let mut found = 0;
@@ -39,7 +49,7 @@ pub fn select<T: Zeroable + Send>(
         Ok::<(), Stopped>(())
     };
     // A short list is done by the calling thread.
-    let is_short = count <= CHUNK;
+    let is_short = count <= chunk;
     let counts: Vec<usize> = if is_short {
         chunks().map(found).collect::<Result<_, Stopped>>()?
     } else {

@@ -16,7 +16,7 @@ use crate::spec::Hidden;
 /// The passes that draw wires, topology and contours.
 pub fn passes(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<LinePass>, PlanError> {
     let Scene { mesh, groups, camera, .. } = scene;
-    let mut styles = line_styles(scene);
+    let mut styles = line_styles(scene, cx)?;
     let hides = groups.hides_lines();
     let is_unneeded = styles.is_empty() && !groups.has_hull();
     if cx.skips.skip(SkipKind::Adjacency, is_unneeded, "no line asks which triangles are neighbours") {

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use crate::limits::{Deadline, Stopped};
+use crate::limits::{Deadline, LimitExceeded, Stopped};
 use crate::mesh::Mesh;
 use crate::mesh::creases::sharp_cos;
 use crate::mesh::edges::{EdgeList, MeshEdge};
+use crate::plan::context::PlanContext;
 use crate::plan::edges::edge_class::{Class, belongs_to, class_of};
 use crate::plan::lines::auto_width::{AutoWidth, open_edges};
 use crate::plan::peeling::FADE;
@@ -107,12 +108,12 @@ impl LineStyle {
 }
 
 /// The line styles of a scene, in the order in which they are drawn.
-pub fn line_styles(scene: &Scene<'_, '_>) -> Vec<LineStyle> {
-    let mut styles = wire_styles(scene);
+pub fn line_styles(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<LineStyle>, LimitExceeded> {
+    let mut styles = wire_styles(scene, cx)?;
     styles.extend(scene.spec.topology.iter().flat_map(topology_styles));
     styles.extend(contour_styles(scene));
     styles.retain(LineStyle::is_seen);
-    styles
+    Ok(styles)
 }
 
 /// A wire's colour: premultiplied, opacity included.
@@ -122,20 +123,25 @@ pub fn wire_color(wire: &Wire) -> [f32; 4] {
 
 /// The width of a wire along edges of materials with some styles. Feature and boundary edges are taken to be
 /// few.
-fn width(scene: &Scene<'_, '_>, wire: &Wire, styles: &[bool]) -> AutoWidth {
+fn width(
+    scene: &Scene<'_, '_>,
+    wire: &Wire,
+    styles: &[bool],
+    cx: &mut PlanContext<'_>,
+) -> Result<AutoWidth, LimitExceeded> {
     let are_polygons = wire.edges == WireEdges::Polygons;
     match wire.thickness {
-        WireThickness::Given(width_px) => AutoWidth { width_px, opacity: 1.0 },
+        WireThickness::Given(width_px) => Ok(AutoWidth { width_px, opacity: 1.0 }),
         WireThickness::Auto if are_polygons || wire.edges == WireEdges::Triangles => {
             let style = |i: usize| scene.groups.style_of[scene.mesh.triangle_materials[i] as usize] as usize;
-            AutoWidth::of(scene, are_polygons, |i| styles[style(i)])
+            AutoWidth::of(scene, are_polygons, |i| styles[style(i)], cx)
         }
-        WireThickness::Auto => AutoWidth::WIDEST,
+        WireThickness::Auto => Ok(AutoWidth::WIDEST),
     }
 }
 
 /// Wires of exact width, each style once.
-fn wire_styles(scene: &Scene<'_, '_>) -> Vec<LineStyle> {
+fn wire_styles(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<LineStyle>, LimitExceeded> {
     let groups = &scene.groups;
     let mut kinds: Vec<(Wire, Vec<bool>)> = Vec::new();
     for (index, layers) in groups.styles.iter().enumerate() {
@@ -146,9 +152,9 @@ fn wire_styles(scene: &Scene<'_, '_>) -> Vec<LineStyle> {
         });
         kinds[at].1[index] = true;
     }
-    let style = |(wire, styles): (Wire, Vec<bool>)| {
-        let AutoWidth { width_px, opacity } = width(scene, &wire, &styles);
-        LineStyle {
+    let mut style = |(wire, styles): (Wire, Vec<bool>)| {
+        let AutoWidth { width_px, opacity } = width(scene, &wire, &styles, cx)?;
+        Ok(LineStyle {
             width_px,
             smoothing_px: wire.smoothing,
             color: wire_color(&wire).map(|v| v * opacity),
@@ -159,9 +165,9 @@ fn wire_styles(scene: &Scene<'_, '_>) -> Vec<LineStyle> {
             has_all_edges: class_of(&wire) == Class::All && styles.iter().all(|&has| has),
             styles: if styles.iter().all(|&has| has) { Vec::new() } else { styles },
             thinnest_px: None,
-        }
+        })
     };
-    kinds.into_iter().map(style).collect()
+    kinds.into_iter().map(&mut style).collect()
 }
 
 /// The styles that show a mesh's topology. Faults come last, so that they lie on top.

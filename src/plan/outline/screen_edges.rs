@@ -4,8 +4,7 @@ use crate::plan::PlanError;
 use crate::plan::context::PlanContext;
 use crate::plan::edges::select::map;
 use crate::plan::outline::ScreenPoint;
-use crate::plan::outline::silhouette_edges::{ScreenMesh, SilhouetteEdge};
-use crate::plan::projection::row_dot;
+use crate::plan::outline::silhouette_edges::{ScreenMesh, SilhouetteEdge, near};
 use crate::scene::Thickness;
 
 /// 1/256 px in a pixel.
@@ -137,13 +136,13 @@ impl<'a> OutlineView<'a> {
 
     /// The smallest W on screen.
     pub fn near(&self) -> f64 {
-        f64::from(self.view.projection.near_w) * (1.0 + 1e-5)
+        near(&self.view.projection)
     }
 
     /// X, Y, Z, W.
+    #[inline(always)]
     pub fn homogeneous(&self, vertex: u32) -> [f64; 4] {
-        let [x, y, w] = self.view.places[vertex as usize];
-        [x, y, row_dot(&self.view.projection.z, self.view.mesh.positions[vertex as usize]), w]
+        self.view.homogeneous(vertex)
     }
 }
 
@@ -153,6 +152,7 @@ pub fn before(near: f64, inside: &[f64; 4], outside: &[f64; 4]) -> [f64; 4] {
 }
 
 /// X, Y, Z, W on screen.
+#[inline(always)]
 pub fn on_screen([x, y, z, w]: [f64; 4]) -> ScreenPoint {
     [x / w, y / w, z / w, 1.0 / w]
 }
@@ -163,6 +163,7 @@ fn mix(a: &[f64; 4], b: &[f64; 4], t: f64) -> [f64; 4] {
 }
 
 /// Cuts a range down to where the affine function with these values at 0 and 1 is not negative.
+#[inline]
 pub fn narrow(range: &mut [f64; 2], from: f64, to: f64) -> Option<()> {
     if from < 0.0 && to < 0.0 {
         return None;

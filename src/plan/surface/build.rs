@@ -102,9 +102,13 @@ fn materials_and_textures(
 /// By material, whether any triangle has it.
 fn used_materials(count: usize, geometry: &Geometry<'_>) -> Vec<bool> {
     let mut is_used = vec![false; count];
-    for &material in geometry.triangle_materials.iter() {
-        if let Some(is_used) = is_used.get_mut(material as usize) {
-            *is_used = true;
+    // Runs of faces mostly have one material.
+    for run in geometry.triangle_materials.chunks(1024) {
+        let is_one = run.iter().fold(true, |is_one, &material| is_one & (material == run[0]));
+        for &material in if is_one { &run[..1] } else { run } {
+            if let Some(is_used) = is_used.get_mut(material as usize) {
+                *is_used = true;
+            }
         }
     }
     is_used

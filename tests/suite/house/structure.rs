@@ -20,8 +20,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("spec", &["mesh", "image", "srgb", "limits"]),
     ("request", &["spec", "mesh", "image", "limits"]),
     ("texture", &["mesh", "srgb", "limits", "warning"]),
-    ("scene", &["spec", "mesh", "limits"]),
-    ("plan", &["scene", "spec", "texture", "mesh", "image", "limits", "warning"]),
+    ("scene", &["spec", "mesh", "parallel", "limits"]),
+    ("plan", &["scene", "spec", "texture", "mesh", "parallel", "image", "limits", "warning"]),
     // Of spec the choice of a back-end alone.
     ("backend", &["plan", "spec", "image", "srgb", "limits"]),
     ("encode", &["image", "limits"]),

@@ -32,6 +32,7 @@ fn projection() -> Projection {
         near: 0.5 * NEAREST,
         far: 2.0 * FARTHEST,
         contains_mesh: true,
+        reach: DVec2::INFINITY,
     };
     let [x, y, z, w] = camera.rows([SIZE_PX; 2]);
     Projection {

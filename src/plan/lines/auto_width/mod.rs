@@ -4,10 +4,13 @@ mod open_edges;
 
 pub use open_edges::open_edges;
 
-use rayon::prelude::*;
+use std::sync::Arc;
 
+use crate::limits::LimitExceeded;
 use crate::mesh::Mesh;
+use crate::parallel;
 use crate::plan::Projection;
+use crate::plan::context::PlanContext;
 use crate::plan::projection::row_dot;
 use crate::scene::Scene;
 
@@ -54,8 +57,24 @@ impl AutoWidth {
     ///
     /// Lines of width w cover `1 - (1 - w / 2r)^2` of a triangle whose inscribed circle has the radius r, and
     /// all of it from w = 2r on. With diagonals left out, `r = 2 area / length of drawn edges` is taken.
-    pub fn of(scene: &Scene<'_, '_>, are_polygons: bool, has_lines: impl Fn(usize) -> bool + Sync) -> Self {
-        let faces = FaceSizes::of(scene, are_polygons, has_lines);
+    pub fn of(
+        scene: &Scene<'_, '_>,
+        are_polygons: bool,
+        has_lines: impl Fn(usize) -> bool,
+        cx: &mut PlanContext<'_>,
+    ) -> Result<Self, LimitExceeded> {
+        // All faces of a mesh may have the same hash.
+        cx.budget.spend("the width of lines", scene.mesh.triangles.len() as u64, 4)?;
+        let looked_at = match cx.prepared {
+            Some(prepared) => prepared.looked_at(|| looked_at(scene.mesh)),
+            None => Arc::new(looked_at(scene.mesh)),
+        };
+        let with_lines = looked_at.iter().map(|&face| face as usize).filter(|&face| has_lines(face));
+        Ok(Self::around(&FaceSizes::of(scene, are_polygons, with_lines)))
+    }
+
+    /// The lines around faces of these sizes.
+    fn around(faces: &FaceSizes) -> Self {
         let [mut thin, mut wide] = WIDTHS_PX;
         let step = |v: f64| ((v * STEPS).round() / STEPS) as f32;
         if faces.covered(wide) <= COVERED_MAX {
@@ -73,33 +92,42 @@ impl AutoWidth {
     }
 }
 
+/// The faces of a mesh that are looked at, in order. They are about [`LOOKED_AT`] to twice as many, unless
+/// an unlucky mesh has equal hashes.
+fn looked_at(mesh: &Mesh) -> Vec<u32> {
+    let count = mesh.triangles.len();
+    // One in so many faces, a power of two.
+    let one_in = 1_u64 << (count / LOOKED_AT).max(1).ilog2();
+    let chunk = |first: usize| -> Vec<u32> {
+        let faces = first..count.min(first + CHUNK);
+        faces.filter(|&face| hash_of(mesh, face).is_multiple_of(one_in)).map(|face| face as u32).collect()
+    };
+    parallel::map((0..count).step_by(CHUNK).collect(), chunk).concat()
+}
+
+/// A number from the places of a face's corners, the same for any order of them.
+fn hash_of(mesh: &Mesh, face: usize) -> u64 {
+    let mut sum = 0_u64;
+    for corner in mesh.triangles[face] {
+        let [x, y, z] = mesh.positions[corner as usize].map(|v| u64::from(v.to_bits()));
+        sum = sum.wrapping_add((x ^ y << 21 ^ z << 42).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    }
+    (sum ^ sum >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93) >> 32
+}
+
 /// Areas of faces on screen, by the diameter of their inscribed circles. Whole numbers, whose sums do not
 /// depend on an order.
 struct FaceSizes([u64; CLASSES]);
 
 impl FaceSizes {
     /// Faces with a corner behind the near plane or the centre outside the picture are left out.
-    fn of(scene: &Scene<'_, '_>, are_polygons: bool, has_lines: impl Fn(usize) -> bool + Sync) -> Self {
+    fn of(scene: &Scene<'_, '_>, are_polygons: bool, faces: impl Iterator<Item = usize>) -> Self {
         let view = View::new(scene, are_polygons);
-        let count = scene.mesh.triangles.len();
-        // One in so many faces, a power of two.
-        let one_in = 1_u64 << (count / LOOKED_AT).max(1).ilog2();
-        let chunk = |first: usize| {
-            let mut sizes = Self([0; CLASSES]);
-            for i in
-                (first..count.min(first + CHUNK)).filter(|&i| view.hash_of(i).is_multiple_of(one_in) && has_lines(i))
-            {
-                if let Some([area, diameter]) = view.size_of(i) {
-                    sizes.0[class_of(diameter)] += (area * 256.0).round() as u64;
-                }
-            }
-            sizes
-        };
-        if count <= CHUNK {
-            return chunk(0);
+        let mut sizes = Self([0; CLASSES]);
+        for [area, diameter] in faces.filter_map(|face| view.size_of(face)) {
+            sizes.0[class_of(diameter)] += (area * 256.0).round() as u64;
         }
-        let chunks: Vec<Self> = (0..count.div_ceil(CHUNK)).into_par_iter().map(|i| chunk(i * CHUNK)).collect();
-        Self(std::array::from_fn(|class| chunks.iter().map(|sizes| sizes.0[class]).sum()))
+        sizes
     }
 
     /// The share of the faces that lines of a width cover, 0 to 1; 0 if there are none.
@@ -158,16 +186,6 @@ impl<'a> View<'a> {
         let drawn = (0..3).filter(|k| mask >> k & 1 == 1);
         let length: f64 = drawn.map(|k: usize| (ways[k][0] * ways[k][0] + ways[k][1] * ways[k][1]).sqrt()).sum();
         (area > 0.0).then_some([area, 4.0 * area / length])
-    }
-
-    /// A number from the places of a face's corners, the same for any order of them.
-    fn hash_of(&self, face: usize) -> u64 {
-        let of_corner = |v: u32| {
-            let [x, y, z] = self.mesh.positions[v as usize].map(|v| u64::from(v.to_bits()));
-            (x ^ y << 21 ^ z << 42).wrapping_mul(0x9e37_79b9_7f4a_7c15)
-        };
-        let sum = self.mesh.triangles[face].map(of_corner).iter().fold(0_u64, |sum, v| sum.wrapping_add(*v));
-        (sum ^ sum >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93) >> 32
     }
 
     /// The length of an edge on screen, pixels, if its middle is in the picture.

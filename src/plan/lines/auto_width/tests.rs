@@ -23,7 +23,8 @@ fn lines(n: usize, are_polygons: bool) -> AutoWidth {
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Cpu };
     let spec = request::read(None, &keys, &rules).unwrap();
     let scene = Scene::new(&mesh, &spec, &mut budget).unwrap();
-    AutoWidth::of(&scene, are_polygons, |_| true)
+    let deadline = Deadline::default();
+    AutoWidth::of(&scene, are_polygons, |_| true, &mut PlanContext::new(&mut budget, &deadline, &[])).unwrap()
 }
 
 #[test]

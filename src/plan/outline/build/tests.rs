@@ -56,7 +56,6 @@ fn a_hull_takes_no_more_than_it_spends() {
             + size_of::<ScreenEdge>() * parts.places.capacity()
             + size_of::<VisiblePart>() * parts.drawn.capacity()
             + 2 * size_of::<EdgeEnd>() * edges.len()
-            + size_of::<[f64; 3]>() * view.places.capacity()
             + mesh.triangles.len()
             + size_of::<HullVertex>() * hull.vertices.capacity()
             + 12 * hull.triangles.capacity()

@@ -1,16 +1,25 @@
 //! The silhouette edges of a view: where surfaces end on screen, and on which side of each edge
 //! nothing is.
 
+use std::sync::Arc;
+
+use crate::limits::Stopped;
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge};
 use crate::mesh::vector::is_in_order;
+use crate::parallel;
 use crate::plan::context::PlanContext;
-use crate::plan::edges::select::{map, select};
+use crate::plan::edges::face_runs::{FACES, FaceRuns};
+use crate::plan::edges::select::{map, select_by};
 use crate::plan::edges::silhouettes::Silhouettes;
-use crate::plan::projection::row_dot;
+use crate::plan::edges::view_of_runs::RunView;
+use crate::plan::projection::Rows;
 use crate::plan::{Edge, PlanError, Projection};
 use crate::scene::{Fill, MaterialGroups, Scene, Thickness};
 use crate::spec::Cull;
+
+/// Runs of faces that a thread takes at a time.
+const RUNS: usize = 128;
 
 /// An edge beside which an outline is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Zeroable)]
@@ -34,10 +43,15 @@ pub struct ScreenMesh<'a> {
     pub mesh: &'a Mesh,
     /// The view.
     pub projection: Projection,
-    /// X, Y and W of each position.
-    pub places: Vec<[f64; 3]>,
+    rows: Rows,
+    /// The runs of its faces.
+    pub runs: Arc<FaceRuns>,
+    /// The same view of runs of faces.
+    pub run_view: RunView,
     /// By face: -1 front, 1 back, 0 edge on.
     facing: Vec<i8>,
+    /// Runs that may have silhouette edges.
+    open_runs: Vec<u32>,
     /// By material: the side that is culled.
     culls: Vec<Cull>,
 }
@@ -47,15 +61,49 @@ impl<'a> ScreenMesh<'a> {
     pub fn new(scene: &Scene<'a, '_>, cx: &mut PlanContext<'_>) -> Result<Self, PlanError> {
         let (mesh, groups) = (scene.mesh, &scene.groups);
         let projection = Projection::new(&scene.camera, scene.size_px(), true);
+        let runs = cx.face_runs(mesh)?;
         let PlanContext { budget, deadline, .. } = cx;
-        budget.spend("an outline", mesh.positions.len() as u64, size_of::<[f64; 3]>() as u64)?;
+        budget.spend("an outline", runs.runs.len() as u64, 1 + 4)?;
         budget.spend("an outline", mesh.triangles.len() as u64, 1)?;
         budget.spend("materials", groups.material_count() as u64, 1)?;
-        let rows = [&projection.x, &projection.y, &projection.w];
-        let places = map(&mesh.positions, deadline, |p| rows.map(|row| row_dot(row, *p)))?;
-        let facings = map(&mesh.triangles, deadline, |triangle| facing(mesh, &places, *triangle))?;
+        let run_view = RunView::new(mesh, &projection, near(&projection));
+        let sides = map(&runs.runs, deadline, |run| run_view.side(run))?;
+        let mut facings = vec![0_i8; mesh.triangles.len()];
+        let pieces = facings.chunks_mut(RUNS * FACES).zip(sides.chunks(RUNS)).enumerate();
+        let rows = Rows::new(&projection);
+        let places = Places { mesh, rows, rounded: run_view.rounded };
+        let fill = |(piece, (facings, sides)): (usize, (&mut [i8], &[i8]))| {
+            deadline.check()?;
+            let runs = facings.chunks_mut(FACES).zip(sides).zip((piece * RUNS * FACES..).step_by(FACES));
+            for ((facings, &side), first) in runs {
+                if side != 0 {
+                    facings.fill(side);
+                } else {
+                    facings.iter_mut().zip(first..).for_each(|(facing, face)| *facing = places.facing(face));
+                }
+            }
+            Ok(())
+        };
+        parallel::map(pieces.collect(), fill).into_iter().collect::<Result<(), Stopped>>()?;
+        let is_open = |r: &u32| sides[*r as usize] == 0 || !runs.runs[*r as usize].is_plain;
+        let mut open_runs = Vec::with_capacity(runs.runs.len());
+        open_runs.extend((0..runs.runs.len() as u32).filter(is_open));
         let culls = (0..groups.material_count()).map(|m| cull(groups, m)).collect();
-        Ok(Self { mesh, projection, places, facing: facings, culls })
+        Ok(Self { mesh, projection, rows, runs, run_view, facing: facings, open_runs, culls })
+    }
+
+    /// X, Y, Z and W of a position.
+    #[inline(always)]
+    pub fn homogeneous(&self, vertex: u32) -> [f64; 4] {
+        let p = self.mesh.positions[vertex as usize];
+        let [x, y, w] = self.rows.place(p);
+        [x, y, self.rows.depth(p), w]
+    }
+
+    /// X, Y and W of a position.
+    #[inline(always)]
+    pub fn place(&self, vertex: u32) -> [f64; 3] {
+        self.rows.place(self.mesh.positions[vertex as usize])
     }
 
     /// The silhouette edges of the materials that have an outline (`outlines`, by material).
@@ -66,8 +114,8 @@ impl<'a> ScreenMesh<'a> {
         silhouettes: &Silhouettes,
         cx: &mut PlanContext<'_>,
     ) -> Result<Vec<SilhouetteEdge>, PlanError> {
-        select("an outline's edges", list.len(), cx, |range, found| {
-            for i in range {
+        select_by("an outline's edges", [self.open_runs.len(), RUNS], cx, |range, found| {
+            for i in self.open_runs[range].iter().flat_map(|&run| self.runs.edges(run as usize)) {
                 let edge = list.get(i);
                 if self.is_surely_inside(&edge) {
                     continue;
@@ -152,22 +200,56 @@ fn cull(groups: &MaterialGroups<'_>, material: usize) -> Cull {
     }
 }
 
-/// The side that a triangle shows: the sign of the volume that it spans with the eye. It is right
-/// for corners behind the eye too.
-fn facing(mesh: &Mesh, places: &[[f64; 3]], triangle: [u32; 3]) -> i8 {
-    // Corners are sorted, so that rounding does not depend on which comes first or on the winding.
-    let mut sorted = triangle;
-    let mut is_even = true;
-    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
-        let is_swapped = !is_in_order(mesh.positions[sorted[i] as usize], mesh.positions[sorted[j] as usize]);
-        (sorted[i], sorted[j]) = if is_swapped { (sorted[j], sorted[i]) } else { (sorted[i], sorted[j]) };
-        is_even ^= is_swapped;
+/// The smallest W on screen.
+pub fn near(projection: &Projection) -> f64 {
+    f64::from(projection.near_w) * (1.0 + 1e-5)
+}
+
+/// The places of a mesh's corners, from which follows what side its faces show.
+struct Places<'a> {
+    mesh: &'a Mesh,
+    rows: Rows,
+    /// Volumes that rounding may take for 0.
+    rounded: f64,
+}
+
+impl Places<'_> {
+    /// The side that a face shows: the sign of the volume that it spans with the eye. It is right for
+    /// corners behind the eye too.
+    #[inline]
+    fn facing(&self, face: usize) -> i8 {
+        let volume = self.volume(self.mesh.triangles[face]);
+        // The sign of a large volume does not depend on rounding.
+        if volume.abs() > self.rounded { sign(volume) } else { self.sorted_facing(face) }
     }
-    let [a, b, c] = sorted.map(|v| places[v as usize]);
-    let (x, y, w) = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
-    let volume = (x * c[0] + y * c[1]) + w * c[2];
-    let sign = i8::from(volume > 0.0) - i8::from(volume < 0.0);
-    if is_even { sign } else { -sign }
+
+    #[inline(always)]
+    fn volume(&self, corners: [u32; 3]) -> f64 {
+        let at = |v: u32| self.rows.place(self.mesh.positions[v as usize]);
+        let (a, b, c) = (at(corners[0]), at(corners[1]), at(corners[2]));
+        let (x, y, w) = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
+        (x * c[0] + y * c[1]) + w * c[2]
+    }
+
+    /// The same from sorted corners, so that rounding does not depend on which comes first or on the winding.
+    #[cold]
+    fn sorted_facing(&self, face: usize) -> i8 {
+        let mut sorted = self.mesh.triangles[face];
+        let mut is_even = true;
+        for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+            let [a, b] = [i, j].map(|k: usize| self.mesh.positions[sorted[k] as usize]);
+            if !is_in_order(a, b) {
+                sorted.swap(i, j);
+                is_even = !is_even;
+            }
+        }
+        let sign = sign(self.volume(sorted));
+        if is_even { sign } else { -sign }
+    }
+}
+
+fn sign(v: f64) -> i8 {
+    i8::from(v > 0.0) - i8::from(v < 0.0)
 }
 
 #[cfg(test)]

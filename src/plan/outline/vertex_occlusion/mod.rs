@@ -10,14 +10,17 @@ use std::f64::consts::TAU;
 
 use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
-use crate::plan::edges::select::select;
+use crate::plan::edges::face_runs::FaceRuns;
+use crate::plan::edges::select::{map_indices, select_by};
 use crate::plan::outline::EdgeEnd;
 use crate::plan::outline::silhouette_edges::ScreenMesh;
 use crate::plan::outline::sort::sort;
-use crate::plan::projection::row_dot;
 
 /// Limit of ends times faces at a vertex. Around a vertex with more, all ends count as visible.
 const PAIRS_MAX: usize = 1 << 12;
+
+/// Runs of faces that a thread takes at a time.
+const RUNS: usize = 128;
 
 /// Relative difference up to which two angles or two slopes count as equal.
 const EQUAL: f64 = 1e-9;
@@ -29,7 +32,7 @@ pub struct VertexOcclusion {
 }
 
 /// From one angle to a larger one, both from 0 to a whole turn.
-#[derive(Clone, Copy, Debug, bytemuck::Zeroable)]
+#[derive(Clone, Copy, Debug, Default, bytemuck::Zeroable)]
 struct Arc {
     vertex: u32,
     from: f64,
@@ -111,24 +114,69 @@ impl Arc {
     }
 }
 
-/// The arcs of all faces around the vertices of ends.
+/// The arcs of all faces around the vertices of ends. Around a vertex without a quad nothing is drawn, so
+/// no arc is needed there.
 fn arcs(ends: &[EdgeEnd], view: &ScreenMesh<'_>, cx: &mut PlanContext<'_>) -> Result<Vec<Arc>, PlanError> {
     let words = view.mesh.positions.len().div_ceil(64);
     cx.budget.spend("an outline's corners", words as u64, 8)?;
+    cx.budget.spend("an outline's corners", view.runs.runs.len() as u64, 4)?;
     let mut has_end = vec![0_u64; words];
-    for end in ends {
+    let mut near_ends = Neighbourhood::default();
+    for end in ends.iter().filter(|end| end.outer.is_some()) {
         has_end[end.vertex as usize / 64] |= 1 << (end.vertex % 64);
+        near_ends.add(view.mesh.positions[end.vertex as usize]);
     }
     let is_listed = |v: u32| has_end[v as usize / 64] >> (v % 64) & 1 == 1;
-    select("an outline's corners", view.mesh.triangles.len(), cx, |range, found| {
-        for i in range {
-            let triangle = view.mesh.triangles[i];
-            for k in (0..3).filter(|&k| is_listed(triangle[k])) {
-                let corners = [0, 1, 2].map(|j| triangle[(k + j) % 3]);
-                face_arcs(view, i as u32, corners).into_iter().flatten().for_each(&mut *found);
-            }
+    let mut runs = Vec::with_capacity(view.runs.runs.len());
+    let all = view.runs.runs.iter().zip(0_u32..);
+    runs.extend(all.filter(|(run, _)| near_ends.meets(&run.bounds)).map(|(_, r)| r));
+    let corners = select_by("an outline's corners", [runs.len(), RUNS], cx, |range, found| {
+        for face in runs[range].iter().flat_map(|&r| FaceRuns::faces(r as usize, view.mesh.triangles.len())) {
+            let triangle = view.mesh.triangles[face];
+            (0..3_u32).filter(|&k| is_listed(triangle[k as usize])).for_each(|k| found([face as u32, k]));
         }
-    })
+    })?;
+    cx.budget.spend("an outline's corners", corners.len() as u64, 4 * size_of::<Arc>() as u64)?;
+    let found = map_indices(corners.len(), cx.deadline, |i| {
+        let [face, k] = corners[i];
+        let triangle = view.mesh.triangles[face as usize];
+        face_arcs(view, face, [0, 1, 2].map(|j| triangle[(k as usize + j) % 3])).map(Option::unwrap_or_default)
+    })?;
+    // Arcs are not empty.
+    let mut arcs = Vec::with_capacity(2 * found.len());
+    arcs.extend(found.into_iter().flatten().filter(|arc| arc.from < arc.to));
+    Ok(arcs)
+}
+
+/// Cells of the unit box, for each axis.
+const CELLS: usize = 64;
+
+/// The cells of the unit box in which some points lie: a row of them in a word.
+struct Neighbourhood(Vec<u64>);
+
+impl Default for Neighbourhood {
+    fn default() -> Self {
+        Self(vec![0; CELLS * CELLS])
+    }
+}
+
+impl Neighbourhood {
+    fn cell(v: f32) -> usize {
+        (((v + 0.5) * CELLS as f32) as usize).min(CELLS - 1)
+    }
+
+    fn add(&mut self, point: [f32; 3]) {
+        let [x, y, z] = point.map(Self::cell);
+        self.0[z * CELLS + y] |= 1 << x;
+    }
+
+    /// True if a cell that a box meets has a point.
+    fn meets(&self, bounds: &[[f32; 3]; 2]) -> bool {
+        let [low, high] = bounds.map(|corner| corner.map(Self::cell));
+        let mask = (u64::MAX << low[0]) & (u64::MAX >> (CELLS - 1 - high[0]));
+        let row = |z: usize| &self.0[z * CELLS + low[1]..=z * CELLS + high[1]];
+        (low[2]..=high[2]).any(|z| row(z).iter().any(|word| word & mask != 0))
+    }
 }
 
 /// The arc that a face covers around its first corner, in two where it goes past a whole turn. None
@@ -137,9 +185,9 @@ fn face_arcs(view: &ScreenMesh<'_>, face: u32, [at, next, last]: [u32; 3]) -> [O
     let shown = view.shown(face).unwrap_or(0);
     // The direction in which a side leaves: the derivative of its place on screen, which is right
     // even where the other end lies behind the eye.
-    let here = view.places[at as usize];
+    let here = view.place(at);
     let angle = |there: u32| {
-        let there = view.places[there as usize];
+        let there = view.place(there);
         let [x, y] = [0, 1].map(|axis| there[axis] * here[2] - here[axis] * there[2]);
         libm::atan2(y, x)
     };
@@ -164,10 +212,7 @@ fn face_arcs(view: &ScreenMesh<'_>, face: u32, [at, next, last]: [u32; 3]) -> [O
 /// Change of a face's depth right and down: `Z = (gx x + gy y + c) W` for all corners, by Cramer's
 /// rule.
 fn slope(view: &ScreenMesh<'_>, corners: [u32; 3]) -> [f64; 2] {
-    let [p, q, r] = corners.map(|v| {
-        let [x, y, w] = view.places[v as usize];
-        [x, y, row_dot(&view.projection.z, view.mesh.positions[v as usize]), w]
-    });
+    let [p, q, r] = corners.map(|v| view.homogeneous(v));
     let determinant = |[a, b, c]: [usize; 3]| {
         let minor = |i: usize, j: usize| q[i] * r[j] - q[j] * r[i];
         p[a] * minor(b, c) + p[b] * minor(c, a) + p[c] * minor(a, b)

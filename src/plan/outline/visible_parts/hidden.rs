@@ -23,10 +23,11 @@ pub fn hidden_range(face: &ScreenFace, edge: &ScreenEdge, vertices: [u32; 2], ti
         return None;
     }
     let sides = Sides::of(face);
-    let at = ends.map(|[x, y, ..]| sides.values([x, y]));
+    let at = [sides.values([ends[0][0], ends[0][1]]), sides.values([ends[1][0], ends[1][1]])];
     let mut range = [0.0, 1.0];
-    for ((from, to), length) in at[0].iter().zip(&at[1]).zip(sides.lengths) {
-        narrow(&mut range, from + BESIDE * length, to + BESIDE * length)?;
+    for k in 0..3 {
+        let beside = BESIDE * sides.lengths[k];
+        narrow(&mut range, at[0][k] + beside, at[1][k] + beside)?;
     }
     let nearer = range.map(|t| {
         let values = [0, 1, 2].map(|k| at[0][k] + t * (at[1][k] - at[0][k]));
@@ -106,9 +107,11 @@ struct Sides {
 impl Sides {
     #[inline]
     fn of(face: &ScreenFace) -> Self {
-        let from = face.corners.map(|[x, y, _]| [x, y]);
-        let way = [0, 1, 2].map(|k: usize| [0, 1].map(|axis| from[(k + 1) % 3][axis] - from[k][axis]));
-        let lengths = way.map(|[x, y]| x.abs() + y.abs());
+        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = face.corners;
+        let from = [[ax, ay], [bx, by], [cx, cy]];
+        let way = [[bx - ax, by - ay], [cx - bx, cy - by], [ax - cx, ay - cy]];
+        let length = |way: [f64; 2]| way[0].abs() + way[1].abs();
+        let lengths = [length(way[0]), length(way[1]), length(way[2])];
         let area = way[0][0] * -way[2][1] + way[0][1] * way[2][0];
         Self { from, way, lengths, area }
     }
@@ -116,7 +119,8 @@ impl Sides {
     /// Twice the areas between the sides and a point: all are positive inside.
     #[inline]
     fn values(&self, [x, y]: [f64; 2]) -> [f64; 3] {
-        [0, 1, 2].map(|k| self.way[k][0] * (y - self.from[k][1]) - self.way[k][1] * (x - self.from[k][0]))
+        let value = |k: usize| self.way[k][0] * (y - self.from[k][1]) - self.way[k][1] * (x - self.from[k][0]);
+        [value(0), value(1), value(2)]
     }
 
     fn depth(&self, face: &ScreenFace, values: [f64; 3]) -> f64 {

@@ -3,12 +3,14 @@
 //! An outline is wider than the edge that it belongs to, and depths alone cannot tell that this
 //! edge is hidden: a face in front of it may recede faster than the outline does.
 
+mod cells;
 mod grid;
 mod hidden;
 
 use rayon::prelude::*;
 
-use self::grid::{Cells, FaceGrid, Marks};
+use self::cells::{Cells, Marks};
+use self::grid::FaceGrid;
 use self::hidden::{depth_at, hidden_range};
 use crate::limits::Stopped;
 use crate::plan::PlanError;
@@ -170,19 +172,22 @@ impl Search<'_> {
         let (place, vertices) = (&self.places[i], self.edges[i].vertices);
         let tiny = place.ends.map(|end| end[2] - self.view.behind(end[2], end[3], EQUAL));
         let tiny = tiny[0].max(tiny[1]);
-        let mut is_hidden = false;
+        // The hidden parts that reach from the first end up to here, and from here to the second end. Where
+        // they meet, nothing is left to be seen, whatever else hides the edge.
+        let [mut from_first, mut from_second] = [0.0, 1.0];
         grid.cells.each(&place.ends.map(|[x, y, ..]| [x, y]), |cell| {
-            if is_hidden {
-                return;
-            }
             for face in grid.faces(cell) {
-                if let Some(range) = hidden_range(face, place, vertices, tiny) {
-                    is_hidden |= range[0] <= 0.0 && range[1] >= 1.0;
-                    hidden.push(range);
+                if from_first >= from_second {
+                    return;
+                }
+                if let Some([from, to]) = hidden_range(face, place, vertices, tiny) {
+                    from_first = if from <= from_first && to > from_first { to } else { from_first };
+                    from_second = if to >= from_second && from < from_second { from } else { from_second };
+                    hidden.push([from, to]);
                 }
             }
         });
-        is_hidden
+        from_first >= from_second
     }
 
     /// The part of an edge, with what its outline covers.
