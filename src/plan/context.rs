@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::PlanError;
 use super::edges::face_runs::FaceRuns;
 use super::edges::silhouettes::Silhouettes;
+use super::lines::auto_width::looked_at;
 use super::prepared::Prepared;
 use super::skips::{SkipKind, Skips};
 use crate::limits::{Budget, Deadline};
@@ -35,6 +36,7 @@ pub struct PlanContext<'c> {
     edges: Option<Arc<EdgeList>>,
     silhouettes: Option<Arc<Silhouettes>>,
     face_runs: Option<Arc<FaceRuns>>,
+    looked_at: Option<Arc<Vec<u32>>>,
 }
 
 impl<'c> PlanContext<'c> {
@@ -50,6 +52,7 @@ impl<'c> PlanContext<'c> {
             edges: None,
             silhouettes: None,
             face_runs: None,
+            looked_at: None,
         }
     }
 
@@ -71,6 +74,20 @@ impl<'c> PlanContext<'c> {
         };
         self.edges = Some(Arc::clone(&edges));
         Ok(edges)
+    }
+
+    /// The faces that are looked at for the width of lines, found when a style first needs them.
+    pub fn looked_at(&mut self, mesh: &Mesh) -> Result<Arc<Vec<u32>>, PlanError> {
+        if let Some(looked_at) = &self.looked_at {
+            return Ok(Arc::clone(looked_at));
+        }
+        self.deadline.check()?;
+        let find = |budget: &mut Budget| looked_at(mesh, budget);
+        let found = match self.prepared {
+            Some(prepared) => prepared.looked_at(self.budget, find)?,
+            None => Arc::new(find(self.budget)?),
+        };
+        Ok(Arc::clone(self.looked_at.insert(found)))
     }
 
     /// The runs of the mesh's faces, found when a stage first needs them.

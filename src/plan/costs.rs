@@ -34,8 +34,8 @@ pub fn spend_plan(scene: &Scene<'_, '_>, geometry: &Geometry<'_>, budget: &mut B
     budget.spend("materials", mesh.materials.len() as u64, MATERIAL_BYTES)?;
     budget.spend("the picture", width * height, 4)?;
     budget.spend("vertices on screen", vertices, VERTEX_BYTES)?;
-    // One byte more is the pass mask.
-    budget.spend("lists of triangles", triangles, LISTED_BYTES + 1)?;
+    // Two bytes more are the pass mask, and the bits of the side that it shows.
+    budget.spend("lists of triangles", triangles, LISTED_BYTES + 2)?;
     if needed_pass(groups).is_some() {
         // Layers are drawn band by band, so what they take per sample is bounded.
         budget.spend("lists of layers", triangles, LAYERED_BYTES)?;

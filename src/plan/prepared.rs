@@ -21,7 +21,7 @@ pub struct Prepared {
     token: Arc<MeshToken>,
     edges: OnceLock<(Arc<EdgeList>, Vec<Spent>)>,
     orientation: OnceLock<Orientation>,
-    looked_at: OnceLock<Arc<Vec<u32>>>,
+    looked_at: OnceLock<(Arc<Vec<u32>>, Vec<Spent>)>,
     face_runs: OnceLock<(Arc<FaceRuns>, Vec<Spent>)>,
     vertex_normals: Mutex<Option<VertexNormals>>,
     textures: Mutex<Option<PreparedTextures>>,
@@ -68,13 +68,7 @@ impl Prepared {
         budget: &mut Budget,
         find: impl FnOnce(&mut Budget) -> Result<EdgeList, LimitExceeded>,
     ) -> Result<Arc<EdgeList>, LimitExceeded> {
-        if let Some((edges, spent)) = self.edges.get() {
-            budget.spend_again(spent)?;
-            return Ok(Arc::clone(edges));
-        }
-        let (edges, spent) = budget.record(find);
-        let edges = Arc::new(edges?);
-        Ok(Arc::clone(&self.edges.get_or_init(|| (edges, spent)).0))
+        kept(&self.edges, budget, find)
     }
 
     /// The runs of faces, paid for; found by `find` if they are not known.
@@ -83,13 +77,7 @@ impl Prepared {
         budget: &mut Budget,
         find: impl FnOnce(&mut Budget) -> Result<FaceRuns, LimitExceeded>,
     ) -> Result<Arc<FaceRuns>, LimitExceeded> {
-        if let Some((runs, spent)) = self.face_runs.get() {
-            budget.spend_again(spent)?;
-            return Ok(Arc::clone(runs));
-        }
-        let (runs, spent) = budget.record(find);
-        let runs = Arc::new(runs?);
-        Ok(Arc::clone(&self.face_runs.get_or_init(|| (runs, spent)).0))
+        kept(&self.face_runs, budget, find)
     }
 
     /// The edges, if they are known.
@@ -105,12 +93,13 @@ impl Prepared {
         })
     }
 
-    /// The faces that are looked at for the width of lines.
-    pub fn looked_at(&self, find: impl FnOnce() -> Vec<u32>) -> Arc<Vec<u32>> {
-        Arc::clone(self.looked_at.get().unwrap_or_else(|| {
-            let found = Arc::new(find());
-            self.looked_at.get_or_init(|| found)
-        }))
+    /// The faces that are looked at for the width of lines, paid for; found by `find` if they are not known.
+    pub fn looked_at(
+        &self,
+        budget: &mut Budget,
+        find: impl FnOnce(&mut Budget) -> Result<Vec<u32>, LimitExceeded>,
+    ) -> Result<Arc<Vec<u32>>, LimitExceeded> {
+        kept(&self.looked_at, budget, find)
     }
 
     /// Vertex normals for a mesh that brings none, with creases, paid for; found by `find` if those that
@@ -148,7 +137,7 @@ impl Prepared {
         let edges = self.edges.get().map_or(0, |(edges, _)| edges.bytes());
         let normals = self.locked_normals().as_ref().map_or(0, VertexNormals::bytes);
         let textures = self.locked_textures().as_ref().map_or(0, |kept| size_of_val(&kept.textures.texels[..]));
-        let looked_at = self.looked_at.get().map_or(0, |faces| size_of_val(&faces[..]));
+        let looked_at = self.looked_at.get().map_or(0, |(faces, _)| size_of_val(&faces[..]));
         let runs = self.face_runs.get().map_or(0, |(runs, _)| runs.bytes());
         (edges + normals + textures + looked_at + runs) as u64
     }
@@ -160,6 +149,21 @@ impl Prepared {
     fn locked_textures(&self) -> MutexGuard<'_, Option<PreparedTextures>> {
         self.textures.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// What a place keeps, paid for; found by `find`, and kept, if it is empty.
+fn kept<T>(
+    place: &OnceLock<(Arc<T>, Vec<Spent>)>,
+    budget: &mut Budget,
+    find: impl FnOnce(&mut Budget) -> Result<T, LimitExceeded>,
+) -> Result<Arc<T>, LimitExceeded> {
+    if let Some((found, spent)) = place.get() {
+        budget.spend_again(spent)?;
+        return Ok(Arc::clone(found));
+    }
+    let (found, spent) = budget.record(find);
+    let found = Arc::new(found?);
+    Ok(Arc::clone(&place.get_or_init(|| (found, spent)).0))
 }
 
 impl VertexNormals {

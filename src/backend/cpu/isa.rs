@@ -114,8 +114,9 @@ impl Isa {
 
     #[cfg(target_arch = "x86_64")]
     fn avx512() -> Option<Self> {
-        let is_there = Self::avx2().is_some() && std::arch::is_x86_feature_detected!("avx512f");
-        is_there.then_some(Self(Level::Avx512))
+        // Those that AVX-512 implies are named as well.
+        let are_there = are_detected!(["fma" "f16c" "avx512f"]);
+        (Self::avx2().is_some() && are_there).then_some(Self(Level::Avx512))
     }
 
     #[cfg(not(target_arch = "x86_64"))]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::limits::{Deadline, LimitExceeded, Stopped};
+use crate::limits::{Deadline, Stopped};
 use crate::mesh::Mesh;
 use crate::mesh::creases::sharp_cos;
 use crate::mesh::edges::{EdgeList, MeshEdge};
@@ -10,7 +10,7 @@ use crate::plan::context::PlanContext;
 use crate::plan::edges::edge_class::{Class, belongs_to, class_of};
 use crate::plan::lines::auto_width::{AutoWidth, open_edges};
 use crate::plan::peeling::FADE;
-use crate::plan::{Edge, LinePass, Shown, Side};
+use crate::plan::{Edge, LinePass, PlanError, Shown, Side};
 use crate::scene::{MaterialGroups, Scene};
 use crate::spec::color::Rgba;
 use crate::spec::{Hidden, OutlineMethod, Topology, Wire, WireEdges, WireMethod, WireThickness};
@@ -108,7 +108,7 @@ impl LineStyle {
 }
 
 /// The line styles of a scene, in the order in which they are drawn.
-pub fn line_styles(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<LineStyle>, LimitExceeded> {
+pub fn line_styles(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<LineStyle>, PlanError> {
     let mut styles = wire_styles(scene, cx)?;
     styles.extend(scene.spec.topology.iter().flat_map(topology_styles));
     styles.extend(contour_styles(scene));
@@ -128,7 +128,7 @@ fn width(
     wire: &Wire,
     styles: &[bool],
     cx: &mut PlanContext<'_>,
-) -> Result<AutoWidth, LimitExceeded> {
+) -> Result<AutoWidth, PlanError> {
     let are_polygons = wire.edges == WireEdges::Polygons;
     match wire.thickness {
         WireThickness::Given(width_px) => Ok(AutoWidth { width_px, opacity: 1.0 }),
@@ -141,7 +141,7 @@ fn width(
 }
 
 /// Wires of exact width, each style once.
-fn wire_styles(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<LineStyle>, LimitExceeded> {
+fn wire_styles(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<LineStyle>, PlanError> {
     let groups = &scene.groups;
     let mut kinds: Vec<(Wire, Vec<bool>)> = Vec::new();
     for (index, layers) in groups.styles.iter().enumerate() {

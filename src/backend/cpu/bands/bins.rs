@@ -140,8 +140,8 @@ fn is_silhouette(context: &RasterContext<'_>, edge: &Edge, is_closed: bool, tria
     };
     let [first, second] = edge.faces;
     match (side(first), side(second)) {
-        // Faces on one side of an edge run along it the same way where they show the same side, and in
-        // turns where they do not.
+        // Two faces lie on one side of their edge if they show the same side and run along it the same way,
+        // or if they do neither.
         (Some(a), Some(b)) if a != [0, 0] && b != [0, 0] => {
             (a == b) == (!is_closed && runs_along(first) == runs_along(second))
         }

@@ -10,7 +10,8 @@ use super::setups::lane_offsets;
 use super::visibility::Parts;
 use crate::backend::cpu::isa::LANES;
 
-/// Samples in a vector.
+/// Samples in a vector. With one sample per pixel it goes 8 columns beyond a block of large triangles, where
+/// edge functions still fit 32 bits: 2^30, to which they are clamped, and at most 2^29 + 2^28 from there.
 const WIDE: usize = 2 * LANES;
 
 // A vector may begin at the last pixel of a row.

@@ -4,14 +4,12 @@ mod open_edges;
 
 pub use open_edges::open_edges;
 
-use std::sync::Arc;
-
-use crate::limits::LimitExceeded;
+use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::parallel;
-use crate::plan::Projection;
-use crate::plan::context::PlanContext;
+use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::projection::row_dot;
+use crate::plan::{PlanError, Projection};
 use crate::scene::Scene;
 
 /// Share of the faces that lines cover at most, on average over their area on screen.
@@ -62,15 +60,16 @@ impl AutoWidth {
         are_polygons: bool,
         has_lines: impl Fn(usize) -> bool,
         cx: &mut PlanContext<'_>,
-    ) -> Result<Self, LimitExceeded> {
-        // All faces of a mesh may have the same hash.
-        cx.budget.spend("the width of lines", scene.mesh.triangles.len() as u64, 4)?;
-        let looked_at = match cx.prepared {
-            Some(prepared) => prepared.looked_at(|| looked_at(scene.mesh)),
-            None => Arc::new(looked_at(scene.mesh)),
-        };
-        let with_lines = looked_at.iter().map(|&face| face as usize).filter(|&face| has_lines(face));
-        Ok(Self::around(&FaceSizes::of(scene, are_polygons, with_lines)))
+    ) -> Result<Self, PlanError> {
+        let looked_at = cx.looked_at(scene.mesh)?;
+        let view = View::new(scene, are_polygons);
+        let mut sizes = FaceSizes([0; CLASSES]);
+        for faces in looked_at.chunks(CHECK_EVERY) {
+            cx.deadline.check()?;
+            let faces = faces.iter().map(|&face| face as usize);
+            sizes.add(&view, faces.filter(|&face| has_lines(face)));
+        }
+        Ok(Self::around(&sizes))
     }
 
     /// The lines around faces of these sizes.
@@ -93,16 +92,24 @@ impl AutoWidth {
 }
 
 /// The faces of a mesh that are looked at, in order. They are about [`LOOKED_AT`] to twice as many, unless
-/// an unlucky mesh has equal hashes.
-fn looked_at(mesh: &Mesh) -> Vec<u32> {
+/// an unlucky mesh has equal hashes: so they are counted first, and paid for.
+pub fn looked_at(mesh: &Mesh, budget: &mut Budget) -> Result<Vec<u32>, LimitExceeded> {
     let count = mesh.triangles.len();
     // One in so many faces, a power of two.
     let one_in = 1_u64 << (count / LOOKED_AT).max(1).ilog2();
-    let chunk = |first: usize| -> Vec<u32> {
+    let picked = |first: usize| {
         let faces = first..count.min(first + CHUNK);
-        faces.filter(|&face| hash_of(mesh, face).is_multiple_of(one_in)).map(|face| face as u32).collect()
+        faces.filter(|&face| hash_of(mesh, face).is_multiple_of(one_in))
     };
-    parallel::map((0..count).step_by(CHUNK).collect(), chunk).concat()
+    let firsts = || (0..count).step_by(CHUNK);
+    let counts = parallel::map(firsts().collect(), |first| picked(first).count());
+    budget.spend("the width of lines", counts.iter().sum::<usize>() as u64, 2 * 4)?;
+    let collect = |(first, count)| {
+        let mut faces = Vec::with_capacity(count);
+        faces.extend(picked(first).map(|face| face as u32));
+        faces
+    };
+    Ok(parallel::map(firsts().zip(counts).collect(), collect).concat())
 }
 
 /// A number from the places of a face's corners, the same for any order of them.
@@ -120,14 +127,11 @@ fn hash_of(mesh: &Mesh, face: usize) -> u64 {
 struct FaceSizes([u64; CLASSES]);
 
 impl FaceSizes {
-    /// Faces with a corner behind the near plane or the centre outside the picture are left out.
-    fn of(scene: &Scene<'_, '_>, are_polygons: bool, faces: impl Iterator<Item = usize>) -> Self {
-        let view = View::new(scene, are_polygons);
-        let mut sizes = Self([0; CLASSES]);
+    /// Adds faces but those with a corner behind the near plane or the centre outside the picture.
+    fn add(&mut self, view: &View<'_>, faces: impl Iterator<Item = usize>) {
         for [area, diameter] in faces.filter_map(|face| view.size_of(face)) {
-            sizes.0[class_of(diameter)] += (area * 256.0).round() as u64;
+            self.0[class_of(diameter)] += (area * 256.0).round() as u64;
         }
-        sizes
     }
 
     /// The share of the faces that lines of a width cover, 0 to 1; 0 if there are none.

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::edges::face_runs::FaceRuns;
-use crate::plan::edges::select::{map_indices, select_by};
+use crate::plan::edges::select::{map, map_indices, select_by};
 use crate::plan::outline::EdgeEnd;
 use crate::plan::outline::silhouette_edges::ScreenMesh;
 use crate::plan::outline::sort::sort;
@@ -43,7 +43,7 @@ struct Arc {
 
 impl VertexOcclusion {
     /// The occlusion around the vertices of `ends`, which are sorted by vertex. Sets
-    /// [`EdgeEnd::is_hidden`] of each end.
+    /// [`EdgeEnd::is_hidden`] of each end at a vertex with a quad.
     pub fn around(ends: &mut [EdgeEnd], view: &ScreenMesh<'_>, cx: &mut PlanContext<'_>) -> Result<Self, PlanError> {
         if ends.is_empty() {
             return Ok(Self::default());
@@ -119,7 +119,7 @@ impl Arc {
 fn arcs(ends: &[EdgeEnd], view: &ScreenMesh<'_>, cx: &mut PlanContext<'_>) -> Result<Vec<Arc>, PlanError> {
     let words = view.mesh.positions.len().div_ceil(64);
     cx.budget.spend("an outline's corners", words as u64, 8)?;
-    cx.budget.spend("an outline's corners", view.runs.runs.len() as u64, 4)?;
+    cx.budget.spend("an outline's corners", view.runs.runs.len() as u64, 1 + 4)?;
     let mut has_end = vec![0_u64; words];
     let mut near_ends = Neighbourhood::default();
     for end in ends.iter().filter(|end| end.outer.is_some()) {
@@ -127,9 +127,9 @@ fn arcs(ends: &[EdgeEnd], view: &ScreenMesh<'_>, cx: &mut PlanContext<'_>) -> Re
         near_ends.add(view.mesh.positions[end.vertex as usize]);
     }
     let is_listed = |v: u32| has_end[v as usize / 64] >> (v % 64) & 1 == 1;
-    let mut runs = Vec::with_capacity(view.runs.runs.len());
-    let all = view.runs.runs.iter().zip(0_u32..);
-    runs.extend(all.filter(|(run, _)| near_ends.meets(&run.bounds)).map(|(_, r)| r));
+    let is_near = map(&view.runs.runs, cx.deadline, |run| u8::from(near_ends.meets(&run.bounds)))?;
+    let mut runs = Vec::with_capacity(is_near.len());
+    runs.extend(is_near.iter().zip(0_u32..).filter(|(is_near, _)| **is_near == 1).map(|(_, r)| r));
     let corners = select_by("an outline's corners", [runs.len(), RUNS], cx, |range, found| {
         for face in runs[range].iter().flat_map(|&r| FaceRuns::faces(r as usize, view.mesh.triangles.len())) {
             let triangle = view.mesh.triangles[face];

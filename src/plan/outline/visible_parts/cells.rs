@@ -55,7 +55,7 @@ impl Cells {
     pub fn each_row<const N: usize>(&self, corners: &[[f64; 2]; N], mut each: impl FnMut(usize, usize, usize)) {
         let [[left, top], [right, bottom]] = self.around(corners);
         for row in top..=bottom {
-            let (from, to) = if right - left <= 1 || top == bottom { (left, right) } else { self.across(corners, row) };
+            let (from, to) = if right <= left + 1 || top == bottom { (left, right) } else { self.across(corners, row) };
             each(row, from, to);
         }
     }

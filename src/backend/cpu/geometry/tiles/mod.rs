@@ -38,7 +38,7 @@ impl Tiles {
         let samples = TILE * band.samples as usize;
         for (y, row) in band.depth.chunks_exact(band.stride).take(band.rows as usize).enumerate() {
             let mins = &mut tiles.depth_min[y / TILE * tiles.columns..][..tiles.columns];
-            // What lies beyond the last pixel has depth 0, so the last tile may count as empty.
+            // What lies beyond the last pixel may have any depth. It can only make the last tile farther.
             for (min, depths) in mins.iter_mut().zip(row.chunks(samples)) {
                 *min = min.min(smallest(depths));
             }

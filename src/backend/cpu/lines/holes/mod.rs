@@ -74,7 +74,7 @@ impl Holes {
 
     /// Bytes of a row.
     pub fn row_bytes(width_px: u32) -> usize {
-        width_px as usize * size_of::<u32>() + (width_px as usize).div_ceil(64) * size_of::<u64>()
+        width_px as usize * size_of::<u32>() + 2 * (width_px as usize).div_ceil(64) * size_of::<u64>()
     }
 
     /// No holes: every pixel gets strokes.
@@ -95,6 +95,9 @@ impl Holes {
         self.stroked.clear();
         self.stroked.reserve_exact(self.row_words * rows);
         self.stroked.resize(self.row_words * rows, 0);
+        // As much, for a simple sum. What is not touched takes no memory.
+        self.stroked_coarse.clear();
+        self.stroked_coarse.reserve_exact(self.row_words * rows);
     }
 
     /// The index of a pixel that is shown.
