@@ -278,9 +278,9 @@ mod tests {
                 (axis.x * x + axis.y * y) + axis.z * z
             };
             let most = |of: &dyn Fn(&[f32; 3]) -> f64| positions.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
-            for k in 0..3 {
-                assert_eq!(all.high[k], most(&|p| along(axes[k], p)));
-                assert_eq!(all.low[k], -most(&|p| -along(axes[k], p)));
+            for (k, &axis) in axes.iter().enumerate() {
+                assert_eq!(all.high[k], most(&|p| along(axis, p)));
+                assert_eq!(all.low[k], -most(&|p| -along(axis, p)));
             }
             for k in 0..2 {
                 assert_eq!(all.plus[k], most(&|p| along(axes[k], p) + slopes[k] * along(axes[2], p)));

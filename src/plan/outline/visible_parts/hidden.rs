@@ -25,8 +25,8 @@ pub fn hidden_range(face: &ScreenFace, edge: &ScreenEdge, vertices: [u32; 2], ti
     let sides = Sides::of(face);
     let at = [sides.values([ends[0][0], ends[0][1]]), sides.values([ends[1][0], ends[1][1]])];
     let mut range = [0.0, 1.0];
-    for k in 0..3 {
-        let beside = BESIDE * sides.lengths[k];
+    for (k, length) in sides.lengths.iter().enumerate() {
+        let beside = BESIDE * length;
         narrow(&mut range, at[0][k] + beside, at[1][k] + beside)?;
     }
     let nearer = range.map(|t| {
