@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::PlanError;
 use super::edges::face_runs::FaceRuns;
 use super::edges::silhouettes::Silhouettes;
-use super::lines::auto_width::looked_at;
+use super::lines::picked_faces::looked_at;
 use super::prepared::Prepared;
 use super::skips::{SkipKind, Skips};
 use crate::limits::{Budget, Deadline};

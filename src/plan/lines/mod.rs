@@ -2,6 +2,7 @@
 
 pub(crate) mod auto_width;
 pub(crate) mod build;
+pub(crate) mod picked_faces;
 pub(crate) mod styles;
 
 pub use crate::mesh::edges::Edge;
