@@ -151,7 +151,7 @@ impl Prepared {
     }
 }
 
-/// What a place keeps, paid for; found by `find`, and kept, if it is empty.
+/// The content of a place, paid for; found by `find`, and kept, if there is none.
 fn kept<T>(
     place: &OnceLock<(Arc<T>, Vec<Spent>)>,
     budget: &mut Budget,

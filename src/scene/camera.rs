@@ -32,7 +32,7 @@ pub struct Camera {
     pub far: f64,
     /// True if all of the mesh lies safely between `near` and the guard band.
     pub contains_mesh: bool,
-    /// How far the mesh reaches from the picture's middle, as shares of half its width and height: an
+    /// The mesh's reach from the picture's middle, as shares of half its width and height: an
     /// upper limit, apart from rounding. Infinite where the mesh is not wholly before the eye.
     pub reach: DVec2,
 }
