@@ -37,6 +37,14 @@ struct Frame {
     normal_triangles_at: u32,
     uv_triangles_at: u32,
     color_triangles_at: u32,
+    // Occlusion: src/plan/occlusion.rs explains it. To places, and how strong it is.
+    occlusion_depth: vec4<f32>,
+    // Width of a pixel, then which places, and which depths, may be of one surface.
+    occlusion_spread: vec4<f32>,
+    // Places that pixels look at, columns in the low halves.
+    taps: array<vec4<u32>, 16>,
+    // 1 / radius^2, in x.
+    occlusion_reach: vec4<f32>,
 };
 
 // Parameters of a dispatch: its triangles, vertices or edges, and the rows of the picture that the
@@ -134,6 +142,8 @@ const CONTOURS: u32 = 16384u;
 // Holes in faces tell what a line pass covers.
 const HOLED: u32 = 32768u;
 const PASS_MASKS: u32 = 0x100000u;
+// Hollows go without some of the light.
+const OCCLUSION: u32 = 0x200000u;
 const HULL_MATERIALS: u32 = 0x400000u;
 const PEELING: u32 = 0x800000u;
 const BEHIND_SURFACE: u32 = 0x1000000u;
@@ -235,6 +245,19 @@ fn rsqrt(v: f32) -> f32 {
 // To the nearest integer, ties to even, for |v| < 2^22.
 fn round_to_i32(v: f32) -> i32 {
     return bitcast<i32>(rn(v + 12582912.0)) - 0x4B400000;
+}
+
+// Share of the brightest value below which light is shown as it is.
+const SHOULDER: f32 = 0.8;
+
+// Values of light that are shown: as they are up to the shoulder, and above it nearing `white`.
+fn rolled_off(v: vec3<f32>, white: f32) -> vec3<f32> {
+    let start = rn(SHOULDER * white);
+    let room = white - start;
+    let over = max(v - start, vec3(0.0));
+    let sum = max(room + over, vec3(1e-30));
+    let inverse = vec3(quick_recip(sum.x), quick_recip(sum.y), quick_recip(sum.z));
+    return min(max(v, vec3(0.0)), vec3(start)) + rn3(rn3(room * over) * inverse);
 }
 
 // row . (p, 1)

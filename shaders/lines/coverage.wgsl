@@ -180,5 +180,5 @@ fn shown(in_base: u32, sample: u32) -> f32 {
 
 // A premultiplied colour under light (A, B).
 fn lit_color(c: vec4<f32>, light: vec2<f32>) -> vec4<f32> {
-    return vec4(clamp(rn3(c.xyz * light.x) + rn(light.y * c.w), vec3(0.0), vec3(c.w)), c.w);
+    return vec4(rolled_off(rn3(c.xyz * light.x) + rn(light.y * c.w), c.w), c.w);
 }

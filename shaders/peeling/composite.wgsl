@@ -25,7 +25,7 @@ fn composite(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgro
         flag_pending(u32(sample_count()) * i, u32(sample_count()));
         return;
     }
-    let show = Show(!has(WIRES_ONLY), select(frame.layer_fade, 1.0, batch.layer == 0u));
+    let show = Show(!has(WIRES_ONLY), select(frame.layer_fade, 1.0, batch.layer == 0u), 1.0);
     if sample_count() == 1 {
         accumulate(i, group_color(single_sample_group(take_layer(i)), pixel, show));
         flag_pending(i, 1u);

@@ -9,9 +9,14 @@ struct Light {
     gloss: f32,
 };
 
-// A colour with straight alpha under light, clamped to 1.
+// A colour with straight alpha under light.
 fn lit(base: vec4<f32>, light_here: Light) -> vec4<f32> {
-    return vec4(clamp(rn3(base.xyz * light_here.gain) + light_here.gloss, vec3(0.0), vec3(1.0)), base.w);
+    return vec4(rolled_off(rn3(base.xyz * light_here.gain) + light_here.gloss, 1.0), base.w);
+}
+
+// A colour as it is, clamped to 1.
+fn unlit(base: vec4<f32>) -> vec4<f32> {
+    return vec4(clamp(base.xyz, vec3(0.0), vec3(1.0)), base.w);
 }
 
 // Light on a surface with unit normal n.

@@ -54,6 +54,8 @@ struct Show {
     fill: bool,
     // Opacity of the wires, 0 to 1.
     wires: f32,
+    // Share of the light that reaches it, 0 to 1.
+    open: f32,
 };
 
 // Premultiplied linear RGBA of surface triangle `id` at a point, in 1/256 px from the picture's
@@ -64,12 +66,12 @@ fn point_color(id: u32, at: vec2<f32>, show: Show) -> vec4<f32> {
         return varying_color(id, at, m, show);
     }
     let base = with_alpha(m, materials[m].base_color, show);
-    var light_here = Light(1.0, 0.0);
+    var shown = unlit(base);
     if (materials[m].flags & MATERIAL_FACE_NORMALS) != 0u {
         let normal = turned_to_viewer(face_normal(id), is_front(id, at));
-        light_here = light(materials[m].metallic, materials[m].roughness, normal);
+        shown = lit(base, dimmed(light(materials[m].metallic, materials[m].roughness, normal), show.open));
     }
-    return premultiplied(lit(base, light_here), materials[m].emissive);
+    return premultiplied(shown, materials[m].emissive);
 }
 
 fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
@@ -112,7 +114,7 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
                 n = normal_mapped(id, m, b.front, uv, n);
             }
         }
-        light_here = light(gloss.y, gloss.x, n);
+        light_here = dimmed(light(gloss.y, gloss.x, n), show.open);
     }
     var emissive = materials[m].emissive;
     if has(TEXTURES) {
@@ -121,7 +123,19 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
     if has(WIRE_LIT) && (flags & MATERIAL_WIRE_LIT) != 0u {
         return lit_wire(cover, wire, base, light_here, emissive);
     }
-    return over(cover, wire, premultiplied(lit(base, light_here), emissive));
+    var shown = unlit(base);
+    if (flags & MATERIAL_LIT) != 0u {
+        shown = lit(base, light_here);
+    }
+    return over(cover, wire, premultiplied(shown, emissive));
+}
+
+// The same light where only a share of it is there.
+fn dimmed(whole: Light, open: f32) -> Light {
+    if has(OCCLUSION) {
+        return Light(rn(whole.gain * open), rn(whole.gloss * open));
+    }
+    return whole;
 }
 
 fn material_index(id: u32) -> u32 {
@@ -159,7 +173,7 @@ fn lit_wire(cover: f32, wire: vec4<f32>, base: vec4<f32>, light_here: Light, emi
     let painted = over(cover, wire, vec4(rn3(base.xyz * base.w), base.w));
     let left = rn(base.w * (1.0 - rn(cover * wire.w)));
     let lit = rn3(painted.xyz * light_here.gain) + rn(painted.w * light_here.gloss);
-    return vec4(clamp(lit, vec3(0.0), vec3(max(painted.w, 0.0))) + rn3(emissive * left), painted.w);
+    return vec4(rolled_off(lit, max(painted.w, 0.0)) + rn3(emissive * left), painted.w);
 }
 
 fn over(cover: f32, top: vec4<f32>, under: vec4<f32>) -> vec4<f32> {

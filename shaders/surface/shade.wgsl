@@ -16,8 +16,9 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
     }
     let pixel = vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width);
     if sample_count() == 1 {
-        let id = triangle_of_sample(first_visibility_sample(i));
-        var color = group_color(single_sample_group(id), pixel, surface_show(id));
+        let sample = first_visibility_sample(i);
+        let id = triangle_of_sample(sample);
+        var color = group_color(single_sample_group(id), pixel, surface_show(id, pixel, sample, 0u));
         if has(PEELING) {
             color = peel_state[i].color + rn4((1.0 - peel_state[i].color.w) * color);
         }
@@ -40,11 +41,12 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
     while left != 0u {
         let group = first_group(in_base, left);
         left &= ~group.same;
+        let show = surface_show(group.id, pixel, in_base, firstTrailingBit(group.same));
         var weight = f32(group.count);
         if has(PEELING) {
             weight = uncovered(first, group.same);
         }
-        sum += rn4(rn(share * weight) * group_color(group, pixel, surface_show(group.id)));
+        sum += rn4(rn(share * weight) * group_color(group, pixel, show));
     }
     colors[i] = sum;
 }
@@ -60,16 +62,25 @@ fn uncovered(first: u32, same: u32) -> f32 {
     return sum;
 }
 
+fn depth_of_sample(sample: u32) -> f32 {
+    return bitcast<f32>(samples[sample].y);
+}
+
 fn triangle_of_sample(sample: u32) -> u32 {
     let word = samples[sample];
     return select(~word.x, NOTHING, word.y == 0u);
 }
 
-// Parts of its material that a surface triangle shows: no wires where the peeled layers show them.
-fn surface_show(id: u32) -> Show {
+// Parts of its material that a surface triangle shows: no wires where the peeled layers show them. Its
+// first sample is number s of a pixel, whose first is at `in_base`.
+fn surface_show(id: u32, pixel: vec2<i32>, in_base: u32, s: u32) -> Show {
+    var show = Show(true, 1.0, 1.0);
+    if has(OCCLUSION) && id < frame.triangle_count {
+        show.open = open_share(pixel, depth_of_sample(in_base + s), depth_of_sample(in_base));
+    }
     if has(WIRES_ONLY) && id < frame.triangle_count {
         let mask = pass_masks[id / 4u] >> (8u * (id & 3u));
-        return Show(true, select(1.0, 0.0, (mask & PASS_LAYER) != 0u));
+        show.wires = select(1.0, 0.0, (mask & PASS_LAYER) != 0u);
     }
-    return Show(true, 1.0);
+    return show;
 }

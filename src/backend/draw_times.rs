@@ -13,6 +13,8 @@ pub enum DrawStage {
     FaceColors,
     /// Triangles into samples.
     Visibility,
+    /// Depths to the light that hollows go without.
+    Occlusion,
     /// Samples to colours; where no line is drawn over faces of one colour each, to bytes too.
     Shade,
     /// Edges over colours.
@@ -23,8 +25,16 @@ pub enum DrawStage {
 
 impl DrawStage {
     /// All of them, in order.
-    pub const ALL: [Self; 7] =
-        [Self::Transform, Self::Sort, Self::FaceColors, Self::Visibility, Self::Shade, Self::Lines, Self::Resolve];
+    pub const ALL: [Self; 8] = [
+        Self::Transform,
+        Self::Sort,
+        Self::FaceColors,
+        Self::Visibility,
+        Self::Occlusion,
+        Self::Shade,
+        Self::Lines,
+        Self::Resolve,
+    ];
 
     /// The word used in reports.
     pub fn name(self) -> &'static str {
@@ -33,6 +43,7 @@ impl DrawStage {
             Self::Sort => "sort",
             Self::FaceColors => "face_colors",
             Self::Visibility => "visibility",
+            Self::Occlusion => "occlusion",
             Self::Shade => "shade",
             Self::Lines => "lines",
             Self::Resolve => "resolve",

@@ -14,12 +14,14 @@ use super::cpu::geometry::transform::{GUARD, OUTSIDE, ScreenVertex};
 use super::cpu::geometry::{clip, samples};
 use super::cpu::lines::holes::{self, inset};
 use super::cpu::lines::{coverage, hidden_lines, segment, stroke};
-use super::cpu::surface::texture;
+use super::cpu::occlusion;
+use super::cpu::surface::{light, texture};
 use super::gpu::params::{Batch, FACES_BACK, FACES_BOTH, FACES_FRONT, Frame, OWN_TRIANGLES, line_flags};
 use super::gpu::pipelines::{Access, Kernel, SampleTarget, SampleWrite, Slot, key};
 use super::gpu::schedule::sizes::{PEEL_STATE_BYTES, STROKES_BYTES, WORK_HEAD_BYTES, WORK_ITEM_BYTES};
 use super::gpu::schedule::{PIECES_MAX, WORKGROUP, line_shares, tiles};
 use super::sample_partition::{GENERATORS, POINTS};
+use crate::plan::occlusion::TAPS_PER_PIXEL;
 use crate::plan::{
     Edge, HullVertex, LinePass, ShadedMaterial, Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
 };
@@ -39,7 +41,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     }
     // Pipeline key.
     add_same!("", key: SURFACE HULL FACE_NORMALS VERTEX_NORMALS WIRES TRIANGLE_MATERIALS EDGE_MASKS LINES CLIPPED
-        EIGHT_SAMPLES SIXTEEN_SAMPLES FOUR_SAMPLES LIT_LINES CONTOURS HOLED PASS_MASKS HULL_MATERIALS PEELING BEHIND_SURFACE
+        EIGHT_SAMPLES SIXTEEN_SAMPLES FOUR_SAMPLES LIT_LINES CONTOURS HOLED PASS_MASKS OCCLUSION HULL_MATERIALS PEELING BEHIND_SURFACE
         WIRES_ONLY PEELED_HULL DERIVATIVE_NORMALS VERTEX_COLORS UVS TEXTURES WIRE_MINIMUM WIRE_LIT DEBUG VARYING);
     // Line flags, pass masks, faces.
     add_same!("", line_flags: SHOWN_VISIBLE SHOWN_HIDDEN SKIP_BACK CONTOUR LIT_PASS FIRST_PASS INSIDE_OUT HOLES
@@ -85,6 +87,10 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("MARKED" = holes::MARKED, "STROKED" = holes::STROKED, "CROSSING_PX" = holes::CROSSING_PX);
     add!("FACES_MAX" = holes::FACES_MAX, "HOLE_UNIT" = inset::HOLE_UNIT);
     add!("INSIDE" = inset::INSIDE, "NARROW_PX" = inset::NARROW_PX, "LEVEL_PX" = inset::LEVEL_PX);
+    // Occlusion.
+    add!("NOWHERE" = occlusion::grid::NOWHERE, "BIAS" = occlusion::gather::BIAS, "GAIN" = occlusion::gather::GAIN);
+    add!("SHOULDER" = light::SHOULDER);
+    add!("TAPS_PER_PIXEL" = TAPS_PER_PIXEL);
     // Sample offsets, a nibble each.
     let nibbles = |samples: u32, axis: usize, from: usize| {
         let offsets = sample_offsets(samples).iter().skip(from).take(8);
@@ -121,7 +127,7 @@ const SHADER_ONLY: &[&str] = &[
 /// Every kernel in each of its variants.
 fn kernels() -> Vec<Kernel> {
     let mut all =
-        vec![Kernel::Transform, Kernel::Clip, Kernel::Composite, Kernel::Shade, Kernel::Edge, Kernel::Coverage];
+        vec![Kernel::Transform, Kernel::Clip, Kernel::Grid, Kernel::Gather, Kernel::Composite, Kernel::Shade, Kernel::Edge, Kernel::Coverage];
     all.extend([Kernel::Holes, Kernel::LineLight, Kernel::Resolve]);
     for write in [SampleWrite::Both, SampleWrite::Depth, SampleWrite::Id] {
         for target in [SampleTarget::Visibility, SampleTarget::Layer] {
@@ -200,6 +206,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 x_row y_row z_row w_row screen_up screen_right to_viewer lamps halfways background hull_color near_w
                 ambient lamp_count zero width height triangle_count vertex_count masks_at material_count layer_fade
                 hull_color_count image_count normal_triangles_at uv_triangles_at color_triangles_at
+                occlusion_depth occlusion_spread taps occlusion_reach
             }),
         ),
         (

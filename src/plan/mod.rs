@@ -17,6 +17,7 @@ mod geometry;
 pub(crate) mod heat;
 mod lines;
 mod margin;
+pub(crate) mod occlusion;
 mod outline;
 mod peeling;
 mod prepared;
@@ -32,6 +33,7 @@ mod warnings;
 pub use crate::texture::{Texture, TextureError, Textures};
 pub use build::{build, build_from, build_keeping};
 pub use error::PlanError;
+pub use occlusion::{OcclusionPass, TAPS};
 pub use lines::{Edge, LinePass, Shown, Side};
 pub use outline::{HullPass, HullVertex};
 pub use peeling::{PeelingPass, pass_mask};
@@ -78,6 +80,8 @@ pub struct DrawPlan<'a> {
     pub projection: Projection,
     /// The surface, filled or only hiding lines; None where a request has neither.
     pub surface: Option<SurfacePass<'a>>,
+    /// The light that does not reach the bottom of the surface's hollows; None where nothing is dimmed.
+    pub occlusion: Option<OcclusionPass>,
     /// Transparent layers over the surface; None where nothing shines through.
     pub peeling: Option<PeelingPass>,
     /// The outline around the surface; None where a request has none.
@@ -125,6 +129,7 @@ impl<'a> DrawPlan<'a> {
             pass_masks: Cow::Borrowed(&[]),
             projection,
             surface: None,
+            occlusion: None,
             peeling: None,
             hull: None,
             lines: Vec::new(),

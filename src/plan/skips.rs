@@ -43,6 +43,8 @@ pub enum SkipKind {
     Clipping,
     /// Visibility samples beyond the picture.
     Margin,
+    /// The light that hollows go without.
+    Occlusion,
 }
 
 impl SkipKind {
@@ -62,6 +64,7 @@ impl SkipKind {
         Self::Adjacency,
         Self::Clipping,
         Self::Margin,
+        Self::Occlusion,
     ];
 }
 
@@ -82,6 +85,7 @@ impl fmt::Display for SkipKind {
             Self::Adjacency => "adjacency",
             Self::Clipping => "clipping",
             Self::Margin => "samples beyond the picture",
+            Self::Occlusion => "occlusion",
         })
     }
 }

@@ -61,7 +61,7 @@ impl Draft {
             time_s: None,
             camera: CameraSpec::default(),
             sheet: None,
-            light: Light::default(),
+            light: Light { ambient_occlusion: style.ambient_occlusion(), ..Light::default() },
             ambient: Dependent::default(),
             image,
             // The default size must not be larger than what a request may ask for.

@@ -54,6 +54,7 @@ impl LayersDraft {
             Style::Wireframe => (None, wire, None),
             Style::Outline => (surface(Shading::Smooth), None, Some(Outline::default())),
             Style::HiddenLine => (white(), wire, None),
+            Style::Clay => (clay(), None, None),
             Style::Technical => (surface(Shading::Smooth), Some(feature_edges()), Some(contour())),
         };
         let hidden = if style == Style::Wireframe { Hidden::Fade } else { Hidden::Hide };
@@ -91,6 +92,13 @@ impl LayersDraft {
         }
         Ok(Layers { surface: self.surface, wire, outline: self.outline })
     }
+}
+
+/// The surface of [`Style::Clay`].
+fn clay() -> Option<Surface> {
+    let color = Some(Rgba([0.62, 0.56, 0.50, 1.0]));
+    let (metallic, roughness) = (Some(0.0), Some(1.0));
+    Some(Surface { color, metallic, roughness, emissive: Some(Rgba::BLACK), textures: false, ..Surface::default() })
 }
 
 /// The lines of [`Style::Technical`]: 1 px wide.

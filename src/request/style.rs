@@ -25,5 +25,19 @@ word_enums! {
         Topology = "topology",
         /// Smooth surface, feature edges and a contour, as in a technical drawing.
         Technical = "technical",
+        /// The bare form: one matt colour for all materials, and strong occlusion.
+        Clay = "clay",
+    }
+}
+
+impl Style {
+    /// Default of [`Light::ambient_occlusion`](crate::spec::Light::ambient_occlusion): looks that show a mesh
+    /// at its best have it, and the techniques that go by name stay as they are known.
+    pub fn ambient_occlusion(self) -> f32 {
+        match self {
+            Self::Clay => 1.0,
+            Self::Auto | Self::Outline | Self::Technical => 0.6,
+            _ => 0.0,
+        }
     }
 }

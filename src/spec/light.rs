@@ -9,6 +9,8 @@ word_enums! {
         Headlight = "headlight",
         /// Key, fill and rim lamps as in a studio; they turn with the camera.
         ThreePoint = "three-point",
+        /// Soft light from all sides of a photographer's tent, most of it from the left and above.
+        Studio = "studio",
         /// No lamps: ambient light alone.
         None = "none",
     }
@@ -26,10 +28,12 @@ pub struct Light {
     pub intensity: f32,
     /// Share of light that comes from everywhere, 0 to 1.
     pub ambient: f32,
+    /// Share of the light that the bottom of a deep hollow goes without, 0 to 1.
+    pub ambient_occlusion: f32,
 }
 
 impl Default for Light {
     fn default() -> Self {
-        Self { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3 }
+        Self { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3, ambient_occlusion: 0.0 }
     }
 }

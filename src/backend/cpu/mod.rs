@@ -15,6 +15,7 @@ mod deadline_poll;
 pub(super) mod geometry;
 mod isa;
 pub(super) mod lines;
+pub(super) mod occlusion;
 mod peeling;
 mod resolve;
 mod stopwatch;
@@ -24,6 +25,7 @@ mod vector;
 
 pub use isa::Isa;
 pub use threads::DrawingThreads;
+use threads::Share;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -33,6 +35,7 @@ use rayon::prelude::*;
 use self::bands::bins::Bins;
 use self::bands::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, ScratchPool};
 use self::isa::LANES;
+use self::occlusion::Occlusion;
 use self::resolve::SrgbEncoder;
 use self::stopwatch::Stopwatch;
 use self::surface::flat::FlatColors;
@@ -40,10 +43,19 @@ use super::{BackendKind, DrawError, DrawStage, DrawTimes, Renderer};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::image::Image;
 use crate::limits::Deadline;
-use crate::plan::DrawPlan;
+use crate::plan::{DrawPlan, OcclusionPass};
 
 /// Vertices or triangles handed to a thread at a time.
 const CHUNK: usize = 8192;
+
+/// Result of a run over all bands.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Goal {
+    /// The picture.
+    Picture,
+    /// Samples alone.
+    Samples,
+}
 
 /// Draws on the CPU. Keeps its buffers from picture to picture.
 pub struct CpuRenderer {
@@ -53,6 +65,7 @@ pub struct CpuRenderer {
     scratch: ScratchPool,
     srgb: SrgbEncoder,
     flat: FlatColors,
+    occlusion: Occlusion,
     /// Of the last picture.
     draw_times: DrawTimes,
     /// True if no shortcuts are taken.
@@ -70,6 +83,8 @@ pub struct RasterContext<'a> {
     srgb: &'a SrgbEncoder,
     /// The colour of each triangle, where every material is flat.
     flat: Option<&'a FlatColors>,
+    /// The light that pixels go without, where they do.
+    occlusion: Option<(&'a OcclusionPass, &'a Occlusion)>,
     /// As [`CpuRenderer::plain`].
     is_plain: bool,
 }
@@ -101,6 +116,7 @@ impl CpuRenderer {
             scratch: ScratchPool::default(),
             srgb: SrgbEncoder::new(),
             flat: FlatColors::default(),
+            occlusion: Occlusion::default(),
             draw_times: DrawTimes::default(),
             is_plain: false,
         }
@@ -133,6 +149,7 @@ impl CpuRenderer {
             watch,
             srgb: &self.srgb,
             flat: None,
+            occlusion: None,
             is_plain: self.is_plain,
         }
     }
@@ -143,7 +160,7 @@ impl CpuRenderer {
         &mut self,
         plan: &DrawPlan<'_>,
         deadline: &Deadline,
-        out: &mut [T],
+        (goal, out): (Goal, &mut [T]),
         each: impl Fn(&RasterContext<'_>, &mut BandScratch, &Bins, usize, &mut [T]) + Sync + Send,
     ) -> Result<(), DrawError> {
         deadline.check()?;
@@ -155,6 +172,7 @@ impl CpuRenderer {
         self.transform(plan, pool);
         lap.end(DrawStage::Transform);
         let mut flat = std::mem::take(&mut self.flat);
+        let mut occlusion = std::mem::take(&mut self.occlusion);
         let mut context = self.context(plan, deadline, &watch);
         // As many bands at once as were paid for, or fewer.
         let mut banding = Banding::new(plan, threads.count());
@@ -166,6 +184,11 @@ impl CpuRenderer {
                 context.flat = Some(&flat);
                 lap.end(DrawStage::FaceColors);
             }
+            if let (Some(pass), true) = (&plan.occlusion, goal == Goal::Picture) {
+                self.find_occlusion(&context, pass, &mut occlusion, (&share, banding, &bins));
+                context.occlusion = Some((pass, &occlusion));
+                lap.end(DrawStage::Occlusion);
+            }
             let row_len = out.len() / plan.height_px as usize;
             let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
             share.run(banding.at_once, items, |(band, out)| {
@@ -174,11 +197,33 @@ impl CpuRenderer {
                 }
             });
         });
-        self.flat = flat;
+        (self.flat, self.occlusion) = (flat, occlusion);
         self.draw_times = watch.times(lap.restart());
         self.trim();
         drawn?;
         Ok(deadline.check()?)
+    }
+
+    /// Draws the depths of all bands, and finds what light their pixels go without.
+    fn find_occlusion(
+        &self,
+        context: &RasterContext<'_>,
+        pass: &OcclusionPass,
+        occlusion: &mut Occlusion,
+        (share, banding, bins): (&Share<'_>, Banding, &Bins),
+    ) {
+        let plan = context.plan;
+        occlusion.grid.reset(pass, [plan.width_px, plan.height_px]);
+        let (shape, stride) = (occlusion.grid.shape(), occlusion.grid.stride());
+        let rows = occlusion.grid.picture_mut().chunks_mut(stride * banding.rows as usize).enumerate();
+        share.run(banding.at_once, rows, |(band, out)| {
+            if context.deadline.check().is_ok() {
+                self.scratch.with(plan, banding, |scratch| {
+                    bands::write_places(context, pass, (scratch, bins, band), shape, out);
+                });
+            }
+        });
+        occlusion.find(context, pass, share.pool());
     }
 
     /// Frees buffers that are too large to keep for another picture.
@@ -186,6 +231,9 @@ impl CpuRenderer {
         self.scratch.trim();
         if self.vertices.capacity() * size_of::<ScreenVertex>() > KEPT_BYTES_MAX {
             self.vertices = Vec::new();
+        }
+        if self.occlusion.allocated() > KEPT_BYTES_MAX {
+            self.occlusion = Occlusion::default();
         }
         if self.flat.bytes() > KEPT_BYTES_MAX {
             self.flat = FlatColors::default();
@@ -195,7 +243,8 @@ impl CpuRenderer {
     /// Memory that drawing the plan takes beside what grows with its mesh, bytes. On all threads,
     /// so that no refusal depends on what else is drawn.
     pub fn bands_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
-        Banding::new(plan, self.threads.count()).bytes(plan) as u64
+        let occlusion = plan.occlusion.as_ref().map_or(0, |pass| Occlusion::bytes(pass, [plan.width_px, plan.height_px]));
+        (Banding::new(plan, self.threads.count()).bytes(plan) + occlusion) as u64
     }
 }
 
@@ -204,7 +253,7 @@ impl CpuRenderer {
     /// back-ends sample for sample.
     pub fn draw_layer(&mut self, plan: &DrawPlan<'_>, layer: u32, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
         let mut words = vec![0_u64; plan.width_px as usize * plan.height_px as usize * plan.samples as usize];
-        self.draw_bands(plan, deadline, &mut words, |context, scratch, bins, band, words| {
+        self.draw_bands(plan, deadline, (Goal::Samples, &mut words), |context, scratch, bins, band, words| {
             bands::draw_layer(context, scratch, bins, band, layer, words);
         })?;
         Ok(words)
@@ -264,13 +313,13 @@ impl RasterContext<'_> {
 impl Renderer for CpuRenderer {
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
         let mut rgba = vec![0_u8; plan.width_px as usize * plan.height_px as usize * 4];
-        self.draw_bands(plan, deadline, &mut rgba, bands::draw)?;
+        self.draw_bands(plan, deadline, (Goal::Picture, &mut rgba), bands::draw)?;
         Ok(Image { width_px: plan.width_px, height_px: plan.height_px, rgba })
     }
 
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
         let mut words = vec![0_u64; plan.width_px as usize * plan.height_px as usize * plan.samples as usize];
-        self.draw_bands(plan, deadline, &mut words, bands::draw_visibility)?;
+        self.draw_bands(plan, deadline, (Goal::Samples, &mut words), bands::draw_visibility)?;
         Ok(words)
     }
 

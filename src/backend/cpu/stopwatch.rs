@@ -62,7 +62,7 @@ mod tests {
     #[test]
     fn stages_of_bands_share_their_wall_time() {
         let ms = |n: u64| AtomicU64::new(n * 1_000_000);
-        let nanoseconds = [ms(3), ms(1), ms(0), ms(10), ms(20), ms(0), ms(10)];
+        let nanoseconds = [ms(3), ms(1), ms(0), ms(10), ms(0), ms(20), ms(0), ms(10)];
         let watch = Stopwatch { nanoseconds };
         let parts: Vec<_> = watch.times(Duration::from_millis(20)).parts().collect();
         let wanted = [

@@ -72,7 +72,7 @@ const ALONE_SIZE_OF_FEW: i32 = 1024;
 type Lost = Arc<OnceLock<String>>;
 
 /// Storage buffers that a kernel binds, at most.
-const STORAGE_BUFFERS: u32 = 16;
+const STORAGE_BUFFERS: u32 = 17;
 
 /// Polls without a pause: a small picture takes a fraction of a millisecond.
 const EAGER_POLLS: u32 = 64;

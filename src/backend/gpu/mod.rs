@@ -33,8 +33,8 @@ use self::recorder::Recorder;
 use self::residents::{Found, Source};
 use self::schedule::Schedule;
 use self::schedule::sizes::{
-    DeviceTraits, OWNER_BYTES, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, samples,
-    work_bytes,
+    DeviceTraits, OWNER_BYTES, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility,
+    occlusion_bytes, samples, work_bytes,
 };
 use self::schedule::step::{Band, Goal, Step};
 use self::stage_clock::StageClock;
@@ -286,6 +286,9 @@ fn upload_shading(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedul
     let band_pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);
     if has_visibility(plan) || !plan.lines.is_empty() {
         buffers.reserve(&gpu.handles, Slot::Colors, band_pixels * color_bytes(plan))?;
+    }
+    if plan.occlusion.is_some() {
+        buffers.reserve(&gpu.handles, Slot::Occlusion, occlusion_bytes(plan))?;
     }
     if let Some(surface) = &plan.surface {
         upload_surface(gpu, buffers, plan, surface)?;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 use crate::backend::sample_partition::{POINTS, sample_partition};
-use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, SurfacePass};
+use crate::plan::{DrawPlan, Edge, Faces, HullPass, Lights, LinePass, OcclusionPass, SurfacePass, TAPS};
 
 /// Uniforms of a plan.
 #[repr(C)]
@@ -38,6 +38,10 @@ pub struct Frame {
     pub normal_triangles_at: u32,
     pub uv_triangles_at: u32,
     pub color_triangles_at: u32,
+    pub occlusion_depth: [f32; 4],
+    pub occlusion_spread: [f32; 4],
+    pub taps: [[u32; 4]; TAPS / 4],
+    pub occlusion_reach: [f32; 4],
 }
 
 /// Uniforms of a dispatch.
@@ -141,12 +145,25 @@ impl Frame {
         if let Some(surface) = &plan.surface {
             frame.surface(surface, &plan.triangles);
         }
+        if let Some(pass) = &plan.occlusion {
+            frame.occlusion(pass);
+        }
         if let Some(hull) = &plan.hull {
             frame.hull_color = hull.color(0);
             frame.hull_color_count = hull.colors.len() as u32;
         }
         frame.layer_fade = plan.peeling().map_or(1.0, |layers| layers.fade);
         frame
+    }
+
+    fn occlusion(&mut self, pass: &OcclusionPass) {
+        let [a, b, c] = pass.depth;
+        self.occlusion_depth = [a, b, c, pass.strength];
+        self.occlusion_spread = [pass.spread[0], pass.spread[1], pass.near, pass.near_depth];
+        self.occlusion_reach[0] = pass.inverse_square();
+        for (at, [across, down]) in pass.taps.iter().enumerate() {
+            self.taps[at / 4][at % 4] = (across & 0xFFFF) as u32 | (down << 16) as u32;
+        }
     }
 
     fn surface(&mut self, surface: &SurfacePass<'_>, triangles: &[[u32; 3]]) {

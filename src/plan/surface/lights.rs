@@ -19,12 +19,17 @@ const HEADLIGHT: &[Place] = &[([-0.5, 0.7, 1.0], 1.0)];
 /// readable, and a rim light from behind that lifts the shape off the background.
 const THREE_POINT: &[Place] = &[([-0.8, 0.9, 0.9], 0.85), ([1.0, 0.15, 0.7], 0.35), ([0.5, 0.9, -0.8], 0.55)];
 
+/// Large lamps at the left and the right of the viewer, and one above: few shadows, and edges that each
+/// catch another of them.
+const STUDIO: &[Place] = &[([-0.7, 0.6, 1.0], 0.62), ([1.0, 0.1, 0.7], 0.28), ([0.1, 1.0, 0.05], 0.3)];
+
 /// The lamps of a scene.
 pub fn lights(light: &Light, camera: &Camera) -> Lights {
     let [right, up, back] = camera.axes;
     let places = match light.preset {
         LightPreset::Headlight => HEADLIGHT,
         LightPreset::ThreePoint => THREE_POINT,
+        LightPreset::Studio => STUDIO,
         LightPreset::None => &[],
     };
     let strength = (1.0 - light.ambient) * light.intensity;

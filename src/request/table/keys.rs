@@ -170,14 +170,17 @@ fn sheet() -> Vec<Field> {
 fn light() -> Vec<Field> {
     fields![
         "light.preset" |d| d.light.preset, default "headlight";
-            "headlight: over the viewer's shoulder; three-point: key, fill and rim lamps, which turn with the camera; none: \
-             ambient light alone.";
+            "headlight: over the viewer's shoulder; three-point: key, fill and rim lamps; studio: soft light from \
+             three sides; all turn with the camera; none: ambient light alone.";
         "light.direction" |d| d.light.direction, in Kind::Direction, default Null;
             "Direction in which the key light shines, in the file's coordinates; null: the preset's.";
         "light.intensity" |d| d.light.intensity, in number(0.0, 10.0), default 1;
             "Strength of the lamps.";
         "light.ambient" |d| d.ambient, in SHARE;
             "Share of light that comes from everywhere; by default 0.3, and 1 without lamps.";
+        "light.ambient_occlusion" |d| d.light.ambient_occlusion, in SHARE;
+            "Darkens hollows, folds and places where parts meet: the share of light that a place goes without which is wholly \
+             shut in. By default 0.6 in the styles auto, outline and technical, 1 in clay, and 0 in the others.";
     ]
 }
 

@@ -22,7 +22,7 @@ fn every_bad_value_is_refused_by_name() {
         (&[("surface.emissive", "red")], OutOfRange, "surface.emissive", "or null"),
         (&[("surface.metallic", "2")], OutOfRange, "surface.metallic", "from 0 to 1, or null"),
         (&[("surface", "off")], WrongType, "surface", "{} for its defaults"),
-        (&[("light.preset", "studio")], OutOfRange, "light.preset", "three-point"),
+        (&[("light.preset", "disco")], OutOfRange, "light.preset", "three-point"),
         (&[("light.direction", "0,0,-0")], OutOfRange, "light.direction", "not all zero"),
         (&[("light.direction", "0,1")], WrongType, "light.direction", "three"),
         (&[("light.direction", "0,1,2e30")], OutOfRange, "light.direction", "1e30"),

@@ -42,7 +42,14 @@ pub fn lit(material: &Material, lights: &Lights, n: V3) -> V3 {
         diffuse += received;
         highlight += received * (alpha / d) * (alpha / d) / ((l_h * l_h).max(0.1) * (4.0 * material.roughness + 2.0));
     }
-    material.base.map(|base| (base * diffuse + 0.04 * highlight).clamp(0.0, 1.0))
+    material.base.map(|base| rolled_off(base * diffuse + 0.04 * highlight))
+}
+
+/// Light as it is shown: above 0.8, half of the rest to white is left where there is 0.2 more, a third
+/// where there is 0.4 more, and so on.
+fn rolled_off(v: f64) -> f64 {
+    let over = (v - 0.8).max(0.0);
+    v.clamp(0.0, 0.8) + 0.2 * over / (0.2 + over)
 }
 
 /// The unit normal of a triangle whose corners run counter-clockwise; None where it has no area.

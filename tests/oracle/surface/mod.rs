@@ -1,6 +1,7 @@
 //! Surfaces: what is seen of them, and its colour.
 
 pub mod light;
+pub mod occlusion;
 pub mod rays;
 pub mod srgb;
 pub mod visible;

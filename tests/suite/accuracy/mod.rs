@@ -5,6 +5,7 @@ pub mod bench;
 pub mod error_table;
 pub mod geometry;
 pub mod mutations;
+pub mod occlusion;
 pub mod oracle_flip;
 pub mod oracle_parts;
 pub mod oracle_scenes;

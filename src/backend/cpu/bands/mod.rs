@@ -34,12 +34,13 @@ use crate::backend::cpu::lines::holes::free_points::{add_points, add_points_plai
 use crate::backend::cpu::lines::holes::{self, Holes};
 use crate::backend::cpu::lines::line_light;
 use crate::backend::cpu::lines::plain::add_holes_plainly;
+use crate::backend::cpu::occlusion::grid::write_band;
 use crate::backend::cpu::peeling;
 use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::flat::{draw_flat, shade_flat};
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::cpu::surface::shade;
-use crate::plan::LinePass;
+use crate::plan::{LinePass, OcclusionPass};
 
 /// Edges between two polls of the deadline. Wide lines count their pixels too.
 const EDGES_PER_POLL: usize = 256;
@@ -75,6 +76,19 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
     }
     resolve::resolve(isa, plan, context.srgb, &scratch.colors, rgba);
     lap.end(DrawStage::Resolve);
+}
+
+/// Draws band number `band` of the visibility buffer, and writes the places of its pixels for the
+/// occlusion stage.
+pub fn write_places(
+    context: &RasterContext<'_>,
+    pass: &OcclusionPass,
+    (scratch, bins, band): (&mut BandScratch, &Bins, usize),
+    shape: (usize, usize),
+    out: &mut [f32],
+) {
+    fill_samples(context, scratch, bins, band);
+    write_band(pass, shape, &scratch.samples, context.plan.triangles.len() as u32, out);
 }
 
 /// Draws band number `band` of the visibility buffer alone, as

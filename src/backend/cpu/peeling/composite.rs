@@ -126,7 +126,7 @@ fn shade_layer_sampled<const S: usize>(
             if !any {
                 continue;
             }
-            shader.groups(ids, [x, y], |_| show, |same, color| peel.accumulate(first, same, color));
+            shader.groups((ids, None), [x, y], |_| show, |same, color| peel.accumulate(first, same, color));
             for s in 0..S {
                 *is_open |= peel.previous.depth[first + s] > 0.0;
             }
@@ -167,7 +167,8 @@ fn shade_surface_sampled<const S: usize>(
                     out[k] += share * over[k];
                 }
             }
-            shader.groups(ids, [x, y], show, |same, color| {
+            let depths = base.depth.get(in_base..in_base + S);
+            shader.groups((ids, depths), [x, y], show, |same, color| {
                 let rest = |s: usize| if same[s] { 1.0 - peel.colors[first + s][3] } else { 0.0 };
                 let weight = share * (0..S).map(rest).sum::<f32>();
                 for k in 0..4 {

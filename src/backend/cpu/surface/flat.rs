@@ -28,7 +28,7 @@ impl FlatColors {
     /// True if all colours of a plan's visible samples are the same all over a triangle.
     pub fn suffice(plan: &DrawPlan<'_>) -> bool {
         let is_flat = |s: &SurfacePass<'_>| !s.is_shaded || s.materials.iter().all(|m| is_flat(s, m));
-        plan.peeling().is_none() && plan.is_shaded() && plan.surface.as_ref().is_none_or(is_flat)
+        plan.peeling().is_none() && plan.occlusion.is_none() && plan.is_shaded() && plan.surface.as_ref().is_none_or(is_flat)
     }
 
     /// Finds the colours of all triangles in the bins, which have each triangle once.
@@ -143,7 +143,7 @@ impl Group {
         if material.flags & flags::FACE_NORMALS != 0 {
             normals = self.normals(context.isa, surface, is_front);
         }
-        let colors = flat_colors(surface, material, &context.plan.projection, Show::ALL, &normals);
+        let colors = flat_colors(surface, material, &context.plan.projection, Show::ALL, (&normals, &[1.0; LANES]));
         if self.are_written(context.isa, &colors, (first, &mut *out)) {
             return;
         }

@@ -11,6 +11,9 @@ use crate::backend::cpu::geometry::transform::quick_recip;
 use crate::backend::cpu::vector::dot;
 use crate::plan::{Lights, Projection};
 
+/// Share of the brightest value below which light is shown as it is.
+pub const SHOULDER: f32 = 0.8;
+
 /// Effect of light on a base colour: `base * gain + gloss`, per channel.
 #[derive(Clone, Copy, Debug)]
 pub struct Light {
@@ -27,9 +30,8 @@ impl Light {
     /// The effect on a premultiplied colour; no channel exceeds alpha.
     #[inline(always)]
     pub fn on_premultiplied(self, c: [f32; 4]) -> [f32; 4] {
-        // Not `f32::clamp`, which would not bear an alpha below 0.
-        let under = |v: f32| (v * self.gain + self.gloss * c[3]).max(0.0).min(c[3].max(0.0));
-        [under(c[0]), under(c[1]), under(c[2]), c[3]]
+        let lit = |v: f32| rolled_off(v * self.gain + self.gloss * c[3], c[3].max(0.0));
+        [lit(c[0]), lit(c[1]), lit(c[2]), c[3]]
     }
 }
 
@@ -42,9 +44,30 @@ pub struct LightLanes<const N: usize> {
 impl<const N: usize> LightLanes<N> {
     /// The base colours as they are.
     pub const NONE: Self = Self { gain: [Light::NONE.gain; N], gloss: [Light::NONE.gloss; N] };
+
+    /// The same where only a share of the light is there.
+    #[inline(always)]
+    pub fn dimmed(mut self, open: &[f32; N]) -> Self {
+        for l in 0..N {
+            self.gain[l] *= open[l];
+            self.gloss[l] *= open[l];
+        }
+        self
+    }
 }
 
-/// A colour with straight alpha under light, clamped to 1.
+/// A value of light that is shown: as it is up to the shoulder, and above it nearing `white` without ever
+/// reaching it, so that bright surfaces keep their form (Reinhard et al. 2002, applied above the
+/// shoulder).
+#[inline(always)]
+fn rolled_off(v: f32, white: f32) -> f32 {
+    let start = SHOULDER * white;
+    let (room, over) = (white - start, (v - start).max(0.0));
+    let inverse = quick_recip((room + over).max(1e-30));
+    v.max(0.0).min(start) + (room * over) * inverse
+}
+
+/// A colour with straight alpha under light.
 #[inline(always)]
 pub fn lit(base: [f32; 4], light: Light) -> [f32; 4] {
     lit_lanes(&base.map(|v| [v]), &LightLanes { gain: [light.gain], gloss: [light.gloss] }).map(|[v]| v)
@@ -56,7 +79,19 @@ pub fn lit_lanes<const N: usize>(base: &[[f32; N]; 4], light: &LightLanes<N>) ->
     let mut colors = *base;
     for k in 0..3 {
         for l in 0..N {
-            colors[k][l] = (base[k][l] * light.gain[l] + light.gloss[l]).clamp(0.0, 1.0);
+            colors[k][l] = rolled_off(base[k][l] * light.gain[l] + light.gloss[l], 1.0);
+        }
+    }
+    colors
+}
+
+/// Colours as they are, clamped to 1.
+#[inline(always)]
+pub fn unlit_lanes<const N: usize>(base: &[[f32; N]; 4]) -> [[f32; N]; 4] {
+    let mut colors = *base;
+    for k in 0..3 {
+        for l in 0..N {
+            colors[k][l] = base[k][l].clamp(0.0, 1.0);
         }
     }
     colors

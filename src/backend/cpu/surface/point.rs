@@ -3,7 +3,7 @@
 
 use super::barycentric::{Barycentrics, Corners};
 use super::debug;
-use super::light::{Light, LightLanes, light_lanes, lit_lanes};
+use super::light::{Light, LightLanes, light_lanes, lit_lanes, unlit_lanes};
 use super::normal::{face_normals, normal_mapped, normals, to_viewer};
 use super::texture::{Uv, blend, of_corners, sample};
 use super::wire::{Place, edge_mask, fwidth_covers, wire_covers};
@@ -48,12 +48,14 @@ pub struct PointShader<'a> {
     flat: Option<(u32, [f32; 4])>,
     /// Shown parts of the material; the same for all points of a triangle.
     pub show: Show,
+    /// Share of the light that reaches the next point, 0 to 1.
+    pub open: f32,
 }
 
 impl<'a> PointShader<'a> {
     /// One for a band.
     pub fn new(context: &'a RasterContext<'a>) -> Self {
-        Self { context, flat: None, show: Show::ALL }
+        Self { context, flat: None, show: Show::ALL, open: 1.0 }
     }
 
     /// The colour of triangle `id` where it is known to be the same all over, and is the one that
@@ -69,8 +71,8 @@ impl<'a> PointShader<'a> {
     pub fn color(&mut self, surface: &SurfacePass<'_>, id: u32, at: [f32; 2]) -> [f32; 4] {
         let material = surface.material(id as usize);
         let points = Points { context: self.context, surface, material, show: self.show };
-        let color = points.colors(&[id], &at.map(|v| [v])).map(|[v]| v);
-        if is_flat(surface, material) {
+        let color = points.colors(&[id], &at.map(|v| [v]), &[self.open]).map(|[v]| v);
+        if is_flat(surface, material) && self.context.occlusion.is_none() {
             self.flat = Some((id, color));
         }
         color
@@ -91,29 +93,29 @@ pub struct Points<'a> {
 
 impl Points<'_> {
     /// Premultiplied linear RGBA of `N` points: of triangles `ids` at `at`, columns, then rows, in
-    /// 1/256 px from the picture's centre.
+    /// 1/256 px from the picture's centre. The share `open` of the light reaches them.
     #[inline(always)]
-    pub fn colors<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2]) -> [[f32; N]; 4] {
+    pub fn colors<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2], open: &[f32; N]) -> [[f32; N]; 4] {
         let is_textured = is_textured(self.surface, self.material);
         if self.material.flags & flags::DEBUG != 0 {
             return self.debug_colors(ids, at);
         }
         if self.material.flags & GENERAL != 0 || is_textured {
-            return self.general(ids, at, is_textured);
+            return self.general(ids, at, open, is_textured);
         }
         if self.material.flags & VARYING != 0 {
-            return self.common(ids, at);
+            return self.common(ids, at, open);
         }
         let mut normals = [[0.0; N]; 3];
         if self.material.flags & flags::FACE_NORMALS != 0 {
             normals = face_normals(self.surface, ids, &self.are_front(ids, at));
         }
-        flat_colors(self.surface, self.material, &self.context.plan.projection, self.show, &normals)
+        flat_colors(self.surface, self.material, &self.context.plan.projection, self.show, (&normals, open))
     }
 
     /// One base colour, smooth or with a wire by fwidth.
     #[inline(always)]
-    fn common<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2]) -> [[f32; N]; 4] {
+    fn common<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2], open: &[f32; N]) -> [[f32; N]; 4] {
         let Self { context, surface, material, show } = self;
         let b = Barycentrics::new(&Corners::new(context, ids, at));
         let base = with_alpha(material, material.base_color, *show);
@@ -130,7 +132,10 @@ impl Points<'_> {
             light_lanes(quick_recip, &surface.lights, projection, &metallic, &roughness, &normal)
         };
         let emissive = material.emissive.map(|v| [v; N]);
-        let color = premultiplied(&lit_lanes(&base.map(|v| [v; N]), &light), &emissive);
+        let base = base.map(|v| [v; N]);
+        let is_lit = material.flags & flags::LIT != 0;
+        let shown = if is_lit { lit_lanes(&base, &light.dimmed(open)) } else { unlit_lanes(&base) };
+        let color = premultiplied(&shown, &emissive);
         if material.flags & flags::WIRE_FWIDTH == 0 || show.wires == 0.0 {
             return color;
         }
@@ -141,7 +146,13 @@ impl Points<'_> {
 
     /// Every material there is, but for debug views.
     #[inline(always)]
-    fn general<const N: usize>(&self, ids: &[u32; N], at: &[[f32; N]; 2], is_textured: bool) -> [[f32; N]; 4] {
+    fn general<const N: usize>(
+        &self,
+        ids: &[u32; N],
+        at: &[[f32; N]; 2],
+        open: &[f32; N],
+        is_textured: bool,
+    ) -> [[f32; N]; 4] {
         let Self { context, surface, material, .. } = self;
         let place = self.place(ids, at, &Corners::new(context, ids, at), is_textured);
         let covers = self.wire_covers(&place);
@@ -161,6 +172,7 @@ impl Points<'_> {
             let metallic = own(flags::OWN_METALLIC, material.metallic, metallic);
             let roughness = own(flags::OWN_ROUGHNESS, material.roughness, roughness);
             light = light_lanes(quick_recip, &surface.lights, &context.plan.projection, &metallic, &roughness, &normal);
+            light = light.dimmed(open);
         }
         let mut emissive = [[0.0; N]; 3];
         for k in 0..3 {
@@ -171,7 +183,9 @@ impl Points<'_> {
         let mut colors = if material.flags & flags::WIRE_LIT != 0 {
             lit_wires(&covers, material.wire_color, &base, &light, &emissive)
         } else {
-            over(&covers, material.wire_color, &premultiplied(&lit_lanes(&base, &light), &emissive))
+            let is_lit = material.flags & flags::LIT != 0;
+            let shown = if is_lit { lit_lanes(&base, &light) } else { unlit_lanes(&base) };
+            over(&covers, material.wire_color, &premultiplied(&shown, &emissive))
         };
         for l in 0..N {
             let is_nothing = (base[3][l] == 0.0) & (covers[l] == 0.0);
@@ -292,22 +306,23 @@ pub fn is_flat(surface: &SurfacePass<'_>, material: &ShadedMaterial) -> bool {
 }
 
 /// Premultiplied linear RGBA of triangles of one material ([`is_flat`]), by their normals on the
-/// viewer's side.
+/// viewer's side. The share `open` of the light reaches them.
 #[inline(always)]
 pub fn flat_colors<const N: usize>(
     surface: &SurfacePass<'_>,
     material: &ShadedMaterial,
     projection: &Projection,
     show: Show,
-    normals: &[[f32; N]; 3],
+    (normals, open): (&[[f32; N]; 3], &[f32; N]),
 ) -> [[f32; N]; 4] {
-    let base = with_alpha(material, material.base_color, show);
-    let mut light = LightLanes::NONE;
+    let base = with_alpha(material, material.base_color, show).map(|v| [v; N]);
+    let mut shown = unlit_lanes(&base);
     if material.flags & flags::FACE_NORMALS != 0 {
         let (metallic, roughness) = ([material.metallic; N], [material.roughness; N]);
-        light = light_lanes(quick_recip, &surface.lights, projection, &metallic, &roughness, normals);
+        let light = light_lanes(quick_recip, &surface.lights, projection, &metallic, &roughness, normals);
+        shown = lit_lanes(&base, &light.dimmed(open));
     }
-    premultiplied(&lit_lanes(&base.map(|v| [v; N]), &light), &material.emissive.map(|v| [v; N]))
+    premultiplied(&shown, &material.emissive.map(|v| [v; N]))
 }
 
 /// The base colour with the material's cutoff, blending and opacity applied to alpha.

@@ -74,18 +74,27 @@ impl<'a> Shader<'a> {
                     row[x as usize] = self.pixel::<S>(band, x, y);
                     continue;
                 }
+                let depths = &band.depth[first + S * x as usize..];
+                let open = |s: usize| self.open_share([x, y], depths[s], depths[0]);
                 if ids[0] != NOTHING && ids.iter().all(|&id| id == ids[0]) {
                     let at = self.mean_place([x, y], [128 * S as i32; 2], S as i32);
-                    waiting.push(Point { id: ids[0], at, weight: 1.0, pixel: x }, row);
+                    waiting.push(Point { id: ids[0], at, weight: 1.0, pixel: x, open: open(0) }, row);
                     continue;
                 }
-                for_each_triangle(ids, |id, offset, count| {
+                for_each_triangle(ids, |id, s, offset, count| {
                     let (at, weight) = (self.mean_place([x, y], offset, count), count as f32 / S as f32);
-                    waiting.push(Point { id, at, weight, pixel: x }, row);
+                    waiting.push(Point { id, at, weight, pixel: x, open: open(s) }, row);
                 });
             }
         }
         waiting.shade(row);
+    }
+
+    /// The share of light that reaches a surface of depth `z` in a pixel whose first sample has the depth
+    /// `own_z`.
+    #[inline(always)]
+    fn open_share(&self, pixel: [u32; 2], z: f32, own_z: f32) -> f32 {
+        self.context.occlusion.map_or(1.0, |(pass, occlusion)| occlusion.open_share(pass, pixel, z, own_z))
     }
 
     /// The mean of `count` samples of a pixel, whose offsets in 1/256 px add up to `offset_sum`: in 1/256
@@ -109,15 +118,16 @@ impl<'a> Shader<'a> {
             is_mixed |= ids[s] != ids[0];
         }
         if !is_mixed {
+            self.points.open = self.open_share([x, y], band.depth[at], band.depth[at]);
             return self.group(ids[0], x, y, [128 * S as i32; 2], S as i32);
         }
-        self.mixed_pixel(ids, x, y)
+        self.mixed_pixel(ids, Some(&band.depth[at..at + S]), x, y)
     }
 
-    fn mixed_pixel<const S: usize>(&mut self, ids: [u32; S], x: u32, y: u32) -> [f32; 4] {
+    fn mixed_pixel<const S: usize>(&mut self, ids: [u32; S], depths: Option<&[f32]>, x: u32, y: u32) -> [f32; 4] {
         let mut sum = [0.0; 4];
         self.groups(
-            ids,
+            (ids, depths),
             [x, y],
             |_| Show::ALL,
             |same, color| {
@@ -131,17 +141,19 @@ impl<'a> Shader<'a> {
     }
 
     /// Shades each triangle among a pixel's samples once, at the mean position of its samples, and
-    /// calls `each` with which samples these are, and its colour.
+    /// calls `each` with which samples these are, and its colour. The samples' depths tell the light that a
+    /// surface goes without; without them, all of it is there.
     #[inline(always)]
     pub fn groups<const S: usize>(
         &mut self,
-        ids: [u32; S],
+        (ids, depths): ([u32; S], Option<&[f32]>),
         [x, y]: [u32; 2],
         show: impl Fn(u32) -> Show,
         mut each: impl FnMut([bool; S], [f32; 4]),
     ) {
-        for_each_triangle(&ids, |own, offset, count| {
+        for_each_triangle(&ids, |own, s, offset, count| {
             self.points.show = show(own);
+            self.points.open = depths.map_or(1.0, |depths| self.open_share([x, y], depths[s], depths[0]));
             let color = self.group(own, x, y, offset, count);
             each(ids.map(|id| id == own), color);
         });
@@ -167,10 +179,10 @@ impl<'a> Shader<'a> {
     }
 }
 
-/// Calls `each` with every triangle among a pixel's samples, by the first of its samples: its id, the
-/// sum of its samples' offsets in 1/256 px, and their number.
+/// Calls `each` with every triangle among a pixel's samples: its id, the number of its first sample, the
+/// sum of its samples' offsets in 1/256 px, and how many they are.
 #[inline(always)]
-fn for_each_triangle<const S: usize>(ids: &[u32; S], mut each: impl FnMut(u32, [i32; 2], i32)) {
+fn for_each_triangle<const S: usize>(ids: &[u32; S], mut each: impl FnMut(u32, usize, [i32; 2], i32)) {
     let offsets = sample_offsets(S as u32);
     for s in 0..S {
         if ids[s] == NOTHING || ids[..s].contains(&ids[s]) {
@@ -182,6 +194,6 @@ fn for_each_triangle<const S: usize>(ids: &[u32; S], mut each: impl FnMut(u32, [
             offset = [offset[0] + is_own * at[0], offset[1] + is_own * at[1]];
             count += is_own;
         }
-        each(ids[s], offset, count);
+        each(ids[s], s, offset, count);
     }
 }

@@ -26,6 +26,8 @@ pub struct Point {
     pub weight: f32,
     /// Index of the pixel in its row.
     pub pixel: u32,
+    /// Share of the light that reaches it, 0 to 1.
+    pub open: f32,
 }
 
 impl<'a> Waiting<'a> {
@@ -65,13 +67,13 @@ dispatch! {
 #[inline(always)]
 fn shade_kernel(context: &RasterContext<'_>, surface: &SurfacePass<'_>, points: &[Point], row: &mut [[f32; 4]]) {
     let Some(first) = points.first() else { return };
-    let (mut ids, mut at) = ([first.id; LANES], first.at.map(|v| [v; LANES]));
+    let (mut ids, mut at, mut open) = ([first.id; LANES], first.at.map(|v| [v; LANES]), [1.0; LANES]);
     for (l, point) in points.iter().enumerate().take(LANES) {
-        ids[l] = point.id;
+        (ids[l], open[l]) = (point.id, point.open);
         (at[0][l], at[1][l]) = (point.at[0], point.at[1]);
     }
     let material = surface.material(first.id as usize);
-    let colors = Points { context, surface, material, show: Show::ALL }.colors(&ids, &at);
+    let colors = Points { context, surface, material, show: Show::ALL }.colors(&ids, &at, &open);
     for (l, point) in points.iter().enumerate().take(LANES) {
         if let Some(pixel) = row.get_mut(point.pixel as usize) {
             for k in 0..4 {

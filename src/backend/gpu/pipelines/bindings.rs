@@ -17,6 +17,8 @@ impl Kernel {
             Self::Clip => CLIP,
             Self::VisibilityTile { target: SampleTarget::Visibility, .. } => TILE,
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => TILE_OF_LAYER,
+            Self::Grid => GRID,
+            Self::Gather => GATHER,
             Self::Composite => COMPOSITE,
             Self::Shade => SHADE,
             Self::Holes => HOLES,
@@ -81,6 +83,10 @@ const TILE: &[Binding] = &[(Slot::Samples, ReadWrite), (Slot::Work, Read)];
 const TILE_OF_LAYER: &[Binding] =
     &[(Slot::Samples, ReadWrite), (Slot::Work, Read), (Slot::PeelLayer, Read), (Slot::PeelState, Read)];
 
+const GRID: &[Binding] = &[(Slot::Samples, Read), (Slot::Occlusion, ReadWrite)];
+
+const GATHER: &[Binding] = &[(Slot::Occlusion, ReadWrite)];
+
 const COMPOSITE: &[Binding] = &[
     (Slot::Positions, Read),
     (Slot::Triangles, Read),
@@ -116,6 +122,7 @@ const SHADE: &[Binding] = &[
     (Slot::Uvs, Read),
     (Slot::VertexColors, Read),
     (Slot::Texels, Read),
+    (Slot::Occlusion, Read),
     (Slot::Colors, ReadWrite),
 ];
 

@@ -23,6 +23,8 @@ const PEEL_STATE: &str = include_str!("../../../../shaders/peeling/state.wgsl");
 const EMIT: &str = include_str!("../../../../shaders/geometry/emit.wgsl");
 const EMIT_LAYER: &str = include_str!("../../../../shaders/peeling/emit_layer.wgsl");
 const OVER: &str = include_str!("../../../../shaders/over.wgsl");
+const PLACE: &str = include_str!("../../../../shaders/occlusion/place.wgsl");
+const SPREAD: &str = include_str!("../../../../shaders/occlusion/spread.wgsl");
 const GROUP: &str = include_str!("../../../../shaders/surface/group.wgsl");
 
 /// Shared by shade, composite and line_light: from a point's position to its colour.
@@ -43,6 +45,8 @@ impl Kernel {
             Self::Transform => "transform",
             Self::Visibility { .. } => "visibility",
             Self::Clip => "clip",
+            Self::Grid => "grid",
+            Self::Gather => "gather",
             Self::Composite => "composite",
             Self::VisibilityTile { .. } => "visibility_tile",
             Self::Shade => "shade",
@@ -84,6 +88,8 @@ impl Kernel {
                 let kernel = include_str!("../../../../shaders/geometry/visibility_tile.wgsl");
                 [COMMON, TRIANGLE, SAMPLES, keep_nearest(write), &emit(target), kernel].concat()
             }
+            Self::Grid => [COMMON, PLACE, include_str!("../../../../shaders/occlusion/grid.wgsl")].concat(),
+            Self::Gather => [COMMON, PLACE, include_str!("../../../../shaders/occlusion/gather.wgsl")].concat(),
             Self::Composite => [
                 &[COMMON, TRIANGLE],
                 SHADE,
@@ -94,7 +100,7 @@ impl Kernel {
             Self::Shade => [
                 &[COMMON, TRIANGLE],
                 SHADE,
-                &[GROUP, PEEL_STATE, include_str!("../../../../shaders/surface/shade.wgsl")],
+                &[GROUP, PEEL_STATE, PLACE, SPREAD, include_str!("../../../../shaders/surface/shade.wgsl")],
             ]
             .concat()
             .concat(),
@@ -144,7 +150,8 @@ impl Kernel {
             Self::VisibilityTile { target: SampleTarget::Visibility, .. } => key::SAMPLES,
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => key::SAMPLES | key::BEHIND_SURFACE,
             Self::Composite => SHADED | key::PEELED_HULL,
-            Self::Shade => SHADED | key::PEELING,
+            Self::Grid | Self::Gather => key::SAMPLES,
+            Self::Shade => SHADED | key::PEELING | key::OCCLUSION,
             Self::LineLight => SHADED,
             Self::Coverage => key::HOLED | key::SURFACE | key::HULL | key::PEELING | key::SAMPLES,
             Self::Holes => key::SAMPLES,

@@ -39,6 +39,8 @@ pub const CONTOURS: u32 = 16384;
 pub const HOLED: u32 = 32768;
 /// A pass mask per triangle.
 pub const PASS_MASKS: u32 = 0x10_0000;
+/// Hollows go without some of the light.
+pub const OCCLUSION: u32 = 0x20_0000;
 /// A material index per triangle of the outline mesh.
 pub const HULL_MATERIALS: u32 = 0x40_0000;
 /// Depth peeling.
@@ -87,6 +89,7 @@ pub fn pipeline_key(plan: &DrawPlan<'_>) -> u32 {
     if let Some(layers) = plan.peeling() {
         key |= PEELING | when(layers.behind_surface, BEHIND_SURFACE) | when(layers.wires_only, WIRES_ONLY);
     }
+    key |= when(plan.occlusion.is_some(), OCCLUSION);
     key | when(!plan.lines.is_empty(), LINES)
         | when(plan.lines.iter().any(|lines| lines.contour), CONTOURS)
         | when(plan.lights_lines(), LIT_LINES)

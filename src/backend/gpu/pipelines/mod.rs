@@ -31,6 +31,10 @@ pub enum Kernel {
         /// As above.
         target: SampleTarget,
     },
+    /// Samples to places for the occlusion stage.
+    Grid,
+    /// Places to the light that hollows go without.
+    Gather,
     /// Samples of a peeled layer to colours, under the layers in front of it.
     Composite,
     /// Samples to colours.
@@ -98,10 +102,11 @@ pub enum Slot {
     PeelState,
     PeelRounds,
     SampleMasks,
+    Occlusion,
 }
 
 /// Number of [`Slot`]s.
-pub const SLOTS: usize = 30;
+pub const SLOTS: usize = 31;
 
 /// A kernel's access to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -202,6 +207,7 @@ impl Kernel {
         match self {
             Self::Transform => DrawStage::Transform,
             Self::Visibility { .. } | Self::Clip | Self::VisibilityTile { .. } => DrawStage::Visibility,
+            Self::Grid | Self::Gather => DrawStage::Occlusion,
             Self::Composite | Self::Shade => DrawStage::Shade,
             Self::Holes | Self::Edge | Self::Coverage | Self::LineLight => DrawStage::Lines,
             Self::Resolve => DrawStage::Resolve,

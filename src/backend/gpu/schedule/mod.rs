@@ -67,13 +67,38 @@ impl Schedule {
         let (steps, batches) = (Vec::new(), Vec::new());
         let mut schedule = Self { steps, batches, banding, work_items: 0, layers: 0, tiles, progress_bytes: 0, goal };
         schedule.transform(plan, device)?;
-        for first in (0..plan.height_px).step_by(banding.rows as usize) {
+        let occlusion = plan.occlusion.is_some() && goal == Goal::Picture;
+        if occlusion {
+            schedule.occlusion(plan, device)?;
+        }
+        for band in schedule.bands(plan) {
+            // The only band's samples are there already.
+            let is_seen = occlusion && banding.rows >= plan.height_px;
+            if !is_seen {
+                schedule.steps.push(Step::ClearBand);
+                schedule.visibility(plan, device, band)?;
+            }
+            if has_visibility(plan) {
+                schedule.layers(plan, device, band, goal)?;
+            }
+            if goal == Goal::Picture {
+                schedule.picture_stages(plan, device, band, &edge_starts)?;
+            }
+            schedule.steps.push(Step::EndBand(Band { rows: [band.row_first as u32, band.row_end as u32] }));
+        }
+        Ok(schedule)
+    }
+
+    /// The bands of the picture.
+    fn bands(&self, plan: &DrawPlan<'_>) -> Vec<Batch> {
+        let banding = self.banding;
+        let [beyond, margin] = [banding.beyond, banding.margin].map(|px| px as i32);
+        let band = |first: u32| {
             let end = plan.height_px.min(first + banding.rows);
-            let [beyond, margin] = [banding.beyond, banding.margin].map(|px| px as i32);
             let [row_first, row_end] = [first as i32, end as i32];
             let seen = [row_first - margin, row_end + margin].map(|y| y.clamp(-beyond, plan.height_px as i32 + beyond));
             // Kernels that run per pixel cover the band's own rows only.
-            let band = Batch {
+            Batch {
                 row_first,
                 row_end,
                 column_end: plan.width_px as i32,
@@ -82,27 +107,38 @@ impl Schedule {
                 seen_margin: beyond,
                 samples_at: plan.samples * (banding.seen_columns(plan) * row_first.abs_diff(seen[0]) + banding.beyond),
                 ..Batch::default()
-            };
-            schedule.steps.push(Step::ClearBand);
-            if has_visibility(plan) {
-                let columns = [-beyond, band.column_end + beyond];
-                let all = Batch {
-                    row_first: seen[0],
-                    row_end: seen[1],
-                    column_first: columns[0],
-                    column_end: columns[1],
-                    samples_at: 0,
-                    ..band
-                };
-                schedule.triangles(device, all, SampleTarget::Visibility, Pass::of_visibility(plan))?;
-                schedule.layers(plan, device, band, goal)?;
             }
-            if goal == Goal::Picture {
-                schedule.picture_stages(plan, device, band, &edge_starts)?;
-            }
-            schedule.steps.push(Step::EndBand(Band { rows: [first, end] }));
+        };
+        (0..plan.height_px).step_by(banding.rows as usize).map(band).collect()
+    }
+
+    /// The visibility buffer of a band.
+    fn visibility(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits, band: Batch) -> Result<(), DrawError> {
+        if !has_visibility(plan) {
+            return Ok(());
         }
-        Ok(schedule)
+        let all = Batch {
+            row_first: band.seen_first,
+            row_end: band.seen_end,
+            column_first: -band.seen_margin,
+            column_end: band.column_end + band.seen_margin,
+            samples_at: 0,
+            ..band
+        };
+        self.triangles(device, all, SampleTarget::Visibility, Pass::of_visibility(plan))
+    }
+
+    /// The light that hollows go without, from the depths of all bands.
+    fn occlusion(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits) -> Result<(), DrawError> {
+        for band in self.bands(plan) {
+            self.steps.push(Step::ClearBand);
+            self.visibility(plan, device, band)?;
+            let count = plan.width_px * band.row_end.abs_diff(band.row_first);
+            self.dispatch(device, Kernel::Grid, count, Batch { count, ..band })?;
+            self.steps.push(Step::Submit);
+        }
+        let count = plan.width_px * plan.height_px;
+        self.dispatch(device, Kernel::Gather, count, Batch { count, ..Batch::default() })
     }
 
     /// The kernels of all steps.

@@ -134,7 +134,13 @@ pub fn bands_bytes(plan: &DrawPlan<'_>) -> u64 {
         loops_are_limited: false,
     };
     // Buffers are made a quarter larger than they need to be.
-    Banding::new(plan, &device, Goal::Picture).map_or(0, |banding| banding.bytes(plan) / 4 * 5)
+    Banding::new(plan, &device, Goal::Picture).map_or(0, |banding| (banding.bytes(plan) + occlusion_bytes(plan)) / 4 * 5)
+}
+
+/// Bytes of the occlusion stage, of the whole picture: a place, and what is found there, per pixel.
+pub fn occlusion_bytes(plan: &DrawPlan<'_>) -> u64 {
+    let pixels = u64::from(plan.width_px) * u64::from(plan.height_px);
+    if plan.occlusion.is_some() { pixels * 8 } else { 0 }
 }
 
 /// True if a plan needs the visibility buffer.

@@ -1,0 +1,21 @@
+// Stage occlusion, per pixel: the place of what its first sample shows, before the far plane. Twin of
+// src/backend/cpu/occlusion/grid.rs.
+
+// Low word: complement of the id. High word: depth.
+@group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
+// Places of all pixels of the picture, then what each found.
+@group(1) @binding(30) var<storage, read_write> occlusion: array<u32>;
+
+@compute @workgroup_size(WORKGROUP)
+fn grid(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
+    if i >= batch.count {
+        return;
+    }
+    let word = samples[first_visibility_sample(i)];
+    var place = NOWHERE;
+    if word.y != 0u && ~word.x < frame.triangle_count {
+        place = place_of(bitcast<f32>(word.y));
+    }
+    occlusion[i + u32(batch.row_first * frame.width)] = bitcast<u32>(place);
+}

@@ -1,0 +1,151 @@
+//! Stage occlusion: the place of what each pixel's first sample shows, before the far plane. Twin of
+//! `shaders/occlusion/grid.wgsl`.
+//!
+//! Even and odd columns of a row lie apart, because they look at other places: so eight pixels whose
+//! places are loaded together look at the same ones. A border of nothing around the picture saves
+//! asking whether a place lies in it.
+
+use std::ops::Range;
+
+use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
+use crate::backend::cpu::geometry::transform::recip;
+use crate::backend::cpu::isa::LANES;
+use crate::plan::OcclusionPass;
+
+/// The place of nothing: so far behind all else that no surface takes light from it.
+pub const NOWHERE: f32 = -1e15;
+
+/// Places per pixel.
+#[derive(Default)]
+pub struct Grid {
+    /// Columns of the picture.
+    pub width_px: u32,
+    /// Rows of the picture.
+    pub height_px: u32,
+    /// Columns and rows around it, an even number.
+    border: usize,
+    /// Columns of one parity, with room for a vector to hang over.
+    half: usize,
+    /// Distance before the far plane, or [`NOWHERE`].
+    depths: Vec<f32>,
+}
+
+impl Grid {
+    /// Places for a picture.
+    pub fn len(pass: &OcclusionPass, size_px: [u32; 2]) -> usize {
+        let (border, half) = Self::layout(pass, size_px[0]);
+        2 * half * (size_px[1] as usize + 2 * border)
+    }
+
+    fn layout(pass: &OcclusionPass, width_px: u32) -> (usize, usize) {
+        let reach = pass.taps.as_flattened().iter().map(|v| v.unsigned_abs()).max().unwrap_or(0).max(2);
+        let border = (reach as usize).next_multiple_of(2);
+        (border, (width_px as usize).div_ceil(2) + border + LANES)
+    }
+
+    /// Empties the grid for a picture.
+    pub fn reset(&mut self, pass: &OcclusionPass, [width_px, height_px]: [u32; 2]) {
+        let (border, half) = Self::layout(pass, width_px);
+        if (self.width_px, self.height_px, self.border) != (width_px, height_px, border) {
+            self.depths.clear();
+            self.depths.resize(Self::len(pass, [width_px, height_px]), NOWHERE);
+        }
+        (self.width_px, self.height_px, self.border, self.half) = (width_px, height_px, border, half);
+    }
+
+    /// Allocated memory, bytes.
+    pub fn bytes(&self) -> usize {
+        self.depths.capacity() * size_of::<f32>()
+    }
+
+    /// Items of a row.
+    pub fn stride(&self) -> usize {
+        2 * self.half
+    }
+
+    /// All places.
+    pub fn depths(&self) -> &[f32] {
+        &self.depths
+    }
+
+    /// The items of the picture's rows.
+    pub fn picture(&self) -> Range<usize> {
+        let first = self.border * self.stride();
+        first..first + self.height_px as usize * self.stride()
+    }
+
+    /// The places in the picture's rows.
+    pub fn picture_mut(&mut self) -> &mut [f32] {
+        let picture = self.picture();
+        &mut self.depths[picture]
+    }
+
+    /// Index of the place `across` and `down` from a pixel; those of eight pixels of the same parity
+    /// follow.
+    #[inline(always)]
+    pub fn index(&self, [x, y]: [u32; 2], [across, down]: [i32; 2]) -> usize {
+        let column = (x as i32 + self.border as i32 + across) as usize;
+        let row = (y as i32 + self.border as i32 + down) as usize;
+        row * self.stride() + (column & 1) * self.half + (column >> 1)
+    }
+
+    /// Of the eight pixels around one, that whose place is nearest to that of depth `z`.
+    #[inline(never)]
+    pub fn nearest_neighbour(&self, pass: &OcclusionPass, pixel: [u32; 2], z: f32) -> Option<[u32; 2]> {
+        let place = place_of(pass, z);
+        let (mut nearest, mut best) = (f32::INFINITY, None);
+        for down in -1..=1 {
+            for across in -1..=1 {
+                let depth = self.depths[self.index(pixel, [across, down])];
+                let difference = (depth - place).abs();
+                if depth > NOWHERE && difference < nearest {
+                    nearest = difference;
+                    best = Some([(pixel[0] as i32 + across) as u32, (pixel[1] as i32 + down) as u32]);
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Eight values from `at` on; zeros where there are not so many.
+#[inline(always)]
+pub fn lanes(all: &[f32], at: usize) -> &[f32; LANES] {
+    all.get(at..).and_then(|values| values.first_chunk()).unwrap_or(&[0.0; LANES])
+}
+
+/// The place of a sample of depth `z`, pixels before the far plane.
+#[inline(always)]
+pub fn place_of(pass: &OcclusionPass, z: f32) -> f32 {
+    let [a, b, c] = pass.depth;
+    (a * z) * recip(b * z + c)
+}
+
+/// Writes the places of a band's pixels into their rows of the grid; outlines, from triangle `triangles`
+/// on, are nothing.
+pub fn write_band(
+    pass: &OcclusionPass,
+    (grid_border, grid_half): (usize, usize),
+    band: &SampleBand,
+    triangles: u32,
+    out: &mut [f32],
+) {
+    for (y, row) in (band.shown[0]..band.shown[1]).zip(out.chunks_exact_mut(2 * grid_half)) {
+        let first = band.index(0, y as i32, 0);
+        let count = band.samples as usize;
+        for x in 0..band.size_px[0] as usize {
+            let at = first + x * count;
+            let (id, z) = (band.ids[at], band.depth[at]);
+            let column = x + grid_border;
+            let is_nothing = (id == NOTHING) | (id >= triangles);
+            row[(column & 1) * grid_half + (column >> 1)] = if is_nothing { NOWHERE } else { place_of(pass, z) };
+        }
+    }
+}
+
+impl Grid {
+    /// Border and length of half a row, which [`write_band`] takes.
+    pub fn shape(&self) -> (usize, usize) {
+        (self.border, self.half)
+    }
+}

@@ -1,0 +1,81 @@
+//! Stage occlusion: the light that hollows go without, from the depths of the whole picture.
+//!
+//! `grid` keeps the place of each pixel's first sample, `gather` looks at the places around it, and
+//! `spread` gives neighbours of one surface each other's results.
+
+pub mod gather;
+pub mod grid;
+pub mod spread;
+
+use self::gather::gather_rows;
+use self::grid::Grid;
+use self::spread::spread_rows;
+use super::{RasterContext, run};
+use crate::plan::OcclusionPass;
+
+/// Rows that a thread takes at a time.
+const ROWS: usize = 16;
+
+/// The light that each pixel goes without, in a picture whose depths are known.
+#[derive(Default)]
+pub struct Occlusion {
+    /// Depths.
+    pub grid: Grid,
+    /// What each pixel found by itself, in the grid's layout: whole numbers of 1/255.
+    gathered: Vec<f32>,
+    /// The same spread over its neighbours, row by row.
+    spread: Vec<u8>,
+}
+
+impl Occlusion {
+    /// Memory for a picture, bytes.
+    pub fn bytes(pass: &OcclusionPass, size_px: [u32; 2]) -> usize {
+        let grid = Grid::len(pass, size_px);
+        2 * grid * size_of::<f32>() + (size_px[0] * size_px[1]) as usize
+    }
+
+    /// Allocated memory, bytes.
+    pub fn allocated(&self) -> usize {
+        self.grid.bytes() + self.gathered.capacity() * size_of::<f32>() + self.spread.capacity()
+    }
+
+    /// Finds what each pixel goes without.
+    pub fn find(&mut self, context: &RasterContext<'_>, pass: &OcclusionPass, pool: Option<&rayon::ThreadPool>) {
+        let Self { grid, gathered, spread } = self;
+        gathered.resize(grid.depths().len(), 0.0);
+        spread.resize((grid.width_px * grid.height_px) as usize, 0);
+        let grid = &*grid;
+        let picture = grid.picture();
+        let rows: Vec<_> = (0..).step_by(ROWS).zip(gathered[picture].chunks_mut(ROWS * grid.stride())).collect();
+        let is_on = || context.deadline.check().is_ok();
+        let gather = |(first, out): (u32, &mut [f32])| {
+            if is_on() {
+                gather_rows(context.isa, pass, grid, context.plan.samples, first, out);
+            }
+        };
+        run(pool, rows, gather);
+        let gathered = &gathered[..];
+        let rows = (0..).step_by(ROWS).zip(spread.chunks_mut(ROWS * grid.width_px as usize)).collect();
+        run(pool, rows, |(first, out): (u32, &mut [u8])| {
+            if is_on() {
+                spread_rows(context.isa, pass, grid, gathered, first, out);
+            }
+        });
+    }
+
+    /// The share of light that reaches a surface of depth `z` in a pixel whose first sample has the
+    /// depth `own_z`.
+    #[inline(always)]
+    pub fn open_share(&self, pass: &OcclusionPass, [x, y]: [u32; 2], z: f32, own_z: f32) -> f32 {
+        let at = if (z - own_z).abs() <= pass.near_depth && own_z > 0.0 {
+            [x, y]
+        } else {
+            match self.grid.nearest_neighbour(pass, [x, y], z) {
+                Some(pixel) => pixel,
+                None => return 1.0,
+            }
+        };
+        let shut = self.spread[(at[1] * self.grid.width_px + at[0]) as usize];
+        1.0 - (pass.strength * (1.0 / 255.0)) * f32::from(shut)
+    }
+}
