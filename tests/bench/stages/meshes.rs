@@ -8,7 +8,7 @@ pub struct MeshFile {
     pub bytes: Vec<u8>,
 }
 
-/// A bumpy torus of about 1 k, 70 k and 1 M triangles; the largest as binary STL too.
+/// A bumpy torus of about 1 k, 70 k and 1 M triangles; the largest as binary STL, PLY and GLB too.
 pub fn made() -> Vec<MeshFile> {
     let obj = |name: &str, n| MeshFile { name: name.into(), bytes: obj(&Torus { n }) };
     vec![
@@ -16,6 +16,8 @@ pub fn made() -> Vec<MeshFile> {
         obj("torus 70 k OBJ", 187),
         obj("torus 1 M OBJ", 707),
         MeshFile { name: "torus 1 M STL".into(), bytes: stl(&Torus { n: 707 }) },
+        MeshFile { name: "torus 1 M PLY".into(), bytes: ply(&Torus { n: 707 }) },
+        MeshFile { name: "torus 1 M GLB".into(), bytes: glb(&Torus { n: 707 }) },
     ]
 }
 
@@ -77,6 +79,63 @@ pub fn stl(torus: &Torus) -> Vec<u8> {
         bytes.extend([0; 2]);
     }
     bytes
+}
+
+/// Binary PLY: floats, and lists of int with their length in a byte.
+pub fn ply(torus: &Torus) -> Vec<u8> {
+    let vertices = torus.n * torus.n;
+    let mut bytes = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        2 * vertices
+    )
+    .into_bytes();
+    bytes.extend(positions(torus));
+    for corners in torus.corners() {
+        bytes.push(3);
+        bytes.extend(corners.map(|[i, j]| (i * torus.n + j) as u32).iter().flat_map(|index| index.to_le_bytes()));
+    }
+    bytes
+}
+
+/// GLB: one primitive, positions as floats, indices of 32 bits.
+pub fn glb(torus: &Torus) -> Vec<u8> {
+    let mut data = positions(torus);
+    let (vertices, indices_at) = (torus.n * torus.n, data.len());
+    for corners in torus.corners() {
+        data.extend(corners.map(|[i, j]| (i * torus.n + j) as u32).iter().flat_map(|index| index.to_le_bytes()));
+    }
+    let json = serde_json::json!({
+        "asset": { "version": "2.0" },
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1 }] }],
+        "buffers": [{ "byteLength": data.len() }],
+        "bufferViews": [
+            { "buffer": 0, "byteLength": indices_at },
+            { "buffer": 0, "byteOffset": indices_at, "byteLength": data.len() - indices_at },
+        ],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": vertices, "type": "VEC3", "min": [-2, -1, -2], "max": [2, 1, 2] },
+            { "bufferView": 1, "componentType": 5125, "count": 6 * vertices, "type": "SCALAR" },
+        ],
+    });
+    let mut json = json.to_string().into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut bytes = b"glTF\x02\0\0\0".to_vec();
+    bytes.extend((12 + 8 + json.len() as u32 + 8 + data.len() as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", json), (b"BIN\0", data)] {
+        bytes.extend((chunk.len() as u32).to_le_bytes());
+        bytes.extend(kind);
+        bytes.extend(chunk);
+    }
+    bytes
+}
+
+fn positions(torus: &Torus) -> Vec<u8> {
+    let n = torus.n;
+    (0..n * n).flat_map(|k| torus.point(k / n, k % n)).flat_map(f32::to_le_bytes).collect()
 }
 
 /// Squares behind each other, as OBJ.
