@@ -45,7 +45,7 @@ fn look(pixel: vec2<i32>, place: vec3<f32>) -> u32 {
     return u32(round_to_i32(rn(share * 255.0)));
 }
 
-// Unit normal, towards the viewer.
+// Unit normal, towards the viewer; zero where a tangent is.
 fn normal_of(pixel: vec2<i32>, place: vec3<f32>) -> vec3<f32> {
     let a = tangent(pixel, place, vec2(1, 0));
     let b = tangent(pixel, place, vec2(0, 1));
@@ -53,7 +53,8 @@ fn normal_of(pixel: vec2<i32>, place: vec3<f32>) -> vec3<f32> {
     return rn3(n * quick_rsqrt(max(dot3(n, n), 1e-12)));
 }
 
-// A tangent along an axis: to the neighbour on that side on which depths lie on a straight line.
+// A tangent along an axis: to the neighbour on that side on which depths lie on a straight line. Zero
+// between two that show nothing: then nothing takes light.
 fn tangent(pixel: vec2<i32>, place: vec3<f32>, axis: vec2<i32>) -> vec3<f32> {
     let before = depth_at(pixel - axis);
     let after = depth_at(pixel + axis);
@@ -61,8 +62,7 @@ fn tangent(pixel: vec2<i32>, place: vec3<f32>, axis: vec2<i32>) -> vec3<f32> {
     let bend_after = (depth_at(pixel + 2 * axis) - 2.0 * after) + place.z;
     let is_before = abs(bend_before) < abs(bend_after);
     if select(after, before, is_before) == NOWHERE {
-        // Beside nothing, as if the surface faced the viewer.
-        return vec3(vec2<f32>(axis), 0.0);
+        return vec3(0.0);
     }
     if is_before {
         return place - place_at(pixel - axis, before);

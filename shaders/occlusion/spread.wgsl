@@ -32,7 +32,8 @@ fn mean_around(pixel: vec2<i32>) -> i32 {
         }
     }
     // The nearest integer, halves up: what is rounded lies at least 1/64 from a half.
-    return round_to_i32((f32(2 * sum + weights) + 0.5) / f32(2 * weights) - 0.5);
+    // Without `rn`, a compiler may add up the two constants that follow each other here.
+    return round_to_i32(rn((f32(2 * sum + weights) + 0.5) / f32(2 * weights) - 0.5));
 }
 
 // Of the eight pixels around one, that whose place is nearest to that of depth z; negative if none

@@ -126,8 +126,16 @@ const SHADER_ONLY: &[&str] = &[
 
 /// Every kernel in each of its variants.
 fn kernels() -> Vec<Kernel> {
-    let mut all =
-        vec![Kernel::Transform, Kernel::Clip, Kernel::Grid, Kernel::Gather, Kernel::Composite, Kernel::Shade, Kernel::Edge, Kernel::Coverage];
+    let mut all = vec![
+        Kernel::Transform,
+        Kernel::Clip,
+        Kernel::Grid,
+        Kernel::Gather,
+        Kernel::Composite,
+        Kernel::Shade,
+        Kernel::Edge,
+        Kernel::Coverage,
+    ];
     all.extend([Kernel::Holes, Kernel::LineLight, Kernel::Resolve]);
     for write in [SampleWrite::Both, SampleWrite::Depth, SampleWrite::Id] {
         for target in [SampleTarget::Visibility, SampleTarget::Layer] {

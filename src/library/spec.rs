@@ -60,6 +60,8 @@ styles! {
     topology = "topology",
     /// Smooth surface, feature edges and a contour, as in a technical drawing.
     technical = "technical",
+    /// The bare form: one matt colour for all materials, and strong occlusion.
+    clay = "clay",
 }
 
 impl Spec {

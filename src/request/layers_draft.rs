@@ -98,7 +98,16 @@ impl LayersDraft {
 fn clay() -> Option<Surface> {
     let color = Some(Rgba([0.62, 0.56, 0.50, 1.0]));
     let (metallic, roughness) = (Some(0.0), Some(1.0));
-    Some(Surface { color, metallic, roughness, emissive: Some(Rgba::BLACK), textures: false, ..Surface::default() })
+    let emissive = Some(Rgba::BLACK);
+    Some(Surface {
+        shading: Shading::Smooth,
+        color,
+        metallic,
+        roughness,
+        emissive,
+        textures: false,
+        ..Surface::default()
+    })
 }
 
 /// The lines of [`Style::Technical`]: 1 px wide.

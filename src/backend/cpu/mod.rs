@@ -243,7 +243,8 @@ impl CpuRenderer {
     /// Memory that drawing the plan takes beside what grows with its mesh, bytes. On all threads,
     /// so that no refusal depends on what else is drawn.
     pub fn bands_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
-        let occlusion = plan.occlusion.as_ref().map_or(0, |pass| Occlusion::bytes(pass, [plan.width_px, plan.height_px]));
+        let occlusion =
+            plan.occlusion.as_ref().map_or(0, |pass| Occlusion::bytes(pass, [plan.width_px, plan.height_px]));
         (Banding::new(plan, self.threads.count()).bytes(plan) + occlusion) as u64
     }
 }

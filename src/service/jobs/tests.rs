@@ -57,7 +57,8 @@ fn spec() -> Spec {
         fits_turn: false,
     };
     let image = ImageSpec { width_px: 8, height_px: 8, format: None, samples: 1, background: Rgba::WHITE, effort: 3 };
-    let light = Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3, ambient_occlusion: 0.0 };
+    let light =
+        Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3, ambient_occlusion: 0.0 };
     Spec {
         layers: Layers::default(),
         materials: Vec::new(),

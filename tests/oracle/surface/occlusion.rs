@@ -71,7 +71,8 @@ fn eye(camera: &Camera) -> V3 {
 
 fn diagonal(positions: &[V3]) -> f64 {
     let side = |k: usize| {
-        let (low, high) = positions.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p[k]), high.max(p[k])));
+        let (low, high) =
+            positions.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p[k]), high.max(p[k])));
         high - low
     };
     length([side(0), side(1), side(2)])

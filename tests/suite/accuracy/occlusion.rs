@@ -102,25 +102,33 @@ fn rmse(truth: &[([u32; 2], f64)], plain: &Image, dark: &Image) -> f64 {
     (squares / (3 * truth.len()) as f64).sqrt()
 }
 
-/// However it is seen, what is flat or bends outwards stays as it is, to the byte.
+/// However it is seen, what is flat stays as it is, to the byte, and so does what bends outwards, but for
+/// corners that are thinner than two pixels: there a normal may lie between those of two faces.
 #[test]
-fn planes_and_balls_go_without_nothing() {
+fn planes_and_cubes_lose_no_light() {
     let plane = "v -1 -1 0\nv 1 -1 0.3\nv 1 1 0.1\nv -1 1 -0.2\nf 1 2 3\n";
     let mut renderers = renderers();
     let mut compared = 0;
-    for obj in [plane.to_owned(), shapes::cube()] {
+    for (obj, pixels_max, steps_max) in [(plane.to_owned(), 0, 0), (shapes::cube(), 64, 12)] {
         let mesh = scenes::mesh(&obj);
         for view in ["auto", "iso", "front", "left", "top"] {
-            for (projection, fov) in [("perspective", "35"), ("perspective", "120"), ("perspective", "0.5"), ("orthographic", "35")] {
-                let draw = |strength| {
+            for (projection, fov) in
+                [("perspective", "35"), ("perspective", "120"), ("perspective", "0.5"), ("orthographic", "35")]
+            {
+                let specs = ["0", "1"].map(|strength| {
                     let mut keys = keys(view, projection, strength).to_vec();
                     keys.push(("camera.fov_deg", fov));
                     scenes::spec(&keys)
-                };
-                let specs = ["0", "1"].map(draw);
+                });
                 for renderer in &mut renderers {
-                    let [plain, dark] = specs.each_ref().map(|spec| renderer.draw(&scenes::plan(&mesh, spec), &Deadline::default()).unwrap());
-                    assert_eq!(plain.rgba, dark.rgba, "{view}, {projection}, {fov}, {}", renderer.kind().name());
+                    let [plain, dark] = specs
+                        .each_ref()
+                        .map(|spec| renderer.draw(&scenes::plan(&mesh, spec), &Deadline::default()).unwrap());
+                    let steps = plain.rgba.chunks(4).zip(dark.rgba.chunks(4));
+                    let steps = steps.map(|(a, b)| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0));
+                    let (pixels, most) = (steps.clone().filter(|&v| v > 0).count(), steps.max().unwrap_or(0));
+                    let what = format!("{view}, {projection}, {fov}, {}", renderer.kind().name());
+                    assert!(pixels <= pixels_max && most <= steps_max, "{what}: {pixels} pixels, up to {most}");
                     compared += 1;
                 }
             }

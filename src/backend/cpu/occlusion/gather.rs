@@ -4,8 +4,8 @@
 use super::grid::{Grid, NOWHERE, lanes};
 use crate::backend::cpu::geometry::transform::round_to_i32;
 use crate::backend::cpu::isa::{LANES, dispatch};
-use crate::plan::{OcclusionPass, sample_offsets};
 use crate::plan::occlusion::TAPS_PER_PIXEL;
+use crate::plan::{OcclusionPass, sample_offsets};
 
 /// Sine of the angle above the surface below which nothing takes light: flat places stay as they are,
 /// however they are rounded.
@@ -92,7 +92,8 @@ impl<'a> Looker<'a> {
         places
     }
 
-    /// A tangent along an axis: to the neighbour on that side on which depths lie on a straight line.
+    /// A tangent along an axis: to the neighbour on that side on which depths lie on a straight line. Zero
+    /// between two that show nothing: then nothing takes light.
     #[inline(always)]
     fn tangent(&self, axis: usize) -> [Lanes; 3] {
         let tap = |steps: i32| if axis == 0 { [steps, 0] } else { [0, steps] };
@@ -106,16 +107,15 @@ impl<'a> Looker<'a> {
             let is_before = bend_before.abs() < bend_after.abs();
             let depth = if is_before { before[l] } else { after[l] };
             for k in 0..3 {
-                let step = if is_before { self.place[k][l] - at_before[k][l] } else { at_after[k][l] - self.place[k][l] };
-                // Beside nothing, as if the surface faced the viewer.
-                let flat = if k == axis { 1.0 } else { 0.0 };
-                tangent[k][l] = if depth == NOWHERE { flat } else { step };
+                let step =
+                    if is_before { self.place[k][l] - at_before[k][l] } else { at_after[k][l] - self.place[k][l] };
+                tangent[k][l] = if depth == NOWHERE { 0.0 } else { step };
             }
         }
         tangent
     }
 
-    /// Unit normals, towards the viewer.
+    /// Unit normals, towards the viewer; zero where a tangent is.
     #[inline(always)]
     fn normals(&self) -> [Lanes; 3] {
         let (a, b) = (self.tangent(0), self.tangent(1));

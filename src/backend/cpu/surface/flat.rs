@@ -28,7 +28,10 @@ impl FlatColors {
     /// True if all colours of a plan's visible samples are the same all over a triangle.
     pub fn suffice(plan: &DrawPlan<'_>) -> bool {
         let is_flat = |s: &SurfacePass<'_>| !s.is_shaded || s.materials.iter().all(|m| is_flat(s, m));
-        plan.peeling().is_none() && plan.occlusion.is_none() && plan.is_shaded() && plan.surface.as_ref().is_none_or(is_flat)
+        plan.peeling().is_none()
+            && plan.occlusion.is_none()
+            && plan.is_shaded()
+            && plan.surface.as_ref().is_none_or(is_flat)
     }
 
     /// Finds the colours of all triangles in the bins, which have each triangle once.

@@ -134,7 +134,8 @@ pub fn bands_bytes(plan: &DrawPlan<'_>) -> u64 {
         loops_are_limited: false,
     };
     // Buffers are made a quarter larger than they need to be.
-    Banding::new(plan, &device, Goal::Picture).map_or(0, |banding| (banding.bytes(plan) + occlusion_bytes(plan)) / 4 * 5)
+    Banding::new(plan, &device, Goal::Picture)
+        .map_or(0, |banding| (banding.bytes(plan) + occlusion_bytes(plan)) / 4 * 5)
 }
 
 /// Bytes of the occlusion stage, of the whole picture: a place, and what is found there, per pixel.
