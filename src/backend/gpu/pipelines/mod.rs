@@ -31,10 +31,17 @@ pub enum Kernel {
         /// As above.
         target: SampleTarget,
     },
+    /// Few triangles to samples, whatever their size.
+    VisibilityFew {
+        /// Phase of writing samples.
+        write: SampleWrite,
+    },
     /// Samples of a peeled layer to colours, under the layers in front of it.
     Composite,
     /// Samples to colours.
     Shade,
+    /// Samples to bytes, where nothing else is to be drawn.
+    Paint,
     /// Faces to the area that their lines leave free.
     Holes,
     /// Edges to strokes.
@@ -201,8 +208,10 @@ impl Kernel {
     pub fn stage(self) -> DrawStage {
         match self {
             Self::Transform => DrawStage::Transform,
-            Self::Visibility { .. } | Self::Clip | Self::VisibilityTile { .. } => DrawStage::Visibility,
-            Self::Composite | Self::Shade => DrawStage::Shade,
+            Self::Visibility { .. } | Self::Clip | Self::VisibilityTile { .. } | Self::VisibilityFew { .. } => {
+                DrawStage::Visibility
+            }
+            Self::Composite | Self::Shade | Self::Paint => DrawStage::Shade,
             Self::Holes | Self::Edge | Self::Coverage | Self::LineLight => DrawStage::Lines,
             Self::Resolve => DrawStage::Resolve,
         }
