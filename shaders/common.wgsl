@@ -97,6 +97,12 @@ struct Batch {
     // Size of the largest triangle that a thread draws by itself, 1/256 px. At most 4096, so that edge values
     // fit 32 bits.
     alone_size: i32,
+    // Workgroups that share a triangle where there are few.
+    groups_each: u32,
+    // Samples that the transform stage empties.
+    cleared: u32,
+    // Where the batch's first pixel is in the bytes of the picture.
+    rgba_at: u32,
 };
 
 // Threads of a workgroup, in every kernel.

@@ -3,13 +3,23 @@
 use std::io::IsTerminal as _;
 
 use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::LevelFilter;
 
 /// Starts the log. `filter` has the syntax of `tracing`: `info`, or `warn,meshsnap::service=debug`.
 /// If `json` is None, the log is JSON unless standard error is a terminal.
 pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
-    let parsed = EnvFilter::try_new(filter).map_err(|e| {
+    let mut parsed = EnvFilter::try_new(filter).map_err(|e| {
         format!("`log` is \"{filter}\", which is no filter ({e}); use error, warn, info, debug or trace")
     })?;
+    // On each start wgpu warns that memory which both sides reach may be slow. What it is used for here is faster:
+    // docs/gpu-notes.md has the figures.
+    if let (false, true, Ok(quiet)) = (
+        filter.contains("wgpu"),
+        parsed.max_level_hint() > Some(LevelFilter::ERROR),
+        "wgpu_core::instance=error".parse(),
+    ) {
+        parsed = parsed.add_directive(quiet);
+    }
     let terminal = std::io::stderr().is_terminal();
     let text = !json.unwrap_or(!terminal);
     let builder = tracing_subscriber::fmt().with_env_filter(parsed).with_writer(std::io::stderr);

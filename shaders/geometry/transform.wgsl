@@ -1,8 +1,13 @@
 // Stage transform, per vertex: unit box to snapped screen coordinates. Twin of
 // src/backend/cpu/geometry/transform.rs.
+//
+// It also empties the first band's visibility buffer and the first work list: a command for each would cost the
+// device more than the stores do.
 
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(3) var<storage, read_write> vertices: array<Vertex>;
+@group(1) @binding(4) var<storage, read_write> samples: array<vec2<u32>>;
+@group(1) @binding(5) var<storage, read_write> work: array<u32>;
 
 // Farthest a snapped coordinate may lie from the picture's centre: 4096 px.
 const GUARD: f32 = 1048576.0;
@@ -10,6 +15,13 @@ const GUARD: f32 = 1048576.0;
 @compute @workgroup_size(WORKGROUP)
 fn transform(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = gid.x + gid.y * groups.x * WORKGROUP;
+    if i == 0u {
+        work[0] = 0u;
+        work[1] = 0u;
+    }
+    for (var s = i; s < batch.cleared; s += groups.x * groups.y * WORKGROUP) {
+        samples[s] = vec2(0u);
+    }
     if i >= batch.count {
         return;
     }

@@ -136,8 +136,9 @@ fn kernels() -> Vec<Kernel> {
         Kernel::Edge,
         Kernel::Coverage,
     ];
-    all.extend([Kernel::Holes, Kernel::LineLight, Kernel::Resolve]);
+    all.extend([Kernel::Holes, Kernel::LineLight, Kernel::Resolve, Kernel::Paint]);
     for write in [SampleWrite::Both, SampleWrite::Depth, SampleWrite::Id] {
+        all.push(Kernel::VisibilityFew { write });
         for target in [SampleTarget::Visibility, SampleTarget::Layer] {
             all.extend([Kernel::Visibility { write, target }, Kernel::VisibilityTile { write, target }]);
         }
@@ -223,7 +224,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 first count faces row_first row_end capacity large_first large_end huge_first huge_end edges_per_group
                 line_width line_smoothing line_flags line_exponent line_windows line_slices line_peak line_units
                 line_pass seen_first seen_end samples_at pass_bit layer column_first column_end seen_margin
-                alone_size
+                alone_size groups_each cleared rgba_at
             }),
         ),
         (

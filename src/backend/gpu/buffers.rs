@@ -68,8 +68,8 @@ pub struct Buffers {
     bound: [Option<wgpu::Buffer>; SLOTS],
     /// Buffers that the current job has filled, to be kept for others if it succeeds.
     filled: Vec<(Slot, Source, wgpu::Buffer)>,
-    /// Uniforms of a plan.
-    pub frame: Option<wgpu::Buffer>,
+    /// Uniforms of a plan, where the CPU cannot write to where kernels read.
+    frame: Option<wgpu::Buffer>,
     /// Uniforms of the dispatches.
     pub batches: Option<wgpu::Buffer>,
     /// Those with which `batches` begins, if they are known.
@@ -169,11 +169,24 @@ impl Buffers {
         self.reserve(gpu, slot, 0).cloned()
     }
 
-    /// Fills a uniform buffer.
-    pub fn upload_uniform<'a>(gpu: &Handles, slot: &'a mut Option<wgpu::Buffer>, bytes: &[u8]) -> &'a wgpu::Buffer {
-        let buffer = Self::uniform(gpu, slot, bytes.len() as u64);
-        gpu.queue.write_buffer(buffer, 0, bytes);
-        buffer
+    /// A buffer that holds the uniforms of a plan. Where kernels can read what the CPU writes it is a new one, because
+    /// then no command copies them: that costs the device more than the buffer costs the CPU.
+    pub fn upload_frame(&mut self, gpu: &Handles, bytes: &[u8]) -> Result<wgpu::Buffer, DrawError> {
+        use wgpu::BufferUsages as U;
+        let size = bytes.len() as u64;
+        if !gpu.maps_storage {
+            let buffer = Self::uniform(gpu, &mut self.frame, size);
+            gpu.queue.write_buffer(buffer, 0, bytes);
+            return Ok(buffer.clone());
+        }
+        let usage = U::UNIFORM | U::MAP_WRITE;
+        let descriptor = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: true };
+        let buffer = gpu.device.create_buffer(&descriptor);
+        let mut view = buffer.get_mapped_range_mut(..).map_err(|e| DrawError::Device(e.to_string()))?;
+        view.copy_from_slice(bytes);
+        drop(view);
+        buffer.unmap();
+        Ok(buffer)
     }
 
     /// A uniform buffer of at least `size` bytes.
@@ -182,14 +195,15 @@ impl Buffers {
         grow(gpu, slot, size, gpu.limits.max_buffer_size, U::UNIFORM | U::COPY_DST)
     }
 
-    /// A buffer of at least `size` bytes that the CPU can map.
+    /// A buffer of at least `size` bytes that the CPU can map, and kernels write to if the device allows both.
     pub fn staging(&mut self, gpu: &Handles, size: u64) -> Result<&wgpu::Buffer, DrawError> {
         use wgpu::BufferUsages as U;
         let limit = gpu.limits.max_buffer_size;
         if size > limit {
             return Err(DrawError::Device(format!("the picture has {size} bytes, and the GPU's limit is {limit}")));
         }
-        Ok(grow(gpu, &mut self.staging, size, limit, U::MAP_READ | U::COPY_DST))
+        let written = if gpu.maps_storage { U::STORAGE } else { U::empty() };
+        Ok(grow(gpu, &mut self.staging, size, limit, U::MAP_READ | U::COPY_DST | written))
     }
 
     /// A small buffer that the CPU can map.

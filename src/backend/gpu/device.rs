@@ -97,7 +97,8 @@ impl Gpu {
         }
         let int64 = wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX;
         let int64_atomics = atomics_choice == AtomicsChoice::Best && adapter.features().contains(int64);
-        let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::PIPELINE_CACHE;
+        let wanted =
+            wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::PIPELINE_CACHE | wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
         let atomics = if int64_atomics { int64 } else { wgpu::Features::empty() };
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("meshsnap"),
@@ -121,6 +122,7 @@ impl Gpu {
             .on_uncaptured_error(Arc::new(|error| tracing::error!(%error, "the GPU reported an error outside a job")));
 
         let file = cache.and_then(|folder| PipelineFile::open(folder, &info, &device));
+        let maps_storage = device.features().contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
         let has_clock = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         let clock_step_ns = has_clock.then(|| queue.get_timestamp_period());
         tracing::debug!(name = info.name, "opened a device");
@@ -129,7 +131,7 @@ impl Gpu {
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
         let info = GpuInfo { name: info.name, driver, device_type: type_name(info.device_type), features };
         Ok(Self {
-            handles: Handles { device, queue, limits },
+            handles: Handles { device, queue, limits, maps_storage },
             pipelines: Pipelines::kept_in(file),
             spare_buffers: SpareBuffers::default(),
             residents: ResidentBuffers::new(if is_software { RESIDENT_BYTES_SOFTWARE } else { RESIDENT_BYTES }),

@@ -5,4 +5,6 @@ pub struct Handles {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     pub limits: wgpu::Limits,
+    /// True if kernels can write to a buffer that the CPU reads, and read one that it writes.
+    pub maps_storage: bool,
 }

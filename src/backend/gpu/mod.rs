@@ -33,7 +33,7 @@ use self::recorder::Recorder;
 use self::residents::{Found, Source};
 use self::schedule::Schedule;
 use self::schedule::sizes::{
-    DeviceTraits, OWNER_BYTES, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility,
+    DeviceTraits, OWNER_BYTES, PEEL_STATE_BYTES, SAMPLE_BYTES, STROKES_BYTES, color_bytes, has_visibility, is_painted,
     occlusion_bytes, samples, work_bytes,
 };
 use self::schedule::step::{Band, Goal, Step};
@@ -102,7 +102,7 @@ impl GpuRenderer {
             gpu.make_pipelines(&schedule.kernels(), pipeline_key(plan))?;
             upload_geometry(gpu, buffers, plan, &schedule)?;
             buffers.staging(&gpu.handles, u64::from(schedule.banding.rows) * row_words as u64 * 8)?;
-            let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
+            let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches)?;
             let mut words = Vec::with_capacity(len);
             execute(&mut recorder, plan, &schedule, |recorder, band| {
                 let size = u64::from(band.rows[1] - band.rows[0]) * row_words as u64 * 8;
@@ -177,18 +177,29 @@ impl GpuRenderer {
         let mut times = DrawTimes::default();
         let drawing = self.gpu.begin_job();
         self.job(|gpu, buffers| {
-            let schedule = Schedule::new(plan, &traits(gpu), Goal::Picture)?;
+            let staging = buffers.staging(&gpu.handles, times_at + StageClock::BYTES)?.clone();
+            let device = traits(gpu);
+            // Kernels write the bytes to where the CPU reads them, if they can.
+            let maps_pictures = gpu.handles.maps_storage && staging.size() <= device.binding_bytes_max;
+            let schedule = Schedule::new(plan, &DeviceTraits { maps_pictures, ..device }, Goal::Picture)?;
             gpu.make_pipelines(&schedule.kernels(), pipeline_key(plan))?;
             upload_geometry(gpu, buffers, plan, &schedule)?;
             upload_shading(gpu, buffers, plan, &schedule)?;
-            buffers.staging(&gpu.handles, times_at + StageClock::BYTES)?;
-            let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches);
+            if maps_pictures {
+                buffers.bind(Slot::Rgba, staging);
+            } else {
+                let band_bytes = row_bytes * u64::from(schedule.banding.rows);
+                buffers.reserve(&gpu.handles, Slot::Rgba, band_bytes)?;
+            }
+            let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches)?;
             if drawing.is_alone {
                 recorder.start_clock();
             }
             execute(&mut recorder, plan, &schedule, |recorder, Band { rows: [first, end] }| {
-                let to = u64::from(first) * row_bytes;
-                recorder.copy_out(Slot::Rgba, 0, u64::from(end - first) * row_bytes, to)?;
+                if !maps_pictures {
+                    let to = u64::from(first) * row_bytes;
+                    recorder.copy_out(Slot::Rgba, 0, u64::from(end - first) * row_bytes, to)?;
+                }
                 if end == plan.height_px {
                     recorder.copy_times(times_at);
                 }
@@ -215,6 +226,7 @@ fn traits(gpu: &Gpu) -> DeviceTraits {
         workgroups_max: gpu.handles.limits.max_compute_workgroups_per_dimension,
         tile_workgroups: if gpu.is_software() { TILE_WORKGROUPS_SOFTWARE } else { TILE_WORKGROUPS },
         alone_size_of_few: gpu.alone_size_of_few,
+        maps_pictures: false,
         int64_atomics: gpu.int64_atomics,
         loops_are_limited: gpu.is_software(),
     }
@@ -284,7 +296,7 @@ fn upload_geometry(
 /// Supplies the input of shade, lines and resolve, and reserves their output.
 fn upload_shading(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
     let band_pixels = u64::from(plan.width_px) * u64::from(schedule.banding.rows);
-    if has_visibility(plan) || !plan.lines.is_empty() {
+    if !is_painted(plan) && (has_visibility(plan) || !plan.lines.is_empty()) {
         buffers.reserve(&gpu.handles, Slot::Colors, band_pixels * color_bytes(plan))?;
     }
     if plan.occlusion.is_some() {
@@ -310,7 +322,6 @@ fn upload_shading(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, schedul
         }
     }
     buffers.upload(&gpu.handles, Slot::Thresholds, bytemuck::cast_slice(&srgb8_thresholds()))?;
-    buffers.reserve(&gpu.handles, Slot::Rgba, band_pixels * 4)?;
     Ok(())
 }
 
@@ -363,7 +374,7 @@ fn execute<'a>(
     while let Some(step) = schedule.steps.get(next) {
         next += 1;
         match *step {
-            Step::ClearBand => clear_band(recorder, plan, schedule)?,
+            Step::ClearBand { samples } => clear_band(recorder, plan, schedule, samples)?,
             Step::ClearLayer => {
                 recorder.clear(Slot::PeelLayer, samples(plan, schedule.banding.rows) * SAMPLE_BYTES)?;
             }
@@ -388,11 +399,16 @@ fn execute<'a>(
     Ok(())
 }
 
-fn clear_band(recorder: &mut Recorder<'_>, plan: &DrawPlan<'_>, schedule: &Schedule) -> Result<(), DrawError> {
+fn clear_band(
+    recorder: &mut Recorder<'_>,
+    plan: &DrawPlan<'_>,
+    schedule: &Schedule,
+    clears_samples: bool,
+) -> Result<(), DrawError> {
     if schedule.layers > 0 {
         recorder.clear(Slot::PeelRounds, u64::from(schedule.layers) * 4)?;
     }
-    if has_visibility(plan) {
+    if has_visibility(plan) && clears_samples {
         recorder.clear(Slot::Samples, schedule.banding.seen_samples(plan) * SAMPLE_BYTES)?;
     }
     if schedule.goal == Goal::Picture && !plan.lines.is_empty() {

@@ -77,6 +77,9 @@ pub struct Batch {
     pub column_end: i32,
     pub seen_margin: i32,
     pub alone_size: i32,
+    pub groups_each: u32,
+    pub cleared: u32,
+    pub rgba_at: u32,
 }
 
 /// Bits of [`Batch::line_flags`].

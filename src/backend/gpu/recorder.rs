@@ -40,9 +40,9 @@ impl<'a> Recorder<'a> {
         buffers: &'a mut Buffers,
         plan: &DrawPlan<'_>,
         batches: &[Batch],
-    ) -> Self {
+    ) -> Result<Self, DrawError> {
         let frame = Frame::new(plan);
-        let frame = Buffers::upload_uniform(&gpu.handles, &mut buffers.frame, bytemuck::bytes_of(&frame)).clone();
+        let frame = buffers.upload_frame(&gpu.handles, bytemuck::bytes_of(&frame))?;
         // One more, for dispatches whose parameters are known only while recording.
         let spare_batch = batches.len();
         let batches = upload_batches(&gpu.handles, buffers, batches);
@@ -51,7 +51,7 @@ impl<'a> Recorder<'a> {
             _ => bind_uniforms(&gpu.handles.device, &frame, &batches),
         };
         buffers.uniforms = Some((frame, batches, uniforms.clone()));
-        Self {
+        Ok(Self {
             gpu,
             deadline,
             buffers,
@@ -63,7 +63,7 @@ impl<'a> Recorder<'a> {
             pass: None,
             clock: None,
             in_flight: None,
-        }
+        })
     }
 
     /// Times the stages from now on, where the device can; to be called before the first dispatch.

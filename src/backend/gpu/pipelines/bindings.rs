@@ -19,8 +19,10 @@ impl Kernel {
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => TILE_OF_LAYER,
             Self::Grid => GRID,
             Self::Gather => GATHER,
+            Self::VisibilityFew { .. } => FEW,
             Self::Composite => COMPOSITE,
             Self::Shade => SHADE,
+            Self::Paint => PAINT,
             Self::Holes => HOLES,
             Self::Edge => EDGE,
             Self::Coverage => COVERAGE,
@@ -47,7 +49,8 @@ impl Kernel {
     }
 }
 
-const TRANSFORM: &[Binding] = &[(Slot::Positions, Read), (Slot::Vertices, ReadWrite)];
+const TRANSFORM: &[Binding] =
+    &[(Slot::Positions, Read), (Slot::Vertices, ReadWrite), (Slot::Samples, ReadWrite), (Slot::Work, ReadWrite)];
 
 const VISIBILITY: &[Binding] = &[
     (Slot::Triangles, Read),
@@ -79,6 +82,14 @@ const CLIP: &[Binding] = &[
 ];
 
 const TILE: &[Binding] = &[(Slot::Samples, ReadWrite), (Slot::Work, Read)];
+
+const FEW: &[Binding] = &[
+    (Slot::Triangles, Read),
+    (Slot::PassMasks, Read),
+    (Slot::Vertices, Read),
+    (Slot::Samples, ReadWrite),
+    (Slot::PeelRounds, Read),
+];
 
 const TILE_OF_LAYER: &[Binding] =
     &[(Slot::Samples, ReadWrite), (Slot::Work, Read), (Slot::PeelLayer, Read), (Slot::PeelState, Read)];
@@ -124,6 +135,25 @@ const SHADE: &[Binding] = &[
     (Slot::Texels, Read),
     (Slot::Occlusion, Read),
     (Slot::Colors, ReadWrite),
+];
+
+const PAINT: &[Binding] = &[
+    (Slot::Positions, Read),
+    (Slot::Triangles, Read),
+    (Slot::Vertices, Read),
+    (Slot::Samples, Read),
+    (Slot::Normals, Read),
+    (Slot::CornerTriangles, Read),
+    (Slot::Attributes, Read),
+    (Slot::Materials, Read),
+    (Slot::FaceNormals, Read),
+    (Slot::PassMasks, Read),
+    (Slot::HullMaterials, Read),
+    (Slot::Uvs, Read),
+    (Slot::VertexColors, Read),
+    (Slot::Texels, Read),
+    (Slot::Thresholds, Read),
+    (Slot::Rgba, ReadWrite),
 ];
 
 const HOLES: &[Binding] = &[

@@ -14,6 +14,8 @@ const FREE_POINTS: &str = include_str!("../../../../shaders/lines/free_points.wg
 const STROKE_WORDS: &str = include_str!("../../../../shaders/lines/stroke_words.wgsl");
 const STROKE: &str = include_str!("../../../../shaders/lines/stroke.wgsl");
 const PLANES: &str = include_str!("../../../../shaders/geometry/planes.wgsl");
+const CORNERS: &str = include_str!("../../../../shaders/geometry/corners.wgsl");
+const TILE: &str = include_str!("../../../../shaders/geometry/tile.wgsl");
 const WORK: &str = include_str!("../../../../shaders/geometry/work.wgsl");
 const TRIANGLE: &str = include_str!("../../../../shaders/geometry/triangle.wgsl");
 const SAMPLES_32: &str = include_str!("../../../../shaders/geometry/samples32.wgsl");
@@ -22,6 +24,7 @@ const SAMPLES: &str = include_str!("../../../../shaders/geometry/samples.wgsl");
 const PEEL_STATE: &str = include_str!("../../../../shaders/peeling/state.wgsl");
 const EMIT: &str = include_str!("../../../../shaders/geometry/emit.wgsl");
 const EMIT_LAYER: &str = include_str!("../../../../shaders/peeling/emit_layer.wgsl");
+const ENCODE: &str = include_str!("../../../../shaders/encode.wgsl");
 const OVER: &str = include_str!("../../../../shaders/over.wgsl");
 const PLACE: &str = include_str!("../../../../shaders/occlusion/place.wgsl");
 const SPREAD: &str = include_str!("../../../../shaders/occlusion/spread.wgsl");
@@ -49,6 +52,8 @@ impl Kernel {
             Self::Gather => "gather",
             Self::Composite => "composite",
             Self::VisibilityTile { .. } => "visibility_tile",
+            Self::VisibilityFew { .. } => "visibility_few",
+            Self::Paint => "paint",
             Self::Shade => "shade",
             Self::Holes => "holes",
             Self::Edge => "edge",
@@ -64,6 +69,7 @@ impl Kernel {
         match self {
             Self::Visibility { write, target } => Self::Visibility { write: first(write), target },
             Self::VisibilityTile { write, target } => Self::VisibilityTile { write: first(write), target },
+            Self::VisibilityFew { write } => Self::VisibilityFew { write: first(write) },
             other => other,
         }
     }
@@ -79,17 +85,29 @@ impl Kernel {
             Self::Transform => [COMMON, include_str!("../../../../shaders/geometry/transform.wgsl")].concat(),
             Self::Visibility { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility.wgsl");
-                [COMMON, TRIANGLE, WORK, SAMPLES, keep_nearest(write), &emit(target), kernel].concat()
+                [COMMON, TRIANGLE, CORNERS, WORK, SAMPLES, keep_nearest(write), &emit(target), kernel].concat()
             }
             Self::Clip => {
-                [COMMON, TRIANGLE, WORK, PLANES, include_str!("../../../../shaders/geometry/clip.wgsl")].concat()
+                [COMMON, TRIANGLE, CORNERS, WORK, PLANES, include_str!("../../../../shaders/geometry/clip.wgsl")]
+                    .concat()
             }
             Self::VisibilityTile { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility_tile.wgsl");
-                [COMMON, TRIANGLE, SAMPLES, keep_nearest(write), &emit(target), kernel].concat()
+                [COMMON, TRIANGLE, SAMPLES, keep_nearest(write), &emit(target), TILE, kernel].concat()
             }
             Self::Grid => [COMMON, PLACE, include_str!("../../../../shaders/occlusion/grid.wgsl")].concat(),
             Self::Gather => [COMMON, PLACE, include_str!("../../../../shaders/occlusion/gather.wgsl")].concat(),
+            Self::VisibilityFew { write } => {
+                let kernel = include_str!("../../../../shaders/geometry/visibility_few.wgsl");
+                [COMMON, TRIANGLE, CORNERS, SAMPLES, keep_nearest(write), EMIT, TILE, kernel].concat()
+            }
+            Self::Paint => [
+                &[COMMON, TRIANGLE],
+                SHADE,
+                &[GROUP, OVER, ENCODE, include_str!("../../../../shaders/surface/paint.wgsl")],
+            ]
+            .concat()
+            .concat(),
             Self::Composite => [
                 &[COMMON, TRIANGLE],
                 SHADE,
@@ -122,7 +140,7 @@ impl Kernel {
                 let kernel = include_str!("../../../../shaders/lines/coverage.wgsl");
                 [COMMON, OVER, STROKE_WORDS, SEEN, INSET, LATTICE, FREE_POINTS, PEEL_STATE, kernel].concat()
             }
-            Self::Resolve => [COMMON, OVER, include_str!("../../../../shaders/resolve.wgsl")].concat(),
+            Self::Resolve => [COMMON, OVER, ENCODE, include_str!("../../../../shaders/resolve.wgsl")].concat(),
         }
     }
 
@@ -148,6 +166,8 @@ impl Kernel {
                 key::SAMPLES | key::PASS_MASKS | key::PEELING | key::BEHIND_SURFACE
             }
             Self::VisibilityTile { target: SampleTarget::Visibility, .. } => key::SAMPLES,
+            Self::VisibilityFew { .. } => key::SAMPLES | key::PASS_MASKS,
+            Self::Paint => SHADED,
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => key::SAMPLES | key::BEHIND_SURFACE,
             Self::Composite => SHADED | key::PEELED_HULL,
             Self::Grid | Self::Gather => key::SAMPLES,
@@ -164,12 +184,12 @@ impl Kernel {
     pub fn constants(self, key: u32) -> Vec<(&'static str, f64)> {
         let key = ("PIPELINE_KEY", f64::from(key));
         match self {
-            Self::Visibility { write: SampleWrite::Depth, .. }
-            | Self::VisibilityTile { write: SampleWrite::Depth, .. } => {
-                vec![key, ("PHASE", 0.0)]
-            }
-            Self::Visibility { write: SampleWrite::Id, .. } | Self::VisibilityTile { write: SampleWrite::Id, .. } => {
-                vec![key, ("PHASE", 1.0)]
+            Self::Visibility { write, .. } | Self::VisibilityTile { write, .. } | Self::VisibilityFew { write } => {
+                match write {
+                    SampleWrite::Both => vec![key],
+                    SampleWrite::Depth => vec![key, ("PHASE", 0.0)],
+                    SampleWrite::Id => vec![key, ("PHASE", 1.0)],
+                }
             }
             _ => vec![key],
         }

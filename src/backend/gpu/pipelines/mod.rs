@@ -35,10 +35,17 @@ pub enum Kernel {
     Grid,
     /// Places to the light that hollows go without.
     Gather,
+    /// Few triangles to samples, whatever their size.
+    VisibilityFew {
+        /// Phase of writing samples.
+        write: SampleWrite,
+    },
     /// Samples of a peeled layer to colours, under the layers in front of it.
     Composite,
     /// Samples to colours.
     Shade,
+    /// Samples to bytes, where nothing else is to be drawn.
+    Paint,
     /// Faces to the area that their lines leave free.
     Holes,
     /// Edges to strokes.
@@ -206,9 +213,11 @@ impl Kernel {
     pub fn stage(self) -> DrawStage {
         match self {
             Self::Transform => DrawStage::Transform,
-            Self::Visibility { .. } | Self::Clip | Self::VisibilityTile { .. } => DrawStage::Visibility,
+            Self::Visibility { .. } | Self::Clip | Self::VisibilityTile { .. } | Self::VisibilityFew { .. } => {
+                DrawStage::Visibility
+            }
             Self::Grid | Self::Gather => DrawStage::Occlusion,
-            Self::Composite | Self::Shade => DrawStage::Shade,
+            Self::Composite | Self::Shade | Self::Paint => DrawStage::Shade,
             Self::Holes | Self::Edge | Self::Coverage | Self::LineLight => DrawStage::Lines,
             Self::Resolve => DrawStage::Resolve,
         }

@@ -10,7 +10,7 @@ pub(crate) mod step;
 #[cfg(test)]
 pub(crate) mod test_plans;
 pub(crate) mod tiles;
-use self::sizes::{Banding, DeviceTraits, has_visibility};
+use self::sizes::{Banding, DeviceTraits, has_visibility, is_painted};
 use self::step::{Band, Goal, Step};
 use self::tiles::{Tiles, alone_size};
 use super::params::{Batch, edge_lists, faces_code};
@@ -36,6 +36,9 @@ pub const PIECES_MAX: u32 = 6;
 /// and do not add to it.
 const BATCHES_MAX: usize = 1 << 19;
 
+/// Samples that a thread of the transform stage empties, at most.
+const CLEARED_BY_THREAD: u32 = 4;
+
 /// Threads of a workgroup, in every kernel.
 pub const WORKGROUP: u32 = 64;
 
@@ -56,6 +59,8 @@ pub struct Schedule {
     pub progress_bytes: u64,
     /// The result.
     pub goal: Goal,
+    /// True until the work list is first used: the transform stage has emptied it.
+    is_work_empty: bool,
 }
 
 impl Schedule {
@@ -65,17 +70,29 @@ impl Schedule {
         let tiles = Tiles::new(plan, device, banding);
         let edge_starts = edge_lists(&plan.lines).1;
         let (steps, batches) = (Vec::new(), Vec::new());
-        let mut schedule = Self { steps, batches, banding, work_items: 0, layers: 0, tiles, progress_bytes: 0, goal };
+        let mut schedule = Self {
+            steps,
+            batches,
+            banding,
+            work_items: 0,
+            layers: 0,
+            tiles,
+            progress_bytes: 0,
+            goal,
+            is_work_empty: true,
+        };
         schedule.transform(plan, device)?;
         let occlusion = plan.occlusion.is_some() && goal == Goal::Picture;
         if occlusion {
             schedule.occlusion(plan, device)?;
         }
-        for band in schedule.bands(plan) {
+        for band in schedule.bands(plan, device) {
             // The only band's samples are there already.
             let is_seen = occlusion && banding.rows >= plan.height_px;
             if !is_seen {
-                schedule.steps.push(Step::ClearBand);
+                // The transform stage has emptied the first ones.
+                let samples = occlusion || band.row_first > 0;
+                schedule.steps.push(Step::ClearBand { samples });
                 schedule.visibility(plan, device, band)?;
             }
             if has_visibility(plan) {
@@ -90,7 +107,7 @@ impl Schedule {
     }
 
     /// The bands of the picture.
-    fn bands(&self, plan: &DrawPlan<'_>) -> Vec<Batch> {
+    fn bands(&self, plan: &DrawPlan<'_>, device: &DeviceTraits) -> Vec<Batch> {
         let banding = self.banding;
         let [beyond, margin] = [banding.beyond, banding.margin].map(|px| px as i32);
         let band = |first: u32| {
@@ -105,6 +122,7 @@ impl Schedule {
                 seen_first: seen[0],
                 seen_end: seen[1],
                 seen_margin: beyond,
+                rgba_at: if device.maps_pictures { first * plan.width_px } else { 0 },
                 samples_at: plan.samples * (banding.seen_columns(plan) * row_first.abs_diff(seen[0]) + banding.beyond),
                 ..Batch::default()
             }
@@ -130,8 +148,8 @@ impl Schedule {
 
     /// The light that hollows go without, from the depths of all bands.
     fn occlusion(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits) -> Result<(), DrawError> {
-        for band in self.bands(plan) {
-            self.steps.push(Step::ClearBand);
+        for band in self.bands(plan, device) {
+            self.steps.push(Step::ClearBand { samples: band.row_first > 0 });
             self.visibility(plan, device, band)?;
             let count = plan.width_px * band.row_end.abs_diff(band.row_first);
             self.dispatch(device, Kernel::Grid, count, Batch { count, ..band })?;
@@ -159,8 +177,11 @@ impl Schedule {
 
     fn transform(&mut self, plan: &DrawPlan<'_>, device: &DeviceTraits) -> Result<(), DrawError> {
         let count = plan.positions.len() as u32;
+        // The band's samples are at most 256 MiB.
+        let cleared = if has_visibility(plan) { self.banding.seen_samples(plan) as u32 } else { 0 };
         if has_visibility(plan) || !plan.lines.is_empty() {
-            self.dispatch(device, Kernel::Transform, count, Batch { count, ..Batch::default() })?;
+            let threads = count.max(cleared.div_ceil(CLEARED_BY_THREAD));
+            self.dispatch(device, Kernel::Transform, threads, Batch { count, cleared, ..Batch::default() })?;
         }
         Ok(())
     }
@@ -214,6 +235,13 @@ impl Schedule {
                 let (chunk, pieces) = if clip { (CHUNK_CLIP, PIECES_MAX) } else { (CHUNK, 1) };
                 for first in ids.clone().step_by(chunk as usize) {
                     let in_chunk = chunk.min(ids.end - first);
+                    let groups_each = self.tiles.groups_each(in_chunk);
+                    if let (SampleTarget::Visibility, false, Some(groups_each)) = (target, clip, groups_each) {
+                        let (count, pass_bit) = (in_chunk, u32::from(pass_bit));
+                        let batch = Batch { first, count, faces: faces_code(faces), pass_bit, groups_each, ..band };
+                        self.dispatch_groups(device, Kernel::VisibilityFew { write }, count * groups_each, batch)?;
+                        continue;
+                    }
                     let capacity = in_chunk * pieces;
                     self.work_items = self.work_items.max(capacity);
                     let batch = Batch {
@@ -227,7 +255,9 @@ impl Schedule {
                         alone_size: alone_size(in_chunk, device),
                         ..band
                     };
-                    self.steps.push(Step::ClearWork);
+                    if !std::mem::take(&mut self.is_work_empty) {
+                        self.steps.push(Step::ClearWork);
+                    }
                     self.dispatch(device, Kernel::Visibility { write, target }, in_chunk, batch)?;
                     if clip {
                         self.dispatch(device, Kernel::Clip, in_chunk, batch)?;
@@ -253,6 +283,9 @@ impl Schedule {
     ) -> Result<(), DrawError> {
         let count = plan.width_px * band.row_end.abs_diff(band.row_first);
         let pixels = Batch { count, ..band };
+        if is_painted(plan) {
+            return self.dispatch(device, Kernel::Paint, count, pixels);
+        }
         if plan.is_shaded() {
             self.dispatch(device, Kernel::Shade, count, pixels)?;
         }
@@ -302,6 +335,29 @@ mod tests {
 
     fn schedule(triangles: &[[u32; 3]], case: Case) -> Result<Schedule, DrawError> {
         Schedule::new(&plan(triangles, case), &DEVICE, Goal::Picture)
+    }
+
+    #[test]
+    fn a_small_flat_picture_takes_three_kernels_and_no_clearing() {
+        let hardware = DeviceTraits {
+            alone_size_of_few: 1024,
+            int64_atomics: true,
+            loops_are_limited: false,
+            tile_workgroups: 1024,
+            ..DEVICE
+        };
+        let case = Case { size_px: [256; 2], is_peeled: false, passes: 0, ..LARGEST };
+        let mut flat = plan(&[[0; 3]], case);
+        flat.projection.clip = false;
+        let schedule = Schedule::new(&flat, &hardware, Goal::Picture).unwrap();
+        let few = Kernel::VisibilityFew { write: SampleWrite::Both };
+        assert_eq!(schedule.kernels(), [Kernel::Transform, few, Kernel::Paint]);
+        assert_eq!(schedule.steps.len(), 5, "{:?}", schedule.steps);
+        assert_eq!(schedule.batches[0].cleared, 256 * 256 * 4);
+        assert!(schedule.steps.contains(&Step::ClearBand { samples: false }));
+        // Clipped triangles go to the work list, which is empty at first.
+        let clipped = Schedule::new(&plan(&[[0; 3]], case), &hardware, Goal::Picture).unwrap();
+        assert!(clipped.kernels().contains(&Kernel::Clip) && !clipped.steps.contains(&Step::ClearWork));
     }
 
     #[test]

@@ -44,6 +44,8 @@ pub struct DeviceTraits {
     pub tile_workgroups: u32,
     /// Size of the largest triangle that a thread draws by itself where there are few, 1/256 px.
     pub alone_size_of_few: i32,
+    /// True if the picture is written to where the CPU reads it.
+    pub maps_pictures: bool,
     /// 64-bit atomics.
     pub int64_atomics: bool,
     /// True if a thread's loops are cut off after a number of iterations: see
@@ -130,6 +132,7 @@ pub fn bands_bytes(plan: &DrawPlan<'_>) -> u64 {
         workgroups_max: u32::MAX,
         tile_workgroups: 1,
         alone_size_of_few: ALONE_SIZE,
+        maps_pictures: false,
         int64_atomics: true,
         loops_are_limited: false,
     };
@@ -147,6 +150,11 @@ pub fn occlusion_bytes(plan: &DrawPlan<'_>) -> u64 {
 /// True if a plan needs the visibility buffer.
 pub fn has_visibility(plan: &DrawPlan<'_>) -> bool {
     plan.surface.is_some() || plan.hull.is_some()
+}
+
+/// True if one kernel makes the picture of the visibility buffer: nothing is drawn over the surface.
+pub fn is_painted(plan: &DrawPlan<'_>) -> bool {
+    plan.is_shaded() && plan.lines.is_empty() && plan.peeling().is_none() && plan.occlusion.is_none()
 }
 
 /// Samples of so many rows.

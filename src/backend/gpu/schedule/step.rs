@@ -5,8 +5,11 @@ use crate::backend::gpu::pipelines::Kernel;
 /// One command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Clears a band's samples and strokes.
-    ClearBand,
+    /// Clears a band's strokes and, unless a kernel has done so, its samples.
+    ClearBand {
+        /// True if no kernel has cleared the samples.
+        samples: bool,
+    },
     /// Empties the work list.
     ClearWork,
     /// Clears the peeled layer.

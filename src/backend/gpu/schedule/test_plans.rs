@@ -11,6 +11,7 @@ pub const DEVICE: DeviceTraits = DeviceTraits {
     workgroups_max: 65_535,
     tile_workgroups: 64,
     alone_size_of_few: ALONE_SIZE,
+    maps_pictures: false,
     int64_atomics: false,
     loops_are_limited: true,
 };

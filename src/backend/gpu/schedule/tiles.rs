@@ -16,6 +16,12 @@ pub const HUGE_PX: u32 = 128;
 /// Fewer triangles than this in a dispatch leave most of a large GPU idle if each is drawn by one thread.
 const FEW_TRIANGLES: u32 = 1 << 15;
 
+/// No more triangles than this in a dispatch are drawn by workgroups alone, without a work list.
+const FEWEST_TRIANGLES: u32 = 1 << 12;
+
+/// Workgroups for so few triangles, in numbers of those that share the large triangles.
+const SHARES_OF_FEW: u32 = 4;
+
 /// Tiles of a large triangle, at most: three wide and high, because it need not begin where a tile
 /// does.
 const LARGE_TILES_MAX: u64 = (HUGE_PX as u64 / TILE_PX as u64 + 1).pow(2);
@@ -36,6 +42,8 @@ pub struct Tiles {
     pub workgroups: u32,
     tile_iterations: u64,
     band_tiles: u64,
+    /// True if triangles that one thread would draw are better drawn by a workgroup, where there are few.
+    shares_few: bool,
 }
 
 impl Tiles {
@@ -51,7 +59,15 @@ impl Tiles {
             // 64 blocks, in each the samples; and as much again for the way there.
             tile_iterations: 64 * (u64::from(plan.samples) + 1) + 64,
             band_tiles: u64::from(seen[0] / TILE_PX + 2) * u64::from(seen[1] / TILE_PX + 2),
+            shares_few: device.alone_size_of_few < ALONE_SIZE,
         }
+    }
+
+    /// Workgroups that share each of so many triangles, if they are so few that no work list is needed.
+    pub fn groups_each(&self, count: u32) -> Option<u32> {
+        let each = (SHARES_OF_FEW * self.workgroups / count.max(1)).max(1);
+        let iterations = self.band_tiles.div_ceil(u64::from(each)) * self.tile_iterations;
+        (self.shares_few && count <= FEWEST_TRIANGLES && iterations <= ITERATIONS_MAX).then_some(each)
     }
 
     /// The ranges of large and of huge items to draw in each round.
@@ -89,8 +105,22 @@ mod tests {
     }
 
     #[test]
+    fn few_triangles_are_shared_unless_a_workgroup_would_take_long() {
+        let tiles = |band_tiles, shares_few| Tiles {
+            in_rounds: false,
+            workgroups: 1024,
+            tile_iterations: 384,
+            band_tiles,
+            shares_few,
+        };
+        let each = [1, 968, 4096, 4097].map(|count| tiles(36, true).groups_each(count));
+        assert_eq!(each, [Some(4096), Some(4), Some(1), None]);
+        assert_eq!([tiles(36, false).groups_each(12), tiles(660, true).groups_each(968)], [None, None]);
+    }
+
+    #[test]
     fn rounds_cover_every_item_once() {
-        let tiles = Tiles { in_rounds: true, workgroups: 32, tile_iterations: 384, band_tiles: 200 };
+        let tiles = Tiles { in_rounds: true, workgroups: 32, tile_iterations: 384, band_tiles: 200, shares_few: false };
         let mut cases = 0;
         for (large, huge) in [(0, 0), (1, 0), (0, 1), (351, 14), (352, 15), (353, 16), (100_000, 1000)] {
             let mut next = [0, 0];

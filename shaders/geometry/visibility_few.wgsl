@@ -1,0 +1,29 @@
+// Stage visibility where there are few triangles: the workgroups of each draw its tiles, whatever its size, so that
+// no work list is needed. No twin: the CPU has one loop for all sizes.
+
+@compute @workgroup_size(WORKGROUP)
+fn visibility_few(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    // All threads of a workgroup take the same way up to draw_tiles, because they compute the same.
+    let g = workgroup.x + workgroup.y * groups.x;
+    let i = g / batch.groups_each;
+    if i >= batch.count {
+        return;
+    }
+    let t = batch.first + i;
+    let v = screen_triangle(t);
+    if is_outside(v) {
+        return;
+    }
+    let bounds = pixel_bounds(vec3(v.a.x, v.b.x, v.c.x), vec3(v.a.y, v.b.y, v.c.y));
+    if bounds.x > bounds.z || bounds.y > bounds.w {
+        return;
+    }
+    let area = area_of(v.a, v.b, v.c);
+    if passes_culling(t, area) {
+        draw_tiles(setup_of(v.a, v.b, v.c, area), t, i32(thread), i32(g % batch.groups_each), i32(batch.groups_each));
+    }
+}

@@ -1,0 +1,38 @@
+// Stages shade and resolve in one, per pixel, where no lines are drawn, no layers peeled and no hollows dimmed: what shade.wgsl and
+// resolve.wgsl do, without the colours in between. No twin: the CPU has a path for flat faces instead.
+
+// Low word: complement of the id. High word: depth.
+@group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
+
+@compute @workgroup_size(WORKGROUP)
+fn paint(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = gid.x + gid.y * groups.x * WORKGROUP;
+    if i >= batch.count {
+        return;
+    }
+    let pixel = vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width);
+    rgba[batch.rgba_at + i] = encode(over_background(seen_color(first_visibility_sample(i), pixel), frame.background));
+}
+
+// Mean colour of a pixel's samples, the first of which is given.
+fn seen_color(first: u32, pixel: vec2<i32>) -> vec4<f32> {
+    if sample_count() == 1 {
+        return group_color(single_sample_group(triangle_of_sample(first)), pixel, Show(true, 1.0, 1.0));
+    }
+    // A power of two.
+    let share = 1.0 / f32(sample_count());
+    var sum = vec4(0.0);
+    // One iteration per triangle among the samples.
+    var left = seen_samples(first);
+    while left != 0u {
+        let group = first_group(first, left);
+        left &= ~group.same;
+        sum += rn4(rn(share * f32(group.count)) * group_color(group, pixel, Show(true, 1.0, 1.0)));
+    }
+    return sum;
+}
+
+fn triangle_of_sample(sample: u32) -> u32 {
+    let word = samples[sample];
+    return select(~word.x, NOTHING, word.y == 0u);
+}
