@@ -13,7 +13,9 @@ struct Frame {
     // Towards each lamp, and how strong it is.
     lamps: array<vec4<f32>, 3>,
     halfways: array<vec4<f32>, 3>,
+    // At the picture's upper edge, and what each row adds to it.
     background: vec4<f32>,
+    background_step: vec4<f32>,
     hull_color: vec4<f32>,
     near_w: f32,
     ambient: f32,

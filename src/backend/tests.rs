@@ -197,8 +197,8 @@ fn layouts() -> Vec<(&'static str, Layout)> {
         (
             "Frame",
             layout!(Frame {
-                x_row y_row z_row w_row screen_up screen_right to_viewer lamps halfways background hull_color near_w
-                ambient lamp_count zero width height triangle_count vertex_count masks_at material_count layer_fade
+                x_row y_row z_row w_row screen_up screen_right to_viewer lamps halfways background background_step hull_color
+                near_w ambient lamp_count zero width height triangle_count vertex_count masks_at material_count layer_fade
                 hull_color_count image_count normal_triangles_at uv_triangles_at color_triangles_at
             }),
         ),

@@ -68,6 +68,7 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
         camera.contains_mesh,
         "the whole mesh lies between the eye and the picture's guard band",
     );
+    let (background, background_step) = spec.image.background.rows(spec.image.height_px);
     Ok(DrawPlan {
         width_px: spec.image.width_px,
         height_px: spec.image.height_px,
@@ -81,7 +82,8 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
         peeling,
         hull,
         lines,
-        background: spec.image.background.premultiplied(),
+        background,
+        background_step,
         skips: cx.skips.done,
         short_chains: cx.short_chains,
         warnings: cx.warnings,

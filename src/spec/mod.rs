@@ -1,6 +1,7 @@
 //! The meaning of a request: a [`Spec`] says what to draw of any mesh, and how. Every value is in
 //! range; units are in the names.
 
+mod background;
 mod camera;
 pub mod color;
 mod image;
@@ -11,6 +12,7 @@ mod sheet;
 mod wire_method;
 pub(crate) mod words;
 
+pub use background::*;
 pub use camera::*;
 pub use image::*;
 pub use layers::*;

@@ -199,7 +199,8 @@ fn image() -> Vec<Field> {
         "image.max_time_ms" |d| d.max_time_ms, in Kind::Above0 { max: JOB_MS_MAX as f64 }, default Null;
             "Longest expected time to draw, as measured on one machine: the most accurate choice within it is taken.";
         "image.background" |d| d.image.background, short "background", default "#fff";
-            "Colour behind the mesh.";
+            "Behind the mesh: a colour, or two from the upper to the lower edge, as #fff..#dde, blended in linear light. Each cell \
+             of a sheet has them.";
         "image.effort" |d| d.image.effort, in Kind::OneOf(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]), default DEFAULT_EFFORT;
             "PNG: 0 to 3 encode quickly; 4 to 9 make smaller files in 5 to 100 times the time, for pictures that are stored.";
         "backend" |d| d.backend;

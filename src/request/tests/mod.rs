@@ -5,9 +5,10 @@ mod refused;
 
 use super::*;
 use crate::mesh::UpAxis;
+use crate::spec::color::Rgba;
 use crate::spec::{
-    DebugView, FlatNormals, Hidden, LightPreset, NamedView, Outline, OutlineMethod, OutlineUnit, Shading, Sheet,
-    SheetViews, WireEdges, WireMethod, WireThickness,
+    Background, DebugView, FlatNormals, Hidden, LightPreset, NamedView, Outline, OutlineMethod, OutlineUnit, Shading,
+    Sheet, SheetViews, WireEdges, WireMethod, WireThickness,
 };
 
 pub fn rules() -> Rules {
@@ -157,7 +158,7 @@ fn every_key_reaches_its_field() {
     assert_eq!((camera.eye, camera.target), (Some([1.0, 2.0, 3.0]), Some([0.0, 0.0, 0.5])));
     assert_eq!((spec.light.intensity, spec.light.ambient), (2.0, 0.1));
     assert_eq!((spec.image.width_px, spec.image.height_px, spec.image.samples), (640, 480, 1));
-    assert_eq!((spec.image.format, spec.image.background), (Some(ImageFormat::Webp), Rgba::TRANSPARENT));
+    assert_eq!((spec.image.format, spec.image.background), (Some(ImageFormat::Webp), Rgba::TRANSPARENT.into()));
     assert_eq!(spec.image.effort, 9);
     assert_eq!(spec.backend, BackendChoice::Cpu);
 }
@@ -261,10 +262,13 @@ fn an_image_limit_below_the_largest_names_its_flag() {
 fn jpeg_lays_its_background_over_white_in_linear_light() {
     let mut spec = query(&[("background", "transparent")]).unwrap();
     set_format(&mut spec, ImageFormat::Jpeg);
-    assert_eq!(spec.image.background, Rgba::WHITE);
+    assert_eq!(spec.image.background, Rgba::WHITE.into());
+    let mut spec = query(&[("background", "#000..transparent")]).unwrap();
+    set_format(&mut spec, ImageFormat::Jpeg);
+    assert_eq!(spec.image.background, Background { top: Rgba::BLACK, bottom: Rgba::WHITE });
     let mut spec = query(&[("background", "transparent")]).unwrap();
     set_format(&mut spec, ImageFormat::Png);
-    assert_eq!(spec.image.background, Rgba::TRANSPARENT);
+    assert_eq!(spec.image.background, Rgba::TRANSPARENT.into());
 }
 
 #[test]

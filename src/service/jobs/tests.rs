@@ -56,7 +56,8 @@ fn spec() -> Spec {
         from_file: false,
         fits_turn: false,
     };
-    let image = ImageSpec { width_px: 8, height_px: 8, format: None, samples: 1, background: Rgba::WHITE, effort: 3 };
+    let image =
+        ImageSpec { width_px: 8, height_px: 8, format: None, samples: 1, background: Rgba::WHITE.into(), effort: 3 };
     let light = Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3 };
     Spec {
         layers: Layers::default(),

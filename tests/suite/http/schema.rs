@@ -84,6 +84,8 @@ const GOOD: &[&str] = &[
     r#"{"light":{"direction":null}}"#,
     r#"{"light":{"direction":[0,0,1e-300]}}"#,
     r##"{"image":{"width":1,"height":4096,"format":"jpg","samples":1,"background":"#fff"}}"##,
+    r##"{"image":{"background":"#fff..#dde"},"style":"flat"}"##,
+    r#"{"background":"abc8..transparent"}"#,
     r#"{"image":{"width":512.0,"samples":4.0,"format":null}}"#,
     r#"{"sheet":{"views":["front","auto"],"columns":2,"labels":true},"points":{"size_px":64}}"#,
     r#"{"sheet":{"turntable":64,"views":null},"surface":{"debug":"uv-layout"}}"#,
@@ -113,6 +115,9 @@ const BAD: &[&str] = &[
     r#"{"sytle":"wire"}"#,
     r#"{"wire.color":"f00"}"#,
     r#"{"max_error":0}"#,
+    r##"{"background":"#fff.#dde"}"##,
+    r##"{"background":"#fff..#dde..#ccc"}"##,
+    r##"{"surface":{"color":"#fff..#dde"}}"##,
     r#"{"image":{"max_error":256}}"#,
     r#"{"image":{"max_time_ms":-1}}"#,
     r#"{"max_time_ms":1}"#,
@@ -177,7 +182,7 @@ fn the_schema_and_the_reader_are_of_one_mind() {
         assert!(request::read(Some(document.as_bytes()), &[], &rules()).is_err(), "the reader takes {document}");
         assert!(!complaints(&validator, document).is_empty(), "the schema takes {document}");
     }
-    assert_eq!((GOOD.len(), BAD.len()), (48, 57));
+    assert_eq!((GOOD.len(), BAD.len()), (50, 60));
 }
 
 /// Documents made at random from pieces of both kinds: as many as both refuse or take; none where

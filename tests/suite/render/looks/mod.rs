@@ -1,0 +1,3 @@
+//! What a request adds around the surface, and how it shows it.
+
+pub mod backgrounds;
