@@ -9,6 +9,7 @@ struct Frame {
     w_row: vec4<f32>,
     screen_up: vec4<f32>,
     screen_right: vec4<f32>,
+    // The last word is the slope of rays, see Projection::ray_slope in src/plan/projection.rs.
     to_viewer: vec4<f32>,
     // Towards each lamp, and how strong it is.
     lamps: array<vec4<f32>, 3>,

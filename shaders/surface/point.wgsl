@@ -21,7 +21,7 @@ struct Material {
     normal_scale: f32,
     flags: u32,
     opacity: f32,
-    padding: u32,
+    facing_opacity: f32,
     // Four texture uses of eight words.
     textures: array<vec4<u32>, 8>,
 };
@@ -42,6 +42,7 @@ const MATERIAL_WIRE_LIT: u32 = 2048u;
 const MATERIAL_DEBUG_SHIFT: u32 = 12u;
 const MATERIAL_OWN_METALLIC: u32 = 32768u;
 const MATERIAL_OWN_ROUGHNESS: u32 = 65536u;
+const MATERIAL_BY_ANGLE: u32 = 131072u;
 
 // Places among a material's textures.
 const SLOT_BASE: u32 = 0u;
@@ -99,6 +100,9 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
     base = with_alpha(m, base, show);
     if base.w == 0.0 && cover == 0.0 {
         return vec4(0.0);
+    }
+    if (flags & MATERIAL_BY_ANGLE) != 0u {
+        base.w = rn(base.w * angle_share(m, at, normal(id, at, m, b)));
     }
     var light_here = Light(1.0, 0.0);
     if (flags & MATERIAL_LIT) != 0u {

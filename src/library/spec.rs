@@ -60,6 +60,8 @@ styles! {
     topology = "topology",
     /// Smooth surface, feature edges and a contour, as in a technical drawing.
     technical = "technical",
+    /// Translucent surface in one colour, opaque where it turns away from the viewer.
+    xray = "xray",
 }
 
 impl Spec {

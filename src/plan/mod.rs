@@ -14,6 +14,7 @@ mod costs;
 mod edges;
 mod error;
 mod geometry;
+mod ground;
 pub(crate) mod heat;
 mod lines;
 mod margin;

@@ -25,5 +25,7 @@ word_enums! {
         Topology = "topology",
         /// Smooth surface, feature edges and a contour, as in a technical drawing.
         Technical = "technical",
+        /// Translucent surface in one colour, opaque where it turns away from the viewer.
+        Xray = "xray",
     }
 }

@@ -24,6 +24,13 @@ const OUTLINE_OBJECT_SHARE: f32 = 0.015;
 /// nothing but itself.
 const OUTLINE_OBJECT_MAX: f32 = 16.0;
 
+/// Distance that the ground's shadow reaches beyond the mesh, as a share of the mesh's longer side across
+/// the up axis.
+pub const GROUND_REACH: f64 = 0.3;
+
+/// Height above the ground up to which the mesh darkens it, as a share of the same side.
+pub const GROUND_HEIGHT: f64 = 0.6;
+
 /// The distance that an outline reaches from its silhouette edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Thickness {
@@ -39,6 +46,9 @@ pub fn border(mesh: &Mesh, groups: &MaterialGroups<'_>, spec: &Spec) -> Border {
     let widest_px = if has_points { LINE_PX.max(f64::from(spec.points.size_px)) } else { 2.0 * LINE_PX };
     let mut border =
         Border { px: if mesh.lines_and_points.is_empty() { 0.0 } else { 0.5 * widest_px }, ..Border::default() };
+    if groups.has_ground() {
+        border.around = ground_distance(mesh);
+    }
     for style in &groups.styles {
         // Points without a fill are drawn as lines are, but wider.
         let has_dots = style.surface.is_none() && has_points;
@@ -59,6 +69,13 @@ pub fn border(mesh: &Mesh, groups: &MaterialGroups<'_>, spec: &Spec) -> Border {
         border.px = border.px.max(f64::from(1.25 * topology.thickness));
     }
     border
+}
+
+/// Distance from the mesh that the ground has at most, generously.
+fn ground_distance(mesh: &Mesh) -> f64 {
+    let [low, high] = mesh.bounds;
+    let side = (0..3).map(|k| f64::from(high[k]) - f64::from(low[k])).fold(0.0, f64::max);
+    side * (1.5 * GROUND_REACH + GROUND_HEIGHT + 0.1)
 }
 
 /// The requested thickness of an outline, or the default for its unit.

@@ -44,6 +44,8 @@ pub struct Border {
     pub grow: f64,
     /// Room on each side, pixels.
     pub px: f64,
+    /// Distance around the mesh that is drawn, too, wherever it lies on screen: units of the box.
+    pub around: f64,
 }
 
 impl Camera {
@@ -89,7 +91,7 @@ impl Camera {
                 Self::new(axes, center, extents.high.z + 1.0, DVec2::new(half * aspect, half), Kind::Orthographic)
             }
         };
-        camera.set_range(&extents, border.grow, size);
+        camera.set_range(&extents, border.grow + border.around, size);
         camera.set_reach(&extents, slopes);
         camera
     }
@@ -212,7 +214,7 @@ fn named_axes(spec: &CameraSpec, up: UpAxis) -> [DVec3; 3] {
 
 /// Model right, up and front for an up axis: right-handed, and as the formats' conventions have it
 /// (glTF: +Y up, +Z front; STL: +Z up, -Y front).
-fn frame(up: UpAxis) -> [DVec3; 3] {
+pub(crate) fn frame(up: UpAxis) -> [DVec3; 3] {
     let (right, up) = match up {
         UpAxis::Y => (DVec3::X, DVec3::Y),
         UpAxis::NegY => (DVec3::X, DVec3::NEG_Y),

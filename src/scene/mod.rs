@@ -9,7 +9,7 @@ pub mod camera;
 mod extents;
 mod material_groups;
 
-pub use border::{LINE_PX, Thickness, point_width};
+pub use border::{GROUND_HEIGHT, GROUND_REACH, LINE_PX, Thickness, point_width};
 pub use material_groups::{Fill, MaterialGroups, barycentric_wire};
 
 use border::{border, outline_thickness};

@@ -132,7 +132,7 @@ impl Frame {
             near_w: p.near_w,
             screen_up: xyz(p.screen_up),
             screen_right: xyz(p.screen_right),
-            to_viewer: xyz(p.to_viewer),
+            to_viewer: [p.to_viewer[0], p.to_viewer[1], p.to_viewer[2], p.ray_slope()],
             background: plan.background,
             background_step: plan.background_step,
             width: plan.width_px,

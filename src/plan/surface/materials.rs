@@ -83,6 +83,10 @@ fn fill(material: &mut ShadedMaterial, mesh: &Mesh, slot: &MaterialSlot, surface
     let none = if is_painted { [1.0; 4] } else { Rgba::from_srgb8(DEFAULT_COLOR).0 };
     let file = slot.base_color.unwrap_or(none);
     material.base_color = surface.color.map_or(file, |color| color.0);
+    if surface.debug == DebugView::None && surface.facing_opacity < 1.0 {
+        material.facing_opacity = surface.facing_opacity;
+        material.flags |= flags::BY_ANGLE;
+    }
     material.opacity = if surface.debug == DebugView::None { surface.opacity } else { 1.0 };
     material.metallic = surface.metallic.or(slot.metallic).unwrap_or(0.0);
     material.roughness = surface.roughness.or(slot.roughness).unwrap_or(DEFAULT_ROUGHNESS);

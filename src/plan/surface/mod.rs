@@ -78,8 +78,8 @@ pub struct ShadedMaterial {
     pub flags: u32,
     /// Factor of the final alpha, 0 to 1.
     pub opacity: f32,
-    /// Always 0.
-    pub padding: u32,
+    /// For [`flags::BY_ANGLE`]: the share of alpha that is left where the surface faces the viewer.
+    pub facing_opacity: f32,
     /// Uses of textures, by [`slots`].
     pub textures: [TextureUse; 4],
 }
@@ -184,6 +184,8 @@ pub mod flags {
     pub const OWN_METALLIC: u32 = 1 << 15;
     /// The request gives the roughness, and the texture's is ignored.
     pub const OWN_ROUGHNESS: u32 = 1 << 16;
+    /// Alpha depends on the angle to the viewer. An unlit material has vertex normals for it.
+    pub const BY_ANGLE: u32 = 1 << 17;
 }
 
 /// Lamps infinitely far away, and light from everywhere.
@@ -232,7 +234,7 @@ impl ShadedMaterial {
             normal_scale: 1.0,
             flags: flags::FILL,
             opacity: 1.0,
-            padding: 0,
+            facing_opacity: 1.0,
             textures: [TextureUse::NONE; 4],
         }
     }

@@ -46,6 +46,9 @@ fn layers() -> Vec<Field> {
             "Light that the surface emits; null: the file's, or none.";
         "surface.opacity" |d| d.surface().opacity, in SHARE, default 1;
             "Multiplies the file's own opacity.";
+        "surface.facing_opacity" |d| d.surface().facing_opacity, in SHARE;
+            "Share of the opacity that is left where the surface faces the viewer; it rises to all of it at grazing angles. By \
+             default the style's, or 1.";
         "surface.textures" |d| d.surface().textures, default true;
             "Shows the file's textures.";
         "surface.debug" |d| d.surface().debug, default "none";
@@ -126,6 +129,9 @@ fn scene_and_camera() -> Vec<Field> {
 
         "scene.time_s" |d| d.time_s, in number(0.0, TIME_S_MAX), default Null;
             "Moment of the file's first animation, in seconds; null: the rest pose.";
+        "scene.ground" |d| d.ground, default "none";
+            "shadow: a soft contact shadow on a plane at the lowest point, if the picture has a filled surface; from below the \
+             plane nothing shows.";
 
         "camera.view" |d| d.camera.view, short "view", default "auto";
             "Named directions, auto being azimuth 30, elevation 20, and iso 45, 30; azimuth_deg and elevation_deg override its angles.";

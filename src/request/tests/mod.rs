@@ -41,6 +41,7 @@ fn every_style_has_its_layers() {
         ("hidden-line", Some(Shading::Unlit), Some(Hidden::Hide), false),
         ("topology", Some(Shading::Flat), None, false),
         ("technical", Some(Shading::Smooth), Some(Hidden::Hide), true),
+        ("xray", Some(Shading::Unlit), None, false),
     ];
     assert_eq!(cases.len(), Style::ALL.len());
     for (style, shading, hidden, outline) in cases {

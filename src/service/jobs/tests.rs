@@ -15,7 +15,7 @@ use crate::limits::{Deadline, Stopped};
 use crate::pipeline::{Output, RenderError, Stage};
 use crate::spec::color::Rgba;
 use crate::spec::{
-    BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind, Sheet,
+    BackendChoice, CameraSpec, Ground, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind, Sheet,
     SheetViews, Spec,
 };
 
@@ -65,6 +65,7 @@ fn spec() -> Spec {
         topology: None,
         points: Points::default(),
         time_s: None,
+        ground: Ground::None,
         camera,
         sheet: None,
         light,

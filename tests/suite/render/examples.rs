@@ -20,7 +20,7 @@ use crate::support::server::{Server, meshsnap};
 use crate::support::skip::{Need, skip};
 
 /// Requests under api/examples.
-const EXAMPLES: usize = 40;
+const EXAMPLES: usize = 42;
 
 const SIZE_PX: u32 = 256;
 

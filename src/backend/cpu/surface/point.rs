@@ -4,7 +4,7 @@
 use super::barycentric::{Barycentrics, Corners};
 use super::debug;
 use super::light::{Light, LightLanes, light_lanes, lit_lanes};
-use super::normal::{face_normals, normal_mapped, normals, to_viewer};
+use super::normal::{angle_shares, face_normals, normal_mapped, normals, to_viewer};
 use super::texture::{Uv, blend, of_corners, sample};
 use super::wire::{Place, edge_mask, fwidth_covers, wire_covers};
 use crate::backend::cpu::RasterContext;
@@ -15,6 +15,7 @@ use crate::plan::{Projection, ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, 
 
 /// Flags that the common materials do not have, textures aside.
 const GENERAL: u32 = flags::DERIVATIVE_NORMALS
+    | flags::BY_ANGLE
     | flags::VERTEX_COLORS
     | flags::DEBUG
     | flags::WIRE_LIT
@@ -146,8 +147,12 @@ impl Points<'_> {
         let place = self.place(ids, at, &Corners::new(context, ids, at), is_textured);
         let covers = self.wire_covers(&place);
         let texels = self.texels(&place, is_textured);
-        let base = self.base_colors(&place, &texels[slots::BASE]);
+        let mut base = self.base_colors(&place, &texels[slots::BASE]);
         let mut light = LightLanes::NONE;
+        if material.flags & flags::BY_ANGLE != 0 {
+            let shares = angle_shares(material, &place, &normals(surface, material, &place));
+            base[3] = std::array::from_fn(|l| base[3][l] * shares[l]);
+        }
         if material.flags & flags::LIT != 0 {
             let mut normal = normals(surface, material, &place);
             if let (Some(uvs), true) = (&surface.uvs, is_textured && self.has_texture(slots::NORMAL)) {
