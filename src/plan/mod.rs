@@ -11,8 +11,10 @@
 mod build;
 mod context;
 mod costs;
+mod cut_outs;
 mod edges;
 mod error;
+mod framing;
 mod geometry;
 mod ground;
 pub(crate) mod heat;
@@ -33,6 +35,7 @@ mod warnings;
 pub use crate::texture::{Texture, TextureError, Textures};
 pub use build::{build, build_from, build_keeping};
 pub use error::PlanError;
+pub use framing::framing;
 pub use lines::{Edge, LinePass, Shown, Side};
 pub use outline::{HullPass, HullVertex};
 pub use peeling::{PeelingPass, pass_mask};

@@ -1,6 +1,7 @@
 //! The room around a mesh that its outlines, lines and points need when the camera is fitted.
 
 use super::camera::Border;
+use super::ground::ground_distance;
 use super::material_groups::MaterialGroups;
 use crate::mesh::{LineOrPoint, Mesh};
 use crate::spec::{Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
@@ -23,13 +24,6 @@ const OUTLINE_OBJECT_SHARE: f32 = 0.015;
 /// Largest thickness in units of the box. An outline thicker than the guard band is wide shows
 /// nothing but itself.
 const OUTLINE_OBJECT_MAX: f32 = 16.0;
-
-/// Distance that the ground's shadow reaches beyond the mesh, as a share of the mesh's longer side across
-/// the up axis.
-pub const GROUND_REACH: f64 = 0.3;
-
-/// Height above the ground up to which the mesh darkens it, as a share of the same side.
-pub const GROUND_HEIGHT: f64 = 0.6;
 
 /// The distance that an outline reaches from its silhouette edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,13 +63,6 @@ pub fn border(mesh: &Mesh, groups: &MaterialGroups<'_>, spec: &Spec) -> Border {
         border.px = border.px.max(f64::from(1.25 * topology.thickness));
     }
     border
-}
-
-/// Distance from the mesh that the ground has at most, generously.
-fn ground_distance(mesh: &Mesh) -> f64 {
-    let [low, high] = mesh.bounds;
-    let side = (0..3).map(|k| f64::from(high[k]) - f64::from(low[k])).fold(0.0, f64::max);
-    side * (1.5 * GROUND_REACH + GROUND_HEIGHT + 0.1)
 }
 
 /// The requested thickness of an outline, or the default for its unit.

@@ -91,6 +91,11 @@ impl<'s> MaterialGroups<'s> {
         self.has_ground
     }
 
+    /// Draws no ground: it is not seen.
+    pub fn leave_ground_out(&mut self) {
+        self.has_ground = false;
+    }
+
     /// True if any material has a hull.
     pub fn has_hull(&self) -> bool {
         self.styles.iter().any(|layers| has_hull(layers))

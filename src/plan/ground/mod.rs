@@ -6,35 +6,19 @@
 
 mod shadow;
 
-use glam::DVec3;
-
 use self::shadow::Shadow;
 use super::geometry::Geometry;
 use super::shared_slice::SharedSlice;
 use super::{CornerValues, PlanError, ShadedMaterial, SurfacePass, flags};
 use crate::plan::context::PlanContext;
-use crate::scene::camera::{Camera, frame};
-use crate::scene::{Fill, GROUND_HEIGHT, Scene};
-use crate::spec::{Cull, ProjectionKind};
-
-/// Distance of the plane below the lowest point, as a share of the shadow's size: so the plane does not
-/// cut the faces on which the mesh stands.
-const BELOW: f64 = 1e-3;
+use crate::scene::{Fill, GroundPlane, Scene};
+use crate::spec::Cull;
 
 /// Bytes of a ground's own lists per cell of its grid: two triangles with materials and colours, and a
 /// vertex.
 const CELL_BYTES: u64 = 2 * (12 + 4 + 4 + 12 + 1) + 12 + 16 + 4;
 
-/// A plane at right angles to the up axis.
-struct Plane {
-    /// Right, up, and right x up.
-    axes: [DVec3; 3],
-    /// Along the up axis.
-    height: f64,
-}
-
-/// Adds the ground to a geometry, and its material to the surface, where the request has one, the
-/// picture has a filled surface and the eye is above the plane. Returns the number of its triangles.
+/// Adds the ground to a geometry, and its material to the surface, where the picture has one. Returns the number of its triangles.
 pub fn add<'m>(
     scene: &Scene<'m, '_>,
     geometry: &mut Geometry<'m>,
@@ -42,13 +26,9 @@ pub fn add<'m>(
     cx: &mut PlanContext<'_>,
 ) -> Result<usize, PlanError> {
     let Some(pass) = surface.as_mut().filter(|_| scene.groups.has_ground()) else { return Ok(0) };
-    let axes = frame(scene.spec.camera.up.unwrap_or(scene.mesh.up));
+    let plane = GroundPlane::new(scene.mesh, scene.spec.camera.up.unwrap_or(scene.mesh.up));
     let is_filled = |material: u32| scene.groups.fill(material as usize) != Fill::None;
-    let Some(shadow) = Shadow::of(scene.mesh, is_filled, axes, cx)? else { return Ok(0) };
-    let plane = Plane { axes, height: shadow.lowest - BELOW / GROUND_HEIGHT * shadow.highest };
-    if !is_above(&scene.camera, &plane) {
-        return Ok(0);
-    }
+    let Some(shadow) = Shadow::of(scene.mesh, is_filled, &plane, cx)? else { return Ok(0) };
     spend(geometry, pass, &shadow, cx)?;
     let is_turned = scene.groups.common_cull() == Cull::Front;
     let grid = Grid::of(&shadow, &plane, geometry.positions.len() as u32, is_turned);
@@ -59,18 +39,6 @@ pub fn add<'m>(
     let material = scene.mesh.materials.len() as u32;
     extend(&mut geometry.triangle_materials, vec![material; count]);
     Ok(count)
-}
-
-/// True if the upper side of a plane is seen.
-fn is_above(camera: &Camera, plane: &Plane) -> bool {
-    let [right, up, back] = camera.axes;
-    match camera.kind {
-        ProjectionKind::Orthographic => back.dot(plane.axes[1]) > 0.0,
-        ProjectionKind::Perspective => {
-            let eye = right * camera.center.x + up * camera.center.y + back * camera.distance;
-            eye.dot(plane.axes[1]) > plane.height
-        }
-    }
 }
 
 /// Spends the copies of the lists to which the ground is appended, and what it appends.
@@ -101,7 +69,7 @@ struct Grid {
 
 impl Grid {
     /// The cells where there is shadow. Their upper sides are fronts, or backs if the grid is turned.
-    fn of(shadow: &Shadow, plane: &Plane, first_vertex: u32, is_turned: bool) -> Self {
+    fn of(shadow: &Shadow, plane: &GroundPlane, first_vertex: u32, is_turned: bool) -> Self {
         let mut grid = Self { positions: Vec::new(), alpha: Vec::new(), triangles: Vec::new(), corners: Vec::new() };
         let [columns, rows] = shadow.size;
         let mut vertices = vec![u32::MAX; shadow.alpha.len()];
@@ -121,7 +89,7 @@ impl Grid {
     }
 
     /// The number of the vertex in the middle of a cell.
-    fn vertex(&mut self, shadow: &Shadow, plane: &Plane, [x, y]: [usize; 2], vertices: &mut [u32]) -> u32 {
+    fn vertex(&mut self, shadow: &Shadow, plane: &GroundPlane, [x, y]: [usize; 2], vertices: &mut [u32]) -> u32 {
         let at = y * shadow.size[0] + x;
         if vertices[at] == u32::MAX {
             let [right, up, across] = plane.axes;

@@ -10,7 +10,7 @@ use crate::limits::Stopped;
 use crate::mesh::Mesh;
 use crate::plan::PlanError;
 use crate::plan::context::PlanContext;
-use crate::scene::{GROUND_HEIGHT, GROUND_REACH};
+use crate::scene::{GROUND_HEIGHT, GROUND_REACH, GroundPlane};
 
 /// Cells along the longer side of the map.
 const CELLS: f64 = 96.0;
@@ -35,10 +35,10 @@ const CELL_BYTES: u64 = 8 + 4 + 2 * 8 + 8;
 
 /// A shadow on the plane below a mesh.
 pub struct Shadow {
-    /// The plane's height: that of the mesh's lowest point.
-    pub lowest: f64,
+    /// The height of the mesh's lowest point.
+    lowest: f64,
     /// The height above it from which nothing darkens the plane.
-    pub highest: f64,
+    highest: f64,
     /// Columns and rows of cells.
     pub size: [usize; 2],
     /// Alpha of black in the middle of each cell, row by row; 0 at the border.
@@ -48,18 +48,15 @@ pub struct Shadow {
 }
 
 impl Shadow {
-    /// The shadow of the faces whose materials are filled, below a mesh with this up axis (the second).
-    /// None if the mesh has no extent across it.
+    /// The shadow of the faces whose materials are filled, on the plane below a mesh. None if the
+    /// mesh has no extent along it.
     pub fn of(
         mesh: &Mesh,
         is_filled: impl Fn(u32) -> bool,
-        axes: [DVec3; 3],
+        plane: &GroundPlane,
         cx: &mut PlanContext<'_>,
     ) -> Result<Option<Self>, PlanError> {
-        let [low, high] = mesh.bounds.map(|corner| DVec3::from(corner.map(f64::from)));
-        let range = axes.map(|axis| [axis.dot(low).min(axis.dot(high)), axis.dot(low).max(axis.dot(high))]);
-        let [right, up, across] = range;
-        let side = (right[1] - right[0]).max(across[1] - across[0]);
+        let GroundPlane { axes, bounds: [right, up, across], side, .. } = *plane;
         if side.is_nan() || side <= 0.0 {
             return Ok(None);
         }

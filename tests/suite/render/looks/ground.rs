@@ -43,9 +43,9 @@ fn the_mesh_keeps_its_pixels_and_gets_a_soft_black_shadow() {
                 assert!(without[3] > 0 || with[..3] == [0; 3], "{style}: {with:?}");
             }
             let alpha = shadow(&with, &without);
-            assert!(alpha.len() > 200, "{style}: {} pixels of shadow", alpha.len());
+            assert!(alpha.len() > 100, "{style}: {} pixels of shadow", alpha.len());
             let (faint, dark) = (alpha.iter().filter(|a| **a < 20).count(), alpha.iter().filter(|a| **a > 50).count());
-            assert!(faint > 30 && dark > 5 && alpha.iter().all(|a| *a <= 185), "{style}: {faint} faint, {dark} dark");
+            assert!(faint > 15 && dark > 5 && alpha.iter().all(|a| *a <= 185), "{style}: {faint} faint, {dark} dark");
         }
     }
 }
@@ -81,7 +81,7 @@ fn the_plane_follows_the_up_axis_and_lies_under_the_lowest_point() {
             (top..bottom).map(|y| shadow(&part(&with, y), &part(&without, y)).len()).sum()
         };
         assert_eq!(rows(0, 30), 0, "{up}");
-        assert!(rows(50, 100) > 200, "{up}");
+        assert!(rows(50, 100) > 60, "{up}");
     }
 }
 
