@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::PlanError;
-use super::cut_outs::{CutOuts, masked};
+use super::cut_outs::{CutOuts, MaskedFaces, masked};
 use super::edges::face_runs::FaceRuns;
 use super::edges::silhouettes::Silhouettes;
 use super::lines::picked_faces::looked_at;
@@ -137,7 +137,7 @@ impl<'c> PlanContext<'c> {
 
     /// What shows of faces with cut-out textures, and by material whether that counts in this picture; None
     /// where it never does.
-    fn cut_outs(&mut self, scene: &Scene<'_, '_>) -> Result<Option<(Arc<CutOuts>, Vec<bool>)>, PlanError> {
+    fn cut_outs(&mut self, scene: &Scene<'_, '_>) -> Result<Option<MaskedFaces>, PlanError> {
         self.budget.spend("materials", scene.mesh.materials.len() as u64, 1)?;
         let masked = masked(scene.mesh, &scene.groups);
         if masked.is_empty() {

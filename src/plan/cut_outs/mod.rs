@@ -6,6 +6,8 @@
 
 mod pyramid;
 
+use std::sync::Arc;
+
 use self::pyramid::Pyramid;
 use super::PlanError;
 use crate::limits::{Budget, Deadline};
@@ -122,6 +124,9 @@ fn shown_of(mesh: &Mesh, face: usize, texture: &TextureRef, pyramid: &Pyramid, l
     let side = |k: usize| [corners[k], corners[(k + 1) % 3], corners[(k + 1) % 3]];
     (0..3).filter(|&k| meets(side(k))).fold(FACE, |bits, k| bits | 1 << k)
 }
+
+/// What shows of a mesh's faces, and by material whether that counts in a picture.
+pub type MaskedFaces = (Arc<CutOuts>, Vec<bool>);
 
 /// True if a style shows the mask of a file's material.
 fn shows_mask(layers: &Layers, slot: &MaterialSlot) -> bool {

@@ -1,14 +1,13 @@
 //! Edges that may be silhouette edges, and the two faces that decide.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge};
 use crate::mesh::topology::Orientation;
 use crate::mesh::vector::{cross, dot};
-use crate::plan::cut_outs::CutOuts;
+use crate::plan::cut_outs::MaskedFaces;
 use crate::plan::{Edge, Side};
 use crate::scene::{Fill, MaterialGroups};
 use crate::spec::{Cull, Layers};
@@ -19,7 +18,7 @@ pub struct Silhouettes {
     /// By material: not drawn while others are, and without a hull. Empty where there is none.
     is_absent: Vec<bool>,
     /// What shows of faces with cut-out textures, and the materials whose cut-outs count.
-    cut_outs: Option<(Arc<CutOuts>, Vec<bool>)>,
+    cut_outs: Option<MaskedFaces>,
     /// All faces of the edges that have more than two.
     crowded: BTreeMap<u32, Vec<u32>>,
 }
@@ -29,7 +28,7 @@ impl Silhouettes {
     pub fn new(
         groups: &MaterialGroups<'_>,
         list: &EdgeList,
-        cut_outs: Option<(Arc<CutOuts>, Vec<bool>)>,
+        cut_outs: Option<MaskedFaces>,
         budget: &mut Budget,
     ) -> Result<Self, LimitExceeded> {
         // A list per edge, and a place in the map.

@@ -54,7 +54,7 @@ pub fn angle_shares<const N: usize>(material: &ShadedMaterial, place: &Place<'_,
             (projection.to_viewer[k] - right * projection.screen_right[k]) + down * projection.screen_up[k]
         });
         let facing = dot([n[0][l], n[1][l], n[2][l]], ray) / dot(ray, ray).sqrt();
-        let grazing = 1.0 - facing.max(0.0).min(1.0);
+        let grazing = 1.0 - facing.clamp(0.0, 1.0);
         shares[l] = least + (1.0 - least) * (grazing * grazing);
     }
     shares
