@@ -22,8 +22,12 @@ struct Material {
     flags: u32,
     opacity: f32,
     facing_opacity: f32,
-    // Four texture uses of eight words.
-    textures: array<vec4<u32>, 8>,
+    occlusion_strength: f32,
+    padding_a: u32,
+    padding_b: u32,
+    padding_c: u32,
+    // Five texture uses of eight words.
+    textures: array<vec4<u32>, 10>,
 };
 
 // Bits of a material's flags.
@@ -49,6 +53,7 @@ const SLOT_BASE: u32 = 0u;
 const SLOT_METALLIC_ROUGHNESS: u32 = 1u;
 const SLOT_NORMAL: u32 = 2u;
 const SLOT_EMISSIVE: u32 = 3u;
+const SLOT_OCCLUSION: u32 = 4u;
 
 // Parts of a material that a point shows.
 struct Show {
@@ -117,6 +122,10 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
             }
         }
         light_here = light(gloss.y, gloss.x, n);
+        if has(TEXTURES) && use_of(m, SLOT_OCCLUSION).texture < frame.image_count {
+            let red = sample_texture(m, SLOT_OCCLUSION, uv).x;
+            light_here = occluded(light_here, materials[m].occlusion_strength, red, gloss.y, n);
+        }
     }
     var emissive = materials[m].emissive;
     if has(TEXTURES) {

@@ -5,6 +5,7 @@ use super::barycentric::{Barycentrics, Corners};
 use super::debug;
 use super::light::{Light, LightLanes, light_lanes, lit_lanes};
 use super::normal::{angle_shares, face_normals, normal_mapped, normals, to_viewer};
+use super::occlusion::occlude;
 use super::texture::{Uv, blend, of_corners, sample};
 use super::wire::{Place, edge_mask, fwidth_covers, wire_covers};
 use crate::backend::cpu::RasterContext;
@@ -165,7 +166,12 @@ impl Points<'_> {
             };
             let metallic = own(flags::OWN_METALLIC, material.metallic, metallic);
             let roughness = own(flags::OWN_ROUGHNESS, material.roughness, roughness);
-            light = light_lanes(quick_recip, &surface.lights, &context.plan.projection, &metallic, &roughness, &normal);
+            let projection = &context.plan.projection;
+            light = light_lanes(quick_recip, &surface.lights, projection, &metallic, &roughness, &normal);
+            if is_textured && self.has_texture(slots::OCCLUSION) {
+                let red = (material.occlusion_strength, &texels[slots::OCCLUSION][0]);
+                occlude(&mut light, (&surface.lights, projection), red, &metallic, &normal);
+            }
         }
         let mut emissive = [[0.0; N]; 3];
         for k in 0..3 {
@@ -239,12 +245,12 @@ impl Points<'_> {
 
     /// Texels by slot; white where there is no texture.
     #[inline(always)]
-    fn texels<const N: usize>(&self, place: &Place<'_, N>, is_textured: bool) -> [[[f32; N]; 4]; 4] {
-        let mut texels = [[[1.0; N]; 4]; 4];
+    fn texels<const N: usize>(&self, place: &Place<'_, N>, is_textured: bool) -> [[[f32; N]; 4]; slots::COUNT] {
+        let mut texels = [[[1.0; N]; 4]; slots::COUNT];
         let Some(uvs) = self.surface.uvs.as_ref().filter(|_| is_textured) else { return texels };
         let uv = Uv::new(uvs, &place.ids, &place.b);
         for (slot, texels) in texels.iter_mut().enumerate() {
-            let is_light = slot == slots::METALLIC_ROUGHNESS || slot == slots::NORMAL;
+            let is_light = [slots::METALLIC_ROUGHNESS, slots::NORMAL, slots::OCCLUSION].contains(&slot);
             if self.has_texture(slot) && (!is_light || self.material.flags & flags::LIT != 0) {
                 *texels = sample(&self.surface.textures, &self.material.textures[slot], &uv);
             }

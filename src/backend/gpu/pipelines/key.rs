@@ -3,7 +3,7 @@
 //! It is the constant `PIPELINE_KEY` of each pipeline, so that a kernel contains only the code that
 //! its plan needs.
 
-use crate::plan::{DrawPlan, SurfacePass, flags};
+use crate::plan::{DrawPlan, SurfacePass, flags, slots};
 
 /// A shaded surface.
 pub const SURFACE: u32 = 1;
@@ -105,7 +105,7 @@ fn samples(count: u32) -> u32 {
 /// Bits for colours that vary over a triangle.
 fn varying(surface: &SurfacePass<'_>, all: u32) -> u32 {
     let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
-    let is_textured = (0..4).any(|slot| surface.samples(slot)) && surface.uvs.is_some();
+    let is_textured = (0..slots::COUNT).any(|slot| surface.samples(slot)) && surface.uvs.is_some();
     let by_minimum = flags::WIRE_THRESHOLD | flags::WIRE_BARYCENTRIC | flags::WIRE_FWIDTH_MIN;
     let varies = flags::VERTEX_NORMALS
         | flags::DERIVATIVE_NORMALS

@@ -7,4 +7,5 @@ pub mod cut_out;
 pub mod cut_out_borders;
 pub mod formulas;
 pub mod levels;
+pub mod occlusion;
 pub mod without;
