@@ -37,8 +37,9 @@ fn the_mesh_keeps_its_pixels_and_gets_a_soft_black_shadow() {
             let without = draw(&obj, &[("style", style), ("camera.margin", "0.2")]);
             let with = draw(&obj, &[("style", style), ("camera.margin", "0.2"), SHADOW]);
             for (with, without) in with.rgba.chunks(4).zip(without.rgba.chunks(4)) {
-                // A hull is drawn with the layers here, so its own border may round otherwise.
-                let same = with.iter().zip(without).all(|(a, b)| a.abs_diff(*b) <= 1);
+                // Where a line lies over the border of the surface, the shadow is a part of what it mixes.
+                let most = if ["flat", "smooth"].contains(&style) { 1 } else { 16 };
+                let same = with.iter().zip(without).all(|(a, b)| a.abs_diff(*b) <= most);
                 assert!(without[3] < 255 || same, "{style}: {without:?} became {with:?}");
                 assert!(without[3] > 0 || with[..3] == [0; 3], "{style}: {with:?}");
             }
@@ -55,7 +56,7 @@ fn nothing_shows_from_below_without_a_surface_or_by_default() {
     let mut cases = 0;
     for keys in [
         [("style", "flat"), ("view", "bottom")],
-        [("style", "outline"), ("camera.elevation_deg", "-15")],
+        [("style", "outline"), ("camera.elevation_deg", "-40")],
         [("style", "wireframe"), ("view", "iso")],
         [("surface", "null"), ("view", "iso")],
         [("surface.debug", "uv-layout"), ("view", "iso")],
