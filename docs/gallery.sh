@@ -11,7 +11,7 @@ size=200
 columns=4
 # From the plainest look to the ones that look inside.
 looks=(
-  technical smooth flat flat-derivative
+  technical xray ground-shadow smooth flat flat-derivative
   unlit three-point light-direction glow
   transparent wire wire-lit hidden-line
   feature-edges wire-fwidth wire-fwidth-min wire-barycentric

@@ -9,11 +9,14 @@ struct Frame {
     w_row: vec4<f32>,
     screen_up: vec4<f32>,
     screen_right: vec4<f32>,
+    // The last word is the slope of rays, see Projection::ray_slope in src/plan/projection.rs.
     to_viewer: vec4<f32>,
     // Towards each lamp, and how strong it is.
     lamps: array<vec4<f32>, 3>,
     halfways: array<vec4<f32>, 3>,
+    // At the picture's upper edge, and what each row adds to it.
     background: vec4<f32>,
+    background_step: vec4<f32>,
     hull_color: vec4<f32>,
     near_w: f32,
     ambient: f32,

@@ -12,6 +12,12 @@ fn flip_alpha_sign(color: vec4<f32>) -> vec4<f32> {
     return vec4(color.xyz, bitcast<f32>(bitcast<u32>(color.w) ^ 0x80000000u));
 }
 
+// The background behind pixel number i of the batch's rows. Twin of DrawPlan::background_at.
+fn background_at(i: u32) -> vec4<f32> {
+    let rows = f32(batch.row_first + i32(i) / frame.width) + 0.5;
+    return frame.background + rn4(frame.background_step * rows);
+}
+
 fn over_background(surface: vec4<f32>, background: vec4<f32>) -> vec4<f32> {
     return surface + rn4(background * (1.0 - surface.w));
 }

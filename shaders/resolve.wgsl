@@ -11,13 +11,13 @@ fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroup
     if i >= batch.count {
         return;
     }
-    var c = frame.background;
+    var c = background_at(i);
     if has(SURFACE | HULL | LINES) {
         c = colors[i];
         if has(LINES) && is_composited(c) {
             c = flip_alpha_sign(c);
         } else {
-            c = over_background(c, frame.background);
+            c = over_background(c, background_at(i));
         }
     }
     rgba[batch.rgba_at + i] = encode(c);

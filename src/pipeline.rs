@@ -144,7 +144,8 @@ fn draw_view(
     };
     let selected = plan::select_quality(spec, mesh.triangles.len(), backends.has_gpu());
     let spec = selected.as_ref().map_or(spec, |selected| &selected.spec);
-    let scene = Scene::new(mesh, spec, budget)?;
+    let framing = plan::framing(mesh, spec, prepared, budget, deadline)?;
+    let scene = Scene::framed_by(framing.as_deref().unwrap_or(&mesh.positions), mesh, spec, budget)?;
     let plan = plan::build_from(&scene, prepared, budget, deadline)?;
     let bands_bytes = backends.bands_bytes(spec.backend, &plan);
     budget.spend("bands of the picture", bands_bytes, 1).map_err(PlanError::Limit)?;
@@ -173,8 +174,10 @@ pub fn make_ready(
     budget: &mut Budget,
     deadline: &Deadline,
 ) -> Result<(), RenderError> {
-    let scene = Scene::new(&model.mesh, spec, budget)?;
-    let plan = plan::build_from(&scene, &model.prepared, budget, deadline)?;
+    let Model { mesh, prepared, .. } = model;
+    let framing = plan::framing(mesh, spec, prepared, budget, deadline)?;
+    let scene = Scene::framed_by(framing.as_deref().unwrap_or(&mesh.positions), mesh, spec, budget)?;
+    let plan = plan::build_from(&scene, prepared, budget, deadline)?;
     Ok(device.make_ready(&plan)?)
 }
 

@@ -33,7 +33,7 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
     }
     // Without a surface nothing has written the colours yet.
     if (batch.line_flags & FIRST_PASS) != 0u && !has(SURFACE | HULL) {
-        colors[i] = flip_alpha_sign(frame.background);
+        colors[i] = flip_alpha_sign(background_at(i));
     }
     let at = STROKE_WORDS * i;
     var by_holes = false;
@@ -67,7 +67,7 @@ fn coverage(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgrou
         if is_composited(under) {
             under = flip_alpha_sign(under);
         } else {
-            under = over_background(uncovered(i, under, points, rn(color.w * batch.line_peak)), frame.background);
+            under = over_background(uncovered(i, under, points, rn(color.w * batch.line_peak)), background_at(i));
         }
         if (batch.line_flags & LIT_PASS) != 0u {
             color = lit_color(color, colors[batch.count + i].xy);

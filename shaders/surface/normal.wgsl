@@ -35,6 +35,18 @@ fn normal(id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> vec3<f32> {
     return frame.to_viewer.xyz;
 }
 
+// Share of alpha that a material of MATERIAL_BY_ANGLE keeps where its unit normal is n: all at grazing
+// angles.
+fn angle_share(m: u32, at: vec2<f32>, n: vec3<f32>) -> f32 {
+    let away = frame.to_viewer.w * at;
+    // Towards the eye.
+    let ray = (frame.to_viewer.xyz - rn3(away.x * frame.screen_right.xyz)) + rn3(away.y * frame.screen_up.xyz);
+    let facing = dot3(n, ray) / sqrt(dot3(ray, ray));
+    let grazing = 1.0 - clamp(facing, 0.0, 1.0);
+    let least = materials[m].facing_opacity;
+    return least + rn((1.0 - least) * rn(grazing * grazing));
+}
+
 // The cross product of the position's fine derivatives in a block of 2 x 2 pixels, as a GPU's
 // rasterizer has them: in f32, with the same rounding errors on both back-ends.
 fn derivative_normal(id: u32, at: vec2<f32>) -> vec3<f32> {

@@ -21,9 +21,13 @@ struct Material {
     normal_scale: f32,
     flags: u32,
     opacity: f32,
-    padding: u32,
-    // Four texture uses of eight words.
-    textures: array<vec4<u32>, 8>,
+    facing_opacity: f32,
+    occlusion_strength: f32,
+    padding_a: u32,
+    padding_b: u32,
+    padding_c: u32,
+    // Five texture uses of eight words.
+    textures: array<vec4<u32>, 10>,
 };
 
 // Bits of a material's flags.
@@ -42,12 +46,14 @@ const MATERIAL_WIRE_LIT: u32 = 2048u;
 const MATERIAL_DEBUG_SHIFT: u32 = 12u;
 const MATERIAL_OWN_METALLIC: u32 = 32768u;
 const MATERIAL_OWN_ROUGHNESS: u32 = 65536u;
+const MATERIAL_BY_ANGLE: u32 = 131072u;
 
 // Places among a material's textures.
 const SLOT_BASE: u32 = 0u;
 const SLOT_METALLIC_ROUGHNESS: u32 = 1u;
 const SLOT_NORMAL: u32 = 2u;
 const SLOT_EMISSIVE: u32 = 3u;
+const SLOT_OCCLUSION: u32 = 4u;
 
 // Parts of a material that a point shows.
 struct Show {
@@ -102,6 +108,9 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
     if base.w == 0.0 && cover == 0.0 {
         return vec4(0.0);
     }
+    if (flags & MATERIAL_BY_ANGLE) != 0u {
+        base.w = rn(base.w * angle_share(m, at, normal(id, at, m, b)));
+    }
     var light_here = Light(1.0, 0.0);
     if (flags & MATERIAL_LIT) != 0u {
         var gloss = vec2(materials[m].roughness, materials[m].metallic);
@@ -114,7 +123,12 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
                 n = normal_mapped(id, m, b.front, uv, n);
             }
         }
-        light_here = dimmed(light(gloss.y, gloss.x, n), show.open);
+        light_here = light(gloss.y, gloss.x, n);
+        if has(TEXTURES) && use_of(m, SLOT_OCCLUSION).texture < frame.image_count {
+            let red = sample_texture(m, SLOT_OCCLUSION, uv).x;
+            light_here = occluded(light_here, materials[m].occlusion_strength, red, gloss.y, n);
+        }
+        light_here = dimmed(light_here, show.open);
     }
     var emissive = materials[m].emissive;
     if has(TEXTURES) {

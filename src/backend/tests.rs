@@ -54,8 +54,8 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("FACES_BOTH" = FACES_BOTH, "FACES_FRONT" = FACES_FRONT, "FACES_BACK" = FACES_BACK);
     // Materials: flags, slots, debug views, samplers.
     add_same!("MATERIAL_", flags: FILL FACE_NORMALS DERIVATIVE_NORMALS LIT VERTEX_COLORS MASK BLEND WIRE_BARYCENTRIC
-        WIRE_FWIDTH_MIN WIRE_FWIDTH WIRES WIRE_LIT DEBUG_SHIFT OWN_METALLIC OWN_ROUGHNESS);
-    add_same!("SLOT_", slots: BASE METALLIC_ROUGHNESS NORMAL EMISSIVE);
+        WIRE_FWIDTH_MIN WIRE_FWIDTH WIRES WIRE_LIT DEBUG_SHIFT OWN_METALLIC OWN_ROUGHNESS BY_ANGLE);
+    add_same!("SLOT_", slots: BASE METALLIC_ROUGHNESS NORMAL EMISSIVE OCCLUSION);
     add_same!("DEBUG_", debug_views: BARYCENTRIC MIN_BARYCENTRIC EDGE_DISTANCE NORMAL UV FACE_ORIENTATION VERTEX_COLOR);
     add!("WRAP_BITS" = samplers::WRAP_BITS, "WRAP_DOWN_SHIFT" = samplers::DOWN_SHIFT);
     add!("WRAP_REPEAT" = samplers::REPEAT, "WRAP_MIRROR" = samplers::MIRROR, "SAMPLER_NEAREST" = samplers::NEAREST);
@@ -212,8 +212,8 @@ fn layouts() -> Vec<(&'static str, Layout)> {
         (
             "Frame",
             layout!(Frame {
-                x_row y_row z_row w_row screen_up screen_right to_viewer lamps halfways background hull_color near_w
-                ambient lamp_count zero width height triangle_count vertex_count masks_at material_count layer_fade
+                x_row y_row z_row w_row screen_up screen_right to_viewer lamps halfways background background_step hull_color
+                near_w ambient lamp_count zero width height triangle_count vertex_count masks_at material_count layer_fade
                 hull_color_count image_count normal_triangles_at uv_triangles_at color_triangles_at
                 occlusion_depth occlusion_spread taps occlusion_reach
             }),
@@ -231,7 +231,8 @@ fn layouts() -> Vec<(&'static str, Layout)> {
             "Material",
             layout!(ShadedMaterial {
                 base_color emissive alpha_cutoff wire_color wire_thickness wire_smoothing metallic roughness
-                normal_scale flags opacity padding textures
+                normal_scale flags opacity facing_opacity occlusion_strength padding_a padding_b padding_c
+                textures
             }),
         ),
         ("Vertex", layout!(ScreenVertex { x y z inv_w })),

@@ -76,7 +76,7 @@ pub struct RenderArgs {
     /// Samples per pixel: 1, 4, 8 or 16
     #[arg(long)]
     samples: Option<String>,
-    /// #rgb, #rrggbb, #rrggbbaa or transparent
+    /// #rgb, #rrggbb, #rrggbbaa or transparent; or two of them from top to bottom: #fff..#dde
     #[arg(long, value_name = "COLOR")]
     background: Option<String>,
     /// Threads that read, plan, draw and decode textures [default: one for each processor]

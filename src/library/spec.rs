@@ -62,6 +62,8 @@ styles! {
     technical = "technical",
     /// The bare form: one matt colour for all materials, and strong occlusion.
     clay = "clay",
+    /// Translucent surface in one colour, opaque where it turns away from the viewer.
+    xray = "xray",
 }
 
 impl Spec {

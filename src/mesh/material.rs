@@ -32,6 +32,10 @@ pub struct MaterialSlot {
     pub normal_scale: Option<f32>,
     /// sRGB colour, times `emissive`.
     pub emissive_texture: Option<TextureRef>,
+    /// Ambient light in red: 1 all of it.
+    pub occlusion_texture: Option<TextureRef>,
+    /// The share of the occlusion texture's darkness that counts, 0 to 1. None: 1.
+    pub occlusion_strength: Option<f32>,
 }
 
 /// The meaning of alpha.

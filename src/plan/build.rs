@@ -6,7 +6,7 @@ use super::prepared::Prepared;
 use super::projection::Projection;
 use super::skips::SkipKind;
 use super::{DrawPlan, HullPass, PlanError, pass_mask};
-use super::{costs, heat, lines, margin, occlusion, outline, primitives, surface};
+use super::{costs, ground, heat, lines, margin, occlusion, outline, primitives, surface};
 use crate::limits::{Budget, Deadline};
 use crate::scene::Scene;
 
@@ -44,12 +44,14 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
     let primitive_lines = primitives::line_passes(scene, &mut cx)?;
     let mut lines = lines::passes(scene, &mut cx)?;
     lines.extend(primitive_lines);
-    let surface = surface::surface_pass(scene, &geometry, &mut cx)?;
+    let mut surface = surface::surface_pass(scene, &geometry, &mut cx)?;
     let occlusion = occlusion::occlusion_pass(scene, surface.as_ref(), &mut cx);
     let clipped = Projection::new(camera, scene.size_px(), true);
     let hides = surface.is_some() || groups.has_hull();
     let needed_px = lines.iter().map(lines::LinePass::margin_rows).filter(|_| hides).max().unwrap_or(0);
     let margin_px = margin::margin_px(scene, &geometry, needed_px, &mut cx)?;
+    let is_mesh_alone = geometry.triangles.len() == scene.mesh.triangles.len();
+    let ground_count = ground::add(scene, &mut geometry, &mut surface, &mut cx)?;
     let hull = if cx.skips.skip(SkipKind::Hull, !groups.has_hull(), "the look has no hull") {
         None
     } else if groups.has_hull() {
@@ -58,17 +60,18 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
         Some(HullPass::default())
     };
     let peeling = peeling_pass(groups, hull.is_some(), &mut cx.skips);
-    let pass_masks = pass_masks(groups, &geometry, surface.is_some(), peeling.as_ref());
+    let pass_masks = pass_masks(groups, &geometry, ground_count, surface.is_some(), peeling.as_ref());
     // Triangles that stand for points and lines have sides that are no edges, and layers show other
     // edges than the surface.
-    let is_one_surface = geometry.triangles.len() == scene.mesh.triangles.len()
-        && pass_masks.iter().all(|&mask| mask == pass_mask::SURFACE);
+    let of_mesh = pass_masks.iter().take(scene.mesh.triangles.len());
+    let is_one_surface = is_mesh_alone && of_mesh.into_iter().all(|&mask| mask == pass_mask::SURFACE);
     lines.iter_mut().for_each(|pass| pass.is_complete &= is_one_surface);
     let is_unclipped = cx.skips.skip(
         SkipKind::Clipping,
         camera.contains_mesh,
         "the whole mesh lies between the eye and the picture's guard band",
     );
+    let (background, background_step) = spec.image.background.rows(spec.image.height_px);
     Ok(DrawPlan {
         width_px: spec.image.width_px,
         height_px: spec.image.height_px,
@@ -83,7 +86,8 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
         peeling,
         hull,
         lines,
-        background: spec.image.background.premultiplied(),
+        background,
+        background_step,
         skips: cx.skips.done,
         short_chains: cx.short_chains,
         warnings: cx.warnings,

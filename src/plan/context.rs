@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::PlanError;
+use super::cut_outs::{CutOuts, MaskedFaces, masked};
 use super::edges::face_runs::FaceRuns;
 use super::edges::silhouettes::Silhouettes;
 use super::lines::picked_faces::looked_at;
@@ -134,6 +135,23 @@ impl<'c> PlanContext<'c> {
         Ok((edges, orientation))
     }
 
+    /// What shows of faces with cut-out textures, and by material whether that counts in this picture; None
+    /// where it never does.
+    fn cut_outs(&mut self, scene: &Scene<'_, '_>) -> Result<Option<MaskedFaces>, PlanError> {
+        self.budget.spend("materials", scene.mesh.materials.len() as u64, 1)?;
+        let masked = masked(scene.mesh, &scene.groups);
+        if masked.is_empty() {
+            return Ok(None);
+        }
+        let deadline = self.deadline;
+        let find = |budget: &mut Budget| CutOuts::of(scene.mesh, budget, deadline);
+        let found = match self.prepared {
+            Some(prepared) => prepared.cut_outs(self.budget, find)?,
+            None => Arc::new(find(self.budget)?),
+        };
+        Ok(Some((found, masked)))
+    }
+
     /// The edges of the mesh, and which of them may be silhouette edges. Contours and hulls share
     /// them.
     pub fn silhouettes(&mut self, scene: &Scene<'_, '_>) -> Result<(Arc<EdgeList>, Arc<Silhouettes>), PlanError> {
@@ -141,7 +159,8 @@ impl<'c> PlanContext<'c> {
         if let Some(silhouettes) = &self.silhouettes {
             return Ok((edges, Arc::clone(silhouettes)));
         }
-        let silhouettes = Arc::new(Silhouettes::new(&scene.groups, &edges, self.budget)?);
+        let cut_outs = self.cut_outs(scene)?;
+        let silhouettes = Arc::new(Silhouettes::new(&scene.groups, &edges, cut_outs, self.budget)?);
         self.silhouettes = Some(Arc::clone(&silhouettes));
         Ok((edges, silhouettes))
     }

@@ -9,7 +9,7 @@ use crate::scene::{MaterialGroups, Scene};
 use crate::spec::Shading;
 
 /// Bytes per material: what the shaders read of it, and flags.
-const MATERIAL_BYTES: u64 = 259;
+const MATERIAL_BYTES: u64 = 307;
 
 /// Bytes that a back-end takes per vertex on screen.
 const VERTEX_BYTES: u64 = 32;

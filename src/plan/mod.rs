@@ -11,9 +11,12 @@
 mod build;
 mod context;
 mod costs;
+mod cut_outs;
 mod edges;
 mod error;
+mod framing;
 mod geometry;
+mod ground;
 pub(crate) mod heat;
 mod lines;
 mod margin;
@@ -33,6 +36,7 @@ mod warnings;
 pub use crate::texture::{Texture, TextureError, Textures};
 pub use build::{build, build_from, build_keeping};
 pub use error::PlanError;
+pub use framing::framing;
 pub use lines::{Edge, LinePass, Shown, Side};
 pub use occlusion::{OcclusionPass, TAPS};
 pub use outline::{HullPass, HullVertex};
@@ -88,8 +92,10 @@ pub struct DrawPlan<'a> {
     pub hull: Option<HullPass<'a>>,
     /// Lines of exact width, drawn over everything else, in this order.
     pub lines: Vec<LinePass>,
-    /// Premultiplied linear RGBA behind everything.
+    /// Premultiplied linear RGBA behind everything, at the picture's upper edge.
     pub background: [f32; 4],
+    /// What each row adds to it; 0 where the background has one colour.
+    pub background_step: [f32; 4],
     /// Work that the plan leaves out, and why.
     pub skips: Vec<Skip>,
     /// Chains of outlines that are left out because they are short: see `outline.min_length`.
@@ -134,11 +140,25 @@ impl<'a> DrawPlan<'a> {
             hull: None,
             lines: Vec::new(),
             background: [0.0; 4],
+            background_step: [0.0; 4],
             skips: Vec::new(),
             short_chains: 0,
             warnings: Vec::new(),
             mesh: None,
         }
+    }
+
+    /// True if the background is not the same in all rows.
+    #[inline(always)]
+    pub fn has_gradient(&self) -> bool {
+        self.background_step != [0.0; 4]
+    }
+
+    /// The background in the middle of a row. Twin of `background_at` in `shaders/over.wgsl`.
+    #[inline(always)]
+    pub fn background_at(&self, row: u32) -> [f32; 4] {
+        let rows = row as f32 + 0.5;
+        std::array::from_fn(|k| self.background[k] + self.background_step[k] * rows)
     }
 
     /// The peeling pass, where there are layers to look for.

@@ -65,7 +65,7 @@ pub fn peeling_pass(groups: &MaterialGroups<'_>, has_hull: bool, skips: &mut Ski
 
 /// The peeling pass that these groups need, if they need one.
 pub fn needed_pass(groups: &MaterialGroups<'_>) -> Option<PeelingPass> {
-    let is_transparent = groups.fills().contains(&Fill::Transparent);
+    let is_transparent = groups.has_ground() || groups.fills().contains(&Fill::Transparent);
     let wires = || {
         let all = groups.by_material.iter().zip(groups.fills());
         all.filter_map(|(layers, fill)| Some((barycentric_wire(layers)?, *fill)))
@@ -88,10 +88,12 @@ pub fn needed_pass(groups: &MaterialGroups<'_>) -> Option<PeelingPass> {
     })
 }
 
-/// [`DrawPlan::pass_masks`](crate::plan::DrawPlan::pass_masks) of a plan with these passes.
+/// [`DrawPlan::pass_masks`](crate::plan::DrawPlan::pass_masks) of a plan with these passes, whose last
+/// triangles are the ground.
 pub fn pass_masks(
     groups: &MaterialGroups<'_>,
     geometry: &Geometry<'_>,
+    ground_count: usize,
     has_surface: bool,
     pass: Option<&PeelingPass>,
 ) -> Cow<'static, [u8]> {
@@ -108,6 +110,8 @@ pub fn pass_masks(
         // Lines and points face the viewer.
         *mask &= pass_mask::SURFACE | pass_mask::LAYER;
     }
+    let ground = all.len() - ground_count;
+    all[ground..].fill(pass_mask::LAYER);
     all.into()
 }
 

@@ -9,6 +9,7 @@ use crate::limits::{Budget, LimitExceeded, Spent};
 use crate::mesh::creases::CreasedNormals;
 use crate::mesh::edges::EdgeList;
 use crate::mesh::topology::Orientation;
+use crate::plan::cut_outs::CutOuts;
 use crate::plan::edges::face_runs::FaceRuns;
 use crate::texture::mips::Reading;
 use crate::texture::{TextureError, Textures};
@@ -23,6 +24,7 @@ pub struct Prepared {
     orientation: OnceLock<Orientation>,
     looked_at: OnceLock<(Arc<Vec<u32>>, Vec<Spent>)>,
     face_runs: OnceLock<(Arc<FaceRuns>, Vec<Spent>)>,
+    cut_outs: OnceLock<(Arc<CutOuts>, Vec<Spent>)>,
     vertex_normals: Mutex<Option<VertexNormals>>,
     textures: Mutex<Option<PreparedTextures>>,
 }
@@ -78,6 +80,15 @@ impl Prepared {
         find: impl FnOnce(&mut Budget) -> Result<FaceRuns, LimitExceeded>,
     ) -> Result<Arc<FaceRuns>, LimitExceeded> {
         kept(&self.face_runs, budget, find)
+    }
+
+    /// What shows of the faces with cut-out textures, paid for; found by `find` if it is not known.
+    pub fn cut_outs<E: From<LimitExceeded>>(
+        &self,
+        budget: &mut Budget,
+        find: impl FnOnce(&mut Budget) -> Result<CutOuts, E>,
+    ) -> Result<Arc<CutOuts>, E> {
+        kept(&self.cut_outs, budget, find)
     }
 
     /// The edges, if they are known.
@@ -139,7 +150,8 @@ impl Prepared {
         let textures = self.locked_textures().as_ref().map_or(0, |kept| size_of_val(&kept.textures.texels[..]));
         let looked_at = self.looked_at.get().map_or(0, |(faces, _)| size_of_val(&faces[..]));
         let runs = self.face_runs.get().map_or(0, |(runs, _)| runs.bytes());
-        (edges + normals + textures + looked_at + runs) as u64
+        let cut_outs = self.cut_outs.get().map_or(0, |(cut_outs, _)| cut_outs.bytes());
+        (edges + normals + textures + looked_at + runs + cut_outs) as u64
     }
 
     fn locked_normals(&self) -> MutexGuard<'_, Option<VertexNormals>> {
@@ -152,11 +164,11 @@ impl Prepared {
 }
 
 /// The content of a place, paid for; found by `find`, and kept, if there is none.
-fn kept<T>(
+fn kept<T, E: From<LimitExceeded>>(
     place: &OnceLock<(Arc<T>, Vec<Spent>)>,
     budget: &mut Budget,
-    find: impl FnOnce(&mut Budget) -> Result<T, LimitExceeded>,
-) -> Result<Arc<T>, LimitExceeded> {
+    find: impl FnOnce(&mut Budget) -> Result<T, E>,
+) -> Result<Arc<T>, E> {
     if let Some((found, spent)) = place.get() {
         budget.spend_again(spent)?;
         return Ok(Arc::clone(found));

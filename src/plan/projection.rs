@@ -38,6 +38,14 @@ impl Projection {
         let near_w = if w[3] == 1.0 && w[..3] == [0.0; 3] { 0.5 } else { camera.near as f32 };
         Self { x, y, z, w, near_w, clip, to_viewer: back, screen_up: up, screen_right: right }
     }
+
+    /// Distance that a ray gains sideways on its way, per distance along the view's axis and 1/256 px
+    /// from the picture's centre; 0 in an orthographic view.
+    pub fn ray_slope(&self) -> f32 {
+        let square = |row: &[f32; 4]| (row[0] * row[0] + row[1] * row[1]) + row[2] * row[2];
+        let (along, across) = (square(&self.w), square(&self.x));
+        if along > 0.0 && across > 0.0 { (along / across).sqrt() } else { 0.0 }
+    }
 }
 
 #[cfg(test)]

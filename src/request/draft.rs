@@ -8,8 +8,8 @@ use crate::request::style::Style;
 use crate::request::table::dependent::Dependent;
 use crate::spec::words::{Words, word_for};
 use crate::spec::{
-    BackendChoice, CameraSpec, DebugView, ImageSpec, Layers, Light, LightPreset, Open, Outline, OutlineMethod, Points,
-    QualityTarget, Spec, Surface, Topology, Wire, WireMethod,
+    BackendChoice, CameraSpec, DebugView, Ground, ImageSpec, Layers, Light, LightPreset, Open, Outline, OutlineMethod,
+    Points, QualityTarget, Spec, Surface, Topology, Wire, WireMethod,
 };
 
 /// Most different styles of exact wires and contours in one picture.
@@ -27,6 +27,8 @@ pub struct Draft {
     pub points: Points,
     /// See [`Spec::time_s`].
     pub time_s: Option<f64>,
+    /// See [`Spec::ground`].
+    pub ground: Ground,
     /// See [`Spec::camera`].
     pub camera: CameraSpec,
     /// The sheet, if it is on.
@@ -59,6 +61,7 @@ impl Draft {
             topology: (style == Style::Topology).then(Topology::default),
             points: Points::default(),
             time_s: None,
+            ground: Ground::None,
             camera: CameraSpec::default(),
             sheet: None,
             light: Light { ambient_occlusion: style.ambient_occlusion(), ..Light::default() },
@@ -122,9 +125,22 @@ impl Draft {
         let ([width_px, height_px], samples) = (self.size_px, self.samples.or(self.image.samples));
         let image = ImageSpec { width_px, height_px, samples, ..self.image };
         let sheet = self.sheet.as_ref().map(|sheet| sheet.finish(&self.camera, &image, px_max)).transpose()?;
-        let Self { topology, points, time_s, camera, .. } = self;
+        let Self { topology, points, time_s, ground, camera, .. } = self;
         let backend = self.backend.or(backend);
-        Ok(Spec { layers, materials, topology, points, time_s, camera, sheet, light, image, backend, quality_target })
+        Ok(Spec {
+            layers,
+            materials,
+            topology,
+            points,
+            time_s,
+            ground,
+            camera,
+            sheet,
+            light,
+            image,
+            backend,
+            quality_target,
+        })
     }
 
     fn quality_target(&self, materials: &[(String, LayersDraft)], backend: BackendChoice) -> Option<QualityTarget> {

@@ -14,6 +14,9 @@ pub const MULTIPLE_MAX: f32 = 10.0;
 /// Largest outline in pixels: wider than any picture needs, and far from overflowing fixed point.
 pub const OUTLINE_PX_MAX: f32 = 100.0;
 
+/// The colour of [`Style::Xray`], a blue of films: `#1d5c96`.
+const XRAY_COLOR: [u8; 4] = [0x1d, 0x5c, 0x96, 0xff];
+
 /// Layers whose dependent defaults are still open.
 #[derive(Clone, Debug)]
 pub struct LayersDraft {
@@ -55,6 +58,7 @@ impl LayersDraft {
             Style::Outline => (surface(Shading::Smooth), None, Some(Outline::default())),
             Style::HiddenLine => (white(), wire, None),
             Style::Clay => (clay(), None, None),
+            Style::Xray => (Some(xray()), None, None),
             Style::Technical => (surface(Shading::Smooth), Some(feature_edges()), Some(contour())),
         };
         let hidden = if style == Style::Wireframe { Hidden::Fade } else { Hidden::Hide };
@@ -108,6 +112,12 @@ fn clay() -> Option<Surface> {
         textures: false,
         ..Surface::default()
     })
+}
+
+/// The surface of [`Style::Xray`]: one colour without light, so that the angle alone shows the form.
+fn xray() -> Surface {
+    let (color, emissive) = (Some(Rgba::from_srgb8(XRAY_COLOR)), Some(Rgba::BLACK));
+    Surface { shading: Shading::Unlit, color, emissive, facing_opacity: 0.07, ..Surface::default() }
 }
 
 /// The lines of [`Style::Technical`]: 1 px wide.

@@ -30,7 +30,6 @@ use std::collections::BTreeMap;
 
 use crate::image::ImageFormat;
 use crate::limits::Limits;
-use crate::spec::color::Rgba;
 use crate::spec::{BackendChoice, Spec};
 use document::item::Item;
 use document::{duplicate_keys, json, mesh_reference};
@@ -113,8 +112,7 @@ pub fn read_moment(overrides: &Overrides, rules: &Rules) -> Result<Option<f64>, 
 pub fn set_format(spec: &mut Spec, format: ImageFormat) {
     spec.image.format = Some(format);
     if format == ImageFormat::Jpeg {
-        let [r, g, b, a] = spec.image.background.premultiplied();
-        spec.image.background = Rgba([r + (1.0 - a), g + (1.0 - a), b + (1.0 - a), 1.0]);
+        spec.image.background = spec.image.background.over_white();
     }
 }
 

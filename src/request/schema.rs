@@ -138,6 +138,11 @@ fn or_null(mut schema: Json) -> Json {
     schema
 }
 
+fn color_pattern() -> String {
+    let hex = "[0-9a-fA-F]";
+    format!("(transparent|#?({hex}{{3,4}}|{hex}{{6}}|{hex}{{8}}))")
+}
+
 fn of_kind(kind: &Kind, image_px: u64) -> Json {
     let whole = || json!({ "type": "integer", "minimum": 1, "maximum": image_px });
     let coordinates = || {
@@ -162,10 +167,9 @@ fn of_kind(kind: &Kind, image_px: u64) -> Json {
             json!({ "type": "array", "items": { "enum": words }, "minItems": 1, "maxItems": count_max })
         }
         Kind::Count { min, max } => json!({ "type": "integer", "minimum": min, "maximum": max }),
-        Kind::Color => {
-            let hex = "[0-9a-fA-F]";
-            let pattern = format!("^(transparent|#?({hex}{{3,4}}|{hex}{{6}}|{hex}{{8}}))$");
-            json!({ "type": "string", "pattern": pattern })
+        Kind::Color => json!({ "type": "string", "pattern": format!("^{}$", color_pattern()) }),
+        Kind::Background => {
+            json!({ "type": "string", "pattern": format!("^{0}(\\.\\.{0})?$", color_pattern()) })
         }
         Kind::Point => coordinates(),
         Kind::Direction => {

@@ -27,6 +27,8 @@ word_enums! {
         Technical = "technical",
         /// The bare form: one matt colour for all materials, and strong occlusion.
         Clay = "clay",
+        /// Translucent surface in one colour, opaque where it turns away from the viewer.
+        Xray = "xray",
     }
 }
 

@@ -1,6 +1,7 @@
 //! The room around a mesh that its outlines, lines and points need when the camera is fitted.
 
 use super::camera::Border;
+use super::ground::ground_distance;
 use super::material_groups::MaterialGroups;
 use crate::mesh::{LineOrPoint, Mesh};
 use crate::spec::{Outline, OutlineMethod, OutlineUnit, Spec, WireMethod};
@@ -39,6 +40,9 @@ pub fn border(mesh: &Mesh, groups: &MaterialGroups<'_>, spec: &Spec) -> Border {
     let widest_px = if has_points { LINE_PX.max(f64::from(spec.points.size_px)) } else { 2.0 * LINE_PX };
     let mut border =
         Border { px: if mesh.lines_and_points.is_empty() { 0.0 } else { 0.5 * widest_px }, ..Border::default() };
+    if groups.has_ground() {
+        border.around = ground_distance(mesh);
+    }
     for style in &groups.styles {
         // Points without a fill are drawn as lines are, but wider.
         let has_dots = style.surface.is_none() && has_points;

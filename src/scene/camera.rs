@@ -44,11 +44,14 @@ pub struct Border {
     pub grow: f64,
     /// Room on each side, pixels.
     pub px: f64,
+    /// Distance around the mesh that is drawn, too, wherever it lies on screen: units of the box.
+    pub around: f64,
 }
 
 impl Camera {
-    /// Places the camera for a picture of `size_px`.
-    pub fn place(spec: &CameraSpec, mesh: &Mesh, size_px: [u32; 2], border: Border) -> Self {
+    /// Places the camera for a picture of `size_px`, fitted to those of the mesh's positions that are in
+    /// `framing`.
+    pub fn place(spec: &CameraSpec, mesh: &Mesh, framing: &[[f32; 3]], size_px: [u32; 2], border: Border) -> Self {
         let size = DVec2::new(f64::from(size_px[0]), f64::from(size_px[1]));
         let up = spec.up.unwrap_or(mesh.up);
         let free = |v: f64| (1.0 - 2.0 * spec.margin - 2.0 * border.px / v).max(0.05);
@@ -67,11 +70,11 @@ impl Camera {
             _ => (named_axes(spec, up), None),
         };
         let slopes = tangents * inner;
-        let extents = if spec.fits_turn {
-            turned_extents(mesh, (axes, frame(up)[1]), sin_cos_deg(spec.elevation_deg()), slopes)
-        } else {
-            Extents::new(mesh, axes, slopes)
+        let extents_of = |positions: &[[f32; 3]]| match spec.fits_turn {
+            true => turned_extents(positions, mesh, (axes, frame(up)[1]), sin_cos_deg(spec.elevation_deg()), slopes),
+            false => Extents::new(positions, axes, slopes),
         };
+        let extents = extents_of(framing);
         let mut camera = match (spec.projection, explicit) {
             (Kind::Perspective, Some((target, distance))) => {
                 let to = DVec2::new(axes[0].dot(target), axes[1].dot(target));
@@ -89,7 +92,9 @@ impl Camera {
                 Self::new(axes, center, extents.high.z + 1.0, DVec2::new(half * aspect, half), Kind::Orthographic)
             }
         };
-        camera.set_range(&extents, border.grow, size);
+        // What does not frame the picture has a depth, too.
+        let extents = if framing.len() == mesh.positions.len() { extents } else { extents_of(&mesh.positions) };
+        camera.set_range(&extents, border.grow + border.around, size);
         camera.set_reach(&extents, slopes);
         camera
     }
@@ -212,7 +217,7 @@ fn named_axes(spec: &CameraSpec, up: UpAxis) -> [DVec3; 3] {
 
 /// Model right, up and front for an up axis: right-handed, and as the formats' conventions have it
 /// (glTF: +Y up, +Z front; STL: +Z up, -Y front).
-fn frame(up: UpAxis) -> [DVec3; 3] {
+pub(crate) fn frame(up: UpAxis) -> [DVec3; 3] {
     let (right, up) = match up {
         UpAxis::Y => (DVec3::X, DVec3::Y),
         UpAxis::NegY => (DVec3::X, DVec3::NEG_Y),

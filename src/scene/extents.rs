@@ -31,13 +31,13 @@ pub struct Extents {
 
 impl Extents {
     /// The bounds along these axes, and in the view pyramid of these slopes.
-    pub fn new(mesh: &Mesh, axes: [DVec3; 3], slopes: DVec2) -> Self {
-        if mesh.positions.is_empty() {
+    pub fn new(positions: &[[f32; 3]], axes: [DVec3; 3], slopes: DVec2) -> Self {
+        if positions.is_empty() {
             let nothing = DVec2::NEG_INFINITY;
             return Self { low: DVec3::ZERO, high: DVec3::ZERO, plus: nothing, minus: nothing };
         }
         let farthest = Farthest::new(axes, slopes);
-        let pieces = map(mesh.positions.chunks(PIECE).collect(), |piece| farthest.lanes_of(piece));
+        let pieces = map(positions.chunks(PIECE).collect(), |piece| farthest.lanes_of(piece));
         let mut lanes = ExtentLanes::EMPTY;
         pieces.iter().for_each(|piece| lanes.merge(piece));
         let least = |v: [f64; LANES]| v.into_iter().fold(f64::INFINITY, f64::min);
@@ -203,12 +203,13 @@ impl ExtentLanes {
     }
 }
 
-/// The bounds of a mesh that turns around the up axis through the middle of its box, in the axes of a
-/// camera above the horizon by the angle of this sine and cosine.
+/// The bounds of positions that turn with their mesh around the up axis through the middle of its box, in the
+/// axes of a camera above the horizon by the angle of this sine and cosine.
 ///
 /// A point at distance r from the axis and height h is at `x = r sin a`, `y = h cos e - r cos a sin e` and
 /// `z = h sin e + r cos a cos e` for a turn by a; each bound is the largest over all a.
 pub fn turned_extents(
+    positions: &[[f32; 3]],
     mesh: &Mesh,
     (axes, up): ([DVec3; 3], DVec3),
     (sin_e, cos_e): (f64, f64),
@@ -216,7 +217,7 @@ pub fn turned_extents(
 ) -> Extents {
     let nothing = DVec2::NEG_INFINITY;
     let mut all = Extents { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, plus: nothing, minus: nothing };
-    if mesh.positions.is_empty() {
+    if positions.is_empty() {
         return Extents { low: DVec3::ZERO, high: DVec3::ZERO, ..all };
     }
     let lean_x = (1.0 + (slopes.x * cos_e) * (slopes.x * cos_e)).sqrt();
@@ -224,7 +225,7 @@ pub fn turned_extents(
     let [low, high] = mesh.bounds.map(|corner| DVec3::from(corner.map(f64::from)));
     let middle = (low + high) * 0.5;
     let on_axis = middle - up * up.dot(middle);
-    for p in &mesh.positions {
+    for p in positions {
         let p = DVec3::from(p.map(f64::from)) - on_axis;
         let h = up.dot(p);
         let r = (p - up * h).length();
@@ -272,7 +273,7 @@ mod tests {
             let turn = DQuat::from_xyzw(random().into(), random().into(), random().into(), 1.0).normalize();
             let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| turn * axis);
             let slopes = DVec2::new(0.3, 2.0);
-            let all = Extents::new(&Mesh { positions: positions.clone(), ..Mesh::default() }, axes, slopes);
+            let all = Extents::new(&positions, axes, slopes);
             let along = |axis: DVec3, p: &[f32; 3]| {
                 let [x, y, z] = p.map(f64::from);
                 (axis.x * x + axis.y * y) + axis.z * z

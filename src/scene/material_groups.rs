@@ -5,7 +5,7 @@ use rapidhash::RapidHashMap;
 
 use crate::mesh::material::AlphaMode;
 use crate::mesh::{MaterialSlot, Mesh};
-use crate::spec::{Cull, DebugView, Hidden, Layers, OutlineMethod, Spec, Wire, WireMethod};
+use crate::spec::{Cull, DebugView, Ground, Hidden, Layers, OutlineMethod, Spec, Wire, WireMethod};
 
 /// Bytes that each material takes in [`MaterialGroups`].
 pub const GROUP_BYTES: u64 = size_of::<&Layers>() as u64 + 4 + 1;
@@ -22,6 +22,7 @@ pub struct MaterialGroups<'s> {
     fills: Vec<Fill>,
     has_fill: bool,
     needs_occluder: bool,
+    has_ground: bool,
 }
 
 /// The fill of a material group's surface.
@@ -56,7 +57,8 @@ impl<'s> MaterialGroups<'s> {
             by_material.iter().zip(&mesh.materials).map(|(layers, slot)| fill(layers, slot)).collect();
         let has_fill = fills.iter().any(|fill| *fill != Fill::None);
         let needs_occluder = !has_fill && styles.iter().any(|layers| has_hideable_lines(layers));
-        Self { by_material, style_of, styles, fills, has_fill, needs_occluder }
+        let has_ground = has_fill && spec.ground != Ground::None;
+        Self { by_material, style_of, styles, fills, has_fill, needs_occluder, has_ground }
     }
 
     /// Number of materials.
@@ -82,6 +84,16 @@ impl<'s> MaterialGroups<'s> {
     /// True if a material has a hull.
     pub fn is_outlined(&self, material: usize) -> bool {
         self.by_material.get(material).is_some_and(|layers| has_hull(layers))
+    }
+
+    /// True if the picture has a ground: one was asked for, and there is a surface to stand on it.
+    pub fn has_ground(&self) -> bool {
+        self.has_ground
+    }
+
+    /// Draws no ground: it is not seen.
+    pub fn leave_ground_out(&mut self) {
+        self.has_ground = false;
     }
 
     /// True if any material has a hull.
@@ -142,5 +154,5 @@ fn fill(layers: &Layers, slot: &MaterialSlot) -> Fill {
         (None, AlphaMode::Opaque) => false,
         (None, AlphaMode::Mask(_) | AlphaMode::Blend) => true,
     };
-    if has_alpha || surface.opacity < 1.0 { Fill::Transparent } else { Fill::Opaque }
+    if has_alpha || surface.opacity < 1.0 || surface.facing_opacity < 1.0 { Fill::Transparent } else { Fill::Opaque }
 }

@@ -7,9 +7,11 @@
 mod border;
 pub mod camera;
 mod extents;
+mod ground;
 mod material_groups;
 
 pub use border::{LINE_PX, Thickness, point_width};
+pub use ground::{GROUND_HEIGHT, GROUND_REACH, GroundPlane};
 pub use material_groups::{Fill, MaterialGroups, barycentric_wire};
 
 use border::{border, outline_thickness};
@@ -49,13 +51,32 @@ pub enum SceneError {
 impl<'m, 's> Scene<'m, 's> {
     /// Groups the mesh's materials by style and places the camera.
     pub fn new(mesh: &'m Mesh, spec: &'s Spec, budget: &mut Budget) -> Result<Self, SceneError> {
+        Self::framed_by(&mesh.positions, mesh, spec, budget)
+    }
+
+    /// As [`Scene::new`], but the camera is fitted to these positions.
+    pub fn framed_by(
+        framing: &[[f32; 3]],
+        mesh: &'m Mesh,
+        spec: &'s Spec,
+        budget: &mut Budget,
+    ) -> Result<Self, SceneError> {
         if spec.camera.from_file && mesh.cameras.is_empty() {
             return Err(SceneError::NoCamera);
         }
         budget.spend("materials", mesh.materials.len() as u64, GROUP_BYTES)?;
-        let groups = MaterialGroups::new(mesh, spec);
+        let mut groups = MaterialGroups::new(mesh, spec);
         let size_px = [spec.image.width_px, spec.image.height_px];
-        let camera = Camera::place(&spec.camera, mesh, size_px, border(mesh, &groups, spec));
+        let place = |groups: &MaterialGroups<'_>| {
+            Camera::place(&spec.camera, mesh, framing, size_px, border(mesh, groups, spec))
+        };
+        let mut camera = place(&groups);
+        // From below the picture is the one without a ground, to the byte.
+        let ground = GroundPlane::new(mesh, spec.camera.up.unwrap_or(mesh.up));
+        if groups.has_ground() && !ground.is_seen(&camera) {
+            groups.leave_ground_out();
+            camera = place(&groups);
+        }
         Ok(Self { mesh, spec, groups, camera })
     }
 

@@ -1,5 +1,6 @@
 //! Size, format, sampling and background of the picture, as a request describes them.
 
+use super::background::Background;
 use super::color::Rgba;
 pub use crate::image::ImageFormat;
 
@@ -14,8 +15,8 @@ pub struct ImageSpec {
     pub format: Option<ImageFormat>,
     /// Visibility samples per pixel: 1, 4, 8 or 16.
     pub samples: u32,
-    /// The colour behind the mesh; alpha 0 is transparent.
-    pub background: Rgba,
+    /// What is behind the mesh; alpha 0 is transparent.
+    pub background: Background,
     /// Time that is spent to make a PNG small, from 0 to 9. Other formats ignore it.
     pub effort: u32,
 }
@@ -30,7 +31,7 @@ impl Default for ImageSpec {
             height_px: 512,
             format: None,
             samples: 4,
-            background: Rgba::WHITE,
+            background: Rgba::WHITE.into(),
             effort: DEFAULT_EFFORT,
         }
     }

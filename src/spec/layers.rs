@@ -98,6 +98,9 @@ pub struct Surface {
     pub emissive: Option<Rgba>,
     /// Multiplies the file's own opacity, 0 to 1.
     pub opacity: f32,
+    /// The share of that opacity where the surface faces the viewer, 0 to 1; at grazing angles it has
+    /// all of it.
+    pub facing_opacity: f32,
     /// Shows the file's textures.
     pub textures: bool,
     /// Shown instead of the shaded colour.
@@ -117,6 +120,7 @@ impl Default for Surface {
             roughness: None,
             emissive: None,
             opacity: 1.0,
+            facing_opacity: 1.0,
             textures: true,
             debug: DebugView::None,
             cull: Cull::None,

@@ -1,6 +1,7 @@
 //! The meaning of a request: a [`Spec`] says what to draw of any mesh, and how. Every value is in
 //! range; units are in the names.
 
+mod background;
 mod camera;
 pub mod color;
 mod image;
@@ -11,6 +12,7 @@ mod sheet;
 mod wire_method;
 pub(crate) mod words;
 
+pub use background::*;
 pub use camera::*;
 pub use image::*;
 pub use layers::*;
@@ -35,6 +37,8 @@ pub struct Spec {
     pub points: Points,
     /// The moment of the file's first animation, seconds. None: the rest pose.
     pub time_s: Option<f64>,
+    /// What the mesh stands on.
+    pub ground: Ground,
     /// Position and lens.
     pub camera: CameraSpec,
     /// Several views of the mesh, each with a part of the picture or of the time. None: one view.
@@ -51,6 +55,14 @@ pub struct Spec {
 }
 
 word_enums! {
+    /// What the mesh stands on.
+    pub enum Ground {
+        /// Nothing.
+        None = "none",
+        /// A plane at its lowest point that shows a soft contact shadow, and nothing else.
+        Shadow = "shadow",
+    }
+
     /// The back-end that draws.
     pub enum BackendChoice {
         /// A hardware GPU if there is one, the CPU otherwise.

@@ -83,38 +83,48 @@ pub fn over_background(surface: [f32; 4], background: [f32; 4]) -> [f32; 4] {
 }
 
 dispatch! {
-    /// Writes a band's colours as sRGB bytes, over the background wherever no line has composited
-    /// both.
-    pub fn resolve(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], rgba: &mut [u8]) = resolve_kernel
+    /// Writes the colours of rows, from `first_row` on, as sRGB bytes, over the background wherever
+    /// no line has composited both.
+    pub fn resolve(
+        plan: &DrawPlan<'_>,
+        srgb: &SrgbEncoder,
+        first_row: u32,
+        colors: &[[f32; 4]],
+        rgba: &mut [u8],
+    ) = resolve_kernel
 }
 
 #[inline(always)]
-fn resolve_kernel(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, colors: &[[f32; 4]], rgba: &mut [u8]) {
-    let mut resolver = Resolver::new(plan, srgb);
+fn resolve_kernel(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, first_row: u32, colors: &[[f32; 4]], rgba: &mut [u8]) {
     let (pixels, _) = rgba.as_chunks_mut::<4>();
-    for (group, out) in colors.chunks(LANES).zip(pixels.chunks_mut(LANES)) {
-        resolver.resolve(group, out);
+    // One colour is the same in all rows.
+    let row_len = if plan.has_gradient() { plan.width_px as usize } else { colors.len().max(1) };
+    for (row, (colors, pixels)) in (first_row..).zip(colors.chunks(row_len).zip(pixels.chunks_mut(row_len))) {
+        let mut resolver = Resolver::new(plan.background_at(row), srgb);
+        for (group, out) in colors.chunks(LANES).zip(pixels.chunks_mut(LANES)) {
+            resolver.resolve(group, out);
+        }
     }
 }
 
-/// Resolves groups of pixels.
+/// Resolves groups of pixels over one colour.
 pub struct Resolver<'a> {
-    plan: &'a DrawPlan<'a>,
+    background: [f32; 4],
     srgb: &'a SrgbEncoder,
     last: Last,
 }
 
 impl<'a> Resolver<'a> {
-    /// One for a band.
+    /// One over a background.
     #[inline(always)]
-    pub fn new(plan: &'a DrawPlan<'a>, srgb: &'a SrgbEncoder) -> Self {
-        Self { plan, srgb, last: Last::of([0.0; 4], plan, srgb) }
+    pub fn new(background: [f32; 4], srgb: &'a SrgbEncoder) -> Self {
+        Self { background, srgb, last: Last::of([0.0; 4], background, srgb) }
     }
 
     /// The bytes of a colour.
     #[inline(always)]
     pub fn pixel(&self, color: [f32; 4]) -> [u8; 4] {
-        resolve_pixel(self.plan, self.srgb, color)
+        resolve_pixel(self.background, self.srgb, color)
     }
 
     /// Resolves up to [`LANES`] neighbours of which some differ.
@@ -124,7 +134,7 @@ impl<'a> Resolver<'a> {
             Some(out) if are_opaque(colors) => self.srgb.encode_opaque(colors, out),
             _ => {
                 for (&c, out) in colors.iter().zip(out) {
-                    *out = resolve_pixel(self.plan, self.srgb, c);
+                    *out = resolve_pixel(self.background, self.srgb, c);
                 }
             }
         }
@@ -135,7 +145,7 @@ impl<'a> Resolver<'a> {
     pub fn resolve(&mut self, colors: &[[f32; 4]], out: &mut [[u8; 4]]) {
         let (Some(group), Some(pixels)) = (colors.first_chunk(), out.first_chunk_mut()) else {
             for (&c, out) in colors.iter().zip(out) {
-                *out = resolve_pixel(self.plan, self.srgb, c);
+                *out = resolve_pixel(self.background, self.srgb, c);
             }
             return;
         };
@@ -148,7 +158,7 @@ impl<'a> Resolver<'a> {
             self.srgb.encode_opaque(group, pixels);
         } else {
             for (&c, out) in group.iter().zip(&mut *pixels) {
-                *out = resolve_pixel(self.plan, self.srgb, c);
+                *out = resolve_pixel(self.background, self.srgb, c);
             }
         }
         self.last = Last { bits: group[LANES - 1].map(f32::to_bits), pixel: pixels[LANES - 1] };
@@ -168,8 +178,8 @@ struct Last {
 }
 
 impl Last {
-    fn of(c: [f32; 4], plan: &DrawPlan<'_>, srgb: &SrgbEncoder) -> Self {
-        Self { bits: c.map(f32::to_bits), pixel: resolve_pixel(plan, srgb, c) }
+    fn of(c: [f32; 4], background: [f32; 4], srgb: &SrgbEncoder) -> Self {
+        Self { bits: c.map(f32::to_bits), pixel: resolve_pixel(background, srgb, c) }
     }
 
     /// True if a group has no other colour.
@@ -186,8 +196,8 @@ impl Last {
 }
 
 #[inline(always)]
-fn resolve_pixel(plan: &DrawPlan<'_>, srgb: &SrgbEncoder, c: [f32; 4]) -> [u8; 4] {
-    let c = if is_composited(&c) { [c[0], c[1], c[2], -c[3]] } else { over_background(c, plan.background) };
+fn resolve_pixel(background: [f32; 4], srgb: &SrgbEncoder, c: [f32; 4]) -> [u8; 4] {
+    let c = if is_composited(&c) { [c[0], c[1], c[2], -c[3]] } else { over_background(c, background) };
     encode_pixel(srgb, c)
 }
 

@@ -7,6 +7,7 @@ use crate::mesh::Mesh;
 use crate::mesh::edges::{EdgeList, MeshEdge};
 use crate::mesh::topology::Orientation;
 use crate::mesh::vector::{cross, dot};
+use crate::plan::cut_outs::MaskedFaces;
 use crate::plan::{Edge, Side};
 use crate::scene::{Fill, MaterialGroups};
 use crate::spec::{Cull, Layers};
@@ -16,13 +17,20 @@ use crate::spec::{Cull, Layers};
 pub struct Silhouettes {
     /// By material: not drawn while others are, and without a hull. Empty where there is none.
     is_absent: Vec<bool>,
+    /// What shows of faces with cut-out textures, and the materials whose cut-outs count.
+    cut_outs: Option<MaskedFaces>,
     /// All faces of the edges that have more than two.
     crowded: BTreeMap<u32, Vec<u32>>,
 }
 
 impl Silhouettes {
     /// Those of a mesh with these edges.
-    pub fn new(groups: &MaterialGroups<'_>, list: &EdgeList, budget: &mut Budget) -> Result<Self, LimitExceeded> {
+    pub fn new(
+        groups: &MaterialGroups<'_>,
+        list: &EdgeList,
+        cut_outs: Option<MaskedFaces>,
+        budget: &mut Budget,
+    ) -> Result<Self, LimitExceeded> {
         // A list per edge, and a place in the map.
         budget.spend("edges of many faces", list.further_faces.len() as u64, 100)?;
         budget.spend("materials", groups.material_count() as u64, 1)?;
@@ -37,13 +45,15 @@ impl Silhouettes {
             let first_two = list.edges[edge as usize].faces;
             crowded.entry(edge).or_insert_with(|| first_two.to_vec()).push(face);
         }
-        Ok(Self { is_absent, crowded })
+        Ok(Self { is_absent, cut_outs, crowded })
     }
 
     /// The edge numbered `index` with the faces that decide whether it is a silhouette edge; None
     /// where no view makes it one.
     pub fn edge(&self, mesh: &Mesh, index: usize, edge: &MeshEdge) -> Option<Edge> {
-        let is_drawn = |face: &u32| *face != Edge::NO_FACE && !self.is_absent(mesh, *face);
+        let is_drawn = |face: &u32| {
+            *face != Edge::NO_FACE && !self.is_absent(mesh, *face) && !self.is_cut_out(mesh, *face, edge.vertices)
+        };
         let crowded = if edge.face_count > 2 { self.crowded.get(&(index as u32)) } else { None };
         let faces = if let Some(all) = crowded {
             let faces: Vec<u32> = all.iter().copied().filter(is_drawn).collect();
@@ -58,6 +68,14 @@ impl Silhouettes {
             if a == Edge::NO_FACE { [b, a] } else { [a, b] }
         };
         (faces[0] != Edge::NO_FACE).then_some(Edge { vertices: edge.vertices, faces })
+    }
+
+    /// True if a face's texture has nothing at one of its sides.
+    fn is_cut_out(&self, mesh: &Mesh, face: u32, side: [u32; 2]) -> bool {
+        self.cut_outs.as_ref().is_some_and(|(cut_outs, masked)| {
+            let is_masked = masked.get(mesh.triangle_materials[face as usize] as usize) == Some(&true);
+            is_masked && cut_outs.is_free(mesh, face as usize, side)
+        })
     }
 
     fn is_absent(&self, mesh: &Mesh, face: u32) -> bool {

@@ -128,7 +128,8 @@ fn add_attributes<'m>(
     if !cx.skips.skip(SkipKind::FaceNormals, is_unlit, "no material is lit by them") {
         pass.face_normals = geometry.face_normals.clone();
     }
-    if !cx.skips.skip(SkipKind::VertexNormals, !reads(flags::VERTEX_NORMALS), "no material is shaded smoothly") {
+    let is_faceted = !reads(flags::VERTEX_NORMALS | flags::BY_ANGLE);
+    if !cx.skips.skip(SkipKind::VertexNormals, is_faceted, "no material is shaded smoothly") {
         pass.vertex_normals = Some(vertex_normals(scene, geometry, cx)?);
     }
     let skips = &mut cx.skips;

@@ -54,6 +54,7 @@ pub fn load_all(slot: &MaterialSlot, textures: &mut TextureLoader<'_>) -> Result
         (&slot.metallic_roughness_texture, false),
         (&slot.normal_texture, false),
         (&slot.emissive_texture, true),
+        (&slot.occlusion_texture, false),
     ];
     for (texture, is_color) in all {
         if let Some(texture) = texture {
@@ -83,10 +84,15 @@ fn fill(material: &mut ShadedMaterial, mesh: &Mesh, slot: &MaterialSlot, surface
     let none = if is_painted { [1.0; 4] } else { Rgba::from_srgb8(DEFAULT_COLOR).0 };
     let file = slot.base_color.unwrap_or(none);
     material.base_color = surface.color.map_or(file, |color| color.0);
+    if surface.debug == DebugView::None && surface.facing_opacity < 1.0 {
+        material.facing_opacity = surface.facing_opacity;
+        material.flags |= flags::BY_ANGLE;
+    }
     material.opacity = if surface.debug == DebugView::None { surface.opacity } else { 1.0 };
     material.metallic = surface.metallic.or(slot.metallic).unwrap_or(0.0);
     material.roughness = surface.roughness.or(slot.roughness).unwrap_or(DEFAULT_ROUGHNESS);
     material.normal_scale = slot.normal_scale.unwrap_or(1.0);
+    material.occlusion_strength = slot.occlusion_strength.unwrap_or(1.0);
     material.emissive = match surface.emissive {
         Some(Rgba([r, g, b, a])) => [r, g, b].map(|v| v * a),
         None => slot.emissive.unwrap_or_default(),
@@ -151,12 +157,13 @@ fn sample(
 ) -> Result<(), PlanError> {
     let is_lit = material.flags & (flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_NORMALS) != 0;
     let reads_texture = surface.metallic.is_none() || surface.roughness.is_none();
-    let wanted: [(usize, bool, &Option<TextureRef>, bool); 4] = [
+    let wanted: [(usize, bool, &Option<TextureRef>, bool); slots::COUNT] = [
         (slots::BASE, surface.color.is_none(), &slot.base_texture, true),
         (slots::METALLIC_ROUGHNESS, is_lit && reads_texture, &slot.metallic_roughness_texture, false),
         // The other kinds of normals show the faces as they are.
         (slots::NORMAL, material.flags & flags::VERTEX_NORMALS != 0, &slot.normal_texture, false),
         (slots::EMISSIVE, surface.emissive.is_none() && material.emissive != [0.0; 3], &slot.emissive_texture, true),
+        (slots::OCCLUSION, is_lit && material.occlusion_strength > 0.0, &slot.occlusion_texture, false),
     ];
     for (place, is_needed, texture, is_color) in wanted {
         if let Some(texture) = texture.as_ref().filter(|_| is_needed) {

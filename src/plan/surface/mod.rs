@@ -78,10 +78,18 @@ pub struct ShadedMaterial {
     pub flags: u32,
     /// Factor of the final alpha, 0 to 1.
     pub opacity: f32,
+    /// For [`flags::BY_ANGLE`]: the share of alpha that is left where the surface faces the viewer.
+    pub facing_opacity: f32,
+    /// The share of the occlusion texture's darkness that counts, 0 to 1.
+    pub occlusion_strength: f32,
     /// Always 0.
-    pub padding: u32,
-    /// Uses of textures, by [`slots`].
-    pub textures: [TextureUse; 4],
+    pub padding_a: u32,
+    /// Always 0.
+    pub padding_b: u32,
+    /// Always 0.
+    pub padding_c: u32,
+    /// Uses of textures, by [`slots`]: [`slots::COUNT`] of them.
+    pub textures: [TextureUse; 5],
 }
 
 /// A material's use of a texture.
@@ -109,6 +117,10 @@ pub mod slots {
     pub const NORMAL: usize = 2;
     /// Emitted light.
     pub const EMISSIVE: usize = 3;
+    /// Ambient light in red.
+    pub const OCCLUSION: usize = 4;
+    /// Number of places.
+    pub const COUNT: usize = 5;
 }
 
 /// Bits of [`TextureUse::sampler`]: the wrap mode across in the lowest bits, the wrap mode down
@@ -184,6 +196,8 @@ pub mod flags {
     pub const OWN_METALLIC: u32 = 1 << 15;
     /// The request gives the roughness, and the texture's is ignored.
     pub const OWN_ROUGHNESS: u32 = 1 << 16;
+    /// Alpha depends on the angle to the viewer. An unlit material has vertex normals for it.
+    pub const BY_ANGLE: u32 = 1 << 17;
 }
 
 /// Lamps infinitely far away, and light from everywhere.
@@ -232,8 +246,12 @@ impl ShadedMaterial {
             normal_scale: 1.0,
             flags: flags::FILL,
             opacity: 1.0,
-            padding: 0,
-            textures: [TextureUse::NONE; 4],
+            facing_opacity: 1.0,
+            occlusion_strength: 1.0,
+            padding_a: 0,
+            padding_b: 0,
+            padding_c: 0,
+            textures: [TextureUse::NONE; slots::COUNT],
         }
     }
 }

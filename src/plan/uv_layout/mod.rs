@@ -10,7 +10,8 @@ use crate::limits::{Budget, Deadline};
 use crate::mesh::{LineOrPoint, Mesh, UpAxis};
 use crate::spec::color::Rgba;
 use crate::spec::{
-    CameraSpec, DebugView, Layers, NamedView, ProjectionKind, Shading, Spec, Surface, Wire, WireEdges, WireThickness,
+    CameraSpec, DebugView, Ground, Layers, NamedView, ProjectionKind, Shading, Spec, Surface, Wire, WireEdges,
+    WireThickness,
 };
 use crate::warning::Warning;
 
@@ -88,7 +89,7 @@ fn spec_of(spec: &Spec) -> Spec {
         margin: spec.camera.margin,
         ..CameraSpec::default()
     };
-    Spec { layers, materials: Vec::new(), topology: None, camera, ..spec.clone() }
+    Spec { layers, materials: Vec::new(), topology: None, ground: Ground::None, camera, ..spec.clone() }
 }
 
 /// The corners of a face in the texture, u to the right and v upwards.

@@ -7,7 +7,7 @@ use super::value::{COORDINATE_MAX, Kind, Value};
 use crate::request::draft::Draft;
 use crate::spec::color::Rgba;
 use crate::spec::words::{Words, words_of};
-use crate::spec::{NamedView, SHEET_VIEWS_MAX, WireThickness};
+use crate::spec::{Background, NamedView, SHEET_VIEWS_MAX, WireThickness};
 
 /// A key that holds a value.
 pub struct Field {
@@ -98,6 +98,7 @@ places! {
     [u32; 2]: Kind::Size, Value::Size(width, height) => [width, height];
     [f64; 3]: Kind::Point, Value::Point(v) => v;
     Rgba: Kind::Color, Value::Color(v) => v;
+    Background: Kind::Background, Value::Background(v) => v;
     bool: Kind::Flag, Value::Flag(v) => v;
 }
 

@@ -46,6 +46,9 @@ fn layers() -> Vec<Field> {
             "Light that the surface emits; null: the file's, or none.";
         "surface.opacity" |d| d.surface().opacity, in SHARE, default 1;
             "Multiplies the file's own opacity.";
+        "surface.facing_opacity" |d| d.surface().facing_opacity, in SHARE;
+            "Share of the opacity that is left where the surface faces the viewer; it rises to all of it at grazing angles. By \
+             default the style's, or 1.";
         "surface.textures" |d| d.surface().textures, default true;
             "Shows the file's textures.";
         "surface.debug" |d| d.surface().debug, default "none";
@@ -126,6 +129,9 @@ fn scene_and_camera() -> Vec<Field> {
 
         "scene.time_s" |d| d.time_s, in number(0.0, TIME_S_MAX), default Null;
             "Moment of the file's first animation, in seconds; null: the rest pose.";
+        "scene.ground" |d| d.ground, default "none";
+            "shadow: a soft contact shadow on a plane at the lowest point, if the picture has a filled surface; from below the \
+             plane nothing shows.";
 
         "camera.view" |d| d.camera.view, short "view", default "auto";
             "Named directions, auto being azimuth 30, elevation 20, and iso 45, 30; azimuth_deg and elevation_deg override its angles.";
@@ -202,7 +208,8 @@ fn image() -> Vec<Field> {
         "image.max_time_ms" |d| d.max_time_ms, in Kind::Above0 { max: JOB_MS_MAX as f64 }, default Null;
             "Longest expected time to draw, as measured on one machine: the most accurate choice within it is taken.";
         "image.background" |d| d.image.background, short "background", default "#fff";
-            "Colour behind the mesh.";
+            "Behind the mesh: a colour, or two from the upper to the lower edge, as #fff..#dde, blended in linear light. Each cell \
+             of a sheet has them.";
         "image.effort" |d| d.image.effort, in Kind::OneOf(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]), default DEFAULT_EFFORT;
             "PNG: 0 to 3 encode quickly; 4 to 9 make smaller files in 5 to 100 times the time, for pictures that are stored.";
         "backend" |d| d.backend;

@@ -41,7 +41,7 @@ pub const SECTIONS: &[Section] = &[
         is_for_materials: false,
     },
     group("points", "Points of the file."),
-    group("scene", "State of the file that is drawn."),
+    group("scene", "State of the file that is drawn, and what it stands on."),
     group("camera", "Position and lens; by default the mesh is fitted into the picture."),
     Section {
         name: "sheet",
@@ -96,7 +96,7 @@ mod tests {
             assert!(field.section().is_none_or(|s| s.turn.is_some() || !s.is_for_materials), "{}", field.key);
             keys += 1;
         }
-        assert_eq!(keys, 63);
+        assert_eq!(keys, 65);
         assert_eq!(FIELDS.iter().filter(|field| field.short.is_some()).count(), 6);
     }
 }

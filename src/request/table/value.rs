@@ -5,6 +5,7 @@ use serde_json::Value as Json;
 
 use crate::request::error::{RequestError, RequestFault};
 use crate::spec::color::Rgba;
+use crate::spec::{BETWEEN, Background};
 
 /// A value as it is given: JSON of a document, or the text of a query parameter or of `--set`.
 #[derive(Clone, Debug)]
@@ -125,6 +126,8 @@ pub enum Kind {
     },
     /// A colour.
     Color,
+    /// A colour, or two with `..` between them.
+    Background,
     /// Three finite numbers.
     Point,
     /// Three finite numbers, not all zero.
@@ -150,11 +153,16 @@ pub enum Value {
     WordList(Vec<usize>),
     /// A colour.
     Color(Rgba),
+    /// A colour or a gradient.
+    Background(Background),
     /// Three numbers.
     Point([f64; 3]),
     /// True or false.
     Flag(bool),
 }
+
+/// The notations for colours.
+const COLOR_FORMS: &str = "a colour: #rgb, #rgba, #rrggbb, #rrggbbaa (with # written as %23 in a URL) or transparent";
 
 /// The notations for points.
 const POINT_FORMS: &str = "as [x, y, z] or, in a query or a flag, x,y,z";
@@ -178,9 +186,8 @@ impl Kind {
                 format!("a list of 1 to {count_max} of {}, {forms}", words.join(", "))
             }
             Self::Count { min, max } => format!("a whole number from {min} to {max}"),
-            Self::Color => {
-                "a colour: #rgb, #rgba, #rrggbb, #rrggbbaa (with # written as %23 in a URL) or transparent".into()
-            }
+            Self::Color => COLOR_FORMS.into(),
+            Self::Background => format!("{COLOR_FORMS}; or two of them from top to bottom, such as #fff..#dde"),
             Self::Point => format!("three finite numbers of at most 1e30, {POINT_FORMS}"),
             Self::Direction => format!("three finite numbers of at most 1e30, not all zero, {POINT_FORMS}"),
             Self::Flag => "true or false".into(),
@@ -202,6 +209,9 @@ impl Kind {
             error.given = format!("{}, {what} in quotes", error.given);
             error.allowed.push_str(", without quotes");
         }
+        if let (Self::Background, Some(meant)) = (self, given.text().and_then(meant_gradient)) {
+            error.allowed.push_str(&format!(" (did you mean {meant}?)"));
+        }
         Err(error)
     }
 
@@ -215,7 +225,13 @@ impl Kind {
             | Self::Pixels
             | Self::Count { .. } => Some("a number"),
             Self::Flag => Some("a truth value"),
-            Self::Size | Self::Words(_) | Self::WordList { .. } | Self::Color | Self::Point | Self::Direction => None,
+            Self::Size
+            | Self::Words(_)
+            | Self::WordList { .. }
+            | Self::Color
+            | Self::Background
+            | Self::Point
+            | Self::Direction => None,
         }
     }
 
@@ -249,10 +265,23 @@ impl Kind {
                 in_range.then_some(Value::Whole(number as u32))
             }
             Self::Color => Rgba::parse(given.text()?).map(Value::Color),
+            Self::Background => Background::parse(given.text()?).map(Value::Background),
             Self::Point => Some(given.point()?).filter(|p| largest(p) <= COORDINATE_MAX).map(Value::Point),
             Self::Direction => direction(given.point()?).map(Value::Point),
             Self::Flag => Some(Value::Flag(given.flag()?)),
         })
+    }
+}
+
+/// The gradient that a text with two colours most likely means, whatever is between and around them.
+fn meant_gradient(text: &str) -> Option<String> {
+    const CHARS_MAX: usize = 80;
+    let is_of_color = |c: char| c.is_ascii_alphanumeric() || c == '#';
+    let parts = text.split(|c| !is_of_color(c)).filter(|part| Rgba::parse(part).is_some());
+    let colors: Vec<&str> = parts.take(3).collect();
+    match colors[..] {
+        [top, bottom] if text.len() <= CHARS_MAX => Some(format!("{top}{BETWEEN}{bottom}")),
+        _ => None,
     }
 }
 

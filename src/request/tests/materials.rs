@@ -2,6 +2,7 @@
 
 use crate::request::tests::{json, query, rules};
 use crate::request::*;
+use crate::spec::color::Rgba;
 use crate::spec::{Layers, OutlineUnit, Shading};
 
 fn material<'s>(spec: &'s Spec, name: &str) -> &'s Layers {

@@ -5,9 +5,10 @@ mod refused;
 
 use super::*;
 use crate::mesh::UpAxis;
+use crate::spec::color::Rgba;
 use crate::spec::{
-    DebugView, FlatNormals, Hidden, LightPreset, NamedView, Outline, OutlineMethod, OutlineUnit, Shading, Sheet,
-    SheetViews, WireEdges, WireMethod, WireThickness,
+    Background, DebugView, FlatNormals, Hidden, LightPreset, NamedView, Outline, OutlineMethod, OutlineUnit, Shading,
+    Sheet, SheetViews, WireEdges, WireMethod, WireThickness,
 };
 
 pub fn rules() -> Rules {
@@ -41,6 +42,7 @@ fn every_style_has_its_layers() {
         ("topology", Some(Shading::Flat), None, false),
         ("technical", Some(Shading::Smooth), Some(Hidden::Hide), true),
         ("clay", Some(Shading::Smooth), None, false),
+        ("xray", Some(Shading::Unlit), None, false),
     ];
     assert_eq!(cases.len(), Style::ALL.len());
     for (style, shading, hidden, outline) in cases {
@@ -158,7 +160,7 @@ fn every_key_reaches_its_field() {
     assert_eq!((camera.eye, camera.target), (Some([1.0, 2.0, 3.0]), Some([0.0, 0.0, 0.5])));
     assert_eq!((spec.light.intensity, spec.light.ambient), (2.0, 0.1));
     assert_eq!((spec.image.width_px, spec.image.height_px, spec.image.samples), (640, 480, 1));
-    assert_eq!((spec.image.format, spec.image.background), (Some(ImageFormat::Webp), Rgba::TRANSPARENT));
+    assert_eq!((spec.image.format, spec.image.background), (Some(ImageFormat::Webp), Rgba::TRANSPARENT.into()));
     assert_eq!(spec.image.effort, 9);
     assert_eq!(spec.backend, BackendChoice::Cpu);
 }
@@ -216,7 +218,7 @@ fn null_is_the_default_or_as_if_the_key_were_not_there() {
         }
         query(&[(key, "null")]).unwrap_or_else(|error| panic!("{error}"));
     }
-    assert_eq!(keys.len(), 69);
+    assert_eq!(keys.len(), 71);
     for document in [r#"{"style":null}"#, r#"{"camera":null,"light":null,"image":null}"#, r#"{"materials":null}"#] {
         assert_eq!(json(document).unwrap(), json("{}").unwrap(), "{document}");
     }
@@ -262,10 +264,13 @@ fn an_image_limit_below_the_largest_names_its_flag() {
 fn jpeg_lays_its_background_over_white_in_linear_light() {
     let mut spec = query(&[("background", "transparent")]).unwrap();
     set_format(&mut spec, ImageFormat::Jpeg);
-    assert_eq!(spec.image.background, Rgba::WHITE);
+    assert_eq!(spec.image.background, Rgba::WHITE.into());
+    let mut spec = query(&[("background", "#000..transparent")]).unwrap();
+    set_format(&mut spec, ImageFormat::Jpeg);
+    assert_eq!(spec.image.background, Background { top: Rgba::BLACK, bottom: Rgba::WHITE });
     let mut spec = query(&[("background", "transparent")]).unwrap();
     set_format(&mut spec, ImageFormat::Png);
-    assert_eq!(spec.image.background, Rgba::TRANSPARENT);
+    assert_eq!(spec.image.background, Rgba::TRANSPARENT.into());
 }
 
 #[test]
@@ -310,7 +315,7 @@ fn stated_defaults_are_the_defaults() {
 #[test]
 fn the_vocabulary_has_every_word() {
     let vocabulary = vocabulary();
-    assert_eq!(vocabulary["style"].len(), 11);
+    assert_eq!(vocabulary["style"].len(), 12);
     assert_eq!(vocabulary["surface.debug"].len(), 13);
     assert_eq!(vocabulary["wire.method"], words_of::<WireMethod>());
     assert_eq!(vocabulary["sheet.views"], vocabulary["camera.view"]);

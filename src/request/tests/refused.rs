@@ -65,6 +65,20 @@ fn every_bad_value_is_refused_by_name() {
         (&[("format", "bmp")], OutOfRange, "format", "png"),
         (&[("background", "white")], OutOfRange, "background", "#rgb"),
         (&[("background", "")], OutOfRange, "background", "%23"),
+        (&[("background", "#fff..")], OutOfRange, "background", "such as #fff..#dde"),
+        (&[("background", "#fff..#dde..#ccc")], OutOfRange, "background", "two of them from top to bottom"),
+        (&[("background", "#fff, #dde")], OutOfRange, "background", "did you mean #fff..#dde?"),
+        (
+            &[("image.background", "#FFF...transparent")],
+            OutOfRange,
+            "image.background",
+            "did you mean #FFF..transparent?",
+        ),
+        (&[("wire.color", "#fff..#dde")], OutOfRange, "wire.color", "a colour"),
+        (&[("scene.ground", "grass")], OutOfRange, "scene.ground", "one of none, shadow"),
+        (&[("scene.ground", "true")], OutOfRange, "scene.ground", "shadow"),
+        (&[("surface.facing_opacity", "1.5")], OutOfRange, "surface.facing_opacity", "from 0 to 1"),
+        (&[("surface.facing_opacity", "clear")], WrongType, "surface.facing_opacity", "a number"),
         (&[("wire.thickness", "101")], OutOfRange, "wire.thickness", "from 0 to 100"),
         (&[("wire.method", "fwidth"), ("wire.thickness", "11")], OutOfRange, "wire.thickness", "from 0 to 10 where"),
         (&[("wire.method", "threshold"), ("wire.thickness", "10.5")], OutOfRange, "wire.thickness", "is not exact"),
@@ -96,7 +110,7 @@ fn every_bad_value_is_refused_by_name() {
         let sentence = error.to_string();
         assert!(sentence.contains(part) && sentence.contains(&format!("`{key}`")), "{pairs:?}: {sentence}");
     }
-    assert_eq!(cases.len(), 75);
+    assert_eq!(cases.len(), 84);
 }
 
 #[test]

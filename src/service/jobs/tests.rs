@@ -15,7 +15,7 @@ use crate::limits::{Deadline, Stopped};
 use crate::pipeline::{Output, RenderError, Stage};
 use crate::spec::color::Rgba;
 use crate::spec::{
-    BackendChoice, CameraSpec, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind, Sheet,
+    BackendChoice, CameraSpec, Ground, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind, Sheet,
     SheetViews, Spec,
 };
 
@@ -56,7 +56,8 @@ fn spec() -> Spec {
         from_file: false,
         fits_turn: false,
     };
-    let image = ImageSpec { width_px: 8, height_px: 8, format: None, samples: 1, background: Rgba::WHITE, effort: 3 };
+    let image =
+        ImageSpec { width_px: 8, height_px: 8, format: None, samples: 1, background: Rgba::WHITE.into(), effort: 3 };
     let light =
         Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3, ambient_occlusion: 0.0 };
     Spec {
@@ -65,6 +66,7 @@ fn spec() -> Spec {
         topology: None,
         points: Points::default(),
         time_s: None,
+        ground: Ground::None,
         camera,
         sheet: None,
         light,

@@ -49,6 +49,7 @@ fn bad_queries_are_a_400_that_names_the_key() {
         ("wire.method=fwidth&wire.thickness=11", "out_of_range", "from 0 to 10 where"),
         ("format_in=dae", "out_of_range", "obj, gltf, glb, stl, ply"),
         ("background=%00", "out_of_range", "background"),
+        ("background=%23fff-%23dde", "out_of_range", "did you mean #fff..#dde?"),
         ("%ff=%ff", "unknown_key", "no key"),
         ("=", "unknown_key", "no key"),
         ("style", "out_of_range", "style"),
@@ -57,7 +58,7 @@ fn bad_queries_are_a_400_that_names_the_key() {
         let detail = server.post(&format!("/v1/render?{query}"), CUBE_OBJ).problem(400, code);
         assert!(detail.contains(part), "{query}: {detail}");
     }
-    assert_eq!(cases.len(), 20);
+    assert_eq!(cases.len(), 21);
     server.post("/v1/render?size=8&materials.Glass%20v2.1.wire=%7B%7D&surface.textures=0", CUBE_OBJ).picture(8, 8);
     server.post("/v1/render?size=8&wire.color=f00&background=%23fff8&format_in=obj", CUBE_OBJ).picture(8, 8);
 }

@@ -46,7 +46,7 @@ fn the_schema_is_valid_and_describes_every_key() {
         assert!(property["description"].as_str().is_some_and(|text| text.ends_with('.')), "{key}: {property}");
         described += 1;
     }
-    assert_eq!(described, 81);
+    assert_eq!(described, 83);
 }
 
 /// Documents that are understood.
@@ -58,7 +58,7 @@ const GOOD: &[&str] = &[
     r#"{"scene":{"time_s":null}}"#,
     r#"{"style":"topology"}"#,
     r##"{"surface":{"shading":"smooth","normals":"derivative","crease_angle_deg":180,"color":"#c8ccd2","metallic":0,"roughness":0.6,
-        "emissive":"#000","opacity":1,"textures":true,"cull":"back","debug":"edge-distance"}}"##,
+        "emissive":"#000","opacity":1,"facing_opacity":0.5,"textures":true,"cull":"back","debug":"edge-distance"}}"##,
     r#"{"surface":null,"wire":{},"outline":null,"topology":{}}"#,
     r#"{"surface":{"color":null,"metallic":null,"roughness":null,"emissive":null}}"#,
     r##"{"wire":{"method":"exact","color":"#000","thickness":100,"smoothing":10,"opacity":0,"lit":false,
@@ -84,6 +84,8 @@ const GOOD: &[&str] = &[
     r#"{"light":{"direction":null}}"#,
     r#"{"light":{"direction":[0,0,1e-300]}}"#,
     r##"{"image":{"width":1,"height":4096,"format":"jpg","samples":1,"background":"#fff"}}"##,
+    r##"{"image":{"background":"#fff..#dde"},"style":"flat","scene":{"ground":"shadow"}}"##,
+    r#"{"background":"abc8..transparent"}"#,
     r#"{"image":{"width":512.0,"samples":4.0,"format":null}}"#,
     r#"{"sheet":{"views":["front","auto"],"columns":2,"labels":true},"points":{"size_px":64}}"#,
     r#"{"sheet":{"turntable":64,"views":null},"surface":{"debug":"uv-layout"}}"#,
@@ -113,6 +115,10 @@ const BAD: &[&str] = &[
     r#"{"sytle":"wire"}"#,
     r#"{"wire.color":"f00"}"#,
     r#"{"max_error":0}"#,
+    r#"{"surface":{"facing_opacity":1.1}}"#,
+    r##"{"background":"#fff.#dde"}"##,
+    r##"{"background":"#fff..#dde..#ccc"}"##,
+    r##"{"surface":{"color":"#fff..#dde"}}"##,
     r#"{"image":{"max_error":256}}"#,
     r#"{"image":{"max_time_ms":-1}}"#,
     r#"{"max_time_ms":1}"#,
@@ -177,7 +183,7 @@ fn the_schema_and_the_reader_are_of_one_mind() {
         assert!(request::read(Some(document.as_bytes()), &[], &rules()).is_err(), "the reader takes {document}");
         assert!(!complaints(&validator, document).is_empty(), "the schema takes {document}");
     }
-    assert_eq!((GOOD.len(), BAD.len()), (48, 57));
+    assert_eq!((GOOD.len(), BAD.len()), (50, 61));
 }
 
 /// Documents made at random from pieces of both kinds: as many as both refuse or take; none where

@@ -37,7 +37,7 @@ fn each_cell_is_the_picture_of_its_view() {
     let server = Server::start(&[]);
     let mesh = shapes::gear(9).into_bytes();
     let mut cells = 0;
-    for (style, background) in [("wire", "transparent"), ("outline", "%23234"), ("technical", "%23fff")] {
+    for (style, background) in [("wire", "transparent"), ("outline", "%23234"), ("technical", "%23fff..%2300f8")] {
         let keys = format!("style={style}&background={background}");
         // Columns of 33 and 34 px, rows of 30 and 31 px.
         let sheet = server

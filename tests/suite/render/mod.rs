@@ -7,6 +7,7 @@ pub mod hulls;
 pub mod layers;
 pub mod layers_hull;
 pub mod lines;
+pub mod looks;
 pub mod models;
 pub mod outlines;
 pub mod prepared;

@@ -74,7 +74,7 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
         draw_lines(context, scratch, bins, band);
         lap.end(DrawStage::Lines);
     }
-    resolve::resolve(isa, plan, context.srgb, &scratch.colors, rgba);
+    resolve::resolve(isa, plan, context.srgb, scratch.samples.shown[0], &scratch.colors, rgba);
     lap.end(DrawStage::Resolve);
 }
 

@@ -163,6 +163,15 @@ impl<'a> LineCompositor<'a> {
         Self { plan, band, peel, sample_masks: (0..samples).map(|s| points_of_sample(samples, s)).collect() }
     }
 
+    /// The background behind a pixel.
+    #[inline(always)]
+    fn background(&self, pixel: usize) -> [f32; 4] {
+        match self.plan.has_gradient() {
+            true => self.plan.background_at(self.band.shown[0] + pixel as u32 / self.band.size_px[0]),
+            false => self.plan.background,
+        }
+    }
+
     /// The surface's colour, weighted by its share of what lines leave uncovered. At the surface's
     /// border this differs from its share of the pixel, because a line along the border covers both
     /// sides alike.
@@ -212,7 +221,7 @@ fn composite_kernel(
                 [c[0], c[1], c[2], -c[3]]
             } else {
                 let surface = compositor.uncovered(i, *c, mask, lines.color[3] * peak);
-                over_background(surface, compositor.plan.background)
+                over_background(surface, compositor.background(i))
             };
             let color = light.get(i).map_or(lines.color, |light| light.on_premultiplied(lines.color));
             *c = std::array::from_fn(|k| cover * color[k] + under[k] * (1.0 - cover * color[3]));

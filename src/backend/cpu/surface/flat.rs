@@ -236,10 +236,14 @@ fn draw(context: &RasterContext<'_>, flat: &FlatColors, band: &SampleBand, rgba:
 #[inline(always)]
 fn draw_sampled<const S: usize>(context: &RasterContext<'_>, flat: &FlatColors, band: &SampleBand, rgba: &mut [u8]) {
     let shader = FlatShader::<S> { context, flat, band };
-    let resolver = Resolver::new(context.plan, context.srgb);
+    let mut resolver = Resolver::new(context.plan.background_at(band.shown[0]), context.srgb);
     let mut last = None;
     let (pixels, _) = rgba.as_chunks_mut::<4>();
     for (y, line) in (band.shown[0]..band.shown[1]).zip(pixels.chunks_exact_mut(band.size_px[0] as usize)) {
+        if context.plan.has_gradient() {
+            resolver = Resolver::new(context.plan.background_at(y), context.srgb);
+            last = None;
+        }
         let groups = shader.row(y).chunks(LANES * S).zip(line.chunks_mut(LANES));
         for (x, (ids, out)) in (0..).step_by(LANES).zip(groups) {
             // Neighbours often have the same id: large flat faces, the background.

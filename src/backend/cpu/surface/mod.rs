@@ -2,7 +2,7 @@
 //!
 //! [`shade`] groups a pixel's samples by triangle, [`point`] shades each group once, at the mean of
 //! its samples; groups of neighbouring pixels are [`waiting`] until eight are shaded together. The rest is its formulas: [`barycentric`] coordinates, [`texture`] lookups, the
-//! [`normal`], [`light`], [`wire`] and [`debug`] views. Twins are in `shaders/surface/`.
+//! [`normal`], [`light`], [`occlusion`], [`wire`] and [`debug`] views. Twins are in `shaders/surface/`.
 
 pub(crate) mod barycentric;
 pub(crate) mod debug;
@@ -11,6 +11,7 @@ pub(crate) mod flat;
 mod flat_avx2;
 pub(crate) mod light;
 pub(crate) mod normal;
+mod occlusion;
 pub(crate) mod point;
 pub(crate) mod shade;
 pub(crate) mod texture;

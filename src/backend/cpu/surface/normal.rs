@@ -4,7 +4,7 @@
 use super::barycentric::Quad;
 use super::texture::{blend, of_corners};
 use super::wire::Place;
-use crate::backend::cpu::vector::{across, cross, facing, turned_to_viewer, unit_or, zip};
+use crate::backend::cpu::vector::{across, cross, dot, facing, turned_to_viewer, unit_or, zip};
 use crate::plan::{CornerValues, Projection, ShadedMaterial, SurfacePass, flags, slots};
 
 /// The unit normals on the viewer's side, without normal textures, at points of one material.
@@ -37,6 +37,27 @@ pub fn face_normals<const N: usize>(surface: &SurfacePass<'_>, ids: &[u32; N], f
         }
     }
     out
+}
+
+/// Shares of alpha that a material of [`flags::BY_ANGLE`] keeps where its unit normals are these: all at
+/// grazing angles.
+#[inline(always)]
+pub fn angle_shares<const N: usize>(material: &ShadedMaterial, place: &Place<'_, N>, n: &[[f32; N]; 3]) -> [f32; N] {
+    let projection = &place.context.plan.projection;
+    let slope = projection.ray_slope();
+    let least = material.facing_opacity;
+    let mut shares = [0.0; N];
+    for l in 0..N {
+        let [right, down] = [slope * place.at[0][l], slope * place.at[1][l]];
+        // Towards the eye.
+        let ray: [f32; 3] = std::array::from_fn(|k| {
+            (projection.to_viewer[k] - right * projection.screen_right[k]) + down * projection.screen_up[k]
+        });
+        let facing = dot([n[0][l], n[1][l], n[2][l]], ray) / dot(ray, ray).sqrt();
+        let grazing = 1.0 - facing.clamp(0.0, 1.0);
+        shares[l] = least + (1.0 - least) * (grazing * grazing);
+    }
+    shares
 }
 
 /// The direction to the viewer, in each lane.

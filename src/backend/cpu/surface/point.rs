@@ -4,7 +4,8 @@
 use super::barycentric::{Barycentrics, Corners};
 use super::debug;
 use super::light::{Light, LightLanes, light_lanes, lit_lanes, unlit_lanes};
-use super::normal::{face_normals, normal_mapped, normals, to_viewer};
+use super::normal::{angle_shares, face_normals, normal_mapped, normals, to_viewer};
+use super::occlusion::occlude;
 use super::texture::{Uv, blend, of_corners, sample};
 use super::wire::{Place, edge_mask, fwidth_covers, wire_covers};
 use crate::backend::cpu::RasterContext;
@@ -15,6 +16,7 @@ use crate::plan::{Projection, ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, 
 
 /// Flags that the common materials do not have, textures aside.
 const GENERAL: u32 = flags::DERIVATIVE_NORMALS
+    | flags::BY_ANGLE
     | flags::VERTEX_COLORS
     | flags::DEBUG
     | flags::WIRE_LIT
@@ -157,8 +159,12 @@ impl Points<'_> {
         let place = self.place(ids, at, &Corners::new(context, ids, at), is_textured);
         let covers = self.wire_covers(&place);
         let texels = self.texels(&place, is_textured);
-        let base = self.base_colors(&place, &texels[slots::BASE]);
+        let mut base = self.base_colors(&place, &texels[slots::BASE]);
         let mut light = LightLanes::NONE;
+        if material.flags & flags::BY_ANGLE != 0 {
+            let shares = angle_shares(material, &place, &normals(surface, material, &place));
+            base[3] = std::array::from_fn(|l| base[3][l] * shares[l]);
+        }
         if material.flags & flags::LIT != 0 {
             let mut normal = normals(surface, material, &place);
             if let (Some(uvs), true) = (&surface.uvs, is_textured && self.has_texture(slots::NORMAL)) {
@@ -171,7 +177,12 @@ impl Points<'_> {
             };
             let metallic = own(flags::OWN_METALLIC, material.metallic, metallic);
             let roughness = own(flags::OWN_ROUGHNESS, material.roughness, roughness);
-            light = light_lanes(quick_recip, &surface.lights, &context.plan.projection, &metallic, &roughness, &normal);
+            let projection = &context.plan.projection;
+            light = light_lanes(quick_recip, &surface.lights, projection, &metallic, &roughness, &normal);
+            if is_textured && self.has_texture(slots::OCCLUSION) {
+                let red = (material.occlusion_strength, &texels[slots::OCCLUSION][0]);
+                occlude(&mut light, (&surface.lights, projection), red, &metallic, &normal);
+            }
             light = light.dimmed(open);
         }
         let mut emissive = [[0.0; N]; 3];
@@ -248,12 +259,12 @@ impl Points<'_> {
 
     /// Texels by slot; white where there is no texture.
     #[inline(always)]
-    fn texels<const N: usize>(&self, place: &Place<'_, N>, is_textured: bool) -> [[[f32; N]; 4]; 4] {
-        let mut texels = [[[1.0; N]; 4]; 4];
+    fn texels<const N: usize>(&self, place: &Place<'_, N>, is_textured: bool) -> [[[f32; N]; 4]; slots::COUNT] {
+        let mut texels = [[[1.0; N]; 4]; slots::COUNT];
         let Some(uvs) = self.surface.uvs.as_ref().filter(|_| is_textured) else { return texels };
         let uv = Uv::new(uvs, &place.ids, &place.b);
         for (slot, texels) in texels.iter_mut().enumerate() {
-            let is_light = slot == slots::METALLIC_ROUGHNESS || slot == slots::NORMAL;
+            let is_light = [slots::METALLIC_ROUGHNESS, slots::NORMAL, slots::OCCLUSION].contains(&slot);
             if self.has_texture(slot) && (!is_light || self.material.flags & flags::LIT != 0) {
                 *texels = sample(&self.surface.textures, &self.material.textures[slot], &uv);
             }

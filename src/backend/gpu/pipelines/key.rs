@@ -3,7 +3,7 @@
 //! It is the constant `PIPELINE_KEY` of each pipeline, so that a kernel contains only the code that
 //! its plan needs.
 
-use crate::plan::{DrawPlan, SurfacePass, flags};
+use crate::plan::{DrawPlan, SurfacePass, flags, slots};
 
 /// A shaded surface.
 pub const SURFACE: u32 = 1;
@@ -77,7 +77,7 @@ pub fn pipeline_key(plan: &DrawPlan<'_>) -> u32 {
         let all = surface.all_flags();
         key |= when(surface.is_shaded, SURFACE) | when(surface.triangle_materials.len() == count, TRIANGLE_MATERIALS);
         key |= when(all & flags::FACE_NORMALS != 0, FACE_NORMALS);
-        key |= when(all & flags::VERTEX_NORMALS != 0, VERTEX_NORMALS);
+        key |= when(all & (flags::VERTEX_NORMALS | flags::BY_ANGLE) != 0, VERTEX_NORMALS);
         key |= varying(surface, all);
         key |= when(all & flags::WIRES != 0, WIRES) | when(surface.edge_masks.len() == count, EDGE_MASKS);
     }
@@ -108,9 +108,14 @@ fn samples(count: u32) -> u32 {
 /// Bits for colours that vary over a triangle.
 fn varying(surface: &SurfacePass<'_>, all: u32) -> u32 {
     let when = |condition: bool, flag: u32| if condition { flag } else { 0 };
-    let is_textured = (0..4).any(|slot| surface.samples(slot)) && surface.uvs.is_some();
+    let is_textured = (0..slots::COUNT).any(|slot| surface.samples(slot)) && surface.uvs.is_some();
     let by_minimum = flags::WIRE_THRESHOLD | flags::WIRE_BARYCENTRIC | flags::WIRE_FWIDTH_MIN;
-    let varies = flags::VERTEX_NORMALS | flags::DERIVATIVE_NORMALS | flags::VERTEX_COLORS | flags::WIRES | flags::DEBUG;
+    let varies = flags::VERTEX_NORMALS
+        | flags::DERIVATIVE_NORMALS
+        | flags::VERTEX_COLORS
+        | flags::WIRES
+        | flags::DEBUG
+        | flags::BY_ANGLE;
     when(all & flags::DERIVATIVE_NORMALS != 0, DERIVATIVE_NORMALS)
         | when(all & (flags::VERTEX_COLORS | flags::DEBUG) != 0 && surface.colors.is_some(), VERTEX_COLORS)
         | when((is_textured || all & flags::DEBUG != 0) && surface.uvs.is_some(), UVS)

@@ -94,7 +94,7 @@ pub struct Material<'a> {
     pub name: Option<String>,
     pub pbr_metallic_roughness: Option<Pbr>,
     pub normal_texture: Option<TextureInfo>,
-    pub occlusion_texture: Option<IgnoredAny>,
+    pub occlusion_texture: Option<TextureInfo>,
     pub emissive_texture: Option<TextureInfo>,
     pub emissive_factor: Option<[f64; 3]>,
     pub alpha_mode: Option<String>,
@@ -138,6 +138,7 @@ pub struct TextureInfo {
     pub index: Index,
     pub tex_coord: Option<Index>,
     pub scale: Option<f64>,
+    pub strength: Option<f64>,
     #[serde(default)]
     pub extensions: TextureInfoExtensions,
 }

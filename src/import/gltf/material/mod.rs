@@ -130,6 +130,8 @@ impl Textures<'_, '_, '_, '_> {
         slot.normal_texture = self.texture(&json.normal_texture)?;
         slot.normal_scale = json.normal_texture.as_ref().and_then(|t| t.scale).map(|s| s.clamp(-1e4, 1e4) as f32);
         slot.emissive_texture = self.texture(&json.emissive_texture)?;
+        slot.occlusion_texture = self.occlusion_texture(&json.occlusion_texture)?;
+        slot.occlusion_strength = json.occlusion_texture.as_ref().and_then(|t| t.strength).map(share);
         let strength = self.extension::<EmissiveStrength>(json, "KHR_materials_emissive_strength")?;
         let strength = strength.and_then(|s| s.emissive_strength).unwrap_or(1.0);
         slot.emissive = json.emissive_factor.map(|rgb| rgb.map(|v| (v * strength).clamp(0.0, BRIGHTEST) as f32));
@@ -157,6 +159,22 @@ impl Textures<'_, '_, '_, '_> {
             self.sets.push(moved.or(info.tex_coord).map_or(0, |set| set.0 as u32));
         }
         Ok(texture)
+    }
+
+    /// An occlusion texture. It costs no picture: one that is not there, or has texture coordinates of its
+    /// own, is a warning.
+    fn occlusion_texture(&mut self, texture: &Option<TextureInfo>) -> Result<Option<TextureRef>, MeshError> {
+        let Some(info) = texture else { return Ok(None) };
+        let moved = info.extensions.transform.as_ref().and_then(|transform| transform.tex_coord);
+        let set = moved.or(info.tex_coord).map_or(0, |set| set.0 as u32);
+        let why = match self.sets.first() {
+            _ if info.index.0 >= self.materials.lists.textures.len() => "it is not there",
+            Some(&other) if other != set => "the other textures use other texture coordinates",
+            _ => return self.texture(texture),
+        };
+        let detail = format!("the occlusion texture of {} is not drawn: {why}", self.what);
+        super::warn_once(self.warnings, "occlusion_ignored", detail);
+        Ok(None)
     }
 
     fn extension<'j, T: Deserialize<'j>>(
@@ -213,9 +231,6 @@ fn warn_of_undrawn(what: &str, json: &lists::Material<'_>, warnings: &mut Vec<Wa
             None => format!("{SPECULAR_GLOSSINESS} is drawn without its specular part ({what} has it)"),
         };
         super::warn_once(warnings, "specular_glossiness_ignored", detail);
-    }
-    if json.occlusion_texture.is_some() {
-        super::warn_once(warnings, "occlusion_ignored", format!("occlusion textures are not drawn ({what} has one)"));
     }
 }
 

@@ -44,7 +44,9 @@ pub fn hull_pass<'m>(
     if used.iter().all(|c| *c == color) {
         colors = vec![color];
     }
-    let needs_materials = colors.len() > 1 || (needed_pass(groups).is_some() && groups.material_count() > 1);
+    // The ground has a material of its own.
+    let has_several = groups.material_count() > 1 || groups.has_ground();
+    let needs_materials = colors.len() > 1 || (needed_pass(groups).is_some() && has_several);
     let (list, silhouettes) = cx.silhouettes(scene)?;
     let mesh = ScreenMesh::new(scene, cx)?;
     let edges = mesh.silhouette_edges(&thicknesses, &list, &silhouettes, cx)?;

@@ -68,6 +68,7 @@ fn textures_samplers_and_transforms() {
     let gltf = surface(json!({
         "pbrMetallicRoughness": { "baseColorTexture": { "index": 1 }, "metallicRoughnessTexture": { "index": 0 } },
         "normalTexture": { "index": 0, "scale": 0.5 },
+        "occlusionTexture": { "index": 0, "strength": 7 },
         "emissiveTexture": { "index": 2, "extensions": { "KHR_texture_transform":
             { "offset": [0, 1], "rotation": std::f64::consts::FRAC_PI_2, "scale": [0.5, 0.5] } } },
     }));
@@ -77,6 +78,13 @@ fn textures_samplers_and_transforms() {
     assert_eq!((base.image, base.wrap, base.nearest), (0, [Wrap::Clamp, Wrap::Mirror], true));
     assert_eq!(slot.metallic_roughness_texture, Some(TextureRef::new(1)), "repeated and smooth by default");
     assert_eq!((slot.normal_texture, slot.normal_scale), (Some(TextureRef::new(1)), Some(0.5)));
+    assert_eq!((slot.occlusion_texture, slot.occlusion_strength), (Some(TextureRef::new(1)), Some(1.0)));
+    let apart = surface(json!({
+        "pbrMetallicRoughness": { "baseColorTexture": { "index": 1 } },
+        "occlusionTexture": { "index": 0, "texCoord": 1 },
+    }));
+    let apart = read(&apart.glb()).unwrap();
+    assert_eq!((apart.materials[0].occlusion_texture, codes(&apart)), (None, vec!["occlusion_ignored"]));
     // The extension's own example: the lower left quadrant.
     let emissive = slot.emissive_texture.unwrap();
     let moved = |u: f32, v: f32| emissive.transform.map(|[a, b, c]| (a * u + b * v + c).abs());

@@ -117,7 +117,7 @@ fn transparent_wireframes_composite_to_the_opaque_picture() {
     let encode = |v: f64| thresholds.partition_point(|&t| f64::from(t) <= v) as i32;
     let mut compared = 0;
     for page in [0.0_f32, 1.0] {
-        spec.image.background = Rgba([page, page, page, 1.0]);
+        spec.image.background = Rgba([page, page, page, 1.0]).into();
         let opaque = draw(&mesh, &spec);
         for (a, b) in over.rgba.chunks(4).zip(opaque.rgba.chunks(4)) {
             let alpha = f64::from(a[3]) / 255.0;

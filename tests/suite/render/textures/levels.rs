@@ -305,13 +305,14 @@ fn a_small_budget_decodes_one_after_the_other() {
 fn uses_are_written_as_the_shaders_read_them() {
     let picture = encode(&image::RgbImage::new(4, 4).into(), ImageFormat::Png);
     let material = json!({ "emissiveFactor": [1, 1, 1], "emissiveTexture": { "index": 0 },
-        "normalTexture": { "index": 0 }, "pbrMetallicRoughness": { "baseColorTexture": { "index": 0,
+        "normalTexture": { "index": 0 }, "occlusionTexture": { "index": 0, "strength": 0.25 }, "pbrMetallicRoughness": { "baseColorTexture": { "index": 0,
         "extensions": { "KHR_texture_transform": { "offset": [0.25, 0.5], "scale": [2, 3] } } } } });
     let mesh = model(&[TRIANGLE], &[UVS], &picture, material);
     let plan = plan_of(&mesh, &[], &Limits::default()).unwrap();
     let surface = plan.surface.unwrap();
     let uses = surface.materials[0].textures;
-    assert_eq!(uses.map(|u| u.texture), [0, TEXTURE_NONE, 1, 0], "once as colour and once as data");
+    assert_eq!(uses.map(|u| u.texture), [0, TEXTURE_NONE, 1, 0, 1], "once as colour and once as data");
+    assert_eq!(surface.materials[0].occlusion_strength, 0.25);
     assert_eq!(uses[slots::BASE].transform, [[2.0, 0.0, 0.25], [0.0, 3.0, 0.5]]);
     assert_eq!((uses[slots::BASE].sampler, surface.textures.images.len()), (0, 2));
     // Without texture coordinates there is nothing to sample with.

@@ -90,7 +90,7 @@ fn other_textures_stay_and_images_are_counted_once() {
     for _ in 0..2 {
         let (found, warnings) = planned(&mesh, &prepared);
         let has = found.textures.map(|texture| texture.texture != TEXTURE_NONE);
-        assert_eq!((has, found.emissive), ([true, false, false, false], [0.0; 3]));
+        assert_eq!((has, found.emissive), ([true, false, false, false, false], [0.0; 3]));
         let [warning] = &warnings[..] else { panic!("{warnings:?}") };
         assert!(!warning.detail.contains("more"), "{}", warning.detail);
     }

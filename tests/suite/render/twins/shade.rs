@@ -182,7 +182,7 @@ fn hostile_coordinates_and_textures_agree() {
             .collect();
         let surface = plan.surface.as_mut().unwrap();
         surface.uvs = Some(CornerValues { values: bad.into(), triangles: plan.triangles.clone() });
-        let uses = [used(CHECKER, 0), turned(CHECKER, f32::MAX), used(COARSE, 5), used(77, 0)];
+        let uses = [used(CHECKER, 0), turned(CHECKER, f32::MAX), used(COARSE, 5), used(77, 0), used(CHECKER, 16)];
         let look = ShadedMaterial { textures: uses, flags: SMOOTH | flags::MASK, alpha_cutoff: 0.1, ..base_look() };
         surface.materials = vec![ShadedMaterial { emissive: [1e30, 2.0, 0.0], ..look }];
         let cpu = CpuRenderer::new(1).draw(plan, &Deadline::default()).unwrap();

@@ -1,0 +1,5 @@
+//! What a request adds around the surface, and how it shows it.
+
+pub mod backgrounds;
+pub mod ground;
+pub mod xray;
