@@ -309,7 +309,7 @@ fn stated_defaults_are_the_defaults() {
         assert_eq!(json(&with.to_string()).unwrap(), json(&without.to_string()).unwrap(), "{}", field.key);
         checked += 1;
     }
-    assert_eq!(checked, 53);
+    assert_eq!(checked, 54);
 }
 
 #[test]
@@ -319,5 +319,5 @@ fn the_vocabulary_has_every_word() {
     assert_eq!(vocabulary["surface.debug"].len(), 13);
     assert_eq!(vocabulary["wire.method"], words_of::<WireMethod>());
     assert_eq!(vocabulary["sheet.views"], vocabulary["camera.view"]);
-    assert_eq!(vocabulary.len(), 17);
+    assert_eq!(vocabulary.len(), 18);
 }
