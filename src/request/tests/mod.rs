@@ -217,7 +217,7 @@ fn null_is_the_default_or_as_if_the_key_were_not_there() {
         }
         query(&[(key, "null")]).unwrap_or_else(|error| panic!("{error}"));
     }
-    assert_eq!(keys.len(), 68);
+    assert_eq!(keys.len(), 70);
     for document in [r#"{"style":null}"#, r#"{"camera":null,"light":null,"image":null}"#, r#"{"materials":null}"#] {
         assert_eq!(json(document).unwrap(), json("{}").unwrap(), "{document}");
     }
@@ -308,15 +308,15 @@ fn stated_defaults_are_the_defaults() {
         assert_eq!(json(&with.to_string()).unwrap(), json(&without.to_string()).unwrap(), "{}", field.key);
         checked += 1;
     }
-    assert_eq!(checked, 53);
+    assert_eq!(checked, 54);
 }
 
 #[test]
 fn the_vocabulary_has_every_word() {
     let vocabulary = vocabulary();
-    assert_eq!(vocabulary["style"].len(), 10);
+    assert_eq!(vocabulary["style"].len(), 11);
     assert_eq!(vocabulary["surface.debug"].len(), 13);
     assert_eq!(vocabulary["wire.method"], words_of::<WireMethod>());
     assert_eq!(vocabulary["sheet.views"], vocabulary["camera.view"]);
-    assert_eq!(vocabulary.len(), 17);
+    assert_eq!(vocabulary.len(), 18);
 }
