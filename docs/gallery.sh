@@ -21,7 +21,7 @@ looks=(
   debug-normal debug-uv debug-face-orientation debug-vertex-color
   debug-aspect debug-edge-length debug-curvature debug-uv-stretch
   debug-uv-layout sheet turntable max-error
-  clay
+  clay studio
 )
 for request in api/examples/*.json; do
   name=$(basename "$request" .json)

@@ -78,8 +78,8 @@ impl Pyramid {
             let [a, b, c] = corners.map(|corner| corner[k]);
             let side = f64::from(self.size[k]);
             let [low, high] = [a.min(b).min(c) - 1.0, a.max(b).max(c) + 1.0];
-            // Written so that NaN fails.
-            let is_near = low > -1e6 * side && high < 1e6 * side;
+            // The least and the largest of numbers do not tell that one is none.
+            let is_near = [a, b, c].iter().all(|v| v.is_finite()) && low > -1e6 * side && high < 1e6 * side;
             let is_within = low >= -1.0 && high <= side + 1.0;
             if !is_near || (wrap[k] == Wrap::Clamp && !is_within) {
                 return true;
@@ -178,7 +178,7 @@ mod tests {
         let size = [37_u32, 20];
         let (mut shown, mut free) = (0, 0);
         for case in 0..3000 {
-            let bits: Vec<bool> = (0..size[0] * size[1]).map(|_| random(&mut state) < 0.01).collect();
+            let bits: Vec<bool> = (0..size[0] * size[1]).map(|_| random(&mut state) < 0.02).collect();
             let pyramid = Pyramid::of_bits(size, bits.clone());
             let wrap = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp][case % 3];
             let reach = if wrap == Wrap::Clamp { 0.99 } else { 2.5 };

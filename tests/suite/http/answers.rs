@@ -140,7 +140,7 @@ fn the_process_says_how_it_is() {
     let capabilities = server.get("/v1/capabilities").json();
     assert_eq!(capabilities["limits"]["triangles"], 1234);
     assert_eq!(capabilities["limits"]["body_bytes"], 64 << 20);
-    assert_eq!(capabilities["styles"].as_array().unwrap().len(), 10);
+    assert_eq!(capabilities["styles"].as_array().unwrap().len(), 12);
     assert_eq!(capabilities["styles"], capabilities["request_words"]["style"]);
     assert_eq!(capabilities["request_words"]["wire.hidden"], serde_json::json!(["hide", "show", "fade"]));
     assert!(capabilities["request_keys"].as_array().unwrap().contains(&"topology.nonmanifold".into()));

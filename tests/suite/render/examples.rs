@@ -20,7 +20,7 @@ use crate::support::server::{Server, meshsnap};
 use crate::support::skip::{Need, skip};
 
 /// Requests under api/examples.
-const EXAMPLES: usize = 42;
+const EXAMPLES: usize = 44;
 
 const SIZE_PX: u32 = 256;
 
@@ -282,7 +282,7 @@ fn the_examples_show_every_look() {
             words += 1;
         }
     }
-    assert_eq!(words, 42);
+    assert_eq!(words, 44);
 }
 
 /// As a stranger would: from the root of a clone, exactly the line that the server prints.
