@@ -40,7 +40,7 @@ struct Frame {
     normal_triangles_at: u32,
     uv_triangles_at: u32,
     color_triangles_at: u32,
-    // Occlusion: src/plan/occlusion.rs explains it. To places, and how strong it is.
+    // Occlusion: src/plan/surface/occlusion.rs explains it. To places, and how strong it is.
     occlusion_depth: vec4<f32>,
     // Width of a pixel, then which places, and which depths, may be of one surface.
     occlusion_spread: vec4<f32>,

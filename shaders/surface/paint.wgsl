@@ -11,7 +11,7 @@ fn paint(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         return;
     }
     let pixel = vec2(i32(i) % frame.width, batch.row_first + i32(i) / frame.width);
-    rgba[batch.rgba_at + i] = encode(over_background(seen_color(first_visibility_sample(i), pixel), frame.background));
+    rgba[batch.rgba_at + i] = encode(over_background(seen_color(first_visibility_sample(i), pixel), background_at(i)));
 }
 
 // Mean colour of a pixel's samples, the first of which is given.

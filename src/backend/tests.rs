@@ -21,9 +21,9 @@ use super::gpu::pipelines::{Access, Kernel, SampleTarget, SampleWrite, Slot, key
 use super::gpu::schedule::sizes::{PEEL_STATE_BYTES, STROKES_BYTES, WORK_HEAD_BYTES, WORK_ITEM_BYTES};
 use super::gpu::schedule::{PIECES_MAX, WORKGROUP, line_shares, tiles};
 use super::sample_partition::{GENERATORS, POINTS};
-use crate::plan::occlusion::TAPS_PER_PIXEL;
 use crate::plan::{
-    Edge, HullVertex, LinePass, ShadedMaterial, Texture, debug_views, flags, pass_mask, sample_offsets, samplers, slots,
+    Edge, HullVertex, LinePass, ShadedMaterial, TAPS_PER_PIXEL, Texture, debug_views, flags, pass_mask, sample_offsets,
+    samplers, slots,
 };
 
 /// Every constant that a shader and Rust both have, as the shader calls it.

@@ -6,7 +6,7 @@ use super::prepared::Prepared;
 use super::projection::Projection;
 use super::skips::SkipKind;
 use super::{DrawPlan, HullPass, PlanError, pass_mask};
-use super::{costs, ground, heat, lines, margin, occlusion, outline, primitives, surface};
+use super::{costs, ground, heat, lines, margin, outline, primitives, surface};
 use crate::limits::{Budget, Deadline};
 use crate::scene::Scene;
 
@@ -45,7 +45,7 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
     let mut lines = lines::passes(scene, &mut cx)?;
     lines.extend(primitive_lines);
     let mut surface = surface::surface_pass(scene, &geometry, &mut cx)?;
-    let occlusion = occlusion::occlusion_pass(scene, surface.as_ref(), &mut cx);
+    let occlusion = surface::occlusion::occlusion_pass(scene, surface.as_ref(), &mut cx);
     let clipped = Projection::new(camera, scene.size_px(), true);
     let hides = surface.is_some() || groups.has_hull();
     let needed_px = lines.iter().map(lines::LinePass::margin_rows).filter(|_| hides).max().unwrap_or(0);

@@ -20,7 +20,6 @@ mod ground;
 pub(crate) mod heat;
 mod lines;
 mod margin;
-pub(crate) mod occlusion;
 mod outline;
 mod peeling;
 mod prepared;
@@ -38,7 +37,6 @@ pub use build::{build, build_from, build_keeping};
 pub use error::PlanError;
 pub use framing::framing;
 pub use lines::{Edge, LinePass, Shown, Side};
-pub use occlusion::{OcclusionPass, TAPS};
 pub use outline::{HullPass, HullVertex};
 pub use peeling::{PeelingPass, pass_mask};
 pub use prepared::{MeshToken, Prepared};
@@ -46,6 +44,7 @@ pub use projection::Projection;
 pub use quality::{QualitySelection, SelectedSpec, select_quality};
 pub use shared_slice::SharedSlice;
 pub use skips::{Skip, SkipKind};
+pub use surface::occlusion::{OcclusionPass, TAPS, TAPS_PER_PIXEL};
 pub use surface::{
     CornerValues, Lamp, Lights, ShadedMaterial, SurfacePass, TEXTURE_NONE, TextureUse, debug_views, flags, samplers,
     slots,

@@ -5,6 +5,7 @@ pub(crate) mod closeup;
 pub(crate) mod edge_masks;
 pub(crate) mod lights;
 pub(crate) mod materials;
+pub(crate) mod occlusion;
 pub(crate) mod textures;
 
 pub use build::surface_pass;

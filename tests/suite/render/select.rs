@@ -315,7 +315,7 @@ fn a_gpu_that_is_wrong_with_many_samples_draws_none_of_them() {
 }
 
 /// Number of styles.
-const STYLES: usize = 10;
+const STYLES: usize = 12;
 
 #[test]
 fn a_warm_gpu_has_drawn_every_style() {

@@ -42,6 +42,11 @@ fn turned(mut shape: Shape, random: &mut Random) -> Shape {
     shape
 }
 
+/// The largest difference of two pictures' bytes.
+fn largest(a: &Image, b: &Image) -> i16 {
+    a.rgba.iter().zip(&b.rgba).map(|(a, b)| (i16::from(*a) - i16::from(*b)).abs()).max().unwrap_or(0)
+}
+
 fn others(shape: &Shape, random: &mut Random) -> Vec<(&'static str, Shape)> {
     let all = flipped(renumbered(&turned(with_faces_shuffled(shape.clone(), random), random), random));
     vec![
@@ -77,7 +82,9 @@ fn order_and_winding_leave_no_trace() {
                         let got = draw(&other, keys, "128x96", renderer.as_mut());
                         assert!(!is_blank(want), "{name}, {look}");
                         let count = differing(want, &got);
-                        if count > 0 {
+                        // A triangle's depths round by its first corner, and occlusion rounds to 1/255.
+                        let allowed = if ["hull", "contour"].contains(look) { 2 } else { 0 };
+                        if count > allowed || largest(want, &got) > i16::from(count > 0) {
                             wrong.push(format!("{name}, {how}, {look}, {}: {count} pixels", renderer.kind().name()));
                         }
                         compared += 1;

@@ -4,8 +4,7 @@
 use super::grid::{Grid, NOWHERE, lanes};
 use crate::backend::cpu::geometry::transform::round_to_i32;
 use crate::backend::cpu::isa::{LANES, dispatch};
-use crate::plan::occlusion::TAPS_PER_PIXEL;
-use crate::plan::{OcclusionPass, sample_offsets};
+use crate::plan::{OcclusionPass, TAPS_PER_PIXEL, sample_offsets};
 
 /// Sine of the angle above the surface below which nothing takes light: flat places stay as they are,
 /// however they are rounded.
