@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use crate::backend::cpu::geometry::samples::{NOTHING, SampleBand};
+use crate::backend::cpu::geometry::samples::SampleBand;
 use crate::backend::cpu::geometry::transform::recip;
 use crate::backend::cpu::isa::LANES;
 use crate::plan::OcclusionPass;
@@ -135,10 +135,13 @@ pub fn write_band(
         let count = band.samples as usize;
         for x in 0..band.size_px[0] as usize {
             let at = first + x * count;
-            let (id, z) = (band.ids[at], band.depth[at]);
             let column = x + grid_border;
-            let is_nothing = (id == NOTHING) | (id >= triangles);
-            row[(column & 1) * grid_half + (column >> 1)] = if is_nothing { NOWHERE } else { place_of(pass, z) };
+            let place = &mut row[(column & 1) * grid_half + (column >> 1)];
+            *place = NOWHERE;
+            // `NOTHING` is larger than all ids.
+            if band.ids[at] < triangles {
+                *place = place_of(pass, band.depth[at]);
+            }
         }
     }
 }
