@@ -65,6 +65,7 @@ impl<'a> Shader<'a> {
         let first = band.index(0, y as i32, 0);
         let (pixels, _) = band.ids[first..first + row.len() * S].as_chunks::<S>();
         let mut waiting = Waiting::new(self.context, surface);
+        let is_dimmed = self.context.occlusion.is_some();
         for (group, pixels) in (0_u32..).zip(pixels.chunks(LANES)) {
             if pixels.as_flattened().iter().fold(0, |any, id| any | (id ^ NOTHING)) == 0 {
                 continue;
@@ -74,8 +75,10 @@ impl<'a> Shader<'a> {
                     row[x as usize] = self.pixel::<S>(band, x, y);
                     continue;
                 }
-                let depths = &band.depth[first + S * x as usize..];
-                let open = |s: usize| self.open_share([x, y], depths[s], depths[0]);
+                let open = |s: usize| {
+                    let depths = if is_dimmed { &band.depth[first + S * x as usize..] } else { return 1.0 };
+                    self.open_share([x, y], depths[s], depths[0])
+                };
                 if ids[0] != NOTHING && ids.iter().all(|&id| id == ids[0]) {
                     let at = self.mean_place([x, y], [128 * S as i32; 2], S as i32);
                     waiting.push(Point { id: ids[0], at, weight: 1.0, pixel: x, open: open(0) }, row);
