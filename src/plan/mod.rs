@@ -93,7 +93,7 @@ pub struct DrawPlan<'a> {
     pub lines: Vec<LinePass>,
     /// Premultiplied linear RGBA behind everything, at the picture's upper edge.
     pub background: [f32; 4],
-    /// What each row adds to it; 0 where the background has one colour.
+    /// Change of the background from row to row; 0 where it has one colour.
     pub background_step: [f32; 4],
     /// Work that the plan leaves out, and why.
     pub skips: Vec<Skip>,

@@ -1,5 +1,7 @@
 //! The light that hollows go without, against many rays.
 
+use meshsnap::backend::Renderer as _;
+use meshsnap::backend::cpu::CpuRenderer;
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
@@ -135,4 +137,20 @@ fn planes_and_cubes_lose_no_light() {
         }
     }
     assert_eq!(compared, 40 * renderers.len());
+}
+
+/// A renderer keeps its buffers from picture to picture, and nothing of what was in them shows.
+#[test]
+fn pictures_do_not_depend_on_those_before() {
+    let mesh = scenes::mesh(&shapes::gear(9));
+    let mut kept = CpuRenderer::new(1);
+    let sizes = ["120x80", "97x61", "61x97", "96x62", "120x80"];
+    for size in sizes {
+        let keys = [("size", size), ("style", "outline"), ("camera.margin", "0"), ("outline.unit", "px")];
+        let spec = scenes::spec(&keys);
+        let plan = scenes::plan(&mesh, &spec);
+        let [again, fresh] =
+            [&mut kept, &mut CpuRenderer::new(1)].map(|r| r.draw(&plan, &Deadline::default()).unwrap());
+        assert!(again.rgba == fresh.rgba, "{size}");
+    }
 }

@@ -51,7 +51,7 @@ struct Looker<'a> {
     /// Columns and rows from the picture's middle.
     column: Lanes,
     row: f32,
-    /// Where the pixels' surfaces are.
+    /// Places of the pixels' surfaces.
     place: [Lanes; 3],
 }
 
@@ -77,7 +77,7 @@ impl<'a> Looker<'a> {
         lanes(self.grid.depths(), self.grid.index(self.pixel, tap))
     }
 
-    /// Where surfaces `tap` away are, at these depths.
+    /// Places of surfaces `tap` away, at these depths.
     #[inline(always)]
     fn places(&self, tap: [i32; 2], depths: &Lanes) -> [Lanes; 3] {
         let [wide, narrower] = self.pass.spread;

@@ -21,9 +21,9 @@ const ROWS: usize = 16;
 pub struct Occlusion {
     /// Depths.
     pub grid: Grid,
-    /// What each pixel found by itself, in the grid's layout: whole numbers of 1/255.
+    /// Results of single pixels, in the grid's layout: whole numbers of 1/255.
     gathered: Vec<f32>,
-    /// The same spread over its neighbours, row by row.
+    /// The same, spread over neighbours, row by row.
     spread: Vec<u8>,
 }
 

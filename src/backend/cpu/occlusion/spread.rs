@@ -50,7 +50,8 @@ fn means(pass: &OcclusionPass, grid: &Grid, gathered: &[f32], pixel: [u32; 2]) -
     for l in 0..LANES {
         // The nearest integer, halves up: what is rounded lies at least 1/64 from a half.
         let mean = ((2.0 * sums[l] + weights[l]) + 0.5) / (2.0 * weights[l]) - 0.5;
-        means[l] = round_to_i32(mean) as u8;
+        // Beside the picture, `gathered` may still hold what an earlier one left.
+        means[l] = if own[l] == NOWHERE { 0 } else { round_to_i32(mean) as u8 };
     }
     means
 }
