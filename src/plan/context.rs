@@ -135,7 +135,7 @@ impl<'c> PlanContext<'c> {
         Ok((edges, orientation))
     }
 
-    /// What shows of faces with cut-out textures, and by material whether that counts in this picture; None
+    /// Visible parts of faces with cut-out textures, and the materials for which they count here; None
     /// where it never does.
     fn cut_outs(&mut self, scene: &Scene<'_, '_>) -> Result<Option<MaskedFaces>, PlanError> {
         self.budget.spend("materials", scene.mesh.materials.len() as u64, 1)?;

@@ -82,7 +82,7 @@ impl Prepared {
         kept(&self.face_runs, budget, find)
     }
 
-    /// What shows of the faces with cut-out textures, paid for; found by `find` if it is not known.
+    /// Visible parts of the faces with cut-out textures, paid for; found by `find` if it is not known.
     pub fn cut_outs<E: From<LimitExceeded>>(
         &self,
         budget: &mut Budget,

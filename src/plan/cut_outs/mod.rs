@@ -29,7 +29,7 @@ const FACE: u8 = 8;
 /// All of it.
 const ALL: u8 = 15;
 
-/// What shows of the faces with cut-out textures.
+/// Visible parts of the faces with cut-out textures.
 #[derive(Debug, Default)]
 pub struct CutOuts {
     /// By face, the bits of what shows; empty where all does.
@@ -125,7 +125,7 @@ fn shown_of(mesh: &Mesh, face: usize, texture: &TextureRef, pyramid: &Pyramid, l
     (0..3).filter(|&k| meets(side(k))).fold(FACE, |bits, k| bits | 1 << k)
 }
 
-/// What shows of a mesh's faces, and by material whether that counts in a picture.
+/// Visible parts of a mesh's faces, and the materials for which they count in a picture.
 pub type MaskedFaces = (Arc<CutOuts>, Vec<bool>);
 
 /// True if a style shows the mask of a file's material.

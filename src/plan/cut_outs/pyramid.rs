@@ -21,7 +21,7 @@ const CHECK_EVERY: u32 = 256;
 /// A point in texels.
 pub type Point = [f64; 2];
 
-/// Whether there is something in each texel, then in squares of twice the side, and so on up to one.
+/// A bit for each texel that has something, then for squares of twice the side, and so on up to one.
 pub struct Pyramid {
     size: [u32; 2],
     /// The place of each level, finest first.

@@ -17,7 +17,7 @@ use crate::spec::{Cull, Layers};
 pub struct Silhouettes {
     /// By material: not drawn while others are, and without a hull. Empty where there is none.
     is_absent: Vec<bool>,
-    /// What shows of faces with cut-out textures, and the materials whose cut-outs count.
+    /// Visible parts of faces with cut-out textures, and the materials whose cut-outs count.
     cut_outs: Option<MaskedFaces>,
     /// All faces of the edges that have more than two.
     crowded: BTreeMap<u32, Vec<u32>>,
