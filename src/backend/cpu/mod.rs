@@ -33,7 +33,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use self::bands::bins::Bins;
-use self::bands::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, ScratchPool};
+use self::bands::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, KeptSamples, ScratchPool};
 use self::isa::LANES;
 use self::occlusion::Occlusion;
 use self::resolve::SrgbEncoder;
@@ -66,6 +66,7 @@ pub struct CpuRenderer {
     srgb: SrgbEncoder,
     flat: FlatColors,
     occlusion: Occlusion,
+    kept: KeptSamples,
     /// Of the last picture.
     draw_times: DrawTimes,
     /// True if no shortcuts are taken.
@@ -117,6 +118,7 @@ impl CpuRenderer {
             srgb: SrgbEncoder::new(),
             flat: FlatColors::default(),
             occlusion: Occlusion::default(),
+            kept: KeptSamples::default(),
             draw_times: DrawTimes::default(),
             is_plain: false,
         }
@@ -173,6 +175,7 @@ impl CpuRenderer {
         lap.end(DrawStage::Transform);
         let mut flat = std::mem::take(&mut self.flat);
         let mut occlusion = std::mem::take(&mut self.occlusion);
+        let mut kept = std::mem::take(&mut self.kept);
         let mut context = self.context(plan, deadline, &watch);
         // As many bands at once as were paid for, or fewer.
         let mut banding = Banding::new(plan, threads.count());
@@ -184,42 +187,50 @@ impl CpuRenderer {
                 context.flat = Some(&flat);
                 lap.end(DrawStage::FaceColors);
             }
+            let mut no_samples = KeptSamples::default();
+            let mut samples = &mut no_samples;
             if let (Some(pass), true) = (&plan.occlusion, goal == Goal::Picture) {
-                self.find_occlusion(&context, pass, &mut occlusion, (&share, banding, &bins));
+                kept.reset(plan, banding);
+                samples = &mut kept;
+                self.find_occlusion(&context, pass, (&mut occlusion, samples), (&share, banding, &bins));
                 context.occlusion = Some((pass, &occlusion));
                 lap.end(DrawStage::Occlusion);
             }
             let row_len = out.len() / plan.height_px as usize;
-            let items = out.chunks_mut(row_len * banding.rows as usize).enumerate();
-            share.run(banding.at_once, items, |(band, out)| {
+            let items = out.chunks_mut(row_len * banding.rows as usize).zip(samples.iter_mut()).enumerate();
+            share.run(banding.at_once, items, |(band, (out, samples))| {
                 if deadline.check().is_ok() {
-                    self.scratch.with(plan, banding, |scratch| each(&context, scratch, &bins, band, out));
+                    self.scratch.with(plan, banding, |scratch| {
+                        scratch.with_kept(samples, true, |scratch| each(&context, scratch, &bins, band, out));
+                    });
                 }
             });
         });
-        (self.flat, self.occlusion) = (flat, occlusion);
+        (self.flat, self.occlusion, self.kept) = (flat, occlusion, kept);
         self.draw_times = watch.times(lap.restart());
         self.trim();
         drawn?;
         Ok(deadline.check()?)
     }
 
-    /// Draws the depths of all bands, and finds what light their pixels go without.
+    /// Draws the samples of all bands, and finds what light their pixels go without.
     fn find_occlusion(
         &self,
         context: &RasterContext<'_>,
         pass: &OcclusionPass,
-        occlusion: &mut Occlusion,
+        (occlusion, kept): (&mut Occlusion, &mut KeptSamples),
         (share, banding, bins): (&Share<'_>, Banding, &Bins),
     ) {
         let plan = context.plan;
         occlusion.grid.reset(pass, [plan.width_px, plan.height_px]);
         let (shape, stride) = (occlusion.grid.shape(), occlusion.grid.stride());
-        let rows = occlusion.grid.picture_mut().chunks_mut(stride * banding.rows as usize).enumerate();
-        share.run(banding.at_once, rows, |(band, out)| {
+        let rows = occlusion.grid.picture_mut().chunks_mut(stride * banding.rows as usize);
+        share.run(banding.at_once, rows.zip(kept.iter_mut()).enumerate(), |(band, (out, samples))| {
             if context.deadline.check().is_ok() {
                 self.scratch.with(plan, banding, |scratch| {
-                    bands::write_places(context, pass, (scratch, bins, band), shape, out);
+                    scratch.with_kept(samples, false, |scratch| {
+                        bands::write_places(context, pass, (scratch, bins, band), shape, out);
+                    });
                 });
             }
         });
@@ -243,9 +254,10 @@ impl CpuRenderer {
     /// Memory that drawing the plan takes beside what grows with its mesh, bytes. On all threads,
     /// so that no refusal depends on what else is drawn.
     pub fn bands_bytes(&self, plan: &DrawPlan<'_>) -> u64 {
+        let banding = Banding::new(plan, self.threads.count());
         let occlusion =
             plan.occlusion.as_ref().map_or(0, |pass| Occlusion::bytes(pass, [plan.width_px, plan.height_px]));
-        (Banding::new(plan, self.threads.count()).bytes(plan) + occlusion) as u64
+        (banding.bytes(plan) + occlusion + KeptSamples::bytes(plan, banding)) as u64
     }
 }
 

@@ -34,7 +34,7 @@ use crate::backend::cpu::lines::holes::free_points::{add_points, add_points_plai
 use crate::backend::cpu::lines::holes::{self, Holes};
 use crate::backend::cpu::lines::line_light;
 use crate::backend::cpu::lines::plain::add_holes_plainly;
-use crate::backend::cpu::occlusion::grid::write_band;
+use crate::backend::cpu::occlusion::grid::{Shape, write_band};
 use crate::backend::cpu::peeling;
 use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::flat::{draw_flat, shade_flat};
@@ -84,11 +84,11 @@ pub fn write_places(
     context: &RasterContext<'_>,
     pass: &OcclusionPass,
     (scratch, bins, band): (&mut BandScratch, &Bins, usize),
-    shape: (usize, usize),
+    shape: Shape,
     out: &mut [f32],
 ) {
     fill_samples(context, scratch, bins, band);
-    write_band(pass, shape, &scratch.samples, context.plan.triangles.len() as u32, out);
+    write_band(context.isa, pass, shape, &scratch.samples, context.plan.triangles.len() as u32, out);
 }
 
 /// Draws band number `band` of the visibility buffer alone, as
@@ -205,8 +205,12 @@ fn for_each_sample(band: &SampleBand, words: &mut [u64], word: impl Fn(usize) ->
     }
 }
 
-/// Moves the scratch to the band and fills its samples, unless nothing in the plan reads them.
+/// Moves the scratch to the band and fills its samples, unless that is done, or nothing in the plan reads
+/// them.
 fn fill_samples(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins, band: usize) {
+    if scratch.is_filled {
+        return;
+    }
     let plan = context.plan;
     let first = band as u32 * scratch.rows;
     let end = (first + scratch.rows).min(plan.height_px);

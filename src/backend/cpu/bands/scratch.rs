@@ -31,6 +31,10 @@ pub const KEPT_BYTES_MAX: usize = 8 << 20;
 /// threads; memory from the system costs as much time as drawing in it.
 const KEPT_SCRATCH_BYTES_MAX: usize = 24 << 20;
 
+/// Memory of a picture's samples, bytes, up to which a plan with occlusion keeps them: 640 x 600 pixels with
+/// four samples. Of larger pictures, bands draw theirs twice, which is cheaper than memory.
+const KEPT_SAMPLES_BYTES_MAX: usize = 12 << 20;
+
 /// Bytes of a sample: depth and id.
 const SAMPLE_BYTES: usize = 8;
 
@@ -121,6 +125,8 @@ fn row_bytes(plan: &DrawPlan<'_>, part: usize) -> usize {
 pub struct BandScratch {
     /// The visibility buffer.
     pub samples: SampleBand,
+    /// True if `samples` holds the band that is drawn already.
+    pub is_filled: bool,
     /// Rows that are shown; the last band of a picture may use fewer.
     pub rows: u32,
     /// Rows beyond these, above and below, that `samples` has room for too.
@@ -145,6 +151,7 @@ impl BandScratch {
     fn new(plan: &DrawPlan<'_>, Banding { rows, margin, .. }: Banding) -> Self {
         Self {
             samples: SampleBand::new([plan.width_px, plan.height_px], plan.margin_px, rows + 2 * margin, plan.samples),
+            is_filled: false,
             rows,
             margin,
             peel: None,
@@ -157,6 +164,16 @@ impl BandScratch {
         }
     }
 
+    /// Calls `each` with a band's kept samples in place of its own, if it has any.
+    pub fn with_kept(&mut self, kept: Option<&mut SampleBand>, is_filled: bool, each: impl FnOnce(&mut Self)) {
+        let Some(kept) = kept else { return each(self) };
+        std::mem::swap(&mut self.samples, kept);
+        self.is_filled = is_filled;
+        each(self);
+        self.is_filled = false;
+        std::mem::swap(&mut self.samples, kept);
+    }
+
     /// Allocated memory, bytes.
     fn bytes(&self) -> usize {
         self.samples.depth.len() * SAMPLE_BYTES
@@ -167,6 +184,46 @@ impl BandScratch {
             + self.holes.bytes()
             + self.owners.capacity() * size_of::<u32>()
             + self.light.capacity() * size_of::<Light>()
+    }
+}
+
+/// The samples of a whole picture, band by band: of one with occlusion, which looks at all depths before
+/// anything is shaded.
+#[derive(Default)]
+pub struct KeptSamples {
+    bands: Vec<SampleBand>,
+    /// What the bands have room for: columns, rows, margin and samples of the picture, and its division.
+    made_for: Option<([u32; 4], Banding)>,
+}
+
+impl KeptSamples {
+    /// Room for a plan's samples, or none where they take too much.
+    pub fn reset(&mut self, plan: &DrawPlan<'_>, banding: Banding) {
+        let made_for = Some(([plan.width_px, plan.height_px, plan.margin_px, plan.samples], banding));
+        if Self::bytes(plan, banding) == 0 {
+            *self = Self::default();
+        } else if self.made_for != made_for {
+            let band = || {
+                let rows = banding.rows + 2 * banding.margin;
+                SampleBand::new([plan.width_px, plan.height_px], plan.margin_px, rows, plan.samples)
+            };
+            self.bands.clear();
+            self.bands.resize_with(plan.height_px.div_ceil(banding.rows) as usize, band);
+            self.made_for = made_for;
+        }
+    }
+
+    /// Memory that a plan's samples take, bytes; 0 if they are not kept.
+    pub fn bytes(plan: &DrawPlan<'_>, banding: Banding) -> usize {
+        let bands = plan.height_px.div_ceil(banding.rows) as usize;
+        let bytes = bands * (banding.rows + 2 * banding.margin) as usize * row_bytes(plan, 0);
+        if plan.occlusion.is_some() && bytes <= KEPT_SAMPLES_BYTES_MAX { bytes } else { 0 }
+    }
+
+    /// Each band's samples; None, without end, where they are not kept.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = Option<&mut SampleBand>> {
+        let count = if self.bands.is_empty() { usize::MAX } else { 0 };
+        self.bands.iter_mut().map(Some).chain(std::iter::repeat_with(|| None).take(count))
     }
 }
 

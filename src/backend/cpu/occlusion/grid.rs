@@ -7,9 +7,9 @@
 
 use std::ops::Range;
 
-use crate::backend::cpu::geometry::samples::SampleBand;
+use crate::backend::cpu::geometry::samples::{SampleBand, for_samples};
 use crate::backend::cpu::geometry::transform::recip;
-use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::plan::OcclusionPass;
 
 /// The place of nothing: so far behind all else that no surface takes light from it.
@@ -121,26 +121,48 @@ pub fn place_of(pass: &OcclusionPass, z: f32) -> f32 {
     (a * z) * recip(b * z + c)
 }
 
-/// Writes the places of a band's pixels into their rows of the grid; outlines, from triangle `triangles`
-/// on, are nothing.
-pub fn write_band(
+/// Border and length of half a row of a [`Grid`].
+pub type Shape = (usize, usize);
+
+dispatch! {
+    /// Writes the places of a band's pixels into their rows of the grid; outlines, from triangle `triangles`
+    /// on, are nothing.
+    pub fn write_band(pass: &OcclusionPass, shape: Shape, band: &SampleBand, triangles: u32, out: &mut [f32]) = write_kernel
+}
+
+#[inline(always)]
+fn write_kernel(
     pass: &OcclusionPass,
-    (grid_border, grid_half): (usize, usize),
+    (grid_border, grid_half): Shape,
     band: &SampleBand,
     triangles: u32,
     out: &mut [f32],
 ) {
+    for_samples!(band.samples, write_sampled(pass, (grid_border, grid_half), band, triangles, out));
+}
+
+#[inline(always)]
+fn write_sampled<const S: usize>(
+    pass: &OcclusionPass,
+    (grid_border, grid_half): Shape,
+    band: &SampleBand,
+    triangles: u32,
+    out: &mut [f32],
+) {
+    let width = band.size_px[0] as usize;
     for (y, row) in (band.shown[0]..band.shown[1]).zip(out.chunks_exact_mut(2 * grid_half)) {
         let first = band.index(0, y as i32, 0);
-        let count = band.samples as usize;
-        for x in 0..band.size_px[0] as usize {
-            let at = first + x * count;
-            let column = x + grid_border;
-            let place = &mut row[(column & 1) * grid_half + (column >> 1)];
-            *place = NOWHERE;
-            // `NOTHING` is larger than all ids.
-            if band.ids[at] < triangles {
-                *place = place_of(pass, band.depth[at]);
+        let samples = first..first + S * width;
+        let (ids, depths) = (&band.ids[samples.clone()], &band.depth[samples]);
+        // The border is even: even columns stay even.
+        let (even, odd) = row.split_at_mut(grid_half);
+        for (parity, out) in [even, odd].into_iter().enumerate() {
+            let out = &mut out[grid_border / 2..][..(width + 1 - parity) / 2];
+            let pixels = ids.chunks(2 * S).zip(depths.chunks(2 * S));
+            for (place, (ids, depths)) in out.iter_mut().zip(pixels) {
+                let (id, depth) = (ids[parity * S], depths[parity * S]);
+                // `NOTHING` is larger than all ids.
+                *place = if id < triangles { place_of(pass, depth) } else { NOWHERE };
             }
         }
     }
@@ -148,7 +170,7 @@ pub fn write_band(
 
 impl Grid {
     /// Border and length of half a row, which [`write_band`] takes.
-    pub fn shape(&self) -> (usize, usize) {
+    pub fn shape(&self) -> Shape {
         (self.border, self.half)
     }
 }
