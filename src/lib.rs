@@ -45,6 +45,7 @@
 // Everything below is how it works: public for the program's own tests and tools, and free to change.
 #[doc(hidden)]
 pub mod backend;
+mod caption;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;

@@ -9,6 +9,7 @@
 //! clock is read to time the stages of drawing, and nothing depends on it.
 
 use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, GpuDevice};
+use crate::caption::{Scale, draw_legend};
 use crate::encode::{self, EncodeError};
 use crate::image::{Image, ImageFormat};
 use crate::import::{self, Bundle, Format, Imported, MeshError};
@@ -152,7 +153,12 @@ fn draw_view(
     ended(Stage::Plan);
 
     // DrawPlan -> Image
-    let drawn = backends.draw(spec.backend, &plan, deadline)?;
+    let mut drawn = backends.draw(spec.backend, &plan, deadline)?;
+    if spec.image.legend {
+        let legends = plan.legends.iter();
+        let scales = legends.map(|plan::Legend { title, ends, colors }| Scale { title, ends: *ends, colors });
+        draw_legend(&mut drawn.image, &scales.collect::<Vec<_>>());
+    }
     ended(Stage::Render);
 
     let mut warnings: Vec<Warning> = plan::unknown_materials(&scene).into_iter().collect();

@@ -1,4 +1,4 @@
-//! A small font of dots for the names of views: five columns, nine rows, of which the last two are
+//! A small font of dots for names and numbers: five columns, nine rows, of which the last two are
 //! below the line.
 
 /// Rows of a letter.
@@ -76,20 +76,17 @@ const LETTERS: &[(char, [u8; ROWS as usize])] = &[
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::NamedView;
-    use crate::spec::words::words_of;
     use std::collections::BTreeSet;
 
     #[test]
-    fn every_view_and_angle_can_be_written_and_no_two_letters_look_alike() {
-        let texts = words_of::<NamedView>().concat() + "0123456789°";
-        for letter in texts.chars() {
+    fn names_and_numbers_can_be_written_and_no_two_letters_look_alike() {
+        for letter in ('a'..='z').chain("0123456789°+-./".chars()) {
             let mut count = 0;
             dots(&letter.to_string(), |column, row| {
                 assert!(column < COLUMNS && row < ROWS, "{letter}");
                 count += 1;
             });
-            assert!(count > 2, "{letter}");
+            assert!(count > 1, "{letter}");
         }
         let looks: BTreeSet<_> = LETTERS.iter().map(|(_, rows)| rows).collect();
         assert_eq!(looks.len(), LETTERS.len());

@@ -239,7 +239,7 @@ fn explain(output: &Output, gpu: &GpuStatus, read: Duration, times: &[(Stage, Du
         eprintln!("skipped {}: {}", skip.kind, skip.why);
     }
     if output.short_chains > 0 {
-        eprintln!("lines of the outline left out, shorter than outline.min_length: {}", output.short_chains);
+        eprintln!("lines left out, shorter than wire.min_length or outline.min_length: {}", output.short_chains);
     }
     eprintln!("{:<6} {:9.3} ms", "read", read.as_secs_f64() * 1e3);
     for (stage, took) in times {

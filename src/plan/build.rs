@@ -38,7 +38,7 @@ pub fn build_keeping<'m>(
 fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPlan<'m>, PlanError> {
     let Scene { spec, groups, camera, .. } = scene;
     let mut geometry = primitives::geometry(scene, &mut cx)?;
-    heat::paint(scene, &mut geometry, &mut cx)?;
+    let legends = heat::paint(scene, &mut geometry, &mut cx)?;
     costs::spend_plan(scene, &geometry, cx.budget)?;
 
     let primitive_lines = primitives::line_passes(scene, &mut cx)?;
@@ -90,6 +90,7 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
         background_step,
         skips: cx.skips.done,
         short_chains: cx.short_chains,
+        legends,
         warnings: cx.warnings,
         mesh: cx.prepared.map(Prepared::token),
     })

@@ -36,6 +36,7 @@ pub use crate::texture::{Texture, TextureError, Textures};
 pub use build::{build, build_from, build_keeping};
 pub use error::PlanError;
 pub use framing::framing;
+pub use heat::Legend;
 pub use lines::{Edge, LinePass, Shown, Side};
 pub use outline::{HullPass, HullVertex};
 pub use peeling::{PeelingPass, pass_mask};
@@ -97,8 +98,11 @@ pub struct DrawPlan<'a> {
     pub background_step: [f32; 4],
     /// Work that the plan leaves out, and why.
     pub skips: Vec<Skip>,
-    /// Chains of outlines that are left out because they are short: see `outline.min_length`.
+    /// Chains of lines that are left out because they are short: see `wire.min_length` and
+    /// `outline.min_length`.
     pub short_chains: u32,
+    /// What the colours of diagnostics mean.
+    pub legends: Vec<Legend>,
     /// What the picture goes without although it was asked for, and why.
     pub warnings: Vec<Warning>,
     /// The mesh that the plan borrows from, where it may be drawn again.
@@ -142,6 +146,7 @@ impl<'a> DrawPlan<'a> {
             background_step: [0.0; 4],
             skips: Vec::new(),
             short_chains: 0,
+            legends: Vec::new(),
             warnings: Vec::new(),
             mesh: None,
         }

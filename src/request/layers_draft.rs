@@ -120,10 +120,10 @@ fn xray() -> Surface {
     Surface { shading: Shading::Unlit, color, emissive, facing_opacity: 0.07, ..Surface::default() }
 }
 
-/// The lines of [`Style::Technical`]: 1 px wide.
+/// The lines of [`Style::Technical`]: 1 px wide, and none where the mesh only crumples.
 fn feature_edges() -> WireDraft {
-    let thickness = WireThickness::Given(1.0);
-    WireDraft { line: Wire { edges: WireEdges::Feature, thickness, ..Wire::default() }, ..WireDraft::default() }
+    let (edges, thickness) = (WireEdges::Feature, WireThickness::Given(1.0));
+    WireDraft { line: Wire { edges, thickness, min_length: 20.0, ..Wire::default() }, ..WireDraft::default() }
 }
 
 /// The contour of [`Style::Technical`], twice as wide.

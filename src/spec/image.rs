@@ -19,6 +19,8 @@ pub struct ImageSpec {
     pub background: Background,
     /// Time that is spent to make a PNG small, from 0 to 9. Other formats ignore it.
     pub effort: u32,
+    /// Tells in the picture what the colours of its diagnostics mean.
+    pub legend: bool,
 }
 
 /// The default of [`ImageSpec::effort`]: quick, because pictures are drawn more often than stored.
@@ -33,6 +35,7 @@ impl Default for ImageSpec {
             samples: 4,
             background: Rgba::WHITE.into(),
             effort: DEFAULT_EFFORT,
+            legend: false,
         }
     }
 }

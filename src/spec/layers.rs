@@ -174,6 +174,9 @@ pub struct Wire {
     /// For [`WireEdges::Feature`]: the smallest angle between two faces' normals that makes an
     /// edge, 0 to 180.
     pub feature_angle_deg: f64,
+    /// For [`WireEdges::Feature`]: edges that are joined at vertices and shorter in all on screen are not
+    /// drawn, pixels.
+    pub min_length: f32,
     /// The treatment of hidden edges.
     pub hidden: Hidden,
 }
@@ -209,6 +212,7 @@ impl Default for Wire {
             lit: false,
             edges: WireEdges::Polygons,
             feature_angle_deg: 30.0,
+            min_length: 0.0,
             hidden: Hidden::Hide,
         }
     }

@@ -2,9 +2,11 @@
 //! computes a colour per face, or per position, and the back-ends draw it as vertex colours without light.
 
 mod color_map;
+mod legend;
 mod measures;
 
 pub use color_map::{DIVERGING, SEQUENTIAL};
+pub use legend::Legend;
 pub use measures::{curvatures, mean_edge, shape_quality, uv_stretch};
 
 use super::context::PlanContext;
@@ -42,12 +44,17 @@ fn shown(layers: &Layers) -> Option<DebugView> {
     layers.surface.map(|surface| surface.debug).filter(|debug| is_heat(*debug))
 }
 
-/// Gives a geometry the colours of the diagnostics that its materials show. Of a mesh without any, it keeps
-/// what it has.
-pub fn paint(scene: &Scene<'_, '_>, geometry: &mut Geometry<'_>, cx: &mut PlanContext<'_>) -> Result<(), PlanError> {
+/// Gives a geometry the colours of the diagnostics that its materials show, and tells what they mean. Of a mesh
+/// without any, it keeps what it has.
+pub fn paint(
+    scene: &Scene<'_, '_>,
+    geometry: &mut Geometry<'_>,
+    cx: &mut PlanContext<'_>,
+) -> Result<Vec<Legend>, PlanError> {
     let views: Vec<Option<DebugView>> = scene.groups.by_material.iter().map(|layers| shown(layers)).collect();
+    let mut legends = Vec::new();
     if views.iter().all(Option::is_none) {
-        return Ok(());
+        return Ok(legends);
     }
     let mesh = scene.mesh;
     cx.budget.spend("the colours of a diagnostic", geometry.triangles.len() as u64, TRIANGLE_BYTES)?;
@@ -63,21 +70,27 @@ pub fn paint(scene: &Scene<'_, '_>, geometry: &mut Geometry<'_>, cx: &mut PlanCo
             DebugView::Curvature => {
                 let edges = cx.edges(mesh)?;
                 let numbers = curvatures(mesh, &edges, cx.deadline)?;
-                painter.by_position(&numbers, &mesh.triangles, is_shown);
+                let most = painter.by_position(&numbers, &mesh.triangles, is_shown) / mesh.to_file.scale;
+                legends.push(Legend::new("mean curvature", [-most, most], &DIVERGING));
             }
             DebugView::UvStretch if mesh.uvs.is_empty() => {
                 let detail = "the mesh has no texture coordinates, and the stretch of its texture is shown as grey";
                 cx.warnings.push(Warning { code: "uvs_missing", detail: detail.to_owned() });
             }
-            _ => painter.by_face(&face_shares(mesh, view, cx.deadline)?, view, is_shown),
+            _ => {
+                let (shares, legend) = face_shares(mesh, view, cx.deadline)?;
+                painter.by_face(&shares, view, is_shown);
+                legends.push(legend);
+            }
         }
     }
     geometry.colors = Some(painter.finish());
-    Ok(())
+    Ok(legends)
 }
 
-/// By face, the place of its number on the colour map, from 0 to 1; NaN for a face that has none.
-fn face_shares(mesh: &Mesh, view: DebugView, deadline: &Deadline) -> Result<Vec<f32>, PlanError> {
+/// By face, the place of its number on the colour map, from 0 to 1; NaN for a face that has none. And what the
+/// map's ends mean.
+fn face_shares(mesh: &Mesh, view: DebugView, deadline: &Deadline) -> Result<(Vec<f32>, Legend), PlanError> {
     let mut numbers = Vec::with_capacity(mesh.triangles.len());
     let whole = if view == DebugView::UvStretch { measures::uv_scale(mesh) } else { 1.0 };
     for (face, triangle) in mesh.triangles.iter().enumerate() {
@@ -95,14 +108,20 @@ fn face_shares(mesh: &Mesh, view: DebugView, deadline: &Deadline) -> Result<Vec<
             }
         } as f32);
     }
-    if view == DebugView::EdgeLength {
-        let [low, high] = range(&numbers);
-        // Edges of one length are in the middle.
-        let span = if high > low { high - low } else { 1.0 };
-        let low = if high > low { low } else { low - 0.5 };
-        numbers.iter_mut().for_each(|number| *number = ((*number - low) / span).clamp(0.0, 1.0));
-    }
-    Ok(numbers)
+    let legend = match view {
+        DebugView::EdgeLength => {
+            let [low, high] = range(&numbers);
+            // Edges of one length are in the middle.
+            let span = if high > low { high - low } else { 1.0 };
+            let low = if high > low { low } else { low - 0.5 };
+            numbers.iter_mut().for_each(|number| *number = ((*number - low) / span).clamp(0.0, 1.0));
+            let ends = [low, low + span].map(|power| libm::exp2(f64::from(power)) * mesh.to_file.scale);
+            Legend::new("edge length", ends, &SEQUENTIAL)
+        }
+        DebugView::Aspect => Legend::new("1 - quality", [0.0, 1.0], &SEQUENTIAL),
+        _ => Legend::new("uv stretch", [-STRETCH_POWERS, STRETCH_POWERS].map(libm::exp2), &DIVERGING),
+    };
+    Ok((numbers, legend))
 }
 
 /// The least and the largest of the numbers without their tails.
@@ -150,8 +169,8 @@ impl Painter {
         }
     }
 
-    /// A colour per position: the diverging map, zero in its middle.
-    fn by_position(&mut self, numbers: &[f32], faces: &[[u32; 3]], is_shown: impl Fn(usize) -> bool) {
+    /// A colour per position: the diverging map, zero in its middle. Returns the number of its last colour.
+    fn by_position(&mut self, numbers: &[f32], faces: &[[u32; 3]], is_shown: impl Fn(usize) -> bool) -> f64 {
         let sizes: Vec<f32> = numbers.iter().map(|number| number.abs()).collect();
         let [_, most] = range(&sizes);
         let most = if most > 0.0 { most } else { 1.0 };
@@ -161,6 +180,7 @@ impl Painter {
         for (face, corners) in faces.iter().enumerate().filter(|(face, _)| is_shown(*face)) {
             self.triangles[face] = corners.map(|v| v + first);
         }
+        f64::from(most)
     }
 
     fn finish<'a>(self) -> CornerValues<'a, [f32; 4]> {

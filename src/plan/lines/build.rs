@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::short_chains::remove_short;
 use super::styles::{LineStyle, line_styles};
 use crate::mesh::edges::EdgeList;
 use crate::plan::context::PlanContext;
@@ -9,7 +10,7 @@ use crate::plan::edges::select::select;
 use crate::plan::edges::silhouettes::{Silhouettes, hides_inside, unseen_side};
 use crate::plan::outline::parts::contours;
 use crate::plan::skips::SkipKind;
-use crate::plan::{Edge, LinePass, PlanError};
+use crate::plan::{Edge, LinePass, PlanError, Projection};
 use crate::scene::Scene;
 use crate::spec::Hidden;
 
@@ -84,12 +85,17 @@ impl Source<'_> {
             }
             return Ok(Arc::new(edges));
         }
-        let found = match self.contours.as_ref().filter(|_| style.contour) {
+        let mut found = match self.contours.as_ref().filter(|_| style.contour) {
             Some(chosen) => select("drawn edges", chosen.len(), cx, |range, found| {
                 self.each(style, chosen[range].iter().map(|&i| i as usize), found);
             })?,
             None => select("drawn edges", self.list.len(), cx, |range, found| self.each(style, range, found))?,
         };
+        if style.min_length_px > 0.0 {
+            let projection = Projection::new(&self.scene.camera, self.scene.size_px(), true);
+            let min_px = f64::from(style.min_length_px);
+            cx.short_chains += remove_short(&mut found, self.scene.mesh, &projection, min_px, cx)?;
+        }
         Ok(Arc::new(found))
     }
 

@@ -3,6 +3,7 @@
 pub(crate) mod auto_width;
 pub(crate) mod build;
 pub(crate) mod picked_faces;
+mod short_chains;
 pub(crate) mod styles;
 
 pub use crate::mesh::edges::Edge;

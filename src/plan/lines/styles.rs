@@ -38,14 +38,28 @@ pub struct LineStyle {
     styles: Vec<bool>,
     /// The least width where the lines would cover most of the surface; None: always as wide.
     thinnest_px: Option<f32>,
+    /// Chains of edges that are shorter on screen are left out; 0: none.
+    pub min_length_px: f32,
 }
 
 impl LineStyle {
     /// Unlit lines along all edges that they are given.
     pub fn everywhere(width_px: f32, smoothing_px: f32, color: [f32; 4], hidden: Hidden) -> Self {
         let (lit, contour, class, styles) = (false, false, Class::All, Vec::new());
-        let (has_all_edges, thinnest_px) = (false, None);
-        Self { width_px, smoothing_px, color, hidden, lit, contour, class, has_all_edges, styles, thinnest_px }
+        let (has_all_edges, thinnest_px, min_length_px) = (false, None, 0.0);
+        Self {
+            width_px,
+            smoothing_px,
+            color,
+            hidden,
+            lit,
+            contour,
+            class,
+            has_all_edges,
+            styles,
+            thinnest_px,
+            min_length_px,
+        }
     }
 
     /// True if the lines are visible at all.
@@ -165,6 +179,7 @@ fn wire_styles(scene: &Scene<'_, '_>, cx: &mut PlanContext<'_>) -> Result<Vec<Li
             has_all_edges: class_of(&wire) == Class::All && styles.iter().all(|&has| has),
             styles: if styles.iter().all(|&has| has) { Vec::new() } else { styles },
             thinnest_px: None,
+            min_length_px: if wire.edges == WireEdges::Feature { wire.min_length } else { 0.0 },
         })
     };
     kinds.into_iter().map(&mut style).collect()
@@ -184,6 +199,7 @@ fn topology_styles(topology: &Topology) -> Vec<LineStyle> {
             has_all_edges: false,
             styles: Vec::new(),
             thinnest_px: (class == Class::Boundary).then_some(topology.thickness),
+            min_length_px: 0.0,
         })
     };
     let crease = Class::Crease(sharp_cos(topology.crease_angle_deg));

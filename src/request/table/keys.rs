@@ -75,6 +75,9 @@ fn layers() -> Vec<Field> {
              feature_angle_deg or ends; boundary: edges with one face.";
         "wire.feature_angle_deg" |d| d.wire().feature_angle_deg, in ANGLE, default 30;
             "For edges=feature: the smallest angle between two faces' normals that makes an edge.";
+        "wire.min_length" |d| d.wire().min_length, in number(0.0, 10_000.0);
+            "For edges=feature: edges that are joined at vertices and shorter in all, in pixels on screen, are not drawn; by \
+             default 20 in the style technical, and 0 in others.";
         "wire.hidden" |d| d.wire_draft().hidden;
             "Edges behind a surface; by default hide, and fade in the style wireframe. Methods other than exact: the same for all \
              materials, and beside transparent materials an opaque fill still hides them.";
@@ -212,6 +215,9 @@ fn image() -> Vec<Field> {
              of a sheet has them.";
         "image.effort" |d| d.image.effort, in Kind::OneOf(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]), default DEFAULT_EFFORT;
             "PNG: 0 to 3 encode quickly; 4 to 9 make smaller files in 5 to 100 times the time, for pictures that are stored.";
+        "image.legend" |d| d.image.legend, default false;
+            "For surface.debug=aspect, edge-length, curvature and uv-stretch: writes the scale of the colours into the lower right \
+             corner, if the picture has room for it.";
         "backend" |d| d.backend;
             "Back-end that draws; by default the server's choice.";
     ]

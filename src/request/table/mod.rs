@@ -96,7 +96,7 @@ mod tests {
             assert!(field.section().is_none_or(|s| s.turn.is_some() || !s.is_for_materials), "{}", field.key);
             keys += 1;
         }
-        assert_eq!(keys, 65);
+        assert_eq!(keys, 67);
         assert_eq!(FIELDS.iter().filter(|field| field.short.is_some()).count(), 6);
     }
 }

@@ -113,7 +113,7 @@ fn every_key_reaches_its_field() {
         "surface": {"shading":"smooth","normals":"derivative","color":"#fff","metallic":1,"roughness":0.25,
                     "emissive":"#100","opacity":0.5,"textures":false,"debug":"edge-distance","cull":"back"},
         "wire": {"method":"fwidth","color":"#000","thickness":2,"opacity":0.5,"lit":true,"edges":"feature",
-                 "feature_angle_deg":45,"hidden":"show"},
+                 "feature_angle_deg":45,"min_length":7,"hidden":"show"},
         "outline": {"method":"contour","color":"#fff","thickness":3,"unit":"px","min_length":12},
         "topology": {"polygon":null,"crease":"#00f","open":"#0f0","nonmanifold":null,"crease_angle_deg":60,"thickness":2},
         "points": {"size_px":7.5},
@@ -121,7 +121,7 @@ fn every_key_reaches_its_field() {
         "camera": {"view":"top","azimuth_deg":10,"elevation_deg":-20,"projection":"orthographic","fov_deg":50,
                    "height":2.5,"up":"-z","margin":0.1,"eye":[1,2,3],"target":[0,0,0.5]},
         "light": {"preset":"three-point","direction":[0,-1,0.5],"intensity":2,"ambient":0.1},
-        "image": {"width":640,"height":480,"format":"webp","samples":1,"background":"transparent","effort":9},
+        "image": {"width":640,"height":480,"format":"webp","samples":1,"background":"transparent","effort":9,"legend":true},
         "backend": "cpu"
     }"##;
     let spec = json(document).unwrap();
@@ -132,7 +132,7 @@ fn every_key_reaches_its_field() {
     let wire = spec.layers.wire.unwrap();
     assert_eq!((wire.method, wire.thickness, wire.smoothing), (WireMethod::Fwidth, WireThickness::Given(2.0), 1.0));
     assert_eq!((wire.edges, wire.hidden, wire.opacity), (WireEdges::Feature, Hidden::Show, 0.5));
-    assert_eq!((wire.lit, wire.feature_angle_deg), (true, 45.0));
+    assert_eq!((wire.lit, wire.feature_angle_deg, wire.min_length), (true, 45.0, 7.0));
     assert_eq!(
         spec.layers.outline,
         Some(Outline {
@@ -161,7 +161,7 @@ fn every_key_reaches_its_field() {
     assert_eq!((spec.light.intensity, spec.light.ambient), (2.0, 0.1));
     assert_eq!((spec.image.width_px, spec.image.height_px, spec.image.samples), (640, 480, 1));
     assert_eq!((spec.image.format, spec.image.background), (Some(ImageFormat::Webp), Rgba::TRANSPARENT.into()));
-    assert_eq!(spec.image.effort, 9);
+    assert_eq!((spec.image.effort, spec.image.legend), (9, true));
     assert_eq!(spec.backend, BackendChoice::Cpu);
 }
 
@@ -218,7 +218,7 @@ fn null_is_the_default_or_as_if_the_key_were_not_there() {
         }
         query(&[(key, "null")]).unwrap_or_else(|error| panic!("{error}"));
     }
-    assert_eq!(keys.len(), 71);
+    assert_eq!(keys.len(), 73);
     for document in [r#"{"style":null}"#, r#"{"camera":null,"light":null,"image":null}"#, r#"{"materials":null}"#] {
         assert_eq!(json(document).unwrap(), json("{}").unwrap(), "{document}");
     }
@@ -309,7 +309,7 @@ fn stated_defaults_are_the_defaults() {
         assert_eq!(json(&with.to_string()).unwrap(), json(&without.to_string()).unwrap(), "{}", field.key);
         checked += 1;
     }
-    assert_eq!(checked, 54);
+    assert_eq!(checked, 55);
 }
 
 #[test]

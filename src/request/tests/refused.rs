@@ -30,6 +30,7 @@ fn every_bad_value_is_refused_by_name() {
         (&[("wire.edges", "sharp")], OutOfRange, "wire.edges", "feature"),
         (&[("wire.lit", "yes")], WrongType, "wire.lit", "true or false"),
         (&[("wire.feature_angle_deg", "181")], OutOfRange, "wire.feature_angle_deg", "from 0 to 180"),
+        (&[("wire.min_length", "10001")], OutOfRange, "wire.min_length", "from 0 to 10000"),
         (&[("wire.hidden", "dash")], OutOfRange, "wire.hidden", "fade"),
         (&[("outline.method", "glow")], OutOfRange, "outline.method", "hull, contour"),
         (&[("topology.open", "7")], OutOfRange, "topology.open", "or null"),
@@ -110,7 +111,7 @@ fn every_bad_value_is_refused_by_name() {
         let sentence = error.to_string();
         assert!(sentence.contains(part) && sentence.contains(&format!("`{key}`")), "{pairs:?}: {sentence}");
     }
-    assert_eq!(cases.len(), 84);
+    assert_eq!(cases.len(), 85);
 }
 
 #[test]

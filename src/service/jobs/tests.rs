@@ -56,8 +56,15 @@ fn spec() -> Spec {
         from_file: false,
         fits_turn: false,
     };
-    let image =
-        ImageSpec { width_px: 8, height_px: 8, format: None, samples: 1, background: Rgba::WHITE.into(), effort: 3 };
+    let image = ImageSpec {
+        width_px: 8,
+        height_px: 8,
+        format: None,
+        samples: 1,
+        background: Rgba::WHITE.into(),
+        effort: 3,
+        legend: false,
+    };
     let light =
         Light { preset: LightPreset::Headlight, direction: None, intensity: 1.0, ambient: 0.3, ambient_occlusion: 0.0 };
     Spec {

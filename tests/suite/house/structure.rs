@@ -25,12 +25,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Of spec the choice of a back-end alone.
     ("backend", &["plan", "spec", "image", "srgb", "limits"]),
     ("encode", &["image", "limits"]),
-    ("sheet", &["spec", "image", "limits"]),
+    ("caption", &["image"]),
+    ("sheet", &["caption", "spec", "image", "limits"]),
     (
         "pipeline",
         &[
-            "report", "import", "encode", "sheet", "backend", "plan", "scene", "spec", "mesh", "image", "limits",
-            "warning",
+            "report", "import", "encode", "caption", "sheet", "backend", "plan", "scene", "spec", "mesh", "image",
+            "limits", "warning",
         ],
     ),
     (

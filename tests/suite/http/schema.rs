@@ -46,7 +46,7 @@ fn the_schema_is_valid_and_describes_every_key() {
         assert!(property["description"].as_str().is_some_and(|text| text.ends_with('.')), "{key}: {property}");
         described += 1;
     }
-    assert_eq!(described, 84);
+    assert_eq!(described, 86);
 }
 
 /// Documents that are understood.
@@ -56,13 +56,14 @@ const GOOD: &[&str] = &[
     r#"{"image":{"max_error":255,"max_time_ms":86400000}}"#,
     r#"{"scene":{"time_s":0}}"#,
     r#"{"scene":{"time_s":null}}"#,
+    r#"{"surface":{"debug":"aspect"},"image":{"legend":true}}"#,
     r#"{"style":"topology"}"#,
     r##"{"surface":{"shading":"smooth","normals":"derivative","crease_angle_deg":180,"color":"#c8ccd2","metallic":0,"roughness":0.6,
         "emissive":"#000","opacity":1,"facing_opacity":0.5,"textures":true,"cull":"back","debug":"edge-distance"}}"##,
     r#"{"surface":null,"wire":{},"outline":null,"topology":{}}"#,
     r#"{"surface":{"color":null,"metallic":null,"roughness":null,"emissive":null}}"#,
     r##"{"wire":{"method":"exact","color":"#000","thickness":100,"smoothing":10,"opacity":0,"lit":false,
-        "edges":"feature","feature_angle_deg":180,"hidden":"fade"}}"##,
+        "edges":"feature","feature_angle_deg":180,"min_length":10000,"hidden":"fade"}}"##,
     r#"{"wire":{"method":"fwidth","thickness":10}}"#,
     r#"{"wire":{"thickness":1.0,"smoothing":0}}"#,
     r#"{"wire":{"color":"ABC"}}"#,
@@ -138,6 +139,7 @@ const BAD: &[&str] = &[
     r#"{"wire":{"smoothing":-0.1}}"#,
     r#"{"wire":{"lit":"false"}}"#,
     r#"{"wire":{"feature_angle_deg":181}}"#,
+    r#"{"wire":{"min_length":-1}}"#,
     r#"{"outline":{"unit":"px","thickness":101}}"#,
     r#"{"outline":{"thickness":-1}}"#,
     r#"{"topology":{"thickness":20.5}}"#,
@@ -183,7 +185,7 @@ fn the_schema_and_the_reader_are_of_one_mind() {
         assert!(request::read(Some(document.as_bytes()), &[], &rules()).is_err(), "the reader takes {document}");
         assert!(!complaints(&validator, document).is_empty(), "the schema takes {document}");
     }
-    assert_eq!((GOOD.len(), BAD.len()), (50, 61));
+    assert_eq!((GOOD.len(), BAD.len()), (51, 62));
 }
 
 /// Documents made at random from pieces of both kinds: as many as both refuse or take; none where

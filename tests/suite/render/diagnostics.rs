@@ -201,6 +201,48 @@ fn a_layout_shows_faces_in_the_texture_and_marks_faults() {
     assert!(detail.contains("materials.A.surface.debug"), "{detail}");
 }
 
+/// The legends of the diagnostics, in the file's units: here a box of 2 x 6 x 10, whose triangles have three
+/// different means of sides.
+#[test]
+fn legends_tell_the_numbers_of_the_first_and_the_last_colour() {
+    let mut obj = shapes::Obj::default();
+    obj.cuboid([0.0; 3], [2.0, 6.0, 10.0]);
+    let mesh = scenes::mesh(&obj.finish());
+    let legend = |debug: &str| {
+        let legends = scenes::plan(&mesh, &scenes::spec(&[("surface.debug", debug), ("size", "64")])).legends;
+        let [legend] = &legends[..] else { panic!("{debug}: {legends:?}") };
+        (legend.title, legend.ends)
+    };
+    let mean = |a: f64, b: f64| (a + b + a.hypot(b)) / 3.0;
+    let (title, ends) = legend("edge-length");
+    assert_eq!(title, "edge length");
+    for (end, wanted) in ends.into_iter().zip([mean(2.0, 6.0), mean(6.0, 10.0)]) {
+        assert!((end / wanted - 1.0).abs() < 1e-6, "{end} is {wanted}");
+    }
+    assert_eq!(legend("aspect").1, [0.0, 1.0]);
+    let (_, [low, high]) = legend("curvature");
+    assert!(low == -high && high > 0.1 && high < 1.0, "{high}");
+    for other in ["none", "uv", "normal"] {
+        assert!(scenes::plan(&mesh, &scenes::spec(&[("surface.debug", other)])).legends.is_empty());
+    }
+}
+
+/// The same on both back-ends, because it is drawn after them; and nowhere but in its corner.
+#[test]
+fn a_legend_lies_in_the_lower_right_corner() {
+    let server = Server::start(&[]);
+    let draw = |debug: &str, legend: bool| {
+        let path = format!("/v1/render?size=300&format=png&surface.debug={debug}&image.legend={legend}");
+        server.post(&path, shapes::torus(24).as_bytes()).picture(300, 300)
+    };
+    let (plain, with) = (draw("edge-length", false), draw("edge-length", true));
+    let changed: Vec<_> = with.enumerate_pixels().filter(|(x, y, pixel)| plain.get_pixel(*x, *y) != *pixel).collect();
+    assert!(changed.len() > 500, "{}", changed.len());
+    assert!(changed.iter().all(|(x, y, _)| *x >= 300 - 110 && *y >= 300 - 40));
+    // Colours by number have a legend, others none.
+    assert_eq!(draw("normal", true), draw("normal", false));
+}
+
 #[test]
 fn twins_of_diagnostics_are_the_same() {
     let Some(gpus) = gpus() else { return };
