@@ -1,7 +1,7 @@
-//! Reads and writes files; the name `-` means a standard stream.
+//! Reads files and writes to standard output; the name `-` means a standard stream.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, IsTerminal as _, Read as _, Seek as _, Write as _};
+use std::io::{self, ErrorKind, Read as _, Seek as _, Write as _};
 
 use bytes::Bytes;
 
@@ -74,23 +74,6 @@ fn read_large(file: &mut File, length: u64) -> io::Result<Option<Bytes>> {
 #[cfg(not(target_os = "linux"))]
 fn read_large(_file: &mut File, _length: u64) -> io::Result<Option<Bytes>> {
     Ok(None)
-}
-
-/// Writes a whole file, or standard output for `-`.
-pub fn write(name: &str, bytes: &[u8]) -> Result<(), CliError> {
-    if name == "-" && io::stdout().is_terminal() {
-        return Err(CliError::usage("standard output is a terminal, which shows no pictures; give -o FILE, or a pipe"));
-    }
-    if name == "-" {
-        return print(bytes);
-    }
-    std::fs::write(name, bytes).map_err(|error| {
-        let sentence = format!("{name}: cannot be written: {error}");
-        match error.kind() {
-            ErrorKind::NotFound | ErrorKind::PermissionDenied | ErrorKind::IsADirectory => CliError::usage(sentence),
-            _ => CliError::ours(sentence),
-        }
-    })
 }
 
 /// Writes to standard output. A reader that stops early, such as `head`, is not an error.

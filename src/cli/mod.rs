@@ -9,10 +9,12 @@ pub(crate) mod error;
 mod files;
 mod health;
 mod inspect;
+mod output;
 mod progress;
 mod render;
 mod serve;
 mod settings;
+mod unfinished;
 
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};

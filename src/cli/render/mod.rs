@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 
+use super::output::{Destination, Inputs};
 use super::progress::Progress;
 use super::settings::LimitSettings;
 use super::{bundle, files};
@@ -103,6 +104,7 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
     let filter = if filter.is_empty() { "warn" } else { &filter };
     telemetry::init(filter, Some(false)).map_err(CliError::usage)?;
     let mesh_name = bundle::name(&arguments.meshes);
+    let destination = Destination::new(&arguments.output, &inputs(arguments))?;
     let limits = arguments.limits.config().limits;
     let format_in = format_in(arguments.format_in.as_deref())?;
     let spec = read_spec(arguments, &limits)?;
@@ -137,7 +139,7 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
         .map_err(|error| CliError::from(error).about(mesh_name))?;
     drop(progress);
 
-    files::write(&arguments.output, &output.bytes)?;
+    destination.write(&arguments.output, &output.bytes)?;
     for warning in &output.warnings {
         eprintln!("meshsnap: {mesh_name}: warning: {}", warning.detail);
     }
@@ -145,6 +147,12 @@ pub fn run(arguments: &RenderArgs) -> Result<(), CliError> {
         explain(&output, &gpu.status(), read, &times, began.elapsed());
     }
     Ok(())
+}
+
+/// The files that a render reads.
+fn inputs(arguments: &RenderArgs) -> Inputs {
+    let request = arguments.request.as_deref().map(Path::to_string_lossy);
+    Inputs::of(arguments.meshes.iter().map(String::as_str).chain(request.as_deref()))
 }
 
 /// Reads the request document, the short flags and `--set`; each overrides those before it.
