@@ -1,6 +1,7 @@
 //! Where a picture goes. A file is replaced as a whole and is never one of the inputs: the bytes
 //! are written to a file beside it, which then takes its name.
 
+use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -15,8 +16,25 @@ use crate::cli::error::CliError;
 const LINKS_MAX: usize = 40;
 
 /// The files that a command reads, which no output may replace.
-#[derive(Default)]
-pub struct Inputs(Vec<(String, Handle)>);
+#[derive(Debug, Default)]
+pub struct Inputs(HashMap<Identity, String>);
+
+/// What two names of one file share.
+#[cfg(unix)]
+type Identity = (u64, u64);
+/// What two names of one file share. The file stays open, so that no other gets its number.
+#[cfg(not(unix))]
+type Identity = Handle;
+
+#[cfg(unix)]
+fn identity(handle: Handle) -> Identity {
+    (handle.dev(), handle.ino())
+}
+
+#[cfg(not(unix))]
+fn identity(handle: Handle) -> Identity {
+    handle
+}
 
 /// Where a picture goes.
 #[derive(Debug)]
@@ -37,13 +55,12 @@ impl Inputs {
             name => Handle::from_path(name),
         };
         // A file that cannot be opened is reported where it is read.
-        Self(names.filter_map(|name| Some((name.to_owned(), handle(name).ok()?))).collect())
+        Self(names.filter_map(|name| Some((identity(handle(name).ok()?), name.to_owned()))).collect())
     }
 
     /// The input that the file at `path` is, by whatever name or link.
     fn name_of(&self, path: &Path) -> Option<&str> {
-        let handle = Handle::from_path(path).ok()?;
-        self.0.iter().find(|(_, input)| *input == handle).map(|(name, _)| name.as_str())
+        self.0.get(&identity(Handle::from_path(path).ok()?)).map(String::as_str)
     }
 }
 
