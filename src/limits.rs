@@ -66,11 +66,11 @@ pub const JOB_MS_MAX: u64 = 24 * 3600 * 1000;
 
 /// A cap that the input exceeds.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what} is {given}, and the limit is {limit} (raise it with {flag})")]
+#[error("{what} is more than {limit} (raise the limit with {flag})")]
 pub struct LimitExceeded {
     /// The thing that was counted, in words: "the number of triangles".
     pub what: String,
-    /// The count that the input asks for.
+    /// The count at which it was refused. The whole input may ask for more, so messages do not say it.
     pub given: u64,
     /// The largest count that is allowed.
     pub limit: u64,

@@ -30,6 +30,11 @@ impl CliError {
         Self { sentence: sentence.into(), exit_code: 3 }
     }
 
+    /// A failure whose sentences are printed already.
+    pub fn silent(exit_code: u8) -> Self {
+        Self { sentence: String::new(), exit_code }
+    }
+
     /// Adds the name of the file that it is about.
     pub fn about(mut self, name: &str) -> Self {
         self.sentence = format!("{name}: {}", self.sentence);

@@ -1,7 +1,8 @@
-//! Reads and writes files; the name `-` means a standard stream.
+//! Reads files and writes to standard output; the name `-` means a standard stream.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, IsTerminal as _, Read as _, Seek as _, Write as _};
+use std::io::{self, ErrorKind, Read as _, Seek as _, Write as _};
+use std::path::Path;
 
 use bytes::Bytes;
 
@@ -11,13 +12,16 @@ use crate::cli::error::CliError;
 /// to fill.
 const LARGE_BYTES: u64 = 1 << 20;
 
+/// Most files of a folder that a misspelt name is compared with.
+const NEIGHBOURS_MAX: usize = 10_000;
+
 /// A large page, bytes. Memory of whole ones needs no others.
 #[cfg(target_os = "linux")]
 const LARGE_PAGE_BYTES: usize = 2 << 20;
 
 /// Reads a whole file, or standard input for `-`, of at most `bytes_max`.
 pub fn read(name: &str, bytes_max: u64) -> Result<Bytes, CliError> {
-    let failed = |error: io::Error| CliError::input(format!("{name}: cannot be read: {error}"));
+    let failed = |error: io::Error| unreadable(name, &error);
     let limit = bytes_max.saturating_add(1);
     let mut bytes = Vec::new();
     if name == "-" {
@@ -27,6 +31,9 @@ pub fn read(name: &str, bytes_max: u64) -> Result<Bytes, CliError> {
         // One read into a buffer of the right size. The length is a hint: files may grow, and some
         // have none.
         let metadata = file.metadata().map_err(failed)?;
+        if metadata.is_dir() {
+            return Err(CliError::usage(format!("{name}: is a folder, and a file is needed")));
+        }
         if metadata.is_file() && metadata.len() > bytes_max {
             return Err(too_large(name, bytes_max));
         }
@@ -46,6 +53,31 @@ pub fn read(name: &str, bytes_max: u64) -> Result<Bytes, CliError> {
         return Err(too_large(name, bytes_max));
     }
     Ok(bytes.into())
+}
+
+/// The reason why a file cannot be read, and for a misspelt name the nearest one.
+fn unreadable(name: &str, error: &io::Error) -> CliError {
+    match error.kind() {
+        ErrorKind::NotFound => match nearest(Path::new(name)) {
+            Some(near) => CliError::input(format!("{name}: there is no such file; did you mean {near}?")),
+            None => CliError::input(format!("{name}: there is no such file")),
+        },
+        ErrorKind::PermissionDenied => CliError::input(format!("{name}: may not be read by this user")),
+        ErrorKind::IsADirectory => CliError::usage(format!("{name}: is a folder, and a file is needed")),
+        _ => CliError::input(format!("{name}: cannot be read: {error}")),
+    }
+}
+
+/// The file in the same folder whose name is nearest, by at most two letters.
+fn nearest(path: &Path) -> Option<String> {
+    let wanted = path.file_name()?.to_str()?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let names = std::fs::read_dir(folder).ok()?.take(NEIGHBOURS_MAX);
+    let names = names.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    let distance = |name: &str| strsim::damerau_levenshtein(wanted, name);
+    let (distance, name) = names.map(|name| (distance(&name), name)).min()?;
+    (distance <= 2 && 2 * distance < wanted.chars().count()).then(|| path.with_file_name(name).display().to_string())
 }
 
 fn too_large(name: &str, bytes_max: u64) -> CliError {
@@ -74,23 +106,6 @@ fn read_large(file: &mut File, length: u64) -> io::Result<Option<Bytes>> {
 #[cfg(not(target_os = "linux"))]
 fn read_large(_file: &mut File, _length: u64) -> io::Result<Option<Bytes>> {
     Ok(None)
-}
-
-/// Writes a whole file, or standard output for `-`.
-pub fn write(name: &str, bytes: &[u8]) -> Result<(), CliError> {
-    if name == "-" && io::stdout().is_terminal() {
-        return Err(CliError::usage("standard output is a terminal, which shows no pictures; give -o FILE, or a pipe"));
-    }
-    if name == "-" {
-        return print(bytes);
-    }
-    std::fs::write(name, bytes).map_err(|error| {
-        let sentence = format!("{name}: cannot be written: {error}");
-        match error.kind() {
-            ErrorKind::NotFound | ErrorKind::PermissionDenied | ErrorKind::IsADirectory => CliError::usage(sentence),
-            _ => CliError::ours(sentence),
-        }
-    })
 }
 
 /// Writes to standard output. A reader that stops early, such as `head`, is not an error.
@@ -137,7 +152,7 @@ mod tests {
         std::fs::write(&path, &bytes).unwrap();
         let read_as = |length: u64| read_large(&mut File::open(&path).unwrap(), length).unwrap();
         // Kernels may be built without large pages.
-        let has_large_pages = std::path::Path::new("/sys/kernel/mm/transparent_hugepage").exists();
+        let has_large_pages = Path::new("/sys/kernel/mm/transparent_hugepage").exists();
         assert_eq!(read_as(1 << 20).is_some_and(|read| read == bytes), has_large_pages);
         assert!(read_as((1 << 20) - 1).is_none(), "it has grown");
         assert!(read_as((1 << 20) + 1).is_none(), "it has shrunk");

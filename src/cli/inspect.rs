@@ -1,6 +1,7 @@
 //! `meshsnap inspect`: reports the content of a mesh file.
 
-use clap::Args;
+use clap::builder::PossibleValuesParser;
+use clap::{Args, ValueHint};
 
 use super::progress::Progress;
 use super::render::{format_in, pairs};
@@ -13,12 +14,20 @@ use crate::pipeline;
 use crate::request::{self, Rules};
 use crate::spec::BackendChoice;
 
+/// Examples at the end of `--help`.
+pub const EXAMPLES: &str = "\
+Examples:
+  meshsnap inspect knot.obj
+  meshsnap inspect model.obj model.mtl wood.png --json
+  meshsnap inspect walk.glb --set scene.time_s=0.5";
+
 /// Arguments of `inspect`.
 #[derive(Args)]
 pub struct InspectArgs {
     #[arg(
         required = true,
         value_name = "MESH",
+        value_hint = ValueHint::FilePath,
         help = format!(
             "Mesh file ({}; known by its bytes, whatever its name) and the files it refers to, \
              or a .zip of them; `-` for standard input",
@@ -32,14 +41,16 @@ pub struct InspectArgs {
     #[arg(
         long,
         value_name = "FORMAT",
-        help = format!("Format of the mesh, where its bytes do not tell: {}", Format::list_names())
+        help = "Format of the mesh, where its bytes do not tell",
+        value_parser = PossibleValuesParser::new(Format::names()),
+        ignore_case = true
     )]
     format_in: Option<String>,
     /// The mesh among several files, where more than one could be
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     entry: Option<String>,
     /// scene.time_s=SECONDS: an animated file at that moment; without it, the rest pose
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, value_name = "KEY=VALUE", value_hint = ValueHint::Other)]
     set: Vec<String>,
     #[command(flatten)]
     limits: LimitSettings,
@@ -48,18 +59,28 @@ pub struct InspectArgs {
 /// Prints the report.
 pub fn run(arguments: &InspectArgs) -> Result<(), CliError> {
     let limits = arguments.limits.config().limits;
-    let format = format_in(arguments.format_in.as_deref())?;
+    let format = format_in(arguments.format_in.as_deref());
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
-    let time_s = request::read_moment(&pairs(&arguments.set)?, &rules)?;
+    let time_s = request::read_moment(&pairs(&arguments.set)?, &rules)
+        .map_err(|error| CliError::usage(format!("--set: {error}")))?;
     let progress = Progress::start("reading");
     let mesh_name = bundle::name(&arguments.meshes);
-    let bundle = bundle::read(&arguments.meshes, arguments.entry.clone(), &limits)?;
+    let named = bundle::read(&arguments.meshes, arguments.entry.clone(), &limits)?;
+    let (paths, archives) = named.paths();
     progress.next("parsing");
     let mut parsed = |_| progress.next("counting edges");
-    let report =
-        pipeline::inspect(&bundle, import::Options { format, time_s }, &limits, &Deadline::default(), &mut parsed)
-            .map_err(|error| CliError::from(error).about(mesh_name))?;
+    let report = pipeline::inspect(
+        &named.bundle,
+        import::Options { format, time_s },
+        &limits,
+        &Deadline::default(),
+        &mut parsed,
+    )
+    .map_err(|error| CliError::from(error).about(mesh_name))?;
     drop(progress);
+    for sentence in bundle::unused(&paths, &named.file_use, |path| archives.iter().any(|archive| archive == path)) {
+        eprintln!("meshsnap: {sentence}");
+    }
     let text =
         if arguments.json { report.json().map_err(|error| CliError::ours(error.to_string()))? } else { report.text() };
     files::print(text.as_bytes())

@@ -9,22 +9,34 @@ pub(crate) mod error;
 mod files;
 mod health;
 mod inspect;
+mod manual;
+mod output;
 mod progress;
 mod render;
 mod serve;
 mod settings;
+mod siblings;
+mod unfinished;
 
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 use error::CliError;
 
 /// Turns 3D meshes into images, here or as an HTTP service.
 #[derive(Parser)]
-#[command(name = "meshsnap", version, about, propagate_version = true)]
+#[command(
+    name = "meshsnap",
+    version,
+    about,
+    propagate_version = true,
+    max_term_width = HELP_COLUMNS,
+    after_help = "`meshsnap COMMAND -h` is short, and `--help` has every option and examples."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -33,10 +45,13 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Draw a mesh into an image file
+    #[command(after_help = SEE_HELP, after_long_help = render::EXAMPLES)]
     Render(Box<render::RenderArgs>),
     /// Report the content of a mesh file
+    #[command(after_help = SEE_HELP, after_long_help = inspect::EXAMPLES)]
     Inspect(inspect::InspectArgs),
     /// Serve renders over HTTP
+    #[command(after_help = SEE_HELP, after_long_help = serve::after_help())]
     Serve(serve::ServeArgs),
     /// Ask a running server whether it is healthy, for container health checks
     Health(health::HealthArgs),
@@ -45,33 +60,58 @@ enum Command {
         /// The shell
         shell: clap_complete::Shell,
     },
+    /// Print a manual page, for `man -l -`
+    Man {
+        /// The command that it is about [default: meshsnap itself]
+        #[arg(value_parser = manual::COMMANDS)]
+        command: Option<String>,
+    },
 }
+
+/// Widest line of a help text.
+const HELP_COLUMNS: usize = 100;
+
+/// The end of a short help text.
+const SEE_HELP: &str = "`--help` has every option and examples.";
 
 /// Runs the program with these arguments.
 pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
-    let cli = match Cli::try_parse_from(arguments) {
+    let words: Vec<OsString> = arguments.collect();
+    let cli = match Cli::try_parse_from(&words) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version come here too; clap prints them to standard output.
             let _ = error.print();
+            advise(&error);
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
     let command = || match cli.command {
-        Command::Render(arguments) => render::run(&arguments),
+        Command::Render(arguments) => render::run(&arguments, &words),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
         Command::Completions { shell } => completions(shell),
+        Command::Man { command } => manual::print(Cli::command(), command.as_deref()),
     };
     // The panic hook has printed the message already.
     let bug = |_| Err(CliError::ours("this is a bug in meshsnap; please report it with the mesh and the request"));
     match catch_unwind(AssertUnwindSafe(command)).unwrap_or_else(bug) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("meshsnap: {}", error.sentence);
+            if !error.sentence.is_empty() {
+                eprintln!("meshsnap: {}", error.sentence);
+            }
             ExitCode::from(error.exit_code)
         }
+    }
+}
+
+/// Says what a newcomer may have meant who names a file and no command.
+fn advise(error: &clap::Error) {
+    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) else { return };
+    if error.kind() == ErrorKind::InvalidSubcommand && std::path::Path::new(word).is_file() {
+        eprintln!("{word} is a file. To draw it: meshsnap render {word} -o out.png");
     }
 }
 

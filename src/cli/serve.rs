@@ -1,10 +1,10 @@
 //! `meshsnap serve`: serves renders over HTTP.
 
 use std::io::ErrorKind;
-use std::net::SocketAddr;
+use std::net::{SocketAddr, ToSocketAddrs as _};
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueHint};
 
 use super::files;
 use super::settings::AllSettings;
@@ -18,16 +18,41 @@ use crate::telemetry;
 #[derive(Args)]
 pub struct ServeArgs {
     /// TOML file with settings under the names of the flags
-    #[arg(long, value_name = "FILE", env = "MESHSNAP_CONFIG")]
+    #[arg(long, value_name = "FILE", env = "MESHSNAP_CONFIG", value_hint = ValueHint::FilePath)]
     config: Option<PathBuf>,
     #[command(flatten)]
     settings: AllSettings,
 }
 
+/// The end of `serve --help`: settings without a flag, and examples.
+pub fn after_help() -> String {
+    let mut text = String::from("Settings without a flag, because every user of the machine can read command lines:\n");
+    for setting in SETTINGS.iter().filter(|setting| !setting.has_flag) {
+        text += &format!(
+            "  {}\n          {}, or `{}` in the file of --config\n",
+            setting.variable(),
+            setting.help,
+            setting.key
+        );
+    }
+    text + EXAMPLES
+}
+
+const EXAMPLES: &str = "
+Every flag is also a variable (MESHSNAP_WORKERS for --workers) and a key of the file.
+
+Examples:
+  meshsnap serve
+  meshsnap serve --listen 127.0.0.1:9000 --workers 4 --limit-body-bytes 16MiB
+  MESHSNAP_API_KEYS=choose-one meshsnap serve --listen 0.0.0.0:8080";
+
 /// Serves until a signal stops the process.
 pub fn run(arguments: &ServeArgs) -> Result<(), CliError> {
     let config = resolve(arguments)?;
-    telemetry::init(&config.log, config.log_json).map_err(CliError::usage)?;
+    telemetry::init(&config.log, config.log_json).map_err(|error| CliError::usage(format!("`log` {error}")))?;
+    config.listen.to_socket_addrs().map_err(|error| {
+        CliError::usage(format!("--listen {}: there is no such address on this machine ({error})", config.listen))
+    })?;
     if config.data_dir.is_some() {
         tracing::warn!("this version keeps jobs and meshes in memory and stores nothing in --data-dir");
     }

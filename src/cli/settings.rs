@@ -1,17 +1,20 @@
 //! Makes command-line arguments of the table of settings.
 
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
-use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, ValueHint};
 
 use crate::config::{Access, Config, SETTINGS, Setting};
+use crate::request::words_of;
+use crate::spec::BackendChoice;
 
 /// The settings of `serve`, given by flags and environment variables.
 #[derive(Clone, Debug, Default)]
 pub struct AllSettings(Given);
 
 /// The settings of `render` and `inspect`: those whose names begin with `limit-`, except the limits
-/// of jobs.
+/// of the service.
 #[derive(Clone, Debug, Default)]
 pub struct LimitSettings(Given);
 
@@ -38,7 +41,9 @@ impl LimitSettings {
 }
 
 fn is_limit(setting: &&Setting) -> bool {
-    setting.key.starts_with("limit-") && !setting.key.starts_with("limit-queue") && setting.key != "limit-job-ms"
+    // Nothing waits here, and no request has a body: these are of the service alone.
+    const OF_SERVICE: [&str; 3] = ["limit-body-bytes", "limit-job-ms", "limit-queue-per-worker"];
+    setting.key.starts_with("limit-") && !OF_SERVICE.contains(&setting.key)
 }
 
 fn has_flag(setting: &&Setting) -> bool {
@@ -55,13 +60,45 @@ fn augment(command: Command, settings: impl Iterator<Item = &'static Setting>) -
             // clap needs static names; one small string per setting is leaked.
             .env(&*setting.variable().leak())
             .hide_env_values(true)
+            .help_heading(heading(setting.key))
+            .hide_short_help(!COMMON.contains(&setting.key))
             .help(format!("{}{shown}", setting.help));
         match setting.access {
             Access::Switch(_) => argument.num_args(0..=1).require_equals(true).default_missing_value("true"),
-            Access::Number(..) => argument.value_name("N").action(ArgAction::Set),
-            Access::Text(..) => argument.value_name("VALUE").action(ArgAction::Set),
+            Access::Number(..) => argument.value_name("N").action(ArgAction::Set).value_hint(ValueHint::Other),
+            Access::Text(..) => values_of(setting.key, argument.value_name("VALUE").action(ArgAction::Set)),
         }
     }))
+}
+
+/// The settings that the short help shows.
+const COMMON: &[&str] = &["listen", "workers", "queue", "backend", "no-auth", "log", "cache-dir"];
+
+/// The heading of a setting in `--help`.
+fn heading(key: &str) -> &'static str {
+    match key {
+        _ if key.starts_with("limit-") => "Limits",
+        "log" | "log-format" => "Log",
+        "workers" | "worker-threads" | "queue" | "backend" | "cache-dir" => "Drawing",
+        "listen" | "no-auth" | "connections" | "header-timeout-ms" | "body-timeout-ms" => "Connections",
+        _ => "Memory",
+    }
+}
+
+/// What a shell completes for a setting that is a text.
+fn values_of(key: &str, argument: Arg) -> Arg {
+    match key {
+        "backend" => argument.value_parser(words_or_empty(&words_of::<BackendChoice>())),
+        "log-format" => argument.value_parser(words_or_empty(&["auto", "text", "json"])),
+        _ if key.ends_with("-dir") => argument.value_hint(ValueHint::DirPath),
+        _ => argument.value_hint(ValueHint::Other),
+    }
+}
+
+/// Words, and the empty text: compose files write an empty variable for one that is not set.
+fn words_or_empty(words: &[&'static str]) -> PossibleValuesParser {
+    let words = words.iter().map(|&word| PossibleValue::new(word));
+    PossibleValuesParser::new(words.chain([PossibleValue::new("").hide(true)]))
 }
 
 fn collect(matches: &ArgMatches, settings: impl Iterator<Item = &'static Setting>) -> Result<Given, clap::Error> {
@@ -72,9 +109,12 @@ fn collect(matches: &ArgMatches, settings: impl Iterator<Item = &'static Setting
         if from_variable && value.is_empty() {
             continue; // compose files write an empty variable for one that is not set
         }
-        let source = if from_variable { setting.variable() } else { "the command line".to_owned() };
-        let checked = Config::default().apply(&source, setting.key, value);
-        checked.map_err(|error| clap::Error::raw(ErrorKind::ValueValidation, format!("{error}\n")))?;
+        let source = setting.variable();
+        setting.set(&mut Config::default(), value).map_err(|allowed| {
+            let name = if from_variable { source } else { format!("--{}", setting.key) };
+            let sentence = format!("{name} is \"{value}\", and allowed is {allowed}\n");
+            clap::Error::raw(ErrorKind::ValueValidation, sentence)
+        })?;
         given.push((setting.key, value.clone()));
     }
     Ok(given)

@@ -39,7 +39,7 @@ const TEXTURE_PX_MAX: u64 = 65_535;
 
 /// Every setting.
 pub const SETTINGS: &[Setting] = &[
-    text("listen", "Address and port to listen on", |c, v| set(&mut c.listen, v), |c| c.listen.clone()),
+    text("listen", "Address and port to listen on", set_listen, |c| c.listen.clone()),
     text(
         "data-dir",
         "Folder for meshes and results (reserved: this version keeps them in memory)",
@@ -153,6 +153,19 @@ fn set(place: &mut String, value: &str) -> Result<(), String> {
     }
     value.clone_into(place);
     Ok(())
+}
+
+/// Sets an address with a port. One part alone is refused: it is unclear who may reach the server.
+fn set_listen(config: &mut Config, value: &str) -> Result<(), String> {
+    let (host, port) = value.rsplit_once(':').unwrap_or(("", value));
+    let port = port.parse::<u16>();
+    if host.is_empty() || port.is_err() {
+        let port = port.unwrap_or(8080);
+        return Err(format!(
+            "an address and a port, such as 127.0.0.1:{port} for this machine alone or 0.0.0.0:{port} for others too"
+        ));
+    }
+    set(&mut config.listen, value)
 }
 
 fn set_folder(place: &mut Option<PathBuf>, value: &str) -> Result<(), String> {

@@ -28,7 +28,7 @@ mod text;
 mod three_mf;
 pub mod up_axis;
 
-pub use bundle::{BadPath, Bundle, BundleFile, Folder};
+pub use bundle::{BadPath, Bundle, BundleFile, FileUse, Folder, Missing, Origin};
 pub use error::{MeshError, MeshFault};
 pub use report::{FileContent, FileMetadata, ImportReport};
 
@@ -133,7 +133,7 @@ fn open<T>(
             files.to_vec()
         }
     };
-    let (folder, format) = entry::choose(files, bundle.entry.as_deref(), options.format, deadline)?;
+    let (folder, format) = entry::choose(files, bundle, options.format, deadline)?;
     let bytes = &folder.entry().bytes;
     let mut cx = Context { limits, budget, deadline, bundle: &folder, time_s: options.time_s };
     let mut raw = (format.entry().read)(bytes, &mut cx)?;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 
 use super::Error;
-use crate::import::{self, Bundle, BundleFile, Format, MeshError, MeshFault, Options};
+use crate::import::{self, Bundle, BundleFile, Format, MeshError, MeshFault, Options, Origin};
 use crate::limits::{Budget, Deadline, Limits};
 use crate::pipeline::Model;
 use crate::warning::Warning;
@@ -130,7 +130,7 @@ impl MeshReader {
 
     /// Reads the mesh.
     pub fn read(self) -> Result<Mesh, Error> {
-        let bundle = bundle(self.files)?.with_entry(self.entry);
+        let bundle = bundle(self.files)?.with_entry(self.entry).given_by(Origin::Library);
         let mut budget = Budget::new(&self.limits);
         let model = Model::read(&bundle, self.options, &self.limits, &mut budget, &self.deadline)?;
         Ok(Mesh { model: Arc::new(model) })

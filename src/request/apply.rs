@@ -5,7 +5,7 @@ use crate::request::Rules;
 use crate::request::document::item::Item;
 use crate::request::document::mesh_reference;
 use crate::request::draft::Draft;
-use crate::request::error::{RequestError, RequestFault};
+use crate::request::error::{RequestError, RequestFault, shorten_key};
 use crate::request::suggest;
 use crate::request::table::value::{Given, Kind, Value};
 use crate::request::table::{self, FIELDS, MATERIALS, SCHEMA, SECTIONS};
@@ -104,10 +104,11 @@ fn unknown_of_material(item: &Item) -> RequestError {
     let of_layers = FIELDS.iter().filter(|f| f.is_for_materials()).map(|f| f.key);
     let known: Vec<&str> = of_layers.chain(layers.iter().copied()).collect();
     let has_layer = item.key.split_once('.').is_some_and(|(layer, _)| layers.contains(&layer));
+    let home = shorten_key(&format!("{}.{}.", MATERIALS.name, item.material.as_deref().unwrap_or_default()));
     let allowed = if has_layer {
-        suggest::allowed(&item.key, &known)
+        suggest::allowed_within(&home, &item.key, &known)
     } else {
-        let near = suggest::nearest(&item.key, &known);
+        let near: Vec<String> = suggest::nearest(&item.key, &known).iter().map(|key| format!("{home}{key}")).collect();
         let near = if near.is_empty() { String::new() } else { format!(" (did you mean {}?)", near.join(" or ")) };
         format!("a material has the layers {} and their keys{near}", layers.join(", "))
     };

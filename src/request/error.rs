@@ -65,6 +65,7 @@ impl fmt::Display for RequestError {
             RequestFault::OutOfRange | RequestFault::WrongType => {
                 write!(f, "`{key}` is {given}, and allowed is {allowed}")
             }
+            RequestFault::NotJson if allowed.is_empty() => write!(f, "the request document is {given}"),
             RequestFault::NotJson => write!(f, "the request document is {given}, and allowed is {allowed}"),
             RequestFault::Conflict => write!(f, "`{key}` is {given}, and {allowed}"),
             RequestFault::Missing => write!(f, "`{key}` is missing: {allowed}"),
@@ -80,7 +81,7 @@ impl std::error::Error for RequestError {}
 
 /// Shortens a key in the middle: a material's name may be long, and its layer and key are at the
 /// end.
-fn shorten_key(key: &str) -> String {
+pub fn shorten_key(key: &str) -> String {
     const CHARS_MAX: usize = 120;
     let count = key.chars().count();
     if count <= CHARS_MAX {

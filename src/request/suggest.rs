@@ -5,6 +5,11 @@ const KEY_CHARS_MAX: usize = 64;
 
 /// The advice for an unknown key: the nearest keys, and all keys of the object that it is in.
 pub fn allowed(key: &str, known: &[&'static str]) -> String {
+    allowed_within("", key, known)
+}
+
+/// The same for a key within an object whose whole key, with its dot, is `home`.
+pub fn allowed_within(home: &str, key: &str, known: &[&'static str]) -> String {
     let group = key.rsplit_once('.').map_or("", |(group, _)| group);
     let siblings: Vec<&str> = match group {
         "" => Vec::new(),
@@ -14,12 +19,27 @@ pub fn allowed(key: &str, known: &[&'static str]) -> String {
         let top: Vec<&str> = known.iter().copied().filter(|k| !k.contains('.')).collect();
         format!("the keys are {}", top.join(", "))
     } else {
-        format!("the keys of {group} are {}", siblings.join(", "))
+        format!("the keys of {home}{group} are {}", siblings.join(", "))
     };
     match nearest(key, known).as_slice() {
         [] => of_object,
-        near => format!("did you mean {}? ({of_object})", near.join(" or ")),
+        near => {
+            let near: Vec<String> = near.iter().map(|key| format!("{home}{key}")).collect();
+            format!("did you mean {}? ({of_object})", near.join(" or "))
+        }
     }
+}
+
+/// The word that was probably meant by a misspelt one.
+pub fn word(given: &str, words: &[&'static str]) -> Option<&'static str> {
+    if given.chars().count() > KEY_CHARS_MAX {
+        return None;
+    }
+    let given = given.trim().to_lowercase();
+    let (distance, word) = words.iter().map(|&word| (strsim::damerau_levenshtein(&given, word), word)).min()?;
+    // Of a short word, every other one is near.
+    let longer = word.chars().count().max(given.chars().count());
+    (distance <= 2 && 2 * distance < longer).then_some(word)
 }
 
 /// The known keys that were probably meant; empty if none is near.
@@ -47,6 +67,37 @@ pub fn nearest(key: &str, known: &[&'static str]) -> Vec<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn typing_mistakes_find_their_word() {
+        let words = ["wire", "wireframe", "hidden-line", "y", "-y", "auto", "gpu", "cpu"];
+        let cases = [
+            ("wier", Some("wire")),
+            ("WIRE", Some("wire")),
+            ("wirefame", Some("wireframe")),
+            ("hiden-line", Some("hidden-line")),
+            ("cpi", Some("cpu")),
+            ("z", None),
+            ("cuda", None),
+            ("", None),
+        ];
+        for (typo, expected) in cases {
+            assert_eq!(word(typo, &words), expected, "{typo}");
+        }
+        assert_eq!(word(&"x".repeat(1_000_000), &words), None);
+    }
+
+    #[test]
+    fn keys_of_materials_are_suggested_whole() {
+        let known = ["surface.opacity", "surface.color", "wire.color"];
+        let said = allowed_within("materials.Glass.", "surface.opactiy", &known);
+        assert!(
+            said.starts_with(
+                "did you mean materials.Glass.surface.opacity? (the keys of materials.Glass.surface are opacity, color)"
+            ),
+            "{said}"
+        );
+    }
 
     #[test]
     fn typing_mistakes_find_their_key() {

@@ -1,49 +1,70 @@
 //! Chooses the mesh among the files of a bundle.
 
-use crate::import::bundle::{BundleFile, UNNAMED, is_zip, show, show_all};
+use crate::import::bundle::{Bundle, BundleFile, Origin, UNNAMED, is_zip, show, show_all};
 use crate::import::formats::FORMATS;
+use crate::import::sniff::foreign;
 use crate::import::{Folder, Format, MeshError, MeshFault, sniff};
 use crate::limits::Deadline;
 
-/// Finds the mesh: the file that `entry` names, or the only one that is a mesh. `format` overrides
-/// sniffing.
+/// Finds the mesh among the unpacked files of a bundle: the one that it names as its entry, or the
+/// only one that is a mesh. `format` overrides sniffing.
 pub fn choose(
     files: Vec<BundleFile>,
-    entry: Option<&str>,
+    bundle: &Bundle,
     format: Option<Format>,
     deadline: &Deadline,
 ) -> Result<(Folder, Format), MeshError> {
+    let (entry, origin) = (bundle.entry.as_deref(), bundle.origin);
     let packages = FORMATS.iter().filter(|row| entry.is_none() && format.is_none_or(|format| format == row.format));
     for row in packages {
         if let Some(number) = row.package_start.and_then(|start| start(&files)) {
-            return Ok((Folder::new(files, number), row.format));
+            return Ok((Folder::new(files, number).of_bundle(bundle), row.format));
         }
     }
-    let folder = Folder::new(files.clone(), 0);
+    let folder = Folder::new(files.clone(), 0).of_bundle(bundle);
     let number = match entry {
         Some(name) => folder
             .at("", name)
             .ok()
             .flatten()
             .or_else(|| folder.of_base_name(name))
-            .ok_or_else(|| unknown(name, &files))?,
+            .ok_or_else(|| unknown(name, &files, origin))?,
         None if files.len() == 1 => 0,
-        None => only_mesh(&files, format, deadline)?,
+        None => only_mesh(&files, format, origin, deadline)?,
     };
     let format = match format {
-        Some(format) => format,
+        Some(format) => {
+            refuse_foreign(&files[number], format)?;
+            format
+        }
         None => {
             let file = &files[number];
             // A single unnamed file needs no name in the error.
             let is_named = files.len() > 1 || file.path != UNNAMED;
-            let what = if is_named { format!("\"{}\"", show(&file.path)) } else { "the body".into() };
-            sniff::sniff(&file.bytes, &what)?
+            let what = if is_named { format!("\"{}\"", show(&file.path)) } else { origin.unnamed().into() };
+            sniff::sniff(&file.bytes, &what, origin)?
         }
     };
     Ok((folder.with_entry(number), format))
 }
 
-fn only_mesh(files: &[BundleFile], format: Option<Format>, deadline: &Deadline) -> Result<usize, MeshError> {
+/// Refuses a file of another kind that a format without a signature would read as garbage.
+fn refuse_foreign(file: &BundleFile, format: Format) -> Result<(), MeshError> {
+    match foreign::kind_of(&file.bytes).filter(|_| format == Format::Obj) {
+        Some(kind) => {
+            let sentence = kind.sentence(&format!("\"{}\"", show(&file.path)), &Format::list());
+            Err(MeshError::new(MeshFault::Unrecognised, sentence))
+        }
+        None => Ok(()),
+    }
+}
+
+fn only_mesh(
+    files: &[BundleFile],
+    format: Option<Format>,
+    origin: Origin,
+    deadline: &Deadline,
+) -> Result<usize, MeshError> {
     let mut meshes = Vec::new();
     for (number, file) in files.iter().enumerate() {
         deadline.check()?;
@@ -53,10 +74,11 @@ fn only_mesh(files: &[BundleFile], format: Option<Format>, deadline: &Deadline) 
     }
     match meshes[..] {
         [number] => Ok(number),
-        [] => Err(no_mesh(files)),
+        [] => Err(no_mesh(files, origin)),
         _ => {
             let names = show_all(meshes.iter().map(|&number| files[number].path.as_str()));
-            let detail = format!("several files of the bundle are meshes: {names}; say which one to draw with `entry`");
+            let option = origin.entry_option();
+            let detail = format!("several files are meshes: {names}; say which one to draw with {option}");
             Err(MeshError::new(MeshFault::EntryUnclear, detail))
         }
     }
@@ -73,25 +95,26 @@ fn is_mesh(file: &BundleFile, format: Option<Format>) -> bool {
     }
 }
 
-fn no_mesh(files: &[BundleFile]) -> MeshError {
+fn no_mesh(files: &[BundleFile], origin: Origin) -> MeshError {
     if files.is_empty() {
-        let detail = format!("the bundle has no files in it; send a mesh ({}) and what belongs to it", Format::list());
+        let detail =
+            format!("there are no files in it, and there should be a mesh ({}) and what belongs to it", Format::list());
         return MeshError::new(MeshFault::Unrecognised, detail);
     }
     let names = show_all(files.iter().map(|file| file.path.as_str()));
-    let detail = format!("no file of the bundle is a mesh in a known format ({}): there is {names}", Format::list());
+    let detail = format!("none of the files is a mesh in a known format ({}): there is {names}", Format::list());
     // Only the upload itself is opened as an archive: nested archives could go on without end.
     match files.iter().find(|file| is_zip(&file.bytes)) {
         Some(file) => {
-            let detail = format!("{detail}; \"{}\" is {}", show(&file.path), sniff::INNER_ZIP);
+            let detail = format!("{detail}; \"{}\" is {}", show(&file.path), sniff::inner_zip(origin));
             MeshError::new(MeshFault::BundleBroken, detail)
         }
         None => MeshError::new(MeshFault::Unrecognised, detail),
     }
 }
 
-fn unknown(name: &str, files: &[BundleFile]) -> MeshError {
+fn unknown(name: &str, files: &[BundleFile], origin: Origin) -> MeshError {
     let names = show_all(files.iter().map(|file| file.path.as_str()));
-    let detail = format!("`entry` is \"{}\", and the bundle has no such file: there is {names}", show(name));
+    let detail = format!("{} is \"{}\", and there is no such file among {names}", origin.entry_option(), show(name));
     MeshError::new(MeshFault::EntryUnclear, detail)
 }

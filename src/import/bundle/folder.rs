@@ -3,7 +3,7 @@
 //! Only names and bytes are handled here. No file is ever opened, so a name that leads out of the
 //! folder leads nowhere.
 
-use crate::import::bundle::{BundleFile, base_name, has_drive, show};
+use crate::import::bundle::{Bundle, BundleFile, FileUse, Origin, base_name, has_drive, show};
 use crate::import::{MeshError, MeshFault};
 use rapidhash::RapidHashMap;
 use std::collections::hash_map::Entry;
@@ -19,6 +19,8 @@ pub struct Folder {
     by_lower_path: RapidHashMap<String, Option<usize>>,
     by_base_name: RapidHashMap<String, Option<usize>>,
     by_lower_base_name: RapidHashMap<String, Option<usize>>,
+    origin: Origin,
+    file_use: Option<FileUse>,
 }
 
 impl Folder {
@@ -30,6 +32,8 @@ impl Folder {
             by_lower_path: RapidHashMap::default(),
             by_base_name: RapidHashMap::default(),
             by_lower_base_name: RapidHashMap::default(),
+            origin: Origin::default(),
+            file_use: None,
             files,
         };
         for (i, file) in folder.files.iter().enumerate() {
@@ -41,9 +45,20 @@ impl Folder {
         folder
     }
 
+    /// The same folder with the origin of the bundle, whose use of files it notes.
+    #[must_use]
+    pub fn of_bundle(self, bundle: &Bundle) -> Self {
+        Self { origin: bundle.origin, file_use: bundle.file_use.clone(), ..self }
+    }
+
+    /// Who gave the files.
+    pub fn origin(&self) -> Origin {
+        self.origin
+    }
+
     /// The file that holds the mesh.
     pub fn entry(&self) -> &BundleFile {
-        &self.files[self.entry]
+        self.file(self.entry)
     }
 
     /// The size of all files.
@@ -51,9 +66,20 @@ impl Folder {
         self.files.iter().map(|file| file.bytes.len() as u64).sum()
     }
 
-    /// The file with this number.
+    /// The file with this number, which counts as used from here on.
     pub fn file(&self, number: usize) -> &BundleFile {
-        &self.files[number]
+        let file = &self.files[number];
+        if let Some(file_use) = &self.file_use {
+            file_use.add_used(&file.path);
+        }
+        file
+    }
+
+    /// Notes that a file in `folder` names one that is not there.
+    pub fn note_missing(&self, folder: &str, name: &str) {
+        if let Some(file_use) = &self.file_use {
+            file_use.add_missing(folder, name);
+        }
     }
 
     /// The same files with another entry.
@@ -70,11 +96,13 @@ impl Folder {
     /// single files lose their folders. A URI that leads out of the bundle is an error. The caller
     /// decodes `data:` URIs.
     pub fn resolve(&self, uri: &str) -> Result<Option<&BundleFile>, MeshError> {
-        let found = match self.at(self.entry().folder(), uri)? {
-            Some(number) => Some(number),
-            None => self.of_base_name(uri),
-        };
-        Ok(found.map(|number| self.file(number)))
+        let folder = self.entry().folder();
+        let at = self.at(folder, uri);
+        let found = at.map(|number| number.or_else(|| self.of_base_name(uri)));
+        if !matches!(found, Ok(Some(_))) {
+            self.note_missing(folder, &readings(uri).next().unwrap_or_default());
+        }
+        Ok(found?.map(|number| self.file(number)))
     }
 
     /// The file at a relative path from `folder`, in any letter case if there is no exact match.
@@ -84,7 +112,7 @@ impl Folder {
         }
         let mut outside = None;
         for path in readings(uri) {
-            match join(folder, &path) {
+            match join(folder, &path, self.origin) {
                 Ok(path) => {
                     let other_case = || self.by_lower_path.get(&path.to_lowercase()).copied().flatten();
                     if let Some(number) = self.by_path.get(&path).copied().or_else(other_case) {
@@ -153,9 +181,10 @@ fn percent_decode(uri: &str) -> Option<String> {
 }
 
 /// Joins `folder` and `path`, and resolves `.` and `..`.
-fn join(folder: &str, path: &str) -> Result<String, MeshError> {
+fn join(folder: &str, path: &str, origin: Origin) -> Result<String, MeshError> {
     let outside = || {
-        let detail = format!("the name \"{}\" leads out of the upload, and nothing outside it is read", show(path));
+        let whole = origin.whole();
+        let detail = format!("the name \"{}\" leads out of {whole}, and nothing outside is read", show(path));
         MeshError::new(MeshFault::OutsideBundle, detail)
     };
     if path.starts_with(['/', '\\']) || has_drive(path) {

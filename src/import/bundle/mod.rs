@@ -2,8 +2,10 @@
 
 pub(crate) mod entry;
 pub(crate) mod folder;
+mod origin;
 pub(crate) mod unzip;
 pub use folder::Folder;
+pub use origin::{FileUse, Missing, Origin};
 
 use super::{Format, MeshError, MeshFault};
 use bytes::Bytes;
@@ -21,6 +23,9 @@ pub struct Bundle {
     /// The path of the mesh, if the client named it.
     pub(crate) entry: Option<String>,
     pub(crate) is_zip: bool,
+    pub(crate) origin: Origin,
+    /// What becomes of the files, if anyone asked.
+    pub(crate) file_use: Option<FileUse>,
 }
 
 /// One file of a bundle.
@@ -42,7 +47,7 @@ impl Bundle {
     pub fn of_one(bytes: impl Into<Bytes>) -> Self {
         let bytes = bytes.into();
         let is_zip = is_zip(&bytes);
-        Self { files: vec![BundleFile { path: UNNAMED.into(), bytes }], entry: None, is_zip }
+        Self { files: vec![BundleFile { path: UNNAMED.into(), bytes }], is_zip, ..Self::default() }
     }
 
     /// A zip archive, whatever its bytes say.
@@ -53,7 +58,7 @@ impl Bundle {
     /// Several files; a single one may be a zip archive.
     pub fn of_files(files: Vec<BundleFile>) -> Self {
         let is_zip = files.len() == 1 && is_zip(&files[0].bytes);
-        Self { files, entry: None, is_zip }
+        Self { files, is_zip, ..Self::default() }
     }
 
     /// The same bundle with the path of its mesh.
@@ -62,15 +67,35 @@ impl Bundle {
         Self { entry, ..self }
     }
 
+    /// The same bundle, given by another than an HTTP request.
+    #[must_use]
+    pub fn given_by(self, origin: Origin) -> Self {
+        Self { origin, ..self }
+    }
+
+    /// The same bundle, which notes the use of its files in `file_use`.
+    #[must_use]
+    pub fn watched_by(self, file_use: &FileUse) -> Self {
+        Self { file_use: Some(file_use.clone()), ..self }
+    }
+
     /// Refuses a single empty file.
     pub fn check_sent(&self) -> Result<(), MeshError> {
         match self.files.as_slice() {
             [single] if single.bytes.is_empty() => Err(MeshError::new(
                 MeshFault::Unrecognised,
-                format!("the body is empty: send the bytes of a mesh file ({})", Format::list()),
+                format!("{} is empty, and should be a mesh ({})", self.subject(single), Format::list()),
             )),
             _ => Ok(()),
         }
+    }
+
+    /// A file as the subject of a sentence. A single unnamed one needs no name.
+    fn subject(&self, file: &BundleFile) -> String {
+        if self.files.len() == 1 && file.path == UNNAMED {
+            return self.origin.unnamed().to_owned();
+        }
+        format!("\"{}\"", show(&file.path))
     }
 
     /// Its files, unopened: an archive is one file.

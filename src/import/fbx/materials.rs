@@ -8,7 +8,7 @@ use super::geometry::Used;
 use crate::import::bundle::show_all;
 use crate::import::context::Context;
 use crate::import::raw::RawMesh;
-use crate::import::{MeshError, text};
+use crate::import::{MeshError, Origin, text};
 use crate::mesh::MaterialSlot;
 use crate::mesh::material::{AlphaMode, ImageContent, ImageSource, TextureRef, Wrap};
 use crate::srgb::srgb_to_linear;
@@ -39,7 +39,7 @@ pub fn read(scene: &Scene, used: &Used, raw: &mut RawMesh, cx: &mut Context<'_>)
         };
         raw.materials.push(slot);
     }
-    raw.report.warnings.extend(reader.warnings());
+    raw.report.warnings.extend(reader.warnings(cx.bundle.origin()));
     raw.images = reader.images;
     Ok(())
 }
@@ -161,6 +161,7 @@ impl Reader {
                 ImageContent::Encoded(bytes.into())
             }
             None => {
+                folder.note_missing(folder.entry().folder(), &name);
                 self.missing.push(name.clone());
                 ImageContent::Absent
             }
@@ -171,13 +172,14 @@ impl Reader {
         Ok(Some(image))
     }
 
-    fn warnings(&self) -> Vec<Warning> {
+    fn warnings(&self, origin: Origin) -> Vec<Warning> {
+        let lacks = origin.lacks();
         let names = show_all(self.missing.iter().map(String::as_str));
         let all = [
             (
                 self.missing.len() as u64,
                 "textures_missing",
-                format!("the upload lacks {names}: add the files to see these textures"),
+                format!("{lacks} {names}: add the files to see these textures"),
             ),
             (
                 self.maps_ignored,

@@ -85,7 +85,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     raw.is_f32 = true;
     let uses_default = meshes.uses_default_material;
     let (slots, images) = meshes.materials.into_slots();
-    raw.report.warnings.extend(images.warnings());
+    raw.report.warnings.extend(images.warnings(cx.bundle.origin()));
     (raw.materials, raw.images) = (slots, images.sources);
     if uses_default {
         raw.materials.push(MaterialSlot::default());

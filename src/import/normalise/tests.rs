@@ -56,7 +56,8 @@ fn raw(corners: &[[f32; 9]], is_soup: bool) -> RawMesh {
 fn finish(raw: RawMesh) -> Imported {
     let limits = Limits::default();
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
-    let (folder, _) = entry::choose(Bundle::of_one("x").into_files(), None, Some(Format::Obj), &deadline).unwrap();
+    let (folder, _) =
+        entry::choose(Bundle::of_one("x").into_files(), &Bundle::default(), Some(Format::Obj), &deadline).unwrap();
     let mut cx = Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
     normalise(raw, &mut cx).unwrap()
 }

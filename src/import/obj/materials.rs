@@ -9,7 +9,7 @@ use crate::import::bundle::show_all;
 use crate::import::context::Context;
 use crate::import::raw::RawMesh;
 use crate::import::text::utf8_or_latin1;
-use crate::import::{Folder, MeshError, text};
+use crate::import::{Folder, MeshError, Origin, text};
 use crate::mesh::MaterialSlot;
 use crate::mesh::material::{AlphaMode, ImageContent, ImageSource, TextureRef};
 use crate::srgb::srgb_to_linear;
@@ -56,7 +56,7 @@ pub fn read(
         slots.push(MaterialSlot { name, ..slot });
     }
     raw.images = reader.images.all;
-    raw.report.warnings.extend(reader.notes.warnings());
+    raw.report.warnings.extend(reader.notes.warnings(cx.bundle.origin()));
     Ok(slots)
 }
 
@@ -91,6 +91,7 @@ impl Reader<'_> {
                 }
             };
             if numbers.is_empty() {
+                self.folder.note_missing(folder, &whole);
                 self.notes.libraries.push(whole.into_owned());
             }
             files.extend(numbers.into_iter().filter(|&number| seen.insert(number)));
@@ -172,6 +173,7 @@ impl Reader<'_> {
                 ImageContent::Encoded(bytes.as_ref().into())
             }
             None => {
+                self.folder.note_missing(self.folder.file(library).folder(), &name);
                 images.of_missing.insert(name.clone().into_owned(), image);
                 self.notes.textures.push(name.clone().into_owned());
                 ImageContent::Absent
@@ -200,7 +202,8 @@ impl Notes {
         self.passed.broken += more.broken;
     }
 
-    fn warnings(&self) -> Vec<Warning> {
+    fn warnings(&self, origin: Origin) -> Vec<Warning> {
+        let lacks = origin.lacks();
         let names = |list: &[String]| show_all(list.iter().map(String::as_str));
         let SkippedLines { bumps, maps, broken } = self.passed;
         let all = [
@@ -208,14 +211,14 @@ impl Notes {
                 self.libraries.len() as u64,
                 "mtl_ignored",
                 format!(
-                    "the upload lacks the material library {}: add it, and the textures it names, to see its colours",
+                    "{lacks} the material library {}: add it, and the textures it names, to see its colours",
                     names(&self.libraries)
                 ),
             ),
             (
                 self.textures.len() as u64,
                 "textures_missing",
-                format!("the upload lacks {}: add the files to see these textures", names(&self.textures)),
+                format!("{lacks} {}: add the files to see these textures", names(&self.textures)),
             ),
             (
                 self.undefined.len() as u64,

@@ -32,7 +32,7 @@ fn outcome(bytes: &[u8]) -> String {
     let limits = Limits::default();
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let files = Bundle::of_one(bytes.to_vec()).into_files();
-    let (folder, _) = entry::choose(files, None, Some(Format::Ply), &deadline).unwrap();
+    let (folder, _) = entry::choose(files, &Bundle::default(), Some(Format::Ply), &deadline).unwrap();
     let mut cx = Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
     match read(bytes, &mut cx) {
         Ok(raw) => format!("{raw:?}"),

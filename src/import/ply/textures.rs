@@ -57,7 +57,7 @@ pub fn apply(names: &[Vec<u8>], numbers: &[u32], raw: &mut RawMesh, cx: &mut Con
     }
     if !images.missing.is_empty() {
         let names = show_all(images.missing.iter().map(String::as_str));
-        let detail = format!("the upload lacks {names}: add the files to see these textures");
+        let detail = format!("{} {names}: add the files to see these textures", cx.bundle.origin().lacks());
         raw.report.warnings.push(Warning { code: "textures_missing", detail });
     }
     raw.images = images.all;
@@ -92,6 +92,7 @@ impl Images {
                 ImageContent::Encoded(bytes.as_ref().into())
             }
             None => {
+                folder.note_missing(folder.entry().folder(), &name);
                 self.missing.push(name.clone());
                 ImageContent::Absent
             }

@@ -24,7 +24,7 @@ pub fn flatten(document: &[u8], depth_max: u64) -> Result<Vec<Item>, RequestErro
             RequestError { flag: Some("--limit-json-depth"), ..error }
         }
         Fault::NotJson(_) if document.trim_ascii().is_empty() => not_json("empty".into(), "a JSON object".into()),
-        Fault::NotJson(e) => not_json(not_json_at(&e), "a JSON object".into()),
+        Fault::NotJson(e) => not_json(not_json_at(&e), String::new()),
         Fault::Repeated(key) => repeated(&key),
     })?;
     let Json::Object(object) = json else {

@@ -4,6 +4,7 @@
 use serde_json::Value as Json;
 
 use crate::request::error::{RequestError, RequestFault};
+use crate::request::suggest;
 use crate::spec::color::Rgba;
 use crate::spec::{BETWEEN, Background};
 
@@ -162,7 +163,7 @@ pub enum Value {
 }
 
 /// The notations for colours.
-const COLOR_FORMS: &str = "a colour: #rgb, #rgba, #rrggbb, #rrggbbaa (with # written as %23 in a URL) or transparent";
+const COLOR_FORMS: &str = "a colour: #rgb, #rgba, #rrggbb, #rrggbbaa (or without #) or transparent";
 
 /// The notations for points.
 const POINT_FORMS: &str = "as [x, y, z] or, in a query or a flag, x,y,z";
@@ -208,6 +209,11 @@ impl Kind {
         {
             error.given = format!("{}, {what} in quotes", error.given);
             error.allowed.push_str(", without quotes");
+        }
+        if let (Self::Words(words) | Self::WordList { words, .. }, Some(text)) = (self, given.text())
+            && let Some(meant) = text.split(',').find_map(|one| misspelt(one, words))
+        {
+            error.allowed.push_str(&format!(" (did you mean {meant}?)"));
         }
         if let (Self::Background, Some(meant)) = (self, given.text().and_then(meant_gradient)) {
             error.allowed.push_str(&format!(" (did you mean {meant}?)"));
@@ -271,6 +277,11 @@ impl Kind {
             Self::Flag => Some(Value::Flag(given.flag()?)),
         })
     }
+}
+
+/// The word that was probably meant by one that is none of `words`.
+fn misspelt(text: &str, words: &[&'static str]) -> Option<&'static str> {
+    if words.contains(&text.trim()) { None } else { suggest::word(text, words) }
 }
 
 /// The gradient that a text with two colours most likely means, whatever is between and around them.

@@ -23,6 +23,7 @@ mod negotiate;
 mod receive;
 mod resources;
 mod router;
+mod signals;
 mod state;
 mod static_document;
 mod stored_mesh;
@@ -32,10 +33,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::net::TcpListener;
-use tokio::signal::unix::{SignalKind, signal};
 
 use crate::config::{Config, cores};
 use crate::service::warm_up::WarmUp;
+use signals::EndSignals;
 use state::AppState;
 
 /// Time beyond a job's deadline after which the process ends without the jobs that still run.
@@ -88,7 +89,7 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     }
     let listener = TcpListener::bind(&*addresses).await.map_err(listen_error)?;
     let address = listener.local_addr()?;
-    let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    let mut signals = EndSignals::new()?;
 
     let state = AppState::start(config)?;
     let router = router::router(&state);
@@ -97,14 +98,10 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     let warm_up = WarmUp::start(&state.gpu, config.backend);
 
     let stop = async {
-        tokio::select! {
-            _ = terminate.recv() => {}
-            _ = interrupt.recv() => {}
-        }
+        signals.next().await;
         tokio::select! {
             () = drain(&state, Duration::from_millis(config.limits.job_ms) + DRAIN_GRACE) => {}
-            _ = terminate.recv() => tracing::warn!("told twice to end: jobs are abandoned"),
-            _ = interrupt.recv() => tracing::warn!("told twice to end: jobs are abandoned"),
+            () = signals.next() => tracing::warn!("told twice to end: jobs are abandoned"),
         }
     };
     let header_timeout = Duration::from_millis(config.header_timeout_ms);

@@ -1,3 +1,7 @@
 //! The command line.
 
+pub mod batch;
 pub mod commands;
+pub mod help;
+pub mod mistakes;
+pub mod outputs;

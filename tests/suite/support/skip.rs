@@ -14,6 +14,8 @@ pub enum Need {
     LargeData,
     /// A program on the `PATH`.
     Curl,
+    /// A shell on the `PATH`.
+    Shell,
 }
 
 impl Need {
@@ -23,6 +25,7 @@ impl Need {
             Self::Gpu => "gpu",
             Self::LargeData => "data",
             Self::Curl => "curl",
+            Self::Shell => "shells",
         }
     }
 }

@@ -122,7 +122,7 @@ impl<'a> Reader<'a> {
             .ok_or_else(|| MeshError::broken(format!("there is no accessor {index} in the glTF file")))
     }
 
-    /// Limits accessors without data, which stand for zeros, to as many elements as the upload has
+    /// Limits accessors without data, which stand for zeros, to as many elements as the files have
     /// bytes: no mesh has more vertices.
     fn check_zeros(&self, index: usize, cx: &Context<'_>) -> Result<(), MeshError> {
         let accessor = self.accessor(index)?;
@@ -134,7 +134,7 @@ impl<'a> Reader<'a> {
         if count <= most {
             return Ok(());
         }
-        Err(broken(index, &format!("has {count} elements and no data, in an upload that has room for {most}")))
+        Err(broken(index, &format!("has {count} elements and no data, in files that have room for {most}")))
     }
 
     /// Fills in what `decode` makes of every element's bytes: those of the buffer view, then the

@@ -145,8 +145,9 @@ pub fn from_uri(uri: &str, what: &str, cx: &mut Context<'_>) -> Result<Uri, Mesh
                 Ok(Uri::Bytes(file.bytes.to_vec()))
             }
             Ok(None) => Ok(Uri::Outside(format!(
-                "{what} of the glTF file is \"{}\", which is not part of the upload: add it, send a GLB, or embed it",
-                printable(uri)
+                "{what} of the glTF file is \"{}\", and {} it: add it, embed it, or take a GLB",
+                printable(uri),
+                cx.bundle.origin().lacks()
             ))),
             Err(error) if error.fault == MeshFault::OutsideBundle => Ok(Uri::Outside(error.detail)),
             Err(error) => Err(error),

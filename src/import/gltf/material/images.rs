@@ -7,7 +7,7 @@ use crate::import::gltf::data::buffers;
 use crate::import::gltf::data::buffers::Uri;
 use crate::import::gltf::document::lists;
 use crate::import::gltf::document::lists::{Lists, TextureInfo, Transform, entry};
-use crate::import::{MeshError, MeshFault};
+use crate::import::{MeshError, MeshFault, Origin};
 use crate::mesh::material::{ImageContent, ImageSource, TextureRef, Wrap};
 use crate::warning::Warning;
 use serde::Deserialize;
@@ -128,9 +128,9 @@ impl Images {
     }
 
     /// Warnings of images that are not there.
-    pub fn warnings(&self) -> impl Iterator<Item = Warning> {
+    pub fn warnings(&self, origin: Origin) -> impl Iterator<Item = Warning> {
         let names = show_all(self.missing.iter().map(String::as_str));
-        let missing = format!("the upload lacks {names}: add the files, or embed them, to see these textures");
+        let missing = format!("{} {names}: add the files, or embed them, to see these textures", origin.lacks());
         let missing = (!self.missing.is_empty()).then_some(Warning { code: "textures_missing", detail: missing });
         let broken = self.broken.first().map(|first| {
             let detail = format!("{first}; it is drawn without (images: {})", self.broken.len());

@@ -88,7 +88,7 @@ fn the_mesh_among_the_files_is_found_or_asked_for() {
     for (entry, fault, part) in [
         ("three.obj", MeshFault::EntryUnclear, "\"a/one.obj\""),
         ("", MeshFault::EntryUnclear, "\"a/one.obj\""),
-        ("t.png", MeshFault::Unrecognised, "\"t.png\" looks like a picture"),
+        ("t.png", MeshFault::Unrecognised, "\"t.png\" is a picture"),
     ] {
         let error = asked(entry).unwrap_err();
         assert!(error.fault == fault && error.detail.contains(part), "{entry}: {error}");
@@ -205,8 +205,8 @@ fn archives_in_archives_and_archives_without_a_mesh_are_said_to_be_that() {
             &["\"a.txt\", \"inner.zip\"; \"inner.zip\" is a zip archive"],
         ),
         (vec![("read me.txt", b"hello")], &["\"read me.txt\" is not a mesh in a known format"]),
-        (vec![("t.png", picture)], &["\"t.png\" looks like a picture"]),
-        (vec![("a.txt", b"a"), ("t.png", picture)], &["no file of the bundle is a mesh", "\"a.txt\", \"t.png\""]),
+        (vec![("t.png", picture)], &["\"t.png\" is a picture"]),
+        (vec![("a.txt", b"a"), ("t.png", picture)], &["none of the files is a mesh", "\"a.txt\", \"t.png\""]),
     ];
     let mut read = 0;
     for (files, parts) in &cases {

@@ -68,7 +68,7 @@ fn a_form_an_archive_and_a_command_line_are_the_same_bundle() {
         for meshes in [&paths[..3], &paths[3..]] {
             let output = run(&[&["render"], meshes, &rest].concat());
             assert_eq!(output.stdout, from_form.body, "{meshes:?}");
-            assert!(!String::from_utf8_lossy(&output.stderr).contains("upload lacks"));
+            assert!(!String::from_utf8_lossy(&output.stderr).contains("does not name"));
         }
         assert!(picture.pixels().any(|p| p.0[3] == 255));
 
@@ -86,7 +86,7 @@ fn a_form_an_archive_and_a_command_line_are_the_same_bundle() {
         // name.
         let output = run(&[&["render"], &paths[..1], &rest].concat());
         let stderr = String::from_utf8(output.stderr).unwrap();
-        assert!(stderr.contains("the upload lacks the material library") && stderr.contains(parts[1].0), "{stderr}");
+        assert!(stderr.contains(parts[1].0) && stderr.contains("beside it: meshsnap render"), "{stderr}");
         let alone = warnings_of_job(&server, "Content-Type: model/obj", parts[0].1);
         assert!(alone.contains(&"mtl_ignored".to_owned()), "{alone:?}");
     }
