@@ -14,6 +14,8 @@ pub enum Need {
     LargeData,
     /// A program on the `PATH`.
     Curl,
+    /// Leave to mount a file system in a namespace of one's own.
+    Mount,
 }
 
 impl Need {
@@ -23,6 +25,7 @@ impl Need {
             Self::Gpu => "gpu",
             Self::LargeData => "data",
             Self::Curl => "curl",
+            Self::Mount => "mount",
         }
     }
 }
