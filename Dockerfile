@@ -12,12 +12,16 @@ FROM debian:bookworm-slim
 RUN apt-get update -qq \
     && apt-get install -y -qq --no-install-recommends mesa-vulkan-drivers libvulkan1 \
     && rm -rf /var/lib/apt/lists/* \
-    && useradd --system --no-create-home --shell /usr/sbin/nologin meshsnap
+    && useradd --system --no-create-home --shell /usr/sbin/nologin meshsnap \
+    && mkdir /data && chown meshsnap /data
 COPY --from=build /usr/local/bin/meshsnap /usr/local/bin/meshsnap
 # The Vulkan loader complains on standard error where this is missing.
 ENV XDG_RUNTIME_DIR=/tmp
 # Large pages for large lists, where the kernel allows them on request (docs/operations.md, "Large pages").
 ENV GLIBC_TUNABLES=glibc.malloc.hugetlb=1
+# Jobs, results and stored meshes, which outlive the container where the volume does.
+ENV MESHSNAP_DATA_DIR=/data
+VOLUME /data
 USER meshsnap
 # A container must listen beyond loopback to be reached at all, and that needs a decision about keys: set
 # MESHSNAP_API_KEYS, or MESHSNAP_NO_AUTH=true where the network around the container keeps strangers out.

@@ -9,7 +9,8 @@ use clap::{Args, ValueHint};
 use super::files;
 use super::settings::AllSettings;
 use crate::cli::error::CliError;
-use crate::config::{Config, SETTINGS};
+use crate::config::{self, Config, SETTINGS};
+use crate::service::durable::OpenError;
 use crate::service::http;
 use crate::service::http::ServeError;
 use crate::telemetry;
@@ -53,15 +54,13 @@ pub fn run(arguments: &ServeArgs) -> Result<(), CliError> {
     config.listen.to_socket_addrs().map_err(|error| {
         CliError::usage(format!("--listen {}: there is no such address on this machine ({error})", config.listen))
     })?;
-    if config.data_dir.is_some() {
-        tracing::warn!("this version keeps jobs and meshes in memory and stores nothing in --data-dir");
-    }
     http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
         ServeError::Unprotected(_) => CliError::usage(error.to_string()),
         ServeError::Listen { error: ref cause, .. } if cause.kind() == ErrorKind::InvalidInput => {
             CliError::usage(error.to_string())
         }
-        ServeError::Listen { .. } | ServeError::Start(_) => CliError::ours(error.to_string()),
+        ServeError::Data(OpenError::InUse(_)) => CliError::usage(error.to_string()),
+        ServeError::Listen { .. } | ServeError::Data(_) | ServeError::Start(_) => CliError::ours(error.to_string()),
     })
 }
 
@@ -82,6 +81,10 @@ fn resolve(arguments: &ServeArgs) -> Result<Config, CliError> {
     }
     for (key, value) in arguments.settings.given() {
         config.apply("the command line", key, value).map_err(|error| CliError::usage(error.to_string()))?;
+    }
+    if config.data_dir.is_none() && !config.ephemeral {
+        let sentence = "there is no home folder to keep jobs in: say --data-dir DIR, or --ephemeral to store nothing";
+        config.data_dir = Some(config::default_data_dir().ok_or_else(|| CliError::usage(sentence))?);
     }
     Ok(config)
 }

@@ -10,6 +10,8 @@ mod settings;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
+use etcetera::BaseStrategy as _;
+
 pub use hardware::why_no_gpu;
 
 use crate::limits::Limits;
@@ -21,8 +23,10 @@ pub use settings::{Access, SETTINGS, Setting};
 pub struct Config {
     /// Address to listen on.
     pub listen: String,
-    /// Folder for meshes and results. Reserved: this version keeps them in memory.
+    /// Folder for jobs, their results, and stored meshes.
     pub data_dir: Option<PathBuf>,
+    /// Stores nothing in a folder.
+    pub ephemeral: bool,
     /// Folder for what makes the next start faster.
     pub cache_dir: Option<PathBuf>,
     /// Number of threads that draw.
@@ -45,8 +49,10 @@ pub struct Config {
     pub header_timeout_ms: u64,
     /// Longest time for the body of a request, milliseconds.
     pub body_timeout_ms: u64,
-    /// Time for which the result of a job can be fetched, milliseconds.
+    /// Time for which the result of a job can be fetched again after the first time, milliseconds.
     pub result_ttl_ms: u64,
+    /// Time for which the result of a job waits for being fetched, milliseconds.
+    pub unfetched_ttl_ms: u64,
     /// Most bytes of results in memory.
     pub result_bytes: u64,
     /// Most results in memory.
@@ -72,6 +78,7 @@ impl Default for Config {
         Self {
             listen: "127.0.0.1:8080".into(),
             data_dir: None,
+            ephemeral: false,
             cache_dir: None,
             workers: cores(),
             worker_threads: 0,
@@ -83,6 +90,7 @@ impl Default for Config {
             header_timeout_ms: 10_000,
             body_timeout_ms: 60_000,
             result_ttl_ms: 600_000,
+            unfetched_ttl_ms: 24 * 3600 * 1000,
             result_bytes: 256 << 20,
             result_count: 10_000,
             mesh_bytes: 256 << 20,
@@ -94,6 +102,12 @@ impl Default for Config {
             limits: Limits::default(),
         }
     }
+}
+
+/// The folder for data by this platform's convention. None if there is no home folder.
+pub fn default_data_dir() -> Option<PathBuf> {
+    let folders = etcetera::choose_base_strategy().ok()?;
+    Some(folders.data_dir().join("meshsnap"))
 }
 
 /// Number of processors that this process may use.

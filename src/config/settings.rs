@@ -42,10 +42,11 @@ pub const SETTINGS: &[Setting] = &[
     text("listen", "Address and port to listen on", set_listen, |c| c.listen.clone()),
     text(
         "data-dir",
-        "Folder for meshes and results (reserved: this version keeps them in memory)",
+        "Folder for jobs, results and stored meshes; by default, one by the platform's convention",
         |c, v| set_folder(&mut c.data_dir, v),
         |c| show_folder(&c.data_dir),
     ),
+    switch("ephemeral", "Store nothing: jobs and meshes end with the process", |c| &mut c.ephemeral),
     text(
         "cache-dir",
         "Folder for what the GPU's driver makes of shaders, so that the next start is faster",
@@ -66,7 +67,12 @@ pub const SETTINGS: &[Setting] = &[
     number("uploads-bytes", "Most bytes of uploads in memory at a time", 1, u64::MAX, |c| &mut c.uploads_bytes),
     number("header-timeout-ms", "Longest time for the header of a request", 1, MS_MAX, |c| &mut c.header_timeout_ms),
     number("body-timeout-ms", "Longest time for the body of a request", 1, MS_MAX, |c| &mut c.body_timeout_ms),
-    number("result-ttl-ms", "Time for which the result of a job is kept", 0, MS_MAX, |c| &mut c.result_ttl_ms),
+    number("result-ttl-ms", "Time for which a result is kept after it was fetched", 0, MS_MAX, |c| {
+        &mut c.result_ttl_ms
+    }),
+    number("unfetched-ttl-ms", "Time for which a result waits for being fetched", 0, MS_MAX, |c| {
+        &mut c.unfetched_ttl_ms
+    }),
     number("result-bytes", "Most bytes of results in memory", 0, u64::MAX, |c| &mut c.result_bytes),
     number("result-count", "Most results in memory", 1, 1 << 24, |c| &mut c.result_count),
     number("mesh-bytes", "Most bytes of stored meshes in memory", 0, u64::MAX, |c| &mut c.mesh_bytes),

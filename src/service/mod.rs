@@ -1,10 +1,12 @@
 //! The daemon: [`http`] in front of [`jobs`] (the queue, the workers and their results) and
-//! [`store`] (meshes that stay). [`residents`] and [`pictures`] remember what was read and drawn. [`warm_up`]
-//! makes the first picture come sooner.
+//! [`store`] (meshes that stay). [`durable`] is the data folder, where both outlive the process. [`residents`] and
+//! [`pictures`] remember what was read and drawn. [`warm_up`] makes the first picture come sooner.
 //!
 //! Architecture invariant: [`http`] alone knows HTTP.
 
 mod cache;
+pub mod digest;
+pub mod durable;
 pub mod http;
 pub mod jobs;
 pub mod pictures;

@@ -31,7 +31,7 @@ pub fn start(more: &[String]) -> (Child, String) {
 /// Starts a server on a back-end with more arguments. Its address.
 pub fn start_on(backend: &str, more: &[String]) -> (Child, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_meshsnap"));
-    command.args(["serve", "--listen", "127.0.0.1:0", "--backend", backend, "--log", "warn"]).args(more);
+    command.args(["serve", "--listen", "127.0.0.1:0", "--backend", backend, "--log", "warn", "--ephemeral"]).args(more);
     let mut child = command.stdout(Stdio::piped()).spawn().expect("the server starts");
     let mut line = String::new();
     BufReader::new(child.stdout.take().expect("a pipe")).read_line(&mut line).expect("the server says where it is");

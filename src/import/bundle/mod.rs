@@ -79,6 +79,16 @@ impl Bundle {
         Self { file_use: Some(file_use.clone()), ..self }
     }
 
+    /// The path of the mesh, if the client named it.
+    pub fn entry(&self) -> Option<&str> {
+        self.entry.as_deref()
+    }
+
+    /// A bundle as it was taken apart into files.
+    pub fn restored(files: Vec<BundleFile>, is_zip: bool, entry: Option<String>) -> Self {
+        Self { files, entry, is_zip, ..Self::default() }
+    }
+
     /// Refuses a single empty file.
     pub fn check_sent(&self) -> Result<(), MeshError> {
         match self.files.as_slice() {

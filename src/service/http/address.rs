@@ -2,7 +2,8 @@
 
 use super::state::AppState;
 use crate::image::ImageFormat;
-use crate::service::store::{Digest, Reading};
+use crate::service::digest::Digest;
+use crate::service::store::Reading;
 use crate::spec::{BackendChoice, Spec};
 
 /// Longest address that is given out: proxies and browsers may refuse longer ones.

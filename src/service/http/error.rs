@@ -12,7 +12,8 @@ use crate::import::{MeshError, MeshFault};
 use crate::limits::LimitExceeded;
 use crate::pipeline::{PlanError, RenderError};
 use crate::request::RequestError;
-use crate::service::jobs::{Failure, Refusal, UploadBudgetFull};
+use crate::service::durable::{ErrorRecord, Unstored};
+use crate::service::jobs::{Failure, Refusal, UploadBudgetFull, name};
 use crate::service::store::StoreError;
 
 /// Kinds of errors, by who is at fault. Each has one status.
@@ -44,6 +45,8 @@ pub enum Fault {
     Unavailable,
     /// The job took longer than a job may take.
     Deadline,
+    /// The server cannot store what it would have to.
+    NoRoom,
     /// The server has a bug.
     Internal,
     /// The framework refused the request by itself, with this status.
@@ -67,10 +70,33 @@ impl Fault {
             Self::Busy => StatusCode::TOO_MANY_REQUESTS,
             Self::Unavailable => StatusCode::SERVICE_UNAVAILABLE,
             Self::Deadline => StatusCode::GATEWAY_TIMEOUT,
+            Self::NoRoom => StatusCode::INSUFFICIENT_STORAGE,
             Self::Internal => StatusCode::INTERNAL_SERVER_ERROR,
             Self::Framework(status) => status,
         }
     }
+}
+
+/// The faults by which jobs fail, under their names in the data folder.
+const FAULTS_OF_JOBS: &[(&str, Fault)] = &[
+    ("bad-request", Fault::BadRequest),
+    ("unknown-format", Fault::UnknownFormat),
+    ("content", Fault::Content),
+    ("unavailable", Fault::Unavailable),
+    ("deadline", Fault::Deadline),
+    ("internal", Fault::Internal),
+];
+
+/// A failure as it is stored.
+pub fn record(failure: &Failure) -> ErrorRecord {
+    record_of(ApiError::from(failure))
+}
+
+/// An error as it is stored.
+pub fn record_of(error: ApiError) -> ErrorRecord {
+    let fault = FAULTS_OF_JOBS.iter().find(|(_, fault)| *fault == error.fault).map_or("internal", |(name, _)| name);
+    let flag = error.flag.map(str::to_owned);
+    ErrorRecord { fault: fault.to_owned(), code: error.code.to_owned(), detail: error.detail, flag }
 }
 
 /// An error as a client sees it.
@@ -186,8 +212,27 @@ impl From<Refusal> for ApiError {
                 let error = Self::new(Fault::Busy, "too_late", detail);
                 error.flag("--limit-job-ms").retry_after(retry_after_s)
             }
+            Refusal::Unstored(unstored) => unstored.into(),
             Refusal::Draining => Self::draining(detail),
         }
+    }
+}
+
+impl From<Unstored> for ApiError {
+    fn from(unstored: Unstored) -> Self {
+        let code = match unstored {
+            Unstored::Full => "storage_full",
+            Unstored::Failed => "storage_failed",
+        };
+        Self::new(Fault::NoRoom, code, unstored.to_string()).retry_after(5)
+    }
+}
+
+impl From<&ErrorRecord> for ApiError {
+    fn from(record: &ErrorRecord) -> Self {
+        let known = FAULTS_OF_JOBS.iter().find(|(name, _)| *name == record.fault);
+        let error = Self::new(known.map_or(Fault::Internal, |(_, fault)| *fault), name(&record.code), &record.detail);
+        error.flag(record.flag.as_deref().map(name))
     }
 }
 
@@ -213,7 +258,9 @@ impl From<&Failure> for ApiError {
         match failure {
             Failure::Render(error) => error.into(),
             Failure::TimeUp { .. } => Self::deadline(failure.to_string()),
-            Failure::Panicked => Self::internal(),
+            Failure::Crashed { .. } => Self::new(Fault::Content, "crashed", failure.to_string()),
+            Failure::Recorded(record) => record.into(),
+            Failure::Panicked | Failure::Lost => Self::internal(),
         }
     }
 }

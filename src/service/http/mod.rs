@@ -8,6 +8,7 @@
 //! 4. [`receive`] reads the query and the body within their limits.
 //! 5. [`dto`] defines the JSON of answers, and [`error`] maps errors to statuses.
 //!
+//! [`recovery`] takes over what an earlier process has left in the data folder.
 //! [`negotiate`] and [`conditional`] read and write single headers. [`stored_mesh`] and [`address`]
 //! serve the resources of stored meshes. [`static_document`] answers with a constant document.
 //!
@@ -21,6 +22,7 @@ mod error;
 mod middleware;
 mod negotiate;
 mod receive;
+mod recovery;
 mod resources;
 mod router;
 mod signals;
@@ -35,6 +37,7 @@ use std::time::Duration;
 use tokio::net::TcpListener;
 
 use crate::config::{Config, cores};
+use crate::service::durable::OpenError;
 use crate::service::warm_up::WarmUp;
 use signals::EndSignals;
 use state::AppState;
@@ -61,6 +64,9 @@ pub enum ServeError {
         /// The cause.
         error: std::io::Error,
     },
+    /// The data folder cannot be used.
+    #[error(transparent)]
+    Data(#[from] OpenError),
     /// Threads or signal handlers could not be set up.
     #[error("the server could not start: {0}")]
     Start(#[from] std::io::Error),
@@ -91,7 +97,8 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     let address = listener.local_addr()?;
     let mut signals = EndSignals::new()?;
 
-    let state = AppState::start(config)?;
+    let (state, recovered) = AppState::start(config)?;
+    recovery::recover(&state, recovered);
     let router = router::router(&state);
     tracing::info!(%address, workers = config.workers, "ready");
     ready(address);
@@ -109,6 +116,9 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     warm_up.stop();
     warm_up.wait(WORKERS_GRACE);
     state.jobs.join(WORKERS_GRACE);
+    if let Some(durable) = &state.durable {
+        durable.close();
+    }
     tracing::info!("ended");
     Ok(())
 }

@@ -5,12 +5,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::static_document::StaticDocument;
+use super::{ServeError, error};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{GpuHost, HardwareHint};
 use crate::config::{Config, cores, why_no_gpu};
 use crate::limits::Limits;
 use crate::request::{self, Rules};
-use crate::service::jobs::{CpuThreads, JobSettings, Jobs, UploadBudget, pipeline_renderers};
+use crate::service::durable::{Durable, Recovered};
+use crate::service::jobs::{CpuThreads, JobSettings, Jobs, Storage, UploadBudget, pipeline_renderers};
 use crate::service::pictures::Pictures;
 use crate::service::residents::Residents;
 use crate::service::store::Store;
@@ -30,6 +32,8 @@ pub struct AppState {
     pub gpu: Arc<GpuHost>,
     /// The memory that uploads share.
     pub upload_budget: Arc<UploadBudget>,
+    /// The data folder. None: nothing outlives the process.
+    pub durable: Option<Durable>,
     /// The stored meshes.
     pub meshes: Store,
     /// Stored meshes as they are drawn.
@@ -46,8 +50,15 @@ pub struct AppState {
 }
 
 impl AppState {
-    /// Builds the state and starts the workers.
-    pub fn start(config: &Config) -> std::io::Result<Arc<Self>> {
+    /// Builds the state and starts the workers. Returns what is in the data folder as well.
+    pub fn start(config: &Config) -> Result<(Arc<Self>, Recovered), ServeError> {
+        let (durable, recovered) = match &config.data_dir {
+            Some(folder) if !config.ephemeral => {
+                let (durable, recovered) = Durable::open(folder)?;
+                (Some(durable), recovered)
+            }
+            _ => (None, Recovered::default()),
+        };
         let threads = match config.worker_threads {
             0 => CpuThreads::Shared(Arc::new(DrawingThreads::new(to_usize(cores())))),
             given => CpuThreads::Each(to_usize(given)),
@@ -62,25 +73,29 @@ impl AppState {
             idle_time: IDLE_TIME,
             job_time: Duration::from_millis(job_ms),
             result_ttl: Duration::from_millis(config.result_ttl_ms),
+            unfetched_ttl: Duration::from_millis(config.unfetched_ttl_ms),
             result_bytes: config.result_bytes,
             result_count: to_usize(config.result_count),
+            storage: durable.clone().map(|durable| Storage { durable, describe: error::record }),
         };
         let rules = Rules { limits: config.limits.clone(), backend: config.backend };
         let schema = format!("{:#}\n", request::schema(&rules));
-        Ok(Arc::new(Self {
+        let state = Arc::new(Self {
             schema: StaticDocument::new(schema, "application/schema+json"),
             rules,
             jobs: Jobs::start(settings, renderers)?,
             gpu,
             upload_budget: UploadBudget::new(config.uploads_bytes),
-            meshes: Store::new(config.mesh_bytes, to_usize(config.mesh_count)),
+            meshes: Store::with(durable.clone(), config.mesh_bytes, to_usize(config.mesh_count)),
+            durable,
             residents,
             pictures: Pictures::new(config.picture_bytes),
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             workers: config.workers,
             api_keys: config.api_keys.clone(),
             draining: AtomicBool::new(false),
-        }))
+        });
+        Ok((state, recovered))
     }
 
     /// Refuses new work from now on. Accepted jobs go on.

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use super::error::{ApiError, Fault};
 use super::state::AppState;
 use crate::import::Bundle;
+use crate::service::digest::Digest;
 use crate::service::jobs::{Reservation, Task, Work};
-use crate::service::store::{Digest, Reading, StoredMesh};
+use crate::service::store::{Reading, StoredMesh};
 
 /// The stored mesh with this name. None is a path segment that is not text.
 pub fn find(state: &AppState, name: Option<&str>) -> Result<Arc<StoredMesh>, ApiError> {
@@ -30,13 +31,18 @@ pub fn unknown() -> ApiError {
 
 /// A worker's task on a stored mesh.
 pub fn work_on(stored: &StoredMesh, reading: Reading, task: Task) -> Work {
+    let (mesh_key, holds) = (Some(key(stored.mesh.digest, &reading)), stored.holds.clone());
+    Work { mesh_key, holds, ..work(stored.mesh.bundle.clone(), reading, task, stored.memory.clone()) }
+}
+
+/// The name under which a mesh stays in memory that is read in the given way.
+pub fn key(digest: Digest, reading: &Reading) -> String {
     // Debug output has every field, and quotes texts: two ways of reading never share a key.
-    let key = format!("{} {reading:?}", stored.mesh.digest);
-    Work { mesh_key: Some(key), ..work(stored.mesh.bundle.clone(), reading, task, stored.memory.clone()) }
+    format!("{digest} {reading:?}")
 }
 
 /// A worker's task on a bundle that is read in the given way.
 pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Reservation>) -> Work {
     let Reading { format_in, entry } = reading;
-    Work { bundle: bundle.with_entry(entry), format_in, mesh_key: None, task, memory }
+    Work { bundle: bundle.with_entry(entry), format_in, mesh_key: None, task, memory, recipe: None, holds: [].into() }
 }

@@ -6,7 +6,7 @@ use super::job::{Failure, JobState};
 use super::registry::JobRegistry;
 
 /// Runs until the registry is drained and every job has ended.
-pub fn run(registry: &JobRegistry) {
+pub fn run(registry: &Arc<JobRegistry>) {
     let limit_ms = u64::try_from(registry.settings.job_time.as_millis()).unwrap_or(u64::MAX);
     while let Some(overdue) = registry.wait_for_overdue() {
         for job in overdue {

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use quick_cache::sync::Cache;
 
-use super::job::{Task, Work};
+use super::job::{Size, Task, Work};
 use crate::image::ImageFormat;
 use crate::spec::{BackendChoice, Spec};
 
@@ -54,19 +54,6 @@ pub struct Estimates {
     hasher: RandomState,
 }
 
-/// The size of a job, on which its estimate depends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Size {
-    /// The duration by the formula, seconds.
-    formula_s: f64,
-    kind: usize,
-    /// A hash of the mesh's key and the task, if the mesh is stored. Two that are equal by chance make an
-    /// estimate worse, and nothing else.
-    mesh: Option<u64>,
-    /// True for a mesh that was drawn before, and so is likely to be in memory.
-    is_known: bool,
-}
-
 impl Estimates {
     /// Nothing is known yet.
     pub fn new() -> Self {
@@ -88,6 +75,11 @@ impl Estimates {
             + BYTE_NS * bytes as f64 * (1.0 + VIEW_SHARE * f64::from(views - 1))
             + SAMPLE_NS * samples;
         Size { formula_s: formula_ns * 1e-9, kind: kind + if is_known { 2 * TASKS } else { 0 }, mesh, is_known }
+    }
+
+    /// The size of a job that has ended before.
+    pub fn no_size(&self) -> Size {
+        Size { formula_s: 0.0, kind: 0, mesh: None, is_known: false }
     }
 
     /// The time for which a job of this size is likely to occupy a worker.

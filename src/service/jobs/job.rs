@@ -14,6 +14,8 @@ use crate::image::ImageFormat;
 use crate::import::{Bundle, Format};
 use crate::limits::Deadline;
 use crate::pipeline::{Output, QualitySelection, RenderError, Stage};
+use crate::service::digest::Digest;
+use crate::service::durable::{ErrorRecord, Hold, JobKey};
 use crate::spec::Spec;
 use crate::warning::Warning;
 
@@ -24,6 +26,16 @@ pub struct JobId(Uuid);
 impl JobId {
     fn new() -> Self {
         Self(Uuid::now_v7())
+    }
+
+    /// The id with this number.
+    pub fn from_key(key: JobKey) -> Self {
+        Self(Uuid::from_u128(key))
+    }
+
+    /// Its number, which names it in the data folder.
+    pub fn key(self) -> JobKey {
+        self.0.as_u128()
     }
 
     /// Reads the usual text of a UUID. None for anything else.
@@ -51,6 +63,22 @@ pub struct Work {
     pub task: Task,
     /// The memory of `bundle`, shared with all other holders of the same bytes.
     pub memory: Arc<Reservation>,
+    /// The request that `task` was read from, so that it can be read again after a restart. None for work that
+    /// nobody fetches later.
+    pub recipe: Option<Arc<Recipe>>,
+    /// The bundle's files in the data folder, if they are there already.
+    pub holds: Arc<[Arc<Hold>]>,
+}
+
+/// A request for a picture, as it was sent.
+#[derive(Clone, Debug, Default)]
+pub struct Recipe {
+    /// The bytes of the document.
+    pub document: Option<Bytes>,
+    /// The dotted keys.
+    pub overrides: Box<[(String, String)]>,
+    /// The stored mesh that the document names.
+    pub mesh: Option<Digest>,
 }
 
 /// Tasks on a mesh.
@@ -152,6 +180,18 @@ pub enum Failure {
     /// The renderer has a bug.
     #[error("the renderer failed unexpectedly")]
     Panicked,
+    /// The process ended each time while it did this job.
+    #[error("the server ended {times} times while it did this job, so it is not tried again")]
+    Crashed {
+        /// How often.
+        times: u32,
+    },
+    /// The data folder has lost what the job needs.
+    #[error("the data folder has lost the files of this job")]
+    Lost,
+    /// The failure of an earlier process.
+    #[error("{}", .0.detail)]
+    Recorded(ErrorRecord),
 }
 
 impl JobState {
@@ -217,12 +257,15 @@ pub struct Job {
     pub id: JobId,
     /// The job can be found by its id, also after its end.
     pub is_kept: bool,
-    /// Time of acceptance.
+    /// Time of acceptance by this process.
     pub accepted: Instant,
     /// Time of acceptance in milliseconds since 1970, for clients.
     pub accepted_unix_ms: u64,
+    /// Its record and its end are in the data folder.
+    pub(super) is_durable: bool,
     /// Number in the order of acceptance.
     pub(super) serial: u64,
+    pub(super) size: Size,
     /// The time for which it will occupy a worker, as far as is known.
     pub(super) estimate: Duration,
     /// Its place in the queue: a time since the registry's beginning.
@@ -230,23 +273,69 @@ pub struct Job {
     pub(super) deadline: Deadline,
     pub(super) state: watch::Sender<JobState>,
     work: Mutex<Option<Work>>,
+    /// Its bytes in the data folder.
+    holds: Mutex<Vec<Arc<Hold>>>,
+}
+
+/// The size of a job, on which its estimate depends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size {
+    /// The duration by the formula, seconds.
+    pub(super) formula_s: f64,
+    /// The number of its kind.
+    pub(super) kind: usize,
+    /// A hash of the mesh's key and the task, if the mesh is stored. Two that are equal by chance make an
+    /// estimate worse, and nothing else.
+    pub(super) mesh: Option<u64>,
+    /// True for a mesh that was drawn before, and so is likely to be in memory.
+    pub(super) is_known: bool,
+}
+
+/// What distinguishes a new job beside its work.
+pub struct Admission {
+    /// The job can be found by its id.
+    pub is_kept: bool,
+    /// It is in the data folder.
+    pub is_durable: bool,
+    /// Number in the order of acceptance.
+    pub serial: u64,
+    /// The size on which its estimate depends.
+    pub size: Size,
+    /// The time for which it will occupy a worker.
+    pub estimate: Duration,
+    /// Its place in the queue.
+    pub rank: Duration,
 }
 
 impl Job {
-    pub(super) fn new(work: Work, is_kept: bool, serial: u64, estimate: Duration, rank: Duration) -> Self {
-        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    pub(super) fn new(work: Option<Work>, admission: Admission, name: Option<(JobId, u64)>) -> Self {
+        let (id, accepted_unix_ms) = name.unwrap_or_else(|| (JobId::new(), unix_ms()));
+        let Admission { is_kept, is_durable, serial, size, estimate, rank } = admission;
         Self {
-            id: JobId::new(),
+            id,
             is_kept,
             accepted: Instant::now(),
-            accepted_unix_ms: u64::try_from(since_1970.as_millis()).unwrap_or(u64::MAX),
+            accepted_unix_ms,
+            is_durable,
             serial,
+            size,
             estimate,
             rank,
             deadline: Deadline::default(),
             state: watch::Sender::new(JobState::Queued),
-            work: Mutex::new(Some(work)),
+            work: Mutex::new(work),
+            holds: Mutex::default(),
         }
+    }
+
+    /// Looks at the work. None if it was taken.
+    pub(super) fn with_work<T>(&self, look: impl FnOnce(&Work) -> T) -> Option<T> {
+        self.work.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(look)
+    }
+
+    /// Replaces the bytes that it holds in the data folder, and returns those that it held.
+    pub(super) fn hold(&self, holds: Vec<Arc<Hold>>) -> Vec<Arc<Hold>> {
+        std::mem::replace(&mut self.holds.lock().unwrap_or_else(PoisonError::into_inner), holds)
     }
 
     /// The state at this moment.
@@ -268,4 +357,10 @@ impl Job {
     pub(super) fn take_work(&self) -> Option<Work> {
         self.work.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
+}
+
+/// Milliseconds since 1970.
+pub fn unix_ms() -> u64 {
+    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since_1970.as_millis()).unwrap_or(u64::MAX)
 }

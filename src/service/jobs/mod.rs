@@ -4,20 +4,23 @@
 //! Architecture invariants: a full queue refuses at once and never waits. An accepted job is never
 //! dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
 //!
-//! Reading order: [`job`] (one job and its states), [`registry`] (all jobs, behind one lock),
-//! [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs),
+//! Reading order: [`job`] (one job and its states), [`registry`] (all jobs, behind one lock), [`results`] (those
+//! that have ended), [`storage`] (jobs in the data folder), [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs),
 //! [`upload_budget`] (memory of uploads).
 
 mod clock;
 mod estimates;
 mod job;
 mod registry;
+mod results;
+mod storage;
 #[cfg(test)]
 mod tests;
 mod upload_budget;
 mod worker;
 
-pub use job::{Failure, Finished, Job, JobId, JobState, Product, Task, Timings, Work};
+pub use job::{Failure, Finished, Job, JobId, JobState, Product, Recipe, Task, Timings, Work};
+pub use storage::{Storage, name, read_picture, value_of};
 pub use upload_budget::{Reservation, UploadBudget, UploadBudgetFull};
 pub use worker::{CpuThreads, Renderer, RendererFactory, pipeline_renderers};
 
@@ -25,6 +28,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use super::durable::{Change, EndRecord, Hold, Unstored};
 use registry::JobRegistry;
 
 /// The limits of the job service.
@@ -38,12 +42,16 @@ pub struct JobSettings {
     pub idle_time: Duration,
     /// Longest time from acceptance to the encoded picture.
     pub job_time: Duration,
-    /// Time for which the result of a kept job can be fetched.
+    /// Time for which the result of a kept job can be fetched again after the first time.
     pub result_ttl: Duration,
+    /// Time for which a result waits for being fetched.
+    pub unfetched_ttl: Duration,
     /// Most encoded bytes of kept results. The oldest are dropped first.
     pub result_bytes: u64,
     /// Most kept results. The oldest are dropped first.
     pub result_count: usize,
+    /// The data folder. None: kept jobs end with the process.
+    pub storage: Option<Storage>,
 }
 
 /// Reasons why a job was not accepted.
@@ -73,6 +81,9 @@ pub enum Refusal {
         /// Seconds until there should be time enough.
         retry_after_s: u64,
     },
+    /// The job cannot be stored.
+    #[error(transparent)]
+    Unstored(#[from] Unstored),
     /// The process shuts down.
     #[error("the server is shutting down and takes no new work")]
     Draining,
@@ -122,6 +133,51 @@ impl Jobs {
         self.registry.submit(work, is_kept)
     }
 
+    /// Queues work that can be found by its id until its result expires. With a data folder, the job is durable
+    /// when this returns, and goes on even if the caller does not wait for that.
+    pub async fn accept(&self, work: Work) -> Result<Arc<Job>, Refusal> {
+        let Some(storage) = self.registry.settings.storage.clone() else { return self.registry.submit(work, true) };
+        let job = self.registry.admit(work, true, true)?;
+        let (registry, stored) = (self.registry.clone(), job.clone());
+        let storing = tokio::spawn(async move {
+            let outcome = store(&storage, &stored).await;
+            match outcome {
+                Ok(()) => registry.enqueue(&stored),
+                Err(_) => registry.withdraw(&stored),
+            }
+            outcome
+        });
+        storing.await.unwrap_or(Err(Unstored::Failed))?;
+        Ok(job)
+    }
+
+    /// Queues a job that an earlier process has accepted at this time.
+    pub fn resume(&self, name: (JobId, u64), work: Work, holds: Vec<Arc<Hold>>) {
+        self.registry.resume(name, work, holds);
+    }
+
+    /// Adds a job that has ended in an earlier process, or whose end is found out now.
+    pub fn restore(&self, name: (JobId, u64), state: JobState, end: Option<&EndRecord>, holds: Vec<Arc<Hold>>) {
+        if end.is_none()
+            && let Some(storage) = &self.registry.settings.storage
+            && let Ok((record, holds)) = storage.of_end(&state)
+        {
+            storage.durable.store_surely(
+                vec![Change::Ended(name.0.key(), Box::new(record))],
+                holds,
+                Vec::new(),
+                |_| (),
+            );
+        }
+        let is_fetched = end.is_some_and(|end| end.fetched_unix_ms.is_some());
+        self.registry.restore(name, state, is_fetched, holds);
+    }
+
+    /// A client has the end of a kept job: from now on it is kept for a while only.
+    pub fn fetched(&self, job: &Job) {
+        self.registry.fetched(job);
+    }
+
     /// Checks that a job would be accepted now, so that a refusal can come before an upload.
     pub fn would_accept(&self) -> Result<(), Refusal> {
         self.registry.would_accept()
@@ -133,7 +189,7 @@ impl Jobs {
     }
 
     /// Cancels a job. One that has ended stays as it is.
-    pub fn cancel(&self, job: &Job) {
+    pub fn cancel(&self, job: &Arc<Job>) {
         self.registry.end(job, JobState::Cancelled);
     }
 
@@ -166,4 +222,15 @@ impl Jobs {
         // Threads that still run are detached, because the process is about to end.
         workers.clear();
     }
+}
+
+/// Writes an accepted job to the data folder. Files are written, and hashed, on a thread that may wait.
+async fn store(storage: &Storage, job: &Arc<Job>) -> Result<(), Unstored> {
+    let (writer, written) = (storage.clone(), job.clone());
+    let recording = tokio::task::spawn_blocking(move || written.with_work(|work| writer.of_job(&written, work)));
+    let recorded = recording.await.ok().flatten().unwrap_or(Err(Unstored::Failed));
+    let (record, holds) = recorded?;
+    storage.durable.store(vec![Change::Accepted(Box::new(record))], holds.clone()).await?;
+    job.hold(holds);
+    Ok(())
 }

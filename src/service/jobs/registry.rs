@@ -11,15 +11,18 @@
 //! might overtake, would then not end within the other three quarters. So an accepted job ends in time, as
 //! far as the estimates are right: only what is accepted in the first quarter of its time can overtake it.
 
-use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use super::estimates::{Estimates, Size};
-use super::job::{Job, JobId, JobState, Work};
+use super::estimates::Estimates;
+use super::job::{Admission, Job, JobId, JobState, Work, unix_ms};
+use super::results::Results;
+use super::storage::Storage;
 use super::{JobLoad, JobSettings, Refusal};
+use crate::service::durable::{Change, Hold};
 
 /// The rank that a job loses for each second of its estimate, seconds.
 const PATIENCE: u32 = 4;
@@ -42,18 +45,20 @@ pub struct JobRegistry {
 #[derive(Default)]
 struct Inner {
     /// By rank and number.
-    queue: BTreeMap<(Duration, u64), (Arc<Job>, Size)>,
-    /// The estimates of all queued jobs together.
+    queue: BTreeMap<(Duration, u64), Arc<Job>>,
+    /// Number of jobs that have a place in the queue and are being stored.
+    storing: usize,
+    /// Number of jobs whose end is being stored.
+    ending: usize,
+    /// The estimates of all queued jobs together, and of those that are being stored.
     queued_time: Duration,
     /// Queued and running jobs in the order of acceptance, which is the order of their deadlines.
     active: BTreeMap<u64, Arc<Job>>,
     /// Jobs that occupy a worker, by number. A cancelled one may do so for a moment longer.
     running: HashMap<u64, Running>,
     kept: HashMap<JobId, Arc<Job>>,
-    /// Kept jobs that have ended, oldest first.
-    ended: VecDeque<EndedJob>,
-    /// Bytes of their results together.
-    ended_bytes: u64,
+    /// Kept jobs that have ended.
+    results: Results,
     draining: bool,
     serial: u64,
 }
@@ -71,15 +76,7 @@ pub enum Next {
 /// A job that occupies a worker.
 struct Running {
     job: Arc<Job>,
-    size: Size,
     since: Instant,
-}
-
-/// A kept job that has ended.
-struct EndedJob {
-    at: Instant,
-    id: JobId,
-    bytes: u64,
 }
 
 impl JobRegistry {
@@ -104,25 +101,92 @@ impl JobRegistry {
 
     /// Queues work. A kept job can be found by its id until its result expires.
     pub fn submit(&self, work: Work, is_kept: bool) -> Result<Arc<Job>, Refusal> {
+        let job = self.admit(work, is_kept, false)?;
+        self.enqueue(&job);
+        Ok(job)
+    }
+
+    /// Gives work a place in the queue, which [`Self::enqueue`] takes or [`Self::withdraw`] gives back.
+    pub fn admit(&self, work: Work, is_kept: bool, is_durable: bool) -> Result<Arc<Job>, Refusal> {
         let size = self.estimates.size(&work);
         let estimate = self.estimates.estimate(size).min(self.settings.job_time);
         let mut inner = self.lock();
         self.check(&inner, Some(estimate))?;
         inner.serial += 1;
         let rank = self.began.elapsed() + (estimate * PATIENCE).min(self.settings.job_time / 4);
-        let job = Arc::new(Job::new(work, is_kept, inner.serial, estimate, rank));
-        inner.queue.insert((rank, job.serial), (job.clone(), size));
+        let admission = Admission { is_kept, is_durable, serial: inner.serial, size, estimate, rank };
+        inner.storing += 1;
         inner.queued_time += estimate;
+        self.publish(&inner);
+        Ok(Arc::new(Job::new(Some(work), admission, None)))
+    }
+
+    /// Queues a job that has a place.
+    pub fn enqueue(&self, job: &Arc<Job>) {
+        let mut inner = self.lock();
+        inner.storing = inner.storing.saturating_sub(1);
+        self.insert(&mut inner, job);
+    }
+
+    /// Gives the place of a job back.
+    pub fn withdraw(&self, job: &Job) {
+        let mut inner = self.lock();
+        inner.storing = inner.storing.saturating_sub(1);
+        inner.queued_time = inner.queued_time.saturating_sub(job.estimate);
+        self.publish(&inner);
+        self.wake_if_draining(&inner);
+    }
+
+    /// Queues a job that an earlier process has accepted, however full the queue is. `holds` are its bytes in
+    /// the data folder.
+    pub fn resume(&self, name: (JobId, u64), work: Work, holds: Vec<Arc<Hold>>) -> Arc<Job> {
+        let size = self.estimates.size(&work);
+        let estimate = self.estimates.estimate(size).min(self.settings.job_time);
+        let mut inner = self.lock();
+        inner.serial += 1;
+        let (serial, rank) = (inner.serial, Duration::ZERO);
+        let admission = Admission { is_kept: true, is_durable: true, serial, size, estimate, rank };
+        let job = Arc::new(Job::new(Some(work), admission, Some(name)));
+        job.hold(holds);
+        inner.queued_time += estimate;
+        self.insert(&mut inner, &job);
+        job
+    }
+
+    /// Adds a job that has ended in an earlier process.
+    pub fn restore(&self, name: (JobId, u64), state: JobState, is_fetched: bool, holds: Vec<Arc<Hold>>) {
+        let mut inner = self.lock();
+        let (size, none) = (self.estimates.no_size(), Duration::ZERO);
+        let admission = Admission { is_kept: true, is_durable: true, serial: 0, size, estimate: none, rank: none };
+        let job = Arc::new(Job::new(None, admission, Some(name)));
+        job.hold(holds);
+        inner.results.add(job.id, result_bytes(&state), is_fetched, &self.settings);
+        job.state.send_replace(state);
+        inner.kept.insert(job.id, job);
+        self.evict(&mut inner);
+        self.clock.notify_one();
+    }
+
+    fn insert(&self, inner: &mut Inner, job: &Arc<Job>) {
+        inner.queue.insert((job.rank, job.serial), job.clone());
         if inner.active.is_empty() {
             self.clock.notify_one();
         }
         inner.active.insert(job.serial, job.clone());
-        if is_kept {
+        if job.is_kept {
             inner.kept.insert(job.id, job.clone());
         }
-        self.publish(&inner);
+        self.publish(inner);
         self.work.notify_one();
-        Ok(job)
+        self.wake_if_draining(inner);
+    }
+
+    /// Threads that wait for the last jobs that are being stored look again whether there will be more.
+    fn wake_if_draining(&self, inner: &Inner) {
+        if inner.draining {
+            self.work.notify_all();
+            self.clock.notify_all();
+        }
     }
 
     /// Waits for the next job, no longer than `time_max`, and counts the worker as busy.
@@ -130,17 +194,21 @@ impl JobRegistry {
         let until = time_max.and_then(|time_max| Instant::now().checked_add(time_max));
         let mut inner = self.lock();
         loop {
-            if let Some((_, (job, size))) = inner.queue.pop_first() {
+            if let Some((_, job)) = inner.queue.pop_first() {
                 inner.queued_time = inner.queued_time.saturating_sub(job.estimate);
                 if let Some(work) = job.take_work() {
-                    inner.running.insert(job.serial, Running { job: job.clone(), size, since: Instant::now() });
+                    inner.running.insert(job.serial, Running { job: job.clone(), since: Instant::now() });
                     job.state.send_replace(JobState::Running);
+                    if let Some(storage) = self.storage_of(&job) {
+                        storage.durable.store_soon(vec![Change::Started(job.id.key())], Vec::new());
+                    }
                     self.publish(&inner);
                     return Next::Job(job, work);
                 }
                 continue;
             }
-            if inner.draining {
+            // A job that is being stored has its place already.
+            if inner.draining && inner.storing == 0 {
                 return Next::End;
             }
             inner = match until.map(|until| until.saturating_duration_since(Instant::now())) {
@@ -152,43 +220,84 @@ impl JobRegistry {
     }
 
     /// Ends the job of a worker, which is free again after `took`.
-    pub fn finish(&self, job: &Job, state: JobState, took: Duration) {
+    pub fn finish(self: &Arc<Self>, job: &Arc<Job>, state: JobState, took: Duration) {
         let mut inner = self.lock();
         if let Some(running) = inner.running.remove(&job.serial)
             // What ended early says how long it takes only if that is longer than was thought.
             && (matches!(state, JobState::Done(_) | JobState::Inspected(_)) || took > job.estimate)
         {
-            self.estimates.learn(running.size, took);
+            self.estimates.learn(running.job.size, took);
         }
-        self.end_locked(&mut inner, job, state);
-        self.publish(&inner);
+        self.end_with(inner, job, state);
     }
 
     /// Ends a job from outside its worker: cancelled, or out of time.
-    pub fn end(&self, job: &Job, state: JobState) {
-        let mut inner = self.lock();
-        self.end_locked(&mut inner, job, state);
-        self.publish(&inner);
+    pub fn end(self: &Arc<Self>, job: &Arc<Job>, state: JobState) {
+        let inner = self.lock();
+        self.end_with(inner, job, state);
     }
 
-    /// Ends a job. Only the first end of a job has an effect.
-    fn end_locked(&self, inner: &mut Inner, job: &Job, state: JobState) {
+    /// Ends a job. Only the first end of a job has an effect. That of a durable one is stored before anybody
+    /// hears of it, so that it cannot end in another way after a crash.
+    fn end_with(self: &Arc<Self>, mut inner: MutexGuard<'_, Inner>, job: &Arc<Job>, state: JobState) {
         if inner.active.remove(&job.serial).is_none() {
-            return;
+            return self.publish(&inner);
         }
         job.deadline.stop();
         if job.take_work().is_some() {
             inner.queue.remove(&(job.rank, job.serial));
             inner.queued_time = inner.queued_time.saturating_sub(job.estimate);
         }
+        let Some(storage) = self.storage_of(job) else {
+            self.announce(&mut inner, job, state);
+            return self.publish(&inner);
+        };
+        inner.ending += 1;
+        self.publish(&inner);
+        drop(inner);
+        let (registry, ended) = (self.clone(), job.clone());
+        let announce = move |state| {
+            let mut inner = registry.lock();
+            inner.ending -= 1;
+            registry.announce(&mut inner, &ended, state);
+            registry.publish(&inner);
+        };
+        match storage.of_end(&state) {
+            Ok((record, holds)) => {
+                // What the job was made of is let go once its end is stored.
+                let inputs = job.hold(holds.clone());
+                let change = Change::Ended(job.id.key(), Box::new(record));
+                storage.durable.store_surely(vec![change], holds, inputs, move |_| announce(state));
+            }
+            // It stays accepted in the data folder: after a restart it is done again.
+            Err(_) => announce(state),
+        }
+    }
+
+    /// Tells everybody that a job has ended.
+    fn announce(&self, inner: &mut Inner, job: &Job, state: JobState) {
         if job.is_kept {
-            let bytes = if let JobState::Done(finished) = &state { finished.picture.len() as u64 } else { 0 };
-            inner.ended.push_back(EndedJob { at: Instant::now(), id: job.id, bytes });
-            inner.ended_bytes += bytes;
+            inner.results.add(job.id, result_bytes(&state), false, &self.settings);
             self.evict(inner);
             self.clock.notify_one();
         }
         job.state.send_replace(state);
+    }
+
+    /// A client has the end of a kept job: from now on it is kept for a while only.
+    pub fn fetched(&self, job: &Job) {
+        let mut inner = self.lock();
+        if inner.results.fetch(job.id, &self.settings) {
+            self.evict(&mut inner);
+            self.clock.notify_one();
+            if let Some(storage) = self.storage_of(job) {
+                storage.durable.store_soon(vec![Change::Fetched(job.id.key(), unix_ms())], Vec::new());
+            }
+        }
+    }
+
+    fn storage_of(&self, job: &Job) -> Option<&Storage> {
+        self.settings.storage.as_ref().filter(|_| job.is_durable)
     }
 
     /// A kept job.
@@ -203,8 +312,8 @@ impl JobRegistry {
             queued: inner.queue.len(),
             running: inner.running.len(),
             wait: self.wait(&inner),
-            kept: inner.ended.len(),
-            kept_bytes: inner.ended_bytes,
+            kept: inner.results.count(),
+            kept_bytes: inner.results.bytes(),
         }
     }
 
@@ -232,12 +341,12 @@ impl JobRegistry {
             if !overdue.is_empty() {
                 return Some(overdue);
             }
-            if inner.draining && inner.active.is_empty() {
+            if inner.draining && inner.active.is_empty() && inner.storing == 0 {
                 return None;
             }
             let next_deadline =
                 inner.active.values().next().and_then(|job| job.accepted.checked_add(self.settings.job_time));
-            let next_expiry = inner.ended.front().and_then(|ended| ended.at.checked_add(self.settings.result_ttl));
+            let next_expiry = inner.results.next_expiry();
             inner = match next_deadline.into_iter().chain(next_expiry).min() {
                 Some(at) => {
                     let wait = at.saturating_duration_since(now);
@@ -257,15 +366,15 @@ impl JobRegistry {
         // Idle workers count as places, so that a queue of 0 accepts a job that can start at once.
         let idle = self.settings.workers.saturating_sub(inner.running.len());
         let wait = self.wait(inner);
-        if inner.queue.len() >= queue + idle {
+        let waiting = inner.queue.len() + inner.storing;
+        if waiting >= queue + idle {
             return Err(Refusal::QueueFull { queue, retry_after_s: retry_after_s(wait) });
         }
         let limit = self.settings.job_time;
-        let longest =
-            inner.queue.values().map(|(job, _)| job.estimate).fold(estimate.unwrap_or_default(), Duration::max);
+        let longest = inner.queue.values().map(|job| job.estimate).fold(estimate.unwrap_or_default(), Duration::max);
         let ends = wait.saturating_add(longest);
         // A job that begins at once is never refused for its estimate alone.
-        if inner.queue.len() >= idle && ends > limit / 4 * 3 {
+        if waiting >= idle && ends > limit / 4 * 3 {
             let (wait_ms, takes_ms) = (to_ms(wait), estimate.map(to_ms));
             let retry_after_s = retry_after_s(ends - limit / 4 * 3);
             return Err(Refusal::TooLate { wait_ms, takes_ms, limit_ms: to_ms(limit), retry_after_s });
@@ -276,7 +385,7 @@ impl JobRegistry {
     /// Time until the jobs that were accepted are done, as far as the estimates know. None while a worker is
     /// idle.
     fn wait(&self, inner: &Inner) -> Duration {
-        if inner.queue.len() + inner.running.len() < self.settings.workers {
+        if inner.queue.len() + inner.storing + inner.running.len() < self.settings.workers {
             return Duration::ZERO;
         }
         let limit = self.settings.job_time;
@@ -284,24 +393,19 @@ impl JobRegistry {
         (inner.queued_time + running) / u32::try_from(self.settings.workers.max(1)).unwrap_or(u32::MAX)
     }
 
-    /// Drops results that are too old or too many. The newest stays, however large.
+    /// Drops results that are too old or too many.
     fn evict(&self, inner: &mut Inner) {
-        let now = Instant::now();
-        while let Some(&EndedJob { at, id, bytes }) = inner.ended.front() {
-            let too_old = now.duration_since(at) >= self.settings.result_ttl;
-            let too_many = inner.ended.len() > 1
-                && (inner.ended_bytes > self.settings.result_bytes || inner.ended.len() > self.settings.result_count);
-            if !too_old && !too_many {
-                break;
+        for id in inner.results.evict(&self.settings) {
+            if let Some(job) = inner.kept.remove(&id)
+                && let Some(storage) = self.storage_of(&job)
+            {
+                storage.durable.store_soon(vec![Change::Forgotten(id.key())], job.hold(Vec::new()));
             }
-            inner.ended.pop_front();
-            inner.ended_bytes -= bytes;
-            inner.kept.remove(&id);
         }
     }
 
     fn publish(&self, inner: &Inner) {
-        self.outstanding.send_replace(inner.queue.len() + inner.running.len());
+        self.outstanding.send_replace(inner.queue.len() + inner.running.len() + inner.storing + inner.ending);
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
@@ -316,6 +420,10 @@ impl Running {
         let so_far = self.since.elapsed();
         so_far.abs_diff(self.job.estimate).min(limit.saturating_sub(self.job.accepted.elapsed()))
     }
+}
+
+fn result_bytes(state: &JobState) -> u64 {
+    if let JobState::Done(finished) = state { finished.picture.len() as u64 } else { 0 }
 }
 
 /// Seconds after which to try again, between 1 and 30.

@@ -28,8 +28,10 @@ fn settings() -> JobSettings {
         idle_time: SOON,
         job_time: Duration::from_secs(30),
         result_ttl: Duration::from_secs(60),
+        unfetched_ttl: Duration::from_secs(60),
         result_bytes: 1000,
         result_count: 100,
+        storage: None,
     }
 }
 
@@ -37,7 +39,15 @@ fn work(budget: &Arc<UploadBudget>, mesh: &'static [u8]) -> Work {
     let mut reservation = budget.reserve();
     reservation.grow(mesh.len() as u64).unwrap();
     let (bundle, task) = (Bundle::of_one(Bytes::from_static(mesh)), Task::Draw(Box::new(spec())));
-    Work { bundle, format_in: None, mesh_key: None, task, memory: Arc::new(reservation) }
+    Work {
+        bundle,
+        format_in: None,
+        mesh_key: None,
+        task,
+        memory: Arc::new(reservation),
+        recipe: None,
+        holds: [].into(),
+    }
 }
 
 /// Any specification: the fake renderer does not read it.
@@ -273,7 +283,7 @@ fn results_are_kept_for_a_while_and_within_their_memory() {
     assert!(fixture.jobs.find(second.id).is_some());
     assert_eq!(fixture.jobs.load().kept_bytes, 600);
 
-    let short_lived = self::fixture(JobSettings { result_ttl: Duration::from_millis(30), ..settings() });
+    let short_lived = self::fixture(JobSettings { unfetched_ttl: Duration::from_millis(30), ..settings() });
     let job = short_lived.submit(b"1", true).unwrap();
     wait(&job);
     let began = Instant::now();
@@ -286,8 +296,8 @@ fn results_are_kept_for_a_while_and_within_their_memory() {
 
 /// A registry without threads, for jobs that are thought to take 1 s, and reports that are thought to take
 /// `report`.
-fn registry(workers: usize, report: Duration, job_time: Duration) -> (JobRegistry, Arc<UploadBudget>) {
-    let registry = JobRegistry::new(JobSettings { workers, queue: 1000, job_time, ..settings() });
+fn registry(workers: usize, report: Duration, job_time: Duration) -> (Arc<JobRegistry>, Arc<UploadBudget>) {
+    let registry = Arc::new(JobRegistry::new(JobSettings { workers, queue: 1000, job_time, ..settings() }));
     let budget = UploadBudget::new(1 << 20);
     for _ in 0..200 {
         registry.estimates.learn(registry.estimates.size(&work(&budget, b"1")), Duration::from_secs(1));

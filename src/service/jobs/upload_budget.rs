@@ -58,6 +58,14 @@ impl Reservation {
     }
 }
 
+impl Reservation {
+    /// Takes `bytes` more, even beyond the cap: what was accepted before a restart is not refused after it.
+    pub fn take(&mut self, bytes: u64) {
+        self.budget.used.fetch_add(bytes, Ordering::Relaxed);
+        self.bytes += bytes;
+    }
+}
+
 impl Drop for Reservation {
     fn drop(&mut self) {
         self.budget.used.fetch_sub(self.bytes, Ordering::Relaxed);

@@ -91,7 +91,7 @@ fn render_stored(
 }
 
 /// Does jobs until the registry is drained.
-pub fn run(registry: &JobRegistry, renderers: &RendererFactory) {
+pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
     // It is made with the first job and dropped when there was none for long, so that an idle process holds
     // no renderer.
     let mut renderer: Option<Renderer> = None;

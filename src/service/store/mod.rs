@@ -1,15 +1,13 @@
 //! The store of meshes. A mesh is named by the digest of its content, so that clients send it once
-//! and draw it often. The store is in memory only.
+//! and draw it often. The store is in memory; where there is a data folder, the same meshes are in it, for the
+//! next start.
 //!
 //! Architecture invariants: a stored mesh never changes. One cap holds for the bytes of all stored
 //! meshes together with those that were removed and are still being drawn. Nothing here knows HTTP,
 //! waits, or parses.
 
-mod digest;
 #[cfg(test)]
 mod tests;
-
-pub use digest::Digest;
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,6 +15,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use bytes::Bytes;
 
 use crate::import::{Bundle, Format};
+use crate::service::digest::Digest;
+use crate::service::durable::{Change, Durable, Hold};
 use crate::service::jobs::{Reservation, UploadBudget};
 
 /// The way in which a bundle is read.
@@ -49,6 +49,8 @@ pub struct StoredMesh {
     /// The memory of its bytes. Every holder of the bytes holds a clone, and the memory counts
     /// until the last clone is dropped.
     pub memory: Arc<Reservation>,
+    /// Its files in the data folder, in the bundle's order, and its report. Empty without a data folder.
+    pub holds: Arc<[Arc<Hold>]>,
 }
 
 /// Reasons why a mesh was not stored.
@@ -85,6 +87,8 @@ pub struct StoreLoad {
 /// that is not being drawn.
 #[derive(Debug)]
 pub struct Store {
+    /// The data folder, which has the same meshes.
+    durable: Option<Durable>,
     memory: Arc<UploadBudget>,
     bytes: u64,
     count: usize,
@@ -108,7 +112,12 @@ struct Entry {
 impl Store {
     /// A store for at most `count` meshes with `bytes` together.
     pub fn new(bytes: u64, count: usize) -> Self {
-        Self { memory: UploadBudget::new(bytes), bytes, count: count.max(1), inner: Mutex::default() }
+        Self::with(None, bytes, count)
+    }
+
+    /// The same, with a data folder.
+    pub fn with(durable: Option<Durable>, bytes: u64, count: usize) -> Self {
+        Self { durable, memory: UploadBudget::new(bytes), bytes, count: count.max(1), inner: Mutex::default() }
     }
 
     /// Finds a mesh, which counts as a use of it.
@@ -116,8 +125,9 @@ impl Store {
         self.lock().touch(digest)
     }
 
-    /// Stores a mesh. False if one of its name is stored already, which then stays as it is.
-    pub fn insert(&self, mesh: NewMesh) -> Result<bool, StoreError> {
+    /// Stores a mesh. False if one of its name is stored already, which then stays as it is. `holds` are its bytes
+    /// in the data folder.
+    pub fn insert(&self, mesh: NewMesh, holds: Arc<[Arc<Hold>]>) -> Result<bool, StoreError> {
         let bytes = mesh.size_bytes();
         self.check_size(bytes)?;
         let mut inner = self.lock();
@@ -125,13 +135,13 @@ impl Store {
             return Ok(false);
         }
         while inner.meshes.len() >= self.count {
-            inner.evict().ok_or(StoreError::Busy { flag: "--mesh-count" })?;
+            self.forget(inner.evict().ok_or(StoreError::Busy { flag: "--mesh-count" })?);
         }
         let mut memory = self.memory.reserve();
         while memory.grow(bytes).is_err() {
-            inner.evict().ok_or(StoreError::Busy { flag: "--mesh-bytes" })?;
+            self.forget(inner.evict().ok_or(StoreError::Busy { flag: "--mesh-bytes" })?);
         }
-        inner.add(StoredMesh { mesh, memory: Arc::new(memory) });
+        inner.add(StoredMesh { mesh, memory: Arc::new(memory), holds });
         Ok(true)
     }
 
@@ -140,7 +150,17 @@ impl Store {
         let mut inner = self.lock();
         let Some(entry) = inner.meshes.remove(&digest) else { return false };
         inner.by_use.remove(&entry.used);
+        self.forget(entry);
         true
+    }
+
+    /// Removes a mesh from the data folder. The lock is held, so that a mesh that is stored anew is stored after
+    /// that.
+    fn forget(&self, entry: Entry) {
+        if let Some(durable) = &self.durable {
+            let change = Change::MeshRemoved(entry.stored.mesh.digest);
+            durable.store_soon(vec![change], entry.stored.holds.to_vec());
+        }
     }
 
     /// Refuses a mesh that would not fit into an empty store.
@@ -190,7 +210,7 @@ impl Inner {
 
     /// Removes the least recently used mesh that is not held elsewhere. Removing a held one would
     /// free no memory. None if all are held.
-    fn evict(&mut self) -> Option<()> {
+    fn evict(&mut self) -> Option<Entry> {
         // These counts cannot grow from 1 meanwhile: new holders need this lock.
         let is_held =
             |entry: &Entry| Arc::strong_count(&entry.stored) > 1 || Arc::strong_count(&entry.stored.memory) > 1;
@@ -198,7 +218,6 @@ impl Inner {
         let (used, digest) =
             self.by_use.iter().find(|(_, digest)| is_free(digest)).map(|(used, digest)| (*used, *digest))?;
         self.by_use.remove(&used);
-        self.meshes.remove(&digest);
-        Some(())
+        self.meshes.remove(&digest)
     }
 }

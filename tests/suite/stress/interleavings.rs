@@ -56,8 +56,10 @@ impl Process {
             idle_time: Duration::from_millis(1),
             job_time: Duration::from_secs(60),
             result_ttl: Duration::from_secs(60),
+            unfetched_ttl: Duration::from_secs(60),
             result_bytes: 1 << 20,
             result_count: 10,
+            storage: None,
         };
         let renderers = pipeline_renderers(gpu, threads, Limits::default(), residents.clone());
         let jobs = Jobs::start(settings, renderers).unwrap();
@@ -75,6 +77,8 @@ impl Process {
             mesh_key: Some(format!("mesh {mesh_number}")),
             task: Task::Draw(Box::new(spec)),
             memory: Arc::new(memory),
+            recipe: None,
+            holds: [].into(),
         };
         self.jobs.submit(work, false).unwrap()
     }

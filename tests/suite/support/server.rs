@@ -20,6 +20,8 @@ pub fn meshsnap() -> Command {
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("MESHSNAP_")) {
         command.env_remove(name);
     }
+    // No test writes to the developer's own data folder: one that is to store something names its own.
+    command.env("MESHSNAP_EPHEMERAL", "true").env("XDG_DATA_HOME", "/nonexistent").env("HOME", "/nonexistent");
     command
 }
 
@@ -88,6 +90,19 @@ impl Server {
     pub fn terminate(&self) {
         let status = Command::new("sh").arg("-c").arg(format!("kill -TERM {}", self.child.id())).status().unwrap();
         assert!(status.success());
+    }
+
+    /// Ends it at once, as a power cut or the kernel does.
+    pub fn kill_9(&self) {
+        let status = Command::new("sh").arg("-c").arg(format!("kill -KILL {}", self.child.id())).status().unwrap();
+        assert!(status.success());
+        let began = Instant::now();
+        // The process is gone when its data folder is free; it stays a zombie until it is waited for.
+        while !std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).is_ok_and(|stat| stat.contains(") Z"))
+        {
+            assert!(began.elapsed() < PATIENCE, "the server does not die");
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
 
     /// Waits for its end.

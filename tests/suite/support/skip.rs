@@ -16,6 +16,8 @@ pub enum Need {
     Curl,
     /// A shell on the `PATH`.
     Shell,
+    /// Leave to mount a file system in a namespace of one's own.
+    Mount,
 }
 
 impl Need {
@@ -26,6 +28,7 @@ impl Need {
             Self::LargeData => "data",
             Self::Curl => "curl",
             Self::Shell => "shells",
+            Self::Mount => "mount",
         }
     }
 }

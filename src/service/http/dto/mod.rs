@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::error::ApiError;
 use crate::image::ImageFormat;
 use crate::import::Bundle;
-use crate::service::store::Digest;
+use crate::service::digest::Digest;
 
 /// An error: a problem document (RFC 9457).
 #[derive(Serialize)]

@@ -20,8 +20,9 @@ use super::state::AppState;
 use super::{negotiate, stored_mesh};
 use crate::limits::Limits;
 use crate::request;
-use crate::service::jobs::{Task, Work};
-use crate::service::store::{Digest, Reading};
+use crate::service::digest::Digest;
+use crate::service::jobs::{Recipe, Task, Work};
+use crate::service::store::Reading;
 use crate::spec::Spec;
 
 /// Longest document, bytes, that is read although the queue is full: that of a stored mesh's picture, which
@@ -70,12 +71,17 @@ pub async fn receive(state: &AppState, request: Request) -> Result<Received, Api
         let key = Some(render_key(state, digest, &reading, &spec));
         let keys = request::all_dotted(document, &overrides, &spec, &state.rules);
         let address = keys.and_then(|keys| Address::new(state, digest, &reading, &spec, &keys));
-        return Ok(Received { work: stored_mesh::work_on(&stored, reading, Task::Draw(spec)), key, address });
+        let document = upload.bundle.files().first().map(|file| file.bytes.clone());
+        let recipe = Some(Arc::new(Recipe { document, overrides, mesh: Some(digest) }));
+        let work = Work { recipe, ..stored_mesh::work_on(&stored, reading, Task::Draw(spec)) };
+        return Ok(Received { work, key, address });
     }
     upload.bundle.check_sent().map_err(|error| ApiError::from(&error))?;
     let spec = with_format(request::read(upload.document.as_deref(), &overrides, &state.rules)?)?;
     let memory = Arc::new(upload.reservation);
-    Ok(Received { work: stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory), key: None, address: None })
+    let recipe = Some(Arc::new(Recipe { document: upload.document, overrides, mesh: None }));
+    let work = Work { recipe, ..stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory) };
+    Ok(Received { work, key: None, address: None })
 }
 
 /// The body, if it is a request document that names a stored mesh. A request with `format_in` has a

@@ -7,9 +7,9 @@ use axum::body::Bytes;
 
 use super::body::{self, BodyKind, Upload};
 use crate::import::Bundle;
+use crate::service::digest::Digest;
 use crate::service::http::error::{ApiError, Fault};
 use crate::service::jobs::Reservation;
-use crate::service::store::Digest;
 
 /// An upload and its name.
 pub struct NamedUpload {

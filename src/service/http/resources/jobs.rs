@@ -16,17 +16,24 @@ use crate::service::jobs::{Job, JobId, JobState};
 /// Accepts a job, always with 202.
 pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
     let received = receive::receive(&state, request).await?;
-    Ok(responses::accepted(&*state.jobs.submit(received.work, true)?))
+    Ok(responses::accepted(&*state.jobs.accept(received.work).await?))
 }
 
 /// The job's state. With `Prefer: wait=N`, the answer comes when the job has ended or after N
 /// seconds.
 pub async fn get(State(state): State<Arc<AppState>>, id: PathName, headers: HeaderMap) -> Result<Response, ApiError> {
     let job = find(&state, id)?;
-    let Some(wait) = negotiate::prefer(&headers).wait else { return Ok(responses::job_state(&job)) };
-    // A timeout is no error: the answer then says that the job has not ended.
-    let _ = tokio::time::timeout(wait, job.ended()).await;
+    let wait = negotiate::prefer(&headers).wait;
+    if let Some(wait) = wait {
+        // A timeout is no error: the answer then says that the job has not ended.
+        let _ = tokio::time::timeout(wait, job.ended()).await;
+    }
+    // The state is all that there is to fetch of a job without a result.
+    if matches!(job.state(), JobState::Failed(_) | JobState::Cancelled) {
+        state.jobs.fetched(&job);
+    }
     let mut response = responses::job_state(&job);
+    let Some(wait) = wait else { return Ok(response) };
     responses::set_preference_applied(&mut response, &format!("wait={}", wait.as_secs()));
     Ok(response)
 }
@@ -35,6 +42,8 @@ pub async fn get(State(state): State<Arc<AppState>>, id: PathName, headers: Head
 pub async fn delete(State(state): State<Arc<AppState>>, id: PathName) -> Result<Response, ApiError> {
     let job = find(&state, id)?;
     state.jobs.cancel(&job);
+    // The end may have to be stored first.
+    job.ended().await;
     Ok(responses::job_state(&job))
 }
 
@@ -42,7 +51,11 @@ pub async fn delete(State(state): State<Arc<AppState>>, id: PathName) -> Result<
 pub async fn result(State(state): State<Arc<AppState>>, id: PathName) -> Result<Response, ApiError> {
     let job = find(&state, id)?;
     let conflict = |code, detail| ApiError::new(Fault::Conflict, code, detail);
-    match job.state() {
+    let ended = job.state();
+    if ended.is_final() {
+        state.jobs.fetched(&job);
+    }
+    match ended {
         JobState::Done(finished) => Ok(responses::picture(&finished)),
         JobState::Failed(failure) => Err(run::job_error(&job, &failure)),
         JobState::Queued | JobState::Running => {

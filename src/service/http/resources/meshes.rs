@@ -12,6 +12,8 @@ use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 
 use super::{PathName, responses, run, text_of};
+use crate::service::digest::Digest;
+use crate::service::durable::{Change, FileRecord, MeshRecord};
 use crate::service::http::conditional;
 use crate::service::http::dto::MeshDto;
 use crate::service::http::error::{ApiError, Fault};
@@ -21,7 +23,7 @@ use crate::service::http::receive::{self, body};
 use crate::service::http::state::AppState;
 use crate::service::http::stored_mesh;
 use crate::service::jobs::Task;
-use crate::service::store::{Digest, NewMesh, Reading};
+use crate::service::store::{NewMesh, Reading};
 
 /// Stores a mesh under its digest.
 pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
@@ -95,7 +97,7 @@ async fn store(state: &AppState, request: Request, wanted: Option<Digest>) -> Re
         let task = Task::Inspect { time_s: None };
         let work = stored_mesh::work(bundle.clone(), reading.clone(), task, memory.clone());
         let report = run::inspect(state, work).await?;
-        state.meshes.insert(NewMesh { digest, bundle, reading, report })?
+        insert(state, NewMesh { digest, bundle, reading, report }).await?
     };
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
     let headers = [
@@ -104,6 +106,33 @@ async fn store(state: &AppState, request: Request, wanted: Option<Digest>) -> Re
         (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
     ];
     Ok((status, headers, Json(body)).into_response())
+}
+
+/// Stores a mesh, in the data folder first, so that an answer promises nothing that a crash can take back.
+async fn insert(state: &AppState, mesh: NewMesh) -> Result<bool, ApiError> {
+    let Some(durable) = state.durable.clone() else { return Ok(state.meshes.insert(mesh, [].into())?) };
+    state.meshes.check_size(mesh.bundle.bytes_len())?;
+    let (writer, written) = (durable.clone(), mesh.clone());
+    let holding = tokio::task::spawn_blocking(move || {
+        let files = written.bundle.files().iter().map(|file| &file.bytes);
+        files.chain([&written.report]).map(|bytes| writer.hold(bytes)).collect::<Result<Vec<_>, _>>()
+    });
+    let holds = holding.await.map_err(|_| ApiError::internal())??;
+    let digests = holds.iter().map(|hold| hold.digest());
+    let files = mesh.bundle.files().iter().zip(digests);
+    let record = MeshRecord {
+        digest: mesh.digest,
+        files: files.map(|(file, digest)| FileRecord { path: file.path.clone(), digest }).collect(),
+        format_in: mesh.reading.format_in.map(|format| format.name().to_owned()),
+        entry: mesh.reading.entry.clone(),
+        report: Digest::of(&mesh.report),
+    };
+    durable.store(vec![Change::MeshStored(Box::new(record))], holds.clone()).await?;
+    let digest = mesh.digest;
+    state.meshes.insert(mesh, holds.into()).map_err(|error| {
+        durable.store_soon(vec![Change::MeshRemoved(digest)], Vec::new());
+        error.into()
+    })
 }
 
 /// The tag of a report: the mesh's name, or a digest of name, way of reading and time.

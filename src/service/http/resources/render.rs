@@ -18,7 +18,7 @@ pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Resul
     let respond_async = negotiate::prefer(request.headers()).respond_async;
     let Received { work, key, address } = receive::receive(&state, request).await?;
     if respond_async {
-        let mut response = responses::accepted(&*state.jobs.submit(work, true)?);
+        let mut response = responses::accepted(&*state.jobs.accept(work).await?);
         responses::set_preference_applied(&mut response, "respond-async");
         return Ok(response);
     }

@@ -1,5 +1,7 @@
 //! The daemon under load and over time: queue, deadline, cancellation, drain.
 
+mod durable;
+
 use std::io::Write as _;
 use std::time::{Duration, Instant};
 
@@ -162,7 +164,7 @@ fn a_terminated_server_finishes_what_it_accepted() {
 
 #[test]
 fn results_are_forgotten_in_time() {
-    let server = Server::start(&["--result-ttl-ms", "100"]);
+    let server = Server::start(&["--unfetched-ttl-ms", "100"]);
     let location = server.post("/v1/jobs?size=16", CUBE_OBJ).header("location").unwrap().to_owned();
     let began = Instant::now();
     while server.get(&location).status != 404 {
@@ -170,6 +172,22 @@ fn results_are_forgotten_in_time() {
         std::thread::sleep(Duration::from_millis(10));
     }
     server.get(&format!("{location}/result")).problem(404, "not_found");
+}
+
+#[test]
+fn a_fetched_result_is_kept_for_less_long_than_one_that_nobody_fetched() {
+    let server = Server::start(&["--result-ttl-ms", "100"]);
+    let jobs = [0, 1].map(|_| server.post("/v1/jobs?size=16", CUBE_OBJ).header("location").unwrap().to_owned());
+    for job in &jobs {
+        server.request("GET", job, &["Prefer: wait=30"], b"");
+    }
+    server.get(&format!("{}/result", jobs[0])).picture(16, 16);
+    let began = Instant::now();
+    while server.get(&jobs[0]).status != 404 {
+        assert!(began.elapsed() < PATIENCE, "still there");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    server.get(&format!("{}/result", jobs[1])).picture(16, 16);
 }
 
 /// The whole program from a cold start; the best of a few, because other tests run beside this one.

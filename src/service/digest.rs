@@ -1,4 +1,4 @@
-//! SHA-256 digests, the names of meshes.
+//! SHA-256 digests, the names of meshes and of files in the data folder.
 
 use std::fmt;
 
@@ -32,6 +32,11 @@ impl Digest {
         Self::of(list.as_bytes())
     }
 
+    /// Its 32 bytes.
+    pub fn as_bytes(&self) -> &[u8; 32] {
+        &self.0
+    }
+
     /// Reads a digest's text. None for anything else, upper case included, so that a mesh has one
     /// name.
     pub fn parse(text: &str) -> Option<Self> {
@@ -60,7 +65,8 @@ impl fmt::Display for Digest {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::import::BundleFile;
+    use crate::service::digest::Digest;
 
     /// FIPS 180-2, appendix B.1.
     const ABC: &str = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";

@@ -1,0 +1,128 @@
+//! What an earlier process has left in the data folder: its stored meshes, its jobs that have not ended, and the
+//! results of those that have.
+
+use std::sync::Arc;
+
+use super::error::{ApiError, record_of};
+use super::state::AppState;
+use super::stored_mesh;
+use crate::import::{Bundle, BundleFile, Format};
+use crate::request;
+use crate::service::durable::{FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob};
+use crate::service::jobs::{Failure, JobId, JobState, Recipe, Task, Work, read_picture, value_of};
+use crate::service::store::{NewMesh, Reading};
+
+/// How often a job may be begun by processes that then ended.
+const STARTS_MAX: u32 = 5;
+
+/// Files of a record, and the holds on them.
+type Files = (Vec<BundleFile>, Vec<Arc<Hold>>);
+
+/// Takes everything over. Jobs that have not ended are queued in the order of acceptance.
+pub fn recover(state: &AppState, mut recovered: Recovered) {
+    let meshes = std::mem::take(&mut recovered.meshes);
+    let jobs = std::mem::take(&mut recovered.jobs);
+    let (mesh_count, job_count) = (meshes.len(), jobs.len());
+    for record in meshes {
+        restore_mesh(state, &recovered, record);
+    }
+    let mut queued = 0;
+    for job in jobs {
+        let name = (JobId::from_key(job.record.key), job.record.accepted_unix_ms);
+        if job.end.is_some() {
+            restore_result(state, &recovered, name, job);
+            continue;
+        }
+        match resumed(state, &recovered, &job) {
+            Ok((work, holds)) => {
+                queued += 1;
+                state.jobs.resume(name, work, holds);
+            }
+            Err(failure) => state.jobs.restore(name, JobState::Failed(Arc::new(failure)), None, Vec::new()),
+        }
+    }
+    if mesh_count + job_count > 0 {
+        tracing::info!(meshes = mesh_count, jobs = job_count, queued, "taken over from the data folder");
+    }
+}
+
+fn restore_mesh(state: &AppState, recovered: &Recovered, record: MeshRecord) {
+    let Some((files, mut holds)) = files(recovered, &record.files) else {
+        return tracing::warn!(mesh = %record.digest, "a stored mesh is lost: its file is missing or damaged");
+    };
+    let Some((report, hold)) = recovered.bytes(record.report) else { return };
+    holds.push(hold);
+    let reading = reading(record.format_in.as_deref(), record.entry);
+    let mesh = NewMesh { digest: record.digest, bundle: Bundle::of_files(files), reading, report };
+    if let Err(error) = state.meshes.insert(mesh, holds.into()) {
+        tracing::warn!(mesh = %record.digest, %error, "a stored mesh does not fit any more");
+    }
+}
+
+fn restore_result(state: &AppState, recovered: &Recovered, name: (JobId, u64), job: RecoveredJob) {
+    let Some(mut end) = job.end else { return };
+    let mut holds = Vec::new();
+    let ended = match (end.picture.take(), end.error.take()) {
+        (Some(picture), _) => {
+            let found = recovered.bytes(picture.digest);
+            let read = found.and_then(|(bytes, hold)| {
+                holds.push(hold);
+                read_picture(picture, bytes)
+            });
+            read.map_or(JobState::Failed(Arc::new(Failure::Lost)), |finished| JobState::Done(Arc::new(finished)))
+        }
+        (None, Some(error)) => JobState::Failed(Arc::new(Failure::Recorded(error))),
+        (None, None) => JobState::Cancelled,
+    };
+    state.jobs.restore(name, ended, Some(&end), holds);
+}
+
+/// The work of a job that has not ended, or the reason why it cannot be done.
+fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Result<(Work, Vec<Arc<Hold>>), Failure> {
+    if job.starts >= STARTS_MAX {
+        return Err(Failure::Crashed { times: job.starts });
+    }
+    let record = &job.record;
+    let (files, mut holds) = files(recovered, &record.files).ok_or(Failure::Lost)?;
+    let document = match record.request.document {
+        Some(digest) => {
+            let (bytes, hold) = recovered.bytes(digest).ok_or(Failure::Lost)?;
+            holds.push(hold);
+            Some(bytes)
+        }
+        None => None,
+    };
+    let task = task(state, record, document.as_deref())?;
+    let recipe = Recipe { document, overrides: record.request.overrides.clone().into(), mesh: record.mesh };
+    let bundle = Bundle::restored(files, record.is_zip, record.entry.clone());
+    let mut memory = state.upload_budget.reserve();
+    memory.take(bundle.bytes_len());
+    let reading = reading(record.format_in.as_deref(), record.entry.clone());
+    let mesh_key = record.mesh.map(|digest| stored_mesh::key(digest, &reading));
+    let (format_in, memory, recipe) = (reading.format_in, Arc::new(memory), Some(Arc::new(recipe)));
+    Ok((Work { bundle, format_in, mesh_key, task, memory, recipe, holds: [].into() }, holds))
+}
+
+/// The request is read again, under the limits of this process.
+fn task(state: &AppState, record: &JobRecord, document: Option<&[u8]>) -> Result<Task, Failure> {
+    let (overrides, rules) = (&record.request.overrides, &state.rules);
+    let read = match document.filter(|_| record.request.names_mesh) {
+        Some(document) => request::read_with_mesh(document, overrides, rules).map(|(_, spec)| spec),
+        None => request::read(document, overrides, rules),
+    };
+    let mut spec = read.map_err(|error| Failure::Recorded(record_of(ApiError::from(error))))?;
+    request::set_format(&mut spec, value_of(&record.request.format).ok_or(Failure::Lost)?);
+    Ok(Task::Draw(Box::new(spec)))
+}
+
+fn files(recovered: &Recovered, records: &[FileRecord]) -> Option<Files> {
+    let found = records.iter().map(|record| {
+        let (bytes, hold) = recovered.bytes(record.digest)?;
+        Some((BundleFile { path: record.path.clone(), bytes }, hold))
+    });
+    found.collect()
+}
+
+fn reading(format_in: Option<&str>, entry: Option<String>) -> Reading {
+    Reading { format_in: format_in.and_then(Format::from_name), entry }
+}

@@ -1,0 +1,162 @@
+//! Jobs in the data folder: what is written of them, and how they are read again.
+
+use std::collections::HashSet;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::time::Duration;
+
+use bytes::Bytes;
+
+use super::job::{Failure, Finished, Job, JobState, Task, Timings, Work, unix_ms};
+use crate::backend::{BackendKind, DrawTimes};
+use crate::pipeline::QualitySelection;
+use crate::service::durable::{
+    Durable, EndRecord, ErrorRecord, FileRecord, Hold, JobRecord, PictureRecord, RequestRecord, SelectionRecord,
+    Unstored, WarningRecord,
+};
+use crate::spec::words::{Words, word_for};
+use crate::warning::Warning;
+
+/// Most different names that are taken over from a data folder: more than there are warnings, methods and
+/// flags.
+const NAMES_MAX: usize = 1000;
+
+/// The data folder, and the words in which failures are stored.
+#[derive(Clone)]
+pub struct Storage {
+    /// The data folder.
+    pub durable: Durable,
+    /// A failure in the words of the interface.
+    pub describe: fn(&Failure) -> ErrorRecord,
+}
+
+/// What was written, and the bytes that it names.
+pub type Stored<R> = (R, Vec<Arc<Hold>>);
+
+impl std::fmt::Debug for Storage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Storage").finish_non_exhaustive()
+    }
+}
+
+impl Storage {
+    /// The record of a job that is accepted. Writes files, so it may take long.
+    pub fn of_job(&self, job: &Job, work: &Work) -> Result<Stored<JobRecord>, Unstored> {
+        let mut holds = work.holds.to_vec();
+        if holds.len() != work.bundle.files().len() {
+            holds = work.bundle.files().iter().map(|file| self.durable.hold(&file.bytes)).collect::<Result<_, _>>()?;
+        }
+        let digests = holds.iter().map(|hold| hold.digest());
+        let files = work.bundle.files().iter().zip(digests);
+        let files = files.map(|(file, digest)| FileRecord { path: file.path.clone(), digest }).collect();
+        let recipe = work.recipe.clone().unwrap_or_default();
+        let document = recipe.document.as_ref().map(|bytes| self.durable.hold(bytes)).transpose()?;
+        let format = match &work.task {
+            Task::Draw(spec) => spec.image.format.map_or("png", word_for),
+            Task::Inspect { .. } => "",
+        };
+        let request = RequestRecord {
+            document: document.as_ref().map(|hold| hold.digest()),
+            names_mesh: recipe.mesh.is_some(),
+            overrides: recipe.overrides.to_vec(),
+            format: format.to_owned(),
+        };
+        holds.extend(document);
+        let record = JobRecord {
+            key: job.id.key(),
+            accepted_unix_ms: job.accepted_unix_ms,
+            request,
+            files,
+            is_zip: work.bundle.is_zip(),
+            format_in: work.format_in.map(|format| format.name().to_owned()),
+            entry: work.bundle.entry().map(str::to_owned),
+            mesh: recipe.mesh,
+        };
+        Ok((record, holds))
+    }
+
+    /// The record of a job's end. Writes the file of a large picture.
+    pub fn of_end(&self, state: &JobState) -> Result<Stored<EndRecord>, Unstored> {
+        let mut end = EndRecord { at_unix_ms: unix_ms(), ..EndRecord::default() };
+        let mut holds = Vec::new();
+        match state {
+            JobState::Done(finished) => {
+                let hold = self.durable.hold(&finished.picture)?;
+                end.picture = Some(of_picture(finished, &hold));
+                holds.push(hold);
+            }
+            JobState::Failed(failure) => end.error = Some((self.describe)(failure)),
+            JobState::Queued | JobState::Running | JobState::Inspected(_) | JobState::Cancelled => {}
+        }
+        Ok((end, holds))
+    }
+}
+
+fn of_picture(finished: &Finished, hold: &Hold) -> PictureRecord {
+    let warnings = finished.warnings.iter();
+    let selection = finished.selection.as_ref().map(|selection| SelectionRecord {
+        samples: selection.samples,
+        wire_methods: selection.wire_methods.iter().map(|&method| method.to_owned()).collect(),
+        backend: word_for(selection.backend).to_owned(),
+        expected_error: selection.expected_error,
+        expected_time_ms: selection.expected_time_ms,
+    });
+    PictureRecord {
+        digest: hold.digest(),
+        format: word_for(finished.format).to_owned(),
+        backend: finished.backend.name().to_owned(),
+        is_substitute: finished.is_substitute,
+        mesh_was_kept: finished.mesh_was_kept,
+        warnings: warnings.map(|w| WarningRecord { code: w.code.to_owned(), detail: w.detail.clone() }).collect(),
+        selection,
+        timings_us: finished.timings.parts().map(|(_, took)| u64::try_from(took.as_micros()).unwrap_or(u64::MAX)),
+    }
+}
+
+/// A picture as it was stored. None if a word of the record is not known any more.
+pub fn read_picture(record: PictureRecord, picture: Bytes) -> Option<Finished> {
+    let [queue, parse, plan, render, encode] = record.timings_us.map(Duration::from_micros);
+    let selection = match record.selection {
+        Some(selection) => Some(QualitySelection {
+            samples: selection.samples,
+            wire_methods: selection.wire_methods.iter().map(|method| name(method)).collect(),
+            backend: value_of(&selection.backend)?,
+            expected_error: selection.expected_error,
+            expected_time_ms: selection.expected_time_ms,
+        }),
+        None => None,
+    };
+    let backend = [BackendKind::Cpu, BackendKind::Gpu].into_iter().find(|kind| kind.name() == record.backend)?;
+    let warnings = record.warnings.into_iter();
+    Some(Finished {
+        picture,
+        format: value_of(&record.format)?,
+        backend,
+        is_substitute: record.is_substitute,
+        warnings: warnings.map(|w| Warning { code: name(&w.code), detail: w.detail }).collect(),
+        selection,
+        mesh_was_kept: record.mesh_was_kept,
+        timings: Timings { queue, parse, plan, render, encode },
+        draw_times: DrawTimes::default(),
+    })
+}
+
+/// The value that a word means.
+pub fn value_of<T: Words>(word: &str) -> Option<T> {
+    T::ALL.iter().find(|(known, _)| *known == word).map(|&(_, value)| value)
+}
+
+/// A name of the program's own that was read from a data folder: a warning's, a method's. There are few, so that
+/// each is kept once and for good, as it is in the program itself.
+pub fn name(text: &str) -> &'static str {
+    static NAMES: LazyLock<Mutex<HashSet<&'static str>>> = LazyLock::new(Mutex::default);
+    let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = names.get(text) {
+        return known;
+    }
+    if names.len() >= NAMES_MAX {
+        return "unknown";
+    }
+    let leaked: &'static str = text.to_owned().leak();
+    names.insert(leaked);
+    leaked
+}
