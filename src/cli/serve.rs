@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
 
-use super::files;
 use super::settings::AllSettings;
+use super::{files, isolation};
 use crate::cli::error::CliError;
 use crate::config::{Config, SETTINGS};
 use crate::service::http;
@@ -56,6 +56,7 @@ pub fn run(arguments: &ServeArgs) -> Result<(), CliError> {
     if config.data_dir.is_some() {
         tracing::warn!("this version keeps jobs and meshes in memory and stores nothing in --data-dir");
     }
+    isolation::ahead(config.workers);
     http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
         ServeError::Unprotected(_) => CliError::usage(error.to_string()),
         ServeError::Listen { error: ref cause, .. } if cause.kind() == ErrorKind::InvalidInput => {
