@@ -55,6 +55,8 @@ pub mod config;
 #[doc(hidden)]
 pub mod encode;
 #[doc(hidden)]
+pub mod guard;
+#[doc(hidden)]
 pub mod image;
 #[doc(hidden)]
 pub mod import;
@@ -73,6 +75,9 @@ mod pluralise;
 pub mod report;
 #[doc(hidden)]
 pub mod request;
+#[cfg(all(feature = "cli", target_os = "linux"))]
+#[doc(hidden)]
+pub mod sandbox;
 #[doc(hidden)]
 pub mod scene;
 #[cfg(feature = "service")]

@@ -6,7 +6,7 @@ use clap::{Args, ValueHint};
 use super::progress::Progress;
 use super::render::{format_in, pairs};
 use super::settings::LimitSettings;
-use super::{bundle, files};
+use super::{bundle, files, isolation};
 use crate::cli::error::CliError;
 use crate::import::{self, Format};
 use crate::limits::Deadline;
@@ -58,6 +58,7 @@ pub struct InspectArgs {
 
 /// Prints the report.
 pub fn run(arguments: &InspectArgs) -> Result<(), CliError> {
+    isolation::on_demand();
     let limits = arguments.limits.config().limits;
     let format = format_in(arguments.format_in.as_deref());
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };

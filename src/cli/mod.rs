@@ -9,6 +9,7 @@ pub(crate) mod error;
 mod files;
 mod health;
 mod inspect;
+mod isolation;
 mod manual;
 mod output;
 mod progress;
@@ -76,7 +77,15 @@ const SEE_HELP: &str = "`--help` has every option and examples.";
 
 /// Runs the program with these arguments.
 pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
+    // Tests make decoders fail.
+    #[cfg(debug_assertions)]
+    if let Ok(decoder) = std::env::var("MESHSNAP_TEST_PANIC_IN") {
+        crate::guard::hook::panic_in(decoder);
+    }
     let words: Vec<OsString> = arguments.collect();
+    if let Some(code) = isolation::run_if_asked(&words) {
+        return code;
+    }
     let cli = match Cli::try_parse_from(&words) {
         Ok(cli) => cli,
         Err(error) => {

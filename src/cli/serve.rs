@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
 
-use super::files;
 use super::settings::AllSettings;
+use super::{files, isolation};
 use crate::cli::error::CliError;
 use crate::config::{self, Config, SETTINGS};
 use crate::service::durable::OpenError;
@@ -54,6 +54,7 @@ pub fn run(arguments: &ServeArgs) -> Result<(), CliError> {
     config.listen.to_socket_addrs().map_err(|error| {
         CliError::usage(format!("--listen {}: there is no such address on this machine ({error})", config.listen))
     })?;
+    isolation::ahead(config.workers);
     http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
         ServeError::Unprotected(_) => CliError::usage(error.to_string()),
         ServeError::Listen { error: ref cause, .. } if cause.kind() == ErrorKind::InvalidInput => {

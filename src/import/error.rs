@@ -1,6 +1,7 @@
 //! Errors of importing.
 
 use super::text;
+use crate::guard::Panicked;
 use crate::limits::{Exhausted, LimitExceeded, Stopped};
 
 /// Longest detail of an error or a warning, in characters. Longer ones only repeat content of the
@@ -32,6 +33,10 @@ pub enum MeshFault {
     BundleBroken,
     /// Several files of the bundle are meshes, or the requested one is missing.
     EntryUnclear,
+    /// A decoder of another crate panicked.
+    DecoderFailed,
+    /// The process in which a decoder runs crashed, hung, took too much memory or tried what it may not do.
+    DecoderCrashed,
     /// The file requires a feature of the format that is not read.
     Unsupported,
     /// Breaks a limit.
@@ -65,6 +70,12 @@ impl MeshError {
 impl From<LimitExceeded> for MeshError {
     fn from(limit: LimitExceeded) -> Self {
         Self::new(MeshFault::Limit(limit.clone()), limit.to_string())
+    }
+}
+
+impl From<Panicked> for MeshError {
+    fn from(panicked: Panicked) -> Self {
+        Self::new(MeshFault::DecoderFailed, panicked.to_string())
     }
 }
 

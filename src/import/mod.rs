@@ -12,6 +12,7 @@ mod error;
 mod fbx;
 mod formats;
 mod gltf;
+pub mod isolate;
 mod metadata;
 mod normalise;
 mod obj;
@@ -88,6 +89,18 @@ pub struct Imported {
     pub mesh: Mesh,
     /// Counts, repairs, warnings and metadata.
     pub report: ImportReport,
+}
+
+/// What the process does that importers in C run in.
+#[cfg(feature = "cli")]
+pub fn answer_in_isolation(head: &[u8], file: &[u8]) -> Vec<u8> {
+    match head.split_first() {
+        #[cfg(feature = "fbx")]
+        Some((&isolate::FBX, head)) => fbx::answer(head, file),
+        #[cfg(feature = "meshopt")]
+        Some((&isolate::MESHOPT, head)) => gltf::answer(head, file),
+        _ => file[..0].to_vec(),
+    }
 }
 
 /// Reads the mesh of a bundle.

@@ -4,6 +4,8 @@
 //! Offsets and field names are those of the KTX File Format, version 2.0, section 3
 //! (<https://registry.khronos.org/KTX/specs/2.0/ktxspec.v2.html>).
 
+#[cfg(feature = "basis")]
+use crate::guard::guarded;
 use crate::texture::TextureError;
 
 /// The header of a KTX2 file.
@@ -68,8 +70,7 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<BasisHeader, TextureError> {
 #[cfg(feature = "basis")]
 pub fn decode(name: &str, bytes: &[u8], header: &BasisHeader) -> Result<Vec<u8>, TextureError> {
     use basisu::{DecodeFlags, TargetFormat, Transcoder};
-    // The crate is young and its input is hostile: a panic in it counts as a broken file.
-    let texels = std::panic::catch_unwind(|| {
+    let texels = guarded("Basis", || {
         let texture = Transcoder::new(bytes).ok()?;
         let same = texture.base_dimensions() == (header.width, header.height);
         same.then(|| texture.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).ok())?

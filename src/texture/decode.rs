@@ -6,6 +6,7 @@
 
 use std::io::{BufRead, Cursor, Seek};
 
+use crate::guard::{Panicked, guarded};
 use crate::srgb::srgb_to_linear;
 use crate::texture::TextureError;
 use crate::texture::basis::{self, BasisHeader, KTX2_MAGIC};
@@ -60,6 +61,10 @@ const ALLOWANCE_BYTES: u64 = 4 << 20;
 
 /// Reads the header alone. `name` is the image's, for errors.
 pub fn header(name: &str, bytes: &[u8]) -> Result<Header, TextureError> {
+    guarded("image", || read_header(name, bytes)).map_err(|panicked| failed(name, panicked))?
+}
+
+fn read_header(name: &str, bytes: &[u8]) -> Result<Header, TextureError> {
     if bytes.starts_with(KTX2_MAGIC) {
         let basis = basis::header(name, bytes)?;
         let BasisHeader { width, height, decoding_bytes } = basis;
@@ -91,6 +96,14 @@ pub fn header(name: &str, bytes: &[u8]) -> Result<Header, TextureError> {
 
 /// Decodes all pixels. The caller has spent [`Header::decoding_bytes`].
 pub fn decode(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, TextureError> {
+    guarded("pixels", || read_pixels(name, bytes, header)).map_err(|panicked| failed(name, panicked))?
+}
+
+fn failed(name: &str, panicked: Panicked) -> TextureError {
+    TextureError::Broken(format!("{name} of the mesh cannot be decoded: {panicked}"))
+}
+
+fn read_pixels(name: &str, bytes: &[u8], header: &Header) -> Result<Pixels, TextureError> {
     let format = match &header.encoding {
         Encoding::Picture(format) => *format,
         Encoding::Basis(basis) => {

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueHint};
 
+use super::isolation;
 use super::output::{Destination, Inputs};
 use super::settings::LimitSettings;
 use crate::cli::error::CliError;
@@ -161,6 +162,7 @@ pub fn run(arguments: &RenderArgs, command: &[OsString]) -> Result<(), CliError>
     let filter = std::env::var("MESHSNAP_LOG").unwrap_or_default();
     let filter = if filter.is_empty() { "warn" } else { &filter };
     telemetry::init(filter, Some(false)).map_err(|error| CliError::usage(format!("MESHSNAP_LOG {error}")))?;
+    isolation::on_demand();
     let limits = arguments.limits.config().limits;
     if is_folder(&arguments.output) {
         return run_batch(arguments, limits);

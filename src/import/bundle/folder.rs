@@ -66,6 +66,16 @@ impl Folder {
         self.files.iter().map(|file| file.bytes.len() as u64).sum()
     }
 
+    /// The paths of all files, and the number of the mesh.
+    pub fn paths(&self) -> (Vec<String>, u32) {
+        (self.files.iter().map(|file| file.path.clone()).collect(), self.entry as u32)
+    }
+
+    /// The file with this number, if there is one.
+    pub fn try_file(&self, number: usize) -> Option<&BundleFile> {
+        (number < self.files.len()).then(|| self.file(number))
+    }
+
     /// The file with this number, which counts as used from here on.
     pub fn file(&self, number: usize) -> &BundleFile {
         let file = &self.files[number];

@@ -2,6 +2,7 @@
 //! its directory is walked entry by entry, entries must not share bytes, and unpacked bytes are
 //! counted.
 
+use crate::guard::guarded;
 use crate::import::bundle::{BundleFile, show};
 use crate::import::{MeshError, MeshFault, text};
 use crate::limits::{self, Budget, Deadline, Limits};
@@ -25,6 +26,15 @@ const BOMBS_BYTES: u64 = 32 << 20;
 
 /// The files of the archive, without what archivers leave in it.
 pub fn unzip(
+    archive: &Bytes,
+    limits: &Limits,
+    budget: &mut Budget,
+    deadline: &Deadline,
+) -> Result<Vec<BundleFile>, MeshError> {
+    guarded("zip", || unpack(archive, limits, budget, deadline))?
+}
+
+fn unpack(
     archive: &Bytes,
     limits: &Limits,
     budget: &mut Budget,

@@ -2,7 +2,7 @@
 //! deadline callback, and opens no file. Indices that it returns are checked again. Without the
 //! feature `fbx` the files are known and refused.
 //!
-//! [`scene`] loads a file; [`costs`] and [`bombs`] refuse files that would take it too long or too much memory,
+//! [`scene`] loads a file, in another process where `isolated` has one; [`costs`] and [`bombs`] refuse files that would take it too long or too much memory,
 //! [`visibility`] finds hidden nodes, [`geometry`] places meshes and cuts their polygons,
 //! [`materials`] makes slots and images.
 
@@ -12,6 +12,8 @@ mod bombs;
 mod costs;
 #[cfg(feature = "fbx")]
 mod geometry;
+#[cfg(all(feature = "fbx", feature = "cli"))]
+mod isolated;
 #[cfg(feature = "fbx")]
 mod materials;
 #[cfg_attr(not(feature = "fbx"), path = "absent.rs")]
@@ -19,9 +21,22 @@ mod scene;
 #[cfg(feature = "fbx")]
 mod visibility;
 
-pub use scene::read;
+#[cfg(all(feature = "fbx", feature = "cli"))]
+pub use isolated::answer;
 
+use super::MeshError;
+use super::context::Context;
+use super::raw::RawMesh;
 use super::text;
+
+/// Reads an FBX file, in another process if the program has set one up.
+pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    #[cfg(all(feature = "fbx", feature = "cli"))]
+    if let Some(isolation) = super::isolate::isolation() {
+        return isolated::read(bytes, isolation, cx);
+    }
+    scene::read(bytes, cx)
+}
 
 /// Bytes of a text that are searched for its keywords.
 const TEXT_SNIFF_BYTES: usize = 4096;

@@ -1,6 +1,7 @@
 //! The scene of an FBX file: loaded by `ufbx`, then read part by part.
 
 use super::{bombs, costs, geometry, materials};
+use crate::guard::guarded;
 use crate::import::FileMetadata;
 use crate::import::context::Context;
 use crate::import::metadata;
@@ -22,6 +23,10 @@ const BYTES_PER_POLL: u64 = 1 << 16;
 
 /// Reads an FBX file.
 pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
+    guarded("FBX", || read_scene(bytes, cx))?
+}
+
+fn read_scene(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     costs::check(bytes, cx)?;
     bombs::check(bytes, cx.deadline)?;
     let scene = load(bytes, cx)?;

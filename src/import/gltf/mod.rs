@@ -12,6 +12,9 @@ mod material;
 mod primitive;
 mod scene;
 
+#[cfg(all(feature = "meshopt", feature = "cli"))]
+pub use data::meshopt_apart::answer;
+
 use self::document::check;
 use self::document::lists::Lists;
 use self::document::schema::Document;

@@ -2,6 +2,7 @@
 //! namespaces of elements. Entities are not expanded: a part with a DTD is refused.
 
 use super::namespaces::{Space, Spaces};
+use crate::guard::guarded;
 use crate::import::bundle::show;
 use crate::import::context::Context;
 use crate::import::{MeshError, text};
@@ -34,6 +35,10 @@ pub trait Visitor {
 
 /// Walks through the part of this name.
 pub fn walk(part: &str, bytes: &[u8], visitor: &mut impl Visitor, cx: &mut Context<'_>) -> Result<(), MeshError> {
+    guarded("XML", || walk_elements(part, bytes, visitor, cx))?
+}
+
+fn walk_elements(part: &str, bytes: &[u8], visitor: &mut impl Visitor, cx: &mut Context<'_>) -> Result<(), MeshError> {
     let bytes = text::to_utf8(bytes, cx.budget)?;
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
     let broken =

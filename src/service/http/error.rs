@@ -311,6 +311,8 @@ impl From<&MeshError> for ApiError {
             MeshFault::OutsideBundle => (Fault::Content, "mesh_outside_bundle"),
             MeshFault::BundleBroken => (Fault::Content, "bundle_broken"),
             MeshFault::EntryUnclear => (Fault::Content, "entry_unclear"),
+            MeshFault::DecoderFailed => (Fault::Content, "decoder_failed"),
+            MeshFault::DecoderCrashed => (Fault::Content, "decoder_crashed"),
             MeshFault::Unsupported => (Fault::Content, "mesh_unsupported"),
             MeshFault::Limit(limit) => return limit.into(),
             MeshFault::Stopped => return Self::deadline(error.detail.clone()),

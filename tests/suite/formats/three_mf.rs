@@ -44,13 +44,13 @@ fn model(resources: &str, build: &str) -> String {
     )
 }
 
-fn cube_model(build: &str) -> String {
+pub fn cube_model(build: &str) -> String {
     model(&format!("<object id=\"1\" type=\"model\">{}</object>", mesh(&triangles(), |_| String::new())), build)
 }
 
-const ITEM: &str = "<item objectid=\"1\"/>";
+pub const ITEM: &str = "<item objectid=\"1\"/>";
 
-fn package(model: &[u8]) -> Vec<u8> {
+pub fn package(model: &[u8]) -> Vec<u8> {
     zipped(&[("[Content_Types].xml", TYPES.as_bytes()), ("_rels/.rels", RELS.as_bytes()), ("3D/3dmodel.model", model)])
 }
 

@@ -3,3 +3,5 @@
 pub mod bombs;
 pub mod cut;
 pub mod fuzzed;
+pub mod panics;
+pub mod sandbox;

@@ -12,14 +12,15 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("srgb", &[]),
     ("image", &["srgb"]),
     ("warning", &[]),
+    ("guard", &[]),
     ("pluralise", &[]),
     ("parallel", &[]),
     ("mesh", &["parallel", "limits", "warning"]),
-    ("import", &["mesh", "parallel", "srgb", "limits", "warning", "pluralise"]),
+    ("import", &["guard", "mesh", "parallel", "srgb", "limits", "warning", "pluralise"]),
     ("report", &["import", "texture", "mesh", "limits", "warning", "pluralise"]),
     ("spec", &["mesh", "image", "srgb", "limits"]),
     ("request", &["spec", "mesh", "image", "limits"]),
-    ("texture", &["mesh", "srgb", "limits", "warning"]),
+    ("texture", &["guard", "mesh", "srgb", "limits", "warning"]),
     ("scene", &["spec", "mesh", "parallel", "limits"]),
     ("plan", &["scene", "spec", "texture", "mesh", "parallel", "image", "limits", "warning"]),
     // Of spec the choice of a back-end alone.
@@ -84,9 +85,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     ("service", &[]),
+    ("sandbox", &["import", "limits"]),
     (
         "cli",
         &[
+            "sandbox",
             "service",
             "service/http",
             "service/jobs",
@@ -103,6 +106,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "warning",
             "config",
             "telemetry",
+            "guard",
         ],
     ),
     ("config", &["request", "spec", "limits"]),
@@ -133,12 +137,23 @@ const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("object_store::", &["service/durable/"]),
     ("quick_cache::", &["service/cache", "service/residents", "service/jobs/estimates"]),
     ("memmap2::", &["cli"]),
+    ("rustix::", &["sandbox/"]),
+    ("landlock::", &["sandbox/"]),
+    ("seccompiler::", &["sandbox/"]),
+    ("libc::", &["sandbox/"]),
     ("clap::", &["cli", "main.rs", "config"]),
     ("tokio::", &["service/", "main.rs", "cli", "telemetry"]),
-    ("std::fs", &["cli", "config", "main.rs", "service/http/", "service/durable/", "backend/gpu/pipelines/file.rs"]),
-    ("std::env", &["cli", "config", "main.rs", "telemetry"]),
+    (
+        "std::fs",
+        &["cli", "sandbox/", "config", "main.rs", "service/http/", "service/durable/", "backend/gpu/pipelines/file.rs"],
+    ),
+    // The sandbox hands a hook of tests on, in debug builds.
+    ("std::env", &["cli", "config", "main.rs", "telemetry", "sandbox/pool.rs"]),
     // Who draws may depend on what both back-ends took: decision 22.
-    ("Instant::now", &["cli", "service/", "telemetry", "main.rs", "backend/cpu/stopwatch.rs", "backend/costs.rs"]),
+    (
+        "Instant::now",
+        &["cli", "sandbox/", "service/", "telemetry", "main.rs", "backend/cpu/stopwatch.rs", "backend/costs.rs"],
+    ),
     ("SystemTime", &["cli", "service/", "telemetry", "main.rs"]),
 ];
 

@@ -44,7 +44,7 @@ fn bad_queries_are_a_400_that_names_the_key() {
         ("wire.thickness=inf", "out_of_range", "from 0 to 10"),
         ("camera.eye=1,2,3", "conflicting_keys", "camera.target"),
         ("materials.Glass%20v2.1.surface.opacity=3", "out_of_range", "`materials.Glass v2.1.surface.opacity`"),
-        ("materials.Glass.opacity=0.3", "unknown_key", "did you mean surface.opacity"),
+        ("materials.Glass.opacity=0.3", "unknown_key", "did you mean materials.Glass.surface.opacity"),
         ("light.direction=0,0,0", "out_of_range", "not all zero"),
         ("wire.method=fwidth&wire.thickness=11", "out_of_range", "from 0 to 10 where"),
         ("format_in=dae", "out_of_range", "obj, gltf, glb, stl, ply"),

@@ -13,7 +13,7 @@ fn json_with_a_mistake_is_told_where_and_not_taken_for_a_mesh() {
     let cases: [(&str, &str, &[&str]); 15] = [
         ("", "not_json", &["empty"]),
         (" \n", "not_json", &["empty"]),
-        ("{", "not_json", &["line 1, column 1", "a JSON object"]),
+        ("{", "not_json", &["line 1, column 1", "EOF while parsing an object"]),
         ("{\n  \"style\": \"wire\",\n}", "not_json", &["line 3, column 1", "trailing comma"]),
         ("{\"style\": 'wire'}", "not_json", &["line 1, column 11", "expected value"]),
         ("{\"style\": \"wi\u{1}re\"}", "not_json", &["line 1, column 14", "control character"]),
@@ -58,7 +58,7 @@ fn nothing_to_draw_is_refused_at_once_by_every_route() {
     for path in ["/v1/render", "/v1/jobs", "/v1/jobs?format_in=obj"] {
         for body in [(&[][..], b"".to_vec()), (&[FORM][..], form(&[("file", b"")]))] {
             let detail = server.request("POST", path, body.0, &body.1).problem(415, "mesh_unrecognised");
-            assert!(detail.contains("the body is empty"), "{path}: {detail}");
+            assert!(detail.contains("is empty, and should be a mesh"), "{path}: {detail}");
             refused += 1;
         }
     }

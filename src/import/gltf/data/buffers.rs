@@ -18,6 +18,8 @@ pub struct Buffers<'a> {
     decoded: Vec<Option<Rc<Cow<'a, [u8]>>>>,
     /// By the index of their view.
     decompressed: BTreeMap<usize, Rc<Cow<'a, [u8]>>>,
+    /// Views that another process has unpacked and none has asked for yet.
+    unpacked: BTreeMap<usize, meshopt::Unpacked>,
 }
 
 /// A buffer view, checked to lie in its buffer.
@@ -41,7 +43,13 @@ impl View<'_> {
 impl<'a> Buffers<'a> {
     /// The buffers of `doc`; `bin` is the binary chunk of a GLB.
     pub fn new(doc: &'a Document, bin: Option<&'a [u8]>) -> Self {
-        Self { doc, bin, decoded: vec![None; doc.buffers.len()], decompressed: BTreeMap::new() }
+        Self {
+            doc,
+            bin,
+            decoded: vec![None; doc.buffers.len()],
+            decompressed: BTreeMap::new(),
+            unpacked: BTreeMap::new(),
+        }
     }
 
     /// The view with the given index.
@@ -60,7 +68,10 @@ impl<'a> Buffers<'a> {
                     let what = format!("the compressed data of buffer view {index}");
                     let from = self.span(&what, packed.buffer.0, packed.byte_offset.0, packed.byte_length.0, cx)?;
                     let has_colors = view.extensions.khr_meshopt.is_some();
-                    let bytes = meshopt::decode(index, packed, has_colors, from.bytes(), view.byte_length.0, cx)?;
+                    self.unpack_apart(index, cx)?;
+                    let unpacked = self.unpacked.remove(&index);
+                    let length = view.byte_length.0;
+                    let bytes = meshopt::decode(index, packed, has_colors, from.bytes(), length, unpacked, cx)?;
                     let bytes = Rc::new(Cow::Owned(bytes));
                     self.decompressed.insert(index, Rc::clone(&bytes));
                     bytes
@@ -72,6 +83,49 @@ impl<'a> Buffers<'a> {
         let what = format!("buffer view {index}");
         let view = self.span(&what, view.buffer.0, view.byte_offset.0, view.byte_length.0, cx)?;
         Ok(View { stride_bytes, ..view })
+    }
+
+    /// Has view `index` unpacked in another process, if there is one, and with it others that may be asked for.
+    #[cfg(all(feature = "meshopt", feature = "cli"))]
+    fn unpack_apart(&mut self, index: usize, cx: &mut Context<'_>) -> Result<(), MeshError> {
+        use super::meshopt_apart;
+        let Some(isolation) = crate::import::isolate::isolation().filter(|_| !self.unpacked.contains_key(&index))
+        else {
+            return Ok(());
+        };
+        let mut views = Vec::new();
+        let mut total_bytes = 0_u64;
+        let others = (0..self.doc.buffer_views.len()).filter(|&other| other != index);
+        for number in std::iter::once(index).chain(others) {
+            let view = &self.doc.buffer_views[number];
+            let json = view.extensions.ext_meshopt.as_ref().or(view.extensions.khr_meshopt.as_ref());
+            let is_done = self.decompressed.contains_key(&number) || self.unpacked.contains_key(&number);
+            let Some(json) = json.filter(|_| !is_done) else { continue };
+            // What is wrong with a view is said when it is asked for.
+            let Ok(packed) = meshopt::shape(number, json, view.byte_length.0) else { continue };
+            let total = total_bytes.saturating_add(packed.bytes());
+            if number != index && total > meshopt_apart::AHEAD_BYTES_MAX {
+                continue;
+            }
+            let Ok(from) = self.span("", json.buffer.0, json.byte_offset.0, json.byte_length.0, cx) else { continue };
+            total_bytes = total;
+            views.push((number, packed, from));
+        }
+        if views.first().is_none_or(|(number, ..)| *number != index) {
+            return Ok(());
+        }
+        // As it comes, and as it is kept.
+        cx.budget.spend("compressed glTF data", total_bytes, 2)?;
+        let parts: Vec<_> = views.iter().map(|(_, packed, from)| (*packed, from.bytes())).collect();
+        let unpacked = meshopt_apart::read(&parts, isolation, cx.deadline)?;
+        self.unpacked.extend(views.iter().map(|(number, ..)| *number).zip(unpacked));
+        Ok(())
+    }
+
+    /// No other process unpacks.
+    #[cfg(not(all(feature = "meshopt", feature = "cli")))]
+    fn unpack_apart(&mut self, _: usize, _: &mut Context<'_>) -> Result<(), MeshError> {
+        Ok(())
     }
 
     /// Some bytes of a buffer.

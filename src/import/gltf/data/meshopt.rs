@@ -6,56 +6,43 @@
 //! of the crate use a square root that differs between processors.
 
 use super::meshopt_filters as filters;
+use crate::guard::{Panicked, guarded};
 use crate::import::MeshError;
 use crate::import::context::Context;
 use crate::import::gltf::document::schema::Meshopt;
 
-/// The unpacked bytes of view `index`, which declares `view_bytes` of them.
+/// The decoder's name.
+pub const DECODER: &str = "meshoptimizer";
+
+/// What became of a view's bytes: None if they are broken.
+pub type Unpacked = Result<Option<Vec<u8>>, Panicked>;
+
+/// The bytes of view `index`, which declares `view_bytes` of them. `unpacked` are those that were unpacked before.
 pub fn decode(
     index: usize,
-    packed: &Meshopt,
+    json: &Meshopt,
     is_khr: bool,
     from: &[u8],
     view_bytes: u64,
+    unpacked: Option<Unpacked>,
     cx: &mut Context<'_>,
 ) -> Result<Vec<u8>, MeshError> {
-    let broken =
-        |what: &str| MeshError::broken(format!("the compressed data of buffer view {index} of the glTF file {what}"));
-    let (count, stride) = (packed.count.0, packed.byte_stride.0);
-    let size = count.checked_mul(stride).filter(|&size| size == view_bytes);
-    let Some(size) = size else {
-        return Err(broken(&format!("has {count} elements of {stride} bytes, and the view has {view_bytes} bytes")));
-    };
-    let is_attributes = packed.mode == "ATTRIBUTES";
-    let is_good_stride =
-        if is_attributes { stride % 4 == 0 && (4..=256).contains(&stride) } else { [2, 4].contains(&stride) };
-    if !is_good_stride {
-        return Err(broken(&format!(
-            "has a stride of {stride} bytes, which is not allowed in the mode {:.20}",
-            packed.mode
-        )));
-    }
-    let filter = packed.filter.as_deref().unwrap_or("NONE");
-    if filter != "NONE" && !is_attributes {
+    let broken = |what: &str| broken(index, what);
+    let packed = shape(index, json, view_bytes)?;
+    let filter = json.filter.as_deref().unwrap_or("NONE");
+    if filter != "NONE" && packed.mode != Mode::Attributes {
         return Err(broken("has a filter, which goes with attributes alone"));
     }
     // Paid for twice: as the codec returns it, and as bytes.
-    cx.budget.spend("compressed glTF data", size, 2)?;
+    cx.budget.spend("compressed glTF data", packed.bytes(), 2)?;
     cx.deadline.check()?;
-    let count = count as usize;
-    let unpacked = match (packed.mode.as_str(), stride) {
-        ("ATTRIBUTES", _) => rows(from, count, stride / 4),
-        ("TRIANGLES", _) if !count.is_multiple_of(3) => {
-            return Err(broken("has indices that do not make up whole triangles"));
-        }
-        ("TRIANGLES", 2) => meshopt::decode_index_buffer::<u16>(from, count).ok().map(|v| shorts(&v)),
-        ("TRIANGLES", _) => meshopt::decode_index_buffer::<u32>(from, count).ok().map(|v| words(&v)),
-        ("INDICES", 2) => meshopt::decode_index_sequence::<u16>(from, count).ok().map(|v| shorts(&v)),
-        ("INDICES", _) => meshopt::decode_index_sequence::<u32>(from, count).ok().map(|v| words(&v)),
-        _ => return Err(broken("has an unknown mode")),
+    let unpacked = match unpacked {
+        Some(unpacked) => unpacked,
+        None => guarded(DECODER, || unpack(packed, from)),
     };
-    let mut bytes = unpacked.ok_or_else(|| broken("cannot be decompressed"))?;
+    let mut bytes = unpacked?.ok_or_else(|| broken("cannot be decompressed"))?;
     cx.deadline.check()?;
+    let stride = packed.stride;
     match (filter, stride) {
         ("NONE", _) => {}
         ("OCTAHEDRAL", 4 | 8) => filters::octahedral(&mut bytes, stride as usize / 4),
@@ -65,6 +52,79 @@ pub fn decode(
         _ => return Err(broken(&format!("has the filter {filter:.20}, which does not go with {stride} bytes"))),
     }
     Ok(bytes)
+}
+
+/// What a view holds.
+#[derive(Clone, Copy, Debug)]
+pub struct Packed {
+    /// Its kind.
+    pub mode: Mode,
+    /// Its elements.
+    pub count: usize,
+    /// Bytes of an element.
+    pub stride: u64,
+}
+
+impl Packed {
+    /// Its bytes, unpacked.
+    pub fn bytes(&self) -> u64 {
+        (self.count as u64).saturating_mul(self.stride)
+    }
+}
+
+/// Checks what view `index` declares of its packed data.
+pub fn shape(index: usize, json: &Meshopt, view_bytes: u64) -> Result<Packed, MeshError> {
+    let broken = |what: &str| broken(index, what);
+    let (count, stride) = (json.count.0, json.byte_stride.0);
+    if count.checked_mul(stride).is_none_or(|size| size != view_bytes) {
+        return Err(broken(&format!("has {count} elements of {stride} bytes, and the view has {view_bytes} bytes")));
+    }
+    let is_attributes = json.mode == "ATTRIBUTES";
+    let is_good_stride =
+        if is_attributes { stride % 4 == 0 && (4..=256).contains(&stride) } else { [2, 4].contains(&stride) };
+    if !is_good_stride {
+        return Err(broken(&format!(
+            "has a stride of {stride} bytes, which is not allowed in the mode {:.20}",
+            json.mode
+        )));
+    }
+    let mode = match json.mode.as_str() {
+        "ATTRIBUTES" => Mode::Attributes,
+        "TRIANGLES" if !count.is_multiple_of(3) => {
+            return Err(broken("has indices that do not make up whole triangles"));
+        }
+        "TRIANGLES" => Mode::Triangles,
+        "INDICES" => Mode::Indices,
+        _ => return Err(broken("has an unknown mode")),
+    };
+    Ok(Packed { mode, count: count as usize, stride })
+}
+
+fn broken(index: usize, what: &str) -> MeshError {
+    MeshError::broken(format!("the compressed data of buffer view {index} of the glTF file {what}"))
+}
+
+/// What is packed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Vertices.
+    Attributes,
+    /// Indices of triangles.
+    Triangles,
+    /// Other indices.
+    Indices,
+}
+
+/// Unpacks elements, which were checked and paid for.
+pub fn unpack(packed: Packed, from: &[u8]) -> Option<Vec<u8>> {
+    let Packed { mode, count, stride } = packed;
+    match (mode, stride) {
+        (Mode::Attributes, _) => rows(from, count, stride / 4),
+        (Mode::Triangles, 2) => meshopt::decode_index_buffer::<u16>(from, count).ok().map(|v| shorts(&v)),
+        (Mode::Triangles, _) => meshopt::decode_index_buffer::<u32>(from, count).ok().map(|v| words(&v)),
+        (Mode::Indices, 2) => meshopt::decode_index_sequence::<u16>(from, count).ok().map(|v| shorts(&v)),
+        (Mode::Indices, _) => meshopt::decode_index_sequence::<u32>(from, count).ok().map(|v| words(&v)),
+    }
 }
 
 /// An element type for the codec, which is generic over types of the element's size.

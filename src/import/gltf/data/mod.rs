@@ -5,5 +5,7 @@ pub(crate) mod attribute;
 pub(crate) mod buffers;
 #[cfg_attr(not(feature = "meshopt"), path = "meshopt_absent.rs")]
 pub(crate) mod meshopt;
+#[cfg(all(feature = "meshopt", feature = "cli"))]
+pub(crate) mod meshopt_apart;
 #[cfg(feature = "meshopt")]
 pub(crate) mod meshopt_filters;

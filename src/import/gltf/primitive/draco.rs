@@ -2,6 +2,7 @@
 //! crate.
 //! <https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_draco_mesh_compression>
 
+use crate::guard::guarded;
 use crate::import::context::Context;
 use crate::import::gltf::data::accessor::{Reader, Shape};
 use crate::import::gltf::data::attribute::{INDICES, Rule};
@@ -53,8 +54,7 @@ impl<'a> Unpacked<'a> {
             .with_max_decoded_bytes(points.saturating_mul(POINT_VALUE_BYTES));
         let mut buffer = DecoderBuffer::new(view.bytes()).with_limits(limits);
         let mut mesh = draco_core::Mesh::new();
-        MeshDecoder::new()
-            .decode(&mut buffer, &mut mesh)
+        guarded("Draco", || MeshDecoder::new().decode(&mut buffer, &mut mesh))?
             .map_err(|error| broken(&what, &format!("cannot be decompressed: {}", text::foreign(error))))?;
         cx.deadline.check()?;
         let has = [mesh.num_faces() as u64, mesh.num_points() as u64];

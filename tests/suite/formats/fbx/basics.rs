@@ -18,7 +18,7 @@ type Writer = fn(&[Node]) -> Vec<u8>;
 const WRITERS: [(&str, Writer); 2] = [("ascii", ascii), ("binary", binary)];
 
 /// A box, shown by one node with these properties.
-fn cube(list: Vec<Node>) -> Vec<Node> {
+pub fn cube(list: Vec<Node>) -> Vec<Node> {
     let objects = vec![geometry(100, &Solid::cuboid(), vec![]), model(200, "Mesh", list)];
     file(1, objects, &[(200, 0, ""), (100, 200, "")])
 }
