@@ -432,30 +432,29 @@ mod tests {
     use crate::import::isolate::IsolationError;
     use crate::import::normalise;
     use crate::import::test_random::Random;
-    use std::sync::Mutex;
 
     const FILES: [&[u8]; 2] =
         [include_bytes!("../../../fuzz/seeds/fbx/cube.fbx"), include_bytes!("../../../fuzz/seeds/fbx/layers.fbx")];
 
     /// Answers in this process, and changes the answer.
-    struct Changed(Mutex<Box<dyn FnMut(Vec<u8>) -> Vec<u8> + Send>>);
+    struct Changed(Box<dyn Fn(Vec<u8>) -> Vec<u8> + Send + Sync>);
 
     impl Isolation for Changed {
         fn decode(&self, order: &Order<'_>, _: &Deadline) -> Result<Vec<u8>, IsolationError> {
             let answer = answer(&order.head[1..], order.file);
-            Ok(self.0.lock().unwrap()(answer))
+            Ok((self.0)(answer))
         }
     }
 
     /// What becomes of a file: its triangles, if the answer is believed and can be drawn.
-    fn outcome(file: &[u8], change: impl FnMut(Vec<u8>) -> Vec<u8> + Send + 'static) -> Result<usize, MeshError> {
+    fn outcome(file: &[u8], change: impl Fn(Vec<u8>) -> Vec<u8> + Send + Sync + 'static) -> Result<usize, MeshError> {
         let limits = Limits::default();
         let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
         let files = vec![BundleFile { path: "a.fbx".into(), bytes: file.to_vec().into() }];
         let folder = Folder::new(files, 0);
         let mut cx =
             Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
-        let raw = read(file, &Changed(Mutex::new(Box::new(change))), &mut cx)?;
+        let raw = read(file, &Changed(Box::new(change)), &mut cx)?;
         normalise(raw, &mut cx).map(|imported| imported.mesh.triangles.len())
     }
 
