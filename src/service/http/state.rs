@@ -73,6 +73,8 @@ impl AppState {
             idle_time: IDLE_TIME,
             job_time: Duration::from_millis(job_ms),
             result_ttl: Duration::from_millis(config.result_ttl_ms),
+            interactive_wait: Duration::from_millis(config.wait_ms),
+            batch_wait: Duration::from_millis(config.batch_wait_ms),
             unfetched_ttl: Duration::from_millis(config.unfetched_ttl_ms),
             result_bytes: config.result_bytes,
             result_count: to_usize(config.result_count),

@@ -264,3 +264,21 @@ fn capabilities_and_keys_know_of_meshes() {
         assert!(paths.contains(&path), "{path}: {paths:?}");
     }
 }
+
+#[test]
+fn a_key_deletes_its_own_meshes_and_sees_its_own_jobs() {
+    let mut command = meshsnap();
+    command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu"]).env("MESHSNAP_API_KEYS", "one,two");
+    let server = Server::start_with(&mut command);
+    let [one, two] = ["one", "two"].map(|key| format!("Authorization: Bearer {key}"));
+    let mesh = server.request("POST", "/v1/meshes", &[&one], CUBE_OBJ).header("location").unwrap().to_owned();
+    assert_eq!(server.request("POST", "/v1/meshes", &[&two], CUBE_OBJ).status, 200, "known");
+    server.request("DELETE", &mesh, &[&two], b"").problem(403, "not_yours");
+    assert_eq!(server.request("GET", &format!("{mesh}/render.png?size=16"), &[&two], b"").status, 200);
+    let job = server.request("POST", "/v1/jobs?size=16", &[&one], CUBE_OBJ).header("location").unwrap().to_owned();
+    for (method, path) in [("GET", job.clone()), ("DELETE", job.clone()), ("GET", format!("{job}/result"))] {
+        server.request(method, &path, &[&two], b"").problem(404, "not_found");
+    }
+    assert_eq!(server.request("GET", &job, &[&one, "Prefer: wait=30"], b"").json()["state"], "done");
+    assert_eq!(server.request("DELETE", &mesh, &[&one], b"").status, 204);
+}

@@ -2,10 +2,13 @@
 //! a slow client can hold a connection for ever.
 
 use std::io;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
+use axum::extract::connect_info::ConnectInfo;
+use axum::middleware::AddExtension;
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
 use hyper_util::server::conn::auto;
 use hyper_util::server::graceful::{GracefulShutdown, Watcher};
@@ -13,6 +16,7 @@ use hyper_util::service::TowerToHyperService;
 use tokio::io::AsyncWriteExt as _;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
+use tower_service::Service as _;
 
 use super::io::ClientStream;
 use crate::service::http::dto::ProblemDto;
@@ -20,6 +24,9 @@ use crate::service::http::error::{ApiError, Fault};
 
 /// Time that clients have to read their answers once the last job has ended.
 const CLOSING_TIME: Duration = Duration::from_secs(5);
+
+/// The routes, with the address of a connection's client.
+type Routes = AddExtension<Router, ConnectInfo<SocketAddr>>;
 
 /// The first bytes of every HTTP/2 connection.
 const HTTP2_PREFACE: &[u8; 24] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
@@ -33,7 +40,7 @@ pub async fn run(
     stop: impl Future<Output = ()>,
 ) {
     let server = Arc::new(server(header_timeout));
-    let service = TowerToHyperService::new(router);
+    let mut routes = router.into_make_service_with_connect_info::<SocketAddr>();
     let graceful = GracefulShutdown::new();
     let places = Arc::new(Semaphore::new(connections_max));
     let mut stop = std::pin::pin!(stop);
@@ -42,8 +49,8 @@ pub async fn run(
             accepted = listener.accept() => accepted,
             () = &mut stop => break,
         };
-        let stream = match accepted {
-            Ok((stream, _)) => stream,
+        let (stream, client) = match accepted {
+            Ok(accepted) => accepted,
             Err(error) => {
                 pause_after(&error).await;
                 continue;
@@ -55,7 +62,8 @@ pub async fn run(
             tokio::spawn(refuse(stream));
             continue;
         };
-        let (server, service, watcher) = (server.clone(), service.clone(), graceful.watcher());
+        let Ok(service) = routes.call(client).await;
+        let (server, service, watcher) = (server.clone(), TowerToHyperService::new(service), graceful.watcher());
         tokio::spawn(async move {
             serve_connection(&server, stream, service, watcher, header_timeout).await;
             drop(place);
@@ -84,7 +92,7 @@ fn server(header_timeout: Duration) -> auto::Builder<TokioExecutor> {
 async fn serve_connection(
     server: &auto::Builder<TokioExecutor>,
     stream: TcpStream,
-    service: TowerToHyperService<Router>,
+    service: TowerToHyperService<Routes>,
     watcher: Watcher,
     header_timeout: Duration,
 ) {

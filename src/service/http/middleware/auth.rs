@@ -1,33 +1,56 @@
-//! Authentication by bearer tokens.
+//! Authentication by bearer tokens, and whose request it is.
 
+use std::net::SocketAddr;
 use std::sync::Arc;
 
+use axum::extract::connect_info::ConnectInfo;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, header};
 use axum::middleware::Next;
 use axum::response::Response;
 
+use crate::service::digest::Digest;
 use crate::service::http::error::{ApiError, Fault};
 use crate::service::http::state::AppState;
+use crate::service::jobs::Owner;
 
-/// Passes a request on if no keys are configured or it carries one of them.
-pub async fn check(State(state): State<Arc<AppState>>, request: Request, next: Next) -> Result<Response, ApiError> {
-    if state.api_keys.is_empty() || has_key(&state.api_keys, request.headers()) {
+/// Passes a request on if no keys are configured or it carries one of them. Adds its [`Owner`].
+pub async fn check(State(state): State<Arc<AppState>>, mut request: Request, next: Next) -> Result<Response, ApiError> {
+    let owner = match state.api_keys.is_empty() {
+        true => Some(by_address(&request)),
+        false => key(&state.api_keys, request.headers()).map(by_key),
+    };
+    if let Some(owner) = owner {
+        request.extensions_mut().insert(owner);
         return Ok(next.run(request).await);
     }
     let detail = "this server wants an API key; send it as `Authorization: Bearer KEY`";
     Err(ApiError::new(Fault::Unauthorized, "unauthorized", detail).header(header::WWW_AUTHENTICATE, "Bearer"))
 }
 
-fn has_key(keys: &[String], headers: &HeaderMap) -> bool {
-    let Some(value) = headers.get(header::AUTHORIZATION).and_then(|v| v.to_str().ok()) else { return false };
-    let Some((scheme, token)) = value.split_once(' ') else { return false };
+/// Without keys, clients are told apart by their addresses.
+fn by_address(request: &Request) -> Owner {
+    let client = request.extensions().get::<ConnectInfo<SocketAddr>>();
+    client.map_or_else(Owner::default, |ConnectInfo(client)| Owner::new(&format!("address {}", client.ip())))
+}
+
+/// A key is named by its digest, because the name is stored.
+fn by_key(key: &str) -> Owner {
+    Owner::new(&format!("key {}", Digest::of(key.as_bytes())))
+}
+
+/// The key that a request carries.
+fn key<'k>(keys: &'k [String], headers: &HeaderMap) -> Option<&'k str> {
+    let value = headers.get(header::AUTHORIZATION).and_then(|v| v.to_str().ok())?;
+    let (scheme, token) = value.split_once(' ')?;
     // Every key is compared, so that the time does not tell which one nearly matched.
-    let mut found = false;
+    let mut found = None;
     for key in keys {
-        found |= equal_in_constant_time(key.as_bytes(), token.trim().as_bytes());
+        if equal_in_constant_time(key.as_bytes(), token.trim().as_bytes()) {
+            found = Some(key.as_str());
+        }
     }
-    found && scheme.eq_ignore_ascii_case("bearer")
+    found.filter(|_| scheme.eq_ignore_ascii_case("bearer"))
 }
 
 /// Equality in a time that depends on the lengths alone.
@@ -55,8 +78,8 @@ mod tests {
         ];
         for (value, expected) in cases {
             let headers = HeaderMap::from_iter([(header::AUTHORIZATION, value.parse().unwrap())]);
-            assert_eq!(has_key(&keys, &headers), expected, "{value}");
+            assert_eq!(key(&keys, &headers).is_some(), expected, "{value}");
         }
-        assert!(!has_key(&keys, &HeaderMap::new()));
+        assert_eq!(key(&keys, &HeaderMap::new()), None);
     }
 }
