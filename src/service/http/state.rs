@@ -13,6 +13,7 @@ use crate::limits::Limits;
 use crate::request::{self, Rules};
 use crate::service::durable::{Durable, Recovered};
 use crate::service::jobs::{CpuThreads, JobSettings, Jobs, Storage, UploadBudget, pipeline_renderers};
+use crate::service::metrics::Metrics;
 use crate::service::pictures::Pictures;
 use crate::service::residents::Residents;
 use crate::service::store::Store;
@@ -32,6 +33,8 @@ pub struct AppState {
     pub gpu: Arc<GpuHost>,
     /// The memory that uploads share.
     pub upload_budget: Arc<UploadBudget>,
+    /// Counters and gauges.
+    pub metrics: Arc<Metrics>,
     /// The data folder. None: nothing outlives the process.
     pub durable: Option<Durable>,
     /// The stored meshes.
@@ -67,6 +70,7 @@ impl AppState {
         let residents = Arc::new(Residents::new(config.resident_bytes));
         let renderers = pipeline_renderers(gpu.clone(), threads, config.limits.clone(), residents.clone());
         let Limits { queue_per_worker, job_ms, .. } = config.limits;
+        let metrics = Arc::new(Metrics::new().map_err(std::io::Error::other)?);
         let settings = JobSettings {
             workers: to_usize(config.workers),
             queue: to_usize(queue_per_worker.saturating_mul(config.workers)),
@@ -78,6 +82,7 @@ impl AppState {
             unfetched_ttl: Duration::from_millis(config.unfetched_ttl_ms),
             result_bytes: config.result_bytes,
             result_count: to_usize(config.result_count),
+            metrics: Some(metrics.clone()),
             storage: durable.clone().map(|durable| Storage { durable, describe: error::record }),
         };
         let rules = Rules { limits: config.limits.clone(), backend: config.backend };
@@ -90,6 +95,7 @@ impl AppState {
             upload_budget: UploadBudget::new(config.uploads_bytes),
             meshes: Store::with(durable.clone(), config.mesh_bytes, to_usize(config.mesh_count)),
             durable,
+            metrics,
             residents,
             pictures: Pictures::new(config.picture_bytes),
             body_timeout: Duration::from_millis(config.body_timeout_ms),

@@ -32,6 +32,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::durable::{Change, EndRecord, Hold, Unstored};
+use super::metrics::Metrics;
 use registry::JobRegistry;
 pub use registry::Restored;
 
@@ -60,6 +61,8 @@ pub struct JobSettings {
     pub result_count: usize,
     /// The data folder. None: kept jobs end with the process.
     pub storage: Option<Storage>,
+    /// Hears of waits, stages and ends.
+    pub metrics: Option<Arc<Metrics>>,
 }
 
 /// Reasons why a job was not accepted.
@@ -207,6 +210,11 @@ impl Jobs {
     /// The load at this moment.
     pub fn load(&self) -> JobLoad {
         self.registry.load()
+    }
+
+    /// Most bytes of kept results.
+    pub fn result_limit_bytes(&self) -> u64 {
+        self.registry.settings.result_bytes
     }
 
     /// Refuses new work from now on. Accepted jobs go on.

@@ -212,6 +212,9 @@ impl JobRegistry {
                     job.state.send_replace(JobState::Running);
                     // Its time begins now.
                     self.clock.notify_one();
+                    if let Some(metrics) = &self.settings.metrics {
+                        metrics.waited(job.class.name(), job.accepted.elapsed());
+                    }
                     if let Some(storage) = self.storage_of(&job) {
                         storage.durable.store_soon(vec![Change::Started(job.id.key())], Vec::new());
                     }
@@ -259,6 +262,7 @@ impl JobRegistry {
             return self.publish(&inner);
         }
         job.deadline.stop();
+        self.count(job, &state);
         if job.take_work().is_some() {
             inner.queue.remove(job);
         }
@@ -285,6 +289,17 @@ impl JobRegistry {
             }
             // It stays accepted in the data folder: after a restart it is done again.
             Err(_) => announce(state),
+        }
+    }
+
+    fn count(&self, job: &Job, state: &JobState) {
+        let Some(metrics) = &self.settings.metrics else { return };
+        metrics.ended(job.class.name(), state.name());
+        if let JobState::Done(finished) = state {
+            // Waiting has a metric of its own.
+            for (stage, took) in finished.timings.parts().into_iter().filter(|(stage, _)| *stage != "queue") {
+                metrics.stage(stage, finished.backend.name(), took);
+            }
         }
     }
 

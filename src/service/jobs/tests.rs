@@ -34,6 +34,7 @@ fn settings() -> JobSettings {
         result_bytes: 1000,
         result_count: 100,
         storage: None,
+        metrics: None,
     }
 }
 

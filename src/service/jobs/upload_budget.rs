@@ -38,6 +38,11 @@ impl UploadBudget {
         Reservation { budget: self.clone(), bytes: 0 }
     }
 
+    /// Most bytes.
+    pub fn limit_bytes(&self) -> u64 {
+        self.limit
+    }
+
     /// Bytes reserved at this moment.
     pub fn used_bytes(&self) -> u64 {
         self.used.load(Ordering::Relaxed)

@@ -36,6 +36,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "service/jobs",
         &[
+            "service/metrics",
             "service/durable",
             "service/digest",
             "service/residents",
@@ -52,6 +53,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     ("service/cache", &[]),
+    ("service/metrics", &[]),
     ("service/digest", &["import"]),
     ("service/durable", &["service/digest"]),
     ("service/residents", &["service/cache", "pipeline", "limits"]),
@@ -62,6 +64,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "service/http",
         &[
             "service/warm_up",
+            "service/metrics",
             "service/store",
             "service/durable",
             "service/digest",
@@ -129,6 +132,7 @@ const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("axum::", &["service/http/"]),
     ("sha2::", &["service/digest"]),
     ("redb::", &["service/durable/"]),
+    ("prometheus::", &["service/metrics"]),
     ("object_store::", &["service/durable/"]),
     ("quick_cache::", &["service/cache", "service/residents", "service/jobs/estimates"]),
     ("memmap2::", &["cli"]),

@@ -8,6 +8,7 @@ pub mod meshes;
 pub mod meshes_bad;
 pub mod meshes_pictures;
 pub mod meshes_room;
+pub mod metrics;
 pub mod mistakes;
 pub mod openapi;
 pub mod quality_target;

@@ -62,6 +62,7 @@ impl Process {
             result_bytes: 1 << 20,
             result_count: 10,
             storage: None,
+            metrics: None,
         };
         let renderers = pipeline_renderers(gpu, threads, Limits::default(), residents.clone());
         let jobs = Jobs::start(settings, renderers).unwrap();

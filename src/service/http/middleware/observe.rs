@@ -1,9 +1,10 @@
 //! The id of each request, its span in the log, and the body of its error.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use axum::body::Body;
-use axum::extract::Request;
+use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Version, header};
 use axum::middleware::Next;
 use axum::response::Response;
@@ -12,6 +13,7 @@ use tracing::Instrument as _;
 use super::drainable_body::DrainableBody;
 use crate::service::http::dto::ProblemDto;
 use crate::service::http::error::ApiError;
+use crate::service::http::state::AppState;
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
@@ -20,7 +22,7 @@ const LOGGED_PATH_CHARS_MAX: usize = 256;
 
 /// Gives the request an id and a span, logs how it ended, and turns errors into
 /// `application/problem+json`.
-pub async fn observe(request: Request, next: Next) -> Response {
+pub async fn observe(State(state): State<Arc<AppState>>, request: Request, next: Next) -> Response {
     let began = Instant::now();
     let id = request_id(request.headers());
     let path: String = request.uri().path().chars().take(LOGGED_PATH_CHARS_MAX).collect();
@@ -37,6 +39,7 @@ pub async fn observe(request: Request, next: Next) -> Response {
 
     let (status, duration_ms) = (response.status().as_u16(), began.elapsed().as_secs_f64() * 1e3);
     let code = response.extensions().get::<ApiError>().map(|e| (e.code, e.detail.clone()));
+    state.metrics.answered(status, code.as_ref().map(|(code, _)| *code));
     span.in_scope(|| match code {
         Some((code, detail)) if status >= 500 => tracing::warn!(status, duration_ms, code, detail, "answered"),
         Some((code, detail)) => tracing::info!(status, duration_ms, code, detail, "answered"),

@@ -6,6 +6,7 @@
 pub mod health;
 pub mod jobs;
 pub mod meshes;
+pub mod metrics;
 pub mod pictures;
 pub mod render;
 mod responses;

@@ -51,7 +51,9 @@ pub async fn get(
             let work = Work { owner, ..stored_mesh::work_on(&stored, reading, Task::Draw(Box::new(spec))) };
             run::draw(&state, work).await
         };
-        responses::found(&state.pictures.find(&tag, drawing).await?, Some(&tag))
+        let found = state.pictures.find(&tag, drawing).await?;
+        state.metrics.picture(found.source.name());
+        responses::found(&found, Some(&tag))
     };
     // The render key replaces the tag of the picture's bytes, which HEAD and 304 cannot know.
     for (name, value) in cached {

@@ -28,7 +28,9 @@ pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Resul
     let mut response = match key {
         Some(key) => {
             let tag = address.as_ref().map(|at| at.etag.as_str());
-            responses::found(&state.pictures.find(&key, drawing).await?, tag)
+            let found = state.pictures.find(&key, drawing).await?;
+            state.metrics.picture(found.source.name());
+            responses::found(&found, tag)
         }
         None => responses::picture(&*drawing.await?),
     };
