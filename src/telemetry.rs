@@ -8,7 +8,8 @@ use tracing_subscriber::filter::LevelFilter;
 /// Starts the log. `filter` has the syntax of `tracing`: `info`, or `warn,meshsnap::service=debug`.
 /// If `json` is None, the log is JSON unless standard error is a terminal.
 pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
-    let mut parsed = EnvFilter::try_new(filter).map_err(|e| {
+    let words = with_usual_words(filter);
+    let mut parsed = EnvFilter::try_new(words).map_err(|e| {
         format!("`log` is \"{filter}\", which is no filter ({e}); use error, warn, info, debug or trace")
     })?;
     // On each start wgpu warns that memory which both sides reach may be slow. What it is used for here is faster:
@@ -33,6 +34,22 @@ pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
     Ok(())
 }
 
+/// The filter with the levels under the names that `tracing` knows. It takes any other word for a target, and is then
+/// silent about everything else.
+fn with_usual_words(filter: &str) -> String {
+    let level = |word: &str| match word.trim().to_ascii_lowercase().as_str() {
+        "warning" => "warn".to_owned(),
+        "err" | "critical" | "fatal" => "error".to_owned(),
+        "information" | "notice" => "info".to_owned(),
+        _ => word.to_owned(),
+    };
+    let directive = |directive: &str| match directive.rsplit_once('=') {
+        Some((target, word)) => format!("{target}={}", level(word)),
+        None => level(directive),
+    };
+    filter.split(',').map(directive).collect::<Vec<_>>().join(",")
+}
+
 /// Sends panic messages to the log, in the log's format. The panics themselves are caught where
 /// jobs run.
 fn log_panics() {
@@ -42,4 +59,25 @@ fn log_panics() {
         let thread = std::thread::current().name().unwrap_or("unnamed").to_owned();
         tracing::error!(place, thread, "panic: {message}");
     }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_have_the_names_that_other_programs_use() {
+        let cases = [
+            ("warning", "warn"),
+            ("WARNING", "warn"),
+            ("info", "info"),
+            ("warning,hyper=debug", "warn,hyper=debug"),
+            ("error,hyper=warning", "error,hyper=warn"),
+        ];
+        for (given, expected) in cases {
+            assert_eq!(with_usual_words(given), expected);
+            let filter = EnvFilter::try_new(expected).unwrap();
+            assert!(filter.max_level_hint() > Some(LevelFilter::OFF), "{expected}");
+        }
+    }
 }

@@ -252,6 +252,8 @@ mod tests {
             ("limit-image-px = 8192", "from 1 to 4096"),
             ("limit-body-bytes = \"99999999999GiB\"", "whole number"),
             ("no-auth = \"maybe\"", "true or false"),
+            ("api-keys = \" , \"", "at least one key"),
+            ("api-keys = []", "at least one key"),
             ("listen = ", "cannot be read"),
             ("[limits]", "must be a plain value"),
         ];

@@ -192,7 +192,8 @@ fn set_log_format(config: &mut Config, value: &str) -> Result<(), String> {
 
 fn set_api_keys(config: &mut Config, value: &str) -> Result<(), String> {
     config.api_keys = value.split(',').map(str::trim).filter(|k| !k.is_empty()).map(str::to_owned).collect();
-    Ok(())
+    // A slip must not open the server to everybody.
+    if config.api_keys.is_empty() { Err("at least one key".into()) } else { Ok(()) }
 }
 
 const fn number(key: &'static str, help: &'static str, min: u64, max: u64, at: fn(&mut Config) -> &mut u64) -> Setting {

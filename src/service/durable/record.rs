@@ -53,6 +53,9 @@ pub struct JobRecord {
     /// The party that asked for it.
     #[serde(default)]
     pub owner: String,
+    /// The id of the request that brought it.
+    #[serde(default)]
+    pub request_id: String,
     /// The name of the stored mesh that is drawn.
     #[serde(with = "optional_digest", default)]
     pub mesh: Option<Digest>,

@@ -155,6 +155,7 @@ fn job(key: JobKey, file: &[u8]) -> JobRecord {
         format_in: None,
         entry: None,
         owner: String::new(),
+        request_id: String::new(),
         mesh: None,
     }
 }

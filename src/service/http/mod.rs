@@ -95,8 +95,15 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     let listener = TcpListener::bind(&*addresses).await.map_err(listen_error)?;
     let address = listener.local_addr()?;
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    // A terminal that is closed, or a tool that asks for new settings, does not end the server.
+    let mut hang_up = signal(SignalKind::hangup())?;
+    tokio::spawn(async move {
+        while hang_up.recv().await.is_some() {
+            tracing::info!("SIGHUP is ignored: settings are read at the start");
+        }
+    });
 
-    let (state, recovered) = AppState::start(config)?;
+    let (state, recovered) = AppState::start(config, address.ip().is_loopback())?;
     recovery::recover(&state, recovered);
     let router = router::router(&state);
     tracing::info!(%address, workers = config.workers, "ready");

@@ -110,8 +110,8 @@ fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Resul
     let reading = reading(record.format_in.as_deref(), record.entry.clone());
     let mesh_key = record.mesh.map(|digest| stored_mesh::key(digest, &reading));
     let (format_in, memory, recipe) = (reading.format_in, Arc::new(memory), Some(Arc::new(recipe)));
-    let owner = Owner::new(&record.owner);
-    Ok((Work { bundle, format_in, mesh_key, task, memory, recipe, owner, holds: [].into() }, holds))
+    let (owner, request_id) = (Owner::new(&record.owner), record.request_id.as_str().into());
+    Ok((Work { bundle, format_in, mesh_key, task, memory, recipe, owner, request_id, holds: [].into() }, holds))
 }
 
 /// The request is read again, under the limits of this process.

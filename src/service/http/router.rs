@@ -9,7 +9,7 @@ use axum::response::Response;
 use axum::routing::{MethodRouter, get, post};
 
 use super::error::ApiError;
-use super::middleware::{auth, observe};
+use super::middleware::{auth, observe, site};
 use super::resources::{health, jobs, meshes, metrics, pictures, render, schema};
 use super::state::AppState;
 
@@ -19,7 +19,8 @@ pub fn router(state: &Arc<AppState>) -> Router {
     let api = protected_routes()
         .into_iter()
         .fold(metrics, |router, (path, methods)| router.route(path, methods))
-        .route_layer(from_fn_with_state(state.clone(), auth::check));
+        .route_layer(from_fn_with_state(state.clone(), auth::check))
+        .route_layer(from_fn_with_state(state.clone(), site::check));
     Router::new()
         .route("/healthz", get(health::healthz))
         .route("/readyz", get(health::readyz))

@@ -47,6 +47,8 @@ pub struct AppState {
     pub body_timeout: Duration,
     /// Number of worker threads.
     pub workers: u64,
+    /// The server can be reached from this machine alone.
+    pub is_local: bool,
     /// Accepted bearer tokens. If there are none, no request needs one.
     pub api_keys: Vec<String>,
     draining: AtomicBool,
@@ -54,7 +56,7 @@ pub struct AppState {
 
 impl AppState {
     /// Builds the state and starts the workers. Returns what is in the data folder as well.
-    pub fn start(config: &Config) -> Result<(Arc<Self>, Recovered), ServeError> {
+    pub fn start(config: &Config, is_local: bool) -> Result<(Arc<Self>, Recovered), ServeError> {
         let (durable, recovered) = match &config.data_dir {
             Some(folder) if !config.ephemeral => {
                 let (durable, recovered) = Durable::open(folder)?;
@@ -100,6 +102,7 @@ impl AppState {
             pictures: Pictures::new(config.picture_bytes),
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             workers: config.workers,
+            is_local,
             api_keys: config.api_keys.clone(),
             draining: AtomicBool::new(false),
         });

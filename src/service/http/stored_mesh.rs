@@ -52,6 +52,7 @@ pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Reservatio
         memory,
         recipe: None,
         owner: Owner::default(),
+        request_id: "".into(),
         holds: [].into(),
     }
 }

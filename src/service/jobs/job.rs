@@ -69,6 +69,8 @@ pub struct Work {
     pub recipe: Option<Arc<Recipe>>,
     /// The party that asks for it.
     pub owner: Owner,
+    /// The id of the request, for the log.
+    pub request_id: Arc<str>,
     /// The bundle's files in the data folder, if they are there already.
     pub holds: Arc<[Arc<Hold>]>,
 }
@@ -264,6 +266,8 @@ pub struct Job {
     pub class: Class,
     /// The party that asked for it.
     pub owner: Owner,
+    /// The id of the request that brought it, for the log.
+    pub request_id: Arc<str>,
     /// Time of acceptance by this process.
     pub accepted: Instant,
     /// Time of acceptance in milliseconds since 1970, for clients.
@@ -326,6 +330,7 @@ impl Job {
             // What can be found by its id is fetched later.
             class: if is_kept { Class::Batch } else { Class::Interactive },
             owner,
+            request_id: work.as_ref().map_or_else(|| "".into(), |work| work.request_id.clone()),
             accepted: Instant::now(),
             accepted_unix_ms,
             is_durable,

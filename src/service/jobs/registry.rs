@@ -293,6 +293,15 @@ impl JobRegistry {
     }
 
     fn count(&self, job: &Job, state: &JobState) {
+        // Of a job that a client waits for, the answer is in the log.
+        if job.is_kept {
+            let (id, request_id, end) = (job.id, &*job.request_id, state.name());
+            let ms = job.accepted.elapsed().as_millis();
+            match state {
+                JobState::Failed(failure) => tracing::warn!(job = %id, request_id, ms, %failure, "a job failed"),
+                _ => tracing::info!(job = %id, request_id, ms, end, "a job ended"),
+            }
+        }
         let Some(metrics) = &self.settings.metrics else { return };
         metrics.ended(job.class.name(), state.name());
         if let JobState::Done(finished) = state {

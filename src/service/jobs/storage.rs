@@ -70,6 +70,7 @@ impl Storage {
             format_in: work.format_in.map(|format| format.name().to_owned()),
             entry: work.bundle.entry().map(str::to_owned),
             owner: work.owner.to_string(),
+            request_id: work.request_id.to_string(),
             mesh: recipe.mesh,
         };
         Ok((record, holds))

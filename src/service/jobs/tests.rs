@@ -50,6 +50,7 @@ fn work(budget: &Arc<UploadBudget>, mesh: &'static [u8]) -> Work {
         memory: Arc::new(reservation),
         recipe: None,
         owner: Owner::default(),
+        request_id: "".into(),
         holds: [].into(),
     }
 }

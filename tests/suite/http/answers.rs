@@ -151,7 +151,7 @@ fn the_process_says_how_it_is() {
     }
     assert!(["not opened", "none"].contains(&backend["gpu"]["state"].as_str().unwrap()), "{backend}");
     let mut stream = server.connect();
-    stream.write_all(b"HEAD /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n").unwrap();
+    stream.write_all(b"HEAD /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").unwrap();
     let mut head = String::new();
     stream.read_to_string(&mut head).unwrap();
     assert!(head.starts_with("HTTP/1.1 200") && head.ends_with("\r\n\r\n"), "{head}");
@@ -186,13 +186,17 @@ fn connections_are_reused_and_pipelined_answers_come_in_order() {
     let server = Server::start(&[]);
     let mut stream = server.connect();
     for _ in 0..3 {
-        stream.write_all(b"GET /version HTTP/1.1\r\nHost: x\r\n\r\nGET /healthz HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
+        stream
+            .write_all(
+                b"GET /version HTTP/1.1\r\nHost: localhost\r\n\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n",
+            )
+            .unwrap();
         assert_eq!(Answer::read(&mut stream).json()["name"], "meshsnap");
         assert_eq!(Answer::read(&mut stream).json()["status"], "ok");
     }
     // An error answer leaves the connection usable too.
-    stream.write_all(b"POST /v1/render?size=0 HTTP/1.1\r\nHost: x\r\nContent-Length: 0\r\n\r\n").unwrap();
+    stream.write_all(b"POST /v1/render?size=0 HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n").unwrap();
     Answer::read(&mut stream).problem(400, "out_of_range");
-    stream.write_all(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
+    stream.write_all(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
     assert_eq!(Answer::read(&mut stream).status, 200);
 }

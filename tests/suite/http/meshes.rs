@@ -34,7 +34,7 @@ pub fn form_of(files: &[(&str, &[u8])]) -> Vec<u8> {
 pub fn head(server: &Server, path: &str, headers: &[&str]) -> Answer {
     let mut stream = server.connect();
     let more: String = headers.iter().map(|h| format!("{h}\r\n")).collect();
-    write!(stream, "HEAD {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n{more}\r\n").unwrap();
+    write!(stream, "HEAD {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{more}\r\n").unwrap();
     let mut text = String::new();
     stream.read_to_string(&mut text).unwrap();
     assert!(text.ends_with("\r\n\r\n") && text.matches("\r\n\r\n").count() == 1, "a body after {text}");

@@ -2,6 +2,7 @@
 
 pub mod answers;
 pub mod bad;
+pub mod guards;
 pub mod jobs;
 pub mod kept;
 pub mod meshes;

@@ -82,6 +82,7 @@ impl Process {
             memory: Arc::new(memory),
             recipe: None,
             owner: Owner::default(),
+            request_id: "".into(),
             holds: [].into(),
         };
         self.jobs.submit(work, false).unwrap()

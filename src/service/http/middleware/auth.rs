@@ -1,6 +1,5 @@
 //! Authentication by bearer tokens, and whose request it is.
 
-use std::net::SocketAddr;
 use std::sync::Arc;
 
 use axum::extract::connect_info::ConnectInfo;
@@ -10,6 +9,7 @@ use axum::middleware::Next;
 use axum::response::Response;
 
 use crate::service::digest::Digest;
+use crate::service::http::connection::activity::Client;
 use crate::service::http::error::{ApiError, Fault};
 use crate::service::http::state::AppState;
 use crate::service::jobs::Owner;
@@ -30,8 +30,8 @@ pub async fn check(State(state): State<Arc<AppState>>, mut request: Request, nex
 
 /// Without keys, clients are told apart by their addresses.
 fn by_address(request: &Request) -> Owner {
-    let client = request.extensions().get::<ConnectInfo<SocketAddr>>();
-    client.map_or_else(Owner::default, |ConnectInfo(client)| Owner::new(&format!("address {}", client.ip())))
+    let client = request.extensions().get::<ConnectInfo<Client>>();
+    client.map_or_else(Owner::default, |ConnectInfo(client)| Owner::new(&format!("address {}", client.address.ip())))
 }
 
 /// A key is named by its digest, because the name is stored.

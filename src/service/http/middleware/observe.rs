@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use axum::body::Body;
+use axum::extract::connect_info::ConnectInfo;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Version, header};
 use axum::middleware::Next;
@@ -11,6 +12,7 @@ use axum::response::Response;
 use tracing::Instrument as _;
 
 use super::drainable_body::DrainableBody;
+use crate::service::http::connection::activity::Client;
 use crate::service::http::dto::ProblemDto;
 use crate::service::http::error::ApiError;
 use crate::service::http::state::AppState;
@@ -24,11 +26,14 @@ const LOGGED_PATH_CHARS_MAX: usize = 256;
 /// `application/problem+json`.
 pub async fn observe(State(state): State<Arc<AppState>>, request: Request, next: Next) -> Response {
     let began = Instant::now();
+    let client = request.extensions().get::<ConnectInfo<Client>>();
+    let _busy = client.map(|ConnectInfo(client)| client.activity.begin());
     let id = request_id(request.headers());
     let path: String = request.uri().path().chars().take(LOGGED_PATH_CHARS_MAX).collect();
     let span = tracing::info_span!("request", request_id = %id, method = %request.method(), path);
     let (headers, version) = (request.headers().clone(), request.version());
-    let (parts, body) = request.into_parts();
+    let (mut parts, body) = request.into_parts();
+    parts.extensions.insert(RequestId(id.as_str().into()));
     let (drainable, body) = DrainableBody::new(body);
     let mut response = next.run(Request::from_parts(parts, body)).instrument(span.clone()).await;
     add_id_and_problem(&mut response, &id);
@@ -46,6 +51,15 @@ pub async fn observe(State(state): State<Arc<AppState>>, request: Request, next:
         None => tracing::info!(status, duration_ms, "answered"),
     });
     response
+}
+
+/// The id of a request.
+#[derive(Clone)]
+struct RequestId(Arc<str>);
+
+/// The id that [`observe`] gave a request.
+pub fn id_of(request: &Request) -> Arc<str> {
+    request.extensions().get::<RequestId>().map_or_else(|| "".into(), |RequestId(id)| id.clone())
 }
 
 /// The client's own id, if it is safe in a log line and a header. A new one otherwise.

@@ -18,7 +18,7 @@ use crate::service::jobs::Class;
 pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
     let respond_async = negotiate::prefer(request.headers()).respond_async;
     let class = if respond_async { Class::Batch } else { Class::Interactive };
-    let Received { work, key, address } = receive::receive(&state, request, class).await?;
+    let Received { work, key, address, is_negotiated } = receive::receive(&state, request, class).await?;
     if respond_async {
         let mut response = responses::accepted(&*state.jobs.accept(work).await?);
         responses::set_preference_applied(&mut response, "respond-async");
@@ -34,6 +34,9 @@ pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Resul
         }
         None => responses::picture(&*drawing.await?),
     };
+    if is_negotiated {
+        response.headers_mut().insert(header::VARY, HeaderValue::from_static("accept"));
+    }
     if let Some((location, (name, etag))) =
         address.and_then(|at| Some((HeaderValue::from_str(&at.url).ok()?, conditional::etag(&at.etag))))
     {

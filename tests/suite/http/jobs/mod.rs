@@ -166,7 +166,7 @@ fn a_client_that_hangs_up_frees_its_worker() {
     for _ in 0..5 {
         let mut stream = server.connect();
         let length = CUBE_OBJ.len();
-        write!(stream, "POST {SLOW} HTTP/1.1\r\nHost: x\r\nContent-Length: {length}\r\n\r\n").unwrap();
+        write!(stream, "POST {SLOW} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {length}\r\n\r\n").unwrap();
         stream.write_all(CUBE_OBJ).unwrap();
         drop(stream);
     }
