@@ -13,6 +13,7 @@ mod progress;
 mod render;
 mod serve;
 mod settings;
+mod sign;
 
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -40,6 +41,8 @@ enum Command {
     Serve(serve::ServeArgs),
     /// Ask a running server whether it is healthy, for container health checks
     Health(health::HealthArgs),
+    /// Sign the address of a picture, so that it can be seen without an API key
+    Sign(sign::SignArgs),
     /// Print a completion script for a shell
     Completions {
         /// The shell
@@ -62,6 +65,7 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
+        Command::Sign(arguments) => sign::run(&arguments),
         Command::Completions { shell } => completions(shell),
     };
     // The panic hook has printed the message already.

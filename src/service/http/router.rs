@@ -10,7 +10,7 @@ use axum::routing::{MethodRouter, get, post};
 
 use super::error::ApiError;
 use super::middleware::{auth, observe, site};
-use super::resources::{health, jobs, meshes, metrics, pictures, render, schema};
+use super::resources::{front_page, health, jobs, meshes, metrics, pictures, render, schema};
 use super::state::AppState;
 
 /// The router of the whole interface.
@@ -22,6 +22,7 @@ pub fn router(state: &Arc<AppState>) -> Router {
         .route_layer(from_fn_with_state(state.clone(), auth::check))
         .route_layer(from_fn_with_state(state.clone(), site::check));
     Router::new()
+        .route("/", get(front_page::get))
         .route("/healthz", get(health::healthz))
         .route("/readyz", get(health::readyz))
         .route("/version", get(health::version))

@@ -187,6 +187,11 @@ impl Jobs {
         self.registry.restore(name, state, is_fetched, holds);
     }
 
+    /// Forgets a kept job that has ended, and its result.
+    pub fn forget(&self, job: &Job) {
+        self.registry.forget(job);
+    }
+
     /// A client has the end of a kept job: from now on it is kept for a while only.
     pub fn fetched(&self, job: &Job) {
         self.registry.fetched(job);

@@ -461,9 +461,21 @@ impl JobRegistry {
         (before + running) / u32::try_from(workers).unwrap_or(u32::MAX)
     }
 
+    /// Forgets a kept job that has ended.
+    pub fn forget(&self, job: &Job) {
+        let mut inner = self.lock();
+        let removed = inner.results.forget(job.id);
+        self.remove(&mut inner, removed);
+    }
+
     /// Drops results that are too old or too many.
     fn evict(&self, inner: &mut Inner) {
-        for id in inner.results.evict(&self.settings) {
+        let evicted = inner.results.evict(&self.settings);
+        self.remove(inner, evicted);
+    }
+
+    fn remove(&self, inner: &mut Inner, ids: impl IntoIterator<Item = JobId>) {
+        for id in ids {
             if let Some(job) = inner.kept.remove(&id)
                 && let Some(storage) = self.storage_of(&job)
             {

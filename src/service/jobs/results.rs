@@ -49,6 +49,12 @@ impl Results {
         is_first
     }
 
+    /// Removes one.
+    pub fn forget(&mut self, id: JobId) -> Option<JobId> {
+        let place = self.places.get(&id).copied()?;
+        self.remove(place)
+    }
+
     /// Removes what has expired, and then what is too much: first what was fetched, then the oldest of the owner
     /// that has the most, so that nobody's results make room for another's. The last one stays, however large.
     pub fn evict(&mut self, settings: &JobSettings) -> Vec<JobId> {

@@ -54,6 +54,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("service/cache", &[]),
     ("service/metrics", &[]),
+    ("service/signature", &[]),
     ("service/digest", &["import"]),
     ("service/durable", &["service/digest"]),
     ("service/residents", &["service/cache", "pipeline", "limits"]),
@@ -64,6 +65,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "service/http",
         &[
             "service/warm_up",
+            "service/signature",
             "service/metrics",
             "service/store",
             "service/durable",
@@ -93,6 +95,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "service/http",
             "service/jobs",
             "service/durable",
+            "service/signature",
             "pipeline",
             "report",
             "request",
@@ -130,7 +133,7 @@ const DIRECT_FILES_MAX: usize = 14;
 const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("wgpu::", &["backend/gpu/"]),
     ("axum::", &["service/http/"]),
-    ("sha2::", &["service/digest"]),
+    ("sha2::", &["service/digest", "service/signature"]),
     ("redb::", &["service/durable/"]),
     ("prometheus::", &["service/metrics"]),
     ("object_store::", &["service/durable/"]),

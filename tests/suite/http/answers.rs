@@ -95,10 +95,25 @@ fn a_form_brings_its_document_and_the_query_overrides_it() {
 }
 
 #[test]
+fn the_front_page_says_what_this_is() {
+    let server = Server::start(&[]);
+    let page = server.get("/");
+    assert_eq!((page.status, page.header("content-type")), (200, Some("text/html; charset=utf-8")));
+    let text = String::from_utf8(page.body).unwrap();
+    assert!(text.contains("curl --data-binary @model.obj 'http://localhost/v1/render?style=wire'"), "{text}");
+    for link in text.split("href=\"").skip(1).map(|rest| rest.split('"').next().unwrap()) {
+        assert_eq!(server.get(link).status, 200, "{link}");
+    }
+    // A host that could mean something in HTML or a shell is not written there.
+    let hostile = server.send("GET / HTTP/1.1\r\nHost: <script>\r\nConnection: close\r\n\r\n", b"");
+    assert!(!String::from_utf8_lossy(&hostile.body).contains("script"), "{hostile:?}");
+}
+
+#[test]
 fn paths_and_methods_that_are_not_there() {
     let server = Server::start(&[]);
     for path in
-        ["/", "/v1", "/v1/render/", "/v1/nothing", "/v1/jobs/x", "/v1/jobs/%ff", "/v1/jobs/../../etc/passwd", "/%00"]
+        ["/v1", "//", "/v1/render/", "/v1/nothing", "/v1/jobs/x", "/v1/jobs/%ff", "/v1/jobs/../../etc/passwd", "/%00"]
     {
         server.get(path).problem(404, "not_found");
     }

@@ -1,10 +1,11 @@
 //! Authentication by bearer tokens, and whose request it is.
 
 use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use axum::extract::connect_info::ConnectInfo;
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, header};
+use axum::http::{HeaderMap, Method, header};
 use axum::middleware::Next;
 use axum::response::Response;
 
@@ -13,12 +14,15 @@ use crate::service::http::connection::activity::Client;
 use crate::service::http::error::{ApiError, Fault};
 use crate::service::http::state::AppState;
 use crate::service::jobs::Owner;
+use crate::service::signature::Signed;
 
 /// Passes a request on if no keys are configured or it carries one of them. Adds its [`Owner`].
 pub async fn check(State(state): State<Arc<AppState>>, mut request: Request, next: Next) -> Result<Response, ApiError> {
+    let key_owner = key(&state.api_keys, request.headers()).map(by_key);
+    let signed_owner = unsign(&mut request, &state.api_keys, key_owner.is_some())?;
     let owner = match state.api_keys.is_empty() {
         true => Some(by_address(&request)),
-        false => key(&state.api_keys, request.headers()).map(by_key),
+        false => key_owner.or(signed_owner),
     };
     if let Some(owner) = owner {
         request.extensions_mut().insert(owner);
@@ -26,6 +30,28 @@ pub async fn check(State(state): State<Arc<AppState>>, mut request: Request, nex
     }
     let detail = "this server wants an API key; send it as `Authorization: Bearer KEY`";
     Err(ApiError::new(Fault::Unauthorized, "unauthorized", detail).header(header::WWW_AUTHENTICATE, "Bearer"))
+}
+
+/// Removes time of expiry and signature from the address of a picture. The owner whose key has signed it; an error if none
+/// has, unless the request has a key of its own or none is needed.
+fn unsign(request: &mut Request, keys: &[String], has_key: bool) -> Result<Option<Owner>, ApiError> {
+    let is_picture = request.uri().path().starts_with("/v1/meshes/") && request.uri().path().contains("/render.");
+    let is_reading = [Method::GET, Method::HEAD].contains(request.method());
+    let address = request.uri().path_and_query().map(|address| address.as_str().to_owned()).unwrap_or_default();
+    let Some(signed) = Signed::read(&address).filter(|_| is_picture && is_reading) else { return Ok(None) };
+    let owner = match signed.check(keys, unix_s()) {
+        Ok(key) => Some(by_key(key)),
+        Err(_) if has_key || keys.is_empty() => None,
+        Err(bad) => return Err(ApiError::new(Fault::Forbidden, "bad_signature", bad.to_string())),
+    };
+    if let Ok(plain) = signed.plain.parse() {
+        *request.uri_mut() = plain;
+    }
+    Ok(owner)
+}
+
+fn unix_s() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs()
 }
 
 /// Without keys, clients are told apart by their addresses.

@@ -43,16 +43,20 @@ pub async fn get(
     Ok(response)
 }
 
-/// Cancels a job that has not ended, and answers with its state.
+/// Cancels a job that has not ended, or forgets one that has, and answers with its state.
 pub async fn delete(
     State(state): State<Arc<AppState>>,
     Extension(owner): Extension<Owner>,
     id: PathName,
 ) -> Result<Response, ApiError> {
     let job = find(&state, &owner, id)?;
-    state.jobs.cancel(&job);
-    // The end may have to be stored first.
-    job.ended().await;
+    if job.state().is_final() {
+        state.jobs.forget(&job);
+    } else {
+        state.jobs.cancel(&job);
+        // The end may have to be stored first.
+        job.ended().await;
+    }
     Ok(responses::job_state(&job))
 }
 

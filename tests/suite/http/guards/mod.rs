@@ -175,3 +175,43 @@ fn idle_http2_connections_do_not_keep_others_out() {
     }
     assert!(pings > 6 && began.elapsed() > Duration::from_secs(1), "{pings} pings");
 }
+
+#[test]
+fn a_signed_address_shows_its_picture_and_nothing_else() {
+    let mut command = meshsnap();
+    command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu"]).env("MESHSNAP_API_KEYS", "one,two");
+    let server = Server::start_with(&mut command);
+    let mesh = server.request("POST", "/v1/meshes", &["Authorization: Bearer two"], CUBE_OBJ);
+    let mesh = mesh.header("location").unwrap().to_owned();
+    let sign = |url: &str, keys: &str, expires: &str| {
+        let output =
+            meshsnap().args(["sign", url, "--expires", expires]).env("MESHSNAP_API_KEYS", keys).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap().trim().to_owned()
+    };
+    let plain = format!("{mesh}/render.png?style=wire&size=24");
+    server.get(&plain).problem(401, "unauthorized");
+    let url = sign(&format!("http://pictures.example{plain}"), "two,three", "1h");
+    let path = url.strip_prefix("http://pictures.example").unwrap();
+    let signed = server.get(path);
+    signed.picture(24, 24);
+    let keyed = server.request("GET", &plain, &["Authorization: Bearer one"], b"");
+    assert_eq!((&signed.body, signed.header("etag")), (&keyed.body, keyed.header("etag")), "the same address");
+    assert_eq!(server.request("HEAD", path, &[], b"").status, 200);
+    // Another picture, another path, another method, another key, another time.
+    for changed in [path.replace("wire", "flat"), path.replace("png", "jpg"), path.replace("exp=", "exp=9")] {
+        server.get(&changed).problem(403, "bad_signature");
+    }
+    server.get(&sign(&plain, "three", "1h")).problem(403, "bad_signature");
+    let expired = sign(&plain, "one", "0s");
+    let detail = server.get(&expired).problem(403, "bad_signature");
+    assert!(detail.contains("expired"), "{detail}");
+    server.get(&sign(&mesh, "one", "1h")).problem(401, "unauthorized");
+    assert!(matches!(server.request("DELETE", path, &[], b"").status, 401 | 405));
+    assert_eq!(server.get(&plain).status, 401);
+
+    for (url, keys) in [("http://x/v1/jobs/1", "one"), ("x", "one"), (plain.as_str(), "")] {
+        let output = meshsnap().args(["sign", url]).env("MESHSNAP_API_KEYS", keys).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{url} {keys}");
+    }
+}

@@ -30,7 +30,10 @@ fn a_job_is_accepted_watched_and_fetched() {
     let same = server.post("/v1/render?style=wire&size=64", CUBE_OBJ);
     assert_eq!(result.body, same.body);
     assert_eq!(result.header("etag"), same.header("etag"));
+    assert!(state["accepted_at"].as_str().is_some_and(|at| at.len() == 24 && at.ends_with('Z')), "{state}");
     assert_eq!(server.request("DELETE", &location, &[], b"").json()["state"], "done", "nothing left to cancel");
+    server.get(&location).problem(404, "not_found");
+    server.wait_for_load(|load| load["kept_results"] == 0 && load["kept_result_bytes"] == 0);
 }
 
 #[test]
