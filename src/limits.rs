@@ -31,7 +31,7 @@ pub struct Limits {
     pub bundle_bytes: u64,
     /// Files of one bundle. Every entry of a zip archive counts, folders too.
     pub bundle_entries: u64,
-    /// Wall-clock time for one job, from acceptance to encoded image, milliseconds.
+    /// Wall-clock time for one job, from the moment at which a worker begins it to the encoded image, milliseconds.
     pub job_ms: u64,
     /// Jobs that wait per worker. A full queue refuses a job at once and never blocks.
     pub queue_per_worker: u64,

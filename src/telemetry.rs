@@ -8,10 +8,13 @@ use tracing_subscriber::filter::LevelFilter;
 /// Starts the log. `filter` has the syntax of `tracing`: `info`, or `warn,meshsnap::service=debug`.
 /// If `json` is None, the log is JSON unless standard error is a terminal.
 pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
-    let filter = level(filter).ok_or_else(|| {
-        format!("is \"{filter}\", which is no level; use off, error, warn, info, debug or trace, or PART=LEVEL")
-    })?;
-    let mut parsed = EnvFilter::try_new(filter).map_err(|e| {
+    let words = with_usual_words(filter);
+    if !is_known(&words) {
+        return Err(format!(
+            "is \"{filter}\", which is no level; use off, error, warn, info, debug or trace, or PART=LEVEL"
+        ));
+    }
+    let mut parsed = EnvFilter::try_new(words).map_err(|e| {
         format!("is \"{filter}\", which is no filter ({e}); use off, error, warn, info, debug or trace")
     })?;
     // On each start wgpu warns that memory which both sides reach may be slow. What it is used for here is faster:
@@ -36,16 +39,28 @@ pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
     Ok(())
 }
 
-/// A filter in which a single word is a level. `tracing` takes other words for parts of a program,
-/// and shows nothing of all others. None for a word that is neither.
-fn level(filter: &str) -> Option<&str> {
+/// True unless a filter is a single word that is no level. `tracing` takes such a word for a part of a program,
+/// and shows nothing of all others.
+fn is_known(filter: &str) -> bool {
     const LEVELS: [&str; 6] = ["off", "error", "warn", "info", "debug", "trace"];
-    let is_level = |word: &str| LEVELS.iter().any(|level| level.eq_ignore_ascii_case(word));
-    match filter.trim() {
-        word if word.eq_ignore_ascii_case("warning") => Some("warn"),
-        word if is_level(word) || !word.chars().all(char::is_alphabetic) || word == "meshsnap" => Some(word),
-        _ => None,
-    }
+    let word = filter.trim();
+    let is_level = LEVELS.iter().any(|level| level.eq_ignore_ascii_case(word));
+    is_level || !word.chars().all(char::is_alphabetic) || word == "meshsnap"
+}
+
+/// The filter with the levels under the names that `tracing` knows.
+fn with_usual_words(filter: &str) -> String {
+    let level = |word: &str| match word.trim().to_ascii_lowercase().as_str() {
+        "warning" => "warn".to_owned(),
+        "err" | "critical" | "fatal" => "error".to_owned(),
+        "information" | "notice" => "info".to_owned(),
+        _ => word.to_owned(),
+    };
+    let directive = |directive: &str| match directive.rsplit_once('=') {
+        Some((target, word)) => format!("{target}={}", level(word)),
+        None => level(directive),
+    };
+    filter.split(',').map(directive).collect::<Vec<_>>().join(",")
 }
 
 /// Sends panic messages to the log, in the log's format. The panics themselves are caught where
@@ -61,23 +76,31 @@ fn log_panics() {
 
 #[cfg(test)]
 mod tests {
-    use super::level;
+    use super::*;
 
     #[test]
     fn a_single_word_is_a_level() {
+        for filter in ["warn", "WARN", "off", "0", "meshsnap", "warn,hyper=debug"] {
+            assert!(is_known(filter), "{filter}");
+        }
+        for filter in ["verbose", "inof"] {
+            assert!(!is_known(filter), "{filter}");
+        }
+    }
+
+    #[test]
+    fn levels_have_the_names_that_other_programs_use() {
         let cases = [
-            ("warn", Some("warn")),
-            ("WARN", Some("WARN")),
-            ("warning", Some("warn")),
-            ("Warning", Some("warn")),
-            ("0", Some("0")),
-            ("meshsnap", Some("meshsnap")),
-            ("warn,hyper=debug", Some("warn,hyper=debug")),
-            ("verbose", None),
-            ("inof", None),
+            ("warning", "warn"),
+            ("WARNING", "warn"),
+            ("info", "info"),
+            ("warning,hyper=debug", "warn,hyper=debug"),
+            ("error,hyper=warning", "error,hyper=warn"),
         ];
-        for (filter, expected) in cases {
-            assert_eq!(level(filter), expected, "{filter}");
+        for (given, expected) in cases {
+            assert_eq!(with_usual_words(given), expected);
+            let filter = EnvFilter::try_new(expected).unwrap();
+            assert!(filter.max_level_hint() > Some(LevelFilter::OFF), "{expected}");
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
 
 use super::DrawError;
@@ -26,6 +26,8 @@ pub struct GpuHost {
     opening_changed: Condvar,
     /// Never held for long: reports must not wait for a driver.
     status: Mutex<GpuStatus>,
+    /// Devices that were lost since the start.
+    losses_in_all: AtomicU64,
     /// Jobs in a row that lost the device.
     losses: AtomicU32,
     costs: CostModel,
@@ -83,7 +85,17 @@ impl GpuHost {
         }
         let (device, status) = (Mutex::default(), Mutex::new(status));
         let (opening, opening_changed) = (Mutex::default(), Condvar::new());
-        Self { open, without, device, opening, opening_changed, status, losses: AtomicU32::new(0), costs }
+        Self {
+            open,
+            without,
+            device,
+            opening,
+            opening_changed,
+            status,
+            losses: AtomicU32::new(0),
+            losses_in_all: AtomicU64::new(0),
+            costs,
+        }
     }
 
     /// The status. Does not wait for an opening.
@@ -99,6 +111,11 @@ impl GpuHost {
     /// The costs of drawing here.
     pub(super) fn costs(&self) -> &CostModel {
         &self.costs
+    }
+
+    /// Devices that were lost since the start.
+    pub fn losses_in_all(&self) -> u64 {
+        self.losses_in_all.load(Ordering::Relaxed)
     }
 
     /// True as long as `auto` may choose a GPU.
@@ -269,6 +286,7 @@ impl GpuHost {
     /// Drops a lost device and reports it.
     fn retire(&self, device: Option<Arc<dyn GpuDevice>>, reason: &str) {
         tracing::warn!(reason, "the GPU was lost");
+        self.losses_in_all.fetch_add(1, Ordering::Relaxed);
         self.set_status(|status| {
             status.state = GpuState::Failed;
             status.reason = Some(format!("the GPU was lost: {reason}"));

@@ -17,6 +17,7 @@ mod render;
 mod serve;
 mod settings;
 mod siblings;
+mod sign;
 mod unfinished;
 
 use std::ffi::OsString;
@@ -56,6 +57,8 @@ enum Command {
     Serve(serve::ServeArgs),
     /// Ask a running server whether it is healthy, for container health checks
     Health(health::HealthArgs),
+    /// Sign the address of a picture, so that it can be seen without an API key
+    Sign(sign::SignArgs),
     /// Print a completion script for a shell
     Completions {
         /// The shell
@@ -100,6 +103,7 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
+        Command::Sign(arguments) => sign::run(&arguments),
         Command::Completions { shell } => completions(shell),
         Command::Man { command } => manual::print(Cli::command(), command.as_deref()),
     };

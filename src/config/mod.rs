@@ -49,6 +49,10 @@ pub struct Config {
     pub header_timeout_ms: u64,
     /// Longest time for the body of a request, milliseconds.
     pub body_timeout_ms: u64,
+    /// Longest time for which a request waits for a worker, as far as is known when it comes, milliseconds.
+    pub wait_ms: u64,
+    /// The same for a job that is fetched later.
+    pub batch_wait_ms: u64,
     /// Time for which the result of a job can be fetched again after the first time, milliseconds.
     pub result_ttl_ms: u64,
     /// Time for which the result of a job waits for being fetched, milliseconds.
@@ -89,6 +93,8 @@ impl Default for Config {
             uploads_bytes: 1 << 30,
             header_timeout_ms: 10_000,
             body_timeout_ms: 60_000,
+            wait_ms: 30_000,
+            batch_wait_ms: 600_000,
             result_ttl_ms: 600_000,
             unfetched_ttl_ms: 24 * 3600 * 1000,
             result_bytes: 256 << 20,
@@ -246,6 +252,8 @@ mod tests {
             ("limit-image-px = 8192", "from 1 to 4096"),
             ("limit-body-bytes = \"99999999999GiB\"", "whole number"),
             ("no-auth = \"maybe\"", "true or false"),
+            ("api-keys = \" , \"", "at least one key"),
+            ("api-keys = []", "at least one key"),
             ("listen = ", "cannot be read"),
             ("[limits]", "must be a plain value"),
         ];

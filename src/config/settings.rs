@@ -57,7 +57,7 @@ pub const SETTINGS: &[Setting] = &[
     number("worker-threads", "Threads within one CPU render; 0: the workers share the cores", 0, 1024, |c| {
         &mut c.worker_threads
     }),
-    number("queue", "Most jobs that wait for each worker", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
+    number("queue", "Most jobs of a class that wait for each worker", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
     text("backend", "Back-end of requests that name none: auto, gpu or cpu", set_backend, |c| {
         word_for(c.backend).into()
     }),
@@ -67,6 +67,8 @@ pub const SETTINGS: &[Setting] = &[
     number("uploads-bytes", "Most bytes of uploads in memory at a time", 1, u64::MAX, |c| &mut c.uploads_bytes),
     number("header-timeout-ms", "Longest time for the header of a request", 1, MS_MAX, |c| &mut c.header_timeout_ms),
     number("body-timeout-ms", "Longest time for the body of a request", 1, MS_MAX, |c| &mut c.body_timeout_ms),
+    number("wait-ms", "Longest time for which a request is let wait for a worker", 0, MS_MAX, |c| &mut c.wait_ms),
+    number("batch-wait-ms", "The same for a job that is fetched later", 0, MS_MAX, |c| &mut c.batch_wait_ms),
     number("result-ttl-ms", "Time for which a result is kept after it was fetched", 0, MS_MAX, |c| {
         &mut c.result_ttl_ms
     }),
@@ -105,7 +107,7 @@ pub const SETTINGS: &[Setting] = &[
     }),
     number("limit-bundle-bytes", "Most bytes of a bundle, unpacked", 1, u64::MAX, |c| &mut c.limits.bundle_bytes),
     number("limit-bundle-entries", "Most files of a bundle", 1, 1 << 16, |c| &mut c.limits.bundle_entries),
-    number("limit-job-ms", "Longest time for one job, including the queue", 1, MS_MAX, |c| &mut c.limits.job_ms),
+    number("limit-job-ms", "Longest time for one job, once a worker has begun it", 1, MS_MAX, |c| &mut c.limits.job_ms),
     number("limit-queue-per-worker", "The same as --queue", 0, 1 << 20, |c| &mut c.limits.queue_per_worker),
 ];
 
@@ -203,7 +205,8 @@ fn set_log_format(config: &mut Config, value: &str) -> Result<(), String> {
 
 fn set_api_keys(config: &mut Config, value: &str) -> Result<(), String> {
     config.api_keys = value.split(',').map(str::trim).filter(|k| !k.is_empty()).map(str::to_owned).collect();
-    Ok(())
+    // A slip must not open the server to everybody.
+    if config.api_keys.is_empty() { Err("at least one key".into()) } else { Ok(()) }
 }
 
 const fn number(key: &'static str, help: &'static str, min: u64, max: u64, at: fn(&mut Config) -> &mut u64) -> Setting {

@@ -50,6 +50,12 @@ pub struct JobRecord {
     pub format_in: Option<String>,
     /// The file that is the mesh, if the request names it.
     pub entry: Option<String>,
+    /// The party that asked for it.
+    #[serde(default)]
+    pub owner: String,
+    /// The id of the request that brought it.
+    #[serde(default)]
+    pub request_id: String,
     /// The name of the stored mesh that is drawn.
     #[serde(with = "optional_digest", default)]
     pub mesh: Option<Digest>,
@@ -168,6 +174,9 @@ pub struct MeshRecord {
     pub format_in: Option<String>,
     /// The file that is the mesh, if it was named.
     pub entry: Option<String>,
+    /// The party that stored it first.
+    #[serde(default)]
+    pub owner: String,
     /// The bytes of its report.
     #[serde(with = "digest")]
     pub report: Digest,

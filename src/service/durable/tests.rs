@@ -146,7 +146,18 @@ impl StorageBackend for Disk {
 fn job(key: JobKey, file: &[u8]) -> JobRecord {
     let request = RequestRecord { document: None, names_mesh: false, overrides: Vec::new(), format: "png".into() };
     let files = vec![FileRecord { path: "mesh".into(), digest: Digest::of(file) }];
-    JobRecord { key, accepted_unix_ms: 1, request, files, is_zip: false, format_in: None, entry: None, mesh: None }
+    JobRecord {
+        key,
+        accepted_unix_ms: 1,
+        request,
+        files,
+        is_zip: false,
+        format_in: None,
+        entry: None,
+        owner: String::new(),
+        request_id: String::new(),
+        mesh: None,
+    }
 }
 
 fn cancelled() -> Box<EndRecord> {

@@ -13,7 +13,7 @@ use crate::limits::LimitExceeded;
 use crate::pipeline::{PlanError, RenderError};
 use crate::request::RequestError;
 use crate::service::durable::{ErrorRecord, Unstored};
-use crate::service::jobs::{Failure, Refusal, UploadBudgetFull, name};
+use crate::service::jobs::{Class, Failure, Refusal, UploadBudgetFull, name};
 use crate::service::store::StoreError;
 
 /// Kinds of errors, by who is at fault. Each has one status.
@@ -23,6 +23,8 @@ pub enum Fault {
     BadRequest,
     /// The request has no valid API key.
     Unauthorized,
+    /// The request's API key does not permit it.
+    Forbidden,
     /// The path names nothing.
     NotFound,
     /// The path does not accept this method.
@@ -59,6 +61,7 @@ impl Fault {
         match self {
             Self::BadRequest => StatusCode::BAD_REQUEST,
             Self::Unauthorized => StatusCode::UNAUTHORIZED,
+            Self::Forbidden => StatusCode::FORBIDDEN,
             Self::NotFound => StatusCode::NOT_FOUND,
             Self::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
             Self::NotAcceptable => StatusCode::NOT_ACCEPTABLE,
@@ -208,9 +211,12 @@ impl From<Refusal> for ApiError {
                 let error = Self::new(Fault::Busy, "queue_full", detail);
                 error.flag("--queue").retry_after(retry_after_s)
             }
-            Refusal::TooLate { retry_after_s, .. } => {
-                let error = Self::new(Fault::Busy, "too_late", detail);
-                error.flag("--limit-job-ms").retry_after(retry_after_s)
+            Refusal::TooLate { class, retry_after_s, .. } => {
+                let flag = match class {
+                    Class::Interactive => "--wait-ms",
+                    Class::Batch => "--batch-wait-ms",
+                };
+                Self::new(Fault::Busy, "too_late", detail).flag(flag).retry_after(retry_after_s)
             }
             Refusal::Unstored(unstored) => unstored.into(),
             Refusal::Draining => Self::draining(detail),

@@ -96,8 +96,9 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     let listener = TcpListener::bind(&*addresses).await.map_err(listen_error)?;
     let address = listener.local_addr()?;
     let mut signals = EndSignals::new()?;
+    signals::ignore_hang_up()?;
 
-    let (state, recovered) = AppState::start(config)?;
+    let (state, recovered) = AppState::start(config, address.ip().is_loopback())?;
     recovery::recover(&state, recovered);
     let router = router::router(&state);
     tracing::info!(%address, workers = config.workers, "ready");
@@ -129,7 +130,9 @@ async fn drain(state: &Arc<AppState>, time_max: Duration) {
     let load = state.jobs.load();
     tracing::info!(queued = load.queued, running = load.running, "draining");
     state.drain();
-    if tokio::time::timeout(time_max, state.jobs.idle()).await.is_err() {
-        tracing::error!("some jobs did not end in time");
+    // Without a data folder, what waits is lost if it is not finished.
+    let waits = if state.durable.is_some() { Duration::ZERO } else { load.batch_wait.max(load.wait) * 2 };
+    if tokio::time::timeout(time_max + waits, state.jobs.idle()).await.is_err() {
+        tracing::warn!("some jobs did not end in time; those in a data folder are done at the next start");
     }
 }

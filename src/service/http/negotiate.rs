@@ -24,16 +24,16 @@ pub fn image_format(requested: Option<ImageFormat>, headers: &HeaderMap) -> Resu
         return Ok(ImageFormat::Png);
     }
     let ranges: Vec<(&str, f32)> = accept.iter().flat_map(|line| line.split(',')).filter_map(range).collect();
-    let scored = FORMATS.map(|format| (format, quality(media_type(format), &ranges)));
-    let mut best: Option<(ImageFormat, f32)> = None;
-    for (format, q) in scored {
-        if q > best.map_or(0.0, |(_, q)| q) {
-            best = Some((format, q));
+    let mut best: Option<(ImageFormat, (f32, u8))> = None;
+    for format in FORMATS {
+        let score = quality(media_type(format), &ranges);
+        if score.0 > 0.0 && best.is_none_or(|(_, best)| score > best) {
+            best = Some((format, score));
         }
     }
     best.map(|(format, _)| format).ok_or_else(|| {
         let detail = "the Accept header allows none of image/png, image/webp and image/jpeg";
-        ApiError::new(Fault::NotAcceptable, "not_acceptable", detail)
+        ApiError::new(Fault::NotAcceptable, "not_acceptable", detail).header(header::VARY, "accept")
     })
 }
 
@@ -46,8 +46,9 @@ fn range(text: &str) -> Option<(&str, f32)> {
     (0.0..=1.0).contains(&q).then_some((name, q))
 }
 
-/// The quality of a media type: that of the most specific range that matches it.
-fn quality(media_type: &str, ranges: &[(&str, f32)]) -> f32 {
+/// The quality of a media type, which is that of the most specific range that matches it, and how specific that is:
+/// a browser that names image/webp beside `image/*` likes it best.
+fn quality(media_type: &str, ranges: &[(&str, f32)]) -> (f32, u8) {
     let specificity = |name: &str| match name {
         _ if name.eq_ignore_ascii_case(media_type) => Some(2),
         _ if name.eq_ignore_ascii_case("image/*") => Some(1),
@@ -55,7 +56,7 @@ fn quality(media_type: &str, ranges: &[(&str, f32)]) -> f32 {
         _ => None,
     };
     let matching = ranges.iter().filter_map(|&(name, q)| specificity(name).map(|s| (s, q)));
-    matching.max_by_key(|&(s, _)| s).map_or(0.0, |(_, q)| q)
+    matching.max_by_key(|&(s, _)| s).map_or((0.0, 0), |(s, q)| (q, s))
 }
 
 /// The preferences in `Prefer`.
@@ -84,6 +85,11 @@ pub fn prefer(headers: &HeaderMap) -> Prefer {
     prefer
 }
 
+/// True if the answer depends on `Accept`.
+pub fn depends_on_accept(requested: Option<ImageFormat>) -> bool {
+    requested.is_none()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,6 +109,8 @@ mod tests {
             ("image/jpeg;q=0.5, image/webp;q=0.4", Some(Jpeg)),
             ("text/html,application/xhtml+xml,image/avif,image/webp,*/*;q=0.8", Some(Webp)),
             ("image/png;q=0, */*", Some(Webp)),
+            ("image/avif,image/webp,image/apng,image/svg+xml,image/*,*/*;q=0.8", Some(Webp)),
+            ("image/avif,image/webp,image/png,image/svg+xml,image/*;q=0.8,*/*;q=0.5", Some(Png)),
             ("IMAGE/PNG", Some(Png)),
             ("text/html", None),
             ("image/png;q=0", None),

@@ -9,7 +9,7 @@ use super::stored_mesh;
 use crate::import::{Bundle, BundleFile, Format};
 use crate::request;
 use crate::service::durable::{FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob};
-use crate::service::jobs::{Failure, JobId, JobState, Recipe, Task, Work, read_picture, value_of};
+use crate::service::jobs::{Failure, JobId, JobState, Owner, Recipe, Restored, Task, Work, read_picture, value_of};
 use crate::service::store::{NewMesh, Reading};
 
 /// How often a job may be begun by processes that then ended.
@@ -28,7 +28,11 @@ pub fn recover(state: &AppState, mut recovered: Recovered) {
     }
     let mut queued = 0;
     for job in jobs {
-        let name = (JobId::from_key(job.record.key), job.record.accepted_unix_ms);
+        let name = Restored {
+            id: JobId::from_key(job.record.key),
+            accepted_unix_ms: job.record.accepted_unix_ms,
+            owner: Owner::new(&job.record.owner),
+        };
         if job.end.is_some() {
             restore_result(state, &recovered, name, job);
             continue;
@@ -36,7 +40,7 @@ pub fn recover(state: &AppState, mut recovered: Recovered) {
         match resumed(state, &recovered, &job) {
             Ok((work, holds)) => {
                 queued += 1;
-                state.jobs.resume(name, work, holds);
+                state.jobs.resume((name.id, name.accepted_unix_ms), work, holds);
             }
             Err(failure) => state.jobs.restore(name, JobState::Failed(Arc::new(failure)), None, Vec::new()),
         }
@@ -53,13 +57,19 @@ fn restore_mesh(state: &AppState, recovered: &Recovered, record: MeshRecord) {
     let Some((report, hold)) = recovered.bytes(record.report) else { return };
     holds.push(hold);
     let reading = reading(record.format_in.as_deref(), record.entry);
-    let mesh = NewMesh { digest: record.digest, bundle: Bundle::of_files(files), reading, report };
+    let mesh = NewMesh {
+        digest: record.digest,
+        bundle: Bundle::of_files(files),
+        reading,
+        report,
+        owner: Owner::new(&record.owner),
+    };
     if let Err(error) = state.meshes.insert(mesh, holds.into()) {
         tracing::warn!(mesh = %record.digest, %error, "a stored mesh does not fit any more");
     }
 }
 
-fn restore_result(state: &AppState, recovered: &Recovered, name: (JobId, u64), job: RecoveredJob) {
+fn restore_result(state: &AppState, recovered: &Recovered, name: Restored, job: RecoveredJob) {
     let Some(mut end) = job.end else { return };
     let mut holds = Vec::new();
     let ended = match (end.picture.take(), end.error.take()) {
@@ -100,7 +110,8 @@ fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Resul
     let reading = reading(record.format_in.as_deref(), record.entry.clone());
     let mesh_key = record.mesh.map(|digest| stored_mesh::key(digest, &reading));
     let (format_in, memory, recipe) = (reading.format_in, Arc::new(memory), Some(Arc::new(recipe)));
-    Ok((Work { bundle, format_in, mesh_key, task, memory, recipe, holds: [].into() }, holds))
+    let (owner, request_id) = (Owner::new(&record.owner), record.request_id.as_str().into());
+    Ok((Work { bundle, format_in, mesh_key, task, memory, recipe, owner, request_id, holds: [].into() }, holds))
 }
 
 /// The request is read again, under the limits of this process.

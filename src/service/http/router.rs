@@ -4,22 +4,25 @@ use std::sync::Arc;
 
 use axum::Router;
 use axum::extract::{DefaultBodyLimit, State};
-use axum::middleware::{from_fn, from_fn_with_state};
+use axum::middleware::from_fn_with_state;
 use axum::response::Response;
 use axum::routing::{MethodRouter, get, post};
 
 use super::error::ApiError;
-use super::middleware::{auth, observe};
-use super::resources::{health, jobs, meshes, pictures, render, schema};
+use super::middleware::{auth, observe, site};
+use super::resources::{front_page, health, jobs, meshes, metrics, pictures, render, schema};
 use super::state::AppState;
 
 /// The router of the whole interface.
 pub fn router(state: &Arc<AppState>) -> Router {
+    let metrics = Router::new().route("/metrics", get(metrics::get));
     let api = protected_routes()
         .into_iter()
-        .fold(Router::new(), |router, (path, methods)| router.route(path, methods))
-        .route_layer(from_fn_with_state(state.clone(), auth::check));
+        .fold(metrics, |router, (path, methods)| router.route(path, methods))
+        .route_layer(from_fn_with_state(state.clone(), auth::check))
+        .route_layer(from_fn_with_state(state.clone(), site::check));
     Router::new()
+        .route("/", get(front_page::get))
         .route("/healthz", get(health::healthz))
         .route("/readyz", get(health::readyz))
         .route("/version", get(health::version))
@@ -33,7 +36,7 @@ pub fn router(state: &Arc<AppState>) -> Router {
         // Bodies, forms included, are metered as they are read. The limit of axum, 2 MB, would come
         // before `--limit-body-bytes`.
         .layer(DefaultBodyLimit::disable())
-        .layer(from_fn(observe::observe))
+        .layer(from_fn_with_state(state.clone(), observe::observe))
         .with_state(state.clone())
 }
 

@@ -1,4 +1,4 @@
-//! The signals that ask the server to end.
+//! The signals that ask the server to end, and one that does not.
 
 use std::io;
 
@@ -35,4 +35,20 @@ impl EndSignals {
             std::future::pending::<()>().await;
         }
     }
+}
+
+/// Keeps SIGHUP from ending the server: a terminal that is closed sends it, and tools that ask for new
+/// settings.
+pub fn ignore_hang_up() -> io::Result<()> {
+    #[cfg(unix)]
+    {
+        use tokio::signal::unix::{SignalKind, signal};
+        let mut hang_up = signal(SignalKind::hangup())?;
+        tokio::spawn(async move {
+            while hang_up.recv().await.is_some() {
+                tracing::info!("SIGHUP is ignored: settings are read at the start");
+            }
+        });
+    }
+    Ok(())
 }

@@ -13,6 +13,7 @@ use crate::limits::Limits;
 use crate::request::{self, Rules};
 use crate::service::durable::{Durable, Recovered};
 use crate::service::jobs::{CpuThreads, JobSettings, Jobs, Storage, UploadBudget, pipeline_renderers};
+use crate::service::metrics::Metrics;
 use crate::service::pictures::Pictures;
 use crate::service::residents::Residents;
 use crate::service::store::Store;
@@ -32,6 +33,8 @@ pub struct AppState {
     pub gpu: Arc<GpuHost>,
     /// The memory that uploads share.
     pub upload_budget: Arc<UploadBudget>,
+    /// Counters and gauges.
+    pub metrics: Arc<Metrics>,
     /// The data folder. None: nothing outlives the process.
     pub durable: Option<Durable>,
     /// The stored meshes.
@@ -44,6 +47,8 @@ pub struct AppState {
     pub body_timeout: Duration,
     /// Number of worker threads.
     pub workers: u64,
+    /// The server can be reached from this machine alone.
+    pub is_local: bool,
     /// Accepted bearer tokens. If there are none, no request needs one.
     pub api_keys: Vec<String>,
     draining: AtomicBool,
@@ -51,7 +56,7 @@ pub struct AppState {
 
 impl AppState {
     /// Builds the state and starts the workers. Returns what is in the data folder as well.
-    pub fn start(config: &Config) -> Result<(Arc<Self>, Recovered), ServeError> {
+    pub fn start(config: &Config, is_local: bool) -> Result<(Arc<Self>, Recovered), ServeError> {
         let (durable, recovered) = match &config.data_dir {
             Some(folder) if !config.ephemeral => {
                 let (durable, recovered) = Durable::open(folder)?;
@@ -67,15 +72,19 @@ impl AppState {
         let residents = Arc::new(Residents::new(config.resident_bytes));
         let renderers = pipeline_renderers(gpu.clone(), threads, config.limits.clone(), residents.clone());
         let Limits { queue_per_worker, job_ms, .. } = config.limits;
+        let metrics = Arc::new(Metrics::new().map_err(std::io::Error::other)?);
         let settings = JobSettings {
             workers: to_usize(config.workers),
             queue: to_usize(queue_per_worker.saturating_mul(config.workers)),
             idle_time: IDLE_TIME,
             job_time: Duration::from_millis(job_ms),
             result_ttl: Duration::from_millis(config.result_ttl_ms),
+            interactive_wait: Duration::from_millis(config.wait_ms),
+            batch_wait: Duration::from_millis(config.batch_wait_ms),
             unfetched_ttl: Duration::from_millis(config.unfetched_ttl_ms),
             result_bytes: config.result_bytes,
             result_count: to_usize(config.result_count),
+            metrics: Some(metrics.clone()),
             storage: durable.clone().map(|durable| Storage { durable, describe: error::record }),
         };
         let rules = Rules { limits: config.limits.clone(), backend: config.backend };
@@ -88,10 +97,12 @@ impl AppState {
             upload_budget: UploadBudget::new(config.uploads_bytes),
             meshes: Store::with(durable.clone(), config.mesh_bytes, to_usize(config.mesh_count)),
             durable,
+            metrics,
             residents,
             pictures: Pictures::new(config.picture_bytes),
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             workers: config.workers,
+            is_local,
             api_keys: config.api_keys.clone(),
             draining: AtomicBool::new(false),
         });

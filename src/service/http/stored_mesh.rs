@@ -6,7 +6,7 @@ use super::error::{ApiError, Fault};
 use super::state::AppState;
 use crate::import::Bundle;
 use crate::service::digest::Digest;
-use crate::service::jobs::{Reservation, Task, Work};
+use crate::service::jobs::{Owner, Reservation, Task, Work};
 use crate::service::store::{Reading, StoredMesh};
 
 /// The stored mesh with this name. None is a path segment that is not text.
@@ -44,5 +44,15 @@ pub fn key(digest: Digest, reading: &Reading) -> String {
 /// A worker's task on a bundle that is read in the given way.
 pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Reservation>) -> Work {
     let Reading { format_in, entry } = reading;
-    Work { bundle: bundle.with_entry(entry), format_in, mesh_key: None, task, memory, recipe: None, holds: [].into() }
+    Work {
+        bundle: bundle.with_entry(entry),
+        format_in,
+        mesh_key: None,
+        task,
+        memory,
+        recipe: None,
+        owner: Owner::default(),
+        request_id: "".into(),
+        holds: [].into(),
+    }
 }

@@ -8,6 +8,7 @@ use bytes::Bytes;
 use tokio::sync::watch;
 use uuid::Uuid;
 
+use super::class::{Class, Owner};
 use super::upload_budget::Reservation;
 use crate::backend::{BackendKind, DrawTimes};
 use crate::image::ImageFormat;
@@ -66,6 +67,10 @@ pub struct Work {
     /// The request that `task` was read from, so that it can be read again after a restart. None for work that
     /// nobody fetches later.
     pub recipe: Option<Arc<Recipe>>,
+    /// The party that asks for it.
+    pub owner: Owner,
+    /// The id of the request, for the log.
+    pub request_id: Arc<str>,
     /// The bundle's files in the data folder, if they are there already.
     pub holds: Arc<[Arc<Hold>]>,
 }
@@ -171,8 +176,8 @@ pub enum Failure {
     /// The pipeline failed.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// The job took too long, waiting included.
-    #[error("the job did not finish within {limit_ms} ms of being accepted")]
+    /// The job took too long.
+    #[error("the job did not finish within {limit_ms} ms after a worker began it")]
     TimeUp {
         /// The longest time allowed.
         limit_ms: u64,
@@ -257,6 +262,12 @@ pub struct Job {
     pub id: JobId,
     /// The job can be found by its id, also after its end.
     pub is_kept: bool,
+    /// How it waits.
+    pub class: Class,
+    /// The party that asked for it.
+    pub owner: Owner,
+    /// The id of the request that brought it, for the log.
+    pub request_id: Arc<str>,
     /// Time of acceptance by this process.
     pub accepted: Instant,
     /// Time of acceptance in milliseconds since 1970, for clients.
@@ -295,6 +306,8 @@ pub struct Size {
 pub struct Admission {
     /// The job can be found by its id.
     pub is_kept: bool,
+    /// The party that asked for it.
+    pub owner: Owner,
     /// It is in the data folder.
     pub is_durable: bool,
     /// Number in the order of acceptance.
@@ -310,10 +323,14 @@ pub struct Admission {
 impl Job {
     pub(super) fn new(work: Option<Work>, admission: Admission, name: Option<(JobId, u64)>) -> Self {
         let (id, accepted_unix_ms) = name.unwrap_or_else(|| (JobId::new(), unix_ms()));
-        let Admission { is_kept, is_durable, serial, size, estimate, rank } = admission;
+        let Admission { is_kept, owner, is_durable, serial, size, estimate, rank } = admission;
         Self {
             id,
             is_kept,
+            // What can be found by its id is fetched later.
+            class: if is_kept { Class::Batch } else { Class::Interactive },
+            owner,
+            request_id: work.as_ref().map_or_else(|| "".into(), |work| work.request_id.clone()),
             accepted: Instant::now(),
             accepted_unix_ms,
             is_durable,

@@ -4,13 +4,15 @@
 //! Architecture invariants: a full queue refuses at once and never waits. An accepted job is never
 //! dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
 //!
-//! Reading order: [`job`] (one job and its states), [`registry`] (all jobs, behind one lock), [`results`] (those
-//! that have ended), [`storage`] (jobs in the data folder), [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs),
+//! Reading order: [`job`] (one job and its states), [`queue`] (those that wait),
+//! [`registry`] (all jobs, behind one lock), [`results`] (those that have ended), [`storage`] (jobs in the data folder), [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs),
 //! [`upload_budget`] (memory of uploads).
 
+mod class;
 mod clock;
 mod estimates;
 mod job;
+mod queue;
 mod registry;
 mod results;
 mod storage;
@@ -19,6 +21,7 @@ mod tests;
 mod upload_budget;
 mod worker;
 
+pub use class::{Class, Owner};
 pub use job::{Failure, Finished, Job, JobId, JobState, Product, Recipe, Task, Timings, Work};
 pub use storage::{Storage, name, read_picture, value_of};
 pub use upload_budget::{Reservation, UploadBudget, UploadBudgetFull};
@@ -29,19 +32,25 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::durable::{Change, EndRecord, Hold, Unstored};
+use super::metrics::Metrics;
 use registry::JobRegistry;
+pub use registry::Restored;
 
 /// The limits of the job service.
 #[derive(Clone, Debug)]
 pub struct JobSettings {
     /// Number of worker threads.
     pub workers: usize,
-    /// Most jobs that wait, over all workers.
+    /// Most jobs of a class that wait, over all workers.
     pub queue: usize,
     /// Time without work after which a worker drops its renderer, and with it the memory in which it draws.
     pub idle_time: Duration,
-    /// Longest time from acceptance to the encoded picture.
+    /// Longest time from the moment at which a worker begins to the encoded picture.
     pub job_time: Duration,
+    /// Longest time for which a job is let wait that somebody waits for, as far as is known.
+    pub interactive_wait: Duration,
+    /// The same for a job that is fetched later.
+    pub batch_wait: Duration,
     /// Time for which the result of a kept job can be fetched again after the first time.
     pub result_ttl: Duration,
     /// Time for which a result waits for being fetched.
@@ -52,6 +61,8 @@ pub struct JobSettings {
     pub result_count: usize,
     /// The data folder. None: kept jobs end with the process.
     pub storage: Option<Storage>,
+    /// Hears of waits, stages and ends.
+    pub metrics: Option<Arc<Metrics>>,
 }
 
 /// Reasons why a job was not accepted.
@@ -65,18 +76,17 @@ pub enum Refusal {
         /// Seconds until a place should be free.
         retry_after_s: u64,
     },
-    /// The jobs that were accepted before would leave too little time.
+    /// The job would wait for too long.
     #[error(
-        "the work that was accepted before takes about {wait_ms} ms{}, which is too near to the limit of \
-         {limit_ms} ms; try again in {retry_after_s} s",
-        takes_ms.map(|ms| format!(" and this job {ms} ms")).unwrap_or_default()
+        "the work that was accepted before takes about {wait_ms} ms, and a job of this kind is let wait for \
+         {limit_ms} ms; try again in {retry_after_s} s"
     )]
     TooLate {
-        /// Time until a worker would be free, as far as is known.
+        /// The class of the job.
+        class: Class,
+        /// Time until it would begin, as far as is known.
         wait_ms: u64,
-        /// Time that the job itself takes, as far as is known; None before its upload.
-        takes_ms: Option<u64>,
-        /// The longest time that a job may take, waiting included.
+        /// The longest time for which it is let wait.
         limit_ms: u64,
         /// Seconds until there should be time enough.
         retry_after_s: u64,
@@ -94,10 +104,14 @@ pub enum Refusal {
 pub struct JobLoad {
     /// Number of jobs that wait.
     pub queued: usize,
+    /// The same by class.
+    pub queued_by_class: [usize; 2],
     /// Number of busy workers.
     pub running: usize,
-    /// Time after which a job that is accepted now would begin, as far as is known.
+    /// Time after which a job that somebody waits for would begin, as far as is known.
     pub wait: Duration,
+    /// The same for a job that is fetched later.
+    pub batch_wait: Duration,
     /// Number of ended jobs that can be found by their ids.
     pub kept: usize,
     /// Encoded bytes of their results.
@@ -157,13 +171,13 @@ impl Jobs {
     }
 
     /// Adds a job that has ended in an earlier process, or whose end is found out now.
-    pub fn restore(&self, name: (JobId, u64), state: JobState, end: Option<&EndRecord>, holds: Vec<Arc<Hold>>) {
+    pub fn restore(&self, name: Restored, state: JobState, end: Option<&EndRecord>, holds: Vec<Arc<Hold>>) {
         if end.is_none()
             && let Some(storage) = &self.registry.settings.storage
             && let Ok((record, holds)) = storage.of_end(&state)
         {
             storage.durable.store_surely(
-                vec![Change::Ended(name.0.key(), Box::new(record))],
+                vec![Change::Ended(name.id.key(), Box::new(record))],
                 holds,
                 Vec::new(),
                 |_| (),
@@ -173,14 +187,19 @@ impl Jobs {
         self.registry.restore(name, state, is_fetched, holds);
     }
 
+    /// Forgets a kept job that has ended, and its result.
+    pub fn forget(&self, job: &Job) {
+        self.registry.forget(job);
+    }
+
     /// A client has the end of a kept job: from now on it is kept for a while only.
     pub fn fetched(&self, job: &Job) {
         self.registry.fetched(job);
     }
 
     /// Checks that a job would be accepted now, so that a refusal can come before an upload.
-    pub fn would_accept(&self) -> Result<(), Refusal> {
-        self.registry.would_accept()
+    pub fn would_accept(&self, class: Class, owner: &Owner) -> Result<(), Refusal> {
+        self.registry.would_accept(class, owner)
     }
 
     /// A kept job.
@@ -196,6 +215,11 @@ impl Jobs {
     /// The load at this moment.
     pub fn load(&self) -> JobLoad {
         self.registry.load()
+    }
+
+    /// Most bytes of kept results.
+    pub fn result_limit_bytes(&self) -> u64 {
+        self.registry.settings.result_bytes
     }
 
     /// Refuses new work from now on. Accepted jobs go on.

@@ -6,10 +6,13 @@
 //! The queue is not a channel, because a cancelled or overdue job must leave it at once and free
 //! its place and its memory.
 //!
-//! Short jobs overtake long ones: a job ranks as if it had been accepted later by [`PATIENCE`] times its
-//! estimate, at most a quarter of the time that a job may take. A job is refused if it, or any job that it
-//! might overtake, would then not end within the other three quarters. So an accepted job ends in time, as
-//! far as the estimates are right: only what is accepted in the first quarter of its time can overtake it.
+//! Waiting and running are timed apart. A job's time begins when a worker begins it, so that no job fails because
+//! it has waited. A job that would wait for too long is refused when it comes, with the time after which it would
+//! not.
+//!
+//! Short jobs overtake long ones of the same owner: a job ranks as if it had been accepted later by [`PATIENCE`]
+//! times its estimate, at most a quarter of the time that a job may take. So what is accepted later than that
+//! cannot overtake it. Batch jobs leave one worker free for interactive ones, where there are several.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -17,8 +20,10 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
+use super::class::{Class, Owner};
 use super::estimates::Estimates;
 use super::job::{Admission, Job, JobId, JobState, Work, unix_ms};
+use super::queue::Queue;
 use super::results::Results;
 use super::storage::Storage;
 use super::{JobLoad, JobSettings, Refusal};
@@ -44,15 +49,10 @@ pub struct JobRegistry {
 
 #[derive(Default)]
 struct Inner {
-    /// By rank and number.
-    queue: BTreeMap<(Duration, u64), Arc<Job>>,
-    /// Number of jobs that have a place in the queue and are being stored.
-    storing: usize,
+    queue: Queue,
     /// Number of jobs whose end is being stored.
     ending: usize,
-    /// The estimates of all queued jobs together, and of those that are being stored.
-    queued_time: Duration,
-    /// Queued and running jobs in the order of acceptance, which is the order of their deadlines.
+    /// Queued and running jobs in the order of acceptance.
     active: BTreeMap<u64, Arc<Job>>,
     /// Jobs that occupy a worker, by number. A cancelled one may do so for a moment longer.
     running: HashMap<u64, Running>,
@@ -71,6 +71,16 @@ pub enum Next {
     Idle,
     /// It ends: there will be no more.
     End,
+}
+
+/// A job that has ended in an earlier process.
+pub struct Restored {
+    /// Its name.
+    pub id: JobId,
+    /// The time of its acceptance in milliseconds since 1970.
+    pub accepted_unix_ms: u64,
+    /// The party that asked for it.
+    pub owner: Owner,
 }
 
 /// A job that occupies a worker.
@@ -95,8 +105,8 @@ impl JobRegistry {
     }
 
     /// Checks that a job would be accepted now.
-    pub fn would_accept(&self) -> Result<(), Refusal> {
-        self.check(&self.lock(), None)
+    pub fn would_accept(&self, class: Class, owner: &Owner) -> Result<(), Refusal> {
+        self.check(&self.lock(), class, owner)
     }
 
     /// Queues work. A kept job can be found by its id until its result expires.
@@ -110,29 +120,28 @@ impl JobRegistry {
     pub fn admit(&self, work: Work, is_kept: bool, is_durable: bool) -> Result<Arc<Job>, Refusal> {
         let size = self.estimates.size(&work);
         let estimate = self.estimates.estimate(size).min(self.settings.job_time);
+        let owner = work.owner.clone();
         let mut inner = self.lock();
-        self.check(&inner, Some(estimate))?;
+        self.check(&inner, if is_kept { Class::Batch } else { Class::Interactive }, &owner)?;
         inner.serial += 1;
         let rank = self.began.elapsed() + (estimate * PATIENCE).min(self.settings.job_time / 4);
-        let admission = Admission { is_kept, is_durable, serial: inner.serial, size, estimate, rank };
-        inner.storing += 1;
-        inner.queued_time += estimate;
+        let admission = Admission { is_kept, owner, is_durable, serial: inner.serial, size, estimate, rank };
+        let job = Arc::new(Job::new(Some(work), admission, None));
+        inner.queue.reserve(job.class, &job.owner, estimate);
         self.publish(&inner);
-        Ok(Arc::new(Job::new(Some(work), admission, None)))
+        Ok(job)
     }
 
     /// Queues a job that has a place.
     pub fn enqueue(&self, job: &Arc<Job>) {
         let mut inner = self.lock();
-        inner.storing = inner.storing.saturating_sub(1);
         self.insert(&mut inner, job);
     }
 
     /// Gives the place of a job back.
     pub fn withdraw(&self, job: &Job) {
         let mut inner = self.lock();
-        inner.storing = inner.storing.saturating_sub(1);
-        inner.queued_time = inner.queued_time.saturating_sub(job.estimate);
+        inner.queue.withdraw(job);
         self.publish(&inner);
         self.wake_if_draining(&inner);
     }
@@ -144,23 +153,25 @@ impl JobRegistry {
         let estimate = self.estimates.estimate(size).min(self.settings.job_time);
         let mut inner = self.lock();
         inner.serial += 1;
-        let (serial, rank) = (inner.serial, Duration::ZERO);
-        let admission = Admission { is_kept: true, is_durable: true, serial, size, estimate, rank };
+        let (serial, rank, owner) = (inner.serial, Duration::ZERO, work.owner.clone());
+        let admission = Admission { is_kept: true, owner, is_durable: true, serial, size, estimate, rank };
         let job = Arc::new(Job::new(Some(work), admission, Some(name)));
         job.hold(holds);
-        inner.queued_time += estimate;
+        inner.queue.reserve(job.class, &job.owner, estimate);
         self.insert(&mut inner, &job);
         job
     }
 
     /// Adds a job that has ended in an earlier process.
-    pub fn restore(&self, name: (JobId, u64), state: JobState, is_fetched: bool, holds: Vec<Arc<Hold>>) {
+    pub fn restore(&self, name: Restored, state: JobState, is_fetched: bool, holds: Vec<Arc<Hold>>) {
+        let Restored { id, accepted_unix_ms, owner } = name;
+        let name = (id, accepted_unix_ms);
         let mut inner = self.lock();
-        let (size, none) = (self.estimates.no_size(), Duration::ZERO);
-        let admission = Admission { is_kept: true, is_durable: true, serial: 0, size, estimate: none, rank: none };
+        let (size, estimate, rank) = (self.estimates.no_size(), Duration::ZERO, Duration::ZERO);
+        let admission = Admission { is_kept: true, owner, is_durable: true, serial: 0, size, estimate, rank };
         let job = Arc::new(Job::new(None, admission, Some(name)));
         job.hold(holds);
-        inner.results.add(job.id, result_bytes(&state), is_fetched, &self.settings);
+        inner.results.add(&job, result_bytes(&state), is_fetched, &self.settings);
         job.state.send_replace(state);
         inner.kept.insert(job.id, job);
         self.evict(&mut inner);
@@ -168,7 +179,7 @@ impl JobRegistry {
     }
 
     fn insert(&self, inner: &mut Inner, job: &Arc<Job>) {
-        inner.queue.insert((job.rank, job.serial), job.clone());
+        inner.queue.insert(job);
         if inner.active.is_empty() {
             self.clock.notify_one();
         }
@@ -194,11 +205,16 @@ impl JobRegistry {
         let until = time_max.and_then(|time_max| Instant::now().checked_add(time_max));
         let mut inner = self.lock();
         loop {
-            if let Some((_, job)) = inner.queue.pop_first() {
-                inner.queued_time = inner.queued_time.saturating_sub(job.estimate);
+            let may_batch = self.batch_running(&inner) < self.batch_workers();
+            if let Some(job) = inner.queue.take(may_batch) {
                 if let Some(work) = job.take_work() {
                     inner.running.insert(job.serial, Running { job: job.clone(), since: Instant::now() });
                     job.state.send_replace(JobState::Running);
+                    // Its time begins now.
+                    self.clock.notify_one();
+                    if let Some(metrics) = &self.settings.metrics {
+                        metrics.waited(job.class.name(), job.accepted.elapsed());
+                    }
                     if let Some(storage) = self.storage_of(&job) {
                         storage.durable.store_soon(vec![Change::Started(job.id.key())], Vec::new());
                     }
@@ -208,7 +224,7 @@ impl JobRegistry {
                 continue;
             }
             // A job that is being stored has its place already.
-            if inner.draining && inner.storing == 0 {
+            if inner.draining && inner.queue.is_empty() {
                 return Next::End;
             }
             inner = match until.map(|until| until.saturating_duration_since(Instant::now())) {
@@ -222,6 +238,8 @@ impl JobRegistry {
     /// Ends the job of a worker, which is free again after `took`.
     pub fn finish(self: &Arc<Self>, job: &Arc<Job>, state: JobState, took: Duration) {
         let mut inner = self.lock();
+        // A batch job may wait for this one's end, although workers are idle.
+        self.work.notify_one();
         if let Some(running) = inner.running.remove(&job.serial)
             // What ended early says how long it takes only if that is longer than was thought.
             && (matches!(state, JobState::Done(_) | JobState::Inspected(_)) || took > job.estimate)
@@ -244,9 +262,9 @@ impl JobRegistry {
             return self.publish(&inner);
         }
         job.deadline.stop();
+        self.count(job, &state);
         if job.take_work().is_some() {
-            inner.queue.remove(&(job.rank, job.serial));
-            inner.queued_time = inner.queued_time.saturating_sub(job.estimate);
+            inner.queue.remove(job);
         }
         let Some(storage) = self.storage_of(job) else {
             self.announce(&mut inner, job, state);
@@ -274,10 +292,30 @@ impl JobRegistry {
         }
     }
 
+    fn count(&self, job: &Job, state: &JobState) {
+        // Of a job that a client waits for, the answer is in the log.
+        if job.is_kept {
+            let (id, request_id, end) = (job.id, &*job.request_id, state.name());
+            let ms = job.accepted.elapsed().as_millis();
+            match state {
+                JobState::Failed(failure) => tracing::warn!(job = %id, request_id, ms, %failure, "a job failed"),
+                _ => tracing::info!(job = %id, request_id, ms, end, "a job ended"),
+            }
+        }
+        let Some(metrics) = &self.settings.metrics else { return };
+        metrics.ended(job.class.name(), state.name());
+        if let JobState::Done(finished) = state {
+            // Waiting has a metric of its own.
+            for (stage, took) in finished.timings.parts().into_iter().filter(|(stage, _)| *stage != "queue") {
+                metrics.stage(stage, finished.backend.name(), took);
+            }
+        }
+    }
+
     /// Tells everybody that a job has ended.
     fn announce(&self, inner: &mut Inner, job: &Job, state: JobState) {
         if job.is_kept {
-            inner.results.add(job.id, result_bytes(&state), false, &self.settings);
+            inner.results.add(job, result_bytes(&state), false, &self.settings);
             self.evict(inner);
             self.clock.notify_one();
         }
@@ -310,8 +348,10 @@ impl JobRegistry {
         let inner = self.lock();
         JobLoad {
             queued: inner.queue.len(),
+            queued_by_class: Class::ALL.map(|class| inner.queue.count(class)),
             running: inner.running.len(),
-            wait: self.wait(&inner),
+            wait: self.wait(&inner, Class::Interactive, &Owner::default()),
+            batch_wait: self.wait(&inner, Class::Batch, &Owner::default()),
             kept: inner.results.count(),
             kept_bytes: inner.results.bytes(),
         }
@@ -336,16 +376,17 @@ impl JobRegistry {
         loop {
             self.evict(&mut inner);
             let now = Instant::now();
-            let late = |job: &&Arc<Job>| now.duration_since(job.accepted) >= self.settings.job_time;
-            let overdue: Vec<_> = inner.active.values().take_while(late).cloned().collect();
+            let active = |running: &&Running| inner.active.contains_key(&running.job.serial);
+            let late = |running: &&Running| now.duration_since(running.since) >= self.settings.job_time;
+            let running = || inner.running.values().filter(active);
+            let overdue: Vec<_> = running().filter(late).map(|running| running.job.clone()).collect();
             if !overdue.is_empty() {
                 return Some(overdue);
             }
-            if inner.draining && inner.active.is_empty() && inner.storing == 0 {
+            if inner.draining && inner.active.is_empty() && inner.queue.is_empty() {
                 return None;
             }
-            let next_deadline =
-                inner.active.values().next().and_then(|job| job.accepted.checked_add(self.settings.job_time));
+            let next_deadline = running().filter_map(|running| running.since.checked_add(self.settings.job_time)).min();
             let next_expiry = inner.results.next_expiry();
             inner = match next_deadline.into_iter().chain(next_expiry).min() {
                 Some(at) => {
@@ -357,45 +398,84 @@ impl JobRegistry {
         }
     }
 
-    /// Checks that a job may be accepted whose estimate is this, if it is known yet.
-    fn check(&self, inner: &Inner, estimate: Option<Duration>) -> Result<(), Refusal> {
+    /// Checks that a job of this class may be accepted from this owner.
+    fn check(&self, inner: &Inner, class: Class, owner: &Owner) -> Result<(), Refusal> {
         if inner.draining {
             return Err(Refusal::Draining);
         }
-        let queue = self.settings.queue;
         // Idle workers count as places, so that a queue of 0 accepts a job that can start at once.
-        let idle = self.settings.workers.saturating_sub(inner.running.len());
-        let wait = self.wait(inner);
-        let waiting = inner.queue.len() + inner.storing;
-        if waiting >= queue + idle {
-            return Err(Refusal::QueueFull { queue, retry_after_s: retry_after_s(wait) });
+        let (queue, idle) = (self.settings.queue, self.idle(inner, class));
+        let wait = self.wait(inner, class, owner);
+        // One owner leaves a quarter of the places to others.
+        let share = queue - queue / 4;
+        if inner.queue.count(class) >= queue + idle || inner.queue.count_of(class, owner) >= share + idle {
+            return Err(Refusal::QueueFull { queue: queue.min(share), retry_after_s: retry_after_s(wait) });
         }
-        let limit = self.settings.job_time;
-        let longest = inner.queue.values().map(|job| job.estimate).fold(estimate.unwrap_or_default(), Duration::max);
-        let ends = wait.saturating_add(longest);
-        // A job that begins at once is never refused for its estimate alone.
-        if waiting >= idle && ends > limit / 4 * 3 {
-            let (wait_ms, takes_ms) = (to_ms(wait), estimate.map(to_ms));
-            let retry_after_s = retry_after_s(ends - limit / 4 * 3);
-            return Err(Refusal::TooLate { wait_ms, takes_ms, limit_ms: to_ms(limit), retry_after_s });
+        let limit = self.wait_limit(class);
+        if wait > limit {
+            let (wait_ms, limit_ms) = (to_ms(wait), to_ms(limit));
+            return Err(Refusal::TooLate { class, wait_ms, limit_ms, retry_after_s: retry_after_s(wait - limit) });
         }
         Ok(())
     }
 
-    /// Time until the jobs that were accepted are done, as far as the estimates know. None while a worker is
+    fn wait_limit(&self, class: Class) -> Duration {
+        match class {
+            Class::Interactive => self.settings.interactive_wait,
+            Class::Batch => self.settings.batch_wait,
+        }
+    }
+
+    /// Workers that batch jobs may occupy. A client that waits for a picture finds the other one free, or finds it so
+    /// soon.
+    fn batch_workers(&self) -> usize {
+        self.settings.workers.saturating_sub(1).max(1)
+    }
+
+    fn batch_running(&self, inner: &Inner) -> usize {
+        inner.running.values().filter(|running| running.job.class == Class::Batch).count()
+    }
+
+    /// Workers that could begin a job of this class now, if none waited.
+    fn idle(&self, inner: &Inner, class: Class) -> usize {
+        let idle = self.settings.workers.saturating_sub(inner.running.len());
+        match class {
+            Class::Interactive => idle,
+            Class::Batch => idle.min(self.batch_workers().saturating_sub(self.batch_running(inner))),
+        }
+    }
+
+    /// Time until a job of this class and owner would begin, as far as the estimates know. None while a worker is
     /// idle.
-    fn wait(&self, inner: &Inner) -> Duration {
-        if inner.queue.len() + inner.storing + inner.running.len() < self.settings.workers {
+    fn wait(&self, inner: &Inner, class: Class, owner: &Owner) -> Duration {
+        if inner.queue.count(class) < self.idle(inner, class) {
             return Duration::ZERO;
         }
         let limit = self.settings.job_time;
         let running: Duration = inner.running.values().map(|running| running.remaining(limit)).sum();
-        (inner.queued_time + running) / u32::try_from(self.settings.workers.max(1)).unwrap_or(u32::MAX)
+        let before = match class {
+            Class::Interactive => inner.queue.time_before(class, owner),
+            Class::Batch => inner.queue.time_before(class, owner) + inner.queue.time(Class::Interactive),
+        };
+        let workers = if class == Class::Batch { self.batch_workers() } else { self.settings.workers.max(1) };
+        (before + running) / u32::try_from(workers).unwrap_or(u32::MAX)
+    }
+
+    /// Forgets a kept job that has ended.
+    pub fn forget(&self, job: &Job) {
+        let mut inner = self.lock();
+        let removed = inner.results.forget(job.id);
+        self.remove(&mut inner, removed);
     }
 
     /// Drops results that are too old or too many.
     fn evict(&self, inner: &mut Inner) {
-        for id in inner.results.evict(&self.settings) {
+        let evicted = inner.results.evict(&self.settings);
+        self.remove(inner, evicted);
+    }
+
+    fn remove(&self, inner: &mut Inner, ids: impl IntoIterator<Item = JobId>) {
+        for id in ids {
             if let Some(job) = inner.kept.remove(&id)
                 && let Some(storage) = self.storage_of(&job)
             {
@@ -405,7 +485,7 @@ impl JobRegistry {
     }
 
     fn publish(&self, inner: &Inner) {
-        self.outstanding.send_replace(inner.queue.len() + inner.running.len() + inner.storing + inner.ending);
+        self.outstanding.send_replace(inner.queue.len() + inner.running.len() + inner.ending);
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
@@ -418,7 +498,7 @@ impl Running {
     /// take as long again as it is late. It stops when its time is up.
     fn remaining(&self, limit: Duration) -> Duration {
         let so_far = self.since.elapsed();
-        so_far.abs_diff(self.job.estimate).min(limit.saturating_sub(self.job.accepted.elapsed()))
+        so_far.abs_diff(self.job.estimate).min(limit.saturating_sub(so_far))
     }
 }
 
@@ -426,9 +506,9 @@ fn result_bytes(state: &JobState) -> u64 {
     if let JobState::Done(finished) = state { finished.picture.len() as u64 } else { 0 }
 }
 
-/// Seconds after which to try again, between 1 and 30.
+/// Seconds after which to try again, at least 1 and at most an hour.
 fn retry_after_s(wait: Duration) -> u64 {
-    wait.as_secs_f64().ceil().clamp(1.0, 30.0) as u64
+    wait.as_secs_f64().ceil().clamp(1.0, 3600.0) as u64
 }
 
 fn to_ms(time: Duration) -> u64 {

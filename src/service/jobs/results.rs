@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant};
 
 use super::JobSettings;
-use super::job::JobId;
+use super::class::Owner;
+use super::job::{Job, JobId};
 
 /// The ended jobs, by the time at which they expire.
 #[derive(Default)]
@@ -14,19 +15,25 @@ pub struct Results {
     places: HashMap<JobId, (Instant, u64)>,
     bytes: u64,
     serial: u64,
+    /// What each owner has: bytes and number.
+    shares: HashMap<Owner, (u64, usize)>,
 }
 
 struct EndedJob {
     id: JobId,
+    owner: Owner,
     bytes: u64,
     is_fetched: bool,
 }
 
 impl Results {
     /// Adds a job that has ended, with the bytes of its result.
-    pub fn add(&mut self, id: JobId, bytes: u64, is_fetched: bool, settings: &JobSettings) {
+    pub fn add(&mut self, job: &Job, bytes: u64, is_fetched: bool, settings: &JobSettings) {
         self.bytes += bytes;
-        self.insert(EndedJob { id, bytes, is_fetched }, settings);
+        let (id, owner) = (job.id, job.owner.clone());
+        let share = self.shares.entry(owner.clone()).or_default();
+        *share = (share.0 + bytes, share.1 + 1);
+        self.insert(EndedJob { id, owner, bytes, is_fetched }, settings);
     }
 
     /// A client has fetched a result. True if it was the first time.
@@ -42,8 +49,14 @@ impl Results {
         is_first
     }
 
-    /// Removes what has expired, and then what is too much: what was fetched first, and what is oldest. The last
-    /// one stays, however large.
+    /// Removes one.
+    pub fn forget(&mut self, id: JobId) -> Option<JobId> {
+        let place = self.places.get(&id).copied()?;
+        self.remove(place)
+    }
+
+    /// Removes what has expired, and then what is too much: first what was fetched, then the oldest of the owner
+    /// that has the most, so that nobody's results make room for another's. The last one stays, however large.
     pub fn evict(&mut self, settings: &JobSettings) -> Vec<JobId> {
         let now = Instant::now();
         let mut evicted = Vec::new();
@@ -53,10 +66,12 @@ impl Results {
         while self.by_expiry.len() > 1
             && (self.bytes > settings.result_bytes || self.by_expiry.len() > settings.result_count)
         {
+            let is_large = self.bytes > settings.result_bytes;
+            let amount = |(bytes, count): &(u64, usize)| if is_large { *bytes } else { *count as u64 };
+            let owner = self.shares.iter().max_by_key(|(_, share)| amount(share)).map(|(owner, _)| owner.clone());
             let fetched = self.by_expiry.iter().find(|(_, ended)| ended.is_fetched);
-            let Some(place) = fetched.or_else(|| self.by_expiry.first_key_value()).map(|(&place, _)| place) else {
-                break;
-            };
+            let oldest = || self.by_expiry.iter().find(|(_, ended)| Some(&ended.owner) == owner.as_ref());
+            let Some(place) = fetched.or_else(oldest).map(|(&place, _)| place) else { break };
             evicted.extend(self.remove(place));
         }
         evicted
@@ -90,6 +105,12 @@ impl Results {
         let ended = self.by_expiry.remove(&place)?;
         self.places.remove(&ended.id);
         self.bytes -= ended.bytes;
+        if let Some(share) = self.shares.get_mut(&ended.owner) {
+            *share = (share.0.saturating_sub(ended.bytes), share.1.saturating_sub(1));
+            if share.1 == 0 {
+                self.shares.remove(&ended.owner);
+            }
+        }
         Some(ended.id)
     }
 }

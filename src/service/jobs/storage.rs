@@ -69,6 +69,8 @@ impl Storage {
             is_zip: work.bundle.is_zip(),
             format_in: work.format_in.map(|format| format.name().to_owned()),
             entry: work.bundle.entry().map(str::to_owned),
+            owner: work.owner.to_string(),
+            request_id: work.request_id.to_string(),
             mesh: recipe.mesh,
         };
         Ok((record, holds))

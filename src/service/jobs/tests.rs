@@ -27,11 +27,14 @@ fn settings() -> JobSettings {
         queue: 2,
         idle_time: SOON,
         job_time: Duration::from_secs(30),
+        interactive_wait: Duration::from_secs(30),
+        batch_wait: Duration::from_secs(600),
         result_ttl: Duration::from_secs(60),
         unfetched_ttl: Duration::from_secs(60),
         result_bytes: 1000,
         result_count: 100,
         storage: None,
+        metrics: None,
     }
 }
 
@@ -46,6 +49,8 @@ fn work(budget: &Arc<UploadBudget>, mesh: &'static [u8]) -> Work {
         task,
         memory: Arc::new(reservation),
         recipe: None,
+        owner: Owner::default(),
+        request_id: "".into(),
         holds: [].into(),
     }
 }
@@ -190,7 +195,7 @@ fn a_full_queue_refuses_at_once_and_takes_jobs_again_later() {
     // The gate is shut: a refusal that waited for a place would wait for ever.
     let refusal = fixture.submit(b"1", false).unwrap_err();
     assert!(matches!(refusal, Refusal::QueueFull { queue: 2, retry_after_s: 1.. }), "{refusal:?}");
-    assert_eq!(fixture.jobs.would_accept(), Err(refusal));
+    assert_eq!(fixture.jobs.would_accept(Class::Interactive, &Owner::default()), Err(refusal));
     fixture.open.send(()).unwrap();
     for job in waiting.iter().chain([&first]) {
         assert!(matches!(wait(job), JobState::Done(_)));
@@ -319,32 +324,105 @@ fn occupy_all(registry: &JobRegistry, budget: &Arc<UploadBudget>) {
 }
 
 #[test]
-fn a_job_that_cannot_end_in_time_is_refused_at_once() {
+fn a_job_that_would_wait_for_too_long_is_refused_at_once() {
     let (registry, budget) = registry(2, Duration::from_secs(1), Duration::from_secs(40));
     assert_eq!(registry.load().wait, Duration::ZERO);
     occupy_all(&registry, &budget);
     let accepted: Vec<_> = std::iter::from_fn(|| registry.submit(work(&budget, b"1"), false).ok()).take(500).collect();
-    // Each worker has one; 57 more, and the one that is asked for, fill the 30 s of both. A second or two more
-    // or less is the time that this took.
-    assert!((54..=60).contains(&accepted.len()), "{}", accepted.len());
+    // Each worker has one; 58 more fill the 30 s of both. A second or two more or less is the time that this took.
+    assert!((56..=62).contains(&accepted.len()), "{}", accepted.len());
     let refusal = registry.submit(work(&budget, b"1"), false).unwrap_err();
     assert!(
-        matches!(refusal, Refusal::TooLate { wait_ms: 27_000..=30_000, limit_ms: 40_000, retry_after_s: 1..=3, .. }),
+        matches!(refusal, Refusal::TooLate { wait_ms: 30_000..=32_000, limit_ms: 30_000, retry_after_s: 1..=3, .. }),
         "{refusal:?}"
     );
-    assert!(refusal.to_string().contains(" and this job "), "{refusal}");
-    assert!(!registry.would_accept().unwrap_err().to_string().contains("this job"), "nothing is known of it yet");
-    assert!(registry.load().wait > Duration::from_secs(27));
+    assert!(registry.load().wait > Duration::from_secs(28));
+    // Batch jobs may wait for longer.
+    assert!(registry.submit(work(&budget, b"1"), true).is_ok());
     accepted.iter().for_each(|job| registry.end(job, JobState::Cancelled));
     assert!(registry.submit(work(&budget, b"1"), false).is_ok(), "there is time again");
 }
 
 #[test]
-fn a_job_that_begins_at_once_is_never_refused_for_its_estimate() {
-    let (registry, budget) = registry(1, Duration::from_secs(1000), Duration::from_secs(4));
-    let job = registry.submit(report_on(&budget), false).unwrap();
-    assert_eq!(job.estimate, registry.settings.job_time, "no job takes longer");
-    assert!(matches!(registry.submit(report_on(&budget), false), Err(Refusal::TooLate { .. })));
+fn a_job_does_not_fail_because_it_has_waited() {
+    let fixture = fixture(JobSettings { job_time: Duration::from_millis(300), queue: 20, ..settings() });
+    let first = fixture.occupy();
+    let waiting: Vec<_> = (0..12).map(|_| fixture.submit(b"1", true).unwrap()).collect();
+    // The first one is out of time, and its renderer goes on for longer than any job may take.
+    assert!(matches!(wait(&first), JobState::Failed(_)));
+    std::thread::sleep(Duration::from_millis(400));
+    fixture.open.send(()).unwrap();
+    for job in &waiting {
+        assert!(matches!(wait(job), JobState::Done(_)), "{:?}", job.state());
+        assert!(job.accepted.elapsed() > Duration::from_millis(300));
+    }
+}
+
+/// Work of an owner.
+fn work_of(budget: &Arc<UploadBudget>, owner: &str) -> Work {
+    Work { owner: Owner::new(owner), ..work(budget, b"1") }
+}
+
+/// Takes the next job and does it.
+fn do_next(registry: &Arc<JobRegistry>) -> Arc<Job> {
+    let Next::Job(job, _) = registry.take(Some(Duration::ZERO)) else { panic!("no job") };
+    registry.finish(&job, JobState::Cancelled, Duration::ZERO);
+    job
+}
+
+#[test]
+fn a_thumbnail_does_not_wait_behind_batch_jobs_and_these_do_not_starve() {
+    let (registry, budget) = registry(1, Duration::from_secs(1), Duration::from_secs(40));
+    let batch: Vec<_> = (0..12).map(|_| registry.submit(work(&budget, b"1"), true).unwrap()).collect();
+    let thumbnails: Vec<_> = (0..8).map(|_| registry.submit(work(&budget, b"1"), false).unwrap()).collect();
+    let order: String = (0..20).map(|_| if do_next(&registry).class == Class::Batch { 'b' } else { 't' }).collect();
+    assert_eq!(order, "ttttbttttbbbbbbbbbbb");
+    drop((batch, thumbnails));
+    // Of several workers, one is left free for whoever waits.
+    let (registry, budget) = self::registry(3, Duration::from_secs(1), Duration::from_secs(40));
+    let jobs: Vec<_> = (0..5).map(|_| registry.submit(work(&budget, b"1"), true).unwrap()).collect();
+    let running: Vec<_> = (0..2).map(|_| registry.take(Some(Duration::ZERO))).collect();
+    assert!(running.iter().all(|next| matches!(next, Next::Job(..))));
+    assert!(matches!(registry.take(Some(Duration::ZERO)), Next::Idle), "for a client that waits");
+    registry.submit(work(&budget, b"1"), false).unwrap();
+    assert!(matches!(registry.take(Some(Duration::ZERO)), Next::Job(..)));
+    drop(jobs);
+}
+
+#[test]
+fn owners_take_turns_and_leave_places_to_each_other() {
+    let (registry, budget) = registry(1, Duration::from_secs(1), Duration::from_secs(40));
+    let submit = |owner: &str| registry.submit(work_of(&budget, owner), true);
+    (0..6).for_each(|_| _ = submit("a").unwrap());
+    assert_eq!(do_next(&registry).owner, Owner::new("a"));
+    (0..2).for_each(|_| _ = submit("b").unwrap());
+    (0..2).for_each(|_| _ = submit("c").unwrap());
+    let order: Vec<String> = (0..9).map(|_| do_next(&registry).owner.to_string()).collect();
+    assert!(order[..6].iter().filter(|owner| *owner == "a").count() <= 2, "{order:?}");
+    assert_eq!(order[6..], ["a", "a", "a"], "{order:?}");
+    assert_eq!(registry.load().queued, 0);
+
+    let (registry, budget) = self::registry(1, Duration::from_secs(1), Duration::from_secs(4000));
+    let submit = |owner: &str| registry.submit(work_of(&budget, owner), true);
+    let accepted = std::iter::from_fn(|| submit("a").ok()).take(2000).count();
+    assert!((500..=751).contains(&accepted), "{accepted}");
+    assert!(submit("a").is_err() && submit("b").is_ok(), "a quarter is left to others");
+    // Whoever sends little waits little.
+    let (light, heavy) = (submit("c").is_ok(), submit("a").unwrap_err().to_string());
+    assert!(light, "{heavy}");
+}
+
+#[test]
+fn one_clients_junk_does_not_cost_anothers_result() {
+    let fixture = fixture(JobSettings { result_count: 4, queue: 100, ..settings() });
+    let submit = |owner: &str| fixture.jobs.submit(work_of(&fixture.budget, owner), true).unwrap();
+    let theirs = submit("b");
+    wait(&theirs);
+    let junk: Vec<_> = (0..6).map(|_| submit("a")).collect();
+    junk.iter().for_each(|job| _ = wait(job));
+    assert!(fixture.jobs.find(theirs.id).is_some(), "the oldest, but of another client");
+    assert_eq!(fixture.jobs.load().kept, 4);
+    assert!(fixture.jobs.find(junk[5].id).is_some() && fixture.jobs.find(junk[0].id).is_none());
 }
 
 #[test]
@@ -360,17 +438,6 @@ fn short_jobs_overtake_long_ones_for_a_while() {
         assert_eq!(job.id, expected.id);
         registry.finish(&job, JobState::Cancelled, Duration::ZERO);
     }
-}
-
-/// However many short jobs overtake a long one, each worker has time for it.
-#[test]
-fn a_long_job_that_was_accepted_keeps_its_time() {
-    let (registry, budget) = registry(2, Duration::from_secs(20), Duration::from_secs(40));
-    occupy_all(&registry, &budget);
-    let long = registry.submit(report_on(&budget), false).unwrap();
-    let overtaking = std::iter::from_fn(|| registry.submit(work(&budget, b"1"), false).ok()).take(500);
-    let before: Duration = overtaking.filter(|job| job.rank < long.rank).map(|job| job.estimate).sum();
-    assert!(before >= Duration::from_secs(1) && before / 2 + long.estimate < Duration::from_secs(30), "{before:?}");
 }
 
 #[test]

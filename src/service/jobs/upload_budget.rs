@@ -9,6 +9,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct UploadBudget {
     used: AtomicU64,
     limit: u64,
+    /// How often it refused bytes.
+    refusals: AtomicU64,
 }
 
 /// The error when other uploads hold all the memory for uploads.
@@ -30,12 +32,23 @@ pub struct Reservation {
 impl UploadBudget {
     /// A budget of `limit` bytes.
     pub fn new(limit: u64) -> Arc<Self> {
-        Arc::new(Self { used: AtomicU64::new(0), limit })
+        Arc::new(Self { used: AtomicU64::new(0), limit, refusals: AtomicU64::new(0) })
     }
 
     /// An empty share, which grows as bytes arrive.
     pub fn reserve(self: &Arc<Self>) -> Reservation {
         Reservation { budget: self.clone(), bytes: 0 }
+    }
+
+    /// How often it refused bytes since the start. A client that holds some and sends nothing makes room when the
+    /// number grows.
+    pub fn refusals(&self) -> u64 {
+        self.refusals.load(Ordering::Relaxed)
+    }
+
+    /// Most bytes.
+    pub fn limit_bytes(&self) -> u64 {
+        self.limit
     }
 
     /// Bytes reserved at this moment.
@@ -49,10 +62,10 @@ impl Reservation {
     pub fn grow(&mut self, bytes: u64) -> Result<(), UploadBudgetFull> {
         let limit = self.budget.limit;
         let grown = |used: u64| used.checked_add(bytes).filter(|&sum| sum <= limit);
-        self.budget
-            .used
-            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, grown)
-            .map_err(|_| UploadBudgetFull { limit })?;
+        self.budget.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, grown).map_err(|_| {
+            self.budget.refusals.fetch_add(1, Ordering::Relaxed);
+            UploadBudgetFull { limit }
+        })?;
         self.bytes += bytes;
         Ok(())
     }

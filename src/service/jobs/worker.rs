@@ -105,7 +105,9 @@ pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
             Next::End => return,
         };
         let started = Instant::now();
+        let span = tracing::info_span!("job", job = %job.id, request_id = &*job.request_id);
         let attempt = catch_unwind(AssertUnwindSafe(|| {
+            let _entered = span.enter();
             let renderer = renderer.get_or_insert_with(|| renderers());
             run_job(renderer, &job, &work, started)
         }));

@@ -17,7 +17,7 @@ use bytes::Bytes;
 use crate::import::{Bundle, Format};
 use crate::service::digest::Digest;
 use crate::service::durable::{Change, Durable, Hold};
-use crate::service::jobs::{Reservation, UploadBudget};
+use crate::service::jobs::{Owner, Reservation, UploadBudget};
 
 /// The way in which a bundle is read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -39,6 +39,8 @@ pub struct NewMesh {
     pub reading: Reading,
     /// The report on its content, as JSON.
     pub report: Bytes,
+    /// The party that stored it first.
+    pub owner: Owner,
 }
 
 /// A mesh that is stored, or was stored when it was found.

@@ -4,7 +4,7 @@ fn mesh(name: &str, bytes: usize) -> NewMesh {
     let digest = Digest::of(name.as_bytes());
     // The path is "mesh", 4 bytes.
     let bundle = Bundle::of_one(vec![b'v'; bytes - 4]);
-    NewMesh { digest, bundle, reading: Reading::default(), report: Bytes::new() }
+    NewMesh { digest, bundle, reading: Reading::default(), report: Bytes::new(), owner: Owner::default() }
 }
 
 fn has(store: &Store, names: &[&str]) -> Vec<bool> {

@@ -38,6 +38,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "service/jobs",
         &[
+            "service/metrics",
             "service/durable",
             "service/digest",
             "service/residents",
@@ -54,6 +55,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     ("service/cache", &[]),
+    ("service/metrics", &[]),
+    ("service/signature", &[]),
     ("service/digest", &["import"]),
     ("service/durable", &["service/digest"]),
     ("service/residents", &["service/cache", "pipeline", "limits"]),
@@ -64,6 +67,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "service/http",
         &[
             "service/warm_up",
+            "service/signature",
+            "service/metrics",
             "service/store",
             "service/durable",
             "service/digest",
@@ -94,6 +99,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "service/http",
             "service/jobs",
             "service/durable",
+            "service/signature",
             "pipeline",
             "report",
             "request",
@@ -132,8 +138,9 @@ const DIRECT_FILES_MAX: usize = 14;
 const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("wgpu::", &["backend/gpu/"]),
     ("axum::", &["service/http/"]),
-    ("sha2::", &["service/digest"]),
+    ("sha2::", &["service/digest", "service/signature"]),
     ("redb::", &["service/durable/"]),
+    ("prometheus::", &["service/metrics"]),
     ("object_store::", &["service/durable/"]),
     ("quick_cache::", &["service/cache", "service/residents", "service/jobs/estimates"]),
     ("memmap2::", &["cli"]),

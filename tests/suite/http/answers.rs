@@ -95,10 +95,25 @@ fn a_form_brings_its_document_and_the_query_overrides_it() {
 }
 
 #[test]
+fn the_front_page_says_what_this_is() {
+    let server = Server::start(&[]);
+    let page = server.get("/");
+    assert_eq!((page.status, page.header("content-type")), (200, Some("text/html; charset=utf-8")));
+    let text = String::from_utf8(page.body).unwrap();
+    assert!(text.contains("curl --data-binary @model.obj 'http://localhost/v1/render?style=wire'"), "{text}");
+    for link in text.split("href=\"").skip(1).map(|rest| rest.split('"').next().unwrap()) {
+        assert_eq!(server.get(link).status, 200, "{link}");
+    }
+    // A host that could mean something in HTML or a shell is not written there.
+    let hostile = server.send("GET / HTTP/1.1\r\nHost: <script>\r\nConnection: close\r\n\r\n", b"");
+    assert!(!String::from_utf8_lossy(&hostile.body).contains("script"), "{hostile:?}");
+}
+
+#[test]
 fn paths_and_methods_that_are_not_there() {
     let server = Server::start(&[]);
     for path in
-        ["/", "/v1", "/v1/render/", "/v1/nothing", "/v1/jobs/x", "/v1/jobs/%ff", "/v1/jobs/../../etc/passwd", "/%00"]
+        ["/v1", "//", "/v1/render/", "/v1/nothing", "/v1/jobs/x", "/v1/jobs/%ff", "/v1/jobs/../../etc/passwd", "/%00"]
     {
         server.get(path).problem(404, "not_found");
     }
@@ -151,7 +166,7 @@ fn the_process_says_how_it_is() {
     }
     assert!(["not opened", "none"].contains(&backend["gpu"]["state"].as_str().unwrap()), "{backend}");
     let mut stream = server.connect();
-    stream.write_all(b"HEAD /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n").unwrap();
+    stream.write_all(b"HEAD /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").unwrap();
     let mut head = String::new();
     stream.read_to_string(&mut head).unwrap();
     assert!(head.starts_with("HTTP/1.1 200") && head.ends_with("\r\n\r\n"), "{head}");
@@ -186,13 +201,17 @@ fn connections_are_reused_and_pipelined_answers_come_in_order() {
     let server = Server::start(&[]);
     let mut stream = server.connect();
     for _ in 0..3 {
-        stream.write_all(b"GET /version HTTP/1.1\r\nHost: x\r\n\r\nGET /healthz HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
+        stream
+            .write_all(
+                b"GET /version HTTP/1.1\r\nHost: localhost\r\n\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n",
+            )
+            .unwrap();
         assert_eq!(Answer::read(&mut stream).json()["name"], "meshsnap");
         assert_eq!(Answer::read(&mut stream).json()["status"], "ok");
     }
     // An error answer leaves the connection usable too.
-    stream.write_all(b"POST /v1/render?size=0 HTTP/1.1\r\nHost: x\r\nContent-Length: 0\r\n\r\n").unwrap();
+    stream.write_all(b"POST /v1/render?size=0 HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n").unwrap();
     Answer::read(&mut stream).problem(400, "out_of_range");
-    stream.write_all(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
+    stream.write_all(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
     assert_eq!(Answer::read(&mut stream).status, 200);
 }

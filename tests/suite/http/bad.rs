@@ -108,14 +108,15 @@ fn bytes_that_are_no_mesh_are_a_precise_4xx() {
 fn a_huge_announced_body_is_refused_at_once_and_unread() {
     let server = Server::start(&[]);
     for expect in ["", "Expect: 100-continue\r\n"] {
-        let head = format!("POST /v1/render HTTP/1.1\r\nHost: x\r\nContent-Length: 10000000000\r\n{expect}\r\n");
+        let head =
+            format!("POST /v1/render HTTP/1.1\r\nHost: localhost\r\nContent-Length: 10000000000\r\n{expect}\r\n");
         // An answer at all is the proof: the announced bytes are never sent.
         let answer = server.send(&head, b"");
         let detail = answer.problem(413, "body_too_large");
         assert!(detail.contains("67108864") && answer.json()["flag"] == "--limit-body-bytes", "{detail}");
     }
     // A length beyond u64 is HTTP that cannot be read.
-    let head = "POST /v1/render HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999999999999999999\r\n\r\n";
+    let head = "POST /v1/render HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999999999999999\r\n\r\n";
     assert_eq!(server.send(head, b"").status, 400);
     server.post("/v1/render?size=16", CUBE_OBJ).picture(16, 16);
 }
@@ -126,7 +127,7 @@ fn a_client_that_sends_on_still_hears_the_413() {
     for chunked in [false, true] {
         let mut stream = server.connect();
         let length = if chunked { "Transfer-Encoding: chunked" } else { "Content-Length: 50000000" };
-        write!(stream, "POST /v1/render HTTP/1.1\r\nHost: x\r\n{length}\r\n\r\n").unwrap();
+        write!(stream, "POST /v1/render HTTP/1.1\r\nHost: localhost\r\n{length}\r\n\r\n").unwrap();
         let chunk = vec![b'v'; 0x4000];
         for _ in 0..200 {
             let sent = if chunked {
@@ -159,7 +160,8 @@ fn uploads_share_their_memory() {
 #[test]
 fn slow_clients_are_let_go() {
     let server = Server::start(&["--header-timeout-ms", "300", "--body-timeout-ms", "300"]);
-    let beginnings: [&[u8]; 4] = [b"", b"PRI * HT", b"GET /healthz HTT", b"GET /healthz HTTP/1.1\r\nHost: x\r\n"];
+    let beginnings: [&[u8]; 4] =
+        [b"", b"PRI * HT", b"GET /healthz HTT", b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n"];
     for beginning in beginnings {
         let mut stream = server.connect();
         stream.write_all(beginning).unwrap();
@@ -170,7 +172,7 @@ fn slow_clients_are_let_go() {
             assert!(!is_guard, "{:?} is held", String::from_utf8_lossy(beginning));
         }
     }
-    let head = "POST /v1/render HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\nv 1 2 3\n";
+    let head = "POST /v1/render HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\nv 1 2 3\n";
     server.send(head, b"").problem(408, "body_timeout");
 }
 
@@ -179,7 +181,9 @@ fn a_body_that_ends_early_costs_nothing() {
     let server = Server::start(&["--workers", "1"]);
     for _ in 0..20 {
         let mut stream = server.connect();
-        stream.write_all(b"POST /v1/render HTTP/1.1\r\nHost: x\r\nContent-Length: 5000\r\n\r\nv 1 2 3\n").unwrap();
+        stream
+            .write_all(b"POST /v1/render HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5000\r\n\r\nv 1 2 3\n")
+            .unwrap();
     }
     server.post("/v1/render?size=16", CUBE_OBJ).picture(16, 16);
     server.wait_for_load(|load| load["queued"] == 0 && load["running"] == 0);
@@ -192,14 +196,14 @@ fn early_refusals_leave_the_connection_in_order() {
     let server = Server::start(&["--limit-body-bytes", "3000000"]);
     let mut stream = server.connect();
     for length in [10, 100_000, 900_000] {
-        let head = format!("POST /v1/render?size=0 HTTP/1.1\r\nHost: x\r\nContent-Length: {length}\r\n\r\n");
+        let head = format!("POST /v1/render?size=0 HTTP/1.1\r\nHost: localhost\r\nContent-Length: {length}\r\n\r\n");
         stream.write_all(head.as_bytes()).unwrap();
         stream.write_all(&vec![b'v'; length]).unwrap();
         let answer = Answer::read(&mut stream);
         answer.problem(400, "out_of_range");
         assert_eq!(answer.header("connection"), None, "{length}");
     }
-    let head = "POST /v1/render?size=0 HTTP/1.1\r\nHost: x\r\nContent-Length: 2000000\r\n";
+    let head = "POST /v1/render?size=0 HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2000000\r\n";
     for more in ["", "Expect: 100-continue\r\n"] {
         let mut stream = server.connect();
         write!(stream, "{head}{more}\r\n").unwrap();
@@ -215,7 +219,7 @@ fn a_connection_too_many_is_told_so() {
     let held = [server.connect(), server.connect()];
     let began = Instant::now();
     loop {
-        let answer = server.send("GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n", b"");
+        let answer = server.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n", b"");
         if answer.status == 503 {
             answer.problem(503, "connections_full");
             assert!(answer.header("retry-after").is_some());
@@ -224,7 +228,7 @@ fn a_connection_too_many_is_told_so() {
         assert!(began.elapsed() < PATIENCE);
     }
     drop(held);
-    while server.send("GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n", b"").status != 200 {
+    while server.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n", b"").status != 200 {
         assert!(began.elapsed() < PATIENCE);
     }
 }

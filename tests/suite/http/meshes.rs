@@ -34,7 +34,7 @@ pub fn form_of(files: &[(&str, &[u8])]) -> Vec<u8> {
 pub fn head(server: &Server, path: &str, headers: &[&str]) -> Answer {
     let mut stream = server.connect();
     let more: String = headers.iter().map(|h| format!("{h}\r\n")).collect();
-    write!(stream, "HEAD {path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n{more}\r\n").unwrap();
+    write!(stream, "HEAD {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{more}\r\n").unwrap();
     let mut text = String::new();
     stream.read_to_string(&mut text).unwrap();
     assert!(text.ends_with("\r\n\r\n") && text.matches("\r\n\r\n").count() == 1, "a body after {text}");
@@ -263,4 +263,22 @@ fn capabilities_and_keys_know_of_meshes() {
     {
         assert!(paths.contains(&path), "{path}: {paths:?}");
     }
+}
+
+#[test]
+fn a_key_deletes_its_own_meshes_and_sees_its_own_jobs() {
+    let mut command = meshsnap();
+    command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu"]).env("MESHSNAP_API_KEYS", "one,two");
+    let server = Server::start_with(&mut command);
+    let [one, two] = ["one", "two"].map(|key| format!("Authorization: Bearer {key}"));
+    let mesh = server.request("POST", "/v1/meshes", &[&one], CUBE_OBJ).header("location").unwrap().to_owned();
+    assert_eq!(server.request("POST", "/v1/meshes", &[&two], CUBE_OBJ).status, 200, "known");
+    server.request("DELETE", &mesh, &[&two], b"").problem(403, "not_yours");
+    assert_eq!(server.request("GET", &format!("{mesh}/render.png?size=16"), &[&two], b"").status, 200);
+    let job = server.request("POST", "/v1/jobs?size=16", &[&one], CUBE_OBJ).header("location").unwrap().to_owned();
+    for (method, path) in [("GET", job.clone()), ("DELETE", job.clone()), ("GET", format!("{job}/result"))] {
+        server.request(method, &path, &[&two], b"").problem(404, "not_found");
+    }
+    assert_eq!(server.request("GET", &job, &[&one, "Prefer: wait=30"], b"").json()["state"], "done");
+    assert_eq!(server.request("DELETE", &mesh, &[&one], b"").status, 204);
 }

@@ -110,7 +110,8 @@ fn a_mesh_larger_than_the_store_is_told_the_flag() {
         server.request("POST", "/v1/meshes", &[FORM], &form_of(&[("a.obj", &long)])),
         {
             let mut stream = server.connect();
-            write!(stream, "POST /v1/meshes HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n").unwrap();
+            write!(stream, "POST /v1/meshes HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n")
+                .unwrap();
             write!(stream, "{:x}\r\n", long.len()).unwrap();
             stream.write_all(&long).unwrap();
             stream.write_all(b"\r\n0\r\n\r\n").unwrap();

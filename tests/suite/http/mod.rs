@@ -2,12 +2,14 @@
 
 pub mod answers;
 pub mod bad;
+pub mod guards;
 pub mod jobs;
 pub mod kept;
 pub mod meshes;
 pub mod meshes_bad;
 pub mod meshes_pictures;
 pub mod meshes_room;
+pub mod metrics;
 pub mod mistakes;
 pub mod openapi;
 pub mod quality_target;

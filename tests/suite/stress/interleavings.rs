@@ -9,7 +9,7 @@ use meshsnap::backend::cpu::DrawingThreads;
 use meshsnap::import::Bundle;
 use meshsnap::limits::Limits;
 use meshsnap::service::jobs::{
-    CpuThreads, Job, JobSettings, JobState, Jobs, Task, UploadBudget, Work, pipeline_renderers,
+    CpuThreads, Job, JobSettings, JobState, Jobs, Owner, Task, UploadBudget, Work, pipeline_renderers,
 };
 use meshsnap::service::residents::Residents;
 
@@ -55,11 +55,14 @@ impl Process {
             queue: 100,
             idle_time: Duration::from_millis(1),
             job_time: Duration::from_secs(60),
+            interactive_wait: Duration::from_secs(60),
+            batch_wait: Duration::from_secs(60),
             result_ttl: Duration::from_secs(60),
             unfetched_ttl: Duration::from_secs(60),
             result_bytes: 1 << 20,
             result_count: 10,
             storage: None,
+            metrics: None,
         };
         let renderers = pipeline_renderers(gpu, threads, Limits::default(), residents.clone());
         let jobs = Jobs::start(settings, renderers).unwrap();
@@ -78,6 +81,8 @@ impl Process {
             task: Task::Draw(Box::new(spec)),
             memory: Arc::new(memory),
             recipe: None,
+            owner: Owner::default(),
+            request_id: "".into(),
             holds: [].into(),
         };
         self.jobs.submit(work, false).unwrap()

@@ -6,6 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
+use axum::extract::connect_info::ConnectInfo;
+use axum::middleware::AddExtension;
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
 use hyper_util::server::conn::auto;
 use hyper_util::server::graceful::{GracefulShutdown, Watcher};
@@ -13,13 +15,21 @@ use hyper_util::service::TowerToHyperService;
 use tokio::io::AsyncWriteExt as _;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
+use tower_service::Service as _;
 
+use super::activity::{Activity, Client};
 use super::io::ClientStream;
 use crate::service::http::dto::ProblemDto;
 use crate::service::http::error::{ApiError, Fault};
 
 /// Time that clients have to read their answers once the last job has ended.
 const CLOSING_TIME: Duration = Duration::from_secs(5);
+
+/// Time beyond that of a header for which a connection may be idle.
+const IDLE_GRACE: Duration = Duration::from_secs(1);
+
+/// The routes, with the address of a connection's client.
+type Routes = AddExtension<Router, ConnectInfo<Client>>;
 
 /// The first bytes of every HTTP/2 connection.
 const HTTP2_PREFACE: &[u8; 24] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
@@ -33,7 +43,7 @@ pub async fn run(
     stop: impl Future<Output = ()>,
 ) {
     let server = Arc::new(server(header_timeout));
-    let service = TowerToHyperService::new(router);
+    let mut routes = router.into_make_service_with_connect_info::<Client>();
     let graceful = GracefulShutdown::new();
     let places = Arc::new(Semaphore::new(connections_max));
     let mut stop = std::pin::pin!(stop);
@@ -42,8 +52,8 @@ pub async fn run(
             accepted = listener.accept() => accepted,
             () = &mut stop => break,
         };
-        let stream = match accepted {
-            Ok((stream, _)) => stream,
+        let (stream, address) = match accepted {
+            Ok(accepted) => accepted,
             Err(error) => {
                 pause_after(&error).await;
                 continue;
@@ -55,9 +65,11 @@ pub async fn run(
             tokio::spawn(refuse(stream));
             continue;
         };
-        let (server, service, watcher) = (server.clone(), service.clone(), graceful.watcher());
+        let activity = Activity::new();
+        let Ok(service) = routes.call(Client { address, activity: activity.clone() }).await;
+        let (server, service, watcher) = (server.clone(), TowerToHyperService::new(service), graceful.watcher());
         tokio::spawn(async move {
-            serve_connection(&server, stream, service, watcher, header_timeout).await;
+            serve_connection(&server, (stream, activity), service, watcher, header_timeout).await;
             drop(place);
         });
     }
@@ -83,18 +95,24 @@ fn server(header_timeout: Duration) -> auto::Builder<TokioExecutor> {
 
 async fn serve_connection(
     server: &auto::Builder<TokioExecutor>,
-    stream: TcpStream,
-    service: TowerToHyperService<Router>,
+    (stream, activity): (TcpStream, Arc<Activity>),
+    service: TowerToHyperService<Routes>,
     watcher: Watcher,
     header_timeout: Duration,
 ) {
     if !sends_preface_in_time(&stream, header_timeout).await {
         return;
     }
-    let io = TokioIo::new(ClientStream::new(stream));
-    // These errors are the client's: it hung up, was too slow or sent no HTTP.
-    if let Err(error) = watcher.watch(server.serve_connection(io, service)).await {
-        tracing::debug!(error = %error, "a connection ended early");
+    let io = TokioIo::new(ClientStream::new(stream, activity.clone()));
+    tokio::select! {
+        served = watcher.watch(server.serve_connection(io, service)) => {
+            // These errors are the client's: it hung up, was too slow or sent no HTTP.
+            if let Err(error) = served {
+                tracing::debug!(error = %error, "a connection ended early");
+            }
+        }
+        // HTTP/1 has its own timer, which ends first.
+        () = activity.idle(header_timeout + IDLE_GRACE) => tracing::debug!("a connection was idle for too long"),
     }
 }
 
@@ -126,7 +144,7 @@ async fn refuse(stream: TcpStream) {
          Content-Type: application/problem+json\r\nX-Request-Id: {request_id}\r\nContent-Length: {}\r\n\r\n{body}",
         body.len()
     );
-    let mut stream = ClientStream::new(stream);
+    let mut stream = ClientStream::new(stream, Activity::new());
     let answering = async {
         let _ = stream.write_all(answer.as_bytes()).await;
         let _ = stream.shutdown().await;

@@ -8,12 +8,15 @@
 use std::future::Future as _;
 use std::io;
 use std::pin::Pin;
+use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 use tokio::time::{Instant, Sleep, sleep};
+
+use super::activity::Activity;
 
 /// Longest time for which a client may read nothing of its answer.
 const WRITE_STALL: Duration = Duration::from_secs(30);
@@ -27,6 +30,7 @@ const LINGER_BUSY: Duration = Duration::from_secs(2);
 /// A client's socket with timeouts.
 pub struct ClientStream {
     inner: TcpStream,
+    activity: Arc<Activity>,
     timer: Pin<Box<Sleep>>,
     phase: Phase,
 }
@@ -44,13 +48,19 @@ enum Phase {
 
 impl ClientStream {
     /// Wraps a socket.
-    pub fn new(inner: TcpStream) -> Self {
-        Self { inner, timer: Box::pin(sleep(WRITE_STALL)), phase: Phase::Open }
+    pub fn new(inner: TcpStream, activity: Arc<Activity>) -> Self {
+        Self { inner, activity, timer: Box::pin(sleep(WRITE_STALL)), phase: Phase::Open }
     }
 
     fn start_timer(&mut self, phase: Phase, wait: Duration) {
         self.phase = phase;
         self.timer.as_mut().reset(Instant::now() + wait);
+    }
+
+    fn note(&self, written: &Poll<io::Result<usize>>) {
+        if let Poll::Ready(Ok(bytes)) = written {
+            self.activity.sent(*bytes);
+        }
     }
 
     /// Passes a write's outcome on, and fails when the client has read nothing for too long.
@@ -76,6 +86,7 @@ impl AsyncRead for ClientStream {
 impl AsyncWrite for ClientStream {
     fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buf: &[u8]) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.inner).poll_write(cx, buf);
+        self.note(&written);
         self.with_stall_timeout(cx, written)
     }
 
@@ -85,6 +96,7 @@ impl AsyncWrite for ClientStream {
         bufs: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.inner).poll_write_vectored(cx, bufs);
+        self.note(&written);
         self.with_stall_timeout(cx, written)
     }
 

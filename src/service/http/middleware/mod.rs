@@ -3,3 +3,4 @@
 pub mod auth;
 mod drainable_body;
 pub mod observe;
+pub mod site;

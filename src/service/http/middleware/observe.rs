@@ -1,17 +1,21 @@
 //! The id of each request, its span in the log, and the body of its error.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use axum::body::Body;
-use axum::extract::Request;
+use axum::extract::connect_info::ConnectInfo;
+use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Version, header};
 use axum::middleware::Next;
 use axum::response::Response;
 use tracing::Instrument as _;
 
 use super::drainable_body::DrainableBody;
+use crate::service::http::connection::activity::Client;
 use crate::service::http::dto::ProblemDto;
 use crate::service::http::error::ApiError;
+use crate::service::http::state::AppState;
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
@@ -20,13 +24,16 @@ const LOGGED_PATH_CHARS_MAX: usize = 256;
 
 /// Gives the request an id and a span, logs how it ended, and turns errors into
 /// `application/problem+json`.
-pub async fn observe(request: Request, next: Next) -> Response {
+pub async fn observe(State(state): State<Arc<AppState>>, request: Request, next: Next) -> Response {
     let began = Instant::now();
+    let client = request.extensions().get::<ConnectInfo<Client>>();
+    let _busy = client.map(|ConnectInfo(client)| client.activity.begin());
     let id = request_id(request.headers());
     let path: String = request.uri().path().chars().take(LOGGED_PATH_CHARS_MAX).collect();
     let span = tracing::info_span!("request", request_id = %id, method = %request.method(), path);
     let (headers, version) = (request.headers().clone(), request.version());
-    let (parts, body) = request.into_parts();
+    let (mut parts, body) = request.into_parts();
+    parts.extensions.insert(RequestId(id.as_str().into()));
     let (drainable, body) = DrainableBody::new(body);
     let mut response = next.run(Request::from_parts(parts, body)).instrument(span.clone()).await;
     add_id_and_problem(&mut response, &id);
@@ -37,12 +44,22 @@ pub async fn observe(request: Request, next: Next) -> Response {
 
     let (status, duration_ms) = (response.status().as_u16(), began.elapsed().as_secs_f64() * 1e3);
     let code = response.extensions().get::<ApiError>().map(|e| (e.code, e.detail.clone()));
+    state.metrics.answered(status, code.as_ref().map(|(code, _)| *code));
     span.in_scope(|| match code {
         Some((code, detail)) if status >= 500 => tracing::warn!(status, duration_ms, code, detail, "answered"),
         Some((code, detail)) => tracing::info!(status, duration_ms, code, detail, "answered"),
         None => tracing::info!(status, duration_ms, "answered"),
     });
     response
+}
+
+/// The id of a request.
+#[derive(Clone)]
+struct RequestId(Arc<str>);
+
+/// The id that [`observe`] gave a request.
+pub fn id_of(request: &Request) -> Arc<str> {
+    request.extensions().get::<RequestId>().map_or_else(|| "".into(), |RequestId(id)| id.clone())
 }
 
 /// The client's own id, if it is safe in a log line and a header. A new one otherwise.

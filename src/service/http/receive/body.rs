@@ -6,7 +6,7 @@ use std::time::Duration;
 use axum::body::{Body, Bytes};
 use axum::extract::{FromRequest as _, Multipart, Request};
 use axum::http::{HeaderMap, header};
-use futures_util::{Stream, StreamExt as _};
+use futures_util::{Stream, StreamExt as _, stream};
 
 use crate::import::{Bundle, BundleFile};
 use crate::limits;
@@ -16,6 +16,9 @@ use crate::service::jobs::{Reservation, UploadBudget};
 /// Most bytes between two parts of a form: boundary and headers. The parser searches them from the
 /// start with every chunk that arrives, so that their cost grows with the square.
 const BETWEEN_PARTS_BYTES_MAX: u64 = 256 << 10;
+
+/// Time without a byte after which an upload makes room for others that find none.
+const STALL: Duration = Duration::from_secs(2);
 
 /// The content of a body.
 #[derive(Debug)]
@@ -217,6 +220,12 @@ impl Meter {
         })
     }
 
+    /// Keeps the error that stops the reading.
+    fn stop(&self, error: ApiError) -> Interrupted {
+        self.lock().error = Some(error);
+        Interrupted
+    }
+
     /// Starts or ends the count of bytes between two parts of a form.
     fn set_between_parts(&self, is_between: bool) {
         self.lock().bytes_between_parts = is_between.then_some(0);
@@ -245,10 +254,25 @@ impl Meter {
 }
 
 fn metered(body: Body, meter: Meter) -> impl Stream<Item = Result<Bytes, Interrupted>> + Send {
-    body.into_data_stream().map(move |chunk| {
-        let chunk = chunk.map_err(|_| Interrupted)?;
-        meter.count(chunk.len() as u64).map(|()| chunk)
+    stream::unfold((body.into_data_stream(), meter), |(mut chunks, meter)| async move {
+        let refusals = meter.upload_budget.refusals();
+        let chunk = loop {
+            match tokio::time::timeout(STALL, chunks.next()).await {
+                Ok(chunk) => break chunk?.map_err(|_| Interrupted),
+                // Others have found no room meanwhile.
+                Err(_) if meter.upload_budget.refusals() != refusals => break Err(meter.stop(stalled())),
+                Err(_) => {}
+            }
+        };
+        let counted = chunk.and_then(|chunk| meter.count(chunk.len() as u64).map(|()| chunk));
+        Some((counted, (chunks, meter)))
     })
+}
+
+/// The error of a client that holds memory, sends nothing, and is in others' way.
+fn stalled() -> ApiError {
+    let detail = "the request body stopped arriving while other uploads waited for the memory that it holds";
+    ApiError::new(Fault::TooSlow, "body_timeout", detail).flag("--uploads-bytes")
 }
 
 fn has_media_type(headers: &HeaderMap, wanted: &str) -> bool {

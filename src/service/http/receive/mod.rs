@@ -16,12 +16,13 @@ use self::body::{BodyKind, BodyLimits, Upload};
 use self::query::Query;
 use super::address::{Address, render_key};
 use super::error::ApiError;
+use super::middleware::observe;
 use super::state::AppState;
 use super::{negotiate, stored_mesh};
 use crate::limits::Limits;
 use crate::request;
 use crate::service::digest::Digest;
-use crate::service::jobs::{Recipe, Task, Work};
+use crate::service::jobs::{Class, Owner, Recipe, Task, Work};
 use crate::service::store::Reading;
 use crate::spec::Spec;
 
@@ -37,11 +38,14 @@ pub struct Received {
     pub key: Option<String>,
     /// The address of the picture, if the mesh is stored.
     pub address: Option<Address>,
+    /// True if the picture's format depends on `Accept`.
+    pub is_negotiated: bool,
 }
 
 /// Reads a request for a picture. Every fault that shows without reading the mesh is found here,
 /// before it takes a worker's time.
-pub async fn receive(state: &AppState, request: Request) -> Result<Received, ApiError> {
+pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Received, ApiError> {
+    let (owner, request_id) = (owner_of(&request), observe::id_of(&request));
     body::check_header(request.headers(), state.rules.limits.body_bytes)?;
     let Query { reading, overrides } = Query::read(request.uri(), &state.rules)?;
     // Forms and JSON may bring a document. Of every other request, the query is the whole document
@@ -53,12 +57,14 @@ pub async fn receive(state: &AppState, request: Request) -> Result<Received, Api
     let is_short_json = body::is_json(request.headers())
         && body::announced_length(request.headers()).is_some_and(|length| length <= DOCUMENT_BYTES_MAX);
     if !is_short_json {
-        state.jobs.would_accept()?;
+        state.jobs.would_accept(class, &owner)?;
     }
 
     let headers = request.headers().clone();
     let upload = read_upload(state, request).await?;
-    let with_format = |mut spec: Spec| {
+    let mut is_negotiated = false;
+    let mut with_format = |mut spec: Spec| {
+        is_negotiated = negotiate::depends_on_accept(spec.image.format);
         let format = negotiate::image_format(spec.image.format, &headers)?;
         request::set_format(&mut spec, format);
         Ok::<_, ApiError>(Box::new(spec))
@@ -73,15 +79,21 @@ pub async fn receive(state: &AppState, request: Request) -> Result<Received, Api
         let address = keys.and_then(|keys| Address::new(state, digest, &reading, &spec, &keys));
         let document = upload.bundle.files().first().map(|file| file.bytes.clone());
         let recipe = Some(Arc::new(Recipe { document, overrides, mesh: Some(digest) }));
-        let work = Work { recipe, ..stored_mesh::work_on(&stored, reading, Task::Draw(spec)) };
-        return Ok(Received { work, key, address });
+        let work = Work { recipe, owner, request_id, ..stored_mesh::work_on(&stored, reading, Task::Draw(spec)) };
+        return Ok(Received { work, key, address, is_negotiated });
     }
     upload.bundle.check_sent().map_err(|error| ApiError::from(&error))?;
     let spec = with_format(request::read(upload.document.as_deref(), &overrides, &state.rules)?)?;
     let memory = Arc::new(upload.reservation);
     let recipe = Some(Arc::new(Recipe { document: upload.document, overrides, mesh: None }));
-    let work = Work { recipe, ..stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory) };
-    Ok(Received { work, key: None, address: None })
+    let work =
+        Work { recipe, owner, request_id, ..stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory) };
+    Ok(Received { work, key: None, address: None, is_negotiated })
+}
+
+/// The party that sends a request.
+pub fn owner_of(request: &Request) -> Owner {
+    request.extensions().get::<Owner>().cloned().unwrap_or_default()
 }
 
 /// The body, if it is a request document that names a stored mesh. A request with `format_in` has a

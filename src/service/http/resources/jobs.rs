@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use axum::extract::{Request, State};
+use axum::extract::{Extension, Request, State};
 use axum::http::HeaderMap;
 use axum::response::Response;
 
@@ -11,18 +11,23 @@ use crate::service::http::error::{ApiError, Fault};
 use crate::service::http::negotiate;
 use crate::service::http::receive;
 use crate::service::http::state::AppState;
-use crate::service::jobs::{Job, JobId, JobState};
+use crate::service::jobs::{Class, Job, JobId, JobState, Owner};
 
 /// Accepts a job, always with 202.
 pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
-    let received = receive::receive(&state, request).await?;
+    let received = receive::receive(&state, request, Class::Batch).await?;
     Ok(responses::accepted(&*state.jobs.accept(received.work).await?))
 }
 
 /// The job's state. With `Prefer: wait=N`, the answer comes when the job has ended or after N
 /// seconds.
-pub async fn get(State(state): State<Arc<AppState>>, id: PathName, headers: HeaderMap) -> Result<Response, ApiError> {
-    let job = find(&state, id)?;
+pub async fn get(
+    State(state): State<Arc<AppState>>,
+    Extension(owner): Extension<Owner>,
+    id: PathName,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    let job = find(&state, &owner, id)?;
     let wait = negotiate::prefer(&headers).wait;
     if let Some(wait) = wait {
         // A timeout is no error: the answer then says that the job has not ended.
@@ -38,18 +43,30 @@ pub async fn get(State(state): State<Arc<AppState>>, id: PathName, headers: Head
     Ok(response)
 }
 
-/// Cancels a job that has not ended, and answers with its state.
-pub async fn delete(State(state): State<Arc<AppState>>, id: PathName) -> Result<Response, ApiError> {
-    let job = find(&state, id)?;
-    state.jobs.cancel(&job);
-    // The end may have to be stored first.
-    job.ended().await;
+/// Cancels a job that has not ended, or forgets one that has, and answers with its state.
+pub async fn delete(
+    State(state): State<Arc<AppState>>,
+    Extension(owner): Extension<Owner>,
+    id: PathName,
+) -> Result<Response, ApiError> {
+    let job = find(&state, &owner, id)?;
+    if job.state().is_final() {
+        state.jobs.forget(&job);
+    } else {
+        state.jobs.cancel(&job);
+        // The end may have to be stored first.
+        job.ended().await;
+    }
     Ok(responses::job_state(&job))
 }
 
 /// The picture, or the error that a waiting client would have got.
-pub async fn result(State(state): State<Arc<AppState>>, id: PathName) -> Result<Response, ApiError> {
-    let job = find(&state, id)?;
+pub async fn result(
+    State(state): State<Arc<AppState>>,
+    Extension(owner): Extension<Owner>,
+    id: PathName,
+) -> Result<Response, ApiError> {
+    let job = find(&state, &owner, id)?;
     let conflict = |code, detail| ApiError::new(Fault::Conflict, code, detail);
     let ended = job.state();
     if ended.is_final() {
@@ -67,7 +84,9 @@ pub async fn result(State(state): State<Arc<AppState>>, id: PathName) -> Result<
     }
 }
 
-fn find(state: &AppState, id: PathName) -> Result<Arc<Job>, ApiError> {
+/// The job, if it is this client's. Addresses are no identity: without keys, who knows the id may have it.
+fn find(state: &AppState, owner: &Owner, id: PathName) -> Result<Arc<Job>, ApiError> {
     let job = text_of(id).and_then(|id| JobId::parse(&id)).and_then(|id| state.jobs.find(id));
+    let job = job.filter(|job| state.api_keys.is_empty() || job.owner == *owner);
     job.ok_or_else(|| ApiError::not_found("there is no such job, or its result has expired"))
 }

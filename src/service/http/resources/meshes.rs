@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::body::Body;
-use axum::extract::{Request, State};
+use axum::extract::{Extension, Request, State};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 
@@ -22,7 +22,7 @@ use crate::service::http::receive::upload::{self, NamedUpload};
 use crate::service::http::receive::{self, body};
 use crate::service::http::state::AppState;
 use crate::service::http::stored_mesh;
-use crate::service::jobs::Task;
+use crate::service::jobs::{Class, Owner, Task, Work};
 use crate::service::store::{NewMesh, Reading};
 
 /// Stores a mesh under its digest.
@@ -39,6 +39,7 @@ pub async fn put(State(state): State<Arc<AppState>>, id: PathName, request: Requ
 /// The report on a mesh. HEAD tells whether the mesh is stored.
 pub async fn get(
     State(state): State<Arc<AppState>>,
+    Extension(owner): Extension<Owner>,
     id: PathName,
     method: Method,
     uri: Uri,
@@ -56,7 +57,7 @@ pub async fn get(
     } else if method == Method::HEAD {
         responses::body_of_unknown_length()
     } else {
-        let work = stored_mesh::work_on(&stored, reading, Task::Inspect { time_s });
+        let work = Work { owner, ..stored_mesh::work_on(&stored, reading, Task::Inspect { time_s }) };
         Body::from(run::inspect(&state, work).await?)
     };
     let media_type = [(header::CONTENT_TYPE, HeaderValue::from_static("application/json"))];
@@ -64,8 +65,17 @@ pub async fn get(
 }
 
 /// Removes a mesh. Jobs that already draw it go on.
-pub async fn delete(State(state): State<Arc<AppState>>, id: PathName) -> Result<Response, ApiError> {
+pub async fn delete(
+    State(state): State<Arc<AppState>>,
+    Extension(owner): Extension<Owner>,
+    id: PathName,
+) -> Result<Response, ApiError> {
     let digest = stored_mesh::digest(text_of(id).as_deref())?;
+    // Addresses are no identity: without keys, everybody may.
+    if !state.api_keys.is_empty() && state.meshes.find(digest).is_some_and(|stored| stored.mesh.owner != owner) {
+        let detail = "another API key has stored this mesh, so that it alone may delete it";
+        return Err(ApiError::new(Fault::Forbidden, "not_yours", detail));
+    }
     match state.meshes.remove(digest) {
         true => {
             state.residents.forget(&digest.to_string());
@@ -83,7 +93,8 @@ async fn store(state: &AppState, request: Request, wanted: Option<Digest>) -> Re
     if let Some(length) = body::announced_length(headers).filter(|_| !body::is_multipart(headers)) {
         state.meshes.check_size(length)?;
     }
-    state.jobs.would_accept()?;
+    let owner = receive::owner_of(&request);
+    state.jobs.would_accept(Class::Interactive, &owner)?;
     let NamedUpload { digest, bundle, memory } = upload::name(receive::read_upload(state, request).await?).await?;
     if let Some(wanted) = wanted.filter(|wanted| *wanted != digest) {
         let detail = format!("the path says {wanted}, and the SHA-256 of what was sent is {digest}");
@@ -95,9 +106,10 @@ async fn store(state: &AppState, request: Request, wanted: Option<Digest>) -> Re
     let is_known = state.meshes.find(digest).is_some_and(|stored| stored.mesh.reading == reading);
     let is_new = !is_known && {
         let task = Task::Inspect { time_s: None };
-        let work = stored_mesh::work(bundle.clone(), reading.clone(), task, memory.clone());
+        let read = stored_mesh::work(bundle.clone(), reading.clone(), task, memory.clone());
+        let work = Work { owner: owner.clone(), ..read };
         let report = run::inspect(state, work).await?;
-        insert(state, NewMesh { digest, bundle, reading, report }).await?
+        insert(state, NewMesh { digest, bundle, reading, report, owner }).await?
     };
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
     let headers = [
@@ -125,6 +137,7 @@ async fn insert(state: &AppState, mesh: NewMesh) -> Result<bool, ApiError> {
         files: files.map(|(file, digest)| FileRecord { path: file.path.clone(), digest }).collect(),
         format_in: mesh.reading.format_in.map(|format| format.name().to_owned()),
         entry: mesh.reading.entry.clone(),
+        owner: mesh.owner.to_string(),
         report: Digest::of(&mesh.report),
     };
     durable.store(vec![Change::MeshStored(Box::new(record))], holds.clone()).await?;

@@ -3,9 +3,11 @@
 //!
 //! Handlers are named after their method. None of them computes: work goes to the job queue.
 
+pub mod front_page;
 pub mod health;
 pub mod jobs;
 pub mod meshes;
+pub mod metrics;
 pub mod pictures;
 pub mod render;
 mod responses;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::extract::rejection::PathRejection;
-use axum::extract::{Path, State};
+use axum::extract::{Extension, Path, State};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 
@@ -17,11 +17,12 @@ use crate::service::http::error::ApiError;
 use crate::service::http::receive::query::{Query, query_error};
 use crate::service::http::state::AppState;
 use crate::service::http::stored_mesh;
-use crate::service::jobs::Task;
+use crate::service::jobs::{Owner, Task, Work};
 
 /// Draws a stored mesh, unless the client has the picture. HEAD draws nothing.
 pub async fn get(
     State(state): State<Arc<AppState>>,
+    Extension(owner): Extension<Owner>,
     path: Result<Path<(String, String)>, PathRejection>,
     method: Method,
     uri: Uri,
@@ -47,10 +48,12 @@ pub async fn get(
     } else {
         // No work is made for a picture that is in memory.
         let drawing = async {
-            let work = stored_mesh::work_on(&stored, reading, Task::Draw(Box::new(spec)));
+            let work = Work { owner, ..stored_mesh::work_on(&stored, reading, Task::Draw(Box::new(spec))) };
             run::draw(&state, work).await
         };
-        responses::found(&state.pictures.find(&tag, drawing).await?, Some(&tag))
+        let found = state.pictures.find(&tag, drawing).await?;
+        state.metrics.picture(found.source.name());
+        responses::found(&found, Some(&tag))
     };
     // The render key replaces the tag of the picture's bytes, which HEAD and 304 cannot know.
     for (name, value) in cached {

@@ -12,11 +12,13 @@ use crate::service::http::error::ApiError;
 use crate::service::http::negotiate;
 use crate::service::http::receive::{self, Received};
 use crate::service::http::state::AppState;
+use crate::service::jobs::Class;
 
 /// Draws while the client waits. With `Prefer: respond-async`, accepts a job instead.
 pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
     let respond_async = negotiate::prefer(request.headers()).respond_async;
-    let Received { work, key, address } = receive::receive(&state, request).await?;
+    let class = if respond_async { Class::Batch } else { Class::Interactive };
+    let Received { work, key, address, is_negotiated } = receive::receive(&state, request, class).await?;
     if respond_async {
         let mut response = responses::accepted(&*state.jobs.accept(work).await?);
         responses::set_preference_applied(&mut response, "respond-async");
@@ -26,10 +28,15 @@ pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Resul
     let mut response = match key {
         Some(key) => {
             let tag = address.as_ref().map(|at| at.etag.as_str());
-            responses::found(&state.pictures.find(&key, drawing).await?, tag)
+            let found = state.pictures.find(&key, drawing).await?;
+            state.metrics.picture(found.source.name());
+            responses::found(&found, tag)
         }
         None => responses::picture(&*drawing.await?),
     };
+    if is_negotiated {
+        response.headers_mut().insert(header::VARY, HeaderValue::from_static("accept"));
+    }
     if let Some((location, (name, etag))) =
         address.and_then(|at| Some((HeaderValue::from_str(&at.url).ok()?, conditional::etag(&at.etag))))
     {

@@ -30,7 +30,10 @@ fn a_job_is_accepted_watched_and_fetched() {
     let same = server.post("/v1/render?style=wire&size=64", CUBE_OBJ);
     assert_eq!(result.body, same.body);
     assert_eq!(result.header("etag"), same.header("etag"));
+    assert!(state["accepted_at"].as_str().is_some_and(|at| at.len() == 24 && at.ends_with('Z')), "{state}");
     assert_eq!(server.request("DELETE", &location, &[], b"").json()["state"], "done", "nothing left to cancel");
+    server.get(&location).problem(404, "not_found");
+    server.wait_for_load(|load| load["kept_results"] == 0 && load["kept_result_bytes"] == 0);
 }
 
 #[test]
@@ -118,13 +121,55 @@ fn a_job_out_of_time_is_a_504() {
     patient.post("/v1/render?size=16", CUBE_OBJ).picture(16, 16);
 }
 
+/// Waiting takes nothing from a job's time: what would wait for too long is refused when it comes.
+#[test]
+fn many_jobs_at_one_worker_end_although_they_wait_for_longer_than_a_job_may_take() {
+    let server = Server::start(&["--workers", "1", "--limit-job-ms", "2000"]);
+    let slow = "/v1/jobs?size=1500";
+    let began = Instant::now();
+    let jobs: Vec<String> =
+        (0..24).map(|_| server.post(slow, CUBE_OBJ).header("location").expect("a 202").to_owned()).collect();
+    for job in &jobs {
+        let mut state = server.get(job).json();
+        while matches!(state["state"].as_str(), Some("queued" | "running")) {
+            state = server.request("GET", job, &["Prefer: wait=30"], b"").json();
+        }
+        assert_eq!(state["state"], "done", "{state}");
+    }
+    println!("24 jobs at one worker in {:?}", began.elapsed());
+    // And with little patience: a 429 that says when.
+    let hasty = Server::start(&["--workers", "1", "--batch-wait-ms", "100"]);
+    let refused = (0..64).map(|_| hasty.post(slow, CUBE_OBJ)).find(|answer| answer.status != 202);
+    let refused = refused.expect("more than 100 ms of work");
+    let detail = refused.problem(429, "too_late");
+    assert_eq!(refused.json()["flag"], "--batch-wait-ms", "{detail}");
+    let seconds: u64 = refused.header("retry-after").unwrap().parse().unwrap();
+    assert!((1..60).contains(&seconds), "{detail}");
+}
+
+/// Several batch jobs wait, and a thumbnail is drawn before they are.
+#[test]
+fn a_thumbnail_does_not_wait_behind_batch_jobs() {
+    let server = Server::start(&["--workers", "2"]);
+    let mesh = server.post("/v1/meshes", CUBE_OBJ).header("location").unwrap().to_owned();
+    let slow = SLOW.replace("/v1/render", "/v1/jobs");
+    let jobs: Vec<String> =
+        (0..12).map(|_| server.post(&slow, CUBE_OBJ).header("location").unwrap().to_owned()).collect();
+    server.get(&format!("{mesh}/render.png?size=32")).picture(32, 32);
+    let ended = jobs.iter().filter(|job| server.get(job).json()["state"] == "done").count();
+    assert!(ended < 12, "the thumbnail came after all of them");
+    for job in &jobs {
+        server.request("DELETE", job, &[], b"");
+    }
+}
+
 #[test]
 fn a_client_that_hangs_up_frees_its_worker() {
     let server = Server::start(&["--workers", "1"]);
     for _ in 0..5 {
         let mut stream = server.connect();
         let length = CUBE_OBJ.len();
-        write!(stream, "POST {SLOW} HTTP/1.1\r\nHost: x\r\nContent-Length: {length}\r\n\r\n").unwrap();
+        write!(stream, "POST {SLOW} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {length}\r\n\r\n").unwrap();
         stream.write_all(CUBE_OBJ).unwrap();
         drop(stream);
     }

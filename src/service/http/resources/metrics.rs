@@ -1,0 +1,59 @@
+//! `/metrics`: counters and gauges in the text format of Prometheus.
+
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::http::{HeaderValue, header};
+use axum::response::{IntoResponse, Response};
+
+use crate::service::http::error::ApiError;
+use crate::service::http::state::AppState;
+use crate::service::jobs::Class;
+use crate::service::metrics::{Gauges, MEDIA_TYPE};
+
+/// Everything that is counted.
+pub async fn get(State(state): State<Arc<AppState>>) -> Result<Response, ApiError> {
+    let text = state.metrics.text(&gauges(&state)).map_err(|error| {
+        tracing::error!(%error, "the metrics cannot be written");
+        ApiError::internal()
+    })?;
+    let headers = [
+        (header::CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE)),
+        (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
+    ];
+    Ok((headers, text).into_response())
+}
+
+fn gauges(state: &AppState) -> Gauges {
+    let (jobs, meshes) = (state.jobs.load(), state.meshes.load());
+    let (residents, pictures) = (state.residents.load(), state.pictures.load());
+    let waits = [jobs.wait, jobs.batch_wait].map(|wait| u64::try_from(wait.as_millis()).unwrap_or(u64::MAX));
+    let queues = Class::ALL.iter().zip(jobs.queued_by_class).zip(waits);
+    Gauges {
+        queues: queues.map(|((class, jobs), wait_ms)| (class.name(), jobs, wait_ms)).collect(),
+        workers: (jobs.running, state.workers),
+        memory: vec![
+            ("uploads", state.upload_budget.used_bytes(), state.upload_budget.limit_bytes()),
+            ("results", jobs.kept_bytes, state.jobs.result_limit_bytes()),
+            ("meshes", meshes.bytes, state.meshes.limits().0),
+            ("residents", residents.bytes, state.residents.limit_bytes()),
+            ("pictures", pictures.bytes, state.pictures.limit_bytes()),
+        ],
+        entries: vec![
+            ("results", jobs.kept),
+            ("meshes", meshes.count),
+            ("residents", residents.count),
+            ("pictures", pictures.count),
+        ],
+        gpu_losses: state.gpu.losses_in_all(),
+        resident_bytes: resident_bytes(),
+    }
+}
+
+/// Memory of this process that is resident. 0 where the system does not say.
+fn resident_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    let kib = line.and_then(|rest| rest.split_whitespace().next()?.parse::<u64>().ok());
+    kib.unwrap_or(0).saturating_mul(1024)
+}
