@@ -80,7 +80,7 @@ pub fn run(arguments: &InspectArgs) -> Result<(), CliError> {
     .map_err(|error| CliError::from(error).about(mesh_name))?;
     drop(progress);
     for sentence in bundle::unused(&paths, &named.file_use, |path| archives.iter().any(|archive| archive == path)) {
-        eprintln!("meshsnap: {sentence}");
+        say!("meshsnap: {sentence}");
     }
     let text =
         if arguments.json { report.json().map_err(|error| CliError::ours(error.to_string()))? } else { report.text() };

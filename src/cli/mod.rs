@@ -4,6 +4,14 @@
 //! the configuration; 3 a fault of meshsnap or the machine. Every error is one sentence on standard
 //! error.
 
+/// Prints a line to standard error. `eprintln!` panics where nobody reads on, as after `2>&1 | head`.
+macro_rules! say {
+    ($($part:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($part)*);
+    }};
+}
+
 mod bundle;
 pub(crate) mod error;
 mod files;
@@ -18,7 +26,6 @@ mod serve;
 mod settings;
 mod siblings;
 mod sign;
-mod unfinished;
 
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -113,7 +120,7 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if !error.sentence.is_empty() {
-                eprintln!("meshsnap: {}", error.sentence);
+                say!("meshsnap: {}", error.sentence);
             }
             ExitCode::from(error.exit_code)
         }
@@ -124,7 +131,7 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
 fn advise(error: &clap::Error) {
     let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) else { return };
     if error.kind() == ErrorKind::InvalidSubcommand && std::path::Path::new(word).is_file() {
-        eprintln!("{word} is a file. To draw it: meshsnap render {word} -o out.png");
+        say!("{word} is a file. To draw it: meshsnap render {word} -o out.png");
     }
 }
 

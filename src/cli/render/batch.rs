@@ -82,7 +82,7 @@ impl Batch<'_> {
             self.report(&outcomes)
         });
         self.mention_unused(&shared);
-        eprintln!("{drawn} drawn, {} failed", failures.len());
+        say!("{drawn} drawn, {} failed", failures.len());
         match failures.iter().copied().max() {
             None => Ok(()),
             // The sentences are said already.
@@ -178,7 +178,7 @@ impl Batch<'_> {
                 };
                 let lines: Vec<String> = outcome.said.into_iter().chain(failed).collect();
                 if !lines.is_empty() {
-                    bar.suspend(|| lines.iter().for_each(|line| eprintln!("meshsnap: {line}")));
+                    bar.suspend(|| lines.iter().for_each(|line| say!("meshsnap: {line}")));
                 }
             }
         }
@@ -200,7 +200,7 @@ impl Batch<'_> {
     fn mention_unused(&self, shared: &Shared) {
         let used = shared.used.lock().unwrap_or_else(PoisonError::into_inner);
         for name in self.tasks.companions.iter().filter(|name| !used.contains(&absolute(name))) {
-            eprintln!("meshsnap: {name}: is not used: no mesh refers to it");
+            say!("meshsnap: {name}: is not used: no mesh refers to it");
         }
     }
 }

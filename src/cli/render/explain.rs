@@ -7,31 +7,31 @@ use crate::pipeline::{Output, Stage};
 
 /// Prints what `--explain` asks for.
 pub fn explain(output: &Output, gpu: &GpuStatus, read: Duration, times: &[(Stage, Duration)], total: Duration) {
-    eprintln!("drawn by {}", output.backend.name());
+    say!("drawn by {}", output.backend.name());
     if let Some(selection) = &output.selection {
         let (error, time_ms) = (selection.expected_error, selection.expected_time_ms);
-        eprintln!("chosen: {selection}; expected error {error}/255, expected time {time_ms} ms");
+        say!("chosen: {selection}; expected error {error}/255, expected time {time_ms} ms");
     }
     let device = gpu.info.as_ref().map(|info| {
         let features = if info.features.is_empty() { "no optional features".into() } else { info.features.join(", ") };
         format!("{}, {}, {}, {features}", info.name, info.driver, info.device_type)
     });
     let parts = [Some(gpu.state.name().to_owned()), device, gpu.reason.clone()];
-    eprintln!("gpu: {}", parts.into_iter().flatten().collect::<Vec<_>>().join("; "));
+    say!("gpu: {}", parts.into_iter().flatten().collect::<Vec<_>>().join("; "));
     for skip in &output.skips {
-        eprintln!("skipped {}: {}", skip.kind, skip.why);
+        say!("skipped {}: {}", skip.kind, skip.why);
     }
     if output.short_chains > 0 {
-        eprintln!("lines left out, shorter than wire.min_length or outline.min_length: {}", output.short_chains);
+        say!("lines left out, shorter than wire.min_length or outline.min_length: {}", output.short_chains);
     }
-    eprintln!("{:<6} {:9.3} ms", "read", read.as_secs_f64() * 1e3);
+    say!("{:<6} {:9.3} ms", "read", read.as_secs_f64() * 1e3);
     for (stage, took) in times {
-        eprintln!("{:<6} {:9.3} ms", format!("{stage:?}").to_lowercase(), took.as_secs_f64() * 1e3);
+        say!("{:<6} {:9.3} ms", format!("{stage:?}").to_lowercase(), took.as_secs_f64() * 1e3);
         if *stage == Stage::Render {
             for (part, took) in output.draw_times.parts() {
-                eprintln!("  {:<12} {:9.3} ms", part.name(), took.as_secs_f64() * 1e3);
+                say!("  {:<12} {:9.3} ms", part.name(), took.as_secs_f64() * 1e3);
             }
         }
     }
-    eprintln!("{:<6} {:9.3} ms", "total", total.as_secs_f64() * 1e3);
+    say!("{:<6} {:9.3} ms", "total", total.as_secs_f64() * 1e3);
 }

@@ -78,10 +78,10 @@ impl Drawing<'_> {
 
         self.destination.write(&arguments.output, &output.bytes)?;
         for sentence in warnings(mesh_name, &output.warnings, &beside) {
-            eprintln!("meshsnap: {sentence}");
+            say!("meshsnap: {sentence}");
         }
         for sentence in bundle::unused(&paths, &file_use, |path| archives.iter().any(|archive| archive == path)) {
-            eprintln!("meshsnap: {sentence}");
+            say!("meshsnap: {sentence}");
         }
         if arguments.explain {
             explain(&output, &gpu.status(), read, &times, began.elapsed());

@@ -73,6 +73,23 @@ fn standard_input_is_an_input_too() {
     assert_eq!(fs::read(&mesh).unwrap(), CUBE_OBJ);
 }
 
+/// As `--explain 2>&1 | head -1` does it.
+#[test]
+fn a_closed_pipe_for_words_costs_no_picture() {
+    let folder = folder();
+    for (arguments, code) in
+        [(&["cube.obj", "-o", "a.png", "--explain"][..], 0), (&["cube.obj", "-o", "b.png", "--style", "wier"], 2)]
+    {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut command = meshsnap();
+        command.current_dir(folder.path()).args(["render", "--backend", "cpu", "--size", "16"]).args(arguments);
+        let status = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(writer).status().unwrap();
+        assert_eq!(status.code(), Some(code), "{arguments:?}: {status}");
+    }
+    assert_eq!(fs::read(folder.path().join("a.png")).unwrap()[1..4], *b"PNG");
+}
+
 #[test]
 fn a_failure_leaves_the_old_picture_and_nothing_else() {
     let folder = folder();

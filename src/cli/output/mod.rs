@@ -1,6 +1,8 @@
 //! Where a picture goes. A file is replaced as a whole and is never one of the inputs: the bytes
 //! are written to a file beside it, which then takes its name.
 
+mod unfinished;
+
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, IsTerminal as _, Write as _};
@@ -9,7 +11,7 @@ use std::path::{Path, PathBuf};
 use same_file::Handle;
 use tempfile::NamedTempFile;
 
-use super::{files, unfinished};
+use super::files;
 use crate::cli::error::CliError;
 
 /// Most symbolic links from a name to its file, as Linux has it.
