@@ -15,9 +15,9 @@ const GAP: u32 = 2;
 const PLATE: [u8; 3] = [0xf7, 0xf8, 0xfa];
 const PLATE_EDGE: u32 = 3;
 
-/// What a legend shows.
+/// The contents of a legend.
 pub struct Scale<'a> {
-    /// What is measured.
+    /// The name of the measured quantity.
     pub title: &'a str,
     /// The lowest and the highest number.
     pub ends: [f64; 2],

@@ -12,7 +12,7 @@ use crate::limits::{self, Limits};
 pub struct NamedFiles {
     /// The files.
     pub bundle: Bundle,
-    /// What becomes of them while the mesh is read.
+    /// The use that the mesh makes of them while it is read.
     pub file_use: FileUse,
     /// The folder that they have in common, to which their paths in the bundle are relative.
     pub common: PathBuf,

@@ -101,7 +101,7 @@ pub struct DrawPlan<'a> {
     /// Chains of lines that are left out because they are short: see `wire.min_length` and
     /// `outline.min_length`.
     pub short_chains: u32,
-    /// What the colours of diagnostics mean.
+    /// The meaning of the colours of diagnostics.
     pub legends: Vec<Legend>,
     /// What the picture goes without although it was asked for, and why.
     pub warnings: Vec<Warning>,

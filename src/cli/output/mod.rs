@@ -1,4 +1,4 @@
-//! Where a picture goes. A file is replaced as a whole and is never one of the inputs: the bytes
+//! The place of a picture. A file is replaced as a whole and is never one of the inputs: the bytes
 //! are written to a file beside it, which then takes its name.
 
 mod unfinished;
@@ -21,10 +21,10 @@ const LINKS_MAX: usize = 40;
 #[derive(Debug, Default)]
 pub struct Inputs(HashMap<Identity, String>);
 
-/// What two names of one file share.
+/// The identity that two names of one file share.
 #[cfg(unix)]
 type Identity = (u64, u64);
-/// What two names of one file share. The file stays open, so that no other gets its number.
+/// The identity that two names of one file share. The file stays open, so that no other gets its number.
 #[cfg(not(unix))]
 type Identity = Handle;
 
@@ -38,7 +38,7 @@ fn identity(handle: Handle) -> Identity {
     handle
 }
 
-/// Where a picture goes.
+/// The place of a picture.
 #[derive(Debug)]
 pub enum Destination {
     /// Standard output.

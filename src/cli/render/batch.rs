@@ -36,14 +36,14 @@ pub struct Batch<'a> {
     pub folder: PathBuf,
 }
 
-/// What became of one picture.
+/// The end of one picture.
 struct Outcome {
     /// Sentences for the user.
     said: Vec<String>,
     result: Result<(), CliError>,
 }
 
-/// What all threads share.
+/// The state that all threads share.
 struct Shared {
     gpu: Arc<GpuHost>,
     next: AtomicUsize,
@@ -205,7 +205,7 @@ impl Batch<'_> {
     }
 }
 
-/// What to do about files that a mesh refers to, that lie beside it and are not named.
+/// Advice about files that a mesh refers to, that lie beside it and are not named.
 fn advice(task: &Task, unread: &[String]) -> Option<(String, bool)> {
     (!unread.is_empty()).then(|| (siblings::advice_to_add(&task.mesh, unread), true))
 }

@@ -1,4 +1,4 @@
-//! What `--explain` prints.
+//! The printout of `--explain`.
 
 use std::time::Duration;
 

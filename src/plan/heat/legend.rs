@@ -1,4 +1,4 @@
-//! What the colours of a diagnostic mean.
+//! The meaning of a diagnostic's colours.
 
 use super::color_map::ColorMap;
 use crate::image::srgb8_thresholds;
@@ -6,7 +6,7 @@ use crate::image::srgb8_thresholds;
 /// A diagnostic's scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Legend {
-    /// What is measured.
+    /// The name of the measured quantity.
     pub title: &'static str,
     /// The numbers of the first and the last colour.
     pub ends: [f64; 2],

@@ -6,6 +6,7 @@ use meshsnap::backend::cpu::{CpuRenderer, Isa};
 use meshsnap::limits::Deadline;
 
 use crate::support::scenes::{self, SCENES};
+use crate::support::shapes;
 
 #[test]
 fn pictures_and_samples_are_the_same_without_shortcuts() {
@@ -31,4 +32,29 @@ fn pictures_and_samples_are_the_same_without_shortcuts() {
         }
     }
     assert!(shown > 1_000_000, "{shown} samples show something");
+}
+
+/// Occlusion: the first picture of a size draws its samples twice, and those that follow keep them. Another
+/// mesh, other lines and another size in between leave nothing behind.
+#[test]
+fn kept_samples_change_nothing() {
+    let deadline = Deadline::default();
+    let (mut plain, mut renderer) = (CpuRenderer::plain(1), CpuRenderer::new(2));
+    let meshes = [shapes::gear(9), shapes::boxes_on_a_floor()].map(|obj| scenes::mesh(&obj));
+    let mut pictures = 0;
+    for size in ["200x160", "200x160", "200x160", "64x200", "64x200", "200x160", "900", "900"] {
+        for (mesh, style) in meshes.iter().flat_map(|mesh| ["auto", "outline", "technical"].map(|style| (mesh, style)))
+        {
+            let plan = scenes::plan(mesh, &scenes::spec(&[("style", style), ("size", size)]));
+            assert!(plan.occlusion.is_some());
+            for _ in 0..2 {
+                assert!(
+                    renderer.draw(&plan, &deadline).unwrap() == plain.draw(&plan, &deadline).unwrap(),
+                    "{size} {style}"
+                );
+                pictures += 1;
+            }
+        }
+    }
+    assert_eq!(pictures, 8 * 6 * 2);
 }

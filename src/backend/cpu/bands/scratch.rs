@@ -189,27 +189,29 @@ impl BandScratch {
 
 /// The samples of a whole picture, band by band: of one with occlusion, which looks at all depths before
 /// anything is shaded.
+///
+/// The first picture of a size draws its samples twice: memory that is new takes more time than that.
 #[derive(Default)]
 pub struct KeptSamples {
     bands: Vec<SampleBand>,
-    /// What the bands have room for: columns, rows, margin and samples of the picture, and its division.
-    made_for: Option<([u32; 4], Banding)>,
+    /// Columns, rows, margin and samples of the last picture with occlusion, and its division.
+    last: Option<([u32; 4], Banding)>,
 }
 
 impl KeptSamples {
-    /// Room for a plan's samples, or none where they take too much.
+    /// Makes room for a plan's samples, if they take little and the last picture was of the same size.
     pub fn reset(&mut self, plan: &DrawPlan<'_>, banding: Banding) {
-        let made_for = Some(([plan.width_px, plan.height_px, plan.margin_px, plan.samples], banding));
+        let size = ([plan.width_px, plan.height_px, plan.margin_px, plan.samples], banding);
         if Self::bytes(plan, banding) == 0 {
             *self = Self::default();
-        } else if self.made_for != made_for {
+        } else if self.last != Some(size) {
+            *self = Self { bands: Vec::new(), last: Some(size) };
+        } else if self.bands.is_empty() {
             let band = || {
                 let rows = banding.rows + 2 * banding.margin;
                 SampleBand::new([plan.width_px, plan.height_px], plan.margin_px, rows, plan.samples)
             };
-            self.bands.clear();
             self.bands.resize_with(plan.height_px.div_ceil(banding.rows) as usize, band);
-            self.made_for = made_for;
         }
     }
 
