@@ -28,7 +28,8 @@ pub fn polls<T>(job: impl FnOnce(&Deadline) -> T) -> u64 {
 }
 
 /// Stops `job` at `moments` polls spread over all that it makes, and fails unless it ends each time
-/// within `more_max` further polls. Gives the number of polls of the whole job.
+/// within `more_max` further polls. Every run of `job` must do the same work. Gives the number of polls of the
+/// whole job.
 pub fn assert_stops_at_any_poll<T>(moments: u64, more_max: u64, mut job: impl FnMut(&Deadline) -> Option<T>) -> u64 {
     let whole = polls(|deadline| assert!(job(deadline).is_some(), "it stops without being told"));
     for moment in 0..moments {
