@@ -81,7 +81,9 @@ impl Batch<'_> {
             drop(sender);
             self.report(&outcomes)
         });
-        self.mention_unused(&shared);
+        if !self.tasks.is_part {
+            self.mention_unused(&shared);
+        }
         say!("{drawn} drawn, {} failed", failures.len());
         match failures.iter().copied().max() {
             None => Ok(()),

@@ -5,7 +5,9 @@ mod explain;
 mod one;
 mod spec;
 mod tasks;
+mod watch;
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -15,17 +17,19 @@ use clap::{Args, ValueHint};
 use super::isolation;
 use super::output::{Destination, Inputs};
 use super::settings::LimitSettings;
+use super::siblings;
 use crate::cli::error::CliError;
 use crate::image::ImageFormat;
-use crate::import::Format;
+use crate::import::{Format, Options};
 use crate::limits::Limits;
 use crate::mesh::UpAxis;
 use crate::request::{Style, Words, word_for, words_of};
-use crate::spec::{BackendChoice, NamedView};
+use crate::spec::{BackendChoice, NamedView, Spec};
 use crate::telemetry;
 use batch::Batch;
 use one::Drawing;
 pub use spec::{format_in, pairs};
+use watch::{Changed, Watched};
 
 /// Examples at the end of `--help`.
 pub const EXAMPLES: &str = "\
@@ -35,6 +39,7 @@ Examples:
   meshsnap render knot.obj -o sheet.png --sheet front,left,top,iso
   meshsnap render knot.obj -o turn.webp --turntable 24
   meshsnap render models/ 'more/*.stl' -o pictures/ --size 256
+  meshsnap render knot.obj -o knot.png --watch
   meshsnap render - -o - --set wire.color=#f00 < knot.obj > knot.png
 
 No file is read that is not named. Exit codes: 0 done, 1 the mesh or the request document is at
@@ -116,6 +121,9 @@ pub struct RenderArgs {
     /// Read the files that the mesh refers to from its own folder, though they are not named
     #[arg(long, help_heading = FILES, hide_short_help = true)]
     pub siblings: bool,
+    /// Draw again whenever a file that is read has changed, until Ctrl-C
+    #[arg(long, help_heading = FILES)]
+    pub watch: bool,
 
     #[arg(long, help = "Back-end", value_parser = words::<BackendChoice>(), help_heading = MACHINE, hide_short_help = true)]
     pub backend: Option<String>,
@@ -156,38 +164,103 @@ fn words<T: Words>() -> PossibleValuesParser {
     PossibleValuesParser::new(words_of::<T>())
 }
 
-/// Draws one mesh, with the files that it refers to, into one image file. `command` is the whole
-/// command line, for advice.
+/// Draws one mesh, with the files that it refers to, into one image file, or each mesh into a folder.
+/// `command` is the whole command line, for advice.
 pub fn run(arguments: &RenderArgs, command: &[OsString]) -> Result<(), CliError> {
     let filter = std::env::var("MESHSNAP_LOG").unwrap_or_default();
     let filter = if filter.is_empty() { "warn" } else { &filter };
     telemetry::init(filter, Some(false)).map_err(|error| CliError::usage(format!("MESHSNAP_LOG {error}")))?;
     isolation::on_demand();
-    let limits = arguments.limits.config().limits;
-    if is_folder(&arguments.output) {
-        return run_batch(arguments, limits);
+    let repeatable = Repeatable { arguments, command, limits: arguments.limits.config().limits };
+    if arguments.watch {
+        repeatable.refuse_streams()?;
+        return watch::run(&repeatable);
     }
-    let destination = Destination::new(&arguments.output, &inputs(arguments))?;
-    refuse_folders(&arguments.meshes)?;
-    let spec = spec::read(arguments, &limits)?;
-    Drawing { arguments, command, limits, spec, destination }.run()
+    repeatable.draw(None)
+}
+
+/// A command that may be repeated when its files have changed.
+struct Repeatable<'a> {
+    arguments: &'a RenderArgs,
+    /// The whole command line.
+    command: &'a [OsString],
+    limits: Limits,
+}
+
+impl Repeatable<'_> {
+    /// Refuses to watch what is read or written once.
+    fn refuse_streams(&self) -> Result<(), CliError> {
+        let names = self.arguments.meshes.iter().chain([&self.arguments.output]);
+        let request = self.arguments.request.as_deref().is_some_and(|path| path == Path::new("-"));
+        if request || names.into_iter().any(|name| name == "-") {
+            let sentence = "--watch: `-`, a stream, does not change once it was read or written; name files";
+            return Err(CliError::usage(sentence));
+        }
+        Ok(())
+    }
+
+    fn draw_one(&self) -> Result<(), CliError> {
+        let Self { arguments, command, ref limits } = *self;
+        let destination = Destination::new(&arguments.output, &inputs(arguments))?;
+        refuse_folders(&arguments.meshes)?;
+        let spec = spec::read(arguments, limits)?;
+        Drawing { arguments, command, limits: limits.clone(), spec, destination }.run()
+    }
+
+    /// The pictures of a folder. Where `changed` is given, only those of the meshes that changed, unless
+    /// something else changed too.
+    fn draw_many(&self, changed: Option<&Changed>) -> Result<(), CliError> {
+        let Self { arguments, ref limits, .. } = *self;
+        let of_one = [("--entry", arguments.entry.is_some()), ("--explain", arguments.explain)];
+        if let Some((flag, _)) = of_one.iter().find(|(_, is_given)| *is_given) {
+            return Err(CliError::usage(format!("{flag} is for a single picture: give -o FILE, not a folder")));
+        }
+        let spec = spec::read(arguments, limits)?;
+        let mut tasks = tasks::find(&arguments.meshes, extension(&spec))?;
+        if let Some(changed) = changed {
+            tasks.keep_only(changed);
+        }
+        Batch { arguments, limits: limits.clone(), spec, tasks, folder: PathBuf::from(&arguments.output) }.run()
+    }
+}
+
+impl Watched for Repeatable<'_> {
+    fn inputs(&self) -> Vec<String> {
+        let Self { arguments, ref limits, .. } = *self;
+        let mut names = tasks::expand(&arguments.meshes);
+        if arguments.siblings && !is_folder(&arguments.output) {
+            // Those of a mesh that cannot be read are not known.
+            let options = Options { format: format_in(arguments.format_in.as_deref()), ..Options::default() };
+            names.extend(siblings::all_beside(&names, arguments.entry.as_deref(), options, limits).unwrap_or_default());
+        }
+        names.extend(arguments.request.as_deref().map(|path| path.to_string_lossy().into_owned()));
+        names
+    }
+
+    fn outputs(&self) -> BTreeSet<PathBuf> {
+        let Self { arguments, ref limits, .. } = *self;
+        let output = Path::new(&arguments.output);
+        if !is_folder(&arguments.output) {
+            return BTreeSet::from([watch::absolute(output)]);
+        }
+        let extension = spec::read(arguments, limits).map_or("png", |spec| extension(&spec));
+        let tasks = tasks::find(&arguments.meshes, extension).unwrap_or_default().all;
+        tasks.iter().map(|task| watch::absolute(&output.join(&task.picture))).collect()
+    }
+
+    fn draw(&self, changed: Option<&Changed>) -> Result<(), CliError> {
+        if is_folder(&self.arguments.output) { self.draw_many(changed) } else { self.draw_one() }
+    }
+}
+
+/// The extension of pictures in a folder.
+fn extension(spec: &Spec) -> &'static str {
+    spec.image.format.map_or("png", word_for)
 }
 
 /// True if the output names a folder: by a slash at its end, or because it is one.
 fn is_folder(output: &str) -> bool {
     output != "-" && (output.ends_with(std::path::is_separator) || Path::new(output).is_dir())
-}
-
-/// Draws a picture of each mesh into a folder.
-fn run_batch(arguments: &RenderArgs, limits: Limits) -> Result<(), CliError> {
-    let of_one = [("--entry", arguments.entry.is_some()), ("--explain", arguments.explain)];
-    if let Some((flag, _)) = of_one.iter().find(|(_, is_given)| *is_given) {
-        return Err(CliError::usage(format!("{flag} is for a single picture: give -o FILE, not a folder")));
-    }
-    let spec = spec::read(arguments, &limits)?;
-    let extension = spec.image.format.map_or("png", word_for);
-    let tasks = tasks::find(&arguments.meshes, extension)?;
-    Batch { arguments, limits, spec, tasks, folder: PathBuf::from(&arguments.output) }.run()
 }
 
 /// The files that a render reads.

@@ -26,6 +26,29 @@ pub struct Tasks {
     pub all: Vec<Task>,
     /// Named files that are no meshes, for meshes that refer to them.
     pub companions: Vec<String>,
+    /// True if some meshes are left out, because their pictures are drawn already.
+    pub is_part: bool,
+}
+
+impl Tasks {
+    /// Leaves out the meshes that are not among these absolute paths, unless one of the paths is no mesh
+    /// of its own: then any mesh may refer to it, and all stay.
+    pub fn keep_only(&mut self, paths: &BTreeSet<PathBuf>) {
+        let meshes: BTreeSet<PathBuf> = self.all.iter().map(|task| absolute(&task.mesh)).collect();
+        if paths.is_subset(&meshes) {
+            self.is_part = paths.len() < meshes.len();
+            self.all.retain(|task| paths.contains(&absolute(&task.mesh)));
+        }
+    }
+}
+
+/// The names with patterns replaced by the files that fit them now.
+pub fn expand(names: &[String]) -> Vec<String> {
+    let files = |name: &String| match is_pattern(name) && fs::metadata(name).is_err() {
+        true => of_pattern(name).unwrap_or_default(),
+        false => vec![name.clone()],
+    };
+    names.iter().flat_map(files).collect()
 }
 
 /// Finds the meshes among the named files, folders and patterns. `extension` is that of pictures.
@@ -191,6 +214,15 @@ mod tests {
             [row("b/x.obj", "b/x.webp", false), row("a.ply", "a.webp", false)]
         );
         assert_eq!(found(&["b/*.obj"]), [row("b/x.obj", "x.webp", false)]);
+        assert_eq!(expand(&[at("b/*.obj"), at("b"), at("c*")]), [at("b/x.obj"), at("b")]);
+        let kept = |changed: &[&str]| {
+            let mut tasks = find(&[at("b")], "png").unwrap();
+            tasks.keep_only(&changed.iter().map(|name| absolute(&at(name))).collect());
+            (tasks.all.len(), tasks.is_part)
+        };
+        assert_eq!(kept(&["b/x.obj", "b/q.zip"]), (2, true));
+        assert_eq!(kept(&["b/x.obj", "b/x.mtl"]), (4, false));
+        assert_eq!(kept(&["b/gone.obj"]), (4, false));
         let tasks = find(&[at("b/x.obj"), at("b/x.mtl"), at("b/readme.md")], "png").unwrap();
         assert_eq!((tasks.all.len(), tasks.companions), (2, vec![at("b/x.mtl")]));
         for (name, part) in [("c*", "no file fits"), ("b/x.mtl", "none of the files"), ("[", "is no pattern")] {

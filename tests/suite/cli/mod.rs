@@ -5,3 +5,4 @@ pub mod commands;
 pub mod help;
 pub mod mistakes;
 pub mod outputs;
+pub mod watch;
