@@ -26,6 +26,7 @@ use crate::telemetry;
 use batch::Batch;
 use one::Drawing;
 pub use spec::{format_in, pairs};
+pub use tasks::{Task, Tasks, find};
 
 /// Examples at the end of `--help`.
 pub const EXAMPLES: &str = "\
@@ -186,7 +187,7 @@ fn run_batch(arguments: &RenderArgs, limits: Limits) -> Result<(), CliError> {
     }
     let spec = spec::read(arguments, &limits)?;
     let extension = spec.image.format.map_or("png", word_for);
-    let tasks = tasks::find(&arguments.meshes, extension)?;
+    let tasks = find(&arguments.meshes, extension)?;
     Batch { arguments, limits, spec, tasks, folder: PathBuf::from(&arguments.output) }.run()
 }
 
