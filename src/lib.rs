@@ -46,6 +46,8 @@
 #[doc(hidden)]
 pub mod backend;
 mod caption;
+#[doc(hidden)]
+pub mod check;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;

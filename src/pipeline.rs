@@ -10,9 +10,10 @@
 
 use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, GpuDevice};
 use crate::caption::{Scale, draw_legend};
+use crate::check::{self, Check, RuleSet};
 use crate::encode::{self, EncodeError};
 use crate::image::{Image, ImageFormat};
-use crate::import::{self, Bundle, Format, Imported, MeshError};
+use crate::import::{self, Bundle, Format, Imported, MeshError, MeshFault};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
 use crate::plan::{self, Prepared, Skip, UvLayout};
@@ -199,6 +200,27 @@ pub fn inspect(
     let Imported { mesh, report } = import::import(bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
     Report::of(&mesh, &report, bundle.bytes_len(), &mut budget, deadline)
+}
+
+/// Judges a file by rules. A file that does not open has one check, which says why.
+///
+/// Fails only where the time or the memory of this job ends after the file was read.
+pub fn check(
+    bundle: &Bundle,
+    options: impl Into<import::Options>,
+    rules: &RuleSet,
+    limits: &Limits,
+    deadline: &Deadline,
+) -> Result<Vec<Check>, MeshError> {
+    let mut budget = Budget::new(limits);
+    match import::import(bundle, options, limits, &mut budget, deadline) {
+        Err(error) if error.fault == MeshFault::Stopped => Err(error),
+        Err(error) => Ok(vec![check::unopened(error.to_string())]),
+        Ok(Imported { mesh, report }) => {
+            let subject = check::Subject { mesh: &mesh, import: &report, file_bytes: bundle.bytes_len() };
+            check::check(&subject, rules, &mut budget, deadline)
+        }
+    }
 }
 
 /// A mesh in memory: imported once, and drawn as often as wanted. What one picture finds out about

@@ -13,6 +13,7 @@ macro_rules! say {
 }
 
 mod bundle;
+mod check;
 pub(crate) mod error;
 mod files;
 mod health;
@@ -59,6 +60,9 @@ enum Command {
     /// Report the content of a mesh file
     #[command(after_help = SEE_HELP, after_long_help = inspect::EXAMPLES)]
     Inspect(inspect::InspectArgs),
+    /// Judge mesh files by rules, for CI
+    #[command(after_help = SEE_HELP, after_long_help = check::EXAMPLES)]
+    Check(check::CheckArgs),
     /// Serve renders over HTTP
     #[command(after_help = SEE_HELP, after_long_help = serve::after_help())]
     Serve(serve::ServeArgs),
@@ -108,6 +112,7 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
     let command = || match cli.command {
         Command::Render(arguments) => render::run(&arguments, &words),
         Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
         Command::Sign(arguments) => sign::run(&arguments),

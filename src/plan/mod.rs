@@ -50,7 +50,7 @@ pub use surface::{
     CornerValues, Lamp, Lights, ShadedMaterial, SurfacePass, TEXTURE_NONE, TextureUse, debug_views, flags, samplers,
     slots,
 };
-pub use uv_layout::UvLayout;
+pub use uv_layout::{GRID_BYTES as UV_GRID_BYTES, UvLayout, overlapping as overlapping_uvs};
 pub use warnings::{is_out_of_view, out_of_view, undrawn_primitives, unknown_materials};
 
 use crate::warning::Warning;

@@ -7,7 +7,7 @@ mod bounds;
 mod text;
 mod topology;
 
-use self::bounds::Bounds;
+pub use self::bounds::Bounds;
 use self::topology::TopologyReport;
 use crate::import::{FileContent, FileMetadata, ImportReport, MeshError};
 use crate::limits::{Budget, Deadline};

@@ -29,6 +29,7 @@ use crate::telemetry;
 use batch::Batch;
 use one::Drawing;
 pub use spec::{format_in, pairs};
+pub use tasks::{Task, Tasks, find};
 use watch::{Changed, Watched};
 
 /// Examples at the end of `--help`.
@@ -216,7 +217,7 @@ impl Repeatable<'_> {
             return Err(CliError::usage(format!("{flag} is for a single picture: give -o FILE, not a folder")));
         }
         let spec = spec::read(arguments, limits)?;
-        let mut tasks = tasks::find(&arguments.meshes, extension(&spec))?;
+        let mut tasks = find(&arguments.meshes, extension(&spec))?;
         if let Some(changed) = changed {
             tasks.keep_only(changed);
         }
@@ -244,7 +245,7 @@ impl Watched for Repeatable<'_> {
             return BTreeSet::from([watch::absolute(output)]);
         }
         let extension = spec::read(arguments, limits).map_or("png", |spec| extension(&spec));
-        let tasks = tasks::find(&arguments.meshes, extension).unwrap_or_default().all;
+        let tasks = find(&arguments.meshes, extension).unwrap_or_default().all;
         tasks.iter().map(|task| watch::absolute(&output.join(&task.picture))).collect()
     }
 

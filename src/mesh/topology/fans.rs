@@ -36,6 +36,11 @@ impl<'a> Fans<'a> {
 
     /// The number of vertices that have more than one fan.
     pub fn count_nonmanifold_vertices(&mut self) -> u64 {
+        self.counts().iter().filter(|count| **count > 1).count() as u64
+    }
+
+    /// The number of fans of each vertex; 255 for all numbers above.
+    pub fn counts(&mut self) -> Vec<u8> {
         let mut fans = vec![0_u8; self.vertices];
         for (face, triangle) in (0_u32..).zip(self.triangles) {
             for (corner, &vertex) in (face * 3..).zip(triangle) {
@@ -43,7 +48,7 @@ impl<'a> Fans<'a> {
                 *count = count.saturating_add(u8::from(self.corners.find(corner) == corner));
             }
         }
-        fans.iter().filter(|count| **count > 1).count() as u64
+        fans
     }
 
     /// The number of closed chains that open edges form. Within a chain, edges connect fans rather

@@ -97,6 +97,26 @@ impl Topology {
     }
 }
 
+/// The vertices that [`Topology::nonmanifold_vertices`] counts, in order. Spends what they take.
+pub fn nonmanifold_vertices(mesh: &Mesh, edges: &EdgeList, budget: &mut Budget) -> Result<Vec<u32>, Exhausted> {
+    budget.spend("the fans of faces", mesh.triangles.len() as u64, 3 * 4)?;
+    budget.spend("the fans of faces", mesh.positions.len() as u64, 1 + 4)?;
+    let counts = Fans::of(mesh, edges).counts();
+    Ok((0_u32..).zip(counts).filter(|(_, count)| *count > 1).map(|(vertex, _)| vertex).collect())
+}
+
+/// The faces that [`Topology::duplicate_faces`] counts, in mesh order. Spends what they take.
+pub fn duplicate_faces(mesh: &Mesh, budget: &mut Budget) -> Result<Vec<u32>, Exhausted> {
+    budget.spend("the comparison of faces", mesh.triangles.len() as u64, 16 + 4)?;
+    let mut faces: Vec<([u32; 3], u32)> = mesh.triangles.iter().copied().zip(0..).collect();
+    faces.iter_mut().for_each(|(face, _)| face.sort_unstable());
+    faces.sort_unstable();
+    let pairs = faces.windows(2).filter(|pair| pair[0].0 == pair[1].0);
+    let mut later: Vec<u32> = pairs.map(|pair| pair[1].1).collect();
+    later.sort_unstable();
+    Ok(later)
+}
+
 /// The orientation of a closed mesh: the side to which the fronts of its faces look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Orientation {

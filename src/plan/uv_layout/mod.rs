@@ -3,7 +3,7 @@
 
 mod overlaps;
 
-pub use overlaps::overlapping;
+pub use overlaps::{GRID_BYTES, overlapping};
 
 use super::PlanError;
 use crate::limits::{Budget, Deadline};
@@ -47,7 +47,7 @@ impl UvLayout {
             return Ok(None);
         }
         budget.spend("the layout of texture coordinates", mesh.triangles.len() as u64, TRIANGLE_BYTES)?;
-        budget.spend("the layout of texture coordinates", overlaps::GRID_BYTES, 1)?;
+        budget.spend("the layout of texture coordinates", GRID_BYTES, 1)?;
         let mut warnings = Vec::new();
         if mesh.uvs.is_empty() {
             let detail = "the mesh has no texture coordinates, and their layout is an empty frame";

@@ -2,8 +2,7 @@
 //! the edge's two faces, so a point with two owners lies where faces overlap. Overlaps between the points
 //! are not found.
 
-use crate::limits::Deadline;
-use crate::plan::PlanError;
+use crate::limits::{Deadline, Stopped};
 
 /// Points of the grid on a side.
 const SIDE: i64 = 1024;
@@ -30,7 +29,7 @@ pub struct Overlaps {
 }
 
 /// Finds the faces that overlap others. Corners are in a box of side 1 around the origin.
-pub fn overlapping(faces: &[[[f64; 2]; 3]], deadline: &Deadline) -> Result<Overlaps, PlanError> {
+pub fn overlapping(faces: &[[[f64; 2]; 3]], deadline: &Deadline) -> Result<Overlaps, Stopped> {
     let mut owners = vec![NONE; (SIDE * SIDE) as usize];
     let mut found = Overlaps { faces: vec![false; faces.len()], is_complete: true };
     let (mut visits, mut checked) = (0_u64, 0_u64);

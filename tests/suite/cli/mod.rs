@@ -1,6 +1,7 @@
 //! The command line.
 
 pub mod batch;
+pub mod check;
 pub mod commands;
 pub mod help;
 pub mod mistakes;

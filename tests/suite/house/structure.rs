@@ -18,6 +18,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mesh", &["parallel", "limits", "warning"]),
     ("import", &["guard", "mesh", "parallel", "srgb", "limits", "warning", "pluralise"]),
     ("report", &["import", "texture", "mesh", "limits", "warning", "pluralise"]),
+    // Of the report the bounds, of the plan the overlaps in the texture.
+    ("check", &["report", "import", "texture", "plan", "mesh", "limits", "pluralise"]),
     ("spec", &["mesh", "image", "srgb", "limits"]),
     ("request", &["spec", "mesh", "image", "limits"]),
     ("texture", &["guard", "mesh", "srgb", "limits", "warning"]),
@@ -31,8 +33,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "pipeline",
         &[
-            "report", "import", "encode", "caption", "sheet", "backend", "plan", "scene", "spec", "mesh", "image",
-            "limits", "warning",
+            "check", "report", "import", "encode", "caption", "sheet", "backend", "plan", "scene", "spec", "mesh",
+            "image", "limits", "warning",
         ],
     ),
     (
@@ -100,6 +102,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "service/jobs",
             "service/durable",
             "service/signature",
+            "service/digest",
+            "check",
             "pipeline",
             "report",
             "request",

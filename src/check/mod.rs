@@ -1,0 +1,86 @@
+//! Checks: rules that a mesh has to obey, and what they find. [`Rule`] is a rule as a client writes
+//! it, [`check`] judges a mesh by several, and a [`Verdict`] is what a pipeline reads.
+//!
+//! These are data transfer objects: the names of their fields are part of the public interface.
+//! Nothing here reads a file.
+
+mod judge;
+mod places;
+mod rule;
+#[cfg(test)]
+mod tests;
+mod uvs;
+mod volume;
+
+pub use judge::{Subject, check, unopened};
+pub use rule::{Level, NAMES, Rule, RuleSet, UnknownRule};
+
+use serde::Serialize;
+
+/// What all rules say of one file.
+#[derive(Clone, Debug, Serialize)]
+pub struct Verdict {
+    /// The file as it is named.
+    pub path: String,
+    /// Its SHA-256; null if it cannot be read.
+    pub sha256: Option<String>,
+    /// True unless a rule of level `error` fails.
+    pub ok: bool,
+    /// One for each rule, in the order of the rules.
+    pub checks: Vec<Check>,
+}
+
+impl Verdict {
+    /// The verdict of these checks.
+    pub fn new(path: String, sha256: Option<String>, checks: Vec<Check>) -> Self {
+        let ok = checks.iter().all(|check| check.ok || check.level == Level::Warn);
+        Self { path, sha256, ok, checks }
+    }
+}
+
+/// What one rule says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Check {
+    /// The rule's name, without its number.
+    pub rule: &'static str,
+    /// Whether it fails the file.
+    pub level: Level,
+    /// True if the mesh obeys it.
+    pub ok: bool,
+    /// True if the fault is an accepted one. There is no list of accepted faults yet, so it is false.
+    pub known: bool,
+    /// The number that was found: of all faults, however many `where` has. Null where nothing is counted.
+    pub found: Option<Figure>,
+    /// The largest number that is allowed.
+    pub allowed: Option<Figure>,
+    /// One sentence for a person.
+    pub detail: String,
+    /// The first faults, with their positions in the file's space.
+    #[serde(rename = "where")]
+    pub places: Vec<Place>,
+}
+
+/// Most places that a check lists.
+pub const PLACES_MAX: usize = 20;
+
+/// A number of a rule.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Figure {
+    /// A count.
+    Count(u64),
+    /// The sides of a box, file units.
+    Size([f64; 3]),
+}
+
+/// A place on a mesh, by positions in the file's space.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Place {
+    /// The ends of an edge.
+    Edge([[f64; 3]; 2]),
+    /// The corners of a face.
+    Face([[f64; 3]; 3]),
+    /// A vertex.
+    Vertex([f64; 3]),
+}

@@ -1,0 +1,102 @@
+//! `meshsnap check`: judges mesh files by rules.
+
+mod run;
+mod text;
+
+use clap::builder::PossibleValuesParser;
+use clap::{Args, ValueEnum, ValueHint};
+
+use super::settings::LimitSettings;
+use super::{isolation, render};
+use crate::check::{NAMES, RuleSet};
+use crate::cli::error::CliError;
+use crate::import::Format;
+use run::Run;
+
+/// Examples at the end of `--help`.
+pub const EXAMPLES: &str = "\
+Examples:
+  meshsnap check parts/
+  meshsnap check 'parts/*.stl' --rules opens,watertight,max-triangles:200000 --warn has-normals
+  meshsnap check model.obj --rules uv-no-overlap,bounds:100,100,50 --format jsonl
+
+A file that cannot be read fails, whatever the rules. Exit codes: 0 every file obeys its rules of level
+error, 1 one does not, 2 the command line is at fault, 3 meshsnap or the machine is.";
+
+/// Arguments of `check`.
+#[derive(Args)]
+pub struct CheckArgs {
+    #[arg(
+        required = true,
+        value_name = "PATH",
+        value_hint = ValueHint::AnyPath,
+        help = format!("Mesh files ({}, or a .zip of one with what it refers to), folders and patterns", Format::list())
+    )]
+    paths: Vec<String>,
+    #[arg(
+        long,
+        value_name = "RULE,...",
+        value_hint = ValueHint::Other,
+        help = "Rules that fail a file [default: opens, and no-warnings as a warning]",
+        long_help = format!(
+            "Rules that fail a file. {}, which take a number: max-triangles:200000, bounds:10,10,2.5 (x, y and z in \
+             the file's units). `no-warnings` warns in either list [default: opens, and no-warnings as a warning]",
+            NAMES.join(", ").replace("max-triangles", "and max-triangles")
+        )
+    )]
+    rules: Vec<String>,
+    /// Rules that are told when broken, and fail nothing
+    #[arg(long, value_name = "RULE,...", value_hint = ValueHint::Other)]
+    warn: Vec<String>,
+    /// text for people, jsonl: a verdict on each line
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t = Output::Text)]
+    format: Output,
+    /// Files that are read at once [default: one for each processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), value_hint = ValueHint::Other)]
+    jobs: Option<u16>,
+    /// Read the files that a mesh refers to from its own folder, though they are not named
+    #[arg(long)]
+    siblings: bool,
+    #[arg(
+        long,
+        value_name = "FORMAT",
+        help = "Format of the meshes, where their bytes do not tell",
+        value_parser = PossibleValuesParser::new(Format::names()),
+        ignore_case = true
+    )]
+    format_in: Option<String>,
+    #[command(flatten)]
+    limits: LimitSettings,
+}
+
+/// The form of the verdicts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Output {
+    /// Lines for people.
+    Text,
+    /// JSON Lines.
+    Jsonl,
+}
+
+/// Judges all files and prints the verdicts, in the order of their paths.
+pub fn run(arguments: &CheckArgs) -> Result<(), CliError> {
+    isolation::on_demand();
+    let rules = rules(&arguments.rules, &arguments.warn)?;
+    if arguments.paths.iter().any(|path| path == "-") {
+        return Err(CliError::usage("`-`, standard input, is no file that can be checked: name files and folders"));
+    }
+    let mut tasks = render::find(&arguments.paths, "png")?;
+    tasks.all.sort_by(|a, b| a.mesh.cmp(&b.mesh));
+    Run::new(arguments, rules, tasks).all()
+}
+
+/// The rules of the command line.
+fn rules(rules: &[String], warn: &[String]) -> Result<RuleSet, CliError> {
+    if rules.is_empty() && warn.is_empty() {
+        return Ok(RuleSet::default());
+    }
+    let split = |lists: &[String]| lists.iter().flat_map(|list| RuleSet::split(list)).collect::<Vec<_>>();
+    let (errors, warnings) = (split(rules), split(warn));
+    RuleSet::parse(errors.iter().map(String::as_str), warnings.iter().map(String::as_str))
+        .map_err(|error| CliError::usage(error.to_string()))
+}

@@ -1,0 +1,177 @@
+//! Judges many files at once, and prints what is said of each in their order.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+
+use super::{CheckArgs, Output, text};
+use crate::backend::cpu::DrawingThreads;
+use crate::check::{RuleSet, Verdict, unopened};
+use crate::cli::bundle::{self, plain};
+use crate::cli::error::CliError;
+use crate::cli::render::{Task, Tasks, format_in};
+use crate::cli::{files, siblings};
+use crate::config::cores;
+use crate::limits::{Deadline, Limits};
+use crate::pipeline;
+use crate::service::digest::Digest;
+
+/// A mesh names a file, which names others.
+const ROUNDS_MAX: usize = 4;
+
+/// Many files to judge.
+pub struct Run<'a> {
+    arguments: &'a CheckArgs,
+    limits: Limits,
+    rules: RuleSet,
+    tasks: Tasks,
+    /// The named files that are no meshes, by their absolute paths.
+    named: BTreeSet<PathBuf>,
+    /// Those of them that were used for some mesh.
+    used: Mutex<BTreeSet<PathBuf>>,
+}
+
+/// The end of one file.
+struct Outcome {
+    /// A sentence for the user beside the verdict.
+    said: Option<String>,
+    result: Result<Verdict, CliError>,
+}
+
+impl<'a> Run<'a> {
+    /// The run of a command.
+    pub fn new(arguments: &'a CheckArgs, rules: RuleSet, tasks: Tasks) -> Self {
+        let named = tasks.companions.iter().map(|name| absolute(name)).collect();
+        let limits = arguments.limits.config().limits;
+        Self { arguments, limits, rules, tasks, named, used: Mutex::default() }
+    }
+
+    /// Judges all. Verdicts go to standard output, and last the count to standard error.
+    pub fn all(&self) -> Result<(), CliError> {
+        let threads = self.arguments.jobs.map_or(cores() as usize, usize::from).min(self.tasks.all.len());
+        let next = AtomicUsize::new(0);
+        let (sender, outcomes) = channel();
+        let (verdicts, failure) = std::thread::scope(|scope| {
+            for _ in 0..threads {
+                let (sender, next) = (sender.clone(), &next);
+                scope.spawn(move || {
+                    // Many files keep all processors busy: each is read by one thread.
+                    let threads_of_one = if threads == 1 { cores() as usize } else { 1 };
+                    DrawingThreads::new(threads_of_one).install(|| {
+                        let mut done = |number, outcome| drop(sender.send((number, outcome)));
+                        self.work(next, &mut done);
+                    });
+                });
+            }
+            drop(sender);
+            self.print(&outcomes)
+        })?;
+        let used = self.used.lock().unwrap_or_else(PoisonError::into_inner);
+        for name in self.tasks.companions.iter().filter(|name| !used.contains(&absolute(name))) {
+            say!("meshsnap: {name}: is not used: no mesh refers to it");
+        }
+        let failed = verdicts.iter().filter(|is_ok| !**is_ok).count();
+        say!("{} ok, {failed} failed", verdicts.len() - failed);
+        match failure {
+            // The sentences are said already.
+            Some(code) => Err(CliError::silent(code)),
+            None if failed > 0 => Err(CliError::silent(1)),
+            None => Ok(()),
+        }
+    }
+
+    /// Judges one file after the other, until none is left.
+    fn work(&self, next: &AtomicUsize, done: &mut (dyn FnMut(usize, Outcome) + Send)) {
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let Some(task) = self.tasks.all.get(number) else { break };
+            let mut said = None;
+            let result = catch_unwind(AssertUnwindSafe(|| self.judge(task, &mut said)));
+            let bug = |_| Err(CliError::ours(format!("{}: this is a bug in meshsnap; please report it", task.mesh)));
+            done(number, Outcome { said, result: result.unwrap_or_else(bug) });
+        }
+    }
+
+    /// Judges one file, with those that it turns out to refer to.
+    fn judge(&self, task: &Task, said: &mut Option<String>) -> Result<Verdict, CliError> {
+        let path = &task.mesh;
+        let mut names = vec![path.clone()];
+        let mut digest = None;
+        for _ in 0..ROUNDS_MAX {
+            let named = match bundle::read(&names, None, &self.limits) {
+                Ok(named) => named,
+                Err(error) if error.exit_code == 3 => return Err(error),
+                Err(error) => {
+                    let own = format!("{path}: ");
+                    let detail = error.sentence.strip_prefix(&own).unwrap_or(&error.sentence).to_owned();
+                    return Ok(Verdict::new(path.clone(), digest, vec![unopened(detail)]));
+                }
+            };
+            // Alone at first: a digest is that of the mesh's own bytes.
+            if let ([own], None) = (named.bundle.files(), &digest) {
+                digest = Some(Digest::of(&own.bytes).to_string());
+            }
+            let format = format_in(self.arguments.format_in.as_deref());
+            let checks = pipeline::check(&named.bundle, format, &self.rules, &self.limits, &Deadline::default());
+            let beside = siblings::beside(&names, &named.common, &named.file_use, &|path| self.named.contains(path));
+            let may_read =
+                |name: &String| task.has_folder || self.arguments.siblings || self.named.contains(&absolute(name));
+            let (readable, unread): (Vec<String>, Vec<String>) = beside.into_iter().partition(may_read);
+            if readable.is_empty() {
+                let checks = checks.unwrap_or_else(|error| vec![unopened(error.to_string())]);
+                *said = (!unread.is_empty()).then(|| siblings::advice_to_add(path, &unread));
+                let used = names.iter().map(|name| absolute(name));
+                self.used.lock().unwrap_or_else(PoisonError::into_inner).extend(used);
+                return Ok(Verdict::new(path.clone(), digest, checks));
+            }
+            names.extend(readable);
+        }
+        let detail = "files refer to files without end";
+        Ok(Verdict::new(path.clone(), digest, vec![unopened(detail)]))
+    }
+
+    /// Prints the verdicts in order. Returns whether each file is in order, and the exit code of a fault of ours.
+    fn print(&self, outcomes: &Receiver<(usize, Outcome)>) -> Result<(Vec<bool>, Option<u8>), CliError> {
+        let (mut verdicts, mut failure) = (Vec::new(), None);
+        let mut waiting: BTreeMap<usize, Outcome> = BTreeMap::new();
+        let mut next = 0;
+        for (number, outcome) in outcomes {
+            waiting.insert(number, outcome);
+            while let Some(Outcome { said, result }) = waiting.remove(&next) {
+                next += 1;
+                match result {
+                    Ok(verdict) => {
+                        files::print(self.show(&verdict)?.as_bytes())?;
+                        verdicts.push(verdict.ok);
+                    }
+                    Err(error) => {
+                        say!("meshsnap: {}", error.sentence);
+                        failure = failure.max(Some(error.exit_code));
+                        verdicts.push(false);
+                    }
+                }
+                if let Some(sentence) = said {
+                    say!("meshsnap: {sentence}");
+                }
+            }
+        }
+        Ok((verdicts, failure))
+    }
+
+    fn show(&self, verdict: &Verdict) -> Result<String, CliError> {
+        match self.arguments.format {
+            Output::Text => Ok(text::text(verdict)),
+            Output::Jsonl => {
+                serde_json::to_string(verdict).map(|line| line + "\n").map_err(|e| CliError::ours(e.to_string()))
+            }
+        }
+    }
+}
+
+fn absolute(name: &str) -> PathBuf {
+    std::path::absolute(name).map_or_else(|_| PathBuf::from(name), |path| plain(&path))
+}

@@ -1,0 +1,107 @@
+//! `meshsnap check`: verdicts, their order, exit codes and mistakes.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Output, Stdio};
+
+use serde_json::Value;
+
+use crate::support::server::{CUBE_OBJ, meshsnap};
+
+/// A cube without its last side.
+fn open_cube() -> Vec<u8> {
+    let text = String::from_utf8(CUBE_OBJ.to_vec()).unwrap();
+    text.replace("f 4 1 5 8\n", "").into_bytes()
+}
+
+/// A folder with a good mesh, one with a hole, one that is none, and one with a material library.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
+    fs::create_dir(folder.path().join("parts")).unwrap();
+    write("parts/good.obj", CUBE_OBJ);
+    write("parts/hole.obj", &open_cube());
+    write("broken.stl", b"solid");
+    write("colored.obj", &[b"mtllib colored.mtl\n", CUBE_OBJ].concat());
+    write("colored.mtl", b"newmtl a\nKd 1 0 0\n");
+    folder
+}
+
+#[track_caller]
+fn check(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
+    let mut command = meshsnap();
+    command.current_dir(folder).arg("check").args(arguments).stdin(Stdio::null());
+    let Output { status, stdout, stderr } = command.output().unwrap();
+    (status.code(), String::from_utf8(stdout).unwrap(), String::from_utf8(stderr).unwrap())
+}
+
+/// Arguments, the exit code, a part of standard output and one of standard error.
+const CASES: &[(&str, i32, &str, &str)] = &[
+    ("parts/good.obj --rules watertight,manifold", 0, "parts/good.obj: ok\n", "1 ok, 0 failed"),
+    ("parts", 0, "parts/good.obj: ok\nparts/hole.obj: ok\n", "2 ok, 0 failed"),
+    ("parts --rules watertight", 1, "  error: watertight: 4 open edges in 1 loop; at (-1, ", "1 ok, 1 failed"),
+    ("parts --warn watertight", 0, "parts/hole.obj: ok\n  warning: watertight: 4 open", "2 ok, 0 failed"),
+    ("parts/*.obj --rules max-triangles:11", 1, "12 triangles, and 11 allowed", "1 ok, 1 failed"),
+    ("parts/good.obj --rules bounds:2,1,2", 1, "2 along y, and 1 allowed", "0 ok, 1 failed"),
+    ("broken.stl parts/good.obj --rules manifold", 1, "broken.stl: FAILED\n  error: opens: ", "1 ok, 1 failed"),
+    ("absent.obj", 1, "absent.obj: FAILED\n  error: opens: there is no such file\n", "0 ok, 1 failed"),
+    ("parts/gud.obj", 1, "did you mean parts/good.obj?", "0 ok, 1 failed"),
+    ("colored.obj", 0, "warning: no-warnings: ", "name it too, or add --siblings"),
+    ("colored.obj colored.mtl", 0, "colored.obj: ok\n", "1 ok, 0 failed"),
+    ("colored.obj --siblings", 0, "colored.obj: ok\n", "1 ok, 0 failed"),
+    ("parts/good.obj colored.mtl", 0, "parts/good.obj: ok\n", "colored.mtl: is not used"),
+    ("parts --rules watertigth", 2, "", "did you mean `watertight`?"),
+    ("parts --rules no-self-intersection", 2, "", "there is no rule `no-self-intersection`"),
+    ("parts --rules max-triangles", 2, "", "takes a whole number: max-triangles:1000"),
+    ("parts --rules manifold --warn manifold", 2, "", "`manifold` is given twice"),
+    ("-", 2, "", "standard input"),
+    ("parts --format xml", 2, "", "jsonl"),
+    ("", 2, "", "PATH"),
+];
+
+#[test]
+fn exit_codes_and_words() {
+    let folder = folder();
+    for (arguments, code, stdout, stderr) in CASES {
+        let words: Vec<&str> = arguments.split_whitespace().collect();
+        let (found, out, said) = check(folder.path(), &words);
+        assert_eq!(found, Some(*code), "{arguments}: {out}{said}");
+        assert!(out.contains(stdout) && said.contains(stderr), "{arguments}: {out}{said}");
+        assert!(*code != 2 || out.is_empty(), "{arguments}: {out}");
+    }
+}
+
+#[test]
+fn a_verdict_is_a_line_of_json() {
+    let folder = folder();
+    let (code, out, _) =
+        check(folder.path(), &["parts", "absent.obj", "--rules", "opens,watertight", "--format", "jsonl"]);
+    assert_eq!(code, Some(1));
+    let verdicts: Vec<Value> = out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let [absent, good, hole] = verdicts.as_slice() else { panic!("{out}") };
+    assert_eq!((&absent["path"], &absent["sha256"]), (&"absent.obj".into(), &Value::Null));
+    assert_eq!((&good["ok"], &good["checks"][1]["where"]), (&true.into(), &Value::Array(Vec::new())));
+    let digest = good["sha256"].as_str().unwrap();
+    assert!(digest.len() == 64 && hole["sha256"] != good["sha256"], "{digest}");
+    let watertight = &hole["checks"][1];
+    assert_eq!((&watertight["found"], &watertight["allowed"]), (&4.into(), &0.into()));
+    assert_eq!(watertight["where"].as_array().unwrap().len(), 4);
+}
+
+#[test]
+fn the_order_is_that_of_the_paths_at_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    for i in 0..60 {
+        // Of very different sizes, so that threads overtake each other.
+        let bytes = if i % 7 == 0 { open_cube() } else { CUBE_OBJ.to_vec() };
+        let padding = "# padding\n".repeat(if i % 5 == 0 { 20_000 } else { 0 });
+        fs::write(folder.path().join(format!("{i:02}.obj")), [padding.as_bytes(), &bytes].concat()).unwrap();
+    }
+    let with = |jobs: &str| check(folder.path(), &[".", "--rules", "watertight", "--format", "jsonl", "--jobs", jobs]);
+    let one = with("1");
+    assert_eq!((one.0, one.1.lines().count()), (Some(1), 60));
+    assert!(one.2.contains("51 ok, 9 failed"), "{}", one.2);
+    for jobs in ["2", "7", "64"] {
+        assert!(with(jobs) == one, "{jobs}");
+    }
+}
