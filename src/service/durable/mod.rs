@@ -18,7 +18,9 @@ mod tests;
 pub use blobs::{Blobs, FolderBlobs};
 pub use hold::Hold;
 pub use log::{Log, RedbLog};
-pub use record::{Change, EndRecord, ErrorRecord, FileRecord, JobKey, JobRecord, MeshRecord, PictureRecord};
+pub use record::{
+    Change, ClaimRecord, EndRecord, ErrorRecord, FileRecord, JobKey, JobRecord, MeshRecord, PictureRecord,
+};
 pub use record::{RequestRecord, SelectionRecord, WarningRecord};
 
 use std::collections::{HashMap, HashSet};

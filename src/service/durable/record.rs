@@ -59,6 +59,19 @@ pub struct JobRecord {
     /// The name of the stored mesh that is drawn.
     #[serde(with = "optional_digest", default)]
     pub mesh: Option<Digest>,
+    /// The name that the client gave the request.
+    #[serde(default)]
+    pub claim: Option<ClaimRecord>,
+}
+
+/// The name of a request.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ClaimRecord {
+    /// The name.
+    pub key: String,
+    /// The digest of the request.
+    #[serde(with = "digest")]
+    pub request: Digest,
 }
 
 /// A request for a picture, as it was sent.

@@ -157,6 +157,7 @@ fn job(key: JobKey, file: &[u8]) -> JobRecord {
         owner: String::new(),
         request_id: String::new(),
         mesh: None,
+        claim: None,
     }
 }
 

@@ -8,8 +8,10 @@ use super::state::AppState;
 use super::stored_mesh;
 use crate::import::{Bundle, BundleFile, Format};
 use crate::request;
-use crate::service::durable::{FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob};
-use crate::service::jobs::{Failure, JobId, JobState, Owner, Recipe, Restored, Task, Work, read_picture, value_of};
+use crate::service::durable::{ClaimRecord, FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob};
+use crate::service::jobs::{
+    Claim, ClaimName, Failure, JobId, JobState, Named, Owner, Recipe, Restored, Task, Work, read_picture, value_of,
+};
 use crate::service::store::{NewMesh, Reading};
 
 /// How often a job may be begun by processes that then ended.
@@ -32,6 +34,7 @@ pub fn recover(state: &AppState, mut recovered: Recovered) {
             id: JobId::from_key(job.record.key),
             accepted_unix_ms: job.record.accepted_unix_ms,
             owner: Owner::new(&job.record.owner),
+            claim: claim(state, &job.record),
         };
         if job.end.is_some() {
             restore_result(state, &recovered, name, job);
@@ -40,6 +43,7 @@ pub fn recover(state: &AppState, mut recovered: Recovered) {
         match resumed(state, &recovered, &job) {
             Ok((work, holds)) => {
                 queued += 1;
+                let work = Work { claim: name.claim, ..work };
                 state.jobs.resume((name.id, name.accepted_unix_ms), work, holds);
             }
             Err(failure) => state.jobs.restore(name, JobState::Failed(Arc::new(failure)), None, Vec::new()),
@@ -111,7 +115,18 @@ fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Resul
     let mesh_key = record.mesh.map(|digest| stored_mesh::key(digest, &reading));
     let (format_in, memory, recipe) = (reading.format_in, Arc::new(memory), Some(Arc::new(recipe)));
     let (owner, request_id) = (Owner::new(&record.owner), record.request_id.as_str().into());
-    Ok((Work { bundle, format_in, mesh_key, task, memory, recipe, owner, request_id, holds: [].into() }, holds))
+    let (claim, own) = (None, [].into());
+    Ok((Work { bundle, format_in, mesh_key, task, memory, recipe, owner, request_id, holds: own, claim }, holds))
+}
+
+/// The name of the job's request, so that the request is known when it is sent again.
+fn claim(state: &AppState, record: &JobRecord) -> Option<Arc<Claim>> {
+    let ClaimRecord { key, request } = record.claim.as_ref()?;
+    let name = ClaimName { owner: Owner::new(&record.owner), key: key.as_str().into() };
+    match state.jobs.claim(&name, *request) {
+        Named::New(claim) => Some(claim),
+        Named::Known(_) | Named::Pending | Named::Other => None,
+    }
 }
 
 /// The request is read again, under the limits of this process.

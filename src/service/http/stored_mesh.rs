@@ -54,5 +54,6 @@ pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Reservatio
         owner: Owner::default(),
         request_id: "".into(),
         holds: [].into(),
+        claim: None,
     }
 }

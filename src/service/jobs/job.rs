@@ -8,6 +8,7 @@ use bytes::Bytes;
 use tokio::sync::watch;
 use uuid::Uuid;
 
+use super::claims::Claim;
 use super::class::{Class, Owner};
 use super::upload_budget::Reservation;
 use crate::backend::{BackendKind, DrawTimes};
@@ -73,6 +74,8 @@ pub struct Work {
     pub request_id: Arc<str>,
     /// The bundle's files in the data folder, if they are there already.
     pub holds: Arc<[Arc<Hold>]>,
+    /// The name that the client gave the request.
+    pub claim: Option<Arc<Claim>>,
 }
 
 /// A request for a picture, as it was sent.
@@ -283,6 +286,8 @@ pub struct Job {
     pub(super) rank: Duration,
     pub(super) deadline: Deadline,
     pub(super) state: watch::Sender<JobState>,
+    /// The name that the client gave its request.
+    pub(super) claim: Option<Arc<Claim>>,
     work: Mutex<Option<Work>>,
     /// Its bytes in the data folder.
     holds: Mutex<Vec<Arc<Hold>>>,
@@ -318,12 +323,14 @@ pub struct Admission {
     pub estimate: Duration,
     /// Its place in the queue.
     pub rank: Duration,
+    /// The name that the client gave the request.
+    pub claim: Option<Arc<Claim>>,
 }
 
 impl Job {
     pub(super) fn new(work: Option<Work>, admission: Admission, name: Option<(JobId, u64)>) -> Self {
         let (id, accepted_unix_ms) = name.unwrap_or_else(|| (JobId::new(), unix_ms()));
-        let Admission { is_kept, owner, is_durable, serial, size, estimate, rank } = admission;
+        let Admission { is_kept, owner, is_durable, serial, size, estimate, rank, claim } = admission;
         Self {
             id,
             is_kept,
@@ -340,6 +347,7 @@ impl Job {
             rank,
             deadline: Deadline::default(),
             state: watch::Sender::new(JobState::Queued),
+            claim,
             work: Mutex::new(work),
             holds: Mutex::default(),
         }

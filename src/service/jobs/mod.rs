@@ -4,10 +4,11 @@
 //! Architecture invariants: a full queue refuses at once and never waits. An accepted job is never
 //! dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
 //!
-//! Reading order: [`job`] (one job and its states), [`queue`] (those that wait),
+//! Reading order: [`job`] (one job and its states), [`claims`] (names of requests), [`queue`] (those that wait),
 //! [`registry`] (all jobs, behind one lock), [`results`] (those that have ended), [`storage`] (jobs in the data folder), [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs),
 //! [`upload_budget`] (memory of uploads).
 
+mod claims;
 mod class;
 mod clock;
 mod estimates;
@@ -21,6 +22,7 @@ mod tests;
 mod upload_budget;
 mod worker;
 
+pub use claims::{Claim, ClaimName};
 pub use class::{Class, Owner};
 pub use job::{Failure, Finished, Job, JobId, JobState, Product, Recipe, Task, Timings, Work};
 pub use storage::{Storage, name, read_picture, value_of};
@@ -31,8 +33,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use super::digest::Digest;
 use super::durable::{Change, EndRecord, Hold, Unstored};
 use super::metrics::Metrics;
+use claims::Claimed;
 use registry::JobRegistry;
 pub use registry::Restored;
 
@@ -99,6 +103,19 @@ pub enum Refusal {
     Draining,
 }
 
+/// What the name of a request stands for.
+#[derive(Debug)]
+pub enum Named {
+    /// This request, which is new.
+    New(Arc<Claim>),
+    /// This request, which was accepted before as this job.
+    Known(Arc<Job>),
+    /// This request, which another connection is about to get accepted.
+    Pending,
+    /// Another request.
+    Other,
+}
+
 /// The load at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct JobLoad {
@@ -163,6 +180,27 @@ impl Jobs {
         });
         storing.await.unwrap_or(Err(Unstored::Failed))?;
         Ok(job)
+    }
+
+    /// Lets a name stand for a request, unless it stands for one whose job can be found.
+    pub fn claim(&self, name: &ClaimName, request: Digest) -> Named {
+        loop {
+            match self.registry.claims.claim(name, request) {
+                Claimed::New(claim) => return Named::New(claim),
+                Claimed::Pending => return Named::Pending,
+                Claimed::Other => return Named::Other,
+                Claimed::Job(key, claim) => match self.find(JobId::from_key(key)) {
+                    Some(job) => return Named::Known(job),
+                    // It went in this moment.
+                    None => self.registry.claims.free(&claim),
+                },
+            }
+        }
+    }
+
+    /// True if the name stands for a request.
+    pub fn has_claim(&self, name: &ClaimName) -> bool {
+        self.registry.claims.has(name)
     }
 
     /// Queues a job that an earlier process has accepted at this time.

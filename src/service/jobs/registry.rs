@@ -20,6 +20,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
+use super::claims::{Claim, Claims};
 use super::class::{Class, Owner};
 use super::estimates::Estimates;
 use super::job::{Admission, Job, JobId, JobState, Work, unix_ms};
@@ -36,6 +37,7 @@ const PATIENCE: u32 = 4;
 pub struct JobRegistry {
     pub(super) settings: JobSettings,
     pub(super) estimates: Estimates,
+    pub(super) claims: Arc<Claims>,
     /// The time from which ranks count.
     began: Instant,
     inner: Mutex<Inner>,
@@ -81,6 +83,8 @@ pub struct Restored {
     pub accepted_unix_ms: u64,
     /// The party that asked for it.
     pub owner: Owner,
+    /// The name that it gave its request.
+    pub claim: Option<Arc<Claim>>,
 }
 
 /// A job that occupies a worker.
@@ -96,6 +100,7 @@ impl JobRegistry {
         Self {
             settings,
             estimates: Estimates::new(),
+            claims: Arc::default(),
             began: Instant::now(),
             inner: Mutex::default(),
             work: Condvar::new(),
@@ -125,7 +130,8 @@ impl JobRegistry {
         self.check(&inner, if is_kept { Class::Batch } else { Class::Interactive }, &owner)?;
         inner.serial += 1;
         let rank = self.began.elapsed() + (estimate * PATIENCE).min(self.settings.job_time / 4);
-        let admission = Admission { is_kept, owner, is_durable, serial: inner.serial, size, estimate, rank };
+        let (serial, claim) = (inner.serial, work.claim.clone());
+        let admission = Admission { is_kept, owner, is_durable, serial, size, estimate, rank, claim };
         let job = Arc::new(Job::new(Some(work), admission, None));
         inner.queue.reserve(job.class, &job.owner, estimate);
         self.publish(&inner);
@@ -153,8 +159,8 @@ impl JobRegistry {
         let estimate = self.estimates.estimate(size).min(self.settings.job_time);
         let mut inner = self.lock();
         inner.serial += 1;
-        let (serial, rank, owner) = (inner.serial, Duration::ZERO, work.owner.clone());
-        let admission = Admission { is_kept: true, owner, is_durable: true, serial, size, estimate, rank };
+        let (serial, rank, owner, claim) = (inner.serial, Duration::ZERO, work.owner.clone(), work.claim.clone());
+        let admission = Admission { is_kept: true, owner, is_durable: true, serial, size, estimate, rank, claim };
         let job = Arc::new(Job::new(Some(work), admission, Some(name)));
         job.hold(holds);
         inner.queue.reserve(job.class, &job.owner, estimate);
@@ -164,16 +170,16 @@ impl JobRegistry {
 
     /// Adds a job that has ended in an earlier process.
     pub fn restore(&self, name: Restored, state: JobState, is_fetched: bool, holds: Vec<Arc<Hold>>) {
-        let Restored { id, accepted_unix_ms, owner } = name;
+        let Restored { id, accepted_unix_ms, owner, claim } = name;
         let name = (id, accepted_unix_ms);
         let mut inner = self.lock();
         let (size, estimate, rank) = (self.estimates.no_size(), Duration::ZERO, Duration::ZERO);
-        let admission = Admission { is_kept: true, owner, is_durable: true, serial: 0, size, estimate, rank };
+        let admission = Admission { is_kept: true, owner, is_durable: true, serial: 0, size, estimate, rank, claim };
         let job = Arc::new(Job::new(None, admission, Some(name)));
         job.hold(holds);
         inner.results.add(&job, result_bytes(&state), is_fetched, &self.settings);
         job.state.send_replace(state);
-        inner.kept.insert(job.id, job);
+        self.keep(&mut inner, &job);
         self.evict(&mut inner);
         self.clock.notify_one();
     }
@@ -185,11 +191,19 @@ impl JobRegistry {
         }
         inner.active.insert(job.serial, job.clone());
         if job.is_kept {
-            inner.kept.insert(job.id, job.clone());
+            self.keep(inner, job);
         }
         self.publish(inner);
         self.work.notify_one();
         self.wake_if_draining(inner);
+    }
+
+    /// From now on, the job can be found by its id, and by the name of its request.
+    fn keep(&self, inner: &mut Inner, job: &Arc<Job>) {
+        inner.kept.insert(job.id, job.clone());
+        if let Some(claim) = &job.claim {
+            claim.set_job(job.id.key());
+        }
     }
 
     /// Threads that wait for the last jobs that are being stored look again whether there will be more.
@@ -476,9 +490,11 @@ impl JobRegistry {
 
     fn remove(&self, inner: &mut Inner, ids: impl IntoIterator<Item = JobId>) {
         for id in ids {
-            if let Some(job) = inner.kept.remove(&id)
-                && let Some(storage) = self.storage_of(&job)
-            {
+            let Some(job) = inner.kept.remove(&id) else { continue };
+            if let Some(claim) = &job.claim {
+                self.claims.free(claim);
+            }
+            if let Some(storage) = self.storage_of(&job) {
                 storage.durable.store_soon(vec![Change::Forgotten(id.key())], job.hold(Vec::new()));
             }
         }

@@ -10,8 +10,8 @@ use super::job::{Failure, Finished, Job, JobState, Task, Timings, Work, unix_ms}
 use crate::backend::{BackendKind, DrawTimes};
 use crate::pipeline::QualitySelection;
 use crate::service::durable::{
-    Durable, EndRecord, ErrorRecord, FileRecord, Hold, JobRecord, PictureRecord, RequestRecord, SelectionRecord,
-    Unstored, WarningRecord,
+    ClaimRecord, Durable, EndRecord, ErrorRecord, FileRecord, Hold, JobRecord, PictureRecord, RequestRecord,
+    SelectionRecord, Unstored, WarningRecord,
 };
 use crate::spec::words::{Words, word_for};
 use crate::warning::Warning;
@@ -72,6 +72,10 @@ impl Storage {
             owner: work.owner.to_string(),
             request_id: work.request_id.to_string(),
             mesh: recipe.mesh,
+            claim: work
+                .claim
+                .as_ref()
+                .map(|claim| ClaimRecord { key: claim.name.key.to_string(), request: claim.request }),
         };
         Ok((record, holds))
     }

@@ -52,6 +52,7 @@ fn work(budget: &Arc<UploadBudget>, mesh: &'static [u8]) -> Work {
         owner: Owner::default(),
         request_id: "".into(),
         holds: [].into(),
+        claim: None,
     }
 }
 

@@ -84,6 +84,7 @@ impl Process {
             owner: Owner::default(),
             request_id: "".into(),
             holds: [].into(),
+            claim: None,
         };
         self.jobs.submit(work, false).unwrap()
     }

@@ -1,9 +1,10 @@
 //! From a request to work for a worker. The cheapest refusals come first.
 //!
-//! [`query`] reads the query, [`body`] the body within its limits. [`upload`] names what is to be
-//! stored.
+//! [`query`] reads the query, [`body`] the body within its limits. [`idempotency`] knows what is sent again.
+//! [`upload`] names what is to be stored.
 
 pub mod body;
+pub mod idempotency;
 pub mod query;
 pub mod upload;
 
@@ -13,6 +14,7 @@ use axum::extract::Request;
 use axum::http::HeaderMap;
 
 use self::body::{BodyKind, BodyLimits, Upload};
+use self::idempotency::Sent;
 use self::query::Query;
 use super::address::{Address, render_key};
 use super::error::ApiError;
@@ -22,13 +24,21 @@ use super::{negotiate, stored_mesh};
 use crate::limits::Limits;
 use crate::request;
 use crate::service::digest::Digest;
-use crate::service::jobs::{Class, Owner, Recipe, Task, Work};
+use crate::service::jobs::{Class, Job, Owner, Recipe, Task, Work};
 use crate::service::store::Reading;
 use crate::spec::Spec;
 
 /// Longest document, bytes, that is read although the queue is full: that of a stored mesh's picture, which
 /// may be in memory.
 const DOCUMENT_BYTES_MAX: u64 = 64 << 10;
+
+/// What a request for a picture brings.
+pub enum Reception {
+    /// One that was found valid.
+    New(Box<Received>),
+    /// One that was accepted before, as this job.
+    Known(Arc<Job>),
+}
 
 /// A request for a picture that was found valid.
 pub struct Received {
@@ -43,33 +53,51 @@ pub struct Received {
 }
 
 /// Reads a request for a picture. Every fault that shows without reading the mesh is found here,
-/// before it takes a worker's time.
-pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Received, ApiError> {
+/// before it takes a worker's time. A request for a job may have been accepted before.
+pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Reception, ApiError> {
     let (owner, request_id) = (owner_of(&request), observe::id_of(&request));
     body::check_header(request.headers(), state.rules.limits.body_bytes)?;
-    let Query { reading, overrides } = Query::read(request.uri(), &state.rules)?;
+    let query = Query::read(request.uri(), &state.rules)?;
+    let name = if class == Class::Batch { idempotency::name_of(request.headers(), &owner)? } else { None };
     // Forms and JSON may bring a document. Of every other request, the query is the whole document
     // and is checked before the upload.
     if !body::is_multipart(request.headers()) && !body::is_json(request.headers()) {
-        request::read(None, &overrides, &state.rules).map_err(query::query_error)?;
+        request::read(None, &query.overrides, &state.rules).map_err(query::query_error)?;
     }
     // A picture that is in memory needs no worker. A document that names its mesh is short.
     let is_short_json = body::is_json(request.headers())
         && body::announced_length(request.headers()).is_some_and(|length| length <= DOCUMENT_BYTES_MAX);
-    if !is_short_json {
+    // Nor does a request that was accepted before.
+    let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
+    if !is_short_json && !is_sent_again {
         state.jobs.would_accept(class, &owner)?;
     }
 
     let headers = request.headers().clone();
     let upload = read_upload(state, request).await?;
+    let claim = match &name {
+        Some(name) => match idempotency::check(state, name, (&query, &upload, &headers)).await? {
+            Sent::First(claim) => Some(claim),
+            Sent::Again(job) => return Ok(Reception::Known(job)),
+        },
+        None => None,
+    };
+    let mut received = understand(state, query, upload, &headers)?;
+    received.work = Work { owner, request_id, claim, ..received.work };
+    Ok(Reception::New(Box::new(received)))
+}
+
+/// Reads the document of a request, and finds the mesh that it names.
+fn understand(state: &AppState, query: Query, upload: Upload, headers: &HeaderMap) -> Result<Received, ApiError> {
+    let Query { reading, overrides } = query;
     let mut is_negotiated = false;
     let mut with_format = |mut spec: Spec| {
         is_negotiated = negotiate::depends_on_accept(spec.image.format);
-        let format = negotiate::image_format(spec.image.format, &headers)?;
+        let format = negotiate::image_format(spec.image.format, headers)?;
         request::set_format(&mut spec, format);
         Ok::<_, ApiError>(Box::new(spec))
     };
-    if let Some(document) = document_of(&upload, &reading, &headers) {
+    if let Some(document) = document_of(&upload, &reading, headers) {
         let (name, spec) = request::read_with_mesh(document, &overrides, &state.rules)?;
         let digest = Digest::parse(&name).ok_or_else(|| request::bad_mesh_name(&name))?;
         let spec = with_format(spec)?;
@@ -79,15 +107,14 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
         let address = keys.and_then(|keys| Address::new(state, digest, &reading, &spec, &keys));
         let document = upload.bundle.files().first().map(|file| file.bytes.clone());
         let recipe = Some(Arc::new(Recipe { document, overrides, mesh: Some(digest) }));
-        let work = Work { recipe, owner, request_id, ..stored_mesh::work_on(&stored, reading, Task::Draw(spec)) };
+        let work = Work { recipe, ..stored_mesh::work_on(&stored, reading, Task::Draw(spec)) };
         return Ok(Received { work, key, address, is_negotiated });
     }
     upload.bundle.check_sent().map_err(|error| ApiError::from(&error))?;
     let spec = with_format(request::read(upload.document.as_deref(), &overrides, &state.rules)?)?;
     let memory = Arc::new(upload.reservation);
     let recipe = Some(Arc::new(Recipe { document: upload.document, overrides, mesh: None }));
-    let work =
-        Work { recipe, owner, request_id, ..stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory) };
+    let work = Work { recipe, ..stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory) };
     Ok(Received { work, key: None, address: None, is_negotiated })
 }
 

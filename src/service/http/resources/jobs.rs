@@ -9,14 +9,17 @@ use axum::response::Response;
 use super::{PathName, responses, run, text_of};
 use crate::service::http::error::{ApiError, Fault};
 use crate::service::http::negotiate;
-use crate::service::http::receive;
+use crate::service::http::receive::{self, Reception};
 use crate::service::http::state::AppState;
 use crate::service::jobs::{Class, Job, JobId, JobState, Owner};
 
-/// Accepts a job, always with 202.
+/// Accepts a job, always with 202. A request that is sent again under its `Idempotency-Key` gets the job that it has.
 pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
-    let received = receive::receive(&state, request, Class::Batch).await?;
-    Ok(responses::accepted(&*state.jobs.accept(received.work).await?))
+    let job = match receive::receive(&state, request, Class::Batch).await? {
+        Reception::New(received) => state.jobs.accept(received.work).await?,
+        Reception::Known(job) => job,
+    };
+    Ok(responses::accepted(&job))
 }
 
 /// The job's state. With `Prefer: wait=N`, the answer comes when the job has ended or after N

@@ -10,19 +10,21 @@ use super::{responses, run};
 use crate::service::http::conditional;
 use crate::service::http::error::ApiError;
 use crate::service::http::negotiate;
-use crate::service::http::receive::{self, Received};
+use crate::service::http::receive::{self, Received, Reception};
 use crate::service::http::state::AppState;
-use crate::service::jobs::Class;
+use crate::service::jobs::{Class, Job};
 
 /// Draws while the client waits. With `Prefer: respond-async`, accepts a job instead.
 pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
     let respond_async = negotiate::prefer(request.headers()).respond_async;
     let class = if respond_async { Class::Batch } else { Class::Interactive };
-    let Received { work, key, address, is_negotiated } = receive::receive(&state, request, class).await?;
+    let received = match receive::receive(&state, request, class).await? {
+        Reception::New(received) => *received,
+        Reception::Known(job) => return Ok(accepted(&job)),
+    };
+    let Received { work, key, address, is_negotiated } = received;
     if respond_async {
-        let mut response = responses::accepted(&*state.jobs.accept(work).await?);
-        responses::set_preference_applied(&mut response, "respond-async");
-        return Ok(response);
+        return Ok(accepted(&*state.jobs.accept(work).await?));
     }
     let drawing = run::draw(&state, work);
     let mut response = match key {
@@ -45,4 +47,10 @@ pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Resul
         response.headers_mut().insert(name, etag);
     }
     Ok(response)
+}
+
+fn accepted(job: &Job) -> Response {
+    let mut response = responses::accepted(job);
+    responses::set_preference_applied(&mut response, "respond-async");
+    response
 }

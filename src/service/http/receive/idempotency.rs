@@ -1,0 +1,78 @@
+//! `Idempotency-Key`: a request that is sent again, because its answer was lost, makes no second job.
+
+use std::sync::Arc;
+
+use axum::http::{HeaderMap, HeaderName};
+
+use super::body::Upload;
+use super::query::Query;
+use crate::service::digest::Digest;
+use crate::service::http::dto::media_type;
+use crate::service::http::error::{ApiError, Fault};
+use crate::service::http::negotiate;
+use crate::service::http::state::AppState;
+use crate::service::jobs::{Claim, ClaimName, Job, Named, Owner};
+
+/// Longest key, characters.
+pub const KEY_CHARS_MAX: usize = 255;
+
+const HEADER: HeaderName = HeaderName::from_static("idempotency-key");
+
+/// What a named request is.
+pub enum Sent {
+    /// One that is sent for the first time. It has the name as long as this or its job is there.
+    First(Arc<Claim>),
+    /// One that was accepted before.
+    Again(Arc<Job>),
+}
+
+/// The name that a client gives its request.
+pub fn name_of(headers: &HeaderMap, owner: &Owner) -> Result<Option<ClaimName>, ApiError> {
+    let bad = |detail: String| ApiError::new(Fault::BadRequest, "bad_idempotency_key", detail);
+    let mut values = headers.get_all(HEADER).iter();
+    let Some(value) = values.next() else { return Ok(None) };
+    if values.next().is_some() {
+        return Err(bad("Idempotency-Key is given twice, and a request has one".to_owned()));
+    }
+    let is_allowed =
+        |text: &&str| (1..=KEY_CHARS_MAX).contains(&text.len()) && text.bytes().all(|b| b.is_ascii_graphic());
+    let key = value.to_str().ok().filter(is_allowed).ok_or_else(|| {
+        bad(format!("Idempotency-Key must be 1 to {KEY_CHARS_MAX} visible ASCII characters, such as a UUID"))
+    })?;
+    Ok(Some(ClaimName { owner: owner.clone(), key: key.into() }))
+}
+
+/// Finds out whether a request was sent before under its name.
+pub async fn check(
+    state: &AppState,
+    name: &ClaimName,
+    (query, upload, headers): (&Query, &Upload, &HeaderMap),
+) -> Result<Sent, ApiError> {
+    match state.jobs.claim(name, digest(query, upload, headers).await?) {
+        Named::New(claim) => Ok(Sent::First(claim)),
+        Named::Known(job) => Ok(Sent::Again(job)),
+        Named::Pending => {
+            let detail =
+                "a request with this Idempotency-Key is being accepted at this moment; send this one again shortly";
+            Err(ApiError::new(Fault::Conflict, "idempotency_key_in_use", detail).retry_after(1))
+        }
+        Named::Other => {
+            let detail =
+                "this Idempotency-Key was sent with another request before; give each request a key of its own";
+            Err(ApiError::new(Fault::Content, "idempotency_key_reused", detail))
+        }
+    }
+}
+
+/// The digest of all that makes a job: files, query, document, and the picture's format if `Accept` decides it.
+async fn digest(query: &Query, upload: &Upload, headers: &HeaderMap) -> Result<Digest, ApiError> {
+    let bundle = upload.bundle.clone();
+    // A large body takes a while.
+    let hashing = tokio::task::spawn_blocking(move || Digest::of_files(bundle.files()));
+    let files = hashing.await.map_err(|_| ApiError::internal())?.to_string();
+    let document = upload.document.as_deref().map(|document| Digest::of(document).to_string());
+    let format_in = query.reading.format_in.map(|format| format.name());
+    let accepted = negotiate::image_format(None, headers).ok().map(media_type);
+    let parts = (files, upload.bundle.is_zip(), document, format_in, &query.reading.entry, &query.overrides, accepted);
+    Ok(Digest::of(&serde_json::to_vec(&parts).map_err(|_| ApiError::internal())?))
+}
