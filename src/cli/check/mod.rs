@@ -1,7 +1,10 @@
 //! `meshsnap check`: judges mesh files by rules.
 
+mod config;
 mod run;
 mod text;
+
+use std::path::PathBuf;
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum, ValueHint};
@@ -11,6 +14,7 @@ use super::{isolation, render};
 use crate::check::{NAMES, RuleSet};
 use crate::cli::error::CliError;
 use crate::import::Format;
+use config::Config;
 use run::Run;
 
 /// Examples at the end of `--help`.
@@ -48,6 +52,12 @@ pub struct CheckArgs {
     /// Rules that are told when broken, and fail nothing
     #[arg(long, value_name = "RULE,...", value_hint = ValueHint::Other)]
     warn: Vec<String>,
+    /// File with the rules [default: meshsnap.toml in this folder or above]
+    ///
+    /// File with the rules; --rules and --warn override all that it says [default: meshsnap.toml in this folder
+    /// or the nearest above it]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    config: Option<PathBuf>,
     /// text for people, jsonl: a verdict on each line
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t = Output::Text)]
     format: Output,
@@ -81,22 +91,23 @@ pub enum Output {
 /// Judges all files and prints the verdicts, in the order of their paths.
 pub fn run(arguments: &CheckArgs) -> Result<(), CliError> {
     isolation::on_demand();
-    let rules = rules(&arguments.rules, &arguments.warn)?;
+    let config = config(arguments)?;
     if arguments.paths.iter().any(|path| path == "-") {
         return Err(CliError::usage("`-`, standard input, is no file that can be checked: name files and folders"));
     }
     let mut tasks = render::find(&arguments.paths, "png")?;
     tasks.all.sort_by(|a, b| a.mesh.cmp(&b.mesh));
-    Run::new(arguments, rules, tasks).all()
+    Run::new(arguments, config, tasks).all()
 }
 
-/// The rules of the command line.
-fn rules(rules: &[String], warn: &[String]) -> Result<RuleSet, CliError> {
-    if rules.is_empty() && warn.is_empty() {
-        return Ok(RuleSet::default());
+/// The rules of the command line, or else of a file.
+fn config(arguments: &CheckArgs) -> Result<Config, CliError> {
+    if arguments.rules.is_empty() && arguments.warn.is_empty() {
+        return Config::find(arguments.config.as_deref());
     }
     let split = |lists: &[String]| lists.iter().flat_map(|list| RuleSet::split(list)).collect::<Vec<_>>();
-    let (errors, warnings) = (split(rules), split(warn));
+    let (errors, warnings) = (split(&arguments.rules), split(&arguments.warn));
     RuleSet::parse(errors.iter().map(String::as_str), warnings.iter().map(String::as_str))
+        .map(Config::of)
         .map_err(|error| CliError::usage(error.to_string()))
 }

@@ -2,15 +2,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 
+use super::config::Config;
 use super::{CheckArgs, Output, text};
 use crate::backend::cpu::DrawingThreads;
-use crate::check::{RuleSet, Verdict, unopened};
+use crate::check::{Verdict, unopened};
 use crate::cli::bundle::{self, plain};
 use crate::cli::error::CliError;
 use crate::cli::render::{Task, Tasks, format_in};
@@ -27,7 +28,7 @@ const ROUNDS_MAX: usize = 4;
 pub struct Run<'a> {
     arguments: &'a CheckArgs,
     limits: Limits,
-    rules: RuleSet,
+    config: Config,
     tasks: Tasks,
     /// The named files that are no meshes, by their absolute paths.
     named: BTreeSet<PathBuf>,
@@ -44,10 +45,10 @@ struct Outcome {
 
 impl<'a> Run<'a> {
     /// The run of a command.
-    pub fn new(arguments: &'a CheckArgs, rules: RuleSet, tasks: Tasks) -> Self {
+    pub fn new(arguments: &'a CheckArgs, config: Config, tasks: Tasks) -> Self {
         let named = tasks.companions.iter().map(|name| absolute(name)).collect();
         let limits = arguments.limits.config().limits;
-        Self { arguments, limits, rules, tasks, named, used: Mutex::default() }
+        Self { arguments, limits, config, tasks, named, used: Mutex::default() }
     }
 
     /// Judges all. Verdicts go to standard output, and last the count to standard error.
@@ -116,7 +117,13 @@ impl<'a> Run<'a> {
                 digest = Some(Digest::of(&own.bytes).to_string());
             }
             let format = format_in(self.arguments.format_in.as_deref());
-            let checks = pipeline::check(&named.bundle, format, &self.rules, &self.limits, &Deadline::default());
+            let checks = pipeline::check(
+                &named.bundle,
+                format,
+                self.config.rules_of(Path::new(path)),
+                &self.limits,
+                &Deadline::default(),
+            );
             let beside = siblings::beside(&names, &named.common, &named.file_use, &|path| self.named.contains(path));
             let may_read =
                 |name: &String| task.has_folder || self.arguments.siblings || self.named.contains(&absolute(name));

@@ -105,3 +105,63 @@ fn the_order_is_that_of_the_paths_at_any_number_of_threads() {
         assert!(with(jobs) == one, "{jobs}");
     }
 }
+
+#[test]
+fn rules_of_a_repository_and_of_files_in_it() {
+    let folder = folder();
+    let config = |text: &str| fs::write(folder.path().join("meshsnap.toml"), text).unwrap();
+    let parts = folder.path().join("parts");
+    let failed = |at: &Path, words: &[&str]| check(at, words).2.lines().last().unwrap_or_default().to_owned();
+    config("[check]\nrules = [\"opens\", \"watertight\"]\nwarn = [\"no-warnings\"]\n");
+    assert_eq!(failed(folder.path(), &["parts"]), "1 ok, 1 failed");
+    // It is found from below, and the command line overrides it.
+    assert_eq!(failed(&parts, &["."]), "1 ok, 1 failed");
+    assert_eq!(failed(folder.path(), &["parts", "--rules", "opens"]), "2 ok, 0 failed");
+    let files = |glob: &str| {
+        config(&format!(
+            "[check]\nrules = [\"watertight\"]\n[[check.files]]\nglob = \"{glob}\"\nrules = [\"opens\"]\n"
+        ));
+        failed(&parts, &["."])
+    };
+    for glob in ["parts/**", "**/hole.obj", "parts/*.obj", "**/*.obj"] {
+        assert_eq!(files(glob), "2 ok, 0 failed", "{glob}");
+    }
+    for glob in ["*.obj", "hole.obj", "other/**", "parts/good.obj"] {
+        assert_eq!(files(glob), "1 ok, 1 failed", "{glob}");
+    }
+    fs::write(folder.path().join("other.toml"), "[check]\nrules = [\"max-triangles:1\"]\n").unwrap();
+    assert_eq!(failed(folder.path(), &["parts", "--config", "other.toml"]), "0 ok, 2 failed");
+}
+
+#[test]
+fn mistakes_of_a_config_have_a_line_and_a_column() {
+    let folder = folder();
+    let cases = [
+        ("[check]\nrule = []\n", "line 2, column 1: there is no key `rule`; did you mean `rules`?"),
+        ("[chekc]\n", "line 1, column 2: there is no key `chekc`; did you mean `check`?"),
+        (
+            "[check]\nrules = [\"opens\", \"watertigth\"]\n",
+            "line 2, column 19: there is no rule `watertigth`; did you mean",
+        ),
+        ("[check]\nrules = \"opens\"\n", "line 2, column 9: a list is needed"),
+        ("[check]\nrules = [5]\n", "line 2, column 10: a text in quotes is needed"),
+        ("[check]\nrules = [\"opens\"\n", "line "),
+        ("check = 5\n", "line 1, column 9: `check` is a table"),
+        ("[check]\n[[check.files]]\nrules = []\n", "[[check.files]] needs a `glob`"),
+        ("[check]\n[[check.files]]\nglob = \"a[\"\n", "line 3, column 8: is no pattern"),
+        (
+            "[check]\nrules = [\"manifold\"]\nwarn = [\"manifold\"]\n",
+            "line 3, column 9: the rule `manifold` is given twice",
+        ),
+    ];
+    for (text, part) in cases {
+        fs::write(folder.path().join("meshsnap.toml"), text).unwrap();
+        let (code, out, said) = check(folder.path(), &["parts"]);
+        assert!(code == Some(2) && out.is_empty() && said.contains(part), "{text}: {said}");
+        assert!(said.contains("meshsnap.toml, line "), "{said}");
+    }
+    fs::write(folder.path().join("meshsnap.toml"), [0xff, 0xfe]).unwrap();
+    assert_eq!(check(folder.path(), &["parts"]).0, Some(2));
+    let (code, _, said) = check(folder.path(), &["parts", "--config", "absent.toml"]);
+    assert!(code == Some(2) && said.contains("absent.toml: there is no such file"), "{said}");
+}
