@@ -121,15 +121,27 @@ impl Setting {
     pub fn set(&self, config: &mut Config, value: &str) -> Result<(), String> {
         match self.access {
             Access::Number(min, max, at) => {
-                let number = parse_number(value).filter(|n| (min..=max).contains(n));
-                *at(config) = number.ok_or_else(|| format!("a whole number from {min} to {max}"))?;
+                let units = self.units();
+                let number = parse_number(value, units).filter(|n| (min..=max).contains(n));
+                let example =
+                    units.last().map_or(String::new(), |(name, _)| format!(", with a unit if you like: 2{name}"));
+                *at(config) = number.ok_or_else(|| format!("a whole number from {min} to {max}{example}"))?;
                 Ok(())
             }
             Access::Switch(at) => {
-                *at(config) = value.parse().map_err(|_| "true or false".to_owned())?;
+                *at(config) = parse_switch(value).ok_or_else(|| "true or false, yes or no, 1 or 0".to_owned())?;
                 Ok(())
             }
             Access::Text(set, _) => set(config, value),
+        }
+    }
+
+    /// The units in which its number can be given, and what they are worth.
+    fn units(&self) -> &'static [(&'static str, u64)] {
+        match self.key {
+            key if key.ends_with("-ms") => TIME_UNITS,
+            key if key.ends_with("-bytes") => SIZE_UNITS,
+            _ => &[],
         }
     }
 
@@ -147,12 +159,26 @@ impl Setting {
 /// The words of `log-format` and their values of [`Config::log_json`].
 const LOG_FORMATS: &[(&str, Option<bool>)] = &[("auto", None), ("text", Some(false)), ("json", Some(true))];
 
-/// Reads `1000`, `1_000` or `64MiB`.
-fn parse_number(text: &str) -> Option<u64> {
-    let units = [("KiB", 10), ("MiB", 20), ("GiB", 30)];
-    let unit = units.iter().find_map(|&(name, shift)| text.strip_suffix(name).map(|rest| (rest.trim_end(), shift)));
-    let (digits, shift) = unit.unwrap_or((text, 0));
-    digits.replace('_', "").parse::<u64>().ok()?.checked_mul(1 << shift)
+/// Units of times in milliseconds. Units that end in others come first.
+const TIME_UNITS: &[(&str, u64)] = &[("ms", 1), ("h", 3_600_000), ("m", 60_000), ("s", 1000)];
+
+/// Units of sizes in bytes.
+const SIZE_UNITS: &[(&str, u64)] = &[("KiB", 1 << 10), ("GiB", 1 << 30), ("MiB", 1 << 20)];
+
+/// Reads `1000`, `1_000`, `64MiB` or `30 s`.
+fn parse_number(text: &str, units: &[(&str, u64)]) -> Option<u64> {
+    let unit = units.iter().find_map(|&(name, worth)| text.strip_suffix(name).map(|rest| (rest.trim_end(), worth)));
+    let (digits, worth) = unit.unwrap_or((text, 1));
+    digits.replace('_', "").parse::<u64>().ok()?.checked_mul(worth)
+}
+
+/// Reads a word for on or off.
+fn parse_switch(text: &str) -> Option<bool> {
+    match text.to_ascii_lowercase().as_str() {
+        "true" | "yes" | "1" => Some(true),
+        "false" | "no" | "0" => Some(false),
+        _ => None,
+    }
 }
 
 fn set(place: &mut String, value: &str) -> Result<(), String> {
@@ -228,4 +254,42 @@ const fn text(
 
 const fn secret(key: &'static str, help: &'static str, set: fn(&mut Config, &str) -> Result<(), String>) -> Setting {
     Setting { key, help, access: Access::Text(set, |c| format!("{} keys", c.api_keys.len())), has_flag: false }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_and_sizes_take_units_and_switches_words() {
+        let mut config = Config::default();
+        let mut set = |key: &str, value: &str| {
+            let setting = SETTINGS.iter().find(|setting| setting.key == key).unwrap();
+            setting.set(&mut config, value).map(|()| setting.show(&config))
+        };
+        for (key, value, expected) in [
+            ("limit-job-ms", "500ms", "500"),
+            ("limit-job-ms", "30s", "30000"),
+            ("limit-job-ms", "2 m", "120000"),
+            ("limit-job-ms", "1_000", "1000"),
+            ("limit-body-bytes", "2MiB", "2097152"),
+            ("ephemeral", "yes", "true"),
+            ("ephemeral", "0", "false"),
+            ("ephemeral", "True", "true"),
+            ("ephemeral", "NO", "false"),
+        ] {
+            assert_eq!(set(key, value).as_deref(), Ok(expected), "{key} {value}");
+        }
+        for (key, value, part) in [
+            ("limit-job-ms", "2MiB", "2s"),
+            ("limit-job-ms", "-1s", "2s"),
+            ("limit-job-ms", "99999999999999999999h", "2s"),
+            ("limit-body-bytes", "30s", "2MiB"),
+            ("workers", "2s", "1 to 1024"),
+            ("ephemeral", "maybe", "yes or no"),
+            ("ephemeral", "", "true or false"),
+        ] {
+            assert!(set(key, value).is_err_and(|allowed| allowed.contains(part)), "{key} {value}");
+        }
+    }
 }

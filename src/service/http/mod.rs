@@ -10,7 +10,7 @@
 //!
 //! [`recovery`] takes over what an earlier process has left in the data folder.
 //! [`negotiate`] and [`conditional`] read and write single headers. [`stored_mesh`] and [`address`]
-//! serve the resources of stored meshes. [`static_document`] answers with a constant document.
+//! serve the resources of stored meshes. [`event_streams`] counts the clients that follow jobs. [`static_document`] answers with a constant document.
 //!
 //! Architecture invariant: axum and hyper are used nowhere else.
 
@@ -19,6 +19,7 @@ mod conditional;
 mod connection;
 mod dto;
 mod error;
+mod event_streams;
 mod middleware;
 mod negotiate;
 mod receive;
@@ -111,6 +112,7 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
             () = drain(&state, Duration::from_millis(config.limits.job_ms) + DRAIN_GRACE) => {}
             () = signals.next() => tracing::warn!("told twice to end: jobs are abandoned"),
         }
+        state.event_streams.close();
     };
     let header_timeout = Duration::from_millis(config.header_timeout_ms);
     connection::accept::run(listener, router, config.connections as usize, header_timeout, stop).await;

@@ -10,7 +10,7 @@ use axum::routing::{MethodRouter, get, post};
 
 use super::error::ApiError;
 use super::middleware::{auth, observe, site};
-use super::resources::{front_page, health, jobs, meshes, metrics, pictures, render, schema};
+use super::resources::{events, front_page, health, jobs, meshes, metrics, pictures, render, schema};
 use super::state::AppState;
 
 /// The router of the whole interface.
@@ -41,7 +41,7 @@ pub fn router(state: &Arc<AppState>) -> Router {
 }
 
 /// The routes that need an API key where keys are configured.
-fn protected_routes() -> [(&'static str, MethodRouter<Arc<AppState>>); 9] {
+fn protected_routes() -> [(&'static str, MethodRouter<Arc<AppState>>); 10] {
     [
         ("/v1/render", post(render::post)),
         ("/v1/meshes", post(meshes::post)),
@@ -51,6 +51,7 @@ fn protected_routes() -> [(&'static str, MethodRouter<Arc<AppState>>); 9] {
         ("/v1/jobs", post(jobs::post)),
         ("/v1/jobs/{id}", get(jobs::get).delete(jobs::delete)),
         ("/v1/jobs/{id}/result", get(jobs::result)),
+        ("/v1/jobs/{id}/events", get(events::get)),
         (schema::PATH, get(schema::get)),
         ("/v1/capabilities", get(capabilities)),
     ]

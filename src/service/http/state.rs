@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use super::event_streams::EventStreams;
 use super::static_document::StaticDocument;
 use super::{ServeError, error};
 use crate::backend::cpu::DrawingThreads;
@@ -37,6 +38,8 @@ pub struct AppState {
     pub metrics: Arc<Metrics>,
     /// The data folder. None: nothing outlives the process.
     pub durable: Option<Durable>,
+    /// The clients that follow jobs.
+    pub event_streams: EventStreams,
     /// The stored meshes.
     pub meshes: Store,
     /// Stored meshes as they are drawn.
@@ -97,6 +100,7 @@ impl AppState {
             upload_budget: UploadBudget::new(config.uploads_bytes),
             meshes: Store::with(durable.clone(), config.mesh_bytes, to_usize(config.mesh_count)),
             durable,
+            event_streams: EventStreams::new(),
             metrics,
             residents,
             pictures: Pictures::new(config.picture_bytes),

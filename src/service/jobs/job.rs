@@ -10,6 +10,7 @@ use uuid::Uuid;
 
 use super::claims::Claim;
 use super::class::{Class, Owner};
+use super::progress::Progress;
 use super::upload_budget::Reservation;
 use crate::backend::{BackendKind, DrawTimes};
 use crate::image::ImageFormat;
@@ -286,6 +287,8 @@ pub struct Job {
     pub(super) rank: Duration,
     pub(super) deadline: Deadline,
     pub(super) state: watch::Sender<JobState>,
+    /// How far it has come in this process.
+    pub(super) progress: watch::Sender<Progress>,
     /// The name that the client gave its request.
     pub(super) claim: Option<Arc<Claim>>,
     work: Mutex<Option<Work>>,
@@ -347,6 +350,7 @@ impl Job {
             rank,
             deadline: Deadline::default(),
             state: watch::Sender::new(JobState::Queued),
+            progress: watch::Sender::default(),
             claim,
             work: Mutex::new(work),
             holds: Mutex::default(),
@@ -366,6 +370,20 @@ impl Job {
     /// The state at this moment.
     pub fn state(&self) -> JobState {
         self.state.borrow().clone()
+    }
+
+    /// A worker begins with it.
+    pub(super) fn begin(&self, task: &Task) {
+        let views = match task {
+            Task::Draw(spec) => spec.sheet.as_ref().map_or(1, |sheet| sheet.count()),
+            Task::Inspect { .. } => 0,
+        };
+        self.progress.send_replace(Progress::begun(views));
+    }
+
+    /// Follows its state and how far it has come.
+    pub fn watch(&self) -> (watch::Receiver<JobState>, watch::Receiver<Progress>) {
+        (self.state.subscribe(), self.progress.subscribe())
     }
 
     /// Waits for the job's end.

@@ -4,7 +4,7 @@
 //! Architecture invariants: a full queue refuses at once and never waits. An accepted job is never
 //! dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
 //!
-//! Reading order: [`job`] (one job and its states), [`claims`] (names of requests), [`queue`] (those that wait),
+//! Reading order: [`job`] (one job and its states), [`claims`] (names of requests), [`progress`] (how far it has come), [`queue`] (those that wait),
 //! [`registry`] (all jobs, behind one lock), [`results`] (those that have ended), [`storage`] (jobs in the data folder), [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs),
 //! [`upload_budget`] (memory of uploads).
 
@@ -13,6 +13,7 @@ mod class;
 mod clock;
 mod estimates;
 mod job;
+mod progress;
 mod queue;
 mod registry;
 mod results;
@@ -25,6 +26,7 @@ mod worker;
 pub use claims::{Claim, ClaimName};
 pub use class::{Class, Owner};
 pub use job::{Failure, Finished, Job, JobId, JobState, Product, Recipe, Task, Timings, Work};
+pub use progress::{Progress, Step};
 pub use storage::{Storage, name, read_picture, value_of};
 pub use upload_budget::{Reservation, UploadBudget, UploadBudgetFull};
 pub use worker::{CpuThreads, Renderer, RendererFactory, pipeline_renderers};

@@ -133,10 +133,12 @@ fn drop_renderer(renderer: &mut Option<Renderer>) {
 fn run_job(renderer: &mut Renderer, job: &Job, work: &Work, started: Instant) -> JobState {
     let mut timings = Timings { queue: started.duration_since(job.accepted), ..Timings::default() };
     let mut stage_began = started;
+    job.begin(&work.task);
     let result = renderer(work, &job.deadline, &mut |stage| {
         let now = Instant::now();
         timings.record(stage, now.duration_since(stage_began));
         stage_began = now;
+        job.progress.send_modify(|progress| *progress = progress.after(stage));
     });
     match result {
         Ok(Product::Picture { output, mesh_was_kept }) => {

@@ -50,7 +50,7 @@ fn the_document_is_whole_and_served_to_everybody() {
     let operations =
         document["paths"].as_object().unwrap().values().flat_map(|item| item.as_object().unwrap().values());
     let ids: Vec<&str> = operations.filter_map(|operation| operation["operationId"].as_str()).collect();
-    assert_eq!((ids.len(), ids.iter().collect::<BTreeSet<_>>().len()), (18, 18));
+    assert_eq!((ids.len(), ids.iter().collect::<BTreeSet<_>>().len()), (19, 19));
 
     let mut command = meshsnap();
     command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu"]).env("MESHSNAP_API_KEYS", "one");
@@ -89,7 +89,7 @@ fn every_path_answers_to_the_methods_that_are_documented_and_to_no_others() {
         }
         assert_eq!(said, allowed, "{path}");
     }
-    assert_eq!(asked, 15 * METHODS.len());
+    assert_eq!(asked, 16 * METHODS.len());
 }
 
 /// Checks an answer's status, headers, type and JSON against the document.
@@ -171,6 +171,8 @@ fn answers_are_as_documented() {
     let job = job.header("location").unwrap();
     ask("GET", "/v1/jobs/{id}", job, &["Prefer: wait=30"], b"", 200);
     ask("GET", RESULT, &format!("{job}/result"), &[], b"", 200);
+    ask("GET", "/v1/jobs/{id}/events", &format!("{job}/events"), &[], b"", 200);
+    ask("GET", "/v1/jobs/{id}/events", &format!("{job}/events"), &["Last-Event-ID: done"], b"", 204);
     ask("DELETE", "/v1/jobs/{id}", job, &[], b"", 200);
     let failed = ask("POST", "/v1/jobs", "/v1/jobs", &[], b"no mesh", 202);
     let failed = failed.header("location").unwrap();
@@ -183,5 +185,5 @@ fn answers_are_as_documented() {
     {
         ask("GET", path, path, &[], b"", 200);
     }
-    assert_eq!(cases, 41);
+    assert_eq!(cases, 43);
 }

@@ -88,7 +88,7 @@ pub async fn result(
 }
 
 /// The job, if it is this client's. Addresses are no identity: without keys, who knows the id may have it.
-fn find(state: &AppState, owner: &Owner, id: PathName) -> Result<Arc<Job>, ApiError> {
+pub(super) fn find(state: &AppState, owner: &Owner, id: PathName) -> Result<Arc<Job>, ApiError> {
     let job = text_of(id).and_then(|id| JobId::parse(&id)).and_then(|id| state.jobs.find(id));
     let job = job.filter(|job| state.api_keys.is_empty() || job.owner == *owner);
     job.ok_or_else(|| ApiError::not_found("there is no such job, or its result has expired"))

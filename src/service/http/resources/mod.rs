@@ -3,6 +3,7 @@
 //!
 //! Handlers are named after their method. None of them computes: work goes to the job queue.
 
+pub mod events;
 pub mod front_page;
 pub mod health;
 pub mod jobs;

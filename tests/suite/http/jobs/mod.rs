@@ -1,6 +1,7 @@
 //! The daemon under load and over time: queue, deadline, cancellation, drain.
 
 mod durable;
+mod events;
 mod idempotency;
 
 use std::io::Write as _;
