@@ -1,6 +1,7 @@
 //! `meshsnap check`: judges mesh files by rules.
 
 mod config;
+mod junit;
 mod run;
 mod text;
 
@@ -61,6 +62,9 @@ pub struct CheckArgs {
     /// text for people, jsonl: a verdict on each line
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t = Output::Text)]
     format: Output,
+    /// File for the verdicts as JUnit XML, too
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    junit: Option<String>,
     /// Files that are read at once [default: one for each processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), value_hint = ValueHint::Other)]
     jobs: Option<u16>,

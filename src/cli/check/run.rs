@@ -9,11 +9,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 
 use super::config::Config;
-use super::{CheckArgs, Output, text};
+use super::{CheckArgs, Output, junit, text};
 use crate::backend::cpu::DrawingThreads;
 use crate::check::{Verdict, unopened};
 use crate::cli::bundle::{self, plain};
 use crate::cli::error::CliError;
+use crate::cli::output::{Destination, Inputs};
 use crate::cli::render::{Task, Tasks, format_in};
 use crate::cli::{files, siblings};
 use crate::config::cores;
@@ -53,10 +54,12 @@ impl<'a> Run<'a> {
 
     /// Judges all. Verdicts go to standard output, and last the count to standard error.
     pub fn all(&self) -> Result<(), CliError> {
+        let junit =
+            self.arguments.junit.as_deref().map(|name| self.destination(name).map(|at| (name, at))).transpose()?;
         let threads = self.arguments.jobs.map_or(cores() as usize, usize::from).min(self.tasks.all.len());
         let next = AtomicUsize::new(0);
         let (sender, outcomes) = channel();
-        let (verdicts, failure) = std::thread::scope(|scope| {
+        let (verdicts, lost, failure) = std::thread::scope(|scope| {
             for _ in 0..threads {
                 let (sender, next) = (sender.clone(), &next);
                 scope.spawn(move || {
@@ -71,12 +74,15 @@ impl<'a> Run<'a> {
             drop(sender);
             self.print(&outcomes)
         })?;
+        if let Some((name, destination)) = junit {
+            destination.write(name, junit::junit(&verdicts).as_bytes())?;
+        }
         let used = self.used.lock().unwrap_or_else(PoisonError::into_inner);
         for name in self.tasks.companions.iter().filter(|name| !used.contains(&absolute(name))) {
             say!("meshsnap: {name}: is not used: no mesh refers to it");
         }
-        let failed = verdicts.iter().filter(|is_ok| !**is_ok).count();
-        say!("{} ok, {failed} failed", verdicts.len() - failed);
+        let failed = verdicts.iter().filter(|verdict| !verdict.ok).count() + lost;
+        say!("{} ok, {failed} failed", self.tasks.all.len() - failed);
         match failure {
             // The sentences are said already.
             Some(code) => Err(CliError::silent(code)),
@@ -141,9 +147,16 @@ impl<'a> Run<'a> {
         Ok(Verdict::new(path.clone(), digest, vec![unopened(detail)]))
     }
 
-    /// Prints the verdicts in order. Returns whether each file is in order, and the exit code of a fault of ours.
-    fn print(&self, outcomes: &Receiver<(usize, Outcome)>) -> Result<(Vec<bool>, Option<u8>), CliError> {
-        let (mut verdicts, mut failure) = (Vec::new(), None);
+    /// The place of a report, which is none of the files that are named.
+    fn destination(&self, name: &str) -> Result<Destination, CliError> {
+        let meshes = self.tasks.all.iter().map(|task| task.mesh.as_str());
+        Destination::new(name, &Inputs::of(meshes.chain(self.tasks.companions.iter().map(String::as_str))))
+    }
+
+    /// Prints the verdicts in order. Returns them, the number of files without one by a fault of ours, and its
+    /// exit code.
+    fn print(&self, outcomes: &Receiver<(usize, Outcome)>) -> Result<(Vec<Verdict>, usize, Option<u8>), CliError> {
+        let (mut verdicts, mut lost, mut failure) = (Vec::new(), 0, None);
         let mut waiting: BTreeMap<usize, Outcome> = BTreeMap::new();
         let mut next = 0;
         for (number, outcome) in outcomes {
@@ -153,12 +166,12 @@ impl<'a> Run<'a> {
                 match result {
                     Ok(verdict) => {
                         files::print(self.show(&verdict)?.as_bytes())?;
-                        verdicts.push(verdict.ok);
+                        verdicts.push(verdict);
                     }
                     Err(error) => {
                         say!("meshsnap: {}", error.sentence);
                         failure = failure.max(Some(error.exit_code));
-                        verdicts.push(false);
+                        lost += 1;
                     }
                 }
                 if let Some(sentence) = said {
@@ -166,7 +179,7 @@ impl<'a> Run<'a> {
                 }
             }
         }
-        Ok((verdicts, failure))
+        Ok((verdicts, lost, failure))
     }
 
     fn show(&self, verdict: &Verdict) -> Result<String, CliError> {

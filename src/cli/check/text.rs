@@ -20,8 +20,8 @@ pub fn text(verdict: &Verdict) -> String {
     text
 }
 
-/// `, at (0, 0, 1) to (0, 1, 1) and 2 more`
-fn at(check: &Check) -> String {
+/// The first places of a fault: `; at (0, 0, 1) to (0, 1, 1) and 2 more`
+pub fn at(check: &Check) -> String {
     let named: Vec<String> = check.places.iter().take(PLACES_MAX).map(place).collect();
     if named.is_empty() {
         return String::new();

@@ -165,3 +165,23 @@ fn mistakes_of_a_config_have_a_line_and_a_column() {
     let (code, _, said) = check(folder.path(), &["parts", "--config", "absent.toml"]);
     assert!(code == Some(2) && said.contains("absent.toml: there is no such file"), "{said}");
 }
+
+#[test]
+fn junit_counts_what_fails() {
+    let folder = folder();
+    let run = || check(folder.path(), &["parts", "broken.stl", "--rules", "opens,watertight", "--junit", "out.xml"]).0;
+    assert_eq!(run(), Some(1));
+    let text = fs::read_to_string(folder.path().join("out.xml")).unwrap();
+    assert_eq!(run(), Some(1));
+    assert_eq!(fs::read_to_string(folder.path().join("out.xml")).unwrap(), text);
+    let document: Vec<_> = text.lines().map(str::trim).collect();
+    assert!(document[1].contains("tests=\"5\" failures=\"2\""), "{text}");
+    for (start, count) in [("<testsuite name=", 3), ("<testcase name=", 5), ("<failure message=", 2)] {
+        assert_eq!(document.iter().filter(|line| line.starts_with(start)).count(), count, "{start}: {text}");
+    }
+    assert!(text.contains("<failure message=\"4 open edges in 1 loop\" type=\"watertight\">"), "{text}");
+    // A report never replaces a mesh.
+    let good = fs::read(folder.path().join("parts/good.obj")).unwrap();
+    assert_eq!(check(folder.path(), &["parts", "--junit", "parts/good.obj"]).0, Some(2));
+    assert_eq!(fs::read(folder.path().join("parts/good.obj")).unwrap(), good);
+}
