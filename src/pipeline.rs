@@ -13,7 +13,7 @@ use crate::caption::{Scale, draw_legend};
 use crate::check::{self, Check, RuleSet};
 use crate::encode::{self, EncodeError};
 use crate::image::{Image, ImageFormat};
-use crate::import::{self, Bundle, Format, Imported, MeshError, MeshFault};
+use crate::import::{self, Bundle, Format, Imported, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
 use crate::plan::{self, Prepared, Skip, UvLayout};
@@ -202,24 +202,31 @@ pub fn inspect(
     Report::of(&mesh, &report, bundle.bytes_len(), &mut budget, deadline)
 }
 
-/// Judges a file by rules. A file that does not open has one check, which says why.
-///
-/// Fails only where the time or the memory of this job ends after the file was read.
-pub fn check(
+/// A file that was read, to be judged.
+pub struct Opened {
+    imported: Imported,
+    budget: Budget,
+    file_bytes: u64,
+}
+
+/// Reads a file, to judge it.
+pub fn open(
     bundle: &Bundle,
     options: impl Into<import::Options>,
-    rules: &RuleSet,
     limits: &Limits,
     deadline: &Deadline,
-) -> Result<Vec<Check>, MeshError> {
+) -> Result<Opened, MeshError> {
     let mut budget = Budget::new(limits);
-    match import::import(bundle, options, limits, &mut budget, deadline) {
-        Err(error) if error.fault == MeshFault::Stopped => Err(error),
-        Err(error) => Ok(vec![check::unopened(error.to_string())]),
-        Ok(Imported { mesh, report }) => {
-            let subject = check::Subject { mesh: &mesh, import: &report, file_bytes: bundle.bytes_len() };
-            check::check(&subject, rules, &mut budget, deadline)
-        }
+    let imported = import::import(bundle, options, limits, &mut budget, deadline)?;
+    Ok(Opened { imported, budget, file_bytes: bundle.bytes_len() })
+}
+
+impl Opened {
+    /// Judges the file by rules. Fails where the time or the memory of the job ends.
+    pub fn check(mut self, rules: &RuleSet, deadline: &Deadline) -> Result<Vec<Check>, MeshError> {
+        let Imported { mesh, report } = &self.imported;
+        let subject = check::Subject { mesh, import: report, file_bytes: self.file_bytes };
+        check::check(&subject, rules, &mut self.budget, deadline)
     }
 }
 

@@ -31,14 +31,14 @@ pub fn unopened(detail: impl Into<String>) -> Check {
     finding.of(Rule::Opens, Level::Error)
 }
 
-/// What each rule says of the file, in the order of the rules.
+/// Judges a file: a check for each rule, in the order of the rules.
 pub fn check(
     subject: &Subject<'_>,
     rules: &RuleSet,
     budget: &mut Budget,
     deadline: &Deadline,
 ) -> Result<Vec<Check>, MeshError> {
-    let mut judge = Judge { subject: *subject, shape: None, budget, deadline };
+    let mut judge = Judge { subject: *subject, edges: None, topology: None, budget, deadline };
     let of_rule = |&(rule, level): &(Rule, Level)| {
         deadline.check()?;
         Ok(judge.finding(rule)?.of(rule, level))
@@ -48,18 +48,15 @@ pub fn check(
 
 struct Judge<'a> {
     subject: Subject<'a>,
-    /// Edges and topology, once a rule has asked for them.
-    shape: Option<Rc<Shape>>,
+    /// The edges, once a rule has asked for them.
+    edges: Option<Rc<EdgeList>>,
+    /// The topology, once a rule has asked for it.
+    topology: Option<Rc<Topology>>,
     budget: &'a mut Budget,
     deadline: &'a Deadline,
 }
 
-struct Shape {
-    edges: EdgeList,
-    topology: Topology,
-}
-
-/// What one rule says, without its name.
+/// A check without the name of its rule.
 struct Finding {
     ok: bool,
     found: Option<Figure>,
@@ -125,7 +122,7 @@ impl Judge<'_> {
                 Finding::of_faults(Faults::without_places(count), detail)
             }
             Rule::SingleComponent => {
-                Finding::at_most(self.shape()?.topology.components, 1, "connected part", "connected parts")
+                Finding::at_most(self.topology()?.components, 1, "connected part", "connected parts")
             }
             Rule::HasNormals => {
                 Finding::presence(!mesh.normals.is_empty(), "it has vertex normals", "it has no vertex normals")
@@ -149,14 +146,22 @@ impl Judge<'_> {
         })
     }
 
-    fn shape(&mut self) -> Result<Rc<Shape>, MeshError> {
-        if let Some(shape) = &self.shape {
-            return Ok(shape.clone());
+    fn edges(&mut self) -> Result<Rc<EdgeList>, MeshError> {
+        if let Some(edges) = &self.edges {
+            return Ok(edges.clone());
         }
         let edges = EdgeList::of(self.subject.mesh, self.budget)?;
         self.deadline.check()?;
+        Ok(self.edges.insert(Rc::new(edges)).clone())
+    }
+
+    fn topology(&mut self) -> Result<Rc<Topology>, MeshError> {
+        if let Some(topology) = &self.topology {
+            return Ok(topology.clone());
+        }
+        let edges = self.edges()?;
         let topology = Topology::of(self.subject.mesh, &edges, self.budget, self.deadline)?;
-        Ok(self.shape.insert(Rc::new(Shape { edges, topology })).clone())
+        Ok(self.topology.insert(Rc::new(topology)).clone())
     }
 
     fn warnings(&self) -> Finding {
@@ -179,13 +184,16 @@ impl Judge<'_> {
 
     fn watertight(&mut self) -> Result<Finding, MeshError> {
         let mesh = self.subject.mesh;
-        let shape = self.shape()?;
-        let Shape { edges, topology } = &*shape;
+        let edges = self.edges()?;
         if edges.is_empty() {
             return Ok(Finding::presence(false, "", "it has no faces"));
         }
         let leaks = edges.iter().filter(|edge| edge.face_count != 2 || edge.has_inconsistent_winding);
         let faults = Faults::at(leaks, |edge| places::edge(mesh, &edge));
+        if faults.count == 0 {
+            return Ok(Finding::of_faults(faults, "it is watertight".to_owned()));
+        }
+        let topology = self.topology()?;
         let mut said = Vec::new();
         if topology.open_edges > 0 {
             let open = pluralise(topology.open_edges, "open edge", "open edges");
@@ -200,16 +208,14 @@ impl Judge<'_> {
             ),
         ];
         said.extend(more.into_iter().filter(|(n, ..)| *n > 0).map(|(n, one, many)| pluralise(n, one, many)));
-        let detail = if said.is_empty() { "it is watertight".to_owned() } else { said.join(", ") };
-        Ok(Finding::of_faults(faults, detail))
+        Ok(Finding::of_faults(faults, said.join(", ")))
     }
 
     fn manifold(&mut self) -> Result<Finding, MeshError> {
         let mesh = self.subject.mesh;
-        let shape = self.shape()?;
-        let edges = &shape.edges;
+        let edges = self.edges()?;
         let of_edges = Faults::at(edges.iter().filter(|e| e.face_count > 2), |edge| places::edge(mesh, &edge));
-        let vertices = topology::nonmanifold_vertices(mesh, edges, self.budget)?;
+        let vertices = topology::nonmanifold_vertices(mesh, &edges, self.budget)?;
         let of_vertices = Faults::at(vertices.into_iter(), |vertex| places::vertex(mesh, vertex));
         let detail = match (of_edges.count, of_vertices.count) {
             (0, 0) => "it is manifold".to_owned(),
@@ -224,8 +230,7 @@ impl Judge<'_> {
 
     fn winding(&mut self) -> Result<Finding, MeshError> {
         let mesh = self.subject.mesh;
-        let shape = self.shape()?;
-        let edges = &shape.edges;
+        let edges = self.edges()?;
         let turned = edges.iter().filter(|edge| edge.face_count == 2 && edge.has_inconsistent_winding);
         let faults = Faults::at(turned, |edge| places::edge(mesh, &edge));
         let (one, more) =
@@ -235,9 +240,8 @@ impl Judge<'_> {
     }
 
     fn inverted(&mut self) -> Result<Finding, MeshError> {
-        let shape = self.shape()?;
-        let edges = &shape.edges;
-        let (faults, closed) = volume::inverted(self.subject.mesh, edges, self.budget)?;
+        let edges = self.edges()?;
+        let (faults, closed) = volume::inverted(self.subject.mesh, &edges, self.budget)?;
         let detail = match (faults.count, closed) {
             (_, 0) => "it has no closed part whose volume has a sign".to_owned(),
             (count, closed) => {

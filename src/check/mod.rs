@@ -17,7 +17,7 @@ pub use rule::{Level, NAMES, Rule, RuleSet, UnknownRule};
 
 use serde::Serialize;
 
-/// What all rules say of one file.
+/// The checks of one file.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
     /// The file as it is named.
@@ -38,12 +38,12 @@ impl Verdict {
     }
 }
 
-/// What one rule says.
+/// The result of one rule.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
     /// The rule's name, without its number.
     pub rule: &'static str,
-    /// Whether it fails the file.
+    /// `error` if breaking it fails the file.
     pub level: Level,
     /// True if the mesh obeys it.
     pub ok: bool,

@@ -71,11 +71,11 @@ pub const NAMES: [&str; 20] = [
     "bounds",
 ];
 
-/// Whether a rule that is broken fails the file.
+/// The weight of a broken rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
-    /// It does.
+    /// The file fails.
     Error,
     /// It is told, no more.
     Warn,
@@ -97,7 +97,7 @@ pub enum UnknownRule {
     Value {
         /// The whole rule.
         given: String,
-        /// What it takes.
+        /// The value that the rule takes.
         detail: String,
     },
     /// The same rule twice.

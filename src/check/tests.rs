@@ -60,7 +60,11 @@ fn cube() -> Obj {
 fn judge(text: &str, rule: &str) -> Check {
     let rules = RuleSet::parse([rule], []).unwrap();
     let bundle = Bundle::of_one(text.as_bytes().to_vec());
-    let mut checks = pipeline::check(&bundle, None, &rules, &Limits::default(), &Deadline::default()).unwrap();
+    let deadline = Deadline::default();
+    let mut checks = match pipeline::open(&bundle, None, &Limits::default(), &deadline) {
+        Ok(opened) => opened.check(&rules, &deadline).unwrap(),
+        Err(fault) => vec![unopened(fault.to_string())],
+    };
     assert_eq!(checks.len(), 1, "{rule}");
     checks.remove(0)
 }

@@ -105,6 +105,12 @@ fn absolute(name: &str) -> Result<PathBuf, CliError> {
     Ok(plain(&path))
 }
 
+/// A path as paths are compared: absolute, without `.` and `..`.
+pub fn comparable(path: impl AsRef<Path>) -> PathBuf {
+    let path = path.as_ref();
+    std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| plain(&path))
+}
+
 /// A path without `.` and `..`.
 pub fn plain(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();

@@ -8,7 +8,7 @@ use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
 use crate::check::{RuleSet, UnknownRule};
-use crate::cli::bundle::plain;
+use crate::cli::bundle::comparable;
 use crate::cli::error::CliError;
 use crate::cli::files;
 
@@ -25,6 +25,8 @@ const FILE_KEYS: [&str; 3] = ["glob", "rules", "warn"];
 /// Rules for all files.
 #[derive(Debug)]
 pub struct Config {
+    /// The file; none for rules of a command.
+    path: Option<PathBuf>,
     /// The folder that globs begin at.
     folder: PathBuf,
     rules: RuleSet,
@@ -35,7 +37,7 @@ pub struct Config {
 impl Config {
     /// The same rules for every file.
     pub fn of(rules: RuleSet) -> Self {
-        Self { folder: PathBuf::new(), rules, of_files: Vec::new() }
+        Self { path: None, folder: PathBuf::new(), rules, of_files: Vec::new() }
     }
 
     /// Reads the file that is named, or else the one in the current folder or the nearest above it, or else
@@ -54,20 +56,25 @@ impl Config {
         let of_command = |error: CliError| CliError { exit_code: 2, ..error };
         let bytes = files::read(&name, BYTES_MAX).map_err(of_command)?;
         let text = std::str::from_utf8(&bytes).map_err(|_| CliError::usage(format!("{name}: is not UTF-8")))?;
-        let folder = std::path::absolute(&path).unwrap_or(path);
-        let folder = plain(folder.parent().unwrap_or(Path::new("")));
-        read(text, folder).map_err(|Fault { at, detail }| {
+        let folder = comparable(&path).parent().unwrap_or(Path::new("")).to_owned();
+        let config = read(text, folder).map_err(|Fault { at, detail }| {
             let before = &text.as_bytes()[..at.min(text.len())];
             let line = before.iter().filter(|byte| **byte == b'\n').count() + 1;
             let start = before.iter().rposition(|byte| *byte == b'\n').map_or(0, |newline| newline + 1);
             let column = String::from_utf8_lossy(&before[start..]).chars().count() + 1;
             CliError::usage(format!("{name}, line {line}, column {column}: {detail}"))
-        })
+        })?;
+        Ok(Self { path: Some(path), ..config })
+    }
+
+    /// The file that the rules come from.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
     }
 
     /// The rules of a file.
     pub fn rules_of(&self, path: &Path) -> &RuleSet {
-        let absolute = std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| plain(&path));
+        let absolute = comparable(path);
         let relative = absolute.strip_prefix(&self.folder).unwrap_or(&absolute);
         let options = MatchOptions { require_literal_separator: true, ..MatchOptions::default() };
         let last = self.of_files.iter().rev().find(|(glob, _)| glob.matches_path_with(relative, options));

@@ -12,7 +12,7 @@ use super::config::Config;
 use super::{CheckArgs, Output, junit, text};
 use crate::backend::cpu::DrawingThreads;
 use crate::check::{Verdict, unopened};
-use crate::cli::bundle::{self, plain};
+use crate::cli::bundle::{self, comparable};
 use crate::cli::error::CliError;
 use crate::cli::output::{Destination, Inputs};
 use crate::cli::render::{Task, Tasks, format_in};
@@ -47,7 +47,7 @@ struct Outcome {
 impl<'a> Run<'a> {
     /// The run of a command.
     pub fn new(arguments: &'a CheckArgs, config: Config, tasks: Tasks) -> Self {
-        let named = tasks.companions.iter().map(|name| absolute(name)).collect();
+        let named = tasks.companions.iter().map(comparable).collect();
         let limits = arguments.limits.config().limits;
         Self { arguments, limits, config, tasks, named, used: Mutex::default() }
     }
@@ -72,13 +72,14 @@ impl<'a> Run<'a> {
                 });
             }
             drop(sender);
-            self.print(&outcomes)
+            // Where nobody reads the verdicts, no more are made.
+            self.print(&outcomes).inspect_err(|_| next.store(self.tasks.all.len(), Ordering::Relaxed))
         })?;
         if let Some((name, destination)) = junit {
             destination.write(name, junit::junit(&verdicts).as_bytes())?;
         }
         let used = self.used.lock().unwrap_or_else(PoisonError::into_inner);
-        for name in self.tasks.companions.iter().filter(|name| !used.contains(&absolute(name))) {
+        for name in self.tasks.companions.iter().filter(|name| !used.contains(&comparable(name))) {
             say!("meshsnap: {name}: is not used: no mesh refers to it");
         }
         let failed = verdicts.iter().filter(|verdict| !verdict.ok).count() + lost;
@@ -123,21 +124,18 @@ impl<'a> Run<'a> {
                 digest = Some(Digest::of(&own.bytes).to_string());
             }
             let format = format_in(self.arguments.format_in.as_deref());
-            let checks = pipeline::check(
-                &named.bundle,
-                format,
-                self.config.rules_of(Path::new(path)),
-                &self.limits,
-                &Deadline::default(),
-            );
+            let opened = pipeline::open(&named.bundle, format, &self.limits, &Deadline::default());
             let beside = siblings::beside(&names, &named.common, &named.file_use, &|path| self.named.contains(path));
             let may_read =
-                |name: &String| task.has_folder || self.arguments.siblings || self.named.contains(&absolute(name));
+                |name: &String| task.has_folder || self.arguments.siblings || self.named.contains(&comparable(name));
             let (readable, unread): (Vec<String>, Vec<String>) = beside.into_iter().partition(may_read);
             if readable.is_empty() {
+                // Judged only now that all its files are there.
+                let rules = self.config.rules_of(Path::new(path));
+                let checks = opened.and_then(|opened| opened.check(rules, &Deadline::default()));
                 let checks = checks.unwrap_or_else(|error| vec![unopened(error.to_string())]);
                 *said = (!unread.is_empty()).then(|| siblings::advice_to_add(path, &unread));
-                let used = names.iter().map(|name| absolute(name));
+                let used = names.iter().map(comparable);
                 self.used.lock().unwrap_or_else(PoisonError::into_inner).extend(used);
                 return Ok(Verdict::new(path.clone(), digest, checks));
             }
@@ -147,10 +145,15 @@ impl<'a> Run<'a> {
         Ok(Verdict::new(path.clone(), digest, vec![unopened(detail)]))
     }
 
-    /// The place of a report, which is none of the files that are named.
+    /// The place of a report, which is none of the files that are read.
     fn destination(&self, name: &str) -> Result<Destination, CliError> {
+        if name == "-" {
+            return Err(CliError::usage("--junit -: standard output has the verdicts; name a file"));
+        }
         let meshes = self.tasks.all.iter().map(|task| task.mesh.as_str());
-        Destination::new(name, &Inputs::of(meshes.chain(self.tasks.companions.iter().map(String::as_str))))
+        let named = meshes.chain(self.tasks.companions.iter().map(String::as_str));
+        let config = self.config.path().map(Path::to_string_lossy);
+        Destination::new(name, &Inputs::of(named.chain(config.as_deref())))
     }
 
     /// Prints the verdicts in order. Returns them, the number of files without one by a fault of ours, and its
@@ -190,8 +193,4 @@ impl<'a> Run<'a> {
             }
         }
     }
-}
-
-fn absolute(name: &str) -> PathBuf {
-    std::path::absolute(name).map_or_else(|_| PathBuf::from(name), |path| plain(&path))
 }

@@ -14,7 +14,7 @@ use super::tasks::{Task, Tasks};
 use super::{RenderArgs, format_in, one};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{Backends, GpuHost, HardwareHint};
-use crate::cli::bundle::{self, plain};
+use crate::cli::bundle::{self, comparable};
 use crate::cli::error::CliError;
 use crate::cli::output::{Destination, Inputs};
 use crate::cli::siblings;
@@ -65,7 +65,7 @@ impl Batch<'_> {
         let shared = Shared {
             gpu: Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), self.arguments.cache_dir.clone())),
             next: AtomicUsize::new(0),
-            named: self.tasks.companions.iter().map(|name| absolute(name)).collect(),
+            named: self.tasks.companions.iter().map(comparable).collect(),
             used: Mutex::default(),
             inputs: Inputs::of(meshes.chain(companions).chain(request.as_deref())),
         };
@@ -128,7 +128,7 @@ impl Batch<'_> {
             let drawn = pipeline::render(job, backends, &self.limits, &Deadline::default(), &mut |_| {});
             let beside = siblings::beside(&names, &common, &file_use, &|path| shared.named.contains(path));
             let may_read =
-                |name: &String| task.has_folder || self.arguments.siblings || shared.named.contains(&absolute(name));
+                |name: &String| task.has_folder || self.arguments.siblings || shared.named.contains(&comparable(name));
             let (readable, unread): (Vec<String>, Vec<String>) = beside.into_iter().partition(may_read);
             if readable.is_empty() {
                 let drawn = drawn.map_err(|error| one::of_mesh(error, &task.mesh, &|| advice(task, &unread)))?;
@@ -152,7 +152,7 @@ impl Batch<'_> {
         // Nor may it be a file that was read though it is not named.
         Destination::new(&output, &Inputs::of(names.iter().map(String::as_str)))?;
         Destination::new(&output, &shared.inputs)?.write(&output, &drawn.bytes)?;
-        let used = names.iter().map(|name| absolute(name));
+        let used = names.iter().map(comparable);
         shared.used.lock().unwrap_or_else(PoisonError::into_inner).extend(used);
         Ok(())
     }
@@ -201,7 +201,7 @@ impl Batch<'_> {
 
     fn mention_unused(&self, shared: &Shared) {
         let used = shared.used.lock().unwrap_or_else(PoisonError::into_inner);
-        for name in self.tasks.companions.iter().filter(|name| !used.contains(&absolute(name))) {
+        for name in self.tasks.companions.iter().filter(|name| !used.contains(&comparable(name))) {
             say!("meshsnap: {name}: is not used: no mesh refers to it");
         }
     }
@@ -210,8 +210,4 @@ impl Batch<'_> {
 /// Advice about files that a mesh refers to, that lie beside it and are not named.
 fn advice(task: &Task, unread: &[String]) -> Option<(String, bool)> {
     (!unread.is_empty()).then(|| (siblings::advice_to_add(&task.mesh, unread), true))
-}
-
-fn absolute(name: &str) -> PathBuf {
-    std::path::absolute(name).map_or_else(|_| PathBuf::from(name), |path| plain(&path))
 }

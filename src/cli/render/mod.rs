@@ -18,6 +18,7 @@ use super::isolation;
 use super::output::{Destination, Inputs};
 use super::settings::LimitSettings;
 use super::siblings;
+use crate::cli::bundle::comparable;
 use crate::cli::error::CliError;
 use crate::image::ImageFormat;
 use crate::import::{Format, Options};
@@ -226,27 +227,32 @@ impl Repeatable<'_> {
 }
 
 impl Watched for Repeatable<'_> {
-    fn inputs(&self) -> Vec<String> {
-        let Self { arguments, ref limits, .. } = *self;
-        let mut names = tasks::expand(&arguments.meshes);
-        if arguments.siblings && !is_folder(&arguments.output) {
-            // Those of a mesh that cannot be read are not known.
-            let options = Options { format: format_in(arguments.format_in.as_deref()), ..Options::default() };
-            names.extend(siblings::all_beside(&names, arguments.entry.as_deref(), options, limits).unwrap_or_default());
-        }
-        names.extend(arguments.request.as_deref().map(|path| path.to_string_lossy().into_owned()));
+    fn named(&self) -> Vec<String> {
+        let mut names = tasks::expand(&self.arguments.meshes);
+        names.extend(self.arguments.request.as_deref().map(|path| path.to_string_lossy().into_owned()));
         names
+    }
+
+    fn beside(&self) -> Vec<String> {
+        let Self { arguments, ref limits, .. } = *self;
+        if !arguments.siblings || is_folder(&arguments.output) {
+            return Vec::new();
+        }
+        let options = Options { format: format_in(arguments.format_in.as_deref()), ..Options::default() };
+        let found = siblings::all_beside(&arguments.meshes, arguments.entry.as_deref(), options, limits);
+        // Those of a mesh that cannot be read are not known.
+        found.unwrap_or_default()
     }
 
     fn outputs(&self) -> BTreeSet<PathBuf> {
         let Self { arguments, ref limits, .. } = *self;
         let output = Path::new(&arguments.output);
         if !is_folder(&arguments.output) {
-            return BTreeSet::from([watch::absolute(output)]);
+            return BTreeSet::from([comparable(output)]);
         }
         let extension = spec::read(arguments, limits).map_or("png", |spec| extension(&spec));
         let tasks = find(&arguments.meshes, extension).unwrap_or_default().all;
-        tasks.iter().map(|task| watch::absolute(&output.join(&task.picture))).collect()
+        tasks.iter().map(|task| comparable(output.join(&task.picture))).collect()
     }
 
     fn draw(&self, changed: Option<&Changed>) -> Result<(), CliError> {

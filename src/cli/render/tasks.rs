@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::cli::bundle::plain;
+use crate::cli::bundle::comparable;
 use crate::cli::error::CliError;
 use crate::import::Format;
 
@@ -34,10 +34,10 @@ impl Tasks {
     /// Leaves out the meshes that are not among these absolute paths, unless one of the paths is no mesh
     /// of its own: then any mesh may refer to it, and all stay.
     pub fn keep_only(&mut self, paths: &BTreeSet<PathBuf>) {
-        let meshes: BTreeSet<PathBuf> = self.all.iter().map(|task| absolute(&task.mesh)).collect();
+        let meshes: BTreeSet<PathBuf> = self.all.iter().map(|task| comparable(&task.mesh)).collect();
         if paths.is_subset(&meshes) {
             self.is_part = paths.len() < meshes.len();
-            self.all.retain(|task| paths.contains(&absolute(&task.mesh)));
+            self.all.retain(|task| paths.contains(&comparable(&task.mesh)));
         }
     }
 }
@@ -82,7 +82,7 @@ pub fn find(names: &[String], extension: &str) -> Result<Tasks, CliError> {
         return Err(CliError::input(format!("none of the files is named as a mesh ({})", Format::list())));
     }
     let mut seen = BTreeSet::new();
-    meshes.retain(|(mesh, _)| seen.insert(absolute(mesh)));
+    meshes.retain(|(mesh, _)| seen.insert(comparable(mesh)));
     let pictures = pictures(&meshes, extension);
     let task = |((mesh, has_folder), picture)| Task { mesh, picture, has_folder };
     tasks.all = meshes.into_iter().zip(pictures).map(task).collect();
@@ -150,14 +150,10 @@ fn of_pattern(pattern: &str) -> Result<Vec<String>, CliError> {
     Ok(files)
 }
 
-fn absolute(name: &str) -> PathBuf {
-    std::path::absolute(name).map_or_else(|_| PathBuf::from(name), |path| plain(&path))
-}
-
 /// A picture for each mesh: its path from the folder that all share, with another extension. Meshes that
 /// differ in their extensions alone keep them.
 fn pictures(meshes: &[(String, bool)], extension: &str) -> Vec<PathBuf> {
-    let paths: Vec<PathBuf> = meshes.iter().map(|(mesh, _)| absolute(mesh)).collect();
+    let paths: Vec<PathBuf> = meshes.iter().map(|(mesh, _)| comparable(mesh)).collect();
     let folders = paths.iter().map(|path| path.parent().unwrap_or(Path::new("")).to_owned());
     let shared = |a: PathBuf, b: PathBuf| {
         a.components().zip(b.components()).take_while(|(a, b)| a == b).map(|(a, _)| a).collect()
@@ -217,7 +213,7 @@ mod tests {
         assert_eq!(expand(&[at("b/*.obj"), at("b"), at("c*")]), [at("b/x.obj"), at("b")]);
         let kept = |changed: &[&str]| {
             let mut tasks = find(&[at("b")], "png").unwrap();
-            tasks.keep_only(&changed.iter().map(|name| absolute(&at(name))).collect());
+            tasks.keep_only(&changed.iter().map(|name| comparable(at(name))).collect());
             (tasks.all.len(), tasks.is_part)
         };
         assert_eq!(kept(&["b/x.obj", "b/q.zip"]), (2, true));

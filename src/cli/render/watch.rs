@@ -6,14 +6,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant, SystemTime};
 
 use notify::{RecommendedWatcher, RecursiveMode, Watcher as _};
 
-use crate::cli::bundle::plain;
+use crate::cli::bundle::comparable;
 use crate::cli::error::CliError;
+use crate::pluralise::pluralise;
 
 /// Time without further changes after which a file is taken to be whole.
 const QUIET: Duration = Duration::from_millis(50);
@@ -24,14 +25,16 @@ const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// Files that are looked at, at most.
 const FILES_MAX: usize = 100_000;
 
-/// Absolute paths of the files that changed since the last picture.
+/// Comparable paths of the files that changed since the last picture.
 pub type Changed = BTreeSet<PathBuf>;
 
 /// A command that can be repeated.
 pub trait Watched {
-    /// Names of the files and folders that are read.
-    fn inputs(&self) -> Vec<String>;
-    /// Absolute paths of the files that are written.
+    /// Names of the files and folders that the command line has, as they are at this moment.
+    fn named(&self) -> Vec<String>;
+    /// Names of the files that are read besides. The mesh is read to find them out.
+    fn beside(&self) -> Vec<String>;
+    /// Comparable paths of the files that are written.
     fn outputs(&self) -> BTreeSet<PathBuf>;
     /// Draws everything, or where `changed` is given, what these files change.
     fn draw(&self, changed: Option<&Changed>) -> Result<(), CliError>;
@@ -43,9 +46,11 @@ pub trait Watched {
 pub fn run(command: &dyn Watched) -> Result<(), CliError> {
     let mut changed: Option<Changed> = None;
     loop {
+        let (beside, outputs) = (command.beside(), command.outputs());
+        let inputs = || command.named().into_iter().chain(beside.iter().cloned()).collect::<Vec<_>>();
         // The watches come first, so that a change during the drawing is seen after it.
-        let wakes = Wakes::of(&command.inputs());
-        let before = stamps(&command.inputs(), &command.outputs());
+        let wakes = Wakes::of(&inputs());
+        let before = stamps(&inputs(), &outputs);
         let began = Instant::now();
         match command.draw(changed.as_ref()) {
             Err(error) if changed.is_none() && (error.exit_code > 1 || before.is_empty()) => return Err(error),
@@ -54,28 +59,33 @@ pub fn run(command: &dyn Watched) -> Result<(), CliError> {
             Ok(()) => say!("meshsnap: drawn in {} ms", began.elapsed().as_millis()),
         }
         if changed.is_none() {
-            say!("meshsnap: waiting for changes of {} files; Ctrl-C ends", before.len());
+            let files = pluralise(before.len() as u64, "file", "files");
+            say!("meshsnap: waiting for changes of {files}; Ctrl-C ends");
         }
+        let mut pause = LOOK_EVERY;
         let after = loop {
-            wakes.wait();
-            let after = stamps(&command.inputs(), &command.outputs());
+            wakes.wait(pause);
+            let began = Instant::now();
+            let after = stamps(&inputs(), &outputs);
             if after != before {
                 break after;
             }
+            // Looking takes little of the time, however many files there are.
+            pause = LOOK_EVERY.max(began.elapsed() * 20);
         };
         let paths = before.keys().chain(after.keys());
         changed = Some(paths.filter(|path| before.get(*path) != after.get(*path)).cloned().collect());
     }
 }
 
-/// What tells that a file changed: its length and its time.
+/// The length and the time of a file, of which one differs after a change.
 type Stamp = (u64, Option<SystemTime>);
 
 /// The stamps of all files, hidden ones in folders and outputs left out. A file that is not there has none.
 fn stamps(inputs: &[String], outputs: &BTreeSet<PathBuf>) -> BTreeMap<PathBuf, Stamp> {
     let mut found = BTreeMap::new();
     for name in inputs {
-        add(absolute(Path::new(name)), outputs, &mut found);
+        add(comparable(name), outputs, &mut found);
     }
     found
 }
@@ -122,11 +132,11 @@ impl Wakes {
         Self { notified, _watcher: watcher }
     }
 
-    /// Waits until something happened and no more follows, or until it is time to look.
-    fn wait(&self) {
-        let woken = self.notified.recv_timeout(LOOK_EVERY);
+    /// Waits until something happened and no more follows, or until `pause` is over.
+    fn wait(&self, pause: Duration) {
+        let woken = self.notified.recv_timeout(pause);
         if woken == Err(RecvTimeoutError::Disconnected) {
-            return std::thread::sleep(LOOK_EVERY);
+            return std::thread::sleep(pause);
         }
         let first = Instant::now();
         while woken.is_ok() && first.elapsed() < LOOK_EVERY && self.notified.recv_timeout(QUIET).is_ok() {}
@@ -143,7 +153,7 @@ fn is_end_of_writing(kind: notify::EventKind) -> bool {
 fn folders(inputs: &[String]) -> BTreeMap<PathBuf, RecursiveMode> {
     let mut folders = BTreeMap::new();
     for name in inputs {
-        let path = absolute(Path::new(name));
+        let path = comparable(name);
         if path.is_dir() {
             folders.insert(path, RecursiveMode::Recursive);
         } else if let Some(folder) = path.parent() {
@@ -153,11 +163,6 @@ fn folders(inputs: &[String]) -> BTreeMap<PathBuf, RecursiveMode> {
     folders
 }
 
-/// A path as it is compared: absolute, without `.` and `..`.
-pub fn absolute(path: &Path) -> PathBuf {
-    std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| plain(&path))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -165,7 +170,7 @@ mod tests {
     #[test]
     fn stamps_are_of_inputs_and_leave_out_hidden_files_links_to_folders_and_outputs() {
         let folder = tempfile::tempdir().unwrap();
-        let root = absolute(folder.path());
+        let root = comparable(folder.path());
         for name in ["in/a.obj", "in/deep/b.stl", "in/.hidden.obj", "in/a.png", "beside.obj"] {
             fs::create_dir_all(root.join(name).parent().unwrap()).unwrap();
             fs::write(root.join(name), "v 0 0 0\n").unwrap();

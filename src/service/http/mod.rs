@@ -10,7 +10,8 @@
 //!
 //! [`recovery`] takes over what an earlier process has left in the data folder.
 //! [`negotiate`] and [`conditional`] read and write single headers. [`stored_mesh`] and [`address`]
-//! serve the resources of stored meshes. [`event_streams`] counts the clients that follow jobs. [`static_document`] answers with a constant document.
+//! serve the resources of stored meshes. [`event_streams`] counts the clients that follow jobs.
+//! [`static_document`] answers with a constant document.
 //!
 //! Architecture invariant: axum and hyper are used nowhere else.
 

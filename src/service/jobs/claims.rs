@@ -34,7 +34,7 @@ pub struct Claim {
     claims: Arc<Claims>,
 }
 
-/// What a name stands for.
+/// The meaning of a name.
 #[derive(Debug)]
 pub enum Claimed {
     /// Nothing until now: it stands for this request.

@@ -4,7 +4,8 @@
 //! Architecture invariants: a full queue refuses at once and never waits. An accepted job is never
 //! dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
 //!
-//! Reading order: [`job`] (one job and its states), [`claims`] (names of requests), [`progress`] (how far it has come), [`queue`] (those that wait),
+//! Reading order: [`job`] (one job and its states), [`claims`] (names of requests), [`progress`] (how far it has
+//! come), [`queue`] (those that wait),
 //! [`registry`] (all jobs, behind one lock), [`results`] (those that have ended), [`storage`] (jobs in the data folder), [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs),
 //! [`upload_budget`] (memory of uploads).
 
@@ -105,7 +106,7 @@ pub enum Refusal {
     Draining,
 }
 
-/// What the name of a request stands for.
+/// The meaning of a request's name.
 #[derive(Debug)]
 pub enum Named {
     /// This request, which is new.

@@ -2,7 +2,7 @@
 
 use crate::pipeline::Stage;
 
-/// What a worker does with a job.
+/// The step of its work that a worker is at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Step {
     /// Nothing yet: the job waits.

@@ -184,4 +184,10 @@ fn junit_counts_what_fails() {
     let good = fs::read(folder.path().join("parts/good.obj")).unwrap();
     assert_eq!(check(folder.path(), &["parts", "--junit", "parts/good.obj"]).0, Some(2));
     assert_eq!(fs::read(folder.path().join("parts/good.obj")).unwrap(), good);
+    // Nor the rules, nor does it mix with what is printed.
+    fs::write(folder.path().join("meshsnap.toml"), "[check]\nrules = [\"opens\"]\n").unwrap();
+    let (code, _, said) = check(folder.path(), &["parts", "--junit", "meshsnap.toml"]);
+    assert!(code == Some(2) && said.contains("meshsnap.toml: is the same file as the input"), "{said}");
+    let (code, printed, said) = check(folder.path(), &["parts", "--junit", "-"]);
+    assert!(code == Some(2) && printed.is_empty() && said.contains("name a file"), "{said}");
 }

@@ -82,7 +82,7 @@ fn a_picture_follows_its_mesh_through_faults_and_new_files() {
     let (mesh, picture) = (folder.path().join("cube.obj"), folder.path().join("cube.png"));
     fs::write(&mesh, cube("1")).unwrap();
     let watcher = Watcher::start(folder.path(), &["cube.obj", "-o", "cube.png"]);
-    watcher.until("waiting for changes of 1 files");
+    watcher.until("waiting for changes of 1 file;");
     let first = fs::read(&picture).unwrap();
 
     // Written in place.

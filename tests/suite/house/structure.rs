@@ -117,6 +117,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "config",
             "telemetry",
             "guard",
+            "pluralise",
         ],
     ),
     ("config", &["request", "spec", "limits"]),

@@ -18,7 +18,7 @@ pub const KEY_CHARS_MAX: usize = 255;
 
 const HEADER: HeaderName = HeaderName::from_static("idempotency-key");
 
-/// What a named request is.
+/// A request with a name.
 pub enum Sent {
     /// One that is sent for the first time. It has the name as long as this or its job is there.
     First(Arc<Claim>),

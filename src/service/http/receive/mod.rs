@@ -32,7 +32,7 @@ use crate::spec::Spec;
 /// may be in memory.
 const DOCUMENT_BYTES_MAX: u64 = 64 << 10;
 
-/// What a request for a picture brings.
+/// A request for a picture, once it is read.
 pub enum Reception {
     /// One that was found valid.
     New(Box<Received>),

@@ -30,7 +30,7 @@ const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
 /// The place of an event in the life of a job, by which it is known what a client has seen.
 type Rank = (Step, u32);
 
-/// What a client has seen of a job.
+/// The part of a job's life that a client has seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Seen {
     Nothing,
@@ -147,7 +147,7 @@ fn event(name: &str, id: String, data: &impl serde::Serialize) -> Option<Event> 
     Event::default().event(name).id(id).json_data(data).ok()
 }
 
-/// What a client has seen that names its last event. One that names none of ours has seen nothing.
+/// The part that a client has seen that names its last event: nothing, if it names none of ours.
 fn seen(id: &str) -> Seen {
     if ["done", "failed", "cancelled"].contains(&id) {
         return Seen::End;

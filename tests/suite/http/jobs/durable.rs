@@ -11,7 +11,7 @@ use crate::support::server::{Answer, CUBE_OBJ, PATIENCE, Server, meshsnap};
 use crate::support::skip::{Need, skip};
 
 /// A server with this data folder.
-fn start(folder: &Path, arguments: &[&str]) -> Server {
+pub fn start(folder: &Path, arguments: &[&str]) -> Server {
     let mut command = meshsnap();
     command
         .args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu", "--ephemeral=false", "--data-dir"])

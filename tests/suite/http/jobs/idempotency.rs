@@ -1,8 +1,8 @@
 //! `Idempotency-Key`: a request that is sent again makes no second job.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
+use super::durable::start;
 use crate::http::answers::{FORM, form};
 use crate::support::server::{Answer, CUBE_OBJ, Server, meshsnap};
 
@@ -14,14 +14,6 @@ fn send(server: &Server, path: &str, headers: &[&str], body: &[u8]) -> Answer {
 fn job(answer: &Answer) -> String {
     assert_eq!(answer.status, 202, "{}", String::from_utf8_lossy(&answer.body));
     answer.header("location").unwrap().to_owned()
-}
-
-fn start(folder: &Path, arguments: &[&str]) -> Server {
-    let mut command = meshsnap();
-    command
-        .args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu", "--ephemeral=false", "--data-dir"])
-        .arg(folder);
-    Server::start_with(command.args(arguments))
 }
 
 #[test]
