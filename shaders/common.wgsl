@@ -46,8 +46,11 @@ struct Frame {
     occlusion_spread: vec4<f32>,
     // Places that pixels look at, columns in the low halves.
     taps: array<vec4<u32>, 16>,
-    // 1 / radius^2, in x.
-    occlusion_reach: vec4<f32>,
+    // 1 / radius^2.
+    occlusion_reach: f32,
+    // Start of the second set of texture coordinates in uvs.
+    second_uvs_at: u32,
+    padding: vec2<u32>,
 };
 
 // Parameters of a dispatch: its triangles, vertices or edges, and the rows of the picture that the

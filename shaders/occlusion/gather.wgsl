@@ -38,7 +38,7 @@ fn look(pixel: vec2<i32>, place: vec3<f32>) -> u32 {
         let v = place_at(to, depth_at(to)) - place;
         let square = dot3(v, v);
         let sine = rn(dot3(v, normal) * quick_rsqrt(max(square, 1e-6)));
-        let near = max(1.0 - rn(square * frame.occlusion_reach.x), 0.0);
+        let near = max(1.0 - rn(square * frame.occlusion_reach), 0.0);
         taken += rn(max(sine - BIAS, 0.0) * rn(near * near));
     }
     let share = min(rn(taken * (GAIN / f32(TAPS_PER_PIXEL))), 1.0);

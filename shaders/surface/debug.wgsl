@@ -29,7 +29,7 @@ fn debug_color(view: u32, id: u32, at: vec2<f32>, m: u32, b: Barycentrics) -> ve
         }
         case DEBUG_UV: {
             if has(UVS) {
-                return shown(checker(uv_of(id, b).at));
+                return shown(checker(uv_of(id, b, 0u).at));
             }
         }
         case DEBUG_FACE_ORIENTATION: {

@@ -66,26 +66,27 @@ fn quad_position(id: u32, b: vec3<f32>) -> vec3<f32> {
 
 // The normal n perturbed by the normal texture. The axes are the triangle's own: increasing u and
 // decreasing v.
-fn normal_mapped(id: u32, m: u32, front: bool, uv: Uv, n: vec3<f32>) -> vec3<f32> {
+fn normal_mapped(id: u32, m: u32, b: Barycentrics, uv: Uv, n: vec3<f32>) -> vec3<f32> {
     let used = use_of(m, SLOT_NORMAL);
     let p = corner_position(id, 0u);
     let e1 = corner_position(id, 1u) - p;
     let e2 = corner_position(id, 2u) - p;
     let first = frame.uv_triangles_at + 3u * id;
-    let t = transformed(used, uvs[corner_triangles[first]]);
-    let d1 = transformed(used, uvs[corner_triangles[first + 1u]]) - t;
-    let d2 = transformed(used, uvs[corner_triangles[first + 2u]]) - t;
+    let start = set_at(used);
+    let t = transformed(used, uvs[start + corner_triangles[first]]);
+    let d1 = transformed(used, uvs[start + corner_triangles[first + 1u]]) - t;
+    let d2 = transformed(used, uvs[start + corner_triangles[first + 2u]]) - t;
     let turn = rn(d1.x * d2.y) - rn(d2.x * d1.y);
     if !(abs(turn) > 1e-30 && abs(turn) < 1e30) {
         return n;
     }
     // Seen from behind, bumps are dents. v runs down in the image, the texture's y up.
-    let side = select(-1.0, 1.0, (turn > 0.0) == front);
+    let side = select(-1.0, 1.0, (turn > 0.0) == b.front);
     let along_u = side * (e1 * d2.y - e2 * d1.y);
     let along_up = side * (e1 * d2.x - e2 * d1.x);
     let tangent = unit_or(across(along_u, n), vec3(0.0));
     let up = unit_or(across(across(along_up, n), tangent), vec3(0.0));
-    let v = 2.0 * sample_texture(m, SLOT_NORMAL, uv).xyz - 1.0;
+    let v = 2.0 * sample_texture(m, SLOT_NORMAL, id, b, uv).xyz - 1.0;
     let x = v.x * materials[m].normal_scale;
     let y = v.y * materials[m].normal_scale;
     return unit_or((x * tangent + y * up) + v.z * n, n);

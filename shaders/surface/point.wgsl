@@ -101,8 +101,8 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
         base = rn4(base * vertex_color(id, b));
     }
     if has(TEXTURES) {
-        uv = uv_of(id, b);
-        base = rn4(base * sample_texture(m, SLOT_BASE, uv));
+        uv = uv_of(id, b, 0u);
+        base = rn4(base * sample_texture(m, SLOT_BASE, id, b, uv));
     }
     base = with_alpha(m, base, show);
     if base.w == 0.0 && cover == 0.0 {
@@ -116,23 +116,23 @@ fn varying_color(id: u32, at: vec2<f32>, m: u32, show: Show) -> vec4<f32> {
         var gloss = vec2(materials[m].roughness, materials[m].metallic);
         var n = normal(id, at, m, b);
         if has(TEXTURES) {
-            let textured = sample_texture(m, SLOT_METALLIC_ROUGHNESS, uv).yz;
+            let textured = sample_texture(m, SLOT_METALLIC_ROUGHNESS, id, b, uv).yz;
             let own = vec2(flags & MATERIAL_OWN_ROUGHNESS, flags & MATERIAL_OWN_METALLIC) != vec2(0u);
             gloss *= select(textured, vec2(1.0), own);
             if use_of(m, SLOT_NORMAL).texture < frame.image_count {
-                n = normal_mapped(id, m, b.front, uv, n);
+                n = normal_mapped(id, m, b, uv, n);
             }
         }
         light_here = light(gloss.y, gloss.x, n);
         if has(TEXTURES) && use_of(m, SLOT_OCCLUSION).texture < frame.image_count {
-            let red = sample_texture(m, SLOT_OCCLUSION, uv).x;
+            let red = sample_texture(m, SLOT_OCCLUSION, id, b, uv).x;
             light_here = occluded(light_here, materials[m].occlusion_strength, red, gloss.y, n);
         }
         light_here = dimmed(light_here, show.open);
     }
     var emissive = materials[m].emissive;
     if has(TEXTURES) {
-        emissive = rn3(emissive * sample_texture(m, SLOT_EMISSIVE, uv).xyz);
+        emissive = rn3(emissive * sample_texture(m, SLOT_EMISSIVE, id, b, uv).xyz);
     }
     if has(WIRE_LIT) && (flags & MATERIAL_WIRE_LIT) != 0u {
         return lit_wire(cover, wire, base, light_here, emissive);

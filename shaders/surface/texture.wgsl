@@ -8,13 +8,14 @@
 // Items of the texels' buffer per image, in front of the texels.
 const IMAGE_VECTORS: u32 = 4u;
 
-// Bits of a texture use's sampler: a wrap mode across, one down, and whether the nearest texel is
-// taken.
+// Bits of a texture use's sampler: a wrap mode across, one down, whether the nearest texel is taken,
+// and whether the second set of texture coordinates says where.
 const WRAP_BITS: u32 = 3u;
 const WRAP_DOWN_SHIFT: u32 = 2u;
 const WRAP_REPEAT: u32 = 0u;
 const WRAP_MIRROR: u32 = 1u;
 const SAMPLER_NEAREST: u32 = 16u;
+const SAMPLER_SECOND_UVS: u32 = 32u;
 
 // Largest coordinate: beyond it f32 has too few fractional bits.
 const UV_MAX: f32 = 1048576.0;
@@ -26,11 +27,12 @@ struct Uv {
     dy: vec2<f32>,
 };
 
-fn uv_of(id: u32, b: Barycentrics) -> Uv {
+// Texture coordinates of a set that starts at set_at.
+fn uv_of(id: u32, b: Barycentrics, set_at: u32) -> Uv {
     let first = frame.uv_triangles_at + 3u * id;
-    let p = uvs[corner_triangles[first]];
-    let q = uvs[corner_triangles[first + 1u]];
-    let r = uvs[corner_triangles[first + 2u]];
+    let p = uvs[set_at + corner_triangles[first]];
+    let q = uvs[set_at + corner_triangles[first + 1u]];
+    let r = uvs[set_at + corner_triangles[first + 2u]];
     return Uv(blend2(b.value, p, q, r), blend2(b.dx, p, q, r), blend2(b.dy, p, q, r));
 }
 
@@ -50,6 +52,11 @@ fn use_of(m: u32, slot: u32) -> Use {
     return Use(u, vec3(bitcast<f32>(head.w), bitcast<vec2<f32>>(tail.xy)), tail.z, tail.w);
 }
 
+// Start of the set of texture coordinates that a use wants.
+fn set_at(used: Use) -> u32 {
+    return select(0u, frame.second_uvs_at, (used.sampler & SAMPLER_SECOND_UVS) != 0u);
+}
+
 // A difference of coordinates, as the texture sees it.
 fn transformed(used: Use, d: vec2<f32>) -> vec2<f32> {
     return vec2(rn(used.u.x * d.x) + rn(used.u.y * d.y), rn(used.v.x * d.x) + rn(used.v.y * d.y));
@@ -62,11 +69,16 @@ struct Image {
     first_texel: u32,
 };
 
-// Linear RGBA of a texture, trilinear; white where there is none.
-fn sample_texture(m: u32, slot: u32, uv: Uv) -> vec4<f32> {
+// Linear RGBA of a texture, trilinear; white where there is none. `first_uv` is of the first set of
+// texture coordinates.
+fn sample_texture(m: u32, slot: u32, id: u32, b: Barycentrics, first_uv: Uv) -> vec4<f32> {
     let used = use_of(m, slot);
     if used.texture >= frame.image_count {
         return vec4(1.0);
+    }
+    var uv = first_uv;
+    if (used.sampler & SAMPLER_SECOND_UVS) != 0u {
+        uv = uv_of(id, b, frame.second_uvs_at);
     }
     let words = texels[IMAGE_VECTORS * used.texture + 1u];
     let first = texels[IMAGE_VECTORS * used.texture + 2u].x + IMAGE_VECTORS * frame.image_count;

@@ -215,7 +215,7 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 x_row y_row z_row w_row screen_up screen_right to_viewer lamps halfways background background_step hull_color
                 near_w ambient lamp_count zero width height triangle_count vertex_count masks_at material_count layer_fade
                 hull_color_count image_count normal_triangles_at uv_triangles_at color_triangles_at
-                occlusion_depth occlusion_spread taps occlusion_reach
+                occlusion_depth occlusion_spread taps occlusion_reach second_uvs_at padding
             }),
         ),
         (

@@ -18,6 +18,8 @@ pub struct RawMesh {
     /// Texture coordinates, one per vertex, (0, 0) the upper left corner of the image and v down;
     /// or empty.
     pub uvs: Vec<[f32; 2]>,
+    /// The same for textures that want a second set; or empty.
+    pub second_uvs: Vec<[f32; 2]>,
     /// Linear RGBA, one per vertex; or empty.
     pub colors: Vec<[f32; 4]>,
     /// Vertex indices; every one is below `positions.len()`: the importer has checked.
@@ -40,6 +42,14 @@ pub struct RawMesh {
     pub up: UpAxis,
     /// Format, counts and warnings so far.
     pub report: ImportReport,
+}
+
+impl RawMesh {
+    /// True if vertices have more than a position.
+    pub fn has_attributes(&self) -> bool {
+        let has_uvs = !(self.uvs.is_empty() && self.second_uvs.is_empty());
+        has_uvs || !(self.normals.is_empty() && self.colors.is_empty())
+    }
 }
 
 /// Triangles that share no vertices, left where they lie in the file: records with nine f32,

@@ -62,6 +62,8 @@ pub struct TextureRef {
     pub wrap: [Wrap; 2],
     /// True if the nearest texel is sampled, false for a blend of neighbours.
     pub nearest: bool,
+    /// True if the place of the image follows the mesh's second set of texture coordinates.
+    pub is_second_uvs: bool,
 }
 
 impl TextureRef {
@@ -70,7 +72,7 @@ impl TextureRef {
 
     /// A use without transform, repeated and filtered.
     pub fn new(image: u32) -> Self {
-        Self { image, transform: Self::IDENTITY, wrap: [Wrap::Repeat; 2], nearest: false }
+        Self { image, transform: Self::IDENTITY, wrap: [Wrap::Repeat; 2], nearest: false, is_second_uvs: false }
     }
 }
 

@@ -59,6 +59,9 @@ pub struct Mesh {
     /// Texture coordinates, (0, 0) the upper left corner of the image and v down; empty where the
     /// file has none.
     pub uvs: Vec<[f32; 2]>,
+    /// The texture coordinates of textures that want a second set
+    /// ([`TextureRef::is_second_uvs`](material::TextureRef::is_second_uvs)); empty where none does.
+    pub second_uvs: Vec<[f32; 2]>,
     /// Linear RGBA vertex colours; empty where the file has none.
     pub colors: Vec<[f32; 4]>,
     /// Bounds of `positions`: minimum and maximum.
@@ -76,7 +79,8 @@ impl Mesh {
         let of_faces =
             size_of_val(&self.face_normals[..]) + self.edge_masks.len() + size_of_val(&self.triangle_materials[..]);
         let of_corners = size_of_val(&self.attribute_triangles[..]) + size_of_val(&self.line_point_attributes[..]);
-        let of_attributes = size_of_val(&self.normals[..]) + size_of_val(&self.uvs[..]) + size_of_val(&self.colors[..]);
+        let of_uvs = size_of_val(&self.uvs[..]) + size_of_val(&self.second_uvs[..]);
+        let of_attributes = size_of_val(&self.normals[..]) + of_uvs + size_of_val(&self.colors[..]);
         let of_others =
             size_of_val(&self.lines_and_points[..]) + size_of_val(&self.materials[..]) + size_of_val(&self.cameras[..]);
         let of_image = |image: &ImageSource| match &image.content {

@@ -341,7 +341,9 @@ fn upload_surface(
         supply(gpu, buffers, Slot::Normals, Source::of(values, mesh), &[bytemuck::cast_slice(values)])?;
     }
     if let Some(CornerValues { values, .. }) = &surface.uvs {
-        supply(gpu, buffers, Slot::Uvs, Source::of(values, mesh), &[bytemuck::cast_slice(values)])?;
+        let sets: [&[u8]; 2] = [bytemuck::cast_slice(values), bytemuck::cast_slice(&surface.second_uvs)];
+        let source = Source::of(values, mesh).map(|source| source.followed_by(sets[1].len()));
+        supply(gpu, buffers, Slot::Uvs, source, &sets)?;
     }
     if let Some(CornerValues { values, .. }) = &surface.colors {
         supply(gpu, buffers, Slot::VertexColors, Source::of(values, mesh), &[bytemuck::cast_slice(values)])?;

@@ -42,7 +42,9 @@ pub struct Frame {
     pub occlusion_depth: [f32; 4],
     pub occlusion_spread: [f32; 4],
     pub taps: [[u32; 4]; TAPS / 4],
-    pub occlusion_reach: [f32; 4],
+    pub occlusion_reach: f32,
+    pub second_uvs_at: u32,
+    pub padding: [u32; 2],
 }
 
 /// Uniforms of a dispatch.
@@ -165,7 +167,7 @@ impl Frame {
         let [a, b, c] = pass.depth;
         self.occlusion_depth = [a, b, c, pass.strength];
         self.occlusion_spread = [pass.spread[0], pass.spread[1], pass.near, pass.near_depth];
-        self.occlusion_reach[0] = pass.inverse_square();
+        self.occlusion_reach = pass.inverse_square();
         for (at, [across, down]) in pass.taps.iter().enumerate() {
             self.taps[at / 4][at % 4] = (across & 0xFFFF) as u32 | (down << 16) as u32;
         }
@@ -182,6 +184,7 @@ impl Frame {
         self.material_count = surface.materials.len() as u32;
         self.masks_at = surface.triangle_materials.len() as u32;
         self.image_count = surface.textures.images.len() as u32;
+        self.second_uvs_at = surface.uvs.as_ref().map_or(0, |uvs| uvs.values.len() as u32);
         let (_, [normals, uvs, colors]) = corner_triangles(surface, triangles);
         (self.normal_triangles_at, self.uv_triangles_at, self.color_triangles_at) = (normals, uvs, colors);
     }

@@ -48,6 +48,11 @@ impl Source {
         }
     }
 
+    /// The list and `bytes` more, which its owner changes as little.
+    pub fn followed_by(self, bytes: usize) -> Self {
+        Self { bytes: self.bytes + bytes as u64, ..self }
+    }
+
     fn key(&self, slot: Slot) -> Key {
         (slot as u32, self.owner.as_ptr().cast::<()>() as usize, self.address, self.bytes)
     }

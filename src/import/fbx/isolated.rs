@@ -411,7 +411,8 @@ impl Texture {
         let wrap = |number: u8| WRAPS.get(usize::from(number)).copied();
         let is_good = (self.image as usize) < lists.images && self.transform.iter().flatten().all(|n| n.is_finite());
         let wrap = [wrap(self.wrap[0])?, wrap(self.wrap[1])?];
-        is_good.then_some(TextureRef { image: self.image, transform: self.transform, wrap, nearest: self.nearest })
+        let texture = TextureRef::new(self.image);
+        is_good.then_some(TextureRef { transform: self.transform, wrap, nearest: self.nearest, ..texture })
     }
 }
 

@@ -13,6 +13,8 @@ pub struct Attributes {
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates.
     pub uvs: Vec<[f32; 2]>,
+    /// The second set of them.
+    pub second_uvs: Vec<[f32; 2]>,
     /// Linear RGBA, 0 to 1.
     pub colors: Vec<[f32; 4]>,
 }
@@ -27,16 +29,8 @@ pub fn repair(raw: &mut RawMesh, count: usize, mesh: &Mesh) -> Attributes {
             *component = if component.is_nan() { 1.0 } else { component.clamp(0.0, 1.0) };
         }
     });
-    let mut uvs = std::mem::take(&mut raw.uvs);
-    let bad_uvs = each_piece(&mut uvs, |piece| {
-        let mut bad = 0_u64;
-        for uv in piece.iter_mut().filter(|uv| !(uv[0].is_finite() && uv[1].is_finite())) {
-            *uv = [0.0; 2];
-            bad += 1;
-        }
-        bad
-    });
-    let bad_uvs: u64 = bad_uvs.iter().sum();
+    let (mut uvs, mut second_uvs) = (std::mem::take(&mut raw.uvs), std::mem::take(&mut raw.second_uvs));
+    let bad_uvs = repair_uvs(&mut uvs) + repair_uvs(&mut second_uvs);
     if bad_uvs > 0 {
         raw.report.warnings.push(Warning {
             code: "uvs_repaired",
@@ -48,8 +42,22 @@ pub fn repair(raw: &mut RawMesh, count: usize, mesh: &Mesh) -> Attributes {
     Attributes {
         normals: if whole(normals.len()) { normals } else { Vec::new() },
         uvs: if whole(uvs.len()) { uvs } else { Vec::new() },
+        second_uvs: if whole(second_uvs.len()) { second_uvs } else { Vec::new() },
         colors: if whole(colors.len()) { colors } else { Vec::new() },
     }
+}
+
+/// Sets coordinates that are not finite to 0. Returns how many there were.
+fn repair_uvs(uvs: &mut [[f32; 2]]) -> u64 {
+    let bad = each_piece(uvs, |piece| {
+        let mut bad = 0_u64;
+        for uv in piece.iter_mut().filter(|uv| !(uv[0].is_finite() && uv[1].is_finite())) {
+            *uv = [0.0; 2];
+            bad += 1;
+        }
+        bad
+    });
+    bad.into_iter().sum()
 }
 
 /// Unit normals. A normal without a direction becomes the mean of its faces' normals.

@@ -43,7 +43,7 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     }
     cx.budget.spend("the welded vertices", vertex_count as u64, number::BYTES_PER_VERTEX)?;
 
-    let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
+    let has_attributes = raw.has_attributes();
     let (mut mesh, kept, triangles) = match &mut soup {
         Some(soup) => {
             let (mesh, kept) = shape(soup, None, &mut raw, cx)?;
@@ -71,11 +71,11 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     mesh.edge_masks = pick(std::mem::take(&mut raw.edge_masks), kept.as_deref());
     mesh.triangle_materials = pick(std::mem::take(&mut raw.triangle_materials), kept.as_deref());
     cx.deadline.check()?;
-    let Attributes { normals, uvs, colors } = attributes::repair(&mut raw, vertex_count, &mesh);
-    if normals.is_empty() && uvs.is_empty() && colors.is_empty() {
+    let Attributes { normals, uvs, second_uvs, colors } = attributes::repair(&mut raw, vertex_count, &mesh);
+    if normals.is_empty() && uvs.is_empty() && second_uvs.is_empty() && colors.is_empty() {
         (mesh.attribute_triangles, mesh.line_point_attributes) = (Vec::new(), Vec::new());
     }
-    (mesh.normals, mesh.uvs, mesh.colors) = (normals, uvs, colors);
+    (mesh.normals, mesh.uvs, mesh.second_uvs, mesh.colors) = (normals, uvs, second_uvs, colors);
     mesh.materials = raw.materials;
     let largest = |piece: &[u32]| piece.iter().copied().fold(0, u32::max);
     let of_triangles = map(mesh.triangle_materials.chunks(POSITIONS_PER_PIECE).collect(), largest).into_iter().max();
@@ -193,7 +193,7 @@ fn weld<G: Geometry>(
 ) -> Result<(Mesh, Option<Vec<u32>>), Stopped> {
     let position = |p: [f64; 3]| unit_box.to_unit(down.of3(p));
     let ends = raw.lines_and_points.iter().map(|one| one.ends);
-    let has_attributes = !(raw.normals.is_empty() && raw.uvs.is_empty() && raw.colors.is_empty());
+    let has_attributes = raw.has_attributes();
     let Numbered { positions, mut triangles, ends, collapsed } =
         number(geometry, &mut faces, ends, position, (has_attributes, cx.deadline))?;
     raw.report.dropped_collapsed_faces = collapsed;

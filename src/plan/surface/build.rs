@@ -58,6 +58,7 @@ pub fn surface_pass<'m>(
         face_normals: SharedSlice::default(),
         vertex_normals: None,
         uvs: None,
+        second_uvs: SharedSlice::default(),
         colors: None,
         edge_masks: Cow::Owned(edge_masks),
         textures,
@@ -139,6 +140,7 @@ fn add_attributes<'m>(
     if !mesh.uvs.is_empty() && !skips.skip(SkipKind::Uvs, !samples && !shows_uvs, "nothing samples a texture") {
         let triangles = geometry.attribute_triangles.clone();
         pass.uvs = Some(CornerValues { values: (&mesh.uvs).into(), triangles });
+        pass.second_uvs = (&mesh.second_uvs).into();
     }
     let is_colorless = !reads(flags::VERTEX_COLORS);
     let has_colors = !mesh.colors.is_empty() || geometry.colors.is_some();

@@ -33,6 +33,8 @@ pub struct Use {
     pub texture: usize,
     /// The transform of the texture coordinates.
     pub transform: [[f32; 3]; 2],
+    /// True for the mesh's second set of texture coordinates.
+    pub is_second_uvs: bool,
     /// Texels of level 0.
     pub texels: f64,
 }
@@ -62,10 +64,12 @@ pub fn finest_levels(
         }
         let Some(list) = of_material.get_mut(material as usize).filter(|list| !list.is_empty()) else { continue };
         let screen = on_screen(geometry.triangles[t].map(|v| geometry.positions[v as usize]), projection);
-        let uvs = geometry.attribute_triangles[t].map(|v| mesh.uvs[v as usize]);
+        let corners = geometry.attribute_triangles[t];
         let before = list.len();
         list.retain(|&index| {
             let one = &uses[index];
+            let uvs = if one.is_second_uvs { &mesh.second_uvs } else { &mesh.uvs };
+            let uvs = corners.map(|v| uvs[v as usize]);
             let density = screen.map_or(0.0, |screen| screen * area_of_uvs(&uvs, &one.transform) * one.texels);
             // Written so that NaN counts as 0.
             least[index] = if density > 0.0 { least[index].min(density) } else { 0.0 };

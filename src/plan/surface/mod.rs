@@ -33,6 +33,8 @@ pub struct SurfacePass<'a> {
     pub vertex_normals: Option<CornerValues<'a, [f32; 3]>>,
     /// Texture coordinates.
     pub uvs: Option<CornerValues<'a, [f32; 2]>>,
+    /// The second set of them, with the indices of the first; as many, or none.
+    pub second_uvs: SharedSlice<'a, [f32; 2]>,
     /// Linear RGBA vertex colours, straight alpha.
     pub colors: Option<CornerValues<'a, [f32; 4]>>,
     /// The edges of each triangle that barycentric wires follow (bit i: corner i to i + 1); empty
@@ -139,6 +141,8 @@ pub mod samplers {
     pub const CLAMP: u32 = 2;
     /// The nearest texel, unfiltered.
     pub const NEAREST: u32 = 16;
+    /// The second set of texture coordinates.
+    pub const SECOND_UVS: u32 = 32;
 }
 
 /// Values of the debug view in [`ShadedMaterial::flags`]; 0 for none.
@@ -268,6 +272,7 @@ impl<'a> SurfacePass<'a> {
             face_normals: SharedSlice::default(),
             vertex_normals: None,
             uvs: None,
+            second_uvs: SharedSlice::default(),
             colors: None,
             edge_masks: Cow::Borrowed(&[]),
             textures: Arc::default(),

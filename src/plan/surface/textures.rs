@@ -86,14 +86,16 @@ impl<'a> TextureLoader<'a> {
             return Ok(Some(TextureUse::NONE));
         }
         // Without texture coordinates a texture has no place on the mesh.
-        if self.mesh.uvs.is_empty() {
+        let is_second_uvs = texture.is_second_uvs;
+        if self.mesh.uvs.is_empty() || is_second_uvs && self.mesh.second_uvs.is_empty() {
             return Ok(None);
         }
         let Some(index) = self.index_of(texture.image, reading)? else { return Ok(None) };
         let Header { width, height, .. } = self.wanted[index].header;
         let texels = f64::from(width) * f64::from(height);
         self.budget.spend("textures", 1, 2 * size_of::<Use>() as u64)?;
-        self.uses.push(Use { material: self.material, texture: index, transform: texture.transform, texels });
+        let (material, transform) = (self.material, texture.transform);
+        self.uses.push(Use { material, texture: index, transform, is_second_uvs, texels });
         Ok(Some(TextureUse { transform: texture.transform, texture: index as u32, sampler: sampler(texture) }))
     }
 
@@ -280,5 +282,6 @@ fn sampler(texture: &TextureRef) -> u32 {
         Wrap::Clamp => super::samplers::CLAMP,
     };
     let nearest = if texture.nearest { super::samplers::NEAREST } else { 0 };
-    wrap(texture.wrap[0]) | wrap(texture.wrap[1]) << super::samplers::DOWN_SHIFT | nearest
+    let uvs = if texture.is_second_uvs { super::samplers::SECOND_UVS } else { 0 };
+    wrap(texture.wrap[0]) | wrap(texture.wrap[1]) << super::samplers::DOWN_SHIFT | nearest | uvs
 }

@@ -34,7 +34,7 @@ pub fn color(
             shown(axes.map(|axis| 0.5 + 0.5 * dot(n, axis)))
         }
         debug_views::UV => match &surface.uvs {
-            Some(uvs) => shown(checker(Uv::new(uvs, &place.ids, &place.b).at.map(|[v]| v))),
+            Some(uvs) => shown(checker(Uv::new(&of_corners(uvs, &place.ids), &place.b).at.map(|[v]| v))),
             None => shown([0.5; 3]),
         },
         debug_views::FACE_ORIENTATION => {

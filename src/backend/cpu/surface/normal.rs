@@ -2,7 +2,7 @@
 //! `shaders/surface/normal.wgsl`.
 
 use super::barycentric::Quad;
-use super::texture::{blend, of_corners};
+use super::texture::{blend, of_corners, uv_corners};
 use super::wire::Place;
 use crate::backend::cpu::vector::{across, cross, dot, facing, turned_to_viewer, unit_or, zip};
 use crate::plan::{CornerValues, Projection, ShadedMaterial, SurfacePass, flags, slots};
@@ -108,14 +108,14 @@ fn corner_positions<const N: usize>(place: &Place<'_, N>) -> [[[f32; N]; 3]; 3] 
 /// increasing u and decreasing v.
 #[inline(always)]
 pub fn normal_mapped<const N: usize>(
-    uvs: &CornerValues<'_, [f32; 2]>,
+    (surface, uvs): (&SurfacePass<'_>, &CornerValues<'_, [f32; 2]>),
     material: &ShadedMaterial,
     place: &Place<'_, N>,
     texels: &[[f32; N]; 4],
     n: &[[f32; N]; 3],
 ) -> [[f32; N]; 3] {
     let p = corner_positions(place);
-    let uv = of_corners(uvs, &place.ids);
+    let uv = uv_corners(surface, uvs, &material.textures[slots::NORMAL], &place.ids);
     // Texture coordinates of the corners, without the shift that all have in common.
     let rows = material.textures[slots::NORMAL].transform;
     let turned = |corner: usize, k: usize, l: usize| rows[k][0] * uv[corner][0][l] + rows[k][1] * uv[corner][1][l];

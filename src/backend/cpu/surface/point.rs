@@ -6,13 +6,13 @@ use super::debug;
 use super::light::{Light, LightLanes, light_lanes, lit_lanes, unlit_lanes};
 use super::normal::{angle_shares, face_normals, normal_mapped, normals, to_viewer};
 use super::occlusion::occlude;
-use super::texture::{Uv, blend, of_corners, sample};
+use super::texture::{Uv, blend, of_corners, sample, uv_corners};
 use super::wire::{Place, edge_mask, fwidth_covers, wire_covers};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::{ScreenVertex, quick_recip};
 use crate::backend::cpu::geometry::visibility::area;
 use crate::backend::cpu::vector::facing;
-use crate::plan::{Projection, ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, slots};
+use crate::plan::{Projection, ShadedMaterial, SurfacePass, TEXTURE_NONE, flags, samplers, slots};
 
 /// Flags that the common materials do not have, textures aside.
 const GENERAL: u32 = flags::DERIVATIVE_NORMALS
@@ -168,7 +168,7 @@ impl Points<'_> {
         if material.flags & flags::LIT != 0 {
             let mut normal = normals(surface, material, &place);
             if let (Some(uvs), true) = (&surface.uvs, is_textured && self.has_texture(slots::NORMAL)) {
-                normal = normal_mapped(uvs, material, &place, &texels[slots::NORMAL], &normal);
+                normal = normal_mapped((surface, uvs), material, &place, &texels[slots::NORMAL], &normal);
             }
             let [_, roughness, metallic, _] = &texels[slots::METALLIC_ROUGHNESS];
             let own = |flag: u32, factor: f32, textured: &[f32; N]| {
@@ -262,11 +262,17 @@ impl Points<'_> {
     fn texels<const N: usize>(&self, place: &Place<'_, N>, is_textured: bool) -> [[[f32; N]; 4]; slots::COUNT] {
         let mut texels = [[[1.0; N]; 4]; slots::COUNT];
         let Some(uvs) = self.surface.uvs.as_ref().filter(|_| is_textured) else { return texels };
-        let uv = Uv::new(uvs, &place.ids, &place.b);
+        let first = Uv::new(&of_corners(uvs, &place.ids), &place.b);
         for (slot, texels) in texels.iter_mut().enumerate() {
             let is_light = [slots::METALLIC_ROUGHNESS, slots::NORMAL, slots::OCCLUSION].contains(&slot);
             if self.has_texture(slot) && (!is_light || self.material.flags & flags::LIT != 0) {
-                *texels = sample(&self.surface.textures, &self.material.textures[slot], &uv);
+                let (textures, used) = (&self.surface.textures, &self.material.textures[slot]);
+                let uv = if used.sampler & samplers::SECOND_UVS == 0 {
+                    first
+                } else {
+                    Uv::new(&uv_corners(self.surface, uvs, used, &place.ids), &place.b)
+                };
+                *texels = sample(textures, used, &uv);
             }
         }
         texels

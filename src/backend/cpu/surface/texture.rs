@@ -4,13 +4,14 @@
 //! texels change.
 
 use super::barycentric::Barycentrics;
-use crate::plan::{CornerValues, Texture, TextureUse, Textures, samplers};
+use crate::plan::{CornerValues, SurfacePass, Texture, TextureUse, Textures, samplers};
 
 /// Largest coordinate: beyond it f32 has too few fractional bits.
 pub const UV_MAX: f32 = 1_048_576.0;
 
 /// Texture coordinates at `N` points, and how they change a pixel to the right and a pixel down:
 /// `[component][lane]`.
+#[derive(Clone, Copy)]
 pub struct Uv<const N: usize> {
     /// At the points.
     pub at: [[f32; N]; 2],
@@ -18,12 +19,11 @@ pub struct Uv<const N: usize> {
 }
 
 impl<const N: usize> Uv<N> {
-    /// The coordinates of triangles at these barycentrics.
+    /// The coordinates of triangles with these corners at these barycentrics.
     #[inline(always)]
-    pub fn new(uvs: &CornerValues<'_, [f32; 2]>, ids: &[u32; N], b: &Barycentrics<N>) -> Self {
-        let corners = of_corners(uvs, ids);
+    pub fn new(corners: &[[[f32; N]; 2]; 3], b: &Barycentrics<N>) -> Self {
         let [right, down] = b.derivatives();
-        Self { at: blend(&corners, &b.value), d: [blend(&corners, &right), blend(&corners, &down)] }
+        Self { at: blend(corners, &b.value), d: [blend(corners, &right), blend(corners, &down)] }
     }
 }
 
@@ -33,11 +33,34 @@ pub fn of_corners<const K: usize, const N: usize>(
     values: &CornerValues<'_, [f32; K]>,
     ids: &[u32; N],
 ) -> [[[f32; N]; K]; 3] {
+    listed_at_corners(&values.values, &values.triangles, ids)
+}
+
+/// The texture coordinates at the corners of triangles that a use of a texture wants.
+#[inline(always)]
+pub fn uv_corners<const N: usize>(
+    surface: &SurfacePass<'_>,
+    uvs: &CornerValues<'_, [f32; 2]>,
+    used: &TextureUse,
+    ids: &[u32; N],
+) -> [[[f32; N]; 2]; 3] {
+    match &surface.second_uvs[..] {
+        second if used.sampler & samplers::SECOND_UVS != 0 => listed_at_corners(second, &uvs.triangles, ids),
+        _ => of_corners(uvs, ids),
+    }
+}
+
+#[inline(always)]
+fn listed_at_corners<const K: usize, const N: usize>(
+    values: &[[f32; K]],
+    triangles: &[[u32; 3]],
+    ids: &[u32; N],
+) -> [[[f32; N]; K]; 3] {
     let mut corners = [[[0.0; N]; K]; 3];
     for l in 0..N {
-        let indices = values.triangles[ids[l] as usize];
+        let indices = triangles[ids[l] as usize];
         for (corner, i) in corners.iter_mut().zip(indices) {
-            let value = values.values[i as usize];
+            let value = values[i as usize];
             for k in 0..K {
                 corner[k][l] = value[k];
             }

@@ -71,6 +71,7 @@ impl Images {
             transform: info.extensions.transform.as_ref().map_or(TextureRef::IDENTITY, transform),
             wrap: [sampler.wrap_s, sampler.wrap_t].map(wrap),
             nearest: sampler.mag_filter == Some(GL_NEAREST),
+            is_second_uvs: false,
         }))
     }
 

@@ -24,7 +24,7 @@ pub struct Materials<'a> {
 #[derive(Clone, Debug)]
 struct Used {
     slot: MaterialSlot,
-    uv_set: Option<u32>,
+    uv_sets: [Option<u32>; 2],
 }
 
 impl<'a> Materials<'a> {
@@ -40,39 +40,32 @@ impl<'a> Materials<'a> {
         self.used.len()
     }
 
-    /// Reads a material that `what` uses. Returns the set of texture coordinates that it needs, or
-    /// None without a texture.
-    pub fn uv_set(
+    /// Reads a material that `what` uses. Returns the sets of texture coordinates that it needs: that
+    /// of its most important texture, then the one of textures that lie otherwise.
+    pub fn uv_sets(
         &mut self,
         what: &str,
         index: usize,
         reader: &mut Reader<'_>,
         warnings: &mut Vec<Warning>,
         cx: &mut Context<'_>,
-    ) -> Result<Option<u32>, MeshError> {
+    ) -> Result<[Option<u32>; 2], MeshError> {
         let Some(known) = self.used.get(index) else {
             return Err(MeshError::broken(format!(
                 "{what} of the glTF file uses material {index}, which is not there"
             )));
         };
         if let Some(used) = known {
-            return Ok(used.uv_set);
+            return Ok(used.uv_sets);
         }
         let json: lists::Material<'_> = entry("material", &self.lists.materials, index)?;
         let what = format!("material {index}");
         warn_of_undrawn(&what, &json, warnings);
-        let mut textures = Textures { what: &what, sets: Vec::new(), materials: self, reader, warnings, cx };
+        let mut textures = Textures { what: &what, uv_sets: [None; 2], materials: self, reader, warnings, cx };
         let slot = textures.slot(&json)?;
-        let sets = std::mem::take(&mut textures.sets);
-        let uv_set = sets.first().copied();
-        if let (Some(uv_set), Some(other)) = (uv_set, sets.iter().find(|&&set| Some(set) != uv_set)) {
-            let detail = format!(
-                "the textures of {what} use texture coordinates {uv_set} and {other}; all of them are drawn with {uv_set}"
-            );
-            super::warn_once(warnings, "uv_sets_differ", detail);
-        }
-        self.used[index] = Some(Used { slot, uv_set });
-        Ok(uv_set)
+        let uv_sets = textures.uv_sets;
+        self.used[index] = Some(Used { slot, uv_sets });
+        Ok(uv_sets)
     }
 
     /// A slot for every material. Unused ones have only a name.
@@ -96,8 +89,8 @@ struct Named {
 /// The state for reading one material's textures.
 struct Textures<'t, 'a, 'r, 'c> {
     what: &'t str,
-    /// Sets of texture coordinates that the textures need, the most important first.
-    sets: Vec<u32>,
+    /// As [`Materials::uv_sets`] has them.
+    uv_sets: [Option<u32>; 2],
     materials: &'t mut Materials<'a>,
     reader: &'t mut Reader<'r>,
     warnings: &'t mut Vec<Warning>,
@@ -154,25 +147,37 @@ impl Textures<'_, '_, '_, '_> {
         let Some(info) = info else { return Ok(None) };
         let Materials { lists, images, .. } = &mut *self.materials;
         let texture = images.texture(self.what, info, lists, self.reader, self.warnings, self.cx)?;
-        if texture.is_some() {
-            let moved = info.extensions.transform.as_ref().and_then(|transform| transform.tex_coord);
-            self.sets.push(moved.or(info.tex_coord).map_or(0, |set| set.0 as u32));
-        }
-        Ok(texture)
+        let moved = info.extensions.transform.as_ref().and_then(|transform| transform.tex_coord);
+        let uv_set = moved.or(info.tex_coord).map_or(0, |set| set.0 as u32);
+        Ok(texture.map(|texture| TextureRef { is_second_uvs: self.is_second(uv_set), ..texture }))
     }
 
-    /// An occlusion texture. It costs no picture: one that is not there, or has texture coordinates of its
-    /// own, is a warning.
+    /// True if a texture that wants this set of texture coordinates follows the second one.
+    fn is_second(&mut self, uv_set: u32) -> bool {
+        let [first, second] = self.uv_sets;
+        match (first, second) {
+            (None, _) => self.uv_sets[0] = Some(uv_set),
+            (Some(first), None) if first != uv_set => self.uv_sets[1] = Some(uv_set),
+            (Some(first), Some(second)) if ![first, second].contains(&uv_set) => {
+                let detail = format!(
+                    "the textures of {} use texture coordinates {first}, {second} and {uv_set}; those with {uv_set} are \
+                     drawn with {first}",
+                    self.what
+                );
+                super::warn_once(self.warnings, "uv_sets_differ", detail);
+            }
+            _ => {}
+        }
+        self.uv_sets[1] == Some(uv_set)
+    }
+
+    /// An occlusion texture. One that is not there costs no picture: it is a warning.
     fn occlusion_texture(&mut self, texture: &Option<TextureInfo>) -> Result<Option<TextureRef>, MeshError> {
         let Some(info) = texture else { return Ok(None) };
-        let moved = info.extensions.transform.as_ref().and_then(|transform| transform.tex_coord);
-        let set = moved.or(info.tex_coord).map_or(0, |set| set.0 as u32);
-        let why = match self.sets.first() {
-            _ if info.index.0 >= self.materials.lists.textures.len() => "it is not there",
-            Some(&other) if other != set => "the other textures use other texture coordinates",
-            _ => return self.texture(texture),
-        };
-        let detail = format!("the occlusion texture of {} is not drawn: {why}", self.what);
+        if info.index.0 < self.materials.lists.textures.len() {
+            return self.texture(texture);
+        }
+        let detail = format!("the occlusion texture of {} is not drawn: it is not there", self.what);
         super::warn_once(self.warnings, "occlusion_ignored", detail);
         Ok(None)
     }

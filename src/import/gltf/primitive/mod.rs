@@ -35,6 +35,8 @@ pub struct Primitive {
     /// One per vertex, or empty.
     pub normals: Vec<[f64; 3]>,
     uvs: Vec<[f64; 2]>,
+    /// As [`RawMesh::second_uvs`].
+    second_uvs: Vec<[f64; 2]>,
     colors: Vec<[f64; 4]>,
     triangles: Vec<[u32; 3]>,
     /// Ends of line segments. A point has its vertex twice.
@@ -86,22 +88,28 @@ impl Primitive {
             return Ok(None);
         }
         let material = json.material.map(|m| m.0);
-        let uv_set = match material {
-            Some(index) => materials.uv_set(what, index, reader, warnings, cx)?,
-            None => None,
+        let uv_sets = match material {
+            Some(index) => materials.uv_sets(what, index, reader, warnings, cx)?,
+            None => [None; 2],
         };
         let mut vertices = Vertices::new(source, reader, cx)?;
         let positions = vertices.attribute::<3>("POSITION", &attribute::POSITION, reader, cx)?.unwrap_or_default();
         vertices.count = Some(positions.len());
         let mut out = Self { what: what.clone(), positions, material, ..Self::default() };
         out.normals = vertices.attribute("NORMAL", &attribute::NORMAL, reader, cx)?.unwrap_or_default();
-        let name = format!("TEXCOORD_{}", uv_set.unwrap_or(0));
-        let uvs = vertices.attribute(&name, &attribute::TEXCOORD, reader, cx)?;
-        if uvs.is_none() && uv_set.is_some() {
-            let detail = format!("{what} has a texture and no {name} that says where it goes");
-            warn_once(warnings, "uvs_missing", detail);
+        let mut uvs = |set: u32, is_needed: bool| -> Result<Vec<[f64; 2]>, MeshError> {
+            let name = format!("TEXCOORD_{set}");
+            let uvs = vertices.attribute(&name, &attribute::TEXCOORD, reader, cx)?;
+            if uvs.is_none() && is_needed {
+                let detail = format!("{what} has a texture and no {name} that says where it goes");
+                warn_once(warnings, "uvs_missing", detail);
+            }
+            Ok(uvs.unwrap_or_default())
+        };
+        out.uvs = uvs(uv_sets[0].unwrap_or(0), uv_sets[0].is_some())?;
+        if let Some(set) = uv_sets[1] {
+            out.second_uvs = uvs(set, true)?;
         }
-        out.uvs = uvs.unwrap_or_default();
         out.colors = vertices.colors(reader, cx)?;
         if source.has_skins {
             out.influences = vertices.influences(reader, cx)?;
@@ -172,6 +180,7 @@ impl Primitive {
         let matrix = transform.normal_matrix();
         raw.normals = whole(&self.normals, count, |n| turn(&matrix, n));
         raw.uvs = whole(&self.uvs, count, |t| t.map(|c| c as f32));
+        raw.second_uvs = whole(&self.second_uvs, count, |t| t.map(|c| c as f32));
         raw.colors = whole(&self.colors, count, |c| c.map(|v| v as f32));
         raw.triangles = std::mem::take(&mut self.triangles);
         raw.edge_masks.extend(&self.edge_masks);
@@ -183,6 +192,11 @@ impl Primitive {
         cx.check_triangles(raw.triangles.len() as u64 + self.triangle_count())?;
         // Lists double when they grow.
         cx.budget.spend("glTF vertices", self.positions.len() as u64, 2 * (24 + 12 + 8 + 16))?;
+        if !(self.second_uvs.is_empty() && raw.second_uvs.is_empty()) {
+            let count = raw.positions.len() + self.positions.len();
+            let known = if raw.second_uvs.is_empty() { count } else { self.positions.len() };
+            cx.budget.spend("second texture coordinates", known as u64, 2 * 8)?;
+        }
         cx.budget.spend("glTF triangles", self.triangles.len() as u64, 2 * (12 + 1 + 4))?;
         if raw.positions.len() + self.positions.len() >= u32::MAX as usize {
             return Err(MeshError::broken("the glTF file has more than 4 billion vertices, with its instances"));
@@ -196,7 +210,9 @@ impl Primitive {
         let matrix = transform.normal_matrix();
         let normals = shape.normals.iter().map(|n| turn(&matrix, n));
         extend_attribute(&mut raw.normals, of.start, of.end, [0.0; 3], normals);
-        extend_attribute(&mut raw.uvs, of.start, of.end, [0.0; 2], self.uvs.iter().map(|t| t.map(|c| c as f32)));
+        let in_f32 = |uv: &[f64; 2]| uv.map(|c| c as f32);
+        extend_attribute(&mut raw.uvs, of.start, of.end, [0.0; 2], self.uvs.iter().map(in_f32));
+        extend_attribute(&mut raw.second_uvs, of.start, of.end, [0.0; 2], self.second_uvs.iter().map(in_f32));
         extend_attribute(&mut raw.colors, of.start, of.end, [1.0; 4], self.colors.iter().map(|c| c.map(|v| v as f32)));
     }
 

@@ -84,7 +84,8 @@ fn textures_samplers_and_transforms() {
         "occlusionTexture": { "index": 0, "texCoord": 1 },
     }));
     let apart = read(&apart.glb()).unwrap();
-    assert_eq!((apart.materials[0].occlusion_texture, codes(&apart)), (None, vec!["occlusion_ignored"]));
+    let occlusion = TextureRef { is_second_uvs: true, ..TextureRef::new(1) };
+    assert_eq!((apart.materials[0].occlusion_texture, codes(&apart)), (Some(occlusion), vec![]));
     // The extension's own example: the lower left quadrant.
     let emissive = slot.emissive_texture.unwrap();
     let moved = |u: f32, v: f32| emissive.transform.map(|[a, b, c]| (a * u + b * v + c).abs());
@@ -116,8 +117,11 @@ fn texture_coordinates_are_those_that_the_material_wants() {
     let mixed = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0, "texCoord": 1 } },
                         "normalTexture": { "index": 0 } });
     let mesh = read(&surface(mixed).glb()).unwrap();
-    assert_eq!(mesh.uvs[mesh.attribute_triangles[0][0] as usize], [0.5; 2], "the base colour's win");
-    assert_eq!(codes(&mesh), ["uv_sets_differ"]);
+    let first = mesh.attribute_triangles[0][0] as usize;
+    assert_eq!((mesh.uvs[first], mesh.second_uvs[first]), ([0.5; 2], [0.0; 2]), "the base colour's are the first");
+    let of = &mesh.materials[0];
+    assert_eq!([of.base_texture, of.normal_texture].map(|texture| texture.unwrap().is_second_uvs), [false, true]);
+    assert!(codes(&mesh).is_empty());
     let absent = json!({ "normalTexture": { "index": 0, "texCoord": 7 } });
     assert_eq!(codes(&read(&surface(absent).glb()).unwrap()), ["uvs_missing"]);
 }

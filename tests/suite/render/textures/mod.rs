@@ -8,4 +8,5 @@ pub mod cut_out_borders;
 pub mod formulas;
 pub mod levels;
 pub mod occlusion;
+pub mod second_uvs;
 pub mod without;

@@ -8,7 +8,7 @@ use meshsnap::backend::gpu::GpuRenderer;
 use meshsnap::image::Image;
 use meshsnap::limits::Deadline;
 use meshsnap::mesh::Mesh;
-use meshsnap::plan::{CornerValues, DrawPlan, ShadedMaterial, Texture, TextureUse, Textures, flags, slots};
+use meshsnap::plan::{CornerValues, DrawPlan, ShadedMaterial, Texture, TextureUse, Textures, flags, samplers, slots};
 
 use crate::support::gpus;
 use crate::support::likeness::{Likeness, Tolerance};
@@ -22,6 +22,7 @@ const CHECKER: u32 = 0;
 const BUMPS: u32 = 1;
 const COARSE: u32 = 2;
 const FLAT: u32 = flags::FILL | flags::FACE_NORMALS;
+const SECOND: u32 = samplers::SECOND_UVS;
 const SMOOTH: u32 = flags::FILL | flags::VERTEX_NORMALS;
 
 const LOOKS: &[Look] = &[
@@ -55,6 +56,14 @@ const LOOKS: &[Look] = &[
     ("normal texture turned", |m| {
         (m.flags, m.metallic, m.textures[slots::NORMAL]) = (SMOOTH, 0.5, turned(BUMPS, -1.5));
         m.normal_scale = 0.6;
+    }),
+    ("texture of the second coordinates", |m| {
+        (m.flags, m.textures[slots::BASE]) = (SMOOTH, used(CHECKER, SECOND));
+        (m.textures[slots::NORMAL], m.textures[slots::OCCLUSION]) = (used(BUMPS, 0), used(CHECKER, 0));
+    }),
+    ("normal texture of the second coordinates", |m| {
+        (m.flags, m.textures[slots::NORMAL]) = (SMOOTH, used(BUMPS, SECOND));
+        m.textures[slots::EMISSIVE] = used(CHECKER, SECOND | samplers::NEAREST);
     }),
     ("emissive texture", |m| {
         (m.flags, m.emissive, m.textures[slots::EMISSIVE]) = (FLAT, [0.7, 0.6, 0.3], used(CHECKER, 0));
@@ -118,7 +127,7 @@ fn every_look_agrees() {
         }
     });
     assert_eq!(cases, LOOKS.len() * truth::cases(1, 3));
-    assert_eq!(LOOKS.len(), 37);
+    assert_eq!(LOOKS.len(), 39);
 }
 
 #[test]
@@ -285,10 +294,12 @@ fn dress<'a>(mesh: &'a Mesh, plan: &mut DrawPlan<'a>) {
     let mut value = |from: f64| random.range(from, 1.0) as f32;
     let colors: Vec<_> = mesh.positions.iter().map(|_| [value(0.0), value(0.0), value(0.0), value(0.2)]).collect();
     let uvs: Vec<_> = mesh.positions.iter().map(|p| [2.5 * p[0] + 0.3 * p[1], 2.0 * p[2] - 1.7 * p[1]]).collect();
+    let second: Vec<_> = mesh.positions.iter().map(|p| [1.1 - 3.0 * p[1], 1.3 * p[0] + 0.7 * p[2]]).collect();
     let surface = plan.surface.as_mut().unwrap();
     surface.face_normals = (&mesh.face_normals).into();
     surface.colors = Some(CornerValues { values: colors.into(), triangles: (&mesh.triangles).into() });
     surface.uvs = Some(CornerValues { values: uvs.into(), triangles: (&mesh.triangles).into() });
+    surface.second_uvs = second.into();
     surface.textures = textures().into();
 }
 
