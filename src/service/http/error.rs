@@ -218,6 +218,8 @@ impl From<Refusal> for ApiError {
                 };
                 Self::new(Fault::Busy, "too_late", detail).flag(flag).retry_after(retry_after_s)
             }
+            Refusal::TooMany { .. } => Self::new(Fault::Content, "too_many_meshes", detail).flag("--queue"),
+            Refusal::TooMuch { .. } => Self::new(Fault::Content, "too_many_meshes", detail).flag("--batch-wait-ms"),
             Refusal::Unstored(unstored) => unstored.into(),
             Refusal::Draining => Self::draining(detail),
         }

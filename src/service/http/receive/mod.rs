@@ -1,10 +1,12 @@
 //! From a request to work for a worker. The cheapest refusals come first.
 //!
-//! [`query`] reads the query, [`body`] the body within its limits. [`idempotency`] knows what is sent again.
+//! [`query`] reads the query, [`body`] the body within its limits. [`idempotency`] knows what is sent again. [`meshes`]
+//! makes a job of each mesh of a form.
 //! [`upload`] names what is to be stored.
 
 pub mod body;
 pub mod idempotency;
+pub mod meshes;
 pub mod query;
 pub mod upload;
 
@@ -15,6 +17,7 @@ use axum::http::HeaderMap;
 
 use self::body::{BodyKind, BodyLimits, Upload};
 use self::idempotency::Sent;
+use self::meshes::MeshOfForm;
 use self::query::Query;
 use super::address::{Address, render_key};
 use super::error::ApiError;
@@ -24,7 +27,7 @@ use super::{negotiate, stored_mesh};
 use crate::limits::Limits;
 use crate::request;
 use crate::service::digest::Digest;
-use crate::service::jobs::{Class, Job, Owner, Recipe, Task, Work};
+use crate::service::jobs::{ClaimName, Class, Job, Owner, Recipe, Task, Work};
 use crate::service::store::Reading;
 use crate::spec::Spec;
 
@@ -38,6 +41,8 @@ pub enum Reception {
     New(Box<Received>),
     /// One that was accepted before, as this job.
     Known(Arc<Job>),
+    /// A form with several meshes, for a job each.
+    Many(Vec<MeshOfForm>),
 }
 
 /// A request for a picture that was found valid.
@@ -50,6 +55,14 @@ pub struct Received {
     pub address: Option<Address>,
     /// True if the picture's format depends on `Accept`.
     pub is_negotiated: bool,
+}
+
+/// The party that sends a request, and the names of the request.
+pub struct Sender {
+    owner: Owner,
+    request_id: Arc<str>,
+    /// The name that the client gave it, and its digest.
+    named: Option<(ClaimName, Digest)>,
 }
 
 /// Reads a request for a picture. Every fault that shows without reading the mesh is found here,
@@ -74,9 +87,19 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     }
 
     let headers = request.headers().clone();
-    let upload = read_upload(state, request).await?;
-    let claim = match &name {
-        Some(name) => match idempotency::check(state, name, (&query, &upload, &headers)).await? {
+    let meshes = (class == Class::Batch).then(|| state.jobs.accepted_max() as u64);
+    let upload = read_body(state, request, meshes).await?;
+    let digest = match &name {
+        Some(_) => Some(idempotency::digest(&query, &upload, &headers).await?),
+        None => None,
+    };
+    let named = name.zip(digest);
+    if upload.kind == BodyKind::Meshes {
+        return meshes::understand(state, query, upload, &headers, &Sender { owner, request_id, named })
+            .map(Reception::Many);
+    }
+    let claim = match &named {
+        Some((name, digest)) => match idempotency::check(state, name, *digest)? {
             Sent::First(claim) => Some(claim),
             Sent::Again(job) => return Ok(Reception::Known(job)),
         },
@@ -131,9 +154,13 @@ fn document_of<'u>(upload: &'u Upload, reading: &Reading, headers: &HeaderMap) -
     (request::names_mesh(body) || is_faulty()).then_some(body)
 }
 
-/// Reads a body within this server's limits.
+/// Reads a body that brings one mesh, within this server's limits.
 pub async fn read_upload(state: &AppState, request: Request) -> Result<Upload, ApiError> {
+    read_body(state, request, None).await
+}
+
+async fn read_body(state: &AppState, request: Request, meshes: Option<u64>) -> Result<Upload, ApiError> {
     let Limits { body_bytes: bytes, bundle_entries: files, .. } = state.rules.limits;
-    let limits = BodyLimits { bytes, files, time: state.body_timeout, upload_budget: &state.upload_budget };
+    let limits = BodyLimits { bytes, files, meshes, time: state.body_timeout, upload_budget: &state.upload_budget };
     body::read(request, limits).await
 }

@@ -1,25 +1,47 @@
 //! `/v1/jobs`: pictures that are fetched later.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use axum::extract::{Extension, Request, State};
-use axum::http::HeaderMap;
-use axum::response::Response;
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse as _, Response};
 
 use super::{PathName, responses, run, text_of};
+use crate::service::http::dto::{JobOfMeshDto, JobsDto};
 use crate::service::http::error::{ApiError, Fault};
 use crate::service::http::negotiate;
+use crate::service::http::receive::meshes::MeshOfForm;
 use crate::service::http::receive::{self, Reception};
 use crate::service::http::state::AppState;
 use crate::service::jobs::{Class, Job, JobId, JobState, Owner};
 
-/// Accepts a job, always with 202. A request that is sent again under its `Idempotency-Key` gets the job that it has.
+/// Accepts a job, or one for each `mesh` part of a form, always with 202. A request that is sent again under its `Idempotency-Key` gets the job that it has.
 pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
-    let job = match receive::receive(&state, request, Class::Batch).await? {
-        Reception::New(received) => state.jobs.accept(received.work).await?,
-        Reception::Known(job) => job,
-    };
-    Ok(responses::accepted(&job))
+    match receive::receive(&state, request, Class::Batch).await? {
+        Reception::New(received) => Ok(responses::accepted(&*state.jobs.accept(received.work).await?)),
+        Reception::Known(job) => Ok(responses::accepted(&job)),
+        Reception::Many(meshes) => accept_all(&state, meshes).await,
+    }
+}
+
+/// Accepts a job for each mesh of a form that has none: all of them or, with an error, none.
+pub(super) async fn accept_all(state: &AppState, meshes: Vec<MeshOfForm>) -> Result<Response, ApiError> {
+    let (mut names, mut works, mut known) = (Vec::new(), Vec::new(), HashMap::new());
+    for (index, mesh) in meshes.into_iter().enumerate() {
+        names.push(mesh.name);
+        match mesh.job {
+            Ok(job) => _ = known.insert(index, job),
+            Err(work) => works.push(*work),
+        }
+    }
+    let mut accepted = state.jobs.accept_all(works).await?.into_iter();
+    let jobs = names.into_iter().enumerate().filter_map(|(index, name)| {
+        let job = known.remove(&index).or_else(|| accepted.next())?;
+        Some(JobOfMeshDto::new(name, &job))
+    });
+    let body = JobsDto { jobs: jobs.collect() };
+    Ok((StatusCode::ACCEPTED, responses::uncached(body)).into_response())
 }
 
 /// The job's state. With `Prefer: wait=N`, the answer comes when the job has ended or after N
