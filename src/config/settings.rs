@@ -62,6 +62,12 @@ pub const SETTINGS: &[Setting] = &[
         word_for(c.backend).into()
     }),
     secret("api-keys", "Bearer tokens of clients, separated by commas", set_api_keys),
+    text(
+        "api-keys-file",
+        "File of named keys as SHA-256 digests, with scopes; read again on SIGHUP",
+        set_api_keys_file,
+        |c| show_folder(&c.api_keys_file),
+    ),
     switch("no-auth", "Allow clients without tokens on addresses other than loopback", |c| &mut c.no_auth),
     number("connections", "Most connections at a time", 1, 1 << 20, |c| &mut c.connections),
     number("uploads-bytes", "Most bytes of uploads in memory at a time", 1, u64::MAX, |c| &mut c.uploads_bytes),
@@ -115,6 +121,12 @@ impl Setting {
     /// The name of the environment variable.
     pub fn variable(&self) -> String {
         format!("MESHSNAP_{}", self.key.to_ascii_uppercase().replace('-', "_"))
+    }
+
+    /// True if an empty variable is the same as none: compose files write one for what is not set. Of keys, it is an error,
+    /// because without keys the server is open.
+    pub fn may_be_empty(&self) -> bool {
+        !self.key.starts_with("api-keys")
     }
 
     /// Sets `value` in `config`. The error is the allowed values, in words.
@@ -233,6 +245,14 @@ fn set_api_keys(config: &mut Config, value: &str) -> Result<(), String> {
     config.api_keys = value.split(',').map(str::trim).filter(|k| !k.is_empty()).map(str::to_owned).collect();
     // A slip must not open the server to everybody.
     if config.api_keys.is_empty() { Err("at least one key".into()) } else { Ok(()) }
+}
+
+/// An empty text is a slip, too.
+fn set_api_keys_file(config: &mut Config, value: &str) -> Result<(), String> {
+    if value.is_empty() {
+        return Err("the path of a file".into());
+    }
+    set_folder(&mut config.api_keys_file, value)
 }
 
 const fn number(key: &'static str, help: &'static str, min: u64, max: u64, at: fn(&mut Config) -> &mut u64) -> Setting {

@@ -14,6 +14,7 @@ use crate::limits::Limits;
 use crate::request::{self, Rules};
 use crate::service::durable::{Durable, Recovered};
 use crate::service::jobs::{CpuThreads, JobSettings, Jobs, Storage, UploadBudget, pipeline_renderers};
+use crate::service::keys::Keys;
 use crate::service::metrics::Metrics;
 use crate::service::pictures::Pictures;
 use crate::service::residents::Residents;
@@ -52,14 +53,14 @@ pub struct AppState {
     pub workers: u64,
     /// The server can be reached from this machine alone.
     pub is_local: bool,
-    /// Accepted bearer tokens. If there are none, no request needs one.
-    pub api_keys: Vec<String>,
+    /// The API keys. If there are none, no request needs one.
+    pub keys: Keys,
     draining: AtomicBool,
 }
 
 impl AppState {
     /// Builds the state and starts the workers. Returns what is in the data folder as well.
-    pub fn start(config: &Config, is_local: bool) -> Result<(Arc<Self>, Recovered), ServeError> {
+    pub fn start(config: &Config, keys: Keys, is_local: bool) -> Result<(Arc<Self>, Recovered), ServeError> {
         let (durable, recovered) = match &config.data_dir {
             Some(folder) if !config.ephemeral => {
                 let (durable, recovered) = Durable::open(folder)?;
@@ -107,7 +108,7 @@ impl AppState {
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             workers: config.workers,
             is_local,
-            api_keys: config.api_keys.clone(),
+            keys,
             draining: AtomicBool::new(false),
         });
         Ok((state, recovered))

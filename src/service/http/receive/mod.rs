@@ -28,6 +28,7 @@ use crate::limits::Limits;
 use crate::request;
 use crate::service::digest::Digest;
 use crate::service::jobs::{ClaimName, Class, Job, Owner, Recipe, Task, Work};
+use crate::service::keys::Access;
 use crate::service::store::Reading;
 use crate::spec::Spec;
 
@@ -68,10 +69,10 @@ pub struct Sender {
 /// Reads a request for a picture. Every fault that shows without reading the mesh is found here,
 /// before it takes a worker's time. A request for a job may have been accepted before.
 pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Reception, ApiError> {
-    let (owner, request_id) = (owner_of(&request), observe::id_of(&request));
+    let (access, request_id) = (access_of(&request), observe::id_of(&request));
     body::check_header(request.headers(), state.rules.limits.body_bytes)?;
     let query = Query::read(request.uri(), &state.rules)?;
-    let name = if class == Class::Batch { idempotency::name_of(request.headers(), &owner)? } else { None };
+    let name = if class == Class::Batch { idempotency::name_of(request.headers(), &access.owner)? } else { None };
     // Forms and JSON may bring a document. Of every other request, the query is the whole document
     // and is checked before the upload.
     if !body::is_multipart(request.headers()) && !body::is_json(request.headers()) {
@@ -83,7 +84,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     // Nor does a request that was accepted before.
     let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
     if !is_short_json && !is_sent_again {
-        state.jobs.would_accept(class, &owner)?;
+        state.jobs.would_accept(class, &access.owner)?;
     }
 
     let headers = request.headers().clone();
@@ -95,7 +96,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     };
     let named = name.zip(digest);
     if upload.kind == BodyKind::Meshes {
-        return meshes::understand(state, query, upload, &headers, &Sender { owner, request_id, named })
+        return meshes::understand(state, query, upload, &headers, &Sender { owner: access.owner, request_id, named })
             .map(Reception::Many);
     }
     let claim = match &named {
@@ -105,13 +106,19 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
         },
         None => None,
     };
-    let mut received = understand(state, query, upload, &headers)?;
-    received.work = Work { owner, request_id, claim, ..received.work };
+    let mut received = understand(state, query, upload, &headers, &access)?;
+    received.work = Work { owner: access.owner, request_id, claim, ..received.work };
     Ok(Reception::New(Box::new(received)))
 }
 
 /// Reads the document of a request, and finds the mesh that it names.
-fn understand(state: &AppState, query: Query, upload: Upload, headers: &HeaderMap) -> Result<Received, ApiError> {
+fn understand(
+    state: &AppState,
+    query: Query,
+    upload: Upload,
+    headers: &HeaderMap,
+    access: &Access,
+) -> Result<Received, ApiError> {
     let Query { reading, overrides } = query;
     let mut is_negotiated = false;
     let mut with_format = |mut spec: Spec| {
@@ -124,7 +131,7 @@ fn understand(state: &AppState, query: Query, upload: Upload, headers: &HeaderMa
         let (name, spec) = request::read_with_mesh(document, &overrides, &state.rules)?;
         let digest = Digest::parse(&name).ok_or_else(|| request::bad_mesh_name(&name))?;
         let spec = with_format(spec)?;
-        let stored = stored_mesh::find(state, Some(&name))?;
+        let stored = stored_mesh::find(state, Some(&name), access)?;
         let key = Some(render_key(state, digest, &reading, &spec));
         let keys = request::all_dotted(document, &overrides, &spec, &state.rules);
         let address = keys.and_then(|keys| Address::new(state, digest, &reading, &spec, &keys));
@@ -141,9 +148,9 @@ fn understand(state: &AppState, query: Query, upload: Upload, headers: &HeaderMa
     Ok(Received { work, key: None, address: None, is_negotiated })
 }
 
-/// The party that sends a request.
-pub fn owner_of(request: &Request) -> Owner {
-    request.extensions().get::<Owner>().cloned().unwrap_or_default()
+/// What the sender of a request sees.
+pub fn access_of(request: &Request) -> Access {
+    request.extensions().get::<Access>().cloned().unwrap_or_default()
 }
 
 /// The body, if it is a request document that names a stored mesh. A request with `format_in` has a
