@@ -80,9 +80,8 @@ fn heading(key: &str) -> &'static str {
         _ if key.starts_with("limit-") => "Limits",
         "log" | "log-format" => "Log",
         "workers" | "worker-threads" | "queue" | "backend" | "cache-dir" => "Drawing",
-        "listen" | "no-auth" | "api-keys-file" | "connections" | "header-timeout-ms" | "body-timeout-ms" => {
-            "Connections"
-        }
+        "listen" | "no-auth" | "api-keys-file" | "cors-origins" | "rate-per-s" | "rate-burst" | "quota-per-day"
+        | "connections" | "header-timeout-ms" | "body-timeout-ms" => "Connections",
         _ => "Memory",
     }
 }

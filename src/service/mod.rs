@@ -1,6 +1,6 @@
 //! The daemon: [`http`] in front of [`jobs`] (the queue, the workers and their results) and
 //! [`store`] (meshes that stay). [`durable`] is the data folder, where both outlive the process. [`residents`] and
-//! [`pictures`] remember what was read and drawn, and [`metrics`] what happened. [`keys`] says who may do what, and
+//! [`pictures`] remember what was read and drawn, and [`metrics`] what happened. [`keys`] says who may do what, [`rates`] how much, and
 //! [`signature`] lets addresses be used without a key. [`warm_up`] makes the first picture come sooner.
 //!
 //! Architecture invariant: [`http`] alone knows HTTP.
@@ -13,6 +13,7 @@ pub mod jobs;
 pub mod keys;
 pub mod metrics;
 pub mod pictures;
+pub mod rates;
 pub mod residents;
 pub mod signature;
 pub mod store;

@@ -17,6 +17,7 @@ use crate::service::jobs::{CpuThreads, JobSettings, Jobs, Storage, UploadBudget,
 use crate::service::keys::Keys;
 use crate::service::metrics::Metrics;
 use crate::service::pictures::Pictures;
+use crate::service::rates::Rates;
 use crate::service::residents::Residents;
 use crate::service::store::Store;
 
@@ -53,6 +54,10 @@ pub struct AppState {
     pub workers: u64,
     /// The server can be reached from this machine alone.
     pub is_local: bool,
+    /// Origins of pages that may use the interface.
+    pub cors_origins: Vec<String>,
+    /// How much each client has asked for.
+    pub rates: Rates,
     /// The API keys. If there are none, no request needs one.
     pub keys: Keys,
     draining: AtomicBool,
@@ -108,6 +113,8 @@ impl AppState {
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             workers: config.workers,
             is_local,
+            cors_origins: config.cors_origins.clone(),
+            rates: Rates::new(to_u32(config.rate_per_s), to_u32(config.rate_burst), to_u32(config.quota_per_day)),
             keys,
             draining: AtomicBool::new(false),
         });
@@ -124,6 +131,10 @@ impl AppState {
     pub fn is_draining(&self) -> bool {
         self.draining.load(Ordering::Relaxed)
     }
+}
+
+fn to_u32(number: u64) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
 }
 
 fn to_usize(number: u64) -> usize {

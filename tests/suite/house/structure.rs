@@ -59,8 +59,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("service/cache", &[]),
     ("service/metrics", &[]),
     ("service/signature", &[]),
-    // Of jobs the owner alone.
+    // Of jobs the owner alone, here and in rates.
     ("service/keys", &["service/digest", "service/jobs"]),
+    ("service/rates", &["service/jobs"]),
     ("service/digest", &["import"]),
     ("service/durable", &["service/digest"]),
     ("service/residents", &["service/cache", "pipeline", "limits"]),
@@ -75,6 +76,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "service/warm_up",
             "service/keys",
+            "service/rates",
             "service/signature",
             "service/metrics",
             "service/store",

@@ -1,6 +1,8 @@
 //! Strangers at the door: pages that abuse a browser, clients that hold what others need, slips in settings, signals.
 
+mod cors;
 mod keys;
+mod rates;
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
