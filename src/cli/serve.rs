@@ -56,7 +56,7 @@ pub fn run(arguments: &ServeArgs) -> Result<(), CliError> {
     })?;
     isolation::ahead(config.workers);
     http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
-        ServeError::Unprotected(_) => CliError::usage(error.to_string()),
+        ServeError::Unprotected(_) | ServeError::Keys(_) => CliError::usage(error.to_string()),
         ServeError::Listen { error: ref cause, .. } if cause.kind() == ErrorKind::InvalidInput => {
             CliError::usage(error.to_string())
         }
@@ -76,7 +76,7 @@ fn resolve(arguments: &ServeArgs) -> Result<Config, CliError> {
     }
     for setting in SETTINGS.iter().filter(|s| !s.has_flag) {
         let variable = setting.variable();
-        if let Some(value) = std::env::var(&variable).ok().filter(|v| !v.is_empty()) {
+        if let Some(value) = std::env::var(&variable).ok().filter(|v| !v.is_empty() || !setting.may_be_empty()) {
             config.apply(&variable, setting.key, &value).map_err(|error| CliError::usage(error.to_string()))?;
         }
     }
@@ -97,7 +97,11 @@ fn announce(address: SocketAddr, config: &Config) {
         _ if address.ip().is_unspecified() => format!("127.0.0.1:{}", address.port()),
         _ => address.to_string(),
     };
-    let key = if config.api_keys.is_empty() { "" } else { " -H \"Authorization: Bearer $KEY\"" };
+    let key = if config.api_keys.is_empty() && config.api_keys_file.is_none() {
+        ""
+    } else {
+        " -H \"Authorization: Bearer $KEY\""
+    };
     let lines = format!(
         "listening on http://{address}\n\
          curl{key} --data-binary @api/examples/knot.obj 'http://{host}/v1/render?style=wire' -o out.png\n"

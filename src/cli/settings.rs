@@ -80,7 +80,8 @@ fn heading(key: &str) -> &'static str {
         _ if key.starts_with("limit-") => "Limits",
         "log" | "log-format" => "Log",
         "workers" | "worker-threads" | "queue" | "backend" | "cache-dir" => "Drawing",
-        "listen" | "no-auth" | "connections" | "header-timeout-ms" | "body-timeout-ms" => "Connections",
+        "listen" | "no-auth" | "api-keys-file" | "cors-origins" | "rate-per-s" | "rate-burst" | "quota-per-day"
+        | "connections" | "header-timeout-ms" | "body-timeout-ms" => "Connections",
         _ => "Memory",
     }
 }
@@ -90,6 +91,7 @@ fn values_of(key: &str, argument: Arg) -> Arg {
     match key {
         "backend" => argument.value_parser(words_or_empty(&words_of::<BackendChoice>())),
         "log-format" => argument.value_parser(words_or_empty(&["auto", "text", "json"])),
+        _ if key.ends_with("-file") => argument.value_hint(ValueHint::FilePath),
         _ if key.ends_with("-dir") => argument.value_hint(ValueHint::DirPath),
         _ => argument.value_hint(ValueHint::Other),
     }
@@ -106,7 +108,7 @@ fn collect(matches: &ArgMatches, settings: impl Iterator<Item = &'static Setting
     for setting in settings {
         let Some(value) = matches.get_one::<String>(setting.key) else { continue };
         let from_variable = matches.value_source(setting.key) == Some(ValueSource::EnvVariable);
-        if from_variable && value.is_empty() {
+        if from_variable && value.is_empty() && setting.may_be_empty() {
             continue; // compose files write an empty variable for one that is not set
         }
         let source = setting.variable();

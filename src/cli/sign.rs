@@ -7,6 +7,7 @@ use clap::Args;
 use super::files;
 use crate::cli::error::CliError;
 use crate::config::Config;
+use crate::service::digest::Digest;
 use crate::service::signature;
 
 /// Arguments of `sign`.
@@ -36,6 +37,6 @@ pub fn run(arguments: &SignArgs) -> Result<(), CliError> {
             format!("{url} is no address of a stored mesh's picture: [http://HOST]/v1/meshes/SHA256/render.png?...");
         return Err(CliError::usage(sentence));
     };
-    let signed = signature::sign(key, &url[path_at..], expires_unix_s);
+    let signed = signature::sign(&Digest::of(key.as_bytes()).to_string(), &url[path_at..], expires_unix_s);
     files::print(format!("{}{signed}\n", &url[..path_at]).as_bytes())
 }

@@ -38,10 +38,20 @@ pub struct Config {
     pub backend: BackendChoice,
     /// Bearer tokens of clients. Empty: no client needs one.
     pub api_keys: Vec<String>,
+    /// File of named keys.
+    pub api_keys_file: Option<PathBuf>,
     /// Allows clients without tokens on addresses other than loopback.
     pub no_auth: bool,
+    /// Origins of pages of other sites that may use the interface: [`ANY_ORIGIN`] alone, or some.
+    pub cors_origins: Vec<String>,
     /// Most connections at a time.
     pub connections: u64,
+    /// Most requests a second of a key, or of an address where there are no keys; 0: any number.
+    pub rate_per_s: u64,
+    /// Most of them at once; 0: those of a second.
+    pub rate_burst: u64,
+    /// Most meshes and jobs of a day; 0: any number.
+    pub quota_per_day: u64,
     /// Most bytes of uploads in memory at a time.
     pub uploads_bytes: u64,
     /// Longest time for the header of a request, milliseconds; also the longest time that a
@@ -88,8 +98,13 @@ impl Default for Config {
             worker_threads: 0,
             backend: BackendChoice::Auto,
             api_keys: Vec::new(),
+            api_keys_file: None,
             no_auth: false,
+            cors_origins: Vec::new(),
             connections: 512,
+            rate_per_s: 0,
+            rate_burst: 0,
+            quota_per_day: 0,
             uploads_bytes: 1 << 30,
             header_timeout_ms: 10_000,
             body_timeout_ms: 60_000,
@@ -109,6 +124,9 @@ impl Default for Config {
         }
     }
 }
+
+/// The word for all origins.
+pub const ANY_ORIGIN: &str = "*";
 
 /// The folder for data by this platform's convention. None if there is no home folder.
 pub fn default_data_dir() -> Option<PathBuf> {
@@ -200,13 +218,13 @@ mod tests {
     #[test]
     fn every_default_is_allowed_and_survives_being_written_and_read() {
         let mut checked = 0;
-        for setting in SETTINGS.iter().filter(|s| s.has_flag && !s.key.ends_with("-dir")) {
+        for setting in SETTINGS.iter().filter(|s| s.has_flag && !s.key.ends_with("-dir") && !s.key.ends_with("-file")) {
             let (default, mut copy) = (Config::default(), Config::default());
             setting.set(&mut copy, &setting.show(&default)).unwrap_or_else(|e| panic!("{}: {e}", setting.key));
             assert_eq!(copy, default, "{}", setting.key);
             checked += 1;
         }
-        assert_eq!(checked, SETTINGS.len() - 3);
+        assert_eq!(checked, SETTINGS.len() - 4);
     }
 
     #[test]
@@ -233,11 +251,13 @@ mod tests {
     fn a_file_sets_everything_that_a_flag_does() {
         let mut config = Config::default();
         let text = "listen = \"0.0.0.0:99\"\nworkers = 3\nno_auth = true\nlimit-body-bytes = \"2MiB\"\n\
+                    cors-origins = [\"https://A.example\", \"http://localhost:3000\", \"http://[::1]:80\"]\n\
                     api-keys = [\"a\", \"b\"]\nbackend = \"cpu\"\nlog-format = \"json\"\nqueue = 5\n";
         config.apply_toml("test.toml", text).unwrap();
         assert_eq!((config.listen.as_str(), config.workers, config.no_auth), ("0.0.0.0:99", 3, true));
         assert_eq!((config.limits.body_bytes, config.limits.queue_per_worker), (2 << 20, 5));
         assert_eq!(config.api_keys, ["a", "b"]);
+        assert_eq!(config.cors_origins, ["https://a.example", "http://localhost:3000", "http://[::1]"]);
         assert_eq!((config.backend, config.log_json), (BackendChoice::Cpu, Some(true)));
     }
 
@@ -254,6 +274,14 @@ mod tests {
             ("no-auth = \"maybe\"", "true or false"),
             ("api-keys = \" , \"", "at least one key"),
             ("api-keys = []", "at least one key"),
+            ("api-keys-file = \"\"", "the path of a file"),
+            ("cors-origins = \"https://a.example/\"", "https://app.example"),
+            ("cors-origins = \"a.example\"", "https://app.example"),
+            ("cors-origins = \"null\"", "https://app.example"),
+            ("cors-origins = \"https://*.example\"", "https://app.example"),
+            ("cors-origins = \"https://a.example:99999\"", "https://app.example"),
+            ("cors-origins = \"https://u@a.example\"", "https://app.example"),
+            ("cors-origins = [\"*\", \"https://a.example\"]", "* alone"),
             ("listen = ", "cannot be read"),
             ("[limits]", "must be a plain value"),
         ];

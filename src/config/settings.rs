@@ -34,6 +34,9 @@ pub struct Setting {
 /// Longest time of any setting, milliseconds.
 const MS_MAX: u64 = JOB_MS_MAX;
 
+/// The largest rate of requests.
+const RATE_MAX: u64 = 1_000_000;
+
 /// The largest side of a JPEG.
 const TEXTURE_PX_MAX: u64 = 65_535;
 
@@ -62,8 +65,27 @@ pub const SETTINGS: &[Setting] = &[
         word_for(c.backend).into()
     }),
     secret("api-keys", "Bearer tokens of clients, separated by commas", set_api_keys),
+    text(
+        "api-keys-file",
+        "File of named keys as SHA-256 digests, with scopes; read again on SIGHUP",
+        set_api_keys_file,
+        |c| show_folder(&c.api_keys_file),
+    ),
     switch("no-auth", "Allow clients without tokens on addresses other than loopback", |c| &mut c.no_auth),
+    text(
+        "cors-origins",
+        "Origins of pages of other sites that may use the interface, separated by commas, or *",
+        set_cors_origins,
+        |c| c.cors_origins.join(","),
+    ),
     number("connections", "Most connections at a time", 1, 1 << 20, |c| &mut c.connections),
+    number("rate-per-s", "Most requests a second of a key, or of an address without keys; 0: any", 0, RATE_MAX, |c| {
+        &mut c.rate_per_s
+    }),
+    number("rate-burst", "Most of them at once; 0: as many as in a second", 0, RATE_MAX, |c| &mut c.rate_burst),
+    number("quota-per-day", "Most POSTs and PUTs a day of a key, or of an address; 0: any", 0, RATE_MAX, |c| {
+        &mut c.quota_per_day
+    }),
     number("uploads-bytes", "Most bytes of uploads in memory at a time", 1, u64::MAX, |c| &mut c.uploads_bytes),
     number("header-timeout-ms", "Longest time for the header of a request", 1, MS_MAX, |c| &mut c.header_timeout_ms),
     number("body-timeout-ms", "Longest time for the body of a request", 1, MS_MAX, |c| &mut c.body_timeout_ms),
@@ -115,6 +137,12 @@ impl Setting {
     /// The name of the environment variable.
     pub fn variable(&self) -> String {
         format!("MESHSNAP_{}", self.key.to_ascii_uppercase().replace('-', "_"))
+    }
+
+    /// True if an empty variable is the same as none: compose files write one for what is not set. Of keys, it is an error,
+    /// because without keys the server is open.
+    pub fn may_be_empty(&self) -> bool {
+        !self.key.starts_with("api-keys")
     }
 
     /// Sets `value` in `config`. The error is the allowed values, in words.
@@ -233,6 +261,45 @@ fn set_api_keys(config: &mut Config, value: &str) -> Result<(), String> {
     config.api_keys = value.split(',').map(str::trim).filter(|k| !k.is_empty()).map(str::to_owned).collect();
     // A slip must not open the server to everybody.
     if config.api_keys.is_empty() { Err("at least one key".into()) } else { Ok(()) }
+}
+
+/// Sets origins as browsers write them: in lower case, without the port that the scheme has anyway.
+fn set_cors_origins(config: &mut Config, value: &str) -> Result<(), String> {
+    let words: Vec<&str> = value.split(',').map(str::trim).filter(|word| !word.is_empty()).collect();
+    if words.contains(&super::ANY_ORIGIN) && words.len() > 1 {
+        return Err("* alone, or origins without it".into());
+    }
+    let origin = |word: &str| {
+        let word = word.to_ascii_lowercase();
+        let (scheme, rest) = word.split_once("://")?;
+        let default_port = match scheme {
+            "http" => 80,
+            "https" => 443,
+            _ => return None,
+        };
+        let (host, port) = match rest.rsplit_once(':') {
+            Some((host, port)) if !port.ends_with(']') => (host, port.parse::<u16>().ok()?),
+            _ => (rest, default_port),
+        };
+        let is_allowed = |byte: u8| byte.is_ascii_alphanumeric() || b".-[]:_".contains(&byte);
+        if host.is_empty() || !host.bytes().all(is_allowed) {
+            return None;
+        }
+        Some(if port == default_port { format!("{scheme}://{host}") } else { format!("{scheme}://{host}:{port}") })
+    };
+    let origins =
+        words.into_iter().map(|word| if word == super::ANY_ORIGIN { Some(word.to_owned()) } else { origin(word) });
+    config.cors_origins =
+        origins.collect::<Option<_>>().ok_or("origins such as https://app.example or http://localhost:3000, or *")?;
+    Ok(())
+}
+
+/// An empty text is a slip, too.
+fn set_api_keys_file(config: &mut Config, value: &str) -> Result<(), String> {
+    if value.is_empty() {
+        return Err("the path of a file".into());
+    }
+    set_folder(&mut config.api_keys_file, value)
 }
 
 const fn number(key: &'static str, help: &'static str, min: u64, max: u64, at: fn(&mut Config) -> &mut u64) -> Setting {

@@ -1,7 +1,7 @@
 //! The daemon: [`http`] in front of [`jobs`] (the queue, the workers and their results) and
 //! [`store`] (meshes that stay). [`durable`] is the data folder, where both outlive the process. [`residents`] and
-//! [`pictures`] remember what was read and drawn, and [`metrics`] what happened. [`signature`] lets addresses be used
-//! without a key. [`warm_up`] makes the first picture come sooner.
+//! [`pictures`] remember what was read and drawn, and [`metrics`] what happened. [`keys`] says who may do what, [`rates`] how much, and
+//! [`signature`] lets addresses be used without a key. [`warm_up`] makes the first picture come sooner.
 //!
 //! Architecture invariant: [`http`] alone knows HTTP.
 
@@ -10,8 +10,10 @@ pub mod digest;
 pub mod durable;
 pub mod http;
 pub mod jobs;
+pub mod keys;
 pub mod metrics;
 pub mod pictures;
+pub mod rates;
 pub mod residents;
 pub mod signature;
 pub mod store;

@@ -1,6 +1,6 @@
 //! Signed addresses: whoever has one may GET what it names until it expires, without an API key. For `<img>` tags.
 //!
-//! The signature is HMAC-SHA256 under an API key over path and query, which ends in the time of expiry:
+//! The signature is HMAC-SHA256 under the SHA-256 of an API key, in hexadecimal digits, over path and query, which ends in the time of expiry:
 //! `/v1/meshes/SHA256/render.png?style=wire&exp=1767225600`. It is added as the last key of the query, `sig`, in
 //! hexadecimal digits.
 
@@ -34,7 +34,7 @@ pub struct Signed<'a> {
     signature: &'a str,
 }
 
-/// Signs a path with its query, from now on until a time in seconds since 1970.
+/// Signs a path with its query under the digest of an API key, from now on until a time in seconds since 1970.
 pub fn sign(key: &str, path_and_query: &str, expires_unix_s: u64) -> String {
     let mark = if path_and_query.contains('?') { '&' } else { '?' };
     let text = format!("{path_and_query}{mark}{EXPIRY}{expires_unix_s}");
@@ -58,11 +58,16 @@ impl<'a> Signed<'a> {
     }
 
     /// The key that has made the signature, if it still counts.
-    pub fn check<'k>(&self, keys: &'k [String], now_unix_s: u64) -> Result<&'k str, BadSignature> {
+    pub fn check<K>(
+        &self,
+        keys: impl IntoIterator<Item = K>,
+        digest_of: impl Fn(&K) -> &str,
+        now_unix_s: u64,
+    ) -> Result<K, BadSignature> {
         let given = bytes(self.signature).ok_or(BadSignature::Wrong)?;
         // The comparison takes the same time wherever they differ.
-        let has_made = |key: &&String| mac(key, self.text).is_some_and(|mac| mac.verify_slice(&given).is_ok());
-        let key = keys.iter().find(has_made).ok_or(BadSignature::Wrong)?;
+        let has_made = |key: &K| mac(digest_of(key), self.text).is_some_and(|mac| mac.verify_slice(&given).is_ok());
+        let key = keys.into_iter().find(has_made).ok_or(BadSignature::Wrong)?;
         if now_unix_s >= self.expires_unix_s { Err(BadSignature::Expired) } else { Ok(key) }
     }
 }
@@ -97,9 +102,9 @@ mod tests {
             let url = sign("two", plain, 1000);
             let signed = Signed::read(&url).unwrap();
             assert_eq!(signed.plain, plain);
-            assert_eq!(signed.check(&keys, 999), Ok("two"));
-            assert_eq!(signed.check(&keys, 1000), Err(BadSignature::Expired));
-            assert_eq!(signed.check(&keys[..1], 999), Err(BadSignature::Wrong));
+            assert_eq!(signed.check(&keys, |key| key, 999), Ok(&"two".to_owned()));
+            assert_eq!(signed.check(&keys, |key| key, 1000), Err(BadSignature::Expired));
+            assert_eq!(signed.check(&keys[..1], |key| key, 999), Err(BadSignature::Wrong));
             let changed = [
                 url.replace("exp=1000", "exp=9999"),
                 url.replace("ab", "ac"),
@@ -110,7 +115,7 @@ mod tests {
             ];
             for url in &changed {
                 assert_eq!(
-                    Signed::read(url).map(|signed| signed.check(&keys, 999)),
+                    Signed::read(url).map(|signed| signed.check(&keys, |key| key, 999)),
                     Some(Err(BadSignature::Wrong)),
                     "{url}"
                 );

@@ -212,6 +212,11 @@ struct Tables<'t> {
 }
 
 impl Tables<'_> {
+    fn mesh(&self, digest: Digest) -> Result<Option<MeshRecord>, redb::Error> {
+        let stored = self.meshes.get(digest.as_bytes())?.map(|record| parse(record.value())).transpose();
+        stored.map_err(redb::Error::Io)
+    }
+
     fn apply(&mut self, change: &Change) -> Result<(), redb::Error> {
         match change {
             Change::Accepted(record) => {
@@ -239,7 +244,21 @@ impl Tables<'_> {
                 self.ends.remove(key)?;
             }
             Change::MeshStored(record) => {
-                self.meshes.insert(record.digest.as_bytes(), &*json(record)?)?;
+                // The report and the way of reading stay those of the first time, as they do in memory.
+                let stored = match self.mesh(record.digest)? {
+                    Some(mut stored) => {
+                        stored.add_owners(record);
+                        json(&stored)?
+                    }
+                    None => json(record)?,
+                };
+                self.meshes.insert(record.digest.as_bytes(), &*stored)?;
+            }
+            Change::MeshDisowned(digest, owner) => {
+                if let Some(mut stored) = self.mesh(*digest)? {
+                    stored.remove_owner(owner);
+                    self.meshes.insert(digest.as_bytes(), &*json(&stored)?)?;
+                }
             }
             Change::MeshRemoved(digest) => {
                 self.meshes.remove(digest.as_bytes())?;

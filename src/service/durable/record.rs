@@ -22,8 +22,10 @@ pub enum Change {
     Fetched(JobKey, u64),
     /// A job has expired.
     Forgotten(JobKey),
-    /// A mesh was stored.
+    /// A mesh was stored, by other parties too if it is there: it then gets their names alone.
     MeshStored(Box<MeshRecord>),
+    /// A party has deleted a mesh that others have, too.
+    MeshDisowned(Digest, String),
     /// A mesh was removed.
     MeshRemoved(Digest),
     /// Bytes that are kept in the log.
@@ -190,9 +192,36 @@ pub struct MeshRecord {
     /// The party that stored it first.
     #[serde(default)]
     pub owner: String,
+    /// Those that stored it later.
+    #[serde(default)]
+    pub later_owners: Vec<String>,
     /// The bytes of its report.
     #[serde(with = "digest")]
     pub report: Digest,
+}
+
+impl MeshRecord {
+    /// All parties that have it.
+    pub fn owners(&self) -> impl Iterator<Item = &String> {
+        [&self.owner].into_iter().chain(&self.later_owners)
+    }
+
+    /// Adds the owners of another record of the mesh.
+    pub fn add_owners(&mut self, other: &Self) {
+        for owner in other.owners() {
+            if !self.owners().any(|known| known == owner) {
+                self.later_owners.push(owner.clone());
+            }
+        }
+    }
+
+    /// Removes an owner. The last one stays: its mesh is removed whole.
+    pub fn remove_owner(&mut self, owner: &str) {
+        self.later_owners.retain(|known| known != owner);
+        if self.owner == owner && !self.later_owners.is_empty() {
+            self.owner = self.later_owners.remove(0);
+        }
+    }
 }
 
 /// A job's key as the hexadecimal digits of its UUID: JSON has no numbers of this size.

@@ -14,6 +14,7 @@ use crate::pipeline::{PlanError, RenderError};
 use crate::request::RequestError;
 use crate::service::durable::{ErrorRecord, Unstored};
 use crate::service::jobs::{Class, Failure, Refusal, UploadBudgetFull, name};
+use crate::service::rates::TooMuch;
 use crate::service::store::StoreError;
 
 /// Kinds of errors, by who is at fault. Each has one status.
@@ -218,6 +219,8 @@ impl From<Refusal> for ApiError {
                 };
                 Self::new(Fault::Busy, "too_late", detail).flag(flag).retry_after(retry_after_s)
             }
+            Refusal::TooMany { .. } => Self::new(Fault::Content, "too_many_meshes", detail).flag("--queue"),
+            Refusal::TooMuch { .. } => Self::new(Fault::Content, "too_many_meshes", detail).flag("--batch-wait-ms"),
             Refusal::Unstored(unstored) => unstored.into(),
             Refusal::Draining => Self::draining(detail),
         }
@@ -239,6 +242,16 @@ impl From<&ErrorRecord> for ApiError {
         let known = FAULTS_OF_JOBS.iter().find(|(name, _)| *name == record.fault);
         let error = Self::new(known.map_or(Fault::Internal, |(_, fault)| *fault), name(&record.code), &record.detail);
         error.flag(record.flag.as_deref().map(name))
+    }
+}
+
+impl From<TooMuch> for ApiError {
+    fn from(much: TooMuch) -> Self {
+        let (code, flag) = match much {
+            TooMuch::Rate { .. } => ("rate_limited", "--rate-per-s"),
+            TooMuch::Day { .. } => ("quota_exceeded", "--quota-per-day"),
+        };
+        Self::new(Fault::Busy, code, much.to_string()).flag(flag).retry_after(much.retry_after_s())
     }
 }
 

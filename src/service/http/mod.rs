@@ -40,8 +40,9 @@ use tokio::net::TcpListener;
 
 use crate::config::{Config, cores};
 use crate::service::durable::OpenError;
+use crate::service::keys::{Keys, KeysError};
 use crate::service::warm_up::WarmUp;
-use signals::EndSignals;
+use signals::{EndSignals, HangUps};
 use state::AppState;
 
 /// Time beyond a job's deadline after which the process ends without the jobs that still run.
@@ -66,6 +67,9 @@ pub enum ServeError {
         /// The cause.
         error: std::io::Error,
     },
+    /// The file of API keys cannot be used.
+    #[error(transparent)]
+    Keys(#[from] KeysError),
     /// The data folder cannot be used.
     #[error(transparent)]
     Data(#[from] OpenError),
@@ -87,10 +91,11 @@ pub fn serve(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
 }
 
 async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), ServeError> {
+    let keys = Keys::open(&config.api_keys, config.api_keys_file.as_deref())?;
     let listen_error = |error| ServeError::Listen { listen: config.listen.clone(), error };
     let addresses: Vec<SocketAddr> = tokio::net::lookup_host(&config.listen).await.map_err(listen_error)?.collect();
     if let Some(open) = addresses.iter().find(|a| !a.ip().is_loopback())
-        && config.api_keys.is_empty()
+        && keys.current().is_empty()
         && !config.no_auth
     {
         return Err(ServeError::Unprotected(*open));
@@ -98,9 +103,10 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     let listener = TcpListener::bind(&*addresses).await.map_err(listen_error)?;
     let address = listener.local_addr()?;
     let mut signals = EndSignals::new()?;
-    signals::ignore_hang_up()?;
+    let hang_ups = HangUps::new()?;
 
-    let (state, recovered) = AppState::start(config, address.ip().is_loopback())?;
+    let (state, recovered) = AppState::start(config, keys, address.ip().is_loopback())?;
+    tokio::spawn(reload_keys(hang_ups, state.clone()));
     recovery::recover(&state, recovered);
     let router = router::router(&state);
     tracing::info!(%address, workers = config.workers, "ready");
@@ -125,6 +131,20 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     }
     tracing::info!("ended");
     Ok(())
+}
+
+/// Reads the file of API keys again with each SIGHUP. An error leaves the keys as they are.
+async fn reload_keys(mut hang_ups: HangUps, state: Arc<AppState>) {
+    while hang_ups.next().await {
+        let reloading = state.clone();
+        // A slow disk must hold nobody up.
+        match tokio::task::spawn_blocking(move || reloading.keys.reload()).await {
+            Ok(Ok(Some(named))) => tracing::info!(named, "SIGHUP: the API keys are read again"),
+            Ok(Ok(None)) => tracing::info!("SIGHUP changes nothing: there is no --api-keys-file"),
+            Ok(Err(error)) => tracing::error!(%error, "SIGHUP: the API keys stay as they are"),
+            Err(_) => tracing::error!("SIGHUP: the API keys were not read"),
+        }
+    }
 }
 
 /// Refuses new work and waits until the accepted jobs have ended, no longer than `time_max`.

@@ -60,13 +60,13 @@ fn restore_mesh(state: &AppState, recovered: &Recovered, record: MeshRecord) {
     };
     let Some((report, hold)) = recovered.bytes(record.report) else { return };
     holds.push(hold);
-    let reading = reading(record.format_in.as_deref(), record.entry);
+    let reading = reading(record.format_in.as_deref(), record.entry.clone());
     let mesh = NewMesh {
         digest: record.digest,
         bundle: Bundle::of_files(files),
         reading,
         report,
-        owner: Owner::new(&record.owner),
+        owners: record.owners().map(|owner| Owner::new(owner)).collect(),
     };
     if let Err(error) = state.meshes.insert(mesh, holds.into()) {
         tracing::warn!(mesh = %record.digest, %error, "a stored mesh does not fit any more");

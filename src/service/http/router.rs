@@ -9,7 +9,7 @@ use axum::response::Response;
 use axum::routing::{MethodRouter, get, post};
 
 use super::error::ApiError;
-use super::middleware::{auth, observe, site};
+use super::middleware::{auth, cors, observe, rates, site};
 use super::resources::{events, front_page, health, jobs, meshes, metrics, pictures, render, schema};
 use super::state::AppState;
 
@@ -19,9 +19,10 @@ pub fn router(state: &Arc<AppState>) -> Router {
     let api = protected_routes()
         .into_iter()
         .fold(metrics, |router, (path, methods)| router.route(path, methods))
+        .route_layer(from_fn_with_state(state.clone(), rates::check))
         .route_layer(from_fn_with_state(state.clone(), auth::check))
         .route_layer(from_fn_with_state(state.clone(), site::check));
-    Router::new()
+    let routes = Router::new()
         .route("/", get(front_page::get))
         .route("/healthz", get(health::healthz))
         .route("/readyz", get(health::readyz))
@@ -32,7 +33,13 @@ pub fn router(state: &Arc<AppState>) -> Router {
             ApiError::not_found(
                 "there is nothing at this path; the work is done at POST /v1/render, and /openapi.json lists the paths",
             )
-        })
+        });
+    // Before keys are asked for: a browser asks without one.
+    let routes = match cors::layer(&state.cors_origins) {
+        Some(layer) => routes.layer(layer),
+        None => routes,
+    };
+    routes
         // Bodies, forms included, are metered as they are read. The limit of axum, 2 MB, would come
         // before `--limit-body-bytes`.
         .layer(DefaultBodyLimit::disable())

@@ -37,18 +37,29 @@ impl EndSignals {
     }
 }
 
-/// Keeps SIGHUP from ending the server: a terminal that is closed sends it, and tools that ask for new
-/// settings.
-pub fn ignore_hang_up() -> io::Result<()> {
+/// SIGHUP, which does not end the server: a terminal that is closed sends it, and tools that ask for new settings.
+pub struct HangUps {
     #[cfg(unix)]
-    {
-        use tokio::signal::unix::{SignalKind, signal};
-        let mut hang_up = signal(SignalKind::hangup())?;
-        tokio::spawn(async move {
-            while hang_up.recv().await.is_some() {
-                tracing::info!("SIGHUP is ignored: settings are read at the start");
-            }
-        });
+    hang_up: tokio::signal::unix::Signal,
+}
+
+impl HangUps {
+    /// Catches it.
+    pub fn new() -> io::Result<Self> {
+        #[cfg(unix)]
+        {
+            use tokio::signal::unix::{SignalKind, signal};
+            Ok(Self { hang_up: signal(SignalKind::hangup())? })
+        }
+        #[cfg(not(unix))]
+        Ok(Self {})
     }
-    Ok(())
+
+    /// Waits for the next one. False if there will be none.
+    pub async fn next(&mut self) -> bool {
+        #[cfg(unix)]
+        return self.hang_up.recv().await.is_some();
+        #[cfg(not(unix))]
+        false
+    }
 }

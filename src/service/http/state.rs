@@ -14,8 +14,10 @@ use crate::limits::Limits;
 use crate::request::{self, Rules};
 use crate::service::durable::{Durable, Recovered};
 use crate::service::jobs::{CpuThreads, JobSettings, Jobs, Storage, UploadBudget, pipeline_renderers};
+use crate::service::keys::Keys;
 use crate::service::metrics::Metrics;
 use crate::service::pictures::Pictures;
+use crate::service::rates::Rates;
 use crate::service::residents::Residents;
 use crate::service::store::Store;
 
@@ -52,14 +54,18 @@ pub struct AppState {
     pub workers: u64,
     /// The server can be reached from this machine alone.
     pub is_local: bool,
-    /// Accepted bearer tokens. If there are none, no request needs one.
-    pub api_keys: Vec<String>,
+    /// Origins of pages that may use the interface.
+    pub cors_origins: Vec<String>,
+    /// How much each client has asked for.
+    pub rates: Rates,
+    /// The API keys. If there are none, no request needs one.
+    pub keys: Keys,
     draining: AtomicBool,
 }
 
 impl AppState {
     /// Builds the state and starts the workers. Returns what is in the data folder as well.
-    pub fn start(config: &Config, is_local: bool) -> Result<(Arc<Self>, Recovered), ServeError> {
+    pub fn start(config: &Config, keys: Keys, is_local: bool) -> Result<(Arc<Self>, Recovered), ServeError> {
         let (durable, recovered) = match &config.data_dir {
             Some(folder) if !config.ephemeral => {
                 let (durable, recovered) = Durable::open(folder)?;
@@ -107,7 +113,9 @@ impl AppState {
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             workers: config.workers,
             is_local,
-            api_keys: config.api_keys.clone(),
+            cors_origins: config.cors_origins.clone(),
+            rates: Rates::new(to_u32(config.rate_per_s), to_u32(config.rate_burst), to_u32(config.quota_per_day)),
+            keys,
             draining: AtomicBool::new(false),
         });
         Ok((state, recovered))
@@ -123,6 +131,10 @@ impl AppState {
     pub fn is_draining(&self) -> bool {
         self.draining.load(Ordering::Relaxed)
     }
+}
+
+fn to_u32(number: u64) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
 }
 
 fn to_usize(number: u64) -> usize {

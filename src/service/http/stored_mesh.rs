@@ -7,11 +7,12 @@ use super::state::AppState;
 use crate::import::Bundle;
 use crate::service::digest::Digest;
 use crate::service::jobs::{Owner, Reservation, Task, Work};
+use crate::service::keys::Access;
 use crate::service::store::{Reading, StoredMesh};
 
-/// The stored mesh with this name. None is a path segment that is not text.
-pub fn find(state: &AppState, name: Option<&str>) -> Result<Arc<StoredMesh>, ApiError> {
-    state.meshes.find(digest(name)?).ok_or_else(unknown)
+/// The stored mesh with this name, if the sender sees it. None is a path segment that is not text.
+pub fn find(state: &AppState, name: Option<&str>, access: &Access) -> Result<Arc<StoredMesh>, ApiError> {
+    state.meshes.find(digest(name)?, access).ok_or_else(unknown)
 }
 
 /// The digest that a path segment names.

@@ -98,6 +98,27 @@ pub enum Refusal {
         /// Seconds until there should be time enough.
         retry_after_s: u64,
     },
+    /// More meshes at once than there could ever be places for.
+    #[error(
+        "the form has more than {most} meshes, for which there is no place even in an empty queue; send fewer at once"
+    )]
+    TooMany {
+        /// Most that may come at once.
+        most: u64,
+    },
+    /// Meshes that would wait for one another for too long.
+    #[error(
+        "{count} meshes of the form take about {takes_ms} ms, and a job is let wait for {limit_ms} ms; send fewer at \
+         once"
+    )]
+    TooMuch {
+        /// Number of meshes.
+        count: usize,
+        /// Time until the last one would begin if there were no others.
+        takes_ms: u64,
+        /// The longest time for which it is let wait.
+        limit_ms: u64,
+    },
     /// The job cannot be stored.
     #[error(transparent)]
     Unstored(#[from] Unstored),
@@ -170,19 +191,36 @@ impl Jobs {
     /// Queues work that can be found by its id until its result expires. With a data folder, the job is durable
     /// when this returns, and goes on even if the caller does not wait for that.
     pub async fn accept(&self, work: Work) -> Result<Arc<Job>, Refusal> {
-        let Some(storage) = self.registry.settings.storage.clone() else { return self.registry.submit(work, true) };
-        let job = self.registry.admit(work, true, true)?;
-        let (registry, stored) = (self.registry.clone(), job.clone());
+        self.accept_all(vec![work]).await?.pop().ok_or(Refusal::Unstored(Unstored::Failed))
+    }
+
+    /// As [`Jobs::accept`], of several works of one owner: all of them or none. In a data folder, they share a
+    /// transaction.
+    pub async fn accept_all(&self, works: Vec<Work>) -> Result<Vec<Arc<Job>>, Refusal> {
+        let storage = self.registry.settings.storage.clone();
+        let jobs = self.registry.admit_all(works, storage.is_some())?;
+        let Some(storage) = storage else {
+            jobs.iter().for_each(|job| self.registry.enqueue(job));
+            return Ok(jobs);
+        };
+        let (registry, stored) = (self.registry.clone(), jobs.clone());
         let storing = tokio::spawn(async move {
             let outcome = store(&storage, &stored).await;
-            match outcome {
-                Ok(()) => registry.enqueue(&stored),
-                Err(_) => registry.withdraw(&stored),
+            for job in &stored {
+                match outcome {
+                    Ok(()) => registry.enqueue(job),
+                    Err(_) => registry.withdraw(job),
+                }
             }
             outcome
         });
         storing.await.unwrap_or(Err(Unstored::Failed))?;
-        Ok(job)
+        Ok(jobs)
+    }
+
+    /// Most works that [`Jobs::accept_all`] may ever accept at once.
+    pub fn accepted_max(&self) -> usize {
+        self.registry.accepted_max()
     }
 
     /// Lets a name stand for a request, unless it stands for one whose job can be found.
@@ -289,13 +327,18 @@ impl Jobs {
     }
 }
 
-/// Writes an accepted job to the data folder. Files are written, and hashed, on a thread that may wait.
-async fn store(storage: &Storage, job: &Arc<Job>) -> Result<(), Unstored> {
-    let (writer, written) = (storage.clone(), job.clone());
-    let recording = tokio::task::spawn_blocking(move || written.with_work(|work| writer.of_job(&written, work)));
-    let recorded = recording.await.ok().flatten().unwrap_or(Err(Unstored::Failed));
-    let (record, holds) = recorded?;
-    storage.durable.store(vec![Change::Accepted(Box::new(record))], holds.clone()).await?;
-    job.hold(holds);
+/// Writes accepted jobs to the data folder. Files are written, and hashed, on a thread that may wait.
+async fn store(storage: &Storage, jobs: &[Arc<Job>]) -> Result<(), Unstored> {
+    let (writer, written) = (storage.clone(), jobs.to_vec());
+    let recording = tokio::task::spawn_blocking(move || {
+        let record = |job: &Arc<Job>| job.with_work(|work| writer.of_job(job, work)).unwrap_or(Err(Unstored::Failed));
+        written.iter().map(record).collect::<Result<Vec<_>, _>>()
+    });
+    let (records, holds): (Vec<_>, Vec<_>) = recording.await.unwrap_or(Err(Unstored::Failed))?.into_iter().unzip();
+    let changes = records.into_iter().map(|record| Change::Accepted(Box::new(record))).collect();
+    storage.durable.store(changes, holds.concat()).await?;
+    for (job, holds) in jobs.iter().zip(holds) {
+        job.hold(holds);
+    }
     Ok(())
 }

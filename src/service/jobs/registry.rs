@@ -23,7 +23,7 @@ use tokio::sync::watch;
 use super::claims::{Claim, Claims};
 use super::class::{Class, Owner};
 use super::estimates::Estimates;
-use super::job::{Admission, Job, JobId, JobState, Work, unix_ms};
+use super::job::{Admission, Job, JobId, JobState, Size, Work, unix_ms};
 use super::queue::Queue;
 use super::results::Results;
 use super::storage::Storage;
@@ -116,25 +116,69 @@ impl JobRegistry {
 
     /// Queues work. A kept job can be found by its id until its result expires.
     pub fn submit(&self, work: Work, is_kept: bool) -> Result<Arc<Job>, Refusal> {
-        let job = self.admit(work, is_kept, false)?;
-        self.enqueue(&job);
+        let size = self.estimates.size(&work);
+        let mut inner = self.lock();
+        let job = self.admit(&mut inner, (work, size), is_kept, false)?;
+        self.insert(&mut inner, &job);
         Ok(job)
     }
 
-    /// Gives work a place in the queue, which [`Self::enqueue`] takes or [`Self::withdraw`] gives back.
-    pub fn admit(&self, work: Work, is_kept: bool, is_durable: bool) -> Result<Arc<Job>, Refusal> {
-        let size = self.estimates.size(&work);
+    /// Gives works places in the queue, all or none, which [`Self::enqueue`] takes or [`Self::withdraw`] gives back.
+    /// They are kept.
+    pub fn admit_all(&self, works: Vec<Work>, are_durable: bool) -> Result<Vec<Arc<Job>>, Refusal> {
+        let works: Vec<_> = works.into_iter().map(|work| (self.estimates.size(&work), work)).collect();
+        let mut inner = self.lock();
+        let mut jobs: Vec<Arc<Job>> = Vec::with_capacity(works.len());
+        for (size, work) in works {
+            match self.admit(&mut inner, (work, size), true, are_durable) {
+                Ok(job) => jobs.push(job),
+                Err(refusal) => {
+                    jobs.iter().for_each(|job| inner.queue.withdraw(job));
+                    self.publish(&inner);
+                    return Err(self.for_ever(refusal, &jobs));
+                }
+            }
+        }
+        self.publish(&inner);
+        Ok(jobs)
+    }
+
+    /// The refusal of works that came with others, which are admitted: if these alone are too much, trying again
+    /// is in vain.
+    fn for_ever(&self, refusal: Refusal, others: &[Arc<Job>]) -> Refusal {
+        let most = self.accepted_max() as u64;
+        let own: Duration = others.iter().map(|job| job.estimate).sum();
+        let (takes, limit) = (own / to_u32(self.batch_workers()), self.settings.batch_wait);
+        match refusal {
+            Refusal::QueueFull { .. } if others.len() as u64 >= most => Refusal::TooMany { most },
+            Refusal::TooLate { .. } if takes > limit => {
+                Refusal::TooMuch { count: others.len() + 1, takes_ms: to_ms(takes), limit_ms: to_ms(limit) }
+            }
+            other => other,
+        }
+    }
+
+    /// Most works of one owner that could be admitted at once: its share of the queue, and every worker that it may have.
+    pub fn accepted_max(&self) -> usize {
+        self.share() + self.batch_workers()
+    }
+
+    fn admit(
+        &self,
+        inner: &mut Inner,
+        (work, size): (Work, Size),
+        is_kept: bool,
+        is_durable: bool,
+    ) -> Result<Arc<Job>, Refusal> {
         let estimate = self.estimates.estimate(size).min(self.settings.job_time);
         let owner = work.owner.clone();
-        let mut inner = self.lock();
-        self.check(&inner, if is_kept { Class::Batch } else { Class::Interactive }, &owner)?;
+        self.check(inner, if is_kept { Class::Batch } else { Class::Interactive }, &owner)?;
         inner.serial += 1;
         let rank = self.began.elapsed() + (estimate * PATIENCE).min(self.settings.job_time / 4);
         let (serial, claim) = (inner.serial, work.claim.clone());
         let admission = Admission { is_kept, owner, is_durable, serial, size, estimate, rank, claim };
         let job = Arc::new(Job::new(Some(work), admission, None));
         inner.queue.reserve(job.class, &job.owner, estimate);
-        self.publish(&inner);
         Ok(job)
     }
 
@@ -420,8 +464,7 @@ impl JobRegistry {
         // Idle workers count as places, so that a queue of 0 accepts a job that can start at once.
         let (queue, idle) = (self.settings.queue, self.idle(inner, class));
         let wait = self.wait(inner, class, owner);
-        // One owner leaves a quarter of the places to others.
-        let share = queue - queue / 4;
+        let share = self.share();
         if inner.queue.count(class) >= queue + idle || inner.queue.count_of(class, owner) >= share + idle {
             return Err(Refusal::QueueFull { queue: queue.min(share), retry_after_s: retry_after_s(wait) });
         }
@@ -431,6 +474,11 @@ impl JobRegistry {
             return Err(Refusal::TooLate { class, wait_ms, limit_ms, retry_after_s: retry_after_s(wait - limit) });
         }
         Ok(())
+    }
+
+    /// Places of one owner, which leaves a quarter to others.
+    fn share(&self) -> usize {
+        self.settings.queue - self.settings.queue / 4
     }
 
     fn wait_limit(&self, class: Class) -> Duration {
@@ -472,7 +520,7 @@ impl JobRegistry {
             Class::Batch => inner.queue.time_before(class, owner) + inner.queue.time(Class::Interactive),
         };
         let workers = if class == Class::Batch { self.batch_workers() } else { self.settings.workers.max(1) };
-        (before + running) / u32::try_from(workers).unwrap_or(u32::MAX)
+        (before + running) / to_u32(workers)
     }
 
     /// Forgets a kept job that has ended.
@@ -525,6 +573,10 @@ fn result_bytes(state: &JobState) -> u64 {
 /// Seconds after which to try again, at least 1 and at most an hour.
 fn retry_after_s(wait: Duration) -> u64 {
     wait.as_secs_f64().ceil().clamp(1.0, 3600.0) as u64
+}
+
+fn to_u32(number: usize) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
 }
 
 fn to_ms(time: Duration) -> u64 {

@@ -72,6 +72,14 @@ impl Reservation {
 }
 
 impl Reservation {
+    /// Hands a part over, at most all of it.
+    #[must_use]
+    pub fn split(&mut self, bytes: u64) -> Self {
+        let bytes = bytes.min(self.bytes);
+        self.bytes -= bytes;
+        Self { budget: self.budget.clone(), bytes }
+    }
+
     /// Takes `bytes` more, even beyond the cap: what was accepted before a restart is not refused after it.
     pub fn take(&mut self, bytes: u64) {
         self.budget.used.fetch_add(bytes, Ordering::Relaxed);
@@ -101,7 +109,12 @@ mod tests {
         assert_eq!(budget.used_bytes(), 100);
         drop(first);
         assert_eq!(budget.used_bytes(), 40);
+        let (part, rest) = (second.split(30), second.split(u64::MAX));
         drop(second);
+        assert_eq!((budget.used_bytes(), part.bytes, rest.bytes), (40, 30, 10));
+        drop(part);
+        assert_eq!(budget.used_bytes(), 10);
+        drop(rest);
         assert_eq!(budget.used_bytes(), 0);
     }
 }

@@ -9,7 +9,7 @@
 #[cfg(test)]
 mod tests;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bytes::Bytes;
@@ -18,6 +18,7 @@ use crate::import::{Bundle, Format};
 use crate::service::digest::Digest;
 use crate::service::durable::{Change, Durable, Hold};
 use crate::service::jobs::{Owner, Reservation, UploadBudget};
+use crate::service::keys::Access;
 
 /// The way in which a bundle is read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -39,8 +40,8 @@ pub struct NewMesh {
     pub reading: Reading,
     /// The report on its content, as JSON.
     pub report: Bytes,
-    /// The party that stored it first.
-    pub owner: Owner,
+    /// The parties that have stored it.
+    pub owners: Vec<Owner>,
 }
 
 /// A mesh that is stored, or was stored when it was found.
@@ -109,6 +110,19 @@ struct Inner {
 struct Entry {
     stored: Arc<StoredMesh>,
     used: u64,
+    /// The parties that have stored it. Content has one name, so that several may have one mesh.
+    owners: BTreeSet<Owner>,
+}
+
+/// What became of a mesh that a party has deleted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Removed {
+    /// The party did not have it.
+    Unknown,
+    /// Others have it still.
+    OfOthers,
+    /// It is gone.
+    Gone,
 }
 
 impl Store {
@@ -122,19 +136,26 @@ impl Store {
         Self { durable, memory: UploadBudget::new(bytes), bytes, count: count.max(1), inner: Mutex::default() }
     }
 
-    /// Finds a mesh, which counts as a use of it.
-    pub fn find(&self, digest: Digest) -> Option<Arc<StoredMesh>> {
-        self.lock().touch(digest)
+    /// Finds a mesh that the party sees, which counts as a use of it.
+    pub fn find(&self, digest: Digest, access: &Access) -> Option<Arc<StoredMesh>> {
+        let mut inner = self.lock();
+        inner.meshes.get(&digest).filter(|entry| entry.is_seen_by(access))?;
+        inner.touch(digest)
     }
 
-    /// Stores a mesh. False if one of its name is stored already, which then stays as it is. `holds` are its bytes
-    /// in the data folder.
+    /// Stores a mesh. One of its name that is stored already stays as it is, and gets the owners. False if they have it
+    /// already. `holds` are its bytes in the data folder.
     pub fn insert(&self, mesh: NewMesh, holds: Arc<[Arc<Hold>]>) -> Result<bool, StoreError> {
         let bytes = mesh.size_bytes();
         self.check_size(bytes)?;
         let mut inner = self.lock();
         if inner.touch(mesh.digest).is_some() {
-            return Ok(false);
+            let entry = inner.meshes.get_mut(&mesh.digest);
+            return Ok(entry.is_some_and(|entry| {
+                let before = entry.owners.len();
+                entry.owners.extend(mesh.owners);
+                entry.owners.len() > before
+            }));
         }
         while inner.meshes.len() >= self.count {
             self.forget(inner.evict().ok_or(StoreError::Busy { flag: "--mesh-count" })?);
@@ -147,13 +168,23 @@ impl Store {
         Ok(true)
     }
 
-    /// Removes a mesh. False if it was not there. Jobs that already draw it go on.
-    pub fn remove(&self, digest: Digest) -> bool {
+    /// Removes a mesh for a party; it goes with its last owner. Jobs that already draw it go on.
+    pub fn remove(&self, digest: Digest, access: &Access) -> Removed {
         let mut inner = self.lock();
-        let Some(entry) = inner.meshes.remove(&digest) else { return false };
+        let Some(entry) = inner.meshes.get_mut(&digest).filter(|entry| entry.is_seen_by(access)) else {
+            return Removed::Unknown;
+        };
+        entry.owners.remove(&access.owner);
+        if !entry.owners.is_empty() && !access.sees_all() {
+            if let Some(durable) = &self.durable {
+                durable.store_soon(vec![Change::MeshDisowned(digest, access.owner.to_string())], Vec::new());
+            }
+            return Removed::OfOthers;
+        }
+        let Some(entry) = inner.meshes.remove(&digest) else { return Removed::Unknown };
         inner.by_use.remove(&entry.used);
         self.forget(entry);
-        true
+        Removed::Gone
     }
 
     /// Removes a mesh from the data folder. The lock is held, so that a mesh that is stored anew is stored after
@@ -194,6 +225,12 @@ impl NewMesh {
     }
 }
 
+impl Entry {
+    fn is_seen_by(&self, access: &Access) -> bool {
+        access.sees_all() || self.owners.contains(&access.owner)
+    }
+}
+
 impl Inner {
     fn touch(&mut self, digest: Digest) -> Option<Arc<StoredMesh>> {
         let entry = self.meshes.get_mut(&digest)?;
@@ -204,10 +241,11 @@ impl Inner {
         Some(entry.stored.clone())
     }
 
-    fn add(&mut self, stored: StoredMesh) {
+    fn add(&mut self, mut stored: StoredMesh) {
+        let owners = std::mem::take(&mut stored.mesh.owners).into_iter().collect();
         self.serial += 1;
         self.by_use.insert(self.serial, stored.mesh.digest);
-        self.meshes.insert(stored.mesh.digest, Entry { stored: Arc::new(stored), used: self.serial });
+        self.meshes.insert(stored.mesh.digest, Entry { stored: Arc::new(stored), used: self.serial, owners });
     }
 
     /// Removes the least recently used mesh that is not held elsewhere. Removing a held one would

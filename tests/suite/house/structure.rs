@@ -59,16 +59,24 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("service/cache", &[]),
     ("service/metrics", &[]),
     ("service/signature", &[]),
+    // Of jobs the owner alone, here and in rates.
+    ("service/keys", &["service/digest", "service/jobs"]),
+    ("service/rates", &["service/jobs"]),
     ("service/digest", &["import"]),
     ("service/durable", &["service/digest"]),
     ("service/residents", &["service/cache", "pipeline", "limits"]),
     ("service/pictures", &["service/cache", "service/jobs", "backend", "image", "warning"]),
-    ("service/store", &["service/jobs", "service/durable", "service/digest", "import", "mesh", "limits"]),
+    (
+        "service/store",
+        &["service/jobs", "service/keys", "service/durable", "service/digest", "import", "mesh", "limits"],
+    ),
     ("service/warm_up", &["pipeline", "request", "backend", "spec", "import", "limits"]),
     (
         "service/http",
         &[
             "service/warm_up",
+            "service/keys",
+            "service/rates",
             "service/signature",
             "service/metrics",
             "service/store",
@@ -157,7 +165,16 @@ const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("tokio::", &["service/", "main.rs", "cli", "telemetry"]),
     (
         "std::fs",
-        &["cli", "sandbox/", "config", "main.rs", "service/http/", "service/durable/", "backend/gpu/pipelines/file.rs"],
+        &[
+            "cli",
+            "sandbox/",
+            "config",
+            "main.rs",
+            "service/http/",
+            "service/durable/",
+            "service/keys/",
+            "backend/gpu/pipelines/file.rs",
+        ],
     ),
     // The sandbox hands a hook of tests on, in debug builds.
     ("std::env", &["cli", "config", "main.rs", "telemetry", "sandbox/pool.rs"]),

@@ -266,14 +266,17 @@ fn capabilities_and_keys_know_of_meshes() {
 }
 
 #[test]
-fn a_key_deletes_its_own_meshes_and_sees_its_own_jobs() {
+fn a_key_sees_its_own_meshes_and_jobs() {
     let mut command = meshsnap();
     command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu"]).env("MESHSNAP_API_KEYS", "one,two");
     let server = Server::start_with(&mut command);
     let [one, two] = ["one", "two"].map(|key| format!("Authorization: Bearer {key}"));
     let mesh = server.request("POST", "/v1/meshes", &[&one], CUBE_OBJ).header("location").unwrap().to_owned();
+    for (method, path) in [("GET", mesh.clone()), ("DELETE", mesh.clone()), ("GET", format!("{mesh}/render.png"))] {
+        server.request(method, &path, &[&two], b"").problem(404, "mesh_unknown");
+    }
+    assert_eq!(server.request("POST", "/v1/meshes", &[&two], CUBE_OBJ).status, 201, "new to this key");
     assert_eq!(server.request("POST", "/v1/meshes", &[&two], CUBE_OBJ).status, 200, "known");
-    server.request("DELETE", &mesh, &[&two], b"").problem(403, "not_yours");
     assert_eq!(server.request("GET", &format!("{mesh}/render.png?size=16"), &[&two], b"").status, 200);
     let job = server.request("POST", "/v1/jobs?size=16", &[&one], CUBE_OBJ).header("location").unwrap().to_owned();
     for (method, path) in [("GET", job.clone()), ("DELETE", job.clone()), ("GET", format!("{job}/result"))] {
@@ -281,4 +284,6 @@ fn a_key_deletes_its_own_meshes_and_sees_its_own_jobs() {
     }
     assert_eq!(server.request("GET", &job, &[&one, "Prefer: wait=30"], b"").json()["state"], "done");
     assert_eq!(server.request("DELETE", &mesh, &[&one], b"").status, 204);
+    server.request("GET", &mesh, &[&one], b"").problem(404, "mesh_unknown");
+    assert_eq!(server.request("DELETE", &mesh, &[&two], b"").status, 204, "the other's is still there");
 }

@@ -84,7 +84,13 @@ impl Server {
             head += header;
             head += "\r\n";
         }
-        self.send(&(head + "\r\n"), body)
+        head += "\r\n";
+        if method == "HEAD" {
+            let mut stream = self.connect();
+            stream.write_all(head.as_bytes()).unwrap();
+            return Answer::read_header(&mut stream);
+        }
+        self.send(&head, body)
     }
 
     /// An open connection.
@@ -179,6 +185,17 @@ pub struct Answer {
 impl Answer {
     /// Reads one answer; the connection stays open if the server leaves it so.
     pub fn read(stream: &mut TcpStream) -> Self {
+        let mut answer = Self::read_header(stream);
+        if let Some(length) = answer.header("content-length") {
+            let mut body = vec![0; length.parse().unwrap()];
+            stream.read_exact(&mut body).unwrap();
+            answer.body = body;
+        }
+        answer
+    }
+
+    /// Reads the header alone, which is all that there is of an answer to HEAD.
+    pub fn read_header(stream: &mut TcpStream) -> Self {
         let mut bytes = Vec::new();
         let mut byte = [0];
         while !bytes.ends_with(b"\r\n\r\n") {
@@ -193,13 +210,7 @@ impl Answer {
         let status = lines.next().unwrap().split(' ').nth(1).unwrap().parse().unwrap();
         let pair = |line: &str| line.split_once(':').map(|(k, v)| (k.to_ascii_lowercase(), v.trim().to_owned()));
         let headers: Vec<_> = lines.map(|line| pair(line).unwrap()).collect();
-        let mut answer = Self { status, headers, body: Vec::new() };
-        if let Some(length) = answer.header("content-length") {
-            let mut body = vec![0; length.parse().unwrap()];
-            stream.read_exact(&mut body).unwrap();
-            answer.body = body;
-        }
-        answer
+        Self { status, headers, body: Vec::new() }
     }
 
     pub fn header(&self, name: &str) -> Option<&str> {

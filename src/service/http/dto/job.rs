@@ -23,6 +23,30 @@ pub struct JobDto {
     error: Option<JobErrorDto>,
 }
 
+/// The states of jobs that came in one form, in its order.
+#[derive(Serialize)]
+pub struct JobsDto {
+    /// The jobs.
+    pub jobs: Vec<JobOfMeshDto>,
+}
+
+/// The state of a job that came in a form with others.
+#[derive(Serialize)]
+pub struct JobOfMeshDto {
+    /// The name of its mesh in the form.
+    name: String,
+    /// The address of the job.
+    url: String,
+    job: JobDto,
+}
+
+impl JobOfMeshDto {
+    /// The state of the job of the mesh with this name.
+    pub fn new(name: String, job: &Job) -> Self {
+        Self { name, url: format!("/v1/jobs/{}", job.id), job: JobDto::new(job) }
+    }
+}
+
 /// The result of a job that is done.
 #[derive(Serialize)]
 struct ResultDto {

@@ -5,7 +5,7 @@ mod capabilities;
 mod job;
 
 pub use capabilities::CapabilitiesDto;
-pub use job::JobDto;
+pub use job::{JobDto, JobOfMeshDto, JobsDto};
 
 use serde::Serialize;
 

@@ -12,12 +12,13 @@ use axum::http::{HeaderMap, HeaderName, Method, header};
 use axum::middleware::Next;
 use axum::response::Response;
 
+use super::cors;
 use crate::service::http::error::{ApiError, Fault};
 use crate::service::http::state::AppState;
 
 /// Refuses what a page of another site makes a browser send.
 pub async fn check(State(state): State<Arc<AppState>>, request: Request, next: Next) -> Result<Response, ApiError> {
-    if state.is_local && state.api_keys.is_empty() {
+    if state.is_local && state.keys.current().is_empty() {
         // HTTP/2 has the host in the URI.
         let host = request.uri().authority().map(|authority| authority.as_str().to_owned());
         let host = host.or_else(|| text(request.headers(), &header::HOST).map(str::to_owned));
@@ -30,20 +31,25 @@ pub async fn check(State(state): State<Arc<AppState>>, request: Request, next: N
             return Err(ApiError::new(Fault::Forbidden, "foreign_host", detail));
         }
         let is_reading = [Method::GET, Method::HEAD, Method::OPTIONS].contains(request.method());
-        if !is_reading && is_cross_site(request.headers()) {
-            let detail = "a page of another site sends this request; give the server API keys if it should";
-            return Err(ApiError::new(Fault::Forbidden, "cross_site", detail));
+        if !is_reading && is_cross_site(request.headers(), &state.cors_origins) {
+            let detail = "a page of another site sends this request; name its origin in --cors-origins, or give the server API \
+                          keys, if it should";
+            return Err(ApiError::new(Fault::Forbidden, "cross_site", detail).flag("--cors-origins"));
         }
     }
     Ok(next.run(request).await)
 }
 
 /// True for a browser's request that a page of another site has made.
-fn is_cross_site(headers: &HeaderMap) -> bool {
+fn is_cross_site(headers: &HeaderMap, allowed: &[String]) -> bool {
+    let origin = text(headers, &header::ORIGIN);
+    if origin.is_some_and(|origin| cors::is_allowed(allowed, origin)) {
+        return false;
+    }
     if text(headers, &HeaderName::from_static("sec-fetch-site")).is_some_and(|site| site == "cross-site") {
         return true;
     }
-    match text(headers, &header::ORIGIN) {
+    match origin {
         // A page without an origin, such as a file or a frame in a sandbox, is foreign.
         Some("null") => true,
         Some(origin) => !origin.split_once("://").is_some_and(|(_, host)| is_local(host)),
@@ -95,7 +101,10 @@ mod tests {
             let mut headers = HeaderMap::new();
             headers.extend(origin.map(|origin| (header::ORIGIN, origin.parse().unwrap())));
             headers.extend(site.map(|site| (HeaderName::from_static("sec-fetch-site"), site.parse().unwrap())));
-            assert_eq!(is_cross_site(&headers), expected, "{origin:?} {site:?}");
+            assert_eq!(is_cross_site(&headers, &[]), expected, "{origin:?} {site:?}");
+            let is_named = origin == Some("https://evil.example");
+            let named = ["https://evil.example".to_owned()];
+            assert_eq!(is_cross_site(&headers, &named), expected && !is_named, "{origin:?} {site:?}");
         }
     }
 }

@@ -11,7 +11,7 @@ use futures_util::{Stream, StreamExt as _, stream};
 use crate::import::{Bundle, BundleFile};
 use crate::limits;
 use crate::service::http::error::{ApiError, Fault};
-use crate::service::jobs::{Reservation, UploadBudget};
+use crate::service::jobs::{Refusal, Reservation, UploadBudget};
 
 /// Most bytes between two parts of a form: boundary and headers. The parser searches them from the
 /// start with every chunk that arrives, so that their cost grows with the square.
@@ -23,7 +23,7 @@ const STALL: Duration = Duration::from_secs(2);
 /// The content of a body.
 #[derive(Debug)]
 pub struct Upload {
-    /// The mesh and the files beside it.
+    /// The mesh and the files beside it; of [`BodyKind::Meshes`], each file is a mesh of its own.
     pub bundle: Bundle,
     /// The kind of body that it came in.
     pub kind: BodyKind,
@@ -40,8 +40,10 @@ pub enum BodyKind {
     Raw,
     /// The bytes of a zip archive.
     Archive,
-    /// A form with files.
+    /// A form with files of one mesh.
     Form,
+    /// A form with several meshes, for a job each.
+    Meshes,
 }
 
 /// The limits within which a body is read.
@@ -50,6 +52,8 @@ pub struct BodyLimits<'a> {
     pub bytes: u64,
     /// Most files in a form.
     pub files: u64,
+    /// Most meshes in a form, each for a job of its own. None: such forms are not taken here.
+    pub meshes: Option<u64>,
     /// Longest time for the whole body.
     pub time: Duration,
     /// The memory that all uploads share.
@@ -96,7 +100,8 @@ pub async fn read(request: Request, limits: BodyLimits<'_>) -> Result<Upload, Ap
         let meter = Meter::new(limits.bytes, limits.upload_budget);
         let chunks = metered(body, meter.clone());
         if is_multipart(&parts.headers) {
-            read_form(Request::from_parts(parts, Body::from_stream(chunks)), &meter, limits.files).await
+            let most = (limits.files, limits.meshes);
+            read_form(Request::from_parts(parts, Body::from_stream(chunks)), &meter, most).await
         } else {
             let is_zip = has_media_type(&parts.headers, "application/zip");
             let bytes = read_whole(chunks, &meter).await?;
@@ -121,18 +126,48 @@ async fn read_whole(chunks: impl Stream<Item = Result<Bytes, Interrupted>>, mete
     Ok(bytes.into())
 }
 
-async fn read_form(request: Request, meter: &Meter, files_max: u64) -> Result<Upload, ApiError> {
+async fn read_form(
+    request: Request,
+    meter: &Meter,
+    (files_max, meshes_max): (u64, Option<u64>),
+) -> Result<Upload, ApiError> {
     let broken = |error: axum::extract::multipart::MultipartError| {
         meter.error_or(|| bad_form(format!("the form cannot be read: {}", error.body_text())))
     };
     let mut form = Multipart::from_request(request, &()).await.map_err(|e| bad_form(e.body_text()))?;
     let (mut files, mut document): (Vec<BundleFile>, _) = (Vec::new(), None);
+    // Known from the first file on.
+    let mut kind = None;
     loop {
         meter.set_between_parts(true);
         let Some(field) = form.next_field().await.map_err(broken)? else { break };
         meter.set_between_parts(false);
         match field.name().unwrap_or_default() {
+            part @ ("file" | "mesh") if kind.is_some_and(|kind| kind != kind_of(part)) => {
+                return Err(bad_form(format!(
+                    "the form has a `{part}` part beside others; `file` parts are one mesh, `mesh` parts are a job each, \
+                     and a mesh with files beside it is sent as a zip"
+                )));
+            }
+            "mesh" => {
+                let Some(most) = meshes_max else {
+                    let detail =
+                        "`mesh` parts are a job each, which POST /v1/jobs takes; here the mesh is a `file` part";
+                    return Err(bad_form(detail));
+                };
+                kind = Some(BodyKind::Meshes);
+                let count = files.len() as u64 + 1;
+                if count > most {
+                    return Err(ApiError::from(Refusal::TooMany { most }));
+                }
+                let unnamed = format!("mesh {count}");
+                let name = field.file_name().filter(|name| !name.is_empty()).unwrap_or(&unnamed);
+                let mut file = BundleFile::new(name, Bytes::new()).map_err(|error| bad_form(error.to_string()))?;
+                file.bytes = field.bytes().await.map_err(broken)?;
+                files.push(file);
+            }
             "file" => {
+                kind = Some(BodyKind::Form);
                 let count = files.len() as u64 + 1;
                 limits::check("the number of files in the form", count, files_max, "--limit-bundle-entries")
                     .map_err(|limit| ApiError::from(&limit))?;
@@ -148,15 +183,21 @@ async fn read_form(request: Request, meter: &Meter, files_max: u64) -> Result<Up
             "request" => document = Some(field.bytes().await.map_err(broken)?),
             other => {
                 let name: String = other.chars().take(40).collect();
-                return Err(bad_form(format!("a form part is named {name:?}, and allowed are `file` and `request`")));
+                return Err(bad_form(format!(
+                    "a form part is named {name:?}, and allowed are `file`, `mesh` and `request`"
+                )));
             }
         }
     }
-    if files.is_empty() {
+    let Some(kind) = kind else {
         return Err(bad_form("the form has no `file` part; send the mesh as one"));
-    }
+    };
     let bundle = Bundle::of_files(files);
-    Ok(Upload { bundle, kind: BodyKind::Form, document, reservation: meter.take_reservation() })
+    Ok(Upload { bundle, kind, document, reservation: meter.take_reservation() })
+}
+
+fn kind_of(part: &str) -> BodyKind {
+    if part == "mesh" { BodyKind::Meshes } else { BodyKind::Form }
 }
 
 /// A file without bytes, under the name that its part gives. The first part needs no name.

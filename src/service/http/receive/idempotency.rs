@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use axum::http::{HeaderMap, HeaderName};
 
-use super::body::Upload;
+use super::body::{BodyKind, Upload};
 use super::query::Query;
+use crate::import::BundleFile;
 use crate::service::digest::Digest;
 use crate::service::http::dto::media_type;
 use crate::service::http::error::{ApiError, Fault};
@@ -43,12 +44,8 @@ pub fn name_of(headers: &HeaderMap, owner: &Owner) -> Result<Option<ClaimName>, 
 }
 
 /// Finds out whether a request was sent before under its name.
-pub async fn check(
-    state: &AppState,
-    name: &ClaimName,
-    (query, upload, headers): (&Query, &Upload, &HeaderMap),
-) -> Result<Sent, ApiError> {
-    match state.jobs.claim(name, digest(query, upload, headers).await?) {
+pub fn check(state: &AppState, name: &ClaimName, request: Digest) -> Result<Sent, ApiError> {
+    match state.jobs.claim(name, request) {
         Named::New(claim) => Ok(Sent::First(claim)),
         Named::Known(job) => Ok(Sent::Again(job)),
         Named::Pending => {
@@ -64,15 +61,31 @@ pub async fn check(
     }
 }
 
+/// The name of one mesh of a form that brings several: the first has the name of the request itself, so that this stands
+/// for the form. Keys have no spaces in them, so that no other request has such a name.
+pub fn name_of_mesh(name: &ClaimName, index: usize) -> ClaimName {
+    let key = if index == 0 { name.key.clone() } else { format!("{} {index}", name.key).into() };
+    ClaimName { owner: name.owner.clone(), key }
+}
+
 /// The digest of all that makes a job: files, query, document, and the picture's format if `Accept` decides it.
-async fn digest(query: &Query, upload: &Upload, headers: &HeaderMap) -> Result<Digest, ApiError> {
-    let bundle = upload.bundle.clone();
+pub async fn digest(query: &Query, upload: &Upload, headers: &HeaderMap) -> Result<Digest, ApiError> {
+    let (bundle, kind) = (upload.bundle.clone(), upload.kind);
     // A large body takes a while.
-    let hashing = tokio::task::spawn_blocking(move || Digest::of_files(bundle.files()));
-    let files = hashing.await.map_err(|_| ApiError::internal())?.to_string();
+    let hashing = tokio::task::spawn_blocking(move || match kind {
+        BodyKind::Meshes => of_meshes(bundle.files()),
+        BodyKind::Raw | BodyKind::Archive | BodyKind::Form => Digest::of_files(bundle.files()).to_string(),
+    });
+    let files = hashing.await.map_err(|_| ApiError::internal())?;
     let document = upload.document.as_deref().map(|document| Digest::of(document).to_string());
     let format_in = query.reading.format_in.map(|format| format.name());
     let accepted = negotiate::image_format(None, headers).ok().map(media_type);
     let parts = (files, upload.bundle.is_zip(), document, format_in, &query.reading.entry, &query.overrides, accepted);
     Ok(Digest::of(&serde_json::to_vec(&parts).map_err(|_| ApiError::internal())?))
+}
+
+/// The list of meshes that are a job each, in their order.
+fn of_meshes(files: &[BundleFile]) -> String {
+    let each = files.iter().map(|file| format!("mesh {} {:?}\n", Digest::of(&file.bytes), file.path));
+    each.collect()
 }

@@ -1,10 +1,12 @@
 //! From a request to work for a worker. The cheapest refusals come first.
 //!
-//! [`query`] reads the query, [`body`] the body within its limits. [`idempotency`] knows what is sent again.
+//! [`query`] reads the query, [`body`] the body within its limits. [`idempotency`] knows what is sent again. [`meshes`]
+//! makes a job of each mesh of a form.
 //! [`upload`] names what is to be stored.
 
 pub mod body;
 pub mod idempotency;
+pub mod meshes;
 pub mod query;
 pub mod upload;
 
@@ -15,6 +17,7 @@ use axum::http::HeaderMap;
 
 use self::body::{BodyKind, BodyLimits, Upload};
 use self::idempotency::Sent;
+use self::meshes::MeshOfForm;
 use self::query::Query;
 use super::address::{Address, render_key};
 use super::error::ApiError;
@@ -24,7 +27,8 @@ use super::{negotiate, stored_mesh};
 use crate::limits::Limits;
 use crate::request;
 use crate::service::digest::Digest;
-use crate::service::jobs::{Class, Job, Owner, Recipe, Task, Work};
+use crate::service::jobs::{ClaimName, Class, Job, Owner, Recipe, Task, Work};
+use crate::service::keys::Access;
 use crate::service::store::Reading;
 use crate::spec::Spec;
 
@@ -38,6 +42,8 @@ pub enum Reception {
     New(Box<Received>),
     /// One that was accepted before, as this job.
     Known(Arc<Job>),
+    /// A form with several meshes, for a job each.
+    Many(Vec<MeshOfForm>),
 }
 
 /// A request for a picture that was found valid.
@@ -52,13 +58,21 @@ pub struct Received {
     pub is_negotiated: bool,
 }
 
+/// The party that sends a request, and the names of the request.
+pub struct Sender {
+    owner: Owner,
+    request_id: Arc<str>,
+    /// The name that the client gave it, and its digest.
+    named: Option<(ClaimName, Digest)>,
+}
+
 /// Reads a request for a picture. Every fault that shows without reading the mesh is found here,
 /// before it takes a worker's time. A request for a job may have been accepted before.
 pub async fn receive(state: &AppState, request: Request, class: Class) -> Result<Reception, ApiError> {
-    let (owner, request_id) = (owner_of(&request), observe::id_of(&request));
+    let (access, request_id) = (access_of(&request), observe::id_of(&request));
     body::check_header(request.headers(), state.rules.limits.body_bytes)?;
     let query = Query::read(request.uri(), &state.rules)?;
-    let name = if class == Class::Batch { idempotency::name_of(request.headers(), &owner)? } else { None };
+    let name = if class == Class::Batch { idempotency::name_of(request.headers(), &access.owner)? } else { None };
     // Forms and JSON may bring a document. Of every other request, the query is the whole document
     // and is checked before the upload.
     if !body::is_multipart(request.headers()) && !body::is_json(request.headers()) {
@@ -70,25 +84,41 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     // Nor does a request that was accepted before.
     let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
     if !is_short_json && !is_sent_again {
-        state.jobs.would_accept(class, &owner)?;
+        state.jobs.would_accept(class, &access.owner)?;
     }
 
     let headers = request.headers().clone();
-    let upload = read_upload(state, request).await?;
-    let claim = match &name {
-        Some(name) => match idempotency::check(state, name, (&query, &upload, &headers)).await? {
+    let meshes = (class == Class::Batch).then(|| state.jobs.accepted_max() as u64);
+    let upload = read_body(state, request, meshes).await?;
+    let digest = match &name {
+        Some(_) => Some(idempotency::digest(&query, &upload, &headers).await?),
+        None => None,
+    };
+    let named = name.zip(digest);
+    if upload.kind == BodyKind::Meshes {
+        return meshes::understand(state, query, upload, &headers, &Sender { owner: access.owner, request_id, named })
+            .map(Reception::Many);
+    }
+    let claim = match &named {
+        Some((name, digest)) => match idempotency::check(state, name, *digest)? {
             Sent::First(claim) => Some(claim),
             Sent::Again(job) => return Ok(Reception::Known(job)),
         },
         None => None,
     };
-    let mut received = understand(state, query, upload, &headers)?;
-    received.work = Work { owner, request_id, claim, ..received.work };
+    let mut received = understand(state, query, upload, &headers, &access)?;
+    received.work = Work { owner: access.owner, request_id, claim, ..received.work };
     Ok(Reception::New(Box::new(received)))
 }
 
 /// Reads the document of a request, and finds the mesh that it names.
-fn understand(state: &AppState, query: Query, upload: Upload, headers: &HeaderMap) -> Result<Received, ApiError> {
+fn understand(
+    state: &AppState,
+    query: Query,
+    upload: Upload,
+    headers: &HeaderMap,
+    access: &Access,
+) -> Result<Received, ApiError> {
     let Query { reading, overrides } = query;
     let mut is_negotiated = false;
     let mut with_format = |mut spec: Spec| {
@@ -101,7 +131,7 @@ fn understand(state: &AppState, query: Query, upload: Upload, headers: &HeaderMa
         let (name, spec) = request::read_with_mesh(document, &overrides, &state.rules)?;
         let digest = Digest::parse(&name).ok_or_else(|| request::bad_mesh_name(&name))?;
         let spec = with_format(spec)?;
-        let stored = stored_mesh::find(state, Some(&name))?;
+        let stored = stored_mesh::find(state, Some(&name), access)?;
         let key = Some(render_key(state, digest, &reading, &spec));
         let keys = request::all_dotted(document, &overrides, &spec, &state.rules);
         let address = keys.and_then(|keys| Address::new(state, digest, &reading, &spec, &keys));
@@ -118,9 +148,9 @@ fn understand(state: &AppState, query: Query, upload: Upload, headers: &HeaderMa
     Ok(Received { work, key: None, address: None, is_negotiated })
 }
 
-/// The party that sends a request.
-pub fn owner_of(request: &Request) -> Owner {
-    request.extensions().get::<Owner>().cloned().unwrap_or_default()
+/// What the sender of a request sees.
+pub fn access_of(request: &Request) -> Access {
+    request.extensions().get::<Access>().cloned().unwrap_or_default()
 }
 
 /// The body, if it is a request document that names a stored mesh. A request with `format_in` has a
@@ -131,9 +161,13 @@ fn document_of<'u>(upload: &'u Upload, reading: &Reading, headers: &HeaderMap) -
     (request::names_mesh(body) || is_faulty()).then_some(body)
 }
 
-/// Reads a body within this server's limits.
+/// Reads a body that brings one mesh, within this server's limits.
 pub async fn read_upload(state: &AppState, request: Request) -> Result<Upload, ApiError> {
+    read_body(state, request, None).await
+}
+
+async fn read_body(state: &AppState, request: Request, meshes: Option<u64>) -> Result<Upload, ApiError> {
     let Limits { body_bytes: bytes, bundle_entries: files, .. } = state.rules.limits;
-    let limits = BodyLimits { bytes, files, time: state.body_timeout, upload_budget: &state.upload_budget };
+    let limits = BodyLimits { bytes, files, meshes, time: state.body_timeout, upload_budget: &state.upload_budget };
     body::read(request, limits).await
 }

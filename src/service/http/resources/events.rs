@@ -20,7 +20,8 @@ use crate::service::http::dto::JobDto;
 use crate::service::http::error::ApiError;
 use crate::service::http::event_streams::Place;
 use crate::service::http::state::AppState;
-use crate::service::jobs::{Job, JobState, Owner, Progress, Step};
+use crate::service::jobs::{Job, JobState, Progress, Step};
+use crate::service::keys::Access;
 
 /// Time without an event after which a comment is sent, so that proxies keep the connection open.
 const KEEP_ALIVE: Duration = Duration::from_secs(10);
@@ -55,17 +56,17 @@ struct Following {
 /// upon which browsers ask no more.
 pub async fn get(
     State(state): State<Arc<AppState>>,
-    Extension(owner): Extension<Owner>,
+    Extension(access): Extension<Access>,
     client: Option<Extension<ConnectInfo<Client>>>,
     id: PathName,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let job = jobs::find(&state, &owner, id)?;
+    let job = jobs::find(&state, &access, id)?;
     let seen = headers.get(LAST_EVENT_ID).and_then(|id| id.to_str().ok()).map_or(Seen::Nothing, seen);
     if seen == Seen::End && job.state().is_final() {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    let place = state.event_streams.open(&owner)?;
+    let place = state.event_streams.open(&access.owner)?;
     let (states, progress) = job.watch();
     let busy = client.map(|Extension(ConnectInfo(client))| client.activity.begin());
     let following = Following { state, job, states, progress, seen, ready: VecDeque::new(), place, _busy: busy };

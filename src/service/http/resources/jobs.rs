@@ -1,36 +1,59 @@
 //! `/v1/jobs`: pictures that are fetched later.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use axum::extract::{Extension, Request, State};
-use axum::http::HeaderMap;
-use axum::response::Response;
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse as _, Response};
 
 use super::{PathName, responses, run, text_of};
+use crate::service::http::dto::{JobOfMeshDto, JobsDto};
 use crate::service::http::error::{ApiError, Fault};
 use crate::service::http::negotiate;
+use crate::service::http::receive::meshes::MeshOfForm;
 use crate::service::http::receive::{self, Reception};
 use crate::service::http::state::AppState;
-use crate::service::jobs::{Class, Job, JobId, JobState, Owner};
+use crate::service::jobs::{Class, Job, JobId, JobState};
+use crate::service::keys::Access;
 
-/// Accepts a job, always with 202. A request that is sent again under its `Idempotency-Key` gets the job that it has.
+/// Accepts a job, or one for each `mesh` part of a form, always with 202. A request that is sent again under its `Idempotency-Key` gets the job that it has.
 pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
-    let job = match receive::receive(&state, request, Class::Batch).await? {
-        Reception::New(received) => state.jobs.accept(received.work).await?,
-        Reception::Known(job) => job,
-    };
-    Ok(responses::accepted(&job))
+    match receive::receive(&state, request, Class::Batch).await? {
+        Reception::New(received) => Ok(responses::accepted(&*state.jobs.accept(received.work).await?)),
+        Reception::Known(job) => Ok(responses::accepted(&job)),
+        Reception::Many(meshes) => accept_all(&state, meshes).await,
+    }
+}
+
+/// Accepts a job for each mesh of a form that has none: all of them or, with an error, none.
+pub(super) async fn accept_all(state: &AppState, meshes: Vec<MeshOfForm>) -> Result<Response, ApiError> {
+    let (mut names, mut works, mut known) = (Vec::new(), Vec::new(), HashMap::new());
+    for (index, mesh) in meshes.into_iter().enumerate() {
+        names.push(mesh.name);
+        match mesh.job {
+            Ok(job) => _ = known.insert(index, job),
+            Err(work) => works.push(*work),
+        }
+    }
+    let mut accepted = state.jobs.accept_all(works).await?.into_iter();
+    let jobs = names.into_iter().enumerate().filter_map(|(index, name)| {
+        let job = known.remove(&index).or_else(|| accepted.next())?;
+        Some(JobOfMeshDto::new(name, &job))
+    });
+    let body = JobsDto { jobs: jobs.collect() };
+    Ok((StatusCode::ACCEPTED, responses::uncached(body)).into_response())
 }
 
 /// The job's state. With `Prefer: wait=N`, the answer comes when the job has ended or after N
 /// seconds.
 pub async fn get(
     State(state): State<Arc<AppState>>,
-    Extension(owner): Extension<Owner>,
+    Extension(access): Extension<Access>,
     id: PathName,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let job = find(&state, &owner, id)?;
+    let job = find(&state, &access, id)?;
     let wait = negotiate::prefer(&headers).wait;
     if let Some(wait) = wait {
         // A timeout is no error: the answer then says that the job has not ended.
@@ -49,10 +72,10 @@ pub async fn get(
 /// Cancels a job that has not ended, or forgets one that has, and answers with its state.
 pub async fn delete(
     State(state): State<Arc<AppState>>,
-    Extension(owner): Extension<Owner>,
+    Extension(access): Extension<Access>,
     id: PathName,
 ) -> Result<Response, ApiError> {
-    let job = find(&state, &owner, id)?;
+    let job = find(&state, &access, id)?;
     if job.state().is_final() {
         state.jobs.forget(&job);
     } else {
@@ -66,10 +89,10 @@ pub async fn delete(
 /// The picture, or the error that a waiting client would have got.
 pub async fn result(
     State(state): State<Arc<AppState>>,
-    Extension(owner): Extension<Owner>,
+    Extension(access): Extension<Access>,
     id: PathName,
 ) -> Result<Response, ApiError> {
-    let job = find(&state, &owner, id)?;
+    let job = find(&state, &access, id)?;
     let conflict = |code, detail| ApiError::new(Fault::Conflict, code, detail);
     let ended = job.state();
     if ended.is_final() {
@@ -87,9 +110,9 @@ pub async fn result(
     }
 }
 
-/// The job, if it is this client's. Addresses are no identity: without keys, who knows the id may have it.
-pub(super) fn find(state: &AppState, owner: &Owner, id: PathName) -> Result<Arc<Job>, ApiError> {
+/// The job, if this client sees it. Addresses are no identity: without keys, who knows the id may have it.
+pub(super) fn find(state: &AppState, access: &Access, id: PathName) -> Result<Arc<Job>, ApiError> {
     let job = text_of(id).and_then(|id| JobId::parse(&id)).and_then(|id| state.jobs.find(id));
-    let job = job.filter(|job| state.api_keys.is_empty() || job.owner == *owner);
+    let job = job.filter(|job| access.sees(&job.owner));
     job.ok_or_else(|| ApiError::not_found("there is no such job, or its result has expired"))
 }

@@ -23,7 +23,8 @@ use crate::service::http::receive::{self, body};
 use crate::service::http::state::AppState;
 use crate::service::http::stored_mesh;
 use crate::service::jobs::{Class, Owner, Task, Work};
-use crate::service::store::{NewMesh, Reading};
+use crate::service::keys::Access;
+use crate::service::store::{NewMesh, Reading, Removed};
 
 /// Stores a mesh under its digest.
 pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
@@ -39,16 +40,16 @@ pub async fn put(State(state): State<Arc<AppState>>, id: PathName, request: Requ
 /// The report on a mesh. HEAD tells whether the mesh is stored.
 pub async fn get(
     State(state): State<Arc<AppState>>,
-    Extension(owner): Extension<Owner>,
+    Extension(access): Extension<Access>,
     id: PathName,
     method: Method,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let (reading, time_s) = Query::read_for_report(&uri, &state.rules)?;
-    let stored = stored_mesh::find(&state, text_of(id).as_deref())?;
+    let stored = stored_mesh::find(&state, text_of(id).as_deref(), &access)?;
     let tag = report_tag(stored.mesh.digest, &reading, time_s);
-    let cached = [conditional::etag(&tag), conditional::cache_for_a_day(!state.api_keys.is_empty())];
+    let cached = [conditional::etag(&tag), conditional::cache_for_a_day(!access.is_open())];
     if conditional::is_known(&headers, &tag) {
         return Ok((StatusCode::NOT_MODIFIED, cached).into_response());
     }
@@ -57,31 +58,27 @@ pub async fn get(
     } else if method == Method::HEAD {
         responses::body_of_unknown_length()
     } else {
-        let work = Work { owner, ..stored_mesh::work_on(&stored, reading, Task::Inspect { time_s }) };
+        let work = Work { owner: access.owner, ..stored_mesh::work_on(&stored, reading, Task::Inspect { time_s }) };
         Body::from(run::inspect(&state, work).await?)
     };
     let media_type = [(header::CONTENT_TYPE, HeaderValue::from_static("application/json"))];
     Ok((cached, media_type, body).into_response())
 }
 
-/// Removes a mesh. Jobs that already draw it go on.
+/// Removes a mesh; other keys that have stored it keep it. Jobs that already draw it go on.
 pub async fn delete(
     State(state): State<Arc<AppState>>,
-    Extension(owner): Extension<Owner>,
+    Extension(access): Extension<Access>,
     id: PathName,
 ) -> Result<Response, ApiError> {
     let digest = stored_mesh::digest(text_of(id).as_deref())?;
-    // Addresses are no identity: without keys, everybody may.
-    if !state.api_keys.is_empty() && state.meshes.find(digest).is_some_and(|stored| stored.mesh.owner != owner) {
-        let detail = "another API key has stored this mesh, so that it alone may delete it";
-        return Err(ApiError::new(Fault::Forbidden, "not_yours", detail));
-    }
-    match state.meshes.remove(digest) {
-        true => {
+    match state.meshes.remove(digest, &access) {
+        Removed::Gone => {
             state.residents.forget(&digest.to_string());
             Ok(StatusCode::NO_CONTENT.into_response())
         }
-        false => Err(stored_mesh::unknown()),
+        Removed::OfOthers => Ok(StatusCode::NO_CONTENT.into_response()),
+        Removed::Unknown => Err(stored_mesh::unknown()),
     }
 }
 
@@ -93,8 +90,8 @@ async fn store(state: &AppState, request: Request, wanted: Option<Digest>) -> Re
     if let Some(length) = body::announced_length(headers).filter(|_| !body::is_multipart(headers)) {
         state.meshes.check_size(length)?;
     }
-    let owner = receive::owner_of(&request);
-    state.jobs.would_accept(Class::Interactive, &owner)?;
+    let access = receive::access_of(&request);
+    state.jobs.would_accept(Class::Interactive, &access.owner)?;
     let NamedUpload { digest, bundle, memory } = upload::name(receive::read_upload(state, request).await?).await?;
     if let Some(wanted) = wanted.filter(|wanted| *wanted != digest) {
         let detail = format!("the path says {wanted}, and the SHA-256 of what was sent is {digest}");
@@ -103,13 +100,15 @@ async fn store(state: &AppState, request: Request, wanted: Option<Digest>) -> Re
     state.meshes.check_size(bundle.bytes_len())?;
     let body = MeshDto::new(digest, &bundle);
     // A mesh that was read in this way before need not be read again.
-    let is_known = state.meshes.find(digest).is_some_and(|stored| stored.mesh.reading == reading);
+    let is_known = state.meshes.find(digest, &access).is_some_and(|stored| stored.mesh.reading == reading);
     let is_new = !is_known && {
         let task = Task::Inspect { time_s: None };
         let read = stored_mesh::work(bundle.clone(), reading.clone(), task, memory.clone());
-        let work = Work { owner: owner.clone(), ..read };
+        let work = Work { owner: access.owner.clone(), ..read };
         let report = run::inspect(state, work).await?;
-        insert(state, NewMesh { digest, bundle, reading, report, owner }).await?
+        // Addresses are no identity: without keys, a mesh is everybody's.
+        let owners = vec![if access.is_open() { Owner::default() } else { access.owner }];
+        insert(state, NewMesh { digest, bundle, reading, report, owners }).await?
     };
     let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
     let headers = [
@@ -137,7 +136,8 @@ async fn insert(state: &AppState, mesh: NewMesh) -> Result<bool, ApiError> {
         files: files.map(|(file, digest)| FileRecord { path: file.path.clone(), digest }).collect(),
         format_in: mesh.reading.format_in.map(|format| format.name().to_owned()),
         entry: mesh.reading.entry.clone(),
-        owner: mesh.owner.to_string(),
+        owner: mesh.owners.first().map(ToString::to_string).unwrap_or_default(),
+        later_owners: Vec::new(),
         report: Digest::of(&mesh.report),
     };
     durable.store(vec![Change::MeshStored(Box::new(record))], holds.clone()).await?;

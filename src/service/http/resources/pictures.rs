@@ -17,12 +17,13 @@ use crate::service::http::error::ApiError;
 use crate::service::http::receive::query::{Query, query_error};
 use crate::service::http::state::AppState;
 use crate::service::http::stored_mesh;
-use crate::service::jobs::{Owner, Task, Work};
+use crate::service::jobs::{Task, Work};
+use crate::service::keys::Access;
 
 /// Draws a stored mesh, unless the client has the picture. HEAD draws nothing.
 pub async fn get(
     State(state): State<Arc<AppState>>,
-    Extension(owner): Extension<Owner>,
+    Extension(access): Extension<Access>,
     path: Result<Path<(String, String)>, PathRejection>,
     method: Method,
     uri: Uri,
@@ -36,9 +37,9 @@ pub async fn get(
     let mut spec = request::read(None, &overrides, &state.rules).map_err(query_error)?;
     request::set_format(&mut spec, format);
 
-    let stored = stored_mesh::find(&state, path.as_ref().map(|(id, _)| id.as_str()))?;
+    let stored = stored_mesh::find(&state, path.as_ref().map(|(id, _)| id.as_str()), &access)?;
     let tag = render_key(&state, stored.mesh.digest, &reading, &spec);
-    let cached = [conditional::etag(&tag), conditional::cache_for_a_day(!state.api_keys.is_empty())];
+    let cached = [conditional::etag(&tag), conditional::cache_for_a_day(!access.is_open())];
     if conditional::is_known(&headers, &tag) {
         return Ok((StatusCode::NOT_MODIFIED, cached).into_response());
     }
@@ -48,7 +49,8 @@ pub async fn get(
     } else {
         // No work is made for a picture that is in memory.
         let drawing = async {
-            let work = Work { owner, ..stored_mesh::work_on(&stored, reading, Task::Draw(Box::new(spec))) };
+            let work =
+                Work { owner: access.owner, ..stored_mesh::work_on(&stored, reading, Task::Draw(Box::new(spec))) };
             run::draw(&state, work).await
         };
         let found = state.pictures.find(&tag, drawing).await?;

@@ -6,7 +6,7 @@ use axum::extract::{Request, State};
 use axum::http::{HeaderValue, header};
 use axum::response::Response;
 
-use super::{responses, run};
+use super::{jobs, responses, run};
 use crate::service::http::conditional;
 use crate::service::http::error::ApiError;
 use crate::service::http::negotiate;
@@ -21,6 +21,7 @@ pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Resul
     let received = match receive::receive(&state, request, class).await? {
         Reception::New(received) => *received,
         Reception::Known(job) => return Ok(accepted(&job)),
+        Reception::Many(meshes) => return Ok(applied(jobs::accept_all(&state, meshes).await?)),
     };
     let Received { work, key, address, is_negotiated } = received;
     if respond_async {
@@ -50,7 +51,10 @@ pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Resul
 }
 
 fn accepted(job: &Job) -> Response {
-    let mut response = responses::accepted(job);
+    applied(responses::accepted(job))
+}
+
+fn applied(mut response: Response) -> Response {
     responses::set_preference_applied(&mut response, "respond-async");
     response
 }

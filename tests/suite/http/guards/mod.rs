@@ -1,5 +1,9 @@
 //! Strangers at the door: pages that abuse a browser, clients that hold what others need, slips in settings, signals.
 
+mod cors;
+mod keys;
+mod rates;
+
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::process::Command;
@@ -47,7 +51,7 @@ fn an_answer_says_when_it_depends_on_accept() {
 
 #[test]
 fn keys_that_are_none_do_not_open_the_server() {
-    for keys in [" , ", ",", " "] {
+    for keys in [" , ", ",", " ", ""] {
         let output =
             meshsnap().args(["serve", "--listen", "127.0.0.1:0"]).env("MESHSNAP_API_KEYS", keys).output().unwrap();
         let sentence = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -195,7 +199,8 @@ fn a_signed_address_shows_its_picture_and_nothing_else() {
     let path = url.strip_prefix("http://pictures.example").unwrap();
     let signed = server.get(path);
     signed.picture(24, 24);
-    let keyed = server.request("GET", &plain, &["Authorization: Bearer one"], b"");
+    let keyed = server.request("GET", &plain, &["Authorization: Bearer two"], b"");
+    server.request("GET", &plain, &["Authorization: Bearer one"], b"").problem(404, "mesh_unknown");
     assert_eq!((&signed.body, signed.header("etag")), (&keyed.body, keyed.header("etag")), "the same address");
     assert_eq!(server.request("HEAD", path, &[], b"").status, 200);
     // Another picture, another path, another method, another key, another time.

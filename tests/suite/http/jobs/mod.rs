@@ -3,6 +3,7 @@
 mod durable;
 mod events;
 mod idempotency;
+mod several;
 
 use std::io::Write as _;
 use std::time::{Duration, Instant};
