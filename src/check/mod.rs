@@ -5,6 +5,7 @@
 //! Nothing here reads a file.
 
 mod judge;
+mod meaning;
 mod places;
 mod rule;
 #[cfg(test)]
@@ -13,6 +14,7 @@ mod uvs;
 mod volume;
 
 pub use judge::{Subject, check, unopened};
+pub use meaning::meaning;
 pub use rule::{Level, NAMES, Rule, RuleSet, UnknownRule};
 
 use serde::Serialize;

@@ -1,9 +1,8 @@
 //! `meshsnap check`: judges mesh files by rules.
 
 mod config;
-mod junit;
+mod reports;
 mod run;
-mod text;
 
 use std::path::PathBuf;
 
@@ -16,6 +15,7 @@ use crate::check::{NAMES, RuleSet};
 use crate::cli::error::CliError;
 use crate::import::Format;
 use config::Config;
+use reports::ReportArgs;
 use run::Run;
 
 /// Examples at the end of `--help`.
@@ -62,9 +62,8 @@ pub struct CheckArgs {
     /// text for people, jsonl: a verdict on each line
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t = Output::Text)]
     format: Output,
-    /// File for the verdicts as JUnit XML, too
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    junit: Option<String>,
+    #[command(flatten)]
+    reports: ReportArgs,
     /// Files that are read at once [default: one for each processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), value_hint = ValueHint::Other)]
     jobs: Option<u16>,

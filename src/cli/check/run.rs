@@ -9,12 +9,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 
 use super::config::Config;
-use super::{CheckArgs, Output, junit, text};
+use super::reports::{Findings, Reports, json_line, text};
+use super::{CheckArgs, Output};
 use crate::backend::cpu::DrawingThreads;
 use crate::check::{Verdict, unopened};
 use crate::cli::bundle::{self, comparable};
 use crate::cli::error::CliError;
-use crate::cli::output::{Destination, Inputs};
+use crate::cli::output::Inputs;
 use crate::cli::render::{Task, Tasks, format_in};
 use crate::cli::{files, siblings};
 use crate::config::cores;
@@ -54,8 +55,7 @@ impl<'a> Run<'a> {
 
     /// Judges all. Verdicts go to standard output, and last the count to standard error.
     pub fn all(&self) -> Result<(), CliError> {
-        let junit =
-            self.arguments.junit.as_deref().map(|name| self.destination(name).map(|at| (name, at))).transpose()?;
+        let reports = Reports::new(&self.arguments.reports, &self.inputs())?;
         let threads = self.arguments.jobs.map_or(cores() as usize, usize::from).min(self.tasks.all.len());
         let next = AtomicUsize::new(0);
         let (sender, outcomes) = channel();
@@ -75,14 +75,13 @@ impl<'a> Run<'a> {
             // Where nobody reads the verdicts, no more are made.
             self.print(&outcomes).inspect_err(|_| next.store(self.tasks.all.len(), Ordering::Relaxed))
         })?;
-        if let Some((name, destination)) = junit {
-            destination.write(name, junit::junit(&verdicts).as_bytes())?;
-        }
+        let findings = Findings { verdicts: &verdicts, lost };
+        reports.write(&findings)?;
         let used = self.used.lock().unwrap_or_else(PoisonError::into_inner);
         for name in self.tasks.companions.iter().filter(|name| !used.contains(&comparable(name))) {
             say!("meshsnap: {name}: is not used: no mesh refers to it");
         }
-        let failed = verdicts.iter().filter(|verdict| !verdict.ok).count() + lost;
+        let failed = findings.failed();
         say!("{} ok, {failed} failed", self.tasks.all.len() - failed);
         match failure {
             // The sentences are said already.
@@ -145,15 +144,12 @@ impl<'a> Run<'a> {
         Ok(Verdict::new(path.clone(), digest, vec![unopened(detail)]))
     }
 
-    /// The place of a report, which is none of the files that are read.
-    fn destination(&self, name: &str) -> Result<Destination, CliError> {
-        if name == "-" {
-            return Err(CliError::usage("--junit -: standard output has the verdicts; name a file"));
-        }
+    /// The files that are read, which no report may replace.
+    fn inputs(&self) -> Inputs {
         let meshes = self.tasks.all.iter().map(|task| task.mesh.as_str());
         let named = meshes.chain(self.tasks.companions.iter().map(String::as_str));
         let config = self.config.path().map(Path::to_string_lossy);
-        Destination::new(name, &Inputs::of(named.chain(config.as_deref())))
+        Inputs::of(named.chain(config.as_deref()))
     }
 
     /// Prints the verdicts in order. Returns them, the number of files without one by a fault of ours, and its
@@ -188,9 +184,7 @@ impl<'a> Run<'a> {
     fn show(&self, verdict: &Verdict) -> Result<String, CliError> {
         match self.arguments.format {
             Output::Text => Ok(text::text(verdict)),
-            Output::Jsonl => {
-                serde_json::to_string(verdict).map(|line| line + "\n").map_err(|e| CliError::ours(e.to_string()))
-            }
+            Output::Jsonl => json_line(verdict),
         }
     }
 }

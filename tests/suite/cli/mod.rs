@@ -6,4 +6,5 @@ pub mod commands;
 pub mod help;
 pub mod mistakes;
 pub mod outputs;
+pub mod reports;
 pub mod watch;
