@@ -8,6 +8,7 @@ use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 
+use super::baseline::Baseline;
 use super::config::Config;
 use super::reports::{Findings, Reports, json_line, text};
 use super::{CheckArgs, Output};
@@ -21,6 +22,7 @@ use crate::cli::{files, siblings};
 use crate::config::cores;
 use crate::limits::{Deadline, Limits};
 use crate::pipeline;
+use crate::pluralise::pluralise;
 use crate::service::digest::Digest;
 
 /// A mesh names a file, which names others.
@@ -32,6 +34,7 @@ pub struct Run<'a> {
     limits: Limits,
     config: Config,
     tasks: Tasks,
+    baseline: Option<Baseline>,
     /// The named files that are no meshes, by their absolute paths.
     named: BTreeSet<PathBuf>,
     /// Those of them that were used for some mesh.
@@ -47,10 +50,10 @@ struct Outcome {
 
 impl<'a> Run<'a> {
     /// The run of a command.
-    pub fn new(arguments: &'a CheckArgs, config: Config, tasks: Tasks) -> Self {
+    pub fn new(arguments: &'a CheckArgs, config: Config, tasks: Tasks, baseline: Option<Baseline>) -> Self {
         let named = tasks.companions.iter().map(comparable).collect();
         let limits = arguments.limits.config().limits;
-        Self { arguments, limits, config, tasks, named, used: Mutex::default() }
+        Self { arguments, limits, config, tasks, baseline, named, used: Mutex::default() }
     }
 
     /// Judges all. Verdicts go to standard output, and last the count to standard error.
@@ -78,11 +81,17 @@ impl<'a> Run<'a> {
         let findings = Findings { verdicts: &verdicts, lost };
         reports.write(&findings)?;
         let used = self.used.lock().unwrap_or_else(PoisonError::into_inner);
-        for name in self.tasks.companions.iter().filter(|name| !used.contains(&comparable(name))) {
+        // Of some meshes alone, it is not known what the others use.
+        let companions = self.tasks.companions.iter().filter(|_| !self.tasks.is_part);
+        for name in companions.filter(|name| !used.contains(&comparable(name))) {
             say!("meshsnap: {name}: is not used: no mesh refers to it");
         }
         let failed = findings.failed();
-        say!("{} ok, {failed} failed", self.tasks.all.len() - failed);
+        let known = match findings.known() {
+            0 => String::new(),
+            known => format!(", {}", pluralise(known, "known fault", "known faults")),
+        };
+        say!("{} ok, {failed} failed{known}", self.tasks.all.len() - failed);
         match failure {
             // The sentences are said already.
             Some(code) => Err(CliError::silent(code)),
@@ -97,10 +106,21 @@ impl<'a> Run<'a> {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(task) = self.tasks.all.get(number) else { break };
             let mut said = None;
-            let result = catch_unwind(AssertUnwindSafe(|| self.judge(task, &mut said)));
+            let result = catch_unwind(AssertUnwindSafe(|| self.judge_known(task, &mut said)));
             let bug = |_| Err(CliError::ours(format!("{}: this is a bug in meshsnap; please report it", task.mesh)));
             done(number, Outcome { said, result: result.unwrap_or_else(bug) });
         }
+    }
+
+    /// Judges one file, and marks what is known or accepts what there is.
+    fn judge_known(&self, task: &Task, said: &mut Option<String>) -> Result<Verdict, CliError> {
+        let mut verdict = self.judge(task, said)?;
+        match &self.baseline {
+            Some(baseline) if self.arguments.update => baseline.update(&mut verdict)?,
+            Some(baseline) => baseline.apply(&mut verdict)?,
+            None => {}
+        }
+        Ok(verdict)
     }
 
     /// Judges one file, with those that it turns out to refer to.

@@ -11,13 +11,14 @@ const RULES: &[&str] = &["--rules", "opens,watertight", "--warn", "max-triangles
 #[test]
 fn several_reports_of_one_run_have_the_same_bytes_each_time() {
     let folder = folder();
-    let files = ["--junit", "a.xml", "--sarif", "a.sarif", "--markdown", "a.md", "--jsonl", "a.jsonl"];
+    let files =
+        ["--junit", "a.xml", "--sarif", "a.sarif", "--markdown", "a.md", "--jsonl", "a.jsonl", "--html", "a.html"];
     let run = |jobs: &str| {
         let words = [&["parts", "broken.stl", "--format", "jsonl", "--jobs", jobs], RULES, &files].concat();
         let (code, out, said) = check(folder.path(), &words);
         assert_eq!(code, Some(1), "{said}");
         let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
-        (out, ["a.xml", "a.sarif", "a.md", "a.jsonl"].map(read))
+        (out, ["a.xml", "a.sarif", "a.md", "a.jsonl", "a.html"].map(read))
     };
     let (out, reports) = run("1");
     assert!(reports.iter().all(|report| report.contains("parts/hole.obj")), "{reports:?}");
@@ -93,7 +94,7 @@ fn markdown_is_a_table_of_the_faults() {
 fn a_report_replaces_no_input_and_no_other_report() {
     let folder = folder();
     fs::write(folder.path().join("meshsnap.toml"), "[check]\nrules = [\"opens\"]\n").unwrap();
-    for flag in ["--junit", "--sarif", "--markdown", "--jsonl"] {
+    for flag in ["--junit", "--sarif", "--markdown", "--html", "--jsonl"] {
         for (name, part) in [
             ("parts/good.obj", "inputs are never written over"),
             ("parts/../meshsnap.toml", "inputs are never written over"),
@@ -107,4 +108,30 @@ fn a_report_replaces_no_input_and_no_other_report() {
     let (code, _, said) = check(folder.path(), &["parts", "--junit", "a", "--sarif", "./parts/../a"]);
     assert!(code == Some(2) && said.contains("another report goes to this file"), "{said}");
     assert!(!folder.path().join("a").exists());
+}
+
+#[test]
+fn the_page_has_a_row_for_each_file_and_loads_nothing() {
+    let folder = folder();
+    let evil = "<img src=x onerror=alert(1)>\u{202e}.obj";
+    fs::write(folder.path().join("parts").join(evil), b"v 0 0 0").unwrap();
+    let words = [&["parts", "--html", "a.html"], RULES].concat();
+    assert_eq!(check(folder.path(), &words).0, Some(1));
+    let page = fs::read_to_string(folder.path().join("a.html")).unwrap();
+    assert!(page.starts_with("<!DOCTYPE html>\n<html lang=\"en\">") && page.ends_with("</html>\n"));
+    let states: Vec<&str> =
+        page.split("<tr data-state=\"").skip(1).map(|rest| rest.split('"').next().unwrap_or_default()).collect();
+    assert_eq!(states, ["error", "warning", "error"]);
+    assert!(
+        page.contains("<h1>meshsnap check: 2 of 3 files failed</h1>\n<p>2 faults, 2 warnings, 0 known faults</p>"),
+        "{page}"
+    );
+    assert!(page.contains("4 open edges in 1 loop<details><summary>4 places</summary><ol><li>(-1, "), "{page}");
+    // A name is a text, whatever it says.
+    assert!(!page.contains("<img") && !page.contains('\u{202e}'), "{page}");
+    assert!(page.contains("parts/&lt;img src=x onerror=alert(1)&gt;\u{fffd}.obj"), "{page}");
+    for loads in ["src=\"", "href=", "url(", "@import", "http:", "https:", "fetch("] {
+        assert!(!page.contains(loads), "{loads}");
+    }
+    assert!(page.contains("default-src 'none'"));
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::text::at;
-use super::{Findings, faults, word};
+use super::{Findings, faults, is_invisible, word};
 use crate::check::{Check, Verdict};
 use crate::pluralise::pluralise;
 
@@ -21,6 +21,10 @@ pub fn markdown(findings: &Findings<'_>) -> String {
         0 => format!("### meshsnap check: {all} ok\n"),
         failed => format!("### meshsnap check: {failed} of {all} failed\n"),
     };
+    if findings.known() > 0 {
+        let known = pluralise(findings.known() as u64, "known fault fails", "known faults fail");
+        let _ = writeln!(text, "\n{known} nothing.");
+    }
     let is_failed = |verdict: &&Verdict| !verdict.ok;
     let (bad, good): (Vec<_>, Vec<_>) = findings.verdicts.iter().partition(is_failed);
     let rows: Vec<(&Verdict, &Check)> =
@@ -95,12 +99,6 @@ fn escaped(text: &str) -> String {
         }
     }
     out
-}
-
-/// Characters that take no place or change the direction of the text: they could make a name look like another.
-fn is_invisible(c: char) -> bool {
-    c.is_control()
-        || matches!(c, '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //!
 //! Equal verdicts make equal bytes: no report has a time, a duration or the name of the machine.
 
+mod html;
 mod junit;
 mod markdown;
 mod sarif;
@@ -25,6 +26,9 @@ pub struct ReportArgs {
     /// File for a table in Markdown, for a comment on a pull request, too
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     markdown: Option<String>,
+    /// File for the verdicts as one page that needs no network, too
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    html: Option<String>,
     /// File for the verdicts as JSON Lines, too
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     jsonl: Option<String>,
@@ -43,6 +47,11 @@ impl Findings<'_> {
     /// The number of files.
     fn files(&self) -> usize {
         self.verdicts.len() + self.lost
+    }
+
+    /// The number of accepted faults.
+    pub fn known(&self) -> usize {
+        self.verdicts.iter().flat_map(|verdict| &verdict.checks).filter(|check| check.known).count()
     }
 
     /// The number of files that are not ok.
@@ -66,11 +75,12 @@ struct Report {
 impl Reports {
     /// The reports that are asked for. None of them may be a file that is read, nor another report.
     pub fn new(arguments: &ReportArgs, inputs: &Inputs) -> Result<Self, CliError> {
-        let ReportArgs { junit, sarif, markdown, jsonl } = arguments;
-        let kinds: [(&str, &Option<String>, Write); 4] = [
+        let ReportArgs { junit, sarif, markdown, html, jsonl } = arguments;
+        let kinds: [(&str, &Option<String>, Write); 5] = [
             ("--junit", junit, |findings| Ok(junit::junit(findings.verdicts))),
             ("--sarif", sarif, sarif::sarif),
             ("--markdown", markdown, |findings| Ok(markdown::markdown(findings))),
+            ("--html", html, |findings| Ok(html::html(findings))),
             ("--jsonl", jsonl, |findings| findings.verdicts.iter().map(json_line).collect()),
         ];
         let mut reports: Vec<Report> = Vec::new();
@@ -105,6 +115,7 @@ pub fn json_line(verdict: &Verdict) -> Result<String, CliError> {
 /// The weight of a fault, in a word.
 fn word(check: &Check) -> &'static str {
     match check.level {
+        _ if check.known => "known",
         Level::Error => "error",
         Level::Warn => "warning",
     }
@@ -113,4 +124,10 @@ fn word(check: &Check) -> &'static str {
 /// The faults of a file.
 fn faults(verdict: &Verdict) -> impl Iterator<Item = &Check> {
     verdict.checks.iter().filter(|check| !check.ok)
+}
+
+/// Characters that take no place or change the direction of the text: they could make a name look like another.
+fn is_invisible(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
 }

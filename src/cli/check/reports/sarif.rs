@@ -5,18 +5,19 @@ use std::path::{Component, Path};
 use serde_json::{Value, json};
 
 use super::text::at;
-use super::{Findings, faults, word};
-use crate::check::{Check, NAMES, meaning};
+use super::{Findings, faults};
+use crate::check::{Check, Level, NAMES, meaning};
 use crate::cli::error::CliError;
 use crate::service::digest::Digest;
 
 /// The report: a result for each broken rule of each file.
 pub fn sarif(findings: &Findings<'_>) -> Result<String, CliError> {
     let rule = |name: &&str| json!({ "id": name, "shortDescription": { "text": meaning(name) } });
+    let has_known = findings.known() > 0;
     let results: Vec<Value> = findings
         .verdicts
         .iter()
-        .flat_map(|verdict| faults(verdict).map(|check| result(&verdict.path, check)))
+        .flat_map(|verdict| faults(verdict).map(|check| result(&verdict.path, check, has_known)))
         .collect();
     let driver = json!({
         "name": "meshsnap",
@@ -36,14 +37,15 @@ pub fn sarif(findings: &Findings<'_>) -> Result<String, CliError> {
     Ok(text + "\n")
 }
 
-fn result(path: &str, check: &Check) -> Value {
+/// Where some faults are known, all have to say whether they are.
+fn result(path: &str, check: &Check, has_known: bool) -> Value {
     let uri = uri(path);
     // The same fault in the same file is the same alert, however often the file changes.
     let fingerprint = Digest::of(format!("{}\n{uri}", check.rule).as_bytes()).to_string();
-    json!({
+    let mut result = json!({
         "ruleId": check.rule,
         "ruleIndex": NAMES.iter().position(|name| *name == check.rule),
-        "level": word(check),
+        "level": level(check),
         "message": { "text": format!("{}{}", check.detail, at(check)) },
         "locations": [{
             "physicalLocation": {
@@ -54,7 +56,19 @@ fn result(path: &str, check: &Check) -> Value {
         }],
         "partialFingerprints": { "primaryLocationLineHash": format!("{}:1", &fingerprint[..16]) },
         "properties": { "found": check.found, "allowed": check.allowed, "where": check.places },
-    })
+    });
+    if has_known {
+        let known = json!([{ "kind": "external", "justification": "it is in the baseline" }]);
+        result["suppressions"] = if check.known { known } else { json!([]) };
+    }
+    result
+}
+
+fn level(check: &Check) -> &'static str {
+    match check.level {
+        Level::Error => "error",
+        Level::Warn => "warning",
+    }
 }
 
 /// A path as a URI: relative to the folder in which the command runs, or `file:` for an absolute path.
