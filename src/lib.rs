@@ -55,6 +55,8 @@ pub mod cli;
 #[doc(hidden)]
 pub mod config;
 #[doc(hidden)]
+pub mod diff;
+#[doc(hidden)]
 pub mod encode;
 #[doc(hidden)]
 pub mod guard;

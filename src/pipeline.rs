@@ -11,6 +11,7 @@
 use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, GpuDevice};
 use crate::caption::{Scale, draw_legend};
 use crate::check::{self, Check, RuleSet};
+use crate::diff::{self, Compared};
 use crate::encode::{self, EncodeError};
 use crate::image::{Image, ImageFormat};
 use crate::import::{self, Bundle, Format, Imported, MeshError};
@@ -21,7 +22,7 @@ pub use crate::plan::{PlanError, QualitySelection};
 use crate::report::Report;
 use crate::scene::{Scene, SceneError};
 use crate::sheet::{self, Canvas, Layout};
-use crate::spec::Spec;
+use crate::spec::{CameraSpec, Sheet, SheetViews, Spec};
 use crate::warning::Warning;
 
 /// Turns the bytes of a mesh into the bytes of a picture.
@@ -147,7 +148,8 @@ fn draw_view(
     let selected = plan::select_quality(spec, mesh.triangles.len(), backends.has_gpu());
     let spec = selected.as_ref().map_or(spec, |selected| &selected.spec);
     let framing = plan::framing(mesh, spec, prepared, budget, deadline)?;
-    let scene = Scene::framed_by(framing.as_deref().unwrap_or(&mesh.positions), mesh, spec, budget)?;
+    let fitted = model.framing.as_deref().or(framing.as_deref()).unwrap_or(&mesh.positions);
+    let scene = Scene::framed_by(fitted, mesh, spec, budget)?;
     let plan = plan::build_from(&scene, prepared, budget, deadline)?;
     let bands_bytes = backends.bands_bytes(spec.backend, &plan);
     budget.spend("bands of the picture", bands_bytes, 1).map_err(PlanError::Limit)?;
@@ -171,6 +173,43 @@ fn draw_view(
     let (skips, short_chains) = (plan.skips, plan.short_chains);
     let Chosen { image, backend, draw_times, is_substitute } = drawn;
     Ok(Drawn { image, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
+}
+
+/// Draws two meshes that were compared side by side, in the colours of their distance from each other, through one
+/// camera that is fitted to both.
+pub fn draw_difference(
+    opened: [&Opened; 2],
+    compared: &Compared,
+    spec: &Spec,
+    backends: &mut Backends,
+    budget: &mut Budget,
+    deadline: &Deadline,
+) -> Result<Image, RenderError> {
+    let meshes = opened.map(|opened| &opened.imported.mesh);
+    let all = compared.of_vertices.iter().flatten();
+    let most = all.copied().filter(|distance| distance.is_finite()).fold(0.0, f64::max);
+    // The newer mesh says what is up, so that the camera is one.
+    let camera = CameraSpec { up: Some(spec.camera.up.unwrap_or(meshes[1].up)), ..spec.camera };
+    let spec = Spec { camera, ..spec.clone() };
+    let sheet = Sheet { views: SheetViews::Named(vec![spec.camera.view; 2]), columns: Some(2), labels: false };
+    let layout = Layout::new(&sheet, &spec.image, false);
+    let mut canvas = Canvas::new(layout, budget).map_err(PlanError::Limit)?;
+    for (cell, side) in layout.cells().zip(0..2) {
+        // What a side takes is free again before the next.
+        let mut of_cell = budget.clone();
+        let limit = |error| RenderError::from(PlanError::Limit(error));
+        let mesh = diff::painted(meshes[side], &compared.of_vertices[side], most, &mut of_cell).map_err(limit)?;
+        let framing = diff::framing(meshes[side], meshes[1 - side], &mut of_cell).map_err(limit)?;
+        let model = Model { mesh, framing: Some(framing), ..Model::default() };
+        let of_view = sheet::cell_spec(&spec, &sheet, &cell);
+        let drawn = draw_view(&model, &of_view, backends, &mut of_cell, deadline, &mut |_| ())?;
+        canvas.paste(&cell, &drawn.image);
+        canvas.write(&cell, ["before", "after"][side]);
+    }
+    let mut image = canvas.finish();
+    let plan::Legend { title, ends, colors } = diff::legend(most);
+    draw_legend(&mut image, &[Scale { title, ends, colors: &colors }]);
+    Ok(image)
 }
 
 /// Makes what a picture needs on a device and can be made without drawing, such as pipelines.
@@ -202,14 +241,14 @@ pub fn inspect(
     Report::of(&mesh, &report, bundle.bytes_len(), &mut budget, deadline)
 }
 
-/// A file that was read, to be judged.
+/// A file that was read, to be judged or compared.
 pub struct Opened {
     imported: Imported,
     budget: Budget,
     file_bytes: u64,
 }
 
-/// Reads a file, to judge it.
+/// Reads a file, to judge it or to compare it.
 pub fn open(
     bundle: &Bundle,
     options: impl Into<import::Options>,
@@ -228,6 +267,16 @@ impl Opened {
         let subject = check::Subject { mesh, import: report, file_bytes: self.file_bytes };
         check::check(&subject, rules, &mut self.budget, deadline)
     }
+
+    /// Compares the file with another, which is the newer one. `max_distance` is the largest distance between the
+    /// surfaces that counts as the same; None: what encodings round away.
+    pub fn diff(&self, other: &Self, max_distance: Option<f64>, deadline: &Deadline) -> Result<Compared, MeshError> {
+        let mut budget = self.budget.clone();
+        budget.spend("the other mesh", other.budget.spent_bytes(), 1)?;
+        let [a, b] =
+            [&self.imported, &other.imported].map(|Imported { mesh, report }| diff::Side { mesh, import: report });
+        diff::compare(a, b, max_distance, &mut budget, deadline)
+    }
 }
 
 /// A mesh in memory: imported once, and drawn as often as wanted. What one picture finds out about
@@ -239,6 +288,8 @@ pub struct Model {
     /// Faults of the file that were tolerated.
     warnings: Vec<Warning>,
     prepared: Prepared,
+    /// Positions in the mesh's unit box to which the camera is fitted; None: those of the mesh.
+    framing: Option<Vec<[f32; 3]>>,
 }
 
 impl Model {
@@ -251,7 +302,7 @@ impl Model {
         deadline: &Deadline,
     ) -> Result<Self, MeshError> {
         let Imported { mesh, report } = import::import(bundle, options, limits, budget, deadline)?;
-        Ok(Self { mesh, warnings: report.warnings, prepared: Prepared::default() })
+        Ok(Self { mesh, warnings: report.warnings, prepared: Prepared::default(), framing: None })
     }
 
     /// The mesh.

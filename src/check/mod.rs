@@ -5,6 +5,7 @@
 //! Nothing here reads a file.
 
 mod judge;
+mod meaning;
 mod places;
 mod rule;
 #[cfg(test)]
@@ -13,6 +14,7 @@ mod uvs;
 mod volume;
 
 pub use judge::{Subject, check, unopened};
+pub use meaning::meaning;
 pub use rule::{Level, NAMES, Rule, RuleSet, UnknownRule};
 
 use serde::Serialize;
@@ -24,7 +26,7 @@ pub struct Verdict {
     pub path: String,
     /// Its SHA-256; null if it cannot be read.
     pub sha256: Option<String>,
-    /// True unless a rule of level `error` fails.
+    /// True unless a rule of level `error` fails in a way that is not known.
     pub ok: bool,
     /// One for each rule, in the order of the rules.
     pub checks: Vec<Check>,
@@ -33,8 +35,14 @@ pub struct Verdict {
 impl Verdict {
     /// The verdict of these checks.
     pub fn new(path: String, sha256: Option<String>, checks: Vec<Check>) -> Self {
-        let ok = checks.iter().all(|check| check.ok || check.level == Level::Warn);
-        Self { path, sha256, ok, checks }
+        let mut verdict = Self { path, sha256, ok: true, checks };
+        verdict.judge();
+        verdict
+    }
+
+    /// Says anew whether the file is ok, after faults became known.
+    pub fn judge(&mut self) {
+        self.ok = !self.checks.iter().any(Check::fails);
     }
 }
 
@@ -47,7 +55,7 @@ pub struct Check {
     pub level: Level,
     /// True if the mesh obeys it.
     pub ok: bool,
-    /// True if the fault is an accepted one. There is no list of accepted faults yet, so it is false.
+    /// True if the fault is an accepted one, which fails nothing.
     pub known: bool,
     /// The number that was found: of all faults, however many `where` has. Null where nothing is counted.
     pub found: Option<Figure>,
@@ -58,6 +66,13 @@ pub struct Check {
     /// The first faults, with their positions in the file's space.
     #[serde(rename = "where")]
     pub places: Vec<Place>,
+}
+
+impl Check {
+    /// True if it fails its file.
+    pub fn fails(&self) -> bool {
+        !self.ok && !self.known && self.level == Level::Error
+    }
 }
 
 /// Most places that a check lists.

@@ -283,3 +283,11 @@ fn a_verdict_is_the_public_json() {
     assert_eq!(edges.len(), 3);
     assert!(edges.contains(&serde_json::json!({ "edge": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]] })), "{edges:?}");
 }
+
+#[test]
+fn each_rule_has_a_meaning() {
+    for name in NAMES {
+        assert!(meaning(name).ends_with('.'), "{name}");
+    }
+    assert_eq!(meaning("other"), "");
+}

@@ -14,6 +14,7 @@ macro_rules! say {
 
 mod bundle;
 mod check;
+mod diff;
 pub(crate) mod error;
 mod files;
 mod health;
@@ -63,6 +64,9 @@ enum Command {
     /// Judge mesh files by rules, for CI
     #[command(after_help = SEE_HELP, after_long_help = check::EXAMPLES)]
     Check(check::CheckArgs),
+    /// Say what differs between two meshes
+    #[command(after_help = SEE_HELP, after_long_help = diff::EXAMPLES)]
+    Diff(diff::DiffArgs),
     /// Serve renders over HTTP
     #[command(after_help = SEE_HELP, after_long_help = serve::after_help())]
     Serve(serve::ServeArgs),
@@ -113,6 +117,7 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
         Command::Render(arguments) => render::run(&arguments, &words),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Diff(arguments) => diff::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
         Command::Sign(arguments) => sign::run(&arguments),

@@ -7,6 +7,7 @@ pub mod creases;
 pub mod edges;
 pub mod material;
 pub mod measure;
+pub mod nearest;
 pub mod normals;
 pub mod primitives;
 pub mod topology;

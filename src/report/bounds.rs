@@ -31,7 +31,7 @@ impl Bounds {
 
 /// Rounds `value` to the digits that are significant in a mesh of size `largest`: positions have 24
 /// bits, about 7 digits.
-fn without_rounding(value: f64, largest: f64) -> f64 {
+pub fn without_rounding(value: f64, largest: f64) -> f64 {
     let magnitude = |v: f64| libm::floor(libm::log10(v.abs()));
     let digits = magnitude(value) - magnitude(largest) + 6.0;
     if !digits.is_finite() || digits > 16.0 {

@@ -7,8 +7,8 @@ mod bounds;
 mod text;
 mod topology;
 
-pub use self::bounds::Bounds;
-use self::topology::TopologyReport;
+pub use self::bounds::{Bounds, without_rounding};
+pub use self::topology::TopologyReport;
 use crate::import::{FileContent, FileMetadata, ImportReport, MeshError};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::edges::EdgeList;

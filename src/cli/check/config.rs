@@ -18,9 +18,10 @@ const NAME: &str = "meshsnap.toml";
 /// The largest file that is read, bytes.
 const BYTES_MAX: u64 = 1 << 20;
 
-/// The keys of `[check]` and of `[[check.files]]`.
-const KEYS: [&str; 3] = ["rules", "warn", "files"];
+/// The keys of `[check]`, of `[[check.files]]` and of `[check.baseline]`.
+const KEYS: [&str; 4] = ["rules", "warn", "files", "baseline"];
 const FILE_KEYS: [&str; 3] = ["glob", "rules", "warn"];
+const BASELINE_KEYS: [&str; 1] = ["dir"];
 
 /// Rules for all files.
 #[derive(Debug)]
@@ -32,12 +33,14 @@ pub struct Config {
     rules: RuleSet,
     /// Rules of the files that a glob fits; of several, the last counts.
     of_files: Vec<(Pattern, RuleSet)>,
+    /// The folder of accepted faults.
+    baseline: Option<PathBuf>,
 }
 
 impl Config {
     /// The same rules for every file.
     pub fn of(rules: RuleSet) -> Self {
-        Self { path: None, folder: PathBuf::new(), rules, of_files: Vec::new() }
+        Self { path: None, folder: PathBuf::new(), rules, of_files: Vec::new(), baseline: None }
     }
 
     /// Reads the file that is named, or else the one in the current folder or the nearest above it, or else
@@ -70,6 +73,16 @@ impl Config {
     /// The file that the rules come from.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()
+    }
+
+    /// The folder of accepted faults.
+    pub fn baseline(&self) -> Option<&Path> {
+        self.baseline.as_deref()
+    }
+
+    /// The folder to which accepted faults belong: that of the file, or the current one.
+    pub fn root(&self) -> &Path {
+        if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder }
     }
 
     /// The rules of a file.
@@ -111,6 +124,7 @@ fn read(text: &str, folder: PathBuf) -> Result<Config, Fault> {
     if rules.is_some() || warn.is_some() {
         config.rules = rule_set(rules.as_ref(), warn.as_ref())?;
     }
+    config.baseline = table.get("baseline").map(baseline).transpose()?.map(|dir| config.folder.join(dir));
     for file in table.get("files").map(list).transpose()?.unwrap_or_default() {
         let DeValue::Table(table) = file.get_ref() else {
             return Err(fault(file.span(), "`files` has tables: [[check.files]]"));
@@ -123,6 +137,16 @@ fn read(text: &str, folder: PathBuf) -> Result<Config, Fault> {
         config.of_files.push((pattern, set));
     }
     Ok(config)
+}
+
+/// The folder of `[check.baseline]`.
+fn baseline(value: &Value<'_>) -> Result<String, Fault> {
+    let DeValue::Table(table) = value.get_ref() else {
+        return Err(fault(value.span(), "`baseline` is a table: [check.baseline]"));
+    };
+    check_keys(table, &BASELINE_KEYS)?;
+    let Some(dir) = table.get("dir") else { return Err(fault(value.span(), "[check.baseline] needs a `dir`")) };
+    Ok(word(dir)?.0)
 }
 
 /// Refuses keys that are not known.

@@ -1,11 +1,12 @@
 //! `meshsnap check`: judges mesh files by rules.
 
+mod baseline;
 mod config;
-mod junit;
+mod reports;
 mod run;
-mod text;
+mod since;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum, ValueHint};
@@ -15,7 +16,9 @@ use super::{isolation, render};
 use crate::check::{NAMES, RuleSet};
 use crate::cli::error::CliError;
 use crate::import::Format;
+use baseline::Baseline;
 use config::Config;
+use reports::ReportArgs;
 use run::Run;
 
 /// Examples at the end of `--help`.
@@ -24,6 +27,8 @@ Examples:
   meshsnap check parts/
   meshsnap check 'parts/*.stl' --rules opens,watertight,max-triangles:200000 --warn has-normals
   meshsnap check model.obj --rules uv-no-overlap,bounds:100,100,50 --format jsonl
+  meshsnap check parts/ --baseline .meshsnap --update
+  meshsnap check parts/ --since origin/main --sarif faults.sarif --markdown comment.md
 
 A file that cannot be read fails, whatever the rules. Exit codes: 0 every file obeys its rules of level
 error, 1 one does not, 2 the command line is at fault, 3 meshsnap or the machine is.";
@@ -62,9 +67,17 @@ pub struct CheckArgs {
     /// text for people, jsonl: a verdict on each line
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t = Output::Text)]
     format: Output,
-    /// File for the verdicts as JUnit XML, too
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    junit: Option<String>,
+    /// Folder of accepted faults, which do not fail again [default: that of meshsnap.toml]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    baseline: Option<PathBuf>,
+    /// Accept the faults that there are now: write them into the baseline
+    #[arg(long)]
+    update: bool,
+    /// Check only the meshes that changed since a commit, by the program `git`
+    #[arg(long, value_name = "REF", value_hint = ValueHint::Other)]
+    since: Option<String>,
+    #[command(flatten)]
+    reports: ReportArgs,
     /// Files that are read at once [default: one for each processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), value_hint = ValueHint::Other)]
     jobs: Option<u16>,
@@ -101,7 +114,16 @@ pub fn run(arguments: &CheckArgs) -> Result<(), CliError> {
     }
     let mut tasks = render::find(&arguments.paths, "png")?;
     tasks.all.sort_by(|a, b| a.mesh.cmp(&b.mesh));
-    Run::new(arguments, config, tasks).all()
+    if let Some(reference) = &arguments.since {
+        since::keep_changed(&mut tasks, reference)?;
+    }
+    let folder = arguments.baseline.clone().or_else(|| config.baseline().map(Path::to_owned));
+    if arguments.update && folder.is_none() {
+        let sentence = "--update needs a baseline: give --baseline DIR, or [check.baseline] in meshsnap.toml";
+        return Err(CliError::usage(sentence));
+    }
+    let baseline = folder.map(|folder| Baseline::new(folder, config.root()));
+    Run::new(arguments, config, tasks, baseline).all()
 }
 
 /// The rules of the command line, or else of a file.

@@ -8,18 +8,21 @@ use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 
+use super::baseline::Baseline;
 use super::config::Config;
-use super::{CheckArgs, Output, junit, text};
+use super::reports::{Findings, Reports, json_line, text};
+use super::{CheckArgs, Output};
 use crate::backend::cpu::DrawingThreads;
 use crate::check::{Verdict, unopened};
 use crate::cli::bundle::{self, comparable};
 use crate::cli::error::CliError;
-use crate::cli::output::{Destination, Inputs};
+use crate::cli::output::Inputs;
 use crate::cli::render::{Task, Tasks, format_in};
 use crate::cli::{files, siblings};
 use crate::config::cores;
 use crate::limits::{Deadline, Limits};
 use crate::pipeline;
+use crate::pluralise::pluralise;
 use crate::service::digest::Digest;
 
 /// A mesh names a file, which names others.
@@ -31,6 +34,7 @@ pub struct Run<'a> {
     limits: Limits,
     config: Config,
     tasks: Tasks,
+    baseline: Option<Baseline>,
     /// The named files that are no meshes, by their absolute paths.
     named: BTreeSet<PathBuf>,
     /// Those of them that were used for some mesh.
@@ -46,16 +50,15 @@ struct Outcome {
 
 impl<'a> Run<'a> {
     /// The run of a command.
-    pub fn new(arguments: &'a CheckArgs, config: Config, tasks: Tasks) -> Self {
+    pub fn new(arguments: &'a CheckArgs, config: Config, tasks: Tasks, baseline: Option<Baseline>) -> Self {
         let named = tasks.companions.iter().map(comparable).collect();
         let limits = arguments.limits.config().limits;
-        Self { arguments, limits, config, tasks, named, used: Mutex::default() }
+        Self { arguments, limits, config, tasks, baseline, named, used: Mutex::default() }
     }
 
     /// Judges all. Verdicts go to standard output, and last the count to standard error.
     pub fn all(&self) -> Result<(), CliError> {
-        let junit =
-            self.arguments.junit.as_deref().map(|name| self.destination(name).map(|at| (name, at))).transpose()?;
+        let reports = Reports::new(&self.arguments.reports, &self.inputs())?;
         let threads = self.arguments.jobs.map_or(cores() as usize, usize::from).min(self.tasks.all.len());
         let next = AtomicUsize::new(0);
         let (sender, outcomes) = channel();
@@ -75,15 +78,20 @@ impl<'a> Run<'a> {
             // Where nobody reads the verdicts, no more are made.
             self.print(&outcomes).inspect_err(|_| next.store(self.tasks.all.len(), Ordering::Relaxed))
         })?;
-        if let Some((name, destination)) = junit {
-            destination.write(name, junit::junit(&verdicts).as_bytes())?;
-        }
+        let findings = Findings { verdicts: &verdicts, lost };
+        reports.write(&findings)?;
         let used = self.used.lock().unwrap_or_else(PoisonError::into_inner);
-        for name in self.tasks.companions.iter().filter(|name| !used.contains(&comparable(name))) {
+        // Of some meshes alone, it is not known what the others use.
+        let companions = self.tasks.companions.iter().filter(|_| !self.tasks.is_part);
+        for name in companions.filter(|name| !used.contains(&comparable(name))) {
             say!("meshsnap: {name}: is not used: no mesh refers to it");
         }
-        let failed = verdicts.iter().filter(|verdict| !verdict.ok).count() + lost;
-        say!("{} ok, {failed} failed", self.tasks.all.len() - failed);
+        let failed = findings.failed();
+        let known = match findings.known() {
+            0 => String::new(),
+            known => format!(", {}", pluralise(known, "known fault", "known faults")),
+        };
+        say!("{} ok, {failed} failed{known}", self.tasks.all.len() - failed);
         match failure {
             // The sentences are said already.
             Some(code) => Err(CliError::silent(code)),
@@ -98,10 +106,21 @@ impl<'a> Run<'a> {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(task) = self.tasks.all.get(number) else { break };
             let mut said = None;
-            let result = catch_unwind(AssertUnwindSafe(|| self.judge(task, &mut said)));
+            let result = catch_unwind(AssertUnwindSafe(|| self.judge_known(task, &mut said)));
             let bug = |_| Err(CliError::ours(format!("{}: this is a bug in meshsnap; please report it", task.mesh)));
             done(number, Outcome { said, result: result.unwrap_or_else(bug) });
         }
+    }
+
+    /// Judges one file, and marks what is known or accepts what there is.
+    fn judge_known(&self, task: &Task, said: &mut Option<String>) -> Result<Verdict, CliError> {
+        let mut verdict = self.judge(task, said)?;
+        match &self.baseline {
+            Some(baseline) if self.arguments.update => baseline.update(&mut verdict)?,
+            Some(baseline) => baseline.apply(&mut verdict)?,
+            None => {}
+        }
+        Ok(verdict)
     }
 
     /// Judges one file, with those that it turns out to refer to.
@@ -145,15 +164,12 @@ impl<'a> Run<'a> {
         Ok(Verdict::new(path.clone(), digest, vec![unopened(detail)]))
     }
 
-    /// The place of a report, which is none of the files that are read.
-    fn destination(&self, name: &str) -> Result<Destination, CliError> {
-        if name == "-" {
-            return Err(CliError::usage("--junit -: standard output has the verdicts; name a file"));
-        }
+    /// The files that are read, which no report may replace.
+    fn inputs(&self) -> Inputs {
         let meshes = self.tasks.all.iter().map(|task| task.mesh.as_str());
         let named = meshes.chain(self.tasks.companions.iter().map(String::as_str));
         let config = self.config.path().map(Path::to_string_lossy);
-        Destination::new(name, &Inputs::of(named.chain(config.as_deref())))
+        Inputs::of(named.chain(config.as_deref()))
     }
 
     /// Prints the verdicts in order. Returns them, the number of files without one by a fault of ours, and its
@@ -188,9 +204,7 @@ impl<'a> Run<'a> {
     fn show(&self, verdict: &Verdict) -> Result<String, CliError> {
         match self.arguments.format {
             Output::Text => Ok(text::text(verdict)),
-            Output::Jsonl => {
-                serde_json::to_string(verdict).map(|line| line + "\n").map_err(|e| CliError::ours(e.to_string()))
-            }
+            Output::Jsonl => json_line(verdict),
         }
     }
 }

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use same_file::Handle;
 use tempfile::NamedTempFile;
 
+use super::bundle::comparable;
 use super::files;
 use crate::cli::error::CliError;
 
@@ -106,6 +107,17 @@ impl Destination {
                 Err(CliError::usage(format!("{name}: cannot be written: there is no folder {folder}; make it first")))
             }
             Err(error) => Err(unwritable(name, &error)),
+        }
+    }
+
+    /// True if both are one file, which need not exist yet. Streams are written one after the other.
+    pub fn is_same_file(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::File(path), Self::File(other)) => {
+                let exist_as_one = || same_file::is_same_file(path, other).unwrap_or(false);
+                comparable(path) == comparable(other) || exist_as_one()
+            }
+            _ => false,
         }
     }
 

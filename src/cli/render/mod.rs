@@ -29,8 +29,8 @@ use crate::spec::{BackendChoice, NamedView, Spec};
 use crate::telemetry;
 use batch::Batch;
 use one::Drawing;
-pub use spec::{format_in, pairs};
-pub use tasks::{Task, Tasks, find};
+pub use spec::{by_extension, format_in, pairs};
+pub use tasks::{Task, Tasks, find, is_companion};
 use watch::{Changed, Watched};
 
 /// Examples at the end of `--help`.

@@ -79,7 +79,7 @@ pub fn pairs(set: &[String]) -> Result<Vec<(String, String)>, CliError> {
 }
 
 /// The format of the output's extension, else that of the document.
-fn by_extension(output: &str, of_document: Option<ImageFormat>) -> Result<Option<ImageFormat>, CliError> {
+pub fn by_extension(output: &str, of_document: Option<ImageFormat>) -> Result<Option<ImageFormat>, CliError> {
     if super::is_folder(output) {
         return Ok(of_document);
     }

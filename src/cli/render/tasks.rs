@@ -107,7 +107,8 @@ fn is_mesh(path: &Path) -> bool {
     extension == "zip" || Format::from_extension(&extension).is_some()
 }
 
-fn is_companion(path: &Path) -> bool {
+/// True for files that meshes refer to, by the extension.
+pub fn is_companion(path: &Path) -> bool {
     const EXTENSIONS: [&str; 12] =
         ["mtl", "bin", "png", "jpg", "jpeg", "webp", "bmp", "tga", "dds", "ktx2", "basis", "txt"];
     EXTENSIONS.contains(&extension_of(path).as_str())

@@ -5,7 +5,7 @@ mod color_map;
 mod legend;
 mod measures;
 
-pub use color_map::{DIVERGING, SEQUENTIAL};
+pub use color_map::{DIVERGING, SEQUENTIAL, color};
 pub use legend::Legend;
 pub use measures::{curvatures, mean_edge, shape_quality, uv_stretch};
 
@@ -165,7 +165,7 @@ impl Painter {
         let map = if view == DebugView::UvStretch { &*DIVERGING } else { &*SEQUENTIAL };
         for (face, share) in shares.iter().enumerate().filter(|(face, _)| is_shown(*face)) {
             self.triangles[face] = [self.values.len() as u32; 3];
-            self.values.push(color_map::color(map, *share));
+            self.values.push(color(map, *share));
         }
     }
 
@@ -176,7 +176,7 @@ impl Painter {
         let most = if most > 0.0 { most } else { 1.0 };
         let first = self.values.len() as u32;
         let share = |number: &f32| 0.5 + 0.5 * (number / most).clamp(-1.0, 1.0);
-        self.values.extend(numbers.iter().map(|number| color_map::color(&DIVERGING, share(number))));
+        self.values.extend(numbers.iter().map(|number| color(&DIVERGING, share(number))));
         for (face, corners) in faces.iter().enumerate().filter(|(face, _)| is_shown(*face)) {
             self.triangles[face] = corners.map(|v| v + first);
         }

@@ -15,7 +15,7 @@ fn open_cube() -> Vec<u8> {
 }
 
 /// A folder with a good mesh, one with a hole, one that is none, and one with a material library.
-fn folder() -> tempfile::TempDir {
+pub fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
     fs::create_dir(folder.path().join("parts")).unwrap();
@@ -28,7 +28,7 @@ fn folder() -> tempfile::TempDir {
 }
 
 #[track_caller]
-fn check(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
+pub fn check(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
     let mut command = meshsnap();
     command.current_dir(folder).arg("check").args(arguments).stdin(Stdio::null());
     let Output { status, stdout, stderr } = command.output().unwrap();

@@ -11,7 +11,7 @@ fn text_of(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-const COMMANDS: [&str; 7] = ["render", "inspect", "check", "serve", "health", "completions", "man"];
+const COMMANDS: [&str; 8] = ["render", "inspect", "check", "diff", "serve", "health", "completions", "man"];
 
 #[test]
 fn help_fits_in_100_columns_and_its_short_form_on_a_screen() {
@@ -22,7 +22,7 @@ fn help_fits_in_100_columns_and_its_short_form_on_a_screen() {
         }
         assert!(short.lines().count() <= 40, "{command}: {} lines", short.lines().count());
     }
-    for command in ["render", "inspect", "check", "serve"] {
+    for command in ["render", "inspect", "check", "diff", "serve"] {
         let (short, long) = (text_of(&[command, "-h"]), text_of(&[command, "--help"]));
         assert!(long.contains("\nExamples:\n  meshsnap ") && !short.contains("Examples:"), "{command}");
         assert!(long.lines().count() > 2 * short.lines().count(), "{command}");

@@ -1,9 +1,13 @@
 //! The command line.
 
+pub mod baseline;
 pub mod batch;
 pub mod check;
 pub mod commands;
+pub mod diff;
 pub mod help;
 pub mod mistakes;
 pub mod outputs;
+pub mod recipes;
+pub mod reports;
 pub mod watch;

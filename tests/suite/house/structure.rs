@@ -20,6 +20,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("report", &["import", "texture", "mesh", "limits", "warning", "pluralise"]),
     // Of the report the bounds, of the plan the overlaps in the texture.
     ("check", &["report", "import", "texture", "plan", "mesh", "limits", "pluralise"]),
+    // Of the report the bounds and the topology under the names that clients read, of the plan the colours of numbers.
+    ("diff", &["report", "import", "plan", "mesh", "guard", "image", "limits", "pluralise"]),
     ("spec", &["mesh", "image", "srgb", "limits"]),
     ("request", &["spec", "mesh", "image", "limits"]),
     ("texture", &["guard", "mesh", "srgb", "limits", "warning"]),
@@ -33,8 +35,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "pipeline",
         &[
-            "check", "report", "import", "encode", "caption", "sheet", "backend", "plan", "scene", "spec", "mesh",
-            "image", "limits", "warning",
+            "check", "diff", "report", "import", "encode", "caption", "sheet", "backend", "plan", "scene", "spec",
+            "mesh", "image", "limits", "warning",
         ],
     ),
     (
@@ -112,6 +114,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "service/signature",
             "service/digest",
             "check",
+            "diff",
+            "encode",
             "pipeline",
             "report",
             "request",

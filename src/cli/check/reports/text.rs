@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use crate::check::{Check, Figure, Level, Place, Verdict};
+use super::{faults, word};
+use crate::check::{Check, Figure, Place, Verdict};
 
 /// Places that a line names; the JSON has more.
 const PLACES_MAX: usize = 3;
@@ -10,12 +11,8 @@ const PLACES_MAX: usize = 3;
 /// A line for the file, and one for each rule that it breaks.
 pub fn text(verdict: &Verdict) -> String {
     let mut text = format!("{}: {}\n", verdict.path, if verdict.ok { "ok" } else { "FAILED" });
-    for check in verdict.checks.iter().filter(|check| !check.ok) {
-        let level = match check.level {
-            Level::Error => "error",
-            Level::Warn => "warning",
-        };
-        let _ = writeln!(text, "  {level}: {}: {}{}", check.rule, check.detail, at(check));
+    for check in faults(verdict) {
+        let _ = writeln!(text, "  {}: {}: {}{}", word(check), check.rule, check.detail, at(check));
     }
     text
 }
@@ -37,7 +34,8 @@ pub fn at(check: &Check) -> String {
     format!("; at {}{more}", named.join(", "))
 }
 
-fn place(place: &Place) -> String {
+/// A place in words.
+pub fn place(place: &Place) -> String {
     let point = |[x, y, z]: &[f64; 3]| format!("({x}, {y}, {z})");
     match place {
         Place::Edge(ends) => ends.iter().map(point).collect::<Vec<_>>().join(" to "),

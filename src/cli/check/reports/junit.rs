@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use quick_xml::escape::escape;
 
 use super::text::at;
-use crate::check::{Check, Level, Verdict};
+use super::word;
+use crate::check::{Check, Verdict};
 
 /// The report of all verdicts. Its times are 0, so that equal verdicts make equal bytes.
 pub fn junit(verdicts: &[Verdict]) -> String {
@@ -23,26 +24,26 @@ pub fn junit(verdicts: &[Verdict]) -> String {
     text + "</testsuites>\n"
 }
 
-/// A case. A broken rule that only warns is a success with an output.
+/// A case. A broken rule that only warns, or is known, is a success with an output.
 fn case(text: &mut String, class: &str, check: &Check) {
     let _ = write!(text, "    <testcase name=\"{}\" classname=\"{class}\" time=\"0\"", check.rule);
     let detail = attribute(&check.detail);
     let whole = attribute(&format!("{}{}", check.detail, at(check)));
-    let _ = match (check.ok, check.level) {
+    let _ = match (check.ok, check.fails()) {
         (true, _) => writeln!(text, "/>"),
-        (false, Level::Error) => writeln!(
+        (false, true) => writeln!(
             text,
             ">\n      <failure message=\"{detail}\" type=\"{}\">{whole}</failure>\n    </testcase>",
             check.rule
         ),
-        (false, Level::Warn) => {
-            writeln!(text, ">\n      <system-out>warning: {whole}</system-out>\n    </testcase>")
+        (false, false) => {
+            writeln!(text, ">\n      <system-out>{}: {whole}</system-out>\n    </testcase>", word(check))
         }
     };
 }
 
 fn failures_of(verdict: &Verdict) -> usize {
-    verdict.checks.iter().filter(|check| !check.ok && check.level == Level::Error).count()
+    verdict.checks.iter().filter(|check| check.fails()).count()
 }
 
 /// A text without the characters that XML 1.0 cannot have, escaped.

@@ -1,0 +1,93 @@
+//! What differs between two meshes.
+
+use std::sync::Arc;
+
+use super::DiffArgs;
+use crate::backend::cpu::DrawingThreads;
+use crate::backend::{Backends, GpuHost, HardwareHint};
+use crate::cli::bundle::{self, NamedFiles};
+use crate::cli::error::CliError;
+use crate::cli::progress::Progress;
+use crate::cli::render::format_in;
+use crate::cli::{files, siblings};
+use crate::config::{cores, why_no_gpu};
+use crate::diff::Compared;
+use crate::import::Options;
+use crate::limits::{Budget, Deadline, Limits};
+use crate::pipeline::{self, Opened};
+use crate::request::{self, Rules};
+use crate::spec::BackendChoice;
+
+/// Pixels of a picture, both sides together.
+const SIZE: &str = "1024x512";
+
+/// Compares two meshes and prints the difference. Returns whether they are the same.
+pub fn run(arguments: &DiffArgs, limits: &Limits) -> Result<bool, CliError> {
+    let DiffArgs { a, b, .. } = arguments;
+    let output = super::output(arguments)?;
+    let progress = Progress::start("reading");
+    let (named_a, named_b) = (read(arguments, a, limits)?, read(arguments, b, limits)?);
+    progress.next("parsing");
+    let (opened_a, opened_b) = (open(arguments, a, &named_a, limits)?, open(arguments, b, &named_b, limits)?);
+    progress.next("comparing");
+    let about = |error: CliError| error.about(&format!("{a} and {b}"));
+    let mut compared = opened_a
+        .diff(&opened_b, arguments.max_distance, &Deadline::default())
+        .map_err(|error| about(CliError::from(error)))?;
+    if have_same_bytes(&named_a, &named_b) {
+        compared.difference.summary = vec!["the files are equal, byte for byte".to_owned()];
+    }
+    if let Some((name, destination)) = output {
+        progress.next("drawing");
+        let image = draw([&opened_a, &opened_b], &compared, limits).map_err(about)?;
+        destination.write(name, &super::encode(name, &image)?)?;
+    }
+    drop(progress);
+    let text = match arguments.json {
+        true => super::json(&compared.difference)?,
+        false => compared.difference.text(),
+    };
+    files::print(text.as_bytes())?;
+    Ok(compared.difference.same)
+}
+
+/// Reads a mesh, and what it refers to if that is asked for.
+fn read(arguments: &DiffArgs, name: &str, limits: &Limits) -> Result<NamedFiles, CliError> {
+    let mut names = vec![name.to_owned()];
+    if arguments.siblings && name != "-" {
+        let options = Options::from(format_in(arguments.format_in.as_deref()));
+        names.extend(siblings::all_beside(&names, None, options, limits)?);
+    }
+    bundle::read(&names, None, limits)
+}
+
+fn open(arguments: &DiffArgs, name: &str, named: &NamedFiles, limits: &Limits) -> Result<Opened, CliError> {
+    let format = format_in(arguments.format_in.as_deref());
+    pipeline::open(&named.bundle, format, limits, &Deadline::default())
+        .map_err(|error| CliError::from(error).about(name))
+}
+
+/// True if both are the same files, whatever the folder and the name of the mesh.
+fn have_same_bytes(a: &NamedFiles, b: &NamedFiles) -> bool {
+    let (a, b) = (a.bundle.files(), b.bundle.files());
+    match (a, b) {
+        ([a], [b]) => a.bytes == b.bytes,
+        _ => a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.path == b.path && a.bytes == b.bytes),
+    }
+}
+
+/// Both meshes side by side, through one camera.
+fn draw(opened: [&Opened; 2], compared: &Compared, limits: &Limits) -> Result<crate::image::Image, CliError> {
+    let rules = Rules { limits: limits.clone(), backend: BackendChoice::Cpu };
+    let keys = [("style", "smooth"), ("size", SIZE), ("light.ambient", "0.5")];
+    let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let spec = request::read(None, &keys, &rules).map_err(|error| CliError::ours(error.to_string()))?;
+    let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), None));
+    let drawing = Arc::new(DrawingThreads::new(cores() as usize));
+    let image = drawing.install(|| {
+        let mut backends = Backends::sharing(gpu.clone(), drawing.clone());
+        let (mut budget, deadline) = (Budget::new(limits), Deadline::default());
+        pipeline::draw_difference(opened, compared, &spec, &mut backends, &mut budget, &deadline)
+    })?;
+    Ok(image)
+}

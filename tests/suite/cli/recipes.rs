@@ -1,0 +1,111 @@
+//! The recipes of docs/ci, as far as they run without a code host.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use super::baseline::{git, git_command};
+use super::check::folder;
+use crate::support::server::{CUBE_OBJ, meshsnap};
+
+fn recipe(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/ci").join(name)
+}
+
+/// The search path, with the program first.
+fn path() -> String {
+    let program = PathBuf::from(meshsnap().get_program());
+    format!("{}:{}", program.parent().unwrap().display(), std::env::var("PATH").unwrap())
+}
+
+#[test]
+fn the_step_of_the_action_writes_reports_and_a_code() {
+    let folder = folder();
+    git(folder.path(), &["init", "-q"]);
+    git(folder.path(), &["add", "."]);
+    git(folder.path(), &["commit", "-qm", "first"]);
+    fs::write(folder.path().join("meshsnap.toml"), "[check]\nrules = [\"opens\", \"watertight\"]\n").unwrap();
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n";
+    fs::write(folder.path().join("parts/a b.obj"), pointer).unwrap();
+    let run = |paths: &str, since: &str| -> (Output, String, String) {
+        let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap_or_default();
+        ["summary", "outputs"].iter().for_each(|name| drop(fs::remove_file(folder.path().join(name))));
+        let mut command = Command::new("bash");
+        command.arg(recipe("github/check.sh")).current_dir(folder.path()).env("PATH", path()).stdin(Stdio::null());
+        command.env("MESHSNAP_PATHS", paths).env("MESHSNAP_SINCE", since);
+        command.env("GITHUB_STEP_SUMMARY", "summary").env("GITHUB_OUTPUT", "outputs");
+        (command.output().unwrap(), read("summary"), read("outputs"))
+    };
+    let (output, summary, outputs) = run("parts\n", "");
+    assert!(output.status.success(), "{output:?}");
+    assert!(
+        summary.starts_with("### meshsnap check: 2 of 3 files failed\n") && summary.contains("Git LFS"),
+        "{summary}"
+    );
+    assert_eq!(outputs, "code=1\n");
+    for report in ["junit.xml", "faults.sarif", "comment.md", "page.html"] {
+        assert!(folder.path().join("meshsnap-reports").join(report).exists(), "{report}");
+    }
+    let (_, summary, outputs) = run("parts/a b.obj\nparts/good.obj", "HEAD");
+    assert!(summary.starts_with("### meshsnap check: 1 of 1 file failed\n"), "{summary}");
+    assert_eq!(outputs, "code=1\n");
+    // No input is a command or an option, and a mistake fails the step.
+    for (paths, since) in [("$(touch x)", ""), ("--help", ""), ("parts", "--output=x"), ("parts", "$(touch x)")] {
+        let (output, ..) = run(paths, since);
+        assert!(!output.status.success() || !outputs.is_empty(), "{paths} {since}");
+    }
+    assert!(!folder.path().join("x").exists());
+}
+
+#[test]
+fn the_hook_refuses_a_commit_with_a_fault() {
+    let folder = folder();
+    git(folder.path(), &["init", "-q"]);
+    let hook = folder.path().join(".git/hooks/pre-commit");
+    fs::create_dir_all(hook.parent().unwrap()).unwrap();
+    fs::copy(recipe("pre-commit"), &hook).unwrap();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        fs::set_permissions(&hook, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    fs::write(folder.path().join("meshsnap.toml"), "[check]\nrules = [\"watertight\"]\n").unwrap();
+    let commit = |files: &[&str]| {
+        git(folder.path(), &[&["add", "--"], files].concat());
+        let output = git_command(folder.path(), &["commit", "-qm", "a"]).env("PATH", path()).output().unwrap();
+        (output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    // Nothing to check, and a mesh that is ok.
+    assert!(commit(&["meshsnap.toml"]).0);
+    fs::write(folder.path().join("parts/a name.obj"), CUBE_OBJ).unwrap();
+    let (is_done, said) = commit(&["parts/a name.obj", "parts/good.obj"]);
+    assert!(is_done && said.contains("2 ok, 0 failed"), "{said}");
+    let (is_done, said) = commit(&["parts/hole.obj"]);
+    assert!(!is_done && said.contains("0 ok, 1 failed"), "{said}");
+}
+
+#[test]
+fn the_workflows_name_what_the_program_has() {
+    // Options of the recipes, whose YAML is read by the code hosts alone.
+    let options = ["--junit", "--sarif", "--markdown", "--html", "--since"];
+    let help = meshsnap().args(["check", "--help"]).output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    for name in ["github/check.sh", "gitlab.yml"] {
+        let text = fs::read_to_string(recipe(name)).unwrap();
+        let used: Vec<&str> = text
+            .split(|c: char| !(c.is_ascii_lowercase() || c == '-'))
+            .filter(|word| word.starts_with("--") && word.len() > 2)
+            .collect();
+        assert!(
+            used.len() >= 3 && used.iter().all(|word| options.contains(word) && help.contains(word)),
+            "{name}: {used:?}"
+        );
+    }
+    // What a pull request chooses goes through the environment, never into a command.
+    for name in ["github/action.yml", "github/check.yml", "github/comment.yml"] {
+        let text = fs::read_to_string(recipe(name)).unwrap();
+        let in_scripts =
+            text.lines().filter(|line| line.trim_start().starts_with("run: ") || line.starts_with("          "));
+        assert!(in_scripts.clone().all(|line| !line.contains("${{") || line.contains(": ${{")), "{name}");
+    }
+}
