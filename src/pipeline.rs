@@ -385,6 +385,7 @@ impl Drawn {
         }
         self.is_substitute |= other.is_substitute;
         self.short_chains += other.short_chains;
+        self.draw_times.mixed_pixels += other.draw_times.mixed_pixels;
         other.draw_times.parts().for_each(|(stage, took)| self.draw_times.add(stage, took));
         // Left out is what no view needed.
         self.skips.retain(|skip| other.skips.iter().any(|other| other.kind == skip.kind));

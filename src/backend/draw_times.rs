@@ -17,6 +17,8 @@ pub enum DrawStage {
     Occlusion,
     /// Samples to colours; where no line is drawn over faces of one colour each, to bytes too.
     Shade,
+    /// Pixels near which faces meet, once more.
+    Mixed,
     /// Edges over colours.
     Lines,
     /// Colours to bytes.
@@ -25,13 +27,14 @@ pub enum DrawStage {
 
 impl DrawStage {
     /// All of them, in order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Transform,
         Self::Sort,
         Self::FaceColors,
         Self::Visibility,
         Self::Occlusion,
         Self::Shade,
+        Self::Mixed,
         Self::Lines,
         Self::Resolve,
     ];
@@ -45,24 +48,29 @@ impl DrawStage {
             Self::Visibility => "visibility",
             Self::Occlusion => "occlusion",
             Self::Shade => "shade",
+            Self::Mixed => "mixed",
             Self::Lines => "lines",
             Self::Resolve => "resolve",
         }
     }
 }
 
-/// The duration of each stage of one picture.
+/// The duration of each stage of one picture, and how many of its pixels were mixed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct DrawTimes([Duration; DrawStage::ALL.len()]);
+pub struct DrawTimes {
+    stages: [Duration; DrawStage::ALL.len()],
+    /// Pixels that were drawn from coverage points; 0 unless samples are adaptive.
+    pub mixed_pixels: u64,
+}
 
 impl DrawTimes {
     /// Adds to the duration of a stage.
     pub fn add(&mut self, stage: DrawStage, took: Duration) {
-        self.0[stage as usize] += took;
+        self.stages[stage as usize] += took;
     }
 
     /// The stages that took time, in order. Empty if nothing was timed.
     pub fn parts(&self) -> impl Iterator<Item = (DrawStage, Duration)> {
-        DrawStage::ALL.into_iter().zip(self.0).filter(|(_, took)| !took.is_zero())
+        DrawStage::ALL.into_iter().zip(self.stages).filter(|(_, took)| !took.is_zero())
     }
 }

@@ -1,7 +1,7 @@
 //! Scene to plan: what a picture needs, and what it does not.
 
 use super::context::PlanContext;
-use super::peeling::{pass_masks, peeling_pass};
+use super::peeling::{needed_pass, pass_masks, peeling_pass};
 use super::prepared::Prepared;
 use super::projection::Projection;
 use super::skips::SkipKind;
@@ -48,7 +48,11 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
     let occlusion = surface::occlusion::occlusion_pass(scene, surface.as_ref(), &mut cx);
     let clipped = Projection::new(camera, scene.size_px(), true);
     let hides = surface.is_some() || groups.has_hull();
-    let needed_px = lines.iter().map(lines::LinePass::margin_rows).filter(|_| hides).max().unwrap_or(0);
+    let is_peeled = needed_pass(groups).is_some();
+    let others = surface::adaptive::Others { lines: !lines.is_empty(), layers: is_peeled };
+    let (samples, is_adaptive) = surface::adaptive::samples(scene, others, &mut cx);
+    let needed_px = lines.iter().map(lines::LinePass::margin_rows).filter(|_| hides).max();
+    let needed_px = needed_px.unwrap_or(0).max(u32::from(is_adaptive));
     let margin_px = margin::margin_px(scene, &geometry, needed_px, &mut cx)?;
     let is_mesh_alone = geometry.triangles.len() == scene.mesh.triangles.len();
     let ground_count = ground::add(scene, &mut geometry, &mut surface, &mut cx)?;
@@ -76,7 +80,8 @@ fn build_in<'m>(scene: &Scene<'m, '_>, mut cx: PlanContext<'_>) -> Result<DrawPl
         width_px: spec.image.width_px,
         height_px: spec.image.height_px,
         margin_px,
-        samples: spec.image.samples,
+        samples,
+        is_adaptive,
         positions: geometry.positions,
         triangles: geometry.triangles,
         pass_masks,

@@ -41,7 +41,7 @@ pub fn margin_px(
     cx: &mut PlanContext<'_>,
 ) -> Result<u32, Stopped> {
     let (is_unneeded, why) = match needed_px {
-        0 => (true, "no line asks what hides it"),
+        0 => (true, "nothing asks what lies beyond a pixel"),
         _ => (is_inside(scene, geometry, cx.deadline)?, "the whole mesh lies inside the picture"),
     };
     let is_skipped = cx.skips.skip(SkipKind::Margin, is_unneeded, why);

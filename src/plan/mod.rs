@@ -72,6 +72,9 @@ pub struct DrawPlan<'a> {
     pub margin_px: u32,
     /// Visibility samples per pixel: 1, 4, 8 or 16.
     pub samples: u32,
+    /// True if pixels near which faces meet that differ in colour are drawn from coverage points
+    /// instead of samples. Such a plan has neither lines nor layers.
+    pub is_adaptive: bool,
     /// Positions in the unit box.
     pub positions: SharedSlice<'a, [f32; 3]>,
     /// Triangles over `positions`. An id in the visibility buffer is an index here, or past them
@@ -133,6 +136,7 @@ impl<'a> DrawPlan<'a> {
             height_px: size_px[1],
             margin_px: 0,
             samples: 1,
+            is_adaptive: false,
             positions: positions.into(),
             triangles: triangles.into(),
             pass_masks: Cow::Borrowed(&[]),
@@ -180,6 +184,12 @@ impl<'a> DrawPlan<'a> {
     #[inline(always)]
     pub fn pass_mask(&self, triangle: usize) -> u8 {
         self.pass_masks.get(triangle).copied().unwrap_or(pass_mask::SURFACE)
+    }
+
+    /// Rows above and below a band whose samples it needs: for what hides its lines, or for the
+    /// neighbours of its pixels.
+    pub fn margin_rows(&self) -> u32 {
+        self.line_margin_rows().max(u32::from(self.is_adaptive))
     }
 
     /// True if any sample gets a colour.

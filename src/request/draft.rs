@@ -9,7 +9,7 @@ use crate::request::table::dependent::Dependent;
 use crate::spec::words::{Words, word_for};
 use crate::spec::{
     BackendChoice, CameraSpec, DebugView, Ground, ImageSpec, Layers, Light, LightPreset, Open, Outline, OutlineMethod,
-    Points, QualityTarget, Spec, Surface, Topology, Wire, WireMethod,
+    Points, QualityTarget, Samples, Spec, Surface, Topology, Wire, WireMethod,
 };
 
 /// Most different styles of exact wires and contours in one picture.
@@ -42,7 +42,7 @@ pub struct Draft {
     /// Columns and rows.
     pub size_px: [u32; 2],
     /// By default 4, unless a quality target chooses.
-    pub samples: Dependent<u32>,
+    pub samples: Dependent<Samples>,
     /// By default the server's, unless a quality target chooses.
     pub backend: Dependent<BackendChoice>,
     /// See [`QualityTarget::max_error`].

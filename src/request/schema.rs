@@ -156,6 +156,10 @@ fn of_kind(kind: &Kind, image_px: u64) -> Json {
         }
         Kind::Above0 { max } => json!({ "type": "number", "exclusiveMinimum": 0, "maximum": max }),
         Kind::OneOf(values) => json!({ "enum": values }),
+        Kind::OneOfOr { word, values } => {
+            let numbers = values.iter().map(|&value| Json::from(value));
+            json!({ "enum": std::iter::once(Json::from(*word)).chain(numbers).collect::<Vec<_>>() })
+        }
         Kind::Pixels => whole(),
         Kind::Size => {
             let digits = image_px.to_string().len() - 1;

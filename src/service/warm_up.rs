@@ -102,7 +102,7 @@ fn make_ready(
     limits: &Limits,
     deadline: &Deadline,
 ) -> Result<(), DrawError> {
-    let samples = specs.first().map_or(1, |(_, spec)| spec.image.samples);
+    let samples = specs.first().map_or(1, |(_, spec)| spec.image.samples.per_pixel());
     let make = &|device: &Arc<dyn GpuDevice>, style: &str, spec: &Spec| {
         let made = || pipeline::make_ready(model, spec, &**device, &mut Budget::new(limits), deadline);
         // wgpu may panic on a lost device.

@@ -13,8 +13,8 @@ pub struct ImageSpec {
     pub height_px: u32,
     /// None: the caller decides, by file extension or Accept header, and else takes PNG.
     pub format: Option<ImageFormat>,
-    /// Visibility samples per pixel: 1, 4, 8 or 16.
-    pub samples: u32,
+    /// Visibility samples per pixel.
+    pub samples: Samples,
     /// What is behind the mesh; alpha 0 is transparent.
     pub background: Background,
     /// Time that is spent to make a PNG small, from 0 to 9. Other formats ignore it.
@@ -22,6 +22,41 @@ pub struct ImageSpec {
     /// Tells in the picture what the colours of its diagnostics mean.
     pub legend: bool,
 }
+
+/// Visibility samples per pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Samples {
+    /// 1, 4, 8 or 16.
+    Fixed(u32),
+    /// 4, and more in pixels that show several faces.
+    Adaptive,
+}
+
+impl Samples {
+    /// The numbers that a request may ask for.
+    pub const FIXED: &'static [u32] = &[1, 4, 8, 16];
+
+    /// Samples in every pixel.
+    pub fn per_pixel(self) -> u32 {
+        match self {
+            Self::Fixed(samples) => samples,
+            Self::Adaptive => 4,
+        }
+    }
+}
+
+/// The value of `image.samples`.
+impl std::fmt::Display for Samples {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Fixed(samples) => samples.fmt(f),
+            Self::Adaptive => f.write_str(ADAPTIVE),
+        }
+    }
+}
+
+/// The word for [`Samples::Adaptive`].
+pub const ADAPTIVE: &str = "adaptive";
 
 /// The default of [`ImageSpec::effort`]: quick, because pictures are drawn more often than stored.
 pub const DEFAULT_EFFORT: u32 = 3;
@@ -32,7 +67,7 @@ impl Default for ImageSpec {
             width_px: 512,
             height_px: 512,
             format: None,
-            samples: 4,
+            samples: Samples::Fixed(4),
             background: Rgba::WHITE.into(),
             effort: DEFAULT_EFFORT,
             legend: false,

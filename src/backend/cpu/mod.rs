@@ -15,6 +15,7 @@ mod deadline_poll;
 pub(super) mod geometry;
 mod isa;
 pub(super) mod lines;
+pub(super) mod mixed;
 pub(super) mod occlusion;
 mod peeling;
 mod resolve;

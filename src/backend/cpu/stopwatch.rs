@@ -6,15 +6,22 @@ use std::time::{Duration, Instant};
 use crate::backend::draw_times::{DrawStage, DrawTimes};
 
 /// The stages of a band, in order. Each thread runs them for its own bands.
-const BAND_STAGES: [DrawStage; 4] = [DrawStage::Visibility, DrawStage::Shade, DrawStage::Lines, DrawStage::Resolve];
+const BAND_STAGES: [DrawStage; 5] =
+    [DrawStage::Visibility, DrawStage::Shade, DrawStage::Mixed, DrawStage::Lines, DrawStage::Resolve];
 
-/// Time of each stage, summed over all threads.
+/// Time of each stage, summed over all threads, and the number of mixed pixels.
 #[derive(Default)]
 pub struct Stopwatch {
+    mixed_pixels: AtomicU64,
     nanoseconds: [AtomicU64; DrawStage::ALL.len()],
 }
 
 impl Stopwatch {
+    /// Counts mixed pixels.
+    pub fn count_mixed(&self, pixels: usize) {
+        self.mixed_pixels.fetch_add(pixels as u64, Ordering::Relaxed);
+    }
+
     /// Begins a stage.
     pub fn begin(&self) -> Lap<'_> {
         Lap { watch: self, began: Instant::now() }
@@ -27,6 +34,7 @@ impl Stopwatch {
         let sum: Duration = BAND_STAGES.into_iter().map(of).sum();
         let wall_share = bands.as_secs_f64() / sum.as_secs_f64().max(1e-9);
         let mut times = DrawTimes::default();
+        times.mixed_pixels = self.mixed_pixels.load(Ordering::Relaxed);
         for stage in DrawStage::ALL {
             let is_of_band = BAND_STAGES.contains(&stage);
             times.add(stage, if is_of_band { of(stage).mul_f64(wall_share) } else { of(stage) });
@@ -62,8 +70,8 @@ mod tests {
     #[test]
     fn stages_of_bands_share_their_wall_time() {
         let ms = |n: u64| AtomicU64::new(n * 1_000_000);
-        let nanoseconds = [ms(3), ms(1), ms(0), ms(10), ms(0), ms(20), ms(0), ms(10)];
-        let watch = Stopwatch { nanoseconds };
+        let nanoseconds = [ms(3), ms(1), ms(0), ms(10), ms(0), ms(20), ms(0), ms(0), ms(10)];
+        let watch = Stopwatch { nanoseconds, mixed_pixels: AtomicU64::new(7) };
         let parts: Vec<_> = watch.times(Duration::from_millis(20)).parts().collect();
         let wanted = [
             (DrawStage::Transform, 3),
@@ -73,6 +81,7 @@ mod tests {
             (DrawStage::Resolve, 5),
         ];
         assert_eq!(parts, wanted.map(|(stage, ms)| (stage, Duration::from_millis(ms))));
+        assert_eq!(watch.times(Duration::ZERO).mixed_pixels, 7);
         assert_eq!(Stopwatch::default().times(Duration::ZERO).parts().count(), 0);
     }
 }

@@ -103,8 +103,8 @@ pub struct RenderArgs {
     /// Request document (JSON; `meshsnap serve` has its schema at /v1/schema)
     #[arg(long, value_name = "FILE.json", value_hint = ValueHint::FilePath, help_heading = LOOK, hide_short_help = true)]
     pub request: Option<PathBuf>,
-    /// Samples per pixel
-    #[arg(long, value_name = "N", value_parser = ["1", "4", "8", "16"], help_heading = LOOK, hide_short_help = true)]
+    /// Samples per pixel; adaptive: 4, and 256 points in pixels that show several faces
+    #[arg(long, value_name = "N", value_parser = ["adaptive", "1", "4", "8", "16"], help_heading = LOOK, hide_short_help = true)]
     pub samples: Option<String>,
 
     #[arg(

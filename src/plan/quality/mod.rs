@@ -14,8 +14,8 @@ use error_table::ErrorTable;
 
 use crate::spec::words::word_for;
 use crate::spec::{
-    BackendChoice, FlatNormals, Hidden, Layers, OutlineMethod, QualityTarget, Shading, Spec, WIRE_METHODS, Wire,
-    WireMethod, WireThickness,
+    BackendChoice, FlatNormals, Hidden, Layers, OutlineMethod, QualityTarget, Samples, Shading, Spec, WIRE_METHODS,
+    Wire, WireMethod, WireThickness,
 };
 use crate::warning::Warning;
 
@@ -34,7 +34,7 @@ pub struct SelectedSpec {
 #[derive(Clone, Debug)]
 pub struct QualitySelection {
     /// The value of `image.samples`.
-    pub samples: u32,
+    pub samples: Samples,
     /// The methods by which wires are drawn, each once.
     pub wire_methods: Vec<&'static str>,
     /// The value of `backend`.
@@ -111,7 +111,8 @@ fn candidates(
     triangles: usize,
     has_gpu: bool,
 ) -> Vec<Candidate> {
-    let samples = if target.open.samples { vec![1, 4, 8, 16] } else { vec![spec.image.samples] };
+    let fixed = || Samples::FIXED.iter().map(|&samples| Samples::Fixed(samples));
+    let samples = if target.open.samples { fixed().collect() } else { vec![spec.image.samples] };
     let has_open_wire = target.open.wire || target.open.material_wires.contains(&true);
     // The width of the other methods depends on each triangle's size.
     let in_pixels = WIRE_METHODS.iter().map(|row| row.method).filter(|method| method.has_pixel_width());
@@ -171,7 +172,8 @@ fn as_wide(wire: &Wire, method: WireMethod) -> Option<Wire> {
     })
 }
 
-/// The error and the time of a picture; None where the table does not have one of its techniques.
+/// The error and the time of a picture; None where the table does not have one of its techniques. With adaptive
+/// samples they are those of the samples that all pixels have.
 fn expect(table: &ErrorTable, spec: &Spec, backend: &str, triangles: usize) -> Option<[f64; 2]> {
     let mut techniques: Vec<&str> = styles(spec).flat_map(techniques).collect();
     techniques.extend(spec.topology.map(|_| word_for(WireMethod::Exact)));
@@ -180,7 +182,7 @@ fn expect(table: &ErrorTable, spec: &Spec, backend: &str, triangles: usize) -> O
     let pixels = f64::from(spec.image.width_px) * f64::from(spec.image.height_px);
     let (mut error, mut time_ms) = (0.0_f64, 0.0);
     for technique in techniques {
-        let row = table.row(technique, backend, spec.image.samples)?;
+        let row = table.row(technique, backend, spec.image.samples.per_pixel())?;
         error = error.max(table.error(row, pixels));
         time_ms += row.time_ms(pixels, triangles as f64);
     }

@@ -1,5 +1,6 @@
 //! The surface: what turns a visible sample into a colour.
 
+pub(crate) mod adaptive;
 pub(crate) mod build;
 pub(crate) mod closeup;
 pub(crate) mod edge_masks;

@@ -7,7 +7,7 @@ use super::value::{COORDINATE_MAX, Kind, Value};
 use crate::request::draft::Draft;
 use crate::spec::color::Rgba;
 use crate::spec::words::{Words, words_of};
-use crate::spec::{Background, NamedView, SHEET_VIEWS_MAX, WireThickness};
+use crate::spec::{ADAPTIVE, Background, NamedView, SHEET_VIEWS_MAX, Samples, WireThickness};
 
 /// A key that holds a value.
 pub struct Field {
@@ -111,6 +111,20 @@ impl Place for WireThickness {
         match value {
             Value::Word(_) => Some(Self::Auto),
             Value::Number(v) => Some(Self::Given(v as f32)),
+            _ => None,
+        }
+    }
+}
+
+impl Place for Samples {
+    fn kind() -> Kind {
+        Kind::OneOfOr { word: ADAPTIVE, values: Self::FIXED }
+    }
+
+    fn of(value: Value) -> Option<Self> {
+        match value {
+            Value::Word(_) => Some(Self::Adaptive),
+            Value::Whole(samples) => Some(Self::Fixed(samples)),
             _ => None,
         }
     }

@@ -105,6 +105,13 @@ pub enum Kind {
     },
     /// One of a few whole numbers.
     OneOf(&'static [u32]),
+    /// One of a few whole numbers, or a word.
+    OneOfOr {
+        /// The word.
+        word: &'static str,
+        /// The numbers.
+        values: &'static [u32],
+    },
     /// A width or height: 1 to the limit in pixels.
     Pixels,
     /// `N` or `WxH`.
@@ -178,7 +185,8 @@ impl Kind {
             Self::Number { min, max } => format!("a number from {} to {}", short(*min), short(*max)),
             Self::NumberOr { word, min, max } => format!("{word} or a number from {} to {}", short(*min), short(*max)),
             Self::Above0 { max } => format!("a number above 0, at most {}", short(*max)),
-            Self::OneOf(values) => values.iter().map(u32::to_string).collect::<Vec<_>>().join(" or "),
+            Self::OneOf(values) => either(values),
+            Self::OneOfOr { word, values } => format!("{word} or {}", either(values)),
             Self::Pixels => format!("a whole number from 1 to {image_px_max}"),
             Self::Size => format!("N or WxH, with whole numbers from 1 to {image_px_max}"),
             Self::Words(words) => format!("one of {}", words.join(", ")),
@@ -228,6 +236,7 @@ impl Kind {
             | Self::NumberOr { .. }
             | Self::Above0 { .. }
             | Self::OneOf(_)
+            | Self::OneOfOr { .. }
             | Self::Pixels
             | Self::Count { .. } => Some("a number"),
             Self::Flag => Some("a truth value"),
@@ -251,7 +260,8 @@ impl Kind {
                 Some(given.number()?).filter(|n| (*min..=*max).contains(n)).map(Value::Number)
             }
             Self::Above0 { max } => Some(given.number()?).filter(|n| *n > 0.0 && n <= max).map(Value::Number),
-            Self::OneOf(values) => {
+            Self::OneOfOr { word, .. } if given.text() == Some(word) => Some(Value::Word(0)),
+            Self::OneOf(values) | Self::OneOfOr { values, .. } => {
                 let number = given.number()?;
                 values.iter().find(|&&v| f64::from(v) == number).map(|&v| Value::Whole(v))
             }
@@ -277,6 +287,11 @@ impl Kind {
             Self::Flag => Some(Value::Flag(given.flag()?)),
         })
     }
+}
+
+/// Numbers, in words.
+fn either(values: &[u32]) -> String {
+    values.iter().map(u32::to_string).collect::<Vec<_>>().join(" or ")
 }
 
 /// The word that was probably meant by one that is none of `words`.

@@ -7,8 +7,8 @@ use super::*;
 use crate::mesh::UpAxis;
 use crate::spec::color::Rgba;
 use crate::spec::{
-    Background, DebugView, FlatNormals, Hidden, LightPreset, NamedView, Outline, OutlineMethod, OutlineUnit, Shading,
-    Sheet, SheetViews, WireEdges, WireMethod, WireThickness,
+    Background, DebugView, FlatNormals, Hidden, LightPreset, NamedView, Outline, OutlineMethod, OutlineUnit, Samples,
+    Shading, Sheet, SheetViews, WireEdges, WireMethod, WireThickness,
 };
 
 pub fn rules() -> Rules {
@@ -159,7 +159,7 @@ fn every_key_reaches_its_field() {
     assert_eq!((camera.azimuth_deg, camera.elevation_deg), (Some(10.0), Some(-20.0)));
     assert_eq!((camera.eye, camera.target), (Some([1.0, 2.0, 3.0]), Some([0.0, 0.0, 0.5])));
     assert_eq!((spec.light.intensity, spec.light.ambient), (2.0, 0.1));
-    assert_eq!((spec.image.width_px, spec.image.height_px, spec.image.samples), (640, 480, 1));
+    assert_eq!((spec.image.width_px, spec.image.height_px, spec.image.samples), (640, 480, Samples::Fixed(1)));
     assert_eq!((spec.image.format, spec.image.background), (Some(ImageFormat::Webp), Rgba::TRANSPARENT.into()));
     assert_eq!((spec.image.effort, spec.image.legend), (9, true));
     assert_eq!(spec.backend, BackendChoice::Cpu);

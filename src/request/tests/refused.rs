@@ -62,7 +62,7 @@ fn every_bad_value_is_refused_by_name() {
         (&[("size", "640x0")], OutOfRange, "size", "N or WxH"),
         (&[("size", "99999999999999999999999")], OutOfRange, "size", "from 1"),
         (&[("image.width", "0")], OutOfRange, "image.width", "from 1"),
-        (&[("samples", "2")], OutOfRange, "samples", "1 or 4"),
+        (&[("samples", "2")], OutOfRange, "samples", "adaptive or 1 or 4"),
         (&[("format", "bmp")], OutOfRange, "format", "png"),
         (&[("background", "white")], OutOfRange, "background", "#rgb"),
         (&[("background", "")], OutOfRange, "background", "or without #"),

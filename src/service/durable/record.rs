@@ -151,7 +151,7 @@ pub struct WarningRecord {
 /// The techniques that were chosen for a request with a quality target.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SelectionRecord {
-    /// Samples per pixel.
+    /// Samples per pixel; 0 for adaptive ones.
     pub samples: u32,
     /// The methods by which wires were drawn.
     pub wire_methods: Vec<String>,

@@ -13,6 +13,7 @@ use crate::service::durable::{
     ClaimRecord, Durable, EndRecord, ErrorRecord, FileRecord, Hold, JobRecord, PictureRecord, RequestRecord,
     SelectionRecord, Unstored, WarningRecord,
 };
+use crate::spec::Samples;
 use crate::spec::words::{Words, word_for};
 use crate::warning::Warning;
 
@@ -100,7 +101,10 @@ impl Storage {
 fn of_picture(finished: &Finished, hold: &Hold) -> PictureRecord {
     let warnings = finished.warnings.iter();
     let selection = finished.selection.as_ref().map(|selection| SelectionRecord {
-        samples: selection.samples,
+        samples: match selection.samples {
+            Samples::Fixed(samples) => samples,
+            Samples::Adaptive => 0,
+        },
         wire_methods: selection.wire_methods.iter().map(|&method| method.to_owned()).collect(),
         backend: word_for(selection.backend).to_owned(),
         expected_error: selection.expected_error,
@@ -123,7 +127,10 @@ pub fn read_picture(record: PictureRecord, picture: Bytes) -> Option<Finished> {
     let [queue, parse, plan, render, encode] = record.timings_us.map(Duration::from_micros);
     let selection = match record.selection {
         Some(selection) => Some(QualitySelection {
-            samples: selection.samples,
+            samples: match selection.samples {
+                0 => Samples::Adaptive,
+                samples => Samples::Fixed(samples),
+            },
             wire_methods: selection.wire_methods.iter().map(|method| name(method)).collect(),
             backend: value_of(&selection.backend)?,
             expected_error: selection.expected_error,

@@ -15,8 +15,8 @@ use crate::limits::{Deadline, Stopped};
 use crate::pipeline::{Output, RenderError, Stage};
 use crate::spec::color::Rgba;
 use crate::spec::{
-    BackendChoice, CameraSpec, Ground, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind, Sheet,
-    SheetViews, Spec,
+    BackendChoice, CameraSpec, Ground, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind,
+    Samples, Sheet, SheetViews, Spec,
 };
 
 const SOON: Duration = Duration::from_secs(10);
@@ -76,7 +76,7 @@ fn spec() -> Spec {
         width_px: 8,
         height_px: 8,
         format: None,
-        samples: 1,
+        samples: Samples::Fixed(1),
         background: Rgba::WHITE.into(),
         effort: 3,
         legend: false,

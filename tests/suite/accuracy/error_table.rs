@@ -7,7 +7,7 @@ use meshsnap::limits::Limits;
 use meshsnap::plan;
 use meshsnap::request;
 use meshsnap::request::Rules;
-use meshsnap::spec::BackendChoice;
+use meshsnap::spec::{BackendChoice, Samples};
 
 use crate::measure::scenes::{SCENES, Scene, UNSEEN};
 use crate::measure::techniques::{Family, Technique};
@@ -67,7 +67,7 @@ fn expected(technique: Technique, samples: u32, size_px: u32) -> f64 {
     let rules = Rules { limits: Limits::default(), backend: BackendChoice::Auto };
     let spec = request::read(None, &keys, &rules).unwrap();
     let selection = plan::select_quality(&spec, 1000, false).unwrap().selection;
-    assert_eq!((selection.samples, selection.backend), (samples, BackendChoice::Cpu));
+    assert_eq!((selection.samples, selection.backend), (Samples::Fixed(samples), BackendChoice::Cpu));
     selection.expected_error
 }
 

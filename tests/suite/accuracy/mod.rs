@@ -1,5 +1,6 @@
 //! The distance of pictures from the truth, and tests that the gates can fail.
 
+pub mod adaptive;
 pub mod behind_eye;
 pub mod bench;
 pub mod error_table;

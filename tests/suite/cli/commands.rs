@@ -208,6 +208,24 @@ fn explain_tells_what_was_skipped_and_how_long_it_took() {
     assert!(stderr.contains("skipped "), "{stderr}");
 }
 
+#[test]
+fn explain_counts_mixed_pixels() {
+    let explained = |more: &[&str]| {
+        let arguments = ["render", "-", "-o", "-", "--size", "64", "--samples", "adaptive", "--explain", "--style"];
+        let output = run(&[&arguments[..], more].concat(), CUBE_OBJ);
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let flat = explained(&["flat"]);
+    let line = flat.lines().find(|line| line.starts_with("mixed pixels, drawn from 256 points each")).unwrap();
+    let count: u32 = line.rsplit(' ').next().unwrap().parse().unwrap();
+    assert!((100..2000).contains(&count), "{line}");
+    assert!(flat.contains("drawn by cpu") && flat.contains("mixed "), "{flat}");
+    let wire = explained(&["wire"]);
+    assert!(!wire.contains("mixed pixels"), "{wire}");
+    assert!(wire.contains("warning: image.samples is adaptive, and lines are drawn over faces"), "{wire}");
+}
+
 /// What a driver makes of shaders is kept, and read again; damage costs time and nothing else.
 #[test]
 fn kept_shaders_change_no_picture() {

@@ -104,7 +104,7 @@ const MISTAKES: &[(&str, i32, &str)] = &[
     ("render cube.obj -o out.png --view fromt", 2, "a similar value exists: 'front'"),
     ("render cube.obj -o out.png --sheet front,tpo", 2, "invalid value 'tpo' for '--sheet <V,V,...>'"),
     ("render cube.obj -o out.png --backend cuda", 2, "[possible values: auto, gpu, cpu]"),
-    ("render cube.obj -o out.png --samples 2", 2, "[possible values: 1, 4, 8, 16]"),
+    ("render cube.obj -o out.png --samples 2", 2, "[possible values: adaptive, 1, 4, 8, 16]"),
     ("render cube.obj -o out.png --format-in dae", 2, "[possible values: obj, gltf, glb, stl, ply, off, fbx, 3mf]"),
     (
         "render cube.obj -o out.png --size 640*480",

@@ -131,7 +131,7 @@ fn values_in_the_wrong_notation_are_told_the_right_one() {
         (br#"{"wire":{"thickness":"2"}}"#, "wrong_type", &["a number in quotes", "from 0 to 100, without quotes"]),
         (br#"{"wire":{"lit":"true"}}"#, "wrong_type", &["a truth value in quotes"]),
         (br#"{"image":{"max_error":"0.5"}}"#, "wrong_type", &["without quotes, or null"]),
-        (br#"{"samples":"many"}"#, "wrong_type", &["`samples` is \"many\", and allowed is 1 or 4"]),
+        (br#"{"samples":"many"}"#, "wrong_type", &["`samples` is \"many\", and allowed is adaptive or 1 or 4"]),
         (br#"{"camera":{"eye":"1,2,3"}}"#, "wrong_type", &["[x, y, z]", "x,y,z", "in a query"]),
     ];
     for (document, code, parts) in cases {

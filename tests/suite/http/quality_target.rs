@@ -74,6 +74,8 @@ fn a_job_reports_its_choice_and_what_could_not_be_met() {
     let (unmet, _) = report("style=wire&max_error=0.01");
     assert_eq!((&unmet["chosen"]["samples"], &unmet["warnings"][0]["code"]), (&16.into(), &"max_error_unmet".into()));
     assert!(unmet["chosen"]["expected_error"].as_f64().unwrap() > 0.01);
+    let (adaptive, _) = report("style=flat&samples=adaptive&max_error=99");
+    assert_eq!(adaptive["chosen"]["samples"], "adaptive", "{adaptive:#}");
     let (late, _) = report("image.max_time_ms=0.000001");
     assert_eq!(late["warnings"][0]["code"], "max_time_ms_unmet", "{late:#}");
     let (plain, _) = report("style=wire");

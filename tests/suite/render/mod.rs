@@ -1,5 +1,6 @@
 //! Pictures: the same on every back-end, and as they should be.
 
+pub mod adaptive;
 pub mod diagnostics;
 pub mod examples;
 pub mod golden;

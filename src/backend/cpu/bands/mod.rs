@@ -34,9 +34,11 @@ use crate::backend::cpu::lines::holes::free_points::{add_points, add_points_plai
 use crate::backend::cpu::lines::holes::{self, Holes};
 use crate::backend::cpu::lines::line_light;
 use crate::backend::cpu::lines::plain::add_holes_plainly;
+use crate::backend::cpu::mixed::draw::draw_mixed;
 use crate::backend::cpu::occlusion::grid::{Shape, write_band};
 use crate::backend::cpu::peeling;
 use crate::backend::cpu::peeling::state::PeelBand;
+use crate::backend::cpu::resolve::Resolver;
 use crate::backend::cpu::surface::flat::{draw_flat, shade_flat};
 use crate::backend::cpu::surface::light::Light;
 use crate::backend::cpu::surface::shade;
@@ -55,6 +57,15 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
     if let (true, Some(flat)) = (plan.lines.is_empty(), context.flat) {
         draw_flat(isa, context, flat, &scratch.samples, rgba);
         lap.end(DrawStage::Shade);
+        if plan.is_adaptive {
+            let (width, first) = (plan.width_px as usize, scratch.samples.shown[0]);
+            let (pixels, _) = rgba.as_chunks_mut::<4>();
+            draw_mixed(context, (&bins.triangles, band), &scratch.samples, &mut scratch.mixed, |x, y, color| {
+                let resolver = Resolver::new(plan.background_at(y), context.srgb);
+                pixels[(y - first) as usize * width + x as usize] = resolver.pixel(color);
+            });
+            lap.end(DrawStage::Mixed);
+        }
         return;
     }
     scratch.colors.clear();
@@ -69,6 +80,14 @@ pub fn draw(context: &RasterContext<'_>, scratch: &mut BandScratch, bins: &Bins,
     }
     if plan.peeling().is_some() || plan.is_shaded() {
         lap.end(DrawStage::Shade);
+    }
+    if plan.is_adaptive && plan.is_shaded() {
+        let (width, first) = (plan.width_px as usize, scratch.samples.shown[0]);
+        let (samples, colors) = (&scratch.samples, &mut scratch.colors);
+        draw_mixed(context, (&bins.triangles, band), samples, &mut scratch.mixed, |x, y, color| {
+            colors[(y - first) as usize * width + x as usize] = color;
+        });
+        lap.end(DrawStage::Mixed);
     }
     if !plan.lines.is_empty() {
         draw_lines(context, scratch, bins, band);

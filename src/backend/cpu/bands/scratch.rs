@@ -6,6 +6,7 @@ use crate::backend::cpu::geometry::samples::{HANGOVER, SampleBand};
 use crate::backend::cpu::lines::coverage::BandStrokes;
 use crate::backend::cpu::lines::farthest::Farthest;
 use crate::backend::cpu::lines::holes::Holes;
+use crate::backend::cpu::mixed::draw::MixedScratch;
 use crate::backend::cpu::peeling::state::PeelBand;
 use crate::backend::cpu::surface::flat::FlatColors;
 use crate::backend::cpu::surface::light::Light;
@@ -54,7 +55,7 @@ impl Banding {
     /// them: then a band has as many rows as lets the threads do the most in [`BANDS_BYTES_MAX`],
     /// because small bands draw most samples for their neighbours, and few large ones fit at once.
     pub fn new(plan: &DrawPlan<'_>, threads: usize) -> Self {
-        let margin = plan.line_margin_rows();
+        let margin = plan.margin_rows();
         let cached = (BAND_BYTES / (row_bytes(plan, 1) + row_bytes(plan, 0)).max(1)) as u32;
         let banding = |rows: u32| {
             let rows = rows.max(cached).max(ROWS_MIN).clamp(1, plan.height_px.max(1));
@@ -100,7 +101,9 @@ impl Banding {
     /// Memory of the bands that are drawn at once.
     pub fn bytes(&self, plan: &DrawPlan<'_>) -> usize {
         let all = (self.rows + 2 * self.margin) as usize;
-        self.at_once * (all * row_bytes(plan, 0) + self.rows as usize * row_bytes(plan, 1))
+        let size = [plan.width_px, self.rows].map(|pixels| pixels as usize);
+        let mixed = if plan.is_adaptive { MixedScratch::bytes_of(size) } else { 0 };
+        self.at_once * (all * row_bytes(plan, 0) + self.rows as usize * row_bytes(plan, 1) + mixed)
     }
 }
 
@@ -141,6 +144,8 @@ pub struct BandScratch {
     pub strokes: BandStrokes,
     /// Holes of the current line pass.
     pub holes: Holes,
+    /// Mixed pixels.
+    pub mixed: MixedScratch,
     /// Per pixel, where the pass is lit: the face that lights its lines, plus 1.
     pub owners: Vec<u32>,
     /// Per pixel, the light on its lines.
@@ -159,6 +164,7 @@ impl BandScratch {
             colors: Vec::new(),
             strokes: BandStrokes::default(),
             holes: Holes::default(),
+            mixed: MixedScratch::default(),
             owners: Vec::new(),
             light: Vec::new(),
         }
@@ -182,6 +188,7 @@ impl BandScratch {
             + self.colors.capacity() * size_of::<[f32; 4]>()
             + self.strokes.bytes()
             + self.holes.bytes()
+            + self.mixed.bytes()
             + self.owners.capacity() * size_of::<u32>()
             + self.light.capacity() * size_of::<Light>()
     }

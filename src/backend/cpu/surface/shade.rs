@@ -162,6 +162,14 @@ impl<'a> Shader<'a> {
         });
     }
 
+    /// The colour of triangle `id` at a point, 1/256 px from the picture's centre, in a pixel whose first
+    /// sample has the depth `own_z`. Its own depth there is `z`.
+    pub fn at_point(&mut self, id: u32, at: [f32; 2], pixel: [u32; 2], [z, own_z]: [f32; 2]) -> [f32; 4] {
+        self.points.show = Show::ALL;
+        self.points.open = self.open_share(pixel, z, own_z);
+        self.colored(id, at)
+    }
+
     /// The colour of triangle `id` at the mean of `count` samples whose offsets in 1/256 px add up
     /// to `offset_sum`.
     #[inline(always)]
@@ -169,11 +177,16 @@ impl<'a> Shader<'a> {
         if id == NOTHING {
             return [0.0; 4];
         }
+        let at = self.mean_place([x, y], offset_sum, count);
+        self.colored(id, at)
+    }
+
+    #[inline(always)]
+    fn colored(&mut self, id: u32, at: [f32; 2]) -> [f32; 4] {
         if let Some(color) = self.points.flat(id) {
             return color;
         }
         let plan = self.context.plan;
-        let at = self.mean_place([x, y], offset_sum, count);
         match (self.context.is_hull(id), &plan.surface, &plan.hull) {
             (false, Some(surface), _) if surface.is_shaded => self.points.color(surface, id, at),
             (true, _, Some(hull)) => hull.color(id as usize),

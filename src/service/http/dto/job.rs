@@ -8,6 +8,7 @@ use super::media_type;
 use crate::pipeline::QualitySelection;
 use crate::service::http::error::ApiError;
 use crate::service::jobs::{Finished, Job, JobId, JobState, Timings};
+use crate::spec::{ADAPTIVE, Samples};
 
 /// The state of a job.
 #[derive(Serialize)]
@@ -64,10 +65,18 @@ struct ResultDto {
 /// is in the result itself.
 #[derive(Serialize)]
 struct ChoiceDto {
-    samples: u32,
+    samples: SamplesDto,
     wire_methods: Vec<&'static str>,
     expected_error: f64,
     expected_time_ms: f64,
+}
+
+/// The value of `image.samples`.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum SamplesDto {
+    Fixed(u32),
+    Word(&'static str),
 }
 
 /// The reason why a job failed.
@@ -135,10 +144,19 @@ impl ResultDto {
     }
 }
 
+impl SamplesDto {
+    fn new(samples: Samples) -> Self {
+        match samples {
+            Samples::Fixed(samples) => Self::Fixed(samples),
+            Samples::Adaptive => Self::Word(ADAPTIVE),
+        }
+    }
+}
+
 impl ChoiceDto {
     fn new(choice: &QualitySelection) -> Self {
         Self {
-            samples: choice.samples,
+            samples: SamplesDto::new(choice.samples),
             wire_methods: choice.wire_methods.clone(),
             expected_error: choice.expected_error,
             expected_time_ms: choice.expected_time_ms,

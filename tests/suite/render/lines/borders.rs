@@ -200,11 +200,11 @@ fn only_where_the_mesh_goes_on_there_are_samples_beyond_the_picture() {
     let cases: [(Keys<'_>, bool, &str); 5] = [
         (&[("style", "wire")], false, "the whole mesh lies inside the picture"),
         (&[("style", "wire"), wide, close, ("camera.target", "0,0,0")], true, ""),
-        (&[("style", "flat"), close, ("camera.target", "0,0,0")], false, "no line asks what hides it"),
+        (&[("style", "flat"), close, ("camera.target", "0,0,0")], false, "nothing asks what lies beyond a pixel"),
         (
             &[("style", "wireframe"), ("wire.hidden", "show"), close, ("camera.target", "0,0,0")],
             false,
-            "no line asks what hides it",
+            "nothing asks what lies beyond a pixel",
         ),
         (&[("style", "hidden-line"), close, ("camera.target", "0,0,0")], true, ""),
     ];

@@ -12,6 +12,7 @@ use crate::backend::cpu::geometry::samples::SampleGrid;
 use crate::backend::cpu::geometry::setups::Corners;
 use crate::backend::cpu::geometry::transform::{OUTSIDE, ScreenVertex};
 use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::mixed::points::POINT_GRID;
 use crate::plan::{DrawPlan, Faces, pass_mask};
 
 /// Triangles of one pass.
@@ -81,7 +82,7 @@ impl Bounds {
     /// Those of a plan's picture.
     pub fn new(plan: &DrawPlan<'_>, [rows, margin]: [u32; 2]) -> Self {
         Self {
-            grid: SampleGrid::new(plan.samples),
+            grid: if plan.is_adaptive { POINT_GRID } else { SampleGrid::new(plan.samples) },
             half: [plan.width_px, plan.height_px].map(|size| size as i32 * 128),
             ranges: [plan.seen_range(plan.width_px), plan.seen_range(plan.height_px)],
             rows: rows as i32,

@@ -1,0 +1,175 @@
+//! Stage mixed, per face: what decides its colour, as far as that is known without shading it.
+//!
+//! Looks are compared, not shown. They are made of numbers that both back-ends have to the bit: colours
+//! that are shaded may differ in their last place.
+
+use crate::backend::cpu::RasterContext;
+use crate::backend::cpu::geometry::samples::NOTHING;
+use crate::backend::cpu::geometry::transform::ScreenVertex;
+use crate::backend::cpu::geometry::visibility::area;
+use crate::backend::cpu::vector::turned_to_viewer;
+use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags};
+
+/// Flags of materials whose colour does not go on smoothly where faces share a corner.
+const BROKEN: u32 = flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::DEBUG | flags::WIRES | flags::BY_ANGLE;
+
+/// Largest difference of two values, squared, over their sum, up to which faces look alike: normals that
+/// differ by about 6 degrees, or colours by about 11/255.
+pub const ALIKE: f32 = 1.0 / 256.0;
+
+/// Added to normals, so that all values are above 0.
+const NORMAL_SHIFT: f32 = 1.5;
+
+/// The highest bits of a key: what its other bits say.
+mod kinds {
+    /// Index of the material of faces that differ by their normals alone.
+    pub const BY_NORMAL: u32 = 1 << 30;
+    /// Nothing: triangles of the outline that differ by their colours alone.
+    pub const BY_COLOR: u32 = 2 << 30;
+    /// Id of a face that is like no other.
+    pub const UNIQUE: u32 = 3 << 30;
+}
+
+/// Flags of materials whose colour depends on more than a normal.
+const MANY_COLORED: u32 = flags::DERIVATIVE_NORMALS
+    | flags::VERTEX_COLORS
+    | flags::DEBUG
+    | flags::WIRES
+    | flags::BY_ANGLE
+    | flags::MASK
+    | flags::BLEND;
+
+/// Ranges of what decides colours, of one face or of several.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Smallest values: of normals, or of colours.
+    low: [f32; 3],
+    /// Largest values.
+    high: [f32; 3],
+    /// Smallest and largest key. Faces with different keys never look alike.
+    keys: [u32; 2],
+    /// Smallest and largest id.
+    ids: [u32; 2],
+}
+
+impl Look {
+    /// The look of no face at all.
+    pub const NOTHING: Self =
+        Self { low: [0.0; 3], high: [0.0; 3], keys: [kinds::UNIQUE | NOTHING; 2], ids: [NOTHING; 2] };
+
+    /// The look of a face, or of the outline's triangle, or of nothing.
+    #[inline(always)]
+    pub fn of(context: &RasterContext<'_>, id: u32) -> Self {
+        if id == NOTHING {
+            return Self::NOTHING;
+        }
+        let of_one = |v: [f32; 3], key: u32| Self { low: v, high: v, keys: [key; 2], ids: [id; 2] };
+        let unique = || of_one([0.0; 3], kinds::UNIQUE | id);
+        if context.is_hull(id) {
+            let color = context.plan.hull.as_ref().map(|hull| hull.color(id as usize));
+            return color.map_or_else(unique, |[r, g, b, _]| of_one([r, g, b], kinds::BY_COLOR));
+        }
+        let corners = context.screen_triangle(id);
+        let surface = context.plan.surface.as_ref().filter(|surface| surface.is_shaded);
+        let Some(surface) = surface.filter(|_| !corners.iter().any(ScreenVertex::is_outside)) else { return unique() };
+        let material = surface.material(id as usize);
+        if material.flags & MANY_COLORED != 0 || is_textured(material) {
+            return unique();
+        }
+        let key = kinds::BY_NORMAL | surface.triangle_materials.get(id as usize).copied().unwrap_or(0);
+        let shifted = |n: [f32; 3]| turned_to_viewer(n, area(&corners) < 0).map(|v| v + NORMAL_SHIFT);
+        if material.flags & flags::LIT == 0 {
+            return of_one([0.0; 3], key);
+        }
+        if material.flags & flags::VERTEX_NORMALS == 0 {
+            return of_one(shifted(face_normal(surface, id)), key);
+        }
+        let Some([a, b, c]) = corner_normals(surface, id) else { return unique() };
+        [shifted(b), shifted(c)].into_iter().fold(of_one(shifted(a), key), |all, v| all.and(&of_one(v, key)))
+    }
+
+    /// The look of these faces and those.
+    #[inline(always)]
+    pub fn and(&self, other: &Self) -> Self {
+        let mut all = *self;
+        for k in 0..3 {
+            all.low[k] = if other.low[k] < all.low[k] { other.low[k] } else { all.low[k] };
+            all.high[k] = if other.high[k] > all.high[k] { other.high[k] } else { all.high[k] };
+        }
+        all.keys = [all.keys[0].min(other.keys[0]), all.keys[1].max(other.keys[1])];
+        all.ids = [all.ids[0].min(other.ids[0]), all.ids[1].max(other.ids[1])];
+        all
+    }
+
+    /// True if there are several faces, or a face and nothing, whose colours may differ.
+    #[inline(always)]
+    pub fn is_mixed(&self) -> bool {
+        let mut are_alike = self.keys[0] == self.keys[1];
+        for k in 0..3 {
+            let difference = self.high[k] - self.low[k];
+            are_alike &= difference * difference <= ALIKE * (self.high[k] + self.low[k]);
+        }
+        self.ids[0] != self.ids[1] && !are_alike
+    }
+}
+
+#[inline(always)]
+fn is_textured(material: &ShadedMaterial) -> bool {
+    material.textures.iter().any(|used| used.texture != TEXTURE_NONE)
+}
+
+#[inline(always)]
+fn face_normal(surface: &SurfacePass<'_>, id: u32) -> [f32; 3] {
+    surface.face_normals.get(id as usize).copied().unwrap_or_default()
+}
+
+#[inline(always)]
+fn corner_normals(surface: &SurfacePass<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
+    let normals = surface.vertex_normals.as_ref()?;
+    let [a, b, c] = *normals.triangles.get(id as usize)?;
+    let of = |i: u32| normals.values.get(i as usize).copied();
+    Some([of(a)?, of(b)?, of(c)?])
+}
+
+/// True if two ids are the same, or smooth faces whose colours go on from one to the other: they show the same
+/// side, and share a corner with all that is interpolated between corners.
+#[inline(always)]
+pub fn are_linked(context: &RasterContext<'_>, a: u32, b: u32) -> bool {
+    if a == b {
+        return true;
+    }
+    let surface = context.plan.surface.as_ref().filter(|surface| surface.is_shaded);
+    let (Some(surface), false) = (surface, context.is_hull(a) | context.is_hull(b)) else { return false };
+    let material_of = |id: u32| surface.triangle_materials.get(id as usize).copied().unwrap_or(0);
+    let material = surface.material(a as usize);
+    if material_of(a) != material_of(b) || material.flags & BROKEN != 0 {
+        return false;
+    }
+    let [at_a, at_b] = [a, b].map(|id| context.screen_triangle(id));
+    if at_a.iter().chain(&at_b).any(ScreenVertex::is_outside) || (area(&at_a) < 0) != (area(&at_b) < 0) {
+        return false;
+    }
+    let has = |flag: u32| material.flags & flag != 0;
+    let normals = surface.vertex_normals.as_ref().filter(|_| has(flags::VERTEX_NORMALS)).map(|v| &v.triangles[..]);
+    let uvs = surface.uvs.as_ref().filter(|_| is_textured(material)).map(|v| &v.triangles[..]);
+    let colors = surface.colors.as_ref().filter(|_| has(flags::VERTEX_COLORS)).map(|v| &v.triangles[..]);
+    let shared = [Some(&context.plan.triangles[..]), normals, uvs, colors].map(|list| shared_corners(list, a, b));
+    shared.into_iter().fold(ALL_CORNERS, |all, shared| all & shared) != 0
+}
+
+/// Bits of all pairs of corners of two triangles.
+const ALL_CORNERS: u32 = (1 << 9) - 1;
+
+/// A bit for each pair of corners of two triangles that have the same index; all where there is no list.
+#[inline(always)]
+fn shared_corners(list: Option<&[[u32; 3]]>, a: u32, b: u32) -> u32 {
+    let Some(list) = list else { return ALL_CORNERS };
+    let (Some(a), Some(b)) = (list.get(a as usize), list.get(b as usize)) else { return 0 };
+    let mut shared = 0;
+    for i in 0..3 {
+        for j in 0..3 {
+            shared |= u32::from(a[i] == b[j]) << (3 * i + j);
+        }
+    }
+    shared
+}

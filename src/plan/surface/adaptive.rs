@@ -1,0 +1,38 @@
+//! Adaptive samples: which pictures have them, and how many samples the others get instead.
+
+use crate::plan::context::PlanContext;
+use crate::scene::Scene;
+use crate::spec::{BackendChoice, Samples};
+use crate::warning::Warning;
+
+/// Samples per pixel of pictures that ask for adaptive ones and cannot have them.
+const INSTEAD: u32 = 16;
+
+/// What a plan draws besides faces.
+#[derive(Clone, Copy, Debug)]
+pub struct Others {
+    /// True if lines of exact width are drawn.
+    pub lines: bool,
+    /// True if something is transparent.
+    pub layers: bool,
+}
+
+/// Samples in every pixel, and true if mixed pixels are drawn from coverage points besides.
+pub fn samples(scene: &Scene<'_, '_>, others: Others, cx: &mut PlanContext<'_>) -> (u32, bool) {
+    let samples = scene.spec.image.samples;
+    if let Samples::Fixed(samples) = samples {
+        return (samples, false);
+    }
+    let reason = if others.lines {
+        "lines are drawn over faces"
+    } else if others.layers {
+        "something is transparent"
+    } else if scene.spec.backend == BackendChoice::Gpu {
+        "the GPU draws fixed samples alone"
+    } else {
+        return (samples.per_pixel(), true);
+    };
+    let detail = format!("image.samples is adaptive, and {reason}: each pixel has {INSTEAD} samples instead");
+    cx.warnings.push(Warning { code: "samples_fixed", detail });
+    (INSTEAD, false)
+}

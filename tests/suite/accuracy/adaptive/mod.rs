@@ -1,0 +1,167 @@
+//! The accuracy of whole pictures of faces, and of their mixed pixels, with adaptive samples: against the
+//! oracle's points, in encoded colours.
+
+use meshsnap::backend::Renderer;
+use meshsnap::limits::Deadline;
+use meshsnap::plan::DrawPlan;
+
+use crate::measure::meshes;
+use crate::oracle::screen::{Scene, Screen};
+use crate::oracle::surface::light::{face_normal, lit, smooth_normals, weights};
+use crate::oracle::surface::rays::{Pen, picture, shares};
+use crate::oracle::surface::srgb;
+use crate::oracle::vector::{V2, V3, cross, dot, unit};
+use crate::support::seen::{lights, material};
+use crate::support::truth::{Errors, Gate, cases, goal, points_per_side, renderers, scene};
+use crate::support::{scenes, shapes};
+
+/// Goal: pixels that show several faces, or a face and the background.
+const MIXED_GOAL: Gate = Gate { rmse: 1.5, max: 16.0, ink: f64::INFINITY };
+/// Goal: whole pictures.
+const WHOLE_GOAL: Gate = Gate { rmse: 0.5, max: f64::INFINITY, ink: f64::INFINITY };
+
+/// Points along a pixel's side that tell how many faces it shows.
+const TOLD_BY: u32 = 16;
+
+type Case = (&'static str, fn() -> String, &'static str, &'static str);
+
+/// Meshes from 12 to some thousand triangles, of all colours and lights.
+const CASES: &[Case] = &[
+    ("cube", shapes::cube, "flat", "headlight"),
+    ("gear", || shapes::gear(9), "flat", "three-point"),
+    ("torus", || shapes::torus(24), "flat", "headlight"),
+    ("smooth torus", || shapes::torus(24), "smooth", "three-point"),
+    ("smooth gear", || shapes::gear(9), "smooth", "headlight"),
+    ("sheet", || shapes::sheet(12), "flat", "three-point"),
+    ("ball", || meshes::icosphere(4), "flat", "headlight"),
+    ("smooth ball", || meshes::icosphere(3), "smooth", "three-point"),
+    ("rings", meshes::rings, "flat", "headlight"),
+    ("smooth rings", meshes::rings, "smooth", "headlight"),
+    ("boxes", shapes::boxes_on_a_floor, "flat", "three-point"),
+    ("stacked boxes", shapes::stacked_boxes, "flat", "headlight"),
+];
+
+/// What a picture should be: linear colours, and which pixels show several faces.
+struct Truth {
+    colors: Vec<V3>,
+    is_mixed: Vec<bool>,
+}
+
+impl Truth {
+    fn of(plan: &DrawPlan<'_>, is_smooth: bool) -> Self {
+        let scene = scene(plan);
+        let screen = Screen::new(&scene);
+        let normals = corner_normals(&scene, is_smooth);
+        let (material, lights) = (material(plan.surface.as_ref().unwrap()), lights(plan));
+        let shade = |triangle: u32, p: V2| lit(&material, &lights, normal_at(&scene, &normals, triangle, p));
+        let background = [0, 1, 2].map(|k| f64::from(plan.background[k]));
+        let pen = Pen { segments: &[], width: 0.0, color: [0.0; 3] };
+        let colors = picture(&screen, &pen, background, points_per_side(), shade);
+        let size = [plan.width_px, plan.height_px];
+        let is_mixed = |i: usize| {
+            let shares = shares(&screen, [i as u32 % size[0], i as u32 / size[0]], TOLD_BY);
+            shares.len() > 1 || shares.iter().any(|(_, share)| *share < 1.0 - 1e-9)
+        };
+        Self { is_mixed: (0..colors.len()).map(is_mixed).collect(), colors }
+    }
+
+    /// The errors of a picture: of its mixed pixels, and of all.
+    fn errors(&self, renderer: &mut dyn Renderer, plan: &DrawPlan<'_>) -> [Errors; 2] {
+        let image = renderer.draw(plan, &Deadline::default()).unwrap();
+        let errors = |is_told: &dyn Fn(usize) -> bool| {
+            let pixels = || (0..self.colors.len()).filter(|&i| is_told(i));
+            let drawn = pixels().flat_map(|i| image.rgba[4 * i..4 * i + 3].iter().map(|&v| f64::from(v) / 255.0));
+            let truth = pixels().flat_map(|i| self.colors[i].map(srgb::from_linear));
+            Errors::of(&drawn.collect::<Vec<_>>(), &truth.collect::<Vec<_>>())
+        };
+        [errors(&|i| self.is_mixed[i]), errors(&|_| true)]
+    }
+}
+
+/// Exact normals by corner of each triangle.
+fn corner_normals(scene: &Scene, is_smooth: bool) -> Vec<[V3; 3]> {
+    if is_smooth {
+        return smooth_normals(&scene.positions, &scene.triangles, 30.0);
+    }
+    let flat = |t: &[u32; 3]| [face_normal(t.map(|v| scene.positions[v as usize])).unwrap_or([0.0, 0.0, 1.0]); 3];
+    scene.triangles.iter().map(flat).collect()
+}
+
+/// The unit normal on the viewer's side at a point of a triangle.
+fn normal_at(scene: &Scene, normals: &[[V3; 3]], triangle: u32, p: V2) -> V3 {
+    let corners = scene.triangles[triangle as usize].map(|v| scene.camera.homogeneous(scene.positions[v as usize]));
+    let [a, b, c] = corners.map(|h| [h[0], h[1], h[3]]);
+    let side = if dot(a, cross(b, c)) < 0.0 { 1.0 } else { -1.0 };
+    let share = weights(corners, p);
+    let of = |k: usize| side * (0..3).map(|i| share[i] * normals[triangle as usize][i][k]).sum::<f64>();
+    unit([of(0), of(1), of(2)])
+}
+
+fn plan_of<'a>(mesh: &'a meshsnap::mesh::Mesh, (_, _, style, light): &Case) -> DrawPlan<'a> {
+    let size = cases("64x56", "320x280");
+    let keys = [("size", size), ("style", style), ("light.preset", light), ("samples", "adaptive")];
+    let mut plan = scenes::plan(mesh, &scenes::spec(&[&keys[..], &[("surface.metallic", "0")]].concat()));
+    // The oracle knows no hollows.
+    plan.occlusion = None;
+    plan
+}
+
+#[test]
+fn whole_pictures_are_near_the_truth() {
+    let (mut missed, mut all) = (Vec::new(), [Errors::default(); 2]);
+    let mut renderers = renderers();
+    renderers.truncate(1);
+    for case in CASES {
+        let mesh = scenes::mesh(&(case.1)());
+        let plan = plan_of(&mesh, case);
+        assert!(plan.is_adaptive, "{}", case.0);
+        let truth = Truth::of(&plan, case.2 == "smooth");
+        for renderer in &mut renderers {
+            let [mixed, whole] = truth.errors(renderer.as_mut(), &plan);
+            let what = format!("- adaptive, {}, {}", case.0, renderer.kind().name());
+            missed.extend(mixed.check(&format!("{what}, mixed"), MIXED_GOAL).err());
+            missed.extend(whole.check(&format!("{what}, whole"), WHOLE_GOAL).err());
+            all[0].add(&mixed);
+            all[1].add(&whole);
+        }
+    }
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+    let [mixed, whole] = all;
+    goal(
+        11,
+        &format!(
+            "{} scenes: mixed pixels RMSE {:.2}, max {:.1}; whole pictures RMSE {:.2}",
+            CASES.len(),
+            mixed.rmse(),
+            mixed.max(),
+            whole.rmse()
+        ),
+    );
+}
+
+/// Pictures that are wrong in known ways do not get through: those of 4 samples, and of 16.
+#[test]
+fn fixed_samples_are_found() {
+    let mut renderers = renderers();
+    let mut found = [0; 2];
+    for case in &CASES[..3] {
+        let mesh = scenes::mesh(&(case.1)());
+        let mut plan = plan_of(&mesh, case);
+        let truth = Truth::of(&plan, false);
+        plan.is_adaptive = false;
+        for (found, samples) in found.iter_mut().zip([4, 16]) {
+            plan.samples = samples;
+            let [mixed, whole] = truth.errors(renderers[0].as_mut(), &plan);
+            let is_let_through = mixed.is_within(MIXED_GOAL) && whole.is_within(WHOLE_GOAL);
+            println!(
+                "{} at {samples}: mixed {:.2} max {:.1}, whole {:.2}",
+                case.0,
+                mixed.rmse(),
+                mixed.max(),
+                whole.rmse()
+            );
+            *found += usize::from(!is_let_through);
+        }
+    }
+    assert_eq!(found, [3, 3]);
+}

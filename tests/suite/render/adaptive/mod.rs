@@ -1,0 +1,195 @@
+//! Adaptive samples: mixed pixels are what their points see, all others what 4 samples see, and how they
+//! are drawn leaves no trace.
+
+use meshsnap::backend::Renderer;
+use meshsnap::backend::cpu::{CpuRenderer, Isa};
+use meshsnap::image::Image;
+use meshsnap::limits::Deadline;
+use meshsnap::plan::DrawPlan;
+
+use crate::support::likeness::{Likeness, Tolerance};
+use crate::support::scenes::{self, SCENES};
+use crate::support::shapes::{self, Random};
+
+fn draw(renderer: &mut dyn Renderer, plan: &DrawPlan<'_>) -> Image {
+    renderer.draw(plan, &Deadline::default()).unwrap()
+}
+
+/// Adaptive plans of all scenes that can have one.
+fn each_plan(mut each: impl FnMut(&str, &mut DrawPlan<'_>)) {
+    let mut plans = 0;
+    for scene in SCENES {
+        let mesh = scenes::mesh(&(scene.obj)());
+        let mut spec = scene.spec();
+        spec.image.samples = meshsnap::spec::Samples::Adaptive;
+        let mut plan = scenes::plan(&mesh, &spec);
+        let is_fixed = plan.warnings.iter().any(|warning| warning.code == "samples_fixed");
+        assert_eq!((plan.is_adaptive, plan.samples), if is_fixed { (false, 16) } else { (true, 4) }, "{}", scene.name);
+        assert_eq!(is_fixed, !plan.lines.is_empty() || plan.peeling.is_some(), "{}", scene.name);
+        if plan.is_adaptive {
+            each(scene.name, &mut plan);
+            plans += 1;
+        }
+    }
+    assert!(plans > 12, "{plans}");
+}
+
+/// Shortcuts, threads (and with them the heights of bands) and instruction sets.
+#[test]
+fn every_way_of_drawing_gives_the_same_bytes() {
+    let mut plain = CpuRenderer::plain(1);
+    let mut others: Vec<CpuRenderer> = Isa::available().into_iter().map(|isa| CpuRenderer::with_isa(2, isa)).collect();
+    others.extend([1, 3, 7].map(CpuRenderer::new));
+    each_plan(|name, plan| {
+        let want = draw(&mut plain, plan);
+        let mixed = plain.draw_times().mixed_pixels;
+        assert!(mixed > 100, "{name}: {mixed}");
+        for renderer in &mut others {
+            assert!(draw(renderer, plan) == want, "{name}");
+            assert_eq!(renderer.draw_times().mixed_pixels, mixed, "{name}");
+        }
+    });
+}
+
+/// Pixels that are not mixed have the bytes of 4 samples, and many pixels are not mixed.
+#[test]
+fn smooth_interiors_are_left_alone() {
+    let mut renderer = CpuRenderer::new(2);
+    each_plan(|name, plan| {
+        let adaptive = draw(&mut renderer, plan);
+        let mixed = renderer.draw_times().mixed_pixels as usize;
+        plan.is_adaptive = false;
+        let differing = Likeness::of(&adaptive, &draw(&mut renderer, plan)).differing();
+        assert_eq!(renderer.draw_times().mixed_pixels, 0);
+        assert!(differing > 50 && differing <= mixed, "{name}: {differing} differ, {mixed} are mixed");
+        let all = (plan.width_px * plan.height_px) as usize;
+        assert!(mixed < all / 2 || name.contains("sheet"), "{name}: {mixed} of {all}");
+    });
+}
+
+/// A pixel at the border is that of the same place in a larger picture.
+#[test]
+fn borders_leave_no_trace() {
+    const MORE_PX: u32 = 64;
+    let mut renderer = CpuRenderer::new(2);
+    let mut beyond = 0;
+    for (obj, style) in [(shapes::torus(24), "flat"), (shapes::gear(9), "flat"), (shapes::torus(14), "smooth")] {
+        let mesh = scenes::mesh(&obj);
+        let keys =
+            [("size", "150x110"), ("style", style), ("samples", "adaptive"), ("camera.projection", "orthographic")];
+        let spec = scenes::spec(&[&keys[..], &[("camera.height", "0.9"), ("camera.azimuth_deg", "20")]].concat());
+        let mut plan = scenes::plan(&mesh, &spec);
+        assert!(plan.is_adaptive && plan.margin_px > 0);
+        let small = draw(&mut renderer, &plan);
+        (plan.width_px, plan.height_px) = (plan.width_px + 2 * MORE_PX, plan.height_px + 2 * MORE_PX);
+        let large = draw(&mut renderer, &plan);
+        let mut middle = small.clone();
+        for (i, pixel) in middle.rgba.chunks_mut(4).enumerate() {
+            let [x, y] = [i as u32 % small.width_px + MORE_PX, i as u32 / small.width_px + MORE_PX];
+            pixel.copy_from_slice(&large.pixel(x, y));
+        }
+        // A moved origin of pixel coordinates rounds differently.
+        Likeness::of(&middle, &small).assert(Tolerance { max: 1, share: 0.002 }, style);
+        beyond += 1;
+    }
+    assert_eq!(beyond, 3);
+}
+
+/// Snapped corners, 1/256 px from the picture's upper left corner.
+type Corners = [[i64; 2]; 3];
+
+/// True if a point (1/512 px) belongs to a triangle by the top-left rule.
+fn owns(corners: &Corners, p: [i64; 2]) -> bool {
+    let [a, b, c] = corners.map(|c| c.map(|v| 2 * v));
+    let cross = |a: [i64; 2], b: [i64; 2], p: [i64; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+    let area = cross(a, b, c);
+    let [a, b, c] = if area > 0 { [a, b, c] } else { [a, c, b] };
+    area != 0
+        && [(a, b), (b, c), (c, a)].into_iter().all(|(a, b)| {
+            let is_top_left = b[1] < a[1] || (b[1] == a[1] && b[0] > a[0]);
+            let side = cross(a, b, p);
+            side > 0 || (side == 0 && is_top_left)
+        })
+}
+
+/// White triangles on black: alpha counts points, or all of 4 samples where a pixel is not mixed.
+#[test]
+fn mixed_pixels_count_their_points() {
+    const SIZE_PX: [u32; 2] = [48, 40];
+    let mut random = Random(7);
+    let mut renderers = [CpuRenderer::new(1), CpuRenderer::plain(1)];
+    let (mut partial, mut whole) = (0, 0);
+    for size_px in [0.4, 3.0, 20.0, 400.0] {
+        let (mut positions, mut triangles, mut snapped) = (Vec::new(), Vec::new(), Vec::<Corners>::new());
+        for t in 0..12 {
+            let at = [random.range(4.0, 44.0), random.range(4.0, 36.0)];
+            let corners =
+                [0; 3].map(|_| [0, 1].map(|k| ((at[k] + size_px * random.range(-1.0, 1.0)) * 256.0).round() as i64));
+            for [x, y] in corners {
+                let from_center = [x - 128 * 48, y - 128 * 40].map(|v| v as f32 / 256.0);
+                positions.push([from_center[0], from_center[1], 0.5]);
+            }
+            triangles.push([3 * t, 3 * t + 1, 3 * t + 2]);
+            snapped.push(corners);
+        }
+        let mut plan = scenes::screen_plan(SIZE_PX, 4, 1.0, &positions, &triangles);
+        (plan.is_adaptive, plan.margin_px, plan.background) = (true, 8, [0.0; 4]);
+        for renderer in &mut renderers {
+            let image = draw(renderer, &plan);
+            for (x, y) in (0..SIZE_PX[1]).flat_map(|y| (0..SIZE_PX[0]).map(move |x| (x, y))) {
+                let place = |i: i64| [2 * (256 * i64::from(x) + i) + 1, 2 * (256 * i64::from(y) + i * 181 % 256) + 1];
+                let count = (0..256).filter(|&i| snapped.iter().any(|corners| owns(corners, place(i)))).count();
+                let alpha = usize::from(image.pixel(x, y)[3]);
+                if alpha == 0 || alpha == 255 {
+                    // A few of the points may be missed where no sample near the pixel sees anything else.
+                    whole += usize::from(count == 256 * alpha / 255);
+                } else {
+                    assert_eq!(alpha, (count as f64 / 256.0 * 255.0 + 0.5) as usize, "pixel {x}, {y} of {size_px} px");
+                    partial += 1;
+                }
+            }
+        }
+    }
+    assert!(partial > 900, "{partial}");
+    let pixels = 2 * 4 * (SIZE_PX[0] * SIZE_PX[1]) as usize;
+    assert!(whole + partial > pixels * 99 / 100, "{whole} and {partial} of {pixels}");
+}
+
+/// Faces that meet leave no gap, and no point has two of them.
+#[test]
+fn shared_edges_have_each_point_once() {
+    let mut random = Random(9);
+    let (mut positions, mut triangles) = (vec![[0.3, -0.2, 0.5]], Vec::new());
+    for i in 0..40 {
+        let a = f64::from(i) / 40.0 * std::f64::consts::TAU;
+        let r = random.range(30.0, 60.0);
+        positions.push([(r * a.cos()) as f32, (r * a.sin()) as f32, 0.5]);
+        triangles.push([0, 1 + i, 1 + (i + 1) % 40]);
+    }
+    let mut plan = scenes::screen_plan([32, 32], 4, 1.0, &positions, &triangles);
+    (plan.is_adaptive, plan.margin_px, plan.background) = (true, 8, [0.0; 4]);
+    // Of two colours, so that its spokes are mixed.
+    let surface = plan.surface.as_mut().unwrap();
+    surface.materials.push(meshsnap::plan::ShadedMaterial::unlit([0.1, 0.1, 0.1, 1.0]));
+    surface.triangle_materials = (0..40).map(|i| i % 2).collect::<Vec<u32>>().into();
+    let mut renderer = CpuRenderer::new(1);
+    let image = draw(&mut renderer, &plan);
+    assert!(renderer.draw_times().mixed_pixels > 500);
+    assert!(image.rgba.chunks(4).all(|pixel| pixel[3] == 255));
+}
+
+#[test]
+fn pictures_that_cannot_have_them_say_so() {
+    let mesh = scenes::mesh(&shapes::cube());
+    let spec = scenes::spec(&[("samples", "adaptive"), ("style", "wire")]);
+    let plan = scenes::plan(&mesh, &spec);
+    assert_eq!((plan.samples, plan.is_adaptive), (16, false));
+    let [warning] = &plan.warnings[..] else { panic!("{:?}", plan.warnings) };
+    let said = "image.samples is adaptive, and lines are drawn over faces: each pixel has 16 samples instead";
+    assert_eq!((warning.code, warning.detail.as_str()), ("samples_fixed", said));
+    let glass = scenes::plan(&mesh, &scenes::spec(&[("samples", "adaptive"), ("surface.opacity", "0.5")]));
+    assert!(glass.warnings[0].detail.contains("something is transparent"), "{:?}", glass.warnings);
+    let gpu = scenes::plan(&mesh, &scenes::spec(&[("samples", "adaptive"), ("style", "flat"), ("backend", "gpu")]));
+    assert_eq!((gpu.samples, gpu.is_adaptive), (16, false));
+    assert!(gpu.warnings[0].detail.contains("the GPU draws fixed samples alone"), "{:?}", gpu.warnings);
+}
