@@ -8,6 +8,7 @@ use crate::import::{ImportReport, MeshError};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
+use crate::mesh::intersections;
 use crate::mesh::material::{ImageContent, ImageSource};
 use crate::mesh::topology::{self, Topology};
 use crate::pluralise::pluralise;
@@ -113,6 +114,12 @@ impl Judge<'_> {
                 let faces = topology::duplicate_faces(mesh, self.budget)?;
                 let faults = Faults::at(faces.into_iter(), |face| places::face(mesh, face));
                 let detail = pluralise(faults.count, "face repeats an earlier one", "faces repeat earlier ones");
+                Finding::of_faults(faults, detail)
+            }
+            Rule::NoSelfIntersection => {
+                let faces = intersections::self_intersections(mesh, self.budget, self.deadline)?;
+                let faults = Faults::at(faces.into_iter(), |face| places::face(mesh, face));
+                let detail = pluralise(faults.count, "face intersects another", "faces intersect others");
                 Finding::of_faults(faults, detail)
             }
             Rule::NoInvertedVolume => self.inverted()?,

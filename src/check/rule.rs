@@ -19,6 +19,8 @@ pub enum Rule {
     NoDegenerate,
     /// No two faces have the same three corners.
     NoDuplicateFaces,
+    /// No two faces have a point in common beside their common corners and edges.
+    NoSelfIntersection,
     /// No closed part is inside out.
     NoInvertedVolume,
     /// No polygon has more than four corners.
@@ -48,7 +50,7 @@ pub enum Rule {
 }
 
 /// All names of rules.
-pub const NAMES: [&str; 20] = [
+pub const NAMES: [&str; 21] = [
     "opens",
     "no-warnings",
     "watertight",
@@ -56,6 +58,7 @@ pub const NAMES: [&str; 20] = [
     "consistent-winding",
     "no-degenerate",
     "no-duplicate-faces",
+    "no-self-intersection",
     "no-inverted-volume",
     "no-ngons",
     "single-component",
@@ -134,6 +137,7 @@ impl Rule {
             "consistent-winding" => plain(Self::ConsistentWinding),
             "no-degenerate" => plain(Self::NoDegenerate),
             "no-duplicate-faces" => plain(Self::NoDuplicateFaces),
+            "no-self-intersection" => plain(Self::NoSelfIntersection),
             "no-inverted-volume" => plain(Self::NoInvertedVolume),
             "no-ngons" => plain(Self::NoNgons),
             "single-component" => plain(Self::SingleComponent),
@@ -164,19 +168,20 @@ impl Rule {
             Self::ConsistentWinding => 4,
             Self::NoDegenerate => 5,
             Self::NoDuplicateFaces => 6,
-            Self::NoInvertedVolume => 7,
-            Self::NoNgons => 8,
-            Self::SingleComponent => 9,
-            Self::HasNormals => 10,
-            Self::HasUv => 11,
-            Self::UvInRange => 12,
-            Self::UvNoOverlap => 13,
-            Self::MaxTriangles(_) => 14,
-            Self::MaxVertices(_) => 15,
-            Self::MaxMaterials(_) => 16,
-            Self::MaxTexturePx(_) => 17,
-            Self::MaxFileBytes(_) => 18,
-            Self::Bounds(_) => 19,
+            Self::NoSelfIntersection => 7,
+            Self::NoInvertedVolume => 8,
+            Self::NoNgons => 9,
+            Self::SingleComponent => 10,
+            Self::HasNormals => 11,
+            Self::HasUv => 12,
+            Self::UvInRange => 13,
+            Self::UvNoOverlap => 14,
+            Self::MaxTriangles(_) => 15,
+            Self::MaxVertices(_) => 16,
+            Self::MaxMaterials(_) => 17,
+            Self::MaxTexturePx(_) => 18,
+            Self::MaxFileBytes(_) => 19,
+            Self::Bounds(_) => 20,
         };
         NAMES[index]
     }

@@ -87,7 +87,7 @@ fn breaks(obj: &Obj, rule: &str, found: u64, detail: &str) -> Check {
 #[test]
 fn a_cube_obeys_the_rules_of_solids() {
     let rules = ["opens", "no-warnings", "watertight", "manifold", "consistent-winding", "no-degenerate"];
-    let more = ["no-duplicate-faces", "no-inverted-volume", "no-ngons", "single-component"];
+    let more = ["no-duplicate-faces", "no-self-intersection", "no-inverted-volume", "no-ngons", "single-component"];
     for rule in rules.into_iter().chain(more) {
         obeys(&cube(), rule);
     }
@@ -162,6 +162,19 @@ fn parts_that_are_inside_out() {
     // A cavity looks inwards by right; a solid within a solid is none, and no fault of this rule.
     obeys(&cube().cube([0.0; 3], 0.5, &SIDES, true), "no-inverted-volume");
     obeys(&cube().cube([0.0; 3], 0.5, &SIDES, false), "no-inverted-volume");
+}
+
+#[test]
+fn faces_that_go_through_others() {
+    let overlapping = cube().cube([1.0; 3], 1.0, &SIDES, false);
+    // Both triangles of three sides of each cube reach into the other.
+    let check = breaks(&overlapping, "no-self-intersection", 12, "12 faces intersect others");
+    assert_eq!(check.places.len(), 12);
+    obeys(&cube().cube([0.0; 3], 0.5, &SIDES, false), "no-self-intersection");
+    obeys(&cube().cube([2.0; 3], 1.0, &SIDES, false), "no-self-intersection");
+    // A side on a side.
+    // A small cube that stands on a side: its foot, the sides that rise from it, and what it stands on.
+    breaks(&cube().cube([1.5, 0.0, 0.0], 0.5, &SIDES, false), "no-self-intersection", 12, "12 faces intersect others");
 }
 
 #[test]
@@ -252,7 +265,7 @@ fn rules_are_read_and_mistakes_named() {
     let cases = [
         ("watertigth", "did you mean `watertight`?"),
         ("max_triangles:5", "did you mean `max-triangles`?"),
-        ("no-self-intersection", "the rules are opens, "),
+        ("self-intersection", "the rules are opens, "),
         ("xyz", "there is no rule `xyz`; the rules are"),
         ("max-triangles", "takes a whole number"),
         ("max-triangles:-1", "takes a whole number"),

@@ -1,10 +1,11 @@
 //! The [`Mesh`], the one form that every importer produces, and what is computed from it:
-//! [`normals`], [`edges`], [`topology`], [`measure`].
+//! [`normals`], [`edges`], [`topology`], [`intersections`], [`measure`].
 //!
 //! **Invariant**: nothing in this room, and nothing after it, depends on the file format.
 
 pub mod creases;
 pub mod edges;
+pub mod intersections;
 pub mod material;
 pub mod measure;
 pub mod nearest;

@@ -12,6 +12,7 @@ pub use self::topology::TopologyReport;
 use crate::import::{FileContent, FileMetadata, ImportReport, MeshError};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::edges::EdgeList;
+use crate::mesh::intersections;
 use crate::mesh::material::{FileLens, ImageContent, ImageSource};
 use crate::mesh::measure::Measures;
 use crate::mesh::topology::Topology;
@@ -132,6 +133,7 @@ impl Report {
         deadline.check()?;
         let topology = Topology::of(mesh, &edges, budget, deadline)?;
         drop(edges);
+        let t_junctions = intersections::t_junctions(mesh, budget, deadline)?;
         let names = mesh.materials.iter().map(|m| m.name.len() + size_of::<String>());
         let images = mesh.images.iter().map(|image| image.name.len() + size_of::<TextureReport>());
         let cameras = mesh.cameras.iter().map(|camera| camera.name.len() + size_of::<CameraReport>());
@@ -140,7 +142,7 @@ impl Report {
         // A sentence for each image that cannot be read.
         budget.spend("the report", mesh.images.len() as u64, 512)?;
         deadline.check()?;
-        Ok(Self::new(mesh, import, file_bytes, topology))
+        Ok(Self::new(mesh, import, file_bytes, (topology, t_junctions)))
     }
 
     /// The report as JSON, byte for byte as `inspect --json` prints it and HTTP answers.
@@ -153,7 +155,12 @@ impl Report {
         text::text(self)
     }
 
-    fn new(mesh: &Mesh, import: &ImportReport, file_bytes: u64, topology: Topology) -> Self {
+    fn new(
+        mesh: &Mesh,
+        import: &ImportReport,
+        file_bytes: u64,
+        (topology, t_junctions): (Topology, Option<u64>),
+    ) -> Self {
         let FileMetadata {
             generator,
             scenes,
@@ -203,7 +210,11 @@ impl Report {
             bounds: Bounds::of(mesh),
             area: measures.area,
             volume: measures.volume.filter(|_| topology.is_watertight),
-            topology: TopologyReport::new(topology, import.dropped_degenerate_faces + import.dropped_collapsed_faces),
+            topology: TopologyReport::new(
+                topology,
+                t_junctions,
+                import.dropped_degenerate_faces + import.dropped_collapsed_faces,
+            ),
             dropped_nonfinite_faces: import.dropped_nonfinite_faces,
             dropped_degenerate_faces: import.dropped_degenerate_faces,
             dropped_collapsed_faces: import.dropped_collapsed_faces,

@@ -19,6 +19,9 @@ pub struct TopologyReport {
     pub nonmanifold_edges: u64,
     /// Vertices where surfaces touch that share no edge there.
     pub nonmanifold_vertices: u64,
+    /// Vertices that lie exactly within an edge of another face; null where so many faces lie above
+    /// each other that counting would take long.
+    pub t_junctions: Option<u64>,
     /// Faces with the same three vertices as an earlier face.
     pub duplicate_faces: u64,
     /// Faces without area, and faces whose corners coincide in f32. They are not drawn.
@@ -49,7 +52,7 @@ pub struct ClosedSurfaces {
 
 impl TopologyReport {
     /// The report on a topology.
-    pub fn new(topology: Topology, degenerate_faces: u64) -> Self {
+    pub fn new(topology: Topology, t_junctions: Option<u64>, degenerate_faces: u64) -> Self {
         let Topology {
             components,
             edges,
@@ -73,6 +76,7 @@ impl TopologyReport {
             boundary_loops,
             nonmanifold_edges,
             nonmanifold_vertices,
+            t_junctions,
             duplicate_faces,
             degenerate_faces,
             inconsistent_edges,
@@ -108,6 +112,7 @@ impl TopologyReport {
         let faults = [
             (self.boundary_loops, "boundary loop", "boundary loops"),
             (self.nonmanifold_vertices, "non-manifold vertex", "non-manifold vertices"),
+            (self.t_junctions.unwrap_or(0), "T-junction", "T-junctions"),
             (self.duplicate_faces, "duplicate face", "duplicate faces"),
         ];
         let met = faults.into_iter().filter(|(count, ..)| *count > 0);

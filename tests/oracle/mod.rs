@@ -14,11 +14,14 @@
 //!    [`lines::silhouette`]: any scene, by many points per pixel.
 //! 4. [`surface::light`]: the colour of a lit surface.
 //! 5. [`flip`]: how different two pictures look.
+//!
+//! And of a mesh: [`contacts`], which triangles intersect.
 
 // Each binary that includes this module uses its own part of it.
 #![allow(dead_code)]
 
 pub mod camera;
+pub mod contacts;
 pub mod coverage;
 pub mod flip;
 pub mod lattice;

@@ -51,7 +51,7 @@ const CASES: &[(&str, i32, &str, &str)] = &[
     ("colored.obj --siblings", 0, "colored.obj: ok\n", "1 ok, 0 failed"),
     ("parts/good.obj colored.mtl", 0, "parts/good.obj: ok\n", "colored.mtl: is not used"),
     ("parts --rules watertigth", 2, "", "did you mean `watertight`?"),
-    ("parts --rules no-self-intersection", 2, "", "there is no rule `no-self-intersection`"),
+    ("parts/good.obj --rules no-self-intersection", 0, "parts/good.obj: ok\n", "1 ok, 0 failed"),
     ("parts --rules max-triangles", 2, "", "takes a whole number: max-triangles:1000"),
     ("parts --rules manifold --warn manifold", 2, "", "`manifold` is given twice"),
     ("-", 2, "", "standard input"),

@@ -4,6 +4,7 @@
 pub mod depth;
 pub mod faces;
 pub mod interleavings;
+pub mod intersections;
 pub mod order;
 pub mod report;
 pub mod scale;
