@@ -59,6 +59,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add_same!("DEBUG_", debug_views: BARYCENTRIC MIN_BARYCENTRIC EDGE_DISTANCE NORMAL UV FACE_ORIENTATION VERTEX_COLOR);
     add!("WRAP_BITS" = samplers::WRAP_BITS, "WRAP_DOWN_SHIFT" = samplers::DOWN_SHIFT);
     add!("WRAP_REPEAT" = samplers::REPEAT, "WRAP_MIRROR" = samplers::MIRROR, "SAMPLER_NEAREST" = samplers::NEAREST);
+    add!("SAMPLER_SECOND_UVS" = samplers::SECOND_UVS);
     // Values that mean something else than a number.
     add!(
         "OUTSIDE" = OUTSIDE,

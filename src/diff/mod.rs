@@ -259,7 +259,7 @@ impl Found<'_> {
         let has_same_attributes = words::lost_attributes(self.a.mesh, self.b.mesh).is_empty();
         let report = |side: Side<'_>, topology: &Topology| {
             let degenerate = side.import.dropped_degenerate_faces + side.import.dropped_collapsed_faces;
-            TopologyReport::new(topology.clone(), degenerate)
+            TopologyReport::new(topology.clone(), None, degenerate)
         };
         let topology = TopologyDifference {
             same: is_same_topology,
