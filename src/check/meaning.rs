@@ -1,4 +1,4 @@
-//! What each rule demands, in a sentence, for reports that explain themselves.
+//! The demand of each rule, in a sentence, for reports that explain themselves.
 
 /// The sentence of a rule, by its name; empty for a name that is none.
 pub fn meaning(rule: &str) -> &'static str {

@@ -55,7 +55,7 @@ fn cube() -> Obj {
     Obj::default().cube([0.0; 3], 1.0, &SIDES, false)
 }
 
-/// What one rule says of an OBJ file.
+/// The check of an OBJ file by one rule.
 #[track_caller]
 fn judge(text: &str, rule: &str) -> Check {
     let rules = RuleSet::parse([rule], []).unwrap();

@@ -1,4 +1,4 @@
-//! What differs between two meshes: their surfaces, parts, faces, topology and materials, in numbers and in the
+//! The differences between two meshes: their surfaces, parts, faces, topology and materials, in numbers and in the
 //! words of a reviewer. Vertex order, face order and the format of the file do not count.
 //!
 //! These are data transfer objects: the names of their fields are part of the public interface. Nothing here
@@ -48,7 +48,7 @@ pub struct Side<'a> {
     pub import: &'a ImportReport,
 }
 
-/// What differs between two meshes, `a` and `b`.
+/// The differences between two meshes, `a` and `b`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Difference {
     /// True if surface, topology and materials are the same.

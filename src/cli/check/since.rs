@@ -52,7 +52,7 @@ fn changed(reference: &str) -> Result<BTreeSet<PathBuf>, CliError> {
 enum GitError {
     /// There is no such program, or it cannot be started.
     Absent(std::io::Error),
-    /// What it said.
+    /// Its message on standard error.
     Refused(String),
 }
 

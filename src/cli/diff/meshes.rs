@@ -1,4 +1,4 @@
-//! What differs between two meshes.
+//! Two meshes on the command line: their differences as text, JSON or a picture.
 
 use std::sync::Arc;
 

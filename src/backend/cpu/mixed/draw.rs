@@ -20,7 +20,7 @@ const AT_ONCE: usize = 512;
 pub struct MixedScratch {
     /// The band's mixed pixels.
     pub pixels: MixedPixels,
-    /// What the points of some of them see.
+    /// The faces that the points of some of them see.
     points: Vec<PixelPoints>,
 }
 
@@ -30,7 +30,7 @@ impl MixedScratch {
         self.pixels.bytes() + self.points.capacity() * size_of::<PixelPoints>()
     }
 
-    /// What [`bytes`](Self::bytes) is for a band of so many columns and rows.
+    /// The [`bytes`](Self::bytes) of a band of so many columns and rows, at most.
     pub const fn bytes_of(size: [usize; 2]) -> usize {
         MixedPixels::bytes_of(size) + AT_ONCE * size_of::<PixelPoints>()
     }

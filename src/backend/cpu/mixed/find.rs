@@ -1,4 +1,4 @@
-//! Stage mixed, per pixel: which pixels are mixed.
+//! Stage mixed, per pixel: finds the mixed pixels.
 //!
 //! A pixel is mixed if the samples of it and of its eight neighbours show several faces (or a face and
 //! nothing) whose colours may differ, by their [`Look`], and do not go on from one to the other
@@ -25,14 +25,14 @@ pub struct MixedPixels {
     may_be_mixed: Vec<u8>,
 }
 
-/// What a pixel's samples see.
+/// The look of the faces that a pixel's samples see.
 #[derive(Clone, Copy, Debug)]
 struct PixelLook {
     look: Look,
     links: Links,
 }
 
-/// Whether colours go on from face to face.
+/// True where colours go on from face to face.
 #[derive(Clone, Copy, Debug)]
 struct Links {
     /// From the pixel's first sample to each of its others, one after the other.
@@ -91,7 +91,7 @@ impl MixedPixels {
             + self.may_be_mixed.capacity()
     }
 
-    /// What [`bytes`](Self::bytes) is for a band.
+    /// The [`bytes`](Self::bytes) of a band, at most.
     pub const fn bytes_of([width, rows]: [usize; 2]) -> usize {
         let pixel = size_of::<u16>() + size_of::<u32>();
         let of_rows = 3 * (width + 2) * (size_of::<u8>() + size_of::<Option<PixelLook>>());
@@ -192,7 +192,7 @@ fn mark_differing(band: &SampleBand, y: i32, out: &mut [u8]) {
     }
 }
 
-/// What a pixel's samples see, and how it goes on from its neighbours.
+/// The faces that a pixel's samples see, and the way in which they go on from its neighbours.
 #[inline(always)]
 fn pixel_look(context: &RasterContext<'_>, band: &SampleBand, [x, y]: [i32; 2]) -> PixelLook {
     let ids_of = |x: i32, y: i32| if band.has(x, y) { band.pixel(x, y).0 } else { &[NOTHING] };

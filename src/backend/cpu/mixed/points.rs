@@ -27,7 +27,7 @@ pub const PLACES: [[i32; POINTS]; 2] = {
 /// Largest of [`PLACES`].
 const PLACE_MAX: i64 = POINTS as i64 - 1;
 
-/// What the points of a pixel see.
+/// The faces that the points of a pixel see, and their depths.
 pub struct PixelPoints {
     /// Reversed depth of each; 0 where there is nothing.
     pub depth: [f32; POINTS],

@@ -37,7 +37,7 @@ pub fn sarif(findings: &Findings<'_>) -> Result<String, CliError> {
     Ok(text + "\n")
 }
 
-/// Where some faults are known, all have to say whether they are.
+/// The result for a fault. If some faults of a run are known, each says whether it is.
 fn result(path: &str, check: &Check, has_known: bool) -> Value {
     let uri = uri(path);
     // The same fault in the same file is the same alert, however often the file changes.
