@@ -182,9 +182,9 @@ pub fn draw_difference(
     compared: &Compared,
     spec: &Spec,
     backends: &mut Backends,
-    budget: &mut Budget,
     deadline: &Deadline,
-) -> Result<Image, RenderError> {
+) -> Result<Drawn, RenderError> {
+    let budget = &mut opened[0].budget_beside(opened[1])?;
     let meshes = opened.map(|opened| &opened.imported.mesh);
     let all = compared.of_vertices.iter().flatten();
     let most = all.copied().filter(|distance| distance.is_finite()).fold(0.0, f64::max);
@@ -194,7 +194,8 @@ pub fn draw_difference(
     let sheet = Sheet { views: SheetViews::Named(vec![spec.camera.view; 2]), columns: Some(2), labels: false };
     let layout = Layout::new(&sheet, &spec.image, false);
     let mut canvas = Canvas::new(layout, budget).map_err(PlanError::Limit)?;
-    for (cell, side) in layout.cells().zip(0..2) {
+    let mut all: Option<Drawn> = None;
+    for (cell, side) in layout.cells().zip(0..2).filter(|(cell, _)| !cell.size_px.contains(&0)) {
         // What a side takes is free again before the next.
         let mut of_cell = budget.clone();
         let limit = |error| RenderError::from(PlanError::Limit(error));
@@ -205,11 +206,42 @@ pub fn draw_difference(
         let drawn = draw_view(&model, &of_view, backends, &mut of_cell, deadline, &mut |_| ())?;
         canvas.paste(&cell, &drawn.image);
         canvas.write(&cell, ["before", "after"][side]);
+        match &mut all {
+            Some(all) => all.add(drawn),
+            None => all = Some(drawn),
+        }
     }
+    let mut all = match all {
+        Some(all) => all,
+        // A picture of one pixel has no room for two sides.
+        None => {
+            let mesh = diff::painted(meshes[1], &[], most, budget).map_err(PlanError::Limit)?;
+            draw_view(&Model { mesh, ..Model::default() }, &spec, backends, budget, deadline, &mut |_| ())?
+        }
+    };
     let mut image = canvas.finish();
     let plan::Legend { title, ends, colors } = diff::legend(most);
     draw_legend(&mut image, &[Scale { title, ends, colors: &colors }]);
-    Ok(image)
+    all.image = image;
+    Ok(all)
+}
+
+/// As [`draw_difference`], as the bytes of a picture.
+pub fn render_difference(
+    opened: [&Opened; 2],
+    compared: &Compared,
+    spec: &Spec,
+    backends: &mut Backends,
+    deadline: &Deadline,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Output, RenderError> {
+    let drawn = draw_difference(opened, compared, spec, backends, deadline)?;
+    ended(Stage::Render);
+    let format = spec.image.format.unwrap_or(ImageFormat::Png);
+    let bytes = encode::encode(&drawn.image, format, spec.image.effort, deadline)?;
+    ended(Stage::Encode);
+    let Drawn { backend, is_substitute, draw_times, skips, short_chains, warnings, selection, .. } = drawn;
+    Ok(Output { bytes, format, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
 }
 
 /// Makes what a picture needs on a device and can be made without drawing, such as pipelines.
@@ -236,7 +268,7 @@ pub fn inspect(
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Report, MeshError> {
     let mut budget = Budget::new(limits);
-    let Imported { mesh, report } = import::import(bundle, options, limits, &mut budget, deadline)?;
+    let Imported { mesh, report, .. } = import::import(bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
     Report::of(&mesh, &report, bundle.bytes_len(), &mut budget, deadline)
 }
@@ -261,20 +293,31 @@ pub fn open(
 }
 
 impl Opened {
+    /// The path of the mesh in its bundle.
+    pub fn path(&self) -> &str {
+        &self.imported.path
+    }
+
     /// Judges the file by rules. Fails where the time or the memory of the job ends.
     pub fn check(mut self, rules: &RuleSet, deadline: &Deadline) -> Result<Vec<Check>, MeshError> {
-        let Imported { mesh, report } = &self.imported;
+        let Imported { mesh, report, .. } = &self.imported;
         let subject = check::Subject { mesh, import: report, file_bytes: self.file_bytes };
         check::check(&subject, rules, &mut self.budget, deadline)
+    }
+
+    /// The memory that is left beside both files.
+    fn budget_beside(&self, other: &Self) -> Result<Budget, MeshError> {
+        let mut budget = self.budget.clone();
+        budget.spend("the other mesh", other.budget.spent_bytes(), 1)?;
+        Ok(budget)
     }
 
     /// Compares the file with another, which is the newer one. `max_distance` is the largest distance between the
     /// surfaces that counts as the same; None: what encodings round away.
     pub fn diff(&self, other: &Self, max_distance: Option<f64>, deadline: &Deadline) -> Result<Compared, MeshError> {
-        let mut budget = self.budget.clone();
-        budget.spend("the other mesh", other.budget.spent_bytes(), 1)?;
+        let mut budget = self.budget_beside(other)?;
         let [a, b] =
-            [&self.imported, &other.imported].map(|Imported { mesh, report }| diff::Side { mesh, import: report });
+            [&self.imported, &other.imported].map(|Imported { mesh, report, .. }| diff::Side { mesh, import: report });
         diff::compare(a, b, max_distance, &mut budget, deadline)
     }
 }
@@ -301,7 +344,7 @@ impl Model {
         budget: &mut Budget,
         deadline: &Deadline,
     ) -> Result<Self, MeshError> {
-        let Imported { mesh, report } = import::import(bundle, options, limits, budget, deadline)?;
+        let Imported { mesh, report, .. } = import::import(bundle, options, limits, budget, deadline)?;
         Ok(Self { mesh, warnings: report.warnings, prepared: Prepared::default(), framing: None })
     }
 

@@ -92,7 +92,7 @@ fn run_import(bundle: &Bundle, options: Options) {
     let limits = limits();
     let mut budget = Budget::new(&limits);
     match import(bundle, options, &limits, &mut budget, &Deadline::default()) {
-        Ok(Imported { mesh, report: import }) => {
+        Ok(Imported { mesh, report: import, .. }) => {
             check(&mesh, &import);
             let report = Report::of(&mesh, &import, bundle.bytes_len(), &mut budget, &Deadline::default());
             let Ok(report) = report else { return };

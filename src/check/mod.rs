@@ -13,7 +13,7 @@ mod tests;
 mod uvs;
 mod volume;
 
-pub use judge::{Subject, check, unopened};
+pub use judge::{Subject, check, of_unreadable, unopened};
 pub use meaning::meaning;
 pub use rule::{Level, NAMES, Rule, RuleSet, UnknownRule};
 
@@ -38,6 +38,11 @@ impl Verdict {
         let mut verdict = Self { path, sha256, ok: true, checks };
         verdict.judge();
         verdict
+    }
+
+    /// Its JSON, on one line.
+    pub fn json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string(self).map(|json| json + "\n")
     }
 
     /// Says anew whether the file is ok, after faults became known.

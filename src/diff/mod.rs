@@ -19,7 +19,7 @@ mod vertices;
 mod whole;
 mod words;
 
-pub use heat::{framing, legend, painted};
+pub use heat::{PICTURE_KEYS, framing, legend, painted};
 pub use materials::{ChangedMaterial, Materials};
 
 use serde::Serialize;
@@ -69,6 +69,13 @@ pub struct Difference {
     pub materials: Materials,
     /// What a reviewer would say, in sentences.
     pub summary: Vec<String>,
+}
+
+impl Difference {
+    /// Its JSON.
+    pub fn json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string_pretty(self).map(|json| json + "\n")
+    }
 }
 
 /// The same of both meshes.

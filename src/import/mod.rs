@@ -89,6 +89,8 @@ pub struct Imported {
     pub mesh: Mesh,
     /// Counts, repairs, warnings and metadata.
     pub report: ImportReport,
+    /// The path of the mesh in its bundle.
+    pub path: String,
 }
 
 /// What the process does that importers in C run in.

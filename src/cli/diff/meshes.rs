@@ -11,15 +11,12 @@ use crate::cli::progress::Progress;
 use crate::cli::render::format_in;
 use crate::cli::{files, siblings};
 use crate::config::{cores, why_no_gpu};
-use crate::diff::Compared;
+use crate::diff::{Compared, PICTURE_KEYS};
 use crate::import::Options;
-use crate::limits::{Budget, Deadline, Limits};
+use crate::limits::{Deadline, Limits};
 use crate::pipeline::{self, Opened};
 use crate::request::{self, Rules};
 use crate::spec::BackendChoice;
-
-/// Pixels of a picture, both sides together.
-const SIZE: &str = "1024x512";
 
 /// Compares two meshes and prints the difference. Returns whether they are the same.
 pub fn run(arguments: &DiffArgs, limits: &Limits) -> Result<bool, CliError> {
@@ -79,15 +76,13 @@ fn have_same_bytes(a: &NamedFiles, b: &NamedFiles) -> bool {
 /// Both meshes side by side, through one camera.
 fn draw(opened: [&Opened; 2], compared: &Compared, limits: &Limits) -> Result<crate::image::Image, CliError> {
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Cpu };
-    let keys = [("style", "smooth"), ("size", SIZE), ("light.ambient", "0.5")];
-    let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let keys = PICTURE_KEYS.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let spec = request::read(None, &keys, &rules).map_err(|error| CliError::ours(error.to_string()))?;
     let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), None));
     let drawing = Arc::new(DrawingThreads::new(cores() as usize));
-    let image = drawing.install(|| {
+    let drawn = drawing.install(|| {
         let mut backends = Backends::sharing(gpu.clone(), drawing.clone());
-        let (mut budget, deadline) = (Budget::new(limits), Deadline::default());
-        pipeline::draw_difference(opened, compared, &spec, &mut backends, &mut budget, &deadline)
+        pipeline::draw_difference(opened, compared, &spec, &mut backends, &Deadline::default())
     })?;
-    Ok(image)
+    Ok(drawn.image)
 }

@@ -86,7 +86,7 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     }
     (mesh.images, mesh.cameras) = (raw.images, raw.cameras);
     mesh.up = raw.up;
-    Ok(Imported { mesh, report: raw.report })
+    Ok(Imported { mesh, report: raw.report, path: cx.bundle.entry().path.clone() })
 }
 
 /// Positions, triangles, normals, lines and bounds of the mesh, and the triangle of each face

@@ -71,7 +71,7 @@ fn soups_and_indices_agree_on_any_number_of_threads() {
         for threads in [1, 4] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             for is_soup in [false, true] {
-                let Imported { mesh, report } = pool.install(|| finish(raw(&corners, is_soup)));
+                let Imported { mesh, report, .. } = pool.install(|| finish(raw(&corners, is_soup)));
                 let all = format!("{mesh:?} {report:?}");
                 assert!(all == *first.get_or_insert(all.clone()), "{side} {odd}: {threads} threads, soup: {is_soup}");
                 let left = mesh.triangles.len() as u64;
@@ -93,7 +93,7 @@ fn what_no_face_uses_changes_nothing() {
         raw.positions.iter_mut().flatten().for_each(|c| *c *= 0.1);
         raw.colors.clear();
         raw.positions.extend(unused);
-        let Imported { mesh, report } = finish(raw);
+        let Imported { mesh, report, .. } = finish(raw);
         format!("{mesh:?} {report:?}")
     };
     let plain = mesh(&[]);

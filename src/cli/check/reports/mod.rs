@@ -109,7 +109,7 @@ impl Reports {
 
 /// A verdict as a line of JSON.
 pub fn json_line(verdict: &Verdict) -> Result<String, CliError> {
-    serde_json::to_string(verdict).map(|line| line + "\n").map_err(|error| CliError::ours(error.to_string()))
+    verdict.json().map_err(|error| CliError::ours(error.to_string()))
 }
 
 /// The weight of a fault, in a word.

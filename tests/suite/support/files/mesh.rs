@@ -16,7 +16,7 @@ pub struct Read {
 }
 
 impl From<Imported> for Read {
-    fn from(Imported { mesh, report }: Imported) -> Self {
+    fn from(Imported { mesh, report, .. }: Imported) -> Self {
         Self { mesh, report }
     }
 }
