@@ -39,7 +39,7 @@ pub fn render(
 
     // Bytes -> Mesh
     let Job { bundle, format_in, spec } = job;
-    let options = import::Options { format: format_in, time_s: spec.time_s };
+    let options = import::Options { format: format_in, time_s: spec.time_s, ..import::Options::default() };
     let model = Model::read(&bundle, options, limits, &mut budget, deadline)?;
     // The files' memory is free for drawing, unless the caller holds them, too.
     drop(bundle);
@@ -288,6 +288,7 @@ pub fn open(
     deadline: &Deadline,
 ) -> Result<Opened, MeshError> {
     let mut budget = Budget::new(limits);
+    let options = import::Options { counts_loose: true, ..options.into() };
     let imported = import::import(bundle, options, limits, &mut budget, deadline)?;
     Ok(Opened { imported, budget, file_bytes: bundle.bytes_len() })
 }

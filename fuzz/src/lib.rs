@@ -32,7 +32,7 @@ pub fn run(target: &str, bytes: &[u8]) {
         "pipeline" => run_pipeline(bytes),
         _ => {
             let (bundle, format) = bundle(target, bytes);
-            run_import(&bundle, Options { format, time_s: time_s(bytes) });
+            run_import(&bundle, Options { format, time_s: time_s(bytes), counts_loose: true });
         }
     }
 }

@@ -132,12 +132,21 @@ impl Judge<'_> {
                 Finding::of_faults(faults, detail)
             }
             Rule::NoSelfIntersection => {
-                let faces = intersections::self_intersections(mesh, self.budget, self.deadline)?;
+                let Some(faces) = intersections::self_intersections(mesh, self.budget, self.deadline)? else {
+                    let detail = "so many faces lie above each other that comparing them would take too long";
+                    return Ok(Finding::presence(false, "", detail));
+                };
                 let faults = Faults::at(faces.into_iter(), |face| places::face(mesh, face));
                 let detail = pluralise(faults.count, "face intersects another", "faces intersect others");
                 Finding::of_faults(faults, detail)
             }
             Rule::NoInvertedVolume => self.inverted()?,
+            Rule::NoLooseVertices => {
+                // Reading leaves these vertices out, and their places with them.
+                let count = import.loose_vertices.unwrap_or(0);
+                let (one, more) = ("vertex that nothing refers to", "vertices that nothing refers to");
+                Finding::of_faults(Faults::without_places(count), pluralise(count, one, more))
+            }
             Rule::NoNgons => {
                 let count = import.polygons_by_arity[5..].iter().sum();
                 let detail = pluralise(count, "polygon with more than 4 corners", "polygons with more than 4 corners");

@@ -72,7 +72,7 @@ pub fn run(arguments: &InspectArgs) -> Result<(), CliError> {
     let mut parsed = |_| progress.next("counting edges");
     let report = pipeline::inspect(
         &named.bundle,
-        import::Options { format, time_s },
+        import::Options { format, time_s, ..import::Options::default() },
         &limits,
         &Deadline::default(),
         &mut parsed,

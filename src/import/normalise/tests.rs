@@ -58,7 +58,14 @@ fn finish(raw: RawMesh) -> Imported {
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let (folder, _) =
         entry::choose(Bundle::of_one("x").into_files(), &Bundle::default(), Some(Format::Obj), &deadline).unwrap();
-    let mut cx = Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
+    let mut cx = Context {
+        limits: &limits,
+        budget: &mut budget,
+        deadline: &deadline,
+        bundle: &folder,
+        time_s: None,
+        counts_loose: false,
+    };
     normalise(raw, &mut cx).unwrap()
 }
 

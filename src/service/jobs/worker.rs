@@ -57,7 +57,7 @@ pub fn pipeline_renderers(
                     Ok(Product::Picture { output: Box::new(output), mesh_was_kept })
                 }
                 Task::Inspect { time_s } => {
-                    let options = import::Options { format: *format_in, time_s: *time_s };
+                    let options = import::Options { format: *format_in, time_s: *time_s, ..import::Options::default() };
                     let report = pipeline::inspect(bundle, options, &limits, deadline, ended)?;
                     Ok(Product::Report(report.json()?))
                 }
@@ -82,7 +82,7 @@ fn render_stored(
     let key = time_s.map_or_else(|| key.to_owned(), |time_s| format!("{key} at {time_s:?} s"));
     let Found { resident, was_kept } = residents.find(&key, deadline, || {
         let mut budget = Budget::new(limits);
-        let options = import::Options { format: job.format_in, time_s };
+        let options = import::Options { format: job.format_in, time_s, ..import::Options::default() };
         let model = Model::read(&job.bundle, options, limits, &mut budget, deadline)?;
         Ok(Resident { model, budget })
     })?;
