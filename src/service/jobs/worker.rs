@@ -12,6 +12,7 @@ use crate::check::{self, Verdict};
 use crate::import::{self, Bundle, MeshError, bundle::UNNAMED};
 use crate::limits::{Budget, Deadline, Limits};
 use crate::pipeline::{self, Model, Output, RenderError, Stage};
+use crate::report::Extras;
 use crate::service::residents::{Found, Resident, Residents};
 
 /// A worker's renderer, which does one job after the other.
@@ -58,7 +59,7 @@ pub fn pipeline_renderers(
                 }
                 Task::Inspect { time_s } => {
                     let options = import::Options { format: *format_in, time_s: *time_s, ..import::Options::default() };
-                    let report = pipeline::inspect(bundle, options, &limits, deadline, ended)?;
+                    let report = pipeline::inspect(bundle, options, Extras::default(), &limits, deadline, ended)?;
                     Ok(Product::Report(report.json()?))
                 }
                 Task::Check(checking) => judge(work, checking, &limits, deadline, ended),
