@@ -158,7 +158,6 @@ fn job(key: JobKey, file: &[u8]) -> JobRecord {
         request_id: String::new(),
         mesh: None,
         claim: None,
-        newer: None,
     }
 }
 
