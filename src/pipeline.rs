@@ -15,7 +15,7 @@ pub use opened::{Opened, Side, draw_difference, open, render_difference};
 use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, GpuDevice};
 use crate::caption::{Scale, draw_legend};
 use crate::encode::{self, EncodeError};
-use crate::image::{Image, ImageFormat};
+use crate::image::{Image, ImageFormat, RowSink};
 use crate::import::{self, Bundle, Format, Imported, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
@@ -62,13 +62,30 @@ pub fn render_model(
     // Mesh -> Scene -> DrawPlan -> Image
     let format = spec.image.format.unwrap_or(ImageFormat::Png);
     let animated = spec.sheet.as_ref().filter(|sheet| sheet.is_animated(format));
-    let drawn = draw_as(model, spec, animated.is_some(), backends, budget, deadline, ended)?;
+    let effort = spec.image.effort;
+    // One view alone is encoded while it is drawn, as far as its format and its back-end allow it.
+    let mut rows = None;
+    let drawn = match &spec.sheet {
+        None => {
+            if !spec.image.legend {
+                rows = encode::row_encoder(
+                    format,
+                    effort,
+                    [spec.image.width_px, spec.image.height_px],
+                    spec.image.background.is_opaque(),
+                );
+            }
+            let sink = rows.as_mut().map(|rows| rows as &mut dyn RowSink);
+            draw_view(model.view(), spec, sink, backends, budget, deadline, ended)?
+        }
+        Some(_) => draw_as(model, spec, animated.is_some(), backends, budget, deadline, ended)?,
+    };
 
     // Image -> bytes
-    let effort = spec.image.effort;
-    let bytes = match animated {
-        Some(sheet) => encode::encode_animation(&drawn.image, sheet.count(), format, effort, deadline)?,
-        None => encode::encode(&drawn.image, format, effort, deadline)?,
+    let bytes = match (animated, rows) {
+        (Some(sheet), _) => encode::encode_animation(&drawn.image, sheet.count(), format, effort, deadline)?,
+        (None, Some(rows)) => rows.finish(&drawn.image)?,
+        (None, None) => encode::encode(&drawn.image, format, effort, deadline)?,
     };
     ended(Stage::Encode);
 
@@ -103,7 +120,9 @@ fn draw_as(
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Drawn, RenderError> {
-    let Some(sheet) = &spec.sheet else { return draw_view(model.view(), spec, backends, budget, deadline, ended) };
+    let Some(sheet) = &spec.sheet else {
+        return draw_view(model.view(), spec, None, backends, budget, deadline, ended);
+    };
     let layout = Layout::new(sheet, &spec.image, is_animated);
     let mut canvas = Canvas::new(layout, budget).map_err(PlanError::Limit)?;
     let mut all: Option<Drawn> = None;
@@ -112,7 +131,7 @@ fn draw_as(
         // What a view takes is free again before the next.
         let mut of_cell = budget.clone();
         let of_view = sheet::cell_spec(spec, sheet, &cell);
-        let drawn = draw_view(model.view(), &of_view, backends, &mut of_cell, deadline, ended)?;
+        let drawn = draw_view(model.view(), &of_view, None, backends, &mut of_cell, deadline, ended)?;
         canvas.paste(&cell, &drawn.image);
         let Some(view) = cell.view else { continue };
         if sheet.labels {
@@ -125,7 +144,9 @@ fn draw_as(
     }
     let mut all = match all {
         Some(all) => all,
-        None => draw_view(model.view(), &Spec { sheet: None, ..spec.clone() }, backends, budget, deadline, ended)?,
+        None => {
+            draw_view(model.view(), &Spec { sheet: None, ..spec.clone() }, None, backends, budget, deadline, ended)?
+        }
     };
     all.image = canvas.finish();
     Ok(all)
@@ -135,6 +156,7 @@ fn draw_as(
 fn draw_view(
     view: View<'_>,
     spec: &Spec,
+    sink: Option<&mut dyn RowSink>,
     backends: &mut Backends,
     budget: &mut Budget,
     deadline: &Deadline,
@@ -158,7 +180,7 @@ fn draw_view(
     ended(Stage::Plan);
 
     // DrawPlan -> Image
-    let mut drawn = backends.draw(spec.backend, &plan, deadline)?;
+    let mut drawn = backends.draw(spec.backend, &plan, sink, deadline)?;
     if spec.image.legend {
         let legends = plan.legends.iter();
         let scales = legends.map(|plan::Legend { title, ends, colors }| Scale { title, ends: *ends, colors });

@@ -61,7 +61,7 @@ impl Opened {
     /// Draws the file.
     pub fn draw(&self, spec: &Spec, backends: &mut Backends, deadline: &Deadline) -> Result<Image, RenderError> {
         let mut budget = self.budget.clone();
-        Ok(draw_view(self.view(None), spec, backends, &mut budget, deadline, &mut |_| ())?.image)
+        Ok(draw_view(self.view(None), spec, None, backends, &mut budget, deadline, &mut |_| ())?.image)
     }
 
     /// Marks places of faults in a picture of the file. Those that are hidden are marked, too.
@@ -173,13 +173,13 @@ pub fn draw_difference(
             Side::Before | Side::After => {
                 let of_view = sheet::cell_spec(&plain, &sheet, &cell);
                 let view = opened[index].view(Some(&framing));
-                draw_view(view, &of_view, backends, &mut of_cell, deadline, &mut |_| ())?
+                draw_view(view, &of_view, None, backends, &mut of_cell, deadline, &mut |_| ())?
             }
             Side::HeatBefore | Side::HeatAfter => {
                 let mesh = heat(meshes[index], compared, index, most, &mut of_cell).map_err(limit)?;
                 let of_view = sheet::cell_spec(&spec, &sheet, &cell);
                 let view = View { mesh: &mesh, prepared: &Prepared::default(), framing: Some(&framing) };
-                draw_view(view, &of_view, backends, &mut of_cell, deadline, &mut |_| ())?
+                draw_view(view, &of_view, None, backends, &mut of_cell, deadline, &mut |_| ())?
             }
         };
         canvas.paste(&cell, &drawn.image);
@@ -192,7 +192,7 @@ pub fn draw_difference(
     let mut all = match all {
         Some(all) => all,
         // A picture of one pixel has no room for several sides.
-        None => draw_view(opened[1].view(None), &plain, backends, budget, deadline, &mut |_| ())?,
+        None => draw_view(opened[1].view(None), &plain, None, backends, budget, deadline, &mut |_| ())?,
     };
     all.image = canvas.finish();
     if sides.iter().any(|side| matches!(side, Side::HeatBefore | Side::HeatAfter)) {
