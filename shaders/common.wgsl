@@ -254,6 +254,14 @@ fn rsqrt(v: f32) -> f32 {
     return r;
 }
 
+// 1 / sqrt(v) for positive normal v within 5e-6 of it.
+fn quick_rsqrt(v: f32) -> f32 {
+    var r = bitcast<f32>(0x5F3759DFu - (bitcast<u32>(v) >> 1u));
+    let half = 0.5 * v;
+    r = rn(r * (1.5 - rn(rn(half * r) * r)));
+    return rn(r * (1.5 - rn(rn(half * r) * r)));
+}
+
 // To the nearest integer, ties to even, for |v| < 2^22.
 fn round_to_i32(v: f32) -> i32 {
     return bitcast<i32>(rn(v + 12582912.0)) - 0x4B400000;

@@ -84,11 +84,3 @@ fn place_at(pixel: vec2<i32>, depth: f32) -> vec3<f32> {
     let wide = frame.occlusion_spread.x - rn(frame.occlusion_spread.y * depth);
     return vec3(rn2(at * wide), depth);
 }
-
-// 1 / sqrt(v) for positive normal v within 5e-6 of it.
-fn quick_rsqrt(v: f32) -> f32 {
-    var r = bitcast<f32>(0x5F3759DFu - (bitcast<u32>(v) >> 1u));
-    let half = 0.5 * v;
-    r = rn(r * (1.5 - rn(rn(half * r) * r)));
-    return rn(r * (1.5 - rn(rn(half * r) * r)));
-}

@@ -20,6 +20,10 @@ const SAMPLER_SECOND_UVS: u32 = 32u;
 // Largest coordinate: beyond it f32 has too few fractional bits.
 const UV_MAX: f32 = 1048576.0;
 
+// Places along the longer axis of a pixel's footprint that are looked at, at most, where the colours of
+// a texture are seen; others only change the light.
+const TAPS_MAX: u32 = 8u;
+
 // Texture coordinates at a point, and how they change a pixel to the right and a pixel down.
 struct Uv {
     at: vec2<f32>,
@@ -69,8 +73,8 @@ struct Image {
     first_texel: u32,
 };
 
-// Linear RGBA of a texture, trilinear; white where there is none. `first_uv` is of the first set of
-// texture coordinates.
+// Linear RGBA of a texture: the mean of places along the pixel's footprint, each trilinear; white where
+// there is no texture. `first_uv` is of the first set of texture coordinates.
 fn sample_texture(m: u32, slot: u32, id: u32, b: Barycentrics, first_uv: Uv) -> vec4<f32> {
     let used = use_of(m, slot);
     if used.texture >= frame.image_count {
@@ -87,16 +91,84 @@ fn sample_texture(m: u32, slot: u32, id: u32, b: Barycentrics, first_uv: Uv) -> 
     let size = vec2<f32>(image.size);
     let x = rn2(transformed(used, uv.dx) * size);
     let y = rn2(transformed(used, uv.dy) * size);
-    let step = max(rn(x.x * x.x) + rn(x.y * x.y), rn(y.x * y.x) + rn(y.y * y.y));
-    let lod = max(min(half_log2(step), f32(image.levels) - 1.0), f32(image.first_level));
-    if (used.sampler & SAMPLER_NEAREST) != 0u {
-        return nearest(image, u32(lod + 0.5), at, used.sampler);
+    let taps_max = select(1u, TAPS_MAX, slot == SLOT_BASE || slot == SLOT_EMISSIVE);
+    let footprint = footprint_of(image, used.sampler, taps_max, x, y);
+    if footprint.taps < 2u {
+        return filtered(image, footprint.lod, at, used.sampler);
+    }
+    let share = quick_recip(f32(footprint.taps));
+    var sum = vec4(0.0);
+    for (var tap = 0u; tap < footprint.taps; tap++) {
+        let along = rn((f32(tap) + 0.5) * share) - 0.5;
+        sum += filtered(image, footprint.lod, at + rn2(footprint.axis * along), used.sampler);
+    }
+    return rn4(sum * share);
+}
+
+// The part of a texture that a pixel covers, as it is looked at.
+struct Footprint {
+    // Places that are looked at, side by side along the axis.
+    taps: u32,
+    // Level of each.
+    lod: f32,
+    // The footprint's longer axis from end to end, in texture coordinates; 0 for one place.
+    axis: vec2<f32>,
+};
+
+// The footprint of a pixel whose step to the right, and down, is so many texels: the ellipse into which
+// the two steps turn a circle.
+fn footprint_of(image: Image, sampler: u32, taps_max: u32, right: vec2<f32>, down: vec2<f32>) -> Footprint {
+    let across = square_of(right);
+    let along = square_of(down);
+    let one = Footprint(1u, lod_of(image, max(across, along)), vec2(0.0));
+    // No texel is smaller.
+    let least = f32(1u << (image.first_level & 31u));
+    let is_small = across + along < 2.25 * least * least;
+    if (sampler & SAMPLER_NEAREST) != 0u || is_small || !(across + along < 1e12) {
+        return one;
+    }
+    let diagonal = rn2(right * right) + rn2(down * down);
+    let b = rn(right.x * right.y) + rn(down.x * down.y);
+    let half = rn(0.5 * (diagonal.x - diagonal.y));
+    let root_square = rn(half * half) + rn(b * b);
+    let root = rn(root_square * quick_rsqrt(max(root_square, 1e-30)));
+    let long_square = rn(0.5 * (diagonal.x + diagonal.y)) + root;
+    let inverse = quick_rsqrt(long_square);
+    let long = rn(long_square * inverse);
+    let short = max(rn(abs(rn(right.x * down.y) - rn(right.y * down.x)) * inverse), least);
+    let taps = min(u32(rn(long * quick_recip(short)) + 0.5), taps_max);
+    if taps < 2u {
+        return one;
+    }
+    let step = rn(long * quick_recip(f32(taps)));
+    var direction = vec2(b, root - half);
+    if half >= 0.0 {
+        direction = vec2(half + root, b);
+    }
+    let scale = rn(long * quick_rsqrt(max(square_of(direction), 1e-30)));
+    let size = vec2<f32>(image.size);
+    let axis = rn2(rn2(direction * scale) * vec2(quick_recip(size.x), quick_recip(size.y)));
+    return Footprint(taps, lod_of(image, max(rn(step * step), rn(short * short))), axis);
+}
+
+fn square_of(v: vec2<f32>) -> f32 {
+    return rn(v.x * v.x) + rn(v.y * v.y);
+}
+
+// The level at which texels are as large as so many of the first, squared.
+fn lod_of(image: Image, size_square: f32) -> f32 {
+    return max(min(half_log2(size_square), f32(image.levels) - 1.0), f32(image.first_level));
+}
+
+fn filtered(image: Image, lod: f32, at: vec2<f32>, sampler: u32) -> vec4<f32> {
+    if (sampler & SAMPLER_NEAREST) != 0u {
+        return nearest(image, u32(lod + 0.5), at, sampler);
     }
     let level = u32(lod);
     let share = lod - f32(level);
-    let fine = bilinear(image, level, at, used.sampler);
+    let fine = bilinear(image, level, at, sampler);
     if share > 0.0 {
-        return mixed(fine, bilinear(image, level + 1u, at, used.sampler), share);
+        return mixed(fine, bilinear(image, level + 1u, at, sampler), share);
     }
     return fine;
 }

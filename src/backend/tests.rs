@@ -73,6 +73,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
     add!("MASK_WORDS" = POINTS / 32, "IMAGE_VECTORS" = size_of::<Texture>() / 8);
     add!("TILE_PX" = tiles::TILE_PX, "HUGE_PX" = tiles::HUGE_PX, "CORNERS_MAX" = clip::CORNERS_MAX);
     add!("GUARD" = GUARD, "BOUND" = clip::BOUND, "UV_MAX" = texture::UV_MAX, "MIN_POSITIVE" = f32::MIN_POSITIVE);
+    add!("TAPS_MAX" = samplers::TAPS_MAX);
     // Lines.
     add!("POINTS" = POINTS, "GENERATOR" = GENERATORS[1], "AREA_UNIT" = coverage::AREA_UNIT, "UNIT" = stroke::UNIT);
     add!(

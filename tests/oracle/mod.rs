@@ -12,7 +12,7 @@
 //! 2. [`lines::strip`] and [`lines::capsule`]: straight lines in closed form.
 //! 3. [`screen`], [`surface::visible`], [`lines::coverage`], [`surface::rays`],
 //!    [`lines::silhouette`]: any scene, by many points per pixel.
-//! 4. [`surface::light`]: the colour of a lit surface.
+//! 4. [`surface::light`]: the colour of a lit surface; [`surface::texture`]: the mean of a texture over a pixel.
 //! 5. [`flip`]: how different two pictures look.
 //!
 //! And of a mesh: [`contacts`], which triangles intersect.

@@ -1,18 +1,23 @@
 //! Texture levels that a picture can reach: finer ones need not be kept.
 //!
-//! The sampler takes the level log2(max(|a|, |b|)), a and b being the derivatives of the texel
-//! coordinates across and down a pixel. max(|a|, |b|)^2 >= |a x b|, the texels that a pixel covers.
-//! Over a triangle with screen corners s_i, texel corners t_i and distances W_i, perspective
-//! interpolation gives
+//! A pixel's footprint in a texture is an ellipse, and A the product of its axes: the texels that the pixel covers. The
+//! sampler takes the level of the longer axis where the axes' ratio r is below 1.5, which is at least
+//! log2(sqrt(A)). Elsewhere it looks at up to [`TAPS_MAX`] places along the longer axis, in the level of the shorter
+//! one, log2(sqrt(A / r)), or of an eighth of the longer one, log2(sqrt(A r) / 8), whichever is coarser. So no pixel
+//! reaches below log2(sqrt(A / min(r, 8))).
+//!
+//! Over a triangle with screen corners s_i, texel corners t_i and distances W_i, perspective interpolation gives
 //!
 //! ```text
-//! |a x b| (p) = area(t) / area(s) * W(p)^3 / (W_0 W_1 W_2)
+//! A(p) = area(t) / area(s) * W(p)^3 / (W_0 W_1 W_2)
+//! J(p) = f J_0 (I - d g^T)
 //! ```
 //!
-//! (u and v are ratios of functions that are linear on screen, with the denominator 1 / W; the
-//! Jacobian of such a ratio is a determinant of the planes over the denominator's cube.) A pixel is
-//! shaded at the mean of its samples, which lie inside the triangle, where W is at least the
-//! smallest W_i. So the least of this over all triangles bounds the level from below.
+//! (u and v are ratios of functions that are linear on screen, with the denominator q = 1 / W. J is the matrix of the
+//! derivatives, J_0 that at the first corner, f a factor, d = p - s_0, and g = grad q / q(p).) A pixel is shaded at the
+//! mean of its samples, which lie inside the triangle, where W is at least the smallest W_i. And r is at most
+//! r_0 (1 + |d| |g|)^2 q_max / q_min, since the determinant of I - d g^T is q_0 / q(p). So the least of A / min(r, 8)
+//! over all triangles bounds the level from below.
 //!
 //! Rounding: corners are snapped to whole units of 1/256 px, so area(s) may be larger than the true
 //! one, by at most e perimeter + 3 e^2 for corners that move by e; and f32 coordinates make area(t)
@@ -23,6 +28,7 @@ use crate::limits::{Deadline, Stopped};
 use crate::mesh::Mesh;
 use crate::plan::geometry::Geometry;
 use crate::plan::projection::Projection;
+use crate::plan::surface::samplers::TAPS_MAX;
 
 /// A material's use of a texture.
 #[derive(Clone, Copy, Debug)]
@@ -35,8 +41,8 @@ pub struct Use {
     pub transform: [[f32; 3]; 2],
     /// True for the mesh's second set of texture coordinates.
     pub is_second_uvs: bool,
-    /// Texels of level 0.
-    pub texels: f64,
+    /// Columns and rows of level 0.
+    pub size: [f64; 2],
 }
 
 /// For each of `count` textures, a level that is reached or exceeded by every pixel that samples
@@ -70,9 +76,10 @@ pub fn finest_levels(
             let one = &uses[index];
             let uvs = if one.is_second_uvs { &mesh.second_uvs } else { &mesh.uvs };
             let uvs = corners.map(|v| uvs[v as usize]);
-            let density = screen.map_or(0.0, |screen| screen * area_of_uvs(&uvs, &one.transform) * one.texels);
-            // Written so that NaN counts as 0.
-            least[index] = if density > 0.0 { least[index].min(density) } else { 0.0 };
+            least[index] = match &screen {
+                Some(screen) => least[index].min(least_density(screen, &uvs, one, least[index])),
+                None => 0.0,
+            };
             level(least[index]) > 0
         });
         open -= before - list.len();
@@ -98,15 +105,27 @@ fn level(density: f64) -> u32 {
     level
 }
 
-/// The factor of the texel area: `W^3 / (W_0 W_1 W_2) / area(s)` at the nearest corner, in 1 /
-/// px^2. None where a corner is outside.
-fn on_screen(corners: [[f32; 3]; 3], projection: &Projection) -> Option<f64> {
+/// A triangle on screen.
+struct OnScreen {
+    /// Its corners, in 1/256 px.
+    points: [[f64; 2]; 3],
+    /// 1 / W at the corners.
+    inverse_w: [f64; 3],
+    /// Twice its area, and its perimeter.
+    area: f64,
+    perimeter: f64,
+}
+
+/// Movement of a corner by snapping, in 1/256 px: half a unit across and down, and twice what f32 is off at the guard
+/// band.
+const MOVED: f64 = 1.5;
+
+/// None where a corner is outside.
+fn on_screen(corners: [[f32; 3]; 3], projection: &Projection) -> Option<OnScreen> {
     /// 4096 px, in 1/256 px.
     const GUARD: f64 = 1_048_576.0;
-    /// Half a unit across and down, and twice what f32 is off at the guard band.
-    const MOVED: f64 = 1.5;
     let mut points = [[0.0; 2]; 3];
-    let mut depths = [1.0; 3];
+    let mut inverse_w = [1.0; 3];
     for k in 0..3 {
         let row = |row: &[f32; 4]| {
             let p = corners[k].map(f64::from);
@@ -115,32 +134,79 @@ fn on_screen(corners: [[f32; 3]; 3], projection: &Projection) -> Option<f64> {
         };
         let w = row(&projection.w);
         points[k] = [row(&projection.x) / w, row(&projection.y) / w];
-        depths[k] = w;
+        inverse_w[k] = 1.0 / w;
         let inside = w > f64::from(projection.near_w) * (1.0 + 1e-6);
         if !(inside && points[k].iter().all(|c| c.abs() < GUARD * 0.999)) {
             return None;
         }
     }
     let (area, perimeter) = area_and_perimeter(points);
-    let area_px = (area + MOVED * perimeter + 3.0 * MOVED * MOVED) / 65536.0;
-    let nearest = depths[0].min(depths[1]).min(depths[2]);
-    Some((nearest / depths[0]) * (nearest / depths[1]) * (nearest / depths[2]) / area_px)
+    Some(OnScreen { points, inverse_w, area, perimeter })
 }
 
-/// Twice the area of a triangle in transformed texture coordinates, less what f32 may be off.
-fn area_of_uvs(uvs: &[[f32; 2]; 3], transform: &[[f32; 3]; 2]) -> f64 {
+/// The least of A / min(r, 8) over a triangle, or more than `enough` if it is that at least. 0 where it is not certain.
+fn least_density(screen: &OnScreen, uvs: &[[f32; 2]; 3], one: &Use, enough: f64) -> f64 {
     let mut largest = 0.0_f64;
-    let points = uvs.map(|uv| {
+    let texels = uvs.map(|uv| {
         let [u, v] = uv.map(f64::from);
-        transform.map(|row| {
-            let [a, b, c] = row.map(f64::from);
+        [0, 1].map(|k| {
+            let [a, b, c] = one.transform[k].map(|v| f64::from(v) * one.size[k]);
             largest = largest.max((a * u).abs() + (b * v).abs() + c.abs());
             a * u + b * v + c
         })
     });
+    // What f32 may be off.
     let unsure = largest / 1_048_576.0;
-    let (area, perimeter) = area_and_perimeter(points);
-    (area - unsure * perimeter - 3.0 * unsure * unsure).max(0.0)
+    let (area, perimeter) = area_and_perimeter(texels);
+    let area = (area - unsure * perimeter - 3.0 * unsure * unsure).max(0.0);
+    let area_px = (screen.area + MOVED * screen.perimeter + 3.0 * MOVED * MOVED) / 65536.0;
+    let q = screen.inverse_w;
+    let most = q[0].max(q[1]).max(q[2]);
+    let density = (q[0] / most) * (q[1] / most) * (q[2] / most) * area / area_px;
+    // Written so that NaN counts as 0.
+    if !(density > 0.0) {
+        return 0.0;
+    }
+    let tapped = density / f64::from(TAPS_MAX);
+    if tapped >= enough {
+        return density;
+    }
+    let ratio = ratio_max(screen, &texels, unsure);
+    match ratio < f64::from(TAPS_MAX) {
+        true if ratio < 1.49 => density,
+        true => density / ratio,
+        false => tapped,
+    }
+}
+
+/// A bound of the ratio of the footprints' axes over a triangle; infinite where none is certain.
+fn ratio_max(screen: &OnScreen, texels: &[[f64; 2]; 3], unsure: f64) -> f64 {
+    let q = screen.inverse_w;
+    let side = |p: &[[f64; 2]; 3], k: usize| [p[k][0] - p[0][0], p[k][1] - p[0][1]];
+    let (s, t) = ([side(&screen.points, 1), side(&screen.points, 2)], [side(texels, 1), side(texels, 2)]);
+    // Derivatives along two sides, at the first corner.
+    let t = [0, 1].map(|k| t[k].map(|v| v * (q[k + 1] / q[0])));
+    let determinant = |m: &[[f64; 2]; 2]| m[0][0] * m[1][1] - m[0][1] * m[1][0];
+    let norm = |m: &[[f64; 2]; 2]| m.iter().flatten().map(|v| v * v).sum::<f64>().sqrt();
+    let (det_s, det_t) = (determinant(&s), determinant(&t));
+    // J_0 = T S^-1, without the factor 1 / det(S), which no ratio has; columns of S and T are the sides.
+    let j = [0, 1].map(|k| [t[0][k] * s[1][1] - t[1][k] * s[0][1], t[1][k] * s[0][0] - t[0][k] * s[1][0]]);
+    let mean = 0.5 * j.iter().flatten().map(|v| v * v).sum::<f64>();
+    let det_j = determinant(&j).abs();
+    let root = (mean * mean - det_j * det_j).max(0.0).sqrt();
+    let ratio = (mean + root) / det_j;
+    let (low, high) = (q[0].min(q[1]).min(q[2]), q[0].max(q[1]).max(q[2]));
+    // Both matrices may be off by six times what a coordinate is: their parts, relative to the inverse.
+    let off = 6.0 * MOVED * norm(&s) / det_s.abs() + 6.0 * unsure * (high / low) * norm(&t) / det_t.abs();
+    let dq = [q[1] - q[0], q[2] - q[0]];
+    let slope = [dq[0] * s[1][1] - dq[1] * s[0][1], dq[1] * s[0][0] - dq[0] * s[1][0]];
+    let steep = slope[0].hypot(slope[1]) / det_s.abs() / low * (0.5 * screen.perimeter);
+    // Written so that NaN is infinite.
+    if off < 0.5 && ratio.is_finite() {
+        ratio * ((1.0 + off) / (1.0 - off)).powi(2) * (1.0 + steep).powi(2) * (high / low)
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// Twice the area of a triangle, and its perimeter.

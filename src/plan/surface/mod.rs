@@ -144,6 +144,14 @@ pub mod samplers {
     pub const NEAREST: u32 = 16;
     /// The second set of texture coordinates.
     pub const SECOND_UVS: u32 = 32;
+    /// Places along the longer axis of a pixel's footprint that are looked at, at most.
+    pub const TAPS_MAX: u32 = 8;
+
+    /// The same for a texture of a slot: several where its colours are seen, one where they only change the light.
+    #[inline(always)]
+    pub fn taps_max(slot: usize) -> u32 {
+        if matches!(slot, super::slots::BASE | super::slots::EMISSIVE) { TAPS_MAX } else { 1 }
+    }
 }
 
 /// Values of the debug view in [`ShadedMaterial::flags`]; 0 for none.

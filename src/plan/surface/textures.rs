@@ -92,10 +92,10 @@ impl<'a> TextureLoader<'a> {
         }
         let Some(index) = self.index_of(texture.image, reading)? else { return Ok(None) };
         let Header { width, height, .. } = self.wanted[index].header;
-        let texels = f64::from(width) * f64::from(height);
+        let size = [f64::from(width), f64::from(height)];
         self.budget.spend("textures", 1, 2 * size_of::<Use>() as u64)?;
         let (material, transform) = (self.material, texture.transform);
-        self.uses.push(Use { material, texture: index, transform, is_second_uvs, texels });
+        self.uses.push(Use { material, texture: index, transform, is_second_uvs, size });
         Ok(Some(TextureUse { transform: texture.transform, texture: index as u32, sampler: sampler(texture) }))
     }
 

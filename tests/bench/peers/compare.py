@@ -1,7 +1,8 @@
 """Run time of meshsnap, VTK and F3D on the same meshes: see tests/bench/peers/run.
 
-Warm: the mesh is in memory. VTK renders and reads its picture back; meshsnap's time is what its
-server reports for plan and render (Server-Timing), with one worker. Process: from the start of a
+Warm: the mesh is in memory, and the camera another each time. VTK renders and reads its picture back;
+meshsnap's time is what its server reports for plan and render of a stored mesh (Server-Timing), with one
+worker, without the rows that are encoded meanwhile. Process: from the start of a
 program to its PNG file. All at 512 x 512 px; meshsnap with 4 samples, VTK and F3D as they are.
 Rounds are interleaved, and figures are medians.
 """
@@ -89,13 +90,26 @@ class Server:
         self.child.terminate()
         self.child.wait()
 
-    def render_ms(self, mesh, style):
-        url = f"http://{self.address}/v1/render?style={style}&size={SIZE_PX}"
-        request = urllib.request.Request(url, data=mesh, headers={"Content-Type": "application/octet-stream"})
+    def store(self, mesh):
+        request = urllib.request.Request(f"http://{self.address}/v1/meshes", data=mesh)
         with urllib.request.urlopen(request) as answer:
+            return answer.headers["Location"]
+
+    def render_ms(self, mesh, azimuth_deg, query):
+        url = f"http://{self.address}{mesh}/render.png?size={SIZE_PX}&camera.azimuth_deg={azimuth_deg}&{query}"
+        with urllib.request.urlopen(url) as answer:
             answer.read()
             timing = dict(re.findall(r"(\w+);dur=([\d.]+)", answer.headers["Server-Timing"]))
-        return float(timing["plan"]) + float(timing["render"])
+        return float(timing["plan"]) + float(timing["render"]) - float(timing.get("encode_rows", 0))
+
+
+# VTK draws the edges of all triangles, 1 px wide.
+LOOKS = {
+    "flat": "style=flat",
+    "wire": "style=wire&wire.edges=triangles&wire.thickness=1",
+    "auto": "style=auto",
+    "wire auto": "style=wire",
+}
 
 
 def warm(server, path):
@@ -109,22 +123,21 @@ def warm(server, path):
         plotter.show(auto_close=False)
         plotters[edges] = plotter
     with open(path, "rb") as file:
-        data = file.read()
+        stored = server.store(file.read())
     times = {}
 
     def took(name, ms):
         times.setdefault(name, []).append(ms)
 
-    for _ in range(WARM_ROUNDS + 1):
+    for turn in range(WARM_ROUNDS + 1):
         for edges, plotter in plotters.items():
             plotter.camera.azimuth += 1
             began = time.perf_counter()
             plotter.render()
             plotter.screenshot(return_img=True)
             took("VTK edges" if edges else "VTK", 1e3 * (time.perf_counter() - began))
-        # VTK draws the edges of all triangles, 1 px wide.
-        for style, keys in (("flat", ""), ("wire", "&wire.edges=triangles&wire.thickness=1")):
-            took(style, server.render_ms(data, style + keys))
+        for name, query in LOOKS.items():
+            took(name, server.render_ms(stored, 30 + turn, query))
     for plotter in plotters.values():
         plotter.close()
     # The first round warms up.
@@ -132,6 +145,8 @@ def warm(server, path):
     row["VTK / flat"] = row["VTK"] / row["flat"]
     row["VTK / (wire - flat)"] = row["VTK"] / max(row["wire"] - row["flat"], 1e-3)
     row["VTK edges / wire"] = row["VTK edges"] / row["wire"]
+    row["VTK / auto"] = row["VTK"] / row["auto"]
+    row["auto / flat"] = row["auto"] / row["flat"]
     return {"mesh": os.path.basename(path), **row}
 
 

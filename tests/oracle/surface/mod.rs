@@ -4,4 +4,5 @@ pub mod light;
 pub mod occlusion;
 pub mod rays;
 pub mod srgb;
+pub mod texture;
 pub mod visible;

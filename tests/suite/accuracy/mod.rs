@@ -13,4 +13,5 @@ pub mod oracle_scenes;
 pub mod outlines;
 pub mod over;
 pub mod shading;
+pub mod textures;
 pub mod wires;

@@ -2,13 +2,16 @@
 //! `shaders/occlusion/gather.wgsl`.
 
 use super::grid::{Grid, NOWHERE, lanes};
-use crate::backend::cpu::geometry::transform::round_to_i32;
+use crate::backend::cpu::geometry::transform::{quick_rsqrt, round_to_i32};
 use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::plan::{OcclusionPass, TAPS_PER_PIXEL, sample_offsets};
 
 /// Sine of the angle above the surface below which nothing takes light: flat places stay as they are,
 /// however they are rounded.
 pub const BIAS: f32 = 0.1;
+
+/// Square of the sine up to which a place surely takes nothing, with a margin for rounding.
+const TAKES_NOTHING: f32 = BIAS * BIAS * 0.99;
 
 /// Factor of the mean that the places take: two walls that meet at right angles take all of the light from where they do.
 pub const GAIN: f32 = 6.0;
@@ -141,12 +144,21 @@ impl<'a> Looker<'a> {
         let mut taken = [0.0; LANES];
         for &tap in self.pass.taps_of(self.pixel[0], self.pixel[1]) {
             let places = self.places(tap, self.depths(tap));
+            let (mut squares, mut alongs, mut takes) = ([0.0; LANES], [0.0; LANES], false);
             for l in 0..LANES {
                 let v: [f32; 3] = std::array::from_fn(|k| places[k][l] - self.place[k][l]);
-                let square = (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2];
-                let along = (v[0] * normals[0][l] + v[1] * normals[1][l]) + v[2] * normals[2][l];
-                let sine = along * quick_rsqrt(square.max(1e-6));
-                let near = (1.0 - square * inverse_square).max(0.0);
+                squares[l] = (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2];
+                alongs[l] = (v[0] * normals[0][l] + v[1] * normals[1][l]) + v[2] * normals[2][l];
+                let above = alongs[l].max(0.0);
+                takes |= above * above > TAKES_NOTHING * squares[l];
+            }
+            // Most places around most pixels.
+            if !takes {
+                continue;
+            }
+            for l in 0..LANES {
+                let sine = alongs[l] * quick_rsqrt(squares[l].max(1e-6));
+                let near = (1.0 - squares[l] * inverse_square).max(0.0);
                 taken[l] += (sine - BIAS).max(0.0) * (near * near);
             }
         }
@@ -158,13 +170,4 @@ impl<'a> Looker<'a> {
         }
         found
     }
-}
-
-/// `1 / sqrt(v)` for positive normal `v` within 5e-6 of it, the same bits everywhere.
-#[inline(always)]
-fn quick_rsqrt(v: f32) -> f32 {
-    let r = f32::from_bits(0x5F37_59DF_u32.wrapping_sub(v.to_bits() >> 1));
-    let half = 0.5 * v;
-    let r = r * (1.5 - (half * r) * r);
-    r * (1.5 - (half * r) * r)
 }

@@ -4,6 +4,7 @@
 //! texels change.
 
 use super::barycentric::Barycentrics;
+use crate::backend::cpu::geometry::transform::{quick_recip, quick_rsqrt};
 use crate::plan::{CornerValues, SurfacePass, Texture, TextureUse, Textures, samplers};
 
 /// Largest coordinate: beyond it f32 has too few fractional bits.
@@ -81,30 +82,29 @@ pub fn blend<const K: usize, const N: usize>([p, q, r]: &[[[f32; N]; K]; 3], w: 
     out
 }
 
-/// Linear RGBA of a texture, trilinear; white where there is none
-/// ([`TEXTURE_NONE`](crate::plan::TEXTURE_NONE)).
+/// Linear RGBA of a texture: the mean of places along the pixel's footprint, each trilinear; white where there is
+/// no texture ([`TEXTURE_NONE`](crate::plan::TEXTURE_NONE)). Up to `taps_max` places are looked at.
 #[inline(always)]
-pub fn sample<const N: usize>(textures: &Textures, used: &TextureUse, uv: &Uv<N>) -> [[f32; N]; 4] {
+pub fn sample<const N: usize>(textures: &Textures, used: &TextureUse, taps_max: u32, uv: &Uv<N>) -> [[f32; N]; 4] {
     let mut out = [[1.0; N]; 4];
     let Some(image) = textures.images.get(used.texture as usize) else {
         return out;
     };
     let size = [image.width as f32, image.height as f32];
-    let (mut at, mut lods) = ([[0.0; 2]; N], [0.0; N]);
+    let mut at = [[0.0; 2]; N];
+    let mut footprints = [Footprint { taps: 1, lod: 0.0, axis: [0.0; 2] }; N];
     for l in 0..N {
+        let (mut right, mut down) = ([0.0; 2], [0.0; 2]);
         for k in 0..2 {
             let [a, b, c] = used.transform[k];
             at[l][k] = bounded((a * uv.at[0][l] + b * uv.at[1][l]) + c);
+            right[k] = (a * uv.d[0][0][l] + b * uv.d[0][1][l]) * size[k];
+            down[k] = (a * uv.d[1][0][l] + b * uv.d[1][1][l]) * size[k];
         }
-        let mut steps = [0.0_f32; 2];
-        for (step, d) in steps.iter_mut().zip(&uv.d) {
-            let texels = |k: usize| (used.transform[k][0] * d[0][l] + used.transform[k][1] * d[1][l]) * size[k];
-            *step = texels(0) * texels(0) + texels(1) * texels(1);
-        }
-        lods[l] = half_log2(steps[0].max(steps[1])).min(image.levels as f32 - 1.0).max(image.first_level as f32);
+        footprints[l] = Footprint::of(image, used.sampler, taps_max, right, down);
     }
     for l in 0..N {
-        let texel = filtered(textures, image, lods[l], at[l], used.sampler);
+        let texel = averaged(textures, image, footprints[l], at[l], used.sampler);
         for k in 0..4 {
             out[k][l] = texel[k];
         }
@@ -112,19 +112,122 @@ pub fn sample<const N: usize>(textures: &Textures, used: &TextureUse, uv: &Uv<N>
     out
 }
 
+/// The part of a texture that a pixel covers, as it is looked at.
+#[derive(Clone, Copy)]
+struct Footprint {
+    /// Places that are looked at, side by side along the axis.
+    taps: u32,
+    /// Level of each.
+    lod: f32,
+    /// The footprint's longer axis from end to end, in texture coordinates.
+    axis: [f32; 2],
+}
+
+impl Footprint {
+    /// The footprint of a pixel whose step to the right, and down, is so many texels: the ellipse into which the
+    /// two steps turn a circle. docs/rasterizer.md, "Textures", has the formulas.
+    ///
+    /// Selections instead of branches, so that a vector holds several.
+    #[inline(always)]
+    fn of(image: &Texture, sampler: u32, taps_max: u32, right: [f32; 2], down: [f32; 2]) -> Self {
+        let square = |v: [f32; 2]| v[0] * v[0] + v[1] * v[1];
+        let (across, along) = (square(right), square(down));
+        // No texel is smaller.
+        let least = (1_u32 << (image.first_level & 31)) as f32;
+        let is_small = across + along < 2.25 * least * least;
+        let is_one = (sampler & samplers::NEAREST != 0) | is_small | !(across + along < 1e12);
+        let [a, c] = [0, 1].map(|k| right[k] * right[k] + down[k] * down[k]);
+        let b = right[0] * right[1] + down[0] * down[1];
+        let half = 0.5 * (a - c);
+        let root_square = half * half + b * b;
+        let root = root_square * quick_rsqrt(root_square.max(1e-30));
+        let long_square = 0.5 * (a + c) + root;
+        let inverse = quick_rsqrt(long_square);
+        let long = long_square * inverse;
+        let short = ((right[0] * down[1] - right[1] * down[0]).abs() * inverse).max(least);
+        let taps = (long * quick_recip(short) + 0.5).min(taps_max as f32) as u32;
+        let is_one = is_one | (taps < 2);
+        let step = long * quick_recip(taps as f32);
+        let direction = if half >= 0.0 { [half + root, b] } else { [b, root - half] };
+        let scale = long * quick_rsqrt(square(direction).max(1e-30));
+        let axis = [
+            (direction[0] * scale) * quick_recip(image.width as f32),
+            (direction[1] * scale) * quick_recip(image.height as f32),
+        ];
+        let size_square = if is_one { across.max(along) } else { (step * step).max(short * short) };
+        let lod = half_log2(size_square).min(image.levels as f32 - 1.0).max(image.first_level as f32);
+        Self { taps: if is_one { 1 } else { taps }, lod, axis }
+    }
+}
+
+/// A level of an image.
+#[derive(Clone, Copy)]
+struct Level {
+    /// Its first texel.
+    first: u32,
+    /// Columns and rows.
+    size: [i32; 2],
+}
+
+impl Level {
+    #[inline(always)]
+    fn of(image: &Texture, level: u32) -> Self {
+        let size = |level: u32| [image.width, image.height].map(|side| (side >> level).max(1));
+        let level = level.min(image.levels.max(1) - 1);
+        let before = |level: u32| size(level)[0] * size(level)[1];
+        let first = image.first_texel + (image.first_level..level).map(before).sum::<u32>();
+        Self { first, size: size(level).map(|side| side as i32) }
+    }
+
+    /// The level that follows, or this one if it is the last.
+    #[inline(always)]
+    fn next(self) -> Self {
+        if self.size == [1, 1] {
+            return self;
+        }
+        let first = self.first + (self.size[0] * self.size[1]) as u32;
+        Self { first, size: self.size.map(|side| (side >> 1).max(1)) }
+    }
+}
+
 #[inline(always)]
-fn filtered(textures: &Textures, image: &Texture, lod: f32, at: [f32; 2], sampler: u32) -> [f32; 4] {
+fn averaged(textures: &Textures, image: &Texture, footprint: Footprint, at: [f32; 2], sampler: u32) -> [f32; 4] {
+    let Footprint { taps, lod, axis } = footprint;
     if sampler & samplers::NEAREST != 0 {
-        return nearest(textures, image, (lod + 0.5) as u32, at, sampler);
+        return nearest(textures, Level::of(image, (lod + 0.5) as u32), at, sampler);
     }
-    let level = lod as u32;
-    let share = lod - level as f32;
+    let share_of_next = lod - (lod as u32) as f32;
+    let level = Level::of(image, lod as u32);
+    let levels = (level, (share_of_next > 0.0).then(|| (level.next(), share_of_next)));
+    if taps < 2 {
+        return trilinear(textures, levels, at, sampler);
+    }
+    let share = quick_recip(taps as f32);
     let mut sum = [0.0; 4];
-    for step in 0..=u32::from(share > 0.0) {
-        let color = bilinear(textures, image, level + step, at, sampler);
-        sum = if step == 0 { color } else { mix(sum, color, share) };
+    for tap in 0..taps {
+        let along = (tap as f32 + 0.5) * share - 0.5;
+        let place = [at[0] + axis[0] * along, at[1] + axis[1] * along];
+        let color = trilinear(textures, levels, place, sampler);
+        for k in 0..4 {
+            sum[k] += color[k];
+        }
     }
-    sum
+    sum.map(|v| v * share)
+}
+
+/// A place in a level, mixed with the next by its share.
+#[inline(always)]
+fn trilinear(
+    textures: &Textures,
+    (level, next): (Level, Option<(Level, f32)>),
+    at: [f32; 2],
+    sampler: u32,
+) -> [f32; 4] {
+    let color = bilinear(textures, level, at, sampler);
+    match next {
+        Some((next, share)) => mix(color, bilinear(textures, next, at, sampler), share),
+        None => color,
+    }
 }
 
 /// Clamps a coordinate to the range with fractional bits; NaN and infinity are 0.
@@ -143,8 +246,7 @@ fn half_log2(v: f32) -> f32 {
 }
 
 #[inline(always)]
-fn bilinear(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], sampler: u32) -> [f32; 4] {
-    let (first, size) = level_of(image, level);
+fn bilinear(textures: &Textures, Level { first, size }: Level, at: [f32; 2], sampler: u32) -> [f32; 4] {
     let (mut low, mut high, mut share) = ([0; 2], [0; 2], [0.0; 2]);
     for k in 0..2 {
         let wrap = sampler >> (samplers::DOWN_SHIFT * k as u32) & samplers::WRAP_BITS;
@@ -160,22 +262,12 @@ fn bilinear(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], samp
     mix(upper, lower, share[1])
 }
 
-fn nearest(textures: &Textures, image: &Texture, level: u32, at: [f32; 2], sampler: u32) -> [f32; 4] {
-    let (first, size) = level_of(image, level);
+fn nearest(textures: &Textures, Level { first, size }: Level, at: [f32; 2], sampler: u32) -> [f32; 4] {
     let [x, y] = [0, 1].map(|k| {
         let wrap = sampler >> (samplers::DOWN_SHIFT * k as u32) & samplers::WRAP_BITS;
         texel_index(floor(wrapped(at[k], wrap) * size[k] as f32), size[k], wrap)
     });
     texel(textures, first + (y * size[0] + x) as u32)
-}
-
-/// First texel and size of a level.
-#[inline(always)]
-fn level_of(image: &Texture, level: u32) -> (u32, [i32; 2]) {
-    let size = |level: u32| [image.width, image.height].map(|side| (side >> level).max(1));
-    let level = level.min(image.levels.max(1) - 1);
-    let before = |level: u32| size(level)[0] * size(level)[1];
-    (image.first_texel + (image.first_level..level).map(before).sum::<u32>(), size(level).map(|side| side as i32))
 }
 
 /// A coordinate in 0 to 1.

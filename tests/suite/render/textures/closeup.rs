@@ -102,11 +102,22 @@ fn lods(corners: [[f32; 3]; 3], uvs: [[f32; 2]; 3], projection: &Projection, tex
                 continue;
             }
             let slope = |f: &[f64; 3], k: usize| (f[k] * at(&q) - at(f) * q[k]) / (at(&q) * at(&q)) * texels;
-            let length = |k: usize| slope(&u, k).hypot(slope(&v, k));
-            out.push(length(1).max(length(2)).log2());
+            out.push(level([slope(&u, 1), slope(&v, 1)], [slope(&u, 2), slope(&v, 2)]));
         }
     }
     out
+}
+
+/// The level of a pixel whose steps to the right and down are so many texels.
+fn level(right: [f64; 2], down: [f64; 2]) -> f64 {
+    let square = |v: [f64; 2]| v[0] * v[0] + v[1] * v[1];
+    let mean = 0.5 * (square(right) + square(down));
+    let determinant = (right[0] * down[1] - right[1] * down[0]).abs();
+    let long = (mean + (mean * mean - determinant * determinant).max(0.0).sqrt()).sqrt();
+    let short = (determinant / long).max(1.0);
+    // As the sampler rounds it, or a tap more.
+    let taps = (long / short + 0.501).floor().min(8.0);
+    if taps < 2.0 { square(right).max(square(down)).sqrt().log2() } else { (long / taps).max(short).log2() }
 }
 
 #[test]
