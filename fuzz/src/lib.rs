@@ -17,9 +17,11 @@ use meshsnap::spec::BackendChoice;
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// Every target: one per name of a mesh format, and those that take more than a mesh.
+mod meshopt;
+
+/// Every target: one per name of a mesh format, and those that take more or less than a mesh.
 pub fn targets() -> Vec<&'static str> {
-    [Format::names(), vec!["zip", "request", "pipeline"]].concat()
+    [Format::names(), vec!["meshopt", "zip", "request", "pipeline"]].concat()
 }
 
 /// Between an OBJ file and the MTL file that it calls `a.mtl`.
@@ -52,6 +54,7 @@ fn bundle(target: &str, bytes: &[u8]) -> (Bundle, Option<Format>) {
         // A 3MF package is an archive, and is recognised by its contents.
         "zip" | "3mf" => (Bundle::zip(bytes.to_vec()), None),
         "obj" => (obj(bytes), Some(Format::Obj)),
+        "meshopt" => (Bundle::of_one(meshopt::glb(bytes)), Some(Format::Glb)),
         name => {
             let format = Format::from_name(name).unwrap_or_else(|| panic!("{name} is no target"));
             (Bundle::of_one(bytes.to_vec()), Some(format))
