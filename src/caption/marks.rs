@@ -83,9 +83,9 @@ mod tests {
     fn marks_are_where_they_are_said_to_be_and_stay_within_the_picture() {
         let grey = |side: u32| Image { width_px: side, height_px: side, rgba: vec![128; 4 * (side * side) as usize] };
         let mut image = grey(64);
-        draw_marks(&mut image, &[Mark::Line([[10.5, 20.5], [40.5, 20.5]]), Mark::Dot([50.5, 50.5])]);
+        draw_marks(&mut image, &[Mark::Line([[10.5, 20.0], [40.5, 20.0]]), Mark::Dot([50.5, 50.5])]);
         for (at, expected) in
-            [([25, 20], MARK), ([50, 50], MARK), ([25, 22], RIM), ([54, 50], [128; 3]), ([25, 40], [128; 3])]
+            [([25, 20], MARK), ([50, 50], MARK), ([25, 21], RIM), ([54, 50], [128; 3]), ([25, 40], [128; 3])]
         {
             let [r, g, b, _] = image.pixel(at[0], at[1]);
             let is_near = [r, g, b].iter().zip(expected).all(|(found, wanted)| found.abs_diff(wanted) < 64);

@@ -1,10 +1,10 @@
 //! `meshsnap inspect`: reports the content of a mesh file.
 
-use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueHint};
 
+use super::format_arg::FormatArg;
 use super::progress::Progress;
-use super::render::{format_in, pairs};
+use super::render::pairs;
 use super::settings::LimitSettings;
 use super::{bundle, files, isolation};
 use crate::cli::error::CliError;
@@ -46,14 +46,8 @@ pub struct InspectArgs {
     /// Report each connected part, too, and the loops of open and sharp edges, with their lengths
     #[arg(long)]
     parts: bool,
-    #[arg(
-        long,
-        value_name = "FORMAT",
-        help = "Format of the mesh, where its bytes do not tell",
-        value_parser = PossibleValuesParser::new(Format::names()),
-        ignore_case = true
-    )]
-    format_in: Option<String>,
+    #[command(flatten)]
+    format_in: FormatArg,
     /// The mesh among several files, where more than one could be
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     entry: Option<String>,
@@ -68,7 +62,7 @@ pub struct InspectArgs {
 pub fn run(arguments: &InspectArgs) -> Result<(), CliError> {
     isolation::on_demand();
     let limits = arguments.limits.config().limits;
-    let format = format_in(arguments.format_in.as_deref());
+    let format = arguments.format_in.format();
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
     let time_s = request::read_moment(&pairs(&arguments.set)?, &rules)
         .map_err(|error| CliError::usage(format!("--set: {error}")))?;

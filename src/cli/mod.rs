@@ -17,6 +17,7 @@ mod check;
 mod diff;
 pub(crate) mod error;
 mod files;
+mod format_arg;
 mod health;
 mod inspect;
 mod isolation;

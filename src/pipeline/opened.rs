@@ -164,7 +164,7 @@ pub fn draw_difference(
     let mut canvas = Canvas::new(layout, budget).map_err(PlanError::Limit)?;
     let mut all: Option<Drawn> = None;
     for (cell, &side) in layout.cells().zip(sides).filter(|(cell, _)| !cell.size_px.contains(&0)) {
-        // What a side takes is free again before the next.
+        // The memory of a side is free again before the next.
         let mut of_cell = budget.clone();
         let limit = |error| RenderError::from(PlanError::Limit(error));
         let index = side.index();

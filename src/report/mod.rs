@@ -74,7 +74,7 @@ pub struct Report {
     dropped_collapsed_faces: u64,
     dropped_loose: u64,
     warnings: Vec<WarningReport>,
-    /// What matters for printing, if it is asked for.
+    /// The figures for printing, if they are asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     print: Option<PrintReport>,
     /// The parts and loops, if they are asked for.
@@ -82,10 +82,10 @@ pub struct Report {
     parts: Option<PartsReport>,
 }
 
-/// What a report has beside what every report has.
+/// Sections that not every report has.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Extras {
-    /// What matters for printing.
+    /// The figures for printing.
     pub print: bool,
     /// The parts, and the loops of edges.
     pub parts: bool,

@@ -1,4 +1,4 @@
-//! What matters for printing a mesh: how thick walls are, what hangs over, and how it stands on the bed.
+//! Figures for printing a mesh: the thickness of its walls, its overhangs, and the way in which it stands on the bed.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::mesh::thickness::thicknesses;
 use crate::mesh::vector::{cross, dot, sub};
 use crate::mesh::{Mesh, UpAxis};
 
-/// Faces that look down more than this from the vertical hang over: what printers do without support.
+/// Faces that look down more than this from the vertical hang over: up to it, printers need no support.
 const OVERHANG_DEG: f64 = 45.0;
 
 /// Largest height above the bed that counts as lying on it, in the unit box.
@@ -93,7 +93,8 @@ impl PrintReport {
         let beyond: f64 = hanging().filter(|face| down(face) < 90.0 - OVERHANG_DEG).map(|face| face.area).sum();
         let steepest = hanging().map(|face| 90.0 - down(face)).filter(|angle| *angle > 0.0).reduce(f64::max);
         let scale = mesh.to_file.scale;
-        let area = |value: f64| without_rounding(value * scale * scale, whole * scale * scale);
+        // The sum of nothing is a negative zero.
+        let area = |value: f64| without_rounding(value * scale * scale + 0.0, whole * scale * scale);
         let contact: f64 = faces.iter().filter(|face| is_on_bed(face)).map(|face| face.area).sum();
         let angle = |value: f64| without_rounding(value, 90.0);
         Ok(Self {

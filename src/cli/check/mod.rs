@@ -9,9 +9,9 @@ mod since;
 
 use std::path::{Path, PathBuf};
 
-use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum, ValueHint};
 
+use super::format_arg::FormatArg;
 use super::settings::LimitSettings;
 use super::{isolation, render};
 use crate::check::{NAMES, RuleSet};
@@ -93,14 +93,8 @@ pub struct CheckArgs {
     /// Read the files that a mesh refers to from its own folder, though they are not named
     #[arg(long)]
     siblings: bool,
-    #[arg(
-        long,
-        value_name = "FORMAT",
-        help = "Format of the meshes, where their bytes do not tell",
-        value_parser = PossibleValuesParser::new(Format::names()),
-        ignore_case = true
-    )]
-    format_in: Option<String>,
+    #[command(flatten)]
+    format_in: FormatArg,
     #[command(flatten)]
     limits: LimitSettings,
 }

@@ -19,7 +19,7 @@ use crate::cli::bundle::{self, comparable};
 use crate::cli::error::CliError;
 use crate::cli::output::Inputs;
 use crate::cli::progress::Bar;
-use crate::cli::render::{Task, Tasks, format_in};
+use crate::cli::render::{Task, Tasks};
 use crate::cli::{files, siblings};
 use crate::config::{cores, why_no_gpu};
 use crate::limits::{Deadline, Limits};
@@ -61,7 +61,7 @@ struct Judged {
     pictures: Vec<ViewPictures>,
 }
 
-/// What a run has found.
+/// The findings of a run.
 #[derive(Default)]
 struct Found {
     verdicts: Vec<Verdict>,
@@ -191,7 +191,7 @@ impl<'a> Run<'a> {
             if let ([own], None) = (named.bundle.files(), &digest) {
                 digest = Some(Digest::of(&own.bytes).to_string());
             }
-            let format = format_in(self.arguments.format_in.as_deref());
+            let format = self.arguments.format_in.format();
             let opened = pipeline::open(&named.bundle, format, &self.limits, &Deadline::default());
             let beside = siblings::beside(&names, &named.common, &named.file_use, &|path| self.named.contains(path));
             let may_read =

@@ -8,7 +8,6 @@ use crate::backend::{Backends, GpuHost, HardwareHint};
 use crate::cli::bundle::{self, NamedFiles};
 use crate::cli::error::CliError;
 use crate::cli::progress::Progress;
-use crate::cli::render::format_in;
 use crate::cli::{files, siblings};
 use crate::config::{cores, why_no_gpu};
 use crate::diff::{Compared, PICTURE_KEYS};
@@ -54,14 +53,14 @@ pub fn run(arguments: &DiffArgs, limits: &Limits) -> Result<bool, CliError> {
 fn read(arguments: &DiffArgs, name: &str, limits: &Limits) -> Result<NamedFiles, CliError> {
     let mut names = vec![name.to_owned()];
     if arguments.siblings && name != "-" {
-        let options = Options::from(format_in(arguments.format_in.as_deref()));
+        let options = Options::from(arguments.format_in.format());
         names.extend(siblings::all_beside(&names, None, options, limits)?);
     }
     bundle::read(&names, None, limits)
 }
 
 fn open(arguments: &DiffArgs, name: &str, named: &NamedFiles, limits: &Limits) -> Result<Opened, CliError> {
-    let format = format_in(arguments.format_in.as_deref());
+    let format = arguments.format_in.format();
     pipeline::open(&named.bundle, format, limits, &Deadline::default())
         .map_err(|error| CliError::from(error).about(name))
 }

@@ -6,11 +6,11 @@ mod pictures;
 use std::fs::{self, File};
 use std::io::Read as _;
 
-use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum, ValueHint};
 use image::ImageFormat;
 use serde::Serialize;
 
+use super::format_arg::FormatArg;
 use super::isolation;
 use super::output::{Destination, Inputs};
 use super::render::by_extension;
@@ -19,7 +19,6 @@ use crate::cli::error::CliError;
 use crate::diff::pictures::sniff;
 use crate::encode;
 use crate::image::Image;
-use crate::import::Format;
 use crate::limits::Deadline;
 
 /// Bytes by which a picture is told from a mesh.
@@ -71,7 +70,7 @@ pub struct DiffArgs {
     /// --max-pixels
     #[arg(long, value_name = "F", value_parser = share, allow_negative_numbers = true, value_hint = ValueHint::Other)]
     max_flip: Option<f64>,
-    /// What the colours of `-o` show of two pictures
+    /// Numbers that the colours of `-o` show of two pictures
     #[arg(long, value_name = "KIND", value_enum, default_value_t = Heat::Channels)]
     heat: Heat,
     /// Picture of both sides and their difference, beside each other
@@ -83,14 +82,8 @@ pub struct DiffArgs {
     /// Read the files that a mesh refers to from its own folder, to compare materials and textures
     #[arg(long)]
     siblings: bool,
-    #[arg(
-        long,
-        value_name = "FORMAT",
-        help = "Format of the meshes, where their bytes do not tell",
-        value_parser = PossibleValuesParser::new(Format::names()),
-        ignore_case = true
-    )]
-    format_in: Option<String>,
+    #[command(flatten)]
+    format_in: FormatArg,
     #[command(flatten)]
     limits: LimitSettings,
 }

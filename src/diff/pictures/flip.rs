@@ -52,15 +52,14 @@ pub fn flip(a: &Picture, b: &Picture) -> Option<Flip> {
     let bands = map((0..height).step_by(BAND).collect(), |top| {
         let rows = top..height.min(top + BAND);
         let [of_a, of_b] = [a, b].map(|picture| Seen::of(picture, rows.clone(), &eye));
-        let pixels = of_a.colors.iter().zip(&of_b.colors).zip(of_a.features.iter().zip(&of_b.features));
-        let error =
-            |((color_a, color_b), (features_a, features_b)): ((&[f64; 3], &[f64; 3]), (&[f64; 2], &[f64; 2]))| {
-                let of_color = eye.color_difference(*color_a, *color_b);
-                let of_features = (0..2).map(|k| (features_a[k] - features_b[k]).abs()).fold(0.0, f64::max);
-                let of_features = libm::pow(of_features * std::f64::consts::FRAC_1_SQRT_2, Q_F).min(1.0);
-                libm::pow(of_color, 1.0 - of_features)
-            };
-        pixels.map(error).collect::<Vec<f64>>()
+        let error = |pixel: usize| {
+            let of_color = eye.color_difference(of_a.colors[pixel], of_b.colors[pixel]);
+            let [features_a, features_b] = [of_a.features[pixel], of_b.features[pixel]];
+            let of_features = (0..2).map(|k| (features_a[k] - features_b[k]).abs()).fold(0.0, f64::max);
+            let of_features = libm::pow(of_features * std::f64::consts::FRAC_1_SQRT_2, Q_F).min(1.0);
+            libm::pow(of_color, 1.0 - of_features)
+        };
+        (0..of_a.colors.len()).map(error).collect::<Vec<f64>>()
     });
     let (mut sum, mut max) = (0.0, 0.0);
     let mut errors = Vec::with_capacity(width * height);
@@ -72,7 +71,7 @@ pub fn flip(a: &Picture, b: &Picture) -> Option<Flip> {
     Some(Flip { mean: sum / errors.len().max(1) as f64, max, errors })
 }
 
-/// What an eye sees of some rows of a picture.
+/// Some rows of a picture as an eye sees them.
 struct Seen {
     /// Colours after the blur of the eye: L, a, b of CIELAB, with the Hunt effect.
     colors: Vec<[f64; 3]>,

@@ -1,4 +1,4 @@
-//! What differs between two pictures, pixel by pixel, and to the eye.
+//! Differences between two pictures, pixel by pixel, and to the eye.
 
 mod flip;
 #[cfg(test)]

@@ -13,7 +13,7 @@ const FACES_MIN: u32 = 64;
 const BYTES_PER_VERTEX: u64 = 4 + 4;
 const BYTES_PER_FACE: u64 = 4 + 8 + 28;
 
-/// What rounding may do to a direction.
+/// The most that rounding changes of a direction.
 const SLACK: f64 = 1e-6;
 
 const NONE: u32 = u32::MAX;

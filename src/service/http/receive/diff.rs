@@ -104,7 +104,7 @@ fn stored(
     let bundle = b.mesh.bundle.clone().with_entry(reading.entry.clone());
     let newer = Newer { bundle, memory: b.memory.clone(), holds: b.holds.clone(), mesh: Some(digests[1]) };
     let work = stored_mesh::work_on(&a, reading.clone(), Task::Inspect { time_s: None });
-    // What is compared is read anew.
+    // Meshes in memory have no report of their import, so they are read anew.
     Ok(Meshes { digests, older: Work { mesh_key: None, ..work }, newer, are_stored: true })
 }
 
@@ -144,7 +144,7 @@ pub fn form_of_answer(keys: &Keys, headers: &HeaderMap) -> Result<Option<ImageFo
     }
 }
 
-/// What is asked about two meshes.
+/// The form of an answer about two meshes, and its tolerance.
 pub struct Answer {
     max_distance: Option<f64>,
     picture: Option<Box<Spec>>,

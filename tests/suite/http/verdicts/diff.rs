@@ -26,7 +26,7 @@ fn sides(a: &[u8], b: &[u8]) -> Vec<u8> {
     form(&[("a", a), ("b", b)])
 }
 
-/// What the program prints on two files.
+/// The output of the program on two files.
 fn printed(a: &[u8], b: &[u8], arguments: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a"), a).unwrap();
@@ -41,7 +41,8 @@ fn printed(a: &[u8], b: &[u8], arguments: &[&str]) -> Value {
 fn differences_are_those_of_the_command_line() {
     let server = Server::start(&[]);
     let (hole, moved, torus) = (hole(), moved(), torus(12));
-    let cases: [(&[u8], &[u8], &str, &[&str]); 5] = [
+    type Case<'a> = (&'a [u8], &'a [u8], &'a str, &'a [&'a str]);
+    let cases: [Case<'_>; 5] = [
         (CUBE_OBJ, &hole, "", &[]),
         (&hole, CUBE_OBJ, "", &[]),
         (CUBE_OBJ, &moved, "", &[]),
