@@ -10,7 +10,7 @@ use meshsnap::mesh::Mesh;
 use meshsnap::mesh::material::{AlphaMode, FileLens};
 use meshsnap::pipeline;
 use meshsnap::pipeline::{Job, RenderError};
-use meshsnap::report::Report;
+use meshsnap::report::{Extras, Report};
 use meshsnap::request;
 use meshsnap::request::Rules;
 use meshsnap::spec::BackendChoice;
@@ -34,7 +34,7 @@ pub fn run(target: &str, bytes: &[u8]) {
         "pipeline" => run_pipeline(bytes),
         _ => {
             let (bundle, format) = bundle(target, bytes);
-            run_import(&bundle, Options { format, time_s: time_s(bytes) });
+            run_import(&bundle, Options { format, time_s: time_s(bytes), counts_loose: true });
         }
     }
 }
@@ -95,9 +95,10 @@ fn run_import(bundle: &Bundle, options: Options) {
     let limits = limits();
     let mut budget = Budget::new(&limits);
     match import(bundle, options, &limits, &mut budget, &Deadline::default()) {
-        Ok(Imported { mesh, report: import }) => {
+        Ok(Imported { mesh, report: import, .. }) => {
             check(&mesh, &import);
-            let report = Report::of(&mesh, &import, bundle.bytes_len(), &mut budget, &Deadline::default());
+            let extras = Extras { print: true, parts: true };
+            let report = Report::of(&mesh, &import, bundle.bytes_len(), extras, &mut budget, &Deadline::default());
             let Ok(report) = report else { return };
             assert!(!report.text().is_empty());
             serde_json::to_vec(&report).expect("a report is JSON");
