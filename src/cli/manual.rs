@@ -7,7 +7,7 @@ use super::files;
 use crate::cli::error::CliError;
 
 /// The commands that have a page of their own.
-pub const COMMANDS: [&str; 7] = ["render", "inspect", "check", "diff", "serve", "health", "completions"];
+pub const COMMANDS: [&str; 8] = ["render", "inspect", "check", "diff", "serve", "health", "sign", "completions"];
 
 /// Prints the page of a command, or of the program.
 pub fn print(mut program: Command, of: Option<&str>) -> Result<(), CliError> {

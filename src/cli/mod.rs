@@ -105,6 +105,8 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
     if let Some(code) = isolation::run_if_asked(&words) {
         return code;
     }
+    #[cfg(feature = "gpu")]
+    crate::backend::gpu::ignore_displays();
     let cli = match Cli::try_parse_from(&words) {
         Ok(cli) => cli,
         Err(error) => {

@@ -16,13 +16,14 @@ cargo xtask COMMAND
   test FILTER...             tests of the suite whose names contain a filter
   bless pictures|schema|tables|examples
                              store what tests compare with anew, then test against it
-  bench [accuracy|load|cached|browse|gpu|stages] [OPTIONS]
-                             measure error and time (accuracy), a server, a GPU, or stages
+  bench [accuracy|load|cached|browse|gpu|crashes|stages] [OPTIONS]
+                             measure error and time (accuracy), a server, a GPU, jobs beside crashes, or stages
   goals                      measure the goals of docs/accuracy.md that tests hold
   gallery [cpu|gpu]          draw docs/gallery anew
   fuzz SECONDS [TARGET...]   fuzz all targets, or the named ones
   lint                       formatting, clippy, documentation, and cargo-deny where it is installed
   features                   check the crate without features, with each alone, and with all
+  cross                      check the program for Windows and macOS, as far as their targets are installed
   package [OPTIONS]          make and build the crate's archive, and look at what is in it
   help                       this text
 
@@ -44,6 +45,7 @@ fn main() -> ExitCode {
         ["fuzz", rest @ ..] => tasks::script("fuzz/run", rest),
         ["lint"] => tasks::lint(),
         ["features"] => tasks::features(),
+        ["cross"] => tasks::cross(),
         ["package", rest @ ..] => tasks::package(rest),
         _ => Err(format!("there is no command `{}`\n\n{HELP}", words.join(" "))),
     };

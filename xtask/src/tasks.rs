@@ -75,10 +75,14 @@ pub fn bless(name: &str) -> Result {
 /// A benchmark by name; accuracy where none is named.
 pub fn bench(arguments: &[&str]) -> Result {
     let (name, options) = match arguments {
-        [name @ ("accuracy" | "load" | "cached" | "browse" | "gpu" | "stages"), options @ ..] => (*name, options),
+        [name @ ("accuracy" | "load" | "cached" | "browse" | "gpu" | "crashes" | "stages"), options @ ..] => {
+            (*name, options)
+        }
         options => ("accuracy", options),
     };
-    let mut command = cargo(&["bench", "--locked", "--bench", name, "--"]);
+    // Only builds with debug assertions have decoders that crash when they are asked to.
+    let profile = if name == "crashes" { "dev" } else { "bench" };
+    let mut command = cargo(&["bench", "--locked", "--profile", profile, "--bench", name, "--"]);
     command.args(options);
     run(command)
 }
@@ -109,6 +113,35 @@ pub fn features() -> Result {
         run(cargo(&[&check[..], &["--no-default-features", "--features", feature]].concat()))?;
     }
     run(cargo(&[&check[..], &["--all-features"]].concat()))
+}
+
+/// Other systems that the program is checked for.
+const OTHER_SYSTEMS: [(&str, &str); 3] = [
+    ("Windows", "x86_64-pc-windows-gnu"),
+    ("macOS on ARM", "aarch64-apple-darwin"),
+    ("macOS on x86", "x86_64-apple-darwin"),
+];
+
+/// Checks the program for other systems, and says which of their targets are not installed.
+pub fn cross() -> Result {
+    // The compiler of the repository's own toolchain, as `cargo` runs it.
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    for (system, target) in OTHER_SYSTEMS {
+        let library = Command::new(&rustc).args(["--print", "target-libdir", "--target", target]).output();
+        let library = library.map_err(|error| format!("rustc cannot be run: {error}"))?;
+        let library = String::from_utf8_lossy(&library.stdout);
+        if !Path::new(library.trim()).is_dir() {
+            println!("{system} was not checked: the target is not installed (rustup target add {target})");
+            continue;
+        }
+        let mut check = cargo(&["check", "--locked", "--package", "meshsnap", "--target", target]);
+        // `cargo check` links nothing, so C is not compiled either: that would take the other system's compiler and headers.
+        for tool in ["CC", "CXX", "AR", "RANLIB"] {
+            check.env(format!("{tool}_{}", target.replace('-', "_")), "true");
+        }
+        run(check)?;
+    }
+    Ok(())
 }
 
 /// The names in the `[features]` table of the manifest, but for `default`.

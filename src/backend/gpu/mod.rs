@@ -3,13 +3,15 @@
 //! In reading order: `device` opens a GPU; `schedule` computes the dispatches for a plan;
 //! `recorder` turns them into commands; `pipelines` holds each kernel's source, bindings and
 //! specialisation; `stage_clock` times the stages; `params` holds the uniforms, `buffers` a job's memory,
-//! `residents` what stays in memory for the next job, `pass_mask` the passes over triangles.
+//! `residents` what stays in memory for the next job, `pass_mask` the passes over triangles. `displays` keeps
+//! drivers from looking for a window system.
 //!
 //! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
 //! thread.
 
 mod buffers;
 mod device;
+mod displays;
 mod handles;
 pub(super) mod params;
 pub(crate) mod pass_mask;
@@ -22,6 +24,7 @@ mod stage_clock;
 use std::sync::Arc;
 
 pub use self::device::{AtomicsChoice, Gpu};
+pub use self::displays::ignore_displays;
 pub use self::schedule::sizes::bands_bytes;
 pub use crate::backend::{GpuInfo, GpuKind};
 

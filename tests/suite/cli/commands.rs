@@ -2,14 +2,19 @@
 
 use std::io::Write as _;
 use std::path::Path;
-use std::process::{Output, Stdio};
+use std::process::{Command, Output, Stdio};
 
 use crate::support::server::{CUBE_OBJ, Server, meshsnap};
 use crate::support::skip::{Need, skip};
 
 fn run(arguments: &[&str], stdin: &[u8]) -> Output {
     let mut command = meshsnap();
-    command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.args(arguments);
+    output_of(command, stdin)
+}
+
+fn output_of(mut command: Command, stdin: &[u8]) -> Output {
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
     // A command that fails early closes its input; that is its right.
     let _ = child.stdin.take().unwrap().write_all(stdin);
@@ -224,6 +229,26 @@ fn explain_counts_mixed_pixels() {
     let wire = explained(&["wire"]);
     assert!(!wire.contains("mixed pixels"), "{wire}");
     assert!(wire.contains("warning: image.samples is adaptive, and lines are drawn over faces"), "{wire}");
+}
+
+/// Drivers look for a display where nothing tells them not to, and complain on standard error.
+#[test]
+fn a_gpu_without_a_display_is_no_complaint() {
+    for folder in [None, Some(""), Some("relative")] {
+        let mut command = meshsnap();
+        for name in ["XDG_RUNTIME_DIR", "WAYLAND_DISPLAY", "DISPLAY", "NODEVICE_SELECT", "MESA_VK_DEVICE_SELECT"] {
+            command.env_remove(name);
+        }
+        command.envs(folder.map(|folder| ("XDG_RUNTIME_DIR", folder)));
+        command.args(["render", "-", "--backend", "gpu", "--size", "16", "-o", "-"]);
+        let output = output_of(command, CUBE_OBJ);
+        let said = String::from_utf8(output.stderr).unwrap();
+        if said.contains("there is no GPU to draw on") {
+            skip(Need::Gpu, "Vulkan");
+            return;
+        }
+        assert!(output.status.success() && said.is_empty(), "{folder:?}: {said}");
+    }
 }
 
 /// What a driver makes of shaders is kept, and read again; damage costs time and nothing else.

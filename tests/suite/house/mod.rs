@@ -1,3 +1,4 @@
 //! Rules that the source itself keeps.
 
 pub mod structure;
+mod systems;
