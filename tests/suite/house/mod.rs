@@ -1,3 +1,4 @@
 //! Rules that the source itself keeps.
 
+mod deploy;
 pub mod structure;
