@@ -34,6 +34,12 @@ impl std::fmt::Debug for Image {
     }
 }
 
+/// Takes the rows of a picture from the top to the bottom, while those below are being drawn.
+pub trait RowSink: Send {
+    /// The next rows, whole: R, G, B and A of each pixel.
+    fn write_rows(&mut self, rgba: &[u8]);
+}
+
 /// The file format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageFormat {

@@ -3,26 +3,28 @@
 //!
 //! The command line and the job workers call [`render`]; the workers do so for synchronous HTTP
 //! too. The library calls [`draw`], which turns a mesh that is read already into a picture.
-//! [`inspect`] reports what is in a file and draws nothing.
+//! [`inspect`] reports what is in a file and draws nothing; [`opened`] judges and compares files.
 //!
 //! Invariant: nothing from here down reads a file or the environment, or knows an async runtime. A
 //! clock is read to time the stages of drawing, and nothing depends on it.
 
+mod opened;
+
+pub use opened::{Opened, Side, draw_difference, open, render_difference};
+
 use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, GpuDevice};
 use crate::caption::{Scale, draw_legend};
-use crate::check::{self, Check, RuleSet};
-use crate::diff::{self, Compared};
 use crate::encode::{self, EncodeError};
-use crate::image::{Image, ImageFormat};
+use crate::image::{Image, ImageFormat, RowSink};
 use crate::import::{self, Bundle, Format, Imported, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
 use crate::plan::{self, Prepared, Skip, UvLayout};
 pub use crate::plan::{PlanError, QualitySelection};
-use crate::report::Report;
+use crate::report::{Extras, Report};
 use crate::scene::{Scene, SceneError};
 use crate::sheet::{self, Canvas, Layout};
-use crate::spec::{CameraSpec, Sheet, SheetViews, Spec};
+use crate::spec::Spec;
 use crate::warning::Warning;
 
 /// Turns the bytes of a mesh into the bytes of a picture.
@@ -39,7 +41,7 @@ pub fn render(
 
     // Bytes -> Mesh
     let Job { bundle, format_in, spec } = job;
-    let options = import::Options { format: format_in, time_s: spec.time_s };
+    let options = import::Options { format: format_in, time_s: spec.time_s, ..import::Options::default() };
     let model = Model::read(&bundle, options, limits, &mut budget, deadline)?;
     // The files' memory is free for drawing, unless the caller holds them, too.
     drop(bundle);
@@ -60,13 +62,30 @@ pub fn render_model(
     // Mesh -> Scene -> DrawPlan -> Image
     let format = spec.image.format.unwrap_or(ImageFormat::Png);
     let animated = spec.sheet.as_ref().filter(|sheet| sheet.is_animated(format));
-    let drawn = draw_as(model, spec, animated.is_some(), backends, budget, deadline, ended)?;
+    let effort = spec.image.effort;
+    // One view alone is encoded while it is drawn, as far as its format and its back-end allow it.
+    let mut rows = None;
+    let drawn = match &spec.sheet {
+        None => {
+            if !spec.image.legend {
+                rows = encode::row_encoder(
+                    format,
+                    effort,
+                    [spec.image.width_px, spec.image.height_px],
+                    spec.image.background.is_opaque(),
+                );
+            }
+            let sink = rows.as_mut().map(|rows| rows as &mut dyn RowSink);
+            draw_view(model.view(), spec, sink, backends, budget, deadline, ended)?
+        }
+        Some(_) => draw_as(model, spec, animated.is_some(), backends, budget, deadline, ended)?,
+    };
 
     // Image -> bytes
-    let effort = spec.image.effort;
-    let bytes = match animated {
-        Some(sheet) => encode::encode_animation(&drawn.image, sheet.count(), format, effort, deadline)?,
-        None => encode::encode(&drawn.image, format, effort, deadline)?,
+    let bytes = match (animated, rows) {
+        (Some(sheet), _) => encode::encode_animation(&drawn.image, sheet.count(), format, effort, deadline)?,
+        (None, Some(rows)) => rows.finish(&drawn.image)?,
+        (None, None) => encode::encode(&drawn.image, format, effort, deadline)?,
     };
     ended(Stage::Encode);
 
@@ -101,7 +120,9 @@ fn draw_as(
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Drawn, RenderError> {
-    let Some(sheet) = &spec.sheet else { return draw_view(model, spec, backends, budget, deadline, ended) };
+    let Some(sheet) = &spec.sheet else {
+        return draw_view(model.view(), spec, None, backends, budget, deadline, ended);
+    };
     let layout = Layout::new(sheet, &spec.image, is_animated);
     let mut canvas = Canvas::new(layout, budget).map_err(PlanError::Limit)?;
     let mut all: Option<Drawn> = None;
@@ -110,7 +131,7 @@ fn draw_as(
         // What a view takes is free again before the next.
         let mut of_cell = budget.clone();
         let of_view = sheet::cell_spec(spec, sheet, &cell);
-        let drawn = draw_view(model, &of_view, backends, &mut of_cell, deadline, ended)?;
+        let drawn = draw_view(model.view(), &of_view, None, backends, &mut of_cell, deadline, ended)?;
         canvas.paste(&cell, &drawn.image);
         let Some(view) = cell.view else { continue };
         if sheet.labels {
@@ -123,7 +144,9 @@ fn draw_as(
     }
     let mut all = match all {
         Some(all) => all,
-        None => draw_view(model, &Spec { sheet: None, ..spec.clone() }, backends, budget, deadline, ended)?,
+        None => {
+            draw_view(model.view(), &Spec { sheet: None, ..spec.clone() }, None, backends, budget, deadline, ended)?
+        }
     };
     all.image = canvas.finish();
     Ok(all)
@@ -131,24 +154,25 @@ fn draw_as(
 
 /// Draws one view.
 fn draw_view(
-    model: &Model,
+    view: View<'_>,
     spec: &Spec,
+    sink: Option<&mut dyn RowSink>,
     backends: &mut Backends,
     budget: &mut Budget,
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Drawn, RenderError> {
     // Mesh -> Scene -> DrawPlan
-    let layout = UvLayout::of(&model.mesh, spec, budget, deadline)?;
+    let layout = UvLayout::of(view.mesh, spec, budget, deadline)?;
     let of_layout = Prepared::default();
     let (mesh, spec, prepared) = match &layout {
         Some(layout) => (&layout.mesh, &layout.spec, &of_layout),
-        None => (&model.mesh, spec, &model.prepared),
+        None => (view.mesh, spec, view.prepared),
     };
     let selected = plan::select_quality(spec, mesh.triangles.len(), backends.has_gpu());
     let spec = selected.as_ref().map_or(spec, |selected| &selected.spec);
     let framing = plan::framing(mesh, spec, prepared, budget, deadline)?;
-    let fitted = model.framing.as_deref().or(framing.as_deref()).unwrap_or(&mesh.positions);
+    let fitted = view.framing.or(framing.as_deref()).unwrap_or(&mesh.positions);
     let scene = Scene::framed_by(fitted, mesh, spec, budget)?;
     let plan = plan::build_from(&scene, prepared, budget, deadline)?;
     let bands_bytes = backends.bands_bytes(spec.backend, &plan);
@@ -156,7 +180,7 @@ fn draw_view(
     ended(Stage::Plan);
 
     // DrawPlan -> Image
-    let mut drawn = backends.draw(spec.backend, &plan, deadline)?;
+    let mut drawn = backends.draw(spec.backend, &plan, sink, deadline)?;
     if spec.image.legend {
         let legends = plan.legends.iter();
         let scales = legends.map(|plan::Legend { title, ends, colors }| Scale { title, ends: *ends, colors });
@@ -173,43 +197,6 @@ fn draw_view(
     let (skips, short_chains) = (plan.skips, plan.short_chains);
     let Chosen { image, backend, draw_times, is_substitute } = drawn;
     Ok(Drawn { image, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
-}
-
-/// Draws two meshes that were compared side by side, in the colours of their distance from each other, through one
-/// camera that is fitted to both.
-pub fn draw_difference(
-    opened: [&Opened; 2],
-    compared: &Compared,
-    spec: &Spec,
-    backends: &mut Backends,
-    budget: &mut Budget,
-    deadline: &Deadline,
-) -> Result<Image, RenderError> {
-    let meshes = opened.map(|opened| &opened.imported.mesh);
-    let all = compared.of_vertices.iter().flatten();
-    let most = all.copied().filter(|distance| distance.is_finite()).fold(0.0, f64::max);
-    // The newer mesh says what is up, so that the camera is one.
-    let camera = CameraSpec { up: Some(spec.camera.up.unwrap_or(meshes[1].up)), ..spec.camera };
-    let spec = Spec { camera, ..spec.clone() };
-    let sheet = Sheet { views: SheetViews::Named(vec![spec.camera.view; 2]), columns: Some(2), labels: false };
-    let layout = Layout::new(&sheet, &spec.image, false);
-    let mut canvas = Canvas::new(layout, budget).map_err(PlanError::Limit)?;
-    for (cell, side) in layout.cells().zip(0..2) {
-        // What a side takes is free again before the next.
-        let mut of_cell = budget.clone();
-        let limit = |error| RenderError::from(PlanError::Limit(error));
-        let mesh = diff::painted(meshes[side], &compared.of_vertices[side], most, &mut of_cell).map_err(limit)?;
-        let framing = diff::framing(meshes[side], meshes[1 - side], &mut of_cell).map_err(limit)?;
-        let model = Model { mesh, framing: Some(framing), ..Model::default() };
-        let of_view = sheet::cell_spec(&spec, &sheet, &cell);
-        let drawn = draw_view(&model, &of_view, backends, &mut of_cell, deadline, &mut |_| ())?;
-        canvas.paste(&cell, &drawn.image);
-        canvas.write(&cell, ["before", "after"][side]);
-    }
-    let mut image = canvas.finish();
-    let plan::Legend { title, ends, colors } = diff::legend(most);
-    draw_legend(&mut image, &[Scale { title, ends, colors: &colors }]);
-    Ok(image)
 }
 
 /// Makes what a picture needs on a device and can be made without drawing, such as pipelines.
@@ -231,52 +218,15 @@ pub fn make_ready(
 pub fn inspect(
     bundle: &Bundle,
     options: impl Into<import::Options>,
+    extras: Extras,
     limits: &Limits,
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Report, MeshError> {
     let mut budget = Budget::new(limits);
-    let Imported { mesh, report } = import::import(bundle, options, limits, &mut budget, deadline)?;
+    let Imported { mesh, report, .. } = import::import(bundle, options, limits, &mut budget, deadline)?;
     ended(Stage::Parse);
-    Report::of(&mesh, &report, bundle.bytes_len(), &mut budget, deadline)
-}
-
-/// A file that was read, to be judged or compared.
-pub struct Opened {
-    imported: Imported,
-    budget: Budget,
-    file_bytes: u64,
-}
-
-/// Reads a file, to judge it or to compare it.
-pub fn open(
-    bundle: &Bundle,
-    options: impl Into<import::Options>,
-    limits: &Limits,
-    deadline: &Deadline,
-) -> Result<Opened, MeshError> {
-    let mut budget = Budget::new(limits);
-    let imported = import::import(bundle, options, limits, &mut budget, deadline)?;
-    Ok(Opened { imported, budget, file_bytes: bundle.bytes_len() })
-}
-
-impl Opened {
-    /// Judges the file by rules. Fails where the time or the memory of the job ends.
-    pub fn check(mut self, rules: &RuleSet, deadline: &Deadline) -> Result<Vec<Check>, MeshError> {
-        let Imported { mesh, report } = &self.imported;
-        let subject = check::Subject { mesh, import: report, file_bytes: self.file_bytes };
-        check::check(&subject, rules, &mut self.budget, deadline)
-    }
-
-    /// Compares the file with another, which is the newer one. `max_distance` is the largest distance between the
-    /// surfaces that counts as the same; None: what encodings round away.
-    pub fn diff(&self, other: &Self, max_distance: Option<f64>, deadline: &Deadline) -> Result<Compared, MeshError> {
-        let mut budget = self.budget.clone();
-        budget.spend("the other mesh", other.budget.spent_bytes(), 1)?;
-        let [a, b] =
-            [&self.imported, &other.imported].map(|Imported { mesh, report }| diff::Side { mesh, import: report });
-        diff::compare(a, b, max_distance, &mut budget, deadline)
-    }
+    Report::of(&mesh, &report, bundle.bytes_len(), extras, &mut budget, deadline)
 }
 
 /// A mesh in memory: imported once, and drawn as often as wanted. What one picture finds out about
@@ -288,8 +238,15 @@ pub struct Model {
     /// Faults of the file that were tolerated.
     warnings: Vec<Warning>,
     prepared: Prepared,
+}
+
+/// A mesh as it is drawn.
+#[derive(Clone, Copy)]
+struct View<'a> {
+    mesh: &'a Mesh,
+    prepared: &'a Prepared,
     /// Positions in the mesh's unit box to which the camera is fitted; None: those of the mesh.
-    framing: Option<Vec<[f32; 3]>>,
+    framing: Option<&'a [[f32; 3]]>,
 }
 
 impl Model {
@@ -301,13 +258,17 @@ impl Model {
         budget: &mut Budget,
         deadline: &Deadline,
     ) -> Result<Self, MeshError> {
-        let Imported { mesh, report } = import::import(bundle, options, limits, budget, deadline)?;
-        Ok(Self { mesh, warnings: report.warnings, prepared: Prepared::default(), framing: None })
+        let Imported { mesh, report, .. } = import::import(bundle, options, limits, budget, deadline)?;
+        Ok(Self { mesh, warnings: report.warnings, prepared: Prepared::default() })
     }
 
     /// The mesh.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
+    }
+
+    fn view(&self) -> View<'_> {
+        View { mesh: &self.mesh, prepared: &self.prepared, framing: None }
     }
 
     /// Faults of the file that were tolerated.

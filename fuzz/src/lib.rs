@@ -10,16 +10,18 @@ use meshsnap::mesh::Mesh;
 use meshsnap::mesh::material::{AlphaMode, FileLens};
 use meshsnap::pipeline;
 use meshsnap::pipeline::{Job, RenderError};
-use meshsnap::report::Report;
+use meshsnap::report::{Extras, Report};
 use meshsnap::request;
 use meshsnap::request::Rules;
 use meshsnap::spec::BackendChoice;
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// Every target: one per name of a mesh format, and those that take more than a mesh.
+mod meshopt;
+
+/// Every target: one per name of a mesh format, and those that take more or less than a mesh.
 pub fn targets() -> Vec<&'static str> {
-    [Format::names(), vec!["zip", "request", "pipeline"]].concat()
+    [Format::names(), vec!["meshopt", "zip", "request", "pipeline"]].concat()
 }
 
 /// Between an OBJ file and the MTL file that it calls `a.mtl`.
@@ -32,7 +34,7 @@ pub fn run(target: &str, bytes: &[u8]) {
         "pipeline" => run_pipeline(bytes),
         _ => {
             let (bundle, format) = bundle(target, bytes);
-            run_import(&bundle, Options { format, time_s: time_s(bytes) });
+            run_import(&bundle, Options { format, time_s: time_s(bytes), counts_loose: true });
         }
     }
 }
@@ -52,6 +54,7 @@ fn bundle(target: &str, bytes: &[u8]) -> (Bundle, Option<Format>) {
         // A 3MF package is an archive, and is recognised by its contents.
         "zip" | "3mf" => (Bundle::zip(bytes.to_vec()), None),
         "obj" => (obj(bytes), Some(Format::Obj)),
+        "meshopt" => (Bundle::of_one(meshopt::glb(bytes)), Some(Format::Glb)),
         name => {
             let format = Format::from_name(name).unwrap_or_else(|| panic!("{name} is no target"));
             (Bundle::of_one(bytes.to_vec()), Some(format))
@@ -92,9 +95,10 @@ fn run_import(bundle: &Bundle, options: Options) {
     let limits = limits();
     let mut budget = Budget::new(&limits);
     match import(bundle, options, &limits, &mut budget, &Deadline::default()) {
-        Ok(Imported { mesh, report: import }) => {
+        Ok(Imported { mesh, report: import, .. }) => {
             check(&mesh, &import);
-            let report = Report::of(&mesh, &import, bundle.bytes_len(), &mut budget, &Deadline::default());
+            let extras = Extras { print: true, parts: true };
+            let report = Report::of(&mesh, &import, bundle.bytes_len(), extras, &mut budget, &Deadline::default());
             let Ok(report) = report else { return };
             assert!(!report.text().is_empty());
             serde_json::to_vec(&report).expect("a report is JSON");

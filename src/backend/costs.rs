@@ -70,18 +70,19 @@ impl CostModel {
             && self.seconds(BackendKind::Cpu, size) < self.seconds(BackendKind::Gpu, size)
     }
 
-    /// Draws a plan, and learns from the time that it takes if it succeeds.
+    /// Draws a plan, and learns from the time that it takes if it succeeds. `draw` says how much of it was no
+    /// drawing.
     pub fn timed<T, E>(
         &self,
         backend: BackendKind,
         size: PlanSize,
-        draw: impl FnOnce() -> Result<T, E>,
+        draw: impl FnOnce() -> Result<(T, Duration), E>,
     ) -> Result<T, E> {
         let began = Instant::now();
         let on_gpu = (backend == BackendKind::Gpu).then(|| self.begin_on_gpu());
-        let drawn = draw()?;
+        let (drawn, other) = draw()?;
         drop(on_gpu);
-        self.learn(backend, size, began.elapsed());
+        self.learn(backend, size, began.elapsed().saturating_sub(other));
         Ok(drawn)
     }
 

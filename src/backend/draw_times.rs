@@ -23,11 +23,13 @@ pub enum DrawStage {
     Lines,
     /// Colours to bytes.
     Resolve,
+    /// Rows to the encoder, while those below are drawn.
+    EncodeRows,
 }
 
 impl DrawStage {
     /// All of them, in order.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Transform,
         Self::Sort,
         Self::FaceColors,
@@ -37,6 +39,7 @@ impl DrawStage {
         Self::Mixed,
         Self::Lines,
         Self::Resolve,
+        Self::EncodeRows,
     ];
 
     /// The word used in reports.
@@ -51,6 +54,7 @@ impl DrawStage {
             Self::Mixed => "mixed",
             Self::Lines => "lines",
             Self::Resolve => "resolve",
+            Self::EncodeRows => "encode_rows",
         }
     }
 }
@@ -67,6 +71,11 @@ impl DrawTimes {
     /// Adds to the duration of a stage.
     pub fn add(&mut self, stage: DrawStage, took: Duration) {
         self.stages[stage as usize] += took;
+    }
+
+    /// The duration of a stage.
+    pub fn of(&self, stage: DrawStage) -> Duration {
+        self.stages[stage as usize]
     }
 
     /// The stages that took time, in order. Empty if nothing was timed.

@@ -27,7 +27,7 @@ pub use draw_times::{DrawStage, DrawTimes};
 pub use host::GpuHost;
 pub use select::{Backends, Chosen};
 
-use crate::image::Image;
+use crate::image::{Image, RowSink};
 use crate::limits::{Deadline, Stopped};
 use crate::plan::DrawPlan;
 
@@ -35,6 +35,18 @@ use crate::plan::DrawPlan;
 pub trait Renderer {
     /// Fills the plan's picture.
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError>;
+
+    /// As [`Renderer::draw`], and gives rows to `sink` as soon as they and those above them are done: all rows, or
+    /// none where the back-end finishes a picture at once.
+    fn draw_rows(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        sink: &mut dyn RowSink,
+        deadline: &Deadline,
+    ) -> Result<Image, DrawError> {
+        let _ = sink;
+        self.draw(plan, deadline)
+    }
 
     /// Fills the visibility buffer alone, for tests that compare back-ends sample for sample.
     ///

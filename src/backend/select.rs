@@ -3,14 +3,15 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::thread;
+use std::time::Duration;
 
 use super::costs::PlanSize;
 use super::device::{GpuDevice, GpuKind, drop_catching_panics};
 #[cfg(feature = "gpu")]
 use super::gpu;
 use super::host::GpuHost;
-use super::{BackendKind, DrawError, DrawTimes, Renderer, cpu};
-use crate::image::Image;
+use super::{BackendKind, DrawError, DrawStage, DrawTimes, Renderer, cpu};
+use crate::image::{Image, RowSink};
 use crate::limits::Deadline;
 use crate::plan::DrawPlan;
 use crate::spec::BackendChoice;
@@ -52,20 +53,22 @@ impl Backends {
         self.host.is_eligible()
     }
 
-    /// Draws the plan on the back-end that `choice` means here and now.
+    /// Draws the plan on the back-end that `choice` means here and now. Gives rows to `sink` as
+    /// [`Renderer::draw_rows`] does.
     pub fn draw(
         &mut self,
         choice: BackendChoice,
         plan: &DrawPlan<'_>,
+        sink: Option<&mut dyn RowSink>,
         deadline: &Deadline,
     ) -> Result<Chosen, DrawError> {
         match choice {
             // Only the CPU draws mixed pixels.
-            _ if plan.is_adaptive => self.draw_on_cpu(plan, deadline),
-            BackendChoice::Cpu => self.draw_on_cpu(plan, deadline),
+            _ if plan.is_adaptive => self.draw_on_cpu(plan, sink, deadline),
+            BackendChoice::Cpu => self.draw_on_cpu(plan, sink, deadline),
             BackendChoice::Gpu => self.draw_on_gpu(GpuKind::Any, plan, deadline),
             BackendChoice::Auto if self.has_gpu() && self.host.costs().prefers_cpu(PlanSize::of(plan)) => {
-                self.draw_on_cpu(plan, deadline)
+                self.draw_on_cpu(plan, sink, deadline)
             }
             BackendChoice::Auto => match self.draw_on_gpu(GpuKind::Hardware, plan, deadline) {
                 Ok(chosen) => Ok(chosen),
@@ -76,7 +79,7 @@ impl Backends {
                     if is_substitute {
                         tracing::warn!(%error, "the CPU draws this job");
                     }
-                    Ok(Chosen { is_substitute, ..self.draw_on_cpu(plan, deadline)? })
+                    Ok(Chosen { is_substitute, ..self.draw_on_cpu(plan, sink, deadline)? })
                 }
             },
         }
@@ -95,10 +98,22 @@ impl Backends {
         }
     }
 
-    fn draw_on_cpu(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Chosen, DrawError> {
-        let draw = || self.cpu.draw(plan, deadline);
-        let image = self.host.costs().timed(BackendKind::Cpu, PlanSize::of(plan), draw)?;
-        Ok(Chosen { image, backend: self.cpu.kind(), draw_times: self.cpu.draw_times(), is_substitute: false })
+    fn draw_on_cpu(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        sink: Option<&mut dyn RowSink>,
+        deadline: &Deadline,
+    ) -> Result<Chosen, DrawError> {
+        let draw = || {
+            let image = match sink {
+                Some(sink) => self.cpu.draw_rows(plan, sink, deadline)?,
+                None => self.cpu.draw(plan, deadline)?,
+            };
+            let draw_times = self.cpu.draw_times();
+            Ok::<_, DrawError>(((image, draw_times), draw_times.of(DrawStage::EncodeRows)))
+        };
+        let (image, draw_times) = self.host.costs().timed(BackendKind::Cpu, PlanSize::of(plan), draw)?;
+        Ok(Chosen { image, backend: self.cpu.kind(), draw_times, is_substitute: false })
     }
 
     /// Draws on the GPU; where that is lost, once more on a fresh one.
@@ -135,7 +150,7 @@ impl Backends {
         }
         let device = found?;
         let host = self.host.clone();
-        let draw = || self.draw_on(&device, plan, deadline);
+        let draw = || Ok((self.draw_on(&device, plan, deadline)?, Duration::ZERO));
         let result = host.costs().timed(BackendKind::Gpu, PlanSize::of(plan), draw);
         if let Err(DrawError::DeviceLost(reason)) = &result {
             // Workers that share a device lose it together, which counts as one loss.

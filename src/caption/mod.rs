@@ -3,9 +3,11 @@
 
 mod font;
 mod legend;
+mod marks;
 
 pub use font::text_width_px;
 pub use legend::{Scale, draw_legend};
+pub use marks::{Mark, draw_marks};
 
 use crate::image::Image;
 

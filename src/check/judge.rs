@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use super::places::{self, Faults};
 use super::{Check, Figure, Level, Rule, RuleSet, uvs, volume};
-use crate::import::{ImportReport, MeshError};
+use crate::import::{ImportReport, MeshError, MeshFault};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
@@ -30,6 +30,21 @@ pub struct Subject<'a> {
 pub fn unopened(detail: impl Into<String>) -> Check {
     let finding = Finding { ok: false, found: None, allowed: None, detail: detail.into(), places: Vec::new() };
     finding.of(Rule::Opens, Level::Error)
+}
+
+/// The check of a file that could not be read. None where that is not the file's fault: of a bundle in which the mesh
+/// is not clear, and of limits.
+pub fn of_unreadable(error: &MeshError) -> Option<Check> {
+    match error.fault {
+        MeshFault::BundleBroken | MeshFault::EntryUnclear | MeshFault::Limit(_) | MeshFault::Stopped => None,
+        MeshFault::Unrecognised
+        | MeshFault::Broken
+        | MeshFault::Empty
+        | MeshFault::OutsideBundle
+        | MeshFault::DecoderFailed
+        | MeshFault::DecoderCrashed
+        | MeshFault::Unsupported => Some(unopened(error.to_string())),
+    }
 }
 
 /// Judges a file: a check for each rule, in the order of the rules.
@@ -117,12 +132,21 @@ impl Judge<'_> {
                 Finding::of_faults(faults, detail)
             }
             Rule::NoSelfIntersection => {
-                let faces = intersections::self_intersections(mesh, self.budget, self.deadline)?;
+                let Some(faces) = intersections::self_intersections(mesh, self.budget, self.deadline)? else {
+                    let detail = "so many faces lie above each other that comparing them would take too long";
+                    return Ok(Finding::presence(false, "", detail));
+                };
                 let faults = Faults::at(faces.into_iter(), |face| places::face(mesh, face));
                 let detail = pluralise(faults.count, "face intersects another", "faces intersect others");
                 Finding::of_faults(faults, detail)
             }
             Rule::NoInvertedVolume => self.inverted()?,
+            Rule::NoLooseVertices => {
+                // Reading leaves these vertices out, and their places with them.
+                let count = import.loose_vertices.unwrap_or(0);
+                let (one, more) = ("vertex that nothing refers to", "vertices that nothing refers to");
+                Finding::of_faults(Faults::without_places(count), pluralise(count, one, more))
+            }
             Rule::NoNgons => {
                 let count = import.polygons_by_arity[5..].iter().sum();
                 let detail = pluralise(count, "polygon with more than 4 corners", "polygons with more than 4 corners");

@@ -13,9 +13,11 @@ mod tests;
 mod uvs;
 mod volume;
 
-pub use judge::{Subject, check, unopened};
+pub use judge::{Subject, check, of_unreadable, unopened};
 pub use meaning::meaning;
 pub use rule::{Level, NAMES, Rule, RuleSet, UnknownRule};
+
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
@@ -30,14 +32,22 @@ pub struct Verdict {
     pub ok: bool,
     /// One for each rule, in the order of the rules.
     pub checks: Vec<Check>,
+    /// Files with pictures, by view, if some were written.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub pictures: BTreeMap<&'static str, String>,
 }
 
 impl Verdict {
     /// The verdict of these checks.
     pub fn new(path: String, sha256: Option<String>, checks: Vec<Check>) -> Self {
-        let mut verdict = Self { path, sha256, ok: true, checks };
+        let mut verdict = Self { path, sha256, ok: true, checks, pictures: BTreeMap::new() };
         verdict.judge();
         verdict
+    }
+
+    /// Its JSON, on one line.
+    pub fn json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string(self).map(|json| json + "\n")
     }
 
     /// Says anew whether the file is ok, after faults became known.

@@ -23,6 +23,8 @@ pub enum Rule {
     NoSelfIntersection,
     /// No closed part is inside out.
     NoInvertedVolume,
+    /// Every vertex of the file belongs to a face, a line or a point.
+    NoLooseVertices,
     /// No polygon has more than four corners.
     NoNgons,
     /// All faces are connected.
@@ -50,7 +52,7 @@ pub enum Rule {
 }
 
 /// All names of rules.
-pub const NAMES: [&str; 21] = [
+pub const NAMES: [&str; 22] = [
     "opens",
     "no-warnings",
     "watertight",
@@ -60,6 +62,7 @@ pub const NAMES: [&str; 21] = [
     "no-duplicate-faces",
     "no-self-intersection",
     "no-inverted-volume",
+    "no-loose-vertices",
     "no-ngons",
     "single-component",
     "has-normals",
@@ -139,6 +142,7 @@ impl Rule {
             "no-duplicate-faces" => plain(Self::NoDuplicateFaces),
             "no-self-intersection" => plain(Self::NoSelfIntersection),
             "no-inverted-volume" => plain(Self::NoInvertedVolume),
+            "no-loose-vertices" => plain(Self::NoLooseVertices),
             "no-ngons" => plain(Self::NoNgons),
             "single-component" => plain(Self::SingleComponent),
             "has-normals" => plain(Self::HasNormals),
@@ -170,18 +174,19 @@ impl Rule {
             Self::NoDuplicateFaces => 6,
             Self::NoSelfIntersection => 7,
             Self::NoInvertedVolume => 8,
-            Self::NoNgons => 9,
-            Self::SingleComponent => 10,
-            Self::HasNormals => 11,
-            Self::HasUv => 12,
-            Self::UvInRange => 13,
-            Self::UvNoOverlap => 14,
-            Self::MaxTriangles(_) => 15,
-            Self::MaxVertices(_) => 16,
-            Self::MaxMaterials(_) => 17,
-            Self::MaxTexturePx(_) => 18,
-            Self::MaxFileBytes(_) => 19,
-            Self::Bounds(_) => 20,
+            Self::NoLooseVertices => 9,
+            Self::NoNgons => 10,
+            Self::SingleComponent => 11,
+            Self::HasNormals => 12,
+            Self::HasUv => 13,
+            Self::UvInRange => 14,
+            Self::UvNoOverlap => 15,
+            Self::MaxTriangles(_) => 16,
+            Self::MaxVertices(_) => 17,
+            Self::MaxMaterials(_) => 18,
+            Self::MaxTexturePx(_) => 19,
+            Self::MaxFileBytes(_) => 20,
+            Self::Bounds(_) => 21,
         };
         NAMES[index]
     }

@@ -304,3 +304,18 @@ fn each_rule_has_a_meaning() {
     }
     assert_eq!(meaning("other"), "");
 }
+
+#[test]
+fn vertices_that_nothing_refers_to_are_counted_though_reading_drops_them() {
+    obeys(&cube(), "no-loose-vertices");
+    let (one, more) = ("1 vertex that nothing refers to", "3 vertices that nothing refers to");
+    breaks(&cube().and("v 9 9 9\n"), "no-loose-vertices", 1, one);
+    // Faces with texture coordinates of their own, so that vertices are made anew.
+    let seams = "v 5 5 5\nvt 0 0\nvt 1 0\nvt 0 1\nvt 1 1\nf 1/1 2/2 3/3\nf 1/4 3/2 4/1\n";
+    breaks(&cube().and(seams), "no-loose-vertices", 1, one);
+    breaks(&cube().and("v 9 9 9\nv 9 9 9\nv 8 8 8\n"), "no-loose-vertices", 3, more);
+    obeys(&cube().and("v 9 9 9\nl 1 -1\n"), "no-loose-vertices");
+    obeys(&cube().and("v 9 9 9\np -1\n"), "no-loose-vertices");
+    // Its face is dropped, and it belongs to one all the same.
+    obeys(&cube().and("v 9 9 9\nf -1 -1 1\n"), "no-loose-vertices");
+}

@@ -11,6 +11,7 @@ use crate::cli::error::CliError;
 use crate::import::{self, Format};
 use crate::limits::Deadline;
 use crate::pipeline;
+use crate::report::Extras;
 use crate::request::{self, Rules};
 use crate::spec::BackendChoice;
 
@@ -19,6 +20,7 @@ pub const EXAMPLES: &str = "\
 Examples:
   meshsnap inspect knot.obj
   meshsnap inspect model.obj model.mtl wood.png --json
+  meshsnap inspect part.stl --print --parts
   meshsnap inspect walk.glb --set scene.time_s=0.5";
 
 /// Arguments of `inspect`.
@@ -38,6 +40,12 @@ pub struct InspectArgs {
     /// Print JSON
     #[arg(long)]
     json: bool,
+    /// Report what matters for printing, too: thickness of walls, overhangs, the way in which it stands
+    #[arg(long)]
+    print: bool,
+    /// Report each connected part, too, and the loops of open and sharp edges, with their lengths
+    #[arg(long)]
+    parts: bool,
     #[arg(
         long,
         value_name = "FORMAT",
@@ -72,7 +80,8 @@ pub fn run(arguments: &InspectArgs) -> Result<(), CliError> {
     let mut parsed = |_| progress.next("counting edges");
     let report = pipeline::inspect(
         &named.bundle,
-        import::Options { format, time_s },
+        import::Options { format, time_s, ..import::Options::default() },
+        Extras { print: arguments.print, parts: arguments.parts },
         &limits,
         &Deadline::default(),
         &mut parsed,

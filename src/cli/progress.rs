@@ -1,11 +1,11 @@
-//! A spinner for long work, shown on terminals only.
+//! A spinner for long work, and a bar for the work on many files, shown on terminals only.
 
 use std::io::IsTerminal as _;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressDrawTarget};
 
 /// Time until the spinner appears.
 const DELAY: Duration = Duration::from_millis(500);
@@ -59,5 +59,33 @@ impl Drop for Progress {
             drop(steps);
             let _ = thread.join();
         }
+    }
+}
+
+/// A bar that fills as files are done. It hides while lines are printed.
+pub struct Bar(ProgressBar);
+
+impl Bar {
+    /// Starts it for so many files; nothing is shown for one alone, and nothing where standard error is no terminal.
+    pub fn start(count: u64) -> Self {
+        let is_shown = count > 1 && std::io::stderr().is_terminal();
+        let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        Self(ProgressBar::with_draw_target(Some(count), target))
+    }
+
+    /// A file is done.
+    pub fn advance(&self) {
+        self.0.inc(1);
+    }
+
+    /// Hides it while `print` runs.
+    pub fn suspend<R>(&self, print: impl FnOnce() -> R) -> R {
+        if self.0.is_hidden() { print() } else { self.0.suspend(print) }
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
     }
 }

@@ -15,6 +15,11 @@ const BYTES_PER_FACE: u64 = 12 + 12 + 12 + 1 + 4;
 /// The name of what the colours mean.
 const TITLE: &str = "distance";
 
+/// The request's keys of a picture of a difference: both sides in one picture, lit so that colours can be compared,
+/// drawn by the CPU, so that its bytes are the same everywhere.
+pub const PICTURE_KEYS: [(&str, &str); 4] =
+    [("style", "smooth"), ("size", "1024x512"), ("light.ambient", "0.5"), ("backend", "cpu")];
+
 /// A mesh without materials of its own, whose vertices have colours from grey, for no distance, to red, for `most`.
 pub fn painted(mesh: &Mesh, distances: &[f64], most: f64, budget: &mut Budget) -> Result<Mesh, LimitExceeded> {
     budget.spend("the colours of a difference", mesh.positions.len() as u64, BYTES_PER_VERTEX)?;

@@ -19,7 +19,7 @@ mod vertices;
 mod whole;
 mod words;
 
-pub use heat::{framing, legend, painted};
+pub use heat::{PICTURE_KEYS, framing, legend, painted};
 pub use materials::{ChangedMaterial, Materials};
 
 use serde::Serialize;
@@ -61,7 +61,7 @@ pub struct Difference {
     pub measures: Sides<Size>,
     /// Faces by their corners.
     pub faces: FaceCounts,
-    /// Connected parts.
+    /// Parts, which are connected by edges.
     pub parts: PartCounts,
     /// The topology.
     pub topology: TopologyDifference,
@@ -69,6 +69,13 @@ pub struct Difference {
     pub materials: Materials,
     /// What a reviewer would say, in sentences.
     pub summary: Vec<String>,
+}
+
+impl Difference {
+    /// Its JSON.
+    pub fn json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string_pretty(self).map(|json| json + "\n")
+    }
 }
 
 /// The same of both meshes.
@@ -226,7 +233,9 @@ pub fn compare(
         a.mesh.triangles == b.mesh.triangles && numbers.iter().zip(0..).all(|(number, own)| *number == own);
     let faces = Faces::of(a.mesh, b.mesh, &numbers, budget)?;
     deadline.check()?;
-    let parts = parts::compare(a.mesh, b.mesh, &faces, in_a, budget)?;
+    let [edges_a, edges_b] = [EdgeList::of(a.mesh, budget)?, EdgeList::of(b.mesh, budget)?];
+    deadline.check()?;
+    let parts = parts::compare([(a.mesh, &edges_a), (b.mesh, &edges_b)], &faces, in_a, budget)?;
     deadline.check()?;
     let whole = whole::find(a.mesh, b.mesh, &faces, in_a, budget)?;
     let error = (ERROR * diagonal).max(rounding);
@@ -237,7 +246,6 @@ pub fn compare(
     let there = way(a.mesh, faces.removed.as_slice(), b.mesh, &mut budget.clone())?;
     let back = way(b.mesh, faces.added.as_slice(), a.mesh, &mut budget.clone())?;
     deadline.check()?;
-    let [edges_a, edges_b] = [EdgeList::of(a.mesh, budget)?, EdgeList::of(b.mesh, budget)?];
     let topologies =
         [Topology::of(a.mesh, &edges_a, budget, deadline)?, Topology::of(b.mesh, &edges_b, budget, deadline)?];
     let of_a = Numbered { mesh: a.mesh, edges: &edges_a, numbers: None };

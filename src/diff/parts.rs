@@ -1,4 +1,5 @@
-//! Connected parts of two meshes: which moved, came, went or changed.
+//! Connected parts of two meshes: which moved, came, went or changed. Faces with a common edge are of one part; surfaces
+//! that touch in a vertex alone are two.
 
 use std::collections::VecDeque;
 
@@ -9,6 +10,7 @@ use super::frame::Frame;
 use super::vertices::Grid;
 use crate::limits::{Budget, LimitExceeded};
 use crate::mesh::Mesh;
+use crate::mesh::edges::{Edge, EdgeList};
 use crate::mesh::union_find::UnionFind;
 use crate::mesh::vector::{cross, dot, sub};
 
@@ -18,9 +20,9 @@ const CANDIDATES_MAX: usize = 256;
 /// Most of them that are compared vertex by vertex: the nearest.
 const VERIFIED_MAX: usize = 8;
 
-/// Memory of a vertex (set, number of a part, lists of vertices) and of a face (number of a part).
-const BYTES_PER_VERTEX: u64 = 4 + 4 + 4 + 24;
-const BYTES_PER_FACE: u64 = 4 + size_of::<Part>() as u64 / 4;
+/// Memory of a vertex (its position) and of a face (set, number of a part, its corners in a list that doubles).
+const BYTES_PER_VERTEX: u64 = 24;
+const BYTES_PER_FACE: u64 = 4 + 4 + 24 + size_of::<Part>() as u64 / 4;
 
 const NONE: u32 = u32::MAX;
 
@@ -78,11 +80,16 @@ pub struct Parts {
 }
 
 /// Compares the parts. `tolerance` is in the unit box of `a`.
-pub fn compare(a: &Mesh, b: &Mesh, faces: &Faces, tolerance: f64, budget: &mut Budget) -> Result<Parts, LimitExceeded> {
+pub fn compare(
+    [(a, edges_a), (b, edges_b)]: [(&Mesh, &EdgeList); 2],
+    faces: &Faces,
+    tolerance: f64,
+    budget: &mut Budget,
+) -> Result<Parts, LimitExceeded> {
     let to_a = Frame::between(&b.to_file, &a.to_file);
     let own = Frame::between(&a.to_file, &a.to_file);
-    let of_a = Labelled::of(a, &faces.removed, own, budget)?;
-    let of_b = Labelled::of(b, &faces.added, to_a, budget)?;
+    let of_a = Labelled::of((a, edges_a), &faces.removed, own, budget)?;
+    let of_b = Labelled::of((b, edges_b), &faces.added, to_a, budget)?;
     let mut parts = Parts::default();
     // Parts that share faces are one part that changed.
     let mut partner = vec![NONE; of_b.parts.len()];
@@ -173,20 +180,27 @@ struct Labelled {
 }
 
 impl Labelled {
-    fn of(mesh: &Mesh, own_faces: &[u32], frame: Frame, budget: &mut Budget) -> Result<Self, LimitExceeded> {
+    fn of(
+        (mesh, edges): (&Mesh, &EdgeList),
+        own_faces: &[u32],
+        frame: Frame,
+        budget: &mut Budget,
+    ) -> Result<Self, LimitExceeded> {
         budget.spend("the parts of a mesh", mesh.positions.len() as u64, BYTES_PER_VERTEX)?;
         budget.spend("the parts of a mesh", mesh.triangles.len() as u64, BYTES_PER_FACE)?;
-        let mut sets = UnionFind::new(mesh.positions.len());
-        for t in &mesh.triangles {
-            sets.unite(t[0], t[1]);
-            sets.unite(t[0], t[2]);
+        let mut sets = UnionFind::new(mesh.triangles.len());
+        for [first, second] in edges.edges.iter().map(|edge| edge.faces).filter(|faces| faces[1] != Edge::NO_FACE) {
+            sets.unite(first, second);
+        }
+        for [edge, face] in &edges.further_faces {
+            sets.unite(edges.edges[*edge as usize].faces[0], *face);
         }
         let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|position| frame.map(*position)).collect();
-        let mut numbers = vec![NONE; positions.len()];
+        let mut numbers = vec![NONE; mesh.triangles.len()];
         let mut parts: Vec<Part> = Vec::new();
         let mut of_face = Vec::with_capacity(mesh.triangles.len());
-        for t in &mesh.triangles {
-            let set = sets.find(t[0]);
+        for (face, t) in (0_u32..).zip(&mesh.triangles) {
+            let set = sets.find(face);
             let number = &mut numbers[set as usize];
             if *number == NONE {
                 *number = parts.len() as u32;
@@ -194,16 +208,17 @@ impl Labelled {
             }
             of_face.push(*number);
             let part = &mut parts[*number as usize];
-            let [a, b, c] = t.map(|vertex| sub(positions[vertex as usize], positions[set as usize]));
+            part.vertices.extend(t);
+            let origin = positions[part.vertices[0] as usize];
+            let [a, b, c] = t.map(|vertex| sub(positions[vertex as usize], origin));
             let normal = cross(sub(b, a), sub(c, a));
             part.faces += 1;
             part.area += dot(normal, normal).sqrt() / 2.0;
             part.volume += dot(a, cross(b, c));
         }
-        for vertex in 0..positions.len() as u32 {
-            if let Some(part) = parts.get_mut(numbers[sets.find(vertex) as usize] as usize) {
-                part.vertices.push(vertex);
-            }
+        for part in &mut parts {
+            part.vertices.sort_unstable();
+            part.vertices.dedup();
         }
         own_faces.iter().for_each(|face| parts[of_face[*face as usize] as usize].own_faces += 1);
         parts.iter_mut().for_each(|part| part.measure(&positions));

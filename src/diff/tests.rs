@@ -364,3 +364,17 @@ fn extreme_sizes_and_places_have_an_answer() {
     let stopped = open(&three().text()).diff(&open(&tiny.text()), None, &Deadline::after_polls(2));
     assert!(stopped.is_err());
 }
+
+#[test]
+fn a_part_that_touches_another_in_one_vertex_is_a_part_of_its_own() {
+    // The small cube's lower corner is the large one's upper one, until it moves.
+    let text = |by: f64| {
+        let obj = Obj::default().cube([0.0; 3], [1.0; 3]).cube([1.5 + by, 1.5, 1.5], [0.5; 3]);
+        obj.text()
+    };
+    let difference = texts(&text(0.0), &text(0.25), None);
+    assert_eq!(difference.topology.a.components, 1);
+    assert_eq!(difference.summary[0], "one part moved by (0.25, 0, 0)", "{:?}", difference.summary);
+    assert_eq!((difference.parts.moved, difference.parts.unchanged), (1, 1), "{:?}", difference.parts);
+    assert_eq!(difference.parts.changed + difference.parts.added + difference.parts.removed, 0);
+}

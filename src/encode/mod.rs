@@ -9,6 +9,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageError};
 
+pub use self::png::QuickPng;
 use crate::image::{Image, ImageFormat};
 use crate::limits::{Deadline, Stopped};
 
@@ -57,6 +58,14 @@ pub fn encode(image: &Image, format: ImageFormat, effort: u32, deadline: &Deadli
         }
     }
     Ok(bytes)
+}
+
+/// An encoder that takes rows while the picture is being drawn. None if the format needs them all at once. It is
+/// fastest if the picture is opaque where that is expected.
+pub fn row_encoder(format: ImageFormat, effort: u32, size_px: [u32; 2], is_opaque: bool) -> Option<QuickPng> {
+    let is_in_rows = format == ImageFormat::Png && png::is_quick(effort);
+    // An error comes again when the picture is encoded.
+    if is_in_rows { QuickPng::new(size_px, is_opaque).ok() } else { None }
 }
 
 /// Encodes an animation that begins again for ever. Its frames are the picture's parts from the top to the

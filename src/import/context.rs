@@ -16,6 +16,8 @@ pub struct Context<'a> {
     pub bundle: &'a Folder,
     /// As [`super::Options::time_s`].
     pub time_s: Option<f64>,
+    /// As [`super::Options::counts_loose`].
+    pub counts_loose: bool,
 }
 
 impl Context<'_> {

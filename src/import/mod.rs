@@ -74,11 +74,13 @@ pub struct Options {
     pub format: Option<Format>,
     /// Moment of the file's first animation, in seconds. None: the rest pose.
     pub time_s: Option<f64>,
+    /// Count the vertices that nothing refers to, which takes a pass over the triangles.
+    pub counts_loose: bool,
 }
 
 impl From<Option<Format>> for Options {
     fn from(format: Option<Format>) -> Self {
-        Self { format, time_s: None }
+        Self { format, ..Self::default() }
     }
 }
 
@@ -89,6 +91,8 @@ pub struct Imported {
     pub mesh: Mesh,
     /// Counts, repairs, warnings and metadata.
     pub report: ImportReport,
+    /// The path of the mesh in its bundle.
+    pub path: String,
 }
 
 /// What the process does that importers in C run in.
@@ -148,7 +152,14 @@ fn open<T>(
     };
     let (folder, format) = entry::choose(files, bundle, options.format, deadline)?;
     let bytes = &folder.entry().bytes;
-    let mut cx = Context { limits, budget, deadline, bundle: &folder, time_s: options.time_s };
+    let mut cx = Context {
+        limits,
+        budget,
+        deadline,
+        bundle: &folder,
+        time_s: options.time_s,
+        counts_loose: options.counts_loose,
+    };
     let mut raw = (format.entry().read)(bytes, &mut cx)?;
     if options.time_s.is_some() && !format.entry().has_animations {
         let detail = format!("scene.time_s is given, and {format} files have no animation");

@@ -27,6 +27,8 @@ pub struct ImportReport {
     /// Line segments and points dropped: those with NaN or infinite ends, and segments without a
     /// length.
     pub dropped_lines_and_points: u64,
+    /// Vertices of the file that no face, line or point refers to, if they were counted.
+    pub loose_vertices: Option<u64>,
     /// Notes for the user, each with a stable code.
     pub warnings: Vec<Warning>,
     /// Metadata of the file.

@@ -11,6 +11,7 @@ pub mod measure;
 pub mod nearest;
 pub mod normals;
 pub mod primitives;
+pub mod thickness;
 pub mod topology;
 pub(crate) mod union_find;
 pub(crate) mod vector;

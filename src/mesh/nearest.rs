@@ -134,6 +134,37 @@ impl<'m> NearestFaces<'m> {
         (best.0 < f64::INFINITY).then(|| Hit { distance: best.0.sqrt(), face: best.1 })
     }
 
+    /// The length of the way from a point along a unit vector to the first face, beyond `least`. None where it meets none.
+    pub fn first_hit(&self, from: [f64; 3], along: [f64; 3], least: f64) -> Option<f64> {
+        let mut best = f64::INFINITY;
+        let mut waiting = [0_u32; WAITING_MAX];
+        let mut count = usize::from(!self.nodes.is_empty());
+        while count > 0 {
+            count -= 1;
+            let index = waiting[count];
+            let node = &self.nodes[index as usize];
+            if !node.is_met(from, along, best) {
+                continue;
+            }
+            if node.face_count > 0 {
+                for face in node.next..node.next + node.face_count {
+                    let corners = self.faces[face as usize].map(|v| self.positions[v as usize].map(f64::from));
+                    if let Some(length) = way_to_triangle(from, along, corners)
+                        && length > least
+                        && length < best
+                    {
+                        best = length;
+                    }
+                }
+            } else if count + 2 <= WAITING_MAX {
+                waiting[count] = node.next;
+                waiting[count + 1] = index + 1;
+                count += 2;
+            }
+        }
+        (best < f64::INFINITY).then_some(best)
+    }
+
     /// The distance of a point to one face.
     pub fn distance_to(&self, face: u32, point: [f64; 3]) -> f64 {
         self.squared_to(face, point).sqrt()
@@ -152,6 +183,41 @@ impl Node {
         let outside = [along(0), along(1), along(2)];
         dot(outside, outside)
     }
+}
+
+impl Node {
+    /// True if a way, no longer than `most`, meets the box, or comes very near to it.
+    fn is_met(&self, from: [f64; 3], along: [f64; 3], most: f64) -> bool {
+        const SLACK: f64 = 1e-9;
+        let (mut enters, mut leaves) = (0.0_f64, most);
+        for k in 0..3 {
+            let (low, high) = (f64::from(self.min[k]) - SLACK - from[k], f64::from(self.max[k]) + SLACK - from[k]);
+            if along[k] == 0.0 {
+                if low > 0.0 || high < 0.0 {
+                    return false;
+                }
+                continue;
+            }
+            let ends = [low / along[k], high / along[k]];
+            enters = enters.max(ends[0].min(ends[1]));
+            leaves = leaves.min(ends[0].max(ends[1]));
+        }
+        enters <= leaves
+    }
+}
+
+/// The length of the way along a unit vector to a triangle, seen from either side (Möller and Trumbore 1997). What passes
+/// an edge by less than rounding meets it.
+fn way_to_triangle(from: [f64; 3], along: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> Option<f64> {
+    const SLACK: f64 = 1e-12;
+    let (ab, ac, way) = (sub(b, a), sub(c, a), sub(from, a));
+    let across = cross(along, ac);
+    let determinant = dot(ab, across);
+    let u = dot(way, across) / determinant;
+    let turned = cross(way, ab);
+    let v = dot(along, turned) / determinant;
+    let length = dot(ac, turned) / determinant;
+    (determinant != 0.0 && u >= -SLACK && v >= -SLACK && u + v <= 1.0 + SLACK && length.is_finite()).then_some(length)
 }
 
 /// The squared distance of a point to a triangle, which may have no area.

@@ -4,10 +4,16 @@
 //! transfer objects, and their field names are part of the public interface.
 
 mod bounds;
+mod parts;
+mod print;
+#[cfg(test)]
+mod tests;
 mod text;
 mod topology;
 
 pub use self::bounds::{Bounds, without_rounding};
+pub use self::parts::PartsReport;
+pub use self::print::PrintReport;
 pub use self::topology::TopologyReport;
 use crate::import::{FileContent, FileMetadata, ImportReport, MeshError};
 use crate::limits::{Budget, Deadline};
@@ -68,6 +74,21 @@ pub struct Report {
     dropped_collapsed_faces: u64,
     dropped_loose: u64,
     warnings: Vec<WarningReport>,
+    /// What matters for printing, if it is asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    print: Option<PrintReport>,
+    /// The parts and loops, if they are asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    parts: Option<PartsReport>,
+}
+
+/// What a report has beside what every report has.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Extras {
+    /// What matters for printing.
+    pub print: bool,
+    /// The parts, and the loops of edges.
+    pub parts: bool,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -125,6 +146,7 @@ impl Report {
         mesh: &Mesh,
         import: &ImportReport,
         file_bytes: u64,
+        extras: Extras,
         budget: &mut Budget,
         deadline: &Deadline,
     ) -> Result<Self, MeshError> {
@@ -142,7 +164,9 @@ impl Report {
         // A sentence for each image that cannot be read.
         budget.spend("the report", mesh.images.len() as u64, 512)?;
         deadline.check()?;
-        Ok(Self::new(mesh, import, file_bytes, (topology, t_junctions)))
+        let print = extras.print.then(|| PrintReport::of(mesh, &mut budget.clone(), deadline)).transpose()?;
+        let parts = extras.parts.then(|| PartsReport::of(mesh, budget, deadline)).transpose()?;
+        Ok(Self { print, parts, ..Self::new(mesh, import, file_bytes, (topology, t_junctions)) })
     }
 
     /// The report as JSON, byte for byte as `inspect --json` prints it and HTTP answers.
@@ -152,7 +176,8 @@ impl Report {
 
     /// For a person to read: a line for each thing that there is.
     pub fn text(&self) -> String {
-        text::text(self)
+        let more = [self.print.as_ref().map(PrintReport::text), self.parts.as_ref().map(PartsReport::text)];
+        text::text(self) + &more.into_iter().flatten().collect::<String>()
     }
 
     fn new(
@@ -220,6 +245,8 @@ impl Report {
             dropped_collapsed_faces: import.dropped_collapsed_faces,
             dropped_loose: import.dropped_lines_and_points,
             warnings: warnings.map(|w| WarningReport { code: w.code, detail: w.detail }).collect(),
+            print: None,
+            parts: None,
         }
     }
 }

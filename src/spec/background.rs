@@ -23,6 +23,11 @@ impl Background {
         }
     }
 
+    /// True if nothing shows through.
+    pub fn is_opaque(self) -> bool {
+        self.top.0[3] >= 1.0 && self.bottom.0[3] >= 1.0
+    }
+
     /// Over a white page, in linear light.
     #[must_use]
     pub fn over_white(self) -> Self {

@@ -40,7 +40,8 @@ fn main() {
         let mut found = (0, None);
         for _ in 0..3 {
             let start = Instant::now();
-            let faces = pool.install(|| self_intersections(mesh, &budget, &deadline)).expect("faces");
+            let faces =
+                pool.install(|| self_intersections(mesh, &budget, &deadline)).expect("faces").expect("not too many");
             best[0] = best[0].min(start.elapsed().as_secs_f64());
             let start = Instant::now();
             let junctions = pool.install(|| t_junctions(mesh, &budget, &deadline)).expect("a count");

@@ -19,6 +19,7 @@ pub(super) mod mixed;
 pub(super) mod occlusion;
 mod peeling;
 mod resolve;
+mod row_queue;
 mod stopwatch;
 pub(super) mod surface;
 mod threads;
@@ -38,11 +39,12 @@ use self::bands::scratch::{BandScratch, Banding, KEPT_BYTES_MAX, KeptSamples, Sc
 use self::isa::LANES;
 use self::occlusion::Occlusion;
 use self::resolve::SrgbEncoder;
+use self::row_queue::RowQueue;
 use self::stopwatch::Stopwatch;
 use self::surface::flat::FlatColors;
 use super::{BackendKind, DrawError, DrawStage, DrawTimes, Renderer};
 use crate::backend::cpu::geometry::transform::ScreenVertex;
-use crate::image::Image;
+use crate::image::{Image, RowSink};
 use crate::limits::Deadline;
 use crate::plan::{DrawPlan, OcclusionPass};
 
@@ -159,12 +161,12 @@ impl CpuRenderer {
 
     /// Calls `each` with every drawn band, its rows of `out` (`row_len` items a picture row) beside
     /// it.
-    fn draw_bands<T: Send>(
+    fn draw_bands<'o, T: Send>(
         &mut self,
         plan: &DrawPlan<'_>,
         deadline: &Deadline,
-        (goal, out): (Goal, &mut [T]),
-        each: impl Fn(&RasterContext<'_>, &mut BandScratch, &Bins, usize, &mut [T]) + Sync + Send,
+        (goal, out): (Goal, &'o mut [T]),
+        each: impl Fn(&RasterContext<'_>, &mut BandScratch, &Bins, usize, &'o mut [T]) + Sync + Send,
     ) -> Result<(), DrawError> {
         deadline.check()?;
         let threads = self.threads.clone();
@@ -327,13 +329,33 @@ impl RasterContext<'_> {
 impl Renderer for CpuRenderer {
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
         let mut rgba = vec![0_u8; plan.width_px as usize * plan.height_px as usize * 4];
-        self.draw_bands(plan, deadline, (Goal::Picture, &mut rgba), bands::draw)?;
+        self.draw_bands(plan, deadline, (Goal::Picture, &mut rgba), |context, scratch, bins, band, out| {
+            bands::draw(context, scratch, bins, band, out);
+        })?;
+        Ok(Image { width_px: plan.width_px, height_px: plan.height_px, rgba })
+    }
+
+    fn draw_rows(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        sink: &mut dyn RowSink,
+        deadline: &Deadline,
+    ) -> Result<Image, DrawError> {
+        let mut rgba = vec![0_u8; plan.width_px as usize * plan.height_px as usize * 4];
+        let queue = RowQueue::new(sink);
+        self.draw_bands(plan, deadline, (Goal::Picture, &mut rgba), |context, scratch, bins, band, out| {
+            bands::draw(context, scratch, bins, band, out);
+            queue.push(context, band, out);
+        })?;
+        drop(queue);
         Ok(Image { width_px: plan.width_px, height_px: plan.height_px, rgba })
     }
 
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {
         let mut words = vec![0_u64; plan.width_px as usize * plan.height_px as usize * plan.samples as usize];
-        self.draw_bands(plan, deadline, (Goal::Samples, &mut words), bands::draw_visibility)?;
+        self.draw_bands(plan, deadline, (Goal::Samples, &mut words), |context, scratch, bins, band, words| {
+            bands::draw_visibility(context, scratch, bins, band, words);
+        })?;
         Ok(words)
     }
 

@@ -6,8 +6,14 @@ use std::time::{Duration, Instant};
 use crate::backend::draw_times::{DrawStage, DrawTimes};
 
 /// The stages of a band, in order. Each thread runs them for its own bands.
-const BAND_STAGES: [DrawStage; 5] =
-    [DrawStage::Visibility, DrawStage::Shade, DrawStage::Mixed, DrawStage::Lines, DrawStage::Resolve];
+const BAND_STAGES: [DrawStage; 6] = [
+    DrawStage::Visibility,
+    DrawStage::Shade,
+    DrawStage::Mixed,
+    DrawStage::Lines,
+    DrawStage::Resolve,
+    DrawStage::EncodeRows,
+];
 
 /// Time of each stage, summed over all threads, and the number of mixed pixels.
 #[derive(Default)]
@@ -70,7 +76,7 @@ mod tests {
     #[test]
     fn stages_of_bands_share_their_wall_time() {
         let ms = |n: u64| AtomicU64::new(n * 1_000_000);
-        let nanoseconds = [ms(3), ms(1), ms(0), ms(10), ms(0), ms(20), ms(0), ms(0), ms(10)];
+        let nanoseconds = [ms(3), ms(1), ms(0), ms(10), ms(0), ms(20), ms(0), ms(0), ms(10), ms(0)];
         let watch = Stopwatch { nanoseconds, mixed_pixels: AtomicU64::new(7) };
         let parts: Vec<_> = watch.times(Duration::from_millis(20)).parts().collect();
         let wanted = [

@@ -1,4 +1,5 @@
-//! Baselines: the faults of each mesh that are accepted, as files in a folder, and so do not fail it again.
+//! Baselines: the faults of each mesh that are accepted, as files in a folder, and so do not fail it again; beside them
+//! its pictures, if views are asked for.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -107,8 +108,28 @@ impl Baseline {
         Ok(())
     }
 
-    /// The file of a mesh: its path below the root, with `.json`.
+    /// The accepted picture of a view; none if there is none.
+    pub fn picture(&self, mesh: &str, view: &str, bytes_max: u64) -> Result<Option<Vec<u8>>, CliError> {
+        read_if_there(&self.file(mesh, &format!("{view}.png"))?, bytes_max)
+            .map_err(|error| CliError { exit_code: 2, ..error })
+    }
+
+    /// Accepts the picture of a view.
+    pub fn keep_picture(&self, mesh: &str, view: &str, png: &[u8]) -> Result<(), CliError> {
+        let path = self.file(mesh, &format!("{view}.png"))?;
+        let name = path.display().to_string();
+        let unwritable = |error: std::io::Error| CliError::usage(format!("{name}: cannot be written: {error}"));
+        fs::create_dir_all(path.parent().unwrap_or(Path::new("."))).map_err(unwritable)?;
+        Destination::new(&name, &Inputs::default())?.write(&name, png)
+    }
+
+    /// The file of a mesh's faults.
     fn file_of(&self, mesh: &str) -> Result<PathBuf, CliError> {
+        self.file(mesh, "json")
+    }
+
+    /// A file of a mesh: its path below the root, with an extension more.
+    fn file(&self, mesh: &str, extension: &str) -> Result<PathBuf, CliError> {
         let absolute = comparable(mesh);
         let relative = absolute.strip_prefix(&self.root).ok();
         let is_plain = |path: &Path| path.components().all(|part| matches!(part, Component::Normal(_)));
@@ -117,7 +138,7 @@ impl Baseline {
             return Err(CliError::usage(format!("{mesh}: lies outside of {root}, to which the baseline belongs")));
         };
         let mut path = self.folder.join(relative).into_os_string();
-        path.push(".json");
+        path.push(format!(".{extension}"));
         Ok(path.into())
     }
 }
@@ -155,5 +176,13 @@ impl KnownFault {
         let has_all_places = before.is_some_and(|before| before == [self.places.len() as f64]);
         let is_recorded = |place: &Place| serde_json::to_value(place).is_ok_and(|place| self.places.contains(&place));
         is_no_more && (!has_all_places || check.places.iter().all(is_recorded))
+    }
+}
+
+/// The bytes of a file; none if there is no such file.
+fn read_if_there(path: &Path, bytes_max: u64) -> Result<Option<Vec<u8>>, CliError> {
+    match fs::metadata(path) {
+        Ok(data) if data.is_file() => files::read(&path.to_string_lossy(), bytes_max).map(|bytes| Some(bytes.to_vec())),
+        _ => Ok(None),
     }
 }

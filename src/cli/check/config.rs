@@ -7,10 +7,13 @@ use glob::{MatchOptions, Pattern};
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
+use super::pictures::view_of;
 use crate::check::{RuleSet, UnknownRule};
 use crate::cli::bundle::comparable;
 use crate::cli::error::CliError;
 use crate::cli::files;
+use crate::request::words_of;
+use crate::spec::NamedView;
 
 /// The name that is looked for.
 const NAME: &str = "meshsnap.toml";
@@ -19,7 +22,7 @@ const NAME: &str = "meshsnap.toml";
 const BYTES_MAX: u64 = 1 << 20;
 
 /// The keys of `[check]`, of `[[check.files]]` and of `[check.baseline]`.
-const KEYS: [&str; 4] = ["rules", "warn", "files", "baseline"];
+const KEYS: [&str; 5] = ["rules", "warn", "views", "files", "baseline"];
 const FILE_KEYS: [&str; 3] = ["glob", "rules", "warn"];
 const BASELINE_KEYS: [&str; 1] = ["dir"];
 
@@ -35,12 +38,14 @@ pub struct Config {
     of_files: Vec<(Pattern, RuleSet)>,
     /// The folder of accepted faults.
     baseline: Option<PathBuf>,
+    /// The views of pictures in reports.
+    views: Vec<NamedView>,
 }
 
 impl Config {
     /// The same rules for every file.
     pub fn of(rules: RuleSet) -> Self {
-        Self { path: None, folder: PathBuf::new(), rules, of_files: Vec::new(), baseline: None }
+        Self { path: None, folder: PathBuf::new(), rules, of_files: Vec::new(), baseline: None, views: Vec::new() }
     }
 
     /// Reads the file that is named, or else the one in the current folder or the nearest above it, or else
@@ -78,6 +83,11 @@ impl Config {
     /// The folder of accepted faults.
     pub fn baseline(&self) -> Option<&Path> {
         self.baseline.as_deref()
+    }
+
+    /// The views of pictures in reports.
+    pub fn views(&self) -> &[NamedView] {
+        &self.views
     }
 
     /// The folder to which accepted faults belong: that of the file, or the current one.
@@ -125,6 +135,9 @@ fn read(text: &str, folder: PathBuf) -> Result<Config, Fault> {
         config.rules = rule_set(rules.as_ref(), warn.as_ref())?;
     }
     config.baseline = table.get("baseline").map(baseline).transpose()?.map(|dir| config.folder.join(dir));
+    for (name, span) in table.get("views").map(texts).transpose()?.unwrap_or_default() {
+        config.views.push(view_of(&name).ok_or_else(|| fault(span, unknown_view(&name)))?);
+    }
     for file in table.get("files").map(list).transpose()?.unwrap_or_default() {
         let DeValue::Table(table) = file.get_ref() else {
             return Err(fault(file.span(), "`files` has tables: [[check.files]]"));
@@ -137,6 +150,12 @@ fn read(text: &str, folder: PathBuf) -> Result<Config, Fault> {
         config.of_files.push((pattern, set));
     }
     Ok(config)
+}
+
+/// The sentence about a word that is no view.
+pub fn unknown_view(name: &str) -> String {
+    let given: String = name.chars().take(60).collect();
+    format!("there is no view `{given}`; the views are {}", words_of::<NamedView>().join(", "))
 }
 
 /// The folder of `[check.baseline]`.

@@ -2,6 +2,7 @@
 
 mod baseline;
 mod config;
+mod pictures;
 mod reports;
 mod run;
 mod since;
@@ -17,7 +18,8 @@ use crate::check::{NAMES, RuleSet};
 use crate::cli::error::CliError;
 use crate::import::Format;
 use baseline::Baseline;
-use config::Config;
+use config::{Config, unknown_view};
+use pictures::view_of;
 use reports::ReportArgs;
 use run::Run;
 
@@ -28,6 +30,7 @@ Examples:
   meshsnap check 'parts/*.stl' --rules opens,watertight,max-triangles:200000 --warn has-normals
   meshsnap check model.obj --rules uv-no-overlap,bounds:100,100,50 --format jsonl
   meshsnap check parts/ --baseline .meshsnap --update
+  meshsnap check parts/ --views iso,front --html page.html
   meshsnap check parts/ --since origin/main --sarif faults.sarif --markdown comment.md
 
 A file that cannot be read fails, whatever the rules. Exit codes: 0 every file obeys its rules of level
@@ -76,6 +79,12 @@ pub struct CheckArgs {
     /// Check only the meshes that changed since a commit, by the program `git`
     #[arg(long, value_name = "REF", value_hint = ValueHint::Other)]
     since: Option<String>,
+    /// Views of pictures in reports and baselines: iso, front, ... [default: those of meshsnap.toml]
+    #[arg(long, value_name = "VIEW,...", value_delimiter = ',', value_hint = ValueHint::Other)]
+    views: Vec<String>,
+    /// Folder for the pictures as files, which --markdown shows
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pictures: Option<PathBuf>,
     #[command(flatten)]
     reports: ReportArgs,
     /// Files that are read at once [default: one for each processor]
@@ -122,8 +131,18 @@ pub fn run(arguments: &CheckArgs) -> Result<(), CliError> {
         let sentence = "--update needs a baseline: give --baseline DIR, or [check.baseline] in meshsnap.toml";
         return Err(CliError::usage(sentence));
     }
+    let named = arguments
+        .views
+        .iter()
+        .map(|name| view_of(name.trim()).ok_or_else(|| CliError::usage(format!("--views: {}", unknown_view(name)))));
+    let named = named.collect::<Result<Vec<_>, _>>()?;
+    let views = if named.is_empty() { config.views().to_vec() } else { named };
+    if arguments.pictures.is_some() && views.is_empty() {
+        let sentence = "--pictures needs views: give --views iso,front, or `views` in meshsnap.toml";
+        return Err(CliError::usage(sentence));
+    }
     let baseline = folder.map(|folder| Baseline::new(folder, config.root()));
-    Run::new(arguments, config, tasks, baseline).all()
+    Run::new(arguments, config, tasks, baseline).with_pictures(&views)?.all()
 }
 
 /// The rules of the command line, or else of a file.

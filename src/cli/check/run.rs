@@ -3,27 +3,30 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::baseline::Baseline;
 use super::config::Config;
+use super::pictures::{Pictures, ViewPictures};
 use super::reports::{Findings, Reports, json_line, text};
 use super::{CheckArgs, Output};
 use crate::backend::cpu::DrawingThreads;
-use crate::check::{Verdict, unopened};
+use crate::backend::{Backends, GpuHost, HardwareHint};
+use crate::check::{Check, Verdict, unopened};
 use crate::cli::bundle::{self, comparable};
 use crate::cli::error::CliError;
 use crate::cli::output::Inputs;
+use crate::cli::progress::Bar;
 use crate::cli::render::{Task, Tasks, format_in};
 use crate::cli::{files, siblings};
-use crate::config::cores;
+use crate::config::{cores, why_no_gpu};
 use crate::limits::{Deadline, Limits};
-use crate::pipeline;
+use crate::pipeline::{self, Opened};
 use crate::pluralise::pluralise;
 use crate::service::digest::Digest;
+use crate::spec::NamedView;
 
 /// A mesh names a file, which names others.
 const ROUNDS_MAX: usize = 4;
@@ -35,6 +38,9 @@ pub struct Run<'a> {
     config: Config,
     tasks: Tasks,
     baseline: Option<Baseline>,
+    /// The pictures, if a report or a baseline wants them.
+    pictures: Option<Pictures>,
+    gpu: Arc<GpuHost>,
     /// The named files that are no meshes, by their absolute paths.
     named: BTreeSet<PathBuf>,
     /// Those of them that were used for some mesh.
@@ -45,7 +51,32 @@ pub struct Run<'a> {
 struct Outcome {
     /// A sentence for the user beside the verdict.
     said: Option<String>,
-    result: Result<Verdict, CliError>,
+    result: Result<Judged, CliError>,
+}
+
+/// A file that was judged.
+struct Judged {
+    verdict: Verdict,
+    /// Its pictures, if the page wants them.
+    pictures: Vec<ViewPictures>,
+}
+
+/// What a run has found.
+#[derive(Default)]
+struct Found {
+    verdicts: Vec<Verdict>,
+    /// The pictures of each verdict.
+    pictures: Vec<Vec<ViewPictures>>,
+    /// Files without a verdict by a fault of ours.
+    lost: usize,
+    /// The exit code of such a fault.
+    failure: Option<u8>,
+}
+
+impl Judged {
+    fn without_pictures(path: &str, digest: Option<String>, checks: Vec<Check>) -> Self {
+        Self { verdict: Verdict::new(path.to_owned(), digest, checks), pictures: Vec::new() }
+    }
 }
 
 impl<'a> Run<'a> {
@@ -53,7 +84,17 @@ impl<'a> Run<'a> {
     pub fn new(arguments: &'a CheckArgs, config: Config, tasks: Tasks, baseline: Option<Baseline>) -> Self {
         let named = tasks.companions.iter().map(comparable).collect();
         let limits = arguments.limits.config().limits;
-        Self { arguments, limits, config, tasks, baseline, named, used: Mutex::default() }
+        let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), None));
+        Self { arguments, limits, config, tasks, baseline, pictures: None, gpu, named, used: Mutex::default() }
+    }
+
+    /// The run with pictures of these views, if anything shows or keeps them.
+    pub fn with_pictures(mut self, views: &[NamedView]) -> Result<Self, CliError> {
+        let CheckArgs { reports, pictures, .. } = self.arguments;
+        if reports.has_page() || pictures.is_some() || self.baseline.is_some() && self.arguments.update {
+            self.pictures = Pictures::new(views, pictures.clone(), &self.limits, self.inputs())?;
+        }
+        Ok(self)
     }
 
     /// Judges all. Verdicts go to standard output, and last the count to standard error.
@@ -62,15 +103,17 @@ impl<'a> Run<'a> {
         let threads = self.arguments.jobs.map_or(cores() as usize, usize::from).min(self.tasks.all.len());
         let next = AtomicUsize::new(0);
         let (sender, outcomes) = channel();
-        let (verdicts, lost, failure) = std::thread::scope(|scope| {
+        let Found { verdicts, pictures, lost, failure } = std::thread::scope(|scope| {
             for _ in 0..threads {
                 let (sender, next) = (sender.clone(), &next);
                 scope.spawn(move || {
                     // Many files keep all processors busy: each is read by one thread.
                     let threads_of_one = if threads == 1 { cores() as usize } else { 1 };
-                    DrawingThreads::new(threads_of_one).install(|| {
+                    let drawing = Arc::new(DrawingThreads::new(threads_of_one));
+                    drawing.install(|| {
+                        let mut backends = Backends::sharing(self.gpu.clone(), drawing.clone());
                         let mut done = |number, outcome| drop(sender.send((number, outcome)));
-                        self.work(next, &mut done);
+                        self.work(next, &mut backends, &mut done);
                     });
                 });
             }
@@ -78,7 +121,7 @@ impl<'a> Run<'a> {
             // Where nobody reads the verdicts, no more are made.
             self.print(&outcomes).inspect_err(|_| next.store(self.tasks.all.len(), Ordering::Relaxed))
         })?;
-        let findings = Findings { verdicts: &verdicts, lost };
+        let findings = Findings { verdicts: &verdicts, pictures: &pictures, lost };
         reports.write(&findings)?;
         let used = self.used.lock().unwrap_or_else(PoisonError::into_inner);
         // Of some meshes alone, it is not known what the others use.
@@ -101,30 +144,36 @@ impl<'a> Run<'a> {
     }
 
     /// Judges one file after the other, until none is left.
-    fn work(&self, next: &AtomicUsize, done: &mut (dyn FnMut(usize, Outcome) + Send)) {
+    fn work(&self, next: &AtomicUsize, backends: &mut Backends, done: &mut (dyn FnMut(usize, Outcome) + Send)) {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(task) = self.tasks.all.get(number) else { break };
             let mut said = None;
-            let result = catch_unwind(AssertUnwindSafe(|| self.judge_known(task, &mut said)));
+            let result = catch_unwind(AssertUnwindSafe(|| self.judge_known(task, backends, &mut said)));
             let bug = |_| Err(CliError::ours(format!("{}: this is a bug in meshsnap; please report it", task.mesh)));
             done(number, Outcome { said, result: result.unwrap_or_else(bug) });
         }
     }
 
     /// Judges one file, and marks what is known or accepts what there is.
-    fn judge_known(&self, task: &Task, said: &mut Option<String>) -> Result<Verdict, CliError> {
-        let mut verdict = self.judge(task, said)?;
+    fn judge_known(&self, task: &Task, backends: &mut Backends, said: &mut Option<String>) -> Result<Judged, CliError> {
+        let Judged { mut verdict, mut pictures } = self.judge(task, backends, said)?;
+        if let Some(drawn) = &self.pictures {
+            verdict.pictures = drawn.write(&task.picture, &pictures)?.into_iter().collect();
+        }
+        if !self.arguments.reports.has_page() {
+            pictures = Vec::new();
+        }
         match &self.baseline {
             Some(baseline) if self.arguments.update => baseline.update(&mut verdict)?,
             Some(baseline) => baseline.apply(&mut verdict)?,
             None => {}
         }
-        Ok(verdict)
+        Ok(Judged { verdict, pictures })
     }
 
     /// Judges one file, with those that it turns out to refer to.
-    fn judge(&self, task: &Task, said: &mut Option<String>) -> Result<Verdict, CliError> {
+    fn judge(&self, task: &Task, backends: &mut Backends, said: &mut Option<String>) -> Result<Judged, CliError> {
         let path = &task.mesh;
         let mut names = vec![path.clone()];
         let mut digest = None;
@@ -135,7 +184,7 @@ impl<'a> Run<'a> {
                 Err(error) => {
                     let own = format!("{path}: ");
                     let detail = error.sentence.strip_prefix(&own).unwrap_or(&error.sentence).to_owned();
-                    return Ok(Verdict::new(path.clone(), digest, vec![unopened(detail)]));
+                    return Ok(Judged::without_pictures(path, digest, vec![unopened(detail)]));
                 }
             };
             // Alone at first: a digest is that of the mesh's own bytes.
@@ -151,17 +200,45 @@ impl<'a> Run<'a> {
             if readable.is_empty() {
                 // Judged only now that all its files are there.
                 let rules = self.config.rules_of(Path::new(path));
-                let checks = opened.and_then(|opened| opened.check(rules, &Deadline::default()));
-                let checks = checks.unwrap_or_else(|error| vec![unopened(error.to_string())]);
-                *said = (!unread.is_empty()).then(|| siblings::advice_to_add(path, &unread));
+                let checked = opened.and_then(|opened| Ok((opened.check(rules, &Deadline::default())?, opened)));
+                let (checks, pictures) = match checked {
+                    Ok((checks, opened)) => {
+                        let pictures = self.draw(&opened, (path, &checks), backends, said)?;
+                        (checks, pictures)
+                    }
+                    Err(error) => (vec![unopened(error.to_string())], Vec::new()),
+                };
+                if !unread.is_empty() {
+                    *said = Some(siblings::advice_to_add(path, &unread));
+                }
                 let used = names.iter().map(comparable);
                 self.used.lock().unwrap_or_else(PoisonError::into_inner).extend(used);
-                return Ok(Verdict::new(path.clone(), digest, checks));
+                let verdict = Verdict::new(path.clone(), digest, checks);
+                return Ok(Judged { verdict, pictures });
             }
             names.extend(readable);
         }
         let detail = "files refer to files without end";
-        Ok(Verdict::new(path.clone(), digest, vec![unopened(detail)]))
+        Ok(Judged::without_pictures(path, digest, vec![unopened(detail)]))
+    }
+
+    /// Draws the pictures of a file. One that cannot be drawn has none, and fails by its faults alone.
+    fn draw(
+        &self,
+        opened: &Opened,
+        (path, checks): (&str, &[Check]),
+        backends: &mut Backends,
+        said: &mut Option<String>,
+    ) -> Result<Vec<ViewPictures>, CliError> {
+        let Some(pictures) = &self.pictures else { return Ok(Vec::new()) };
+        let accepted = (self.baseline.as_ref(), self.arguments.update);
+        match pictures.draw(opened, (path, checks), accepted, backends) {
+            Err(error) if error.exit_code == 1 => {
+                *said = Some(format!("{}: no pictures are made of it", error.sentence));
+                Ok(Vec::new())
+            }
+            drawn => drawn,
+        }
     }
 
     /// The files that are read, which no report may replace.
@@ -172,10 +249,10 @@ impl<'a> Run<'a> {
         Inputs::of(named.chain(config.as_deref()))
     }
 
-    /// Prints the verdicts in order. Returns them, the number of files without one by a fault of ours, and its
-    /// exit code.
-    fn print(&self, outcomes: &Receiver<(usize, Outcome)>) -> Result<(Vec<Verdict>, usize, Option<u8>), CliError> {
-        let (mut verdicts, mut lost, mut failure) = (Vec::new(), 0, None);
+    /// Prints the verdicts in order, and returns all.
+    fn print(&self, outcomes: &Receiver<(usize, Outcome)>) -> Result<Found, CliError> {
+        let mut found = Found::default();
+        let bar = Bar::start(self.tasks.all.len() as u64);
         let mut waiting: BTreeMap<usize, Outcome> = BTreeMap::new();
         let mut next = 0;
         for (number, outcome) in outcomes {
@@ -183,22 +260,25 @@ impl<'a> Run<'a> {
             while let Some(Outcome { said, result }) = waiting.remove(&next) {
                 next += 1;
                 match result {
-                    Ok(verdict) => {
-                        files::print(self.show(&verdict)?.as_bytes())?;
-                        verdicts.push(verdict);
+                    Ok(Judged { verdict, pictures }) => {
+                        let shown = self.show(&verdict)?;
+                        bar.suspend(|| files::print(shown.as_bytes()))?;
+                        found.verdicts.push(verdict);
+                        found.pictures.push(pictures);
                     }
                     Err(error) => {
-                        say!("meshsnap: {}", error.sentence);
-                        failure = failure.max(Some(error.exit_code));
-                        lost += 1;
+                        bar.suspend(|| say!("meshsnap: {}", error.sentence));
+                        found.failure = found.failure.max(Some(error.exit_code));
+                        found.lost += 1;
                     }
                 }
                 if let Some(sentence) = said {
-                    say!("meshsnap: {sentence}");
+                    bar.suspend(|| say!("meshsnap: {sentence}"));
                 }
+                bar.advance();
             }
         }
-        Ok((verdicts, lost, failure))
+        Ok(found)
     }
 
     fn show(&self, verdict: &Verdict) -> Result<String, CliError> {

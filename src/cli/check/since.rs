@@ -10,20 +10,67 @@ use std::process::{Command, Stdio};
 use crate::cli::error::CliError;
 use crate::cli::render::{Task, Tasks, is_companion};
 
+/// The largest mesh in which names of files are looked for, bytes. A larger one counts as changed with any file beside it.
+const SEARCHED_BYTES_MAX: u64 = 256 << 20;
+
+/// The largest material library that is searched, bytes.
+const LIBRARY_BYTES_MAX: u64 = 16 << 20;
+
 /// Leaves out the meshes that have not changed since a commit, here or in git. A mesh counts as changed, too, where a
-/// file that it may refer to has, such as a texture in its folder or below.
+/// file has whose name is in it, such as a texture in its folder or below, or in its material library.
 pub fn keep_changed(tasks: &mut Tasks, reference: &str) -> Result<(), CliError> {
     let changed = changed(reference)?;
     let companions: Vec<&PathBuf> = changed.iter().filter(|path| is_companion(path)).collect();
     let has_changed = |task: &Task| {
         let Ok(path) = fs::canonicalize(&task.mesh) else { return true };
         let folder = path.parent().unwrap_or(Path::new("/"));
-        changed.contains(&path) || companions.iter().any(|companion| companion.starts_with(folder))
+        let beside: Vec<&PathBuf> = companions.iter().copied().filter(|one| one.starts_with(folder)).collect();
+        changed.contains(&path) || !beside.is_empty() && names_any(&path, &beside)
     };
     let before = tasks.all.len();
     tasks.all.retain(has_changed);
     tasks.is_part |= tasks.all.len() < before;
     Ok(())
+}
+
+/// True if a mesh names one of these files, or a material library in its folder that does. Importers find a file by its
+/// base name, too, so that is what is looked for, as it is or percent-encoded.
+fn names_any(mesh: &Path, files: &[&PathBuf]) -> bool {
+    let size = |path: &Path| fs::metadata(path).map_or(u64::MAX, |data| data.len());
+    if size(mesh) > SEARCHED_BYTES_MAX {
+        return true;
+    }
+    let Ok(text) = fs::read(mesh) else { return true };
+    let mut names: Vec<Vec<u8>> = files.iter().flat_map(|file| spellings(file)).collect();
+    let libraries = fs::read_dir(mesh.parent().unwrap_or(Path::new("/"))).into_iter().flatten().flatten();
+    let libraries = libraries.map(|entry| entry.path()).filter(|path| {
+        path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mtl")) && size(path) <= LIBRARY_BYTES_MAX
+    });
+    let naming = libraries.filter(|path| fs::read(path).is_ok_and(|text| has_any(&text, &names)));
+    let naming: Vec<Vec<u8>> = naming.flat_map(|path| spellings(&path)).collect();
+    names.extend(naming);
+    has_any(&text, &names)
+}
+
+/// The base name of a file, as texts may spell it, in lower case.
+fn spellings(file: &Path) -> Vec<Vec<u8>> {
+    let name = file.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
+    let encoded: String =
+        name.bytes().map(|byte| if plain(byte) { char::from(byte).into() } else { format!("%{byte:02x}") }).collect();
+    // glTF is JSON, which may escape what is not ASCII.
+    let escaped = name.encode_utf16().map(|unit| match u8::try_from(unit) {
+        Ok(byte) if byte.is_ascii() => char::from(byte).to_string(),
+        _ => format!("\\u{unit:04x}"),
+    });
+    let escaped: String = escaped.collect();
+    [name.into_bytes(), encoded.into_bytes(), escaped.into_bytes()].into()
+}
+
+/// True if one of these, in lower case, is in a text.
+fn has_any(text: &[u8], names: &[Vec<u8>]) -> bool {
+    let text = text.to_ascii_lowercase();
+    names.iter().any(|name| !name.is_empty() && memchr::memmem::find(&text, name).is_some())
 }
 
 /// The files that differ from those of a commit, and those that git does not know, as absolute paths.

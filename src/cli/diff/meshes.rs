@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::DiffArgs;
+use super::{DiffArgs, Output, Outputs};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{Backends, GpuHost, HardwareHint};
 use crate::cli::bundle::{self, NamedFiles};
@@ -11,20 +11,20 @@ use crate::cli::progress::Progress;
 use crate::cli::render::format_in;
 use crate::cli::{files, siblings};
 use crate::config::{cores, why_no_gpu};
-use crate::diff::Compared;
+use crate::diff::{Compared, PICTURE_KEYS};
 use crate::import::Options;
-use crate::limits::{Budget, Deadline, Limits};
-use crate::pipeline::{self, Opened};
+use crate::limits::{Deadline, Limits};
+use crate::pipeline::{self, Opened, Side};
 use crate::request::{self, Rules};
-use crate::spec::BackendChoice;
+use crate::spec::{BackendChoice, Spec};
 
-/// Pixels of a picture, both sides together.
-const SIZE: &str = "1024x512";
+/// Pixels of each side, where it is a picture of its own.
+const SIZE: &str = "512x512";
 
 /// Compares two meshes and prints the difference. Returns whether they are the same.
 pub fn run(arguments: &DiffArgs, limits: &Limits) -> Result<bool, CliError> {
     let DiffArgs { a, b, .. } = arguments;
-    let output = super::output(arguments)?;
+    let outputs = Outputs::of(arguments)?;
     let progress = Progress::start("reading");
     let (named_a, named_b) = (read(arguments, a, limits)?, read(arguments, b, limits)?);
     progress.next("parsing");
@@ -37,10 +37,9 @@ pub fn run(arguments: &DiffArgs, limits: &Limits) -> Result<bool, CliError> {
     if have_same_bytes(&named_a, &named_b) {
         compared.difference.summary = vec!["the files are equal, byte for byte".to_owned()];
     }
-    if let Some((name, destination)) = output {
+    if !outputs.is_empty() {
         progress.next("drawing");
-        let image = draw([&opened_a, &opened_b], &compared, limits).map_err(about)?;
-        destination.write(name, &super::encode(name, &image)?)?;
+        write([&opened_a, &opened_b], &compared, &outputs, limits).map_err(about)?;
     }
     drop(progress);
     let text = match arguments.json {
@@ -76,18 +75,33 @@ fn have_same_bytes(a: &NamedFiles, b: &NamedFiles) -> bool {
     }
 }
 
-/// Both meshes side by side, through one camera.
-fn draw(opened: [&Opened; 2], compared: &Compared, limits: &Limits) -> Result<crate::image::Image, CliError> {
+/// Writes pictures, all through one camera.
+fn write(opened: [&Opened; 2], compared: &Compared, outputs: &Outputs<'_>, limits: &Limits) -> Result<(), CliError> {
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Cpu };
-    let keys = [("style", "smooth"), ("size", SIZE), ("light.ambient", "0.5")];
-    let keys = keys.map(|(key, value)| (key.to_owned(), value.to_owned()));
-    let spec = request::read(None, &keys, &rules).map_err(|error| CliError::ours(error.to_string()))?;
+    let spec = |keys: &[(&str, &str)]| {
+        let keys: Vec<_> = keys.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        request::read(None, &keys, &rules).map_err(|error| CliError::ours(error.to_string()))
+    };
+    let (heat, plain) = (spec(&PICTURE_KEYS)?, spec(&[("size", SIZE), ("backend", "cpu")])?);
+    let of_one = Spec { image: plain.image, ..heat.clone() };
     let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), None));
     let drawing = Arc::new(DrawingThreads::new(cores() as usize));
-    let image = drawing.install(|| {
+    drawing.install(|| {
         let mut backends = Backends::sharing(gpu.clone(), drawing.clone());
-        let (mut budget, deadline) = (Budget::new(limits), Deadline::default());
-        pipeline::draw_difference(opened, compared, &spec, &mut backends, &mut budget, &deadline)
-    })?;
-    Ok(image)
+        let mut draw = |sides: &[Side], spec: &Spec| {
+            let deadline = Deadline::default();
+            pipeline::draw_difference(opened, compared, sides, spec, &plain, &mut backends, &deadline)
+                .map(|drawn| drawn.image)
+                .map_err(CliError::from)
+        };
+        if let Some(Output { name, destination }) = &outputs.heat {
+            let image = draw(&[Side::HeatBefore, Side::HeatAfter], &heat)?;
+            destination.write(name, &super::encode(name, &image)?)?;
+        }
+        if outputs.has_sides() {
+            let [before, after] = [Side::Before, Side::After].map(|side| draw(&[side], &of_one));
+            outputs.write_sides([&before?, &after?], &draw(&[Side::HeatAfter], &of_one)?)?;
+        }
+        Ok(())
+    })
 }

@@ -7,7 +7,7 @@ use std::fs::{self, File};
 use std::io::Read as _;
 
 use clap::builder::PossibleValuesParser;
-use clap::{Args, ValueHint};
+use clap::{Args, ValueEnum, ValueHint};
 use image::ImageFormat;
 use serde::Serialize;
 
@@ -67,6 +67,19 @@ pub struct DiffArgs {
     /// Largest difference of a channel at which a pixel counts as the same, in steps of 255 [default: 0]
     #[arg(long, value_name = "E", value_parser = distance, allow_negative_numbers = true, value_hint = ValueHint::Other)]
     max_error: Option<f64>,
+    /// Largest mean difference of pictures that a person sees (FLIP), from 0 to 1; pixels then count only beside
+    /// --max-pixels
+    #[arg(long, value_name = "F", value_parser = share, allow_negative_numbers = true, value_hint = ValueHint::Other)]
+    max_flip: Option<f64>,
+    /// What the colours of `-o` show of two pictures
+    #[arg(long, value_name = "KIND", value_enum, default_value_t = Heat::Channels)]
+    heat: Heat,
+    /// Picture of both sides and their difference, beside each other
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    side_by_side: Option<String>,
+    /// Animated picture (PNG, WebP) that shows one side and then the other
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    blink: Option<String>,
     /// Read the files that a mesh refers to from its own folder, to compare materials and textures
     #[arg(long)]
     siblings: bool,
@@ -80,6 +93,22 @@ pub struct DiffArgs {
     format_in: Option<String>,
     #[command(flatten)]
     limits: LimitSettings,
+}
+
+/// The numbers that colours show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Heat {
+    /// The largest difference of a channel.
+    Channels,
+    /// The difference that a person sees.
+    Flip,
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("give a number from 0 to 1, such as 0.05".to_owned()),
+    }
 }
 
 fn distance(text: &str) -> Result<f64, String> {
@@ -104,8 +133,12 @@ pub fn run(arguments: &DiffArgs) -> Result<(), CliError> {
             pictures::run(arguments, [a, b], &limits)?
         }
         [None, None] => {
-            let has_other = arguments.max_pixels.is_some() || arguments.max_error.is_some();
-            refuse(has_other, "--max-pixels and --max-error are for pictures (PNG, WebP, JPEG), and these are none")?;
+            let has_other =
+                arguments.max_pixels.is_some() || arguments.max_error.is_some() || arguments.max_flip.is_some();
+            let sentence =
+                "--max-pixels, --max-error and --max-flip are for pictures (PNG, WebP, JPEG), and these are none";
+            refuse(has_other, sentence)?;
+            refuse(arguments.heat != Heat::Channels, "--heat is for pictures (PNG, WebP, JPEG), and these are none")?;
             meshes::run(arguments, &limits)?
         }
         [of_a, _] => {
@@ -130,15 +163,82 @@ fn picture_format(name: &str) -> Option<ImageFormat> {
     sniff(&head)
 }
 
-/// The picture to write, with its place.
-fn output(arguments: &DiffArgs) -> Result<Option<(&str, Destination)>, CliError> {
-    let Some(name) = arguments.output.as_deref() else { return Ok(None) };
-    if name == "-" {
-        return Err(CliError::usage("-o -: standard output has the difference; name a file"));
+/// A picture to write: its name and its place.
+struct Output<'a> {
+    name: &'a str,
+    destination: Destination,
+}
+
+/// The pictures to write.
+struct Outputs<'a> {
+    heat: Option<Output<'a>>,
+    side_by_side: Option<Output<'a>>,
+    blink: Option<Output<'a>>,
+}
+
+impl<'a> Outputs<'a> {
+    fn of(arguments: &'a DiffArgs) -> Result<Self, CliError> {
+        let inputs = Inputs::of([&arguments.a, &arguments.b].into_iter().map(String::as_str));
+        let output = |flag: &str, name: &'a Option<String>| -> Result<Option<Output<'a>>, CliError> {
+            let Some(name) = name.as_deref() else { return Ok(None) };
+            if name == "-" {
+                return Err(CliError::usage(format!("{flag} -: standard output has the difference; name a file")));
+            }
+            format_of(name)?;
+            Ok(Some(Output { name, destination: Destination::new(name, &inputs)? }))
+        };
+        let heat = output("-o", &arguments.output)?;
+        let side_by_side = output("--side-by-side", &arguments.side_by_side)?;
+        let blink = output("--blink", &arguments.blink)?;
+        if let Some(Output { name, .. }) = &blink
+            && format_of(name)? == crate::image::ImageFormat::Jpeg
+        {
+            return Err(CliError::usage(format!(
+                "--blink {name}: JPEG has no animations; name a .png or a .webp file"
+            )));
+        }
+        Ok(Self { heat, side_by_side, blink })
     }
-    format_of(name)?;
-    let inputs = Inputs::of([&arguments.a, &arguments.b].into_iter().map(String::as_str));
-    Ok(Some((name, Destination::new(name, &inputs)?)))
+
+    /// True if there is none.
+    fn is_empty(&self) -> bool {
+        self.heat.is_none() && self.side_by_side.is_none() && self.blink.is_none()
+    }
+
+    /// True if there is one of both sides as they look.
+    fn has_sides(&self) -> bool {
+        self.side_by_side.is_some() || self.blink.is_some()
+    }
+
+    /// Says of each that it is not written.
+    fn refuse(&self, why: &str) {
+        for Output { name, .. } in [&self.heat, &self.side_by_side, &self.blink].into_iter().flatten() {
+            say!("meshsnap: {name}: is not written: {why}");
+        }
+    }
+
+    /// Writes both sides, and both with their difference.
+    fn write_sides(&self, sides: [&Image; 2], difference: &Image) -> Result<(), CliError> {
+        if let Some(Output { name, destination }) = &self.side_by_side {
+            destination.write(name, &encode(name, &beside([sides[0], sides[1], difference]))?)?;
+        }
+        if let Some(Output { name, destination }) = &self.blink {
+            let frames = [sides[0].rgba.as_slice(), &sides[1].rgba].concat();
+            let frames = Image { width_px: sides[0].width_px, height_px: 2 * sides[0].height_px, rgba: frames };
+            let bytes = encode::encode_animation(&frames, 2, format_of(name)?, EFFORT, &Deadline::default());
+            destination.write(name, &bytes.map_err(|error| CliError::ours(error.to_string()))?)?;
+        }
+        Ok(())
+    }
+}
+
+/// Pictures of one size beside each other.
+fn beside<const N: usize>(images: [&Image; N]) -> Image {
+    let [Image { width_px, height_px, .. }, ..] = images[..] else { return images[0].clone() };
+    let bytes = *width_px as usize * 4;
+    let rows = 0..*height_px as usize;
+    let rgba = rows.flat_map(|row| images.map(|image| &image.rgba[row * bytes..][..bytes])).flatten().copied();
+    Image { width_px: width_px * N as u32, height_px: *height_px, rgba: rgba.collect() }
 }
 
 /// The format that a file's extension names.

@@ -2,7 +2,7 @@
 
 use image::ImageFormat;
 
-use super::{DiffArgs, encode};
+use super::{DiffArgs, Heat, Output, Outputs, encode};
 use crate::cli::error::CliError;
 use crate::cli::files;
 use crate::diff::pictures::{self, Picture, Tolerance};
@@ -16,13 +16,23 @@ pub fn run(arguments: &DiffArgs, formats: [ImageFormat; 2], limits: &Limits) -> 
         Picture::read(&bytes, format, limits).map_err(|error| CliError::input(format!("{name}: {error}")))
     };
     let (a, b) = (read(a, formats[0])?, read(b, formats[1])?);
-    let tolerance =
-        Tolerance { pixels: arguments.max_pixels.unwrap_or_default(), error: arguments.max_error.unwrap_or_default() };
+    let DiffArgs { max_pixels: pixels, max_flip: flip, .. } = *arguments;
+    let tolerance = Tolerance { pixels, error: arguments.max_error.unwrap_or_default(), flip };
+    let outputs = Outputs::of(arguments)?;
     let difference = pictures::compare(&a, &b, tolerance);
-    if let Some((name, destination)) = super::output(arguments)? {
-        match pictures::heat(&a, &b, tolerance) {
-            Some(heat) => destination.write(name, &encode(name, &heat)?)?,
-            None => say!("meshsnap: {name}: is not written: the pictures have different sizes"),
+    if !outputs.is_empty() {
+        let heat = match arguments.heat {
+            Heat::Channels => pictures::heat(&a, &b, tolerance),
+            Heat::Flip => pictures::flip_heat(&a, &b),
+        };
+        match heat {
+            Some(heat) => {
+                if let Some(Output { name, destination }) = &outputs.heat {
+                    destination.write(name, &encode(name, &heat)?)?;
+                }
+                outputs.write_sides([&a.image(), &b.image()], &heat)?;
+            }
+            None => outputs.refuse("the pictures have different sizes"),
         }
     }
     let text = match arguments.json {

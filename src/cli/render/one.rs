@@ -99,7 +99,11 @@ impl Drawing<'_> {
     }
 
     fn beside(&self, names: &[String]) -> Result<Vec<String>, CliError> {
-        let options = Options { format: format_in(self.arguments.format_in.as_deref()), time_s: self.spec.time_s };
+        let options = Options {
+            format: format_in(self.arguments.format_in.as_deref()),
+            time_s: self.spec.time_s,
+            ..Options::default()
+        };
         siblings::all_beside(names, self.arguments.entry.as_deref(), options, &self.limits)
     }
 

@@ -58,6 +58,7 @@ struct Read {
     images: Vec<(String, Image)>,
     up: u8,
     file_vertices: u64,
+    loose_vertices: Option<u64>,
     polygons_by_arity: [u64; 13],
     /// Dropped faces and lines, in the order of [`ImportReport`].
     dropped: [u64; 4],
@@ -177,7 +178,14 @@ fn read_there(head: &Head, bytes: &[u8]) -> Result<Read, MeshError> {
     let bundle = Bundle::default().given_by(origin).watched_by(&file_use);
     let folder = Folder::new(files, entry).of_bundle(&bundle);
     let deadline = Deadline::default();
-    let mut cx = Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
+    let mut cx = Context {
+        limits: &limits,
+        budget: &mut budget,
+        deadline: &deadline,
+        bundle: &folder,
+        time_s: None,
+        counts_loose: false,
+    };
     let raw = scene::read(bytes, &mut cx)?;
     let missing = file_use.missing().into_iter().map(|Missing { folder, name }| (folder, name)).collect();
     Ok(Read { spent_bytes: budget.spent_bytes(), missing, ..Read::of(raw) })
@@ -229,6 +237,7 @@ impl Read {
             images: raw.images.into_iter().map(image).collect(),
             up: place(AXES, &raw.up),
             file_vertices: raw.report.file_vertices,
+            loose_vertices: raw.report.loose_vertices,
             polygons_by_arity: raw.report.polygons_by_arity,
             dropped: [
                 raw.report.dropped_nonfinite_faces,
@@ -297,6 +306,7 @@ impl Read {
         let report = ImportReport {
             format: Format::Fbx,
             file_vertices: self.file_vertices,
+            loose_vertices: self.loose_vertices,
             polygons_by_arity: self.polygons_by_arity,
             dropped_nonfinite_faces,
             dropped_degenerate_faces,
@@ -453,8 +463,14 @@ mod tests {
         let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
         let files = vec![BundleFile { path: "a.fbx".into(), bytes: file.to_vec().into() }];
         let folder = Folder::new(files, 0);
-        let mut cx =
-            Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
+        let mut cx = Context {
+            limits: &limits,
+            budget: &mut budget,
+            deadline: &deadline,
+            bundle: &folder,
+            time_s: None,
+            counts_loose: false,
+        };
         let raw = read(file, &Changed(Box::new(change)), &mut cx)?;
         normalise(raw, &mut cx).map(|imported| imported.mesh.triangles.len())
     }

@@ -33,6 +33,7 @@ use crate::import::context::Context;
 use crate::import::gltf::data::accessor::Reader;
 use crate::mesh::MaterialSlot;
 use crate::warning::Warning;
+use rapidhash::RapidHashMap;
 use std::rc::Rc;
 
 /// True if the bytes begin as a GLB container.
@@ -76,6 +77,7 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
         of_mesh: vec![None; doc.meshes.len()],
         uses_default_material: false,
         instances: vec![0; doc.meshes.len()],
+        used: RapidHashMap::default(),
     };
     for instance in &scene.instances {
         if let Some(count) = meshes.instances.get_mut(instance.mesh) {
@@ -84,6 +86,10 @@ pub fn read(bytes: &[u8], cx: &mut Context<'_>) -> Result<RawMesh, MeshError> {
     }
     for instance in &scene.instances {
         meshes.show(instance, &mut raw, cx)?;
+    }
+    if cx.counts_loose {
+        let loose = meshes.used.values().flatten().filter(|is_used| !**is_used).count();
+        raw.report.loose_vertices = Some(loose as u64);
     }
     raw.is_f32 = true;
     let uses_default = meshes.uses_default_material;
@@ -108,6 +114,9 @@ struct Meshes<'a> {
     uses_default_material: bool,
     /// Number of instances of each mesh.
     instances: Vec<u32>,
+    /// By accessor of positions, where unused vertices are counted: the vertices that a primitive uses. Several
+    /// primitives may share an accessor.
+    used: RapidHashMap<usize, Vec<bool>>,
 }
 
 impl Meshes<'_> {
@@ -186,7 +195,15 @@ impl Meshes<'_> {
                 has_ngons: ngons_are_used && primitive.extensions.ngons.is_some(),
                 has_skins: !self.doc.skins.is_empty(),
             };
-            primitives.extend(Primitive::read(&source, &mut self.reader, &mut self.materials, warnings, cx)?);
+            let read = Primitive::read(&source, &mut self.reader, &mut self.materials, warnings, cx)?;
+            if let Some(read) = &read
+                && let Some(accessor) = primitive.attributes.get("POSITION").filter(|_| cx.counts_loose)
+            {
+                let is_used = self.used.entry(accessor.0).or_default();
+                cx.budget.spend("glTF vertices", read.positions.len().saturating_sub(is_used.len()) as u64, 1)?;
+                read.mark_used(is_used);
+            }
+            primitives.extend(read);
         }
         let primitives = Rc::new(primitives);
         self.of_mesh[mesh] = Some(Rc::clone(&primitives));

@@ -58,7 +58,14 @@ fn finish(raw: RawMesh) -> Imported {
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let (folder, _) =
         entry::choose(Bundle::of_one("x").into_files(), &Bundle::default(), Some(Format::Obj), &deadline).unwrap();
-    let mut cx = Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
+    let mut cx = Context {
+        limits: &limits,
+        budget: &mut budget,
+        deadline: &deadline,
+        bundle: &folder,
+        time_s: None,
+        counts_loose: false,
+    };
     normalise(raw, &mut cx).unwrap()
 }
 
@@ -71,7 +78,7 @@ fn soups_and_indices_agree_on_any_number_of_threads() {
         for threads in [1, 4] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             for is_soup in [false, true] {
-                let Imported { mesh, report } = pool.install(|| finish(raw(&corners, is_soup)));
+                let Imported { mesh, report, .. } = pool.install(|| finish(raw(&corners, is_soup)));
                 let all = format!("{mesh:?} {report:?}");
                 assert!(all == *first.get_or_insert(all.clone()), "{side} {odd}: {threads} threads, soup: {is_soup}");
                 let left = mesh.triangles.len() as u64;
@@ -93,7 +100,7 @@ fn what_no_face_uses_changes_nothing() {
         raw.positions.iter_mut().flatten().for_each(|c| *c *= 0.1);
         raw.colors.clear();
         raw.positions.extend(unused);
-        let Imported { mesh, report } = finish(raw);
+        let Imported { mesh, report, .. } = finish(raw);
         format!("{mesh:?} {report:?}")
     };
     let plain = mesh(&[]);

@@ -22,7 +22,14 @@ fn try_read(text: &str, part_bytes: usize, is_quick: bool) -> Result<(Summary, R
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let files = Bundle::of_one(text.as_bytes().to_vec()).into_files();
     let (folder, _) = entry::choose(files, &Bundle::default(), Some(Format::Obj), &deadline).unwrap();
-    let mut cx = Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
+    let mut cx = Context {
+        limits: &limits,
+        budget: &mut budget,
+        deadline: &deadline,
+        bundle: &folder,
+        time_s: None,
+        counts_loose: false,
+    };
     let mut raw = RawMesh::default();
     let summary = read_text(text.as_bytes(), part_bytes, is_quick, &mut raw, &mut cx)?;
     Ok((summary, raw))

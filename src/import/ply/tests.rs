@@ -33,7 +33,14 @@ fn outcome(bytes: &[u8]) -> String {
     let (mut budget, deadline) = (Budget::new(&limits), Deadline::default());
     let files = Bundle::of_one(bytes.to_vec()).into_files();
     let (folder, _) = entry::choose(files, &Bundle::default(), Some(Format::Ply), &deadline).unwrap();
-    let mut cx = Context { limits: &limits, budget: &mut budget, deadline: &deadline, bundle: &folder, time_s: None };
+    let mut cx = Context {
+        limits: &limits,
+        budget: &mut budget,
+        deadline: &deadline,
+        bundle: &folder,
+        time_s: None,
+        counts_loose: false,
+    };
     match read(bytes, &mut cx) {
         Ok(raw) => format!("{raw:?}"),
         Err(error) => error.detail.split_once(": ").map_or(error.detail.clone(), |(_, what)| what.to_owned()),

@@ -10,7 +10,7 @@ fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Mesh {
 #[track_caller]
 fn found(mesh: &Mesh) -> (Vec<u32>, Option<u64>) {
     let (budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
-    let faces = self_intersections(mesh, &budget, &deadline).unwrap();
+    let faces = self_intersections(mesh, &budget, &deadline).unwrap().unwrap();
     (faces, t_junctions(mesh, &budget, &deadline).unwrap())
 }
 
@@ -98,4 +98,94 @@ fn it_stops_and_it_is_refused() {
     assert!(matches!(self_intersections(&pile, &small, &Deadline::default()), Err(Exhausted::Limit(_))));
     assert!(matches!(t_junctions(&pile, &small, &Deadline::default()), Err(Exhausted::Limit(_))));
     assert_eq!(found(&Mesh::default()), (vec![], Some(0)));
+}
+
+/// Faces around one vertex: a wheel whose rim is a zigzag, so that no two of them lie in one plane.
+fn wheel(spokes: u32) -> Mesh {
+    let mut wheel = mesh(&[[0.0; 3]], &[]);
+    for i in 0..spokes {
+        let angle = f64::from(i) / f64::from(spokes) * std::f64::consts::TAU;
+        let height = if i % 2 == 0 { 0.01 } else { -0.01 };
+        wheel.positions.push([(0.5 * libm::cos(angle)) as f32, (0.5 * libm::sin(angle)) as f32, height]);
+        wheel.triangles.push([0, 1 + i, 1 + (i + 1) % spokes]);
+    }
+    wheel
+}
+
+#[test]
+fn a_fan_of_many_faces_takes_time_by_their_number() {
+    let (budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
+    let mut wheel = wheel(100_000);
+    let tree = Tree::of(&wheel, &mut budget.clone(), &deadline).unwrap();
+    let fans = Fans::of(&wheel, &tree, &mut budget.clone(), &deadline).unwrap();
+    assert_eq!((fans.trees.len(), fans.trees[0].len()), (1, 100_000));
+    let pairs = |search: Search<'_>| search.estimate().unwrap() / 100_000.0;
+    let around = pairs(Search { mesh: &wheel, tree: &tree, fans: Some(&fans), deadline: &deadline });
+    let of_fan = pairs(Search { mesh: &wheel, tree: &fans.trees[0], fans: None, deadline: &deadline });
+    assert!(around < 1.0 && of_fan < 32.0, "{around} and {of_fan} pairs for each face");
+    assert!(found(&wheel).0.is_empty());
+    // A face of the same fan that lies across some of the others, and one beside the fan that cuts through it.
+    let across = 100_000;
+    wheel.triangles.push([0, 1, 1 + 11]);
+    let last = wheel.positions.len() as u32;
+    wheel.positions.extend([[-0.3, 0.0, 0.1], [-0.3, 0.001, 0.1], [-0.3, 0.0, -0.1]]);
+    wheel.triangles.push([last, last + 1, last + 2]);
+    let faces = found(&wheel).0;
+    assert!(faces.ends_with(&[across, across + 1]), "{faces:?}");
+    assert!(faces.contains(&5) && faces.iter().any(|face| face.abs_diff(50_000) < 100), "{faces:?}");
+    assert!(faces.len() < 200, "{}", faces.len());
+}
+
+#[test]
+fn fans_have_the_intersections_that_are_found_without_them() {
+    let (budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
+    let mut random = 0x2545_f491_4f6c_dd1d_u64;
+    let mut number = |range: u32| {
+        random ^= random << 13;
+        random ^= random >> 7;
+        random ^= random << 17;
+        (random >> 33) as u32 % range
+    };
+    let (mut met, mut fans_met) = (0, 0);
+    for _ in 0..60 {
+        // Few places, so that much lies in one plane or on one line; and a hub with faces for a fan.
+        let points = 24;
+        let mut one = Mesh::default();
+        for _ in 0..points {
+            one.positions.push([0; 3].map(|_| number(9) as f32 / 16.0 - 0.25));
+        }
+        for i in 0..110 {
+            let hub = if i < 90 { 0 } else { number(points) };
+            one.triangles.push([hub, number(points), number(points)]);
+        }
+        let mut expected = vec![false; one.triangles.len()];
+        let tree = Tree::of(&one, &mut budget.clone(), &deadline).unwrap();
+        fans_met += Fans::of(&one, &tree, &mut budget.clone(), &deadline).unwrap().trees.len();
+        let position = |vertex: u32| one.positions[vertex as usize].map(f64::from);
+        let with_area = |face: usize| pair::has_area(one.triangles[face].map(position));
+        for a in (0..one.triangles.len()).filter(|face| with_area(*face)) {
+            for b in (0..a).filter(|face| with_area(*face)) {
+                if pair::intersect(one.triangles[a], one.triangles[b], false, position) {
+                    (expected[a], expected[b]) = (true, true);
+                    met += 1;
+                }
+            }
+        }
+        let expected: Vec<u32> = (0..expected.len() as u32).filter(|face| expected[*face as usize]).collect();
+        assert_eq!(found(&one).0, expected);
+    }
+    assert!(met > 1000 && fans_met >= 30, "{met} pairs, {fans_met} fans");
+}
+
+#[test]
+fn pages_of_one_book_are_not_compared_for_ever() {
+    // Faces with a common edge: every pair has boxes and directions in common.
+    let mut book = mesh(&[[0.0, 0.0, -0.25], [0.0, 0.0, 0.25]], &[]);
+    for i in 0..30_000_u32 {
+        let angle = f64::from(i) / 30_000.0 * std::f64::consts::TAU;
+        book.positions.push([(0.5 * libm::cos(angle)) as f32, (0.5 * libm::sin(angle)) as f32, 0.0]);
+        book.triangles.push([0, 1, 2 + i]);
+    }
+    let (budget, deadline) = (Budget::new(&Limits::default()), Deadline::default());
+    assert!(self_intersections(&book, &budget, &deadline).unwrap().is_none());
 }

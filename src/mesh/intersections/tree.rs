@@ -46,6 +46,16 @@ impl Aabb {
         points.into_iter().fold(Self::default(), |around, p| around.union(&Self { low: p, high: p }))
     }
 
+    /// The box with these limits.
+    pub fn between(low: [f32; 3], high: [f32; 3]) -> Self {
+        Self { low, high }
+    }
+
+    /// A box that overlaps every other.
+    pub fn everything() -> Self {
+        Self { low: [f32::NEG_INFINITY; 3], high: [f32::INFINITY; 3] }
+    }
+
     /// The points that both have.
     pub fn overlap(&self, other: &Self) -> Self {
         let low = std::array::from_fn(|k| self.low[k].max(other.low[k]));
@@ -84,13 +94,22 @@ impl Tree {
     /// The tree of the faces that have an area.
     pub fn of(mesh: &Mesh, budget: &mut Budget, deadline: &Deadline) -> Result<Self, Exhausted> {
         budget.spend("the tree of faces", mesh.triangles.len() as u64, BYTES_PER_FACE)?;
-        let mut keyed = keys(mesh);
-        deadline.check()?;
-        keyed.par_sort_unstable();
-        deadline.check()?;
-        let faces = map_items(&keyed, |&(_, face)| face);
-        drop(keyed);
+        let faces = in_order(keys(mesh), deadline)?;
         let boxes = map_items(&faces, |&face| Aabb::of(corners(mesh, face)));
+        Self::above(faces, boxes, deadline)
+    }
+
+    /// The tree of faces with boxes of their own, which lie in the unit box.
+    pub fn of_boxes(boxed: Vec<(u32, Aabb)>, budget: &mut Budget, deadline: &Deadline) -> Result<Self, Exhausted> {
+        budget.spend("the tree of faces", boxed.len() as u64, BYTES_PER_FACE)?;
+        let order =
+            in_order(boxed.iter().zip(0..).map(|((_, around), index)| (key(around), index)).collect(), deadline)?;
+        let (faces, boxes) = order.into_iter().map(|index| boxed[index as usize]).unzip();
+        Self::above(faces, boxes, deadline)
+    }
+
+    /// The tree above faces in the order of the curve.
+    fn above(faces: Vec<u32>, boxes: Vec<Aabb>, deadline: &Deadline) -> Result<Self, Exhausted> {
         let leaves = faces.len().div_ceil(LEAF).next_power_of_two();
         let mut nodes = vec![Aabb::default(); 2 * leaves];
         for (node, boxes) in nodes[leaves..].iter_mut().zip(boxes.chunks(LEAF)) {
@@ -136,6 +155,22 @@ impl Tree {
         nodes
     }
 
+    /// By node: the value that all places under it have; `none` where there are several.
+    pub fn common_value(&self, values: &[u32], none: u32) -> Vec<u32> {
+        let common = |one: Option<u32>, other: Option<u32>| match (one, other) {
+            (None, value) | (value, None) => value,
+            (Some(one), Some(other)) => Some(if one == other { one } else { none }),
+        };
+        let mut nodes: Vec<Option<u32>> = vec![None; 2 * self.leaves];
+        for (node, values) in nodes[self.leaves..].iter_mut().zip(values.chunks(LEAF)) {
+            *node = values.iter().fold(None, |all, value| common(all, Some(*value)));
+        }
+        for node in (1..self.leaves).rev() {
+            nodes[node] = common(nodes[2 * node], nodes[2 * node + 1]);
+        }
+        nodes.into_iter().map(|value| value.unwrap_or(none)).collect()
+    }
+
     /// Calls `each` with the places of the faces whose boxes overlap a box, until it breaks. Passes
     /// over nodes that are not wanted.
     pub fn visit<B>(
@@ -169,6 +204,14 @@ impl Tree {
         }
         None
     }
+}
+
+/// The second numbers of some pairs, in the order of the first ones.
+fn in_order(mut keyed: Vec<(u64, u32)>, deadline: &Deadline) -> Result<Vec<u32>, Exhausted> {
+    deadline.check()?;
+    keyed.par_sort_unstable();
+    deadline.check()?;
+    Ok(map_items(&keyed, |&(_, number)| number))
 }
 
 fn corners(mesh: &Mesh, face: u32) -> [[f32; 3]; 3] {

@@ -21,7 +21,7 @@ pub use log::{Log, RedbLog};
 pub use record::{
     Change, ClaimRecord, EndRecord, ErrorRecord, FileRecord, JobKey, JobRecord, MeshRecord, PictureRecord,
 };
-pub use record::{RequestRecord, SelectionRecord, WarningRecord};
+pub use record::{RequestKind, RequestRecord, SelectionRecord, SideRecord, WarningRecord};
 
 use std::collections::{HashMap, HashSet};
 use std::io;

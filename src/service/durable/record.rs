@@ -61,9 +61,24 @@ pub struct JobRecord {
     /// The name of the stored mesh that is drawn.
     #[serde(with = "optional_digest", default)]
     pub mesh: Option<Digest>,
+    /// The newer one of two meshes that are compared.
+    #[serde(default)]
+    pub newer: Option<SideRecord>,
     /// The name that the client gave the request.
     #[serde(default)]
     pub claim: Option<ClaimRecord>,
+}
+
+/// One of two meshes that are compared.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SideRecord {
+    /// Its files.
+    pub files: Vec<FileRecord>,
+    /// True if they are an archive that is not yet unpacked.
+    pub is_zip: bool,
+    /// Its name, if it is stored.
+    #[serde(with = "optional_digest", default)]
+    pub mesh: Option<Digest>,
 }
 
 /// The name of a request.
@@ -76,7 +91,7 @@ pub struct ClaimRecord {
     pub request: Digest,
 }
 
-/// A request for a picture, as it was sent.
+/// A request, as it was sent.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RequestRecord {
     /// The bytes of the document.
@@ -88,6 +103,25 @@ pub struct RequestRecord {
     pub overrides: Vec<(String, String)>,
     /// The picture's format, as it was negotiated.
     pub format: String,
+    /// The work that is asked for.
+    #[serde(default)]
+    pub kind: RequestKind,
+    /// The name of the upload that a verdict is on.
+    #[serde(with = "optional_digest", default)]
+    pub upload: Option<Digest>,
+}
+
+/// The work that a request asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RequestKind {
+    /// A picture.
+    #[default]
+    Draw,
+    /// A verdict on a mesh.
+    Check,
+    /// The difference between two meshes.
+    Diff,
 }
 
 /// A file of a mesh.
@@ -122,8 +156,11 @@ pub struct PictureRecord {
     /// Its bytes.
     #[serde(with = "digest")]
     pub digest: Digest,
-    /// Its format.
+    /// Its format; `json` for a verdict.
     pub format: String,
+    /// True for a verdict that is to be answered with 422.
+    #[serde(default)]
+    pub has_failed: bool,
     /// The back-end that drew it.
     pub backend: String,
     /// True if the CPU drew it in place of a GPU.

@@ -144,7 +144,14 @@ impl StorageBackend for Disk {
 }
 
 fn job(key: JobKey, file: &[u8]) -> JobRecord {
-    let request = RequestRecord { document: None, names_mesh: false, overrides: Vec::new(), format: "png".into() };
+    let request = RequestRecord {
+        document: None,
+        names_mesh: false,
+        overrides: Vec::new(),
+        format: "png".into(),
+        kind: RequestKind::Draw,
+        upload: None,
+    };
     let files = vec![FileRecord { path: "mesh".into(), digest: Digest::of(file) }];
     JobRecord {
         key,
@@ -157,6 +164,7 @@ fn job(key: JobKey, file: &[u8]) -> JobRecord {
         owner: String::new(),
         request_id: String::new(),
         mesh: None,
+        newer: None,
         claim: None,
     }
 }

@@ -103,6 +103,10 @@ pub fn record_of(error: ApiError) -> ErrorRecord {
     ErrorRecord { fault: fault.to_owned(), code: error.code.to_owned(), detail: error.detail, flag }
 }
 
+/// Marks an answer with the status of an error whose body is what was asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct IsAnswer;
+
 /// An error as a client sees it.
 #[derive(Clone, Debug)]
 pub struct ApiError {

@@ -7,9 +7,14 @@ use axum::http::{HeaderMap, header};
 use super::dto::media_type;
 use super::error::{ApiError, Fault};
 use crate::image::ImageFormat;
+use crate::service::jobs::Media;
 
-/// The formats, best first: of those that a client accepts equally, the first is taken.
-const FORMATS: [ImageFormat; 3] = [ImageFormat::Png, ImageFormat::Webp, ImageFormat::Jpeg];
+/// The forms of pictures, best first: of those that a client accepts equally, the first is taken.
+const PICTURES: [Media; 3] =
+    [Media::Picture(ImageFormat::Png), Media::Picture(ImageFormat::Webp), Media::Picture(ImageFormat::Jpeg)];
+
+/// JSON, and then the forms of pictures.
+const ALL: [Media; 4] = [Media::Json, PICTURES[0], PICTURES[1], PICTURES[2]];
 
 /// Longest wait that a client can set: proxies often end a request after a minute.
 const WAIT_S_MAX: u64 = 60;
@@ -19,22 +24,44 @@ pub fn image_format(requested: Option<ImageFormat>, headers: &HeaderMap) -> Resu
     if let Some(format) = requested {
         return Ok(format);
     }
+    best(&PICTURES, headers)
+        .map(|media| picture_format(media).unwrap_or(ImageFormat::Png))
+        .ok_or_else(|| not_acceptable("the Accept header allows none of image/png, image/webp and image/jpeg"))
+}
+
+/// JSON (None), or else a picture of the format that the client likes better.
+pub fn json_or_image(headers: &HeaderMap) -> Result<Option<ImageFormat>, ApiError> {
+    best(&ALL, headers).map(picture_format).ok_or_else(|| {
+        not_acceptable("the Accept header allows none of application/json, image/png, image/webp and image/jpeg")
+    })
+}
+
+fn picture_format(media: Media) -> Option<ImageFormat> {
+    match media {
+        Media::Picture(format) => Some(format),
+        Media::Json => None,
+    }
+}
+
+fn not_acceptable(detail: &str) -> ApiError {
+    ApiError::new(Fault::NotAcceptable, "not_acceptable", detail).header(header::VARY, "accept")
+}
+
+/// The form that a client accepts best. None if it accepts none.
+fn best(forms: &[Media], headers: &HeaderMap) -> Option<Media> {
     let accept: Vec<&str> = headers.get_all(header::ACCEPT).iter().filter_map(|v| v.to_str().ok()).collect();
     if accept.iter().all(|line| line.trim().is_empty()) {
-        return Ok(ImageFormat::Png);
+        return forms.first().copied();
     }
     let ranges: Vec<(&str, f32)> = accept.iter().flat_map(|line| line.split(',')).filter_map(range).collect();
-    let mut best: Option<(ImageFormat, (f32, u8))> = None;
-    for format in FORMATS {
-        let score = quality(media_type(format), &ranges);
+    let mut best: Option<(Media, (f32, u8))> = None;
+    for &form in forms {
+        let score = quality(media_type(form), &ranges);
         if score.0 > 0.0 && best.is_none_or(|(_, best)| score > best) {
-            best = Some((format, score));
+            best = Some((form, score));
         }
     }
-    best.map(|(format, _)| format).ok_or_else(|| {
-        let detail = "the Accept header allows none of image/png, image/webp and image/jpeg";
-        ApiError::new(Fault::NotAcceptable, "not_acceptable", detail).header(header::VARY, "accept")
-    })
+    best.map(|(form, _)| form)
 }
 
 /// A media range and its quality. None if it is malformed.
@@ -51,12 +78,16 @@ fn range(text: &str) -> Option<(&str, f32)> {
 fn quality(media_type: &str, ranges: &[(&str, f32)]) -> (f32, u8) {
     let specificity = |name: &str| match name {
         _ if name.eq_ignore_ascii_case(media_type) => Some(2),
-        _ if name.eq_ignore_ascii_case("image/*") => Some(1),
+        _ if name.strip_suffix("/*").is_some_and(|kind| is_of_kind(media_type, kind)) => Some(1),
         "*/*" => Some(0),
         _ => None,
     };
     let matching = ranges.iter().filter_map(|&(name, q)| specificity(name).map(|s| (s, q)));
     matching.max_by_key(|&(s, _)| s).map_or((0.0, 0), |(s, q)| (q, s))
+}
+
+fn is_of_kind(media_type: &str, kind: &str) -> bool {
+    media_type.split('/').next().is_some_and(|own| own.eq_ignore_ascii_case(kind))
 }
 
 /// The preferences in `Prefer`.

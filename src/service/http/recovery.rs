@@ -4,13 +4,18 @@
 use std::sync::Arc;
 
 use super::error::{ApiError, record_of};
+use super::receive::keys::Keys;
+use super::receive::{check, diff};
 use super::state::AppState;
 use super::stored_mesh;
 use crate::import::{Bundle, BundleFile, Format};
 use crate::request;
-use crate::service::durable::{ClaimRecord, FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob};
+use crate::service::durable::{
+    ClaimRecord, FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob, RequestKind,
+};
 use crate::service::jobs::{
-    Claim, ClaimName, Failure, JobId, JobState, Named, Owner, Recipe, Restored, Task, Work, read_picture, value_of,
+    Claim, ClaimName, Failure, JSON, JobId, JobState, Named, Newer, Owner, Recipe, Restored, Task, Work, read_picture,
+    value_of,
 };
 use crate::service::store::{NewMesh, Reading};
 
@@ -106,7 +111,18 @@ fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Resul
         }
         None => None,
     };
-    let task = task(state, record, document.as_deref())?;
+    let newer = match &record.newer {
+        Some(side) => {
+            let (files, own) = self::files(recovered, &side.files).ok_or(Failure::Lost)?;
+            let bundle = Bundle::restored(files, side.is_zip, record.entry.clone());
+            let mut memory = state.upload_budget.reserve();
+            memory.take(bundle.bytes_len());
+            holds.extend(own.iter().cloned());
+            Some(Newer { bundle, memory: Arc::new(memory), holds: own.into(), mesh: side.mesh })
+        }
+        None => None,
+    };
+    let task = task(state, record, document.as_deref(), newer)?;
     let recipe = Recipe { document, overrides: record.request.overrides.clone().into(), mesh: record.mesh };
     let bundle = Bundle::restored(files, record.is_zip, record.entry.clone());
     let mut memory = state.upload_budget.reserve();
@@ -130,13 +146,26 @@ fn claim(state: &AppState, record: &JobRecord) -> Option<Arc<Claim>> {
 }
 
 /// The request is read again, under the limits of this process.
-fn task(state: &AppState, record: &JobRecord, document: Option<&[u8]>) -> Result<Task, Failure> {
+fn task(state: &AppState, record: &JobRecord, document: Option<&[u8]>, newer: Option<Newer>) -> Result<Task, Failure> {
     let (overrides, rules) = (&record.request.overrides, &state.rules);
+    let recorded = |error| Failure::Recorded(record_of(error));
+    match record.request.kind {
+        RequestKind::Draw => {}
+        RequestKind::Check => {
+            let digest = record.request.upload.ok_or(Failure::Lost)?;
+            return check::task(&Keys::stored(overrides), digest).map_err(recorded);
+        }
+        RequestKind::Diff => {
+            let format = (record.request.format != JSON).then(|| value_of(&record.request.format).ok_or(Failure::Lost));
+            let answer = diff::Answer::of(state, &Keys::stored(overrides), format.transpose()?).map_err(recorded)?;
+            return Ok(answer.task(newer.ok_or(Failure::Lost)?));
+        }
+    }
     let read = match document.filter(|_| record.request.names_mesh) {
         Some(document) => request::read_with_mesh(document, overrides, rules).map(|(_, spec)| spec),
         None => request::read(document, overrides, rules),
     };
-    let mut spec = read.map_err(|error| Failure::Recorded(record_of(ApiError::from(error))))?;
+    let mut spec = read.map_err(|error| recorded(ApiError::from(error)))?;
     request::set_format(&mut spec, value_of(&record.request.format).ok_or(Failure::Lost)?);
     Ok(Task::Draw(Box::new(spec)))
 }

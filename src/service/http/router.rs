@@ -10,6 +10,7 @@ use axum::routing::{MethodRouter, get, post};
 
 use super::error::ApiError;
 use super::middleware::{auth, cors, observe, rates, site};
+use super::resources::verdicts::{check, diff};
 use super::resources::{events, front_page, health, jobs, meshes, metrics, pictures, render, schema};
 use super::state::AppState;
 
@@ -48,9 +49,11 @@ pub fn router(state: &Arc<AppState>) -> Router {
 }
 
 /// The routes that need an API key where keys are configured.
-fn protected_routes() -> [(&'static str, MethodRouter<Arc<AppState>>); 10] {
+fn protected_routes() -> [(&'static str, MethodRouter<Arc<AppState>>); 12] {
     [
         ("/v1/render", post(render::post)),
+        ("/v1/check", post(check::post)),
+        ("/v1/diff", post(diff::post)),
         ("/v1/meshes", post(meshes::post)),
         ("/v1/meshes/{sha256}", get(meshes::get).put(meshes::put).delete(meshes::delete)),
         // The last segment is `render.png` and so on: the router matches whole segments only.

@@ -41,7 +41,7 @@ const MESHES: usize = 4096;
 
 /// Numbers of kinds of tasks, and of kinds of jobs: each task on the CPU or on any back-end, of a mesh that
 /// is to be read or of one that was drawn before.
-const TASKS: usize = 4;
+const TASKS: usize = 6;
 const KINDS: usize = 4 * TASKS;
 
 /// Factors between the durations of jobs and the formula.
@@ -64,13 +64,15 @@ impl Estimates {
     pub fn size(&self, work: &Work) -> Size {
         let (samples, views) = match &work.task {
             Task::Draw(spec) => drawn(spec),
-            Task::Inspect { .. } => (0.0, 1),
+            Task::Inspect { .. } | Task::Check(_) => (0.0, 1),
+            Task::Diff(comparing) => (comparing.picture.as_ref().map_or(0.0, |spec| drawn(spec).0), 2),
         };
         let kind = kind(&work.task);
         // What a mesh takes in one view says little about its sheets.
         let mesh = work.mesh_key.as_ref().map(|key| self.hasher.hash_one((kind, key, views)));
         let is_known = mesh.is_some_and(|mesh| self.meshes.get(&mesh).is_some());
-        let bytes = if is_known { 0 } else { work.bundle.bytes_len() };
+        let newer = if let Task::Diff(comparing) = &work.task { comparing.newer.bundle.bytes_len() } else { 0 };
+        let bytes = if is_known { 0 } else { work.bundle.bytes_len() + newer };
         let formula_ns = f64::from(views) * JOB_NS
             + BYTE_NS * bytes as f64 * (1.0 + VIEW_SHARE * f64::from(views - 1))
             + SAMPLE_NS * samples;
@@ -123,7 +125,12 @@ fn drawn(spec: &Spec) -> (f64, u32) {
 
 /// The number of the kind of a task.
 fn kind(task: &Task) -> usize {
-    let Task::Draw(spec) = task else { return 0 };
+    let spec = match task {
+        Task::Inspect { .. } => return 0,
+        Task::Check(_) => return 4,
+        Task::Diff(_) => return 5,
+        Task::Draw(spec) => spec,
+    };
     let Spec { layers, materials, topology, .. } = &**spec;
     let mut all = materials.iter().map(|(_, layers)| layers).chain([layers]);
     let task = if all.clone().any(|layers| layers.wire.is_some()) || topology.is_some() {

@@ -13,6 +13,7 @@ use super::class::{Class, Owner};
 use super::progress::Progress;
 use super::upload_budget::Reservation;
 use crate::backend::{BackendKind, DrawTimes};
+use crate::check::RuleSet;
 use crate::image::ImageFormat;
 use crate::import::{Bundle, Format};
 use crate::limits::Deadline;
@@ -95,11 +96,52 @@ pub struct Recipe {
 pub enum Task {
     /// Draw a picture.
     Draw(Box<Spec>),
+    /// Judge it by rules.
+    Check(Box<Checking>),
+    /// Compare it with a newer one.
+    Diff(Box<Comparing>),
     /// Write a report on its content.
     Inspect {
         /// The time within its animation, as in [`Spec::time_s`].
         time_s: Option<f64>,
     },
+}
+
+/// A mesh that is judged.
+#[derive(Clone, Debug)]
+pub struct Checking {
+    /// The rules.
+    pub rules: RuleSet,
+    /// The name of the upload.
+    pub digest: Digest,
+    /// A broken rule of level `error` is an answer of 422.
+    pub may_fail: bool,
+}
+
+/// A mesh that is compared with a newer one.
+#[derive(Clone, Debug)]
+pub struct Comparing {
+    /// The newer mesh.
+    pub newer: Newer,
+    /// The largest distance that counts as the same, file units.
+    pub max_distance: Option<f64>,
+    /// The picture that is the answer. None: the answer is JSON.
+    pub picture: Option<Box<Spec>>,
+    /// A difference is an answer of 422.
+    pub may_fail: bool,
+}
+
+/// The newer one of two meshes.
+#[derive(Clone, Debug)]
+pub struct Newer {
+    /// The mesh and the files beside it.
+    pub bundle: Bundle,
+    /// The memory of `bundle`.
+    pub memory: Arc<Reservation>,
+    /// The bundle's files in the data folder, if they are there already.
+    pub holds: Arc<[Arc<Hold>]>,
+    /// Its name, if it is stored.
+    pub mesh: Option<Digest>,
 }
 
 /// The outcome of a task.
@@ -114,6 +156,13 @@ pub enum Product {
     },
     /// The outcome of [`Task::Inspect`], as JSON.
     Report(String),
+    /// The outcome of [`Task::Check`], and of [`Task::Diff`] without a picture.
+    Verdict {
+        /// The verdict, as JSON.
+        json: String,
+        /// True if its answer is 422.
+        has_failed: bool,
+    },
 }
 
 /// The states of a job. All but the first two are final.
@@ -123,7 +172,7 @@ pub enum JobState {
     Queued,
     /// A worker does it.
     Running,
-    /// It ended with a picture.
+    /// It ended with a picture or a verdict.
     Done(Arc<Finished>),
     /// It ended with a report, as JSON. Clones share the bytes.
     Inspected(Bytes),
@@ -133,14 +182,25 @@ pub enum JobState {
     Cancelled,
 }
 
-/// A picture and the metadata of its making.
+/// The form of a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Media {
+    /// A picture of this format.
+    Picture(ImageFormat),
+    /// A verdict as JSON.
+    Json,
+}
+
+/// A picture or a verdict, and the metadata of its making.
 #[derive(Debug)]
 pub struct Finished {
-    /// The encoded picture. Clones share the bytes.
-    pub picture: Bytes,
-    /// The picture's format.
-    pub format: ImageFormat,
-    /// The back-end that drew it.
+    /// The encoded picture, or the text of the verdict. Clones share the bytes.
+    pub content: Bytes,
+    /// The form of the content.
+    pub media: Media,
+    /// True for a verdict that is to be answered with 422, as its request asks.
+    pub has_failed: bool,
+    /// The back-end that drew it; the CPU for verdicts.
     pub backend: BackendKind,
     /// True if the CPU drew it because a GPU that was chosen could not.
     pub is_substitute: bool,
@@ -161,8 +221,9 @@ impl Finished {
     pub fn new(output: Output, timings: Timings) -> Self {
         let Output { bytes, format, backend, is_substitute, draw_times, warnings, selection, .. } = output;
         Self {
-            picture: bytes.into(),
-            format,
+            content: bytes.into(),
+            media: Media::Picture(format),
+            has_failed: false,
             backend,
             is_substitute,
             warnings,
@@ -170,6 +231,22 @@ impl Finished {
             mesh_was_kept: false,
             timings,
             draw_times,
+        }
+    }
+
+    /// A verdict as JSON.
+    pub fn verdict(json: String, has_failed: bool, timings: Timings) -> Self {
+        Self {
+            content: json.into(),
+            media: Media::Json,
+            has_failed,
+            backend: BackendKind::Cpu,
+            is_substitute: false,
+            warnings: Vec::new(),
+            selection: None,
+            mesh_was_kept: false,
+            timings,
+            draw_times: DrawTimes::default(),
         }
     }
 }
@@ -388,7 +465,7 @@ impl Job {
     pub(super) fn begin(&self, task: &Task) {
         let views = match task {
             Task::Draw(spec) => spec.sheet.as_ref().map_or(1, |sheet| sheet.count()),
-            Task::Inspect { .. } => 0,
+            Task::Inspect { .. } | Task::Check(_) | Task::Diff(_) => 0,
         };
         self.progress.send_replace(Progress::begun(views));
     }

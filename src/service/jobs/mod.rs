@@ -1,5 +1,5 @@
 //! Jobs: a bounded queue, worker threads that each own a renderer, and the results. A job draws a
-//! picture, or writes the report on a mesh that is to be stored.
+//! picture, judges a mesh, compares two, or writes the report on one that is to be stored.
 //!
 //! Architecture invariants: a full queue refuses at once and never waits. An accepted job is never
 //! dropped before its end. A panic costs its job alone. Nothing here knows HTTP.
@@ -27,9 +27,11 @@ mod worker;
 
 pub use claims::{Claim, ClaimName};
 pub use class::{Class, Owner};
-pub use job::{Failure, Finished, Job, JobId, JobState, Product, Recipe, Task, Timings, Work};
+pub use job::{
+    Checking, Comparing, Failure, Finished, Job, JobId, JobState, Media, Newer, Product, Recipe, Task, Timings, Work,
+};
 pub use progress::{Progress, Step};
-pub use storage::{Storage, name, read_picture, value_of};
+pub use storage::{JSON, Storage, name, read_picture, value_of};
 pub use upload_budget::{Reservation, UploadBudget, UploadBudgetFull};
 pub use worker::{CpuThreads, Renderer, RendererFactory, pipeline_renderers};
 

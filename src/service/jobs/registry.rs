@@ -23,7 +23,7 @@ use tokio::sync::watch;
 use super::claims::Claims;
 use super::class::{Class, Owner};
 use super::estimates::Estimates;
-use super::job::{Admission, Job, JobId, JobState, Restored, Size, Work, unix_ms};
+use super::job::{Admission, Job, JobId, JobState, Media, Restored, Size, Work, unix_ms};
 use super::queue::Queue;
 use super::results::Results;
 use super::storage::Storage;
@@ -363,7 +363,8 @@ impl JobRegistry {
         metrics.ended(job.class.name(), state.name());
         if let JobState::Done(finished) = state {
             // Waiting has a metric of its own.
-            for (stage, took) in finished.timings.parts().into_iter().filter(|(stage, _)| *stage != "queue") {
+            let is_stage = |stage: &str| stage != "queue" && (finished.media != Media::Json || stage == "parse");
+            for (stage, took) in finished.timings.parts().into_iter().filter(|(stage, _)| is_stage(stage)) {
                 metrics.stage(stage, finished.backend.name(), took);
             }
         }
@@ -569,7 +570,7 @@ impl JobRegistry {
 }
 
 fn result_bytes(state: &JobState) -> u64 {
-    if let JobState::Done(finished) = state { finished.picture.len() as u64 } else { 0 }
+    if let JobState::Done(finished) = state { finished.content.len() as u64 } else { 0 }
 }
 
 /// Seconds after which to try again, at least 1 and at most an hour.

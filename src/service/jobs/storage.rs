@@ -6,12 +6,13 @@ use std::time::Duration;
 
 use bytes::Bytes;
 
-use super::job::{Failure, Finished, Job, JobState, Task, Timings, Work, unix_ms};
+use super::job::{Failure, Finished, Job, JobState, Media, Newer, Task, Timings, Work, unix_ms};
 use crate::backend::{BackendKind, DrawTimes};
+use crate::import::Bundle;
 use crate::pipeline::QualitySelection;
 use crate::service::durable::{
-    ClaimRecord, Durable, EndRecord, ErrorRecord, FileRecord, Hold, JobRecord, PictureRecord, RequestRecord,
-    SelectionRecord, Unstored, WarningRecord,
+    ClaimRecord, Durable, EndRecord, ErrorRecord, FileRecord, Hold, JobRecord, PictureRecord, RequestKind,
+    RequestRecord, SelectionRecord, SideRecord, Unstored, WarningRecord,
 };
 use crate::spec::Samples;
 use crate::spec::words::{Words, word_for};
@@ -20,6 +21,9 @@ use crate::warning::Warning;
 /// Most different names that are taken over from a data folder: more than there are warnings, methods and
 /// flags.
 const NAMES_MAX: usize = 1000;
+
+/// The word for verdicts in place of a picture's format.
+pub const JSON: &str = "json";
 
 /// The data folder, and the words in which failures are stored.
 #[derive(Clone)]
@@ -42,24 +46,34 @@ impl std::fmt::Debug for Storage {
 impl Storage {
     /// The record of a job that is accepted. Writes files, so it may take long.
     pub fn of_job(&self, job: &Job, work: &Work) -> Result<Stored<JobRecord>, Unstored> {
-        let mut holds = work.holds.to_vec();
-        if holds.len() != work.bundle.files().len() {
-            holds = work.bundle.files().iter().map(|file| self.durable.hold(&file.bytes)).collect::<Result<_, _>>()?;
-        }
-        let digests = holds.iter().map(|hold| hold.digest());
-        let files = work.bundle.files().iter().zip(digests);
-        let files = files.map(|(file, digest)| FileRecord { path: file.path.clone(), digest }).collect();
+        let (files, mut holds) = self.of_files(&work.bundle, &work.holds)?;
+        let newer = match &work.task {
+            Task::Diff(comparing) => {
+                let Newer { bundle, holds: known, mesh, .. } = &comparing.newer;
+                let (files, own) = self.of_files(bundle, known)?;
+                holds.extend(own);
+                Some(SideRecord { files, is_zip: bundle.is_zip(), mesh: *mesh })
+            }
+            Task::Draw(_) | Task::Inspect { .. } | Task::Check(_) => None,
+        };
         let recipe = work.recipe.clone().unwrap_or_default();
         let document = recipe.document.as_ref().map(|bytes| self.durable.hold(bytes)).transpose()?;
-        let format = match &work.task {
-            Task::Draw(spec) => spec.image.format.map_or("png", word_for),
-            Task::Inspect { .. } => "",
+        let (kind, format, upload) = match &work.task {
+            Task::Draw(spec) => (RequestKind::Draw, spec.image.format.map_or("png", word_for), None),
+            Task::Inspect { .. } => (RequestKind::Draw, "", None),
+            Task::Check(checking) => (RequestKind::Check, JSON, Some(checking.digest)),
+            Task::Diff(comparing) => {
+                let picture = comparing.picture.as_ref().and_then(|spec| spec.image.format);
+                (RequestKind::Diff, picture.map_or(JSON, word_for), None)
+            }
         };
         let request = RequestRecord {
             document: document.as_ref().map(|hold| hold.digest()),
             names_mesh: recipe.mesh.is_some(),
             overrides: recipe.overrides.to_vec(),
             format: format.to_owned(),
+            kind,
+            upload,
         };
         holds.extend(document);
         let record = JobRecord {
@@ -73,6 +87,7 @@ impl Storage {
             owner: work.owner.to_string(),
             request_id: work.request_id.to_string(),
             mesh: recipe.mesh,
+            newer,
             claim: work
                 .claim
                 .as_ref()
@@ -81,13 +96,25 @@ impl Storage {
         Ok((record, holds))
     }
 
+    /// The records of the files of a bundle. They are in the data folder already if there are as many holds.
+    fn of_files(&self, bundle: &Bundle, holds: &[Arc<Hold>]) -> Result<Stored<Vec<FileRecord>>, Unstored> {
+        let files = bundle.files();
+        let holds = match holds.len() == files.len() {
+            true => holds.to_vec(),
+            false => files.iter().map(|file| self.durable.hold(&file.bytes)).collect::<Result<_, _>>()?,
+        };
+        let digests = holds.iter().map(|hold| hold.digest());
+        let records = files.iter().zip(digests).map(|(file, digest)| FileRecord { path: file.path.clone(), digest });
+        Ok((records.collect(), holds))
+    }
+
     /// The record of a job's end. Writes the file of a large picture.
     pub fn of_end(&self, state: &JobState) -> Result<Stored<EndRecord>, Unstored> {
         let mut end = EndRecord { at_unix_ms: unix_ms(), ..EndRecord::default() };
         let mut holds = Vec::new();
         match state {
             JobState::Done(finished) => {
-                let hold = self.durable.hold(&finished.picture)?;
+                let hold = self.durable.hold(&finished.content)?;
                 end.picture = Some(of_picture(finished, &hold));
                 holds.push(hold);
             }
@@ -112,7 +139,11 @@ fn of_picture(finished: &Finished, hold: &Hold) -> PictureRecord {
     });
     PictureRecord {
         digest: hold.digest(),
-        format: word_for(finished.format).to_owned(),
+        format: match finished.media {
+            Media::Picture(format) => word_for(format).to_owned(),
+            Media::Json => JSON.to_owned(),
+        },
+        has_failed: finished.has_failed,
         backend: finished.backend.name().to_owned(),
         is_substitute: finished.is_substitute,
         mesh_was_kept: finished.mesh_was_kept,
@@ -122,8 +153,8 @@ fn of_picture(finished: &Finished, hold: &Hold) -> PictureRecord {
     }
 }
 
-/// A picture as it was stored. None if a word of the record is not known any more.
-pub fn read_picture(record: PictureRecord, picture: Bytes) -> Option<Finished> {
+/// A picture or a verdict as it was stored. None if a word of the record is not known any more.
+pub fn read_picture(record: PictureRecord, content: Bytes) -> Option<Finished> {
     let [queue, parse, plan, render, encode] = record.timings_us.map(Duration::from_micros);
     let selection = match record.selection {
         Some(selection) => Some(QualitySelection {
@@ -141,8 +172,9 @@ pub fn read_picture(record: PictureRecord, picture: Bytes) -> Option<Finished> {
     let backend = [BackendKind::Cpu, BackendKind::Gpu].into_iter().find(|kind| kind.name() == record.backend)?;
     let warnings = record.warnings.into_iter();
     Some(Finished {
-        picture,
-        format: value_of(&record.format)?,
+        content,
+        media: if record.format == JSON { Media::Json } else { Media::Picture(value_of(&record.format)?) },
+        has_failed: record.has_failed,
         backend,
         is_substitute: record.is_substitute,
         warnings: warnings.map(|w| Warning { code: name(&w.code), detail: w.detail }).collect(),

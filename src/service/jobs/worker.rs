@@ -4,13 +4,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::job::{Failure, Finished, Job, JobState, Product, Task, Timings, Work};
+use super::job::{Checking, Comparing, Failure, Finished, Job, JobState, Product, Task, Timings, Work};
 use super::registry::{JobRegistry, Next};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{Backends, GpuHost};
-use crate::import;
+use crate::check::{self, Verdict};
+use crate::import::{self, Bundle, MeshError, bundle::UNNAMED};
 use crate::limits::{Budget, Deadline, Limits};
 use crate::pipeline::{self, Model, Output, RenderError, Stage};
+use crate::report::Extras;
 use crate::service::residents::{Found, Resident, Residents};
 
 /// A worker's renderer, which does one job after the other.
@@ -56,10 +58,12 @@ pub fn pipeline_renderers(
                     Ok(Product::Picture { output: Box::new(output), mesh_was_kept })
                 }
                 Task::Inspect { time_s } => {
-                    let options = import::Options { format: *format_in, time_s: *time_s };
-                    let report = pipeline::inspect(bundle, options, &limits, deadline, ended)?;
+                    let options = import::Options { format: *format_in, time_s: *time_s, ..import::Options::default() };
+                    let report = pipeline::inspect(bundle, options, Extras::default(), &limits, deadline, ended)?;
                     Ok(Product::Report(report.json()?))
                 }
+                Task::Check(checking) => judge(work, checking, &limits, deadline, ended),
+                Task::Diff(comparing) => compare(work, comparing, &mut backends, &limits, deadline, ended),
             }
         })
     })
@@ -79,7 +83,7 @@ fn render_stored(
     let key = time_s.map_or_else(|| key.to_owned(), |time_s| format!("{key} at {time_s:?} s"));
     let Found { resident, was_kept } = residents.find(&key, deadline, || {
         let mut budget = Budget::new(limits);
-        let options = import::Options { format: job.format_in, time_s };
+        let options = import::Options { format: job.format_in, time_s, ..import::Options::default() };
         let model = Model::read(&job.bundle, options, limits, &mut budget, deadline)?;
         Ok(Resident { model, budget })
     })?;
@@ -88,6 +92,56 @@ fn render_stored(
     let output = pipeline::render_model(&resident.model, job.spec, backends, &mut budget, deadline, ended);
     residents.weigh(&key, &resident);
     Ok((output?, was_kept))
+}
+
+/// Judges a mesh. One that cannot be read has a verdict, too.
+fn judge(
+    work: &Work,
+    checking: &Checking,
+    limits: &Limits,
+    deadline: &Deadline,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Product, RenderError> {
+    let Work { bundle, format_in, .. } = work;
+    let opened = pipeline::open(bundle, *format_in, limits, deadline);
+    ended(Stage::Parse);
+    let file = bundle.files().first().filter(|_| bundle.files().len() == 1 && !bundle.is_zip());
+    let named = bundle.entry().or(file.map(|file| file.path.as_str()));
+    let path = opened.as_ref().map_or(named.unwrap_or(UNNAMED), |opened| opened.path()).to_owned();
+    let checks = match opened.and_then(|opened| opened.check(&checking.rules, deadline)) {
+        Ok(checks) => checks,
+        Err(error) => vec![check::of_unreadable(&error).ok_or(error)?],
+    };
+    ended(Stage::Render);
+    let verdict = Verdict::new(path, Some(checking.digest.to_string()), checks);
+    Ok(Product::Verdict { has_failed: checking.may_fail && !verdict.ok, json: verdict.json()? })
+}
+
+/// Compares two meshes, and draws the difference if that is the answer.
+fn compare(
+    work: &Work,
+    comparing: &Comparing,
+    backends: &mut Backends,
+    limits: &Limits,
+    deadline: &Deadline,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Product, RenderError> {
+    let Comparing { newer, max_distance, picture, may_fail } = comparing;
+    let open = |bundle: &Bundle, side: &str| {
+        let about = |error: MeshError| MeshError { detail: format!("{side}: {}", error.detail), ..error };
+        pipeline::open(bundle, work.format_in, limits, deadline).map_err(about)
+    };
+    let (a, b) = (open(&work.bundle, "a")?, open(&newer.bundle, "b")?);
+    ended(Stage::Parse);
+    let compared = a.diff(&b, *max_distance, deadline)?;
+    let Some(spec) = picture else {
+        ended(Stage::Render);
+        let has_failed = *may_fail && !compared.difference.same;
+        return Ok(Product::Verdict { has_failed, json: compared.difference.json()? });
+    };
+    ended(Stage::Plan);
+    let output = pipeline::render_difference([&a, &b], &compared, spec, backends, deadline, ended)?;
+    Ok(Product::Picture { output: Box::new(output), mesh_was_kept: false })
 }
 
 /// Does jobs until the registry is drained, or until one took so long that another worker has replaced this one.
@@ -148,6 +202,9 @@ fn run_job(renderer: &mut Renderer, job: &Job, work: &Work, started: Instant) ->
             JobState::Done(Arc::new(Finished { mesh_was_kept, ..Finished::new(*output, timings) }))
         }
         Ok(Product::Report(json)) => JobState::Inspected(json.into()),
+        Ok(Product::Verdict { json, has_failed }) => {
+            JobState::Done(Arc::new(Finished::verdict(json, has_failed, timings)))
+        }
         Err(error) => JobState::Failed(Arc::new(Failure::Render(error))),
     }
 }

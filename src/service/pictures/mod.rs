@@ -86,7 +86,7 @@ struct Kept {
 impl Weighed for Kept {
     fn bytes(&self) -> u64 {
         let warnings: usize = self.finished.warnings.iter().map(Warning::bytes).sum();
-        (self.finished.picture.len() + warnings) as u64 + OVERHEAD_BYTES
+        (self.finished.content.len() + warnings) as u64 + OVERHEAD_BYTES
     }
 }
 

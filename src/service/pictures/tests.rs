@@ -4,12 +4,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::*;
 use crate::backend::{BackendKind, DrawTimes};
 use crate::image::ImageFormat;
-use crate::service::jobs::Timings;
+use crate::service::jobs::{Media, Timings};
 
 fn picture(bytes: usize) -> Arc<Finished> {
     Arc::new(Finished {
-        picture: vec![7; bytes].into(),
-        format: ImageFormat::Png,
+        content: vec![7; bytes].into(),
+        media: Media::Picture(ImageFormat::Png),
+        has_failed: false,
         backend: BackendKind::Cpu,
         is_substitute: false,
         warnings: Vec::new(),
@@ -52,7 +53,7 @@ async fn the_others_draw_for_themselves_where_the_first_fails_or_hangs_up() {
     let found = pictures.find("a", async { Ok::<_, ()>(picture(10)) }).await.unwrap();
     assert_eq!(found.source, Source::Miss);
     let again = pictures.find("a", async { Err(()) }).await.unwrap();
-    assert_eq!((again.source, again.finished.picture.len()), (Source::Hit, 10));
+    assert_eq!((again.source, again.finished.content.len()), (Source::Hit, 10));
 }
 
 #[tokio::test]

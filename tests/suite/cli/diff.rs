@@ -92,11 +92,25 @@ fn png(folder: &Path, name: &str, side_px: u32, others: u32, red: u8) {
 /// As [`CASES`], for pictures.
 const PICTURES: &[(&str, i32, &str, &str)] = &[
     ("a.png a.png", 0, "same\n  no pixel differs\n", ""),
-    ("a.png b.png", 1, "different\n  3 pixels differ of 64 (4.69 %), by up to 4 of 255, within (0, 1) to (2, 1)\n", ""),
+    (
+        "a.png b.png",
+        1,
+        "different\n  3 pixels differ of 64 (4.69 %), by up to 4 of 255, within (0, 1) to (2, 1); FLIP ",
+        "",
+    ),
     ("a.png b.png --max-pixels 3", 0, "same\n", ""),
     ("a.png b.png --max-pixels 2", 1, "different\n", ""),
     ("a.png b.png --max-error 4", 0, "no pixel differs by more than 4 of 255: the largest difference is 4\n", ""),
     ("a.png b.png --max-error 3.9", 1, "3 pixels differ", ""),
+    ("a.png b.png --max-flip 0.5", 0, "same\n", ""),
+    ("a.png b.png --max-flip 0.0001", 1, "different\n", ""),
+    ("a.png b.png --max-flip 0.5 --max-pixels 2", 1, "different\n", ""),
+    ("a.png b.png --max-flip 2", 2, "", "give a number from 0 to 1"),
+    ("a.png b.png --blink out.jpg", 2, "", "JPEG has no animations"),
+    ("a.png b.png --side-by-side a.png", 2, "", "inputs are never written over"),
+    ("a.png b.png --side-by-side -", 2, "", "--side-by-side -: standard output has the difference"),
+    ("cube.obj copy.obj --max-flip 0.5", 2, "", "are for pictures"),
+    ("cube.obj copy.obj --heat flip", 2, "", "--heat is for pictures"),
     ("a.png c.png -o out.png", 1, "the size is 4 x 4 px, before 8 x 8 px", "out.png: is not written"),
     ("a.png broken.png", 1, "", "broken.png: the picture cannot be read"),
     ("a.png cube.obj", 2, "", "a.png is a picture and cube.obj is none"),
@@ -173,4 +187,43 @@ fn the_picture_of_two_meshes_has_both_in_one_frame() {
     assert!(fs::read(folder.path().join("heat.png")).unwrap() == bytes);
     assert_eq!(diff(folder.path(), &["cube.obj", "cube.obj", "-o", "heat.webp"]).0, Some(0));
     assert_eq!(diff(folder.path(), &["cube.obj", "two.obj", "-o", "two.obj"]).0, Some(2));
+}
+
+#[test]
+fn both_sides_are_shown_beside_each_other_and_by_turns() {
+    let folder = folder();
+    png(folder.path(), "a.png", 8, 0, 0);
+    png(folder.path(), "b.png", 8, 3, 200);
+    let words = ["--side-by-side", "three.png", "--blink", "blink.png", "-o", "heat.png", "--heat", "flip"];
+    assert_eq!(diff(folder.path(), &[&["a.png", "b.png"], &words[..]].concat()).0, Some(1));
+    let open = |name: &str| image::open(folder.path().join(name)).unwrap().to_rgba8();
+    let three = open("three.png");
+    assert_eq!(three.dimensions(), (24, 8));
+    assert_eq!([three.get_pixel(0, 1)[0], three.get_pixel(8, 1)[0]], [100, 200]);
+    assert_eq!(*three.get_pixel(16, 1), *open("heat.png").get_pixel(0, 1));
+    let frames = |name: &str| {
+        let decoder =
+            image::codecs::png::PngDecoder::new(std::io::Cursor::new(fs::read(folder.path().join(name)).unwrap()));
+        use image::AnimationDecoder as _;
+        decoder.unwrap().apng().unwrap().into_frames().collect_frames().unwrap()
+    };
+    let shown = frames("blink.png");
+    assert_eq!(shown.len(), 2);
+    assert_eq!([0, 1].map(|frame: usize| shown[frame].buffer().get_pixel(0, 1)[0]), [100, 200]);
+
+    // Meshes: through one camera, so that the cube that moved lies elsewhere.
+    let words = ["cube.obj", "moved.obj", "--side-by-side", "three.png", "--blink", "blink.png"];
+    assert_eq!(diff(folder.path(), &words).0, Some(1));
+    let three = open("three.png");
+    assert_eq!(three.dimensions(), (3 * 512, 512));
+    let shown = frames("blink.png");
+    // Where the picture is not white, below the label.
+    let middle = |at: u32| {
+        let inked =
+            (0..512).filter(|x| (60..512).any(|y| three.get_pixel(at * 512 + x, y)[2] < 230)).collect::<Vec<_>>();
+        (inked[0] + inked[inked.len() - 1]) / 2
+    };
+    assert!(middle(1) > middle(0) + 20, "{} {}", middle(0), middle(1));
+    let side = |frame: usize| image::imageops::crop_imm(&three, frame as u32 * 512, 0, 512, 512).to_image();
+    assert!((0..2).all(|frame| *shown[frame].buffer() == side(frame)));
 }

@@ -10,4 +10,5 @@ pub mod mistakes;
 pub mod outputs;
 pub mod recipes;
 pub mod reports;
+mod repository;
 pub mod watch;

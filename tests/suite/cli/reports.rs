@@ -135,3 +135,122 @@ fn the_page_has_a_row_for_each_file_and_loads_nothing() {
     }
     assert!(page.contains("default-src 'none'"));
 }
+
+/// The address of each picture of a page, with its text.
+fn pictures_of(page: &str) -> Vec<(image::RgbaImage, String)> {
+    use base64::Engine as _;
+    let images = page.split("<img src=\"data:image/png;base64,").skip(1);
+    images
+        .map(|rest| {
+            let (data, rest) = rest.split_once('"').unwrap();
+            let bytes = base64::engine::general_purpose::STANDARD.decode(data).unwrap();
+            let alt = rest.split("alt=\"").nth(1).unwrap().split('"').next().unwrap();
+            (image::load_from_memory(&bytes).unwrap().to_rgba8(), alt.to_owned())
+        })
+        .collect()
+}
+
+fn is_red(pixel: &image::Rgba<u8>) -> bool {
+    pixel[0] > 180 && pixel[1] < 90 && pixel[2] < 90
+}
+
+#[test]
+fn pages_show_the_views_and_mark_where_a_rule_fails() {
+    let folder = folder();
+    fs::write(folder.path().join("meshsnap.toml"), "[check]\nrules = [\"watertight\"]\nviews = [\"iso\", \"left\"]\n")
+        .unwrap();
+    assert_eq!(check(folder.path(), &["parts", "--html", "a.html"]).0, Some(1));
+    let page = fs::read_to_string(folder.path().join("a.html")).unwrap();
+    let found = pictures_of(&page);
+    let names: Vec<&str> = found.iter().map(|(_, alt)| alt.as_str()).collect();
+    let expected = ["iso", "left", "topology"];
+    let of = |file: &str| expected.map(|view| format!("{view}: parts/{file}"));
+    assert_eq!(names, [of("good.obj"), of("hole.obj")].concat());
+    for (picture, alt) in &found {
+        assert_eq!(picture.dimensions(), (320, 320), "{alt}");
+        let red = picture.pixels().filter(|pixel| is_red(pixel)).count();
+        // The hole is at -x, so that its edges are around the picture from the left.
+        let is_marked = alt.ends_with("hole.obj");
+        assert!(if is_marked { red > 300 } else { red == 0 || alt.starts_with("topology") }, "{alt}: {red}");
+    }
+    // The same bytes at any number of threads.
+    assert_eq!(check(folder.path(), &["parts", "--html", "b.html", "--jobs", "1"]).0, Some(1));
+    assert!(page == fs::read_to_string(folder.path().join("b.html")).unwrap());
+    // Nothing is drawn that nobody sees.
+    let (_, out, _) = check(folder.path(), &["parts", "--format", "jsonl"]);
+    assert!(!out.contains("pictures"), "{out}");
+}
+
+#[test]
+fn pictures_are_files_that_markdown_and_json_name() {
+    let folder = folder();
+    let words = ["parts", "--views", "iso", "--pictures", "seen here", "--markdown", "a.md", "--format", "jsonl"];
+    let (code, out, said) = check(folder.path(), &[&words, RULES].concat());
+    assert_eq!(code, Some(1), "{said}");
+    let verdicts: Vec<Value> = out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let mut pictures = 0;
+    for (verdict, name) in verdicts.iter().zip(["good", "hole"]) {
+        for view in ["iso", "topology"] {
+            let path = verdict["pictures"][view].as_str().unwrap();
+            assert!(path.starts_with("seen here/") && path.ends_with(&format!("{name}.{view}.png")), "{path}");
+            assert_eq!(image::open(folder.path().join(path)).unwrap().to_rgba8().dimensions(), (320, 320));
+            pictures += 1;
+        }
+    }
+    assert_eq!(pictures, 4);
+    let markdown = fs::read_to_string(folder.path().join("a.md")).unwrap();
+    assert!(
+        markdown.contains("\n| file | iso | topology |\n|---|---|---|\n| `parts/hole.obj` | <img src=\"seen%20here/"),
+        "{markdown}"
+    );
+    assert!(
+        markdown.contains("width=\"160\" alt=\"iso of parts/hole.obj\">") && !markdown.contains("good.iso"),
+        "{markdown}"
+    );
+}
+
+#[test]
+fn baselines_keep_pictures_and_a_page_shows_what_changed() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name);
+    let words = ["parts", "--baseline", "known", "--views", "iso,top", "--rules", "watertight"];
+    assert_eq!(check(folder.path(), &[&words[..], &["--update"]].concat()).0, Some(0));
+    for name in ["good.obj.iso.png", "good.obj.top.png", "good.obj.topology.png", "hole.obj.iso.png", "hole.obj.json"] {
+        assert!(path("known/parts").join(name).is_file(), "{name}");
+    }
+    let with_page = [&words[..], &["--html", "a.html"]].concat();
+    assert_eq!(check(folder.path(), &with_page).0, Some(0));
+    let page = fs::read_to_string(path("a.html")).unwrap();
+    assert!(!page.contains("class=\"change\"") && pictures_of(&page).len() == 6, "nothing has changed");
+    // The cube becomes longer along z: it looks the same from above but for its distance.
+    let longer = String::from_utf8(fs::read(path("parts/good.obj")).unwrap()).unwrap().replace(" 1\n", " 3\n");
+    fs::write(path("parts/good.obj"), longer).unwrap();
+    assert_eq!(check(folder.path(), &with_page).0, Some(0));
+    let page = fs::read_to_string(path("a.html")).unwrap();
+    let alts: Vec<String> = pictures_of(&page).into_iter().map(|(_, alt)| alt).collect();
+    for kind in ["before", "after", "difference"] {
+        assert!(alts.contains(&format!("iso, {kind}: parts/good.obj")), "{alts:?}");
+        assert!(!alts.contains(&format!("iso, {kind}: parts/hole.obj")), "{alts:?}");
+    }
+    let flip: f64 = page.split("iso changed by ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!((0.01..1.0).contains(&flip), "{flip}");
+    assert!(page.contains("aria-label=\"Blink iso of parts/good.obj\">Blink</button>"), "{page}");
+    // An accepted picture that is none has no difference, and stops nothing.
+    fs::write(path("known/parts/good.obj.iso.png"), b"no picture").unwrap();
+    assert_eq!(check(folder.path(), &with_page).0, Some(0));
+}
+
+#[test]
+fn views_that_are_none_and_pictures_without_views_are_refused() {
+    let folder = folder();
+    for (words, part) in [
+        (&["parts", "--views", "sideways"][..], "--views: there is no view `sideways`; the views are auto, iso"),
+        (&["parts", "--pictures", "seen"], "--pictures needs views"),
+    ] {
+        let (code, _, said) = check(folder.path(), words);
+        assert!(code == Some(2) && said.contains(part), "{said}");
+    }
+    fs::write(folder.path().join("meshsnap.toml"), "[check]\nviews = [\"iso\",\n  \"up\"]\n").unwrap();
+    let (code, _, said) = check(folder.path(), &["parts"]);
+    assert!(code == Some(2) && said.contains("line 3, column 3: there is no view `up`"), "{said}");
+}

@@ -11,7 +11,7 @@ use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::mesh::edges::EdgeList;
 use meshsnap::mesh::topology::Topology;
 use meshsnap::mesh::{Mesh, ToFile};
-use meshsnap::report::Report;
+use meshsnap::report::{Extras, Report};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
@@ -22,7 +22,8 @@ fn report(bytes: &[u8]) -> (Value, String) {
 }
 
 fn of(mesh: &Mesh, import: &ImportReport, bytes: u64) -> Report {
-    Report::of(mesh, import, bytes, &mut Budget::new(&Limits::default()), &Deadline::default()).unwrap()
+    Report::of(mesh, import, bytes, Extras::default(), &mut Budget::new(&Limits::default()), &Deadline::default())
+        .unwrap()
 }
 
 /// Area and volume.
@@ -273,10 +274,12 @@ fn a_poor_budget_and_a_raised_flag_stop_the_report() {
     let stopped = Deadline::default();
     stopped.stop();
     assert!(Topology::of(&mesh, &edges, &mut Budget::new(&Limits::default()), &stopped).is_err());
-    assert!(Report::of(&mesh, &mesh.report, 0, &mut Budget::new(&Limits::default()), &stopped).is_err());
+    assert!(
+        Report::of(&mesh, &mesh.report, 0, Extras::default(), &mut Budget::new(&Limits::default()), &stopped).is_err()
+    );
     let needed = (0..10_000).find(|&memory_bytes| {
         let limits = Limits { memory_bytes, ..Limits::default() };
-        Report::of(&mesh, &mesh.report, 0, &mut Budget::new(&limits), &Deadline::default()).is_ok()
+        Report::of(&mesh, &mesh.report, 0, Extras::default(), &mut Budget::new(&limits), &Deadline::default()).is_ok()
     });
     assert!(needed.is_some_and(|bytes| bytes > 500), "{needed:?}");
 }

@@ -25,7 +25,8 @@ pub fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
 #[test]
 fn every_importer_has_a_target_with_seeds_and_words() {
     let targets: BTreeSet<&str> = targets::targets().into_iter().collect();
-    let expected: BTreeSet<&str> = Format::names().into_iter().chain(["zip", "request", "pipeline"]).collect();
+    let expected: BTreeSet<&str> =
+        Format::names().into_iter().chain(["meshopt", "zip", "request", "pipeline"]).collect();
     assert_eq!(targets, expected, "fuzz/src/lib.rs");
     let manifest = std::fs::read_to_string(root().join("fuzz/Cargo.toml")).unwrap();
     let bins: BTreeSet<&str> = manifest.split("[[bin]]").skip(1).filter_map(|bin| bin.split('"').nth(1)).collect();

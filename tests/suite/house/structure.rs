@@ -21,7 +21,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Of the report the bounds, of the plan the overlaps in the texture.
     ("check", &["report", "import", "texture", "plan", "mesh", "limits", "pluralise"]),
     // Of the report the bounds and the topology under the names that clients read, of the plan the colours of numbers.
-    ("diff", &["report", "import", "plan", "mesh", "guard", "image", "limits", "pluralise"]),
+    ("diff", &["report", "import", "plan", "mesh", "guard", "image", "srgb", "parallel", "limits", "pluralise"]),
     ("spec", &["mesh", "image", "srgb", "limits"]),
     ("request", &["spec", "mesh", "image", "limits"]),
     ("texture", &["guard", "mesh", "srgb", "limits", "warning"]),
@@ -47,6 +47,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "service/digest",
             "service/residents",
             "pipeline",
+            "check",
             "report",
             "backend",
             "spec",
@@ -88,6 +89,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "service/residents",
             "service/pictures",
             "pipeline",
+            "check",
+            "diff",
             "report",
             "request",
             "backend",

@@ -19,7 +19,7 @@ fn a_posted_mesh_comes_back_as_a_picture() {
     }
     // The stages of drawing follow, as far as they ran.
     let names: Vec<&str> = timing.split(", ").filter_map(|item| item.split(';').next()).collect();
-    let drawing = ["transform", "sort", "face_colors", "visibility", "shade", "lines", "resolve"];
+    let drawing = ["transform", "sort", "face_colors", "visibility", "shade", "lines", "resolve", "encode_rows"];
     let ran: Vec<&str> = drawing.into_iter().filter(|stage| names.contains(stage)).collect();
     assert!(names[5..] == ran && ran.contains(&"visibility") && ran.contains(&"lines"), "{timing}");
     let again = server.post("/v1/render?style=wire&size=96x64", CUBE_OBJ);

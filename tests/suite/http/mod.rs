@@ -15,3 +15,4 @@ pub mod openapi;
 pub mod quality_target;
 pub mod schema;
 pub mod sheets;
+pub mod verdicts;

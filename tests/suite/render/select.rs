@@ -24,7 +24,7 @@ use BackendKind::{Cpu as ByCpu, Gpu as ByGpu};
 
 /// Draws a job, checks the picture, and says who drew it.
 fn draw(backends: &mut Backends, choice: BackendChoice) -> Result<BackendKind, DrawError> {
-    let chosen = backends.draw(choice, &job(), &Deadline::default())?;
+    let chosen = backends.draw(choice, &job(), None, &Deadline::default())?;
     assert_eq!(chosen.image, CpuRenderer::new(1).draw(&job(), &Deadline::default()).unwrap());
     Ok(chosen.backend)
 }
@@ -320,7 +320,7 @@ fn while_the_gpu_is_busy_the_cpu_draws_what_is_small() {
     // The job is small, and nobody has to wait for it.
     let mut backends = Backends::new(host, 1);
     check(&mut backends, &[(Auto, Ok(ByCpu)), (Gpu, Ok(ByGpu)), (Auto, Ok(ByCpu))]);
-    assert!(!backends.draw(Auto, &job(), &Deadline::default()).unwrap().is_substitute);
+    assert!(!backends.draw(Auto, &job(), None, &Deadline::default()).unwrap().is_substitute);
     open.send(()).unwrap();
     assert_eq!(busy.join().unwrap(), ByGpu);
     check(&mut backends, &[(Auto, Ok(ByGpu))]);
@@ -335,7 +335,7 @@ fn a_gpu_that_is_wrong_with_many_samples_draws_none_of_them() {
     check(&mut backends, &[(Auto, Ok(ByGpu))]);
     assert_eq!(host.status().state, GpuState::Ready);
     let fine = || DrawPlan { samples: 16, ..job() };
-    let chosen = backends.draw(Auto, &fine(), &Deadline::default()).unwrap();
+    let chosen = backends.draw(Auto, &fine(), None, &Deadline::default()).unwrap();
     let want = CpuRenderer::new(1).draw(&fine(), &Deadline::default()).unwrap();
     assert_eq!((chosen.backend, chosen.image), (ByCpu, want));
     let status = host.status();

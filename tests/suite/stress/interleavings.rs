@@ -119,7 +119,7 @@ fn a_thousand_interleavings_leave_every_picture_right_and_nothing_behind() {
     let alone = Process::start();
     let pictures: Vec<_> = (0..15)
         .map(|i| match end_of(&runtime, &alone.submit(i / 3, STYLES[i % 3], "cpu")) {
-            JobState::Done(finished) => finished.picture.clone(),
+            JobState::Done(finished) => finished.content.clone(),
             other => panic!("{other:?}"),
         })
         .collect();
@@ -145,7 +145,7 @@ fn a_thousand_interleavings_leave_every_picture_right_and_nothing_behind() {
             for (job, picture) in jobs {
                 match end_of(&runtime, &job) {
                     JobState::Done(finished) => {
-                        assert!(finished.picture == pictures[picture], "round {rounds}: picture {picture}");
+                        assert!(finished.content == pictures[picture], "round {rounds}: picture {picture}");
                         done += 1;
                     }
                     JobState::Cancelled => cancelled += 1,

@@ -141,7 +141,7 @@ fn a_thousand_meshes_agree_with_exact_clipping_of_all_pairs() {
             faces.clone().any(|other| face != other && contacts::intersect(small.corners(face), small.corners(other)))
         };
         let expected: Vec<u32> = faces.clone().filter(meets).map(|face| face as u32).collect();
-        let found = self_intersections(&mesh, &budget, &deadline).unwrap();
+        let found = self_intersections(&mesh, &budget, &deadline).unwrap().unwrap();
         assert_eq!(found, expected, "mesh {i}: {:?} {:?}", small.vertices, small.triangles);
         meeting[kind as usize] += found.len();
         apart[kind as usize] += faces.len() - found.len();

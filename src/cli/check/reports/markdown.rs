@@ -10,6 +10,9 @@ use crate::pluralise::pluralise;
 /// Most bytes of the report: a comment on GitHub has at most 65,536 characters.
 const BYTES_MAX: usize = 60_000;
 
+/// The width of a picture in the table, pixels.
+const THUMBNAIL_PX: u32 = 160;
+
 /// Most characters of a text in a cell, before they are escaped.
 const CELL_CHARS_MAX: usize = 300;
 
@@ -46,11 +49,49 @@ pub fn markdown(findings: &Findings<'_>) -> String {
         let more = pluralise(left.len() as u64, "fault is", "faults are");
         let _ = writeln!(text, "\n{more} left out here, for the size of a comment.");
     }
+    thumbnails(findings, &mut text);
     if findings.lost > 0 {
         let lost = pluralise(findings.lost as u64, "file has", "files have");
         let _ = writeln!(text, "\n{lost} no verdict, by a fault of meshsnap.");
     }
     text
+}
+
+/// A table of the pictures that were written of files that fail, as far as there is room.
+fn thumbnails(findings: &Findings<'_>, text: &mut String) {
+    let shown = || findings.verdicts.iter().filter(|verdict| !verdict.ok && !verdict.pictures.is_empty());
+    let Some(first) = shown().next() else { return };
+    let views: Vec<&str> = first.pictures.keys().copied().collect();
+    let head = format!("\n| file | {} |\n|---|{}\n", views.join(" | "), "---|".repeat(views.len()));
+    if text.len() + head.len() > BYTES_MAX {
+        return;
+    }
+    *text += &head;
+    let mut left = 0;
+    for verdict in shown() {
+        let cells = verdict.pictures.iter().map(|(view, path)| {
+            format!(
+                " <img src=\"{}\" width=\"{THUMBNAIL_PX}\" alt=\"{view} of {}\"> |",
+                address(path),
+                prose(&verdict.path)
+            )
+        });
+        let row = format!("| {} |{}\n", name(&verdict.path), cells.collect::<String>());
+        match text.len() + row.len() > BYTES_MAX {
+            true => left += 1,
+            false => *text += &row,
+        }
+    }
+    if left > 0 {
+        let more = pluralise(left, "file has pictures", "files have pictures");
+        let _ = writeln!(text, "\n{more} that are left out here, for the size of a comment.");
+    }
+}
+
+/// A path as a relative address, percent-encoded.
+fn address(path: &str) -> String {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~/".contains(&byte);
+    path.bytes().map(|byte| if is_plain(byte) { char::from(byte).into() } else { format!("%{byte:02X}") }).collect()
 }
 
 /// A name as code, where nothing is a link, a mention or a column.
@@ -133,7 +174,7 @@ mod tests {
             Verdict::new(path, None, vec![unopened("x".repeat(500))])
         };
         let verdicts: Vec<_> = (0..2000).map(of).collect();
-        let text = markdown(&Findings { verdicts: &verdicts, lost: 1 });
+        let text = markdown(&Findings { verdicts: &verdicts, pictures: &[], lost: 1 });
         assert!(text.starts_with("### meshsnap check: 2001 of 2001 files failed\n"), "{}", &text[..200]);
         assert!(text.len() < 65_536, "{}", text.len());
         let rows = text.lines().filter(|line| line.starts_with("| <code>")).count();

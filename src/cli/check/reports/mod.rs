@@ -10,6 +10,7 @@ pub mod text;
 
 use clap::{Args, ValueHint};
 
+use super::pictures::ViewPictures;
 use crate::check::{Check, Level, Verdict};
 use crate::cli::error::CliError;
 use crate::cli::output::{Destination, Inputs};
@@ -34,11 +35,20 @@ pub struct ReportArgs {
     jsonl: Option<String>,
 }
 
+impl ReportArgs {
+    /// True if a page is asked for, which shows pictures.
+    pub fn has_page(&self) -> bool {
+        self.html.is_some()
+    }
+}
+
 /// All that a run has found.
 #[derive(Clone, Copy, Debug)]
 pub struct Findings<'a> {
     /// The verdicts, in the order of their paths.
     pub verdicts: &'a [Verdict],
+    /// The pictures of each verdict; none where no report shows them.
+    pub pictures: &'a [Vec<ViewPictures>],
     /// Files without a verdict, by a fault of ours.
     pub lost: usize,
 }
@@ -109,7 +119,7 @@ impl Reports {
 
 /// A verdict as a line of JSON.
 pub fn json_line(verdict: &Verdict) -> Result<String, CliError> {
-    serde_json::to_string(verdict).map(|line| line + "\n").map_err(|error| CliError::ours(error.to_string()))
+    verdict.json().map_err(|error| CliError::ours(error.to_string()))
 }
 
 /// The weight of a fault, in a word.

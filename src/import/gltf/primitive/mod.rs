@@ -245,6 +245,13 @@ impl Primitive {
         Ok(())
     }
 
+    /// Marks the vertices that its triangles, lines and points use.
+    pub fn mark_used(&self, is_used: &mut Vec<bool>) {
+        is_used.resize(is_used.len().max(self.positions.len()), false);
+        let of_lines = self.lines_and_points.iter().flatten();
+        self.triangles.iter().flatten().chain(of_lines).for_each(|vertex| is_used[*vertex as usize] = true);
+    }
+
     /// The index of its material.
     pub fn material(&self) -> Option<usize> {
         self.material

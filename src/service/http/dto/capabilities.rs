@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::backend::GpuStatus;
+use crate::check::NAMES;
 use crate::import::Format;
 use crate::request::{self, Style, word_for, words_of};
 use crate::service::http::state::AppState;
@@ -20,6 +21,7 @@ pub struct CapabilitiesDto {
     schema: &'static str,
     request_keys: Vec<&'static str>,
     request_words: BTreeMap<&'static str, Vec<&'static str>>,
+    check_rules: [&'static str; NAMES.len()],
     paths: Vec<String>,
     backend: BackendDto,
     workers: u64,
@@ -92,6 +94,7 @@ impl CapabilitiesDto {
             schema,
             request_keys: request::keys(),
             request_words: request::vocabulary(),
+            check_rules: NAMES,
             paths,
             backend: BackendDto::new(state.rules.backend, state.gpu.status()),
             workers: state.workers,

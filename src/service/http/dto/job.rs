@@ -134,8 +134,8 @@ impl ResultDto {
         let warnings = finished.warnings.iter();
         Self {
             url: format!("/v1/jobs/{id}/result"),
-            content_type: media_type(finished.format),
-            bytes: finished.picture.len(),
+            content_type: media_type(finished.media),
+            bytes: finished.content.len(),
             backend: finished.backend.name(),
             timings_ms: TimingsDto::new(&finished.timings),
             warnings: warnings.map(|w| WarningDto { code: w.code, detail: w.detail.clone() }).collect(),

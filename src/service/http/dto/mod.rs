@@ -13,6 +13,7 @@ use super::error::ApiError;
 use crate::image::ImageFormat;
 use crate::import::Bundle;
 use crate::service::digest::Digest;
+use crate::service::jobs::Media;
 
 /// An error: a problem document (RFC 9457).
 #[derive(Serialize)]
@@ -109,11 +110,12 @@ impl MeshDto {
     }
 }
 
-/// The media type of a picture.
-pub fn media_type(format: ImageFormat) -> &'static str {
-    match format {
-        ImageFormat::Png => "image/png",
-        ImageFormat::Webp => "image/webp",
-        ImageFormat::Jpeg => "image/jpeg",
+/// The media type of a result.
+pub fn media_type(media: Media) -> &'static str {
+    match media {
+        Media::Picture(ImageFormat::Png) => "image/png",
+        Media::Picture(ImageFormat::Webp) => "image/webp",
+        Media::Picture(ImageFormat::Jpeg) => "image/jpeg",
+        Media::Json => "application/json",
     }
 }

@@ -14,7 +14,7 @@ use tracing::Instrument as _;
 use super::drainable_body::DrainableBody;
 use crate::service::http::connection::activity::Client;
 use crate::service::http::dto::ProblemDto;
-use crate::service::http::error::ApiError;
+use crate::service::http::error::{ApiError, IsAnswer};
 use crate::service::http::state::AppState;
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
@@ -74,7 +74,8 @@ fn request_id(headers: &HeaderMap) -> String {
 /// Adds the request's id, and to an error its problem document.
 fn add_id_and_problem(response: &mut Response, id: &str) {
     let status = response.status();
-    if status.is_client_error() || status.is_server_error() {
+    let is_answer = response.extensions().get::<IsAnswer>().is_some();
+    if !is_answer && (status.is_client_error() || status.is_server_error()) {
         let error = response.extensions_mut().get_or_insert_with(|| ApiError::of_framework(status)).clone();
         let body = serde_json::to_vec(&ProblemDto::new(&error, id)).unwrap_or_default();
         let headers = response.headers_mut();

@@ -12,7 +12,7 @@ use crate::service::http::dto::media_type;
 use crate::service::http::error::{ApiError, Fault};
 use crate::service::http::negotiate;
 use crate::service::http::state::AppState;
-use crate::service::jobs::{Claim, ClaimName, Job, Named, Owner};
+use crate::service::jobs::{Claim, ClaimName, Job, Media, Named, Owner};
 
 /// Longest key, characters.
 pub const KEY_CHARS_MAX: usize = 255;
@@ -79,7 +79,7 @@ pub async fn digest(query: &Query, upload: &Upload, headers: &HeaderMap) -> Resu
     let files = hashing.await.map_err(|_| ApiError::internal())?;
     let document = upload.document.as_deref().map(|document| Digest::of(document).to_string());
     let format_in = query.reading.format_in.map(|format| format.name());
-    let accepted = negotiate::image_format(None, headers).ok().map(media_type);
+    let accepted = negotiate::image_format(None, headers).ok().map(|format| media_type(Media::Picture(format)));
     let parts = (files, upload.bundle.is_zip(), document, format_in, &query.reading.entry, &query.overrides, accepted);
     Ok(Digest::of(&serde_json::to_vec(&parts).map_err(|_| ApiError::internal())?))
 }

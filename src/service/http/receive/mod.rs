@@ -1,11 +1,15 @@
 //! From a request to work for a worker. The cheapest refusals come first.
 //!
-//! [`query`] reads the query, [`body`] the body within its limits. [`idempotency`] knows what is sent again. [`meshes`]
+//! [`query`] reads the query, [`body`] the body within its limits. [`check`] and [`diff`] read requests for
+//! verdicts, by [`keys`] of their own. [`idempotency`] knows what is sent again. [`meshes`]
 //! makes a job of each mesh of a form.
 //! [`upload`] names what is to be stored.
 
 pub mod body;
+pub mod check;
+pub mod diff;
 pub mod idempotency;
+pub mod keys;
 pub mod meshes;
 pub mod query;
 pub mod upload;
@@ -79,11 +83,9 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
         request::read(None, &query.overrides, &state.rules).map_err(query::query_error)?;
     }
     // A picture that is in memory needs no worker. A document that names its mesh is short.
-    let is_short_json = body::is_json(request.headers())
-        && body::announced_length(request.headers()).is_some_and(|length| length <= DOCUMENT_BYTES_MAX);
     // Nor does a request that was accepted before.
     let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
-    if !is_short_json && !is_sent_again {
+    if !is_short_json(request.headers()) && !is_sent_again {
         state.jobs.would_accept(class, &access.owner)?;
     }
 
@@ -146,6 +148,11 @@ fn understand(
     let recipe = Some(Arc::new(Recipe { document: upload.document, overrides, mesh: None }));
     let work = Work { recipe, ..stored_mesh::work(upload.bundle, reading, Task::Draw(spec), memory) };
     Ok(Received { work, key: None, address: None, is_negotiated })
+}
+
+/// True for a document that names its mesh, and so is short.
+fn is_short_json(headers: &HeaderMap) -> bool {
+    body::is_json(headers) && body::announced_length(headers).is_some_and(|length| length <= DOCUMENT_BYTES_MAX)
 }
 
 /// What the sender of a request sees.

@@ -19,16 +19,7 @@ pub struct Query {
 impl Query {
     /// Reads a query and refuses keys that are given twice. The values of dotted keys stay text.
     pub fn read(uri: &Uri, rules: &Rules) -> Result<Self, ApiError> {
-        let extract::Query(mut pairs) = extract::Query::<Vec<(String, String)>>::try_from_uri(uri)
-            .map_err(|e| bad("bad_query", format!("the query cannot be read: {}", e.body_text())))?;
-        let format_in = take(&mut pairs, "format_in")?;
-        let format_in = format_in.map(|name| {
-            Format::from_name(&name).ok_or_else(|| {
-                let allowed = Format::names().join(", ");
-                bad("out_of_range", format!("`format_in` is {}, and allowed is one of {allowed}", quote(&name)))
-            })
-        });
-        let reading = Reading { format_in: format_in.transpose()?, entry: take(&mut pairs, "entry")? };
+        let (reading, pairs) = pairs(uri)?;
         request::check_once(&pairs, rules)?;
         Ok(Self { reading, overrides: pairs.into() })
     }
@@ -56,6 +47,20 @@ impl Query {
     }
 }
 
+/// The keys about reading the mesh, and the other pairs of a query.
+pub fn pairs(uri: &Uri) -> Result<(Reading, Vec<(String, String)>), ApiError> {
+    let extract::Query(mut pairs) = extract::Query::<Vec<(String, String)>>::try_from_uri(uri)
+        .map_err(|e| bad("bad_query", format!("the query cannot be read: {}", e.body_text())))?;
+    let format_in = take(&mut pairs, "format_in")?;
+    let format_in = format_in.map(|name| {
+        Format::from_name(&name).ok_or_else(|| {
+            let allowed = Format::names().join(", ");
+            bad("out_of_range", format!("`format_in` is {}, and allowed is one of {allowed}", quote(&name)))
+        })
+    });
+    Ok((Reading { format_in: format_in.transpose()?, entry: take(&mut pairs, "entry")? }, pairs))
+}
+
 /// The error of a dotted key. For an unknown key it adds the keys that only a query has, because
 /// the request module does not know them.
 pub fn query_error(mut error: RequestError) -> ApiError {
@@ -74,11 +79,12 @@ fn take(pairs: &mut Vec<(String, String)>, key: &str) -> Result<Option<String>, 
     Ok(values.pop())
 }
 
-fn bad(code: &'static str, detail: String) -> ApiError {
+/// The error of a request that is malformed.
+pub fn bad(code: &'static str, detail: String) -> ApiError {
     ApiError::new(Fault::BadRequest, code, detail)
 }
 
 /// The beginning of a client's text, in quotes.
-fn quote(text: &str) -> String {
+pub fn quote(text: &str) -> String {
     format!("{:?}", text.chars().take(40).collect::<String>())
 }

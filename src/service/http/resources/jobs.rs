@@ -1,4 +1,4 @@
-//! `/v1/jobs`: pictures that are fetched later.
+//! `/v1/jobs`: pictures and verdicts that are fetched later.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -7,6 +7,7 @@ use axum::extract::{Extension, Request, State};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse as _, Response};
 
+use super::verdicts::{check, diff};
 use super::{PathName, responses, run, text_of};
 use crate::service::http::dto::{JobOfMeshDto, JobsDto};
 use crate::service::http::error::{ApiError, Fault};
@@ -17,13 +18,45 @@ use crate::service::http::state::AppState;
 use crate::service::jobs::{Class, Job, JobId, JobState};
 use crate::service::keys::Access;
 
+/// The work of a job, by the key `kind` of the query.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Render,
+    Check,
+    Diff,
+}
+
 /// Accepts a job, or one for each `mesh` part of a form, always with 202. A request that is sent again under its `Idempotency-Key` gets the job that it has.
-pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Result<Response, ApiError> {
+pub async fn post(State(state): State<Arc<AppState>>, mut request: Request) -> Result<Response, ApiError> {
+    match take_kind(&mut request)? {
+        Kind::Render => {}
+        Kind::Check => return check::accept(&state, request).await,
+        Kind::Diff => return diff::accept(&state, request).await,
+    }
     match receive::receive(&state, request, Class::Batch).await? {
         Reception::New(received) => Ok(responses::accepted(&*state.jobs.accept(received.work).await?)),
         Reception::Known(job) => Ok(responses::accepted(&job)),
         Reception::Many(meshes) => accept_all(&state, meshes).await,
     }
+}
+
+/// Removes the key `kind` from the query.
+fn take_kind(request: &mut Request) -> Result<Kind, ApiError> {
+    let Some(query) = request.uri().query() else { return Ok(Kind::Render) };
+    let (kinds, others): (Vec<&str>, Vec<&str>) = query.split('&').partition(|pair| pair.starts_with("kind="));
+    let kind = match kinds.as_slice() {
+        [] => return Ok(Kind::Render),
+        ["kind=render"] => Kind::Render,
+        ["kind=check"] => Kind::Check,
+        ["kind=diff"] => Kind::Diff,
+        _ => {
+            let detail = "`kind` is given once, and allowed is one of render, check, diff";
+            return Err(ApiError::new(Fault::BadRequest, "out_of_range", detail));
+        }
+    };
+    let address = format!("{}?{}", request.uri().path(), others.join("&"));
+    *request.uri_mut() = address.parse().map_err(|_| ApiError::internal())?;
+    Ok(kind)
 }
 
 /// Accepts a job for each mesh of a form that has none: all of them or, with an error, none.
@@ -86,7 +119,7 @@ pub async fn delete(
     Ok(responses::job_state(&job))
 }
 
-/// The picture, or the error that a waiting client would have got.
+/// The picture or the verdict, or the error that a waiting client would have got.
 pub async fn result(
     State(state): State<Arc<AppState>>,
     Extension(access): Extension<Access>,
@@ -99,7 +132,7 @@ pub async fn result(
         state.jobs.fetched(&job);
     }
     match ended {
-        JobState::Done(finished) => Ok(responses::picture(&finished)),
+        JobState::Done(finished) => Ok(responses::result(&finished)),
         JobState::Failed(failure) => Err(run::job_error(&job, &failure)),
         JobState::Queued | JobState::Running => {
             Err(conflict("not_finished", "the job has not ended yet; ask again shortly").retry_after(1))

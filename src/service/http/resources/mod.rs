@@ -14,6 +14,7 @@ pub mod render;
 mod responses;
 mod run;
 pub mod schema;
+pub mod verdicts;
 
 use axum::extract::Path;
 use axum::extract::rejection::PathRejection;

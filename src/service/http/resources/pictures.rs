@@ -17,7 +17,7 @@ use crate::service::http::error::ApiError;
 use crate::service::http::receive::query::{Query, query_error};
 use crate::service::http::state::AppState;
 use crate::service::http::stored_mesh;
-use crate::service::jobs::{Task, Work};
+use crate::service::jobs::{Media, Task, Work};
 use crate::service::keys::Access;
 
 /// Draws a stored mesh, unless the client has the picture. HEAD draws nothing.
@@ -44,7 +44,7 @@ pub async fn get(
         return Ok((StatusCode::NOT_MODIFIED, cached).into_response());
     }
     let mut response = if method == Method::HEAD {
-        let media_type = HeaderValue::from_static(media_type(format));
+        let media_type = HeaderValue::from_static(media_type(Media::Picture(format)));
         ([(header::CONTENT_TYPE, media_type)], responses::body_of_unknown_length()).into_response()
     } else {
         // No work is made for a picture that is in memory.

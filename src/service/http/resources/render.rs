@@ -35,7 +35,7 @@ pub async fn post(State(state): State<Arc<AppState>>, request: Request) -> Resul
             state.metrics.picture(found.source.name());
             responses::found(&found, tag)
         }
-        None => responses::picture(&*drawing.await?),
+        None => responses::result(&*drawing.await?),
     };
     if is_negotiated {
         response.headers_mut().insert(header::VARY, HeaderValue::from_static("accept"));

@@ -9,12 +9,35 @@ use serde::Serialize;
 
 use crate::service::http::conditional;
 use crate::service::http::dto::{JobDto, media_type};
-use crate::service::jobs::{Finished, Job};
+use crate::service::http::error::IsAnswer;
+use crate::service::jobs::{Finished, Job, Media, Timings};
 use crate::service::pictures::{Found, Source};
 
-/// A picture, with its back-end, timings and warnings as headers.
-pub fn picture(finished: &Finished) -> Response {
-    picture_with_tag(finished, &conditional::content_tag(&finished.picture))
+/// A picture, with its back-end, timings and warnings as headers, or a verdict.
+pub fn result(finished: &Finished) -> Response {
+    with_tag(finished, &conditional::content_tag(&finished.content))
+}
+
+fn with_tag(finished: &Finished, tag: &str) -> Response {
+    match finished.media {
+        Media::Picture(_) => picture_with_tag(finished, tag),
+        Media::Json => verdict_with_tag(finished, tag),
+    }
+}
+
+fn verdict_with_tag(finished: &Finished, tag: &str) -> Response {
+    let Timings { queue, parse, render, .. } = finished.timings;
+    let timings = [("queue", queue), ("parse", parse), ("judge", render)];
+    let timings = timings.map(|(name, took)| format!("{name};dur={:.3}", took.as_secs_f64() * 1e3));
+    let headers = [
+        (header::CONTENT_TYPE, HeaderValue::from_static(media_type(finished.media))),
+        conditional::etag(tag),
+        (HeaderName::from_static("server-timing"), header_text(&timings.join(", "))),
+    ];
+    let status = if finished.has_failed { StatusCode::UNPROCESSABLE_ENTITY } else { StatusCode::OK };
+    let mut response = (status, headers, finished.content.clone()).into_response();
+    response.extensions_mut().insert(IsAnswer);
+    response
 }
 
 fn picture_with_tag(finished: &Finished, tag: &str) -> Response {
@@ -28,7 +51,7 @@ fn picture_with_tag(finished: &Finished, tag: &str) -> Response {
         })
         .collect();
     let headers = [
-        (header::CONTENT_TYPE, HeaderValue::from_static(media_type(finished.format))),
+        (header::CONTENT_TYPE, HeaderValue::from_static(media_type(finished.media))),
         conditional::etag(tag),
         (HeaderName::from_static("x-render-backend"), HeaderValue::from_static(finished.backend.name())),
         (HeaderName::from_static("server-timing"), header_text(&timings.join(", "))),
@@ -47,17 +70,17 @@ fn picture_with_tag(finished: &Finished, tag: &str) -> Response {
             (HeaderName::from_static("x-chosen"), header_text(&choice.to_string())),
         ]
     });
-    let mut response = (StatusCode::OK, headers, finished.picture.clone()).into_response();
+    let mut response = (StatusCode::OK, headers, finished.content.clone()).into_response();
     response.headers_mut().extend(choice.into_iter().flatten().chain(warnings));
     response
 }
 
-/// As [`picture`], and whether it was in memory. A picture that this request has not drawn brings its
+/// As [`result`], and whether it was in memory. A picture that this request has not drawn brings its
 /// age instead of timings. Its tag is `tag`, if it has an address; the bytes are then not hashed.
 pub fn found(found: &Found, tag: Option<&str>) -> Response {
     let mut response = match tag {
-        Some(tag) => picture_with_tag(&found.finished, tag),
-        None => picture(&found.finished),
+        Some(tag) => with_tag(&found.finished, tag),
+        None => result(&found.finished),
     };
     let headers = response.headers_mut();
     headers.insert("x-cache", HeaderValue::from_static(found.source.name()));

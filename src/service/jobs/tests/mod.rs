@@ -186,7 +186,7 @@ fn a_job_ends_with_its_picture_and_gives_its_memory_back() {
     let fixture = fixture(settings());
     let job = fixture.submit(b"12345", false).unwrap();
     let JobState::Done(finished) = wait(&job) else { panic!("{:?}", job.state()) };
-    assert_eq!(finished.picture.len(), 5);
+    assert_eq!(finished.content.len(), 5);
     assert_eq!(fixture.budget.used_bytes(), 0);
     assert!(fixture.jobs.find(job.id).is_none(), "not kept");
 }

@@ -15,6 +15,7 @@ use meshsnap::image::Image;
 use meshsnap::import::{Bundle, BundleFile, Format, survey};
 use meshsnap::limits::{Budget, Deadline, Limits};
 use meshsnap::pipeline;
+use meshsnap::report::Extras;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -187,7 +188,8 @@ fn totals(files: &[(String, Vec<u8>)], is_said_gltf: bool, is_drawn: bool) -> Op
     let surveyed = survey(&bundle, format, &limits, &mut Budget::new(&limits), &Deadline::default());
     let surveyed = surveyed.ok()?.content.map(|c| [c.draw_calls, c.vertices, c.triangles]);
     if is_drawn {
-        let report = pipeline::inspect(&bundle, format, &limits, &Deadline::default(), &mut |_| {}).unwrap();
+        let report =
+            pipeline::inspect(&bundle, format, Extras::default(), &limits, &Deadline::default(), &mut |_| {}).unwrap();
         let report: Value = serde_json::from_str(&report.json().unwrap()).unwrap();
         let content = &report["file_content"];
         let inspected = ["draw_calls", "vertices", "triangles"].map(|key| content[key].as_u64());

@@ -1,6 +1,6 @@
 //! The daemon under load and over time: queue, deadline, cancellation, drain.
 
-mod durable;
+pub mod durable;
 mod events;
 mod idempotency;
 mod several;

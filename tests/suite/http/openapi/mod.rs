@@ -55,7 +55,7 @@ fn the_document_is_whole_and_served_to_everybody() {
     let operations =
         document["paths"].as_object().unwrap().values().flat_map(|item| item.as_object().unwrap().values());
     let ids: Vec<&str> = operations.filter_map(|operation| operation["operationId"].as_str()).collect();
-    assert_eq!((ids.len(), ids.iter().collect::<BTreeSet<_>>().len()), (19, 19));
+    assert_eq!((ids.len(), ids.iter().collect::<BTreeSet<_>>().len()), (21, 21));
 
     let mut command = meshsnap();
     command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu"]).env("MESHSNAP_API_KEYS", "one");
@@ -94,7 +94,7 @@ fn every_path_answers_to_the_methods_that_are_documented_and_to_no_others() {
         }
         assert_eq!(said, allowed, "{path}");
     }
-    assert_eq!(asked, 16 * METHODS.len());
+    assert_eq!(asked, 18 * METHODS.len());
 }
 
 /// Checks an answer's status, headers, type and JSON against the document.
@@ -152,6 +152,38 @@ fn answers_are_as_documented() {
     ask("POST", "/v1/render", "/v1/render", &["Accept: text/html"], CUBE_OBJ, 406);
     ask("POST", "/v1/render", "/v1/render", &[], b"no mesh", 415);
     ask("POST", "/v1/render", "/v1/render", &[], many.as_bytes(), 422);
+    const CHECK: &str = "/v1/check";
+    ask("POST", CHECK, "/v1/check?rules=watertight,bounds:1,1,1,max-triangles:3", &[], CUBE_OBJ, 200);
+    ask("POST", CHECK, "/v1/check?rules=max-triangles:3&fail=422", &[], CUBE_OBJ, 422);
+    ask("POST", CHECK, "/v1/check", &[], b"no mesh", 200);
+    ask("POST", CHECK, "/v1/check", &[], many.as_bytes(), 422);
+    ask("POST", CHECK, "/v1/check?rules=x", &[], CUBE_OBJ, 400);
+    ask("POST", CHECK, "/v1/check", &[json], format!("{{\"mesh\":\"{:064}\"}}", 0).as_bytes(), 404);
+    ask("POST", CHECK, "/v1/check", &[], b"", 415);
+    let checked =
+        ask("POST", CHECK, "/v1/check?rules=max-triangles:3&fail=422", &["Prefer: respond-async"], CUBE_OBJ, 202);
+    let checked = checked.header("location").unwrap();
+    ask("GET", "/v1/jobs/{id}", checked, &["Prefer: wait=30"], b"", 200);
+    ask("GET", RESULT, &format!("{checked}/result"), &[], b"", 422);
+    let checked = ask("POST", "/v1/jobs", "/v1/jobs?kind=check&rules=opens", &[], CUBE_OBJ, 202);
+    let checked = checked.header("location").unwrap();
+    ask("GET", "/v1/jobs/{id}", checked, &["Prefer: wait=30"], b"", 200);
+    ask("GET", RESULT, &format!("{checked}/result"), &[], b"", 200);
+    const DIFF: &str = "/v1/diff";
+    let sides = form(&[("a", CUBE_OBJ), ("b", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")]);
+    ask("POST", DIFF, "/v1/diff?max_distance=0.1", &[FORM], &sides, 200);
+    ask("POST", DIFF, "/v1/diff?size=64x32", &[FORM, "Accept: image/webp"], &sides, 200);
+    ask("POST", DIFF, "/v1/diff?fail=422", &[FORM], &sides, 422);
+    ask("POST", DIFF, "/v1/diff", &[FORM], &form(&[("a", CUBE_OBJ), ("b", many.as_bytes())]), 422);
+    ask("POST", DIFF, "/v1/diff", &[FORM], &form(&[("a", CUBE_OBJ), ("b", b"no mesh")]), 415);
+    ask("POST", DIFF, "/v1/diff", &[FORM, "Accept: text/html"], &sides, 406);
+    ask("POST", DIFF, "/v1/diff", &[], CUBE_OBJ, 400);
+    ask("POST", DIFF, "/v1/diff", &[json], format!("{{\"a\":\"{0:064}\",\"b\":\"{0:064}\"}}", 0).as_bytes(), 404);
+    let compared = ask("POST", DIFF, "/v1/diff?fail=422", &[FORM, "Prefer: respond-async"], &sides, 202);
+    let compared = compared.header("location").unwrap();
+    ask("GET", "/v1/jobs/{id}", compared, &["Prefer: wait=30"], b"", 200);
+    ask("GET", RESULT, &format!("{compared}/result"), &[], b"", 422);
+    ask("POST", "/v1/jobs", "/v1/jobs?kind=diff&format=png", &[FORM], &sides, 202);
     ask("POST", "/v1/meshes", "/v1/meshes", &[], CUBE_OBJ, 201);
     ask("POST", "/v1/meshes", "/v1/meshes", &[], CUBE_OBJ, 200);
     ask("POST", "/v1/meshes", "/v1/meshes", &[FORM], &form(&[("other", b"")]), 400);
@@ -192,5 +224,5 @@ fn answers_are_as_documented() {
     {
         ask("GET", path, path, &[], b"", 200);
     }
-    assert_eq!(cases, 44);
+    assert_eq!(cases, 69);
 }

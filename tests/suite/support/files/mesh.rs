@@ -16,7 +16,7 @@ pub struct Read {
 }
 
 impl From<Imported> for Read {
-    fn from(Imported { mesh, report }: Imported) -> Self {
+    fn from(Imported { mesh, report, .. }: Imported) -> Self {
         Self { mesh, report }
     }
 }
@@ -53,7 +53,7 @@ pub fn read_limited(bytes: &[u8], format: Option<Format>, limits: &Limits) -> Re
 
 /// Imports at a moment of the file's first animation.
 pub fn read_at(bytes: &[u8], time_s: f64) -> Result<Read, MeshError> {
-    let (limits, options) = (Limits::default(), Options { format: None, time_s: Some(time_s) });
+    let (limits, options) = (Limits::default(), Options { time_s: Some(time_s), ..Options::default() });
     import(&Bundle::of_one(bytes.to_vec()), options, &limits, &mut Budget::new(&limits), &Deadline::default())
         .map(Read::from)
 }

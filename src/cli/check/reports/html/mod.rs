@@ -2,11 +2,14 @@
 
 use std::fmt::Write as _;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use quick_xml::escape::escape;
 
 use super::text::{at, place};
-use super::{Findings, faults, word};
+use super::{Findings, ViewPictures, faults, word};
 use crate::check::{Check, Figure, Verdict, meaning};
+use crate::cli::check::pictures::Changed;
 use crate::pluralise::pluralise;
 
 const CSS: &str = include_str!("page.css");
@@ -15,6 +18,9 @@ const JS: &str = include_str!("page.js");
 /// Nothing is loaded, and no other page can frame or change this one.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; \
                       base-uri 'none'; form-action 'none'";
+
+/// Most bytes of pictures: a page that is larger opens slowly.
+const PICTURES_BYTES_MAX: usize = 32 << 20;
 
 /// The page.
 pub fn html(findings: &Findings<'_>) -> String {
@@ -46,7 +52,11 @@ pub fn html(findings: &Findings<'_>) -> String {
     page += "</select></label>\n<span id=\"shown\" role=\"status\"></span>\n</form>\n";
     page += "<div class=\"table\" role=\"region\" aria-label=\"Files\" tabindex=\"0\">\n<table>\n<thead>\n<tr>\
              <th scope=\"col\">File</th><th scope=\"col\">Verdict</th><th scope=\"col\">Faults</th></tr>\n</thead>\n<tbody>\n";
-    findings.verdicts.iter().for_each(|verdict| row(&mut page, verdict));
+    let mut room = PICTURES_BYTES_MAX;
+    for (index, verdict) in findings.verdicts.iter().enumerate() {
+        let pictures = findings.pictures.get(index).map(Vec::as_slice).unwrap_or_default();
+        row(&mut page, verdict, pictures, &mut room);
+    }
     let _ = write!(page, "</tbody>\n</table>\n</div>\n</main>\n<script>\n{JS}</script>\n</body>\n</html>\n");
     page
 }
@@ -69,7 +79,7 @@ fn counts(findings: &Findings<'_>) -> String {
     said.join(", ")
 }
 
-fn row(page: &mut String, verdict: &Verdict) {
+fn row(page: &mut String, verdict: &Verdict, pictures: &[ViewPictures], room: &mut usize) {
     let met = |meant: &str| faults(verdict).any(|check| word(check) == meant);
     let (state, label) = match () {
         () if !verdict.ok => ("error", "failed"),
@@ -87,7 +97,55 @@ fn row(page: &mut String, verdict: &Verdict) {
         faults(verdict).for_each(|check| fault(page, check));
         page.push_str("</ul>");
     }
+    views(page, &verdict.path, pictures, room);
     page.push_str("</td></tr>\n");
+}
+
+/// The pictures of a file, as far as there is room.
+fn views(page: &mut String, path: &str, pictures: &[ViewPictures], room: &mut usize) {
+    let bytes = |one: &ViewPictures| {
+        let changed = one.changed.as_ref().map_or(0, |changed| changed.before.len() + changed.difference.len());
+        (one.after.len() + changed).div_ceil(3) * 4
+    };
+    if pictures.is_empty() {
+        return;
+    }
+    if pictures.iter().map(bytes).sum::<usize>() > *room {
+        page.push_str("<p class=\"left-out\">The pictures are left out, for the size of the page.</p>");
+        return;
+    }
+    *room -= pictures.iter().map(bytes).sum::<usize>();
+    page.push_str("<div class=\"views\">");
+    for ViewPictures { view, after, changed } in pictures {
+        let mut figure = |kind: &str, png: &[u8]| {
+            let data = STANDARD.encode(png);
+            let caption = if kind.is_empty() { (*view).to_owned() } else { format!("{view}, {kind}") };
+            let class = if kind.is_empty() { "after" } else { kind };
+            let _ = write!(
+                page,
+                "<figure class=\"{class}\"><img src=\"data:image/png;base64,{data}\" width=\"160\" height=\"160\" \
+                 alt=\"{caption}: {}\"><figcaption>{caption}</figcaption></figure>",
+                text(path)
+            );
+        };
+        let Some(Changed { before, difference, flip }) = changed else {
+            figure("", after);
+            continue;
+        };
+        figure("before", before);
+        figure("after", after);
+        if !difference.is_empty() {
+            figure("difference", difference);
+        }
+        let _ = write!(
+            page,
+            "<p class=\"change\">{view} changed by {} (FLIP, 0 to 1) <button type=\"button\" hidden \
+             aria-pressed=\"false\" aria-label=\"Blink {view} of {}\">Blink</button></p>",
+            short(*flip),
+            text(path)
+        );
+    }
+    page.push_str("</div>");
 }
 
 fn fault(page: &mut String, check: &Check) {
@@ -119,6 +177,11 @@ fn fault(page: &mut String, check: &Check) {
         page.push_str(&text(&at(check)));
     }
     page.push_str("</li>");
+}
+
+/// Two digits.
+fn short(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(value)
 }
 
 /// A text without characters that take no place or turn the line around, escaped.

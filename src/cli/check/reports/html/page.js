@@ -19,3 +19,37 @@ form.hidden = false;
 form.addEventListener("input", filter);
 form.addEventListener("submit", (event) => event.preventDefault());
 filter();
+
+// Blinks a view: the picture after shows the one before by turns. Where motion is unwanted, each press turns once.
+const still = matchMedia("(prefers-reduced-motion: reduce)");
+for (const button of document.querySelectorAll(".change button")) {
+  const figures = [];
+  for (let one = button.parentElement.previousElementSibling; one; one = one.previousElementSibling) {
+    if (!one.matches("figure")) break;
+    figures.push(one);
+    if (one.matches(".before")) break;
+  }
+  const find = (name) => figures.find((one) => one.matches(name))?.querySelector("img");
+  const [before, after] = [find(".before"), find(".after")];
+  if (!before || !after) continue;
+  const sources = [after.src, before.src];
+  let turn = 0;
+  let timer = 0;
+  const show = (next) => { turn = next; after.src = sources[turn]; };
+  const press = () => {
+    if (still.matches) {
+      show(1 - turn);
+      button.setAttribute("aria-pressed", String(turn === 1));
+    } else if (timer) {
+      clearInterval(timer);
+      timer = 0;
+      show(0);
+      button.setAttribute("aria-pressed", "false");
+    } else {
+      timer = setInterval(() => show(1 - turn), 600);
+      button.setAttribute("aria-pressed", "true");
+    }
+  };
+  button.hidden = false;
+  button.addEventListener("click", press);
+}

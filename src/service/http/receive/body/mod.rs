@@ -1,5 +1,7 @@
 //! Reads a request's body within its limits: size, shared memory, and time.
 
+pub mod sides;
+
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -177,7 +179,7 @@ async fn read_form(
                 limits::check("the number of files in the form", count, files_max, "--limit-bundle-entries")
                     .map_err(|limit| ApiError::from(&limit))?;
                 // The name is checked before the bytes are read, so that a bad one costs nothing.
-                let mut file = empty_file(field.file_name(), files.len())?;
+                let mut file = empty_file(field.file_name(), (files.len(), "file"))?;
                 file.check_new(&files).map_err(|e| bad_form(format!("{e}; each `file` part needs its own")))?;
                 file.bytes = field.bytes().await.map_err(broken)?;
                 files.push(file);
@@ -206,11 +208,11 @@ fn kind_of(part: &str) -> BodyKind {
 }
 
 /// A file without bytes, under the name that its part gives. The first part needs no name.
-fn empty_file(name: Option<&str>, files_before: usize) -> Result<BundleFile, ApiError> {
+fn empty_file(name: Option<&str>, (files_before, part): (usize, &str)) -> Result<BundleFile, ApiError> {
     let name = match name {
         None | Some("") if files_before == 0 => "mesh",
         None | Some("") => {
-            return Err(bad_form(format!("`file` part {} of the form has no filename", files_before + 1)));
+            return Err(bad_form(format!("`{part}` part {} of the form has no filename", files_before + 1)));
         }
         Some(name) => name,
     };

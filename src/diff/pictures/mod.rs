@@ -1,4 +1,8 @@
-//! What differs between two pictures, pixel by pixel.
+//! What differs between two pictures, pixel by pixel, and to the eye.
+
+mod flip;
+#[cfg(test)]
+mod tests;
 
 use image::{ImageFormat, ImageReader};
 use serde::Serialize;
@@ -8,6 +12,7 @@ use crate::guard::{Panicked, guarded};
 use crate::image::Image;
 use crate::limits::Limits;
 use crate::pluralise::pluralise;
+pub use flip::{Flip, flip};
 
 /// The longest side of a picture, pixels.
 const SIDE_PX_MAX: u32 = 16_384;
@@ -40,16 +45,18 @@ pub enum PictureError {
 /// What counts as the same.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tolerance {
-    /// Pixels that may differ.
-    pub pixels: u64,
+    /// Pixels that may differ. None: none, unless `flip` is given.
+    pub pixels: Option<u64>,
     /// The largest difference of a channel at which a pixel is the same, in steps of 255.
     pub error: f64,
+    /// The mean FLIP that may be.
+    pub flip: Option<f64>,
 }
 
 /// What differs between two pictures.
 #[derive(Clone, Debug, Serialize)]
 pub struct PictureDifference {
-    /// True if no more pixels differ than may.
+    /// True if no more differs than may.
     pub same: bool,
     /// The sizes.
     pub sizes: [SizePx; 2],
@@ -82,6 +89,17 @@ pub struct PixelDifference {
     /// Column and row of the upper left and the lower right corner of the box around those that differ; null if
     /// none does.
     pub bounds_px: Option<[[u32; 2]; 2]>,
+    /// The difference that a person sees, from 0 to 1.
+    pub flip: FlipFigures,
+}
+
+/// FLIP over all pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct FlipFigures {
+    /// The mean.
+    pub mean: f64,
+    /// The largest.
+    pub max: f64,
 }
 
 /// The format of a picture that can be compared; none for other bytes.
@@ -107,6 +125,17 @@ impl Picture {
         };
         let pixels = decoded.as_raw().as_chunks::<4>().0.iter().map(|pixel| over_nothing(*pixel)).collect();
         Ok(Self { width_px, height_px, pixels })
+    }
+
+    /// Its pixels, 8 bits each, with colours as they are.
+    pub fn image(&self) -> Image {
+        let byte = |value: u16| ((u32::from(value) * 255 + 32_767) / 65_535) as u8;
+        let plain = |[r, g, b, a]: &[u16; 4]| {
+            let color = |value: u16| (u32::from(value) * 65_535 / u32::from(*a).max(1)).min(65_535) as u16;
+            [byte(color(*r)), byte(color(*g)), byte(color(*b)), byte(*a)]
+        };
+        let rgba = self.pixels.iter().flat_map(plain).collect();
+        Image { width_px: self.width_px, height_px: self.height_px, rgba }
     }
 
     fn size(&self) -> SizePx {
@@ -141,9 +170,18 @@ pub fn compare(a: &Picture, b: &Picture, tolerance: Tolerance) -> PictureDiffere
     let total = a.pixels.len() as u64;
     let mean = sum as f64 / total.max(1) as f64 * STEPS / CHANNEL_MAX;
     let bounds_px = (differ > 0).then_some([low, high]);
-    let pixels = PixelDifference { differ, total, max: in_steps(max), mean, bounds_px };
+    let seen = if max > 0 { flip(a, b) } else { None };
+    let flip = seen.map(|Flip { mean, max, .. }| FlipFigures { mean, max }).unwrap_or_default();
+    let pixels = PixelDifference { differ, total, max: in_steps(max), mean, bounds_px, flip };
     let summary = vec![pixels.sentence(tolerance.error)];
-    PictureDifference { same: differ <= tolerance.pixels, sizes, pixels: Some(pixels), summary }
+    PictureDifference { same: tolerance.holds(&pixels), sizes, pixels: Some(pixels), summary }
+}
+
+impl Tolerance {
+    fn holds(&self, found: &PixelDifference) -> bool {
+        let pixels_max = self.pixels.unwrap_or(if self.flip.is_some() { u64::MAX } else { 0 });
+        found.differ <= pixels_max && self.flip.is_none_or(|flip| found.flip.mean <= flip)
+    }
 }
 
 impl PixelDifference {
@@ -160,10 +198,13 @@ impl PixelDifference {
         let differ = pluralise(self.differ, "pixel differs", "pixels differ");
         let share = 100.0 * self.differ as f64 / self.total as f64;
         format!(
-            "{differ} of {} ({} %), by up to {} of 255, within ({left}, {top}) to ({right}, {bottom})",
+            "{differ} of {} ({} %), by up to {} of 255, within ({left}, {top}) to ({right}, {bottom}); FLIP {} on \
+             average, {} at most",
             self.total,
             short(share),
-            short(self.max)
+            short(self.max),
+            short(self.flip.mean),
+            short(self.flip.max)
         )
     }
 }
@@ -196,6 +237,22 @@ pub fn heat(a: &Picture, b: &Picture, tolerance: Tolerance) -> Option<Image> {
     Some(Image { width_px: a.width_px, height_px: a.height_px, rgba })
 }
 
+/// The second picture in pale grey, with what a person sees of the difference in colour: from yellow, a little, to red.
+/// None where the sizes differ.
+pub fn flip_heat(a: &Picture, b: &Picture) -> Option<Image> {
+    let Flip { errors, .. } = flip(a, b)?;
+    let color = |(error, now): (&f32, &[u16; 4])| {
+        // Below this nobody sees a difference.
+        if *error < 0.02 {
+            return pale(*now);
+        }
+        let share = error.min(1.0);
+        [255 - (80.0 * share) as u8, (200.0 * (1.0 - share)) as u8, 0, 255]
+    };
+    let rgba = errors.iter().zip(&b.pixels).flat_map(color).collect();
+    Some(Image { width_px: a.width_px, height_px: a.height_px, rgba })
+}
+
 /// The largest difference of a channel.
 fn distance(before: [u16; 4], now: [u16; 4]) -> u16 {
     (0..4).fold(0, |largest, k| largest.max(before[k].abs_diff(now[k])))
@@ -215,63 +272,4 @@ fn pale([r, g, b, a]: [u16; 4]) -> [u8; 4] {
 /// Three digits.
 fn short(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn picture(width_px: u32, pixels: &[[u8; 4]]) -> Picture {
-        let bytes = pixels.as_flattened().to_vec();
-        let image = image::RgbaImage::from_raw(width_px, pixels.len() as u32 / width_px, bytes).unwrap();
-        let mut png = Vec::new();
-        image.write_to(&mut Cursor::new(&mut png), ImageFormat::Png).unwrap();
-        Picture::read(&png, sniff(&png).unwrap(), &Limits::default()).unwrap()
-    }
-
-    const GREY: [u8; 4] = [100, 100, 100, 255];
-
-    #[test]
-    fn pixels_that_differ_are_counted_and_found() {
-        let mut pixels = [GREY; 12];
-        let a = picture(4, &pixels);
-        assert_eq!(compare(&a, &a, Tolerance::default()).summary, ["no pixel differs"]);
-        (pixels[5], pixels[11]) = ([100, 102, 100, 255], [100, 100, 110, 255]);
-        let b = picture(4, &pixels);
-        let found = compare(&a, &b, Tolerance::default());
-        let numbers = found.pixels.unwrap();
-        assert_eq!((numbers.differ, numbers.total, numbers.max), (2, 12, 10.0));
-        assert_eq!((numbers.mean, numbers.bounds_px), (1.0, Some([[1, 1], [3, 2]])));
-        assert_eq!(found.summary, ["2 pixels differ of 12 (16.7 %), by up to 10 of 255, within (1, 1) to (3, 2)"]);
-        let is_same = |pixels, error| compare(&a, &b, Tolerance { pixels, error }).same;
-        assert!(!is_same(0, 0.0) && !is_same(1, 0.0) && is_same(2, 0.0));
-        assert!(!is_same(0, 2.0) && is_same(1, 2.0) && is_same(0, 10.0));
-        let heat = heat(&a, &b, Tolerance { pixels: 0, error: 2.0 }).unwrap();
-        let is_colored = |i: usize| heat.rgba[4 * i] != heat.rgba[4 * i + 1];
-        assert!((0..12).all(|i| is_colored(i) == (i == 11)));
-    }
-
-    #[test]
-    fn what_is_transparent_has_no_colour() {
-        let clear = |red| picture(1, &[[red, 0, 0, 0]]);
-        assert!(compare(&clear(0), &clear(255), Tolerance::default()).same);
-        let half = compare(&picture(1, &[[255, 0, 0, 128]]), &picture(1, &[[0, 0, 0, 128]]), Tolerance::default());
-        assert_eq!(half.pixels.unwrap().max.round(), 128.0);
-        assert!(!compare(&clear(0), &picture(1, &[[0, 0, 0, 255]]), Tolerance::default()).same);
-    }
-
-    #[test]
-    fn other_sizes_and_what_is_no_picture_are_told() {
-        let (a, b) = (picture(2, &[GREY; 4]), picture(4, &[GREY; 4]));
-        let found = compare(&a, &b, Tolerance { pixels: 100, error: 255.0 });
-        assert!(!found.same && found.pixels.is_none() && heat(&a, &b, Tolerance::default()).is_none());
-        assert_eq!(found.summary, ["the size is 4 x 1 px, before 2 x 2 px"]);
-        assert_eq!(sniff(b"solid"), None);
-        let broken = b"\x89PNG\r\n\x1a\n and so on";
-        assert!(Picture::read(broken, sniff(broken).unwrap(), &Limits::default()).is_err());
-        let small = Limits { memory_bytes: 64, ..Limits::default() };
-        let mut png = Vec::new();
-        image::RgbaImage::new(64, 64).write_to(&mut Cursor::new(&mut png), ImageFormat::Png).unwrap();
-        assert!(Picture::read(&png, ImageFormat::Png, &small).is_err());
-    }
 }

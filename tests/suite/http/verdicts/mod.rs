@@ -1,0 +1,4 @@
+//! Verdicts on meshes over HTTP.
+
+mod check;
+mod diff;
