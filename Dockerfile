@@ -2,6 +2,8 @@
 FROM rust:1-bookworm AS build
 WORKDIR /src
 COPY . .
+# The commit, for /version: --build-arg MESHSNAP_COMMIT=$(git rev-parse HEAD)
+ARG MESHSNAP_COMMIT
 # The caches keep downloaded and built dependencies between builds; the binary is copied out because they are no part of
 # the image.
 RUN --mount=type=cache,target=/usr/local/cargo/registry --mount=type=cache,target=/src/target \

@@ -3,21 +3,19 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
 
 use super::DrawError;
 use super::costs::CostModel;
 use super::device::{GpuDevice, GpuKind, GpuState, GpuStatus, HardwareHint, Opener, drop_catching_panics};
 use super::probe::{ProbeError, probe};
-
-/// Jobs in a row that lost the device, after which `auto` goes on with the CPU.
-const LOSSES_MAX: u32 = 3;
+use super::recovery::{Clock, Recovery};
 
 /// The process's one GPU, shared by all workers.
 pub struct GpuHost {
     open: Box<Opener>,
-    /// The reason why `auto` means the CPU. Set at most once, and never cleared.
+    /// The reason why `auto` means the CPU for ever. Set at most once, and never cleared.
     without: OnceLock<String>,
     /// Held while a device is opened.
     device: Mutex<Slot>,
@@ -28,8 +26,8 @@ pub struct GpuHost {
     status: Mutex<GpuStatus>,
     /// Devices that were lost since the start.
     losses_in_all: AtomicU64,
-    /// Jobs in a row that lost the device.
-    losses: AtomicU32,
+    /// Losses in a row, after which `auto` means the CPU for a while.
+    recovery: Recovery,
     costs: CostModel,
 }
 
@@ -92,15 +90,24 @@ impl GpuHost {
             opening,
             opening_changed,
             status,
-            losses: AtomicU32::new(0),
+            recovery: Recovery::default(),
             losses_in_all: AtomicU64::new(0),
             costs,
         }
     }
 
+    /// The same host, which takes the time of rests from `now`.
+    #[must_use]
+    pub fn with_clock(self, now: Box<Clock>) -> Self {
+        Self { recovery: Recovery::with_clock(now), ..self }
+    }
+
     /// The status. Does not wait for an opening.
     pub fn status(&self) -> GpuStatus {
         let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some(reason) = self.recovery.resting() {
+            status.reason = Some(reason);
+        }
         // A GPU is ready then: a software one, or one that has recovered.
         if status.state == GpuState::Ready {
             status.reason = status.reason.map(|reason| format!("`auto` means the CPU all the same: {reason}"));
@@ -118,16 +125,21 @@ impl GpuHost {
         self.losses_in_all.load(Ordering::Relaxed)
     }
 
-    /// True as long as `auto` may choose a GPU.
+    /// True as long as `auto` may choose a GPU, now or later.
     pub fn may_have_hardware(&self) -> bool {
         self.without.get().is_none()
+    }
+
+    /// True if `auto` may choose a GPU now.
+    pub fn is_eligible(&self) -> bool {
+        self.may_have_hardware() && self.recovery.resting().is_none()
     }
 
     /// The device for a request of this kind. It is opened on first use, and draws the probe on first
     /// use of a number of samples per pixel; other workers wait meanwhile. A thread that opens it calls
     /// `opened` before it draws the probe, and one that waits may call it meanwhile.
     ///
-    /// `NoGpu` is final. `DeviceLost` means that a device that was there is gone, and that another
+    /// `NoGpu` is final, or lasts for the time of a rest. `DeviceLost` means that a device that was there is gone, and that another
     /// try may help.
     pub fn device(
         &self,
@@ -199,22 +211,27 @@ impl GpuHost {
         is_current
     }
 
-    /// Counts a job whose device was lost under it. After too many in a row `auto` means the CPU.
+    /// Counts a job whose device was lost under it. After too many in a row `auto` means the CPU for a while.
     pub fn count_loss(&self, reason: &str) {
-        if self.losses.fetch_add(1, Ordering::Relaxed) + 1 == LOSSES_MAX {
-            self.go_without(format!("the GPU was lost in {LOSSES_MAX} jobs in a row, at last because: {reason}"), true);
+        if let Some(reason) = self.recovery.lost(reason) {
+            tracing::warn!(reason, "the GPU rests: `auto` means the CPU");
         }
     }
 
     /// Counts a job that the device drew without trouble.
     pub fn count_success(&self) {
-        self.losses.store(0, Ordering::Relaxed);
+        if self.recovery.drawn() {
+            tracing::info!("the GPU draws again");
+        }
     }
 
     fn check_auto(&self, kind: GpuKind) -> Result<(), DrawError> {
-        match self.without.get() {
-            Some(reason) if kind == GpuKind::Hardware => Err(DrawError::NoGpu(reason.clone())),
-            _ => Ok(()),
+        if kind == GpuKind::Any {
+            return Ok(());
+        }
+        match self.without.get().cloned().or_else(|| self.recovery.resting()) {
+            Some(reason) => Err(DrawError::NoGpu(reason)),
+            None => Ok(()),
         }
     }
 

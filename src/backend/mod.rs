@@ -17,6 +17,7 @@ mod draw_times;
 pub mod gpu;
 mod host;
 pub mod probe;
+mod recovery;
 pub(crate) mod sample_partition;
 mod select;
 

@@ -48,9 +48,9 @@ impl Backends {
         Self { cpu: cpu::CpuRenderer::on(threads), host, gpu: None }
     }
 
-    /// True as long as `auto` may choose a GPU here. Opens none, so there may turn out to be none.
+    /// True if `auto` may choose a GPU here now. Opens none, so there may turn out to be none.
     pub fn has_gpu(&self) -> bool {
-        self.host.may_have_hardware()
+        self.host.is_eligible()
     }
 
     /// Draws the plan on the back-end that `choice` means here and now. Gives rows to `sink` as

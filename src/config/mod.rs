@@ -46,6 +46,12 @@ pub struct Config {
     pub cors_origins: Vec<String>,
     /// Most connections at a time.
     pub connections: u64,
+    /// Most connections of one address; 0: three quarters of all.
+    pub connections_per_address: u64,
+    /// Time after which a connection is asked to end, milliseconds.
+    pub connection_age_ms: u64,
+    /// Least bytes a second by which a client sends a body, and reads an answer that waits for it; 0: any.
+    pub least_rate_bytes: u64,
     /// Most requests a second of a key, or of an address where there are no keys; 0: any number.
     pub rate_per_s: u64,
     /// Most of them at once; 0: those of a second.
@@ -59,6 +65,8 @@ pub struct Config {
     pub header_timeout_ms: u64,
     /// Longest time for the body of a request, milliseconds.
     pub body_timeout_ms: u64,
+    /// Time beyond the limit of a job after which its worker is replaced, milliseconds.
+    pub overdue_grace_ms: u64,
     /// Longest time for which a request waits for a worker, as far as is known when it comes, milliseconds.
     pub wait_ms: u64,
     /// The same for a job that is fetched later.
@@ -102,12 +110,16 @@ impl Default for Config {
             no_auth: false,
             cors_origins: Vec::new(),
             connections: 512,
+            connections_per_address: 0,
+            connection_age_ms: 3600 * 1000,
+            least_rate_bytes: 1024,
             rate_per_s: 0,
             rate_burst: 0,
             quota_per_day: 0,
             uploads_bytes: 1 << 30,
             header_timeout_ms: 10_000,
             body_timeout_ms: 60_000,
+            overdue_grace_ms: 30_000,
             wait_ms: 30_000,
             batch_wait_ms: 600_000,
             result_ttl_ms: 600_000,

@@ -79,6 +79,19 @@ pub const SETTINGS: &[Setting] = &[
         |c| c.cors_origins.join(","),
     ),
     number("connections", "Most connections at a time", 1, 1 << 20, |c| &mut c.connections),
+    number("connections-per-address", "Most of them from one address; 0: three quarters", 0, 1 << 20, |c| {
+        &mut c.connections_per_address
+    }),
+    number("connection-age-ms", "Time after which a connection is asked to end", 1, MS_MAX, |c| {
+        &mut c.connection_age_ms
+    }),
+    number(
+        "least-rate-bytes",
+        "Fewest bytes a second of a body, and of an answer that waits; 0: any",
+        0,
+        1 << 30,
+        |c| &mut c.least_rate_bytes,
+    ),
     number("rate-per-s", "Most requests a second of a key, or of an address without keys; 0: any", 0, RATE_MAX, |c| {
         &mut c.rate_per_s
     }),
@@ -89,6 +102,9 @@ pub const SETTINGS: &[Setting] = &[
     number("uploads-bytes", "Most bytes of uploads in memory at a time", 1, u64::MAX, |c| &mut c.uploads_bytes),
     number("header-timeout-ms", "Longest time for the header of a request", 1, MS_MAX, |c| &mut c.header_timeout_ms),
     number("body-timeout-ms", "Longest time for the body of a request", 1, MS_MAX, |c| &mut c.body_timeout_ms),
+    number("overdue-grace-ms", "Time beyond limit-job-ms after which a job's worker is replaced", 1, MS_MAX, |c| {
+        &mut c.overdue_grace_ms
+    }),
     number("wait-ms", "Longest time for which a request is let wait for a worker", 0, MS_MAX, |c| &mut c.wait_ms),
     number("batch-wait-ms", "The same for a job that is fetched later", 0, MS_MAX, |c| &mut c.batch_wait_ms),
     number("result-ttl-ms", "Time for which a result is kept after it was fetched", 0, MS_MAX, |c| {

@@ -6,6 +6,7 @@
 //! the key out. [`table`] is the table of keys, from which [`schema()`] follows.
 
 mod apply;
+mod components;
 pub(crate) mod document;
 mod draft;
 mod error;
@@ -20,6 +21,7 @@ mod tests;
 
 pub use crate::spec::words::{Words, word_for, words_of};
 pub use apply::keys;
+pub use components::{PREFIX as COMPONENTS_PREFIX, components};
 pub use document::dotted::all_dotted;
 pub use document::mesh_reference::{bad_mesh_name, is_faulty_document, names_mesh};
 pub use error::{RequestError, RequestFault};

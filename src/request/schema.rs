@@ -91,32 +91,32 @@ fn object(section: &Section, image_px: u64) -> Json {
         "additionalProperties": false,
     });
     let given = |key: &str, is: Json| json!({ "properties": { key: is }, "required": [key] });
-    let rules = match section.name {
+    let rule = match section.name {
         "wire" => {
             let thin = json!({ "properties": { "thickness": { "maximum": MULTIPLE_MAX } } });
-            vec![json!({ "if": given("method", json!({ "not": { "enum": ["exact", null] } })), "then": thin })]
+            Some((given("method", json!({ "not": { "enum": ["exact", null] } })), thin))
         }
         "outline" => {
             let thin = json!({ "properties": { "thickness": { "maximum": OUTLINE_PX_MAX } } });
-            vec![json!({ "if": given("unit", json!({ "const": "px" })), "then": thin })]
+            Some((given("unit", json!({ "const": "px" })), thin))
         }
         "camera" => {
             let point = |key| given(key, json!({ "type": "array" }));
             let no_file = json!({ "properties": { "from_file": { "enum": [false, null] } } });
-            vec![
-                json!({ "if": point("eye"), "then": { "allOf": [point("target"), no_file] } }),
-                json!({ "if": point("target"), "then": point("eye") }),
-            ]
+            let all = json!({ "allOf": [point("eye"), point("target"), no_file] });
+            Some((json!({ "anyOf": [point("eye"), point("target")] }), all))
         }
-        _ => Vec::new(),
+        _ => None,
     };
-    if !rules.is_empty() {
-        schema["allOf"] = rules.into();
+    if let Some((condition, consequence)) = rule {
+        schema["if"] = condition;
+        schema["then"] = consequence;
     }
     schema
 }
 
-fn property(field: &Field, image_px: u64) -> Json {
+/// The schema of a key's values.
+pub(super) fn property(field: &Field, image_px: u64) -> Json {
     let mut schema = or_null(of_kind(&field.kind, image_px));
     schema["description"] = field.about.as_str().into();
     if let Some(default) = &field.default {
@@ -125,7 +125,8 @@ fn property(field: &Field, image_px: u64) -> Json {
     schema
 }
 
-fn or_null(mut schema: Json) -> Json {
+/// The schema of a value that may also be null.
+pub(super) fn or_null(mut schema: Json) -> Json {
     if let Some(Json::Array(words)) = schema.get_mut("enum") {
         words.push(Json::Null);
     }
@@ -143,6 +144,24 @@ fn color_pattern() -> String {
     format!("(transparent|#?({hex}{{3,4}}|{hex}{{6}}|{hex}{{8}}))")
 }
 
+/// The whole numbers from 1 to `max`, which is not 0, as a pattern.
+fn up_to(max: u64) -> String {
+    let digits = max.to_string();
+    let mut alternatives = Vec::new();
+    if let Some(fewer) = digits.len().checked_sub(2) {
+        alternatives.push(format!("[1-9][0-9]{{0,{fewer}}}"));
+    }
+    for (place, digit) in digits.bytes().enumerate() {
+        let (before, after) = (&digits[..place], digits.len() - 1 - place);
+        let lowest = if place == 0 { b'1' } else { b'0' };
+        if digit > lowest {
+            alternatives.push(format!("{before}[{}-{}][0-9]{{{after}}}", lowest as char, (digit - 1) as char));
+        }
+    }
+    alternatives.push(digits);
+    format!("({})", alternatives.join("|"))
+}
+
 fn of_kind(kind: &Kind, image_px: u64) -> Json {
     let whole = || json!({ "type": "integer", "minimum": 1, "maximum": image_px });
     let coordinates = || {
@@ -152,23 +171,21 @@ fn of_kind(kind: &Kind, image_px: u64) -> Json {
     match kind {
         Kind::Number { min, max } => json!({ "type": "number", "minimum": min, "maximum": max }),
         Kind::NumberOr { word, min, max } => {
-            json!({ "anyOf": [{ "type": "number", "minimum": min, "maximum": max }, { "const": word }] })
+            json!({ "anyOf": [{ "type": "number", "minimum": min, "maximum": max }, { "type": "string", "const": word }] })
         }
         Kind::Above0 { max } => json!({ "type": "number", "exclusiveMinimum": 0, "maximum": max }),
         Kind::OneOf(values) => json!({ "enum": values }),
         Kind::OneOfOr { word, values } => {
-            let numbers = values.iter().map(|&value| Json::from(value));
-            json!({ "enum": std::iter::once(Json::from(*word)).chain(numbers).collect::<Vec<_>>() })
+            json!({ "anyOf": [{ "type": "string", "const": word }, { "type": "integer", "enum": values }] })
         }
         Kind::Pixels => whole(),
         Kind::Size => {
-            let digits = image_px.to_string().len() - 1;
-            let side = format!("[1-9][0-9]{{0,{digits}}}");
+            let side = up_to(image_px);
             json!({ "anyOf": [whole(), { "type": "string", "pattern": format!("^{side}([xX]{side})?$") }] })
         }
         Kind::Words(words) => json!({ "enum": words }),
         Kind::WordList { words, count_max } => {
-            json!({ "type": "array", "items": { "enum": words }, "minItems": 1, "maxItems": count_max })
+            json!({ "type": "array", "items": { "type": "string", "enum": words }, "minItems": 1, "maxItems": count_max })
         }
         Kind::Count { min, max } => json!({ "type": "integer", "minimum": min, "maximum": max }),
         Kind::Color => json!({ "type": "string", "pattern": format!("^{}$", color_pattern()) }),
@@ -183,5 +200,24 @@ fn of_kind(kind: &Kind, image_px: u64) -> Json {
             schema
         }
         Kind::Flag => json!({ "type": "boolean" }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pattern_counts() {
+        let mut numbers = 0;
+        for max in [1, 9, 10, 64, 100, 640, 999, 4096, 16384] {
+            let pattern = jsonschema::draft202012::new(&json!({ "pattern": format!("^{}$", up_to(max)) })).unwrap();
+            for number in 0..=20_000_u64 {
+                let expected = (1..=max).contains(&number);
+                assert_eq!(pattern.is_valid(&number.to_string().into()), expected, "{number} up to {max}");
+                numbers += 1;
+            }
+        }
+        assert_eq!(numbers, 9 * 20_001);
     }
 }

@@ -30,6 +30,8 @@ pub struct Metrics {
     memory_limits: IntGaugeVec,
     entries: IntGaugeVec,
     gpu_losses: IntCounter,
+    overdue: IntCounter,
+    quarantined: IntGauge,
     resident: IntGauge,
 }
 
@@ -44,8 +46,10 @@ impl std::fmt::Debug for Metrics {
 pub struct Gauges {
     /// Jobs that wait and milliseconds that one would wait, by class.
     pub queues: Vec<(&'static str, usize, u64)>,
-    /// Busy workers, and all of them.
-    pub workers: (usize, u64),
+    /// Workers by state.
+    pub workers: Vec<(&'static str, u64)>,
+    /// Meshes that are refused because workers did not end with them.
+    pub quarantined: usize,
     /// Bytes in use and the cap, by account.
     pub memory: Vec<(&'static str, u64, u64)>,
     /// Number of things kept, by account.
@@ -90,6 +94,14 @@ impl Metrics {
             memory_limits: gauge("meshsnap_memory_limit_bytes", "Most memory of an account.", &["account"])?,
             entries: gauge("meshsnap_kept_entries", "Number of things that are kept.", &["account"])?,
             gpu_losses: registered(r, IntCounter::new("meshsnap_gpu_losses_total", "Times that a GPU was lost.")?)?,
+            overdue: registered(
+                r,
+                IntCounter::new("meshsnap_workers_overdue_total", "Workers that did not end a job whose time was up.")?,
+            )?,
+            quarantined: registered(
+                r,
+                IntGauge::new("meshsnap_quarantined_meshes", "Meshes that are refused because of that.")?,
+            )?,
             resident: registered(r, IntGauge::new("process_resident_memory_bytes", "Resident memory size in bytes.")?)?,
             registry,
         })
@@ -124,15 +136,21 @@ impl Metrics {
         self.pictures.with_label_values(&[outcome]).inc();
     }
 
+    /// A worker did not end its job.
+    pub fn worker_overdue(&self) {
+        self.overdue.inc();
+    }
+
     /// All of it as text.
     pub fn text(&self, gauges: &Gauges) -> Result<String, prometheus::Error> {
         for &(class, jobs, wait_ms) in &gauges.queues {
             self.queued.with_label_values(&[class]).set(to_i64(jobs as u64));
             self.expected_wait.with_label_values(&[class]).set(to_i64(wait_ms));
         }
-        let (busy, all) = gauges.workers;
-        self.workers.with_label_values(&["busy"]).set(to_i64(busy as u64));
-        self.workers.with_label_values(&["all"]).set(to_i64(all));
+        for &(state, count) in &gauges.workers {
+            self.workers.with_label_values(&[state]).set(to_i64(count));
+        }
+        self.quarantined.set(to_i64(gauges.quarantined as u64));
         for &(account, bytes, limit) in &gauges.memory {
             self.memory.with_label_values(&[account]).set(to_i64(bytes));
             self.memory_limits.with_label_values(&[account]).set(to_i64(limit));

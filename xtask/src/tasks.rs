@@ -21,12 +21,7 @@ struct Stored {
 /// Everything that `bless` knows.
 const STORED: [Stored; 4] = [
     Stored { name: "pictures", filter: "render::golden::", write: ("MESHSNAP_GOLDEN", "write"), path: "tests/golden" },
-    Stored {
-        name: "schema",
-        filter: "the_stored_schema_is_the_generated_one",
-        write: ("MESHSNAP_GOLDEN", "write"),
-        path: "api/material.schema.json",
-    },
+    Stored { name: "schema", filter: "the_stored_schema", write: ("MESHSNAP_GOLDEN", "write"), path: "api" },
     Stored {
         name: "tables",
         filter: "the_shipped_table_is_what_was_measured",

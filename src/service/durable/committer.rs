@@ -63,8 +63,14 @@ impl Commit {
     }
 }
 
-/// Writes until it is told to close.
-pub fn run(mut log: Box<dyn Log>, blobs: &dyn Blobs, index: &Index, inbox: &Receiver<Message>) {
+/// Writes until it is told to close. `written` hears of the outcome of each transaction.
+pub fn run(
+    mut log: Box<dyn Log>,
+    blobs: &dyn Blobs,
+    index: &Index,
+    inbox: &Receiver<Message>,
+    written: &dyn Fn(Result<(), Unstored>),
+) {
     let mut owed: Vec<Commit> = Vec::new();
     let mut dropped: Vec<Digest> = Vec::new();
     loop {
@@ -89,7 +95,7 @@ pub fn run(mut log: Box<dyn Log>, blobs: &dyn Blobs, index: &Index, inbox: &Rece
             }
         }
         if is_due || is_closing {
-            owed = write(&mut *log, batch, &mut dropped, index);
+            owed = write(&mut *log, batch, &mut dropped, index, written);
         } else {
             owed = batch;
         }
@@ -101,9 +107,16 @@ pub fn run(mut log: Box<dyn Log>, blobs: &dyn Blobs, index: &Index, inbox: &Rece
 }
 
 /// Writes a transaction, and tells its commits. Returns those that have to be tried again.
-fn write(log: &mut dyn Log, batch: Vec<Commit>, dropped: &mut Vec<Digest>, index: &Index) -> Vec<Commit> {
+fn write(
+    log: &mut dyn Log,
+    batch: Vec<Commit>,
+    dropped: &mut Vec<Digest>,
+    index: &Index,
+    written: &dyn Fn(Result<(), Unstored>),
+) -> Vec<Commit> {
     match log.commit(&changes(&batch, dropped, index)) {
         Ok(()) => {
+            written(Ok(()));
             dropped.clear();
             for commit in batch {
                 commit.holds.iter().filter(|hold| hold.is_small()).for_each(|hold| hold.set_stored());
@@ -113,6 +126,7 @@ fn write(log: &mut dyn Log, batch: Vec<Commit>, dropped: &mut Vec<Digest>, index
         }
         Err(error) => {
             let cause = unstored(&error);
+            written(Err(cause));
             batch.into_iter().map(|commit| commit.answer(Err(cause))).filter(|commit| commit.must).collect()
         }
     }

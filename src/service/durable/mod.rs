@@ -26,6 +26,7 @@ pub use record::{RequestKind, RequestRecord, SelectionRecord, SideRecord, Warnin
 use std::collections::{HashMap, HashSet};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::JoinHandle;
@@ -92,7 +93,25 @@ struct Inner {
     index: Arc<Index>,
     inbox: Sender<Message>,
     on_drop: OnDrop,
+    health: Arc<Health>,
     committer: Mutex<Option<JoinHandle<()>>>,
+}
+
+/// The outcome of the last write.
+#[derive(Default)]
+struct Health {
+    trouble: Mutex<Option<Unstored>>,
+    is_probing: AtomicBool,
+}
+
+impl Health {
+    fn set(&self, outcome: Result<(), Unstored>) {
+        *self.trouble.lock().unwrap_or_else(PoisonError::into_inner) = outcome.err();
+    }
+
+    fn trouble(&self) -> Option<Unstored> {
+        *self.trouble.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// The content of a data folder when it was opened.
@@ -155,11 +174,12 @@ impl Durable {
             }
         }
         sweep(&*blobs, &found)?;
-        let (writer_blobs, writer_index) = (blobs.clone(), index.clone());
-        let committer = std::thread::Builder::new()
-            .name("committer".into())
-            .spawn(move || committer::run(log, &*writer_blobs, &writer_index, &outbox))?;
-        let inner = Inner { blobs, index, inbox, on_drop, committer: Mutex::new(Some(committer)) };
+        let (writer_blobs, writer_index, health) = (blobs.clone(), index.clone(), Arc::new(Health::default()));
+        let writer_health = health.clone();
+        let committer = std::thread::Builder::new().name("committer".into()).spawn(move || {
+            committer::run(log, &*writer_blobs, &writer_index, &outbox, &|outcome| writer_health.set(outcome))
+        })?;
+        let inner = Inner { blobs, index, inbox, on_drop, health, committer: Mutex::new(Some(committer)) };
         let log::Contents { jobs, meshes } = contents;
         Ok((Self(Arc::new(inner)), Recovered { jobs, meshes, blobs: found }))
     }
@@ -169,7 +189,9 @@ impl Durable {
     pub fn hold(&self, bytes: &Bytes) -> Result<Arc<Hold>, Unstored> {
         let hold = self.0.index.hold(bytes, SMALL_BYTES_MAX, &self.0.on_drop);
         if !hold.is_small() && !hold.is_stored() {
-            self.0.blobs.put(hold.digest(), bytes).map_err(|error| unstored(&error))?;
+            let put = self.0.blobs.put(hold.digest(), bytes).map_err(|error| unstored(&error));
+            self.0.health.set(put);
+            put?;
             hold.set_stored();
         }
         Ok(hold)
@@ -198,6 +220,24 @@ impl Durable {
     /// Stores changes soon. `releases` are let go then.
     pub fn store_soon(&self, changes: Vec<Change>, releases: Vec<Arc<Hold>>) {
         self.store_surely(changes, Vec::new(), releases, |_| ());
+    }
+
+    /// The error of the last write, if it failed. Then something is written again, so that the next call knows whether
+    /// the disk has recovered. Waits for nothing.
+    pub fn trouble(&self) -> Option<Unstored> {
+        let trouble = self.0.health.trouble()?;
+        if !self.0.health.is_probing.swap(true, Ordering::Relaxed) {
+            let health = self.0.health.clone();
+            let done = Box::new(move |_| health.is_probing.store(false, Ordering::Relaxed));
+            self.send(Commit {
+                changes: Vec::new(),
+                holds: Vec::new(),
+                releases: Vec::new(),
+                must: false,
+                done: Some(done),
+            });
+        }
+        Some(trouble)
     }
 
     /// Writes what is outstanding and ends the thread that writes. Nothing is stored after that.

@@ -225,6 +225,7 @@ impl From<Refusal> for ApiError {
             }
             Refusal::TooMany { .. } => Self::new(Fault::Content, "too_many_meshes", detail).flag("--queue"),
             Refusal::TooMuch { .. } => Self::new(Fault::Content, "too_many_meshes", detail).flag("--batch-wait-ms"),
+            Refusal::Quarantined { .. } => Self::new(Fault::Content, "mesh_quarantined", detail),
             Refusal::Unstored(unstored) => unstored.into(),
             Refusal::Draining => Self::draining(detail),
         }

@@ -11,13 +11,14 @@
 //! [`recovery`] takes over what an earlier process has left in the data folder.
 //! [`negotiate`] and [`conditional`] read and write single headers. [`stored_mesh`] and [`address`]
 //! serve the resources of stored meshes. [`event_streams`] counts the clients that follow jobs.
-//! [`static_document`] answers with a constant document.
+//! [`static_document`] answers with a constant document, [`descriptions`] are two of them.
 //!
 //! Architecture invariant: axum and hyper are used nowhere else.
 
 mod address;
 mod conditional;
 mod connection;
+mod descriptions;
 mod dto;
 mod error;
 mod event_streams;
@@ -42,6 +43,7 @@ use crate::config::{Config, cores};
 use crate::service::durable::OpenError;
 use crate::service::keys::{Keys, KeysError};
 use crate::service::warm_up::WarmUp;
+use connection::accept::ConnectionLimits;
 use signals::{EndSignals, HangUps};
 use state::AppState;
 
@@ -121,8 +123,14 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
         }
         state.event_streams.close();
     };
-    let header_timeout = Duration::from_millis(config.header_timeout_ms);
-    connection::accept::run(listener, router, config.connections as usize, header_timeout, stop).await;
+    let limits = ConnectionLimits {
+        all: config.connections as usize,
+        per_client: config.connections_per_address as usize,
+        header_time: Duration::from_millis(config.header_timeout_ms),
+        age: Duration::from_millis(config.connection_age_ms),
+        least_rate: config.least_rate_bytes,
+    };
+    connection::accept::run(listener, router, limits, stop).await;
     warm_up.stop();
     warm_up.wait(WORKERS_GRACE);
     state.jobs.join(WORKERS_GRACE);

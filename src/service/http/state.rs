@@ -1,17 +1,17 @@
 //! The state that all handlers share.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use super::event_streams::EventStreams;
 use super::static_document::StaticDocument;
-use super::{ServeError, error};
+use super::{ServeError, descriptions, error};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{GpuHost, HardwareHint};
 use crate::config::{Config, cores, why_no_gpu};
 use crate::limits::Limits;
-use crate::request::{self, Rules};
+use crate::request::Rules;
 use crate::service::durable::{Durable, Recovered};
 use crate::service::jobs::{CpuThreads, JobSettings, Jobs, Storage, UploadBudget, pipeline_renderers};
 use crate::service::keys::Keys;
@@ -30,6 +30,8 @@ pub struct AppState {
     pub rules: Rules,
     /// The JSON Schema of request documents under these rules.
     pub schema: StaticDocument,
+    /// The description of the interface under these rules, once somebody has asked for it.
+    pub openapi: OnceLock<StaticDocument>,
     /// The job queue and its workers.
     pub jobs: Jobs,
     /// The process's GPU.
@@ -50,6 +52,8 @@ pub struct AppState {
     pub pictures: Pictures,
     /// Time limit for reading one request body.
     pub body_timeout: Duration,
+    /// Least bytes a second of a request body; 0: any.
+    pub least_rate: u64,
     /// Number of worker threads.
     pub workers: u64,
     /// The server can be reached from this machine alone.
@@ -87,6 +91,7 @@ impl AppState {
             queue: to_usize(queue_per_worker.saturating_mul(config.workers)),
             idle_time: IDLE_TIME,
             job_time: Duration::from_millis(job_ms),
+            overdue_grace: Duration::from_millis(config.overdue_grace_ms),
             result_ttl: Duration::from_millis(config.result_ttl_ms),
             interactive_wait: Duration::from_millis(config.wait_ms),
             batch_wait: Duration::from_millis(config.batch_wait_ms),
@@ -97,9 +102,9 @@ impl AppState {
             storage: durable.clone().map(|durable| Storage { durable, describe: error::record }),
         };
         let rules = Rules { limits: config.limits.clone(), backend: config.backend };
-        let schema = format!("{:#}\n", request::schema(&rules));
         let state = Arc::new(Self {
-            schema: StaticDocument::new(schema, "application/schema+json"),
+            schema: descriptions::schema(&rules),
+            openapi: OnceLock::new(),
             rules,
             jobs: Jobs::start(settings, renderers)?,
             gpu,
@@ -111,6 +116,7 @@ impl AppState {
             residents,
             pictures: Pictures::new(config.picture_bytes),
             body_timeout: Duration::from_millis(config.body_timeout_ms),
+            least_rate: config.least_rate_bytes,
             workers: config.workers,
             is_local,
             cors_origins: config.cors_origins.clone(),

@@ -1,17 +1,29 @@
-//! The thread that ends overdue jobs and drops expired results. It sleeps until the next of either.
+//! The thread that ends overdue jobs, replaces overdue workers, and drops expired results. It sleeps until the next of
+//! these.
 
 use std::sync::Arc;
 
 use super::job::{Failure, JobState};
 use super::registry::JobRegistry;
 
-/// Runs until the registry is drained and every job has ended.
-pub fn run(registry: &Arc<JobRegistry>) {
+/// Runs until the registry is drained and every job has ended. `replace` starts a worker.
+pub fn run(registry: &Arc<JobRegistry>, replace: &dyn Fn()) {
     let limit_ms = u64::try_from(registry.settings.job_time.as_millis()).unwrap_or(u64::MAX);
-    while let Some(overdue) = registry.wait_for_overdue() {
-        for job in overdue {
+    while let Some(late) = registry.wait_for_late() {
+        for job in late.jobs {
             // The answer goes out now, even if the worker needs a moment to stop.
             registry.end(&job, JobState::Failed(Arc::new(Failure::TimeUp { limit_ms })));
+        }
+        for (running, is_replaced) in late.workers {
+            let (mesh, strikes) = registry.quarantine.strike(&running.bundle);
+            let (job, request_id, ms) = (running.job.id, &*running.job.request_id, running.since.elapsed().as_millis());
+            tracing::error!(%job, request_id, ms, %mesh, strikes, is_replaced, "a worker does not end its job");
+            if let Some(metrics) = &registry.settings.metrics {
+                metrics.worker_overdue();
+            }
+            if is_replaced {
+                replace();
+            }
         }
     }
 }

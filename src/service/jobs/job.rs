@@ -387,6 +387,18 @@ pub struct Size {
     pub(super) is_known: bool,
 }
 
+/// A job that has ended in an earlier process.
+pub struct Restored {
+    /// Its name.
+    pub id: JobId,
+    /// The time of its acceptance in milliseconds since 1970.
+    pub accepted_unix_ms: u64,
+    /// The party that asked for it.
+    pub owner: Owner,
+    /// The name that it gave its request.
+    pub claim: Option<Arc<Claim>>,
+}
+
 /// What distinguishes a new job beside its work.
 pub struct Admission {
     /// The job can be found by its id.

@@ -6,7 +6,7 @@
 //!
 //! Reading order: [`job`] (one job and its states), [`claims`] (names of requests), [`progress`] (how far it has
 //! come), [`queue`] (those that wait),
-//! [`registry`] (all jobs, behind one lock), [`results`] (those that have ended), [`storage`] (jobs in the data folder), [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs),
+//! [`registry`] (all jobs, behind one lock), [`results`] (those that have ended), [`storage`] (jobs in the data folder), [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs), [`watchdog`] (overdue workers),
 //! [`upload_budget`] (memory of uploads).
 
 mod claims;
@@ -22,6 +22,7 @@ mod storage;
 #[cfg(test)]
 mod tests;
 mod upload_budget;
+mod watchdog;
 mod worker;
 
 pub use claims::{Claim, ClaimName};
@@ -42,8 +43,8 @@ use super::digest::Digest;
 use super::durable::{Change, EndRecord, Hold, Unstored};
 use super::metrics::Metrics;
 use claims::Claimed;
+pub use job::Restored;
 use registry::JobRegistry;
-pub use registry::Restored;
 
 /// The limits of the job service.
 #[derive(Clone, Debug)]
@@ -56,6 +57,8 @@ pub struct JobSettings {
     pub idle_time: Duration,
     /// Longest time from the moment at which a worker begins to the encoded picture.
     pub job_time: Duration,
+    /// Time beyond that after which its worker is replaced.
+    pub overdue_grace: Duration,
     /// Longest time for which a job is let wait that somebody waits for, as far as is known.
     pub interactive_wait: Duration,
     /// The same for a job that is fetched later.
@@ -124,6 +127,15 @@ pub enum Refusal {
     /// The job cannot be stored.
     #[error(transparent)]
     Unstored(#[from] Unstored),
+    /// The mesh keeps workers busy beyond the time of a job.
+    #[error(
+        "the mesh {mesh} kept workers busy long after their time was up, so it is not tried again until the server starts \
+         anew"
+    )]
+    Quarantined {
+        /// Its SHA-256.
+        mesh: Digest,
+    },
     /// The process shuts down.
     #[error("the server is shutting down and takes no new work")]
     Draining,
@@ -149,8 +161,14 @@ pub struct JobLoad {
     pub queued: usize,
     /// The same by class.
     pub queued_by_class: [usize; 2],
-    /// Number of busy workers.
+    /// Number of busy workers, without those that are overdue.
     pub running: usize,
+    /// Workers that do not end their jobs.
+    pub overdue: usize,
+    /// Those of them that have no replacement.
+    pub missing: usize,
+    /// Meshes that are refused because of it.
+    pub quarantined: usize,
     /// Time after which a job that somebody waits for would begin, as far as is known.
     pub wait: Duration,
     /// The same for a job that is fetched later.
@@ -173,20 +191,33 @@ impl Jobs {
     pub fn start(settings: JobSettings, renderers: RendererFactory) -> std::io::Result<Self> {
         let workers = settings.workers.max(1);
         let registry = Arc::new(JobRegistry::new(settings));
-        let mut threads = Vec::new();
-        for index in 0..workers {
-            let (registry, renderers) = (registry.clone(), renderers.clone());
-            let name = format!("render-{index}");
-            threads.push(std::thread::Builder::new().name(name).spawn(move || worker::run(&registry, &renderers))?);
-        }
+        let threads = Arc::new(Mutex::new(Vec::new()));
+        let start = {
+            let (registry, threads) = (registry.clone(), threads.clone());
+            move || {
+                let (registry, renderers) = (registry.clone(), renderers.clone());
+                let mut threads = threads.lock().unwrap_or_else(PoisonError::into_inner);
+                let name = format!("render-{}", threads.len());
+                let worker = move || worker::run(&registry, &renderers);
+                threads.push(std::thread::Builder::new().name(name).spawn(worker)?);
+                std::io::Result::Ok(())
+            }
+        };
+        (0..workers).try_for_each(|_| start())?;
         let clocked = registry.clone();
-        std::thread::Builder::new().name("job-clock".into()).spawn(move || clock::run(&clocked))?;
-        Ok(Self { registry, workers: Arc::new(Mutex::new(threads)) })
+        let replace = move || {
+            if let Err(error) = start() {
+                tracing::error!(%error, "no worker could be started in the place of an overdue one");
+            }
+        };
+        std::thread::Builder::new().name("job-clock".into()).spawn(move || clock::run(&clocked, &replace))?;
+        Ok(Self { registry, workers: threads })
     }
 
     /// Queues work. A kept job can be found by its id until its result expires. Any other job lives
     /// as long as its handle.
     pub fn submit(&self, work: Work, is_kept: bool) -> Result<Arc<Job>, Refusal> {
+        self.check_mesh(&work)?;
         self.registry.submit(work, is_kept)
     }
 
@@ -199,6 +230,7 @@ impl Jobs {
     /// As [`Jobs::accept`], of several works of one owner: all of them or none. In a data folder, they share a
     /// transaction.
     pub async fn accept_all(&self, works: Vec<Work>) -> Result<Vec<Arc<Job>>, Refusal> {
+        works.iter().try_for_each(|work| self.check_mesh(work))?;
         let storage = self.registry.settings.storage.clone();
         let jobs = self.registry.admit_all(works, storage.is_some())?;
         let Some(storage) = storage else {
@@ -218,6 +250,10 @@ impl Jobs {
         });
         storing.await.unwrap_or(Err(Unstored::Failed))?;
         Ok(jobs)
+    }
+
+    fn check_mesh(&self, work: &Work) -> Result<(), Refusal> {
+        self.registry.quarantine.holds(&work.bundle).map_or(Ok(()), |mesh| Err(Refusal::Quarantined { mesh }))
     }
 
     /// Most works that [`Jobs::accept_all`] may ever accept at once.

@@ -20,13 +20,14 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use super::claims::{Claim, Claims};
+use super::claims::Claims;
 use super::class::{Class, Owner};
 use super::estimates::Estimates;
-use super::job::{Admission, Job, JobId, JobState, Media, Size, Work, unix_ms};
+use super::job::{Admission, Job, JobId, JobState, Media, Restored, Size, Work, unix_ms};
 use super::queue::Queue;
 use super::results::Results;
 use super::storage::Storage;
+use super::watchdog::{Overdue, Quarantine, Running};
 use super::{JobLoad, JobSettings, Refusal};
 use crate::service::durable::{Change, Hold};
 
@@ -38,6 +39,7 @@ pub struct JobRegistry {
     pub(super) settings: JobSettings,
     pub(super) estimates: Estimates,
     pub(super) claims: Arc<Claims>,
+    pub(super) quarantine: Quarantine,
     /// The time from which ranks count.
     began: Instant,
     inner: Mutex<Inner>,
@@ -58,6 +60,8 @@ struct Inner {
     active: BTreeMap<u64, Arc<Job>>,
     /// Jobs that occupy a worker, by number. A cancelled one may do so for a moment longer.
     running: HashMap<u64, Running>,
+    /// Workers that are counted as lost.
+    overdue: Overdue,
     kept: HashMap<JobId, Arc<Job>>,
     /// Kept jobs that have ended.
     results: Results,
@@ -75,22 +79,13 @@ pub enum Next {
     End,
 }
 
-/// A job that has ended in an earlier process.
-pub struct Restored {
-    /// Its name.
-    pub id: JobId,
-    /// The time of its acceptance in milliseconds since 1970.
-    pub accepted_unix_ms: u64,
-    /// The party that asked for it.
-    pub owner: Owner,
-    /// The name that it gave its request.
-    pub claim: Option<Arc<Claim>>,
-}
-
-/// A job that occupies a worker.
-struct Running {
-    job: Arc<Job>,
-    since: Instant,
+/// What has taken too long.
+#[derive(Default)]
+pub struct Late {
+    /// Jobs whose time is up.
+    pub jobs: Vec<Arc<Job>>,
+    /// Jobs that their worker does not end, and whether another worker is to take its place.
+    pub workers: Vec<(Running, bool)>,
 }
 
 impl JobRegistry {
@@ -101,6 +96,7 @@ impl JobRegistry {
             settings,
             estimates: Estimates::new(),
             claims: Arc::default(),
+            quarantine: Quarantine::default(),
             began: Instant::now(),
             inner: Mutex::default(),
             work: Condvar::new(),
@@ -266,7 +262,8 @@ impl JobRegistry {
             let may_batch = self.batch_running(&inner) < self.batch_workers();
             if let Some(job) = inner.queue.take(may_batch) {
                 if let Some(work) = job.take_work() {
-                    inner.running.insert(job.serial, Running { job: job.clone(), since: Instant::now() });
+                    let (bundle, since) = (work.bundle.clone(), Instant::now());
+                    inner.running.insert(job.serial, Running { job: job.clone(), bundle, since });
                     job.state.send_replace(JobState::Running);
                     // Its time begins now.
                     self.clock.notify_one();
@@ -293,9 +290,10 @@ impl JobRegistry {
         }
     }
 
-    /// Ends the job of a worker, which is free again after `took`.
-    pub fn finish(self: &Arc<Self>, job: &Arc<Job>, state: JobState, took: Duration) {
+    /// Ends the job of a worker, which is free again after `took`. True if it takes another job.
+    pub fn finish(self: &Arc<Self>, job: &Arc<Job>, state: JobState, took: Duration) -> bool {
         let mut inner = self.lock();
+        let goes_on = inner.overdue.ended(job);
         // A batch job may wait for this one's end, although workers are idle.
         self.work.notify_one();
         if let Some(running) = inner.running.remove(&job.serial)
@@ -305,6 +303,7 @@ impl JobRegistry {
             self.estimates.learn(running.job.size, took);
         }
         self.end_with(inner, job, state);
+        goes_on
     }
 
     /// Ends a job from outside its worker: cancelled, or out of time.
@@ -405,7 +404,11 @@ impl JobRegistry {
     /// The load at this moment.
     pub fn load(&self) -> JobLoad {
         let inner = self.lock();
+        let (overdue, missing) = inner.overdue.counts();
         JobLoad {
+            overdue,
+            missing,
+            quarantined: self.quarantine.count(),
             queued: inner.queue.len(),
             queued_by_class: Class::ALL.map(|class| inner.queue.count(class)),
             running: inner.running.len(),
@@ -428,26 +431,34 @@ impl JobRegistry {
         self.outstanding.subscribe()
     }
 
-    /// Waits until jobs are overdue, and returns them. None once there will be no more. Drops
-    /// expired results meanwhile.
-    pub fn wait_for_overdue(&self) -> Option<Vec<Arc<Job>>> {
+    /// Waits until jobs or workers are late, and returns them. None once there will be no more. Drops expired results
+    /// meanwhile.
+    pub fn wait_for_late(&self) -> Option<Late> {
+        let (limit, most) = (self.settings.job_time, self.settings.job_time + self.settings.overdue_grace);
         let mut inner = self.lock();
         loop {
             self.evict(&mut inner);
             let now = Instant::now();
-            let active = |running: &&Running| inner.active.contains_key(&running.job.serial);
-            let late = |running: &&Running| now.duration_since(running.since) >= self.settings.job_time;
-            let running = || inner.running.values().filter(active);
-            let overdue: Vec<_> = running().filter(late).map(|running| running.job.clone()).collect();
-            if !overdue.is_empty() {
-                return Some(overdue);
+            let is_active = |running: &&Running| inner.active.contains_key(&running.job.serial);
+            let is_late = |running: &&Running, time| now.duration_since(running.since) >= time;
+            let late = inner.running.values().filter(is_active).filter(|running| is_late(running, limit));
+            let mut late = Late { jobs: late.map(|running| running.job.clone()).collect(), ..Late::default() };
+            let stuck: Vec<_> = inner.running.extract_if(|_, running| is_late(&&*running, most)).collect();
+            for (_, running) in stuck {
+                let is_replaced = inner.overdue.add(&running.job, self.settings.workers);
+                late.workers.push((running, is_replaced));
+            }
+            if !late.jobs.is_empty() || !late.workers.is_empty() {
+                self.publish(&inner);
+                return Some(late);
             }
             if inner.draining && inner.active.is_empty() && inner.queue.is_empty() {
                 return None;
             }
-            let next_deadline = running().filter_map(|running| running.since.checked_add(self.settings.job_time)).min();
-            let next_expiry = inner.results.next_expiry();
-            inner = match next_deadline.into_iter().chain(next_expiry).min() {
+            let next_time =
+                |running: &Running| if inner.active.contains_key(&running.job.serial) { limit } else { most };
+            let next = inner.running.values().filter_map(|r| r.since.checked_add(next_time(r)));
+            inner = match next.chain(inner.results.next_expiry()).min() {
                 Some(at) => {
                     let wait = at.saturating_duration_since(now);
                     self.clock.wait_timeout(inner, wait).unwrap_or_else(PoisonError::into_inner).0
@@ -555,15 +566,6 @@ impl JobRegistry {
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Running {
-    /// Time until it ends, as far as is known. A job that takes longer than its estimate is expected to
-    /// take as long again as it is late. It stops when its time is up.
-    fn remaining(&self, limit: Duration) -> Duration {
-        let so_far = self.since.elapsed();
-        so_far.abs_diff(self.job.estimate).min(limit.saturating_sub(so_far))
     }
 }
 

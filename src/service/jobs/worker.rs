@@ -144,7 +144,7 @@ fn compare(
     Ok(Product::Picture { output: Box::new(output), mesh_was_kept: false })
 }
 
-/// Does jobs until the registry is drained.
+/// Does jobs until the registry is drained, or until one took so long that another worker has replaced this one.
 pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
     // It is made with the first job and dropped when there was none for long, so that an idle process holds
     // no renderer.
@@ -173,7 +173,10 @@ pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
         // The memory is freed before the end is announced, so that a client that waits for the end
         // can send the next mesh of the same size.
         drop(work);
-        registry.finish(&job, state, started.elapsed());
+        if !registry.finish(&job, state, started.elapsed()) {
+            tracing::warn!(job = %job.id, "an overdue worker has ended its job after all");
+            return;
+        }
     }
 }
 

@@ -1,4 +1,5 @@
 //! Rules that the source itself keeps.
 
+mod deploy;
 pub mod structure;
 mod systems;

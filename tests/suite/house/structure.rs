@@ -190,7 +190,16 @@ const ONLY_UNDER: &[(&str, &[&str])] = &[
     // Who draws may depend on what both back-ends took: decision 22.
     (
         "Instant::now",
-        &["cli", "sandbox/", "service/", "telemetry", "main.rs", "backend/cpu/stopwatch.rs", "backend/costs.rs"],
+        &[
+            "cli",
+            "sandbox/",
+            "service/",
+            "telemetry",
+            "main.rs",
+            "backend/cpu/stopwatch.rs",
+            "backend/costs.rs",
+            "backend/recovery.rs",
+        ],
     ),
     ("SystemTime", &["cli", "service/", "telemetry", "main.rs"]),
 ];

@@ -151,7 +151,12 @@ fn the_process_says_how_it_is() {
     let server = Server::start(&["--limit-triangles", "1234"]);
     assert_eq!(server.get("/healthz").json()["status"], "ok");
     assert_eq!(server.get("/readyz").json()["status"], "ready");
-    assert_eq!(server.get("/version").json()["version"], env!("CARGO_PKG_VERSION"));
+    let version = server.get("/version").json();
+    assert_eq!(version["version"], env!("CARGO_PKG_VERSION"));
+    let commit = version["commit"].as_str();
+    assert!(commit.is_none_or(|commit| commit.len() >= 7), "{version}");
+    // Tests are not built as a release, and then the commit is the one that the builder has named.
+    assert_eq!(commit.is_some(), option_env!("MESHSNAP_COMMIT").is_some(), "{version}");
     let capabilities = server.get("/v1/capabilities").json();
     assert_eq!(capabilities["limits"]["triangles"], 1234);
     assert_eq!(capabilities["limits"]["body_bytes"], 64 << 20);

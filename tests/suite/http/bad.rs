@@ -219,7 +219,7 @@ fn a_connection_too_many_is_told_so() {
     let held = [server.connect(), server.connect()];
     let began = Instant::now();
     loop {
-        let answer = server.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n", b"");
+        let answer = server.send("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n", b"");
         if answer.status == 503 {
             answer.problem(503, "connections_full");
             assert!(answer.header("retry-after").is_some());
@@ -228,7 +228,7 @@ fn a_connection_too_many_is_told_so() {
         assert!(began.elapsed() < PATIENCE);
     }
     drop(held);
-    while server.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n", b"").status != 200 {
+    while server.send("GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n", b"").status != 200 {
         assert!(began.elapsed() < PATIENCE);
     }
 }

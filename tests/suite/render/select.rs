@@ -2,6 +2,7 @@
 //! with a real one.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -223,6 +224,36 @@ fn lost_in_three_jobs_in_a_row_means_the_cpu() {
     let status = host.status();
     assert_eq!(status.state, GpuState::Ready);
     assert!(status.reason.unwrap().contains("lost in 3 jobs in a row"));
+}
+
+#[test]
+fn a_gpu_that_is_lost_often_rests_and_is_tried_again() {
+    // Lost in three jobs, in a trial, and then well.
+    let machine = Machine::new(&[Open::Hardware; 9], &[Act::Loses; 6]);
+    let clock_s = Arc::new(AtomicU64::new(0));
+    let read = clock_s.clone();
+    let host = Arc::into_inner(machine.host(HardwareHint::Maybe)).unwrap();
+    let host = Arc::new(host.with_clock(Box::new(move || Duration::from_secs(read.load(Ordering::Relaxed)))));
+    let pass = |seconds: u64| clock_s.fetch_add(seconds, Ordering::Relaxed);
+    let mut backends = Backends::new(host.clone(), 1);
+    check(&mut backends, &[(Auto, Ok(ByCpu)); 3]);
+    let opened = machine.opened().len();
+    pass(59);
+    check(&mut backends, &[(Auto, Ok(ByCpu)); 3]);
+    assert!(!backends.has_gpu() && host.may_have_hardware());
+    assert!(host.status().reason.unwrap().contains("tried again after 60 s"));
+    assert_eq!(machine.opened().len(), opened, "nobody opens it while it rests");
+    pass(1);
+    assert!(backends.has_gpu());
+    check(&mut backends, &[(Auto, Ok(ByCpu)); 2]);
+    let reason = host.status().reason.unwrap();
+    assert!(reason.contains("lost again when it was tried") && reason.contains("after 120 s"), "{reason}");
+    pass(119);
+    check(&mut backends, &[(Auto, Ok(ByCpu))]);
+    pass(1);
+    check(&mut backends, &[(Auto, Ok(ByGpu)); 2]);
+    let status = host.status();
+    assert_eq!((status.state, status.reason), (GpuState::Ready, None));
 }
 
 #[test]

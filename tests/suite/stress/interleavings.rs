@@ -54,6 +54,7 @@ impl Process {
             workers: 3,
             queue: 100,
             idle_time: Duration::from_millis(1),
+            overdue_grace: Duration::from_secs(60),
             job_time: Duration::from_secs(60),
             interactive_wait: Duration::from_secs(60),
             batch_wait: Duration::from_secs(60),

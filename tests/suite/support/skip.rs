@@ -18,6 +18,10 @@ pub enum Need {
     Shell,
     /// Leave to mount a file system in a namespace of one's own.
     Mount,
+    /// Tools in Python, which `tests/run` installs into `target/python`.
+    Python,
+    /// `systemd-analyze` on the `PATH`.
+    Systemd,
 }
 
 impl Need {
@@ -29,6 +33,8 @@ impl Need {
             Self::Curl => "curl",
             Self::Shell => "shells",
             Self::Mount => "mount",
+            Self::Python => "python",
+            Self::Systemd => "systemd",
         }
     }
 }

@@ -49,6 +49,18 @@ impl<'a> ProblemDto<'a> {
 pub struct StatusDto {
     /// `ok` or `ready`.
     pub status: &'static str,
+    /// What does not work although the process takes work.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub problems: Vec<DifficultyDto>,
+}
+
+/// Something that does not work for now.
+#[derive(Serialize)]
+pub struct DifficultyDto {
+    /// The code of the error that it is for requests.
+    pub code: &'static str,
+    /// One sentence.
+    pub detail: String,
 }
 
 /// The answer of `/version`.
@@ -56,12 +68,18 @@ pub struct StatusDto {
 pub struct VersionDto {
     name: &'static str,
     version: &'static str,
+    /// The commit that the program is built from, if that is known.
+    commit: Option<&'static str>,
 }
 
 impl VersionDto {
     /// Name and version of this program.
     pub fn new() -> Self {
-        Self { name: env!("CARGO_PKG_NAME"), version: env!("CARGO_PKG_VERSION") }
+        Self {
+            name: env!("CARGO_PKG_NAME"),
+            version: env!("CARGO_PKG_VERSION"),
+            commit: option_env!("MESHSNAP_BUILT_FROM"),
+        }
     }
 }
 

@@ -41,7 +41,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     let (reading, mut keys) = Keys::of_query(request.uri(), &KEYS)?;
     // Before the upload, so that a mistake costs none.
     task(&keys, Digest::of(b""))?;
-    let name = if class == Class::Batch { idempotency::name_of(request.headers(), &access.owner)? } else { None };
+    let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
     let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
     if !is_short_json(request.headers()) && !is_sent_again {
         state.jobs.would_accept(class, &access.owner)?;

@@ -61,7 +61,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     let (reading, mut keys) = Keys::of_query(request.uri(), &KEYS)?;
     // Before the upload, so that a mistake costs none.
     Answer::of(state, &keys, form_of_answer(&keys, request.headers())?)?;
-    let name = if class == Class::Batch { idempotency::name_of(request.headers(), &access.owner)? } else { None };
+    let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
     let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
     if !is_short_json(request.headers()) && !is_sent_again {
         state.jobs.would_accept(class, &access.owner)?;
@@ -69,7 +69,8 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     let headers = request.headers().clone();
     let limits = &state.rules.limits;
     let (bytes, files, time) = (limits.body_bytes, limits.bundle_entries, state.body_timeout);
-    let limits = BodyLimits { bytes, files, meshes: None, time, upload_budget: &state.upload_budget };
+    let (least_rate, upload_budget) = (state.least_rate, &state.upload_budget);
+    let limits = BodyLimits { bytes, files, meshes: None, time, least_rate, upload_budget };
     let meshes = match sides::read(request, limits).await? {
         sides::Sides::Document(document) => stored(state, &document, &mut keys, &reading, &access)?,
         sides::Sides::Meshes { bundles, reservations } => sent(bundles, reservations, &reading).await?,

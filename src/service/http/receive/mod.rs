@@ -76,7 +76,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     let (access, request_id) = (access_of(&request), observe::id_of(&request));
     body::check_header(request.headers(), state.rules.limits.body_bytes)?;
     let query = Query::read(request.uri(), &state.rules)?;
-    let name = if class == Class::Batch { idempotency::name_of(request.headers(), &access.owner)? } else { None };
+    let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
     // Forms and JSON may bring a document. Of every other request, the query is the whole document
     // and is checked before the upload.
     if !body::is_multipart(request.headers()) && !body::is_json(request.headers()) {
@@ -175,6 +175,7 @@ pub async fn read_upload(state: &AppState, request: Request) -> Result<Upload, A
 
 async fn read_body(state: &AppState, request: Request, meshes: Option<u64>) -> Result<Upload, ApiError> {
     let Limits { body_bytes: bytes, bundle_entries: files, .. } = state.rules.limits;
-    let limits = BodyLimits { bytes, files, meshes, time: state.body_timeout, upload_budget: &state.upload_budget };
+    let (time, least_rate, upload_budget) = (state.body_timeout, state.least_rate, &state.upload_budget);
+    let limits = BodyLimits { bytes, files, meshes, time, least_rate, upload_budget };
     body::read(request, limits).await
 }

@@ -7,21 +7,32 @@ use axum::extract::State;
 use axum::response::Response;
 
 use super::{responses, schema};
-use crate::service::http::dto::{CapabilitiesDto, StatusDto, VersionDto};
-use crate::service::http::error::ApiError;
+use crate::service::durable::Durable;
+use crate::service::http::dto::{CapabilitiesDto, DifficultyDto, StatusDto, VersionDto};
+use crate::service::http::error::{ApiError, Fault};
 use crate::service::http::state::AppState;
 
 /// 200 while the process is alive.
 pub async fn healthz() -> Response {
-    responses::uncached(StatusDto { status: "ok" })
+    responses::uncached(StatusDto { status: "ok", problems: Vec::new() })
 }
 
-/// 200 while the process takes work.
+/// 200 while the process takes work. It tells of what it cannot do.
 pub async fn readyz(State(state): State<Arc<AppState>>) -> Result<Response, ApiError> {
     if state.is_draining() {
         return Err(ApiError::draining("the server is shutting down"));
     }
-    Ok(responses::uncached(StatusDto { status: "ready" }))
+    let load = state.jobs.load();
+    let detail = format!("{} workers do not end jobs whose time is up", load.overdue);
+    if load.missing as u64 >= state.workers {
+        let detail = format!("{detail}, and none is left; start the server anew");
+        return Err(ApiError::new(Fault::Unavailable, "workers_overdue", detail));
+    }
+    let overdue = (load.overdue > 0).then(|| DifficultyDto { code: "workers_overdue", detail });
+    let trouble = state.durable.as_ref().and_then(Durable::trouble).map(ApiError::from);
+    let storage = trouble.map(|error| DifficultyDto { code: error.code, detail: error.detail });
+    let problems = overdue.into_iter().chain(storage).collect();
+    Ok(responses::uncached(StatusDto { status: "ready", problems }))
 }
 
 /// Name and version of the program.

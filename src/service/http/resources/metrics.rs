@@ -31,7 +31,8 @@ fn gauges(state: &AppState) -> Gauges {
     let queues = Class::ALL.iter().zip(jobs.queued_by_class).zip(waits);
     Gauges {
         queues: queues.map(|((class, jobs), wait_ms)| (class.name(), jobs, wait_ms)).collect(),
-        workers: (jobs.running, state.workers),
+        workers: vec![("busy", jobs.running as u64), ("all", state.workers), ("overdue", jobs.overdue as u64)],
+        quarantined: jobs.quarantined,
         memory: vec![
             ("uploads", state.upload_budget.used_bytes(), state.upload_budget.limit_bytes()),
             ("results", jobs.kept_bytes, state.jobs.result_limit_bytes()),

@@ -3,6 +3,7 @@
 mod cors;
 mod keys;
 mod rates;
+mod slow;
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -163,13 +164,14 @@ impl Pinging {
 
 #[test]
 fn idle_http2_connections_do_not_keep_others_out() {
-    let server = Server::start(&["--connections", "6", "--header-timeout-ms", "500"]);
+    let server = Server::start(&["--connections", "6", "--connections-per-address", "6", "--header-timeout-ms", "500"]);
     let mut idle: Vec<Pinging> = (0..6).map(|_| Pinging::open(&server)).collect();
     let began = Instant::now();
     let (mut pings, mut refused) = (0, 0);
     loop {
         pings += idle.iter_mut().filter_map(|connection| connection.ping().then_some(())).count();
-        let answer = server.get("/healthz");
+        assert_eq!(server.get("/healthz").status, 200, "health has places of its own");
+        let answer = server.get("/");
         if answer.status == 200 && refused > 0 {
             break;
         }

@@ -3,7 +3,7 @@
 pub mod sides;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::body::{Body, Bytes};
 use axum::extract::{FromRequest as _, Multipart, Request};
@@ -19,8 +19,11 @@ use crate::service::jobs::{Refusal, Reservation, UploadBudget};
 /// start with every chunk that arrives, so that their cost grows with the square.
 const BETWEEN_PARTS_BYTES_MAX: u64 = 256 << 10;
 
-/// Time without a byte after which an upload makes room for others that find none.
+/// Time in which an upload must go on to keep its memory while others find none.
 const STALL: Duration = Duration::from_secs(2);
+
+/// Time over which the speed of an upload is measured otherwise.
+const RATE_WINDOW: Duration = Duration::from_secs(10);
 
 /// The content of a body.
 #[derive(Debug)]
@@ -58,6 +61,8 @@ pub struct BodyLimits<'a> {
     pub meshes: Option<u64>,
     /// Longest time for the whole body.
     pub time: Duration,
+    /// Least bytes a second; 0: any.
+    pub least_rate: u64,
     /// The memory that all uploads share.
     pub upload_budget: &'a Arc<UploadBudget>,
 }
@@ -99,7 +104,7 @@ pub fn bad_form(detail: impl Into<String>) -> ApiError {
 pub async fn read(request: Request, limits: BodyLimits<'_>) -> Result<Upload, ApiError> {
     let reading = async {
         let (parts, body) = request.into_parts();
-        let meter = Meter::new(limits.bytes, limits.upload_budget);
+        let meter = Meter::new(&limits);
         let chunks = metered(body, meter.clone());
         if is_multipart(&parts.headers) {
             let most = (limits.files, limits.meshes);
@@ -223,6 +228,7 @@ struct Interrupted;
 #[derive(Clone)]
 struct Meter {
     bytes_max: u64,
+    least_rate: u64,
     upload_budget: Arc<UploadBudget>,
     state: Arc<Mutex<MeterState>>,
 }
@@ -236,10 +242,11 @@ struct MeterState {
 }
 
 impl Meter {
-    fn new(bytes_max: u64, upload_budget: &Arc<UploadBudget>) -> Self {
+    fn new(limits: &BodyLimits<'_>) -> Self {
+        let BodyLimits { bytes: bytes_max, least_rate, upload_budget, .. } = *limits;
         let reservation = upload_budget.reserve();
         let state = MeterState { bytes: 0, bytes_between_parts: None, reservation, error: None };
-        Self { bytes_max, upload_budget: upload_budget.clone(), state: Arc::new(Mutex::new(state)) }
+        Self { bytes_max, least_rate, upload_budget: upload_budget.clone(), state: Arc::new(Mutex::new(state)) }
     }
 
     fn count(&self, bytes: u64) -> Result<(), Interrupted> {
@@ -296,23 +303,68 @@ impl Meter {
     }
 }
 
+/// The chunks of a body, counted. It ends with an error where the client sends more slowly than it may.
 fn metered(body: Body, meter: Meter) -> impl Stream<Item = Result<Bytes, Interrupted>> + Send {
-    stream::unfold((body.into_data_stream(), meter), |(mut chunks, meter)| async move {
-        let refusals = meter.upload_budget.refusals();
+    let pace = Pace::new(&meter.upload_budget);
+    stream::unfold((body.into_data_stream(), meter, pace), |(mut chunks, meter, mut pace)| async move {
         let chunk = loop {
             match tokio::time::timeout(STALL, chunks.next()).await {
-                Ok(chunk) => break chunk?.map_err(|_| Interrupted),
-                // Others have found no room meanwhile.
-                Err(_) if meter.upload_budget.refusals() != refusals => break Err(meter.stop(stalled())),
-                Err(_) => {}
+                Ok(chunk) => {
+                    let chunk = chunk?.map_err(|_| Interrupted);
+                    pace.bytes += chunk.as_ref().map_or(0, |chunk| chunk.len() as u64);
+                    break pace.check(&meter).and(chunk);
+                }
+                Err(_) => {
+                    if let Err(interrupted) = pace.check(&meter) {
+                        break Err(interrupted);
+                    }
+                }
             }
         };
         let counted = chunk.and_then(|chunk| meter.count(chunk.len() as u64).map(|()| chunk));
-        Some((counted, (chunks, meter)))
+        Some((counted, (chunks, meter, pace)))
     })
 }
 
-/// The error of a client that holds memory, sends nothing, and is in others' way.
+/// The speed of an upload, from window to window.
+struct Pace {
+    since: Instant,
+    bytes: u64,
+    /// Uploads that had found no room when the window began.
+    refusals: u64,
+}
+
+impl Pace {
+    fn new(budget: &UploadBudget) -> Self {
+        Self { since: Instant::now(), bytes: 0, refusals: budget.refusals() }
+    }
+
+    /// Refuses an upload that is too slow. While others find no room, a window is short.
+    fn check(&mut self, meter: &Meter) -> Result<(), Interrupted> {
+        let (time, is_in_the_way) = (self.since.elapsed(), meter.upload_budget.refusals() != self.refusals);
+        let window = if is_in_the_way { STALL } else { RATE_WINDOW };
+        if time < window {
+            return Ok(());
+        }
+        let wanted = (meter.least_rate as f64 * time.as_secs_f64()) as u64;
+        if is_in_the_way && (self.bytes == 0 || self.bytes < wanted) {
+            return Err(meter.stop(stalled()));
+        }
+        if self.bytes < wanted {
+            return Err(meter.stop(below_rate(meter.least_rate)));
+        }
+        *self = Self::new(&meter.upload_budget);
+        Ok(())
+    }
+}
+
+/// The error of a client that sends a few bytes now and then.
+fn below_rate(least_rate: u64) -> ApiError {
+    let detail = format!("the request body arrived with fewer than {least_rate} bytes a second");
+    ApiError::new(Fault::TooSlow, "body_timeout", detail).flag("--least-rate-bytes")
+}
+
+/// The error of a client that holds memory, sends nothing or hardly anything, and is in others' way.
 fn stalled() -> ApiError {
     let detail = "the request body stopped arriving while other uploads waited for the memory that it holds";
     ApiError::new(Fault::TooSlow, "body_timeout", detail).flag("--uploads-bytes")

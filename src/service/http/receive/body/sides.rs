@@ -30,7 +30,7 @@ pub enum Sides {
 pub async fn read(request: Request, limits: BodyLimits<'_>) -> Result<Sides, ApiError> {
     let reading = async {
         let (parts, body) = request.into_parts();
-        let meter = Meter::new(limits.bytes, limits.upload_budget);
+        let meter = Meter::new(&limits);
         let chunks = metered(body, meter.clone());
         if is_multipart(&parts.headers) {
             let form = Request::from_parts(parts, Body::from_stream(chunks));

@@ -1,3 +1,5 @@
+mod watchdog;
+
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -27,6 +29,7 @@ fn settings() -> JobSettings {
         queue: 2,
         idle_time: SOON,
         job_time: Duration::from_secs(30),
+        overdue_grace: SOON,
         interactive_wait: Duration::from_secs(30),
         batch_wait: Duration::from_secs(600),
         result_ttl: Duration::from_secs(60),
@@ -118,7 +121,7 @@ fn output(bytes: usize) -> Output {
 fn fake_render(work: &Work, deadline: &Deadline, gate: &Mutex<Receiver<()>>) -> Result<Output, RenderError> {
     match &work.bundle.files()[0].bytes[..] {
         b"panic" => panic!("asked to"),
-        b"wait" => {
+        [b's', b't', b'u', b'c', b'k', _] | b"wait" => {
             gate.lock().unwrap().recv_timeout(SOON).map_or(Err(RenderError::Stopped(Stopped)), |()| Ok(output(1)))
         }
         b"spin" => loop {
