@@ -121,9 +121,7 @@ fn footprint_of(image: Image, sampler: u32, taps_max: u32, right: vec2<f32>, dow
     let across = square_of(right);
     let along = square_of(down);
     let one = Footprint(1u, lod_of(image, max(across, along)), vec2(0.0));
-    // No texel is smaller.
-    let least = f32(1u << (image.first_level & 31u));
-    let is_small = across + along < 2.25 * least * least;
+    let is_small = across + along < 2.25;
     if (sampler & SAMPLER_NEAREST) != 0u || is_small || !(across + along < 1e12) {
         return one;
     }
@@ -135,7 +133,7 @@ fn footprint_of(image: Image, sampler: u32, taps_max: u32, right: vec2<f32>, dow
     let long_square = rn(0.5 * (diagonal.x + diagonal.y)) + root;
     let inverse = quick_rsqrt(long_square);
     let long = rn(long_square * inverse);
-    let short = max(rn(abs(rn(right.x * down.y) - rn(right.y * down.x)) * inverse), least);
+    let short = max(rn(abs(rn(right.x * down.y) - rn(right.y * down.x)) * inverse), 1.0);
     let taps = min(u32(rn(long * quick_recip(short)) + 0.5), taps_max);
     if taps < 2u {
         return one;

@@ -132,9 +132,7 @@ impl Footprint {
     fn of(image: &Texture, sampler: u32, taps_max: u32, right: [f32; 2], down: [f32; 2]) -> Self {
         let square = |v: [f32; 2]| v[0] * v[0] + v[1] * v[1];
         let (across, along) = (square(right), square(down));
-        // No texel is smaller.
-        let least = (1_u32 << (image.first_level & 31)) as f32;
-        let is_small = across + along < 2.25 * least * least;
+        let is_small = across + along < 2.25;
         let is_one = (sampler & samplers::NEAREST != 0) | is_small | !(across + along < 1e12);
         let [a, c] = [0, 1].map(|k| right[k] * right[k] + down[k] * down[k]);
         let b = right[0] * right[1] + down[0] * down[1];
@@ -144,7 +142,7 @@ impl Footprint {
         let long_square = 0.5 * (a + c) + root;
         let inverse = quick_rsqrt(long_square);
         let long = long_square * inverse;
-        let short = ((right[0] * down[1] - right[1] * down[0]).abs() * inverse).max(least);
+        let short = ((right[0] * down[1] - right[1] * down[0]).abs() * inverse).max(1.0);
         let taps = (long * quick_recip(short) + 0.5).min(taps_max as f32) as u32;
         let is_one = is_one | (taps < 2);
         let step = long * quick_recip(taps as f32);

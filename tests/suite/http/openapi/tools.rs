@@ -74,6 +74,14 @@ fn a_generated_client_draws() {
     assert_eq!(pictures, 4);
 }
 
+/// The number of pairs of a path and a method in a document, without that of the document itself, which schemathesis
+/// leaves out.
+fn operations(document: &serde_json::Value) -> usize {
+    let methods = ["get", "head", "post", "put", "delete", "patch", "options"];
+    let paths = document["paths"].as_object().unwrap().iter().filter(|(path, _)| *path != "/openapi.json");
+    paths.map(|(_, path)| methods.iter().filter(|method| path.get(**method).is_some()).count()).sum()
+}
+
 /// All checks of schemathesis, on requests that keep the document and on such that break it. What a schema cannot
 /// express is listed by name in `tests/python/hooks.py`.
 #[test]
@@ -90,6 +98,6 @@ fn schemathesis_finds_nothing() {
     println!("{summary}");
     let cases: u32 = summary.split(' ').next().unwrap().parse().unwrap();
     assert!(cases > 3_000, "{summary}");
-    let tested = printed.lines().find(|line| line.contains("Tested:")).expect(&printed);
-    assert!(tested.contains("21"), "{tested}: every operation");
+    let tested = printed.lines().find_map(|line| line.trim().strip_prefix("Tested: ")).expect(&printed);
+    assert_eq!(tested.parse(), Ok(operations(&server.get("/openapi.json").json())), "every operation");
 }
