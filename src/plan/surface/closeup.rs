@@ -163,8 +163,9 @@ fn least_density(screen: &OnScreen, uvs: &[[f32; 2]; 3], one: &Use, enough: f64)
     let q = screen.inverse_w;
     let most = q[0].max(q[1]).max(q[2]);
     let density = (q[0] / most) * (q[1] / most) * (q[2] / most) * area / area_px;
-    // Written so that NaN counts as 0.
-    if !(density > 0.0) {
+    // NaN is not.
+    let is_certain = density > 0.0;
+    if !is_certain {
         return 0.0;
     }
     let tapped = density / f64::from(TAPS_MAX);

@@ -133,7 +133,9 @@ impl Footprint {
         let square = |v: [f32; 2]| v[0] * v[0] + v[1] * v[1];
         let (across, along) = (square(right), square(down));
         let is_small = across + along < 2.25;
-        let is_one = (sampler & samplers::NEAREST != 0) | is_small | !(across + along < 1e12);
+        // Infinite sums and NaN are not.
+        let is_measured = across + along < 1e12;
+        let is_one = (sampler & samplers::NEAREST != 0) | is_small | !is_measured;
         let [a, c] = [0, 1].map(|k| right[k] * right[k] + down[k] * down[k]);
         let b = right[0] * right[1] + down[0] * down[1];
         let half = 0.5 * (a - c);

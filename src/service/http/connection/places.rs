@@ -10,19 +10,22 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 /// Places for questions about health.
 const RESERVED: usize = 16;
 
+/// Places that each client has.
+type Counts = Mutex<HashMap<IpAddr, usize>>;
+
 /// The places of a server.
 #[derive(Clone)]
 pub struct Places {
     all: Arc<Semaphore>,
     reserved: Arc<Semaphore>,
-    by_client: Arc<Mutex<HashMap<IpAddr, usize>>>,
+    by_client: Arc<Counts>,
     per_client: usize,
 }
 
 /// A place, given back when it is dropped.
 pub struct Place {
     _permit: OwnedSemaphorePermit,
-    client: Option<(IpAddr, Arc<Mutex<HashMap<IpAddr, usize>>>)>,
+    client: Option<(IpAddr, Arc<Counts>)>,
 }
 
 /// The reason why a connection gets no place.

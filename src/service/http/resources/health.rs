@@ -28,7 +28,7 @@ pub async fn readyz(State(state): State<Arc<AppState>>) -> Result<Response, ApiE
         let detail = format!("{detail}, and none is left; start the server anew");
         return Err(ApiError::new(Fault::Unavailable, "workers_overdue", detail));
     }
-    let overdue = (load.overdue > 0).then(|| DifficultyDto { code: "workers_overdue", detail });
+    let overdue = (load.overdue > 0).then_some(DifficultyDto { code: "workers_overdue", detail });
     let trouble = state.durable.as_ref().and_then(Durable::trouble).map(ApiError::from);
     let storage = trouble.map(|error| DifficultyDto { code: error.code, detail: error.detail });
     let problems = overdue.into_iter().chain(storage).collect();
