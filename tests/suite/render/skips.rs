@@ -18,7 +18,7 @@ use crate::support::truth::{goal, is_long};
 /// Views of [`textured`]: its texture from afar, close up, not at all; and its vertex colours
 /// instead.
 const TEXTURED: &[(&str, &[(&str, &str)])] = &[
-    ("texture-small", &[("style", "smooth"), ("size", "48")]),
+    ("texture-small", &[("style", "smooth"), ("size", "16")]),
     (
         "texture-close",
         &[("style", "smooth"), ("size", "160"), ("camera.eye", "0.1,0.1,0.3"), ("camera.target", "0,0,0")],
