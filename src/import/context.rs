@@ -25,4 +25,19 @@ impl Context<'_> {
     pub fn check_triangles(&self, count: u64) -> Result<(), MeshError> {
         Ok(crate::limits::check("the number of triangles", count, self.limits.triangles, "--limit-triangles")?)
     }
+
+    /// The number of vertices, of so many, that are not among the `used` ones. None where nobody wants it.
+    pub fn loose(&self, vertices: usize, used: impl Iterator<Item = u32>) -> Result<Option<u64>, MeshError> {
+        if !self.counts_loose {
+            return Ok(None);
+        }
+        self.budget.clone().spend("the vertices that are used", vertices as u64, 1)?;
+        let mut is_used = vec![false; vertices];
+        for vertex in used {
+            if let Some(is_used) = is_used.get_mut(vertex as usize) {
+                *is_used = true;
+            }
+        }
+        Ok(Some(is_used.iter().filter(|is_used| !**is_used).count() as u64))
+    }
 }

@@ -35,6 +35,15 @@ pub struct ImportReport {
     pub metadata: FileMetadata,
 }
 
+impl ImportReport {
+    /// Adds loose vertices of a part of the file, if they were counted.
+    pub fn add_loose(&mut self, count: Option<u64>) {
+        if let Some(count) = count {
+            *self.loose_vertices.get_or_insert(0) += count;
+        }
+    }
+}
+
 /// A warning for each kind of thing that occurred: its count, its code, and a sentence that the
 /// count ends.
 pub fn counted_warnings<const N: usize>(kinds: [(u64, &'static str, &str); N]) -> impl Iterator<Item = Warning> {

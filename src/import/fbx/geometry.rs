@@ -102,7 +102,7 @@ impl Part {
         let place = Place::of(&node.geometry_to_world);
         let attributes = Attributes::of(mesh);
         raw.report.file_vertices += mesh.vertices.len() as u64;
-        *raw.report.loose_vertices.get_or_insert(0) += loose(mesh, cx)?;
+        raw.report.add_loose(cx.loose(mesh.vertices.len(), mesh.vertex_position.indices.iter().copied())?);
         self.set.clear();
         attributes.begin(raw, cx)?;
         for (number, face) in mesh.faces.iter().enumerate() {
@@ -138,19 +138,6 @@ impl Part {
         complete(raw);
         Ok(())
     }
-}
-
-/// The number of vertices that no face refers to.
-fn loose(mesh: &Mesh, cx: &mut Context<'_>) -> Result<u64, MeshError> {
-    let mut budget = cx.budget.clone();
-    budget.spend("the vertices of the file", mesh.vertices.len() as u64, 1)?;
-    let mut is_used = vec![false; mesh.vertices.len()];
-    for &vertex in mesh.vertex_position.indices.iter() {
-        if let Some(is_used) = is_used.get_mut(vertex as usize) {
-            *is_used = true;
-        }
-    }
-    Ok(is_used.iter().filter(|is_used| !**is_used).count() as u64)
 }
 
 /// Line objects, which belong to no mesh, at each node that refers to them.

@@ -26,6 +26,7 @@ struct Head {
     /// The paths of the bundle's files, and which of them is the mesh.
     paths: Vec<String>,
     entry: u32,
+    counts_loose: bool,
 }
 
 /// What comes back.
@@ -135,7 +136,14 @@ pub fn read(bytes: &[u8], isolation: &dyn Isolation, cx: &mut Context<'_>) -> Re
     let Limits { memory_bytes, triangles, nodes, .. } = *cx.limits;
     let origin = place(ORIGINS, &cx.bundle.origin());
     let spent_bytes = cx.budget.spent_bytes();
-    let head = Head { limits: [memory_bytes, triangles, nodes], spent_bytes, origin, paths, entry };
+    let head = Head {
+        limits: [memory_bytes, triangles, nodes],
+        spent_bytes,
+        origin,
+        paths,
+        entry,
+        counts_loose: cx.counts_loose,
+    };
     let head = postcard::to_stdvec(&head).map_err(|_| MeshError::broken("the names of the files are too long"))?;
     let head = [&[isolate::FBX], head.as_slice()].concat();
     let memory_bytes = memory_bytes.saturating_sub(spent_bytes);
@@ -184,7 +192,7 @@ fn read_there(head: &Head, bytes: &[u8]) -> Result<Read, MeshError> {
         deadline: &deadline,
         bundle: &folder,
         time_s: None,
-        counts_loose: false,
+        counts_loose: head.counts_loose,
     };
     let raw = scene::read(bytes, &mut cx)?;
     let missing = file_use.missing().into_iter().map(|Missing { folder, name }| (folder, name)).collect();

@@ -43,8 +43,10 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     }
     cx.budget.spend("the welded vertices", vertex_count as u64, number::BYTES_PER_VERTEX)?;
 
-    if cx.counts_loose && soup.is_none() && raw.report.loose_vertices.is_none() {
-        raw.report.loose_vertices = Some(loose(&raw, cx)?);
+    if soup.is_none() && raw.report.loose_vertices.is_none() {
+        let of_lines = raw.lines_and_points.iter().flat_map(|one| one.ends);
+        let used = raw.triangles.iter().flatten().copied().chain(of_lines);
+        raw.report.loose_vertices = cx.loose(raw.positions.len(), used)?;
     }
     let has_attributes = raw.has_attributes();
     let (mut mesh, kept, triangles) = match &mut soup {
@@ -90,16 +92,6 @@ pub fn normalise(mut raw: RawMesh, cx: &mut Context<'_>) -> Result<Imported, Mes
     (mesh.images, mesh.cameras) = (raw.images, raw.cameras);
     mesh.up = raw.up;
     Ok(Imported { mesh, report: raw.report, path: cx.bundle.entry().path.clone() })
-}
-
-/// The number of vertices that nothing refers to.
-fn loose(raw: &RawMesh, cx: &Context<'_>) -> Result<u64, MeshError> {
-    let mut budget = cx.budget.clone();
-    budget.spend("the vertices that are used", raw.positions.len() as u64, 1)?;
-    let mut is_used = vec![false; raw.positions.len()];
-    let of_lines = raw.lines_and_points.iter().flat_map(|one| &one.ends);
-    raw.triangles.iter().flatten().chain(of_lines).for_each(|vertex| is_used[*vertex as usize] = true);
-    Ok(is_used.iter().filter(|is_used| !**is_used).count() as u64)
 }
 
 /// Positions, triangles, normals, lines and bounds of the mesh, and the triangle of each face

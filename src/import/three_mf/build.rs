@@ -162,26 +162,14 @@ impl Builder<'_> {
             raw.edge_masks.push(ALL_EDGES);
             raw.triangle_materials.push(material);
         }
-        *raw.report.loose_vertices.get_or_insert(0) += loose(object, cx)?;
+        let used = object.triangles.iter().flat_map(|triangle| triangle.corners);
+        raw.report.add_loose(cx.loose(object.vertices.len(), used)?);
         self.set.pay_all(VERTEX_BYTES, cx)?;
         if !raw.colors.is_empty() {
             raw.colors.resize(raw.positions.len(), WHITE);
         }
         Ok(())
     }
-}
-
-/// The number of vertices that no triangle refers to.
-fn loose(object: &Object, cx: &mut Context<'_>) -> Result<u64, MeshError> {
-    let mut budget = cx.budget.clone();
-    budget.spend("the 3MF vertices", object.vertices.len() as u64, 1)?;
-    let mut is_used = vec![false; object.vertices.len()];
-    for &vertex in object.triangles.iter().flat_map(|triangle| &triangle.corners) {
-        if let Some(is_used) = is_used.get_mut(vertex as usize) {
-            *is_used = true;
-        }
-    }
-    Ok(is_used.iter().filter(|is_used| !**is_used).count() as u64)
 }
 
 /// The key that distinguishes corners at one vertex, and the corner's own colour.

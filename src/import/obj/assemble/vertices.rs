@@ -72,8 +72,10 @@ pub fn fill(
         }
         (part.corner_uvs, part.corner_normals) = (Vec::new(), Vec::new());
     }
-    let loose = combinations.newest.iter().filter(|newest| **newest == MISSING).count();
-    raw.report.loose_vertices = Some(loose as u64);
+    if cx.counts_loose {
+        let loose = combinations.newest.iter().filter(|newest| **newest == MISSING).count();
+        raw.report.loose_vertices = Some(loose as u64);
+    }
     let all = &combinations.all;
     if all.len() >= u32::MAX as usize {
         return Err(MeshError::broken("the OBJ file has more than 4 billion vertices"));
