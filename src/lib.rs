@@ -70,6 +70,8 @@ pub mod limits;
 #[doc(hidden)]
 pub mod mesh;
 mod parallel;
+#[cfg(feature = "service")]
+mod percent;
 #[doc(hidden)]
 pub mod pipeline;
 #[doc(hidden)]

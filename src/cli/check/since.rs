@@ -9,6 +9,7 @@ use std::process::{Command, Stdio};
 
 use crate::cli::error::CliError;
 use crate::cli::render::{Task, Tasks, is_companion};
+use crate::percent;
 
 /// The largest mesh in which names of files are looked for, bytes. A larger one counts as changed with any file beside it.
 const SEARCHED_BYTES_MAX: u64 = 256 << 20;
@@ -55,9 +56,7 @@ fn names_any(mesh: &Path, files: &[&PathBuf]) -> bool {
 /// The base name of a file, as texts may spell it, in lower case.
 fn spellings(file: &Path) -> Vec<Vec<u8>> {
     let name = file.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
-    let encoded: String =
-        name.bytes().map(|byte| if plain(byte) { char::from(byte).into() } else { format!("%{byte:02x}") }).collect();
+    let encoded = percent::encoded(&name, b"").to_ascii_lowercase();
     // glTF is JSON, which may escape what is not ASCII.
     let escaped = name.encode_utf16().map(|unit| match u8::try_from(unit) {
         Ok(byte) if byte.is_ascii() => char::from(byte).to_string(),

@@ -2,6 +2,7 @@
 
 use super::state::AppState;
 use crate::image::ImageFormat;
+use crate::percent;
 use crate::service::digest::Digest;
 use crate::service::store::Reading;
 use crate::spec::{BackendChoice, Spec};
@@ -35,7 +36,8 @@ impl Address {
         let format_in = reading.format_in.map(|format| ("format_in", format.name()));
         let entry = reading.entry.as_deref().map(|entry| ("entry", entry));
         let keys = keys.iter().map(|(key, text)| (key.as_str(), text.as_str())).chain(format_in).chain(entry);
-        let query: Vec<String> = keys.map(|(key, text)| format!("{}={}", escape(key), escape(text))).collect();
+        let query: Vec<String> =
+            keys.map(|(key, text)| [key, text].map(|part| percent::encoded(part, b",:/")).join("=")).collect();
         let mark = if query.is_empty() { "" } else { "?" };
         let url = format!("/v1/meshes/{digest}/render.{extension}{mark}{}", query.join("&"));
         (url.len() <= URL_BYTES_MAX).then(|| Self { url, etag: render_key(state, digest, reading, spec) })
@@ -57,10 +59,4 @@ pub fn render_key(state: &AppState, digest: Digest, reading: &Reading, spec: &Sp
     let key = format!("{} {digest} {reading:?} {spec:?} {may_be_gpu}", env!("CARGO_PKG_VERSION"));
     let weak = if may_be_gpu { "W/" } else { "" };
     format!("{weak}\"{}\"", Digest::of(key.as_bytes()))
-}
-
-/// Percent-encodes a part of a query (RFC 3986, 3.4).
-fn escape(text: &str) -> String {
-    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~,:/".contains(&byte);
-    text.bytes().map(|byte| if plain(byte) { char::from(byte).into() } else { format!("%{byte:02X}") }).collect()
 }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::text::at;
 use super::{Findings, faults, is_invisible, word};
 use crate::check::{Check, Verdict};
+use crate::percent;
 use crate::pluralise::pluralise;
 
 /// Most bytes of the report: a comment on GitHub has at most 65,536 characters.
@@ -72,7 +73,7 @@ fn thumbnails(findings: &Findings<'_>, text: &mut String) {
         let cells = verdict.pictures.iter().map(|(view, path)| {
             format!(
                 " <img src=\"{}\" width=\"{THUMBNAIL_PX}\" alt=\"{view} of {}\"> |",
-                address(path),
+                percent::encoded(path, b"/"),
                 prose(&verdict.path)
             )
         });
@@ -86,12 +87,6 @@ fn thumbnails(findings: &Findings<'_>, text: &mut String) {
         let more = pluralise(left, "file has pictures", "files have pictures");
         let _ = writeln!(text, "\n{more} that are left out here, for the size of a comment.");
     }
-}
-
-/// A path as a relative address, percent-encoded.
-fn address(path: &str) -> String {
-    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~/".contains(&byte);
-    path.bytes().map(|byte| if is_plain(byte) { char::from(byte).into() } else { format!("%{byte:02X}") }).collect()
 }
 
 /// A name as code, where nothing is a link, a mention or a column.

@@ -8,6 +8,7 @@ use super::text::at;
 use super::{Findings, faults};
 use crate::check::{Check, Level, NAMES, meaning};
 use crate::cli::error::CliError;
+use crate::percent;
 use crate::service::digest::Digest;
 
 /// The report: a result for each broken rule of each file.
@@ -78,7 +79,8 @@ fn uri(path: &str) -> String {
     for component in path.components() {
         match component {
             Component::Prefix(_) | Component::Normal(_) => {
-                segments.push(escape(&component.as_os_str().to_string_lossy()));
+                // A colon would end a scheme.
+                segments.push(percent::encoded(&component.as_os_str().to_string_lossy(), b""));
             }
             Component::ParentDir => segments.push("..".to_owned()),
             Component::RootDir | Component::CurDir => {}
@@ -86,18 +88,6 @@ fn uri(path: &str) -> String {
     }
     let relative = segments.join("/");
     if path.is_absolute() { format!("file:///{relative}") } else { relative }
-}
-
-/// Percent escapes for all bytes that a segment of a path cannot have. A colon would end a scheme.
-fn escape(segment: &str) -> String {
-    let mut text = String::new();
-    for byte in segment.bytes() {
-        match byte {
-            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' => text.push(char::from(byte)),
-            other => text += &format!("%{other:02X}"),
-        }
-    }
-    text
 }
 
 #[cfg(test)]
