@@ -24,7 +24,7 @@ pub use crate::plan::{PlanError, QualitySelection};
 use crate::report::{Extras, Report};
 use crate::scene::{Scene, SceneError};
 use crate::sheet::{self, Canvas, Layout};
-use crate::spec::Spec;
+use crate::spec::{Sheet, Spec};
 use crate::warning::Warning;
 
 /// Turns the bytes of a mesh into the bytes of a picture.
@@ -64,21 +64,17 @@ pub fn render_model(
     let animated = spec.sheet.as_ref().filter(|sheet| sheet.is_animated(format));
     let effort = spec.image.effort;
     // One view alone is encoded while it is drawn, as far as its format and its back-end allow it.
-    let mut rows = None;
+    let size_px = [spec.image.width_px, spec.image.height_px];
+    let mut rows = match spec.sheet.is_none() && !spec.image.legend {
+        true => encode::row_encoder(format, effort, size_px, spec.image.background.is_opaque()),
+        false => None,
+    };
     let drawn = match &spec.sheet {
+        Some(sheet) => draw_sheet(model, (sheet, animated.is_some()), spec, backends, budget, deadline, ended)?,
         None => {
-            if !spec.image.legend {
-                rows = encode::row_encoder(
-                    format,
-                    effort,
-                    [spec.image.width_px, spec.image.height_px],
-                    spec.image.background.is_opaque(),
-                );
-            }
             let sink = rows.as_mut().map(|rows| rows as &mut dyn RowSink);
             draw_view(model.view(), spec, sink, backends, budget, deadline, ended)?
         }
-        Some(_) => draw_as(model, spec, animated.is_some(), backends, budget, deadline, ended)?,
     };
 
     // Image -> bytes
@@ -106,23 +102,22 @@ pub fn draw(
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Drawn, RenderError> {
-    draw_as(model, spec, false, backends, budget, deadline, ended)
+    match &spec.sheet {
+        Some(sheet) => draw_sheet(model, (sheet, false), spec, backends, budget, deadline, ended),
+        None => draw_view(model.view(), spec, None, backends, budget, deadline, ended),
+    }
 }
 
-/// Draws one view, or all views of a sheet: into a grid, or else as the frames of an animation, from top to
-/// bottom.
-fn draw_as(
+/// Draws all views of a sheet: into a grid, or else as the frames of an animation, from top to bottom.
+fn draw_sheet(
     model: &Model,
+    (sheet, is_animated): (&Sheet, bool),
     spec: &Spec,
-    is_animated: bool,
     backends: &mut Backends,
     budget: &mut Budget,
     deadline: &Deadline,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Drawn, RenderError> {
-    let Some(sheet) = &spec.sheet else {
-        return draw_view(model.view(), spec, None, backends, budget, deadline, ended);
-    };
     let layout = Layout::new(sheet, &spec.image, is_animated);
     let mut canvas = Canvas::new(layout, budget).map_err(PlanError::Limit)?;
     let mut all: Option<Drawn> = None;

@@ -216,6 +216,25 @@ impl CpuRenderer {
         Ok(deadline.check()?)
     }
 
+    /// Draws the picture. A sink gets its bands as [`Renderer::draw_rows`] says.
+    fn draw_picture(
+        &mut self,
+        plan: &DrawPlan<'_>,
+        sink: Option<&mut dyn RowSink>,
+        deadline: &Deadline,
+    ) -> Result<Image, DrawError> {
+        let mut rgba = vec![0_u8; plan.width_px as usize * plan.height_px as usize * 4];
+        let queue = sink.map(RowQueue::new);
+        self.draw_bands(plan, deadline, (Goal::Picture, &mut rgba), |context, scratch, bins, band, out| {
+            bands::draw(context, scratch, bins, band, out);
+            if let Some(queue) = &queue {
+                queue.push(context, band, out);
+            }
+        })?;
+        drop(queue);
+        Ok(Image { width_px: plan.width_px, height_px: plan.height_px, rgba })
+    }
+
     /// Draws the samples of all bands, and finds what light their pixels go without.
     fn find_occlusion(
         &self,
@@ -328,11 +347,7 @@ impl RasterContext<'_> {
 
 impl Renderer for CpuRenderer {
     fn draw(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Image, DrawError> {
-        let mut rgba = vec![0_u8; plan.width_px as usize * plan.height_px as usize * 4];
-        self.draw_bands(plan, deadline, (Goal::Picture, &mut rgba), |context, scratch, bins, band, out| {
-            bands::draw(context, scratch, bins, band, out);
-        })?;
-        Ok(Image { width_px: plan.width_px, height_px: plan.height_px, rgba })
+        self.draw_picture(plan, None, deadline)
     }
 
     fn draw_rows(
@@ -341,14 +356,7 @@ impl Renderer for CpuRenderer {
         sink: &mut dyn RowSink,
         deadline: &Deadline,
     ) -> Result<Image, DrawError> {
-        let mut rgba = vec![0_u8; plan.width_px as usize * plan.height_px as usize * 4];
-        let queue = RowQueue::new(sink);
-        self.draw_bands(plan, deadline, (Goal::Picture, &mut rgba), |context, scratch, bins, band, out| {
-            bands::draw(context, scratch, bins, band, out);
-            queue.push(context, band, out);
-        })?;
-        drop(queue);
-        Ok(Image { width_px: plan.width_px, height_px: plan.height_px, rgba })
+        self.draw_picture(plan, Some(sink), deadline)
     }
 
     fn draw_visibility(&mut self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Vec<u64>, DrawError> {

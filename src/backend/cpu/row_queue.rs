@@ -7,20 +7,20 @@ use crate::backend::DrawStage;
 use crate::image::RowSink;
 
 /// The bands of a picture that are finished, until the sink has them.
-pub struct RowQueue<'a> {
-    sink: Mutex<Next<'a>>,
+pub struct RowQueue<'s, 'a> {
+    sink: Mutex<Next<'s>>,
     finished: Mutex<Vec<Option<&'a [u8]>>>,
 }
 
 /// The sink, and the band that it takes next.
-struct Next<'a> {
-    sink: &'a mut dyn RowSink,
+struct Next<'s> {
+    sink: &'s mut dyn RowSink,
     band: usize,
 }
 
-impl<'a> RowQueue<'a> {
+impl<'s, 'a> RowQueue<'s, 'a> {
     /// A queue without bands.
-    pub fn new(sink: &'a mut dyn RowSink) -> Self {
+    pub fn new(sink: &'s mut dyn RowSink) -> Self {
         Self { sink: Mutex::new(Next { sink, band: 0 }), finished: Mutex::default() }
     }
 

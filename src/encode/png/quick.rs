@@ -1,7 +1,7 @@
 //! PNG as rows come: one filter for the whole picture, Paeth, and Huffman codes that are not fitted to
 //! it.
 //!
-//! What Paeth leaves of a rendering is mostly runs of zeros, so trying more filters pays little. A row
+//! Paeth leaves of a rendering mostly runs of zeros, so trying more filters pays little. A row
 //! that equals the one above it, as in background and flat faces, is written as zeros without
 //! computing anything.
 

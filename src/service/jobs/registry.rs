@@ -79,7 +79,7 @@ pub enum Next {
     End,
 }
 
-/// What has taken too long.
+/// The jobs and workers that have taken too long.
 #[derive(Default)]
 pub struct Late {
     /// Jobs whose time is up.

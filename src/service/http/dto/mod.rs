@@ -49,7 +49,7 @@ impl<'a> ProblemDto<'a> {
 pub struct StatusDto {
     /// `ok` or `ready`.
     pub status: &'static str,
-    /// What does not work although the process takes work.
+    /// Faults in spite of which the process takes work.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub problems: Vec<DifficultyDto>,
 }
