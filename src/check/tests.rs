@@ -62,7 +62,7 @@ fn judge(text: &str, rule: &str) -> Check {
     let bundle = Bundle::of_one(text.as_bytes().to_vec());
     let deadline = Deadline::default();
     let mut checks = match pipeline::open(&bundle, None, &Limits::default(), &deadline) {
-        Ok(opened) => opened.check(&rules, &deadline).unwrap(),
+        Ok(opened) => opened.check(&rules, Options::default(), &deadline).unwrap(),
         Err(fault) => vec![unopened(fault.to_string())],
     };
     assert_eq!(checks.len(), 1, "{rule}");
@@ -318,4 +318,48 @@ fn vertices_that_nothing_refers_to_are_counted_though_reading_drops_them() {
     obeys(&cube().and("v 9 9 9\np -1\n"), "no-loose-vertices");
     // Its face is dropped, and it belongs to one all the same.
     obeys(&cube().and("v 9 9 9\nf -1 -1 1\n"), "no-loose-vertices");
+}
+
+#[test]
+fn a_limit_that_a_rule_hits_is_told_by_that_rule() {
+    let rules = RuleSet::parse(["opens", "watertight"], ["manifold"]).unwrap();
+    let bundle = Bundle::of_one(cube().text.into_bytes());
+    let deadline = Deadline::default();
+    let opened = |memory_bytes| {
+        let limits = Limits { memory_bytes, ..Limits::default() };
+        pipeline::open(&bundle, None, &limits, &deadline)
+    };
+    // The least memory with which the file opens leaves none for its edges.
+    let least = (0..200).map(|n| 256 * n).find(|bytes| opened(*bytes).is_ok()).unwrap();
+    let opened = opened(least).unwrap();
+    let error = opened.check(&rules, Options::default(), &deadline).unwrap_err();
+    assert!(matches!(error.fault, crate::import::MeshFault::Limit(_)), "{error:?}");
+    let options = Options { fails_at_limits: true, ..Options::default() };
+    let checks = opened.check(&rules, options, &deadline).unwrap();
+    assert_eq!(checks.iter().map(|check| check.ok).collect::<Vec<_>>(), [true, false, false]);
+    for check in &checks[1..] {
+        assert!(check.found.is_none() && check.places.is_empty(), "{check:?}");
+        assert!(check.detail.starts_with("it could not be judged: ") && check.detail.contains("--limit-memory-bytes"));
+    }
+    assert!(!Verdict::new("x".into(), None, checks).ok);
+}
+
+#[test]
+fn all_places_are_listed_on_request_up_to_a_bound_of_the_whole_verdict() {
+    let row = |count: usize| -> String {
+        (0..count).map(|i| format!("v {i} 0 0\nv {i} 1 0\nv {i} 0 1\nf -1 -2 -3\n")).collect()
+    };
+    let with = |count: usize, options: Options| {
+        let rules = RuleSet::parse(["watertight", "manifold"], ["no-warnings"]).unwrap();
+        let bundle = Bundle::of_one(row(count).into_bytes());
+        let opened = pipeline::open(&bundle, None, &Limits::default(), &Deadline::default()).unwrap();
+        opened.check(&rules, options, &Deadline::default()).unwrap()
+    };
+    let options = Options { all_places: true, ..Options::default() };
+    let (all, first) = (with(50, options), with(50, Options::default()));
+    assert_eq!((all[0].places.len(), first[0].places.len()), (150, PLACES_MAX));
+    assert_eq!(all[0].places[..PLACES_MAX], first[0].places);
+    let many = with(ALL_PLACES_MAX / 3 + 10, options);
+    assert_eq!(many[0].places.len(), ALL_PLACES_MAX);
+    assert_eq!(many[0].found, Some(Figure::Count(3 * (ALL_PLACES_MAX as u64 / 3 + 10))));
 }

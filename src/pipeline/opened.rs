@@ -42,11 +42,16 @@ impl Opened {
         &self.imported.path
     }
 
-    /// Judges the file by rules. Fails where the time or the memory of the job ends.
-    pub fn check(&self, rules: &RuleSet, deadline: &Deadline) -> Result<Vec<Check>, MeshError> {
+    /// Judges the file by rules. Fails where the time of the job ends, and by its memory unless rules are to tell that.
+    pub fn check(
+        &self,
+        rules: &RuleSet,
+        options: check::Options,
+        deadline: &Deadline,
+    ) -> Result<Vec<Check>, MeshError> {
         let Imported { mesh, report, .. } = &self.imported;
         let subject = check::Subject { mesh, import: report, file_bytes: self.file_bytes };
-        check::check(&subject, rules, &mut self.budget.clone(), deadline)
+        check::check(&subject, rules, options, &mut self.budget.clone(), deadline)
     }
 
     /// Compares the file with another, which is the newer one. `max_distance` is the largest distance between the

@@ -71,13 +71,17 @@ impl Obj {
         let vertices = self.vertices.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n"));
         let face = |face: &Vec<usize>| face.iter().map(|v| format!(" {}", v + 1)).collect::<String>();
         let text: String = vertices.chain(self.faces.iter().map(|corners| format!("f{}\n", face(corners)))).collect();
-        let extras = Extras { print: true, parts: true };
-        let (limits, deadline) = (Limits::default(), Deadline::default());
-        let bundle = Bundle::of_one(text.into_bytes());
-        let report = pipeline::inspect(&bundle, None, extras, &limits, &deadline, &mut |_| ()).unwrap();
-        assert!(report.text().contains("overhangs") && report.text().contains("parts"), "{}", report.text());
+        let extras = Extras { print: true, parts: true, uv: true };
+        let report = report_of(text, extras);
+        let text = report.text();
+        assert!(text.contains("overhangs") && text.contains("parts") && text.contains("charts       none"), "{text}");
         serde_json::from_str(&report.json().unwrap()).unwrap()
     }
+}
+
+fn report_of(obj: String, extras: Extras) -> Report {
+    let (limits, deadline) = (Limits::default(), Deadline::default());
+    pipeline::inspect(&Bundle::of_one(obj.into_bytes()), None, extras, &limits, &deadline, &mut |_| ()).unwrap()
 }
 
 #[track_caller]
@@ -169,4 +173,34 @@ fn loops_are_as_long_as_their_edges() {
     let around = |radius: f64| 2.0 * segments as f64 * radius * (std::f64::consts::PI / segments as f64).sin();
     near(&ring["length"], 2.0 * (around(3.5) + around(4.5)));
     near(&ring["longest"][0]["length"], around(4.5));
+}
+
+#[test]
+fn charts_have_the_areas_of_the_file_and_its_stretch() {
+    // Two squares of 8 by 2: one has a quarter of the texture, the other half of that quarter, mirrored, on the first one.
+    let vertices = "v 0 0 0\nv 8 0 0\nv 8 2 0\nv 0 2 0\nv 0 0 5\nv 8 0 5\nv 8 2 5\nv 0 2 5\n";
+    let uvs = "vt 0 0\nvt 0.5 0\nvt 0.5 0.5\nvt 0 0.5\nvt 0.25 0\nvt 0 0\nvt 0 0.5\nvt 0.25 0.5\n";
+    let obj = format!("{vertices}{uvs}f 1/1 2/2 3/3 4/4\nf 5/5 6/6 7/7 8/8\n");
+    let report = report_of(obj, Extras { uv: true, ..Extras::default() });
+    let json: Value = serde_json::from_str(&report.json().unwrap()).unwrap();
+    let uv = &json["uv"];
+    assert_eq!((&uv["charts"], &uv["flipped_faces"], &uv["faces_without_area"]), (&2.into(), &2.into(), &0.into()));
+    near(&uv["area"], 0.375);
+    near(&uv["overlaps"]["covered_area"], 0.25);
+    near(&uv["overlaps"]["overlapping_area"], 0.125);
+    assert_eq!(uv["overlaps"]["faces"], 4);
+    assert!(uv["overlaps"]["stated_error"].as_f64().unwrap() < 1e-6, "{uv}");
+    // Lengths on the surface over those in the texture: 16 and 4, scaled by the root of 0.25 / 16.
+    let [first, second] = [&uv["largest"][0], &uv["largest"][1]];
+    near(&first["stretch"]["linf"], 2.0);
+    near(&first["stretch"]["l2"], (0.5 * (4.0 + 0.25_f64)).sqrt());
+    // 32 and 4 of the mirrored one.
+    near(&second["stretch"]["linf"], 32.0 * (0.125 / 16.0_f64).sqrt());
+    near(&uv["stretch"]["linf"], 32.0 * (0.375 / 32.0_f64).sqrt());
+    near(&uv["stretch"]["l2"], ((272.0 + 1040.0) / 4.0 * 0.375 / 32.0_f64).sqrt());
+    assert_eq!(second["flipped_faces"], 2);
+    let text = report.text();
+    let expected = "charts       2, 37.5 % of the texture's area, stretch 1.961 (L2), 3.464 (Linf), 2 faces mirrored\n  \
+                    overlaps   4 faces, 12.5 % of the texture's area (within";
+    assert!(text.contains(expected), "{text}");
 }

@@ -191,3 +191,22 @@ fn junit_counts_what_fails() {
     let (code, printed, said) = check(folder.path(), &["parts", "--junit", "-"]);
     assert!(code == Some(2) && printed.is_empty() && said.contains("name a file"), "{said}");
 }
+
+#[test]
+fn all_places_are_listed_on_request() {
+    let folder = tempfile::tempdir().unwrap();
+    let row: String = (0..30).map(|i| format!("v {i} 0 0\nv {i} 1 0\nv {i} 0 1\nf -1 -2 -3\n")).collect();
+    fs::write(folder.path().join("row.obj"), row).unwrap();
+    let places = |more: &[&str]| {
+        let arguments =
+            [&["row.obj", "--rules", "watertight", "--format", "jsonl", "--html", "page.html"], more].concat();
+        let (code, stdout, stderr) = check(folder.path(), &arguments);
+        assert_eq!(code, Some(1), "{stderr}");
+        let page = fs::read_to_string(folder.path().join("page.html")).unwrap();
+        assert!(page.contains("the first 20 of 90 places"), "{page}");
+        let verdict: Value = serde_json::from_str(&stdout).unwrap();
+        assert_eq!(verdict["checks"][0]["found"], 90);
+        verdict["checks"][0]["where"].as_array().unwrap().len()
+    };
+    assert_eq!((places(&[]), places(&["--all-places"])), (20, 90));
+}

@@ -8,7 +8,7 @@ use quick_xml::escape::escape;
 
 use super::text::{at, place};
 use super::{Findings, ViewPictures, faults, word};
-use crate::check::{Check, Figure, Verdict, meaning};
+use crate::check::{Check, Figure, PLACES_MAX, Verdict, meaning};
 use crate::cli::check::pictures::Changed;
 use crate::pluralise::pluralise;
 
@@ -158,7 +158,7 @@ fn fault(page: &mut String, check: &Check) {
         text(&check.detail)
     );
     if !check.places.is_empty() {
-        let shown = check.places.len() as u64;
+        let shown = check.places.len().min(PLACES_MAX) as u64;
         let all = match check.found {
             Some(Figure::Count(count)) => count.max(shown),
             _ => shown,
@@ -169,7 +169,7 @@ fn fault(page: &mut String, check: &Check) {
             pluralise(shown, "place", "places")
         };
         let _ = write!(page, "<details><summary>{first}</summary><ol>");
-        for one in &check.places {
+        for one in check.places.iter().take(PLACES_MAX) {
             let _ = write!(page, "<li>{}</li>", text(&place(one)));
         }
         page.push_str("</ol></details>");
