@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use super::places::{self, Faults};
-use super::{ALL_PLACES_MAX, Check, Figure, Level, Options, PLACES_MAX, Place, Rule, RuleSet, uvs, volume};
+use super::{ALL_PLACES_MAX, Check, Figure, Level, Options, PLACES_MAX, Place, Rule, RuleSet, polygons, uvs, volume};
 use crate::import::{ImportReport, MeshError, MeshFault};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
@@ -142,10 +142,12 @@ impl Judge<'_> {
             Rule::Manifold => self.manifold()?,
             Rule::ConsistentWinding => self.winding()?,
             Rule::NoDegenerate => {
-                // Reading drops these faces, and their places with them.
+                // Reading drops these faces, and keeps the places of the first.
                 let count = import.dropped_degenerate_faces + import.dropped_collapsed_faces;
                 let detail = pluralise(count, "face without area", "faces without area");
-                Finding::of_faults(Faults::without_places(count), detail)
+                let places = import.degenerate_places.iter().take(self.places_max);
+                let places = places.map(|corners| places::corners(mesh, *corners)).collect();
+                Finding::of_faults(Faults { count, places }, detail)
             }
             Rule::NoDuplicateFaces => {
                 let faces = topology::duplicate_faces(mesh, self.budget)?;
@@ -172,7 +174,12 @@ impl Judge<'_> {
             Rule::NoNgons => {
                 let count = import.polygons_by_arity[5..].iter().sum();
                 let detail = pluralise(count, "polygon with more than 4 corners", "polygons with more than 4 corners");
-                Finding::of_faults(Faults::without_places(count), detail)
+                let places = match count {
+                    0 => Vec::new(),
+                    _ => polygons::ngons(mesh, self.budget)?,
+                };
+                let places = Faults::at(places.into_iter(), self.places_max, |face| places::face(mesh, face)).places;
+                Finding::of_faults(Faults { count, places }, detail)
             }
             Rule::SingleComponent => {
                 Finding::at_most(self.topology()?.components, 1, "connected part", "connected parts")
@@ -273,11 +280,13 @@ impl Judge<'_> {
         let of_vertices = Faults::at(vertices.into_iter(), self.places_max, |vertex| places::vertex(mesh, vertex));
         let detail = match (of_edges.count, of_vertices.count) {
             (0, 0) => "it is manifold".to_owned(),
-            (edges, vertices) => format!(
-                "{}, {} where surfaces touch",
-                pluralise(edges, "edge with more than two faces", "edges with more than two faces"),
-                pluralise(vertices, "vertex", "vertices")
-            ),
+            (edges, vertices) => {
+                let (one, more) = ("edge with more than two faces", "edges with more than two faces");
+                let of_edges = (edges > 0).then(|| pluralise(edges, one, more));
+                let (one, more) = ("vertex where surfaces touch", "vertices where surfaces touch");
+                let of_vertices = (vertices > 0).then(|| pluralise(vertices, one, more));
+                of_edges.into_iter().chain(of_vertices).collect::<Vec<_>>().join(", ")
+            }
         };
         Ok(Finding::of_faults(of_edges.and(of_vertices, self.places_max), detail))
     }

@@ -7,6 +7,7 @@
 mod judge;
 mod meaning;
 mod places;
+mod polygons;
 mod rule;
 #[cfg(test)]
 mod tests;

@@ -55,6 +55,11 @@ pub fn face(mesh: &Mesh, face: u32) -> Place {
     Place::Face(mesh.triangles[face as usize].map(|vertex| position(mesh, vertex)))
 }
 
+/// The place of a face with these corners in the file's space.
+pub fn corners(mesh: &Mesh, corners: [[f64; 3]; 3]) -> Place {
+    Place::Face(corners.map(|corner| corner.map(|value| tidy(value, mesh.to_file.scale))))
+}
+
 /// The position of a vertex, rounded to the digits that f32 has.
 fn position(mesh: &Mesh, vertex: u32) -> [f64; 3] {
     let to_file = &mesh.to_file;

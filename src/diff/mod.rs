@@ -197,6 +197,28 @@ pub struct Compared {
     pub of_vertices: [Vec<f64>; 2],
 }
 
+impl Compared {
+    /// The place of a side's largest distance, if the distances of its vertices do not tell of it: a hole has none of
+    /// its own.
+    pub fn hidden_place(&self, side: usize) -> Option<[f64; 3]> {
+        let way = self.way(side)?;
+        let of_vertices = self.of_vertices[side].iter().copied().filter(|distance| distance.is_finite());
+        let told = of_vertices.fold(self.difference.geometry.tolerance, f64::max);
+        (way.max > 1.5 * told).then_some(way.at)
+    }
+
+    /// True if the older side has what is farther from the newer one than the other way round: a part that was removed.
+    pub fn is_seen_before(&self) -> bool {
+        let [a, b] = [0, 1].map(|side| self.way(side).map_or(0.0, |way| way.max));
+        a > 2.0 * b
+    }
+
+    fn way(&self, side: usize) -> Option<Way> {
+        let Geometry { a_to_b, b_to_a, .. } = self.difference.geometry;
+        [a_to_b, b_to_a][side]
+    }
+}
+
 /// All that was found, for the words.
 struct Found<'a> {
     a: Side<'a>,

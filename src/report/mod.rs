@@ -12,7 +12,7 @@ mod tests;
 mod text;
 mod topology;
 
-pub use self::bounds::{Bounds, without_rounding};
+pub use self::bounds::{Bounds, significant, without_rounding};
 pub use self::charts::ChartsReport;
 pub use self::parts::PartsReport;
 pub use self::print::PrintReport;

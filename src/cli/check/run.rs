@@ -127,6 +127,9 @@ impl<'a> Run<'a> {
         for name in companions.filter(|name| !used.contains(&comparable(name))) {
             say!("meshsnap: {name}: is not used: no mesh refers to it");
         }
+        if let (Some(reference), true) = (&self.arguments.since, self.tasks.all.is_empty()) {
+            say!("no mesh has changed since {reference}");
+        }
         let failed = findings.failed();
         let known = match findings.known() {
             0 => String::new(),

@@ -5,7 +5,7 @@
 //! rounding. A tree of boxes finds the pairs.
 
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
 use super::cover::Uncovered;
 use super::{Uv, orientation, twice_area, uvs};
@@ -24,7 +24,8 @@ const PAIRS_PER_POLL: u64 = 256;
 const PAIRS_PER_FACE_MAX: u64 = 64;
 const PAIRS_MAX: u64 = 4_000_000;
 
-/// Most cuts of polygons in all.
+/// Most cuts of polygons, likewise. A face that lies across ten others has some 30.
+const CUTS_PER_FACE_MAX: u64 = 64;
 const CUTS_MAX: u64 = 20_000_000;
 
 /// Most polygons into which one face is cut.
@@ -56,7 +57,8 @@ pub fn overlaps(mesh: &Mesh, budget: &Budget, deadline: &Deadline) -> Result<Opt
     let boxes = boxes(mesh);
     deadline.check()?;
     let tree = Tree::of_boxes(boxes, &mut budget, deadline)?;
-    let search = Search { mesh, tree: &tree, deadline, pairs: AtomicU64::new(0), cuts: AtomicU64::new(0) };
+    let (pairs, cuts, has_shreds) = (AtomicU64::new(0), AtomicU64::new(0), AtomicBool::new(false));
+    let search = Search { mesh, tree: &tree, deadline, pairs, cuts, has_shreds };
     let places: Vec<usize> = (0..tree.len()).step_by(PIECE).collect();
     let pieces = map(places, |start| {
         let mut of_piece = Vec::new();
@@ -109,12 +111,16 @@ struct Search<'a> {
     deadline: &'a Deadline,
     pairs: AtomicU64,
     cuts: AtomicU64,
+    /// A face was cut into too many polygons.
+    has_shreds: AtomicBool,
 }
 
 impl Search<'_> {
     fn is_too_much(&self) -> bool {
-        let pairs_max = PAIRS_MAX + PAIRS_PER_FACE_MAX * self.tree.len() as u64;
-        self.pairs.load(Relaxed) > pairs_max || self.cuts.load(Relaxed) > CUTS_MAX
+        let faces = self.tree.len() as u64;
+        self.pairs.load(Relaxed) > PAIRS_MAX + PAIRS_PER_FACE_MAX * faces
+            || self.cuts.load(Relaxed) > CUTS_MAX + CUTS_PER_FACE_MAX * faces
+            || self.has_shreds.load(Relaxed)
     }
 
     /// The overlaps of a face; none if there are too many of them.
@@ -127,27 +133,36 @@ impl Search<'_> {
             return Ok(Some(Found { is_overlapping: false, first: whole, alone: whole, error: 0.0 }));
         }
         others.sort_unstable();
+        let (earlier, later) = others.split_at(others.partition_point(|other| *other < face));
         let mut left = Uncovered::of(own);
-        let earlier = others.partition_point(|other| *other < face);
-        let mut first = whole;
-        for (count, other) in others.iter().enumerate() {
-            if count == earlier {
-                first = left.area();
+        if !self.take(&mut left, earlier)? {
+            return Ok(None);
+        }
+        let first = left.area();
+        if !self.take(&mut left, later)? {
+            return Ok(None);
+        }
+        Ok(Some(Found { is_overlapping: true, first, alone: left.area(), error: 2.0 * left.error() }))
+    }
+
+    /// Takes away what other faces cover. False if that takes too long.
+    fn take(&self, left: &mut Uncovered, others: &[u32]) -> Result<bool, Stopped> {
+        for other in others {
+            if left.pieces() == 0 {
+                break;
             }
             let before = left.cuts;
             left.take(uvs(self.mesh, *other));
             self.cuts.fetch_add(left.cuts - before, Relaxed);
-            if self.is_too_much() || left.pieces() > POLYGONS_MAX {
-                self.cuts.fetch_max(CUTS_MAX + 1, Relaxed);
-                return Ok(None);
+            if left.pieces() > POLYGONS_MAX {
+                self.has_shreds.store(true, Relaxed);
+            }
+            if self.is_too_much() {
+                return Ok(false);
             }
             self.deadline.check()?;
         }
-        let alone = left.area();
-        if earlier == others.len() {
-            first = alone;
-        }
-        Ok(Some(Found { is_overlapping: true, first, alone, error: 2.0 * left.error() }))
+        Ok(true)
     }
 
     /// The faces that overlap a face; none if there are too many to look at.

@@ -186,7 +186,7 @@ fn the_number_of_threads_has_bounds() {
 fn inspect_says_what_is_in_the_file() {
     let output = run(&["inspect", "-", "--json"], CUBE_OBJ);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(report["format"], "obj");
     assert_eq!((report["triangles"].as_u64(), report["polygons"].as_u64()), (Some(12), Some(6)));
     assert_eq!(report["positions"], 8);

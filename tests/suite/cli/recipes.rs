@@ -7,6 +7,7 @@ use std::process::{Command, Output, Stdio};
 use super::baseline::{git, git_command};
 use super::check::folder;
 use crate::support::server::{CUBE_OBJ, meshsnap};
+use crate::support::skip::{Need, skip};
 
 fn recipe(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/ci").join(name)
@@ -108,4 +109,62 @@ fn the_workflows_name_what_the_program_has() {
             text.lines().filter(|line| line.trim_start().starts_with("run: ") || line.starts_with("          "));
         assert!(in_scripts.clone().all(|line| !line.contains("${{") || line.contains(": ${{")), "{name}");
     }
+}
+
+/// A tool of `target/python`. None, and the test counts as skipped, where it is missing.
+fn tool(name: &str) -> Option<Command> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/python/bin").join(name);
+    if !path.is_file() {
+        skip(Need::Python, &format!("{name} in target/python"));
+        return None;
+    }
+    Some(Command::new(path))
+}
+
+#[track_caller]
+fn passes(command: &mut Command) {
+    let output = command.output().unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&said));
+}
+
+#[test]
+fn the_recipes_are_valid_by_the_schemas_of_the_code_hosts() {
+    let workflows = ["github/check.yml", "github/comment.yml"];
+    let kinds: [(&[&str], &[&str]); 3] = [
+        (&["vendor.github-workflows"], &workflows),
+        (&["vendor.github-actions"], &["github/action.yml"]),
+        (&["vendor.gitlab-ci", "--data-transform", "gitlab-ci"], &["gitlab.yml"]),
+    ];
+    let mut checked = 0;
+    for (schema, names) in kinds {
+        let Some(mut command) = tool("check-jsonschema") else { return };
+        passes(command.arg("--builtin-schema").args(schema).args(names.iter().map(|name| recipe(name))));
+        checked += names.len();
+    }
+    assert_eq!(checked, 4);
+    // The schema refuses what is wrong.
+    let folder = tempfile::tempdir().unwrap();
+    let wrong = folder.path().join("action.yml");
+    let action = fs::read_to_string(recipe("github/action.yml")).unwrap();
+    fs::write(&wrong, action.replace("using: composite", "using: anything")).unwrap();
+    let Some(mut command) = tool("check-jsonschema") else { return };
+    let refused = command.args(["--builtin-schema", "vendor.github-actions"]).arg(&wrong).output().unwrap();
+    assert_eq!(refused.status.code(), Some(1), "{refused:?}");
+}
+
+#[test]
+fn the_scripts_have_no_fault_that_shellcheck_knows() {
+    let Some(mut command) = tool("shellcheck") else { return };
+    passes(command.arg(recipe("github/check.sh")).arg(recipe("pre-commit")));
+    // The scripts within the action.
+    let action = fs::read_to_string(recipe("github/action.yml")).unwrap();
+    let lines = action.lines().filter_map(|line| line.trim().strip_prefix("run: "));
+    let script: String = lines.map(|line| format!("{line}\n")).collect();
+    assert_eq!(script.lines().count(), 3, "{script}");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("action.sh");
+    fs::write(&file, format!("#!/bin/bash\n{script}")).unwrap();
+    let Some(mut command) = tool("shellcheck") else { return };
+    passes(command.arg(&file));
 }
