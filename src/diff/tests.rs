@@ -295,3 +295,15 @@ fn a_part_that_touches_another_in_one_vertex_is_a_part_of_its_own() {
     assert_eq!((difference.parts.moved, difference.parts.unchanged), (1, 1), "{:?}", difference.parts);
     assert_eq!(difference.parts.changed + difference.parts.added + difference.parts.removed, 0);
 }
+
+#[test]
+fn vertices_on_edges_of_others_are_counted_on_both_sides() {
+    // A square beside two halves of one: their common corner lies on its edge.
+    let plane =
+        |text: &str| format!("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\nv 1 0.5 0\nv 2 0.5 0\n{text}");
+    let square = "f 1 2 3 4\n";
+    let (whole, halves) = (plane(&format!("{square}f 2 5 6 3\n")), plane(&format!("{square}f 2 5 8 7\nf 7 8 6 3\n")));
+    let difference = texts(&whole, &halves, None);
+    let counts = [&difference.topology.a, &difference.topology.b].map(|side| side.t_junctions);
+    assert_eq!(counts, [Some(0), Some(1)]);
+}
