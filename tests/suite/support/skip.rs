@@ -22,6 +22,8 @@ pub enum Need {
     Python,
     /// `systemd-analyze` on the `PATH`.
     Systemd,
+    /// Chromium on the `PATH`, and axe-core, which `tests/run` installs into `target/node`.
+    Browser,
 }
 
 impl Need {
@@ -35,6 +37,7 @@ impl Need {
             Self::Mount => "mount",
             Self::Python => "python",
             Self::Systemd => "systemd",
+            Self::Browser => "browser",
         }
     }
 }
