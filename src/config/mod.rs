@@ -5,6 +5,7 @@
 //! A new setting is a field of [`Config`], its default, and one line of [`SETTINGS`].
 
 mod hardware;
+mod memory;
 mod settings;
 
 use std::path::PathBuf;
@@ -13,6 +14,7 @@ use std::sync::LazyLock;
 use etcetera::BaseStrategy as _;
 
 pub use hardware::why_no_gpu;
+pub use memory::memory_bytes;
 
 use crate::limits::Limits;
 use crate::spec::BackendChoice;
@@ -58,6 +60,9 @@ pub struct Config {
     pub rate_burst: u64,
     /// Most meshes and jobs of a day; 0: any number.
     pub quota_per_day: u64,
+    /// Most bytes of memory for jobs, uploads, stored meshes, caches, results and answers together; 0: by the container or
+    /// the machine.
+    pub memory_bytes: u64,
     /// Most bytes of uploads in memory at a time.
     pub uploads_bytes: u64,
     /// Longest time for the header of a request, milliseconds; also the longest time that a
@@ -116,6 +121,7 @@ impl Default for Config {
             rate_per_s: 0,
             rate_burst: 0,
             quota_per_day: 0,
+            memory_bytes: 0,
             uploads_bytes: 1 << 30,
             header_timeout_ms: 10_000,
             body_timeout_ms: 60_000,
@@ -255,6 +261,7 @@ mod tests {
             bundle_entries: _,
             job_ms: _,
             queue_per_worker: _,
+            lender: _,
         } = Limits::default();
         assert_eq!(count, 12, "a limit without a flag, or a flag without a limit");
     }

@@ -99,6 +99,13 @@ pub const SETTINGS: &[Setting] = &[
     number("quota-per-day", "Most POSTs and PUTs a day of a key, or of an address; 0: any", 0, RATE_MAX, |c| {
         &mut c.quota_per_day
     }),
+    number(
+        "memory-bytes",
+        "Most bytes of memory for all work and all that is kept; 0: by the machine",
+        0,
+        u64::MAX,
+        |c| &mut c.memory_bytes,
+    ),
     number("uploads-bytes", "Most bytes of uploads in memory at a time", 1, u64::MAX, |c| &mut c.uploads_bytes),
     number("header-timeout-ms", "Longest time for the header of a request", 1, MS_MAX, |c| &mut c.header_timeout_ms),
     number("body-timeout-ms", "Longest time for the body of a request", 1, MS_MAX, |c| &mut c.body_timeout_ms),

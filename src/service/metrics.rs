@@ -28,6 +28,7 @@ pub struct Metrics {
     workers: IntGaugeVec,
     memory: IntGaugeVec,
     memory_limits: IntGaugeVec,
+    memory_budget: IntGauge,
     entries: IntGaugeVec,
     gpu_losses: IntCounter,
     overdue: IntCounter,
@@ -52,6 +53,8 @@ pub struct Gauges {
     pub quarantined: usize,
     /// Bytes in use and the cap, by account.
     pub memory: Vec<(&'static str, u64, u64)>,
+    /// Most bytes of all accounts together.
+    pub memory_budget: u64,
     /// Number of things kept, by account.
     pub entries: Vec<(&'static str, usize)>,
     /// How often a GPU was lost.
@@ -92,6 +95,10 @@ impl Metrics {
             workers: gauge("meshsnap_workers", "Worker threads.", &["state"])?,
             memory: gauge("meshsnap_memory_bytes", "Memory in use, by account.", &["account"])?,
             memory_limits: gauge("meshsnap_memory_limit_bytes", "Most memory of an account.", &["account"])?,
+            memory_budget: registered(
+                r,
+                IntGauge::new("meshsnap_memory_budget_bytes", "Most memory of all accounts together.")?,
+            )?,
             entries: gauge("meshsnap_kept_entries", "Number of things that are kept.", &["account"])?,
             gpu_losses: registered(r, IntCounter::new("meshsnap_gpu_losses_total", "Times that a GPU was lost.")?)?,
             overdue: registered(
@@ -155,6 +162,7 @@ impl Metrics {
             self.memory.with_label_values(&[account]).set(to_i64(bytes));
             self.memory_limits.with_label_values(&[account]).set(to_i64(limit));
         }
+        self.memory_budget.set(to_i64(gauges.memory_budget));
         for &(account, count) in &gauges.entries {
             self.entries.with_label_values(&[account]).set(to_i64(count as u64));
         }

@@ -1,5 +1,5 @@
 //! The daemon: [`http`] in front of [`jobs`] (the queue, the workers and their results) and
-//! [`store`] (meshes that stay). [`durable`] is the data folder, where both outlive the process. [`residents`] and
+//! [`store`] (meshes that stay). [`durable`] is the data folder, where both outlive the process. [`memory`] is what all of them share. [`residents`] and
 //! [`pictures`] remember what was read and drawn, and [`metrics`] what happened. [`keys`] says who may do what, [`rates`] how much, and
 //! [`signature`] lets addresses be used without a key. [`warm_up`] makes the first picture come sooner.
 //!
@@ -11,6 +11,7 @@ pub mod durable;
 pub mod http;
 pub mod jobs;
 pub mod keys;
+pub mod memory;
 pub mod metrics;
 pub mod pictures;
 pub mod rates;

@@ -9,6 +9,7 @@ use super::receive::{check, diff};
 use super::state::AppState;
 use super::stored_mesh;
 use crate::import::{Bundle, BundleFile, Format};
+use crate::limits::Lender;
 use crate::request;
 use crate::service::durable::{
     ClaimRecord, FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob, RequestKind,
@@ -17,6 +18,7 @@ use crate::service::jobs::{
     Claim, ClaimName, Failure, JSON, JobId, JobState, Named, Newer, Owner, Recipe, Restored, Task, Work, read_picture,
     value_of,
 };
+use crate::service::memory::Account;
 use crate::service::store::{NewMesh, Reading};
 
 /// How often a job may be begun by processes that then ended.
@@ -88,7 +90,9 @@ fn restore_result(state: &AppState, recovered: &Recovered, name: Restored, job: 
                 holds.push(hold);
                 read_picture(picture, bytes)
             });
-            read.map_or(JobState::Failed(Arc::new(Failure::Lost)), |finished| JobState::Done(Arc::new(finished)))
+            read.map_or(JobState::Failed(Arc::new(Failure::Lost)), |finished| {
+                JobState::Done(Arc::new(finished.counted(&state.memory)))
+            })
         }
         (None, Some(error)) => JobState::Failed(Arc::new(Failure::Recorded(error))),
         (None, None) => JobState::Cancelled,
@@ -115,7 +119,7 @@ fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Resul
         Some(side) => {
             let (files, own) = self::files(recovered, &side.files).ok_or(Failure::Lost)?;
             let bundle = Bundle::restored(files, side.is_zip, record.entry.clone());
-            let mut memory = state.upload_budget.reserve();
+            let memory = state.memory.share(Account::Uploads);
             memory.take(bundle.bytes_len());
             holds.extend(own.iter().cloned());
             Some(Newer { bundle, memory: Arc::new(memory), holds: own.into(), mesh: side.mesh })
@@ -125,14 +129,18 @@ fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Resul
     let task = task(state, record, document.as_deref(), newer)?;
     let recipe = Recipe { document, overrides: record.request.overrides.clone().into(), mesh: record.mesh };
     let bundle = Bundle::restored(files, record.is_zip, record.entry.clone());
-    let mut memory = state.upload_budget.reserve();
+    let memory = state.memory.share(Account::Uploads);
     memory.take(bundle.bytes_len());
     let reading = reading(record.format_in.as_deref(), record.entry.clone());
     let mesh_key = record.mesh.map(|digest| stored_mesh::key(digest, &reading));
     let (format_in, memory, recipe) = (reading.format_in, Arc::new(memory), Some(Arc::new(recipe)));
     let (owner, request_id) = (Owner::new(&record.owner), record.request_id.as_str().into());
     let (claim, own) = (None, [].into());
-    Ok((Work { bundle, format_in, mesh_key, task, memory, recipe, owner, request_id, holds: own, claim }, holds))
+    let lender = Lender(None);
+    Ok((
+        Work { bundle, format_in, mesh_key, task, memory, lender, recipe, owner, request_id, holds: own, claim },
+        holds,
+    ))
 }
 
 /// The name of the job's request, so that the request is known when it is sent again.

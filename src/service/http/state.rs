@@ -9,12 +9,13 @@ use super::static_document::StaticDocument;
 use super::{ServeError, descriptions, error};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{GpuHost, HardwareHint};
-use crate::config::{Config, cores, why_no_gpu};
+use crate::config::{Config, cores, memory_bytes, why_no_gpu};
 use crate::limits::Limits;
 use crate::request::Rules;
 use crate::service::durable::{Durable, Recovered};
-use crate::service::jobs::{CpuThreads, JobSettings, Jobs, Storage, UploadBudget, pipeline_renderers};
+use crate::service::jobs::{CpuThreads, JobSettings, Jobs, Storage, pipeline_renderers};
 use crate::service::keys::Keys;
+use crate::service::memory::{Account, Memory, MemoryLimits};
 use crate::service::metrics::Metrics;
 use crate::service::pictures::Pictures;
 use crate::service::rates::Rates;
@@ -36,8 +37,8 @@ pub struct AppState {
     pub jobs: Jobs,
     /// The process's GPU.
     pub gpu: Arc<GpuHost>,
-    /// The memory that uploads share.
-    pub upload_budget: Arc<UploadBudget>,
+    /// The memory of the process.
+    pub memory: Arc<Memory>,
     /// Counters and gauges.
     pub metrics: Arc<Metrics>,
     /// The data folder. None: nothing outlives the process.
@@ -82,7 +83,8 @@ impl AppState {
             given => CpuThreads::Each(to_usize(given)),
         };
         let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), config.cache_dir.clone()));
-        let residents = Arc::new(Residents::new(config.resident_bytes));
+        let memory = Memory::new(&memory_limits(config));
+        let residents = Arc::new(Residents::new(config.resident_bytes, memory.clone()));
         let renderers = pipeline_renderers(gpu.clone(), threads, config.limits.clone(), residents.clone());
         let Limits { queue_per_worker, job_ms, .. } = config.limits;
         let metrics = Arc::new(Metrics::new().map_err(std::io::Error::other)?);
@@ -96,8 +98,9 @@ impl AppState {
             interactive_wait: Duration::from_millis(config.wait_ms),
             batch_wait: Duration::from_millis(config.batch_wait_ms),
             unfetched_ttl: Duration::from_millis(config.unfetched_ttl_ms),
-            result_bytes: config.result_bytes,
+            result_bytes: memory.cap(Account::Results),
             result_count: to_usize(config.result_count),
+            memory: memory.clone(),
             metrics: Some(metrics.clone()),
             storage: durable.clone().map(|durable| Storage { durable, describe: error::record }),
         };
@@ -108,13 +111,13 @@ impl AppState {
             rules,
             jobs: Jobs::start(settings, renderers)?,
             gpu,
-            upload_budget: UploadBudget::new(config.uploads_bytes),
-            meshes: Store::with(durable.clone(), config.mesh_bytes, to_usize(config.mesh_count)),
+            meshes: Store::new(durable.clone(), memory.clone(), to_usize(config.mesh_count)),
             durable,
             event_streams: EventStreams::new(),
             metrics,
             residents,
-            pictures: Pictures::new(config.picture_bytes),
+            pictures: Pictures::new(config.picture_bytes, &memory),
+            memory,
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             least_rate: config.least_rate_bytes,
             workers: config.workers,
@@ -137,6 +140,21 @@ impl AppState {
     pub fn is_draining(&self) -> bool {
         self.draining.load(Ordering::Relaxed)
     }
+}
+
+/// The caps of the accounts: what is configured, and where memory is scarce, parts of it. Half is for jobs then. Caches have
+/// caps of their own.
+fn memory_limits(config: &Config) -> MemoryLimits {
+    let all = memory_bytes(config.memory_bytes);
+    let job = config.limits.memory_bytes.min(all / 2);
+    let rest = all - job;
+    let accounts = vec![
+        (Account::Uploads, config.uploads_bytes.min(rest / 2)),
+        (Account::Results, config.result_bytes.min(rest / 4)),
+        (Account::Meshes, config.mesh_bytes.min(rest / 4)),
+    ];
+    tracing::info!(bytes = all, job, "memory");
+    MemoryLimits { all, job, accounts }
 }
 
 fn to_u32(number: u64) -> u32 {

@@ -173,6 +173,7 @@ pub fn read_picture(record: PictureRecord, content: Bytes) -> Option<Finished> {
     let warnings = record.warnings.into_iter();
     Some(Finished {
         content,
+        memory: None,
         media: if record.format == JSON { Media::Json } else { Media::Picture(value_of(&record.format)?) },
         has_failed: record.has_failed,
         backend,

@@ -21,8 +21,9 @@ use crate::service::http::error::ApiError;
 use crate::service::http::middleware::observe;
 use crate::service::http::state::AppState;
 use crate::service::http::{negotiate, stored_mesh};
-use crate::service::jobs::{Class, Comparing, Newer, Recipe, Reservation, Task, Work};
+use crate::service::jobs::{Class, Comparing, Newer, Recipe, Task, Work};
 use crate::service::keys::Access;
+use crate::service::memory::Share;
 use crate::service::store::Reading;
 use crate::spec::Spec;
 
@@ -69,8 +70,8 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     let headers = request.headers().clone();
     let limits = &state.rules.limits;
     let (bytes, files, time) = (limits.body_bytes, limits.bundle_entries, state.body_timeout);
-    let (least_rate, upload_budget) = (state.least_rate, &state.upload_budget);
-    let limits = BodyLimits { bytes, files, meshes: None, time, least_rate, upload_budget };
+    let (least_rate, memory) = (state.least_rate, &state.memory);
+    let limits = BodyLimits { bytes, files, meshes: None, time, least_rate, memory };
     let meshes = match sides::read(request, limits).await? {
         sides::Sides::Document(document) => stored(state, &document, &mut keys, &reading, &access)?,
         sides::Sides::Meshes { bundles, reservations } => sent(bundles, reservations, &reading).await?,
@@ -110,7 +111,7 @@ fn stored(
 }
 
 /// Two meshes that were sent.
-async fn sent(bundles: [Bundle; 2], memory: [Reservation; 2], reading: &Reading) -> Result<Meshes, ApiError> {
+async fn sent(bundles: [Bundle; 2], memory: [Share; 2], reading: &Reading) -> Result<Meshes, ApiError> {
     for bundle in &bundles {
         bundle.check_sent().map_err(|error| ApiError::from(&error))?;
     }

@@ -175,7 +175,7 @@ pub async fn read_upload(state: &AppState, request: Request) -> Result<Upload, A
 
 async fn read_body(state: &AppState, request: Request, meshes: Option<u64>) -> Result<Upload, ApiError> {
     let Limits { body_bytes: bytes, bundle_entries: files, .. } = state.rules.limits;
-    let (time, least_rate, upload_budget) = (state.body_timeout, state.least_rate, &state.upload_budget);
-    let limits = BodyLimits { bytes, files, meshes, time, least_rate, upload_budget };
+    let (time, least_rate, memory) = (state.body_timeout, state.least_rate, &state.memory);
+    let limits = BodyLimits { bytes, files, meshes, time, least_rate, memory };
     body::read(request, limits).await
 }
