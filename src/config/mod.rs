@@ -42,6 +42,12 @@ pub struct Config {
     pub api_keys: Vec<String>,
     /// File of named keys.
     pub api_keys_file: Option<PathBuf>,
+    /// The key of signatures of webhooks, as text. None: there are no webhooks.
+    pub webhook_secret: Option<String>,
+    /// Lets webhooks go to addresses of private networks.
+    pub webhooks_to_private: bool,
+    /// The pause after the first attempt of a webhook that fails, milliseconds.
+    pub webhook_retry_ms: u64,
     /// Allows clients without tokens on addresses other than loopback.
     pub no_auth: bool,
     /// Origins of pages of other sites that may use the interface: [`ANY_ORIGIN`] alone, or some.
@@ -112,6 +118,9 @@ impl Default for Config {
             backend: BackendChoice::Auto,
             api_keys: Vec::new(),
             api_keys_file: None,
+            webhook_secret: None,
+            webhooks_to_private: false,
+            webhook_retry_ms: 5000,
             no_auth: false,
             cors_origins: Vec::new(),
             connections: 512,
@@ -202,6 +211,8 @@ impl Config {
             return Err(ConfigError::Unknown { source_name: source_name.into(), key: key.into(), known });
         };
         setting.set(self, value).map_err(|allowed| {
+            // Messages reach logs, which are no place for secrets.
+            let value = if setting.has_flag { value } else { "(not shown)" };
             let (source_name, key, value) = (source_name.into(), key.into(), value.into());
             ConfigError::Value { source_name, key, value, allowed }
         })
@@ -242,7 +253,7 @@ mod tests {
             assert_eq!(copy, default, "{}", setting.key);
             checked += 1;
         }
-        assert_eq!(checked, SETTINGS.len() - 4);
+        assert_eq!(checked, SETTINGS.len() - 5);
     }
 
     #[test]

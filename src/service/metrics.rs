@@ -23,6 +23,8 @@ pub struct Metrics {
     answers: IntCounterVec,
     rejections: IntCounterVec,
     pictures: IntCounterVec,
+    webhooks: IntCounterVec,
+    webhooks_waiting: IntGauge,
     queued: IntGaugeVec,
     expected_wait: IntGaugeVec,
     workers: IntGaugeVec,
@@ -57,6 +59,8 @@ pub struct Gauges {
     pub memory_budget: u64,
     /// Number of things kept, by account.
     pub entries: Vec<(&'static str, usize)>,
+    /// Webhooks that are to be delivered.
+    pub webhooks: usize,
     /// How often a GPU was lost.
     pub gpu_losses: u64,
     /// Memory of the process.
@@ -86,6 +90,11 @@ impl Metrics {
             answers: counter("meshsnap_http_answers_total", "Answers by status.", &["status"])?,
             rejections: counter("meshsnap_rejections_total", "Answers that are errors, by code.", &["status", "code"])?,
             pictures: counter("meshsnap_pictures_total", "Pictures of stored meshes, by X-Cache.", &["outcome"])?,
+            webhooks: counter("meshsnap_webhooks_total", "Ends of webhooks, and attempts that failed.", &["outcome"])?,
+            webhooks_waiting: registered(
+                r,
+                IntGauge::new("meshsnap_webhooks_waiting", "Webhooks that are to be delivered.")?,
+            )?,
             queued: gauge("meshsnap_queue_jobs", "Jobs that wait for a worker.", &["class"])?,
             expected_wait: gauge(
                 "meshsnap_queue_expected_wait_milliseconds",
@@ -143,6 +152,11 @@ impl Metrics {
         self.pictures.with_label_values(&[outcome]).inc();
     }
 
+    /// An attempt to deliver a webhook failed, or it came to an end.
+    pub fn webhook(&self, outcome: &str) {
+        self.webhooks.with_label_values(&[outcome]).inc();
+    }
+
     /// A worker did not end its job.
     pub fn worker_overdue(&self) {
         self.overdue.inc();
@@ -157,6 +171,7 @@ impl Metrics {
         for &(state, count) in &gauges.workers {
             self.workers.with_label_values(&[state]).set(to_i64(count));
         }
+        self.webhooks_waiting.set(to_i64(gauges.webhooks as u64));
         self.quarantined.set(to_i64(gauges.quarantined as u64));
         for &(account, bytes, limit) in &gauges.memory {
             self.memory.with_label_values(&[account]).set(to_i64(bytes));

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::error::{ApiError, record_of};
+use super::hear_of_ends;
 use super::receive::keys::Keys;
 use super::receive::{check, diff};
 use super::state::AppState;
@@ -44,7 +45,11 @@ pub fn recover(state: &AppState, mut recovered: Recovered) {
             claim: claim(state, &job.record),
         };
         if job.end.is_some() {
+            let (id, end) = (name.id, job.end.as_ref());
+            let is_told = end.is_some_and(|end| end.notified_unix_ms.is_some());
+            let webhook = job.record.webhook.clone().filter(|_| !is_told);
             restore_result(state, &recovered, name, job);
+            tell(state, id, webhook.as_deref());
             continue;
         }
         match resumed(state, &recovered, &job) {
@@ -53,11 +58,22 @@ pub fn recover(state: &AppState, mut recovered: Recovered) {
                 let work = Work { claim: name.claim, ..work };
                 state.jobs.resume((name.id, name.accepted_unix_ms), work, holds);
             }
-            Err(failure) => state.jobs.restore(name, JobState::Failed(Arc::new(failure)), None, Vec::new()),
+            Err(failure) => {
+                let id = name.id;
+                state.jobs.restore(name, JobState::Failed(Arc::new(failure)), None, Vec::new());
+                tell(state, id, job.record.webhook.as_deref());
+            }
         }
     }
     if mesh_count + job_count > 0 {
         tracing::info!(meshes = mesh_count, jobs = job_count, queued, "taken over from the data folder");
+    }
+}
+
+/// Tells the webhook of a job of its end, of which an earlier process has not told it.
+fn tell(state: &AppState, id: JobId, webhook: Option<&str>) {
+    if let (Some(address), Some(job)) = (webhook, state.jobs.find(id)) {
+        hear_of_ends::send(state.webhooks.as_ref(), &job, address);
     }
 }
 
@@ -135,10 +151,23 @@ fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Resul
     let mesh_key = record.mesh.map(|digest| stored_mesh::key(digest, &reading));
     let (format_in, memory, recipe) = (reading.format_in, Arc::new(memory), Some(Arc::new(recipe)));
     let (owner, request_id) = (Owner::new(&record.owner), record.request_id.as_str().into());
-    let (claim, own) = (None, [].into());
+    let (claim, own, webhook) = (None, [].into(), record.webhook.as_deref().map(Into::into));
     let lender = Lender(None);
     Ok((
-        Work { bundle, format_in, mesh_key, task, memory, lender, recipe, owner, request_id, holds: own, claim },
+        Work {
+            bundle,
+            format_in,
+            mesh_key,
+            task,
+            memory,
+            lender,
+            recipe,
+            owner,
+            request_id,
+            holds: own,
+            claim,
+            webhook,
+        },
         holds,
     ))
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::event_streams::EventStreams;
 use super::static_document::StaticDocument;
-use super::{ServeError, descriptions, error};
+use super::{ServeError, descriptions, error, hear_of_ends};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{GpuHost, HardwareHint};
 use crate::config::{Config, cores, memory_bytes, why_no_gpu};
@@ -21,6 +21,7 @@ use crate::service::pictures::Pictures;
 use crate::service::rates::Rates;
 use crate::service::residents::Residents;
 use crate::service::store::Store;
+use crate::service::webhooks::Webhooks;
 
 /// Time without work after which a worker frees the memory in which it draws.
 const IDLE_TIME: Duration = Duration::from_secs(10);
@@ -43,6 +44,8 @@ pub struct AppState {
     pub metrics: Arc<Metrics>,
     /// The data folder. None: nothing outlives the process.
     pub durable: Option<Durable>,
+    /// The webhooks. None: there is no secret for them.
+    pub webhooks: Option<Webhooks>,
     /// The clients that follow jobs.
     pub event_streams: EventStreams,
     /// The stored meshes.
@@ -88,6 +91,7 @@ impl AppState {
         let renderers = pipeline_renderers(gpu.clone(), threads, config.limits.clone(), residents.clone());
         let Limits { queue_per_worker, job_ms, .. } = config.limits;
         let metrics = Arc::new(Metrics::new().map_err(std::io::Error::other)?);
+        let webhooks = hear_of_ends::start(config, durable.clone(), &metrics)?;
         let settings = JobSettings {
             workers: to_usize(config.workers),
             queue: to_usize(queue_per_worker.saturating_mul(config.workers)),
@@ -102,6 +106,7 @@ impl AppState {
             result_count: to_usize(config.result_count),
             memory: memory.clone(),
             metrics: Some(metrics.clone()),
+            webhooks: hear_of_ends::of_jobs(webhooks.as_ref()),
             storage: durable.clone().map(|durable| Storage { durable, describe: error::record }),
         };
         let rules = Rules { limits: config.limits.clone(), backend: config.backend };
@@ -113,6 +118,7 @@ impl AppState {
             gpu,
             meshes: Store::new(durable.clone(), memory.clone(), to_usize(config.mesh_count)),
             durable,
+            webhooks,
             event_streams: EventStreams::new(),
             metrics,
             residents,

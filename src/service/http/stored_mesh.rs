@@ -59,5 +59,6 @@ pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Share>) ->
         request_id: "".into(),
         holds: [].into(),
         claim: None,
+        webhook: None,
     }
 }

@@ -81,6 +81,8 @@ pub struct Work {
     pub holds: Arc<[Arc<Hold>]>,
     /// The name that the client gave the request.
     pub claim: Option<Arc<Claim>>,
+    /// The address that hears of its end.
+    pub webhook: Option<Arc<str>>,
 }
 
 /// A request for a picture, as it was sent.
@@ -368,6 +370,8 @@ pub struct Job {
     pub owner: Owner,
     /// The id of the request that brought it, for the log.
     pub request_id: Arc<str>,
+    /// The address that hears of its end.
+    pub webhook: Option<Arc<str>>,
     /// Time of acceptance by this process.
     pub accepted: Instant,
     /// Time of acceptance in milliseconds since 1970, for clients.
@@ -455,6 +459,7 @@ impl Job {
             class: if is_kept { Class::Batch } else { Class::Interactive },
             owner,
             request_id: work.as_ref().map_or_else(|| "".into(), |work| work.request_id.clone()),
+            webhook: work.as_ref().and_then(|work| work.webhook.clone()),
             accepted: Instant::now(),
             accepted_unix_ms,
             is_durable,

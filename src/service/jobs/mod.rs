@@ -42,7 +42,7 @@ use super::durable::{Change, EndRecord, Hold, Unstored};
 use super::memory::Memory;
 use super::metrics::Metrics;
 use claims::Claimed;
-pub use job::Restored;
+pub use job::{Restored, unix_ms};
 use registry::JobRegistry;
 
 /// The limits of the job service.
@@ -76,6 +76,18 @@ pub struct JobSettings {
     pub storage: Option<Storage>,
     /// Hears of waits, stages and ends.
     pub metrics: Option<Arc<Metrics>>,
+    /// Hears of the end of each job that has a webhook.
+    pub webhooks: Option<OnEnd>,
+}
+
+/// Hears of the end of a job. A lock is held, so it returns at once.
+#[derive(Clone)]
+pub struct OnEnd(pub Arc<dyn Fn(&Arc<Job>) + Send + Sync>);
+
+impl std::fmt::Debug for OnEnd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("OnEnd").finish_non_exhaustive()
+    }
 }
 
 /// Reasons why a job was not accepted.

@@ -28,7 +28,7 @@ use super::queue::Queue;
 use super::results::Results;
 use super::storage::Storage;
 use super::watchdog::{Overdue, Quarantine, Running};
-use super::{JobLoad, JobSettings, Refusal};
+use super::{JobLoad, JobSettings, OnEnd, Refusal};
 use crate::service::durable::{Change, Hold};
 
 /// The rank that a job loses for each second of its estimate, seconds.
@@ -346,13 +346,18 @@ impl JobRegistry {
     }
 
     /// Tells everybody that a job has ended.
-    fn announce(&self, inner: &mut Inner, job: &Job, state: JobState) {
+    fn announce(&self, inner: &mut Inner, job: &Arc<Job>, state: JobState) {
         if job.is_kept {
             inner.results.add(job, &state, false, &self.settings);
             self.evict(inner);
             self.clock.notify_one();
         }
         job.state.send_replace(state);
+        if let Some(OnEnd(hear)) = &self.settings.webhooks
+            && job.webhook.is_some()
+        {
+            hear(job);
+        }
     }
 
     /// A client has the end of a kept job: from now on it is kept for a while only.

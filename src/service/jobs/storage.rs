@@ -87,6 +87,7 @@ impl Storage {
             owner: work.owner.to_string(),
             request_id: work.request_id.to_string(),
             mesh: recipe.mesh,
+            webhook: work.webhook.as_deref().map(str::to_owned),
             newer,
             claim: work
                 .claim

@@ -85,6 +85,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "limits",
         ],
     ),
+    ("service/webhooks", &["service/metrics"]),
     ("service/warm_up", &["pipeline", "request", "backend", "spec", "import", "limits"]),
     (
         "service/http",
@@ -92,6 +93,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "service/warm_up",
             "service/keys",
             "service/memory",
+            "service/webhooks",
             "service/rates",
             "service/signature",
             "service/metrics",
@@ -173,7 +175,7 @@ const DIRECT_FILES_MAX: usize = 14;
 const ONLY_UNDER: &[(&str, &[&str])] = &[
     ("wgpu::", &["backend/gpu/"]),
     ("axum::", &["service/http/"]),
-    ("sha2::", &["service/digest", "service/signature"]),
+    ("sha2::", &["service/digest", "service/signature", "service/webhooks"]),
     ("redb::", &["service/durable/"]),
     ("prometheus::", &["service/metrics"]),
     ("object_store::", &["service/durable/"]),

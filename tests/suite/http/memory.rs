@@ -76,13 +76,13 @@ fn noise(side: usize) -> Vec<u8> {
 
 #[test]
 fn answers_that_nobody_reads_count_once_and_are_given_back() {
-    const PICTURES: u32 = 8;
+    const PICTURES: u32 = 14;
     // Half of it is for jobs, so that answers may take the other half.
-    let server = Server::start(&["--memory-bytes", "64MiB", "--workers", "2"]);
-    let mesh = noise(170);
+    let server = Server::start(&["--memory-bytes", "32MiB", "--workers", "2"]);
+    let mesh = noise(100);
     let (mut readers, mut bytes, mut refused) = (Vec::new(), 0, 0);
     for number in 0..PICTURES {
-        let path = format!("/v1/jobs?size={}&samples=1&image.effort=0&view=front&style=unlit", 2000 + number);
+        let path = format!("/v1/jobs?size={}&samples=1&image.effort=0&view=front&style=unlit", 1500 - number);
         let answer = server.post(&path, &mesh);
         if answer.status != 202 {
             answer.problem(429, "memory_full");
@@ -94,24 +94,29 @@ fn answers_that_nobody_reads_count_once_and_are_given_back() {
         let job = answer.header("location").unwrap().to_owned();
         server.request("GET", &job, &["Prefer: wait=60"], b"");
         let result = account(&server, "results");
-        assert!(result > 4_000_000, "{result}: {}", server.get(&job).json());
-        // Two that read nothing and ask for several: what the buffers of their sockets have not taken stays here, once.
+        assert!(result > 2_500_000, "{result}: {}", server.get(&job).json());
+        // Two that read nothing of several answers: what the buffers of their sockets have not taken stays here, once.
         for _ in 0..2 {
             let mut stream = server.connect();
             let question = format!("GET {job}/result HTTP/1.1\r\nHost: localhost\r\n\r\n");
-            stream.write_all(question.repeat(2).as_bytes()).unwrap();
+            stream.write_all(question.repeat(4).as_bytes()).unwrap();
             // The server has begun to answer.
             stream.peek(&mut [0; 1]).unwrap();
             readers.push(stream);
         }
         bytes += result;
+        // The first answers are on their way, and the next one waits.
+        std::thread::sleep(Duration::from_millis(300));
         server.request("DELETE", &job, &[], b"");
-        assert_eq!((account(&server, "results"), account(&server, "answers")), (0, bytes));
+        // Each counts once, however many read it. The buffers of a socket may grow, and take one after a while.
+        let waiting = account(&server, "answers");
+        assert!(waiting <= bytes && waiting >= bytes / 2, "{waiting} of {bytes}");
+        assert_eq!(account(&server, "results"), 0);
     }
     println!("{bytes} bytes wait, {refused} jobs were refused");
     assert!(refused > 0 && readers.len() >= 4);
     server.get("/healthz").json();
-    Answer::read(&mut readers[0]).picture(2000, 2000);
+    Answer::read(&mut readers[0]).picture(1500, 1500);
     drop(readers);
     wait_until("clients that went away hold memory", || account(&server, "answers") == 0);
     server.post("/v1/render?size=64", CUBE_OBJ).picture(64, 64);

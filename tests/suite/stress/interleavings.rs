@@ -65,6 +65,7 @@ impl Process {
             memory: memory.clone(),
             storage: None,
             metrics: None,
+            webhooks: None,
         };
         let renderers = pipeline_renderers(gpu, threads, Limits::default(), residents.clone());
         let jobs = Jobs::start(settings, renderers).unwrap();
@@ -88,6 +89,7 @@ impl Process {
             request_id: "".into(),
             holds: [].into(),
             claim: None,
+            webhook: None,
         };
         self.jobs.submit(work, false).unwrap()
     }
@@ -121,7 +123,7 @@ fn a_thousand_interleavings_leave_every_picture_right_and_nothing_behind() {
     let alone = Process::start();
     let pictures: Vec<_> = (0..15)
         .map(|i| match end_of(&runtime, &alone.submit(i / 3, STYLES[i % 3], "cpu")) {
-            JobState::Done(finished) => finished.content.clone(),
+            JobState::Done(finished) => finished.content.to_vec(),
             other => panic!("{other:?}"),
         })
         .collect();

@@ -11,7 +11,7 @@ use super::check::Asked;
 use super::idempotency::{self, Sent};
 use super::keys::Keys;
 use super::query::bad;
-use super::{access_of, is_short_json};
+use super::{access_of, is_short_json, webhook};
 use crate::diff;
 use crate::image::ImageFormat;
 use crate::import::Bundle;
@@ -63,6 +63,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     // Before the upload, so that a mistake costs none.
     Answer::of(state, &keys, form_of_answer(&keys, request.headers())?)?;
     let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
+    let webhook = webhook::of(state, request.headers(), class)?;
     let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
     if !is_short_json(request.headers()) && !is_sent_again {
         state.jobs.would_accept(class, &access.owner)?;
@@ -88,7 +89,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     let mesh = meshes.are_stored.then_some(meshes.digests[0]);
     let recipe = Some(Arc::new(Recipe { document: None, overrides: keys.pairs().into(), mesh }));
     let task = answer.task(meshes.newer);
-    let work = Work { task, recipe, owner: access.owner, request_id, claim, ..meshes.older };
+    let work = Work { task, recipe, owner: access.owner, request_id, claim, webhook, ..meshes.older };
     Ok(Asked::New { work: Box::new(work), key })
 }
 

@@ -61,6 +61,7 @@ pub fn understand(
             recipe: Some(recipe.clone()),
             owner: sender.owner.clone(),
             request_id: sender.request_id.clone(),
+            webhook: sender.webhook.clone(),
             claim,
             ..stored_mesh::work(bundle, reading.clone(), task, memory)
         };

@@ -11,6 +11,7 @@ use crate::service::http::state::AppState;
 use crate::service::jobs::Class;
 use crate::service::memory::Account;
 use crate::service::metrics::{Gauges, MEDIA_TYPE};
+use crate::service::webhooks::Webhooks;
 
 /// Everything that is counted.
 pub async fn get(State(state): State<Arc<AppState>>) -> Result<Response, ApiError> {
@@ -41,6 +42,7 @@ fn gauges(state: &AppState) -> Gauges {
         workers: vec![("busy", jobs.running as u64), ("all", state.workers), ("overdue", jobs.overdue as u64)],
         quarantined: jobs.quarantined,
         memory: Account::ALL.map(|account| (account.name(), memory.used(account), cap(account))).to_vec(),
+        webhooks: state.webhooks.as_ref().map_or(0, Webhooks::count),
         memory_budget: memory.limit(),
         entries: vec![
             ("results", jobs.kept),

@@ -40,6 +40,7 @@ fn settings() -> JobSettings {
         memory: Memory::unlimited(&[(Account::Uploads, 1 << 20)]),
         storage: None,
         metrics: None,
+        webhooks: None,
     }
 }
 
@@ -59,6 +60,7 @@ fn work(budget: &Arc<Memory>, mesh: &'static [u8]) -> Work {
         request_id: "".into(),
         holds: [].into(),
         claim: None,
+        webhook: None,
     }
 }
 

@@ -4,6 +4,7 @@ pub mod durable;
 mod events;
 mod idempotency;
 mod several;
+mod webhooks;
 
 use std::io::Write as _;
 use std::time::{Duration, Instant};
