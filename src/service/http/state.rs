@@ -18,6 +18,7 @@ use crate::service::keys::Keys;
 use crate::service::memory::{Account, Memory, MemoryLimits};
 use crate::service::metrics::Metrics;
 use crate::service::pictures::Pictures;
+use crate::service::priority::with_low_threads;
 use crate::service::rates::Rates;
 use crate::service::residents::Residents;
 use crate::service::store::Store;
@@ -82,7 +83,7 @@ impl AppState {
             _ => (None, Recovered::default()),
         };
         let threads = match config.worker_threads {
-            0 => CpuThreads::Shared(Arc::new(DrawingThreads::new(to_usize(cores())))),
+            0 => CpuThreads::Shared(Arc::new(with_low_threads(|| DrawingThreads::new(to_usize(cores()))))),
             given => CpuThreads::Each(to_usize(given)),
         };
         let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), config.cache_dir.clone()));

@@ -14,6 +14,7 @@ use crate::import::{self, Bundle, MeshError, bundle::UNNAMED};
 use crate::limits::{Budget, Deadline, Lender, Limits};
 use crate::pipeline::{self, Model, Output, RenderError, Stage};
 use crate::report::Extras;
+use crate::service::priority;
 use crate::service::residents::{Found, Residents};
 
 /// A worker's renderer, which does one job after the other.
@@ -157,6 +158,7 @@ pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
     // It is made with the first job and dropped when there was none for long, so that an idle process holds
     // no renderer.
     let mut renderer: Option<Renderer> = None;
+    priority::lower();
     loop {
         let (job, work, memory) = match registry.take(renderer.is_some().then_some(registry.settings.idle_time)) {
             Next::Job(job, work, memory) => (job, work, memory),

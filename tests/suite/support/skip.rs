@@ -22,6 +22,8 @@ pub enum Need {
     Python,
     /// `systemd-analyze` on the `PATH`.
     Systemd,
+    /// A C compiler, `cc`, on the `PATH`.
+    Compiler,
 }
 
 impl Need {
@@ -35,6 +37,7 @@ impl Need {
             Self::Mount => "mount",
             Self::Python => "python",
             Self::Systemd => "systemd",
+            Self::Compiler => "compiler",
         }
     }
 }

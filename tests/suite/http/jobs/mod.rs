@@ -1,5 +1,6 @@
 //! The daemon under load and over time: queue, deadline, cancellation, drain.
 
+pub mod disk;
 pub mod durable;
 mod events;
 mod idempotency;
