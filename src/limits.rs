@@ -35,7 +35,35 @@ pub struct Limits {
     pub job_ms: u64,
     /// Jobs that wait per worker. A full queue refuses a job at once and never blocks.
     pub queue_per_worker: u64,
+    /// The owner of the memory that jobs share. None: each job has its own.
+    pub lender: Lender,
 }
+
+/// The owner of memory that several jobs share.
+pub trait Lend: std::fmt::Debug + Send + Sync {
+    /// The job holds so many bytes in all from now on, unless it holds more already. The error is the most that a job may
+    /// ever hold.
+    fn lend(&self, bytes: u64) -> Result<(), u64>;
+
+    /// What the job holds is counted elsewhere from now on: it begins at 0 again.
+    fn restart(&self);
+}
+
+/// An owner of memory, or none.
+#[derive(Clone, Debug, Default)]
+pub struct Lender(pub Option<Arc<dyn Lend>>);
+
+impl PartialEq for Lender {
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
+            (None, None) => true,
+            _ => false,
+        }
+    }
+}
+
+impl Eq for Lender {}
 
 impl Default for Limits {
     fn default() -> Self {
@@ -52,6 +80,7 @@ impl Default for Limits {
             bundle_entries: 1000,
             job_ms: 30_000,
             queue_per_worker: 64,
+            lender: Lender(None),
         }
     }
 }
@@ -99,6 +128,9 @@ pub struct Spent {
 pub struct Budget {
     /// A list of all that is spent while [`record`](Self::record) runs; None at other times.
     recorded: Option<Vec<Spent>>,
+    lender: Lender,
+    /// Bytes that were spent before, and that the lender does not lend.
+    lent_from: u64,
     spent: u64,
     limit: u64,
     texture_px: u64,
@@ -109,8 +141,23 @@ pub struct Budget {
 impl Budget {
     /// An unspent budget of `limits.memory_bytes`, with the limits on textures.
     pub fn new(limits: &Limits) -> Self {
-        let Limits { memory_bytes, texture_px, texture_total_px, .. } = *limits;
-        Self { recorded: None, spent: 0, limit: memory_bytes, texture_px, texture_total_px, textures_px: 0 }
+        let &Limits { memory_bytes, texture_px, texture_total_px, ref lender, .. } = limits;
+        Self {
+            recorded: None,
+            lender: lender.clone(),
+            lent_from: 0,
+            spent: 0,
+            limit: memory_bytes,
+            texture_px,
+            texture_total_px,
+            textures_px: 0,
+        }
+    }
+
+    /// What is left of this budget, for a job that borrows from `lender` all that is spent beyond `from` bytes.
+    #[must_use]
+    pub fn lent_by(&self, lender: &Lender, from: u64) -> Self {
+        Self { lender: lender.clone(), lent_from: from.min(self.spent), ..self.clone() }
     }
 
     /// Takes `count * size_bytes` from the budget for `what`, or refuses.
@@ -118,6 +165,14 @@ impl Budget {
         let bytes = count.saturating_mul(size_bytes);
         let wanted = self.spent.saturating_add(bytes);
         check(&format!("the memory for {what}, in bytes,"), wanted, self.limit, "--limit-memory-bytes")?;
+        if let Some(lender) = &self.lender.0 {
+            lender.lend(wanted - self.lent_from).map_err(|limit| LimitExceeded {
+                what: format!("the memory for {what}, in bytes,"),
+                given: wanted,
+                limit,
+                flag: "--memory-bytes",
+            })?;
+        }
         self.spent = wanted;
         if let Some(recorded) = &mut self.recorded {
             recorded.push(Spent { what: what.into(), bytes });

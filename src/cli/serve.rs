@@ -56,7 +56,9 @@ pub fn run(arguments: &ServeArgs) -> Result<(), CliError> {
     })?;
     isolation::ahead(config.workers);
     http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
-        ServeError::Unprotected(_) | ServeError::Keys(_) => CliError::usage(error.to_string()),
+        ServeError::Unprotected(_) | ServeError::Keys(_) | ServeError::WebhookSecret => {
+            CliError::usage(error.to_string())
+        }
         ServeError::Listen { error: ref cause, .. } if cause.kind() == ErrorKind::InvalidInput => {
             CliError::usage(error.to_string())
         }

@@ -5,6 +5,7 @@
 //! A new setting is a field of [`Config`], its default, and one line of [`SETTINGS`].
 
 mod hardware;
+mod memory;
 mod settings;
 
 use std::path::PathBuf;
@@ -13,6 +14,7 @@ use std::sync::LazyLock;
 use etcetera::BaseStrategy as _;
 
 pub use hardware::why_no_gpu;
+pub use memory::memory_bytes;
 
 use crate::limits::Limits;
 use crate::spec::BackendChoice;
@@ -40,6 +42,12 @@ pub struct Config {
     pub api_keys: Vec<String>,
     /// File of named keys.
     pub api_keys_file: Option<PathBuf>,
+    /// The key of signatures of webhooks, as text. None: there are no webhooks.
+    pub webhook_secret: Option<String>,
+    /// Lets webhooks go to addresses of private networks.
+    pub webhooks_to_private: bool,
+    /// The pause after the first attempt of a webhook that fails, milliseconds.
+    pub webhook_retry_ms: u64,
     /// Allows clients without tokens on addresses other than loopback.
     pub no_auth: bool,
     /// Origins of pages of other sites that may use the interface: [`ANY_ORIGIN`] alone, or some.
@@ -58,6 +66,9 @@ pub struct Config {
     pub rate_burst: u64,
     /// Most meshes and jobs of a day; 0: any number.
     pub quota_per_day: u64,
+    /// Most bytes of memory for jobs, uploads, stored meshes, caches, results and answers together; 0: by the container or
+    /// the machine.
+    pub memory_bytes: u64,
     /// Most bytes of uploads in memory at a time.
     pub uploads_bytes: u64,
     /// Longest time for the header of a request, milliseconds; also the longest time that a
@@ -107,6 +118,9 @@ impl Default for Config {
             backend: BackendChoice::Auto,
             api_keys: Vec::new(),
             api_keys_file: None,
+            webhook_secret: None,
+            webhooks_to_private: false,
+            webhook_retry_ms: 5000,
             no_auth: false,
             cors_origins: Vec::new(),
             connections: 512,
@@ -116,6 +130,7 @@ impl Default for Config {
             rate_per_s: 0,
             rate_burst: 0,
             quota_per_day: 0,
+            memory_bytes: 0,
             uploads_bytes: 1 << 30,
             header_timeout_ms: 10_000,
             body_timeout_ms: 60_000,
@@ -196,6 +211,8 @@ impl Config {
             return Err(ConfigError::Unknown { source_name: source_name.into(), key: key.into(), known });
         };
         setting.set(self, value).map_err(|allowed| {
+            // Messages reach logs, which are no place for secrets.
+            let value = if setting.has_flag { value } else { "(not shown)" };
             let (source_name, key, value) = (source_name.into(), key.into(), value.into());
             ConfigError::Value { source_name, key, value, allowed }
         })
@@ -236,7 +253,7 @@ mod tests {
             assert_eq!(copy, default, "{}", setting.key);
             checked += 1;
         }
-        assert_eq!(checked, SETTINGS.len() - 4);
+        assert_eq!(checked, SETTINGS.len() - 5);
     }
 
     #[test]
@@ -255,6 +272,7 @@ mod tests {
             bundle_entries: _,
             job_ms: _,
             queue_per_worker: _,
+            lender: _,
         } = Limits::default();
         assert_eq!(count, 12, "a limit without a flag, or a flag without a limit");
     }

@@ -71,6 +71,20 @@ pub const SETTINGS: &[Setting] = &[
         set_api_keys_file,
         |c| show_folder(&c.api_keys_file),
     ),
+    Setting {
+        key: "webhook-secret",
+        help: "Key of signatures of webhooks: whsec_ and 24 to 64 bytes in base64; without it there are none",
+        access: Access::Text(set_webhook_secret, |_| "a secret".into()),
+        has_flag: false,
+    },
+    switch("webhooks-to-private", "Let webhooks go to addresses of private networks", |c| &mut c.webhooks_to_private),
+    number(
+        "webhook-retry-ms",
+        "Pause after the first attempt of a webhook that fails; then four times as long",
+        1,
+        MS_MAX,
+        |c| &mut c.webhook_retry_ms,
+    ),
     switch("no-auth", "Allow clients without tokens on addresses other than loopback", |c| &mut c.no_auth),
     text(
         "cors-origins",
@@ -99,6 +113,13 @@ pub const SETTINGS: &[Setting] = &[
     number("quota-per-day", "Most POSTs and PUTs a day of a key, or of an address; 0: any", 0, RATE_MAX, |c| {
         &mut c.quota_per_day
     }),
+    number(
+        "memory-bytes",
+        "Most bytes of memory for all work and all that is kept; 0: by the machine",
+        0,
+        u64::MAX,
+        |c| &mut c.memory_bytes,
+    ),
     number("uploads-bytes", "Most bytes of uploads in memory at a time", 1, u64::MAX, |c| &mut c.uploads_bytes),
     number("header-timeout-ms", "Longest time for the header of a request", 1, MS_MAX, |c| &mut c.header_timeout_ms),
     number("body-timeout-ms", "Longest time for the body of a request", 1, MS_MAX, |c| &mut c.body_timeout_ms),
@@ -307,6 +328,16 @@ fn set_cors_origins(config: &mut Config, value: &str) -> Result<(), String> {
         words.into_iter().map(|word| if word == super::ANY_ORIGIN { Some(word.to_owned()) } else { origin(word) });
     config.cors_origins =
         origins.collect::<Option<_>>().ok_or("origins such as https://app.example or http://localhost:3000, or *")?;
+    Ok(())
+}
+
+/// The text is read where it is used; here it is seen whether it can be.
+fn set_webhook_secret(config: &mut Config, value: &str) -> Result<(), String> {
+    let is_secret = value.strip_prefix("whsec_").is_some_and(|text| (32..=88).contains(&text.len()));
+    if !is_secret {
+        return Err("whsec_ and 24 to 64 bytes in base64, as echo whsec_$(openssl rand -base64 32) prints".into());
+    }
+    config.webhook_secret = Some(value.to_owned());
     Ok(())
 }
 

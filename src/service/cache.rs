@@ -1,7 +1,11 @@
 //! A cache under a cap of bytes, for [`pictures`](super::pictures) and [`residents`](super::residents).
 
+use std::sync::Arc;
+
 use quick_cache::sync::{Cache, DefaultLifecycle};
 use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
+
+use super::memory::{Account, Memory};
 
 /// A cache by names. What is used least goes first.
 pub type ByteCache<V> = Cache<String, V, ByBytes>;
@@ -20,6 +24,21 @@ impl<V: Weighed> Weighter<String, V> for ByBytes {
     fn weight(&self, name: &String, value: &V) -> u64 {
         name.len() as u64 + value.bytes()
     }
+}
+
+/// Lets the cache make room from now on when the process is short of memory.
+pub fn shrink_for<V: Weighed + Clone + Send + Sync + 'static>(
+    memory: &Memory,
+    account: Account,
+    cache: &Arc<ByteCache<V>>,
+) {
+    let cache = Arc::downgrade(cache);
+    memory.shrinks(account, move |bytes| {
+        let Some(cache) = cache.upgrade() else { return };
+        let capacity = cache.capacity();
+        cache.set_capacity(cache.weight().saturating_sub(bytes).max(1));
+        cache.set_capacity(capacity);
+    });
 }
 
 /// A cache for `bytes` in all, of values that take `typical_bytes` each on an average.

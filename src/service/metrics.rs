@@ -23,11 +23,14 @@ pub struct Metrics {
     answers: IntCounterVec,
     rejections: IntCounterVec,
     pictures: IntCounterVec,
+    webhooks: IntCounterVec,
+    webhooks_waiting: IntGauge,
     queued: IntGaugeVec,
     expected_wait: IntGaugeVec,
     workers: IntGaugeVec,
     memory: IntGaugeVec,
     memory_limits: IntGaugeVec,
+    memory_budget: IntGauge,
     entries: IntGaugeVec,
     gpu_losses: IntCounter,
     overdue: IntCounter,
@@ -52,8 +55,12 @@ pub struct Gauges {
     pub quarantined: usize,
     /// Bytes in use and the cap, by account.
     pub memory: Vec<(&'static str, u64, u64)>,
+    /// Most bytes of all accounts together.
+    pub memory_budget: u64,
     /// Number of things kept, by account.
     pub entries: Vec<(&'static str, usize)>,
+    /// Webhooks that are to be delivered.
+    pub webhooks: usize,
     /// How often a GPU was lost.
     pub gpu_losses: u64,
     /// Memory of the process.
@@ -83,6 +90,11 @@ impl Metrics {
             answers: counter("meshsnap_http_answers_total", "Answers by status.", &["status"])?,
             rejections: counter("meshsnap_rejections_total", "Answers that are errors, by code.", &["status", "code"])?,
             pictures: counter("meshsnap_pictures_total", "Pictures of stored meshes, by X-Cache.", &["outcome"])?,
+            webhooks: counter("meshsnap_webhooks_total", "Ends of webhooks, and attempts that failed.", &["outcome"])?,
+            webhooks_waiting: registered(
+                r,
+                IntGauge::new("meshsnap_webhooks_waiting", "Webhooks that are to be delivered.")?,
+            )?,
             queued: gauge("meshsnap_queue_jobs", "Jobs that wait for a worker.", &["class"])?,
             expected_wait: gauge(
                 "meshsnap_queue_expected_wait_milliseconds",
@@ -92,6 +104,10 @@ impl Metrics {
             workers: gauge("meshsnap_workers", "Worker threads.", &["state"])?,
             memory: gauge("meshsnap_memory_bytes", "Memory in use, by account.", &["account"])?,
             memory_limits: gauge("meshsnap_memory_limit_bytes", "Most memory of an account.", &["account"])?,
+            memory_budget: registered(
+                r,
+                IntGauge::new("meshsnap_memory_budget_bytes", "Most memory of all accounts together.")?,
+            )?,
             entries: gauge("meshsnap_kept_entries", "Number of things that are kept.", &["account"])?,
             gpu_losses: registered(r, IntCounter::new("meshsnap_gpu_losses_total", "Times that a GPU was lost.")?)?,
             overdue: registered(
@@ -136,6 +152,11 @@ impl Metrics {
         self.pictures.with_label_values(&[outcome]).inc();
     }
 
+    /// An attempt to deliver a webhook failed, or it came to an end.
+    pub fn webhook(&self, outcome: &str) {
+        self.webhooks.with_label_values(&[outcome]).inc();
+    }
+
     /// A worker did not end its job.
     pub fn worker_overdue(&self) {
         self.overdue.inc();
@@ -150,11 +171,13 @@ impl Metrics {
         for &(state, count) in &gauges.workers {
             self.workers.with_label_values(&[state]).set(to_i64(count));
         }
+        self.webhooks_waiting.set(to_i64(gauges.webhooks as u64));
         self.quarantined.set(to_i64(gauges.quarantined as u64));
         for &(account, bytes, limit) in &gauges.memory {
             self.memory.with_label_values(&[account]).set(to_i64(bytes));
             self.memory_limits.with_label_values(&[account]).set(to_i64(limit));
         }
+        self.memory_budget.set(to_i64(gauges.memory_budget));
         for &(account, count) in &gauges.entries {
             self.entries.with_label_values(&[account]).set(to_i64(count as u64));
         }

@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use quick_cache::sync::GuardResult;
 
-use super::cache::{ByteCache, Weighed, with_room_for};
+use super::cache::{ByteCache, Weighed, shrink_for, with_room_for};
+use super::memory::{Account, Memory, Share};
 use crate::limits::{Budget, Deadline};
 use crate::pipeline::{Model, RenderError};
 
@@ -28,6 +29,8 @@ pub struct Resident {
     pub model: Model,
     /// A job's budget after reading it, so that a job that reads nothing has as much left.
     pub budget: Budget,
+    /// The bytes that it counts with as long as anything holds it. None: it is not kept, and is its job's memory.
+    memory: Share,
 }
 
 /// A mesh that a job draws.
@@ -44,7 +47,8 @@ pub struct Found {
 /// memory until the job ends.
 #[derive(Debug)]
 pub struct Residents {
-    cache: ByteCache<Kept>,
+    cache: Arc<ByteCache<Kept>>,
+    memory: Arc<Memory>,
     bytes: u64,
 }
 
@@ -72,8 +76,10 @@ impl Weighed for Kept {
 
 impl Residents {
     /// Room for meshes of so many bytes together. None are kept if it is 0.
-    pub fn new(bytes: u64) -> Self {
-        Self { cache: with_room_for(bytes, TYPICAL_BYTES), bytes }
+    pub fn new(bytes: u64, memory: Arc<Memory>) -> Self {
+        let cache = Arc::new(with_room_for(bytes, TYPICAL_BYTES));
+        shrink_for(&memory, Account::Residents, &cache);
+        Self { cache, memory, bytes }
     }
 
     /// The mesh of this key, read by `read` if it is not in memory. However many jobs ask at the same
@@ -82,18 +88,25 @@ impl Residents {
         &self,
         key: &str,
         deadline: &Deadline,
-        read: impl FnOnce() -> Result<Resident, RenderError>,
+        read: impl FnOnce() -> Result<(Model, Budget), RenderError>,
     ) -> Result<Found, RenderError> {
+        let read = || {
+            let (model, budget) = read()?;
+            Ok(Arc::new(Resident { model, budget, memory: self.memory.share(Account::Residents) }))
+        };
         if self.bytes == 0 {
-            return read().map(|read| Found { resident: Arc::new(read), was_kept: false });
+            return read().map(|resident| Found { resident, was_kept: false });
         }
         loop {
             match self.cache.get_value_or_guard(key, Some(WAIT)) {
                 GuardResult::Value(kept) => return Ok(Found { resident: kept.resident, was_kept: true }),
                 GuardResult::Guard(guard) => {
-                    let resident = Arc::new(read()?);
-                    // An error says that it was removed in the meantime.
-                    let _ = guard.insert(Kept::new(&resident));
+                    let resident = read()?;
+                    let kept = Kept::new(&resident);
+                    // Without room it is dropped with its job. The error of `insert` says that it was removed in the meantime.
+                    if kept.bytes <= self.bytes && resident.memory.grow(kept.bytes).is_ok() {
+                        let _ = guard.insert(kept);
+                    }
                     return Ok(Found { resident, was_kept: false });
                 }
                 GuardResult::Timeout => deadline.check()?,
@@ -106,9 +119,12 @@ impl Residents {
         let now = Kept::new(resident);
         // Of two pictures that end together, the one that was weighed first must not win.
         let has_grown = |kept: &Kept| Arc::ptr_eq(&kept.resident, resident) && kept.bytes < now.bytes;
-        if self.cache.peek(key).is_some_and(|kept| has_grown(&kept))
-            && self.cache.replace(key.to_owned(), now, true).is_err()
-        {
+        let Some(kept) = self.cache.peek(key).filter(has_grown) else { return };
+        let more = now.bytes - kept.bytes;
+        drop(kept);
+        if resident.memory.grow(more).is_err() {
+            self.cache.remove(key);
+        } else if self.cache.replace(key.to_owned(), now, true).is_err() {
             tracing::debug!(key, "a mesh in memory was dropped: with what a picture added it is too large to keep");
         }
     }
@@ -126,6 +142,13 @@ impl Residents {
     /// The content at this moment.
     pub fn load(&self) -> ResidentLoad {
         ResidentLoad { count: self.cache.len(), bytes: self.cache.weight() }
+    }
+}
+
+impl Resident {
+    /// True if it counts as a mesh in memory.
+    pub fn is_counted(&self) -> bool {
+        self.memory.bytes() > 0
     }
 }
 

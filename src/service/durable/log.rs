@@ -217,6 +217,14 @@ impl Tables<'_> {
         stored.map_err(redb::Error::Io)
     }
 
+    fn change_end(&mut self, key: JobKey, change: impl FnOnce(EndRecord) -> EndRecord) -> Result<(), redb::Error> {
+        let end = self.ends.get(key)?.map(|end| parse::<EndRecord>(end.value())).transpose();
+        if let Some(end) = end.map_err(redb::Error::Io)? {
+            self.ends.insert(key, &*json(&change(end))?)?;
+        }
+        Ok(())
+    }
+
     fn apply(&mut self, change: &Change) -> Result<(), redb::Error> {
         match change {
             Change::Accepted(record) => {
@@ -232,11 +240,10 @@ impl Tables<'_> {
             }
             Change::Ended(..) => {}
             Change::Fetched(key, at_unix_ms) => {
-                let end = self.ends.get(key)?.map(|end| parse::<EndRecord>(end.value())).transpose();
-                if let Some(end) = end.map_err(redb::Error::Io)? {
-                    let end = EndRecord { fetched_unix_ms: Some(*at_unix_ms), ..end };
-                    self.ends.insert(key, &*json(&end)?)?;
-                }
+                self.change_end(*key, |end| EndRecord { fetched_unix_ms: Some(*at_unix_ms), ..end })?;
+            }
+            Change::Notified(key, at_unix_ms) => {
+                self.change_end(*key, |end| EndRecord { notified_unix_ms: Some(*at_unix_ms), ..end })?;
             }
             Change::Forgotten(key) => {
                 self.jobs.remove(key)?;

@@ -20,6 +20,8 @@ pub enum Change {
     Ended(JobKey, Box<EndRecord>),
     /// A client has fetched the result of a job.
     Fetched(JobKey, u64),
+    /// Nothing more is sent to the webhook of a job.
+    Notified(JobKey, u64),
     /// A job has expired.
     Forgotten(JobKey),
     /// A mesh was stored, by other parties too if it is there: it then gets their names alone.
@@ -67,6 +69,9 @@ pub struct JobRecord {
     /// The name that the client gave the request.
     #[serde(default)]
     pub claim: Option<ClaimRecord>,
+    /// The address that hears of its end.
+    #[serde(default)]
+    pub webhook: Option<String>,
 }
 
 /// One of two meshes that are compared.
@@ -142,6 +147,9 @@ pub struct EndRecord {
     /// The time at which a client first fetched the result.
     #[serde(default)]
     pub fetched_unix_ms: Option<u64>,
+    /// The time at which its webhook had it, or was given up.
+    #[serde(default)]
+    pub notified_unix_ms: Option<u64>,
     /// The picture of a job that is done.
     #[serde(default)]
     pub picture: Option<PictureRecord>,

@@ -166,6 +166,7 @@ fn job(key: JobKey, file: &[u8]) -> JobRecord {
         mesh: None,
         newer: None,
         claim: None,
+        webhook: None,
     }
 }
 

@@ -13,7 +13,8 @@ use crate::limits::LimitExceeded;
 use crate::pipeline::{PlanError, RenderError};
 use crate::request::RequestError;
 use crate::service::durable::{ErrorRecord, Unstored};
-use crate::service::jobs::{Class, Failure, Refusal, UploadBudgetFull, name};
+use crate::service::jobs::{Class, Failure, Refusal, name};
+use crate::service::memory::MemoryFull;
 use crate::service::rates::TooMuch;
 use crate::service::store::StoreError;
 
@@ -158,6 +159,15 @@ impl ApiError {
         Self::new(Fault::TooLarge, "body_too_large", detail).flag("--limit-body-bytes")
     }
 
+    /// The body is larger than the memory for all uploads.
+    pub fn body_beyond_memory(limit: u64) -> Self {
+        let detail = format!(
+            "the request body is larger than {limit} bytes, the memory for all uploads (raise it with --uploads-bytes, and \
+             --memory-bytes where that is less than four times as much)"
+        );
+        Self::new(Fault::TooLarge, "body_too_large", detail).flag("--uploads-bytes")
+    }
+
     /// The server shuts down and takes no new work.
     pub fn draining(detail: impl Into<String>) -> Self {
         Self::new(Fault::Unavailable, "draining", detail).retry_after(5)
@@ -223,6 +233,9 @@ impl From<Refusal> for ApiError {
                 };
                 Self::new(Fault::Busy, "too_late", detail).flag(flag).retry_after(retry_after_s)
             }
+            Refusal::MemoryFull { retry_after_s, .. } => {
+                Self::new(Fault::Busy, "memory_full", detail).flag("--memory-bytes").retry_after(retry_after_s)
+            }
             Refusal::TooMany { .. } => Self::new(Fault::Content, "too_many_meshes", detail).flag("--queue"),
             Refusal::TooMuch { .. } => Self::new(Fault::Content, "too_many_meshes", detail).flag("--batch-wait-ms"),
             Refusal::Quarantined { .. } => Self::new(Fault::Content, "mesh_quarantined", detail),
@@ -260,10 +273,13 @@ impl From<TooMuch> for ApiError {
     }
 }
 
-impl From<UploadBudgetFull> for ApiError {
-    fn from(full: UploadBudgetFull) -> Self {
-        let error = Self::new(Fault::Busy, "uploads_full", full.to_string());
-        error.flag("--uploads-bytes").retry_after(1)
+impl From<MemoryFull> for ApiError {
+    fn from(full: MemoryFull) -> Self {
+        let (code, flag) = match full {
+            MemoryFull::Account { account, .. } => ("uploads_full", account.flag()),
+            MemoryFull::Process { .. } => ("memory_full", "--memory-bytes"),
+        };
+        Self::new(Fault::Busy, code, full.to_string()).flag(flag).retry_after(1)
     }
 }
 
@@ -272,6 +288,7 @@ impl From<StoreError> for ApiError {
         let detail = error.to_string();
         match error {
             StoreError::TooLarge { .. } => Self::new(Fault::TooLarge, "mesh_too_large", detail).flag("--mesh-bytes"),
+            StoreError::Full => Self::new(Fault::Busy, "memory_full", detail).flag("--memory-bytes").retry_after(1),
             StoreError::Busy { flag } => Self::new(Fault::Busy, "meshes_full", detail).flag(flag).retry_after(1),
         }
     }

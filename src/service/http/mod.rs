@@ -10,7 +10,7 @@
 //!
 //! [`recovery`] takes over what an earlier process has left in the data folder.
 //! [`negotiate`] and [`conditional`] read and write single headers. [`stored_mesh`] and [`address`]
-//! serve the resources of stored meshes. [`event_streams`] counts the clients that follow jobs.
+//! serve the resources of stored meshes. [`event_streams`] counts the clients that follow jobs, [`hear_of_ends`] tells webhooks of their ends.
 //! [`static_document`] answers with a constant document, [`descriptions`] are two of them.
 //!
 //! Architecture invariant: axum and hyper are used nowhere else.
@@ -22,6 +22,7 @@ mod descriptions;
 mod dto;
 mod error;
 mod event_streams;
+mod hear_of_ends;
 mod middleware;
 mod negotiate;
 mod receive;
@@ -72,6 +73,11 @@ pub enum ServeError {
     /// The file of API keys cannot be used.
     #[error(transparent)]
     Keys(#[from] KeysError),
+    /// The secret of webhooks is none.
+    #[error(
+        "MESHSNAP_WEBHOOK_SECRET must be whsec_ and 24 to 64 bytes in base64: echo whsec_$(openssl rand -base64 32)"
+    )]
+    WebhookSecret,
     /// The data folder cannot be used.
     #[error(transparent)]
     Data(#[from] OpenError),
@@ -134,6 +140,9 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
     warm_up.stop();
     warm_up.wait(WORKERS_GRACE);
     state.jobs.join(WORKERS_GRACE);
+    if let Some(webhooks) = &state.webhooks {
+        webhooks.close();
+    }
     if let Some(durable) = &state.durable {
         durable.close();
     }

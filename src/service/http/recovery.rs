@@ -4,11 +4,13 @@
 use std::sync::Arc;
 
 use super::error::{ApiError, record_of};
+use super::hear_of_ends;
 use super::receive::keys::Keys;
 use super::receive::{check, diff};
 use super::state::AppState;
 use super::stored_mesh;
 use crate::import::{Bundle, BundleFile, Format};
+use crate::limits::Lender;
 use crate::request;
 use crate::service::durable::{
     ClaimRecord, FileRecord, Hold, JobRecord, MeshRecord, Recovered, RecoveredJob, RequestKind,
@@ -17,6 +19,7 @@ use crate::service::jobs::{
     Claim, ClaimName, Failure, JSON, JobId, JobState, Named, Newer, Owner, Recipe, Restored, Task, Work, read_picture,
     value_of,
 };
+use crate::service::memory::Account;
 use crate::service::store::{NewMesh, Reading};
 
 /// How often a job may be begun by processes that then ended.
@@ -42,7 +45,11 @@ pub fn recover(state: &AppState, mut recovered: Recovered) {
             claim: claim(state, &job.record),
         };
         if job.end.is_some() {
+            let (id, end) = (name.id, job.end.as_ref());
+            let is_told = end.is_some_and(|end| end.notified_unix_ms.is_some());
+            let webhook = job.record.webhook.clone().filter(|_| !is_told);
             restore_result(state, &recovered, name, job);
+            tell(state, id, webhook.as_deref());
             continue;
         }
         match resumed(state, &recovered, &job) {
@@ -51,11 +58,22 @@ pub fn recover(state: &AppState, mut recovered: Recovered) {
                 let work = Work { claim: name.claim, ..work };
                 state.jobs.resume((name.id, name.accepted_unix_ms), work, holds);
             }
-            Err(failure) => state.jobs.restore(name, JobState::Failed(Arc::new(failure)), None, Vec::new()),
+            Err(failure) => {
+                let id = name.id;
+                state.jobs.restore(name, JobState::Failed(Arc::new(failure)), None, Vec::new());
+                tell(state, id, job.record.webhook.as_deref());
+            }
         }
     }
     if mesh_count + job_count > 0 {
         tracing::info!(meshes = mesh_count, jobs = job_count, queued, "taken over from the data folder");
+    }
+}
+
+/// Tells the webhook of a job of its end, of which an earlier process has not told it.
+fn tell(state: &AppState, id: JobId, webhook: Option<&str>) {
+    if let (Some(address), Some(job)) = (webhook, state.jobs.find(id)) {
+        hear_of_ends::send(state.webhooks.as_ref(), &job, address);
     }
 }
 
@@ -88,7 +106,9 @@ fn restore_result(state: &AppState, recovered: &Recovered, name: Restored, job: 
                 holds.push(hold);
                 read_picture(picture, bytes)
             });
-            read.map_or(JobState::Failed(Arc::new(Failure::Lost)), |finished| JobState::Done(Arc::new(finished)))
+            read.map_or(JobState::Failed(Arc::new(Failure::Lost)), |finished| {
+                JobState::Done(Arc::new(finished.counted(&state.memory)))
+            })
         }
         (None, Some(error)) => JobState::Failed(Arc::new(Failure::Recorded(error))),
         (None, None) => JobState::Cancelled,
@@ -115,7 +135,7 @@ fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Resul
         Some(side) => {
             let (files, own) = self::files(recovered, &side.files).ok_or(Failure::Lost)?;
             let bundle = Bundle::restored(files, side.is_zip, record.entry.clone());
-            let mut memory = state.upload_budget.reserve();
+            let memory = state.memory.share(Account::Uploads);
             memory.take(bundle.bytes_len());
             holds.extend(own.iter().cloned());
             Some(Newer { bundle, memory: Arc::new(memory), holds: own.into(), mesh: side.mesh })
@@ -125,14 +145,31 @@ fn resumed(state: &AppState, recovered: &Recovered, job: &RecoveredJob) -> Resul
     let task = task(state, record, document.as_deref(), newer)?;
     let recipe = Recipe { document, overrides: record.request.overrides.clone().into(), mesh: record.mesh };
     let bundle = Bundle::restored(files, record.is_zip, record.entry.clone());
-    let mut memory = state.upload_budget.reserve();
+    let memory = state.memory.share(Account::Uploads);
     memory.take(bundle.bytes_len());
     let reading = reading(record.format_in.as_deref(), record.entry.clone());
     let mesh_key = record.mesh.map(|digest| stored_mesh::key(digest, &reading));
     let (format_in, memory, recipe) = (reading.format_in, Arc::new(memory), Some(Arc::new(recipe)));
     let (owner, request_id) = (Owner::new(&record.owner), record.request_id.as_str().into());
-    let (claim, own) = (None, [].into());
-    Ok((Work { bundle, format_in, mesh_key, task, memory, recipe, owner, request_id, holds: own, claim }, holds))
+    let (claim, own, webhook) = (None, [].into(), record.webhook.as_deref().map(Into::into));
+    let lender = Lender(None);
+    Ok((
+        Work {
+            bundle,
+            format_in,
+            mesh_key,
+            task,
+            memory,
+            lender,
+            recipe,
+            owner,
+            request_id,
+            holds: own,
+            claim,
+            webhook,
+        },
+        holds,
+    ))
 }
 
 /// The name of the job's request, so that the request is known when it is sent again.

@@ -6,20 +6,23 @@ use std::time::Duration;
 
 use super::event_streams::EventStreams;
 use super::static_document::StaticDocument;
-use super::{ServeError, descriptions, error};
+use super::{ServeError, descriptions, error, hear_of_ends};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{GpuHost, HardwareHint};
-use crate::config::{Config, cores, why_no_gpu};
+use crate::config::{Config, cores, memory_bytes, why_no_gpu};
 use crate::limits::Limits;
 use crate::request::Rules;
 use crate::service::durable::{Durable, Recovered};
-use crate::service::jobs::{CpuThreads, JobSettings, Jobs, Storage, UploadBudget, pipeline_renderers};
+use crate::service::jobs::{CpuThreads, JobSettings, Jobs, Storage, pipeline_renderers};
 use crate::service::keys::Keys;
+use crate::service::memory::{Account, Memory, MemoryLimits};
 use crate::service::metrics::Metrics;
 use crate::service::pictures::Pictures;
+use crate::service::priority::with_low_threads;
 use crate::service::rates::Rates;
 use crate::service::residents::Residents;
 use crate::service::store::Store;
+use crate::service::webhooks::Webhooks;
 
 /// Time without work after which a worker frees the memory in which it draws.
 const IDLE_TIME: Duration = Duration::from_secs(10);
@@ -36,12 +39,14 @@ pub struct AppState {
     pub jobs: Jobs,
     /// The process's GPU.
     pub gpu: Arc<GpuHost>,
-    /// The memory that uploads share.
-    pub upload_budget: Arc<UploadBudget>,
+    /// The memory of the process.
+    pub memory: Arc<Memory>,
     /// Counters and gauges.
     pub metrics: Arc<Metrics>,
     /// The data folder. None: nothing outlives the process.
     pub durable: Option<Durable>,
+    /// The webhooks. None: there is no secret for them.
+    pub webhooks: Option<Webhooks>,
     /// The clients that follow jobs.
     pub event_streams: EventStreams,
     /// The stored meshes.
@@ -78,14 +83,16 @@ impl AppState {
             _ => (None, Recovered::default()),
         };
         let threads = match config.worker_threads {
-            0 => CpuThreads::Shared(Arc::new(DrawingThreads::new(to_usize(cores())))),
+            0 => CpuThreads::Shared(Arc::new(with_low_threads(|| DrawingThreads::new(to_usize(cores()))))),
             given => CpuThreads::Each(to_usize(given)),
         };
         let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), config.cache_dir.clone()));
-        let residents = Arc::new(Residents::new(config.resident_bytes));
+        let memory = Memory::new(&memory_limits(config));
+        let residents = Arc::new(Residents::new(config.resident_bytes, memory.clone()));
         let renderers = pipeline_renderers(gpu.clone(), threads, config.limits.clone(), residents.clone());
         let Limits { queue_per_worker, job_ms, .. } = config.limits;
         let metrics = Arc::new(Metrics::new().map_err(std::io::Error::other)?);
+        let webhooks = hear_of_ends::start(config, durable.clone(), &metrics)?;
         let settings = JobSettings {
             workers: to_usize(config.workers),
             queue: to_usize(queue_per_worker.saturating_mul(config.workers)),
@@ -96,9 +103,11 @@ impl AppState {
             interactive_wait: Duration::from_millis(config.wait_ms),
             batch_wait: Duration::from_millis(config.batch_wait_ms),
             unfetched_ttl: Duration::from_millis(config.unfetched_ttl_ms),
-            result_bytes: config.result_bytes,
+            result_bytes: memory.cap(Account::Results),
             result_count: to_usize(config.result_count),
+            memory: memory.clone(),
             metrics: Some(metrics.clone()),
+            webhooks: hear_of_ends::of_jobs(webhooks.as_ref()),
             storage: durable.clone().map(|durable| Storage { durable, describe: error::record }),
         };
         let rules = Rules { limits: config.limits.clone(), backend: config.backend };
@@ -108,13 +117,14 @@ impl AppState {
             rules,
             jobs: Jobs::start(settings, renderers)?,
             gpu,
-            upload_budget: UploadBudget::new(config.uploads_bytes),
-            meshes: Store::with(durable.clone(), config.mesh_bytes, to_usize(config.mesh_count)),
+            meshes: Store::new(durable.clone(), memory.clone(), to_usize(config.mesh_count)),
             durable,
+            webhooks,
             event_streams: EventStreams::new(),
             metrics,
             residents,
-            pictures: Pictures::new(config.picture_bytes),
+            pictures: Pictures::new(config.picture_bytes, &memory),
+            memory,
             body_timeout: Duration::from_millis(config.body_timeout_ms),
             least_rate: config.least_rate_bytes,
             workers: config.workers,
@@ -137,6 +147,21 @@ impl AppState {
     pub fn is_draining(&self) -> bool {
         self.draining.load(Ordering::Relaxed)
     }
+}
+
+/// The caps of the accounts: what is configured, and where memory is scarce, parts of it. Half is for jobs then. Caches have
+/// caps of their own.
+fn memory_limits(config: &Config) -> MemoryLimits {
+    let all = memory_bytes(config.memory_bytes);
+    let job = config.limits.memory_bytes.min(all / 2);
+    let rest = all - job;
+    let accounts = vec![
+        (Account::Uploads, config.uploads_bytes.min(rest / 2)),
+        (Account::Results, config.result_bytes.min(rest / 4)),
+        (Account::Meshes, config.mesh_bytes.min(rest / 4)),
+    ];
+    tracing::info!(bytes = all, job, "memory");
+    MemoryLimits { all, job, accounts }
 }
 
 fn to_u32(number: u64) -> u32 {

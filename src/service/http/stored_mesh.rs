@@ -5,9 +5,11 @@ use std::sync::Arc;
 use super::error::{ApiError, Fault};
 use super::state::AppState;
 use crate::import::Bundle;
+use crate::limits::Lender;
 use crate::service::digest::Digest;
-use crate::service::jobs::{Owner, Reservation, Task, Work};
+use crate::service::jobs::{Owner, Task, Work};
 use crate::service::keys::Access;
+use crate::service::memory::Share;
 use crate::service::store::{Reading, StoredMesh};
 
 /// The stored mesh with this name, if the sender sees it. None is a path segment that is not text.
@@ -43,7 +45,7 @@ pub fn key(digest: Digest, reading: &Reading) -> String {
 }
 
 /// A worker's task on a bundle that is read in the given way.
-pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Reservation>) -> Work {
+pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Share>) -> Work {
     let Reading { format_in, entry } = reading;
     Work {
         bundle: bundle.with_entry(entry),
@@ -51,10 +53,12 @@ pub fn work(bundle: Bundle, reading: Reading, task: Task, memory: Arc<Reservatio
         mesh_key: None,
         task,
         memory,
+        lender: Lender(None),
         recipe: None,
         owner: Owner::default(),
         request_id: "".into(),
         holds: [].into(),
         claim: None,
+        webhook: None,
     }
 }

@@ -20,6 +20,18 @@ const JOB_NS: f64 = 500_000.0;
 const BYTE_NS: f64 = 5.0;
 const SAMPLE_NS: f64 = 5.0;
 
+/// Bytes of memory of the formula: for any job, for each byte that is to be read, for each sample of a picture.
+const JOB_BYTES: f64 = 4_194_304.0;
+const BYTE_BYTES: f64 = 8.0;
+const SAMPLE_BYTES: f64 = 16.0;
+
+/// Part of the way that a factor of memory goes down towards what the last job held. It goes up at once, but at most
+/// doubles: a job that was made to be large says little about the next.
+const MEMORY_STEP: f64 = 0.05;
+
+/// The largest factor of memory, and the inverse of the smallest.
+const MEMORY_FACTOR_MAX: f64 = 64.0;
+
 /// Time of a further view of a mesh, as a share of the time of reading it.
 const VIEW_SHARE: f64 = 0.25;
 
@@ -49,6 +61,8 @@ const KINDS: usize = 4 * TASKS;
 pub struct Estimates {
     /// Powers of two of the factors, by kind.
     kinds: Mutex<[f64; KINDS]>,
+    /// Factors between the memory of jobs and its formula, by kind.
+    memory: Mutex<[f64; KINDS]>,
     /// The same by [`Size::mesh`].
     meshes: Cache<u64, f64>,
     hasher: RandomState,
@@ -57,7 +71,12 @@ pub struct Estimates {
 impl Estimates {
     /// Nothing is known yet.
     pub fn new() -> Self {
-        Self { kinds: Mutex::new([0.0; KINDS]), meshes: Cache::new(MESHES), hasher: RandomState::new() }
+        Self {
+            kinds: Mutex::new([0.0; KINDS]),
+            memory: Mutex::new([1.0; KINDS]),
+            meshes: Cache::new(MESHES),
+            hasher: RandomState::new(),
+        }
     }
 
     /// The size of a job.
@@ -76,12 +95,14 @@ impl Estimates {
         let formula_ns = f64::from(views) * JOB_NS
             + BYTE_NS * bytes as f64 * (1.0 + VIEW_SHARE * f64::from(views - 1))
             + SAMPLE_NS * samples;
-        Size { formula_s: formula_ns * 1e-9, kind: kind + if is_known { 2 * TASKS } else { 0 }, mesh, is_known }
+        let formula_bytes = JOB_BYTES + BYTE_BYTES * bytes as f64 + SAMPLE_BYTES * samples;
+        let kind = kind + if is_known { 2 * TASKS } else { 0 };
+        Size { formula_s: formula_ns * 1e-9, kind, mesh, is_known, formula_bytes }
     }
 
     /// The size of a job that has ended before.
     pub fn no_size(&self) -> Size {
-        Size { formula_s: 0.0, kind: 0, mesh: None, is_known: false }
+        Size { formula_s: 0.0, kind: 0, mesh: None, is_known: false, formula_bytes: 0.0 }
     }
 
     /// The time for which a job of this size is likely to occupy a worker.
@@ -105,6 +126,19 @@ impl Estimates {
             let step = if size.is_known { MESH_STEP * (seen - power) } else { 0.0 };
             self.meshes.insert(mesh, power + step);
         }
+    }
+
+    /// The memory that a job of this size is likely to hold, bytes.
+    pub fn memory(&self, size: Size) -> u64 {
+        (size.formula_bytes * self.memory.lock().unwrap_or_else(PoisonError::into_inner)[size.kind]) as u64
+    }
+
+    /// Learns from a job that held so much.
+    pub fn learn_memory(&self, size: Size, bytes: u64) {
+        let seen = bytes as f64 / size.formula_bytes.max(1.0);
+        let factor = &mut self.memory.lock().unwrap_or_else(PoisonError::into_inner)[size.kind];
+        let learnt = if seen > *factor { seen.min(2.0 * *factor) } else { *factor + MEMORY_STEP * (seen - *factor) };
+        *factor = learnt.clamp(1.0 / MEMORY_FACTOR_MAX, MEMORY_FACTOR_MAX);
     }
 
     fn locked(&self) -> std::sync::MutexGuard<'_, [f64; KINDS]> {
@@ -150,7 +184,8 @@ mod tests {
     /// A plain job that takes so many milliseconds by the formula, perhaps on a mesh that was drawn before.
     fn size(formula_ms: f64, mesh: Option<u64>) -> Size {
         let is_known = mesh.is_some();
-        Size { formula_s: formula_ms * 1e-3, kind: 1 + if is_known { 2 * TASKS } else { 0 }, mesh, is_known }
+        let kind = 1 + if is_known { 2 * TASKS } else { 0 };
+        Size { formula_s: formula_ms * 1e-3, kind, mesh, is_known, formula_bytes: 1e6 }
     }
 
     fn ms(estimates: &Estimates, size: Size) -> f64 {
@@ -169,6 +204,25 @@ mod tests {
         let other = Size { kind: 2, ..size(2.0, None) };
         assert!((ms(&estimates, other) - 2.0).abs() < 1e-6, "other kinds of jobs");
         assert!((ms(&estimates, size(2.0, Some(7))) - 2.0).abs() < 1e-6, "nothing is read of a mesh in memory");
+    }
+
+    #[test]
+    fn memory_is_learnt_upwards_soon_and_downwards_slowly() {
+        let estimates = Estimates::new();
+        assert_eq!(estimates.memory(size(1.0, None)), 1_000_000);
+        estimates.learn_memory(size(1.0, None), 1 << 40);
+        assert_eq!(estimates.memory(size(1.0, None)), 2_000_000, "one job says little");
+        for _ in 0..20 {
+            estimates.learn_memory(size(1.0, None), 1 << 40);
+        }
+        assert_eq!(estimates.memory(size(1.0, None)), 64_000_000);
+        assert_eq!(estimates.memory(size(1.0, Some(7))), 1_000_000, "another kind");
+        estimates.learn_memory(size(1.0, None), 1_000_000);
+        assert!((60_000_000..62_000_000).contains(&estimates.memory(size(1.0, None))));
+        for _ in 0..1000 {
+            estimates.learn_memory(size(1.0, None), 0);
+        }
+        assert_eq!(estimates.memory(size(1.0, None)), 15_625);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! One job: its work, its state and its result.
 
 use std::fmt;
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -11,15 +12,15 @@ use uuid::Uuid;
 use super::claims::Claim;
 use super::class::{Class, Owner};
 use super::progress::Progress;
-use super::upload_budget::Reservation;
 use crate::backend::{BackendKind, DrawTimes};
 use crate::check::RuleSet;
 use crate::image::ImageFormat;
 use crate::import::{Bundle, Format};
-use crate::limits::Deadline;
+use crate::limits::{Deadline, Lender};
 use crate::pipeline::{Output, QualitySelection, RenderError, Stage};
 use crate::service::digest::Digest;
 use crate::service::durable::{ErrorRecord, Hold, JobKey};
+use crate::service::memory::{Account, Keeping, Memory, Share, counted};
 use crate::spec::Spec;
 use crate::warning::Warning;
 
@@ -66,7 +67,9 @@ pub struct Work {
     /// The task on the mesh.
     pub task: Task,
     /// The memory of `bundle`, shared with all other holders of the same bytes.
-    pub memory: Arc<Reservation>,
+    pub memory: Arc<Share>,
+    /// The memory that a worker borrows for it. None until one begins it.
+    pub lender: Lender,
     /// The request that `task` was read from, so that it can be read again after a restart. None for work that
     /// nobody fetches later.
     pub recipe: Option<Arc<Recipe>>,
@@ -78,6 +81,8 @@ pub struct Work {
     pub holds: Arc<[Arc<Hold>]>,
     /// The name that the client gave the request.
     pub claim: Option<Arc<Claim>>,
+    /// The address that hears of its end.
+    pub webhook: Option<Arc<str>>,
 }
 
 /// A request for a picture, as it was sent.
@@ -139,7 +144,7 @@ pub struct Newer {
     /// The mesh and the files beside it.
     pub bundle: Bundle,
     /// The memory of `bundle`.
-    pub memory: Arc<Reservation>,
+    pub memory: Arc<Share>,
     /// The bundle's files in the data folder, if they are there already.
     pub holds: Arc<[Arc<Hold>]>,
     /// Its name, if it is stored.
@@ -198,6 +203,8 @@ pub enum Media {
 pub struct Finished {
     /// The encoded picture, or the text of the verdict. Clones share the bytes.
     pub content: Bytes,
+    /// The memory of the content, if it is counted.
+    pub memory: Option<Arc<Share>>,
     /// The form of the content.
     pub media: Media,
     /// True for a verdict that is to be answered with 422, as its request asks.
@@ -224,6 +231,7 @@ impl Finished {
         let Output { bytes, format, backend, is_substitute, draw_times, warnings, selection, .. } = output;
         Self {
             content: bytes.into(),
+            memory: None,
             media: Media::Picture(format),
             has_failed: false,
             backend,
@@ -240,6 +248,7 @@ impl Finished {
     pub fn verdict(json: String, has_failed: bool, timings: Timings) -> Self {
         Self {
             content: json.into(),
+            memory: None,
             media: Media::Json,
             has_failed,
             backend: BackendKind::Cpu,
@@ -250,6 +259,18 @@ impl Finished {
             timings,
             draw_times: DrawTimes::default(),
         }
+    }
+
+    /// Counts its bytes as long as anything holds them: in a cache, as a result, or in an answer that is being sent.
+    #[must_use]
+    pub fn counted(mut self, memory: &Arc<Memory>) -> Self {
+        let (content, share) = counted(memory, std::mem::take(&mut self.content));
+        Self { content, memory: Some(share), ..self }
+    }
+
+    /// Counts its bytes on the account of what keeps it, as long as the guard lives.
+    pub fn kept_on(&self, account: Account) -> Option<Keeping> {
+        self.memory.clone().map(|share| Keeping::new(share, account))
     }
 }
 
@@ -351,6 +372,8 @@ pub struct Job {
     pub owner: Owner,
     /// The id of the request that brought it, for the log.
     pub request_id: Arc<str>,
+    /// The address that hears of its end.
+    pub webhook: Option<Arc<str>>,
     /// Time of acceptance by this process.
     pub accepted: Instant,
     /// Time of acceptance in milliseconds since 1970, for clients.
@@ -362,6 +385,8 @@ pub struct Job {
     pub(super) size: Size,
     /// The time for which it will occupy a worker, as far as is known.
     pub(super) estimate: Duration,
+    /// The memory with which a worker begins it, bytes. It grows once, if it turns out that others have what it needs.
+    pub(super) memory_bytes: AtomicU64,
     /// Its place in the queue: a time since the registry's beginning.
     pub(super) rank: Duration,
     pub(super) deadline: Deadline,
@@ -387,6 +412,8 @@ pub struct Size {
     pub(super) mesh: Option<u64>,
     /// True for a mesh that was drawn before, and so is likely to be in memory.
     pub(super) is_known: bool,
+    /// Bytes of memory by the formula.
+    pub(super) formula_bytes: f64,
 }
 
 /// A job that has ended in an earlier process.
@@ -415,6 +442,8 @@ pub struct Admission {
     pub size: Size,
     /// The time for which it will occupy a worker.
     pub estimate: Duration,
+    /// The memory with which it begins, bytes.
+    pub memory_bytes: u64,
     /// Its place in the queue.
     pub rank: Duration,
     /// The name that the client gave the request.
@@ -424,7 +453,7 @@ pub struct Admission {
 impl Job {
     pub(super) fn new(work: Option<Work>, admission: Admission, name: Option<(JobId, u64)>) -> Self {
         let (id, accepted_unix_ms) = name.unwrap_or_else(|| (JobId::new(), unix_ms()));
-        let Admission { is_kept, owner, is_durable, serial, size, estimate, rank, claim } = admission;
+        let Admission { is_kept, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim } = admission;
         Self {
             id,
             is_kept,
@@ -432,12 +461,14 @@ impl Job {
             class: if is_kept { Class::Batch } else { Class::Interactive },
             owner,
             request_id: work.as_ref().map_or_else(|| "".into(), |work| work.request_id.clone()),
+            webhook: work.as_ref().and_then(|work| work.webhook.clone()),
             accepted: Instant::now(),
             accepted_unix_ms,
             is_durable,
             serial,
             size,
             estimate,
+            memory_bytes: AtomicU64::new(memory_bytes),
             rank,
             deadline: Deadline::default(),
             state: watch::Sender::new(JobState::Queued),
@@ -485,6 +516,11 @@ impl Job {
             // Unreachable, because this job owns the sender. A stale state is better than a panic.
             Err(_) => self.state(),
         }
+    }
+
+    /// Gives the work back that a worker has taken, and could not do.
+    pub(super) fn put_work(&self, work: Work) {
+        *self.work.lock().unwrap_or_else(PoisonError::into_inner) = Some(work);
     }
 
     /// Takes the work out of the job. None if it was taken before.

@@ -6,12 +6,12 @@
 //!
 //! Reading order: [`job`] (one job and its states), [`claims`] (names of requests), [`progress`] (how far it has
 //! come), [`queue`] (those that wait),
-//! [`registry`] (all jobs, behind one lock), [`results`] (those that have ended), [`storage`] (jobs in the data folder), [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs), [`watchdog`] (overdue workers),
-//! [`upload_budget`] (memory of uploads).
+//! [`registry`] (all jobs, behind one lock), [`dispatch`] (jobs on their way to workers), [`results`] (those that have ended), [`storage`] (jobs in the data folder), [`estimates`] (how long jobs will take), [`worker`] (does the jobs), [`clock`] (ends overdue jobs), [`watchdog`] (overdue workers).
 
 mod claims;
 mod class;
 mod clock;
+mod dispatch;
 mod estimates;
 mod job;
 mod progress;
@@ -21,7 +21,6 @@ mod results;
 mod storage;
 #[cfg(test)]
 mod tests;
-mod upload_budget;
 mod watchdog;
 mod worker;
 
@@ -32,7 +31,6 @@ pub use job::{
 };
 pub use progress::{Progress, Step};
 pub use storage::{JSON, Storage, name, read_picture, value_of};
-pub use upload_budget::{Reservation, UploadBudget, UploadBudgetFull};
 pub use worker::{CpuThreads, Renderer, RendererFactory, pipeline_renderers};
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -41,9 +39,10 @@ use std::time::{Duration, Instant};
 
 use super::digest::Digest;
 use super::durable::{Change, EndRecord, Hold, Unstored};
+use super::memory::Memory;
 use super::metrics::Metrics;
 use claims::Claimed;
-pub use job::Restored;
+pub use job::{Restored, unix_ms};
 use registry::JobRegistry;
 
 /// The limits of the job service.
@@ -71,10 +70,24 @@ pub struct JobSettings {
     pub result_bytes: u64,
     /// Most kept results. The oldest are dropped first.
     pub result_count: usize,
+    /// The memory of the process.
+    pub memory: Arc<Memory>,
     /// The data folder. None: kept jobs end with the process.
     pub storage: Option<Storage>,
     /// Hears of waits, stages and ends.
     pub metrics: Option<Arc<Metrics>>,
+    /// Hears of the end of each job that has a webhook.
+    pub webhooks: Option<OnEnd>,
+}
+
+/// Hears of the end of a job. A lock is held, so it returns at once.
+#[derive(Clone)]
+pub struct OnEnd(pub Arc<dyn Fn(&Arc<Job>) + Send + Sync>);
+
+impl std::fmt::Debug for OnEnd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("OnEnd").finish_non_exhaustive()
+    }
 }
 
 /// Reasons why a job was not accepted.
@@ -101,6 +114,17 @@ pub enum Refusal {
         /// The longest time for which it is let wait.
         limit_ms: u64,
         /// Seconds until there should be time enough.
+        retry_after_s: u64,
+    },
+    /// What is kept and being sent leaves no memory for the job.
+    #[error(
+        "uploads, results and answers that are being sent leave no memory for this job, which takes about {bytes} \
+         bytes; try again in {retry_after_s} s"
+    )]
+    MemoryFull {
+        /// Bytes that it takes, as far as is known.
+        bytes: u64,
+        /// Seconds until there may be some.
         retry_after_s: u64,
     },
     /// More meshes at once than there could ever be places for.

@@ -94,17 +94,25 @@ impl Queue {
         }
     }
 
+    /// The job that [`Self::take`] takes.
+    pub fn next(&self, may_batch: bool) -> Option<&Arc<Job>> {
+        self.of(self.next_class(may_batch)?).next()
+    }
+
     /// Takes the next job: a batch job only if one may begin.
     pub fn take(&mut self, may_batch: bool) -> Option<Arc<Job>> {
-        let has_batch = may_batch && self.batch.has_jobs();
-        let class = match self.interactive.has_jobs() {
-            true if has_batch && self.in_a_row >= INTERACTIVE_IN_A_ROW => Class::Batch,
-            true => Class::Interactive,
-            false if has_batch => Class::Batch,
-            false => return None,
-        };
+        let class = self.next_class(may_batch)?;
         self.in_a_row = if class == Class::Batch { 0 } else { self.in_a_row.saturating_add(1) };
         self.class(class).take()
+    }
+
+    fn next_class(&self, may_batch: bool) -> Option<Class> {
+        let has_batch = may_batch && self.batch.has_jobs();
+        match self.interactive.has_jobs() {
+            true if has_batch && self.in_a_row >= INTERACTIVE_IN_A_ROW => Some(Class::Batch),
+            true => Some(Class::Interactive),
+            false => has_batch.then_some(Class::Batch),
+        }
     }
 
     /// Number of jobs of a class.
@@ -161,6 +169,12 @@ impl Queue {
 impl Waiting {
     fn has_jobs(&self) -> bool {
         self.count > self.reserved
+    }
+
+    /// The job that [`Self::take`] takes.
+    fn next(&self) -> Option<&Arc<Job>> {
+        let ready = self.owners.values().filter(|turns| !turns.jobs.is_empty());
+        ready.min_by_key(|turns| turns.had)?.jobs.first_key_value().map(|(_, job)| job)
     }
 
     fn take(&mut self) -> Option<Arc<Job>> {

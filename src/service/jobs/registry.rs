@@ -28,11 +28,14 @@ use super::queue::Queue;
 use super::results::Results;
 use super::storage::Storage;
 use super::watchdog::{Overdue, Quarantine, Running};
-use super::{JobLoad, JobSettings, Refusal};
+use super::{JobLoad, JobSettings, OnEnd, Refusal};
 use crate::service::durable::{Change, Hold};
 
 /// The rank that a job loses for each second of its estimate, seconds.
 const PATIENCE: u32 = 4;
+
+/// The least memory of a job, bytes: that of one that is not known yet.
+const JOB_BYTES_MIN: u64 = 1 << 20;
 
 /// All jobs, and the conditions that threads wait for.
 pub struct JobRegistry {
@@ -44,39 +47,30 @@ pub struct JobRegistry {
     began: Instant,
     inner: Mutex<Inner>,
     /// Wakes workers: a job was queued, or draining began.
-    work: Condvar,
+    pub(super) work: Condvar,
     /// Wakes the clock: there is a new deadline or a new result, or draining began.
-    clock: Condvar,
+    pub(super) clock: Condvar,
     /// Number of jobs that wait or occupy a worker.
     outstanding: watch::Sender<usize>,
 }
 
+/// What the lock guards.
 #[derive(Default)]
-struct Inner {
-    queue: Queue,
+pub(super) struct Inner {
+    pub(super) queue: Queue,
     /// Number of jobs whose end is being stored.
     ending: usize,
     /// Queued and running jobs in the order of acceptance.
-    active: BTreeMap<u64, Arc<Job>>,
+    pub(super) active: BTreeMap<u64, Arc<Job>>,
     /// Jobs that occupy a worker, by number. A cancelled one may do so for a moment longer.
-    running: HashMap<u64, Running>,
+    pub(super) running: HashMap<u64, Running>,
     /// Workers that are counted as lost.
     overdue: Overdue,
     kept: HashMap<JobId, Arc<Job>>,
     /// Kept jobs that have ended.
     results: Results,
-    draining: bool,
+    pub(super) draining: bool,
     serial: u64,
-}
-
-/// The next step of a worker.
-pub enum Next {
-    /// It does this job.
-    Job(Arc<Job>, Work),
-    /// It has waited in vain.
-    Idle,
-    /// It ends: there will be no more.
-    End,
 }
 
 /// The jobs and workers that have taken too long.
@@ -107,7 +101,21 @@ impl JobRegistry {
 
     /// Checks that a job would be accepted now.
     pub fn would_accept(&self, class: Class, owner: &Owner) -> Result<(), Refusal> {
-        self.check(&self.lock(), class, owner)
+        self.check(&self.lock(), class, owner)?;
+        self.check_memory(JOB_BYTES_MIN)
+    }
+
+    /// Checks that what cannot be dropped leaves memory for a job.
+    fn check_memory(&self, bytes: u64) -> Result<(), Refusal> {
+        match self.settings.memory.could_run(bytes) {
+            true => Ok(()),
+            false => Err(Refusal::MemoryFull { bytes, retry_after_s: 2 }),
+        }
+    }
+
+    /// The memory with which a job of this size begins.
+    fn memory_of(&self, size: Size) -> u64 {
+        self.estimates.memory(size).max(JOB_BYTES_MIN).min(self.settings.memory.job_max())
     }
 
     /// Queues work. A kept job can be found by its id until its result expires.
@@ -167,12 +175,13 @@ impl JobRegistry {
         is_durable: bool,
     ) -> Result<Arc<Job>, Refusal> {
         let estimate = self.estimates.estimate(size).min(self.settings.job_time);
-        let owner = work.owner.clone();
+        let (memory_bytes, owner) = (self.memory_of(size), work.owner.clone());
+        self.check_memory(memory_bytes)?;
         self.check(inner, if is_kept { Class::Batch } else { Class::Interactive }, &owner)?;
         inner.serial += 1;
         let rank = self.began.elapsed() + (estimate * PATIENCE).min(self.settings.job_time / 4);
         let (serial, claim) = (inner.serial, work.claim.clone());
-        let admission = Admission { is_kept, owner, is_durable, serial, size, estimate, rank, claim };
+        let admission = Admission { is_kept, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim };
         let job = Arc::new(Job::new(Some(work), admission, None));
         inner.queue.reserve(job.class, &job.owner, estimate);
         Ok(job)
@@ -200,7 +209,8 @@ impl JobRegistry {
         let mut inner = self.lock();
         inner.serial += 1;
         let (serial, rank, owner, claim) = (inner.serial, Duration::ZERO, work.owner.clone(), work.claim.clone());
-        let admission = Admission { is_kept: true, owner, is_durable: true, serial, size, estimate, rank, claim };
+        let (is_kept, is_durable, memory_bytes) = (true, true, self.memory_of(size));
+        let admission = Admission { is_kept, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim };
         let job = Arc::new(Job::new(Some(work), admission, Some(name)));
         job.hold(holds);
         inner.queue.reserve(job.class, &job.owner, estimate);
@@ -213,11 +223,12 @@ impl JobRegistry {
         let Restored { id, accepted_unix_ms, owner, claim } = name;
         let name = (id, accepted_unix_ms);
         let mut inner = self.lock();
-        let (size, estimate, rank) = (self.estimates.no_size(), Duration::ZERO, Duration::ZERO);
-        let admission = Admission { is_kept: true, owner, is_durable: true, serial: 0, size, estimate, rank, claim };
+        let (size, estimate, rank, serial) = (self.estimates.no_size(), Duration::ZERO, Duration::ZERO, 0);
+        let (is_kept, is_durable, memory_bytes) = (true, true, 0);
+        let admission = Admission { is_kept, owner, is_durable, serial, size, estimate, memory_bytes, rank, claim };
         let job = Arc::new(Job::new(None, admission, Some(name)));
         job.hold(holds);
-        inner.results.add(&job, result_bytes(&state), is_fetched, &self.settings);
+        inner.results.add(&job, &state, is_fetched, &self.settings);
         job.state.send_replace(state);
         self.keep(&mut inner, &job);
         self.evict(&mut inner);
@@ -251,42 +262,6 @@ impl JobRegistry {
         if inner.draining {
             self.work.notify_all();
             self.clock.notify_all();
-        }
-    }
-
-    /// Waits for the next job, no longer than `time_max`, and counts the worker as busy.
-    pub fn take(&self, time_max: Option<Duration>) -> Next {
-        let until = time_max.and_then(|time_max| Instant::now().checked_add(time_max));
-        let mut inner = self.lock();
-        loop {
-            let may_batch = self.batch_running(&inner) < self.batch_workers();
-            if let Some(job) = inner.queue.take(may_batch) {
-                if let Some(work) = job.take_work() {
-                    let (bundle, since) = (work.bundle.clone(), Instant::now());
-                    inner.running.insert(job.serial, Running { job: job.clone(), bundle, since });
-                    job.state.send_replace(JobState::Running);
-                    // Its time begins now.
-                    self.clock.notify_one();
-                    if let Some(metrics) = &self.settings.metrics {
-                        metrics.waited(job.class.name(), job.accepted.elapsed());
-                    }
-                    if let Some(storage) = self.storage_of(&job) {
-                        storage.durable.store_soon(vec![Change::Started(job.id.key())], Vec::new());
-                    }
-                    self.publish(&inner);
-                    return Next::Job(job, work);
-                }
-                continue;
-            }
-            // A job that is being stored has its place already.
-            if inner.draining && inner.queue.is_empty() {
-                return Next::End;
-            }
-            inner = match until.map(|until| until.saturating_duration_since(Instant::now())) {
-                None => self.work.wait(inner).unwrap_or_else(PoisonError::into_inner),
-                Some(Duration::ZERO) => return Next::Idle,
-                Some(time) => self.work.wait_timeout(inner, time).unwrap_or_else(PoisonError::into_inner).0,
-            };
         }
     }
 
@@ -371,13 +346,18 @@ impl JobRegistry {
     }
 
     /// Tells everybody that a job has ended.
-    fn announce(&self, inner: &mut Inner, job: &Job, state: JobState) {
+    fn announce(&self, inner: &mut Inner, job: &Arc<Job>, state: JobState) {
         if job.is_kept {
-            inner.results.add(job, result_bytes(&state), false, &self.settings);
+            inner.results.add(job, &state, false, &self.settings);
             self.evict(inner);
             self.clock.notify_one();
         }
         job.state.send_replace(state);
+        if let Some(OnEnd(hear)) = &self.settings.webhooks
+            && job.webhook.is_some()
+        {
+            hear(job);
+        }
     }
 
     /// A client has the end of a kept job: from now on it is kept for a while only.
@@ -392,7 +372,7 @@ impl JobRegistry {
         }
     }
 
-    fn storage_of(&self, job: &Job) -> Option<&Storage> {
+    pub(super) fn storage_of(&self, job: &Job) -> Option<&Storage> {
         self.settings.storage.as_ref().filter(|_| job.is_durable)
     }
 
@@ -502,11 +482,11 @@ impl JobRegistry {
 
     /// Workers that batch jobs may occupy. A client that waits for a picture finds the other one free, or finds it so
     /// soon.
-    fn batch_workers(&self) -> usize {
+    pub(super) fn batch_workers(&self) -> usize {
         self.settings.workers.saturating_sub(1).max(1)
     }
 
-    fn batch_running(&self, inner: &Inner) -> usize {
+    pub(super) fn batch_running(&self, inner: &Inner) -> usize {
         inner.running.values().filter(|running| running.job.class == Class::Batch).count()
     }
 
@@ -560,17 +540,13 @@ impl JobRegistry {
         }
     }
 
-    fn publish(&self, inner: &Inner) {
+    pub(super) fn publish(&self, inner: &Inner) {
         self.outstanding.send_replace(inner.queue.len() + inner.running.len() + inner.ending);
     }
 
-    fn lock(&self) -> MutexGuard<'_, Inner> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-fn result_bytes(state: &JobState) -> u64 {
-    if let JobState::Done(finished) = state { finished.content.len() as u64 } else { 0 }
 }
 
 /// Seconds after which to try again, at least 1 and at most an hour.

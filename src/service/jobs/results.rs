@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use super::JobSettings;
 use super::class::Owner;
-use super::job::{Job, JobId};
+use super::job::{Job, JobId, JobState};
+use crate::service::memory::{Account, Keeping};
 
 /// The ended jobs, by the time at which they expire.
 #[derive(Default)]
@@ -24,16 +25,22 @@ struct EndedJob {
     owner: Owner,
     bytes: u64,
     is_fetched: bool,
+    /// Counts its bytes as those of a result.
+    _memory: Option<Keeping>,
 }
 
 impl Results {
-    /// Adds a job that has ended, with the bytes of its result.
-    pub fn add(&mut self, job: &Job, bytes: u64, is_fetched: bool, settings: &JobSettings) {
+    /// Adds a job that has ended in this state.
+    pub fn add(&mut self, job: &Job, state: &JobState, is_fetched: bool, settings: &JobSettings) {
+        let (bytes, memory) = match state {
+            JobState::Done(finished) => (finished.content.len() as u64, finished.kept_on(Account::Results)),
+            _ => (0, None),
+        };
         self.bytes += bytes;
         let (id, owner) = (job.id, job.owner.clone());
         let share = self.shares.entry(owner.clone()).or_default();
         *share = (share.0 + bytes, share.1 + 1);
-        self.insert(EndedJob { id, owner, bytes, is_fetched }, settings);
+        self.insert(EndedJob { id, owner, bytes, is_fetched, _memory: memory }, settings);
     }
 
     /// A client has fetched a result. True if it was the first time.

@@ -87,6 +87,7 @@ impl Storage {
             owner: work.owner.to_string(),
             request_id: work.request_id.to_string(),
             mesh: recipe.mesh,
+            webhook: work.webhook.as_deref().map(str::to_owned),
             newer,
             claim: work
                 .claim
@@ -173,6 +174,7 @@ pub fn read_picture(record: PictureRecord, content: Bytes) -> Option<Finished> {
     let warnings = record.warnings.into_iter();
     Some(Finished {
         content,
+        memory: None,
         media: if record.format == JSON { Media::Json } else { Media::Picture(value_of(&record.format)?) },
         has_failed: record.has_failed,
         backend,

@@ -4,16 +4,18 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::dispatch::Next;
 use super::job::{Checking, Comparing, Failure, Finished, Job, JobState, Product, Task, Timings, Work};
-use super::registry::{JobRegistry, Next};
+use super::registry::JobRegistry;
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{Backends, GpuHost};
 use crate::check::{self, Verdict};
 use crate::import::{self, Bundle, MeshError, bundle::UNNAMED};
-use crate::limits::{Budget, Deadline, Limits};
+use crate::limits::{Budget, Deadline, Lender, Limits};
 use crate::pipeline::{self, Model, Output, RenderError, Stage};
 use crate::report::Extras;
-use crate::service::residents::{Found, Resident, Residents};
+use crate::service::priority;
+use crate::service::residents::{Found, Residents};
 
 /// A worker's renderer, which does one job after the other.
 pub type Renderer = Box<dyn FnMut(&Work, &Deadline, &mut dyn FnMut(Stage)) -> Result<Product, RenderError>>;
@@ -45,7 +47,8 @@ pub fn pipeline_renderers(
         };
         let (limits, residents) = (limits.clone(), residents.clone());
         Box::new(move |work, deadline, ended| {
-            let Work { bundle, format_in, mesh_key, task, .. } = work;
+            let Work { bundle, format_in, mesh_key, task, lender, .. } = work;
+            let limits = Limits { lender: lender.clone(), ..limits.clone() };
             match task {
                 Task::Draw(spec) => {
                     let job = pipeline::Job { bundle: bundle.clone(), format_in: *format_in, spec };
@@ -85,10 +88,16 @@ fn render_stored(
         let mut budget = Budget::new(limits);
         let options = import::Options { format: job.format_in, time_s, ..import::Options::default() };
         let model = Model::read(&job.bundle, options, limits, &mut budget, deadline)?;
-        Ok(Resident { model, budget })
+        // From here on it is the memory of a mesh that is kept, if there is room for it.
+        if let Some(lender) = &limits.lender.0 {
+            lender.restart();
+        }
+        Ok((model, budget.lent_by(&Lender(None), 0)))
     })?;
     ended(Stage::Parse);
-    let mut budget = resident.budget.clone();
+    // A mesh that is kept has a share of its own.
+    let counted = if resident.is_counted() { resident.budget.spent_bytes() } else { 0 };
+    let mut budget = resident.budget.lent_by(&limits.lender, counted);
     let output = pipeline::render_model(&resident.model, job.spec, backends, &mut budget, deadline, ended);
     residents.weigh(&key, &resident);
     Ok((output?, was_kept))
@@ -150,9 +159,10 @@ pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
     // It is made with the first job and dropped when there was none for long, so that an idle process holds
     // no renderer.
     let mut renderer: Option<Renderer> = None;
+    priority::lower();
     loop {
-        let (job, work) = match registry.take(renderer.is_some().then_some(registry.settings.idle_time)) {
-            Next::Job(job, work) => (job, work),
+        let (job, work, memory) = match registry.take(renderer.is_some().then_some(registry.settings.idle_time)) {
+            Next::Job(job, work, memory) => (job, work, memory),
             Next::Idle => {
                 drop_renderer(&mut renderer);
                 continue;
@@ -166,11 +176,27 @@ pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
             let renderer = renderer.get_or_insert_with(|| renderers());
             run_job(renderer, &job, &work, started)
         }));
+        registry.estimates.learn_memory(job.size, memory.peak());
+        memory.release();
         let state = attempt.unwrap_or_else(|_| {
             tracing::error!(job = %job.id, "a job panicked; its worker goes on with a fresh renderer");
             drop_renderer(&mut renderer);
             JobState::Failed(Arc::new(Failure::Panicked))
         });
+        let work = match memory.was_refused() && matches!(state, JobState::Failed(_)) {
+            true => match registry.again(&job, work) {
+                Some(work) => work,
+                None => continue,
+            },
+            false => work,
+        };
+        let state = match state {
+            JobState::Done(finished) => match Arc::try_unwrap(finished) {
+                Ok(finished) => JobState::Done(Arc::new(finished.counted(&registry.settings.memory))),
+                Err(finished) => JobState::Done(finished),
+            },
+            state => state,
+        };
         // The memory is freed before the end is announced, so that a client that waits for the end
         // can send the next mesh of the same size.
         drop(work);

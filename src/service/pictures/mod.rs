@@ -10,8 +10,9 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use crate::service::cache::{ByteCache, Weighed, with_room_for};
+use crate::service::cache::{ByteCache, Weighed, shrink_for, with_room_for};
 use crate::service::jobs::Finished;
+use crate::service::memory::{Account, Keeping, Memory};
 use crate::warning::Warning;
 
 /// Bytes of a picture on an average, to size tables.
@@ -27,7 +28,7 @@ const KEPT_FOR: Duration = Duration::from_secs(24 * 3600);
 /// The pictures. One cap holds for the bytes of all.
 #[derive(Debug)]
 pub struct Pictures {
-    cache: ByteCache<Kept>,
+    cache: Arc<ByteCache<Kept>>,
     /// By key, what tells the others of a picture that is being drawn.
     drawing: Mutex<HashMap<String, watch::Sender<Option<Kept>>>>,
     bytes: u64,
@@ -81,6 +82,8 @@ struct First<'a> {
 struct Kept {
     finished: Arc<Finished>,
     drawn: Instant,
+    /// Counts its bytes as those of a picture that is kept.
+    memory: Option<Arc<Keeping>>,
 }
 
 impl Weighed for Kept {
@@ -92,8 +95,10 @@ impl Weighed for Kept {
 
 impl Pictures {
     /// Room for pictures of so many bytes together. None are kept if it is 0.
-    pub fn new(bytes: u64) -> Self {
-        Self { cache: with_room_for(bytes, TYPICAL_BYTES), drawing: Mutex::default(), bytes }
+    pub fn new(bytes: u64, memory: &Memory) -> Self {
+        let cache = Arc::new(with_room_for(bytes, TYPICAL_BYTES));
+        shrink_for(memory, Account::Pictures, &cache);
+        Self { cache, drawing: Mutex::default(), bytes }
     }
 
     /// The picture of this key, drawn by `draw` if it is not in memory. Requests for the same picture
@@ -108,12 +113,13 @@ impl Pictures {
                 {
                     return Ok(kept.found(Source::Coalesced));
                 }
-                Kept { finished: draw.await?, drawn: Instant::now() }
+                Kept::new(draw.await?)
             }
             Joined::First(first) => {
-                let kept = Kept { finished: draw.await?, drawn: Instant::now() };
+                let mut kept = Kept::new(draw.await?);
                 // Another picture is due when the GPU is back.
                 if !kept.finished.is_substitute {
+                    kept.memory = kept.finished.kept_on(Account::Pictures).map(Arc::new);
                     self.cache.insert(key.to_owned(), kept.clone());
                 }
                 first.tell(kept)
@@ -186,6 +192,10 @@ impl Drop for First<'_> {
 }
 
 impl Kept {
+    fn new(finished: Arc<Finished>) -> Self {
+        Self { finished, drawn: Instant::now(), memory: None }
+    }
+
     fn found(&self, source: Source) -> Found {
         Found { finished: Arc::clone(&self.finished), source, age: self.drawn.elapsed() }
     }

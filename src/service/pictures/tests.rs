@@ -5,10 +5,12 @@ use super::*;
 use crate::backend::{BackendKind, DrawTimes};
 use crate::image::ImageFormat;
 use crate::service::jobs::{Media, Timings};
+use crate::service::memory::Memory;
 
 fn picture(bytes: usize) -> Arc<Finished> {
     Arc::new(Finished {
         content: vec![7; bytes].into(),
+        memory: None,
         media: Media::Picture(ImageFormat::Png),
         has_failed: false,
         backend: BackendKind::Cpu,
@@ -29,7 +31,7 @@ fn endless(pictures: &Arc<Pictures>) -> tokio::task::JoinHandle<Result<Found, &'
 
 #[tokio::test]
 async fn the_others_draw_for_themselves_where_the_first_fails_or_hangs_up() {
-    let pictures = Arc::new(Pictures::new(1 << 20));
+    let pictures = Arc::new(Pictures::new(1 << 20, &Memory::unlimited(&[])));
     let gone = endless(&pictures);
     tokio::task::yield_now().await;
     let others: Vec<_> = (0..3)
@@ -58,7 +60,7 @@ async fn the_others_draw_for_themselves_where_the_first_fails_or_hangs_up() {
 
 #[tokio::test]
 async fn those_who_wait_get_the_first_ones_picture() {
-    let pictures = Arc::new(Pictures::new(0));
+    let pictures = Arc::new(Pictures::new(0, &Memory::unlimited(&[])));
     let (paint, dries) = tokio::sync::oneshot::channel::<()>();
     let first = tokio::spawn({
         let pictures = pictures.clone();
@@ -84,7 +86,7 @@ async fn those_who_wait_get_the_first_ones_picture() {
 
 #[tokio::test]
 async fn a_picture_in_place_of_a_gpus_is_not_kept() {
-    let pictures = Pictures::new(1 << 20);
+    let pictures = Pictures::new(1 << 20, &Memory::unlimited(&[]));
     for is_substitute in [true, true, false] {
         let mut drawn = picture(10);
         Arc::get_mut(&mut drawn).unwrap().is_substitute = is_substitute;
@@ -98,7 +100,7 @@ async fn a_picture_in_place_of_a_gpus_is_not_kept() {
 
 #[tokio::test]
 async fn what_is_too_large_is_drawn_and_not_kept() {
-    let pictures = Pictures::new(10_000);
+    let pictures = Pictures::new(10_000, &Memory::unlimited(&[]));
     let drawn = AtomicUsize::new(0);
     for _ in 0..2 {
         let draw = async {

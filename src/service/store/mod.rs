@@ -17,8 +17,9 @@ use bytes::Bytes;
 use crate::import::{Bundle, Format};
 use crate::service::digest::Digest;
 use crate::service::durable::{Change, Durable, Hold};
-use crate::service::jobs::{Owner, Reservation, UploadBudget};
+use crate::service::jobs::Owner;
 use crate::service::keys::Access;
+use crate::service::memory::{Account, Memory, MemoryFull, Share};
 
 /// The way in which a bundle is read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -51,7 +52,7 @@ pub struct StoredMesh {
     pub mesh: NewMesh,
     /// The memory of its bytes. Every holder of the bytes holds a clone, and the memory counts
     /// until the last clone is dropped.
-    pub memory: Arc<Reservation>,
+    pub memory: Arc<Share>,
     /// Its files in the data folder, in the bundle's order, and its report. Empty without a data folder.
     pub holds: Arc<[Arc<Hold>]>,
 }
@@ -75,6 +76,9 @@ pub enum StoreError {
         /// The flag that raises the cap.
         flag: &'static str,
     },
+    /// Other uses of memory take all the room.
+    #[error("the server's memory is in use; try again shortly")]
+    Full,
 }
 
 /// The content of the store at one moment.
@@ -92,8 +96,7 @@ pub struct StoreLoad {
 pub struct Store {
     /// The data folder, which has the same meshes.
     durable: Option<Durable>,
-    memory: Arc<UploadBudget>,
-    bytes: u64,
+    memory: Arc<Memory>,
     count: usize,
     inner: Mutex<Inner>,
 }
@@ -126,14 +129,9 @@ pub enum Removed {
 }
 
 impl Store {
-    /// A store for at most `count` meshes with `bytes` together.
-    pub fn new(bytes: u64, count: usize) -> Self {
-        Self::with(None, bytes, count)
-    }
-
-    /// The same, with a data folder.
-    pub fn with(durable: Option<Durable>, bytes: u64, count: usize) -> Self {
-        Self { durable, memory: UploadBudget::new(bytes), bytes, count: count.max(1), inner: Mutex::default() }
+    /// A store for at most `count` meshes, with the bytes that their account may have, and perhaps a data folder.
+    pub fn new(durable: Option<Durable>, memory: Arc<Memory>, count: usize) -> Self {
+        Self { durable, memory, count: count.max(1), inner: Mutex::default() }
     }
 
     /// Finds a mesh that the party sees, which counts as a use of it.
@@ -148,6 +146,9 @@ impl Store {
     pub fn insert(&self, mesh: NewMesh, holds: Arc<[Arc<Hold>]>) -> Result<bool, StoreError> {
         let bytes = mesh.size_bytes();
         self.check_size(bytes)?;
+        let memory = self.memory.share(Account::Meshes);
+        // Caches may make room, so that the lock is not held.
+        let reserved = memory.grow(bytes);
         let mut inner = self.lock();
         if inner.touch(mesh.digest).is_some() {
             let entry = inner.meshes.get_mut(&mesh.digest);
@@ -160,9 +161,17 @@ impl Store {
         while inner.meshes.len() >= self.count {
             self.forget(inner.evict().ok_or(StoreError::Busy { flag: "--mesh-count" })?);
         }
-        let mut memory = self.memory.reserve();
-        while memory.grow(bytes).is_err() {
-            self.forget(inner.evict().ok_or(StoreError::Busy { flag: "--mesh-bytes" })?);
+        match reserved {
+            Ok(()) => {}
+            Err(MemoryFull::Process { .. }) => return Err(StoreError::Full),
+            Err(MemoryFull::Account { .. }) => loop {
+                self.forget(inner.evict().ok_or(StoreError::Busy { flag: "--mesh-bytes" })?);
+                match memory.grow_now(bytes) {
+                    Ok(()) => break,
+                    Err(None) => {}
+                    Err(Some(_)) => return Err(StoreError::Full),
+                }
+            },
         }
         inner.add(StoredMesh { mesh, memory: Arc::new(memory), holds });
         Ok(true)
@@ -198,17 +207,18 @@ impl Store {
 
     /// Refuses a mesh that would not fit into an empty store.
     pub fn check_size(&self, bytes: u64) -> Result<(), StoreError> {
-        if bytes > self.bytes { Err(StoreError::TooLarge { bytes, limit: self.bytes }) } else { Ok(()) }
+        let limit = self.memory.cap(Account::Meshes);
+        if bytes > limit { Err(StoreError::TooLarge { bytes, limit }) } else { Ok(()) }
     }
 
     /// The content of the store at this moment.
     pub fn load(&self) -> StoreLoad {
-        StoreLoad { count: self.lock().meshes.len(), bytes: self.memory.used_bytes() }
+        StoreLoad { count: self.lock().meshes.len(), bytes: self.memory.used(Account::Meshes) }
     }
 
     /// Most bytes and most meshes.
     pub fn limits(&self) -> (u64, usize) {
-        (self.bytes, self.count)
+        (self.memory.cap(Account::Meshes), self.count)
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {

@@ -17,9 +17,13 @@ fn has(store: &Store, names: &[&str]) -> Vec<bool> {
     names.iter().map(|name| inner.meshes.contains_key(&Digest::of(name.as_bytes()))).collect()
 }
 
+fn store(bytes: u64, count: usize) -> Store {
+    Store::new(None, Memory::unlimited(&[(Account::Meshes, bytes)]), count)
+}
+
 #[test]
 fn the_least_recently_used_goes_first() {
-    let store = Store::new(100, 10);
+    let store = store(100, 10);
     for name in ["a", "b", "c"] {
         assert_eq!(store.insert(mesh(name, 30), [].into()), Ok(true));
     }
@@ -36,7 +40,7 @@ fn the_least_recently_used_goes_first() {
 
 #[test]
 fn no_more_than_the_count_stay() {
-    let store = Store::new(1000, 2);
+    let store = store(1000, 2);
     for name in ["a", "b", "c"] {
         assert_eq!(store.insert(mesh(name, 5), [].into()), Ok(true));
     }
@@ -56,7 +60,7 @@ fn no_more_than_the_count_stay() {
 
 #[test]
 fn what_is_held_stays_and_counts_until_it_is_let_go() {
-    let store = Store::new(100, 10);
+    let store = store(100, 10);
     for name in ["a", "b"] {
         store.insert(mesh(name, 40), [].into()).unwrap();
     }
@@ -76,7 +80,7 @@ fn what_is_held_stays_and_counts_until_it_is_let_go() {
 
 #[test]
 fn many_threads_never_exceed_the_memory() {
-    let store = Store::new(1000, 7);
+    let store = store(1000, 7);
     let stored = std::sync::atomic::AtomicUsize::new(0);
     std::thread::scope(|scope| {
         for thread in 0..8 {
@@ -103,7 +107,7 @@ fn many_threads_never_exceed_the_memory() {
 
 #[test]
 fn a_mesh_is_its_owners_and_goes_with_the_last_of_them() {
-    let store = Store::new(100, 10);
+    let store = store(100, 10);
     let of = |name: &str| NewMesh { owners: vec![Owner::new(name)], ..mesh("a", 30) };
     let access = |name: &str| {
         let mut access = Access::default();

@@ -150,8 +150,8 @@ fn uploads_share_their_memory() {
     let mut long = CUBE_OBJ.to_vec();
     long.extend(vec![b'\n'; 2000]);
     let answer = server.post("/v1/render?size=8", &long);
-    answer.problem(429, "uploads_full");
-    assert!(answer.header("retry-after").is_some());
+    answer.problem(413, "body_too_large");
+    assert_eq!(answer.json()["flag"], "--uploads-bytes", "trying again would be in vain");
     for _ in 0..10 {
         server.post("/v1/render?size=8", CUBE_OBJ).picture(8, 8);
     }

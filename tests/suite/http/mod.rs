@@ -5,6 +5,7 @@ pub mod bad;
 pub mod guards;
 pub mod jobs;
 pub mod kept;
+pub mod memory;
 pub mod meshes;
 pub mod meshes_bad;
 pub mod meshes_pictures;

@@ -7,10 +7,9 @@ use std::time::Duration;
 use meshsnap::backend::HardwareHint;
 use meshsnap::backend::cpu::DrawingThreads;
 use meshsnap::import::Bundle;
-use meshsnap::limits::Limits;
-use meshsnap::service::jobs::{
-    CpuThreads, Job, JobSettings, JobState, Jobs, Owner, Task, UploadBudget, Work, pipeline_renderers,
-};
+use meshsnap::limits::{Lender, Limits};
+use meshsnap::service::jobs::{CpuThreads, Job, JobSettings, JobState, Jobs, Owner, Task, Work, pipeline_renderers};
+use meshsnap::service::memory::{Account, Memory};
 use meshsnap::service::residents::Residents;
 
 use crate::support::fake_gpus::{Machine, Open};
@@ -40,14 +39,15 @@ fn mesh(number: usize) -> Vec<u8> {
 struct Process {
     machine: Machine,
     residents: Arc<Residents>,
-    budget: Arc<UploadBudget>,
+    budget: Arc<Memory>,
     jobs: Jobs,
 }
 
 impl Process {
     fn start() -> Self {
         let machine = Machine::new(&[Open::Hardware; 2 * ROUNDS], &[]);
-        let residents = Arc::new(Residents::new(RESIDENT_BYTES));
+        let memory = Memory::unlimited(&[]);
+        let residents = Arc::new(Residents::new(RESIDENT_BYTES, memory.clone()));
         let threads = CpuThreads::Shared(Arc::new(DrawingThreads::new(2)));
         let gpu = machine.host(HardwareHint::Maybe);
         let settings = JobSettings {
@@ -62,18 +62,20 @@ impl Process {
             unfetched_ttl: Duration::from_secs(60),
             result_bytes: 1 << 20,
             result_count: 10,
+            memory: memory.clone(),
             storage: None,
             metrics: None,
+            webhooks: None,
         };
         let renderers = pipeline_renderers(gpu, threads, Limits::default(), residents.clone());
         let jobs = Jobs::start(settings, renderers).unwrap();
-        Self { machine, residents, budget: UploadBudget::new(1 << 20), jobs }
+        Self { machine, residents, budget: memory, jobs }
     }
 
     fn submit(&self, mesh_number: usize, style: &str, backend: &str) -> Arc<Job> {
         let spec = scenes::spec(&[("style", style), ("size", "24"), ("backend", backend)]);
         let bytes = mesh(mesh_number);
-        let mut memory = self.budget.reserve();
+        let memory = self.budget.share(Account::Uploads);
         memory.grow(bytes.len() as u64).unwrap();
         let work = Work {
             bundle: Bundle::of_one(bytes),
@@ -81,11 +83,13 @@ impl Process {
             mesh_key: Some(format!("mesh {mesh_number}")),
             task: Task::Draw(Box::new(spec)),
             memory: Arc::new(memory),
+            lender: Lender(None),
             recipe: None,
             owner: Owner::default(),
             request_id: "".into(),
             holds: [].into(),
             claim: None,
+            webhook: None,
         };
         self.jobs.submit(work, false).unwrap()
     }
@@ -119,7 +123,7 @@ fn a_thousand_interleavings_leave_every_picture_right_and_nothing_behind() {
     let alone = Process::start();
     let pictures: Vec<_> = (0..15)
         .map(|i| match end_of(&runtime, &alone.submit(i / 3, STYLES[i % 3], "cpu")) {
-            JobState::Done(finished) => finished.content.clone(),
+            JobState::Done(finished) => finished.content.to_vec(),
             other => panic!("{other:?}"),
         })
         .collect();
@@ -174,7 +178,9 @@ fn ends_clean(runtime: &tokio::runtime::Runtime, process: Process) {
     runtime.block_on(async { tokio::time::timeout(Duration::from_secs(60), jobs.idle()).await.expect("idle") });
     jobs.join(Duration::from_secs(60));
     drop(jobs);
-    assert_eq!(budget.used_bytes(), 0);
+    assert_eq!(budget.used(Account::Uploads), 0);
+    assert_eq!(budget.used(Account::Jobs), 0);
+    assert_eq!(budget.used(Account::Answers), 0, "somebody holds a picture");
     // The clock's thread ends a moment after the workers.
     let began = std::time::Instant::now();
     let devices = std::mem::take(&mut machine.0.lock().unwrap().devices);

@@ -24,6 +24,8 @@ pub enum Need {
     Systemd,
     /// Chromium on the `PATH`, and axe-core, which `tests/run` installs into `target/node`.
     Browser,
+    /// A C compiler, `cc`, on the `PATH`.
+    Compiler,
 }
 
 impl Need {
@@ -38,6 +40,7 @@ impl Need {
             Self::Python => "python",
             Self::Systemd => "systemd",
             Self::Browser => "browser",
+            Self::Compiler => "compiler",
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::config::ANY_ORIGIN;
 const MAX_AGE: Duration = Duration::from_secs(7200);
 
 /// Headers that pages may send.
-const ALLOWED: [HeaderName; 8] = [
+const ALLOWED: [HeaderName; 9] = [
     header::ACCEPT,
     header::AUTHORIZATION,
     header::CONTENT_TYPE,
@@ -19,6 +19,7 @@ const ALLOWED: [HeaderName; 8] = [
     HeaderName::from_static("idempotency-key"),
     HeaderName::from_static("last-event-id"),
     HeaderName::from_static("prefer"),
+    HeaderName::from_static("webhook"),
     HeaderName::from_static("x-request-id"),
 ];
 

@@ -8,7 +8,7 @@ use super::body::{self, BodyKind};
 use super::idempotency::{self, Sent};
 use super::keys::Keys;
 use super::query::{Query, bad, quote};
-use super::{access_of, document_of, is_short_json, read_upload, upload};
+use super::{access_of, document_of, is_short_json, read_upload, upload, webhook};
 use crate::check::RuleSet;
 use crate::service::digest::Digest;
 use crate::service::http::error::ApiError;
@@ -42,6 +42,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     // Before the upload, so that a mistake costs none.
     task(&keys, Digest::of(b""))?;
     let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
+    let webhook = webhook::of(state, request.headers(), class)?;
     let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
     if !is_short_json(request.headers()) && !is_sent_again {
         state.jobs.would_accept(class, &access.owner)?;
@@ -76,7 +77,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
         (Work { recipe: Some(Arc::new(recipe)), ..work }, named.digest)
     };
     let key = key(digest, &reading, &keys)?;
-    let work = Box::new(Work { owner: access.owner, request_id, claim, ..work });
+    let work = Box::new(Work { owner: access.owner, request_id, claim, webhook, ..work });
     Ok(Asked::New { work, key })
 }
 

@@ -11,7 +11,7 @@ use super::check::Asked;
 use super::idempotency::{self, Sent};
 use super::keys::Keys;
 use super::query::bad;
-use super::{access_of, is_short_json};
+use super::{access_of, is_short_json, webhook};
 use crate::diff;
 use crate::image::ImageFormat;
 use crate::import::Bundle;
@@ -21,8 +21,9 @@ use crate::service::http::error::ApiError;
 use crate::service::http::middleware::observe;
 use crate::service::http::state::AppState;
 use crate::service::http::{negotiate, stored_mesh};
-use crate::service::jobs::{Class, Comparing, Newer, Recipe, Reservation, Task, Work};
+use crate::service::jobs::{Class, Comparing, Newer, Recipe, Task, Work};
 use crate::service::keys::Access;
+use crate::service::memory::Share;
 use crate::service::store::Reading;
 use crate::spec::Spec;
 
@@ -62,6 +63,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     // Before the upload, so that a mistake costs none.
     Answer::of(state, &keys, form_of_answer(&keys, request.headers())?)?;
     let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
+    let webhook = webhook::of(state, request.headers(), class)?;
     let is_sent_again = name.as_ref().is_some_and(|name| state.jobs.has_claim(name));
     if !is_short_json(request.headers()) && !is_sent_again {
         state.jobs.would_accept(class, &access.owner)?;
@@ -69,8 +71,8 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     let headers = request.headers().clone();
     let limits = &state.rules.limits;
     let (bytes, files, time) = (limits.body_bytes, limits.bundle_entries, state.body_timeout);
-    let (least_rate, upload_budget) = (state.least_rate, &state.upload_budget);
-    let limits = BodyLimits { bytes, files, meshes: None, time, least_rate, upload_budget };
+    let (least_rate, memory) = (state.least_rate, &state.memory);
+    let limits = BodyLimits { bytes, files, meshes: None, time, least_rate, memory };
     let meshes = match sides::read(request, limits).await? {
         sides::Sides::Document(document) => stored(state, &document, &mut keys, &reading, &access)?,
         sides::Sides::Meshes { bundles, reservations } => sent(bundles, reservations, &reading).await?,
@@ -87,7 +89,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     let mesh = meshes.are_stored.then_some(meshes.digests[0]);
     let recipe = Some(Arc::new(Recipe { document: None, overrides: keys.pairs().into(), mesh }));
     let task = answer.task(meshes.newer);
-    let work = Work { task, recipe, owner: access.owner, request_id, claim, ..meshes.older };
+    let work = Work { task, recipe, owner: access.owner, request_id, claim, webhook, ..meshes.older };
     Ok(Asked::New { work: Box::new(work), key })
 }
 
@@ -110,7 +112,7 @@ fn stored(
 }
 
 /// Two meshes that were sent.
-async fn sent(bundles: [Bundle; 2], memory: [Reservation; 2], reading: &Reading) -> Result<Meshes, ApiError> {
+async fn sent(bundles: [Bundle; 2], memory: [Share; 2], reading: &Reading) -> Result<Meshes, ApiError> {
     for bundle in &bundles {
         bundle.check_sent().map_err(|error| ApiError::from(&error))?;
     }

@@ -80,8 +80,12 @@ pub async fn digest(query: &Query, upload: &Upload, headers: &HeaderMap) -> Resu
     let document = upload.document.as_deref().map(|document| Digest::of(document).to_string());
     let format_in = query.reading.format_in.map(|format| format.name());
     let accepted = negotiate::image_format(None, headers).ok().map(|format| media_type(Media::Picture(format)));
+    let webhook = headers.get("webhook").map(|address| address.as_bytes());
     let parts = (files, upload.bundle.is_zip(), document, format_in, &query.reading.entry, &query.overrides, accepted);
-    Ok(Digest::of(&serde_json::to_vec(&parts).map_err(|_| ApiError::internal())?))
+    // A request without one has the digest that it had before there were webhooks.
+    let parts = serde_json::to_vec(&parts).map_err(|_| ApiError::internal())?;
+    let parts = webhook.map_or(parts.clone(), |address| [&parts, address].concat());
+    Ok(Digest::of(&parts))
 }
 
 /// The list of meshes that are a job each, in their order.

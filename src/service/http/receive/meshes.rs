@@ -37,7 +37,7 @@ pub fn understand(
     let format = negotiate::image_format(spec.image.format, headers)?;
     request::set_format(&mut spec, format);
     let recipe = Arc::new(Recipe { document: upload.document, overrides, mesh: None });
-    let mut reservation = upload.reservation;
+    let reservation = upload.reservation;
     let mut meshes = Vec::new();
     for (index, file) in upload.bundle.into_files().into_iter().enumerate() {
         let memory = Arc::new(reservation.split(file.bytes.len() as u64));
@@ -61,6 +61,7 @@ pub fn understand(
             recipe: Some(recipe.clone()),
             owner: sender.owner.clone(),
             request_id: sender.request_id.clone(),
+            webhook: sender.webhook.clone(),
             claim,
             ..stored_mesh::work(bundle, reading.clone(), task, memory)
         };

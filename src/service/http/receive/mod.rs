@@ -3,7 +3,7 @@
 //! [`query`] reads the query, [`body`] the body within its limits. [`check`] and [`diff`] read requests for
 //! verdicts, by [`keys`] of their own. [`idempotency`] knows what is sent again. [`meshes`]
 //! makes a job of each mesh of a form.
-//! [`upload`] names what is to be stored.
+//! [`upload`] names what is to be stored. [`webhook`] reads who hears of a job's end.
 
 pub mod body;
 pub mod check;
@@ -13,6 +13,7 @@ pub mod keys;
 pub mod meshes;
 pub mod query;
 pub mod upload;
+pub mod webhook;
 
 use std::sync::Arc;
 
@@ -66,6 +67,7 @@ pub struct Received {
 pub struct Sender {
     owner: Owner,
     request_id: Arc<str>,
+    webhook: Option<Arc<str>>,
     /// The name that the client gave it, and its digest.
     named: Option<(ClaimName, Digest)>,
 }
@@ -77,6 +79,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     body::check_header(request.headers(), state.rules.limits.body_bytes)?;
     let query = Query::read(request.uri(), &state.rules)?;
     let name = idempotency::name_of(request.headers(), &access.owner)?.filter(|_| class == Class::Batch);
+    let webhook = webhook::of(state, request.headers(), class)?;
     // Forms and JSON may bring a document. Of every other request, the query is the whole document
     // and is checked before the upload.
     if !body::is_multipart(request.headers()) && !body::is_json(request.headers()) {
@@ -98,8 +101,8 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
     };
     let named = name.zip(digest);
     if upload.kind == BodyKind::Meshes {
-        return meshes::understand(state, query, upload, &headers, &Sender { owner: access.owner, request_id, named })
-            .map(Reception::Many);
+        let sender = Sender { owner: access.owner, request_id, webhook, named };
+        return meshes::understand(state, query, upload, &headers, &sender).map(Reception::Many);
     }
     let claim = match &named {
         Some((name, digest)) => match idempotency::check(state, name, *digest)? {
@@ -109,7 +112,7 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
         None => None,
     };
     let mut received = understand(state, query, upload, &headers, &access)?;
-    received.work = Work { owner: access.owner, request_id, claim, ..received.work };
+    received.work = Work { owner: access.owner, request_id, claim, webhook, ..received.work };
     Ok(Reception::New(Box::new(received)))
 }
 
@@ -175,7 +178,7 @@ pub async fn read_upload(state: &AppState, request: Request) -> Result<Upload, A
 
 async fn read_body(state: &AppState, request: Request, meshes: Option<u64>) -> Result<Upload, ApiError> {
     let Limits { body_bytes: bytes, bundle_entries: files, .. } = state.rules.limits;
-    let (time, least_rate, upload_budget) = (state.body_timeout, state.least_rate, &state.upload_budget);
-    let limits = BodyLimits { bytes, files, meshes, time, least_rate, upload_budget };
+    let (time, least_rate, memory) = (state.body_timeout, state.least_rate, &state.memory);
+    let limits = BodyLimits { bytes, files, meshes, time, least_rate, memory };
     body::read(request, limits).await
 }

@@ -9,7 +9,7 @@ use super::body::{self, BodyKind, Upload};
 use crate::import::Bundle;
 use crate::service::digest::Digest;
 use crate::service::http::error::{ApiError, Fault};
-use crate::service::jobs::Reservation;
+use crate::service::memory::Share;
 
 /// An upload and its name.
 pub struct NamedUpload {
@@ -18,7 +18,7 @@ pub struct NamedUpload {
     /// The files to store.
     pub bundle: Bundle,
     /// The memory of the upload.
-    pub memory: Arc<Reservation>,
+    pub memory: Arc<Share>,
 }
 
 /// Names an upload: a file or an archive by its bytes, a form by the list of its files.

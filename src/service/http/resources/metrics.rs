@@ -9,7 +9,9 @@ use axum::response::{IntoResponse, Response};
 use crate::service::http::error::ApiError;
 use crate::service::http::state::AppState;
 use crate::service::jobs::Class;
+use crate::service::memory::Account;
 use crate::service::metrics::{Gauges, MEDIA_TYPE};
+use crate::service::webhooks::Webhooks;
 
 /// Everything that is counted.
 pub async fn get(State(state): State<Arc<AppState>>) -> Result<Response, ApiError> {
@@ -29,17 +31,19 @@ fn gauges(state: &AppState) -> Gauges {
     let (residents, pictures) = (state.residents.load(), state.pictures.load());
     let waits = [jobs.wait, jobs.batch_wait].map(|wait| u64::try_from(wait.as_millis()).unwrap_or(u64::MAX));
     let queues = Class::ALL.iter().zip(jobs.queued_by_class).zip(waits);
+    let memory = &state.memory;
+    let cap = |account| match account {
+        Account::Residents => state.residents.limit_bytes(),
+        Account::Pictures => state.pictures.limit_bytes(),
+        _ => memory.cap(account),
+    };
     Gauges {
         queues: queues.map(|((class, jobs), wait_ms)| (class.name(), jobs, wait_ms)).collect(),
         workers: vec![("busy", jobs.running as u64), ("all", state.workers), ("overdue", jobs.overdue as u64)],
         quarantined: jobs.quarantined,
-        memory: vec![
-            ("uploads", state.upload_budget.used_bytes(), state.upload_budget.limit_bytes()),
-            ("results", jobs.kept_bytes, state.jobs.result_limit_bytes()),
-            ("meshes", meshes.bytes, state.meshes.limits().0),
-            ("residents", residents.bytes, state.residents.limit_bytes()),
-            ("pictures", pictures.bytes, state.pictures.limit_bytes()),
-        ],
+        memory: Account::ALL.map(|account| (account.name(), memory.used(account), cap(account))).to_vec(),
+        webhooks: state.webhooks.as_ref().map_or(0, Webhooks::count),
+        memory_budget: memory.limit(),
         entries: vec![
             ("results", jobs.kept),
             ("meshes", meshes.count),

@@ -7,14 +7,15 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
+use super::dispatch::Next;
 use super::estimates::Estimates;
-use super::registry::Next;
 use super::*;
 use crate::backend::{BackendKind, DrawTimes};
 use crate::image::ImageFormat;
 use crate::import::Bundle;
-use crate::limits::{Deadline, Stopped};
+use crate::limits::{Deadline, Lender, Stopped};
 use crate::pipeline::{Output, RenderError, Stage};
+use crate::service::memory::Account;
 use crate::spec::color::Rgba;
 use crate::spec::{
     BackendChoice, CameraSpec, Ground, ImageSpec, Layers, Light, LightPreset, NamedView, Points, ProjectionKind,
@@ -36,13 +37,15 @@ fn settings() -> JobSettings {
         unfetched_ttl: Duration::from_secs(60),
         result_bytes: 1000,
         result_count: 100,
+        memory: Memory::unlimited(&[(Account::Uploads, 1 << 20)]),
         storage: None,
         metrics: None,
+        webhooks: None,
     }
 }
 
-fn work(budget: &Arc<UploadBudget>, mesh: &'static [u8]) -> Work {
-    let mut reservation = budget.reserve();
+fn work(budget: &Arc<Memory>, mesh: &'static [u8]) -> Work {
+    let reservation = budget.share(Account::Uploads);
     reservation.grow(mesh.len() as u64).unwrap();
     let (bundle, task) = (Bundle::of_one(Bytes::from_static(mesh)), Task::Draw(Box::new(spec())));
     Work {
@@ -51,11 +54,13 @@ fn work(budget: &Arc<UploadBudget>, mesh: &'static [u8]) -> Work {
         mesh_key: None,
         task,
         memory: Arc::new(reservation),
+        lender: Lender(None),
         recipe: None,
         owner: Owner::default(),
         request_id: "".into(),
         holds: [].into(),
         claim: None,
+        webhook: None,
     }
 }
 
@@ -134,7 +139,7 @@ fn fake_render(work: &Work, deadline: &Deadline, gate: &Mutex<Receiver<()>>) -> 
 
 struct Fixture {
     jobs: Jobs,
-    budget: Arc<UploadBudget>,
+    budget: Arc<Memory>,
     open: Sender<()>,
     /// Number of renderers that were made. Each holds it.
     renderers: Arc<AtomicUsize>,
@@ -156,7 +161,12 @@ fn fixture(settings: JobSettings) -> Fixture {
             Ok(Product::Picture { output: Box::new(output), mesh_was_kept: false })
         })
     });
-    Fixture { jobs: Jobs::start(settings, factory).unwrap(), budget: UploadBudget::new(1 << 20), open, renderers }
+    Fixture {
+        jobs: Jobs::start(settings, factory).unwrap(),
+        budget: Memory::unlimited(&[(Account::Uploads, 1 << 20)]),
+        open,
+        renderers,
+    }
 }
 
 impl Fixture {
@@ -187,7 +197,7 @@ fn a_job_ends_with_its_picture_and_gives_its_memory_back() {
     let job = fixture.submit(b"12345", false).unwrap();
     let JobState::Done(finished) = wait(&job) else { panic!("{:?}", job.state()) };
     assert_eq!(finished.content.len(), 5);
-    assert_eq!(fixture.budget.used_bytes(), 0);
+    assert_eq!(fixture.budget.used(Account::Uploads), 0);
     assert!(fixture.jobs.find(job.id).is_none(), "not kept");
 }
 
@@ -230,7 +240,7 @@ fn a_panic_costs_its_job_alone() {
         assert!(matches!(wait(&fixture.submit(b"1", false).unwrap()), JobState::Done(_)));
         assert_eq!(fixture.renderers.load(Ordering::Relaxed), round, "a fresh renderer");
     }
-    assert_eq!(fixture.budget.used_bytes(), 0);
+    assert_eq!(fixture.budget.used(Account::Uploads), 0);
 }
 
 #[test]
@@ -243,7 +253,7 @@ fn a_job_out_of_time_stops_wherever_it_is() {
         assert!(job.accepted.elapsed() >= Duration::from_millis(150));
     }
     assert!(matches!(wait(&fixture.submit(b"1", false).unwrap()), JobState::Done(_)), "the worker is free again");
-    assert_eq!(fixture.budget.used_bytes(), 0);
+    assert_eq!(fixture.budget.used(Account::Uploads), 0);
 }
 
 #[test]
@@ -267,10 +277,10 @@ fn a_cancelled_job_frees_its_place_and_its_memory_at_once() {
     let fixture = fixture(settings());
     let first = fixture.occupy();
     let waiting = [fixture.submit(b"22", true).unwrap(), fixture.submit(b"333", true).unwrap()];
-    assert_eq!(fixture.budget.used_bytes(), 4 + 2 + 3);
+    assert_eq!(fixture.budget.used(Account::Uploads), 4 + 2 + 3);
     fixture.jobs.cancel(&waiting[0]);
     assert!(matches!(waiting[0].state(), JobState::Cancelled));
-    assert_eq!((fixture.budget.used_bytes(), fixture.jobs.load().queued), (4 + 3, 1));
+    assert_eq!((fixture.budget.used(Account::Uploads), fixture.jobs.load().queued), (4 + 3, 1));
     fixture.submit(b"1", false).unwrap();
     fixture.open.send(()).unwrap();
     assert!(matches!(wait(&waiting[1]), JobState::Done(_)));
@@ -305,9 +315,9 @@ fn results_are_kept_for_a_while_and_within_their_memory() {
 
 /// A registry without threads, for jobs that are thought to take 1 s, and reports that are thought to take
 /// `report`.
-fn registry(workers: usize, report: Duration, job_time: Duration) -> (Arc<JobRegistry>, Arc<UploadBudget>) {
+fn registry(workers: usize, report: Duration, job_time: Duration) -> (Arc<JobRegistry>, Arc<Memory>) {
     let registry = Arc::new(JobRegistry::new(JobSettings { workers, queue: 1000, job_time, ..settings() }));
-    let budget = UploadBudget::new(1 << 20);
+    let budget = Memory::unlimited(&[(Account::Uploads, 1 << 20)]);
     for _ in 0..200 {
         registry.estimates.learn(registry.estimates.size(&work(&budget, b"1")), Duration::from_secs(1));
         registry.estimates.learn(registry.estimates.size(&report_on(&budget)), report);
@@ -315,12 +325,12 @@ fn registry(workers: usize, report: Duration, job_time: Duration) -> (Arc<JobReg
     (registry, budget)
 }
 
-fn report_on(budget: &Arc<UploadBudget>) -> Work {
+fn report_on(budget: &Arc<Memory>) -> Work {
     Work { task: Task::Inspect { time_s: None }, ..work(budget, b"1") }
 }
 
 /// Gives each worker a job of 1 s.
-fn occupy_all(registry: &JobRegistry, budget: &Arc<UploadBudget>) {
+fn occupy_all(registry: &JobRegistry, budget: &Arc<Memory>) {
     for _ in 0..registry.settings.workers {
         registry.submit(work(budget, b"1"), false).unwrap();
         assert!(matches!(registry.take(None), Next::Job(..)));
@@ -363,13 +373,13 @@ fn a_job_does_not_fail_because_it_has_waited() {
 }
 
 /// Work of an owner.
-fn work_of(budget: &Arc<UploadBudget>, owner: &str) -> Work {
+fn work_of(budget: &Arc<Memory>, owner: &str) -> Work {
     Work { owner: Owner::new(owner), ..work(budget, b"1") }
 }
 
 /// Takes the next job and does it.
 fn do_next(registry: &Arc<JobRegistry>) -> Arc<Job> {
-    let Next::Job(job, _) = registry.take(Some(Duration::ZERO)) else { panic!("no job") };
+    let Next::Job(job, ..) = registry.take(Some(Duration::ZERO)) else { panic!("no job") };
     registry.finish(&job, JobState::Cancelled, Duration::ZERO);
     job
 }
@@ -438,7 +448,7 @@ fn short_jobs_overtake_long_ones_for_a_while() {
     // 4 s and, at most, a quarter of 40 s behind.
     assert!((5..7).contains(&(long.rank - short.rank).as_secs()), "{:?} {:?}", long.rank, short.rank);
     for expected in [short, long] {
-        let Next::Job(job, _) = registry.take(None) else { panic!("no job") };
+        let Next::Job(job, ..) = registry.take(None) else { panic!("no job") };
         assert_eq!(job.id, expected.id);
         registry.finish(&job, JobState::Cancelled, Duration::ZERO);
     }
@@ -494,12 +504,15 @@ fn many_threads_lose_no_job() {
     assert_eq!(done.load(Ordering::Relaxed), 1600);
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
     runtime.block_on(async { tokio::time::timeout(SOON, fixture.jobs.idle()).await.expect("idle") });
-    assert_eq!((fixture.budget.used_bytes(), fixture.jobs.load().queued, fixture.jobs.load().running), (0, 0, 0));
+    assert_eq!(
+        (fixture.budget.used(Account::Uploads), fixture.jobs.load().queued, fixture.jobs.load().running),
+        (0, 0, 0)
+    );
 }
 
 #[test]
 fn the_views_of_a_sheet_are_estimated() {
-    let (estimates, budget) = (Estimates::new(), UploadBudget::new(1 << 20));
+    let (estimates, budget) = (Estimates::new(), Memory::unlimited(&[(Account::Uploads, 1 << 20)]));
     let estimate = |turntable: Option<u32>, columns: Option<u32>| {
         let mut work = work(&budget, b"v 0 0 0\n");
         let Task::Draw(spec) = &mut work.task else { panic!("it draws") };

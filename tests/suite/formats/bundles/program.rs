@@ -221,7 +221,7 @@ fn upload_memory_is_given_back() {
     for _ in 0..10 {
         server.request("POST", "/v1/render?size=16", &[FORM], &body).picture(16, 16);
         let too_much = files_form(&[("a.obj", CUBE_OBJ), ("b.txt", &large)]);
-        server.request("POST", "/v1/render?size=16", &[FORM], &too_much).problem(429, "uploads_full");
+        server.request("POST", "/v1/render?size=16", &[FORM], &too_much).problem(413, "body_too_large");
         server.request("POST", "/v1/render?size=16", &[FORM], &body[..body.len() - 30]).problem(400, "bad_form");
     }
 }

@@ -1,6 +1,7 @@
 //! Strangers at the door: pages that abuse a browser, clients that hold what others need, slips in settings, signals.
 
 mod cors;
+mod hang_ups;
 mod keys;
 mod rates;
 mod slow;

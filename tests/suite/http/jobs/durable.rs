@@ -26,7 +26,7 @@ fn submit(server: &Server, query: &str) -> String {
 }
 
 /// The final state of a job.
-fn end_of(server: &Server, job: &str) -> serde_json::Value {
+pub fn end_of(server: &Server, job: &str) -> serde_json::Value {
     let began = Instant::now();
     loop {
         let state = server.request("GET", job, &["Prefer: wait=30"], b"").json();

@@ -1,9 +1,11 @@
 //! The daemon under load and over time: queue, deadline, cancellation, drain.
 
+pub mod disk;
 pub mod durable;
 mod events;
 mod idempotency;
 mod several;
+mod webhooks;
 
 use std::io::Write as _;
 use std::time::{Duration, Instant};

@@ -13,7 +13,8 @@ use futures_util::{Stream, StreamExt as _, stream};
 use crate::import::{Bundle, BundleFile};
 use crate::limits;
 use crate::service::http::error::{ApiError, Fault};
-use crate::service::jobs::{Refusal, Reservation, UploadBudget};
+use crate::service::jobs::Refusal;
+use crate::service::memory::{Account, Memory, Share};
 
 /// Most bytes between two parts of a form: boundary and headers. The parser searches them from the
 /// start with every chunk that arrives, so that their cost grows with the square.
@@ -35,7 +36,7 @@ pub struct Upload {
     /// The request document, if the body is a multipart form that has one.
     pub document: Option<Bytes>,
     /// The memory that bundle and document take.
-    pub reservation: Reservation,
+    pub reservation: Share,
 }
 
 /// Kinds of bodies, by `Content-Type`.
@@ -63,8 +64,8 @@ pub struct BodyLimits<'a> {
     pub time: Duration,
     /// Least bytes a second; 0: any.
     pub least_rate: u64,
-    /// The memory that all uploads share.
-    pub upload_budget: &'a Arc<UploadBudget>,
+    /// The memory of the process.
+    pub memory: &'a Arc<Memory>,
 }
 
 /// Refuses what can be refused from the header alone. This comes before a byte is read, and so
@@ -104,6 +105,10 @@ pub fn bad_form(detail: impl Into<String>) -> ApiError {
 pub async fn read(request: Request, limits: BodyLimits<'_>) -> Result<Upload, ApiError> {
     let reading = async {
         let (parts, body) = request.into_parts();
+        let most = limits.memory.cap(Account::Uploads);
+        if announced_length(&parts.headers).is_some_and(|length| length > most) {
+            return Err(ApiError::body_beyond_memory(most));
+        }
         let meter = Meter::new(&limits);
         let chunks = metered(body, meter.clone());
         if is_multipart(&parts.headers) {
@@ -229,7 +234,7 @@ struct Interrupted;
 struct Meter {
     bytes_max: u64,
     least_rate: u64,
-    upload_budget: Arc<UploadBudget>,
+    memory: Arc<Memory>,
     state: Arc<Mutex<MeterState>>,
 }
 
@@ -237,16 +242,16 @@ struct MeterState {
     bytes: u64,
     /// Bytes since the last part of a form, while the parser searches the next one.
     bytes_between_parts: Option<u64>,
-    reservation: Reservation,
+    reservation: Share,
     error: Option<ApiError>,
 }
 
 impl Meter {
     fn new(limits: &BodyLimits<'_>) -> Self {
-        let BodyLimits { bytes: bytes_max, least_rate, upload_budget, .. } = *limits;
-        let reservation = upload_budget.reserve();
+        let BodyLimits { bytes: bytes_max, least_rate, memory, .. } = *limits;
+        let reservation = memory.share(Account::Uploads);
         let state = MeterState { bytes: 0, bytes_between_parts: None, reservation, error: None };
-        Self { bytes_max, least_rate, upload_budget: upload_budget.clone(), state: Arc::new(Mutex::new(state)) }
+        Self { bytes_max, least_rate, memory: memory.clone(), state: Arc::new(Mutex::new(state)) }
     }
 
     fn count(&self, bytes: u64) -> Result<(), Interrupted> {
@@ -256,6 +261,8 @@ impl Meter {
         state.bytes_between_parts = before.map(|seen| seen + bytes);
         let counted = if state.bytes > self.bytes_max {
             Err(ApiError::body_too_large(self.bytes_max))
+        } else if state.bytes > self.memory.cap(Account::Uploads) {
+            Err(ApiError::body_beyond_memory(self.memory.cap(Account::Uploads)))
         // The chunk that ends the search may hold much of the part's content, so it does not count.
         } else if before.is_some_and(|seen| seen > BETWEEN_PARTS_BYTES_MAX) {
             Err(bad_form(format!(
@@ -294,8 +301,8 @@ impl Meter {
     }
 
     /// Hands over the memory that was reserved so far.
-    fn take_reservation(&self) -> Reservation {
-        std::mem::replace(&mut self.lock().reservation, self.upload_budget.reserve())
+    fn take_reservation(&self) -> Share {
+        std::mem::replace(&mut self.lock().reservation, self.memory.share(Account::Uploads))
     }
 
     fn lock(&self) -> MutexGuard<'_, MeterState> {
@@ -305,7 +312,7 @@ impl Meter {
 
 /// The chunks of a body, counted. It ends with an error where the client sends more slowly than it may.
 fn metered(body: Body, meter: Meter) -> impl Stream<Item = Result<Bytes, Interrupted>> + Send {
-    let pace = Pace::new(&meter.upload_budget);
+    let pace = Pace::new(&meter.memory);
     stream::unfold((body.into_data_stream(), meter, pace), |(mut chunks, meter, mut pace)| async move {
         let chunk = loop {
             match tokio::time::timeout(STALL, chunks.next()).await {
@@ -335,13 +342,13 @@ struct Pace {
 }
 
 impl Pace {
-    fn new(budget: &UploadBudget) -> Self {
-        Self { since: Instant::now(), bytes: 0, refusals: budget.refusals() }
+    fn new(memory: &Memory) -> Self {
+        Self { since: Instant::now(), bytes: 0, refusals: memory.refusals(Account::Uploads) }
     }
 
     /// Refuses an upload that is too slow. While others find no room, a window is short.
     fn check(&mut self, meter: &Meter) -> Result<(), Interrupted> {
-        let (time, is_in_the_way) = (self.since.elapsed(), meter.upload_budget.refusals() != self.refusals);
+        let (time, is_in_the_way) = (self.since.elapsed(), meter.memory.refusals(Account::Uploads) != self.refusals);
         let window = if is_in_the_way { STALL } else { RATE_WINDOW };
         if time < window {
             return Ok(());
@@ -353,7 +360,7 @@ impl Pace {
         if self.bytes < wanted {
             return Err(meter.stop(below_rate(meter.least_rate)));
         }
-        *self = Self::new(&meter.upload_budget);
+        *self = Self::new(&meter.memory);
         Ok(())
     }
 }

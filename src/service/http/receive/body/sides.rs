@@ -7,7 +7,7 @@ use super::{BodyLimits, Meter, bad_form, empty_file, is_multipart, metered, read
 use crate::import::{Bundle, BundleFile};
 use crate::limits;
 use crate::service::http::error::ApiError;
-use crate::service::jobs::Reservation;
+use crate::service::memory::Share;
 
 /// The parts of a form that brings two meshes: the older one, and the newer one.
 pub const PARTS: [&str; 2] = ["a", "b"];
@@ -20,7 +20,7 @@ pub enum Sides {
         /// The meshes.
         bundles: [Bundle; 2],
         /// The memory of each.
-        reservations: [Reservation; 2],
+        reservations: [Share; 2],
     },
     /// A document.
     Document(Bytes),
@@ -75,7 +75,7 @@ async fn read_form(request: Request, meter: &Meter, files_max: u64) -> Result<Si
             "the form has no `{missing}` part; send the older mesh as `a`, the newer one as `b`"
         )));
     }
-    let mut whole = meter.take_reservation();
+    let whole = meter.take_reservation();
     let bundles = sides.map(Bundle::of_files);
     let older = whole.split(bundles[0].bytes_len());
     Ok(Sides::Meshes { bundles, reservations: [older, whole] })

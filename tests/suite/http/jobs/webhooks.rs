@@ -1,0 +1,223 @@
+//! Webhooks: receivers that hear of the ends of jobs.
+
+use std::io::{Read as _, Write as _};
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use base64::Engine as _;
+use hmac::{Hmac, KeyInit as _, Mac as _};
+use serde_json::Value;
+use sha2::Sha256;
+
+use crate::support::server::{CUBE_OBJ, PATIENCE, Server, meshsnap};
+
+const SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
+
+/// A receiver that takes what comes, or answers with 503, and passes on what it has heard.
+struct Hook {
+    address: String,
+    heard: Receiver<(bool, String)>,
+    takes: Arc<AtomicBool>,
+}
+
+impl Hook {
+    fn new(takes: bool) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = format!("http://{}/hook", listener.local_addr().unwrap());
+        let (takes, (sender, heard)) = (Arc::new(AtomicBool::new(takes)), channel());
+        let does_take = takes.clone();
+        std::thread::spawn(move || {
+            for stream in listener.incoming() {
+                let mut stream = stream.unwrap();
+                stream.set_read_timeout(Some(PATIENCE)).unwrap();
+                let (mut text, mut buffer) = (Vec::new(), [0; 4096]);
+                // The JSON of a job ends as no part of it before does.
+                while serde_json::from_str::<Value>(body(&String::from_utf8_lossy(&text))).is_err() {
+                    match stream.read(&mut buffer) {
+                        Ok(count) if count > 0 => text.extend(&buffer[..count]),
+                        _ => break,
+                    }
+                }
+                let takes = does_take.load(Ordering::Relaxed);
+                let status = if takes { "200 OK" } else { "503 Later" };
+                let _ = write!(stream, "HTTP/1.1 {status}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n");
+                let _ = sender.send((takes, String::from_utf8(text).unwrap()));
+            }
+        });
+        Self { address, heard, takes }
+    }
+
+    /// The next job that it has taken. Checks the signature.
+    fn taken(&self) -> Value {
+        let began = Instant::now();
+        while let Ok((takes, text)) = self.heard.recv_timeout(PATIENCE.saturating_sub(began.elapsed())) {
+            check(&text);
+            if takes {
+                return serde_json::from_str(body(&text)).unwrap();
+            }
+        }
+        panic!("nothing came")
+    }
+}
+
+fn body(text: &str) -> &str {
+    text.split_once("\r\n\r\n").map_or("", |(_, body)| body)
+}
+
+fn header<'t>(text: &'t str, name: &str) -> &'t str {
+    let line = text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": "));
+    line.unwrap_or_else(|| panic!("no {name} in {text}"))
+}
+
+/// Verifies the signature as a receiver does.
+fn check(text: &str) {
+    let (id, time) = (header(text, "webhook-id"), header(text, "webhook-timestamp"));
+    let base64 = base64::prelude::BASE64_STANDARD;
+    let key = base64.decode(SECRET.strip_prefix("whsec_").unwrap()).unwrap();
+    let mut mac = Hmac::<Sha256>::new_from_slice(&key).unwrap();
+    mac.update(format!("{id}.{time}.{}", body(text)).as_bytes());
+    let signature = header(text, "webhook-signature").strip_prefix("v1,").unwrap();
+    mac.verify_slice(&base64.decode(signature).unwrap()).expect("the signature is right");
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_secs();
+    assert!(now.abs_diff(time.parse().unwrap()) < 60);
+}
+
+fn start(arguments: &[&str]) -> Server {
+    let mut command = meshsnap();
+    command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu"]).env("MESHSNAP_WEBHOOK_SECRET", SECRET);
+    Server::start_with(command.args(arguments))
+}
+
+fn metric(server: &Server, name: &str) -> f64 {
+    let text = String::from_utf8(server.get("/metrics").body).unwrap();
+    text.lines().find_map(|line| line.strip_prefix(name)?.trim().parse().ok()).unwrap_or(0.0)
+}
+
+#[test]
+fn a_receiver_hears_of_each_end_once() {
+    let server = start(&["--webhooks-to-private", "--webhook-retry-ms", "1"]);
+    let hook = Hook::new(true);
+    let webhook = format!("Webhook: {}", hook.address);
+    let done = server.request("POST", "/v1/jobs?size=16", &[&webhook], CUBE_OBJ);
+    let failed = server.request("POST", "/v1/jobs?size=16", &[&webhook], b"no mesh");
+    let judged = server.request("POST", "/v1/check", &[&webhook, "Prefer: respond-async"], CUBE_OBJ);
+    let form = b"--b\r\nContent-Disposition: form-data; name=\"mesh\"; filename=\"a.obj\"\r\n\r\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n\r\n--b\r\n\
+        Content-Disposition: form-data; name=\"mesh\"; filename=\"b.obj\"\r\n\r\nv 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\n\r\n--b--\r\n";
+    let several =
+        server.request("POST", "/v1/jobs?size=16", &[&webhook, "Content-Type: multipart/form-data; boundary=b"], form);
+    let mut expected = vec![
+        (done.json()["id"].clone(), "job.done"),
+        (failed.json()["id"].clone(), "job.failed"),
+        (judged.json()["id"].clone(), "job.done"),
+    ];
+    expected
+        .extend(several.json()["jobs"].as_array().unwrap().iter().map(|job| (job["job"]["id"].clone(), "job.done")));
+    assert_eq!(expected.len(), 5);
+    for _ in 0..5 {
+        let payload = hook.taken();
+        let id = &payload["data"]["id"];
+        let at = expected.iter().position(|(expected, _)| expected == id).expect("each comes once");
+        let (_, kind) = expected.swap_remove(at);
+        assert_eq!(payload["type"], kind);
+        // What it hears is what a client sees that asks.
+        let job = server.get(&format!("/v1/jobs/{}", id.as_str().unwrap())).json();
+        assert_eq!(payload["data"], job);
+        assert!(payload["timestamp"].as_str().unwrap().ends_with('Z'));
+    }
+    let began = Instant::now();
+    while metric(&server, "meshsnap_webhooks_total{outcome=\"delivered\"}") < 5.0 {
+        assert!(began.elapsed() < PATIENCE);
+    }
+    assert_eq!(metric(&server, "meshsnap_webhooks_waiting"), 0.0);
+    assert!(hook.heard.try_recv().is_err());
+}
+
+#[test]
+fn a_restart_tries_again_what_was_not_taken() {
+    let (folder, hook) = (tempfile::tempdir().unwrap(), Hook::new(false));
+    let data = folder.path().to_str().unwrap();
+    let arguments = [
+        "--ephemeral=false",
+        "--data-dir",
+        data,
+        "--webhooks-to-private",
+        "--webhook-retry-ms",
+        "1h",
+        "--workers",
+        "1",
+    ];
+    let server = start(&arguments);
+    let webhook = format!("Webhook: {}", hook.address);
+    let mut ids = Vec::new();
+    for size in 16..20 {
+        let answer = server.request("POST", &format!("/v1/jobs?size={size}"), &[&webhook], CUBE_OBJ);
+        ids.push(answer.json()["id"].clone());
+    }
+    // Each has failed once, and would be tried again in an hour.
+    let refused: Vec<_> = (0..4).map(|_| hook.heard.recv_timeout(PATIENCE).unwrap().0).collect();
+    assert_eq!(refused, [false; 4]);
+    assert_eq!(metric(&server, "meshsnap_webhooks_waiting"), 4.0);
+    server.kill_9();
+    drop(server);
+    hook.takes.store(true, Ordering::Relaxed);
+    let server = start(&arguments);
+    let mut taken: Vec<_> = (0..4).map(|_| hook.taken()["data"]["id"].clone()).collect();
+    taken.sort_by_key(Value::to_string);
+    ids.sort_by_key(Value::to_string);
+    assert_eq!(taken, ids);
+    // What was taken is not sent again, once that is written down.
+    let began = Instant::now();
+    while metric(&server, "meshsnap_webhooks_total{outcome=\"delivered\"}") < 4.0 {
+        assert!(began.elapsed() < PATIENCE);
+    }
+    server.terminate();
+    let mut server = server;
+    server.wait();
+    let server = start(&arguments);
+    assert_eq!(server.get("/v1/capabilities").json()["load"]["kept_results"], 4);
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(hook.heard.try_recv().is_err());
+    assert_eq!(metric(&server, "meshsnap_webhooks_waiting"), 0.0);
+}
+
+#[test]
+fn what_is_no_address_for_a_webhook_is_refused() {
+    let server = start(&[]);
+    let post = |path: &str, headers: &[&str]| server.request("POST", path, headers, CUBE_OBJ);
+    let mut refused = 0;
+    for bad in [
+        "",
+        "nonsense",
+        "ftp://a.example/",
+        "https://u:p@a.example/",
+        "http://127.0.0.1:1/",
+        "http://[::1]/",
+        "http://10.0.0.1/",
+        "http://localhost:80/",
+        "https://a.example/#x",
+        "http://169.254.169.254/latest/meta-data/",
+    ] {
+        post("/v1/jobs?size=16", &[&format!("Webhook: {bad}")]).problem(400, "bad_webhook");
+        refused += 1;
+    }
+    assert_eq!(refused, 10);
+    post("/v1/jobs?size=16", &["Webhook: https://a.example/", "Webhook: https://b.example/"])
+        .problem(400, "bad_webhook");
+    // Nobody waits for a webhook who waits for the picture.
+    post("/v1/render?size=16", &["Webhook: https://a.example/"]).problem(400, "bad_webhook");
+    post("/v1/check", &["Webhook: https://a.example/"]).problem(400, "bad_webhook");
+    assert_eq!(metric(&server, "meshsnap_queue_jobs{class=\"batch\"}"), 0.0);
+    let plain = Server::start(&[]);
+    plain.request("POST", "/v1/jobs", &["Webhook: https://a.example/"], CUBE_OBJ).problem(422, "webhooks_off");
+    for (secret, what) in [("hunter2", "whsec_"), ("whsec_????????????????????????????????", "base64")] {
+        let mut command = meshsnap();
+        let output = command.args(["serve", "--listen", "127.0.0.1:0"]).env("MESHSNAP_WEBHOOK_SECRET", secret);
+        let output = output.output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        assert!(text.contains(what) && !text.contains("????"), "{text}");
+    }
+}
