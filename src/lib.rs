@@ -67,6 +67,8 @@ pub mod import;
 mod library;
 #[doc(hidden)]
 pub mod limits;
+#[cfg(test)]
+mod made_obj;
 #[doc(hidden)]
 pub mod mesh;
 mod parallel;

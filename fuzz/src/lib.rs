@@ -97,7 +97,7 @@ fn run_import(bundle: &Bundle, options: Options) {
     match import(bundle, options, &limits, &mut budget, &Deadline::default()) {
         Ok(Imported { mesh, report: import, .. }) => {
             check(&mesh, &import);
-            let extras = Extras { print: true, parts: true };
+            let extras = Extras { print: true, parts: true, uv: true };
             let report = Report::of(&mesh, &import, bundle.bytes_len(), extras, &mut budget, &Deadline::default());
             let Ok(report) = report else { return };
             assert!(!report.text().is_empty());

@@ -1,5 +1,5 @@
-// Stage occlusion, per pixel: looks at places around it and adds up what light they take. Twin of
-// src/backend/cpu/occlusion/gather.rs.
+// Stage occlusion, per pixel of every second column and row: looks at places around it and adds up what light they
+// take. Twin of src/backend/cpu/occlusion/gather.rs.
 
 // Places of all pixels of the picture, then what each found.
 @group(1) @binding(30) var<storage, read_write> occlusion: array<u32>;
@@ -18,6 +18,9 @@ fn gather(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups
         return;
     }
     let pixel = vec2(i32(i) % frame.width, i32(i) / frame.width);
+    if ((pixel.x | pixel.y) & 1) == 1 {
+        return;
+    }
     let own = depth_at(pixel);
     var found = 0u;
     if own != NOWHERE {
@@ -29,7 +32,7 @@ fn gather(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups
 // The light that the places around a pixel take, 1/255.
 fn look(pixel: vec2<i32>, place: vec3<f32>) -> u32 {
     let normal = normal_of(pixel, place);
-    let part = TAPS_PER_PIXEL * u32((pixel.x & 1) + 2 * (pixel.y & 1));
+    let part = TAPS_PER_PIXEL * u32(((pixel.x >> 1u) & 1) + 2 * ((pixel.y >> 1u) & 1));
     var taken = 0.0;
     for (var t = part; t < part + TAPS_PER_PIXEL; t++) {
         // Four taps to a vector, two halves of a word each.

@@ -1,5 +1,5 @@
-// Stage occlusion, per pixel: a weighted mean of what a pixel and its neighbours of the same surface
-// found. Twin of src/backend/cpu/occlusion/spread.rs.
+// Stage occlusion, per pixel: a weighted mean of what pixels around it that show the same surface found. Twin of
+// src/backend/cpu/occlusion/spread.rs.
 
 @group(1) @binding(30) var<storage, read> occlusion: array<u32>;
 
@@ -21,17 +21,23 @@ fn mean_around(pixel: vec2<i32>) -> i32 {
     let found_at = u32(frame.width * frame.height);
     var sum = 0;
     var weights = 0;
-    for (var y = -1; y <= 1; y++) {
-        for (var x = -1; x <= 1; x++) {
+    // To the columns and rows of pixels that have looked around: -2, 0 and 2 from even ones, -3 to 3 from odd ones.
+    let farthest = 2 + (pixel & vec2(1));
+    for (var y = -farthest.y; y <= farthest.y; y += 2) {
+        for (var x = -farthest.x; x <= farthest.x; x += 2) {
             let to = pixel + vec2(x, y);
             if is_in_picture(to) && abs(place_in(to) - own) <= frame.occlusion_spread.z {
-                let weight = (2 - abs(x)) * (2 - abs(y));
+                let weight = (4 - abs(x)) * (4 - abs(y));
                 sum += weight * i32(occlusion[found_at + u32(to.y * frame.width + to.x)]);
                 weights += weight;
             }
         }
     }
-    // The nearest integer, halves up: what is rounded lies at least 1/64 from a half.
+    // Where none of them shows the surface, nothing is taken.
+    if weights == 0 {
+        return 0;
+    }
+    // The nearest integer, halves up: what is rounded lies at least 1/256 from a half.
     // Without `rn`, a compiler may add up the two constants that follow each other here.
     return round_to_i32(rn((f32(2 * sum + weights) + 0.5) / f32(2 * weights) - 0.5));
 }

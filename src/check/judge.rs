@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use super::places::{self, Faults};
-use super::{Check, Figure, Level, Rule, RuleSet, uvs, volume};
+use super::{ALL_PLACES_MAX, Check, Figure, Level, Options, PLACES_MAX, Place, Rule, RuleSet, polygons, uvs, volume};
 use crate::import::{ImportReport, MeshError, MeshFault};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
@@ -51,13 +51,27 @@ pub fn of_unreadable(error: &MeshError) -> Option<Check> {
 pub fn check(
     subject: &Subject<'_>,
     rules: &RuleSet,
+    options: Options,
     budget: &mut Budget,
     deadline: &Deadline,
 ) -> Result<Vec<Check>, MeshError> {
-    let mut judge = Judge { subject: *subject, edges: None, topology: None, budget, deadline };
+    if options.all_places {
+        budget.spend("the places of faults", ALL_PLACES_MAX as u64, size_of::<Place>() as u64)?;
+    }
+    let places_max = if options.all_places { ALL_PLACES_MAX } else { PLACES_MAX };
+    let mut judge = Judge { subject: *subject, edges: None, topology: None, places_max, budget, deadline };
     let of_rule = |&(rule, level): &(Rule, Level)| {
         deadline.check()?;
-        Ok(judge.finding(rule)?.of(rule, level))
+        let finding = match judge.finding(rule) {
+            Err(error) if options.fails_at_limits && matches!(error.fault, MeshFault::Limit(_)) => {
+                Finding::unjudged(&error)
+            }
+            finding => finding?,
+        };
+        if options.all_places {
+            judge.places_max -= finding.places.len().min(judge.places_max);
+        }
+        Ok(finding.of(rule, level))
     };
     rules.0.iter().map(of_rule).collect()
 }
@@ -68,6 +82,8 @@ struct Judge<'a> {
     edges: Option<Rc<EdgeList>>,
     /// The topology, once a rule has asked for it.
     topology: Option<Rc<Topology>>,
+    /// Most places that the next rule lists.
+    places_max: usize,
     budget: &'a mut Budget,
     deadline: &'a Deadline,
 }
@@ -78,13 +94,19 @@ struct Finding {
     found: Option<Figure>,
     allowed: Option<Figure>,
     detail: String,
-    places: Vec<super::Place>,
+    places: Vec<Place>,
 }
 
 impl Finding {
     fn of(self, rule: Rule, level: Level) -> Check {
         let Self { ok, found, allowed, detail, places } = self;
         Check { rule: rule.name(), level, ok, known: false, found, allowed, detail, places }
+    }
+
+    /// A rule that could not be judged, in the words of the limit.
+    fn unjudged(error: &MeshError) -> Self {
+        let detail = format!("it could not be judged: {error}");
+        Self { ok: false, found: None, allowed: None, detail, places: Vec::new() }
     }
 
     /// Faults, of which none is allowed.
@@ -120,14 +142,16 @@ impl Judge<'_> {
             Rule::Manifold => self.manifold()?,
             Rule::ConsistentWinding => self.winding()?,
             Rule::NoDegenerate => {
-                // Reading drops these faces, and their places with them.
+                // Reading drops these faces, and keeps the places of the first.
                 let count = import.dropped_degenerate_faces + import.dropped_collapsed_faces;
                 let detail = pluralise(count, "face without area", "faces without area");
-                Finding::of_faults(Faults::without_places(count), detail)
+                let places = import.degenerate_places.iter().take(self.places_max);
+                let places = places.map(|corners| places::corners(mesh, *corners)).collect();
+                Finding::of_faults(Faults { count, places }, detail)
             }
             Rule::NoDuplicateFaces => {
                 let faces = topology::duplicate_faces(mesh, self.budget)?;
-                let faults = Faults::at(faces.into_iter(), |face| places::face(mesh, face));
+                let faults = Faults::at(faces.into_iter(), self.places_max, |face| places::face(mesh, face));
                 let detail = pluralise(faults.count, "face repeats an earlier one", "faces repeat earlier ones");
                 Finding::of_faults(faults, detail)
             }
@@ -136,7 +160,7 @@ impl Judge<'_> {
                     let detail = "so many faces lie above each other that comparing them would take too long";
                     return Ok(Finding::presence(false, "", detail));
                 };
-                let faults = Faults::at(faces.into_iter(), |face| places::face(mesh, face));
+                let faults = Faults::at(faces.into_iter(), self.places_max, |face| places::face(mesh, face));
                 let detail = pluralise(faults.count, "face intersects another", "faces intersect others");
                 Finding::of_faults(faults, detail)
             }
@@ -150,7 +174,12 @@ impl Judge<'_> {
             Rule::NoNgons => {
                 let count = import.polygons_by_arity[5..].iter().sum();
                 let detail = pluralise(count, "polygon with more than 4 corners", "polygons with more than 4 corners");
-                Finding::of_faults(Faults::without_places(count), detail)
+                let places = match count {
+                    0 => Vec::new(),
+                    _ => polygons::ngons(mesh, self.budget)?,
+                };
+                let places = Faults::at(places.into_iter(), self.places_max, |face| places::face(mesh, face)).places;
+                Finding::of_faults(Faults { count, places }, detail)
             }
             Rule::SingleComponent => {
                 Finding::at_most(self.topology()?.components, 1, "connected part", "connected parts")
@@ -162,7 +191,7 @@ impl Judge<'_> {
                 Finding::presence(!mesh.uvs.is_empty(), "it has texture coordinates", "it has no texture coordinates")
             }
             Rule::UvInRange => {
-                let faults = uvs::outside(mesh, self.budget)?;
+                let faults = uvs::outside(mesh, self.places_max, self.budget)?;
                 let (one, more) = ("vertex lies outside of the texture", "vertices lie outside of the texture");
                 let detail = pluralise(faults.count, one, more);
                 Finding::of_faults(faults, detail)
@@ -220,7 +249,7 @@ impl Judge<'_> {
             return Ok(Finding::presence(false, "", "it has no faces"));
         }
         let leaks = edges.iter().filter(|edge| edge.face_count != 2 || edge.has_inconsistent_winding);
-        let faults = Faults::at(leaks, |edge| places::edge(mesh, &edge));
+        let faults = Faults::at(leaks, self.places_max, |edge| places::edge(mesh, &edge));
         if faults.count == 0 {
             return Ok(Finding::of_faults(faults, "it is watertight".to_owned()));
         }
@@ -245,25 +274,28 @@ impl Judge<'_> {
     fn manifold(&mut self) -> Result<Finding, MeshError> {
         let mesh = self.subject.mesh;
         let edges = self.edges()?;
-        let of_edges = Faults::at(edges.iter().filter(|e| e.face_count > 2), |edge| places::edge(mesh, &edge));
+        let of_edges =
+            Faults::at(edges.iter().filter(|e| e.face_count > 2), self.places_max, |e| places::edge(mesh, &e));
         let vertices = topology::nonmanifold_vertices(mesh, &edges, self.budget)?;
-        let of_vertices = Faults::at(vertices.into_iter(), |vertex| places::vertex(mesh, vertex));
+        let of_vertices = Faults::at(vertices.into_iter(), self.places_max, |vertex| places::vertex(mesh, vertex));
         let detail = match (of_edges.count, of_vertices.count) {
             (0, 0) => "it is manifold".to_owned(),
-            (edges, vertices) => format!(
-                "{}, {} where surfaces touch",
-                pluralise(edges, "edge with more than two faces", "edges with more than two faces"),
-                pluralise(vertices, "vertex", "vertices")
-            ),
+            (edges, vertices) => {
+                let (one, more) = ("edge with more than two faces", "edges with more than two faces");
+                let of_edges = (edges > 0).then(|| pluralise(edges, one, more));
+                let (one, more) = ("vertex where surfaces touch", "vertices where surfaces touch");
+                let of_vertices = (vertices > 0).then(|| pluralise(vertices, one, more));
+                of_edges.into_iter().chain(of_vertices).collect::<Vec<_>>().join(", ")
+            }
         };
-        Ok(Finding::of_faults(of_edges.and(of_vertices), detail))
+        Ok(Finding::of_faults(of_edges.and(of_vertices, self.places_max), detail))
     }
 
     fn winding(&mut self) -> Result<Finding, MeshError> {
         let mesh = self.subject.mesh;
         let edges = self.edges()?;
         let turned = edges.iter().filter(|edge| edge.face_count == 2 && edge.has_inconsistent_winding);
-        let faults = Faults::at(turned, |edge| places::edge(mesh, &edge));
+        let faults = Faults::at(turned, self.places_max, |edge| places::edge(mesh, &edge));
         let (one, more) =
             ("edge between faces that look to different sides", "edges between faces that look to different sides");
         let detail = pluralise(faults.count, one, more);
@@ -272,7 +304,7 @@ impl Judge<'_> {
 
     fn inverted(&mut self) -> Result<Finding, MeshError> {
         let edges = self.edges()?;
-        let (faults, closed) = volume::inverted(self.subject.mesh, &edges, self.budget)?;
+        let (faults, closed) = volume::inverted(self.subject.mesh, &edges, self.places_max, self.budget)?;
         let detail = match (faults.count, closed) {
             (_, 0) => "it has no closed part whose volume has a sign".to_owned(),
             (count, closed) => {
@@ -284,7 +316,7 @@ impl Judge<'_> {
     }
 
     fn uv_overlaps(&mut self) -> Result<Finding, MeshError> {
-        let (faults, is_complete) = uvs::overlaps(self.subject.mesh, self.budget, self.deadline)?;
+        let (faults, is_complete) = uvs::overlaps(self.subject.mesh, self.places_max, self.budget, self.deadline)?;
         let detail = pluralise(faults.count, "face overlaps another", "faces overlap others");
         let at_least = if is_complete { "" } else { "at least " };
         Ok(Finding::of_faults(faults, format!("{at_least}{detail} in the texture")))

@@ -7,6 +7,7 @@
 mod judge;
 mod meaning;
 mod places;
+mod polygons;
 mod rule;
 #[cfg(test)]
 mod tests;
@@ -85,8 +86,20 @@ impl Check {
     }
 }
 
-/// Most places that a check lists.
+/// Most places that a check lists, unless all are asked for.
 pub const PLACES_MAX: usize = 20;
+
+/// Most places in one verdict where all are asked for. The others are counted.
+pub const ALL_PLACES_MAX: usize = 100_000;
+
+/// How a file is judged, beside its rules.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options {
+    /// All places are listed, up to [`ALL_PLACES_MAX`].
+    pub all_places: bool,
+    /// A rule that takes more memory than the job may have fails, and says so. Otherwise the whole judgement fails.
+    pub fails_at_limits: bool,
+}
 
 /// A number of a rule.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -1,6 +1,6 @@
 //! Positions of faults, in the file's space.
 
-use super::{PLACES_MAX, Place};
+use super::Place;
 use crate::mesh::Mesh;
 use crate::mesh::edges::MeshEdge;
 
@@ -9,17 +9,17 @@ use crate::mesh::edges::MeshEdge;
 pub struct Faults {
     /// All of them.
     pub count: u64,
-    /// The first [`PLACES_MAX`].
+    /// The first.
     pub places: Vec<Place>,
 }
 
 impl Faults {
-    /// The faults at these places. All are counted, and only the first are made.
-    pub fn at<T>(all: impl Iterator<Item = T>, place: impl Fn(T) -> Place) -> Self {
+    /// The faults at these places. All are counted, and only the first so many are made.
+    pub fn at<T>(all: impl Iterator<Item = T>, places_max: usize, place: impl Fn(T) -> Place) -> Self {
         let mut faults = Self::default();
         for one in all {
             faults.count += 1;
-            if faults.places.len() < PLACES_MAX {
+            if faults.places.len() < places_max {
                 faults.places.push(place(one));
             }
         }
@@ -31,11 +31,11 @@ impl Faults {
         Self { count, places: Vec::new() }
     }
 
-    /// These faults and others.
-    pub fn and(mut self, others: Self) -> Self {
+    /// These faults and others, with so many places at most.
+    pub fn and(mut self, others: Self, places_max: usize) -> Self {
         self.count += others.count;
         self.places.extend(others.places);
-        self.places.truncate(PLACES_MAX);
+        self.places.truncate(places_max);
         self
     }
 }
@@ -53,6 +53,11 @@ pub fn edge(mesh: &Mesh, edge: &MeshEdge) -> Place {
 /// The place of a face.
 pub fn face(mesh: &Mesh, face: u32) -> Place {
     Place::Face(mesh.triangles[face as usize].map(|vertex| position(mesh, vertex)))
+}
+
+/// The place of a face with these corners in the file's space.
+pub fn corners(mesh: &Mesh, corners: [[f64; 3]; 3]) -> Place {
+    Place::Face(corners.map(|corner| corner.map(|value| tidy(value, mesh.to_file.scale))))
 }
 
 /// The position of a vertex, rounded to the digits that f32 has.

@@ -13,7 +13,7 @@ const SLACK: f32 = 1e-5;
 const BYTES_PER_FACE: u64 = 48 + 4 + 1;
 
 /// Vertices whose texture coordinates lie outside of the texture.
-pub fn outside(mesh: &Mesh, budget: &mut Budget) -> Result<Faults, MeshError> {
+pub fn outside(mesh: &Mesh, places_max: usize, budget: &mut Budget) -> Result<Faults, MeshError> {
     budget.spend("the texture coordinates", mesh.uvs.len() as u64, 1)?;
     let mut is_met = vec![false; mesh.uvs.len()];
     let corners =
@@ -23,12 +23,17 @@ pub fn outside(mesh: &Mesh, budget: &mut Budget) -> Result<Faults, MeshError> {
         let at = attribute as usize;
         mesh.uvs.get(at).is_some_and(|uv| is_outside(*uv)) && !std::mem::replace(&mut is_met[at], true)
     });
-    Ok(Faults::at(outside, |(_, vertex)| places::vertex(mesh, vertex)))
+    Ok(Faults::at(outside, places_max, |(_, vertex)| places::vertex(mesh, vertex)))
 }
 
 /// Faces that share a place in the texture with others, and whether all were looked at. Overlaps
 /// between the points of a grid of 1,024 on a side are not found.
-pub fn overlaps(mesh: &Mesh, budget: &mut Budget, deadline: &Deadline) -> Result<(Faults, bool), MeshError> {
+pub fn overlaps(
+    mesh: &Mesh,
+    places_max: usize,
+    budget: &mut Budget,
+    deadline: &Deadline,
+) -> Result<(Faults, bool), MeshError> {
     budget.spend("the faces in the texture", mesh.triangles.len() as u64, BYTES_PER_FACE)?;
     budget.spend("the faces in the texture", UV_GRID_BYTES, 1)?;
     let uv = |v: u32| mesh.uvs.get(v as usize).copied().unwrap_or([0.0; 2]).map(f64::from);
@@ -49,7 +54,7 @@ pub fn overlaps(mesh: &Mesh, budget: &mut Budget, deadline: &Deadline) -> Result
     let corners: Vec<[[f64; 2]; 3]> = all.iter().map(|(_, corners)| *corners).collect();
     let found = overlapping_uvs(&corners, deadline)?;
     let faces = all.iter().zip(&found.faces).filter(|(_, is_overlapping)| **is_overlapping);
-    Ok((Faults::at(faces, |((face, _), _)| places::face(mesh, *face)), found.is_complete))
+    Ok((Faults::at(faces, places_max, |((face, _), _)| places::face(mesh, *face)), found.is_complete))
 }
 
 fn has_area([a, b, c]: &[[f64; 2]; 3]) -> bool {

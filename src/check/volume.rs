@@ -28,7 +28,12 @@ struct Part {
 
 /// The closed parts whose fronts look inwards, and how many parts are closed. A part of negative volume
 /// within the box of a solid is that solid's cavity, and no fault.
-pub fn inverted(mesh: &Mesh, edges: &EdgeList, budget: &mut Budget) -> Result<(Faults, u64), LimitExceeded> {
+pub fn inverted(
+    mesh: &Mesh,
+    edges: &EdgeList,
+    places_max: usize,
+    budget: &mut Budget,
+) -> Result<(Faults, u64), LimitExceeded> {
     budget.spend("the volumes of parts", mesh.positions.len() as u64, BYTES_PER_VERTEX)?;
     budget.spend("the volumes of parts", mesh.triangles.len() as u64, BYTES_PER_TRIANGLE)?;
     let parts = parts(mesh, edges);
@@ -41,7 +46,7 @@ pub fn inverted(mesh: &Mesh, edges: &EdgeList, budget: &mut Budget) -> Result<(F
         solids.iter().any(is_around)
     };
     let faults = closed.clone().filter(|part| part.volume < 0.0 && !is_cavity(part));
-    Ok((Faults::at(faults, |part| places::face(mesh, part.first_face)), closed.count() as u64))
+    Ok((Faults::at(faults, places_max, |part| places::face(mesh, part.first_face)), closed.count() as u64))
 }
 
 /// The parts, in the order of their first faces.

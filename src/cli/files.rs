@@ -76,7 +76,9 @@ fn nearest(path: &Path) -> Option<String> {
     let names = std::fs::read_dir(folder).ok()?.take(NEIGHBOURS_MAX);
     let names = names.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
     let distance = |name: &str| strsim::damerau_levenshtein(wanted, name);
-    let (distance, name) = names.map(|name| (distance(&name), name)).min()?;
+    // A link to nothing is there, and no file.
+    let others = names.filter(|name| name != wanted);
+    let (distance, name) = others.map(|name| (distance(&name), name)).min()?;
     (distance <= 2 && 2 * distance < wanted.chars().count()).then(|| path.with_file_name(name).display().to_string())
 }
 

@@ -1,9 +1,10 @@
 //! Files that a mesh refers to, that the command does not name, and that lie beside the mesh.
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use super::bundle::{self, plain};
+use super::bundle::{self, NamedFiles, comparable, plain};
 use crate::cli::error::CliError;
 use crate::import::bundle::show_all;
 use crate::import::{self, FileUse, Options};
@@ -11,6 +12,50 @@ use crate::limits::{Budget, Deadline, Limits};
 
 /// Files that name others, one after the other: a mesh its material library, and that its textures.
 const ROUNDS_MAX: usize = 3;
+
+/// One of many meshes, read with the files that belong to it.
+pub struct Read<T> {
+    /// The result of the reading that had all files.
+    pub value: T,
+    /// The files that were read, the mesh first.
+    pub names: Vec<String>,
+    /// Files that the mesh refers to, that lie beside it and may not be read.
+    pub unread: Vec<String>,
+}
+
+/// The files that one of many meshes may have read beside itself.
+#[derive(Clone, Copy)]
+pub struct Companions<'a> {
+    /// The named files that are no meshes, by their absolute paths.
+    pub named: &'a BTreeSet<PathBuf>,
+    /// True if all that lie beside a mesh may be read.
+    pub all: bool,
+}
+
+/// Reads one of many meshes by `read`, and again with the files that it turns out to refer to, until
+/// none is missing that may be read.
+pub fn read_on<T>(
+    mesh: &str,
+    companions: Companions<'_>,
+    limits: &Limits,
+    mut read: impl FnMut(&NamedFiles) -> T,
+) -> Result<Read<T>, CliError> {
+    let Companions { named, all } = companions;
+    let mut names = vec![mesh.to_owned()];
+    // The first reading has the mesh alone.
+    for _ in 0..=ROUNDS_MAX {
+        let files = bundle::read(&names, None, limits)?;
+        let value = read(&files);
+        let beside = beside(&names, &files.common, &files.file_use, &|path| named.contains(path));
+        let may_read = |name: &String| all || named.contains(&comparable(name));
+        let (readable, unread): (Vec<String>, Vec<String>) = beside.into_iter().partition(may_read);
+        if readable.is_empty() {
+            return Ok(Read { value, names, unread });
+        }
+        names.extend(readable);
+    }
+    Err(CliError::input(format!("{}: files refer to files without end", mesh)))
+}
 
 /// The missing files that lie beside the mesh, as a command would name them. Those that lie outside
 /// of the folder of the files that are named count only if they are `known`: a stranger's mesh must

@@ -28,6 +28,7 @@ use crate::import::{ImportReport, MeshError};
 use crate::limits::{Budget, Deadline};
 use crate::mesh::Mesh;
 use crate::mesh::edges::EdgeList;
+use crate::mesh::intersections;
 use crate::mesh::measure::Measures;
 use crate::mesh::topology::Topology;
 use crate::report::{Bounds, TopologyReport, without_rounding};
@@ -197,6 +198,28 @@ pub struct Compared {
     pub of_vertices: [Vec<f64>; 2],
 }
 
+impl Compared {
+    /// The place of a side's largest distance, if the distances of its vertices do not tell of it: a hole has none of
+    /// its own.
+    pub fn hidden_place(&self, side: usize) -> Option<[f64; 3]> {
+        let way = self.way(side)?;
+        let of_vertices = self.of_vertices[side].iter().copied().filter(|distance| distance.is_finite());
+        let told = of_vertices.fold(self.difference.geometry.tolerance, f64::max);
+        (way.max > 1.5 * told).then_some(way.at)
+    }
+
+    /// True if the older side has what is farther from the newer one than the other way round: a part that was removed.
+    pub fn is_seen_before(&self) -> bool {
+        let [a, b] = [0, 1].map(|side| self.way(side).map_or(0.0, |way| way.max));
+        a > 2.0 * b
+    }
+
+    fn way(&self, side: usize) -> Option<Way> {
+        let Geometry { a_to_b, b_to_a, .. } = self.difference.geometry;
+        [a_to_b, b_to_a][side]
+    }
+}
+
 /// All that was found, for the words.
 struct Found<'a> {
     a: Side<'a>,
@@ -248,6 +271,8 @@ pub fn compare(
     deadline.check()?;
     let topologies =
         [Topology::of(a.mesh, &edges_a, budget, deadline)?, Topology::of(b.mesh, &edges_b, budget, deadline)?];
+    let [junctions_a, junctions_b] = meshes.map(|mesh| intersections::t_junctions(mesh, budget, deadline));
+    let t_junctions = [junctions_a?, junctions_b?];
     let of_a = Numbered { mesh: a.mesh, edges: &edges_a, numbers: None };
     let of_b = Numbered { mesh: b.mesh, edges: &edges_b, numbers: Some(&numbers) };
     let new_holes = holes::only_in(of_b, of_a, budget)?;
@@ -255,24 +280,24 @@ pub fn compare(
     let materials = materials::compare(a.mesh, b.mesh, &faces.common, budget)?;
     let ways = [there, back];
     let found = Found { a, b, diagonal, tolerance, has_same_order, faces, parts, whole, new_holes, closed_holes, ways };
-    Ok(found.compared(topologies, materials))
+    Ok(found.compared(topologies, t_junctions, materials))
 }
 
 impl Found<'_> {
-    fn compared(mut self, topologies: [Topology; 2], materials: Materials) -> Compared {
+    fn compared(mut self, topologies: [Topology; 2], t_junctions: [Option<u64>; 2], materials: Materials) -> Compared {
         let [of_a, of_b] =
             [(self.a, &topologies[0]), (self.b, &topologies[1])].map(|(side, topology)| size(side, topology));
         let geometry = self.geometry();
         let is_same_topology = has_same_faults(&topologies[0], &topologies[1]);
         let has_same_attributes = words::lost_attributes(self.a.mesh, self.b.mesh).is_empty();
-        let report = |side: Side<'_>, topology: &Topology| {
+        let report = |side: Side<'_>, topology: &Topology, t_junctions: Option<u64>| {
             let degenerate = side.import.dropped_degenerate_faces + side.import.dropped_collapsed_faces;
-            TopologyReport::new(topology.clone(), None, degenerate)
+            TopologyReport::new(topology.clone(), t_junctions, degenerate)
         };
         let topology = TopologyDifference {
             same: is_same_topology,
-            a: report(self.a, &topologies[0]),
-            b: report(self.b, &topologies[1]),
+            a: report(self.a, &topologies[0], t_junctions[0]),
+            b: report(self.b, &topologies[1], t_junctions[1]),
         };
         let mut difference = Difference {
             same: geometry.same && topology.same && materials.same && has_same_attributes,

@@ -3,93 +3,9 @@
 use super::*;
 use crate::import::Bundle;
 use crate::limits::{Deadline, Limits};
+use crate::made_obj::Obj;
 use crate::mesh::vector::{cross, dot, sub};
 use crate::pipeline::{self, Opened};
-
-/// An OBJ file in the making.
-#[derive(Clone, Default)]
-struct Obj {
-    vertices: Vec<[f64; 3]>,
-    faces: Vec<Vec<usize>>,
-}
-
-const CORNERS: [[f64; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, 1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-];
-
-const SIDES: [[usize; 4]; 6] = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
-
-impl Obj {
-    fn cube(mut self, centre: [f64; 3], size: [f64; 3]) -> Self {
-        let first = self.vertices.len();
-        self.vertices.extend(CORNERS.map(|corner| std::array::from_fn(|k| centre[k] + size[k] * corner[k])));
-        self.faces.extend(SIDES.map(|side| side.map(|corner| first + corner).to_vec()));
-        self
-    }
-
-    /// A flat grid of n by n squares with sides of 1 / n, from (x, y, z) on.
-    fn plane(n: usize, [x, y, z]: [f64; 3]) -> Self {
-        let at = |i: usize| i as f64 / n as f64;
-        let vertices = (0..=n).flat_map(|j| (0..=n).map(move |i| [x + at(i), y + at(j), z])).collect();
-        let corner = |i: usize, j: usize| j * (n + 1) + i;
-        let square = |i: usize, j: usize| vec![corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
-        let faces = (0..n).flat_map(|j| (0..n).map(move |i| square(i, j))).collect();
-        Self { vertices, faces }
-    }
-
-    /// A sphere of triangles, closed.
-    fn sphere(rings: usize, radius: f64) -> Self {
-        let (around, mut obj) = (2 * rings, Self::default());
-        for ring in 0..=rings {
-            let polar = std::f64::consts::PI * ring as f64 / rings as f64;
-            // The last ring is one point, as the first.
-            let is_pole = ring == rings;
-            for step in 0..around {
-                let turn = std::f64::consts::TAU * step as f64 / around as f64;
-                let [s, c] = if is_pole { [0.0, -1.0] } else { [polar.sin(), polar.cos()] };
-                obj.vertices.push([radius * s * turn.cos(), radius * s * turn.sin(), radius * c]);
-            }
-        }
-        for ring in 0..rings {
-            for step in 0..around {
-                let at = |ring: usize, step: usize| ring * around + step % around;
-                let [a, b, c, d] = [at(ring, step), at(ring + 1, step), at(ring + 1, step + 1), at(ring, step + 1)];
-                obj.faces.extend([vec![a, b, c], vec![a, c, d]]);
-            }
-        }
-        obj
-    }
-
-    fn map(mut self, each: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
-        self.vertices.iter_mut().for_each(|vertex| *vertex = each(*vertex));
-        self
-    }
-
-    fn text(&self) -> String {
-        let vertices = self.vertices.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n"));
-        let face = |face: &Vec<usize>| face.iter().map(|v| format!(" {}", v + 1)).collect::<String>();
-        vertices.chain(self.faces.iter().map(|corners| format!("f{}\n", face(corners)))).collect()
-    }
-
-    /// The same faces, with all vertices and faces in another order, and each face from another corner on.
-    fn shuffled(&self) -> Self {
-        let n = self.vertices.len();
-        let faces = self.faces.iter().rev().map(|face| {
-            let mut face: Vec<usize> = face.iter().map(|v| n - 1 - v).collect();
-            // Quadrilaterals keep the diagonal by which they are divided.
-            face.rotate_left(if self.faces[0].len() == 4 { 2 } else { 1 });
-            face
-        });
-        Self { vertices: self.vertices.iter().rev().copied().collect(), faces: faces.collect() }
-    }
-}
 
 fn open(text: &str) -> Opened {
     let bundle = Bundle::of_one(text.as_bytes().to_vec());
@@ -313,7 +229,8 @@ fn distances_of_random_meshes_are_those_of_a_brute_force() {
     for n in 1..8 {
         let mut soup = || {
             let vertices: Vec<[f64; 3]> = (0..3 * n).map(|_| [(); 3].map(|()| random(&mut state))).collect();
-            Obj { vertices, faces: (0..n).map(|face| vec![3 * face, 3 * face + 1, 3 * face + 2]).collect() }
+            let faces = (0..n).map(|face| vec![3 * face, 3 * face + 1, 3 * face + 2]).collect();
+            Obj { vertices, faces, more: String::new() }
         };
         let (a, b) = (soup(), soup());
         let geometry = diff(&a, &b).geometry;
@@ -377,4 +294,16 @@ fn a_part_that_touches_another_in_one_vertex_is_a_part_of_its_own() {
     assert_eq!(difference.summary[0], "one part moved by (0.25, 0, 0)", "{:?}", difference.summary);
     assert_eq!((difference.parts.moved, difference.parts.unchanged), (1, 1), "{:?}", difference.parts);
     assert_eq!(difference.parts.changed + difference.parts.added + difference.parts.removed, 0);
+}
+
+#[test]
+fn vertices_on_edges_of_others_are_counted_on_both_sides() {
+    // A square beside two halves of one: their common corner lies on its edge.
+    let plane =
+        |text: &str| format!("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\nv 1 0.5 0\nv 2 0.5 0\n{text}");
+    let square = "f 1 2 3 4\n";
+    let (whole, halves) = (plane(&format!("{square}f 2 5 6 3\n")), plane(&format!("{square}f 2 5 8 7\nf 7 8 6 3\n")));
+    let difference = texts(&whole, &halves, None);
+    let counts = [&difference.topology.a, &difference.topology.b].map(|side| side.t_junctions);
+    assert_eq!(counts, [Some(0), Some(1)]);
 }

@@ -4,7 +4,7 @@ use super::Format;
 use crate::warning::Warning;
 
 /// Counts, repairs and warnings of one import, and the file's metadata. `inspect` prints them.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImportReport {
     /// Format that was read.
     pub format: Format,
@@ -21,6 +21,8 @@ pub struct ImportReport {
     /// Faces dropped because two corners are equal or all lie on one line, exactly, in the file's
     /// own numbers.
     pub dropped_degenerate_faces: u64,
+    /// The corners of the first of these faces, in the file's numbers.
+    pub degenerate_places: Vec<[[f64; 3]; 3]>,
     /// Faces dropped because welding merged two of their corners: they are too small beside the
     /// whole mesh for 24 bits.
     pub dropped_collapsed_faces: u64,

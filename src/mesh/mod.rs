@@ -1,8 +1,9 @@
 //! The [`Mesh`], the one form that every importer produces, and what is computed from it:
-//! [`normals`], [`edges`], [`topology`], [`intersections`], [`measure`].
+//! [`normals`], [`edges`], [`topology`], [`intersections`], [`charts`], [`measure`].
 //!
 //! **Invariant**: nothing in this room, and nothing after it, depends on the file format.
 
+pub mod charts;
 pub mod creases;
 pub mod edges;
 pub mod intersections;

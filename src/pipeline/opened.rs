@@ -42,11 +42,16 @@ impl Opened {
         &self.imported.path
     }
 
-    /// Judges the file by rules. Fails where the time or the memory of the job ends.
-    pub fn check(&self, rules: &RuleSet, deadline: &Deadline) -> Result<Vec<Check>, MeshError> {
+    /// Judges the file by rules. Fails where the time of the job ends, and by its memory unless rules are to tell that.
+    pub fn check(
+        &self,
+        rules: &RuleSet,
+        options: check::Options,
+        deadline: &Deadline,
+    ) -> Result<Vec<Check>, MeshError> {
         let Imported { mesh, report, .. } = &self.imported;
         let subject = check::Subject { mesh, import: report, file_bytes: self.file_bytes };
-        check::check(&subject, rules, &mut self.budget.clone(), deadline)
+        check::check(&subject, rules, options, &mut self.budget.clone(), deadline)
     }
 
     /// Compares the file with another, which is the newer one. `max_distance` is the largest distance between the
@@ -75,19 +80,7 @@ impl Opened {
         let (mesh, mut budget) = (&self.imported.mesh, self.budget.clone());
         let framing = plan::framing(mesh, spec, &self.prepared, &mut budget, deadline)?;
         let scene = Scene::framed_by(framing.as_deref().unwrap_or(&mesh.positions), mesh, spec, &mut budget)?;
-        let rows = scene.camera.rows([image.width_px, image.height_px]);
-        let middle = [f64::from(image.width_px) / 2.0, f64::from(image.height_px) / 2.0];
-        let near = scene.camera.near;
-        let on_image = |position: &[f64; 3]| -> Option<[f64; 2]> {
-            let to_file = &mesh.to_file;
-            let at: [f64; 3] = std::array::from_fn(|k| (position[k] - to_file.centre[k]) / to_file.scale);
-            let [x, y, _, w] =
-                rows.map(|row| (0..3).map(|k| f64::from(row[k]) * at[k]).sum::<f64>() + f64::from(row[3]));
-            // Beyond the eye nothing is seen.
-            (w > near.min(1e-3) && w.is_finite()).then(|| [middle[0] + x / (256.0 * w), middle[1] + y / (256.0 * w)])
-        };
-        let marks: Vec<Mark> = places.iter().filter_map(|place| mark(place, on_image)).flatten().collect();
-        draw_marks(image, &marks);
+        mark_places(image, &scene, places);
         Ok(())
     }
 
@@ -101,6 +94,22 @@ impl Opened {
         budget.spend("the other mesh", other.budget.spent_bytes(), 1)?;
         Ok(budget)
     }
+}
+
+/// Marks places in a picture of a scene.
+fn mark_places(image: &mut Image, scene: &Scene<'_, '_>, places: &[Place]) {
+    let rows = scene.camera.rows([image.width_px, image.height_px]);
+    let middle = [f64::from(image.width_px) / 2.0, f64::from(image.height_px) / 2.0];
+    let near = scene.camera.near;
+    let on_image = |position: &[f64; 3]| -> Option<[f64; 2]> {
+        let to_file = &scene.mesh.to_file;
+        let at: [f64; 3] = std::array::from_fn(|k| (position[k] - to_file.centre[k]) / to_file.scale);
+        let [x, y, _, w] = rows.map(|row| (0..3).map(|k| f64::from(row[k]) * at[k]).sum::<f64>() + f64::from(row[3]));
+        // Beyond the eye nothing is seen.
+        (w > near.min(1e-3) && w.is_finite()).then(|| [middle[0] + x / (256.0 * w), middle[1] + y / (256.0 * w)])
+    };
+    let marks: Vec<Mark> = places.iter().filter_map(|place| mark(place, on_image)).flatten().collect();
+    draw_marks(image, &marks);
 }
 
 /// The marks of a place. None if a part of it is beyond the eye.
@@ -132,6 +141,11 @@ impl Side {
     /// The number of the mesh.
     fn index(self) -> usize {
         usize::from(matches!(self, Self::After | Self::HeatAfter))
+    }
+
+    /// True if the colours are those of distances.
+    fn has_colors(self) -> bool {
+        matches!(self, Self::HeatBefore | Self::HeatAfter)
     }
 
     fn label(self) -> &'static str {
@@ -169,7 +183,7 @@ pub fn draw_difference(
         let limit = |error| RenderError::from(PlanError::Limit(error));
         let index = side.index();
         let framing = diff::framing(meshes[index], meshes[1 - index], &mut of_cell).map_err(limit)?;
-        let drawn = match side {
+        let mut drawn = match side {
             Side::Before | Side::After => {
                 let of_view = sheet::cell_spec(&plain, &sheet, &cell);
                 let view = opened[index].view(Some(&framing));
@@ -182,8 +196,18 @@ pub fn draw_difference(
                 draw_view(view, &of_view, None, backends, &mut of_cell, deadline, &mut |_| ())?
             }
         };
+        if let (true, Some(place)) = (side.has_colors(), compared.hidden_place(index)) {
+            let of_view = sheet::cell_spec(&spec, &sheet, &cell);
+            let scene = Scene::framed_by(&framing, meshes[index], &of_view, &mut of_cell)?;
+            mark_places(&mut drawn.image, &scene, &[Place::Vertex(place)]);
+        }
         canvas.paste(&cell, &drawn.image);
-        canvas.write(&cell, side.label());
+        // One side in colours stands beside pictures of both.
+        match sides {
+            [Side::HeatBefore] => canvas.write(&cell, "before: distance"),
+            [Side::HeatAfter] => canvas.write(&cell, "after: distance"),
+            _ => canvas.write(&cell, side.label()),
+        }
         match &mut all {
             Some(all) => all.add(drawn),
             None => all = Some(drawn),
@@ -195,7 +219,8 @@ pub fn draw_difference(
         None => draw_view(opened[1].view(None), &plain, None, backends, budget, deadline, &mut |_| ())?,
     };
     all.image = canvas.finish();
-    if sides.iter().any(|side| matches!(side, Side::HeatBefore | Side::HeatAfter)) {
+    // Where no vertex has a distance, there is one colour.
+    if most > 0.0 && sides.iter().any(|side| side.has_colors()) {
         let plan::Legend { title, ends, colors } = diff::legend(most);
         draw_legend(&mut all.image, &[Scale { title, ends, colors: &colors }]);
     }

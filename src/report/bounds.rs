@@ -40,6 +40,12 @@ pub fn without_rounding(value: f64, largest: f64) -> f64 {
     if digits < 0.0 { 0.0 } else { format!("{value:.*e}", digits as usize).parse().unwrap_or(value) }
 }
 
+/// Rounds `value` to so many digits, where an f64 can hold that.
+pub fn significant(value: f64, digits: usize) -> f64 {
+    let rounded = format!("{value:.*e}", digits.saturating_sub(1)).parse().ok();
+    rounded.filter(|rounded: &f64| rounded.is_finite()).unwrap_or(value)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -59,5 +65,15 @@ mod tests {
         for (value, largest, expected) in cases {
             assert_eq!(without_rounding(value, largest), expected, "{value} {largest}");
         }
+    }
+
+    #[test]
+    fn digits_are_as_many_as_asked_for() {
+        let cases =
+            [(1234.567, 2, 1200.0), (0.012_34, 3, 0.0123), (-9.99, 2, -10.0), (0.0, 3, 0.0), (f64::MAX, 1, f64::MAX)];
+        for (value, digits, expected) in cases {
+            assert_eq!(significant(value, digits), expected, "{value} {digits}");
+        }
+        assert!(significant(f64::NAN, 2).is_nan());
     }
 }

@@ -4,6 +4,7 @@
 //! transfer objects, and their field names are part of the public interface.
 
 mod bounds;
+mod charts;
 mod parts;
 mod print;
 #[cfg(test)]
@@ -11,7 +12,8 @@ mod tests;
 mod text;
 mod topology;
 
-pub use self::bounds::{Bounds, without_rounding};
+pub use self::bounds::{Bounds, significant, without_rounding};
+pub use self::charts::ChartsReport;
 pub use self::parts::PartsReport;
 pub use self::print::PrintReport;
 pub use self::topology::TopologyReport;
@@ -80,6 +82,9 @@ pub struct Report {
     /// The parts and loops, if they are asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     parts: Option<PartsReport>,
+    /// The charts of the texture, if they are asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    uv: Option<ChartsReport>,
 }
 
 /// Sections that not every report has.
@@ -89,6 +94,8 @@ pub struct Extras {
     pub print: bool,
     /// The parts, and the loops of edges.
     pub parts: bool,
+    /// The charts of the texture.
+    pub uv: bool,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -166,7 +173,8 @@ impl Report {
         deadline.check()?;
         let print = extras.print.then(|| PrintReport::of(mesh, &mut budget.clone(), deadline)).transpose()?;
         let parts = extras.parts.then(|| PartsReport::of(mesh, budget, deadline)).transpose()?;
-        Ok(Self { print, parts, ..Self::new(mesh, import, file_bytes, (topology, t_junctions)) })
+        let uv = extras.uv.then(|| ChartsReport::of(mesh, budget, deadline)).transpose()?;
+        Ok(Self { print, parts, uv, ..Self::new(mesh, import, file_bytes, (topology, t_junctions)) })
     }
 
     /// The report as JSON, byte for byte as `inspect --json` prints it and HTTP answers.
@@ -176,7 +184,11 @@ impl Report {
 
     /// For a person to read: a line for each thing that there is.
     pub fn text(&self) -> String {
-        let more = [self.print.as_ref().map(PrintReport::text), self.parts.as_ref().map(PartsReport::text)];
+        let more = [
+            self.print.as_ref().map(PrintReport::text),
+            self.parts.as_ref().map(PartsReport::text),
+            self.uv.as_ref().map(ChartsReport::text),
+        ];
         text::text(self) + &more.into_iter().flatten().collect::<String>()
     }
 
@@ -247,6 +259,7 @@ impl Report {
             warnings: warnings.map(|w| WarningReport { code: w.code, detail: w.detail }).collect(),
             print: None,
             parts: None,
+            uv: None,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The report as text for a person: a name and a value per line.
 
-use super::{Arity, CameraReport, Report, TextureReport};
+use super::{Arity, CameraReport, Report, TextureReport, significant};
 use crate::pluralise::pluralise;
 use std::fmt::Write as _;
 
@@ -89,10 +89,12 @@ fn extensions(report: &Report) -> Option<String> {
 }
 
 fn measures(report: &Report) -> Option<String> {
-    let area = report.area.map(|area| format!("area {}", plain(short(area))));
+    // Positions have 24 bits.
+    let digits = |value| significant(value, 7);
+    let area = report.area.map(|area| format!("area {}", plain(digits(area))));
     let volume = report
         .volume
-        .map(|volume| format!("volume {}{}", plain(short(volume)), if volume < 0.0 { " (inside out)" } else { "" }));
+        .map(|volume| format!("volume {}{}", plain(digits(volume)), if volume < 0.0 { " (inside out)" } else { "" }));
     joined(area.into_iter().chain(volume))
 }
 
@@ -101,11 +103,6 @@ fn measures(report: &Report) -> Option<String> {
 fn plain(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 || (1e-9..1e16).contains(&size) { value.to_string() } else { format!("{value:e}") }
-}
-
-/// A number rounded to 7 digits, because positions have 24 bits.
-fn short(value: f64) -> f64 {
-    format!("{value:.6e}").parse().unwrap_or(value)
 }
 
 /// Faces, lines and points that are not drawn, with the reason.

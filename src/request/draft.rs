@@ -64,7 +64,7 @@ impl Draft {
             ground: Ground::None,
             camera: CameraSpec::default(),
             sheet: None,
-            light: Light { ambient_occlusion: style.ambient_occlusion(), ..Light::default() },
+            light: Light { ambient: style.ambient(), ambient_occlusion: style.ambient_occlusion(), ..Light::default() },
             ambient: Dependent::default(),
             image,
             // The default size must not be larger than what a request may ask for.
@@ -121,7 +121,7 @@ impl Draft {
         check_uv_layout(&layers, &materials)?;
         check_camera(&self.camera)?;
         let has_lamps = self.light.preset != LightPreset::None;
-        let light = Light { ambient: self.ambient.or(if has_lamps { 0.3 } else { 1.0 }), ..self.light };
+        let light = Light { ambient: self.ambient.or(if has_lamps { self.light.ambient } else { 1.0 }), ..self.light };
         let ([width_px, height_px], samples) = (self.size_px, self.samples.or(self.image.samples));
         let image = ImageSpec { width_px, height_px, samples, ..self.image };
         let sheet = self.sheet.as_ref().map(|sheet| sheet.finish(&self.camera, &image, px_max)).transpose()?;

@@ -42,4 +42,13 @@ impl Style {
             _ => 0.0,
         }
     }
+
+    /// Default of [`Light::ambient`](crate::spec::Light::ambient) beside lamps: the same looks have less, so that
+    /// their sides differ more.
+    pub fn ambient(self) -> f32 {
+        match self {
+            Self::Auto | Self::Outline | Self::Technical | Self::Clay => 0.18,
+            _ => crate::spec::Light::default().ambient,
+        }
+    }
 }

@@ -87,6 +87,11 @@ pub struct CheckArgs {
     pictures: Option<PathBuf>,
     #[command(flatten)]
     reports: ReportArgs,
+    /// List all places of faults, not the first 20 of each rule
+    ///
+    /// List all places of faults in JSON and in the baseline, not the first 20 of each rule: at most 100,000 for a file
+    #[arg(long)]
+    all_places: bool,
     /// Files that are read at once [default: one for each processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), value_hint = ValueHint::Other)]
     jobs: Option<u16>,

@@ -14,22 +14,20 @@ use super::reports::{Findings, Reports, json_line, text};
 use super::{CheckArgs, Output};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{Backends, GpuHost, HardwareHint};
-use crate::check::{Check, Verdict, unopened};
-use crate::cli::bundle::{self, comparable};
+use crate::check::{self, Check, Verdict, unopened};
+use crate::cli::bundle::comparable;
 use crate::cli::error::CliError;
+use crate::cli::files;
 use crate::cli::output::Inputs;
 use crate::cli::progress::Bar;
 use crate::cli::render::{Task, Tasks};
-use crate::cli::{files, siblings};
+use crate::cli::siblings::{self, Read};
 use crate::config::{cores, why_no_gpu};
 use crate::limits::{Deadline, Limits};
 use crate::pipeline::{self, Opened};
 use crate::pluralise::pluralise;
 use crate::service::digest::Digest;
 use crate::spec::NamedView;
-
-/// A mesh names a file, which names others.
-const ROUNDS_MAX: usize = 4;
 
 /// Many files to judge.
 pub struct Run<'a> {
@@ -129,6 +127,9 @@ impl<'a> Run<'a> {
         for name in companions.filter(|name| !used.contains(&comparable(name))) {
             say!("meshsnap: {name}: is not used: no mesh refers to it");
         }
+        if let (Some(reference), true) = (&self.arguments.since, self.tasks.all.is_empty()) {
+            say!("no mesh has changed since {reference}");
+        }
         let failed = findings.failed();
         let known = match findings.known() {
             0 => String::new(),
@@ -175,51 +176,41 @@ impl<'a> Run<'a> {
     /// Judges one file, with those that it turns out to refer to.
     fn judge(&self, task: &Task, backends: &mut Backends, said: &mut Option<String>) -> Result<Judged, CliError> {
         let path = &task.mesh;
-        let mut names = vec![path.clone()];
+        let companions = siblings::Companions { named: &self.named, all: task.has_folder || self.arguments.siblings };
+        let format = self.arguments.format_in.format();
         let mut digest = None;
-        for _ in 0..ROUNDS_MAX {
-            let named = match bundle::read(&names, None, &self.limits) {
-                Ok(named) => named,
-                Err(error) if error.exit_code == 3 => return Err(error),
-                Err(error) => {
-                    let own = format!("{path}: ");
-                    let detail = error.sentence.strip_prefix(&own).unwrap_or(&error.sentence).to_owned();
-                    return Ok(Judged::without_pictures(path, digest, vec![unopened(detail)]));
-                }
-            };
+        let read = siblings::read_on(path, companions, &self.limits, |named| {
             // Alone at first: a digest is that of the mesh's own bytes.
             if let ([own], None) = (named.bundle.files(), &digest) {
                 digest = Some(Digest::of(&own.bytes).to_string());
             }
-            let format = self.arguments.format_in.format();
-            let opened = pipeline::open(&named.bundle, format, &self.limits, &Deadline::default());
-            let beside = siblings::beside(&names, &named.common, &named.file_use, &|path| self.named.contains(path));
-            let may_read =
-                |name: &String| task.has_folder || self.arguments.siblings || self.named.contains(&comparable(name));
-            let (readable, unread): (Vec<String>, Vec<String>) = beside.into_iter().partition(may_read);
-            if readable.is_empty() {
-                // Judged only now that all its files are there.
-                let rules = self.config.rules_of(Path::new(path));
-                let checked = opened.and_then(|opened| Ok((opened.check(rules, &Deadline::default())?, opened)));
-                let (checks, pictures) = match checked {
-                    Ok((checks, opened)) => {
-                        let pictures = self.draw(&opened, (path, &checks), backends, said)?;
-                        (checks, pictures)
-                    }
-                    Err(error) => (vec![unopened(error.to_string())], Vec::new()),
-                };
-                if !unread.is_empty() {
-                    *said = Some(siblings::advice_to_add(path, &unread));
-                }
-                let used = names.iter().map(comparable);
-                self.used.lock().unwrap_or_else(PoisonError::into_inner).extend(used);
-                let verdict = Verdict::new(path.clone(), digest, checks);
-                return Ok(Judged { verdict, pictures });
+            pipeline::open(&named.bundle, format, &self.limits, &Deadline::default())
+        });
+        let Read { value: opened, names, unread } = match read {
+            Ok(read) => read,
+            Err(error) if error.exit_code == 3 => return Err(error),
+            Err(error) => {
+                let own = format!("{path}: ");
+                let detail = error.sentence.strip_prefix(&own).unwrap_or(&error.sentence).to_owned();
+                return Ok(Judged::without_pictures(path, digest, vec![unopened(detail)]));
             }
-            names.extend(readable);
+        };
+        let (checks, pictures) = match opened {
+            Ok(opened) => {
+                let options = check::Options { all_places: self.arguments.all_places, fails_at_limits: true };
+                let checks = opened.check(self.config.rules_of(Path::new(path)), options, &Deadline::default());
+                let checks = checks.map_err(|error| CliError::from(error).about(path))?;
+                let pictures = self.draw(&opened, (path, &checks), backends, said)?;
+                (checks, pictures)
+            }
+            Err(error) => (vec![unopened(error.to_string())], Vec::new()),
+        };
+        if !unread.is_empty() {
+            *said = Some(siblings::advice_to_add(path, &unread));
         }
-        let detail = "files refer to files without end";
-        Ok(Judged::without_pictures(path, digest, vec![unopened(detail)]))
+        let used = names.iter().map(comparable);
+        self.used.lock().unwrap_or_else(PoisonError::into_inner).extend(used);
+        Ok(Judged { verdict: Verdict::new(path.clone(), digest, checks), pictures })
     }
 
     /// Draws the pictures of a file. One that cannot be drawn has none, and fails by its faults alone.

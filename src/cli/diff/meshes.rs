@@ -99,7 +99,8 @@ fn write(opened: [&Opened; 2], compared: &Compared, outputs: &Outputs<'_>, limit
         }
         if outputs.has_sides() {
             let [before, after] = [Side::Before, Side::After].map(|side| draw(&[side], &of_one));
-            outputs.write_sides([&before?, &after?], &draw(&[Side::HeatAfter], &of_one)?)?;
+            let colored = if compared.is_seen_before() { Side::HeatBefore } else { Side::HeatAfter };
+            outputs.write_sides([&before?, &after?], &draw(&[colored], &of_one)?)?;
         }
         Ok(())
     })

@@ -14,17 +14,14 @@ use super::tasks::{Task, Tasks};
 use super::{RenderArgs, format_in, one};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{Backends, GpuHost, HardwareHint};
-use crate::cli::bundle::{self, comparable};
+use crate::cli::bundle::comparable;
 use crate::cli::error::CliError;
 use crate::cli::output::{Destination, Inputs};
-use crate::cli::siblings;
+use crate::cli::siblings::{self, Read};
 use crate::config::{cores, why_no_gpu};
 use crate::limits::{Deadline, Limits};
 use crate::pipeline::{self, Job, Output};
 use crate::spec::Spec;
-
-/// A mesh names a file, which names others.
-const ROUNDS_MAX: usize = 4;
 
 /// Many pictures to draw.
 pub struct Batch<'a> {
@@ -119,26 +116,16 @@ impl Batch<'_> {
         backends: &mut Backends,
         said: &mut Vec<String>,
     ) -> Result<(), CliError> {
-        let mut names = vec![task.mesh.clone()];
-        for _ in 0..ROUNDS_MAX {
-            let named = bundle::read(&names, None, &self.limits)?;
-            let (file_use, common) = (named.file_use, named.common);
+        let companions = siblings::Companions { named: &shared.named, all: task.has_folder || self.arguments.siblings };
+        let Read { value: drawn, names, unread } = siblings::read_on(&task.mesh, companions, &self.limits, |named| {
             let format_in = format_in(self.arguments.format_in.as_deref());
-            let job = Job { bundle: named.bundle, format_in, spec: &self.spec };
-            let drawn = pipeline::render(job, backends, &self.limits, &Deadline::default(), &mut |_| {});
-            let beside = siblings::beside(&names, &common, &file_use, &|path| shared.named.contains(path));
-            let may_read =
-                |name: &String| task.has_folder || self.arguments.siblings || shared.named.contains(&comparable(name));
-            let (readable, unread): (Vec<String>, Vec<String>) = beside.into_iter().partition(may_read);
-            if readable.is_empty() {
-                let drawn = drawn.map_err(|error| one::of_mesh(error, &task.mesh, &|| advice(task, &unread)))?;
-                self.write(task, &drawn, &names, shared)?;
-                said.extend(one::warnings(&task.mesh, &drawn.warnings, &|| advice(task, &unread)));
-                return Ok(());
-            }
-            names.extend(readable);
-        }
-        Err(CliError::input(format!("{}: files refer to files without end", task.mesh)))
+            let job = Job { bundle: named.bundle.clone(), format_in, spec: &self.spec };
+            pipeline::render(job, backends, &self.limits, &Deadline::default(), &mut |_| {})
+        })?;
+        let drawn = drawn.map_err(|error| one::of_mesh(error, &task.mesh, &|| advice(task, &unread)))?;
+        self.write(task, &drawn, &names, shared)?;
+        said.extend(one::warnings(&task.mesh, &drawn.warnings, &|| advice(task, &unread)));
+        Ok(())
     }
 
     /// Writes the picture of a mesh that was read from these files.

@@ -114,8 +114,8 @@ pub fn is_companion(path: &Path) -> bool {
     EXTENSIONS.contains(&extension_of(path).as_str())
 }
 
-/// The meshes in a folder and the folders in it, sorted. Hidden ones are left out, and links to folders
-/// are not followed.
+/// The meshes in a folder and the folders in it, sorted. Hidden ones are left out, links to folders are not
+/// followed, and what is no file is passed over: reading a pipe or a device might never end.
 fn of_folder(folder: &Path, meshes: &mut Vec<(String, bool)>) -> Result<(), CliError> {
     let failed = |error: std::io::Error| CliError::input(format!("{}: cannot be read: {error}", folder.display()));
     let mut entries: Vec<_> = fs::read_dir(folder).map_err(failed)?.collect::<Result<_, _>>().map_err(failed)?;
@@ -127,7 +127,8 @@ fn of_folder(folder: &Path, meshes: &mut Vec<(String, bool)>) -> Result<(), CliE
         }
         if kind.is_dir() {
             of_folder(&path, meshes)?;
-        } else if is_mesh(&path) {
+        } else if is_mesh(&path) && fs::metadata(&path).map_or(true, |target| target.is_file()) {
+            // A link to nothing is told as one.
             meshes.push((path.to_string_lossy().into_owned(), true));
         }
     }

@@ -12,6 +12,7 @@ use crate::guard::{Panicked, guarded};
 use crate::image::Image;
 use crate::limits::Limits;
 use crate::pluralise::pluralise;
+use crate::report::significant;
 pub use flip::{Flip, flip};
 
 /// The longest side of a picture, pixels.
@@ -190,7 +191,7 @@ impl PixelDifference {
             return match self.max > 0.0 {
                 true => format!(
                     "no pixel differs by more than {error} of 255: the largest difference is {}",
-                    short(self.max)
+                    significant(self.max, 3)
                 ),
                 false => "no pixel differs".to_owned(),
             };
@@ -201,10 +202,10 @@ impl PixelDifference {
             "{differ} of {} ({} %), by up to {} of 255, within ({left}, {top}) to ({right}, {bottom}); FLIP {} on \
              average, {} at most",
             self.total,
-            short(share),
-            short(self.max),
-            short(self.flip.mean),
-            short(self.flip.max)
+            significant(share, 3),
+            significant(self.max, 3),
+            significant(self.flip.mean, 3),
+            significant(self.flip.max, 3)
         )
     }
 }
@@ -267,9 +268,4 @@ fn pale([r, g, b, a]: [u16; 4]) -> [u8; 4] {
     let luma = (54 * u32::from(r) + 183 * u32::from(g) + 19 * u32::from(b)) / 256 + (65_535 - u32::from(a));
     let grey = 190 + (luma.min(65_535) * 65 / 65_535) as u8;
     [grey, grey, grey, 255]
-}
-
-/// Three digits.
-fn short(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
 }

@@ -160,6 +160,15 @@ pub fn pick<G: Geometry>(geometry: &G, down: Option<Pow2>, deadline: &Deadline) 
     }
 }
 
+/// The corners of the first triangles without an area.
+pub fn degenerate<G: Geometry>(geometry: &G, faces: &Faces<G::Key>, count: usize) -> Vec<[[f64; 3]; 3]> {
+    let (Some(kept), true) = (&faces.kept, faces.degenerate > 0) else { return Vec::new() };
+    let mut kept = kept.iter().copied().peekable();
+    let is_dropped = |triangle: &usize| kept.next_if_eq(&(*triangle as u32)).is_none();
+    let dropped = (0..geometry.triangles()).filter(is_dropped).map(|triangle| geometry.corners(triangle));
+    dropped.filter(|corners| corners.iter().all(is_usable)).take(count).collect()
+}
+
 fn pick_scaled<G: Geometry>(
     geometry: &G,
     scale: impl Fn([f64; 3]) -> [f64; 3] + Sync + Send,

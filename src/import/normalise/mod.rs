@@ -120,6 +120,7 @@ fn shape<G: Geometry>(
     }
     raw.report.dropped_nonfinite_faces = faces.nonfinite;
     raw.report.dropped_degenerate_faces = faces.degenerate;
+    raw.report.degenerate_places = faces::degenerate(geometry, &faces, DEGENERATE_PLACES_MAX);
     if faces.normals.is_empty() && raw.lines_and_points.is_empty() {
         return Err(empty(&raw.report));
     }
@@ -148,6 +149,8 @@ fn pick<T: Copy + Send + Sync>(all: Vec<T>, kept: Option<&[u32]>) -> Vec<T> {
 
 /// Positions handed to a thread at a time.
 const POSITIONS_PER_PIECE: usize = 65_536;
+/// Most faces without area whose corners are kept for reports.
+const DEGENERATE_PLACES_MAX: usize = 20;
 /// Most vertices, or corners of triangles that share none. Welding marks numbers with a bit.
 const VERTICES_MAX: usize = 1 << 30;
 /// Memory beside the raw mesh: a triangle's normal, its distinct corners in its piece, its number

@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use self::fans::Fans;
-use self::tree::{Aabb, Tree};
+pub(super) use self::tree::{Aabb, Tree};
 use super::Mesh;
 use crate::limits::{Budget, Deadline, Exhausted, Stopped};
 use crate::parallel::map;

@@ -19,6 +19,9 @@ const LENGTH_MIN: f64 = 4.0;
 /// outline's width.
 const BRIDGED: f64 = 1.0;
 
+/// The least share of an outline's width that is more than a dotted line.
+const SHOWN_MIN: f64 = 0.45;
+
 /// Parts whose outline is hidden by what lies closely behind it are drawn where they are connected
 /// and shorter in all than this, in multiples of the outline's width: a line has no gaps there.
 const GAP_MAX: f64 = 2.0;
@@ -174,26 +177,47 @@ impl<'a> Chains<'a> {
     }
 
     /// By part, true if it belongs to a long run of parts whose outline is hidden by what lies closely
-    /// behind it: what is left of it would be a dotted line. Chains are forgotten.
+    /// behind it: what is left of it would be a dotted line. Hidden edges belong to such runs, too. Chains are
+    /// forgotten.
     fn dotted(&mut self, view: &OutlineView<'_>, width: f64, deadline: &Deadline) -> Result<Vec<bool>, PlanError> {
         let parts = self.parts;
-        self.sets = UnionFind::new(parts.len());
+        self.sets = UnionFind::new(parts.len() + self.hidden.len());
         self.last.fill(0);
-        let is_weak = |part: &VisiblePart| part.shown == 0.0 && !part.is_border;
+        let is_weak = |part: &VisiblePart| part.shown < SHOWN_MIN && !part.is_border;
+        let is_single = |i: usize| {
+            let same = |other: Option<&VisiblePart>| other.is_some_and(|other| other.edge == parts[i].edge);
+            !same(parts.get(i + 1)) && !(i > 0 && same(parts.get(i - 1)))
+        };
         for (i, part) in parts.iter().enumerate().filter(|(_, part)| is_weak(part)) {
             if i % CHECK_EVERY == 0 {
                 deadline.check()?;
             }
-            for end in (0..2).filter(|&end| part.range[end] == [0.0, 1.0][end]) {
+            // The rest of its edge is hidden.
+            let is_whole = is_single(i);
+            for end in (0..2).filter(|&end| is_whole || part.range[end] == [0.0, 1.0][end]) {
                 self.touch(part.edge, end, i);
             }
         }
-        let mut lengths = vec![0_u64; parts.len()];
+        for i in 0..self.hidden.len() {
+            if i % CHECK_EVERY == 0 {
+                deadline.check()?;
+            }
+            for end in 0..2 {
+                self.touch(self.hidden[i], end, parts.len() + i);
+            }
+        }
+        let mut lengths = vec![0_u64; parts.len() + self.hidden.len()];
+        let mut add = |sets: &mut UnionFind, member: usize, edge: u32, range: f64| {
+            let place = &self.places[edge as usize];
+            let limit = GAP_MAX * width * view.reach(self.edges[edge as usize].material, place.ends[0][3]);
+            lengths[sets.find(member as u32) as usize] += share(place.way().1 * range, limit);
+        };
         for (i, part) in parts.iter().enumerate().filter(|(_, part)| is_weak(part)) {
-            let place = &self.places[part.edge as usize];
-            let limit = GAP_MAX * width * view.reach(self.edges[part.edge as usize].material, place.ends[0][3]);
-            let own = place.way().1 * (part.range[1] - part.range[0]);
-            lengths[self.sets.find(i as u32) as usize] += share(own, limit);
+            let range = if is_single(i) { 1.0 } else { part.range[1] - part.range[0] };
+            add(&mut self.sets, i, part.edge, range);
+        }
+        for (i, edge) in self.hidden.iter().enumerate() {
+            add(&mut self.sets, parts.len() + i, *edge, 1.0);
         }
         Ok((0..parts.len()).map(|i| lengths[self.sets.find(i as u32) as usize] >= LEAST as u64).collect())
     }

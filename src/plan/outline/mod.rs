@@ -7,6 +7,7 @@
 
 pub(crate) mod build;
 pub(crate) mod chains;
+mod outer_side;
 pub(crate) mod parts;
 pub(crate) mod round_join;
 pub(crate) mod screen_edges;

@@ -11,7 +11,7 @@ use crate::spec::ProjectionKind;
 
 /// Places around a pixel that are looked at, and those that one pixel looks at itself.
 pub const TAPS: usize = 64;
-/// As above: four neighbours share all of them.
+/// As above: four pixels share all of them.
 pub const TAPS_PER_PIXEL: usize = TAPS / 4;
 
 /// Distance within which a surface takes light from another, as a share of the mesh's diagonal.
@@ -42,7 +42,7 @@ pub struct OcclusionPass {
     pub near: f32,
     /// A pixel's samples show one surface where their depths differ by no more.
     pub near_depth: f32,
-    /// The places that pixels look at, columns and rows from their own. Pixel (x, y) looks at number
+    /// The places that pixels look at, columns and rows from their own. Pixel (2x, 2y) looks at number
     /// `x % 2 + 2 (y % 2)` of four equal parts.
     pub taps: [[i32; 2]; TAPS],
 }
@@ -100,10 +100,10 @@ impl OcclusionPass {
         1.0 / (self.radius * self.radius)
     }
 
-    /// The places that a pixel looks at.
+    /// The places that a pixel of an even column and row looks at.
     #[inline(always)]
     pub fn taps_of(&self, x: u32, y: u32) -> &[[i32; 2]] {
-        let part = ((x & 1) + 2 * (y & 1)) as usize;
+        let part = (((x >> 1) & 1) + 2 * ((y >> 1) & 1)) as usize;
         &self.taps[part * TAPS_PER_PIXEL..(part + 1) * TAPS_PER_PIXEL]
     }
 }

@@ -186,7 +186,8 @@ fn light() -> Vec<Field> {
         "light.intensity" |d| d.light.intensity, in number(0.0, 10.0), default 1;
             "Strength of the lamps.";
         "light.ambient" |d| d.ambient, in SHARE;
-            "Share of light that comes from everywhere; by default 0.3, and 1 without lamps.";
+            "Share of light that comes from everywhere; by default 0.18 in the styles auto, outline, technical and clay, 0.3 in the others, and 1 \
+             without lamps.";
         "light.ambient_occlusion" |d| d.light.ambient_occlusion, in SHARE;
             "Darkens hollows, folds and places where parts meet: the share of light that a place goes without which is wholly \
              shut in. By default 0.6 in the styles auto, outline and technical, 1 in clay, and 0 in the others.";

@@ -117,6 +117,8 @@ pub enum Task {
 pub struct Checking {
     /// The rules.
     pub rules: RuleSet,
+    /// All places of faults are listed, not the first few.
+    pub all_places: bool,
     /// The name of the upload.
     pub digest: Digest,
     /// A broken rule of level `error` is an answer of 422.

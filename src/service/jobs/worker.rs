@@ -117,7 +117,8 @@ fn judge(
     let file = bundle.files().first().filter(|_| bundle.files().len() == 1 && !bundle.is_zip());
     let named = bundle.entry().or(file.map(|file| file.path.as_str()));
     let path = opened.as_ref().map_or(named.unwrap_or(UNNAMED), |opened| opened.path()).to_owned();
-    let checks = match opened.and_then(|opened| opened.check(&checking.rules, deadline)) {
+    let options = check::Options { all_places: checking.all_places, fails_at_limits: false };
+    let checks = match opened.and_then(|opened| opened.check(&checking.rules, options, deadline)) {
         Ok(checks) => checks,
         Err(error) => vec![check::of_unreadable(&error).ok_or(error)?],
     };

@@ -111,7 +111,7 @@ fn planes_and_cubes_lose_no_light() {
     let plane = "v -1 -1 0\nv 1 -1 0.3\nv 1 1 0.1\nv -1 1 -0.2\nf 1 2 3\n";
     let mut renderers = renderers();
     let mut compared = 0;
-    for (obj, pixels_max, steps_max) in [(plane.to_owned(), 0, 0), (shapes::cube(), 64, 16)] {
+    for (obj, pixels_max, steps_max) in [(plane.to_owned(), 0, 0), (shapes::cube(), 64, 24)] {
         let mesh = scenes::mesh(&obj);
         for view in ["auto", "iso", "front", "left", "top"] {
             for (projection, fov) in

@@ -191,3 +191,44 @@ fn junit_counts_what_fails() {
     let (code, printed, said) = check(folder.path(), &["parts", "--junit", "-"]);
     assert!(code == Some(2) && printed.is_empty() && said.contains("name a file"), "{said}");
 }
+
+#[test]
+fn all_places_are_listed_on_request() {
+    let folder = tempfile::tempdir().unwrap();
+    let row: String = (0..30).map(|i| format!("v {i} 0 0\nv {i} 1 0\nv {i} 0 1\nf -1 -2 -3\n")).collect();
+    fs::write(folder.path().join("row.obj"), row).unwrap();
+    let places = |more: &[&str]| {
+        let arguments =
+            [&["row.obj", "--rules", "watertight", "--format", "jsonl", "--html", "page.html"], more].concat();
+        let (code, stdout, stderr) = check(folder.path(), &arguments);
+        assert_eq!(code, Some(1), "{stderr}");
+        let page = fs::read_to_string(folder.path().join("page.html")).unwrap();
+        assert!(page.contains("the first 20 of 90 places"), "{page}");
+        let verdict: Value = serde_json::from_str(&stdout).unwrap();
+        assert_eq!(verdict["checks"][0]["found"], 90);
+        verdict["checks"][0]["where"].as_array().unwrap().len()
+    };
+    assert_eq!((places(&[]), places(&["--all-places"])), (20, 90));
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_passed_over_in_folders_and_told_where_it_is_named() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join("parts").join(name);
+    let made = std::process::Command::new("mkfifo").arg(path("pipe.obj")).status().unwrap();
+    assert!(made.success());
+    std::os::unix::fs::symlink("/dev/zero", path("endless.stl")).unwrap();
+    std::os::unix::fs::symlink(path("good.obj"), path("link.obj")).unwrap();
+    std::os::unix::fs::symlink(path("."), path("folder.obj")).unwrap();
+    std::os::unix::fs::symlink("nothing.obj", path("nothing_here.obj")).unwrap();
+    std::os::unix::fs::symlink("round.obj", path("round.obj")).unwrap();
+    let (code, out, said) = check(folder.path(), &["parts", "--rules", "opens"]);
+    let expected = "parts/good.obj: ok\nparts/hole.obj: ok\nparts/link.obj: ok\nparts/nothing_here.obj: FAILED\n  error: \
+                    opens: there is no such file\nparts/round.obj: FAILED\n  error: opens: cannot be read: ";
+    assert!(code == Some(1) && out.starts_with(expected), "{out}{said}");
+    assert!(said.contains("3 ok, 2 failed"), "{said}");
+    // A folder that is named as a mesh is a folder, here one that links to itself.
+    let (code, out, said) = check(folder.path(), &["parts/folder.obj", "--rules", "opens"]);
+    assert!(code == Some(1) && out.contains("parts/folder.obj/good.obj: ok"), "{out}{said}");
+}

@@ -4,6 +4,8 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use serde_json::Value;
+
 use crate::support::server::{CUBE_OBJ, Server, meshsnap};
 use crate::support::skip::{Need, skip};
 
@@ -184,7 +186,7 @@ fn the_number_of_threads_has_bounds() {
 fn inspect_says_what_is_in_the_file() {
     let output = run(&["inspect", "-", "--json"], CUBE_OBJ);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(report["format"], "obj");
     assert_eq!((report["triangles"].as_u64(), report["polygons"].as_u64()), (Some(12), Some(6)));
     assert_eq!(report["positions"], 8);
@@ -199,6 +201,44 @@ fn inspect_says_what_is_in_the_file() {
     let text = run(&["inspect", "-"], CUBE_OBJ);
     let text = String::from_utf8(text.stdout).unwrap();
     assert!(text.contains("triangles") && text.contains("6 x 4"), "{text}");
+    let charts = run(&["inspect", "-", "--uv"], b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
+    let charts = String::from_utf8(charts.stdout).unwrap();
+    assert!(
+        charts.contains("charts       1, 50.0 % of the texture's area, stretch 1.000 (L2), 1.000 (Linf)"),
+        "{charts}"
+    );
+}
+
+#[test]
+fn inspect_reports_on_many_meshes_by_lines() {
+    let folder = super::check::folder();
+    let inspect = |arguments: &[&str]| {
+        let mut command = meshsnap();
+        command.current_dir(folder.path()).arg("inspect").args(arguments).stdin(Stdio::null());
+        let output = command.output().unwrap();
+        let lines = String::from_utf8(output.stdout).unwrap();
+        let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        (output.status.code(), lines, String::from_utf8(output.stderr).unwrap())
+    };
+    let (code, lines, stderr) =
+        inspect(&["parts", "broken.stl", "absent.obj", "colored.obj", "colored.mtl", "--jsonl"]);
+    assert_eq!(code, Some(1), "{stderr}");
+    let paths: Vec<&str> = lines.iter().map(|line| line["path"].as_str().unwrap()).collect();
+    assert_eq!(paths, ["absent.obj", "broken.stl", "colored.obj", "parts/good.obj", "parts/hole.obj"]);
+    let errors: Vec<bool> = lines.iter().map(|line| line["error"].is_string()).collect();
+    assert_eq!(errors, [true, true, false, false, false]);
+    assert_eq!(lines[0], serde_json::json!({ "path": "absent.obj", "error": "there is no such file" }));
+    // Its library was read, or there were a warning.
+    assert_eq!(lines[2]["warnings"], serde_json::json!([]));
+    assert_eq!((&lines[3]["triangles"], &lines[4]["topology"]["open_edges"]), (&12.into(), &4.into()));
+    assert!(lines[3].get("uv").is_none() && stderr.contains("meshsnap: broken.stl: "), "{stderr}");
+    // The report of one mesh is that of --json, with its path.
+    let alone = run(&["inspect", "-", "--json", "--uv", "--parts"], CUBE_OBJ);
+    let mut alone: Value = serde_json::from_slice(&alone.stdout).unwrap();
+    alone["path"] = "parts/good.obj".into();
+    let (code, lines, _) = inspect(&["parts/good.obj", "--jsonl", "--uv", "--parts"]);
+    assert_eq!((code, lines), (Some(0), vec![alone]));
+    assert_eq!(inspect(&["parts", "--jsonl", "--json"]).0, Some(2));
 }
 
 #[test]

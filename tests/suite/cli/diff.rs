@@ -227,3 +227,31 @@ fn both_sides_are_shown_beside_each_other_and_by_turns() {
     let side = |frame: usize| image::imageops::crop_imm(&three, frame as u32 * 512, 0, 512, 512).to_image();
     assert!((0..2).all(|frame| *shown[frame].buffer() == side(frame)));
 }
+
+#[test]
+fn what_is_gone_is_seen_on_the_older_side() {
+    let folder = folder();
+    let hole = String::from_utf8(CUBE_OBJ.to_vec()).unwrap();
+    // A side that the camera sees.
+    fs::write(folder.path().join("open.obj"), hole.replace("f 5 6 7 8\n", "")).unwrap();
+    fs::write(folder.path().join("two.obj"), two_cubes()).unwrap();
+    let open = |name: &str| image::open(folder.path().join(name)).unwrap().to_rgba8();
+    let red = |image: &image::RgbaImage, side: u32| {
+        let is_red = |[r, g, b, _]: [i32; 4]| r > g + 60 && r > b + 60;
+        let is_in = |x: u32, y: u32| (512 * side..512 * side + 512).contains(&x) && y < 440;
+        image.enumerate_pixels().filter(|(x, y, pixel)| is_in(*x, *y) && is_red(pixel.0.map(i32::from))).count()
+    };
+    let words = ["cube.obj", "open.obj", "-o", "heat.png", "--side-by-side", "three.png"];
+    let (code, out, said) = diff(folder.path(), &words);
+    assert!(code == Some(1) && out.contains("a hole with 4 edges near ("), "{out}{said}");
+    let (heat, three) = (open("heat.png"), open("three.png"));
+    assert!((40..2000).contains(&red(&heat, 0)), "{}", red(&heat, 0));
+    assert!((40..2000).contains(&red(&three, 2)), "{}", red(&three, 2));
+    assert_eq!([red(&heat, 1), red(&three, 0), red(&three, 1)], [0; 3]);
+    // A part that was removed, and one that was added: the third picture has it.
+    for words in [["two.obj", "cube.obj"], ["cube.obj", "two.obj"]] {
+        assert_eq!(diff(folder.path(), &[&words[..], &["--side-by-side", "three.png"]].concat()).0, Some(1));
+        let three = open("three.png");
+        assert!(red(&three, 2) > 1000 && red(&three, 0) + red(&three, 1) == 0, "{words:?}: {}", red(&three, 2));
+    }
+}

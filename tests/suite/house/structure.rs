@@ -16,6 +16,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("pluralise", &[]),
     ("percent", &[]),
     ("parallel", &[]),
+    // For the tests of several rooms.
+    ("made_obj", &[]),
     ("mesh", &["parallel", "limits", "warning"]),
     ("import", &["guard", "mesh", "parallel", "srgb", "limits", "warning", "pluralise"]),
     ("report", &["import", "texture", "mesh", "limits", "warning", "pluralise"]),

@@ -24,6 +24,8 @@ pub enum Need {
     Systemd,
     /// A C compiler, `cc`, on the `PATH`.
     Compiler,
+    /// Chromium on the `PATH`, and axe-core, which `tests/run` installs into `target/node`.
+    Browser,
 }
 
 impl Need {
@@ -38,6 +40,7 @@ impl Need {
             Self::Python => "python",
             Self::Systemd => "systemd",
             Self::Compiler => "compiler",
+            Self::Browser => "browser",
         }
     }
 }

@@ -1,7 +1,7 @@
-//! Stage occlusion, per pixel: looks at places around it and adds up what light they take. Twin of
-//! `shaders/occlusion/gather.wgsl`.
+//! Stage occlusion, per pixel of every second column and row: looks at places around it and adds up what light
+//! they take. Twin of `shaders/occlusion/gather.wgsl`.
 
-use super::grid::{Grid, NOWHERE, lanes};
+use super::grid::{Grid, NOWHERE, PHASES, lanes};
 use crate::backend::cpu::geometry::transform::{quick_rsqrt, round_to_i32};
 use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::plan::{OcclusionPass, TAPS_PER_PIXEL, sample_offsets};
@@ -20,7 +20,7 @@ pub const GAIN: f32 = 6.0;
 type Lanes = [f32; LANES];
 
 dispatch! {
-    /// Fills rows of the grid's layout, from row `first` of the picture on.
+    /// Fills rows of the grid's layout, from row `first` of the picture on: every second pixel of even rows.
     pub fn gather_rows(pass: &OcclusionPass, grid: &Grid, samples: u32, first: u32, out: &mut [f32]) = gather_kernel
 }
 
@@ -31,10 +31,10 @@ fn gather_kernel(pass: &OcclusionPass, grid: &Grid, samples: u32, first: u32, ou
         x0 as f32 * (1.0 / 256.0) - 0.5 * grid.width_px as f32,
         y0 as f32 * (1.0 / 256.0) - 0.5 * grid.height_px as f32,
     ];
-    for (y, row) in (first..).zip(out.chunks_exact_mut(grid.stride())) {
+    for (y, row) in (first..).zip(out.chunks_exact_mut(grid.stride())).filter(|(y, _)| y % 2 == 0) {
         let row_start = grid.index([0, y], [0, 0]) / grid.stride() * grid.stride();
-        for parity in 0..2 {
-            for x in (parity..grid.width_px).step_by(2 * LANES) {
+        for phase in [0, 2] {
+            for x in (phase..grid.width_px).step_by(PHASES * LANES) {
                 let at = grid.index([x, y], [0, 0]);
                 let looker = Looker::new(pass, grid, [x, y], from);
                 let found = if looker.is_nothing() { [0.0; LANES] } else { looker.look() };
@@ -46,7 +46,7 @@ fn gather_kernel(pass: &OcclusionPass, grid: &Grid, samples: u32, first: u32, ou
     }
 }
 
-/// Eight pixels of one parity, beside each other.
+/// Eight pixels that look at the same places, [`PHASES`] columns apart.
 struct Looker<'a> {
     pass: &'a OcclusionPass,
     grid: &'a Grid,
@@ -63,7 +63,7 @@ impl<'a> Looker<'a> {
     fn new(pass: &'a OcclusionPass, grid: &'a Grid, pixel: [u32; 2], from: [f32; 2]) -> Self {
         let mut column = [0.0; LANES];
         for l in 0..LANES {
-            column[l] = (pixel[0] + 2 * l as u32) as f32 + from[0];
+            column[l] = (pixel[0] + (PHASES * l) as u32) as f32 + from[0];
         }
         let mut looker = Self { pass, grid, pixel, column, row: pixel[1] as f32 + from[1], place: [[0.0; LANES]; 3] };
         looker.place = looker.places([0, 0], looker.depths([0, 0]));

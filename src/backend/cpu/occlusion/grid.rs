@@ -1,8 +1,8 @@
 //! Stage occlusion: the place of what each pixel's first sample shows, before the far plane. Twin of
 //! `shaders/occlusion/grid.wgsl`.
 //!
-//! Even and odd columns of a row lie apart, because they look at other places: so eight pixels whose
-//! places are loaded together look at the same ones. A border of nothing around the picture saves
+//! Every fourth column of a row lies together, because pixels beside each other look at other places: so eight
+//! pixels whose places are loaded together look at the same ones. A border of nothing around the picture saves
 //! asking whether a place lies in it.
 
 use std::ops::Range;
@@ -15,6 +15,9 @@ use crate::plan::OcclusionPass;
 /// The place of nothing: so far behind all else that no surface takes light from it.
 pub const NOWHERE: f32 = -1e15;
 
+/// Distance between the columns that lie together.
+pub const PHASES: usize = 4;
+
 /// Places per pixel.
 #[derive(Default)]
 pub struct Grid {
@@ -22,10 +25,10 @@ pub struct Grid {
     pub width_px: u32,
     /// Rows of the picture.
     pub height_px: u32,
-    /// Columns and rows around it, an even number.
+    /// Columns and rows around it, a multiple of [`PHASES`].
     border: usize,
-    /// Columns of one parity, with room for a vector to hang over.
-    half: usize,
+    /// Columns that lie together, with room for a vector to hang over.
+    part: usize,
     /// Distance before the far plane, or [`NOWHERE`].
     depths: Vec<f32>,
 }
@@ -33,24 +36,24 @@ pub struct Grid {
 impl Grid {
     /// Places for a picture.
     pub fn len(pass: &OcclusionPass, size_px: [u32; 2]) -> usize {
-        let (border, half) = Self::layout(pass, size_px[0]);
-        2 * half * (size_px[1] as usize + 2 * border)
+        let (border, part) = Self::layout(pass, size_px[0]);
+        PHASES * part * (size_px[1] as usize + 2 * border)
     }
 
     fn layout(pass: &OcclusionPass, width_px: u32) -> (usize, usize) {
         let reach = pass.taps.as_flattened().iter().map(|v| v.unsigned_abs()).max().unwrap_or(0).max(2);
-        let border = (reach as usize).next_multiple_of(2);
-        (border, (width_px as usize).div_ceil(2) + border + LANES)
+        let border = (reach as usize).next_multiple_of(PHASES);
+        (border, (width_px as usize + 2 * border).div_ceil(PHASES) + LANES)
     }
 
     /// Empties the grid for a picture.
     pub fn reset(&mut self, pass: &OcclusionPass, [width_px, height_px]: [u32; 2]) {
-        let (border, half) = Self::layout(pass, width_px);
+        let (border, part) = Self::layout(pass, width_px);
         if (self.width_px, self.height_px, self.border) != (width_px, height_px, border) {
             self.depths.clear();
             self.depths.resize(Self::len(pass, [width_px, height_px]), NOWHERE);
         }
-        (self.width_px, self.height_px, self.border, self.half) = (width_px, height_px, border, half);
+        (self.width_px, self.height_px, self.border, self.part) = (width_px, height_px, border, part);
     }
 
     /// Allocated memory, bytes.
@@ -60,7 +63,7 @@ impl Grid {
 
     /// Items of a row.
     pub fn stride(&self) -> usize {
-        2 * self.half
+        PHASES * self.part
     }
 
     /// All places.
@@ -80,13 +83,13 @@ impl Grid {
         &mut self.depths[picture]
     }
 
-    /// Index of the place `across` and `down` from a pixel; those of eight pixels of the same parity
+    /// Index of the place `across` and `down` from a pixel; those of pixels [`PHASES`] columns farther each
     /// follow.
     #[inline(always)]
     pub fn index(&self, [x, y]: [u32; 2], [across, down]: [i32; 2]) -> usize {
         let column = (x as i32 + self.border as i32 + across) as usize;
         let row = (y as i32 + self.border as i32 + down) as usize;
-        row * self.stride() + (column & 1) * self.half + (column >> 1)
+        row * self.stride() + (column % PHASES) * self.part + column / PHASES
     }
 
     /// Of the eight pixels around one, that whose place is nearest to that of depth `z`.
@@ -121,7 +124,7 @@ pub fn place_of(pass: &OcclusionPass, z: f32) -> f32 {
     (a * z) * recip(b * z + c)
 }
 
-/// Border and length of half a row of a [`Grid`].
+/// Border of a [`Grid`], and its columns that lie together.
 pub type Shape = (usize, usize);
 
 dispatch! {
@@ -131,36 +134,29 @@ dispatch! {
 }
 
 #[inline(always)]
-fn write_kernel(
-    pass: &OcclusionPass,
-    (grid_border, grid_half): Shape,
-    band: &SampleBand,
-    triangles: u32,
-    out: &mut [f32],
-) {
-    for_samples!(band.samples, write_sampled(pass, (grid_border, grid_half), band, triangles, out));
+fn write_kernel(pass: &OcclusionPass, (border, part): Shape, band: &SampleBand, triangles: u32, out: &mut [f32]) {
+    for_samples!(band.samples, write_sampled(pass, (border, part), band, triangles, out));
 }
 
 #[inline(always)]
 fn write_sampled<const S: usize>(
     pass: &OcclusionPass,
-    (grid_border, grid_half): Shape,
+    (border, part): Shape,
     band: &SampleBand,
     triangles: u32,
     out: &mut [f32],
 ) {
     let width = band.size_px[0] as usize;
-    for (y, row) in (band.shown[0]..band.shown[1]).zip(out.chunks_exact_mut(2 * grid_half)) {
+    for (y, row) in (band.shown[0]..band.shown[1]).zip(out.chunks_exact_mut(PHASES * part)) {
         let first = band.index(0, y as i32, 0);
         let samples = first..first + S * width;
         let (ids, depths) = (&band.ids[samples.clone()], &band.depth[samples]);
-        // The border is even: even columns stay even.
-        let (even, odd) = row.split_at_mut(grid_half);
-        for (parity, out) in [even, odd].into_iter().enumerate() {
-            let out = &mut out[grid_border / 2..][..(width + 1 - parity) / 2];
-            let pixels = ids.chunks(2 * S).zip(depths.chunks(2 * S));
+        for (phase, out) in row.chunks_exact_mut(part).enumerate() {
+            // The border is a multiple of the number of phases.
+            let out = &mut out[border / PHASES..][..(width + PHASES - 1 - phase) / PHASES];
+            let pixels = ids.chunks(PHASES * S).zip(depths.chunks(PHASES * S));
             for (place, (ids, depths)) in out.iter_mut().zip(pixels) {
-                let (id, depth) = (ids[parity * S], depths[parity * S]);
+                let (id, depth) = (ids[phase * S], depths[phase * S]);
                 // `NOTHING` is larger than all ids.
                 *place = if id < triangles { place_of(pass, depth) } else { NOWHERE };
             }
@@ -169,8 +165,8 @@ fn write_sampled<const S: usize>(
 }
 
 impl Grid {
-    /// Border and length of half a row, which [`write_band`] takes.
+    /// The layout, which [`write_band`] takes.
     pub fn shape(&self) -> Shape {
-        (self.border, self.half)
+        (self.border, self.part)
     }
 }

@@ -1,7 +1,7 @@
-//! Stage occlusion, per pixel: a weighted mean of what a pixel and its neighbours of the same surface
-//! found. Twin of `shaders/occlusion/spread.wgsl`.
+//! Stage occlusion, per pixel: a weighted mean of what pixels around it that show the same surface found. Twin of
+//! `shaders/occlusion/spread.wgsl`.
 
-use super::grid::{Grid, NOWHERE, lanes};
+use super::grid::{Grid, NOWHERE, PHASES, lanes};
 use crate::backend::cpu::geometry::transform::round_to_i32;
 use crate::backend::cpu::isa::{LANES, dispatch};
 use crate::plan::OcclusionPass;
@@ -14,10 +14,10 @@ dispatch! {
 #[inline(always)]
 fn spread_kernel(pass: &OcclusionPass, grid: &Grid, gathered: &[f32], first: u32, out: &mut [u8]) {
     for (y, row) in (first..).zip(out.chunks_exact_mut(grid.width_px as usize)) {
-        for parity in 0..2 {
-            for x in (parity..grid.width_px).step_by(2 * LANES) {
+        for phase in 0..PHASES as u32 {
+            for x in (phase..grid.width_px).step_by(PHASES * LANES) {
                 let means = means(pass, grid, gathered, [x, y]);
-                for (out, mean) in row[x as usize..].iter_mut().step_by(2).zip(means) {
+                for (out, mean) in row[x as usize..].iter_mut().step_by(PHASES).zip(means) {
                     *out = mean;
                 }
             }
@@ -25,7 +25,7 @@ fn spread_kernel(pass: &OcclusionPass, grid: &Grid, gathered: &[f32], first: u32
     }
 }
 
-/// The means of eight pixels of one parity.
+/// The means of eight pixels, [`PHASES`] columns apart.
 #[inline(always)]
 fn means(pass: &OcclusionPass, grid: &Grid, gathered: &[f32], pixel: [u32; 2]) -> [u8; LANES] {
     let own = lanes(grid.depths(), grid.index(pixel, [0, 0]));
@@ -34,9 +34,14 @@ fn means(pass: &OcclusionPass, grid: &Grid, gathered: &[f32], pixel: [u32; 2]) -
     }
     // Small integers: exact.
     let (mut sums, mut weights) = ([0.0_f32; LANES], [0.0_f32; LANES]);
-    for down in -1..=1 {
-        for across in -1..=1 {
-            let weight = ((2 - i32::abs(across)) * (2 - i32::abs(down))) as f32;
+    // To the columns and rows of pixels that have looked around: -2, 0 and 2 from even ones, -3 to 3 from odd ones.
+    let steps = |at: u32| {
+        let farthest = 2 + (at & 1) as i32;
+        (-farthest..=farthest).step_by(2)
+    };
+    for down in steps(pixel[1]) {
+        for across in steps(pixel[0]) {
+            let weight = ((4 - i32::abs(across)) * (4 - i32::abs(down))) as f32;
             let at = grid.index(pixel, [across, down]);
             let (depths, found) = (lanes(grid.depths(), at), lanes(gathered, at));
             for l in 0..LANES {
@@ -48,10 +53,11 @@ fn means(pass: &OcclusionPass, grid: &Grid, gathered: &[f32], pixel: [u32; 2]) -
     }
     let mut means = [0; LANES];
     for l in 0..LANES {
-        // The nearest integer, halves up: what is rounded lies at least 1/64 from a half.
-        let mean = ((2.0 * sums[l] + weights[l]) + 0.5) / (2.0 * weights[l]) - 0.5;
-        // Beside the picture, `gathered` may still hold what an earlier one left.
-        means[l] = if own[l] == NOWHERE { 0 } else { round_to_i32(mean) as u8 };
+        // The nearest integer, halves up: what is rounded lies at least 1/256 from a half.
+        let mean = ((2.0 * sums[l] + weights[l]) + 0.5) / (2.0 * weights[l].max(1.0)) - 0.5;
+        // Where none of them shows the surface, nothing is taken. Beside the picture, `gathered` may still hold what
+        // an earlier one left.
+        means[l] = if own[l] == NOWHERE || weights[l] == 0.0 { 0 } else { round_to_i32(mean) as u8 };
     }
     means
 }

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::text::at;
 use super::{Findings, faults};
-use crate::check::{Check, Level, NAMES, meaning};
+use crate::check::{Check, Level, NAMES, PLACES_MAX, meaning};
 use crate::cli::error::CliError;
 use crate::percent;
 use crate::service::digest::Digest;
@@ -56,7 +56,7 @@ fn result(path: &str, check: &Check, has_known: bool) -> Value {
             },
         }],
         "partialFingerprints": { "primaryLocationLineHash": format!("{}:1", &fingerprint[..16]) },
-        "properties": { "found": check.found, "allowed": check.allowed, "where": check.places },
+        "properties": { "found": check.found, "allowed": check.allowed, "where": &check.places[..check.places.len().min(PLACES_MAX)] },
     });
     if has_known {
         let known = json!([{ "kind": "external", "justification": "it is in the baseline" }]);

@@ -3,30 +3,21 @@
 //! It covers all points within the outline's thickness of where the surface ends on screen, on the
 //! side where nothing of the surface is. Where a corner turns inwards the offset quads overlap.
 
+use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
 use crate::plan::costs::spend_hull;
 use crate::plan::geometry::Geometry;
+use crate::plan::outline::outer_side::OuterSide;
 use crate::plan::outline::parts::{OutlineParts, outlines};
 use crate::plan::outline::round_join::RoundJoins;
-use crate::plan::outline::screen_edges::{OutlineView, RECEDES, ScreenEdge};
+use crate::plan::outline::screen_edges::{OutlineView, ScreenEdge};
 use crate::plan::outline::silhouette_edges::{ScreenMesh, SilhouetteEdge};
 use crate::plan::outline::visible_parts::VisiblePart;
 use crate::plan::outline::{EdgeEnd, HullPass, HullVertex, ScreenPoint};
 use crate::plan::peeling::needed_pass;
 use crate::plan::shared_slice::SharedSlice;
-use crate::plan::{Edge, PlanError};
 use crate::scene::{Scene, Thickness};
 use crate::spec::OutlineMethod;
-
-/// Largest slope of an outline that follows a face beyond its edge, so that it lies behind what
-/// continues that face elsewhere: the other teeth of a gear.
-const RECEDES_MAX: f64 = 2.5;
-
-/// Slope of such an outline beyond that of its face.
-const RECEDES_MORE: f64 = 0.05;
-
-/// The least depth that is still before the far plane.
-const DEPTH_MIN: f64 = 1e-30;
 
 /// The hull of the materials that have one, in a picture with this margin.
 pub fn hull_pass<'m>(
@@ -122,28 +113,13 @@ impl<'a> OutlineMesh<'a> {
 
     /// Adds the offset quads beside the visible parts of an edge.
     fn offset_quads(&mut self, edge: &SilhouetteEdge, place: &ScreenEdge, parts: &[VisiblePart]) {
-        let [a, b] = place.ends;
-        let (along, length) = place.way();
-        let reach = place.ends.map(|end| self.view.reach(edge.material, end[3]));
-        if length < 1e-6 || reach[0].max(reach[1]) <= 0.0 {
-            return;
-        }
+        let Some(side) = OuterSide::of(self.view, edge, place) else { return };
+        let ([a, b], (along, length)) = (place.ends, place.way());
         let out = f64::from(edge.free);
-        // The outer side touches the circles around both ends, of which one may be nearer and
-        // larger. Where that circle surrounds the other one, the quad is empty and the nearer end's
-        // join reaches around.
-        let sine = ((reach[0] - reach[1]) / length).clamp(-1.0, 1.0);
-        let cosine = (1.0 - sine * sine).sqrt();
-        let normal = [sine * along[0] - cosine * out * along[1], sine * along[1] + cosine * out * along[0]];
-        let depths = self.depths(edge, place.ends, [along[0], along[1], length], normal, reach);
-        let outer_ends = [0, 1].map(|k| {
-            let at = [0, 1].map(|axis| place.ends[k][axis] + reach[k] * normal[axis]);
-            [at[0], at[1], depths[k], place.ends[k][3]]
-        });
         let mut outer = [None; 2];
         for part in parts {
             let across = [-out * along[1], out * along[0]];
-            let corners = part.range.map(|share| self.corners(edge, place, &outer_ends, share, across));
+            let corners = part.range.map(|share| self.corners(edge, place, &side, share, across));
             let [[inner_a, outer_a], [inner_b, outer_b]] = corners;
             self.hull.triangles.extend([[inner_a, inner_b, outer_b], [inner_a, outer_b, outer_a]]);
             self.hull.triangle_materials.extend([edge.material; 2]);
@@ -160,10 +136,10 @@ impl<'a> OutlineMesh<'a> {
                 material: edge.material,
                 free: if k == 0 { edge.free } else { -edge.free },
                 angle: libm::atan2(sign * along[1], sign * along[0]),
-                turn: libm::acos(sign * sine),
+                turn: libm::acos(sign * side.sine),
                 middle: [end[0], end[1]],
-                reach: reach[k],
-                depth: depths[k],
+                reach: side.reach[k],
+                depth: side.ends[k][2],
                 inv_w: end[3],
                 slope: sign * (b[2] - a[2]) / length,
                 is_hidden: false,
@@ -176,14 +152,13 @@ impl<'a> OutlineMesh<'a> {
         &mut self,
         edge: &SilhouetteEdge,
         place: &ScreenEdge,
-        outer: &[ScreenPoint; 2],
+        side: &OuterSide,
         share: f64,
         out: [f64; 2],
     ) -> [u32; 2] {
         let k = usize::from(share > 0.5);
         let is_end = share == [0.0, 1.0][k];
-        let outer: ScreenPoint =
-            if is_end { outer[k] } else { std::array::from_fn(|i| outer[0][i] + share * (outer[1][i] - outer[0][i])) };
+        let outer = if is_end { side.ends[k] } else { side.at(share) };
         let inner = if is_end && place.is_whole[k] {
             edge.vertices[k]
         } else {
@@ -198,45 +173,6 @@ impl<'a> OutlineMesh<'a> {
     fn vertex(&mut self, point: ScreenPoint) -> u32 {
         self.hull.vertices.push(HullVertex::snapped(point));
         self.first_vertex + self.hull.vertices.len() as u32 - 1
-    }
-
-    /// Depths of the outer corners of an offset quad.
-    fn depths(
-        &self,
-        edge: &SilhouetteEdge,
-        ends: [ScreenPoint; 2],
-        [right, down, length]: [f64; 3],
-        normal: [f64; 2],
-        reach: [f64; 2],
-    ) -> [f64; 2] {
-        // Change of depth from the edge outwards, in the plane of the face that recedes most.
-        let slope_along = (ends[1][2] - ends[0][2]) / length;
-        let out = f64::from(edge.free);
-        let slope = |face: u32| {
-            let corners = self.view.view.mesh.triangles.get(face as usize)?;
-            let third = corners.iter().find(|v| !edge.vertices.contains(v))?;
-            let [x, y, z, w] = self.view.homogeneous(*third);
-            let from = [x / w - ends[0][0], y / w - ends[0][1]];
-            let across = out * (right * from[1] - down * from[0]);
-            let is_known = w >= f64::from(self.view.view.projection.near_w) && across < -1e-6;
-            is_known.then(|| (z / w - ends[0][2] - slope_along * (right * from[0] + down * from[1])) / across)
-        };
-        let slope = edge.faces.iter().filter(|face| **face != Edge::NO_FACE).filter_map(|face| slope(*face));
-        let slope = slope.fold(f64::INFINITY, f64::min);
-        let sideways = normal[0] * right + normal[1] * down;
-        let outwards = out * (right * normal[1] - down * normal[0]);
-        [0, 1].map(|k| {
-            let depth = ends[k][2];
-            let receding = |slope: f64| self.view.receding(ends[k], slope, reach[k]);
-            let usual = receding(RECEDES);
-            let followed = depth + reach[k] * (sideways * slope_along + outwards * slope);
-            let depth = if followed < usual && followed > receding(RECEDES_MAX) {
-                followed - (depth - receding(RECEDES_MORE))
-            } else {
-                usual
-            };
-            depth.max(DEPTH_MIN)
-        })
     }
 }
 

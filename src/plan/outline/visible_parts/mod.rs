@@ -15,7 +15,8 @@ use self::hidden::{depth_at, hidden_range};
 use crate::limits::Stopped;
 use crate::plan::PlanError;
 use crate::plan::context::{CHECK_EVERY, PlanContext};
-use crate::plan::outline::screen_edges::{OutlineView, PX, RECEDES, ScreenEdge};
+use crate::plan::outline::outer_side::OuterSide;
+use crate::plan::outline::screen_edges::{OutlineView, PX, ScreenEdge};
 use crate::plan::outline::silhouette_edges::SilhouetteEdge;
 use crate::scene::{Fill, MaterialGroups, barycentric_wire};
 use crate::spec::{Layers, OutlineMethod};
@@ -197,16 +198,17 @@ impl Search<'_> {
         let last = ((range[1] * count as f64).ceil() as usize).clamp(first + 1, count);
         // A chain goes on where its edge is cut at the border of the picture.
         let is_cut = |end: usize| range[end] == [0.0, 1.0][end] && !self.places[i].is_whole[end];
+        let side = OuterSide::of(self.view, &self.edges[i], &self.places[i]);
         let (mut shown, mut is_border) = (0, is_cut(0) || is_cut(1));
         for k in first..last {
             let [beside, across @ ..] = self.beside(i, k);
             if grid.faces(grid.cells.at(beside)).all(|face| depth_at(face, beside).is_none()) {
                 is_border = true;
             } else if self.method == OutlineMethod::Hull {
-                let edge = self.places[i].at((k as f64 + 0.5) / count as f64);
-                let reach = self.view.reach(self.edges[i].material, edge[3]);
+                let along = (k as f64 + 0.5) / count as f64;
+                let (inner, outer) = (self.places[i].at(along)[2], side.as_ref().map_or(0.0, |side| side.at(along)[2]));
                 for (at, share) in across.into_iter().zip(ACROSS) {
-                    let depth = self.view.receding(edge, RECEDES, share * reach);
+                    let depth = inner + share * (outer - inner);
                     let is_before = |face| depth_at(face, at).is_some_and(|other| other >= depth);
                     shown += usize::from(!grid.faces(grid.cells.at(at)).any(is_before));
                 }

@@ -7,7 +7,7 @@ use axum::extract::Request;
 use super::body::{self, BodyKind};
 use super::idempotency::{self, Sent};
 use super::keys::Keys;
-use super::query::{Query, bad};
+use super::query::{Query, bad, quote};
 use super::{access_of, document_of, is_short_json, read_upload, upload, webhook};
 use crate::check::RuleSet;
 use crate::service::digest::Digest;
@@ -19,7 +19,7 @@ use crate::service::jobs::{Checking, Class, Job, Recipe, Task, Work};
 use crate::service::store::Reading;
 
 /// The keys of a check, beside those that say how the mesh is read.
-const KEYS: [&str; 3] = ["rules", "warn", "fail"];
+const KEYS: [&str; 4] = ["rules", "warn", "fail", "places"];
 
 /// A request for a verdict, once it is read.
 pub enum Asked {
@@ -83,7 +83,16 @@ pub async fn receive(state: &AppState, request: Request, class: Class) -> Result
 
 /// The task of these keys on the upload of this name.
 pub fn task(keys: &Keys, digest: Digest) -> Result<Task, ApiError> {
-    Ok(Task::Check(Box::new(Checking { rules: rules(keys)?, digest, may_fail: keys.may_fail()? })))
+    let (rules, all_places, may_fail) = (rules(keys)?, all_places(keys)?, keys.may_fail()?);
+    Ok(Task::Check(Box::new(Checking { rules, all_places, digest, may_fail })))
+}
+
+fn all_places(keys: &Keys) -> Result<bool, ApiError> {
+    match keys.get("places") {
+        None | Some("first") => Ok(false),
+        Some("all") => Ok(true),
+        Some(other) => Err(bad("out_of_range", format!("`places` is {}, and allowed are first, all", quote(other)))),
+    }
 }
 
 fn rules(keys: &Keys) -> Result<RuleSet, ApiError> {
@@ -103,6 +112,7 @@ fn rules(keys: &Keys) -> Result<RuleSet, ApiError> {
 /// The name of an answer. Debug output has every field, exact numbers and quoted text.
 fn key(digest: Digest, reading: &Reading, keys: &Keys) -> Result<String, ApiError> {
     let version = env!("CARGO_PKG_VERSION");
-    let key = format!("check {version} {digest} {reading:?} {:?} {}", rules(keys)?, keys.may_fail()?);
+    let (rules, all_places) = (rules(keys)?, all_places(keys)?);
+    let key = format!("check {version} {digest} {reading:?} {rules:?} {all_places} {}", keys.may_fail()?);
     Ok(format!("\"{}\"", Digest::of(key.as_bytes())))
 }

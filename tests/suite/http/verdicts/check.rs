@@ -129,7 +129,7 @@ fn mistakes_are_refused_before_a_worker_sees_them() {
     let server = Server::start(&["--limit-triangles", "100", "--limit-body-bytes", "100000"]);
     let digest = Digest::of(CUBE_OBJ).to_string();
     let long = format!("rules={}", "x".repeat(5000));
-    let cases: [(&str, &str, &str); 16] = [
+    let cases: [(&str, &str, &str); 17] = [
         ("rules=watertigt", "unknown_rule", "did you mean `watertight`?"),
         ("rules=max-triangles", "unknown_rule", "max-triangles:1000"),
         ("rules=max-triangles:-1", "unknown_rule", "max-triangles:1000"),
@@ -141,6 +141,7 @@ fn mistakes_are_refused_before_a_worker_sees_them() {
         ("rules=", "out_of_range", "names no rule"),
         ("rules=opens&rules=opens", "conflicting_keys", "`rules` is given twice"),
         ("fail=1", "out_of_range", "allowed is 422"),
+        ("places=some", "out_of_range", "allowed are first, all"),
         ("style=wire", "unknown_key", "`rules`, `warn`, `fail`"),
         ("kind=check", "unknown_key", "`rules`, `warn`, `fail`"),
         ("format_in=exe", "out_of_range", "stl"),
@@ -187,23 +188,30 @@ fn mistakes_are_refused_before_a_worker_sees_them() {
     let many = server.post("/v1/check", torus(12).as_bytes());
     let detail = many.problem(422, "limit_exceeded");
     assert_eq!(many.json()["flag"], "--limit-triangles", "{detail}");
-    assert_eq!(refused, 30);
+    assert_eq!(refused, 31);
     server.get("/v1/check").problem(405, "method_not_allowed");
 }
 
 #[test]
 fn the_faults_of_a_bad_mesh_are_counted_and_few_are_listed() {
     let server = Server::start(&[]);
-    // A triangle for each vertex of a long row: all edges are open.
-    let mut text = String::new();
-    for i in 0..20_000 {
-        text += &format!("v {i} 0 0\nv {i} 1 0\nv {i} 0 1\nf -1 -2 -3\n");
-    }
+    // A triangle for each place of a long row: all edges are open.
+    let row = |count: usize| -> String {
+        (0..count).map(|i| format!("v {i} 0 0\nv {i} 1 0\nv {i} 0 1\nf -1 -2 -3\n")).collect()
+    };
+    let text = row(20_000);
     let answer = server.post("/v1/check?rules=watertight,no-self-intersection,single-component", text.as_bytes());
     let verdict = answer.json();
     assert_eq!((&verdict["checks"][0]["found"], &verdict["checks"][2]["found"]), (&60_000.into(), &20_000.into()));
     assert_eq!(verdict["checks"][0]["where"].as_array().unwrap().len(), 20);
     assert!(answer.body.len() < 8000, "{} bytes", answer.body.len());
+    // All on request, up to a bound.
+    let all = server.post("/v1/check?rules=watertight&places=all", text.as_bytes()).json();
+    let places = all["checks"][0]["where"].as_array().unwrap();
+    assert_eq!((places.len(), &places[..20]), (60_000, &verdict["checks"][0]["where"].as_array().unwrap()[..]));
+    let bounded = server.post("/v1/check?rules=watertight&places=all", row(34_000).as_bytes()).json();
+    assert_eq!(bounded["checks"][0]["found"], 102_000);
+    assert_eq!(bounded["checks"][0]["where"].as_array().unwrap().len(), 100_000);
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! What strikes at first sight: wires that hide the surface, and surfaces without form because light bleaches
 //! them. Every mesh, in the looks that it has when nothing is asked for.
 //!
-//! `cargo test --test suite first_sight -- --nocapture` prints the figures of each mesh, and the RMS of
-//! luminance minus its mean over 9 x 9 pixels: how clearly a picture shows small forms.
+//! `cargo test --test suite -- first_sight outlines_specks --nocapture` prints the figures of each mesh, and the
+//! RMS of luminance minus its mean over 9 x 9 pixels: how clearly a picture shows small forms.
 
 #![allow(clippy::unwrap_used)] // clippy knows tests, but not their helpers
 
@@ -26,6 +26,9 @@ const DARK_MAX: f64 = 0.25;
 
 /// Share of a mesh's pixels that may be bleached at 512 px.
 const BLEACHED_MAX: f64 = 0.02;
+
+/// Alpha of a pixel that shows nothing but the mesh. Other programs round it down.
+const WHOLE: u8 = 254;
 
 /// Pixels beside one whose mean it is compared to.
 const REACH: usize = 4;
@@ -57,6 +60,57 @@ fn first_sight_tells_dark_from_bright() {
     assert_eq!((white.dark, white.bleached), (0.0, 1.0));
     let wires = figures(&mesh, &[("style", "wire"), ("wire.thickness", "3"), ("size", "256")]);
     assert!(wires.dark > DARK_MAX && wires.contrast > 20.0 && white.contrast < 1e-9, "{wires:?}");
+}
+
+/// Local contrast of the default picture, as a share of that of Blender's Workbench (studio light, cavity) from the
+/// same side and of the same size.
+const CLARITY_MIN: f64 = 0.9;
+
+#[test]
+fn first_sight_is_as_clear_as_that_of_workbench() {
+    let folders = (data::large_folder("models"), data::large_folder("references"));
+    let (Some(models), Some(references)) = folders else { return };
+    let mut missed = Vec::new();
+    for name in ["fandisk.obj", "stanford-bunny.obj", "featuretype.STL"] {
+        let mesh = scenes::mesh_of(&std::fs::read(models.join(name)).unwrap()).unwrap();
+        let stem = name.split('.').next().unwrap();
+        let reference = image::open(references.join(format!("workbench-{stem}.png"))).unwrap().into_rgba8();
+        let reference =
+            Image { width_px: reference.width(), height_px: reference.height(), rgba: reference.into_raw() };
+        let own = of_height(&mesh, height_px(&reference));
+        let share = contrast(&own) / contrast(&reference);
+        println!("{name:<32} local contrast {:4.2}: {share:.2} of Workbench's", contrast(&own));
+        if share < CLARITY_MIN {
+            missed.push(format!("{name}: {share:.3}"));
+        }
+    }
+    assert!(missed.is_empty(), "{missed:?}");
+}
+
+/// The default picture of a mesh, with the margin with which it is as high as asked.
+fn of_height(mesh: &Mesh, wanted_px: usize) -> Image {
+    let [mut low, mut high] = [0.0, 0.4];
+    let mut picture = None;
+    for _ in 0..8 {
+        let margin = 0.5 * (low + high);
+        let keys = [("size", "512"), ("background", "transparent"), ("camera.margin", &margin.to_string())];
+        let drawn = CpuRenderer::new(2).draw(&scenes::plan(mesh, &scenes::spec(&keys)), &Deadline::default()).unwrap();
+        if height_px(&drawn) > wanted_px {
+            low = margin
+        } else {
+            high = margin
+        }
+        picture = Some(drawn);
+    }
+    picture.unwrap()
+}
+
+/// Rows from the first to the last that shows the mesh.
+fn height_px(picture: &Image) -> usize {
+    let rows = || picture.rgba.chunks_exact(4 * picture.width_px as usize);
+    let shows = |row: &[u8]| row.chunks_exact(4).any(|pixel| pixel[3] > 127);
+    let (first, last) = (rows().position(shows), rows().rposition(shows));
+    first.zip(last).map_or(0, |(first, last)| last - first + 1)
 }
 
 /// Prints the figures of all meshes, and compares them to the goals.
@@ -113,7 +167,7 @@ fn contrast(picture: &Image) -> f64 {
     for y in REACH..height.saturating_sub(REACH) {
         for x in REACH..width.saturating_sub(REACH) {
             let around = || (y - REACH..=y + REACH).flat_map(|y| (x - REACH..=x + REACH).map(move |x| (x, y)));
-            if pixel(x, y)[3] < 255 || around().any(|(x, y)| pixel(x, y)[3] < 255) {
+            if around().any(|(x, y)| pixel(x, y)[3] < WHOLE) {
                 continue;
             }
             let sum: f64 = around().map(|(x, y)| luminance(pixel(x, y))).sum();

@@ -1,7 +1,7 @@
 //! Specks: isolated crumbs of an outline inside a shape. Every mesh, in the default outline and as a
 //! contour.
 //!
-//! `cargo test --test suite outlines_specks -- --nocapture` prints the number of each mesh.
+//! `cargo test --test suite -- first_sight outlines_specks --nocapture` prints the number of each mesh.
 
 use meshsnap::backend::Renderer;
 use meshsnap::backend::cpu::CpuRenderer;
@@ -19,14 +19,14 @@ const SPECK_PX: usize = 80;
 /// The goal: specks of a mesh.
 const SPECKS_MAX: usize = 3;
 
-/// Meshes that miss the goal, with the specks that they have: sheets that lie closely over each
-/// other, and triangles without order.
-const MORE: [(&str, usize); 2] = [("DamagedHelmet.glb", 19), ("soup.stl", 5)];
+/// Meshes that miss the goal in one of the views, with the specks that they have: triangles that pierce each
+/// other without order.
+const MORE: [(&str, usize); 1] = [("soup.stl", 4)];
 
 #[test]
 fn outlines_specks_are_few_on_the_models_of_the_repository() {
     let meshes = readable(&data::folder("models"));
-    assert_eq!(measure(&meshes), 2 * meshes.len());
+    assert_eq!(measure(&meshes), 4 * meshes.len());
     assert!(meshes.len() >= 16, "{}", meshes.len());
 }
 
@@ -35,7 +35,7 @@ fn outlines_specks_are_few_on_large_models() {
     let Some(folder) = data::large_folder("models") else { return };
     let meshes = readable(&folder);
     assert!(meshes.len() >= 36, "only {} models are read", meshes.len());
-    assert_eq!(measure(&meshes), 2 * meshes.len());
+    assert_eq!(measure(&meshes), 4 * meshes.len());
 }
 
 #[test]
@@ -67,12 +67,12 @@ fn measure(meshes: &[(String, Mesh)]) -> usize {
     let mut missed = Vec::new();
     let mut pictures = 0;
     for (name, mesh) in meshes {
-        for method in ["hull", "contour"] {
-            let count = specks(mesh, &[("outline.method", method)]);
-            println!("{name:<32} {method:<8} {count:4} specks");
+        for (method, view) in [("hull", "auto"), ("hull", "iso"), ("contour", "auto"), ("contour", "iso")] {
+            let count = specks(mesh, &[("outline.method", method), ("view", view)]);
+            println!("{name:<32} {method:<8} {view:<4} {count:4} specks");
             let most = MORE.iter().find(|(more, _)| more == name).map_or(SPECKS_MAX, |(_, most)| *most);
             if count > most {
-                missed.push(format!("{name}, {method}: {count} specks"));
+                missed.push(format!("{name}, {method}, {view}: {count} specks"));
             }
             pictures += 1;
         }

@@ -8,9 +8,10 @@ use quick_xml::escape::escape;
 
 use super::text::{at, place};
 use super::{Findings, ViewPictures, faults, word};
-use crate::check::{Check, Figure, Verdict, meaning};
+use crate::check::{Check, Figure, PLACES_MAX, Verdict, meaning};
 use crate::cli::check::pictures::Changed;
 use crate::pluralise::pluralise;
+use crate::report::significant;
 
 const CSS: &str = include_str!("page.css");
 const JS: &str = include_str!("page.js");
@@ -46,19 +47,41 @@ pub fn html(findings: &Findings<'_>) -> String {
         ("warning", "with warnings"),
         ("known", "with known faults"),
         ("ok", "ok"),
+        ("changed", "with changed pictures"),
     ] {
         let _ = writeln!(page, "<option value=\"{value}\">{label}</option>");
     }
     page += "</select></label>\n<span id=\"shown\" role=\"status\"></span>\n</form>\n";
-    page += "<div class=\"table\" role=\"region\" aria-label=\"Files\" tabindex=\"0\">\n<table>\n<thead>\n<tr>\
-             <th scope=\"col\">File</th><th scope=\"col\">Verdict</th><th scope=\"col\">Faults</th></tr>\n</thead>\n<tbody>\n";
+    page += "<div class=\"table\" role=\"region\" aria-label=\"Files\" tabindex=\"0\">\n<table role=\"table\">\n\
+             <thead role=\"rowgroup\">\n<tr role=\"row\">";
+    for name in ["File", "Verdict", "Faults"] {
+        let _ = write!(page, "<th scope=\"col\" role=\"columnheader\">{name}</th>");
+    }
+    page += "</tr>\n</thead>\n<tbody role=\"rowgroup\">\n";
     let mut room = PICTURES_BYTES_MAX;
-    for (index, verdict) in findings.verdicts.iter().enumerate() {
+    let mut rows: Vec<(usize, &Verdict)> = findings.verdicts.iter().enumerate().collect();
+    // Faults first, and otherwise in the order of the paths: sorting keeps it.
+    rows.sort_by_key(|(_, verdict)| STATES.iter().position(|(state, _)| *state == state_of(verdict)));
+    for (index, verdict) in rows {
         let pictures = findings.pictures.get(index).map(Vec::as_slice).unwrap_or_default();
         row(&mut page, verdict, pictures, &mut room);
     }
     let _ = write!(page, "</tbody>\n</table>\n</div>\n</main>\n<script>\n{JS}</script>\n</body>\n</html>\n");
     page
+}
+
+/// States of files with their labels, in the order of the rows.
+const STATES: [(&str, &str); 4] =
+    [("error", "failed"), ("warning", "ok, with warnings"), ("known", "ok, with known faults"), ("ok", "ok")];
+
+fn state_of(verdict: &Verdict) -> &'static str {
+    let met = |meant: &str| faults(verdict).any(|check| word(check) == meant);
+    match () {
+        () if !verdict.ok => "error",
+        () if met("warning") => "warning",
+        () if met("known") => "known",
+        () => "ok",
+    }
 }
 
 /// A sentence with the numbers of faults.
@@ -80,16 +103,12 @@ fn counts(findings: &Findings<'_>) -> String {
 }
 
 fn row(page: &mut String, verdict: &Verdict, pictures: &[ViewPictures], room: &mut usize) {
-    let met = |meant: &str| faults(verdict).any(|check| word(check) == meant);
-    let (state, label) = match () {
-        () if !verdict.ok => ("error", "failed"),
-        () if met("warning") => ("warning", "ok, with warnings"),
-        () if met("known") => ("known", "ok, with known faults"),
-        () => ("ok", "ok"),
-    };
+    let state = state_of(verdict);
+    let label = STATES.iter().find(|(one, _)| *one == state).map_or("", |(_, label)| label);
     let _ = write!(
         page,
-        "<tr data-state=\"{state}\"><th scope=\"row\">{}</th><td class=\"{state}\">{label}</td><td>",
+        "<tr data-state=\"{state}\" role=\"row\"><th scope=\"row\" role=\"rowheader\">{}</th>\
+         <td class=\"{state}\" role=\"cell\">{label}</td><td class=\"faults\" role=\"cell\">",
         text(&verdict.path)
     );
     if faults(verdict).next().is_some() {
@@ -117,6 +136,9 @@ fn views(page: &mut String, path: &str, pictures: &[ViewPictures], room: &mut us
     *room -= pictures.iter().map(bytes).sum::<usize>();
     page.push_str("<div class=\"views\">");
     for ViewPictures { view, after, changed } in pictures {
+        if changed.is_some() {
+            page.push_str("<div class=\"changed\">");
+        }
         let mut figure = |kind: &str, png: &[u8]| {
             let data = STANDARD.encode(png);
             let caption = if kind.is_empty() { (*view).to_owned() } else { format!("{view}, {kind}") };
@@ -140,8 +162,8 @@ fn views(page: &mut String, path: &str, pictures: &[ViewPictures], room: &mut us
         let _ = write!(
             page,
             "<p class=\"change\">{view} changed by {} (FLIP, 0 to 1) <button type=\"button\" hidden \
-             aria-pressed=\"false\" aria-label=\"Blink {view} of {}\">Blink</button></p>",
-            short(*flip),
+             aria-pressed=\"false\" aria-label=\"Blink {view} of {}\">Blink</button></p></div>",
+            significant(*flip, 2),
             text(path)
         );
     }
@@ -158,7 +180,7 @@ fn fault(page: &mut String, check: &Check) {
         text(&check.detail)
     );
     if !check.places.is_empty() {
-        let shown = check.places.len() as u64;
+        let shown = check.places.len().min(PLACES_MAX) as u64;
         let all = match check.found {
             Some(Figure::Count(count)) => count.max(shown),
             _ => shown,
@@ -169,7 +191,7 @@ fn fault(page: &mut String, check: &Check) {
             pluralise(shown, "place", "places")
         };
         let _ = write!(page, "<details><summary>{first}</summary><ol>");
-        for one in &check.places {
+        for one in check.places.iter().take(PLACES_MAX) {
             let _ = write!(page, "<li>{}</li>", text(&place(one)));
         }
         page.push_str("</ol></details>");
@@ -177,11 +199,6 @@ fn fault(page: &mut String, check: &Check) {
         page.push_str(&text(&at(check)));
     }
     page.push_str("</li>");
-}
-
-/// Two digits.
-fn short(value: f64) -> f64 {
-    format!("{value:.1e}").parse().unwrap_or(value)
 }
 
 /// A text without characters that take no place or turn the line around, escaped.

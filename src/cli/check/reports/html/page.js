@@ -9,7 +9,8 @@ const filter = () => {
   let count = 0;
   for (const row of rows) {
     const text = row.textContent.toLowerCase();
-    const fits = (state === "all" || row.dataset.state === state) && words.every((word) => text.includes(word));
+    const isOf = state === "all" || row.dataset.state === state || (state === "changed" && row.querySelector(".changed"));
+    const fits = isOf && words.every((word) => text.includes(word));
     row.hidden = !fits;
     count += fits ? 1 : 0;
   }
@@ -23,13 +24,7 @@ filter();
 // Blinks a view: the picture after shows the one before by turns. Where motion is unwanted, each press turns once.
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 for (const button of document.querySelectorAll(".change button")) {
-  const figures = [];
-  for (let one = button.parentElement.previousElementSibling; one; one = one.previousElementSibling) {
-    if (!one.matches("figure")) break;
-    figures.push(one);
-    if (one.matches(".before")) break;
-  }
-  const find = (name) => figures.find((one) => one.matches(name))?.querySelector("img");
+  const find = (name) => button.closest(".changed").querySelector(`${name} img`);
   const [before, after] = [find(".before"), find(".after")];
   if (!before || !after) continue;
   const sources = [after.src, before.src];

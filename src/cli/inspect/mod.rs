@@ -1,5 +1,7 @@
 //! `meshsnap inspect`: reports the content of a mesh file.
 
+mod lines;
+
 use clap::{Args, ValueHint};
 
 use super::format_arg::FormatArg;
@@ -21,6 +23,8 @@ Examples:
   meshsnap inspect knot.obj
   meshsnap inspect model.obj model.mtl wood.png --json
   meshsnap inspect part.stl --print --parts
+  meshsnap inspect model.glb --uv
+  meshsnap inspect parts/ 'more/*.obj' --jsonl
   meshsnap inspect walk.glb --set scene.time_s=0.5";
 
 /// Arguments of `inspect`.
@@ -40,12 +44,19 @@ pub struct InspectArgs {
     /// Print JSON
     #[arg(long)]
     json: bool,
+    /// Take each name for a mesh of its own, or a folder or a pattern of meshes, and print the report on each as a line of
+    /// JSON, in the order of their paths
+    #[arg(long, conflicts_with_all = ["json", "entry"])]
+    jsonl: bool,
     /// Report what matters for printing, too: thickness of walls, overhangs, the way in which it stands
     #[arg(long)]
     print: bool,
     /// Report each connected part, too, and the loops of open and sharp edges, with their lengths
     #[arg(long)]
     parts: bool,
+    /// Report the charts of the texture, too: their areas, how much they stretch it, and where they overlap
+    #[arg(long)]
+    uv: bool,
     #[command(flatten)]
     format_in: FormatArg,
     /// The mesh among several files, where more than one could be
@@ -58,6 +69,12 @@ pub struct InspectArgs {
     limits: LimitSettings,
 }
 
+impl InspectArgs {
+    fn extras(&self) -> Extras {
+        Extras { print: self.print, parts: self.parts, uv: self.uv }
+    }
+}
+
 /// Prints the report.
 pub fn run(arguments: &InspectArgs) -> Result<(), CliError> {
     isolation::on_demand();
@@ -66,21 +83,19 @@ pub fn run(arguments: &InspectArgs) -> Result<(), CliError> {
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
     let time_s = request::read_moment(&pairs(&arguments.set)?, &rules)
         .map_err(|error| CliError::usage(format!("--set: {error}")))?;
+    let options = import::Options { format, time_s, ..import::Options::default() };
+    if arguments.jsonl {
+        return lines::run(arguments, options, limits);
+    }
     let progress = Progress::start("reading");
     let mesh_name = bundle::name(&arguments.meshes);
     let named = bundle::read(&arguments.meshes, arguments.entry.clone(), &limits)?;
     let (paths, archives) = named.paths();
     progress.next("parsing");
     let mut parsed = |_| progress.next("counting edges");
-    let report = pipeline::inspect(
-        &named.bundle,
-        import::Options { format, time_s, ..import::Options::default() },
-        Extras { print: arguments.print, parts: arguments.parts },
-        &limits,
-        &Deadline::default(),
-        &mut parsed,
-    )
-    .map_err(|error| CliError::from(error).about(mesh_name))?;
+    let report =
+        pipeline::inspect(&named.bundle, options, arguments.extras(), &limits, &Deadline::default(), &mut parsed)
+            .map_err(|error| CliError::from(error).about(mesh_name))?;
     drop(progress);
     for sentence in bundle::unused(&paths, &named.file_use, |path| archives.iter().any(|archive| archive == path)) {
         say!("meshsnap: {sentence}");
