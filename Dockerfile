@@ -1,4 +1,5 @@
 # Builds with the toolchain's image, runs on a slim Debian with a software Vulkan, as a user without rights.
+# docker build --target cpu makes the smaller image without Vulkan, which draws on the CPU alone.
 FROM rust:1-bookworm AS build
 WORKDIR /src
 COPY . .
@@ -9,12 +10,8 @@ ARG MESHSNAP_COMMIT
 RUN --mount=type=cache,target=/usr/local/cargo/registry --mount=type=cache,target=/src/target \
     cargo build --release --locked --bin meshsnap && cp target/release/meshsnap /usr/local/bin/
 
-FROM debian:bookworm-slim
-# lavapipe, so that the GPU back-end works without a GPU; on a host with one, its driver is mounted in.
-RUN apt-get update -qq \
-    && apt-get install -y -qq --no-install-recommends mesa-vulkan-drivers libvulkan1 \
-    && rm -rf /var/lib/apt/lists/* \
-    && useradd --system --no-create-home --shell /usr/sbin/nologin meshsnap \
+FROM debian:bookworm-slim AS cpu
+RUN useradd --system --no-create-home --shell /usr/sbin/nologin meshsnap \
     && mkdir /data && chown meshsnap /data
 COPY --from=build /usr/local/bin/meshsnap /usr/local/bin/meshsnap
 # The Vulkan loader complains on standard error where this is missing.
@@ -33,3 +30,11 @@ EXPOSE 8080
 HEALTHCHECK --interval=10s --timeout=4s --start-period=5s --retries=3 CMD ["meshsnap", "health"]
 ENTRYPOINT ["meshsnap"]
 CMD ["serve"]
+
+FROM cpu
+# lavapipe, so that the GPU back-end works without a GPU; on a host with one, its driver is mounted in.
+USER root
+RUN apt-get update -qq \
+    && apt-get install -y -qq --no-install-recommends mesa-vulkan-drivers libvulkan1 \
+    && rm -rf /var/lib/apt/lists/*
+USER meshsnap

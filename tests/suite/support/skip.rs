@@ -22,10 +22,10 @@ pub enum Need {
     Python,
     /// `systemd-analyze` on the `PATH`.
     Systemd,
-    /// Chromium on the `PATH`, and axe-core, which `tests/run` installs into `target/node`.
-    Browser,
     /// A C compiler, `cc`, on the `PATH`.
     Compiler,
+    /// Chromium on the `PATH`, and axe-core, which `tests/run` installs into `target/node`.
+    Browser,
 }
 
 impl Need {
@@ -39,8 +39,8 @@ impl Need {
             Self::Mount => "mount",
             Self::Python => "python",
             Self::Systemd => "systemd",
-            Self::Browser => "browser",
             Self::Compiler => "compiler",
+            Self::Browser => "browser",
         }
     }
 }

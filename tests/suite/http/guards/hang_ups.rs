@@ -130,7 +130,7 @@ fn the_place_of_a_client_that_hangs_up_is_free_at_once() {
     let mut times: Vec<Duration> = (0..ROUNDS)
         .map(|_| {
             let mut stream = server.connect();
-            let path = "/v1/render?size=4096&samples=16&style=technical";
+            let path = "/v1/render?size=2048&samples=16&style=technical";
             write!(stream, "POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {}\r\n\r\n", CUBE_OBJ.len())
                 .unwrap();
             stream.write_all(CUBE_OBJ).unwrap();
