@@ -186,7 +186,7 @@ impl<'a> Chains<'a> {
         let is_weak = |part: &VisiblePart| part.shown < SHOWN_MIN && !part.is_border;
         let is_single = |i: usize| {
             let same = |other: Option<&VisiblePart>| other.is_some_and(|other| other.edge == parts[i].edge);
-            !same(parts.get(i + 1)) && !(i > 0 && same(parts.get(i - 1)))
+            !(same(parts.get(i + 1)) || i > 0 && same(parts.get(i - 1)))
         };
         for (i, part) in parts.iter().enumerate().filter(|(_, part)| is_weak(part)) {
             if i % CHECK_EVERY == 0 {

@@ -82,7 +82,10 @@ pub struct JobSettings {
 
 /// Hears of the end of a job. A lock is held, so it returns at once.
 #[derive(Clone)]
-pub struct OnEnd(pub Arc<dyn Fn(&Arc<Job>) + Send + Sync>);
+pub struct OnEnd(pub Arc<Hearer>);
+
+/// A function that is called with a job that has ended.
+pub type Hearer = dyn Fn(&Arc<Job>) + Send + Sync;
 
 impl std::fmt::Debug for OnEnd {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
