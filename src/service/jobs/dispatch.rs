@@ -17,7 +17,7 @@ const MEMORY_WAIT: Duration = Duration::from_millis(20);
 /// The next step of a worker.
 pub enum Next {
     /// It does this job.
-    Job(Arc<Job>, Work, Arc<JobMemory>),
+    Job(Arc<Job>, Box<Work>, Arc<JobMemory>),
     /// It has waited in vain.
     Idle,
     /// It ends: there will be no more.
@@ -53,7 +53,7 @@ impl JobRegistry {
                         storage.durable.store_soon(vec![Change::Started(job.id.key())], Vec::new());
                     }
                     self.publish(&inner);
-                    return Next::Job(job, work, memory);
+                    return Next::Job(job, Box::new(work), memory);
                 }
                 continue;
             }

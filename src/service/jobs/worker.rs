@@ -184,8 +184,8 @@ pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
             JobState::Failed(Arc::new(Failure::Panicked))
         });
         let work = match memory.was_refused() && matches!(state, JobState::Failed(_)) {
-            true => match registry.again(&job, work) {
-                Some(work) => work,
+            true => match registry.again(&job, *work) {
+                Some(work) => Box::new(work),
                 None => continue,
             },
             false => work,
