@@ -80,12 +80,12 @@ pub struct JobSettings {
     pub webhooks: Option<OnEnd>,
 }
 
-/// Hears of the end of a job. A lock is held, so it returns at once.
-#[derive(Clone)]
-pub struct OnEnd(pub Arc<Hearer>);
+/// What is called with a job that has ended. A lock is held, so it returns at once.
+pub type Hear = dyn Fn(&Arc<Job>) + Send + Sync;
 
-/// A function that is called with a job that has ended.
-pub type Hearer = dyn Fn(&Arc<Job>) + Send + Sync;
+/// Hears of the end of a job.
+#[derive(Clone)]
+pub struct OnEnd(pub Arc<Hear>);
 
 impl std::fmt::Debug for OnEnd {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -162,7 +162,7 @@ pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
     priority::lower();
     loop {
         let (job, work, memory) = match registry.take(renderer.is_some().then_some(registry.settings.idle_time)) {
-            Next::Job(job, work, memory) => (job, *work, memory),
+            Next::Job(job, work, memory) => (job, work, memory),
             Next::Idle => {
                 drop_renderer(&mut renderer);
                 continue;
@@ -184,8 +184,8 @@ pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
             JobState::Failed(Arc::new(Failure::Panicked))
         });
         let work = match memory.was_refused() && matches!(state, JobState::Failed(_)) {
-            true => match registry.again(&job, work) {
-                Some(work) => work,
+            true => match registry.again(&job, *work) {
+                Some(work) => Box::new(work),
                 None => continue,
             },
             false => work,
