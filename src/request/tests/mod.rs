@@ -193,6 +193,8 @@ fn defaults_depend_on_other_keys_where_the_contract_says_so() {
     let light = query(&[("light.preset", "none")]).unwrap().light;
     assert_eq!((light.intensity, light.ambient), (1.0, 1.0));
     let light = query(&[("light.preset", "three-point")]).unwrap().light;
+    assert_eq!((light.intensity, light.ambient), (1.0, 0.18));
+    let light = query(&[("style", "flat"), ("light.preset", "three-point")]).unwrap().light;
     assert_eq!((light.intensity, light.ambient), (1.0, 0.3));
     for method in ["fwidth-min", "barycentric", "threshold"] {
         assert_eq!(smoothing(&[("wire.method", method)]), 1.0, "{method}");
