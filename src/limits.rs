@@ -45,7 +45,7 @@ pub trait Lend: std::fmt::Debug + Send + Sync {
     /// ever hold.
     fn lend(&self, bytes: u64) -> Result<(), u64>;
 
-    /// What the job holds is counted elsewhere from now on: it begins at 0 again.
+    /// The job holds 0 bytes from now on: somebody else counts those that it has borrowed.
     fn restart(&self);
 }
 
@@ -154,7 +154,7 @@ impl Budget {
         }
     }
 
-    /// What is left of this budget, for a job that borrows from `lender` all that is spent beyond `from` bytes.
+    /// This budget with its spending so far, for a job that borrows from `lender` all that is spent beyond `from` bytes.
     #[must_use]
     pub fn lent_by(&self, lender: &Lender, from: u64) -> Self {
         Self { lender: lender.clone(), lent_from: from.min(self.spent), ..self.clone() }

@@ -92,7 +92,7 @@ pub const PLACES_MAX: usize = 20;
 /// Most places in one verdict where all are asked for. The others are counted.
 pub const ALL_PLACES_MAX: usize = 100_000;
 
-/// How a file is judged, beside its rules.
+/// Options of a verdict, beside its rules.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
     /// All places are listed, up to [`ALL_PLACES_MAX`].

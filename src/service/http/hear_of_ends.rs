@@ -1,4 +1,4 @@
-//! What webhooks are told of the end of a job: the JSON of its state.
+//! The message that a webhook gets at the end of a job: the JSON of its state.
 
 use std::sync::Arc;
 use std::time::Duration;

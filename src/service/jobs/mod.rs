@@ -80,7 +80,8 @@ pub struct JobSettings {
     pub webhooks: Option<OnEnd>,
 }
 
-/// What is called with a job that has ended. A lock is held, so it returns at once.
+/// A function that is called with each job that has ended. The registry holds its lock meanwhile, so the function returns
+/// at once.
 pub type Hear = dyn Fn(&Arc<Job>) + Send + Sync;
 
 /// Hears of the end of a job.
@@ -119,7 +120,7 @@ pub enum Refusal {
         /// Seconds until there should be time enough.
         retry_after_s: u64,
     },
-    /// What is kept and being sent leaves no memory for the job.
+    /// There is no memory for the job beside uploads, results and answers.
     #[error(
         "uploads, results and answers that are being sent leave no memory for this job, which takes about {bytes} \
          bytes; try again in {retry_after_s} s"

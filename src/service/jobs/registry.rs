@@ -54,7 +54,7 @@ pub struct JobRegistry {
     outstanding: watch::Sender<usize>,
 }
 
-/// What the lock guards.
+/// The state of all jobs, behind one lock.
 #[derive(Default)]
 pub(super) struct Inner {
     pub(super) queue: Queue,

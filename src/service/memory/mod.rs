@@ -32,7 +32,7 @@ pub enum Account {
     Residents,
     /// Pictures of stored meshes; a cache.
     Pictures,
-    /// What was made and nothing keeps: answers that are being sent.
+    /// Answers that are being sent and are kept nowhere.
     Answers,
 }
 
@@ -189,8 +189,8 @@ impl Memory {
         self.job
     }
 
-    /// How often an account was refused bytes since the start. A client that holds some and sends nothing makes room when
-    /// the number grows.
+    /// Number of times that an account was refused bytes since the start. While the number grows, a client that holds
+    /// memory and sends nothing is cut off.
     pub fn refusals(&self, account: Account) -> u64 {
         self.lock().refusals[account as usize]
     }

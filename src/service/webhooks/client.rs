@@ -24,7 +24,7 @@ const SECRET_BYTES: std::ops::RangeInclusive<usize> = 24..=64;
 /// The beginning of a secret's text.
 const SECRET_PREFIX: &str = "whsec_";
 
-/// What became of an attempt.
+/// The result of an attempt.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The receiver has it.

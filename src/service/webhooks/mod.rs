@@ -37,7 +37,7 @@ const BACK_OFF: u32 = 4;
 /// Time at the end of the process for deliveries that are due.
 const CLOSING_TIME: Duration = Duration::from_secs(2);
 
-/// What is sent of the end of a job.
+/// A message about the end of a job, and its receiver.
 #[derive(Clone, Debug)]
 pub struct Delivery {
     /// Its id, the same in each attempt: receivers know by it what they have already.
@@ -81,9 +81,9 @@ struct Inner {
 
 #[derive(Default)]
 struct State {
-    /// What has ended and is not a delivery yet.
+    /// Ended jobs whose messages are not written yet.
     incoming: Vec<Make>,
-    /// What waits, by the time of its next attempt.
+    /// Deliveries that wait, by the time of their next attempt, each with the number of attempts so far.
     waiting: BTreeMap<(Instant, u64), (Delivery, u32)>,
     /// Deliveries on their way, by host.
     on_way: HashMap<String, usize>,

@@ -198,13 +198,14 @@ impl Search<'_> {
         let last = ((range[1] * count as f64).ceil() as usize).clamp(first + 1, count);
         // A chain goes on where its edge is cut at the border of the picture.
         let is_cut = |end: usize| range[end] == [0.0, 1.0][end] && !self.places[i].is_whole[end];
-        let side = OuterSide::of(self.view, &self.edges[i], &self.places[i]);
+        let is_hull = self.method == OutlineMethod::Hull;
+        let side = is_hull.then(|| OuterSide::of(self.view, &self.edges[i], &self.places[i])).flatten();
         let (mut shown, mut is_border) = (0, is_cut(0) || is_cut(1));
         for k in first..last {
             let [beside, across @ ..] = self.beside(i, k);
             if grid.faces(grid.cells.at(beside)).all(|face| depth_at(face, beside).is_none()) {
                 is_border = true;
-            } else if self.method == OutlineMethod::Hull {
+            } else if is_hull {
                 let along = (k as f64 + 0.5) / count as f64;
                 let (inner, outer) = (self.places[i].at(along)[2], side.as_ref().map_or(0.0, |side| side.at(along)[2]));
                 for (at, share) in across.into_iter().zip(ACROSS) {
