@@ -33,6 +33,9 @@ pub struct Verdict {
     pub ok: bool,
     /// One for each rule, in the order of the rules.
     pub checks: Vec<Check>,
+    /// Sentences on the changes since a commit, if one was named.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub changes: Option<Vec<String>>,
     /// Files with pictures, by view, if some were written.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub pictures: BTreeMap<&'static str, String>,
@@ -41,7 +44,7 @@ pub struct Verdict {
 impl Verdict {
     /// The verdict of these checks.
     pub fn new(path: String, sha256: Option<String>, checks: Vec<Check>) -> Self {
-        let mut verdict = Self { path, sha256, ok: true, checks, pictures: BTreeMap::new() };
+        let mut verdict = Self { path, sha256, ok: true, checks, changes: None, pictures: BTreeMap::new() };
         verdict.judge();
         verdict
     }

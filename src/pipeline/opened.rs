@@ -63,22 +63,41 @@ impl Opened {
         diff::compare(a, b, max_distance, &mut budget, deadline)
     }
 
-    /// Draws the file.
-    pub fn draw(&self, spec: &Spec, backends: &mut Backends, deadline: &Deadline) -> Result<Image, RenderError> {
-        let mut budget = self.budget.clone();
-        Ok(draw_view(self.view(None), spec, None, backends, &mut budget, deadline, &mut |_| ())?.image)
+    /// Draws the file. If it is to be compared, the camera is fitted to what is `beside` it, too.
+    pub fn draw(
+        &self,
+        beside: Option<&Self>,
+        spec: &Spec,
+        backends: &mut Backends,
+        deadline: &Deadline,
+    ) -> Result<Image, RenderError> {
+        let mut budget = self.budget_of(beside)?;
+        let framing = self.framing_with(beside, &mut budget)?;
+        let view = self.view(framing.as_deref());
+        Ok(draw_view(view, spec, None, backends, &mut budget, deadline, &mut |_| ())?.image)
     }
 
-    /// Marks places of faults in a picture of the file. Those that are hidden are marked, too.
+    /// A request whose camera takes this file's word for what is up.
+    pub fn with_up(&self, spec: &Spec) -> Spec {
+        let up = Some(spec.camera.up.unwrap_or(self.imported.mesh.up));
+        Spec { camera: CameraSpec { up, ..spec.camera }, ..spec.clone() }
+    }
+
+    /// Marks places of faults in a picture of the file, drawn with the same file beside it. Those that are hidden are
+    /// marked, too.
     pub fn mark(
         &self,
         image: &mut Image,
+        beside: Option<&Self>,
         spec: &Spec,
         places: &[Place],
         deadline: &Deadline,
     ) -> Result<(), RenderError> {
-        let (mesh, mut budget) = (&self.imported.mesh, self.budget.clone());
-        let framing = plan::framing(mesh, spec, &self.prepared, &mut budget, deadline)?;
+        let (mesh, mut budget) = (&self.imported.mesh, self.budget_of(beside)?);
+        let framing = match self.framing_with(beside, &mut budget)? {
+            None => plan::framing(mesh, spec, &self.prepared, &mut budget, deadline)?,
+            framing => framing,
+        };
         let scene = Scene::framed_by(framing.as_deref().unwrap_or(&mesh.positions), mesh, spec, &mut budget)?;
         mark_places(image, &scene, places);
         Ok(())
@@ -86,6 +105,16 @@ impl Opened {
 
     fn view<'a>(&'a self, framing: Option<&'a [[f32; 3]]>) -> View<'a> {
         View { mesh: &self.imported.mesh, prepared: &self.prepared, framing }
+    }
+
+    /// The places to which a camera is fitted that shows this file and another. None: there is no other.
+    fn framing_with(&self, beside: Option<&Self>, budget: &mut Budget) -> Result<Option<Vec<[f32; 3]>>, MeshError> {
+        Ok(beside.map(|other| diff::framing(&self.imported.mesh, &other.imported.mesh, budget)).transpose()?)
+    }
+
+    /// The memory that is left beside the file, and beside another if there is one.
+    fn budget_of(&self, beside: Option<&Self>) -> Result<Budget, MeshError> {
+        beside.map_or_else(|| Ok(self.budget.clone()), |other| self.budget_beside(other))
     }
 
     /// The memory that is left beside both files.
@@ -169,9 +198,9 @@ pub fn draw_difference(
     let all = compared.of_vertices.iter().flatten();
     let most = all.copied().filter(|distance| distance.is_finite()).fold(0.0, f64::max);
     // The newer mesh says what is up, so that the camera is one.
-    let up = Some(spec.camera.up.unwrap_or(meshes[1].up));
-    let with_up = |spec: &Spec| Spec { camera: CameraSpec { up, ..spec.camera }, ..spec.clone() };
-    let (spec, plain) = (with_up(spec), Spec { image: spec.image, ..with_up(plain) });
+    let spec = opened[1].with_up(spec);
+    let camera = CameraSpec { up: spec.camera.up, ..plain.camera };
+    let plain = Spec { image: spec.image, camera, ..plain.clone() };
     let views = SheetViews::Named(vec![spec.camera.view; sides.len()]);
     let sheet = Sheet { views, columns: Some(sides.len() as u32), labels: false };
     let layout = Layout::new(&sheet, &spec.image, false);

@@ -1,6 +1,7 @@
 //! `meshsnap check`: judges mesh files by rules.
 
 mod baseline;
+mod changes;
 mod config;
 mod pictures;
 mod reports;
@@ -76,7 +77,7 @@ pub struct CheckArgs {
     /// Accept the faults that there are now: write them into the baseline
     #[arg(long)]
     update: bool,
-    /// Check only the meshes that changed since a commit, by the program `git`
+    /// Check only the meshes that changed since a commit, by the program `git`, and say what changed in each
     #[arg(long, value_name = "REF", value_hint = ValueHint::Other)]
     since: Option<String>,
     /// Views of pictures in reports and baselines: iso, front, ... [default: those of meshsnap.toml]
@@ -122,9 +123,10 @@ pub fn run(arguments: &CheckArgs) -> Result<(), CliError> {
     }
     let mut tasks = render::find(&arguments.paths, "png")?;
     tasks.all.sort_by(|a, b| a.mesh.cmp(&b.mesh));
-    if let Some(reference) = &arguments.since {
-        since::keep_changed(&mut tasks, reference)?;
-    }
+    let commit = match &arguments.since {
+        Some(reference) => Some(since::keep_changed(&mut tasks, reference)?),
+        None => None,
+    };
     let folder = arguments.baseline.clone().or_else(|| config.baseline().map(Path::to_owned));
     if arguments.update && folder.is_none() {
         let sentence = "--update needs a baseline: give --baseline DIR, or [check.baseline] in meshsnap.toml";
@@ -141,7 +143,7 @@ pub fn run(arguments: &CheckArgs) -> Result<(), CliError> {
         return Err(CliError::usage(sentence));
     }
     let baseline = folder.map(|folder| Baseline::new(folder, config.root()));
-    Run::new(arguments, config, tasks, baseline).with_pictures(&views)?.all()
+    Run::new(arguments, config, tasks, baseline).since(commit).with_pictures(&views)?.all()
 }
 
 /// The rules of the command line, or else of a file.

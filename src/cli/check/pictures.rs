@@ -38,19 +38,29 @@ pub struct ViewPictures {
     pub view: &'static str,
     /// The file as it is, with marks where rules fail.
     pub after: Vec<u8>,
-    /// The accepted picture, if it differs.
+    /// The picture of before, if it differs.
     pub changed: Option<Changed>,
 }
 
-/// A picture that is no more as it was accepted.
+/// A picture that is no more as it was.
 #[derive(Debug)]
 pub struct Changed {
-    /// The accepted picture.
+    /// The picture of before.
     pub before: Vec<u8>,
     /// The differences in colour.
     pub difference: Vec<u8>,
     /// The mean difference that a person sees (FLIP).
     pub flip: f64,
+}
+
+/// The pictures with which those of a file are compared.
+pub struct Against<'a> {
+    /// The accepted pictures.
+    pub baseline: Option<&'a Baseline>,
+    /// The pictures are accepted from now on.
+    pub is_update: bool,
+    /// The file as it was, whose pictures count rather than the accepted ones.
+    pub older: Option<&'a Opened>,
 }
 
 /// The pictures of a run.
@@ -88,12 +98,13 @@ impl Pictures {
         Ok(Some(Self { views, folder, limits: limits.clone(), inputs }))
     }
 
-    /// Draws a file, and compares the pictures with those that were accepted.
+    /// Draws a file, and compares the pictures with those of its older side, through one camera that is fitted to both,
+    /// or with those that were accepted.
     pub fn draw(
         &self,
         opened: &Opened,
         (mesh, checks): (&str, &[Check]),
-        (baseline, is_update): (Option<&Baseline>, bool),
+        against: &Against<'_>,
         backends: &mut Backends,
     ) -> Result<Vec<ViewPictures>, CliError> {
         let deadline = Deadline::default();
@@ -102,23 +113,26 @@ impl Pictures {
         let mut all = Vec::new();
         for (view, spec) in &self.views {
             let about = |error: CliError| error.about(&format!("{mesh}, {view}"));
-            let mut image = opened.draw(spec, backends, &deadline).map_err(|error| about(error.into()))?;
+            let older = against.older.filter(|_| !against.is_update);
+            let mut draw = |opened: &Opened, beside, spec: &Spec| {
+                opened.draw(beside, spec, backends, &deadline).map_err(|error| about(error.into()))
+            };
+            let mut image = draw(opened, older, spec)?;
             let plain = png(&image)?;
-            let mut changed = None;
-            match baseline {
-                Some(baseline) if is_update => baseline.keep_picture(mesh, view, &plain)?,
-                Some(baseline) => {
-                    let before = baseline.picture(mesh, view, BYTES_MAX)?;
-                    changed = before
-                        .filter(|before| *before != plain)
-                        .map(|before| self.changed(before, &plain))
-                        .transpose()?;
+            let before = match (older, against.baseline) {
+                (Some(older), _) => Some(png(&draw(older, Some(opened), &opened.with_up(spec))?)?),
+                (None, Some(baseline)) if against.is_update => {
+                    baseline.keep_picture(mesh, view, &plain)?;
+                    None
                 }
-                None => {}
-            }
+                (None, Some(baseline)) => baseline.picture(mesh, view, BYTES_MAX)?,
+                (None, None) => None,
+            };
+            let changed =
+                before.filter(|before| *before != plain).map(|before| self.changed(before, &plain)).transpose()?;
             let is_marked = !places.is_empty();
             if is_marked {
-                opened.mark(&mut image, spec, &places, &deadline).map_err(|error| about(error.into()))?;
+                opened.mark(&mut image, older, spec, &places, &deadline).map_err(|error| about(error.into()))?;
             }
             all.push(ViewPictures { view, after: if is_marked { png(&image)? } else { plain }, changed });
         }

@@ -8,9 +8,11 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::baseline::Baseline;
+use super::changes::{self, Changes};
 use super::config::Config;
-use super::pictures::{Pictures, ViewPictures};
+use super::pictures::{Against, Pictures, ViewPictures};
 use super::reports::{Findings, Reports, json_line, text};
+use super::since::Commit;
 use super::{CheckArgs, Output};
 use crate::backend::cpu::DrawingThreads;
 use crate::backend::{Backends, GpuHost, HardwareHint};
@@ -36,6 +38,8 @@ pub struct Run<'a> {
     config: Config,
     tasks: Tasks,
     baseline: Option<Baseline>,
+    /// The commit with which meshes are compared.
+    commit: Option<Commit>,
     /// The pictures, if a report or a baseline wants them.
     pictures: Option<Pictures>,
     gpu: Arc<GpuHost>,
@@ -83,7 +87,13 @@ impl<'a> Run<'a> {
         let named = tasks.companions.iter().map(comparable).collect();
         let limits = arguments.limits.config().limits;
         let gpu = Arc::new(GpuHost::new(HardwareHint::unless(why_no_gpu()), None));
-        Self { arguments, limits, config, tasks, baseline, pictures: None, gpu, named, used: Mutex::default() }
+        let (commit, pictures, used) = (None, None, Mutex::default());
+        Self { arguments, limits, config, tasks, baseline, commit, pictures, gpu, named, used }
+    }
+
+    /// The run that compares meshes with a commit.
+    pub fn since(self, commit: Option<Commit>) -> Self {
+        Self { commit, ..self }
     }
 
     /// The run with pictures of these views, if anything shows or keeps them.
@@ -178,12 +188,13 @@ impl<'a> Run<'a> {
         let path = &task.mesh;
         let companions = siblings::Companions { named: &self.named, all: task.has_folder || self.arguments.siblings };
         let format = self.arguments.format_in.format();
-        let mut digest = None;
+        let (mut digest, mut paths) = (None, Vec::new());
         let read = siblings::read_on(path, companions, &self.limits, |named| {
             // Alone at first: a digest is that of the mesh's own bytes.
             if let ([own], None) = (named.bundle.files(), &digest) {
                 digest = Some(Digest::of(&own.bytes).to_string());
             }
+            paths = named.bundle.files().iter().map(|file| file.path.clone()).collect();
             pipeline::open(&named.bundle, format, &self.limits, &Deadline::default())
         });
         let Read { value: opened, names, unread } = match read {
@@ -195,12 +206,15 @@ impl<'a> Run<'a> {
                 return Ok(Judged::without_pictures(path, digest, vec![unopened(detail)]));
             }
         };
+        let mut changes = None;
         let (checks, pictures) = match opened {
             Ok(opened) => {
                 let options = check::Options { all_places: self.arguments.all_places, fails_at_limits: true };
                 let checks = opened.check(self.config.rules_of(Path::new(path)), options, &Deadline::default());
                 let checks = checks.map_err(|error| CliError::from(error).about(path))?;
-                let pictures = self.draw(&opened, (path, &checks), backends, said)?;
+                let Changes { sentences, older } = self.changes(&opened, names.iter().cloned().zip(paths).collect());
+                changes = self.commit.is_some().then_some(sentences);
+                let pictures = self.draw((&opened, older.as_ref()), (path, &checks), backends, said)?;
                 (checks, pictures)
             }
             Err(error) => (vec![unopened(error.to_string())], Vec::new()),
@@ -210,20 +224,28 @@ impl<'a> Run<'a> {
         }
         let used = names.iter().map(comparable);
         self.used.lock().unwrap_or_else(PoisonError::into_inner).extend(used);
-        Ok(Judged { verdict: Verdict::new(path.clone(), digest, checks), pictures })
+        let verdict = Verdict { changes, ..Verdict::new(path.clone(), digest, checks) };
+        Ok(Judged { verdict, pictures })
+    }
+
+    /// The changes of a mesh since the commit, if there is one.
+    fn changes(&self, opened: &Opened, sources: Vec<(String, String)>) -> Changes {
+        let options = self.arguments.format_in.format().into();
+        let since = |commit| changes::since(commit, opened, &sources, options, &self.limits);
+        self.commit.as_ref().map(since).unwrap_or_default()
     }
 
     /// Draws the pictures of a file. One that cannot be drawn has none, and fails by its faults alone.
     fn draw(
         &self,
-        opened: &Opened,
+        (opened, older): (&Opened, Option<&Opened>),
         (path, checks): (&str, &[Check]),
         backends: &mut Backends,
         said: &mut Option<String>,
     ) -> Result<Vec<ViewPictures>, CliError> {
         let Some(pictures) = &self.pictures else { return Ok(Vec::new()) };
-        let accepted = (self.baseline.as_ref(), self.arguments.update);
-        match pictures.draw(opened, (path, checks), accepted, backends) {
+        let against = Against { baseline: self.baseline.as_ref(), is_update: self.arguments.update, older };
+        match pictures.draw(opened, (path, checks), &against, backends) {
             Err(error) if error.exit_code == 1 => {
                 *said = Some(format!("{}: no pictures are made of it", error.sentence));
                 Ok(Vec::new())

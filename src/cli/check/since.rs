@@ -1,7 +1,7 @@
-//! `--since REF`: the meshes that changed, by the `git` program.
+//! `--since REF`: the meshes that changed and their older sides, by the `git` program.
 
 use std::collections::BTreeSet;
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -17,10 +17,14 @@ const SEARCHED_BYTES_MAX: u64 = 256 << 20;
 /// The largest material library that is searched, bytes.
 const LIBRARY_BYTES_MAX: u64 = 16 << 20;
 
+/// The largest pointer of Git LFS, bytes.
+const LARGE_FILE_BYTES_MAX: usize = 1024;
+
 /// Leaves out the meshes that have not changed since a commit, here or in git. A mesh counts as changed, too, where a
 /// file has whose name is in it, such as a texture in its folder or below, or in its material library.
-pub fn keep_changed(tasks: &mut Tasks, reference: &str) -> Result<(), CliError> {
-    let changed = changed(reference)?;
+pub fn keep_changed(tasks: &mut Tasks, reference: &str) -> Result<Commit, CliError> {
+    let commit = Commit::find(reference)?;
+    let changed = commit.changed()?;
     let companions: Vec<&PathBuf> = changed.iter().filter(|path| is_companion(path)).collect();
     let has_changed = |task: &Task| {
         let Ok(path) = fs::canonicalize(&task.mesh) else { return true };
@@ -31,7 +35,7 @@ pub fn keep_changed(tasks: &mut Tasks, reference: &str) -> Result<(), CliError> 
     let before = tasks.all.len();
     tasks.all.retain(has_changed);
     tasks.is_part |= tasks.all.len() < before;
-    Ok(())
+    Ok(commit)
 }
 
 /// True if a mesh names one of these files, or a material library in its folder that does. Importers find a file by its
@@ -72,26 +76,99 @@ fn has_any(text: &[u8], names: &[Vec<u8>]) -> bool {
     names.iter().any(|name| !name.is_empty() && memchr::memmem::find(&text, name).is_some())
 }
 
-/// The files that differ from those of a commit, and those that git does not know, as absolute paths.
-fn changed(reference: &str) -> Result<BTreeSet<PathBuf>, CliError> {
-    let top =
-        git(&["rev-parse", "--show-toplevel"]).map_err(|error| error.sentence("--since needs a git repository"))?;
-    let top = PathBuf::from(path_of(top.trim_ascii_end()));
-    // A name that begins with a hyphen is no option, and what the name means is asked for once.
-    let commit = format!("{reference}^{{commit}}");
-    let commit = git(&["rev-parse", "--verify", "--quiet", "--end-of-options", &commit])
-        .map_err(|error| error.sentence(&format!("--since {reference}: git knows no such commit")))?;
-    let commit = String::from_utf8_lossy(commit.trim_ascii_end()).into_owned();
-    let in_top = ["-C", &top.to_string_lossy()].map(str::to_owned);
-    let list = |words: &[&str]| {
-        let words: Vec<&str> = in_top.iter().map(String::as_str).chain(words.iter().copied()).collect();
-        git(&words).map_err(|error| error.sentence("the changes cannot be listed"))
-    };
-    let differ = ["diff", "--name-only", "-z", "--no-ext-diff", "--no-renames", "--diff-filter=d", &commit, "--"];
-    let unknown = ["ls-files", "--others", "--exclude-standard", "-z"];
-    let lists = [list(&differ)?, list(&unknown)?];
-    let names = lists.iter().flat_map(|list| list.split(|byte| *byte == 0)).filter(|name| !name.is_empty());
-    Ok(names.filter_map(|name| fs::canonicalize(top.join(path_of(name))).ok()).collect())
+/// A commit of the repository of the current folder.
+#[derive(Debug)]
+pub struct Commit {
+    /// The folder of the repository.
+    top: PathBuf,
+    /// Its full name.
+    id: String,
+}
+
+impl Commit {
+    /// The commit that a name means.
+    pub fn find(reference: &str) -> Result<Self, CliError> {
+        let top =
+            git(&["rev-parse", "--show-toplevel"]).map_err(|error| error.sentence("--since needs a git repository"))?;
+        // A name that begins with a hyphen is no option, and what the name means is asked for once.
+        let commit = format!("{reference}^{{commit}}");
+        let id = git(&["rev-parse", "--verify", "--quiet", "--end-of-options", &commit])
+            .map_err(|error| error.sentence(&format!("--since {reference}: git knows no such commit")))?;
+        Ok(Self {
+            top: PathBuf::from(path_of(top.trim_ascii_end())),
+            id: String::from_utf8_lossy(id.trim_ascii_end()).into_owned(),
+        })
+    }
+
+    /// The files that differ from those of the commit, and those that git does not know, as absolute paths.
+    fn changed(&self) -> Result<BTreeSet<PathBuf>, CliError> {
+        let list = |words: &[&str]| self.git(words).map_err(|error| error.sentence("the changes cannot be listed"));
+        let differ = ["diff", "--name-only", "-z", "--no-ext-diff", "--no-renames", "--diff-filter=d", &self.id, "--"];
+        let unknown = ["ls-files", "--others", "--exclude-standard", "-z"];
+        let lists = [list(&differ)?, list(&unknown)?];
+        let names = lists.iter().flat_map(|list| list.split(|byte| *byte == 0)).filter(|name| !name.is_empty());
+        Ok(names.filter_map(|name| fs::canonicalize(self.top.join(path_of(name))).ok()).collect())
+    }
+
+    /// A file as it is in the commit, of at most so many bytes. None if it is not there. The error says why it cannot be
+    /// read.
+    pub fn file(&self, path: &Path, bytes_max: u64) -> Result<Option<Vec<u8>>, String> {
+        let Some(name) = fs::canonicalize(path).ok().and_then(|path| self.name_of(&path)) else { return Ok(None) };
+        let Ok(size) = self.git(&[OsStr::new("cat-file"), OsStr::new("-s"), &name]) else { return Ok(None) };
+        let size = std::str::from_utf8(size.trim_ascii_end()).ok().and_then(|size| size.parse::<u64>().ok());
+        if size.is_none_or(|size| size > bytes_max) {
+            return Err(format!("{} is larger than {bytes_max} bytes there", path.display()));
+        }
+        let bytes = self.git(&[OsStr::new("cat-file"), OsStr::new("blob"), &name]);
+        let bytes = bytes.map_err(|error| error.sentence(&path.display().to_string()).sentence)?;
+        match large_file(&bytes) {
+            Some(oid) => self.large_file(oid, path, bytes_max).map(Some),
+            None => Ok(Some(bytes)),
+        }
+    }
+
+    /// The name that git has for a file in the commit.
+    fn name_of(&self, path: &Path) -> Option<OsString> {
+        let top = fs::canonicalize(&self.top).ok()?;
+        let mut name = OsString::from(&self.id);
+        for (number, part) in path.strip_prefix(top).ok()?.components().enumerate() {
+            name.push(if number == 0 { ":" } else { "/" });
+            name.push(part);
+        }
+        Some(name)
+    }
+
+    /// The content of a file of Git LFS, from where `git lfs fetch` keeps it. Nothing is fetched here.
+    fn large_file(&self, oid: &str, path: &Path, bytes_max: u64) -> Result<Vec<u8>, String> {
+        let folder = self.git(&["rev-parse", "--git-common-dir"]);
+        let folder = folder.map_err(|error| error.sentence("the folder of git is not found").sentence)?;
+        let objects = self.top.join(path_of(folder.trim_ascii_end())).join("lfs/objects");
+        let object = objects.join(&oid[..2]).join(&oid[2..4]).join(oid);
+        let lacks =
+            format!("{} is a pointer of Git LFS there, and its content is not here: git lfs fetch", path.display());
+        match fs::metadata(&object) {
+            Ok(data) if data.len() > bytes_max => {
+                Err(format!("{} is larger than {bytes_max} bytes there", path.display()))
+            }
+            Ok(_) => fs::read(&object).map_err(|_| lacks),
+            Err(_) => Err(lacks),
+        }
+    }
+
+    /// Runs git in the folder of the repository.
+    fn git<W: AsRef<OsStr>>(&self, words: &[W]) -> Result<Vec<u8>, GitError> {
+        let folder = [OsStr::new("-C"), self.top.as_os_str()];
+        let words: Vec<&OsStr> = folder.into_iter().chain(words.iter().map(AsRef::as_ref)).collect();
+        git(&words)
+    }
+}
+
+/// The SHA-256 by which a pointer of Git LFS names its content; None if the file is no pointer.
+fn large_file(bytes: &[u8]) -> Option<&str> {
+    let text = std::str::from_utf8(bytes.get(..LARGE_FILE_BYTES_MAX.min(bytes.len()))?).ok()?;
+    let text = text.strip_prefix("version https://git-lfs.github.com/spec/")?;
+    let oid = text.lines().find_map(|line| line.strip_prefix("oid sha256:"))?.trim_end();
+    (oid.len() == 64 && oid.bytes().all(|byte| byte.is_ascii_hexdigit())).then_some(oid)
 }
 
 /// The reason why git gave no answer.
@@ -117,7 +194,7 @@ impl GitError {
 
 /// Runs git in the current folder and returns what it prints. No shell is between, and nothing that a repository
 /// configures is started.
-fn git(words: &[&str]) -> Result<Vec<u8>, GitError> {
+fn git<W: AsRef<OsStr>>(words: &[W]) -> Result<Vec<u8>, GitError> {
     let mut command = Command::new("git");
     command.args(["-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null"]).args(words);
     command.env("GIT_OPTIONAL_LOCKS", "0").env("LC_ALL", "C").stdin(Stdio::null());

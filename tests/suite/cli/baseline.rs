@@ -154,6 +154,60 @@ fn only_meshes_that_changed_since_a_commit_are_checked() {
     assert!(!folder.path().join("x").exists());
 }
 
+/// A mesh that is new, one whose older side is a pointer of Git LFS whose content is here, is not, or is no mesh, and one
+/// that lost a face: the page shows both sides of those that can be read.
+#[test]
+fn older_sides_come_from_git() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    git(folder.path(), &["init", "-q"]);
+    let pointer = |byte: char| {
+        let oid: String = std::iter::repeat_n(byte, 64).collect();
+        format!("version https://git-lfs.github.com/spec/v1\noid sha256:{oid}\nsize {}\n", CUBE_OBJ.len())
+    };
+    let object = at(".git/lfs/objects/aa/aa").join("a".repeat(64));
+    fs::create_dir_all(object.parent().unwrap()).unwrap();
+    fs::write(object, CUBE_OBJ).unwrap();
+    fs::write(at("kept.obj"), pointer('a')).unwrap();
+    fs::write(at("absent.obj"), pointer('b')).unwrap();
+    fs::write(at("broken.obj"), "nonsense").unwrap();
+    fs::write(at("open.obj"), CUBE_OBJ).unwrap();
+    git(folder.path(), &["add", "."]);
+    git(folder.path(), &["commit", "-qm", "first"]);
+    for name in ["kept.obj", "absent.obj", "broken.obj", "new.obj"] {
+        fs::write(at(name), CUBE_OBJ).unwrap();
+    }
+    fs::write(at("open.obj"), without(&["4 1 5 8"])).unwrap();
+    let options = ["--since", "HEAD", "--views", "iso", "--html", "page.html", "--markdown", "changes.md"];
+    let (code, out, said) = check(folder.path(), &[&["."], &options[..]].concat());
+    assert_eq!(code, Some(0), "{out}{said}");
+    let of = |name: &str| -> Vec<String> {
+        let lines = out.lines().skip_while(|line| *line != format!("./{name}: ok")).skip(1);
+        let own = lines.take_while(|line| line.starts_with(' ')).filter_map(|line| line.strip_prefix("  changed: "));
+        own.map(str::to_owned).collect()
+    };
+    let mut checked = 0;
+    for (name, part) in [
+        ("new.obj", "the file is new"),
+        ("kept.obj", "the geometry is unchanged"),
+        ("absent.obj", "its content is not here: git lfs fetch"),
+        ("broken.obj", "its older side cannot be read: "),
+        ("open.obj", "a hole with 4 edges near "),
+    ] {
+        assert!(of(name).iter().any(|sentence| sentence.contains(part)), "{name}: {out}");
+        checked += 1;
+    }
+    assert_eq!(checked, 5);
+    let page = fs::read_to_string(at("page.html")).unwrap();
+    assert!(page.contains(", before: ./open.obj") && !page.contains(", before: ./kept.obj"));
+    assert!(page.matches("<li><span>changed</span>").count() >= 5);
+    let table = fs::read_to_string(at("changes.md")).unwrap();
+    assert!(table.contains("| `./open.obj` | ") && table.contains("a hole with 4 edges"), "{table}");
+    let (code, json, _) = check(folder.path(), &["open.obj", "--since", "HEAD", "--format", "jsonl"]);
+    let verdict: Value = serde_json::from_str(&json).unwrap();
+    assert!(code == Some(0) && verdict["changes"][0].as_str().unwrap().contains("a hole"), "{json}");
+}
+
 #[test]
 fn a_folder_without_git_is_told() {
     let folder = folder();

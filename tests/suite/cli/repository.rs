@@ -198,7 +198,9 @@ fn each_commit_is_named_in_words_and_nothing_else() {
         let (code, out, said) = check(&repository, &["models", "--since", "HEAD~1", "--rules", "opens"]);
         let judged: Vec<&str> = out.lines().filter(|line| !line.starts_with(' ')).collect();
         assert_eq!((code, judged), (Some(0), vec![format!("{mesh}: ok").as_str()]), "{message}: {out}{said}");
+        let changed: Vec<&str> = out.lines().filter_map(|line| line.strip_prefix("  changed: ")).collect();
         let said = said_of(&repository, &mesh);
+        assert_eq!(changed, said, "{message}");
         assert_eq!(said.len(), expected.len(), "{message}: {said:?}");
         for (sentence, part) in said.iter().zip(expected) {
             assert!(sentence.contains(part), "{message}: {said:?}");

@@ -50,12 +50,36 @@ pub fn markdown(findings: &Findings<'_>) -> String {
         let more = pluralise(left.len() as u64, "fault is", "faults are");
         let _ = writeln!(text, "\n{more} left out here, for the size of a comment.");
     }
+    changes(findings, &mut text);
     thumbnails(findings, &mut text);
     if findings.lost > 0 {
         let lost = pluralise(findings.lost as u64, "file has", "files have");
         let _ = writeln!(text, "\n{lost} no verdict, by a fault of meshsnap.");
     }
     text
+}
+
+/// A table of the changes since a commit, as far as there is room.
+fn changes(findings: &Findings<'_>, text: &mut String) {
+    let said = |verdict: &Verdict| verdict.changes.as_ref().is_some_and(|changes| !changes.is_empty());
+    let mut left = findings.verdicts.iter().filter(|verdict| said(verdict)).peekable();
+    if left.peek().is_none() {
+        return;
+    }
+    *text += "\n| file | changed |\n|---|---|\n";
+    let mut left_out = 0;
+    for verdict in left {
+        let sentences: Vec<String> = verdict.changes.iter().flatten().map(|change| prose(change)).collect();
+        let row = format!("| {} | {} |\n", name(&verdict.path), sentences.join("<br>"));
+        match text.len() + row.len() > BYTES_MAX {
+            true => left_out += 1,
+            false => *text += &row,
+        }
+    }
+    if left_out > 0 {
+        let more = pluralise(left_out, "changed file is", "changed files are");
+        let _ = writeln!(text, "\n{more} left out here, for the size of a comment.");
+    }
 }
 
 /// A table of the pictures that were written of files that fail, as far as there is room.

@@ -8,11 +8,14 @@ use crate::check::{Check, Figure, Place, Verdict};
 /// Places that a line names; the JSON has more.
 const PLACES_MAX: usize = 3;
 
-/// A line for the file, and one for each rule that it breaks.
+/// A line for the file, and one for each rule that it breaks and each change.
 pub fn text(verdict: &Verdict) -> String {
     let mut text = format!("{}: {}\n", verdict.path, if verdict.ok { "ok" } else { "FAILED" });
     for check in faults(verdict) {
         let _ = writeln!(text, "  {}: {}: {}{}", word(check), check.rule, check.detail, at(check));
+    }
+    for change in verdict.changes.iter().flatten() {
+        let _ = writeln!(text, "  changed: {change}");
     }
     text
 }

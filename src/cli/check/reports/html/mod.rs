@@ -54,7 +54,8 @@ pub fn html(findings: &Findings<'_>) -> String {
     page += "</select></label>\n<span id=\"shown\" role=\"status\"></span>\n</form>\n";
     page += "<div class=\"table\" role=\"region\" aria-label=\"Files\" tabindex=\"0\">\n<table role=\"table\">\n\
              <thead role=\"rowgroup\">\n<tr role=\"row\">";
-    for name in ["File", "Verdict", "Faults"] {
+    let has_changes = findings.verdicts.iter().any(|verdict| verdict.changes.is_some());
+    for name in ["File", "Verdict", if has_changes { "Faults and changes" } else { "Faults" }] {
         let _ = write!(page, "<th scope=\"col\" role=\"columnheader\">{name}</th>");
     }
     page += "</tr>\n</thead>\n<tbody role=\"rowgroup\">\n";
@@ -114,6 +115,13 @@ fn row(page: &mut String, verdict: &Verdict, pictures: &[ViewPictures], room: &m
     if faults(verdict).next().is_some() {
         page.push_str("<ul>");
         faults(verdict).for_each(|check| fault(page, check));
+        page.push_str("</ul>");
+    }
+    if verdict.changes.is_some() {
+        page.push_str("<ul class=\"changes\">");
+        for change in verdict.changes.iter().flatten() {
+            let _ = write!(page, "<li><span>changed</span> {}</li>", text(change));
+        }
         page.push_str("</ul>");
     }
     views(page, &verdict.path, pictures, room);
