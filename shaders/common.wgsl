@@ -1,4 +1,4 @@
-// Every stage: the uniforms, shared constants, and arithmetic that gives the CPU's bits
+// Every stage: the uniforms' types, shared constants, and arithmetic that gives the CPU's bits
 // (docs/rasterizer.md, "Rounded operations"). Prepended to each stage by
 // src/backend/gpu/pipelines/mod.rs.
 
@@ -50,7 +50,13 @@ struct Frame {
     occlusion_reach: f32,
     // Start of the second set of texture coordinates in uvs.
     second_uvs_at: u32,
-    padding: vec2<u32>,
+    // Start of the job's vertices, items of the work list and pixels: not 0 for jobs of a gang.
+    vertices_at: u32,
+    items_at: u32,
+    pixels_at: u32,
+    padding_a: u32,
+    padding_b: u32,
+    padding_c: u32,
 };
 
 // Parameters of a dispatch: its triangles, vertices or edges, and the rows of the picture that the
@@ -113,6 +119,9 @@ struct Batch {
 
 // Threads of a workgroup, in every kernel.
 const WORKGROUP: u32 = 64u;
+
+// Jobs in a gang, at most.
+const JOBS_MAX: u32 = 16u;
 
 // Vectors of four words per item of the work list.
 const ITEM_VECTORS: u32 = 3u;
@@ -180,9 +189,6 @@ const VARYING: u32 = 0x40000000u;
 // Bits of the above. A constant of the pipeline, so that a kernel contains only the code that its
 // plan needs.
 override PIPELINE_KEY: u32 = 0u;
-
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<uniform> batch: Batch;
 
 fn has(flag: u32) -> bool {
     return (PIPELINE_KEY & flag) != 0u;

@@ -7,13 +7,14 @@
 
 @compute @workgroup_size(WORKGROUP)
 fn resolve(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    begin_job(gid.z);
     let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
     }
     var c = background_at(i);
     if has(SURFACE | HULL | LINES) {
-        c = colors[i];
+        c = colors[frame.pixels_at + i];
         if has(LINES) && is_composited(c) {
             c = flip_alpha_sign(c);
         } else {

@@ -16,9 +16,9 @@ struct Corners {
 
 fn screen_triangle(t: u32) -> Corners {
     return Corners(
-        vertices[triangles[3u * t]],
-        vertices[triangles[3u * t + 1u]],
-        vertices[triangles[3u * t + 2u]],
+        vertices[frame.vertices_at + triangles[3u * t]],
+        vertices[frame.vertices_at + triangles[3u * t + 1u]],
+        vertices[frame.vertices_at + triangles[3u * t + 2u]],
     );
 }
 

@@ -1,5 +1,5 @@
 // Stage visibility, per sample: writes to the visibility buffer.
 
 fn emit(pixel: vec2<i32>, n: i32, z: f32, id: u32) {
-    keep_nearest(sample_index(pixel.x, pixel.y, n), z, id);
+    keep_nearest(batch.samples_at + sample_index(pixel.x, pixel.y, n), z, id);
 }

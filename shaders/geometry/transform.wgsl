@@ -7,25 +7,25 @@
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(3) var<storage, read_write> vertices: array<Vertex>;
 @group(1) @binding(4) var<storage, read_write> samples: array<vec2<u32>>;
-@group(1) @binding(5) var<storage, read_write> work: array<u32>;
+@group(1) @binding(5) var<storage, read_write> work: array<vec2<u32>>;
 
 // Farthest a snapped coordinate may lie from the picture's centre: 4096 px.
 const GUARD: f32 = 1048576.0;
 
 @compute @workgroup_size(WORKGROUP)
 fn transform(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    begin_job(gid.z);
     let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i == 0u {
-        work[0] = 0u;
-        work[1] = 0u;
+        work[job()] = vec2(0u);
     }
     for (var s = i; s < batch.cleared; s += groups.x * groups.y * WORKGROUP) {
-        samples[s] = vec2(0u);
+        samples[batch.samples_at + s] = vec2(0u);
     }
     if i >= batch.count {
         return;
     }
-    vertices[i] = snap_vertex(vec3(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]));
+    vertices[frame.vertices_at + i] = snap_vertex(vec3(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]));
 }
 
 fn snap_vertex(p: vec3<f32>) -> Vertex {

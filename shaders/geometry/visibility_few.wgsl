@@ -7,6 +7,7 @@ fn visibility_few(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
+    begin_job(workgroup.z);
     // All threads of a workgroup take the same way up to draw_tiles, because they compute the same.
     let g = workgroup.x + workgroup.y * groups.x;
     let i = g / batch.groups_each;

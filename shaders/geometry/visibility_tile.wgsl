@@ -2,8 +2,8 @@
 // loop for all sizes.
 
 struct WorkList {
-    large: u32,
-    huge: u32,
+    // Large and huge ones of each job of a gang.
+    counts: array<vec2<u32>, JOBS_MAX>,
     items: array<vec4<u32>>,
 };
 
@@ -15,11 +15,12 @@ fn visibility_tile(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    let large_end = min(work.large, batch.large_end);
+    begin_job(workgroup.z);
+    let large_end = min(work.counts[job()].x, batch.large_end);
     for (var i = batch.large_first + workgroup.x; i < large_end; i += groups.x) {
         draw_item(i, i32(thread), 0, 1);
     }
-    let huge_end = min(work.huge, batch.huge_end);
+    let huge_end = min(work.counts[job()].y, batch.huge_end);
     for (var i = batch.huge_first; i < huge_end; i++) {
         // Every workgroup takes every n-th tile; beginning elsewhere for each triangle evens out
         // the load.
@@ -30,9 +31,10 @@ fn visibility_tile(
 
 // Draws every step-th tile of an item.
 fn draw_item(item: u32, thread: i32, start: i32, step: i32) {
-    let x = work.items[ITEM_VECTORS * item];
-    let y = work.items[ITEM_VECTORS * item + 1u];
-    let depth = work.items[ITEM_VECTORS * item + 2u];
+    let first = ITEM_VECTORS * (frame.items_at + item);
+    let x = work.items[first];
+    let y = work.items[first + 1u];
+    let depth = work.items[first + 2u];
     let s = Setup(
         bitcast<vec3<i32>>(x.xyz),
         bitcast<vec3<i32>>(y.xyz),

@@ -1,9 +1,14 @@
 // Stage visibility: the work list of large triangles, for visibility_tile.wgsl.
 
-struct Work {
+struct Counts {
     large: atomic<u32>,
     huge: atomic<u32>,
-    // Three words of four an item; large ones from the front, huge ones from the back.
+};
+
+struct Work {
+    // Of each job of a gang.
+    counts: array<Counts, JOBS_MAX>,
+    // Three words of four an item; a job's large ones from the front, huge ones from the back.
     items: array<vec4<u32>>,
 };
 
@@ -15,11 +20,12 @@ const HUGE_PX: i32 = 128;
 fn append_work_item(s: Setup, size: vec2<i32>, id: u32) {
     var slot: u32;
     if max(size.x, size.y) < HUGE_PX {
-        slot = atomicAdd(&work.large, 1u);
+        slot = atomicAdd(&work.counts[job()].large, 1u);
     } else {
-        slot = batch.capacity - 1u - atomicAdd(&work.huge, 1u);
+        slot = batch.capacity - 1u - atomicAdd(&work.counts[job()].huge, 1u);
     }
-    work.items[ITEM_VECTORS * slot] = vec4(bitcast<vec3<u32>>(s.x), id);
-    work.items[ITEM_VECTORS * slot + 1u] = vec4(bitcast<vec3<u32>>(s.y), bitcast<u32>(s.depth_range.x));
-    work.items[ITEM_VECTORS * slot + 2u] = vec4(bitcast<vec3<u32>>(s.depth), bitcast<u32>(s.depth_range.y));
+    let first = ITEM_VECTORS * (frame.items_at + slot);
+    work.items[first] = vec4(bitcast<vec3<u32>>(s.x), id);
+    work.items[first + 1u] = vec4(bitcast<vec3<u32>>(s.y), bitcast<u32>(s.depth_range.x));
+    work.items[first + 2u] = vec4(bitcast<vec3<u32>>(s.depth), bitcast<u32>(s.depth_range.y));
 }

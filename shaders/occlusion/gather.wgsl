@@ -1,7 +1,7 @@
 // Stage occlusion, per pixel of every second column and row: looks at places around it and adds up what light they
 // take. Twin of src/backend/cpu/occlusion/gather.rs.
 
-// Places of all pixels of the picture, then what each found.
+// Of each job of a gang: places of all pixels of the picture, then what each found.
 @group(1) @binding(30) var<storage, read_write> occlusion: array<u32>;
 
 // Sine of the angle above the surface below which nothing takes light.
@@ -13,6 +13,7 @@ const TAPS_PER_PIXEL: u32 = 16u;
 
 @compute @workgroup_size(WORKGROUP)
 fn gather(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    begin_job(gid.z);
     let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
@@ -26,7 +27,7 @@ fn gather(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups
     if own != NOWHERE {
         found = look(pixel, place_at(pixel, own));
     }
-    occlusion[batch.count + i] = found;
+    occlusion[2u * frame.pixels_at + batch.count + i] = found;
 }
 
 // The light that the places around a pixel take, 1/255.
@@ -77,7 +78,7 @@ fn depth_at(pixel: vec2<i32>) -> f32 {
     if !is_in_picture(pixel) {
         return NOWHERE;
     }
-    return bitcast<f32>(occlusion[u32(pixel.y * frame.width + pixel.x)]);
+    return bitcast<f32>(occlusion[2u * frame.pixels_at + u32(pixel.y * frame.width + pixel.x)]);
 }
 
 // Where the surface of a pixel is, at a depth.

@@ -3,11 +3,12 @@
 
 // Low word: complement of the id. High word: depth.
 @group(1) @binding(4) var<storage, read> samples: array<vec2<u32>>;
-// Places of all pixels of the picture, then what each found.
+// Of each job of a gang: places of all pixels of the picture, then what each found.
 @group(1) @binding(30) var<storage, read_write> occlusion: array<u32>;
 
 @compute @workgroup_size(WORKGROUP)
 fn grid(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    begin_job(gid.z);
     let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
@@ -17,5 +18,5 @@ fn grid(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) 
     if word.y != 0u && ~word.x < frame.triangle_count {
         place = place_of(bitcast<f32>(word.y));
     }
-    occlusion[i + u32(batch.row_first * frame.width)] = bitcast<u32>(place);
+    occlusion[2u * frame.pixels_at + i + u32(batch.row_first * frame.width)] = bitcast<u32>(place);
 }

@@ -18,7 +18,7 @@ fn open_share(pixel: vec2<i32>, z: f32, own_z: f32) -> f32 {
 
 fn mean_around(pixel: vec2<i32>) -> i32 {
     let own = place_in(pixel);
-    let found_at = u32(frame.width * frame.height);
+    let found_at = 2u * frame.pixels_at + u32(frame.width * frame.height);
     var sum = 0;
     var weights = 0;
     // To the columns and rows of pixels that have looked around: -2, 0 and 2 from even ones, -3 to 3 from odd ones.
@@ -66,5 +66,5 @@ fn place_in(pixel: vec2<i32>) -> f32 {
     if !is_in_picture(pixel) {
         return NOWHERE;
     }
-    return bitcast<f32>(occlusion[u32(pixel.y * frame.width + pixel.x)]);
+    return bitcast<f32>(occlusion[2u * frame.pixels_at + u32(pixel.y * frame.width + pixel.x)]);
 }

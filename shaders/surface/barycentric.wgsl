@@ -18,9 +18,9 @@ struct Corners {
 
 // Snapped corners; if one is behind the eye, the homogeneous ones, which are valid there too.
 fn corners_of(id: u32, at: vec2<f32>) -> Corners {
-    let a = vertices[triangles[3u * id]];
-    let b = vertices[triangles[3u * id + 1u]];
-    let c = vertices[triangles[3u * id + 2u]];
+    let a = vertices[frame.vertices_at + triangles[3u * id]];
+    let b = vertices[frame.vertices_at + triangles[3u * id + 1u]];
+    let c = vertices[frame.vertices_at + triangles[3u * id + 2u]];
     if !has(CLIPPED) || (a.x != OUTSIDE && b.x != OUTSIDE && c.x != OUTSIDE) {
         let x = vec3<f32>(vec3(a.x, b.x, c.x)) - at.x;
         let y = vec3<f32>(vec3(a.y, b.y, c.y)) - at.y;

@@ -6,6 +6,7 @@
 
 @compute @workgroup_size(WORKGROUP)
 fn paint(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    begin_job(gid.z);
     let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;

@@ -10,6 +10,7 @@
 
 @compute @workgroup_size(WORKGROUP)
 fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    begin_job(gid.z);
     let i = gid.x + gid.y * groups.x * WORKGROUP;
     if i >= batch.count {
         return;
@@ -22,7 +23,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         if has(PEELING) {
             color = peel_state[i].color + rn4((1.0 - peel_state[i].color.w) * color);
         }
-        colors[i] = color;
+        colors[frame.pixels_at + i] = color;
         return;
     }
     let first = u32(sample_count()) * i;
@@ -48,7 +49,7 @@ fn shade(@builtin(global_invocation_id) gid: vec3<u32>, @builtin(num_workgroups)
         }
         sum += rn4(rn(share * weight) * group_color(group, pixel, show));
     }
-    colors[i] = sum;
+    colors[frame.pixels_at + i] = sum;
 }
 
 // Share of the surface that the layers leave visible at some samples, in samples.

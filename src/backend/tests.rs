@@ -18,7 +18,7 @@ use super::cpu::occlusion;
 use super::cpu::surface::{light, texture};
 use super::gpu::params::{Batch, FACES_BACK, FACES_BOTH, FACES_FRONT, Frame, OWN_TRIANGLES, line_flags};
 use super::gpu::pipelines::{Access, Kernel, SampleTarget, SampleWrite, Slot, key};
-use super::gpu::schedule::sizes::{PEEL_STATE_BYTES, STROKES_BYTES, WORK_HEAD_BYTES, WORK_ITEM_BYTES};
+use super::gpu::schedule::sizes::{JOBS_MAX, PEEL_STATE_BYTES, STROKES_BYTES, WORK_HEAD_BYTES, WORK_ITEM_BYTES};
 use super::gpu::schedule::{PIECES_MAX, WORKGROUP, line_shares, tiles};
 use super::sample_partition::{GENERATORS, POINTS};
 use crate::plan::{
@@ -57,6 +57,7 @@ fn shared_constants() -> BTreeMap<&'static str, f64> {
         WIRE_FWIDTH_MIN WIRE_FWIDTH WIRES WIRE_LIT DEBUG_SHIFT OWN_METALLIC OWN_ROUGHNESS BY_ANGLE);
     add_same!("SLOT_", slots: BASE METALLIC_ROUGHNESS NORMAL EMISSIVE OCCLUSION);
     add_same!("DEBUG_", debug_views: BARYCENTRIC MIN_BARYCENTRIC EDGE_DISTANCE NORMAL UV FACE_ORIENTATION VERTEX_COLOR);
+    add!("JOBS_MAX" = JOBS_MAX);
     add!("WRAP_BITS" = samplers::WRAP_BITS, "WRAP_DOWN_SHIFT" = samplers::DOWN_SHIFT);
     add!("WRAP_REPEAT" = samplers::REPEAT, "WRAP_MIRROR" = samplers::MIRROR, "SAMPLER_NEAREST" = samplers::NEAREST);
     add!("SAMPLER_SECOND_UVS" = samplers::SECOND_UVS);
@@ -148,12 +149,14 @@ fn kernels() -> Vec<Kernel> {
     all
 }
 
+/// All kernels, those that gangs share also in the form for gangs.
 fn parsed() -> Vec<(Kernel, naga::Module)> {
-    let parse = |kernel: Kernel| match naga::front::wgsl::parse_str(&kernel.source()) {
+    let parse = |(kernel, is_of_gang): (Kernel, bool)| match naga::front::wgsl::parse_str(&kernel.source(is_of_gang)) {
         Ok(module) => (kernel, module),
-        Err(error) => panic!("{kernel:?}: {}", error.emit_to_string(&kernel.source())),
+        Err(error) => panic!("{kernel:?}: {}", error.emit_to_string(&kernel.source(is_of_gang))),
     };
-    kernels().into_iter().map(parse).collect()
+    let shared = kernels().into_iter().filter(|kernel| kernel.is_shared()).map(|kernel| (kernel, true));
+    kernels().into_iter().map(|kernel| (kernel, false)).chain(shared).map(parse).collect()
 }
 
 #[test]
@@ -217,7 +220,8 @@ fn layouts() -> Vec<(&'static str, Layout)> {
                 x_row y_row z_row w_row screen_up screen_right to_viewer lamps halfways background background_step hull_color
                 near_w ambient lamp_count zero width height triangle_count vertex_count masks_at material_count layer_fade
                 hull_color_count image_count normal_triangles_at uv_triangles_at color_triangles_at
-                occlusion_depth occlusion_spread taps occlusion_reach second_uvs_at padding
+                occlusion_depth occlusion_spread taps occlusion_reach second_uvs_at vertices_at items_at pixels_at
+                padding_a padding_b padding_c
             }),
         ),
         (

@@ -26,7 +26,7 @@ use meshsnap::request::{self, Rules};
 use meshsnap::scene::Scene;
 use meshsnap::spec::BackendChoice;
 
-const LOOKS: [&str; 3] = ["flat", "wire", "outline"];
+const LOOKS: [&str; 4] = ["flat", "auto", "wire", "outline"];
 
 fn main() {
     let (mut file, mut size, mut workers, mut rounds) = (None, "512".to_owned(), 1, 60_usize);

@@ -8,6 +8,7 @@ use std::thread;
 use std::time::Duration;
 
 use super::buffers::SpareBuffers;
+use super::gang::Gangs;
 use super::handles::Handles;
 use super::residents::ResidentBuffers;
 use super::schedule::sizes::ALONE_SIZE;
@@ -33,6 +34,7 @@ pub struct Gpu {
     pub(super) pipelines: Pipelines,
     pub(super) spare_buffers: SpareBuffers,
     pub(super) residents: ResidentBuffers<wgpu::Buffer>,
+    pub(super) gangs: Gangs,
     pub(super) int64_atomics: bool,
     /// Size of the largest triangle that a thread draws by itself where there are few, 1/256 px.
     pub(super) alone_size_of_few: i32,
@@ -47,6 +49,8 @@ pub struct Gpu {
     renderers: AtomicUsize,
     /// Jobs that it is drawing.
     jobs: AtomicUsize,
+    /// Jobs that it has drawn together with others.
+    jobs_shared: AtomicUsize,
 }
 
 /// A job that a device draws, until this is dropped.
@@ -135,6 +139,7 @@ impl Gpu {
             pipelines: Pipelines::kept_in(file),
             spare_buffers: SpareBuffers::default(),
             residents: ResidentBuffers::new(if is_software { RESIDENT_BYTES_SOFTWARE } else { RESIDENT_BYTES }),
+            gangs: Gangs::default(),
             int64_atomics,
             alone_size_of_few: if is_software && atomics_choice == AtomicsChoice::Best {
                 ALONE_SIZE
@@ -148,6 +153,7 @@ impl Gpu {
             polling: Mutex::new(()),
             renderers: AtomicUsize::new(0),
             jobs: AtomicUsize::new(0),
+            jobs_shared: AtomicUsize::new(0),
         })
     }
 
@@ -170,6 +176,24 @@ impl Gpu {
     /// Counts a job.
     pub(super) fn begin_job(&self) -> Drawing<'_> {
         Drawing { jobs: &self.jobs, is_alone: self.jobs.fetch_add(1, Ordering::Relaxed) == 0 }
+    }
+
+    /// Jobs so far that shared their dispatches with others.
+    pub fn jobs_shared(&self) -> usize {
+        self.jobs_shared.load(Ordering::Relaxed)
+    }
+
+    /// True if jobs that come while it is busy may share dispatches. Software gains nothing by it.
+    pub(super) fn draws_gangs(&self) -> bool {
+        self.handles.maps_storage && self.alone_size_of_few < ALONE_SIZE
+    }
+
+    /// To be called for each gang, with its number of jobs.
+    pub(super) fn gang_drawn(&self, jobs: usize) {
+        if jobs > 1 {
+            self.jobs_shared.fetch_add(jobs, Ordering::Relaxed);
+        }
+        (0..jobs).for_each(|_| self.job_ended());
     }
 
     /// To be called for each new renderer.

@@ -3,7 +3,7 @@
 //! In reading order: `device` opens a GPU; `schedule` computes the dispatches for a plan;
 //! `recorder` turns them into commands; `pipelines` holds each kernel's source, bindings and
 //! specialisation; `stage_clock` times the stages; `params` holds the uniforms, `buffers` a job's memory,
-//! `residents` what stays in memory for the next job, `pass_mask` the passes over triangles. `displays` keeps
+//! `residents` what stays in memory for the next job, `gang` the jobs that share dispatches, `pass_mask` the passes over triangles. `displays` keeps
 //! drivers from looking for a window system.
 //!
 //! **Invariant:** a job uses the device on one thread only, because wgpu's error scopes belong to a
@@ -12,6 +12,7 @@
 mod buffers;
 mod device;
 mod displays;
+mod gang;
 mod handles;
 pub(super) mod params;
 pub(crate) mod pass_mask;
@@ -29,6 +30,7 @@ pub use self::schedule::sizes::bands_bytes;
 pub use crate::backend::{GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
+use self::gang::{Seat as _, Share, may_share};
 use self::params::{attributes, corner_triangles, edge_lists, hull_materials, sample_masks};
 use self::pipelines::Slot;
 use self::pipelines::key::pipeline_key;
@@ -179,6 +181,14 @@ impl GpuRenderer {
         let times_at = size.next_multiple_of(8);
         let mut times = DrawTimes::default();
         let drawing = self.gpu.begin_job();
+        // A job that finds the device idle is drawn at once, and timed.
+        if !drawing.is_alone
+            && self.gpu.draws_gangs()
+            && let Some(rgba) = self.draw_in_gang(plan, deadline)?
+        {
+            image.rgba = rgba;
+            return Ok(image);
+        }
         self.job(|gpu, buffers| {
             let staging = buffers.staging(&gpu.handles, times_at + StageClock::BYTES)?.clone();
             let device = traits(gpu);
@@ -220,6 +230,52 @@ impl GpuRenderer {
         })?;
         self.draw_times = times;
         Ok(image)
+    }
+}
+
+impl GpuRenderer {
+    /// Draws plans in one gang, for tests that compare that with drawing them one by one. None if they cannot share
+    /// dispatches.
+    pub fn draw_together(&mut self, plans: &[&DrawPlan<'_>]) -> Result<Option<Vec<Vec<u8>>>, DrawError> {
+        let mut shares: Vec<Share> = Vec::new();
+        for plan in plans {
+            let Some((_, share)) = self.share(plan)? else { return Ok(None) };
+            if shares.first().is_some_and(|first| !first.is_alike(&share)) || shares.len() == share.gang_max() {
+                return Ok(None);
+            }
+            shares.push(share);
+        }
+        let Some(Some((schedule, _))) = plans.first().map(|plan| self.share(plan)).transpose()? else {
+            return Ok(None);
+        };
+        let pictures = gang::draw(&self.gpu, plans[0], &schedule, &shares)?;
+        Ok(Some((0..shares.len()).map(|job| pictures.rgba(job).to_vec()).collect()))
+    }
+
+    /// The picture, drawn together with those of other jobs or for them. None if it is to be drawn alone.
+    fn draw_in_gang(&self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Option<Vec<u8>>, DrawError> {
+        let Some((schedule, share)) = self.share(plan)? else { return Ok(None) };
+        let lead = |shares: &[Share]| match gang::draw(&self.gpu, plan, &schedule, shares) {
+            Ok(pictures) => Some(pictures),
+            Err(error) => {
+                // Each is drawn again, alone, and has its own error then.
+                tracing::debug!(%error, jobs = shares.len(), "a gang was not drawn");
+                None
+            }
+        };
+        let drawn = self.gpu.gangs.draw(share, deadline, lead)?;
+        deadline.check()?;
+        Ok(drawn.map(|(pictures, job)| pictures.rgba(job).to_vec()))
+    }
+
+    /// The plan's schedule and share, if it can be drawn in a gang.
+    fn share(&self, plan: &DrawPlan<'_>) -> Result<Option<(Schedule, Share)>, DrawError> {
+        if !self.gpu.handles.maps_storage || !may_share(plan) {
+            return Ok(None);
+        }
+        let device = DeviceTraits { maps_pictures: true, ..traits(&self.gpu) };
+        let schedule = Schedule::new(plan, &device, Goal::Picture)?;
+        Ok(Share::of(plan, &schedule).map(|share| (schedule, share)))
     }
 }
 

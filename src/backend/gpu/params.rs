@@ -44,7 +44,12 @@ pub struct Frame {
     pub taps: [[u32; 4]; TAPS / 4],
     pub occlusion_reach: f32,
     pub second_uvs_at: u32,
-    pub padding: [u32; 2],
+    pub vertices_at: u32,
+    pub items_at: u32,
+    pub pixels_at: u32,
+    pub padding_a: u32,
+    pub padding_b: u32,
+    pub padding_c: u32,
 }
 
 /// Uniforms of a dispatch.

@@ -48,7 +48,7 @@ impl<'a> Recorder<'a> {
         let batches = upload_batches(&gpu.handles, buffers, batches);
         let uniforms = match buffers.uniforms.take() {
             Some((frame_before, batches_before, group)) if frame_before == frame && batches_before == batches => group,
-            _ => bind_uniforms(&gpu.handles.device, &frame, &batches),
+            _ => bind_uniforms(&gpu.handles.device, &frame, (&batches, BATCH_STRIDE)),
         };
         buffers.uniforms = Some((frame, batches, uniforms.clone()));
         Ok(Self {
@@ -88,7 +88,7 @@ impl<'a> Recorder<'a> {
     /// Runs a kernel.
     pub fn dispatch(&mut self, kernel: Kernel, batch: usize, workgroups: [u32; 2]) -> Result<(), DrawError> {
         if !self.kernels.contains_key(&kernel) {
-            let bound = self.bind(kernel)?;
+            let bound = bind_buffers(self.gpu, self.buffers, kernel, self.key)?;
             self.kernels.insert(kernel, bound);
         }
         self.begin_pass(kernel.stage());
@@ -207,24 +207,6 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    fn bind(&mut self, kernel: Kernel) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
-        let pipeline = self.gpu.pipelines.get(&self.gpu.handles.device, kernel, self.key);
-        let mut bound = Vec::new();
-        for &(slot, _) in kernel.buffers() {
-            bound.push((slot, self.buffers.storage(&self.gpu.handles, kernel.bound_at(slot))?));
-        }
-        let entries: Vec<_> = bound
-            .iter()
-            .map(|(slot, buffer)| wgpu::BindGroupEntry { binding: *slot as u32, resource: buffer.as_entire_binding() })
-            .collect();
-        let group = self.gpu.handles.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &pipeline.buffers,
-            entries: &entries,
-        });
-        Ok((pipeline, group))
-    }
-
     /// Begins a pass for a stage, if the stage needs another.
     fn begin_pass(&mut self, stage: DrawStage) {
         if self.pass.as_ref().is_some_and(|(of, _)| *of == stage || self.clock.is_none()) {
@@ -251,9 +233,37 @@ fn new_encoder(gpu: &Gpu) -> wgpu::CommandEncoder {
     gpu.handles.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None })
 }
 
-/// Binds the uniforms of a plan, and one dispatch's of those of all.
-fn bind_uniforms(device: &wgpu::Device, frame: &wgpu::Buffer, batches: &wgpu::Buffer) -> wgpu::BindGroup {
-    let one = wgpu::BufferBinding { buffer: batches, offset: 0, size: wgpu::BufferSize::new(BATCH_STRIDE as u64) };
+/// Binds a kernel's buffers to its pipeline for plans with this key.
+pub fn bind_buffers(
+    gpu: &Gpu,
+    buffers: &mut Buffers,
+    kernel: Kernel,
+    key: u32,
+) -> Result<(Arc<Pipeline>, wgpu::BindGroup), DrawError> {
+    let pipeline = gpu.pipelines.get(&gpu.handles.device, kernel, key);
+    let mut bound = Vec::new();
+    for &(slot, _) in kernel.buffers() {
+        bound.push((slot, buffers.storage(&gpu.handles, kernel.bound_at(slot))?));
+    }
+    let entries: Vec<_> = bound
+        .iter()
+        .map(|(slot, buffer)| wgpu::BindGroupEntry { binding: *slot as u32, resource: buffer.as_entire_binding() })
+        .collect();
+    let group = gpu.handles.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.buffers,
+        entries: &entries,
+    });
+    Ok((pipeline, group))
+}
+
+/// Binds the uniforms of a plan, and one dispatch's of those of all, which lie `stride` bytes apart.
+pub fn bind_uniforms(
+    device: &wgpu::Device,
+    frame: &wgpu::Buffer,
+    (batches, stride): (&wgpu::Buffer, usize),
+) -> wgpu::BindGroup {
+    let one = wgpu::BufferBinding { buffer: batches, offset: 0, size: wgpu::BufferSize::new(stride as u64) };
     device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
         layout: &uniforms_layout(device),

@@ -53,6 +53,11 @@ impl Source {
         Self { bytes: self.bytes + bytes as u64, ..self }
     }
 
+    /// Owner, address and bytes. No other list has them as long as the owner, or this source, lives.
+    pub fn identity(&self) -> (usize, usize, u64) {
+        (self.owner.as_ptr().cast::<()>() as usize, self.address, self.bytes)
+    }
+
     fn key(&self, slot: Slot) -> Key {
         (slot as u32, self.owner.as_ptr().cast::<()>() as usize, self.address, self.bytes)
     }

@@ -4,6 +4,8 @@ use crate::backend::gpu::pipelines::key;
 use crate::backend::gpu::pipelines::{Kernel, SampleTarget, SampleWrite};
 
 const COMMON: &str = include_str!("../../../../shaders/common.wgsl");
+const ONE_JOB: &str = include_str!("../../../../shaders/one_job.wgsl");
+const GANG: &str = include_str!("../../../../shaders/gang.wgsl");
 const CONTOUR: &str = include_str!("../../../../shaders/lines/contour.wgsl");
 const HIDDEN_LINES: &str = include_str!("../../../../shaders/lines/hidden_lines.wgsl");
 const INSET: &str = include_str!("../../../../shaders/lines/inset.wgsl");
@@ -76,72 +78,78 @@ impl Kernel {
     }
 
     /// WGSL has no include: a kernel is its files, one after the other.
-    pub fn source(self) -> String {
+    pub fn source(self, is_of_gang: bool) -> String {
+        [COMMON, if is_of_gang { GANG } else { ONE_JOB }, &self.own_source()].concat()
+    }
+
+    /// True if a gang's jobs can share it: then it asks for its job first.
+    pub fn is_shared(self) -> bool {
+        match self {
+            Self::Transform | Self::VisibilityFew { .. } | Self::Paint => true,
+            Self::Grid | Self::Gather | Self::Shade | Self::Resolve => true,
+            Self::Visibility { target, .. } | Self::VisibilityTile { target, .. } => target == SampleTarget::Visibility,
+            _ => false,
+        }
+    }
+
+    fn own_source(self) -> String {
         let keep_nearest = |write: SampleWrite| if write == SampleWrite::Both { SAMPLES_64 } else { SAMPLES_32 };
         let emit = |target: SampleTarget| match target {
             SampleTarget::Visibility => EMIT.to_owned(),
             SampleTarget::Layer => [PEEL_STATE, EMIT_LAYER].concat(),
         };
         match self {
-            Self::Transform => [COMMON, include_str!("../../../../shaders/geometry/transform.wgsl")].concat(),
+            Self::Transform => include_str!("../../../../shaders/geometry/transform.wgsl").to_owned(),
             Self::Visibility { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility.wgsl");
-                [COMMON, TRIANGLE, CORNERS, WORK, SAMPLES, keep_nearest(write), &emit(target), kernel].concat()
+                [TRIANGLE, CORNERS, WORK, SAMPLES, keep_nearest(write), &emit(target), kernel].concat()
             }
             Self::Clip => {
-                [COMMON, TRIANGLE, CORNERS, WORK, PLANES, include_str!("../../../../shaders/geometry/clip.wgsl")]
-                    .concat()
+                [TRIANGLE, CORNERS, WORK, PLANES, include_str!("../../../../shaders/geometry/clip.wgsl")].concat()
             }
             Self::VisibilityTile { write, target } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility_tile.wgsl");
-                [COMMON, TRIANGLE, SAMPLES, keep_nearest(write), &emit(target), TILE, kernel].concat()
+                [TRIANGLE, SAMPLES, keep_nearest(write), &emit(target), TILE, kernel].concat()
             }
-            Self::Grid => [COMMON, PLACE, include_str!("../../../../shaders/occlusion/grid.wgsl")].concat(),
-            Self::Gather => [COMMON, PLACE, include_str!("../../../../shaders/occlusion/gather.wgsl")].concat(),
+            Self::Grid => [PLACE, include_str!("../../../../shaders/occlusion/grid.wgsl")].concat(),
+            Self::Gather => [PLACE, include_str!("../../../../shaders/occlusion/gather.wgsl")].concat(),
             Self::VisibilityFew { write } => {
                 let kernel = include_str!("../../../../shaders/geometry/visibility_few.wgsl");
-                [COMMON, TRIANGLE, CORNERS, SAMPLES, keep_nearest(write), EMIT, TILE, kernel].concat()
+                [TRIANGLE, CORNERS, SAMPLES, keep_nearest(write), EMIT, TILE, kernel].concat()
             }
-            Self::Paint => [
-                &[COMMON, TRIANGLE],
-                SHADE,
-                &[GROUP, OVER, ENCODE, include_str!("../../../../shaders/surface/paint.wgsl")],
-            ]
-            .concat()
-            .concat(),
-            Self::Composite => [
-                &[COMMON, TRIANGLE],
-                SHADE,
-                &[GROUP, PEEL_STATE, include_str!("../../../../shaders/peeling/composite.wgsl")],
-            ]
-            .concat()
-            .concat(),
+            Self::Paint => {
+                [&[TRIANGLE], SHADE, &[GROUP, OVER, ENCODE, include_str!("../../../../shaders/surface/paint.wgsl")]]
+                    .concat()
+                    .concat()
+            }
+            Self::Composite => {
+                [&[TRIANGLE], SHADE, &[GROUP, PEEL_STATE, include_str!("../../../../shaders/peeling/composite.wgsl")]]
+                    .concat()
+                    .concat()
+            }
             Self::Shade => [
-                &[COMMON, TRIANGLE],
+                &[TRIANGLE],
                 SHADE,
                 &[GROUP, PEEL_STATE, PLACE, SPREAD, include_str!("../../../../shaders/surface/shade.wgsl")],
             ]
             .concat()
             .concat(),
             Self::LineLight => {
-                [&[COMMON, TRIANGLE], SHADE, &[include_str!("../../../../shaders/lines/line_light.wgsl")]]
-                    .concat()
-                    .concat()
+                [&[TRIANGLE], SHADE, &[include_str!("../../../../shaders/lines/line_light.wgsl")]].concat().concat()
             }
             Self::Holes => {
                 let kernel = include_str!("../../../../shaders/lines/holes.wgsl");
-                [COMMON, TRIANGLE, STROKE_WORDS, SEEN, INSET, kernel].concat()
+                [TRIANGLE, STROKE_WORDS, SEEN, INSET, kernel].concat()
             }
             Self::Edge => {
                 let kernel = include_str!("../../../../shaders/lines/edge.wgsl");
-                [COMMON, TRIANGLE, PLANES, CONTOUR, SEGMENT, SEEN, HIDDEN_LINES, STROKE_WORDS, LATTICE, STROKE, kernel]
-                    .concat()
+                [TRIANGLE, PLANES, CONTOUR, SEGMENT, SEEN, HIDDEN_LINES, STROKE_WORDS, LATTICE, STROKE, kernel].concat()
             }
             Self::Coverage => {
                 let kernel = include_str!("../../../../shaders/lines/coverage.wgsl");
-                [COMMON, OVER, STROKE_WORDS, SEEN, INSET, LATTICE, FREE_POINTS, PEEL_STATE, kernel].concat()
+                [OVER, STROKE_WORDS, SEEN, INSET, LATTICE, FREE_POINTS, PEEL_STATE, kernel].concat()
             }
-            Self::Resolve => [COMMON, OVER, ENCODE, include_str!("../../../../shaders/resolve.wgsl")].concat(),
+            Self::Resolve => [OVER, ENCODE, include_str!("../../../../shaders/resolve.wgsl")].concat(),
         }
     }
 
@@ -160,24 +168,24 @@ impl Kernel {
             | key::HULL_MATERIALS
             | key::WIRES_ONLY;
         match self {
-            Self::Transform => 0,
+            Self::Transform => key::GANG,
             Self::Clip => key::PASS_MASKS | key::PEELING,
-            Self::Visibility { target: SampleTarget::Visibility, .. } => key::SAMPLES | key::PASS_MASKS,
+            Self::Visibility { target: SampleTarget::Visibility, .. } => key::SAMPLES | key::PASS_MASKS | key::GANG,
             Self::Visibility { target: SampleTarget::Layer, .. } => {
                 key::SAMPLES | key::PASS_MASKS | key::PEELING | key::BEHIND_SURFACE
             }
-            Self::VisibilityTile { target: SampleTarget::Visibility, .. } => key::SAMPLES,
-            Self::VisibilityFew { .. } => key::SAMPLES | key::PASS_MASKS,
-            Self::Paint => SHADED,
+            Self::VisibilityTile { target: SampleTarget::Visibility, .. } => key::SAMPLES | key::GANG,
+            Self::VisibilityFew { .. } => key::SAMPLES | key::PASS_MASKS | key::GANG,
+            Self::Paint => SHADED | key::GANG,
             Self::VisibilityTile { target: SampleTarget::Layer, .. } => key::SAMPLES | key::BEHIND_SURFACE,
             Self::Composite => SHADED | key::PEELED_HULL,
-            Self::Grid | Self::Gather => key::SAMPLES,
-            Self::Shade => SHADED | key::PEELING | key::OCCLUSION,
+            Self::Grid | Self::Gather => key::SAMPLES | key::GANG,
+            Self::Shade => SHADED | key::PEELING | key::OCCLUSION | key::GANG,
             Self::LineLight => SHADED,
             Self::Coverage => key::HOLED | key::SURFACE | key::HULL | key::PEELING | key::SAMPLES,
             Self::Holes => key::SAMPLES,
             Self::Edge => key::HOLED | key::CONTOURS | key::CLIPPED | key::SAMPLES,
-            Self::Resolve => key::SURFACE | key::HULL | key::LINES,
+            Self::Resolve => key::SURFACE | key::HULL | key::LINES | key::GANG,
         }
     }
 

@@ -9,6 +9,8 @@ use crate::plan::{DrawPlan, SurfacePass, flags, slots};
 pub const SURFACE: u32 = 1;
 /// An outline mesh.
 pub const HULL: u32 = 2;
+/// The jobs of a gang share the kernel. No feature of a plan: whoever draws a gang adds it.
+pub const GANG: u32 = 4;
 /// A material lit by face normals.
 pub const FACE_NORMALS: u32 = 8;
 /// A material lit by vertex normals.

@@ -136,8 +136,8 @@ type MadeOnce<K, T> = Mutex<HashMap<K, Arc<OnceLock<T>>>>;
 #[derive(Default)]
 pub struct Pipelines {
     made: MadeOnce<(Kernel, u32), Arc<Pipeline>>,
-    /// By kernel, without the phase: its code as wgpu has checked it.
-    modules: MadeOnce<Kernel, wgpu::ShaderModule>,
+    /// By kernel, without the phase, and by whether gangs share it: its code as wgpu has checked it.
+    modules: MadeOnce<(Kernel, bool), wgpu::ShaderModule>,
     /// The driver's own form of the pipelines, kept on disk.
     file: Option<PipelineFile>,
 }
@@ -178,10 +178,9 @@ impl Pipelines {
     }
 
     fn make(&self, device: &wgpu::Device, kernel: Kernel, key: u32) -> Pipeline {
-        let place = Arc::clone(
-            self.modules.lock().unwrap_or_else(PoisonError::into_inner).entry(kernel.in_one_phase()).or_default(),
-        );
-        let module = place.get_or_init(|| kernel.module(device));
+        let of = (kernel.in_one_phase(), key & key::GANG != 0);
+        let place = Arc::clone(self.modules.lock().unwrap_or_else(PoisonError::into_inner).entry(of).or_default());
+        let module = place.get_or_init(|| kernel.module(device, of.1));
         let pipeline = kernel.compile(device, key, module, self.file.as_ref().map(PipelineFile::cache));
         tracing::debug!(?kernel, key, "made a pipeline");
         pipeline
@@ -224,8 +223,8 @@ impl Kernel {
     }
 
     /// The kernel's code, checked.
-    fn module(self, device: &wgpu::Device) -> wgpu::ShaderModule {
-        let source = wgpu::ShaderSource::Wgsl(self.source().into());
+    fn module(self, device: &wgpu::Device, is_of_gang: bool) -> wgpu::ShaderModule {
+        let source = wgpu::ShaderSource::Wgsl(self.source(is_of_gang).into());
         device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(self.entry()), source })
     }
 

@@ -11,8 +11,11 @@ const BAND_BYTES: u64 = 64 << 20;
 /// their band.
 const SEEN_BYTES: u64 = 256 << 20;
 
-/// Bytes of the work list before its items.
-pub const WORK_HEAD_BYTES: u64 = 16;
+/// Bytes of the work list before its items: the numbers of large and of huge ones, for each job of a gang.
+pub const WORK_HEAD_BYTES: u64 = 8 * JOBS_MAX as u64;
+
+/// Jobs in a gang, at most.
+pub const JOBS_MAX: usize = 16;
 
 /// Bytes of one of its items.
 pub const WORK_ITEM_BYTES: u64 = 48;
@@ -141,10 +144,13 @@ pub fn bands_bytes(plan: &DrawPlan<'_>) -> u64 {
         .map_or(0, |banding| (banding.bytes(plan) + occlusion_bytes(plan)) / 4 * 5)
 }
 
-/// Bytes of the occlusion stage, of the whole picture: a place, and what is found there, per pixel.
+/// Bytes of the occlusion stage per pixel: a place, and what is found there.
+pub const OCCLUSION_BYTES: u64 = 8;
+
+/// Bytes of the occlusion stage, of the whole picture.
 pub fn occlusion_bytes(plan: &DrawPlan<'_>) -> u64 {
     let pixels = u64::from(plan.width_px) * u64::from(plan.height_px);
-    if plan.occlusion.is_some() { pixels * 8 } else { 0 }
+    if plan.occlusion.is_some() { pixels * OCCLUSION_BYTES } else { 0 }
 }
 
 /// True if a plan needs the visibility buffer.

@@ -1,5 +1,6 @@
 //! Number of runs of the kernel that draws large triangles.
 
+use super::PIECES_MAX;
 use super::sizes::{ALONE_SIZE, Banding, DeviceTraits};
 use crate::plan::DrawPlan;
 
@@ -52,15 +53,21 @@ impl Tiles {
         let seen = [banding.seen_columns(plan), banding.seen_rows(plan)];
         let pixels = u64::from(seen[0]) * u64::from(seen[1].max(plan.height_px));
         let hull = plan.hull.as_ref().map_or(0, |hull| hull.triangles.len());
-        let tests = ((plan.triangles.len() + hull) as u64).saturating_mul(pixels * u64::from(plan.samples));
-        Self {
-            in_rounds: device.loops_are_limited || tests > BLIND_TESTS_MAX,
+        let triangles = (plan.triangles.len() + hull) as u64;
+        let tests = triangles.saturating_mul(pixels * u64::from(plan.samples));
+        let mut tiles = Self {
+            in_rounds: false,
             workgroups: device.tile_workgroups.min(device.workgroups_max),
             // 64 blocks, in each the samples; and as much again for the way there.
             tile_iterations: 64 * (u64::from(plan.samples) + 1) + 64,
             band_tiles: u64::from(seen[0] / TILE_PX + 2) * u64::from(seen[1] / TILE_PX + 2),
             shares_few: device.alone_size_of_few < ALONE_SIZE,
-        }
+        };
+        // No list of so few items is too long for one round.
+        let fits_one_round =
+            triangles.saturating_mul(u64::from(PIECES_MAX)) <= tiles.items_of_a_round().into_iter().min().unwrap_or(0);
+        tiles.in_rounds = device.loops_are_limited && !fits_one_round || tests > BLIND_TESTS_MAX;
+        tiles
     }
 
     /// Workgroups that share each of so many triangles, if they are so few that no work list is needed.
@@ -70,13 +77,18 @@ impl Tiles {
         (self.shares_few && count <= FEWEST_TRIANGLES && iterations <= ITERATIONS_MAX).then_some(each)
     }
 
+    /// Large items, and huge ones, for which there is time in one round.
+    fn items_of_a_round(&self) -> [u64; 2] {
+        let workgroups = u64::from(self.workgroups);
+        // A large triangle is drawn by one workgroup.
+        let large = ITERATIONS_MAX / (LARGE_TILES_MAX * self.tile_iterations) * workgroups;
+        let huge_iterations = self.band_tiles.div_ceil(workgroups) * self.tile_iterations;
+        [large, ITERATIONS_MAX / huge_iterations]
+    }
+
     /// The ranges of large and of huge items to draw in each round.
     pub fn rounds(&self, large: u32, huge: u32) -> Vec<[std::ops::Range<u32>; 2]> {
-        // A large triangle is drawn by one workgroup.
-        let large_step =
-            (ITERATIONS_MAX / (LARGE_TILES_MAX * self.tile_iterations)).max(1) * u64::from(self.workgroups);
-        let huge_iterations = self.band_tiles.div_ceil(u64::from(self.workgroups)) * self.tile_iterations;
-        let huge_step = (ITERATIONS_MAX / huge_iterations).max(1);
+        let [large_step, huge_step] = self.items_of_a_round().map(|items| items.max(1));
         let ranges = |count: u32, step: u64| {
             (0..u64::from(count)).step_by(step as usize).map(move |i| i as u32..(i + step).min(u64::from(count)) as u32)
         };
@@ -95,7 +107,7 @@ pub fn alone_size(count: u32, device: &DeviceTraits) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::gpu::schedule::test_plans::DEVICE;
+    use crate::backend::gpu::schedule::test_plans::{Case, DEVICE, LARGEST, plan};
 
     #[test]
     fn few_triangles_keep_a_real_gpu_busy() {
@@ -116,6 +128,25 @@ mod tests {
         let each = [1, 968, 4096, 4097].map(|count| tiles(36, true).groups_each(count));
         assert_eq!(each, [Some(4096), Some(4), Some(1), None]);
         assert_eq!([tiles(36, false).groups_each(12), tiles(660, true).groups_each(968)], [None, None]);
+    }
+
+    #[test]
+    fn a_list_that_is_short_for_sure_is_drawn_in_one_round() {
+        let software = DeviceTraits { loops_are_limited: true, tile_workgroups: 64, ..DEVICE };
+        let case = Case { size_px: [256; 2], is_peeled: false, passes: 0, ..LARGEST };
+        let mut cases = 0;
+        for triangles in [1, 12, 17, 18, 100, 5000] {
+            let triangles = vec![[0; 3]; triangles];
+            let mut plan = plan(&triangles, case);
+            plan.hull = None;
+            let banding = Banding { rows: 256, margin: 0, beyond: 0 };
+            let tiles = Tiles::new(&plan, &software, banding);
+            let all = PIECES_MAX * triangles.len() as u32;
+            let rounds = tiles.rounds(all, all);
+            assert_eq!(tiles.in_rounds, rounds.len() > 2, "{} triangles: {rounds:?}", triangles.len());
+            cases += usize::from(tiles.in_rounds);
+        }
+        assert_eq!(cases, 3);
     }
 
     #[test]

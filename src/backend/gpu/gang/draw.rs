@@ -1,0 +1,180 @@
+//! The commands that draw a gang.
+
+use std::sync::{Arc, mpsc};
+
+use super::seat::Share;
+use crate::backend::DrawError;
+use crate::backend::gpu::buffers::Buffers;
+use crate::backend::gpu::device::Gpu;
+use crate::backend::gpu::params::{Batch, Frame};
+use crate::backend::gpu::pipelines::Slot;
+use crate::backend::gpu::recorder::{bind_buffers, bind_uniforms};
+use crate::backend::gpu::schedule::Schedule;
+use crate::backend::gpu::schedule::sizes::{
+    JOBS_MAX, OCCLUSION_BYTES, SAMPLE_BYTES, color_bytes, is_painted, work_bytes,
+};
+use crate::backend::gpu::{upload_geometry, upload_shading};
+use crate::limits::Deadline;
+use crate::plan::{DrawPlan, HullVertex};
+
+/// Distance between the batches of two dispatches: those of all jobs lie together. Every device can bind there.
+const BATCHES_STRIDE: usize = JOBS_MAX * size_of::<Batch>();
+
+/// The pictures of a gang, in memory that the CPU and the device share.
+pub struct Pictures {
+    gpu: Arc<Gpu>,
+    /// Some until it is dropped.
+    view: Option<wgpu::BufferView>,
+    /// Some until it is dropped.
+    buffers: Option<Buffers>,
+    /// The end of each picture, bytes; it begins where the one before it ends.
+    ends: Vec<usize>,
+}
+
+impl Pictures {
+    /// Bytes of the picture of a job.
+    pub fn rgba(&self, job: usize) -> &[u8] {
+        let begin = job.checked_sub(1).and_then(|before| self.ends.get(before)).copied().unwrap_or(0);
+        let end = self.ends.get(job).copied().unwrap_or(begin);
+        self.view.as_ref().and_then(|view| view.get(begin..end)).unwrap_or_default()
+    }
+}
+
+impl Drop for Pictures {
+    fn drop(&mut self) {
+        self.view = None;
+        if let Some(buffers) = self.buffers.take() {
+            if let Some(staging) = &buffers.staging {
+                staging.unmap();
+            }
+            self.gpu.spare_buffers.give_back(buffers);
+        }
+    }
+}
+
+/// Draws the pictures of all shares, the first of which is the plan's own.
+pub fn draw(
+    gpu: &Arc<Gpu>,
+    plan: &DrawPlan<'_>,
+    schedule: &Schedule,
+    shares: &[Share],
+) -> Result<Arc<Pictures>, DrawError> {
+    gpu.check()?;
+    let mut buffers = gpu.spare_buffers.take();
+    let drawn = gpu.scoped(|| submit(gpu, &mut buffers, plan, schedule, shares));
+    gpu.gang_drawn(shares.len());
+    let filled = buffers.unbind_all();
+    // After an error the buffers may still be in use.
+    let (view, ends) = drawn?;
+    filled.into_iter().for_each(|(slot, source, buffer)| gpu.residents.keep(slot, &source, buffer));
+    Ok(Arc::new(Pictures { gpu: gpu.clone(), view: Some(view), buffers: Some(buffers), ends }))
+}
+
+/// Where the jobs' parts of the buffers begin.
+#[derive(Default)]
+struct Starts {
+    vertices: u32,
+    samples: u32,
+    items: u32,
+    pixels: u32,
+}
+
+fn submit(
+    gpu: &Gpu,
+    buffers: &mut Buffers,
+    plan: &DrawPlan<'_>,
+    schedule: &Schedule,
+    shares: &[Share],
+) -> Result<(wgpu::BufferView, Vec<usize>), DrawError> {
+    let key = shares.first().map_or(0, Share::key);
+    let kernels = schedule.kernels();
+    gpu.make_pipelines(&kernels, key)?;
+    upload_geometry(gpu, buffers, plan, schedule)?;
+    upload_shading(gpu, buffers, plan, schedule)?;
+    let (frames, batches, ends, all) = uniforms(shares);
+    reserve(gpu, buffers, plan, &all)?;
+    let frames = buffers.upload_frame(&gpu.handles, bytemuck::cast_slice(&frames))?;
+    buffers.known_batches.clear();
+    let bytes: &[u8] = bytemuck::cast_slice(&batches);
+    let of_dispatches = Buffers::uniform(&gpu.handles, &mut buffers.batches, bytes.len() as u64).clone();
+    gpu.handles.queue.write_buffer(&of_dispatches, 0, bytes);
+    let group = bind_uniforms(&gpu.handles.device, &frames, (&of_dispatches, BATCHES_STRIDE));
+    let mut bound = Vec::new();
+    for &kernel in &kernels {
+        bound.push(bind_buffers(gpu, buffers, kernel, key)?);
+    }
+    let mut encoder = gpu.handles.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None });
+    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes: None });
+    let own = shares.first().map_or(&[][..], Share::dispatches);
+    for (number, dispatch) in own.iter().enumerate() {
+        let Some((pipeline, buffers)) = kernels.iter().position(|k| *k == dispatch.kernel).and_then(|at| bound.get(at))
+        else {
+            continue;
+        };
+        let most = |axis: usize| {
+            let of = |share: &Share| share.dispatches().get(number).map_or(1, |dispatch| dispatch.workgroups[axis]);
+            shares.iter().map(of).max().unwrap_or(1)
+        };
+        pass.set_pipeline(&pipeline.pipeline);
+        pass.set_bind_group(0, &group, &[(number * BATCHES_STRIDE) as u32]);
+        pass.set_bind_group(1, buffers, &[]);
+        pass.dispatch_workgroups(most(0), most(1), shares.len() as u32);
+    }
+    drop(pass);
+    gpu.handles.queue.submit([encoder.finish()]);
+    let size = ends.last().copied().unwrap_or(0) as u64;
+    Ok((read(gpu, buffers, size)?, ends))
+}
+
+/// Reserves what the kernels write, for all jobs.
+fn reserve(gpu: &Gpu, buffers: &mut Buffers, plan: &DrawPlan<'_>, all: &Starts) -> Result<(), DrawError> {
+    let vertices = u64::from(all.vertices) * size_of::<HullVertex>() as u64;
+    buffers.reserve(&gpu.handles, Slot::Vertices, vertices)?;
+    buffers.reserve(&gpu.handles, Slot::Samples, u64::from(all.samples) * SAMPLE_BYTES)?;
+    buffers.reserve(&gpu.handles, Slot::Work, work_bytes(all.items))?;
+    let pixels = u64::from(all.pixels);
+    if !is_painted(plan) {
+        buffers.reserve(&gpu.handles, Slot::Colors, pixels * color_bytes(plan))?;
+    }
+    if plan.occlusion.is_some() {
+        buffers.reserve(&gpu.handles, Slot::Occlusion, pixels * OCCLUSION_BYTES)?;
+    }
+    let staging = buffers.staging(&gpu.handles, pixels * 4)?.clone();
+    buffers.bind(Slot::Rgba, staging);
+    Ok(())
+}
+
+/// The uniforms of all jobs, and of all jobs for each dispatch; the end of each picture, bytes; and the sizes of all.
+fn uniforms(shares: &[Share]) -> (Vec<Frame>, Vec<Batch>, Vec<usize>, Starts) {
+    let dispatches = shares.first().map_or(0, |share| share.dispatches().len());
+    let mut frames = vec![Frame::default(); JOBS_MAX];
+    let mut batches = vec![Batch::default(); JOBS_MAX * dispatches];
+    let (mut at, mut ends) = (Starts::default(), Vec::new());
+    for (job, (share, frame)) in shares.iter().zip(&mut frames).enumerate() {
+        *frame = Frame { vertices_at: at.vertices, items_at: at.items, pixels_at: at.pixels, ..*share.frame() };
+        for (number, dispatch) in share.dispatches().iter().enumerate() {
+            if let Some(batch) = batches.get_mut(number * JOBS_MAX + job) {
+                *batch = Batch { samples_at: at.samples, rgba_at: at.pixels, ..dispatch.batch };
+            }
+        }
+        let amounts = share.amounts();
+        at.vertices += amounts.vertices;
+        at.samples += amounts.samples;
+        at.items += amounts.items;
+        at.pixels += amounts.pixels;
+        ends.push(at.pixels as usize * 4);
+    }
+    (frames, batches, ends, at)
+}
+
+/// Waits for the device, and maps the pictures. No deadline ends this: a gang is many jobs', and small.
+fn read(gpu: &Gpu, buffers: &Buffers, size: u64) -> Result<wgpu::BufferView, DrawError> {
+    let staging = buffers.staging.as_ref().ok_or_else(|| DrawError::Device("no memory for pictures".to_owned()))?;
+    let (sender, mapped) = mpsc::channel();
+    staging.map_async(wgpu::MapMode::Read, 0..size, move |result| {
+        let _ = sender.send(result);
+    });
+    let mapped = gpu.wait(&mapped, &Deadline::default())?;
+    mapped.map_err(|error| DrawError::Device(format!("reading pictures back failed: {error}")))?;
+    staging.get_mapped_range(0..size).map_err(|e| DrawError::Device(e.to_string()))
+}
