@@ -55,7 +55,9 @@ pub fn run(arguments: &ServeArgs) -> Result<(), CliError> {
         CliError::usage(format!("--listen {}: there is no such address on this machine ({error})", config.listen))
     })?;
     isolation::ahead(config.workers);
-    http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
+    let served = http::serve(&config, |address| announce(address, &config));
+    telemetry::traces::finish();
+    served.map_err(|error| match error {
         ServeError::Unprotected(_) | ServeError::Keys(_) | ServeError::WebhookSecret => {
             CliError::usage(error.to_string())
         }

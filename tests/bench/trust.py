@@ -42,8 +42,9 @@ def promise(holds, text):
 class Server:
     """A server on a free port."""
 
-    def __init__(self, program, *arguments, data=None):
+    def __init__(self, program, *arguments, data=None, variables=None):
         environment = {key: value for key, value in os.environ.items() if not key.startswith("MESHSNAP_")}
+        environment |= variables or {}
         command = [program, "serve", "--listen", "127.0.0.1:0", "--backend", "cpu", "--log", "error"]
         command += ["--data-dir", str(data)] if data else ["--ephemeral"]
         self.process = subprocess.Popen(

@@ -5,6 +5,8 @@ pub mod durable;
 mod events;
 mod idempotency;
 mod several;
+#[cfg(feature = "otel")]
+mod traces;
 mod webhooks;
 
 use std::io::Write as _;
