@@ -46,6 +46,8 @@ pub struct Config {
     pub webhook_secret: Option<String>,
     /// Lets webhooks go to addresses of private networks.
     pub webhooks_to_private: bool,
+    /// The certificates by which receivers of webhooks are trusted, in PEM. None: Mozilla's list.
+    pub webhooks_ca: Option<PathBuf>,
     /// The pause after the first attempt of a webhook that fails, milliseconds.
     pub webhook_retry_ms: u64,
     /// Allows clients without tokens on addresses other than loopback.
@@ -120,6 +122,7 @@ impl Default for Config {
             api_keys_file: None,
             webhook_secret: None,
             webhooks_to_private: false,
+            webhooks_ca: None,
             webhook_retry_ms: 5000,
             no_auth: false,
             cors_origins: Vec::new(),

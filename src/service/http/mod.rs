@@ -78,6 +78,9 @@ pub enum ServeError {
         "MESHSNAP_WEBHOOK_SECRET must be whsec_ and 24 to 64 bytes in base64: echo whsec_$(openssl rand -base64 32)"
     )]
     WebhookSecret,
+    /// The certificates for webhooks cannot be used.
+    #[error("--webhooks-ca {0}")]
+    WebhooksCa(String),
     /// The data folder cannot be used.
     #[error(transparent)]
     Data(#[from] OpenError),

@@ -136,7 +136,8 @@ fn receiver(statuses: &'static [&'static str]) -> (String, Receiver<String>) {
 fn webhooks(to_private: bool) -> (Webhooks, Receiver<String>) {
     let (sender, settled) = channel();
     let sender = Mutex::new(sender);
-    let settings = WebhookSettings { secret: secret(), to_private, retry: Duration::from_millis(1), metrics: None };
+    let (retry, roots) = (Duration::from_millis(1), RootCerts::WebPki);
+    let settings = WebhookSettings { secret: secret(), to_private, roots, retry, metrics: None };
     let settled_ids = Box::new(move |id: &str| _ = sender.lock().unwrap().send(id.to_owned()));
     (Webhooks::start(settings, settled_ids).unwrap(), settled)
 }
