@@ -132,6 +132,9 @@ pub const SETTINGS: &[Setting] = &[
     number("overdue-grace-ms", "Time beyond limit-job-ms after which a job's worker is replaced", 1, MS_MAX, |c| {
         &mut c.overdue_grace_ms
     }),
+    number("drain-delay-ms", "Time after the signal to end for which work is still taken", 0, MS_MAX, |c| {
+        &mut c.drain_delay_ms
+    }),
     number("wait-ms", "Longest time for which a request is let wait for a worker", 0, MS_MAX, |c| &mut c.wait_ms),
     number("batch-wait-ms", "The same for a job that is fetched later", 0, MS_MAX, |c| &mut c.batch_wait_ms),
     number("result-ttl-ms", "Time for which a result is kept after it was fetched", 0, MS_MAX, |c| {

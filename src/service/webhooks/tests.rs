@@ -168,7 +168,11 @@ fn what_fails_is_tried_again_under_the_same_id() {
         let time = header("webhook-timestamp").parse().unwrap();
         assert_eq!(header("webhook-signature"), secret().sign("one", time, r#"{"a":1}"#).unwrap());
     }
-    assert_eq!(webhooks.count(), 0);
+    // It is settled a moment before it is counted.
+    let began = Instant::now();
+    while webhooks.count() != 0 {
+        assert!(began.elapsed() < SOON, "{} wait", webhooks.count());
+    }
 }
 
 #[test]

@@ -90,7 +90,17 @@ fn add_id_and_problem(response: &mut Response, id: &str) {
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
         *response.body_mut() = Body::from(body);
     }
+    add_browsers_rules(response.headers_mut());
     if let Ok(value) = HeaderValue::from_str(id) {
         response.headers_mut().insert(REQUEST_ID, value);
     }
+}
+
+/// Types are what they are said to be. Pictures may stand in pages of every origin, also in those that are isolated; all
+/// else in pages of this one, unless CORS allows more.
+fn add_browsers_rules(headers: &mut HeaderMap) {
+    let is_picture = headers.get(header::CONTENT_TYPE).is_some_and(|kind| kind.as_bytes().starts_with(b"image/"));
+    let policy = if is_picture { "cross-origin" } else { "same-origin" };
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static(policy));
 }
