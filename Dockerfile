@@ -5,10 +5,12 @@ WORKDIR /src
 COPY . .
 # The commit, for /version: --build-arg MESHSNAP_COMMIT=$(git rev-parse HEAD)
 ARG MESHSNAP_COMMIT
+# Features beside those by default, such as otel.
+ARG MESHSNAP_FEATURES=""
 # The caches keep downloaded and built dependencies between builds; the binary is copied out because they are no part of
 # the image.
 RUN --mount=type=cache,target=/usr/local/cargo/registry --mount=type=cache,target=/src/target \
-    cargo build --release --locked --bin meshsnap && cp target/release/meshsnap /usr/local/bin/
+    cargo build --release --locked --features "$MESHSNAP_FEATURES" --bin meshsnap && cp target/release/meshsnap /usr/local/bin/
 
 FROM debian:bookworm-slim AS cpu
 RUN useradd --system --no-create-home --shell /usr/sbin/nologin meshsnap \

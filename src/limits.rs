@@ -180,6 +180,13 @@ impl Budget {
         Ok(())
     }
 
+    /// Borrows memory beside what is spent, which another process takes for the job. The error is the most that the job may
+    /// ever hold.
+    pub fn lend_beside(&self, bytes: u64) -> Result<(), u64> {
+        let wanted = (self.spent - self.lent_from).saturating_add(bytes);
+        self.lender.0.as_ref().map_or(Ok(()), |lender| lender.lend(wanted))
+    }
+
     /// Runs `work`, and returns what it spent as well, in order.
     pub fn record<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> (T, Vec<Spent>) {
         let outer = self.recorded.replace(Vec::new());

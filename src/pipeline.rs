@@ -364,6 +364,18 @@ pub enum Stage {
     Encode,
 }
 
+impl Stage {
+    /// Its name in headers, metrics and traces.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Parse => "parse",
+            Self::Plan => "plan",
+            Self::Render => "render",
+            Self::Encode => "encode",
+        }
+    }
+}
+
 /// Errors of [`render`] and [`draw`], by who is at fault.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {

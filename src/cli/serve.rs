@@ -55,8 +55,10 @@ pub fn run(arguments: &ServeArgs) -> Result<(), CliError> {
         CliError::usage(format!("--listen {}: there is no such address on this machine ({error})", config.listen))
     })?;
     isolation::ahead(config.workers);
-    http::serve(&config, |address| announce(address, &config)).map_err(|error| match error {
-        ServeError::Unprotected(_) | ServeError::Keys(_) | ServeError::WebhookSecret => {
+    let served = http::serve(&config, |address| announce(address, &config));
+    telemetry::traces::finish();
+    served.map_err(|error| match error {
+        ServeError::Unprotected(_) | ServeError::Keys(_) | ServeError::WebhookSecret | ServeError::WebhooksCa(_) => {
             CliError::usage(error.to_string())
         }
         ServeError::Listen { error: ref cause, .. } if cause.kind() == ErrorKind::InvalidInput => {

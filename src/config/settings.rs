@@ -68,7 +68,7 @@ pub const SETTINGS: &[Setting] = &[
     text(
         "api-keys-file",
         "File of named keys as SHA-256 digests, with scopes; read again on SIGHUP",
-        set_api_keys_file,
+        |c, v| set_file(&mut c.api_keys_file, v),
         |c| show_folder(&c.api_keys_file),
     ),
     Setting {
@@ -78,6 +78,12 @@ pub const SETTINGS: &[Setting] = &[
         has_flag: false,
     },
     switch("webhooks-to-private", "Let webhooks go to addresses of private networks", |c| &mut c.webhooks_to_private),
+    text(
+        "webhooks-ca",
+        "File of certificates in PEM by which receivers of webhooks are trusted, instead of Mozilla's list",
+        |c, v| set_file(&mut c.webhooks_ca, v),
+        |c| show_folder(&c.webhooks_ca),
+    ),
     number(
         "webhook-retry-ms",
         "Pause after the first attempt of a webhook that fails; then four times as long",
@@ -125,6 +131,9 @@ pub const SETTINGS: &[Setting] = &[
     number("body-timeout-ms", "Longest time for the body of a request", 1, MS_MAX, |c| &mut c.body_timeout_ms),
     number("overdue-grace-ms", "Time beyond limit-job-ms after which a job's worker is replaced", 1, MS_MAX, |c| {
         &mut c.overdue_grace_ms
+    }),
+    number("drain-delay-ms", "Time after the signal to end for which work is still taken", 0, MS_MAX, |c| {
+        &mut c.drain_delay_ms
     }),
     number("wait-ms", "Longest time for which a request is let wait for a worker", 0, MS_MAX, |c| &mut c.wait_ms),
     number("batch-wait-ms", "The same for a job that is fetched later", 0, MS_MAX, |c| &mut c.batch_wait_ms),
@@ -342,11 +351,11 @@ fn set_webhook_secret(config: &mut Config, value: &str) -> Result<(), String> {
 }
 
 /// An empty text is a slip, too.
-fn set_api_keys_file(config: &mut Config, value: &str) -> Result<(), String> {
+fn set_file(file: &mut Option<PathBuf>, value: &str) -> Result<(), String> {
     if value.is_empty() {
         return Err("the path of a file".into());
     }
-    set_folder(&mut config.api_keys_file, value)
+    set_folder(file, value)
 }
 
 const fn number(key: &'static str, help: &'static str, min: u64, max: u64, at: fn(&mut Config) -> &mut u64) -> Setting {

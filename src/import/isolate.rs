@@ -20,7 +20,7 @@ pub trait Isolation: Send + Sync {
 }
 
 /// What is decoded, and what that may cost.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Order<'a> {
     /// What the decoder has to know beside the file.
     pub head: &'a [u8],
@@ -28,6 +28,8 @@ pub struct Order<'a> {
     pub file: &'a [u8],
     /// Memory that decoding may take, bytes.
     pub memory_bytes: u64,
+    /// Borrows memory of the job for what the process takes now, as [`crate::limits::Budget::lend_beside`] does.
+    pub lend: &'a dyn Fn(u64) -> Result<(), u64>,
 }
 
 /// A decoding that failed outside of the decoder's own errors.
@@ -39,6 +41,9 @@ pub enum IsolationError {
     /// The process ended, or was ended.
     #[error("{0}")]
     Crashed(String),
+    /// The process took more memory than the job can have, bytes.
+    #[error("the process that reads files of this format took too much memory: more than {0} bytes are not to be had")]
+    TooLarge(u64),
 }
 
 static ISOLATION: OnceLock<Box<dyn Isolation>> = OnceLock::new();
@@ -58,6 +63,7 @@ impl From<IsolationError> for MeshError {
         match error {
             IsolationError::Stopped(stopped) => stopped.into(),
             IsolationError::Crashed(detail) => Self::new(MeshFault::DecoderCrashed, detail),
+            too_large @ IsolationError::TooLarge(_) => Self::new(MeshFault::DecoderCrashed, too_large.to_string()),
         }
     }
 }

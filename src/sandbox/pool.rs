@@ -40,6 +40,36 @@ struct Process {
     child: Child,
     socket: UnixStream,
     layers: Layers,
+    meter: Meter,
+}
+
+/// The memory of a process that is its own, as the kernel counts it.
+struct Meter {
+    process: u32,
+    /// What the program takes before it knows a file, bytes.
+    begins_with: u64,
+}
+
+impl Meter {
+    fn new(process: u32) -> Self {
+        let mut meter = Self { process, begins_with: 0 };
+        meter.begins_with = meter.bytes();
+        meter
+    }
+
+    /// Bytes now, beside those of the program. What cannot be read counts as nothing.
+    fn bytes(&self) -> u64 {
+        let text = std::fs::read_to_string(format!("/proc/{}/statm", self.process)).unwrap_or_default();
+        // All of it, what is resident, and what of that belongs to files and is shared.
+        let pages: Vec<u64> = text.split_whitespace().take(3).filter_map(|pages| pages.parse().ok()).collect();
+        let own = if let [_, resident, shared] = pages[..] { resident.saturating_sub(shared) } else { 0 };
+        (own * rustix::param::page_size() as u64).saturating_sub(self.begins_with)
+    }
+
+    /// Has the job borrow what the process takes now, and `beside` bytes for it in this one.
+    fn hold(&self, order: &Order<'_>, beside: u64) -> Result<(), IsolationError> {
+        (order.lend)(self.bytes().saturating_add(beside)).map_err(IsolationError::TooLarge)
+    }
 }
 
 impl Pool {
@@ -95,6 +125,9 @@ impl Isolation for Pool {
         };
         let mut process = self.take().map_err(ours)?;
         let answer = process.ask(order, deadline);
+        if let Err(IsolationError::TooLarge(_)) = &answer {
+            let _ = process.child.kill();
+        }
         if let Err(IsolationError::Crashed(_)) = &answer {
             // Its end says more than the silence on the socket.
             let why = reason(process.end());
@@ -120,10 +153,13 @@ impl Process {
         command.stdin(OwnedFd::from(theirs)).stdout(Stdio::null()).stderr(Stdio::null());
         let child = command.current_dir("/").spawn()?;
         socket.set_read_timeout(Some(START_TIME_MAX))?;
-        let mut process =
-            Self { child, socket: socket.try_clone()?, layers: Layers { has_landlock: false, has_seccomp: false } };
+        let (meter, layers) = (Meter::new(child.id()), Layers { has_landlock: false, has_seccomp: false });
+        let mut process = Self { child, socket: socket.try_clone()?, layers, meter };
         match receive_ready(&mut socket) {
-            Ok(layers) => process.layers = layers,
+            Ok(layers) => {
+                process.layers = layers;
+                process.meter = Meter::new(process.child.id());
+            }
             Err(error) => {
                 process.end();
                 return Err(error);
@@ -135,25 +171,25 @@ impl Process {
     /// Hands it an order and waits for the answer.
     fn ask(&mut self, order: &Order<'_>, deadline: &Deadline) -> Result<Vec<u8>, IsolationError> {
         let silent = |_: io::Error| IsolationError::Crashed(String::new());
+        // The file is there twice from now on: here, and where it is read.
+        let file_bytes = order.file.len() as u64;
+        self.meter.hold(order, file_bytes)?;
         let file = sealed(order.file).map_err(silent)?;
-        let header = OrderHeader {
-            head_bytes: order.head.len() as u64,
-            file_bytes: order.file.len() as u64,
-            memory_bytes: order.memory_bytes,
-        };
+        let header = OrderHeader { head_bytes: order.head.len() as u64, file_bytes, memory_bytes: order.memory_bytes };
         send_order(&self.socket, header, file.as_fd()).map_err(silent)?;
         self.socket.write_all(order.head).map_err(silent)?;
         self.socket.set_read_timeout(Some(POLL)).map_err(silent)?;
-        let length: [u8; 8] = self.read(8, deadline)?.try_into().map_err(|_| IsolationError::Crashed(String::new()))?;
+        let length: [u8; 8] =
+            self.read(8, order, deadline)?.try_into().map_err(|_| IsolationError::Crashed(String::new()))?;
         let length = u64::from_le_bytes(length);
         if length > order.memory_bytes.max(ANSWER_BYTES_MIN) {
             return Err(IsolationError::Crashed(String::new()));
         }
-        self.read(length, deadline)
+        self.read(length, order, deadline)
     }
 
     /// Reads so many bytes. What a process says of its length is not believed: memory grows with what has come.
-    fn read(&mut self, length: u64, deadline: &Deadline) -> Result<Vec<u8>, IsolationError> {
+    fn read(&mut self, length: u64, order: &Order<'_>, deadline: &Deadline) -> Result<Vec<u8>, IsolationError> {
         let (mut all, mut chunk) = (Vec::new(), vec![0; 256 << 10]);
         let began = std::time::Instant::now();
         while (all.len() as u64) < length {
@@ -162,6 +198,7 @@ impl Process {
                 Ok(0) => return Err(IsolationError::Crashed(String::new())),
                 Ok(count) => all.extend_from_slice(&chunk[..count]),
                 Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {
+                    self.meter.hold(order, (order.file.len() + all.len()) as u64)?;
                     if began.elapsed() > WALL_TIME_MAX {
                         return Err(IsolationError::Crashed(String::new()));
                     }

@@ -1,5 +1,8 @@
 """What schemathesis must be told of meshsnap: meshes to send, and the rules that a schema cannot express."""
 
+import os
+import re
+
 import schemathesis
 from hypothesis import strategies as st
 from schemathesis.checks import CHECKS
@@ -11,6 +14,17 @@ MESHES = [
     "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n",
 ]
 schemathesis.openapi.format("binary", st.sampled_from(MESHES))
+
+# What the document allows as an address of a webhook goes to the receiver of the test, and to nobody else's machine.
+PORT = r"(:(6553[0-5]|655[0-2][0-9]|65[0-4][0-9]{2}|6[0-4][0-9]{3}|[1-5][0-9]{4}|[1-9][0-9]{0,3}))?"
+ADDRESS = re.compile(rf"^https?://[A-Za-z0-9.-]+{PORT}(/[A-Za-z0-9/._~-]*)?$")
+
+
+@schemathesis.hook
+def before_call(context, case, kwargs):
+    if case.headers and ADDRESS.match(str(case.headers.get("Webhook", ""))):
+        case.headers["Webhook"] = os.environ["WEBHOOK_RECEIVER"]
+
 
 # Answers to requests that the document allows and meshsnap refuses, by code and a part of the detail. Each is a rule
 # between values, which a schema cannot express.
@@ -24,7 +38,6 @@ RULES_BETWEEN_VALUES = [
     ("out_of_range", " where `"),  # a range that depends on another key of the same layer or of the document
     ("out_of_range", "frames have at most"),  # the pixels of all frames together
     ("out_of_range", "cells"),  # the pixels of each cell of a sheet
-    ("webhooks_off", ""),  # the server of the test has no secret for them
 ]
 
 
@@ -42,6 +55,8 @@ def is_rule_between_values(response, case):
     if case.path in WORDS_OF_THEIR_OWN or (case.query or {}).get("kind") in ("check", "diff"):
         return True
     problem = response.json()
+    if problem["code"] == "bad_webhook" and not ADDRESS.match(str((case.headers or {}).get("Webhook", ""))):
+        return True  # of the longest text of a header, schemathesis forgets the pattern
     if problem["code"] == "mesh_broken" and "format_in" in (case.query or {}):
         return True  # `format_in` is the format of what was sent
     return any(problem["code"] == code and part in problem["detail"] for code, part in RULES_BETWEEN_VALUES)

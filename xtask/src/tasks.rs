@@ -100,14 +100,16 @@ pub fn lint() -> Result {
     }
 }
 
-/// Checks the library and its programs without features, with each alone, and with all.
+/// Checks the library and its programs without features, with each alone, and with all. Runs the tests of what is off by
+/// default.
 pub fn features() -> Result {
     let check = ["check", "--locked", "--package", "meshsnap"];
     run(cargo(&[&check[..], &["--no-default-features"]].concat()))?;
     for feature in &feature_names()? {
         run(cargo(&[&check[..], &["--no-default-features", "--features", feature]].concat()))?;
     }
-    run(cargo(&[&check[..], &["--all-features"]].concat()))
+    run(cargo(&[&check[..], &["--all-features"]].concat()))?;
+    run(cargo(&["test", "--locked", "--features", "otel", "--test", "suite", "--", "jobs::traces"]))
 }
 
 /// Other systems that the program is checked for.

@@ -147,7 +147,8 @@ pub fn read(bytes: &[u8], isolation: &dyn Isolation, cx: &mut Context<'_>) -> Re
     let head = postcard::to_stdvec(&head).map_err(|_| MeshError::broken("the names of the files are too long"))?;
     let head = [&[isolate::FBX], head.as_slice()].concat();
     let memory_bytes = memory_bytes.saturating_sub(spent_bytes);
-    let answer = isolation.decode(&Order { head: &head, file: bytes, memory_bytes }, cx.deadline)?;
+    let lend = |bytes| cx.budget.lend_beside(bytes);
+    let answer = isolation.decode(&Order { head: &head, file: bytes, memory_bytes, lend: &lend }, cx.deadline)?;
     // The lists in memory are at most a few times as long as what came.
     cx.budget.spend("the FBX file", answer.len() as u64, 1)?;
     let foul = || MeshError::new(MeshFault::DecoderCrashed, "the decoder of this format answered with nonsense");

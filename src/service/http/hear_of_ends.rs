@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::service::durable::{Change, Durable};
 use crate::service::jobs::{Job, JobId, OnEnd};
 use crate::service::metrics::Metrics;
-use crate::service::webhooks::{Delivery, Secret, Target, WebhookSettings, Webhooks};
+use crate::service::webhooks::{Delivery, RootCerts, Secret, Target, WebhookSettings, Webhooks, roots};
 
 /// The payload, in the form of Standard Webhooks.
 #[derive(Serialize)]
@@ -28,7 +28,16 @@ pub fn start(
     metrics: &Arc<Metrics>,
 ) -> Result<Option<Webhooks>, ServeError> {
     let Some(text) = &config.webhook_secret else { return Ok(None) };
+    let roots = match &config.webhooks_ca {
+        None => RootCerts::WebPki,
+        Some(path) => {
+            let broken = |why: String| ServeError::WebhooksCa(format!("{}: {why}", path.display()));
+            let pem = std::fs::read(path).map_err(|error| broken(error.to_string()))?;
+            roots(&pem).ok_or_else(|| broken("there are no certificates in PEM".to_owned()))?
+        }
+    };
     let settings = WebhookSettings {
+        roots,
         secret: Secret::read(text).ok_or(ServeError::WebhookSecret)?,
         to_private: config.webhooks_to_private,
         retry: Duration::from_millis(config.webhook_retry_ms),

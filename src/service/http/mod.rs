@@ -78,6 +78,9 @@ pub enum ServeError {
         "MESHSNAP_WEBHOOK_SECRET must be whsec_ and 24 to 64 bytes in base64: echo whsec_$(openssl rand -base64 32)"
     )]
     WebhookSecret,
+    /// The certificates for webhooks cannot be used.
+    #[error("--webhooks-ca {0}")]
+    WebhooksCa(String),
     /// The data folder cannot be used.
     #[error(transparent)]
     Data(#[from] OpenError),
@@ -123,8 +126,12 @@ async fn run(config: &Config, ready: impl FnOnce(SocketAddr)) -> Result<(), Serv
 
     let stop = async {
         signals.next().await;
+        let drained = async {
+            leave(&state, Duration::from_millis(config.drain_delay_ms)).await;
+            drain(&state, Duration::from_millis(config.limits.job_ms) + DRAIN_GRACE).await;
+        };
         tokio::select! {
-            () = drain(&state, Duration::from_millis(config.limits.job_ms) + DRAIN_GRACE) => {}
+            () = drained => {}
             () = signals.next() => tracing::warn!("told twice to end: jobs are abandoned"),
         }
         state.event_streams.close();
@@ -161,6 +168,16 @@ async fn reload_keys(mut hang_ups: HangUps, state: Arc<AppState>) {
             Ok(Err(error)) => tracing::error!(%error, "SIGHUP: the API keys stay as they are"),
             Err(_) => tracing::error!("SIGHUP: the API keys were not read"),
         }
+    }
+}
+
+/// Says at `/readyz` that the server ends, and takes work for a while all the same: those who distribute requests look there
+/// now and then, and send some until they have looked.
+async fn leave(state: &Arc<AppState>, delay: Duration) {
+    if !delay.is_zero() {
+        tracing::info!(seconds = delay.as_secs_f64(), "leaving: not ready any more, and work is taken for a while");
+        state.leave();
+        tokio::time::sleep(delay).await;
     }
 }
 

@@ -69,6 +69,7 @@ pub struct AppState {
     pub rates: Rates,
     /// The API keys. If there are none, no request needs one.
     pub keys: Keys,
+    leaving: AtomicBool,
     draining: AtomicBool,
 }
 
@@ -132,6 +133,7 @@ impl AppState {
             cors_origins: config.cors_origins.clone(),
             rates: Rates::new(to_u32(config.rate_per_s), to_u32(config.rate_burst), to_u32(config.quota_per_day)),
             keys,
+            leaving: AtomicBool::new(false),
             draining: AtomicBool::new(false),
         });
         Ok((state, recovered))
@@ -141,6 +143,16 @@ impl AppState {
     pub fn drain(&self) {
         self.draining.store(true, Ordering::Relaxed);
         self.jobs.drain();
+    }
+
+    /// The server is to end, and takes work for a while yet.
+    pub fn leave(&self) {
+        self.leaving.store(true, Ordering::Relaxed);
+    }
+
+    /// True once [`AppState::leave`] or [`AppState::drain`] was called.
+    pub fn is_leaving(&self) -> bool {
+        self.leaving.load(Ordering::Relaxed) || self.is_draining()
     }
 
     /// True once [`AppState::drain`] was called.

@@ -22,6 +22,7 @@ use crate::service::digest::Digest;
 use crate::service::durable::{ErrorRecord, Hold, JobKey};
 use crate::service::memory::{Account, Keeping, Memory, Share, counted};
 use crate::spec::Spec;
+use crate::telemetry::traces::Trace;
 use crate::warning::Warning;
 
 /// The name of a job. Later ids sort after earlier ones.
@@ -372,6 +373,8 @@ pub struct Job {
     pub owner: Owner,
     /// The id of the request that brought it, for the log.
     pub request_id: Arc<str>,
+    /// The place of that request in a trace.
+    pub trace: Trace,
     /// The address that hears of its end.
     pub webhook: Option<Arc<str>>,
     /// Time of acceptance by this process.
@@ -461,6 +464,7 @@ impl Job {
             class: if is_kept { Class::Batch } else { Class::Interactive },
             owner,
             request_id: work.as_ref().map_or_else(|| "".into(), |work| work.request_id.clone()),
+            trace: Trace::here(),
             webhook: work.as_ref().and_then(|work| work.webhook.clone()),
             accepted: Instant::now(),
             accepted_unix_ms,

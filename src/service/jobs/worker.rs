@@ -4,6 +4,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Instant;
 
+use tracing::Span;
+
 use super::dispatch::Next;
 use super::job::{Checking, Comparing, Failure, Finished, Job, JobState, Product, Task, Timings, Work};
 use super::registry::JobRegistry;
@@ -16,6 +18,7 @@ use crate::pipeline::{self, Model, Output, RenderError, Stage};
 use crate::report::Extras;
 use crate::service::priority;
 use crate::service::residents::{Found, Residents};
+use crate::telemetry::traces;
 
 /// A worker's renderer, which does one job after the other.
 pub type Renderer = Box<dyn FnMut(&Work, &Deadline, &mut dyn FnMut(Stage)) -> Result<Product, RenderError>>;
@@ -171,6 +174,8 @@ pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
         };
         let started = Instant::now();
         let span = tracing::info_span!("job", job = %job.id, request_id = &*job.request_id);
+        job.trace.adopt(&span);
+        traces::add_part(&span, "queue", job.accepted, started);
         let attempt = catch_unwind(AssertUnwindSafe(|| {
             let _entered = span.enter();
             let renderer = renderer.get_or_insert_with(|| renderers());
@@ -183,6 +188,7 @@ pub fn run(registry: &Arc<JobRegistry>, renderers: &RendererFactory) {
             drop_renderer(&mut renderer);
             JobState::Failed(Arc::new(Failure::Panicked))
         });
+        traces::describe_end(&span, state.name(), matches!(state, JobState::Failed(_)));
         let work = match memory.was_refused() && matches!(state, JobState::Failed(_)) {
             true => match registry.again(&job, *work) {
                 Some(work) => Box::new(work),
@@ -221,6 +227,7 @@ fn run_job(renderer: &mut Renderer, job: &Job, work: &Work, started: Instant) ->
     let result = renderer(work, &job.deadline, &mut |stage| {
         let now = Instant::now();
         timings.record(stage, now.duration_since(stage_began));
+        traces::add_part(&Span::current(), stage.name(), stage_began, now);
         stage_began = now;
         job.progress.send_modify(|progress| *progress = progress.after(stage));
     });

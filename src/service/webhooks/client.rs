@@ -9,6 +9,7 @@ use hmac::{Hmac, KeyInit as _, Mac as _};
 use sha2::Sha256;
 use ureq::Agent;
 use ureq::http::Uri;
+use ureq::tls::{PemItem, RootCerts, TlsConfig, parse_pem};
 use ureq::unversioned::resolver::{DefaultResolver, ResolvedSocketAddrs, Resolver};
 use ureq::unversioned::transport::{DefaultConnector, NextTimeout};
 
@@ -23,6 +24,17 @@ const SECRET_BYTES: std::ops::RangeInclusive<usize> = 24..=64;
 
 /// The beginning of a secret's text.
 const SECRET_PREFIX: &str = "whsec_";
+
+/// Reads the certificates of a file in PEM. None if there are none, or the file is broken.
+pub fn roots(pem: &[u8]) -> Option<RootCerts> {
+    let certificates = parse_pem(pem).filter_map(|item| match item {
+        Ok(PemItem::Certificate(certificate)) => Some(Ok(certificate)),
+        Ok(_) => None,
+        Err(error) => Some(Err(error)),
+    });
+    let certificates: Vec<_> = certificates.collect::<Result<_, _>>().ok()?;
+    (!certificates.is_empty()).then(|| RootCerts::from(certificates))
+}
 
 /// The result of an attempt.
 #[derive(Debug, PartialEq, Eq)]
@@ -88,11 +100,12 @@ const PRIVATE: &str = "the name has addresses of private networks alone";
 pub struct Client(Agent);
 
 impl Client {
-    /// A client that connects to private addresses, or does not.
-    pub fn new(to_private: bool) -> Self {
+    /// A client that connects to private addresses, or does not, and trusts receivers by these roots.
+    pub fn new(to_private: bool, roots: RootCerts) -> Self {
         let config = Agent::config_builder()
             .timeout_global(Some(TIME))
             .http_status_as_error(false)
+            .tls_config(TlsConfig::builder().root_certs(roots).build())
             .max_redirects(0)
             .max_redirects_will_error(false)
             // A proxy would look the name up itself.

@@ -13,9 +13,11 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-pub use client::Secret;
 use client::{Client, Outcome};
+pub use client::{Secret, roots};
 pub use target::{BadTarget, Target};
+
+pub use ureq::tls::RootCerts;
 
 use super::metrics::Metrics;
 
@@ -60,6 +62,8 @@ pub struct WebhookSettings {
     pub secret: Secret,
     /// Addresses of private networks are allowed.
     pub to_private: bool,
+    /// The certificates by which receivers are trusted.
+    pub roots: RootCerts,
     /// The pause after the first attempt that fails.
     pub retry: Duration,
     /// Counts attempts and ends.
@@ -106,7 +110,7 @@ impl std::fmt::Debug for Webhooks {
 impl Webhooks {
     /// Starts the threads.
     pub fn start(settings: WebhookSettings, settled: Settled) -> std::io::Result<Self> {
-        let client = Client::new(settings.to_private);
+        let client = Client::new(settings.to_private, settings.roots.clone());
         let (state, changed) = (Mutex::default(), Condvar::new());
         let webhooks = Self(Arc::new(Inner { settings, settled, client, state, changed }));
         for number in 0..THREADS {

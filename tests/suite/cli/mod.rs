@@ -5,6 +5,7 @@ pub mod batch;
 pub mod check;
 pub mod commands;
 pub mod diff;
+mod documents;
 pub mod help;
 pub mod mistakes;
 pub mod outputs;

@@ -62,6 +62,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "image",
             "limits",
             "warning",
+            // Of it the traces alone.
+            "telemetry",
         ],
     ),
     ("service/memory", &["limits"]),

@@ -7,7 +7,7 @@ use super::meshopt::{DECODER, Mode, Packed, Unpacked, unpack};
 use crate::guard::{Panicked, guarded};
 use crate::import::isolate::{self, Isolation, Order};
 use crate::import::{MeshError, MeshFault};
-use crate::limits::Deadline;
+use crate::limits::{Budget, Deadline};
 
 /// Most unpacked bytes of views that are unpacked before they are asked for.
 pub const AHEAD_BYTES_MAX: u64 = 64 << 20;
@@ -32,7 +32,7 @@ const MODES: [Mode; 3] = [Mode::Attributes, Mode::Triangles, Mode::Indices];
 pub fn read(
     views: &[(Packed, &[u8])],
     isolation: &dyn Isolation,
-    deadline: &Deadline,
+    (budget, deadline): (&Budget, &Deadline),
 ) -> Result<Vec<Unpacked>, MeshError> {
     let part = |&(Packed { mode, count, stride }, bytes): &(Packed, &[u8])| Part {
         mode: MODES.iter().position(|&one| one == mode).unwrap_or_default() as u8,
@@ -47,7 +47,8 @@ pub fn read(
     let file = views.iter().map(|(_, bytes)| *bytes).collect::<Vec<_>>().concat();
     let unpacked_bytes = views.iter().map(|(packed, _)| packed.bytes()).fold(0, u64::saturating_add);
     let memory_bytes = unpacked_bytes.saturating_mul(3).saturating_add(BESIDE_BYTES);
-    let answer = isolation.decode(&Order { head: &head, file: &file, memory_bytes }, deadline)?;
+    let lend = |bytes| budget.lend_beside(bytes);
+    let answer = isolation.decode(&Order { head: &head, file: &file, memory_bytes, lend: &lend }, deadline)?;
     let all: Vec<Answer> = postcard::from_bytes(&answer).map_err(|_| foul())?;
     let fits = |one: &Answer, packed: &Packed| match one {
         Ok(Some(bytes)) => bytes.len() as u64 == packed.bytes(),

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use axum::body::Body;
 use axum::extract::connect_info::ConnectInfo;
-use axum::extract::{Request, State};
+use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Version, header};
 use axum::middleware::Next;
 use axum::response::Response;
@@ -16,6 +16,7 @@ use crate::service::http::connection::activity::Client;
 use crate::service::http::dto::ProblemDto;
 use crate::service::http::error::{ApiError, IsAnswer};
 use crate::service::http::state::AppState;
+use crate::telemetry::traces::{self, Trace};
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
@@ -30,8 +31,12 @@ pub async fn observe(State(state): State<Arc<AppState>>, request: Request, next:
     let _busy = client.map(|ConnectInfo(client)| client.activity.begin());
     let id = request_id(request.headers());
     let path: String = request.uri().path().chars().take(LOGGED_PATH_CHARS_MAX).collect();
-    let span = tracing::info_span!("request", request_id = %id, method = %request.method(), path);
+    let empty = tracing::field::Empty;
+    let span = tracing::info_span!("request", request_id = %id, method = %request.method(), path, otel.kind = empty);
     let (headers, version) = (request.headers().clone(), request.version());
+    Trace::of_headers(|name| headers.get(name)?.to_str().ok()).adopt(&span);
+    let route = request.extensions().get::<MatchedPath>().map(MatchedPath::as_str);
+    traces::describe_request(&span, request.method().as_str(), route);
     let (mut parts, body) = request.into_parts();
     parts.extensions.insert(RequestId(id.as_str().into()));
     let (drainable, body) = DrainableBody::new(body);
@@ -44,6 +49,7 @@ pub async fn observe(State(state): State<Arc<AppState>>, request: Request, next:
 
     let (status, duration_ms) = (response.status().as_u16(), began.elapsed().as_secs_f64() * 1e3);
     let code = response.extensions().get::<ApiError>().map(|e| (e.code, e.detail.clone()));
+    traces::describe_answer(&span, status);
     state.metrics.answered(status, code.as_ref().map(|(code, _)| *code));
     span.in_scope(|| match code {
         Some((code, detail)) if status >= 500 => tracing::warn!(status, duration_ms, code, detail, "answered"),
@@ -84,7 +90,17 @@ fn add_id_and_problem(response: &mut Response, id: &str) {
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
         *response.body_mut() = Body::from(body);
     }
+    add_browsers_rules(response.headers_mut());
     if let Ok(value) = HeaderValue::from_str(id) {
         response.headers_mut().insert(REQUEST_ID, value);
     }
+}
+
+/// Types are what they are said to be. Pictures may stand in pages of every origin, also in those that are isolated; all
+/// else in pages of this one, unless CORS allows more.
+fn add_browsers_rules(headers: &mut HeaderMap) {
+    let is_picture = headers.get(header::CONTENT_TYPE).is_some_and(|kind| kind.as_bytes().starts_with(b"image/"));
+    let policy = if is_picture { "cross-origin" } else { "same-origin" };
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static(policy));
 }

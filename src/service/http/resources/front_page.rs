@@ -21,7 +21,6 @@ pub async fn get(headers: HeaderMap) -> Response {
     };
     response.headers_mut().extend([
         (header::CONTENT_SECURITY_POLICY, HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'")),
-        (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
         (HeaderName::from_static("vary"), HeaderValue::from_static("host")),
     ]);
     response

@@ -19,7 +19,7 @@ pub async fn healthz() -> Response {
 
 /// 200 while the process takes work. It tells of what it cannot do.
 pub async fn readyz(State(state): State<Arc<AppState>>) -> Result<Response, ApiError> {
-    if state.is_draining() {
+    if state.is_leaving() {
         return Err(ApiError::draining("the server is shutting down"));
     }
     let load = state.jobs.load();

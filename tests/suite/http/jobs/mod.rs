@@ -5,6 +5,8 @@ pub mod durable;
 mod events;
 mod idempotency;
 mod several;
+#[cfg(feature = "otel")]
+mod traces;
 mod webhooks;
 
 use std::io::Write as _;
@@ -180,6 +182,43 @@ fn a_client_that_hangs_up_frees_its_worker() {
     }
     server.wait_for_load(|load| load["queued"] == 0 && load["running"] == 0);
     server.post("/v1/render?size=16", CUBE_OBJ).picture(16, 16);
+}
+
+#[test]
+fn a_server_that_leaves_takes_work_for_a_while() {
+    let mut server = Server::start(&["--drain-delay-ms", "3s"]);
+    assert_eq!(server.get("/readyz").status, 200);
+    let began = Instant::now();
+    server.terminate();
+    while server.get("/readyz").status != 503 {
+        assert!(began.elapsed() < PATIENCE, "still ready");
+    }
+    server.get("/readyz").problem(503, "draining");
+    let noticed = began.elapsed();
+    let drawn = server.post("/v1/render?size=16", CUBE_OBJ);
+    // On a machine so busy that the time is up, nothing is shown.
+    if noticed < Duration::from_secs(1) && began.elapsed() < Duration::from_secs(3) {
+        drawn.picture(16, 16);
+    }
+    assert_eq!(server.wait().code(), Some(0));
+    assert!(began.elapsed() >= Duration::from_secs(3), "{:?}", began.elapsed());
+}
+
+#[test]
+fn answers_say_to_browsers_what_they_are() {
+    let server = Server::start(&[]);
+    let answers = [
+        (server.post("/v1/render?size=16", CUBE_OBJ), 200, "cross-origin"),
+        (server.post("/v1/jobs?size=16", CUBE_OBJ), 202, "same-origin"),
+        (server.get("/"), 200, "same-origin"),
+        (server.get("/nothing"), 404, "same-origin"),
+        (server.get("/metrics"), 200, "same-origin"),
+    ];
+    for (answer, status, policy) in &answers {
+        assert_eq!((answer.status, answer.header("x-content-type-options")), (*status, Some("nosniff")));
+        assert_eq!(answer.header("cross-origin-resource-policy"), Some(*policy), "{status}");
+    }
+    assert_eq!(answers.len(), 5);
 }
 
 #[test]

@@ -135,6 +135,54 @@ fn a_receiver_hears_of_each_end_once() {
     assert!(hook.heard.try_recv().is_err());
 }
 
+/// The certificate of the receiver is of an authority that nobody else knows. Its private key is for tests alone.
+#[test]
+fn receivers_are_trusted_by_the_certificates_of_a_file() {
+    use rustls::pki_types::pem::PemObject as _;
+    use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+    let data = |name: &str| format!("{}/tests/data/tls/{name}", env!("CARGO_MANIFEST_DIR"));
+    let chain = vec![CertificateDer::from_pem_file(data("server.pem")).unwrap()];
+    let key = PrivateKeyDer::from_pem_file(data("server.key")).unwrap();
+    let provider = Arc::new(rustls::crypto::ring::default_provider());
+    let config = rustls::ServerConfig::builder_with_provider(provider).with_safe_default_protocol_versions().unwrap();
+    let config = Arc::new(config.with_no_client_auth().with_single_cert(chain, key).unwrap());
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("Webhook: https://localhost:{}/hook", listener.local_addr().unwrap().port());
+    let (sender, heard) = channel();
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            let connection = rustls::ServerConnection::new(config.clone()).unwrap();
+            let mut stream = rustls::StreamOwned::new(connection, stream.unwrap());
+            let mut buffer = [0; 4096];
+            // A client that does not trust it hangs up.
+            let heard_more = stream.read(&mut buffer).is_ok_and(|count| count > 0);
+            let _ = stream.write_all(b"HTTP/1.1 204 No Content\r\nConnection: close\r\n\r\n");
+            let _ = sender.send(heard_more);
+        }
+    });
+    for (arguments, is_trusted) in [(vec![], false), (vec!["--webhooks-ca".to_owned(), data("ca.pem")], true)] {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let server = start(&[&["--webhooks-to-private", "--webhook-retry-ms", "600000"], &arguments[..]].concat());
+        assert_eq!(server.request("POST", "/v1/jobs?size=16", &[&address], CUBE_OBJ).status, 202);
+        assert_eq!(heard.recv_timeout(PATIENCE), Ok(is_trusted));
+        let outcome = if is_trusted { "delivered" } else { "failed_attempt" };
+        let began = Instant::now();
+        while metric(&server, &format!("meshsnap_webhooks_total{{outcome=\"{outcome}\"}}")) < 1.0 {
+            assert!(began.elapsed() < PATIENCE, "{outcome}");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+    for (file, why) in [("server.key", "no certificates"), ("missing.pem", "No such file")] {
+        let mut command = meshsnap();
+        command
+            .args(["serve", "--listen", "127.0.0.1:0", "--webhooks-ca", &data(file)])
+            .env("MESHSNAP_WEBHOOK_SECRET", SECRET);
+        let output = command.output().unwrap();
+        let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && printed.contains(why), "{file}: {printed}");
+    }
+}
+
 #[test]
 fn a_restart_tries_again_what_was_not_taken() {
     let (folder, hook) = (tempfile::tempdir().unwrap(), Hook::new(false));

@@ -106,7 +106,15 @@ fn check(document: &Value, method: &str, path: &str, answer: &Answer) {
     assert!(response.is_object(), "{what} is not documented: {}", String::from_utf8_lossy(&answer.body));
     let documented: BTreeSet<String> =
         response["headers"].as_object().unwrap().keys().map(|name| name.to_lowercase()).collect();
-    let of_every_answer = ["date", "content-length", "content-type", "connection", "transfer-encoding"];
+    let of_every_answer = [
+        "date",
+        "content-length",
+        "content-type",
+        "connection",
+        "transfer-encoding",
+        "x-content-type-options",
+        "cross-origin-resource-policy",
+    ];
     for (name, _) in &answer.headers {
         let is_known = documented.contains(name) || of_every_answer.contains(&name.as_str());
         assert!(is_known || name == "www-authenticate" && answer.status == 401, "{what}: {name} is not documented");

@@ -1,10 +1,14 @@
 //! Tools that read `/openapi.json`: a validator, a generator of clients, and a tester that makes requests from it.
 //! They are Python, and `tests/run` installs them into `target/python`.
 
+use std::io::{Read as _, Write as _};
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
-use crate::support::server::{CUBE_OBJ, Server};
+use crate::support::server::{CUBE_OBJ, Server, meshsnap};
 use crate::support::skip::{Need, skip};
 
 /// A program of `target/python`. None, and the test counts as skipped, where it is missing.
@@ -82,6 +86,24 @@ fn operations(document: &serde_json::Value) -> usize {
     paths.map(|(_, path)| methods.iter().filter(|method| path.get(**method).is_some()).count()).sum()
 }
 
+/// The address of a receiver of webhooks, and how many it has heard.
+fn receiver() -> (String, Arc<AtomicU32>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("http://{}/", listener.local_addr().unwrap());
+    let heard = Arc::new(AtomicU32::new(0));
+    let count = heard.clone();
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            let mut stream = stream.unwrap();
+            // The signature is tried in `jobs::webhooks`.
+            let _ = stream.read(&mut [0; 4096]);
+            let _ = stream.write_all(b"HTTP/1.1 204 No Content\r\nConnection: close\r\n\r\n");
+            count.fetch_add(1, Ordering::Relaxed);
+        }
+    });
+    (address, heard)
+}
+
 /// All checks of schemathesis, on requests that keep the document and on such that break it. What a schema cannot
 /// express is listed by name in `tests/python/hooks.py`.
 #[test]
@@ -89,7 +111,12 @@ fn schemathesis_finds_nothing() {
     let Some(mut tester) = tool("schemathesis") else { return };
     let folder = tempfile::tempdir().unwrap();
     // Small pictures: this is about requests.
-    let server = Server::start(&["--limit-image-px", "64"]);
+    let (receiver, heard) = receiver();
+    let mut command = meshsnap();
+    command.args(["serve", "--listen", "127.0.0.1:0", "--backend", "cpu", "--limit-image-px", "64"]);
+    command.arg("--webhooks-to-private").env("MESHSNAP_WEBHOOK_SECRET", format!("whsec_{}", "A".repeat(32)));
+    let server = Server::start_with(&mut command);
+    tester.env("WEBHOOK_RECEIVER", receiver);
     tester.current_dir(folder.path()).env("PYTHONPATH", scripts()).env("SCHEMATHESIS_HOOKS", "hooks");
     tester.arg("run").arg(format!("http://{}/openapi.json", server.address));
     let printed =
@@ -98,6 +125,9 @@ fn schemathesis_finds_nothing() {
     println!("{summary}");
     let cases: u32 = summary.split(' ').next().unwrap().parse().unwrap();
     assert!(cases > 3_000, "{summary}");
+    let heard = heard.load(Ordering::Relaxed);
+    println!("{heard} webhooks");
+    assert!(heard >= 10, "{heard} webhooks");
     let tested = printed.lines().find_map(|line| line.trim().strip_prefix("Tested: ")).expect(&printed);
     assert_eq!(tested.parse(), Ok(operations(&server.get("/openapi.json").json())), "every operation");
 }

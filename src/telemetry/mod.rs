@@ -1,9 +1,15 @@
-//! The log on standard error: text on a terminal, one JSON object per line elsewhere.
+//! The log on standard error: text on a terminal, one JSON object per line elsewhere. With the feature `otel`, [`traces`]
+//! for OpenTelemetry as well.
+
+#[cfg_attr(not(feature = "otel"), path = "traces_absent.rs")]
+pub mod traces;
 
 use std::io::IsTerminal as _;
 
-use tracing_subscriber::EnvFilter;
 use tracing_subscriber::filter::LevelFilter;
+use tracing_subscriber::layer::{Layer as _, SubscriberExt as _};
+use tracing_subscriber::util::SubscriberInitExt as _;
+use tracing_subscriber::{EnvFilter, fmt, registry};
 
 /// Starts the log. `filter` has the syntax of `tracing`: `info`, or `warn,meshsnap::service=debug`.
 /// If `json` is None, the log is JSON unless standard error is a terminal.
@@ -28,12 +34,14 @@ pub fn init(filter: &str, json: Option<bool>) -> Result<(), String> {
     }
     let terminal = std::io::stderr().is_terminal();
     let text = !json.unwrap_or(!terminal);
-    let builder = tracing_subscriber::fmt().with_env_filter(parsed).with_writer(std::io::stderr);
-    let started = if text {
-        builder.with_ansi(terminal).with_target(false).try_init()
+    let lines = fmt::layer().with_writer(std::io::stderr);
+    let log = if text {
+        lines.with_ansi(terminal).with_target(false).boxed()
     } else {
-        builder.json().flatten_event(true).with_current_span(true).with_span_list(false).try_init()
+        lines.json().flatten_event(true).with_current_span(true).with_span_list(false).boxed()
     };
+    // Each has a filter of its own: a quiet log makes no holes in traces.
+    let started = registry().with(log.with_filter(parsed)).with(traces::layer()?).try_init();
     started.map_err(|e| e.to_string())?;
     log_panics();
     Ok(())
