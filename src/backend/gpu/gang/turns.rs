@@ -50,6 +50,9 @@ enum News<S, R> {
     Drawn(Option<(R, usize)>),
 }
 
+/// Where a waiting job hears.
+type Hears<S, R> = mpsc::Receiver<News<S, R>>;
+
 /// Jobs that are drawn together, the leader first.
 struct Gang<S, R> {
     seats: Vec<S>,
@@ -91,7 +94,7 @@ impl<S: Seat + Clone, R: Clone> Turns<S, R> {
     }
 
     /// A gang of one, if the job leads at once; or its number and where it hears of its turn.
-    fn enter(&self, seat: S) -> Result<Gang<S, R>, (u64, mpsc::Receiver<News<S, R>>)> {
+    fn enter(&self, seat: S) -> Result<Gang<S, R>, (u64, Hears<S, R>)> {
         let mut state = self.lock();
         if state.drawn.iter().filter(|kind| kind.is_alike(&seat)).count() < LEADERS {
             state.drawn.push(seat.clone());
