@@ -57,7 +57,10 @@ pub fn encode(image: &Image, format: ImageFormat, effort: u32, deadline: &Deadli
             WebPEncoder::new_lossless(&mut bytes).encode(&image.rgba, width, height, ExtendedColorType::Rgba8)?;
         }
         (ImageFormat::Jpeg, is_opaque) => {
+            // The largest pictures take tens of milliseconds for each of these steps.
+            deadline.check()?;
             let rgb = if is_opaque { drop_alpha(&image.rgba) } else { over_white(image) };
+            deadline.check()?;
             let encoder = JpegEncoder::new_with_quality(Stoppable { bytes: &mut bytes, deadline }, JPEG_QUALITY);
             let written = encoder.write_image(&rgb, width, height, ExtendedColorType::Rgb8);
             // A writer's errors are of one kind, so that the reason is asked for again.

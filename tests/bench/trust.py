@@ -418,9 +418,12 @@ def times_to_free(server, path, body, count):
     def spent():
         return sum(ran for ran, _, _ in server.waits().values())
 
-    while len(times) < count:
+    for attempt in range(4 * count):
+        if len(times) == count:
+            break
         connection = http.client.HTTPConnection(server.host, server.port)
-        connection.request("POST", path, body)
+        # Another mesh each time: verdicts on one are kept.
+        connection.request("POST", path, body + b"\n# %d" % attempt)
         began = time.monotonic()
         while server.load()["running"] == 0 and time.monotonic() - began < whole:
             pass
@@ -432,6 +435,8 @@ def times_to_free(server, path, body, count):
         while server.load()["running"] != 0:
             pass
         times.append(1000 * min(time.monotonic() - began, spent() - on_cores))
+    if len(times) < count / 2:
+        sys.exit(f"{path} was hardly ever found running")
     return times
 
 
