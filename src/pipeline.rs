@@ -12,14 +12,14 @@ mod opened;
 
 pub use opened::{Opened, Side, draw_difference, open, render_difference};
 
-use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, GpuDevice};
+use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes};
 use crate::caption::{Scale, draw_legend};
 use crate::encode::{self, EncodeError};
 use crate::image::{Image, ImageFormat, RowSink};
 use crate::import::{self, Bundle, Format, Imported, MeshError};
 use crate::limits::{Budget, Deadline, Limits, Stopped};
 use crate::mesh::Mesh;
-use crate::plan::{self, Prepared, Skip, UvLayout};
+use crate::plan::{self, DrawPlan, Prepared, Skip, UvLayout};
 pub use crate::plan::{PlanError, QualitySelection};
 use crate::report::{Extras, Report};
 use crate::scene::{Scene, SceneError};
@@ -194,19 +194,19 @@ fn draw_view(
     Ok(Drawn { image, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
 }
 
-/// Makes what a picture needs on a device and can be made without drawing, such as pipelines.
+/// Has `make` prepare for a picture: it gets the plan, and makes what a device needs, such as pipelines.
 pub fn make_ready(
     model: &Model,
     spec: &Spec,
-    device: &dyn GpuDevice,
     budget: &mut Budget,
     deadline: &Deadline,
+    make: impl FnOnce(&DrawPlan<'_>) -> Result<(), DrawError>,
 ) -> Result<(), RenderError> {
     let Model { mesh, prepared, .. } = model;
     let framing = plan::framing(mesh, spec, prepared, budget, deadline)?;
     let scene = Scene::framed_by(framing.as_deref().unwrap_or(&mesh.positions), mesh, spec, budget)?;
     let plan = plan::build_from(&scene, prepared, budget, deadline)?;
-    Ok(device.make_ready(&plan)?)
+    Ok(make(&plan)?)
 }
 
 /// Reports what is in a file.

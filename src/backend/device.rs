@@ -66,6 +66,9 @@ pub trait GpuDevice: Send + Sync {
     /// Makes what pictures of this plan's kind need and can be made without drawing. A device that gains
     /// nothing by that does nothing.
     fn make_ready(&self, plan: &DrawPlan<'_>) -> Result<(), DrawError>;
+
+    /// The same for pictures that are drawn together with others while the device is busy.
+    fn make_ready_for_load(&self, plan: &DrawPlan<'_>) -> Result<(), DrawError>;
 }
 
 /// Opens a device.

@@ -46,7 +46,7 @@ struct Process {
 /// The memory of a process that is its own, as the kernel counts it.
 struct Meter {
     process: u32,
-    /// What the program takes before it knows a file, bytes.
+    /// Bytes of the program, before it knows a file.
     begins_with: u64,
 }
 

@@ -11,13 +11,17 @@ use crate::backend::{Backends, DrawError, GpuDevice, GpuHost, GpuKind};
 use crate::import::Bundle;
 use crate::limits::{Budget, Deadline, Limits};
 use crate::pipeline::{self, Model};
+use crate::plan::DrawPlan;
 use crate::request::{self, Rules, Style};
 use crate::spec::words::Words as _;
 use crate::spec::{BackendChoice, Spec};
 
-/// One triangle. The looks of a plain mesh need no other pipelines; textures, colours, several materials
-/// and other numbers of samples do.
-const MESH: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+/// One triangle. The looks of a plain mesh of few triangles need no other pipelines; textures, colours, several
+/// materials and other numbers of samples do.
+const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+/// Triangles of a mesh that the kernels for many triangles draw.
+const MANY: usize = 5000;
 
 /// A thread that warms a GPU up.
 pub struct WarmUp {
@@ -62,10 +66,12 @@ fn warm(gpu: Arc<GpuHost>, deadline: &Deadline) {
     let began = Instant::now();
     let limits = Limits::default();
     let rules = Rules { limits: limits.clone(), backend: BackendChoice::Auto };
-    let bundle = Bundle::of_one(MESH.to_vec());
-    let model = match Model::read(&bundle, None, &limits, &mut Budget::new(&limits), deadline) {
-        Ok(model) => model,
-        Err(error) => return tracing::debug!(%error, "the GPU is not warmed up"),
+    let read = |obj: String| {
+        Model::read(&Bundle::of_one(obj.into_bytes()), None, &limits, &mut Budget::new(&limits), deadline)
+    };
+    let (model, large) = match (read(MESH.to_owned()), read([MESH, &"f 1 2 3\n".repeat(MANY)].concat())) {
+        (Ok(model), Ok(large)) => (model, large),
+        (Err(error), _) | (_, Err(error)) => return tracing::debug!(%error, "the GPU is not warmed up"),
     };
     let mut backends = Backends::new(gpu.clone(), 1);
     let specs = Style::ALL.iter().filter_map(|&(style, _)| {
@@ -80,16 +86,38 @@ fn warm(gpu: Arc<GpuHost>, deadline: &Deadline) {
         return;
     }
     tracing::debug!(ms = began.elapsed().as_millis(), "the GPU is open");
-    for (style, spec) in &specs {
+    // The number of triangles makes no difference but to the first kernels, which all styles share.
+    let plain = specs.iter().filter(|(_, spec)| spec.layers.wire.is_none()).take(1).map(|styled| (&large, styled));
+    for (model, (style, spec)) in specs.iter().map(|styled| (&model, styled)).chain(plain) {
         if deadline.check().is_err() || !gpu.may_have_hardware() {
             return;
         }
-        let drawn = pipeline::draw(&model, spec, &mut backends, &mut Budget::new(&limits), deadline, &mut |_| ());
+        let drawn = pipeline::draw(model, spec, &mut backends, &mut Budget::new(&limits), deadline, &mut |_| ());
         if let Err(error) = drawn {
             tracing::debug!(style, %error, "a style was not warmed up");
         }
     }
     tracing::info!(ms = began.elapsed().as_millis(), "the GPU is warm");
+    prepare_for_load(&gpu, &[model, large], &specs, &limits, deadline);
+}
+
+/// Makes what pictures need that are drawn together with others. Nobody waits for that while there is little to do.
+fn prepare_for_load(gpu: &GpuHost, models: &[Model], specs: &[(&str, Spec)], limits: &Limits, deadline: &Deadline) {
+    let samples = specs.first().map_or(1, |(_, spec)| spec.image.samples.per_pixel());
+    let Ok(device) = gpu.device(GpuKind::Hardware, samples, &|_| ()) else { return };
+    for (model, (style, spec)) in models.iter().flat_map(|model| specs.iter().map(move |styled| (model, styled))) {
+        if deadline.check().is_err() || device.lost().is_some() {
+            break;
+        }
+        let make = |plan: &DrawPlan<'_>| device.make_ready_for_load(plan);
+        let made = || pipeline::make_ready(model, spec, &mut Budget::new(limits), deadline, make);
+        // wgpu may panic on a lost device.
+        if let Ok(Err(error)) = catch_unwind(AssertUnwindSafe(made)) {
+            tracing::debug!(style, %error, "a style's pipelines for load were not made ahead");
+        }
+    }
+    // Dropping the device may panic, too.
+    let _ = catch_unwind(AssertUnwindSafe(move || drop(device)));
 }
 
 /// Opens the device and, while it draws its probe, begins to make the pipelines of all styles. The driver
@@ -104,7 +132,8 @@ fn make_ready(
 ) -> Result<(), DrawError> {
     let samples = specs.first().map_or(1, |(_, spec)| spec.image.samples.per_pixel());
     let make = &|device: &Arc<dyn GpuDevice>, style: &str, spec: &Spec| {
-        let made = || pipeline::make_ready(model, spec, &**device, &mut Budget::new(limits), deadline);
+        let make = |plan: &DrawPlan<'_>| device.make_ready(plan);
+        let made = || pipeline::make_ready(model, spec, &mut Budget::new(limits), deadline, make);
         // wgpu may panic on a lost device.
         if let Ok(Err(error)) = catch_unwind(AssertUnwindSafe(made)) {
             tracing::debug!(style, %error, "a style's pipelines were not made ahead");

@@ -29,7 +29,7 @@ use tracing_subscriber::registry::LookupSpan;
 /// Time for one batch, and for the last one at the end of the process.
 const SEND_TIME: Duration = Duration::from_secs(5);
 
-/// What the spans of this program are named after, in traces.
+/// The name of the service and of its spans, in traces.
 const NAME: &str = "meshsnap";
 
 /// The variables that name a collector, the more special one first.
@@ -68,7 +68,7 @@ impl Trace {
     }
 }
 
-/// What a request asks for, under the names of OpenTelemetry's conventions. The span has an empty field `otel.kind`.
+/// Notes a request's method and route, under the names of OpenTelemetry's conventions. The span has an empty field `otel.kind`.
 pub fn describe_request(span: &Span, method: &str, route: Option<&str>) {
     if SENDING.get().is_none() {
         return;
@@ -86,7 +86,7 @@ pub fn describe_request(span: &Span, method: &str, route: Option<&str>) {
     span.context().span().update_name(name);
 }
 
-/// How a request was answered.
+/// Notes the status of the answer.
 pub fn describe_answer(span: &Span, status: u16) {
     if SENDING.get().is_none() {
         return;
@@ -97,7 +97,7 @@ pub fn describe_answer(span: &Span, status: u16) {
     }
 }
 
-/// How a job ended.
+/// Notes the end of a job.
 pub fn describe_end(span: &Span, state: &'static str, has_failed: bool) {
     if SENDING.get().is_none() {
         return;

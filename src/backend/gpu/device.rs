@@ -24,7 +24,7 @@ pub enum AtomicsChoice {
     /// 64-bit atomics where the device has them.
     Best,
     /// Two passes of 32-bit atomics, as on a device without; for tests. A software device then shares few
-    /// triangles among its threads as hardware does.
+    /// triangles among its threads, and dispatches among jobs, as hardware does.
     Force32,
 }
 
@@ -183,7 +183,8 @@ impl Gpu {
         self.jobs_shared.load(Ordering::Relaxed)
     }
 
-    /// True if jobs that come while it is busy may share dispatches. Software gains nothing by it.
+    /// True if jobs that come while it is busy may share dispatches. A software device gains nothing by that, and does so
+    /// only where it behaves as hardware, for tests.
     pub(super) fn draws_gangs(&self) -> bool {
         self.handles.maps_storage && self.alone_size_of_few < ALONE_SIZE
     }
@@ -402,5 +403,9 @@ impl GpuDevice for Gpu {
     /// memory for each thread.
     fn make_ready(&self, plan: &DrawPlan<'_>) -> Result<(), DrawError> {
         if Self::is_software(self) { Ok(()) } else { super::make_pipelines_of(self, plan) }
+    }
+
+    fn make_ready_for_load(&self, plan: &DrawPlan<'_>) -> Result<(), DrawError> {
+        if Self::is_software(self) { Ok(()) } else { super::make_pipelines_of_gangs(self, plan) }
     }
 }

@@ -54,6 +54,23 @@ fn make_pipelines_of(gpu: &Gpu, plan: &DrawPlan<'_>) -> Result<(), DrawError> {
     gpu.make_pipelines(&schedule.kernels(), pipeline_key(plan))
 }
 
+/// The same for a gang of such plans, if they can share dispatches.
+fn make_pipelines_of_gangs(gpu: &Gpu, plan: &DrawPlan<'_>) -> Result<(), DrawError> {
+    match share_of(gpu, plan)? {
+        Some((schedule, share)) => gpu.make_pipelines(&schedule.kernels(), share.key()),
+        None => Ok(()),
+    }
+}
+
+/// The plan's schedule and share, if it can be drawn in a gang.
+fn share_of(gpu: &Gpu, plan: &DrawPlan<'_>) -> Result<Option<(Schedule, Share)>, DrawError> {
+    if !gpu.handles.maps_storage || !may_share(plan) {
+        return Ok(None);
+    }
+    let schedule = Schedule::new(plan, &DeviceTraits { maps_pictures: true, ..traits(gpu) }, Goal::Picture)?;
+    Ok(Share::of(plan, &schedule).map(|share| (schedule, share)))
+}
+
 /// Workgroups that share the large triangles: enough to fill a large GPU.
 const TILE_WORKGROUPS: u32 = 1024;
 
@@ -239,13 +256,13 @@ impl GpuRenderer {
     pub fn draw_together(&mut self, plans: &[&DrawPlan<'_>]) -> Result<Option<Vec<Vec<u8>>>, DrawError> {
         let mut shares: Vec<Share> = Vec::new();
         for plan in plans {
-            let Some((_, share)) = self.share(plan)? else { return Ok(None) };
+            let Some((_, share)) = share_of(&self.gpu, plan)? else { return Ok(None) };
             if shares.first().is_some_and(|first| !first.is_alike(&share)) || shares.len() == share.gang_max() {
                 return Ok(None);
             }
             shares.push(share);
         }
-        let Some(Some((schedule, _))) = plans.first().map(|plan| self.share(plan)).transpose()? else {
+        let Some(Some((schedule, _))) = plans.first().map(|plan| share_of(&self.gpu, plan)).transpose()? else {
             return Ok(None);
         };
         let pictures = gang::draw(&self.gpu, plans[0], &schedule, &shares)?;
@@ -254,7 +271,7 @@ impl GpuRenderer {
 
     /// The picture, drawn together with those of other jobs or for them. None if it is to be drawn alone.
     fn draw_in_gang(&self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Option<Vec<u8>>, DrawError> {
-        let Some((schedule, share)) = self.share(plan)? else { return Ok(None) };
+        let Some((schedule, share)) = share_of(&self.gpu, plan)? else { return Ok(None) };
         let lead = |shares: &[Share]| match gang::draw(&self.gpu, plan, &schedule, shares) {
             Ok(pictures) => Some(pictures),
             Err(error) => {
@@ -266,16 +283,6 @@ impl GpuRenderer {
         let drawn = self.gpu.gangs.draw(share, deadline, lead)?;
         deadline.check()?;
         Ok(drawn.map(|(pictures, job)| pictures.rgba(job).to_vec()))
-    }
-
-    /// The plan's schedule and share, if it can be drawn in a gang.
-    fn share(&self, plan: &DrawPlan<'_>) -> Result<Option<(Schedule, Share)>, DrawError> {
-        if !self.gpu.handles.maps_storage || !may_share(plan) {
-            return Ok(None);
-        }
-        let device = DeviceTraits { maps_pictures: true, ..traits(&self.gpu) };
-        let schedule = Schedule::new(plan, &device, Goal::Picture)?;
-        Ok(Share::of(plan, &schedule).map(|share| (schedule, share)))
     }
 }
 

@@ -142,6 +142,10 @@ impl GpuDevice for Fake {
         assert!(!panics, "a driver that cannot compile");
         Ok(())
     }
+
+    fn make_ready_for_load(&self, _: &DrawPlan<'_>) -> Result<(), DrawError> {
+        Ok(())
+    }
 }
 
 struct FakeRenderer(Arc<Fake>);

@@ -70,7 +70,7 @@ pub fn draw(
     Ok(Arc::new(Pictures { gpu: gpu.clone(), view: Some(view), buffers: Some(buffers), ends }))
 }
 
-/// Where the jobs' parts of the buffers begin.
+/// The beginning of a job's part of each buffer; of the last, the end.
 #[derive(Default)]
 struct Starts {
     vertices: u32,

@@ -30,7 +30,7 @@ struct Own {
     amounts: Amounts,
 }
 
-/// What the jobs of a gang have in common.
+/// The traits that the jobs of a gang have in common.
 #[derive(PartialEq)]
 struct Kind {
     key: u32,
@@ -57,16 +57,17 @@ pub struct Amounts {
     pub pixels: u32,
 }
 
-/// True unless lines are drawn or layers peeled: their stages have more to clear, and more to wait for.
+/// True for a plan of a surface alone. Lines, layers and hulls have more to clear, to wait for, or to bring.
 pub fn may_share(plan: &DrawPlan<'_>) -> bool {
-    plan.is_shaded() && plan.lines.is_empty() && plan.peeling().is_none()
+    let has_more = !plan.lines.is_empty() || plan.peeling().is_some() || plan.hull.is_some();
+    plan.is_shaded() && !has_more && plan.pass_masks.is_empty()
 }
 
 impl Share {
     /// The share of a job; None if the job is drawn alone.
     pub fn of(plan: &DrawPlan<'_>, schedule: &Schedule) -> Option<Self> {
         let is_one_band = schedule.banding.rows >= plan.height_px && schedule.banding.beyond == 0;
-        if !may_share(plan) || !is_one_band || plan.hull.is_some() || !plan.pass_masks.is_empty() {
+        if !may_share(plan) || !is_one_band {
             return None;
         }
         let dispatches = dispatches(schedule)?;
@@ -103,7 +104,7 @@ impl Share {
         &self.0.dispatches
     }
 
-    /// What kernels write for it.
+    /// Its shares of what kernels write.
     pub fn amounts(&self) -> Amounts {
         self.0.amounts
     }

@@ -42,7 +42,7 @@ struct Waiting<S, R> {
     news: mpsc::Sender<News<S, R>>,
 }
 
-/// What a waiting job hears.
+/// News for a waiting job.
 enum News<S, R> {
     /// It leads.
     Lead(Gang<S, R>),
@@ -50,7 +50,7 @@ enum News<S, R> {
     Drawn(Option<(R, usize)>),
 }
 
-/// Where a waiting job hears.
+/// A waiting job's end of the channel of its news.
 type Hears<S, R> = mpsc::Receiver<News<S, R>>;
 
 /// Jobs that are drawn together, the leader first.
