@@ -12,7 +12,7 @@ mod opened;
 
 pub use opened::{Opened, Side, draw_difference, open, render_difference};
 
-use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes};
+use crate::backend::{BackendKind, Backends, Chosen, DrawError, DrawTimes, GpuDevice};
 use crate::caption::{Scale, draw_legend};
 use crate::encode::{self, EncodeError};
 use crate::image::{Image, ImageFormat, RowSink};
@@ -194,19 +194,41 @@ fn draw_view(
     Ok(Drawn { image, backend, is_substitute, draw_times, skips, short_chains, warnings, selection })
 }
 
-/// Has `make` prepare for a picture: it gets the plan, and makes what a device needs, such as pipelines.
+/// Makes what a picture needs on a device and can be made without drawing, such as pipelines.
 pub fn make_ready(
+    model: &Model,
+    spec: &Spec,
+    device: &dyn GpuDevice,
+    budget: &mut Budget,
+    deadline: &Deadline,
+) -> Result<(), RenderError> {
+    let make = |plan: &DrawPlan<'_>| Ok(device.make_ready(plan)?);
+    with_plan(model, spec, budget, deadline, make)
+}
+
+/// The same for a picture that is drawn together with others while the device is busy.
+pub fn make_ready_for_load(
+    model: &Model,
+    spec: &Spec,
+    device: &dyn GpuDevice,
+    budget: &mut Budget,
+    deadline: &Deadline,
+) -> Result<(), RenderError> {
+    let make = |plan: &DrawPlan<'_>| Ok(device.make_ready_for_load(plan)?);
+    with_plan(model, spec, budget, deadline, make)
+}
+
+fn with_plan(
     model: &Model,
     spec: &Spec,
     budget: &mut Budget,
     deadline: &Deadline,
-    make: impl FnOnce(&DrawPlan<'_>) -> Result<(), DrawError>,
+    then: impl FnOnce(&DrawPlan<'_>) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
     let Model { mesh, prepared, .. } = model;
     let framing = plan::framing(mesh, spec, prepared, budget, deadline)?;
     let scene = Scene::framed_by(framing.as_deref().unwrap_or(&mesh.positions), mesh, spec, budget)?;
-    let plan = plan::build_from(&scene, prepared, budget, deadline)?;
-    Ok(make(&plan)?)
+    then(&plan::build_from(&scene, prepared, budget, deadline)?)
 }
 
 /// Reports what is in a file.

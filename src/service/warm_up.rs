@@ -11,7 +11,6 @@ use crate::backend::{Backends, DrawError, GpuDevice, GpuHost, GpuKind};
 use crate::import::Bundle;
 use crate::limits::{Budget, Deadline, Limits};
 use crate::pipeline::{self, Model};
-use crate::plan::DrawPlan;
 use crate::request::{self, Rules, Style};
 use crate::spec::words::Words as _;
 use crate::spec::{BackendChoice, Spec};
@@ -109,8 +108,7 @@ fn prepare_for_load(gpu: &GpuHost, models: &[Model], specs: &[(&str, Spec)], lim
         if deadline.check().is_err() || device.lost().is_some() {
             break;
         }
-        let make = |plan: &DrawPlan<'_>| device.make_ready_for_load(plan);
-        let made = || pipeline::make_ready(model, spec, &mut Budget::new(limits), deadline, make);
+        let made = || pipeline::make_ready_for_load(model, spec, &*device, &mut Budget::new(limits), deadline);
         // wgpu may panic on a lost device.
         if let Ok(Err(error)) = catch_unwind(AssertUnwindSafe(made)) {
             tracing::debug!(style, %error, "a style's pipelines for load were not made ahead");
@@ -132,8 +130,7 @@ fn make_ready(
 ) -> Result<(), DrawError> {
     let samples = specs.first().map_or(1, |(_, spec)| spec.image.samples.per_pixel());
     let make = &|device: &Arc<dyn GpuDevice>, style: &str, spec: &Spec| {
-        let make = |plan: &DrawPlan<'_>| device.make_ready(plan);
-        let made = || pipeline::make_ready(model, spec, &mut Budget::new(limits), deadline, make);
+        let made = || pipeline::make_ready(model, spec, &**device, &mut Budget::new(limits), deadline);
         // wgpu may panic on a lost device.
         if let Ok(Err(error)) = catch_unwind(AssertUnwindSafe(made)) {
             tracing::debug!(style, %error, "a style's pipelines were not made ahead");

@@ -354,8 +354,10 @@ fn a_warm_gpu_has_drawn_every_style() {
     let warm_up = WarmUp::start(&machine.host(HardwareHint::Maybe), Auto);
     assert!(warm_up.wait(Duration::from_secs(30)), "it takes too long");
     let drawn = |machine: &Machine| machine.0.lock().unwrap().drawn_px.iter().filter(|&&px| px == 64).count();
-    assert_eq!((machine.opened(), drawn(&machine)), (vec![GpuKind::Hardware], STYLES));
+    // Each with few triangles, and one with many.
+    assert_eq!((machine.opened(), drawn(&machine)), (vec![GpuKind::Hardware], STYLES + 1));
     assert_eq!(machine.0.lock().unwrap().made_ready, STYLES);
+    assert_eq!(machine.0.lock().unwrap().made_ready_for_load, 2 * STYLES);
     // Without hardware, or need of it, nothing is opened. A software GPU, or none, is left alone.
     let cases: [(&[Open], HardwareHint, BackendChoice); 4] = [
         (&[], none(), Auto),

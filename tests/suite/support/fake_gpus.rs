@@ -58,6 +58,8 @@ pub struct Story {
     pub renderers: usize,
     /// Plans that devices were made ready for.
     pub made_ready: usize,
+    /// Plans that pictures drawn together were prepared for.
+    pub made_ready_for_load: usize,
     /// True if making a device ready panics.
     pub ready_panics: bool,
     /// What the first probe waits for.
@@ -144,6 +146,7 @@ impl GpuDevice for Fake {
     }
 
     fn make_ready_for_load(&self, _: &DrawPlan<'_>) -> Result<(), DrawError> {
+        self.machine.0.lock().unwrap().made_ready_for_load += 1;
         Ok(())
     }
 }
