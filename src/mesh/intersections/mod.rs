@@ -5,10 +5,11 @@
 //! face or an edge of another. These do not: a common corner, a common edge, and a face that repeats
 //! another. Faces without area in the mesh's own f32 positions take no part.
 //!
-//! All decisions are exact on these positions: [`robust`] gives the signs. [`Tree`] finds the pairs
+//! All decisions are exact on these positions: `orient` and [`robust`] give the signs. [`Tree`] finds the pairs
 //! whose boxes overlap; those of [`fans`] it finds by their directions from the apex. The results depend neither on the order of work nor on the number of threads.
 
 mod fans;
+mod orient;
 mod pair;
 mod plane;
 mod tree;

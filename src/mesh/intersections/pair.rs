@@ -1,8 +1,7 @@
 //! Decides of two faces whether they intersect, and of a vertex whether it lies on an edge.
 
-use robust::{Coord3D, orient3d};
-
 use super::Point;
+use super::orient::orient;
 use super::plane::{Projection, are_on_one_side, have_mixed_signs, side as side_of_line};
 
 type Triangle = [Point; 3];
@@ -108,13 +107,12 @@ fn meets([p, q]: [Point; 2], sides: [f64; 2], [a, b, c]: Triangle) -> bool {
 }
 
 /// The side of the plane through a triangle that a point lies on: positive, negative, or 0 on it.
-fn side([a, b, c]: Triangle, d: Point) -> f64 {
+fn side(triangle @ [a, b, c]: Triangle, d: Point) -> f64 {
     // Most points that lie in a plane exactly lie in one along two axes.
     if (0..3).any(|k| a[k] == b[k] && a[k] == c[k] && a[k] == d[k]) {
         return 0.0;
     }
-    let [a, b, c, d] = [a, b, c, d].map(|[x, y, z]| Coord3D { x, y, z });
-    orient3d(a, b, c, d)
+    orient(triangle, d)
 }
 
 /// True if a point lies within a segment, and is none of its ends.
