@@ -5,7 +5,7 @@
 //! of the mesh is bound once, so the jobs of a gang draw the same mesh with the same materials: they differ in the
 //! camera, the light, the background and the size.
 //!
-//! In reading order: [`seat`] (a job's share, and which jobs are alike), [`turns`] (who draws, and for whom), [`draw`]
+//! In reading order: [`seat`] (a job's share, and which jobs are alike), [`turns`] (who draws, and for whom), [`mod@draw`]
 //! (the commands).
 
 mod draw;
