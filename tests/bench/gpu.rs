@@ -2,7 +2,7 @@
 //! encoding, on any number of workers.
 //!
 //!     cargo bench --bench gpu                              # bumpy tori of 70 k and 1 M triangles, 512 px
-//!     cargo bench --bench gpu -- --mesh bunny.obj --size 256 --workers 16 --rounds 200
+//!     cargo bench --bench gpu -- --mesh bunny.obj --look flat --size 256 --workers 16 --rounds 200
 
 // A tool for developers: giving up loudly is fine.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -30,6 +30,7 @@ const LOOKS: [&str; 4] = ["flat", "auto", "wire", "outline"];
 
 fn main() {
     let (mut file, mut size, mut workers, mut rounds) = (None, "512".to_owned(), 1, 60_usize);
+    let mut looks = LOOKS.map(str::to_owned).to_vec();
     let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
     while let Some(name) = arguments.next() {
         let value = arguments.next().unwrap_or_else(|| panic!("{name} needs a value"));
@@ -37,6 +38,7 @@ fn main() {
             "--mesh" => file = Some(value),
             "--size" => size = value,
             "--workers" => workers = value.parse().expect("a number"),
+            "--look" => looks = vec![value],
             "--rounds" => rounds = value.parse().expect("a number"),
             other => panic!("there is no option {other}"),
         }
@@ -53,7 +55,7 @@ fn main() {
     println!("{}: opened in {:.0} ms; {size} px, {workers} workers", gpu.info().name, ms(began));
     for file in files {
         let mesh = read(&file);
-        for look in LOOKS {
+        for look in &looks {
             measure(&gpu, (&file.name, &mesh), (look, &size), workers, rounds.max(1));
         }
     }

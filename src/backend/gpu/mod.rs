@@ -30,7 +30,7 @@ pub use self::schedule::sizes::bands_bytes;
 pub use crate::backend::{GpuInfo, GpuKind};
 
 use self::buffers::Buffers;
-use self::gang::{Seat as _, Share, may_share};
+use self::gang::{Seat as _, Share, Turn, may_share};
 use self::params::{attributes, corner_triangles, edge_lists, hull_materials, sample_masks};
 use self::pipelines::Slot;
 use self::pipelines::key::pipeline_key;
@@ -191,21 +191,34 @@ impl GpuRenderer {
         deadline.check()?;
         let row_bytes = u64::from(plan.width_px) * 4;
         let size = row_bytes * u64::from(plan.height_px);
-        let mut image = Image { width_px: plan.width_px, height_px: plan.height_px, rgba: Vec::new() };
+        let image = Image { width_px: plan.width_px, height_px: plan.height_px, rgba: Vec::new() };
         if size == 0 {
             return Ok(image);
         }
-        let times_at = size.next_multiple_of(8);
-        let mut times = DrawTimes::default();
         let drawing = self.gpu.begin_job();
         // A job that finds the device idle is drawn at once, and timed.
-        if !drawing.is_alone
-            && self.gpu.draws_gangs()
-            && let Some(rgba) = self.draw_in_gang(plan, deadline)?
-        {
-            image.rgba = rgba;
-            return Ok(image);
-        }
+        let may_gang = !drawing.is_alone && self.gpu.draws_gangs();
+        let leading = match if may_gang { self.turn(plan, deadline)? } else { None } {
+            Some(Drawn::InGang(rgba)) => return Ok(Image { rgba, ..image }),
+            Some(Drawn::Alone(leading)) => Some(leading),
+            None => None,
+        };
+        let (rgba, times) = self.draw_alone(plan, deadline, drawing.is_alone)?;
+        drop(leading);
+        self.draw_times = times;
+        Ok(Image { rgba, ..image })
+    }
+
+    /// The bytes of a picture, drawn with buffers of its own, and the times of its stages if they are asked for.
+    fn draw_alone(
+        &self,
+        plan: &DrawPlan<'_>,
+        deadline: &Deadline,
+        is_timed: bool,
+    ) -> Result<(Vec<u8>, DrawTimes), DrawError> {
+        let row_bytes = u64::from(plan.width_px) * 4;
+        let size = row_bytes * u64::from(plan.height_px);
+        let times_at = size.next_multiple_of(8);
         self.job(|gpu, buffers| {
             let staging = buffers.staging(&gpu.handles, times_at + StageClock::BYTES)?.clone();
             let device = traits(gpu);
@@ -222,7 +235,7 @@ impl GpuRenderer {
                 buffers.reserve(&gpu.handles, Slot::Rgba, band_bytes)?;
             }
             let mut recorder = Recorder::new(gpu, deadline, buffers, plan, &schedule.batches)?;
-            if drawing.is_alone {
+            if is_timed {
                 recorder.start_clock();
             }
             execute(&mut recorder, plan, &schedule, |recorder, Band { rows: [first, end] }| {
@@ -235,18 +248,15 @@ impl GpuRenderer {
                 }
                 recorder.submit()
             })?;
-            let mut stamps = Vec::new();
-            let read = if drawing.is_alone { times_at + StageClock::BYTES } else { times_at };
+            let (mut rgba, mut stamps) = (Vec::new(), Vec::new());
+            let read = if is_timed { times_at + StageClock::BYTES } else { times_at };
             recorder.read_staging(read, |bytes| {
                 let (picture, after) = bytes.split_at(times_at as usize);
-                image.rgba = picture[..size as usize].to_vec();
+                rgba = picture[..size as usize].to_vec();
                 stamps = after.to_vec();
             })?;
-            times = recorder.times(&stamps);
-            Ok(())
-        })?;
-        self.draw_times = times;
-        Ok(image)
+            Ok((rgba, recorder.times(&stamps)))
+        })
     }
 }
 
@@ -269,21 +279,30 @@ impl GpuRenderer {
         Ok(Some((0..shares.len()).map(|job| pictures.rgba(job).to_vec()).collect()))
     }
 
-    /// The picture, drawn together with those of other jobs or for them. None if it is to be drawn alone.
-    fn draw_in_gang(&self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Option<Vec<u8>>, DrawError> {
+    /// Waits for the job's turn among those that are alike. None if it is to be drawn alone, whoever else is drawn.
+    fn turn(&self, plan: &DrawPlan<'_>, deadline: &Deadline) -> Result<Option<Drawn<'_>>, DrawError> {
         let Some((schedule, share)) = share_of(&self.gpu, plan)? else { return Ok(None) };
-        let lead = |shares: &[Share]| match gang::draw(&self.gpu, plan, &schedule, shares) {
-            Ok(pictures) => Some(pictures),
-            Err(error) => {
-                // Each is drawn again, alone, and has its own error then.
-                tracing::debug!(%error, jobs = shares.len(), "a gang was not drawn");
-                None
+        let drawn = match self.gpu.gangs.turn(share, deadline)? {
+            Turn::Lead(leading) if leading.seats().len() == 1 => return Ok(Some(Drawn::Alone(leading))),
+            Turn::Lead(leading) => {
+                let pictures = gang::draw(&self.gpu, plan, &schedule, leading.seats());
+                leading.give(pictures.as_ref().ok());
+                // Where that has failed, each is drawn again, alone, and has its own error then.
+                pictures.inspect_err(|error| tracing::debug!(%error, "a gang was not drawn")).ok().map(|all| (all, 0))
             }
+            Turn::Drawn(drawn) => drawn,
         };
-        let drawn = self.gpu.gangs.draw(share, deadline, lead)?;
         deadline.check()?;
-        Ok(drawn.map(|(pictures, job)| pictures.rgba(job).to_vec()))
+        Ok(drawn.map(|(pictures, job)| Drawn::InGang(pictures.rgba(job).to_vec())))
     }
+}
+
+/// A job's turn, when it has come.
+enum Drawn<'a> {
+    /// The bytes of its picture.
+    InGang(Vec<u8>),
+    /// It is to be drawn alone, before this is dropped.
+    Alone(gang::Leading<'a, Share, Arc<gang::Pictures>>),
 }
 
 fn traits(gpu: &Gpu) -> DeviceTraits {

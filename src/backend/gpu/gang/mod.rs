@@ -16,8 +16,8 @@ use std::sync::Arc;
 
 pub use self::draw::{Pictures, draw};
 pub use self::seat::{Share, may_share};
-pub use self::turns::Seat;
 use self::turns::Turns;
+pub use self::turns::{Leading, Seat, Turn};
 
 /// The gangs of a device.
 pub type Gangs = Turns<Share, Arc<Pictures>>;

@@ -1,8 +1,8 @@
 //! Turns: who draws a gang, and for whom.
 //!
-//! The first job of a kind leads: it draws at once, alone. Jobs of that kind that come while [`LEADERS`] of them
-//! draw wait together. When a leader has drawn, the first of those that wait leads, and draws for all of them. So no
-//! job waits for others to come, and the more jobs there are, the larger the gangs.
+//! The first jobs of a kind are drawn at once, alone. Jobs of that kind that come while [`LEADERS`] are drawn wait
+//! together. When a leader has drawn, the first of those that wait leads, and draws for all of them. So no job waits for
+//! others to come, and the more jobs there are, the larger the gangs.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
@@ -10,8 +10,10 @@ use std::time::Duration;
 
 use crate::limits::{Deadline, Stopped};
 
-/// Gangs of a kind that are drawn at a time: the commands of one are recorded while the device draws another.
-const LEADERS: usize = 2;
+/// Jobs and gangs of a kind that are drawn at a time: the commands of some are recorded while the device draws others.
+/// With 2 or 3, a device without much to do draws fewer pictures than if all jobs were drawn alone; with 6 or 8, a busy
+/// one draws fewer (docs/gpu-notes.md).
+const LEADERS: usize = 4;
 
 /// Time between two looks of a waiting job at its deadline.
 const LOOK: Duration = Duration::from_millis(2);
@@ -60,6 +62,37 @@ struct Gang<S, R> {
     news: Vec<mpsc::Sender<News<S, R>>>,
 }
 
+/// A job's turn.
+pub enum Turn<'a, S: Seat + Clone, R: Clone> {
+    /// It draws, for itself and maybe for others.
+    Lead(Leading<'a, S, R>),
+    /// Its leader has drawn, and the job is the one of this number; or has failed.
+    Drawn(Option<(R, usize)>),
+}
+
+/// The lead of a gang. The next gang has its turn when this is dropped.
+pub struct Leading<'a, S: Seat + Clone, R: Clone> {
+    gang: Gang<S, R>,
+    next: Next<'a, S, R>,
+}
+
+impl<S: Seat + Clone, R: Clone> Leading<'_, S, R> {
+    /// The jobs to draw, the leader's own first.
+    pub fn seats(&self) -> &[S] {
+        &self.gang.seats
+    }
+
+    /// Ends the lead, and gives the others what was drawn; none if that has failed.
+    pub fn give(self, drawn: Option<&R>) {
+        let Self { gang, next } = self;
+        drop(next);
+        for (number, news) in (1..).zip(&gang.news) {
+            // A job that has given up has dropped its end.
+            let _ = news.send(News::Drawn(drawn.map(|drawn| (drawn.clone(), number))));
+        }
+    }
+}
+
 impl<S, R> Default for Turns<S, R> {
     fn default() -> Self {
         Self(Mutex::new(State { waiting: VecDeque::new(), drawn: Vec::new(), number: 0 }))
@@ -67,30 +100,17 @@ impl<S, R> Default for Turns<S, R> {
 }
 
 impl<S: Seat + Clone, R: Clone> Turns<S, R> {
-    /// Waits for the job's turn. Either `lead` draws for it and others, or another job does. Returns what was drawn,
-    /// and the job's number in it; none if that failed.
-    pub fn draw(
-        &self,
-        seat: S,
-        deadline: &Deadline,
-        lead: impl FnOnce(&[S]) -> Option<R>,
-    ) -> Result<Option<(R, usize)>, Stopped> {
+    /// Waits for the job's turn.
+    pub fn turn(&self, seat: S, deadline: &Deadline) -> Result<Turn<'_, S, R>, Stopped> {
         let gang = match self.enter(seat) {
             Ok(gang) => gang,
             Err((number, news)) => match self.wait(number, &news, deadline)? {
                 News::Lead(gang) => gang,
-                News::Drawn(drawn) => return Ok(drawn),
+                News::Drawn(drawn) => return Ok(Turn::Drawn(drawn)),
             },
         };
-        // However this ends, the next gang has its turn.
         let next = Next { turns: self, kind: gang.seats[0].clone() };
-        let drawn = lead(&gang.seats);
-        drop(next);
-        for (number, news) in (1..).zip(&gang.news) {
-            // A job that has given up has dropped its end.
-            let _ = news.send(News::Drawn(drawn.clone().map(|drawn| (drawn, number))));
-        }
-        Ok(drawn.map(|drawn| (drawn, 0)))
+        Ok(Turn::Lead(Leading { gang, next }))
     }
 
     /// A gang of one, if the job leads at once; or its number and where it hears of its turn.
@@ -187,6 +207,22 @@ mod tests {
 
     type Drawn = Arc<Vec<u32>>;
 
+    fn draw(
+        turns: &Turns<Job, Drawn>,
+        job: Job,
+        deadline: &Deadline,
+        lead: impl FnOnce(&[Job]) -> Option<Drawn>,
+    ) -> Result<Option<(Drawn, usize)>, Stopped> {
+        match turns.turn(job, deadline)? {
+            Turn::Drawn(drawn) => Ok(drawn),
+            Turn::Lead(leading) => {
+                let drawn = lead(leading.seats());
+                leading.give(drawn.as_ref());
+                Ok(drawn.map(|drawn| (drawn, 0)))
+            }
+        }
+    }
+
     #[test]
     fn each_job_gets_its_own_and_gangs_form_while_others_are_drawn() {
         let turns = Turns::<Job, Drawn>::default();
@@ -201,7 +237,7 @@ mod tests {
                     thread::sleep(Duration::from_millis(1));
                     Some(Arc::new(seats.iter().map(|seat| seat.1).collect::<Vec<_>>()))
                 };
-                let (drawn, at) = turns.draw(Job(number % 3, number), &Deadline::default(), lead).unwrap().unwrap();
+                let (drawn, at) = draw(&turns, Job(number % 3, number), &Deadline::default(), lead).unwrap().unwrap();
                 assert_eq!(drawn[at], number);
             };
             let threads: Vec<_> =
@@ -230,7 +266,7 @@ mod tests {
                             assert!((number + n) % 7 != 0, "a leader that panics");
                             (n % 5 != 0).then(|| Arc::new(seats.iter().map(|seat| seat.1).collect()))
                         };
-                        let draw = || turns.draw(Job(0, number), &deadline, lead);
+                        let draw = || draw(turns, Job(0, number), &deadline, lead);
                         match std::panic::catch_unwind(std::panic::AssertUnwindSafe(draw)) {
                             Ok(Ok(Some((all, at)))) => {
                                 assert_eq!(all[at], number);
