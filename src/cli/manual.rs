@@ -7,7 +7,8 @@ use super::files;
 use crate::cli::error::CliError;
 
 /// The commands that have a page of their own.
-pub const COMMANDS: [&str; 8] = ["render", "inspect", "check", "diff", "serve", "health", "sign", "completions"];
+pub const COMMANDS: [&str; 9] =
+    ["render", "inspect", "check", "diff", "serve", "jobs", "health", "sign", "completions"];
 
 /// Prints the page of a command, or of the program.
 pub fn print(mut program: Command, of: Option<&str>) -> Result<(), CliError> {

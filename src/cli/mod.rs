@@ -21,6 +21,7 @@ mod format_arg;
 mod health;
 mod inspect;
 mod isolation;
+mod jobs;
 mod manual;
 mod output;
 mod progress;
@@ -71,6 +72,9 @@ enum Command {
     /// Serve renders over HTTP
     #[command(after_help = SEE_HELP, after_long_help = serve::after_help())]
     Serve(serve::ServeArgs),
+    /// List the jobs in the data folder of a server
+    #[command(after_long_help = jobs::EXAMPLES)]
+    Jobs(jobs::JobsArgs),
     /// Ask a running server whether it is healthy, for container health checks
     Health(health::HealthArgs),
     /// Sign the address of a picture, so that it can be seen without an API key
@@ -122,6 +126,7 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> ExitCode {
         Command::Check(arguments) => check::run(&arguments),
         Command::Diff(arguments) => diff::run(&arguments),
         Command::Serve(arguments) => serve::run(&arguments),
+        Command::Jobs(arguments) => jobs::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
         Command::Sign(arguments) => sign::run(&arguments),
         Command::Completions { shell } => completions(shell),

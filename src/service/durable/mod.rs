@@ -12,16 +12,18 @@ mod committer;
 mod hold;
 mod log;
 mod record;
+mod snapshot;
 #[cfg(test)]
 mod tests;
 
 pub use blobs::{Blobs, FolderBlobs};
 pub use hold::Hold;
-pub use log::{Log, RedbLog};
+pub use log::{Contents, Log, RedbLog};
 pub use record::{
     Change, ClaimRecord, EndRecord, ErrorRecord, FileRecord, JobKey, JobRecord, MeshRecord, PictureRecord,
 };
 pub use record::{RequestKind, RequestRecord, SelectionRecord, SideRecord, WarningRecord};
+pub use snapshot::read;
 
 use std::collections::{HashMap, HashSet};
 use std::io;
@@ -180,7 +182,7 @@ impl Durable {
             committer::run(log, &*writer_blobs, &writer_index, &outbox, &|outcome| writer_health.set(outcome))
         })?;
         let inner = Inner { blobs, index, inbox, on_drop, health, committer: Mutex::new(Some(committer)) };
-        let log::Contents { jobs, meshes } = contents;
+        let Contents { jobs, meshes } = contents;
         Ok((Self(Arc::new(inner)), Recovered { jobs, meshes, blobs: found }))
     }
 

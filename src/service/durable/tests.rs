@@ -143,7 +143,7 @@ impl StorageBackend for Disk {
     }
 }
 
-fn job(key: JobKey, file: &[u8]) -> JobRecord {
+pub(super) fn job(key: JobKey, file: &[u8]) -> JobRecord {
     let request = RequestRecord {
         document: None,
         names_mesh: false,
@@ -170,7 +170,7 @@ fn job(key: JobKey, file: &[u8]) -> JobRecord {
     }
 }
 
-fn cancelled() -> Box<EndRecord> {
+pub(super) fn cancelled() -> Box<EndRecord> {
     Box::new(EndRecord { at_unix_ms: 2, ..EndRecord::default() })
 }
 

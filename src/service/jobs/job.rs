@@ -538,3 +538,23 @@ pub fn unix_ms() -> u64 {
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since_1970.as_millis()).unwrap_or(u64::MAX)
 }
+
+/// A time in milliseconds since 1970 as text. Times that have no such text are those of a broken clock.
+pub fn rfc_3339(unix_ms: u64) -> String {
+    // The last millisecond of the year 9999.
+    const UNIX_MS_MAX: u64 = 253_402_300_799_999;
+    let time = UNIX_EPOCH + Duration::from_millis(unix_ms.min(UNIX_MS_MAX));
+    humantime::format_rfc3339_millis(time).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rfc_3339;
+
+    #[test]
+    fn times_have_a_text() {
+        assert_eq!(rfc_3339(0), "1970-01-01T00:00:00.000Z");
+        assert_eq!(rfc_3339(1_709_210_096_789), "2024-02-29T12:34:56.789Z");
+        assert_eq!(rfc_3339(u64::MAX), "9999-12-31T23:59:59.999Z");
+    }
+}

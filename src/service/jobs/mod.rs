@@ -42,7 +42,7 @@ use super::durable::{Change, EndRecord, Hold, Unstored};
 use super::memory::Memory;
 use super::metrics::Metrics;
 use claims::Claimed;
-pub use job::{Restored, unix_ms};
+pub use job::{Restored, rfc_3339, unix_ms};
 use registry::JobRegistry;
 
 /// The limits of the job service.

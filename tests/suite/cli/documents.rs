@@ -48,6 +48,7 @@ const README: &[(&str, Outcome)] = &[
     ("/v1/jobs/ID/result -o knot.png", Draws("knot.png", [512, 512])),
     ("curl -N", Prints(&["event: done", "data: {"])),
     ("curl -X DELETE", Prints(&["\"id\":\"ID\"", "\"state\":\"done\""])),
+    ("meshsnap jobs --dead", Prints(&["1 stored mesh"])),
     ("mesh=@api/examples/knot.obj", Prints(&["\"jobs\":[", "knot.obj", "lamp.obj"])),
     (
         "rules=watertight,max-triangles:100000",
@@ -92,6 +93,8 @@ const OPERATIONS: &[(&str, Outcome)] = &[
     ("OTEL_EXPORTER_OTLP_ENDPOINT", Elsewhere("`http::jobs::traces` does so")),
     ("/v1/meshes", Prints(&["\"sha256\":\"SHA256\""])),
     ("\"mesh\": \"SHA256\"", Draws("knot.png", [512, 512])),
+    ("meshsnap jobs --dead", Prints(&["1 stored mesh"])),
+    ("meshsnap jobs --jsonl", Prints(&[])),
     ("docker build", Elsewhere("takes a container engine")),
     ("docker run", Elsewhere("takes a container engine")),
     ("Authorization: Bearer choose-one", Draws("out.png", [512, 512])),
@@ -201,6 +204,7 @@ fn shell(command: &str, folder: &Path) -> Command {
     }
     let programs = Path::new(env!("CARGO_BIN_EXE_meshsnap")).parent().unwrap().display().to_string();
     shell.env("PATH", format!("{programs}:{}", std::env::var("PATH").unwrap())).env("MESHSNAP_API_KEYS", "choose-one");
+    shell.env("MESHSNAP_DATA_DIR", folder.join("data"));
     shell.args(["-c", command]).current_dir(folder).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     shell
 }
@@ -221,7 +225,8 @@ fn is_picture(path: &Path, size: [u32; 2]) -> Result<(), String> {
 
 /// Types the commands of a document. Returns how many were run.
 fn type_all(document: &str, rows: &[(&str, Outcome)], folder: &Path) -> usize {
-    let server = Server::start(&["--workers", "2"]);
+    let data_dir = folder.join("data").display().to_string();
+    let server = Server::start(&["--workers", "2", "--ephemeral=false", "--data-dir", &data_dir]);
     let knot = std::fs::read(folder.join("api/examples/knot.obj")).unwrap();
     let sha256: String =
         <sha2::Sha256 as sha2::Digest>::digest(&knot).iter().map(|byte| format!("{byte:02x}")).collect();
@@ -301,5 +306,5 @@ fn what_the_documents_say_is_what_happens() {
         ran += type_all(document, rows, folder.path());
     }
     println!("{ran} commands");
-    assert_eq!(ran, 53);
+    assert_eq!(ran, 56);
 }

@@ -4,6 +4,7 @@ pub mod disk;
 pub mod durable;
 mod events;
 mod idempotency;
+mod listing;
 mod several;
 #[cfg(feature = "otel")]
 mod traces;
