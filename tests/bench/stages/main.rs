@@ -7,6 +7,7 @@
 //!     cargo bench --bench stages -- --growth                  # time and memory against triangles, pixels, samples
 //!     cargo bench --bench stages -- --growth --write          # the same into docs/growth.md and docs/growth.svg
 //!     cargo bench --bench stages -- --fill                  # triangles and samples a second, one thread
+//!     cargo bench --bench stages -- --samples               # fixed numbers of samples, and adaptive ones
 //!     cargo bench --bench stages -- --gate                    # fails where a stage has become slower
 //!     cargo bench --bench stages -- --write                   # keeps today's ratios for the gate
 //!
@@ -23,6 +24,7 @@ mod meshes;
 mod plot;
 mod reference;
 mod rounds;
+mod samples;
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -40,6 +42,7 @@ struct Options {
     write: bool,
     growth: bool,
     fill: bool,
+    samples: bool,
 }
 
 fn main() -> ExitCode {
@@ -60,6 +63,10 @@ fn main() -> ExitCode {
     } else {
         options.meshes.iter().map(|path| meshes::file(path)).collect()
     };
+    if options.samples {
+        samples::print(&meshes, options.threads, options.rounds);
+        return ExitCode::SUCCESS;
+    }
     let rows: Vec<Row> = meshes.iter().flat_map(|mesh| measure(mesh, options.threads, options.rounds)).collect();
     print(&rows, options.threads);
     if options.write {
@@ -70,8 +77,16 @@ fn main() -> ExitCode {
 
 fn options() -> Options {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut options =
-        Options { meshes: Vec::new(), threads, rounds: 15, gate: false, write: false, growth: false, fill: false };
+    let mut options = Options {
+        meshes: Vec::new(),
+        threads,
+        rounds: 15,
+        gate: false,
+        write: false,
+        growth: false,
+        fill: false,
+        samples: false,
+    };
     let mut arguments = std::env::args().skip(1).filter(|argument| argument != "--bench");
     while let Some(name) = arguments.next() {
         let mut value = || arguments.next().unwrap_or_else(|| panic!("{name} lacks its value"));
@@ -83,6 +98,7 @@ fn options() -> Options {
             "--write" => options.write = true,
             "--growth" => options.growth = true,
             "--fill" => options.fill = true,
+            "--samples" => options.samples = true,
             other => panic!("{other} is unknown: see the top of tests/bench/stages/main.rs"),
         }
     }

@@ -1,18 +1,20 @@
 //! Stage mixed, per band: draws the mixed pixels of a band once more.
 
+use super::color::color;
+use super::crowd::Crowd;
+use super::faces::PixelFaces;
 use super::find::{MixedPixels, find};
-use super::points::{POINT_GRID, PixelPoints, PointTriangle, Share, for_each_share};
+use super::points::POINT_GRID;
+use super::triangle::PointTriangle;
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::bands::triangle_bins::TriangleBin;
 use crate::backend::cpu::deadline_poll::DeadlinePoll;
 use crate::backend::cpu::geometry::samples::SampleBand;
-use crate::backend::cpu::geometry::transform::{ScreenVertex, recip};
-use crate::backend::cpu::geometry::visibility::Setup;
+use crate::backend::cpu::geometry::transform::ScreenVertex;
 use crate::backend::cpu::isa::dispatch;
-use crate::backend::cpu::surface::shade::Shader;
 use crate::backend::sample_partition::POINTS;
 
-/// Pixels whose points are in memory at a time: 1 MiB, half of a common second-level cache.
+/// Pixels whose faces are in memory at a time: less than 1 MiB, half of a common second-level cache.
 const AT_ONCE: usize = 512;
 
 /// Buffers of the stage.
@@ -20,19 +22,67 @@ const AT_ONCE: usize = 512;
 pub struct MixedScratch {
     /// The band's mixed pixels.
     pub pixels: MixedPixels,
-    /// The faces that the points of some of them see.
-    points: Vec<PixelPoints>,
+    /// What the points of some of them see.
+    seen: Seen,
+}
+
+/// What the points of some pixels see.
+#[derive(Default)]
+pub struct Seen {
+    /// By pixel: its faces.
+    pub faces: Vec<PixelFaces>,
+    /// By pixel: one more than the index of its crowd; 0 for a pixel of few faces.
+    pub crowd_of: Vec<u16>,
+    /// Pixels of many faces.
+    pub crowds: Vec<Crowd>,
+    /// By pixel: premultiplied linear RGBA, nothing behind it.
+    pub colors: Vec<[f32; 4]>,
 }
 
 impl MixedScratch {
     /// Allocated memory, bytes.
     pub fn bytes(&self) -> usize {
-        self.pixels.bytes() + self.points.capacity() * size_of::<PixelPoints>()
+        let Seen { faces, crowd_of, crowds, colors } = &self.seen;
+        self.pixels.bytes()
+            + faces.capacity() * size_of::<PixelFaces>()
+            + crowd_of.capacity() * size_of::<u16>()
+            + crowds.capacity() * size_of::<Crowd>()
+            + colors.capacity() * size_of::<[f32; 4]>()
     }
 
     /// The [`bytes`](Self::bytes) of a band of so many columns and rows, at most.
     pub const fn bytes_of(size: [usize; 2]) -> usize {
-        MixedPixels::bytes_of(size) + AT_ONCE * size_of::<PixelPoints>()
+        let of_pixel = size_of::<PixelFaces>() + size_of::<u16>() + size_of::<Crowd>() + size_of::<[f32; 4]>();
+        MixedPixels::bytes_of(size) + AT_ONCE * of_pixel
+    }
+}
+
+impl Seen {
+    /// Makes place for so many pixels, which see nothing.
+    fn reset(&mut self, count: usize) {
+        // Places are made once: a place has more than 1 KiB.
+        if self.faces.len() < AT_ONCE {
+            self.faces.reserve_exact(AT_ONCE - self.faces.len());
+            self.faces.resize_with(AT_ONCE, || PixelFaces::EMPTY);
+        }
+        self.faces.iter_mut().take(count).for_each(PixelFaces::clear);
+        self.crowd_of.reserve_exact(AT_ONCE.saturating_sub(self.crowd_of.len()));
+        self.crowd_of.clear();
+        self.crowd_of.resize(count, 0);
+        self.crowds.clear();
+        self.colors.reserve_exact(AT_ONCE.saturating_sub(self.colors.len()));
+        self.colors.clear();
+        self.colors.resize(count, [0.0; 4]);
+    }
+
+    /// Makes a crowd of a pixel.
+    #[inline(never)]
+    fn crowd(&mut self, i: usize) -> Option<&mut Crowd> {
+        if self.crowd_of[i] == 0 {
+            self.crowds.push(Crowd::of(&self.faces[i]));
+            self.crowd_of[i] = self.crowds.len() as u16;
+        }
+        self.crowds.get_mut(usize::from(self.crowd_of[i]) - 1)
     }
 }
 
@@ -45,27 +95,22 @@ pub fn draw_mixed(
     scratch: &mut MixedScratch,
     mut each: impl FnMut(u32, u32, [f32; 4]),
 ) {
-    let MixedScratch { pixels, points } = scratch;
+    let MixedScratch { pixels, seen } = scratch;
     find(context.isa, context, samples, pixels);
     context.watch.count_mixed(pixels.columns.len());
-    points.clear();
-    points.reserve_exact(AT_ONCE);
-    points.resize_with(AT_ONCE.min(pixels.columns.len()), || PixelPoints::EMPTY);
-    let mut shader = Shader::new(context);
     for first in (0..pixels.columns.len()).step_by(AT_ONCE) {
         if context.deadline.check().is_err() {
             return;
         }
-        let end = (first + AT_ONCE).min(pixels.columns.len());
-        let some = &mut SomePixels { pixels, first, points: &mut points[..end - first], samples };
+        let count = AT_ONCE.min(pixels.columns.len() - first);
+        seen.reset(count);
+        let some = &mut SomePixels { pixels, first, count, seen, samples };
         see(context.isa, context, (bins, band), some);
-        let mut row = pixels.row_of(first, samples);
-        for (i, points) in (first..end).zip(&*some.points) {
-            while i >= pixels.end_of(row, samples) {
-                row += 1;
-            }
-            let x = u32::from(pixels.columns[i]);
-            each(x, row, color(&mut shader, samples, [x, row], points));
+        color(context.isa, context, some);
+        let mut row = some.first_row();
+        for i in 0..count {
+            let [x, y] = some.place(i, &mut row);
+            each(x, y, some.seen.colors[i]);
         }
     }
 }
@@ -89,8 +134,10 @@ pub struct SomePixels<'a> {
     pixels: &'a MixedPixels,
     /// The first of them.
     first: usize,
-    points: &'a mut [PixelPoints],
-    samples: &'a SampleBand,
+    count: usize,
+    seen: &'a mut Seen,
+    /// The band.
+    pub samples: &'a SampleBand,
 }
 
 dispatch! {
@@ -100,69 +147,98 @@ dispatch! {
 
 #[inline(always)]
 fn see_kernel(context: &RasterContext<'_>, (bins, band): (&[TriangleBin], usize), some: &mut SomePixels<'_>) {
-    some.points.fill_with(|| PixelPoints::EMPTY);
-    let end = some.first + some.points.len() - 1;
-    let rows = [some.first, end].map(|i| some.pixels.row_of(i, some.samples) as i32);
+    let rows = [some.first, some.first + some.count - 1].map(|i| some.pixels.row_of(i, some.samples) as i32);
+    let rows = [rows[0], rows[1] + 1];
     let mut poll = DeadlinePoll::new(context.deadline);
     for bin in bins {
-        let pieces = bin.pieces_in(band).map(|(id, piece)| (id, *piece));
-        let whole = bin.whole_in(band).map(|id| (id, context.screen_triangle(id)));
-        for (id, corners) in pieces.chain(whole) {
-            let pixels = some.offer(id, &corners, [rows[0], rows[1] + 1]);
+        for (id, piece) in bin.pieces_in(band) {
+            let pixels = some.offer(context, id, piece, rows);
             if poll.is_expired(pixels * POINTS as u64) {
                 return;
+            }
+        }
+    }
+    // What faces away is mostly hidden by then.
+    for is_front in [true, false] {
+        for bin in bins {
+            let (listed, others) = if is_front { &bin.fronts } else { &bin.backs }.items_in(band);
+            for ids in [listed, &others] {
+                for &id in ids {
+                    let pixels = some.offer(context, id, &context.screen_triangle(id), rows);
+                    if poll.is_expired(pixels * POINTS as u64) {
+                        return;
+                    }
+                }
             }
         }
     }
 }
 
 impl SomePixels<'_> {
+    /// Number of pixels.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// The row of the first.
+    pub fn first_row(&self) -> u32 {
+        self.pixels.row_of(self.first, self.samples)
+    }
+
+    /// Column and row of pixel number `i`. `row` is that of the pixel before it.
+    #[inline(always)]
+    pub fn place(&self, i: usize, row: &mut u32) -> [u32; 2] {
+        while self.first + i >= self.pixels.end_of(*row, self.samples) {
+            *row += 1;
+        }
+        [u32::from(self.pixels.columns[self.first + i]), *row]
+    }
+
+    /// What they see.
+    pub fn seen(&self) -> &Seen {
+        self.seen
+    }
+
+    /// Their colours.
+    pub fn colors_mut(&mut self) -> &mut [[f32; 4]] {
+        &mut self.seen.colors
+    }
+
     /// Offers a triangle to the pixels that it may touch in these rows; how many they are.
     #[inline(always)]
-    fn offer(&mut self, id: u32, corners: &[ScreenVertex; 3], rows: [i32; 2]) -> u64 {
+    fn offer(&mut self, context: &RasterContext<'_>, id: u32, corners: &[ScreenVertex; 3], rows: [i32; 2]) -> u64 {
         let [width, height] = self.samples.size_px.map(|size| size as i32);
-        let range = |v: [i32; 3], size: i32, pixels: [i32; 2]| {
-            let ends = [v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2])];
-            POINT_GRID.pixels(ends.map(|v| v + 128 * size), pixels)
-        };
-        let [left, right] = range(corners.map(|v| v.x), width, [0, width]);
-        let [top, bottom] = range(corners.map(|v| v.y), height, rows);
+        let [a, b, c] = corners;
+        let [low, high] = [a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x)];
+        let [left, right] = POINT_GRID.pixels([low + 128 * width, high + 128 * width], [0, width]);
+        let [low, high] = [a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y)];
+        let [top, bottom] = POINT_GRID.pixels([low + 128 * height, high + 128 * height], rows);
         if left > right || top > bottom {
             return 0;
         }
-        let end = self.first + self.points.len();
+        let end = self.first + self.count;
         let (mut triangle, mut offered) = (None, 0);
         for y in top..=bottom {
             let row = (y - self.samples.shown[0] as i32) as usize * width as usize;
-            let [from, to] = [left, right + 1].map(|x| self.pixels.starts[row + x as usize] as usize);
+            let from = self.pixels.starts[row + left as usize] as usize;
+            let to = self.pixels.starts[row + right as usize + 1] as usize;
             for i in from.max(self.first)..to.min(end) {
                 if triangle.is_none() {
-                    triangle = Setup::new(corners).map(PointTriangle::new);
+                    triangle = PointTriangle::new(corners);
                 }
-                let Some(triangle) = &triangle else { return offered };
+                let Some(triangle) = &mut triangle else { return offered };
                 let x = i32::from(self.pixels.columns[i]);
                 let corner = [256 * x - 128 * width, 256 * y - 128 * height];
-                triangle.offer(id, corner, &mut self.points[i - self.first]);
+                let i = i - self.first;
+                let is_crowd = self.seen.crowd_of[i] != 0 || context.is_plain;
+                if (is_crowd || !self.seen.faces[i].offer(context.isa, triangle, id, corner))
+                    && let Some(crowd) = self.seen.crowd(i)
+                {
+                    crowd.offer(context.isa, triangle, id, corner);
+                }
                 offered += 1;
             }
         }
         offered
     }
-}
-
-/// The colour of a pixel by what its points see: each triangle is shaded once, at the mean of its points.
-fn color(shader: &mut Shader<'_>, samples: &SampleBand, [x, y]: [u32; 2], points: &PixelPoints) -> [f32; 4] {
-    let own_z = samples.depth[samples.index(x as i32, y as i32, 0)];
-    let corner = [0, 1].map(|k| [x, y][k] as i32 * 256 - samples.size_px[k] as i32 * 128);
-    let mut sum = [0.0; 4];
-    for_each_share(&points.ids, |Share { id, first, count, place_sum }| {
-        let scale = recip((2 * count) as f32);
-        let at = [0, 1].map(|k| corner[k] as f32 + place_sum[k] as f32 * scale);
-        let color = shader.at_point(id, at, [x, y], [points.depth[first], own_z]);
-        let weight = count as f32 / POINTS as f32;
-        for k in 0..4 {
-            sum[k] += weight * color[k];
-        }
-    });
-    sum
 }

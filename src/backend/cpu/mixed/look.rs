@@ -14,8 +14,8 @@ use crate::plan::{ShadedMaterial, SurfacePass, TEXTURE_NONE, flags};
 const BROKEN: u32 = flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::DEBUG | flags::WIRES | flags::BY_ANGLE;
 
 /// Largest difference of two values, squared, over their sum, up to which faces look alike: normals that
-/// differ by about 6 degrees, or colours by about 11/255.
-pub const ALIKE: f32 = 1.0 / 256.0;
+/// differ by about 12 degrees, or colours by about 22/255.
+pub const ALIKE: f32 = 1.0 / 64.0;
 
 /// Added to normals, so that all values are above 0.
 const NORMAL_SHIFT: f32 = 1.5;
@@ -111,6 +111,43 @@ impl Look {
         }
         self.ids[0] != self.ids[1] && !are_alike
     }
+}
+
+/// Pairs of faces that were compared last: neighbouring pixels show the same ones.
+pub struct Pairs([Pair; Pairs::COUNT]);
+
+#[derive(Clone, Copy)]
+struct Pair {
+    ids: [u32; 2],
+    goes_on: bool,
+}
+
+impl Pairs {
+    const COUNT: usize = 1024;
+
+    /// None but of nothing and nothing.
+    pub fn new() -> Self {
+        Self([Pair { ids: [NOTHING; 2], goes_on: true }; Self::COUNT])
+    }
+
+    /// True if colours go on from one of two ids to the other: they are the same, look alike, or are linked.
+    #[inline(always)]
+    pub fn goes_on(&mut self, context: &RasterContext<'_>, a: u32, b: u32) -> bool {
+        if a == b {
+            return true;
+        }
+        let ids = [a.min(b), a.max(b)];
+        let place = &mut self.0[ids[0].wrapping_mul(5).wrapping_add(ids[1]) as usize % Self::COUNT];
+        if place.ids != ids {
+            *place = Pair { ids, goes_on: goes_on(context, ids) };
+        }
+        place.goes_on
+    }
+}
+
+#[inline(never)]
+fn goes_on(context: &RasterContext<'_>, [a, b]: [u32; 2]) -> bool {
+    !Look::of(context, a).and(&Look::of(context, b)).is_mixed() || are_linked(context, a, b)
 }
 
 #[inline(always)]

@@ -1,11 +1,19 @@
 //! Stage mixed, per pixel, of plans with adaptive samples: pixels near which faces meet that differ in
 //! colour are drawn again, from 256 coverage points each.
 //!
-//! [`look`] says what decides the colour of a face, [`find`] which pixels are mixed, [`points`] what each
-//! point of a pixel sees, and [`draw`] runs them for a band.
+//! [`look`] says what decides the colour of a face, [`find`] which pixels are mixed, [`points`] has their points,
+//! [`triangle`] says which of them a triangle covers, [`faces`] and [`crowd`] which face each sees, [`shares`] and [`color`] what
+//! colour that makes, and [`draw`] runs them for a band.
 //! Only the CPU has this stage.
 
+mod color;
+mod crowd;
 pub(crate) mod draw;
+mod faces;
 pub(crate) mod find;
 pub(crate) mod look;
+#[cfg(target_arch = "x86_64")]
+mod outside_avx2;
 pub(crate) mod points;
+mod shares;
+mod triangle;

@@ -1,12 +1,6 @@
-//! Stage mixed, per triangle and mixed pixel: the points that a triangle covers, and its depth at each.
-//!
-//! Points lie in the middle of 1/256 px, so edge functions are taken in halves of it. The rest is as in
-//! stage visibility: exact signs with the top-left rule, depth from offsets.
+//! Stage mixed: the coverage points of a pixel, and sets of them.
 
-use crate::backend::cpu::geometry::nearest::update;
-use crate::backend::cpu::geometry::samples::{NOTHING, SampleGrid};
-use crate::backend::cpu::geometry::visibility::{Setup, clamp};
-use crate::backend::cpu::isa::LANES;
+use crate::backend::cpu::geometry::samples::SampleGrid;
 use crate::backend::sample_partition::{GENERATORS, POINTS};
 
 /// Columns and rows of points in a pixel: some in each.
@@ -25,127 +19,216 @@ pub const PLACES: [[i32; POINTS]; 2] = {
 };
 
 /// Largest of [`PLACES`].
-const PLACE_MAX: i64 = POINTS as i64 - 1;
+pub const PLACE_MAX: i32 = POINTS as i32 - 1;
 
-/// The faces that the points of a pixel see, and their depths.
-pub struct PixelPoints {
-    /// Reversed depth of each; 0 where there is nothing.
-    pub depth: [f32; POINTS],
-    /// Triangle of each.
-    pub ids: [u32; POINTS],
-    /// No point is farther.
-    farthest: f32,
-}
+/// Bits of a word.
+const WORD: usize = u64::BITS as usize;
 
-/// A triangle, ready to be offered to pixels.
-pub struct PointTriangle {
-    setup: Setup,
-    dx: [i32; 3],
-    dy: [i32; 3],
-    bias: [i64; 3],
-}
+/// Words of a set.
+const WORDS: usize = POINTS / WORD;
 
-impl PixelPoints {
-    /// A pixel without triangles.
-    pub const EMPTY: Self = Self { depth: [0.0; POINTS], ids: [NOTHING; POINTS], farthest: 0.0 };
-}
+/// Binary digits of a place.
+const DIGITS: usize = 8;
 
-impl PointTriangle {
-    /// A triangle by its setup.
-    #[inline(always)]
-    pub fn new(setup: Setup) -> Self {
-        let dx: [i32; 3] = std::array::from_fn(|k| setup.x[(k + 1) % 3] - setup.x[k]);
-        let dy: [i32; 3] = std::array::from_fn(|k| setup.y[(k + 1) % 3] - setup.y[k]);
-        let bias = std::array::from_fn(|k| if dy[k] < 0 || (dy[k] == 0 && dx[k] > 0) { 0 } else { -1 });
-        Self { setup, dx, dy, bias }
+/// By axis and digit: the points whose place has that digit.
+const DIGIT_SETS: [[PointSet; DIGITS]; 2] = {
+    let mut sets = [[PointSet::NONE; DIGITS]; 2];
+    let mut i = 0;
+    while i < POINTS {
+        let mut digit = 0;
+        while digit < DIGITS {
+            sets[0][digit].0[i / WORD] |= ((PLACES[0][i] >> digit & 1) as u64) << (i % WORD);
+            sets[1][digit].0[i / WORD] |= ((PLACES[1][i] >> digit & 1) as u64) << (i % WORD);
+            digit += 1;
+        }
+        i += 1;
     }
+    sets
+};
 
-    /// Edge functions, halved, at the first point's place of the pixel with this corner; None where no
-    /// point of the pixel is inside. An edge that has all of the pixel inside is left out.
+/// Some points of a pixel: bit i of the words, from the lowest, is point i.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PointSet(pub [u64; WORDS]);
+
+impl PointSet {
+    /// None.
+    pub const NONE: Self = Self([0; WORDS]);
+    /// All.
+    pub const ALL: Self = Self([!0; WORDS]);
+
+    /// Those in the columns from the first to the last, one in each.
     #[inline(always)]
-    fn edges_at(&self, corner: [i32; 2]) -> Option<[[i32; 3]; 3]> {
-        let mut edges = [[0; 3]; 3];
-        for k in 0..3 {
-            let (dx, dy) = (i64::from(self.dx[k]), i64::from(self.dy[k]));
-            let (px, py) = (i64::from(corner[0] - self.setup.x[k]), i64::from(corner[1] - self.setup.y[k]));
-            let c = (2 * (dx * py - dy * px) + (dx - dy) + self.bias[k]) >> 1;
-            if c + (PLACE_MAX * dx).max(0) + (PLACE_MAX * -dy).max(0) < 0 {
-                return None;
-            }
-            if c + (PLACE_MAX * dx).min(0) + (PLACE_MAX * -dy).min(0) < 0 {
-                edges[k] = [c.clamp(-(1 << 30), 1 << 30) as i32, self.dx[k], self.dy[k]];
+    pub fn between([first, last]: [i32; 2]) -> Self {
+        let mut set = Self::NONE;
+        for w in 0..WORDS {
+            let low = (first - (WORD * w) as i32).max(0);
+            let high = (last - (WORD * w) as i32).min(WORD as i32 - 1);
+            if low <= high {
+                set.0[w] = !0 >> (WORD as i32 - 1 - (high - low)) << low;
             }
         }
-        Some(edges)
+        set
     }
 
-    /// Offers the triangle to the points of the pixel with this upper left corner, 1/256 px from the
-    /// picture's centre.
+    /// The points of this set and the other.
     #[inline(always)]
-    pub fn offer(&self, id: u32, corner: [i32; 2], points: &mut PixelPoints) {
-        let Setup { depth, depth_range, .. } = self.setup;
-        // Of equal depths the lower id is kept.
-        if depth_range[1] < points.farthest {
-            return;
+    pub fn and(mut self, other: Self) -> Self {
+        for w in 0..WORDS {
+            self.0[w] &= other.0[w];
         }
-        let Some(edges) = self.edges_at(corner) else { return };
-        let from = [2 * (corner[0] - self.setup.x[0]) + 1, 2 * (corner[1] - self.setup.y[0]) + 1];
-        let mut farthest = [f32::INFINITY; LANES];
-        let (depths, _) = points.depth.as_chunks_mut::<LANES>();
-        let (ids, _) = points.ids.as_chunks_mut::<LANES>();
-        let (columns, rows) = (PLACES[0].as_chunks::<LANES>().0, PLACES[1].as_chunks::<LANES>().0);
-        for i in 0..POINTS / LANES {
-            let (mut outside, mut z) = ([0; LANES], [0.0; LANES]);
-            for [c, dx, dy] in edges {
-                for l in 0..LANES {
-                    outside[l] |=
-                        c.wrapping_add(dx.wrapping_mul(rows[i][l]).wrapping_sub(dy.wrapping_mul(columns[i][l])));
+        self
+    }
+
+    /// The points of this set or the other.
+    #[inline(always)]
+    pub fn or(mut self, other: Self) -> Self {
+        for w in 0..WORDS {
+            self.0[w] |= other.0[w];
+        }
+        self
+    }
+
+    /// The points of this set that the other has not.
+    #[inline(always)]
+    pub fn without(mut self, other: Self) -> Self {
+        for w in 0..WORDS {
+            self.0[w] &= !other.0[w];
+        }
+        self
+    }
+
+    /// True if it has no point.
+    #[inline(always)]
+    pub fn is_empty(self) -> bool {
+        let mut any = 0;
+        for w in 0..WORDS {
+            any |= self.0[w];
+        }
+        any == 0
+    }
+
+    /// Adds point `i`.
+    #[inline(always)]
+    pub fn add(&mut self, i: usize) {
+        self.0[i / WORD] |= 1 << (i % WORD);
+    }
+
+    /// True if it has point `i`.
+    #[cfg(test)]
+    pub fn has(self, i: usize) -> bool {
+        self.0[i / WORD] >> (i % WORD) & 1 != 0
+    }
+
+    /// Number of its points.
+    #[inline(always)]
+    pub fn count(self) -> i32 {
+        let mut count = 0;
+        for w in 0..WORDS {
+            count += self.0[w].count_ones() as i32;
+        }
+        count
+    }
+
+    /// Number of its first point; [`POINTS`] if it has none.
+    #[inline(always)]
+    pub fn first(self) -> usize {
+        let mut first = POINTS;
+        for w in (0..WORDS).rev() {
+            first = if self.0[w] == 0 { first } else { WORD * w + self.0[w].trailing_zeros() as usize };
+        }
+        first
+    }
+
+    /// Sum of its points' columns and rows, 1/512 px from the pixel's corner.
+    #[inline(always)]
+    pub fn place_sum(self) -> [i32; 2] {
+        let mut sums = [self.count(); 2];
+        for (axis, sum) in sums.iter_mut().enumerate() {
+            for (digit, set) in DIGIT_SETS[axis].iter().enumerate() {
+                *sum += 2 * (self.and(*set).count() << digit);
+            }
+        }
+        sums
+    }
+
+    /// Calls `each` with the number of each point.
+    #[inline(always)]
+    pub fn for_each(self, mut each: impl FnMut(usize)) {
+        self.filter(|i| {
+            each(i);
+            true
+        });
+    }
+
+    /// Its points for which `stays` is true.
+    #[inline(always)]
+    pub fn filter(mut self, mut stays: impl FnMut(usize) -> bool) -> Self {
+        for w in 0..WORDS {
+            let mut left = self.0[w];
+            while left != 0 {
+                let bit = left.trailing_zeros();
+                left &= left - 1;
+                if !stays(WORD * w + bit as usize) {
+                    self.0[w] ^= 1 << bit;
                 }
             }
-            for l in 0..LANES {
-                let x = (from[0] + 2 * columns[i][l]) as f32 * 0.5;
-                let y = (from[1] + 2 * rows[i][l]) as f32 * 0.5;
-                z[l] = clamp((depth[0] + depth[1] * x) + depth[2] * y, depth_range);
-            }
-            update(&outside, &z, id, &mut depths[i], &mut ids[i]);
-            for l in 0..LANES {
-                farthest[l] = if depths[i][l] < farthest[l] { depths[i][l] } else { farthest[l] };
+        }
+        self
+    }
+
+    /// The points for which `is_in` is true.
+    #[inline(always)]
+    pub fn of(mut is_in: impl FnMut(usize) -> bool) -> Self {
+        let mut set = Self::NONE;
+        for w in 0..WORDS {
+            for bit in 0..WORD {
+                set.0[w] |= u64::from(is_in(WORD * w + bit)) << bit;
             }
         }
-        points.farthest = farthest.into_iter().fold(f32::INFINITY, |least, z| if z < least { z } else { least });
+        set
     }
 }
 
-/// A triangle's share of a pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Share {
-    /// Its id.
-    pub id: u32,
-    /// Number of the first point that sees it.
-    pub first: usize,
-    /// Number of points that see it.
-    pub count: i32,
-    /// Sum of the points' columns and rows, 1/512 px from the pixel's corner.
-    pub place_sum: [i32; 2],
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Calls `each` with the triangles that a pixel's points see, in the order of their first points.
-#[inline(always)]
-pub fn for_each_share(ids: &[u32; POINTS], mut each: impl FnMut(Share)) {
-    let mut is_known = [0_u32; POINTS];
-    for first in 0..POINTS {
-        let id = ids[first];
-        if is_known[first] != 0 || id == NOTHING {
-            continue;
+    #[test]
+    fn columns_have_a_point_each() {
+        for first in 0..POINTS as i32 {
+            for last in (first..POINTS as i32).step_by(7) {
+                let want = PointSet::of(|i| (first..=last).contains(&PLACES[0][i]));
+                assert_eq!(PointSet::between([first, last]), want, "{first} to {last}");
+            }
         }
-        let (mut count, mut sums) = (0, [0; 2]);
-        for i in 0..POINTS {
-            let is_own = -i32::from(ids[i] == id);
-            is_known[i] |= is_own as u32;
-            count -= is_own;
-            sums[0] += PLACES[0][i] & is_own;
-            sums[1] += PLACES[1][i] & is_own;
+    }
+
+    #[test]
+    fn sets_know_their_points() {
+        let sets = [
+            PointSet::NONE,
+            PointSet::ALL,
+            PointSet::of(|i| i == 0),
+            PointSet::of(|i| i == 255),
+            PointSet::of(|i| i * i % 7 == 2),
+            PointSet::of(|i| i > 100 && i % 64 < 3),
+        ];
+        for set in sets {
+            let points: Vec<usize> = (0..POINTS).filter(|&i| set.has(i)).collect();
+            assert_eq!(set.count() as usize, points.len());
+            assert_eq!(set.first(), points.first().copied().unwrap_or(POINTS));
+            assert_eq!(set.is_empty(), points.is_empty());
+            assert_eq!(set, PointSet::of(|i| points.contains(&i)));
+            assert_eq!(set.filter(|i| i % 3 == 1), PointSet::of(|i| set.has(i) && i % 3 == 1));
+            assert_eq!(
+                set.place_sum(),
+                [0, 1].map(|axis| points.iter().map(|&i| 2 * PLACES[axis][i] + 1).sum::<i32>())
+            );
+            for other in sets {
+                assert_eq!(set.and(other), PointSet::of(|i| set.has(i) && other.has(i)));
+                assert_eq!(set.or(other), PointSet::of(|i| set.has(i) || other.has(i)));
+                assert_eq!(set.without(other), PointSet::of(|i| set.has(i) && !other.has(i)));
+            }
         }
-        each(Share { id, first, count, place_sum: sums.map(|sum| 2 * sum + count) });
     }
 }

@@ -68,6 +68,13 @@ impl FlatColors {
         self.colors.capacity() * size_of::<[f32; 4]>()
     }
 
+    /// The colour of a triangle; None where it has to be found per pixel.
+    #[inline(always)]
+    pub fn known(&self, id: u32) -> Option<[f32; 4]> {
+        let color = self.of(id);
+        (!color[0].is_nan()).then_some(color)
+    }
+
     #[inline(always)]
     fn of(&self, id: u32) -> [f32; 4] {
         let last = self.colors.len().wrapping_sub(1);

@@ -15,5 +15,5 @@ mod occlusion;
 pub(crate) mod point;
 pub(crate) mod shade;
 pub(crate) mod texture;
-mod waiting;
+pub mod waiting;
 pub(crate) mod wire;

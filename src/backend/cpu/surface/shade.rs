@@ -96,7 +96,7 @@ impl<'a> Shader<'a> {
     /// The share of light that reaches a surface of depth `z` in a pixel whose first sample has the depth
     /// `own_z`.
     #[inline(always)]
-    fn open_share(&self, pixel: [u32; 2], z: f32, own_z: f32) -> f32 {
+    pub fn open_share(&self, pixel: [u32; 2], z: f32, own_z: f32) -> f32 {
         self.context.occlusion.map_or(1.0, |(pass, occlusion)| occlusion.open_share(pass, pixel, z, own_z))
     }
 

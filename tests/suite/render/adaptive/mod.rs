@@ -51,6 +51,25 @@ fn every_way_of_drawing_gives_the_same_bytes() {
     });
 }
 
+/// Pixels with up to a hundred faces in each, and with few.
+#[test]
+fn pixels_of_many_faces_have_the_same_bytes_too() {
+    let mesh = scenes::mesh(&shapes::torus(160));
+    let mut plain = CpuRenderer::plain(1);
+    let mut others: Vec<CpuRenderer> = Isa::available().into_iter().map(|isa| CpuRenderer::with_isa(2, isa)).collect();
+    let (mut smallest, mut largest) = (u64::MAX, 0);
+    for (style, size) in [("flat", "24"), ("flat", "90"), ("smooth", "40"), ("smooth", "200")] {
+        let plan = scenes::plan(&mesh, &scenes::spec(&[("size", size), ("style", style), ("samples", "adaptive")]));
+        let want = draw(&mut plain, &plan);
+        let mixed = plain.draw_times().mixed_pixels;
+        (smallest, largest) = (smallest.min(mixed), largest.max(mixed));
+        for renderer in &mut others {
+            assert!(draw(renderer, &plan) == want, "{style}, {size} px");
+        }
+    }
+    assert!(smallest > 30 && largest > 600, "{smallest} to {largest} mixed pixels");
+}
+
 /// Pixels that are not mixed have the bytes of 4 samples, and many pixels are not mixed.
 #[test]
 fn smooth_interiors_are_left_alone() {

@@ -1,0 +1,139 @@
+//! Stage mixed, per pixel: the faces that its points see, as a set of points for each.
+//!
+//! Depths are compared for whole faces where one lies in front of the other all over the pixel, and point by point
+//! elsewhere. The result is that of [`crowd`](super::crowd), point for point.
+
+use super::points::PointSet;
+use super::shares::{Share, Shares};
+use super::triangle::{Plane, PointTriangle};
+use crate::backend::cpu::isa::Isa;
+
+/// Faces of a pixel that have a place. A pixel of more is a [`Crowd`](super::crowd::Crowd).
+pub const FACES_MAX: usize = 16;
+
+/// The faces that the points of a pixel see.
+pub struct PixelFaces {
+    /// The points that see one.
+    covered: PointSet,
+    /// No point is farther; 0 where one sees nothing.
+    farthest: f32,
+    /// Number of faces.
+    count: usize,
+    faces: [Face; FACES_MAX],
+}
+
+/// A face, or a piece of one, and the points that see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Face {
+    /// The triangle.
+    pub id: u32,
+    /// The points that see it: at least one.
+    pub points: PointSet,
+    /// Its depth in the pixel.
+    pub plane: Plane,
+    /// Between these all its depths are.
+    extremes: [f32; 2],
+}
+
+impl Face {
+    const EMPTY: Self = Self { id: 0, points: PointSet::NONE, plane: Plane::EMPTY, extremes: [0.0; 2] };
+
+    /// Those of the points at which this face hides another one: of equal depths, the lower id is in front.
+    #[inline(always)]
+    fn hides(&self, other: &Self, points: PointSet) -> PointSet {
+        if self.extremes[0] > other.extremes[1] {
+            return points;
+        }
+        if self.extremes[1] < other.extremes[0] {
+            return PointSet::NONE;
+        }
+        points.filter(|i| {
+            let (own, of_other) = (self.plane.at(i), other.plane.at(i));
+            own > of_other || (own == of_other && self.id < other.id)
+        })
+    }
+}
+
+impl PixelFaces {
+    /// A pixel without faces.
+    pub const EMPTY: Self = Self { covered: PointSet::NONE, farthest: 0.0, count: 0, faces: [Face::EMPTY; FACES_MAX] };
+
+    /// Takes all faces away.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        (self.covered, self.farthest, self.count) = (PointSet::NONE, 0.0, 0);
+    }
+
+    /// Its faces, in no order.
+    #[inline(always)]
+    pub fn faces(&self) -> &[Face] {
+        &self.faces[..self.count]
+    }
+
+    /// Finds the triangles' shares.
+    #[inline(always)]
+    pub fn shares(&self, shares: &mut Shares) {
+        shares.clear();
+        for face in self.faces() {
+            shares.insert(Share { id: face.id, points: face.points, depth: face.plane.at(face.points.first()) });
+        }
+    }
+
+    /// Offers a triangle to the points of the pixel with this upper left corner, 1/256 px from the picture's centre.
+    /// False if there is no place for it.
+    #[inline(always)]
+    pub fn offer(&mut self, isa: Isa, triangle: &mut PointTriangle, id: u32, corner: [i32; 2]) -> bool {
+        if triangle.nearest < self.farthest {
+            return true;
+        }
+        let Some(outline) = triangle.at(corner) else { return true };
+        let plane = triangle.plane_at(corner);
+        let extremes = plane.extremes();
+        if extremes[1] < self.farthest {
+            return true;
+        }
+        let mut points = outline.inside(isa);
+        // What is as far as nothing is not seen.
+        if extremes[0] <= 0.0 {
+            points = points.filter(|i| plane.at(i) > 0.0);
+        }
+        let mut face = Face { id, points, plane, extremes };
+        if !points.and(self.covered).is_empty() {
+            self.part(&mut face);
+        }
+        if face.points.is_empty() {
+            return true;
+        }
+        if self.count == FACES_MAX {
+            return false;
+        }
+        self.faces[self.count] = face;
+        self.count += 1;
+        self.covered = self.covered.or(points);
+        if self.covered == PointSet::ALL {
+            self.farthest = f32::INFINITY;
+            for face in &self.faces[..self.count] {
+                self.farthest = if face.extremes[0] < self.farthest { face.extremes[0] } else { self.farthest };
+            }
+        }
+        true
+    }
+
+    /// Parts the points that a face and others cover by who is in front. Faces that are hidden lose their places.
+    #[inline(always)]
+    fn part(&mut self, face: &mut Face) {
+        let mut kept = 0;
+        for i in 0..self.count {
+            let mut other = self.faces[i];
+            let both = other.points.and(face.points);
+            if !both.is_empty() {
+                let won = face.hides(&other, both);
+                other.points = other.points.without(won);
+                face.points = face.points.without(both.without(won));
+            }
+            self.faces[kept] = other;
+            kept += usize::from(!other.points.is_empty());
+        }
+        self.count = kept;
+    }
+}

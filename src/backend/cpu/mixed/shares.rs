@@ -1,0 +1,78 @@
+//! Stage mixed, per pixel: the shares of its triangles.
+
+use super::points::PointSet;
+use crate::backend::sample_partition::POINTS;
+
+/// A triangle's share of a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Share {
+    /// The triangle.
+    pub id: u32,
+    /// The points that see it.
+    pub points: PointSet,
+    /// Its depth at the first of them.
+    pub depth: f32,
+}
+
+/// The shares of a pixel's triangles, in the order of their first points.
+pub struct Shares {
+    list: [Share; POINTS],
+    len: usize,
+}
+
+impl Shares {
+    /// None.
+    pub fn new() -> Self {
+        Self { list: [Share { id: 0, points: PointSet::NONE, depth: 0.0 }; POINTS], len: 0 }
+    }
+
+    /// Forgets all.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// All of them.
+    #[inline(always)]
+    pub fn all(&self) -> &[Share] {
+        &self.list[..self.len]
+    }
+
+    /// Adds one that comes after the others.
+    #[inline(always)]
+    pub fn push(&mut self, share: Share) {
+        self.list[self.len] = share;
+        self.len += 1;
+    }
+
+    /// Adds a point to share number `n`.
+    #[inline(always)]
+    pub fn add_point(&mut self, n: usize, i: usize) {
+        self.list[n].points.add(i);
+    }
+
+    /// Adds one where it belongs. Pieces of a triangle become one share.
+    #[inline(always)]
+    pub fn insert(&mut self, mut share: Share) {
+        let mut kept = 0;
+        for i in 0..self.len {
+            let other = self.list[i];
+            if other.id == share.id {
+                let is_first = other.points.first() < share.points.first();
+                share.depth = if is_first { other.depth } else { share.depth };
+                share.points = share.points.or(other.points);
+            } else {
+                self.list[kept] = other;
+                kept += 1;
+            }
+        }
+        let first = share.points.first();
+        let mut at = kept;
+        while at > 0 && self.list[at - 1].points.first() > first {
+            self.list[at] = self.list[at - 1];
+            at -= 1;
+        }
+        self.list[at] = share;
+        self.len = kept + 1;
+    }
+}

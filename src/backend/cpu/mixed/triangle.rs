@@ -1,0 +1,242 @@
+//! Stage mixed, per triangle and pixel: the points that the triangle covers, and its depth at each.
+//!
+//! Points lie in the middle of 1/256 px, so edge functions are taken in halves of it. The rest is as in
+//! stage visibility: exact signs with the top-left rule, depth from offsets.
+
+use super::points::{PLACE_MAX, PLACES, PointSet};
+use crate::backend::cpu::geometry::transform::ScreenVertex;
+use crate::backend::cpu::geometry::visibility::{Setup, area, clamp};
+use crate::backend::cpu::isa::Isa;
+
+/// A triangle, ready to be offered to pixels.
+pub struct PointTriangle {
+    corners: [ScreenVertex; 3],
+    /// The first corner of each edge, in an order that makes the area positive.
+    x: [i32; 3],
+    y: [i32; 3],
+    dx: [i32; 3],
+    dy: [i32; 3],
+    bias: [i64; 3],
+    /// Its leftmost and rightmost corner.
+    ends: [i32; 2],
+    /// The nearest depth of its corners.
+    pub nearest: f32,
+    /// Of its depth: found when a pixel asks for it.
+    setup: Option<Setup>,
+}
+
+/// An edge function in a pixel: its value at the first point, halved, and its change per row and, negative, per column.
+pub type Edge = [i32; 3];
+
+/// The edge function of an edge that has all of a pixel inside.
+pub const NO_EDGE: Edge = [0; 3];
+
+/// A triangle in a pixel, without its depth.
+pub struct Outline {
+    /// First and last column that it touches.
+    columns: [i32; 2],
+    edges: [Edge; 3],
+}
+
+/// The depth of a triangle in a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    /// The first point from the triangle's first corner, 1/512 px.
+    from: [i32; 2],
+    /// As [`Setup::depth`].
+    depth: [f32; 3],
+    /// As [`Setup::depth_range`].
+    range: [f32; 2],
+}
+
+impl PointTriangle {
+    /// None where the triangle has no area.
+    #[inline(always)]
+    pub fn new(corners: &[ScreenVertex; 3]) -> Option<Self> {
+        let area = area(corners);
+        if area == 0 {
+            return None;
+        }
+        let [a, b, c] = *corners;
+        let [b, c] = if area > 0 { [b, c] } else { [c, b] };
+        let (x, y) = ([a.x, b.x, c.x], [a.y, b.y, c.y]);
+        let (mut dx, mut dy, mut bias) = ([0; 3], [0; 3], [0; 3]);
+        for k in 0..3 {
+            (dx[k], dy[k]) = (x[(k + 1) % 3] - x[k], y[(k + 1) % 3] - y[k]);
+            bias[k] = if dy[k] < 0 || (dy[k] == 0 && dx[k] > 0) { 0 } else { -1 };
+        }
+        let ends = [a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x)];
+        Some(Self { corners: *corners, x, y, dx, dy, bias, ends, nearest: a.z.max(b.z).max(c.z), setup: None })
+    }
+
+    /// First and last column of points that may be inside, in the pixel with this upper left corner, 1/256 px from the
+    /// picture's centre; None if there is none.
+    #[inline(always)]
+    fn columns_at(&self, corner: [i32; 2]) -> Option<[i32; 2]> {
+        let first = (self.ends[0] - corner[0]).max(0);
+        let last = (self.ends[1] - 1 - corner[0]).min(PLACE_MAX);
+        (first <= last).then_some([first, last])
+    }
+
+    /// What the triangle is in the pixel with this corner; None where no point of the pixel is inside.
+    #[inline(always)]
+    pub fn at(&self, corner: [i32; 2]) -> Option<Outline> {
+        let columns = self.columns_at(corner)?;
+        Some(Outline { columns, edges: self.edges_at(corner)? })
+    }
+
+    /// Edge functions in the pixel with this corner; None where no point of the pixel is inside.
+    #[inline(always)]
+    fn edges_at(&self, corner: [i32; 2]) -> Option<[Edge; 3]> {
+        const MAX: i64 = PLACE_MAX as i64;
+        let mut edges = [NO_EDGE; 3];
+        for k in 0..3 {
+            let (dx, dy) = (i64::from(self.dx[k]), i64::from(self.dy[k]));
+            let (px, py) = (i64::from(corner[0] - self.x[k]), i64::from(corner[1] - self.y[k]));
+            let c = (2 * (dx * py - dy * px) + (dx - dy) + self.bias[k]) >> 1;
+            if c + (MAX * dx).max(0) + (MAX * -dy).max(0) < 0 {
+                return None;
+            }
+            if c + (MAX * dx).min(0) + (MAX * -dy).min(0) < 0 {
+                edges[k] = [c.clamp(-(1 << 30), 1 << 30) as i32, self.dx[k], self.dy[k]];
+            }
+        }
+        Some(edges)
+    }
+
+    /// The depth in the pixel with this corner.
+    #[inline(always)]
+    pub fn plane_at(&mut self, corner: [i32; 2]) -> Plane {
+        if self.setup.is_none() {
+            self.setup = Setup::new(&self.corners);
+        }
+        match &self.setup {
+            Some(Setup { x, y, depth, depth_range, .. }) => Plane {
+                from: [2 * (corner[0] - x[0]) + 1, 2 * (corner[1] - y[0]) + 1],
+                depth: *depth,
+                range: *depth_range,
+            },
+            // There is one where there is an area.
+            None => Plane::EMPTY,
+        }
+    }
+}
+
+impl Plane {
+    /// The depth of nothing, for places that wait to be used.
+    pub const EMPTY: Self = Self { from: [0; 2], depth: [0.0; 3], range: [0.0; 2] };
+
+    /// The depth at point `i`.
+    #[inline(always)]
+    pub fn at(&self, i: usize) -> f32 {
+        self.at_place([PLACES[0][i], PLACES[1][i]])
+    }
+
+    #[inline(always)]
+    fn at_place(&self, place: [i32; 2]) -> f32 {
+        let x = (self.from[0] + 2 * place[0]) as f32 * 0.5;
+        let y = (self.from[1] + 2 * place[1]) as f32 * 0.5;
+        clamp((self.depth[0] + self.depth[1] * x) + self.depth[2] * y, self.range)
+    }
+
+    /// Two depths between which those of all points are. Each step of [`at`](Self::at) rounds to the nearest, so a
+    /// larger number never becomes less than a smaller one, and the extremes are in corners.
+    #[inline(always)]
+    pub fn extremes(&self) -> [f32; 2] {
+        let far = [1, 2].map(|k| if self.depth[k] < 0.0 { PLACE_MAX } else { 0 });
+        [self.at_place(far), self.at_place(far.map(|place| PLACE_MAX - place))]
+    }
+}
+
+impl Outline {
+    /// The points inside.
+    #[inline(always)]
+    pub fn inside(&self, isa: Isa) -> PointSet {
+        // A column has one point, of the same number.
+        let mut inside = PointSet::between(self.columns);
+        for edge in &self.edges {
+            if *edge != NO_EDGE {
+                inside = inside.without(outside(isa, *edge, self.columns));
+            }
+        }
+        inside
+    }
+}
+
+/// The points that lie outside an edge, of those in the columns from the first to the last, and any others.
+#[inline(always)]
+#[allow(unsafe_code)]
+fn outside(isa: Isa, edge: Edge, columns: [i32; 2]) -> PointSet {
+    #[cfg(target_arch = "x86_64")]
+    if isa.has_avx2() {
+        // SAFETY: `has_avx2` is true where the processor has AVX2.
+        return unsafe { super::outside_avx2::outside(edge, columns) };
+    }
+    let _ = (isa, columns);
+    outside_plainly(edge)
+}
+
+/// The points that lie outside an edge, one by one.
+#[inline(always)]
+pub fn outside_plainly([c, dx, dy]: Edge) -> PointSet {
+    PointSet::of(|i| c.wrapping_add(dx.wrapping_mul(PLACES[1][i]).wrapping_sub(dy.wrapping_mul(PLACES[0][i]))) < 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::sample_partition::POINTS;
+
+    /// Numbers that look random: xorshift64, Marsaglia 2003.
+    fn next(state: &mut u64) -> i32 {
+        *state ^= *state << 13;
+        *state ^= *state >> 7;
+        *state ^= *state << 17;
+        (*state >> 20) as i32
+    }
+
+    #[test]
+    fn each_instruction_set_finds_the_same_points() {
+        let mut state = 0x2545_F491_4F6C_DD1D;
+        let mut mixed = 0;
+        for _ in 0..20_000 {
+            let shift = next(&mut state).rem_euclid(16);
+            let [dx, dy] = [0, 1].map(|_| next(&mut state) >> (8 + shift));
+            let c = (next(&mut state) >> shift).clamp(-(1 << 30), 1 << 30);
+            let want = outside_plainly([c, dx, dy]);
+            mixed += usize::from(want != PointSet::NONE && want != PointSet::ALL);
+            let first = next(&mut state) & PLACE_MAX;
+            for columns in [[0, PLACE_MAX], [first, PLACE_MAX], [first / 2, first]] {
+                let all = PointSet::between(columns);
+                for isa in Isa::available() {
+                    let found = outside(isa, [c, dx, dy], columns).and(all);
+                    assert_eq!(found, want.and(all), "{isa:?} {c} {dx} {dy} {columns:?}");
+                }
+            }
+        }
+        assert!(mixed > 2_000, "{mixed}");
+    }
+
+    #[test]
+    fn depths_lie_between_their_extremes() {
+        let mut state = 0x9E37_79B9_7F4A_7C15;
+        let mut compared = 0;
+        for _ in 0..2_000 {
+            let corner = |state: &mut u64| ScreenVertex {
+                x: next(state) >> 18,
+                y: next(state) >> 18,
+                z: (next(state) >> 8) as f32 / (1 << 24) as f32 + 0.5,
+                ..ScreenVertex::default()
+            };
+            let corners = [0; 3].map(|_| corner(&mut state));
+            let Some(mut triangle) = PointTriangle::new(&corners) else { continue };
+            let plane = triangle.plane_at([next(&mut state) >> 16, next(&mut state) >> 16]);
+            let [low, high] = plane.extremes();
+            for i in 0..POINTS {
+                assert!(low <= plane.at(i) && plane.at(i) <= high, "{plane:?}");
+            }
+            compared += 1;
+        }
+        assert!(compared > 1_900);
+    }
+}
