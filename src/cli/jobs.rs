@@ -23,7 +23,7 @@ Examples:
 /// Arguments of `jobs`.
 #[derive(Args)]
 pub struct JobsArgs {
-    /// Folder of the server [default: that of `serve`]
+    /// Folder of the server [default: that of `serve` without a --config]
     #[arg(long, value_name = "DIR", env = "MESHSNAP_DATA_DIR", value_hint = ValueHint::DirPath)]
     data_dir: Option<PathBuf>,
     /// Only jobs that have failed
@@ -38,7 +38,7 @@ pub struct JobsArgs {
 #[derive(Serialize)]
 struct JobLine<'a> {
     id: String,
-    /// As over HTTP. A job that was begun is `running`, also if its server has crashed.
+    /// As over HTTP, but a job that was begun is `running`, also if its server has crashed.
     state: &'static str,
     kind: RequestKind,
     accepted_unix_ms: u64,
@@ -68,6 +68,14 @@ struct ResultLine<'a> {
     sha256: String,
     format: &'a str,
     backend: &'a str,
+    /// A verdict whose request wanted 422 for it.
+    #[serde(skip_serializing_if = "is_false")]
+    has_failed: bool,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde gives a reference
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// Prints the jobs, the oldest first.
@@ -80,6 +88,10 @@ pub fn run(arguments: &JobsArgs) -> Result<(), CliError> {
             let folder = folder.display();
             CliError::usage(format!("{folder} is no data folder of meshsnap: name the one of `serve` with --data-dir"))
         }
+        OpenError::Io { error, .. } if error.kind() == ErrorKind::ResourceBusy => CliError::ours(format!(
+            "the data folder {} is written to without a pause, so that no copy of its log is of one state: try again",
+            folder.display()
+        )),
         OpenError::Io { error, .. } => {
             CliError::ours(format!("the data folder {} cannot be read: {error}", folder.display()))
         }
@@ -97,7 +109,7 @@ pub fn run(arguments: &JobsArgs) -> Result<(), CliError> {
         }
     }
     if !arguments.jsonl {
-        text += &summary(&jobs, contents.meshes.len());
+        text += &format!("{} in {}\n", summary(&jobs, contents.meshes.len()), folder.display());
     }
     files::print(text.as_bytes())
 }
@@ -138,6 +150,7 @@ impl<'a> JobLine<'a> {
                 sha256: picture.digest.to_string(),
                 format: &picture.format,
                 backend: &picture.backend,
+                has_failed: picture.has_failed,
             }),
             error: end.and_then(|end| end.error.as_ref()),
         }
@@ -155,8 +168,9 @@ impl<'a> JobLine<'a> {
             // Names from the client's file are in it.
             text.extend(error.detail.chars().map(|c| if c.is_control() { '\u{FFFD}' } else { c }));
         } else if let Some(result) = &self.result {
+            let verdict = if result.has_failed { ", failed" } else { "" };
             let is_fetched = if self.fetched_unix_ms.is_some() { ", fetched" } else { "" };
-            let _ = write!(text, "  {}{is_fetched}", result.format);
+            let _ = write!(text, "  {}{verdict}{is_fetched}", result.format);
         } else if self.starts > 1 {
             let _ = write!(text, "  begun {} times", self.starts);
         }
@@ -164,12 +178,12 @@ impl<'a> JobLine<'a> {
     }
 }
 
-/// The last line: how many jobs of each state there are, and how many meshes.
+/// The start of the last line: how many jobs of each state there are, and how many meshes.
 fn summary(jobs: &[JobLine], meshes: usize) -> String {
     let count = |state| jobs.iter().filter(|job| job.state == state).count();
     let counts = STATES.iter().map(|state| (count(*state), state)).filter(|(count, _)| *count > 0);
     let counts: Vec<String> = counts.map(|(count, state)| format!("{count} {state}")).collect();
     let of_states = if counts.is_empty() { String::new() } else { format!(" ({})", counts.join(", ")) };
     let plural = |count: usize, one: &str, many: &str| format!("{count} {}", if count == 1 { one } else { many });
-    format!("{}{of_states}, {}\n", plural(jobs.len(), "job", "jobs"), plural(meshes, "stored mesh", "stored meshes"))
+    format!("{}{of_states}, {}", plural(jobs.len(), "job", "jobs"), plural(meshes, "stored mesh", "stored meshes"))
 }

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::Path;
 use std::sync::Mutex;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use redb::backends::InMemoryBackend;
 use redb::{DatabaseError, StorageBackend as _, StorageError};
@@ -15,37 +15,61 @@ use redb::{DatabaseError, StorageBackend as _, StorageError};
 use super::log::{Contents, Log as _, RedbLog, builder};
 use super::{LOG_FILE, OpenError};
 
-/// Copies that are made before the reader gives up.
-const TRIES: u32 = 20;
+/// Time for which a log that changes is copied anew.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Time between two copies.
-const PAUSE: Duration = Duration::from_millis(25);
+const PAUSE: Duration = Duration::from_millis(5);
+
+/// Bytes at the start of a log in which each commit changes something.
+const HEADER_BYTES: usize = 512;
+
+/// The bytes with which each database of redb begins.
+const MAGIC: [u8; 9] = *b"redb\x1A\x0A\xA9\x0D\x0A";
 
 /// Bytes that are read at a time.
 const PART_BYTES: usize = 1 << 20;
 
-/// The jobs and meshes in a data folder. Nothing in it is changed, not even what a crash has left unfinished.
+/// The jobs and meshes in a data folder. Nothing in it is changed, not even what a crash has left unfinished. Takes as much
+/// memory as the log has. `ResourceBusy`: it was written to without a pause.
 pub fn read(folder: &Path) -> Result<Contents, OpenError> {
+    read_within(folder, PATIENCE, &mut || ()).map_err(|error| match error.kind() {
+        io::ErrorKind::Unsupported => OpenError::Newer(folder.to_owned()),
+        _ => OpenError::Io { folder: folder.to_owned(), error },
+    })
+}
+
+/// As [`read`]. `after_part` is called after each part that is copied.
+fn read_within(folder: &Path, patience: Duration, after_part: &mut dyn FnMut()) -> io::Result<Contents> {
     let path = folder.join(LOG_FILE);
-    let mut tries = 0;
+    let began = Instant::now();
     loop {
-        tries += 1;
-        let error = match copy(&path, PART_BYTES, &mut || ()).and_then(contents_of) {
+        let before = header(&path)?;
+        if !before.is_empty() && !before.starts_with(&MAGIC) {
+            return Err(io::Error::new(io::ErrorKind::InvalidData, format!("{LOG_FILE} is no log of meshsnap")));
+        }
+        let error = match copy(&path, PART_BYTES, after_part).and_then(contents_of) {
             Ok(contents) => return Ok(contents),
             Err(error) => error,
         };
-        use io::ErrorKind::{IsADirectory, NotADirectory, NotFound, PermissionDenied, Unsupported};
-        match error.kind() {
-            Unsupported => return Err(OpenError::Newer(folder.to_owned())),
-            NotFound | PermissionDenied | NotADirectory | IsADirectory => {}
-            _ if tries < TRIES => {
-                std::thread::sleep(PAUSE);
-                continue;
-            }
-            _ => {}
+        // A log that did not change meanwhile will not be better another time.
+        if error.kind() == io::ErrorKind::Unsupported || header(&path)? == before {
+            return Err(error);
         }
-        return Err(OpenError::Io { folder: folder.to_owned(), error });
+        if began.elapsed() > patience {
+            return Err(io::ErrorKind::ResourceBusy.into());
+        }
+        std::thread::sleep(PAUSE);
     }
+}
+
+fn header(path: &Path) -> io::Result<Vec<u8>> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("{LOG_FILE} is no file")));
+    }
+    let mut header = Vec::new();
+    File::open(path)?.take(HEADER_BYTES as u64).read_to_end(&mut header)?;
+    Ok(header)
 }
 
 /// The file in memory. `after_part` is called after each part that is read.
@@ -80,7 +104,10 @@ fn contents_of(copy: InMemoryBackend) -> io::Result<Contents> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+
     use super::*;
+    use crate::service::digest::Digest;
     use crate::service::durable::tests::{cancelled, job};
     use crate::service::durable::{Change, RedbLog};
 
@@ -137,10 +164,49 @@ mod tests {
     fn a_log_is_read_while_it_is_written_to() {
         let folder = tempfile::tempdir().unwrap();
         let mut log = RedbLog::open(&folder.path().join(LOG_FILE)).unwrap();
-        for pair in 0..30 {
-            commit_pair(&mut log, pair);
-            assert_eq!(read(folder.path()).unwrap().jobs.len(), 2 * (pair as usize + 1).min(20));
-        }
+        // Some megabytes, so that commits come while it is copied.
+        let filler: Vec<_> = (0..200_u32).map(|i| i.to_le_bytes().repeat(10_000)).collect();
+        let stored = filler.iter().map(|bytes| Change::SmallStored(Digest::of(bytes), bytes.clone().into()));
+        log.commit(&stored.collect::<Vec<_>>()).unwrap();
+        commit_pair(&mut log, 0);
+        let is_over = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for pair in (1..).take_while(|_| !is_over.load(Ordering::Relaxed)) {
+                    commit_pair(&mut log, pair);
+                }
+            });
+            for _ in 0..5 {
+                let contents = read(folder.path());
+                is_over.store(contents.is_err(), Ordering::Relaxed);
+                assert_eq!(contents.unwrap().jobs.len() % 2, 0);
+            }
+            is_over.store(true, Ordering::Relaxed);
+        });
+    }
+
+    #[test]
+    fn a_log_that_never_rests_is_said_to_be_busy() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(LOG_FILE);
+        drop(RedbLog::open(&path).unwrap());
+        let mut bytes = std::fs::read(&path).unwrap();
+        // A log whose pages are gone.
+        bytes[4096..].fill(0xEE);
+        std::fs::write(&path, &bytes).unwrap();
+        let patience = Duration::from_millis(50);
+        let kind = |after_part: &mut dyn FnMut()| {
+            read_within(folder.path(), patience, after_part).err().map(|error| error.kind())
+        };
+        assert_eq!(kind(&mut || ()), Some(io::ErrorKind::Other));
+        let mut copies = 0;
+        let mut commit = || {
+            copies += 1;
+            bytes[HEADER_BYTES - 1] ^= 1;
+            std::fs::write(&path, &bytes).unwrap();
+        };
+        assert_eq!(kind(&mut commit), Some(io::ErrorKind::ResourceBusy));
+        assert!(copies > 1, "{copies}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Stage mixed, per pixel: its colour by what its points see. Each triangle is shaded once, at the mean of its points, and
 //! weighs its share of them.
 
-use super::draw::{Seen, SomePixels};
+use super::pixels::{Seen, SomePixels};
 use super::shares::{Share, Shares};
 use crate::backend::cpu::RasterContext;
 use crate::backend::cpu::geometry::transform::recip;

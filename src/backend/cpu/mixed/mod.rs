@@ -3,7 +3,7 @@
 //!
 //! [`look`] says what decides the colour of a face, [`find`] which pixels are mixed, [`points`] has their points,
 //! [`triangle`] says which of them a triangle covers, [`faces`] and [`crowd`] which face each sees, [`shares`] and [`color`] what
-//! colour that makes, and [`draw`] runs them for a band.
+//! colour that makes, and [`draw`] runs them for some [`pixels`] of a band after the other.
 //! Only the CPU has this stage.
 
 mod color;
@@ -14,6 +14,7 @@ pub(crate) mod find;
 pub(crate) mod look;
 #[cfg(target_arch = "x86_64")]
 mod outside_avx2;
+mod pixels;
 pub(crate) mod points;
 mod shares;
 mod triangle;

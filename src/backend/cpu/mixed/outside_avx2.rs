@@ -6,7 +6,6 @@
 use std::arch::x86_64::*;
 
 use super::points::{PLACES, PointSet};
-use super::triangle::Edge;
 use crate::backend::cpu::isa::LANES;
 use crate::backend::sample_partition::{GENERATORS, POINTS};
 
@@ -30,7 +29,7 @@ const TOGETHER: usize = 4 * LANES;
 /// As `triangle::outside`.
 #[inline]
 #[target_feature(enable = "avx2")]
-pub fn outside([c, dx, dy]: Edge, columns: [i32; 2]) -> PointSet {
+pub fn outside([c, dx, dy]: [i32; 3], columns: [i32; 2]) -> PointSet {
     let mut bits = [0_u32; POINTS / TOGETHER];
     let range = columns[0] as usize / TOGETHER..(columns[1] as usize / TOGETHER + 1).min(bits.len());
     let first = range.start * TOGETHER;

@@ -11,8 +11,8 @@ use std::time::Duration;
 use crate::limits::{Deadline, Stopped};
 
 /// Jobs and gangs of a kind that are drawn at a time: the commands of some are recorded while the device draws others.
-/// With 2 or 3, a device without much to do draws fewer pictures than if all jobs were drawn alone; with 6 or 8, a busy
-/// one draws fewer (docs/gpu-notes.md).
+/// With 2, a device without much to do draws fewer pictures than if all jobs were drawn alone; with 8, a busy one draws
+/// fewer (docs/gpu-notes.md).
 const LEADERS: usize = 4;
 
 /// Time between two looks of a waiting job at its deadline.
