@@ -113,7 +113,7 @@ fn pictures_of_many_workers_are_right_whoever_shares() {
         thread::scope(|scope| {
             let worker = |first: usize| {
                 let (mut renderer, mut drawn) = (GpuRenderer::new(gpu.clone()), 0);
-                for at in (0..48).map(|n| (first * 5 + n) % plans.len()) {
+                for at in (0..20).map(|n| (first * 5 + n) % plans.len()) {
                     // Some give up.
                     let deadline = if at % 11 == 3 { Deadline::after_polls(4) } else { Deadline::default() };
                     if let Ok(image) = renderer.draw(&plans[at], &deadline) {
@@ -123,7 +123,7 @@ fn pictures_of_many_workers_are_right_whoever_shares() {
                 }
                 drawn
             };
-            let workers: Vec<_> = (0..8).map(|first| scope.spawn(move || worker(first))).collect();
+            let workers: Vec<_> = (0..24).map(|first| scope.spawn(move || worker(first))).collect();
             workers.into_iter().map(|worker| worker.join().unwrap()).sum::<usize>()
         })
     });
