@@ -43,7 +43,7 @@ struct JobLine<'a> {
     kind: RequestKind,
     accepted_unix_ms: u64,
     accepted_at: String,
-    /// How often a worker has begun it.
+    /// Times that a worker has begun it.
     starts: u32,
     owner: &'a str,
     request_id: &'a str,
@@ -69,13 +69,8 @@ struct ResultLine<'a> {
     format: &'a str,
     backend: &'a str,
     /// A verdict whose request wanted 422 for it.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     has_failed: bool,
-}
-
-#[allow(clippy::trivially_copy_pass_by_ref)] // serde gives a reference
-fn is_false(value: &bool) -> bool {
-    !value
 }
 
 /// Prints the jobs, the oldest first.
@@ -178,7 +173,7 @@ impl<'a> JobLine<'a> {
     }
 }
 
-/// The start of the last line: how many jobs of each state there are, and how many meshes.
+/// The start of the last line: numbers of jobs, by state, and of meshes.
 fn summary(jobs: &[JobLine], meshes: usize) -> String {
     let count = |state| jobs.iter().filter(|job| job.state == state).count();
     let counts = STATES.iter().map(|state| (count(*state), state)).filter(|(count, _)| *count > 0);

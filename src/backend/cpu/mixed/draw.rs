@@ -15,7 +15,7 @@ use crate::backend::sample_partition::POINTS;
 pub struct MixedScratch {
     /// The band's mixed pixels.
     pub pixels: MixedPixels,
-    /// What the points of some of them see.
+    /// The faces that the points of some of them see.
     seen: Seen,
 }
 

@@ -9,7 +9,7 @@ use super::triangle::{Plane, PointTriangle};
 use crate::backend::cpu::isa::Isa;
 
 /// Faces of a pixel that have a place. A pixel of more is a [`Crowd`](super::crowd::Crowd).
-pub const FACES_MAX: usize = 16;
+const FACES_MAX: usize = 16;
 
 /// The faces that the points of a pixel see.
 pub struct PixelFaces {
@@ -80,7 +80,8 @@ impl PixelFaces {
     }
 
     /// Offers a triangle to the points of the pixel with this upper left corner, 1/256 px from the picture's centre.
-    /// False if there is no place for it.
+    /// False if there is no place for it. Then others may have lost points to it already, which are to be offered to it
+    /// again.
     #[inline(always)]
     pub fn offer(&mut self, isa: Isa, triangle: &mut PointTriangle, id: u32, corner: [i32; 2]) -> bool {
         if triangle.nearest < self.farthest {

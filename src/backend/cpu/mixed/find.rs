@@ -16,8 +16,8 @@ pub struct MixedPixels {
     pub columns: Vec<u16>,
     /// By pixel of the shown rows, and after the last: the number of mixed pixels before it.
     pub starts: Vec<u32>,
-    /// By row modulo 3: where colours do not go on, as bits of [`breaks`].
-    breaks: [Row<u8>; 3],
+    /// By row modulo 3: the places where colours do not go on, as bits of [`breaks`].
+    breaks: [Row; 3],
     /// Of one row.
     is_mixed: Vec<u8>,
 }
@@ -30,29 +30,27 @@ mod breaks {
     pub const LEFT: u8 = 2;
     /// The same from the pixel above.
     pub const UPPER: u8 = 4;
-    /// All of them.
-    pub const ALL: u8 = OWN | LEFT | UPPER;
 }
 
 /// Values of a row's pixels, and of one more on each side.
 #[derive(Default)]
-struct Row<T> {
+struct Row {
     /// Its number.
     y: Option<i32>,
     /// The first lies left of the picture.
-    values: Vec<T>,
+    values: Vec<u8>,
 }
 
-impl<T: Copy> Row<T> {
-    fn reset(&mut self, width: usize, value: T) {
+impl Row {
+    fn reset(&mut self, width: usize) {
         self.y = None;
         self.values.clear();
         self.values.reserve_exact(width + 2);
-        self.values.resize(width + 2, value);
+        self.values.resize(width + 2, 0);
     }
 
     fn bytes(&self) -> usize {
-        self.values.capacity() * size_of::<T>()
+        self.values.capacity()
     }
 }
 
@@ -64,7 +62,7 @@ impl MixedPixels {
         self.columns.reserve_exact(width * rows);
         self.starts.reserve_exact(width * rows + 1);
         for row in &mut self.breaks {
-            row.reset(width, 0);
+            row.reset(width);
         }
         self.is_mixed.clear();
         self.is_mixed.resize(width, 0);
@@ -120,10 +118,10 @@ impl MixedPixels {
     /// on the way from its first sample to theirs.
     #[inline(always)]
     fn join(&mut self, y: i32) {
-        use breaks::{ALL, LEFT, OWN, UPPER};
+        use breaks::{LEFT, OWN, UPPER};
         let [above, own, below] = [y - 1, y, y + 1].map(|y| &self.breaks[y.rem_euclid(3) as usize].values[..]);
         for (x, out) in self.is_mixed.iter_mut().enumerate() {
-            let beside = own[x] & OWN | own[x + 1] & ALL | own[x + 2] & (OWN | LEFT);
+            let beside = own[x] & OWN | own[x + 1] | own[x + 2] & (OWN | LEFT);
             *out = beside | above[x + 1] & OWN | below[x + 1] & (OWN | UPPER);
         }
     }
@@ -140,7 +138,7 @@ fn find_breaks(context: &RasterContext<'_>, band: &SampleBand, y: i32, pairs: &m
     }
 }
 
-/// Where colours break off in a pixel, and on the way to it.
+/// The places where colours break off in a pixel, and on the way to it.
 #[inline(always)]
 fn breaks_at(context: &RasterContext<'_>, band: &SampleBand, [x, y]: [i32; 2], pairs: &mut Pairs) -> u8 {
     let ids_of = |x: i32, y: i32| if band.has(x, y) { band.pixel(x, y).0 } else { &[NOTHING] };

@@ -15,7 +15,7 @@ const BROKEN: u32 = flags::FACE_NORMALS | flags::DERIVATIVE_NORMALS | flags::DEB
 
 /// Largest difference of two values, squared, over their sum, up to which faces look alike: normals that
 /// differ by about 12 degrees, or colours by about 22/255.
-pub const ALIKE: f32 = 1.0 / 64.0;
+const ALIKE: f32 = 1.0 / 64.0;
 
 /// Added to normals, so that all values are above 0.
 const NORMAL_SHIFT: f32 = 1.5;
@@ -41,29 +41,26 @@ const MANY_COLORED: u32 = flags::DERIVATIVE_NORMALS
 
 /// Ranges of what decides colours, of one face or of several.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+struct Look {
     /// Smallest values: of normals, or of colours.
     low: [f32; 3],
     /// Largest values.
     high: [f32; 3],
     /// Smallest and largest key. Faces with different keys never look alike.
     keys: [u32; 2],
-    /// Smallest and largest id.
-    ids: [u32; 2],
 }
 
 impl Look {
     /// The look of no face at all.
-    pub const NOTHING: Self =
-        Self { low: [0.0; 3], high: [0.0; 3], keys: [kinds::UNIQUE | NOTHING; 2], ids: [NOTHING; 2] };
+    const NOTHING: Self = Self { low: [0.0; 3], high: [0.0; 3], keys: [kinds::UNIQUE | NOTHING; 2] };
 
     /// The look of a face, or of the outline's triangle, or of nothing.
     #[inline(always)]
-    pub fn of(context: &RasterContext<'_>, id: u32) -> Self {
+    fn of(context: &RasterContext<'_>, id: u32) -> Self {
         if id == NOTHING {
             return Self::NOTHING;
         }
-        let of_one = |v: [f32; 3], key: u32| Self { low: v, high: v, keys: [key; 2], ids: [id; 2] };
+        let of_one = |v: [f32; 3], key: u32| Self { low: v, high: v, keys: [key; 2] };
         let unique = || of_one([0.0; 3], kinds::UNIQUE | id);
         if context.is_hull(id) {
             let color = context.plan.hull.as_ref().map(|hull| hull.color(id as usize));
@@ -90,26 +87,26 @@ impl Look {
 
     /// The look of these faces and those.
     #[inline(always)]
-    pub fn and(&self, other: &Self) -> Self {
+    fn and(&self, other: &Self) -> Self {
         let mut all = *self;
         for k in 0..3 {
             all.low[k] = if other.low[k] < all.low[k] { other.low[k] } else { all.low[k] };
             all.high[k] = if other.high[k] > all.high[k] { other.high[k] } else { all.high[k] };
         }
         all.keys = [all.keys[0].min(other.keys[0]), all.keys[1].max(other.keys[1])];
-        all.ids = [all.ids[0].min(other.ids[0]), all.ids[1].max(other.ids[1])];
         all
     }
 
-    /// True if there are several faces, or a face and nothing, whose colours may differ.
+    /// True if the colours of these faces and those hardly differ.
     #[inline(always)]
-    pub fn is_mixed(&self) -> bool {
-        let mut are_alike = self.keys[0] == self.keys[1];
+    fn is_like(&self, other: &Self) -> bool {
+        let all = self.and(other);
+        let mut is_like = all.keys[0] == all.keys[1];
         for k in 0..3 {
-            let difference = self.high[k] - self.low[k];
-            are_alike &= difference * difference <= ALIKE * (self.high[k] + self.low[k]);
+            let difference = all.high[k] - all.low[k];
+            is_like &= difference * difference <= ALIKE * (all.high[k] + all.low[k]);
         }
-        self.ids[0] != self.ids[1] && !are_alike
+        is_like
     }
 }
 
@@ -147,7 +144,7 @@ impl Pairs {
 
 #[inline(never)]
 fn goes_on(context: &RasterContext<'_>, [a, b]: [u32; 2]) -> bool {
-    !Look::of(context, a).and(&Look::of(context, b)).is_mixed() || are_linked(context, a, b)
+    Look::of(context, a).is_like(&Look::of(context, b)) || are_linked(context, a, b)
 }
 
 #[inline(always)]
@@ -171,7 +168,7 @@ fn corner_normals(surface: &SurfacePass<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
 /// True if two ids are the same, or smooth faces whose colours go on from one to the other: they show the same
 /// side, and share a corner with all that is interpolated between corners.
 #[inline(always)]
-pub fn are_linked(context: &RasterContext<'_>, a: u32, b: u32) -> bool {
+fn are_linked(context: &RasterContext<'_>, a: u32, b: u32) -> bool {
     if a == b {
         return true;
     }

@@ -1,9 +1,9 @@
 //! Stage mixed, per pixel, of plans with adaptive samples: pixels near which faces meet that differ in
 //! colour are drawn again, from 256 coverage points each.
 //!
-//! [`look`] says what decides the colour of a face, [`find`] which pixels are mixed, [`points`] has their points,
-//! [`triangle`] says which of them a triangle covers, [`faces`] and [`crowd`] which face each sees, [`shares`] and [`color`] what
-//! colour that makes, and [`draw`] runs them for some [`pixels`] of a band after the other.
+//! [`look`] says what decides the colour of a face, [`find`] which pixels are mixed. [`points`] has their points,
+//! [`triangle`] says which of them a triangle covers, [`faces`] and [`crowd`] which face each sees, [`shares`] and
+//! [`color`] what colour that makes. [`draw`] runs them for a band, for some of its [`pixels`] at a time.
 //! Only the CPU has this stage.
 
 mod color;

@@ -1,4 +1,4 @@
-//! Stage mixed: which points lie outside an edge, in AVX2 instructions. Compilers make much longer code of
+//! Stage mixed: the points that lie outside an edge, in AVX2 instructions. Compilers make much longer code of
 //! "a bit for each sign".
 
 #![allow(unsafe_code)]
@@ -29,19 +29,17 @@ const TOGETHER: usize = 4 * LANES;
 /// As `triangle::outside`.
 #[inline]
 #[target_feature(enable = "avx2")]
-pub fn outside([c, dx, dy]: [i32; 3], columns: [i32; 2]) -> PointSet {
+pub fn outside([c, dx, dy]: [i32; 3]) -> PointSet {
     let mut bits = [0_u32; POINTS / TOGETHER];
-    let range = columns[0] as usize / TOGETHER..(columns[1] as usize / TOGETHER + 1).min(bits.len());
-    let first = range.start * TOGETHER;
     // All sums are modulo 2^32.
     let along = |change: i32, places: &[i32; POINTS]| {
-        _mm256_mullo_epi32(_mm256_set1_epi32(change), load(&places.as_chunks::<LANES>().0[first / LANES]))
+        _mm256_mullo_epi32(_mm256_set1_epi32(change), load(&places.as_chunks::<LANES>().0[0]))
     };
     let start = _mm256_sub_epi32(along(dx, &PLACES[1]), along(dy, &PLACES[0]));
     let mut value = _mm256_add_epi32(_mm256_set1_epi32(c), start);
     let step = _mm256_set1_epi32(dx.wrapping_mul(ROWS).wrapping_sub(dy.wrapping_mul(LANES as i32)));
     let pixel = _mm256_set1_epi32(dx.wrapping_mul(POINTS as i32));
-    for (bits, wraps) in bits[range.clone()].iter_mut().zip(&WRAPS.as_chunks::<4>().0[range]) {
+    for (bits, wraps) in bits.iter_mut().zip(WRAPS.as_chunks::<4>().0) {
         let mut four = [value; 4];
         for (own, wraps) in four.iter_mut().zip(wraps) {
             *own = value;

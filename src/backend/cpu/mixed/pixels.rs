@@ -1,4 +1,4 @@
-//! Stage mixed: mixed pixels that are drawn together, and what their points see.
+//! Stage mixed: mixed pixels that are drawn together, and the faces that their points see.
 
 use super::crowd::Crowd;
 use super::faces::PixelFaces;
@@ -12,7 +12,7 @@ use crate::backend::cpu::geometry::transform::ScreenVertex;
 /// Pixels whose faces are in memory at a time: less than 1 MiB, half of a common second-level cache.
 pub const AT_ONCE: usize = 512;
 
-/// What the points of some pixels see.
+/// The faces that the points of some pixels see, and the colours that these make.
 #[derive(Default)]
 pub struct Seen {
     /// By pixel: its faces.
@@ -127,7 +127,7 @@ impl<'a> SomePixels<'a> {
         [u32::from(self.pixels.columns[self.first + i]), *row]
     }
 
-    /// What they see.
+    /// The faces that they see, and their colours.
     pub fn seen(&self) -> &Seen {
         self.seen
     }

@@ -56,20 +56,6 @@ impl PointSet {
     /// All.
     pub const ALL: Self = Self([!0; WORDS]);
 
-    /// Those in the columns from the first to the last, one in each.
-    #[inline(always)]
-    pub fn between([first, last]: [i32; 2]) -> Self {
-        let mut set = Self::NONE;
-        for w in 0..WORDS {
-            let low = (first - (WORD * w) as i32).max(0);
-            let high = (last - (WORD * w) as i32).min(WORD as i32 - 1);
-            if low <= high {
-                set.0[w] = !0 >> (WORD as i32 - 1 - (high - low)) << low;
-            }
-        }
-        set
-    }
-
     /// The points of this set and the other.
     #[inline(always)]
     pub fn and(mut self, other: Self) -> Self {
@@ -192,16 +178,6 @@ impl PointSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn columns_have_a_point_each() {
-        for first in 0..POINTS as i32 {
-            for last in (first..POINTS as i32).step_by(7) {
-                let want = PointSet::of(|i| (first..=last).contains(&PLACES[0][i]));
-                assert_eq!(PointSet::between([first, last]), want, "{first} to {last}");
-            }
-        }
-    }
 
     #[test]
     fn sets_know_their_points() {

@@ -17,8 +17,6 @@ pub struct PointTriangle {
     dx: [i32; 3],
     dy: [i32; 3],
     bias: [i64; 3],
-    /// Its leftmost and rightmost corner.
-    ends: [i32; 2],
     /// The nearest depth of its corners.
     pub nearest: f32,
     /// Of its depth: found when a pixel asks for it.
@@ -26,17 +24,13 @@ pub struct PointTriangle {
 }
 
 /// An edge function in a pixel: its value at the first point, halved, and its change per row and, negative, per column.
-pub type Edge = [i32; 3];
+type Edge = [i32; 3];
 
 /// The edge function of an edge that has all of a pixel inside.
-pub const NO_EDGE: Edge = [0; 3];
+const NO_EDGE: Edge = [0; 3];
 
 /// A triangle in a pixel, without its depth.
-pub struct Outline {
-    /// First and last column that it touches.
-    columns: [i32; 2],
-    edges: [Edge; 3],
-}
+pub struct Outline([Edge; 3]);
 
 /// The depth of a triangle in a pixel.
 #[derive(Clone, Copy, Debug)]
@@ -65,29 +59,13 @@ impl PointTriangle {
             (dx[k], dy[k]) = (x[(k + 1) % 3] - x[k], y[(k + 1) % 3] - y[k]);
             bias[k] = if dy[k] < 0 || (dy[k] == 0 && dx[k] > 0) { 0 } else { -1 };
         }
-        let ends = [a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x)];
-        Some(Self { corners: *corners, x, y, dx, dy, bias, ends, nearest: a.z.max(b.z).max(c.z), setup: None })
+        Some(Self { corners: *corners, x, y, dx, dy, bias, nearest: a.z.max(b.z).max(c.z), setup: None })
     }
 
-    /// First and last column of points that may be inside, in the pixel with this upper left corner, 1/256 px from the
-    /// picture's centre; None if there is none.
-    #[inline(always)]
-    fn columns_at(&self, corner: [i32; 2]) -> Option<[i32; 2]> {
-        let first = (self.ends[0] - corner[0]).max(0);
-        let last = (self.ends[1] - 1 - corner[0]).min(PLACE_MAX);
-        (first <= last).then_some([first, last])
-    }
-
-    /// What the triangle is in the pixel with this corner; None where no point of the pixel is inside.
+    /// The triangle in the pixel with this upper left corner, 1/256 px from the picture's centre; None where no point of the
+    /// pixel is inside.
     #[inline(always)]
     pub fn at(&self, corner: [i32; 2]) -> Option<Outline> {
-        let columns = self.columns_at(corner)?;
-        Some(Outline { columns, edges: self.edges_at(corner)? })
-    }
-
-    /// Edge functions in the pixel with this corner; None where no point of the pixel is inside.
-    #[inline(always)]
-    fn edges_at(&self, corner: [i32; 2]) -> Option<[Edge; 3]> {
         const MAX: i64 = PLACE_MAX as i64;
         let mut edges = [NO_EDGE; 3];
         for k in 0..3 {
@@ -101,7 +79,7 @@ impl PointTriangle {
                 edges[k] = [c.clamp(-(1 << 30), 1 << 30) as i32, self.dx[k], self.dy[k]];
             }
         }
-        Some(edges)
+        Some(Outline(edges))
     }
 
     /// The depth in the pixel with this corner.
@@ -152,33 +130,32 @@ impl Outline {
     /// The points inside.
     #[inline(always)]
     pub fn inside(&self, isa: Isa) -> PointSet {
-        // A column has one point, of the same number.
-        let mut inside = PointSet::between(self.columns);
-        for edge in &self.edges {
-            if *edge != NO_EDGE {
-                inside = inside.without(outside(isa, *edge, self.columns));
+        let mut inside = PointSet::ALL;
+        for edge in self.0 {
+            if edge != NO_EDGE {
+                inside = inside.without(outside(isa, edge));
             }
         }
         inside
     }
 }
 
-/// The points that lie outside an edge, of those in the columns from the first to the last, and any others.
+/// The points that lie outside an edge.
 #[inline(always)]
 #[allow(unsafe_code)]
-fn outside(isa: Isa, edge: Edge, columns: [i32; 2]) -> PointSet {
+fn outside(isa: Isa, edge: Edge) -> PointSet {
     #[cfg(target_arch = "x86_64")]
     if isa.has_avx2() {
         // SAFETY: `has_avx2` is true where the processor has AVX2.
-        return unsafe { super::outside_avx2::outside(edge, columns) };
+        return unsafe { super::outside_avx2::outside(edge) };
     }
-    let _ = (isa, columns);
+    let _ = isa;
     outside_plainly(edge)
 }
 
 /// The points that lie outside an edge, one by one.
 #[inline(always)]
-pub fn outside_plainly([c, dx, dy]: Edge) -> PointSet {
+fn outside_plainly([c, dx, dy]: Edge) -> PointSet {
     PointSet::of(|i| c.wrapping_add(dx.wrapping_mul(PLACES[1][i]).wrapping_sub(dy.wrapping_mul(PLACES[0][i]))) < 0)
 }
 
@@ -205,13 +182,8 @@ mod tests {
             let c = (next(&mut state) >> shift).clamp(-(1 << 30), 1 << 30);
             let want = outside_plainly([c, dx, dy]);
             mixed += usize::from(want != PointSet::NONE && want != PointSet::ALL);
-            let first = next(&mut state) & PLACE_MAX;
-            for columns in [[0, PLACE_MAX], [first, PLACE_MAX], [first / 2, first]] {
-                let all = PointSet::between(columns);
-                for isa in Isa::available() {
-                    let found = outside(isa, [c, dx, dy], columns).and(all);
-                    assert_eq!(found, want.and(all), "{isa:?} {c} {dx} {dy} {columns:?}");
-                }
+            for isa in Isa::available() {
+                assert_eq!(outside(isa, [c, dx, dy]), want, "{isa:?} {c} {dx} {dy}");
             }
         }
         assert!(mixed > 2_000, "{mixed}");

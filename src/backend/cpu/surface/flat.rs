@@ -72,7 +72,7 @@ impl FlatColors {
     #[inline(always)]
     pub fn known(&self, id: u32) -> Option<[f32; 4]> {
         let color = self.of(id);
-        (!color[0].is_nan()).then_some(color)
+        (!color[3].is_nan()).then_some(color)
     }
 
     #[inline(always)]
